@@ -11,8 +11,8 @@ from pathlib import Path
 import numpy as np
 
 from wristctl.arrays import Array
-from wristctl.commands.compare.ranking import answer
 from wristctl.commands.printed_table import degrees
+from wristctl.commands.ranking_answer import advice, do_not_use, names_of
 from wristctl.comparison.bootstrap import paired_ratio, penalised, plain
 from wristctl.comparison.world_ranking import WorldRanking, rank, world_scores
 from wristctl.config.controller_row import Row
@@ -52,7 +52,8 @@ def _ranking(study: Study, family: str) -> list[str]:
 
 
 def _table(found: WorldRanking) -> list[str]:
-    lines = [f"## {found.name}: {found.family.about}", "", answer(found), ""]
+    said = f"{advice([found])} {do_not_use([found], names_of([found]))}"
+    lines = [f"## {found.name}: {found.family.about}", "", said, ""]
     lines += [
         "| group | row | RMSE [deg] | times better than feedforward | fails, swings |",
         "| --- | --- | --- | --- | --- |",

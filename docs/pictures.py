@@ -10,14 +10,15 @@ import cv2
 import numpy as np
 from matplotlib.figure import Figure
 
-from wristctl.commands.compare.class_figures import answer_figure
 from wristctl.commands.hysteresis.figures import loops as loops_by_speed
-from wristctl.comparison.class_standing import class_standings
+from wristctl.commands.ranking_drawing import places_of
 from wristctl.comparison.combinations import ComparedRow, compare
+from wristctl.comparison.controller_ranking import class_rankings
 from wristctl.comparison.paper import T2
 from wristctl.config.camera import Gates, Markers, SceneSettings
 from wristctl.config.wrist import WristParameters
 from wristctl.plotting.loop_figures import errors
+from wristctl.plotting.ranking_figures import answer_figure
 from wristctl.plotting.wrist_drawing import directions
 from wristctl.records.formats import write_figure
 from wristctl.simulation.hysteresis import loops
@@ -132,7 +133,8 @@ def answer() -> None:
     rows = tuple(row for row in study.compare.rows if row.gains != "tuned")
     chosen = study.compare.model_copy(update={"rows": rows})
     results = compare(study.model_copy(update={"compare": chosen}))
-    keep("answer", answer_figure(class_standings(results, chosen, study.wrist)))
+    rankings = class_rankings(results, chosen, study.wrist)
+    keep("answer", answer_figure(rankings, places_of(rankings)))
 
 
 def main() -> None:

@@ -19,9 +19,9 @@ FIGURES = {"laws": "Every law on every rig", "terms": "What each term of a law b
 
 
 def answer_of(run: Run) -> list[str]:
-    """Its paragraphs, each on one line."""
-    lines = json.loads((run.path / "overview.json").read_text(encoding="utf-8"))["answer"]
-    return [" ".join(each.split("\n")) for each in "\n".join(lines).split("\n\n")]
+    """The lines of its first screen, as a terminal shows them."""
+    lines: list[str] = json.loads((run.path / "overview.json").read_text(encoding="utf-8"))["answer"]
+    return ["```", *lines, "```"]
 
 
 def ranking(run: Run, family: str) -> list[str]:
@@ -71,7 +71,8 @@ def main() -> None:
     lines = [
         "# Which law for which rig",
         "",
-        *(part for said in answer_of(run) for part in (said, "")),
+        *answer_of(run),
+        "",
         *(part for each in pictures for part in (each, "")),
         f"`{command}`, {minutes:.0f} minutes on two cores, {run.id}. Its result, the same by any executor and",
         f"after any interruption, has the hash `{manifest['result_sha256']}`. What it costs",

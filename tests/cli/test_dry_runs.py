@@ -45,7 +45,7 @@ LONG = ("--set", "wrist.length=0.12", "--set")
         (("tune", "--set", "scenarios=[{reference: {angle_deg: 170}}]"), "tune.scenarios.0.reference.angle_deg"),
         (("tune", "--set", "scenarios=[{reference: {inverse: network}}]"), "--network RUN"),
         (("compare", "--set", "references=[{angle_deg: 170}]"), "compare.references.0.angle_deg - fix"),
-        (("compare",), "--network RUN"),
+        (("compare", "--set", "inverses=[network]"), "--network RUN"),
         (("hw-run", "--set", "reference.angle_deg=170"), "hw-run.reference.angle_deg - fix: ask for less"),
         (("hw-run", "--set", "reference.inverse=network"), "hw-run.reference.inverse - fix: --network RUN"),
         (("hw-run", "--set", "push.force=1e6"), "hw-run.push.force - fix: is that meant? go on with --force"),
@@ -88,6 +88,7 @@ def test_a_dry_run_says_which_values_a_leaf_may_have(call: Call) -> None:
 
 def test_a_dry_run_of_compare_counts_the_directions_too(call: Call) -> None:
     code, out, _ = call("compare", "--dry-run", "--set", "directions=[ulnar, radial, flexion, extension]",
+                        "--set", "loops={a: {}, b: {}, c: {}}", "--set", "references=[{kind: step}, {}, {kind: sine}]",
                         "--set", "inverses=[none]", "--set", "controllers=[{controller: feedforward}]")  # fmt: skip
     assert code == 0 and "# 36 rollouts of 5 s\n" in out
 
@@ -110,10 +111,11 @@ def test_a_dry_run_of_compare_counts_a_search_of_its_own_too(call: Call) -> None
 def test_a_dry_run_counts_repetitions_where_they_can_differ(call: Call) -> None:
     one = "{plant_segments: 1}"
     seen = "{plant_segments: 1, sensor: {level: camera}}"
+    few = "rows: [{controller: smc, gains: printed}], references: [{kind: step}, {}, {duration: 2.0}]"
     for command, more, said in (
         ("simulate", f"loop={seen}", "# 8 rollouts of 5 s"),
         ("simulate", f"loop={one}", "# one rollout of 5 s"),
-        ("compare", f"compare={{inverses: [none], loops: {{a: {one}, b: {seen}}}}}", "# 27 rollouts of 5 s"),
+        ("compare", f"compare={{inverses: [none], loops: {{a: {one}, b: {seen}}}, {few}}}", "# 27 rollouts of 5 s"),
         ("tune", f"loops={{four-segments: {seen}}}", "# 38400 rollouts of 5 s for each of smc"),
     ):
         code, out, _ = call(command, "--dry-run", "--set", "repetitions=8", "--set", more)

@@ -99,7 +99,7 @@ def test_tuned_gains_reach_compare_and_simulate(call: Call) -> None:
     assert {name: best[name] for name in gains["smc"]} == gains["smc"] and len(history) == 12
     assert best["objective"] == best["validated"] <= history["objective"].min()  # nothing is random here
     code, out, _ = call(*COMPARE, "--set", "controllers=[{controller: pid, gains: tuned}]", "--tuned", "latest:tune")
-    assert code == 0 and "1. pid" in out
+    assert code == 0 and "use pid/tuned" in out
     compared = open_run("latest:compare")
     assert [entry["run"] for entry in compared.manifest.model_dump()["inputs"]] == [tuned.id]
     assert call("simulate", "--gains", "tuned", "--tuned", tuned.id, "--set", "horizon=0.5")[0] == 0
@@ -149,7 +149,7 @@ def test_gains_tuned_on_what_they_would_be_judged_on_are_refused(call: Call) -> 
         (("tune", "--set", "optimiser=differential-evolution", "--candidates", "2"), "at least 3 candidates, not 2"),
         (("tune", "--set", "scenarios=[{loop: four-segmets}]"), "did you mean 'four-segments'?"),
         (("compare", "--set", "controllers=[{controller: pdi, gains: printed}]"), "did you mean 'pid'?"),
-        (("compare",), "--network RUN"),
+        (("compare", "--set", "inverses=[network]"), "--network RUN"),
     ],
 )
 def test_what_the_user_got_wrong_is_one_line_and_no_run_that_looks_complete(
@@ -282,10 +282,10 @@ def test_gains_are_searched_on_worlds_and_rows_ranked_on_others_with_the_answer_
         "compare", *SOFT, "--set", "worlds={family: soft, draws: 12}", "--set", rows, "--tuned", tuned.id
     )
     assert code == 0, err
-    best = out.splitlines()[2]
-    assert best.startswith("soft (12 worlds): 1. ct-dob") and best.index("pd-ff") < best.index("feedforward")
+    (best,) = [line for line in out.splitlines() if line.startswith("soft (12) ")]
+    assert best.index("ct-dob") < best.index("pd-ff") and "use ct-dob/tuned" in out.splitlines()[0]
     run = open_run("latest:compare")
-    assert (run.path / "README.md").read_text().index("1. ct-dob") < 2000
+    assert (run.path / "README.md").read_text().index("use ct-dob/tuned") < 2000
     assert run.problems() == [] and len(run.data("worlds")) == 3 * 12
     ranking = run.data("ranking")
     assert ranking["row"].tolist() == ["ct-dob/tuned", "pd-ff/default", "feedforward/default"]
@@ -330,4 +330,5 @@ def test_where_every_law_fails_or_swings_the_answer_says_so_and_the_table_stays(
     rows = "controllers=[{controller: pd-ff}, {controller: feedforward}]"
     hard = ("--set", wild, "--set", "worlds={family: wild, draws: 8}", "--set", rows)
     code, out, _ = call("compare", *hard)
-    assert "nothing has a place" in out and "fails: pd-ff, feedforward" in out and code == 3
+    assert "use none of these" in out and "eave their range: pd-ff and feedforward (each in 8 of 8 worlds)" in out
+    assert code == 3

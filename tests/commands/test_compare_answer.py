@@ -1,4 +1,4 @@
-"""The answer in words: who is best where, who fails, what the paper's law ranks, within a terminal."""
+"""The answer of a comparison: what to use where, what not and why, what of the paper holds, on one screen."""
 
 from __future__ import annotations
 
@@ -10,17 +10,24 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from wristctl.commands.compare.answer import LADDER, LINES, answer_lines, wrapped
+from wristctl.commands.compare.answer import answer_of
 from wristctl.commands.printed_table import COLUMNS, two
-from wristctl.comparison.bootstrap import geometric_mean, penalised
-from wristctl.comparison.class_standing import ClassStanding
+from wristctl.commands.ranking_answer import LINES, condition, names_of, ranking_table, winner
+from wristctl.commands.ranking_tables import answer_tables
 from wristctl.comparison.combinations import CLASSES
+from wristctl.comparison.controller_ranking import Ranking, Traits
 from wristctl.comparison.model_confidence_set import LEAST_PAIRS
 from wristctl.comparison.tie_groups import standing
 
-ROWS = ("mrac/default", "smc/exchanged", "smc/printed", "pid/printed", "gvsc/default", "nc/default")
-RUNGS = tuple(f"{name}/default" for name in LADDER)
-RMSE = dict(zip((*ROWS, *RUNGS), (1e-5, 4e-3, 0.3, 3e-3, 5e-3, 2e-3, 1e-1, 1e-3, 2e-4, 1e-4, 1e-4), strict=True))
+RMSE = {
+    "mrac/default": 1e-4, "smc/exchanged": 4e-3, "smc/printed": 0.3, "pid/printed": 3e-3, "gvsc/default": 5e-3,
+    "nc/default": 2e-3, "feedforward/default": 1e-1, "pd-ff/default": 1e-3, "pid-ff/default": 5e-4,
+}  # fmt: skip
+TRAITS = {
+    "camera and tendons": Traits(True, True, True),
+    "pushed": Traits(load=True),
+    "off-nominal": Traits(unknown=True),
+}
 
 
 def stands(
@@ -32,13 +39,16 @@ def stands(
     motions: int = 12,
     chatters: tuple[str, ...] = (),
     unconverged: tuple[str, ...] = (),
-) -> ClassStanding:
-    """Rows on so many motions, each its RMSE times what all share."""
+    failed: dict[str, int] | None = None,
+) -> Ranking:
+    """Rows on so many motions, each its RMSE times what all share; `failed` rows in the first so many motions."""
     errors = RMSE if rmse is None else rmse
     rng = np.random.default_rng(5)
     shared, own = rng.normal(0.0, 0.5, motions), 0.02 * rng.standard_normal((len(errors), motions))
     scores = np.array(list(errors.values()))[:, None] * np.exp(shared + own)
     labels = list(errors)
+    for label, count in (failed or {}).items():
+        scores[labels.index(label), :count] = np.inf
     swing = np.array([0.05 if label in swings else 0.0 for label in labels])
     peak = np.array([70.0 if label in strained else 0.0 for label in labels])
     short = np.array([motions if label in away else 0 for label in labels])
@@ -46,95 +56,160 @@ def stands(
     drifts = np.array([label in unconverged for label in labels])
     holds = {"limit cycle": swing > 0.0, "chatters": slams > 0.0, "not converged": drifts}
     swinging = np.repeat(np.any(list(holds.values()), axis=0)[:, None], motions, axis=1)
-    return ClassStanding(
-        name, f"{motions} motions", labels, ["a"], scores,
-        standing(scores, swinging, 0, short=short > 0, unphysical=peak > 0.0),
-        [geometric_mean(each, 0) for each in penalised(scores)], swing, peak, short, motions, slams,
-        {name: motions * each for name, each in holds.items()},
+    steps = name.endswith(", steps")
+    return Ranking(
+        name=name, unit="case", labels=labels, scores=scores,
+        standing=standing(scores, swinging, 0, short=short > 0, unphysical=peak > 0.0),
+        swing=swing, chatter=slams, peak=peak, away=short, motions=motions, loops=["a"],
+        unsound={kind: np.isfinite(scores).sum(axis=1) * flags for kind, flags in holds.items()},
+        traits=TRAITS.get(name.removesuffix(", steps"), Traits())._replace(jumps=steps),
     )  # fmt: skip
 
 
-def test_the_best_stands_first_with_its_interval_and_what_it_buys() -> None:
-    lines = answer_lines([stands()])
-    assert lines[2].startswith("sampled (12 motions): ") and "RMSE [deg]" in lines[0]
-    assert re.search(r"1\. mrac 0\.001 \[<0\.001, \S+\]", lines[2])
-    said = " ".join(" ".join(lines).split())
-    assert re.search(r"errors over mrac's: (pid|smc)-dob x5\.\d+, feedforward x5\d00 \[", said), "of 0.001 deg"
-    assert "smc/exchanged 7/10" in said, "of the 10 places of 11 rows, one of which two share"
+def told(*rankings: Ranking) -> str:
+    """The answer in one line."""
+    answer = answer_of(rankings)
+    assert answer is not None
+    return " ".join(" ".join(answer.lines()).split())
 
 
-def test_the_paper_is_answered_by_name() -> None:
-    """What becomes of printed gains in each class adds up to all classes."""
-    said = " ".join(answer_lines([stands(away=("smc/printed",)), stands("pushed", swings=("pid/printed",))]))
-    assert "smc does not arrive in 1, has a place in 1 of 2 classes" in said
-    assert "pid has a place in 1, fails, swings or chatters in 1" in said
-    assert "the paper's order (least RMSE first: smc, mrac, pid, gvsc, nc) holds in 0 of 2 classes" in said
+def test_a_condition_is_a_line_with_the_best_the_next_and_the_gain_over_feedforward() -> None:
+    """Errors and ratios are those of the rankings; the first sentence names the same controller."""
+    one = stands()
+    table = ranking_table([one], names_of([one]))
+    (line,) = table.rows
+    assert line[:2] == ("sampled (12)", f"mrac {two(np.degrees(one.means[0].value))}")
+    assert line[3].startswith("pid-ff ") and line[5] == "0 of 9"
+    ratio = one.means[one.labels.index("feedforward/default")].value / one.means[0].value
+    assert line[4].endswith(f"({two(ratio)})")
+    assert "use mrac/default: RMSE" in told(one) and f"{two(ratio)} times less than feedforward" in told(one)
+
+
+def test_the_rig_is_answered_first_and_what_is_best_elsewhere_is_warned_of_where_it_swings() -> None:
+    rig = stands("camera and tendons", swings=("mrac/default", "pid/printed"))
+    said = told(stands(), rig, stands("pushed"))
+    assert said.index("use pid-ff/default") < said.index("use mrac/default")
+    warned = said[said.index("use mrac/default") :]
+    assert "(sampled, push) use mrac/default" in said
+    assert re.search(r"a camera it swings by 2\.9 deg in 12 of 12 cases", warned)
+    avoided = said[said.index("Do not use") :]
+    assert all(f"{name} by 2.9 deg" in avoided for name in ("mrac", "pid/printed"))
+
+
+def test_every_fault_is_named_with_its_size_and_its_number_of_cases() -> None:
+    said = told(
+        stands(
+            swings=("smc/exchanged",), away=("smc/printed",), strained=("gvsc/default",), chatters=("pid/printed",),
+            unconverged=("nc/default",), failed={"pd-ff/default": 5},
+        )
+    )  # fmt: skip
+    avoided = said[said.index("Do not use") : said.index("The paper")].lower()
+    for fact in (
+        "swings: smc/exchanged by 2.9 deg (in 12 of 12 cases)",
+        "does not arrive: smc/printed (in 12 of 12 motions)",
+        "pulls harder than a tendon bears: gvsc with 70 n",
+        "chatters: pid/printed 300 times a second (in 12 of 12 cases)",
+        "changes with the integration step: nc (in 12 of 12 cases)",
+        "leaves its range: pd-ff (in 5 of 12 cases)",
+    ):
+        assert fact in avoided
+    assert "6 of 9" in said, "as many in the table"
+
+
+def test_what_must_not_be_used_without_a_rig_is_named_after_the_rigs_with_its_conditions() -> None:
+    said = told(
+        stands(away=("smc/printed",), swings=("nc/default",)), stands("pushed", swings=("nc/default",)),
+        stands("camera and tendons", swings=("mrac/default",)),
+    )  # fmt: skip
+    rig, elsewhere = said[said.index("Do not use") : said.index("The paper")].split("Elsewhere")
+    assert "mrac by 2.9 deg" in rig and "nc" not in rig.split() and "mrac" not in elsewhere
+    assert "smc/printed in sampled;" in elsewhere and "nc in sampled and push." in elsewhere
+
+
+def test_a_row_that_fails_and_swings_is_named_once_by_the_graver_fault() -> None:
+    said = told(stands(swings=("pd-ff/default",), failed={"pd-ff/default": 5}))
+    avoided = said[said.index("Do not use") : said.index("The paper")]
+    assert avoided.count("pd-ff") == 1 and "eaves its range: pd-ff (in 5 of 12 cases)" in avoided
+
+
+def test_the_paper_is_answered_by_its_gains_and_the_conditions_in_which_they_work() -> None:
+    said = told(
+        stands("ideal", away=("smc/printed",), swings=("smc/exchanged",)),
+        stands(away=("smc/printed",), chatters=("smc/exchanged",)),
+        stands("pushed", swings=("pid/printed", "smc/exchanged"), failed={"smc/printed": 12}),
+        stands("camera and tendons", rmse=RMSE | {"smc/printed": 0.01}, swings=("smc/exchanged",)),
+    )
+    paper = said[said.index("The paper.") :]
+    assert re.search(r"smc/printed works in motors \+ camera \([\d.]+ deg\), leaves its range in push", paper)
+    assert "does not arrive in the others" in paper
+    assert re.search(
+        r"pid/printed works in ideal .*, sampled .* and motors \+ camera .* swings or chatters in push", paper
+    )
+    assert "smc/exchanged (P1 and P2 exchanged) swings or chatters in every condition" in paper
+    assert "smc < mrac < pid < gvsc < nc holds in none of 4 conditions" in paper
+
+
+def test_the_papers_ranking_holds_where_it_does() -> None:
     order = dict(
         zip(("smc/tuned", "mrac/default", "pid/tuned", "gvsc/default", "nc/default"), (1, 2, 3, 4, 5), strict=True)
     )
     theirs = stands(rmse={label: 1e-3 * value for label, value in order.items()})
-    assert "holds in 1 of 2 classes (sampled)" in " ".join(answer_lines([theirs, stands("pushed")]))
-    both = {"smc/printed": 1e-3, "feedforward/default": 1e-2}
-    assert "smc has a place in 1 of 1 classes" in " ".join(answer_lines([stands(rmse=both)]))
+    assert "holds in sampled alone" in told(theirs, stands("pushed"))
+    assert "holds in" not in told(stands(rmse={"smc/printed": 1e-3, "feedforward/default": 1e-2}))
 
 
-def test_limit_cycles_failures_and_short_ends_are_named_with_how_often() -> None:
-    one = stands(swings=("pid/printed",), away=("smc/printed",), strained=("gvsc/default",))
-    lost = " ".join(answer_lines([one]))
-    assert "limit cycle: pid/printed +-2.9 deg; does not arrive: smc/printed; no tendon bears it: gvsc 70 N" in lost
-    scores, swings = one.scores.copy(), np.zeros(one.scores.shape, bool)
-    scores[4, :5], swings[4, 3:8] = np.inf, True
-    counts = {"limit cycle": np.full(11, 3), "chatters": np.zeros(11, int), "not converged": np.zeros(11, int)}
-    half = replace(one, scores=scores, standing=standing(scores, swings, 0), swing=np.full(11, 0.05), unsound=counts)
-    assert "fails: gvsc 5/12 (+-2.9 deg in 3/12)" in " ".join(answer_lines([half])), "each motion once"
-
-
-def test_rows_that_chatter_or_have_not_converged_stand_in_no_place_and_are_named_so() -> None:
-    one = stands(swings=("smc/printed",), chatters=("pid/printed", "smc/printed"), unconverged=("gvsc/default",))
-    said = " ".join(" ".join(answer_lines([one])).split())
-    assert "limit cycle: smc/printed +-2.9 deg (chatters 300/s in 12/12)" in said
-    assert "chatters: pid/printed 300/s; not converged: gvsc" in said and "+-0 deg" not in said
-    assert {one.standing.fate(one.labels.index(row)) for row in ("pid/printed", "gvsc/default")} == {"unreliable"}
-
-
-def test_rows_that_tie_are_joined() -> None:
+def test_what_cannot_be_told_apart_is_named_and_counted() -> None:
     alike = {"a/default": 1e-3, "b/default": 1e-3, "c/default": 5e-3}
-    (line,) = [each for each in answer_lines([stands(rmse=alike)]) if "1." in each]
-    assert re.search(r"1\. [ab] \S+ \[.*\] = [ab] \S+ 2\. c", line.replace(";", ""))
+    one = stands(rmse=alike)
+    assert ranking_table([one], names_of([one])).rows[0][2] == "1 more"
+    said = told(one)
+    assert re.search(r"use (a/default or b|b/default or a)/default", said)
+    assert re.search(r"As good as the best. Sampled: [ab]\.", said)
+    many = stands(rmse={f"c{number}/default": 1e-3 for number in range(6)})
+    assert all(f"c{number}" in told(many) for number in range(6))
 
 
-def test_what_too_few_motions_tell_is_no_tie_and_has_no_number() -> None:
-    apart = {"a/default": 1e-3, "b/default": 1e-1}
-    said = " ".join(" ".join(answer_lines([stands(rmse=apart, motions=3)])).split())
-    block = said[said.index("sampled (3 motions)") :]
-    assert f"n=3, {LEAST_PAIRS} at least" in block and "--repetitions" in block
-    assert " = " not in block and "1." not in block.replace("1.0", "") and "a 0.0" in block and "b " in block
-
-
-def test_errors_that_nobody_can_measure_are_equal_and_said_to_be_less() -> None:
+def test_of_equal_errors_the_one_is_best_that_is_so_in_most_conditions() -> None:
     tiny = {"a/default": 1e-9, "b/default": 1e-7, "c/default": 5e-3}
-    (line,) = [each for each in answer_lines([stands(rmse=tiny)]) if "1." in each]
-    assert "1. a <0.001 = b <0.001" in line
-    said = " ".join(answer_lines([stands(rmse=tiny)]))
-    assert "errors over 0.001 deg: c x2" in said and "a's" not in said, "no ratio of what nobody can measure"
+    other = stands("pushed", rmse={"a/default": 5e-3, "b/default": 1e-9, "c/default": 5e-3})
+    one = stands(rmse=tiny)
+    assert one.labels[winner(one, [one, other]) or 0] == "b/default" and winner(one) == 0
+    assert "b <0.001" in told(one, other) and "use b/default: RMSE <0.001 deg" in told(one, other)
 
 
-def test_rows_shown_left_out_and_without_a_place_add_up_to_all_rows() -> None:
-    """However little room there is."""
-    swinging, away, strained = ("pid/printed", "nc/default"), ("smc/printed",), ("gvsc/default",)
-    for classes in (1, 5, 10):
-        names = [*CLASSES, *(f"{name}, steps" for name in CLASSES)][:classes]
-        lines = answer_lines([stands(name, None, swinging, away, strained) for name in names])
-        assert len(lines) <= LINES and all(any(line.startswith(f"{name} (") for line in lines) for name in names)
-    (first, *_) = names
-    text = "\n".join(answer_lines([stands(first, None, swinging, away, strained)]))
-    block = text[text.index(f"{first} (12 motions)") : text.index("errors over")]
-    shown = [label for label in RMSE if re.search(rf"(^|[ =]){re.escape(called(label))}[ ;]", block.replace("\n", " "))]
-    assert len(shown) == len(RMSE) and "more" not in block
+def test_too_few_cases_are_no_ranking_and_no_tie() -> None:
+    apart = {"a/default": 1e-3, "b/default": 1e-1}
+    said = told(stands(rmse=apart, motions=3))
+    assert f"(3 cases, {LEAST_PAIRS} are needed)" in said and "no ranking" in said
+    assert "As good as" not in said and " use " not in said.split("no ranking")[0]
+    mixed = told(stands(rmse=apart, motions=3), stands("pushed", rmse=apart))
+    assert "use a/default" in mixed and "no ranking in sampled" in mixed
 
 
-def called(label: str) -> str:
-    return label.removesuffix("/default")
+def test_steps_are_lines_of_their_own_and_no_part_of_what_is_advised_for_moves() -> None:
+    """pd-ff is best on steps alone."""
+    steps = stands("sampled, steps", rmse=RMSE | {"pd-ff/default": 1e-7})
+    one = stands()
+    lines = ranking_table([one, steps], names_of([one])).rows
+    assert [line[0] for line in lines] == ["sampled (12)", "sampled (steps) (12)"]
+    assert [line[1].split()[0] for line in lines] == ["mrac", "pd-ff"]
+    assert "use mrac/default" in told(one, steps) and "use pd-ff" not in told(one, steps)
+    assert "use pd-ff/default" in told(steps), "where there is nothing else"
+
+
+def test_nothing_that_is_usable_is_told() -> None:
+    rows = {"a/default": 1e-3, "b/default": 1e-2}
+    assert "use none of these" in told(stands(rmse=rows, swings=tuple(rows)))
+
+
+def test_no_comparison_has_no_answer() -> None:
+    assert answer_of([]) is None and answer_tables([]) == []
+
+
+@pytest.mark.parametrize("name", CLASSES)
+def test_each_condition_is_called_by_another_name(name: str) -> None:
+    names = {condition(stands(other)) for other in CLASSES} | {condition(stands(f"{name}, steps"))}
+    assert len(names) == len(CLASSES) + 1
 
 
 @settings(max_examples=25, deadline=None)
@@ -142,18 +217,24 @@ def called(label: str) -> str:
     st.integers(1, 5),
     st.lists(st.text("abcdefgh-", min_size=1, max_size=30), min_size=1, max_size=18, unique=True),
     st.integers(0, 1000),
+    st.booleans(),
 )
-def test_an_answer_fits_a_terminal_whatever_is_compared(classes: int, laws: list[str], seed: int) -> None:
+def test_an_answer_fits_a_terminal_whatever_is_compared(classes: int, laws: list[str], seed: int, steps: bool) -> None:
     rng = np.random.default_rng(seed)
     rmse = {f"{law}/g{k}": float(10.0 ** rng.uniform(-6, 0)) for k, law in enumerate(laws)}
     swings, away = (tuple(label for label in rmse if rng.random() < 0.3) for _ in range(2))
-    lines = answer_lines([stands(name, rmse, swings, away) for name in CLASSES[:classes]])
-    assert len(lines) <= LINES and max(map(len, lines)) <= max(COLUMNS, 24 + 8 + 35)
-    assert all(any(line.startswith(name) for line in lines) for name in CLASSES[:classes])
+    names = [*CLASSES[:classes], *(f"{name}, steps" for name in CLASSES[:classes] if steps)]
+    answer = answer_of([stands(name, rmse, swings, away) for name in names], "results/20261124T162110Z-compare-x-1")
+    assert answer is not None
+    lines = answer.lines()
+    assert len(lines) <= LINES and max(map(len, lines)) <= COLUMNS
+    assert sum(bool(re.match(r".* \(12\) ", line)) for line in lines) >= len(names)
 
 
-def test_no_comparison_has_no_answer() -> None:
-    assert answer_lines([]) == []
+def test_the_tables_of_a_run_begin_with_the_answers() -> None:
+    first, second = answer_tables([stands(), stands("pushed")])
+    assert [len(first.columns), len(first.rows)] == [6, 2] and second.columns[0] == "push?"
+    assert len(answer_tables([stands()])) == 1, "one condition asks nothing"
 
 
 @pytest.mark.parametrize(
@@ -164,30 +245,7 @@ def test_a_number_is_as_short_as_two_digits_are(value: float, said: str) -> None
     assert two(value) == said
 
 
-def test_what_does_not_fit_is_counted_and_nothing_else_is_lost() -> None:
-    words = [f"w{k}" for k in range(40)]
-    assert " ".join(wrapped(words, 9, 60)).replace(";", "").split() == words
-    short = wrapped(words, 2, 30)
-    shown = " ".join(short).replace(";", "").split()
-    assert len(short) == 2 and max(map(len, short)) <= 30
-    assert shown[-2:] == [f"+{40 - len(shown[:-2])}", "more"] and shown[:-2] == words[: len(shown) - 2]
-    assert wrapped(["a\u00a0b c d e f g h"], 1, 9) == ["a b c ..."], "held together, and shown as a blank"
-
-
-def test_whoever_swings_is_named_before_places_take_the_room() -> None:
-    """With ten classes there are two lines for each: all that swing, fewer places, and how many are left out."""
-    swinging = ("pid/printed", "smc/exchanged", "nc/default")
-    lines = answer_lines([stands(name, swings=swinging) for name in CLASSES])
-    assert len(lines) <= LINES and sum("limit cycle: " in line for line in lines) == 5
-    for name in swinging:
-        assert sum(line.count(f"{name.removesuffix('/default')} +-2.9 deg") for line in lines) == 5
-    assert sum("1. mrac " in line for line in lines) == 5
-    many = {f"law{k}/default": 1e-3 * 1.5**k for k in range(14)}
-    squeezed = "".join(answer_lines([stands(f"class {k}", many) for k in range(10)]))
-    left_out = 0
-    for block in squeezed.split("class ")[1:]:
-        places = block.split("errors over")[0]
-        left = re.search(r"\+(\d+) more", places)
-        left_out += left is not None
-        assert len(re.findall(r"law\d+ ", places)) + int(left[1] if left else 0) == 14
-    assert left_out >= 5
+def test_an_interval_is_given_where_there_are_cases_enough() -> None:
+    assert "(95 %: " in told(stands(motions=8)) and "(95 %: " not in told(stands(motions=7))
+    scaled = replace(stands(), scores=stands().scores * 2.0)
+    assert scaled.means[0].value == pytest.approx(2.0 * stands().means[0].value)

@@ -17,6 +17,7 @@ import pytest
 import wristctl
 from wristctl.commands.study.units import Studied
 from wristctl.comparison import world_ranking as judge_unit
+from wristctl.comparison.bootstrap import plain
 from wristctl.config.study import Study
 from wristctl.errors import UserError
 from wristctl.records import Run, list_runs
@@ -66,18 +67,21 @@ def run_of(found: Studied) -> Run:
     return found.run
 
 
-def test_its_answer_names_the_rig_a_law_with_its_interval_and_what_each_term_buys(done: Studied) -> None:
+def test_its_answer_names_the_controller_what_each_term_buys_and_heads_the_run(done: Studied) -> None:
     text = (run_of(done).path / "README.md").read_text()
     result = text[text.index("## Result") :]
-    first = " ".join(result.split("\n\n")[1].split())
-    assert first.startswith("``` rig (a rig in small): run p") and "times below feedforward's" in first
-    assert max(map(len, done.summary)) <= 100
-    assert "figures/laws.png" in result and (run_of(done).path / "figures" / "laws.png").is_file()
-    assert "an integral (pd-ff/tuned -> pid-ff/tuned): rig " in result
-    assert result.count("run p") == 1, "said once"
-    assert "Tuned otherwise on rig (RMSE alone)" in result
-    assert "(random): " in result and "(random again beside random): " in result
-    assert str(done).startswith("rig (a rig in small): run p"), "the terminal begins with it too"
+    assert max(map(len, done.summary)) <= 100 and len(done.summary) <= 32
+    first = done.rankings["rig"].labels[done.rankings["rig"].standing.groups[0][0]]
+    assert first in done.summary[0] and done.summary[0] in result and result.count(done.summary[0]) == 1
+    assert str(done).startswith(done.summary[0]), "the terminal begins with it too"
+    (integral,) = [line for line in done.summary if line.startswith("an integral ")]
+    (value,) = [one for one in done.terms if one.term == "an integral"]
+    assert integral.split()[-1] == ("undecided" if value.times.is_one else plain(value.times.value))
+    words = " ".join(done.summary)
+    assert all(shift.variant in words for shift in done.shifts) and len(done.shifts) == 3
+    for name in ("laws", "answer", "performance-profile", "ratio-to-feedforward", "terms"):
+        assert (run_of(done).path / "figures" / f"{name}.png").is_file()
+    assert "figures/laws.png" in result
 
 
 def test_feedback_is_worth_what_the_worlds_say(done: Studied) -> None:

@@ -24,7 +24,7 @@ WRONG: list[tuple[Wrong, str]] = [
     (lambda: wristctl.simulate(study(None, "simulate.gains=tuned")), "fix: tuned=..., a tune run that tuned smc"),
     (lambda: wristctl.simulate(study(None, f"simulate={{{STEP}}}")), "fix: network=..."),
     (lambda: wristctl.tune(study(None, f"tune.scenarios=[{{{STEP}}}]")), "fix: network=..."),
-    (lambda: wristctl.compare(study()), "fix: network=..."),
+    (lambda: wristctl.compare(study(None, "compare.inverses=[network]")), "fix: network=..."),
     (lambda: wristctl.gen_data(study(None, "gen-data.source=run")),
      "fix: wristctl.gen_data(study, run='latest:simulate')"),
     (lambda: wristctl.gen_data(study(), run=quick()), "fix: load_study(..., 'gen-data.source=run')"),

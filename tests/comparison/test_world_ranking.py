@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 import pytest
 
 from wristctl.arrays import Array
-from wristctl.commands.compare.answer import answer_lines
+from wristctl.commands.compare.answer import answer_of
 from wristctl.commands.compare.command import Compared
-from wristctl.commands.compare.ranking import answer
 from wristctl.commands.results import Findings
-from wristctl.comparison.class_standing import of_ranking
 from wristctl.comparison.model_confidence_set import LEAST_PAIRS
 from wristctl.comparison.world_ranking import (
     RANKED,
@@ -31,16 +31,24 @@ FAMILY = Family()
 
 
 def row(label: str, rmse: Array, swings: tuple[int, ...] = (), failed: tuple[int, ...] = ()) -> RankedRow:
-    lost, swung = np.isin(np.arange(WORLDS), failed), np.isin(np.arange(WORLDS), swings)
-    metrics = dict.fromkeys(RANKED, rmse[None]) | {"drift": np.zeros((1, WORLDS))}
-    nothing = np.zeros((1, WORLDS), bool)
-    measured = Measured(metrics, lost[None], np.ones((1, WORLDS)), nothing[0])
+    worlds = np.arange(len(rmse))
+    lost, swung = np.isin(worlds, failed), np.isin(worlds, swings)
+    none = np.zeros((1, len(worlds)))
+    metrics = dict.fromkeys(RANKED, rmse[None]) | {"drift": none}
+    measured = Measured(metrics, lost[None], none + 1.0, none[0] > 0.0)
     return RankedRow(label, np.where(lost, np.inf, rmse), swung, measured)
 
 
 def made_up(*rows: RankedRow) -> WorldRanking:
     ordinary = np.exp(np.random.default_rng(0).normal(-3.0, 0.5, WORLDS))
-    return ranking("made-up", FAMILY, [row("feedforward/default", ordinary), *rows], 0)
+    return ranking("made-up", FAMILY, [row("feedforward/default", ordinary), *rows])
+
+
+def told(*rankings: WorldRanking) -> str:
+    """The answer of rankings, in one line."""
+    answer = answer_of(rankings)
+    assert answer is not None
+    return " ".join(" ".join(answer.lines()).split())
 
 
 def hard(seed: int = 0, scale: float = 1.0, spread: float = 0.05) -> Array:
@@ -55,31 +63,31 @@ def test_rows_that_worlds_cannot_tell_apart_are_one_group_and_others_are_not() -
     assert [set(each) for each in names] == [{"a/x", "b/x"}, {"c/x"}, {"feedforward/default"}]
     gain = found.gains[found.standing.groups[0][0]]
     assert gain.low < 1.0 / 0.3 < gain.high and gain.low > 3.0
-    said = answer(found)
-    assert "a/x, b/x (a tie) are best" in said or "b/x, a/x (a tie) are best" in said
-    assert "Next is c/x" in said and "are told in 40 worlds" in said and "Not to be relied on" not in said
+    said = told(found)
+    assert "use a/x or b/x" in said or "use b/x or a/x" in said
+    assert re.search(r"1 more +c \d", said) and "Every controller here can be used" in said
 
 
 def test_a_law_that_is_best_until_it_swings_is_never_called_best() -> None:
     found = made_up(row("wild/x", hard(1, 0.01), swings=(7,)), row("calm/x", hard(2, 0.5)))
     assert found.rows[found.standing.groups[0][0]].label == "calm/x"
     assert found.standing.group(1) is None and found.standing.order[-1] == 1
-    assert "calm/x is best" in answer(found) and "wild/x (swings or chatters in 1 of 40)" in answer(found)
+    said = told(found)
+    assert "use calm/x" in said and said.index("Do not use") < said.index("wild") and "1 of 40 worlds" in said
 
 
 def test_a_law_that_fails_anywhere_is_kept_and_never_called_best() -> None:
     found = made_up(row("wild/x", hard(1, 0.01), failed=(3, 4)), row("calm/x", hard(2, 0.5)))
-    assert "wild/x (fails in 2 of 40)" in answer(found) and found.rows[found.standing.order[0]].label == "calm/x"
+    assert "leaves its range: wild (in 2 of 40 worlds)" in told(found).replace("Leaves", "leaves")
+    assert found.rows[found.standing.order[0]].label == "calm/x"
     lines = {line["row"]: line for line in ranking_frame(found).to_dict("records")}
     assert lines["wild/x"]["failures"] == 0.05 and lines["wild/x"]["worst_rmse"] == np.inf
     assert found.standing.group(1) is None and lines["calm/x"]["group"] == 1
 
 
 def test_where_everything_swings_nothing_is_best() -> None:
-    found = ranking("made-up", FAMILY, [row("feedforward/default", hard(), swings=(0,))], 0)
-    assert answer(found) == (
-        "On made-up nothing can be relied on: every row fails, swings or chatters in some of 40 worlds."
-    )
+    found = ranking("made-up", FAMILY, [row("feedforward/default", hard(), swings=(0,))])
+    assert "use none of these" in told(found)
 
 
 SETTINGS = (
@@ -115,12 +123,11 @@ def test_a_row_that_chatters_in_a_world_stands_with_those_that_swing_and_is_name
         "compare.controllers=[{controller: super-twisting}, {controller: ct-dob, gains: hardware}]",
     ])  # fmt: skip
     (found,) = rank(study)
-    known = of_ranking(found)
-    slams, sound = known.labels.index("super-twisting/default"), known.labels.index("ct-dob/hardware")
+    slams, sound = found.labels.index("super-twisting/default"), found.labels.index("ct-dob/hardware")
     assert found.rows[slams].swings.all() and not found.rows[sound].swings.any()
-    assert found.standing.fate(slams) == "unreliable" and 300.0 < known.chatter[slams] < 600.0
-    assert known.unsound["chatters"][[slams, sound]].tolist() == [3, 0] and known.chatter[sound] == 0.0
-    assert "chatters: super-twisting " in " ".join(" ".join(answer_lines([known])).split())
+    assert found.standing.fate(slams) == "unreliable" and 300.0 < found.chatter[slams] < 600.0
+    assert found.unsound["chatters"][[slams, sound]].tolist() == [3, 0] and found.chatter[sound] == 0.0
+    assert "hatters: super-twisting " in told(found) and "3 of 3 worlds" in told(found)
 
 
 def test_the_table_of_worlds_has_each_row_world_and_motion_in_its_place() -> None:
@@ -136,7 +143,7 @@ def test_the_table_of_worlds_has_each_row_world_and_motion_in_its_place() -> Non
         measured = Measured(metrics, failed, np.ones((1, 8)), np.zeros(8, bool))
         scores = np.sqrt(3.0) * factor * 10.0 ** -(3.0 + np.arange(4.0))
         rows.append(RankedRow(label, scores, np.zeros(4, bool), measured))
-    found = worlds_frame(ranking("made-up", family, rows, 0))
+    found = worlds_frame(ranking("made-up", family, rows))
     for line in found.to_dict("records"):
         factor = 0.5 if line["row"] == "a/x" else 1.0
         assert line["rmse"] == pytest.approx(factor * 10.0 ** -(3.0 + line["world"]) * motions[line["motion"]])
@@ -168,11 +175,11 @@ def test_steps_are_ranked_apart_from_smooth_motions() -> None:
 
 def test_a_family_of_too_few_worlds_tells_so_and_ranks_nothing() -> None:
     def few(label: str, scale: float) -> RankedRow:
-        return RankedRow(label, scale * np.ones(3), np.zeros(3, bool), row(label, np.ones(WORLDS)).measured)
+        return row(label, scale * np.ones(3))
 
-    found = ranking("made-up", FAMILY, [few("feedforward/default", 1.0), few("a/x", 0.01)], 0)
-    said = answer(found)
-    assert f"{LEAST_PAIRS} or more" in said and "3 worlds" in said and " best" not in said and "tie" not in said
+    found = ranking("made-up", FAMILY, [few("feedforward/default", 1.0), few("a/x", 0.01)])
+    said = told(found)
+    assert f"(3 worlds, {LEAST_PAIRS} are needed)" in said and "no ranking" in said and " use " not in said
     assert [line["fate"] for line in ranking_frame(found).to_dict("records")] == ["too few to tell"] * 2
 
 
@@ -180,28 +187,26 @@ def test_a_comparison_has_a_fault_where_all_rows_are_unreliable_and_none_where_w
     study = load_study([], [])
 
     def fault(swings: tuple[int, ...], worlds: int = WORLDS) -> bool:
-        rows = [row("feedforward/default", hard(), swings), row("a/x", hard(1), swings)]
-        few = [each._replace(rmse=each.rmse[:worlds], swings=each.swings[:worlds]) for each in rows]
-        found = ranking("made-up", FAMILY, few, 0)
-        return Compared(study, Findings(0), [], [], {}, {}, [], [found]).fault is not None
+        rows = [row(label, hard(seed)[:worlds], swings) for seed, label in enumerate(("feedforward/default", "a/x"))]
+        found = ranking("made-up", FAMILY, rows)
+        return Compared(study, Findings(0), [], [], {}, {}, [found]).fault is not None
 
     assert fault((0,)) and not fault(()) and not fault((), worlds=3) and fault((0,), worlds=3)
 
 
 def test_a_law_that_is_seldom_lost_keeps_its_place_and_is_told_with_its_share() -> None:
     rows = [row("feedforward/default", hard()), row("a/x", hard(1, 0.1), swings=(3,))]
-    kept, gone = (ranking("made-up", FAMILY, rows, 0, tolerated) for tolerated in (0.01, 0.0))
+    kept, gone = (ranking("made-up", FAMILY, rows, tolerated) for tolerated in (0.01, 0.0))
     assert kept.standing.groups[0] == [1] and gone.standing.unreliable == [1]
-    assert "a/x (swings or chatters in 1: 2.5 % [0.063, 13]) is best" in answer(kept)
-    assert "Not to be relied on: a/x (swings or chatters in 1 of 40)" in answer(gone)
+    assert "use a/x" in told(kept) and "use feedforward" in told(gone) and "1 of 40 worlds" in told(gone)
     lines = {line["row"]: line for line in ranking_frame(kept).to_dict("records")}
     assert (lines["a/x"]["lost"], lines["a/x"]["fate"]) == (1 / 40, "ranked")
     assert lines["a/x"]["lost_low"] < 0.01 < lines["a/x"]["lost_high"]
 
 
 def test_errors_that_nobody_can_measure_are_said_to_be_less() -> None:
-    said = answer(made_up(row("a/x", np.full(WORLDS, 1e-9)), row("b/x", np.full(WORLDS, 1e-6))))
-    assert "a/x, b/x (a tie) are best: RMSE <0.001 deg" in said
+    said = told(made_up(row("a/x", np.full(WORLDS, 1e-9)), row("b/x", np.full(WORLDS, 1e-6))))
+    assert "use a/x or b/x: RMSE <0.001 deg" in said
 
 
 def test_the_same_worlds_give_the_same_ranking_whatever_stands_beside_a_row() -> None:

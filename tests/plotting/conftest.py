@@ -10,7 +10,7 @@ import pytest
 from matplotlib.figure import Figure
 
 from wristctl.api import load_study
-from wristctl.commands.compare.class_figures import answer_figure, error_against_variation, tension_rows
+from wristctl.commands.compare.class_figures import error_against_variation, tension_rows
 from wristctl.commands.compare.figures import error_over_disturbance, rmse_map, variation_dots
 from wristctl.commands.hw_run.figures import DIRECTIONS, LoggedTrial, desired_and_obtained, lateness
 from wristctl.commands.hw_run.figures import errors as trial_errors
@@ -18,12 +18,18 @@ from wristctl.commands.hw_run.figures import tensions as trial_tensions
 from wristctl.commands.simulate.figures import sliding
 from wristctl.commands.track.figures import angle
 from wristctl.commands.tune.figures import convergence, gain_history, gain_sensitivity
-from wristctl.comparison.class_standing import ClassStanding, class_standings
 from wristctl.comparison.combinations import ComparedRow
+from wristctl.comparison.controller_ranking import Ranking, class_rankings
 from wristctl.config.wrist import WristParameters
 from wristctl.control.pid import PID
 from wristctl.control.smc import SMC
 from wristctl.plotting.loop_figures import angles, errors, tensions
+from wristctl.plotting.ranking_figures import (
+    answer_figure,
+    paired_ratios,
+    performance_profile,
+    probability_of_better,
+)
 from wristctl.plotting.wrist_drawing import directions, stroboscope
 from wristctl.simulation.repetitions import Repeated, Simulation
 from wristctl.simulation.trajectory import Trajectory
@@ -73,10 +79,13 @@ def results() -> list[ComparedRow]:
     return [result(*pair, rmse=1e-5 * (k + 1), failed=k == 3) for k, pair in enumerate(pairs)]
 
 
-def standings() -> list[ClassStanding]:
-    """Of the same rows: what diverged cannot be relied on."""
+def rankings() -> list[Ranking]:
+    """Of the same rows: what diverged must not be used."""
     study = load_study(None, "compare.loops={four-segments: {}}")
-    return class_standings([each for each in results() if each.controller != "nc"], study.compare, study.wrist)
+    return class_rankings([each for each in results() if each.controller != "nc"], study.compare, study.wrist)
+
+
+PLACES = {"sampled": "sampled", "sampled, steps": "sampled (steps)"}
 
 
 def pushed() -> list[ComparedRow]:
@@ -131,8 +140,11 @@ FIGURES: dict[str, Callable[[], Figure]] = {
     "angles, late": lambda: angles([late()]),
     "tensions, late": lambda: tensions(late()),
     "rmse map": lambda: rmse_map(results(), "Loop default"),
-    "answer": lambda: answer_figure(standings()),
-    "error against variation": lambda: error_against_variation(results(), standings()),
+    "answer": lambda: answer_figure(rankings(), PLACES),
+    "performance profile": lambda: performance_profile(rankings(), PLACES),
+    "ratios to feedforward": lambda: paired_ratios(rankings(), "feedforward/default", PLACES),
+    "who beats whom": lambda: probability_of_better(rankings()[0], "sampled"),
+    "error against variation": lambda: error_against_variation(results(), rankings()),
     "tensions of several": lambda: tension_rows([course(row, 0.1 * k + 0.1) for k, row in enumerate(ROWS[:3])], "all"),
     "error over a disturbance": lambda: error_over_disturbance(
         pushed(), "disturbances.push.force", {"a": 0.0, "b": 1.0, "c": 2.0}

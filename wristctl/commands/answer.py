@@ -19,8 +19,8 @@ class Answer:
     """The answer in one or two plain sentences."""
     table: Table | None = None
     """Figures behind the sentence, with units in the heads: at most COLUMNS wide."""
-    notes: Sequence[str] = ()
-    """What not to use and why, and what to do next: a paragraph each; after `$ ` a command."""
+    notes: Sequence[str | Table] = ()
+    """What not to use and why, and what to do next: a paragraph or a table each; after `$ ` a command."""
     more: str = ""
     """Where more is."""
 
@@ -29,6 +29,12 @@ class Answer:
         blocks = [in_lines(self.sentence)]
         if self.table is not None:
             blocks.append(self.table.text(COLUMNS).split("\n"))
-        blocks += [[note[2:]] if note.startswith("$ ") else in_lines(note) for note in self.notes]
+        blocks += [_lines(note) for note in self.notes]
         blocks += [in_lines(self.more)] * bool(self.more)
         return [line for k, block in enumerate(blocks) for line in [*[""] * bool(k), *block]]
+
+
+def _lines(note: str | Table) -> list[str]:
+    if isinstance(note, Table):
+        return note.text(COLUMNS).split("\n")
+    return [note[2:]] if note.startswith("$ ") else in_lines(note)

@@ -66,6 +66,27 @@ def check_row(row: Row | SimulateSettings, tuned: Gains | None, run: Run | None 
     gains_of(law, row.gains, tuned)
 
 
+def with_what_there_is(study: Study, inputs: Inputs) -> tuple[Study, list[str]]:
+    """A comparison without the rows that want a tune run, and the inverse that wants a network, where none is given.
+
+    And what is left out, in words. Where nothing would be left, and where a run is given that lacks some gains, the
+    study stays as it is: what it lacks is an error.
+    """
+    settings, left_out = study.compare, list[str]()
+    searched = settings.tuning.controllers if settings.tuning is not None else ()
+    if "tuned" not in inputs:
+        rows = tuple(row for row in settings.rows if row.gains != "tuned" or row.controller in searched)
+        if rows and len(rows) < len(settings.rows):
+            missing = [row.label for row in settings.rows if row not in rows]
+            left_out.append(f"{', '.join(missing)} (no run of tune is given as tuned)")
+            settings = settings.model_copy(update={"rows": rows})
+    inverses = tuple(inverse for inverse in settings.inverses if inverse != "network")
+    if "network" not in inputs and inverses and inverses != settings.inverses and not settings.worlds.family:
+        left_out.append("references through a network (no run of train is given as network)")
+        settings = settings.model_copy(update={"inverses": inverses})
+    return study.model_copy(update={"compare": settings}) if left_out else study, left_out
+
+
 def check_reach(references: Iterable[Reference], wrist: WristParameters, where: str) -> None:
     """UserError for the first reference that asks for more than the wrist's range, or whose course fails."""
     import numpy as np

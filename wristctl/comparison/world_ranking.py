@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wristctl.arrays import Array
-from wristctl.comparison.bootstrap import GeometricMean, geometric_mean, paired_ratio, penalised
-from wristctl.comparison.tie_groups import Standing, standing
+from wristctl.comparison.controller_ranking import STREAM, Ranking, Traits, counted
+from wristctl.comparison.tie_groups import standing
 from wristctl.config.controller_row import Row
 from wristctl.config.families import Family, Worlds
 from wristctl.config.study import Study
@@ -45,8 +45,6 @@ RANKED = (
     "energy",
     "drift",
 )
-# Seed stream of the resampling: the same worlds give the same intervals.
-_STREAM = 20_031
 
 
 class RankedRow(NamedTuple):
@@ -60,25 +58,16 @@ class RankedRow(NamedTuple):
     measured: Measured
 
 
-@dataclass(frozen=True)
-class WorldRanking:
-    """Rows over a family's worlds; `yardstick` is the number of feedforward's."""
+@dataclass(frozen=True, kw_only=True)
+class WorldRanking(Ranking):
+    """A ranking over a family's worlds, with all that was measured there."""
 
-    name: str
-    """Name of the family; with `, steps` for the steps of a family that has smooth motions too."""
     family: Family
-    motions: int
-    """Number of the family's motions in the ranking."""
-    jumps: bool
-    """Whether they are steps."""
-    worlds: int
     rows: list[RankedRow]
-    yardstick: int
-    standing: Standing
-    means: list[GeometricMean]
-    """Geometric mean of every row's RMSE [rad]."""
-    gains: list[GeometricMean]
-    """Ratio of feedforward's RMSE to every row's."""
+
+    def medians(self, metric: str) -> Array:
+        """Median of a metric over all rollouts of each row, (R,); nan where no rollout has a finite value."""
+        return np.array([_median(row.measured.metrics[metric]) for row in self.rows])
 
 
 def kinds_of(family: Family) -> dict[bool, list[int]]:
@@ -122,8 +111,7 @@ def rank(
         measured = measure(law, gains, cases, study.wrist, RANKED, report)
         for kind, chosen in kinds.items():
             ranked[kind].append(_row(row.label, measured.of_motions(chosen, len(family.references)), worlds.draws))
-    yardstick = next(k for k, row in enumerate(rows) if row.controller == YARDSTICK)
-    return [ranking(name, family, ranked[kind], yardstick, steps=kind) for kind in kinds]
+    return [ranking(name, family, ranked[kind], steps=kind) for kind in kinds]
 
 
 def _row(label: str, measured: Measured, worlds: int) -> RankedRow:
@@ -139,12 +127,7 @@ def world_scores(measured: Measured, worlds: int) -> Array:
 
 
 def ranking(
-    name: str,
-    family: Family,
-    rows: Sequence[RankedRow],
-    yardstick: int,
-    tolerated: float = 0.0,
-    steps: bool | None = None,
+    name: str, family: Family, rows: Sequence[RankedRow], tolerated: float = 0.0, steps: bool | None = None
 ) -> WorldRanking:
     """The ranking of rows that were measured on the same worlds, of which each may fail, swing or chatter in a share.
 
@@ -153,15 +136,42 @@ def ranking(
     """
     kinds = kinds_of(family)
     kind = next(iter(kinds)) if steps is None else steps
-    scores = np.array([row.rmse for row in rows])
-    penalised_scores = penalised(scores)
-    stands = standing(scores, np.array([row.swings for row in rows]), _STREAM, tolerated)
-    means = [geometric_mean(row_scores, _STREAM) for row_scores in penalised_scores]
-    gains = [paired_ratio(penalised_scores[yardstick], row_scores, _STREAM) for row_scores in penalised_scores]
-    shown = f"{name}, steps" if kind and len(kinds) > 1 else name
+    scores, measured = np.array([row.rmse for row in rows]), [row.measured for row in rows]
+    shape = len(rows), scores.shape[1], -1
+    flags = {
+        "limit cycle": [one.limit_cycles for one in measured],
+        "chatters": [one.chatter > 0.0 for one in measured],
+        "not converged": [one.unconverged for one in measured],
+    }
+    swinging = np.array([row.swings for row in rows])  # of several noises the middle one counts, not any
+    worlds = {name: np.reshape(holds, shape).any(axis=2) & swinging for name, holds in flags.items()}
+    swings = [one.metrics["oscillation"] * one.limit_cycles for one in measured]
+    none = np.zeros(len(rows))
     return WorldRanking(
-        shown, family, len(kinds[kind]), kind, scores.shape[1], list(rows), yardstick, stands, means, gains
-    )  # fmt: skip
+        name=f"{name}, steps" if kind and len(kinds) > 1 else name,
+        unit="world",
+        labels=[row.label for row in rows],
+        scores=scores,
+        standing=standing(scores, swinging, STREAM, tolerated),
+        swing=np.array([np.nanmax(swing, initial=0.0) for swing in swings]),
+        chatter=np.array([one.chatter.max(initial=0.0) for one in measured]),
+        unsound=counted(worlds, scores),
+        peak=none,
+        away=none.astype(int),
+        motions=len(kinds[kind]),
+        traits=_traits(family, kind),
+        family=family,
+        rows=list(rows),
+    )
+
+
+def _traits(family: Family, steps: bool) -> Traits:
+    """What a family asks of a controller: its loop's, and what is drawn beside it."""
+    loop, drawn = family.loop, list(family.draw)
+    camera, tendons = loop.sensor.level == "camera", loop.actuator.level == "tendon"
+    load = any(key.startswith("disturbances.") for key in drawn)
+    unknown = any(key.startswith("plant.") for key in drawn)
+    return Traits(camera or tendons, camera, tendons, steps, load, unknown, loop.plant.model == "hinges")
 
 
 def ranking_frame(ranked: WorldRanking) -> pd.DataFrame:
@@ -216,8 +226,8 @@ def worlds_frame(ranked: WorldRanking) -> pd.DataFrame:
     for row in ranked.rows:
         where = {
             "row": row.label,
-            "world": np.repeat(np.arange(ranked.worlds), ranked.motions),
-            "motion": np.tile(numbers, ranked.worlds),
+            "world": np.repeat(np.arange(ranked.count), ranked.motions),
+            "motion": np.tile(numbers, ranked.count),
         }
         values = {name: values[0] for name, values in row.measured.metrics.items()}
         parts.append(pd.DataFrame(where | {"failed": row.measured.failed[0]} | values))

@@ -2,28 +2,43 @@
 
 from wristctl.config.controller_row import REPETITIONS, Row
 from wristctl.config.families import Worlds
-from wristctl.config.loop import LOOPS, DirectionName, InverseName, Loops, Reference
+from wristctl.config.loop import LOOPS, DirectionName, InverseName, Loop, Loops, Reference
 from wristctl.config.section import Section, choice, quantity
 from wristctl.config.tune import TuneSettings
+
+# Preset of gains for motors, tendons and a camera.
+_HARDWARE = "hardware"
+# Controllers compared where none are named, with gains that need no tuning.
+_PRESETS = (
+    {"smc": "printed", "pid": "printed", "mrac": "default", "gvsc": "default", "feedforward": "default"},
+    dict.fromkeys(("mrac", "nc", "pd-ff", "pid-ff", "pid-dob", "smc-dob", "ct-dob"), _HARDWARE),
+    {"smc": "exchanged"},
+)
+_ROWS = tuple(Row(controller=name, gains=gains) for presets in _PRESETS for name, gains in presets.items())
+# Loops compared on where none are named: as believed, behind a rig, pushed, and of a wrist softer than believed.
+_LOOPS: dict[str, Loop] = {
+    **{name: loop for name, loop in LOOPS.items() if loop == Loop()},
+    "camera": Loop.model_validate(
+        {"control_period": 5e-3, "actuator": {"level": "tendon", "sheath": 1.0}, "sensor": {"level": "camera"}}
+    ),
+    "push": Loop.model_validate({"disturbances": {"push": {"force": 2.0}}}),
+    "soft": Loop.model_validate({"plant": {"stiffness_scale": 0.8}}),
+}
+# Angle [deg] and duration [s] of the moves compared on where none are named: fewer than eight have no interval.
+_MOVES = ((30, 1.0), (30, 2.0), (-30, 1.0), (-30, 2.0), (15, 1.0), (-15, 1.0), (40, 1.5), (-40, 1.5))
 
 
 class CompareSettings(Section):
     """Controllers x loops x references x inverses, beside the paper's T2."""
 
-    rows: tuple[Row, ...] = choice(
-        (Row(controller="smc", gains="printed"),), "controllers with their gains", min_length=1, alias="controllers"
-    )
+    rows: tuple[Row, ...] = choice(_ROWS, "controllers with their gains", min_length=1, alias="controllers")
     loops: Loops = choice(
-        LOOPS,
-        "the loops to judge on, each a block of the table; naming any replaces these (`exact: {}` is the built-in one)",
+        _LOOPS,
+        "the loops to compare on; naming any replaces these (`exact: {}` is the built-in one)",
         min_length=1,
     )
     references: tuple[Reference, ...] = choice(
-        (
-            Reference(kind="step"),
-            Reference(kind="minimum-jerk", duration=1.0),
-            Reference(kind="minimum-jerk", duration=2.0),
-        ),
+        tuple(Reference(kind="minimum-jerk", angle_deg=angle, duration=duration) for angle, duration in _MOVES),
         "references, each followed from rest",
         min_length=1,
     )

@@ -1,26 +1,252 @@
-"""Figures of a ranking over worlds: intervals in order, and in how many worlds each row is how near to the best."""
+"""Figures of rankings: errors at a glance, profiles, ratios to one baseline, and how probably one beats another."""
+
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.ticker import LogLocator
 
+from wristctl.comparison.bootstrap import penalised
+from wristctl.comparison.controller_ranking import Ranking, probability_of_less
 from wristctl.comparison.tie_groups import performance_profiles
-from wristctl.comparison.world_ranking import WorldRanking
-from wristctl.plotting.style import BLACK, colour, figure, legend_below, line, logarithmic, title
+from wristctl.plotting.style import (
+    BLACK,
+    GREY,
+    SILVER,
+    colour,
+    columns_within,
+    figure,
+    in_words,
+    legend_below,
+    legend_under,
+    line,
+    logarithmic,
+    title,
+    undress,
+)
 
-_FACTORS, _SHOWN = np.geomspace(1.0, 30.0, 200), 6
+_FACTORS = np.geomspace(1.0, 30.0, 200)
+# Controllers in one panel, at most.
+_SHOWN = 7
+# Mark of what must not be used: in black, which is no controller's colour.
+_UNUSABLE: dict[str, Any] = {"marker": "x", "color": BLACK, "markersize": 4.5, "markeredgewidth": 1.2}
+# Marks of gains, and of further presets in their order.
+_MARKS = {"default": "o", "printed": "v", "exchanged": "D", "tuned": "s"}
+_FURTHER = ("^", "P", "h", "<", ">", "*")
+# Width [in] of a figure from which controllers have room for words beside their names.
+_ROOM = 6.0
 
 
-def ranking_intervals(ranking: WorldRanking) -> Figure:
+def answer_figure(rankings: Sequence[Ranking], places: Mapping[str, str]) -> Figure:
+    """RMSE [deg] of all controllers under every condition on one axis (log), each with its 95 % interval.
+
+    A band is a condition, its best controller on top. Colours are controllers, marks their gains, and black crosses
+    what must not be used. `places` are the words of each condition by the ranking's name.
+    """
+    most = max(len(ranking.labels) for ranking in rankings)
+    labels = list(dict.fromkeys(label for ranking in rankings for label in ranking.labels))
+    marks = _marks(labels)
+    picture, ((axes,),) = figure(height=1.4 + len(rankings) * (0.25 + 0.055 * most))
+    for band, ranking in enumerate(rankings):
+        for step, row in enumerate(ranking.standing.order):
+            name, _, gains = ranking.labels[row].partition("/")
+            mean, height = ranking.means[row], band + 0.86 * (step / max(1, most - 1) - 0.5)
+            ends, shade = np.degrees([mean.low, mean.high]), colour(name)
+            if np.isfinite(ends).all():
+                axes.plot(ends, [height, height], color=shade, linewidth=1.0, zorder=1.8)
+            usable = ranking.standing.fate(row) in ("ranked", "too few to tell")
+            mark = {"marker": marks[gains], "color": shade, "markersize": 4.5} if usable else _UNUSABLE
+            axes.plot(np.degrees(mean.value), height, linestyle="none", **mark)
+        if band:
+            axes.axhline(band - 0.5, color=SILVER, linewidth=0.8)
+    axes.set_yticks(range(len(rankings)), [places[ranking.name] for ranking in rankings])
+    axes.set_ylim(len(rankings) - 0.5, -0.5)
+    axes.grid(False, axis="y")
+    axes.tick_params(axis="y", length=0.0)
+    logarithmic(axes.xaxis)
+    axes.tick_params(axis="x", which="minor", labelbottom=False)
+    axes.set_xlabel("RMSE [deg]: geometric mean with 95 % interval")
+    every: dict[str, Any] = {"linestyle": "none", "markersize": 4.5}
+    called = in_words if picture.get_figwidth() >= _ROOM else str
+    names = dict.fromkeys(label.split("/")[0] for label in labels)
+    handles = [Line2D([], [], marker="o", color=colour(name), label=called(name), **every) for name in names]
+    handles += [
+        Line2D([], [], marker=mark, color=GREY, label=f"{gains} gains", **every)
+        for gains, mark in marks.items()
+        if len(marks) > 1
+    ]
+    if any(_bad(ranking) for ranking in rankings):
+        handles.append(Line2D([], [], linestyle="none", label="must not be used", **_UNUSABLE))
+    legend_under(picture, handles, 3)
+    return picture
+
+
+def _marks(labels: Sequence[str]) -> dict[str, str]:
+    """Mark of each kind of gains among the labels."""
+    gains = list(dict.fromkeys(label.partition("/")[2] for label in labels))
+    further = [name for name in gains if name not in _MARKS]
+    marks = _MARKS | {name: _FURTHER[place % len(_FURTHER)] for place, name in enumerate(further)}
+    return {name: marks[name] for name in gains}
+
+
+def _bad(ranking: Ranking) -> list[int]:
+    stands = ranking.standing
+    return [*stands.unphysical, *stands.short, *stands.unreliable]
+
+
+def _panels(rankings: Sequence[Ranking], height: float, width: float, **shared: Any) -> tuple[Figure, list[Any]]:
+    """A figure with a panel for each ranking."""
+    columns = columns_within(len(rankings), width)
+    deep = -(-len(rankings) // columns)
+    picture, axes = figure(deep, columns, height=deep * height + 0.9, **shared)
+    panels = axes.ravel().tolist()
+    for place, panel in enumerate(panels):
+        panel.set_visible(place < len(rankings))
+        panel.tick_params(axis="x", labelbottom=place + columns >= len(rankings))
+    return picture, panels[: len(rankings)]
+
+
+def _label(panels: Sequence[Any], text: str) -> None:
+    """A label below the middle of the last row of panels."""
+    columns = panels[0].get_gridspec().ncols
+    last = panels[(len(panels) - 1) // columns * columns :]
+    last[(len(last) - 1) // 2].set_xlabel(text, loc="left" if len(last) < columns else "center")
+
+
+def performance_profile(rankings: Sequence[Ranking], places: Mapping[str, str]) -> Figure:
+    """Share of the cases in which each controller is within a factor of the best one there: a panel for each ranking.
+
+    Drawn are the best two of each ranking and feedforward. What fails in a case is within no factor.
+    """
+    picture, panels = _panels(rankings, 1.9, 0.95, sharex=True, sharey=True)
+    shown = _often_first(rankings)[: _SHOWN - 1]
+    shown += [one.labels[one.yardstick] for one in rankings if one.yardstick is not None]
+    shown = list(dict.fromkeys(shown))
+    for panel, ranking in zip(panels, rankings, strict=True):
+        scores = np.where(np.isfinite(ranking.scores), penalised(ranking.scores), np.inf)
+        shares = performance_profiles(scores, _FACTORS)
+        for label in shown:
+            if label in ranking.labels:
+                share = 100.0 * shares[ranking.labels.index(label)]
+                panel.plot(_FACTORS, share, label=_called(label), **line(label))
+        panel.set_xscale("log")
+        panel.set_xticks([1.0, 3.0, 10.0, 30.0], ["1", "3", "10", "30"])
+        panel.minorticks_off()
+        panel.set(xlim=(1.0, _FACTORS[-1]), ylim=(0.0, 104.0))
+        title(panel, places[ranking.name])
+    _label(panels, "factor of the least RMSE in each case")
+    panels[0].set_ylabel(f"{rankings[0].unit}s [%]")
+    legend_below(picture)
+    return picture
+
+
+def _often_first(rankings: Sequence[Ranking]) -> list[str]:
+    """Labels by the number of rankings in which nothing is better, then by their mean place."""
+    first: Counter[str] = Counter()
+    places: dict[str, list[int]] = {}
+    for ranking in rankings:
+        first.update(ranking.labels[row] for row in (ranking.standing.groups or [[]])[0])
+        for place, row in enumerate(ranking.standing.order):
+            places.setdefault(ranking.labels[row], []).append(place)
+    return sorted(places, key=lambda label: (-first[label], float(np.mean(places[label]))))
+
+
+def paired_ratios(rankings: Sequence[Ranking], baseline: str, places: Mapping[str, str]) -> Figure:
+    """RMSE over that of one baseline, label controller/gains, in the same cases: a panel for each ranking that has it.
+
+    A diamond is the geometric mean with its 95 % interval, a dot a case (Cumming's estimation plot). Black crosses must
+    not be used. Left of the line is better than the baseline.
+    """
+    having = [ranking for ranking in rankings if baseline in ranking.labels]
+    labels = _by_mean_ratio(having, baseline)
+    picture, panels = _panels(having, 0.5 + 0.19 * len(labels), 0.95, sharex=True, sharey=True)
+    for panel, ranking in zip(panels, having, strict=True):
+        base = ranking.labels.index(baseline)
+        scores, bad = penalised(ranking.scores), _bad(ranking)
+        for height, label in enumerate(labels):
+            if label not in ranking.labels:
+                continue
+            row = ranking.labels.index(label)
+            inverse, shade = ranking.times_better(row, base), colour(label.split("/")[0])
+            ratios = scores[row] / scores[base]
+            panel.plot(ratios, np.full(len(ratios), height), ".", color=shade, markersize=2.5, alpha=0.4)
+            if np.isfinite(inverse.high) and inverse.low > 0.0:
+                panel.plot([1.0 / inverse.high, 1.0 / inverse.low], [height] * 2, color=shade, linewidth=1.6)
+            mark = _UNUSABLE if row in bad else {"marker": "D", "color": shade, "markersize": 3.5}
+            panel.plot(1.0 / inverse.value, height, linestyle="none", **mark)
+        panel.axvline(1.0, color=BLACK, linewidth=0.8)
+        logarithmic(panel.xaxis)
+        panel.xaxis.set_major_locator(LogLocator(numticks=3))
+        panel.minorticks_off()
+        title(panel, places[ranking.name])
+    panels[0].set_yticks(range(len(labels)), [_called(label) for label in labels])
+    panels[0].set_ylim(len(labels) - 0.5, -0.5)
+    _label(panels, f"RMSE over {_called(baseline)}'s [-]")
+    marks: dict[str, Any] = {"linestyle": "none", "color": GREY}
+    handles = [
+        Line2D([], [], marker="D", markersize=3.5, label="geometric mean, 95 % interval", **marks),
+        Line2D([], [], marker=".", markersize=4.0, label=f"a {having[0].unit}", **marks),
+    ]
+    if any(_bad(ranking) for ranking in having):
+        handles.append(Line2D([], [], linestyle="none", label="must not be used", **_UNUSABLE))
+    legend_under(picture, handles, 3)
+    return picture
+
+
+def _by_mean_ratio(rankings: Sequence[Ranking], baseline: str) -> list[str]:
+    """Labels by the mean logarithm of their ratio to the baseline, the least first; without the baseline itself."""
+    ratios: dict[str, list[float]] = {}
+    for ranking in rankings:
+        base = ranking.means[ranking.labels.index(baseline)].value
+        for label, mean in zip(ranking.labels, ranking.means, strict=True):
+            if label != baseline:
+                ratios.setdefault(label, []).append(np.log(mean.value / base))
+    return sorted(ratios, key=lambda label: float(np.mean(ratios[label])))
+
+
+def probability_of_better(ranking: Ranking, place: str) -> Figure:
+    """Probability [%] that a controller (row) has less RMSE than another (column) in a case of this condition.
+
+    It is the share of the cases; equal errors count half. Controllers from best to worst, without those that must not
+    be used where two or more may.
+    """
+    order, bad = ranking.standing.order, _bad(ranking)
+    usable = [row for row in order if row not in bad]
+    order = usable if len(usable) > 1 else order
+    shares = 100.0 * probability_of_less(ranking.scores)[np.ix_(order, order)]
+    shares[np.tril_indices(len(order))] = np.nan  # what is below the diagonal follows from what is above
+    shares = shares[:-1, 1:] if len(order) > 1 else shares
+    names = [_called(ranking.labels[row]) for row in order]
+    picture, ((axes,),) = figure(height=max(2.8, 1.5 + 0.28 * len(order)))
+    undress(axes)
+    drawn = axes.imshow(shares, cmap="PuOr", vmin=-40.0, vmax=140.0, aspect="auto")
+    room = picture.get_figwidth() / (len(order) + 5)
+    if room > 0.24:
+        for (row, column), share in np.ndenumerate(shares):
+            if np.isfinite(share):
+                axes.text(column, row, f"{share:.0f}", ha="center", va="center", fontsize=7.5)
+    axes.set_xticks(range(shares.shape[1]), names[-shares.shape[1] :], rotation=90.0)
+    axes.set_yticks(range(shares.shape[0]), names[: shares.shape[0]])
+    title(axes, f"{place}, {ranking.cases}")
+    bar = picture.colorbar(drawn, ax=axes, pad=0.02, label="row is better [%]")
+    bar.ax.set_ylim(0.0, 100.0)
+    return picture
+
+
+def ranking_intervals(ranking: Ranking) -> Figure:
     """RMSE of each row with its interval, best on top; a bar joins ties, what has no place is grey, with the reason.
 
     Small dots are the worlds.
     """
     order = ranking.standing.order
     picture, ((axes,),) = figure(height=0.8 + 0.28 * len(order))
-    for place, row_index in enumerate(order):
-        row, mean, group = ranking.rows[row_index], ranking.means[row_index], ranking.standing.group(row_index)
-        row_colour = "0.6" if group is None else colour(row.label.split("/")[0])
-        worlds = np.degrees(row.rmse[np.isfinite(row.rmse)])
+    for place, row in enumerate(order):
+        scores, mean, group = ranking.scores[row], ranking.means[row], ranking.standing.group(row)
+        row_colour = "0.6" if group is None else colour(ranking.labels[row].split("/")[0])
+        worlds = np.degrees(scores[np.isfinite(scores)])
         axes.plot(worlds, np.full(len(worlds), place), ".", color=row_colour, markersize=2.0, alpha=0.35)
         ends = np.degrees([[mean.value - mean.low], [mean.high - mean.value]])
         if np.isfinite(ends).all():
@@ -33,41 +259,23 @@ def ranking_intervals(ranking: WorldRanking) -> Figure:
                       transform=axes.get_yaxis_transform(), clip_on=False)  # fmt: skip
         first += len(group_rows)
     labels = [
-        ranking.rows[row_index].label + ("" if ranking.standing.group(row_index) else f" ({_why(ranking, row_index)})")
-        for row_index in order
+        _called(ranking.labels[row]) + ("" if ranking.standing.group(row) else f" ({_why(ranking, row)})")
+        for row in order
     ]
     axes.set_yticks(range(len(order)), labels)
     axes.invert_yaxis()
     axes.set_xscale("log")
     logarithmic(axes.xaxis)
-    axes.set_xlabel("RMSE [deg]")
-    title(axes, f"{ranking.name}: geometric mean over {ranking.worlds} worlds with 95 % interval; a bar joins ties")
+    axes.set_xlabel("RMSE [deg]: geometric mean with 95 % interval")
+    title(axes, f"{ranking.name}: {ranking.cases}; a bar joins what cannot be told apart")
     return picture
 
 
-def _why(ranking: WorldRanking, row_index: int) -> str:
+def _why(ranking: Ranking, row: int) -> str:
     """Why a row has no place."""
-    fate = ranking.standing.fate(row_index)
+    fate = ranking.standing.fate(row)
     return "fails, swings or chatters" if fate == "unreliable" else fate
 
 
-def world_profiles(ranking: WorldRanking) -> Figure:
-    """Performance profiles: the share of worlds in which a row is within a factor of the best row there.
-
-    Of many rows the best, and feedforward.
-    """
-    picture, ((axes,),) = figure(height=3.8)
-    shares = performance_profiles(np.array([row.rmse for row in ranking.rows]), _FACTORS)
-    best = ranking.standing.order[:_SHOWN]
-    for row_index in [*best, *({ranking.yardstick} - set(best))]:
-        axes.plot(
-            _FACTORS,
-            100.0 * shares[row_index],
-            label=ranking.rows[row_index].label,
-            **line(ranking.rows[row_index].label),
-        )
-    axes.set_xscale("log")
-    logarithmic(axes.xaxis)
-    axes.set(xlabel="factor of the best row's RMSE", ylabel="worlds [%]", ylim=(0.0, 102.0), xlim=(1.0, _FACTORS[-1]))
-    legend_below(picture)
-    return picture
+def _called(label: str) -> str:
+    return label.removesuffix("/default") if label.startswith("feedforward/") else label

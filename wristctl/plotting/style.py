@@ -52,6 +52,24 @@ _CONTROLLERS = {
     "pid-dob": "#4575b4",
     "smc-dob": "#762a83",
 }
+# What controllers are, in words that stand beside their names.
+_IN_WORDS = {
+    "smc": "sliding mode",
+    "mrac": "model reference adaptive",
+    "gvsc": "variable strain",
+    "nc": "neuro-controller",
+    "smc-tracking": "tracking sliding mode",
+    "feedforward": "open loop",
+    "ct-dob": "computed torque, observer",
+    "mpc": "model predictive",
+    "adrc": "disturbance rejection",
+    "lqi": "linear quadratic",
+    "nn-mrac": "adaptive network",
+    "pd-ff": "PD, feedforward",
+    "pid-ff": "PID, feedforward",
+    "pid-dob": "PID, observer",
+    "smc-dob": "sliding mode, observer",
+}
 _OTHERS = (OLIVE, FOREST, ROSE)
 # Line style of the desired angle: a band behind the lines. Long lines are drawn in pieces, so it must hide its own.
 WANTED: dict[str, Any] = {"color": SILVER, "linewidth": 5.0, "zorder": 1.9, "label": "desired"}
@@ -199,6 +217,12 @@ def legend_under(figure: Figure, handles: Sequence[Any], columns: int, labels: S
 def colour(controller: str) -> str:
     """The controller's colour, the same in every figure; one without its own gets a colour by its name."""
     return _CONTROLLERS.get(controller) or _OTHERS[zlib.crc32(controller.encode()) % len(_OTHERS)]
+
+
+def in_words(controller: str) -> str:
+    """The controller's name, and what it is: smc (sliding mode)."""
+    words = _IN_WORDS.get(controller)
+    return f"{controller} ({words})" if words else controller
 
 
 def line(label: str) -> dict[str, Any]:

@@ -1,244 +1,125 @@
-"""The answer of a comparison in words: which law is best in which class of conditions, by how much, and who fails."""
+"""The answer of a comparison in words, and its tables: which controller to use where, and what of the paper holds."""
 
 from __future__ import annotations
 
 import math
-from collections import Counter
 from collections.abc import Container, Iterable, Sequence
 from typing import TYPE_CHECKING
 
-from wristctl.commands.printed_table import COLUMNS, Table, degrees, in_lines, two
+from wristctl.commands.answer import Answer
+from wristctl.commands.printed_table import Table
+from wristctl.commands.ranking_answer import (
+    PRINTED,
+    advice,
+    certainty,
+    condition,
+    do_not_use,
+    error,
+    facts,
+    fitted,
+    joined,
+    names_of,
+    ranking_table,
+    ties,
+    unusable,
+)
 from wristctl.commands.results import Findings
 
 if TYPE_CHECKING:
-    from wristctl.comparison.class_standing import ClassStanding
     from wristctl.comparison.combinations import ComparedRow
+    from wristctl.comparison.controller_ranking import Ranking
     from wristctl.comparison.step_cost import StepTime
 
-
-# Lines of a terminal that an answer may take.
-LINES = 32
-# Laws of growing complexity: the worth of a term is the gain over the rung below.
-LADDER = ("feedforward", "pd-ff", "pid-ff", "pid-dob", "smc-dob")
-# Name of the paper's own law, and of the gains that it prints.
-PAPERS, PRINTED = "smc", "printed"
-_INDENT = "    "
-_WIDTH = COLUMNS - len(_INDENT)
-# Mark before a row that is not told apart from the best of its place.
-_EQUAL = "="
-# Blank at which no line ends.
-_HELD = "\u00a0"
-_WHERE = "every row and metric: --all prints them, the run's report.html sorts and filters them"
+# Name of the paper's own controller.
+PAPERS = "smc"
 
 
-def answer_lines(standings: Sequence[ClassStanding]) -> list[str]:
-    """At most LINES lines of at most COLUMNS columns; empty where nothing was judged."""
-    if not standings:
-        return []
-    from wristctl.simulation.oscillation import LIMIT_CYCLE
-
-    names, swing = _names(standings), deg(LIMIT_CYCLE)
-    head = [
-        "RMSE [deg], geometric mean [95 % interval], best first; = not told apart from the best of its place;",
-        f"no place: fails, limit-cycles (> {swing} deg at rest), chatters, is short, not physical; no n/m: in all",
+def answer_of(rankings: Sequence[Ranking], run: str = "") -> Answer | None:
+    """The answer of a comparison for one screen, with the path of its run; None where nothing was compared."""
+    if not rankings:
+        return None
+    names = names_of(rankings)
+    more = f"All figures of every controller: `--all`, or {run}/report.html." if run else "All figures: `.tables`."
+    notes = [
+        (ties(rankings, names), ""),
+        (do_not_use(rankings, names), ""),
+        (papers(rankings), ""),
+        (certainty(rankings), ""),
+        (f"Your own wrist: `wristctl compare controllers mywrist.yaml` (docs/your-own-wrist.md). {more}", more),
     ]
-    end = [
-        *wrapped(_printed(standings), 2),
-        *wrapped(_papers_places(standings, names), 2),
-        *wrapped(_papers_order(standings), 1),
+    return fitted(Answer(advice(rankings), ranking_table(rankings, names)), notes)
+
+
+def papers(rankings: Sequence[Ranking]) -> str:
+    """What becomes of the paper's printed gains, of P1 and P2 exchanged, and of its ranking, condition by condition."""
+    labels = list(dict.fromkeys(label for ranking in rankings for label in ranking.labels))
+    sentences = [
+        f"{label}{explained} {_outcomes(rankings, label)}."
+        for gains, explained in ((PRINTED, ""), ("exchanged", " (P1 and P2 exchanged)"))
+        for label in labels
+        if label.endswith(f"/{gains}")
     ]
-    end.append(_WHERE)
-    room = LINES - len(head) - len(end)
-    rooms = [max(1, room // len(standings))] * len(standings)
-    for index in sorted(
-        range(len(standings)), key=lambda place: -len(wrapped(_lost(standings[place], names), LINES, _WIDTH))
-    ):
-        rooms[index] += sum(rooms) < room
-    blocks = [_block(standing, names, allowed) for standing, allowed in zip(standings, rooms, strict=True)]
-    return [*head, *[line for block in blocks for line in block][:room], *end]
+    if ranks := _papers_order(rankings):
+        sentences.append(ranks)
+    return f"The paper. {' '.join(sentences)}" if sentences else ""
 
 
-def head_with_the_best(findings: Findings, standings: Sequence[ClassStanding]) -> None:
-    """Let the run's page be headed by the error of the best row of each class."""
-    names: list[str] = []
-    for standing in standings:
-        if standing.standing.groups:
-            best = standing.standing.groups[0][0]
-            mean, names = standing.means[best], [*names, f"best_{standing.name.replace(',', '').replace(' ', '_')}"]
-            interval = (mean.low, mean.high) if math.isfinite(mean.high) else None
-            meaning = f"RMSE of {standing.labels[best]}, the best row there, over {standing.cells}"
-            findings.metric(names[-1], mean.value, "rad", "lower", standing.scores.shape[1], interval, meaning)
-    findings.headline(*names)
+# Faults that a word says of the paper's gains, the commonest last; others by their verb.
+_UNSTEADY = ("swings", "chatters", "pulls harder than a tendon bears", "changes with the integration step")
 
 
-def _names(standings: Sequence[ClassStanding]) -> dict[str, str]:
-    """Short name of each row: its law alone where the law has no other row; printed gains are always named."""
-    labels = dict.fromkeys(label for standing in standings for label in standing.labels)
-    laws = Counter(label.split("/")[0] for label in labels)
-    alone = {label for label in labels if laws[label.split("/")[0]] == 1 and not label.endswith(f"/{PRINTED}")}
-    return {label: label.split("/")[0] if label in alone else label.removesuffix("/default") for label in labels}
-
-
-def _block(standing: ClassStanding, names: dict[str, str], room: int) -> list[str]:
-    """Groups in order, who has no place (of both as much as there is room for), and what the best one buys."""
-    name = f"{standing.name} ({standing.cells}): "
-    groups, lost, bought = _groups(standing, names), _lost(standing, names), _buys(standing, names)
-    below = (room - 1 if room < 3 else room - 2) if room > 1 else 0
-    lines = wrapped(lost, below, _WIDTH) if below else []
-    ends = wrapped(bought, 1, _WIDTH) if len(lines) < room - 1 else []
-    lines = [*wrapped([name + groups[0], *groups[1:]], room - len(lines) - len(ends), _WIDTH), *lines, *ends]
-    return [line if number == 0 else f"{_INDENT}{line}" for number, line in enumerate(lines)]
-
-
-def _groups(standing: ClassStanding, names: dict[str, str]) -> list[str]:
-    """Pieces of text, one a row: the best of a group with the group's number, then the tied rows after =."""
-    if untold := standing.standing.untold:
-        return _untold(
-            standing, [f"{names[standing.labels[row]]} {degrees(standing.means[row].value)}" for row in untold]
-        )
-    if not standing.standing.groups:
-        return ["nothing has a place"]
-    pieces = []
-    for number, group in enumerate(standing.standing.groups, start=1):
-        for place, row in enumerate(group):
-            mean = standing.means[row]
-            bounded = number == 1 and place == 0 and math.isfinite(mean.high) and mean.high > mean.low
-            ends = f" [{degrees(mean.low)}, {degrees(mean.high)}]" if bounded else ""
-            begin = f"{_EQUAL}{_HELD}" if place else f"{number}.{_HELD}"
-            pieces.append(f"{begin}{names[standing.labels[row]]} {degrees(mean.value)}{ends}")
-    return pieces
-
-
-def _untold(standing: ClassStanding, rows: list[str]) -> list[str]:
-    """Statement that too few motions were run to tell these rows apart, least error first, with a remedy."""
-    from wristctl.comparison.model_confidence_set import LEAST_PAIRS
-
-    n, unit = standing.scores.shape[1], standing.cells.split()[1].rstrip("s")
-    more = "more motions or --repetitions" if standing.loops else "more worlds"
-    sentence = f"too few {unit}s to tell (n={n}, {LEAST_PAIRS} at least): {more}; least error first, not ranked:"
-    return [f"{sentence} {rows[0]},", *(f"{row}," for row in rows[1:])]
-
-
-def _lost(standing: ClassStanding, names: dict[str, str]) -> list[str]:
-    """Who has no place: each row once, with in how many motions where not in all."""
-    stands, motions = standing.standing, standing.motions
-    called = [names[label] for label in standing.labels]
-
-    def among(times: int, count: int) -> str:
-        return "" if times == count else f" {times}/{count}"
-
-    unreliable: dict[str, list[str]] = {"fails": [], **{kind: [] for kind in standing.unsound}}
-    for row in stands.unreliable:
-        sizes = {"limit cycle": f" +-{deg(standing.swing[row])} deg", "chatters": f" {two(standing.chatter[row])}/s"}
-        n, times = stands.lost[row].n, {"fails": stands.failures[row].times}
-        times |= {kind: int(counts[row]) for kind, counts in standing.unsound.items()}
-        first, *other_kinds = [kind for kind, count in times.items() if count]
-        shown = {kind: f"{kind}{sizes.get(kind, '')}".removeprefix("limit cycle ") for kind in other_kinds}
-        also = ", ".join(f"{wording} in {times[kind]}/{n}" for kind, wording in shown.items())
-        entry = f"{called[row]}{sizes.get(first, '')}{among(times[first], n)}"
-        unreliable[first].append(entry + f" ({also})" * bool(also))
-    kinds = unreliable | {
-        "does not arrive": [f"{called[row]}{among(int(standing.away[row]), motions)}" for row in stands.short],
-        "no tendon bears it": [f"{called[row]} {standing.peak[row]:.2g} N" for row in stands.unphysical],
-    }
-    pieces = []
-    for kind, rows in kinds.items():
-        pieces += [
-            f"{'' if index else f'{kind}: '}{row}{',' * (index < len(rows) - 1)}" for index, row in enumerate(rows)
-        ]
-    return pieces
-
-
-def _buys(standing: ClassStanding, names: dict[str, str]) -> list[str]:
-    """Errors of the next place, of feedforward and of the rungs of the ladder, over that of the best row."""
-    groups = standing.standing.groups
-    if not groups:
-        return []
-    best = groups[0][0]
-    rungs = {name: row for name in LADDER if (row := standing.best(name)) is not None and row != best}
-    following = [groups[1][0]] if len(groups) > 1 else []
-    pieces: list[str] = []
-    for row in dict.fromkeys([*following, *rungs.values()]):
-        ratio, name = standing.times_better(best, row), names[standing.labels[row]]
-        bounded = name == LADDER[0] and math.isfinite(ratio.high)
-        times = f"{ratio.value:.2f}" if ratio.value < 10.0 else two(ratio.value)
-        pieces.append(f"{name} x{times}" + f" [{two(ratio.low)}, {two(ratio.high)}]" * bounded + ",")
-    least = degrees(standing.means[best].value)
-    beside = f"{names[standing.labels[best]]}'s" if not least.startswith("<") else f"{least[1:]} deg"
-    return [f"errors over {beside}: {pieces[0]}", *pieces[1:]] if pieces else []
-
-
-def _printed(standings: Sequence[ClassStanding]) -> list[str]:
-    """Fates of the paper's printed gains, with the number of classes of each fate; the numbers add up to all."""
-    sentences: list[str] = []
-    for label in dict.fromkeys(
-        label for standing in standings for label in standing.labels if label.endswith(f"/{PRINTED}")
-    ):
-        fates = [
-            standing.standing.fate(standing.labels.index(label)) for standing in standings if label in standing.labels
-        ]
-        words = {"unreliable": "fails, swings or chatters", "ranked": "has a place"}
-        kinds = [f"{words.get(fate, fate)} in {times}" for fate, times in Counter(fates).items()]
-        begin, classes = ("", "") if sentences else ("printed gains: ", f" of {len(fates)} classes")
-        sentences.append(f"{begin}{label.split('/')[0]} {', '.join(kinds)}{classes}")
-    return sentences
-
-
-def _papers_places(standings: Sequence[ClassStanding], names: dict[str, str]) -> list[str]:
-    """The places of the paper's law in each class, of how many places."""
-    sentences = []
-    for label in names:
-        law, _, gains = label.partition("/")
-        if law != PAPERS or gains == PRINTED:
+def _outcomes(rankings: Sequence[Ranking], label: str) -> str:
+    """Conditions in which a row works, with its error, and in which it does not, by what is wrong there."""
+    works, bad = list[str](), dict[str, list[str]]()
+    for ranking in rankings:
+        if label not in ranking.labels:
             continue
-        places = []
-        for standing in standings:
-            group = standing.standing.group(standing.labels.index(label)) if label in standing.labels else None
-            places.append("-" if group is None else f"{group}/{len(standing.standing.groups)}")
-        sentences.append(f"{label} {', '.join(places)}")
-    if not sentences:
-        return []
-    return [f"place of all places, by class (-: none): {sentences[0]}", *sentences[1:]]
+        row, where = ranking.labels.index(label), condition(ranking)
+        if row in unusable(ranking):
+            verb = next(iter(facts(ranking, row)))
+            bad.setdefault("swings or chatters" if verb in _UNSTEADY else verb, []).append(where)
+        else:
+            works.append(f"{where} ({error(ranking, row)} deg)")
+    ordered = sorted(bad.items(), key=lambda item: len(item[1]))
+    if not works and len(ordered) == 1:
+        return f"{ordered[0][0]} in every condition"
+    clauses = [f"works in {joined(works)}" if works else "works nowhere"]
+    for verb, places in ordered:
+        rest = verb == ordered[-1][0] and len(places) > 1
+        clauses.append(f"{verb} in {'the others' if rest else joined(places)}")
+    return joined(clauses)
 
 
-def _papers_order(standings: Sequence[ClassStanding]) -> list[str]:
-    """Whether the order of the paper's five laws by RMSE is that of their best rows here."""
+def _papers_order(rankings: Sequence[Ranking]) -> str:
+    """Whether the order of the paper's five controllers by RMSE is that of their best rows here."""
     from wristctl.comparison.paper import T2
 
     printed = sorted(T2, key=lambda name: T2[name].rmse)
-    rows = {
-        standing.name: [standing.labels[row].split("/")[0] for row in standing.standing.order] for standing in standings
-    }
-    printed_laws = {name: list(dict.fromkeys(law for law in laws if law in T2)) for name, laws in rows.items()}
-    ours = {name: laws for name, laws in printed_laws.items() if len(laws) == len(T2)}
-    if not ours:
-        return []
-    holds = [name for name, order in ours.items() if order == printed]
-    where = f" ({', '.join(holds)})" if holds else ""
-    order = f"the paper's order (least RMSE first: {', '.join(printed)})"
-    return [f"{order} holds in {len(holds)} of {len(ours)} classes{where}"]
+    holds, complete = [], 0
+    for ranking in rankings:
+        ordered = [ranking.labels[row].split("/")[0] for row in ranking.standing.order]
+        theirs = list(dict.fromkeys(name for name in ordered if name in T2))
+        complete += len(theirs) == len(T2)
+        if theirs == printed:
+            holds.append(condition(ranking))
+    if not complete:
+        return ""
+    where = f"{joined(holds)} alone" if holds else f"none of {complete} conditions"
+    return f"Its ranking {' < '.join(printed)} holds in {where}."
 
 
-def wrapped(pieces: Iterable[str], lines: int, columns: int = COLUMNS, remainder: str = "more") -> list[str]:
-    """Wrap as many pieces as fit in `lines` lines, and add the number of the pieces left out."""
-    texts = [piece for piece in pieces if piece]
-    for kept in range(len(texts), 0, -1):
-        text = "".join(
-            f"{piece} " if piece.endswith(",") or after.startswith(_EQUAL) else f"{piece}; "
-            for piece, after in zip(texts[:kept], [*texts[1:kept], ""], strict=True)
-        ).rstrip(" ,;")
-        text += f"; +{len(texts) - kept} {remainder}" if kept < len(texts) else ""
-        wrapped_lines = in_lines(text, columns)
-        if len(wrapped_lines) <= lines:
-            break
-    else:
-        wrapped_lines = in_lines(texts[0] if texts else "", columns, max(1, lines))
-    return [line.replace(_HELD, " ") for line in wrapped_lines]
-
-
-def deg(value: float) -> str:
-    """An angle [rad] in degrees, to two digits."""
-    return two(math.degrees(value))
+def head_with_the_best(findings: Findings, rankings: Sequence[Ranking]) -> None:
+    """Let the run's page be headed by the error of the best row under each condition."""
+    headed: list[str] = []
+    for ranking in rankings:
+        if ranking.standing.groups:
+            best = ranking.standing.groups[0][0]
+            mean, name = ranking.means[best], f"best_{ranking.name.replace(',', '').replace(' ', '_')}"
+            interval = (mean.low, mean.high) if math.isfinite(mean.high) else None
+            meaning = f"RMSE of {ranking.labels[best]}, the best there, over {ranking.cases}"
+            findings.metric(name, mean.value, "rad", "lower", ranking.count, interval, meaning)
+            headed.append(name)
+    findings.headline(*headed)
 
 
 # Metrics that a motion which never rests does not have.

@@ -1,24 +1,20 @@
 """Figures of classes of conditions: the answer at once, and controllers beside each other."""
 
 from collections.abc import Sequence
-from textwrap import fill
-from typing import Any
 
 import numpy as np
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from wristctl.commands.compare.csv_data import metrics_of
-from wristctl.comparison.class_standing import ClassStanding
 from wristctl.comparison.combinations import ComparedRow
+from wristctl.comparison.controller_ranking import Ranking, undominated
 from wristctl.plotting.loop_figures import envelope, label
 from wristctl.plotting.style import (
     BLACK,
     GREY,
     ORANGE,
     PURPLE,
-    VERMILLION,
     colour,
     columns_within,
     figure,
@@ -35,7 +31,7 @@ _BESIDE = ("smc", "pid", "feedforward")
 MOST = 5
 
 
-def shown_rows(standing: ClassStanding) -> list[str]:
+def shown_rows(standing: Ranking) -> list[str]:
     """Rows that a figure of several shows: the best two, then the best of the paper's law, of PID and feedforward."""
     order = [standing.labels[row] for row in standing.standing.order]
     beside = [standing.labels[row] for name in _BESIDE if (row := standing.best(name)) is not None]
@@ -61,9 +57,7 @@ def tension_rows(courses: Sequence[Trajectory], heading: str = "") -> Figure:
     return fig
 
 
-def error_against_variation(
-    results: Sequence[ComparedRow], classes: Sequence[ClassStanding], heading: str = ""
-) -> Figure:
+def error_against_variation(results: Sequence[ComparedRow], classes: Sequence[Ranking], heading: str = "") -> Figure:
     """RMSE [deg] against the tensions' total variation [N/s] of each row, medians over motions: a panel for each class.
 
     A line joins what nothing beats in both (Pareto's front); a row that is unreliable, does not arrive or is not
@@ -80,7 +74,9 @@ def error_against_variation(
             style = {"color": colour(row.split("/")[0]), "linestyle": "none", "marker": "o" if sound[row] else "x"}
             (drawn,) = panel.plot(variation, error, markersize=5.0, **style)
             drawn_laws.setdefault(row.split("/")[0], drawn)
-        front = pareto_front(np.array([points[row] for row in points if sound[row]]).reshape(-1, 2))
+        costs = np.array([points[row] for row in points if sound[row]]).reshape(-1, 2)
+        front = costs[undominated(costs)]
+        front = front[np.argsort(front[:, 1])]
         panel.plot(front[:, 1], front[:, 0], color=BLACK, linewidth=0.8, zorder=1.5)
         title(panel, standing.name)
     for panel in axes.ravel().tolist()[len(classes) :]:
@@ -105,15 +101,6 @@ def error_against_variation(
     return fig
 
 
-def pareto_front(points: np.ndarray) -> np.ndarray:
-    """Points of Pareto's front, (F, 2), among points (P, 2), sorted by the second coordinate.
-
-    A point is on the front where no other is at least as small in both coordinates and smaller in one.
-    """
-    kept = [point for point in points if not any((rival <= point).all() and (rival < point).any() for rival in points)]
-    return np.array(sorted(kept, key=lambda point: (point[1], point[0]))).reshape(-1, 2)
-
-
 def _points(results: Sequence[ComparedRow]) -> dict[str, tuple[float, float]]:
     """Median RMSE [deg] and variation of each row over its motions."""
     points = {}
@@ -124,66 +111,3 @@ def _points(results: Sequence[ComparedRow]) -> dict[str, tuple[float, float]]:
         if np.isfinite(error).any():
             points[row] = float(np.degrees(np.nanmedian(error))), max(float(np.nanmedian(variation)), 1e-3)
     return points
-
-
-_BEST = "best, or tied with it"
-# Markers by the fate of a row.
-_MARKS: dict[str, dict[str, Any]] = {
-    _BEST: {"marker": "o", "markersize": 7.0, "markeredgecolor": BLACK},
-    "ranked": {"marker": "o", "markersize": 4.5},
-    "too few to tell": {"marker": "o", "markersize": 4.5, "markerfacecolor": "none"},
-    "unreliable": {"marker": "x", "color": VERMILLION, "markersize": 6.0, "markeredgewidth": 1.8},
-    "does not arrive": {"marker": "v", "color": GREY, "markersize": 5.5},
-    "not physical": {"marker": "^", "color": GREY, "markersize": 5.5},
-}
-_SHOWN = {"ranked": "behind it", "unreliable": "fails, swings or chatters"}
-
-
-def answer_figure(standings: Sequence[ClassStanding]) -> Figure:
-    """RMSE [deg] of each row in each class, log, with its 95 % interval; rows from best to worst over all classes."""
-    labels = _rows(standings)
-    columns = columns_within(len(standings), 1.1)
-    deep = -(-len(standings) // columns)
-    fig, axes = figure(deep, columns, height=deep * (0.85 + 0.2 * len(labels)) + 0.95, sharey=True)
-    for panel, standing in zip(axes.ravel().tolist(), standings, strict=False):
-        _panel(panel, standing, labels)
-    for panel in axes.ravel().tolist()[len(standings) :]:
-        panel.set_visible(False)
-    axes[0, 0].set_yticks(range(len(labels)), [label.removesuffix("/default") for label in labels])
-    axes[0, 0].invert_yaxis()
-    axes[-1, (columns - 1) // 2].set_xlabel("RMSE [deg]: geometric mean with 95 % interval", fontsize=9.0)
-    plain: dict[str, Any] = {"linestyle": "none", "color": GREY}
-    kinds = {_kind(class_standing, row) for class_standing in standings for row in range(len(class_standing.labels))}
-    handles = [
-        Line2D([], [], label=_SHOWN.get(name, name), **plain | mark) for name, mark in _MARKS.items() if name in kinds
-    ]
-    legend_under(fig, handles, 3)
-    return fig
-
-
-def _panel(panel: Axes, standing: ClassStanding, labels: Sequence[str]) -> None:
-    for row, name in enumerate(standing.labels):
-        mean, place, kind = standing.means[row], labels.index(name), _kind(standing, row)
-        style = {"color": colour(name.split("/")[0])} | _MARKS[kind]
-        ends = np.degrees([mean.low, mean.high])
-        if np.isfinite(ends).all():
-            panel.plot(ends, [place, place], color=style["color"], linewidth=1.4)
-        panel.plot(np.degrees(mean.value), place, linestyle="none", **style)
-    logarithmic(panel.xaxis)
-    panel.set_ylim(-0.7, len(labels) - 0.3)
-    panel.tick_params(axis="x", which="minor", labelbottom=False)
-    panel.tick_params(axis="x", labelsize=7.5)
-    title(panel, f"{fill(standing.name, 12)}\n{standing.cells}")
-
-
-def _kind(standing: ClassStanding, row: int) -> str:
-    return _BEST if standing.standing.group(row) == 1 else standing.standing.fate(row)
-
-
-def _rows(standings: Sequence[ClassStanding]) -> list[str]:
-    """Labels by their mean place over the classes."""
-    places: dict[str, list[int]] = {}
-    for standing in standings:
-        for place, row in enumerate(standing.standing.order):
-            places.setdefault(standing.labels[row], []).append(place)
-    return sorted(places, key=lambda label: float(np.mean(places[label])))

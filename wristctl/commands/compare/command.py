@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -9,9 +10,10 @@ from functools import partial
 from itertools import chain
 from typing import TYPE_CHECKING, Any
 
+from wristctl.commands.answer import Answer
 from wristctl.commands.compare.answer import (
     STANDING_UNITS,
-    answer_lines,
+    answer_of,
     head_with_the_best,
     loop_tables,
     step_table,
@@ -30,6 +32,7 @@ from wristctl.commands.inputs_of_loops import (
     network_for,
     tuned_gains,
     tuned_on,
+    with_what_there_is,
 )
 from wristctl.commands.loop_warnings import (
     asked_by,
@@ -39,6 +42,9 @@ from wristctl.commands.loop_warnings import (
     warn_outside_conditions,
 )
 from wristctl.commands.procedure import Procedure
+from wristctl.commands.ranking_answer import condition
+from wristctl.commands.ranking_drawing import draw_rankings
+from wristctl.commands.ranking_tables import answer_tables, every_row
 from wristctl.commands.results import Findings, StudyResult
 from wristctl.commands.session import Session
 from wristctl.commands.sweep.command import sweepable
@@ -46,50 +52,49 @@ from wristctl.commands.tune.command import planned_search, search_all
 from wristctl.config.study import Study
 from wristctl.errors import UserError, under
 
+log = logging.getLogger(__name__)
+
 if TYPE_CHECKING:
     import numpy as np
     import pandas as pd
 
-    from wristctl.comparison.class_standing import ClassStanding
     from wristctl.comparison.combinations import ComparedRow
+    from wristctl.comparison.controller_ranking import Ranking
     from wristctl.comparison.step_cost import StepTime
-    from wristctl.comparison.world_ranking import WorldRanking
     from wristctl.control.table import Gains
     from wristctl.simulation.closed_loop import Size
     from wristctl.tuning.search import Search
 
 
-def draw(findings: Findings, study: Study, results: list[ComparedRow], standings: Sequence[ClassStanding]) -> None:
-    """Draw each class, RMSE against variation of tension, RMSE over a growing leaf, and every row on every loop."""
-    from wristctl.commands.compare.class_figures import answer_figure, error_against_variation
+def draw(findings: Findings, study: Study, results: list[ComparedRow], rankings: Sequence[Ranking]) -> None:
+    """Draw each condition, RMSE against tension variation and over a growing setting, and every row on every loop."""
+    from wristctl.commands.compare.class_figures import error_against_variation
     from wristctl.commands.compare.figures import error_over_disturbance, series_of_sizes
 
-    caption = "RMSE of every row in each class of conditions, with 95 % intervals; rows from best to worst over all"
-    findings.figure("answer", answer_figure, standings, caption=caption)
-    findings.overview.figure = "answer"
-    for standing in standings:
-        _of_class(findings, standing, results)
+    draw_rankings(findings, rankings, later=True)
+    for ranking in rankings:
+        _of_class(findings, ranking, results)
     later = partial(findings.figure, later=True)
     first = [result for result in results if result.inverse == _stands_for(results)[2]]
     caption = "RMSE against total variation of tension, medians over motions; the line is Pareto's front"
-    later("rmse-against-tension-variation", error_against_variation, first, standings, caption=caption)
+    later("rmse-against-tension-variation", error_against_variation, first, rankings, caption=caption)
     for leaf, sizes in series_of_sizes(study.compare.loops).items():
         caption = f"RMSE over {leaf}, medians over motions"
         later(f"rmse-over-{_slug(leaf)}", error_over_disturbance, first, leaf, sizes, caption=caption)
     _of_every_row(findings, study, results)
 
 
-def _of_class(findings: Findings, standing: ClassStanding, results: Sequence[ComparedRow]) -> None:
+def _of_class(findings: Findings, ranking: Ranking, results: Sequence[ComparedRow]) -> None:
     """Errors and tensions over time of the best rows and of the paper's, on the motion that stands for the class."""
     from wristctl.commands.compare.class_figures import shown_rows, tension_rows
     from wristctl.plotting.loop_figures import error_sizes, errors
 
     later = partial(findings.figure, later=True)
-    cell = _stands_for(standing.of(results))
+    cell = _stands_for(ranking.of(results))
     by_label = {result.label: result for result in results if (result.loop, result.reference, result.inverse) == cell}
-    shown = [by_label[row] for row in shown_rows(standing) if row in by_label]
+    shown = [by_label[row] for row in shown_rows(ranking) if row in by_label]
     courses = [result.simulation.trajectory for result in shown]
-    slug, where = _slug(standing.name), f"{standing.name}: loop {cell[0]}, {cell[1]}"
+    slug, where = _slug(ranking.name), f"{condition(ranking)}: loop {cell[0]}, {cell[1]}"
     caption = f"|theta - reference| of the best rows and of the paper's laws, {where}"
     later(f"error-over-time-{slug}", errors, courses, where, log=True, caption=caption)
     later(
@@ -142,23 +147,23 @@ class Compared(StudyResult):
     """Searches of the controllers that were tuned here, by name."""
     step_times: dict[str, StepTime]
     """Median and 99th percentile of a control step on this machine [us], by controller/gains."""
-    standings: list[ClassStanding]
-    """Standings of the rows in each class of conditions, or over the worlds of a family."""
-    rankings: Sequence[WorldRanking] = ()
-    """Rankings over the worlds of a named family: of its smooth motions, of its steps. `rows` is empty then."""
+    rankings: Sequence[Ranking]
+    """Rankings under each condition, or over the worlds of a named family: of its smooth motions, of its steps. `rows`
+    is empty then."""
 
     @property
     def fault(self) -> UserError | None:
-        """Error of a ranking in which every row is unreliable; None where some row stands."""
-        if any(len(ranking.standing.unreliable) < len(ranking.rows) for ranking in self.rankings) or not self.rankings:
+        """Error of rankings over worlds in which every row is unreliable; None where some row stands."""
+        worlds = [ranking for ranking in self.rankings if ranking.unit == "world"]
+        if any(len(ranking.standing.unreliable) < len(ranking.labels) for ranking in worlds) or not worlds:
             return None
         reason, where = "every row fails, swings or chatters in some world", self.findings.run
         return UserError(reason, str(where.path) if where else "", "other gains, or milder worlds", exit_code=3)
 
     @property
-    def summary(self) -> list[str]:
-        """Best row in each class of conditions, in words."""
-        return answer_lines(self.standings)
+    def answer(self) -> Answer | None:
+        """Which controller to use under which condition, and which must not be used."""
+        return answer_of(self.rankings, str(self.findings.run.path) if self.findings.run else "")
 
     def frame(self) -> pd.DataFrame:
         """One row per combination: every metric beside the paper's; of a ranking one per row, best first."""
@@ -166,10 +171,10 @@ class Compared(StudyResult):
 
         from wristctl.commands.compare.csv_data import frame
         from wristctl.comparison.combinations import paper_cells
-        from wristctl.comparison.world_ranking import ranking_frame
+        from wristctl.comparison.world_ranking import WorldRanking, ranking_frame
 
-        if self.rankings:
-            return pd.concat([ranking_frame(ranking) for ranking in self.rankings], ignore_index=True)
+        if worlds := [ranking for ranking in self.rankings if isinstance(ranking, WorldRanking)]:
+            return pd.concat([ranking_frame(ranking) for ranking in worlds], ignore_index=True)
         return frame(self.rows, paper_cells(self.study))
 
     def series(self) -> dict[str, np.ndarray]:
@@ -189,6 +194,7 @@ def plan(study: Study, inputs: Inputs) -> str:
     from wristctl.comparison.combinations import refuse_tuned_scenarios
     from wristctl.simulation.closed_loop import check_size
 
+    study, _ = with_what_there_is(study, inputs)
     settings, earlier, searched = study.compare, tuned_on(inputs), ""
     found_here = settings.tuning.controllers if settings.tuning is not None else ()
     for number, row in enumerate(settings.rows):
@@ -229,14 +235,17 @@ def compare(session: Session) -> Compared:
     """Compare controllers on loops and references, beside the paper's numbers, or rank them on a family of worlds."""
     from wristctl.commands.compare.csv_data import frame, repetitions_frame, series
     from wristctl.commands.truth_table import truth_tables
-    from wristctl.comparison.class_standing import class_standings, of_ranking, standings_frame
     from wristctl.comparison.combinations import compare as run_comparison
     from wristctl.comparison.combinations import paper_cells
+    from wristctl.comparison.controller_ranking import class_rankings, standings_frame
     from wristctl.comparison.repetition_spread import spread
     from wristctl.simulation.closed_loop import scenario_of
     from wristctl.simulation.worlds import Draws
 
-    study, findings, searches = session.study, session.findings, dict[str, "Search"]()
+    study, left_out = with_what_there_is(session.study, session.inputs)
+    findings, searches = session.findings, dict[str, "Search"]()
+    if left_out:
+        log.warning("left out: %s", "; ".join(left_out))
     settings = study.compare
     loops = judged_loops(study, study.compare).values()
     warn_if_it_buckles(findings, study.wrist, loops)
@@ -248,10 +257,11 @@ def compare(session: Session) -> Compared:
         searches = search_all(session, study.model_copy(update={"tune": settings.tuning}), network)
     tuned = dict(tuned_gains(session.inputs) or {}) | {name: search.gains for name, search in searches.items()}
     if settings.worlds.family:
-        rankings, shown = ranked(session, study, network, tuned)
-        stands = [of_ranking(ranking) for ranking in rankings]
-        head_with_the_best(findings, stands)
-        return Compared(study, findings, shown, [], searches, {}, stands, rankings)
+        of_worlds = ranked(session, study, network, tuned)
+        head_with_the_best(findings, of_worlds)
+        draw_rankings(findings, of_worlds)
+        shown = [*answer_tables(of_worlds), *map(every_row, of_worlds)]
+        return Compared(study, findings, shown, [], searches, {}, of_worlds)
     with session.progress("comparing", total=100, unit="%") as report:
         results = run_comparison(study, network, tuned, lambda share: report(round(100 * share)))
     scenarios = [scenario_of(reference, way) for reference in settings.references for way in settings.directions]
@@ -265,27 +275,32 @@ def compare(session: Session) -> Compared:
         name = "_".join((result.loop, result.label, result.inverse, result.reference)).replace(" ", "-")
         rmse = spread(result.repeated.metrics["rmse"])
         findings.metric(f"rmse_{name}", rmse.median, "rad", "lower", rmse.n, rmse.interval)
-    standings = class_standings(results, settings, study.wrist)
-    findings.table("data/standings.csv", standings_frame(standings), units=STANDING_UNITS)
-    head_with_the_best(findings, standings)
-    times = _step_times(session, tuned)
+    rankings = class_rankings(results, settings, study.wrist)
+    findings.table("data/standings.csv", standings_frame(rankings), units=STANDING_UNITS)
+    head_with_the_best(findings, rankings)
+    times = _step_times(session, study, tuned)
     with session.progress("drawing"):
-        draw(findings, study, results, standings)
+        draw(findings, study, results, rankings)
     by_loop = [loop_tables(loop, [r for r in results if r.loop == loop], cells) for loop in settings.loops]
-    tables = [*chain.from_iterable(by_loop), step_table(times), *truth_tables(study.wrist, settings.loops)]
-    return Compared(study, findings, tables, results, searches, times, standings)
+    tables = [
+        *answer_tables(rankings),
+        *chain.from_iterable(by_loop),
+        step_table(times),
+        *truth_tables(study.wrist, settings.loops),
+    ]
+    return Compared(study, findings, tables, results, searches, times, rankings)
 
 
-def _step_times(session: Session, tuned: Gains) -> dict[str, StepTime]:
+def _step_times(session: Session, study: Study, tuned: Gains) -> dict[str, StepTime]:
     from wristctl.comparison.step_cost import step_time
     from wristctl.control.table import controller, gains_of
 
     times = {}
     with session.progress("timing the control step"):
-        for row in session.study.compare.rows:
+        for row in study.compare.rows:
             law = controller(row.controller)
             gains = gains_of(law, row.gains, tuned)
-            times[f"{row.controller}/{row.gains_name}"] = step_time(law, gains, session.study.wrist)
+            times[f"{row.controller}/{row.gains_name}"] = step_time(law, gains, study.wrist)
     session.findings.plain("timing.json", {name: time._asdict() for name, time in times.items()})
     return times
 

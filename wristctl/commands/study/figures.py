@@ -7,10 +7,10 @@ from matplotlib.axes import Axes
 from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, NullFormatter
-from numpy.typing import NDArray
 
 from wristctl.arrays import Array
 from wristctl.comparison.bootstrap import plain
+from wristctl.comparison.controller_ranking import undominated
 from wristctl.comparison.paired_worlds import TermValue
 from wristctl.comparison.world_ranking import WorldRanking
 from wristctl.plotting.style import (
@@ -29,28 +29,6 @@ from wristctl.plotting.style import (
 
 _COLOURS = "RdYlBu"
 _AXES = (("chattering", "total variation of tension [N/s]"), ("energy", "work on the wrist [J]"))
-
-
-def medians(ranking: WorldRanking, metric: str) -> Array:
-    """Median of a metric over all rollouts of each row, (R,); nan where no rollout has a finite value."""
-    values = (row.measured.metrics[metric] for row in ranking.rows)
-    return np.array(
-        [
-            np.median(row_values[np.isfinite(row_values)]) if np.isfinite(row_values).any() else np.nan
-            for row_values in values
-        ]
-    )
-
-
-def undominated(costs: Array) -> NDArray[np.bool_]:
-    """Mask (R,) of the rows of `costs` (R, C) on Pareto's front.
-
-    A row is on the front where no other row is at most as dear in all costs and cheaper in one.
-    """
-    no_dearer, cheaper = costs[None] <= costs[:, None], costs[None] < costs[:, None]
-    beaten = np.any(np.all(no_dearer, axis=2) & np.any(cheaper, axis=2), axis=1)
-    front: NDArray[np.bool_] = ~beaten & np.all(np.isfinite(costs), axis=1)
-    return front
 
 
 def laws_by_rig(rankings: Mapping[str, WorldRanking]) -> Figure:
@@ -121,7 +99,7 @@ def pareto(ranking: WorldRanking) -> Figure:
     fig, ((left, right),) = figure(1, 2, height=4.6, sharey=True)
     rmse = np.degrees([mean.value for mean in ranking.means])
     for axes, (metric, label) in zip((left, right), _AXES, strict=True):
-        _front(axes, medians(ranking, metric), rmse, ranking)
+        _front(axes, ranking.medians(metric), rmse, ranking)
         axes.set_xlabel(label)
     left.set_ylabel("RMSE [deg]")
     fig.suptitle(f"{ranking.name}: error and its price; hollow rows fail, swing or chatter", fontsize=10.0)
@@ -162,7 +140,7 @@ def world_map(ranking: WorldRanking) -> Figure:
         axes.plot(places[:, 1] + 0.5, places[:, 0] + 0.5, mark, color=VERMILLION, markersize=2.5, linestyle="none")
     axes.set_yticks(np.arange(len(rows)) + 0.5, [ranking.rows[index].label for index in rows])
     axes.invert_yaxis()
-    axes.set_xlabel(f"{ranking.worlds} worlds, the easiest first")
+    axes.set_xlabel(f"{ranking.count} worlds, the easiest first")
     fig.colorbar(drawn, ax=axes, label="RMSE over the best row's there", extend="max")
     title(axes, f"{ranking.name}: world by world; x fails, a dot swings")
     return fig

@@ -7,8 +7,9 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from wristctl.commands.printed_table import Table
+from wristctl.commands.ranking_drawing import draw_rankings
+from wristctl.commands.ranking_tables import answer_tables, every_row
 from wristctl.commands.session import Session
-from wristctl.commands.study.answer import answer
 from wristctl.commands.study.units import BASE, Studied, StudyPlace, families_of
 from wristctl.config.study import Study
 
@@ -45,18 +46,17 @@ def written(session: Session, judged: Pieces, searches: dict[StudyPlace, Search]
         rankings = _rankings(study, judged)
         terms = [value for ranking in rankings.values() for value in term_values(ranking, study.study.terms)]
         shifts = _shifts(study, judged)
-    sentences = answer(rankings, terms, shifts, study.study.varied or families_of(study)[0])
     _note_streams(session)
     _tables(session, rankings, terms, shifts, searches)
     times = _step_times(session, searches)
     with session.progress("drawing"):
         _draw(session, rankings, terms)
-    shown = [Table("Which law for which rig", *_best(rankings))]
-    shown += [_ranking_table(ranking, times) for ranking in rankings.values()]
+    shown = answer_tables(list(rankings.values()))
+    shown += [every_row(ranking, times) for ranking in rankings.values()]
     if poisoned:
         rows = [(lost.unit.name, lost.why) for lost in poisoned]
         shown.append(Table("Given up, and left out", ("unit of work", "why"), rows))
-    return Studied(study, session.findings, shown, sentences, rankings, searches, terms, shifts, poisoned)
+    return Studied(study, session.findings, shown, rankings, searches, terms, shifts, poisoned)
 
 
 def _rankings(study: Study, judged: Pieces) -> dict[str, WorldRanking]:
@@ -77,7 +77,7 @@ def _rankings(study: Study, judged: Pieces) -> dict[str, WorldRanking]:
             rows = [
                 row_of(place.label, pieces, study.wrist.tension_range, motions) for place, pieces in of_family.items()
             ]
-            one = ranking(family, family_of, rows, laws.index(YARDSTICK), study.study.tolerated, steps)
+            one = ranking(family, family_of, rows, study.study.tolerated, steps)
             rankings[one.name] = one
     return rankings
 
@@ -135,13 +135,13 @@ def _tables(
     for name, ranking in rankings.items():
         slug = _slug(name)
         findings.table(f"data/ranking-{slug}.csv", ranking_frame(ranking), units=units)
-        worlds = {"world": range(ranking.worlds)} | {row.label: row.rmse for row in ranking.rows}
+        worlds = {"world": range(ranking.count)} | {row.label: row.rmse for row in ranking.rows}
         meaning = {row.label: "geometric mean of the RMSE over motions and noises; inf: failed" for row in ranking.rows}
         findings.table(f"data/worlds-{slug}.csv", pd.DataFrame(worlds), dict.fromkeys(meaning, "rad"), meaning)
         for index, row in enumerate(ranking.rows):
             mean = ranking.means[index]
             interval = (mean.low, mean.high) if math.isfinite(mean.high) else None
-            findings.metric(f"rmse_{slug}_{row.label}", mean.value, "rad", "lower", ranking.worlds, interval)
+            findings.metric(f"rmse_{slug}_{row.label}", mean.value, "rad", "lower", ranking.count, interval)
     for family in families_of(session.study):
         if file := findings.file(f"data/gains-{family}.json"):
             gains = {
@@ -181,73 +181,27 @@ def _step_times(session: Session, searches: Mapping[StudyPlace, Search]) -> dict
 
 def _draw(session: Session, rankings: Mapping[str, WorldRanking], terms: Sequence[TermValue]) -> None:
     from wristctl.commands.study.figures import laws_by_rig, pareto, terms_by_rig, world_map
-    from wristctl.plotting.ranking_figures import ranking_intervals, world_profiles
+    from wristctl.plotting.ranking_figures import ranking_intervals
 
     findings = session.findings
+    draw_rankings(findings, list(rankings.values()))
     if rankings:
-        findings.figure("laws", laws_by_rig, rankings)
+        findings.figure(
+            "laws", laws_by_rig, rankings, caption="How many times less RMSE than feedforward, on every rig"
+        )
         findings.overview.figure = "laws"
     if terms:
-        findings.figure("terms", terms_by_rig, terms)
+        findings.figure("terms", terms_by_rig, terms, caption="How many times less RMSE a term of a controller gives")
     for name, ranking in rankings.items():
-        findings.figure(f"ranking-{_slug(name)}", ranking_intervals, ranking)
-        findings.figure(f"profiles-{_slug(name)}", world_profiles, ranking)
-        findings.figure(f"pareto-{_slug(name)}", pareto, ranking)
-        findings.figure(f"worlds-{_slug(name)}", world_map, ranking)
+        slug = _slug(name)
+        caption = f"RMSE of every controller on {name}, with 95 % intervals over worlds"
+        findings.figure(f"ranking-{slug}", ranking_intervals, ranking, caption=caption)
+        caption = f"RMSE against variation of tension and work on {name}; hollow rows must not be used"
+        findings.figure(f"pareto-{slug}", pareto, ranking, caption=caption)
+        caption = f"RMSE over the least one in each world of {name}; a cross fails, a dot swings"
+        findings.figure(f"worlds-{slug}", world_map, ranking, caption=caption)
 
 
 def _slug(name: str) -> str:
     """Name of a file made from a ranking's name."""
     return name.replace(", ", "-")
-
-
-def _best(rankings: Mapping[str, WorldRanking]) -> tuple[tuple[str, ...], list[tuple[object, ...]]]:
-    """The first group of each family."""
-    heads = (
-        "rig",
-        "law",
-        "RMSE [deg]",
-        "95 % low",
-        "high",
-        "times less than feedforward",
-        "95 %",
-        "cannot be told [%]",
-    )
-    rows: list[tuple[object, ...]] = []
-    for family, ranking in rankings.items():
-        floor = 100.0 * (ranking.standing.floor - 1.0)
-        for index in ranking.standing.groups[0] if ranking.standing.groups else []:
-            mean, gain = ranking.means[index], ranking.gains[index]
-            ends = tuple(math.degrees(end) for end in (mean.value, mean.low, mean.high))
-            rows.append(
-                (family, ranking.rows[index].label, *ends, gain.value, f"{gain.low:.3g} to {gain.high:.3g}", floor)
-            )
-    return heads, rows
-
-
-def _ranking_table(ranking: WorldRanking, times: Mapping[str, StepTime]) -> Table:
-    import numpy as np
-
-    from wristctl.commands.study.figures import medians, undominated
-
-    energy, chattering = medians(ranking, "energy"), medians(ranking, "chattering")
-    rmse = np.array([estimate.value for estimate in ranking.means])
-    front = undominated(np.column_stack([rmse, chattering, energy]))
-    rows = []
-    for index in ranking.standing.order:
-        mean, gain, group = ranking.means[index], ranking.gains[index], ranking.standing.group(index)
-        failures, swings = ranking.standing.failures[index], ranking.standing.swings[index]
-        lost = [f"{100 * share.value:.3g} % (< {100 * share.high:.2g})" for share in (failures, swings)]
-        tick = times.get(ranking.rows[index].label.split("/")[0])
-        ends = tuple(math.degrees(end) for end in (mean.value, mean.low, mean.high))
-        rows.append((
-            "-" if group is None else str(group), ranking.rows[index].label, *ends,
-            gain.value, f"{gain.low:.3g} to {gain.high:.3g}", *lost, chattering[index], energy[index],
-            tick.median if tick else None, "yes" if front[index] and group else "",
-        ))  # fmt: skip
-    heads = (
-        "group", "row", "RMSE [deg]", "95 % low", "high", "times less", "95 %", "fails", "swings", "tension [N/s]",
-        "work [J]", "tick [us]", "undominated",
-    )  # fmt: skip
-    title = f"{ranking.name}: {ranking.worlds} held-out worlds, {ranking.motions} motions each"
-    return Table(title, heads, rows)

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
+from wristctl.commands.answer import Answer
 from wristctl.commands.results import StudyResult
 from wristctl.config.fair_study import FairStudySettings, StudyBudget, StudyVariant
 from wristctl.config.families import TuningWorlds
@@ -122,8 +123,6 @@ class Studied(StudyResult):
 
     kind = "study"
 
-    sentences: list[str]
-    """Law for each rig, gain of each term, and reliability of the order: lines of 100 columns."""
     rankings: dict[str, WorldRanking]
     """Rankings by family."""
     searches: dict[StudyPlace, Search]
@@ -133,9 +132,12 @@ class Studied(StudyResult):
     """Units that failed on every worker: their rows are left out."""
 
     @property
-    def summary(self) -> list[str]:
-        """`sentences`."""
-        return self.sentences
+    def answer(self) -> Answer | None:
+        """Controller for each rig, gain of each term, and reliability of the order."""
+        from wristctl.commands.study.answer import answer_of
+
+        run = str(self.findings.run.path) if self.findings.run else ""
+        return answer_of(list(self.rankings.values()), self.terms, self.shifts, run)
 
     @property
     def fault(self) -> UserError | None:

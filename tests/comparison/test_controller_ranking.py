@@ -11,8 +11,8 @@ import pytest
 from tests.commands.conftest import repeated
 from wristctl.api import load_study
 from wristctl.comparison.bootstrap import MEASURABLE, paired_ratio
-from wristctl.comparison.class_standing import ClassStanding, class_standings, standings_frame
 from wristctl.comparison.combinations import CLASSES, ComparedRow, class_of
+from wristctl.comparison.controller_ranking import Ranking, class_rankings, probability_of_less, standings_frame
 from wristctl.config.loop import LOOPS, Loop
 from wristctl.config.wrist import WristParameters
 from wristctl.simulation.repetitions import Repeated
@@ -50,9 +50,9 @@ def compared(label: str, rmse: list[float], loop: str = "a", inverse: str = "non
     return [ComparedRow(loop, f"move {k}", inverse, name, gains, each) for k, each in enumerate(own)]
 
 
-def stand(rows: list[ComparedRow], loops: str = "{a: {}}") -> list[ClassStanding]:
+def stand(rows: list[ComparedRow], loops: str = "{a: {}}") -> list[Ranking]:
     study = load_study(None, f"compare.loops={loops}")
-    return class_standings(rows, study.compare, study.wrist)
+    return class_rankings(rows, study.compare, study.wrist)
 
 
 SPREAD = [1.0, 1.4, 0.7, 2.0, 0.5, 1.1, 0.9, 1.3, 1.8, 0.6]
@@ -66,7 +66,7 @@ def test_rows_stand_in_groups_over_the_motions_of_a_class() -> None:
         for (label, factor), own in zip(factors.items(), noise, strict=True)
     ]
     (found,) = stand([each for row in rows for each in row])
-    assert (found.name, found.cells, found.loops) == ("sampled", "10 motions", ["a"])
+    assert (found.name, found.cases, found.loops) == ("sampled", "10 cases", ["a"])
     assert [sorted(found.labels[at] for at in group) for group in found.standing.groups] == [
         ["a/x", "b/x"],
         ["c/x"],
@@ -76,13 +76,14 @@ def test_rows_stand_in_groups_over_the_motions_of_a_class() -> None:
     assert ratio.value == pytest.approx(2.0, rel=0.03) and ratio.low < ratio.value < ratio.high
     assert reverse.value == pytest.approx(1.0 / ratio.value)
     assert ratio.value == pytest.approx(paired_ratio(found.scores[2], found.scores[0], 1).value)
+    assert found.yardstick is None and np.isnan([gain.value for gain in found.gains]).all()
 
 
 def test_classes_come_in_their_order_and_each_has_its_own_loops() -> None:
     rows = [each for loop in ("soft", "plain", "other") for each in compared("a/x", [1e-3], loop)]
     found = stand(rows, "{soft: {plant: {stiffness_scale: 0.8}}, plain: {}, other: {plant: {payload: 0.1}}}")
     assert [(each.name, each.loops) for each in found] == [("sampled", ["plain"]), ("off-nominal", ["soft", "other"])]
-    assert [each.cells for each in found] == ["1 motion", "2 motions"]
+    assert [each.cases for each in found] == ["1 case", "2 cases"]
 
 
 def test_what_swings_or_fails_or_does_not_arrive_or_is_not_physical_is_in_no_group() -> None:
@@ -153,13 +154,13 @@ def test_more_repetitions_than_motions_are_what_is_compared() -> None:
     }
     few = [each for label, own in rmse.items() for each in compared(label, own[:, 0].tolist())]
     (found,) = stand(few)
-    assert found.cells == "2 motions" and found.standing.untold == [0, 1]
+    assert found.cases == "2 cases" and found.standing.untold == [0, 1]
     many = [
         ComparedRow("a", f"move {k}", "none", label[0], "x", repeated(label, own[k].tolist()))
         for label, own in rmse.items() for k in (0, 1)
     ]  # fmt: skip
     (found,) = stand(many)
-    assert found.cells == "12 repetitions" and found.standing.groups == [[0], [1]] and found.motions == 2
+    assert found.cases == "12 repetitions" and found.standing.groups == [[0], [1]] and found.motions == 2
     np.testing.assert_allclose(found.scores, [np.sqrt(own[0] * own[1]) for own in rmse.values()])
     assert found.means[0].value == pytest.approx(np.exp(np.log(rmse["a/x"]).mean()))
 
@@ -179,8 +180,8 @@ def test_steps_are_no_part_of_the_mean_of_smooth_motions() -> None:
 
     rows = both("a/x", 1e-4) + both("b/x", 1e-2)
     smooth, steps = stand(rows)
-    assert (smooth.name, smooth.cells, smooth.jumps) == ("sampled", "8 motions", False)
-    assert (steps.name, steps.cells, steps.jumps) == ("sampled, steps", "1 motion", True)
+    assert (smooth.name, smooth.cases, smooth.jumps) == ("sampled", "8 cases", False)
+    assert (steps.name, steps.cases, steps.jumps) == ("sampled, steps", "1 case", True)
     assert smooth.times_better(0, 1).value == pytest.approx(100.0) and smooth.standing.groups == [[0], [1]]
     assert steps.means[0].value == steps.means[1].value == pytest.approx(0.04) and steps.standing.untold == [0, 1]
     assert [len(each.of(rows)) for each in (smooth, steps)] == [16, 2]
@@ -212,6 +213,37 @@ def _short(given: Repeated) -> Repeated:
     course = given.first.trajectory
     halved = replace(given.first, trajectory=replace(course, theta=0.5 * course.theta))
     return replace(given, first=halved)
+
+
+def test_gains_are_over_feedforwards_error_in_the_same_cases() -> None:
+    errors = {"a/x": 1e-3, "feedforward/default": 8e-3, "b/x": 4e-3}
+    rows = [compared(label, list(factor * np.array(SPREAD))) for label, factor in errors.items()]
+    (found,) = stand([each for row in rows for each in row])
+    assert found.yardstick == 1 and [gain.value for gain in found.gains] == pytest.approx([8.0, 1.0, 2.0])
+
+
+def test_a_condition_has_the_traits_that_all_its_loops_share() -> None:
+    loops = (
+        "{plain: {}, soft: {plant: {stiffness_scale: 0.8}}, push: {disturbances: {push: {force: 1.0}}},"
+        " camera: {sensor: {level: camera}}, rig: {sensor: {level: camera}, actuator: {level: tendon}}}"
+    )
+    rows = [each for loop in ("plain", "soft", "push", "camera", "rig") for each in compared("a/x", [1e-3], loop)]
+    traits = {each.name: each.traits for each in stand(rows, loops)}
+    told = {name: (one.rig, one.camera, one.tendons, one.load, one.unknown) for name, one in traits.items()}
+    assert told == {
+        "sampled": (False, False, False, False, False),
+        "camera and tendons": (True, True, False, False, False),  # one of the two has no tendons
+        "pushed": (False, False, False, True, False),
+        "off-nominal": (False, False, False, False, True),
+    }
+
+
+def test_one_beats_another_in_the_share_of_cases_where_its_error_is_less() -> None:
+    """Equal below what can be measured, and where both fail; the two shares of a pair add up to one."""
+    scores = np.array([[1e-3, 1e-3, 1e-9, np.inf], [2e-3, 5e-4, 1e-7, np.inf], [5e-3, 6e-3, 1e-2, 1e-2]])
+    shares = probability_of_less(scores)
+    assert shares[0].tolist() == [0.5, 0.5, 0.75] and shares[2].tolist() == [0.25, 0.25, 0.5]
+    np.testing.assert_allclose(shares + shares.T, 1.0)
 
 
 def test_control_is_judged_without_a_network_where_it_can_be() -> None:

@@ -1,0 +1,402 @@
+"""Rankings in words: which controller to use where, what must not be used and why, and how sure that is.
+
+`compare` says so of its conditions, `study` of its families of worlds.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+from wristctl.commands.answer import Answer
+from wristctl.commands.printed_table import Table, degrees, two
+
+if TYPE_CHECKING:
+    from wristctl.comparison.controller_ranking import Ranking, Traits
+
+# Lines of a terminal that an answer of rankings may take.
+LINES = 32
+# Name of gains that the paper prints: never left out of a label.
+PRINTED = "printed"
+# Letters of a name, at most.
+_LETTERS = 18
+
+
+def condition(ranking: Ranking) -> str:
+    """A condition in a few words; of worlds the name of their family."""
+    if ranking.unit == "world":
+        return ranking.name.replace(", steps", " (steps)")
+    name, traits = ranking.name.removesuffix(", steps"), ranking.traits
+    if name == "camera and tendons":
+        words = _rig(traits)
+    else:
+        words = {"pushed": "push", "off-nominal": "wrong model"}.get(name, name)
+        words = f"{_rig(traits)} + {words}" if traits.rig else words
+    return f"{words} (steps)" if ranking.jumps else words
+
+
+def _rig(traits: Traits) -> str:
+    if traits.camera and traits.tendons:
+        return "motors + camera"
+    return "camera" if traits.camera else "motors" if traits.tendons else "motors or camera"
+
+
+def _rig_whole(rankings: Sequence[Ranking]) -> str:
+    """What is simulated of a rig in these conditions."""
+    traits = [ranking.traits for ranking in rankings]
+    if all(one.camera and one.tendons for one in traits):
+        return "motors, tendons and a camera"
+    return "a camera" if all(one.camera for one in traits) else "motors, tendons or a camera"
+
+
+def names_of(rankings: Sequence[Ranking]) -> dict[str, str]:
+    """Short name of each row: its controller alone where that has no other gains; printed gains are always named."""
+    labels = list(dict.fromkeys(label for ranking in rankings for label in ranking.labels))
+    controllers = Counter(label.split("/")[0] for label in labels)
+    names = {}
+    for label in labels:
+        name, _, gains = label.partition("/")
+        short = name if controllers[name] == 1 and gains != PRINTED else label
+        names[label] = short if len(short) <= _LETTERS else f"{short[: _LETTERS - 1]}~"
+    return names
+
+
+def winner(ranking: Ranking, rankings: Sequence[Ranking] = ()) -> int | None:
+    """The first row of the first group; of those with the same error the one that most other rankings have in theirs.
+
+    None where nothing is ranked.
+    """
+    if not ranking.standing.groups:
+        return None
+    first = ranking.standing.groups[0]
+    least = ranking.means[first[0]].value
+    equal = [row for row in first if ranking.means[row].value <= least * (1.0 + 1e-9)]
+    often = Counter(label for other in rankings for label in _first_group(other))
+    return max(equal, key=lambda row: (often[ranking.labels[row]], -first.index(row)))
+
+
+def _first_group(ranking: Ranking) -> list[str]:
+    return [ranking.labels[row] for row in ranking.standing.groups[0]] if ranking.standing.groups else []
+
+
+def joined(words: Sequence[str], last: str = "and") -> str:
+    """a, b and c."""
+    return f"{', '.join(words[:-1])} {last} {words[-1]}" if len(words) > 1 else "".join(words)
+
+
+def error(ranking: Ranking, row: int) -> str:
+    """Geometric mean of a row's RMSE [deg]."""
+    return degrees(ranking.means[row].value)
+
+
+def advice(rankings: Sequence[Ranking]) -> str:
+    """Which controller to use: a sentence for conditions with motors or a camera, and one for ideal ones.
+
+    It is of smooth motions; where all jump, of steps.
+    """
+    smooth = [ranking for ranking in rankings if not ranking.jumps]
+    sentences = []
+    for rig in (True, False):
+        alike = [ranking for ranking in smooth or rankings if ranking.traits.rig == rig]
+        if alike:
+            where = f"with {_rig_whole(alike) if rig else 'ideal angles and torques'}"
+            where = where.capitalize() if smooth else f"For steps {where}"
+            others = [ranking for ranking in smooth or rankings if ranking.traits.rig and not rig]
+            sentences.append(_use(where, alike, others))
+    return " ".join(sentences)
+
+
+def _use(where: str, alike: Sequence[Ranking], others: Sequence[Ranking]) -> str:
+    """What to use in conditions of one kind, how large its error is there, and in which others it must not be used."""
+    ranked = [ranking for ranking in alike if ranking.standing.groups]
+    if not ranked:
+        return f"{where} {_no_ranking(alike)}."
+    often = Counter(label for ranking in ranked for label in _first_group(ranking))
+    firsts = {ranking.labels[row] for ranking in ranked if (row := winner(ranking, ranked)) is not None}
+    chosen = max(sorted(firsts), key=lambda label: (often[label], -_mean(ranked, label)))
+    places = [(ranking, ranking.labels.index(chosen)) for ranking in ranked if chosen in ranking.labels]
+    places = [place for place in places if place[0].standing.group(place[1]) == 1]
+    means = sorted(ranking.means[row].value for ranking, row in places)
+    equal = [label for label, times in often.items() if times == often[chosen] == len(ranked) and label != chosen]
+    named = [chosen, *equal] if len(equal) <= 3 else [chosen]
+    everywhere = len(places) == len(alike) > 1
+    names = f" ({', '.join(map(condition, alike))})" if everywhere else ""
+    text = f"{where}{names} use {joined([*map(called, named)], 'or')}: RMSE {_ends([*map(degrees, means)])} deg"
+    if len(places) == 1:
+        text += interval(*places[0])
+    if len(alike) > 1 and not everywhere:
+        text += f", and nothing is better in {joined([condition(ranking) for ranking, _ in places])}"
+    gains = sorted(ranking.gains[row].value for ranking, row in places if math.isfinite(ranking.gains[row].value))
+    if any(map(_open_loop, (chosen, *equal))):
+        text += "; no controller is better than feedforward, which is open loop"
+    elif gains:
+        text += f", {_ends([*map(two, gains)])} times less than feedforward"
+    if few := [condition(ranking) for ranking in alike if ranking.standing.untold]:
+        text += f" (no ranking in {joined(few)}: too few cases)"
+    bad = [
+        (ranking, ranking.labels.index(chosen))
+        for ranking in others
+        if chosen in ranking.labels and ranking.labels.index(chosen) in unusable(ranking)
+    ]
+    if not bad:
+        return f"{text}."
+    worst = max(bad, key=lambda place: _lost(*place))
+    return f"{text}; with {_rig_whole([worst[0]])} {'it' if len(named) == 1 else chosen} {fact(*worst)}."
+
+
+def _no_ranking(alike: Sequence[Ranking]) -> str:
+    from wristctl.comparison.model_confidence_set import LEAST_PAIRS
+
+    few = [ranking for ranking in alike if ranking.standing.untold]
+    if not few:
+        return "use none of these: each fails, swings, chatters or does not arrive"
+    fewest = min(few, key=lambda ranking: ranking.count)
+    least = min(fewest.standing.untold, key=lambda row: fewest.means[row].value)
+    lowest = f"{called(fewest.labels[least])} has the least RMSE, {error(fewest, least)} deg"
+    return f"there is no ranking: too few cases ({fewest.cases}, {LEAST_PAIRS} are needed). {lowest}"
+
+
+def _ends(shown: Sequence[str]) -> str:
+    """The first and the last of sorted numbers in words; one where they are equal."""
+    return shown[0] if shown[0] == shown[-1] else f"{shown[0]} to {shown[-1]}"
+
+
+def _mean(rankings: Sequence[Ranking], label: str) -> float:
+    """Mean of the logarithm of a row's RMSE over the rankings that it is in."""
+    means = [ranking.means[ranking.labels.index(label)].value for ranking in rankings if label in ranking.labels]
+    return sum(map(math.log, means)) / len(means)
+
+
+def interval(ranking: Ranking, row: int) -> str:
+    """The 95 % interval of a row's RMSE in words; empty where there is none."""
+    mean = ranking.means[row]
+    if not (math.isfinite(mean.high) and mean.high > mean.low):
+        return ""
+    return f" (95 %: {degrees(mean.low)} to {degrees(mean.high)})"
+
+
+def called(label: str) -> str:
+    """A controller with its gains; feedforward has none."""
+    return label.split("/")[0] if _open_loop(label) else label
+
+
+def _open_loop(label: str) -> bool:
+    from wristctl.tuning.objective import YARDSTICK
+
+    return label.split("/")[0] == YARDSTICK
+
+
+def unusable(ranking: Ranking) -> list[int]:
+    """Rows that must not be used: they fail, swing, chatter, do not arrive or pull harder than a tendon bears."""
+    stands = ranking.standing
+    return [*stands.unphysical, *stands.short, *stands.unreliable]
+
+
+def facts(ranking: Ranking, row: int) -> dict[str, tuple[str, int]]:
+    """What is wrong with a row by verb: by how much, and in how many cases; the gravest first."""
+    swing = f"by {two(math.degrees(ranking.swing[row]))} deg"
+    found = {
+        "leaves its range": ("", ranking.standing.failures[row].times),
+        "swings": (swing, int(ranking.unsound["limit cycle"][row])),
+        "chatters": (f"{two(ranking.chatter[row])} times a second", int(ranking.unsound["chatters"][row])),
+        "does not arrive": ("", int(ranking.away[row])),
+    }
+    if ranking.peak[row] > 0.0:
+        found["pulls harder than a tendon bears"] = (f"with {two(ranking.peak[row])} N", ranking.count)
+    if not any(count for _, count in found.values()):
+        found["changes with the integration step"] = ("", int(ranking.unsound["not converged"][row]))
+    if not any(count for _, count in found.values()):
+        found["swings or chatters"] = ("", ranking.standing.swings[row].times)
+    return {verb: (size, count) for verb, (size, count) in found.items() if count}
+
+
+def fact(ranking: Ranking, row: int) -> str:
+    """The gravest fault of a row with its size and number of cases: swings by 2.7 deg in 7 of 8 cases."""
+    verb, (size, count) = next(iter(facts(ranking, row).items()))
+    return " ".join(filter(None, [verb, size, f"in {count} of {_of(ranking, verb)}"]))
+
+
+def _of(ranking: Ranking, verb: str) -> str:
+    """Number and kind of what a fault is counted in."""
+    return f"{ranking.motions} motions" if verb == "does not arrive" else ranking.cases
+
+
+def ranking_table(rankings: Sequence[Ranking], names: Mapping[str, str]) -> Table:
+    """A condition a line: the best, how many are as good, the next, feedforward, and how many must not be used."""
+    unit = "worlds" if rankings[0].unit == "world" else "cases"
+    heads = (
+        f"condition ({unit})",
+        "best: RMSE [deg]",
+        "as good",
+        "next: RMSE [deg]",
+        "feedforward (ratio)",
+        "unusable",
+    )
+    rows = []
+    for ranking in rankings:
+        row, groups, base = winner(ranking, rankings), ranking.standing.groups, ranking.yardstick
+        why = "no ranking: too few" if ranking.standing.untold else "none"
+        best = why if row is None else f"{names[ranking.labels[row]]} {error(ranking, row)}"
+        after = groups[1][0] if len(groups) > 1 else None
+        following = "-" if after is None else f"{names[ranking.labels[after]]} {error(ranking, after)}"
+        ratio = "" if row is None or base is None else f" ({two(ranking.gains[row].value)})"
+        open_loop = "-" if base is None else f"{error(ranking, base)}{ratio}"
+        others = f"{len(groups[0]) - 1} more" if groups and len(groups[0]) > 1 else "-"
+        begin, end = f"{condition(ranking)} ({ranking.count})", f"{len(unusable(ranking))} of {len(ranking.labels)}"
+        rows.append((begin, best, others, following, open_loop, end))
+    return Table("", heads, rows)
+
+
+def ties(rankings: Sequence[Ranking], names: Mapping[str, str]) -> str:
+    """Every controller that is as good as the best of a condition; conditions with the same ones together."""
+    same: dict[tuple[str, ...], list[str]] = {}
+    for ranking in rankings:
+        row = winner(ranking, rankings)
+        if row is not None and len(ranking.standing.groups[0]) > 1:
+            others = tuple(names[ranking.labels[other]] for other in ranking.standing.groups[0] if other != row)
+            same.setdefault(others, []).append(condition(ranking))
+    listed = [f"{joined(where)}: {', '.join(others)}" for others, where in same.items()]
+    return f"As good as the best. {'. '.join(_capital(one) for one in listed)}." if listed else ""
+
+
+def _capital(text: str) -> str:
+    return text[:1].upper() + text[1:]
+
+
+def do_not_use(rankings: Sequence[Ranking], names: Mapping[str, str]) -> str:
+    """Every controller that must not be used with motors, tendons and a camera, and why.
+
+    Where no condition has them, of all conditions. A row that is bad in several conditions is told for the worst.
+    """
+    rigs = [ranking for ranking in rankings if ranking.traits.rig and not ranking.jumps]
+    chosen = rigs or list(rankings)
+    where = f" with {_rig_whole(rigs)}" if rigs else ""
+    worst: dict[str, tuple[Ranking, int]] = {}
+    for ranking in chosen:
+        for row in unusable(ranking):
+            before = worst.get(ranking.labels[row])
+            if before is None or _lost(ranking, row) > _lost(*before):
+                worst[ranking.labels[row]] = (ranking, row)
+    if not worst:
+        return f"Every controller here can be used{where}."
+    by_verb: dict[str, list[tuple[str, str]]] = {}
+    for label, (ranking, row) in sorted(worst.items(), key=lambda item: -item[1][0].swing[item[1][1]]):
+        verb, (size, count) = next(iter(facts(ranking, row).items()))
+        place = f", {condition(ranking)}" if len(chosen) > 1 else ""
+        by_verb.setdefault(verb, []).append(
+            (f"{names[label]} {size}".rstrip(), f"in {count} of {_of(ranking, verb)}{place}")
+        )
+    sentences = []
+    for verb, rows in by_verb.items():
+        counts = list(dict.fromkeys(count for _, count in rows))
+        if len(counts) == 1:
+            text = f"{joined([name for name, _ in rows])} ({'each ' * (len(rows) > 1)}{counts[0]})"
+        else:
+            text = joined([f"{name} ({count})" for name, count in rows])
+        sentences.append(f"{_THEY[verb] if len(rows) > 1 else verb}: {text}")
+    elsewhere = _elsewhere([ranking for ranking in rankings if ranking not in chosen], names)
+    return f"Do not use{where}. {'. '.join(_capital(sentence) for sentence in sentences)}.{elsewhere}"
+
+
+def _elsewhere(rankings: Sequence[Ranking], names: Mapping[str, str]) -> str:
+    """Names of those that must not be used in further conditions, those of the same conditions together."""
+    bad = [(ranking, [ranking.labels[row] for row in unusable(ranking)]) for ranking in rankings]
+    by_places: dict[tuple[str, ...], list[str]] = {}
+    for label in dict.fromkeys(label for _, labels in bad for label in labels):
+        places = tuple(condition(ranking) for ranking, labels in bad if label in labels)
+        by_places.setdefault(places, []).append(names[label])
+    listed = [f"{joined(who)} in {joined(places)}" for places, who in by_places.items()]
+    return f" Elsewhere do not use {'; '.join(listed)}." if listed else ""
+
+
+def _lost(ranking: Ranking, row: int) -> float:
+    return ranking.standing.lost[row].value
+
+
+# Faults of several.
+_THEY = {
+    "leaves its range": "these leave their range",
+    "swings": "these swing",
+    "chatters": "these chatter",
+    "swings or chatters": "these swing or chatter",
+    "does not arrive": "these do not arrive",
+    "pulls harder than a tendon bears": "these pull harder than a tendon bears",
+    "changes with the integration step": "these change with the integration step",
+}
+
+
+# Questions that a builder of a rig can answer, in the order in which they are asked.
+_QUESTIONS = {
+    "rig": "camera?",
+    "jumps": "steps?",
+    "load": "push?",
+    "unknown": "wrong model?",
+    "uneven": "uneven wrist?",
+}
+
+
+def decision_table(rankings: Sequence[Ranking], names: Mapping[str, str], title: str = "") -> Table:
+    """Questions whose answers part the conditions, and for each answer what to use, its RMSE and the next.
+
+    Of conditions that no question parts the last one stands for all.
+    """
+    ends = _parted(rankings, {})
+    asked = [trait for trait in _QUESTIONS if any(trait in answers for answers, _ in ends)]
+    heads = (*(_QUESTIONS[trait] for trait in asked), "use", "RMSE [deg], 95 %", "as good", "next, times more")
+    rows = [(*(answers.get(trait, "-") for trait in asked), *_leaf(one, rankings, names)) for answers, one in ends]
+    return Table(title, heads, rows)
+
+
+def _parted(rankings: Sequence[Ranking], answers: dict[str, str]) -> list[tuple[dict[str, str], Ranking]]:
+    """The conditions at the ends of the tree of questions, with the answers that lead there."""
+    for trait in _QUESTIONS:
+        sides = {"yes": [one for one in rankings if getattr(one.traits, trait)]}
+        sides["no"] = [one for one in rankings if not getattr(one.traits, trait)]
+        if all(sides.values()):
+            return [end for answer, side in sides.items() for end in _parted(side, {**answers, trait: answer})]
+    return [(answers, rankings[-1])]
+
+
+def _leaf(ranking: Ranking, rankings: Sequence[Ranking], names: Mapping[str, str]) -> tuple[str, ...]:
+    row, groups = winner(ranking, rankings), ranking.standing.groups
+    if row is None:
+        return "too few to rank" if ranking.standing.untold else "none", "", "", ""
+    mean = ranking.means[row]
+    ends = f" [{degrees(mean.low)}, {degrees(mean.high)}]" if mean.low < mean.high < math.inf else ""
+    others = [names[ranking.labels[other]] for other in groups[0] if other != row]
+    following = "-"
+    if len(groups) > 1:
+        after = groups[1][0]
+        following = f"{names[ranking.labels[after]]} {two(ranking.means[after].value / mean.value, 3)}"
+    equal = "-" if not others else others[0] if len(others) == 1 else f"{len(others)} more"
+    return names[ranking.labels[row]], f"{degrees(mean.value)}{ends}", equal, following
+
+
+def certainty(rankings: Sequence[Ranking]) -> str:
+    """By how much errors must differ to be told apart, at which level."""
+    floors = sorted(one.standing.floor for one in rankings if one.standing.groups and math.isfinite(one.standing.floor))
+    if not floors:
+        return ""
+    size = _ends([two(100.0 * (floor - 1.0)) for floor in floors])
+    more = "more worlds" if rankings[0].unit == "world" else "more motions or --repetitions"
+    unit = f"{rankings[0].unit}s"
+    return (
+        f"How sure: 95 %. RMSE is a geometric mean over the {unit}. Controllers whose RMSE differ by less than "
+        f"{size} % cannot be told apart with so few {unit}; {more} can."
+    )
+
+
+def fitted(answer: Answer, notes: Sequence[tuple[str | Table, str | Table]]) -> Answer:
+    """The answer with as much of its notes as its lines hold: where they are too many, the short forms of the last.
+
+    `notes` are pairs of a note and its short form, which may be empty.
+    """
+    for shortened in range(len(notes) + 1):
+        chosen = [note if place < len(notes) - shortened else short for place, (note, short) in enumerate(notes)]
+        whole = replace(answer, notes=[note for note in chosen if note])
+        if len(whole.lines()) <= LINES:
+            break
+    return whole

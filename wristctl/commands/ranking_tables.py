@@ -1,0 +1,56 @@
+"""Rankings as tables: the answer's, and every row of a ranking over worlds."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+from wristctl.commands.printed_table import Table, degrees, two
+from wristctl.commands.ranking_answer import condition, decision_table, names_of, ranking_table
+
+if TYPE_CHECKING:
+    from wristctl.comparison.controller_ranking import Ranking
+    from wristctl.comparison.step_cost import StepTime
+    from wristctl.comparison.world_ranking import WorldRanking
+
+
+def answer_tables(rankings: Sequence[Ranking]) -> list[Table]:
+    """The table of the answer with a title, a condition a line; and where there are several, as questions."""
+    if not rankings:
+        return []
+    names = names_of(rankings)
+    title = "Best controller under each condition; the ratio is that of feedforward's RMSE to the best one's"
+    shown = [replace(ranking_table(rankings, names), title=title)]
+    tree = decision_table(rankings, names, "Which controller for which rig")
+    return [*shown, tree] if len(tree.rows) > 1 else shown
+
+
+def every_row(ranking: WorldRanking, times: Mapping[str, StepTime] | None = None) -> Table:
+    """All rows of a ranking, from best to worst, with intervals, faults and costs; `times` of a tick by controller."""
+    import numpy as np
+
+    from wristctl.comparison.controller_ranking import undominated
+
+    energy, chattering = ranking.medians("energy"), ranking.medians("chattering")
+    rmse = np.array([estimate.value for estimate in ranking.means])
+    front = undominated(np.column_stack([rmse, chattering, energy]))
+    rows = []
+    for row in ranking.standing.order:
+        mean, gain, group = ranking.means[row], ranking.gains[row], ranking.standing.group(row)
+        failures, swings = ranking.standing.failures[row], ranking.standing.swings[row]
+        lost = [f"{100 * share.value:.3g} % (< {100 * share.high:.2g})" for share in (failures, swings)]
+        tick = (times or {}).get(ranking.labels[row].split("/")[0])
+        ends = tuple(degrees(end, 3) for end in (mean.value, mean.low, mean.high))
+        ratio = f"{two(gain.low, 3)} to {two(gain.high, 3)}"
+        rows.append((
+            "-" if group is None else str(group), ranking.labels[row], *ends,
+            degrees(float(ranking.scores[row].max()), 3), gain.value, ratio, *lost, chattering[row], energy[row],
+            tick.median if tick else None, "yes" if front[row] and group else "",
+        ))  # fmt: skip
+    heads = (
+        "group", "controller", "RMSE [deg]", "95 % low", "high", "worst", "times less than feedforward", "95 %",
+        "fails", "swings or chatters", "tension [N/s]", "work [J]", "tick [us]", "undominated",
+    )  # fmt: skip
+    title = f"{condition(ranking)}: {ranking.count} held-out worlds, {ranking.motions} motions each"
+    return Table(title, heads, rows)
