@@ -87,6 +87,16 @@ COMMANDS = {
             "wristctl study experiments/fair_study.yaml --budget full --resume RUN --executor dask://host:8786",
         ),
     ),
+    "recommend": Entry(
+        "wristctl.commands.recommend.command:RECOMMEND",
+        _OWN,
+        "Say which controller with which gains to run on a wrist.",
+        examples=(
+            "wristctl recommend --set wrist.length=0.12 --set wrist.stiffness=2.0",
+            "wristctl recommend --from-identified latest:identify",
+            "wristctl recommend --set loop.actuator.tendon_stiffness=2e4 --set 'controllers=[ct-dob, pid-ff]'",
+        ),
+    ),
     "simulate": Entry(
         "wristctl.commands.simulate.command:SIMULATE",
         _REPRODUCE,
