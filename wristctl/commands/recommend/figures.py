@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import FormatStrFormatter, LogLocator, NullFormatter
 
-from wristctl.plotting.style import BLUE, GREY, VERMILLION, figure, logarithmic
+from wristctl.plotting.style import BLUE, GREY, VERMILLION, figure
 
 if TYPE_CHECKING:
     from wristctl.commands.recommend.answer import Limit, Recommended
@@ -33,7 +34,10 @@ def errors(result: Recommended) -> Figure:
             [median], [place], "x" if unreliable else "o", color=VERMILLION if unreliable else shade, markersize=6
         )
     axes.set_yticks(range(len(order)), [result.candidates[k].label for k in order])
-    logarithmic(axes.xaxis)
+    axes.set_xscale("log")
+    axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+    axes.xaxis.set_major_formatter(FormatStrFormatter("%g"))
+    axes.xaxis.set_minor_formatter(NullFormatter())
     axes.set_xlabel("RMSE on a simulated rig [deg] (cross: fails, swings or chatters on some)")
     return picture
 
@@ -54,5 +58,5 @@ def _limit(axes: Axes, tried: Sequence[Limit], label: str) -> None:
         axes.plot([limit.value], [size], "x" if limit.lost else "o", color=VERMILLION if limit.lost else BLUE)
         if limit.lost:
             axes.annotate(f"{limit.lost} of {limit.rigs} lost", (limit.value, size), (3, 4), textcoords="offset points")
-    axes.set_ylim(bottom=0.0)
+    axes.set_ylim(0.0, 1.2 * np.nanmax(sizes))
     axes.set_xlabel(label)
