@@ -19,8 +19,8 @@ GENERATED = {"board/messages.py"}
 
 SHARED_FILE_NAMES = {
     "a command or a thing, and its settings in config": {
-        "audit", "bench", "camera", "compare", "hw_run", "hysteresis", "identify", "learning", "plant", "simulate",
-        "study", "tune", "wrist",
+        "audit", "bench", "camera", "compare", "hw_run", "hysteresis", "identify", "learning", "plant", "recommend",
+        "simulate", "study", "tune", "wrist",
     },
     "what commands do, and the part of the command line that shows it": {"commands", "progress"},
 }  # fmt: skip

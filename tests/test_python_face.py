@@ -17,8 +17,8 @@ import wristctl
 PACKAGE = Path(wristctl.__file__).parent
 
 FACE = {
-    "analyse", "audit", "compare", "gen_data", "hysteresis", "identify", "load_study", "open_run", "runs", "simulate",
-    "study", "train", "tune",
+    "analyse", "audit", "compare", "gen_data", "hysteresis", "identify", "load_study", "open_run", "recommend", "runs",
+    "simulate", "study", "train", "tune",
 }  # fmt: skip
 
 SMALL = """

@@ -12,8 +12,8 @@ In a notebook:
     wristctl.runs(kind="compare", newer="2d")    # a DataFrame
     wristctl.open_run("latest:compare").data("comparison")
 
-`gen_data`, `train`, `tune`, `compare`, `study`, `analyse`, `hysteresis`, `identify` and `audit` go the same way:
-wristctl.api.
+`gen_data`, `train`, `tune`, `compare`, `study`, `analyse`, `hysteresis`, `identify`, `recommend` and `audit`
+go the same way: wristctl.api.
 """
 
 from __future__ import annotations
@@ -33,6 +33,7 @@ if TYPE_CHECKING:
         identify,
         load_study,
         open_run,
+        recommend,
         runs,
         simulate,
         study,
@@ -50,6 +51,7 @@ __all__ = [
     "identify",
     "load_study",
     "open_run",
+    "recommend",
     "runs",
     "simulate",
     "study",

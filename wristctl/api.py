@@ -21,6 +21,8 @@ from wristctl.commands.hysteresis.command import HYSTERESIS, Hysteresis
 from wristctl.commands.identify.command import IDENTIFY, Identified
 from wristctl.commands.perform import RESULTS, Folder, Ref, carry_out, in_python
 from wristctl.commands.progress import Watch
+from wristctl.commands.recommend.answer import Recommended
+from wristctl.commands.recommend.command import RECOMMEND
 from wristctl.commands.simulate.command import SIMULATE, Simulated
 from wristctl.commands.study.command import FAIR_STUDY
 from wristctl.commands.study.units import Studied
@@ -132,6 +134,23 @@ def study(
     workers that compute other numbers or are gone.
     """
     return carry_out(FAIR_STUDY, study, {"resume": resume}, out, label, progress, executor)
+
+
+@in_python()
+def recommend(
+    study: Study, *, from_identified: Ref | Identified | None = None, out: Folder | None = None, label: str = "",
+    progress: Watch | None = None,
+) -> Recommended:  # fmt: skip
+    """A controller with gains for the study's wrist, by its `recommend` section.
+
+    Presets are scaled to the wrist, tuned shortly on simulated rigs, and tested on others. `from_identified` (identify)
+    gives the wrist's parameters. The result has `.best` (controller, origin, gains), `.ranking`, `.motions` and
+    `.payloads` (what it holds), `.reach_deg`; `.frame()` is a row per candidate. Raises UserError for a wrist that its
+    tendons cannot bend by 5 deg.
+
+    With a folder `out` it is a sealed run directory too, named by `label`; `progress` is called as it goes on.
+    """
+    return carry_out(RECOMMEND, study, {"from_identified": from_identified}, out, label, progress)
 
 
 @in_python()

@@ -89,7 +89,17 @@ COMMANDS = {
         shortcuts=("horizon",),
         examples=(
             "wristctl compare experiments/paper.yaml --network latest:train --tuned latest:tune",
-            "wristctl compare --set 'inverses=[none]' --set 'rows=[{controller: computed-torque, gains: default}]'",
+            "wristctl compare --set 'inverses=[none]' --set 'controllers=[{controller: computed-torque, gains: default}]'",
+        ),
+    ),
+    "recommend": Entry(
+        "wristctl.commands.recommend.command:RECOMMEND",
+        _MAIN,
+        "Say which controller with which gains to run on a wrist.",
+        examples=(
+            "wristctl recommend --set wrist.length=0.12 --set wrist.stiffness=2.0",
+            "wristctl recommend --from-identified latest:identify",
+            "wristctl recommend --set loop.actuator.tendon_stiffness=2e4 --set 'controllers=[ct-dob, pid-ff]'",
         ),
     ),
     "identify": Entry(

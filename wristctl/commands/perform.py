@@ -233,7 +233,7 @@ def carry_out(
 
 
 # Kinds of runs whose repetition gives the same result.
-AGAIN = ("gen-data", "train", "tune", "compare", "simulate", "analyse", "hysteresis", "identify", "audit")
+AGAIN = ("gen-data", "train", "tune", "compare", "recommend", "simulate", "analyse", "hysteresis", "identify", "audit")
 # Relative difference of metrics up to which a repetition counts as the same result.
 _ALIKE = 1e-6
 

@@ -14,6 +14,7 @@ from wristctl.config.hw_run import CalibrateWristSettings, HwRunSettings
 from wristctl.config.hysteresis import HysteresisSettings
 from wristctl.config.identify import IdentifySettings
 from wristctl.config.learning import DataSettings, TrainSettings
+from wristctl.config.recommend import RecommendSettings
 from wristctl.config.section import Section
 from wristctl.config.simulate import AnalyseSettings, SimulateSettings
 from wristctl.config.tune import TuneSettings
@@ -44,6 +45,7 @@ class Study(Section):
     tune: TuneSettings = TuneSettings()
     compare: CompareSettings = CompareSettings()
     study: FairStudySettings = FairStudySettings()
+    recommend: RecommendSettings = RecommendSettings()
     simulate: SimulateSettings = SimulateSettings()
     analyse: AnalyseSettings = AnalyseSettings()
     audit: AuditSettings = AuditSettings()

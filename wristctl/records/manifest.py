@@ -19,8 +19,8 @@ TABLES, OVERVIEW = "tables.json", "overview.json"
 
 # Commands that make runs.
 KINDS = (
-    "gen-data", "train", "tune", "compare", "study", "simulate", "analyse", "hysteresis", "audit", "hw-run", "identify",
-    "track", "calibrate-camera", "calibrate-wrist",
+    "gen-data", "train", "tune", "compare", "study", "recommend", "simulate", "analyse", "hysteresis", "audit",
+    "hw-run", "identify", "track", "calibrate-camera", "calibrate-wrist",
 )  # fmt: skip
 
 EndState = Literal["running", "ok", "failed", "interrupted"]

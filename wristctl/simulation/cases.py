@@ -90,6 +90,21 @@ class Measured:
         """Whether a loop swings, chatters or has not converged, so that nobody can rely on its metrics, (P, C)."""
         return self.limit_cycles | (self.chatter > 0.0) | self.unconverged
 
+    def swings_beside(self, without_feedback: Measured) -> NDArray[np.bool_]:
+        """`swings`, and where it swings while its reference moves, (P, C).
+
+        On a moving reference friction's kinks look like swings: what feedforward shows on the same case, which cannot
+        swing by itself, is allowed twice, and LIMIT_CYCLE beyond that.
+        """
+        allowed = LIMIT_CYCLE + 2.0 * np.nan_to_num(without_feedback.metrics["oscillation"])
+        moving: NDArray[np.bool_] = (self.metrics["oscillation"] > allowed) & ~self.rests
+        return self.swings | moving
+
+    def largest_swing(self, without_feedback: Measured) -> float:
+        """Largest oscillation [rad] where it swings (`swings_beside`); 0 where it never does."""
+        swings = np.nan_to_num(self.metrics["oscillation"]) * self.swings_beside(without_feedback)
+        return float(swings.max())
+
     def of_motions(self, chosen: Sequence[int], motions: int) -> Measured:
         """Results of the `chosen` motions, of the cases of worlds with so many `motions` each."""
         indices = np.flatnonzero(np.isin(np.arange(len(self.rests)) % motions, chosen))

@@ -1,0 +1,156 @@
+"""What `recommend` finds: presets scaled to a wrist, its reach, and a controller that holds on every simulated rig."""
+
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import yaml
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import wristctl
+from wristctl.commands.recommend.answer import RECOMMENDED, Recommended
+from wristctl.commands.recommend.command import FAMILY, reach_deg
+from wristctl.config.loop import Loop, Reference
+from wristctl.config.study import Study
+from wristctl.config.wrist import WristParameters
+from wristctl.control.table import controller, gains_of
+from wristctl.errors import UserError
+from wristctl.simulation.cases import measure
+from wristctl.simulation.drawn_worlds import drawn_cases
+from wristctl.simulation.reference import motion
+from wristctl.simulation.rollout import rollout
+from wristctl.tuning.scaled_presets import dynamic_stiffness, scaled_to
+
+WRIST = WristParameters()
+QUICK = (
+    "recommend={controllers: [pid-ff, ct-dob], loop: {plant_segments: 1, control_period: 5.0e-3}, "
+    "draw: {plant.stiffness: x0.7..1.3, disturbances.load: '-0.3..0.3'}, horizon: 2.5, draws: 2, validation: 2, "
+    "tests: 8, candidates: 4, iterations: 1, frequencies: [0.5, 1.0], payloads: [0.2]}"
+)
+
+
+def heavier(times: float) -> WristParameters:
+    """A wrist of which every torque is so many times the default one's."""
+    loads = ("mass", "hand_mass", "stiffness", "damping", "pretension", "tension_limit")
+    return WRIST.model_copy(update={name: times * getattr(WRIST, name) for name in loads})
+
+
+@settings(max_examples=20, deadline=None)
+@given(times=st.floats(0.3, 3.0))
+def test_where_all_torques_are_scaled_the_dynamic_stiffness_is_too_and_so_are_gains_of_torque(times: float) -> None:
+    wrist = heavier(times)
+    assert dynamic_stiffness(wrist) == pytest.approx(times * dynamic_stiffness(WRIST), rel=1e-12)
+    for name, power in (("pid-ff", 1), ("ct-dob", 0)):
+        law = controller(name)
+        preset, gains = list(law.presets.items())[-1]
+        assert scaled_to(wrist, law).presets[preset] == pytest.approx(
+            {gain: value * times**power for gain, value in gains.items()}, rel=1e-9
+        )
+    kappa = [law.presets["default"]["kappa"] for law in (controller("nc"), scaled_to(wrist, controller("nc")))]
+    assert kappa[1] == pytest.approx(kappa[0] / times, rel=1e-9), "of unit 1/(N m)"
+
+
+@pytest.mark.parametrize("name", ["pid-ff", "smc-dob", "nc"])
+def test_scaled_presets_move_a_wrist_of_scaled_torques_as_the_presets_moved_the_default_one(name: str) -> None:
+    moved = []
+    for wrist in (WRIST, heavier(2.0)):
+        law = scaled_to(wrist, controller(name))
+        preset = list(law.presets)[-1]
+        followed = motion(Reference(), wrist, 1.5, 5e-3)
+        loop = Loop(plant_segments=1, control_period=5e-3)
+        gains = np.array([gains_of(law, preset)])
+        done = rollout(law, gains, [followed], np.zeros(1, np.int64), loop, wrist, record=True, threads=1)
+        moved.append(done.column("theta", 0))
+    np.testing.assert_allclose(moved[1], moved[0], atol=2e-6)
+
+
+def study_of(*overrides: str) -> Study:
+    return wristctl.load_study(None, QUICK, *overrides)
+
+
+def test_the_reach_is_the_wanted_angle_or_what_the_tendons_hold_on_the_worst_rig() -> None:
+    assert reach_deg(study_of()) == 45.0
+    assert reach_deg(study_of("wrist.range_deg=20")) == 20.0
+    stiff = [reach_deg(study_of(f"wrist.stiffness={stiffness}")) for stiffness in (2.0, 3.0, 6.0)]
+    assert stiff == sorted(stiff, reverse=True) and stiff[-1] < 45.0
+    without = study_of("wrist.stiffness=3.0", "recommend.draw={plant.stiffness: x0.7..0.8}")
+    assert reach_deg(without) > stiff[1], "springs that are never stiffer than believed"
+
+
+def test_a_wrist_beyond_its_tendons_is_told_so_before_anything_runs(tmp_path: Path) -> None:
+    with pytest.raises(UserError, match="hold the wrist to") as told:
+        wristctl.recommend(study_of("wrist.stiffness=60.0"), out=tmp_path)
+    assert told.value.exit_code == 2 and not list(tmp_path.iterdir())
+
+
+@pytest.fixture(scope="module")
+def found(tmp_path_factory: pytest.TempPathFactory) -> Recommended:
+    return wristctl.recommend(study_of(), out=tmp_path_factory.mktemp("recommend"))
+
+
+def test_what_is_recommended_is_best_of_what_holds_on_every_rig(found: Recommended) -> None:
+    ranked, best = found.ranking, found.best
+    assert best is not None and best.controller in ("pid-ff", "ct-dob")
+    first = ranked.standing.groups[0][0]
+    assert found.candidates[first] == best and ranked.standing.lost[first].times == 0
+    medians = [np.median(row.rmse) for row in ranked.rows]
+    assert found.metrics["rmse"] == pytest.approx(medians[first], rel=0.2) and medians[first] < medians[-1]
+    assert found.metrics["rmse_low"] <= found.metrics["rmse"] <= found.metrics["rmse_high"]
+    assert [limit.value for limit in found.motions] == [0.5, 1.0] and found.payloads[0].rigs == 12
+
+
+def test_its_gains_are_a_study_file_for_simulate_and_hw_run(found: Recommended) -> None:
+    assert found.run is not None and found.best is not None
+    file = found.run.file(RECOMMENDED)
+    written = yaml.safe_load(file.read_text())
+    study = wristctl.load_study(file)
+    assert study.simulate.controller == found.best.controller == study.hw_run.rows[0].controller
+    assert study.simulate.gains == study.hw_run.rows[0].gains == written["simulate"]["gains"]
+    assert written["simulate"]["gains"] == pytest.approx(found.best.gains, rel=1e-5)
+
+
+def test_its_answer_fits_a_screen_and_names_gains_error_and_limits(found: Recommended) -> None:
+    lines = found.answer.lines()
+    assert len(lines) <= 32 and all(len(line) <= 100 for line in lines if not line.startswith("wristctl "))
+    text = " ".join(lines)
+    assert found.best is not None and all(f"{name} = {value:.3g}" for name, value in found.best.gains.items())
+    assert f"{math.degrees(found.metrics['rmse']):.2g} deg" in text
+    assert all(candidate.label in text for candidate in found.candidates)
+
+
+def test_the_same_seed_recommends_the_same_and_another_draws_other_rigs(found: Recommended) -> None:
+    again = wristctl.recommend(study_of())
+    assert again.metrics == found.metrics and again.best == found.best
+    other = wristctl.recommend(study_of("seed=1"))
+    assert other.metrics["rmse"] != found.metrics["rmse"]
+
+
+def test_where_every_controller_chatters_nothing_is_recommended() -> None:
+    """The paper's PID at a period of 10 ms, for which its least gains of the search's box are still too strong."""
+    done = wristctl.recommend(study_of("recommend.controllers=[pid]", "recommend.loop.control_period=1e-2"))
+    assert done.best is None and done.fault is not None and done.fault.exit_code == 3
+    assert [share.times for share in done.ranking.standing.lost] == [8, 8, 0] and not done.motions
+    assert done.marks and len(done.answer.lines()) <= 32
+
+
+def measured_on(cases: list[Any], name: str, gains: dict[str, float]) -> Any:
+    law = controller(name)
+    return measure(law, np.array([list(law.values(gains))]), cases, WRIST, ["rmse", "oscillation"])
+
+
+def test_swings_are_seen_while_the_reference_moves_beside_those_without_feedback() -> None:
+    """A disturbance observer that is faster than the camera swings on a sine; feedforward never does beside itself."""
+    study = wristctl.load_study(None)
+    family = study.recommend.family(20.0)
+    slow = Reference(kind="two-sided-sine", frequency=0.5, angle_deg=20.0)
+    family = family.model_copy(update={"draw": {}, "references": (slow,), "horizon": 4.0})
+    cases = drawn_cases(family, FAMILY, "test", 0, 1, WRIST)
+    open_loop = measured_on(cases, "feedforward", {})
+    assert not open_loop.swings_beside(open_loop).any() and open_loop.largest_swing(open_loop) == 0.0
+    calm = measured_on(cases, "ct-dob", {"w": 15.0, "zeta": 1.0, "wo": 10.0})
+    wild = measured_on(cases, "ct-dob", {"w": 120.0, "zeta": 0.3, "wo": 1000.0})
+    assert not calm.swings_beside(open_loop).any()
+    assert wild.swings_beside(open_loop).all() and wild.largest_swing(open_loop) > math.radians(0.5)

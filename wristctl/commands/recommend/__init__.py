@@ -1,0 +1,1 @@
+"""A controller with gains for one wrist and rig: `wristctl recommend`."""

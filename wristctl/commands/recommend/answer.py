@@ -1,0 +1,186 @@
+"""What is recommended, in words: controller and gains, the error to expect, what not to use, and the limits."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, NamedTuple
+
+from wristctl.commands.answer import Answer
+from wristctl.commands.printed_table import Table, degrees, two
+from wristctl.commands.results import StudyResult
+from wristctl.errors import UserError
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from wristctl.arrays import Array
+    from wristctl.comparison.world_ranking import WorldRanking
+    from wristctl.tuning.search import Search
+
+# File with what is recommended, for `simulate` and `hw-run`.
+RECOMMENDED = "data/recommended.yaml"
+# Angle of the sines by which it is found how fast a motion may be, where the tendons reach it [deg].
+_SINE_DEG = 20.0
+
+
+class Limit(NamedTuple):
+    """How one motion or payload went, on so many simulated rigs."""
+
+    value: float
+    """Frequency [Hz] or mass [kg]."""
+    rigs: int
+    lost: int
+    """Rigs on which the wrist fails, swings, chatters, or the numbers did not converge."""
+    error: float
+    """Median RMSE [rad]."""
+    swing: float
+    """Largest swing of any rig, at rest or beside the reference's own motion [rad]."""
+
+
+class Candidate(NamedTuple):
+    """A controller with gains that are tested."""
+
+    controller: str
+    origin: str
+    """`tuned`, or `scaled preset`."""
+    gains: dict[str, float]
+
+    @property
+    def label(self) -> str:
+        """Controller and origin."""
+        return f"{self.controller}, {self.origin}" if self.gains else self.controller
+
+
+@dataclass(frozen=True, repr=False, eq=False)
+class Recommended(StudyResult):
+    """Candidates in order on rigs that no search has seen; how fast the best may move, and what it may carry."""
+
+    kind = "recommend"
+
+    reach_deg: float
+    """Angle [deg] to either side that the tendons hold on every simulated rig."""
+    candidates: list[Candidate]
+    ranking: WorldRanking
+    """`ranking.rows` are the candidates in order, feedforward last."""
+    searches: dict[str, Search]
+    motions: list[Limit]
+    payloads: list[Limit]
+    next_command: str
+    """Command that tries the recommendation on the rig."""
+
+    @property
+    def best(self) -> Candidate | None:
+        """Recommended controller and gains; None where no candidate can be relied on."""
+        groups = self.ranking.standing.groups
+        first = groups[0][0] if groups else self.ranking.yardstick
+        return None if first == self.ranking.yardstick else self.candidates[first]
+
+    @property
+    def fault(self) -> UserError | None:
+        """Error where nothing can be recommended; None where something is."""
+        if self.best is not None:
+            return None
+        where = str(self.findings.run.path) if self.findings.run else ""
+        reason = "no controller with feedback can be relied on for this wrist on this rig"
+        fix = "a stiffer drive, a faster camera or slower motions (recommend.loop, recommend.references)"
+        return UserError(reason, where, fix, exit_code=3)
+
+    @property
+    def marks(self) -> list[str]:
+        """`nothing to recommend` where that is so."""
+        return [] if self.best is not None else ["nothing to recommend"]
+
+    def frame(self) -> pd.DataFrame:
+        """A row for each candidate, best first; angles in rad."""
+        from wristctl.comparison.world_ranking import ranking_frame
+
+        return ranking_frame(self.ranking)
+
+    @property
+    def answer(self) -> Answer:
+        """What to run, what error to expect, what not to use, and the limits."""
+        return Answer(_sentence(self), _table(self), _notes(self), f"The gains are in {RECOMMENDED} of the run.")
+
+
+def _sentence(result: Recommended) -> str:
+    best, ranked = result.best, result.ranking
+    if best is None:
+        return "Nothing can be recommended: every controller with feedback fails, swings or chatters on some rig."
+    row = ranked.rows[ranked.standing.groups[0][0]]
+    low, median, high = spread(row.rmse)
+    values = ", ".join(_gain(best, name) for name in best.gains)
+    ratio = ranked.gains[ranked.standing.groups[0][0]].value
+    sentence = (
+        f"Use {best.controller} with {values}. Expect an error of {degrees(median)} deg RMSE ({degrees(low)} to "
+        f"{degrees(high)} deg on 8 of 10 simulated rigs), {two(ratio)} times less than without feedback."
+    )
+    alike = [result.candidates[k].label for k in ranked.standing.groups[0][1:] if k != ranked.yardstick]
+    return f"{sentence} It cannot be told apart from {', '.join(alike)}." if alike else sentence
+
+
+def _gain(candidate: Candidate, name: str) -> str:
+    from wristctl.control.table import controller
+
+    return f"{name} = {candidate.gains[name]:.3g} {controller(candidate.controller).gains[name].unit}".rstrip()
+
+
+def spread(errors: Array) -> tuple[float, float, float]:
+    """Error [rad] that 1, 5 and 9 of 10 rigs stay below."""
+    import numpy as np
+
+    low, median, high = np.percentile(errors, (10.0, 50.0, 90.0), method="nearest")
+    return float(low), float(median), float(high)
+
+
+def _table(result: Recommended) -> Table:
+    """Candidates from best to worst; those that cannot be relied on come last, with the reason."""
+    ranked, rows = result.ranking, []
+    for k in ranked.standing.order:
+        low, median, high = (degrees(error) if math.isfinite(error) else "-" for error in spread(ranked.rows[k].rmse))
+        lost = _lost(ranked, k)
+        rows.append((result.candidates[k].label, median, f"{low} to {high}", lost or "holds on all"))
+    heads = ("controller, gains", "error [deg]", "on 8 of 10 rigs [deg]", f"of {ranked.worlds} simulated rigs")
+    return Table("", heads, rows)
+
+
+def _lost(ranked: WorldRanking, k: int) -> str:
+    """On how many rigs a candidate fails, and on how many it swings and by how much; empty where it holds on all."""
+    failures, swings = ranked.standing.failures[k].times, ranked.standing.swings[k].times
+    swing = ranked.rows[k].measured.largest_swing(ranked.rows[ranked.yardstick].measured)
+    size = f"swings by up to {degrees(swing)} deg" if swing > 0.0 else "chatters"
+    return ", ".join([f"fails on {failures}"] * bool(failures) + [f"{size} on {swings}"] * bool(swings))
+
+
+def _notes(result: Recommended) -> list[str]:
+    wanted = result.study.recommend.largest_deg
+    short = f" (asked: {wanted:g} deg)" if result.reach_deg < wanted else ""
+    notes = [f"The tendons hold {result.reach_deg:g} deg to either side on every simulated rig{short}."]
+    if result.best is None:
+        return notes
+    sine = f"sines of {sine_deg(result.reach_deg):g} deg to both sides"
+    notes.append(
+        f"{_up_to(result.motions, 'Hz', sine)} {_up_to(result.payloads, 'kg', 'an unknown payload in the hand')}"
+    )
+    return [*notes, "Next, emulated (on a real rig: --set port=/dev/ttyACM0):", f"$ {result.next_command}"]
+
+
+def _up_to(limits: Sequence[Limit], unit: str, subject: str) -> str:
+    """Up to which value nothing was lost, and what was at the next."""
+    from wristctl.simulation.oscillation import LIMIT_CYCLE
+
+    sound = next((k for k, limit in enumerate(limits) if limit.lost), len(limits))
+    begin = f"It holds {subject} up to {limits[sound - 1].value:g} {unit}" if sound else f"It does not hold {subject}"
+    if sound:
+        begin += f" ({degrees(limits[sound - 1].error)} deg RMSE)"
+    if sound == len(limits):
+        return f"{begin}, the largest tried."
+    beyond = limits[sound]
+    how = f"swings by up to {degrees(beyond.swing)} deg" if beyond.swing > LIMIT_CYCLE else "chatters or fails"
+    return f"{begin}: at {beyond.value:g} {unit} it {how} on {beyond.lost} of {beyond.rigs} rigs."
+
+
+def sine_deg(reach_deg: float) -> float:
+    """Angle [deg] of the sines that are tried, of what the tendons reach."""
+    return min(_SINE_DEG, math.floor(0.7 * reach_deg))

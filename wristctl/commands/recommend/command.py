@@ -1,0 +1,276 @@
+"""Which controller with which gains to run on one's own wrist: presets scaled to it, tuned and tested on drawn rigs."""
+
+from __future__ import annotations
+
+import math
+import shlex
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+from wristctl.commands.inputs import EarlierRun, Inputs
+from wristctl.commands.inputs_of_loops import identified
+from wristctl.commands.loop_warnings import warn_if_coarse, warn_if_it_buckles
+from wristctl.commands.procedure import Procedure
+from wristctl.commands.recommend.answer import RECOMMENDED, Candidate, Limit, Recommended, sine_deg, spread
+from wristctl.commands.results import Findings
+from wristctl.commands.session import Session
+from wristctl.config.families import Family, TuningWorlds
+from wristctl.config.loop import Reference
+from wristctl.config.study import Study
+from wristctl.config.tune import Objective, TuneSettings
+from wristctl.errors import UserError, under
+
+if TYPE_CHECKING:
+    from wristctl.comparison.world_ranking import WorldRanking
+    from wristctl.simulation.cases import Measured
+    from wristctl.tuning.search import Search
+
+# Name of the family of simulated rigs, of which the draws are named.
+FAMILY = "recommend"
+# Angle [deg] that the tendons must reach on every simulated rig for a motion to be worth a search.
+LEAST_DEG = 5.0
+# Weight of swings in a search [decades]: gains that swing on any rig of a search are not wanted.
+_SWINGING = 3.0
+# Rigs on which the limits of motion and payload are looked for.
+_RIGS_AT_LIMITS = 12
+TUNED, SCALED = "tuned", "scaled preset"
+
+
+def reach_deg(study: Study) -> float:
+    """Largest whole angle [deg] to both sides that the tendons hold on every rig that can be drawn, at most the wanted.
+
+    The worst rig has the stiffest springs, the largest payload and load, and the tendons nearest to the middle.
+    """
+    from wristctl.simulation.worlds import plant_of
+    from wristctl.wrist.statics import shortfall
+
+    settings = study.recommend
+    wanted = min(settings.largest_deg, study.wrist.range_deg)
+    family, ends = settings.family(wanted), (0.0, 1.0 - 1e-12)
+    held = wanted
+    for near in ends:  # of the radius; all else at the end that asks for more
+        for side in ends:  # of the load
+            shares = dict.fromkeys(family.draw, ends[1])
+            shares |= {key: near for key in family.draw if "radius" in key}
+            shares |= {key: side for key in family.draw if key.endswith(".load")}
+            loop = family.world(shares)
+            if not loop.limits:
+                continue
+            actual = plant_of(study.wrist, loop.plant)
+            for toward in (-1.0, 1.0):
+                bound = math.radians(toward * wanted)
+                short = shortfall(actual, min(bound, 0.0), max(bound, 0.0), loop.disturbances.load)
+                if short is not None:
+                    held = min(held, 0.0 if math.isnan(short.angle) else math.degrees(abs(short.angle)))
+    return float(math.floor(held))
+
+
+def plan(study: Study, inputs: Inputs) -> str:
+    """Check the controllers, and that the tendons reach what is asked for. Raises UserError."""
+    from wristctl.control.table import controller
+    from wristctl.simulation.closed_loop import Size, check_size
+    from wristctl.tuning.search import check_tunable
+
+    study = identified(study, "recommend", inputs)
+    settings = study.recommend
+    with under("recommend"):
+        for number, name in enumerate(settings.controllers):
+            with under(f"controllers.{number}"):
+                check_tunable(controller(name))
+    reach = reach_deg(study)
+    if reach < LEAST_DEG:
+        reason = f"the tendons hold the wrist to {reach:g} deg only: no controller can help"
+        raise UserError(reason, "wrist", "a larger tension_limit or tendon_radius, a softer wrist, or a lighter hand")
+    searched = settings.candidates * settings.iterations * settings.draws + settings.validation * settings.candidates
+    count = len(settings.controllers) * len(settings.references) * (searched + 2 * settings.tests)
+    check_size(Size([settings.loop], settings.horizon, count))
+    return (
+        f"{', '.join(settings.controllers)} tuned on {settings.draws} simulated rigs and tested on {settings.tests} "
+        f"others, motions of up to {reach:g} deg: about {count} rollouts of {settings.horizon:g} s"
+    )
+
+
+def recommend(session: Session) -> Recommended:
+    """Scale presets to the wrist, tune each controller shortly, test all on rigs that no search has seen."""
+    from wristctl.simulation.drawn_worlds import streams_of
+
+    study, findings = identified(session.study, "recommend", session.inputs), session.findings
+    settings, reach = study.recommend, reach_deg(study)
+    warn_if_it_buckles(findings, study.wrist, [settings.loop])
+    warn_if_coarse([settings.loop])
+    family = settings.family(reach)
+    for split in ("tune", "validation", "test"):
+        findings.note_streams(streams_of(family, FAMILY, split))
+    searches = _searches(session, study, family)
+    candidates = _candidates(study, searches)
+    ranking = _tested(session, study, family, candidates)
+    result = Recommended(session.study, findings, [], reach, candidates, ranking, searches, [], [], "")
+    if result.best is None:
+        return _recorded(result)
+    with session.progress("how fast and how heavy"):
+        motions = _limits(study, result.best, [_sines(family, reach, value) for value in settings.frequencies])
+        payloads = _limits(study, result.best, [_laden(family, mass) for mass in settings.payloads])
+    return _recorded(
+        replace(
+            result,
+            motions=[limit._replace(value=value) for limit, value in zip(motions, settings.frequencies, strict=True)],
+            payloads=[limit._replace(value=value) for limit, value in zip(payloads, settings.payloads, strict=True)],
+            next_command=_next_command(session),
+        )
+    )
+
+
+def _searches(session: Session, study: Study, family: Family) -> dict[str, Search]:
+    from wristctl.control.table import controller
+    from wristctl.tuning.objective import Judge
+    from wristctl.tuning.scaled_presets import scaled_to
+    from wristctl.tuning.search import search, tuning_cases
+
+    settings = study.recommend
+    tuning = study.model_copy(
+        update={
+            "families": {FAMILY: family},
+            "tune": TuneSettings(
+                controllers=settings.controllers, optimiser="differential-evolution",
+                candidates=settings.candidates, iterations=settings.iterations, finalists=settings.candidates,
+                objective=Objective(swinging=_SWINGING),
+                worlds=TuningWorlds(family=FAMILY, draws=settings.draws, validation=settings.validation),
+            ),
+        }
+    )  # fmt: skip
+    judges = [Judge(cases, study.wrist, tuning.tune.objective) for cases in tuning_cases(tuning)]
+    searches = {}
+    with session.progress("tuning", total=len(settings.controllers), unit="controllers") as advance:
+        for number, name in enumerate(settings.controllers, start=1):
+            law = scaled_to(study.wrist, controller(name))
+            searches[name] = search(tuning, law, session.findings.stream, (judges[0], judges[1]))
+            advance(number)
+    return searches
+
+
+def _candidates(study: Study, searches: Mapping[str, Search]) -> list[Candidate]:
+    """What is tested: of each controller its tuned gains and its scaled preset where that is another; feedforward."""
+    from wristctl.control.table import controller
+    from wristctl.tuning.objective import YARDSTICK
+    from wristctl.tuning.scaled_presets import scaled_to
+
+    candidates = []
+    for name, found in searches.items():
+        presets = list(scaled_to(study.wrist, controller(name)).presets.values())
+        tuned = Candidate(name, TUNED, dict(found.gains))
+        if presets and dict(presets[-1]) != tuned.gains:
+            candidates.append(Candidate(name, SCALED, dict(presets[-1])))
+        elif presets:
+            tuned = tuned._replace(origin=SCALED)
+        candidates.append(tuned)
+    return [*candidates, Candidate(YARDSTICK, "", {})]
+
+
+def _tested(session: Session, study: Study, family: Family, candidates: Sequence[Candidate]) -> WorldRanking:
+    import numpy as np
+
+    from wristctl.comparison.world_ranking import RANKED, RankedRow, ranking, world_scores
+    from wristctl.control.table import controller
+    from wristctl.simulation.cases import measure
+    from wristctl.simulation.drawn_worlds import drawn_cases
+
+    tests = study.recommend.tests
+    cases = drawn_cases(family, FAMILY, "test", study.seed, tests, study.wrist)
+    measured: list[Measured] = []
+    with session.progress("testing", total=len(candidates), unit="candidates") as advance:
+        for number, candidate in enumerate(candidates, start=1):
+            law = controller(candidate.controller)
+            gains = np.array([list(law.values(candidate.gains))])
+            measured.append(measure(law, gains, cases, study.wrist, RANKED))
+            advance(number)
+    rows = [
+        RankedRow(
+            candidate.label,
+            world_scores(of_candidate, tests)[0],
+            np.any(of_candidate.swings_beside(measured[-1]).reshape(tests, -1), axis=1),
+            of_candidate,
+        )
+        for candidate, of_candidate in zip(candidates, measured, strict=True)
+    ]
+    return ranking(FAMILY, family, rows, yardstick=len(rows) - 1)
+
+
+def _sines(family: Family, reach: float, frequency: float) -> Family:
+    """The rigs asked for a sine to both sides, for at least two of its periods."""
+    draw = {key: source for key, source in family.draw.items() if key != "reference.angle_deg"}
+    motion = Reference(kind="two-sided-sine", frequency=frequency, angle_deg=sine_deg(reach))
+    horizon = max(family.horizon, math.ceil(2.0 / frequency))
+    return family.model_copy(update={"draw": draw, "references": (motion,), "horizon": float(horizon)})
+
+
+def _laden(family: Family, mass: float) -> Family:
+    """The rigs with a payload of this mass [kg]."""
+    draw = {key: source for key, source in family.draw.items() if key != "plant.payload"}
+    plant = family.loop.plant.model_copy(update={"payload": mass})
+    return family.model_copy(update={"draw": draw, "loop": family.loop.model_copy(update={"plant": plant})})
+
+
+def _limits(study: Study, best: Candidate, families: Sequence[Family]) -> list[Limit]:
+    """How the recommended gains do on each of the families; the values are left open."""
+    import numpy as np
+
+    from wristctl.control.table import controller
+    from wristctl.simulation.cases import measure
+    from wristctl.simulation.drawn_worlds import drawn_cases
+    from wristctl.tuning.objective import YARDSTICK
+
+    limits = []
+    for family in families:
+        cases = drawn_cases(family, FAMILY, "test", study.seed, _RIGS_AT_LIMITS, study.wrist)
+
+        own, open_loop = (
+            measure(controller(name), np.array([list(gains.values())]), cases, study.wrist, ["rmse", "oscillation"])
+            for name, gains in ((best.controller, best.gains), (YARDSTICK, {}))
+        )
+        lost = (own.failed | own.swings_beside(open_loop)).reshape(_RIGS_AT_LIMITS, -1).any(axis=1)
+        error, swing = float(np.nanmedian(own.metrics["rmse"])), own.largest_swing(open_loop)
+        limits.append(Limit(math.nan, _RIGS_AT_LIMITS, int(lost.sum()), error, swing))
+    return limits
+
+
+def _next_command(session: Session) -> str:
+    run = session.findings.run
+    folder = str(run.path / RECOMMENDED) if run else RECOMMENDED
+    return shlex.join(["wristctl", "hw-run", *session.typed, folder])
+
+
+def _recorded(result: Recommended) -> Recommended:
+    """The result, its figures, tables and gains written."""
+    from wristctl.commands.recommend.figures import errors, limits
+    from wristctl.comparison.world_ranking import worlds_frame
+
+    findings, ranked, best = result.findings, result.ranking, result.best
+    findings.table("data/ranking.csv", result.frame())
+    findings.table("data/rigs.csv", worlds_frame(ranked))
+    findings.metric("reach_deg", result.reach_deg, "deg", "higher", meaning="angle held on every simulated rig")
+    caption = "Error of each controller over the simulated rigs: median, 8 of 10 rigs, and each rig"
+    findings.figure("errors", errors, result, caption=caption)
+    findings.overview.figure = "errors"
+    if best is None:
+        return result
+    row = ranked.rows[ranked.standing.groups[0][0]]
+    low, median, high = spread(row.rmse)
+    meaning = f"RMSE of {best.label} on a simulated rig"
+    findings.metric("rmse", median, "rad", "lower", ranked.worlds, meaning=f"{meaning}: median")
+    findings.metric("rmse_low", low, "rad", "lower", ranked.worlds, meaning=f"{meaning}: 1 of 10 stay below")
+    findings.metric("rmse_high", high, "rad", "lower", ranked.worlds, meaning=f"{meaning}: 9 of 10 stay below")
+    findings.headline("rmse", "rmse_low", "rmse_high", "reach_deg")
+    findings.figure("limits", limits, result, caption="Error and lost rigs over frequency and over payload")
+    _write_gains(findings, best)
+    return result
+
+
+def _write_gains(findings: Findings, best: Candidate) -> None:
+    gains = ", ".join(f"{name}: {value:.6g}" for name, value in best.gains.items())
+    row = f"{{controller: {best.controller}, gains: {{{gains}}}}}"
+    head = f"# {best.label}, as `wristctl recommend` found it. After a wrist's file: wristctl hw-run WRIST.yaml THIS"
+    findings.text(RECOMMENDED, f"{head}\nsimulate: {row}\nhw-run:\n  rows:\n    - {row}\n")
+
+
+RECOMMEND = Procedure("recommend", plan, recommend, (EarlierRun("from_identified", kind="identify", optional=True),))

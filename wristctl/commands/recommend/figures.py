@@ -1,0 +1,62 @@
+"""Figures of a recommendation: errors over simulated rigs, and how they grow with speed and payload."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import FormatStrFormatter, LogLocator, NullFormatter
+
+from wristctl.plotting.style import BLUE, GREY, VERMILLION, figure
+
+if TYPE_CHECKING:
+    from wristctl.commands.recommend.answer import Limit, Recommended
+
+
+def errors(result: Recommended) -> Figure:
+    """Every candidate's error on each rig, with median and 10 to 90 % of rigs; what cannot be relied on is grey."""
+    ranked = result.ranking
+    order = ranked.standing.order[::-1]
+    picture, ((axes,),) = figure(height=1.1 + 0.3 * len(order))
+    jitter = np.random.default_rng(0).uniform(-0.18, 0.18, ranked.worlds)
+    for place, k in enumerate(order):
+        sizes = np.degrees(ranked.rows[k].rmse)
+        sizes = np.where(np.isfinite(sizes), sizes, np.nan)
+        unreliable = k in ranked.standing.unreliable
+        shade = GREY if unreliable or k == ranked.yardstick else BLUE
+        axes.plot(sizes, place + jitter, ".", color=shade, markersize=2.5, alpha=0.5)
+        low, median, high = np.nanpercentile(sizes, (10.0, 50.0, 90.0))
+        axes.plot([low, high], [place, place], color=shade, linewidth=2.0)
+        axes.plot(
+            [median], [place], "x" if unreliable else "o", color=VERMILLION if unreliable else shade, markersize=6
+        )
+    axes.set_yticks(range(len(order)), [result.candidates[k].label for k in order])
+    axes.set_xscale("log")
+    axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+    axes.xaxis.set_major_formatter(FormatStrFormatter("%g"))
+    axes.xaxis.set_minor_formatter(NullFormatter())
+    axes.set_xlabel("RMSE on a simulated rig [deg] (cross: fails, swings or chatters on some)")
+    return picture
+
+
+def limits(result: Recommended) -> Figure:
+    """Median error of the recommended gains over the sines' frequency and over the payload; crosses lose rigs."""
+    picture, ((left, right),) = figure(1, 2, height=2.6)
+    _limit(left, result.motions, "frequency of a sine to both sides [Hz]")
+    _limit(right, result.payloads, "unknown payload [kg]")
+    left.set_ylabel("median RMSE [deg]")
+    return picture
+
+
+def _limit(axes: Axes, tried: Sequence[Limit], label: str) -> None:
+    values, sizes = [limit.value for limit in tried], np.degrees([limit.error for limit in tried])
+    axes.plot(values, sizes, color=BLUE, linewidth=1.2)
+    for limit, size in zip(tried, sizes, strict=True):
+        axes.plot([limit.value], [size], "x" if limit.lost else "o", color=VERMILLION if limit.lost else BLUE)
+        if limit.lost:
+            axes.annotate(f"{limit.lost} of {limit.rigs} lost", (limit.value, size), (3, 4), textcoords="offset points")
+    axes.set_ylim(0.0, 1.2 * np.nanmax(sizes))
+    axes.set_xlabel(label)

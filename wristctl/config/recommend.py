@@ -1,0 +1,76 @@
+"""Settings of `recommend`: which controllers are tuned for a wrist, on which rig, and for which motions."""
+
+from typing import Annotated
+
+from pydantic import Field
+
+from wristctl.config.families import Drawn, Family
+from wristctl.config.loop import Loop, Reference
+from wristctl.config.plant import Actuator, Sensor
+from wristctl.config.section import Section, choice, quantity
+from wristctl.config.tune import Controllers
+
+# Where a simulated rig differs from what its controller believes. The angle of each motion is drawn too.
+_DRAWN: dict[str, Drawn] = {
+    "plant.actuator.tendon_stiffness": "x0.7..1.4 log",
+    "plant.actuator.friction": "0.03..0.2",
+    "plant.actuator.sheath": "0..3",
+    "plant.stiffness": "x0.7..1.3",
+    "plant.damping": "x0.5..2",
+    "plant.payload": "0..0.15",
+    "plant.tendon_radius": "x0.97..1.03",
+    "plant.sensor.delay_frames": "1..3",
+    "plant.sensor.noise_deg": "0.03..0.1",
+    "plant_segments": (4, 4, 8),
+    "plant.model": ("pcc", "pcc", "hinges"),
+    "disturbances.load": "-0.3..0.3",
+}
+_MOTIONS = (
+    Reference(kind="minimum-jerk", duration=1.0),
+    Reference(kind="minimum-jerk", duration=0.7),
+    Reference(kind="two-sided-sine", frequency=0.2),
+    Reference(kind="two-sided-sine", frequency=0.5),
+)
+
+
+class RecommendSettings(Section):
+    """A controller with gains for one's own wrist and rig."""
+
+    controllers: Controllers = choice(
+        ("ct-dob", "smc-dob", "pid-dob", "pid-ff", "nc", "mrac"), "controllers to tune and to test", min_length=1
+    )
+    loop: Loop = choice(
+        Loop(
+            control_period=5e-3,
+            actuator=Actuator(level="tendon", friction=0.1, sheath=1.0),
+            sensor=Sensor(level="camera"),
+        ),
+        "the rig: motors, tendons, camera and timing",
+    )
+    draw: dict[str, Drawn] = choice(
+        _DRAWN, "settings of the loop in which simulated rigs differ, and what each is drawn from"
+    )
+    references: tuple[Reference, ...] = choice(
+        _MOTIONS, "motions that each simulated rig follows, to angles drawn within its reach", min_length=1
+    )
+    horizon: float = quantity(5.0, "s", "duration of one rollout", "assumed", gt=0)
+    largest_deg: float = quantity(45.0, "deg", "largest angle asked for, where the tendons reach it", gt=0, le=180)
+    draws: int = choice(16, "simulated rigs to tune on", ge=2, le=10_000)
+    validation: int = choice(
+        20, "other rigs to choose by, among the best gains and the scaled presets", ge=2, le=10_000
+    )
+    tests: int = choice(40, "further rigs, which no search has seen, to test on", ge=8, le=10_000)
+    candidates: int = choice(12, "candidates per iteration of each search", ge=4, le=10_000)
+    iterations: int = choice(6, "iterations of each search", ge=1, le=100_000)
+    frequencies: tuple[Annotated[float, Field(gt=0)], ...] = quantity(
+        (0.2, 0.4, 0.6, 0.8, 1.0), "Hz", "sines to both sides by which it is found how fast a motion may be"
+    )
+    payloads: tuple[Annotated[float, Field(gt=0)], ...] = quantity(
+        (0.1, 0.2, 0.3, 0.5), "kg", "masses in the hand, unknown to the controller, that are tried", "assumed"
+    )
+    from_identified: str | None = choice(None, "identify run whose parameters replace the study's")
+
+    def family(self, largest_deg: float) -> Family:
+        """The simulated rigs, asked for angles of up to `largest_deg` to both sides."""
+        drawn = self.draw | {"reference.angle_deg": f"{-largest_deg:g}..{largest_deg:g}"}
+        return Family(loop=self.loop, draw=drawn, references=self.references, horizon=self.horizon)
