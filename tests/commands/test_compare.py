@@ -196,7 +196,9 @@ def test_a_plan_counts_rollouts_and_names_the_row_that_cannot_be() -> None:
     references = len(study.compare.references)
     assert COMPARE.plan(study, Inputs()) == f"{2 * 2 * references} rollouts of 2.5 s"
     tuned: Any = SimpleNamespace(study=study, gains={"smc": SMC.presets["exchanged"]}, run=None)
-    wrong = wristctl.load_study(None, "compare.controllers=[{controller: feedforward}, {controller: pid, gains: tuned}]")
+    wrong = wristctl.load_study(
+        None, "compare.controllers=[{controller: feedforward}, {controller: pid, gains: tuned}]"
+    )
     with pytest.raises(UserError) as caught:
         COMPARE.plan(wrong, Inputs({"tuned": tuned}))
     assert caught.value.what == "no tuned gains of pid" and "compare.controllers.1.gains" in str(caught.value)

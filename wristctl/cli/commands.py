@@ -89,7 +89,7 @@ COMMANDS = {
         shortcuts=("horizon",),
         examples=(
             "wristctl compare experiments/paper.yaml --network latest:train --tuned latest:tune",
-            "wristctl compare --set 'inverses=[none]' --set 'controllers=[{controller: computed-torque, gains: default}]'",
+            "wristctl compare --set 'inverses=[none]' --set 'controllers=[{controller: lqi, gains: default}]'",
         ),
     ),
     "recommend": Entry(

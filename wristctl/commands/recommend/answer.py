@@ -74,8 +74,8 @@ class Recommended(StudyResult):
     def best(self) -> Candidate | None:
         """Recommended controller and gains; None where no candidate can be relied on."""
         groups = self.ranking.standing.groups
-        first = groups[0][0] if groups else self.ranking.yardstick
-        return None if first == self.ranking.yardstick else self.candidates[first]
+        first = self.candidates[groups[0][0]] if groups else self.candidates[-1]
+        return first if first.gains else None
 
     @property
     def fault(self) -> UserError | None:
@@ -116,7 +116,7 @@ def _sentence(result: Recommended) -> str:
         f"Use {best.controller} with {values}. Expect an error of {degrees(median)} deg RMSE ({degrees(low)} to "
         f"{degrees(high)} deg on 8 of 10 simulated rigs), {two(ratio)} times less than without feedback."
     )
-    alike = [result.candidates[k].label for k in ranked.standing.groups[0][1:] if k != ranked.yardstick]
+    alike = [result.candidates[k].label for k in ranked.standing.groups[0][1:] if result.candidates[k].gains]
     return f"{sentence} It cannot be told apart from {', '.join(alike)}." if alike else sentence
 
 
@@ -141,14 +141,14 @@ def _table(result: Recommended) -> Table:
         low, median, high = (degrees(error) if math.isfinite(error) else "-" for error in spread(ranked.rows[k].rmse))
         lost = _lost(ranked, k)
         rows.append((result.candidates[k].label, median, f"{low} to {high}", lost or "holds on all"))
-    heads = ("controller, gains", "error [deg]", "on 8 of 10 rigs [deg]", f"of {ranked.worlds} simulated rigs")
+    heads = ("controller, gains", "error [deg]", "on 8 of 10 rigs [deg]", f"of {ranked.count} simulated rigs")
     return Table("", heads, rows)
 
 
 def _lost(ranked: WorldRanking, k: int) -> str:
     """On how many rigs a candidate fails, and on how many it swings and by how much; empty where it holds on all."""
     failures, swings = ranked.standing.failures[k].times, ranked.standing.swings[k].times
-    swing = ranked.rows[k].measured.largest_swing(ranked.rows[ranked.yardstick].measured)
+    swing = ranked.rows[k].measured.largest_swing(ranked.rows[-1].measured)
     size = f"swings by up to {degrees(swing)} deg" if swing > 0.0 else "chatters"
     return ", ".join([f"fails on {failures}"] * bool(failures) + [f"{size} on {swings}"] * bool(swings))
 

@@ -193,7 +193,7 @@ def _tested(session: Session, study: Study, family: Family, candidates: Sequence
         )
         for candidate, of_candidate in zip(candidates, measured, strict=True)
     ]
-    return ranking(FAMILY, family, rows, yardstick=len(rows) - 1)
+    return ranking(FAMILY, family, rows)
 
 
 def _sines(family: Family, reach: float, frequency: float) -> Family:
@@ -257,9 +257,9 @@ def _recorded(result: Recommended) -> Recommended:
     row = ranked.rows[ranked.standing.groups[0][0]]
     low, median, high = spread(row.rmse)
     meaning = f"RMSE of {best.label} on a simulated rig"
-    findings.metric("rmse", median, "rad", "lower", ranked.worlds, meaning=f"{meaning}: median")
-    findings.metric("rmse_low", low, "rad", "lower", ranked.worlds, meaning=f"{meaning}: 1 of 10 stay below")
-    findings.metric("rmse_high", high, "rad", "lower", ranked.worlds, meaning=f"{meaning}: 9 of 10 stay below")
+    findings.metric("rmse", median, "rad", "lower", ranked.count, meaning=f"{meaning}: median")
+    findings.metric("rmse_low", low, "rad", "lower", ranked.count, meaning=f"{meaning}: 1 of 10 stay below")
+    findings.metric("rmse_high", high, "rad", "lower", ranked.count, meaning=f"{meaning}: 9 of 10 stay below")
     findings.headline("rmse", "rmse_low", "rmse_high", "reach_deg")
     findings.figure("limits", limits, result, caption="Error and lost rigs over frequency and over payload")
     _write_gains(findings, best)
@@ -270,7 +270,7 @@ def _write_gains(findings: Findings, best: Candidate) -> None:
     gains = ", ".join(f"{name}: {value:.6g}" for name, value in best.gains.items())
     row = f"{{controller: {best.controller}, gains: {{{gains}}}}}"
     head = f"# {best.label}, as `wristctl recommend` found it. After a wrist's file: wristctl hw-run WRIST.yaml THIS"
-    findings.text(RECOMMENDED, f"{head}\nsimulate: {row}\nhw-run:\n  rows:\n    - {row}\n")
+    findings.text(RECOMMENDED, f"{head}\nsimulate: {row}\nhw-run:\n  controllers:\n    - {row}\n")
 
 
 RECOMMEND = Procedure("recommend", plan, recommend, (EarlierRun("from_identified", kind="identify", optional=True),))

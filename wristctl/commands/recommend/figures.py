@@ -21,12 +21,12 @@ def errors(result: Recommended) -> Figure:
     ranked = result.ranking
     order = ranked.standing.order[::-1]
     picture, ((axes,),) = figure(height=1.1 + 0.3 * len(order))
-    jitter = np.random.default_rng(0).uniform(-0.18, 0.18, ranked.worlds)
+    jitter = np.random.default_rng(0).uniform(-0.18, 0.18, ranked.count)
     for place, k in enumerate(order):
         sizes = np.degrees(ranked.rows[k].rmse)
         sizes = np.where(np.isfinite(sizes), sizes, np.nan)
         unreliable = k in ranked.standing.unreliable
-        shade = GREY if unreliable or k == ranked.yardstick else BLUE
+        shade = GREY if unreliable or not result.candidates[k].gains else BLUE
         axes.plot(sizes, place + jitter, ".", color=shade, markersize=2.5, alpha=0.5)
         low, median, high = np.nanpercentile(sizes, (10.0, 50.0, 90.0))
         axes.plot([low, high], [place, place], color=shade, linewidth=2.0)
