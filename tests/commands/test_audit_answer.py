@@ -238,4 +238,4 @@ def test_without_loops_there_is_no_sentence_and_no_table_about_them() -> None:
     text = [claim for claim in CLAIMS if claim.evidence == "text"]
     answer = answer_of(judge_all(text, Grounds()))
     assert answer.table is None and answer.sentence
-    assert not any("loops" in note or "RMSE" in str(note) for note in answer.notes) and answer.notes
+    assert not any("loops" in str(note) or "RMSE" in str(note) for note in answer.notes) and answer.notes
