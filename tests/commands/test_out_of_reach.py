@@ -137,4 +137,4 @@ def test_a_loop_beyond_its_tendons_is_warned_of_before_and_no_gains_are_advised(
         assert ("cannot hold" in caplog.text) is beyond
         assert ("106 N" in said and "16.7 deg" in said and "0.0361 m" in said) is beyond
         advised = "wristctl tune 'my wrist.yaml' --set wrist.length=0.12 --set 'tune.controllers=[ct-dob]'"
-        assert ("wristctl tune" in said) is not beyond and said.endswith(advised) is not beyond
+        assert ("wristctl tune" in said) is not beyond and (advised in said) is not beyond

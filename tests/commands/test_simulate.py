@@ -15,6 +15,7 @@ import wristctl
 from tests.commands.conftest import columns_of, known_of, repeated, session
 from wristctl.commands import printed_table as answer_lines
 from wristctl.commands.inputs import Inputs
+from wristctl.commands.printed_table import degrees
 from wristctl.commands.simulate.command import SIMULATE, Simulated
 from wristctl.comparison.repetition_spread import spread
 from wristctl.errors import UserError
@@ -73,7 +74,13 @@ def test_the_badge_of_a_loops_page_is_its_verdict(settings: list[str], verdict: 
     assert f">{verdict}</span>" in text and ('class="state ok"' in text) == (verdict == "ok")
     assert (verdict in done.tables[0].title.lower()) == (verdict != "ok")
     assert all(len(line) <= answer_lines.COLUMNS for line in done.summary), "no line is cut off at a page's edge"
-    assert bool(done.summary) == (verdict == "does not arrive")
+    text = " ".join(done.summary)
+    assert (verdict in text) == (verdict != "ok") and len(done.summary) <= 24
+    assert (
+        f"RMSE {degrees(done.metrics['rmse'])} deg" in text
+        and f"{degrees(done.metrics['steady_state'])} deg off" in text
+    )
+    assert bool(done.short_of) == bool(done.advice) == (verdict == "does not arrive")
 
 
 def test_of_repetitions_medians_are_told_with_their_interval(simulate: Simulate) -> None:
@@ -160,3 +167,20 @@ def test_a_reference_through_a_network_needs_one() -> None:
     assert {(need.leaf, need.kind): need.optional for need in SIMULATE.needs} == {
         ("network", "train"): True, ("tuned", "tune"): True, ("from_identified", "identify"): True,
     }  # fmt: skip
+
+
+def test_an_answer_names_its_scenario_wrist_and_gains_and_of_repetitions_has_a_table(simulate: Simulate) -> None:
+    settings = ["simulate={controller: pid, gains: 'Kp=10,Ki=2,Kd=0.1', direction: radial, horizon: 1.0}"]
+    own = [
+        "simulate.loop={actuator: {level: tendon}, sensor: {level: camera}, control_period: 5.0e-3}",
+        "wrist.length=0.12",
+    ]
+    text = " ".join(wristctl.simulate(wristctl.load_study(None, *settings, *own)).summary)
+    for fact in ("30 deg radial in 1 s", "120 mm", "elastic tendons", "60 Hz", "5 ms", "Kp = 10, Ki = 2, Kd = 0.1"):
+        assert fact in text, fact
+    several = simulate(repeated("smc/exchanged", NINE, settling=3.0)).answer
+    assert several.table is not None and "9 repetitions" in several.table.columns[-1]
+    rows = {str(row[0]): row[1:] for row in several.table.rows}
+    expected = spread(np.array(NINE))
+    assert rows["RMSE [deg]"] == (degrees(5.0), f"{degrees(expected.low)} to {degrees(expected.high)}")
+    assert simulate(repeated("smc/exchanged")).answer.table is None

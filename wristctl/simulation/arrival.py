@@ -43,13 +43,14 @@ def why_not(course: Trajectory, limit: float) -> str:
     cut = float(np.mean(np.abs(wanted - delivered) > 1e-6 * np.abs(wanted)))
     if turns > _BOTH_WAYS and cut > 0.5:
         return (
-            f"{ending}; the law asks for {_largest(wanted):.3g} N m to one side and the other, turning at "
+            f"{ending}; the controller asks for {_largest(wanted):.3g} N m to one side and the other, turning at "
             f"{100.0 * turns:.0f} % of samples, and tensions of {limit:g} N cut it off {100.0 * cut:.3g} % of the time"
         )
     if cut > 0.5:
         most, asked_for = _largest(delivered), _largest(wanted)
         return f"{ending}; tensions of {limit:g} N give at most {most:.3g} N m of the {asked_for:.3g} that it asks for"
-    return f"{ending}; the law asks for no more than {_largest(wanted[-late:]):.3g} N m there: its gains are too small"
+    most = _largest(wanted[-late:])
+    return f"{ending}; the controller asks for no more than {most:.3g} N m there: its gains are too small"
 
 
 def _largest(torque: np.ndarray) -> float:

@@ -8,6 +8,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+from wristctl.commands.answer import Answer
 from wristctl.commands.inputs import EarlierRun, Inputs
 from wristctl.commands.inputs_of_loops import (
     check_inverses,
@@ -54,7 +55,9 @@ class Simulated(StudyResult):
     """Metrics of every repetition."""
     failed: bool
     short_of: str = ""
-    """Reason in a line why the loop does not arrive at its reference, with a remedy."""
+    """Reason why the loop does not arrive at its reference; empty where it does."""
+    advice: Sequence[str] = ()
+    """What may help where it does not: sentences, and a command after `$ `."""
 
     @property
     def fault(self) -> UserError | None:
@@ -66,22 +69,16 @@ class Simulated(StudyResult):
         return UserError(f"the wrist {self.repeated.failure}", where, fix, exit_code=3)
 
     @property
-    def summary(self) -> list[str]:
-        """Why a loop does not arrive, and what does, a command on a line of its own; empty where it arrives."""
-        from wristctl.commands.printed_table import in_lines
+    def answer(self) -> Answer:
+        """The scenario and how it ends, in a few lines; why a loop does not arrive, and what may help."""
+        from wristctl.commands.simulate.answer import answer
 
-        why, *command = self.short_of.split("\n")
-        return [*in_lines(why), *command]
+        return answer(self.study, self.repeated, self.short_of, self.advice)
 
     @property
     def marks(self) -> list[str]:
         """Verdicts on the loop: failed, does not arrive, limit cycle, chatters, not physical, not converged."""
         return self.repeated.marks
-
-    @property
-    def remark(self) -> bool:
-        """The metrics are the answer."""
-        return True
 
     @property
     def trajectory(self) -> Trajectory:
@@ -169,13 +166,13 @@ def simulate(session: Session) -> Simulated:
             caption = "How the motion comes to the law's sliding surface: phase plane, and sigma over time"
             findings.figure("sliding", sliding, course, law.surface, gains, caption=caption)
         findings.figure("motion", stroboscope, course, wrist, plant=settings.loop.plant.model)
-    short_of = "" if failed or repeated.arrives else _short_of(session, study, repeated, network, beyond)
-    return Simulated(session.study, findings, tables, repeated, failed, short_of)
+    short_of, advice = ("", []) if failed or repeated.arrives else _short_of(session, study, repeated, network, beyond)
+    return Simulated(session.study, findings, tables, repeated, failed, short_of, advice)
 
 
 def _short_of(
     session: Session, study: Study, repeated: Repeated, network: Inverse | None, beyond: Sequence[OutOfReach]
-) -> str:
+) -> tuple[str, list[str]]:
     """Why the loop does not arrive, and what may help.
 
     Beyond what tendons hold that is other tendons or another motion; else those of its law's presets that arrive: they
@@ -189,17 +186,17 @@ def _short_of(
     limit = study.wrist.tension_limit if chosen.loop.limits else math.inf
     short = f"does not arrive: {why_not(repeated.first.trajectory, limit)}"
     if beyond:
-        return f"{short}; {beyond[0].what}: no gains can help; {beyond[0].fix}"
+        return f"{short}; {beyond[0].what}", [f"No gains can help: {beyond[0].fix}."]
     arriving = []
-    with session.progress("trying the law's other gains"):
+    with session.progress("trying the controller's other gains"):
         for preset in controller(chosen.controller).presets:
             trial = chosen.model_copy(update={"gains": preset, "repetitions": 1})
             if preset != chosen.gains and run_simulation(study.model_copy(update={"simulate": trial}), network).arrives:
                 arriving.append(preset)
     if arriving:
-        return f"{short}; try --gains {' or '.join(arriving)}"
+        return short, [f"On the same loop these gains arrive: --gains {' or --gains '.join(arriving)}."]
     tune = shlex.join(["wristctl", "tune", *session.typed, "--set", f"tune.controllers=[{chosen.controller}]"])
-    return f"{short}; no preset of the law does here:\n{tune}"
+    return short, [f"No preset of {chosen.controller} arrives here. Search its gains:", f"$ {tune}"]
 
 
 def _table(findings: Findings, title: str, repeated: Repeated) -> Table:
