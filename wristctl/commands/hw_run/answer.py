@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, NamedTuple
+from collections.abc import Hashable, Mapping, Sequence
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from wristctl.commands.answer import Answer
 from wristctl.commands.printed_table import Table, degrees, two
@@ -85,7 +85,8 @@ def _sentence(trials: pd.DataFrame, label: str, twins: Mapping[int, Simulation])
         means = means_of(pushed, twins)
         force = ", ".join(f"{newtons:g}" for newtons in sorted({abs(force) for force in pushed["push"]}))
         after = f"after a push of {force} N"
-        parts.append(f"{_within('recovers', means.recovery)} {after} (error {_deg(means.rmse)} deg RMSE with it)")
+        recovers = "is back at once" if means.recovery == 0.0 else _within("recovers", means.recovery)
+        parts.append(f"{recovers} {after} (error {_deg(means.rmse)} deg RMSE with it)")
     return f"{label}: {', '.join(parts)}."
 
 
@@ -134,7 +135,7 @@ def _apart(done: pd.DataFrame, labels: Sequence[str], twins: Mapping[int, Simula
             if means.apart:
                 ratio = means.rmse / means.simulated
                 times = f"{two(max(ratio, 1.0 / ratio))} times {'larger' if ratio > 1.0 else 'smaller'}"
-                where = f"{label}{' with a push' * pushed}"
+                where = f"{f'{label} ' * (len(labels) > 1)}{'with' if pushed else 'without'} a push"
                 facts.append(f"{where} {_deg(means.rmse)} deg, {times} than {_deg(means.simulated)} deg simulated")
     if not facts:
         return []
@@ -153,7 +154,7 @@ def _unsound(trials: pd.DataFrame, marks: Sequence[str], metrics: Mapping[str, f
     return notes
 
 
-def _records(trials: pd.DataFrame, column: str, sound: str) -> list[dict[str, object]]:
+def _records(trials: pd.DataFrame, column: str, sound: str) -> list[dict[Hashable, Any]]:
     """Trials whose `column` says something else than is sound."""
     if column not in trials:
         return []

@@ -107,7 +107,7 @@ def model_answer(driven: Sequence[HysteresisLoop], bands: Sequence[DeadBand], ma
         for loop in rows
     ]
     notes = [f"Width and works are of a cycle at {slowest:g} Hz, with a presliding of {1e6 * main.presliding:g} um."]
-    if open_ := sum(item.drift > 0.0 for item in (*driven, *bands)):
+    if open_ := sum(drift > 0.0 for drift in [*(loop.drift for loop in driven), *(band.drift for band in bands)]):
         total = len(driven) + len(bands)
         notes.append(f"Do not rely on all of them: {open_} of {total} loops and dead bands have not converged (--all).")
     return Answer(_of_wrist(own, held.get(main)), Table("", heads, cells), notes, more)
