@@ -47,9 +47,12 @@ def means_of(trials: pd.DataFrame, twins: Mapping[int, Simulation]) -> Means:
     import numpy as np
 
     names = "rmse", "steady_state", "settling", "recovery"
-    values = [float(trials[name].mean(skipna=False)) if len(trials) else math.nan for name in names]
+    rmse, rest, settling, recovery = (
+        float(trials[name].mean(skipna=False)) if len(trials) else math.nan for name in names
+    )
     simulated = [twins[number].metrics["rmse"] for number in trials["trial"]]
-    return Means(len(trials), *values, float(np.mean(simulated)) if simulated else math.nan)
+    model = float(np.mean(simulated)) if simulated else math.nan
+    return Means(len(trials), rmse, rest, settling, recovery, model)
 
 
 def answer_of(
