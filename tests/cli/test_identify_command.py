@@ -30,7 +30,14 @@ def test_two_poses_give_a_run_that_simulate_starts_from(call: Call, tmp_path: Pa
     assert table.low["stiffness"] < table.value["stiffness"] < table.high["stiffness"] < KNOWN.stiffness
     assert (table.verdict["friction"], table.value["friction"]) == ("fixed", 0.1)
     assert found.metrics["stiffness"]["interval"] == [table.low["stiffness"], table.high["stiffness"]]
-    assert found.metrics["condition"]["value"] > 1.0 and "condition number" in out
+    assert found.metrics["condition"]["value"] > 1.0
+    lines = out.splitlines()
+    shown = {line.split()[0]: line for line in lines if line.split()[:1] and line.split()[0] in table.index}
+    assert list(shown) == list(table.index) and len(lines) <= 34
+    assert all(len(line) <= 100 for line in lines if str(found.path.name) not in line)
+    assert f"{table.value['stiffness']:.4g}" in shown["stiffness"] and " N m/rad " in shown["stiffness"]
+    assert f"{table.low['stiffness']:.4g} to {table.high['stiffness']:.4g}" in shown["stiffness"]
+    assert "fixed" in shown["friction"] and "fixed" not in shown["stiffness"]
     pasted = load_study([found.file("data/identified.yaml")])
     assert pasted.wrist.damping == table.value["damping"]
     sensor = pasted.simulate.loop.sensor
@@ -50,9 +57,12 @@ def test_what_cannot_be_told_apart_is_refused_with_what_to_add(call: Call, tmp_p
     code, out, err = call("identify", run.id)
     assert code == 3 and "not identify damping" in err and "add " in err and "--set fix." in err
     assert "What to add" in err and "condition number" in err and out == ""
+    told = next(line for line in err.splitlines() if line.startswith("damping "))
+    assert told.split()[1:3] == ["-", "-"] and err.index("damping") < err.index(told)
     failed = open_run(next((tmp_path / "results").glob("*-identify-*")))
     assert failed.state == "failed" and failed.manifest.exit_code == 3
     assert set(failed.data("parameters").verdict) >= {"not identified"}
+    assert "condition number of the Jacobian" in (failed.path / "README.md").read_text()
     assert not (failed.path / "data/identified.yaml").exists()
 
 

@@ -63,7 +63,8 @@ def test_analyse_takes_the_loop_of_simulate_and_begins_with_its_margins(call: Ca
     typed = ("--controller", "pid", "--set", "gains={Kp: 10.0, Ki: 20.0, Kd: 0.5}", "--over", "Kp")
     code, out, _ = call("analyse", *typed, "--set", "loop.control_period=2e-3", "--set", "angles_deg=[20.0]")
     run = open_run("latest:analyse")
-    assert code == 0 and out.startswith("pid/given is stable at 20 deg: gain margin ")
+    assert code == 0 and out.startswith("pid/given is stable at 20 deg")
+    assert f"delay margin {1e3 * run.metrics['delay_margin']['value']:.3g} ms" in out
     assert run.config.simulate.loop.control_period == 2e-3 and run.config.analyse.over == "Kp"
     delay = run.metrics["delay_margin"]
     assert 5e-3 < delay["value"] < 15e-3 and delay["unit"] == "s"
@@ -274,8 +275,11 @@ SEARCH = ("tune", *SOFT, "--candidates", "4", "--iterations", "3", "--set", "con
 def test_gains_are_searched_on_worlds_and_rows_ranked_on_others_with_the_answer_first(call: Call) -> None:
     code, out, err = call(*SEARCH)
     assert code == 0, err
-    assert "decades beside feedforward" in out and "found by" in out
     tuned = open_run("latest:tune")
+    assert all(
+        f"{gain} = {value:.4g}" in out
+        for gain, value in json.loads(tuned.file("data/gains.json").read_text())["ct-dob"].items()
+    )
     assert len(tuned.data("history-ct-dob")) == 24 and tuned.config.families["soft"].about == "springs"
     rows = "controllers=[{controller: ct-dob, gains: tuned}, {controller: pd-ff}]"
     code, out, err = call(

@@ -40,7 +40,15 @@ def test_the_answer_is_the_least_margin_of_all_angles() -> None:
     assert f"gain margin {20.0 * math.log10(least):.3g} dB" in done.sentence and f"{least:.3g} times" in done.sentence
     assert f"delay margin {1e3 * delay:.3g} ms" in done.sentence and "stable at 0, 15 and 30 deg" in done.sentence
     assert f"settles in {1e3 * table['settling'].max():.3g} ms" in done.sentence
-    assert done.tables[0].title == done.sentence and str(done).startswith(done.sentence)
+    assert done.tables[0].title == done.sentence and done.sentence in str(done)
+    words, lines = " ".join(done.summary), done.summary
+    assert "stable at 0, 15 and 30 deg" in words and f"{20.0 * math.log10(least):.3g} dB" in words
+    assert f"delay margin {1e3 * delay:.3g} ms" in words and len(lines) <= 32 and max(map(len, lines)) <= 100
+    for row, (_, found) in zip(done.answer.table.rows, table.iterrows(), strict=True):
+        own = found["gain_most"], found["phase_margin"], found["delay_margin"], found["settling"], found["overshoot"]
+        shown = 20.0 * math.log10(own[0]), math.degrees(own[1]), 1e3 * own[2], 1e3 * own[3], 100.0 * own[4]
+        assert row[0] == found["angle_deg"] and row[1:] == pytest.approx(shown)
+    assert len(done.answer.table.text(100).splitlines()) == 2 + len(table), "side by side"
     assert list(done.figures) == ["bode", "step", "sensitivity", "locus"] and done.portrait is None
     assert known_of(done.findings, "gain_most", "delay_margin") == [("", "higher", 3), ("s", "higher", 3)]
 
@@ -49,7 +57,7 @@ def test_a_sealed_run_begins_with_the_answer_and_one_figure(tmp_path: Path) -> N
     done = analyse("simulate={controller: smc-tracking, gains: default, horizon: 0.5}", "analyse.over=k", out=tmp_path)
     assert done.run is not None
     text = (done.run.path / "README.md").read_text(encoding="utf-8")
-    assert text.index(done.sentence) < text.index("figures/bode.png") < text.index("least factor")
+    assert text.index(done.summary[0]) < text.index("figures/bode.png") < text.index("least factor")
     assert columns_of(done.run, "data/margins.csv")["delay_margin"][0] == "s"
     assert set(columns_of(done.run, "data/response.csv")) == {
         "angle_deg", "frequency", "gain", "phase", "plant_gain", "plant_phase",
@@ -121,6 +129,8 @@ def test_an_unstable_loop_is_told_with_what_would_mend_it_and_ends_with_a_fault(
     assert "smc/exchanged is UNSTABLE at 0, 15 and 30 deg" in done.sentence and "stable up to" in done.sentence
     assert done.fault is not None and done.fault.exit_code == 3 and "0, 15 and 30 deg" in done.fault.what
     assert math.isnan(done.metrics["delay_margin"]) and done.metrics["growth"] > 1e3
+    assert [row[1:] for row in done.answer.table.rows] == 3 * [5 * (None,)]
+    assert "UNSTABLE" in done.summary[0] and "stable up to" in " ".join(done.summary)
     assert "step" not in done.figures and done.figures["locus"].axes
 
 
@@ -129,6 +139,7 @@ def test_a_wrist_that_buckles_needs_some_gain_to_stay(caplog: pytest.LogCaptureF
         done = analyse(PID, "wrist.hand_mass=0.9", STRAIGHT)
     assert done.fault is None and 0.0 < done.metrics["gain_least"] < 0.1 and "buckles" in caplog.text
     assert ", and at 0.0" in done.sentence
+    assert f"{done.metrics['gain_least']:.3g} times" in " ".join(done.summary[1:])
     alone = analyse("simulate={controller: feedforward, gains: default}", "wrist.hand_mass=0.9", STRAIGHT)
     assert "and it is UNSTABLE" in alone.sentence and alone.fault is not None
 

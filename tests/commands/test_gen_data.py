@@ -180,3 +180,15 @@ def test_of_more_samples_than_anybody_reads_the_arrays_alone_are_kept(
         assert (run.path / "data" / "samples.csv").exists() == csv
         assert len(run.array("samples")["theta"]) == count == run.metrics["samples"]["value"]
         assert f"<!-- {shown} samples of the tip -->" in run.file("figures/coverage.svg").read_text()
+
+
+@pytest.mark.parametrize("source", ["pcc", "plant"])
+def test_the_answer_gives_the_ranges_of_every_quantity_in_deg_and_mm(generate: Generate, source: str) -> None:
+    done = generate(source)
+    lines, table = done.summary, done.answer.table
+    assert table is not None and len(lines) <= 32 and max(map(len, lines)) <= 100
+    ranges = [(row[1], row[2]) for row in done.tables[0].rows[:-1]]
+    assert [row[1:3] for row in table.rows] == ranges and len(ranges) == (6 if source == "plant" else 4)
+    assert {row[3] for row in table.rows} <= {"deg", "mm", "kg"} and lines[0].startswith("4 samples ")
+    assert f"{done.metrics['exact_inverse_max_error_deg']:.2g} deg" in " ".join(lines)
+    assert "25 % by their payload, 50 % by their pose" in " ".join(lines)

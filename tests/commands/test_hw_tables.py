@@ -13,6 +13,7 @@ import pytest
 import wristctl
 from tests.commands.conftest import repeated
 from wristctl.commands.hw_run import results as hw_tables
+from wristctl.commands.hw_run.answer import answer_of
 from wristctl.commands.hw_run.command import Performed
 from wristctl.commands.inputs import Inputs
 from wristctl.commands.printed_table import Table
@@ -168,3 +169,47 @@ def test_trials_that_do_not_arrive_or_chatter_are_the_verdict_on_the_run(short: 
     done = Performed(study, Findings(0), [], table, twins)
     expected = {"does not arrive": short, "chatters": fast}
     assert done.marks == [f"{mark}: {count} of 5 trials" for mark, count in expected.items() if count]
+
+
+def _twins(rmse: float) -> dict[int, Simulation]:
+    return {number: repeated("twin", [rmse]).first for number in range(len(FACTS))}
+
+
+def _small() -> pd.DataFrame:
+    """The trials with errors of some hundredths of a radian."""
+    table = trials()
+    return table.assign(rmse=0.01 * table["rmse"], settling=0.01 * table["settling"], odd="")
+
+
+def test_the_answer_gives_error_settling_and_recovery_by_direction_in_degrees() -> None:
+    table = _small()
+    answer = answer_of(table, _twins(0.03), {}, [], "")
+    lines = answer.lines()
+    assert len(lines) <= 32 and max(map(len, lines)) <= 100 and answer.table is not None
+    rows = {(row[0], row[1]): row[2:] for row in answer.table.rows}
+    assert set(rows) == {("smc/printed", "ulnar"), ("smc/printed", "radial"), ("pid/printed", "ulnar")}
+    ulnar = rows["smc/printed", "ulnar"]  # trials 1 and 6 without a push, 4 with one
+    assert float(ulnar[0]) == pytest.approx(np.degrees(0.035), rel=0.05)
+    assert float(ulnar[4]) == pytest.approx(np.degrees(0.04), rel=0.05)
+    assert float(ulnar[5]) == pytest.approx(4000.0) and rows["pid/printed", "ulnar"][4:] == ("-", "-")
+    assert f"{float(ulnar[1]):.3g}" == f"{float(f'{np.degrees(0.03):.2g}'):.3g}"
+    assert "1 of 6 trials" in " ".join(lines), "one was stopped"
+
+
+@pytest.mark.parametrize(("simulated", "told"), [(0.02, True), (0.031, False), (0.05, False), (0.06, True)])
+def test_a_measured_error_far_from_the_simulated_one_is_told(simulated: float, told: bool) -> None:
+    table = _small().query("controller == 'smc' and push == 0.0 and outcome == 'ok'").assign(rmse=0.0345)
+    lines = " ".join(answer_of(table, _twins(simulated), {}, [], "").lines())
+    assert ("simulated." in lines) == told
+    assert not told or ("smaller" if simulated > 0.0345 else "larger") in lines
+
+
+def test_timing_is_told_only_where_ticks_were_skipped() -> None:
+    quiet, late = (answer_of(_small(), _twins(0.03), {"ticks": 500.0, "overruns": o}, [], "") for o in (0.0, 7.0))
+    assert "7 of 500" in " ".join(late.lines()) and "of 500" not in " ".join(quiet.lines())
+
+
+def test_a_trial_that_was_odd_or_never_settled_is_told() -> None:
+    table = _small().assign(settling=np.nan, odd=["", "the marker jumped", "", "", "", ""])
+    lines = " ".join(answer_of(table, _twins(0.03), {}, ["chatters: 2 of 5 trials"], "").lines())
+    assert "the marker jumped" in lines and "never settles" in lines and "chatters: 2 of 5 trials" in lines

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import json
 import math
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -87,6 +89,28 @@ def test_a_measured_loop_is_fitted_and_told_before_all_else(recorded: Path, tmp_
     np.testing.assert_allclose(kept.theta - kept.theta_model, done.fit.residuals[0], atol=1e-15)
     np.testing.assert_allclose(kept.tension_minus - kept.tension_minus_model, done.fit.residuals[2], atol=1e-12)
     assert "measured" in done.figures and kept.time.iloc[0] > 0.0
+    rows = _rows_of_a_screen(done)
+    for row, name, scale in zip(rows, CABLE._fields, (1.0, 1.0, 1e6), strict=False):
+        low, high = (scale * end for end in getattr(done.fit, name)[1:])
+        assert float(row[1]) == pytest.approx(scale * done.metrics[name], rel=5e-3)
+        assert [float(end) for end in row[2].split(" to ")] == pytest.approx([low, high], rel=5e-3)
+
+
+def _rows_of_a_screen(done: Hysteresis) -> list[Sequence[Any]]:
+    """Rows of the answer's table, of an answer that fits a screen."""
+    assert len(done.summary) <= 32 and done.answer.table is not None
+    assert all(len(line) <= 100 for line in done.summary if "report.html" not in line)
+    return list(done.answer.table.rows)
+
+
+def test_the_answer_without_a_loop_gives_the_dead_band_and_the_width_of_each_sheath(done: Hysteresis) -> None:
+    rows = _rows_of_a_screen(done)
+    assert [row[1] for row in rows] == [0.0, 1.0, 3.0]
+    own = next(row for row in rows if row[1] == CABLE.sheath)
+    slow = next(loop for loop in done.loops if loop.case.tendons == CABLE and loop.case.frequency == 0.5)
+    assert own[2] == pytest.approx(done.metrics["dead_band"]) and own[3] == pytest.approx(math.degrees(slow.width))
+    assert own[4] == pytest.approx(1e3 * done.metrics["friction_work"])
+    assert f"{done.metrics['dead_band']:.3g} deg" in " ".join(done.summary)
 
 
 def test_what_a_narrow_loop_does_not_tell_is_said(tmp_path: Path) -> None:
@@ -97,6 +121,7 @@ def test_what_a_narrow_loop_does_not_tell_is_said(tmp_path: Path) -> None:
     assert "tells mu (bend + sheath)" in title and "not mu and the sheath apart" in title and "wider range" in title
     assert math.isnan(done.metrics["sheath"]) and done.metrics["exponent"] > 0.0
     assert done.tables[0].rows[1][3] is None, "no end of the sheath's interval"
+    assert [row[1] for row in _rows_of_a_screen(done)[:2]] == ["-", "-"]
 
 
 def test_a_loop_sampled_too_coarsely_at_its_turns_is_warned_of(

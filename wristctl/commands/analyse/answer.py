@@ -6,6 +6,7 @@ import math
 from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, Literal, NamedTuple
 
+from wristctl.commands.answer import Answer
 from wristctl.commands.printed_table import Table, number
 from wristctl.commands.results import Findings
 
@@ -60,6 +61,47 @@ def answer(label: str, analyses: Sequence[LoopAnalysis], angles: Sequence[float]
         *_linear_range(analyses[-1]),
     ]
     return f"{label} is stable at {listed(angles)}: {', '.join(parts)}"
+
+
+def on_a_screen(label: str, sentence: str, analyses: Sequence[LoopAnalysis], angles: Sequence[float]) -> Answer:
+    """The answer for one screen; `sentence` is that of `answer`, which an unstable or an open loop begins with."""
+    is_open = all(analysis.is_open for analysis in analyses)
+    stable = all(analysis.margins.stable for analysis in analyses)
+    more = "Root locus, limits of linearity and all columns: --all."
+    if is_open or not stable:
+        return Answer(f"{sentence}.", None if is_open else _screen_table(analyses, angles), (), more)
+    most = min(analysis.margins.most.value for analysis in analyses)
+    least = max(analysis.margins.least.value for analysis in analyses)
+    delay = min(analysis.margins.delay for analysis in analyses)
+    gain = (
+        f"gain margin {_three(decibels(most))} dB ({_three(most)} times the loop gain)"
+        if math.isfinite(most)
+        else "any larger loop gain is stable"
+    )
+    margin = f"delay margin {_time(delay)}" if math.isfinite(delay) else "any delay is stable"
+    first = f"{label} is stable at {listed(angles)}: {gain}, {margin}."
+    notes = [f"Below {_three(least)} times the loop gain it is unstable."] * (least > 0.0)
+    for swings in _linear_range(analyses[-1]):
+        holds = f"these margins hold {swings}" if swings.startswith("for ") else swings.removeprefix("and yet ")
+        notes.append(f"At {listed(angles[-1:])} {holds}.")
+    return Answer(first, _screen_table(analyses, angles), notes, more)
+
+
+def _screen_table(analyses: Sequence[LoopAnalysis], angles: Sequence[float]) -> Table:
+    """Margins and step of each resting angle: what everybody needs of them; a dash where the loop is unstable."""
+    columns = (
+        "at rest [deg]", "gain margin [dB]", "phase margin [deg]", "delay margin [ms]", "settling [ms]",
+        "overshoot [%]",
+    )  # fmt: skip
+    rows = []
+    for angle, analysis in zip(angles, analyses, strict=True):
+        margins, step = analysis.margins, analysis.step
+        values = (
+            decibels(margins.most.value), math.degrees(margins.phase.value), 1e3 * margins.delay,
+            1e3 * step.settling, 100.0 * step.overshoot,
+        )  # fmt: skip
+        rows.append((angle, *(value if margins.stable else None for value in values)))
+    return Table("", columns, rows)
 
 
 def _gain_margin(analyses: Sequence[LoopAnalysis]) -> str:

@@ -16,10 +16,12 @@ from wristctl.commands.analyse.answer import (
     listed,
     locus_table,
     margin_table,
+    on_a_screen,
     portrait_table,
     step_table,
     write,
 )
+from wristctl.commands.answer import Answer
 from wristctl.commands.inputs import EarlierRun, Inputs
 from wristctl.commands.inputs_of_loops import (
     check_inverses,
@@ -59,6 +61,8 @@ class Analysed(StudyResult):
 
     kind = "analyse"
 
+    label: str
+    """Controller with its gains."""
     sentence: str
     angles: Sequence[float]
     found: Sequence[LoopAnalysis]
@@ -67,6 +71,11 @@ class Analysed(StudyResult):
     """Root locus at the last angle; None where nothing is fed back."""
     portrait: PhasePortrait | None
     """Phase portrait of a sliding law, toward the last angle; None of another law."""
+
+    @property
+    def answer(self) -> Answer:
+        """Whether the loop is stable, with its least margins."""
+        return on_a_screen(self.label, self.sentence, self.found, self.angles)
 
     @property
     def fault(self) -> UserError | None:
@@ -139,7 +148,7 @@ def analyse(session: Session) -> Analysed:
     portrait = _portrait(session, row, study, last)
     label = f"{row.law.name}/{chosen.gains if isinstance(chosen.gains, str) else 'given'}"
     sentence = answer(label, analyses, angles)
-    findings.summary(f"**{sentence}**\n\n![Bode plot](figures/bode.png)")
+    findings.overview.figure = "bode"
     results = LoopResults(angles, analyses, locus, portrait)
     write(findings, results)
     with session.progress("drawing"):
@@ -152,7 +161,7 @@ def analyse(session: Session) -> Analysed:
         )
     tables.append(limit_table(analyses[-1], CUTS[chosen.loop.sensor.level]))
     tables += [] if portrait is None else [portrait_table(portrait)]
-    return Analysed(session.study, findings, tables, sentence, angles, analyses, locus, portrait)
+    return Analysed(session.study, findings, tables, label, sentence, angles, analyses, locus, portrait)
 
 
 def _row(study: Study, inputs: Inputs) -> AnalysedRow:

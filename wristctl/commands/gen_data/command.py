@@ -7,6 +7,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from wristctl.commands.answer import Answer
+from wristctl.commands.gen_data.answer import RANGES, answer_of
 from wristctl.commands.inputs import EarlierRun, Given, Inputs
 from wristctl.commands.printed_table import Table
 from wristctl.commands.procedure import Procedure
@@ -34,6 +36,12 @@ class Generated(StudyResult):
     kind = "gen-data"
 
     samples: Samples
+
+    @property
+    def answer(self) -> Answer:
+        """What was drawn, with its ranges in deg and mm."""
+        run = str(self.findings.run.path) if self.findings.run else ""
+        return answer_of(self.samples.names, self.metrics, run)
 
     def frame(self) -> pd.DataFrame:
         """One row per sample: x, y, the other inputs, theta, arc_length; SI units."""
@@ -97,9 +105,8 @@ def gen_data(session: Session) -> Generated:
         share = float(np.mean(samples.held_out == code))
         findings.metric(f"held_out_{name}_share", share, n=count, meaning=f"share held out of training by its {name}")
     rows: list[tuple[str, float, float]] = []
-    units = {"theta": (180.0 / np.pi, "deg"), "pose": (180.0 / np.pi, "deg"), "hand_mass": (1.0, "kg")}
     for name in ("theta", "arc_length", "x", "y", *samples.names):
-        scale, unit = units.get(name, (1e3, "mm"))
+        scale, unit = RANGES.get(name, (1e3, "mm"))
         low, high = scale * float(table[name].min()), scale * float(table[name].max())
         rows.append((f"{name} [{unit}]", low, high))
         findings.metric(f"{name}_min_{unit}", low, unit=unit, n=count, meaning=f"least: {MEANING[name]}")

@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
+from wristctl.commands.answer import Answer
+from wristctl.commands.hw_run.answer import answer_of
 from wristctl.commands.inputs import EarlierRun, Inputs
 from wristctl.commands.inputs_of_loops import (
     check_inverses,
@@ -38,6 +40,12 @@ class Performed(StudyResult):
     trials: pd.DataFrame
     twins: dict[int, Simulation]
     """by the trial's number"""
+
+    @property
+    def answer(self) -> Answer:
+        """Error by direction, settling and recovery, and how far simulation agrees."""
+        run = str(self.findings.run.path) if self.findings.run else ""
+        return answer_of(self.trials, self.twins, self.metrics, self.marks, run)
 
     @property
     def marks(self) -> list[str]:

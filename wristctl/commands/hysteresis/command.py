@@ -9,6 +9,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from wristctl.commands.answer import Answer
+from wristctl.commands.hysteresis.answer import measured_answer, model_answer
 from wristctl.commands.inputs import Inputs
 from wristctl.commands.printed_table import Table, number
 from wristctl.commands.procedure import Procedure
@@ -189,6 +191,17 @@ class Hysteresis(StudyResult):
     loops: list[HysteresisLoop]
     dead_bands: list[DeadBand]
     fit: FrictionFit | None
+
+    @property
+    def answer(self) -> Answer:
+        """A measured loop's own shape and fit, else the dead band and loops of the wrist."""
+        from wristctl.simulation.hysteresis import main_case
+
+        where = f", or {self.findings.run.path}/report.html" if self.findings.run else ""
+        if self.fit is not None:
+            more = f"The loops of the model: --all{where}."
+            return measured_answer(self.fit, self.study.wrist, more)
+        return model_answer(self.loops, self.dead_bands, main_case(self.study.hysteresis), f"Every loop: --all{where}.")
 
     @property
     def marks(self) -> list[str]:

@@ -8,6 +8,8 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
+from wristctl.commands.answer import Answer
+from wristctl.commands.identify.answer import found_answer, refused_answer
 from wristctl.commands.inputs import EarlierRun, Inputs
 from wristctl.commands.printed_table import Table
 from wristctl.commands.procedure import Procedure
@@ -22,6 +24,7 @@ if TYPE_CHECKING:
 
     from wristctl.identification.fit import Fit, Problem
     from wristctl.identification.intervals import Knowledge
+    from wristctl.identification.lack_of_fit import Suspicion
 
 log = logging.getLogger(__name__)
 
@@ -36,6 +39,14 @@ class Identified(StudyResult):
     knowledge: Knowledge
     yaml: str
     """A study file with what was found: the wrist, and the actuator and sensor of a loop."""
+    suspected: list[Suspicion]
+    """What the residuals say that the model may lack."""
+
+    @property
+    def answer(self) -> Answer:
+        """Parameters with intervals and units, and what the model misses."""
+        run = str(self.findings.run.path) if self.findings.run else ""
+        return found_answer(self.fit, self.knowledge, self.suspected, run)
 
     @property
     def values(self) -> dict[str, float]:
@@ -91,8 +102,9 @@ def identify(session: Session) -> Identified:
         parameters(findings, fitted, estimated, lacking), fit_table(findings, fitted, estimated),
         residual_table(missed), causes(fitted, sure, suspected), budget_table(fitted, moved),
     ]  # fmt: skip
-    if offered:
-        tables.append(offers(offered))
+    additions_table = offers(offered) if offered else None
+    if additions_table is not None:
+        tables.append(additions_table)
     with session.progress("drawing"):
         findings.figure("angles", angles, fitted)
         findings.figure("residuals", residuals, fitted, estimated)
@@ -102,24 +114,25 @@ def identify(session: Session) -> Identified:
     for suspicion in suspected:
         if suspicion.evident:
             log.warning("the trials look like %s, which the model has not; intervals are widened", suspicion.told)
-    with _told_if_refused(session, tables):
+    refused = refused_answer(fitted, estimated, lacking, suspected, additions_table)
+    with _told_if_refused(session, refused, tables):
         if settings.misfit == "refuse":
             refuse_misfit(fitted, sure, suspected, missed)
         refuse(lacking, offered, estimated.condition, problem.start)
     yaml = identified_yaml(fitted.values, _camera(session.inputs, fitted))
     findings.text("data/identified.yaml", yaml)
-    return Identified(session.study, findings, tables, fitted, estimated, yaml)
+    return Identified(session.study, findings, tables, fitted, estimated, yaml, suspected)
 
 
 @contextmanager
-def _told_if_refused(session: Session, tables: Sequence[Table]) -> Iterator[None]:
-    """The tables are told all the same, where what they say is refused."""
+def _told_if_refused(session: Session, refused: Answer, tables: Sequence[Table]) -> Iterator[None]:
+    """Where the result is refused its answer is told all the same, and the run keeps the tables."""
     try:
         yield
     except UserError:
         text = "\n\n".join(table.text() for table in tables)
         session.findings.summary(f"```\n{text}\n```")
-        session.operator.tell(text)
+        session.operator.tell("\n".join(refused.lines()))
         raise
 
 

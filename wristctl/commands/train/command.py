@@ -8,11 +8,14 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from wristctl.commands.answer import Answer
 from wristctl.commands.gen_data.command import drawn, samples_of
 from wristctl.commands.inputs import EarlierRun, Inputs
+from wristctl.commands.printed_table import Table
 from wristctl.commands.procedure import Procedure
 from wristctl.commands.results import StudyResult
 from wristctl.commands.session import Session
+from wristctl.commands.train.answer import answer_of
 from wristctl.commands.train.results import (
     best_row,
     error_table,
@@ -144,6 +147,16 @@ class Trained(StudyResult):
     choice: Choice | None
     """Choice of a search over the grid, with its reason. None without a search."""
     measures: pd.DataFrame
+    kept: str
+    """Name of the network that is kept."""
+    errors: Table
+    """Errors of the network, a polynomial and the closed form in every place."""
+
+    @property
+    def answer(self) -> Answer:
+        """Error on samples that no training has seen, beside the closed form's."""
+        run = str(self.findings.run.path) if self.findings.run else ""
+        return answer_of(self.errors, len(self.split.test), (self.kept, len(self.trials)), run)
 
     def frame(self) -> pd.DataFrame:
         """One row per network and seed: its errors on the test samples and elsewhere, losses and epochs."""
@@ -243,11 +256,14 @@ def train(session: Session) -> Trained:
     tables.append(trial_table(findings, row_trials, kept))
     measures = trials_frame(trials, where)
     tables += ranking_tables(findings, settings, trials, measures)
-    tables.append(error_table(findings, kept, samples, split, where))
+    errors = error_table(findings, kept, samples, split, where)
+    tables.append(errors)
     tables.append(timing_table(findings, kept, samples, split, seconds))
     if checkpoints:
         shutil.rmtree(checkpoints, ignore_errors=True)
-    return Trained(session.study, findings, tables, kept.network, trials, samples, split, choice, measures)
+    return Trained(
+        session.study, findings, tables, kept.network, trials, samples, split, choice, measures, name, errors
+    )
 
 
 TRAIN = Procedure(

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from wristctl.commands.answer import Answer
 from wristctl.commands.inputs import EarlierRun, Inputs
 from wristctl.commands.inputs_of_loops import (
     check_family_reach,
@@ -29,6 +30,7 @@ from wristctl.commands.procedure import Procedure
 from wristctl.commands.results import Findings, StudyResult
 from wristctl.commands.session import Done, Session
 from wristctl.commands.sweep.command import sweepable
+from wristctl.commands.tune.answer import Beside, answer_of, beside_feedforward
 from wristctl.config.families import Family
 from wristctl.config.loop import Reference
 from wristctl.config.study import Study
@@ -57,6 +59,16 @@ class Tuned(StudyResult):
     lost: dict[str, dict[str, int]]
     """by controller, on how many of the cases that its best gains were chosen by they fail, swing, chatter or do not
     converge; empty where they never do"""
+    errors: dict[str, Beside]
+    """by controller, its error beside feedforward's on those cases"""
+    cases: int
+    """Number of those cases."""
+
+    @property
+    def answer(self) -> Answer | None:
+        """Best gains, their error beside feedforward, and what they do wrong."""
+        run = str(self.findings.run.path) if self.findings.run else ""
+        return answer_of(self.searches, self.errors, self.lost, self.cases, run)
 
     @property
     def marks(self) -> list[str]:
@@ -174,7 +186,8 @@ def tune(session: Session) -> Tuned:
     columns = ("controller", "objective", "fate", "found by", "evaluations", "gains")
     tables = [Table("Tuned gains, best first; objective in decades beside feedforward", columns, rows)]
     tables += truth_tables(study.wrist, judged_loops(study, study.tune))
-    return Tuned(session.study, session.findings, tables, searches, lost)
+    errors = beside_feedforward({name: best.gains for name, best in searches.items()}, cases, study.wrist)
+    return Tuned(session.study, session.findings, tables, searches, lost, errors, len(cases))
 
 
 def search_all(session: Session, study: Study, network: Inverse | None) -> dict[str, Search]:

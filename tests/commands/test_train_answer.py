@@ -1,0 +1,41 @@
+"""The answer of a training: errors where it was not trained, beside the closed form, as the metrics have them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+import wristctl
+from wristctl.commands.printed_table import Table
+from wristctl.commands.train.answer import answer_of
+from wristctl.commands.train.command import Trained
+
+SMALL = ("seed=3", "gen-data.samples=40", "train={hidden: [4], activation: tanh, epochs: 3, workers: 1}")
+
+
+@pytest.fixture(scope="module")
+def trained(tmp_path_factory: pytest.TempPathFactory) -> Trained:
+    """A network of a moment, in a run directory."""
+    return wristctl.train(wristctl.load_study(None, *SMALL), out=tmp_path_factory.mktemp("trained"))
+
+
+def test_errors_are_those_of_the_metrics_in_degrees_and_fit_a_screen(trained: Trained) -> None:
+    lines, table, run = trained.summary, trained.answer.table, trained.run
+    assert table is not None and run is not None and len(lines) <= 32
+    assert all(len(line) <= 100 for line in lines if str(run.path) not in line)
+    errors = {row[:2]: row[2:] for row in table.rows}
+    expected = trained.metrics["rmse_deg"], trained.metrics["max_error_deg"]
+    assert [float(cell) for cell in errors["network", "test samples"]] == pytest.approx(expected, rel=0.05)
+    assert errors["closed form", "test samples"] == ("<0.001", "<0.001") and trained.metrics["exact_rmse_deg"] < 1e-3
+    assert " ".join(lines).startswith(f"On {len(trained.split.test)} samples")
+    (file,) = (Path(word) for line in lines for word in line.split() if word.endswith(".safetensors"))
+    assert file.is_file()
+
+
+@pytest.mark.parametrize("networks", [1, 3])
+def test_of_several_networks_the_kept_one_is_named(networks: int) -> None:
+    rows = [("network", "test samples", 0.9, 0.5, 2.0), ("exact inverse", "test samples", 0.9, 3.0, float("inf"))]
+    words = " ".join(answer_of(Table("", "abcde", rows), 8, ("tan-8", networks), "").lines())
+    assert ("tan-8" in words) == ("of 3 networks" in words) == (networks == 3)
+    assert "0.5 deg RMSE, at most 2 deg" in words and "3 deg there, at most - deg" in words

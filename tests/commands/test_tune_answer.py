@@ -1,0 +1,85 @@
+"""The answer of a search for gains: its figures are the search's, with units, and it hides nothing of the gains."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from wristctl import load_study, tune
+from wristctl.commands.tune.answer import Beside, answer_of, at_edge
+from wristctl.commands.tune.command import Tuned
+from wristctl.control.table import controller
+from wristctl.tuning.search import Finalist, Search, Tried
+
+STUDY = (
+    "tune={controllers: [smc, pid], candidates: 2, iterations: 2, horizon: 0.3, loops: {fast: {plant_segments: 1}}, "
+    "scenarios: [{loop: fast, reference: {kind: step, angle_deg: 20.0}}]}",
+)
+
+
+@pytest.fixture(scope="module")
+def tuned(tmp_path_factory: pytest.TempPathFactory) -> Tuned:
+    """A search of a moment, in a run directory."""
+    return tune(load_study(None, *STUDY), out=tmp_path_factory.mktemp("tuned"))
+
+
+def _search(name: str, values: Sequence[float] = (), origin: str = "search") -> Search:
+    table = controller(name).gains
+    gains = dict(zip(table, values or [math.sqrt(gain.low * gain.high) for gain in table.values()], strict=True))
+    finalist = Finalist(tuple(gains.values()), origin, -1.0, -1.0)
+    return Search(name, gains, -1.0, 4, Tried(np.zeros((1, 1)), np.zeros((1, 1, len(gains)))), 1, (finalist,))
+
+
+def _text(search: Search, lost: dict[str, int]) -> str:
+    name = search.controller
+    answer = answer_of({name: search}, {name: Beside(1e-3, 2e-2, 8)}, {name: lost}, 8, "")
+    assert answer is not None
+    return "\n".join(answer.lines())
+
+
+def test_figures_are_those_of_the_search_and_fit_a_screen(tuned: Tuned) -> None:
+    assert tuned.answer is not None and tuned.answer.table is not None
+    lines, best = list(tuned.summary), min(tuned.searches, key=lambda name: tuned.searches[name].objective)
+    assert len(lines) <= 32 and all(len(line) <= 100 for line in lines if not line.startswith("wristctl "))
+    for name, value in tuned.gains[best].items():
+        assert f"{name} = {value:.4g} {controller(best).gains[name].unit}".rstrip() in " ".join(lines)
+    assert tuned.answer.table.rows[0][0] == best
+    assert {row[0]: row[1] for row in tuned.answer.table.rows} == {
+        name: tuned.metrics[f"{name}_objective"] for name in tuned.searches
+    }
+    assert tuned.run is not None and Path(tuned.run.path / "config.yaml").is_file()
+    assert any(str(tuned.run.path / "config.yaml") in line for line in lines if line.startswith("wristctl simulate"))
+
+
+def test_the_error_stands_beside_that_of_feedforward_on_the_same_cases(tuned: Tuned) -> None:
+    for beside in tuned.errors.values():
+        assert beside.cases == tuned.cases == 1 and 0.0 < beside.error < math.radians(20.0)
+    assert len({beside.feedforward for beside in tuned.errors.values()}) == 1
+    assert Beside(1e-3, 2e-2, 8).ratio == pytest.approx(20.0)
+
+
+@pytest.mark.parametrize("end", ["low", "high"])
+def test_a_gain_at_either_end_of_its_box_is_named_and_one_well_within_is_not(end: str) -> None:
+    table = controller("smc").gains
+    middle = [math.sqrt(gain.low * gain.high) for gain in table.values()]
+    last = list(table)[-1]
+    found = _search("smc", [*middle[:-1], getattr(table[last], end)])
+    assert [name for name, *_ in at_edge(found)] == [last] and at_edge(_search("smc")) == []
+    inside = {"low": 1.2, "high": 1.0 / 1.2}[end] * getattr(table[last], end)
+    assert at_edge(_search("smc", [*middle[:-1], inside])) == []
+    assert "edge" in _text(found, {}) and "edge" not in _text(_search("smc"), {})
+
+
+def test_a_preset_that_nothing_beats_is_named() -> None:
+    assert "hardware" in _text(_search("smc", origin="hardware"), {})
+    assert "preset" not in _text(_search("smc"), {})
+
+
+def test_what_the_gains_do_wrong_is_told_with_the_number_of_cases() -> None:
+    text = _text(_search("smc"), {"limit cycle": 3, "failed": 2})
+    assert "swings in 3 of 8 cases" in text and "fails in 2 of 8 cases" in text
+    assert " of 8 cases" not in _text(_search("smc"), {})

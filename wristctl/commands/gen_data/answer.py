@@ -1,0 +1,44 @@
+"""The answer of a data set: how many samples of what, with their ranges in deg and mm."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+
+from wristctl.commands.answer import Answer
+from wristctl.commands.printed_table import Table, degrees, number
+
+# Factor and unit in which a quantity is shown; of others 1e3 and mm.
+RANGES = {"theta": (180.0 / math.pi, "deg"), "pose": (180.0 / math.pi, "deg"), "hand_mass": (1.0, "kg")}
+# Quantities in words.
+_WORDS = {"theta": "bending angle", "arc_length": "arc length", "x": "tip, along the straight wrist", "y": "tip, aside",
+          "pose": "tilt of the wrist", "hand_mass": "mass in the hand"}  # fmt: skip
+
+
+def answer_of(inputs: Sequence[str], metrics: Mapping[str, float], run: str) -> Answer:
+    """What was drawn; `inputs` are those beside the tip, `run` is the path of the run, empty in memory."""
+    count = int(metrics["samples"])
+    low, high = (metrics[f"theta_{end}_deg"] for end in ("min", "max"))
+    sentence = f"{count} samples of tip position and bending angle, from {number(low)} to {number(high)} deg."
+    error, largest = (math.radians(metrics[f"exact_inverse_{name}"]) for name in ("rmse_deg", "max_error_deg"))
+    notes = [
+        f"The closed form 2 atan2(y, x) errs by {degrees(error)} deg RMSE on them, at most {degrees(largest)} deg."
+    ]
+    held = [
+        f"{100.0 * metrics[f'held_out_{name}_share']:.3g} % by their {name}"
+        for name in ("payload", "pose")
+        if metrics[f"held_out_{name}_share"] > 0.0
+    ]
+    notes += [f"Held out of training: {', '.join(held)}."] * bool(held)
+    if run:
+        notes += ["Next, train a network on them:", f"$ wristctl train --data {run}"]
+    more = f"The samples: {run}/data/samples.npz" if run else ""
+    return Answer(sentence, Table("", ("quantity", "least", "greatest", "unit"), _rows(inputs, metrics)), notes, more)
+
+
+def _rows(inputs: Sequence[str], metrics: Mapping[str, float]) -> list[tuple[str, float, float, str]]:
+    rows = []
+    for name in ("theta", "arc_length", "x", "y", *inputs):
+        unit = RANGES.get(name, (1e3, "mm"))[1]
+        rows.append((_WORDS.get(name, name), metrics[f"{name}_min_{unit}"], metrics[f"{name}_max_{unit}"], unit))
+    return rows

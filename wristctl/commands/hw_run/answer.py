@@ -1,0 +1,164 @@
+"""The answer of trials on a rig: error by direction in degrees, settling, recovery, and how far simulation agrees."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Hashable, Mapping, Sequence
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from wristctl.commands.answer import Answer
+from wristctl.commands.printed_table import Table, degrees, two
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from wristctl.simulation.repetitions import Simulation
+
+# Factor between measured and simulated error beyond which that is said.
+APART = 1.5
+# Rows of a table by direction; with more there is a row for each controller.
+_ROWS = 16
+
+
+class Means(NamedTuple):
+    """Means over trials that ended well; nan where there is none, or where one of them never settles."""
+
+    trials: int
+    rmse: float
+    """[rad]"""
+    steady_state: float
+    """[rad]"""
+    settling: float
+    """[s]"""
+    recovery: float
+    """[s]"""
+    simulated: float
+    """RMSE of the same trials in simulation [rad]."""
+
+    @property
+    def apart(self) -> bool:
+        """Whether measured and simulated error differ by more than APART."""
+        ratio = self.rmse / self.simulated if self.simulated > 0.0 else math.nan
+        return math.isfinite(ratio) and not 1.0 / APART <= ratio <= APART
+
+
+def means_of(trials: pd.DataFrame, twins: Mapping[int, Simulation]) -> Means:
+    """Means of some trials."""
+    import numpy as np
+
+    names = "rmse", "steady_state", "settling", "recovery"
+    rmse, rest, settling, recovery = (
+        float(trials[name].mean(skipna=False)) if len(trials) else math.nan for name in names
+    )
+    simulated = [twins[number].metrics["rmse"] for number in trials["trial"]]
+    model = float(np.mean(simulated)) if simulated else math.nan
+    return Means(len(trials), rmse, rest, settling, recovery, model)
+
+
+def answer_of(
+    trials: pd.DataFrame,
+    twins: Mapping[int, Simulation],
+    metrics: Mapping[str, float],
+    marks: Sequence[str],
+    run: str,
+) -> Answer:
+    """What the trials came to; `trials` are all that began, `run` is the path of their run."""
+    done = trials[trials["outcome"] == "ok"].assign(label=lambda table: table["controller"] + "/" + table["gains"])
+    labels = list(dict.fromkeys(done["label"]))
+    more = f"All tables: --all. Every trial: {run}/report.html" if run else "All tables: `.tables`."
+    notes = [*_apart(done, labels, twins), *_unsound(trials, marks, metrics)]
+    if not labels:
+        return Answer(f"None of {len(trials)} trials was completed.", None, notes, more)
+    sentences = [_sentence(done[done["label"] == label], label, twins) for label in labels[:2]]
+    stopped = len(trials) - len(done)
+    sentences.append(f"{stopped} of {len(trials)} trials ended early." if stopped else "No trial ended early.")
+    return Answer(" ".join(sentences), _table(done, labels, twins), notes, more)
+
+
+def _sentence(trials: pd.DataFrame, label: str, twins: Mapping[int, Simulation]) -> str:
+    free, pushed = trials[trials["push"] == 0.0], trials[trials["push"] != 0.0]
+    parts = []
+    if len(free):
+        means = means_of(free, twins)
+        each = [means_of(group, twins).rmse for _, group in free.groupby("direction", sort=False)]
+        spread = f" ({degrees(min(each))} to {degrees(max(each))} deg by direction)" if len(each) > 1 else ""
+        parts.append(f"error {_deg(means.rmse)} deg RMSE{spread}")
+        parts.append(_within("settles", means.settling))
+    if len(pushed):
+        means = means_of(pushed, twins)
+        force = ", ".join(f"{newtons:g}" for newtons in sorted({abs(force) for force in pushed["push"]}))
+        after = f"after a push of {force} N"
+        recovers = "is back at once" if means.recovery == 0.0 else _within("recovers", means.recovery)
+        parts.append(f"{recovers} {after} (error {_deg(means.rmse)} deg RMSE with it)")
+    return f"{label}: {', '.join(parts)}."
+
+
+def _within(verb: str, seconds: float) -> str:
+    return f"{verb} within {two(seconds)} s" if math.isfinite(seconds) else f"never {verb} in some trial"
+
+
+def _deg(angle: float) -> str:
+    return degrees(angle) if math.isfinite(angle) else "-"
+
+
+def _seconds(value: float) -> str:
+    return two(value) if math.isfinite(value) else "-"
+
+
+def _table(done: pd.DataFrame, labels: Sequence[str], twins: Mapping[int, Simulation]) -> Table:
+    """A row for each direction and controller, with and without a push; for very many a row for each controller."""
+    directions = list(dict.fromkeys(done["direction"]))
+    by_direction = len(directions) * len(labels) <= _ROWS
+    heads = (
+        "controller", "direction", "error [deg]", "simulated [deg]", "at the end [deg]", "settling [s]",
+        "pushed: [deg]", "recovery [s]",
+    )  # fmt: skip
+    rows = []
+    for label in labels:
+        of_label = done[done["label"] == label]
+        for direction in directions if by_direction else ["all"]:
+            group = of_label if direction == "all" else of_label[of_label["direction"] == direction]
+            if group.empty:
+                continue
+            free, pushed = (means_of(group[(group["push"] != 0.0) == push], twins) for push in (False, True))
+            rows.append(
+                (label, direction, _deg(free.rmse), _deg(free.simulated), _deg(free.steady_state),
+                 _seconds(free.settling), _deg(pushed.rmse), _seconds(pushed.recovery))
+            )  # fmt: skip
+    several = len(labels) > 1
+    return Table("", heads[not several :], [row[not several :] for row in rows])
+
+
+def _apart(done: pd.DataFrame, labels: Sequence[str], twins: Mapping[int, Simulation]) -> list[str]:
+    """Where measured and simulated errors differ much, in one paragraph."""
+    facts = []
+    for label in labels:
+        for pushed in (False, True):
+            means = means_of(done[(done["label"] == label) & ((done["push"] != 0.0) == pushed)], twins)
+            if means.apart:
+                ratio = means.rmse / means.simulated
+                times = f"{two(max(ratio, 1.0 / ratio))} times {'larger' if ratio > 1.0 else 'smaller'}"
+                where = f"{f'{label} ' * (len(labels) > 1)}{'with' if pushed else 'without'} a push"
+                facts.append(f"{where} {_deg(means.rmse)} deg, {times} than {_deg(means.simulated)} deg simulated")
+    if not facts:
+        return []
+    return [f"Measured and simulated errors do not agree: {'; '.join(facts)}. Do not rely on that simulation here."]
+
+
+def _unsound(trials: pd.DataFrame, marks: Sequence[str], metrics: Mapping[str, float]) -> list[str]:
+    """Trials that ended early or were odd, what the wrist does wrong, and ticks that were skipped."""
+    notes = [f"Trial {row['trial']} ended early: {row['outcome']}." for row in _records(trials, "outcome", "ok")[:3]]
+    notes += [f"Trial {row['trial']} was odd: {row['odd']}." for row in _records(trials, "odd", "")[:3]]
+    if marks:
+        notes.append(f"Of the completed trials: {'; '.join(marks)}.")
+    if metrics.get("overruns", 0.0) > 0.0:
+        skipped, ticks = int(metrics["overruns"]), int(metrics["ticks"])
+        notes.append(f"The controller was too slow for its period: {skipped} of {ticks} control ticks were skipped.")
+    return notes
+
+
+def _records(trials: pd.DataFrame, column: str, sound: str) -> list[dict[Hashable, Any]]:
+    """Trials whose `column` says something else than is sound."""
+    if column not in trials:
+        return []
+    return [row for row in trials.to_dict("records") if row[column] not in (sound, None) and row[column] == row[column]]

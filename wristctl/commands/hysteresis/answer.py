@@ -1,0 +1,132 @@
+"""The answer of a study of hysteresis: a measured loop's own shape and fit, or the dead band of the wrist as it is."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+from wristctl.commands.answer import Answer
+from wristctl.commands.printed_table import Table, degrees, two
+
+if TYPE_CHECKING:
+    from wristctl.config.wrist import WristParameters
+    from wristctl.identification.friction_fit import FrictionEstimate, FrictionFit
+    from wristctl.identification.loop_shape import LoopShape
+    from wristctl.simulation.hysteresis import DeadBand, HysteresisLoop
+    from wristctl.simulation.spool_driven import FrictionCase
+
+# Rows that a table may have; of more, those of the main coefficient of friction.
+_ROWS = 14
+
+
+def measured_answer(fit: FrictionFit, wrist: WristParameters, more: str) -> Answer:
+    """A measured loop by itself, then friction's parameters, with a dash where the loop does not tell them."""
+    from wristctl.identification.loop_shape import loop_shape
+
+    loop = fit.problem.loop
+    shape = loop_shape(loop, wrist)
+    heads = ("friction's parameters", "value", "95 % interval", "unit")
+    return Answer(_of_shape(loop.name, loop.winch, shape), Table("", heads, _fitted(fit)), _notes(fit), more)
+
+
+def _of_shape(name: str, winch: bool, shape: LoopShape) -> str:
+    """Width, work and slope as far as the columns give them; `winch`: only pulls at the spools are known."""
+    parts = []
+    if shape.width is not None:
+        same = "pulls" if winch else "spools"
+        parts.append(f"at the same {same} the angles out and back are {degrees(abs(shape.width))} deg apart")
+    if shape.work is not None:
+        mean = f" (mean of {shape.cycles})" if shape.cycles > 1 else ""
+        parts.append(f"a cycle takes {two(1e3 * shape.work, 3)} mJ at the spools{mean}")
+    if shape.stiffness is not None:
+        parts.append(f"the pulls' torque rises by {two(shape.stiffness, 3)} N m/rad")
+    if shape.gain is not None:
+        parts.append(f"the wrist bends by {two(math.degrees(1e-3 * shape.gain), 3)} deg for 1 mm reeled in")
+    return f"The loop of {name} by itself: {', '.join(parts)}." if parts else f"{name} holds no stroke there and back."
+
+
+def _told_apart(fit: FrictionFit) -> bool:
+    """Whether coefficient and sheath are each told by the loop, not only together."""
+    return fit.friction.low > 0.0 and math.isfinite(fit.sheath.high)
+
+
+def _fitted(fit: FrictionFit) -> list[tuple[str, str, str, str]]:
+    bend, exponent = fit.told_best
+    apart = _told_apart(fit)
+    return [
+        _row("friction coefficient", fit.friction, "", apart),
+        _row("sheath (angle of wrap before the wrist)", fit.sheath, "rad", apart),
+        _row("presliding", fit.presliding, "um", math.isfinite(fit.presliding.high), 1e6),
+        _row(f"coefficient x (bend + sheath), at a bend of {math.degrees(bend):.3g} deg", exponent, "", True),
+    ]
+
+
+def _row(name: str, estimate: FrictionEstimate, unit: str, told: bool, scale: float = 1.0) -> tuple[str, str, str, str]:
+    value, low, high = (two(scale * end, 3) for end in estimate)
+    return (name, value, f"{low} to {high}", unit) if told else (name, "-", "-", "")
+
+
+def _notes(fit: FrictionFit) -> list[str]:
+    angle, *tensions = fit.noise
+    left = f"{degrees(float(angle))} deg of angle"
+    if tensions:
+        left += f" and {two(float(max(tensions)))} N of tension"
+    notes = [f"The model leaves over (standard deviation) {left}, of {fit.count} samples."]
+    if not _told_apart(fit):
+        notes.append(
+            "The loop tells coefficient and sheath only together, so neither has a value. A wider range of bend would "
+            "tell them apart."
+        )
+    if not math.isfinite(fit.presliding.high):
+        notes.append("The loop does not tell presliding. More samples at its turns would.")
+    return notes
+
+
+def model_answer(driven: Sequence[HysteresisLoop], bands: Sequence[DeadBand], main: FrictionCase, more: str) -> Answer:
+    """Dead band, width and works of the wrist at its main friction, beside other coefficients and sheaths."""
+    first = driven[0].case
+    outer = [loop for loop in driven if (loop.case.low, loop.case.high) == (first.low, first.high)]
+    slowest = min(loop.case.frequency for loop in outer)
+    slow = [loop for loop in outer if loop.case.frequency == slowest]
+    own = next(loop for loop in slow if loop.case.tendons == main)
+    rows = [loop for loop in slow if loop.case.tendons.presliding == main.presliding]
+    if len(rows) > _ROWS:
+        rows = [loop for loop in rows if loop.case.tendons.friction == main.friction][:_ROWS]
+    held = {band.tendons: band for band in _middle(bands)}
+    heads = ("friction", "sheath [rad]", "dead band [deg]", "width [deg]", "friction's work [mJ]", "damping's [mJ]")
+    cells = [
+        (
+            loop.case.tendons.friction,
+            loop.case.tendons.sheath,
+            math.degrees(held[loop.case.tendons].width) if loop.case.tendons in held else None,
+            math.degrees(loop.width),
+            1e3 * loop.friction_work,
+            1e3 * loop.damped_work,
+        )
+        for loop in rows
+    ]
+    notes = [f"Width and works are of a cycle at {slowest:g} Hz, with a presliding of {1e6 * main.presliding:g} um."]
+    if open_ := sum(drift > 0.0 for drift in [*(loop.drift for loop in driven), *(band.drift for band in bands)]):
+        total = len(driven) + len(bands)
+        notes.append(f"Do not rely on all of them: {open_} of {total} loops and dead bands have not converged (--all).")
+    return Answer(_of_wrist(own, held.get(main)), Table("", heads, cells), notes, more)
+
+
+def _middle(bands: Sequence[DeadBand]) -> list[DeadBand]:
+    """The dead band at the middle one of the angles, of each friction."""
+    by_case: dict[FrictionCase, list[DeadBand]] = {}
+    for band in bands:
+        by_case.setdefault(band.tendons, []).append(band)
+    return [some[len(some) // 2] for some in by_case.values()]
+
+
+def _of_wrist(loop: HysteresisLoop, band: DeadBand | None) -> str:
+    case = loop.case
+    begin = f"With a friction coefficient of {case.tendons.friction:g} and a sheath of {case.tendons.sheath:g} rad"
+    if band is not None:
+        dead = f"the dead band is {degrees(band.width, 3)} deg at {math.degrees(band.unhindered):g} deg"
+        begin += f" {dead}, and"
+    swing = f"{math.degrees(case.low):g} to {math.degrees(case.high):g} deg"
+    width = f"the wrist is bent by {degrees(abs(loop.width), 3)} deg more on its way back"
+    return f"{begin} {width}. Friction takes {two(1e3 * loop.friction_work, 3)} mJ in a cycle of {swing}."

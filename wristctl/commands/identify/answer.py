@@ -1,0 +1,73 @@
+"""The answer of an identification: parameters with intervals and units, or what the trials do not tell."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
+
+from wristctl.commands.answer import Answer
+from wristctl.commands.printed_table import Table, degrees, number
+
+if TYPE_CHECKING:
+    from wristctl.identification.fit import Fit
+    from wristctl.identification.intervals import Knowledge
+    from wristctl.identification.lack_of_fit import Suspicion
+
+
+def found_answer(fit: Fit, knowledge: Knowledge, suspected: Sequence[Suspicion], run: str) -> Answer:
+    """What was found; `run` is the path of its run, empty in memory."""
+    trials, frames = len(fit.problem.trials), sum(map(len, fit.residuals))
+    names = ", ".join(fit.problem.free)
+    sentence = (
+        f"Identified from {trials} trial{'s' * (trials > 1)} ({frames} frames): {names}. The model leaves over "
+        f"{degrees(float(fit.noise))} deg of the marker's angle (standard deviation)."
+    )
+    notes = [*_misses(knowledge, suspected)]
+    if run:
+        notes += ["Next, simulate the wrist that was found:", f"$ wristctl simulate --from-identified {run}"]
+    more = f"Correlations, residuals and assumptions: --all. The study file: {run}/data/identified.yaml" if run else ""
+    return Answer(sentence, parameter_table(fit, knowledge, {}), notes, more)
+
+
+def refused_answer(
+    fit: Fit, knowledge: Knowledge, lacking: Mapping[str, float], suspected: Sequence[Suspicion], offers: Table | None
+) -> Answer:
+    """What the trials do not tell, and what to add: the refusal before the figures."""
+    if lacking:
+        sentence = f"Nothing to rely on: these trials do not tell {', '.join(lacking)} well enough."
+    else:
+        sentence = "Nothing to rely on: the model does not fit these trials."
+    return Answer(
+        sentence,
+        parameter_table(fit, knowledge, lacking),
+        [*_misses(knowledge, suspected), *([offers] if offers else [])],
+        "All tables are in the run's README.md.",
+    )
+
+
+def parameter_table(fit: Fit, knowledge: Knowledge, lacking: Mapping[str, float]) -> Table:
+    """Parameters with their 95 % intervals; a dash where the trials do not tell."""
+    from wristctl.commands.identify.tables import parameter_rows
+
+    rows = []
+    for name, value, low, high, unit, believed, verdict in parameter_rows(fit, knowledge, lacking):
+        if verdict == "not identified":
+            value_text, interval_text = "-", "-"
+        else:
+            value_text = number(value)
+            interval_text = "fixed" if verdict == "fixed" else f"{number(low)} to {number(high)}"
+        remark = "not told beyond what was assumed" if verdict == "as assumed" else ""
+        rows.append((name, value_text, interval_text, unit, number(believed), remark))
+    return Table("", ("parameter", "value", "95 % interval", "unit", "in the first run's study", ""), rows)
+
+
+def _misses(knowledge: Knowledge, suspected: Sequence[Suspicion]) -> list[str]:
+    """Signs that the model lacks something, for which the intervals are widened."""
+    lines = [
+        f"The trials look like {suspicion.told}, which the model has not."
+        for suspicion in suspected
+        if suspicion.evident
+    ]
+    if knowledge.misses_something:
+        lines.append("Neighbouring residuals are alike, so the model misses something.")
+    return [f"{' '.join(lines)} The intervals are widened for it."] if lines else []

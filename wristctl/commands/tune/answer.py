@@ -1,0 +1,172 @@
+"""The answer of a search in words: gains with units, their error beside feedforward, and what they do wrong."""
+
+from __future__ import annotations
+
+import math
+import shlex
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, NamedTuple
+
+from wristctl.commands.answer import Answer
+from wristctl.commands.printed_table import Table, degrees, two
+
+if TYPE_CHECKING:
+    from wristctl.arrays import Array
+    from wristctl.config.wrist import WristParameters
+    from wristctl.simulation.cases import Case
+    from wristctl.tuning.search import Search
+
+# Share of a gain's search range, on its logarithmic scale, within which a gain lies at the edge.
+_EDGE = 0.01
+# Lines of an answer beyond which its table leaves the gains to the file that holds them.
+_LINES = 32
+# What a mark says of a case, as a verb.
+_VERBS = {
+    "failed": "fails",
+    "limit cycle": "swings",
+    "chatters": "chatters",
+    "not converged": "depends on the integration step",
+}
+
+
+class Beside(NamedTuple):
+    """RMSE of tuned gains and of feedforward on the same cases, [rad]: the geometric mean of those where both last."""
+
+    error: float
+    feedforward: float
+    cases: int
+    """Cases where both last; 0: no error can be told."""
+
+    @property
+    def ratio(self) -> float:
+        """How many times less the error is than feedforward's."""
+        return self.feedforward / self.error
+
+
+def beside_feedforward(
+    gains: Mapping[str, Mapping[str, float]], cases: Sequence[Case], wrist: WristParameters
+) -> dict[str, Beside]:
+    """Error of each controller's gains beside feedforward; errors too small to be measured count alike."""
+    import numpy as np
+
+    from wristctl.comparison.bootstrap import MEASURABLE
+    from wristctl.control.table import controller
+    from wristctl.simulation.cases import measure
+    from wristctl.tuning.objective import YARDSTICK
+
+    def errors(name: str, values: Mapping[str, float]) -> Array:
+        measured = measure(controller(name), np.array([list(values.values())]), cases, wrist, ["rmse"])
+        return np.maximum(np.where(measured.failed[0], np.nan, measured.metrics["rmse"][0]), MEASURABLE)
+
+    open_loop, results = errors(YARDSTICK, {}), {}
+    for name, values in gains.items():
+        closed = errors(name, values)
+        both = np.isfinite(closed) & np.isfinite(open_loop)
+        means = [float(np.exp(np.log(some[both]).mean())) if both.any() else math.nan for some in (closed, open_loop)]
+        results[name] = Beside(means[0], means[1], int(both.sum()))
+    return results
+
+
+def answer_of(
+    searches: Mapping[str, Search],
+    errors: Mapping[str, Beside],
+    lost: Mapping[str, Mapping[str, int]],
+    cases: int,
+    run: str,
+) -> Answer | None:
+    """The answer of a search on so many `cases`; None where nothing was searched. `run` is its path, if it has one."""
+    if not searches:
+        return None
+    ordered = sorted(searches, key=lambda name: searches[name].objective)
+    best = ordered[0]
+    notes = [*_edges(ordered, searches), *_presets(ordered, searches), *_lost(ordered, lost, cases)]
+    if run:
+        words = ["wristctl", "simulate", f"{run}/config.yaml", "--controller", best, "--gains", "tuned", "--tuned", run]
+        notes += ["Next, one motion with these gains:", f"$ {shlex.join(words)}"]
+    more = f"All tables: --all. The gains: {run}/data/gains.json" if run else "All tables: `.tables`."
+    whole = Answer(_sentence(best, searches[best], errors[best], cases), _table(ordered, searches, errors), notes, more)
+    if len(whole.lines()) <= _LINES or len(ordered) == 1:
+        return whole
+    return Answer(whole.sentence, _table(ordered, searches, errors, with_gains=False), notes, more)
+
+
+def _sentence(name: str, search: Search, beside: Beside, cases: int) -> str:
+    begin = f"Use {name} with {_gains(search)}."
+    if not beside.cases:
+        return f"{begin} It fails in each of {cases} cases (objective {search.objective:.3g})."
+    times = f"{_times(beside)} feedforward's {degrees(beside.feedforward)} deg"
+    where = f"{cases} cases" if beside.cases == cases else f"{beside.cases} of {cases} cases (in the others it fails)"
+    return f"{begin} Its error is {degrees(beside.error)} deg RMSE over {where}: {times}."
+
+
+def _times(beside: Beside) -> str:
+    if abs(beside.ratio - 1.0) < 0.01:
+        return "the same as"
+    return f"{two(beside.ratio)} times less than" if beside.ratio > 1.0 else f"{two(1.0 / beside.ratio)} times"
+
+
+def _gains(search: Search) -> str:
+    from wristctl.control.table import controller
+
+    table = controller(search.controller).gains
+    return ", ".join(f"{name} = {value:.4g} {table[name].unit}".rstrip() for name, value in search.gains.items())
+
+
+def _table(
+    ordered: Sequence[str], searches: Mapping[str, Search], errors: Mapping[str, Beside], with_gains: bool = True
+) -> Table:
+    """A row for each controller, best objective first."""
+    heads = ("controller", "objective", "error [deg]", "feedforward's [deg]", *["gains"] * with_gains)
+    rows = []
+    for name in ordered:
+        beside = errors[name]
+        figures = (degrees(beside.error), degrees(beside.feedforward)) if beside.cases else ("-", "-")
+        rows.append((name, searches[name].objective, *figures, *[_gains(searches[name])] * with_gains))
+    return Table("", heads, rows)
+
+
+def _edges(ordered: Sequence[str], searches: Mapping[str, Search]) -> list[str]:
+    """Gains that lie at an end of the range in which they were searched: beyond it may be better ones."""
+    lines = []
+    for name in ordered:
+        lines += [
+            f"{gain} = {value:.4g} of {name} is at the edge of its box ({low:g} to {high:g} {unit}".rstrip() + ")."
+            for gain, value, low, high, unit in at_edge(searches[name])
+        ]
+    return [" ".join(lines)] * bool(lines)
+
+
+def at_edge(search: Search) -> list[tuple[str, float, float, float, str]]:
+    """Gains within 1 % of an end of their search box, by its logarithmic scale: name, value, ends, unit."""
+    from wristctl.control.table import controller
+
+    table = controller(search.controller).gains
+    near = []
+    for name, value in search.gains.items():
+        low, high, unit = table[name].low, table[name].high, table[name].unit
+        place = math.log(value / low) / math.log(high / low)
+        if min(place, 1.0 - place) <= _EDGE:
+            near.append((name, value, low, high, unit))
+    return near
+
+
+def _presets(ordered: Sequence[str], searches: Mapping[str, Search]) -> list[str]:
+    """Controllers for which the search found nothing better than a preset."""
+    lines = []
+    for name in ordered:
+        finalists = searches[name].finalists
+        if finalists and finalists[0].origin != "search":
+            lines.append(f"For {name} nothing better than the preset {finalists[0].origin} was found.")
+    return [" ".join(lines)] * bool(lines)
+
+
+def _lost(ordered: Sequence[str], lost: Mapping[str, Mapping[str, int]], cases: int) -> list[str]:
+    """What the gains do wrong, and in how many cases; a sentence also where they do nothing wrong."""
+    facts = [
+        f"{name} {' and '.join(f'{_VERBS[mark]} in {count} of {cases} cases' for mark, count in lost[name].items())}"
+        for name in ordered
+        if lost[name]
+    ]
+    if facts:
+        return [f"Do not rely on these: {'; '.join(facts)}."]
+    return [f"In none of the {cases} cases does any of them fail, swing or chatter."]
