@@ -15,7 +15,7 @@ class CompareSettings(Section):
     )
     loops: Loops = choice(
         LOOPS,
-        "the loops to judge on, each a block of the table; naming any replaces these (`exact: {}` is the built-in one)",
+        "the loops to compare on; naming any replaces these (`exact: {}` is the built-in one)",
         min_length=1,
     )
     references: tuple[Reference, ...] = choice(
@@ -38,4 +38,4 @@ class CompareSettings(Section):
     repetitions: int = choice(1, REPETITIONS, ge=1, le=1000)
     network: str | None = choice(None, "train run: path, id or latest:train")
     tuned: str | None = choice(None, "tune run: path, id or latest:tune")
-    tuning: TuneSettings | None = choice(None, "a search for the rows with gains: tuned, in place of a tune run")
+    tuning: TuneSettings | None = choice(None, "a search for the controllers with gains: tuned, in place of a tune run")

@@ -197,7 +197,7 @@ def _refused(law: Law, error: NumbaError) -> UserError:
     numbers = re.findall(rf'File "[^"]*{re.escape(Path(file).name)}", line (\d+)', text)
     line = numbers[-1] if numbers else law.__code__.co_firstlineno
     fix = "docs/lanes.md says what a law may call; or state plain=True, and it runs as plain Python"
-    return UserError(f"the law does not compile: {why}", f"{file}:{line}", fix)
+    return UserError(f"the controller does not compile: {why}", f"{file}:{line}", fix)
 
 
 @cache
