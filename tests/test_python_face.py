@@ -40,7 +40,7 @@ compare:
   controllers: [{controller: pid, gains: tuned}]
 simulate: {horizon: 0.2}
 """
-"""As README's study, in a moment."""
+"""As the documented study, in a moment."""
 
 
 def test_a_notebook_can_simulate_from_overrides() -> None:
@@ -51,8 +51,8 @@ def test_a_notebook_can_simulate_from_overrides() -> None:
     assert frame["theta"].iloc[-1] == pytest.approx(frame["theta_desired"].iloc[-1], abs=1e-3)
 
 
-def test_the_readmes_notebook_runs_as_it_stands(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    text = (PACKAGE.parent / "README.md").read_text(encoding="utf-8")
+def test_the_documented_notebook_runs_as_it_stands(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    text = (PACKAGE.parent / "docs" / "commands.md").read_text(encoding="utf-8")
     (code,) = re.findall(r"^```python\n(.*?)^```", text, re.DOTALL | re.MULTILINE)
     file = tmp_path / "experiments" / "paper.yaml"
     file.parent.mkdir()

@@ -108,7 +108,7 @@ class _Episodes:
         except ValueError as error:
             what = f"the worlds of {self.family} cannot be stepped together: {error}"
             raise UserError(
-                what, f"families.{self.family}.draw", "draw no such leaf, or step them one by one"
+                what, f"families.{self.family}.draw", "draw no such setting, or step them one by one"
             ) from error
         return self._seen()[:3]
 

@@ -106,7 +106,7 @@ def _learn(call: Call, run: Run) -> None:
     assert set(samples["recording"]) == {0} and len(samples["theta"]) == len(usable)
     np.testing.assert_array_equal(samples["theta"], usable["theta"])
     code, _, err = call("train", "--data", "latest:gen-data", "--dry-run")
-    assert code == 2 and "1 recording: training, choosing and judging need one each" in err
+    assert code == 2 and "1 recording: training, choosing and testing need one each" in err
 
 
 def _hear(run: Run) -> None:

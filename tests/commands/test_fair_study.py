@@ -129,7 +129,7 @@ def test_whoever_resumes_with_other_code_is_told_once_that_all_is_computed_anew(
 ) -> None:
     monkeypatch.setattr(unit, "code_digest", lambda: "other")
     again = wristctl.study(study, resume=run_of(done).path, out=tmp_path)
-    assert caplog.text.count(f"{run_of(done).id} was made by other code: none of its units can be taken over") == 1
+    assert caplog.text.count(f"{run_of(done).id} was made by other code: none of its units can be kept") == 1
     assert run_of(again).result_hash == run_of(done).result_hash
 
 
@@ -200,7 +200,9 @@ def test_ranges_of_worlds_put_together_are_the_whole(study: Study, monkeypatch: 
         ("study.controllers=[pd-ff, pd-ff]", r"pd-ff is named twice"),
         ("study.budget=ful", r"unknown budget 'ful' - study.budget - fix: one of small"),
         ("study.presets=[{controller: smc, gains: tuned}]", r"no tuned gains of smc - study.presets.0"),
-        ("study.terms={x: [pd-ff/tuned, pid-ff/tunes]}", r"no row 'pid-ff/tunes' is judged - study.terms.x - fix: did"),
+        (
+            "study.terms={x: [pd-ff/tuned, pid-ff/tunes]}",
+            r"'pid-ff/tunes' is not in the study - study.terms.x - fix: did"),
         ("study.variants={x: {optimiser: psoo}}", r"unknown optimiser 'psoo'.*did you mean 'pso'"),
         ("study.variants={x: {beside: y}, z: {}}", r"x beside 'y': one of RMSE alone, random, random again, z - "),
         ("study.variants={x: {beside: x}}", r"x beside 'x': one of RMSE alone, random, random again - "),

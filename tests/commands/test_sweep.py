@@ -179,6 +179,6 @@ def test_a_search_and_a_comparison_are_done_at_every_point() -> None:
 
 def test_a_sweep_of_what_is_not_there_says_so_before_anything_is_written(tmp_path: Path) -> None:
     study = swept(wristctl.load_study(None, *FAST), "simulate.loop.plant.stifness=1,2")
-    with pytest.raises(UserError, match=r"there is no leaf simulate.loop.plant.stifness .*did you mean 'stiffness'"):
+    with pytest.raises(UserError, match=r"there is no setting simulate.loop.plant.stifness .*did you mean 'stiffness'"):
         wristctl.simulate(study, out=tmp_path)
     assert not list(tmp_path.iterdir())

@@ -78,8 +78,8 @@ def test_nearly_continuous_settings_are_measured_as_they_are() -> None:
 @pytest.mark.parametrize(
     ("text", "said"),
     [
-        ("wrist.lenght: {draw: 1..2}", "there is no leaf lenght"),
-        ("lenght: {draw: 1..2}", "there is no leaf lenght"),
+        ("wrist.lenght: {draw: 1..2}", "there is no setting lenght"),
+        ("lenght: {draw: 1..2}", "there is no setting lenght"),
         ("wrist.length: {draw: -1..2}", "cannot draw wrist.length"),
         ("wrist.length: {why: x}", "give draw: or one_of:"),
         ("horizon: {draw: 1..9}", "horizon at most 6"),

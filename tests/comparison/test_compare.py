@@ -87,7 +87,7 @@ def test_gains_are_not_judged_on_the_loop_and_the_reference_that_they_were_tuned
     def judged(loops: dict[str, dict[str, object]], reference: dict[str, object]) -> CompareSettings:
         return CompareSettings.model_validate({"loops": loops, "references": (reference,)})
 
-    with pytest.raises(UserError, match="tuned on a scenario that they would be judged on: step 30 deg on loop other"):
+    with pytest.raises(UserError, match="tuned on a scenario that they would be tested on: step 30 deg on loop other"):
         refuse_tuned_scenarios(judged({"fine": {}, "other": SOFT}, {"kind": "step"}), tuned)
     others: tuple[tuple[dict[str, dict[str, object]], dict[str, object]], ...] = (
         ({"soft": {}}, {"kind": "step"}),  # the same name for another loop

@@ -180,7 +180,7 @@ def test_a_key_that_nothing_reads_is_refused_with_its_line_and_the_key_that_was_
         error = _refusal(file)
         if "unknowns" in path and (path[-1] == "unless" or path[-2] == "one_of"):  # keys of leaves elsewhere
             assert error.where.startswith(f"{file}:"), place
-            assert error.what.endswith(f"there is no leaf {misspelt.split('.')[-1]}"), place
+            assert error.what.endswith(f"there is no setting {misspelt.split('.')[-1]}"), place
             continue
         names = (0 if isinstance(key, int) else key for key in (*path, misspelt))
         assert error.where == f"{file}:{line}: {'.'.join(map(str, names))}", place

@@ -131,6 +131,11 @@ def mutate(mutant: Mutant, folder: Path) -> None:
     for name in (
         "pyproject.toml",
         "README.md",
+        "CHANGELOG.md",
+        "CITATION.cff",
+        "CODE_OF_CONDUCT.md",
+        "SECURITY.md",
+        "SUPPORT.md",
         "CONTRIBUTING.md",
         "Makefile",
         "LICENSE",

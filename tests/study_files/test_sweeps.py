@@ -84,10 +84,10 @@ def test_leaves_of_lists_and_whole_numbers_given_as_ranges_are_reached() -> None
 @pytest.mark.parametrize(
     "sweep, told",
     [
-        (["wrist.lenght=0.05,0.06"], r"no leaf wrist.lenght - .*wrist.lenght=0.05,0.06.*did you mean 'length'"),
-        (["wrsit.length=0.05"], r"there is no leaf wrsit.length .* did you mean 'wrist'"),
-        (["loop.plant=1"], r"simulate.loop.plant is a group of leaves"),
-        (["gains.Kx=1"], r"there is no leaf simulate.gains.Kx"),
+        (["wrist.lenght=0.05,0.06"], r"no setting wrist.lenght - .*wrist.lenght=0.05,0.06.*did you mean 'length'"),
+        (["wrsit.length=0.05"], r"there is no setting wrsit.length .* did you mean 'wrist'"),
+        (["loop.plant=1"], r"simulate.loop.plant is a group of settings"),
+        (["gains.Kx=1"], r"there is no setting simulate.gains.Kx"),
         (["wrist.length=0..1:1000000000"], r"a sweep of 1e\+09 points is more than 1e\+06 .* drawn ones"),
         (["wrist.length=0.1..1:1100", "wrist.damping=0.1..1:1100"], r"a sweep of 1.21e\+06 points"),
         (["wrist.length=0.05..0.06"], r"a range says how many values it has"),
@@ -99,7 +99,7 @@ def test_leaves_of_lists_and_whole_numbers_given_as_ranges_are_reached() -> None
         (["wrist.length=0.05,-1"], r"wrist.length cannot be -1: Input should be greater than 0"),
         (["loop.plant_segments=1..2:3"], r"simulate.loop.plant_segments cannot be 1.5"),
         (["wrist.length=1,2", "wrist.length=3"], r"wrist.length is swept twice"),
-        (["wrist.length=~1..2:3", "wrist.damping=~1..2:4"], r"drawn leaves go together, and 3 and 4 values do not"),
+        (["wrist.length=~1..2:3", "wrist.damping=~1..2:4"], r"drawn settings go together, and 3 and 4 values do not"),
     ],
 )  # fmt: skip
 def test_a_sweep_that_cannot_be_is_named(sweep: list[str], told: str) -> None:

@@ -46,7 +46,7 @@ def new(
 ) -> None:
     """Write a controller, reference or optimiser that runs as it stands, for you to change."""
     if not re.fullmatch(r"[a-z][a-z0-9]*(-[a-z0-9]+)*", name):
-        raise UserError(f"{name!r} is no name for a {kind}", "NAME", "small letters, digits and dashes: my-law")
+        raise UserError(f"{name!r} is no name for a {kind}", "NAME", "small letters, digits and dashes: my-controller")
     if keyword.iskeyword(name):
         raise UserError(f"{name!r} is a word of Python's own", "NAME", f"another name: my-{name}")
     if name in _TABLES[kind]:
@@ -118,7 +118,7 @@ def check_controller(
     ],
     config: Annotated[
         list[Path] | None,
-        typer.Option("--config", "-c", metavar="FILE", help="Study file with its `laws`."),
+        typer.Option("--config", "-c", metavar="FILE", help="Study file with its `controller-settings`."),
     ] = None,
     no_board: Annotated[bool, typer.Option("--no-board", help="Leave out the trial on the emulated board.")] = False,
     trust_code: TrustCode = False,

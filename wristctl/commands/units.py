@@ -48,7 +48,7 @@ def performed(
     folder, earlier = (source.path / UNITS if source else None for source in (run, stopped))
     first = folder is None or not folder.exists()
     if first and stopped is not None and stopped.manifest.code.tree_sha256 != code_digest():
-        log.warning("%s was made by other code: none of its units can be taken over, all are computed anew", stopped.id)
+        log.warning("%s was made by other code: none of its units can be kept, all are computed anew", stopped.id)
     if folder is not None:
         folder.mkdir(exist_ok=True)
     furnish = None

@@ -61,10 +61,10 @@ def refuse_tuned_scenarios(compared: CompareSettings, tuned: TuneSettings) -> No
             for reference in compared.references:
                 if same_loop and reference_name(reference) == reference_name(scenario.reference):
                     raise UserError(
-                        f"the gains were tuned on a scenario that they would be judged on: "
+                        f"the gains were tuned on a scenario that they would be tested on: "
                         f"{reference_name(reference)} on loop {name}",
                         where="compare.references",
-                        fix="tune on other references, or judge on others",
+                        fix="tune on other references, or compare on others",
                     )
 
 

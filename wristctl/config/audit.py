@@ -113,7 +113,7 @@ class AuditSettings(Section):
     claims: tuple[Claim, ...] = choice((), "the ledger: claims with what decides them; experiments/claims.yaml has all")
     table1: str | None = choice(None, "train run of experiments/table1.yaml: path, id or latest:train")
     selection: str | None = choice(None, "train run of experiments/model_selection.yaml: path, id or latest:train")
-    hardware: str | None = choice(None, "hw-run run that judges the experiment's claims: path, id or latest:hw-run")
+    hardware: str | None = choice(None, "hw-run run that decides the experiment's claims: path, id or latest:hw-run")
     horizon: float = quantity(5.0, "s", "duration of one rollout", "assumed", gt=0)
     box: Box = Box()
 

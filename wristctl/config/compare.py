@@ -53,4 +53,4 @@ class CompareSettings(Section):
     repetitions: int = choice(1, REPETITIONS, ge=1, le=1000)
     network: str | None = choice(None, "train run: path, id or latest:train")
     tuned: str | None = choice(None, "tune run: path, id or latest:tune")
-    tuning: TuneSettings | None = choice(None, "a search for the rows with gains: tuned, in place of a tune run")
+    tuning: TuneSettings | None = choice(None, "a search for the controllers with gains: tuned, in place of a tune run")

@@ -11,19 +11,19 @@ from wristctl.config.tune import Objective
 
 
 class StudyBudget(Section):
-    """Computing budget, equal for every law and family."""
+    """Computing budget, equal for every controller and family."""
 
     candidates: int = choice(10, "candidates per iteration of a search", ge=2, le=10_000)
     iterations: int = choice(8, "iterations of a search", ge=1, le=100_000)
-    finalists: int = choice(8, "best candidates that are judged anew on other worlds", ge=1, le=1000)
+    finalists: int = choice(8, "best candidates that are evaluated anew on other worlds", ge=1, le=1000)
     draws: int = choice(3, "worlds of a family that a search runs on", ge=1, le=10_000)
     validation: int = choice(8, "other worlds that its gains are chosen by", ge=1, le=10_000)
-    worlds: int = choice(20, "held-out worlds of a family that all are judged on", ge=8, le=100_000)
+    worlds: int = choice(20, "held-out worlds of a family that all are tested on", ge=8, le=100_000)
     noises: int = choice(1, "streams of camera noise that each motion in each of these meets", ge=1, le=1000)
 
 
 class StudyVariant(Section):
-    """Another way to tune, to see whether the order of the laws hangs on it."""
+    """Another way to tune, to see whether the order of the controllers depends on it."""
 
     optimiser: str = choice("", "another optimiser; empty: the study's")
     objective: Objective | None = choice(None, "another objective; null: the study's")
@@ -38,21 +38,22 @@ class StudyVariant(Section):
 
 
 class FairStudySettings(Section):
-    """Every law tuned with the same budget on each family of worlds, and judged on worlds that no search has seen."""
+    """Controllers tuned with the same budget on each family of worlds, and tested on worlds that no search has seen."""
 
     laws: tuple[ControllerName, ...] = choice(
         ("pd-ff", "pid-ff"), "controllers that are tuned", min_length=1, alias="controllers"
     )
     families: tuple[str, ...] = choice((), "families of worlds, by their names in `families`; none: all")
-    presets: tuple[Row, ...] = choice((), "rows judged beside the tuned laws")
+    presets: tuple[Row, ...] = choice((), "controllers with their gains, tested beside the tuned ones")
     terms: dict[str, tuple[str, str]] = choice(
-        {}, "what is asked for: in words, and the rows without and with it, as pid-ff/tuned"
+        {}, "questions: in words, and the controllers without and with the term, as pid-ff/tuned"
     )
     optimiser: Annotated[str, OneOf(OPTIMISERS)] = choice("differential-evolution", "ask/tell optimiser of searches")
     objective: Objective = Objective()
     tolerated: float = choice(
         0.01,
-        "share of the worlds in which a row may fail, swing or chatter; shown to do so in more, it is not recommended",
+        "share of the worlds in which a controller may fail, swing or chatter; shown to do so in more, it is not "
+        "recommended",
         ge=0,
         lt=1,
     )
@@ -60,7 +61,7 @@ class FairStudySettings(Section):
     varied: str = choice("", "the family that the variants are tried on; empty: the first")
     budget: str = choice("small", "which of the budgets")
     budgets: dict[str, StudyBudget] = choice({"small": StudyBudget()}, "budgets by name", min_length=1)
-    resume: str | None = choice(None, "study run that was cut short: its units are taken over")
+    resume: str | None = choice(None, "study run that was cut short: its results are kept")
 
     @model_validator(mode="after")
     def _laws_once(self) -> Self:

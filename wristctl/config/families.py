@@ -63,11 +63,11 @@ class Family(Section):
 
     loop: Loop = Loop()
     draw: dict[str, Drawn] = choice(
-        {}, "leaves of the loop, or of its references as reference.angle_deg, and what each is drawn from"
+        {}, "settings of the loop, or of its references as reference.angle_deg, and what each is drawn from"
     )
     references: tuple[Reference, ...] = choice((Reference(),), "motions, each followed in every world", min_length=1)
     horizon: float = quantity(3.0, "s", "duration of one rollout", "assumed", gt=0)
-    about: str = choice("", "what is asked of a law here, in a few words")
+    about: str = choice("", "what is asked of a controller here, in a few words")
 
     def world(self, shares: Mapping[str, float]) -> Loop:
         """The loop with its leaves at these shares of what they are drawn from."""

@@ -127,7 +127,9 @@ class HwRunSettings(RigSettings):
     horizon: float = quantity(5.0, "s", "duration of a trial", "assumed", gt=0)
     back: float = quantity(1.0, "s", "duration of the return to zero", "assumed", gt=0)
     rest: float = quantity(0.5, "s", "rest at zero before each trial", "assumed", ge=0.1)
-    control_period: float = quantity(5e-3, "s", "time between two evaluations of the law", "assumed", ge=2e-3, le=0.05)
+    control_period: float = quantity(
+        5e-3, "s", "time between two evaluations of the controller", "assumed", ge=2e-3, le=0.05
+    )
     calibration: str | None = choice(None, "calibrate-wrist run; without one the rig is homed from scratch")
     positions: Literal["find", "stored"] = choice("find", "zero positions: found anew, or as the calibration left them")
     from_identified: str | None = choice(None, "identify run whose parameters replace what the controller knows")

@@ -31,12 +31,12 @@ class DataSettings(Section):
     poses: tuple[float, ...] = quantity(
         (0.0, 90.0, 180.0), "deg", "plant: tilts of the base from upright, drawn in turn", "assumed", min_length=1
     )
-    held_out_poses: tuple[float, ...] = quantity((), "deg", "plant: tilts kept from training, to judge by")
+    held_out_poses: tuple[float, ...] = quantity((), "deg", "plant: tilts kept from training, to test by")
     payload: tuple[float, float] = quantity(
         (0.0, 0.5), "", "plant: range of the payload over the hand's mass", "assumed"
     )
     held_out_payload: tuple[float, float] = quantity(
-        (0.2, 0.3), "", "plant: part of that range kept from training, to judge by"
+        (0.2, 0.3), "", "plant: part of that range kept from training, to test by"
     )
     run: str | None = choice(
         None, "run: one with tips and angles (hw-run, track, simulate, compare): path, id or latest:hw-run"
@@ -82,7 +82,7 @@ class NetworkSettings(Section):
     """A multilayer perceptron and its training; defaults are the paper's network."""
 
     preset: Literal["t1-sigmoid", "t1-relu", "t1-leaky-relu", "t1-tanh", "recommended"] | None = choice(
-        None, "values for the leaves below that are not given"
+        None, "values for the settings below that are not given"
     )
     inputs: Literal["all", "tip"] = choice("all", "all of the data's inputs, or the tip position alone")
     hidden: tuple[Annotated[int, Field(ge=1, le=10_000)], ...] = choice(
@@ -165,7 +165,7 @@ class TrainSettings(NetworkSettings):
         lt=1,
     )
     split: Literal["recording", "sample"] = choice(
-        "recording", "of measured data: whole recordings, or samples by themselves, whose neighbours then judge them"
+        "recording", "of measured data: whole recordings, or samples by themselves, whose neighbours then test them"
     )
     seeds: int = choice(
         1,
@@ -173,7 +173,7 @@ class TrainSettings(NetworkSettings):
         ge=1,
         le=100,
     )
-    rows: tuple[NetworkRow, ...] = choice((), "several networks side by side, in place of the one above")
+    rows: tuple[NetworkRow, ...] = choice((), "several networks side by side, instead of the one above")
     search: bool = choice(False, "choose layers and activation by cross-validation over the grid, then train that")
     grid: Grid = Grid()
     workers: int = choice(0, "processes at once, whose number changes no byte; 0: one for each core", ge=0, le=256)
@@ -184,7 +184,7 @@ class TrainSettings(NetworkSettings):
     def _names_differ(self) -> Self:
         names = [row.name for row in self.rows]
         if "" in names or len(set(names)) < len(names):
-            raise ValueError("each row needs a name of its own")
+            raise ValueError("each network of rows needs a name of its own")
         if self.rows and self.search:
             raise ValueError("give rows or search, not both")
         for hidden in self.grid.layers() if self.search else ():

@@ -47,7 +47,9 @@ class Loop(Section):
     disturbances: Disturbances = Disturbances()
     actuator: Actuator = Actuator()
     sensor: Sensor = Sensor()
-    control_period: float = quantity(1e-3, "s", "time between two evaluations of the law", "assumed", gt=0, le=0.1)
+    control_period: float = quantity(
+        1e-3, "s", "time between two evaluations of the controller", "assumed", gt=0, le=0.1
+    )
     substeps: int | None = choice(
         None,
         "integration steps in a period; null: as many as its numbers take, of 1 ms at most for elastic tendons (0.5 ms "
@@ -160,7 +162,7 @@ class Reference(OpenSection):
 
 
 class Scenario(Section):
-    """A loop and a reference: what a controller is tuned or judged on."""
+    """A loop and a reference: what a controller is tuned or tested on."""
 
     loop: str = choice("four-segments", "name of a loop in `loops`")
     reference: Reference = Reference()

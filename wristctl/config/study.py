@@ -32,7 +32,7 @@ class Study(Section):
         json_schema_extra={"unsaid": True},
     )
     sweep: tuple[str, ...] = Field(
-        (), description="leaves at many values, as KEY=1,2,3 or KEY=0..3:20", json_schema_extra={"unsaid": True}
+        (), description="settings at many values, as KEY=1,2,3 or KEY=0..3:20", json_schema_extra={"unsaid": True}
     )
     controller_settings: dict[str, dict[str, float]] = Field(
         {},

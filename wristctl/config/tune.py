@@ -65,7 +65,9 @@ class TuneSettings(Section):
     candidates: int = choice(40, "candidates per iteration (particles of the swarm)", "assumed", ge=2, le=10_000)
     iterations: int = choice(60, "iterations of each search", "assumed", ge=1, le=100_000)
     restarts: int = choice(1, "searches, the first from a preset, the others from the middle of the box", ge=1, le=100)
-    finalists: int = choice(50, "best candidates that are judged anew, with the presets, to choose from", ge=1, le=1000)
+    finalists: int = choice(
+        50, "best candidates that are evaluated anew, with the presets, to choose from", ge=1, le=1000
+    )
     objective: Objective = Objective()
     worlds: TuningWorlds = TuningWorlds()
     scenarios: tuple[Scenario, ...] = choice(
@@ -73,7 +75,7 @@ class TuneSettings(Section):
             Scenario(reference=Reference(kind="step", angle_deg=20.0)),
             Scenario(reference=Reference(kind="minimum-jerk", angle_deg=20.0, duration=1.5)),
         ),
-        "tuning scenarios, where no worlds are named; compare refuses to judge on any of them",
+        "tuning scenarios, where no worlds are named; compare refuses any of them",
         min_length=1,
     )
     loops: Loops = choice(

@@ -21,11 +21,11 @@ STRATA = ("loop.plant_segments", "loop.control_period", "measured")
 
 
 class Unstated(Section):
-    """One thing that is not given: values of a leaf, or alternatives that set several leaves; and why so."""
+    """One thing that is not given: values of a setting, or alternatives that set several settings; and why so."""
 
     draw: Drawn | None = None
-    one_of: dict[str, dict[str, Any]] | None = choice(None, "alternatives by name, each with its leaves")
-    unless: dict[str, Any] | None = choice(None, "beside a draw: leaves that do without it")
+    one_of: dict[str, dict[str, Any]] | None = choice(None, "alternatives by name, each with its settings")
+    unless: dict[str, Any] | None = choice(None, "beside a draw: settings that do without it")
     odds: float = choice(0.0, "share of the settings without it", ge=0, lt=1)
     why: str = choice("", "why this range")
 
@@ -81,7 +81,7 @@ class Box(Section):
         if data[""]:
             leaf = next(iter(data[""]))
             raise PydanticCustomError(
-                "draw", "cannot draw {key}: {why}", {"key": leaf, "why": f"there is no leaf {leaf}"}
+                "draw", "cannot draw {key}: {why}", {"key": leaf, "why": f"there is no setting {leaf}"}
             )
         loop = Loop.model_validate(data["loop"])
         if measured == "observer":
@@ -98,7 +98,9 @@ class Box(Section):
                 except ValidationError as error:
                     why = error.errors()[0]
                     leaf = ".".join(map(str, why["loc"]))
-                    reason = f"there is no leaf {leaf}" if why["type"] == "extra_forbidden" else f"{leaf}: {why['msg']}"
+                    reason = (
+                        f"there is no setting {leaf}" if why["type"] == "extra_forbidden" else f"{leaf}: {why['msg']}"
+                    )
                     raise PydanticCustomError(
                         "draw", "cannot draw {key}: {why}", {"key": key, "why": reason}
                     ) from error

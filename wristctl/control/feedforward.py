@@ -1,4 +1,4 @@
-"""Stiffness and gravity feedforward: the baseline that every feedback law has to beat."""
+"""Stiffness and gravity feedforward: the baseline that every feedback controller has to beat."""
 
 from typing import Any
 

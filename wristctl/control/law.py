@@ -203,7 +203,7 @@ def _refused(law: Law, error: NumbaError) -> UserError:
         fix = (_import_of(match[1]) if match.lastindex == 1 else "") or fix
     numbers = re.findall(rf'File "[^"]*{re.escape(Path(file).name)}", line (\d+)', text)
     line = numbers[-1] if numbers else law.__code__.co_firstlineno
-    return UserError(f"the law does not compile: {why}", f"{file}:{line}", fix)
+    return UserError(f"the controller does not compile: {why}", f"{file}:{line}", fix)
 
 
 def _import_of(name: str) -> str:

@@ -144,9 +144,9 @@ def _split_recordings(recording: NDArray[np.int64], train_share: float, rng: np.
     recordings = rng.permutation(np.unique(recording))
     if len(recordings) < 3:
         raise UserError(
-            f"{len(recordings)} recording{'s' * (len(recordings) != 1)}: training, choosing and judging need one each",
+            f"{len(recordings)} recording{'s' * (len(recordings) != 1)}: training, choosing and testing need one each",
             where="train.data",
-            fix="measure more, or train with split: sample, which judges by neighbours of what it was trained on",
+            fix="measure more, or train with split: sample, which tests by neighbours of what it was trained on",
         )
     train = min(max(1, round(len(recordings) * train_share)), len(recordings) - 2)
     validation = train + max(1, (len(recordings) - train) // 2)

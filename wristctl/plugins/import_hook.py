@@ -50,11 +50,13 @@ def data_file(source: str, name: str) -> Path:
     """
     file = Path(os.path.abspath(Path(source).parent / name))
     if not file.is_file():
-        raise UserError(f"no file {name} beside {Path(source).name}", str(file), "paths count from the law's file")
+        raise UserError(
+            f"no file {name} beside {Path(source).name}", str(file), "paths count from the controller's file"
+        )
     if _under_way:
         root = _under_way[-1].root
         if not file.resolve().is_relative_to(root.resolve()):
-            raise UserError("a law reads data from outside its folder", str(file), f"put it below {root}")
+            raise UserError("a controller reads data from outside its folder", str(file), f"put it below {root}")
         _under_way[-1].note(file, digest_now(file))
     elif Path(source) in _imported and file not in _imported:
         problem = f"{name} is asked for when {Path(source).name} has been imported, and would not be kept with it"

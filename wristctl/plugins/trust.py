@@ -102,4 +102,4 @@ def _check_seal(home: Path, files: Mapping[Path, str]) -> None:
         name = file.relative_to(home).as_posix() if file.is_relative_to(home) else str(file)
         if sealed.get(name, "" if complete else digest) != digest:
             problem = "the run's code is not as it was sealed"
-            raise UserError(problem, str(file), "restore the run, or take the law from where you trust it")
+            raise UserError(problem, str(file), "restore the run, or take the controller from where you trust it")

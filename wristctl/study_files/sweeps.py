@@ -111,13 +111,13 @@ def _changed(section: Any, path: tuple[str, ...], value: Any, axis: SweepAxis) -
         fields = _names(type(section))
         extra = section.model_extra or {}
         if head not in fields and head not in extra and not (hasattr(section, "added") and head in section.added()):
-            raise UserError(f"there is no leaf {axis.key}", axis.where, meant(head, fields))
+            raise UserError(f"there is no setting {axis.key}", axis.where, meant(head, fields))
         name = fields.get(head, head)
         current = getattr(section, name, None)
         new = _changed(current, tuple(below_head), value, axis) if below_head else _alike(current, value)
         if not below_head and isinstance(current, Section):
             raise UserError(
-                f"{axis.key} is a group of leaves", axis.where, f"one of {', '.join(keys_of(type(current)))}"
+                f"{axis.key} is a group of settings", axis.where, f"one of {', '.join(keys_of(type(current)))}"
             )
         if below_head and not type(section).__pydantic_decorators__.model_validators:  # what is new has been checked
             return section.model_copy(update={name: new})
@@ -128,14 +128,14 @@ def _changed(section: Any, path: tuple[str, ...], value: Any, axis: SweepAxis) -
     if isinstance(section, Mapping) and (head in section or below_head):
         head = head if head in section else LOOPS.get(head, head)
         if head not in section:
-            raise UserError(f"there is no leaf {axis.key}", axis.where, meant(head, map(str, section)))
+            raise UserError(f"there is no setting {axis.key}", axis.where, meant(head, map(str, section)))
         new = _changed(section[head], tuple(below_head), value, axis) if below_head else _alike(section[head], value)
         return {**section, head: new}
     if isinstance(section, tuple) and head.isdigit() and int(head) < len(section):
         current = section[int(head)]
         new = _changed(current, tuple(below_head), value, axis) if below_head else _alike(current, value)
         return (*section[: int(head)], new, *section[int(head) + 1 :])
-    raise UserError(f"there is no leaf {axis.key}", axis.where, "one that `--dry-run` shows")
+    raise UserError(f"there is no setting {axis.key}", axis.where, "one that `--dry-run` shows")
 
 
 @cache
@@ -167,7 +167,7 @@ def _count(text: str, values: str) -> tuple[int, bool]:
 def _points(counts: Sequence[tuple[int, bool]], text: str) -> int:
     drawn = {many for many, drawn in counts if drawn}
     if len(drawn) > 1:
-        problem = f"drawn leaves go together, and {' and '.join(map(str, sorted(drawn)))} values do not"
+        problem = f"drawn settings go together, and {' and '.join(map(str, sorted(drawn)))} values do not"
         raise UserError(problem, Argument("sweep", text), "the same number of each")
     return math.prod([many for many, drawn in counts if not drawn]) * (drawn.pop() if drawn else 1)
 

@@ -225,7 +225,7 @@ def _at_rest(row: AnalysedRow, study: Study, angle: float) -> LoopAnalysis:
         reason = f"to rest at {angle:g} deg takes {most:.3g} N in a tendon that bears {bears:g}"
         raise UserError(reason, "analyse.angles_deg", "a smaller angle, or a larger wrist.tension_limit")
     if analysis.linear.bend > _CURVED:
-        log.warning("at %g deg the law bends within 1e-4 rad: its margins are of smaller swings", angle)
+        log.warning("at %g deg the control law is not linear within 1e-4 rad: its margins are of smaller swings", angle)
     return analysis
 
 

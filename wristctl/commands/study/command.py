@@ -54,7 +54,7 @@ def plan(study: Study, inputs: Inputs) -> str:
         for term, pair in settings.terms.items():
             for label in pair:
                 if label not in labels:
-                    raise UserError(f"no row '{label}' is judged", f"terms.{term}", meant(label, labels))
+                    raise UserError(f"'{label}' is not in the study", f"terms.{term}", meant(label, labels))
         for name, _, way in ways_to_tune(study):
             overridden = name in settings.variants and settings.variants[name].optimiser
             places = {

@@ -5,6 +5,7 @@ from __future__ import annotations
 import shutil
 import time
 from dataclasses import dataclass
+from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -164,12 +165,15 @@ class Trained(StudyResult):
 
 
 def plan(study: Study, inputs: Inputs) -> str:
-    """Plan of a training. Raises UserError for a split that leaves no samples to judge by."""
+    """Plan of a training. Raises UserError without PyTorch, and for a split that leaves no samples to evaluate on."""
     import numpy as np
 
     from wristctl.learning.dataset import split_samples
     from wristctl.learning.selection import grid_points
 
+    if find_spec("torch") is None:
+        fix = "pip install torch --index-url https://download.pytorch.org/whl/cpu"
+        raise UserError("training needs PyTorch, which is not installed", "train", fix)
     settings, samples, held_out, whose = study.train, inputs.read("data", samples_of), None, None
     count, source = study.gen_data.samples, "samples of its own"
     if samples is not None:
