@@ -134,6 +134,7 @@ def _use(where: str, alike: Sequence[Ranking], others: Sequence[Ranking]) -> str
         text += "; no controller is better than feedforward, which is open loop"
     elif gains:
         text += f", {_ends([*map(two, gains)])} times less than feedforward"
+    text += _seldom(named, [ranking for ranking, _ in places])
     if few := [condition(ranking) for ranking in alike if ranking.standing.untold]:
         text += f" (no ranking in {joined(few)}: too few cases)"
     bad = [
@@ -145,6 +146,17 @@ def _use(where: str, alike: Sequence[Ranking], others: Sequence[Ranking]) -> str
         return f"{text}."
     worst = max(bad, key=lambda place: _lost(*place))
     return f"{text}; with {_rig_whole([worst[0]])} {'it' if len(named) == 1 else chosen} {fact(*worst)}."
+
+
+def _seldom(labels: Sequence[str], rankings: Sequence[Ranking]) -> str:
+    """Faults of controllers that have them too seldom to be shown to exceed what is tolerated, the worst of each."""
+    words = ""
+    for label in labels:
+        lost = [(ranking, ranking.labels.index(label)) for ranking in rankings if label in ranking.labels]
+        ranking, row = max(lost, key=lambda place: _lost(*place))
+        if ranking.standing.lost[row].times:
+            words += f"; {label} {fact(ranking, row)}"
+    return words
 
 
 def _no_ranking(alike: Sequence[Ranking]) -> str:

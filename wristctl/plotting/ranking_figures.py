@@ -2,6 +2,7 @@
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
+from textwrap import fill
 from typing import Any
 
 import numpy as np
@@ -237,44 +238,36 @@ def probability_of_better(ranking: Ranking, place: str) -> Figure:
 
 
 def ranking_intervals(ranking: Ranking) -> Figure:
-    """RMSE of each row with its interval, best on top; a bar joins ties, what has no place is grey, with the reason.
+    """RMSE of each row with its interval, best on top; a bar joins ties, black crosses must not be used.
 
     Small dots are the worlds.
     """
     order = ranking.standing.order
     picture, ((axes,),) = figure(height=0.8 + 0.28 * len(order))
+    width, bad = picture.get_figwidth(), _bad(ranking)
     for place, row in enumerate(order):
-        scores, mean, group = ranking.scores[row], ranking.means[row], ranking.standing.group(row)
-        row_colour = "0.6" if group is None else colour(ranking.labels[row].split("/")[0])
+        scores, mean = ranking.scores[row], ranking.means[row]
+        row_colour = colour(ranking.labels[row].split("/")[0])
         worlds = np.degrees(scores[np.isfinite(scores)])
         axes.plot(worlds, np.full(len(worlds), place), ".", color=row_colour, markersize=2.0, alpha=0.35)
         ends = np.degrees([[mean.value - mean.low], [mean.high - mean.value]])
         if np.isfinite(ends).all():
             axes.errorbar(np.degrees(mean.value), place, xerr=ends, color=row_colour, capsize=3.0, linewidth=1.6)
-        axes.plot(np.degrees(mean.value), place, "o", color=row_colour, markersize=5.0, markeredgecolor=BLACK)
+        dot = {"marker": "o", "color": row_colour, "markersize": 5.0, "markeredgecolor": BLACK}
+        axes.plot(np.degrees(mean.value), place, linestyle="none", **(_UNUSABLE if row in bad else dot))
     first = 0
     for group_rows in ranking.standing.groups:
         if len(group_rows) > 1:
             axes.plot([1.015, 1.015], [first - 0.3, first + len(group_rows) - 0.7], color=BLACK, linewidth=2.5,
                       transform=axes.get_yaxis_transform(), clip_on=False)  # fmt: skip
         first += len(group_rows)
-    labels = [
-        _called(ranking.labels[row]) + ("" if ranking.standing.group(row) else f" ({_why(ranking, row)})")
-        for row in order
-    ]
-    axes.set_yticks(range(len(order)), labels)
+    axes.set_yticks(range(len(order)), [_called(ranking.labels[row]) for row in order])
     axes.invert_yaxis()
     axes.set_xscale("log")
     logarithmic(axes.xaxis)
-    axes.set_xlabel("RMSE [deg]: geometric mean with 95 % interval")
-    title(axes, f"{ranking.name}: {ranking.cases}; a bar joins what cannot be told apart")
+    axes.set_xlabel("RMSE [deg]")
+    title(axes, fill(f"{ranking.name}, {ranking.cases}: a bar joins what cannot be told apart", round(9 * width)))
     return picture
-
-
-def _why(ranking: Ranking, row: int) -> str:
-    """Why a row has no place."""
-    fate = ranking.standing.fate(row)
-    return "fails, swings or chatters" if fate == "unreliable" else fate
 
 
 def _called(label: str) -> str:
