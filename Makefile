@@ -1,4 +1,4 @@
-# make run: the paper's study in small, from data to which law is best and what of the paper holds. make test: what CI runs.
+# make run: the paper's study in small, from data to which controller to use and what of the paper holds. make test: what CI runs.
 
 SHELL := /bin/bash
 PYTHON ?= $(shell command -v python3.11 || command -v python3)
@@ -18,7 +18,7 @@ run: .venv/run
 	step tune $(STUDY) --network "$$network"; tuned=$$made; \
 	compared=$$(last compare $(STUDY) --network "$$network" --tuned "$$tuned"); \
 	judged=$$(last paper audit $(CLAIMS)); \
-	printf '\nWhich law is best\n%s\nWhat of the paper holds\n%s\n' "$$compared" "$$judged"
+	printf '\nWhich controller to use\n%s\nWhat of the paper holds\n%s\n' "$$compared" "$$judged"
 
 test: lint
 	$(BIN)/pytest -n auto --maxprocesses 4

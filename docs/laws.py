@@ -12,7 +12,8 @@ import numpy as np
 
 from wristctl.arrays import Array
 from wristctl.commands.printed_table import degrees
-from wristctl.commands.ranking_answer import advice, do_not_use, names_of
+from wristctl.commands.ranking_answer import advice, do_not_use
+from wristctl.commands.ranking_words import names_of
 from wristctl.comparison.bootstrap import paired_ratio, penalised, plain
 from wristctl.comparison.world_ranking import WorldRanking, rank, world_scores
 from wristctl.config.controller_row import Row

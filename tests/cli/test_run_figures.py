@@ -74,7 +74,7 @@ def test_a_report_with_all_figures_shows_those_left_for_later(call: Call) -> Non
         (("figures", "latest:compare", "answre"), "did you mean 'answer'?"),
         (("figures", "latest:compare", "--width", "88"), "--width 88mm"),
         (("figures", "latest:compare", "--width", "8800mm"), "4 to 100 cm"),
-        (("table", "latest:compare", "-n", "9"), "1 to 3"),
+        (("table", "latest:compare", "-n", "9"), "1 to 5"),
         (("show", "latest:compare:smal"), "did you mean 'small'?"),
         (("show", "latest:tune"), "one of compare"),
         (("ls", "--columns", "id,rsme"), "unknown column 'rsme'"),
@@ -110,11 +110,15 @@ def test_the_latest_of_a_label_is_found_and_told_apart(call: Call) -> None:
 def test_a_table_is_printed_whole_or_as_latex(call: Call) -> None:
     plain = call("runs", "table", "latest:compare")[1]
     assert plain.count("Loop fast") == 2 and "Control step" in plain
-    text = call("runs", "table", "latest:compare", "-n", "1", "--latex")[1]
-    assert text.startswith("\\begin{table}") and text.count("\\\\") == 3 and "Control step" not in text
-    assert "\\caption{Loop fast" in text and "overshoot [\\%]" in text
+    whole = call("runs", "table", "latest:compare", "--latex")[1]
+    assert whole.count("\\begin{table}") == 5 and "overshoot [\\%]" in whole
+    answer = call("runs", "table", "latest:compare", "-n", "1", "--latex")[1]
+    assert whole.startswith(answer.rstrip()) and "{llllll}" in answer, "the answer comes first, in six columns"
+    assert answer.count("\\\\") == 3 and "sampled (steps)" in answer, "a head, moves and steps"
 
 
 def test_latex_writes_out_what_it_would_read_and_aligns_numbers() -> None:
     text = latex_table(Table("50 % & more_", ("a_b", "x"), [("p & q", 1.23456), ("r", None)]))
+    less = latex_table(Table("<1", ("RMSE > 0",), [("<0.001",)]))
+    assert "<" not in less and ">" not in less and less.count("\\textless{}") == 2 and "\\textgreater{}" in less
     assert "50 \\% \\& more\\_" in text and "p \\& q & 1.235" in text and "{lr}" in text and "a\\_b" in text

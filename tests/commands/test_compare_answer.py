@@ -12,8 +12,9 @@ from hypothesis import strategies as st
 
 from wristctl.commands.compare.answer import answer_of
 from wristctl.commands.printed_table import COLUMNS, two
-from wristctl.commands.ranking_answer import LINES, condition, names_of, ranking_table, winner
+from wristctl.commands.ranking_answer import LINES, ranking_table
 from wristctl.commands.ranking_tables import answer_tables
+from wristctl.commands.ranking_words import condition, names_of, winner
 from wristctl.comparison.combinations import CLASSES
 from wristctl.comparison.controller_ranking import Ranking, Traits
 from wristctl.comparison.model_confidence_set import LEAST_PAIRS

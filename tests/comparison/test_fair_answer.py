@@ -107,6 +107,7 @@ def test_a_controller_that_is_seldom_lost_keeps_its_place_until_more_is_shown() 
     """1 % is tolerated: 1 of 40 does not show more, 3 do."""
     seldom, often = (said(row("a/tuned", 1.0, swings=count), row("bb/tuned", 1.5), tolerated=0.01) for count in (1, 3))
     assert "use a/tuned" in seldom and "Every controller here can be used" in seldom
+    assert re.search(r"a/tuned swings .*in 1 of 40 worlds", seldom), "kept, and told all the same"
     assert "use bb/tuned" in often and lost(often, "a", 3)
 
 
@@ -116,6 +117,13 @@ def test_every_controller_that_must_not_be_used_is_named_with_its_worlds_and_the
     for name, count in (("a", 2), ("b", 7), ("d", 1), ("e", 2)):
         assert lost(text, name, count)
     assert re.search(r"eaves its range: e ", text)
+
+
+def test_of_several_rigs_the_one_counts_in_which_a_controller_is_lost_most() -> None:
+    rows = {"rig": 2, "chain": 5}
+    rigs = [ranked(row("a/x", 1.0, swings=count), row("bb/x", 2.0), family=name) for name, count in rows.items()]
+    for order in (rigs, rigs[::-1]):
+        assert re.search(r"Do not use .* a( by \S+ deg)? \(in 5 of 40 worlds, chain\)", told(*order))
 
 
 def test_where_all_fail_none_is_recommended() -> None:

@@ -23,3 +23,14 @@ def test_every_ratio_can_be_read_on_its_cells_colour() -> None:
     inks = np.array([np.array(to_rgb(text.get_color())) @ LUMINANCE for text in axes.texts])
     assert len(inks) == len(cells) == 13 and np.ptp(cells) > 0.3
     assert np.abs(inks - cells).min() > 0.35
+
+
+def test_what_nothing_beats_is_bold_and_what_must_not_be_used_is_slanted() -> None:
+    rows = [row("a/tuned", 1.0), row("bb/tuned", 2.0), row("ccc/tuned", 0.5, swings=9)]
+    (axes, *_) = laws_by_rig({"bench": ranked(*rows)}).axes
+    names = [label.get_text() for label in axes.get_yticklabels()]
+    looks = {names[int(text.get_position()[1])]: (text.get_fontweight(), text.get_fontstyle()) for text in axes.texts}
+    assert looks == {
+        "a/tuned": ("bold", "normal"), "bb/tuned": ("normal", "normal"), "ccc/tuned": ("normal", "italic"),
+        "feedforward/default": ("normal", "normal"),
+    }  # fmt: skip

@@ -78,11 +78,11 @@ def with_what_there_is(study: Study, inputs: Inputs) -> tuple[Study, list[str]]:
         rows = tuple(row for row in settings.rows if row.gains != "tuned" or row.controller in searched)
         if rows and len(rows) < len(settings.rows):
             missing = [row.label for row in settings.rows if row not in rows]
-            left_out.append(f"{', '.join(missing)} (no run of tune is given as tuned)")
+            left_out.append(f"{', '.join(missing)} (no tune run is given)")
             settings = settings.model_copy(update={"rows": rows})
     inverses = tuple(inverse for inverse in settings.inverses if inverse != "network")
     if "network" not in inputs and inverses and inverses != settings.inverses and not settings.worlds.family:
-        left_out.append("references through a network (no run of train is given as network)")
+        left_out.append("references through a network (no train run is given)")
         settings = settings.model_copy(update={"inverses": inverses})
     return study.model_copy(update={"compare": settings}) if left_out else study, left_out
 

@@ -90,6 +90,8 @@ def latex_table(table: Table) -> str:
     styled = styled.format_index(escape="latex", axis="columns")
     aligned = "".join("r" if is_number else "l" for is_number in numeric)
     text: str = styled.to_latex(column_format=aligned, hrules=True, caption=escaped(printable(table.title)) or None)
+    for character in "<>":  # which print as others in LaTeX's first encoding
+        text = text.replace(character, _ESCAPED[character])
     return text.rstrip()
 
 
@@ -102,6 +104,7 @@ def _latex_cell(value: Any) -> str:
 
 
 _ESCAPED = {character: f"\\{character}" for character in "&%$#_{}"} | {
+    "<": r"\textless{}", ">": r"\textgreater{}",
     "~": r"\textasciitilde{}", "^": r"\textasciicircum{}", "\\": r"\textbackslash{}",
 }  # fmt: skip
 

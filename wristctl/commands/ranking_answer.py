@@ -13,83 +13,26 @@ from typing import TYPE_CHECKING
 
 from wristctl.commands.answer import Answer
 from wristctl.commands.printed_table import Table, degrees, two
+from wristctl.commands.ranking_words import (
+    called,
+    condition,
+    counted_in,
+    error,
+    fact,
+    facts,
+    first_group,
+    interval,
+    joined,
+    open_loop,
+    rig_whole,
+    winner,
+)
 
 if TYPE_CHECKING:
-    from wristctl.comparison.controller_ranking import Ranking, Traits
+    from wristctl.comparison.controller_ranking import Ranking
 
 # Lines of a terminal that an answer of rankings may take.
 LINES = 32
-# Name of gains that the paper prints: never left out of a label.
-PRINTED = "printed"
-# Letters of a name, at most.
-_LETTERS = 18
-
-
-def condition(ranking: Ranking) -> str:
-    """A condition in a few words; of worlds the name of their family."""
-    if ranking.unit == "world":
-        return ranking.name.replace(", steps", " (steps)")
-    name, traits = ranking.name.removesuffix(", steps"), ranking.traits
-    if name == "camera and tendons":
-        words = _rig(traits)
-    else:
-        words = {"pushed": "push", "off-nominal": "wrong model"}.get(name, name)
-        words = f"{_rig(traits)} + {words}" if traits.rig else words
-    return f"{words} (steps)" if ranking.jumps else words
-
-
-def _rig(traits: Traits) -> str:
-    if traits.camera and traits.tendons:
-        return "motors + camera"
-    return "camera" if traits.camera else "motors" if traits.tendons else "motors or camera"
-
-
-def _rig_whole(rankings: Sequence[Ranking]) -> str:
-    """What is simulated of a rig in these conditions."""
-    traits = [ranking.traits for ranking in rankings]
-    if all(one.camera and one.tendons for one in traits):
-        return "motors, tendons and a camera"
-    return "a camera" if all(one.camera for one in traits) else "motors, tendons or a camera"
-
-
-def names_of(rankings: Sequence[Ranking]) -> dict[str, str]:
-    """Short name of each row: its controller alone where that has no other gains; printed gains are always named."""
-    labels = list(dict.fromkeys(label for ranking in rankings for label in ranking.labels))
-    controllers = Counter(label.split("/")[0] for label in labels)
-    names = {}
-    for label in labels:
-        name, _, gains = label.partition("/")
-        short = name if controllers[name] == 1 and gains != PRINTED else label
-        names[label] = short if len(short) <= _LETTERS else f"{short[: _LETTERS - 1]}~"
-    return names
-
-
-def winner(ranking: Ranking, rankings: Sequence[Ranking] = ()) -> int | None:
-    """The first row of the first group; of those with the same error the one that most other rankings have in theirs.
-
-    None where nothing is ranked.
-    """
-    if not ranking.standing.groups:
-        return None
-    first = ranking.standing.groups[0]
-    least = ranking.means[first[0]].value
-    equal = [row for row in first if ranking.means[row].value <= least * (1.0 + 1e-9)]
-    often = Counter(label for other in rankings for label in _first_group(other))
-    return max(equal, key=lambda row: (often[ranking.labels[row]], -first.index(row)))
-
-
-def _first_group(ranking: Ranking) -> list[str]:
-    return [ranking.labels[row] for row in ranking.standing.groups[0]] if ranking.standing.groups else []
-
-
-def joined(words: Sequence[str], last: str = "and") -> str:
-    """a, b and c."""
-    return f"{', '.join(words[:-1])} {last} {words[-1]}" if len(words) > 1 else "".join(words)
-
-
-def error(ranking: Ranking, row: int) -> str:
-    """Geometric mean of a row's RMSE [deg]."""
-    return degrees(ranking.means[row].value)
 
 
 def advice(rankings: Sequence[Ranking]) -> str:
@@ -102,7 +45,7 @@ def advice(rankings: Sequence[Ranking]) -> str:
     for rig in (True, False):
         alike = [ranking for ranking in smooth or rankings if ranking.traits.rig == rig]
         if alike:
-            where = f"with {_rig_whole(alike) if rig else 'ideal angles and torques'}"
+            where = f"with {rig_whole(alike) if rig else 'ideal angles and torques'}"
             where = where.capitalize() if smooth else f"For steps {where}"
             others = [ranking for ranking in smooth or rankings if ranking.traits.rig and not rig]
             sentences.append(_use(where, alike, others))
@@ -114,7 +57,7 @@ def _use(where: str, alike: Sequence[Ranking], others: Sequence[Ranking]) -> str
     ranked = [ranking for ranking in alike if ranking.standing.groups]
     if not ranked:
         return f"{where} {_no_ranking(alike)}."
-    often = Counter(label for ranking in ranked for label in _first_group(ranking))
+    often = Counter(label for ranking in ranked for label in first_group(ranking))
     firsts = {ranking.labels[row] for ranking in ranked if (row := winner(ranking, ranked)) is not None}
     chosen = max(sorted(firsts), key=lambda label: (often[label], -_mean(ranked, label)))
     places = [(ranking, ranking.labels.index(chosen)) for ranking in ranked if chosen in ranking.labels]
@@ -130,21 +73,33 @@ def _use(where: str, alike: Sequence[Ranking], others: Sequence[Ranking]) -> str
     if len(alike) > 1 and not everywhere:
         text += f", and nothing is better in {joined([condition(ranking) for ranking, _ in places])}"
     gains = sorted(ranking.gains[row].value for ranking, row in places if math.isfinite(ranking.gains[row].value))
-    if any(map(_open_loop, (chosen, *equal))):
+    if any(map(open_loop, (chosen, *equal))):
         text += "; no controller is better than feedforward, which is open loop"
     elif gains:
         text += f", {_ends([*map(two, gains)])} times less than feedforward"
+    text += _seldom(named, [ranking for ranking, _ in places])
     if few := [condition(ranking) for ranking in alike if ranking.standing.untold]:
         text += f" (no ranking in {joined(few)}: too few cases)"
     bad = [
         (ranking, ranking.labels.index(chosen))
         for ranking in others
-        if chosen in ranking.labels and ranking.labels.index(chosen) in unusable(ranking)
+        if chosen in ranking.labels and ranking.labels.index(chosen) in ranking.standing.unusable
     ]
     if not bad:
         return f"{text}."
     worst = max(bad, key=lambda place: _lost(*place))
-    return f"{text}; with {_rig_whole([worst[0]])} {'it' if len(named) == 1 else chosen} {fact(*worst)}."
+    return f"{text}; with {rig_whole([worst[0]])} {'it' if len(named) == 1 else chosen} {fact(*worst)}."
+
+
+def _seldom(labels: Sequence[str], rankings: Sequence[Ranking]) -> str:
+    """Faults of controllers that have them too seldom to be shown to exceed what is tolerated, the worst of each."""
+    words = ""
+    for label in labels:
+        lost = [(ranking, ranking.labels.index(label)) for ranking in rankings if label in ranking.labels]
+        ranking, row = max(lost, key=lambda place: _lost(*place))
+        if ranking.standing.lost[row].times:
+            words += f"; {label} {fact(ranking, row)}"
+    return words
 
 
 def _no_ranking(alike: Sequence[Ranking]) -> str:
@@ -170,60 +125,6 @@ def _mean(rankings: Sequence[Ranking], label: str) -> float:
     return sum(map(math.log, means)) / len(means)
 
 
-def interval(ranking: Ranking, row: int) -> str:
-    """The 95 % interval of a row's RMSE in words; empty where there is none."""
-    mean = ranking.means[row]
-    if not (math.isfinite(mean.high) and mean.high > mean.low):
-        return ""
-    return f" (95 %: {degrees(mean.low)} to {degrees(mean.high)})"
-
-
-def called(label: str) -> str:
-    """A controller with its gains; feedforward has none."""
-    return label.split("/")[0] if _open_loop(label) else label
-
-
-def _open_loop(label: str) -> bool:
-    from wristctl.tuning.objective import YARDSTICK
-
-    return label.split("/")[0] == YARDSTICK
-
-
-def unusable(ranking: Ranking) -> list[int]:
-    """Rows that must not be used: they fail, swing, chatter, do not arrive or pull harder than a tendon bears."""
-    stands = ranking.standing
-    return [*stands.unphysical, *stands.short, *stands.unreliable]
-
-
-def facts(ranking: Ranking, row: int) -> dict[str, tuple[str, int]]:
-    """What is wrong with a row by verb: by how much, and in how many cases; the gravest first."""
-    swing = f"by {two(math.degrees(ranking.swing[row]))} deg"
-    found = {
-        "leaves its range": ("", ranking.standing.failures[row].times),
-        "swings": (swing, int(ranking.unsound["limit cycle"][row])),
-        "chatters": (f"{two(ranking.chatter[row])} times a second", int(ranking.unsound["chatters"][row])),
-        "does not arrive": ("", int(ranking.away[row])),
-    }
-    if ranking.peak[row] > 0.0:
-        found["pulls harder than a tendon bears"] = (f"with {two(ranking.peak[row])} N", ranking.count)
-    if not any(count for _, count in found.values()):
-        found["changes with the integration step"] = ("", int(ranking.unsound["not converged"][row]))
-    if not any(count for _, count in found.values()):
-        found["swings or chatters"] = ("", ranking.standing.swings[row].times)
-    return {verb: (size, count) for verb, (size, count) in found.items() if count}
-
-
-def fact(ranking: Ranking, row: int) -> str:
-    """The gravest fault of a row with its size and number of cases: swings by 2.7 deg in 7 of 8 cases."""
-    verb, (size, count) = next(iter(facts(ranking, row).items()))
-    return " ".join(filter(None, [verb, size, f"in {count} of {_of(ranking, verb)}"]))
-
-
-def _of(ranking: Ranking, verb: str) -> str:
-    """Number and kind of what a fault is counted in."""
-    return f"{ranking.motions} motions" if verb == "does not arrive" else ranking.cases
-
-
 def ranking_table(rankings: Sequence[Ranking], names: Mapping[str, str]) -> Table:
     """A condition a line: the best, how many are as good, the next, feedforward, and how many must not be used."""
     unit = "worlds" if rankings[0].unit == "world" else "cases"
@@ -245,7 +146,10 @@ def ranking_table(rankings: Sequence[Ranking], names: Mapping[str, str]) -> Tabl
         ratio = "" if row is None or base is None else f" ({two(ranking.gains[row].value)})"
         open_loop = "-" if base is None else f"{error(ranking, base)}{ratio}"
         others = f"{len(groups[0]) - 1} more" if groups and len(groups[0]) > 1 else "-"
-        begin, end = f"{condition(ranking)} ({ranking.count})", f"{len(unusable(ranking))} of {len(ranking.labels)}"
+        begin, end = (
+            f"{condition(ranking)} ({ranking.count})",
+            f"{len(ranking.standing.unusable)} of {len(ranking.labels)}",
+        )
         rows.append((begin, best, others, following, open_loop, end))
     return Table("", heads, rows)
 
@@ -273,10 +177,10 @@ def do_not_use(rankings: Sequence[Ranking], names: Mapping[str, str]) -> str:
     """
     rigs = [ranking for ranking in rankings if ranking.traits.rig and not ranking.jumps]
     chosen = rigs or list(rankings)
-    where = f" with {_rig_whole(rigs)}" if rigs else ""
+    where = f" with {rig_whole(rigs)}" if rigs else ""
     worst: dict[str, tuple[Ranking, int]] = {}
     for ranking in chosen:
-        for row in unusable(ranking):
+        for row in ranking.standing.unusable:
             before = worst.get(ranking.labels[row])
             if before is None or _lost(ranking, row) > _lost(*before):
                 worst[ranking.labels[row]] = (ranking, row)
@@ -287,7 +191,7 @@ def do_not_use(rankings: Sequence[Ranking], names: Mapping[str, str]) -> str:
         verb, (size, count) = next(iter(facts(ranking, row).items()))
         place = f", {condition(ranking)}" if len(chosen) > 1 else ""
         by_verb.setdefault(verb, []).append(
-            (f"{names[label]} {size}".rstrip(), f"in {count} of {_of(ranking, verb)}{place}")
+            (f"{names[label]} {size}".rstrip(), f"in {count} of {counted_in(ranking, verb)}{place}")
         )
     sentences = []
     for verb, rows in by_verb.items():
@@ -303,7 +207,7 @@ def do_not_use(rankings: Sequence[Ranking], names: Mapping[str, str]) -> str:
 
 def _elsewhere(rankings: Sequence[Ranking], names: Mapping[str, str]) -> str:
     """Names of those that must not be used in further conditions, those of the same conditions together."""
-    bad = [(ranking, [ranking.labels[row] for row in unusable(ranking)]) for ranking in rankings]
+    bad = [(ranking, [ranking.labels[row] for row in ranking.standing.unusable]) for ranking in rankings]
     by_places: dict[tuple[str, ...], list[str]] = {}
     for label in dict.fromkeys(label for _, labels in bad for label in labels):
         places = tuple(condition(ranking) for ranking, labels in bad if label in labels)

@@ -7,7 +7,8 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from wristctl.commands.printed_table import Table, degrees, two
-from wristctl.commands.ranking_answer import condition, decision_table, names_of, ranking_table
+from wristctl.commands.ranking_answer import decision_table, ranking_table
+from wristctl.commands.ranking_words import condition, names_of
 
 if TYPE_CHECKING:
     from wristctl.comparison.controller_ranking import Ranking

@@ -85,7 +85,12 @@ class Standing(NamedTuple):
     @property
     def order(self) -> list[int]:
         """All rows: ranked from best to worst, then those that stand in no group."""
-        return [*chain.from_iterable(self.groups), *self.untold, *self.unphysical, *self.short, *self.unreliable]
+        return [*chain.from_iterable(self.groups), *self.untold, *self.unusable]
+
+    @property
+    def unusable(self) -> list[int]:
+        """Rows that must not be used: they fail, swing, chatter, do not arrive or pull harder than a tendon bears."""
+        return [*self.unphysical, *self.short, *self.unreliable]
 
     def group(self, row: int) -> int | None:
         """The number of a row's group, from 1; None where it stands in none."""

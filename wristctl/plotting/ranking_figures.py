@@ -2,6 +2,7 @@
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
+from textwrap import fill
 from typing import Any
 
 import numpy as np
@@ -57,7 +58,7 @@ def answer_figure(rankings: Sequence[Ranking], places: Mapping[str, str]) -> Fig
             ends, shade = np.degrees([mean.low, mean.high]), colour(name)
             if np.isfinite(ends).all():
                 axes.plot(ends, [height, height], color=shade, linewidth=1.0, zorder=1.8)
-            usable = ranking.standing.fate(row) in ("ranked", "too few to tell")
+            usable = row not in ranking.standing.unusable
             mark = {"marker": marks[gains], "color": shade, "markersize": 4.5} if usable else _UNUSABLE
             axes.plot(np.degrees(mean.value), height, linestyle="none", **mark)
         if band:
@@ -78,7 +79,7 @@ def answer_figure(rankings: Sequence[Ranking], places: Mapping[str, str]) -> Fig
         for gains, mark in marks.items()
         if len(marks) > 1
     ]
-    if any(_bad(ranking) for ranking in rankings):
+    if any(ranking.standing.unusable for ranking in rankings):
         handles.append(Line2D([], [], linestyle="none", label="must not be used", **_UNUSABLE))
     legend_under(picture, handles, 3)
     return picture
@@ -90,11 +91,6 @@ def _marks(labels: Sequence[str]) -> dict[str, str]:
     further = [name for name in gains if name not in _MARKS]
     marks = _MARKS | {name: _FURTHER[place % len(_FURTHER)] for place, name in enumerate(further)}
     return {name: marks[name] for name in gains}
-
-
-def _bad(ranking: Ranking) -> list[int]:
-    stands = ranking.standing
-    return [*stands.unphysical, *stands.short, *stands.unreliable]
 
 
 def _panels(rankings: Sequence[Ranking], height: float, width: float, **shared: Any) -> tuple[Figure, list[Any]]:
@@ -165,7 +161,7 @@ def paired_ratios(rankings: Sequence[Ranking], baseline: str, places: Mapping[st
     picture, panels = _panels(having, 0.5 + 0.19 * len(labels), 0.95, sharex=True, sharey=True)
     for panel, ranking in zip(panels, having, strict=True):
         base = ranking.labels.index(baseline)
-        scores, bad = penalised(ranking.scores), _bad(ranking)
+        scores, bad = penalised(ranking.scores), ranking.standing.unusable
         for height, label in enumerate(labels):
             if label not in ranking.labels:
                 continue
@@ -190,7 +186,7 @@ def paired_ratios(rankings: Sequence[Ranking], baseline: str, places: Mapping[st
         Line2D([], [], marker="D", markersize=3.5, label="geometric mean, 95 % interval", **marks),
         Line2D([], [], marker=".", markersize=4.0, label=f"a {having[0].unit}", **marks),
     ]
-    if any(_bad(ranking) for ranking in having):
+    if any(ranking.standing.unusable for ranking in having):
         handles.append(Line2D([], [], linestyle="none", label="must not be used", **_UNUSABLE))
     legend_under(picture, handles, 3)
     return picture
@@ -213,7 +209,7 @@ def probability_of_better(ranking: Ranking, place: str) -> Figure:
     It is the share of the cases; equal errors count half. Controllers from best to worst, without those that must not
     be used where two or more may.
     """
-    order, bad = ranking.standing.order, _bad(ranking)
+    order, bad = ranking.standing.order, ranking.standing.unusable
     usable = [row for row in order if row not in bad]
     order = usable if len(usable) > 1 else order
     shares = 100.0 * probability_of_less(ranking.scores)[np.ix_(order, order)]
@@ -237,44 +233,36 @@ def probability_of_better(ranking: Ranking, place: str) -> Figure:
 
 
 def ranking_intervals(ranking: Ranking) -> Figure:
-    """RMSE of each row with its interval, best on top; a bar joins ties, what has no place is grey, with the reason.
+    """RMSE of each row with its interval, best on top; a bar joins ties, black crosses must not be used.
 
     Small dots are the worlds.
     """
     order = ranking.standing.order
     picture, ((axes,),) = figure(height=0.8 + 0.28 * len(order))
+    width, bad = picture.get_figwidth(), ranking.standing.unusable
     for place, row in enumerate(order):
-        scores, mean, group = ranking.scores[row], ranking.means[row], ranking.standing.group(row)
-        row_colour = "0.6" if group is None else colour(ranking.labels[row].split("/")[0])
+        scores, mean = ranking.scores[row], ranking.means[row]
+        row_colour = colour(ranking.labels[row].split("/")[0])
         worlds = np.degrees(scores[np.isfinite(scores)])
         axes.plot(worlds, np.full(len(worlds), place), ".", color=row_colour, markersize=2.0, alpha=0.35)
         ends = np.degrees([[mean.value - mean.low], [mean.high - mean.value]])
         if np.isfinite(ends).all():
             axes.errorbar(np.degrees(mean.value), place, xerr=ends, color=row_colour, capsize=3.0, linewidth=1.6)
-        axes.plot(np.degrees(mean.value), place, "o", color=row_colour, markersize=5.0, markeredgecolor=BLACK)
+        dot = {"marker": "o", "color": row_colour, "markersize": 5.0, "markeredgecolor": BLACK}
+        axes.plot(np.degrees(mean.value), place, linestyle="none", **(_UNUSABLE if row in bad else dot))
     first = 0
     for group_rows in ranking.standing.groups:
         if len(group_rows) > 1:
             axes.plot([1.015, 1.015], [first - 0.3, first + len(group_rows) - 0.7], color=BLACK, linewidth=2.5,
                       transform=axes.get_yaxis_transform(), clip_on=False)  # fmt: skip
         first += len(group_rows)
-    labels = [
-        _called(ranking.labels[row]) + ("" if ranking.standing.group(row) else f" ({_why(ranking, row)})")
-        for row in order
-    ]
-    axes.set_yticks(range(len(order)), labels)
+    axes.set_yticks(range(len(order)), [_called(ranking.labels[row]) for row in order])
     axes.invert_yaxis()
     axes.set_xscale("log")
     logarithmic(axes.xaxis)
-    axes.set_xlabel("RMSE [deg]: geometric mean with 95 % interval")
-    title(axes, f"{ranking.name}: {ranking.cases}; a bar joins what cannot be told apart")
+    axes.set_xlabel("RMSE [deg]")
+    title(axes, fill(f"{ranking.name}, {ranking.cases}: a bar joins what cannot be told apart", round(9 * width)))
     return picture
-
-
-def _why(ranking: Ranking, row: int) -> str:
-    """Why a row has no place."""
-    fate = ranking.standing.fate(row)
-    return "fails, swings or chatters" if fate == "unreliable" else fate
 
 
 def _called(label: str) -> str:

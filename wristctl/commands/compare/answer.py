@@ -8,21 +8,8 @@ from typing import TYPE_CHECKING
 
 from wristctl.commands.answer import Answer
 from wristctl.commands.printed_table import Table
-from wristctl.commands.ranking_answer import (
-    PRINTED,
-    advice,
-    certainty,
-    condition,
-    do_not_use,
-    error,
-    facts,
-    fitted,
-    joined,
-    names_of,
-    ranking_table,
-    ties,
-    unusable,
-)
+from wristctl.commands.ranking_answer import advice, certainty, do_not_use, fitted, ranking_table, ties
+from wristctl.commands.ranking_words import PRINTED, condition, error, facts, joined, names_of
 from wristctl.commands.results import Findings
 
 if TYPE_CHECKING:
@@ -75,7 +62,7 @@ def _outcomes(rankings: Sequence[Ranking], label: str) -> str:
         if label not in ranking.labels:
             continue
         row, where = ranking.labels.index(label), condition(ranking)
-        if row in unusable(ranking):
+        if row in ranking.standing.unusable:
             verb = next(iter(facts(ranking, row)))
             bad.setdefault("swings or chatters" if verb in _UNSTEADY else verb, []).append(where)
         else:

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 
 from wristctl.commands.answer import Answer
 from wristctl.commands.printed_table import Table
-from wristctl.commands.ranking_answer import advice, certainty, decision_table, do_not_use, fitted, joined, names_of
+from wristctl.commands.ranking_answer import advice, certainty, decision_table, do_not_use, fitted
+from wristctl.commands.ranking_words import joined, names_of
 
 if TYPE_CHECKING:
     from wristctl.comparison.controller_ranking import Ranking
@@ -46,9 +47,13 @@ def answer_of(
 
 def _fewer(rankings: Sequence[Ranking]) -> str:
     """How many controllers must not be used where, and where they are named."""
-    from wristctl.commands.ranking_answer import condition, unusable
+    from wristctl.commands.ranking_words import condition
 
-    counts = [f"{len(unusable(one))} of {len(one.labels)} in {condition(one)}" for one in rankings if unusable(one)]
+    counts = [
+        f"{len(one.standing.unusable)} of {len(one.labels)} in {condition(one)}"
+        for one in rankings
+        if one.standing.unusable
+    ]
     return f"Do not use {joined(counts)}: `--all` names them, and why." if counts else ""
 
 

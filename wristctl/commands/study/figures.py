@@ -1,6 +1,7 @@
 """Figures of a study of all laws: who is best where, what terms buy, what accuracy costs, and world by world."""
 
 from collections.abc import Mapping, Sequence
+from textwrap import fill
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -20,6 +21,7 @@ from wristctl.plotting.style import (
     SILVER,
     VERMILLION,
     colour,
+    columns_within,
     figure,
     legend_below,
     logarithmic,
@@ -28,22 +30,20 @@ from wristctl.plotting.style import (
 )
 
 _COLOURS = "RdYlBu"
+# Letters of a heading in an inch.
+_LETTERS = 12
 _AXES = (("chattering", "total variation of tension [N/s]"), ("energy", "work on the wrist [J]"))
 
 
 def laws_by_rig(rankings: Mapping[str, WorldRanking]) -> Figure:
-    """Feedforward's RMSE over each row's RMSE on each family, with the number of the row's group.
-
-    A dash stands for rows that have no place, whatever their error.
-    """
-    labels = list(dict.fromkeys(row.label for family_ranking in rankings.values() for row in family_ranking.rows))
-    times, marks = np.full((len(labels), len(rankings)), np.nan), np.full((len(labels), len(rankings)), "", object)
+    """Feedforward's RMSE over each controller's on each family: bold where nothing is better, slanted if not usable."""
+    labels = list(dict.fromkeys(label for family_ranking in rankings.values() for label in family_ranking.labels))
+    times, kinds = np.full((len(labels), len(rankings)), np.nan), np.full((len(labels), len(rankings)), "", object)
     for column, ranking in enumerate(rankings.values()):
-        for index, row in enumerate(ranking.rows):
-            place = labels.index(row.label), column
+        for index, label in enumerate(ranking.labels):
+            place, group = (labels.index(label), column), ranking.standing.group(index)
             times[place] = ranking.gains[index].value
-            group = ranking.standing.group(index)
-            marks[place] = f"{plain(times[place])}  ({group})" if group else f"{plain(times[place])}  -"
+            kinds[place] = "best" if group == 1 else "" if group else "unusable"
     order = np.argsort(-np.nanmean(np.log(times), axis=1), kind="stable")
     fig, ((axes,),) = figure(height=1.2 + 0.27 * len(labels))
     undress(axes)
@@ -52,29 +52,41 @@ def laws_by_rig(rankings: Mapping[str, WorldRanking]) -> Figure:
     dark = drawn.to_rgba(times)[..., :3] @ np.array([0.299, 0.587, 0.114]) < 0.5
     for y, index in enumerate(order):
         for x in range(len(rankings)):
-            weight, slant = "bold" if "(1)" in marks[index, x] else None, None if "(" in marks[index, x] else "italic"
-            axes.text(x + 0.5, y + 0.5, marks[index, x], ha="center", va="center", fontsize=8.5,
-                      color="white" if dark[index, x] else BLACK, fontweight=weight, fontstyle=slant)  # fmt: skip
-    axes.set_xticks(np.arange(len(rankings)) + 0.5, list(rankings))
+            weight, slant = "bold" if kinds[index, x] == "best" else None, kinds[index, x] == "unusable"
+            if np.isfinite(times[index, x]):
+                axes.text(x + 0.5, y + 0.5, plain(times[index, x]), ha="center", va="center", fontsize=8.5,
+                          color="white" if dark[index, x] else BLACK, fontweight=weight,
+                          fontstyle="italic" if slant else None)  # fmt: skip
+    axes.set_xticks(np.arange(len(rankings)) + 0.5, [_short(name) for name in rankings])
     axes.set_yticks(np.arange(len(labels)) + 0.5, [labels[line] for line in order])
     axes.invert_yaxis()
     axes.xaxis.tick_top()
-    heading = "How many times less error than feedforward; (group of ties); - and slanted: no place"
-    fig.suptitle(heading, fontsize=10.0)
+    heading = "How many times less RMSE than feedforward; bold: nothing is better; slanted: must not be used"
+    fig.suptitle(fill(heading, round(_LETTERS * fig.get_figwidth())), fontsize=10.0)
     return fig
+
+
+def _short(name: str) -> str:
+    """Name of a family above a narrow column."""
+    return name.replace(", steps", "\n(steps)")
 
 
 def terms_by_rig(values: Sequence[TermValue]) -> Figure:
     """RMSE without each term over RMSE with it, with its interval, a panel for each family; grey where 1 is within."""
     families, terms = (list(dict.fromkeys(getattr(value, name) for value in values)) for name in ("family", "term"))
-    fig, axes = figure(1, len(families), height=1.1 + 0.27 * len(terms), sharey=True)
+    columns = columns_within(len(families), 0.8)
+    deep = -(-len(families) // columns)
+    fig, axes = figure(deep, columns, height=0.8 + deep * (0.5 + 0.27 * len(terms)), sharey=True)
+    panels = dict(zip(families, axes.ravel().tolist(), strict=False))
+    for panel in axes.ravel().tolist()[len(families) :]:
+        panel.set_visible(False)
     for term_value in values:
-        panel, place, times = axes[0, families.index(term_value.family)], terms.index(term_value.term), term_value.times
+        panel, place, times = panels[term_value.family], terms.index(term_value.term), term_value.times
         shade = SILVER if times.is_one else BLUE if times.value > 1.0 else VERMILLION
         if np.isfinite(times.high):
             panel.plot([times.low, times.high], [place, place], color=shade, linewidth=3.0)
         panel.plot(times.value, place, "o", color=shade, markeredgecolor=BLACK, markersize=5.0)
-    for panel, family in zip(axes[0], families, strict=True):
+    for family, panel in panels.items():
         panel.axvline(1.0, color=BLACK, linewidth=0.8)
         logarithmic(panel.xaxis)
         panel.xaxis.set_minor_formatter(NullFormatter())
@@ -83,11 +95,12 @@ def terms_by_rig(values: Sequence[TermValue]) -> Figure:
             panel.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
             panel.xaxis.set_major_formatter("{x:g}")
         else:
-            panel.xaxis.set_major_locator(LogLocator(numticks=4))
-        title(panel, family)
+            panel.xaxis.set_major_locator(LogLocator(numticks=3))
+        title(panel, _short(family))
     axes[0, 0].set_yticks(range(len(terms)), terms)
     axes[0, 0].invert_yaxis()
-    fig.supxlabel("times less RMSE, with 95 % interval; grey: cannot be told", fontsize=10.0)
+    label = "times less RMSE, with 95 % interval; grey: cannot be told"
+    fig.supxlabel(fill(label, round(_LETTERS * fig.get_figwidth())), fontsize=10.0)
     return fig
 
 
@@ -102,7 +115,8 @@ def pareto(ranking: WorldRanking) -> Figure:
         _front(axes, ranking.medians(metric), rmse, ranking)
         axes.set_xlabel(label)
     left.set_ylabel("RMSE [deg]")
-    fig.suptitle(f"{ranking.name}: error and its price; hollow rows fail, swing or chatter", fontsize=10.0)
+    heading = f"{ranking.name}: error and its price; hollow: must not be used"
+    fig.suptitle(fill(heading, round(_LETTERS * fig.get_figwidth())), fontsize=10.0)
     legend_below(fig, 4)
     return fig
 
@@ -125,7 +139,7 @@ def _front(axes: Axes, cost: Array, rmse: Array, ranking: WorldRanking) -> None:
 
 
 def world_map(ranking: WorldRanking) -> Figure:
-    """RMSE of each row over the best row's in each world; worlds sorted by the best. Crosses fail, dots swing."""
+    """RMSE of each row over the least one in each world; worlds sorted by the least. Crosses fail, dots swing."""
     scores = np.array([row.rmse for row in ranking.rows])
     best = np.where(np.isfinite(scores), scores, np.inf).min(axis=0)
     worlds, rows = np.argsort(best, kind="stable"), np.array(ranking.standing.order)
@@ -141,6 +155,6 @@ def world_map(ranking: WorldRanking) -> Figure:
     axes.set_yticks(np.arange(len(rows)) + 0.5, [ranking.rows[index].label for index in rows])
     axes.invert_yaxis()
     axes.set_xlabel(f"{ranking.count} worlds, the easiest first")
-    fig.colorbar(drawn, ax=axes, label="RMSE over the best row's there", extend="max")
+    fig.colorbar(drawn, ax=axes, label="RMSE over the least one there [-]", extend="max")
     title(axes, f"{ranking.name}: world by world; x fails, a dot swings")
     return fig

@@ -1,0 +1,133 @@
+"""Words of rankings: conditions, controllers with their gains, errors in degrees, and what is wrong with one."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+from wristctl.commands.printed_table import degrees, two
+
+if TYPE_CHECKING:
+    from wristctl.comparison.controller_ranking import Ranking, Traits
+
+# Name of gains that the paper prints: never left out of a label.
+PRINTED = "printed"
+# Letters of a name, at most.
+_LETTERS = 18
+
+
+def condition(ranking: Ranking) -> str:
+    """A condition in a few words; of worlds the name of their family."""
+    if ranking.unit == "world":
+        return ranking.name.replace(", steps", " (steps)")
+    name, traits = ranking.name.removesuffix(", steps"), ranking.traits
+    if name == "camera and tendons":
+        words = _rig(traits)
+    else:
+        words = {"pushed": "push", "off-nominal": "wrong model"}.get(name, name)
+        words = f"{_rig(traits)} + {words}" if traits.rig else words
+    return f"{words} (steps)" if ranking.jumps else words
+
+
+def _rig(traits: Traits) -> str:
+    if traits.camera and traits.tendons:
+        return "motors + camera"
+    return "camera" if traits.camera else "motors" if traits.tendons else "motors or camera"
+
+
+def rig_whole(rankings: Sequence[Ranking]) -> str:
+    """What is simulated of a rig in these conditions."""
+    traits = [ranking.traits for ranking in rankings]
+    if all(one.camera and one.tendons for one in traits):
+        return "motors, tendons and a camera"
+    return "a camera" if all(one.camera for one in traits) else "motors, tendons or a camera"
+
+
+def names_of(rankings: Sequence[Ranking]) -> dict[str, str]:
+    """Short name of each row: its controller alone where that has no other gains; printed gains are always named."""
+    labels = list(dict.fromkeys(label for ranking in rankings for label in ranking.labels))
+    controllers = Counter(label.split("/")[0] for label in labels)
+    names = {}
+    for label in labels:
+        name, _, gains = label.partition("/")
+        short = name if controllers[name] == 1 and gains != PRINTED else label
+        names[label] = short if len(short) <= _LETTERS else f"{short[: _LETTERS - 1]}~"
+    return names
+
+
+def winner(ranking: Ranking, rankings: Sequence[Ranking] = ()) -> int | None:
+    """The first row of the first group; of those with the same error the one that most other rankings have in theirs.
+
+    None where nothing is ranked.
+    """
+    if not ranking.standing.groups:
+        return None
+    first = ranking.standing.groups[0]
+    least = ranking.means[first[0]].value
+    equal = [row for row in first if ranking.means[row].value <= least * (1.0 + 1e-9)]
+    often = Counter(label for other in rankings for label in first_group(other))
+    return max(equal, key=lambda row: (often[ranking.labels[row]], -first.index(row)))
+
+
+def first_group(ranking: Ranking) -> list[str]:
+    return [ranking.labels[row] for row in ranking.standing.groups[0]] if ranking.standing.groups else []
+
+
+def joined(words: Sequence[str], last: str = "and") -> str:
+    """a, b and c."""
+    return f"{', '.join(words[:-1])} {last} {words[-1]}" if len(words) > 1 else "".join(words)
+
+
+def error(ranking: Ranking, row: int) -> str:
+    """Geometric mean of a row's RMSE [deg]."""
+    return degrees(ranking.means[row].value)
+
+
+def interval(ranking: Ranking, row: int) -> str:
+    """The 95 % interval of a row's RMSE in words; empty where there is none."""
+    mean = ranking.means[row]
+    if not (math.isfinite(mean.high) and mean.high > mean.low):
+        return ""
+    return f" (95 %: {degrees(mean.low)} to {degrees(mean.high)})"
+
+
+def called(label: str) -> str:
+    """A controller with its gains; feedforward has none."""
+    return label.split("/")[0] if open_loop(label) else label
+
+
+def open_loop(label: str) -> bool:
+    from wristctl.tuning.objective import YARDSTICK
+
+    return label.split("/")[0] == YARDSTICK
+
+
+def facts(ranking: Ranking, row: int) -> dict[str, tuple[str, int]]:
+    """What is wrong with a row by verb: by how much, and in how many cases; the gravest first."""
+    swing = f"by {two(math.degrees(ranking.swing[row]))} deg"
+    found = {
+        "leaves its range": ("", ranking.standing.failures[row].times),
+        "swings": (swing, int(ranking.unsound["limit cycle"][row])),
+        "chatters": (f"{two(ranking.chatter[row])} times a second", int(ranking.unsound["chatters"][row])),
+        "does not arrive": ("", int(ranking.away[row])),
+    }
+    if ranking.peak[row] > 0.0:
+        found["pulls harder than a tendon bears"] = (f"with {two(ranking.peak[row])} N", ranking.count)
+    if not any(count for _, count in found.values()):
+        found["changes with the integration step"] = ("", int(ranking.unsound["not converged"][row]))
+    if not any(count for _, count in found.values()):
+        found["swings or chatters"] = ("", ranking.standing.swings[row].times)
+    return {verb: (size, count) for verb, (size, count) in found.items() if count}
+
+
+def fact(ranking: Ranking, row: int) -> str:
+    """The gravest fault of a row with its size and number of cases: swings by 2.7 deg in 7 of 8 cases."""
+    verb, (size, count) = next(iter(facts(ranking, row).items()))
+    return " ".join(filter(None, [verb, size, f"in {count} of {counted_in(ranking, verb)}"]))
+
+
+def counted_in(ranking: Ranking, verb: str) -> str:
+    """Number and kind of what a fault is counted in."""
+    return f"{ranking.motions} motions" if verb == "does not arrive" else ranking.cases
