@@ -1,10 +1,11 @@
 """The functions that `import wristctl` offers: what the commands do, for notebooks and scripts.
 
-Each takes a study and returns a result with `.metrics`, `.tables`, `.figures` (drawn when asked for), `.frame()` and
-`.run`. Inputs are named as on the command line (a path, an id, the beginning of one, latest:<kind>), or are `Run`
-objects, or earlier results. With `out=None` nothing is written; with a folder the result is also a sealed run directory
-there, as the command writes it. Nothing is printed: `progress(what, count, total, figures)` is called as it goes on,
-warnings go to the logger "wristctl". What is wrong is a UserError that says what, where and how to mend it.
+Each takes a study, its file or the name of an experiment, and returns a result with `.metrics`, `.tables`, `.figures`
+(drawn when asked for), `.frame()` and `.run`. Inputs are named as on the command line (a path, an id, the beginning of
+one, latest:<kind>), or are `Run` objects, or earlier results. With `out=None` nothing is written; with a folder the
+result is also a sealed run directory there, as the command writes it. Nothing is printed: `progress(what, count,
+total, figures)` is called as it goes on, warnings go to the logger "wristctl". What is wrong is a UserError that says
+what, where and how to mend it.
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ from wristctl.commands.compare.command import COMPARE, Compared
 from wristctl.commands.gen_data.command import GEN_DATA, Generated
 from wristctl.commands.hysteresis.command import HYSTERESIS, Hysteresis
 from wristctl.commands.identify.command import IDENTIFY, Identified
-from wristctl.commands.perform import RESULTS, Folder, Ref, carry_out, in_python
+from wristctl.commands.perform import RESULTS, Folder, Ref, StudyOrFile, carry_out, in_python
 from wristctl.commands.progress import Watch
 from wristctl.commands.recommend.answer import Recommended
 from wristctl.commands.recommend.command import RECOMMEND
@@ -41,16 +42,17 @@ if TYPE_CHECKING:
 def load_study(file: str | Path | None = None, *overrides: str, trust_code: bool = False) -> Study:
     """The study of a YAML file, of an experiment by its name ("quick"), or of defaults only.
 
-    `overrides` such as "wrist.length=0.09" win over the file, later ones over earlier ones; quantities are in the units
-    that `wristctl <command> --dry-run` shows: SI, but for suffixes such as _deg. Raises UserError for an unknown key or
-    a value that cannot be, with file and line, and what was meant. `trust_code` lets the code run that a run carries.
+    `overrides` such as "wrist.length=0.09" win over the file, later ones over earlier ones; quantities are in the
+    units that `wristctl COMMAND --dry-run --all` shows: SI, but for suffixes like _deg. Raises UserError for an
+    unknown key or a value that cannot be, with file and line, and what was meant. `trust_code` lets the code run that
+    a run carries.
     """
     return _load_study([Path(file)] if file else [], list(overrides), trust_code=trust_code)
 
 
 @in_python()
 def gen_data(
-    study: Study, *, run: Ref | Simulated | Compared | None = None, out: Folder | None = None, label: str = "",
+    study: StudyOrFile, *, run: Ref | Simulated | Compared | None = None, out: Folder | None = None, label: str = "",
     progress: Watch | None = None,
 ) -> Generated:  # fmt: skip
     """Samples of tip positions [m] and bending angles [rad], by the study's `gen-data` section.
@@ -66,7 +68,7 @@ def gen_data(
 
 @in_python()
 def train(
-    study: Study, *, data: Ref | Generated | None = None, resume: Ref | None = None, out: Folder | None = None,
+    study: StudyOrFile, *, data: Ref | Generated | None = None, resume: Ref | None = None, out: Folder | None = None,
     label: str = "", progress: Watch | None = None,
 ) -> Trained:  # fmt: skip
     """Networks from tip position [m] to bending angle [rad], by the study's `train` section.
@@ -83,7 +85,7 @@ def train(
 
 @in_python()
 def tune(
-    study: Study, *, network: Ref | Trained | None = None, from_identified: Ref | Identified | None = None,
+    study: StudyOrFile, *, network: Ref | Trained | None = None, from_identified: Ref | Identified | None = None,
     executor: str = "serial", out: Folder | None = None, label: str = "", progress: Watch | None = None,
 ) -> Tuned:  # fmt: skip
     """Gains by search, by the study's `tune` section: the same budget and objective for every controller.
@@ -102,7 +104,7 @@ def tune(
 
 @in_python()
 def compare(
-    study: Study, *, network: Ref | Trained | None = None, tuned: Ref | Tuned | None = None,
+    study: StudyOrFile, *, network: Ref | Trained | None = None, tuned: Ref | Tuned | None = None,
     executor: str = "serial", out: Folder | None = None, label: str = "", progress: Watch | None = None,
 ) -> Compared:  # fmt: skip
     """Controllers x loops x references, by the study's `compare` section, beside the paper's numbers.
@@ -122,8 +124,8 @@ def compare(
 
 @in_python()
 def study(
-    study: Study, *, resume: Ref | None = None, executor: str = "serial", out: Folder | None = None, label: str = "",
-    progress: Watch | None = None,
+    study: StudyOrFile, *, resume: Ref | None = None, executor: str = "serial", out: Folder | None = None,
+    label: str = "", progress: Watch | None = None,
 ) -> Studied:  # fmt: skip
     """Every law tuned and judged at equal budget on families of worlds, by the study's `study` section.
 
@@ -155,7 +157,7 @@ def recommend(
 
 @in_python()
 def simulate(
-    study: Study, *, network: Ref | Trained | None = None, tuned: Ref | Tuned | None = None,
+    study: StudyOrFile, *, network: Ref | Trained | None = None, tuned: Ref | Tuned | None = None,
     from_identified: Ref | Identified | None = None, executor: str = "serial",
     out: Folder | None = None, label: str = "", progress: Watch | None = None,
 ) -> Simulated:  # fmt: skip
@@ -175,7 +177,7 @@ def simulate(
 
 @in_python()
 def analyse(
-    study: Study, *, network: Ref | Trained | None = None, tuned: Ref | Tuned | None = None,
+    study: StudyOrFile, *, network: Ref | Trained | None = None, tuned: Ref | Tuned | None = None,
     from_identified: Ref | Identified | None = None, out: Folder | None = None, label: str = "",
     progress: Watch | None = None,
 ) -> Analysed:  # fmt: skip
@@ -191,7 +193,7 @@ def analyse(
 
 @in_python()
 def hysteresis(
-    study: Study, *, out: Folder | None = None, label: str = "", progress: Watch | None = None
+    study: StudyOrFile, *, out: Folder | None = None, label: str = "", progress: Watch | None = None
 ) -> Hysteresis:
     """Loops of a wrist whose tendons have friction, by the study's `hysteresis` section, which may name a measured one.
 
@@ -204,7 +206,7 @@ def hysteresis(
 
 @in_python()
 def identify(
-    study: Study, *, runs: Ref | Sequence[Ref] | None = None, out: Folder | None = None, label: str = "",
+    study: StudyOrFile, *, runs: Ref | Sequence[Ref] | None = None, out: Folder | None = None, label: str = "",
     progress: Watch | None = None,
 ) -> Identified:  # fmt: skip
     """Stiffness, damping, tendons and delay of a real wrist from the logged trials of `runs` (hw-run).
@@ -220,7 +222,7 @@ def identify(
 
 @in_python()
 def audit(
-    study: Study, *, table1: Ref | Trained | None = None, selection: Ref | Trained | None = None,
+    study: StudyOrFile, *, table1: Ref | Trained | None = None, selection: Ref | Trained | None = None,
     hardware: Ref | None = None, out: Folder | None = None, label: str = "", progress: Watch | None = None,
 ) -> Audited:  # fmt: skip
     """Every claim of the paper in the study's `audit` section (experiments/claims.yaml has all) with a verdict.

@@ -12,7 +12,8 @@ from pathlib import Path
 import pytest
 
 from tests.cli.conftest import PROBE, ROOT
-from wristctl.records import list_runs
+from wristctl.config.study import Study
+from wristctl.records import list_runs, start_run
 
 STREAMS = ["2>&1 |", "2>/dev/null |", "2> >(exec true) |"]
 
@@ -30,6 +31,19 @@ def test_a_closed_pipe_costs_no_run(tmp_path: Path, streams: str) -> None:
     (run,) = runs
     assert run.state == "ok" and run.metrics["rmse"]["value"] == 1e-3
     run.check()
+
+
+def test_a_reader_of_results_may_leave(tmp_path: Path) -> None:
+    """Before anything is written, or amid output of more than a pipe holds."""
+    with start_run("tune", Study(), "", tmp_path / "results") as live:
+        for number in range(3000):
+            live.metric(f"a_metric_of_a_long_name_{number}", float(number))
+    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
+    for reader in ("true", "head -1"):
+        command = f"{sys.executable} -m wristctl runs show {live.id} --metrics | {reader}; echo ${{PIPESTATUS[0]}}"
+        asked = ["bash", "-c", command]
+        done = subprocess.run(asked, cwd=tmp_path, env=environment, capture_output=True, text=True, timeout=120)
+        assert done.stdout.splitlines()[-1] in ("0", "141") and done.stderr == ""
 
 
 def test_an_interrupted_search_names_how_to_go_on(tmp_path: Path) -> None:

@@ -33,7 +33,20 @@ def test_a_change_is_told_in_its_unit_and_in_per_cent_of_what_was(call: Call) ->
 def test_metrics_stand_after_the_configuration_and_inputs_last(call: Call) -> None:
     data = _made("gen-data", {})
     a, b = _made("train", {"rmse": 1.0}), _made("tune", {"rmse": 2.0}, InputRun("data", data))
-    out = call("runs", "diff", a.id, b.id)[1]
+    out = call("runs", "diff", a.id, b.id, "--all")[1]
     assert out.index("Configuration") < out.index("Metrics") < out.index("Inputs")
     (row,) = [line.split() for line in out[out.index("Inputs") :].splitlines() if line.startswith("data")]
     assert row == ["data", "-", data.result_hash]
+
+
+def test_of_many_differences_or_unlike_runs_a_few_lines_say_so(call: Call) -> None:
+    many: dict[str, float | None] = {f"m{number}": float(number) for number in range(60)}
+    after: dict[str, float | None] = dict.fromkeys(many, -1.0)
+    a, b = _made("tune", many), _made("tune", after, out=Path("elsewhere"))
+    short, whole = (call("runs", "diff", a.id, str(b.path), *more)[1] for more in ((), ("--all",)))
+    assert len(short.splitlines()) <= 10 and "--all" in short and "57 more" in short and "m3 " not in short
+    assert len(whole.splitlines()) > 60 and "--all" not in whole
+    other = _made("train", {"m0": 0.0})
+    unlike = call("runs", "diff", a.id, other.id)[1]
+    assert len(unlike.splitlines()) <= 10 and "different kinds: tune and train" in unlike
+    assert "different kinds" not in short + whole

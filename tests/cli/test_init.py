@@ -7,8 +7,11 @@ import shlex
 from pathlib import Path
 
 import pytest
+import yaml
 
 from tests.cli.conftest import ROOT, Command
+from wristctl.config.study import Study
+from wristctl.study_files.load import load_study
 
 SOURCE = ROOT / "experiments"
 
@@ -23,13 +26,34 @@ def test_init_lays_all_experiments_out_and_its_next_lines_run(
 ) -> None:
     done = wristctl("init", "my study")
     assert done.returncode == 0 and _files(tmp_path / "my study" / "experiments") == _files(SOURCE)
-    assert [each.name for each in (tmp_path / "my study").iterdir()] == ["experiments"]
+    names = {each.name for each in (tmp_path / "my study").iterdir()}
+    assert names == {"experiments", "mywrist.yaml", "README.md"}
     lines = [shlex.split(line) for line in re.findall(r"^  (.*)$", done.stdout, re.MULTILINE)]
-    assert lines[0] == ["cd", "my study"] and len(lines) > 4
+    assert lines[0] == ["cd", "my study"] and len(lines) == 4
     monkeypatch.chdir(lines[0][1])
+    page = Path("README.md").read_text()
     for _, *typed in lines[1:]:
+        assert "mywrist.yaml" in typed and shlex.join(["wristctl", *typed]) in page
         said = wristctl(*typed, "--dry-run")
-        assert said.returncode == 0 or re.search(r"no [a-z-]+ run that ended ok - latest:", said.stderr), said.stderr
+        assert said.returncode == 0 and not said.stderr, said.stderr
+
+
+def test_the_wrist_of_init_is_the_default_one_with_each_value_explained(wristctl: Command, tmp_path: Path) -> None:
+    assert wristctl("init", ".").returncode == 0
+    file = tmp_path / "mywrist.yaml"
+    assert load_study([file]).wrist == Study().wrist
+    values = re.findall(r"^  (\w+): .*# \S", file.read_text(), re.MULTILINE)
+    assert set(values) == set(yaml.safe_load(file.read_text())["wrist"]) and len(values) > 10
+    file.write_text(file.read_text().replace("length: 0.080", "length: 0.120"))
+    assert "length: 0.12" in wristctl("simulate", "mywrist.yaml", "--dry-run").stdout
+
+
+@pytest.mark.parametrize("name", ["mywrist.yaml", "README.md", "experiments"])
+def test_init_writes_over_no_file_of_yours(wristctl: Command, tmp_path: Path, name: str) -> None:
+    (tmp_path / name).write_text("mine")
+    done = wristctl("init", ".")
+    assert done.returncode == 2 and f" - {name} - " in done.stderr
+    assert [each.name for each in tmp_path.iterdir()] == [name] and (tmp_path / name).read_text() == "mine"
 
 
 def test_init_goes_into_a_folder_of_yours_and_writes_over_nothing(wristctl: Command, tmp_path: Path) -> None:

@@ -46,10 +46,10 @@ def test_diff_names_each_part_that_differs(call: Call, made: tuple[Run, Run]) ->
     assert found["config"]["seed"] == {"before": 0, "after": 3}
     assert found["metrics"] == {"rmse": {"before": 2.0, "after": 1.0}}
     assert found["code"] == found["environment"] == {}
-    out = call("runs", "diff", data.id, network.id)[1]
+    out = call("runs", "diff", data.id, network.id, "--all")[1]
     assert "rmse         2      1      -1         -50" in out
     assert f"before  {data.id}\nafter   {network.id}\n" in out
-    out = call("runs", "diff", network.id, data.id)[1]
+    out = call("runs", "diff", network.id, data.id, "--all")[1]
     assert "rmse         1      2       1         100" in out
     inputs = json.loads(call("runs", "diff", network.id, data.id, "--json")[1])["inputs"]
     assert inputs == {"data": {"before": data.result_hash, "after": None}}

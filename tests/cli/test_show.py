@@ -17,7 +17,7 @@ from wristctl.config.study import Study
 from wristctl.errors import UserError
 from wristctl.records import InputRun, Run, seal, start_run
 from wristctl.records.files import sha256_of
-from wristctl.records.manifest import Code
+from wristctl.records.manifest import OVERVIEW, Code, Overview
 from wristctl.records.tags import change_tags
 
 COMMIT, TREE = "0123456789abcdef0123", 64 * "a"
@@ -169,3 +169,26 @@ def test_a_report_stands_beside_the_first_run_under_a_name_of_those_it_shows(
     assert all(re.fullmatch(r"report-[0-9a-f]{6}\.html", page.name) for page in pages)
     assert live.id in pages[2].read_text() and network.id in pages[2].read_text()
     assert data.id in Path(f"results/report-{data.id}.html").read_text()
+
+
+def test_show_begins_with_the_answer_and_has_metrics_when_asked(call: Call) -> None:
+    with start_run("tune", Study()) as live:
+        live.metric("rmse", 0.25, "rad")
+        live.file(OVERVIEW).write_text(Overview(answer=["It works.", "", "Why."]).text())
+    lines = call("runs", "show", live.id)[1].splitlines()
+    assert lines[:4] == ["It works.", "", "Why.", ""] and not any(line.startswith("rmse") for line in lines)
+    assert any("--metrics" in line for line in lines)
+    asked = call("runs", "show", live.id, "--metrics")[1].splitlines()
+    assert asked[0] == "It works." and any(line.startswith("rmse") for line in asked)
+
+
+def test_a_label_after_a_dash_and_a_csv_are_no_runs_and_what_is_meant_is_said(call: Call, data: Run) -> None:
+    with start_run("compare", Study(), "quick") as live:
+        pass
+    code, _, err = call("runs", "show", "latest:compare-quick")
+    assert code == 2 and "latest:compare:quick" in err
+    assert call("runs", "show", "latest:compare:quick")[1].rstrip().endswith(str(live.id))
+    Path("my.csv").write_text("t [s]\n0\n")
+    for command in (("identify", "my.csv"), ("train", "--data", "my.csv"), ("runs", "show", "my.csv")):
+        code, _, err = call(*command)
+        assert code == 2 and "gen-data --source csv" in err and "hysteresis --measured" in err, command

@@ -45,3 +45,11 @@ def test_no_text_in_a_table_forges_a_line_or_moves_a_cursor() -> None:
 
 def test_a_table_without_rows_shows_its_columns() -> None:
     assert Table("", ("a", "b"), []).text() == "a  b\n-  -"
+
+
+def test_latex_has_the_title_as_caption_and_a_wide_table_is_scaled_to_the_text() -> None:
+    narrow = latex_table(TABLE)
+    assert "\\caption{T}" in narrow and "resizebox" not in narrow
+    wide = latex_table(Table("W", [f"column {number} [rad]" for number in range(12)], [tuple(range(12))]))
+    assert wide.index("resizebox{\\textwidth}") < wide.index("begin{tabular}") and "end{tabular}}" in wide
+    assert wide.count("{") == wide.count("}")

@@ -142,11 +142,11 @@ def test_errors_know_the_newcomers(elsewhere: Elsewhere) -> None:
 
 
 def test_a_dry_run_prints_their_names_units_and_defaults(elsewhere: Elsewhere) -> None:
-    said = elsewhere("simulate", "--dry-run", "--set", "reference={kind: sweep, end_frequency: 3}").stdout
+    said = elsewhere("simulate", "--dry-run", "--all", "--set", "reference={kind: sweep, end_frequency: 3}").stdout
     kind, model = (next(line for line in said.splitlines() if f" {key}:" in line) for key in ("kind", "model"))
     assert kind.endswith(", sweep") and model.endswith(", hinge")
     assert "end_frequency: 3  # [1/s] frequency after `duration`" in said
-    tuned = elsewhere("tune", "--dry-run", "--set", "objective.jerk=0.5").stdout
+    tuned = elsewhere("tune", "--dry-run", "--all", "--set", "objective.jerk=0.5").stdout
     assert "jerk: 0.5  # weight of root mean square of the angle's third derivative" in tuned
     listed = "pso, differential-evolution, cma-es, random, coordinates"
     assert f"optimiser: pso  # ask/tell optimiser (or file.py:NAME): {listed}" in tuned

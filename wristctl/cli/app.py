@@ -1,6 +1,7 @@
 """`wristctl`: the program, and the way every command ends."""
 
 import gc
+import os
 import signal
 import sys
 import traceback
@@ -93,6 +94,9 @@ def main() -> NoReturn:
     with interrupts() as interrupt:
         try:
             code = get_command(app)(prog_name="wristctl", standalone_mode=False) or 0
+            sys.stdout.flush()
+        except BrokenPipeError:
+            code = _unread()
         except UserError as error:
             code = _failed(str(error), error, error.exit_code)
         except typer.TyperException as error:
@@ -100,8 +104,10 @@ def main() -> NoReturn:
             code = _failed(f"{error.format_message()} - fix: {command} --help", error, error.exit_code)
         except (KeyboardInterrupt, typer.Abort):
             code = 130
-        except SystemExit:  # completion ends so
-            raise
+        except SystemExit as ended:  # completion ends so, and typer where it meets a closed pipe
+            if not isinstance(ended.__context__, BrokenPipeError):
+                raise
+            code = _unread()
         except BaseException as error:
             notes = getattr(error, "__notes__", ["run again with --debug for the traceback"])
             if interrupt.asked:
@@ -113,6 +119,12 @@ def main() -> NoReturn:
         signal.setitimer(signal.ITIMER_REAL, 0.0)  # what has ended need not be interrupted again
         gc.freeze()  # else the interpreter looks for cycles once more before it ends: 0.3 s
         sys.exit(code)
+
+
+def _unread() -> int:
+    """Exit code where whoever read the output has left; what is still in its buffer goes nowhere."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
+    return 128 + signal.SIGPIPE
 
 
 def _failed(message: str, error: BaseException, code: int) -> int:

@@ -105,7 +105,7 @@ def _perform(
         except UserError as error:
             raise located(error, origins) from error
         if options.dry_run:
-            return print_plan(procedure.kind, prepared.study, plan, options.out, options.as_json)
+            return print_plan(procedure.kind, prepared.study, plan, options.out, options.as_json, options.all_)
         if procedure.in_units:
             check_executor(executor)
         label = options.label or re.sub(r"[^A-Za-z0-9_.-]", "-", files[-1].stem if files else "")[:60]

@@ -13,18 +13,20 @@ from wristctl.config.study import Study
 from wristctl.escape import printable
 from wristctl.records import Run
 from wristctl.records.journal import jsonable
-from wristctl.study_files.resolved import resolved_yaml
+from wristctl.study_files.resolved import changed_yaml, resolved_yaml
 
 
-def print_plan(kind: str, study: Study, plan: str, out: Path, as_json: bool) -> None:
-    """The resolved study, every leaf with unit and source, and what would be done."""
-    resolved = resolved_yaml(with_places(study), kind)
+def print_plan(kind: str, study: Study, plan: str, out: Path, as_json: bool, everything: bool = False) -> None:
+    """Settings that are not at their defaults, or every one, with unit and source; and what would be done."""
+    placed = with_places(study)
+    resolved = resolved_yaml(placed, kind) if everything or as_json else changed_yaml(placed, kind)
     if as_json:
         shown = {"schema": "wristctl.plan/1", "kind": kind, "config": resolved, "plan": plan}
         print(json.dumps(shown, indent=2))
         return
     print(resolved, end="")
-    for line in [*plan.splitlines(), f"would write a {kind} run under {out}; nothing is written now"]:
+    rest = [] if everything else ["every other setting is at its default: --dry-run --all shows them"]
+    for line in [*rest, *plan.splitlines(), f"would write a {kind} run under {out}; nothing is written now"]:
         print(f"# {printable(line)}")
 
 

@@ -22,6 +22,7 @@ from wristctl.errors import TO, Argument, UserError, writing
 from wristctl.plugins.places import placed
 from wristctl.plugins.trust import asking
 from wristctl.records.files import write_text
+from wristctl.records.manifest import README
 from wristctl.study_files.load import load_study
 from wristctl.study_files.shipped import EXPERIMENTS, shipped
 
@@ -68,13 +69,13 @@ def new(
 
 init_app = typer.Typer(add_completion=False)
 
-_AFTER_INIT = """
-wristctl gen-data experiments/quick.yaml
-wristctl train experiments/quick.yaml --data latest:gen-data
-wristctl tune experiments/quick.yaml --network latest:train
-wristctl compare experiments/quick.yaml --network latest:train --tuned latest:tune
-wristctl audit experiments/claims.yaml
-"""
+# The file of a wrist of one's own, and the commands that follow it.
+_WRIST = "mywrist.yaml"
+_AFTER_INIT = (
+    f"wristctl simulate {_WRIST}",
+    f"wristctl compare controllers {_WRIST}",
+    f"wristctl tune {_WRIST} --iterations 20",
+)
 
 
 @init_app.command("init")
@@ -82,10 +83,11 @@ def init(
     folder: Annotated[Path, typer.Argument(metavar="DIR", help="Folder to write to; made where there is none.")],
     debug: Debug = False,
 ) -> None:
-    """Lay out the study files and laws that come with wristctl in a folder, for you to change."""
+    """Begin a folder for a wrist of your own: mywrist.yaml with its values, and studies and laws to change."""
     to = folder / EXPERIMENTS
-    if os.path.lexists(to):
-        raise UserError("there are experiments already, and they may be changed", str(to), "another folder")
+    for place in (to, folder / _WRIST, folder / README):
+        if os.path.lexists(place):
+            raise UserError("this is there already, and it may be changed", str(place), "another folder")
     with writing(to, Argument("folder", metavar="DIR", positional=True)):
         folder.mkdir(parents=True, exist_ok=True)
         with TemporaryDirectory(dir=folder, prefix=f".{EXPERIMENTS}-") as scratch:
@@ -93,9 +95,15 @@ def init(
             for file in _files():
                 (copies / file).parent.mkdir(parents=True, exist_ok=True)
                 (copies / file).write_bytes((shipped() / file).read_bytes())
+            templates = files("wristctl.cli") / "templates"
+            for name in (_WRIST, README):
+                text = (templates / f"{name}.txt").read_text(encoding="utf-8")
+                (Path(scratch) / name).write_text(text.replace("@commands@", "\n".join(_AFTER_INIT)), encoding="utf-8")
             copies.rename(to)
-    say(f"{to} is written, for you to change. The paper's study in small, a few minutes:")
-    for line in (f"cd {shlex.quote(str(folder))}", *_AFTER_INIT.split("\n")[1:-1]):
+            for name in (_WRIST, README):
+                (Path(scratch) / name).rename(folder / name)
+    say(f"{folder / _WRIST} is written: put the values of your wrist in. Then:")
+    for line in (f"cd {shlex.quote(str(folder))}", *_AFTER_INIT):
         say(f"  {line}")
 
 

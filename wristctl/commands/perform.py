@@ -24,6 +24,7 @@ from wristctl.records import LiveRun, Run, start_run
 from wristctl.records.copied_inputs import sealed_references
 from wristctl.records.journal import jsonable
 from wristctl.records.manifest import MANIFEST, TABLES, Manifest, Overview
+from wristctl.study_files.load import load_study
 
 # Laws that a listing names.
 _NAMED = 2
@@ -148,7 +149,8 @@ def perform(
             findings.keep_overview()
     run.console(str(result))
     run.summary(_summary(result, findings.overview), first=bool(result.summary))
-    content = json.dumps(plain_tables(result.tables), indent=2, allow_nan=False)
+    answered = [result.answer.table] if result.answer is not None and result.answer.table is not None else []
+    content = json.dumps(plain_tables([*answered, *result.tables]), indent=2, allow_nan=False)
     run.file(TABLES).write_text(content + "\n", encoding="utf-8")
     if result.fault is not None:
         run.exit_code = result.fault.exit_code
@@ -178,6 +180,8 @@ def _page(path: Path, manifest: Manifest) -> str:
 
 Ref = str | Path | Run
 Folder = str | Path
+# A study, its file, or the name of an experiment.
+StudyOrFile = Study | str | Path
 # Folder of runs when none is named.
 RESULTS = "results"
 
@@ -200,7 +204,7 @@ def check_executor(named: str) -> None:
 
 
 def carry_out(
-    procedure: Procedure[Found], study: Study, named_inputs: Mapping[str, Any], out: Folder | None, label: str,
+    procedure: Procedure[Found], study: StudyOrFile, named_inputs: Mapping[str, Any], out: Folder | None, label: str,
     progress: Watch | None, executor: str = "serial",
 ) -> Found:  # fmt: skip
     """Plan and perform a procedure.
@@ -210,7 +214,7 @@ def carry_out(
     procedure
         Procedure of the command.
     study
-        Study to perform.
+        Study to perform, or its file, or the name of an experiment.
     named_inputs
         Inputs by role.
     out
@@ -222,6 +226,7 @@ def carry_out(
     executor
         Name of the executor of units of work.
     """
+    study = study if isinstance(study, Study) else load_study([Path(study)])
     folder, show = Path(RESULTS if out is None else out), watched(progress)
     prepared = prepare(procedure, study, folder, named_inputs)
     prepared.plan()

@@ -80,7 +80,10 @@ def _blocks(widths: Sequence[int], width: int | None) -> list[list[int]]:
 
 
 def latex_table(table: Table) -> str:
-    """A table for the packages booktabs and caption, numbers to four digits and aligned to the right."""
+    """A table for the packages booktabs and caption, numbers to four digits and aligned to the right.
+
+    One that is wider than an answer is scaled to the width of the text (package graphicx).
+    """
     import pandas as pd
 
     columns = [printable(column) for column in table.columns]
@@ -89,7 +92,13 @@ def latex_table(table: Table) -> str:
     styled = pd.DataFrame(cells, columns=columns).style.hide(axis="index").format(escape="latex")
     styled = styled.format_index(escape="latex", axis="columns")
     aligned = "".join("r" if is_number else "l" for is_number in numeric)
-    text: str = styled.to_latex(column_format=aligned, hrules=True, caption=escaped(printable(table.title)) or None)
+    caption = escaped(printable(table.title)) or None
+    text: str = styled.to_latex(
+        column_format=aligned, hrules=True, caption=caption, position_float="centering" if caption else None
+    )
+    if len(table.text().split("\n", 2 * bool(table.title) + 1)[-1].split("\n", 1)[0]) > COLUMNS:
+        text = text.replace(r"\begin{tabular}", r"\resizebox{\textwidth}{!}{%" "\n" r"\begin{tabular}")
+        text = text.replace(r"\end{tabular}", r"\end{tabular}}")
     for character in "<>":  # which print as others in LaTeX's first encoding
         text = text.replace(character, _ESCAPED[character])
     return text.rstrip()

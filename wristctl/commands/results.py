@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import base64
+import html
+import io
 import json
 import math
 from abc import ABC, abstractmethod
@@ -14,7 +17,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Literal
 from wristctl.commands.answer import Answer
 from wristctl.commands.printed_table import Table
 from wristctl.config.study import Study
-from wristctl.errors import UserError
+from wristctl.errors import UserError, meant
 from wristctl.records import LiveRun, Run, stream
 from wristctl.records.manifest import OVERVIEW, Overview
 
@@ -24,6 +27,13 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from wristctl.records.formats import Columns
+
+
+class Metrics(dict[str, float]):
+    """Numbers by name. An unknown name is a KeyError that says which is meant."""
+
+    def __missing__(self, name: str) -> float:
+        raise KeyError(f"no metric {name!r}: {meant(str(name), self)}")
 
 
 class Figures(Mapping[str, "Figure"]):
@@ -39,6 +49,8 @@ class Figures(Mapping[str, "Figure"]):
         self._drawn.pop(name, None)
 
     def __getitem__(self, name: str) -> Figure:
+        if name not in self._drawers:
+            raise KeyError(f"no figure {name!r}: {meant(str(name), self._drawers)}")
         if name not in self._drawn:
             self._drawn[name] = self._drawers[name]()
         return self._drawn[name]
@@ -244,10 +256,10 @@ class StudyResult(ABC):
         return False
 
     @property
-    def metrics(self) -> dict[str, float]:
+    def metrics(self) -> Metrics:
         """Numbers by name, in the units that the run's metrics.json gives; nan where there is none."""
         values = {name: metric["value"] for name, metric in self.findings.metrics.items()}
-        return {name: math.nan if value is None else value for name, value in values.items()}
+        return Metrics({name: math.nan if value is None else value for name, value in values.items()})
 
     @property
     def figures(self) -> Figures:
@@ -259,9 +271,24 @@ class StudyResult(ABC):
         """The sealed run directory; None where the result is in memory only."""
         return Run(self.findings.run.path) if self.findings.run else None
 
+    def _repr_html_(self) -> str:
+        """The answer, or the tables where there is none, with the figure of the answer, for a notebook."""
+        text = "\n".join(self.summary) or "\n\n".join(table.text() for table in self.tables)
+        name = self.findings.overview.figure or next(iter(self.figures), "")
+        source = f"data:image/png;base64,{_png(self.figures[name])}" if name else ""
+        picture = f'<img style="max-width: 100%" src="{source}">' * bool(name)
+        return f"<pre>{html.escape(text)}</pre>{picture}"
+
     def __str__(self) -> str:
         return "\n\n".join([*["\n".join(self.summary)] * bool(self.summary), *(table.text() for table in self.tables)])
 
     def __repr__(self) -> str:
         where = str(self.findings.run.path) if self.findings.run else "in memory"
         return f"<{type(self).__name__}: {where}; {len(self.metrics)} metrics; {self.figures!r}>"
+
+
+def _png(figure: Figure) -> str:
+    """A figure as PNG in base64."""
+    content = io.BytesIO()
+    figure.savefig(content, format="png", dpi=100)
+    return base64.b64encode(content.getvalue()).decode("ascii")

@@ -19,6 +19,12 @@ from wristctl.records.tags import known_tags
 _log = logging.getLogger(__name__)
 
 
+_OF_CSV = (
+    "for samples of tip and angle: wristctl gen-data --source csv --set 'files=[FILE]', then latest:gen-data; for a "
+    "loop of torque or tension over angle: wristctl hysteresis --measured FILE"
+)
+
+
 def list_runs(results: Path = RESULTS) -> list[Run]:
     """All runs of a results folder, oldest first; broken ones are among them and raise nothing."""
     return [Run(results / name) for name in run_names(results)]
@@ -37,6 +43,8 @@ def open_run(ref: str | Path, results: Path = RESULTS) -> Run:
     path = Path(ref)
     if path.name == MANIFEST:
         path = path.parent
+    if path.suffix.lower() == ".csv" and not path.is_dir():
+        raise UserError("a CSV file where a run is needed", str(ref), _OF_CSV)
     if str(ref) and path.exists():
         return _readable(path)
     if len(path.parts) != 1:
@@ -101,7 +109,11 @@ def _latest(ref: str, results: Path) -> Run:
         kinds, labels = {run.kind for run in ended}, {run.label for run in ended if run.kind == kind}
         if labels:
             raise UserError(f"no {kind} run with the label {label!r}", f"{ref} in {results}", meant(label, labels))
-        fix = meant(kind, kinds) if kinds else ("run `", Call(command_of(kind)), "` first")
+        longest = max((one for one in kinds if kind.startswith(f"{one}-")), key=len, default="")
+        if longest:
+            labelled = f"latest:{longest}:{kind.removeprefix(f'{longest}-')}"
+            raise UserError(f"no command makes {kind!r} runs", f"{ref} in {results}", f"did you mean {labelled}?")
+        fix: Phrase = meant(kind, kinds) if kinds else ("run `", Call(command_of(kind)), "` first")
         raise UserError(f"no {kind} run that ended ok", f"{ref} in {results}", fix)
     return Run(results / latest.id)
 

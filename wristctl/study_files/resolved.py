@@ -10,6 +10,7 @@ import yaml
 
 from wristctl.config.choices import CONTROLLERS
 from wristctl.config.foreign import PLAIN
+from wristctl.config.loop import LOOPS
 from wristctl.config.plant import is_unsaid
 from wristctl.config.section import OpenSection, Parameter, Section
 from wristctl.config.study import Study
@@ -19,6 +20,11 @@ from wristctl.study_files.strict_yaml import parse_yaml
 _WORD = re.compile(r"[A-Za-z0-9_./][A-Za-z0-9_./ -]*[A-Za-z0-9_./]|[A-Za-z_/]")
 
 Entry = tuple[str, Any, str]
+
+
+class _Part(list[Entry]):
+    """Some entries of a section."""
+
 
 _SHARED = ("seed", "wrist")
 _OWN = "controller-settings"
@@ -39,6 +45,42 @@ def resolved_yaml(study: Study, command: str) -> str:
     return "\n".join(_mapping(entries, "")) + "\n"
 
 
+def changed_yaml(study: Study, command: str) -> str:
+    """The settings of what `command` reads that are not at their defaults, as YAML that gives the same study."""
+    changed = [entry for entry in _changed(study) if entry[0] in _keys(command)]
+    return "\n".join(_mapping(changed, "")) + "\n" if changed else ""
+
+
+def _changed(section: Section, of_several: bool = False) -> _Part:
+    """Entries that are not at their defaults, or all of them where a preset among them has set others.
+
+    The first, which tells one of several from another, is always there.
+    """
+    part, whole = _Part(), _Part()
+    for (key, value, comment), name in zip(_entries(section, False), _names(section), strict=True):
+        entry, field = (key, _reduced(value), comment), type(section).model_fields.get(name)
+        whole.append(entry)
+        if field is None or value != field.get_default(call_default_factory=True) or (of_several and not part):
+            part.append(entry)
+    dumped, kept = section.model_dump(by_alias=True), {key for key, _, _ in part}
+    try:
+        again = type(section).model_validate({key: dumped[key] for key in kept}, by_alias=True, by_name=False)
+    except ValueError:
+        return whole
+    return part if again == section else whole
+
+
+def _reduced(value: Any) -> Any:
+    """A value with its sections cut down to what is changed in them."""
+    if isinstance(value, Section):
+        return _changed(value)
+    if isinstance(value, tuple):
+        return tuple(_changed(item, True) if isinstance(item, Section) else item for item in value)
+    if isinstance(value, dict):  # what is left out of a built-in loop is that one's
+        return {name: item if name in LOOPS else _reduced(item) for name, item in value.items()}
+    return value
+
+
 def config_hash(study: Study, command: str) -> str:
     """SHA-256 of what `command` reads, as canonical JSON."""
     part = study.model_dump(mode="json", by_alias=True, include=names_read(command))
@@ -54,13 +96,20 @@ def _keys(command: str) -> Sequence[str]:
     return (*_SHARED, command, *_READ.get(command, ()))
 
 
-def _entries(section: Section) -> Iterator[Entry]:
+def _names(section: Section) -> list[str]:
+    """Attributes of a section in the order of its entries."""
+    fields = type(section).model_fields.items()
+    names = [name for name, field in fields if not (is_unsaid(field) and getattr(section, name) == field.default)]
+    return [*names, *((section.model_extra or ()) if isinstance(section, OpenSection) else ())]
+
+
+def _entries(section: Section, with_choices: bool = True) -> Iterator[Entry]:
     for (key, field), name in zip(keys_of(type(section)).items(), type(section).model_fields, strict=True):
         value = getattr(section, name)
         if is_unsaid(field) and value == field.default:
             continue
         unit, source = unit_of(field), source_of(field) if value == field.default else ""
-        choices = ", ".join(choices_of(field))
+        choices = ", ".join(choices_of(field)) if with_choices else ""
         meaning = f"{field.description or ''}{choices and f': {choices}'}"
         parts = (unit and f"[{unit}]", meaning, source and f"({source})")
         yield key, value, " ".join(part for part in parts if part)
@@ -72,20 +121,27 @@ def _entries(section: Section) -> Iterator[Entry]:
 def _mapping(entries: Iterable[Entry], pad: str) -> Iterator[str]:
     for key, value, comment in entries:
         remark = f"  # {comment}" if comment else ""
-        if isinstance(value, Section):
+        if isinstance(value, Section | _Part) and value:
             yield f"{pad}{_scalar(key)}:{remark}"
-            yield from _mapping(_entries(value), pad + "  ")
+            yield from _mapping(_inner(value), pad + "  ")
         elif isinstance(value, dict) and value:
             yield f"{pad}{_scalar(key)}:{remark}"
             yield from _mapping(((name, item, _of_a_law(key, name)) for name, item in value.items()), pad + "  ")
-        elif isinstance(value, tuple) and any(isinstance(item, Section) for item in value):
+        elif isinstance(value, tuple) and any(isinstance(item, Section | _Part) for item in value):
             yield f"{pad}{_scalar(key)}:{remark}"
-            for item in value:
-                first, *further = _mapping(_entries(item), pad + "    ")
+            for number, item in enumerate(value):
+                inner = _inner(item)
+                if number and isinstance(item, _Part):  # what a setting means is said once
+                    inner = [(name, held, "") for name, held, _ in inner]
+                first, *further = _mapping(inner, pad + "    ")
                 yield f"{pad}  - {first.lstrip()}"
                 yield from further
         else:
             yield f"{pad}{_scalar(key)}: {_flow(value)}{remark}"
+
+
+def _inner(value: Section | _Part) -> Iterable[Entry]:
+    return _entries(value) if isinstance(value, Section) else value
 
 
 def _of_a_law(law: str, setting: str) -> str:
@@ -103,7 +159,7 @@ def _parameter(added: Parameter) -> str:
 def _flow(value: Any) -> str:
     if isinstance(value, tuple):
         return f"[{', '.join(map(_flow, value))}]"
-    return "{}" if isinstance(value, dict) else _scalar(value)
+    return "{}" if isinstance(value, dict | _Part) else _scalar(value)
 
 
 def _scalar(value: Any) -> str:

@@ -135,7 +135,7 @@ def _changed(section: Any, path: tuple[str, ...], value: Any, axis: SweepAxis) -
         current = section[int(head)]
         new = _changed(current, tuple(below_head), value, axis) if below_head else _alike(current, value)
         return (*section[: int(head)], new, *section[int(head) + 1 :])
-    raise UserError(f"there is no setting {axis.key}", axis.where, "one that `--dry-run` shows")
+    raise UserError(f"there is no setting {axis.key}", axis.where, "one that `--dry-run --all` shows")
 
 
 @cache

@@ -13,11 +13,12 @@ from wristctl.cli.output import say
 from wristctl.commands.printed_table import Table, number
 from wristctl.errors import Argument, UserError, meant
 from wristctl.records import Run, open_run
-from wristctl.records.difference import Difference, difference
+from wristctl.records.difference import Change, Difference, difference
 from wristctl.records.find import entries, in_order, select
 from wristctl.records.index import IndexEntry
 from wristctl.records.journal import jsonable
 from wristctl.records.lineage import ancestry, dependents
+from wristctl.records.manifest import read_overview
 from wristctl.records.run import RunState
 from wristctl.records.tags import change_tags, known_tags
 
@@ -101,8 +102,14 @@ def _cell(entry: IndexEntry, name: str) -> Any:
     return ", ".join(value) if isinstance(value, list) else value
 
 
-def show(ref: Ref, out: Out = RESULTS, as_json: Json = False, debug: Debug = False) -> None:
-    """Show one run: command, state, inputs, metrics and files."""
+def show(
+    ref: Ref,
+    metrics: Annotated[bool, typer.Option("--metrics", help="Print every metric too.")] = False,
+    out: Out = RESULTS,
+    as_json: Json = False,
+    debug: Debug = False,
+) -> None:
+    """Show one run: its answer, command, state, inputs and files; metrics too where it has no answer."""
     run = open_run(ref, out)
     tags = known_tags(run.path.parent).get(run.id, [])
     if as_json:
@@ -110,11 +117,18 @@ def show(ref: Ref, out: Out = RESULTS, as_json: Json = False, debug: Debug = Fal
         shown = {**manifest, "state": run.state, "tags": tags, "metrics": run.metrics, "run": str(run.path)}
         print(json.dumps(jsonable(shown), indent=2))
         return
-    print("\n\n".join(table.text() for table in _run_tables(run, tags)), end="\n\n")
+    answer = read_overview(run.path).answer
+    for line in answer:
+        say(line)
+    print("\n" * bool(answer), end="")
+    shown_tables = _run_tables(run, tags, metrics or not answer)
+    print("\n\n".join(table.text() for table in shown_tables), end="\n\n")
+    if answer and not metrics and run.metrics:
+        say(f"{len(run.metrics)} metrics: wristctl runs show {run.id} --metrics")
     say(run.path)
 
 
-def _run_tables(run: Run, tags: list[str]) -> list[Table]:
+def _run_tables(run: Run, tags: list[str], with_metrics: bool) -> list[Table]:
     manifest = run.manifest
     commit = (manifest.code.commit or "")[:12]
     dirty = "with uncommitted changes" if manifest.code.dirty else ""
@@ -135,17 +149,22 @@ def _run_tables(run: Run, tags: list[str]) -> list[Table]:
     files = [(output.path, output.bytes, output.sha256[:12]) for output in manifest.outputs]
     return [
         Table("", ("run", run.id), facts),
-        *([Table("Metrics", ("metric", "value", "unit", "better", "n"), metrics)] if metrics else []),
+        *([Table("Metrics", ("metric", "value", "unit", "better", "n"), metrics)] if metrics and with_metrics else []),
         *([Table("Files", ("path", "bytes", "sha256"), files)] if files else []),
     ]
 
 
-_DIFF_TITLES = {"config": "Configuration", "code": "Code", "environment": "Environment", "inputs": "Inputs"}
+# Differences printed without `--all`, and names of a summary's line.
+_MANY, _FEW = 40, 3
+_DIFF_TITLES = {
+    "config": "Configuration", "metrics": "Metrics", "code": "Code", "environment": "Environment", "inputs": "Inputs",
+}  # fmt: skip
 
 
 def diff(
     before: Ref,
     after: Annotated[str, typer.Argument(metavar="OTHER", help="The run to compare it with.", autocompletion=run_ids)],
+    all_: Annotated[bool, typer.Option("--all", help="Print every difference, not a summary of many.")] = False,
     out: Out = RESULTS,
     as_json: Json = False,
     debug: Debug = False,
@@ -163,18 +182,39 @@ def diff(
     say(f"before  {a.id}")
     say(f"after   {b.id}")
     print()
+    if a.kind != b.kind:
+        say(f"The runs are of different kinds: {a.kind} and {b.kind}.")
+    if not all_ and (a.kind != b.kind or sum(map(len, vars(differences).values())) > _MANY):
+        for line in _diff_summary(differences):
+            say(line)
+        say("every difference: --all")
+        return
     print("\n\n".join(table.text() for table in _diff_tables(differences)) or "nothing differs")
 
 
-def _diff_tables(differences: Difference) -> Iterator[Table]:
+def _diff_summary(differences: Difference) -> Iterator[str]:
+    """A line for each subject in which the runs differ: in how many things, and the first of them."""
+    for title, changes in _by_subject(differences):
+        names = ", ".join(change.name for change in changes[:_FEW])
+        more = f" and {len(changes) - _FEW} more" * (len(changes) > _FEW)
+        yield f"{title}: {names}{more}"
+
+
+def _by_subject(differences: Difference) -> Iterator[tuple[str, list[Change]]]:
+    """Titles with what differs, in the order in which it is shown."""
     for name, title in _DIFF_TITLES.items():
-        if name == "code" and differences.metrics:
-            rows = [
-                (change.name, change.before, change.after, *_change(change.before, change.after))
-                for change in differences.metrics
-            ]
-            yield Table("Metrics", ("metric", "before", "after", "change", "change [%]"), rows)
         if changes := getattr(differences, name):
+            yield title, changes
+
+
+def _diff_tables(differences: Difference) -> Iterator[Table]:
+    for title, changes in _by_subject(differences):
+        if changes is differences.metrics:
+            rows = [
+                (change.name, change.before, change.after, *_change(change.before, change.after)) for change in changes
+            ]
+            yield Table(title, ("metric", "before", "after", "change", "change [%]"), rows)
+        else:
             changed = [(change.name, _text(change.before), _text(change.after)) for change in changes]
             yield Table(title, ("what", "before", "after"), changed)
 
