@@ -23,7 +23,7 @@ from wristctl.comparison.combinations import ComparedRow
 from wristctl.config.wrist import WristParameters
 from wristctl.control.pid import PID
 from wristctl.control.smc import SMC
-from wristctl.plotting.loop_figures import angles, errors, tensions
+from wristctl.plotting.loop_figures import angles, errors, overlay, tensions
 from wristctl.plotting.wrist_drawing import directions, stroboscope
 from wristctl.simulation.repetitions import Repeated, Simulation
 from wristctl.simulation.trajectory import Trajectory
@@ -132,6 +132,7 @@ FIGURES: dict[str, Callable[[], Figure]] = {
     "tensions, late": lambda: tensions(late()),
     "rmse map": lambda: rmse_map(results(), "Loop default"),
     "answer": lambda: answer_figure(standings()),
+    "overlay": lambda: overlay([course(row, 0.1 * k + 0.1, k == 1) for k, row in enumerate(ROWS)], "ideal"),
     "error against variation": lambda: error_against_variation(results(), standings()),
     "tensions of several": lambda: tension_rows([course(row, 0.1 * k + 0.1) for k, row in enumerate(ROWS[:3])], "all"),
     "error over a disturbance": lambda: error_over_disturbance(

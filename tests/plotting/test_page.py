@@ -127,7 +127,7 @@ def test_a_long_line_of_an_answer_is_not_cut_off_at_the_edge(browser: Any, tmp_p
     with start_run("train", Study(), "", tmp_path, [], page=lambda path, man: page(Run(path), man)) as live:
         live.file(OVERVIEW).write_text(Overview(["hardly moves, and why " * 20]).text())
     browser.open(Run(live.path).file("report.html"), width, False)
-    wide = "const a = document.querySelector('#answer pre'); return a.scrollWidth - a.clientWidth"
+    wide = "const a = document.querySelector('#answer'); return a.scrollWidth - a.clientWidth"
     assert browser.run(wide) <= 0
 
 

@@ -82,7 +82,7 @@ def draw(findings: Findings, study: Study, results: list[ComparedRow], standings
 def _of_class(findings: Findings, standing: ClassStanding, results: Sequence[ComparedRow]) -> None:
     """Errors and tensions over time of the best rows and of the paper's, on the motion that stands for the class."""
     from wristctl.commands.compare.class_figures import shown_rows, tension_rows
-    from wristctl.plotting.loop_figures import error_sizes, errors
+    from wristctl.plotting.loop_figures import error_sizes, errors, overlay
 
     later = partial(findings.figure, later=True)
     cell = _stands_for(standing.of(results))
@@ -90,6 +90,8 @@ def _of_class(findings: Findings, standing: ClassStanding, results: Sequence[Com
     shown = [by_label[row] for row in shown_rows(standing) if row in by_label]
     courses = [result.simulation.trajectory for result in shown]
     slug, where = _slug(standing.name), f"{standing.name}: loop {cell[0]}, {cell[1]}"
+    caption = f"Angle and error of the best rows and of the paper's laws, {where}"
+    findings.figure(f"overlay-{slug}", overlay, courses, where, later=standing.jumps, caption=caption)
     caption = f"|theta - reference| of the best rows and of the paper's laws, {where}"
     later(f"error-over-time-{slug}", errors, courses, where, log=True, caption=caption)
     later(
