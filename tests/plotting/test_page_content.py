@@ -20,7 +20,7 @@ from wristctl.comparison.combinations import ComparedRow
 from wristctl.config.learning import TrainSettings
 from wristctl.config.study import Study
 from wristctl.plotting.page import LARGEST, blocks, figures, inline_figure, page, several_page
-from wristctl.plotting.page_tables import tables
+from wristctl.plotting.page_tables import shown_tables, tables
 from wristctl.records import InputRun, Run, start_run
 from wristctl.records.manifest import OVERVIEW, Overview, read_overview
 from wristctl.simulation.repetitions import Repeated
@@ -253,7 +253,7 @@ def test_tables_are_in_degrees_by_their_heads_and_by_their_rows_units(tmp_path: 
         {"title": "A", "columns": ["who", "RMSE [rad]", "rate [rad/s]"], "rows": [["a", 0.5, 2.0], ["b", None, 1.0]]},
         {"title": "B", "columns": ["metric", "value", "unit"], "rows": [["rmse", 0.5, "rad"], ["peak", 9.5, "N"]]},
     ]
-    first, second = tables(made(tmp_path, {}, tables=stored))
+    first, second = shown_tables(made(tmp_path, {}, tables=stored))
     assert first["columns"] == ["who", "RMSE [deg]", "rate [rad/s]"]
     assert first["rows"] == [["a", pytest.approx(90.0 / np.pi), 2.0], ["b", None, 1.0]]
     assert second["rows"] == [["rmse", pytest.approx(90.0 / np.pi), "deg"], ["peak", 9.5, "N"]]
@@ -283,10 +283,11 @@ def test_a_comparison_has_one_table_whose_rows_are_its_files(tmp_path: Path, res
     ]
     stored.append({"title": "Control step", "columns": ["controller"], "rows": [["smc"]]})
     plain = json.loads(json.dumps(stored, default=float).replace("NaN", "null"))
-    with start_run("compare", Study(), "", tmp_path) as live:
+    with start_run("compare", Study(), "", tmp_path, page=lambda path, man: page(Run(path), man)) as live:
         live.table("data/comparison.csv", csv, units={"rmse": "rad", "settling": "s"})
         live.file("tables.json").write_text(json.dumps(plain))
-    one, step = tables(Run(live.path))
+    one, step = shown_tables(Run(live.path))
+    assert tables(Run(live.path)) == plain, "what is printed stays as it was stored"
     assert step == stored[-1] and one["columns"][:3] == ["loop", "motion", "controller"]
     assert len(keys) > 2 and len(one["rows"]) == len(csv) == len(results)
     by_head = [dict(zip(one["columns"], row, strict=True)) for row in one["rows"]]
@@ -295,3 +296,16 @@ def test_a_comparison_has_one_table_whose_rows_are_its_files(tmp_path: Path, res
         assert shown["controller"] == f"{row['controller']}/{row['gains']}"
         assert shown["RMSE [deg]"] == pytest.approx(np.degrees(row["rmse"]), nan_ok=True)
         assert shown["settling [s]"] == 0.8 and shown["verdict"] == f"{row['controller']} on {row['loop']}"
+    text = Run(live.path).file("report.html").read_text()
+    place = one["columns"].index("RMSE [deg]") - 3  # after three columns of words
+    lines = [line for line in re.findall(r"<tr>(.*?)</tr>", text, re.DOTALL) if " on " in line]
+    on_page = [float(re.findall('data-value="(.*?)"', line)[place]) for line in lines]
+    np.testing.assert_allclose(on_page, np.degrees(csv.rmse), rtol=1e-12)
+
+
+def test_an_angle_that_nobody_can_measure_is_less_than_a_thousandth_of_a_degree(tmp_path: Path) -> None:
+    heads = ["RMSE [rad]", "time [s]"]
+    stored = [{"title": "T", "columns": heads, "rows": [[1e-7, 1e-7], [-1e-7, 0.5], [0.0, 1.0], [1e-3, 2.0]]}]
+    found = rows(page_of(made(tmp_path, {}, tables=stored)))
+    shown = [[html.unescape(cell) for cell in row] for row in found if len(row) == 2][:4]
+    assert shown == [["<0.001", "1e-07"], ["<0.001", "0.5"], ["0", "1"], ["0.0573", "2"]]

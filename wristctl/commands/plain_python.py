@@ -19,7 +19,7 @@ def warn_of_plain(procedure: Procedure[Any], study: Study) -> None:
     """
     section = procedure.section(study)
     rows = [section] if hasattr(section, "controller") else getattr(section, "rows", ())
-    names = [row.controller for row in rows] or getattr(section, "controllers", ())
+    names = [row.controller for row in rows] or getattr(section, "controllers", [])
     for name in dict.fromkeys(names):
         law = CONTROLLERS.get(name)
         if isinstance(law, Controller) and law.plain:

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 from wristctl.escape import printable, printable_lines
 from wristctl.plotting.animation import animation
-from wristctl.plotting.page_tables import in_degrees, tables
+from wristctl.plotting.page_tables import in_degrees, shown_tables
 from wristctl.records.difference import difference
 from wristctl.records.lineage import Ancestor, ancestry
 from wristctl.records.manifest import CONFIG, Manifest, command_of, read_overview
@@ -131,6 +131,8 @@ def _block(part: Sequence[str]) -> dict[str, Any]:
     return {"kind": "lines" if as_is else "text", "text": "\n".join(part) if as_is else " ".join(part)}
 
 
+_LEAST_DEG = 1e-3
+
 # Headline numbers shown where the command names none.
 _CARDS = 6
 
@@ -155,7 +157,7 @@ def page(run: Run, manifest: Manifest, beside: Path | None = None) -> str:
         answer=blocks(overview.answer),
         headline=_headline(run.metrics, overview.cards),
         metrics=_metrics(run),
-        tables=tables(run),
+        tables=shown_tables(run),
         figures=[picture for picture in drawn if picture not in first],
         first=first,
         undrawn=[caption or name for name, caption in overview.captions.items() if name not in drawn_names],
@@ -204,7 +206,10 @@ def _shown(value: Any) -> Any:
     return printable_lines(value) if type(value) is str else value
 
 
-def _cell(value: Any) -> str:
+def _cell(value: Any, head: Any = "") -> str:
+    """A cell for a person, below its column's head: an angle that nobody can measure is one of less than 0.001 deg."""
+    if isinstance(value, float) and str(head).endswith("[deg]") and 0.0 < abs(value) < _LEAST_DEG:
+        return f"<{_LEAST_DEG:g}"
     if value is None:
         return "-"
     if isinstance(value, bool):

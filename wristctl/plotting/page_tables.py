@@ -25,7 +25,7 @@ def in_degrees(value: Any, unit: str) -> tuple[Any, str]:
 
 
 def tables(run: Run) -> list[dict[str, Any]]:
-    """The tables that a command printed or kept: title, columns and rows each; those of a comparison's loops in one."""
+    """The tables that a command printed or kept: title, columns and rows each."""
     if not (run.path / TABLES).exists():
         return []
     file = run.file(TABLES)
@@ -36,6 +36,12 @@ def tables(run: Run) -> list[dict[str, Any]]:
     if not isinstance(stored, list) or not all(map(_is_table, stored)):
         again = ("restore it, or run `", Call(command_of(run.kind)), "` again")
         raise UserError("no tables as wristctl writes them", str(file), again)
+    return stored
+
+
+def shown_tables(run: Run) -> list[dict[str, Any]]:
+    """The tables for a page: angles in degrees, and those of a comparison's loops and motions in one."""
+    stored = tables(run)
     if run.kind == "compare" and (run.path / "data/comparison.csv").is_file():
         stored = _in_one(run, stored)
     return [_readable(table) for table in stored]
@@ -86,28 +92,21 @@ def _in_one(run: Run, stored: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
         verdicts |= {(*motion, *map(str, row[:2])): str(row[-1]) for row in table["rows"] if len(row) > 2}
     if not of_loops:
         return list(stored)
-    units = {
-        column.name: column.unit
-        for output in run.manifest.outputs
-        if output.path == "data/comparison.csv"
-        for column in output.columns
-    }
     shown = [name for name in frame.columns if name in METRICS and METRICS[name].heading and frame[name].notna().any()]
-    heads = [_head(name, in_degrees(None, units.get(name) or METRICS[name].unit)[1]) for name in shown]
+    heads = [_head(name, in_degrees(None, METRICS[name].unit)[1]) for name in shown]
     many = frame["inverse"].nunique() > 1
     columns = ["loop", "motion", "controller", *["inverse"] * many, *heads, "verdict"]
     rows = [
-        _row(entry, shown, units, many, verdicts) for entry in frame.astype(dict.fromkeys(_WHO, str)).to_dict("records")
+        _row(entry, {name: METRICS[name].unit for name in shown}, many, verdicts)
+        for entry in frame.astype(dict.fromkeys(_WHO, str)).to_dict("records")
     ]
     return [{"title": "", "columns": columns, "rows": rows}, *others]
 
 
-def _row(
-    entry: dict[Any, Any], shown: Sequence[str], units: dict[str, str], many: bool, verdicts: dict[tuple[str, ...], str]
-) -> list[Any]:
+def _row(entry: dict[Any, Any], units: dict[str, str], many: bool, verdicts: dict[tuple[str, ...], str]) -> list[Any]:
     loop, motion, controller, gains, inverse = (entry[name] for name in _WHO)
     label = f"{controller}/{gains}"
-    values = [in_degrees(float(entry[name]), units.get(name, ""))[0] for name in shown]
+    values = [in_degrees(float(entry[name]), unit)[0] for name, unit in units.items()]
     verdict = verdicts.get((loop, motion, label, inverse)) or ("failed" if entry["failed"] else "ok")
     return [loop, motion, label, *[inverse] * many, *values, verdict]
 
