@@ -1,13 +1,16 @@
 """Controllers in plain Python: what they cost, said before anything starts."""
 
+from __future__ import annotations
+
 import logging
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from wristctl.commands.procedure import Procedure
 from wristctl.config.study import Study
-from wristctl.control.law import LEAST_PLAIN_PERIOD, Controller
-from wristctl.control.table import CONTROLLERS
 from wristctl.errors import UserError
+
+if TYPE_CHECKING:
+    from wristctl.control.law import Controller
 
 log = logging.getLogger(__name__)
 
@@ -17,9 +20,12 @@ def warn_of_plain(procedure: Procedure[Any], study: Study) -> None:
 
     UserError where a comparison leaves none of its loops to it.
     """
+    from wristctl.control.law import Controller
+    from wristctl.control.table import CONTROLLERS
+
     section = procedure.section(study)
     rows = [section] if hasattr(section, "controller") else getattr(section, "rows", ())
-    names = [row.controller for row in rows] or getattr(section, "controllers", [])
+    names = [row.controller for row in rows if hasattr(row, "controller")] or getattr(section, "controllers", [])
     for name in dict.fromkeys(names):
         law = CONTROLLERS.get(name)
         if isinstance(law, Controller) and law.plain:
@@ -29,6 +35,7 @@ def warn_of_plain(procedure: Procedure[Any], study: Study) -> None:
 
 def _cost(procedure: Procedure[Any], study: Study, law: Controller) -> str:
     from wristctl.comparison.step_cost import step_time
+    from wristctl.control.law import LEAST_PLAIN_PERIOD
 
     assert procedure.size is not None
     alone, left_out = _alone(procedure.kind, study, law)
@@ -44,6 +51,8 @@ def _cost(procedure: Procedure[Any], study: Study, law: Controller) -> str:
 
 def _alone(command: str, study: Study, law: Controller) -> tuple[Study, list[str]]:
     """The study with this controller alone, on the loops that it is run on, and the names of the others."""
+    from wristctl.control.law import LEAST_PLAIN_PERIOD
+
     if command == "tune":
         return study.model_copy(update={"tune": study.tune.model_copy(update={"controllers": (law.name,)})}), []
     if command != "compare" or study.compare.worlds.family:
