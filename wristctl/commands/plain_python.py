@@ -43,10 +43,14 @@ def _cost(procedure: Procedure[Any], study: Study, law: Controller) -> str:
     ticks = size.rollouts * size.horizon * sum(1.0 / loop.control_period for loop in size.loops) / len(size.loops)
     gains = [law.values(preset) for preset in law.presets.values()]
     middle = tuple((gain.low * gain.high) ** 0.5 for gain in law.gains.values())
-    seconds = 1e-6 * step_time(law, gains[-1] if gains else middle, study.wrist).median * ticks
+    try:
+        seconds = 1e-6 * step_time(law, gains[-1] if gains else middle, study.wrist).median * ticks
+        duration = f"take about {_duration(seconds)}"
+    except UserError:  # the run that comes fails of it, and keeps what it said
+        duration = "take a time that is not known, for it fails when it is timed"
     cases = f"{size.rollouts:.0f} case{'s' * (size.rollouts > 1)}"
     remark = f"left out on {', '.join(left_out)} (a tick below {LEAST_PLAIN_PERIOD:g} s); " if left_out else ""
-    return f"{remark}{cases} take about {_duration(seconds)}"
+    return f"{remark}{cases} {duration}"
 
 
 def _alone(command: str, study: Study, law: Controller) -> tuple[Study, list[str]]:
