@@ -43,7 +43,7 @@ def files() -> dict[str, str]:
 
 def test_figures_are_as_wide_as_asked_and_stand_beside_the_sealed_run(call: Call) -> None:
     sealed, run = files(), open_run("latest:compare")
-    assert {each.stem for each in (run.path / "figures").iterdir()} == {"answer"}
+    assert {each.stem for each in (run.path / "figures").iterdir()} == {"answer", "overlay-sampled"}
     names = ("answer", "tension-variation-fast")
     code, out, error = call("runs", "figures", run.id, *names, "--format", "pdf", "--width", "88mm")
     assert code == 0, error

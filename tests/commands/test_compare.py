@@ -133,7 +133,8 @@ def test_the_answer_is_drawn_and_each_class_by_itself(compare: Compare) -> None:
     rows = [*both("fast", STEP), *both("fast", MOVE), *both("fast", MOVE, inverse="none")]
     done = compare(rows, inverses="[closed-form, none]")
     assert list(done.figures) == [
-        "answer", "performance-profile", "ratio-to-feedforward", "probability-sampled", "error-over-time-sampled",
+        "answer", "performance-profile", "ratio-to-feedforward", "probability-sampled", "overlay-sampled",
+        "error-over-time-sampled",
         "tension-over-time-sampled", "rmse-against-tension-variation", "rmse-by-reference-fast",
         "tension-variation-fast",
     ]  # fmt: skip
@@ -161,14 +162,16 @@ def test_loops_stand_beside_each_other_for_each_reference(compare: Compare) -> N
     assert "error-over-time-off-nominal" in done.figures
 
 
-def test_a_run_draws_the_answer_alone_and_says_what_else_there_is(compare: Compare, tmp_path: Path) -> None:
+def test_a_run_draws_the_answer_with_an_overlay_of_each_condition_and_says_what_else_there_is(
+    compare: Compare, tmp_path: Path
+) -> None:
     rows = both("fast", MOVE)
     done = compare(rows)
     with pytest.MonkeyPatch.context() as during:
         during.setattr(combinations, "compare", lambda *_: rows)
         kept = wristctl.compare(done.study, out=tmp_path)
     assert kept.run is not None
-    assert {file.stem for file in (kept.run.path / "figures").iterdir()} == {"answer"}
+    assert {file.stem for file in (kept.run.path / "figures").iterdir()} == {"answer", "overlay-sampled"}
     overview = read_overview(kept.run.path)
     assert overview.answer == list(kept.summary) and "tension-variation-fast" in overview.captions
     assert (kept.run.path / "README.md").read_text().index(kept.summary[1]) < 700, "the page begins with it"

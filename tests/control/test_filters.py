@@ -74,7 +74,8 @@ def test_low_pass_and_derivative_are_scipys_first_order_hold_at_any_frequency(
 ) -> None:
     x = drawn(seed)
     found = filtered(x, w, 0.3, period)
-    for column, continuous in ((LOW_PASS, ([w], [1.0, w])), (DERIVATIVE, ([w, 0.0], [1.0, w]))):
+    systems: dict[int, Any] = {LOW_PASS: ([w], [1.0, w]), DERIVATIVE: ([w, 0.0], [1.0, w])}
+    for column, continuous in systems.items():
         numerator, denominator, _ = signal.cont2discrete(continuous, period, method="foh")
         expected = from_rest(numerator.ravel(), denominator, x)
         scale = np.abs(expected).max()

@@ -227,7 +227,7 @@ def test_what_is_no_law_is_refused_in_words_with_its_place(tmp_path: Path, fault
     assert not (tmp_path / "results").exists()
 
 
-FUNCTIONS = {
+FUNCTIONS: dict[str, Any] = {
     "cos(x)": np.cos, "math.exp(x)": np.exp, "np.sin(x)": np.sin, "np.arctan2(x, y)": np.arctan2,
     "math.sqrt(x * x)": np.abs, "min(x, y)": np.minimum, "np.floor(x)": np.floor,
     "math.pow(x * x, y)": lambda x, y: np.power(x * x, y),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import signal
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -12,6 +13,13 @@ from numba.core import event
 
 import wristctl as face
 from tests.doors.conftest import ROOT
+from wristctl.commands.analyse.command import ANALYSE
+from wristctl.commands.compare.command import COMPARE
+from wristctl.commands.perform import prepare
+from wristctl.commands.plain_python import warn_of_plain
+from wristctl.commands.simulate.command import SIMULATE
+from wristctl.comparison import step_cost
+from wristctl.comparison.combinations import count_rollouts
 from wristctl.config.loop import Loop, Reference
 from wristctl.config.study import Study
 from wristctl.config.wrist import WristParameters
@@ -24,6 +32,7 @@ from wristctl.interrupt import from_outside, interrupts
 from wristctl.simulation.outcome import Outcome
 from wristctl.simulation.reference import motion
 from wristctl.simulation.rollout import rollout
+from wristctl.study_files.load import load_study
 
 WRIST = WristParameters()
 
@@ -185,7 +194,7 @@ def test_every_table_flags_it(monkeypatch: pytest.MonkeyPatch) -> None:
         if "controller" in table.columns:
             at = list(table.columns).index("controller")
             assert all("plainly(py)" in str(row[at]) for row in table.rows), table.title
-    with pytest.raises(UserError, match="only compiled laws can be linearised"):
+    with pytest.raises(UserError, match="plain Python"):
         face.analyse(Study.model_validate({"simulate": {"controller": law.name, "gains": "default"}}))
 
 
@@ -232,3 +241,126 @@ def test_the_files_of_the_worked_examples_are_shown_in_the_page() -> None:
     page = (ROOT / "docs" / "your-own-controller.md").read_text(encoding="utf-8")
     for name in ("lqr", "mpc_osqp"):
         assert (ROOT / "experiments" / "own_controllers" / f"{name}.py").read_text(encoding="utf-8") in page
+
+
+def compared(loops: dict[str, Any], *names: str) -> Study:
+    data = {
+        "horizon": 0.1,
+        "controllers": tuple({"controller": name, "gains": "default"} for name in names),
+        "loops": loops,
+        "references": ({"duration": 0.05}, {"duration": 0.05, "angle_deg": -10.0}),
+        "inverses": ("none",),
+    }
+    return Study.model_validate({"compare": data})
+
+
+FAST = {"limits": False, "control_period": 1e-6, "plant_segments": 1, "substeps": 1}
+SLOW = {"plant_segments": 1, "substeps": 1}
+
+
+def test_a_comparison_leaves_plain_python_out_of_loops_of_a_microsecond_and_says_what_the_rest_costs(
+    monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    ticks: list[float] = []
+
+    def push(now: Any, wrist: Any, gains: Any, memory: Any) -> float:
+        ticks.append(now.period)
+        return 0.1
+
+    law = plain(push)
+    monkeypatch.setitem(CONTROLLERS, law.name, law)
+    study = compared({"fast": FAST, "slow": SLOW}, "feedforward", law.name)
+    done = face.compare(study)
+    rows = {(row.controller, row.loop) for row in done.rows}
+    assert rows == {("feedforward", "fast"), ("feedforward", "slow"), (law.name, "slow")}
+    assert set(ticks) == {1e-3}
+    assert count_rollouts(study.compare) == len(done.rows) == 6
+    (told,) = [record.getMessage() for record in caplog.records if law.name in record.getMessage()]
+    assert "fast" in told and "slow" not in told and "2 cases" in told
+    placed = {ranking.name: ranking.labels for ranking in done.rankings}
+    assert [law.name in str(labels) for labels in placed.values()].count(True) == 1
+    with pytest.raises(UserError, match="plainly") as refused:
+        face.compare(compared({"fast": FAST}, "feedforward", law.name))
+    assert refused.value.exit_code == 2
+
+
+def test_in_a_class_of_a_fast_and_a_slower_loop_compiled_laws_are_compared_on_both(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def push(now: Any, wrist: Any, gains: Any, memory: Any) -> float:
+        return 0.1
+
+    law = plain(push)
+    monkeypatch.setitem(CONTROLLERS, law.name, law)
+    loops = {"fast": FAST, "ideal": SLOW | {"control_period": 1e-4, "limits": False}}
+    (ranking,) = face.compare(compared(loops, law.name, "feedforward")).rankings
+    assert ranking.labels == ["feedforward/default"] and list(ranking.loops) == ["fast", "ideal"]
+
+
+def test_the_cost_told_is_that_of_the_laws_own_ticks(
+    monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    def push(now: Any, wrist: Any, gains: Any, memory: Any) -> float:
+        return 0.1
+
+    monkeypatch.setattr(step_cost, "step_time", lambda *_: step_cost.StepTime(2000.0, 2000.0))
+    law = plain(push)
+    monkeypatch.setitem(CONTROLLERS, law.name, law)
+    study = Study.model_validate({"simulate": {"controller": law.name, "gains": "default", "horizon": 1200.0}})
+    warn_of_plain(SIMULATE, study)
+    (told,) = [record.getMessage() for record in caplog.records]
+    assert told.endswith("40 min"), "1.2 million ticks of 2 ms"
+
+
+OWN = """
+from wristctl.control.law import Controller, Gain
+def law(now, wrist, gains, memory):
+    return -gains.k * (now.theta - now.theta_ref)
+GAINS = {"k": Gain("N m/rad", "spring", 0.1, 10.0)}
+ONLY = Controller("only", law, "", GAINS, {"soft": {"k": 0.5}})
+TWO = Controller("two", law, "", GAINS, {"soft": {"k": 0.5}, "default": {"k": 1.0}})
+PLAIN = Controller("plainly", law, "", GAINS, {"soft": {"k": 0.5}}, plain=True)
+"""
+
+
+@pytest.mark.parametrize(("name", "preset"), [("ONLY", "soft"), ("TWO", "default")])
+@pytest.mark.parametrize("command", [SIMULATE, ANALYSE, COMPARE], ids=lambda procedure: procedure.kind)
+def test_a_controller_brings_its_own_preset_where_nobody_names_gains(
+    tmp_path: Path, name: str, preset: str, command: Any
+) -> None:
+    (tmp_path / "own.py").write_text(OWN)
+    place = f"{tmp_path}/own.py:{name}"
+    field, overrides = (
+        ("rows", [f"controllers=[{{controller: {place}}}]", "inverses=[none]"])
+        if command is COMPARE
+        else ("gains", [f"simulate.controller={place}"])
+    )
+    study = prepare(command, load_study((), overrides, command.kind), tmp_path).study
+    chosen = study.compare.rows[0].gains if field == "rows" else study.simulate.gains
+    assert chosen == preset
+
+
+def test_gains_that_somebody_names_with_the_controller_are_never_replaced(tmp_path: Path) -> None:
+    (tmp_path / "own.py").write_text(OWN)
+    place = f"{tmp_path}/own.py:ONLY"
+    (tmp_path / "other.yaml").write_text("simulate: {controller: smc, gains: exchanged}")
+    (tmp_path / "mine.yaml").write_text("simulate: {controller: own.py:ONLY, gains: exchanged}")
+
+    def gains(*overrides: str, file: str = "other.yaml") -> Any:
+        prepared = prepare(SIMULATE, load_study([tmp_path / file], overrides, "simulate"), tmp_path)
+        prepared.plan()
+        return prepared.study.simulate.gains
+
+    assert gains(f"controller={place}") == "soft", "the file's gains are for the file's controller"
+    assert gains("controller=smc") == "exchanged", "which another may have too"
+    for overrides, file in (((f"controller={place}", "gains=exchanged"), "other.yaml"), ((), "mine.yaml")):
+        with pytest.raises(UserError, match="exchanged"):
+            gains(*overrides, file=file)
+
+
+def test_a_plain_law_that_is_to_be_analysed_is_refused_for_being_plain(tmp_path: Path) -> None:
+    (tmp_path / "own.py").write_text(OWN)
+    study = load_study((), [f"simulate.controller={tmp_path}/own.py:PLAIN"], "analyse")
+    with pytest.raises(UserError, match="plain Python") as refused:
+        prepare(ANALYSE, study, tmp_path).plan()
+    assert refused.value.where == "simulate.controller"

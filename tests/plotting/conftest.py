@@ -23,7 +23,7 @@ from wristctl.comparison.controller_ranking import Ranking, class_rankings
 from wristctl.config.wrist import WristParameters
 from wristctl.control.pid import PID
 from wristctl.control.smc import SMC
-from wristctl.plotting.loop_figures import angles, errors, tensions
+from wristctl.plotting.loop_figures import angles, errors, overlay, tensions
 from wristctl.plotting.ranking_figures import (
     answer_figure,
     paired_ratios,
@@ -144,6 +144,7 @@ FIGURES: dict[str, Callable[[], Figure]] = {
     "performance profile": lambda: performance_profile(rankings(), PLACES),
     "ratios to feedforward": lambda: paired_ratios(rankings(), "feedforward/default", PLACES),
     "who beats whom": lambda: probability_of_better(rankings()[0], "sampled"),
+    "overlay": lambda: overlay([course(row, 0.1 * k + 0.1, k == 1) for k, row in enumerate(ROWS)], "ideal"),
     "error against variation": lambda: error_against_variation(results(), rankings()),
     "tensions of several": lambda: tension_rows([course(row, 0.1 * k + 0.1) for k, row in enumerate(ROWS[:3])], "all"),
     "error over a disturbance": lambda: error_over_disturbance(

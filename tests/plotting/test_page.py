@@ -31,6 +31,7 @@ assert SPEC is not None and SPEC.loader is not None
 BROWSER = importlib.util.module_from_spec(SPEC)
 SPEC.loader.exec_module(BROWSER)
 
+TABLE_ROWS = "[...document.querySelector('table.sortable').tBodies[0].rows]"
 MARKUP = "</script><b>bold</b>"
 
 
@@ -127,17 +128,31 @@ def test_a_long_line_of_an_answer_is_not_cut_off_at_the_edge(browser: Any, tmp_p
     with start_run("train", Study(), "", tmp_path, [], page=lambda path, man: page(Run(path), man)) as live:
         live.file(OVERVIEW).write_text(Overview(["hardly moves, and why " * 20]).text())
     browser.open(Run(live.path).file("report.html"), width, False)
-    wide = "const a = document.querySelector('#answer pre'); return a.scrollWidth - a.clientWidth"
+    wide = "const a = document.querySelector('#answer'); return a.scrollWidth - a.clientWidth"
     assert browser.run(wide) <= 0
 
 
 def test_a_table_sorts_by_number_and_back(browser: Any, compared: Run) -> None:
     browser.open(compared.file("report.html"), 1280, False)
     press = "document.querySelectorAll('table.sortable')[0].querySelectorAll('th button')[2].click();"
-    read = "return [...document.querySelector('table.sortable').tBodies[0].rows].map(row => row.cells[2].textContent)"
+    read = f"return {TABLE_ROWS}.map(row => row.cells[2].dataset.value || '-')"
     rising, falling = browser.run(press + read), browser.run(press + read)
     numbers = [float(text) for text in rising if text != "-"]
     assert numbers == sorted(numbers) and len(numbers) == 17 and falling == rising[::-1]
+
+
+def test_rows_that_contain_all_words_stay_and_a_keyboard_reaches_everything(browser: Any, compared: Run) -> None:
+    browser.open(compared.file("report.html"), 390, False)
+    typed = "const i = document.querySelector('.filter input'); i.value = 'jerk smc/tuned 2';"
+    typed += "i.dispatchEvent(new Event('input'));"
+    typed += f"return {TABLE_ROWS}.filter(row => !row.hidden).map(row => row.textContent)"
+    (left,) = browser.run(typed)
+    assert "smc/tuned" in left and "minimum jerk 2 s" in left
+    unreachable = (
+        "return [...document.querySelectorAll('button, input, select, summary, .wide')]"
+        ".filter(e => e.tabIndex < 0).map(e => e.outerHTML)"
+    )
+    assert browser.run(unreachable) == []
 
 
 def test_the_wrist_bends_as_it_was_logged_and_the_animation_runs(browser: Any, compared: Run) -> None:

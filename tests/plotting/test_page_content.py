@@ -6,19 +6,27 @@ import base64
 import html
 import json
 import re
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
+from wristctl.commands.answer import Answer
+from wristctl.commands.compare.csv_data import frame
+from wristctl.commands.printed_table import Table
+from wristctl.comparison.combinations import ComparedRow
 from wristctl.config.learning import TrainSettings
 from wristctl.config.study import Study
-from wristctl.plotting.page import LARGEST, figures, inline_figure, page, several_page
+from wristctl.plotting.page import LARGEST, blocks, figures, inline_figure, page, several_page
+from wristctl.plotting.page_tables import shown_tables, tables
 from wristctl.records import InputRun, Run, start_run
 from wristctl.records.manifest import OVERVIEW, Overview, read_overview
+from wristctl.simulation.repetitions import Repeated
 
 
-def made(tmp_path: Path, metrics: dict[str, Any], unit: str = "rad", better: Any = "lower", **files: Any) -> Run:
+def made(tmp_path: Path, metrics: dict[str, Any], unit: str = "N", better: Any = "lower", **files: Any) -> Run:
     with start_run("train", Study(), "", tmp_path, ["wristctl", "train", "--label", "a b"]) as live:
         for name, value in metrics.items():
             live.metric(name, value, unit if name != "other" else "s", better, meaning=f"says {name}")
@@ -57,28 +65,25 @@ def test_where_none_is_chosen_the_first_that_may_be_better_or_worse_head_it(tmp_
     assert [name for name, _ in cards(plain)] == [f"m {k}" for k in range(20, 14, -1)]
 
 
-def test_the_answer_begins_the_page_and_figures_follow_in_reading_order(tmp_path: Path) -> None:
-    run = made(tmp_path, {"rmse": 1.0}, tables=[{"title": "All", "columns": ["a"], "rows": [["b"]]}])
+def test_the_answer_begins_the_page_then_overlays_and_one_table_before_all_else(tmp_path: Path) -> None:
+    stored = [{"title": title, "columns": ["a"], "rows": [["b"]]} for title in ("All", "Folded")]
+    run = made(tmp_path, {"rmse": 1.0}, tables=stored)
     folder = run.path / "figures"
     folder.mkdir()
-    for name in ("alone", "b-late", "a-early", "first"):
+    for name in ("alone", "b-late", "a-early", "first", "overlay-ideal", "angle"):
         (folder / f"{name}.svg").write_text(SVG)
     captions = {"first": "the answer drawn", "b-late": "comes <second>", "a-early": "", "undrawn": "drawn later"}
-    (run.path / OVERVIEW).write_text(Overview(["smc < pid", "holds"], "first", [], captions).text())
+    captions |= {"overlay-ideal": "two courses", "angle": "the angle"}
+    (run.path / OVERVIEW).write_text(Overview(["smc < pid", "", "holds"], "first", ["rmse"], captions).text())
     text = page_of(run)
     order = [
-        "smc &lt; pid\nholds",
-        "the answer drawn",
-        "All",
-        "comes &lt;second&gt;",
-        "a early",
-        "alone",
-        "drawn later",
-    ]
-    places = [text.index(each) for each in order]
-    assert places == sorted(places) and "<details><summary>All</summary>" in text
+        "smc &lt; pid", "holds", "the answer drawn", "two courses", "the angle", "All", "Folded", 'class="card"',
+        "comes &lt;second&gt;", "a early", "alone", "drawn later",
+    ]  # fmt: skip
+    places = [text.index(mark) for mark in order]
+    assert places == sorted(places) and "<summary>Folded</summary>" in text and "<summary>All</summary>" not in text
     assert f"wristctl runs report --all-figures {run.id}" in text
-    assert [name for name, *_ in figures(run)] == ["first", "b-late", "a-early", "alone"]
+    assert [name for name, *_ in figures(run)] == ["first", "b-late", "a-early", "overlay-ideal", "angle", "alone"]
 
 
 def badge(run: Run) -> tuple[str, str]:
@@ -109,8 +114,38 @@ def test_an_overview_that_cannot_be_read_costs_nothing(tmp_path: Path, content: 
 
 def test_all_metrics_stand_in_a_table_with_unit_direction_and_meaning(tmp_path: Path) -> None:
     found = rows(page_of(made(tmp_path, {"rmse": 0.123456, "none": float("nan")})))
-    assert ["rmse", "0.1235", "rad", "lower", "1", "says rmse"] in found
-    assert ["none", "-", "rad", "lower", "1", "says none"] in found
+    assert ["rmse", "0.1235", "N", "lower", "1", "says rmse"] in found
+    assert ["none", "-", "N", "lower", "1", "says none"] in found
+
+
+def test_angles_are_in_degrees_in_cards_and_metrics_and_nothing_else_is(tmp_path: Path) -> None:
+    for unit, factor, shown in (
+        ("rad", 180.0 / np.pi, "deg"),
+        ("rad s", 180.0 / np.pi, "deg s"),
+        ("rad/s", 1.0, "rad/s"),
+    ):
+        run = made(tmp_path / shown.replace("/", ""), {"rmse": 0.25}, unit)
+        text = page_of(run)
+        assert cards(run) == [("rmse", f"{0.25 * factor:.4g}")] and f"<small>{shown}</small>" in text
+        assert ["rmse", f"{0.25 * factor:.4g}", shown, "lower", "1", "says rmse"] in rows(text)
+        assert run.metrics["rmse"]["value"] == 0.25
+
+
+def test_an_answer_is_paragraphs_a_table_by_its_rule_and_commands_to_copy() -> None:
+    answer = Answer(
+        "The first controller is best. " * 6,
+        Table("", ("condition", "error [deg]", "not to be used"), [("on a rig", 0.5, "a, b"), ("ideal", None, "")]),
+        ["Do not use b. " * 9, "$ wristctl tune a.yaml --set x=1"],
+        "See report.html.",
+    )
+    sentence, table, note, command, more = blocks(answer.lines())
+    assert sentence == {"kind": "text", "text": " ".join(("The first controller is best. " * 6).split())}
+    assert table["columns"] == ["condition", "error [deg]", "not to be used"]
+    assert table["rows"] == [["on a rig", "0.5", "a, b"], ["ideal", "-", ""]]
+    assert note == {"kind": "text", "text": ("Do not use b. " * 9).strip()}
+    assert command == {"kind": "command", "text": "wristctl tune a.yaml --set x=1"}
+    assert more["text"] == "See report.html." and blocks([]) == [] and blocks(["", " "]) == []
+    assert blocks(["a: 1", "    b"]) == [{"kind": "lines", "text": "a: 1\n    b"}], "indented lines stay lines"
 
 
 def test_cells_are_words_whole_numbers_four_digits_or_a_dash(tmp_path: Path) -> None:
@@ -211,3 +246,66 @@ def test_several_runs_are_told_apart_from_the_first_in_columns_of_their_own(tmp_
         "<svg >1</svg>",
         "<svg >2</svg>",
     ]
+
+
+def test_tables_are_in_degrees_by_their_heads_and_by_their_rows_units(tmp_path: Path) -> None:
+    stored = [
+        {"title": "A", "columns": ["who", "RMSE [rad]", "rate [rad/s]"], "rows": [["a", 0.5, 2.0], ["b", None, 1.0]]},
+        {"title": "B", "columns": ["metric", "value", "unit"], "rows": [["rmse", 0.5, "rad"], ["peak", 9.5, "N"]]},
+    ]
+    first, second = shown_tables(made(tmp_path, {}, tables=stored))
+    assert first["columns"] == ["who", "RMSE [deg]", "rate [rad/s]"]
+    assert first["rows"] == [["a", pytest.approx(90.0 / np.pi), 2.0], ["b", None, 1.0]]
+    assert second["rows"] == [["rmse", pytest.approx(90.0 / np.pi), "deg"], ["peak", 9.5, "N"]]
+
+
+def test_a_comparison_has_one_table_whose_rows_are_its_files(tmp_path: Path, results: list[ComparedRow]) -> None:
+    """In place of one for each loop and motion, also of a loop with a comma in its name."""
+    first, *others = [
+        replace(
+            row, repeated=Repeated.once(replace(row.simulation, metrics={"settling": 0.8} | row.simulation.metrics))
+        )
+        for row in results
+    ]
+    compared_rows = [replace(first, loop="camera, tendons"), *others]
+    csv = frame(compared_rows, ())
+    keys = list(dict.fromkeys(zip(csv.loop, csv.reference, strict=True)))
+    stored = [
+        {
+            "title": f"Loop {loop}, {motion}",
+            "columns": ["controller", "inverse", "RMSE [rad]", "fate"],
+            "rows": [
+                [f"{row.controller}/{row.gains}", row.inverse, row.rmse, f"{row.controller} on {loop}"]
+                for row in csv[(csv.loop == loop) & (csv.reference == motion)].itertuples()
+            ],
+        }
+        for loop, motion in keys
+    ]
+    stored.append({"title": "Control step", "columns": ["controller"], "rows": [["smc"]]})
+    plain = json.loads(json.dumps(stored, default=float).replace("NaN", "null"))
+    with start_run("compare", Study(), "", tmp_path, page=lambda path, man: page(Run(path), man)) as live:
+        live.table("data/comparison.csv", csv, units={"rmse": "rad", "settling": "s"})
+        live.file("tables.json").write_text(json.dumps(plain))
+    one, step = shown_tables(Run(live.path))
+    assert tables(Run(live.path)) == plain, "what is printed stays as it was stored"
+    assert step == stored[-1] and one["columns"][:3] == ["loop", "motion", "controller"]
+    assert len(keys) > 2 and len(one["rows"]) == len(csv) == len(results)
+    by_head = [dict(zip(one["columns"], row, strict=True)) for row in one["rows"]]
+    for shown, row in zip(by_head, csv.to_dict("records"), strict=True):
+        assert (shown["loop"], shown["motion"]) == (row["loop"], row["reference"])
+        assert shown["controller"] == f"{row['controller']}/{row['gains']}"
+        assert shown["RMSE [deg]"] == pytest.approx(np.degrees(row["rmse"]), nan_ok=True)
+        assert shown["settling [s]"] == 0.8 and shown["verdict"] == f"{row['controller']} on {row['loop']}"
+    text = Run(live.path).file("report.html").read_text()
+    place = one["columns"].index("RMSE [deg]") - 3  # after three columns of words
+    lines = [line for line in re.findall(r"<tr>(.*?)</tr>", text, re.DOTALL) if " on " in line]
+    on_page = [float(re.findall('data-value="(.*?)"', line)[place]) for line in lines]
+    np.testing.assert_allclose(on_page, np.degrees(csv.rmse), rtol=1e-12)
+
+
+def test_an_angle_that_nobody_can_measure_is_less_than_a_thousandth_of_a_degree(tmp_path: Path) -> None:
+    heads = ["RMSE [rad]", "time [s]"]
+    stored = [{"title": "T", "columns": heads, "rows": [[1e-7, 1e-7], [-1e-7, 0.5], [0.0, 1.0], [1e-3, 2.0]]}]
+    found = rows(page_of(made(tmp_path, {}, tables=stored)))
+    shown = [[html.unescape(cell) for cell in row] for row in found if len(row) == 2][:4]
+    assert shown == [["<0.001", "1e-07"], ["<0.001", "0.5"], ["0", "1"], ["0.0573", "2"]]

@@ -30,7 +30,7 @@ new_app = typer.Typer(add_completion=False)
 
 _TABLES = {"controller": CONTROLLERS, "reference": REFERENCES, "optimiser": OPTIMISERS}
 _AFTER_NEW = {
-    "controller": "wristctl check-controller {0}\nwristctl simulate --controller {0} --gains default",
+    "controller": "wristctl check-controller {0}\nwristctl simulate --controller {0}",
     "reference": "wristctl simulate --set reference.kind={0}",
     "optimiser": "wristctl tune --set optimiser={0}",
 }

@@ -3,17 +3,21 @@
 import json
 import logging
 from collections.abc import Mapping
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeVar
 
 from wristctl.config.choices import CONTROLLERS, OPTIMISERS, REFERENCES, Choices
+from wristctl.config.controller_row import Row
 from wristctl.config.foreign import PLAIN, Foreign, is_reference
 from wristctl.config.leaves import named_in, renamed
+from wristctl.config.simulate import SimulateSettings
 from wristctl.config.study import Study
 from wristctl.errors import UserError, nearest
 from wristctl.plugins.places import entry_point_names
 from wristctl.study_files.resolved import names_read
 
 log = logging.getLogger(__name__)
+
+_Row = TypeVar("_Row", Row, SimulateSettings)
 
 
 class Adopted(NamedTuple):
@@ -63,6 +67,35 @@ def adopted(study: Study, command: str) -> Adopted:
         return Adopted(study, ())
     called = {name: renamed(content, own_name) for name, content in sections.items()}
     return Adopted(study.model_copy(update=called | {"controller_settings": settings}), tuple(origins))
+
+
+def with_presets(study: Study, command: str) -> Study:
+    """The study with a controller's own preset where nobody chose gains for it and it has none of the default's name.
+
+    That is its preset `default`, or else its first, for the commands of one loop and for `compare`.
+    """
+    if command not in ("simulate", "analyse", "compare"):
+        return study
+    section = study.compare if command == "compare" else study.simulate
+    if isinstance(section, SimulateSettings):
+        return study.model_copy(update={"simulate": _with_preset(section)})
+    rows = {
+        name: tuple(map(_with_preset, value))
+        for name, value in section
+        if isinstance(value, tuple) and value and isinstance(value[0], Row)
+    }
+    return study.model_copy(update={"compare": section.model_copy(update=rows)})
+
+
+def _with_preset(row: _Row) -> _Row:
+    if "gains" in row.model_fields_set or row.controller not in CONTROLLERS:
+        return row
+    presets = getattr(CONTROLLERS[row.controller], "presets", {})
+    if not presets or row.gains in presets:
+        return row
+    preset = "default" if "default" in presets else next(iter(presets))
+    log.info("%s has no gains '%s': its own preset '%s' is taken", row.controller, row.gains, preset)
+    return row.model_copy(update={"gains": preset})
 
 
 def with_places(study: Study, places: dict[str, str] | None = None) -> Study:
@@ -148,7 +181,5 @@ def _entry(table: Choices[Any], name: str, entry: Any, origin: Foreign, study: S
         raise UserError(reason, origin.reference, f'rename this one: name="my-{entry_name}"')
     if table.what == CONTROLLERS.what:
         vet(entry, origin.reference)
-        if entry.plain:
-            log.warning("%s is plain Python: its rollouts run one by one, and its times are Python's", entry_name)
     table.lend(entry_name, entry, origin)
     return entry_name

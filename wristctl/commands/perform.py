@@ -9,8 +9,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Generic
 
-from wristctl.commands.adoption import adopted, with_places
+from wristctl.commands.adoption import adopted, with_places, with_presets
 from wristctl.commands.inputs import Inputs, check_motions, named_for_good, opened
+from wristctl.commands.plain_python import warn_of_plain
 from wristctl.commands.printed_table import Table
 from wristctl.commands.procedure import Found, Procedure, procedure_of
 from wristctl.commands.progress import Watch, watched
@@ -75,6 +76,8 @@ def prepare(
         study = study.model_copy(update=named)
     check_motions(study, procedure.kind)
     study, foreign = adopted(study, procedure.kind)
+    study = with_presets(study, procedure.kind)
+    warn_of_plain(procedure, study)
     return Prepared(procedure, study, inputs, foreign)
 
 

@@ -105,8 +105,9 @@ def planned(study: Study, network: Inverse | None = None) -> list[Condition]:
 def count_rollouts(chosen: CompareSettings) -> int:
     """Number of rollouts in a `compare` section."""
     courses = len(chosen.directions) * len(chosen.references) * len(chosen.inverses)
-    times = [chosen.repetitions if is_random(loop) else 1 for loop in chosen.loops.values()]
-    return len(chosen.rows) * courses * sum(times)
+    times = [(loop, chosen.repetitions if is_random(loop) else 1) for loop in chosen.loops.values()]
+    laws = [controller(row.controller) for row in chosen.rows]
+    return courses * sum(count for loop, count in times for law in laws if law.keeps_up(loop.control_period))
 
 
 def compare(
@@ -128,6 +129,8 @@ def compare(
         courses, motions = condition.courses, [each.motion for each in condition.courses]
         scenarios = [each.scenario for each in courses]
         for number, name in enumerate(names):
+            if not controller(name).keeps_up(condition.loop.control_period):
+                continue
             rows = [i for i, row in enumerate(chosen.rows) if row.controller == name]
             batch = np.array([gains[i] for i in rows for _ in courses]).reshape(len(rows) * len(courses), -1)
             which = np.tile(np.arange(len(courses)), len(rows))

@@ -181,9 +181,10 @@ def class_rankings(results: Sequence[ComparedRow], settings: CompareSettings, wr
 
 def _ranked(name: str, results: Sequence[ComparedRow], loops: Sequence[str], traits: Traits) -> Ranking:
     """Rows under one condition; over its cases, or over repetitions where all cases have more of them."""
-    labels = list(dict.fromkeys(result.label for result in results))
     cells = list(dict.fromkeys((result.loop, result.reference) for result in results))
     repeated = {(result.label, result.loop, result.reference): result.repeated for result in results}
+    everyone = dict.fromkeys(result.label for result in results)  # plain Python is left out of the fastest loops
+    labels = [label for label in everyone if all((label, *cell) in repeated for cell in cells)]
     table = [[repeated[label, *cell] for cell in cells] for label in labels]
     repetitions = {len(cell.failed) for row in table for cell in row}
     redrawn = len(repetitions) == 1 and max(repetitions) > len(cells)

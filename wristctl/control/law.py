@@ -43,6 +43,9 @@ wrist_of = rows_named(Segments._fields)
 
 Law = Callable[[Any, Any, Any, Any], Any]
 
+# Control period [s] below which no comparison runs plain Python: a second of such a loop takes a second or more.
+LEAST_PLAIN_PERIOD = 1e-5
+
 # Origin of presets for the rig.
 BY_TRIAL = "behind a 60 Hz camera, steppers and tendons of 8 to 100 kN/m: by trial at the corners of docs/margins.py"
 
@@ -138,6 +141,10 @@ class Controller:
     def values(self, gains: Mapping[str, float]) -> tuple[float, ...]:
         """Gains by name in the order in which compiled code holds them."""
         return tuple(float(gains[name]) for name in self.gains)
+
+    def keeps_up(self, period: float) -> bool:
+        """Whether a comparison runs it in a loop with this control period [s]: plain Python not in the fastest."""
+        return not self.plain or period >= LEAST_PLAIN_PERIOD
 
     def compiled(self, count: int = 1) -> Any:
         """The law as what every kernel of as many rollouts can call: native code, or a way out to plain Python.

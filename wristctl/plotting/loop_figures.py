@@ -28,6 +28,8 @@ from wristctl.simulation.trajectory import Trajectory
 
 # Errors below this [rad] are not shown on a logarithmic axis.
 _SMALLEST = 1e-8
+# Error that nobody can measure [deg].
+_LEAST_DEG = 1e-3
 # Samples in the close-up of tensions.
 _LAST = 20
 # Parts of a long course of which each is drawn by its least and its largest value.
@@ -72,6 +74,28 @@ def errors(trajectories: Sequence[Trajectory], heading: str = "", log: bool = Fa
         _at_most(axes, -2.0 * size - 0.01, 2.0 * size + 0.01)
     axes.set(xlabel="time [s]", ylabel="|error| [rad]" if log else "error [rad]")
     title(axes, heading)
+    legend_below(picture)
+    return picture
+
+
+def overlay(trajectories: Sequence[Trajectory], heading: str = "") -> Figure:
+    """Angle and, below it, size of the error [deg] over time [s], one line for each trajectory.
+
+    What nobody can measure is drawn as 0.001 deg.
+    """
+    picture, ((above,), (below,)) = figure(2, 1, height=4.4, sharex=True)
+    for course in trajectories:
+        above.plot(course.time, np.degrees(course.theta), label=label(course), **line(course.label))
+        error = np.maximum(np.degrees(np.abs(course.error)), _LEAST_DEG)
+        below.plot(course.time, error, **line(course.label))
+    draw_desired(above, trajectories)
+    within_half_a_move(above, trajectories)
+    logarithmic(below.yaxis)
+    largest = max(float(np.degrees(np.abs(course.theta_ref)).max()) for course in trajectories)
+    _at_most(below, 0.5 * _LEAST_DEG, 2.0 * largest + 1.0)
+    above.set(ylabel="bending angle [deg]")
+    below.set(xlabel="time [s]", ylabel="|error| [deg]")
+    title(above, heading)
     legend_below(picture)
     return picture
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import base64
 import hashlib
-import json
 import math
 import re
 import shlex
@@ -14,12 +13,12 @@ from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from wristctl.errors import Call, UserError
 from wristctl.escape import printable, printable_lines
 from wristctl.plotting.animation import animation
+from wristctl.plotting.page_tables import in_degrees, shown_tables
 from wristctl.records.difference import difference
 from wristctl.records.lineage import Ancestor, ancestry
-from wristctl.records.manifest import CONFIG, TABLES, Manifest, command_of, read_overview
+from wristctl.records.manifest import CONFIG, Manifest, command_of, read_overview
 from wristctl.records.run import Run
 from wristctl.version import __version__
 
@@ -100,6 +99,40 @@ def _box(node: Ancestor, x: int, y: int, is_root: bool) -> str:
     )
 
 
+# Figures of angle and error over time, which come before every table.
+_OVERLAY = re.compile(r"overlay-|(angle|error)s?$")
+# The line below the heads of an aligned table.
+_RULE = re.compile(r"-+(  -+)*")
+
+
+def blocks(lines: Sequence[str]) -> list[dict[str, Any]]:
+    """The blocks of an answer, which empty lines part: a `table`, a `command`, `lines` as they are, or `text`.
+
+    An aligned table's columns are those of the rule below its heads.
+    """
+    parts: list[list[str]] = [[]]
+    for line in lines:
+        if line.strip():
+            parts[-1].append(line)
+        else:
+            parts.append([])
+    return [_block(part) for part in parts if part]
+
+
+def _block(part: Sequence[str]) -> dict[str, Any]:
+    if len(part) > 1 and _RULE.fullmatch(part[1]):
+        starts = [0, *(space.end() for space in re.finditer(" +", part[1]))]
+        spans = list(zip(starts, [*starts[1:], None], strict=True))
+        heads, _, *rows = [[line[start:end].strip() for start, end in spans] for line in part]
+        return {"kind": "table", "columns": heads, "rows": rows}
+    if len(part) == 1 and part[0].startswith("wristctl "):
+        return {"kind": "command", "text": part[0]}
+    as_is = any(line.startswith(" ") for line in part)
+    return {"kind": "lines" if as_is else "text", "text": "\n".join(part) if as_is else " ".join(part)}
+
+
+_LEAST_DEG = 1e-3
+
 # Headline numbers shown where the command names none.
 _CARDS = 6
 
@@ -114,18 +147,19 @@ def page(run: Run, manifest: Manifest, beside: Path | None = None) -> str:
     """
     overview, drawn = read_overview(run.path), figures(run, beside)
     drawn_names = {name for name, *_ in drawn}
+    first = [picture for picture in drawn if picture[0] == overview.figure or _OVERLAY.match(picture[0])]
     return render(
         "run.html",
         heading=run.id,
         manifest=manifest,
         command=command_of(manifest.kind),
         verdict=", ".join(overview.marks) if manifest.state == "ok" else "",
-        answer=overview.answer,
+        answer=blocks(overview.answer),
         headline=_headline(run.metrics, overview.cards),
         metrics=_metrics(run),
-        tables=tables(run),
-        figures=[picture for picture in drawn if picture[0] != overview.figure],
-        first=[picture for picture in drawn if picture[0] == overview.figure],
+        tables=shown_tables(run),
+        figures=[picture for picture in drawn if picture not in first],
+        first=first,
         undrawn=[caption or name for name, caption in overview.captions.items() if name not in drawn_names],
         animation=animation(run),
         lineage=lineage_picture(ancestry(run, state=manifest.state)),
@@ -172,7 +206,10 @@ def _shown(value: Any) -> Any:
     return printable_lines(value) if type(value) is str else value
 
 
-def _cell(value: Any) -> str:
+def _cell(value: Any, head: Any = "") -> str:
+    """A cell for a person, below its column's head: an angle that nobody can measure is one of less than 0.001 deg."""
+    if isinstance(value, float) and str(head).endswith("[deg]") and 0.0 < abs(value) < _LEAST_DEG:
+        return f"<{_LEAST_DEG:g}"
     if value is None:
         return "-"
     if isinstance(value, bool):
@@ -187,37 +224,18 @@ def _headline(metrics: dict[str, dict[str, Any]], cards: Sequence[str]) -> list[
     with_value = {name: metric for name, metric in metrics.items() if metric["value"] is not None}
     chosen = [name for name in cards if name in with_value]
     chosen = chosen or [name for name, metric in with_value.items() if metric.get("better")] or list(with_value)
-    return [(name, with_value[name]) for name in chosen[:_CARDS]]
+    return [(name, _for_people(with_value[name])) for name in chosen[:_CARDS]]
+
+
+def _for_people(metric: dict[str, Any]) -> dict[str, Any]:
+    value, unit = in_degrees(metric["value"], metric.get("unit") or "")
+    return metric | {"value": value, "unit": unit}
 
 
 def _metrics(run: Run) -> list[tuple[Any, ...]]:
     kept = ("value", "unit", "better", "n", "meaning")
-    return [(name, *(metric.get(key) for key in kept)) for name, metric in run.metrics.items()]
-
-
-def tables(run: Run) -> list[dict[str, Any]]:
-    """The tables that a command printed or kept: title, columns and rows each."""
-    if not (run.path / TABLES).exists():
-        return []
-    file = run.file(TABLES)
-    try:
-        stored = json.loads(file.read_bytes())
-    except (ValueError, RecursionError):
-        stored = None
-    if not isinstance(stored, list) or not all(map(_is_table, stored)):
-        again = ("restore it, or run `", Call(command_of(run.kind)), "` again")
-        raise UserError("no tables as wristctl writes them", str(file), again)
-    return stored
-
-
-def _is_table(stored: object) -> bool:
-    """Whether a page can show it: a title, names of columns and rows of cells."""
-    if not isinstance(stored, dict) or not isinstance(stored.get("title"), str):
-        return False
-    columns, rows = stored.get("columns"), stored.get("rows")
-    if not isinstance(columns, list) or not isinstance(rows, list) or not all(isinstance(row, list) for row in rows):
-        return False
-    return not any(isinstance(cell, list | dict) for row in (columns, *rows) for cell in row)
+    shown = {name: _for_people(metric) for name, metric in run.metrics.items()}
+    return [(name, *(metric.get(key) for key in kept)) for name, metric in shown.items()]
 
 
 def _provenance(manifest: Manifest) -> list[tuple[str, str]]:

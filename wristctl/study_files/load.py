@@ -73,9 +73,16 @@ def read_study(
     if note:
         former.note()
     try:
-        return Study.model_validate(data, by_alias=True, by_name=False), origins
+        study = Study.model_validate(data, by_alias=True, by_name=False)
     except ValidationError as error:
         raise explained(error, origins) from error
+    if _is_override(origins, "controller") and not _is_override(origins, "gains"):
+        study.simulate.model_fields_set.discard("gains")  # the file's are for its own controller
+    return study, origins
+
+
+def _is_override(origins: Mapping[KeyPath, Phrase], leaf: str) -> bool:
+    return any(path[:2] == ("simulate", leaf) and isinstance(origin, Setting) for path, origin in origins.items())
 
 
 def _merge_file(

@@ -149,7 +149,7 @@ def table(
 ) -> None:
     """Print the tables of a run: all that the command printed or kept back."""
     from wristctl.commands.printed_table import Table, latex_table
-    from wristctl.plotting.page import tables
+    from wristctl.plotting.page_tables import tables
 
     run = open_run(ref, out)
     run_tables = [Table(content["title"], content["columns"], content["rows"]) for content in tables(run)]

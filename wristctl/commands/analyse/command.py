@@ -110,8 +110,11 @@ def plan(study: Study, inputs: Inputs) -> str:
         looks_back(smooth(chosen.loop, settings.friction))
     law = controller(chosen.controller)
     if law.plain:
-        reason = f"{law.name} is plain Python, and only compiled laws can be linearised"
-        raise UserError(reason, "simulate.controller", "one that compiles (docs/your-own-controller.md)")
+        reason = f"{law.name} is plain Python, and only compiled controllers can be linearised"
+        fix = (
+            "leave out plain=True and write it so that it compiles (docs/lanes.md); simulate shows its answer to a step"
+        )
+        raise UserError(reason, "simulate.controller", fix)
     if settings.over not in ("loop", *law.gains):
         reason = f"{law.name} has no gain '{settings.over}' for a root locus"
         raise UserError(reason, "analyse.over", meant(settings.over, ["loop", *law.gains]))

@@ -87,7 +87,7 @@ def draw(findings: Findings, study: Study, results: list[ComparedRow], rankings:
 def _of_class(findings: Findings, ranking: Ranking, results: Sequence[ComparedRow]) -> None:
     """Errors and tensions over time of the best rows and of the paper's, on the motion that stands for the class."""
     from wristctl.commands.compare.class_figures import shown_rows, tension_rows
-    from wristctl.plotting.loop_figures import error_sizes, errors
+    from wristctl.plotting.loop_figures import error_sizes, errors, overlay
 
     later = partial(findings.figure, later=True)
     cell = _stands_for(ranking.of(results))
@@ -95,6 +95,8 @@ def _of_class(findings: Findings, ranking: Ranking, results: Sequence[ComparedRo
     shown = [by_label[row] for row in shown_rows(ranking) if row in by_label]
     courses = [result.simulation.trajectory for result in shown]
     slug, where = _slug(ranking.name), f"{condition(ranking)}: loop {cell[0]}, {cell[1]}"
+    caption = f"Angle and error of the best controllers and of the paper's, {where}"
+    findings.figure(f"overlay-{slug}", overlay, courses, where, later=ranking.jumps, caption=caption)
     caption = f"|theta - reference| of the best rows and of the paper's laws, {where}"
     later(f"error-over-time-{slug}", errors, courses, where, log=True, caption=caption)
     later(

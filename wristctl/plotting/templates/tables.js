@@ -1,10 +1,13 @@
 "use strict";
-// What is typed above a table leaves the rows that contain it.
+// What is typed above a table leaves the rows that contain all of its words.
 for (const typed of document.querySelectorAll(".filter input")) {
   const body = typed.parentElement.nextElementSibling.querySelector("tbody");
   typed.addEventListener("input", () => {
-    const wanted = typed.value.toLowerCase();
-    for (const row of body.rows) row.hidden = !row.textContent.toLowerCase().includes(wanted);
+    const words = typed.value.toLowerCase().split(/\s+/);
+    for (const row of body.rows) {
+      const text = row.textContent.toLowerCase();
+      row.hidden = !words.every(word => text.includes(word));
+    }
   });
 }
 // A click on a column's head sorts its table by it; a second one turns the order round.

@@ -7,7 +7,7 @@
   const play = document.getElementById("play"), slider = document.getElementById("instant");
   const clock = document.getElementById("clock"), speed = document.getElementById("speed");
   const groups = document.getElementById("group"), place = document.getElementById("wrists");
-  let panels = [], instant = 0, last = null;
+  let panels = [], instant = duration / 4, last = null;  // where a move shows, not all straight
 
   const element = (name, attributes) => {
     const made = document.createElementNS(SPACE, name);

@@ -1,0 +1,116 @@
+"""Numbers of a run's page: its tables, a comparison's in one, and angles in degrees."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Sequence
+from typing import Any
+
+from wristctl.errors import Call, UserError
+from wristctl.records.manifest import TABLES, command_of
+from wristctl.records.run import Run
+
+# Units of angles in files, and what people read.
+_DEGREES = {"rad": "deg", "rad s": "deg s"}
+_WHO = ("loop", "reference", "controller", "gains", "inverse")
+
+
+def in_degrees(value: Any, unit: str) -> tuple[Any, str]:
+    """A number and its unit for people: angles, and their integrals, in degrees."""
+    if unit not in _DEGREES:
+        return value, unit
+    is_number = isinstance(value, int | float) and not isinstance(value, bool)
+    return (math.degrees(value) if is_number else value), _DEGREES[unit]
+
+
+def tables(run: Run) -> list[dict[str, Any]]:
+    """The tables that a command printed or kept: title, columns and rows each."""
+    if not (run.path / TABLES).exists():
+        return []
+    file = run.file(TABLES)
+    try:
+        stored = json.loads(file.read_bytes())
+    except (ValueError, RecursionError):
+        stored = None
+    if not isinstance(stored, list) or not all(map(_is_table, stored)):
+        again = ("restore it, or run `", Call(command_of(run.kind)), "` again")
+        raise UserError("no tables as wristctl writes them", str(file), again)
+    return stored
+
+
+def shown_tables(run: Run) -> list[dict[str, Any]]:
+    """The tables for a page: angles in degrees, and those of a comparison's loops and motions in one."""
+    stored = tables(run)
+    if run.kind == "compare" and (run.path / "data/comparison.csv").is_file():
+        stored = _in_one(run, stored)
+    return [_readable(table) for table in stored]
+
+
+def _readable(table: dict[str, Any]) -> dict[str, Any]:
+    """The table with angles in degrees, of columns that say `[rad]` and of rows that have their unit in a column."""
+    heads, rows = [str(head) for head in table["columns"]], [list(row) for row in table["rows"]]
+    unit_at = heads.index("unit") if "unit" in heads else None
+    for at, head in enumerate(heads):
+        name, _, unit = head.removesuffix("]").rpartition("[")
+        if head.endswith("]") and unit in _DEGREES:
+            heads[at] = f"{name}[{_DEGREES[unit]}]"
+            for row in rows:
+                row[at] = in_degrees(row[at], unit)[0]
+    for row in rows:
+        if unit_at is not None and row[unit_at] in _DEGREES:
+            row[:] = [in_degrees(cell, row[unit_at])[0] for cell in row]
+            row[unit_at] = _DEGREES[row[unit_at]]
+    return table | {"columns": heads, "rows": rows}
+
+
+def _is_table(stored: object) -> bool:
+    """Whether a page can show it: a title, names of columns and rows of cells."""
+    if not isinstance(stored, dict) or not isinstance(stored.get("title"), str):
+        return False
+    columns, rows = stored.get("columns"), stored.get("rows")
+    if not isinstance(columns, list) or not isinstance(rows, list) or not all(isinstance(row, list) for row in rows):
+        return False
+    return not any(isinstance(cell, list | dict) for row in (columns, *rows) for cell in row)
+
+
+def _in_one(run: Run, stored: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
+    """The tables of a comparison, with one in place of those of each loop and motion: a row per row of its file."""
+    from wristctl.simulation.metrics import METRICS
+
+    frame = run.data("comparison")
+    titles = {
+        f"Loop {loop}, {motion}": (loop, motion) for loop, motion in zip(frame.loop, frame.reference, strict=True)
+    }
+    of_loops, others, verdicts = list[str](), list[dict[str, Any]](), dict[tuple[str, ...], str]()
+    for table in stored:
+        motion = titles.get(table["title"]) or titles.get(table["title"].rpartition(", medians of ")[0])
+        if motion is None:
+            others.append(table)
+            continue
+        of_loops.append(table["title"])
+        verdicts |= {(*motion, *map(str, row[:2])): str(row[-1]) for row in table["rows"] if len(row) > 2}
+    if not of_loops:
+        return list(stored)
+    shown = [name for name in frame.columns if name in METRICS and METRICS[name].heading and frame[name].notna().any()]
+    heads = [_head(name, in_degrees(None, METRICS[name].unit)[1]) for name in shown]
+    many = frame["inverse"].nunique() > 1
+    columns = ["loop", "motion", "controller", *["inverse"] * many, *heads, "verdict"]
+    rows = [
+        _row(entry, {name: METRICS[name].unit for name in shown}, many, verdicts)
+        for entry in frame.astype(dict.fromkeys(_WHO, str)).to_dict("records")
+    ]
+    return [{"title": "", "columns": columns, "rows": rows}, *others]
+
+
+def _row(entry: dict[Any, Any], units: dict[str, str], many: bool, verdicts: dict[tuple[str, ...], str]) -> list[Any]:
+    loop, motion, controller, gains, inverse = (entry[name] for name in _WHO)
+    label = f"{controller}/{gains}"
+    values = [in_degrees(float(entry[name]), unit)[0] for name, unit in units.items()]
+    verdict = verdicts.get((loop, motion, label, inverse)) or ("failed" if entry["failed"] else "ok")
+    return [loop, motion, label, *[inverse] * many, *values, verdict]
+
+
+def _head(name: str, unit: str) -> str:
+    words = "RMSE" if name == "rmse" else name.replace("_", " ")
+    return f"{words} [{unit}]" if unit and unit != "1" else words
