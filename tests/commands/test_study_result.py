@@ -20,7 +20,7 @@ from wristctl.commands.printed_table import Table
 from wristctl.commands.results import StudyResult
 from wristctl.commands.simulate.command import Simulated
 from wristctl.errors import UserError
-from wristctl.plotting.page import tables
+from wristctl.plotting.page_tables import tables
 
 
 def test_every_result_is_told_in_a_line_and_is_a_thing_of_its_own() -> None:
