@@ -28,7 +28,7 @@ _HEAVIEST, _BESIDE_A_BOX = 5, 3
 # Sample rate from which control is as good as continuous [kHz].
 _CONTINUOUS = 100.0
 _COUNTS = ("no", "one", "two", "three", "four", "five", "six", "seven", "eight", "nine")
-_MORE = "Every claim with its reason: add --all, or see report.html of the run. Words: docs/index.md."
+_MORE = "Every claim with its reason: add --all, or see report.html of the run. Words: docs/glossary.md."
 
 
 def answer_of(judged: Sequence[Judgement], strips: Sequence[Strip] = (), limit: float = math.inf) -> Answer:
