@@ -133,8 +133,8 @@ def page(found: list[Row], steps: list[tuple[int, str, float, float, float]]) ->
         "%), without anybody choosing substeps: where tendons are elastic a step is 1 ms at most (0.5 ms above "
         "50 kN/m), and tendons with their friction are evaluated, and linearised, at each of its stages. The other "
         f"{len(swinging)} swing, and are not compared: {sum(row.both_swing for row in swinging)} of them in both ways."
-        f" {len(wandering)} {'swings' if len(wandering) == 1 else 'swing'} by less, but so that no step, however small, "
-        "tells their RMSE."
+        f" {len(wandering)} {'swings' if len(wandering) == 1 else 'swing'} by less, but so that no step, however "
+        "small, tells their RMSE."
     )
     lines = [
         "# How accurate a simulated loop is",
