@@ -58,7 +58,7 @@ def test_wristctl_alone_shows_help_with_examples() -> None:
 
 
 def test_what_most_users_want_stands_in_front() -> None:
-    front = ["init", "simulate", "gen-data", "train", "tune", "compare", "identify", "hw-run", "runs"]
+    front = ["init", "simulate", "gen-data", "train", "tune", "compare", "recommend", "identify", "hw-run", "runs"]
     shown = _python("from wristctl.cli.app import main; main()").stdout
     places = [shown.index(f"│ {name} ") for name in front]
     assert places == sorted(places) and set(front) < set(COMMANDS)
