@@ -35,6 +35,11 @@ QUICKLY: dict[str, tuple[tuple[str, ...], ...]] = {
     "compare": ((*FAST, "--horizon", "0.5", "--set", "inverses=[none]", "--set", f"references=[{MOVE % 30}]"),),
     "study": (("scenarios/ideal", "--set", "controllers=[pd-ff]", "--set", f"budgets.small={BUDGET}"),),
     "hysteresis": (LOOPS,),
+    "recommend": ((
+        "--set", "controllers=[pid-ff]", "--set", "loop={plant_segments: 1, control_period: 5.0e-3}",
+        "--set", "draw={plant.stiffness: x0.7..1.3}", "--set", "draws=2", "--set", "validation=2", "--set", "tests=8",
+        "--set", "candidates=4", "--set", "iterations=1", "--set", "frequencies=[1.0]", "--set", "payloads=[0.2]",
+    ),),
     "audit": (("--set", f"claims=[{CLAIM}]", "--set", "horizon=0.1"),),
 }  # fmt: skip
 """The commands that need nothing but a study, or the run of one before them, and what makes them quick."""

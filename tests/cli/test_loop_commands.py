@@ -181,7 +181,7 @@ def test_repetitions_give_medians_with_intervals_in_tables_metrics_and_data(call
     code, out, _ = call("simulate", "--set", "horizon=0.3", *CAMERA, loop, "--set", "reference.duration=0.2")
     run = open_run("latest:simulate")
     every, known = run.data("repetitions"), run.metrics["rmse"]
-    assert code == 0 and "8 repetitions" in out and re.search(r"metric +median +95 % low +95 % high", out)
+    assert code == 0 and "8 repetitions" in out and re.search(r"figure +median +95 % interval", out)
     assert len(every) == 8 and every["rmse"].nunique() == 8
     assert known["value"] == pytest.approx(every["rmse"].median()) and known["n"] == 8
     low, high = known["interval"]
@@ -259,7 +259,11 @@ def test_simulate_exits_3_where_the_wrist_left_its_range_and_its_run_stands(call
     settings = ("simulate.controller=smc-tracking", "simulate.gains=camera", loop)
     code, out, err = call("simulate", *(part for each in settings for part in ("--set", each)))
     run = Run(Path(out.splitlines()[-1]))
-    assert code == 3 and "the wrist left its range at" in err and "FAILED: left its range at" in out
+    assert (
+        code == 3
+        and "the wrist left its range at" in err
+        and "fails: the wrist left its range at" in " ".join(out.split())
+    )
     assert run.state == "ok" and run.manifest.exit_code == 3 and run.problems() == []
     assert "FAILED: left its range at" in run.file("README.md").read_text()
 

@@ -74,7 +74,7 @@ def test_a_report_with_all_figures_shows_those_left_for_later(call: Call) -> Non
         (("figures", "latest:compare", "answre"), "did you mean 'answer'?"),
         (("figures", "latest:compare", "--width", "88"), "--width 88mm"),
         (("figures", "latest:compare", "--width", "8800mm"), "4 to 100 cm"),
-        (("table", "latest:compare", "-n", "9"), "1 to 5"),
+        (("table", "latest:compare", "-n", "9"), "1 to 6"),
         (("show", "latest:compare:smal"), "did you mean 'small'?"),
         (("show", "latest:tune"), "one of compare"),
         (("ls", "--columns", "id,rsme"), "unknown column 'rsme'"),

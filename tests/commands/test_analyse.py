@@ -180,7 +180,7 @@ def test_angles_count_toward_the_direction_and_a_sine_ends_at_its_farthest() -> 
 def test_a_law_that_bends_at_once_is_warned_of(caplog: pytest.LogCaptureFixture) -> None:
     with caplog.at_level(logging.WARNING):
         analyse("simulate={gains: printed, horizon: 0.1}", STRAIGHT)
-    assert "at 0 deg the law bends" in caplog.text
+    assert "at 0 deg the control law is not linear" in caplog.text
 
 
 def test_frames_that_never_repeat_are_warned_of(caplog: pytest.LogCaptureFixture) -> None:

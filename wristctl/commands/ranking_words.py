@@ -72,6 +72,7 @@ def winner(ranking: Ranking, rankings: Sequence[Ranking] = ()) -> int | None:
 
 
 def first_group(ranking: Ranking) -> list[str]:
+    """Labels of the best controllers, which cannot be told apart; none where nothing is ranked."""
     return [ranking.labels[row] for row in ranking.standing.groups[0]] if ranking.standing.groups else []
 
 
@@ -99,6 +100,7 @@ def called(label: str) -> str:
 
 
 def open_loop(label: str) -> bool:
+    """Whether a label is of the controller without feedback."""
     from wristctl.tuning.objective import YARDSTICK
 
     return label.split("/")[0] == YARDSTICK
