@@ -27,9 +27,10 @@ def answer_of(rankings: Sequence[Ranking], run: str = "") -> Answer | None:
         return None
     names = names_of(rankings)
     more = f"All figures of every controller: `--all`, or {run}/report.html." if run else "All figures: `.tables`."
+    unusable = do_not_use(rankings, names)
     notes = [
         (ties(rankings, names), ""),
-        (do_not_use(rankings, names), ""),
+        (unusable, "Some must not be used; which, and why: `--all`." if unusable else ""),
         (papers(rankings), ""),
         (certainty(rankings), ""),
         (f"Your own wrist: `wristctl compare controllers mywrist.yaml` (docs/your-own-wrist.md). {more}", more),
