@@ -1,6 +1,7 @@
 """What `recommend` finds: presets scaled to a wrist, its reach, and a controller that holds on every simulated rig."""
 
 import math
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -11,15 +12,17 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import wristctl
+from tests.commands.conftest import session
 from wristctl.commands.recommend.answer import RECOMMENDED, Recommended
-from wristctl.commands.recommend.command import FAMILY, reach_deg
+from wristctl.commands.recommend.command import FAMILY, _next_command, reach_deg
 from wristctl.config.loop import Loop, Reference
 from wristctl.config.study import Study
 from wristctl.config.wrist import WristParameters
 from wristctl.control.table import controller, gains_of
 from wristctl.errors import UserError
-from wristctl.simulation.cases import measure
+from wristctl.simulation.cases import Measured, measure
 from wristctl.simulation.drawn_worlds import drawn_cases
+from wristctl.simulation.oscillation import FASTEST
 from wristctl.simulation.reference import motion
 from wristctl.simulation.rollout import rollout
 from wristctl.tuning.scaled_presets import dynamic_stiffness, scaled_to
@@ -154,3 +157,63 @@ def test_swings_are_seen_while_the_reference_moves_beside_those_without_feedback
     wild = measured_on(cases, "ct-dob", {"w": 120.0, "zeta": 0.3, "wo": 1000.0})
     assert not calm.swings_beside(open_loop).any()
     assert wild.swings_beside(open_loop).all() and wild.largest_swing(open_loop) > math.radians(0.5)
+
+
+def test_the_size_of_a_swing_is_of_what_swings_and_not_of_what_chatters() -> None:
+    """Of four cases one chatters at rest, one swings at rest, and of two in motion one swings beside feedforward."""
+
+    def measured(oscillation: list[float], chattering: list[float]) -> Measured:
+        metrics = {"oscillation": [oscillation], "chattering": [chattering], "drift": [[0.0] * 4]}
+        arrays = {name: np.array(values) for name, values in metrics.items()}
+        rests = np.array([True, True, False, False])
+        return Measured(arrays, np.zeros((1, 4), bool), np.ones((1, 4)), rests, WRIST.tension_range)
+
+    slams = 4.0 * WRIST.tension_range * 2.0 * FASTEST
+    own = measured([1e-5, 3e-3, 9e-3, 5e-3], [slams, 0.0, 0.0, 0.0])
+    open_loop = measured([0.0, 0.0, 5e-3, 1e-3], [0.0] * 4)
+    assert own.swings_beside(open_loop).tolist() == [[True, True, False, True]]
+    assert own.largest_swing(open_loop) == 5e-3, "9e-3 rad are less than twice what feedforward shows there"
+    chatters = measured([1e-5, 0.0, 0.0, 0.0], [slams, 0.0, 0.0, 0.0])
+    assert chatters.swings_beside(open_loop).any() and chatters.largest_swing(open_loop) == 0.0
+
+
+OWN = """
+from wristctl.control.law import Controller, Gain
+from wristctl.control.model import inverse_dynamics
+def law(now, wrist, gains, memory):
+    forward = inverse_dynamics(wrist, now.theta_ref, now.rate_ref, now.acceleration_ref)
+    return forward - gains.k * (now.theta - now.theta_ref) - gains.d * (now.rate - now.rate_ref)
+GAINS = {"k": Gain("N m/rad", "spring", 0.1, 4.0), "d": Gain("N m s/rad", "damper", 1e-2, 0.08)}
+MINE = Controller("mine", law, "", GAINS, {"soft": {"k": 2.0, "d": 0.05}})
+"""
+
+
+def test_a_controller_of_ones_own_is_recommended_by_the_runs_copy_of_it(tmp_path: Path) -> None:
+    (tmp_path / "own.py").write_text(OWN)
+    place = f"{tmp_path / 'own.py'}:MINE"
+    done = wristctl.recommend(study_of(f"recommend.controllers=[{place}]"), out=tmp_path)
+    assert done.run is not None and done.best is not None and done.best.controller == "mine"
+    assert "own.py:MINE" in done.run.file("config.yaml").read_text()
+    again = wristctl.load_study(done.run.file(RECOMMENDED), trust_code=True)
+    copy = done.run.path / "code" / "own" / "own.py"
+    assert again.hw_run.rows[0].controller == again.simulate.controller and copy.read_text() == OWN
+    assert Path(again.simulate.controller.rpartition(":")[0]).resolve() == copy.resolve()
+    assert not wristctl.simulate(again).failed
+
+
+def test_where_no_feedback_is_better_than_none_that_is_the_reason_and_not_that_all_swing() -> None:
+    """The same rows in three other orders: feedforward alone first, nothing ranked, and feedforward in a tie."""
+    found = done = wristctl.recommend(study_of("recommend.controllers=[pid-ff]"))
+    ranked = replace(done.ranking, standing=done.ranking.standing._replace(groups=[[len(done.candidates) - 1], [0]]))
+    behind = replace(found, ranking=ranked)
+    assert behind.best is None and behind.fault is not None and "feedforward" in behind.fault.what
+    nothing = replace(found, ranking=replace(ranked, standing=ranked.standing._replace(groups=[])))
+    assert nothing.best is None and nothing.fault is not None and "swings" in nothing.fault.what
+    tied = replace(ranked, standing=ranked.standing._replace(groups=[[len(done.candidates) - 1, 0]]))
+    assert replace(found, ranking=tied).best == done.candidates[0]
+
+
+def test_the_next_command_is_of_the_wrist_and_not_of_the_recommendation() -> None:
+    typed = ("my wrist.yaml", "--set", "recommend.draws=2", "--set", "wrist.length=0.1", "--set", "recommend.tests=8")
+    told = _next_command(replace(session(study_of()), typed=typed))
+    assert told == f"wristctl hw-run 'my wrist.yaml' --set wrist.length=0.1 {RECOMMENDED}"

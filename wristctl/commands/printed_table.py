@@ -135,6 +135,11 @@ def in_lines(text: str, columns: int = COLUMNS, most: int | None = None, indent:
     )  # fmt: skip
 
 
+def joined(words: Sequence[str], last: str = "and") -> str:
+    """Words as a list in a sentence: a, b and c."""
+    return f"{', '.join(words[:-1])} {last} {words[-1]}" if len(words) > 1 else "".join(words)
+
+
 def two(value: float, digits: int = 2) -> str:
     """A number to two digits (or so many), as short as it goes: 15000, 0.012, 3.1e-5."""
     shown = f"{value:.{digits}g}"

@@ -241,6 +241,11 @@ class StudyResult(ABC):
         return None
 
     @property
+    def place(self) -> str:
+        """Path of the run directory; empty where the result is in memory only."""
+        return str(self.findings.run.path) if self.findings.run else ""
+
+    @cached_property
     def summary(self) -> Sequence[str]:
         """The answer in lines of at most 100 columns; empty where the tables are the answer."""
         return self.answer.lines() if self.answer is not None else ()
@@ -249,11 +254,6 @@ class StudyResult(ABC):
     def marks(self) -> list[str]:
         """Why a result is no good, in a word or two each: the verdict on the run's page; empty where it is sound."""
         return []
-
-    @property
-    def remark(self) -> bool:
-        """Whether the summary only introduces the tables, which are printed all the same."""
-        return False
 
     @property
     def metrics(self) -> Metrics:
@@ -283,8 +283,7 @@ class StudyResult(ABC):
         return "\n\n".join([*["\n".join(self.summary)] * bool(self.summary), *(table.text() for table in self.tables)])
 
     def __repr__(self) -> str:
-        where = str(self.findings.run.path) if self.findings.run else "in memory"
-        return f"<{type(self).__name__}: {where}; {len(self.metrics)} metrics; {self.figures!r}>"
+        return f"<{type(self).__name__}: {self.place or 'in memory'}; {len(self.metrics)} metrics; {self.figures!r}>"
 
 
 def _png(figure: Figure) -> str:

@@ -96,14 +96,17 @@ class Measured:
         On a moving reference friction's kinks look like swings: what feedforward shows on the same case, which cannot
         swing by itself, is allowed twice, and LIMIT_CYCLE beyond that.
         """
-        allowed = LIMIT_CYCLE + 2.0 * np.nan_to_num(without_feedback.metrics["oscillation"])
-        moving: NDArray[np.bool_] = (self.metrics["oscillation"] > allowed) & ~self.rests
-        return self.swings | moving
+        return self.swings | self._swings_in_motion(without_feedback)
 
     def largest_swing(self, without_feedback: Measured) -> float:
-        """Largest oscillation [rad] where it swings (`swings_beside`); 0 where it never does."""
-        swings = np.nan_to_num(self.metrics["oscillation"]) * self.swings_beside(without_feedback)
-        return float(swings.max())
+        """Largest oscillation [rad] where it swings, at rest or in motion as `swings_beside` has it; else 0."""
+        swinging = self.limit_cycles | self._swings_in_motion(without_feedback)
+        return float((np.nan_to_num(self.metrics["oscillation"]) * swinging).max())
+
+    def _swings_in_motion(self, without_feedback: Measured) -> NDArray[np.bool_]:
+        allowed = LIMIT_CYCLE + 2.0 * np.nan_to_num(without_feedback.metrics["oscillation"])
+        moving: NDArray[np.bool_] = (self.metrics["oscillation"] > allowed) & ~self.rests
+        return moving
 
     def of_motions(self, chosen: Sequence[int], motions: int) -> Measured:
         """Results of the `chosen` motions, of the cases of worlds with so many `motions` each."""

@@ -28,7 +28,8 @@ class _Part(list[Entry]):
 
 _SHARED = ("seed", "wrist")
 _OWN = "controller-settings"
-_READ: dict[str, tuple[str, ...]] = {"train": ("gen-data",), "simulate": (_OWN, "sweep"), "hw-run": (_OWN,)}
+_READ: dict[str, tuple[str, ...]] = {"train": ("gen-data",), "simulate": (_OWN, "sweep")}
+_READ |= dict.fromkeys(("hw-run", "recommend"), (_OWN,))
 _READ |= dict.fromkeys(("tune", "compare"), ("families", _OWN, "sweep")) | {"study": ("families", _OWN)}
 _READ |= {command: (subject, _OWN) for command, subject in SUBJECTS.items()}
 """Sections that a command reads beside its own: without a data run, train draws what gen-data would."""

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
 from wristctl.commands.answer import Answer
-from wristctl.commands.printed_table import Table, degrees, two
+from wristctl.commands.printed_table import Table, degrees, joined, two
 from wristctl.commands.results import StudyResult
 from wristctl.errors import UserError
 
@@ -72,20 +72,30 @@ class Recommended(StudyResult):
 
     @property
     def best(self) -> Candidate | None:
-        """Recommended controller and gains; None where no candidate can be relied on."""
+        """Recommended controller and gains; None where none with feedback is among the best that hold on every rig."""
+        return None if self.best_row is None else self.candidates[self.best_row]
+
+    @property
+    def best_row(self) -> int | None:
+        """Its number among the candidates and the ranking's rows."""
         groups = self.ranking.standing.groups
-        first = self.candidates[groups[0][0]] if groups else self.candidates[-1]
-        return first if first.gains else None
+        return next((row for row in groups[0] if self.candidates[row].gains), None) if groups else None
+
+    @property
+    def why_none(self) -> str:
+        """Reason for which nothing is recommended."""
+        sound = [row for group in self.ranking.standing.groups for row in group if self.candidates[row].gains]
+        if sound:
+            return "no controller with feedback that holds on every rig errs less than feedforward"
+        return "every controller with feedback fails, swings or chatters on some rig"
 
     @property
     def fault(self) -> UserError | None:
         """Error where nothing can be recommended; None where something is."""
         if self.best is not None:
             return None
-        where = str(self.findings.run.path) if self.findings.run else ""
-        reason = "no controller with feedback can be relied on for this wrist on this rig"
         fix = "a stiffer drive, a faster camera or slower motions (recommend.loop, recommend.references)"
-        return UserError(reason, where, fix, exit_code=3)
+        return UserError(f"nothing to recommend: {self.why_none}", self.place, fix, exit_code=3)
 
     @property
     def marks(self) -> list[str]:
@@ -101,23 +111,23 @@ class Recommended(StudyResult):
     @property
     def answer(self) -> Answer:
         """What to run, what error to expect, what not to use, and the limits."""
-        return Answer(_sentence(self), _table(self), _notes(self), f"The gains are in {RECOMMENDED} of the run.")
+        gains = "" if self.best is None else f"The gains are in {RECOMMENDED} of the run. "
+        return Answer(_sentence(self), _table(self), _notes(self), f"{gains}Every rig: data/rigs.csv.")
 
 
 def _sentence(result: Recommended) -> str:
-    best, ranked = result.best, result.ranking
-    if best is None:
-        return "Nothing can be recommended: every controller with feedback fails, swings or chatters on some rig."
-    row = ranked.rows[ranked.standing.groups[0][0]]
-    low, median, high = spread(row.rmse)
+    best, ranked, row = result.best, result.ranking, result.best_row
+    if best is None or row is None:
+        return f"Nothing can be recommended: {result.why_none}."
+    low, median, high = spread(ranked.rows[row].rmse)
     values = ", ".join(_gain(best, name) for name in best.gains)
-    ratio = ranked.gains[ranked.standing.groups[0][0]].value
     sentence = (
         f"Use {best.controller} with {values}. Expect an error of {degrees(median)} deg RMSE ({degrees(low)} to "
-        f"{degrees(high)} deg on 8 of 10 simulated rigs), {two(ratio)} times less than without feedback."
+        f"{degrees(high)} deg on 8 of 10 simulated rigs), {two(ranked.gains[row].value)} times less than "
+        "without feedback."
     )
-    alike = [result.candidates[k].label for k in ranked.standing.groups[0][1:] if result.candidates[k].gains]
-    return f"{sentence} It cannot be told apart from {', '.join(alike)}." if alike else sentence
+    alike = [result.candidates[other].label for other in ranked.standing.groups[0] if other != row]
+    return f"{sentence} It cannot be told apart from {joined(alike)}." if alike else sentence
 
 
 def _gain(candidate: Candidate, name: str) -> str:

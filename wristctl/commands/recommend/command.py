@@ -23,6 +23,7 @@ from wristctl.errors import UserError, under
 
 if TYPE_CHECKING:
     from wristctl.comparison.world_ranking import WorldRanking
+    from wristctl.control.law import Controller
     from wristctl.simulation.cases import Measured
     from wristctl.tuning.search import Search
 
@@ -93,7 +94,9 @@ def plan(study: Study, inputs: Inputs) -> str:
 
 def recommend(session: Session) -> Recommended:
     """Scale presets to the wrist, tune each controller shortly, test all on rigs that no search has seen."""
+    from wristctl.control.table import controller
     from wristctl.simulation.drawn_worlds import streams_of
+    from wristctl.tuning.scaled_presets import scaled_to
 
     study, findings = identified(session.study, "recommend", session.inputs), session.findings
     settings, reach = study.recommend, reach_deg(study)
@@ -102,29 +105,21 @@ def recommend(session: Session) -> Recommended:
     family = settings.family(reach)
     for split in ("tune", "validation", "test"):
         findings.note_streams(streams_of(family, FAMILY, split))
-    searches = _searches(session, study, family)
-    candidates = _candidates(study, searches)
+    scaled = [scaled_to(study.wrist, controller(name)) for name in settings.controllers]
+    searches = _searches(session, study, family, scaled)
+    candidates = _candidates(scaled, searches)
     ranking = _tested(session, study, family, candidates)
     result = Recommended(session.study, findings, [], reach, candidates, ranking, searches, [], [], "")
     if result.best is None:
         return _recorded(result)
     with session.progress("how fast and how heavy"):
-        motions = _limits(study, result.best, [_sines(family, reach, value) for value in settings.frequencies])
-        payloads = _limits(study, result.best, [_laden(family, mass) for mass in settings.payloads])
-    return _recorded(
-        replace(
-            result,
-            motions=[limit._replace(value=value) for limit, value in zip(motions, settings.frequencies, strict=True)],
-            payloads=[limit._replace(value=value) for limit, value in zip(payloads, settings.payloads, strict=True)],
-            next_command=_next_command(session),
-        )
-    )
+        motions = [_limit(study, result.best, rate, _sines(family, reach, rate)) for rate in settings.frequencies]
+        payloads = [_limit(study, result.best, mass, _laden(family, mass)) for mass in settings.payloads]
+    return _recorded(replace(result, motions=motions, payloads=payloads, next_command=_next_command(session)))
 
 
-def _searches(session: Session, study: Study, family: Family) -> dict[str, Search]:
-    from wristctl.control.table import controller
+def _searches(session: Session, study: Study, family: Family, scaled: Sequence[Controller]) -> dict[str, Search]:
     from wristctl.tuning.objective import Judge
-    from wristctl.tuning.scaled_presets import scaled_to
     from wristctl.tuning.search import search, tuning_cases
 
     settings = study.recommend
@@ -141,29 +136,22 @@ def _searches(session: Session, study: Study, family: Family) -> dict[str, Searc
     )  # fmt: skip
     judges = [Judge(cases, study.wrist, tuning.tune.objective) for cases in tuning_cases(tuning)]
     searches = {}
-    with session.progress("tuning", total=len(settings.controllers), unit="controllers") as advance:
-        for number, name in enumerate(settings.controllers, start=1):
-            law = scaled_to(study.wrist, controller(name))
-            searches[name] = search(tuning, law, session.findings.stream, (judges[0], judges[1]))
+    with session.progress("tuning", total=len(scaled), unit="controllers") as advance:
+        for number, law in enumerate(scaled, start=1):
+            searches[law.name] = search(tuning, law, session.findings.stream, (judges[0], judges[1]))
             advance(number)
     return searches
 
 
-def _candidates(study: Study, searches: Mapping[str, Search]) -> list[Candidate]:
-    """What is tested: of each controller its tuned gains and its scaled preset where that is another; feedforward."""
-    from wristctl.control.table import controller
+def _candidates(scaled: Sequence[Controller], searches: Mapping[str, Search]) -> list[Candidate]:
+    """What is tested: of each controller its scaled preset and its tuned gains where these are others; feedforward."""
     from wristctl.tuning.objective import YARDSTICK
-    from wristctl.tuning.scaled_presets import scaled_to
 
     candidates = []
-    for name, found in searches.items():
-        presets = list(scaled_to(study.wrist, controller(name)).presets.values())
-        tuned = Candidate(name, TUNED, dict(found.gains))
-        if presets and dict(presets[-1]) != tuned.gains:
-            candidates.append(Candidate(name, SCALED, dict(presets[-1])))
-        elif presets:
-            tuned = tuned._replace(origin=SCALED)
-        candidates.append(tuned)
+    for law, found in zip(scaled, searches.values(), strict=True):
+        preset = dict(list(law.presets.values())[-1]) if law.presets else {}
+        candidates += [Candidate(law.name, SCALED, preset)] * bool(preset)
+        candidates += [Candidate(law.name, TUNED, dict(found.gains))] * (found.gains != preset)
     return [*candidates, Candidate(YARDSTICK, "", {})]
 
 
@@ -211,8 +199,8 @@ def _laden(family: Family, mass: float) -> Family:
     return family.model_copy(update={"draw": draw, "loop": family.loop.model_copy(update={"plant": plant})})
 
 
-def _limits(study: Study, best: Candidate, families: Sequence[Family]) -> list[Limit]:
-    """How the recommended gains do on each of the families; the values are left open."""
+def _limit(study: Study, best: Candidate, value: float, family: Family) -> Limit:
+    """How the recommended gains do on a family of which one thing has this value."""
     import numpy as np
 
     from wristctl.control.table import controller
@@ -220,24 +208,23 @@ def _limits(study: Study, best: Candidate, families: Sequence[Family]) -> list[L
     from wristctl.simulation.drawn_worlds import drawn_cases
     from wristctl.tuning.objective import YARDSTICK
 
-    limits = []
-    for family in families:
-        cases = drawn_cases(family, FAMILY, "test", study.seed, _RIGS_AT_LIMITS, study.wrist)
-
-        own, open_loop = (
-            measure(controller(name), np.array([list(gains.values())]), cases, study.wrist, ["rmse", "oscillation"])
-            for name, gains in ((best.controller, best.gains), (YARDSTICK, {}))
-        )
-        lost = (own.failed | own.swings_beside(open_loop)).reshape(_RIGS_AT_LIMITS, -1).any(axis=1)
-        error, swing = float(np.nanmedian(own.metrics["rmse"])), own.largest_swing(open_loop)
-        limits.append(Limit(math.nan, _RIGS_AT_LIMITS, int(lost.sum()), error, swing))
-    return limits
+    cases = drawn_cases(family, FAMILY, "test", study.seed, _RIGS_AT_LIMITS, study.wrist)
+    own, open_loop = (
+        measure(controller(name), np.array([list(gains.values())]), cases, study.wrist, ["rmse", "oscillation"])
+        for name, gains in ((best.controller, best.gains), (YARDSTICK, {}))
+    )
+    lost = (own.failed | own.swings_beside(open_loop)).reshape(_RIGS_AT_LIMITS, -1).any(axis=1)
+    error = float(np.nanmedian(own.metrics["rmse"]))
+    return Limit(value, _RIGS_AT_LIMITS, int(lost.sum()), error, own.largest_swing(open_loop))
 
 
 def _next_command(session: Session) -> str:
-    run = session.findings.run
-    folder = str(run.path / RECOMMENDED) if run else RECOMMENDED
-    return shlex.join(["wristctl", "hw-run", *session.typed, folder])
+    """The trial of what is recommended, on the wrist as it was typed; settings of the recommendation are none of it."""
+    run, typed = session.findings.run, list(session.typed)
+    while "--set" in typed and any(word.startswith("recommend.") for word in typed):
+        place = next(k for k, word in enumerate(typed) if word.startswith("recommend.") and typed[k - 1] == "--set")
+        del typed[place - 1 : place + 1]
+    return shlex.join(["wristctl", "hw-run", *typed, str(run.path / RECOMMENDED) if run else RECOMMENDED])
 
 
 def _recorded(result: Recommended) -> Recommended:
@@ -252,23 +239,29 @@ def _recorded(result: Recommended) -> Recommended:
     caption = "Error of each controller over the simulated rigs: median, 8 of 10 rigs, and each rig"
     findings.figure("errors", errors, result, caption=caption)
     findings.overview.figure = "errors"
-    if best is None:
+    if best is None or result.best_row is None:
         return result
-    row = ranked.rows[ranked.standing.groups[0][0]]
-    low, median, high = spread(row.rmse)
+    low, median, high = spread(ranked.rows[result.best_row].rmse)
     meaning = f"RMSE of {best.label} on a simulated rig"
     findings.metric("rmse", median, "rad", "lower", ranked.count, meaning=f"{meaning}: median")
     findings.metric("rmse_low", low, "rad", "lower", ranked.count, meaning=f"{meaning}: 1 of 10 stay below")
     findings.metric("rmse_high", high, "rad", "lower", ranked.count, meaning=f"{meaning}: 9 of 10 stay below")
     findings.headline("rmse", "rmse_low", "rmse_high", "reach_deg")
     findings.figure("limits", limits, result, caption="Error and lost rigs over frequency and over payload")
-    _write_gains(findings, best)
+    _write_gains(findings, best, result.candidates)
     return result
 
 
-def _write_gains(findings: Findings, best: Candidate) -> None:
-    gains = ", ".join(f"{name}: {value:.6g}" for name, value in best.gains.items())
-    row = f"{{controller: {best.controller}, gains: {{{gains}}}}}"
+def _write_gains(findings: Findings, best: Candidate, candidates: Sequence[Candidate]) -> None:
+    """A study file with the recommended controller, for `simulate` and `hw-run`; one of one's own is the run's copy."""
+    from wristctl.control.table import CONTROLLERS
+    from wristctl.records.copied_inputs import sealed_references
+
+    origins = [CONTROLLERS.origin(name) for name in dict.fromkeys(one.controller for one in candidates)]
+    copies, origin = sealed_references([one for one in origins if one]), CONTROLLERS.origin(best.controller)
+    name = f'"../{copies[origin.reference]}"' if origin else best.controller
+    gains = ", ".join(f"{gain}: {value:.6g}" for gain, value in best.gains.items())
+    row = f"{{controller: {name}, gains: {{{gains}}}}}"
     head = f"# {best.label}, as `wristctl recommend` found it. After a wrist's file: wristctl hw-run WRIST.yaml THIS"
     findings.text(RECOMMENDED, f"{head}\nsimulate: {row}\nhw-run:\n  controllers:\n    - {row}\n")
 

@@ -10,6 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import FormatStrFormatter, LogLocator, NullFormatter
 
+from wristctl.commands.recommend.answer import spread
 from wristctl.plotting.style import BLUE, GREY, VERMILLION, figure
 
 if TYPE_CHECKING:
@@ -28,7 +29,7 @@ def errors(result: Recommended) -> Figure:
         unreliable = k in ranked.standing.unreliable
         shade = GREY if unreliable or not result.candidates[k].gains else BLUE
         axes.plot(sizes, place + jitter, ".", color=shade, markersize=2.5, alpha=0.5)
-        low, median, high = np.nanpercentile(sizes, (10.0, 50.0, 90.0))
+        low, median, high = np.degrees(spread(ranked.rows[k].rmse))
         axes.plot([low, high], [place, place], color=shade, linewidth=2.0)
         axes.plot(
             [median], [place], "x" if unreliable else "o", color=VERMILLION if unreliable else shade, markersize=6
