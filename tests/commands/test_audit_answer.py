@@ -10,8 +10,8 @@ from typing import Any
 import pandas as pd
 import pytest
 
-from wristctl.commands.answer import Answer
-from wristctl.commands.audit.answer import LINES, answer_of
+from wristctl.commands.answer import LINES, Answer
+from wristctl.commands.audit.answer import answer_of
 from wristctl.commands.printed_table import COLUMNS
 from wristctl.comparison.claims import Grounds, LoopCondition, Metrics, judge_all
 from wristctl.comparison.paper import T2

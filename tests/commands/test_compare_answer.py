@@ -10,9 +10,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from wristctl.commands.answer import LINES
 from wristctl.commands.compare.answer import answer_of
 from wristctl.commands.printed_table import COLUMNS, two
-from wristctl.commands.ranking_answer import LINES, ranking_table
+from wristctl.commands.ranking_answer import ranking_table
 from wristctl.commands.ranking_tables import answer_tables
 from wristctl.commands.ranking_words import condition, names_of, winner
 from wristctl.comparison.combinations import CLASSES

@@ -121,6 +121,6 @@ def _perform(
                 remark += f"; go on: wristctl {procedure.kind} --resume {run.id}"
             console.print(f"interrupted{remark}", **PLAIN)
             raise
-    print_result(run.path, outcome.tables, options.as_json, outcome.summary, options.all_ or outcome.remark)
+    print_result(run.path, outcome.tables, options.as_json, outcome.summary, options.all_)
     if outcome.fault is not None:
         raise outcome.fault

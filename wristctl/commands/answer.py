@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from wristctl.commands.printed_table import COLUMNS, Table, in_lines
 
 # Lines of a terminal that an answer may take.
-LINES = 24
+LINES = 32
 
 
 @dataclass(frozen=True)

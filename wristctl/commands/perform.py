@@ -152,7 +152,8 @@ def perform(
             findings.keep_overview()
     run.console(str(result))
     run.summary(_summary(result, findings.overview), first=bool(result.summary))
-    answered = [result.answer.table] if result.answer is not None and result.answer.table is not None else []
+    answer = result.answer
+    answered = [answer.table] if answer is not None and answer.table is not None else []
     content = json.dumps(plain_tables([*answered, *result.tables]), indent=2, allow_nan=False)
     run.file(TABLES).write_text(content + "\n", encoding="utf-8")
     if result.fault is not None:

@@ -6,6 +6,7 @@ import logging
 from typing import TYPE_CHECKING, Any
 
 from wristctl.commands.procedure import Procedure
+from wristctl.commands.progress import duration
 from wristctl.config.study import Study
 from wristctl.errors import UserError
 
@@ -45,12 +46,12 @@ def _cost(procedure: Procedure[Any], study: Study, law: Controller) -> str:
     middle = tuple((gain.low * gain.high) ** 0.5 for gain in law.gains.values())
     try:
         seconds = 1e-6 * step_time(law, gains[-1] if gains else middle, study.wrist).median * ticks
-        duration = f"take about {_duration(seconds)}"
+        time = f"take about {duration(max(1.0, seconds))}"
     except UserError:  # the run that comes fails of it, and keeps what it said
-        duration = "take a time that is not known, for it fails when it is timed"
+        time = "take a time that is not known, for it fails when it is timed"
     cases = f"{size.rollouts:.0f} case{'s' * (size.rollouts > 1)}"
     remark = f"left out on {', '.join(left_out)} (a tick below {LEAST_PLAIN_PERIOD:g} s); " if left_out else ""
-    return f"{remark}{cases} {duration}"
+    return f"{remark}{cases} {time}"
 
 
 def _alone(command: str, study: Study, law: Controller) -> tuple[Study, list[str]]:
@@ -69,9 +70,3 @@ def _alone(command: str, study: Study, law: Controller) -> tuple[Study, list[str
     rows = tuple(row for row in settings.rows if row.controller == law.name)
     alone = settings.model_copy(update={"rows": rows, "loops": loops})
     return study.model_copy(update={"compare": alone}), [name for name in settings.loops if name not in loops]
-
-
-def _duration(seconds: float) -> str:
-    if seconds < 100.0:
-        return f"{max(1.0, seconds):.0f} s"
-    return f"{seconds / 60.0:.0f} min" if seconds < 6000.0 else f"{seconds / 3600.0:.1f} h"

@@ -11,8 +11,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from wristctl.commands.answer import Answer
-from wristctl.commands.printed_table import Table, degrees, two
+from wristctl.commands.answer import LINES, Answer
+from wristctl.commands.printed_table import Table, degrees, joined, two
 from wristctl.commands.ranking_words import (
     called,
     condition,
@@ -22,7 +22,6 @@ from wristctl.commands.ranking_words import (
     facts,
     first_group,
     interval,
-    joined,
     open_loop,
     rig_whole,
     winner,
@@ -30,9 +29,6 @@ from wristctl.commands.ranking_words import (
 
 if TYPE_CHECKING:
     from wristctl.comparison.controller_ranking import Ranking
-
-# Lines of a terminal that an answer of rankings may take.
-LINES = 32
 
 
 def advice(rankings: Sequence[Ranking]) -> str:

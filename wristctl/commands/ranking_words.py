@@ -76,11 +76,6 @@ def first_group(ranking: Ranking) -> list[str]:
     return [ranking.labels[row] for row in ranking.standing.groups[0]] if ranking.standing.groups else []
 
 
-def joined(words: Sequence[str], last: str = "and") -> str:
-    """a, b and c."""
-    return f"{', '.join(words[:-1])} {last} {words[-1]}" if len(words) > 1 else "".join(words)
-
-
 def error(ranking: Ranking, row: int) -> str:
     """Geometric mean of a row's RMSE [deg]."""
     return degrees(ranking.means[row].value)

@@ -21,7 +21,7 @@ LOOPS = {"default": "four-segments"}
 FOLDERS = {"experiments/laws": "experiments/own_controllers"}
 
 
-def key_today(path: tuple[str, ...]) -> tuple[str, ...]:
+def key_today(path: tuple[str | int, ...]) -> tuple[str | int, ...]:
     """A key path with its beginning as it is called today."""
     for before, today in KEYS.items():
         if path[: len(before)] == before:

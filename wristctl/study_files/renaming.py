@@ -42,7 +42,7 @@ class NewNames:
 
 def with_keys_of_today(document: Document, place: Phrase, found: NewNames) -> Document:
     """The document with every key by its name of today."""
-    data, lines = document.data, {_today(path): line for path, line in document.lines.items()}
+    data, lines = document.data, {former_names.key_today(path): line for path, line in document.lines.items()}
     if not isinstance(data, dict):
         return document
     for before, today in former_names.KEYS.items():
@@ -56,14 +56,6 @@ def with_keys_of_today(document: Document, place: Phrase, found: NewNames) -> Do
         line = lines.get(today)
         found.add(".".join(before), ".".join(today), f"{worded(place)}:{line}" if line else place)
     return Document(data, lines)
-
-
-def _today(path: KeyPath) -> KeyPath:
-    beginning = tuple(map(str, path[:2]))
-    for before, today in former_names.KEYS.items():
-        if beginning[: len(before)] == before:
-            return (*today, *path[len(before) :])
-    return path
 
 
 def with_loops_of_today(data: dict[str, Any], origins: dict[KeyPath, Phrase], found: NewNames) -> None:

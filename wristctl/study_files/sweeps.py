@@ -53,7 +53,7 @@ def axes_of(study: Study, command: str) -> list[SweepAxis]:
         key, equals, values = text.partition("=")
         if not equals or not key.strip() or not values.strip():
             raise UserError("a sweep is KEY=VALUES", Argument("sweep", text), _EXAMPLE)
-        name = ".".join(key_today(tuple(whole_key(key.strip(), command).split("."))))
+        name = ".".join(map(str, key_today(tuple(whole_key(key.strip(), command).split(".")))))
         if name in [axis.key for axis in axes]:
             raise UserError(f"{name} is swept twice", Argument("sweep", text), "give all its values at once")
         counted.append((text, *_count(text, values)))

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, Literal, NamedTuple
 
 from wristctl.commands.answer import Answer
-from wristctl.commands.printed_table import Table, number
+from wristctl.commands.printed_table import Table, joined, number
 from wristctl.commands.results import Findings
 
 if TYPE_CHECKING:
@@ -36,8 +36,7 @@ def decibels(factor: float) -> float:
 def listed(angles: Iterable[float]) -> str:
     """Angles [deg] as text: 0, 15 and 30 deg."""
     texts = [f"{round(angle, 6):g}" for angle in angles]
-    *earlier, last = texts
-    return f"{', '.join(earlier)} and {last} deg" if earlier else f"{last} deg"
+    return f"{joined(texts)} deg"
 
 
 def answer(label: str, analyses: Sequence[LoopAnalysis], angles: Sequence[float]) -> str:

@@ -83,9 +83,8 @@ class Analysed(StudyResult):
         bad = [angle for angle, analysis in zip(self.angles, self.found, strict=True) if not analysis.margins.stable]
         if not bad:
             return None
-        where = str(self.findings.run.path) if self.findings.run else ""
         fix = "look at the figures; try other gains, or a shorter control_period"
-        return UserError(f"the loop is unstable at {listed(bad)}", where, fix, exit_code=3)
+        return UserError(f"the loop is unstable at {listed(bad)}", self.place, fix, exit_code=3)
 
     def frame(self) -> pd.DataFrame:
         """Margins and step, a row per resting angle [deg]; SI units, phase margins in rad, inf: no limit."""

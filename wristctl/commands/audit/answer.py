@@ -10,7 +10,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
-from wristctl.commands.answer import Answer
+from wristctl.commands.answer import LINES, Answer
 from wristctl.commands.printed_table import Table, degrees
 from wristctl.config.loop import LOOPS
 
@@ -21,8 +21,6 @@ if TYPE_CHECKING:
     from wristctl.config.audit import Claim
 
 
-# Lines of a terminal that the answer may take.
-LINES = 32
 # Claims shown with both numbers, and so many where a box was drawn.
 _HEAVIEST, _BESIDE_A_BOX = 5, 3
 # Sample rate from which control is as good as continuous [kHz].

@@ -7,9 +7,9 @@ from collections.abc import Container, Iterable, Sequence
 from typing import TYPE_CHECKING
 
 from wristctl.commands.answer import Answer
-from wristctl.commands.printed_table import Table
+from wristctl.commands.printed_table import Table, joined
 from wristctl.commands.ranking_answer import advice, certainty, do_not_use, fitted, ranking_table, ties
-from wristctl.commands.ranking_words import PRINTED, condition, error, facts, joined, names_of
+from wristctl.commands.ranking_words import PRINTED, condition, error, facts, names_of
 from wristctl.commands.results import Findings
 
 if TYPE_CHECKING:

@@ -165,7 +165,7 @@ class Compared(StudyResult):
     @property
     def answer(self) -> Answer | None:
         """Which controller to use under which condition, and which must not be used."""
-        return answer_of(self.rankings, str(self.findings.run.path) if self.findings.run else "")
+        return answer_of(self.rankings, self.place)
 
     def frame(self) -> pd.DataFrame:
         """One row per combination: every metric beside the paper's; of a ranking one per row, best first."""

@@ -40,8 +40,7 @@ class Generated(StudyResult):
     @property
     def answer(self) -> Answer:
         """What was drawn, with its ranges in deg and mm."""
-        run = str(self.findings.run.path) if self.findings.run else ""
-        return answer_of(self.samples.names, self.metrics, run)
+        return answer_of(self.samples.names, self.metrics, self.place)
 
     def frame(self) -> pd.DataFrame:
         """One row per sample: x, y, the other inputs, theta, arc_length; SI units."""

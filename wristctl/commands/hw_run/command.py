@@ -44,8 +44,7 @@ class Performed(StudyResult):
     @property
     def answer(self) -> Answer:
         """Error by direction, settling and recovery, and how far simulation agrees."""
-        run = str(self.findings.run.path) if self.findings.run else ""
-        return answer_of(self.trials, self.twins, self.metrics, self.marks, run)
+        return answer_of(self.trials, self.twins, self.metrics, self.marks, self.place)
 
     @property
     def marks(self) -> list[str]:

@@ -45,8 +45,7 @@ class Identified(StudyResult):
     @property
     def answer(self) -> Answer:
         """Parameters with intervals and units, and what the model misses."""
-        run = str(self.findings.run.path) if self.findings.run else ""
-        return found_answer(self.fit, self.knowledge, self.suspected, run)
+        return found_answer(self.fit, self.knowledge, self.suspected, self.place)
 
     @property
     def values(self) -> dict[str, float]:

@@ -3,17 +3,20 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from wristctl.commands.answer import Answer
-from wristctl.commands.loop_words import controller_words, listed, loop_words, motion_words, wrist_words
-from wristctl.commands.printed_table import Table, degrees, two
+from wristctl.commands.printed_table import Table, degrees, joined, two
+from wristctl.config.wrist import WristParameters
 
 if TYPE_CHECKING:
+    from wristctl.config.loop import DirectionName, Loop, Reference
     from wristctl.config.study import Study
     from wristctl.simulation.repetitions import Repeated
 
+# Actuators in words, by level.
+_ACTUATORS = {"ideal": "", "lagged": "motors with a lag", "tendon": "stepper motors and elastic tendons"}
 # Figures of the table of repetitions: metric, heading, and whether it is an angle.
 _FIGURES = (
     ("rmse", "RMSE [deg]", True),
@@ -43,14 +46,14 @@ def answer(study: Study, repeated: Repeated, reason: str = "", advice: Sequence[
     """
     chosen, count = study.simulate, len(repeated.failed)
     scenario = (
-        f"{motion_words(chosen.reference, chosen.direction)} on {wrist_words(study.wrist)} "
-        f"({loop_words(chosen.loop, study.wrist)})"
+        f"{_motion_words(chosen.reference, chosen.direction)} on {_wrist_words(study.wrist)} "
+        f"({_loop_words(chosen.loop, study.wrist)})"
     )
     verdicts = [*_faults(repeated), *([reason] if reason else [])]
-    figures = "" if repeated.first.failed else listed(_told(repeated))
-    subject = controller_words(chosen.controller, chosen.gains)
+    figures = "" if repeated.first.failed else joined(_told(repeated))
+    subject = _controller_words(chosen.controller, chosen.gains)
     there = f". There: {figures}" if figures else ""
-    does = f"{listed(verdicts)}{there}" if verdicts else f"follows with {figures}"
+    does = f"{joined(verdicts)}{there}" if verdicts else f"follows with {figures}"
     median = f" Figures are medians of {count} repetitions." * (count > 1)
     sentence = f"{scenario}: {subject} {does}.{median}"
     more = "All metrics: `--all`; the motion and its figures: report.html of the run."
@@ -120,3 +123,63 @@ def _table(repeated: Repeated) -> Table:
         ]
         rows.append((heading, shown[0], f"{shown[1]} to {shown[2]}"))
     return Table("", ("figure", "median", f"95 % interval, {len(repeated.failed)} repetitions"), rows)
+
+
+def _controller_words(name: str, gains: str | Mapping[str, float]) -> str:
+    """A controller with its gains: smc with its printed gains, pid with Kp = 10, Ki = 2."""
+    from wristctl.control.table import controller
+
+    law = controller(name)
+    if not law.gains:
+        return law.name
+    if isinstance(gains, str):
+        return f"{law.name} with {'tuned' if gains == 'tuned' else f'its {gains}'} gains"
+    return f"{law.name} with {', '.join(f'{gain} = {value:.3g}' for gain, value in gains.items())}"
+
+
+def _motion_words(reference: Reference, direction: DirectionName = "ulnar") -> str:
+    """A wanted motion: 30 deg ulnar in 1 s (minimum jerk)."""
+    from wristctl.config.choices import REFERENCES
+    from wristctl.simulation.reference import reference_name
+
+    if REFERENCES[reference.kind].plane:
+        return reference_name(reference)
+    if reference.tip is None and reference.kind == "minimum-jerk":
+        return f"{reference.end_deg:g} deg {direction} in {reference.duration:g} s (minimum jerk)"
+    if reference.tip is None and reference.kind == "step":
+        return f"a step of {reference.end_deg:g} deg {direction}"
+    return f"{reference_name(reference)}, {direction}"
+
+
+def _wrist_words(wrist: WristParameters) -> str:
+    """The paper's wrist, or another one by its length and stiffness."""
+    if wrist == WristParameters():
+        return "the paper's wrist"
+    return f"a wrist of {1e3 * wrist.length:g} mm and {wrist.stiffness:g} N m/rad"
+
+
+def _loop_words(loop: Loop, wrist: WristParameters) -> str:
+    """Segments, motors, camera, what the controller does not know, and how often it acts."""
+    from wristctl.simulation.worlds import World, mismatches
+
+    count, sensor = loop.plant_segments, loop.sensor
+    parts = [f"{count} {'hinge' if loop.plant.model == 'hinges' else 'segment'}{'s' * (count > 1)}"]
+    parts += [_ACTUATORS[loop.actuator.level]] * (loop.actuator.level != "ideal")
+    parts += [f"a camera of {sensor.frame_rate:g} Hz"] * (sensor.level == "camera")
+    parts += ["tensions without a limit"] * (not loop.limits)
+    parts += _disturbances(loop)
+    if unknown := [mismatch.key.rpartition(".")[2].replace("_", " ") for mismatch in mismatches(World(loop, wrist))]:
+        parts.append(f"a plant unlike the controller's model in {joined(unknown)}")
+    return ", ".join([*parts, f"controller every {1e3 * loop.control_period:g} ms"])
+
+
+def _disturbances(loop: Loop) -> list[str]:
+    disturbances = loop.disturbances
+    parts = []
+    if disturbances.push.force:
+        parts.append(f"a push of {disturbances.push.force:g} N at {disturbances.push.start:g} s")
+    if disturbances.load:
+        parts.append(f"a constant load of {disturbances.load:g} N")
+    if disturbances.drift.scale != 1.0:
+        parts.append(f"a stiffness that drifts to {disturbances.drift.scale:g} times")
+    return parts

@@ -64,9 +64,8 @@ class Simulated(StudyResult):
         """Error of a wrist that left its range; None where it stayed within."""
         if not self.failed:
             return None
-        where = str(self.findings.run.path) if self.findings.run else ""
         fix = "look at the figures; try other gains or a slower move"
-        return UserError(f"the wrist {self.repeated.failure}", where, fix, exit_code=3)
+        return UserError(f"the wrist {self.repeated.failure}", self.place, fix, exit_code=3)
 
     @property
     def answer(self) -> Answer:

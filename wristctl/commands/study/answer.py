@@ -7,9 +7,9 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from wristctl.commands.answer import Answer
-from wristctl.commands.printed_table import Table
+from wristctl.commands.printed_table import Table, joined
 from wristctl.commands.ranking_answer import advice, certainty, decision_table, do_not_use, fitted
-from wristctl.commands.ranking_words import joined, names_of
+from wristctl.commands.ranking_words import names_of
 
 if TYPE_CHECKING:
     from wristctl.comparison.controller_ranking import Ranking

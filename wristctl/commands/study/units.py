@@ -136,18 +136,17 @@ class Studied(StudyResult):
         """Controller for each rig, gain of each term, and reliability of the order."""
         from wristctl.commands.study.answer import answer_of
 
-        run = str(self.findings.run.path) if self.findings.run else ""
-        return answer_of(list(self.rankings.values()), self.terms, self.shifts, run)
+        return answer_of(list(self.rankings.values()), self.terms, self.shifts, self.place)
 
     @property
     def fault(self) -> UserError | None:
         """Error that names the units given up; None where all were computed."""
         if not self.poisoned:
             return None
-        first, where = self.poisoned[0], str(self.findings.run.path) if self.findings.run else ""
+        first = self.poisoned[0]
         more = f" and {len(self.poisoned) - 1} more" if len(self.poisoned) > 1 else ""
         reason = f"{first.unit.name}{more} failed wherever tried, and is left out: {first.why}"
-        return UserError(reason, where, "mend it and resume: what is done is kept", exit_code=3)
+        return UserError(reason, self.place, "mend it and resume: what is done is kept", exit_code=3)
 
     def frame(self) -> pd.DataFrame:
         """A row per family and row of its ranking, best first; angles in rad."""

@@ -140,9 +140,9 @@ class Swept(StudyResult):
         """UserError for points that were given up."""
         if not self.poisoned:
             return None
-        first, where = self.poisoned[0], str(self.findings.run.path) if self.findings.run else ""
+        first = self.poisoned[0]
         problem = f"{len(self.poisoned)} of the sweep's points failed: {first.unit.name}: {first.why}"
-        return UserError(problem, where, "leave those values out, or mend them", exit_code=3)
+        return UserError(problem, self.place, "leave those values out, or mend them", exit_code=3)
 
 
 def sweepable(procedure: Procedure[Found]) -> Procedure[Found]:

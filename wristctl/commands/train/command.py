@@ -156,8 +156,7 @@ class Trained(StudyResult):
     @property
     def answer(self) -> Answer:
         """Error on samples that no training has seen, beside the closed form's."""
-        run = str(self.findings.run.path) if self.findings.run else ""
-        return answer_of(self.errors, len(self.split.test), (self.kept, len(self.trials)), run)
+        return answer_of(self.errors, len(self.split.test), (self.kept, len(self.trials)), self.place)
 
     def frame(self) -> pd.DataFrame:
         """One row per network and seed: its errors on the test samples and elsewhere, losses and epochs."""

@@ -7,7 +7,7 @@ import shlex
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
-from wristctl.commands.answer import Answer
+from wristctl.commands.answer import LINES, Answer
 from wristctl.commands.printed_table import Table, degrees, two
 
 if TYPE_CHECKING:
@@ -18,8 +18,6 @@ if TYPE_CHECKING:
 
 # Share of a gain's search range, on its logarithmic scale, within which a gain lies at the edge.
 _EDGE = 0.01
-# Lines of an answer beyond which its table leaves the gains to the file that holds them.
-_LINES = 32
 # What a mark says of a case, as a verb.
 _VERBS = {
     "failed": "fails",
@@ -85,7 +83,7 @@ def answer_of(
         notes += ["Next, one motion with these gains:", f"$ {shlex.join(words)}"]
     more = f"All tables: --all. The gains: {run}/data/gains.json" if run else "All tables: `.tables`."
     whole = Answer(_sentence(best, searches[best], errors[best], cases), _table(ordered, searches, errors), notes, more)
-    if len(whole.lines()) <= _LINES or len(ordered) == 1:
+    if len(whole.lines()) <= LINES or len(ordered) == 1:
         return whole
     return Answer(whole.sentence, _table(ordered, searches, errors, with_gains=False), notes, more)
 

@@ -67,8 +67,7 @@ class Tuned(StudyResult):
     @property
     def answer(self) -> Answer | None:
         """Best gains, their error beside feedforward, and what they do wrong."""
-        run = str(self.findings.run.path) if self.findings.run else ""
-        return answer_of(self.searches, self.errors, self.lost, self.cases, run)
+        return answer_of(self.searches, self.errors, self.lost, self.cases, self.place)
 
     @property
     def marks(self) -> list[str]:
