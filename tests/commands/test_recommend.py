@@ -13,8 +13,8 @@ from hypothesis import strategies as st
 
 import wristctl
 from tests.commands.conftest import session
-from wristctl.commands.recommend.answer import RECOMMENDED, Recommended
-from wristctl.commands.recommend.command import FAMILY, _next_command, reach_deg
+from wristctl.commands.recommend.answer import RECOMMENDED, Recommended, spread
+from wristctl.commands.recommend.command import FAMILY, TOLERATED, _next_command, reach_deg
 from wristctl.config.loop import Loop, Reference
 from wristctl.config.study import Study
 from wristctl.config.wrist import WristParameters
@@ -22,7 +22,7 @@ from wristctl.control.table import controller, gains_of
 from wristctl.errors import UserError
 from wristctl.simulation.cases import Measured, measure
 from wristctl.simulation.drawn_worlds import drawn_cases
-from wristctl.simulation.oscillation import FASTEST
+from wristctl.simulation.oscillation import FASTEST, oscillations, sustained
 from wristctl.simulation.reference import motion
 from wristctl.simulation.rollout import rollout
 from wristctl.tuning.scaled_presets import dynamic_stiffness, scaled_to
@@ -83,6 +83,19 @@ def test_the_reach_is_the_wanted_angle_or_what_the_tendons_hold_on_the_worst_rig
     assert reach_deg(without) > stiff[1], "springs that are never stiffer than believed"
 
 
+def test_the_worst_rig_has_its_load_to_either_side_and_its_tendons_nearest_to_the_middle() -> None:
+    def reached(draw: str) -> float:
+        return reach_deg(study_of("wrist.stiffness=3.0", f"recommend.draw={{{draw}}}"))
+
+    ahead, behind = (reached(f"disturbances.load: '{ends}'") for ends in ("0.5..3.0", "-3.0..-0.5"))
+    assert ahead == behind < reached("disturbances.load: '-0.1..0.1'"), "the mirror image"
+    assert reached("plant.tendon_radius: x0.7..1.0") < reached("plant.tendon_radius: x0.99..1.0") <= 45.0
+
+
+def test_of_forty_one_rigs_four_stay_below_the_spread_and_four_are_above_it() -> None:
+    assert spread(np.arange(41.0)[::-1]) == (4.0, 20.0, 36.0)
+
+
 def test_a_wrist_beyond_its_tendons_is_told_so_before_anything_runs(tmp_path: Path) -> None:
     with pytest.raises(UserError, match="hold the wrist to") as told:
         wristctl.recommend(study_of("wrist.stiffness=60.0"), out=tmp_path)
@@ -98,7 +111,7 @@ def test_what_is_recommended_is_best_of_what_holds_on_every_rig(found: Recommend
     ranked, best = found.ranking, found.best
     assert best is not None and best.controller in ("pid-ff", "ct-dob")
     first = ranked.standing.groups[0][0]
-    assert found.candidates[first] == best and ranked.standing.lost[first].times == 0
+    assert found.candidates[first] == best and ranked.standing.lost[first].low <= TOLERATED
     medians = [np.median(row.rmse) for row in ranked.rows]
     assert found.metrics["rmse"] == pytest.approx(medians[first], rel=0.2) and medians[first] < medians[-1]
     assert found.metrics["rmse_low"] <= found.metrics["rmse"] <= found.metrics["rmse_high"]
@@ -132,8 +145,8 @@ def test_the_same_seed_recommends_the_same_and_another_draws_other_rigs(found: R
 
 
 def test_where_every_controller_chatters_nothing_is_recommended() -> None:
-    """The paper's PID at a period of 10 ms, for which its least gains of the search's box are still too strong."""
-    done = wristctl.recommend(study_of("recommend.controllers=[pid]", "recommend.loop.control_period=1e-2"))
+    """The paper's PID at a period of 50 ms, which its preset and what so short a search finds do not stand."""
+    done = wristctl.recommend(study_of("recommend.controllers=[pid]", "recommend.loop.control_period=5e-2"))
     assert done.best is None and done.fault is not None and done.fault.exit_code == 3
     assert [share.times for share in done.ranking.standing.lost] == [8, 8, 0] and not done.motions
     assert done.marks and len(done.answer.lines()) <= 32
@@ -141,7 +154,7 @@ def test_where_every_controller_chatters_nothing_is_recommended() -> None:
 
 def measured_on(cases: list[Any], name: str, gains: dict[str, float]) -> Any:
     law = controller(name)
-    return measure(law, np.array([list(law.values(gains))]), cases, WRIST, ["rmse", "oscillation"])
+    return measure(law, np.array([list(law.values(gains))]), cases, WRIST, ["rmse", "oscillation", "sustained"])
 
 
 def test_swings_are_seen_while_the_reference_moves_beside_those_without_feedback() -> None:
@@ -159,22 +172,36 @@ def test_swings_are_seen_while_the_reference_moves_beside_those_without_feedback
     assert wild.swings_beside(open_loop).all() and wild.largest_swing(open_loop) > math.radians(0.5)
 
 
-def test_the_size_of_a_swing_is_of_what_swings_and_not_of_what_chatters() -> None:
-    """Of four cases one chatters at rest, one swings at rest, and of two in motion one swings beside feedforward."""
+def test_the_size_of_a_swing_is_of_what_swings_and_not_of_what_chatters_or_kinks() -> None:
+    """Of five cases one chatters at rest and one swings there; in motion two have kinks, and one swings on and on."""
 
-    def measured(oscillation: list[float], chattering: list[float]) -> Measured:
-        metrics = {"oscillation": [oscillation], "chattering": [chattering], "drift": [[0.0] * 4]}
-        arrays = {name: np.array(values) for name, values in metrics.items()}
-        rests = np.array([True, True, False, False])
-        return Measured(arrays, np.zeros((1, 4), bool), np.ones((1, 4)), rests, WRIST.tension_range)
+    def measured(oscillation: list[float], sustained: list[float], chattering: float = 0.0) -> Measured:
+        slams = [chattering, *[0.0] * 4]
+        rows = {"oscillation": oscillation, "sustained": sustained, "chattering": slams, "drift": [0.0] * 5}
+        arrays = {name: np.array([values]) for name, values in rows.items()}
+        rests = np.array([True, True, False, False, False])
+        return Measured(arrays, np.zeros((1, 5), bool), np.ones((1, 5)), rests, WRIST.tension_range)
 
     slams = 4.0 * WRIST.tension_range * 2.0 * FASTEST
-    own = measured([1e-5, 3e-3, 9e-3, 5e-3], [slams, 0.0, 0.0, 0.0])
-    open_loop = measured([0.0, 0.0, 5e-3, 1e-3], [0.0] * 4)
-    assert own.swings_beside(open_loop).tolist() == [[True, True, False, True]]
-    assert own.largest_swing(open_loop) == 5e-3, "9e-3 rad are less than twice what feedforward shows there"
-    chatters = measured([1e-5, 0.0, 0.0, 0.0], [slams, 0.0, 0.0, 0.0])
+    own = measured([1e-5, 3e-3, 9e-2, 9e-3, 6e-3], [1e-5, 2e-3, 1e-3, 7e-3, 5e-3], slams)
+    open_loop = measured([0.0, 0.0, 5e-3, 5e-3, 1e-3], [0.0, 0.0, 1e-4, 3e-3, 5e-4])
+    assert own.swings_beside(open_loop).tolist() == [[True, True, False, False, True]]
+    assert own.largest_swing(open_loop) == 5e-3, "7e-3 rad are less than twice what feedforward shows there"
+    chatters = measured([1e-5, 0.0, 0.0, 0.0, 0.0], [1e-5, 0.0, 0.0, 0.0, 0.0], slams)
     assert chatters.swings_beside(open_loop).any() and chatters.largest_swing(open_loop) == 0.0
+
+
+@pytest.mark.parametrize("sign", [-1.0, 1.0])
+def test_a_swing_that_goes_on_has_its_amplitude_and_a_kink_that_is_over_has_almost_none(sign: float) -> None:
+    """On a sine to both sides: a faster one of 1 deg all the time, and one that dies out in a tenth of a period."""
+    time = np.arange(0.0, 5.0, 5e-3)
+    wanted = sign * 0.3 * np.sin(2.0 * np.pi * 0.5 * time)
+    fast = math.radians(1.0) * np.sin(2.0 * np.pi * 6.0 * time)
+    kink = fast * np.exp(-((time + 0.5) % 1.0) / 0.05)
+    theta, which = np.array([wanted + fast, wanted + kink]), np.zeros(2, np.int64)
+    on, over = np.degrees(sustained(theta, wanted[None], which, 5e-3))
+    assert on == pytest.approx(1.0, rel=0.15) and over < 0.05
+    assert np.degrees(oscillations(theta, wanted[None], which, 5e-3))[1] > 5.0 * over
 
 
 OWN = """

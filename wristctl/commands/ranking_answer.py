@@ -129,7 +129,7 @@ def ranking_table(rankings: Sequence[Ranking], names: Mapping[str, str]) -> Tabl
         "best: RMSE [deg]",
         "as good",
         "next: RMSE [deg]",
-        "feedforward (ratio)",
+        "feedforward, times",
         "unusable",
     )
     rows = []

@@ -22,7 +22,7 @@ from wristctl.seeds import Entropy
 from wristctl.simulation.closed_loop import trajectory
 from wristctl.simulation.metrics import METRICS, energy
 from wristctl.simulation.motion import Motion
-from wristctl.simulation.oscillation import LIMIT_CYCLE, REST, chatter, oscillations
+from wristctl.simulation.oscillation import LIMIT_CYCLE, REST, chatter, oscillations, sustained
 from wristctl.simulation.outcome import Outcome
 from wristctl.simulation.rollout import How, columns_of, rollout, structure
 from wristctl.simulation.worlds import plant_of
@@ -33,7 +33,7 @@ _RECORDED_AT_ONCE = 6_000_000
 _SPECTRA = 256
 
 # Metrics of courses that are taken of many rollouts without a trajectory for each.
-AT_ONCE = ("oscillation", "energy", "substeps", "drift")
+AT_ONCE = ("oscillation", "sustained", "energy", "substeps", "drift")
 
 
 class Case(NamedTuple):
@@ -91,21 +91,21 @@ class Measured:
         return self.limit_cycles | (self.chatter > 0.0) | self.unconverged
 
     def swings_beside(self, without_feedback: Measured) -> NDArray[np.bool_]:
-        """`swings`, and where it swings while its reference moves, (P, C).
+        """`swings`, and where it goes on swinging while its reference moves, (P, C); of `sustained` measurements.
 
-        On a moving reference friction's kinks look like swings: what feedforward shows on the same case, which cannot
-        swing by itself, is allowed twice, and LIMIT_CYCLE beyond that.
+        Feedforward cannot swing by itself: twice what it shows on the same case is allowed, and LIMIT_CYCLE beyond it.
         """
         return self.swings | self._swings_in_motion(without_feedback)
 
     def largest_swing(self, without_feedback: Measured) -> float:
-        """Largest oscillation [rad] where it swings, at rest or in motion as `swings_beside` has it; else 0."""
-        swinging = self.limit_cycles | self._swings_in_motion(without_feedback)
-        return float((np.nan_to_num(self.metrics["oscillation"]) * swinging).max())
+        """Largest swing [rad], at rest or in motion as `swings_beside` has them; 0 where it never swings."""
+        resting = np.nan_to_num(self.metrics["oscillation"]) * self.limit_cycles
+        moving = np.nan_to_num(self.metrics["sustained"]) * self._swings_in_motion(without_feedback)
+        return float(np.maximum(resting, moving).max())
 
     def _swings_in_motion(self, without_feedback: Measured) -> NDArray[np.bool_]:
-        allowed = LIMIT_CYCLE + 2.0 * np.nan_to_num(without_feedback.metrics["oscillation"])
-        moving: NDArray[np.bool_] = (self.metrics["oscillation"] > allowed) & ~self.rests
+        allowed = LIMIT_CYCLE + 2.0 * np.nan_to_num(without_feedback.metrics["sustained"])
+        moving: NDArray[np.bool_] = (self.metrics["sustained"] > allowed) & ~self.rests
         return moving
 
     def of_motions(self, chosen: Sequence[int], motions: int) -> Measured:
@@ -153,9 +153,9 @@ def measure(
 
 def _recorded(metrics: Sequence[str]) -> How:
     """Samples that the metrics need beyond sums."""
-    if any(METRICS[name].of_totals is None and name not in AT_ONCE for name in metrics):
+    if any(name not in AT_ONCE and METRICS[name].of_totals is None for name in metrics):
         return True
-    return "briefly" if any(name in ("oscillation", "energy") for name in metrics) else False
+    return "briefly" if any(name in ("oscillation", "sustained", "energy") for name in metrics) else False
 
 
 def _alike(cases: Sequence[Case]) -> list[list[int]]:
@@ -189,8 +189,9 @@ def at_once(metrics: Sequence[str], outcome: Outcome, which: NDArray[np.int64], 
     """Metrics that are taken of the samples, `step` [s] apart, of many rollouts without a trajectory for
     each; `which` are the references that they follow."""
     values = dict[str, Array]()
-    if "oscillation" in metrics:
-        values["oscillation"] = _oscillation(outcome, which, step)
+    for name, amplitudes in (("oscillation", oscillations), ("sustained", sustained)):
+        if name in metrics:
+            values[name] = _amplitudes(amplitudes, outcome, which, step)
     if "substeps" in metrics:
         values["substeps"] = outcome.steps.astype(float)
     if "drift" in metrics:
@@ -214,7 +215,9 @@ def _measured(
         law, np.repeat(gains, count, axis=0), motions, which, loops[0] if one else loops, wrist,
         streams=[case.stream for case in cases] * rows, record=_recorded(metrics), converge=converge,
     )  # fmt: skip
-    values = {name: outcome.metrics[name] for name in metrics if METRICS[name].of_totals is not None}
+    values = {
+        name: outcome.metrics[name] for name in metrics if name not in AT_ONCE and METRICS[name].of_totals is not None
+    }
     slow = [name for name in metrics if name not in values and name not in AT_ONCE]
     values |= at_once(metrics, outcome, which, float(motions[0].time[1]))
     if slow:
@@ -230,13 +233,13 @@ def _measured(
     return outcome, values
 
 
-def _oscillation(outcome: Outcome, which: NDArray[np.int64], step: float) -> Array:
-    """The metric of that name, without a trajectory for each."""
+def _amplitudes(amplitudes: Callable[..., Array], outcome: Outcome, which: NDArray[np.int64], step: float) -> Array:
+    """`oscillations` or `sustained` of every rollout, without a trajectory for each."""
     theta = outcome.columns("theta")
     swings = np.empty(len(theta))
     with threadpool_limits(limits=1, user_api="blas"):
         for first in range(0, len(theta), _SPECTRA):
             chunk = slice(first, first + _SPECTRA)
             motions, followed = np.unique(which[chunk], return_inverse=True)
-            swings[chunk] = oscillations(theta[chunk], outcome.references[motions, 0], followed, step)
+            swings[chunk] = amplitudes(theta[chunk], outcome.references[motions, 0], followed, step)
     return swings

@@ -48,6 +48,18 @@ def oscillations(theta: Array, references: Array, which: NDArray[np.int64], step
     return amplitudes
 
 
+def sustained(theta: Array, references: Array, which: NDArray[np.int64], step: float) -> Array:
+    """Amplitude [rad] of a sinusoid that is as far from zero for half of the time as what `oscillations` looks at.
+
+    Of a swing that goes on it is the swing's amplitude. What a friction that turns leaves is large for a short time,
+    twice a period, and small here. Arguments and shape are those of `oscillations`.
+    """
+    amplitudes = np.full(len(theta), _UNKNOWN)
+    for indices, left in _remaining(theta, references, which, step):
+        amplitudes[indices] = math.sqrt(2.0) * np.median(np.abs(left), axis=1)
+    return amplitudes
+
+
 def at_rest(course: Trajectory) -> bool:
     """Whether the reference rests for the last 2 s, so that what is left at the end is a swing of the loop's own."""
     samples = round(REST / _step(course))

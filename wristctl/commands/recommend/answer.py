@@ -72,7 +72,7 @@ class Recommended(StudyResult):
 
     @property
     def best(self) -> Candidate | None:
-        """Recommended controller and gains; None where none with feedback is among the best that hold on every rig."""
+        """Recommended controller and gains; None where none with feedback is among the best to rely on."""
         return None if self.best_row is None else self.candidates[self.best_row]
 
     @property
@@ -86,8 +86,8 @@ class Recommended(StudyResult):
         """Reason for which nothing is recommended."""
         sound = [row for group in self.ranking.standing.groups for row in group if self.candidates[row].gains]
         if sound:
-            return "no controller with feedback that holds on every rig errs less than feedforward"
-        return "every controller with feedback fails, swings or chatters on some rig"
+            return "no controller with feedback that can be relied on errs less than feedforward"
+        return "every controller with feedback fails, swings or chatters on too many rigs"
 
     @property
     def fault(self) -> UserError | None:
@@ -126,6 +126,8 @@ def _sentence(result: Recommended) -> str:
         f"{degrees(high)} deg on 8 of 10 simulated rigs), {two(ranked.gains[row].value)} times less than "
         "without feedback."
     )
+    if lost := _lost(ranked, row):
+        sentence += f" It {lost} of {ranked.count} rigs."
     alike = [result.candidates[other].label for other in ranked.standing.groups[0] if other != row]
     return f"{sentence} It cannot be told apart from {joined(alike)}." if alike else sentence
 

@@ -33,6 +33,10 @@ FAMILY = "recommend"
 LEAST_DEG = 5.0
 # Weight of swings in a search [decades]: gains that swing on any rig of a search are not wanted.
 _SWINGING = 3.0
+# Share of rigs that a controller must not be shown to lose: those drawn have the worst of friction, delay and load.
+TOLERATED = 0.05
+# What the limits of motion and payload are told by.
+_SWINGS = ("rmse", "oscillation", "sustained")
 # Rigs on which the limits of motion and payload are looked for.
 _RIGS_AT_LIMITS = 12
 TUNED, SCALED = "tuned", "scaled preset"
@@ -170,7 +174,7 @@ def _tested(session: Session, study: Study, family: Family, candidates: Sequence
         for number, candidate in enumerate(candidates, start=1):
             law = controller(candidate.controller)
             gains = np.array([list(law.values(candidate.gains))])
-            measured.append(measure(law, gains, cases, study.wrist, RANKED))
+            measured.append(measure(law, gains, cases, study.wrist, [*RANKED, "sustained"]))
             advance(number)
     rows = [
         RankedRow(
@@ -181,7 +185,7 @@ def _tested(session: Session, study: Study, family: Family, candidates: Sequence
         )
         for candidate, of_candidate in zip(candidates, measured, strict=True)
     ]
-    return ranking(FAMILY, family, rows)
+    return ranking(FAMILY, family, rows, tolerated=TOLERATED)
 
 
 def _sines(family: Family, reach: float, frequency: float) -> Family:
@@ -210,7 +214,7 @@ def _limit(study: Study, best: Candidate, value: float, family: Family) -> Limit
 
     cases = drawn_cases(family, FAMILY, "test", study.seed, _RIGS_AT_LIMITS, study.wrist)
     own, open_loop = (
-        measure(controller(name), np.array([list(gains.values())]), cases, study.wrist, ["rmse", "oscillation"])
+        measure(controller(name), np.array([list(gains.values())]), cases, study.wrist, _SWINGS)
         for name, gains in ((best.controller, best.gains), (YARDSTICK, {}))
     )
     lost = (own.failed | own.swings_beside(open_loop)).reshape(_RIGS_AT_LIMITS, -1).any(axis=1)
