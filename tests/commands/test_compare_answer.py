@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from wristctl.commands.answer import LINES
@@ -214,6 +214,7 @@ def test_each_condition_is_called_by_another_name(name: str) -> None:
     assert len(names) == len(CLASSES) + 1
 
 
+@example(5, ["a"], 0, True)
 @settings(max_examples=25, deadline=None)
 @given(
     st.integers(1, 5),

@@ -24,10 +24,7 @@ class Table:
 
     def text(self, width: int | None = None) -> str:
         """Aligned columns, numbers to four digits; columns beyond `width` go below, the first repeated."""
-        heads = [printable(column) for column in self.columns]
-        rows = [[_plain(value) for value in row] for row in self.rows]
-        cells = [[_cell(value) for value in row] for row in rows]
-        widths = [max(map(len, column)) for column in zip(heads, *cells, strict=True)]
+        heads, rows, cells, widths = self._layout()
         right = [_numeric([row[index] for row in rows]) for index in range(len(self.columns))]
 
         def line(values: Sequence[str], chosen: Sequence[int]) -> str:
@@ -42,6 +39,19 @@ class Table:
             rule = "  ".join("-" * widths[index] for index in chosen)
             blocks.append("\n".join([line(heads, chosen), rule, *(line(row, chosen) for row in cells)]))
         return "\n".join([printable(self.title), ""] * bool(self.title) + ["\n\n".join(blocks)])
+
+    def within(self, width: int) -> Table:
+        """The table without the columns for which a line of `width` columns has no room."""
+        shown = _blocks(self._layout()[3], width)[0]
+        chosen = [[row[index] for index in shown] for row in self.rows]
+        return Table(self.title, [self.columns[index] for index in shown], chosen)
+
+    def _layout(self) -> tuple[list[str], list[list[Any]], list[list[str]], list[int]]:
+        """Heads, plain values, their text, and the width of each column."""
+        heads = [printable(column) for column in self.columns]
+        rows = [[_plain(value) for value in row] for row in self.rows]
+        cells = [[_cell(value) for value in row] for row in rows]
+        return heads, rows, cells, [max(map(len, column)) for column in zip(heads, *cells, strict=True)]
 
 
 def number(value: float) -> str:

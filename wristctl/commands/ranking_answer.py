@@ -12,7 +12,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from wristctl.commands.answer import LINES, Answer
-from wristctl.commands.printed_table import Table, degrees, joined, two
+from wristctl.commands.printed_table import COLUMNS, Table, degrees, joined, two
 from wristctl.commands.ranking_words import (
     called,
     condition,
@@ -292,11 +292,12 @@ def certainty(rankings: Sequence[Ranking]) -> str:
 def fitted(answer: Answer, notes: Sequence[tuple[str | Table, str | Table]]) -> Answer:
     """The answer with as much of its notes as its lines hold: where they are too many, the short forms of the last.
 
-    `notes` are pairs of a note and its short form, which may be empty.
+    `notes` are pairs of a note and its short form, which may be empty. Where that is not enough, the columns of the
+    table that stand below the others go.
     """
     for shortened in range(len(notes) + 1):
         chosen = [note if place < len(notes) - shortened else short for place, (note, short) in enumerate(notes)]
         whole = replace(answer, notes=[note for note in chosen if note])
         if len(whole.lines()) <= LINES:
-            break
-    return whole
+            return whole
+    return replace(whole, table=whole.table and whole.table.within(COLUMNS))
