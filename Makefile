@@ -7,7 +7,7 @@ CLAIMS ?= experiments/claims.yaml
 BIN := .venv/bin
 
 .PHONY: run test lint bench bench-sweeps bench-peers bench-all firmware test-firmware test-faults test-trust test-vision test-identify \
-	test-rig test-statistics converge worlds clean venv mutants coverage installed
+	test-rig test-statistics converge worlds docs clean venv mutants coverage installed
 
 run: .venv/run
 	@set -eo pipefail; \
@@ -34,6 +34,10 @@ bench: .venv/run
 	$(BIN)/python benchmarks/board.py
 	$(BIN)/python benchmarks/emulated_bench.py
 	$(BIN)/python benchmarks/vision.py
+
+# The documentation as a site, offline, with a gallery of runs made now: build/site/html/index.html.
+docs: .venv/docs
+	$(BIN)/python docs/build_site.py
 
 # The motor board's image, byte for byte what the package ships (Debian 12: gcc-avr binutils-avr avr-libc).
 firmware:
@@ -120,6 +124,11 @@ venv: .venv/dev
 .venv/dev: pyproject.toml constraints.txt
 	test -x $(BIN)/pip || $(PYTHON) -m venv .venv
 	$(BIN)/pip install --quiet -c constraints.txt -e '.[dev]'
+	touch $@
+
+.venv/docs: pyproject.toml constraints.txt
+	test -x $(BIN)/pip || $(PYTHON) -m venv .venv
+	$(BIN)/pip install --quiet -c constraints.txt -e '.[docs]'
 	touch $@
 
 clean:
