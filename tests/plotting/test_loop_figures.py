@@ -90,8 +90,8 @@ def test_a_long_course_is_a_line_of_means_in_a_band_that_keeps_every_peak(course
 
 def test_an_envelope_is_of_samples_of_the_course_and_keeps_every_peak() -> None:
     time, course = np.arange(20_007.0) * 1e-3, np.random.default_rng(0).uniform(2.0, 60.0, 20_007)
-    at, kept_values = envelope(time, course)
-    at = np.searchsorted(time, at)
+    drawn_time, kept_values = envelope(time, course)
+    at = np.searchsorted(time, drawn_time)
     np.testing.assert_array_equal(kept_values, course[at])
     assert len(at) < 1100 and (np.diff(at) > 0).all()
     for first in range(0, 20_000, 400):  # ten parts: peaks stay where they are
@@ -100,13 +100,14 @@ def test_an_envelope_is_of_samples_of_the_course_and_keeps_every_peak() -> None:
 
 
 def test_one_motion_has_angle_error_and_tensions_below_each_other(course: Course) -> None:
-    one = replace(course("smc/exchanged"), seen=course("smc/exchanged", 0.4).theta)
+    seen = course("smc/exchanged", 0.4).theta
+    one = replace(course("smc/exchanged"), seen=seen)
     above, middle, below = one_motion(one, "Loop fast").axes
     assert [axes.get_ylabel() for axes in (above, middle, below)] == ["angle [deg]", "error [deg]", "tension [N]"]
     assert above.get_title("left") == "Loop fast" and below.get_xlabel() == "time [s]"
     assert labels(above) == ["smc/exchanged", "as seen", "desired"] and labels(below) == ["+ side", "- side"]
     np.testing.assert_array_equal(middle.lines[0].get_ydata(), np.degrees(one.error))
-    np.testing.assert_array_equal(middle.lines[1].get_ydata(), np.degrees(one.seen - one.theta_ref))
+    np.testing.assert_array_equal(middle.lines[1].get_ydata(), np.degrees(seen - one.theta_ref))
     for axes, tension in zip(below.lines, one.tension.T, strict=True):
         np.testing.assert_array_equal(axes.get_ydata(), tension)
 
