@@ -48,14 +48,14 @@ FINE: Any = {"primal_feasibility_tolerance": 1e-10, "dual_feasibility_tolerance"
 NAMES = st.sampled_from(sorted(LAYOUTS))
 
 
-def drawn(name: str, count: int, seed: int, largest_bend: float = 70.0) -> tuple[Array, Array]:
+def drawn(name: str, count: int, seed: int) -> tuple[Array, Array]:
     """Arms (P, T, 2) at random poses and random torques (P, 2), of which about half can be reached."""
     rng = np.random.default_rng(seed)
     bend, torque = (
         size[:, None] * np.stack([np.cos(toward), np.sin(toward)], axis=1)
         for size, toward in (
             (rng.uniform(0.0, largest, count), rng.uniform(0.0, math.tau, count))
-            for largest in (math.radians(largest_bend), 2.6)
+            for largest in (math.radians(70.0), 2.6)
         )
     )
     return np.array([LAYOUTS[name].moment_arms(u, LENGTH, DISCS) for u in bend]), torque
@@ -174,8 +174,20 @@ def test_a_turned_wrist_is_pulled_alike(name: str, toward: float, size: float, t
         assert backward == pytest.approx(plain.pulls, abs=1e-8)
 
 
-def test_without_an_upper_limit_every_torque_is_reached() -> None:
-    arms, torque = drawn("three", 8, seed=3)
+@pytest.mark.parametrize("bend", [(0.0, 0.0), (0.7, 0.0), (0.0, -0.4), (0.3, 0.3), (-0.5, 0.5)])
+@pytest.mark.parametrize("name", ["four", "five", "six"])
+def test_opposite_arms_on_one_line_are_no_pair(name: str, bend: tuple[float, float]) -> None:
+    """A wrist bent along a plane or a diagonal: what two parallel arms seem to carry is rounding."""
+    _, torque = drawn(name, 500, seed=4)
+    arms = LAYOUTS[name].moment_arms(bend, LENGTH, DISCS)
+    result = allocated(arms, torque, LEAST, GREATEST)
+    assert result.pulls @ arms == pytest.approx(result.share[:, None] * torque, abs=1e-11)
+    assert result.share.min() > 0.3 and not result.saturated.all()
+
+
+@pytest.mark.parametrize("name", ["three", "six"])
+def test_without_an_upper_limit_every_torque_is_reached(name: str) -> None:
+    arms, torque = drawn(name, 8, seed=3)
     for size in (1e-6, 1.0, 1e5):
         result = allocated(arms, size * torque, LEAST, np.inf)
         assert not result.saturated.any()
@@ -191,15 +203,29 @@ def test_a_pull_has_limits_of_its_own(name: str) -> None:
     least[-1] = greatest[-1] = 0.0 if tendons > 3 else LEAST
     result = allocated(arms, 0.2 * torque, least, greatest)
     assert (result.pulls >= least).all() and (result.pulls <= greatest).all()
-    rays = [abs(pulls @ pose - share * wanted).max() < 1e-9 for pulls, pose, share, wanted in zip(
-        result.pulls, arms, result.share, 0.2 * torque, strict=True
-    )]  # fmt: skip
-    chosen = np.flatnonzero(np.array(rays) & (result.share > 0.0))
-    assert len(chosen) > 5
-    share, least_sum = solved(arms[chosen], 0.2 * torque[chosen], least, greatest)
-    assert result.share[chosen] == pytest.approx(share, abs=1e-8)
-    inside = ~result.saturated[chosen]
-    assert result.pulls[chosen].sum(axis=1)[inside] == pytest.approx(least_sum[inside], abs=1e-9)
+    resting, wanted, reached = least @ arms, 0.2 * torque, np.einsum("pt,ptk->pk", result.pulls, arms)
+    on_ray = abs(reached - result.share[:, None] * wanted).max(axis=1) < 1e-9
+    share, least_sum = solved(arms[on_ray], wanted[on_ray], least, greatest)
+    assert on_ray.sum() > 5 and result.share[on_ray] == pytest.approx(share, abs=1e-8)
+    inside = ~result.saturated[on_ray]
+    assert result.pulls[on_ray].sum(axis=1)[inside] == pytest.approx(least_sum[inside], abs=1e-9)
+    off = np.flatnonzero(~on_ray)
+    assert len(off) > 1 or tendons != 4
+    on_way = resting[off] + result.share[off, None] * (wanted - resting)[off]
+    assert reached[off] == pytest.approx(on_way, abs=1e-9)
+    for number in off:
+        further = resting[number] + (result.share[number] + 1e-6) * (wanted - resting)[number]
+        corners = reachable_torques(arms[number], least, greatest)
+        sides = np.roll(corners, -1, axis=0) - corners
+        across = sides[:, 0] * (further - corners)[:, 1] - sides[:, 1] * (further - corners)[:, 0]
+        assert across.min() < 0.0
+
+
+def test_a_pull_at_its_greatest_is_not_rounded_beyond() -> None:
+    least, greatest = 15.7, 50.1
+    assert least + (greatest - least) > greatest
+    result = allocated(LAYOUTS["three"].cross_section, [9.0, 9.0], least, greatest)
+    assert result.pulls.max() == greatest
 
 
 def test_with_one_of_three_lost_a_torque_that_needs_it_is_left_on_the_way() -> None:
