@@ -6,8 +6,8 @@ STUDY ?= experiments/quick.yaml
 CLAIMS ?= experiments/claims.yaml
 BIN := .venv/bin
 
-.PHONY: run test lint bench bench-sweeps bench-peers bench-all firmware test-firmware test-faults test-trust test-vision test-identify test-allocation \
-	test-rig test-statistics converge worlds clean venv mutants coverage installed
+.PHONY: run test lint bench bench-sweeps bench-peers bench-all firmware test-firmware test-faults test-trust test-vision test-identify \
+	test-allocation test-rig test-statistics converge worlds clean venv mutants coverage installed
 
 run: .venv/run
 	@set -eo pipefail; \
