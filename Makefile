@@ -7,7 +7,7 @@ CLAIMS ?= experiments/claims.yaml
 BIN := .venv/bin
 
 .PHONY: run test lint bench bench-sweeps bench-peers bench-all firmware test-firmware test-faults test-trust test-vision test-identify \
-	test-rig test-statistics converge worlds clean venv mutants coverage installed
+	test-allocation test-rig test-statistics converge worlds clean venv mutants coverage installed
 
 run: .venv/run
 	@set -eo pipefail; \
@@ -52,6 +52,10 @@ test-identify: .venv/dev
 # Do 95 % intervals of a comparison hold the truth as often, and groups of ties all that are alike?
 test-statistics: .venv/dev
 	WRISTCTL_THOROUGH=1 $(BIN)/pytest -s tests/comparison tests/tuning
+
+# Pulls of three to six tendons in two planes against a linear program, at 10,000 poses each.
+test-allocation: .venv/dev
+	WRISTCTL_THOROUGH=1 $(BIN)/pytest -s tests/wrist/test_allocation.py
 
 # Cameras, markers and calibration with many more frames, and their runs repeated.
 test-vision: .venv/dev

@@ -4,17 +4,22 @@ from __future__ import annotations
 
 import math
 from itertools import pairwise
+from pathlib import Path
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+import wristctl
 from wristctl.arrays import Array
 from wristctl.config.wrist import WristParameters
 from wristctl.errors import UserError
+from wristctl.study_files.error_messages import located
+from wristctl.study_files.load import load_study, read_study
+from wristctl.study_files.resolved import changed_yaml, resolved_yaml
 from wristctl.wrist.directions import ACTIVE, DIRECTIONS
-from wristctl.wrist.tendon_layout import TendonLayout, TendonPlace
+from wristctl.wrist.tendon_layout import TendonLayout, TendonPlace, check_planar
 
 WRIST = WristParameters()
 THREE = TendonLayout.three(0.02, first=0.3)
@@ -129,3 +134,76 @@ def test_a_layout_that_cannot_hold_a_wrist_says_why(layout: tuple[TendonPlace, .
 def test_two_tendons_at_one_place_that_end_at_different_discs_are_two() -> None:
     layout = TendonLayout((*THREE.places, TendonPlace(THREE.places[1].angle, 0.02, ends_at=3)))
     assert layout.cross_section[1].tolist() == layout.cross_section[3].tolist()
+
+
+def test_a_study_names_its_layout_or_lists_the_places() -> None:
+    listed = (
+        "wrist.tendons=[{angle_deg: 90}, {angle_deg: 210, radius: 0.01, ends_at: 3}, {angle_deg: 330, multiplicity: 2}]"
+    )
+    layout = TendonLayout.of(load_study([], ["wrist.tendon_radius=0.03", listed]).wrist)
+    expected = [[0.0, 0.03], [-0.01 * math.sqrt(0.75), -0.005], [0.03 * math.sqrt(0.75), -0.015]]
+    assert layout.cross_section == pytest.approx(np.array(expected), abs=1e-15)
+    assert layout.multiplicity.tolist() == [1, 1, 2] and layout.shares(5).tolist() == [1.0, 0.5, 1.0]
+    for name, count in (("three", 3), ("four", 4), ("five", 5)):
+        named = TendonLayout.of(load_study([], [f"wrist.tendons={name}"]).wrist)
+        assert len(named.places) == count and named.cross_section.max() <= WRIST.tendon_radius
+    assert TendonLayout.of(WRIST) == TendonLayout.four(WRIST.tendon_radius)
+
+
+def test_a_list_of_places_is_written_out_as_it_was_read(tmp_path: Path) -> None:
+    study = load_study(
+        [], ["wrist.tendons=[{angle_deg: 0}, {angle_deg: 120, radius: 0.013}, {angle_deg: 240, ends_at: 4}]"]
+    )
+    for written in (resolved_yaml, changed_yaml):
+        file = tmp_path / "config.yaml"
+        file.write_text(written(study, "simulate"), encoding="utf-8")
+        assert load_study([file]).wrist == study.wrist
+
+
+SQUARE = "[{angle_deg: 45}, {angle_deg: 135}, {angle_deg: 225}, {angle_deg: 315}]"
+
+
+@pytest.mark.parametrize(
+    "tendons", ["four", "five", SQUARE, SQUARE.replace("45", "405", 1)[:-1] + ", {angle_deg: 0, radius: 0}]"]
+)
+def test_one_plane_takes_two_sides_of_two_tendons(tendons: str) -> None:
+    check_planar(load_study([], [f"wrist.tendons={tendons}"]).wrist)
+
+
+@pytest.mark.parametrize(
+    ("tendons", "problem"),
+    [
+        ("three", "two sides of two tendons alike, and tendon 1 is of neither"),
+        (SQUARE.replace("315", "320"), "and tendon 4 is of neither"),
+        (SQUARE.replace("135}", "135, radius: 0.019}"), "and tendon 2 is of neither"),
+        (SQUARE.replace("135}", "135, ends_at: 4}"), "and tendon 2 is of neither"),
+        (SQUARE.replace("135}", "135, multiplicity: 2}"), "and tendon 2 is of neither"),
+        ("[{angle_deg: 45}, {angle_deg: 135}, {angle_deg: 225}, {angle_deg: 315}, {angle_deg: 0}]", "and tendon 5"),
+        ("[{angle_deg: 0, multiplicity: 2}, {angle_deg: 180, multiplicity: 2}]", "and tendon 1 is of neither"),
+        ("[{angle_deg: 45}, {angle_deg: 135}, {angle_deg: 270, radius: 0}]", "2 tendons off the axis"),
+        (SQUARE.replace("315}", "225, ends_at: 5}"), "tendons 3 and 4 are at one place"),
+        (SQUARE.replace("]", ", {angle_deg: 45, ends_at: 5}]"), "tendons 1 and 5 are at one place"),
+    ],
+)
+def test_commands_in_one_plane_refuse_other_layouts(tendons: str, problem: str) -> None:
+    with pytest.raises(UserError, match=problem):
+        wristctl.simulate(load_study([], [f"wrist.tendons={tendons}"]))
+
+
+def test_an_error_has_the_line_of_the_place(tmp_path: Path) -> None:
+    file = tmp_path / "study.yaml"
+    lines = [
+        "wrist:",
+        "  tendons:",
+        "    - {angle_deg: 0}",
+        "    - {angle_deg: 120}",
+        "    - {angle_deg: 240, ends_at: 7}",
+    ]
+    file.write_text("\n".join(lines), encoding="utf-8")
+    study, origins = read_study([file])
+    with pytest.raises(UserError) as refused:
+        TendonLayout.of(study.wrist)
+    assert located(refused.value, origins).where == f"{file}:5: wrist.tendons.2"
+    file.write_text("\n".join(lines).replace("240", "left"), encoding="utf-8")
+    with pytest.raises(UserError, match=r"'left' should be a valid number .*study.yaml:5: wrist.tendons.2.angle_deg"):
+        load_study([file])

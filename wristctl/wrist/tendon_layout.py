@@ -13,11 +13,18 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from wristctl.arrays import Array
+from wristctl.config.wrist import WristParameters
 from wristctl.errors import UserError
 from wristctl.wrist.directions import TENDONS
 
 # Distances, relative to the largest radius, below which two places are one, and angles [rad] that are no gap.
 _APART = 1e-6
+_KEY = "wrist.tendons"
+_FOUR = f"{_KEY}: four"
+
+
+def _key(number: int) -> str:
+    return f"{_KEY}.{number - 1}"
 
 
 @dataclass(frozen=True)
@@ -54,13 +61,15 @@ class TendonLayout:
 
     def __post_init__(self) -> None:
         for number, place in enumerate(self.places, 1):
-            name, last = f"tendon {number}", place.ends_at
+            name, where, last = f"tendon {number}", _key(number), place.ends_at
             if not (math.isfinite(place.angle) and 0.0 <= place.radius < math.inf):
-                raise UserError(f"{name} is nowhere: angle {place.angle:g} rad, radius {place.radius:g} m", name)
+                raise UserError(f"{name} is nowhere: angle {place.angle:g} rad, radius {place.radius:g} m", where)
             if last is not None and last < 2:
-                raise UserError(f"{name} ends at disc {last}, and disc 1 is clamped", name, "2 or a later disc")
+                raise UserError(f"{name} ends at disc {last}, and disc 1 is clamped", where, "2 or a later disc")
             if place.multiplicity < 1:
-                raise UserError(f"{name} stands for {place.multiplicity} tendons", name, "a multiplicity of at least 1")
+                raise UserError(
+                    f"{name} stands for {place.multiplicity} tendons", where, "a multiplicity of at least 1"
+                )
         self._check_distinct()
         self._check_spanned()
 
@@ -71,7 +80,7 @@ class TendonLayout:
                 distance = float(np.hypot(*(self.cross_section[i] - self.cross_section[j])))
                 if distance <= _APART * largest and self.places[i].ends_at == self.places[j].ends_at:
                     what = f"tendons {i + 1} and {j + 1} are at one place"
-                    raise UserError(what, f"tendon {j + 1}", "one place with a multiplicity of 2, or another angle")
+                    raise UserError(what, _key(j + 1), "one place with a multiplicity of 2, or another angle")
 
     def _check_spanned(self) -> None:
         around = self._around
@@ -79,13 +88,13 @@ class TendonLayout:
             return
         if len(around) < 3:
             what = f"{len(around)} tendons off the axis cannot bend a wrist in two planes"
-            raise UserError(what, "tendons", "at least three, or two at 0 and 180 deg for one plane")
+            raise UserError(what, _KEY, "at least three, or two at 0 and 180 deg for one plane")
         gaps = np.diff([*around, around[0] + 2.0 * math.pi])
         widest = int(np.argmax(gaps))
         if gaps[widest] >= math.pi - _APART:
             toward = math.degrees(around[widest] + 0.5 * gaps[widest]) % 360.0
             what = f"no tendon pulls toward {toward:.0f} deg: there is none in {math.degrees(gaps[widest]):.0f} deg"
-            raise UserError(what, "tendons", "gaps between neighbouring tendons below 180 deg")
+            raise UserError(what, _KEY, "gaps between neighbouring tendons below 180 deg")
 
     @property
     def _around(self) -> list[float]:
@@ -120,7 +129,7 @@ class TendonLayout:
         for number, place in enumerate(self.places, 1):
             if place.ends_at is not None and place.ends_at > discs:
                 what = f"tendon {number} ends at disc {place.ends_at} of {discs}"
-                raise UserError(what, f"tendon {number}", f"a disc from 2 to {discs}")
+                raise UserError(what, _key(number), f"a disc from 2 to {discs}")
         last = [place.ends_at or discs for place in self.places]
         return (np.array(last, float) - 1.0) / (discs - 1.0)
 
@@ -135,7 +144,7 @@ class TendonLayout:
             if abs(count - exact) > 1e-9:
                 last = self.places[number - 1].ends_at
                 what = f"tendon {number} ends at disc {last} of {discs}, within one of {segments} segments"
-                raise UserError(what, f"tendon {number}", f"segments: {discs - 1}")
+                raise UserError(what, _key(number), f"segments: {discs - 1}")
         return whole
 
     def moment_arms(self, bend: ArrayLike, length: float, discs: int) -> Array:
@@ -165,6 +174,26 @@ class TendonLayout:
         return arms
 
     @classmethod
+    def of(cls, wrist: WristParameters) -> Self:
+        """Layout of a wrist's parameters. Raises UserError, with the key of the place, as the class does."""
+        radius = wrist.tendon_radius
+        if isinstance(wrist.tendons, str):
+            return {"three": cls.three, "four": cls.four, "five": cls.five}[wrist.tendons](radius)
+        layout = cls(
+            tuple(
+                TendonPlace(
+                    angle=math.radians(place.angle_deg),
+                    radius=radius if place.radius is None else place.radius,
+                    ends_at=None if place.ends_at == wrist.discs else place.ends_at,
+                    multiplicity=place.multiplicity,
+                )
+                for place in wrist.tendons
+            )
+        )
+        layout.shares(wrist.discs)
+        return layout
+
+    @classmethod
     def pair_of_sides(cls, offset: float) -> Self:
         """The wrist in one plane: two tendons alike at +offset and two at -offset [m] from its neutral line."""
         return cls((TendonPlace(0.0, offset, multiplicity=2), TendonPlace(math.pi, offset, multiplicity=2)))
@@ -188,3 +217,18 @@ class TendonLayout:
                 TendonPlace(math.atan2(flexion, ulnar), radius if ulnar else 0.0) for ulnar, flexion in TENDONS.values()
             )
         )
+
+
+def check_planar(wrist: WristParameters) -> None:
+    """UserError unless a wrist in one plane sees its tendons as two sides of two alike, as `four` and `five` are.
+
+    Either plane has to: motions toward ulnar and toward flexion are of the same wrist.
+    """
+    layout, corner = TendonLayout.of(wrist), wrist.tendon_offset
+    expected = TendonLayout.four(wrist.tendon_radius).cross_section
+    for number, (c, place) in enumerate(zip(layout.cross_section, layout.places, strict=True), 1):
+        at_corner = np.hypot(*(expected - c).T).min() <= _APART * corner
+        if place.radius > 0.0 and not (at_corner and place.multiplicity == 1 and place.ends_at is None):
+            where = _KEY if isinstance(wrist.tendons, str) else _key(number)
+            what = f"a wrist in one plane has two sides of two tendons alike, and tendon {number} is of neither"
+            raise UserError(what, where, _FOUR)
