@@ -28,6 +28,7 @@ from wristctl.trial.tick_timing import TickTiming
 from wristctl.trial.tracking import Tracking
 from wristctl.trial.tracking_monitor import Following, Greatest
 from wristctl.trial.trials import Trial, at_rest, back, motion_of
+from wristctl.vision.camera_pose import CameraPose
 from wristctl.wrist.directions import in_plane
 from wristctl.wrist.kinematics import Inverse
 
@@ -63,7 +64,8 @@ class Stop:
 
 class Experiment:
     """Trials; `outcomes` holds how each trial that began has ended, `odd` what was odd in it, `greatest`
-    what came nearest to the limits in any, `stop` why they ended early.
+    what came nearest to the limits in any, `poses` the camera's by plane (None: calibrated), `stop` why they ended
+    early.
 
     Raises UserError for what is wrong with controllers, gains or motions.
     """
@@ -84,6 +86,7 @@ class Experiment:
         self.stop: Stop | None = None
         self.zero: Zero | None = None
         self.greatest, self.odd = Greatest(), dict[int, str]()
+        self.poses: dict[str, CameraPose | None] = {}
         self._under_way: tuple[int, float] | None = None  # number and start of the trial that goes on
 
     def run(self, testbed: Testbed, shown: Shown | None = None) -> None:
@@ -141,6 +144,7 @@ class Experiment:
         if self.zero is not None:
             self._let_go(board, self.zero)
         watching = Patience(board)
+        self.poses[plane] = watching.stand_square(tracking, settings.homing)
         marker = watching.angle(tracking, 4 * settings.homing.frames)
         watching.pace.fits(settings.safety.stale)
         if self.zero is None:  # the marker is seen, and nothing moves yet

@@ -169,6 +169,7 @@ def _summarise(session: Session, experiment: Experiment, trial_log: TrialLog) ->
     if timing.late:
         findings.summary(timing.camera.summary())
     _tell_oddities(session, experiment)
+    findings.plain("data/camera_pose.json", {plane: pose and pose.plain() for plane, pose in experiment.poses.items()})
     if experiment.zero is not None:
         findings.plain("data/zero.json", experiment.zero.plain())
     if experiment.stop is None:
