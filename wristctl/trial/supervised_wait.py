@@ -6,13 +6,15 @@ from typing import NamedTuple
 
 import numpy as np
 
+from wristctl.arrays import Array
 from wristctl.board.driver import Board
 from wristctl.board.messages import State, Status
 from wristctl.config.hw_run import Homing
 from wristctl.trial.camera_pace import CameraPace
-from wristctl.trial.safety import Monitor, SafetyStop
+from wristctl.trial.safety import SafetyStop
 from wristctl.trial.spools import Paths
 from wristctl.trial.tracking import Tracking
+from wristctl.trial.watch import Watch
 from wristctl.vision.camera_pose import CameraPose
 from wristctl.vision.marker import Sighting
 
@@ -125,9 +127,10 @@ class InSight:
     """
 
     def __init__(
-        self, tracking: Tracking, monitor: Monitor, paths: Paths, now: Callable[[], float], signs: np.ndarray
+        self, tracking: Tracking, watch: Watch, stale: float, paths: Paths, now: Callable[[], float], signs: Array
     ) -> None:
-        self._tracking, self._monitor, self._paths, self._now, self._signs = tracking, monitor, paths, now, signs
+        self._tracking, self._watch, self._stale = tracking, watch, stale
+        self._paths, self._now, self._signs = paths, now, signs
         self._seen = self._looked = now()
 
     def __call__(self, status: Status) -> None:
@@ -136,10 +139,10 @@ class InSight:
         if now - self._looked < _LOOK:
             return
         self._looked, looked = now, self._tracking.look()
-        if now - self._seen > self._monitor.stale:
+        if now - self._seen > self._stale:
             return
         reeled = self._signs * np.array(status.position, float)
         for sighting in looked:
             if math.isfinite(sighting.theta):
                 self._seen = sighting.time
-                self._monitor.standing(sighting.theta, reeled, self._paths.taut(sighting.theta)[0])
+                self._watch.standing(sighting.theta, reeled, self._paths.taut(sighting.theta)[0])
