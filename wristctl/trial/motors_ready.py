@@ -76,7 +76,7 @@ def in_sight(testbed: Testbed, settings: CalibrateWristSettings) -> Iterator[tup
             patience = Patience(board)
             testbed.face(settings.plane, patience.pulse)
             tracking = testbed.tracking()
-            patience.angle(tracking, settings.homing.frames)  # the marker is seen, and nothing moves yet
+            patience.stand_square(tracking, settings.homing)  # the markers are seen, and nothing moves yet
             testbed.confirm(patience.pulse)
             yield board, hello, tracking
         except BaseException:
