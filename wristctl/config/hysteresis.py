@@ -4,7 +4,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from wristctl.config.given_files import given_file
+from wristctl.config.given_files import columns_of_file, given_file, of_file
 from wristctl.config.plant import Actuator
 from wristctl.config.section import Section, choice, quantity
 
@@ -53,7 +53,9 @@ class HysteresisSettings(Section):
     segments: int = choice(4, "constant-curvature segments of the wrist", "as simulated", ge=1, le=8)
     step: float = quantity(1e-3, "s", "longest integration step", "as simulated", gt=0, le=5e-3)
     samples: int = choice(200, "samples kept of each cycle, a multiple of 4", ge=40, le=10_000, multiple_of=4)
-    measured: str | None = given_file("a measured loop (CSV, see docs/hysteresis.md) to overlay and to fit")
+    measured: str | None = given_file("a measured loop to overlay and to fit: an open log (docs/open-log.md)")
+    columns: str | None = columns_of_file()
+    trial: str | None = of_file("trial of the measured log that is the loop, where it has several")
     known: KnownBeforehand = KnownBeforehand()
 
     @model_validator(mode="after")

@@ -7,7 +7,7 @@ sheath): where the share may be 0, the sheath has no end.
 """
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -21,26 +21,14 @@ from wristctl.config.hysteresis import HysteresisSettings
 from wristctl.config.plant import Actuator
 from wristctl.config.wrist import WristParameters
 from wristctl.errors import UserError
-from wristctl.records.measured_table import ANGLE, LENGTH, TIME, Expected
+from wristctl.records.log_converters import read_log
+from wristctl.records.open_log import OpenLog
 from wristctl.simulation.spool_driven import SpooledWrist, spooled
+from wristctl.wrist.directions import DIRECTIONS
 from wristctl.wrist.statics import FROM_ABOVE, FROM_BELOW
 from wristctl.wrist.tendons import TENDONS_PER_SIDE
 
-_FORCES = {"N": 1.0}
-# The columns that there may be, and their units; a tension is one tendon's at its spool, a side has two alike.
-LOOP_TABLE = Expected(
-    "measured loop",
-    {
-        "time": TIME,
-        "angle": ANGLE,
-        "spool_plus": LENGTH,
-        "spool_minus": LENGTH,
-        "tension_plus": _FORCES,
-        "tension_minus": _FORCES,
-    },
-    needed=("time", "angle"),
-    example="time [s],angle [deg],spool_plus [mm],spool_minus [mm]",
-)
+_EXAMPLE = "time [s],angle [deg],spool_plus [mm],spool_minus [mm]"
 _FEWEST = 100
 # Share of its whole way that what drives a loop goes back by before that is a turn.
 _TREMBLE = 0.05
@@ -48,6 +36,10 @@ _TREMBLE = 0.05
 _MEDIAN = 0.6745
 # Share of the largest tension by which noise may take one below nothing.
 _NOISE = 0.05
+# Time between two samples of a log without times [s].
+_SLOWLY = 0.1
+# Bend beside its plane that a wrist may show [rad].
+_OUT_OF_PLANE = math.radians(5.0)
 # By which factor spools may go further, or less far, than the angle asks for.
 _APART = 3.0
 
@@ -105,33 +97,79 @@ class MeasuredLoop:
         return bool(pulled[away[0]] > pulled[0])
 
 
-def read_loop(file: Path, wrist: WristParameters) -> MeasuredLoop:
-    """A measured loop. Raises UserError for a file that is none, with line and column, and what would mend it."""
-    read = LOOP_TABLE.read(file)
-    columns = read.columns
-    spools, tensions = (_pair(columns, name, str(file)) for name in ("spool", "tension"))
+def read_loop(file: Path, wrist: WristParameters, names: str = "", trial: str | None = None) -> MeasuredLoop:
+    """A measured loop in an open log. Raises UserError for a file that is none, with line and column.
+
+    `names` are another author's columns as `wristctl.records.open_log` has them, `trial` is that of several to be used.
+    A log without times is taken as slow: so much of its way in a second that damping plays no part.
+    """
+    log = trial_of(read_log(file, names, "measured loop"), trial)
+    slow: Array = _SLOWLY * np.arange(len(log), dtype=np.float64)
+    time = log.whole("time", _EXAMPLE) if "time" in log.columns else slow
+    bend, spools, tensions = planar_bend(log), in_pairs(log, "spool"), in_pairs(log, "tension")
     if spools is None and tensions is None:
-        raise UserError("neither spools nor tensions", str(file), f"columns of both sides, as in {LOOP_TABLE.example}")
-    loop = MeasuredLoop(file.name, columns["time"], columns["angle"], spools, tensions)
-    _check(loop, wrist, str(file), read.lines)
+        raise UserError("neither spools nor tensions", str(file), f"columns of both sides, as in {_EXAMPLE}")
+    loop = MeasuredLoop(file.name, time, bend, spools, tensions)
+    _check(loop, wrist, log)
     return loop
 
 
-def _pair(columns: Mapping[str, Array], name: str, where: str) -> Array | None:
-    sides = [f"{name}_plus", f"{name}_minus"]
-    present = [side for side in sides if side in columns]
-    if len(present) == 1:
-        lacking = next(side for side in sides if side not in columns)
-        raise UserError(f"{present[0]} without {lacking}", where, "both sides, or none")
-    return np.stack([columns[side] for side in sides], axis=1) if present else None
+def trial_of(log: OpenLog, trial: str | None) -> OpenLog:
+    """One trial of a log: the one named, or the only one."""
+    trials = log.trials()
+    if trial is None and len(trials) == 1:
+        return log
+    if trial is None or trial not in trials:
+        problem = f"{len(trials)} trials" if trial is None else f"no trial {trial}"
+        raise UserError(problem, str(log.file), f"name one of them with hysteresis.trial: {', '.join(trials)}")
+    return trials[trial]
 
 
-def _check(loop: MeasuredLoop, wrist: WristParameters, file: str, lines: Sequence[int]) -> None:
+def planar_bend(log: OpenLog) -> Array:
+    """Bend (T,) [rad] of a log whose wrist stays in one plane. Raises UserError where it does not."""
+    bends = log.bends()
+    if bends is None:
+        return log.whole("bend_y", _EXAMPLE)
+    across = np.nanmax(bends, axis=0) - np.nanmin(bends, axis=0)
+    along, beside = int(across.argmax()), float(across.min())
+    if beside > _OUT_OF_PLANE:
+        problem = f"the wrist leaves its plane by {math.degrees(beside):.3g} deg"
+        raise UserError(problem, str(log.file), "a motion in one plane, bend_y or bend_z alone")
+    bend: Array = bends[:, along]
+    for name in ("bend_y", "bend_z", "inclination"):
+        if name in log.columns:
+            log.without_gaps(name)
+    return bend
+
+
+def in_pairs(log: OpenLog, quantity: str) -> Array | None:
+    """Spools [m] or tensions [N] of the + and the - side (T, 2): those of two tendons, or means of two pairs."""
+    columns = log.tendons(quantity)
+    if not columns:
+        return None
+    if len(columns) == 1:
+        there = log.head(f"{quantity}_{next(iter(columns))}")
+        lacking = there.replace("plus", "minus") if "plus" in there else there.replace("minus", "plus")
+        other = lacking if lacking != there else f"{quantity}_{3 - next(iter(columns))}"
+        raise UserError(f"{there} without {other}", str(log.file), "both sides, or none")
+    if len(columns) == 2:
+        return np.stack(list(columns.values()), axis=1)
+    plus, minus = (
+        next(d.tendons for d in DIRECTIONS.values() if (d.plane, d.sign) == ("ulnar", sign)) for sign in (1, -1)
+    )
+    if set(columns) != {*plus, *minus}:
+        problem = f"{quantity} of tendons {', '.join(map(str, columns))}"
+        raise UserError(problem, str(log.file), f"two sides ({quantity}_1, {quantity}_2), or tendons 1, 2, 4 and 5")
+    return np.stack([0.5 * sum(columns[tendon] for tendon in side) for side in (plus, minus)], axis=1)
+
+
+def _check(loop: MeasuredLoop, wrist: WristParameters, log: OpenLog) -> None:
+    file = str(log.file)
     if len(loop.time) < _FEWEST:
         raise UserError(f"{len(loop.time)} samples, too few to tell", file, f"at least {_FEWEST}")
     back = np.flatnonzero(np.diff(loop.time) <= 0.0)
     if len(back):
-        raise UserError("time does not go on", f"{file}:{lines[back[0] + 1]}", "samples in the order of their times")
+        raise UserError("time does not go on", log.at(int(back[0]) + 1), "samples in the order of their times")
     most = float(np.abs(loop.angle).max())
     if most > 2.0 * math.radians(wrist.range_deg):
         problem = f"it bends by {math.degrees(most):.3g} deg, the wrist's range is {wrist.range_deg:g} deg"
@@ -139,7 +177,7 @@ def _check(loop: MeasuredLoop, wrist: WristParameters, file: str, lines: Sequenc
     if loop.tensions is not None:
         pushes = loop.tensions.min(axis=1) < -_NOISE * loop.tensions.max()
         if pushes.any():
-            where = f"{file}:{lines[int(np.argmax(pushes))]}"
+            where = log.at(int(np.argmax(pushes)))
             raise UserError("a tendon pushes", where, "tensions of 0 N or more: is the load cell's zero right?")
     moved = loop.drive - loop.drive.mean(axis=0)
     together = float(np.sum((moved[:, 0] - moved[:, 1]) * (loop.angle - loop.angle.mean())))

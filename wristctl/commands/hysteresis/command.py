@@ -48,8 +48,10 @@ def problem_of(study: Study) -> LoopProblem:
     """The study's measured loop. Raises UserError for a file that is none."""
     from wristctl.identification.loop_problem import LoopProblem, read_loop
 
-    assert study.hysteresis.measured is not None
-    return LoopProblem(read_loop(Path(study.hysteresis.measured), study.wrist), study.wrist, study.hysteresis)
+    settings = study.hysteresis
+    assert settings.measured is not None
+    loop = read_loop(Path(settings.measured), study.wrist, settings.columns or "", settings.trial)
+    return LoopProblem(loop, study.wrist, settings)
 
 
 def fit_measured(session: Session) -> tuple[FrictionFit, Table]:
