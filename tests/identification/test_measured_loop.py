@@ -10,7 +10,7 @@ import pytest
 
 from wristctl.config.wrist import WristParameters
 from wristctl.errors import UserError
-from wristctl.identification.loop_problem import MeasuredLoop, read_loop
+from wristctl.identification.measured_loop import MeasuredLoop, read_loop
 
 WRIST = WristParameters()
 TIME = np.linspace(0.0, 10.0, 201)

@@ -140,7 +140,7 @@ def test_the_probes_bend_is_its_turn_in_the_base_whichever_way_that_stands(tmp_p
     assert list(log.trials()) == ["First", "Second"] and first.at(0).endswith("motor1.xlsx:2")
     np.testing.assert_allclose(first.columns["bend_y"], bend, atol=2e-3)
     np.testing.assert_allclose(second.columns["bend_y"], bend[::-1], atol=2e-3)
-    np.testing.assert_allclose(first.columns["spool_1"], 1e-6 * (steps - 1600.0))
+    np.testing.assert_allclose(first.columns["spool_1"], 0.01 * np.radians(0.05 * (steps - 1600.0)), rtol=2e-3)
     np.testing.assert_allclose(first.columns["spool_2"], -first.columns["spool_1"])
     with pytest.raises(UserError, match="no sheet has a motor position"):
         read_log(workbook(tmp_path / "other.xlsx", {"A": [["x", "y"], [1.0, 2.0]]}), "tee-probe")

@@ -26,8 +26,8 @@ ARM_STEP = math.pi * 10e-3 / 200
 """Length of tendon that a step of the silicone arm's motors reels in [m]: pulley of 10 mm, 200 steps a turn."""
 ARM_PERIOD = 0.25
 """Time between two samples of the silicone arm [s]."""
-PROBE_STEP = 1e-6
-"""Length [m] that stands for a step of the probe's motors, whose pulleys are not published."""
+PROBE_RADIUS = 0.010
+"""Length of tendon [m] that the probe is taken to move for a radian of bend: its pulleys are not published."""
 
 _NECK_LOAD = re.compile(r"(\d+)gr")
 
@@ -126,7 +126,7 @@ def _tee_probe(file: Path) -> OpenLog:
     """Steps of one plane's motor and the bend in that plane, by the tip's orientation in the base; a sheet is a trial.
 
     An antagonist pair: what one tendon reels in the other pays out. Bends count from the middle of the range of steps;
-    times are not published. The scale of the spools is nobody's: a step stands for 1 um.
+    times are not published. Nor is the scale of the spools: they are taken to move 10 mm for a radian of bend.
     """
     parts, words, lines = list[dict[str, Array]](), list[str](), list[int]()
     for sheet, (head, *rows) in ((name, rows) for name, rows in read_sheets(file).items() if rows):
@@ -138,8 +138,9 @@ def _tee_probe(file: Path) -> OpenLog:
         whole = np.isfinite(values).all(axis=1)
         values, kept = values[whole], [row for row, there in zip(kept, whole, strict=True) if there]
         steps = values[:, 0] - 0.5 * (values[:, 0].max() + values[:, 0].min())
-        spool = PROBE_STEP * steps
-        parts.append({"spool_1": spool, "spool_2": -spool, "bend_y": _turned(steps, values[:, 1:5], values[:, 5:9])})
+        bend = _turned(steps, values[:, 1:5], values[:, 5:9])
+        spool = PROBE_RADIUS * float(np.ptp(bend) / np.ptp(steps)) * steps
+        parts.append({"spool_1": spool, "spool_2": -spool, "bend_y": bend})
         words += [sheet] * len(values)
         lines += [number for number, _ in kept]
     if not parts:

@@ -159,8 +159,8 @@ def spooled(wrists: Sequence[SpooledWrist], inputs: Told, steps: int, h: float, 
     stop = Event()
 
     def run(block: int) -> None:
-        own = (values[block] for name, values in blocks._asdict().items() if name != "inner")
-        block_lanes = _Lanes(*own, one_block(blocks.inner, block))
+        parts = {name: rows[block] for name, rows in blocks._asdict().items() if name != "inner"}
+        block_lanes = _Lanes(**parts, inner=one_block(blocks.inner, block))
         for first in range(0, steps, _CHUNK):
             if stop.is_set():
                 return
@@ -194,7 +194,8 @@ def _lanes(wrists: Sequence[SpooledWrist], h: float) -> _Lanes:
         )
     begin, bent = np.array([driven.begin for driven in wrists]), np.array([driven.inner_z for driven in wrists])
     inner = inner_of([driven.plant for driven in wrists], begin, bent, to_blocks)
-    return _Lanes(*(to_blocks(np.array(column)) for column in zip(*rows, strict=True)), inner)
+    of_wrist, of_tendons_, state, memories, ends = (to_blocks(np.array(column)) for column in zip(*rows, strict=True))
+    return _Lanes(of_wrist, of_tendons_, state, memories, ends, inner)
 
 
 # Step between two angles at which the statics are solved [rad]; chords between them are 1e-10 m off.
