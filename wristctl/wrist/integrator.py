@@ -16,6 +16,7 @@ from wristctl.lanes.lane import where, zero_like
 from wristctl.lanes.rows import lanes_like, planes_like, square_like
 from wristctl.wrist.arcs import Chords
 from wristctl.wrist.chain import chords, spring, tendon_torques
+from wristctl.wrist.dahl import resist, resist_slope
 from wristctl.wrist.dynamics import bias, equation_of_motion, mass_matrix
 from wristctl.wrist.jacobian import residual_jacobians
 from wristctl.wrist.plant import path_along, path_before
@@ -70,13 +71,13 @@ def _contact(nonideal: Any, n: int, theta: Any, omega: Any) -> Any:
 
 @by_type
 def yield_(tendons: Any, segment: Any, theta: Any, omega: Any, spool_input: Any, r: Any) -> None:
-    """Add to the residual r (n,) what end stops take and what creeping springs give."""
+    """Add to the residual r (n,) what end stops and inner friction take and what creeping springs give."""
     raise NotImplementedError("compiled code only")
 
 
 @by_type
 def yield_jacobians(tendons: Any, theta: Any, omega: Any, by_theta: Any, by_rate: Any) -> None:
-    """Add what end stops add to dr/d(theta) and dr/d(rate), (n, n)."""
+    """Add what end stops and inner friction add to dr/d(theta) and dr/d(rate), (n, n)."""
     raise NotImplementedError("compiled code only")
 
 
@@ -96,6 +97,7 @@ def _yield(tendons: Any, segment: Any, theta: Any, omega: Any, spool_input: Any,
     for k in range(len(theta)):
         torque, _, _ = _contact(nonideal, len(theta), theta[k], omega[k])
         r[k] = r[k] + torque - nonideal.spring_creep * spring(segment, k) * state[springs + k]
+    resist(tendons.inner, theta, r)
 
 
 @implements(yield_jacobians, PulledTendons, RealTendons)
@@ -104,6 +106,7 @@ def _yield_jacobians(tendons: Any, theta: Any, omega: Any, by_theta: Any, by_rat
         _, stiffness, damping = _contact(tendons.nonideal, len(theta), theta[k], omega[k])
         by_theta[k, k] = by_theta[k, k] + stiffness
         by_rate[k, k] = by_rate[k, k] + damping
+    resist_slope(tendons.inner, theta, omega, by_theta)
 
 
 @compiled
