@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from wristctl.arrays import Array
 from wristctl.comparison.controller_ranking import STREAM, Ranking, Traits, counted
-from wristctl.comparison.tie_groups import standing
+from wristctl.comparison.tie_groups import Comparisons, standing
 from wristctl.config.controller_row import Row
 from wristctl.config.families import Family, Worlds
 from wristctl.config.study import Study
@@ -56,6 +56,8 @@ class RankedRow(NamedTuple):
     swings: NDArray[np.bool_]
     """Whether on any motion it swings by more than 0.1 deg at rest, chatters, or depends on the integration step."""
     measured: Measured
+    motions: int = 1
+    """Number of motions that `measured` has in each world, each with as many streams of noise."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -116,7 +118,7 @@ def rank(
 
 def _row(label: str, measured: Measured, worlds: int) -> RankedRow:
     swings = np.any(measured.swings.reshape(worlds, -1), axis=1)
-    return RankedRow(label, world_scores(measured, worlds)[0], swings, measured)
+    return RankedRow(label, world_scores(measured, worlds)[0], swings, measured, measured.failed.shape[1] // worlds)
 
 
 def world_scores(measured: Measured, worlds: int) -> Array:
@@ -127,12 +129,17 @@ def world_scores(measured: Measured, worlds: int) -> Array:
 
 
 def ranking(
-    name: str, family: Family, rows: Sequence[RankedRow], tolerated: float = 0.0, steps: bool | None = None
+    name: str,
+    family: Family,
+    rows: Sequence[RankedRow],
+    tolerated: float = 0.0,
+    steps: bool | None = None,
+    compared: Comparisons | None = None,
 ) -> WorldRanking:
     """The ranking of rows that were measured on the same worlds, of which each may fail, swing or chatter in a share.
 
     They were on those motions of the family that are steps, where `steps`, or on its others; of a family of one kind
-    that need not be said.
+    that need not be said. `compared` are their comparisons, where these are over more than worlds.
     """
     kinds = kinds_of(family)
     kind = next(iter(kinds)) if steps is None else steps
@@ -152,7 +159,7 @@ def ranking(
         unit="world",
         labels=[row.label for row in rows],
         scores=scores,
-        standing=standing(scores, swinging, STREAM, tolerated),
+        standing=standing(scores, swinging, STREAM, tolerated, compared=compared),
         swing=np.array([np.nanmax(swing, initial=0.0) for swing in swings]),
         chatter=np.array([one.chatter.max(initial=0.0) for one in measured]),
         unsound=counted(worlds, scores),
@@ -317,4 +324,4 @@ def row_of(
     metrics = {name: metrics_of_worlds[name].reshape(1, -1) for name in RANKED}
     lasted, rests = metrics_of_worlds["lasted"].reshape(1, -1), metrics_of_worlds["rests"].ravel()
     measured = Measured(metrics, failed.reshape(1, -1), lasted, rests, tension_range)
-    return RankedRow(label, scores, unsound.any(axis=1), measured)
+    return RankedRow(label, scores, unsound.any(axis=1), measured, failed.shape[1])
