@@ -16,7 +16,6 @@ from wristctl.errors import UserError
 from wristctl.trial.homing import check_zero, slacken
 from wristctl.trial.log import LOG
 
-
 NAMES = "log", "between", "frames", "residuals", "truth", "wire"
 
 
