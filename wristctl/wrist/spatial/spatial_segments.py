@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike
 
 from wristctl.arrays import Array
 from wristctl.config.wrist import WristParameters
-from wristctl.lanes.named_tuples import tuple_of
+from wristctl.lanes.named_tuples import replacing, tuple_of
 from wristctl.wrist.tendon_layout import TendonLayout
 
 
@@ -54,6 +54,9 @@ FIELDS = len(SpatialSegments._fields)
 
 # Segments of lanes from rows of lanes, in compiled code.
 load_spatial_segments = tuple_of(SpatialSegments)
+
+# Segments with another force on the tip and other stiffnesses.
+load_tip = replacing("force_x", "force_y", "force_z", "stiffness_yy", "stiffness_yz", "stiffness_zz")
 
 
 def ellipse(along: float, across: float, axis: float) -> Array:
