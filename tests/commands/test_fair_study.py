@@ -198,6 +198,24 @@ def test_a_row_of_a_study_chatters_where_the_middle_of_its_noises_does_on_any_mo
     assert not judge_unit.row_of("one", [pieces | still | slams], 65.0).swings.any(), "a wider range is crossed less"
 
 
+def test_a_row_swings_where_it_does_in_motion_by_more_than_feedforward_may(study: Study) -> None:
+    """Of the stored metrics alone: three worlds with a motion that rests and one that does not, three noises each."""
+    (unit,) = judge_unit.judge_units(study, "rig", "pd-ff", {"Kp": 4.0, "Kd": 0.2}, 3, 3)
+    pieces = judge_unit.judged(unit.spec)
+    rests = np.zeros(pieces["rmse"].shape, bool)
+    rests[:, 0] = True
+    calm = pieces | dict.fromkeys(("oscillation", "drift", "chattering", "sustained"), 0.0 * pieces["rmse"])
+    calm |= {"rests": rests}
+    own, open_loop = calm["sustained"].copy(), calm["sustained"].copy()
+    own[0, 1, :2] = own[1, 0] = own[2, 1] = np.deg2rad(0.5)
+    open_loop[2, 1] = np.deg2rad(0.3)
+    swinging = calm | {"sustained": own}
+    row = judge_unit.row_of("one", [swinging], 58.0, open_loop=[calm | {"sustained": open_loop}])
+    assert row.swings.tolist() == [True, False, False], "at rest that is another metric; twice feedforward's is allowed"
+    assert not judge_unit.row_of("one", [swinging], 58.0).swings.any()
+    assert judge_unit.row_of("one", [swinging], 58.0, open_loop=[calm]).swings.tolist() == [True, False, True]
+
+
 def test_ranges_of_worlds_put_together_are_the_whole(study: Study, monkeypatch: pytest.MonkeyPatch) -> None:
     gains = {"Kp": 4.0, "Kd": 0.2}
     (whole,) = judge_unit.judge_units(study, "rig", "pd-ff", gains, 10, 2)

@@ -174,7 +174,7 @@ def _tested(session: Session, study: Study, family: Family, candidates: Sequence
         for number, candidate in enumerate(candidates, start=1):
             law = controller(candidate.controller)
             gains = np.array([list(law.values(candidate.gains))])
-            measured.append(measure(law, gains, cases, study.wrist, [*RANKED, "sustained"]))
+            measured.append(measure(law, gains, cases, study.wrist, RANKED))
             advance(number)
     rows = [
         RankedRow(

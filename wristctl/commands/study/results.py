@@ -89,8 +89,9 @@ def _rankings(study: Study, judged: Pieces) -> dict[str, TunedRanking]:
             continue
         family_of, published = study.families[family], list[int]()
         for steps, motions in kinds_of(family_of).items():
+            (open_loop,), width = of_family[f"{YARDSTICK}/default"], study.wrist.tension_range
             rows = [
-                [row_of(label, pieces, study.wrist.tension_range, motions) for pieces in tunings]
+                [row_of(label, pieces, width, motions, None, open_loop) for pieces in tunings]
                 for label, tunings in of_family.items()
             ]
             published = published or [published_tuning(of_row) for of_row in rows]
@@ -142,13 +143,11 @@ def _tables(
     """Tables and numbers for programs."""
     import pandas as pd
 
-    from wristctl.comparison.world_ranking import RANKED, ranking_frame
+    from wristctl.comparison.world_ranking import ranked_units, ranking_frame
     from wristctl.control.table import write_gains
-    from wristctl.simulation.metrics import METRICS
 
     findings = session.findings
-    units = {name: METRICS[name].unit or "1" for name in RANKED}
-    units |= dict.fromkeys(("rmse_low", "rmse_high", "worst_rmse"), "rad")
+    units = ranked_units() | dict.fromkeys(("rmse_low", "rmse_high", "worst_rmse"), "rad")
     for name, ranking in rankings.items():
         slug = _slug(name)
         findings.table(f"data/ranking-{slug}.csv", ranking_frame(ranking), units=units)
