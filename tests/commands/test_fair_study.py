@@ -16,6 +16,7 @@ import pandas as pd
 import pytest
 
 import wristctl
+from tests.documented import script_of_docs
 from wristctl.commands.study.units import Studied, StudyPlace
 from wristctl.comparison import world_ranking as judge_unit
 from wristctl.comparison.bootstrap import plain
@@ -119,6 +120,20 @@ def test_every_tuning_has_worlds_of_its_own_and_the_median_is_published(done: St
         row = found.labels.index(f"{law}/tuned")
         first_noise = found.rows[row].measured.metrics["rmse"].reshape(10, 2, 2)[:, :, 0]
         assert np.array_equal(again.rows[0].measured.metrics["rmse"].reshape(10, 2), first_noise)
+
+
+def test_what_is_shipped_of_it_is_the_median_tuning_with_its_figures_and_run(done: Studied, study: Study) -> None:
+    run, ranking = run_of(done), done.rankings["rig"]
+    kept = {"elsewhere": {"run": "of another run"}}
+    shipped = script_of_docs("published_gains").with_run(kept, run)
+    assert shipped["elsewhere"] == kept["elsewhere"] and shipped["rig"]["run"] == run.id
+    published = json.loads((run.path / "data" / "gains-rig.json").read_text())
+    assert {name: row["gains"] for name, row in shipped["rig"]["controllers"].items()} == published
+    for name, row in shipped["rig"]["controllers"].items():
+        place = ranking.labels.index(f"{name}/tuned")
+        assert row["rmse"] == pytest.approx(np.exp(np.log(ranking.scores[place]).mean()))
+        assert row["rmse"] == max(row["tunings"]), "of two the worse one is in the middle"
+        assert row["rmse_low"] <= row["rmse"] and row["reliable"] == (place not in ranking.standing.unusable)
 
 
 def test_a_variant_is_held_against_the_one_that_it_names(done: Studied) -> None:

@@ -22,6 +22,7 @@ from wristctl.errors import UserError
 
 if TYPE_CHECKING:
     from wristctl.control.law import Conditions
+    from wristctl.control.shipped_gains import ShippedGains
     from wristctl.wrist.statics import Shortfall
 
 
@@ -47,6 +48,7 @@ def warn_if_it_buckles(findings: Findings, wrist: WristParameters, loops: Iterab
 
 def outside_conditions(rows: Iterable[Row | SimulateSettings], loops: Iterable[Loop]) -> list[str]:
     """Presets that are not made for a loop with motors, tendons and a camera, in words."""
+    from wristctl.control.shipped_gains import is_shipped, shipped_gains
     from wristctl.control.table import controller
 
     real = [rig for rig in loops if rig.actuator.level == "tendon" and rig.sensor.level == "camera"]
@@ -54,6 +56,9 @@ def outside_conditions(rows: Iterable[Row | SimulateSettings], loops: Iterable[L
     presets = {(row.controller, row.gains) for row in rows if isinstance(row.gains, str) and row.gains != "tuned"}
     for name, preset in sorted(presets):
         law = controller(name)
+        if is_shipped(preset):
+            warnings += _of_shipped(name, shipped_gains(law.name, preset), preset, real)
+            continue
         stated = law.conditions.get(preset_today(preset, law.presets))
         if real and stated is None:
             instead = f"; made for them: {', '.join(law.conditions)}" if law.conditions else ""
@@ -68,6 +73,20 @@ def warn_outside_conditions(rows: Iterable[Row | SimulateSettings], loops: Itera
     """Warn of each preset that is not made for its loop."""
     for warning in outside_conditions(rows, loops):
         log.warning("%s", warning)
+
+
+def _of_shipped(name: str, shipped: ShippedGains, label: str, loops: Iterable[Loop]) -> list[str]:
+    """What speaks against shipped gains on loops with motors, tendons and a camera, in words."""
+    warnings = []
+    for loop in loops:
+        if shipped.conditions is None:
+            warnings.append(f"{name}/{label} is of a family without elastic tendons behind a camera: it may swing")
+        elif mismatch := _outside(shipped.conditions, loop):
+            warnings.append(f"{name}/{label} was found for {mismatch}: it may swing")
+        if not shipped.reliable:
+            lost = f"{shipped.lost} of {shipped.worlds} worlds"
+            warnings.append(f"{name}/{label} fails, swings or chatters in {lost} of {shipped.run}")
+    return list(dict.fromkeys(warnings))
 
 
 def _outside(stated: Conditions, loop: Loop) -> str:

@@ -11,6 +11,7 @@ from wristctl.commands.printed_table import Table
 from wristctl.commands.ranking_drawing import draw_rankings
 from wristctl.commands.ranking_tables import answer_tables, every_row
 from wristctl.commands.session import Session
+from wristctl.commands.study.published import PUBLISHED, published, published_gains
 from wristctl.commands.study.units import BASE, Studied, StudyPlace, budget_of, families_of
 from wristctl.config.study import Study
 
@@ -163,6 +164,8 @@ def _tables(
     for family in families_of(session.study):
         if family in rankings and (file := findings.file(f"data/gains-{family}.json")):
             write_gains(file, published_gains(rankings[family], searches))
+    of_families = {name: published(rankings[name], searches) for name in families_of(session.study) if name in rankings}
+    findings.plain(PUBLISHED, of_families)
     flat = [
         {"term": value.term, "family": value.family, "without": value.without, "with": value.given,
          "times": value.times.value, "low": value.times.low, "high": value.times.high,
@@ -174,16 +177,6 @@ def _tables(
     if shifts:
         frame = pd.DataFrame([shift._asdict() | {"best": " -> ".join(shift.best)} for shift in shifts])
         findings.table("data/sensitivity.csv", frame, dict.fromkeys(map(str, frame.columns), "1"))
-
-
-def published_gains(ranking: TunedRanking, searches: Mapping[StudyPlace, Search]) -> dict[str, dict[str, float]]:
-    """Gains of the median tuning of each law on a family, by law."""
-    numbers = dict(zip(ranking.labels, ranking.published, strict=True))
-    return {
-        place.law: search.gains
-        for place, search in searches.items()
-        if (place.variant, place.family) == (BASE, ranking.name) and place.tuning == numbers.get(place.label)
-    }
 
 
 def _step_times(session: Session, searches: Mapping[StudyPlace, Search]) -> dict[str, StepTime]:
