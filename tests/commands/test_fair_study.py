@@ -49,6 +49,8 @@ study:
     small: {candidates: 4, iterations: 2, finalists: 2, tunings: 2, draws: 2, validation: 2, worlds: 10, noises: 2}
 """
 
+pytestmark = pytest.mark.painted
+
 
 @pytest.fixture(scope="module")
 def file(tmp_path_factory: pytest.TempPathFactory) -> Path:

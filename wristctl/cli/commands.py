@@ -50,7 +50,8 @@ COMMANDS = {
         "wristctl.commands.gen_data.command:GEN_DATA",
         _MAIN,
         "Sample tip positions and bending angles for a network.",
-        shortcuts=("samples", "source"),
+        shortcuts=("samples", "source", "columns"),
+        advanced=("columns",),
         examples=(
             "wristctl gen-data experiments/paper.yaml",
             "wristctl gen-data --samples 5000 --label large",
@@ -174,7 +175,8 @@ COMMANDS = {
         "wristctl.commands.hysteresis.command:HYSTERESIS",
         _MORE,
         "Drive the wrist through hysteresis loops; fit a measured one.",
-        shortcuts=("drive", "shape", "measured"),
+        shortcuts=("drive", "shape", "measured", "columns"),
+        advanced=("columns",),
         examples=(
             "wristctl hysteresis experiments/hysteresis.yaml",
             "wristctl hysteresis --measured loop.csv",

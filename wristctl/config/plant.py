@@ -166,6 +166,8 @@ class TrueWrist(Overrides):
     tilt_deg: float = fact(0.0, "deg", "by how much its base leans toward theta > 0, gravity being as believed")
     creep: float = fact(0.0, "", "share of the stiffness that relaxes (one Maxwell branch)", ge=0, lt=1)
     creep_time: float = fact(10.0, "s", "time constant of that", gt=0)
+    inner_friction: float = fact(0.0, "N m", "torque of friction on the bend itself, inside the wrist", ge=0)
+    inner_presliding_deg: float = fact(0.5, "deg", "bend in which that turns round", gt=0)
     end_stop_deg: float | None = fact(None, "deg", "bending angle at which the wrist meets its end stops", gt=0, le=180)
     end_stop_stiffness: float = fact(20.0, "N m/rad", "of the whole wrist's end stops", gt=0)
     end_stop_dissipation: float = fact(1.0, "s/rad", "Hunt and Crossley's: share of that per rate of impact", ge=0)
