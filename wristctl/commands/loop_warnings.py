@@ -132,9 +132,15 @@ class OutOfReach(NamedTuple):
 
 
 def asked_by(study: Study, settings: SimulateSettings | TuneSettings | CompareSettings) -> list[AskedMotion]:
-    """The motions of a section; of a family those at both ends of what they are drawn from, on its own loop."""
+    """The motions of a section; of a family those at both ends of what they are drawn from, on its own loop.
+
+    A family and the scenarios of `tune` have one plane, in which all angles count.
+    """
+    from wristctl.simulation.reference import toward
+
     if isinstance(settings, SimulateSettings):
-        return [AskedMotion("", settings.loop, settings.reference, settings.direction, settings.horizon)]
+        asked = toward(settings.reference, settings.direction)
+        return [AskedMotion("", settings.loop, asked, settings.direction, settings.horizon)]
     if name := settings.worlds.family:
         family = study.families[name]
         return [
@@ -144,7 +150,7 @@ def asked_by(study: Study, settings: SimulateSettings | TuneSettings | CompareSe
         scenarios = settings.scenarios
         return [AskedMotion(s.loop, settings.loops[s.loop], s.reference, "ulnar", settings.horizon) for s in scenarios]
     motions = [
-        AskedMotion(name, loop, reference, direction, settings.horizon)
+        AskedMotion(name, loop, toward(reference, direction), direction, settings.horizon)
         for name, loop in settings.loops.items()
         for reference in settings.references
         for direction in settings.directions
@@ -197,15 +203,14 @@ def refuse_out_of_reach(study: Study, inputs: Inputs) -> None:
 
 def _shortfall(wrist: WristParameters, asked: AskedMotion) -> Shortfall | None:
     from wristctl.simulation.batch import sample_period
-    from wristctl.simulation.reference import motion, toward
+    from wristctl.simulation.reference import motion
     from wristctl.simulation.worlds import loop_facing, plant_of
     from wristctl.wrist.statics import shortfall
 
     if not asked.loop.limits:
         return None
     facing, loop = loop_facing(wrist, asked.loop, asked.direction)
-    reference = by_angles(toward(asked.reference, asked.direction))
-    theta = motion(reference, facing, asked.horizon, sample_period(loop.control_period)).theta_ref
+    theta = motion(by_angles(asked.reference), facing, asked.horizon, sample_period(loop.control_period)).theta_ref
     low, high = min(0.0, float(theta.min())), max(0.0, float(theta.max()))
     return shortfall(plant_of(facing, loop.plant), low, high, loop.disturbances.load)
 
