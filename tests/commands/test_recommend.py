@@ -29,7 +29,8 @@ from wristctl.tuning.scaled_presets import dynamic_stiffness, scaled_to
 
 WRIST = WristParameters()
 QUICK = (
-    "recommend={controllers: [pid-ff, ct-dob], loop: {plant_segments: 1, control_period: 5.0e-3}, "
+    "recommend={controllers: [pid-ff, ct-dob], loop: {plant_segments: 1, actuator: {level: ideal}, "
+    "sensor: {level: ideal}}, "
     "draw: {plant.stiffness: x0.7..1.3, disturbances.load: '-0.3..0.3'}, horizon: 2.5, draws: 2, validation: 2, "
     "tests: 8, candidates: 4, iterations: 1, frequencies: [0.5, 1.0], payloads: [0.2]}"
 )
@@ -238,6 +239,19 @@ def test_where_no_feedback_is_better_than_none_that_is_the_reason_and_not_that_a
     assert nothing.best is None and nothing.fault is not None and "swings" in nothing.fault.what
     tied = replace(ranked, standing=ranked.standing._replace(groups=[[len(done.candidates) - 1, 0]]))
     assert replace(found, ranking=tied).best == done.candidates[0]
+
+
+def test_a_rig_of_which_one_thing_is_stated_keeps_its_motors_tendons_camera_and_period() -> None:
+    rig = Study().recommend.loop
+    assert rig.actuator.level == "tendon" and rig.sensor.level == "camera"
+    for setting in ("sensor.delay_frames=3", "actuator.friction=0.3", "plant_segments=2", "control_period=1.0e-2"):
+        loop = wristctl.load_study(None, f"recommend.loop.{setting}").recommend.loop
+        section, _, leaf = setting.partition("=")[0].rpartition(".")
+        changed = getattr(loop, section) if section else loop
+        assert getattr(changed, leaf) == float(setting.partition("=")[2])
+        default = {leaf: getattr(getattr(rig, section) if section else rig, leaf)}
+        mended = changed.model_copy(update=default)
+        assert (loop.model_copy(update={section: mended}) if section else mended) == rig, "nothing else"
 
 
 RIG = (
