@@ -16,7 +16,7 @@ import pytest
 from typer.main import get_command
 
 from tests.cli.conftest import Call, Command
-from wristctl.cli import app, command
+from wristctl.cli import app
 from wristctl.cli.app import typer_of
 from wristctl.cli.commands import CALIBRATIONS, COMMANDS
 from wristctl.commands.perform import perform

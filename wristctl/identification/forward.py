@@ -134,6 +134,13 @@ def angles(candidates: Sequence[SupposedWrist], reeled: Array, h: float, n: int,
         wide = angle.shape[1:]
         memory = np.ascontiguousarray(np.broadcast_to(rest.reshape(-1, *[1] * len(wide)), (len(rest), *wide)))
         advance(
-            model, value, (tendon, one_block(friction, block)), spools, memory, np.zeros((2 * k, *wide)), angle, (0,) * k
+            model,
+            value,
+            (tendon, one_block(friction, block)),
+            spools,
+            memory,
+            np.zeros((2 * k, *wide)),
+            angle,
+            (0,) * k,
         )
     return to_rows(trajectories, len(candidates))
