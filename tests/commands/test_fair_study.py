@@ -16,6 +16,7 @@ import pandas as pd
 import pytest
 
 import wristctl
+from tests.documented import script_of_docs
 from wristctl.commands.study.units import Studied, StudyPlace
 from wristctl.comparison import world_ranking as judge_unit
 from wristctl.comparison.bootstrap import plain
@@ -123,6 +124,20 @@ def test_every_tuning_has_worlds_of_its_own_and_the_median_is_published(done: St
         assert np.array_equal(again.rows[0].measured.metrics["rmse"].reshape(10, 2), first_noise)
 
 
+def test_what_is_shipped_of_it_is_the_median_tuning_with_its_figures_and_run(done: Studied, study: Study) -> None:
+    run, ranking = run_of(done), done.rankings["rig"]
+    kept = {"elsewhere": {"run": "of another run"}}
+    shipped = script_of_docs("published_gains").with_run(kept, run)
+    assert shipped["elsewhere"] == kept["elsewhere"] and shipped["rig"]["run"] == run.id
+    published = json.loads((run.path / "data" / "gains-rig.json").read_text())
+    assert {name: row["gains"] for name, row in shipped["rig"]["controllers"].items()} == published
+    for name, row in shipped["rig"]["controllers"].items():
+        place = ranking.labels.index(f"{name}/tuned")
+        assert row["rmse"] == pytest.approx(np.exp(np.log(ranking.scores[place]).mean()))
+        assert row["rmse"] == max(row["tunings"]), "of two the worse one is in the middle"
+        assert row["rmse_low"] <= row["rmse"] and row["reliable"] == (place not in ranking.standing.unusable)
+
+
 def test_a_variant_is_held_against_the_one_that_it_names(done: Studied) -> None:
     """The same search twice finds the same gains: nothing turns round, and no RMSE changes."""
     table = pd.read_csv(run_of(done).path / "data" / "sensitivity.csv", comment="#").set_index("variant")
@@ -198,6 +213,24 @@ def test_a_row_of_a_study_chatters_where_the_middle_of_its_noises_does_on_any_mo
     row = judge_unit.row_of("one", [pieces | still | slams], 58.0)
     assert row.swings.tolist() == [False, True, False] and (row.measured.chatter > 0.0).sum() == 3
     assert not judge_unit.row_of("one", [pieces | still | slams], 65.0).swings.any(), "a wider range is crossed less"
+
+
+def test_a_row_swings_where_it_does_in_motion_by_more_than_feedforward_may(study: Study) -> None:
+    """Of the stored metrics alone: three worlds with a motion that rests and one that does not, three noises each."""
+    (unit,) = judge_unit.judge_units(study, "rig", "pd-ff", {"Kp": 4.0, "Kd": 0.2}, 3, 3)
+    pieces = judge_unit.judged(unit.spec)
+    rests = np.zeros(pieces["rmse"].shape, bool)
+    rests[:, 0] = True
+    calm = pieces | dict.fromkeys(("oscillation", "drift", "chattering", "sustained"), 0.0 * pieces["rmse"])
+    calm |= {"rests": rests}
+    own, open_loop = calm["sustained"].copy(), calm["sustained"].copy()
+    own[0, 1, :2] = own[1, 0] = own[2, 1] = np.deg2rad(0.5)
+    open_loop[2, 1] = np.deg2rad(0.3)
+    swinging = calm | {"sustained": own}
+    row = judge_unit.row_of("one", [swinging], 58.0, open_loop=[calm | {"sustained": open_loop}])
+    assert row.swings.tolist() == [True, False, False], "at rest that is another metric; twice feedforward's is allowed"
+    assert not judge_unit.row_of("one", [swinging], 58.0).swings.any()
+    assert judge_unit.row_of("one", [swinging], 58.0, open_loop=[calm]).swings.tolist() == [True, False, True]
 
 
 def test_ranges_of_worlds_put_together_are_the_whole(study: Study, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -66,6 +66,11 @@ class TunedRanking(WorldRanking):
         means = np.exp(self.logarithms.mean(axis=(2, 3)))
         return [(float(errors.min()), float(errors.max())) for errors in means]
 
+    def published_error(self, row: int) -> float:
+        """Geometric mean of the RMSE [rad] of a row's published gains; a failure counts as 90 deg."""
+        tunings = self.logarithms[row]
+        return float(np.exp(tunings[self.published[row] % len(tunings)].mean()))
+
     def tunings_frame(self) -> pd.DataFrame:
         """A line for each tuning of each row that was tuned: its error [rad], and in how many worlds it is lost."""
         import pandas as pd

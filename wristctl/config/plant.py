@@ -196,12 +196,24 @@ class Drift(Section):
     duration: float = quantity(5.0, "s", "how long it takes", "assumed", gt=0)
 
 
+class Grasp(Section):
+    """An object that the hand takes up while the forearm is level, so that its weight lies across the straight wrist.
+
+    Its inertia is left out: at 5 rad/s^2 it is a twentieth of the weight.
+    """
+
+    mass: float = quantity(0.0, "kg", "mass of the object; + weighs toward theta > 0, - to the other side")
+    start: float = quantity(1.0, "s", "time at which its weight begins to be felt", "assumed", ge=0)
+    duration: float = quantity(0.2, "s", "time until all of it is", "assumed", gt=0)
+
+
 class Disturbances(OpenSection):
     """Disturbances of the wrist, unknown to its controller."""
 
     push: Push = Push()
     load: float = quantity(0.0, "N", "constant force on the last disc, across the straight wrist")
     drift: Drift = Drift()
+    grasp: Grasp = Grasp()
 
     def added(self) -> Mapping[str, Parameter]:
         """Parameters that disturbances from outside the package add."""

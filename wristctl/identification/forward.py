@@ -85,8 +85,9 @@ def _less(faults: Any, tendons: Any, plant: Any, q: Any, on_spools: Any, time: A
 
 
 def _advance(
-    model: Any, values: Any, tendon: Any, inner: Any, spools: Any, memory: Any, state: Any, angle: Any, cut: Any
+    model: Any, values: Any, friction: Any, spools: Any, memory: Any, state: Any, angle: Any, cut: Any
 ) -> None:
+    tendon, inner = friction
     plant, tendon_rows = parameters_of(model, rows_of(values)), rows_of(tendon)
     zero = zero_like(tendon_rows[0])
     tendons = RealTendons(tendon_rows[_STIFFNESS], read_nonideal(tendon_rows), rows_of(memory), inner_in_lanes(inner))
@@ -133,6 +134,13 @@ def angles(candidates: Sequence[SupposedWrist], reeled: Array, h: float, n: int,
         wide = angle.shape[1:]
         memory = np.ascontiguousarray(np.broadcast_to(rest.reshape(-1, *[1] * len(wide)), (len(rest), *wide)))
         advance(
-            model, value, tendon, one_block(friction, block), spools, memory, np.zeros((2 * k, *wide)), angle, (0,) * k
+            model,
+            value,
+            (tendon, one_block(friction, block)),
+            spools,
+            memory,
+            np.zeros((2 * k, *wide)),
+            angle,
+            (0,) * k,
         )
     return to_rows(trajectories, len(candidates))

@@ -11,6 +11,7 @@ from wristctl.commands.printed_table import Table
 from wristctl.commands.ranking_drawing import draw_rankings
 from wristctl.commands.ranking_tables import answer_tables, every_row
 from wristctl.commands.session import Session
+from wristctl.commands.study.published import PUBLISHED, published, published_gains
 from wristctl.commands.study.units import BASE, Studied, StudyPlace, budget_of, families_of
 from wristctl.config.study import Study
 
@@ -89,8 +90,9 @@ def _rankings(study: Study, judged: Pieces) -> dict[str, TunedRanking]:
             continue
         family_of, published = study.families[family], list[int]()
         for steps, motions in kinds_of(family_of).items():
+            (open_loop,), width = of_family[f"{YARDSTICK}/default"], study.wrist.tension_range
             rows = [
-                [row_of(label, pieces, study.wrist.tension_range, motions) for pieces in tunings]
+                [row_of(label, pieces, width, motions, None, open_loop) for pieces in tunings]
                 for label, tunings in of_family.items()
             ]
             published = published or [published_tuning(of_row) for of_row in rows]
@@ -142,13 +144,11 @@ def _tables(
     """Tables and numbers for programs."""
     import pandas as pd
 
-    from wristctl.comparison.world_ranking import RANKED, ranking_frame
+    from wristctl.comparison.world_ranking import ranked_units, ranking_frame
     from wristctl.control.table import write_gains
-    from wristctl.simulation.metrics import METRICS
 
     findings = session.findings
-    units = {name: METRICS[name].unit or "1" for name in RANKED}
-    units |= dict.fromkeys(("rmse_low", "rmse_high", "worst_rmse"), "rad")
+    units = ranked_units() | dict.fromkeys(("rmse_low", "rmse_high", "worst_rmse"), "rad")
     for name, ranking in rankings.items():
         slug = _slug(name)
         findings.table(f"data/ranking-{slug}.csv", ranking_frame(ranking), units=units)
@@ -164,6 +164,8 @@ def _tables(
     for family in families_of(session.study):
         if family in rankings and (file := findings.file(f"data/gains-{family}.json")):
             write_gains(file, published_gains(rankings[family], searches))
+    of_families = {name: published(rankings[name], searches) for name in families_of(session.study) if name in rankings}
+    findings.plain(PUBLISHED, of_families)
     flat = [
         {"term": value.term, "family": value.family, "without": value.without, "with": value.given,
          "times": value.times.value, "low": value.times.low, "high": value.times.high,
@@ -175,16 +177,6 @@ def _tables(
     if shifts:
         frame = pd.DataFrame([shift._asdict() | {"best": " -> ".join(shift.best)} for shift in shifts])
         findings.table("data/sensitivity.csv", frame, dict.fromkeys(map(str, frame.columns), "1"))
-
-
-def published_gains(ranking: TunedRanking, searches: Mapping[StudyPlace, Search]) -> dict[str, dict[str, float]]:
-    """Gains of the median tuning of each law on a family, by law."""
-    numbers = dict(zip(ranking.labels, ranking.published, strict=True))
-    return {
-        place.law: search.gains
-        for place, search in searches.items()
-        if (place.variant, place.family) == (BASE, ranking.name) and place.tuning == numbers.get(place.label)
-    }
 
 
 def _step_times(session: Session, searches: Mapping[StudyPlace, Search]) -> dict[str, StepTime]:
