@@ -8,10 +8,11 @@ from wristctl.config.loop import Loop
 from wristctl.config.wrist import WristParameters
 from wristctl.control.table import controller, gains_of
 from wristctl.errors import UserError
+from wristctl.plotting.bend_figure import bend_figure
 from wristctl.simulation.bend_paths import BEND_PATHS
 from wristctl.simulation.motion import Angles, Motion
 from wristctl.simulation.rollout import rollout
-from wristctl.simulation.two_planes import BendCourse, bend_path, simulate_two_planes
+from wristctl.simulation.two_planes import BendCourse, bend_path, reach_of_bends, simulate_two_planes
 from wristctl.wrist.tendon_layout import TendonLayout
 
 LAW = controller("pid-ff")
@@ -108,6 +109,27 @@ def test_a_wrist_pushed_out_of_its_range_has_failed_for_good() -> None:
     assert course.failed and np.isnan(course.metrics()["rmse"])
     lost = np.isnan(course.bend[:, 0])
     assert lost[np.argmax(lost) :].all()
+
+
+def test_the_reach_of_weak_tendons_is_where_a_held_bend_saturates() -> None:
+    weak = WRIST.model_copy(update={"tension_limit": 9.0})
+    reach = np.hypot(*reach_of_bends(weak, TendonLayout.four(WRIST.tendon_radius), 8).T)
+    assert reach[0] == pytest.approx(reach[[2, 4, 6, 8]])
+    assert reach[1] == pytest.approx(reach[[3, 5, 7]])
+    assert 0.0 < reach[1] < reach[0] < np.deg2rad(WRIST.range_deg)  # toward one tendon; between two
+    still = np.zeros((2, 3, 3001))
+    for degrees, saturates in ((-2.0, False), (2.0, True)):
+        still[0, 0] = np.minimum(np.arange(3001) / 1500, 1.0) * (reach[0] + np.deg2rad(degrees))
+        assert (followed(still, weak).share[-1] < 0.999) == saturates
+
+
+def test_the_picture_draws_what_is_wanted_followed_and_in_reach() -> None:
+    course = followed(bend_path("figure-of-8", 20.0, 1.0, 1.0))
+    (axes,) = bend_figure(course, reach_of_bends(WRIST, TendonLayout.of(WRIST))).axes
+    lines = {line.get_label(): line.get_xydata() for line in axes.get_lines()}
+    assert set(lines) == {"in reach", "wanted", "followed"}
+    assert np.array(lines["followed"]) == pytest.approx(np.rad2deg(course.bend))
+    assert np.hypot(*np.array(lines["in reach"]).T).max() == pytest.approx(WRIST.range_deg)
 
 
 def test_what_cannot_run_is_said() -> None:

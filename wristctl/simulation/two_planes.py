@@ -19,8 +19,10 @@ from wristctl.simulation.spatial_kernel import (
     run_spatial,
 )
 from wristctl.simulation.worlds import bending_limit
+from wristctl.wrist.allocation import allocated
 from wristctl.wrist.segments import segments
 from wristctl.wrist.spatial.spatial_kinematics import spatial_tips
+from wristctl.wrist.spatial.spatial_model import spatial_terms
 from wristctl.wrist.spatial.spatial_segments import OF_A_TENDON, spatial_values
 from wristctl.wrist.tendon_layout import TendonLayout
 
@@ -107,6 +109,24 @@ def bend_path(name: str, size_deg: float, turn: float, horizon: float, toward_de
     c, s = np.cos(np.deg2rad(toward_deg)), np.sin(np.deg2rad(toward_deg))
     turned: Array = np.einsum("ij,jkt->ikt", np.array([[c, -s], [s, c]]), path)
     return turned
+
+
+def reach_of_bends(wrist: WristParameters, layout: TendonLayout, directions: int = 72) -> Array:
+    """The largest bend (directions + 1, 2) [rad] that tendons within their limits hold at rest, all around.
+
+    Of the wrist as one segment, to half a degree, up to its range; the last direction is the first again.
+    """
+    around = np.linspace(0.0, 2.0 * np.pi, directions + 1)
+    sizes = np.deg2rad(np.arange(0.0, wrist.range_deg + 0.25, 0.5))
+    bends = sizes[:, None, None] * np.stack([np.cos(around), np.sin(around)], axis=-1)
+    at_rest = spatial_terms(spatial_values(wrist, layout, 1), bends, 0.0 * bends)
+    torque = at_rest.bias + wrist.stiffness * np.array([1.0, wrist.flexion_ratio]) * bends
+    limits = wrist.pretension * layout.multiplicity, wrist.tension_limit * layout.multiplicity
+    arms = at_rest.moment_arms.reshape(-1, len(layout.places), 2)
+    held = ~allocated(arms, torque.reshape(-1, 2), *limits).saturated.reshape(len(sizes), -1)
+    last = np.cumprod(held, axis=0).sum(axis=0) - 1
+    reach: Array = bends[last.clip(0), np.arange(directions + 1)]
+    return reach
 
 
 def simulate_two_planes(
