@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
 from wristctl.arrays import Array
@@ -121,7 +122,8 @@ def expected_bend(recording: NeckRecording, shared: Array, own: Array) -> Array:
     lift = gain / RADIUS * (recording.delayed(delay) - 1e-3 * own[2:])
     c, s = math.cos(turn), math.sin(turn)
     bend = static_bend(lift, recording.mass, tendon, softening, compression)
-    return bend @ np.array([[c, s], [-s, c]]) + own[:2]
+    turned: Array = bend @ np.array([[c, s], [-s, c]]) + own[:2]
+    return turned
 
 
 def predict_third_load(folder: Path) -> NeckPrediction:
@@ -134,7 +136,8 @@ def predict_third_load(folder: Path) -> NeckPrediction:
         rows, owns = [], x[6:].reshape(-1, 5)
         for recording, own in zip(recordings, owns, strict=True):
             rows += [np.degrees(expected_bend(recording, x[:6], own) - recording.bend).ravel(), _SLACK_WEIGHT * own[2:]]
-        return np.concatenate(rows)
+        every: Array = np.concatenate(rows)
+        return every
 
     scale = np.r_[0.1, 3.0, 0.1, 0.05, 0.02, 0.05, np.tile([0.02, 0.02, 0.5, 0.5, 0.5], 2)]
     bounds = np.r_[_LOW, np.tile(-_OWN_HIGH, 2)], np.r_[_HIGH, np.tile(_OWN_HIGH, 2)]
@@ -142,7 +145,8 @@ def predict_third_load(folder: Path) -> NeckPrediction:
 
     def zeros(own: Array) -> Array:
         wrong = expected_bend(asked, x[:6], own) - asked.bend
-        return np.r_[np.degrees(wrong[begin]).ravel(), _SLACK_WEIGHT * own[2:]]
+        rows: Array = np.r_[np.degrees(wrong[begin]).ravel(), _SLACK_WEIGHT * own[2:]]
+        return rows
 
     own = least_squares(zeros, np.zeros(5)).x
     wrong = np.degrees(expected_bend(asked, x[:6], own) - asked.bend)[~begin]
@@ -165,7 +169,7 @@ def error_by_blocks(wrong: Array, time: Array) -> tuple[float, float, float]:
     return _rms(wrong), float(low), float(high)
 
 
-def _linear(recordings: list[NeckRecording], asked: NeckRecording, begin: Array) -> float:
+def _linear(recordings: list[NeckRecording], asked: NeckRecording, begin: NDArray[np.bool_]) -> float:
     """Error [deg] of a linear map of the motors 50 ms earlier, whose zeros the begin of the asked recording gives."""
     spools = [recording.delayed(0.05) for recording in recordings]
     zeros = np.repeat(np.eye(len(spools)), [len(part) for part in spools], axis=0)
