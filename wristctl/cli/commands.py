@@ -183,6 +183,7 @@ COMMANDS = {
             "wristctl hysteresis --drive tensions --set 'ranges_deg=[[0, 30]]' --set 'sheaths=[0, 1]'",
         ),
     ),
+    "validate": Entry("wristctl.cli.validate:app", _MORE, "Hold the model against recordings of real robots."),
     "export-model": Entry("wristctl.cli.export_model:app", _MORE, "Write the wrist of a run for MuJoCo or MATLAB."),
     "paper": Entry("wristctl.cli.paper_commands:app", _MORE, "Check the paper's claims one by one."),
 }
