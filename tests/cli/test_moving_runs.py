@@ -11,6 +11,8 @@ from tests.cli.conftest import Call
 from wristctl.records import Run, open_run
 
 WALK = "time [s],angle [deg]\n" + "".join(f"{t / 20},{5 * (t / 20) ** 2}\n" for t in range(21))
+pytestmark = pytest.mark.painted  # their pictures are part of what is compared
+
 STUDY = """
 gen-data: {samples: 60}
 train: {hidden: [4], epochs: 2, workers: 1}
@@ -60,7 +62,6 @@ def again(call: Call, run: Path, *out: str) -> Run:
     return Run(Path(said.splitlines()[-1]))
 
 
-@pytest.mark.painted
 def test_a_packed_run_is_done_again_at_a_colleagues_with_the_same_result(call: Call, made: Run) -> None:
     code, said, err = call("runs", "pack", made.id, "--out", "author/results", "--file", "mail.zip")
     assert code == 0 and said.splitlines()[-1] == "mail.zip", err
