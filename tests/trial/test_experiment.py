@@ -23,7 +23,7 @@ def test_a_trial_follows_its_reference_and_comes_back(experiment: Run) -> None:
     done = experiment()
     log, truth = done.table("log"), done.table("truth")
     assert done.error is None and done.experiment.outcomes == {0: "ok"}
-    assert list(log.columns) == list(LOG) and len(log) == 80 and (log["state"] == "ENABLED").all()
+    assert list(log.columns) == list(LOG) and len(log) == 40 and (log["state"] == "ENABLED").all()
     error = np.interp(log["time"], truth["time"], truth["theta"]) - log["theta_ref"]
     assert math.degrees(np.abs(error).max()) < 0.6
     between = done.table("between")
@@ -52,9 +52,13 @@ def test_frames_are_fused_at_their_capture_time(experiment: Run) -> None:
     assert math.degrees(off[0]) < 0.6 < math.degrees(off[1])
 
 
-def test_positions_in_the_log_are_of_the_time_that_it_says(experiment: Run) -> None:
-    """By the true spools: to a tenth of a millisecond, though a status comes four after its command."""
-    done = experiment()
+@pytest.mark.parametrize(("period", "most"), [(10.1e-3, 1e-4), (10e-3, 0.6e-3)])
+def test_positions_in_the_log_are_of_the_time_that_it_says(experiment: Run, period: float, most: float) -> None:
+    """By the true spools, to a tenth of a millisecond, though a status comes six after its command.
+
+    That is so where ticks begin anywhere in USB's frames. Where they keep step with them, a whole frame may go by.
+    """
+    done = experiment(control_period=period)
     log, truth = done.table("log"), done.bench.truth()
     begin = float(log["clock"].iloc[0] - log["time"].iloc[0])
     late, weight = 0.0, 0.0
@@ -64,7 +68,7 @@ def test_positions_in_the_log_are_of_the_time_that_it_says(experiment: Run) -> N
         true = np.interp(log["counted"] + begin, truth.time - 0.5e-3, truth.reeled[:, axis])
         late += float(rate @ (position - true))
         weight += float(rate @ rate)
-    assert abs(late / weight) < 1e-4
+    assert abs(late / weight) < most
     assert (log["counted"] - log["time"]).mean() > 1e-3
 
 

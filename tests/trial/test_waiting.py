@@ -81,7 +81,7 @@ def test_in_ten_seconds_no_step_is_made_and_tendons_keep_their_pull(
     done = two_planes(experiment, seed, takes=10.0, force=force)
     assert done.error is None and done.experiment.outcomes == {0: "ok", 1: "ok"}
     assert waited.seconds == pytest.approx(10.0, abs=0.05)
-    assert set(waited.steps) == {waited.steps[0]} and len(waited.steps) > 400
+    assert set(waited.steps) == {waited.steps[0]} and len(waited.steps) > 300
     bent = waited.angles.max() - waited.angles[0], waited.angles[0] - waited.angles.min()
     changed = np.abs(waited.pulls - waited.pulls[0]).max(axis=1)
     print(f"{seed} {force} bent by {bent}, pulls change by {changed.max():.2f} N, in the end by {changed[-1]:.2f} N")

@@ -123,9 +123,12 @@ class RenderedCamera(Section):
 class SerialLine(Section):
     """The wire between the host and the emulated board."""
 
-    latency_timer: float = quantity(
-        1e-3, "s", "the USB adapter hands over what the board says at this interval", "USB's frames", ge=1e-3, le=0.255
+    adapter: Literal["16u2", "ftdi", "ch340"] = choice(
+        "16u2",
+        "USB adapter, which hands over what the board says; 16u2, a genuine Mega's: every 4.096 ms; ftdi: every "
+        "latency_timer; ch340: in each of USB's frames of 1 ms",
     )
+    latency_timer: float = quantity(16e-3, "s", "of an ftdi adapter", "FTDI's default", ge=1e-3, le=0.255)
 
 
 class WeakenedPlant(TrueWrist):

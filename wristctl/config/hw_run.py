@@ -131,7 +131,7 @@ class HwRunSettings(RigSettings):
     back: float = quantity(1.0, "s", "duration of the return to zero", "assumed", gt=0)
     rest: float = quantity(0.5, "s", "rest at zero before each trial", "assumed", ge=0.1)
     control_period: float = quantity(
-        5e-3, "s", "time between two evaluations of the controller", "assumed", ge=2e-3, le=0.05
+        10e-3, "s", "time between two evaluations of the controller", "a Mega answers within 9 ms", ge=2e-3, le=0.05
     )
     calibration: str | None = choice(None, "calibrate-wrist run; without one the rig is homed from scratch")
     positions: Literal["find", "stored"] = choice("find", "zero positions: found anew, or as the calibration left them")
