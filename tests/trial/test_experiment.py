@@ -9,12 +9,15 @@ from typing import Any
 import numpy as np
 import pytest
 
-from tests.trial.conftest import Run, settings_of
+from tests.trial.conftest import WRIST, Run, settings_of
 from wristctl.board.driver import Board
 from wristctl.board.messages import State
 from wristctl.errors import UserError
-from wristctl.trial.homing import check_zero, slacken
+from wristctl.trial.experiment import spared
+from wristctl.trial.homing import slacken
 from wristctl.trial.log import LOG
+from wristctl.trial.safety import SafetyStop
+from wristctl.trial.zero_checks import check_zero
 
 NAMES = "log", "between", "frames", "residuals", "truth", "wire"
 
@@ -134,3 +137,24 @@ def test_stored_positions_of_another_start_of_the_board_are_refused(experiment: 
     assert isinstance(done.error, UserError) and done.error.exit_code == 4
     assert "the board has restarted since" in done.error.what and "positions: stored" in done.error.fix
     assert not (done.folder / "log.csv").read_text().splitlines()[1:]
+
+
+def test_co_contraction_in_a_trial_is_found_behind_it_and_never_beyond_the_motors_pull(experiment: Run) -> None:
+    faults = tuple({"kind": "tendon-creeps", "at": 0.1, "axis": axis, "size": -3.0, "duration": 0.6} for axis in (1, 2))
+    bench = {"motors": {"slack": (0.0, 0.0, 0.0, 0.0)}, "person": {"takes": 0.5}, "faults": faults}
+    done = experiment(bench=bench)
+    assert isinstance(done.error, SafetyStop) and "tendons pull against each other" in done.error.what
+    assert done.experiment.outcomes == {0: "ok"} and done.experiment.odd == {0: ""}, "no residual shows it"
+    assert 30.0 < done.bench.truth().pull.max() < 43.5
+
+
+def test_no_law_asks_for_more_than_the_motors_hold_and_nothing_is_pulled_beyond_the_least_of_limits(
+    experiment: Run,
+) -> None:
+    done = experiment(safety={"motor_pull": 30.0, "tension": 45.0})
+    assert done.experiment._wrist.tension_limit == pytest.approx(24.0)
+    assert done.experiment._settings.safety.tension == 30.0
+    strong = settings_of(safety={"motor_pull": 200.0, "tension": 150.0}).within(WRIST)
+    assert strong.safety.tension == WRIST.tension_limit == 60.0
+    with pytest.raises(UserError, match="cannot hold a pretension of 2 N"):
+        spared(WRIST, settings_of(safety={"motor_pull": 2.4}))

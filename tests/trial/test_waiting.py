@@ -164,11 +164,15 @@ def test_at_a_real_rig_a_person_is_asked_with_the_wait_that_a_fault_may_end(monk
     asked: list[str] = []
     monkeypatch.setattr(testbeds, "DeviceCamera", Dark)
     monkeypatch.setattr(testbeds, "open_transport", Dark)
-    real = RealTestbed(settings_of(port="x"), View(), None, ask)
+    real = RealTestbed(settings_of(port="x", safety={"motor_pull": 30.0}), View(), None, ask)
     for question in (real.confirm, lambda meanwhile: real.face("flexion", meanwhile)):
         with pytest.raises(TimeoutError):
             question(_fault)
-    assert asked[0] == BEFORE_MOTION and "bends toward flexion" in asked[1]
+    assert (
+        asked[0] == BEFORE_MOTION.format(30.0)
+        and "pull 30 N at most" in asked[0]
+        and "bends toward flexion" in asked[1]
+    )
 
 
 def _fault() -> None:

@@ -10,6 +10,7 @@ from wristctl.config.controller_row import Row
 from wristctl.config.loop import DirectionName, Loop, Reference
 from wristctl.config.plant import Actuator, Plant, Push, Sensor, TrueActuator, TrueSensor, TrueWrist
 from wristctl.config.section import Section, choice, quantity
+from wristctl.config.wrist import WristParameters
 from wristctl.errors import Unfitting
 
 # Lifetime of a step rate on the board: least time [s], and number of ticks.
@@ -41,7 +42,13 @@ class Safety(Section):
 
     angle_deg: float = quantity(55.0, "deg", "largest bending angle, as estimated", "range and a tenth", gt=0)
     rate: float = quantity(10.0, "rad/s", "largest bending rate, as estimated", "assumed", gt=0)
-    tension: float = quantity(80.0, "N", "largest tension by spool position and estimated angle", "assumed", gt=0)
+    motor_pull: float = quantity(
+        42.0, "N", "largest pull of a motor at its drive's current, beyond which it slips", "1.0 A: rig.md", gt=0
+    )
+    tension: float = quantity(
+        60.0, "N", "largest by spool position and estimated angle; motor_pull or wrist.tension_limit where less",
+        "assumed", gt=0,
+    )  # fmt: skip
     travel: float = quantity(0.020, "m", "furthest a spool may reel in or pay out from zero", "assumed", gt=0)
     follow_deg: float = quantity(
         3.5, "deg", "furthest that the marker may be from where the spools should have the wrist", "measured", gt=0
@@ -95,6 +102,11 @@ class RigSettings(Section):
     device: Device = Device()
     bench: BenchSettings = choice(BenchSettings(), "the emulated rig, where there is no port")
     optics: str | None = choice(None, "calibrate-camera run; without one the camera looks square at the plane")
+
+    def within(self, wrist: WristParameters) -> Self:
+        """Settings whose largest tension is no more than the wrist bears and the motors can pull."""
+        tension = min(self.safety.tension, self.safety.motor_pull, wrist.tension_limit)
+        return self.model_copy(update={"safety": self.safety.model_copy(update={"tension": tension})})
 
     @model_validator(mode="after")
     def _spools_and_frames(self) -> Self:
