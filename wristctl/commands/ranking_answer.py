@@ -202,13 +202,19 @@ def do_not_use(rankings: Sequence[Ranking], names: Mapping[str, str]) -> str:
 
 
 def _elsewhere(rankings: Sequence[Ranking], names: Mapping[str, str]) -> str:
-    """Names of those that must not be used in further conditions, those of the same conditions together."""
-    bad = [(ranking, [ranking.labels[row] for row in ranking.standing.unusable]) for ranking in rankings]
-    by_places: dict[tuple[str, ...], list[str]] = {}
-    for label in dict.fromkeys(label for _, labels in bad for label in labels):
-        places = tuple(condition(ranking) for ranking, labels in bad if label in labels)
-        by_places.setdefault(places, []).append(names[label])
-    listed = [f"{joined(who)} in {joined(places)}" for places, who in by_places.items()]
+    """Those that must not be used in further conditions, and why; those with one fault in the same ones together."""
+    where: dict[tuple[str, str], list[str]] = {}
+    for ranking in rankings:
+        for row in ranking.standing.unusable:
+            verb = next(iter(facts(ranking, row)))
+            where.setdefault((ranking.labels[row], verb), []).append(condition(ranking))
+    alike: dict[tuple[str, tuple[str, ...]], list[str]] = {}
+    for (label, verb), places in where.items():
+        alike.setdefault((verb, tuple(places)), []).append(names[label])
+    listed = [
+        f"{joined(who)}, which {_THEY[verb].removeprefix('these ') if len(who) > 1 else verb} in {joined(places)}"
+        for (verb, places), who in alike.items()
+    ]
     return f" Elsewhere do not use {'; '.join(listed)}." if listed else ""
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from wristctl.commands.printed_table import degrees, two
@@ -52,9 +52,19 @@ def names_of(rankings: Sequence[Ranking]) -> dict[str, str]:
     names = {}
     for label in labels:
         name, _, gains = label.partition("/")
-        short = name if controllers[name] == 1 and gains != PRINTED else label
-        names[label] = short if len(short) <= _LETTERS else f"{short[: _LETTERS - 1]}~"
-    return names
+        names[label] = name if controllers[name] == 1 and gains != PRINTED else label
+    return _shortened(names)
+
+
+def _shortened(names: Mapping[str, str]) -> dict[str, str]:
+    """Names by label, cut where they are long: at the end, else in the middle, else not, so that all differ."""
+    begins = {label: f"{name[: _LETTERS - 1]}~" for label, name in names.items()}
+    middles = {label: f"{name[:7]}~{name[8 - _LETTERS :]}" for label, name in names.items()}
+    shown = {}
+    for label, name in names.items():
+        tries = [cut[label] for cut in (begins, middles) if Counter(cut.values())[cut[label]] == 1]
+        shown[label] = name if len(name) <= _LETTERS or not tries else tries[0]
+    return shown
 
 
 def winner(ranking: Ranking, rankings: Sequence[Ranking] = ()) -> int | None:
