@@ -3,15 +3,25 @@
 from __future__ import annotations
 
 import logging
+import os
 import signal
 import subprocess
 from collections import Counter
 from collections.abc import Callable, Iterator
+from functools import cache
+from importlib import metadata
 from pathlib import Path
-from typing import Any
+from types import SimpleNamespace
+from typing import TYPE_CHECKING, Any
 
 import pytest
 from hypothesis import HealthCheck, settings
+
+from wristctl.records import formats, provenance, start
+from wristctl.records.manifest import Code
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 # A shell starts background jobs with Ctrl-C ignored, and children inherit that: tests that interrupt need it back.
 signal.signal(signal.SIGINT, signal.default_int_handler)
@@ -25,6 +35,69 @@ settings.load_profile("wristctl")
 def _log_level() -> None:
     """A command that was called in this process has set how much is logged; the next test begins anew."""
     logging.getLogger("wristctl").setLevel(logging.NOTSET)
+
+
+@pytest.fixture(autouse=True, scope="session")
+def _runs_begin_and_end_soon() -> Iterator[None]:
+    """Runs of this process read sources and installed packages once, and do not wait for the disk.
+
+    Where these are the subject, tests call them themselves (tests/records) or run processes (tests/faults).
+    """
+    installed = [SimpleNamespace(metadata=package.metadata) for package in metadata.distributions()]
+    code_of = cache(lambda package: provenance.code_state())
+
+    def code_state() -> tuple[Code, bytes, str]:
+        code, patch, listing = code_of(provenance._PACKAGE)
+        return code.model_copy(), patch, listing
+
+    with pytest.MonkeyPatch.context() as session:
+        session.setattr(provenance, "metadata", SimpleNamespace(distributions=lambda: installed))
+        session.setattr(start, "code_state", code_state)
+        session.setattr(os, "fsync", lambda descriptor: None)
+        yield
+
+
+write_figure = formats.write_figure
+_PIXEL = bytes.fromhex(
+    "89504e470d0a1a0a0000000d4948445200000001000000010806000000"
+    "1f15c4890000000b49444154789c6360000200000500017a5eab3f0000000049454e44ae426082"
+)
+
+
+def _blank(stem: Path, figure: Figure, dpi: int = 150) -> None:
+    width, height = 72.0 * figure.get_size_inches()
+    svg = f'<svg xmlns="http://www.w3.org/2000/svg" width="{width:g}pt" height="{height:g}pt"></svg>\n'
+    stem.with_name(f"{stem.name}.png").write_bytes(_PIXEL)
+    stem.with_name(f"{stem.name}.svg").write_text(svg, encoding="utf-8")
+
+
+@pytest.fixture(autouse=True, scope="session")
+def _blank_pictures() -> Iterator[None]:
+    """Figures are made, and in the runs of this process blank pictures of their size written.
+
+    A picture costs more than all else in most runs. Every figure is painted in tests/plotting, and what each command
+    leaves, in tests that are marked `painted`.
+    """
+    with pytest.MonkeyPatch.context() as session:
+        session.setattr(formats, "write_figure", _blank)
+        yield
+
+
+def _paint(request: pytest.FixtureRequest) -> Iterator[None]:
+    """Pictures are painted where a test, or a whole file with the runs that its tests share, is marked so."""
+    with pytest.MonkeyPatch.context() as during:
+        if request.node.get_closest_marker("painted"):
+            during.setattr(formats, "write_figure", write_figure)
+        yield
+
+
+_painted_files = pytest.fixture(autouse=True, scope="module")(_paint)
+_painted_tests = pytest.fixture(autouse=True)(_paint)
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Markers of this suite."""
+    config.addinivalue_line("markers", "painted: pictures of runs are painted, not blank")
 
 
 @pytest.fixture

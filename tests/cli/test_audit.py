@@ -47,6 +47,7 @@ def test_ledger_orders_the_rows_of_t2_as_it_prints_them_and_judges_no_law_that_i
             assert getattr(less, fields[str(claim.metric)]) < getattr(more, fields[str(claim.metric)])
 
 
+@pytest.mark.painted
 def test_audit_judges_every_claim_on_each_loop_and_draws_one_figure(call: Call, tmp_path: Path) -> None:
     """On the ledger without the rivals, whose rollouts on the exact loop take long."""
     data = yaml.safe_load(LEDGER.read_text())

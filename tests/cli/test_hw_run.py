@@ -43,6 +43,7 @@ QUICK = (
 SLOW = ("--set", "sensor={level: camera, frame_rate: 20}")
 
 
+@pytest.mark.painted
 def test_the_emulated_experiment_ends_in_a_sealed_run_with_tables_and_pictures(call: Call) -> None:
     code, out, err = call(*QUICK, "--video")
     run = open_run("latest:hw-run")

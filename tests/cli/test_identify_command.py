@@ -19,6 +19,7 @@ from wristctl.study_files.load import load_study
 SIDES: tuple[DirectionName, ...] = ("ulnar", "extension")
 
 
+@pytest.mark.painted
 def test_two_poses_give_a_run_that_simulate_starts_from(call: Call, tmp_path: Path) -> None:
     poses = [write_run(tmp_path / "results", 0, pose, sides=SIDES) for pose in (UPRIGHT, LEVEL)]
     code, out, err = call("identify", *(run.id for run in poses), "--set", "fix.friction=0.1")

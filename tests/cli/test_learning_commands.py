@@ -27,6 +27,7 @@ QUICK = tuple(word for leaf in LEAVES for word in ("--set", leaf))
 TRAIN = ("train", "--data", "latest:gen-data", *QUICK, "--seeds", "2")
 
 
+@pytest.mark.painted
 def test_gen_data_leaves_samples_that_read_back_exactly(call: Call) -> None:
     code, out, _ = call("gen-data", "--samples", "200")
     run = open_run("latest:gen-data")
@@ -161,6 +162,7 @@ def test_a_search_killed_outright_resumes_to_the_same_bytes(call: Call, tmp_path
     assert code == 0 and resumed.id != whole.id and resumed.result_hash == whole.result_hash
 
 
+@pytest.mark.painted
 def test_rows_are_ranked_with_intervals_beside_the_paper(call: Call, tmp_path: Path) -> None:
     study = tmp_path / "rows.yaml"
     rows = "".join(
@@ -180,6 +182,7 @@ def test_rows_are_ranked_with_intervals_beside_the_paper(call: Call, tmp_path: P
     assert [row[-1] for row in seeds["rows"] if row[:2] == ["sigmoid-printed", "gradient_norm"]] == [0.0012]
 
 
+@pytest.mark.painted
 def test_a_search_chooses_by_cross_validation_and_says_why(call: Call) -> None:
     grid = "grid={depths: [1, 3], activations: [tanh], widths: [8], folds: 2}"
     call("train", "--search", *QUICK, "--epochs", "3", "--set", grid, "--set", "gen-data.samples=80")

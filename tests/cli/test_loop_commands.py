@@ -33,6 +33,7 @@ COMPARE = (
 )  # fmt: skip
 
 
+@pytest.mark.painted
 def test_simulate_leaves_a_trajectory_metrics_and_pictures(call: Call) -> None:
     code, out, _ = call("simulate", "--controller", "computed-torque", "--gains", "default")
     run = open_run("latest:simulate")
@@ -59,6 +60,7 @@ def test_the_tuning_that_is_advised_is_of_the_users_own_wrist(call: Call, tmp_pa
     assert (shown["wrist"]["length"], shown["wrist"]["stiffness"]) == (0.1, 0.7)
 
 
+@pytest.mark.painted
 def test_analyse_takes_the_loop_of_simulate_and_begins_with_its_margins(call: Call) -> None:
     typed = ("--controller", "pid", "--set", "gains={Kp: 10.0, Ki: 20.0, Kd: 0.5}", "--over", "Kp")
     code, out, _ = call("analyse", *typed, "--set", "loop.control_period=2e-3", "--set", "angles_deg=[20.0]")
@@ -91,6 +93,7 @@ def tuned_before(call: Call, tuning: Path, tmp_path: Path) -> None:
     shutil.copytree(tuning / "results", tmp_path / "results")
 
 
+@pytest.mark.painted
 @pytest.mark.usefixtures("tuned_before")
 def test_tuned_gains_reach_compare_and_simulate(call: Call) -> None:
     tuned = open_run("latest:tune")
@@ -276,6 +279,7 @@ SEARCH = ("tune", *SOFT, "--candidates", "4", "--iterations", "3", "--set", "con
           "--set", "restarts=2", "--set", "worlds={family: soft, draws: 2, validation: 3}")  # fmt: skip
 
 
+@pytest.mark.painted
 def test_gains_are_searched_on_worlds_and_rows_ranked_on_others_with_the_answer_first(call: Call) -> None:
     code, out, err = call(*SEARCH)
     assert code == 0, err

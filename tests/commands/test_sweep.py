@@ -100,6 +100,7 @@ def test_gains_are_swept_from_the_preset_they_stand_in_for() -> None:
     assert table["rmse"][1] < table["rmse"][0]
 
 
+@pytest.mark.painted
 def test_a_sweep_is_one_run_with_a_table_with_units_and_a_figure_for_each_key(tmp_path: Path) -> None:
     study = swept(wristctl.load_study(None, *FAST), "wrist.stiffness=0.4..0.9:4", "simulate.controller=pid-ff,pd-ff")
     done = wristctl.simulate(study, out=tmp_path)

@@ -87,6 +87,7 @@ def test_a_table_of_columns_or_of_a_frame_is_what_pandas_would_write(results: Pa
     assert written == 2 * [frame.to_csv(index=False, lineterminator="\n")]
 
 
+@pytest.mark.painted
 def test_figures_are_the_same_bytes_each_time(tmp_path: Path) -> None:
     from matplotlib.figure import Figure
 
