@@ -125,7 +125,8 @@ def test_what_must_not_be_used_without_a_rig_is_named_after_the_rigs_with_its_co
     )  # fmt: skip
     rig, elsewhere = said[said.index("Do not use") : said.index("The paper")].split("Elsewhere")
     assert "mrac by 2.9 deg" in rig and "nc" not in rig.split() and "mrac" not in elsewhere
-    assert "smc/printed in sampled;" in elsewhere and "nc in sampled and push." in elsewhere
+    assert "smc/printed, which does not arrive in sampled;" in elsewhere
+    assert "nc, which swings in sampled and push." in elsewhere
 
 
 def test_a_row_that_fails_and_swings_is_named_once_by_the_graver_fault() -> None:
