@@ -7,7 +7,7 @@ CLAIMS ?= experiments/claims.yaml
 BIN := .venv/bin
 
 .PHONY: run test lint bench bench-sweeps bench-peers bench-all firmware test-firmware test-faults test-trust test-vision test-identify \
-	test-rig test-statistics converge worlds clean venv mutants coverage installed
+	test-allocation test-rig test-statistics converge worlds docs clean venv mutants coverage installed
 
 run: .venv/run
 	@set -eo pipefail; \
@@ -35,6 +35,10 @@ bench: .venv/run
 	$(BIN)/python benchmarks/emulated_bench.py
 	$(BIN)/python benchmarks/vision.py
 
+# The documentation as a site, offline, with a gallery of runs made now: build/site/html/index.html.
+docs: .venv/docs
+	$(BIN)/python docs/build_site.py
+
 # The motor board's image, byte for byte what the package ships (Debian 12: gcc-avr binutils-avr avr-libc).
 firmware:
 	$(MAKE) -C wristctl/board/firmware check
@@ -52,6 +56,10 @@ test-identify: .venv/dev
 # Do 95 % intervals of a comparison hold the truth as often, and groups of ties all that are alike?
 test-statistics: .venv/dev
 	WRISTCTL_THOROUGH=1 $(BIN)/pytest -s tests/comparison tests/tuning
+
+# Pulls of three to six tendons in two planes against a linear program, at 10,000 poses each.
+test-allocation: .venv/dev
+	WRISTCTL_THOROUGH=1 $(BIN)/pytest -s tests/wrist/test_allocation.py
 
 # Cameras, markers and calibration with many more frames, and their runs repeated.
 test-vision: .venv/dev
@@ -120,6 +128,11 @@ venv: .venv/dev
 .venv/dev: pyproject.toml constraints.txt
 	test -x $(BIN)/pip || $(PYTHON) -m venv .venv
 	$(BIN)/pip install --quiet -c constraints.txt -e '.[dev]'
+	touch $@
+
+.venv/docs: pyproject.toml constraints.txt
+	test -x $(BIN)/pip || $(PYTHON) -m venv .venv
+	$(BIN)/pip install --quiet -c constraints.txt -e '.[docs]'
 	touch $@
 
 clean:

@@ -127,7 +127,7 @@ def _study(study: Study, costs: dict[str, dict[str, float]]) -> list[str]:
     for family in study.study.families:
         known = study.families[family]
         each = len(known.references) * noises_of(known, budget.noises) * budget.worlds
-        laws = [*study.study.laws, *(row.controller for row in study.study.presets)]
+        laws = [*study.study.laws * budget.tunings, *(row.controller for row in study.study.presets)]
         judged += sum(each * costs[family][law] for law in laws)
     minutes = (searched + judged) / 60.0 / CORES
     return [

@@ -38,6 +38,9 @@ ROWS = "[" + ", ".join(
     )
 ) + "]"  # fmt: skip
 
+LOOPS = "{exact: {}, sampled: {}, four-segments: {}}"
+REFERENCES = "[{kind: step}, {duration: 1.0}, {duration: 2.0}]"
+
 MARK = "*"
 """Behind a number that no integration step settles."""
 
@@ -141,7 +144,8 @@ def main() -> None:
     camera()
     hysteresis()
     answer()
-    study = load_study([], [f"controllers={ROWS}", "inverses=[none]"], "compare")
+    settings = [f"controllers={ROWS}", f"loops={LOOPS}", f"references={REFERENCES}", "inverses=[none]"]
+    study = load_study([], settings, "compare")
     results = compare(study)
     shown = ("smc/exchanged", "smc/initial", "pid/printed", "computed-torque/default")
     for loop in ("exact", "four-segments"):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -11,7 +12,10 @@ from wristctl.board.board_errors import BoardError, Faulted, NoAnswer, Refused, 
 from wristctl.board.driver import ATTEMPTS, Board, within_reach
 from wristctl.board.emulator import Atmega2560
 from wristctl.board.emulator.atmega2560 import VirtualTransport
+from wristctl.board.emulator.chip import FREQUENCY
+from wristctl.board.framing import encode
 from wristctl.board.messages import (
+    BAUD,
     DICTIONARY_HASH,
     MAX_RATE,
     TOTAL_RATE,
@@ -200,7 +204,7 @@ def test_an_emergency_stop_in_a_jog_is_named_and_no_mystery_of_where_the_axes_st
 
     monkeypatch.setattr(wire, "wait", pressed)
     with pytest.raises(Faulted) as error:
-        board.jog((340, 0, 0, 0))
+        board.jog((190, 0, 0, 0))
     assert Fault.ESTOP_INPUT in error.value.faults and error.value.exit_code == 5
 
 
@@ -225,6 +229,41 @@ def test_whatever_ends_a_session_stops_the_motors(wire: BadWire, error: type[Bas
     assert not [edge for edge in wire.chip.events() if edge["port"] == ord("A")]
     status = Board(wire).read()
     assert status.state == State.FAULT and Fault.ESTOP_COMMAND in status.faults
+
+
+@pytest.mark.parametrize(
+    "stop",
+    [
+        Board.emergency_stop,
+        lambda board: board.close(emergency=True),
+        lambda board: Board(board.transport).stop_whatever_runs(),
+    ],
+    ids=["emergency_stop", "close", "stop_whatever_runs"],
+)
+def test_every_emergency_stop_of_the_driver_ends_the_steps_on_its_last_byte_whatever_waits_before_it(
+    board: Board, wire: BadWire, monkeypatch: pytest.MonkeyPatch, stop: Callable[[Board], object]
+) -> None:
+    """Behind 60 other commands; obeyed in its turn it would be 17 ms later."""
+    ready(board)
+    for _ in range(40):
+        board.turn((5000.0, -5000.0, 3000.0, 0.0), 0.2)
+        wire.wait(0.005)
+    write, last_byte = wire.write, [0]
+
+    def timed(data: bytes) -> None:
+        write(data)
+        last_byte.append(wire.chip.cycles + wire.chip.bytes_coming * 10 * FREQUENCY // BAUD)
+
+    wire.chip.events()
+    write(60 * encode(Command.STATUS, 200))
+    monkeypatch.setattr(wire, "write", timed)
+    stop(board)
+    wire.wait(0.1)
+    events = wire.chip.events()
+    steps = events["cycle"][events["port"] == ord("A")].astype(int)
+    assert len(steps) > 50, "they moved until then"
+    assert (steps[-1] - last_byte[1]) / FREQUENCY < 0.1e-3
+    assert Board(wire).read().faults == Fault.ESTOP_COMMAND
 
 
 def test_a_session_that_ends_well_leaves_the_drives_off(wire: BadWire) -> None:

@@ -16,7 +16,7 @@ import pytest
 from typer.main import get_command
 
 from tests.cli.conftest import Call, Command
-from wristctl.cli import app, command
+from wristctl.cli import app
 from wristctl.cli.app import typer_of
 from wristctl.cli.commands import CALIBRATIONS, COMMANDS
 from wristctl.commands.perform import perform
@@ -139,7 +139,7 @@ def test_quiet_and_verbose_reach_the_messages_and_the_operator(probe: Command, m
         seen.append((operator.quiet, operator.flags, operator.console.stderr))
         return perform(prepared, run, show, operator, *others)
 
-    monkeypatch.setattr(command, "perform", watched)
+    monkeypatch.setattr("wristctl.commands.perform.perform", watched)
     assert "sampling" in probe("gen-data", "-v").stderr and probe("gen-data", "-q").stderr == ""
     assert seen == [(False, frozenset(), True), (True, frozenset(), True)]
 

@@ -80,6 +80,34 @@ def test_a_tendon_is_reeled_in_by_what_is_typed_and_let_go_at_the_end(
     assert board.energised == [False] * 4 and Board(board).read().position == (0, 0, sum(steps), 0)
 
 
+def test_jogs_together_lead_no_further_than_a_taut_tendon_may_be_pulled_until_the_drives_let_go(
+    call: Call, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """60 N at 20 kN/m are 3 mm, to either side: nobody knows which way is in."""
+    for sign in (1, -1):
+        typed(monkeypatch, f"yes\n{0.9 * sign}\n{0.2 * sign}\n{-5.0 * sign}\n\n")
+        words = (
+            "hw",
+            "jog",
+            "--axis",
+            "2",
+            "--mm",
+            str(2.0 * sign),
+            "--port",
+            "emulated",
+            "--set",
+            "safety.tension=60",
+        )
+        code, out, err = call(*words)
+        assert code == 0 and out.count("\n") == 3, "the third word alone is refused"
+        assert "axis 2 would be 3.1 mm from where" in err and "would pull 62 N, beyond 60 N" in err
+        position = sum(round(mm * sign / STEP_MM) for mm in (2.0, 0.9, -5.0))
+        assert Board(Emulated.made[-1]).read().position == (0, 0, position, 0)
+    for length, refused in (("3", 0), ("3.1", 2)):
+        again = ("hw", "slacken", "--mm", length, "--port", "emulated", "--yes", "--set", "safety.tension=60")
+        assert call(*again)[0] == refused
+
+
 def test_from_home_an_axis_goes_to_lengths_from_zero(call: Call, monkeypatch: pytest.MonkeyPatch) -> None:
     typed(monkeypatch, "2 0.5\n7 1\n1 -1\n2 0\n\n")
     code, out, err = call("hw", "home", "--port", "emulated", "--yes")

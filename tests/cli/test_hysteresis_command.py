@@ -15,6 +15,7 @@ from wristctl.simulation.spool_driven import FrictionCase
 QUICK = ("--set", "ranges_deg=[[0, 10]]", "--set", "frequencies=[1, 5]", "--set", "angles_deg=[]")
 
 
+@pytest.mark.painted
 def test_a_run_with_a_measured_loop_is_repeated_to_the_byte(call: Call, tmp_path: Path) -> None:
     weights = SHORT._replace(what="tensions")
     written(made_loop(FrictionCase(0.15, 0.5, 3e-5), 0, weights).loop, tmp_path / "loop.csv")
@@ -29,12 +30,13 @@ def test_a_run_with_a_measured_loop_is_repeated_to_the_byte(call: Call, tmp_path
     assert {each["verdict"] for each in found["files"]} <= {"identical", "volatile"}
 
 
-def test_a_plan_says_what_would_be_driven_and_fitted(call: Call, tmp_path: Path) -> None:
+def test_a_plan_says_what_would_be_fitted(call: Call, tmp_path: Path) -> None:
     problem = made_loop(FrictionCase(0.1, 1.0, 2e-5), 0, SHORT)
     written(problem.loop, tmp_path / "loop.csv")
     code, out, _ = call("hysteresis", *QUICK, "--measured", "loop.csv", "--dry-run")
     samples = len(problem.measured[0])
-    assert code == 0 and f"6 loops, 5.4 simulated seconds; friction, sheath, presliding from {samples} samples" in out
+    assert code == 0 and f"friction, sheath, presliding from {samples} samples" in out.replace("\n", " ")
+    assert "simulated seconds" not in out, "a measured loop is fitted; nothing else is driven"
 
 
 @pytest.mark.parametrize(

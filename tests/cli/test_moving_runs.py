@@ -11,6 +11,8 @@ from tests.cli.conftest import Call
 from wristctl.records import Run, open_run
 
 WALK = "time [s],angle [deg]\n" + "".join(f"{t / 20},{5 * (t / 20) ** 2}\n" for t in range(21))
+pytestmark = pytest.mark.painted  # their pictures are part of what is compared
+
 STUDY = """
 gen-data: {samples: 60}
 train: {hidden: [4], epochs: 2, workers: 1}

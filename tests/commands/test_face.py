@@ -195,7 +195,7 @@ def test_domain_objects_are_what_they_are_called(in_memory: Results) -> None:
 
 def test_a_figure_is_drawn_when_it_is_asked_for_and_once(in_memory: Results, tmp_path: Path) -> None:
     figures = in_memory["simulate"].figures
-    assert list(figures) == ["angle", "error", "tensions", "sliding", "motion"] and len(figures) == 5
+    assert list(figures) == ["course", "angle", "error", "tensions", "sliding", "motion"] and len(figures) == 6
     angle = figures["angle"]
     assert angle is figures["angle"] and angle.axes
     angle.savefig(tmp_path / "angle.png")

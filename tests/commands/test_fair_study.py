@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import signal
 import subprocess
@@ -15,9 +16,12 @@ import pandas as pd
 import pytest
 
 import wristctl
-from wristctl.commands.study.units import Studied
+from tests.documented import script_of_docs
+from wristctl.commands.study.units import Studied, StudyPlace
 from wristctl.comparison import world_ranking as judge_unit
 from wristctl.comparison.bootstrap import plain
+from wristctl.config.controller_row import Row
+from wristctl.config.families import Worlds
 from wristctl.config.study import Study
 from wristctl.errors import UserError
 from wristctl.records import Run, list_runs
@@ -41,7 +45,8 @@ study:
     RMSE alone: {objective: {steady_state: 0.0, worst: 0.0}}
     random: {optimiser: random}
     random again: {optimiser: random, beside: random}
-  budgets: {small: {candidates: 4, iterations: 2, finalists: 2, draws: 2, validation: 2, worlds: 10, noises: 2}}
+  budgets:
+    small: {candidates: 4, iterations: 2, finalists: 2, tunings: 2, draws: 2, validation: 2, worlds: 10, noises: 2}
 """
 
 pytestmark = pytest.mark.painted
@@ -88,10 +93,49 @@ def test_its_answer_names_the_controller_what_each_term_buys_and_heads_the_run(d
 
 def test_feedback_is_worth_what_the_worlds_say(done: Studied) -> None:
     found = done.rankings["rig"]
-    errors = {row.label: row.rmse for row in found.rows}
+    errors = {label: [tuning.rmse for tuning in rows] for label, rows in zip(found.labels, found.tunings, strict=True)}
     (feedback,) = [each for each in done.terms if each.term == "feedback"]
-    ratio = np.exp(np.mean(np.log(errors["feedforward/default"] / errors["pd-ff/tuned"])))
-    assert feedback.times.value == pytest.approx(ratio) and feedback.times.low > 1.0
+    assert list(map(len, errors.values())) == [2, 2, 1]
+    ratios = [errors["feedforward/default"][0] / tuning for tuning in errors["pd-ff/tuned"]]
+    assert feedback.times.value == pytest.approx(np.exp(np.mean(np.log(ratios))))
+    assert feedback.times.low < min(np.exp(np.mean(np.log(ratios), axis=1))), "two tunings tell little"
+
+
+def test_every_tuning_has_worlds_of_its_own_and_the_median_is_published(done: Studied, study: Study) -> None:
+    """Of two the worse one; its figures are those of its gains, wherever they are asked for again."""
+    found, path = done.rankings["rig"], run_of(done).path
+    table = pd.read_csv(path / "data" / "tunings-rig.csv", comment="#")
+    assert list(table.columns[:3]) == ["row", "tuning", "published"]
+    published = json.loads((path / "data" / "gains-rig.json").read_text())
+    for law in study.study.laws:
+        searches = [done.searches[StudyPlace("", "rig", f"{law}/tuned", law, number)] for number in range(2)]
+        assert searches[0].tried.gains.shape == searches[1].tried.gains.shape
+        assert not np.array_equal(searches[0].tried.values, searches[1].tried.values)
+        lines = table[table["row"] == f"{law}/tuned"]
+        worse = int(np.argmax(lines["rmse"]))
+        assert list(lines["published"]) == [number == worse for number in range(2)]
+        assert published[law] == searches[worse].gains
+        compared = study.compare.model_copy(
+            update={"rows": (Row(controller=law, gains=published[law]),), "worlds": Worlds(family="rig", draws=10)}
+        )
+        (again,) = judge_unit.rank(study.model_copy(update={"compare": compared}))
+        row = found.labels.index(f"{law}/tuned")
+        first_noise = found.rows[row].measured.metrics["rmse"].reshape(10, 2, 2)[:, :, 0]
+        assert np.array_equal(again.rows[0].measured.metrics["rmse"].reshape(10, 2), first_noise)
+
+
+def test_what_is_shipped_of_it_is_the_median_tuning_with_its_figures_and_run(done: Studied, study: Study) -> None:
+    run, ranking = run_of(done), done.rankings["rig"]
+    kept = {"elsewhere": {"run": "of another run"}}
+    shipped = script_of_docs("published_gains").with_run(kept, run)
+    assert shipped["elsewhere"] == kept["elsewhere"] and shipped["rig"]["run"] == run.id
+    published = json.loads((run.path / "data" / "gains-rig.json").read_text())
+    assert {name: row["gains"] for name, row in shipped["rig"]["controllers"].items()} == published
+    for name, row in shipped["rig"]["controllers"].items():
+        place = ranking.labels.index(f"{name}/tuned")
+        assert row["rmse"] == pytest.approx(np.exp(np.log(ranking.scores[place]).mean()))
+        assert row["rmse"] == max(row["tunings"]), "of two the worse one is in the middle"
+        assert row["rmse_low"] <= row["rmse"] and row["reliable"] == (place not in ranking.standing.unusable)
 
 
 def test_a_variant_is_held_against_the_one_that_it_names(done: Studied) -> None:
@@ -171,6 +215,24 @@ def test_a_row_of_a_study_chatters_where_the_middle_of_its_noises_does_on_any_mo
     assert not judge_unit.row_of("one", [pieces | still | slams], 65.0).swings.any(), "a wider range is crossed less"
 
 
+def test_a_row_swings_where_it_does_in_motion_by_more_than_feedforward_may(study: Study) -> None:
+    """Of the stored metrics alone: three worlds with a motion that rests and one that does not, three noises each."""
+    (unit,) = judge_unit.judge_units(study, "rig", "pd-ff", {"Kp": 4.0, "Kd": 0.2}, 3, 3)
+    pieces = judge_unit.judged(unit.spec)
+    rests = np.zeros(pieces["rmse"].shape, bool)
+    rests[:, 0] = True
+    calm = pieces | dict.fromkeys(("oscillation", "drift", "chattering", "sustained"), 0.0 * pieces["rmse"])
+    calm |= {"rests": rests}
+    own, open_loop = calm["sustained"].copy(), calm["sustained"].copy()
+    own[0, 1, :2] = own[1, 0] = own[2, 1] = np.deg2rad(0.5)
+    open_loop[2, 1] = np.deg2rad(0.3)
+    swinging = calm | {"sustained": own}
+    row = judge_unit.row_of("one", [swinging], 58.0, open_loop=[calm | {"sustained": open_loop}])
+    assert row.swings.tolist() == [True, False, False], "at rest that is another metric; twice feedforward's is allowed"
+    assert not judge_unit.row_of("one", [swinging], 58.0).swings.any()
+    assert judge_unit.row_of("one", [swinging], 58.0, open_loop=[calm]).swings.tolist() == [True, False, True]
+
+
 def test_ranges_of_worlds_put_together_are_the_whole(study: Study, monkeypatch: pytest.MonkeyPatch) -> None:
     gains = {"Kp": 4.0, "Kd": 0.2}
     (whole,) = judge_unit.judge_units(study, "rig", "pd-ff", gains, 10, 2)
@@ -225,6 +287,7 @@ def test_without_families_it_says_where_there_are_some() -> None:
 def test_the_committed_study_can_be_run_and_has_the_size_it_is_said_to_have() -> None:
     study = wristctl.load_study(Path(wristctl.__file__).parents[1] / "experiments" / "fair_study.yaml")
     full = study.study.budgets["full"]
-    assert len(study.study.laws) >= 16 and full.candidates * full.iterations == 2000
-    assert full.worlds * len(study.study.families) == 1000 and full.noises == 30
+    assert len(study.study.laws) >= 16 and full.tunings >= 5 and study.study.budgets["small"].tunings >= 2
+    assert all(budget.draws >= 16 for budget in study.study.budgets.values()), "fewer do not tell gains apart"
+    assert full.worlds * len(study.study.families) == 1000 and full.noises == 6
     assert {"pd-ff", "pid-ff", "pid-dob", "smc-dob"} <= set(study.study.laws), "the ladder"

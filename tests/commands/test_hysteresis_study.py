@@ -174,6 +174,29 @@ def test_a_fit_by_too_long_a_step_is_warned_of(
 ) -> None:
     loop = made_loop(CABLE, 1, SHORT._replace(frequency=1.0, cycles=2.0)).loop
     wristctl.hysteresis(
-        study(f"hysteresis.measured={written(loop, tmp_path / 'quick.csv')}", f"hysteresis.step={step}")
+        study(
+            f"hysteresis.measured={written(loop, tmp_path / 'quick.csv')}",
+            f"hysteresis.step={step}",
+            "hysteresis.misfit=tell",
+        )
     )
     assert any("hysteresis.step: 0.0025" in said for said in caplog.messages) == told
+
+
+def test_a_loop_that_no_model_fits_is_refused_where_everybody_looks(
+    tmp_path: Path,
+) -> None:
+    """An angle that wriggles by 1 deg along its way: no friction does that."""
+    loop = made_loop(CABLE, 1, SHORT._replace(what="spools")).loop
+    wriggle = np.radians(1.0) * np.sin(12.0 * np.pi * 0.3 * loop.time)
+    wriggling = replace(loop, angle=loop.angle + wriggle)
+    named = f"hysteresis.measured={written(wriggling, tmp_path / 'wriggling.csv')}"
+    with pytest.raises(UserError, match=r"the best model is off by .* it misses something") as caught:
+        wristctl.hysteresis(study(named), out=tmp_path / "results")
+    assert caught.value.exit_code == 3
+    (run,) = (tmp_path / "results").glob("*-hysteresis-*")
+    told = (run / "README.md").read_text()
+    assert "Nothing to rely on: the best model leaves" in told and "friction inside the wrist" in told
+    assert json.loads((run / "metrics.json").read_text())["misfit"]["value"] > 2.0
+    taken = wristctl.hysteresis(study(named, "hysteresis.misfit=tell"))
+    assert taken.summary[0].startswith("Nothing to rely on") and taken.loops == [] and len(taken.fits) == 3

@@ -138,3 +138,19 @@ def test_a_loop_beyond_its_tendons_is_warned_of_before_and_no_gains_are_advised(
         assert ("106 N" in said and "16.7 deg" in said and "0.0361 m" in said) is beyond
         advised = "wristctl tune 'my wrist.yaml' --set wrist.length=0.12 --set 'tune.controllers=[ct-dob]'"
         assert ("wristctl tune" in said) is not beyond and (advised in said) is not beyond
+
+
+@pytest.mark.parametrize("family", ["ideal", "camera", "uneven", "handling", "steps"])
+@pytest.mark.parametrize("section", ["tune", "compare"])
+def test_motions_of_either_plane_can_be_asked_of_a_family_and_all_are_within_reach(family: str, section: str) -> None:
+    """Daily living is anatomical: of the flexion plane in `ideal`, whatever direction a command has by default."""
+    study = wristctl.load_study(f"experiments/scenarios/{family}.yaml", f"{section}.worlds.family={family}")
+    asked = asked_by(study, getattr(study, section))
+    assert {one.reference.kind for one in asked} == {one.kind for one in study.families[family].references}
+    assert out_of_reach(study.wrist, asked) == []
+
+
+def test_a_motion_of_the_other_plane_has_no_direction_in_this_one() -> None:
+    study = wristctl.load_study(None, "compare.references=[{kind: adl:mean-flexion}]", "compare.directions=[ulnar]")
+    with pytest.raises(UserError, match="not in it"):
+        asked_by(study, study.compare)

@@ -12,9 +12,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import wristctl
-from tests.commands.conftest import session
-from wristctl.commands.recommend.answer import RECOMMENDED, Recommended, spread
-from wristctl.commands.recommend.command import FAMILY, TOLERATED, _next_command, reach_deg
+from wristctl.commands.recommend.answer import RECOMMENDED, Candidate, Recommended, spread
+from wristctl.commands.recommend.command import FAMILY, TOLERATED, reach_deg
+from wristctl.commands.recommend.study_file import hw_run_fits, next_command, study_file
 from wristctl.config.loop import Loop, Reference
 from wristctl.config.study import Study
 from wristctl.config.wrist import WristParameters
@@ -29,7 +29,8 @@ from wristctl.tuning.scaled_presets import dynamic_stiffness, scaled_to
 
 WRIST = WristParameters()
 QUICK = (
-    "recommend={controllers: [pid-ff, ct-dob], loop: {plant_segments: 1, control_period: 5.0e-3}, "
+    "recommend={controllers: [pid-ff, ct-dob], loop: {plant_segments: 1, actuator: {level: ideal}, "
+    "sensor: {level: ideal}}, "
     "draw: {plant.stiffness: x0.7..1.3, disturbances.load: '-0.3..0.3'}, horizon: 2.5, draws: 2, validation: 2, "
     "tests: 8, candidates: 4, iterations: 1, frequencies: [0.5, 1.0], payloads: [0.2]}"
 )
@@ -240,7 +241,50 @@ def test_where_no_feedback_is_better_than_none_that_is_the_reason_and_not_that_a
     assert replace(found, ranking=tied).best == done.candidates[0]
 
 
+def test_a_rig_of_which_one_thing_is_stated_keeps_its_motors_tendons_camera_and_period() -> None:
+    rig = Study().recommend.loop
+    assert rig.actuator.level == "tendon" and rig.sensor.level == "camera"
+    for setting in ("sensor.delay_frames=3", "actuator.friction=0.3", "plant_segments=2", "control_period=1.0e-2"):
+        loop = wristctl.load_study(None, f"recommend.loop.{setting}").recommend.loop
+        section, _, leaf = setting.partition("=")[0].rpartition(".")
+        changed = getattr(loop, section) if section else loop
+        assert getattr(changed, leaf) == float(setting.partition("=")[2])
+        default = {leaf: getattr(getattr(rig, section) if section else rig, leaf)}
+        mended = changed.model_copy(update=default)
+        assert (loop.model_copy(update={section: mended}) if section else mended) == rig, "nothing else"
+
+
+RIG = (
+    "recommend.loop={control_period: 1.0e-2, actuator: {level: tendon, friction: 0.2, step_rate: 9000}, "
+    "sensor: {level: camera, frame_rate: 50, delay_frames: 3}}"
+)
+BEST = Candidate("pid-ff", "tuned", {"Kp": 3.0, "Ki": 1.23456789, "Kd": 0.2})
+
+
 def test_the_next_command_is_of_the_wrist_and_not_of_the_recommendation() -> None:
     typed = ("my wrist.yaml", "--set", "recommend.draws=2", "--set", "wrist.length=0.1", "--set", "recommend.tests=8")
-    told = _next_command(replace(session(study_of()), typed=typed))
+    told = next_command(study_of(RIG), typed, RECOMMENDED)
     assert told == f"wristctl hw-run 'my wrist.yaml' --set wrist.length=0.1 {RECOMMENDED}"
+    assert next_command(study_of(), (), "f.yaml") == "wristctl simulate f.yaml", "hw-run has no ideal motors"
+
+
+@pytest.mark.parametrize("reach, asked", [(45.0, 30.0), (12.0, 12.0)])
+def test_its_file_has_the_wrist_and_the_rig_for_simulate_and_hw_run(tmp_path: Path, reach: float, asked: float) -> None:
+    made_for = study_of(RIG, "wrist.length=0.11")
+    (tmp_path / "best.yaml").write_text(study_file(made_for, BEST, BEST.controller, reach))
+    read = wristctl.load_study(tmp_path / "best.yaml")
+    rig = made_for.recommend.loop
+    for loop in (read.simulate.loop, read.hw_run.loop):
+        assert (loop.actuator, loop.sensor, loop.control_period) == (rig.actuator, rig.sensor, 1e-2)
+    assert read.wrist == made_for.wrist and read.hw_run.reference.end_deg == asked
+    assert read.hw_run.rows[0].gains == read.simulate.gains == pytest.approx(BEST.gains, rel=1e-5)
+
+
+@pytest.mark.parametrize("loop", ["control_period=1.0e-3", "sensor.level=ideal", "actuator.level=lagged"])
+def test_a_rig_that_hw_run_cannot_have_is_left_out_of_its_section(tmp_path: Path, loop: str) -> None:
+    other = study_of(RIG, f"recommend.loop.{loop}")
+    assert hw_run_fits(study_of(RIG)) and not hw_run_fits(other)
+    (tmp_path / "best.yaml").write_text(study_file(other, BEST, BEST.controller, 45.0))
+    read = wristctl.load_study(tmp_path / "best.yaml")
+    assert read.hw_run.actuator == Study().hw_run.actuator and read.hw_run.rows[0].controller == "pid-ff"
+    assert read.simulate.loop.actuator == other.recommend.loop.actuator

@@ -15,6 +15,7 @@ from scipy.io import loadmat
 from wristctl.commands.export.run_data import FORMATS, export_run
 from wristctl.errors import UserError
 from wristctl.records import Run, start_run
+from wristctl.records.log_converters import read_log
 from wristctl.study_files.load import load_study
 from wristctl.vision.camera import Frame
 from wristctl.vision.marker import Sighting, SightingVerdict
@@ -134,3 +135,40 @@ def test_a_package_that_is_missing_is_named(made: Run, tmp_path: Path, monkeypat
     with pytest.raises(UserError, match="needs the package mcap") as caught:
         export_run(made, "mcap", tmp_path / "a")
     assert "wristctl[logs]" in caught.value.fix and not (tmp_path / "a").exists()
+
+
+def test_a_rigs_motions_are_an_open_log_with_spools_and_bends_at_their_own_times(tmp_path: Path) -> None:
+    positions = {f"position_{tendon}": 100.0 * tendon + np.arange(4) for tendon in (1, 2, 4, 5)}
+    ticks = {"trial": np.array([0, 0, 1, 1]), "counted": np.array([0.0, 0.01, 0.0, 0.01]), **positions}
+    frames = {
+        "trial": np.array([0, 0, 1]), "captured": np.array([0.004, 0.012, 0.002]), "theta": np.array([0.1, 0.9, 0.3]),
+        "tip_x": np.full(3, 0.08), "tip_y": np.array([0.01, 0.02, 0.03]), "verdict": np.array(["ok", "blurred", "ok"]),
+    }  # fmt: skip
+    with start_run("hw-run", load_study(), "", tmp_path) as live:
+        live.table("data/log.csv", ticks)
+        live.table("data/frames.csv", frames)
+        live.table("data/trials.csv", {"trial": np.array([0, 1]), "direction": np.array(["ulnar", "flexion"])})
+    run = Run(live.path)
+    ulnar, flexion = read_log(export_run(run, "csv", tmp_path / "log.csv")).trials().values()
+    step = run.config.hw_run.actuator.step_length
+    assert ulnar.columns["time"].tolist() == [0.0, 0.004, 0.01]
+    np.testing.assert_allclose(ulnar.columns["spool_4"], [400.0 * step, np.nan, 401.0 * step])
+    np.testing.assert_array_equal(ulnar.columns["bend_y"], [np.nan, 0.1, np.nan])
+    assert np.isnan(ulnar.columns["bend_z"]).all() and np.isnan(flexion.columns["bend_y"]).all()
+    assert flexion.columns["bend_z"][1] == 0.3 and flexion.columns["tip_z"][1] == 0.03
+    with pytest.raises(UserError, match="a hw-run run holds no motion"):
+        (run.path / "data" / "log.csv").unlink()
+        export_run(run, "csv", tmp_path / "none.csv")
+
+
+def test_a_hysteresis_run_is_a_loop_that_can_be_measured(tmp_path: Path) -> None:
+    courses = {
+        "loop": np.array([0, 0, 1]), "time": np.array([0.0, 0.1, 0.0]), "theta": np.array([0.1, 0.2, 0.3]),
+        "given_plus": np.array([1e-3, 2e-3, 3e-3]), "given_minus": -np.array([1e-3, 2e-3, 3e-3]),
+        "spool_plus": np.array([4.0, 6.0, 8.0]), "spool_minus": np.array([4.0, 2.0, 2.0]),
+    }  # fmt: skip
+    with start_run("hysteresis", load_study(), "", tmp_path) as live:
+        live.table("data/courses.csv", courses)
+    first, _ = read_log(export_run(Run(live.path), "csv", tmp_path / "loops.csv")).trials().values()
+    assert first.columns["tension_1"].tolist() == [2.0, 3.0] and first.columns["spool_2"].tolist() == [-1e-3, -2e-3]
+    assert first.columns["bend_y"].tolist() == [0.1, 0.2]

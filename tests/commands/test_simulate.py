@@ -54,7 +54,7 @@ def test_of_one_rollout_every_metric_is_told(simulate: Simulate) -> None:
         assert (value, unit, meaning) == (once.first.metrics[name], METRICS[name].unit, METRICS[name].formula)
         assert done.metrics[name] == value and done.findings.metrics[name]["meaning"] == meaning
     assert known_of(done.findings, "rmse", "settling") == [("rad", "lower", 1), ("s", "lower", 1)]
-    assert list(done.figures) == ["angle", "error", "tensions", "sliding", "motion"] and not done.failed
+    assert list(done.figures) == ["course", "angle", "error", "tensions", "sliding", "motion"] and not done.failed
     np.testing.assert_array_equal(done.frame()["theta"], once.first.trajectory.theta)
 
 
@@ -100,7 +100,7 @@ def test_of_repetitions_medians_are_told_with_their_interval(simulate: Simulate)
         "lower",
         f"{METRICS['rmse'].formula}; median",
     )
-    assert list(done.figures) == ["angle", "error", "error-repetitions", "tensions", "sliding", "motion"]
+    assert list(done.figures) == ["course", "error-repetitions", "angle", "error", "tensions", "sliding", "motion"]
 
 
 def test_two_repetitions_are_several(simulate: Simulate) -> None:

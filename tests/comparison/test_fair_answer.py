@@ -14,7 +14,8 @@ from wristctl.commands.ranking_answer import decision_table
 from wristctl.commands.study.answer import answer_of
 from wristctl.comparison.controller_ranking import undominated
 from wristctl.comparison.paired_worlds import TermValue, order_shift, term_values
-from wristctl.comparison.world_ranking import RANKED, RankedRow, WorldRanking, ranking
+from wristctl.comparison.tuned_ranking import TunedRanking, tuned_ranking
+from wristctl.comparison.world_ranking import RANKED, RankedRow
 from wristctl.config.families import Family
 from wristctl.simulation.cases import Measured
 
@@ -48,12 +49,12 @@ FAMILIES = {
 }
 
 
-def ranked(*rows: RankedRow, tolerated: float = 0.0, family: str = "bench") -> WorldRanking:
+def ranked(*rows: RankedRow, tolerated: float = 0.0, family: str = "bench") -> TunedRanking:
     every = [row("feedforward/default", 4.0), *rows]
-    return ranking(family, FAMILIES[family], every, tolerated)
+    return tuned_ranking(family, FAMILIES[family], [[one] for one in every], [0] * len(every), tolerated)
 
 
-def told(*rankings: WorldRanking, terms: list[TermValue] | None = None) -> str:
+def told(*rankings: TunedRanking, terms: list[TermValue] | None = None) -> str:
     """The answer in one line."""
     answer = answer_of(rankings, terms or [], [])
     assert answer is not None
@@ -127,7 +128,7 @@ def test_of_several_rigs_the_one_counts_in_which_a_controller_is_lost_most() -> 
 
 
 def test_where_all_fail_none_is_recommended() -> None:
-    text = told(ranking("bench", FAMILIES["bench"], [row("feedforward/default", 4.0, failed=3)]))
+    text = told(tuned_ranking("bench", FAMILIES["bench"], [[row("feedforward/default", 4.0, failed=3)]], [0]))
     assert "use none of these" in text and "feedforward (in 3 of 40 worlds)" in text
 
 
@@ -175,17 +176,17 @@ def test_a_term_buys_the_ratio_of_the_errors_with_and_without_it(factor: float, 
 
 
 def test_an_order_that_stays_and_one_that_turns_round() -> None:
-    before = [row("a/tuned", 1.0), row("bb/tuned", 1.5), row("ccc/tuned", 2.0)]
+    before = [[row("a/tuned", 1.0)], [row("bb/tuned", 1.5)], [row("ccc/tuned", 2.0)]]
     same = order_shift(
-        "the same", before, [row(each.label, 2.0 * f) for each, f in zip(before, (1.0, 1.5, 2.0), strict=True)]
+        "the same", before, [[row(each.label, 2.0 * f)] for (each,), f in zip(before, (1.0, 1.5, 2.0), strict=True)]
     )
     assert (same.tau, same.pairs, same.resolved, same.reversed) == (1.0, 3, 3, 0) and same.ratio == pytest.approx(2.0)
     turned = order_shift(
-        "turned", before, [row(each.label, f) for each, f in zip(before, (2.0, 1.5, 1.0), strict=True)]
+        "turned", before, [[row(each.label, f)] for (each,), f in zip(before, (2.0, 1.5, 1.0), strict=True)]
     )
     assert (turned.tau, turned.resolved, turned.reversed) == (-1.0, 3, 3)
     assert turned.best == ("a/tuned", "ccc/tuned")
-    tied = order_shift("tied", before, [row(each.label, 1.0, 0.5) for each in before])
+    tied = order_shift("tied", before, [[row(each.label, 1.0, 0.5)] for (each,) in before])
     assert tied.resolved == 0 and tied.reversed == 0
 
 

@@ -149,6 +149,22 @@ def test_a_tension_beyond_the_wrists_stands_beside_the_verdict() -> None:
     assert beyond.reason == "1.07e+05 N on a step 30 deg"
 
 
+def test_numbers_that_change_with_the_integration_step_are_marked() -> None:
+    def found(*drifts: float, **more: Any) -> Any:
+        table = moves(2.0, 2.0).assign(drift=drifts, peak_tension=70.0)
+        return judge(claim(**more), grounds({"exact": table}, tension_limit=80.0)).found["exact"]
+
+    assert found(0.0, 0.0, 9.0, 9.0, 9.0, 9.0).mark == "", "neither a step nor other controllers count"
+    for drifts in ((0.02, 0.0), (0.0, 0.02), (0.01, 0.02)):
+        marked = found(*drifts, 0.0, 0.0, 0.0, 0.0)
+        assert (marked.verdict, marked.mark) == ("reproduced", "not converged")
+        assert "0.02 rad" in marked.reason
+    ordering = {"value": None, "evidence": "ordering", "than": "pid/printed"}
+    assert found(0.0, 0.0, 9.0, 9.0, 0.0, 0.03, **ordering).mark == "not converged"
+    both = judge(claim(), grounds({"exact": moves(2.0, 2.0).assign(drift=0.1, peak_tension=70.0)}, tension_limit=60.0))
+    assert both.found["exact"].mark == "not physical, not converged"
+
+
 def test_what_the_paper_leaves_open_stays_open_with_ours_beside() -> None:
     named = claim(unspecified="the law is only named")
     for one, said in ((2.0, "reproduced"), (1e-9, BETTER), (9.0, WORSE)):

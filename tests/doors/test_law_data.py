@@ -55,6 +55,7 @@ def run_of(folder: Path) -> Run:
     return Run(done.run.path)
 
 
+@pytest.mark.painted
 def test_weights_are_sealed_and_a_run_replays_when_they_are_gone(learned: Path) -> None:
     run = run_of(learned)
     assert {each for each in run.manifest.code.foreign if each.endswith(".npy")} == {"code/strange/nets/weights.npy"}

@@ -76,6 +76,7 @@ def test_nothing_of_a_hostile_run_executes(stranger: Path, by: str) -> None:
     assert [each.name for each in run.path.parent.iterdir() if each.is_dir()] == [name], "and no run looks complete"
 
 
+@pytest.mark.painted
 def test_a_run_replays_identically_from_its_copy_once_it_is_trusted(stranger: Path) -> None:
     run = sealed(stranger)
     assert set(run.manifest.code.foreign) == {"code/strange/helper.py", "code/strange/strange.py"}

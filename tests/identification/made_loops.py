@@ -11,7 +11,8 @@ import numpy as np
 from wristctl.config.hysteresis import HysteresisSettings, KnownBeforehand
 from wristctl.config.plant import Actuator
 from wristctl.config.wrist import WristParameters
-from wristctl.identification.loop_problem import LoopProblem, MeasuredLoop
+from wristctl.identification.loop_problem import LoopProblem
+from wristctl.identification.measured_loop import MeasuredLoop
 from wristctl.simulation.spool_driven import FrictionCase, SpooledWrist, spooled, strokes
 
 BELIEVED, KNOWN = WristParameters(), KnownBeforehand()

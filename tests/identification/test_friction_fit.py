@@ -4,15 +4,22 @@ from __future__ import annotations
 
 import math
 import os
+from dataclasses import replace
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from tests.identification.made_loops import SHORT, Measured, Recording, made_loop
+from wristctl.arrays import Array
+from wristctl.config.hysteresis import FixedInLoop, HysteresisSettings
+from wristctl.config.plant import Actuator, TrueWrist
+from wristctl.config.wrist import WristParameters
 from wristctl.errors import UserError
-from wristctl.identification.friction_fit import FrictionFit, fit_friction
-from wristctl.identification.loop_problem import LEAST_SHARE
-from wristctl.simulation.spool_driven import FrictionCase
+from wristctl.identification.friction_fit import FrictionFit, fit_friction, fit_in_turn
+from wristctl.identification.loop_problem import INNER, LEAST_SHARE, PRESLIDING, STIFFNESS, LoopProblem
+from wristctl.identification.measured_loop import MeasuredLoop
+from wristctl.simulation.spool_driven import FrictionCase, SpooledWrist, spooled
 
 NAMES = ("friction", "sheath", "presliding")
 CABLE = FrictionCase(0.1, 1.0, 2e-5)
@@ -122,7 +129,7 @@ def test_samples_that_leap_at_the_turns_are_measured(wide: FrictionFit) -> None:
     assert coarse.loop.spools is not None
     steps = np.abs(np.diff(coarse.loop.spools[:, 0]))
     assert steps.max() > 1e-4
-    covariance = np.eye(9)
+    covariance = np.eye(12)
     fit = FrictionFit(coarse, coarse.begin(), [np.zeros(3)], np.ones(1), covariance, 0.0)
     around = [0.5 * (steps[turn - 1] + steps[turn]) for turn in coarse.loop.turns]
     assert fit.leap == pytest.approx(max(around)) and fit.leap > 2e-6
@@ -130,7 +137,7 @@ def test_samples_that_leap_at_the_turns_are_measured(wide: FrictionFit) -> None:
 
 def test_ends_of_intervals_stay_where_they_can_be() -> None:
     problem = made_loop(CABLE, 6)
-    x, covariance = problem.begin(), 1e-12 * np.eye(9)
+    x, covariance = problem.begin(), 1e-12 * np.eye(12)
     x[1] = 1.0
     covariance[1, 1] = 0.25
     fit = FrictionFit(problem, x, [np.zeros(3)], np.ones(1), covariance, 0.0)
@@ -164,3 +171,51 @@ def test_a_recording_with_nothing_after_its_first_long_stroke_is_refused() -> No
     with pytest.raises(UserError, match="too little comes after the first turn") as caught:
         problem.measured  # noqa: B018
     assert "two cycles" in caught.value.fix
+
+
+def probe(torque: float, slack: float, seed: int = 3) -> LoopProblem:
+    """A loop of spools alone: slack tendons, friction inside the wrist, which is softer than believed."""
+    wrist = WristParameters(gravity=(0.0, 0.0), gravity_flexion=0.0, hand_mass=0.0)
+    true = wrist.model_copy(update={"stiffness": 0.8 * wrist.stiffness})
+    time = np.arange(0.0, 8.0, 0.02)
+    spool = 6e-3 * np.sin(2.0 * np.pi * 0.25 * time)
+    tendons = Actuator(level="tendon", friction=0.0, tendon_stiffness=20e3)
+    plant = TrueWrist(inner_friction=torque, inner_presliding_deg=0.6)
+
+    def told(at: Array, which: NDArray[np.int64]) -> Array:
+        path = np.interp(at, time, spool)
+        return np.stack([path - slack, -path - slack], axis=1)[:, :, None]
+
+    done = spooled([SpooledWrist(true, tendons, np.zeros(4), plant=plant)], told, 8001, 1e-3)
+    angle = np.interp(time, 1e-3 * np.arange(done.theta.shape[1]), done.theta[0])
+    angle += np.radians(0.05) * np.random.default_rng(seed).standard_normal(len(time))
+    loop = MeasuredLoop("probe.csv", time, angle, np.stack([spool, -spool], axis=1), None)
+    return LoopProblem(loop, wrist, HysteresisSettings())
+
+
+def test_a_loop_of_slack_tendons_wants_friction_inside_the_wrist() -> None:
+    """The plateau at the turns, where both tendons are slack and it stays bent, is no tendon's friction."""
+    problem = probe(0.04, 1.5e-3)
+    *others, fit = fit_in_turn(problem)
+    assert [each.problem.supposed.inner for each in others] == [False, False] and fit.problem.supposed.inner
+    assert fit.misfit < 1.3 < 4.0 < min(each.misfit for each in others)
+    stiffness = 0.8 * problem.wrist.stiffness
+    assert fit.inner_friction is not None and fit.inner_presliding is not None
+    ratio = fit.inner_friction.value / fit.stiffness.value
+    assert ratio == pytest.approx(0.04 / stiffness, rel=0.1), "spools alone tell a ratio"
+    assert all(side.holds(1.5e-3) for side in fit.slack)
+    assert fit.friction.low == 0.0
+
+
+def test_a_loop_that_tendons_explain_is_asked_for_nothing_more(wide: FrictionFit) -> None:
+    assert wide.misfit < 1.5 and wide.inner_friction is None and INNER in wide.problem.fixed
+    assert wide.problem.step == wide.problem.settings.step
+    held = wide.problem.settings.model_copy(
+        update={"fix": FixedInLoop(stiffness=0.5, presliding=1e-5, inner_friction=0.02)}
+    )
+    fixed = replace(wide.problem, settings=held)
+    assert fixed.begin()[STIFFNESS] == pytest.approx(math.log(0.5 / wide.problem.wrist.stiffness))
+    assert (
+        not {STIFFNESS, PRESLIDING, INNER} & set(fixed.free.tolist())
+        and fixed.plant(fixed.begin()).inner_friction == 0.02
+    )

@@ -9,8 +9,8 @@ import pytest
 
 from wristctl.arrays import Array
 from wristctl.config.wrist import WristParameters
-from wristctl.identification.loop_problem import MeasuredLoop
 from wristctl.identification.loop_shape import LoopShape, loop_shape
+from wristctl.identification.measured_loop import MeasuredLoop
 from wristctl.wrist.tendons import TENDONS_PER_SIDE
 
 WRIST = WristParameters()

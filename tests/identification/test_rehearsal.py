@@ -117,7 +117,7 @@ LATE, STOPPED = {"creep": 0.1}, {"end_stop_deg": 12.0}
 WITH: dict[str, dict[str, Any]] = {
     "plant.creep_time": LATE, "plant.end_stop_stiffness": STOPPED, "plant.end_stop_dissipation": STOPPED,
     "facts.creep_time": LATE, "facts.slip": {"slips_at": 0.2, "slip": 1e-4}, "plant.taper": {"model": "hinges"},
-    "plant.flexion_ratio": {}, "actuator.presliding": {},
+    "plant.flexion_ratio": {}, "actuator.presliding": {}, "plant.inner_presliding_deg": {"inner_friction": 0.02},
 }  # fmt: skip
 """What a leaf needs beside it to mean anything."""
 OTHERS: dict[str, Any] = {

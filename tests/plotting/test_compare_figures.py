@@ -76,11 +76,12 @@ def test_errors_of_repetitions_are_their_median_with_its_interval_at_every_momen
     own = dataclasses.replace(one_result().repeated, errors=errors, failed=np.arange(12) < 2)
     (axes,) = error_sizes([own]).axes
     median, _zero = axes.lines
-    np.testing.assert_allclose(np.asarray(median.get_ydata(), float), 6.5 * np.linspace(1.0, 2.0, len(time)))
+    drawn = np.radians(np.asarray(median.get_ydata(), float))
+    np.testing.assert_allclose(drawn, 6.5 * np.linspace(1.0, 2.0, len(time)))
     (band,) = axes.collections
-    places = np.asarray(band.get_paths()[0].vertices)
+    places = np.radians(np.asarray(band.get_paths()[0].vertices))
     assert places[:, 1].min() == pytest.approx(3.0) and places[:, 1].max() == pytest.approx(20.0)
-    assert axes.get_ylabel() == "median |error| of 12 [rad]" and median.get_label() == "smc/tuned, 2 failed"
+    assert axes.get_ylabel() == "median |error| of 12 [deg]" and median.get_label() == "smc/tuned, 2 failed"
     diverged = dataclasses.replace(own, errors=np.where(np.arange(12)[:, None] < 7, np.nan, errors))
     assert np.isnan(np.asarray(error_sizes([diverged]).axes[0].lines[0].get_ydata())).all()
 

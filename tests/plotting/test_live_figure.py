@@ -44,7 +44,7 @@ def test_before_the_first_row_there_are_axes_and_no_lines() -> None:
 
 def test_rows_may_be_as_long_as_a_thousand_bytes(tmp_path: Path) -> None:
     log, whole = tmp_path / "log.csv", rows(1000)
-    long = whole.assign(state="x" * 285)
+    long = whole.assign(state="x" * 265)
     assert 950 < max(map(len, long.to_csv(index=False).splitlines())) <= 1000
     log.write_text(long.to_csv(index=False))
     assert len(newest_rows(log, 1.0, PERIOD)) == 200

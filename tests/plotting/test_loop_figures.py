@@ -10,7 +10,7 @@ import pytest
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 
-from wristctl.plotting.loop_figures import angles, errors, tensions
+from wristctl.plotting.loop_figures import angles, envelope, errors, one_motion, tensions
 from wristctl.simulation.trajectory import Trajectory
 
 Course = Callable[..., Trajectory]
@@ -44,10 +44,10 @@ def test_loop_that_diverges_is_named_so_and_hides_no_other(course: Course) -> No
     assert axes.get_ylim()[1] <= 45.0
 
 
-def test_errors_are_drawn_in_radians(course: Course) -> None:
+def test_errors_are_drawn_in_degrees(course: Course) -> None:
     one = course("smc/printed")
     (axes,) = errors([one], "SMC").axes
-    np.testing.assert_array_equal(line(axes, "smc/printed").get_ydata(), one.error)
+    np.testing.assert_array_equal(line(axes, "smc/printed").get_ydata(), np.degrees(one.error))
     assert axes.get_title("left") == "SMC"
 
 
@@ -56,7 +56,7 @@ def test_logarithmic_errors_are_positive_and_leave_out_what_is_too_small(course:
     (axes,) = errors([one], log=True).axes
     drawn = np.asarray(line(axes, "smc/printed").get_ydata())
     known = np.abs(one.error) >= 1e-8
-    np.testing.assert_array_equal(drawn[known], np.abs(one.error)[known])
+    np.testing.assert_allclose(drawn[known], np.degrees(np.abs(one.error))[known], rtol=1e-12)
     assert axes.get_yscale() == "log" and np.isnan(drawn[~known]).all() and not known.all()
 
 
@@ -65,26 +65,51 @@ def test_tensions_show_both_sides_and_both_torques_with_a_close_up_of_the_end(co
     plus, close, minus, _, torque, _ = tensions(one).axes
     np.testing.assert_array_equal(plus.lines[0].get_ydata(), one.tension[:, 0])
     np.testing.assert_array_equal(minus.lines[0].get_ydata(), one.tension[:, 1])
-    np.testing.assert_array_equal(line(torque, "wanted by the law").get_ydata(), one.torque_wanted)
-    np.testing.assert_array_equal(line(torque, "of the commanded tensions").get_ydata(), one.torque)
+    np.testing.assert_array_equal(line(torque, "torque wanted").get_ydata(), one.torque_wanted)
+    np.testing.assert_array_equal(line(torque, "torque of the tensions").get_ydata(), one.torque)
     np.testing.assert_array_equal(close.lines[0].get_ydata(), one.tension[-20:, 0])
     assert np.asarray(close.lines[0].get_xdata())[0] == pytest.approx(1e3 * (one.time[-20] - one.time[-1]))
-    assert labels(plus) == ["commanded"]
+    assert labels(plus) == ["tension of the + side"] and labels(minus) == ["tension of the - side"]
 
 
-def test_a_long_course_of_tensions_is_drawn_by_samples_of_its_own_that_keep_every_peak(course: Course) -> None:
-    short = course("smc/exchanged")
+def test_a_long_course_is_a_line_of_means_in_a_band_that_keeps_every_peak(course: Course) -> None:
     rng = np.random.default_rng(0)
     time, tension = np.arange(20_007.0) * 1e-3, rng.uniform(2.0, 60.0, (20_007, 2))
     torque = 0.04 * (tension[:, 0] - tension[:, 1])
-    one = replace(short, time=time, tension=tension, torque=torque, torque_wanted=torque)
-    drawn = tensions(one).axes[0].lines[0]
-    at = np.searchsorted(time, np.asarray(drawn.get_xdata()))
-    np.testing.assert_array_equal(drawn.get_ydata(), tension[at, 0])
+    one = replace(course("smc/exchanged"), time=time, tension=tension, torque=torque, torque_wanted=torque)
+    panel = tensions(one).axes[0]
+    at, mean = (np.asarray(values) for values in panel.lines[0].get_data())
+    (band,) = (np.asarray(each.get_paths()[0].vertices) for each in panel.collections)
+    assert len(at) == 500 and (np.diff(at) > 0).all()
+    for k in (0, 250, 499):  # samples of a part, and the band above and below its mean
+        part = tension[40 * k : 40 * k + 40, 0]
+        assert mean[k] == pytest.approx(part.mean()) and at[k] == pytest.approx(time[40 * k : 40 * k + 40].mean())
+        edges = band[np.isclose(band[:, 0], at[k]), 1]
+        assert (edges.min(), edges.max()) == pytest.approx((part.min(), part.max()))
+
+
+def test_an_envelope_is_of_samples_of_the_course_and_keeps_every_peak() -> None:
+    time, course = np.arange(20_007.0) * 1e-3, np.random.default_rng(0).uniform(2.0, 60.0, 20_007)
+    drawn_time, kept_values = envelope(time, course)
+    at = np.searchsorted(time, drawn_time)
+    np.testing.assert_array_equal(kept_values, course[at])
     assert len(at) < 1100 and (np.diff(at) > 0).all()
     for first in range(0, 20_000, 400):  # ten parts: peaks stay where they are
-        whole, kept = tension[first : first + 400, 0], tension[at[(at >= first) & (at < first + 400)], 0]
+        whole, kept = course[first : first + 400], course[at[(at >= first) & (at < first + 400)]]
         assert (kept.min(), kept.max()) == (whole.min(), whole.max())
+
+
+def test_one_motion_has_angle_error_and_tensions_below_each_other(course: Course) -> None:
+    seen = course("smc/exchanged", 0.4).theta
+    one = replace(course("smc/exchanged"), seen=seen)
+    above, middle, below = one_motion(one, "Loop fast").axes
+    assert [axes.get_ylabel() for axes in (above, middle, below)] == ["angle [deg]", "error [deg]", "tension [N]"]
+    assert above.get_title("left") == "Loop fast" and below.get_xlabel() == "time [s]"
+    assert labels(above) == ["smc/exchanged", "as seen", "desired"] and labels(below) == ["+ side", "- side"]
+    np.testing.assert_array_equal(middle.lines[0].get_ydata(), np.degrees(one.error))
+    np.testing.assert_array_equal(middle.lines[1].get_ydata(), np.degrees(seen - one.theta_ref))
+    for axes, tension in zip(below.lines, one.tension.T, strict=True):
+        np.testing.assert_array_equal(axes.get_ydata(), tension)
 
 
 def test_what_the_controller_sees_and_what_acts_are_drawn_where_they_differ(course: Course) -> None:
@@ -94,14 +119,15 @@ def test_what_the_controller_sees_and_what_acts_are_drawn_where_they_differ(cour
     (axes,) = angles([late]).axes
     np.testing.assert_array_equal(line(axes, "smc/exchanged as seen").get_ydata(), np.degrees(seen))
     (axes,) = errors([late]).axes
-    np.testing.assert_array_equal(line(axes, "smc/exchanged as seen").get_ydata(), seen - late.theta_ref)
+    np.testing.assert_array_equal(line(axes, "smc/exchanged as seen").get_ydata(), np.degrees(seen - late.theta_ref))
     plus, _, minus, *_ = tensions(late).axes
     for side, drawn in enumerate((plus, minus)):
-        np.testing.assert_array_equal(line(drawn, "commanded").get_ydata(), late.tension[:, side])
-        np.testing.assert_array_equal(line(drawn, "acting").get_ydata(), acting[:, side])
+        name = f"tension of the {'+-'[side]} side"
+        np.testing.assert_array_equal(line(drawn, name).get_ydata(), late.tension[:, side])
+        np.testing.assert_array_equal(line(drawn, "tension that acts").get_ydata(), acting[:, side])
     same = replace(one, seen=one.theta, acting=one.tension)
     assert labels(angles([same]).axes[0]) == ["smc/exchanged", "desired"]
-    assert "acting" not in labels(tensions(same).axes[0])
+    assert "tension that acts" not in labels(tensions(same).axes[0])
 
 
 def test_angles_are_named_and_have_their_units(course: Course) -> None:
@@ -150,15 +176,15 @@ def test_the_desired_angle_is_that_of_the_first_loop(course: Course) -> None:
 
 def test_errors_are_measured_around_zero_and_a_diverging_one_hides_no_other(course: Course) -> None:
     (axes,) = errors([course("smc/printed")]).axes
-    assert axes.get_ylim()[0] < -np.radians(30.0) and axes.get_yscale() == "linear"
-    assert (axes.get_xlabel(), axes.get_ylabel()) == ("time [s]", "error [rad]")
+    assert axes.get_ylim()[0] < -30.0 and axes.get_yscale() == "linear"
+    assert (axes.get_xlabel(), axes.get_ylabel()) == ("time [s]", "error [deg]")
     assert [0.0, 0.0] in [list(np.asarray(each.get_ydata())) for each in axes.lines]
     one, half = course("pid/printed", diverges=True), np.linspace(0.1, 0.5, 200) * course("pid/printed").theta_ref
     for sign in (1.0, -1.0):
         wild = replace(one, theta=sign * np.tan(one.time))
-        reach = 2.0 * np.radians(30.0)
+        reach = 2.0 * 30.0
         low, high = errors([replace(wild, theta_ref=half), wild]).axes[0].get_ylim()
-        assert (low, high) == pytest.approx((-reach, reach), abs=0.02)
+        assert (low, high) == pytest.approx((-reach, reach), abs=1.0)
         assert low < -reach < reach < high, "a whole move to either side, and a little more"
 
 
@@ -166,23 +192,23 @@ def test_the_logarithm_of_an_error_is_of_its_size_alone(course: Course) -> None:
     one = course("smc/printed")
     late = replace(one, seen=np.roll(one.theta, 3))
     (axes,) = errors([late], log=True).axes
-    assert labels(axes) == ["smc/printed"] and axes.get_ylabel() == "|error| [rad]"
+    assert labels(axes) == ["smc/printed"] and axes.get_ylabel() == "|error| [deg]"
 
 
 def test_the_side_on_which_tensions_are_named_and_begin_at_zero(course: Course) -> None:
     one = course("smc/exchanged")
     plus, close, minus, _, torque, last = (made := tensions(one)).axes
-    assert [each.get_ylabel() for each in made.axes] == ["+ side [N]", "", "- side [N]", "", "torque [N m]", ""]
-    assert [each.get_xlabel() for each in made.axes[4:]] == ["time [s]", "time - 4.975 s [ms]"]
-    assert plus.get_title("left") == "smc/exchanged: tension per tendon, torque"
+    assert [each.get_ylabel() for each in made.axes] == ["tension [N]", "", "tension [N]", "", "torque [N m]", ""]
+    assert [each.get_xlabel() for each in made.axes[4:]] == ["time [s]", "to the end [ms]"]
+    assert plus.get_title("left") == "smc/exchanged"
     assert close.get_title("left") == "last 20 samples"
     for each in (plus, minus):
         low, high = each.get_ylim()
         assert low == 0.0 and 60.0 < high < 66.0, "the largest tension of both sides"
-    assert [each.get_legend() is not None for each in made.axes] == [False] * 4 + [True, False]
+    assert len(made.legends) == 1 and not any(each.get_legend() for each in made.axes)
     for each in (torque, last):
         np.testing.assert_array_equal(
-            line(each, "wanted by the law").get_ydata(),
+            line(each, "torque wanted").get_ydata(),
             one.torque_wanted[-len(each.lines[0].get_xdata()) :],  # type: ignore[arg-type]
         )
     assert np.asarray(last.lines[0].get_xdata())[-1] == 0.0
@@ -193,10 +219,10 @@ def test_tensions_that_act_are_shown_beside_those_commanded_with_a_legend(course
     one = course("smc/exchanged")
     made = tensions(replace(one, acting=2.0 * one.tension))
     plus, close, minus, close_minus, *_ = made.axes
-    assert [each.get_legend() is not None for each in made.axes] == [False, False, True, False, True, False]
+    assert [text.get_text() for text in made.legends[0].get_texts()].count("tension that acts") == 1
     assert 120.0 < plus.get_ylim()[1] < 132.0 and plus.get_ylim() == minus.get_ylim()
     for side, panel in enumerate((close, close_minus)):
-        np.testing.assert_array_equal(line(panel, "acting").get_ydata(), 2.0 * one.tension[-20:, side])
+        np.testing.assert_array_equal(line(panel, "tension that acts").get_ydata(), 2.0 * one.tension[-20:, side])
 
 
 def test_a_torque_that_the_law_wants_beyond_all_tensions_does_not_flatten_the_one_given(course: Course) -> None:
@@ -219,10 +245,9 @@ def test_a_course_is_drawn_sample_by_sample_until_there_are_four_in_a_pixel(cour
     torque = 0.04 * (tension[:, 0] - tension[:, 1])
     time = 1e-3 * np.arange(float(count))
     one = replace(course("smc/exchanged"), time=time, tension=tension, torque=torque, torque_wanted=torque)
-    drawn = tensions(one).axes[0].lines[0]
-    assert len(np.asarray(drawn.get_xdata())) == (count if count < 2000 else 1000)
-    at = np.searchsorted(one.time, np.asarray(drawn.get_xdata()))
-    np.testing.assert_array_equal(drawn.get_ydata(), tension[at, 0])
+    panel = tensions(one).axes[0]
+    assert len(np.asarray(panel.lines[0].get_xdata())) == (count if count < 2000 else 500)
+    assert len(panel.collections) == (count == 2000)
 
 
 def test_what_differs_by_less_than_a_millionth_is_not_drawn_twice(course: Course) -> None:

@@ -169,7 +169,7 @@ def pressed_in_a_jog(command: str, served: Bridge) -> str:
     while "type yes" not in said.lower():
         assert select.select([process.stderr], [], [], 60.0)[0]
         said += os.read(process.stderr.fileno(), 4096).decode()
-    time.sleep(0.7)  # drives settle for 0.2 s, and 5 mm take 0.85 s
+    time.sleep(0.5)  # drives settle for 0.2 s, and 3 mm take 0.5 s
     served.type("press")
     _, err = process.communicate(timeout=60.0)
     assert process.returncode == 5, err

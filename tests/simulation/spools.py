@@ -12,8 +12,9 @@ from wristctl.config.plant import Actuator, TendonFacts, TrueActuator, TrueWrist
 from wristctl.config.wrist import WristParameters
 from wristctl.lanes.lane import zero_like
 from wristctl.lanes.rows import part, rows_of
-from wristctl.simulation.nonideal import nonideal_of, spools_after_slip, unmoved
+from wristctl.simulation.nonideal import inner_of, nonideal_of, spools_after_slip, unmoved
 from wristctl.wrist.compiled_model import terms
+from wristctl.wrist.dahl import inner_in_lanes
 from wristctl.wrist.pcc import PCC
 from wristctl.wrist.plant import advance_or_stop, kernel_of, parameters_of, travel
 from wristctl.wrist.segments import segments
@@ -60,13 +61,14 @@ def _spooled(
     reeled: Any,
     state: Any,
     memory: Any,
+    inner: Any,
     out: Any,
     h: float,
     cut: Any,
 ) -> None:
     segment, n = parameters_of(model, rows_of(parameters)), len(cut)
     zero = zero_like(segment.length)
-    tendons = RealTendons(stiffness + zero, read_nonideal(rows_of(values)), rows_of(memory))
+    tendons = RealTendons(stiffness + zero, read_nonideal(rows_of(values)), rows_of(memory), inner_in_lanes(inner))
     q, rate = part(rows_of(state), 0, cut), part(rows_of(state), n, cut)
     alive, before = 1.0 + zero, (reeled[0, 0] + zero, reeled[0, 1] + zero)
     for k in range(reeled.shape[0]):
@@ -107,7 +109,8 @@ def spooled(
     parameters = segments(wrist or WristParameters(), n, (0.0, force))
     stiffness = TENDONS_PER_SIDE * actuator.tendon_stiffness
     move = kernel_of(_spooled, PCC)
-    move(PCC, parameters, values, stiffness, np.ascontiguousarray(reeled), state, memory, out, h, (0,) * n)
+    inner = inner_of([plant or TrueWrist()], np.zeros((1, n)), np.zeros(1), lambda rows: rows[0])
+    move(PCC, parameters, values, stiffness, np.ascontiguousarray(reeled), state, memory, inner, out, h, (0,) * n)
     return Spooled(*out.T)
 
 

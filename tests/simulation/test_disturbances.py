@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from wristctl.config.loop import Loop, Reference
-from wristctl.config.plant import Disturbances, Drift, Plant, Push
+from wristctl.config.plant import Disturbances, Drift, Grasp, Plant, Push
 from wristctl.config.wrist import WristParameters
 from wristctl.control.table import controller
 from wristctl.simulation.disturbances import acting
@@ -52,6 +52,16 @@ def test_a_loaded_wrist_rests_where_tendons_gravity_and_tip_force_balance() -> N
     values, zero = segments(WRIST, 4, (0.0, 0.3)), np.zeros(4)
     assert np.abs(linearised(values, outcome.coordinates(0)[-1], zero, zero, pulls)[0]).max() < 1e-4
     assert outcome.column("theta", 0)[-1] > run(Disturbances()).column("theta", 0)[-1] + 0.03
+
+
+@pytest.mark.parametrize("mass", [0.05, -0.05])
+def test_an_object_taken_up_weighs_like_a_load_and_before_it_there_is_none(mass: float) -> None:
+    taken = course(Disturbances(grasp=Grasp(mass=mass, start=1.0, duration=0.5)))[:, 0]
+    assert not taken[TIME <= 1.0].any() and taken[TIME >= 1.5] == pytest.approx(9.81 * mass)
+    assert taken[1250] == pytest.approx(9.81 * mass / 2.0)
+    grasped = run(Disturbances(grasp=Grasp(mass=mass, start=0.5)), horizon=8.0).column("theta", 0)
+    loaded = run(Disturbances(load=9.81 * mass), horizon=8.0).column("theta", 0)
+    assert grasped[-1] == pytest.approx(loaded[-1], abs=1e-5) and abs(grasped[500] - loaded[500]) > 1e-3
 
 
 def test_a_wrist_that_has_drifted_rests_where_a_softer_one_does() -> None:

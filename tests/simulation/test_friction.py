@@ -13,7 +13,8 @@ from tests.simulation.spools import HOME, STIFF, WRIST, antagonists, minimum_jer
 from wristctl.config.plant import Actuator
 from wristctl.lanes.compiled import kernel
 from wristctl.lanes.rows import rows_of
-from wristctl.wrist.tendon_mechanics import bristle, capstan
+from wristctl.wrist.dahl import bristle
+from wristctl.wrist.tendon_mechanics import capstan
 
 
 @pytest.mark.parametrize(("sheath", "presliding"), [(0.0, 2e-5), (1.0, 5e-6), (1.0, 2e-5), (3.0, 2e-5), (3.0, 1e-4)])

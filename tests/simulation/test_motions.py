@@ -242,7 +242,7 @@ def put(line: int, text: str) -> str:
         ("".join([*LINES[:60], *LINES[80:]]), "a gap of 0.21 s, where samples are 0.01 s apart", ":61", "fill it in"),
         (put(40, "0.38,49.0"), "the angle jumps by 3", ":40", "mend that sample"),
         (text_of(time__s=TIME, angle__rad=ANGLE), "the angle jumps by", ":", "the right unit into the header"),
-        (put(9, "0.07,nan"), "angle is 'nan'", ":9", "a number"),
+        (put(9, "0.07,ten"), "angle is 'ten'", ":9", "a number"),
         (put(9, "0.07,1.0,2.0"), "3 cells under 2 columns", ":9", "one number for each column"),
         ("".join(LINES[:4]), "3 samples, too few for a motion", "", "at least 4"),
     ],

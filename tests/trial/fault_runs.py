@@ -175,6 +175,17 @@ def from_power_on(case: Case, phase: Phase) -> Judged:
     return judge([case], phase, perform(over(_settings(phase), {"bench": case.bench})), sound_course(phase))
 
 
+def camera_before(rng: np.random.Generator) -> dict[str, Any]:
+    """A webcam on a tripod, in a room: as far off square as it may stand uncalibrated, its lens, and the light."""
+    oblique, toward = np.sqrt(rng.uniform(0.0, 10.0**2)), rng.uniform(0.0, 2.0 * np.pi)
+    return {
+        "tilt_deg": oblique * np.cos(toward), "pan_deg": oblique * np.sin(toward), "roll_deg": rng.uniform(-3.0, 3.0),
+        "distance": 0.28 * rng.uniform(0.94, 1.03), "distortion": rng.uniform(-0.15, 0.02),
+        "gradient": rng.uniform(0.0, 0.8), "noise": rng.uniform(1.0, 8.0), "blur": rng.uniform(0.6, 1.2),
+        "contrast": rng.uniform(0.6, 0.9),
+    }  # fmt: skip
+
+
 def rig_settings(rng: np.random.Generator, number: int) -> dict[str, Any]:
     """A sound rig drawn from those that there may be, homed, in one plane, pushed by a person."""
     late = rng.uniform(-0.02, 0.02)
@@ -187,7 +198,7 @@ def rig_settings(rng: np.random.Generator, number: int) -> dict[str, Any]:
             "tendon_stiffness": float(np.exp(rng.uniform(np.log(5e3), np.log(50e3)))), "sheath": rng.uniform(0.0, 2.0),
             "creep": 0.04,
         },
-        "camera": {"delay_frames": 2.0 + 60.0 * late},
+        "camera": {"delay_frames": 2.0 + 60.0 * late, "scene": camera_before(rng)},
         "motors": {"slack": tuple(rng.uniform(1e-4, 5e-4, 4).tolist())},
         "person": {"takes": 1.0},
     }  # fmt: skip

@@ -101,5 +101,8 @@ class Marker:
         time = self._board.transport.now() - self.delay
         return [Sighting(time, self.number, theta - self.zero, verdict, np.zeros((2, 4, 2)))]
 
+    def stand_square(self, sightings: Sequence[Sighting]) -> None:
+        """It is square."""
+
     def close(self) -> None:
         """Nothing is open."""

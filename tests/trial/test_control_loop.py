@@ -18,7 +18,7 @@ from wristctl.control.table import controller
 from wristctl.trial.control_loop import ControlLoop
 from wristctl.trial.log import TrialLog
 from wristctl.trial.safety import SafetyStop
-from wristctl.trial.steering import Steering
+from wristctl.trial.steering import Answer, Steering
 from wristctl.trial.tick_timing import TickTiming
 from wristctl.trial.trials import at_rest, back
 from wristctl.vision.marker import SightingVerdict
@@ -306,6 +306,17 @@ def test_a_law_that_raises_stops_as_such(rig_of: RigOf) -> None:
     rig.loop._steering.respond = lambda *_: 1 / 0
     with pytest.raises(SafetyStop, match="the controller failed: ZeroDivisionError"):
         rig.follow(at_rest(0.02, PERIOD))
+
+
+@pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf])
+@pytest.mark.parametrize("name", ["torque_wanted", "torque", "plus", "minus"])
+def test_what_a_law_wants_is_never_sent_where_it_is_no_number(rig_of: RigOf, name: str, value: float) -> None:
+    rig = rig_of()
+    answer = Answer(0.5, 0.5, 10.0, 2.0, False)._replace(**{name: value})  # type: ignore[arg-type]
+    rig.loop._steering.respond = lambda *_: answer
+    with pytest.raises(SafetyStop, match="torque is not a number"):
+        rig.follow(at_rest(0.02, PERIOD))
+    assert not any(any(what[1]) for what in rig.board.told if what[0] == "turn")
 
 
 def test_verdicts_are_told_as_they_are(rig_of: RigOf) -> None:

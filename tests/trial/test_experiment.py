@@ -16,6 +16,8 @@ from wristctl.errors import UserError
 from wristctl.trial.homing import check_zero, slacken
 from wristctl.trial.log import LOG
 
+NAMES = "log", "between", "frames", "residuals", "truth", "wire"
+
 
 def test_a_trial_follows_its_reference_and_comes_back(experiment: Run) -> None:
     done = experiment()
@@ -95,7 +97,7 @@ def test_the_same_seed_gives_the_same_bytes(experiment: Run) -> None:
     for _ in range(2):
         done = experiment()
         files.append({file.name: file.read_bytes() for file in done.folder.iterdir()})
-    assert set(files[0]) == {"log.csv", "between.csv", "frames.csv", "truth.csv", "wire.csv"} and files[0] == files[1]
+    assert set(files[0]) == {f"{name}.csv" for name in NAMES} and files[0] == files[1]
 
 
 def test_a_stored_zero_is_checked_on_a_wrist_that_has_had_time_to_straighten(

@@ -10,9 +10,14 @@ import numpy as np
 import pytest
 
 from tests.trial.conftest import WRIST, settings_of
+from wristctl.board.messages import State
+from wristctl.control.response import Estimate
+from wristctl.trial.blind_model import BlindModel
+from wristctl.trial.likely_causes import Evidence, likely_causes, reversals
 from wristctl.trial.safety import SafetyStop
 from wristctl.trial.spools import on_plus_side
-from wristctl.trial.tracking_monitor import BlindModel, Evidence, Following, likely_causes, reversals
+from wristctl.trial.tick_timing import TickTiming
+from wristctl.trial.watch import Tick, Watch
 from wristctl.vision.marker import Sighting, SightingVerdict
 from wristctl.wrist.directions import away_of
 
@@ -33,19 +38,22 @@ def still(time: float) -> float:
 def watched(
     theta: Course = still, away: Course = still, load: Course = still, seconds: float = 1.0, position: Course = still,
     **changes: Any,
-) -> tuple[Following, float]:  # fmt: skip
+) -> tuple[Watch, float]:  # fmt: skip
     """A wrist whose spools are said to stand here [steps] and whose marker shows this; when it was stopped."""
     settings = settings_of(**changes)
-    following = Following(settings, WRIST, "ulnar", PERIOD)
-    held = WRIST.pretension / settings.actuator.tendon_stiffness
+    watch = Watch(settings, WRIST, "ulnar", TickTiming(PERIOD))
+    held, taut = WRIST.pretension / settings.actuator.tendon_stiffness, np.zeros(4)
     for tick in range(round(seconds / PERIOD)):
         time = tick * PERIOD
         if tick % FRAME == 0:
             size = math.exp(-away(time) / PER_RADIAN) * 0.9
-            following.saw(Sighting(time, tick, theta(time), SightingVerdict.OK, np.zeros((2, 4, 2)), size), time)
-        following.see(time, load(time), np.full(4, position(time)))
-        following.predict(held, held)
-    return following, time
+            watch.saw(Sighting(time, tick, theta(time), SightingVerdict.OK, np.zeros((2, 4, 2)), size), time, time)
+        estimate = Estimate(0.0, 0.0, load(time))
+        now = Tick(time, 0.0, estimate, np.full(4, position(time)), taut, State.ENABLED, 0, 0)
+        watch.see(now, time)
+        watch.judge(now)
+        watch.predict(held, held)
+    return watch, time
 
 
 def stopped(**given: Any) -> tuple[str, float]:
@@ -74,10 +82,10 @@ def slowly(value: float) -> Course:
 
 def test_a_wrist_that_does_as_its_motors_do_goes_on_and_the_greatest_is_kept() -> None:
     near = 0.9 * math.radians(LIMITS.across_deg)
-    following, _ = watched(away=after(near), load=after(-0.9 * LIMITS.load), theta=slowly(0.9 * math.radians(3.5)))
-    assert following.greatest.across == pytest.approx(near, rel=1e-6)
-    assert following.greatest.load == pytest.approx(0.9 * LIMITS.load)
-    assert math.degrees(following.greatest.apart) == pytest.approx(0.9 * 3.5, abs=0.05)
+    watch, _ = watched(away=after(near), load=after(-0.9 * LIMITS.load), theta=slowly(0.9 * math.radians(3.5)))
+    assert watch.most["across"] == pytest.approx(near, rel=1e-6)
+    assert watch.most["load"] == pytest.approx(0.9 * LIMITS.load)
+    assert math.degrees(watch.most["apart"]) == pytest.approx(0.9 * 3.5, abs=0.05)
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
@@ -85,7 +93,7 @@ def test_each_limit_stops_once_it_is_exceeded_for_so_long(sign: float) -> None:
     said, late = stopped(load=after(sign * 1.01 * LIMITS.load))
     assert "a load of 1.62 N m, beyond 1.6 N m" in said and late == pytest.approx(LIMITS.odd_for, abs=2 * PERIOD)
     said, late = stopped(away=after(sign * math.radians(1.05 * LIMITS.across_deg)))
-    assert "bends 1.1 deg across its plane, beyond 1.0 deg" in said and late < LIMITS.odd_for + 5 * PERIOD
+    assert "bends 1.1 deg across its plane, beyond 1 deg" in said and late < LIMITS.odd_for + 5 * PERIOD
     said, _ = stopped(theta=slowly(sign * math.radians(1.2 * LIMITS.follow_deg)))
     assert "deg from where they should have it, beyond 3.5 deg" in said
 
@@ -129,11 +137,8 @@ def test_what_the_marker_shows_of_a_wrist_at_rest_is_no_bend_across() -> None:
 
 
 def test_a_marker_without_a_size_is_not_judged_across() -> None:
-    following = Following(SETTINGS, WRIST, "ulnar", PERIOD)
-    for tick in range(100):
-        following.saw(Sighting(tick * PERIOD, tick, 0.0, SightingVerdict.OK, np.zeros((2, 4, 2))), tick * PERIOD)
-        following.see(tick * PERIOD, 0.0, np.zeros(4))
-    assert following.greatest.across == 0.0
+    watch, _ = watched(away=lambda time: math.nan)
+    assert watch.most["across"] == 0.0
 
 
 def blind(softest: float, plus: float, minus: float) -> np.ndarray:
@@ -208,6 +213,19 @@ def test_causes_of_the_whole_wrist_go_by_how_far_it_moved() -> None:
     assert "bends by less" in of(turned=turned, meant=0.2, bent=0.1)[0]
     assert "marker has slipped" in of(jump=0.1)[0]
     assert of(load=1.0)[-1] == "something holds or pushes the wrist"
+
+
+def test_a_push_comes_first_where_the_trial_has_one_and_last_where_none_is_meant() -> None:
+    for seen in ({"load": 1.0}, {"across": 0.05, "load": 1.0}, {"jump": 0.1}):
+        pushed, alone = of(pushed=True, **seen), of(**seen)
+        assert pushed[0].startswith("this trial's push was harder") and pushed[1:] == alone[:-1]
+        assert "pushes the wrist" in alone[-1]
+
+
+def test_an_oblique_camera_is_named_where_the_bend_across_may_be_its_own() -> None:
+    for across, oblique, first in ((1.5, 6.0, True), (-1.5, 6.0, True), (2.0, 6.0, False), (1.5, 0.0, False)):
+        causes = of(across=math.radians(across), oblique=math.radians(oblique), load=1.0)
+        assert ("does not look square" in causes[0]) is first and "off its pulley" in causes[first]
 
 
 def test_a_loop_that_swings_is_said_to_before_any_tendon_is_blamed() -> None:

@@ -82,8 +82,11 @@ def test_before_anything_moves_ramps_watchdog_and_limits_are_set_and_drives_swit
     actuator = Actuator(level="tendon", step_acceleration=30_000.0)
     settings = settings_of(actuator=actuator, safety={"watchdog": 0.2, "travel": 0.01, "hold": True})
     prepare(board, settings)
-    steps = round(0.01 / spools_of(actuator).step)
-    assert board.told == [Configure(0.2, 1, 30_000), Limits((-steps,) * 4, (steps,) * 4), "enable"]
+    prepare(board, settings, 1e-3)
+    steps, homing, one = (round(length / spools_of(actuator).step) for length in (0.01, 2.78e-3, 1e-3))
+    limits = (-steps,) * 4, (steps,) * 4
+    ramps = Configure(0.2, 1, 30_000)
+    assert board.told == [ramps, Limits(*limits, homing), "enable", ramps, Limits(*limits, one), "enable"]
 
 
 def test_an_old_fault_is_cleared_first() -> None:

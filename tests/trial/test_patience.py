@@ -9,6 +9,8 @@ import numpy as np
 import pytest
 
 from tests.trial.rig import Marker, RigBoard
+from tests.trial.test_rig_facts import posed
+from wristctl.config.hw_run import Homing
 from wristctl.trial.safety import SafetyStop
 from wristctl.trial.supervised_wait import Patience
 
@@ -53,3 +55,15 @@ def test_a_step_that_nobody_has_asked_for_ends_the_wait() -> None:
     board.position[2] += 1
     with pytest.raises(SafetyStop, match=r"moved by \[0, 0, 1, 0\] steps"):
         patience.pulse()
+
+
+def test_a_camera_too_oblique_for_its_markers_is_refused_and_one_that_is_not_is_told() -> None:
+    board: Any = RigBoard()
+    tracking: Any = Marker(board, lambda: 0.0)
+    for pan, most in ((-14.0, 15.0), (14.0, 15.0), (4.0, 5.0)):
+        tracking.stand_square = lambda seen, pan=pan: posed(0.0, pan)
+        pose = Patience(board).stand_square(tracking, Homing(oblique_deg=most))
+        assert pose is not None and math.degrees(pose.oblique) == pytest.approx(abs(pan))
+        with pytest.raises(SafetyStop, match=f"looks {abs(pan):.0f} deg off square .*, beyond") as stopped:
+            Patience(board).stand_square(tracking, Homing(oblique_deg=abs(pan) - 0.5))
+        assert "--optics" in str(stopped.value.fix)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import Any
 
@@ -13,8 +14,10 @@ from wristctl.board.check import RoundTrips, latency_timer, shorter
 from wristctl.config.hw_run import HwRunSettings
 from wristctl.trial.rig_facts import RigFacts, troubles
 from wristctl.trial.rig_strokes import Latency
+from wristctl.vision.camera_pose import CameraPose
 from wristctl.vision.detector import PictureQuality
 from wristctl.vision.marker import SightingVerdict
+from wristctl.vision.view import View
 
 SETTINGS = HwRunSettings()
 SOUND = RigFacts(
@@ -22,6 +25,12 @@ SOUND = RigFacts(
     quality=PictureQuality(48.0, 1.0, 40.0, 220.0), noise=4e-4, woken=np.full(200, 1e-4),
     latency=Latency(1e-3, 3e-4, 40.0, 5e-4, 200),
 )  # fmt: skip
+
+
+def posed(tilt: float, pan: float = 0.0, misfit: float = 1e-3) -> CameraPose:
+    """A camera so many degrees off square."""
+    return CameraPose(math.radians(tilt), math.radians(pan), -0.05, misfit, View())
+
 
 SLOW = RoundTrips("STATUS", 100, 0.016, 0.03, 0.04)
 
@@ -31,7 +40,7 @@ def told(**changes: Any) -> list[tuple[bool, str, str]]:
 
 
 def test_a_sound_rig_has_no_troubles() -> None:
-    assert told() == []
+    assert told() == [] == told(pose=posed(3.0, -3.0))
 
 
 @pytest.mark.parametrize(
@@ -47,6 +56,9 @@ def test_a_sound_rig_has_no_troubles() -> None:
          "device.delay=0.0600"),
         ({"latency": Latency(0.12, 3e-4, 40.0, 5e-4, 99)}, True, "beyond safety.stale", "safety.stale of 0.2 s"),
         ({"pace": pace(60.0, 0.03, verdict=SightingVerdict.TWICE)}, True, "60 of 60 pictures: twice", "same id"),
+        ({"pose": posed(6.0)}, False, "looks 6 deg off square", "--optics"),
+        ({"pose": posed(0.0, -16.0)}, True, "looks 16 deg off square", "--optics"),
+        ({"pose": posed(0.0, misfit=0.02)}, False, "no squares of one plane (by 2.0 %)", "flat on stiff flags"),
         ({"quality": PictureQuality(28.0, 1.0, 40.0, 220.0)}, False, "28 px wide", "40 px"),
         ({"quality": PictureQuality(48.0, 2.4, 40.0, 220.0)}, False, "blurred by 2.4 px", "focus"),
         ({"quality": PictureQuality(48.0, 1.0, 90.0, 254.0)}, False, "rim is white", "shorter"),

@@ -128,9 +128,10 @@ def made_up(loop_cells: tuple[int, ...], **metrics: list[float]) -> tuple[Judge,
     cases = [Case(case.loop, case.motion, case.stream, cell) for cell in loop_cells]
     weights = {"steady_state": 0.0, "chattering": 0.0, "oscillation": 0.0} | {"worst": 0.0, "swinging": 0.0}
     judge = Judge(cases, study.wrist, Objective.model_validate(weights | {"rmse": 1.0}))
-    known, rests = {name: np.ones((1, len(cases))) for name in METRICS}, np.array([True] * len(cases))
+    known, rests = {name: np.ones((1, len(cases))) for name in (*METRICS, "sustained")}, np.array([True] * len(cases))
     judge._yardstick = Measured(known, np.zeros((1, len(cases)), bool), np.ones((1, len(cases))), rests)
-    values = {name: np.array([given]) for name, given in metrics.items()} | {"drift": np.zeros((1, len(cases)))}
+    still = {"drift": np.zeros((1, len(cases))), "sustained": np.zeros((1, len(cases)))}
+    values = still | {name: np.array([given]) for name, given in metrics.items()}
     return judge, Measured(values, np.zeros((1, len(cases)), bool), np.ones((1, len(cases))), rests)
 
 
@@ -163,6 +164,17 @@ def test_cases_that_swing_cost_the_root_of_their_share() -> None:
         assert weighed(judge, swinging=1.0).value(measured)[0] == pytest.approx(still + cost)
         moving = replace(measured, rests=np.array([True, False, True, True]))
         assert judge.value(moving)[0] == pytest.approx(still)
+
+
+def test_cases_that_swing_in_motion_cost_alike_beyond_twice_what_feedforward_shows_there() -> None:
+    for swing, open_loop, cost in ((1.01, 0.0, 0.5), (0.99, 0.0, 0.0), (2.9, 1.0, 0.0), (3.1, 1.0, 0.5)):
+        swings = [0.0, swing * LIMIT_CYCLE, 0.0, 0.0]
+        judge, measured = made_up((0, 1, 2, 3), rmse=[0.1] * 4, oscillation=[0.0] * 4, sustained=swings)
+        judge._yardstick.metrics["sustained"] = np.full((1, 4), open_loop * LIMIT_CYCLE)
+        still = weighed(judge, swinging=0.0).value(measured)[0]
+        moving = replace(measured, rests=np.zeros(4, bool))
+        assert weighed(judge, swinging=1.0).value(moving)[0] == pytest.approx(still + cost)
+        assert judge.value(measured)[0] == pytest.approx(still), "at rest that is another metric"
 
 
 @pytest.mark.parametrize("times", [0, 1, 4])

@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 
 VECTORS = Path(__file__).parents[1] / "data" / "wrist_vectors.json"
+SPATIAL = VECTORS.with_name("wrist_spatial_vectors.json")
 CHECK = Path(__file__).parents[1] / "check_vectors.py"
 
 
@@ -17,10 +18,11 @@ def run(path: Path) -> subprocess.CompletedProcess[str]:
     return subprocess.run([sys.executable, CHECK, path], capture_output=True, text=True)
 
 
-def test_model_agrees_with_reference_vectors() -> None:
-    done = run(VECTORS)
+@pytest.mark.parametrize(("vectors", "quantities"), [(VECTORS, 6), (SPATIAL, 7)], ids=["planar", "spatial"])
+def test_model_agrees_with_reference_vectors(vectors: Path, quantities: int) -> None:
+    done = run(vectors)
     assert done.returncode == 0, done.stdout + done.stderr
-    assert done.stdout.count(" ok") == 6
+    assert done.stdout.count(" ok") == quantities
 
 
 @pytest.mark.parametrize("quantity", ["mass matrix", "trajectory"])

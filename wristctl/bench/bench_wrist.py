@@ -17,7 +17,7 @@ from wristctl.config.plant import Disturbances
 from wristctl.config.wrist import WristParameters
 from wristctl.seeds import Entropy
 from wristctl.simulation.disturbances import acting
-from wristctl.simulation.nonideal import nonideal_of, of_tendons, unmoved
+from wristctl.simulation.nonideal import inner_of, nonideal_of, of_tendons, unmoved
 from wristctl.simulation.worlds import drawn, facing, plant_of
 from wristctl.wrist.directions import ACTIVE, DIRECTIONS, away_of, tendons_of
 from wristctl.wrist.out_of_plane import across_of
@@ -137,7 +137,7 @@ class BenchWrist:
             out = self._record[self._rows : self._rows + count]
             hanging = Hanging(
                 self._model, self._values, self._settings.actuator.tendon_stiffness, self._nonideal, self._tendons,
-                self._stepper, self._sides, self._across,
+                self._inner, self._stepper, self._sides, self._across,
             )  # fmt: skip
             heard = self._follow(
                 hanging, self._spools, self._state, disturbed, self._edges, self._periods, self._begun, out,
@@ -184,6 +184,7 @@ class BenchWrist:
         tendon_states = of_tendons(self._tendons, AXES)[np.argsort(self._axes)][axes]
         self._tendons = unmoved(self._spools.reeled[axes], np.zeros(3), np.zeros(AXES), self._state[: self._n])
         of_tendons(self._tendons, AXES)[:] = tendon_states
+        self._inner = inner_of([self._drawn], self._state[None, : self._n], np.zeros(1), lambda rows: rows[0])
         self._axes = axes
 
     def _make_room(self, count: int) -> None:

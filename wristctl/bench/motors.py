@@ -18,6 +18,7 @@ from wristctl.lanes.compiled import compiled
 from wristctl.lanes.lane import zero_like
 from wristctl.lanes.rows import part, rows_of
 from wristctl.simulation.nonideal import electrical_turn, tendon_after_slip
+from wristctl.wrist.dahl import inner_in_lanes
 from wristctl.wrist.plant import advance_or_stop, disturbed, parameters_of, travel
 from wristctl.wrist.tendon_mechanics import RealTendons, read_nonideal, spool_pull
 
@@ -126,8 +127,8 @@ class Hanging(NamedTuple):
     """Load of the motors: plant and tendons.
 
     The plant (its model and the values of its parameters), a tendon's stiffness [N/m], the values of Nonideal and the
-    state that go with four of them, the motors, the axes of two tendons on the + and two on the - side, and what bends
-    across the plane (wrist.across.Across).
+    state that go with four of them, friction inside the wrist, the motors, the axes of two tendons on the + and two on
+    the - side, and what bends across the plane (wrist.across.Across).
     """
 
     model: Any
@@ -135,6 +136,7 @@ class Hanging(NamedTuple):
     stiffness: float
     nonideal: Any
     tendons: Any
+    inner: Any
     motor: Any
     sides: Any
     across: Any
@@ -174,7 +176,8 @@ def follow(
     n = len(cut)
     q, rate = part(rows_of(state), 0, cut), part(rows_of(state), n, cut)
     zero = zero_like(reeled[0])
-    tendons = RealTendons(hanging.stiffness + zero, read_nonideal(rows_of(hanging.nonideal)), rows_of(hanging.tendons))
+    nonideal, inner = read_nonideal(rows_of(hanging.nonideal)), inner_in_lanes(hanging.inner)
+    tendons = RealTendons(hanging.stiffness + zero, nonideal, rows_of(hanging.tendons), inner)
     ahead, behind, ahead_too, behind_too = sides[0], sides[2], sides[1], sides[3]
     edge = 0
     for k in range(acting.shape[0]):

@@ -16,6 +16,7 @@ from wristctl.board.messages import (
     COMMAND_OF,
     DICTIONARY_HASH,
     ENABLE_KEY,
+    ESTOP_SEQ,
     FEEDS_WATCHDOG,
     LAYOUTS,
     MAX_RATE,
@@ -80,8 +81,11 @@ class Exchange:
         return self._decoder.bad_frames + self._decoder.bad_crc
 
     def ask(self, command: Command, payload: bytes, patience: float, attempts: int) -> bytes:
-        """Result and payload of the answer, each attempt waited for `patience` seconds. Raises NoAnswer."""
-        self._sequence = (self._sequence + 1) & 0xFF
+        """Result and payload of the answer, each attempt waited for `patience` seconds. Raises NoAnswer.
+
+        Commands are numbered in turn; an emergency stop has the number by which the board obeys it on its last byte.
+        """
+        self._sequence = ESTOP_SEQ if command is Command.ESTOP else (self._sequence + 1) & 0xFF
         frame, bytes_before, began = (
             encode(command, self._sequence, payload),
             self.traffic.bytes_read,

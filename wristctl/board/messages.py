@@ -7,16 +7,15 @@ from typing import NamedTuple
 
 from wristctl.board.layout import Field, Layout
 
-PROTOCOL_VERSION = 2
-FIRMWARE_VERSION = (2, 0, 0)
-DICTIONARY_HASH = 0x31AF83AA
+PROTOCOL_VERSION = 3
+FIRMWARE_VERSION = (3, 0, 0)
+DICTIONARY_HASH = 0xED3418D2
 BAUD = 250000
 AXES = 4  # 1: step/direction drives
 MAX_RATE = 20000  # steps/s: of one axis
 TOTAL_RATE = 40000  # steps/s: of all axes together: what the step interrupts leave time for
 JOG_RATE = 400  # steps/s: of every axis while positions are not trusted
 ESTOP_MS = 3  # ms: for which the emergency stop input must read open: shorter is noise
-JOG_SPAN = 3200  # steps: furthest a JOG may lie from where the axis is: one turn at 1/16 step
 SETTLE_MS = 200  # ms: from energising a drive to its first step
 HEARTBEAT_MS = 5  # ms: a main loop silent for longer counts as hung
 ENABLE_KEY = 1465010515  # 1: makes an ENABLE that no noise produces
@@ -62,13 +61,13 @@ class Command(IntEnum):
     DISABLE = 6  # ramp down, then release the drives; positions are no longer trusted. In FAULT: release held drives
     RATE = 7  # turn each axis at this rate for its life at most, then ramp to rest; below 1 step/s stand still
     TARGET = 8  # go to these positions, no faster than these rates; may be changed on the way
-    JOG = 9  # creep to these positions at JOG_RATE, without soft limits: the way home, while positions are not trusted
+    JOG = 9  # creep home at JOG_RATE while positions are not trusted, within LIMITS' jog of where the drives came on
     HOME = 10  # the axes stand at these positions: trust them from here on
     STOP = 11  # ramp every axis down to rest; stays ENABLED and homed
     ESTOP = 12  # no further step, drives released, FAULT: obeyed in every state
     CLEAR = 13  # FAULT to DISABLED; refused while the emergency stop input is open
     CONFIGURE = 14  # ramps, watchdog and what the drives do in a fault; only in DISABLED, kept until reset
-    LIMITS = 15  # soft limits of TARGET, RATE and HOME; only in DISABLED, kept until reset
+    LIMITS = 15  # soft limits of TARGET, RATE and HOME, and how far JOG may creep; only in DISABLED, kept until reset
     CONNECT = 16  # a connection begins, the next after HELLO's: bound commands of those before are refused
 
 
@@ -185,7 +184,7 @@ class Target(NamedTuple):
 
 
 class Jog(NamedTuple):
-    """Creep to these positions at JOG_RATE, without soft limits: the way home, while positions are not trusted."""
+    """Creep home at JOG_RATE while positions are not trusted, within LIMITS' jog of where the drives came on."""
 
     position: tuple[int, int, int, int]  # steps, -1000000000 to 1000000000
 
@@ -206,10 +205,11 @@ class Configure(NamedTuple):
 
 
 class Limits(NamedTuple):
-    """Soft limits of TARGET, RATE and HOME; only in DISABLED, kept until reset."""
+    """Soft limits of TARGET, RATE and HOME, and how far JOG may creep; only in DISABLED, kept until reset."""
 
     lowest: tuple[int, int, int, int] = (-1000000000,) * 4  # steps, -1000000000 to 1000000000
     highest: tuple[int, int, int, int] = (1000000000,) * 4  # steps, -1000000000 to 1000000000
+    jog: int = 200  # steps, 1 to 65535
 
 
 class Connect(NamedTuple):
@@ -233,7 +233,7 @@ class Hello(NamedTuple):
 
 
 class Status(NamedTuple):
-    """State, positions and rates at one instant."""
+    """State, faults and flags at one instant, positions and rates right after it."""
 
     time: float  # s
     state: State  # State
@@ -284,6 +284,7 @@ LAYOUTS: dict[type, Layout] = {
     Limits: Layout(
         Field("lowest", "i", 4, 1, "steps", -1000000000, 1000000000, None),
         Field("highest", "i", 4, 1, "steps", -1000000000, 1000000000, None),
+        Field("jog", "H", 1, 1, "steps", 1, 65535, None),
     ),
     Connect: Layout(
         Field("number", "H", 1, 1, "1", 0, 65535, None),

@@ -11,21 +11,17 @@ from typing import Any, get_origin
 import typer
 
 from wristctl.cli.commands import Entry
-from wristctl.cli.operator import TerminalOperator, idle, typed_line
 from wristctl.cli.options import Options, Own, StudyCommand, controllers, run_ids, signature
-from wristctl.cli.output import print_plan, print_result
-from wristctl.cli.progress import PLAIN, listening, progress
-from wristctl.commands.perform import check_executor, perform, prepare, recording
 from wristctl.commands.procedure import Procedure
 from wristctl.errors import UserError
 from wristctl.plugins.trust import asking
-from wristctl.study_files.error_messages import check_sizes, located
 from wristctl.study_files.keys import section_keys, whole_key
-from wristctl.study_files.load import read_study
 
 
 def asked_to_trust(trust: bool, shown: str) -> bool:
     """Shows what would run; yes where --trust-code was `given`, or where it is typed at a terminal, and never else."""
+    from wristctl.cli.operator import idle, typed_line
+
     typer.echo(shown, err=True)
     if trust or not sys.stdin.isatty():
         return trust
@@ -91,6 +87,13 @@ def _execute(
 def _perform(
     procedure: Procedure[Any], options: Options, shortcuts: Sequence[str], flags: frozenset[str], executor: str
 ) -> None:
+    from wristctl.cli.operator import TerminalOperator  # here, where a completion does not wait for them
+    from wristctl.cli.output import print_plan, print_result
+    from wristctl.cli.progress import PLAIN, listening, progress
+    from wristctl.commands.perform import check_executor, perform, prepare, recording
+    from wristctl.study_files.error_messages import check_sizes, located
+    from wristctl.study_files.load import read_study
+
     files = [*(options.files or ()), *(options.config or ())]
     seed = [f"seed={options.seed}"] if options.seed is not None else []
     study, origins = read_study(files, [*(options.override or ()), *shortcuts, *seed], procedure.kind)

@@ -50,7 +50,8 @@ COMMANDS = {
         "wristctl.commands.gen_data.command:GEN_DATA",
         _MAIN,
         "Sample tip positions and bending angles for a network.",
-        shortcuts=("samples", "source"),
+        shortcuts=("samples", "source", "columns"),
+        advanced=("columns",),
         examples=(
             "wristctl gen-data experiments/paper.yaml",
             "wristctl gen-data --samples 5000 --label large",
@@ -174,13 +175,15 @@ COMMANDS = {
         "wristctl.commands.hysteresis.command:HYSTERESIS",
         _MORE,
         "Drive the wrist through hysteresis loops; fit a measured one.",
-        shortcuts=("drive", "shape", "measured"),
+        shortcuts=("drive", "shape", "measured", "columns"),
+        advanced=("columns",),
         examples=(
             "wristctl hysteresis experiments/hysteresis.yaml",
             "wristctl hysteresis --measured loop.csv",
             "wristctl hysteresis --drive tensions --set 'ranges_deg=[[0, 30]]' --set 'sheaths=[0, 1]'",
         ),
     ),
+    "validate": Entry("wristctl.cli.validate:app", _MORE, "Hold the model against recordings of real robots."),
     "export-model": Entry("wristctl.cli.export_model:app", _MORE, "Write the wrist of a run for MuJoCo or MATLAB."),
     "paper": Entry("wristctl.cli.paper_commands:app", _MORE, "Check the paper's claims one by one."),
 }

@@ -39,7 +39,7 @@ def jog(
     out: Out = RESULTS, dry_run: Dry = False, yes: Yes = False, debug: Debug = False,
 ) -> None:  # fmt: skip
     """Reel a tendon in, or pay it out, slowly and by little; then by as much more as is typed."""
-    plan = f"axis {axis} {_reels(mm)}, at 400 steps/s and without soft limits; then the drives hold"
+    plan = f"axis {axis} {_reels(mm)}, at 400 steps/s; then the drives hold"
     with _session(plan, port, baud, override, calibration, out, dry_run, yes) as hand:
         if hand is None:
             return

@@ -176,6 +176,10 @@ def _rows(facts: RigFacts) -> list[tuple[str, str]]:
         grey = f"{quality.black:.0f} to {quality.white:.0f} of 255"
         rows += [("tip's marker", f"{quality.side:.0f} px, blurred by {quality.blur:.1f} px, grey {grey}"),
                  ("scatter of the resting angle", f"{math.degrees(facts.noise):.3f} deg")]  # fmt: skip
+    if facts.pose is not None:
+        tilt, pan = (f"{math.degrees(angle):+.1f}" for angle in (facts.pose.tilt, facts.pose.pan))
+        off = f"{math.degrees(facts.pose.oblique):.1f} deg (tilt {tilt}, pan {pan})"
+        rows.append(("camera off square, by its markers", off))
     return rows
 
 
@@ -199,6 +203,7 @@ def _plain(facts: RigFacts, faults: list[Trouble]) -> dict[str, Any]:
             "latency": None if facts.latency is None else facts.latency._asdict(),
             "marker": None if facts.quality is None else facts.quality._asdict(),
             "noise": facts.noise,
+            "pose": None if facts.pose is None else facts.pose.plain(),
         }
     )
     return plain

@@ -157,6 +157,14 @@ def _stopped(ref: str | Path, wanted: EarlierRun, out: Path) -> Run:
     return run
 
 
+def check_tendons(study: Study) -> None:
+    """UserError where the wrist's tendons are none that it can bend in one plane with, as all commands have it."""
+    if study.wrist.tendons != "four":
+        from wristctl.wrist.tendon_layout import check_planar
+
+        check_planar(study.wrist)
+
+
 def check_motions(study: Study, command: str) -> None:
     """See that every recording of the sections that a command reads is one, and within the wrist's range.
 

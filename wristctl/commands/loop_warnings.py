@@ -22,6 +22,7 @@ from wristctl.errors import UserError
 
 if TYPE_CHECKING:
     from wristctl.control.law import Conditions
+    from wristctl.control.shipped_gains import ShippedGains
     from wristctl.wrist.statics import Shortfall
 
 
@@ -47,6 +48,7 @@ def warn_if_it_buckles(findings: Findings, wrist: WristParameters, loops: Iterab
 
 def outside_conditions(rows: Iterable[Row | SimulateSettings], loops: Iterable[Loop]) -> list[str]:
     """Presets that are not made for a loop with motors, tendons and a camera, in words."""
+    from wristctl.control.shipped_gains import is_shipped, shipped_gains
     from wristctl.control.table import controller
 
     real = [rig for rig in loops if rig.actuator.level == "tendon" and rig.sensor.level == "camera"]
@@ -54,6 +56,9 @@ def outside_conditions(rows: Iterable[Row | SimulateSettings], loops: Iterable[L
     presets = {(row.controller, row.gains) for row in rows if isinstance(row.gains, str) and row.gains != "tuned"}
     for name, preset in sorted(presets):
         law = controller(name)
+        if is_shipped(preset):
+            warnings += _of_shipped(name, shipped_gains(law.name, preset), preset, real)
+            continue
         stated = law.conditions.get(preset_today(preset, law.presets))
         if real and stated is None:
             instead = f"; made for them: {', '.join(law.conditions)}" if law.conditions else ""
@@ -68,6 +73,20 @@ def warn_outside_conditions(rows: Iterable[Row | SimulateSettings], loops: Itera
     """Warn of each preset that is not made for its loop."""
     for warning in outside_conditions(rows, loops):
         log.warning("%s", warning)
+
+
+def _of_shipped(name: str, shipped: ShippedGains, label: str, loops: Iterable[Loop]) -> list[str]:
+    """What speaks against shipped gains on loops with motors, tendons and a camera, in words."""
+    warnings = []
+    for loop in loops:
+        if shipped.conditions is None:
+            warnings.append(f"{name}/{label} is of a family without elastic tendons behind a camera: it may swing")
+        elif mismatch := _outside(shipped.conditions, loop):
+            warnings.append(f"{name}/{label} was found for {mismatch}: it may swing")
+        if not shipped.reliable:
+            lost = f"{shipped.lost} of {shipped.worlds} worlds"
+            warnings.append(f"{name}/{label} fails, swings or chatters in {lost} of {shipped.run}")
+    return list(dict.fromkeys(warnings))
 
 
 def _outside(stated: Conditions, loop: Loop) -> str:
@@ -113,9 +132,15 @@ class OutOfReach(NamedTuple):
 
 
 def asked_by(study: Study, settings: SimulateSettings | TuneSettings | CompareSettings) -> list[AskedMotion]:
-    """The motions of a section; of a family those at both ends of what they are drawn from, on its own loop."""
+    """The motions of a section; of a family those at both ends of what they are drawn from, on its own loop.
+
+    A family and the scenarios of `tune` have one plane, in which all angles count.
+    """
+    from wristctl.simulation.reference import toward
+
     if isinstance(settings, SimulateSettings):
-        return [AskedMotion("", settings.loop, settings.reference, settings.direction, settings.horizon)]
+        asked = toward(settings.reference, settings.direction)
+        return [AskedMotion("", settings.loop, asked, settings.direction, settings.horizon)]
     if name := settings.worlds.family:
         family = study.families[name]
         return [
@@ -125,7 +150,7 @@ def asked_by(study: Study, settings: SimulateSettings | TuneSettings | CompareSe
         scenarios = settings.scenarios
         return [AskedMotion(s.loop, settings.loops[s.loop], s.reference, "ulnar", settings.horizon) for s in scenarios]
     motions = [
-        AskedMotion(name, loop, reference, direction, settings.horizon)
+        AskedMotion(name, loop, toward(reference, direction), direction, settings.horizon)
         for name, loop in settings.loops.items()
         for reference in settings.references
         for direction in settings.directions
@@ -178,15 +203,14 @@ def refuse_out_of_reach(study: Study, inputs: Inputs) -> None:
 
 def _shortfall(wrist: WristParameters, asked: AskedMotion) -> Shortfall | None:
     from wristctl.simulation.batch import sample_period
-    from wristctl.simulation.reference import motion, toward
+    from wristctl.simulation.reference import motion
     from wristctl.simulation.worlds import loop_facing, plant_of
     from wristctl.wrist.statics import shortfall
 
     if not asked.loop.limits:
         return None
     facing, loop = loop_facing(wrist, asked.loop, asked.direction)
-    reference = by_angles(toward(asked.reference, asked.direction))
-    theta = motion(reference, facing, asked.horizon, sample_period(loop.control_period)).theta_ref
+    theta = motion(by_angles(asked.reference), facing, asked.horizon, sample_period(loop.control_period)).theta_ref
     low, high = min(0.0, float(theta.min())), max(0.0, float(theta.max()))
     return shortfall(plant_of(facing, loop.plant), low, high, loop.disturbances.load)
 

@@ -222,10 +222,15 @@ def _on_loop(claim: Claim, loop: str, shown: Grounds) -> Finding | None:
         finding = of_numbers(printed(claim), ours, claim.sense)
     if claim.derived and loop == DERIVED_ON and finding.verdict in ("worse than the paper", "does not hold"):
         finding = finding._replace(verdict="contradicted")
-    strongest = _unphysical(table, (claim.label, claim.than), shown.tension_limit)
-    if not strongest:
-        return finding
-    return finding._replace(mark="not physical", reason="; ".join(part for part in (finding.reason, strongest) if part))
+    marks = {
+        "not physical": _unphysical(table, (claim.label, claim.than), shown.tension_limit),
+        "not converged": _unconverged((moves, than_moves)),
+    }
+    reasons = [finding.reason, *marks.values()]
+    return finding._replace(
+        mark=", ".join(mark for mark, reason in marks.items() if reason),
+        reason="; ".join(reason for reason in reasons if reason),
+    )
 
 
 def _unphysical(table: pd.DataFrame, labels: Sequence[str | None], limit: float) -> str:
@@ -236,6 +241,12 @@ def _unphysical(table: pd.DataFrame, labels: Sequence[str | None], limit: float)
     peaks = selected["peak_tension"].to_numpy(float)
     peak = int(peaks.argmax())
     return "" if peaks[peak] <= limit * (1.0 + 1e-9) else f"{peaks[peak]:.3g} N on a {selected['reference'].iloc[peak]}"
+
+
+def _unconverged(moves: Sequence[pd.DataFrame]) -> str:
+    """Largest change of the motions' numbers with the integration step; empty where all of them have converged."""
+    largest = max(float(np.nanmax(table["drift"], initial=0.0)) for table in moves) if "drift" in moves[0] else 0.0
+    return f"its numbers change by up to {largest:.2g} rad with the integration step" * bool(largest)
 
 
 def _moves(table: pd.DataFrame, label: str) -> pd.DataFrame:

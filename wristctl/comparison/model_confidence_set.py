@@ -33,7 +33,7 @@ class PairedComparisons:
 
     def __init__(self, logarithms: Array, seed: int | Entropy) -> None:
         gridded = on_grid(logarithms)
-        self._means: Array = gridded.mean(axis=1)
+        self.means: Array = gridded.mean(axis=1)
         self._pairs = np.array(list(combinations(range(len(gridded)), 2)), int).reshape(-1, 2)
         self._differences: Array = gridded[self._pairs[:, 0]] - gridded[self._pairs[:, 1]]
         self._statistics = _flipped(self._differences, seed)
@@ -47,7 +47,7 @@ class PairedComparisons:
         While the largest statistic among those left is larger than in all but `_level` of the flips, its worse row
         goes.
         """
-        left = sorted(rows, key=lambda row: (self._means[row], row))
+        left = sorted(rows, key=lambda row: (self.means[row], row))
         while len(left) > 1:
             among = np.flatnonzero(np.isin(self._pairs, left).all(axis=1))
             statistics = self._statistics[:, among]

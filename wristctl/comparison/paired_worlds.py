@@ -1,17 +1,17 @@
 """Comparisons on the same worlds: what a term of a law buys, and whether the order of laws hangs on their tuning."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from itertools import combinations
 from typing import NamedTuple
 
 import numpy as np
 
 from wristctl.arrays import Array
-from wristctl.comparison.bootstrap import GeometricMean, Resampled, paired_ratio, penalised, plain
+from wristctl.comparison.bootstrap import GeometricMean, plain
+from wristctl.comparison.repeated_tunings import RepeatedTunings
+from wristctl.comparison.tuned_ranking import logarithms
 from wristctl.comparison.world_ranking import RankedRow, WorldRanking
-
-_TERM_STREAM = 20_032
 
 
 class TermValue(NamedTuple):
@@ -47,8 +47,7 @@ def term_values(ranking: WorldRanking, terms: Mapping[str, tuple[str, str]]) -> 
     for term, (without, with_term) in terms.items():
         if without in places and with_term in places:
             pair = places[without], places[with_term]
-            scores, other_scores = (penalised(ranking.rows[index].rmse) for index in pair)
-            times = paired_ratio(scores, other_scores, _TERM_STREAM)
+            times = ranking.times_better(pair[1], pair[0])
             values.append(
                 TermValue(term, ranking.name, without, with_term, times, (lost[pair[0]].times, lost[pair[1]].times))
             )
@@ -75,26 +74,25 @@ class OrderShift(NamedTuple):
     """Geometric mean over laws and worlds of the RMSE after over that before."""
 
 
-def order_shift(variant: str, before: list[RankedRow], after: list[RankedRow]) -> OrderShift:
-    """Compare rows of the same laws, in the same order, on the same worlds."""
+def order_shift(
+    variant: str, before: Sequence[Sequence[RankedRow]], after: Sequence[Sequence[RankedRow]]
+) -> OrderShift:
+    """Compare rows of the same laws, in the same order, on the same worlds, each with its tunings before and after."""
     from scipy.stats import kendalltau
 
-    logs_before, logs_after = (np.log([penalised(row.rmse) for row in rows]) for rows in (before, after))
-    means = logs_before.mean(axis=1), logs_after.mean(axis=1)
-    signs = _signs(logs_before) * _signs(logs_after)
-    best = tuple(rows[int(np.argmin(mean))].label for rows, mean in zip((before, after), means, strict=True))
-    tau = float(kendalltau(*means).statistic) if len(logs_before) > 1 else float("nan")
+    errors = logarithms(before), logarithms(after)
+    means = [of_side.mean(axis=(1, 2, 3)) for of_side in errors]
+    signs = _signs(errors[0]) * _signs(errors[1])
+    best = tuple(rows[int(np.argmin(mean))][0].label for rows, mean in zip((before, after), means, strict=True))
+    tau = float(kendalltau(*means).statistic) if len(before) > 1 else float("nan")
     ratio = float(np.exp(np.mean(means[1] - means[0])))
     return OrderShift(
         variant, tau, len(signs), int(np.sum(signs != 0)), int(np.sum(signs < 0)), (best[0], best[1]), ratio
     )  # fmt: skip
 
 
-def _signs(logarithms: Array) -> Array:
-    """Sign of the better row in every pair of rows; 0 where the worlds do not decide."""
-    pairs = list(combinations(range(len(logarithms)), 2))
-    if not pairs:
-        return np.zeros(0)
-    first, second = np.array(pairs).T
-    low, high = Resampled(logarithms[first] - logarithms[second], _SHIFT_STREAM).intervals()
-    return np.asarray((low > 0.0) * 1.0 - (high < 0.0) * 1.0)
+def _signs(errors: Array) -> Array:
+    """Sign of the better row in every pair of rows (R, T, W, S); 0 where tunings and worlds do not decide."""
+    repeated = RepeatedTunings(errors, _SHIFT_STREAM)
+    ratios = [repeated.ratio(*pair) for pair in combinations(range(len(errors)), 2)]
+    return np.array([float(ratio.low > 1.0) - float(ratio.high < 1.0) for ratio in ratios])

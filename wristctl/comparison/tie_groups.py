@@ -1,8 +1,9 @@
 """Who is best, in groups that the worlds cannot tell apart, who stands in none and why, and what could be told."""
 
 import math
+from collections.abc import Sequence
 from itertools import chain
-from typing import Literal, NamedTuple
+from typing import Literal, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -107,6 +108,20 @@ class Standing(NamedTuple):
         return next((fate for fate, rows in fates.items() if row in rows), "ranked")
 
 
+class Comparisons(Protocol):
+    """Rows of logarithms compared pair by pair: their means, which of them may be best, and what could be told."""
+
+    means: Array
+
+    def best(self, rows: Sequence[int]) -> list[int]:
+        """Rows that may be best, the best first."""
+        ...
+
+    def resolution(self, rows: Sequence[int]) -> float:
+        """The smallest ratio that is told from 1 as a rule."""
+        ...
+
+
 def standing(
     scores: ArrayLike,
     swings: NDArray[np.bool_],
@@ -116,6 +131,7 @@ def standing(
     unphysical: ArrayLike = False,
     failure: float = FAILURE,
     floor: float = MEASURABLE,
+    compared: Comparisons | None = None,
 ) -> Standing:
     """Order rows of positive scores (R, W) over the same worlds, less being better.
 
@@ -124,29 +140,30 @@ def standing(
     the 95 % interval of that share lies above it. Else a failure counts as the score `failure`. What is below `floor`
     is equal. Rows (R,) that are `short` or `unphysical` are not ranked either.
 
-    Two rows or more of fewer worlds than LEAST_PAIRS are not told apart, nor called a tie.
+    Two rows or more of fewer worlds than LEAST_PAIRS are not told apart, nor called a tie. `compared` are the rows'
+    comparisons; where there are none, they are compared over the worlds.
     """
     score_array = np.asarray(scores, float)
     failed = ~np.isfinite(score_array)
     logs = np.log(penalised(score_array, failure, floor))
     lost = [share(flags) for flags in failed | swings]
-    means = logs.mean(axis=1)
+    comparisons = compared or PairedComparisons(logs, seed)
+    means = comparisons.means
     by_mean = np.argsort(means, kind="stable").tolist()
-    rarest = np.lexsort((means, [interval.value for interval in lost])).tolist()
+    rarest = np.lexsort((means, np.array([interval.value for interval in lost]))).tolist()
     marks = [np.broadcast_to(each, len(lost)) for each in ([each.low > tolerated for each in lost], short, unphysical)]
     fates = np.select(marks, ["unreliable", "short", "unphysical"], "sound")
     sound, far, strained = ([row for row in by_mean if fates[row] == fate] for fate in ("sound", "short", "unphysical"))
-    compared = PairedComparisons(logs, seed)
     enough = len(sound) < 2 or score_array.shape[1] >= LEAST_PAIRS
     return Standing(
-        _groups(compared, sound) if enough else [], [] if enough else sound, strained, far,
+        _groups(comparisons, sound) if enough else [], [] if enough else sound, strained, far,
         [row for row in rarest if fates[row] == "unreliable"],
         lost, [share(flags) for flags in failed], [share(flags) for flags in swings & ~failed],
-        compared.resolution(sound),
+        comparisons.resolution(sound),
     )  # fmt: skip
 
 
-def _groups(compared: PairedComparisons, rows: list[int]) -> list[list[int]]:
+def _groups(compared: Comparisons, rows: list[int]) -> list[list[int]]:
     groups = []
     while rows:
         groups.append(compared.best(rows))

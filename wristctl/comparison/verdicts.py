@@ -30,7 +30,7 @@ class Finding(NamedTuple):
     high: float = np.nan
     reason: str = ""
     mark: str = ""
-    """Mark beside the verdict, as `not physical`."""
+    """Marks beside the verdict, as `not physical` or `not converged`."""
     beside: VerdictName | None = None
     """Verdict under our choice of a detail that the paper leaves open."""
 

@@ -16,13 +16,14 @@ from numpy.typing import NDArray
 
 from wristctl.arrays import Array
 from wristctl.comparison.controller_ranking import STREAM, Ranking, Traits, counted
-from wristctl.comparison.tie_groups import standing
+from wristctl.comparison.tie_groups import Comparisons, standing
 from wristctl.config.controller_row import Row
 from wristctl.config.families import Family, Worlds
 from wristctl.config.study import Study
 from wristctl.control.table import TunedGains, controller, gains_of
 from wristctl.simulation.cases import Measured, measure
 from wristctl.simulation.drawn_worlds import drawn_cases
+from wristctl.simulation.metrics import METRICS
 from wristctl.simulation.oscillation import LIMIT_CYCLE, chatter
 from wristctl.simulation.reference import jumps
 from wristctl.tuning.objective import YARDSTICK
@@ -38,6 +39,7 @@ RANKED = (
     "rmse",
     "steady_state",
     "oscillation",
+    "sustained",
     "chattering",
     "peak_tension",
     "rms_tension",
@@ -45,6 +47,11 @@ RANKED = (
     "energy",
     "drift",
 )
+
+
+def ranked_units() -> dict[str, str]:
+    """Units of RANKED, by name; what goes on swinging in motion is no metric by itself."""
+    return {name: METRICS[name].unit or "1" for name in RANKED if name in METRICS} | {"sustained": "rad"}
 
 
 class RankedRow(NamedTuple):
@@ -56,6 +63,8 @@ class RankedRow(NamedTuple):
     swings: NDArray[np.bool_]
     """Whether on any motion it swings by more than 0.1 deg at rest, chatters, or depends on the integration step."""
     measured: Measured
+    motions: int = 1
+    """Number of motions that `measured` has in each world, each with as many streams of noise."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -98,8 +107,7 @@ def rank(
     rows = list(study.compare.rows)
     if not any(row.controller == YARDSTICK for row in rows):
         rows.append(Row(controller=YARDSTICK, gains="default"))
-    kinds = kinds_of(family)
-    ranked: dict[bool, list[RankedRow]] = {kind: [] for kind in kinds}
+    kinds, every = kinds_of(family), list[Measured]()
     for number, row in enumerate(rows):
         law = controller(row.controller)
 
@@ -108,15 +116,19 @@ def rank(
                 progress((number + share) / len(rows))
 
         gains = np.array([gains_of(law, row.gains, tuned)])
-        measured = measure(law, gains, cases, study.wrist, RANKED, report)
-        for kind, chosen in kinds.items():
-            ranked[kind].append(_row(row.label, measured.of_motions(chosen, len(family.references)), worlds.draws))
-    return [ranking(name, family, ranked[kind], steps=kind) for kind in kinds]
+        every.append(measure(law, gains, cases, study.wrist, RANKED, report))
+    rankings = []
+    for kind, chosen in kinds.items():
+        measured = [one.of_motions(chosen, len(family.references)) for one in every]
+        open_loop = next(one for one, row in zip(measured, rows, strict=True) if row.controller == YARDSTICK)
+        ranked = [_row(row.label, one, open_loop, worlds.draws) for one, row in zip(measured, rows, strict=True)]
+        rankings.append(ranking(name, family, ranked, steps=kind))
+    return rankings
 
 
-def _row(label: str, measured: Measured, worlds: int) -> RankedRow:
-    swings = np.any(measured.swings.reshape(worlds, -1), axis=1)
-    return RankedRow(label, world_scores(measured, worlds)[0], swings, measured)
+def _row(label: str, measured: Measured, open_loop: Measured, worlds: int) -> RankedRow:
+    swings = np.any(measured.swings_beside(open_loop).reshape(worlds, -1), axis=1)
+    return RankedRow(label, world_scores(measured, worlds)[0], swings, measured, measured.failed.shape[1] // worlds)
 
 
 def world_scores(measured: Measured, worlds: int) -> Array:
@@ -127,33 +139,38 @@ def world_scores(measured: Measured, worlds: int) -> Array:
 
 
 def ranking(
-    name: str, family: Family, rows: Sequence[RankedRow], tolerated: float = 0.0, steps: bool | None = None
+    name: str,
+    family: Family,
+    rows: Sequence[RankedRow],
+    tolerated: float = 0.0,
+    steps: bool | None = None,
+    compared: Comparisons | None = None,
 ) -> WorldRanking:
     """The ranking of rows that were measured on the same worlds, of which each may fail, swing or chatter in a share.
 
     They were on those motions of the family that are steps, where `steps`, or on its others; of a family of one kind
-    that need not be said.
+    that need not be said. `compared` are their comparisons, where these are over more than worlds.
     """
     kinds = kinds_of(family)
     kind = next(iter(kinds)) if steps is None else steps
     scores, measured = np.array([row.rmse for row in rows]), [row.measured for row in rows]
     shape = len(rows), scores.shape[1], -1
+    open_loop = next((row.measured for row in rows if row.label.split("/")[0] == YARDSTICK), None)
     flags = {
-        "limit cycle": [one.limit_cycles for one in measured],
+        "limit cycle": [one.limit_cycles | (one.swings_in_motion(open_loop or one)) for one in measured],
         "chatters": [one.chatter > 0.0 for one in measured],
         "not converged": [one.unconverged for one in measured],
     }
     swinging = np.array([row.swings for row in rows])  # of several noises the middle one counts, not any
     worlds = {name: np.reshape(holds, shape).any(axis=2) & swinging for name, holds in flags.items()}
-    swings = [one.metrics["oscillation"] * one.limit_cycles for one in measured]
     none = np.zeros(len(rows))
     return WorldRanking(
         name=f"{name}, steps" if kind and len(kinds) > 1 else name,
         unit="world",
         labels=[row.label for row in rows],
         scores=scores,
-        standing=standing(scores, swinging, STREAM, tolerated),
-        swing=np.array([np.nanmax(swing, initial=0.0) for swing in swings]),
+        standing=standing(scores, swinging, STREAM, tolerated, compared=compared),
+        swing=np.array([one.largest_swing(open_loop or one) for one in measured]),
         chatter=np.array([one.chatter.max(initial=0.0) for one in measured]),
         unsound=counted(worlds, scores),
         peak=none,
@@ -291,17 +308,27 @@ def row_of(
     tension_range: float,
     motions: Sequence[int] | None = None,
     noises: int | None = None,
+    open_loop: Sequence[Mapping[str, np.ndarray]] | None = None,
 ) -> RankedRow:
     """A row of a ranking from its ranges of worlds in order; of these motions and so many of the noises, or of all.
 
-    It swings in a world where it does in the middle one of its noises, on any motion that rests, where it chatters on
-    any in the middle one, or where a motion depends on the integration step however short. `tension_range` is the
-    wrist's, from pretension to limit [N].
+    It swings in a world where it does in the middle one of its noises: at rest, or, by more than twice what feedforward
+    shows there (`open_loop`, its ranges of worlds), while its reference moves. It also counts as swinging where it
+    chatters on any motion in the middle one, or where a motion depends on the integration step however short.
+    `tension_range` is the wrist's, from pretension to limit [N].
     """
     chosen = slice(None) if motions is None else list(motions)
     metrics_of_worlds = {
         name: np.concatenate([piece[name] for piece in pieces])[:, chosen, :noises] for name in pieces[0]
     }
+    rests_at_end = metrics_of_worlds["rests"][:, :, 0]
+    moving = np.zeros(rests_at_end.shape, bool)
+    if open_loop is not None:
+        without = np.concatenate([piece["sustained"] for piece in open_loop])[:, chosen, :noises]
+        middle, allowed = (
+            np.median(np.nan_to_num(of_row), axis=2) for of_row in (metrics_of_worlds["sustained"], without)
+        )
+        moving = (middle > LIMIT_CYCLE + 2.0 * allowed) & ~rests_at_end
     failed, worlds = metrics_of_worlds["failed"], len(metrics_of_worlds["failed"])
     rmse = np.where(failed, np.inf, metrics_of_worlds["rmse"])
     scores = np.exp(np.log(rmse).reshape(worlds, -1).mean(axis=1))
@@ -309,12 +336,8 @@ def row_of(
         np.where(np.isnan(metrics_of_worlds["oscillation"]), 0.0, metrics_of_worlds["oscillation"]), axis=2
     )
     chatters = chatter(np.median(metrics_of_worlds["chattering"], axis=2), tension_range) > 0.0
-    unsound = (
-        ((left > LIMIT_CYCLE) & metrics_of_worlds["rests"][:, :, 0])
-        | chatters
-        | (metrics_of_worlds["drift"] > 0.0).any(axis=2)
-    )
+    unsound = ((left > LIMIT_CYCLE) & rests_at_end) | moving | chatters | (metrics_of_worlds["drift"] > 0.0).any(axis=2)
     metrics = {name: metrics_of_worlds[name].reshape(1, -1) for name in RANKED}
     lasted, rests = metrics_of_worlds["lasted"].reshape(1, -1), metrics_of_worlds["rests"].ravel()
     measured = Measured(metrics, failed.reshape(1, -1), lasted, rests, tension_range)
-    return RankedRow(label, scores, unsound.any(axis=1), measured)
+    return RankedRow(label, scores, unsound.any(axis=1), measured, failed.shape[1])

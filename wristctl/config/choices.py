@@ -158,6 +158,7 @@ DISTURBANCES: Choices[Any] = Choices(
         "push": "wristctl.simulation.disturbances:PUSH",
         "load": "wristctl.simulation.disturbances:LOAD",
         "drift": "wristctl.simulation.disturbances:DRIFT",
+        "grasp": "wristctl.simulation.disturbances:GRASP",
     },
 )
 

@@ -11,6 +11,7 @@ from wristctl.errors import Unfitting
 
 # How gains are given by name, for a description and an error.
 BY_NAME = "every gain by name (Kp=10,Ki=2,Kd=0.1)"
+GAINS = f"a preset's name, `tuned` (from a tune run), `tuned:camera` (of a family, shipped), or {BY_NAME}"
 
 
 def _by_name(gains: Any) -> Any:
@@ -40,7 +41,7 @@ class Row(Section):
     """One controller with one set of gains."""
 
     controller: ControllerName = choice("smc", "name in the table of controllers, or file.py:NAME")
-    gains: GainsChoice = choice("default", f"a preset's name, `tuned` (from a tune run), or {BY_NAME}")
+    gains: GainsChoice = choice("default", GAINS)
 
     @property
     def gains_name(self) -> str:

@@ -16,8 +16,11 @@ class StudyBudget(Section):
     candidates: int = choice(10, "candidates per iteration of a search", ge=2, le=10_000)
     iterations: int = choice(8, "iterations of a search", ge=1, le=100_000)
     finalists: int = choice(8, "best candidates that are evaluated anew on other worlds", ge=1, le=1000)
-    draws: int = choice(3, "worlds of a family that a search runs on", ge=1, le=10_000)
-    validation: int = choice(8, "other worlds that its gains are chosen by", ge=1, le=10_000)
+    tunings: int = choice(
+        3, "searches of each controller on each family, each on worlds of its own and with another start", ge=2, le=1000
+    )
+    draws: int = choice(16, "worlds of a family that a search runs on", ge=1, le=10_000)
+    validation: int = choice(16, "other worlds that its gains are chosen by", ge=1, le=10_000)
     worlds: int = choice(20, "held-out worlds of a family that all are tested on", ge=8, le=100_000)
     noises: int = choice(1, "streams of camera noise that each motion in each of these meets", ge=1, le=1000)
 

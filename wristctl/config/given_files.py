@@ -22,6 +22,11 @@ def of_file(meaning: str) -> Any:
     return Field(None, description=meaning, json_schema_extra={"unit": "", "source": "", "unsaid": True})
 
 
+def columns_of_file() -> Any:
+    """A leaf that maps another author's columns to those of an open log."""
+    return of_file("another's columns, as `time=t [ms], bend_y=imu [deg]`, or a converter's name (docs/open-log.md)")
+
+
 def names_a_file(field: FieldInfo | None) -> bool:
     """Whether a leaf names files."""
     extra = field.json_schema_extra if field else None

@@ -30,6 +30,9 @@ class Homing(Section):
         0.15, "", "steps per radian may differ from the model's by this share", "measured", gt=0
     )
     taut: float = quantity(0.15e-3, "m", "by how much a tendon may be taut when homing begins", "assumed", ge=0)
+    oblique_deg: float = quantity(
+        15.0, "deg", "how far off square the markers may show an uncalibrated camera", "emulated: +-10", gt=0, lt=45
+    )
     sticks: float = quantity(0.3e-3, "m", "path between reeling in and letting go: friction", "assumed", gt=0)
 
 

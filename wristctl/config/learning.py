@@ -6,7 +6,7 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, model_validator
 
-from wristctl.config.given_files import given_file
+from wristctl.config.given_files import columns_of_file, given_file
 from wristctl.config.section import Section, choice, quantity
 
 Activation = Literal["sigmoid", "relu", "leaky-relu", "tanh", "silu"]
@@ -41,7 +41,8 @@ class DataSettings(Section):
     run: str | None = choice(
         None, "run: one with tips and angles (hw-run, track, simulate, compare): path, id or latest:hw-run"
     )
-    files: tuple[str, ...] = given_file("csv: files with units in their headers (docs/measured-data.md)", ())
+    files: tuple[str, ...] = given_file("csv: open logs with tips and angles (docs/open-log.md)", ())
+    columns: str | None = columns_of_file()
 
     @model_validator(mode="after")
     def _ranges_in_order(self) -> Self:

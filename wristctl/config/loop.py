@@ -9,7 +9,7 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import BeforeValidator, model_validator
 
 from wristctl.config.choices import REFERENCES
-from wristctl.config.given_files import given_file, of_file
+from wristctl.config.given_files import columns_of_file, given_file, of_file
 from wristctl.config.plant import Actuator, Disturbances, Plant, Sensor
 from wristctl.config.section import OneOf, OpenSection, Parameter, Section, choice, quantity
 
@@ -100,8 +100,9 @@ class Reference(OpenSection):
     )
     duration: float = quantity(1.0, "s", "duration of each minimum-jerk move or step", "assumed", gt=0)
     frequency: float = quantity(0.5, "1/s", "frequency of a sine, a chirp's at first", "assumed", gt=0)
-    file: str | None = given_file("recording: a CSV with units in its header")
+    file: str | None = given_file("recording: an open log (docs/open-log.md)")
     column: str | None = of_file("recording: name of the angle's column, or tip; by default angle, bend, theta, tip")
+    columns: str | None = columns_of_file()
     inverse: InverseName = choice(
         "none",
         "how wanted tips become reference angles: a network, one arc's closed-form inverse, or the angle itself",

@@ -166,6 +166,8 @@ class TrueWrist(Overrides):
     tilt_deg: float = fact(0.0, "deg", "by how much its base leans toward theta > 0, gravity being as believed")
     creep: float = fact(0.0, "", "share of the stiffness that relaxes (one Maxwell branch)", ge=0, lt=1)
     creep_time: float = fact(10.0, "s", "time constant of that", gt=0)
+    inner_friction: float = fact(0.0, "N m", "torque of friction on the bend itself, inside the wrist", ge=0)
+    inner_presliding_deg: float = fact(0.5, "deg", "bend in which that turns round", gt=0)
     end_stop_deg: float | None = fact(None, "deg", "bending angle at which the wrist meets its end stops", gt=0, le=180)
     end_stop_stiffness: float = fact(20.0, "N m/rad", "of the whole wrist's end stops", gt=0)
     end_stop_dissipation: float = fact(1.0, "s/rad", "Hunt and Crossley's: share of that per rate of impact", ge=0)
@@ -194,12 +196,24 @@ class Drift(Section):
     duration: float = quantity(5.0, "s", "how long it takes", "assumed", gt=0)
 
 
+class Grasp(Section):
+    """An object that the hand takes up while the forearm is level, so that its weight lies across the straight wrist.
+
+    Its inertia is left out: at 5 rad/s^2 it is a twentieth of the weight.
+    """
+
+    mass: float = quantity(0.0, "kg", "mass of the object; + weighs toward theta > 0, - to the other side")
+    start: float = quantity(1.0, "s", "time at which its weight begins to be felt", "assumed", ge=0)
+    duration: float = quantity(0.2, "s", "time until all of it is", "assumed", gt=0)
+
+
 class Disturbances(OpenSection):
     """Disturbances of the wrist, unknown to its controller."""
 
     push: Push = Push()
     load: float = quantity(0.0, "N", "constant force on the last disc, across the straight wrist")
     drift: Drift = Drift()
+    grasp: Grasp = Grasp()
 
     def added(self) -> Mapping[str, Parameter]:
         """Parameters that disturbances from outside the package add."""

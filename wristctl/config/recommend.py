@@ -1,12 +1,12 @@
 """Settings of `recommend`: which controllers are tuned for a wrist, on which rig, and for which motions."""
 
-from typing import Annotated
+from collections.abc import Mapping
+from typing import Annotated, Any
 
-from pydantic import Field
+from pydantic import BeforeValidator, Field
 
 from wristctl.config.families import Drawn, Family
 from wristctl.config.loop import Loop, Reference
-from wristctl.config.plant import Actuator, Sensor
 from wristctl.config.section import Section, choice, quantity
 from wristctl.config.tune import Controllers
 
@@ -31,6 +31,21 @@ _MOTIONS = (
     Reference(kind="two-sided-sine", frequency=0.2),
     Reference(kind="two-sided-sine", frequency=0.5),
 )
+_RIG: dict[str, Any] = {
+    "control_period": 5e-3,
+    "actuator": {"level": "tendon", "friction": 0.1, "sheath": 1.0},
+    "sensor": {"level": "camera"},
+}
+
+
+def _from_the_rig(loop: Any) -> Any:
+    """A loop as given; what it leaves out of period, motors, tendons and camera is the default rig's, no ideal one."""
+    if not isinstance(loop, Mapping):
+        return loop
+    parts = {
+        name: {**_RIG[name], **loop[name]} for name in ("actuator", "sensor") if isinstance(loop.get(name), Mapping)
+    }
+    return {**_RIG, **loop, **parts}
 
 
 class RecommendSettings(Section):
@@ -39,13 +54,9 @@ class RecommendSettings(Section):
     controllers: Controllers = choice(
         ("ct-dob", "smc-dob", "pid-dob", "pid-ff", "nc", "mrac"), "controllers to tune and to test", min_length=1
     )
-    loop: Loop = choice(
-        Loop(
-            control_period=5e-3,
-            actuator=Actuator(level="tendon", friction=0.1, sheath=1.0),
-            sensor=Sensor(level="camera"),
-        ),
-        "the rig: motors, tendons, camera and timing",
+    loop: Annotated[Loop, BeforeValidator(_from_the_rig)] = choice(
+        Loop.model_validate(_RIG),
+        "the rig: motors, tendons, camera and timing; what a study leaves out of them is as in the default here",
     )
     draw: dict[str, Drawn] = choice(
         _DRAWN, "settings of the loop in which simulated rigs differ, and what each is drawn from"

@@ -2,7 +2,7 @@
 
 from typing import Literal
 
-from wristctl.config.controller_row import BY_NAME, ControllerName, GainsChoice
+from wristctl.config.controller_row import GAINS, ControllerName, GainsChoice
 from wristctl.config.loop import DirectionName, Loop, Reference
 from wristctl.config.section import Section, choice, quantity
 
@@ -11,7 +11,7 @@ class SimulateSettings(Section):
     """One closed loop."""
 
     controller: ControllerName = choice("smc", "name in the table of controllers, or file.py:NAME")
-    gains: GainsChoice = choice("hardware", f"a preset's name, `tuned` (from a tune run), or {BY_NAME}")
+    gains: GainsChoice = choice("hardware", GAINS)
     loop: Loop = Loop()
     reference: Reference = Reference()
     direction: DirectionName = choice("ulnar", "direction of bending; the reference's angle counts toward it")

@@ -1,11 +1,20 @@
 """The wrist's parameters; every default carries its source: the paper gives few of them (C10)."""
 
 import math
-from typing import Self
+from typing import Literal, Self
 
 from pydantic import model_validator
 
 from wristctl.config.section import Section, choice, quantity
+
+
+class TendonPlace(Section):
+    """A place in the wrist's cross-section where a tendon runs, or several alike that are pulled together."""
+
+    angle_deg: float = quantity(..., "deg", "direction from the wrist's axis, from ulnar (0) toward flexion (90)")
+    radius: float | None = quantity(None, "m", "distance from the wrist's axis; null: wrist.tendon_radius", ge=0)
+    ends_at: int | None = choice(None, "disc that the tendon ends at, the clamped one being 1; null: the last", ge=2)
+    multiplicity: int = choice(1, "number of tendons alike at this place", ge=1)
 
 
 class WristParameters(Section):
@@ -23,6 +32,12 @@ class WristParameters(Section):
     )
     damping: float = quantity(0.105, "N m s/rad", "bending damping of the whole wrist", "paper, C1", ge=0)
     tendon_radius: float = quantity(0.020, "m", "radius of the circle of tendons", "assumed", gt=0)
+    tendons: Literal["three", "four", "five"] | tuple[TendonPlace, ...] = choice(
+        "four",
+        "places: three at 120 deg, four at 45 deg from both planes, five with one more in the centre, or a list of "
+        "places; a wrist in one plane has four or five",
+        "paper",
+    )
     pretension: float = quantity(2.0, "N", "least tension of each tendon", "assumed", ge=0)
     tension_limit: float = quantity(60.0, "N", "largest tension of each tendon", "assumed", gt=0)
     range_deg: float = quantity(50.0, "deg", "bending range to either side", "paper", gt=0, le=180)

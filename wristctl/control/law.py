@@ -87,7 +87,7 @@ class Conditions(NamedTuple):
 class Surface(NamedTuple):
     """Sliding surface that a law's switching term reads: sigma = a e + b de/dt + c int(e), 0 on the surface.
 
-    `weights` gives a, b and c by the law's gains, `layer` the |sigma| within which the term is about a line.
+    `weights` gives a, b and c by the law's gains, `layer` the size of sigma within which the term is about a line.
     """
 
     weights: Callable[[Mapping[str, float]], tuple[float, float, float]]

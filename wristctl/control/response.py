@@ -50,16 +50,31 @@ def _continued(control: Any, first: int, since: float) -> None:
 def perceive(control: Any, believed: Any, estimate: Any, bounds: Any, since: float, period: float) -> Any:
     """Put what a law sees into its signals; the least and the largest torque [N m] in reach. Arguments as `respond`."""
     low, high = bounds
-    signals = rows_of(control.signals)
     torque_low, torque_high = reach(estimate.theta, believed, low, high)
+    perceive_within(control, estimate, torque_low, torque_high, since, period)
+    return torque_low, torque_high
+
+
+@compiled
+def perceive_within(
+    control: Any, estimate: Any, torque_low: Any, torque_high: Any, since: float, period: float
+) -> None:
+    """Put what a law sees into its signals, where the torques in reach [N m] are known."""
+    signals = rows_of(control.signals)
     signals[_THETA] = estimate.theta
     signals[_RATE] = estimate.rate
     signals[_LOAD] = estimate.load
     _continued(control, _THETA_REF, since)
     signals[_LOW] = torque_low
     signals[_HIGH] = torque_high
-    signals[_PERIOD] = period + zero_like(low)
-    return torque_low, torque_high
+    signals[_PERIOD] = period + zero_like(torque_low)
+
+
+@compiled
+def wanted_torque(control: Any) -> Any:
+    """Torque [N m] that the law wants, by its signals."""
+    gains, memory = rows_of(control.gains), rows_of(control.memory)
+    return control.law(now_of(control.signals), wrist_of(control.model), gains, memory)
 
 
 @compiled
@@ -71,7 +86,6 @@ def respond(control: Any, believed: Any, estimate: Any, bounds: Any, since: floa
     """
     low, high = bounds
     torque_low, torque_high = perceive(control, believed, estimate, bounds, since, period)
-    gains, memory = rows_of(control.gains), rows_of(control.memory)
-    wanted = control.law(now_of(control.signals), wrist_of(control.model), gains, memory)
+    wanted = wanted_torque(control)
     plus, minus = allocate(estimate.theta, believed, wanted, low, high)
     return wanted, torque_low, torque_high, plus, minus

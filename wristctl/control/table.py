@@ -8,6 +8,7 @@ from wristctl.config.choices import CONTROLLERS as _TABLE
 from wristctl.config.choices import Choices
 from wristctl.config.former_names import preset_today
 from wristctl.control.law import Controller
+from wristctl.control.shipped_gains import PREFIX, families, is_shipped, shipped_gains
 from wristctl.control.vetting import law_of
 from wristctl.errors import Call, UserError, meant
 from wristctl.records.files import write_text
@@ -27,21 +28,25 @@ def controller(name: str) -> Controller:
 def gains_of(
     chosen: Controller, gains: str | Mapping[str, float], tuned: TunedGains | None = None
 ) -> tuple[float, ...]:
-    """Gains by preset name, `tuned`, or by value, in the controller's order; UserError for what is unknown or missing.
+    """Gains by name or by value, in the controller's order; UserError for what is unknown or missing.
 
-    `tuned` holds a tune run's gains by controller and name.
+    A name is a preset's, `tuned`, or `tuned:FAMILY` for the gains that a study found on a family of worlds. `tuned`
+    holds a tune run's gains by controller and name.
     """
     if gains == "tuned":
         if tuned is None or chosen.name not in tuned:
             fix = f"--tuned RUN, a tune run that tuned {chosen.name}"
             raise UserError(f"no tuned gains of {chosen.name}", "gains", fix)
         gains = tuned[chosen.name]
+    if isinstance(gains, str) and is_shipped(gains):
+        gains = shipped_gains(chosen.name, gains).gains
     if isinstance(gains, str):
         preset = preset_today(gains, chosen.presets)
         if preset not in chosen.presets:
             example = ",".join(f"{name}=1" for name in chosen.gains)
             by_name = f", or every gain by name, such as {example}" if example else ""
-            fix = f"{meant(gains, [*chosen.presets, 'tuned'])}{by_name}"
+            shipped = [PREFIX + family for family in families()]
+            fix = f"{meant(gains, [*chosen.presets, 'tuned', *shipped])}{by_name}"
             raise UserError(f"unknown gains '{gains}' of {chosen.name}", "gains", fix)
         return chosen.values(chosen.presets[preset])
     for name in gains:

@@ -15,7 +15,8 @@ from wristctl.lanes.blocks import to_blocks, to_rows
 from wristctl.lanes.compiled import by_type, implements
 from wristctl.lanes.lane import zero_like
 from wristctl.lanes.rows import part, rows_of
-from wristctl.simulation.nonideal import nonideal_of, tendon_after_slip, unmoved, wears
+from wristctl.simulation.nonideal import inner_of, nonideal_of, tendon_after_slip, unmoved, wears
+from wristctl.wrist.dahl import inner_in_lanes, one_block
 from wristctl.wrist.pcc import PCC
 from wristctl.wrist.plant import PlantModel, advance_or_stop, kernel_of, parameters_of, tip_angle, travel
 from wristctl.wrist.tendon_mechanics import Nonideal, RealTendons, read_nonideal
@@ -83,10 +84,13 @@ def _less(faults: Any, tendons: Any, plant: Any, q: Any, on_spools: Any, time: A
     )
 
 
-def _advance(model: Any, values: Any, tendon: Any, spools: Any, memory: Any, state: Any, angle: Any, cut: Any) -> None:
+def _advance(
+    model: Any, values: Any, friction: Any, spools: Any, memory: Any, state: Any, angle: Any, cut: Any
+) -> None:
+    tendon, inner = friction
     plant, tendon_rows = parameters_of(model, rows_of(values)), rows_of(tendon)
     zero = zero_like(tendon_rows[0])
-    tendons = RealTendons(tendon_rows[_STIFFNESS], read_nonideal(tendon_rows), rows_of(memory))
+    tendons = RealTendons(tendon_rows[_STIFFNESS], read_nonideal(tendon_rows), rows_of(memory), inner_in_lanes(inner))
     n = len(cut)
     q, rate = part(rows_of(state), 0, cut), part(rows_of(state), n, cut)
     alive = 1.0 + zero
@@ -123,8 +127,20 @@ def angles(candidates: Sequence[SupposedWrist], reeled: Array, h: float, n: int,
     trajectories = np.empty((len(values), len(reeled), *values.shape[2:]))
     spools = Reeled(np.ascontiguousarray(reeled, float), h, round(SETTLE / h), faults)
     advance, rest = kernel_of(_advance, model), unmoved(np.zeros(4), np.zeros(3), np.zeros(4), np.zeros(k))
-    for value, tendon, angle in zip(values, tendons, trajectories, strict=True):
+    friction = inner_of(
+        [c.plant for c in candidates], np.zeros((len(candidates), k)), np.zeros(len(candidates)), to_blocks
+    )
+    for block, (value, tendon, angle) in enumerate(zip(values, tendons, trajectories, strict=True)):
         wide = angle.shape[1:]
         memory = np.ascontiguousarray(np.broadcast_to(rest.reshape(-1, *[1] * len(wide)), (len(rest), *wide)))
-        advance(model, value, tendon, spools, memory, np.zeros((2 * k, *wide)), angle, (0,) * k)
+        advance(
+            model,
+            value,
+            (tendon, one_block(friction, block)),
+            spools,
+            memory,
+            np.zeros((2 * k, *wide)),
+            angle,
+            (0,) * k,
+        )
     return to_rows(trajectories, len(candidates))

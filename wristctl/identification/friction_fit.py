@@ -17,12 +17,20 @@ from scipy.stats import norm, qmc
 from wristctl.arrays import Array
 from wristctl.identification.intervals import NORMAL_95, autocorrelation, bandwidth, inflation, inverse, long_run
 from wristctl.identification.loop_problem import (
+    BEGIN_INNER_PRESLIDING_DEG,
     BEGIN_PRESLIDING,
     EXPONENT,
+    INNER,
+    INNER_PRESLIDING,
     LEAST_SHARE,
     NUDGES,
     PRESLIDING,
+    RADIUS,
     SHARE,
+    SPOOL_MINUS,
+    SPOOL_PLUS,
+    STIFFNESS,
+    SUPPOSITIONS,
     WIDEST,
     LoopProblem,
 )
@@ -30,8 +38,8 @@ from wristctl.identification.loop_problem import (
 # Evaluations of one search; 10 are usual.
 _MOST = 200
 # Places that are tried first: how many, from how many of them a search starts, between which exponents and
-# preslidings [m].
-_STARTS, _BEST, _EXPONENTS, _PRESLIDINGS = 32, 4, (0.02, 1.0), (3e-6, 2e-4)
+# preslidings [m], and between which bends [rad] that inner friction holds.
+_STARTS, _BEST, _EXPONENTS, _PRESLIDINGS, _INNERS = 32, 4, (0.02, 1.0), (3e-6, 2e-4), (0.01, 0.5)
 # Relative decrease of the cost below which a rough search stops.
 _ROUGH = 1e-3
 # Samples over which small errors are alike.
@@ -73,15 +81,14 @@ class FrictionFit:
     def without_friction(self) -> Array:
         """The angle (T,) that the same wrist would take without friction [rad]."""
         x = self.x.copy()
-        x[EXPONENT] = 0.0
+        x[[EXPONENT, INNER]] = 0.0
         return self.problem.expected([x])[0][0]
 
     @property
     def step_error(self) -> float:
         """RMS change of what is expected when the integration step is halved, over the noise; of all quantities the
         largest."""
-        settings = self.problem.settings
-        finely = replace(self.problem, settings=settings.model_copy(update={"step": 0.5 * settings.step}))
+        finely = replace(self.problem, finer=2)
         (coarse,), (fine,) = self.problem.expected([self.x]), finely.expected([self.x])
         parts = zip(fine, coarse, self.noise, strict=True)
         return max(float(np.sqrt(np.mean((one - second) ** 2)) / noise) for one, second, noise in parts)
@@ -96,6 +103,48 @@ class FrictionFit:
         steps = np.abs(np.diff(loop.spools[:, 0]))
         turns = loop.turns[(loop.turns > 0) & (loop.turns < len(steps))]
         return float((0.5 * (steps[turns - 1] + steps[turns])).max())
+
+    @property
+    def misfit(self) -> float:
+        """Variance of what is left over that of the samples' own noise; of all signals the largest."""
+        return float(np.max((self.noise / self.problem.noise) ** 2))
+
+    @property
+    def inner_friction(self) -> FrictionEstimate | None:
+        """Torque of friction inside the wrist [N m]; None where there is none."""
+        if self.x[INNER] == 0.0 and INNER in self.problem.fixed:
+            return None
+        bend = self._straight(INNER, 0.0, math.inf)
+        return FrictionEstimate(*(end * self.problem.supposed_wrist(self.x).stiffness for end in bend))
+
+    @property
+    def inner_presliding(self) -> FrictionEstimate | None:
+        """Bend in which that turns round [rad]."""
+        if self.inner_friction is None:
+            return None
+        return self._scaled(INNER_PRESLIDING, math.radians(BEGIN_INNER_PRESLIDING_DEG))
+
+    @property
+    def stiffness(self) -> FrictionEstimate:
+        """Bending stiffness of the whole wrist [N m/rad]."""
+        return self._scaled(STIFFNESS, self.problem.wrist.stiffness)
+
+    @property
+    def tendon_radius(self) -> FrictionEstimate:
+        """Radius of the tendons' circle [m]."""
+        return self._scaled(RADIUS, self.problem.wrist.tendon_radius)
+
+    @property
+    def slack(self) -> list[FrictionEstimate]:
+        """Length that the + and the - side reel in before they pull [m], over what their spools count."""
+        sides = [] if self.problem.loop.winch else [SPOOL_PLUS, SPOOL_MINUS]
+        ends = [self._straight(index, -math.inf, math.inf) for index in sides]
+        return [FrictionEstimate(-side.value, -side.high, -side.low) for side in ends]
+
+    def _scaled(self, index: int, unit: float) -> FrictionEstimate:
+        """A coordinate that is a logarithm, in the unit of where its search begins."""
+        logarithms = self._straight(index, -50.0, 50.0)
+        return FrictionEstimate(*(unit * math.exp(end) for end in logarithms))
 
     @property
     def exponent(self) -> FrictionEstimate:
@@ -154,6 +203,16 @@ class FrictionFit:
         return FrictionEstimate(value, max(least, value - half), min(most, value + half))
 
 
+def fit_in_turn(problem: LoopProblem) -> list[FrictionFit]:
+    """Fits of what is supposed of a loop, in turn, until one fits; the last is the one that leaves least over."""
+    fits = list[FrictionFit]()
+    for supposed in SUPPOSITIONS:
+        fits.append(fit_friction(replace(problem, supposed=supposed)))
+        if fits[-1].misfit <= problem.settings.lack_of_fit:
+            return fits
+    return sorted(fits, key=lambda fit: -fit.misfit)
+
+
 def fit_friction(problem: LoopProblem) -> FrictionFit:
     """Least squares of the model against a measured loop; what is known beforehand counts by its own deviation.
 
@@ -173,7 +232,9 @@ def fit_friction(problem: LoopProblem) -> FrictionFit:
         )
     parts = [residual / sd for residual, sd in zip(best.residuals, noise, strict=True)]
     slopes = [slope / sd for slope, sd in zip(best.slopes, noise, strict=True)]
-    covariance = _covariance(parts, slopes, problem.prior)
+    free = np.ix_(problem.free, problem.free)
+    covariance = np.zeros((problem.count, problem.count))
+    covariance[free] = _covariance(parts, [slope[:, problem.free] for slope in slopes], problem.prior[problem.free])
     return FrictionFit(problem, best.x, best.residuals, noise, covariance, autocorrelation(parts))
 
 
@@ -192,7 +253,10 @@ def _starts(problem: LoopProblem, noise: Array) -> Array:
     x[:, EXPONENT] = np.exp(np.interp(spread[:, EXPONENT], (0.0, 1.0), np.log(_EXPONENTS)))
     x[:, SHARE] = spread[:, SHARE]
     x[:, PRESLIDING] = np.interp(spread[:, PRESLIDING], (0.0, 1.0), np.log(_PRESLIDINGS)) - math.log(BEGIN_PRESLIDING)
+    x[:, INNER] = np.exp(np.interp(spread[:, INNER], (0.0, 1.0), np.log(_INNERS)))
     x[:, weighted] = norm.ppf(spread[:, weighted]) / problem.prior[weighted]
+    for index, value in problem.fixed.items():
+        x[:, index] = value
     x = np.concatenate([usual[None], x])
     costs = [
         sum(float(np.sum(((e - m) / sd) ** 2)) for e, m, sd in zip(each, problem.measured, noise, strict=True))
@@ -204,39 +268,48 @@ def _starts(problem: LoopProblem, noise: Array) -> Array:
 
 def _search(problem: LoopProblem, x: Array, noise: Array, tolerance: float = 1e-9) -> _Found:
     """The least squares that a search from x finds, measured quantities weighed by their noise."""
-    weighted, weights = problem.prior > 0.0, problem.prior
+    free = problem.free
+    weights = problem.prior[free]
+    weighted, begin = weights > 0.0, x
     last: tuple[Array, list[Array], list[Array]] | None = None
 
-    def at(x: Array) -> tuple[Array, list[Array], list[Array]]:
+    def whole(moved: Array) -> Array:
+        x = begin.copy()
+        x[free] = moved
+        return x
+
+    def at(moved: Array) -> tuple[Array, list[Array], list[Array]]:
         nonlocal last
-        if last is None or not np.array_equal(last[0], x):
-            last = (x.copy(), *_linearised(problem, x))
+        if last is None or not np.array_equal(last[0], moved):
+            last = (moved.copy(), *_linearised(problem, whole(moved)))
         return last
 
-    def rows(x: Array) -> Array:
-        parts = [(e - m) / sd for e, m, sd in zip(at(x)[1], problem.measured, noise, strict=True)]
-        return np.concatenate([*parts, (weights * x)[weighted]])
+    def rows(moved: Array) -> Array:
+        parts = [(e - m) / sd for e, m, sd in zip(at(moved)[1], problem.measured, noise, strict=True)]
+        return np.concatenate([*parts, (weights * moved)[weighted]])
 
-    def slopes(x: Array) -> Array:
-        return np.concatenate([*(s / sd for s, sd in zip(at(x)[2], noise, strict=True)), np.diag(weights)[weighted]])
+    def slopes(moved: Array) -> Array:
+        columns = [s[:, free] / sd for s, sd in zip(at(moved)[2], noise, strict=True)]
+        return np.concatenate([*columns, np.diag(weights)[weighted]])
 
-    bounds = problem.bounds()
-    solution = least_squares(rows, x, slopes, bounds=bounds, x_scale="jac", xtol=1e-7, ftol=tolerance, max_nfev=_MOST)
+    low, high = (bound[free] for bound in problem.bounds())
+    solution = least_squares(
+        rows, x[free].clip(low, high), slopes, bounds=(low, high), x_scale="jac", xtol=1e-7, ftol=tolerance,
+        max_nfev=_MOST,
+    )  # fmt: skip
     residuals = [m - e for m, e in zip(problem.measured, at(solution.x)[1], strict=True)]
-    return _Found(solution.x, float(solution.cost), residuals, at(solution.x)[2])
+    return _Found(whole(solution.x), float(solution.cost), residuals, at(solution.x)[2])
 
 
 def _linearised(problem: LoopProblem, x: Array) -> tuple[list[Array], list[Array]]:
     """Expected course (T,) of every quantity, and its derivatives (T, coordinates); nudges point inward."""
     inward = np.where(x > problem.bounds()[1] - 0.1, -1.0, 1.0)
     nudges = inward * np.array(NUDGES[: len(x)])
-    expected, *nudged = problem.expected([x, *(x + np.diag(nudges))])
-    slopes = [
-        np.stack(
-            [(nudged_signals[k] - signal) / nudge for nudged_signals, nudge in zip(nudged, nudges, strict=True)], axis=1
-        )
-        for k, signal in enumerate(expected)
-    ]
+    expected, *nudged = problem.expected([x, *(x + np.diag(nudges)[problem.free])])
+    slopes = [np.zeros((len(signal), len(x))) for signal in expected]
+    for index, signals in zip(problem.free, nudged, strict=True):
+        for slope, signal, near in zip(slopes, expected, signals, strict=True):
+            slope[:, index] = (near - signal) / nudges[index]
     return expected, slopes
 
 

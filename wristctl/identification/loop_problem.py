@@ -7,10 +7,10 @@ sheath): where the share may be 0, the sheath has no end.
 """
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,155 +18,57 @@ from scipy.interpolate import PchipInterpolator
 
 from wristctl.arrays import Array
 from wristctl.config.hysteresis import HysteresisSettings
-from wristctl.config.plant import Actuator
+from wristctl.config.plant import Actuator, TrueWrist
 from wristctl.config.wrist import WristParameters
 from wristctl.errors import UserError
-from wristctl.records.measured_table import ANGLE, LENGTH, TIME, Expected
+from wristctl.identification.fit import frame_noise
+from wristctl.identification.measured_loop import MeasuredLoop
 from wristctl.simulation.spool_driven import SpooledWrist, spooled
 from wristctl.wrist.statics import FROM_ABOVE, FROM_BELOW
 from wristctl.wrist.tendons import TENDONS_PER_SIDE
 
-_FORCES = {"N": 1.0}
-# The columns that there may be, and their units; a tension is one tendon's at its spool, a side has two alike.
-LOOP_TABLE = Expected(
-    "measured loop",
-    {
-        "time": TIME,
-        "angle": ANGLE,
-        "spool_plus": LENGTH,
-        "spool_minus": LENGTH,
-        "tension_plus": _FORCES,
-        "tension_minus": _FORCES,
-    },
-    needed=("time", "angle"),
-    example="time [s],angle [deg],spool_plus [mm],spool_minus [mm]",
-)
-_FEWEST = 100
-# Share of its whole way that what drives a loop goes back by before that is a turn.
-_TREMBLE = 0.05
-# Median of the absolute value of a normal variable, over its standard deviation.
-_MEDIAN = 0.6745
-# Share of the largest tension by which noise may take one below nothing.
-_NOISE = 0.05
-# By which factor spools may go further, or less far, than the angle asks for.
-_APART = 3.0
-
-
-@dataclass(frozen=True)
-class MeasuredLoop:
-    """T samples, SI units; spools and tensions (T, 2) are of the + and the - side, None where not measured."""
-
-    name: str
-    time: Array
-    angle: Array
-    spools: Array | None
-    tensions: Array | None
-
-    @property
-    def winch(self) -> bool:
-        """Whether only the pulls at the spools are known, not where these are."""
-        return self.spools is None
-
-    @property
-    def drive(self) -> Array:
-        """Input of the wrist: spools or tensions, (T, 2)."""
-        measured = self.tensions if self.spools is None else self.spools
-        assert measured is not None
-        return measured
-
-    @property
-    def tremble(self) -> float:
-        """Standard deviation [N] of noise in pulls that drive it, by how far a sample lies beside its neighbours' mean;
-        0 where spools do."""
-        if not self.winch:
-            return 0.0
-        beside = np.abs(np.diff(self.drive, 2, axis=0)) / math.sqrt(6.0)
-        return float(np.median(beside)) / _MEDIAN
-
-    @cached_property
-    def turns(self) -> NDArray[np.int64]:
-        """Samples at which what drives it turns round; small trembles do not count."""
-        pulled = self.drive[:, 0] - self.drive[:, 1]
-        least, turns, sign, begin = _TREMBLE * float(np.ptp(pulled)), list[int](), 1.0 if self.rises else -1.0, 0
-        while True:
-            onward = sign * pulled[begin:]
-            back = np.flatnonzero(np.maximum.accumulate(onward) - onward > least)
-            if not len(back):
-                return np.array(turns, np.int64)
-            begin += int(np.argmax(onward[: back[0]]))
-            turns.append(begin)
-            sign = -sign
-
-    @property
-    def rises(self) -> bool:
-        """Whether it begins on its way up."""
-        pulled = self.drive[:, 0] - self.drive[:, 1]
-        away = np.flatnonzero(np.abs(pulled - pulled[0]) > _TREMBLE * float(np.ptp(pulled)))
-        return bool(pulled[away[0]] > pulled[0])
-
-
-def read_loop(file: Path, wrist: WristParameters) -> MeasuredLoop:
-    """A measured loop. Raises UserError for a file that is none, with line and column, and what would mend it."""
-    read = LOOP_TABLE.read(file)
-    columns = read.columns
-    spools, tensions = (_pair(columns, name, str(file)) for name in ("spool", "tension"))
-    if spools is None and tensions is None:
-        raise UserError("neither spools nor tensions", str(file), f"columns of both sides, as in {LOOP_TABLE.example}")
-    loop = MeasuredLoop(file.name, columns["time"], columns["angle"], spools, tensions)
-    _check(loop, wrist, str(file), read.lines)
-    return loop
-
-
-def _pair(columns: Mapping[str, Array], name: str, where: str) -> Array | None:
-    sides = [f"{name}_plus", f"{name}_minus"]
-    present = [side for side in sides if side in columns]
-    if len(present) == 1:
-        lacking = next(side for side in sides if side not in columns)
-        raise UserError(f"{present[0]} without {lacking}", where, "both sides, or none")
-    return np.stack([columns[side] for side in sides], axis=1) if present else None
-
-
-def _check(loop: MeasuredLoop, wrist: WristParameters, file: str, lines: Sequence[int]) -> None:
-    if len(loop.time) < _FEWEST:
-        raise UserError(f"{len(loop.time)} samples, too few to tell", file, f"at least {_FEWEST}")
-    back = np.flatnonzero(np.diff(loop.time) <= 0.0)
-    if len(back):
-        raise UserError("time does not go on", f"{file}:{lines[back[0] + 1]}", "samples in the order of their times")
-    most = float(np.abs(loop.angle).max())
-    if most > 2.0 * math.radians(wrist.range_deg):
-        problem = f"it bends by {math.degrees(most):.3g} deg, the wrist's range is {wrist.range_deg:g} deg"
-        raise UserError(problem, file, "the angle's unit in the header, or wrist.range_deg")
-    if loop.tensions is not None:
-        pushes = loop.tensions.min(axis=1) < -_NOISE * loop.tensions.max()
-        if pushes.any():
-            where = f"{file}:{lines[int(np.argmax(pushes))]}"
-            raise UserError("a tendon pushes", where, "tensions of 0 N or more: is the load cell's zero right?")
-    moved = loop.drive - loop.drive.mean(axis=0)
-    together = float(np.sum((moved[:, 0] - moved[:, 1]) * (loop.angle - loop.angle.mean())))
-    if together <= 0.0:
-        what = "where the + side reels in or pulls, the angle falls" if together < 0.0 else "nothing moves"
-        raise UserError(what, file, "the sign of the angle, or plus and minus in the header the other way round")
-    if not len(loop.turns):
-        raise UserError("it never turns round", file, "record there and back, two cycles or more")
-    if loop.spools is not None:
-        share = float(np.ptp(loop.spools[:, 0])) / (wrist.tendon_offset * float(np.ptp(loop.angle)))
-        if not 1.0 / _APART < share < _APART:
-            what = f"spools move {share:.2g} times as far as this angle takes with wrist.tendon_radius"
-            raise UserError(what, file, "the units in the header, or wrist.tendon_radius")
-
-
-# Coordinates of a search: the exponent, the bend's share of it, logarithms over where it begins, zeros [rad, m]; the
-# last three only where spools were measured.
-EXPONENT, SHARE, PRESLIDING, STIFFNESS, DAMPING, ANGLE_ZERO, TENDON, SPOOL_PLUS, SPOOL_MINUS = range(9)
+# Coordinates of a search: the exponent, the bend's share of it, logarithms over where it begins, zeros [rad, m];
+# friction inside the wrist as the bend at which its torque balances the springs [rad]. The last three only where spools
+# were measured.
+(EXPONENT, SHARE, PRESLIDING, STIFFNESS, DAMPING, ANGLE_ZERO, INNER, INNER_PRESLIDING, RADIUS, TENDON, SPOOL_PLUS,
+ SPOOL_MINUS) = range(12)  # fmt: skip
 # Steps of finite differences.
-NUDGES = (1e-4, 1e-4, 1e-3, 1e-3, 1e-3, 1e-3, 1e-3, 1e-6, 1e-6)
-# Start of a search for presliding [m], and its width as a logarithm.
+NUDGES = (1e-4, 1e-4, 1e-3, 1e-3, 1e-3, 1e-3, 1e-4, 1e-3, 1e-4, 1e-3, 1e-6, 1e-6)
+# Start of a search for presliding [m], and its width as a logarithm; that of inner friction [deg].
 BEGIN_PRESLIDING, WIDEST = 2e-5, math.log(1e3)
+BEGIN_INNER_PRESLIDING_DEG = 1.0
 # Below it a share is none.
 LEAST_SHARE = 1e-4
-_BEGIN_FRICTION, _BEGIN_SHEATH = 0.1, 1.0
+_BEGIN_FRICTION, _BEGIN_SHEATH, _BEGIN_INNER = 0.1, 1.0, 0.05
 # Share of the samples that may pass before the first that counts.
 _MOST_LOST = 0.7
+# Integration steps of a loop: a slow one takes longer ones, up to the longest [s].
+_STEPS, _LONGEST_STEP = 20_000, 0.02
+# Least noise of an angle [rad] and of a tension [N].
+_LEAST_NOISE = (math.radians(0.01), 0.01, 0.01)
+
+
+class Supposition(NamedTuple):
+    """What a fit of a loop takes for granted."""
+
+    words: str
+    freed: bool
+    """Whether stiffness, radius, slack and the angle's zero are hardly known beforehand."""
+    inner: bool
+    """Whether there is friction inside the wrist."""
+
+
+AS_BELIEVED = Supposition("friction of the tendons", False, False)
+SUPPOSITIONS = (
+    AS_BELIEVED,
+    Supposition("and stiffness, radius, slack free", True, False),
+    Supposition("and friction inside the wrist", True, True),
+)
+"""In the order in which they are tried: each has what those before it have."""
+# Standard deviations of what is freed: logarithms, then radians and metres.
+# How well a bend in which inner friction turns round is known: a logarithm.
+_INNER_PRESLIDING_ERROR = 1.5
+_FREED = {STIFFNESS: 1.0, RADIUS: 0.5, ANGLE_ZERO: math.radians(10.0), SPOOL_PLUS: 3e-3, SPOOL_MINUS: 3e-3}
 
 
 @dataclass(frozen=True)
@@ -176,6 +78,9 @@ class LoopProblem:
     loop: MeasuredLoop
     wrist: WristParameters
     settings: HysteresisSettings
+    supposed: Supposition = AS_BELIEVED
+    finer: int = 1
+    """Integration steps in place of each usual one."""
 
     @cached_property
     def first(self) -> int:
@@ -205,25 +110,83 @@ class LoopProblem:
         more = () if self.loop.winch or self.loop.tensions is None else self.loop.tensions.T
         return [signal[self.first :] for signal in (self.loop.angle, *more)]
 
+    @property
+    def noise(self) -> Array:
+        """Noise of each signal's single samples, whatever it does from sample to sample."""
+        least = _LEAST_NOISE[: len(self.measured)]
+        return np.array([max(frame_noise([s]), floor) for s, floor in zip(self.measured, least, strict=True)])
+
+    @cached_property
+    def step(self) -> float:
+        """Integration step [s]."""
+        lasts = float(self.loop.time[-1] - self.loop.time[0])
+        return max(self.settings.step, min(_LONGEST_STEP, lasts / _STEPS)) / self.finer
+
+    @cached_property
+    def count(self) -> int:
+        """Number of coordinates."""
+        return TENDON if self.loop.winch else SPOOL_MINUS + 1
+
+    @cached_property
+    def fixed(self) -> dict[int, float]:
+        """Coordinates that are held, with their values."""
+        fix, held = self.settings.fix, dict[int, float]()
+        if fix.stiffness is not None:
+            held[STIFFNESS] = math.log(fix.stiffness / self.wrist.stiffness)
+        if fix.tendon_radius is not None:
+            held[RADIUS] = math.log(fix.tendon_radius / self.wrist.tendon_radius)
+        elif self.loop.winch or not self.supposed.freed:
+            held[RADIUS] = 0.0
+        if fix.presliding is not None:
+            held[PRESLIDING] = math.log(fix.presliding / BEGIN_PRESLIDING)
+        if fix.inner_friction is not None:
+            held[INNER] = fix.inner_friction / self.wrist.stiffness
+        elif not self.supposed.inner:
+            held[INNER] = 0.0
+        if fix.inner_presliding_deg is not None:
+            held[INNER_PRESLIDING] = math.log(fix.inner_presliding_deg / BEGIN_INNER_PRESLIDING_DEG)
+        elif held.get(INNER) == 0.0:
+            held[INNER_PRESLIDING] = 0.0
+        return held
+
+    @cached_property
+    def free(self) -> NDArray[np.int64]:
+        """Indices of the coordinates that a search moves."""
+        return np.array([index for index in range(self.count) if index not in self.fixed], np.int64)
+
     @cached_property
     def prior(self) -> Array:
         """One over the standard deviation with which each coordinate is known beforehand; 0 where nothing is."""
         known = self.settings.known
-        errors = known.stiffness_error, known.damping_error, math.radians(known.zero_error_deg)
-        spools = known.tendon_stiffness_error, known.spool_error, known.spool_error
-        return np.array([0.0, 0.0, 0.0, *(1.0 / error for error in (*errors, *(() if self.loop.winch else spools)))])
+        errors = {
+            STIFFNESS: known.stiffness_error,
+            DAMPING: known.damping_error,
+            ANGLE_ZERO: math.radians(known.zero_error_deg),
+            INNER_PRESLIDING: _INNER_PRESLIDING_ERROR,
+            RADIUS: known.radius_error,
+            TENDON: known.tendon_stiffness_error,
+            SPOOL_PLUS: known.spool_error,
+            SPOOL_MINUS: known.spool_error,
+        }
+        if self.supposed.freed:
+            errors |= {index: max(error, errors[index]) for index, error in _FREED.items()}
+        return np.array([1.0 / errors[index] if index in errors else 0.0 for index in range(self.count)])
 
     def begin(self) -> Array:
         """The coordinates at the start."""
-        x = np.zeros(len(self.prior))
+        x = np.zeros(self.count)
         x[EXPONENT] = _BEGIN_FRICTION * (_BEGIN_SHEATH + self.bend)
         x[SHARE] = self.bend / (_BEGIN_SHEATH + self.bend)
+        x[INNER] = _BEGIN_INNER
+        for index, value in self.fixed.items():
+            x[index] = value
         return x
 
     def bounds(self) -> tuple[Array, Array]:
         """Least and largest coordinates."""
-        low, high = np.full(len(self.prior), -np.inf), np.full(len(self.prior), np.inf)
+        low, high = np.full(self.count, -np.inf), np.full(self.count, np.inf)
         low[:3], high[:3] = (0.0, LEAST_SHARE, -WIDEST), (5.0, 1.0, WIDEST)
+        low[INNER], high[INNER], low[INNER_PRESLIDING], high[INNER_PRESLIDING] = 0.0, 2.0, -4.0, 4.0
         return low, high
 
     def tendons(self, x: Array) -> Actuator:
@@ -237,15 +200,33 @@ class LoopProblem:
             }
         )
 
+    def plant(self, x: Array) -> TrueWrist:
+        """Friction inside the wrist at coordinates x."""
+        torque = float(x[INNER]) * self.supposed_wrist(x).stiffness
+        if self.settings.fix.inner_friction is not None:
+            torque = self.settings.fix.inner_friction
+        turns = BEGIN_INNER_PRESLIDING_DEG * math.exp(x[INNER_PRESLIDING])
+        return TrueWrist().model_copy(update={"inner_friction": torque, "inner_presliding_deg": turns})
+
+    def supposed_wrist(self, x: Array) -> WristParameters:
+        """The wrist at coordinates x."""
+        scales = {"stiffness": x[STIFFNESS], "damping": x[DAMPING], "tendon_radius": x[RADIUS]}
+        return self.wrist.model_copy(
+            update={name: getattr(self.wrist, name) * math.exp(scale) for name, scale in scales.items()}
+        )
+
     def expected(self, candidates: Sequence[Array]) -> list[list[Array]]:
         """Expected measurements at coordinates, as `measured` has it; they run side by side."""
         loop, sides = self.loop, float(TENDONS_PER_SIDE)
         zeros = np.array([(0.0, 0.0) if loop.winch else x[[SPOOL_PLUS, SPOOL_MINUS]] for x in candidates])
         drive = PchipInterpolator(loop.time - loop.time[0], (sides if loop.winch else 1.0) * loop.drive)
         begin = np.full(self.settings.segments, loop.angle[0] / self.settings.segments)
-        z = FROM_BELOW if loop.rises else FROM_ABOVE
-        lanes = [SpooledWrist(self._wrist(x), self.tendons(x), begin, loop.winch, z) for x in candidates]
-        h, lasts = self.settings.step, float(loop.time[-1] - loop.time[0])
+        z, inner_z = (FROM_BELOW, 1.0) if loop.rises else (FROM_ABOVE, -1.0)
+        lanes = [
+            SpooledWrist(self.supposed_wrist(x), self.tendons(x), begin, loop.winch, z, self.plant(x), inner_z)
+            for x in candidates
+        ]
+        h, lasts = self.step, float(loop.time[-1] - loop.time[0])
         every = max(1, int(0.5 * float(np.median(np.diff(loop.time))) / h))
 
         def told(time: Array, which: NDArray[np.int64]) -> Array:
@@ -263,7 +244,3 @@ class LoopProblem:
                 [np.interp(instants, grid, signal) for signal in (courses.theta[lane] + x[ANGLE_ZERO], *pulls)]
             )
         return signals
-
-    def _wrist(self, x: Array) -> WristParameters:
-        own = self.wrist.stiffness * math.exp(x[STIFFNESS]), self.wrist.damping * math.exp(x[DAMPING])
-        return self.wrist.model_copy(update=dict(zip(("stiffness", "damping"), own, strict=True)))

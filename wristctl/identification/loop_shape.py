@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from wristctl.arrays import Array
 from wristctl.config.wrist import WristParameters
-from wristctl.identification.loop_problem import MeasuredLoop
+from wristctl.identification.measured_loop import MeasuredLoop
 from wristctl.wrist.tendons import TENDONS_PER_SIDE
 
 

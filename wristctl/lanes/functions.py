@@ -14,7 +14,7 @@ from wristctl.lanes.lane import exp2i, exponent, floor, polynomial, where, zero_
 from wristctl.lanes.types import LaneType
 
 # The series of `bessel` hold for x^2 up to this: a little more than pi^2.
-_REACH = 10
+SERIES_REACH = 10
 
 
 def _bessel_series(order: int, terms: int) -> tuple[float, ...]:
@@ -22,10 +22,10 @@ def _bessel_series(order: int, terms: int) -> tuple[float, ...]:
     coefficients = [Fraction(1, math.prod(range(1, 2 * order + 2, 2)))]
     for k in range(16):
         coefficients.append(-coefficients[-1] / (2 * (k + 1) * (2 * order + 2 * k + 3)))
-    return _economised(coefficients, Fraction(_REACH), terms)
+    return economised(coefficients, Fraction(SERIES_REACH), terms)
 
 
-def _economised(series: Sequence[Fraction], reach: Fraction, terms: int) -> tuple[float, ...]:
+def economised(series: Sequence[Fraction], reach: Fraction, terms: int) -> tuple[float, ...]:
     """A power series for 0 to `reach`, economised to as few terms.
 
     Lanczos: as long as there are more, take off the multiple of Chebyshev's polynomial on that interval that takes off
@@ -214,7 +214,7 @@ def _of_lanes(x: Any, y: Any) -> Callable[[Any, Any], Any] | None:
 
 # atan(t)/t - 1 over t^2, in t^2, for |t| <= tan(pi/8)
 _EIGHTH = math.sqrt(2.0) - 1.0
-_arc_rest = polynomial(_economised([Fraction((-1) ** k, 2 * k + 1) for k in range(1, 30)], Fraction(1716, 10000), 13))
+_arc_rest = polynomial(economised([Fraction((-1) ** k, 2 * k + 1) for k in range(1, 30)], Fraction(1716, 10000), 13))
 
 
 @compiled

@@ -32,7 +32,8 @@ def _factors(value: Any) -> Any:
     return value.operands if getattr(value, "opname", None) == "fmul" else None
 
 
-def _add(builder: Any, x: Any, y: Any) -> Any:
+def add_lanes(builder: Any, x: Any, y: Any) -> Any:
+    """Emit x + y, fused with a product next to it."""
     if product := _factors(x):
         return _fma(builder, *product, y)
     if product := _factors(y):
@@ -40,7 +41,8 @@ def _add(builder: Any, x: Any, y: Any) -> Any:
     return builder.fadd(x, y)
 
 
-def _subtract(builder: Any, x: Any, y: Any) -> Any:
+def subtract_lanes(builder: Any, x: Any, y: Any) -> Any:
+    """Emit x - y, fused with a product next to it."""
     if product := _factors(x):
         return _fma(builder, *product, builder.fneg(y))
     if product := _factors(y):
@@ -49,8 +51,8 @@ def _subtract(builder: Any, x: Any, y: Any) -> Any:
 
 
 _TWO = (LaneType, LaneType)
-define(operator.add, _TWO, LaneType, _add)
-define(operator.sub, _TWO, LaneType, _subtract)
+define(operator.add, _TWO, LaneType, add_lanes)
+define(operator.sub, _TWO, LaneType, subtract_lanes)
 define(operator.mul, _TWO, LaneType, lambda b, x, y: b.fmul(x, y))
 define(operator.truediv, _TWO, LaneType, lambda b, x, y: b.fdiv(x, y))
 define(operator.neg, (LaneType,), LaneType, lambda b, x: b.fneg(x))
@@ -194,13 +196,13 @@ def _scaled(builder: Any, s: Any, v: Any) -> Any:
 
 def _dot(builder: Any, u: Any, v: Any) -> Any:
     (a, b), (c, d) = _xy(builder, u), _xy(builder, v)
-    return _add(builder, builder.fmul(a, c), builder.fmul(b, d))
+    return add_lanes(builder, builder.fmul(a, c), builder.fmul(b, d))
 
 
 def _complex_product(builder: Any, u: Any, v: Any) -> Any:
     (a, b), (c, d) = _xy(builder, u), _xy(builder, v)
-    real = _subtract(builder, builder.fmul(a, c), builder.fmul(b, d))
-    imaginary = _add(builder, builder.fmul(a, d), builder.fmul(b, c))
+    real = subtract_lanes(builder, builder.fmul(a, c), builder.fmul(b, d))
+    imaginary = add_lanes(builder, builder.fmul(a, d), builder.fmul(b, c))
     return _planar(builder, real, imaginary)
 
 
@@ -213,7 +215,7 @@ _VECTORS = (PlaneType, PlaneType)
 define(planar, _TWO, PlaneType, _planar)
 define(turn, (PlaneType,), PlaneType, _turn)
 define(dot, _VECTORS, LaneType, _dot)
-define(operator.add, _VECTORS, PlaneType, _each(_add))
-define(operator.sub, _VECTORS, PlaneType, _each(_subtract))
+define(operator.add, _VECTORS, PlaneType, _each(add_lanes))
+define(operator.sub, _VECTORS, PlaneType, _each(subtract_lanes))
 define(operator.mul, (LaneType, PlaneType), PlaneType, _scaled)
 define(operator.mul, _VECTORS, PlaneType, _complex_product)

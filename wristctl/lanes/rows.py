@@ -19,6 +19,8 @@ import wristctl.lanes.lane  # noqa: F401 teaches numba what lanes do
 from wristctl.lanes.types import WIDTHS, LaneType, PlaneType, RowsType
 
 _PAIR_OF_INDICES = numba.types.UniTuple(numba.types.intp, 2)
+# Types of an index of rows: one number, or [i, j].
+INDEX_TYPES = (types.intp, _PAIR_OF_INDICES)
 
 
 def _index_type(index: types.Type) -> types.Type:
@@ -64,15 +66,16 @@ def _load(context: Any, builder: Any, sig: Any, args: list[Any]) -> Any:
     return load_row(builder, sig.args[0], *args)
 
 
-def _store(context: Any, builder: Any, sig: Any, args: list[Any]) -> Any:
+def store_row(context: Any, builder: Any, sig: Any, args: list[Any]) -> Any:
+    """Lowering of rows[index] = value."""
     builder.store(args[2], _address(builder, sig.args[0], *args[:2]), align=8)
     return context.get_dummy_value()
 
 
-for _index in (types.intp, _PAIR_OF_INDICES):
+for _index in INDEX_TYPES:
     lower_builtin(operator.getitem, RowsType, _index)(_load)
     for _element in (LaneType, PlaneType):
-        lower_builtin(operator.setitem, RowsType, _index, _element)(_store)
+        lower_builtin(operator.setitem, RowsType, _index, _element)(store_row)
 
 
 @lower_builtin(len, RowsType)
@@ -150,7 +153,9 @@ def beyond(typingctx: Any, rows: RowsType, start: types.Integer) -> Any:
     return signature(RowsType(rows.element, None), rows, types.intp), _beyond
 
 
-def _scratch(result: RowsType, rows: RowsType) -> Any:
+def scratch_rows(result: RowsType, rows: RowsType) -> Any:
+    """Signature and lowering of a function of `rows` that gives memory for rows of the type `result`."""
+
     def codegen(context: Any, builder: Any, sig: Any, args: list[Any]) -> Any:
         memory = ir.ArrayType(result.element.llvm, result.entries)
         return _rows(builder, result, _opaque(builder, cgutils.alloca_once(builder, memory), memory))
@@ -161,16 +166,16 @@ def _scratch(result: RowsType, rows: RowsType) -> Any:
 @intrinsic
 def lanes_like(typingctx: Any, rows: RowsType) -> Any:
     """Scratch lanes, uninitialised, as many as `rows`."""
-    return _scratch(RowsType(LaneType(rows.element.width), rows.size), rows)
+    return scratch_rows(RowsType(LaneType(rows.element.width), rows.size), rows)
 
 
 @intrinsic
 def planes_like(typingctx: Any, rows: RowsType) -> Any:
     """Scratch planar vectors, uninitialised, as many as `rows`."""
-    return _scratch(RowsType(PlaneType(rows.element.width), rows.size), rows)
+    return scratch_rows(RowsType(PlaneType(rows.element.width), rows.size), rows)
 
 
 @intrinsic
 def square_like(typingctx: Any, rows: RowsType) -> Any:
     """A scratch matrix of lanes, uninitialised, with a row and a column for each of `rows`."""
-    return _scratch(RowsType(LaneType(rows.element.width), rows.size, columns=rows.size or 1), rows)
+    return scratch_rows(RowsType(LaneType(rows.element.width), rows.size, columns=rows.size or 1), rows)

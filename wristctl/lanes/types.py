@@ -24,13 +24,15 @@ LANES = 8
 WIDTHS = (1, LANES)
 
 
-class _Wide(types.Type):
+class WideType(types.Type):
+    """What is a block of rollouts wide."""
+
     def __init__(self, width: int) -> None:
         self.width = width
         super().__init__(name=f"{type(self).__name__}({width})")
 
 
-class LaneType(_Wide):
+class LaneType(WideType):
     """A number; Python's numbers convert to it by repetition."""
 
     @property
@@ -43,7 +45,7 @@ class LaneType(_Wide):
         return Conversion.safe if isinstance(other, types.Number) else None
 
 
-class MaskType(_Wide):
+class MaskType(WideType):
     """The result of comparing two lanes."""
 
     @property
@@ -52,7 +54,7 @@ class MaskType(_Wide):
         return ir.VectorType(ir.IntType(1), self.width)
 
 
-class PlaneType(_Wide):
+class PlaneType(WideType):
     """A planar vector, written as a complex number: x + i y."""
 
     @property
@@ -108,7 +110,9 @@ def _number_to_lane(context: Any, builder: Any, fromty: types.Type, toty: LaneTy
     return repeat(builder, context.cast(builder, value, fromty, types.float64), toty.llvm)
 
 
-def define(function: Any, arguments: tuple[type[_Wide], ...], result: type[_Wide], emit: Callable[..., Any]) -> None:
+def define(
+    function: Any, arguments: tuple[type[WideType], ...], result: type[WideType], emit: Callable[..., Any]
+) -> None:
     """Teach numba `function` on these types by `emit(builder, *values)`; numbers among the lanes are repeated."""
 
     def lowered(context: Any, builder: Any, sig: Any, args: list[Any]) -> Any:
@@ -118,7 +122,7 @@ def define(function: Any, arguments: tuple[type[_Wide], ...], result: type[_Wide
         _teach(function, tuple(kind(width) for kind in arguments), result(width), lowered)
 
 
-def _teach(function: Any, arguments: tuple[_Wide, ...], result: _Wide, lowered: Callable[..., Any]) -> None:
+def _teach(function: Any, arguments: tuple[WideType, ...], result: WideType, lowered: Callable[..., Any]) -> None:
     class Signature(AbstractTemplate):
         def generic(self, args: tuple[types.Type, ...], kws: dict[str, Any]) -> Any:
             if len(args) != len(arguments) or all(isinstance(argument, types.Number) for argument in args):

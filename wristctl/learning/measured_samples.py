@@ -1,7 +1,7 @@
 """Samples that were measured: tips and angles of recordings, from tables of runs or from CSV files."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -11,28 +11,14 @@ from wristctl.arrays import Array
 from wristctl.errors import UserError
 from wristctl.learning.dataset import Samples
 from wristctl.learning.domain import OTHERS, Domain
-from wristctl.records.measured_table import ANGLE, LENGTH, NUMBER, TIME, Expected
+from wristctl.records.log_converters import read_log
 from wristctl.wrist.kinematics import exact_arc
 
 # Columns of a table of a run that hold a course.
 NEEDED = ("tip_x", "tip_y", "theta")
-# Other names of the columns in CSV files.
-_NAMES = {"x": "tip_x", "y": "tip_y", "angle": "theta"}
-_PLACES = {"tip_x": LENGTH, "tip_y": LENGTH, "x": LENGTH, "y": LENGTH}
-DATA = Expected(
-    "measured data",
-    {
-        **_PLACES,
-        "angle": ANGLE,
-        "theta": ANGLE,
-        "pose": ANGLE,
-        "hand_mass": {"kg": 1.0, "g": 1e-3},
-        "trial": NUMBER,
-        "time": TIME,
-    },
-    needed=(),
-    example="tip_x [mm],tip_y [mm],angle [deg]",
-)
+# Names of those columns, and of further inputs, in an open log.
+_NAMES = {"bend_y": "theta", "mass": "hand_mass"}
+_EXAMPLE = "tip_x [mm],tip_y [mm],angle [deg]"
 _FEWEST = 10
 
 
@@ -59,7 +45,7 @@ def courses_in(columns: Mapping[str, Any], name: str) -> Iterator[RecordedCourse
     shape = arrays["theta"].shape
     if "trial" in columns and len(shape) == 1:
         whose = np.asarray(columns["trial"])
-        parts = [(f"{name}, trial {number:g}", whose == number) for number in np.unique(whose)]
+        parts = [(f"{name}, trial {_label(number)}", whose == number) for number in dict.fromkeys(whose.tolist())]
     else:
         rows = range(shape[0]) if len(shape) == 2 else (slice(None),)
         parts = [(name, np.index_exp[row]) for row in rows]
@@ -72,19 +58,32 @@ def courses_in(columns: Mapping[str, Any], name: str) -> Iterator[RecordedCourse
             yield RecordedCourse(label, tip, kept["theta"], {key: kept[key] for key in OTHERS if key in kept})
 
 
-def read_courses(file: Path) -> list[RecordedCourse]:
-    """The recordings in a CSV file whose header has units. Raises UserError with line and column for what is none."""
-    table = DATA.read(file)
-    columns = {_NAMES.get(name, name): column for name, column in table.columns.items()}
-    if len(columns) < len(table.columns):
-        raise UserError("the same column under two names", f"{file}:1", "leave one out")
-    for name in NEEDED:
-        if name not in columns:
-            raise UserError(f"no column {name}", str(file), f"a header such as {DATA.example}")
+def _label(trial: str | float) -> str:
+    try:
+        return f"{float(trial):g}"
+    except ValueError:
+        return str(trial)
+
+
+def read_courses(file: Path, names: str = "") -> list[RecordedCourse]:
+    """The recordings in an open log. Raises UserError with line and column for what is none.
+
+    `names` are another author's columns as `wristctl.records.open_log` has them. Samples without a tip or an angle are
+    left out.
+    """
+    log = read_log(file, names, "measured data")
+    bends = log.bends()
+    if bends is not None:
+        log = replace(log, columns={**log.columns, "bend_y": bends[:, 0]})
+    for name in ("tip_x", "tip_y", "bend_y"):
+        if name not in log.columns:
+            log.whole(name, _EXAMPLE)
+    columns: dict[str, Any] = {_NAMES.get(name, name): column for name, column in log.columns.items()}
+    columns.update(log.words)
     off = np.flatnonzero(np.abs(columns["theta"]) > np.pi)
     if off.size:
         problem = f"an angle of {np.rad2deg(columns['theta'][off[0]]):.4g} deg"
-        raise UserError(problem, table.at(int(off[0])), "put the angle's unit into the header")
+        raise UserError(problem, log.at(int(off[0])), "put the angle's unit into the header")
     return list(courses_in(columns, file.name))
 
 

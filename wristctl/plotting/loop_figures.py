@@ -32,8 +32,8 @@ _SMALLEST = 1e-8
 _LEAST_DEG = 1e-3
 # Samples in the close-up of tensions.
 _LAST = 20
-# Parts of a long course of which each is drawn by its least and its largest value.
-_COLUMNS = 500
+# Parts of a long course of which each is drawn by its least and its largest value, and samples in a part from there on.
+_COLUMNS, _SAMPLES_OF_PART = 500, 4
 
 
 def angles(trajectories: Sequence[Trajectory], heading: str = "") -> Figure:
@@ -55,24 +55,77 @@ def angles(trajectories: Sequence[Trajectory], heading: str = "") -> Figure:
     return picture
 
 
+def one_motion(course: Trajectory, heading: str = "") -> Figure:
+    """One motion on three panels over time [s]: bending angle [deg], its error [deg] and the tensions [N].
+
+    The panel of tensions has the commanded one of each side.
+    """
+    picture, axes = figure(3, 1, height=5.4, sharex=True, height_ratios=(3, 2, 2))
+    above, middle, below = axes[:, 0]
+    style = line(course.label)
+    above.plot(course.time, np.degrees(course.theta), label=label(course), **style)
+    middle.plot(course.time, np.degrees(course.error), **style)
+    if (measured := _apart(course.seen, course.theta)) is not None:
+        above.plot(course.time, np.degrees(measured), label="as seen", **THIN)
+        middle.plot(course.time, np.degrees(measured - course.theta_ref), **THIN)
+    draw_desired(above, [course])
+    within_half_a_move(above, [course])
+    middle.axhline(0.0, color=BLACK, linewidth=0.8, zorder=1.0)
+    _within_errors(middle, [course])
+    for side, shade, tension in zip("+-", (ORANGE, PURPLE), course.tension.T, strict=True):
+        draw_course(below, course.time, tension, shade, label=f"{side} side")
+    below.set_ylim(bottom=0.0)
+    legend(below, loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=2, borderaxespad=0.0)
+    for panel, name in zip((above, middle, below), ("angle [deg]", "error [deg]", "tension [N]"), strict=True):
+        panel.set_ylabel(name)
+    below.set_xlabel("time [s]")
+    picture.align_ylabels()
+    title(above, heading)
+    legend(above, loc="lower right")
+    return picture
+
+
+def draw_course(axes: Axes, time: Array, course: Array, shade: str, label: str = "") -> None:
+    """Draw one course (T,) over time (T,) as it is held from sample to sample.
+
+    A long one is a line of means in a pale band from least to largest: what jumps at every sample would fill an area.
+    """
+    parts = in_parts(course)
+    if parts.shape[1] == 1:
+        axes.step(time, course, color=shade, linewidth=1.0, where="post", label=label)
+        return
+    middle = in_parts(time).mean(axis=1)
+    axes.fill_between(middle, parts.min(axis=1), parts.max(axis=1), color=shade, alpha=0.25, linewidth=0.0)
+    axes.plot(middle, parts.mean(axis=1), color=shade, linewidth=1.2, label=label)
+
+
+def in_parts(course: Array) -> Array:
+    """Samples (T,) of a long course in parts (N, samples); samples that fill no part are left out.
+
+    A short course is one sample a part.
+    """
+    size = len(course) // _COLUMNS if len(course) >= _SAMPLES_OF_PART * _COLUMNS else 1
+    return course[: len(course) // size * size].reshape(-1, size)
+
+
 def errors(trajectories: Sequence[Trajectory], heading: str = "", log: bool = False) -> Figure:
-    """Error e = theta - theta_ref [rad] over time [s], as in the paper's figures of SMC and PID; `log` for |e|.
+    """Error e = theta - theta_ref [deg] over time [s], as in the paper's figures of SMC and PID; `log` for |e|.
 
     Beside it, but not with `log`, the error that the controller sees where that differs (a camera's delay and noise).
     """
     picture, ((axes,),) = figure(height=3.4)
     for course in trajectories:
         error = np.where(np.abs(course.error) < _SMALLEST, np.nan, np.abs(course.error)) if log else course.error
-        axes.plot(course.time, error, label=label(course), **line(course.label))
+        axes.plot(course.time, np.degrees(error), label=label(course), **line(course.label))
         if not log and (measured := _apart(course.seen, course.theta)) is not None:
-            axes.plot(course.time, measured - course.theta_ref, label=f"{course.label} as seen", **THIN)
+            seen = np.degrees(measured - course.theta_ref)
+            axes.plot(course.time, seen, label=f"{course.label} as seen", **THIN)
     if log:
         logarithmic(axes.yaxis)
     else:
         axes.axhline(0.0, color=BLACK, linewidth=0.8, zorder=1.0)
-        size = max(float(np.abs(course.theta_ref).max()) for course in trajectories)
-        _at_most(axes, -2.0 * size - 0.01, 2.0 * size + 0.01)
-    axes.set(xlabel="time [s]", ylabel="|error| [rad]" if log else "error [rad]")
+        _within_errors(axes, trajectories)
+    axes.set(xlabel="time [s]", ylabel="|error| [deg]" if log else "error [deg]")
     title(axes, heading)
     legend_below(picture)
     return picture
@@ -101,12 +154,12 @@ def overlay(trajectories: Sequence[Trajectory], heading: str = "") -> Figure:
 
 
 def tensions(trajectory: Trajectory) -> Figure:
-    """Tension per tendon [N] of both sides, and the torque [N m] that the law wants and that the tensions should give.
+    """Tension per tendon [N] of both sides; below it the torque [N m] that is wanted and that of the tensions.
 
     Where tensions do not act as they are commanded (lag, steps, elastic tendons) both are drawn.
     On the right the last samples alone, so that tensions which jump at every tick can be told from a filled area.
     """
-    picture, axes = figure(3, 2, height=6.0, sharex="col", sharey="row", width_ratios=(3, 1))
+    picture, axes = figure(3, 2, height=6.0, sharex="col", sharey="row", width_ratios=(2, 1))
     acting = _apart(trajectory.acting, trajectory.tension)
     largest = max(
         float(np.nanmax(tensions_of_side))
@@ -116,35 +169,30 @@ def tensions(trajectory: Trajectory) -> Figure:
     end = float(trajectory.time[-1])
     close_up = slice(-_LAST, None), 1e3 * (trajectory.time - end)
     for column, (part, time) in zip(axes.T, ((slice(None), trajectory.time), close_up), strict=True):
-        for panel, colour, tension in zip(column, (ORANGE, PURPLE), trajectory.tension.T, strict=False):
-            drawn = envelope(time[part], tension[part])
-            panel.step(*drawn, color=colour, linewidth=1.0, where="post", label="commanded")
+        for panel, shade, side, tension in zip(column, (ORANGE, PURPLE), "+-", trajectory.tension.T, strict=False):
+            draw_course(panel, time[part], tension[part], shade, f"tension of the {side} side")
         for panel, tension in zip(column, () if acting is None else acting.T, strict=False):
-            panel.plot(*envelope(time[part], tension[part]), label="acting", **THIN)
-        wanted = {"color": GREY, "label": "wanted by the law"}
-        acting_style = {"color": BLACK, "label": "of the commanded tensions"}
-        for torque, style in ((trajectory.torque_wanted, wanted), (trajectory.torque, acting_style)):
-            column[2].step(*envelope(time[part], torque[part]), linewidth=1.0, where="post", **style)
-    for panel, name in zip(axes[:, 0], ("+ side [N]", "- side [N]", "torque [N m]"), strict=True):
+            panel.plot(*envelope(time[part], tension[part]), label="tension that acts", **THIN)
+        draw_course(column[2], time[part], trajectory.torque_wanted[part], GREY, "torque wanted")
+        draw_course(column[2], time[part], trajectory.torque[part], BLACK, "torque of the tensions")
+    for panel, name in zip(axes[:, 0], ("tension [N]", "tension [N]", "torque [N m]"), strict=True):
         panel.set_ylabel(name)
     for panel in axes[:2, 0]:
         panel.set_ylim(0.0, 1.05 * largest)
     size = 2.0 * float(np.nanmax(np.abs(trajectory.torque), initial=1e-3))
     _at_most(axes[2, 0], -size, size)
     axes[2, 0].set_xlabel("time [s]")
-    axes[2, 1].set_xlabel(f"time - {end:.4g} s [ms]")
-    title(axes[0, 0], f"{label(trajectory)}: tension per tendon, torque")
+    axes[2, 1].set_xlabel("to the end [ms]")
+    title(axes[0, 0], label(trajectory))
     title(axes[0, 1], f"last {_LAST} samples")
-    if acting is not None:
-        legend(axes[1, 0], loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=2, borderaxespad=0.0)
-    legend(axes[2, 0], loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=2, borderaxespad=0.0)
+    legend_below(picture, 2)
     return picture
 
 
 def envelope(time: Array, course: Array) -> tuple[Array, Array]:
     """Envelope of a course (T,) that jumps at every sample: the least and largest value of each part."""
     samples_per_column = len(time) // _COLUMNS
-    if samples_per_column < 4:
+    if samples_per_column < _SAMPLES_OF_PART:
         return time, course
     covered = samples_per_column * _COLUMNS
     parts = course[:covered].reshape(_COLUMNS, samples_per_column)
@@ -186,6 +234,12 @@ def within_half_a_move(axes: Axes, trajectories: Sequence[Trajectory]) -> None:
     _at_most(axes, low - margin, high + margin)
 
 
+def _within_errors(axes: Axes, trajectories: Sequence[Trajectory]) -> None:
+    """Let the axis of errors [deg] end at twice the largest angle that is wanted."""
+    size = max(float(np.degrees(np.abs(course.theta_ref)).max()) for course in trajectories)
+    _at_most(axes, -2.0 * size - 0.5, 2.0 * size + 0.5)
+
+
 def _at_most(axes: Axes, low: float, high: float) -> None:
     """Keep the y axis within low to high."""
     bottom, top = axes.get_ylim()
@@ -193,20 +247,20 @@ def _at_most(axes: Axes, low: float, high: float) -> None:
 
 
 def error_sizes(repeated: Sequence[Repeated], heading: str = "") -> Figure:
-    """Size of the error |theta - theta_ref| [rad] over time [s]: the repetitions' median with its 95 % interval.
+    """Size of the error |theta - theta_ref| [deg] over time [s]: the repetitions' median with its 95 % interval.
 
     A repetition that diverged counts as the largest error; with fewer than six there is no band.
     """
     picture, ((axes,),) = figure(height=3.4)
     for loop in repeated:
-        course, errors = loop.first.trajectory, np.abs(loop.errors)
+        course, errors = loop.first.trajectory, np.degrees(np.abs(loop.errors))
         median, low, high = spread_over_time(errors)
         style = line(course.label)
         label = course.label + (f", {loop.failed.sum()} failed" if loop.failed.any() else "")
         axes.plot(course.time, np.where(np.isfinite(median), median, np.nan), label=label, **style)
         axes.fill_between(course.time, low, high, color=style["color"], alpha=0.25, linewidth=0.0)
     axes.axhline(0.0, color=BLACK, linewidth=0.8, zorder=1.0)
-    axes.set(xlabel="time [s]", ylabel=f"median |error| of {len(repeated[0].errors)} [rad]")
+    axes.set(xlabel="time [s]", ylabel=f"median |error| of {len(repeated[0].errors)} [deg]")
     title(axes, heading)
     legend_below(picture)
     return picture

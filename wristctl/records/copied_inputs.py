@@ -52,7 +52,7 @@ def write_files(folder: Path, contents: dict[str, bytes]) -> None:
 
 
 def _content(file: Path) -> bytes:
-    from wristctl.records.measured_table import with_units
+    from wristctl.records.open_log import with_units
 
     try:
         content = file.read_bytes()

@@ -17,11 +17,12 @@ from wristctl.simulation.disturbances import acting
 from wristctl.simulation.frames import frame_counts, readings, remembered, side_by_side
 from wristctl.simulation.kernel import Disturbed, LoopCourse, LoopState, LoopValues, Scratch, Setup, Undisturbed
 from wristctl.simulation.motion import Motion
-from wristctl.simulation.nonideal import is_ideal, nonideal_of, unmoved
+from wristctl.simulation.nonideal import inner_of, is_ideal, nonideal_of, unmoved
 from wristctl.simulation.observer import NoCamera, Observer, Schedule, Watch
 from wristctl.simulation.stationary_filter import Belief, stationary_gains
 from wristctl.simulation.sums import SUMS
 from wristctl.simulation.worlds import World, bending_limit, check_stops
+from wristctl.wrist.dahl import NoInnerFriction
 from wristctl.wrist.plant import PlantModel
 from wristctl.wrist.segments import segments
 from wristctl.wrist.tendon_mechanics import ElasticTendons, NoTendons, PulledTendons, RealTendons, Tendons
@@ -93,7 +94,11 @@ def batch(
         nonideal_of(world.loop.plant, actuator, world.loop.plant.actuator, step)
         for world, actuator in zip(worlds, actuators, strict=True)
     ]
-    ideal = all(map(is_ideal, nonideals))
+    plants = [world.loop.plant for world in worlds]
+    inner = inner_of(
+        plants, coordinates, np.zeros(len(worlds)), lambda rows: spread(np.ascontiguousarray(rows[world_index]), count)
+    )
+    ideal = all(map(is_ideal, nonideals)) and isinstance(inner, NoInnerFriction)
 
     def of_worlds(row: Callable[[int], Array]) -> Array:
         """A row of each world's as blocks; of one world as one block for all."""
@@ -124,7 +129,8 @@ def batch(
             return ElasticTendons(stiffness) if level == "tendon" else NoTendons()
         nonideal = of_worlds(lambda index: np.array(nonideals[index]))
         state = spread(np.array([resting(index) for index in range(len(worlds))])[world_index], count)
-        return RealTendons(stiffness, nonideal, state) if level == "tendon" else PulledTendons(nonideal, state)
+        real = RealTendons(stiffness, nonideal, state, inner)
+        return real if level == "tendon" else PulledTendons(nonideal, state, inner)
 
     ends = zip(motions, references[:, 0, -1], strict=True)
     goals = np.array([followed_motion.goals_at(end) for followed_motion, end in ends])[lanes.motion]

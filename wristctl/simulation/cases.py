@@ -95,15 +95,16 @@ class Measured:
 
         Feedforward cannot swing by itself: twice what it shows on the same case is allowed, and LIMIT_CYCLE beyond it.
         """
-        return self.swings | self._swings_in_motion(without_feedback)
+        return self.swings | self.swings_in_motion(without_feedback)
 
     def largest_swing(self, without_feedback: Measured) -> float:
         """Largest swing [rad], at rest or in motion as `swings_beside` has them; 0 where it never swings."""
         resting = np.nan_to_num(self.metrics["oscillation"]) * self.limit_cycles
-        moving = np.nan_to_num(self.metrics["sustained"]) * self._swings_in_motion(without_feedback)
+        moving = np.nan_to_num(self.metrics["sustained"]) * self.swings_in_motion(without_feedback)
         return float(np.maximum(resting, moving).max())
 
-    def _swings_in_motion(self, without_feedback: Measured) -> NDArray[np.bool_]:
+    def swings_in_motion(self, without_feedback: Measured) -> NDArray[np.bool_]:
+        """Whether it goes on swinging while its reference moves, by more than feedforward on the same case, (P, C)."""
         allowed = LIMIT_CYCLE + 2.0 * np.nan_to_num(without_feedback.metrics["sustained"])
         moving: NDArray[np.bool_] = (self.metrics["sustained"] > allowed) & ~self.rests
         return moving

@@ -14,6 +14,8 @@ from wristctl.config.choices import Choices
 from wristctl.config.plant import Disturbances
 from wristctl.config.section import Parameter
 
+# [m/s^2]
+_GRAVITY = 9.81
 # From the settings and times (T,) [s] to what is so then, (T,).
 Of = Callable[[Disturbances, Array], Array]
 
@@ -60,8 +62,14 @@ def _drift(settings: Disturbances, time: Array) -> Array:
     return 1.0 + (drift.scale - 1.0) * np.clip((time - drift.start) / drift.duration, 0.0, 1.0)
 
 
+def _grasp(settings: Disturbances, time: Array) -> Array:
+    grasp = settings.grasp
+    return grasp.mass * _GRAVITY * np.clip((time - grasp.start) / grasp.duration, 0.0, 1.0)
+
+
 LOAD = Disturbance(
     "a constant force", lambda settings: settings.load != 0.0, force=lambda s, time: np.full(len(time), s.load)
 )
 PUSH = Disturbance("a person's push", lambda settings: settings.push.force != 0.0, force=_push)
+GRASP = Disturbance("an object taken up", lambda settings: settings.grasp.mass != 0.0, force=_grasp)
 DRIFT = Disturbance("springs that change", lambda settings: settings.drift.scale != 1.0, scale=_drift)

@@ -1,6 +1,7 @@
 """Effects that ideal tendons and springs leave out, from a study's leaves: values, states, and spools that slip."""
 
 import math
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -10,6 +11,7 @@ from wristctl.config.plant import Actuator, TendonFacts, TrueActuator, TrueWrist
 from wristctl.lanes.compiled import by_type, compiled, implements
 from wristctl.lanes.functions import clip, maximum, minimum
 from wristctl.lanes.lane import where
+from wristctl.wrist.dahl import Inner, InnerFriction, NoInnerFriction, inner_state
 from wristctl.wrist.tendon_mechanics import (
     LOST,
     OF_A_TENDON,
@@ -74,6 +76,19 @@ def is_ideal(nonideal: Nonideal) -> bool:
 def wears(nonideal: Nonideal) -> bool:
     """Whether tendons may have reeled in something else than their spools."""
     return nonideal.backlash > 0.0 or any(map(math.isfinite, (nonideal.broken_at, nonideal.slips_at, nonideal.torque)))
+
+
+def inner_of(plants: Sequence[TrueWrist], q: Array, z: Array, blocks: Callable[[Array], Array]) -> Inner:
+    """Friction inside wrists (B,) at rest at coordinates q (B, n), their bristles bent by z (B,).
+
+    `blocks` makes blocks of lanes of rows (B, values). Where no wrist has any there is none.
+    """
+    if not any(plant.inner_friction for plant in plants):
+        return NoInnerFriction()
+    torque = np.array([[plant.inner_friction] for plant in plants])
+    slope = np.array([[q.shape[1] / math.radians(plant.inner_presliding_deg)] for plant in plants])
+    state = np.array([inner_state(angles, bent) for angles, bent in zip(q, z, strict=True)])
+    return InnerFriction(blocks(torque), blocks(slope), blocks(state))
 
 
 def _time(time: float | None) -> float:

@@ -16,12 +16,11 @@ from wristctl.arrays import Array
 from wristctl.config.loop import Reference
 from wristctl.config.section import Parameter
 from wristctl.errors import UserError, meant
-from wristctl.records.measured_table import ANGLE, LENGTH, TIME, Expected, MeasuredTable
+from wristctl.records.log_converters import read_log
+from wristctl.records.open_log import ANGLE, SYNONYMS, OpenLog
 from wristctl.simulation.reference import ReferenceKind
 from wristctl.wrist.kinematics import exact_arc
 
-# Names of the bending angle, the first of which that stands there is taken.
-ANGLES = ("angle", "bend", "theta")
 TIP = ("tip_x", "tip_y")
 _EXAMPLE = "time [s],angle [deg]"
 _FEWEST = 4
@@ -40,58 +39,66 @@ class Recording:
     of_tips: bool
 
 
-def read_recording(file: Path, column: str | None = None) -> Recording:
-    """The motion in a file: the column named, else an angle by one of its names, else tips.
+def read_recording(file: Path, column: str | None = None, names: str = "") -> Recording:
+    """The motion in an open log: the column that is named, else its bend, else tips. Empty cells are passed over.
 
-    Raises UserError for a file that is none, with line and column: gaps, times that repeat, jumps, units that are not
-    there or not known.
+    `names` are another author's columns as `wristctl.records.open_log` has them. Raises UserError for a file that is
+    none, with line and column: gaps, times that repeat, jumps, units that are not there or not known.
     """
-    if column is not None and column not in (*ANGLES, "tip"):
-        names: tuple[str, ...] = (column,)
+    more = {} if column is None or column in SYNONYMS or column == "tip" else {column: ANGLE}
+    log = read_log(file, names, "recording", others=True, more=more)
+    log.whole("time", _EXAMPLE)
+    chosen = _angle_in(log, column)
+    if chosen is None and not all(name in log.columns for name in TIP):
+        fix = f"a header such as {_EXAMPLE}, or time [s],tip_x [mm],tip_y [mm]"
+        raise UserError("neither an angle nor tips", str(file), fix)
+    if chosen is None:
+        tip = np.column_stack([log.columns[name] for name in TIP])
+        arc, unknown = np.stack(exact_arc(tip)), np.isnan(tip.sum(axis=1))
     else:
-        names = ANGLES if column is None else TIP if column == "tip" else (column,)
-    units = {"time": TIME} | {name: LENGTH if name in TIP else ANGLE for name in (*names, *TIP)}
-    table = Expected("recording", units, ("time",), _EXAMPLE, others=True).read(file)
-    chosen = next((name for name in names if name in table.columns), None)
-    if chosen is None or chosen in TIP:
-        if column not in (None, "tip"):
-            raise UserError(
-                f"no column {column}", str(file), f"reference.column: {meant(str(column), _columns(table))}"
-            )
-        if not all(name in table.columns for name in TIP):
-            fix = f"a header such as {_EXAMPLE}, or time [s],tip_x [mm],tip_y [mm]"
-            raise UserError("neither an angle nor tips", str(file), fix)
-        arc = np.stack(exact_arc(np.column_stack([table.columns[name] for name in TIP])))
-    else:
-        angle = table.columns[chosen]
-        arc = np.stack([angle, 0.0 * angle])
-    time = table.columns["time"]
-    _check(table, time, arc[0])
-    return Recording(time - time[0], arc, chosen is None or chosen in TIP)
+        arc, unknown = np.stack([chosen, 0.0 * chosen]), np.isnan(chosen)
+    if unknown.any():
+        log, arc = log.only(~unknown), arc[:, ~unknown]
+    time = log.columns["time"]
+    _check(log, time, arc[0])
+    return Recording(time - time[0], arc, chosen is None)
 
 
-def _columns(table: MeasuredTable) -> list[str]:
-    return [name for name in table.columns if name != "time"]
+def _angle_in(log: OpenLog, column: str | None) -> Array | None:
+    """The angle of a column, or of the first plane's bend where none is named; None where tips are meant."""
+    if column == "tip":
+        return None
+    if column is None:
+        bends = log.bends()
+        return None if bends is None else bends[:, 0]
+    name = next((name for name in (column, SYNONYMS.get(column, "")) if name in log.columns), None)
+    if name is None or log.head(name) != column != name:
+        raise UserError(f"no column {column}", str(log.file), f"reference.column: {meant(column, _columns(log))}")
+    return log.columns[name]
 
 
-def _check(table: MeasuredTable, time: Array, angle: Array) -> None:
+def _columns(log: OpenLog) -> list[str]:
+    return [log.head(name) for name in log.columns if name != "time"]
+
+
+def _check(log: OpenLog, time: Array, angle: Array) -> None:
     if len(time) < _FEWEST:
-        raise UserError(f"{len(time)} samples, too few for a motion", str(table.file), f"at least {_FEWEST}")
+        raise UserError(f"{len(time)} samples, too few for a motion", str(log.file), f"at least {_FEWEST}")
     steps = np.diff(time)
     if (bad := np.flatnonzero(steps <= 0.0)).size:
         problem = "time repeats" if steps[bad[0]] == 0.0 else "time goes back"
-        raise UserError(problem, table.at(bad[0] + 1), "one motion a file, its samples in the order of their times")
+        raise UserError(problem, log.at(int(bad[0]) + 1), "one motion a file, its samples in the order of their times")
     usual = float(np.median(steps))
     if (bad := np.flatnonzero(steps > _GAP * usual)).size:
         problem = f"a gap of {steps[bad[0]]:.3g} s, where samples are {usual:.3g} s apart"
-        raise UserError(problem, table.at(bad[0] + 1), "fill it in, or cut the recording there")
+        raise UserError(problem, log.at(int(bad[0]) + 1), "fill it in, or cut the recording there")
     if not np.isfinite(angle).all():
-        raise UserError("a tip at the base", table.at(int(np.argmin(np.isfinite(angle)))), "tips in front of the base")
+        raise UserError("a tip at the base", log.at(int(np.argmin(np.isfinite(angle)))), "tips in front of the base")
     jumps = np.abs(np.diff(angle))
     if (bad := np.flatnonzero(jumps > _JUMP)).size:
         problem = f"the angle jumps by {np.rad2deg(jumps[bad[0]]):.3g} deg from a sample to the next"
         fix = "mend that sample, record more often, or put the right unit into the header"
-        raise UserError(problem, table.at(bad[0] + 1), fix)
+        raise UserError(problem, log.at(int(bad[0]) + 1), fix)
 
 
 def recording_of(reference: Reference) -> Recording:
@@ -100,12 +107,12 @@ def recording_of(reference: Reference) -> Recording:
         raise UserError("a recording needs its file", "reference.file", "reference.file: walk.csv")
     file = Path(reference.file)
     stamp = file.stat() if file.is_file() else None
-    return _read(file, reference.column, stamp and (stamp.st_mtime_ns, stamp.st_size))
+    return _read(file, reference.column, reference.columns or "", stamp and (stamp.st_mtime_ns, stamp.st_size))
 
 
 @lru_cache(maxsize=16)
-def _read(file: Path, column: str | None, stamp: object) -> Recording:
-    return read_recording(file, column)
+def _read(file: Path, column: str | None, names: str, stamp: object) -> Recording:
+    return read_recording(file, column, names)
 
 
 def _course(reference: Reference, time: Array) -> Array:

@@ -22,8 +22,9 @@ from wristctl.lanes.blocks import lanes_of, to_blocks, to_rows
 from wristctl.lanes.lane import where, zero_like
 from wristctl.lanes.rows import part, rows_of
 from wristctl.processes import cores, stoppable
-from wristctl.simulation.nonideal import nonideal_of, of_tendons, unmoved
+from wristctl.simulation.nonideal import inner_of, nonideal_of, of_tendons, unmoved
 from wristctl.wrist.compiled_model import terms
+from wristctl.wrist.dahl import inner_in_lanes, one_block
 from wristctl.wrist.pcc import PCC
 from wristctl.wrist.plant import advance_or_stop, kernel_of, parameters_of, tip_angle
 from wristctl.wrist.segments import segments
@@ -48,6 +49,10 @@ class SpooledWrist(NamedTuple):
     winch: bool = False
     z: tuple[float, float] = (0.0, 0.0)
     """State of both sides' bristles at first."""
+    plant: TrueWrist = TrueWrist()
+    """What else the wrist has: creep, end stops, friction inside it."""
+    inner_z: float = 0.0
+    """State of that friction's bristles at first."""
 
 
 class Spooled(NamedTuple):
@@ -89,6 +94,7 @@ class _Lanes(NamedTuple):
     memory: Any
     ends: Any
     """Works so far, and of the last step's end what both sides have reeled in, pull at the spool and at the wrist."""
+    inner: Any
 
 
 _ENDS = 9
@@ -97,7 +103,7 @@ _ENDS = 9
 def _move(model: Any, lanes: Any, driven: Any, timing: Any, out: Any, cut: Any) -> None:
     segment, values = parameters_of(model, rows_of(lanes.wrist)), rows_of(lanes.tendons)
     zero = zero_like(values[_STIFFNESS])
-    tendons = RealTendons(values[_STIFFNESS], read_nonideal(values), rows_of(lanes.memory))
+    tendons = RealTendons(values[_STIFFNESS], read_nonideal(values), rows_of(lanes.memory), inner_in_lanes(lanes.inner))
     winch, memory, ends, n = values[_STIFFNESS + 1], rows_of(lanes.memory), rows_of(lanes.ends), len(cut)
     q, rate = part(rows_of(lanes.state), 0, cut), part(rows_of(lanes.state), n, cut)
     alive = 1.0 + zero
@@ -153,7 +159,8 @@ def spooled(wrists: Sequence[SpooledWrist], inputs: Told, steps: int, h: float, 
     stop = Event()
 
     def run(block: int) -> None:
-        block_lanes = _Lanes(*(values[block] for values in blocks))
+        parts = {name: rows[block] for name, rows in blocks._asdict().items() if name != "inner"}
+        block_lanes = _Lanes(**parts, inner=one_block(blocks.inner, block))
         for first in range(0, steps, _CHUNK):
             if stop.is_set():
                 return
@@ -171,13 +178,13 @@ def spooled(wrists: Sequence[SpooledWrist], inputs: Told, steps: int, h: float, 
 def _lanes(wrists: Sequence[SpooledWrist], h: float) -> _Lanes:
     rows = []
     for driven in wrists:
-        nonideal = nonideal_of(TrueWrist(), driven.actuator, TendonFacts(), h)
+        nonideal = nonideal_of(driven.plant, driven.actuator, TendonFacts(), h)
         stiffness = _WINCH if driven.winch else TENDONS_PER_SIDE * driven.actuator.tendon_stiffness
         path = np.array([*(driven.wrist.length - PCC.taut(driven.wrist, driven.begin)), np.abs(driven.begin).sum()])
         memory = unmoved(np.zeros(2), path, np.zeros(2), driven.begin)
         of_tendons(memory, 2)[:, 0] = driven.z
         rows.append(
-            _Lanes(
+            (
                 PCC.values(driven.wrist, len(driven.begin)),
                 np.array([*nonideal, stiffness, float(driven.winch)], float),
                 np.concatenate([driven.begin, 0.0 * driven.begin]),
@@ -185,7 +192,10 @@ def _lanes(wrists: Sequence[SpooledWrist], h: float) -> _Lanes:
                 np.zeros(_ENDS),
             )
         )
-    return _Lanes(*(to_blocks(np.array(column)) for column in zip(*rows, strict=True)))
+    begin, bent = np.array([driven.begin for driven in wrists]), np.array([driven.inner_z for driven in wrists])
+    inner = inner_of([driven.plant for driven in wrists], begin, bent, to_blocks)
+    of_wrist, of_tendons_, state, memories, ends = (to_blocks(np.array(column)) for column in zip(*rows, strict=True))
+    return _Lanes(of_wrist, of_tendons_, state, memories, ends, inner)
 
 
 # Step between two angles at which the statics are solved [rad]; chords between them are 1e-10 m off.

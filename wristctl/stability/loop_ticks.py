@@ -23,6 +23,7 @@ from wristctl.simulation.observer import Schedule, Watch
 from wristctl.simulation.sums import SUMS
 from wristctl.simulation.worlds import World
 from wristctl.stability.smooth_loop import cycle_of
+from wristctl.wrist.dahl import InnerFriction
 from wristctl.wrist.plant import kernel_of
 from wristctl.wrist.tendon_mechanics import OF_A_TENDON, PATH, PulledTendons, RealTendons
 
@@ -68,6 +69,9 @@ def state_parts(batch: Batch, memory: int, tick: int, back: Remembered) -> Itera
     if isinstance(state.tendons, (PulledTendons, RealTendons)):
         rows = state.tendons.state
         yield StatePart("spring creep", rows, np.arange(rows.shape[1] - k, rows.shape[1]), np.full(k, _ANGLE))
+        if isinstance(state.tendons.inner, InnerFriction):
+            sizes = np.concatenate([np.ones(k), np.full(k, _ANGLE)])
+            yield StatePart("inner friction", state.tendons.inner.state, np.arange(2 * k), sizes)
     if isinstance(state.watch, Watch):
         observer, taken = state.watch.observer, int(state.watch.turn[0, 0, 0])
         sizes = np.array([_ANGLE, _RATE, _ANGLE])

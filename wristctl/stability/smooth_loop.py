@@ -34,6 +34,7 @@ def smooth(loop: Loop, friction: FrictionReading) -> Loop:
         "actuator": loop.plant.actuator.model_copy(update=facts | events),
         "sensor": sensor,
         "end_stop_deg": None,
+        "inner_friction": 0.0 if friction == "slipping" else loop.plant.inner_friction,
         "stiffness_spread": 0.0,
         "damping_spread": 0.0,
         "payload_spread": 0.0,

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from types import NoneType, UnionType
-from typing import Any, Literal, get_args, get_origin
+from typing import Any, Literal, Union, get_args, get_origin
 
 from pydantic.fields import FieldInfo
 
@@ -28,7 +28,8 @@ def field_at(path: KeyPath) -> tuple[Any, FieldInfo | None]:
             field = fields.get(str(key))
             kind = _given(field.annotation) if field else None
         else:
-            items = [item for item in get_args(kind) if item is not ...]
+            whole = get_args(kind)[-1] if get_origin(kind) in (Union, UnionType) else kind  # a name, or a list
+            items = [item for item in get_args(whole) if item is not ...]
             kind = items[-1] if items else None
     return kind, field
 

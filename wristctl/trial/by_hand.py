@@ -6,6 +6,7 @@ from wristctl.board.board_errors import BoardError, Refused
 from wristctl.board.driver import Board
 from wristctl.board.messages import AXES, JOG_RATE, Result, Target
 from wristctl.config.hw_run import RigSettings
+from wristctl.errors import UserError
 from wristctl.trial.motors_ready import prepare
 from wristctl.trial.spools import spools_of
 from wristctl.trial.supervised_wait import Patience
@@ -23,12 +24,31 @@ class ByHand:
     def __init__(self, board: Board, settings: RigSettings, signs: Sequence[int] = (1,) * AXES) -> None:
         self._board, self._signs, self._step = board, signs, spools_of(settings.actuator).step
         self._furthest = round(settings.safety.travel / self._step)
-        prepare(board, settings)
+        self._stiffness, self._tension = settings.actuator.tendon_stiffness, settings.safety.tension
+        prepare(board, settings, self.reach)
+        self._origin = board.read().position
+
+    @property
+    def reach(self) -> float:
+        """Tendon [m] that may be reeled in before homing: one that was taut then pulls `safety.tension`."""
+        return self._tension / self._stiffness
 
     def jog(self, lengths: Sequence[float]) -> tuple[int, ...]:
-        """Creep on by `lengths`, without soft limits; the steps made, once the axes stand."""
+        """Creep on by `lengths`; the steps made, once the axes stand. No more than `reach` in all.
+
+        Raises UserError where that would be more.
+        """
         steps = [sign * round(length / self._step) for sign, length in zip(self._signs, lengths, strict=True)]
-        self._board.jog([position + way for position, way in zip(self._board.read().position, steps, strict=True)])
+        goal = [position + way for position, way in zip(self._board.read().position, steps, strict=True)]
+        for axis, (position, origin) in enumerate(zip(goal, self._origin, strict=True)):
+            if (way := abs(position - origin)) > round(self.reach / self._step):
+                length = way * self._step
+                problem = (
+                    f"axis {axis} would be {1e3 * length:.1f} mm from where the drives were switched on: a tendon that "
+                    f"was taut there would pull {length * self._stiffness:.0f} N, beyond {self._tension:g} N"
+                )
+                raise UserError(problem, fix="release the drives, so that a taut tendon lets go, and jog again")
+        self._board.jog(goal)
         return tuple(steps)
 
     def patience(self) -> Patience:

@@ -20,14 +20,13 @@ from wristctl.control.response import Estimate
 from wristctl.errors import UserError
 from wristctl.simulation.motion import Motion
 from wristctl.trial.log import TrialLog, of_axes
-from wristctl.trial.safety import Monitor, SafetyStop, Seen
+from wristctl.trial.safety import SafetyStop
 from wristctl.trial.spools import Paths, spools_of
 from wristctl.trial.steering import Answer, HostFaults, Steering
 from wristctl.trial.supervised_wait import InSight, Patience
 from wristctl.trial.tick_timing import TickTiming
 from wristctl.trial.tracking import Tracking
-from wristctl.trial.tracking_monitor import Following
-from wristctl.trial.warnings_report import Oddities
+from wristctl.trial.watch import Tick, Watch
 
 # Takes each tick's row of the log, to show it.
 Shown = Callable[[dict[str, Any]], None]
@@ -61,15 +60,13 @@ class ControlLoop:
 
     def __init__(
         self, board: Board, tracking: Tracking, settings: HwRunSettings, wrist: WristParameters, plane: str,
-        signs: Sequence[int], timing: TickTiming, log: TrialLog, shown: Shown | None = None,
+        signs: Sequence[int], timing: TickTiming, log: TrialLog, shown: Shown | None = None, oblique: float = 0.0,
     ) -> None:  # fmt: skip
         self._board, self._tracking, self._log, self._timing, self._shown = board, tracking, log, timing, shown
         self._clock, self._period, self._signs = board.transport, timing.period, np.array(signs)
-        self._life, self._limits = settings.rate_life, settings.safety
+        self._life, self._stale = settings.rate_life, settings.safety.stale
         self._spools, self._paths = spools_of(settings.actuator), Paths(wrist, plane)
-        self._monitor = Monitor(settings.safety, self._spools)
-        self._following = Following(settings, wrist, plane, timing.period)
-        self._settings, self.oddities = settings, Oddities(settings)
+        self.watch = Watch(settings, wrist, plane, timing, oblique)
         self._steering = Steering(wrist, settings.actuator, settings.sensor, timing.period, 0.0)
         self._status, self._sent = board.read(), np.zeros(AXES)
         self._epoch = self._last_usable = self._clock.now()
@@ -83,28 +80,26 @@ class ControlLoop:
 
     def follow(
         self, motion: Motion, controller: Controller, gains: Sequence[float], trial: int = -1,
-        faults: HostFaults | None = None,
+        faults: HostFaults | None = None, pushed: bool = False,
     ) -> None:  # fmt: skip
         """Follow a motion sampled at the period; its ticks are logged under the number of the trial.
 
+        `pushed` says that a person pushes in it.
         At its end the motors stand, and the board has said so: that takes some ticks more, which belong to no trial.
         Raises SafetyStop, BoardError, CameraError, and OSError where the log cannot be written.
         """
         self._steering.use(controller, gains)
-        self.oddities = Oddities(self._settings)
-        resent, skipped = self._board.traffic.resent, self._timing.overruns
+        self.watch.begin(pushed)
         course = np.stack([motion.theta_ref, motion.rate_ref, motion.acceleration_ref], axis=1)
         task = Task(motion, course, trial, self.next_tick, faults or HostFaults(()))
         first = self._steering.tick
         while (k := self._steering.tick - first) < len(motion.time):
             self._tick(task, k)
-        self.oddities.resent = self._board.traffic.resent - resent
-        self.oddities.skipped = self._timing.overruns - skipped
         self._come_to_rest(task._replace(trial=-1))
 
     def patience(self) -> Patience:
         """For waiting between two motions, the wrist in sight."""
-        sight = InSight(self._tracking, self._monitor, self._paths, self._clock.now, self._signs)
+        sight = InSight(self._tracking, self.watch, self._stale, self._paths, self._clock.now, self._signs)
         return Patience(self._board, sight)
 
     def _come_to_rest(self, task: Task) -> None:
@@ -122,8 +117,7 @@ class ControlLoop:
         clock, due, steering, motion = self._clock.now(), self.next_tick, self._steering, task.motion
         marker = self._look(task)
         estimate, position = steering.estimate, self._reeled()
-        self._watch(estimate, position, clock, clock - due)
-        self._following.see(clock, estimate.load, position)
+        self._judge(task.trial, estimate, position, clock, clock - due)
         if k is None:
             reference, answer = (float(motion.theta_ref[-1]), 0.0, 0.0), _NO_ANSWER
             tension, target = np.full(AXES, math.nan), position
@@ -149,6 +143,7 @@ class ControlLoop:
             "state": self._status.state.name,
             "faults": "+".join(fault.name or "" for fault in Fault if fault in self._status.faults),
             "counted": self._counted - task.begin,
+            "board": self._status.time,
             "late": clock - due,
             "woken": woken,
             "round_trip": self._board.round_trip,
@@ -158,38 +153,35 @@ class ControlLoop:
         self._log.tick(row)
         if self._shown is not None:
             self._shown(row)
-        self.oddities.tick(row, clock - self._last_usable, self._following.greatest)
         took = self._clock.now() - clock
         self._go_on()
-        self._timing.tick(clock - due, woken, self._board.round_trip, took, self._skipped)
-        self._timing.judge(self._limits)
+        culprit = self._timing.tick(clock - due, woken, self._board.round_trip, took, self._skipped)
+        self.watch.ticked(clock, self._board.round_trip, self._skipped, culprit)
 
     def _look(self, task: Task) -> dict[str, Any]:
         """Fuse what was seen since the last tick; for the log the newest verdict and the newest angle used."""
         marker: dict[str, Any] = {"theta_measured": math.nan, "captured": math.nan, "verdict": ""}
         for sighting in self._tracking.look():
             marker["verdict"] = str(sighting.verdict)
-            self.oddities.base(sighting.corners[0])
+            now, frame = self._clock.now(), None
+            self.watch.sighted(sighting, now)
             self._timing.camera.add(sighting)
-            if math.isfinite(sighting.theta) and self._steering.see(sighting.theta, sighting.time - self._epoch):
+            captured = sighting.time - self._epoch
+            if math.isfinite(sighting.theta) and self._steering.see(sighting.theta, captured):
                 self._last_usable = sighting.time
-                self.oddities.lag.add(sighting.theta, *self._following.saw(sighting, sighting.time - self._epoch))
+                frame = self.watch.saw(sighting, captured, now)
                 marker |= {"theta_measured": sighting.theta, "captured": sighting.time - task.begin}
             if task.trial >= 0:
-                used = self._clock.now() - task.begin
-                captured = sighting.time - task.begin
-                tip = sighting.tip_x, sighting.tip_y
-                self._log.frame(task.trial, sighting.number, captured, used, sighting.theta, sighting.verdict, *tip)
+                self._log.frame(task.trial, now - task.begin, task.begin, sighting, frame)
         return marker
 
-    def _watch(self, estimate: Estimate, position: Array, clock: float, late: float) -> None:
-        """Raises SafetyStop where the limits are exceeded."""
-        age, delay = clock - self._last_usable, late + self._skipped * self._period
+    def _judge(self, trial: int, estimate: Estimate, position: Array, clock: float, late: float) -> None:
+        """Raises SafetyStop where a residual is beyond its limit; all are logged before."""
         taut, _ = self._paths.taut(estimate.theta)
-        status, stale = self._status, self._monitor.stale
-        why, fix = self._timing.camera.missing(clock, stale) if age > stale else ("", "")
-        measured = Seen(estimate, age, why, position, taut, status.state, delay, status.lapses, clock, fix)
-        self._monitor.see(measured)
+        delay, resent = late + self._skipped * self._period, self._board.traffic.resent
+        tick = Tick(clock, delay, estimate, position, taut, self._status.state, self._status.lapses, resent)
+        self._log.residuals(trial, clock, self.watch.see(tick, self._last_usable))
+        self.watch.judge(tick)
 
     def _answer(self, task: Task, k: int, time: float) -> Answer:
         try:
@@ -199,7 +191,8 @@ class ControlLoop:
         except Exception as error:
             problem = f"the controller failed: {type(error).__name__}: {error}"
             raise SafetyStop(problem, fix="run again with --debug for the traceback") from error
-        self._monitor.answer(answer)
+        if not all(map(math.isfinite, answer)):
+            raise SafetyStop("the law's torque is not a number", fix="see its gains and model")
         return answer
 
     def _turn(self, tension: Array, position: Array, theta_ref: float, rate_ref: float) -> Array:
@@ -226,8 +219,7 @@ class ControlLoop:
         self._skipped = max(0, int((self._clock.now() - self.next_tick - self._period) / self._period))
         for _ in range(1 + self._skipped):
             self._steering.predict(plus, minus)
-            self._following.predict(plus, minus)
-        self.oddities.round_trips.append(self._board.round_trip)
+            self.watch.predict(plus, minus)
 
     def _reeled(self) -> Array:
         """Steps that the spools have reeled in, by the last status."""

@@ -26,8 +26,9 @@ from wristctl.trial.supervised_wait import Patience
 from wristctl.trial.testbeds import Testbed
 from wristctl.trial.tick_timing import TickTiming
 from wristctl.trial.tracking import Tracking
-from wristctl.trial.tracking_monitor import Following, Greatest
 from wristctl.trial.trials import Trial, at_rest, back, motion_of
+from wristctl.trial.watch import Watch
+from wristctl.vision.camera_pose import CameraPose
 from wristctl.wrist.directions import in_plane
 from wristctl.wrist.kinematics import Inverse
 
@@ -62,8 +63,9 @@ class Stop:
 
 
 class Experiment:
-    """Trials; `outcomes` holds how each trial that began has ended, `odd` what was odd in it, `greatest`
-    what came nearest to the limits in any, `stop` why they ended early.
+    """Trials; `outcomes` holds how each trial that began has ended, `odd` what was odd in it, `most`
+    the largest of each residual in any, `poses` the camera's by plane (None: calibrated), `stop` why they ended
+    early.
 
     Raises UserError for what is wrong with controllers, gains or motions.
     """
@@ -83,7 +85,8 @@ class Experiment:
         self.outcomes: dict[int, str] = {}
         self.stop: Stop | None = None
         self.zero: Zero | None = None
-        self.greatest, self.odd = Greatest(), dict[int, str]()
+        self.most, self.odd = dict[str, float](), dict[int, str]()
+        self.poses: dict[str, CameraPose | None] = {}
         self._under_way: tuple[int, float] | None = None  # number and start of the trial that goes on
 
     def run(self, testbed: Testbed, shown: Shown | None = None) -> None:
@@ -118,7 +121,7 @@ class Experiment:
         taut, _ = Paths(self._wrist, plane).taut(0.0)
         spools.target(still, taut)
         spools.rate(still, still, still, settings.control_period)
-        Following(settings, self._wrist, plane, settings.control_period).predict(float(taut[0]), float(taut[0]))
+        Watch(settings, self._wrist, plane, self.timing).predict(float(taut[0]), float(taut[0]))
         for law, gains in [*self._laws, (self._back, ())]:
             steering.use(law, gains)
             steering.respond(np.zeros((1, 3)))
@@ -141,6 +144,7 @@ class Experiment:
         if self.zero is not None:
             self._let_go(board, self.zero)
         watching = Patience(board)
+        self.poses[plane] = watching.stand_square(tracking, settings.homing)
         marker = watching.angle(tracking, 4 * settings.homing.frames)
         watching.pace.fits(settings.safety.stale)
         if self.zero is None:  # the marker is seen, and nothing moves yet
@@ -151,9 +155,10 @@ class Experiment:
         else:
             check_zero(board, tracking, settings, self._wrist, plane, self.zero)
         tracking.zero = marker
+        pose = self.poses[plane]
         loop = ControlLoop(
             board, tracking, settings, in_plane(self._wrist, plane), plane, self.zero.signs, self.timing, self._log,
-            shown,
+            shown, 0.0 if pose is None else pose.oblique,
         )  # fmt: skip
         loop.follow(at_rest(settings.rest, settings.control_period), self._back, ())
         return loop
@@ -182,10 +187,10 @@ class Experiment:
         testbed.begin(start, disturbances, self._draws.camera(trial.scenario, trial.repetition))
         faults = HostFaults(settings.bench.faults) if testbed.emulated else None
         try:
-            loop.follow(followed, law, gains, trial.number, faults)
+            loop.follow(followed, law, gains, trial.number, faults, pushed=trial.push != 0.0)
         finally:
-            self.greatest = Greatest(*map(max, self.greatest, loop.oddities.greatest))
-            self.odd[trial.number] = loop.oddities.words()
+            self.most = {name: max(value, self.most.get(name, 0.0)) for name, value in loop.watch.most.items()}
+            self.odd[trial.number] = loop.watch.words()
         self._trial_ended(testbed, "ok")
         loop.follow(back(followed.final, settings.back, settings.rest, settings.control_period), self._back, ())
 

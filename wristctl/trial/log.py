@@ -14,6 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wristctl.records.run_writer import RESERVE
+from wristctl.trial.residuals import columns
+from wristctl.trial.watch import Frame
+from wristctl.vision.marker import Sighting
 from wristctl.wrist.directions import ACTIVE
 
 # Name -> unit and meaning.
@@ -46,6 +49,7 @@ LOG: Columns = {
     **_of_tendons("target", "steps", "wanted spool position, 0 where straight and just taut, positive reeled in"),
     **_of_tendons("position", "steps", "spool position by the board's status"),
     "counted": ("s", "when the board had those positions, on the trial's time"),
+    "board": ("s", "the board's own clock then"),
     **_of_tendons("sent", "1/s", "step rate really sent"),
     "state": ("", "of the board"),
     "faults": ("", "of the board"),
@@ -67,6 +71,23 @@ FRAMES: Columns = {
     "verdict": ("", "whether it can be used, and if not why"),
     "tip_x": ("m", "tip from the first disc along the straight wrist, by the same frame; empty where unusable"),
     "tip_y": ("m", "tip across, toward theta > 0"),
+    "size": ("", "tip's marker over the base's, by the edges that a bend across does not foreshorten"),
+    "predicted": (
+        "rad",
+        "angle that the spools should have made by then, with tendons as believed; empty where unused",
+    ),
+    "predicted_soft": ("rad", "the same with tendons of safety.softest"),
+    **{
+        f"{marker}_{axis}{corner}": ("px", f"corner {corner} of the {marker}'s marker, {meaning}; empty where not seen")
+        for marker in ("base", "tip")
+        for corner in range(4)
+        for axis, meaning in (("x", "rightward"), ("y", "downward"))
+    },
+}
+RESIDUALS: Columns = {
+    "trial": ("", "number, from 0; -1 between trials"),
+    "clock": ("s", "the run's one clock"),
+    **columns(),
 }
 
 _RESERVED = 4 << 20
@@ -151,13 +172,13 @@ class Stream:
 
 
 class TrialLog:
-    """log.csv and frames.csv of trials; between.csv for the moves between them; wire.csv with all bytes of the whole
-    run; truth.csv of an emulated bench. The clock is `monotonic`, or virtual.
+    """log.csv and frames.csv of trials; between.csv for the moves between them; residuals.csv of both; wire.csv with
+    all bytes of the whole run; truth.csv of an emulated bench. The clock is `monotonic`, or virtual.
     """
 
     def __init__(self, folder: Path, segments: int | None, period: float, monotonic: bool = False) -> None:
         self.disk, self._monotonic = Disk(folder), monotonic
-        tables = {"log": LOG, "between": LOG, "frames": FRAMES, "wire": WIRE}
+        tables = {"log": LOG, "between": LOG, "frames": FRAMES, "residuals": RESIDUALS, "wire": WIRE}
         if segments is not None:
             tables["truth"] = truth_columns(segments)
         try:
@@ -174,12 +195,20 @@ class TrialLog:
         self.last.append(dict(row))
         values = {**row, "utc": row["clock"] + time.time() - time.monotonic() if self._monotonic else math.nan}
         self.streams["between" if row["trial"] < 0 else "log"].row(values[name] for name in LOG)
+        self.streams["residuals"].flush()
         self.streams["wire"].flush()
         self._write_truth(_AT_ONCE)
 
-    def frame(self, *values: Any) -> None:
-        """One frame of a trial."""
-        self.streams["frames"].row(values)
+    def frame(self, trial: int, used: float, begin: float, sighting: Sighting, frame: Frame | None) -> None:
+        """One frame of a trial that began at `begin`, there at `used` on its time; `frame` where its angle counts."""
+        predicted = (math.nan, math.nan) if frame is None else frame.predicted.tolist()
+        seen = sighting.theta, sighting.verdict, sighting.tip_x, sighting.tip_y, sighting.size
+        place = trial, sighting.number, sighting.time - begin, used
+        self.streams["frames"].row((*place, *seen, *predicted, *sighting.corners.ravel().tolist()))
+
+    def residuals(self, trial: int, clock: float, values: Mapping[str, float]) -> None:
+        """Residuals of a tick, written with its row: also of the tick that they end, which has none."""
+        self.streams["residuals"].wait((trial, clock, *values.values()))
 
     def wire(self, clock: float, way: str, data: bytes) -> None:
         """Bytes on the wire, written at the next tick: whoever stops the motors must not hear of a full disk."""

@@ -76,7 +76,7 @@ def in_sight(testbed: Testbed, settings: CalibrateWristSettings) -> Iterator[tup
             patience = Patience(board)
             testbed.face(settings.plane, patience.pulse)
             tracking = testbed.tracking()
-            patience.angle(tracking, settings.homing.frames)  # the marker is seen, and nothing moves yet
+            patience.stand_square(tracking, settings.homing)  # the markers are seen, and nothing moves yet
             testbed.confirm(patience.pulse)
             yield board, hello, tracking
         except BaseException:
@@ -88,12 +88,18 @@ def in_sight(testbed: Testbed, settings: CalibrateWristSettings) -> Iterator[tup
         testbed.close()
 
 
-def prepare(board: Board, settings: RigSettings) -> None:
-    """Set ramps, watchdog and soft limits of a board, clear an old fault, and switch the drives on."""
+def prepare(board: Board, settings: RigSettings, reach: float | None = None) -> None:
+    """Set ramps, watchdog and soft limits of a board, clear an old fault, and switch the drives on.
+
+    Until the axes are homed none may creep further than `reach` [m] of tendon from where they are switched on; None:
+    as far as homing goes.
+    """
     limits, spools = settings.safety, spools_of(settings.actuator)
     if board.read().state == State.FAULT:
         board.clear()
     furthest = round(limits.travel / spools.step)
     ramps = Configure(limits.watchdog, int(limits.hold), round(spools.acceleration))
-    board.set_up(ramps, Limits((-furthest,) * 4, (furthest,) * 4))
+    homing = settings.homing
+    jog = round((homing.slack + homing.pull + 3.0 * homing.move if reach is None else reach) / spools.step)
+    board.set_up(ramps, Limits((-furthest,) * 4, (furthest,) * 4, jog))
     board.enable()

@@ -13,11 +13,13 @@ from wristctl.board.messages import LAYOUTS, Command, Rate
 from wristctl.config.hw_run import HwRunSettings
 from wristctl.trial.camera_pace import FIX, CameraPace
 from wristctl.trial.rig_strokes import Latency, RigStrokes, find_latency
+from wristctl.trial.supervised_wait import OBLIQUE_FIX
 from wristctl.trial.testbeds import Testbed
 from wristctl.trial.tick_timing import FIX as TIMING_FIX
 from wristctl.trial.tick_timing import SCHEDULING
 from wristctl.trial.tracking import Tracking
 from wristctl.vision.camera import CameraError, Frame
+from wristctl.vision.camera_pose import CameraPose
 from wristctl.vision.detector import PictureQuality, quality_of
 from wristctl.vision.marker import Sighting, SightingVerdict
 
@@ -30,6 +32,8 @@ _SLOW_CAMERA, _UNEVEN, _UNSTAMPED, _WOKEN = 0.9, 0.3, 5e-3, 0.2
 _SURE = 0.7e-3
 # Limits of a marker: side and blur [px], grey of its rim that is too bright, and too little above its border's.
 _SMALL, _BLURRED, _BRIGHT, _FAINT = 40.0, 1.8, 250.0, 60.0
+# Limits of its pose: degrees off square, and corners off two squares of one plane, in sides.
+_OBLIQUE_DEG, _MISFIT = 5.0, 0.006
 
 
 class RigFacts(NamedTuple):
@@ -47,6 +51,8 @@ class RigFacts(NamedTuple):
     """Delays with which the computer woke."""
     latency: Latency | None
     """None where nothing was to move."""
+    pose: CameraPose | None = None
+    """None for a calibrated camera, or one that sees no markers."""
 
 
 class Trouble(NamedTuple):
@@ -80,7 +86,9 @@ def measure(
     """
     trips, timer = round_trips(board, Command.STATUS, _TRIPS), latency_timer(testbed.transport.name)
     tracking = testbed.tracking()
-    pace, angles = _watched(tracking, testbed)
+    pace, sightings = _watched(tracking, testbed)
+    angles = [sighting.theta for sighting in sightings if math.isfinite(sighting.theta)]
+    pose = tracking.stand_square(sightings)
     woken = _woken(testbed, settings.control_period)
     usable = pace.verdicts[SightingVerdict.OK] > 0
     latency = None
@@ -93,19 +101,19 @@ def measure(
         strokes.let_go()
     quality = PictureQuality(*np.median(pictures.qualities, axis=0)) if pictures.qualities else None
     noise = float(np.std(angles)) if len(angles) > 2 else math.nan
-    return RigFacts(trips, timer, pace, quality, noise, woken, latency)
+    return RigFacts(trips, timer, pace, quality, noise, woken, latency, pose)
 
 
-def _watched(tracking: Tracking, testbed: Testbed) -> tuple[CameraPace, list[float]]:
-    clock, pace, angles = testbed.transport, CameraPace(), []
+def _watched(tracking: Tracking, testbed: Testbed) -> tuple[CameraPace, list[Sighting]]:
+    clock, pace, sightings = testbed.transport, CameraPace(), []
     tracking.look()
     end = clock.now() + _WATCHED
     while clock.now() < end:
         for sighting in tracking.look():
             pace.add(sighting)
-            angles += [sighting.theta] if math.isfinite(sighting.theta) else []
+            sightings.append(sighting)
         clock.wait(2e-3)
-    return pace, angles
+    return pace, sightings
 
 
 def _woken(testbed: Testbed, period: float) -> Array:
@@ -121,6 +129,7 @@ def _woken(testbed: Testbed, period: float) -> Array:
 def troubles(facts: RigFacts, settings: HwRunSettings, port: str) -> list[Trouble]:
     """Troubles of a rig for these settings, the grave first."""
     met = [*_of_the_link(facts, settings, port), *_of_the_camera(facts, settings), *_of_the_pictures(facts)]
+    met += _of_the_pose(facts, settings)
     late = float(np.quantile(facts.woken, 0.99))
     if late > _WOKEN * settings.control_period:
         problem = f"one time in a hundred this computer wakes a tick {1e3 * late:.1f} ms late"
@@ -182,3 +191,17 @@ def _of_the_pictures(facts: RigFacts) -> list[Trouble]:
         (quality.white - quality.black < _FAINT, "its print is faint", "more light, or a longer device.exposure"),
     ]
     return [Trouble(False, problem, fix) for is_bad, problem, fix in checks if is_bad]
+
+
+def _of_the_pose(facts: RigFacts, settings: HwRunSettings) -> list[Trouble]:
+    pose, most = facts.pose, settings.homing.oblique_deg
+    if pose is None:
+        return []
+    oblique = math.degrees(pose.oblique)
+    problem = f"the camera looks {oblique:.0f} deg off square at the bending plane"
+    checks = [
+        (oblique > _OBLIQUE_DEG, oblique > most, problem, OBLIQUE_FIX),
+        (pose.misfit > _MISFIT, False, f"the markers are no squares of one plane (by {100.0 * pose.misfit:.1f} %)",
+         "glue both flat on stiff flags in one plane, as far from the camera, of one print"),
+    ]  # fmt: skip
+    return [Trouble(grave, what, fix) for is_bad, grave, what, fix in checks if is_bad]

@@ -6,12 +6,19 @@ from typing import NamedTuple
 
 import numpy as np
 
+from wristctl.arrays import Array
 from wristctl.board.driver import Board
 from wristctl.board.messages import State, Status
+from wristctl.config.hw_run import Homing
 from wristctl.trial.camera_pace import CameraPace
-from wristctl.trial.safety import Monitor, SafetyStop
+from wristctl.trial.safety import SafetyStop
 from wristctl.trial.spools import Paths
 from wristctl.trial.tracking import Tracking
+from wristctl.trial.watch import Watch
+from wristctl.vision.camera_pose import CameraPose
+from wristctl.vision.marker import Sighting
+
+OBLIQUE_FIX = "set the camera square, or calibrate it: wristctl hw calibrate camera, then --optics"
 
 # A moment of waiting: comes back soon, to be called again, and raises what ends the wait.
 Meanwhile = Callable[[], None]
@@ -66,20 +73,39 @@ class Patience:
 
     def reading(self, tracking: Tracking, frames: int) -> Reading:
         """Medians of the next usable frames. Raises SafetyStop where none come."""
-        readings: list[tuple[float, float]] = []
+        usable = self.sightings(tracking, frames)
+        theta, size = np.median([(sighting.theta, sighting.size) for sighting in usable], axis=0)
+        return Reading(float(theta), float(size))
+
+    def sightings(self, tracking: Tracking, frames: int) -> list[Sighting]:
+        """The next usable frames. Raises SafetyStop where none come."""
+        usable: list[Sighting] = []
         tracking.look()
         began = self._board.transport.now()
-        while len(readings) < frames:
+        while len(usable) < frames:
             self.pulse()
             for sighting in tracking.look():
                 self.pace.add(sighting)
                 if sighting.time >= began and math.isfinite(sighting.theta):
-                    readings.append((sighting.theta, sighting.size))
+                    usable.append(sighting)
             if self._board.transport.now() - began > _READING:
                 why, fix = self.pace.missing(self._board.transport.now(), _READING)
                 raise SafetyStop(f"the marker's angle could not be read ({why})", "homing", fix)
-        theta, size = np.median(readings, axis=0)
-        return Reading(float(theta), float(size))
+        return usable
+
+    def stand_square(self, tracking: Tracking, homing: Homing) -> CameraPose | None:
+        """Fit the camera's pose to a wrist at rest; None for a calibrated camera.
+
+        Raises SafetyStop where it is too oblique for that, or where no markers can be read.
+        """
+        pose = tracking.stand_square(self.sightings(tracking, 4 * homing.frames))
+        if pose is not None and pose.oblique > math.radians(homing.oblique_deg):
+            problem = (
+                f"the camera looks {math.degrees(pose.oblique):.0f} deg off square at the bending plane, beyond "
+                f"{homing.oblique_deg:g} deg"
+            )
+            raise SafetyStop(problem, "homing", OBLIQUE_FIX)
+        return pose
 
     def _see(self, status: Status) -> None:
         stood = self._stood
@@ -101,9 +127,10 @@ class InSight:
     """
 
     def __init__(
-        self, tracking: Tracking, monitor: Monitor, paths: Paths, now: Callable[[], float], signs: np.ndarray
+        self, tracking: Tracking, watch: Watch, stale: float, paths: Paths, now: Callable[[], float], signs: Array
     ) -> None:
-        self._tracking, self._monitor, self._paths, self._now, self._signs = tracking, monitor, paths, now, signs
+        self._tracking, self._watch, self._stale = tracking, watch, stale
+        self._paths, self._now, self._signs = paths, now, signs
         self._seen = self._looked = now()
 
     def __call__(self, status: Status) -> None:
@@ -112,10 +139,10 @@ class InSight:
         if now - self._looked < _LOOK:
             return
         self._looked, looked = now, self._tracking.look()
-        if now - self._seen > self._monitor.stale:
+        if now - self._seen > self._stale:
             return
         reeled = self._signs * np.array(status.position, float)
         for sighting in looked:
             if math.isfinite(sighting.theta):
                 self._seen = sighting.time
-                self._monitor.standing(sighting.theta, reeled, self._paths.taut(sighting.theta)[0])
+                self._watch.standing(sighting.theta, reeled, self._paths.taut(sighting.theta)[0])

@@ -5,7 +5,7 @@ import threading
 import time
 import zlib
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import NamedTuple, Protocol
 
 import numpy as np
@@ -13,6 +13,7 @@ import numpy as np
 from wristctl.arrays import Array
 from wristctl.loop_priority import beside_the_loop
 from wristctl.vision.camera import Camera, Frame
+from wristctl.vision.camera_pose import CameraPose
 from wristctl.vision.marker import Sighting, SightingVerdict, Tracker
 
 # Seconds for which a picture is known again: longer than any ring of buffers lasts.
@@ -77,6 +78,9 @@ class Tracking(Protocol):
     def look(self) -> list[Sighting]:
         """Sightings since the last look, oldest first; never waits for a frame."""
 
+    def stand_square(self, sightings: Sequence[Sighting]) -> CameraPose | None:
+        """Set the bending plane square, for a camera that has not been calibrated: `Tracker.stand_square`."""
+
     def close(self) -> None:
         """Look no more; the camera stays open."""
 
@@ -104,6 +108,10 @@ class InlineTracking:
         if self._keep is not None:
             self._keep(frame, sighting)
         return [sighting]
+
+    def stand_square(self, sightings: Sequence[Sighting]) -> CameraPose | None:
+        """The frames to come are seen so; the marker's zero is to be read anew."""
+        return self._tracker.stand_square(sightings)
 
     def close(self) -> None:
         """Nothing goes on between looks."""
@@ -134,6 +142,10 @@ class ThreadedTracking:
         while self._seen:
             sightings.append(self._seen.popleft())
         return [sighting._replace(theta=sighting.theta - self.zero) for sighting in sightings]
+
+    def stand_square(self, sightings: Sequence[Sighting]) -> CameraPose | None:
+        """The frames to come are seen so; the marker's zero is to be read anew."""
+        return self._inner.stand_square(sightings)
 
     def close(self) -> None:
         """Stop looking."""

@@ -36,7 +36,7 @@ class Judge:
 
     A case's value is the weighted sum of log10((metric + floor) / (the yardstick's + floor)); where it fails it is
     3 to 4 decades. The objective is the mean over all cases, plus a weight times the worst cell (a case with its
-    repetitions), plus one times the square root of the share of cases that swing at rest, chatter or do not converge:
+    repetitions), plus one times the square root of the share of cases that swing, chatter or do not converge:
     steep at the first of them, since no ranking relies on such gains, and never the same for two that do more and less.
     """
 
@@ -44,7 +44,9 @@ class Judge:
         self._cases, self._wrist, self._weights = cases, wrist, weights
         self._cells = np.array([case.cell for case in cases])
         self._horizons = np.array([case.motion.horizon for case in cases])
-        self._metrics = list(dict.fromkeys([*weights.weights(), *(["oscillation"] if weights.swinging else [])]))
+        self._metrics = list(
+            dict.fromkeys([*weights.weights(), *(["oscillation", "sustained"] if weights.swinging else [])])
+        )
         self._yardstick = measure(controller(YARDSTICK), np.zeros((1, 0)), cases, wrist, self._metrics)
 
     def __call__(self, law: Controller, gains: Array) -> Array:
@@ -78,7 +80,7 @@ class Judge:
         cells = np.stack([value[:, self._cells == cell].mean(axis=1) for cell in np.unique(self._cells)], axis=1)
         total: Array = value.mean(axis=1) + self._weights.worst * cells.max(axis=1)
         if self._weights.swinging:
-            total = total + self._weights.swinging * np.sqrt(measured.swings.mean(axis=1))
+            total = total + self._weights.swinging * np.sqrt(measured.swings_beside(self._yardstick).mean(axis=1))
         return total
 
     def _known(self, name: str) -> Array:

@@ -139,10 +139,10 @@ def check_tunable(controller: Controller) -> None:
         raise UserError(f"{controller.name} has no gains to tune", fix="leave it out")
 
 
-def tuning_cases(study: Study, network: Inverse | None = None) -> tuple[list[Case], list[Case]]:
+def tuning_cases(study: Study, network: Inverse | None = None, tuning: int = 0) -> tuple[list[Case], list[Case]]:
     """Cases for the search, and cases for the choice among its best gains: other worlds, or other noise.
 
-    The latter are none where nothing is random.
+    The latter are none where nothing is random. Every `tuning` has other worlds of the family.
     """
     settings = study.tune
     if settings.worlds.family:
@@ -150,8 +150,8 @@ def tuning_cases(study: Study, network: Inverse | None = None) -> tuple[list[Cas
         family = study.families[name]
         draws = settings.worlds.draws, settings.worlds.validation
         return (
-            drawn_cases(family, name, "tune", study.seed, draws[0], study.wrist, network),
-            drawn_cases(family, name, "validation", study.seed, draws[1], study.wrist, network),
+            drawn_cases(family, name, "tune", study.seed, draws[0], study.wrist, network, tuning * draws[0]),
+            drawn_cases(family, name, "validation", study.seed, draws[1], study.wrist, network, tuning * draws[1]),
         )
     check_loops(settings)
     cases = _scenarios(study, Draws(study.seed, "tuning"), settings.repetitions, network)
@@ -278,8 +278,11 @@ def _chosen(controller: Controller, result: Search, judge: Judge, choose: Judge 
     )  # fmt: skip
 
 
-def search_unit(study: Study, law: str) -> Unit:
-    """The search for gains of a law by the study's `tune` section, on worlds of the family that it names."""
+def search_unit(study: Study, law: str, tuning: int = 0) -> Unit:
+    """The search for gains of a law by the study's `tune` section, on worlds of the family that it names.
+
+    Every `tuning` is on other worlds of it, with another stream of the optimiser.
+    """
     family, settings = study.tune.worlds.family, study.tune
     needed = study.model_copy(
         update={
@@ -291,16 +294,23 @@ def search_unit(study: Study, law: str) -> Unit:
     rollouts = settings.candidates * settings.iterations * settings.restarts * settings.worlds.draws
     rollouts += settings.finalists * settings.worlds.validation
     size = rollouts * len(study.families[family].references)
-    spec = {"study": content, "law": law}
-    return Unit("wristctl.tuning.search:searched", spec, f"search for gains of {law} on {family}", size)
+    spec = {"study": content, "law": law, "tuning": tuning}
+    name = f"search {tuning + 1} for gains of {law} on {family}"
+    return Unit("wristctl.tuning.search:searched", spec, name, size)
+
+
+def search_stream(name: str, tuning: int) -> str:
+    """The name of the optimiser's stream in a tuning."""
+    return f"{name}, tuning {tuning + 1}" if tuning else name
 
 
 def searched(spec: Mapping[str, Any]) -> dict[str, np.ndarray]:
     """Result of one unit of `search_unit`: all gains that were tried, and the finalists, best first."""
     study, law = Study.model_validate_json(json.dumps(spec["study"])), controller(spec["law"])
-    cases, validation_cases = tuning_cases(study)
+    tuning = spec["tuning"]
+    cases, validation_cases = tuning_cases(study, tuning=tuning)
     judges = Judge(cases, study.wrist, study.tune.objective), Judge(validation_cases, study.wrist, study.tune.objective)
-    result = search(study, law, lambda name: stream(study.seed, name), judges)
+    result = search(study, law, lambda name: stream(study.seed, search_stream(name, tuning)), judges)
     return {
         "values": result.tried.values,
         "gains": result.tried.gains,

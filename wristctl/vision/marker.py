@@ -1,6 +1,7 @@
 """The wrist's angle from its two markers, frame by frame, and the gates that an angle must pass."""
 
 import math
+from collections.abc import Sequence
 from enum import StrEnum
 from typing import NamedTuple
 
@@ -9,6 +10,7 @@ import numpy as np
 from wristctl.arrays import Array
 from wristctl.config.camera import Gates, Markers
 from wristctl.vision.camera import Frame, Image
+from wristctl.vision.camera_pose import CameraPose, pose_of
 from wristctl.vision.detector import Detector, edges, square_angle
 from wristctl.vision.view import View
 
@@ -88,16 +90,32 @@ class Tracker:
 
     def __init__(self, markers: Markers, view: View, gates: Gates, zero: float = 0.0) -> None:
         self._markers, self._view, self._gates, self.zero = markers, view, gates, zero
-        self._detector = Detector()
+        self._detector, self._calibrated = Detector(), view.size is not None
         self._last_seen: dict[int, Array] = {}
         self._base: _Base | None = None
         self._used: tuple[float, float] | None = None
         self._look_round = -math.inf
         self._small = True
+        self._picture = 0, 0
+        self._pose: CameraPose | None = None
+
+    def stand_square(self, sightings: Sequence[Sighting]) -> CameraPose | None:
+        """Set the plane square by the markers of these sightings of a wrist at rest, from the next frame on.
+
+        None, and nothing changed, where the camera has been calibrated, or the markers are not seen.
+        """
+        whole = [sighting.corners for sighting in sightings if np.isfinite(sighting.corners).all()]
+        if not whole or self._calibrated:
+            return None
+        self._pose = pose_of(whole, self._picture, self._markers)
+        return self._pose
 
     def see(self, frame: Frame) -> Sighting:
         """The angle in a frame; frames come in the order of time. Raises UserError for pictures of another size."""
-        self._view.check_size(frame.image.shape[1], frame.image.shape[0], "camera")
+        self._picture = frame.image.shape[1], frame.image.shape[0]
+        self._view.check_size(*self._picture, "camera")
+        if self._pose is not None:
+            self._view, self._base, self._pose = self._pose.view, None, None
         markers = self._find(frame)
         bases, tips = (markers.get(number, []) for number in (self._markers.base, self._markers.tip))
         verdict, theta = self._judge(frame.time, bases, tips)

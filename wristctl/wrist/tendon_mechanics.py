@@ -13,31 +13,18 @@ Springs creep alike.
 from typing import Any, NamedTuple
 
 from wristctl.lanes.compiled import by_type, compiled, implements
-from wristctl.lanes.functions import exp, expm1_of_negative, maximum
+from wristctl.lanes.functions import exp, maximum
 from wristctl.lanes.lane import rounded, where, zero_like
 from wristctl.lanes.named_tuples import tuple_of
 from wristctl.lanes.rows import lanes_like, rows_of
 from wristctl.wrist.chain import lengths, moment_arms
-
-
-@compiled
-def bristle(z: Any, travel: Any, slope: Any) -> Any:
-    """The bristle's state after its tendon has moved by `travel` [m], positive towards the spool; slope 1/s [1/m]."""
-    sign = where(travel < 0.0, -1.0, 1.0)
-    return z - expm1_of_negative(-slope * abs(travel)) * (sign - z)
+from wristctl.wrist.dahl import bristle, bristle_slope, inner_in_lanes, remember_bend
 
 
 @compiled
 def capstan(friction: Any, wrapped: Any, z: Any) -> Any:
     """Pull at the wrist over pull at the spool."""
     return exp(-friction * wrapped * z)
-
-
-@compiled
-def bristle_slope(z: Any, speed: Any, slope: Any) -> Any:
-    """dz/dx [1/m] where the tendon moves at this speed; between both directions' where it is at rest."""
-    sign = where(speed > 0.0, 1.0, where(speed < 0.0, -1.0, 0.0))
-    return (1.0 - z * sign) * slope
 
 
 class Nonideal(NamedTuple):
@@ -91,6 +78,8 @@ class PulledTendons(NamedTuple):
 
     nonideal: Any
     state: Any
+    inner: Any
+    """InnerFriction of the wrist, or NoInnerFriction."""
 
 
 class ElasticTendons(NamedTuple):
@@ -100,11 +89,12 @@ class ElasticTendons(NamedTuple):
 
 
 class RealTendons(NamedTuple):
-    """Tendons with friction, creep and faults: the stiffness of each [N/m], Nonideal, and their state."""
+    """Tendons with friction, creep and faults: the stiffness of each [N/m], Nonideal, their state, inner friction."""
 
     stiffness: Any
     nonideal: Any
     state: Any
+    inner: Any
 
 
 Tendons = NoTendons | PulledTendons | ElasticTendons | RealTendons
@@ -123,7 +113,9 @@ def _none(tendons: Any) -> Any:
 
 @implements(tendons_in_lanes, PulledTendons)
 def _pulled(tendons: Any) -> Any:
-    return PulledTendons(read_nonideal(rows_of(tendons.nonideal)), rows_of(tendons.state))
+    return PulledTendons(
+        read_nonideal(rows_of(tendons.nonideal)), rows_of(tendons.state), inner_in_lanes(tendons.inner)
+    )
 
 
 @implements(tendons_in_lanes, ElasticTendons)
@@ -134,7 +126,8 @@ def _elastic(tendons: Any) -> Any:
 @implements(tendons_in_lanes, RealTendons)
 def _real(tendons: Any) -> Any:
     nonideal = read_nonideal(rows_of(tendons.nonideal))
-    return RealTendons(rows_of(tendons.stiffness)[0], nonideal, rows_of(tendons.state))
+    inner = inner_in_lanes(tendons.inner)
+    return RealTendons(rows_of(tendons.stiffness)[0], nonideal, rows_of(tendons.state), inner)
 
 
 def state_rows(tendons: int, coordinates: int) -> int:
@@ -296,11 +289,12 @@ def _update_nothing(tendons: Any, theta: Any, spool_input: Any, path: Any) -> No
 
 @implements(update_memory, PulledTendons)
 @compiled
-def _update_springs(tendons: Any, theta: Any, spool_input: Any, path: Any) -> None:
+def _update_wrist(tendons: Any, theta: Any, spool_input: Any, path: Any) -> None:
     state = tendons.state
     for k in range(len(theta)):
         row = row_of(len(spool_input), PATH) + k
         state[row] = theta[k] + tendons.nonideal.spring_keep * (state[row] - theta[k])
+    remember_bend(tendons.inner, theta)
 
 
 @implements(update_memory, RealTendons)
@@ -312,4 +306,4 @@ def _update_tendons(tendons: Any, theta: Any, reeled: Any, path: Any) -> None:
         state[crept] = stretch + nonideal.tendon_keep * (state[crept] - stretch)
     for i in range(PATH):
         state[i] = path[i]
-    _update_springs(tendons, theta, reeled, path)
+    _update_wrist(tendons, theta, reeled, path)

@@ -96,8 +96,8 @@ def test_nothing_lapses_at_rest_or_on_the_way_to_a_target(bench: Bench) -> None:
     bench.run_ms(60)
     bench.do(bench.enable)
     bench.run_ms(90)
-    bench.do(Jog((1_000, 0, 0, -60)))
-    assert bench.wait_for_rest().position == (1_000, 0, 0, -60)
+    bench.do(Jog((1_000, 0, 0, -160)))
+    assert bench.wait_for_rest().position == (1_000, 0, 0, -160)
     assert bench.status().lapses == 0 and Flag.LAPSED not in bench.status().flags
 
 

@@ -9,7 +9,6 @@ from tests.board.bench import MS, Bench
 from tests.board.drive_watch import CLOCK
 from wristctl.board.messages import (
     JOG_RATE,
-    JOG_SPAN,
     Command,
     Configure,
     Flag,
@@ -188,7 +187,7 @@ def test_until_homed_only_slow_short_jogs_move(bench: Bench) -> None:
     bench.do(bench.enable)
     assert bench.ask(Rate((100.0, 0.0, 0.0, 0.0)))[0] is Result.UNHOMED
     assert bench.ask(Target((100, 0, 0, 0), (100, 1, 1, 1)))[0] is Result.UNHOMED
-    assert bench.ask(Jog((JOG_SPAN + 1, 0, 0, 0)))[0] is Result.RANGE
+    assert bench.ask(Jog((Limits().jog + 1, 0, 0, 0)))[0] is Result.RANGE
     bench.look()
     bench.do(Jog((-120, 50, 0, 0)))
     assert bench.wait_for_rest().position == (-120, 50, 0, 0)
@@ -196,6 +195,25 @@ def test_until_homed_only_slow_short_jogs_move(bench: Bench) -> None:
     assert CLOCK / up_to_speed.min() < 1.01 * JOG_RATE
     assert bench.do(Home((7, 8, 9, 10))).position == (7, 8, 9, 10)
     assert bench.ask(Jog(ORIGIN))[0] is Result.STATE
+
+
+def test_jogs_together_lead_no_further_than_their_limit_until_the_drives_have_let_go(bench: Bench) -> None:
+    bench.do(Limits(jog=300))
+    bench.do(bench.enable)
+    for goal in ((300, -300, 0, 0), (0, 0, 0, 0), (-300, 300, 1, 0)):
+        bench.do(Jog(goal))
+        assert bench.wait_for_rest().position == goal == positions(bench)
+    for goal in ((-301, 300, 1, 0), (-300, 301, 1, 0), (0, 0, 0, 301)):
+        assert bench.ask(Jog(goal))[0] is Result.RANGE
+    bench.do(bench.enable)  # said again, it changes nothing
+    assert bench.ask(Jog((-301, 300, 1, 0)))[0] is Result.RANGE
+    assert bench.status().position == (-300, 300, 1, 0)
+    bench.do(Command.DISABLE)
+    bench.run_ms(60)
+    bench.do(bench.enable)
+    bench.do(Jog((-600, 600, 301, 0)))
+    assert bench.wait_for_rest().position == (-600, 600, 301, 0)
+    assert bench.ask(Jog((-600, 600, 302, 0)))[0] is Result.RANGE
 
 
 def test_no_step_comes_before_the_drives_have_settled(bench: Bench) -> None:

@@ -13,6 +13,7 @@ from wristctl.board.messages import (
     ENABLE_KEY,
     ESTOP_SEQ,
     HEARTBEAT_MS,
+    LAYOUTS,
     Command,
     Configure,
     Fault,
@@ -22,6 +23,7 @@ from wristctl.board.messages import (
     Rate,
     Result,
     State,
+    Status,
     Target,
 )
 
@@ -119,6 +121,28 @@ def test_emergency_stop_overtakes_the_commands_that_wait_before_it(bench: Bench)
     _, _, last_byte = bench.send(Command.ESTOP, ESTOP_SEQ)
     assert milliseconds_to_last_step(bench, last_byte) < 0.1
     assert_latched(bench, Fault.ESTOP_COMMAND)
+
+
+def test_a_status_is_of_one_instant_also_where_a_stop_falls_into_its_making(bench: Bench) -> None:
+    """The millisecond that latches the button comes at every moment of the answer's making, every 16 cycles of it."""
+    bench.run(-bench.chip.cycles % MS)
+    states = []
+    for offset in range(0, MS, 16):
+        bench.do(bench.enable)
+        bench.run(-bench.chip.cycles % MS + MS // 2)
+        bench.chip.drive(*ESTOP, True)
+        bench.run(3 * MS - 7 * 640 - offset)
+        bench.send(Command.STATUS)
+        bench.run(4 * MS)
+        ((_, _, payload),) = bench.frames()
+        status = LAYOUTS[Status].unpack(Status, payload[1:])
+        states.append(status.state)
+        is_on = status.state is State.ENABLED
+        assert (Flag.DRIVES_ON in status.flags, status.faults == Fault(0)) == (is_on, is_on), offset
+        bench.chip.drive(*ESTOP, False)
+        bench.run_ms(5)
+        bench.do(Command.CLEAR)
+    assert {State.ENABLED, State.FAULT} == set(states), "both sides of it were met"
 
 
 def test_no_axis_starts_again_when_a_stop_falls_into_the_working_out_of_its_rate(bench: Bench, rounds: int) -> None:

@@ -45,14 +45,18 @@ uint8_t on_limits(const struct limits_command *c) {
   return RESULT_OK;
 }
 
+/* Where the drives were switched on: no tendon is pulled by more than its stiffness makes of the way from there. */
+static int32_t jog_origin[AXES];
+
 uint8_t on_enable(const struct enable_command *c) {
   if (c->key != ENABLE_KEY) return RESULT_KEY;
   if (c->configuration != crc16(&told, sizeof told)) return RESULT_CONFIGURATION;
   if (safety_state() == STATE_ENABLED) return RESULT_OK;
   motion_stop();
+  for (uint8_t i = 0; i < AXES; i++) jog_origin[i] = axis_position(i);
   safety_enable();
   if (safety_state() == STATE_ENABLED) return RESULT_OK;
-  return safety_flags() & FLAG_ESTOP_OPEN ? RESULT_ESTOP_OPEN : RESULT_ALARM;
+  return safety_now().flags & FLAG_ESTOP_OPEN ? RESULT_ESTOP_OPEN : RESULT_ALARM;
 }
 
 uint8_t on_rate(const struct rate_command *c) {
@@ -76,8 +80,8 @@ uint8_t on_target(const struct target_command *c) {
 
 uint8_t on_jog(const struct jog_command *c) {
   for (uint8_t i = 0; i < AXES; i++) {
-    int32_t way = c->position[i] - axis_position(i);
-    if (way > JOG_SPAN || way < -JOG_SPAN) return RESULT_RANGE;
+    int32_t way = c->position[i] - jog_origin[i];
+    if (way > told.limits.jog || way < -(int32_t)told.limits.jog) return RESULT_RANGE;
   }
   for (uint8_t i = 0; i < AXES; i++) motion_go_to(i, c->position[i], JOG_RATE);
   return RESULT_OK;
@@ -150,15 +154,21 @@ void answer_hello(struct hello_answer *a) {
 }
 
 void answer_status(struct status_answer *a) {
-  *a = (struct status_answer){.time = clock_us(), .state = safety_state(), .faults = safety_faults()};
-  a->flags = safety_flags() | (motion_moving() ? FLAG_MOVING : 0) | (motion_at_limit() ? FLAG_AT_LIMIT : 0) |
-             (motion_lapsed() ? FLAG_LAPSED : 0);
-  a->lapses = motion_lapses();
-  a->watchdog_left = safety_watchdog_left_ms();
+  a->time = clock_us();
+  struct safety now = safety_now(); /* before the positions: of a board that has stopped they are final */
+  a->state = now.state;
+  a->faults = now.faults;
+  a->flags = now.flags;
+  a->watchdog_left = now.watchdog_left_ms;
   for (uint8_t i = 0; i < AXES; i++) {
+    bool stepping = axis_stepping(i);
     a->position[i] = axis_position(i);
-    a->rate[i] = motion_rate(i);
+    a->rate[i] = stepping ? motion_rate(i) : 0;
+    if (stepping || (a->state == STATE_ENABLED && motion_has_goal(i, a->position[i]))) a->flags |= FLAG_MOVING;
+    if (motion_held_back(i, a->position[i])) a->flags |= FLAG_AT_LIMIT;
   }
+  if (motion_lapsed()) a->flags |= FLAG_LAPSED;
+  a->lapses = motion_lapses();
 }
 
 void answer_counters(struct counters_answer *a) {
@@ -175,7 +185,7 @@ void commands_answer(struct frame *f) {
 
 void commands_init(void) {
   connection = (uint16_t)boot_nonce() << 8;
-  struct limits_command widest;
+  struct limits_command widest = {.jog = DEFAULT_JOG};
   for (uint8_t i = 0; i < AXES; i++) {
     widest.lowest[i] = DEFAULT_LOWEST;
     widest.highest[i] = DEFAULT_HIGHEST;

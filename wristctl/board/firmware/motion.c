@@ -94,26 +94,24 @@ static void lapse(void) {
   lapses++;
 }
 
-static bool has_goal(uint8_t axis) {
-  return motions[axis].top_rate >= SLOWEST_RATE && motions[axis].goal != axis_position(axis);
+bool motion_has_goal(uint8_t axis, int32_t position) {
+  return motions[axis].top_rate >= SLOWEST_RATE && motions[axis].goal != position;
 }
 
 bool motion_moving(void) {
   for (uint8_t i = 0; i < AXES; i++)
-    if (axis_stepping(i) || (safety_state() == STATE_ENABLED && has_goal(i))) return true;
+    if (axis_stepping(i) || (safety_state() == STATE_ENABLED && motion_has_goal(i, axis_position(i)))) return true;
   return false;
 }
 
 bool motion_lapsed(void) { return lapsed; }
 uint8_t motion_lapses(void) { return lapses; }
 
-bool motion_at_limit(void) {
-  for (uint8_t i = 0; i < AXES; i++)
-    if (motions[i].to_limit && !has_goal(i)) return true;
-  return false;
+bool motion_held_back(uint8_t axis, int32_t position) {
+  return motions[axis].to_limit && !motion_has_goal(axis, position);
 }
 
-int16_t motion_rate(uint8_t axis) { return axis_stepping(axis) ? motions[axis].rate : 0; }
+int16_t motion_rate(uint8_t axis) { return motions[axis].rate; }
 
 /* The rate from which constant braking, in updates of this length, ends exactly after `distance` steps. */
 static float braking_rate(int32_t distance) {

@@ -132,21 +132,19 @@ ISR(WDT_vect) {
 void safety_alive(void) { silent_ms = 0; }
 
 uint8_t safety_state(void) { return state; }
-uint8_t safety_faults(void) { return faults; }
 bool safety_homed(void) { return homed; }
 
-uint8_t safety_flags(void) {
-  return (homed ? FLAG_HOMED : 0) | (drives_are_on() ? FLAG_DRIVES_ON : 0) | (estop_open() ? FLAG_ESTOP_OPEN : 0) |
-         (settle_left ? FLAG_SETTLING : 0) | (alarm_open() ? FLAG_ALARM : 0);
+struct safety safety_now(void) {
+  struct safety now;
+  ATOMIC_BLOCK(ATOMIC_RESTORESTATE) {
+    now = (struct safety){.state = state, .faults = faults, .watchdog_left_ms = watchdog_left};
+    now.flags = (homed ? FLAG_HOMED : 0) | (drives_are_on() ? FLAG_DRIVES_ON : 0) | (estop_open() ? FLAG_ESTOP_OPEN : 0) |
+                (settle_left ? FLAG_SETTLING : 0) | (alarm_open() ? FLAG_ALARM : 0);
+  }
+  return now;
 }
 
 bool safety_may_move(void) { return state == STATE_ENABLED && !settle_left; }
-
-uint16_t safety_watchdog_left_ms(void) {
-  uint16_t left;
-  ATOMIC_BLOCK(ATOMIC_RESTORESTATE) { left = watchdog_left; }
-  return left;
-}
 
 void safety_feed_watchdog(void) {
   ATOMIC_BLOCK(ATOMIC_RESTORESTATE) { watchdog_left = config.watchdog_ms; }

@@ -13,11 +13,14 @@ struct configuration {
 void safety_init(void);
 void safety_configure(struct configuration c, uint16_t longest_stop_ms); /* the stop is cut off after that long */
 uint8_t safety_state(void);
-uint8_t safety_faults(void);
-uint8_t safety_flags(void); /* HOMED, DRIVES_ON, ESTOP_OPEN, SETTLING, ALARM */
+
+struct safety {
+  uint8_t state, faults, flags; /* HOMED, DRIVES_ON, ESTOP_OPEN, SETTLING, ALARM */
+  uint16_t watchdog_left_ms;
+};
+struct safety safety_now(void); /* all at one instant: no stop falls between them */
 bool safety_may_move(void); /* ENABLED and settled */
 bool safety_homed(void);
-uint16_t safety_watchdog_left_ms(void);
 
 void safety_alive(void);         /* the main loop, every turn */
 void safety_feed_watchdog(void); /* a command that feeds has come */

@@ -164,17 +164,18 @@ def table(
 
 def export(
     ref: Ref,
-    to: Annotated[Literal["mcap", "mat"], typer.Option("--to", help="The format.")],
+    to: Annotated[Literal["csv", "mcap", "mat"], typer.Option("--to", help="The format.")] = "csv",
     file: Annotated[
         Path | None, typer.Option("--file", help="Where to write it; by default the run's id, in this folder.")
     ] = None,
     out: Out = RESULTS,
     debug: Debug = False,
 ) -> None:
-    """Write a run's tables, arrays and videos for other programs, with their units.
+    """Write a run's motions, tables, arrays and videos for other programs, with their units.
 
-    mat: one file for MATLAB and Octave. mcap: a log of what went on in time, videos too, for Foxglove, PlotJuggler or
-    Rerun. A table for pandas is the CSV file of the run, or `wristctl.open_run(RUN).data(NAME)` in Python.
+    csv: its motions as an open log, which wristctl reads again. mat: one file for MATLAB and Octave. mcap: a log of
+    what went on in time, videos too, for Foxglove, PlotJuggler or Rerun. A table for pandas is the CSV file of the run,
+    or `wristctl.open_run(RUN).data(NAME)` in Python.
     """
     from wristctl.commands.export.run_data import export_run
 

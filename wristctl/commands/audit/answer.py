@@ -127,7 +127,7 @@ def _is_number(claim: Claim, metric: str) -> bool:
 def _beyond(findings: Mapping[str, Finding]) -> str:
     """Where the number takes tensions above the limit."""
     reproduced = _where(findings, "reproduced")
-    beyond = [name for name in reproduced if findings[name].mark]
+    beyond = [name for name in reproduced if "not physical" in findings[name].mark]
     where = f" {_on(beyond)}" * (len(reproduced) > len(beyond))
     return f", with tensions that no tendon bears{where}" * bool(beyond)
 

@@ -18,17 +18,16 @@ def ranked(session: Session, study: Study, network: Inverse | None, tuned: Tuned
     """Rank the rows of `compare` on the worlds that it names, and write down rankings and worlds."""
     import pandas as pd
 
-    from wristctl.comparison.world_ranking import RANKED, rank, ranking_frame, worlds_frame
+    from wristctl.comparison.world_ranking import rank, ranked_units, ranking_frame, worlds_frame
     from wristctl.plotting.ranking_figures import ranking_intervals
     from wristctl.simulation.drawn_worlds import streams_of
-    from wristctl.simulation.metrics import METRICS
 
     findings, worlds = session.findings, study.compare.worlds
     with session.progress("ranking", total=100, unit="%") as report:
         rankings = rank(study, tuned, network, lambda share: report(round(100 * share)))
     if worlds.sealed is None:
         findings.note_streams(streams_of(study.families[worlds.family], worlds.family, worlds.split))
-    units = {name: METRICS[name].unit or "1" for name in RANKED} | {f"rmse_{end}": "rad" for end in ("low", "high")}
+    units = ranked_units() | {f"rmse_{end}": "rad" for end in ("low", "high")}
     ranking = pd.concat([ranking_frame(one_ranking) for one_ranking in rankings], ignore_index=True)
     findings.table("data/ranking.csv", ranking, units=units | {"worst_rmse": "rad"})
     frames = pd.concat([worlds_frame(one_ranking) for one_ranking in rankings], ignore_index=True)

@@ -1,4 +1,4 @@
-"""A run's data in formats of other programs: MATLAB's, and MCAP, which robot log viewers open."""
+"""A run's data in formats of other programs: open logs, MATLAB's, and MCAP, which robot log viewers open."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from wristctl.commands.export.open_log_of_run import write_open_log
 from wristctl.errors import FILE, UserError
 from wristctl.records import Run
 from wristctl.records.files import replacing
@@ -38,7 +39,7 @@ def columns_of(run: Run, table: str) -> dict[str, tuple[str, str]]:
 
 
 def export_run(run: Run, to: str, file: Path | None) -> Path:
-    """Write a run's data as `to` (mat, mcap); where they were written.
+    """Write a run's data as `to` (csv, mat, mcap); where they were written.
 
     Raises UserError for a run without data, a file in the way, or a package that is not installed.
     """
@@ -132,6 +133,7 @@ def _mcap(run: Run, path: Path) -> None:
 
 # File ending and writer of each format.
 FORMATS: dict[str, tuple[str, Callable[[Run, Path], None]]] = {
+    "csv": (".csv", write_open_log),
     "mat": (".mat", _mat),
     "mcap": (".mcap", _mcap),
 }

@@ -156,7 +156,8 @@ def _courses(study: Study, inputs: Inputs) -> list[RecordedCourse]:
 
         if not study.gen_data.files:
             raise UserError("source csv needs files", "gen-data.files", Setting("files=[recording.csv]", "gen-data"))
-        return [course for file in study.gen_data.files for course in read_courses(Path(file))]
+        names = study.gen_data.columns or ""
+        return [course for file in study.gen_data.files for course in read_courses(Path(file), names)]
     courses = inputs.read("run", _courses_of)
     if courses is None:
         fix = Call("gen-data", arguments=(Argument("run", "latest:simulate"),))

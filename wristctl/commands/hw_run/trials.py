@@ -1,6 +1,7 @@
 """The trials of hw-run with their log, a row for each by the log alone, and how they went."""
 
 import logging
+import math
 from functools import partial
 
 import cv2
@@ -20,6 +21,7 @@ from wristctl.simulation.metrics import METRICS
 from wristctl.trial.calibration import WristCalibration
 from wristctl.trial.experiment import Experiment
 from wristctl.trial.log import TrialLog
+from wristctl.trial.residuals import FILE, RESIDUALS, limits_of, plain
 from wristctl.trial.safety import SafetyStop
 from wristctl.trial.testbeds import open_testbed
 from wristctl.trial.trials import JUDGED, Trial, evaluated, trials_of
@@ -169,6 +171,8 @@ def _summarise(session: Session, experiment: Experiment, trial_log: TrialLog) ->
     if timing.late:
         findings.summary(timing.camera.summary())
     _tell_oddities(session, experiment)
+    findings.plain(FILE, plain(limits_of(settings)))
+    findings.plain("data/camera_pose.json", {plane: pose and pose.plain() for plane, pose in experiment.poses.items()})
     if experiment.zero is not None:
         findings.plain("data/zero.json", experiment.zero.plain())
     if experiment.stop is None:
@@ -184,19 +188,15 @@ def _summarise(session: Session, experiment: Experiment, trial_log: TrialLog) ->
 
 def _tell_oddities(session: Session, experiment: Experiment) -> None:
     """Report how near trials came to the limits on unexpected motion, and anything odd."""
-    findings, limits, greatest = session.findings, session.study.hw_run.safety, experiment.greatest
-    limits_and_values = {
-        "apart": (np.degrees(greatest.apart), limits.follow_deg, "deg", "marker from where the spools should have it"),
-        "jump": (np.degrees(greatest.jump), limits.jump_deg, "deg", "of the marker, off that, between two frames"),
-        "load": (greatest.load, limits.load, "N m", "load torque as estimated"),
-        "across": (np.degrees(greatest.across), limits.across_deg, "deg", "bend across the plane"),
-    }
-    for name, (value, limit, unit, meaning) in limits_and_values.items():
-        findings.metric(f"greatest_{name}", float(value), unit, "lower", meaning=f"{meaning}; limit {limit:g} {unit}")
-    parts = ", ".join(
-        f"{name} {value:.2g} of {limit:g} {unit}" for name, (value, limit, unit, _) in limits_and_values.items()
-    )
-    findings.summary(f"Greatest of what the model of the rig does not explain, and the limit: {parts}.")
+    findings, most = session.findings, experiment.most
+    parts = []
+    for name, unit, limit, *_ in limits_of(session.study.hw_run):
+        line = RESIDUALS[name]
+        if math.isfinite(limit) and limit > 0.0 and name in most:
+            meaning = f"{line.meaning}; limit {limit:.4g} {unit}"
+            findings.metric(f"greatest_{name}", most[name], unit, "lower", meaning=meaning)
+            parts.append(f"{name} {line.shown(most[name])} of {line.shown(limit)}")
+    findings.summary(f"Greatest residuals, and their limits: {', '.join(parts)}. wristctl hw limits --from this run.")
     for number, words in experiment.odd.items():
         if words and experiment.outcomes.get(number) == "ok":
             text = f"Trial {number} went through, but was odd: {words}"

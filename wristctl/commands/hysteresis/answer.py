@@ -18,16 +18,25 @@ if TYPE_CHECKING:
 
 # Rows that a table may have; of more, those of the main coefficient of friction.
 _ROWS = 14
+# Ratio of an interval's ends beyond which a stiffness is not told.
+_TOLD = 3.0
 
 
-def measured_answer(fit: FrictionFit, wrist: WristParameters, more: str) -> Answer:
-    """A measured loop by itself, then friction's parameters, with a dash where the loop does not tell them."""
+def measured_answer(fits: Sequence[FrictionFit], wrist: WristParameters, more: str) -> Answer:
+    """A measured loop by itself, then what was found, with a dash where the loop does not tell it.
+
+    `fits` are those that were tried, the chosen one last. Where it does not fit, that is the first sentence.
+    """
     from wristctl.identification.loop_shape import loop_shape
 
+    fit = fits[-1]
     loop = fit.problem.loop
-    shape = loop_shape(loop, wrist)
-    heads = ("friction's parameters", "value", "95 % interval", "unit")
-    return Answer(_of_shape(loop.name, loop.winch, shape), Table("", heads, _fitted(fit)), _notes(fit), more)
+    sentence = _of_shape(loop.name, loop.winch, loop_shape(loop, wrist))
+    if fit.misfit > fit.problem.settings.lack_of_fit:
+        left = f"{degrees(float(fit.noise[0]))} deg of angle over, {two(fit.misfit**0.5)} times the samples' own noise"
+        sentence = f"Nothing to rely on: the best model leaves {left}. {sentence}"
+    heads = ("parameter", "value", "95 % interval", "unit")
+    return Answer(sentence, Table("", heads, _fitted(fit)), _notes(fits), more)
 
 
 def _of_shape(name: str, winch: bool, shape: LoopShape) -> str:
@@ -59,7 +68,26 @@ def _fitted(fit: FrictionFit) -> list[tuple[str, str, str, str]]:
         _row("sheath (angle of wrap before the wrist)", fit.sheath, "rad", apart),
         _row("presliding", fit.presliding, "um", math.isfinite(fit.presliding.high), 1e6),
         _row(f"coefficient x (bend + sheath), at a bend of {math.degrees(bend):.3g} deg", exponent, "", True),
+        *_of_the_wrist(fit),
     ]
+
+
+def _of_the_wrist(fit: FrictionFit) -> list[tuple[str, str, str, str]]:
+    """Rows of stiffness, inner friction, radius and slack, where they were found."""
+    rows = []
+    if fit.inner_friction is not None and fit.inner_presliding is not None:
+        rows += [
+            _row("friction inside the wrist", fit.inner_friction, "N m", fit.inner_friction.low > 0.0),
+            _row("bend in which that turns round", fit.inner_presliding, "deg", True, math.degrees(1.0)),
+        ]
+    if fit.problem.supposed.freed:
+        stiffness = fit.stiffness
+        rows.append(_row("stiffness", stiffness, "N m/rad", stiffness.high < _TOLD * stiffness.low))
+        if not fit.problem.loop.winch:
+            rows.append(_row("tendon radius", fit.tendon_radius, "mm", True, 1e3))
+            names = ("slack of the + side", "slack of the - side")
+            rows += [_row(name, slack, "mm", True, 1e3) for name, slack in zip(names, fit.slack, strict=True)]
+    return rows
 
 
 def _row(name: str, estimate: FrictionEstimate, unit: str, told: bool, scale: float = 1.0) -> tuple[str, str, str, str]:
@@ -67,12 +95,23 @@ def _row(name: str, estimate: FrictionEstimate, unit: str, told: bool, scale: fl
     return (name, value, f"{low} to {high}", unit) if told else (name, "-", "-", "")
 
 
-def _notes(fit: FrictionFit) -> list[str]:
+def _wanted(fits: Sequence[FrictionFit]) -> list[str]:
+    """What the data want beyond the friction of tendons, in words."""
+    chosen, left = fits[-1], [(fit.problem.supposed, degrees(float(fit.noise[0]))) for fit in fits]
+    if len(fits) == 1:
+        return []
+    steps = ", ".join(f"{supposed.words}: {size} deg" for supposed, size in sorted(left, key=lambda pair: pair[0][1:]))
+    wants = "friction inside the wrist" if chosen.problem.supposed.inner else "another stiffness, radius or slack"
+    return [f"The loop wants {wants}. Left over with {steps}."]
+
+
+def _notes(fits: Sequence[FrictionFit]) -> list[str]:
+    fit = fits[-1]
     angle, *tensions = fit.noise
     left = f"{degrees(float(angle))} deg of angle"
     if tensions:
         left += f" and {two(float(max(tensions)))} N of tension"
-    notes = [f"The model leaves over (standard deviation) {left}, of {fit.count} samples."]
+    notes = [f"The model leaves over (standard deviation) {left}, of {fit.count} samples.", *_wanted(fits)]
     if not _told_apart(fit):
         notes.append(
             "The loop tells coefficient and sheath only together, so neither has a value. A wider range of bend would "

@@ -2,140 +2,28 @@
 
 from __future__ import annotations
 
-import logging
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from wristctl.commands.answer import Answer
 from wristctl.commands.hysteresis.answer import measured_answer, model_answer
+from wristctl.commands.hysteresis.measured import FITTED, fit_measured, problem_of, refuse_misfit
 from wristctl.commands.inputs import Inputs
-from wristctl.commands.printed_table import Table, number
+from wristctl.commands.printed_table import Table
 from wristctl.commands.procedure import Procedure
 from wristctl.commands.results import Findings, StudyResult
 from wristctl.commands.session import Session
 from wristctl.config.study import Study
+from wristctl.errors import UserError
 
 if TYPE_CHECKING:
     import pandas as pd
 
-    from wristctl.identification.friction_fit import FrictionEstimate, FrictionFit
-    from wristctl.identification.loop_problem import LoopProblem
+    from wristctl.identification.friction_fit import FrictionFit
     from wristctl.simulation.hysteresis import DeadBand, HysteresisLoop
     from wristctl.simulation.spool_driven import FrictionCase
-
-
-log = logging.getLogger(__name__)
-
-# Fitted parameters: unit and meaning.
-FITTED = {
-    "friction": ("", "coefficient of the tendons' friction, mu"),
-    "sheath": ("rad", "angle by which a tendon is wrapped before it reaches the wrist"),
-    "presliding": ("m", "path in which friction turns round"),
-}
-# Share of the presliding by which a loop may leap between two samples at its turns.
-_COARSE = 0.25
-
-# Share of the noise by which what is expected may change with the integration step.
-_STEP_ERROR = 0.1
-# Share of the dead band in pull, pull times exponent, by which pulls that drive a loop may tremble.
-_TREMBLE = 0.01
-
-
-def problem_of(study: Study) -> LoopProblem:
-    """The study's measured loop. Raises UserError for a file that is none."""
-    from wristctl.identification.loop_problem import LoopProblem, read_loop
-
-    assert study.hysteresis.measured is not None
-    return LoopProblem(read_loop(Path(study.hysteresis.measured), study.wrist), study.wrist, study.hysteresis)
-
-
-def fit_measured(session: Session) -> tuple[FrictionFit, Table]:
-    """The fit, and the table that says what came out of it."""
-    from wristctl.commands.hysteresis.figures import measured
-    from wristctl.identification.friction_fit import fit_friction
-    from wristctl.identification.intervals import ALIKE
-    from wristctl.records.files import sha256_of
-
-    findings, source = session.findings, Path(str(session.study.hysteresis.measured))
-    with session.progress("fitting the measured loop"):
-        friction_fit = fit_friction(problem_of(session.study))
-    if friction_fit.autocorrelation > ALIKE:
-        log.warning("neighbouring residuals are alike: the model misses something; the intervals are widened for it")
-    if friction_fit.step_error > _STEP_ERROR:
-        advice = "the fit depends on the integration step: half of it changes the model by %.2g of the noise - fix: %s"
-        log.warning(advice, friction_fit.step_error, f"hysteresis.step: {0.5 * session.study.hysteresis.step:g}")
-    if friction_fit.leap > _COARSE * friction_fit.presliding.value:
-        leap, path = 1e6 * friction_fit.leap, 1e6 * friction_fit.presliding.value
-        fix = "sample more often, or turn more softly"
-        advice = "the loop leaps %.2g um between two samples at its turns, and presliding is some %.2g um: %s - fix: %s"
-        log.warning(advice, leap, path, "values may be off by more than their intervals", fix)
-    loop = friction_fit.problem.loop
-    if loop.winch and loop.tremble > _TREMBLE * friction_fit.exponent.value * float(loop.drive.mean()):
-        fix = "measure the spools' positions too, or hang weights"
-        advice = "the pulls that drive the loop tremble by %.2g N: presliding may come out too long - fix: %s"
-        log.warning(advice, loop.tremble, fix)
-    findings.plain("data/source.json", {"name": source.name, "sha256": sha256_of(source)})
-    _write_fit(findings, friction_fit)
-    findings.figure("measured", measured, friction_fit)
-    return friction_fit, _fit_table(findings, friction_fit)
-
-
-def _write_fit(findings: Findings, friction_fit: FrictionFit) -> None:
-    columns = {"time": friction_fit.problem.loop.time[friction_fit.problem.first :]}
-    names = ("theta", "tension_plus", "tension_minus")
-    for name, samples, residual in zip(names, friction_fit.problem.measured, friction_fit.residuals, strict=False):
-        columns |= {name: samples, f"{name}_model": samples - residual}
-    units = {name: "s" if name == "time" else "rad" if name.startswith("theta") else "N" for name in columns}
-    findings.table("data/measured.csv", columns, units)
-
-
-def _fit_table(findings: Findings, friction_fit: FrictionFit) -> Table:
-    rows: list[tuple[str, float, float | None, float | None, str, str]] = []
-    for name, (unit, meaning) in FITTED.items():
-        value, low, high = getattr(friction_fit, name)
-        ended = math.isfinite(high)
-        rows.append((name, value, low, high if ended else None, unit, meaning))
-        findings.metric(
-            name, value if ended else None, unit, "", friction_fit.count, (low, high) if ended else None, meaning
-        )
-    bend, exponent = friction_fit.told_best
-    meaning = f"mu (bend + sheath) at a bend of {math.degrees(bend):.3g} deg, where it is told best"
-    findings.metric("exponent", exponent.value, "", "", friction_fit.count, (exponent.low, exponent.high), meaning)
-    rows.append(("exponent", *exponent, "", meaning))
-    findings.metric("correlation", friction_fit.correlation, n=friction_fit.count, meaning=_CORRELATION)
-    rows.append(("correlation", friction_fit.correlation, None, None, "", _CORRELATION))
-    for name, unit, noise in zip(
-        ("angle", "+ tension", "- tension"), ("rad", "N", "N"), friction_fit.noise, strict=False
-    ):
-        rows.append((f"{name}, left over", float(noise), None, None, unit, "standard deviation of measured less model"))
-    heads = ("", "value", "95 % low", "95 % high", "unit", "meaning")
-    return Table(_fit_heading(friction_fit), heads, rows)
-
-
-_CORRELATION = "of mu with bend + sheath, as logarithms, at the mean bend"
-
-
-def _fit_heading(friction_fit: FrictionFit) -> str:
-    """Heading of the fit's table."""
-    friction, sheath, path = friction_fit.friction, friction_fit.sheath, friction_fit.presliding
-    presliding = f"presliding {_between(path, 1e6)} um" if math.isfinite(path.high) else "nothing of presliding"
-    if friction.low > 0.0 and math.isfinite(sheath.high):
-        apart = f"mu {_between(friction)}, sheath {_between(sheath)} rad"
-        return f"{friction_fit.problem.loop.name} tells {apart} and {presliding}"
-    bend, exponent = friction_fit.told_best
-    return (
-        f"{friction_fit.problem.loop.name} tells mu (bend + sheath), {_between(exponent)} at a bend of "
-        f"{math.degrees(bend):.3g} deg, and {presliding},\nbut not mu and the sheath apart: mu may be up to "
-        f"{number(friction.high)}, the sheath {number(sheath.low)} rad or more; a wider range of bend would tell"
-    )
-
-
-def _between(estimate: FrictionEstimate, scale: float = 1.0) -> str:
-    value, low, high = (number(scale * end) for end in estimate)
-    return f"{value} ({low} to {high})"
 
 
 _LOOPS = {
@@ -190,7 +78,13 @@ class Hysteresis(StudyResult):
 
     loops: list[HysteresisLoop]
     dead_bands: list[DeadBand]
-    fit: FrictionFit | None
+    fits: list[FrictionFit]
+    """Fits of a measured loop that were tried, the chosen one last."""
+
+    @property
+    def fit(self) -> FrictionFit | None:
+        """The chosen fit of a measured loop."""
+        return self.fits[-1] if self.fits else None
 
     @property
     def answer(self) -> Answer:
@@ -199,8 +93,7 @@ class Hysteresis(StudyResult):
 
         where = f", or {self.findings.run.path}/report.html" if self.findings.run else ""
         if self.fit is not None:
-            more = f"The loops of the model: --all{where}."
-            return measured_answer(self.fit, self.study.wrist, more)
+            return measured_answer(self.fits, self.study.wrist, f"All that was fitted: --all{where}.")
         return model_answer(self.loops, self.dead_bands, main_case(self.study.hysteresis), f"Every loop: --all{where}.")
 
     @property
@@ -221,26 +114,28 @@ class Hysteresis(StudyResult):
 
 
 def plan(study: Study, inputs: Inputs) -> str:
-    """See that the wrist can be driven so, and that a measured loop can be read."""
+    """See that the wrist can be driven so, or that a measured loop can be read."""
     from wristctl.simulation.hysteresis import loop_cases
     from wristctl.simulation.spool_driven import strokes
 
     settings = study.hysteresis
+    if settings.measured is not None:
+        problem = problem_of(study)
+        return f"{', '.join(FITTED)} from {len(problem.measured[0])} samples of {problem.loop.name}"
     strokes(study.wrist, settings)
     count, lasts = len(loop_cases(settings)), 1.5 * sum(1.0 / frequency for frequency in settings.frequencies)
-    size_text = f"{count} loops, {lasts * count / len(settings.frequencies):.3g} simulated seconds"
-    if settings.measured is None:
-        return size_text
-    problem = problem_of(study)
-    return f"{size_text}; {', '.join(FITTED)} from {len(problem.measured[0])} samples of {problem.loop.name}"
+    return f"{count} loops, {lasts * count / len(settings.frequencies):.3g} simulated seconds"
 
 
 def hysteresis(session: Session) -> Hysteresis:
-    """Drive the wrist through hysteresis loops, and fit tendon friction to a measured one.
+    """Drive the wrist through hysteresis loops, or fit friction to a measured one.
 
-    Its spools go to and fro at several speeds, over several ranges, for several frictions. Of a measured loop (a CSV
-    file) coefficient, sheath and presliding are found, with 95 % intervals.
+    Its spools go to and fro at several speeds, over several ranges, for several frictions. Of a measured loop (an open
+    log) friction of tendons and wrist, stiffness, radius and slack are found, with 95 % intervals; one that no model
+    fits is refused.
     """
+    if session.study.hysteresis.measured is not None:
+        return _of_measured(session)
     from wristctl.commands.hysteresis import figures
     from wristctl.simulation.hysteresis import dead_bands, loops, main_case
     from wristctl.simulation.spool_driven import strokes
@@ -250,13 +145,12 @@ def hysteresis(session: Session) -> Hysteresis:
     with session.progress("compiling and driving loops", 100, "%") as advance:
         driven = loops(driven_strokes, lambda share: advance(round(100.0 * share)))
         bands = dead_bands(driven_strokes)
-    fit, answer = fit_measured(session) if settings.measured is not None else (None, None)
     shortest = min([item.step for item in driven] + [each.step for each in bands])
     findings.numerics(integrator="RODAS3", step=shortest, segments=settings.segments)
     open_ = _still_change(driven, bands)
     findings.metric("not_converged", open_, "", "lower", len(driven) + len(bands), meaning=_NOT_CONVERGED)
-    tables = [*([answer] if answer else []), *_tables(findings, driven, bands, main_case(settings))]
-    result = Hysteresis(session.study, findings, tables, driven, bands, fit)
+    tables = _tables(findings, driven, bands, main_case(settings))
+    result = Hysteresis(session.study, findings, tables, driven, bands, [])
     _write(findings, result)
     with session.progress("drawing"):
         if bands:
@@ -265,6 +159,24 @@ def hysteresis(session: Session) -> Hysteresis:
         if len(settings.ranges_deg) > 1:
             findings.figure("minor-loops", figures.minor_loops, driven_strokes, driven)
         findings.figure("work", figures.work, driven_strokes, driven)
+    return result
+
+
+def _of_measured(session: Session) -> Hysteresis:
+    """Fit a measured loop; one that no model fits is refused, with all that was found in the run."""
+    fits, tables = fit_measured(session)
+    chosen, settings = fits[-1], session.study.hysteresis
+    session.findings.numerics(integrator="RODAS3", step=chosen.problem.step, segments=settings.segments)
+    result = Hysteresis(session.study, session.findings, tables, [], [], fits)
+    try:
+        refuse_misfit(fits)
+    except UserError:
+        text = "\n".join(result.answer.lines())
+        session.findings.summary(
+            "\n\n".join(f"```\n{part}\n```" for part in (text, *(table.text() for table in tables)))
+        )
+        session.operator.tell(text)
+        raise
     return result
 
 

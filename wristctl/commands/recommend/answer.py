@@ -175,7 +175,9 @@ def _notes(result: Recommended) -> list[str]:
     notes.append(
         f"{_up_to(result.motions, 'Hz', sine)} {_up_to(result.payloads, 'kg', 'an unknown payload in the hand')}"
     )
-    return [*notes, "Next, emulated (on a real rig: --set port=/dev/ttyACM0):", f"$ {result.next_command}"]
+    emulated = result.next_command.startswith("wristctl hw-run")
+    how = "emulated (on a real rig: --set port=/dev/ttyACM0)" if emulated else "simulated (hw-run has no such rig)"
+    return [*notes, f"Next, {how}:", f"$ {result.next_command}"]
 
 
 def _up_to(limits: Sequence[Limit], unit: str, subject: str) -> str:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import shlex
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
@@ -13,6 +12,7 @@ from wristctl.commands.inputs_of_loops import identified
 from wristctl.commands.loop_warnings import warn_if_coarse, warn_if_it_buckles
 from wristctl.commands.procedure import Procedure
 from wristctl.commands.recommend.answer import RECOMMENDED, Candidate, Limit, Recommended, sine_deg, spread
+from wristctl.commands.recommend.study_file import next_command, study_file
 from wristctl.commands.results import Findings
 from wristctl.commands.session import Session
 from wristctl.config.families import Family, TuningWorlds
@@ -115,11 +115,13 @@ def recommend(session: Session) -> Recommended:
     ranking = _tested(session, study, family, candidates)
     result = Recommended(session.study, findings, [], reach, candidates, ranking, searches, [], [], "")
     if result.best is None:
-        return _recorded(result)
+        return _recorded(study, result)
     with session.progress("how fast and how heavy"):
         motions = [_limit(study, result.best, rate, _sines(family, reach, rate)) for rate in settings.frequencies]
         payloads = [_limit(study, result.best, mass, _laden(family, mass)) for mass in settings.payloads]
-    return _recorded(replace(result, motions=motions, payloads=payloads, next_command=_next_command(session)))
+    file = str(findings.run.path / RECOMMENDED) if findings.run else RECOMMENDED
+    command = next_command(study, session.typed, file)
+    return _recorded(study, replace(result, motions=motions, payloads=payloads, next_command=command))
 
 
 def _searches(session: Session, study: Study, family: Family, scaled: Sequence[Controller]) -> dict[str, Search]:
@@ -174,7 +176,7 @@ def _tested(session: Session, study: Study, family: Family, candidates: Sequence
         for number, candidate in enumerate(candidates, start=1):
             law = controller(candidate.controller)
             gains = np.array([list(law.values(candidate.gains))])
-            measured.append(measure(law, gains, cases, study.wrist, [*RANKED, "sustained"]))
+            measured.append(measure(law, gains, cases, study.wrist, RANKED))
             advance(number)
     rows = [
         RankedRow(
@@ -222,17 +224,8 @@ def _limit(study: Study, best: Candidate, value: float, family: Family) -> Limit
     return Limit(value, _RIGS_AT_LIMITS, int(lost.sum()), error, own.largest_swing(open_loop))
 
 
-def _next_command(session: Session) -> str:
-    """The trial of what is recommended, on the wrist as it was typed; settings of the recommendation are none of it."""
-    run, typed = session.findings.run, list(session.typed)
-    while "--set" in typed and any(word.startswith("recommend.") for word in typed):
-        place = next(k for k, word in enumerate(typed) if word.startswith("recommend.") and typed[k - 1] == "--set")
-        del typed[place - 1 : place + 1]
-    return shlex.join(["wristctl", "hw-run", *typed, str(run.path / RECOMMENDED) if run else RECOMMENDED])
-
-
-def _recorded(result: Recommended) -> Recommended:
-    """The result, its figures, tables and gains written."""
+def _recorded(study: Study, result: Recommended) -> Recommended:
+    """The result, its figures, tables and study file written; `study` has the wrist that was identified."""
     from wristctl.commands.recommend.figures import errors, limits
     from wristctl.comparison.world_ranking import worlds_frame
 
@@ -252,22 +245,19 @@ def _recorded(result: Recommended) -> Recommended:
     findings.metric("rmse_high", high, "rad", "lower", ranked.count, meaning=f"{meaning}: 9 of 10 stay below")
     findings.headline("rmse", "rmse_low", "rmse_high", "reach_deg")
     findings.figure("limits", limits, result, caption="Error and lost rigs over frequency and over payload")
-    _write_gains(findings, best, result.candidates)
+    _write_file(study, findings, best, result)
     return result
 
 
-def _write_gains(findings: Findings, best: Candidate, candidates: Sequence[Candidate]) -> None:
-    """A study file with the recommended controller, for `simulate` and `hw-run`; one of one's own is the run's copy."""
+def _write_file(study: Study, findings: Findings, best: Candidate, result: Recommended) -> None:
+    """The study file; a controller of one's own is the run's copy."""
     from wristctl.control.table import CONTROLLERS
     from wristctl.records.copied_inputs import sealed_references
 
-    origins = [CONTROLLERS.origin(name) for name in dict.fromkeys(one.controller for one in candidates)]
+    origins = [CONTROLLERS.origin(name) for name in dict.fromkeys(one.controller for one in result.candidates)]
     copies, origin = sealed_references([one for one in origins if one]), CONTROLLERS.origin(best.controller)
-    name = f'"../{copies[origin.reference]}"' if origin else best.controller
-    gains = ", ".join(f"{gain}: {value:.6g}" for gain, value in best.gains.items())
-    row = f"{{controller: {name}, gains: {{{gains}}}}}"
-    head = f"# {best.label}, as `wristctl recommend` found it. After a wrist's file: wristctl hw-run WRIST.yaml THIS"
-    findings.text(RECOMMENDED, f"{head}\nsimulate: {row}\nhw-run:\n  controllers:\n    - {row}\n")
+    name = f"../{copies[origin.reference]}" if origin else best.controller
+    findings.text(RECOMMENDED, study_file(study, best, name, result.reach_deg))
 
 
 RECOMMEND = Procedure("recommend", plan, recommend, (EarlierRun("from_identified", kind="identify", optional=True),))

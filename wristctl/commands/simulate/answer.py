@@ -180,6 +180,8 @@ def _disturbances(loop: Loop) -> list[str]:
         parts.append(f"a push of {disturbances.push.force:g} N at {disturbances.push.start:g} s")
     if disturbances.load:
         parts.append(f"a constant load of {disturbances.load:g} N")
+    if disturbances.grasp.mass:
+        parts.append(f"an object of {abs(disturbances.grasp.mass):g} kg taken up at {disturbances.grasp.start:g} s")
     if disturbances.drift.scale != 1.0:
         parts.append(f"a stiffness that drifts to {disturbances.drift.scale:g} times")
     return parts

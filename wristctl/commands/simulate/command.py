@@ -6,6 +6,7 @@ import math
 import shlex
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from wristctl.commands.answer import Answer
@@ -124,7 +125,7 @@ def simulate(session: Session) -> Simulated:
     from wristctl.commands.simulate.figures import consistency, sliding
     from wristctl.commands.truth_table import truth_heading, truth_tables
     from wristctl.control.table import controller, gains_of
-    from wristctl.plotting.loop_figures import angles, error_sizes, errors, tensions
+    from wristctl.plotting.loop_figures import angles, error_sizes, errors, one_motion, tensions
     from wristctl.plotting.wrist_drawing import stroboscope
     from wristctl.simulation.closed_loop import scenario_of
     from wristctl.simulation.closed_loop import simulate as run_simulation
@@ -152,19 +153,22 @@ def simulate(session: Session) -> Simulated:
     tables = [_table(findings, title, repeated), *truth_tables(wrist, {"simulate": settings.loop})]
     with session.progress("drawing"):
         world = truth_heading(wrist, settings.loop)
-        findings.figure("angle", angles, [course], heading=world)
-        findings.figure("error", errors, [course], heading=world)
+        caption = "Bending angle, error and tensions over time; what changes faster is a band about its mean"
+        findings.figure("course", one_motion, course, heading=world, caption=caption)
         if len(repeated.failed) > 1:
             findings.figure("error-repetitions", error_sizes, [repeated])
-        findings.figure("tensions", tensions, course)
+        later = partial(findings.figure, later=True)
+        later("angle", angles, [course], heading=world)
+        later("error", errors, [course], heading=world)
+        findings.figure("tensions", tensions, course, later=not repeated.marks)
         if course.load is not None and course.expected > 0.0:
-            findings.figure("observer", consistency, course, heading=world)
+            later("observer", consistency, course, heading=world)
         law = controller(settings.controller)
         if law.surface is not None and not failed:
             gains = dict(zip(law.gains, gains_of(law, settings.gains, tuned_gains(session.inputs)), strict=True))
-            caption = "How the motion comes to the law's sliding surface: phase plane, and sigma over time"
-            findings.figure("sliding", sliding, course, law.surface, gains, caption=caption)
-        findings.figure("motion", stroboscope, course, wrist, plant=settings.loop.plant.model)
+            caption = "How the motion comes to the controller's sliding surface: phase plane, and sigma over time"
+            later("sliding", sliding, course, law.surface, gains, caption=caption)
+        later("motion", stroboscope, course, wrist, plant=settings.loop.plant.model)
     short_of, advice = ("", []) if failed or repeated.arrives else _short_of(session, study, repeated, network, beyond)
     return Simulated(session.study, findings, tables, repeated, failed, short_of, advice)
 
@@ -200,7 +204,7 @@ def _short_of(
 
 def _table(findings: Findings, title: str, repeated: Repeated) -> Table:
     """Every metric: its value, or of several repetitions the median with its 95 % interval."""
-    import pandas as pd
+    import numpy as np
 
     from wristctl.comparison.repetition_spread import spread
     from wristctl.simulation.metrics import METRICS
@@ -219,10 +223,11 @@ def _table(findings: Findings, title: str, repeated: Repeated) -> Table:
             rows.append((name, estimate.median, estimate.low, estimate.high, metric.unit, metric.formula))
     if once:
         return Table(title, ("metric", "value", "unit", "meaning"), rows)
-    every = pd.DataFrame({"repetition": range(len(repeated.failed)), "failed": repeated.failed, **repeated.metrics})
+    count = len(repeated.failed)
+    every = {"repetition": np.arange(count), "failed": repeated.failed, **repeated.metrics}
     findings.table("data/repetitions.csv", every, {name: metric.unit for name, metric in METRICS.items()})
     heads = ("metric", "median", "95 % low", "95 % high", "unit", "meaning")
-    return Table(f"{title}, {len(every)} repetitions", heads, rows)
+    return Table(f"{title}, {count} repetitions", heads, rows)
 
 
 SIMULATE = sweepable(

@@ -3,9 +3,12 @@
 from collections.abc import Mapping
 
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from wristctl.arrays import Array
 from wristctl.control.law import Surface
+from wristctl.plotting.loop_figures import in_parts
 from wristctl.plotting.style import (
     BLACK,
     BLUE,
@@ -20,13 +23,14 @@ from wristctl.plotting.style import (
 )
 from wristctl.simulation.trajectory import Trajectory
 
-_FIRST_RATE = 1e-9
+# Least rate [deg/s] to either side, and least |sigma| over its layer, that are drawn.
+_FIRST_RATE, _LEAST_SHARE = 1e-9, 1e-6
 
 
 def sliding(course: Trajectory, surface: Surface, gains: Mapping[str, float]) -> Figure:
     """Left the error and its rate over the surface; right |sigma| over the width of its layer, log, over time [s].
 
-    The rate is the one that the law reads; until sigma has come into the layer for good it is drawn in vermillion.
+    The rate is the one that the controller reads. What comes before sigma stays in the layer is drawn in vermillion.
     """
     a, b, c = surface.weights(gains)
     step = float(course.time[1] - course.time[0])
@@ -43,19 +47,30 @@ def sliding(course: Trajectory, surface: Surface, gains: Mapping[str, float]) ->
     plane.fill_between(span, -a / b * span - layer, -a / b * span + layer, color=LIGHT, linewidth=0.0, label="layer")
     plane.plot(span, -a / b * span, color=BLACK, linewidth=1.0, label="surface, without its integral")
     plane.set_ylim(1.1 * min(speed.min(), -_FIRST_RATE), 1.1 * max(speed.max(), _FIRST_RATE))
-    for phase, colour, label in (
-        (slice(0, reached + 1), VERMILLION, "reaching"),
-        (slice(reached, None), BLUE, "in the layer for good"),
-    ):
-        plane.plot(error[phase], speed[phase], color=colour, linewidth=1.0, label=label)
-        over_time.plot(course.time[phase], np.maximum(share[phase], 1e-12), color=colour, linewidth=1.0)
+    phases = [(slice(0, reached + 1), VERMILLION, "reaching"), (slice(reached, None), BLUE, "in the layer for good")]
+    for phase, colour, label in phases[: 1 if reached >= len(share) else 2]:
+        _draw_phase(plane, error[phase], speed[phase], colour, label)
+        _draw_share(over_time, course.time[phase], np.maximum(share[phase], _LEAST_SHARE), colour)
     over_time.axhline(1.0, color=BLACK, linewidth=0.8)
     logarithmic(over_time.yaxis)
     plane.set(xlabel="error [deg]", ylabel="rate [deg/s]")
-    over_time.set(xlabel="time [s]", ylabel="|sigma| over its layer [1]")
+    over_time.set(xlabel="time [s]", ylabel="|sigma| / layer [1]")
     title(plane, course.label)
     legend_below(fig, 2)
     return fig
+
+
+def _draw_phase(axes: Axes, error: Array, speed: Array, shade: str, name: str) -> None:
+    """A path in the phase plane: pale as it is, and that of its means, so that what jumps fills no area."""
+    axes.plot(error, speed, color=shade, linewidth=0.4, alpha=0.2)
+    axes.plot(in_parts(error).mean(axis=1), in_parts(speed).mean(axis=1), color=shade, linewidth=1.2, label=name)
+
+
+def _draw_share(axes: Axes, time: Array, share: Array, shade: str) -> None:
+    """A positive course for a logarithmic axis: its medians in a pale band from least to largest."""
+    parts, middle = in_parts(share), in_parts(time).mean(axis=1)
+    axes.fill_between(middle, parts.min(axis=1), parts.max(axis=1), color=shade, alpha=0.25, linewidth=0.0)
+    axes.plot(middle, np.median(parts, axis=1), color=shade, linewidth=1.2)
 
 
 _NORMAL_95 = 1.96
@@ -67,11 +82,11 @@ def consistency(course: Trajectory, heading: str = "") -> Figure:
     error, band = np.degrees(course.seen - course.theta), _NORMAL_95 * np.degrees(course.expected)
     fig, axes = figure(2, 1, height=4.2, sharex=True)
     upper, lower = axes[:, 0]
-    upper.axhspan(-band, band, color=GREY, alpha=0.35, linewidth=0.0, label="95 % by what it believes")
-    upper.plot(course.time, error, color=VERMILLION, linewidth=1.0, label="observer less true angle")
+    upper.axhspan(-band, band, color=GREY, alpha=0.35, linewidth=0.0, label="band of 95 % that the observer expects")
+    upper.plot(course.time, error, color=VERMILLION, linewidth=1.0, label="observed less true angle")
     upper.set_ylabel("error [deg]")
     within = 100.0 * np.mean(np.abs(error) <= band)
-    title(upper, f"{course.label}: {within:.0f} % within, RMS {course.consistency:.2g} times what it expects")
+    title(upper, f"{within:.0f} % in the band, RMS {course.consistency:.2g} times as expected")
     legend(upper, loc="upper right")
     lower.plot(course.time, course.load, color=BLUE, linewidth=1.0)
     lower.axhline(0.0, color=BLACK, linewidth=0.8, zorder=1.0)

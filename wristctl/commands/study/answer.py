@@ -9,15 +9,15 @@ from typing import TYPE_CHECKING
 from wristctl.commands.answer import Answer
 from wristctl.commands.printed_table import Table, joined
 from wristctl.commands.ranking_answer import advice, certainty, decision_table, do_not_use, fitted
-from wristctl.commands.ranking_words import names_of
+from wristctl.commands.ranking_words import condition, names_of, winner
 
 if TYPE_CHECKING:
-    from wristctl.comparison.controller_ranking import Ranking
     from wristctl.comparison.paired_worlds import OrderShift, TermValue
+    from wristctl.comparison.tuned_ranking import TunedRanking
 
 
 def answer_of(
-    rankings: Sequence[Ranking], terms: Sequence[TermValue], shifts: Sequence[OrderShift], run: str = ""
+    rankings: Sequence[TunedRanking], terms: Sequence[TermValue], shifts: Sequence[OrderShift], run: str = ""
 ) -> Answer | None:
     """The answer of a study for one screen; None where nothing was ranked.
 
@@ -36,7 +36,7 @@ def answer_of(
         return None
     names = names_of(rankings)
     more = f"Every controller: `--all`, or {run}/report.html." if run else "Every controller: `.tables`."
-    sure = certainty(rankings)
+    sure = f"{certainty(rankings)} {first_again(rankings)}".strip()
     notes: list[tuple[str | Table, str | Table]] = [
         (terms_table(terms) if terms else "", ""),
         (do_not_use(rankings, names), _fewer(rankings)),
@@ -45,10 +45,25 @@ def answer_of(
     return fitted(Answer(advice(rankings), decision_table(rankings, names)), notes)
 
 
-def _fewer(rankings: Sequence[Ranking]) -> str:
-    """How many controllers must not be used where, and where they are named."""
-    from wristctl.commands.ranking_words import condition
+def first_again(rankings: Sequence[TunedRanking]) -> str:
+    """How often the best is first again: in halves of the worlds, and in single tunings of all."""
+    from wristctl.comparison.repeated_tunings import HALVES
 
+    facts = []
+    for ranking in rankings:
+        row = winner(ranking, rankings)
+        if row is None or len([one for group in ranking.standing.groups for one in group]) < 2:
+            continue
+        firsts = ranking.firsts(row)
+        name = ranking.labels[row].split("/")[0]
+        facts.append(f"{condition(ranking)} {name} {firsts.halves} and {firsts.tunings} of {firsts.of_tunings}")
+    if not facts:
+        return ""
+    return f"First in how many of {HALVES} halves of the worlds, and with how many tunings: {'; '.join(facts)}."
+
+
+def _fewer(rankings: Sequence[TunedRanking]) -> str:
+    """How many controllers must not be used where, and where they are named."""
     counts = [
         f"{len(one.standing.unusable)} of {len(one.labels)} in {condition(one)}"
         for one in rankings

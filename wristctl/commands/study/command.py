@@ -73,13 +73,15 @@ def plan(study: Study, inputs: Inputs) -> str:
         check_family_reach(study, name)
     searches = sum(unit.size for unit in search_units(study).values())
     per_world = sum(len(family.references) * noises_of(family, budget.noises) for family in families.values())
-    judged = per_world * budget.worlds * len(labels)
+    rows = len(settings.laws) * budget.tunings + len(labels) - len(settings.laws)
+    judged = per_world * budget.worlds * rows
     longest = max(Size([studied.loop], studied.horizon).steps for studied in families.values())
     with under("study"):
         check_steps((searches + judged) * longest, searches + judged)
     evaluations = budget.candidates * budget.iterations
     return (
-        f"{len(settings.laws)} laws with {evaluations} evaluations each on {', '.join(families)}, judged with "
+        f"{len(settings.laws)} laws, each tuned {budget.tunings} times with {evaluations} evaluations on "
+        f"{budget.draws} worlds of {', '.join(families)}, judged with "
         f"{len(labels) - len(settings.laws)} presets on {budget.worlds} held-out worlds of each: "
         f"{searches} rollouts of searches and {judged} of judgements"
     )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
@@ -10,7 +11,8 @@ from wristctl.commands.printed_table import Table
 from wristctl.commands.ranking_drawing import draw_rankings
 from wristctl.commands.ranking_tables import answer_tables, every_row
 from wristctl.commands.session import Session
-from wristctl.commands.study.units import BASE, Studied, StudyPlace, families_of
+from wristctl.commands.study.published import PUBLISHED, published, published_gains
+from wristctl.commands.study.units import BASE, Studied, StudyPlace, budget_of, families_of
 from wristctl.config.study import Study
 
 if TYPE_CHECKING:
@@ -18,11 +20,12 @@ if TYPE_CHECKING:
 
     from wristctl.comparison.paired_worlds import OrderShift, TermValue
     from wristctl.comparison.step_cost import StepTime
-    from wristctl.comparison.world_ranking import WorldRanking
+    from wristctl.comparison.tuned_ranking import TunedRanking
     from wristctl.tuning.search import Search
     from wristctl.work.fan_out import Poisoned
 
-Pieces = Mapping[StudyPlace, Sequence[Mapping[str, "np.ndarray"]]]
+Piece = Mapping[str, "np.ndarray"]
+Pieces = Mapping[StudyPlace, Sequence[Piece]]
 
 
 def written(session: Session, judged: Pieces, searches: dict[StudyPlace, Search], poisoned: list[Poisoned]) -> Studied:
@@ -59,25 +62,41 @@ def written(session: Session, judged: Pieces, searches: dict[StudyPlace, Search]
     return Studied(study, session.findings, shown, rankings, searches, terms, shifts, poisoned)
 
 
-def _rankings(study: Study, judged: Pieces) -> dict[str, WorldRanking]:
-    """Rankings by name: that of the family, and `family, steps` for its steps where it has other motions."""
-    from wristctl.comparison.world_ranking import kinds_of, ranking, row_of
+def _tunings(study: Study, judged: Pieces, variant: str, family: str) -> dict[str, list[Sequence[Piece]]]:
+    """What was judged of each row, by label: its tunings in order. A row of which one was given up is left out."""
+    places = [place for place in judged if (place.variant, place.family) == (variant, family)]
+    wanted = {f"{law}/tuned": budget_of(study.study).tunings for law in study.study.laws}
+    counts = Counter(place.label for place in places)
+    complete = [place for place in places if counts[place.label] == wanted.get(place.label, 1)]
+    rows: dict[str, list[Sequence[Piece]]] = {}
+    for place in sorted(complete, key=lambda place: place.tuning):
+        rows.setdefault(place.label, []).append(judged[place])
+    return {label: rows[label] for label in dict.fromkeys(place.label for place in complete)}
+
+
+def _rankings(study: Study, judged: Pieces) -> dict[str, TunedRanking]:
+    """Rankings by name: that of the family, and `family, steps` for its steps where it has other motions.
+
+    The gains that are published are the same in both.
+    """
+    from wristctl.comparison.tuned_ranking import published_tuning, tuned_ranking
+    from wristctl.comparison.world_ranking import kinds_of, row_of
     from wristctl.tuning.objective import YARDSTICK
 
-    rankings = {}
+    rankings = dict[str, "TunedRanking"]()
     for family in families_of(study):
-        of_family = {
-            place: pieces for place, pieces in judged.items() if (place.variant, place.family) == (BASE, family)
-        }
-        laws = [place.law for place in of_family]
-        if YARDSTICK not in laws:
+        of_family = _tunings(study, judged, BASE, family)
+        if f"{YARDSTICK}/default" not in of_family:
             continue
-        family_of = study.families[family]
+        family_of, published = study.families[family], list[int]()
         for steps, motions in kinds_of(family_of).items():
+            (open_loop,), width = of_family[f"{YARDSTICK}/default"], study.wrist.tension_range
             rows = [
-                row_of(place.label, pieces, study.wrist.tension_range, motions) for place, pieces in of_family.items()
+                [row_of(label, pieces, width, motions, None, open_loop) for pieces in tunings]
+                for label, tunings in of_family.items()
             ]
-            one = ranking(family, family_of, rows, study.study.tolerated, steps)
+            published = published or [published_tuning(of_row) for of_row in rows]
+            one = tuned_ranking(family, family_of, rows, published, study.study.tolerated, steps)
             rankings[one.name] = one
     return rankings
 
@@ -88,18 +107,16 @@ def _shifts(study: Study, judged: Pieces) -> list[OrderShift]:
     from wristctl.comparison.world_ranking import kinds_of, row_of
 
     shifts, width = [], study.wrist.tension_range
+    varied = study.study.varied or families_of(study)[0]
+    motions = next(iter(kinds_of(study.families[varied]).values()))
     for variant, way in study.study.variants.items():
-        after = {place: pieces for place, pieces in judged.items() if place.variant == variant}
-        before = {place: judged.get(place._replace(variant=way.beside or BASE)) for place in after}
-        pairs = [(place, earlier, after[place]) for place, earlier in before.items() if earlier is not None]
+        before, after = (_tunings(study, judged, name, varied) for name in (way.beside or BASE, variant))
+        labels = [label for label in after if label in before]
         rows = [
-            [
-                row_of(place.label, pieces, width, next(iter(kinds_of(study.families[place.family]).values())), 1)
-                for place, pieces in side
-            ]
-            for side in ([(p, b) for p, b, _ in pairs], [(p, a) for p, _, a in pairs])
+            [[row_of(label, pieces, width, motions, 1) for pieces in side[label]] for label in labels]
+            for side in (before, after)
         ]
-        if pairs:
+        if labels:
             name = f"{variant} beside {way.beside}" if way.beside else variant
             shifts.append(order_shift(name, *rows))
     return shifts
@@ -107,17 +124,19 @@ def _shifts(study: Study, judged: Pieces) -> list[OrderShift]:
 
 def _note_streams(session: Session) -> None:
     from wristctl.simulation.drawn_worlds import streams_of
+    from wristctl.tuning.search import search_stream
 
     study, findings = session.study, session.findings
     for name in families_of(study):
         for split in ("tune", "validation", "test"):
             findings.note_streams(streams_of(study.families[name], name, split))
-    findings.note_streams(f"search {law}" for law in study.study.laws)
+    tunings = range(budget_of(study.study).tunings)
+    findings.note_streams(search_stream(f"search {law}", tuning) for law in study.study.laws for tuning in tunings)
 
 
 def _tables(
     session: Session,
-    rankings: Mapping[str, WorldRanking],
+    rankings: Mapping[str, TunedRanking],
     terms: Sequence[TermValue],
     shifts: Sequence[OrderShift],
     searches: Mapping[StudyPlace, Search],
@@ -125,13 +144,11 @@ def _tables(
     """Tables and numbers for programs."""
     import pandas as pd
 
-    from wristctl.comparison.world_ranking import RANKED, ranking_frame
+    from wristctl.comparison.world_ranking import ranked_units, ranking_frame
     from wristctl.control.table import write_gains
-    from wristctl.simulation.metrics import METRICS
 
     findings = session.findings
-    units = {name: METRICS[name].unit or "1" for name in RANKED}
-    units |= dict.fromkeys(("rmse_low", "rmse_high", "worst_rmse"), "rad")
+    units = ranked_units() | dict.fromkeys(("rmse_low", "rmse_high", "worst_rmse"), "rad")
     for name, ranking in rankings.items():
         slug = _slug(name)
         findings.table(f"data/ranking-{slug}.csv", ranking_frame(ranking), units=units)
@@ -142,14 +159,13 @@ def _tables(
             mean = ranking.means[index]
             interval = (mean.low, mean.high) if math.isfinite(mean.high) else None
             findings.metric(f"rmse_{slug}_{row.label}", mean.value, "rad", "lower", ranking.count, interval)
+        if len(tunings := ranking.tunings_frame()):
+            findings.table(f"data/tunings-{slug}.csv", tunings, dict.fromkeys(map(str, tunings.columns), "1"))
     for family in families_of(session.study):
-        if file := findings.file(f"data/gains-{family}.json"):
-            gains = {
-                place.law: search.gains
-                for place, search in searches.items()
-                if (place.variant, place.family) == (BASE, family)
-            }
-            write_gains(file, gains)
+        if family in rankings and (file := findings.file(f"data/gains-{family}.json")):
+            write_gains(file, published_gains(rankings[family], searches))
+    of_families = {name: published(rankings[name], searches) for name in families_of(session.study) if name in rankings}
+    findings.plain(PUBLISHED, of_families)
     flat = [
         {"term": value.term, "family": value.family, "without": value.without, "with": value.given,
          "times": value.times.value, "low": value.times.low, "high": value.times.high,
@@ -179,7 +195,7 @@ def _step_times(session: Session, searches: Mapping[StudyPlace, Search]) -> dict
     return times
 
 
-def _draw(session: Session, rankings: Mapping[str, WorldRanking], terms: Sequence[TermValue]) -> None:
+def _draw(session: Session, rankings: Mapping[str, TunedRanking], terms: Sequence[TermValue]) -> None:
     from wristctl.commands.study.figures import laws_by_rig, pareto, terms_by_rig, world_map
     from wristctl.plotting.ranking_figures import ranking_intervals
 

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
     from wristctl.comparison.paired_worlds import OrderShift, TermValue
-    from wristctl.comparison.world_ranking import WorldRanking
+    from wristctl.comparison.tuned_ranking import TunedRanking
     from wristctl.tuning.search import Search
     from wristctl.work.fan_out import Poisoned
     from wristctl.work.worker import Golden, Unit
@@ -29,12 +29,13 @@ BASE = ""
 
 
 class StudyPlace(NamedTuple):
-    """Variant, family, row and law of a search or a judgement."""
+    """Variant, family, row, law and tuning of a search or a judgement; gains that are not searched have one tuning."""
 
     variant: str
     family: str
     label: str
     law: str
+    tuning: int = 0
 
 
 def budget_of(settings: FairStudySettings) -> StudyBudget:
@@ -60,14 +61,15 @@ def ways_to_tune(study: Study) -> list[tuple[str, str, TuneSettings]]:
 
 
 def search_units(study: Study) -> dict[StudyPlace, Unit]:
-    """A search for every law on every family, and for every variant on one."""
+    """Searches for every law on every family, and for every variant on one, as many as the budget has tunings."""
     from wristctl.tuning.search import search_unit
 
     units = dict[StudyPlace, "Unit"]()
     for name, family, settings in ways_to_tune(study):
         tuned = study.model_copy(update={"tune": settings})
         for law in study.study.laws:
-            units[StudyPlace(name, family, f"{law}/tuned", law)] = search_unit(tuned, law)
+            for tuning in range(budget_of(study.study).tunings):
+                units[StudyPlace(name, family, f"{law}/tuned", law, tuning)] = search_unit(tuned, law, tuning)
     return units
 
 
@@ -123,7 +125,7 @@ class Studied(StudyResult):
 
     kind = "study"
 
-    rankings: dict[str, WorldRanking]
+    rankings: dict[str, TunedRanking]
     """Rankings by family."""
     searches: dict[StudyPlace, Search]
     terms: list[TermValue]

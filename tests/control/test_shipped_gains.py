@@ -1,0 +1,96 @@
+"""Gains that a study found, by the name of their family: the numbers, and what speaks against them on a loop."""
+
+from __future__ import annotations
+
+import re
+from typing import Any
+
+import pytest
+
+import wristctl
+from tests.documented import DOCS, script_of_docs
+from wristctl.commands.loop_warnings import outside_conditions
+from wristctl.config.controller_row import Row
+from wristctl.config.loop import Loop
+from wristctl.control import shipped_gains
+from wristctl.control.shipped_gains import PREFIX, families
+from wristctl.control.table import CONTROLLERS, controller, gains_of
+from wristctl.errors import UserError
+
+CAMERA = {
+    "about": "a rig",
+    "conditions": {"period": [5e-3, 5e-3], "tendon_stiffness": [8e3, 3e4]},
+    "worlds": 40,
+    "run": "20260101T000000Z-study-x",
+    "controllers": {
+        "pd-ff": {"gains": {"Kd": 0.25, "Kp": 3.5}, "rmse": 0.004, "lost": 0, "reliable": True},
+        "pid-ff": {"gains": {"Kp": 3.0, "Ki": 1.0, "Kd": 0.2}, "rmse": 0.003, "lost": 9, "reliable": False},
+    },
+}
+RIG = {"control_period": 5e-3, "actuator": {"level": "tendon"}, "sensor": {"level": "camera"}}
+
+
+@pytest.fixture
+def shipped(monkeypatch: pytest.MonkeyPatch) -> None:
+    content = {"camera": CAMERA, "ideal": CAMERA | {"conditions": None}}
+    monkeypatch.setattr(shipped_gains, "_shipped", lambda: content)
+
+
+def rig(**actuator: Any) -> Loop:
+    return Loop.model_validate(RIG | {"actuator": {"level": "tendon"} | actuator})
+
+
+@pytest.mark.usefixtures("shipped")
+def test_gains_of_a_family_are_its_numbers_in_the_controllers_order() -> None:
+    assert gains_of(controller("pd-ff"), "tuned:camera") == (3.5, 0.25)
+    by_name, by_value = (
+        wristctl.simulate(wristctl.load_study(None, "simulate.controller=pd-ff", f"simulate.gains={gains}"))
+        for gains in ("tuned:camera", "{Kp: 3.5, Kd: 0.25}")
+    )
+    assert (by_name.trajectory.theta == by_value.trajectory.theta).all()
+
+
+@pytest.mark.usefixtures("shipped")
+@pytest.mark.parametrize(
+    "name, gains, told",
+    [
+        ("pd-ff", "tuned:camra", "unknown gains 'tuned:camra'.*did you mean 'tuned:camera'"),
+        ("smc", "tuned:camera", "no gains of smc are shipped for 'camera'.*pd-ff, pid-ff"),
+        ("pd-ff", "tuned:", "no study of '' is shipped"),
+        ("pd-ff", "tunedcamera", "unknown gains 'tunedcamera' of pd-ff.*tuned:camera"),
+    ],
+)
+def test_what_is_not_shipped_is_named_with_what_is(name: str, gains: str, told: str) -> None:
+    with pytest.raises(UserError) as raised:
+        gains_of(controller(name), gains)
+    assert re.search(told, str(raised.value)) and raised.value.exit_code == 2
+
+
+@pytest.mark.usefixtures("shipped")
+def test_they_warn_outside_the_family_and_where_the_study_lost_worlds() -> None:
+    def warned(name: str, gains: str, loop: Loop) -> list[str]:
+        return outside_conditions([Row(controller=name, gains=gains)], [loop])
+
+    assert warned("pd-ff", "tuned:camera", rig(tendon_stiffness=2e4)) == []
+    (soft,) = warned("pd-ff", "tuned:camera", rig(tendon_stiffness=6e3))
+    assert "found for tendons of 8 to 30 kN/m, not 6" in soft
+    (ideal,) = warned("pd-ff", "tuned:ideal", rig(tendon_stiffness=2e4))
+    assert "without elastic tendons" in ideal and warned("pd-ff", "tuned:ideal", Loop()) == []
+    (lost,) = warned("pid-ff", "tuned:camera", rig(tendon_stiffness=2e4))
+    assert "9 of 40 worlds" in lost and str(CAMERA["run"]) in lost
+
+
+def test_what_is_shipped_can_be_run_and_lies_within_the_search_boxes() -> None:
+    for family in families():
+        for name in shipped_gains._shipped()[family]["controllers"]:
+            law = CONTROLLERS[name]
+            values = dict(zip(law.gains, gains_of(law, PREFIX + family), strict=True))
+            assert all(law.gains[gain].low <= value <= law.gains[gain].high for gain, value in values.items())
+
+
+def test_the_page_prints_what_is_shipped_with_its_run() -> None:
+    text = (DOCS / "gains.md").read_text(encoding="utf-8")
+    assert text == script_of_docs("published_gains").page(shipped_gains._shipped())
+    for family in families():
+        for name in shipped_gains._shipped()[family]["controllers"]:
+            assert shipped_gains.shipped_gains(name, PREFIX + family).run in text and f"| {name} |" in text

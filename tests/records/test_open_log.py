@@ -1,0 +1,125 @@
+"""Open logs: any order, unit and author's name of a column give the same numbers, and what is wrong has its place."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from wristctl.errors import UserError
+from wristctl.records.log_converters import read_log
+from wristctl.records.open_log import COLUMNS, OpenLog, mapped_names, units_of, write_log
+
+HEAD = "time [s],trial,spool_1 [mm],spool_2 [mm],tension_1 [N],bend_y [deg],mass [g],marker"
+ROWS = ["0.0,a,1.0,-1.0,2.5,10.0,500,start", "0.1,a,2.0,-2.0,,20.0,500,", "0.0,b,3.0,-3.0,4.5,,500,end"]
+
+
+def log_of(folder: Path, *lines: str, names: str = "", name: str = "log.csv") -> OpenLog:
+    file = folder / name
+    file.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    return read_log(file, names)
+
+
+def test_columns_are_in_si_units_and_an_empty_cell_is_no_number(tmp_path: Path) -> None:
+    log = log_of(tmp_path, HEAD, *ROWS)
+    np.testing.assert_allclose(log.columns["spool_2"], [-1e-3, -2e-3, -3e-3])
+    np.testing.assert_allclose(log.columns["bend_y"], np.radians([10.0, 20.0, np.nan]))
+    np.testing.assert_allclose(log.columns["mass"], 0.5)
+    assert log.words["marker"].tolist() == ["start", "", "end"] and len(log) == 3
+    assert list(log.tendons("spool")) == [1, 2]
+    with pytest.raises(UserError, match=r"tension_1 is missing - .*log\.csv:3 - "):
+        log.tendons("tension")
+
+
+def test_trials_part_the_log_and_keep_their_lines(tmp_path: Path) -> None:
+    first, second = log_of(tmp_path, "# by hand", HEAD, *ROWS).trials().values()
+    np.testing.assert_allclose(first.columns["spool_1"], [1e-3, 2e-3])
+    assert second.columns["tension_1"].tolist() == [4.5] and second.at(0).endswith("log.csv:5")
+    alone = log_of(tmp_path, "time [s],angle [rad]", "0.0,0.1")
+    assert alone.trials() == {"": alone}
+
+
+def test_names_of_another_author_are_mapped_with_their_units(tmp_path: Path) -> None:
+    names = "time=t [ms], spool_1=enc a [0.175 mm], spool_2=enc b [-2 mm], bend_y=imu, trial=name, tip_x=x [mm]"
+    log = log_of(tmp_path, "name;t;enc a;noise;enc b;imu [deg];x", "up;100;10;7;5;90;3", names=names)
+    expected = {"time": 0.1, "spool_1": 1.75e-3, "spool_2": -1e-2, "bend_y": 0.5 * np.pi, "tip_x": 3e-3}
+    assert {name: pytest.approx(float(column[0])) for name, column in log.columns.items()} == expected
+    assert log.words["trial"].tolist() == ["up"]
+
+
+@pytest.mark.parametrize(
+    ("names", "what", "fix"),
+    [
+        ("bend_y=imv [deg]", "no column 'imv', which is to be bend_y", "did you mean 'imu'?"),
+        ("bent=imu [deg]", "bent is no column of an open log", "did you mean"),
+        ("bend_y", "'bend_y' maps no column", "bend_y=imu [deg]"),
+        ("bend_y=imu [N]", "imu is in 'N'", "imu [deg] or [rad]"),
+        ("bend_y=imu", "column 'imu' is no name with a unit", "imu [deg] or [rad]"),
+        ("bend_y=imu [2 N]", "imu is in '2 N'", "a multiple such as [0.5 deg]"),
+    ],
+)
+def test_a_mapping_that_cannot_be_meant_is_refused(names: str, what: str, fix: str, tmp_path: Path) -> None:
+    with pytest.raises(UserError) as caught:
+        log_of(tmp_path, "t [s],imu", "0,1", names=names)
+    assert what in caught.value.what and fix in caught.value.fix
+
+
+@pytest.mark.parametrize(
+    ("lines", "message"),
+    [
+        (("time [s],bent_y [deg]", "0,1"), r"unknown column 'bent_y' - .*log\.csv:1 - fix: did you mean 'bend_y'\?"),
+        (("time [s],angle [deg],theta [rad]", "0,1,2"), r"theta stands there twice - .*:1 - fix: .* bend_y"),
+        (("time [s],tension_1 [N]", "0,1", "1,two"), r"tension_1 is 'two' - .*:3 - "),
+        (("time [s],tension_1 [N]", "0,1", "1,inf"), r"tension_1 is 'inf' - .*:3 - "),
+        (("time [s],tension_0 [N]", "0,1"), r"unknown column 'tension_0'"),
+        (("time [s],mass [kg]", "", "# c", "0,1,2"), r"3 cells under 2 columns - .*:4"),
+    ],
+)
+def test_what_is_wrong_is_said_with_line_and_column(lines: tuple[str, ...], message: str, tmp_path: Path) -> None:
+    with pytest.raises(UserError, match=message):
+        log_of(tmp_path, *lines)
+
+
+def test_bends_come_from_either_pair_of_columns(tmp_path: Path) -> None:
+    by_parts = log_of(tmp_path, "bend_y [deg],bend_z [deg]", "3,4", "-3,4")
+    by_size = log_of(tmp_path, "orientation [deg],inclination [deg]", "53.13010235415598,5", "126.86989764584402,5")
+    one, other = by_size.bends(), by_parts.bends()
+    assert one is not None and other is not None
+    np.testing.assert_allclose(one, other, rtol=1e-12)
+    alone = log_of(tmp_path, "bend_z [rad]", "0.2").bends()
+    assert alone is not None and alone.tolist() == [[0.0, 0.2]]
+    assert log_of(tmp_path, "time [s]", "0.2").bends() is None
+
+
+NAMES = st.sampled_from([*COLUMNS, "spool_1", "spool_12", "tension_3"])
+VALUES = st.floats(-1e300, 1e300) | st.just(math.nan)
+
+
+@given(names=st.lists(NAMES, min_size=1, max_size=5, unique=True), values=st.lists(VALUES, min_size=1, max_size=4))
+def test_what_is_written_reads_back_exactly(
+    names: list[str], values: list[float], tmp_path_factory: pytest.TempPathFactory
+) -> None:
+    columns = {name: np.array(values) * (k + 1.0) for k, name in enumerate(names)}
+    file = tmp_path_factory.getbasetemp() / "again.csv"
+    write_log(OpenLog(file, "log", columns, {"trial": np.array([f"no {k}" for k in range(len(values))])}), file)
+    again = read_log(file)
+    for name, column in columns.items():
+        np.testing.assert_array_equal(again.columns[name], column)
+    assert again.words["trial"].tolist() == [f"no {k}" for k in range(len(values))]
+
+
+def test_a_mapping_may_have_commas_in_its_units_only() -> None:
+    assert mapped_names("time=t [s],bend_y=b [2 deg]") == {"t": ("time", "s"), "b": ("bend_y", "2 deg")}
+    assert mapped_names("angle=b, mass=m [kg]") == {"b": ("bend_y", ""), "m": ("mass", "kg")}
+    assert units_of("spool_7") is units_of("tip_x") and units_of("spool") is None
+
+
+def test_parquet_files_are_read_or_say_what_is_missing(tmp_path: Path) -> None:
+    file = tmp_path / "log.parquet"
+    file.write_bytes(b"PAR1")
+    with pytest.raises(UserError, match=r"parquet|cannot read"):
+        read_log(file)

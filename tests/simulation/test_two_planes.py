@@ -1,0 +1,141 @@
+"""The closed loop in two planes: against the loop in one plane, under turns, and what the planes do to each other."""
+
+import numpy as np
+import pytest
+
+from wristctl.arrays import Array
+from wristctl.config.loop import Loop
+from wristctl.config.wrist import WristParameters
+from wristctl.control.table import controller, gains_of
+from wristctl.errors import UserError
+from wristctl.plotting.bend_figure import bend_figure
+from wristctl.simulation.bend_paths import BEND_PATHS
+from wristctl.simulation.motion import Angles, Motion
+from wristctl.simulation.rollout import rollout
+from wristctl.simulation.two_planes import BendCourse, bend_path, reach_of_bends, simulate_two_planes
+from wristctl.wrist.tendon_layout import TendonLayout
+
+LAW = controller("pid-ff")
+GAINS = np.array(gains_of(LAW, "default"))
+WRIST = WristParameters()
+
+
+def followed(path: Array, wrist: WristParameters = WRIST, **how: object) -> BendCourse:
+    return simulate_two_planes(LAW, GAINS, path, wrist, **how)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("name", BEND_PATHS)
+def test_a_path_begins_at_rest_and_straight_and_its_derivatives_are_its_own(name: str) -> None:
+    bend, rate, acceleration = np.swapaxes(bend_path(name, 25.0, 1.0, 2.0), 0, 1)
+    assert not bend[:, 0].any() and not rate[:, 0].any()
+    assert np.gradient(bend, 1e-3, axis=1)[:, 1:-1] == pytest.approx(rate[:, 1:-1], abs=2e-4)
+    assert np.gradient(rate, 1e-3, axis=1)[:, 1:-1] == pytest.approx(acceleration[:, 1:-1], abs=0.05)  # the jerk jumps
+    assert np.hypot(*bend).max() <= np.deg2rad(25.0) * (1.0 + 1e-9)
+
+
+def test_circumduction_keeps_its_size_and_comes_round_once_a_turn() -> None:
+    bend = bend_path("circumduction", 25.0, 1.0, 3.0)[:, 0]
+    assert np.hypot(*bend[:, 600:]) == pytest.approx(np.deg2rad(25.0))
+    assert bend[:, 1500] == pytest.approx(bend[:, 2500])
+    assert bend[:, 1500] == pytest.approx(-bend[:, 2000])
+
+
+@pytest.mark.parametrize("side", [0, 1])
+def test_a_bend_in_one_plane_is_the_loop_in_that_plane(side: int) -> None:
+    line = bend_path("dart-thrower", 35.0, 1.0, 1.0, toward_deg=-40.0)[0]
+    path = np.zeros((2, *line.shape))
+    path[side] = line
+    course = followed(path)
+    time = course.time
+    motion = Motion(time, Angles.of(line), np.zeros((len(time), 2)), None, 0.0, time[-1], time[-1])
+    loop = Loop(control_period=1e-3, substeps=1, plant_segments=4)
+    planar = rollout(LAW, GAINS[None], [motion], np.zeros(1, np.int64), loop, WRIST, record=True)
+    assert course.bend[:, side] == pytest.approx(planar.column("theta", 0), abs=1e-9)
+    assert course.torque_wanted[:, side] == pytest.approx(planar.column("torque_wanted", 0), abs=1e-7)
+    assert abs(course.bend[:, 1 - side]).max() < 1e-12
+
+
+@pytest.mark.parametrize("name", BEND_PATHS)
+def test_a_path_turned_by_a_right_angle_leaves_the_same_errors(name: str) -> None:
+    plain = followed(bend_path(name, 25.0, 1.0, 1.0))
+    turned = followed(bend_path(name, 25.0, 1.0, 1.0, toward_deg=90.0))
+    assert turned.bend[:, 1] == pytest.approx(plain.bend[:, 0], abs=1e-10)
+    assert turned.bend[:, 0] == pytest.approx(-plain.bend[:, 1], abs=1e-10)
+    assert turned.metrics()["rmse_flexion"] == pytest.approx(plain.metrics()["rmse_ulnar"], rel=1e-6)
+    assert turned.metrics()["rmse"] == pytest.approx(plain.metrics()["rmse"], rel=1e-6)
+
+
+def test_what_the_planes_do_to_each_other_falls_with_the_bend_as_its_cube() -> None:
+    def coupling(size: float) -> float:
+        path = bend_path("figure-of-8", size, 1.0, 1.0)
+        alone = path * np.array([1.0, 0.0])[:, None, None]
+        return float(abs(followed(path).bend[:, 0] - followed(alone).bend[:, 0]).max())
+
+    small, large = coupling(4.0), coupling(16.0)
+    assert large > 1e-6
+    assert 4.0**2 < large / small < 4.0**4
+
+
+def test_a_push_from_the_side_bends_toward_it_and_the_loop_answers() -> None:
+    path = bend_path("dart-thrower", 0.0, 1.0, 1.0)
+    pushed, other = (followed(path, force=np.array([0.0, 0.0, side])) for side in (2.0, -2.0))
+    assert pushed.bend[100, 1] > 1e-4
+    assert other.bend[:, 1] == pytest.approx(-pushed.bend[:, 1], abs=1e-10)
+    assert pushed.torque[-1, 1] < -1e-3
+    assert abs(pushed.bend[:, 0]).max() < 1e-10
+
+
+def test_three_tendons_follow_and_pulls_keep_their_limits() -> None:
+    course = followed(bend_path("circumduction", 25.0, 1.0, 2.0), layout=TendonLayout.three(WRIST.tendon_radius))
+    assert course.pulls.shape[1] == 3 and not course.failed
+    assert course.pulls.min() >= WRIST.pretension - 1e-12 and course.pulls.max() <= WRIST.tension_limit + 1e-12
+    reached = course.share > 1.0 - 1e-12
+    assert course.torque[reached] == pytest.approx(course.torque_wanted[reached], abs=1e-10)
+    assert course.metrics()["rmse"] < np.deg2rad(0.5)
+
+
+def test_torque_out_of_reach_keeps_its_direction_and_counts_as_saturation() -> None:
+    weak = WRIST.model_copy(update={"tension_limit": 6.0})
+    course = followed(bend_path("circumduction", 30.0, 1.0, 1.5), weak)
+    scaled = (course.share > 0.0) & (course.share < 0.99)
+    assert course.metrics()["saturation"] == pytest.approx(np.mean(course.share < 1.0 - 1e-9)) and scaled.any()
+    wanted = course.share[scaled, None] * course.torque_wanted[scaled]
+    assert course.torque[scaled] == pytest.approx(wanted, abs=1e-9)
+
+
+def test_a_wrist_pushed_out_of_its_range_has_failed_for_good() -> None:
+    weak = WRIST.model_copy(update={"tension_limit": 4.0})
+    course = followed(bend_path("circle", 10.0, 1.0, 1.0), weak, force=np.array([0.0, 60.0, 0.0]))
+    assert course.failed and np.isnan(course.metrics()["rmse"])
+    lost = np.isnan(course.bend[:, 0])
+    assert lost[np.argmax(lost) :].all()
+
+
+def test_the_reach_of_weak_tendons_is_where_a_held_bend_saturates() -> None:
+    weak = WRIST.model_copy(update={"tension_limit": 9.0})
+    reach = np.hypot(*reach_of_bends(weak, TendonLayout.four(WRIST.tendon_radius), 8).T)
+    assert reach[0] == pytest.approx(reach[[2, 4, 6, 8]])
+    assert reach[1] == pytest.approx(reach[[3, 5, 7]])
+    assert 0.0 < reach[1] < reach[0] < np.deg2rad(WRIST.range_deg)  # toward one tendon; between two
+    still = np.zeros((2, 3, 3001))
+    for degrees, saturates in ((-2.0, False), (2.0, True)):
+        still[0, 0] = np.minimum(np.arange(3001) / 1500, 1.0) * (reach[0] + np.deg2rad(degrees))
+        assert (followed(still, weak).share[-1] < 0.999) == saturates
+
+
+def test_the_picture_draws_what_is_wanted_followed_and_in_reach() -> None:
+    course = followed(bend_path("figure-of-8", 20.0, 1.0, 1.0))
+    (axes,) = bend_figure(course, reach_of_bends(WRIST, TendonLayout.of(WRIST))).axes
+    lines = {line.get_label(): line.get_xydata() for line in axes.get_lines()}
+    assert set(lines) == {"in reach", "wanted", "followed"}
+    assert np.array(lines["followed"]) == pytest.approx(np.rad2deg(course.bend))
+    assert np.hypot(*np.array(lines["in reach"]).T).max() == pytest.approx(WRIST.range_deg)
+
+
+def test_what_cannot_run_is_said() -> None:
+    with pytest.raises(UserError, match="no bend path 'square'"):
+        bend_path("square", 10.0, 1.0, 1.0)
+    with pytest.raises(UserError, match="beyond the wrist's range"):
+        followed(bend_path("circumduction", WRIST.range_deg + 1.0, 1.0, 2.0))
+    with pytest.raises(UserError, match="control period"):
+        followed(bend_path("circle", 10.0, 1.0, 1.0), control_period=3e-4)

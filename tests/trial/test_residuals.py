@@ -1,0 +1,203 @@
+"""One table of residuals: each has its word and its stop, and a run's values give both again."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from tests.trial.conftest import WRIST, settings_of
+from wristctl.board.messages import State
+from wristctl.control.response import Estimate
+from wristctl.trial.residuals import RESIDUALS, Judge, Limit, limits_of, load, notes, plain, stopped_by, worst
+from wristctl.trial.safety import SafetyStop
+from wristctl.trial.tick_timing import LINK, SCHEDULING, WORK, TickTiming
+from wristctl.trial.watch import Tick, Watch
+from wristctl.vision.marker import Sighting, SightingVerdict
+
+SETTINGS = settings_of()
+LIMITS = limits_of(SETTINGS)
+BY_NAME = {limit.name: limit for limit in LIMITS}
+SOUND = dict.fromkeys(RESIDUALS, 0.0)
+PERIOD, SAFETY = SETTINGS.control_period, SETTINGS.safety
+SQUARE = np.array([[0.0, 0.0], [40.0, 0.0], [40.0, 40.0], [0.0, 40.0]])
+
+STOPPING = [limit for limit in LIMITS if math.isfinite(limit.limit)]
+NOTED = [limit for limit in LIMITS if math.isfinite(limit.odd)]
+
+
+def test_a_sound_tick_stops_nothing_and_a_sound_trial_has_no_word() -> None:
+    assert Judge(LIMITS).beyond(0.0, SOUND) is None and notes(SOUND, LIMITS) == []
+    assert {limit.name for limit in STOPPING} | {limit.name for limit in NOTED} == set(RESIDUALS)
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+@pytest.mark.parametrize("limit", STOPPING, ids=lambda limit: limit.name)
+def test_each_limit_stops_just_beyond_it_alone_and_not_just_within(limit: Limit, side: float) -> None:
+    judge, near = Judge(LIMITS), 1e-6 + 0.01 * limit.limit
+    within = max(0.0, limit.limit - near)
+    for tick in range(200):
+        assert judge.beyond(tick * PERIOD, SOUND | {limit.name: side * within}) is None
+    since = 200
+    while not (beyond := judge.beyond(since * PERIOD, SOUND | {limit.name: side * (limit.limit + near)})):
+        since += 1
+    assert beyond is limit and (since - 200) * PERIOD == pytest.approx(limit.held, abs=PERIOD)
+    said = stopped_by(limit, side * (limit.limit + near))
+    assert said and "{" not in said and RESIDUALS[limit.name].causes
+
+
+@pytest.mark.parametrize("limit", NOTED, ids=lambda limit: limit.name)
+def test_each_word_is_said_just_beyond_its_value_alone_and_not_just_within(limit: Limit) -> None:
+    most = worst({**SOUND, limit.name: -1.05 * limit.odd}, {})
+    assert notes(worst(SOUND | {limit.name: 0.95 * limit.odd}, {}), LIMITS) == []
+    (word,) = notes(most, LIMITS)
+    assert word and "{" not in word
+    every = {each.name: 1.05 * each.odd for each in NOTED}
+    assert len(notes(worst(SOUND | every, {}), LIMITS)) == len(NOTED)
+
+
+def test_of_several_ticks_the_largest_counts_and_of_a_lag_the_newest() -> None:
+    most: Mapping[str, float] = {}
+    for torque, lag in ((0.2, 0.02), (-0.9, 0.05), (0.1, 0.01), (math.nan, 0.012)):
+        most = worst(SOUND | {"load": torque, "lag": lag}, most)
+    assert (most["load"], most["lag"]) == (0.9, 0.012)
+
+
+@given(st.lists(st.floats(0.0, 4.0), min_size=1, max_size=60))
+def test_a_lasting_limit_is_exceeded_for_as_long_as_its_size_allows(sizes: list[float]) -> None:
+    """By a plain reading of the words: since when, and how far now."""
+    judge, limit, since, stop = Judge(LIMITS), BY_NAME["load"], math.inf, None
+    for tick, size in enumerate(sizes):
+        clock = tick * PERIOD
+        since = min(since, clock) if size > limit.limit else math.inf
+        if size > limit.limit and clock - since >= limit.held * limit.limit / size:
+            stop = tick
+            break
+    first = next(
+        (tick for tick, size in enumerate(sizes) if judge.beyond(tick * PERIOD, SOUND | {"load": size})), None
+    )  # fmt: skip
+    assert first == stop
+
+
+def test_a_limit_that_is_kept_does_not_forgive_another_and_a_pause_between_motions_does() -> None:
+    judge = Judge(LIMITS)
+    over = {"across": 1.01 * BY_NAME["across"].limit}
+    for tick in range(12):
+        assert judge.beyond(tick * PERIOD, SOUND | over | {"load": 2.0 * (tick % 2)}) is None
+    assert judge.beyond(12 * PERIOD, SOUND | over) is BY_NAME["across"]
+    assert judge.beyond(12 * PERIOD + 0.6, SOUND | over) is None
+
+
+def test_limits_written_are_limits_read(tmp_path: Path) -> None:
+    file = tmp_path / "limits.json"
+    file.write_text(json.dumps(plain(LIMITS), allow_nan=False))
+    assert load(file) == LIMITS
+    file.write_text("{}")
+    with pytest.raises(KeyError):
+        load(file)
+
+
+WELL = Tick(0.0, 0.0, Estimate(0.0, 0.0, 0.0), np.zeros(4), np.zeros(4), State.ENABLED, 0, 0)
+
+
+def ticks(watch: Watch, timing: TickTiming, count: int, woken: float = 0.0, trip: float = 2.9e-3, work: float = 4e-4,
+          skips: int | None = None) -> None:  # fmt: skip
+    """Ticks as a loop does them, each judged."""
+    late = 0.0
+    clock = getattr(watch, "clock", 0.0)
+    for _ in range(count):
+        tick = WELL._replace(clock=clock)
+        watch.see(tick, clock)
+        watch.judge(tick)
+        ended = late + woken + trip + work - PERIOD
+        skipped = max(0, int(ended / PERIOD)) if skips is None else skips
+        culprit = timing.tick(late + woken, woken, trip, trip + work, skipped)
+        watch.ticked(clock, trip, skipped, culprit)
+        late = max(0.0, ended - skipped * PERIOD)
+        clock += (1 + skipped) * PERIOD
+    watch.clock = clock  # type: ignore[attr-defined]
+
+
+def watching(**changes: Any) -> tuple[Watch, TickTiming]:
+    timing = TickTiming(PERIOD)
+    return Watch(settings_of(**changes), WRIST, "ulnar", timing), timing
+
+
+@pytest.mark.parametrize(
+    ("how", "culprit", "said"),
+    [
+        ({"trip": 0.016}, LINK, "the board's answers take 16.0 ms, beyond 4.75 ms"),
+        ({"trip": 0.006}, LINK, "the board's answers take 6.0 ms"),
+        ({"woken": 0.006}, SCHEDULING, "ticks were skipped: the computer woke the loop late"),
+        ({"work": 0.007}, WORK, "ticks were skipped: the loop's own work"),
+    ],
+)
+def test_a_loop_that_cannot_keep_its_period_is_stopped_within_half_a_second_and_a_few_ticks(
+    how: dict[str, float], culprit: str, said: str
+) -> None:
+    watch, timing = watching()
+    with pytest.raises(SafetyStop, match=said) as stopped:
+        ticks(watch, timing, 400, **how)  # type: ignore[arg-type]
+    assert stopped.value.exit_code == 5 and stopped.value.fix
+    assert len(timing.late) + timing.overruns <= 115
+    assert timing.culprits.most_common(1)[0][0] == culprit and culprit in timing.said()
+
+
+def test_a_few_skipped_ticks_are_borne_and_the_last_half_second_alone_counts() -> None:
+    watch, timing = watching()
+    for _ in range(20):
+        ticks(watch, timing, 9)
+        ticks(watch, timing, 1, skips=1)
+    assert timing.overruns == 20 and watch.most["skipped"] == pytest.approx(0.1, abs=0.02)
+    ticks(watch, timing, 200)
+    watch.begin()
+    ticks(watch, timing, 1)
+    assert watch.most["skipped"] == 0.0
+    with pytest.raises(SafetyStop, match="of the last half second's ticks were skipped"):
+        ticks(watch, timing, 60, skips=1)
+
+
+def sighting(number: int, verdict: SightingVerdict = SightingVerdict.OK, shift: float = 0.0) -> Sighting:
+    corners = np.stack([SQUARE + np.array([0.0, down]) for down in (shift, -300.0)])
+    return Sighting(number / 60.0, number, 0.0, verdict, corners, 1.0)
+
+
+@pytest.mark.parametrize(("dropped", "share"), [(0.0, 0.05), (0.0, 0.3), (0.4, 0.05), (0.4, 0.3)])
+def test_usable_angles_count_as_missing_beside_those_that_are_believed_to_drop(dropped: float, share: float) -> None:
+    watch, timing = watching(sensor={"level": "camera", "dropped": dropped})
+    rate, used = 60.0 * (1.0 - dropped) * (1.0 - share), 0
+    for tick in range(600):
+        if used < rate * tick * PERIOD:
+            used += 1
+            watch.saw(sighting(used), tick * PERIOD, tick * PERIOD)
+        ticks(watch, timing, 1)
+    assert watch.most["unseen"] == pytest.approx(share, abs=0.05)
+    assert ("usable angles" in watch.words()) is (share > 0.12)
+
+
+def test_the_first_place_of_the_bases_marker_is_where_it_was_first_seen_whole() -> None:
+    watch, timing = watching()
+    for shift, moved in ((math.nan, 0.0), (500.0, 0.0), (500.9, 0.9 / 40.0), (496.0, 0.1), (math.nan, 0.1)):
+        watch.sighted(sighting(0, shift=shift), 0.0)
+        ticks(watch, timing, 1)
+        assert watch._values["moved"] == pytest.approx(moved)
+    assert "moved by 10 % of its side" in watch.words()
+
+
+def test_pictures_that_are_no_news_and_commands_sent_again_are_counted_over_the_last_moments() -> None:
+    watch, _ = watching()
+    for number in range(5):
+        watch.sighted(sighting(number, SightingVerdict.FROZEN if number % 2 else SightingVerdict.STAMP), 0.0)
+    watch.sighted(sighting(9, SightingVerdict.NO_TIP), 0.0)
+    for resent, clock in ((250, 0.0), (253, 0.5), (253, 0.99), (253, 1.01), (254, 3.0)):
+        watch.see(WELL._replace(resent=resent, clock=clock), clock)
+        expected = {0.0: (5, 0), 0.5: (5, 3), 0.99: (5, 3), 1.01: (0, 3), 3.0: (0, 1)}[clock]
+        assert (watch._values["repeated"], watch._values["resent"]) == expected
+    assert "5 pictures within a second were no news" in watch.words() and "3 commands" in watch.words()

@@ -1,0 +1,120 @@
+"""The motions of a run as an open log, which commands and other programs read."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from wristctl.arrays import Array
+from wristctl.errors import FILE, UserError
+from wristctl.records import Run
+from wristctl.records.formats import read_arrays, read_table
+from wristctl.records.open_log import OpenLog, write_log
+from wristctl.wrist.directions import ACTIVE, DIRECTIONS
+from wristctl.wrist.tendons import TENDONS_PER_SIDE
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+Columns = dict[str, Array]
+# Columns of a table of a motion in one plane, by their names in an open log.
+_MOTION = {"time": "time", "theta": "bend_y", "tip_x": "tip_x", "tip_y": "tip_y"}
+
+
+def open_log_of(run: Run) -> OpenLog:
+    """Motions of a run, one after the other. Raises UserError for a run that holds none."""
+    if (run.path / "data").is_dir():
+        for name, convert in _CONVERTED.items():
+            if (run.path / "data" / name).is_file():
+                columns, words = convert(run)
+                return OpenLog(run.path, "log", columns, words)
+    problem = f"a {run.kind} run holds no motion over time"
+    raise UserError(problem, str(run.path), "name a simulate, compare, track, hysteresis or hw-run run")
+
+
+def write_open_log(run: Run, path: Path) -> None:
+    """Write the motions of a run as an open log."""
+    write_log(open_log_of(run), path, FILE)
+
+
+def _trials(run: Run) -> tuple[Columns, Mapping[str, np.ndarray]]:
+    """Trials of a rig: spools at the times of the ticks, bends and tips at those of the frames, in either plane."""
+    log, frames, kinds = (run.data(name) for name in ("log", "frames", "trials"))
+    step = run.config.hw_run.actuator.step_length
+    parts: list[tuple[Columns, str]] = []
+    for row in kinds.itertuples():
+        number, flexion = row.trial, DIRECTIONS[str(row.direction)].plane == "flexion"
+        ticks, seen = log[log.trial == number], frames[(frames.trial == number) & (frames.verdict == "ok")]
+        spools = {f"spool_{tendon}": step * ticks[f"position_{tendon}"].to_numpy(float) for tendon in ACTIVE}
+        bend, tip = ("bend_z", "tip_z") if flexion else ("bend_y", "tip_y")
+        sights = {bend: seen.theta.to_numpy(float)}
+        if "tip_x" in seen:
+            sights |= {"tip_x": seen.tip_x.to_numpy(float), tip: seen.tip_y.to_numpy(float)}
+        both = [(ticks.counted.to_numpy(float), spools), (seen.captured.to_numpy(float), sights)]
+        parts.append((_merged(both), f"{number}"))
+    names = sorted({name for columns, _ in parts for name in columns}, key=_order)
+    columns = {
+        name: np.concatenate([part.get(name, np.full(len(part["time"]), np.nan)) for part, _ in parts])
+        for name in names
+    }
+    return columns, {"trial": np.concatenate([np.full(len(part["time"]), trial) for part, trial in parts])}
+
+
+def _order(name: str) -> tuple[bool, str]:
+    return name != "time", name
+
+
+def _merged(parts: list[tuple[Array, Columns]]) -> Columns:
+    """Columns at times of their own as columns at all times, in their order; cells of other times are empty."""
+    time = np.concatenate([times for times, _ in parts])
+    order, begin, merged = np.argsort(time, kind="stable"), 0, {"time": time}
+    for times, columns in parts:
+        for name, column in columns.items():
+            merged[name] = np.full(len(time), np.nan)
+            merged[name][begin : begin + len(times)] = column
+        begin += len(times)
+    return {name: column[order] for name, column in merged.items()}
+
+
+def _motion(file: str) -> Callable[[Run], tuple[Columns, Mapping[str, np.ndarray]]]:
+    def columns(run: Run) -> tuple[Columns, Mapping[str, np.ndarray]]:
+        table = read_table(run.file(f"data/{file}"))
+        return {name: table[old].to_numpy(float) for old, name in _MOTION.items() if old in table}, {}
+
+    return columns
+
+
+def _compared(run: Run) -> tuple[Columns, Mapping[str, np.ndarray]]:
+    """Every motion of a comparison is a trial, by its number."""
+    arrays = read_arrays(run.file("data/trajectories.npz"))
+    shape = arrays["theta"].shape
+    columns = {
+        name: np.broadcast_to(arrays[old], shape).astype(float).ravel()
+        for old, name in _MOTION.items()
+        if old in arrays and arrays[old].shape[-1:] == shape[-1:]
+    }
+    return columns, {"trial": np.repeat(np.arange(shape[0]), shape[1]).astype(str)}
+
+
+def _loops(run: Run) -> tuple[Columns, Mapping[str, np.ndarray]]:
+    """Every hysteresis loop is a trial; tensions are those of one tendon."""
+    table: pd.DataFrame = read_table(run.file("data/courses.csv"))
+    columns = {"time": table.time.to_numpy(float)}
+    for number, side in enumerate(("plus", "minus"), 1):
+        if run.config.hysteresis.drive == "spools":
+            columns[f"spool_{number}"] = table[f"given_{side}"].to_numpy(float)
+        columns[f"tension_{number}"] = table[f"spool_{side}"].to_numpy(float) / TENDONS_PER_SIDE
+    return columns | {"bend_y": table.theta.to_numpy(float)}, {"trial": table.loop.to_numpy().astype(str)}
+
+
+_CONVERTED: Mapping[str, Callable[[Run], tuple[Columns, Mapping[str, np.ndarray]]]] = {
+    "log.csv": _trials,
+    "trajectory.csv": _motion("trajectory.csv"),
+    "track.csv": _motion("track.csv"),
+    "trajectories.npz": _compared,
+    "courses.csv": _loops,
+}
+"""By the file of a run that holds its motions."""

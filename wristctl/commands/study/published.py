@@ -1,0 +1,56 @@
+"""Gains that a study publishes: of each controller those of its median tuning, with what they were found for."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+from wristctl.commands.study.units import BASE, StudyPlace
+from wristctl.config.families import Family, Range
+
+if TYPE_CHECKING:
+    from wristctl.comparison.tuned_ranking import TunedRanking
+    from wristctl.tuning.search import Search
+
+# File of a run with all that is published; `python docs/published_gains.py RUN` ships it.
+PUBLISHED = "data/published.json"
+_STIFFNESS = "actuator.tendon_stiffness"
+
+
+def published_gains(ranking: TunedRanking, searches: Mapping[StudyPlace, Search]) -> dict[str, dict[str, float]]:
+    """Gains of the median tuning of each controller on a family, by controller."""
+    numbers = dict(zip(ranking.labels, ranking.published, strict=True))
+    return {
+        place.law: search.gains
+        for place, search in searches.items()
+        if (place.variant, place.family) == (BASE, ranking.name) and place.tuning == numbers.get(place.label)
+    }
+
+
+def published(ranking: TunedRanking, searches: Mapping[StudyPlace, Search]) -> dict[str, Any]:
+    """What is published of a family: its conditions, and of each controller gains, errors [rad] and lost worlds."""
+    controllers = {}
+    for law, gains in published_gains(ranking, searches).items():
+        row = ranking.labels.index(f"{law}/tuned")
+        mean, (least, largest) = ranking.means[row], ranking.spreads[row]
+        controllers[law] = {
+            "gains": gains,
+            "rmse": ranking.published_error(row),
+            "rmse_low": mean.low,
+            "rmse_high": mean.high,
+            "tunings": [least, largest],
+            "lost": ranking.standing.lost[row].times,
+            "reliable": row not in ranking.standing.unusable,
+        }
+    about, worlds = ranking.family.about, ranking.count
+    return {"about": about, "conditions": conditions(ranking.family), "worlds": worlds, "controllers": controllers}
+
+
+def conditions(family: Family) -> dict[str, list[float]] | None:
+    """Periods [s] and believed stiffness of a tendon [N/m] of a family with motors, tendons and a camera; else None."""
+    loop = family.loop
+    if loop.actuator.level != "tendon" or loop.sensor.level != "camera":
+        return None
+    drawn = family.draw.get(_STIFFNESS)
+    stiffness = Range.read(drawn)[:2] if isinstance(drawn, str) else (loop.actuator.tendon_stiffness,) * 2
+    return {"period": [loop.control_period] * 2, "tendon_stiffness": list(stiffness)}

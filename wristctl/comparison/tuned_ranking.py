@@ -1,0 +1,128 @@
+"""Rows ranked over worlds where some were tuned several times: what an error is for whoever tunes once more.
+
+The gains of a row are those of its median tuning: its errors in every world, and whether it fails or swings, are
+theirs. Its mean error, its order and what it is worth beside another are over all of its tunings.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from wristctl.arrays import Array
+from wristctl.comparison.bootstrap import GeometricMean, penalised
+from wristctl.comparison.controller_ranking import STREAM
+from wristctl.comparison.repeated_tunings import Firsts, Order, RepeatedTunings, median_tuning
+from wristctl.comparison.tie_groups import share
+from wristctl.comparison.world_ranking import RankedRow, WorldRanking, ranking
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from wristctl.config.families import Family
+
+
+@dataclass(frozen=True, kw_only=True)
+class TunedRanking(WorldRanking):
+    """A ranking of rows of which each has one tuning or several; `rows` are those of the published gains."""
+
+    tunings: list[list[RankedRow]]
+    """Every tuning of each row."""
+    published: list[int]
+    """The tuning of each row whose gains are published."""
+    logarithms: Array
+    """Logarithms of the errors [rad], (R, T, W, S) with S streams of noise in each world."""
+
+    @cached_property
+    def repeated(self) -> RepeatedTunings:
+        """Errors of all rows over tunings, worlds and noise."""
+        return RepeatedTunings(self.logarithms, STREAM)
+
+    @cached_property
+    def means(self) -> list[GeometricMean]:
+        """Geometric mean of each row's RMSE [rad] over its tunings; a failure counts as 90 deg."""
+        return self.repeated.estimates()
+
+    def times_better(self, row: int, reference_row: int) -> GeometricMean:
+        """Ratio of a reference row's RMSE to another row's, tunings and worlds drawn anew."""
+        return self.repeated.ratio(reference_row, row)
+
+    def firsts(self, row: int) -> Firsts:
+        """In how many halves of the worlds, and with how many tunings, a ranked row has the least error."""
+        return self._order.firsts(row)
+
+    @cached_property
+    def _order(self) -> Order:
+        ranked_rows = [row for group in self.standing.groups for row in group]
+        return Order(self.logarithms, ranked_rows or range(len(self.rows)), STREAM)
+
+    @cached_property
+    def spreads(self) -> list[tuple[float, float]]:
+        """Least and largest geometric mean of the RMSE [rad] of each row's tunings."""
+        means = np.exp(self.logarithms.mean(axis=(2, 3)))
+        return [(float(errors.min()), float(errors.max())) for errors in means]
+
+    def published_error(self, row: int) -> float:
+        """Geometric mean of the RMSE [rad] of a row's published gains; a failure counts as 90 deg."""
+        tunings = self.logarithms[row]
+        return float(np.exp(tunings[self.published[row] % len(tunings)].mean()))
+
+    def tunings_frame(self) -> pd.DataFrame:
+        """A line for each tuning of each row that was tuned: its error [rad], and in how many worlds it is lost."""
+        import pandas as pd
+
+        lines = []
+        for row, tunings in enumerate(self.tunings):
+            means = np.exp(self.logarithms[row].mean(axis=(1, 2)))
+            for number, tuning in enumerate(tunings if len(tunings) > 1 else []):
+                lost = share(~np.isfinite(tuning.rmse) | tuning.swings)
+                lines.append(
+                    {"row": self.labels[row], "tuning": number + 1, "published": number == self.published[row],
+                     "rmse": means[number], "lost": lost.times, "worlds": lost.n}
+                )  # fmt: skip
+        return pd.DataFrame(lines)
+
+
+def tuned_ranking(
+    name: str,
+    family: Family,
+    tunings: Sequence[Sequence[RankedRow]],
+    published: Sequence[int],
+    tolerated: float = 0.0,
+    steps: bool | None = None,
+) -> TunedRanking:
+    """The ranking of rows, each with one tuning or as many as the others, measured on the same worlds and noise.
+
+    The other parameters are those of `wristctl.comparison.world_ranking.ranking`.
+    """
+    errors = logarithms(tunings)
+    rows = [of_row[number] for of_row, number in zip(tunings, published, strict=True)]
+    base = ranking(name, family, rows, tolerated, steps, RepeatedTunings(errors, STREAM))
+    values = {field.name: getattr(base, field.name) for field in fields(base)}
+    return TunedRanking(
+        **values, tunings=[list(of_row) for of_row in tunings], published=list(published), logarithms=errors
+    )
+
+
+def logarithms(tunings: Sequence[Sequence[RankedRow]]) -> Array:
+    """Logarithms of the errors (R, T, W, S) of rows with one tuning or as many as the others."""
+    most = max(map(len, tunings))
+    errors = [[np.log(penalised(_streams(row))) for row in of_row] for of_row in tunings]
+    return np.array([of_row * (most // len(of_row)) for of_row in errors])
+
+
+def _streams(row: RankedRow) -> Array:
+    """Geometric mean over the motions of a row's RMSE (W, S) in every world and stream of noise; inf: one failed."""
+    measured, worlds = row.measured, len(row.rmse)
+    rmse = np.where(measured.failed, np.inf, measured.metrics["rmse"]).reshape(worlds, row.motions, -1)
+    means: Array = np.exp(np.log(rmse).mean(axis=1))
+    return means
+
+
+def published_tuning(tunings: Sequence[RankedRow]) -> int:
+    """The median tuning of a row by its geometric mean error: whose gains are neither lucky nor unlucky."""
+    return median_tuning([float(np.log(penalised(row.rmse)).mean()) for row in tunings])

@@ -1,0 +1,88 @@
+"""Paths of a wrist that bends in two planes: its bend toward ulnar and toward flexion, each with two derivatives.
+
+All begin at rest and straight, and get up to speed within a quarter of a turn.
+"""
+
+from collections.abc import Callable
+
+import numpy as np
+
+from wristctl.arrays import Array
+from wristctl.simulation.references import minimum_jerk
+
+# Share of a turn in which a motion gets up to its speed.
+_SPEEDING = 0.25
+# Direction of the dart-thrower's line, from ulnar toward flexion [rad].
+_DIAGONAL = np.deg2rad(40.0)
+
+
+def _phase(time: Array, turn: float) -> tuple[Array, Array, Array]:
+    """Phase [rad] of a motion that comes to one turn in `turn` [s] from rest, with two derivatives.
+
+    Its speed rises as a minimum jerk does.
+    """
+    rate, ramp = 2.0 * np.pi / turn, _SPEEDING * turn
+    x = np.clip(time / ramp, 0.0, 1.0)
+    phase = rate * ramp * x**4 * (2.5 - 3.0 * x + x * x) + rate * np.maximum(time - ramp, 0.0)
+    return phase, rate * x**3 * (10.0 - 15.0 * x + 6.0 * x * x), rate / ramp * 30.0 * (x * (1.0 - x)) ** 2
+
+
+def _of_phase(value: Array, slope: Array, curve: Array, phase: tuple[Array, Array, Array]) -> Array:
+    """A function of the phase with two derivatives by time, (3, T), from its derivatives by the phase."""
+    _, rate, acceleration = phase
+    return np.stack([value, slope * rate, curve * rate**2 + slope * acceleration])
+
+
+def circumduction(time: Array, size: float, turn: float) -> Array:
+    """The hand circles about the straight wrist; the bend's size rises within half a turn, while it is turned already.
+
+    Parameters
+    ----------
+    time
+        Samples (T,) [s].
+    size
+        Largest bend [rad].
+    turn
+        Time of a turn [s].
+
+    Returns the bend, its rate and its acceleration in both planes, (2, 3, T); so do the other paths.
+    """
+    phase = _phase(time, turn)
+    cosine, sine = np.cos(phase[0]), np.sin(phase[0])
+    around = np.stack([_of_phase(cosine, -sine, -cosine, phase), _of_phase(sine, cosine, -sine, phase)])
+    r = size * minimum_jerk(time, 0.5 * turn)
+    f, df, ddf = around[:, 0], around[:, 1], around[:, 2]
+    return np.stack([r[0] * f, r[1] * f + r[0] * df, r[2] * f + 2.0 * r[1] * df + r[0] * ddf], axis=1)
+
+
+def circle(time: Array, size: float, turn: float) -> Array:
+    """A circle of bends through straight and `size` toward ulnar; parameters as `circumduction`."""
+    phase = _phase(time, turn)
+    cosine, sine = np.cos(phase[0]), np.sin(phase[0])
+    forth, aside = _of_phase(1.0 - cosine, sine, cosine, phase), _of_phase(sine, cosine, -sine, phase)
+    return 0.5 * size * np.stack([forth, aside])
+
+
+def figure_of_8(time: Array, size: float, turn: float) -> Array:
+    """A figure of 8 through straight, by `size` toward ulnar and radial; parameters as `circumduction`."""
+    phase = _phase(time, turn)
+    sine, cosine = np.sin(phase[0]), np.cos(phase[0])
+    double, other = np.sin(2.0 * phase[0]), np.cos(2.0 * phase[0])
+    long = _of_phase(sine, cosine, -sine, phase)
+    return size * np.stack([long, 0.5 * _of_phase(double, 2.0 * other, -4.0 * double, phase)])
+
+
+def dart_thrower(time: Array, size: float, turn: float) -> Array:
+    """There and back on the line from radial extension to ulnar flexion; parameters as `circumduction`."""
+    phase = _phase(time, turn)
+    swing = _of_phase(np.sin(phase[0]), np.cos(phase[0]), -np.sin(phase[0]), phase)
+    return size * np.stack([np.cos(_DIAGONAL) * swing, np.sin(_DIAGONAL) * swing])
+
+
+# Bend paths by name: of the times, the largest bend and the time of a turn.
+BEND_PATHS: dict[str, Callable[[Array, float, float], Array]] = {
+    "circle": circle,
+    "figure-of-8": figure_of_8,
+    "circumduction": circumduction,
+    "dart-thrower": dart_thrower,
+}

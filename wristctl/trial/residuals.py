@@ -1,0 +1,261 @@
+"""Residuals of a rig: what the model of it does not explain. One table: unit, limit, time and causes of each.
+
+Every tick has a value of each residual. One that is beyond its limit for long enough stops the motors; one that comes
+near it is worth a word. Both are computed from values and limits alone, so that a run's files give them again.
+"""
+
+import json
+import math
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from wristctl.config.hw_run import HwRunSettings
+
+
+class Shown(NamedTuple):
+    """How people read a value: unit, its size, and the format of a number of them."""
+
+    unit: str
+    size: float
+    form: str
+
+    def __call__(self, value: float) -> str:
+        """The value with its unit."""
+        return f"{value / self.size:{self.form}}{' ' * bool(self.unit)}{self.unit}"
+
+
+_MS, _DEG, _MM = Shown("ms", 1e-3, ".0f"), Shown("deg", math.radians(1.0), ".1f"), Shown("mm", 1e-3, ".1f")
+_SHARE, _COUNT = Shown("%", 0.01, ".0f"), Shown("", 1.0, ".0f")
+
+
+class Residual(NamedTuple):
+    """A line of the table. `stops` and `odd` are templates of `value` and `limit`."""
+
+    shown: Shown
+    meaning: str
+    limit: Callable[[HwRunSettings], float]
+    """In the unit of the log; inf: it never stops."""
+    odd: float
+    """Share of the limit, or where there is none the value itself, beyond which a trial was odd; inf: never."""
+    causes: str
+    """Likeliest first, and advice."""
+    stops: str = ""
+    notes: str = ""
+    lasting: bool = False
+    """Whether it may exceed its limit for `safety.odd_for`; others stop at once."""
+
+
+def _never(settings: HwRunSettings) -> float:
+    return math.inf
+
+
+_CALMER = "gentler gains or reference, or widen safety.{}"
+_TENDONS = (
+    "tendons, motors or the tip's marker do otherwise than the board believes; something holds or pushes the wrist"
+)
+_CAMERA = "the camera's light, focus, cable or mode; what covers a marker"
+_CABLE = "close other programs, or see that the cable and its plugs are sound"
+_LINK = "the USB adapter's latency timer or a hub: wristctl hw check --rig; or a longer control_period"
+
+# In the order in which they are looked at: what a late tick sees is late as well.
+RESIDUALS: Mapping[str, Residual] = {
+    "late": Residual(
+        _MS, "delay of a tick", lambda s: s.safety.late, 0.6, "close other programs, or a longer control_period",
+        "a tick came {value} late", "a tick {value} late (limit {limit})",
+    ),
+    "lapses": Residual(
+        _COUNT, "step rates in the last second that came too late to the board", lambda s: 2.0, math.inf, _CABLE,
+        "step rates came too late to the board {value} times in 1 s",
+    ),
+    "no_number": Residual(
+        _COUNT, "values of the observer's estimate that are not finite", lambda s: 0.0, math.inf,
+        "see the frames in data/frames.csv", "the observer's estimate is not a number",
+    ),
+    "angle": Residual(
+        _DEG, "bending angle as estimated", lambda s: math.radians(s.safety.angle_deg), math.inf,
+        _CALMER.format("angle_deg"), "angle {value} beyond +-{limit}",
+    ),
+    "rate": Residual(
+        Shown("rad/s", 1.0, ".1f"), "bending rate as estimated", lambda s: s.safety.rate, math.inf,
+        _CALMER.format("rate"), "rate {value} beyond +-{limit}",
+    ),
+    "age": Residual(
+        _MS, "time since the capture of a usable marker angle", lambda s: s.safety.stale, 0.6, _CAMERA,
+        "no usable marker angle for {value}", "no usable marker angle for {value} (limit {limit})",
+    ),
+    "pull": Residual(
+        Shown("N", 1.0, ".0f"), "largest tension by spool position and estimated angle",
+        lambda s: s.safety.tension, math.inf, "something holds the wrist, or the zero positions are wrong: home again",
+        "tension of about {value} beyond {limit}",
+    ),
+    "travel": Residual(
+        _MM, "spool furthest from zero", lambda s: s.safety.travel, math.inf,
+        "a smaller reference, or widen safety.travel", "a spool {value} from zero, beyond {limit}",
+    ),
+    "disabled": Residual(
+        _COUNT, "1 where the board is not ENABLED", lambda s: 0.0, math.inf, "home again", "the board is not ENABLED"
+    ),
+    "jump": Residual(
+        _DEG, "marker against where spools should have it, change between two frames",
+        lambda s: math.radians(s.safety.jump_deg), 0.5, "the tip's marker has slipped; pictures shown or dated wrongly",
+        "the marker's angle jumps by {value} from one frame to the next, beyond {limit}",
+        "{value} of jump between frames (limit {limit})",
+    ),
+    "across": Residual(
+        _DEG, "bend across the plane, by the size of the tip's marker", lambda s: math.radians(s.safety.across_deg),
+        0.8, "one tendon of two is lost or pulls alone; motors exchanged; a camera that is not square",
+        "the wrist bends {value} across its plane, beyond {limit}", "{value} across the plane (limit {limit})", True,
+    ),
+    "load": Residual(
+        Shown("N m", 1.0, ".2f"), "load torque as estimated", lambda s: s.safety.load, 0.6, _TENDONS,
+        "the wrist does not follow its motors: a load of {value}, beyond {limit}", "a load of {value} (limit {limit})",
+        True,
+    ),
+    "apart": Residual(
+        _DEG, "marker against where spools should have it", lambda s: math.radians(s.safety.follow_deg), 0.35, _TENDONS,
+        "the wrist does not follow its motors: it is {value} from where they should have it, beyond {limit}",
+        "{value} off its motors (limit {limit})", True,
+    ),
+    "round_trip": Residual(
+        Shown("ms", 1e-3, ".1f"), "median time of half a second's commands until the board's answer",
+        lambda s: s.safety.round_trip * s.control_period, 0.85 / 0.95, _LINK,
+        "the board's answers take {value}, beyond {limit}", "the board's answers took {value} (limit {limit})",
+    ),
+    "skipped": Residual(
+        _SHARE, "share of half a second's ticks that were skipped", lambda s: s.safety.skipped, 0.1,
+        "close other programs; a longer control_period", "{value} of the last half second's ticks were skipped",
+        "{value} of half a second's ticks skipped (limit {limit})",
+    ),
+    "unseen": Residual(
+        _SHARE, "share of the believed usable angles that did not come, over two seconds", _never, 0.12, _CAMERA,
+        notes="{value} of the usable angles that should come did not",
+    ),
+    "repeated": Residual(
+        _COUNT, "pictures in the last second that were no news, or whose time cannot be", _never, 3.0,
+        "the camera or its driver repeats old pictures: plug it in again, another USB port",
+        notes="{value} pictures within a second were no news",
+    ),
+    "resent": Residual(
+        _COUNT, "commands in the last two seconds that had to be sent again", _never, 1.0, "see the cable",
+        notes="{value} commands within two seconds sent again: see the cable",
+    ),
+    "moved": Residual(
+        _SHARE, "the base's marker from its first place, over its side", _never, 0.03, "camera or clamp is loose",
+        notes="the base's marker moved by {value} of its side: camera or clamp is loose",
+    ),
+    "lag": Residual(
+        _MS, "least time by which the marker comes after its motors, in this motion so far", _never, 0.015,
+        "pictures older than their stamps say, soft tendons or friction",
+        notes="the marker comes {value} or more after its motors: pictures older than dated, soft tendons or friction",
+    ),
+}  # fmt: skip
+
+
+class Limit(NamedTuple):
+    """Limit of a residual for one run; SI units."""
+
+    name: str
+    unit: str
+    limit: float
+    held: float
+    """Time for which it may be exceeded [s]; half as long if twice."""
+    odd: float
+    """Value from which a trial was odd."""
+
+
+def limits_of(settings: HwRunSettings) -> tuple[Limit, ...]:
+    """The table for these settings."""
+    limits = []
+    for name, residual in RESIDUALS.items():
+        most, held = residual.limit(settings), settings.safety.odd_for if residual.lasting else 0.0
+        odd = residual.odd * most if math.isfinite(most) and math.isfinite(residual.odd) else residual.odd
+        limits.append(Limit(name, _SI.get(residual.shown.unit, residual.shown.unit), most, held, odd))
+    return tuple(limits)
+
+
+_SI = {"ms": "s", "mm": "m", "deg": "rad", "%": ""}
+
+
+def columns() -> dict[str, tuple[str, str]]:
+    """Unit and meaning of each residual, as the log has them."""
+    return {name: (_SI.get(line.shown.unit, line.shown.unit), line.meaning) for name, line in RESIDUALS.items()}
+
+
+class Judge:
+    """Applies limits to one tick after the other."""
+
+    def __init__(self, limits: Sequence[Limit]) -> None:
+        self._limits, self._since, self._last = limits, dict[str, float](), -math.inf
+
+    def beyond(self, clock: float, values: Mapping[str, float]) -> Limit | None:
+        """The first limit, in the table's order, that is to stop the motors at this tick; nan is no evidence."""
+        if clock - self._last > _APART:
+            self._since.clear()
+        self._last = clock
+        for limit in self._limits:
+            size = abs(values[limit.name])
+            if not size > limit.limit:
+                self._since.pop(limit.name, None)
+            elif limit.held == 0.0 or clock - self._since.setdefault(limit.name, clock) >= (
+                limit.held * limit.limit / size
+            ):
+                return limit
+        return None
+
+
+# Seconds between two ticks of different motions.
+_APART = 0.5
+
+
+def worst(values: Mapping[str, float], most: Mapping[str, float]) -> dict[str, float]:
+    """The larger size of each residual; of `lag`, which sums a motion up, the newest."""
+    sizes = {name: 0.0 if math.isnan(value) else abs(value) for name, value in values.items()}
+    return {name: sizes[name] if name == "lag" else max(sizes[name], most.get(name, 0.0)) for name in RESIDUALS}
+
+
+def notes(most: Mapping[str, float], limits: Sequence[Limit]) -> list[str]:
+    """What was odd of a trial with these largest values, in words."""
+    return [
+        RESIDUALS[name].notes.format(value=RESIDUALS[name].shown(most[name]), limit=_limit(name, limit))
+        for name, _, limit, _, odd in limits
+        if most.get(name, 0.0) > odd
+    ]
+
+
+def stopped_by(limit: Limit, value: float) -> str:
+    """Say which limit stopped the motors."""
+    line = RESIDUALS[limit.name]
+    signed = value if limit.name in ("angle", "rate") else abs(value)
+    return line.stops.format(value=line.shown(signed), limit=_limit(limit.name, limit.limit))
+
+
+def _limit(name: str, limit: float) -> str:
+    shown = RESIDUALS[name].shown
+    return f"{limit / shown.size:.3g}{' ' * bool(shown.unit)}{shown.unit}"
+
+
+FILE, SCHEMA = "data/limits.json", "wristctl.limits/1"
+
+
+def plain(limits: Sequence[Limit]) -> dict[str, Any]:
+    """For JSON; a limit that never stops is null."""
+    rows = [
+        {name: value if not isinstance(value, float) or math.isfinite(value) else None
+         for name, value in limit._asdict().items()}
+        | {"meaning": RESIDUALS[limit.name].meaning, "causes": RESIDUALS[limit.name].causes}
+        for limit in limits
+    ]  # fmt: skip
+    return {"schema": SCHEMA, "limits": rows}
+
+
+def load(file: Path) -> tuple[Limit, ...]:
+    """Read what `plain` has given. Raises OSError, ValueError and KeyError."""
+    table = json.loads(file.read_text(encoding="utf-8"))
+    if table["schema"] != SCHEMA:
+        raise ValueError(table["schema"])
+    limits = []
+    for row in table["limits"]:
+        limit, held, odd = (math.inf if row[name] is None else float(row[name]) for name in ("limit", "held", "odd"))
+        limits.append(Limit(row["name"], row["unit"], limit, held, odd))
+    return tuple(limits)

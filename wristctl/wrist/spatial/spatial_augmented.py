@@ -1,0 +1,194 @@
+"""The paper's augmented form in two planes: each segment as a rigid chain, the readable reference in NumPy.
+
+As in the plane (`wristctl.wrist.augmented`) a segment turns, slides, slides and turns, and its point mass is between
+the slides; but a turn is now by a rotation vector across the tangent, half of the segment's: rho/2 with rho = (0, -u_z,
+u_y), and a slide is d = l/2 S(|u|/2), S(x) = sin(x)/x, along the chord. So the joints of a segment are mu = (u/2, d, d,
+u/2), six numbers, and J_mu = d(mu)/du reduces them to two. A turn's axes are the columns of the rotation vector's
+Jacobian, so that nothing is singular at the straight wrist.
+
+All is written without absolute values and branches: at complex coordinates it gives the analytic functions, whose
+imaginary part over a small step is a derivative to rounding. One state at a time; SI units.
+"""
+
+from math import factorial
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wristctl.wrist.spatial.spatial_segments import FIELDS, OF_A_TENDON, SpatialSegments
+
+# Real or complex.
+Numbers = NDArray[Any]
+
+_TERMS = 20
+
+
+def stumpff_of(s: Any, k: int) -> Any:
+    """c_k(s) by Taylor's series."""
+    return sum((-s) ** j / factorial(2 * j + k) for j in range(_TERMS))
+
+
+def hat(v: Numbers) -> Numbers:
+    """The matrix of v x."""
+    return np.array([[0.0 * v[0], -v[2], v[1]], [v[2], 0.0 * v[0], -v[0]], [-v[1], v[0], 0.0 * v[0]]])
+
+
+class Turn(NamedTuple):
+    """A turn by a bend u."""
+
+    rotation: Numbers
+    """(3, 3)"""
+    axes: Numbers
+    """Angular velocity by each component of u's rate, (3, 2)."""
+    axes_rate: Numbers
+    """Its time derivative at the given rate of u."""
+
+
+# Columns: the rotation vectors of bends by u_y and by u_z.
+_RHO = np.array([[0.0, 0.0], [0.0, -1.0], [1.0, 0.0]])
+
+
+def turned(u: Numbers, rate: Numbers) -> Turn:
+    """The turn by u (2,) that changes at a rate (2,)."""
+    s, s_rate = u @ u, 2.0 * (u @ rate)
+    c1, c2, c3, c4, c5 = (stumpff_of(s, k) for k in range(1, 6))
+    # by s: half of k c_{k+2} - c_{k+1}
+    c1_rate, c2_rate, c3_rate = (0.5 * s_rate * slope for slope in (c3 - c2, 2.0 * c4 - c3, 3.0 * c5 - c4))
+    rho, rho_rate = _RHO @ u, _RHO @ rate
+    w, w_rate = hat(rho), hat(rho_rate)
+    rotation = np.eye(3) + c1 * w + c2 * w @ w
+    outer, outer_rate = np.outer(rho, rho), np.outer(rho_rate, rho) + np.outer(rho, rho_rate)
+    axes = c1 * np.eye(3) + c2 * w + c3 * outer
+    axes_rate = c1_rate * np.eye(3) + c2_rate * w + c2 * w_rate + c3_rate * outer + c3 * outer_rate
+    return Turn(rotation, axes @ _RHO, axes_rate @ _RHO)
+
+
+def joints(q: Numbers, rate: Numbers, length: float) -> tuple[Numbers, Numbers, Numbers]:
+    """mu (6n,), J_mu (6n, 2n) and the time derivative of J_mu at coordinates and rates (2n,)."""
+    n = len(q) // 2
+    kind = np.result_type(q, rate)
+    mu, jacobian, jacobian_rate = np.zeros(6 * n, kind), np.zeros((6 * n, 2 * n), kind), np.zeros((6 * n, 2 * n), kind)
+    for k in range(n):
+        rows, columns = slice(6 * k, 6 * k + 6), slice(2 * k, 2 * k + 2)
+        u, x = q[columns], rate[columns]
+        s = 0.25 * u @ u
+        c1, c2, c3, c4, c5 = (stumpff_of(s, m) for m in range(1, 6))
+        # d = l/2 c_1(|u|^2/4); by u_a: l/8 (c_3 - c_2) u_a
+        slope, curvature = c3 - c2, 0.25 * ((3.0 * c5 - c4) - (2.0 * c4 - c3)) * (u @ x)
+        slide, by_u = 0.5 * length * c1, 0.125 * length * slope * u
+        by_u_rate = 0.125 * length * (curvature * u + slope * x)
+        mu[rows] = [*(0.5 * u), slide, slide, *(0.5 * u)]
+        jacobian[rows, columns] = np.vstack([0.5 * np.eye(2), by_u, by_u, 0.5 * np.eye(2)])
+        jacobian_rate[rows, columns] = np.vstack([np.zeros((2, 2)), by_u_rate, by_u_rate, np.zeros((2, 2))])
+    return mu, jacobian, jacobian_rate
+
+
+class Moved(NamedTuple):
+    """A point on the chain, with what moves it."""
+
+    place: Numbers
+    jacobian: Numbers
+    """d(place)/d(mu), (3, 6n)."""
+    jacobian_rate: Numbers
+    """Its time derivative."""
+
+
+class Augmented(NamedTuple):
+    """Terms of the equation of motion; as `wristctl.wrist.spatial.spatial_model.SpatialTerms`."""
+
+    mass: Numbers
+    coriolis: Numbers
+    """C (2n, 2n): C rate are the Coriolis and centrifugal terms, and dM/dt - 2 C is skew."""
+    gravity: Numbers
+    tip: Numbers
+    rotation: Numbers
+    tip_jacobian: Numbers
+    """d(tip)/dq, (3, 2n)."""
+
+
+def _chain(mu: Numbers, mu_rate: Numbers, hand_offset: float) -> tuple[list[Moved], Moved, Moved, Numbers]:
+    """The segments' masses, the hand, the last disc's centre, and its rotation."""
+    size = len(mu)
+    kind = np.result_type(mu, mu_rate)
+    frame, frame_rate = np.eye(3, dtype=kind), np.zeros((3, 3), kind)
+    origin, origin_rate = np.zeros(3, kind), np.zeros(3, kind)
+    columns: list[tuple[Any, ...]] = []
+    masses = []
+
+    def moved(place: Numbers, place_rate: Numbers) -> Moved:
+        jacobian, rate = np.zeros((3, size), kind), np.zeros((3, size), kind)
+        for number, (is_turn, axis, axis_rate, about, about_rate) in enumerate(columns):
+            if is_turn:
+                jacobian[:, number] = np.cross(axis, place - about)
+                rate[:, number] = np.cross(axis_rate, place - about) + np.cross(axis, place_rate - about_rate)
+            else:
+                jacobian[:, number], rate[:, number] = axis, axis_rate
+        return Moved(place, jacobian, rate)
+
+    for first in range(0, size, 6):
+        for joint in (0, 2, 3, 4):
+            at = first + joint
+            if joint in (2, 3):
+                columns.append((False, frame[:, 0], frame_rate[:, 0], origin, origin_rate))
+                origin_rate = origin_rate + mu_rate[at] * frame[:, 0] + mu[at] * frame_rate[:, 0]
+                origin = origin + mu[at] * frame[:, 0]
+                if joint == 2:
+                    masses.append(moved(origin, origin_rate))
+                continue
+            turn = turned(mu[at : at + 2], mu_rate[at : at + 2])
+            axes, axes_rate = frame @ turn.axes, frame_rate @ turn.axes + frame @ turn.axes_rate
+            columns += [(True, axes[:, a], axes_rate[:, a], origin, origin_rate) for a in (0, 1)]
+            spin = hat(turn.axes @ mu_rate[at : at + 2])
+            frame, frame_rate = frame @ turn.rotation, frame_rate @ turn.rotation + frame @ spin @ turn.rotation
+    beyond, beyond_rate = hand_offset * frame[:, 0], hand_offset * frame_rate[:, 0]
+    return masses, moved(origin + beyond, origin_rate + beyond_rate), moved(origin, origin_rate), frame
+
+
+def spatial_augmented(parameters: Numbers, q: Numbers, rate: Numbers) -> Augmented:
+    """Terms of the equation of motion at coordinates and rates (2n,); `parameters` as `spatial_values` gives them."""
+    segment = SpatialSegments(*parameters[:FIELDS])
+    mu, j_mu, j_mu_rate = joints(q, rate, segment.length)
+    masses, hand, tip, rotation = _chain(mu, j_mu @ rate, segment.hand_offset)
+    m_b, c_b, g_b = (np.zeros(shape, mu.dtype) for shape in ((len(mu), len(mu)), (len(mu), len(mu)), len(mu)))
+    gravity = np.array([segment.gravity_x, segment.gravity_y, segment.gravity_z])
+    for mass, point in [*((segment.mass, point) for point in masses), (segment.hand_mass, hand)]:
+        m_b += mass * point.jacobian.T @ point.jacobian
+        c_b += mass * point.jacobian.T @ point.jacobian_rate
+        g_b -= mass * point.jacobian.T @ gravity
+    coriolis = j_mu.T @ (m_b @ j_mu_rate + c_b @ j_mu)
+    return Augmented(j_mu.T @ m_b @ j_mu, coriolis, j_mu.T @ g_b, tip.place, rotation, tip.jacobian @ j_mu)
+
+
+def augmented_tendons(parameters: Numbers, q: Numbers) -> tuple[Numbers, Numbers]:
+    """Lengths of the tendons (T,) and their moment arms (T, 2n) [m].
+
+    Along each segment (l - c.u) S(|u|/2g), as far as it runs there, and minus its derivative.
+    """
+    segment = SpatialSegments(*parameters[:FIELDS])
+    tendons = np.reshape(parameters[FIELDS:], (-1, OF_A_TENDON))
+    places, per_span = tendons[:, :2], 0.25 / segment.spans**2
+    length, arms = 0.0, []
+    for k, u in enumerate(q.reshape(-1, 2)):
+        share = np.clip(tendons[:, 2] - k, 0.0, 1.0)
+        c1, c2, c3 = (stumpff_of(per_span * u @ u, m) for m in (1, 2, 3))
+        straight = segment.length - places @ u
+        length = length + share * straight * c1
+        arms.append(share[:, None] * (places * c1 - per_span * (c3 - c2) * np.outer(straight, u)))
+    return np.asarray(length), np.concatenate(arms, axis=1)
+
+
+def augmented_residual(
+    parameters: Numbers, q: Numbers, rate: Numbers, acceleration: Numbers, pulls: Numbers
+) -> Numbers:
+    """M q'' + r (2n,) under the tendons' pulls (T,) [N]."""
+    segment = SpatialSegments(*parameters[:FIELDS])
+    at = spatial_augmented(parameters, q, rate)
+    force = np.array([segment.force_x, segment.force_y, segment.force_z])
+    stiffness = np.array([[segment.stiffness_yy, segment.stiffness_yz], [segment.stiffness_yz, segment.stiffness_zz]])
+    damping = np.array([[segment.damping_yy, segment.damping_yz], [segment.damping_yz, segment.damping_zz]])
+    passive = (q.reshape(-1, 2) @ stiffness + rate.reshape(-1, 2) @ damping).ravel()
+    arms = augmented_tendons(parameters, q)[1]
+    inertial = at.mass @ acceleration + at.coriolis @ rate + at.gravity
+    residual: Numbers = inertial - at.tip_jacobian.T @ force + passive - pulls @ arms
+    return residual
