@@ -173,7 +173,9 @@ class Compared(StudyResult):
         unranked = [ranking for ranking in self.rankings if not ranking.standing.groups and not ranking.jumps]
         few = [condition(ranking) for ranking in unranked if ranking.standing.untold]
         none = [condition(ranking) for ranking in unranked if not ranking.standing.untold]
-        return [f"{what}: {', '.join(where)}" for what, where in (("no usable one", none), ("no ranking", few)) if where]
+        return [
+            f"{what}: {', '.join(where)}" for what, where in (("no usable one", none), ("no ranking", few)) if where
+        ]
 
     def frame(self) -> pd.DataFrame:
         """One row per combination: every metric beside the paper's; of a ranking one per row, best first."""
