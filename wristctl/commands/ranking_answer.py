@@ -135,7 +135,7 @@ def ranking_table(rankings: Sequence[Ranking], names: Mapping[str, str]) -> Tabl
         "best: RMSE [deg]",
         "tied",
         "next: RMSE [deg]",
-        "feedforward (ratio)",
+        "feedforward (x)",
         "unusable",
     )
     rows = []
@@ -148,7 +148,7 @@ def ranking_table(rankings: Sequence[Ranking], names: Mapping[str, str]) -> Tabl
         bound = ">" if best.endswith(degrees(0.0)) else ""
         ratio = "" if row is None or base is None else f" ({bound}{two(ranking.gains[row].value)})"
         open_loop = "-" if base is None else f"{error(ranking, base)}{ratio}"
-        others = f"{len(groups[0]) - 1} more" if groups and len(groups[0]) > 1 else "-"
+        others = f"{len(groups[0]) - 1}" if groups and len(groups[0]) > 1 else "-"
         begin, end = (
             f"{condition(ranking)} ({ranking.count})",
             f"{len(ranking.standing.unusable)} of {len(ranking.labels)}",

@@ -46,14 +46,20 @@ def rig_whole(rankings: Sequence[Ranking]) -> str:
     return "a camera" if all(one.camera for one in traits) else "motors, tendons or a camera"
 
 
-def names_of(rankings: Sequence[Ranking]) -> dict[str, str]:
-    """Name of each row: its label, without gains where all that are not the paper's are the same, or none matter."""
+def names_of(rankings: Sequence[Ranking], short: bool = False) -> dict[str, str]:
+    """Name of each row: its label, without gains where all that are not the paper's are the same, or none matter.
+
+    With `short` a controller that has one set of gains is its name alone.
+    """
     labels = list(dict.fromkeys(label for ranking in rankings for label in ranking.labels))
     ours = {label.partition("/")[2] for label in labels if not open_loop(label)} - PAPERS_GAINS
+    controllers = Counter(label.partition("/")[0] for label in labels)
     names = {}
     for label in labels:
         name, _, gains = label.partition("/")
-        names[label] = name if open_loop(label) or (len(ours) == 1 and gains in ours) else label
+        alone = len(ours) == 1 and gains in ours
+        one = short and controllers[name] == 1 and gains != PRINTED
+        names[label] = name if open_loop(label) or alone or one else label
     return _shortened(names)
 
 
