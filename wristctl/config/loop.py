@@ -65,6 +65,10 @@ class Loop(Section):
         "compensated", "", "in two planes: whether their effect on each other is added to the controller's torques"
     )
 
+    spool_lead: bool = seldom(
+        True, "", "in two planes: whether spools run ahead of the reference by what they lag behind a moving target"
+    )
+
     @property
     def steps(self) -> int:
         """Integration steps within one control period."""

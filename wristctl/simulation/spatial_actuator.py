@@ -10,7 +10,7 @@ from wristctl.lanes.compiled import by_type, compiled, implements
 from wristctl.lanes.functions import clip, maximum
 from wristctl.lanes.lane import zero_like
 from wristctl.lanes.named_tuples import tuple_of
-from wristctl.lanes.rows import rows_of
+from wristctl.lanes.rows import lanes_like, rows_of
 from wristctl.simulation.actuator import (
     IdealDrive,
     LaggedDrive,
@@ -20,7 +20,7 @@ from wristctl.simulation.actuator import (
     reel_in,
     spool_target,
 )
-from wristctl.wrist.spatial.spatial_tendons import lengths_along
+from wristctl.wrist.spatial.spatial_tendons import lengths_along, moment_arms_of
 from wristctl.wrist.spatial.spooled_tendons import RubbingTendons, straight_length
 from wristctl.wrist.tendon_mechanics import ElasticTendons, NoTendons
 
@@ -70,36 +70,41 @@ def motor_at(motor: Any, alike: Any) -> Any:
 
 @by_type
 def drive_tendons(
-    drive: Any, motors: Any, believed: Any, alike: Any, bend_ref: Any, pulls: Any, h: float, out: Any
+    drive: Any, motors: Any, known: Any, bend_ref: Any, rate_ref: Any, pulls: Any, h: float, out: Any
 ) -> Any:
     """Host's counts a period after commanded pulls [N], into `out`: pulls, or lengths on spools [m].
 
-    `believed` is the controller's one-segment wrist; `alike` the number of tendons at each place.
+    `known` is Knowledge. With its `lead` a spool runs ahead of the reference by the distance by which it lags behind
+    a target that moves: what it takes to brake, and a period.
     """
     raise NotImplementedError("compiled code only")
 
 
 @implements(drive_tendons, IdealDrive)
 def _as_commanded(
-    drive: Any, motors: Any, believed: Any, alike: Any, bend_ref: Any, pulls: Any, h: float, out: Any
+    drive: Any, motors: Any, known: Any, bend_ref: Any, rate_ref: Any, pulls: Any, h: float, out: Any
 ) -> Any:
     for t in range(len(pulls)):
         out[t] = pulls[t]
 
 
 @implements(drive_tendons, LaggedDrive)
-def _lagging(drive: Any, motors: Any, believed: Any, alike: Any, bend_ref: Any, pulls: Any, h: float, out: Any) -> None:
+def _lagging(drive: Any, motors: Any, known: Any, bend_ref: Any, rate_ref: Any, pulls: Any, h: float, out: Any) -> None:
     for t in range(len(pulls)):
-        out[t] = lag_pull(motor_at(drive.motor, alike[t]), motors, 2 * t, pulls[t], h)
+        out[t] = lag_pull(motor_at(drive.motor, known.alike[t]), motors, 2 * t, pulls[t], h)
 
 
 @implements(drive_tendons, SpoolDrive)
-def _reeling(drive: Any, motors: Any, believed: Any, alike: Any, bend_ref: Any, pulls: Any, h: float, out: Any) -> None:
-    lengths_along(believed, bend_ref, out)
+def _reeling(drive: Any, motors: Any, known: Any, bend_ref: Any, rate_ref: Any, pulls: Any, h: float, out: Any) -> None:
+    arms = lanes_like(bend_ref)
+    lengths_along(known.wrist, bend_ref, out)
     for t in range(len(pulls)):
-        motor = motor_at(drive.motor, alike[t])
-        target = spool_target(pulls[t], motor.stiffness, straight_length(believed, t), out[t])
-        out[t] = reel_in(motor, motors, 2 * t, target, h)
+        motor = motor_at(drive.motor, known.alike[t])
+        moment_arms_of(known.wrist, bend_ref, t, arms)
+        speed = arms[0] * rate_ref[0] + arms[1] * rate_ref[1]
+        ahead = speed * (abs(speed) / (2.0 * motor.acceleration) + h)
+        target = spool_target(pulls[t], motor.stiffness, straight_length(known.wrist, t), out[t])
+        out[t] = reel_in(motor, motors, 2 * t, target + known.lead * ahead, h)
 
 
 @by_type

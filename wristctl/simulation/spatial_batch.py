@@ -147,6 +147,7 @@ def spatial_batch(
         stiffness=rows([alike * motor_of(actuator).stiffness / TENDONS_PER_SIDE for actuator in actuators]),
         broken_at=rows([_broken_at(fact.actuator, places) for fact in facts]),
         backlash=rows([np.array([fact.actuator.backlash]) for fact in facts]),
+        lead=rows([np.array([float(world.loop.spool_lead)]) for world in worlds]),
         friction=FrictionRows(rows([np.array(row) for row in friction])) if rubbing else NoFriction(),
     )  # fmt: skip
     watch, frames = _watch(worlds, layout, streams, period, samples * ticks * period)

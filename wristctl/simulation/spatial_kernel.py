@@ -72,7 +72,7 @@ class SpatialValues(NamedTuple):
     (Segments); gains; and limits: least and greatest pull at each place of tendons [N], then the bend [rad] beyond
     which a wrist has failed. Of the motors: the drive as its host counts, the scale of the counts and the offset at
     each place. Of each place's tendons: their number, all their stiffness [N/m], the time at which they break, and the
-    backlash of all. Friction is that of tendons, or NoFriction.
+    backlash of all; 1 where spools run ahead of the reference. Friction is that of tendons, or NoFriction.
     """
 
     plant: Any
@@ -87,6 +87,7 @@ class SpatialValues(NamedTuple):
     stiffness: Any
     broken_at: Any
     backlash: Any
+    lead: Any
     friction: Any
 
 
@@ -133,7 +134,7 @@ def run_spatial(setup: Any, course: Any, world: Any, states: Any, scratch: Any, 
         drive, friction = drive_in_lanes(values.drive), friction_in_lanes(values.friction)
         known = Knowledge(
             believed, load_segments(rows_of(values.model_y)), load_segments(rows_of(values.model_z)), alike, drive,
-            setup.coupling,
+            setup.coupling, rows_of(values.lead)[0],
         )  # fmt: skip
         control_y = Controlled(setup.law, scratch.now_y, values.model_y, values.gains, state.memory_y, scratch.target_y)
         control_z = Controlled(setup.law, scratch.now_z, values.model_z, values.gains, state.memory_z, scratch.target_z)
@@ -199,7 +200,8 @@ def run_spatial(setup: Any, course: Any, world: Any, states: Any, scratch: Any, 
                 since, time = tick * period, now_tick * period + zero
                 wish[0] = target_y[0] + since * (target_y[1] + 0.5 * since * target_y[2])
                 wish[1] = target_z[0] + since * (target_z[1] + 0.5 * since * target_z[2])
-                drive_tendons(drive, motors, believed, alike, wish, pulls, period, counts)
+                speed[0], speed[1] = target_y[1] + since * target_y[2], target_z[1] + since * target_z[2]
+                drive_tendons(drive, motors, known, wish, speed, pulls, period, counts)
                 deliver(drive, winding, backlash, counts, delivered)
                 for t in range(count):
                     left[t] = where(time >= broken_at[t], zero, 1.0)

@@ -31,8 +31,8 @@ class Compensated(NamedTuple):
 class Knowledge(NamedTuple):
     """What a controller's side knows in two planes.
 
-    The one-segment wrist with its tendons, each plane's Segments, the number of tendons at each place, the drive, and
-    Ignored or Compensated.
+    The one-segment wrist with its tendons, each plane's Segments, the number of tendons at each place, the drive,
+    Ignored or Compensated, and 1 where spools run ahead of the reference, else 0.
     """
 
     wrist: Any
@@ -41,6 +41,7 @@ class Knowledge(NamedTuple):
     alike: Any
     drive: Any
     coupling: Any
+    lead: Any
 
 
 class SpatialSchedule(NamedTuple):

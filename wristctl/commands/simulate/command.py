@@ -105,7 +105,7 @@ def plan(study: Study, inputs: Inputs) -> str:
         if in_two_planes(study):
             check_row(settings, tuned_gains(inputs), inputs.runs().get("tuned"))
             check_two_planes(identified(study, "simulate", inputs))
-            check_size(size(study))
+            check_size(size(study), planes=2)
             return _in_words(study, " in two planes", identified(study, "simulate", inputs).wrist)
         check_row(settings, tuned_gains(inputs), inputs.runs().get("tuned"))
         check_reach([settings.reference], identified(study, "simulate", inputs).wrist, "reference")
