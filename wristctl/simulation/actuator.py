@@ -146,7 +146,7 @@ def at_rest(drive: Drive, wrist: WristParameters, model: PlantModel, q: Array, s
 
 
 @compiled
-def _lag(motor: Any, state: Any, side: int, command: Any, h: float) -> Any:
+def lag_pull(motor: Any, state: Any, side: int, command: Any, h: float) -> Any:
     fastest = motor.stiffness * motor.speed * h
     change = clip((command - state[side]) * (h / (motor.lag + h)), -fastest, fastest)
     state[side] = state[side] + change
@@ -162,7 +162,7 @@ def reeling(gap: Any, acceleration: Any, h: float) -> Any:
 
 
 @compiled
-def _reel(motor: Any, state: Any, side: int, target: Any, h: float) -> Any:
+def reel_in(motor: Any, state: Any, side: int, target: Any, h: float) -> Any:
     """Move a stepper towards its target with bounded speed and acceleration; returns whole microsteps."""
     gap = target - state[side]
     change = rounded(motor.acceleration * h)
@@ -196,14 +196,14 @@ def _as_commanded(drive: Any, state: Any, believed: Any, theta_ref: Any, plus: A
 
 @implements(actuate, LaggedDrive)
 def _lagged(drive: Any, state: Any, believed: Any, theta_ref: Any, plus: Any, minus: Any, h: float) -> Any:
-    return _lag(drive.motor, state, 0, plus, h), _lag(drive.motor, state, 2, minus, h)
+    return lag_pull(drive.motor, state, 0, plus, h), lag_pull(drive.motor, state, 2, minus, h)
 
 
 @implements(actuate, SpoolDrive)
 def _reeled(drive: Any, state: Any, believed: Any, theta_ref: Any, plus: Any, minus: Any, h: float) -> Any:
     motor, (path_plus, path_minus) = drive.motor, lengths(theta_ref, believed)
-    reeled_plus = _reel(motor, state, 0, spool_target(plus, motor.stiffness, believed.length, path_plus), h)
-    reeled_minus = _reel(motor, state, 2, spool_target(minus, motor.stiffness, believed.length, path_minus), h)
+    reeled_plus = reel_in(motor, state, 0, spool_target(plus, motor.stiffness, believed.length, path_plus), h)
+    reeled_minus = reel_in(motor, state, 2, spool_target(minus, motor.stiffness, believed.length, path_minus), h)
     return reeled_plus, reeled_minus
 
 
