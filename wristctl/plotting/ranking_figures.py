@@ -54,7 +54,7 @@ def answer_figure(rankings: Sequence[Ranking], places: Mapping[str, str]) -> Fig
     for band, ranking in enumerate(rankings):
         for step, row in enumerate(ranking.standing.order):
             name, _, gains = ranking.labels[row].partition("/")
-            mean, height = ranking.means[row], band + 0.86 * (step / max(1, most - 1) - 0.5)
+            mean, height = ranking.means[row], band + 0.9 * ((step + 0.5) / most - 0.5)
             ends, shade = np.degrees([mean.low, mean.high]), colour(name)
             if np.isfinite(ends).all():
                 axes.plot(ends, [height, height], color=shade, linewidth=1.0, zorder=1.8)

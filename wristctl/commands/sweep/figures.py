@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
 
 from wristctl.plotting.style import BLUE, GREY, VERMILLION, figure, logarithmic, with_unit
 
@@ -16,6 +17,10 @@ if TYPE_CHECKING:
 
 # Range beyond which an axis is logarithmic; places at which a line of medians is drawn.
 _DECADES, _BINS = 20.0, 25
+# Median over largest value below which swept values crowd at the small ones.
+_EVEN = 0.25
+# Ticks of an axis of swept values, at most.
+_TICKS = 5
 
 
 def over_key(
@@ -46,8 +51,10 @@ def over_key(
         panel.set_xlabel(with_unit(key, units[key]))
         if labels is not None:
             panel.set_xticks(range(len(labels)), labels, rotation=30, ha="right")
-        elif _is_wide(places):
+        elif _is_logarithmic(places):
             logarithmic(panel.xaxis)
+        else:
+            panel.xaxis.set_major_locator(MaxNLocator(_TICKS))
     for panel in panels[len(metrics) :]:
         panel.set_visible(False)
     spread = f"; {', '.join(other_keys)} as swept" if other_keys else ""
@@ -59,6 +66,11 @@ def over_key(
 def _is_wide(values: np.ndarray) -> bool:
     finite = values[np.isfinite(values)]
     return bool(finite.size and finite.min() > 0.0 and finite.max() / finite.min() > _DECADES)
+
+
+def _is_logarithmic(values: np.ndarray) -> bool:
+    """Whether values reach over decades and were not drawn evenly."""
+    return _is_wide(values) and bool(np.median(values) < _EVEN * values.max())
 
 
 def _medians(panel: Axes, places: np.ndarray, heights: np.ndarray) -> None:
