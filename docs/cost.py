@@ -1,4 +1,4 @@
-"""What rollouts cost here, by law and world, and what a cluster adds: `python docs/cost.py` writes docs/cost.md.
+"""What rollouts cost here, by controller and world, and what a cluster adds: `python docs/cost.py` writes docs/cost.md.
 
 Processor time of this process and its threads, which a busy machine changes little; the best of three.
 """
@@ -38,7 +38,7 @@ SLEEPS, TAKES = 40, 0.25
 
 
 def cost(law: str, cases: list[Case], study: Study) -> float:
-    """Seconds of one core for a rollout of a law, as a study measures it."""
+    """Seconds of one core for a rollout of a controller, as a study measures it."""
     chosen = controller(law)
     gains = np.array([chosen.values(list(chosen.presets.values())[-1])] * ROWS)
     measure(chosen, gains[:1], cases[:20], study.wrist, RANKED)
@@ -90,7 +90,7 @@ def main() -> None:
     laws = [name for name in CONTROLLERS if name == "feedforward" or name in study.study.laws]
     known = {each: drawn_cases(study.families[each], each, "test", 0, WORLDS, study.wrist) for each in families}
     costs = {family: {law: cost(law, cases, study) for law in laws} for family, cases in known.items()}
-    lines = [f"| law | {' | '.join(families)} |", f"| --- |{' --- |' * len(families)}"]
+    lines = [f"| controller | {' | '.join(families)} |", f"| --- |{' --- |' * len(families)}"]
     for law in laws:
         lines.append(f"| {law} | {' | '.join(f'{1.0 / costs[family][law]:.0f}' for family in families)} |")
     means = {family: float(np.mean(list(own.values()))) for family, own in costs.items()}
@@ -155,7 +155,7 @@ _BEGIN = [
 ]  # fmt: skip
 _MANY = [
     "", f"## {MANY:.0e} rollouts", "",
-    "At the mean of all laws, with the dearest executor's share on the cluster.", "",
+    "At the mean of all controllers, with the dearest executor's share on the cluster.", "",
     f"| family | core-hours | days on these {CORES} cores | hours on 1,000 cores |", "| --- | --- | --- | --- |",
 ]  # fmt: skip
 

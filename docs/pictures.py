@@ -131,7 +131,7 @@ def hysteresis() -> None:
 
 
 def answer() -> None:
-    """What `make run` answers: every law in each class of conditions, but for the rows that are tuned first."""
+    """What `make run` answers: every controller in each class of conditions, but for the rows that are tuned first."""
     study = load_study([HERE.parent / "experiments" / "quick.yaml"], [])
     rows = tuple(row for row in study.compare.rows if row.gains != "tuned")
     chosen = study.compare.model_copy(update={"rows": rows})

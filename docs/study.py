@@ -1,4 +1,4 @@
-"""The answer of a study of all laws, as a page: `python docs/study.py RUN` writes docs/study.md from a sealed run.
+"""The answer of a study of controllers, as a page: `python docs/study.py RUN` writes docs/study.md from a sealed run.
 
 RUN is of `wristctl study experiments/fair_study.yaml --budget full --executor processes`.
 """
@@ -15,7 +15,7 @@ from pathlib import Path
 from wristctl.records import Run
 
 HERE = Path(__file__).parent
-FIGURES = {"laws": "Every law on every rig", "terms": "What each term of a law buys"}
+FIGURES = {"laws": "Every controller on every rig", "terms": "What each term of a controller buys"}
 
 
 def answer_of(run: Run) -> list[str]:
@@ -48,7 +48,7 @@ def sensitivity(run: Run) -> list[str]:
         for each in run.data("sensitivity").to_dict("records")
     ]
     heads = (
-        "tuned otherwise", "pairs of laws", "told apart both times", "the other way round", "Kendall's tau",
+        "tuned otherwise", "pairs of controllers", "told apart both times", "the other way round", "Kendall's tau",
         "lowest before -> after", "all RMSE times",
     )  # fmt: skip
     return [f"| {' | '.join(heads)} |", "| --- " * len(heads) + "|", *rows]
@@ -69,7 +69,7 @@ def main() -> None:
     command = shlex.join(["wristctl", *manifest["argv"][1:]])
     pictures = [f"![{told}](images/study-{name}.png)" for name, told in FIGURES.items()]
     lines = [
-        "# Which law for which rig",
+        "# Which controller for which rig, tuned at equal budget",
         "",
         *answer_of(run),
         "",
