@@ -112,7 +112,7 @@ def _over(added: dict[str, float], unit: float) -> list[str]:
     return [
         "", "## What an executor adds", "",
         f"To a unit of work, measured on {SLEEPS} units that only wait, the file written and synced included; beside a",
-        f"unit of judgements on `camera`, 8,000 rollouts or {unit:.1f} s of one core.", "",
+        f"unit of tests on `camera`, 8,000 rollouts or {unit:.1f} s of one core.", "",
         "| executor | ms a unit | % of a unit |", "| --- | --- | --- |", *rows,
     ]  # fmt: skip
 
@@ -134,7 +134,7 @@ def _study(study: Study, costs: dict[str, dict[str, float]]) -> list[str]:
         "", "## The full study", "",
         f"`--budget full`: {plan(study, Inputs())}.", "",
         f"By the costs above {searched / 60.0:.0f} core-minutes of searches and",
-        f"{judged / 60.0:.0f} of judgements: {minutes:.0f} minutes on {CORES} cores, an estimate.",
+        f"{judged / 60.0:.0f} of tests: {minutes:.0f} minutes on {CORES} cores, an estimate.",
         "A run of it: [study](study.md).",
     ]  # fmt: skip
 

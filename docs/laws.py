@@ -105,11 +105,13 @@ def main() -> None:
 
 _BEGIN = f"""# Which controller for which rig, with presets
 
+With motors, tendons and a camera use computed torque with a disturbance observer for smooth motions, and feedforward
+for jumps. This page ranks presets; tuned at equal budget the answer is [the study's](study.md).
+
 Presets on {WORLDS} drawn worlds of each family of experiments/scenarios, all on the same worlds, motions and noise: the
-geometric mean of the RMSE with its 95 % interval over worlds. Rows of one group are not told apart from its first
-([how](worlds.md#who-is-best)); a row that fails or swings in any world stands in none. Made by `python docs/laws.py`.
-Every controller is tuned first, with one budget, by
-`wristctl compare experiments/scenarios/camera.yaml experiments/rivals.yaml`.
+geometric mean of the RMSE with its 95 % interval over worlds. Controllers of one group are not told apart from its
+first ([how](worlds.md#who-is-best)); one that fails or swings in any world has no group. Made by `python docs/laws.py`.
+`wristctl compare experiments/scenarios/camera.yaml experiments/rivals.yaml` tunes each first, with one budget.
 
 ## When each wins
 
@@ -126,8 +128,8 @@ Every controller is tuned first, with one budget, by
 - **Sliding terms** elsewhere (smc-tracking, smc-dob): tuned they tie with the same controller without one.
 - **Networks** (nc, nn-mrac): no better than an integral here. nn-mrac is the group's law (arXiv 2510.19068) as far as
   it is specified; its published reference model is far slower.
-- **Jumps**: behind motors (steps) none beats feedforward by more than a hundredth, and most swing; ask for motions instead.
-  With torques as commanded (ideal, steps) MPC is best, and all that have feedback beat feedforward.
+- **Jumps**: behind motors (steps) none beats feedforward by more than a hundredth, and most swing. Ask for motions
+  instead. With torques as commanded (ideal, steps) MPC is best, and all that have feedback beat feedforward.
 - **The paper's law** (smc): exchanged gains swing, and with gains of ours it is a feedforward.
 
 An adaptive or gain-scheduled smc was not added: tuned smc-tracking ties with pid-ff, so there is nothing to schedule.

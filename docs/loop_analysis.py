@@ -262,7 +262,7 @@ _BEGIN = [
     "",
     "![simulated over predicted](images/loop-analysis.png)",
     "",
-    f"Bold is what a row is judged by: within {100.0 * CLOSE:g} %, else the script ends with exit code 1.",
+    f"Bold decides on a row: within {100.0 * CLOSE:g} %, else the script ends with exit code 1.",
     "",
     f"| row | predicted gain | delay | gain: {_KICKS} | delay: {_KICKS} |",
     f"| --- | --- | --- {_RULE}{_RULE}|",

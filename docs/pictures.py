@@ -68,14 +68,15 @@ def page(results: list[ComparedRow]) -> str:
     return f"""\
 # The paper's gains on three loops
 
-Made by `python docs/pictures.py`; the angle is given directly (no network). Loops: `exact` is the model as its own
-plant, torque held for a microsecond, no limits; `sampled` the same at 1 kHz with 60 N tendons; `four-segments`
-a four-segment plant under the one-segment model. An RMSE with {MARK} changes with the integration step, however short:
-[convergence](convergence.md).
+{textwrap.fill(said(results), 120)}
+
+The angle is given directly (no network). Loops: `exact` is the model as its own plant, torque held for a microsecond,
+no limits; `sampled` the same at 1 kHz with 60 N tendons; `four-segments` a four-segment plant under the one-segment
+model. An RMSE with {MARK} changes with the integration step, however short: [convergence](convergence.md).
 
 {table(results)}
 
-{textwrap.fill(said(results), 120)}
+Made by `python docs/pictures.py`.
 """
 
 

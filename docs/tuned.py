@@ -123,7 +123,7 @@ def main() -> None:
         "# Tuned gains beside presets",
         "",
         f"{said} Each is tuned by the budget of experiments/rivals.yaml on drawn worlds of a family; among the",
-        "best candidates and its presets the gains are chosen on worlds of a second split, and judged here on",
+        "best candidates and its presets the gains are chosen on worlds of a second split, and tested here on",
         f"{TEST_WORLDS} worlds of a third: how many times less the RMSE is than the preset's (geometric mean, 95 %",
         "interval over worlds), and in how many cases either swings by more than 0.1 deg at rest or fails. As in every",
         "ranking, what swings or fails in more of the worlds is worse, whatever its RMSE. Worse is what is so beyond",
