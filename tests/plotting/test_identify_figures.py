@@ -65,7 +65,7 @@ def test_marker_and_model_are_drawn_in_degrees_with_their_difference_beside() ->
             np.testing.assert_array_equal(each.get_xdata(), trial.captured)
         assert left.get_ylabel() == "angle [deg]"
     assert rows(made) == ["trial 0", "trial 1", "trial 2"]
-    assert [axes.get_title("left") for axes in made.axes[1::2]] == ["marker less model [deg]", "", ""]
+    assert [axes.get_title("left") for axes in made.axes[1::2]] == ["difference [deg]", "", ""]
     assert [axes.get_xlabel() for axes in made.axes] == ["", "", "", "", "time [s]", "time [s]"]
 
 

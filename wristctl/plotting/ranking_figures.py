@@ -69,9 +69,10 @@ def answer_figure(rankings: Sequence[Ranking], places: Mapping[str, str]) -> Fig
     axes.tick_params(axis="y", length=0.0)
     logarithmic(axes.xaxis)
     axes.tick_params(axis="x", which="minor", labelbottom=False)
-    axes.set_xlabel("RMSE [deg]: geometric mean with 95 % interval")
+    wide = picture.get_figwidth() >= _ROOM
+    axes.set_xlabel("RMSE [deg]: geometric mean with 95 % interval" if wide else "RMSE [deg], 95 % interval")
     every: dict[str, Any] = {"linestyle": "none", "markersize": 4.5}
-    called = in_words if picture.get_figwidth() >= _ROOM else str
+    called = in_words if wide else str
     names = dict.fromkeys(label.split("/")[0] for label in labels)
     handles = [Line2D([], [], marker="o", color=colour(name), label=called(name), **every) for name in names]
     handles += [

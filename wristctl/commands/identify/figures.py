@@ -30,7 +30,7 @@ def angles(fit: Fit) -> Figure:
         right.set_ylim(-most, most)
         left.set_ylabel("angle [deg]")
         title(left, text)
-    title(axes[0, 1], "marker less model [deg]")
+    title(axes[0, 1], "difference [deg]")
     for panel in axes[-1]:
         panel.set_xlabel("time [s]")
     legend_below(picture)
