@@ -32,7 +32,7 @@ def about(result: Result) -> str:
     lines = [
         "# How fast\n",
         "Made by `make bench-all`, which measures, and writes this page. One closed loop, run by everything that can "
-        "run it: the planar wrist of n segments, the paper's sliding mode law at 1 kHz (P1, P2, P3 = "
+        "run it: the planar wrist of n segments, the paper's sliding mode control at 1 kHz (P1, P2, P3 = "
         f"{', '.join(f'{g:g}' for g in raw['task']['gains'])}), tendons with limits, a 30 degree minimum-jerk move of "
         f"{raw['task']['move']:g} s. Speed is simulated seconds per second of wall time, compiled before, the median "
         "of alternating runs; one thread means one core. Error is the largest difference of the tip angle over the "
