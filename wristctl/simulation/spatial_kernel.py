@@ -155,8 +155,8 @@ def run_spatial(setup: Any, course: Any, values: Any, state: Any, scratch: Any, 
                     high_y = high_y + lever[0] * where(lever[0] > 0.0, back, forth)
                     low_z = low_z + lever[1] * where(lever[1] > 0.0, forth, back)
                     high_z = high_z + lever[1] * where(lever[1] > 0.0, back, forth)
-                perceive_within(control_y, Estimate(bend_y, rate_y, zero), low_y, high_y, tick * period, period)
-                perceive_within(control_z, Estimate(bend_z, rate_z, zero), low_z, high_z, tick * period, period)
+                perceive_within(control_y, Estimate(bend_y, rate_y, zero), zero, (low_y, high_y), tick * period, period)
+                perceive_within(control_z, Estimate(bend_z, rate_z, zero), zero, (low_z, high_z), tick * period, period)
                 wanted_y, wanted_z = wanted_torque(control_y), wanted_torque(control_z)
                 share = allocate(arms, planar(wanted_y, wanted_z), least, greatest, pulls)
                 if tick == 0:
