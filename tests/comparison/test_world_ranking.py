@@ -191,12 +191,12 @@ def test_a_comparison_has_a_fault_where_all_rows_are_unreliable_and_none_where_w
         found = ranking("made-up", FAMILY, rows)
         return Compared(study, Findings(0), [], [], {}, {}, [found]).fault is not None
 
-    assert fault((0,)) and not fault(()) and not fault((), worlds=3) and fault((0,), worlds=3)
+    assert fault((0, 1, 2)) and not fault(()) and not fault((), worlds=3) and fault((0, 1), worlds=3)
 
 
 def test_a_law_that_is_seldom_lost_keeps_its_place_and_is_told_with_its_share() -> None:
     rows = [row("feedforward/default", hard()), row("a/x", hard(1, 0.1), swings=(3,))]
-    kept, gone = (ranking("made-up", FAMILY, rows, tolerated) for tolerated in (0.01, 0.0))
+    kept, gone = ranking("made-up", FAMILY, rows), ranking("made-up", FAMILY, rows, tolerated=0.0)
     assert kept.standing.groups[0] == [1] and gone.standing.unreliable == [1]
     assert "use a/x" in told(kept) and "use feedforward" in told(gone) and "1 of 40 worlds" in told(gone)
     lines = {line["row"]: line for line in ranking_frame(kept).to_dict("records")}
