@@ -6,6 +6,7 @@ import re
 import sys
 from collections.abc import Sequence
 from functools import partial
+from importlib import import_module
 from typing import Any, get_origin
 
 import typer
@@ -45,6 +46,8 @@ def study_command(procedure: Procedure[Any], entry: Entry) -> typer.Typer:
     first = (argument,) if argument else ()
 
     def call(**arguments: Any) -> None:
+        if entry.listing is not None and arguments.pop("list"):
+            return _list(entry.listing[0])
         leaves = {leaf: arguments.pop(leaf) for leaf in (*first, *named, *shortcuts)}
         raised = frozenset(name for name in flags if arguments.pop(name))
         sweeps = arguments.pop("sweep") if procedure.sweeps else None
@@ -67,6 +70,7 @@ def study_command(procedure: Procedure[Any], entry: Entry) -> typer.Typer:
         for leaf in (*first, *shortcuts, *named)
     ]
     parameters += [Own(name, text, bool) for name, text in flags.items()]
+    parameters += [Own("list", entry.listing[1], bool)] if entry.listing else []
     parameters += [Own("sweep", _SWEEP, list[str])] * procedure.sweeps
     parameters += [Own("executor", _EXECUTOR, str, advanced=True)] * procedure.in_units
     call.__signature__ = signature(parameters, argument)  # type: ignore[attr-defined]
@@ -75,6 +79,14 @@ def study_command(procedure: Procedure[Any], entry: Entry) -> typer.Typer:
     epilog = "\n".join(["Examples:", *shown, _MORE_OPTIONS])
     app.command(procedure.kind, cls=StudyCommand, help=inspect.getdoc(procedure.perform), epilog=epilog)(call)
     return app
+
+
+def _list(place: str) -> None:
+    from wristctl.cli.output import say
+
+    module, _, name = place.partition(":")
+    for line in getattr(import_module(module), name)():
+        say(line)
 
 
 def _execute(
