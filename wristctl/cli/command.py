@@ -4,7 +4,7 @@ import inspect
 import json
 import re
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import partial
 from importlib import import_module
 from typing import Any, get_origin
@@ -68,7 +68,7 @@ def study_command(procedure: Procedure[Any], entry: Entry) -> typer.Typer:
     quoted = {*first, *named, *switches, *texts}
     kinds: dict[str, Any] = dict.fromkeys(switches, bool)
     kinds |= {leaf: list[str] for leaf in (*first, *named) if get_origin(keys[leaf].annotation) is tuple}
-    completed = {"controller": controllers, "reference.kind": references}
+    completed: dict[str, Callable[..., list[str]]] = {"controller": controllers, "reference.kind": references}
     completed |= {need.leaf: run_ids for need in procedure.needs}
     parameters = [
         Own(
