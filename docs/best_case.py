@@ -129,7 +129,7 @@ step. `python docs/best_case.py` writes this page.
 
 {answer}
 
-![best case](images/best_case.png)
+![Angle and tensions under the paper's exchanged gains in the setting nearest to its numbers](images/best_case.png)
 
 ## What is left at best (a)
 

@@ -192,7 +192,7 @@ def page(found: Found) -> str:
         lines += [f"- {first}", *(f"  {line}" for line in rest)]
     lines += [
         "",
-        "![each preset in four worlds](images/friction.png)",
+        "![Errors of each preset without friction and with three angles of sheath](images/friction.png)",
         "",
         *_HOW.strip().splitlines(),
         "",

@@ -260,7 +260,7 @@ _BEGIN = [
     "with SciPy and python-control, and find the same limits to 2e-6. Simulated loops take steps of "
     f"{1e3 * STEP:g} ms.",
     "",
-    "![simulated over predicted](images/loop-analysis.png)",
+    "![Simulated over predicted gain and delay at which loops begin to oscillate](images/loop-analysis.png)",
     "",
     f"Bold decides on a row: within {100.0 * CLOSE:g} %, else the script ends with exit code 1.",
     "",

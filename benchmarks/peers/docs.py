@@ -159,7 +159,11 @@ def main() -> None:
             claims += claimed(found[name])
             parts.append(section(found[name]))
     page = [about(result), "## Wanted and measured\n", claims_table(claims), ONE_LANE]
-    page += ["![rates and ratios](images/benchmarks.svg)\n", "## Rates\n", *parts]
+    page += [
+        "![Closed loops a second by wristctl and its peers, and their ratios](images/benchmarks.svg)\n",
+        "## Rates\n",
+        *parts,
+    ]
     (DOCS / "images").mkdir(parents=True, exist_ok=True)
     (DOCS / "benchmarks.md").write_text("\n".join(page))
     figure(result, DOCS / "images" / "benchmarks")
