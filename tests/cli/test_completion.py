@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import subprocess
 import sys
@@ -19,28 +20,27 @@ from wristctl.records import start_run
 ROOT = Path(__file__).parents[2]
 HEAVY = {"torch", "scipy", "pandas", "matplotlib", "cv2", "numba", "numpy", "jinja2"}
 CODE = """
-import sys
-sys.argv = ["wristctl"]
+import contextlib, io, json, os, sys
 from wristctl.cli.app import main
-try:
-    main()
-finally:
-    print("loaded:", *sorted({name.split(".")[0] for name in sys.modules}), file=sys.stderr)
+for typed in json.loads(sys.argv[1]):
+    words = f"wristctl {typed}"
+    os.environ |= {"COMP_WORDS": words, "COMP_CWORD": str(len(words.split(" ")) - 1)}
+    sys.argv = ["wristctl"]
+    with contextlib.redirect_stdout(io.StringIO()) as offered, contextlib.suppress(SystemExit):
+        main()
+    print(json.dumps([offered.getvalue().split(), sorted({name.split(".")[0] for name in sys.modules})]))
 """
 
 
-def _completed(folder: Path, typed: str) -> list[str]:
-    words = f"wristctl {typed}"
-    environment = {
-        **os.environ,
-        "PYTHONPATH": str(ROOT),
-        "_WRISTCTL_COMPLETE": "complete_bash",
-        "COMP_WORDS": words,
-        "COMP_CWORD": str(len(words.split(" ")) - 1),
-    }
-    done = subprocess.run([sys.executable, "-c", CODE], cwd=folder, env=environment, capture_output=True, text=True)
-    assert not HEAVY & set(done.stderr.split("loaded:")[1].split())
-    return done.stdout.split()
+def _completed(folder: Path, *typed: str) -> list[list[str]]:
+    """What is offered for each of these, typed one after the other."""
+    environment = {**os.environ, "PYTHONPATH": str(ROOT), "_WRISTCTL_COMPLETE": "complete_bash"}
+    command = [sys.executable, "-c", CODE, json.dumps(typed)]
+    done = subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True)
+    answers = [json.loads(line) for line in done.stdout.splitlines()]
+    assert len(answers) == len(typed), done.stderr
+    assert not HEAVY & {name for _, loaded in answers for name in loaded}
+    return [offered for offered, _ in answers]
 
 
 @pytest.fixture
@@ -55,17 +55,17 @@ def folder(tmp_path: Path) -> Path:
 
 def test_runs_are_completed_by_id_and_as_the_latest(folder: Path) -> None:
     (run,) = [path.name for path in (folder / "results").iterdir() if path.is_dir()]
-    assert _completed(folder, "runs show ") == [run, "latest:gen-data"]
-    assert _completed(folder, f"runs diff x {run[:5]}") == [run]
-    for typed in ("train --data", "audit --table1", "hw-run --optics", "identify"):
-        assert _completed(folder, f"{typed} lat") == ["latest:gen-data"]
+    latest = [f"{typed} lat" for typed in ("train --data", "audit --table1", "hw-run --optics", "identify")]
+    shown, compared, *offered = _completed(folder, "runs show ", f"runs diff x {run[:5]}", *latest)
+    assert shown == [run, "latest:gen-data"] and compared == [run]
+    assert offered == [["latest:gen-data"]] * len(latest)
 
 
 def test_study_files_controllers_and_commands_are_completed(folder: Path) -> None:
-    assert _completed(folder, "train ") == ["experiments/paper.yaml", "experiments/quick.yaml"]
-    assert _completed(folder, "compare experiments/q") == ["experiments/quick.yaml"]
-    assert _completed(folder, "simulate --controller sm") == ["smc", "smc-dob", "smc-tracking"]
-    assert _completed(folder, "runs rep") == ["replay", "report"]
+    typed = ("train ", "compare experiments/q", "simulate --controller sm", "runs rep")
+    studies, one, laws, verbs = _completed(folder, *typed)
+    assert studies == ["experiments/paper.yaml", "experiments/quick.yaml"] and one == ["experiments/quick.yaml"]
+    assert laws == ["smc", "smc-dob", "smc-tracking"] and verbs == ["replay", "report"]
 
 
 def test_runs_are_the_newest_first_and_kinds_in_order(folder: Path) -> None:

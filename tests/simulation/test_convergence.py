@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 from typing import Any
 
@@ -23,6 +24,7 @@ from wristctl.tuning.objective import Judge
 from wristctl.tuning.search import tuning_cases
 
 UNKNOWNS = Path(__file__).parents[2] / "experiments" / "unknowns.yaml"
+THOROUGH = bool(os.environ.get("WRISTCTL_THOROUGH"))
 NONE = np.zeros(1, np.int64)
 
 
@@ -71,12 +73,16 @@ def test_a_smooth_loop_keeps_its_one_step_to_the_bit(law: str) -> None:
 
 
 def settings(count: int) -> list[PaperSetting]:
-    """Settings that the paper leaves open, at periods of 1 to 10 ms and limits of 40 to 100 N."""
+    """Settings that the paper leaves open, at periods of 1 to 10 ms and limits of 40 to 100 N.
+
+    Of few segments one and of many four: the kernels that other tests compile too. Every number of them is thorough.
+    """
     rng, found = np.random.default_rng(5), []
     for each in drawn_settings(load_study([UNKNOWNS]).audit.box, WristParameters(), 5):
         if each.measured != "ideal" or each.loop.control_period < 1e-3:
             continue
-        loop = each.loop.model_copy(update={"limits": True})
+        cut = each.loop.plant_segments if THOROUGH else 1 if each.loop.plant_segments < 4 else 4
+        loop = each.loop.model_copy(update={"limits": True, "plant_segments": cut})
         limit = float(np.exp(rng.uniform(np.log(40.0), np.log(100.0))))
         found.append(each._replace(loop=loop, wrist=each.wrist.model_copy(update={"tension_limit": limit})))
     return found[:count]

@@ -4,18 +4,19 @@ import inspect
 import json
 import re
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import partial
+from importlib import import_module
 from typing import Any, get_origin
 
 import typer
 
 from wristctl.cli.commands import Entry
-from wristctl.cli.options import Options, Own, StudyCommand, controllers, run_ids, signature
+from wristctl.cli.options import Options, Own, StudyCommand, controllers, references, run_ids, signature
 from wristctl.commands.procedure import Procedure
 from wristctl.errors import UserError
 from wristctl.plugins.trust import asking
-from wristctl.study_files.keys import section_keys, whole_key
+from wristctl.study_files.keys import field_at, section_keys, whole_key
 
 
 def asked_to_trust(trust: bool, shown: str) -> bool:
@@ -45,7 +46,9 @@ def study_command(procedure: Procedure[Any], entry: Entry) -> typer.Typer:
     first = (argument,) if argument else ()
 
     def call(**arguments: Any) -> None:
-        leaves = {leaf: arguments.pop(leaf) for leaf in (*first, *named, *shortcuts)}
+        if entry.listing is not None and arguments.pop("list"):
+            return _list(entry.listing[0])
+        leaves = {leaf: arguments.pop(_option_of(leaf)) for leaf in (*first, *named, *shortcuts)}
         raised = frozenset(name for name in flags if arguments.pop(name))
         sweeps = arguments.pop("sweep") if procedure.sweeps else None
         executor = (procedure.in_units and arguments.pop("executor")) or "serial"
@@ -56,17 +59,29 @@ def study_command(procedure: Procedure[Any], entry: Entry) -> typer.Typer:
         _execute(procedure, options, set_, raised | ({"force"} if options.force else set()), executor)
 
     keys = section_keys(procedure.kind)
+    for leaf in shortcuts:
+        _, field = field_at((procedure.kind, *leaf.split(".")))
+        if field is not None:
+            keys[leaf] = field
     switches = {leaf for leaf in shortcuts if keys[leaf].annotation is bool}
     texts = {leaf for leaf in shortcuts if keys[leaf].annotation in (str, str | None)}
     quoted = {*first, *named, *switches, *texts}
     kinds: dict[str, Any] = dict.fromkeys(switches, bool)
     kinds |= {leaf: list[str] for leaf in (*first, *named) if get_origin(keys[leaf].annotation) is tuple}
-    completed = {"controller": controllers} | {need.leaf: run_ids for need in procedure.needs}
+    completed: dict[str, Callable[..., list[str]]] = {"controller": controllers, "reference.kind": references}
+    completed |= {need.leaf: run_ids for need in procedure.needs}
     parameters = [
-        Own(leaf, keys[leaf].description or "", kinds.get(leaf, str), completed.get(leaf), leaf in entry.advanced)
+        Own(
+            _option_of(leaf),
+            keys[leaf].description or "",
+            kinds.get(leaf, str),
+            completed.get(leaf),
+            leaf in entry.advanced,
+        )
         for leaf in (*first, *shortcuts, *named)
     ]
     parameters += [Own(name, text, bool) for name, text in flags.items()]
+    parameters += [Own("list", entry.listing[1], bool)] if entry.listing else []
     parameters += [Own("sweep", _SWEEP, list[str])] * procedure.sweeps
     parameters += [Own("executor", _EXECUTOR, str, advanced=True)] * procedure.in_units
     call.__signature__ = signature(parameters, argument)  # type: ignore[attr-defined]
@@ -75,6 +90,19 @@ def study_command(procedure: Procedure[Any], entry: Entry) -> typer.Typer:
     epilog = "\n".join(["Examples:", *shown, _MORE_OPTIONS])
     app.command(procedure.kind, cls=StudyCommand, help=inspect.getdoc(procedure.perform), epilog=epilog)(call)
     return app
+
+
+def _list(place: str) -> None:
+    from wristctl.cli.output import say
+
+    module, _, name = place.partition(":")
+    for line in getattr(import_module(module), name)():
+        say(line)
+
+
+def _option_of(leaf: str) -> str:
+    """Name of the option for a leaf: `reference` for `reference.kind`."""
+    return leaf.partition(".")[0]
 
 
 def _execute(

@@ -74,10 +74,12 @@ def prepare(
     if inputs:
         named = {procedure.subject.replace("-", "_"): named_for_good(inputs, section, out)}
         study = study.model_copy(update=named)
-    check_tendons(study)
+    check_tendons(study, procedure.kind)
     check_motions(study, procedure.kind)
     study, foreign = adopted(study, procedure.kind)
     study = with_presets(study, procedure.kind)
+    if procedure.completed is not None:
+        study = procedure.completed(study)
     warn_of_plain(procedure, study)
     return Prepared(procedure, study, inputs, foreign)
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from wristctl.commands.printed_table import degrees, two
@@ -12,8 +12,9 @@ from wristctl.commands.printed_table import degrees, two
 if TYPE_CHECKING:
     from wristctl.comparison.controller_ranking import Ranking, Traits
 
-# Name of gains that the paper prints: never left out of a label.
+# Names of gains that the paper prints, and of those with P1 and P2 exchanged: never left out of a label.
 PRINTED = "printed"
+PAPERS_GAINS = {PRINTED, "exchanged"}
 # Letters of a name, at most.
 _LETTERS = 18
 
@@ -45,16 +46,32 @@ def rig_whole(rankings: Sequence[Ranking]) -> str:
     return "a camera" if all(one.camera for one in traits) else "motors, tendons or a camera"
 
 
-def names_of(rankings: Sequence[Ranking]) -> dict[str, str]:
-    """Short name of each row: its controller alone where that has no other gains; printed gains are always named."""
+def names_of(rankings: Sequence[Ranking], short: bool = False) -> dict[str, str]:
+    """Name of each row: its label, without gains where all that are not the paper's are the same, or none matter.
+
+    With `short` a controller that has one set of gains is its name alone.
+    """
     labels = list(dict.fromkeys(label for ranking in rankings for label in ranking.labels))
-    controllers = Counter(label.split("/")[0] for label in labels)
+    ours = {label.partition("/")[2] for label in labels if not open_loop(label)} - PAPERS_GAINS
+    controllers = Counter(label.partition("/")[0] for label in labels)
     names = {}
     for label in labels:
         name, _, gains = label.partition("/")
-        short = name if controllers[name] == 1 and gains != PRINTED else label
-        names[label] = short if len(short) <= _LETTERS else f"{short[: _LETTERS - 1]}~"
-    return names
+        alone = len(ours) == 1 and gains in ours
+        one = short and controllers[name] == 1 and gains != PRINTED
+        names[label] = name if open_loop(label) or alone or one else label
+    return _shortened(names)
+
+
+def _shortened(names: Mapping[str, str]) -> dict[str, str]:
+    """Names by label, cut where they are long: at the end, else in the middle, else not, so that all differ."""
+    begins = {label: f"{name[: _LETTERS - 1]}~" for label, name in names.items()}
+    middles = {label: f"{name[:7]}~{name[8 - _LETTERS :]}" for label, name in names.items()}
+    shown = {}
+    for label, name in names.items():
+        tries = [cut[label] for cut in (begins, middles) if Counter(cut.values())[cut[label]] == 1]
+        shown[label] = name if len(name) <= _LETTERS or not tries else tries[0]
+    return shown
 
 
 def winner(ranking: Ranking, rankings: Sequence[Ranking] = ()) -> int | None:
@@ -86,7 +103,7 @@ def interval(ranking: Ranking, row: int) -> str:
     mean = ranking.means[row]
     if not (math.isfinite(mean.high) and mean.high > mean.low):
         return ""
-    return f" (95 %: {degrees(mean.low)} to {degrees(mean.high)})"
+    return f" (95 % interval: {degrees(mean.low)} to {degrees(mean.high)})"
 
 
 def called(label: str) -> str:

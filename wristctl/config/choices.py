@@ -136,6 +136,10 @@ REFERENCES: Choices[Any] = Choices(
         "square": "wristctl.simulation.excitations:SQUARE",
         "random-steps": "wristctl.simulation.excitations:RANDOM_STEPS",
         "recording": "wristctl.simulation.recording:RECORDING",
+        "circle": "wristctl.simulation.bend_paths:CIRCLE",
+        "figure-of-8": "wristctl.simulation.bend_paths:FIGURE_OF_8",
+        "circumduction": "wristctl.simulation.bend_paths:CIRCUMDUCTION",
+        "dart-thrower": "wristctl.simulation.bend_paths:DART_THROWER",
         "adl:personal-care": "wristctl.simulation.daily_living:PERSONAL_CARE",
         "adl:eating": "wristctl.simulation.daily_living:EATING",
         "adl:stirring": "wristctl.simulation.daily_living:STIRRING",
@@ -208,6 +212,16 @@ OPTIMISERS: Choices[Any] = Choices(
 )
 
 # Table of `wristctl.wrist.plant.PlantModel`.
+ROBOTS: Choices[Any] = Choices(
+    "real robot",
+    {
+        "uc3m-soft-neck": "wristctl.identification.real_robots:SOFT_NECK",
+        "opencr-v4": "wristctl.identification.real_robots:OPENCR_V4",
+        "opencr-v6": "wristctl.identification.real_robots:OPENCR_V6",
+        "deepc-arm": "wristctl.identification.real_robots:DEEPC_ARM",
+        "tee-probe": "wristctl.identification.real_robots:TEE_PROBE",
+    },
+)
 PLANTS: Choices[Any] = Choices(
     "plant",
     {

@@ -29,6 +29,12 @@ def choice(default: Any, meaning: str, source: str = "", **constraints: Any) -> 
     return quantity(default, "", meaning, source, **constraints)
 
 
+def seldom(default: Any, unit: str, meaning: str, **constraints: Any) -> Any:
+    """A leaf that config.yaml leaves out where it has its default."""
+    extra: JsonDict = {"unit": unit, "source": "", "unsaid": True}
+    return Field(default, description=meaning, json_schema_extra=extra, **constraints)
+
+
 @dataclass(frozen=True)
 class OneOf:
     """The type of a leaf that names an entry of a table: `Annotated[str, OneOf(CONTROLLERS)]`."""
@@ -37,9 +43,10 @@ class OneOf:
 
     def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
         """The string's schema, and then that the table has it; the error is that of a Literal."""
-        return core_schema.no_info_after_validator_function(self._known, handler(source))
+        return core_schema.no_info_after_validator_function(self.checked, handler(source))
 
-    def _known(self, name: str) -> str:
+    def checked(self, name: str) -> str:
+        """The name, where the table has it; PydanticCustomError where not."""
         if self.table.group and is_reference(name):
             file, _ = split(name)
             if not file.is_file():

@@ -167,6 +167,16 @@ class Compared(StudyResult):
         """Which controller to use under which condition, and which must not be used."""
         return answer_of(self.rankings, self.place)
 
+    @property
+    def marks(self) -> list[str]:
+        """Conditions in which no controller can be used, or none is ranked for want of cases."""
+        unranked = [ranking for ranking in self.rankings if not ranking.standing.groups and not ranking.jumps]
+        few = [condition(ranking) for ranking in unranked if ranking.standing.untold]
+        none = [condition(ranking) for ranking in unranked if not ranking.standing.untold]
+        return [
+            f"{what}: {', '.join(where)}" for what, where in (("no usable one", none), ("no ranking", few)) if where
+        ]
+
     def frame(self) -> pd.DataFrame:
         """One row per combination: every metric beside the paper's; of a ranking one per row, best first."""
         import pandas as pd
