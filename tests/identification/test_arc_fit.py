@@ -36,7 +36,7 @@ def made(
                         np.arange(samples) // 20)  # fmt: skip
     whole = {name: np.array([value]) for name, value in values.items()}
     zero = np.full((1, robot.zeros), 0.01)
-    measured = robot.expected(whole, zero, np.array([slack]), bare)[0]
+    measured = robot.expected(whole, zero, np.array([slack]), bare)[0][0]
     shaken = measured + noise * np.random.default_rng(seed).normal(size=measured.shape)
     return replace(bare, measured=shaken)
 
