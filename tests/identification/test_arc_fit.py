@@ -126,10 +126,14 @@ def test_window_means_are_those_of_a_line_and_stay_beyond_its_ends() -> None:
     assert means == pytest.approx(np.array([[0.4, 3.0], [1.1, 3.0], [0.0, 3.0]]), abs=1e-9)
 
 
-def test_a_delay_moves_the_spools_of_a_recording() -> None:
+def test_a_motion_is_seen_later_by_a_delay_whether_samples_are_instants_or_means() -> None:
     recording = made(NECK, TRUE, SLACK, 0.0)
-    moved = recording.delayed(0.25)
-    assert moved[5:] == pytest.approx(recording.spools[4:-1])
+    seen = recording.later(recording.spools, 0.25)
+    assert seen[1:] == pytest.approx(recording.spools[:-1])
+    fine = np.arange(0.0, 60.0, 0.05)
+    course = np.stack([np.interp(fine, recording.time, spool) for spool in recording.spools.T], axis=1)
+    means = replace(recording, course=(fine, course)).delayed(0.25)
+    assert means[20:-20] == pytest.approx(recording.spools[19:-21], abs=2e-4)
 
 
 def test_arcs_of_unequal_length_end_where_equal_ones_do_when_cut_apart() -> None:

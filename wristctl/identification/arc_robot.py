@@ -112,15 +112,16 @@ class ArcRobot:
         """
         gain = values.get("gain", np.ones(len(zero)))
         delays = values.get("delay")
-        if delays is None:
-            spools = np.broadcast_to(recording.spools, (len(zero), *recording.spools.shape))
-        else:
+        spools = np.broadcast_to(recording.spools, (len(zero), *recording.spools.shape))
+        if delays is not None and recording.course is not None:
             different, which = np.unique(delays, return_inverse=True)
             spools = np.stack([recording.delayed(delay) for delay in different])[which]
         reeled = gain[:, None, None] * spools - slack[:, None, :]
         robot = self.arcs(values, recording.mass, len(zero))
         coordinates = robot.rest(reeled, recording.pause)
         pulls = robot.pulls(reeled, coordinates) * values.get("force", np.ones(len(zero)))[:, None, None]
+        if delays is not None and recording.course is None:
+            coordinates = np.stack([recording.later(*late) for late in zip(coordinates, delays, strict=True)])
         arcs = len(self.lengths)
         bends = coordinates[..., : 2 * arcs].reshape(*coordinates.shape[:2], arcs, 2)
         if self.measured == "bend":
@@ -200,11 +201,14 @@ class ArcRecording:
     """Fine times (F,) [s] and spools (F, M) [m], where samples are means over the time between two."""
 
     def delayed(self, delay: float) -> Array:
-        """Spools (T, M) [m] a delay [s] earlier: means over the time of a sample."""
-        if self.course is None:
-            moved = [np.interp(self.time - delay, self.time, spool) for spool in self.spools.T]
-            return np.stack(moved, axis=1)
+        """Spools (T, M) [m] a delay [s] earlier, by their course: means over the time of a sample."""
+        assert self.course is not None
         return window_means(*self.course, self.time - delay, float(np.median(np.diff(self.time))))
+
+    def later(self, coordinates: Array, delay: float) -> Array:
+        """Coordinates (T, N) as they are seen a delay [s] later."""
+        moved = [np.interp(self.time - delay, self.time, column) for column in coordinates.T]
+        return np.stack(moved, axis=1)
 
 
 def window_means(time: Array, values: Array, at: Array, width: float) -> Array:
