@@ -133,7 +133,7 @@ class ArcFit:
         for k, (name, unknown) in enumerate(self.robot.unknowns(self.terms).items()):
             value, half = float(self.x[k]), 1.96 * problem.scale[k] * math.sqrt(max(0.0, float(variance[k])))
             low, high = value - float(half), value + float(half)
-            at_end = min(value - unknown.low, unknown.high - value) < 1e-3 * (unknown.high - unknown.low)
+            at_end = min(value - unknown.low, unknown.high - value) < 1e-2 * unknown.scale
             wide = half > max(abs(value), 3.0 * unknown.scale)
             ends = (max(low, unknown.low), high)
             if wide or (at_end and unknown.low != 0.0):

@@ -80,7 +80,7 @@ def _neck_recording(file: Path, name: str, fitted: bool, zeroing: float) -> ArcR
     return ArcRecording(
         name, name, at, window_means(time, spools, at, _PERIOD), window_means(time, bends, at, _PERIOD), pause,
         whole & fitted, begin & (not fitted), ~begin & (not fitted), (at // _BLOCK).astype(np.int64),
-        float(log.columns["mass"][0]), (time, spools),
+        float(log.columns["mass"][0]), course=(time, spools),
     )  # fmt: skip
 
 

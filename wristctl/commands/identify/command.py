@@ -30,6 +30,9 @@ if TYPE_CHECKING:
 
 log = logging.getLogger(__name__)
 
+# Draws of the posterior that a run keeps as a family of worlds.
+_DRAWS = 200
+
 
 @dataclass(frozen=True, repr=False, eq=False)
 class Identified(StudyResult):
@@ -100,12 +103,15 @@ def identify(session: Session) -> Identified | LogTold:
     """
     if session.study.identify.logs:
         return identify_logs(session)
+    import numpy as np
+
     from wristctl.commands.identify.figures import angles, correlations, residuals
     from wristctl.commands.identify.tables import budget_table, causes, fit_table, offers, parameters, residual_table
     from wristctl.identification.fit import fit
     from wristctl.identification.identifiability import FINER, additions, budget, not_identified, refuse
     from wristctl.identification.intervals import knowledge
     from wristctl.identification.lack_of_fit import misfits, refuse_misfit, suspicions, widened
+    from wristctl.identification.posterior import posterior_draws, posterior_yaml
     from wristctl.identification.unknowns import identified_yaml
 
     findings, settings = session.findings, session.study.identify
@@ -139,8 +145,12 @@ def identify(session: Session) -> Identified | LogTold:
         if settings.misfit == "refuse":
             refuse_misfit(fitted, sure, suspected, missed)
         refuse(lacking, offered, estimated.condition, problem.start)
-    yaml = identified_yaml(fitted.values, _camera(session.inputs, fitted))
+    camera = _camera(session.inputs, fitted)
+    yaml = identified_yaml(fitted.values, camera)
     findings.text("data/identified.yaml", yaml)
+    rng = np.random.default_rng(findings.stream("posterior"))
+    draws = posterior_draws(fitted, estimated, _DRAWS, rng)
+    findings.text("data/posterior.yaml", yaml + posterior_yaml(draws, fitted.values, camera))
     return Identified(session.study, findings, tables, fitted, estimated, yaml, suspected)
 
 
