@@ -42,6 +42,10 @@ def test_two_poses_give_a_run_that_simulate_starts_from(call: Call, tmp_path: Pa
     assert "fixed" in shown["friction"] and "fixed" not in shown["stiffness"]
     pasted = load_study([found.file("data/identified.yaml")])
     assert pasted.wrist.damping == table.value["damping"]
+    family = load_study([found.file("data/posterior.yaml")]).families["posterior"]
+    drawn = np.array([row["plant.stiffness"] for row in family.together])
+    low, high = table.low["stiffness"], table.high["stiffness"]
+    assert len(drawn) == 200 and 0.88 < np.mean((low < drawn) & (drawn < high)) < 0.995
     sensor = pasted.simulate.loop.sensor
     assert sensor.frame_rate == pytest.approx(60.0, rel=1e-6) and sensor.dropped == pytest.approx(0.05, abs=0.03)
     assert sensor.delay_frames == pytest.approx(60.0 * (0.01 + 0.03), abs=0.1)

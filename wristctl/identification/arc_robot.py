@@ -31,7 +31,7 @@ class ArcUnknown(NamedTuple):
 
 
 UNKNOWNS: dict[str, ArcUnknown] = {
-    "gain": ArcUnknown(1.0, 0.5, 1.5, 0.1, "", "length reeled in, over that published for the winch and radius"),
+    "gain": ArcUnknown(1.0, 0.2, 5.0, 0.1, "", "length reeled in, over that published for the winch and radius"),
     "tendon": ArcUnknown(10.0, 0.05, 200.0, 3.0, "", "stiffness of a tendon times squared radius over the first arc's"),
     "stiffness": ArcUnknown(1.0, 0.1, 10.0, 0.3, "", "bending stiffness of an arc over that of the first"),
     "softening": ArcUnknown(0.8, -0.5, 0.999, 0.1, "1/kg", "share of the bending stiffness that a kilogram takes away"),
@@ -81,6 +81,8 @@ class ArcRobot:
     """Where the search begins, other than UNKNOWNS have it."""
     known_to: Mapping[str, float] = field(default_factory=dict)
     """How well unknowns are known beforehand: standard deviations from where the search begins."""
+    timed: bool = True
+    """Whether its recordings have times, without which nothing is told of creep."""
 
     def unknowns(self, terms: Sequence[Term]) -> dict[str, ArcUnknown]:
         """The unknowns of its model with these terms, those of arcs numbered."""

@@ -63,6 +63,7 @@ def robot_of_log(log: OpenLog, wrist: WristParameters, radius_error: float) -> A
     return ArcRobot(
         (wrist.length,), tuple(angles), radius, (1,) * len(numbers), "bend" if measured == "bend" else "tip",
         tuple(base), {"gain": 1.0, "turn": 0.0, "delay": 0.03}, {"gain": radius_error},
+        "time" in log.columns,
     )  # fmt: skip
 
 

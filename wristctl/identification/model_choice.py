@@ -76,7 +76,7 @@ def tried_models(
     yield slack
     base = plain if slack.verdict == "unwanted" else slack
     others = list[TriedModel]()
-    for term in (term for term in OF_TERM if term != "slack"):
+    for term in (term for term in OF_TERM if term != "slack" and (robot.timed or term != "creep")):
         others.append(_tried(robot, cases, centred, (*base.terms, term), base))
         yield others[-1]
     wanted = sorted((model for model in others if model.verdict == "wanted"), key=lambda model: model.score.error)
