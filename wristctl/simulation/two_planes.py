@@ -19,7 +19,6 @@ from wristctl.simulation.spatial_batch import check_spatial, sample_step, spatia
 from wristctl.simulation.spatial_kernel import SPATIAL_RECORDED, run_spatial
 from wristctl.simulation.worlds import World
 from wristctl.wrist.allocation import allocated
-from wristctl.wrist.spatial.spatial_kinematics import spatial_tips
 from wristctl.wrist.spatial.spatial_model import spatial_terms
 from wristctl.wrist.spatial.spatial_segments import ellipse, spatial_values
 from wristctl.wrist.tendon_layout import TendonLayout
@@ -153,11 +152,9 @@ def rollout_bends(
     flat = record.reshape(len(record), samples * columns, *record.shape[3:])
     kept = to_rows(flat, count).reshape(count, samples, columns)
     wanted = references[:, 0].T
-    desired = spatial_tips(wanted, wrist.length)
     courses = []
     for rows, world in zip(kept, worlds, strict=True):
         places, first = len(layout.places), len(SPATIAL_RECORDED)
-        coordinates = rows[:, first + 2 * places :]
         courses.append(
             BendCourse(
                 time=time,
@@ -171,9 +168,9 @@ def rollout_bends(
                 share=rows[:, 8],
                 pulls=rows[:, first : first + places],
                 acting=rows[:, first + places : first + 2 * places],
-                coordinates=coordinates,
-                tip=spatial_tips(coordinates, world.plant.length),
-                tip_desired=desired,
+                coordinates=rows[:, first + 2 * places :],
+                length=world.plant.length,
+                length_known=world.wrist.length,
             )
         )
     return courses
