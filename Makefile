@@ -12,12 +12,14 @@ BIN := .venv/bin
 run: .venv/run
 	@set -eo pipefail; \
 	step() { echo; echo "== wristctl $$*"; said=$$($(BIN)/wristctl "$$@"); echo "$$said"; made=$${said##*$$'\n'}; }; \
-	last() { echo "== wristctl $$*" >&2; $(BIN)/wristctl "$$@" | sed '/^$$/d'; }; \
+	answer() { kept=$$1; shift; echo "== wristctl $$*" >&2; \
+	  $(BIN)/wristctl "$$@" | awk -v RS= -v kept=",$$kept," \
+	    'index(kept, "," NR ",") { print } { made = $$0 } END { print "More: " made "/README.md" }'; }; \
 	step gen-data $(STUDY); data=$$made; \
 	step train $(STUDY) --data "$$data"; network=$$made; \
 	step tune $(STUDY) --network "$$network"; tuned=$$made; \
-	compared=$$(last compare $(STUDY) --network "$$network" --tuned "$$tuned"); \
-	judged=$$(last paper audit $(CLAIMS)); \
+	compared=$$(answer 1,2,4 compare $(STUDY) --network "$$network" --tuned "$$tuned"); \
+	judged=$$(answer 1,2,3,4 paper audit $(CLAIMS)); \
 	printf '\nWhich controller to use\n%s\nWhat of the paper holds\n%s\n' "$$compared" "$$judged"
 
 test: lint

@@ -13,7 +13,7 @@ from wristctl.config.bench import BenchSettings, Motors
 from wristctl.config.wrist import WristParameters
 
 TAUT = Motors(slack=(0.0, 0.0, 0.0, 0.0))
-TICK = 0.005
+TICK = 0.01
 
 
 class Host:
@@ -37,9 +37,9 @@ class Host:
 
     def rest(self, seconds: float) -> None:
         """Stand still, the link kept alive."""
-        for _ in range(round(seconds / (10 * TICK))):
+        for _ in range(round(seconds / (5 * TICK))):
             self.board.ping()
-            self.bench.transport.wait(10 * TICK)
+            self.bench.transport.wait(5 * TICK)
 
     def reel(self, steps: tuple[int, int, int, int], rate: int = 2000) -> None:
         """Reel the axes in to these positions (steps), and wait until they stand."""

@@ -75,3 +75,12 @@ def test_tendons_give_way_once_each_time_their_moment_comes() -> None:
     assert motors.next(0.9) == 1.5 and motors.give_way(1.5) == [(3, -2e-3)] and motors.give_way(2.0) == []
     faults.begin(3.0)
     assert motors.give_way(3.6) == [(3, -2e-3)], "in every trial"
+
+
+def test_a_tendon_that_creeps_does_so_for_as_long_as_it_is_told_beside_others_that_give_way() -> None:
+    creeps = InjectedFault(kind="tendon-creeps", at=0.5, duration=0.2, axis=1, size=-1.5, since="power-on")
+    detaches = InjectedFault(kind="tendon-detached", at=0.602, axis=3, since="power-on")
+    motors = MotorFaults(Faults([creeps, detaches]), (0, 1, 2, 3))
+    assert motors.next(0.0) == 0.5 and motors.creeping(0.49) == motors.creeping(0.71) == []
+    assert motors.creeping(0.5) == [(1, -1.5e-3)]
+    assert 0.5 < motors.next(0.5) <= 0.51 and motors.next(0.6) == 0.602, "in small pieces"

@@ -26,9 +26,10 @@ from wristctl.bench.rig import Rig
 from wristctl.bench.server import BenchServer, FaultyLine
 from wristctl.board.board_errors import NoAnswer, PortLost, Restarted
 from wristctl.board.driver import Board
+from wristctl.board.emulator.chip import FREQUENCY
 from wristctl.board.emulator.serve import PtyLine
 from wristctl.board.messages import Flag, Target
-from wristctl.config.bench import BenchSettings, InjectedFault, RenderedCamera
+from wristctl.config.bench import BenchSettings, InjectedFault, RenderedCamera, SerialLine
 from wristctl.config.camera import SceneSettings
 from wristctl.config.wrist import WristParameters
 from wristctl.vision.camera import Frame
@@ -155,17 +156,20 @@ def test_on_a_faulty_line_the_host_is_not_heard_for_a_while_and_a_lost_port_is_c
     clock, wire = [0.0], Wire()
     faults = Faults([InjectedFault(kind="host-silent", at=1.0, duration=0.5), InjectedFault(kind="port-lost", at=2.0)])
     faults.begin(10.0)
-    line = FaultyLine(wire, faults, lambda: clock[0])
+    line = FaultyLine(wire, faults, lambda: round(clock[0] * FREQUENCY), SerialLine())
     heard = {}
-    for clock[0] in (9.0, 11.2, 11.6, 12.1, 13.0):
+    for clock[0] in (9.0, 9.0015, 11.2, 11.21, 11.6, 11.61, 12.1, 13.0):
         assert line.wait(0.0)  # the board keeps its power
         line.send(b"y")
         heard[clock[0]] = (line.receive(), line.heard)
-    assert heard == {9.0: (b"x", 9.0), 11.2: (b"", 9.0), 11.6: (b"x", 11.6), 12.1: (b"", 11.6), 13.0: (b"", 11.6)}
+    assert heard == {
+        9.0: (b"", None), 9.0015: (b"x", 9.0015), 11.2: (b"x", 11.2), 11.21: (b"", 11.2), 11.6: (b"", 11.2),
+        11.61: (b"x", 11.61), 12.1: (b"x", 12.1), 13.0: (b"", 12.1),
+    }  # fmt: skip
     assert wire.closed
 
 
-def test_an_adapter_with_a_latency_timer_hands_over_what_the_board_says_at_its_ticks() -> None:
+def test_what_the_board_says_is_passed_on_when_its_adapter_hands_it_over() -> None:
     class Heard(Wire):
         heard: list[tuple[float, bytes]]
 
@@ -174,12 +178,15 @@ def test_an_adapter_with_a_latency_timer_hands_over_what_the_board_says_at_its_t
 
     clock, wire = [0.0], Heard()
     wire.heard = []
-    line = FaultyLine(wire, Faults(()), lambda: clock[0], latency_timer=0.016)
-    for clock[0], said in ((0.001, b"a"), (0.010, b"b"), (0.017, b""), (0.0325, b"c"), (0.047, b""), (0.049, b"")):
+    line = FaultyLine(wire, Faults(()), lambda: round(clock[0] * FREQUENCY), SerialLine(adapter="ftdi"))
+    for clock[0], said in (
+        (0.001, b"a"), (0.010, b"b"), (0.0171, b""), (0.0321, b""), (0.0325, b"c"), (0.047, b""),
+        (0.0491, b""),
+    ):  # fmt: skip
         if said:
             line.send(said)
         line.pass_on()
-    assert wire.heard == [(0.017, b"ab"), (0.049, b"c")]
+    assert wire.heard == [(0.0171, b"ab"), (0.0491, b"c")]
 
 
 @pytest.fixture

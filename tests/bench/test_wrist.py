@@ -10,7 +10,7 @@ import pytest
 from tests.bench.conftest import TAUT, HostOn
 from wristctl.bench.bench_wrist import Truth
 from wristctl.bench.virtual_bench import VirtualBench
-from wristctl.config.bench import BenchSettings, Motors, StepperActuator, WeakenedPlant
+from wristctl.config.bench import BenchSettings, InjectedFault, Motors, StepperActuator, WeakenedPlant
 from wristctl.config.plant import Disturbances, Push
 from wristctl.config.wrist import WristParameters
 from wristctl.simulation.worlds import plant_of
@@ -197,6 +197,25 @@ def test_an_overloaded_motor_slips_by_whole_turns_of_its_field(host_on: HostOn) 
     slip = (np.array(host.bench.motion().steps) * ACTUATOR.step_length - truth.reeled[-1]) / ACTUATOR.step_length
     np.testing.assert_allclose(slip, np.repeat(64 * np.rint(slip[0] / 64), 4), atol=1e-6)
     assert slip[0] >= 64
+
+
+@pytest.mark.parametrize("axes", [(0, 3), (1, 2), (0, 1, 2, 3)])
+def test_steps_that_nobody_counts_pull_opposite_tendons_up_to_what_the_motors_hold(
+    host_on: HostOn, axes: tuple[int, ...]
+) -> None:
+    """Pulls that balance bend nothing: 100 uncounted steps/s, first along the tendons' stiffness, then slipping."""
+    rate = 100 * ACTUATOR.step_length
+    faults = tuple(
+        InjectedFault(kind="tendon-creeps", at=0.5, axis=axis, size=-1e3 * rate, since="power-on") for axis in axes
+    )
+    host = host_on(BenchSettings(motors=TAUT, faults=faults))
+    host.rest(3.0)
+    truth = host.bench.truth()
+    holding = SETTINGS.motors.holding_torque / ACTUATOR.pulley_radius
+    early = truth.pull[np.searchsorted(truth.time, 1.0)]
+    assert early[list(axes)] == pytest.approx(ACTUATOR.tendon_stiffness * rate * 0.5, rel=0.15)
+    assert holding - 20.0 < truth.pull.max() <= holding + ACTUATOR.tendon_stiffness * rate * 5e-3 + 0.1
+    assert np.abs(truth.angle).max() < np.deg2rad(1.0) and host.bench.motion().steps == (0, 0, 0, 0)
 
 
 def test_the_same_seed_gives_the_same_bytes_however_often_one_looks() -> None:

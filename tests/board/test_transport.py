@@ -108,6 +108,7 @@ def test_ports_that_may_be_boards_come_first_and_by_name(monkeypatch: pytest.Mon
     listed = ports()
     assert [port.device for port in listed] == [f"/dev/z{k}" for k in range(5, 10)] + ["/dev/a", "/dev/b"]
     assert [port.board_like for port in listed] == [True] * 5 + [False] * 2
+    assert [port.adapter for port in listed] == ["CP210x", "FTDI", "CH340", "16U2", "16U2", "", ""]
     assert (listed[0].description, listed[0].serial_number) == ("", "")
 
 

@@ -18,7 +18,7 @@ from wristctl.board.check import RoundTrips
 from wristctl.board.driver import Traffic
 from wristctl.board.flashing import IMAGE
 from wristctl.board.messages import Command, Counters, Hello, Reset, Result, State, Status
-from wristctl.board.transport import BOOT_TIME
+from wristctl.board.transport import BOOT_TIME, PortFound
 from wristctl.cli.options import facts_of
 
 HELLO = Hello(2, 0xAB, (1, 2, 3), 9, Reset.EXTERNAL | Reset.WARM, 4, 1000, 2000, 5)
@@ -70,6 +70,7 @@ def asked(monkeypatch: pytest.MonkeyPatch) -> list[tuple[Any, ...]]:
     monkeypatch.setattr("wristctl.board.transport.only_board", lambda: "/dev/only")
     monkeypatch.setattr("wristctl.board.driver.Board", Plugged)
     monkeypatch.setattr("wristctl.board.check.round_trips", timed)
+    monkeypatch.setattr("wristctl.board.check.ports", lambda: [PortFound("/dev/board", "Mega", "", True, "16U2")])
     monkeypatch.setattr("wristctl.board.check.move_a_little", lambda _, axis: found.append(("moved", axis)))
     monkeypatch.setattr("wristctl.board.flashing.flash", lambda place, image, say: found.append((place, image)))
     return found
@@ -84,7 +85,13 @@ def test_check_shows_the_board_its_times_in_milliseconds_and_its_counts(call: Ca
     assert [out.index(title) for title in ("Board", "Round trips", "On the wire")] == sorted(
         out.index(title) for title in ("Board", "Round trips", "On the wire")
     )
-    for line in (["port", "/dev/board"], ["firmware", "1.2.3"], ["dictionary", "000000ab"], ["state", "DISABLED"]):
+    for line in (
+        ["USB", "adapter", "16U2,", "hands", "over", "every", "4.1", "ms"],
+        ["port", "/dev/board"],
+        ["firmware", "1.2.3"],
+        ["dictionary", "000000ab"],
+        ["state", "DISABLED"],
+    ):
         assert line in lines
     assert ["PING", "200", "1", "2.5", "40"] in lines and ["STATUS", "200", "2", "5", "80"] in lines
     assert out.index("median [ms]") < out.index("p99 [ms]") < out.index("worst [ms]")
@@ -99,6 +106,7 @@ def test_check_for_programs_is_in_seconds(call: Call, asked: list[Any]) -> None:
     assert told["round_trips_s"][1] == {
         "command": "STATUS", "rounds": 1, "median": 0.002, "p99": 0.005, "worst": 0.08,
     }  # fmt: skip
+    assert told["adapter"] == {"name": "16U2", "every": 0.004096}
     assert told["position"] == [5, 6, 7, 8] and told["protocol"] == 2
     assert told["counters"] == {
         "sent": 31, "resent": 0, "answers": 29, "stale": 0, "bytes_read": 0, "bad_frames_here": 3,

@@ -157,7 +157,13 @@ def test_a_covered_marker_ends_in_a_sealed_run_with_its_reason_and_the_last_seco
     assert "no usable marker angle" in err and "the motors stand" in err and "The last second" in err
     stop = json.loads(run.file("data/stop.json").read_text())
     assert stop["motors_stand"] and stop["trial"] == 0 and stop["rate"] == [0, 0, 0, 0]
-    assert len(run.data("log")) > 40 and "no tip" in set(run.data("frames")["verdict"])
+    code, out, _ = call("hw", "limits", "--from", run.id, "--figure", "residuals.png")
+    assert code == 0 and f"{run.id} was stopped in trial 0" in out and "no usable marker angle for 160 ms" in out
+    assert "A run that was stopped proposes no limits" in out and Path("residuals.png").stat().st_size > 10_000
+    code, out, _ = call("hw", "limits", "--from", run.id, "--json")
+    told = json.loads(out)
+    assert told["stopped"][0]["by"] == told["residuals"][0]["name"] == "age" and told["stopped"][0]["trial"] == 0
+    assert len(run.data("log")) > 20 and "no tip" in set(run.data("frames")["verdict"])
     assert call("hw", "watch", "--file", "seen.png")[:2] == (0, "seen.png\n")  # what there is of it
     assert Path("seen.png").read_bytes().startswith(b"\x89PNG")
 
@@ -224,7 +230,7 @@ def test_a_port_where_nobody_answers_is_exit_4_after_three_seconds(
     [
         (("--set", "controllers=[{controller: smc-trackin, gains: hardware}]"), "did you mean 'smc-tracking'?"),
         (("--set", "safety.late=0.2"), "must be below watchdog (0.1 s)"),
-        (("--set", "safety.late=0.095"), "hw-run - fix: safety.late below 0.095, or a longer safety.watchdog"),
+        (("--set", "safety.late=0.095"), "hw-run - fix: safety.late below 0.09, or a longer safety.watchdog"),
         ((*SLOW, "--set", "control_period=0.04"), "fix: control_period below 0.04, or safety.watchdog above 0.1"),
         (("--set", "safety={watchdog: 0.04, late: 0.02}"), "hw-run - fix: safety.watchdog above 0.05"),
         (("--set", "positions=stored"), "needs a calibration run"),

@@ -30,7 +30,7 @@ from wristctl.trial.homing import Zero
 from wristctl.trial.log import TrialLog
 
 THOROUGH = bool(os.environ.get("WRISTCTL_THOROUGH"))
-AT, PERIOD = 0.2, 5e-3
+AT, PERIOD = 0.2, 10e-3
 STAGGER = 0.02
 """Between two faults, so that the second comes while the first is being noticed."""
 TRIAL = (

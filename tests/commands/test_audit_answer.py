@@ -77,14 +77,14 @@ def trained(best: set[str] = frozenset(), beaten: set[str] = frozenset(), dead: 
 NOTHING = {"smc/printed": 1.0, "smc/exchanged": 1.0, "pid/printed": 1.0}
 
 
-SMC, SWAPPED, PID = "(SMC)", "SMC with P1 and P2 exchanged", "its PID"
+SMC, SWAPPED, PID = "(SMC)", "SMC with its gains P1 and P2 exchanged", "its PID"
 
 
 def test_each_loop_is_named_by_what_it_is() -> None:
     answer = answered(dict.fromkeys(LOOPS, loop({}, {})))
     assert answer.table is not None
     heads = answer.table.columns[2:-1]
-    assert len(set(heads)) == len(LOOPS) and not {"exact", "sampled", "default"} & set(heads)
+    assert len(set(heads)) == len(LOOPS) and not {"exact", "default"} & set(heads)
     first = answer.sentence.split(". ")[0]
     assert all(head in first for head in heads) and "no tension limit" in first and "60 N" in first
 
@@ -98,14 +98,14 @@ def test_whatever_arrives_is_said_to_and_nothing_else() -> None:
         assert "on any loop" in sentence(nowhere, who, "30 deg") and "all loops" not in sentence(nowhere, who, "30 deg")
     some = said({names[0]: there, names[1]: loop({"smc/printed": 1.0}, {}), names[2]: away})
     assert "30 deg on the ideal loop only" in sentence(some, SMC)
-    assert "30 deg on the ideal and 1 kHz loops" in sentence(some, SWAPPED + " (")
+    assert "30 deg on the ideal and sampled loops" in sentence(some, SWAPPED + " (")
 
 
 def test_the_printed_error_comes_out_where_it_does_and_beyond_the_tendons_strength_it_says_so() -> None:
     off = dict.fromkeys(NOTHING, 0.5)
     ideal, sampled, segments = LOOPS
     mixed = sentence(said({ideal: loop({}, {}, 1e5), sampled: loop({}, {}), segments: loop({}, off)}), SMC)
-    assert "on the ideal and 1 kHz loops" in mixed and mixed.endswith("no tendon bears on the ideal loop")
+    assert "on the ideal and sampled loops" in mixed and mixed.endswith("no tendon bears on the ideal loop")
     alone = said({ideal: loop({}, {}, 1e5), sampled: loop({}, off), segments: loop({}, off)})
     assert re.search("RMSE on the ideal loop only, .*no tendon bears$", sentence(alone, "Its PID"))
     sound = said(dict.fromkeys(LOOPS, loop({}, {})))
@@ -119,16 +119,16 @@ def test_the_ranking_is_that_of_the_numbers() -> None:
     assert sentence(said(printed), "smaller RMSE").count("on all loops") == 2
     assert "on all loops" in sentence(said(printed), "designs of ours")
     found = said({**printed, last: loop({}, {"pid/printed": 1e-5})})
-    assert sentence(found, "smaller RMSE").count("on the ideal and 1 kHz loops") == 2
-    assert "on the ideal and 1 kHz loops" in sentence(found, "designs of ours")
+    assert sentence(found, "smaller RMSE").count("on the ideal and sampled loops") == 2
+    assert "on the ideal and sampled loops" in sentence(found, "designs of ours")
     one_link = said(dict.fromkeys(LOOPS, loop({}, {"gvsc/default": 0.09})))
     assert "on no loop" in sentence(one_link, "designs of ours"), "GVSC above NC alone breaks it"
     alike = sentence(said(dict.fromkeys(LOOPS, loop({}, {"smc/printed": 1.5e-3}))), "smaller RMSE")
-    assert "on no loop, with equal errors on the ideal, 1 kHz and 4-segment loops;" in alike
+    assert "on no loop, with equal errors on the ideal, sampled and 4-segment loops;" in alike
     differ = loop({}, {})
     differ.loc[(differ["gains"] == "exchanged") & differ["reference"].str.contains(" 2 s"), "rmse"] = 1.0
     told = sentence(said({**printed, last: differ}), "smaller RMSE")
-    assert told.endswith("on the ideal and 1 kHz loops, undecided on the 4-segment loop, where the two moves differ")
+    assert told.endswith("on the ideal and sampled loops, in one of two moves on the 4-segment loop")
 
 
 def test_the_networks_are_told_by_the_ways_to_train_them() -> None:
@@ -159,9 +159,9 @@ def test_the_heaviest_claims_have_both_numbers_in_degrees_and_where_they_agree()
     answer = answered({ideal: fails, sampled: loop({}, {}), segments: off})
     assert answer.table is not None and "[deg]" in answer.table.title and len(answer.table.rows) == 5
     printed, exchanged, pid, *_ = (list(row[1:]) for row in answer.table.rows)
-    assert printed == ["0.015", "fails", "0.015", "0.015", "1 kHz, 4-segment"]
-    assert exchanged == ["0.015", "0.015", "0.015", "29", "ideal, 1 kHz"]
-    assert pid == ["0.086", "14", "0.086", "0.086", "1 kHz, 4-segment"]
+    assert printed == ["0.015", "fails", "0.015", "0.015", "sampled, 4-segment"]
+    assert exchanged == ["0.015", "0.015", "0.015", "29", "ideal, sampled"]
+    assert pid == ["0.086", "14", "0.086", "0.086", "sampled, 4-segment"]
     whole = answered(dict.fromkeys(LOOPS, loop({}, {}))).table
     assert whole is not None and whole.rows[0][-1] == "all loops" and whole.rows[-1][-1] == "no loop"
     for row in whole.rows:

@@ -29,7 +29,7 @@ from wristctl.loop_priority import prioritised
 ROOT = Path(__file__).parents[2]
 BOOT_LOADER = Path("/usr/share/arduino/hardware/arduino/avr/bootloaders/stk500v2/stk500boot_v2_mega2560.hex")
 TENDONS_OFF = ("--set", "bench.motors.slack=[0.02, 0.02, 0.02, 0.02]")
-PERIOD, MAY_BE_LATE = 5e-3, 2.5e-3
+PERIOD, MAY_BE_LATE = 10e-3, 5e-3
 
 pytestmark = pytest.mark.skipif(not os.environ.get("WRISTCTL_RIG"), reason="runs alone: make test-rig")
 
@@ -134,7 +134,7 @@ def do(command: str, typed: str = "", timeout: float = 240.0) -> tuple[int, str,
 def test_a_slow_link_and_camera_are_named_and_the_latency_is_found_to_two_milliseconds(
     bridge: Callable[..., Bridge],
 ) -> None:
-    slow = ("bench.line.latency_timer=0.016", "bench.camera.frame_rate=15", "bench.camera.delay_frames=0.9",
+    slow = ("bench.line.adapter=ftdi", "bench.camera.frame_rate=15", "bench.camera.delay_frames=0.9",
             "bench.camera.dropped=0", "priority=true")  # fmt: skip
     served = bridge(*(part for each in slow for part in ("--set", each)))
     with in_time():
@@ -205,7 +205,7 @@ def test_first_power_up_is_walked_from_flashing_to_the_first_motion(bridge: Call
             served.type(act)
             code, out, err = do(check)
             assert code == 0 and re.search(rf"state +{state}", out) and re.search(rf"faults +{fault}", out), out + err
-        assert float(re.search(r"STATUS +200 +([\d.]+)", out)[1]) < 5.0  # type: ignore[index]
+        assert float(re.search(r"STATUS +200 +([\d.]+)", out)[1]) < 8.0  # type: ignore[index]
         code, out, err = do(here(), "yes\n")
         assert code == 0, err
         assert "emergency stop" in pressed_in_a_jog(here(), served)
@@ -226,7 +226,7 @@ def test_first_power_up_is_walked_from_flashing_to_the_first_motion(bridge: Call
     served = bridge(*options)  # its tendons as they were before
     with in_time():
         code, out, err = do(here(), "yes\n")
-        assert code == 0 and out.startswith("This rig can run the loop of 5 ms"), out + err
+        assert code == 0 and out.startswith("This rig can run the loop of 10 ms"), out + err
         code, out, err = do(here(), "yes\nyes\n")
         taken_up = re.search(r"^ *2 +4 +\+1 +([\d.]+)", out, re.MULTILINE)  # slack of 0.4 mm, and 1 deg in both planes
         assert code == 0 and taken_up and 0.9 < float(taken_up[1]) < 1.5, out + err

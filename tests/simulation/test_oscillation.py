@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -22,6 +23,7 @@ from wristctl.simulation.oscillation import (
     oscillation,
     oscillation_frequency,
     oscillations,
+    sustained,
 )
 from wristctl.simulation.reference import motion
 from wristctl.simulation.repetitions import Repeated, Simulation
@@ -127,6 +129,21 @@ def test_feedforward_behind_a_tip_path_does_not_swing() -> None:
     short, longer = simulate(load_study([], path)), simulate(load_study([], [*path, "simulate.horizon=6"]))
     assert short.metrics["oscillation"][0] > LIMIT_CYCLE and short.swing == 0.0 and short.marks == []
     assert longer.metrics["oscillation"][0] < 0.1 * LIMIT_CYCLE and longer.fate == ""
+
+
+@pytest.mark.parametrize("sign", [-1.0, 1.0])
+def test_an_answer_to_jumps_is_no_swing_in_motion_and_a_swing_on_a_smooth_motion_is(sign: float) -> None:
+    time = np.arange(0.0, 5.0, 5e-3)
+    square, sine = (sign * 0.3 * wave(np.sin(2.0 * np.pi * 0.6 * time)) for wave in (np.sign, np.asarray))
+    buzz = math.radians(1.0) * np.sin(2.0 * np.pi * 6.0 * time)
+    amplitudes = sustained(
+        np.array([square, sine, sine]) + buzz * [[1.0], [1.0], [0.0]],
+        np.array([square, sine]),
+        np.array([0, 1, 1]),
+        5e-3,
+    )
+    assert math.isnan(amplitudes[0])
+    assert amplitudes[1:] == pytest.approx([math.radians(1.0), 0.0], rel=0.25, abs=1e-6)
 
 
 def test_what_was_before_the_last_second_does_not_count() -> None:

@@ -34,6 +34,9 @@ class Case:
     mended: tuple[Phase, ...] = ()
     """Phases in which it is found and allowed for, so that nothing is odd any more."""
 
+    parts: tuple[Mapping[str, Any], ...] = ()
+    """More that comes with it, or again: what differs from the first, `at` counted from that."""
+
     def right(self, phase: Phase) -> tuple[End, ...]:
         """Ends that are right; caught unless the case says otherwise."""
         return self.ends.get(phase, ("caught",))
@@ -44,7 +47,7 @@ class Case:
             return []
         since = "power-on" if phase == "homing" else "first trial"
         own = {"kind": self.kind, "size": self.size, "axis": self.axis, "duration": self.duration}
-        return [{**own, "at": AT[phase], "since": since}]
+        return [{**own, **part, "at": AT[phase] + part.get("at", 0.0), "since": since} for part in ({}, *self.parts)]
 
 
 def _everywhere(*ends: End) -> dict[Phase, tuple[End, ...]]:

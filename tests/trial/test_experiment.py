@@ -9,12 +9,15 @@ from typing import Any
 import numpy as np
 import pytest
 
-from tests.trial.conftest import Run, settings_of
+from tests.trial.conftest import WRIST, Run, settings_of
 from wristctl.board.driver import Board
 from wristctl.board.messages import State
 from wristctl.errors import UserError
-from wristctl.trial.homing import check_zero, slacken
+from wristctl.trial.experiment import spared
+from wristctl.trial.homing import slacken
 from wristctl.trial.log import LOG
+from wristctl.trial.safety import SafetyStop
+from wristctl.trial.zero_checks import check_zero
 
 NAMES = "log", "between", "frames", "residuals", "truth", "wire"
 
@@ -23,7 +26,7 @@ def test_a_trial_follows_its_reference_and_comes_back(experiment: Run) -> None:
     done = experiment()
     log, truth = done.table("log"), done.table("truth")
     assert done.error is None and done.experiment.outcomes == {0: "ok"}
-    assert list(log.columns) == list(LOG) and len(log) == 80 and (log["state"] == "ENABLED").all()
+    assert list(log.columns) == list(LOG) and len(log) == 40 and (log["state"] == "ENABLED").all()
     error = np.interp(log["time"], truth["time"], truth["theta"]) - log["theta_ref"]
     assert math.degrees(np.abs(error).max()) < 0.6
     between = done.table("between")
@@ -52,9 +55,13 @@ def test_frames_are_fused_at_their_capture_time(experiment: Run) -> None:
     assert math.degrees(off[0]) < 0.6 < math.degrees(off[1])
 
 
-def test_positions_in_the_log_are_of_the_time_that_it_says(experiment: Run) -> None:
-    """By the true spools: to a tenth of a millisecond, though a status comes four after its command."""
-    done = experiment()
+@pytest.mark.parametrize(("period", "most"), [(10.1e-3, 1e-4), (10e-3, 0.6e-3)])
+def test_positions_in_the_log_are_of_the_time_that_it_says(experiment: Run, period: float, most: float) -> None:
+    """By the true spools, to a tenth of a millisecond, though a status comes six after its command.
+
+    That is so where ticks begin anywhere in USB's frames. Where they keep step with them, a whole frame may go by.
+    """
+    done = experiment(control_period=period)
     log, truth = done.table("log"), done.bench.truth()
     begin = float(log["clock"].iloc[0] - log["time"].iloc[0])
     late, weight = 0.0, 0.0
@@ -64,7 +71,7 @@ def test_positions_in_the_log_are_of_the_time_that_it_says(experiment: Run) -> N
         true = np.interp(log["counted"] + begin, truth.time - 0.5e-3, truth.reeled[:, axis])
         late += float(rate @ (position - true))
         weight += float(rate @ rate)
-    assert abs(late / weight) < 1e-4
+    assert abs(late / weight) < most
     assert (log["counted"] - log["time"]).mean() > 1e-3
 
 
@@ -130,3 +137,24 @@ def test_stored_positions_of_another_start_of_the_board_are_refused(experiment: 
     assert isinstance(done.error, UserError) and done.error.exit_code == 4
     assert "the board has restarted since" in done.error.what and "positions: stored" in done.error.fix
     assert not (done.folder / "log.csv").read_text().splitlines()[1:]
+
+
+def test_co_contraction_in_a_trial_is_found_behind_it_and_never_beyond_the_motors_pull(experiment: Run) -> None:
+    faults = tuple({"kind": "tendon-creeps", "at": 0.1, "axis": axis, "size": -3.0, "duration": 0.6} for axis in (1, 2))
+    bench = {"motors": {"slack": (0.0, 0.0, 0.0, 0.0)}, "person": {"takes": 0.5}, "faults": faults}
+    done = experiment(bench=bench)
+    assert isinstance(done.error, SafetyStop) and "tendons pull against each other" in done.error.what
+    assert done.experiment.outcomes == {0: "ok"} and done.experiment.odd == {0: ""}, "no residual shows it"
+    assert 30.0 < done.bench.truth().pull.max() < 43.5
+
+
+def test_no_law_asks_for_more_than_the_motors_hold_and_nothing_is_pulled_beyond_the_least_of_limits(
+    experiment: Run,
+) -> None:
+    done = experiment(safety={"motor_pull": 30.0, "tension": 45.0})
+    assert done.experiment._wrist.tension_limit == pytest.approx(24.0)
+    assert done.experiment._settings.safety.tension == 30.0
+    strong = settings_of(safety={"motor_pull": 200.0, "tension": 150.0}).within(WRIST)
+    assert strong.safety.tension == WRIST.tension_limit == 60.0
+    with pytest.raises(UserError, match="cannot hold a pretension of 2 N"):
+        spared(WRIST, settings_of(safety={"motor_pull": 2.4}))

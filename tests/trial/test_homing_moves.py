@@ -15,9 +15,10 @@ from tests.trial.rig import Marker, RigBoard
 from wristctl.board.messages import JOG_RATE, Status
 from wristctl.config.hw_run import Homing
 from wristctl.config.plant import Actuator
-from wristctl.trial.homing import Bend, ExpectedMoves, Zero, check_zero, find_zero, slacken
+from wristctl.trial.homing import Bend, ExpectedMoves, Zero, find_zero, slacken
 from wristctl.trial.safety import SafetyStop
 from wristctl.trial.spools import on_plus_side, spools_of
+from wristctl.trial.zero_checks import check_cocontraction, check_zero
 from wristctl.wrist.directions import ACTIVE, away_of
 
 SPOOLS = spools_of(Actuator(level="tendon"))
@@ -206,6 +207,39 @@ def test_a_tendon_that_is_still_taut_where_all_are_slackened_is_found(short: int
         return
     with pytest.raises(SafetyStop, match=r"a slackened wrist still moved by .* when it was slackened further"):
         check_zero(board, tracking, settings, WRIST, "ulnar", zero)
+
+
+@pytest.mark.parametrize("plane", ["ulnar", "flexion"])
+@pytest.mark.parametrize("signs", [(1, 1, 1, 1), (-1, 1, -1, 1)], ids=str)
+@pytest.mark.parametrize(
+    ("short", "refused"),
+    [((0, 0, 0, 0), False), ((70, 0, 0, 70), True), ((0, 70, 70, 0), True), ((70, 70, 70, 70), True),
+     ((45, 0, 0, 45), False), ((30, 30, 30, 30), False)],
+)  # fmt: skip
+def test_tendons_that_pull_against_each_other_bend_a_wrist_whose_one_side_is_let_out(
+    plane: str, signs: tuple[int, ...], short: tuple[int, ...], refused: bool
+) -> None:
+    """By steps that nobody counted; pulls that balance bend nothing before, and afterwards all are slack or stop."""
+    board: Any = Slackened()
+    sides = np.where(on_plus_side(plane), 1.0, -1.0)
+
+    def angle() -> float:
+        return GLUED + float(
+            (sides * np.maximum(0.0, np.array(signs) * board.position + np.array(short))).sum() / 1950.0
+        )
+
+    tracking: Any = Marker(board, angle)
+    settings = settings_of(homing={"frames": 1, "rest": 0.0})
+    zero = Zero(signs, tuple(PER_RADIAN), GLUED, (0.0,) * 4)
+    assert angle() == pytest.approx(GLUED)
+    if refused:
+        with pytest.raises(SafetyStop, match="tendons pull against each other") as stopped:
+            check_cocontraction(board, tracking, settings, WRIST, plane, zero)
+        assert stopped.value.exit_code == 5
+    else:
+        check_cocontraction(board, tracking, settings, WRIST, plane, zero)
+    slack = round(settings.homing.pull / SPOOLS.step)
+    assert board.position.tolist() == [-slack * sign for sign in signs]
 
 
 @pytest.mark.parametrize("plane", ["ulnar", "flexion"])

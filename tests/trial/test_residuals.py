@@ -87,12 +87,12 @@ def test_a_lasting_limit_is_exceeded_for_as_long_as_its_size_allows(sizes: list[
 
 
 def test_a_limit_that_is_kept_does_not_forgive_another_and_a_pause_between_motions_does() -> None:
-    judge = Judge(LIMITS)
+    judge, apart = Judge(LIMITS), 5e-3
     over = {"across": 1.01 * BY_NAME["across"].limit}
     for tick in range(12):
-        assert judge.beyond(tick * PERIOD, SOUND | over | {"load": 2.0 * (tick % 2)}) is None
-    assert judge.beyond(12 * PERIOD, SOUND | over) is BY_NAME["across"]
-    assert judge.beyond(12 * PERIOD + 0.6, SOUND | over) is None
+        assert judge.beyond(tick * apart, SOUND | over | {"load": 2.0 * (tick % 2)}) is None
+    assert judge.beyond(12 * apart, SOUND | over) is BY_NAME["across"]
+    assert judge.beyond(12 * apart + 0.6, SOUND | over) is None
 
 
 def test_limits_written_are_limits_read(tmp_path: Path) -> None:
@@ -133,10 +133,10 @@ def watching(**changes: Any) -> tuple[Watch, TickTiming]:
 @pytest.mark.parametrize(
     ("how", "culprit", "said"),
     [
-        ({"trip": 0.016}, LINK, "the board's answers take 16.0 ms, beyond 4.75 ms"),
-        ({"trip": 0.006}, LINK, "the board's answers take 6.0 ms"),
-        ({"woken": 0.006}, SCHEDULING, "ticks were skipped: the computer woke the loop late"),
-        ({"work": 0.007}, WORK, "ticks were skipped: the loop's own work"),
+        ({"trip": 0.016}, LINK, "the board's answers take 16.0 ms, beyond 9.5 ms"),
+        ({"trip": 0.011}, LINK, "the board's answers take 11.0 ms"),
+        ({"woken": 0.011}, SCHEDULING, "ticks were skipped: the computer woke the loop late"),
+        ({"work": 0.012}, WORK, "ticks were skipped: the loop's own work"),
     ],
 )
 def test_a_loop_that_cannot_keep_its_period_is_stopped_within_half_a_second_and_a_few_ticks(
@@ -146,7 +146,7 @@ def test_a_loop_that_cannot_keep_its_period_is_stopped_within_half_a_second_and_
     with pytest.raises(SafetyStop, match=said) as stopped:
         ticks(watch, timing, 400, **how)  # type: ignore[arg-type]
     assert stopped.value.exit_code == 5 and stopped.value.fix
-    assert len(timing.late) + timing.overruns <= 115
+    assert len(timing.late) + timing.overruns <= 0.575 / PERIOD
     assert timing.culprits.most_common(1)[0][0] == culprit and culprit in timing.said()
 
 

@@ -20,7 +20,7 @@ from wristctl.trial.trials import JUDGED, Trial, evaluated, motion_of, twin
 from wristctl.wrist.directions import DIRECTIONS
 
 PERIOD, HORIZON = 5e-3, 3.0
-SETTINGS = settings_of(horizon=HORIZON)
+SETTINGS = settings_of(horizon=HORIZON, control_period=PERIOD)
 MOTION = motion_of(SETTINGS, WRIST, "ulnar")
 TIME = MOTION.time
 PUSH = Push(force=2.0, start=2.0, duration=0.4)
@@ -172,7 +172,9 @@ def test_a_trial_of_several_moves_is_judged_by_its_last_one(before: float, final
 
 
 def test_a_perfect_follower_of_five_degrees_back_passes_nothing() -> None:
-    settings = settings_of(reference={"kind": "multi-step", "angles_deg": (30.0, 25.0)}, horizon=HORIZON)
+    settings = settings_of(
+        reference={"kind": "multi-step", "angles_deg": (30.0, 25.0)}, horizon=HORIZON, control_period=PERIOD
+    )
     followed = motion_of(settings, WRIST, "radial")
     log = course(theta=followed.theta_ref)
     values = evaluated(Trial(0, "radial", 0, 0.0, 0), log, followed, PUSH, PERIOD, None)

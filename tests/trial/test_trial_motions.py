@@ -42,9 +42,9 @@ def test_at_rest_it_stays_straight() -> None:
 def test_a_trials_motion_is_mirrored_where_its_direction_counts_negative() -> None:
     settings = settings_of(horizon=0.6)
     there, other, flexion = (motion_of(settings, WRIST, each) for each in ("ulnar", "radial", "flexion"))
-    assert np.degrees(there.final) == pytest.approx(8.0) and len(there.time) == 120 and there.horizon == 0.6
+    assert np.degrees(there.final) == pytest.approx(8.0) and len(there.time) == 60 and there.horizon == 0.6
     assert there.theta_ref == pytest.approx(-other.theta_ref) and there.theta_ref == pytest.approx(flexion.theta_ref)
-    assert np.diff(there.time) == pytest.approx(PERIOD)
+    assert np.diff(there.time) == pytest.approx(settings.control_period)
 
 
 def test_a_reference_that_is_no_number_somewhere_never_comes_to_the_motors(monkeypatch: pytest.MonkeyPatch) -> None:

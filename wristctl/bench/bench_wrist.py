@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from wristctl.arrays import Array
 from wristctl.bench.faults import Faults, MotorFaults
-from wristctl.bench.motors import CYCLES, PERIOD, Hanging, follow, spool_state_of, stepper_of
+from wristctl.bench.motors import CYCLES, PERIOD, Hanging, Stepper, follow, spool_state_of, stepper_of
 from wristctl.board.emulator.chip import FREQUENCY
 from wristctl.board.messages import AXES
 from wristctl.config.bench import BenchSettings
@@ -77,6 +77,7 @@ class BenchWrist:
         motors = settings.actuator
         self._nonideal = np.array(nonideal_of(settings.plant, motors, motors, PERIOD))
         self._stepper, self._spools = stepper_of(settings), spool_state_of(settings)
+        self._steps = self._spools.step.copy()
         self._state = np.zeros(2 * self._n)
         self._axes = np.arange(AXES)
         self._tendons = unmoved(self._spools.reeled, np.zeros(3), np.zeros(AXES), self._state[: self._n])
@@ -127,8 +128,12 @@ class BenchWrist:
             for axis, slack in self._faults.give_way(self.time):
                 self._spools.slack[axis] += slack
                 self._spools.reeled[axis] -= slack
+            self._rescale(self._faults.rescaled(self.time))
             if (due := self._faults.next(self.time)) < math.inf:
                 count = min(count, max(1, math.ceil((due - self.time) / PERIOD - 1e-9)))
+            for axis, rate in self._faults.creeping(self.time):
+                self._spools.slack[axis] += rate * count * PERIOD
+                self._spools.reeled[axis] -= rate * count * PERIOD
             self._make_room(count)
             time = PERIOD * np.arange(self._periods, self._periods + count, dtype=np.float64)
             disturbed = acting(self._disturbances, time - self._start)
@@ -137,7 +142,7 @@ class BenchWrist:
             out = self._record[self._rows : self._rows + count]
             hanging = Hanging(
                 self._model, self._values, self._settings.actuator.tendon_stiffness, self._nonideal, self._tendons,
-                self._inner, self._stepper, self._sides, self._across,
+                self._inner, self._held(), self._sides, self._across,
             )  # fmt: skip
             heard = self._follow(
                 hanging, self._spools, self._state, disturbed, self._edges, self._periods, self._begun, out,
@@ -146,6 +151,17 @@ class BenchWrist:
             self._edges = self._edges[heard:]
             self._rows += count
             self._periods += count
+
+    def _rescale(self, scale: list[float]) -> None:
+        """Let each drive make so many times its own way with a step, from where its spool stands."""
+        step = self._steps * scale
+        self._spools.slack[:] += (step - self._spools.step) * self._spools.counted
+        self._spools.step[:] = step
+
+    def _held(self) -> Stepper:
+        """The motors, as far as they hold now."""
+        holding = min(self._stepper.holding, self._faults.holding(self.time))
+        return self._stepper._replace(holding=holding)
 
     def truth(self, since: float = 0.0) -> Truth:
         """True motion after `since` [s], as far back as the last minute."""

@@ -54,10 +54,13 @@ Edges = NDArray[np.int64]
 _PORT_A, _PORT_C = ord("A"), ord("C")
 _ALL_OFF = (1 << AXES) - 1
 _WIRES: tuple[FaultKind, ...] = ("direction-flipped", "direction-stuck", "motor-stalled", "drive-off", "supply-off")
+_DRIVES: tuple[FaultKind, ...] = ("drive-rescaled", "torque-lost")
 _POWER: tuple[FaultKind, ...] = ("drive-off", "supply-off")
 _TENDONS: tuple[FaultKind, ...] = ("tendon-detached", "tendon-slipped")
 # Slack of a tendon that is off its pulley [m].
 _OFF = 1.0
+# Seconds of creep that are paid out at once.
+_CREEPS_BY = 5e-3
 
 
 class MotorFaults:
@@ -73,7 +76,14 @@ class MotorFaults:
 
     def hear(self, edges: Edges, until: int) -> Edges:
         """The edges up to a cycle as the motors see them, and those of supplies that went and came meanwhile."""
-        edges = self._exchanged(edges)
+        edges = self._exchanged(edges, self._order)
+        for fault in self._faults.of(("motors-exchanged",)):
+            begin, end = self._ends(fault)
+            during = (edges[:, 0] >= begin) & (edges[:, 0] < end)
+            order = list(range(AXES))
+            order[fault.axis], order[round(fault.size)] = round(fault.size), fault.axis
+            edges = np.concatenate([edges[~during], self._exchanged(edges[during], order)])
+            edges = edges[np.argsort(edges[:, 0], kind="stable")]
         power = [cycle for fault in self._faults.of(_POWER) for cycle in self._ends(fault)]
         switched = sorted(cycle for cycle in power if self._until < cycle <= until)
         if switched:
@@ -103,18 +113,35 @@ class MotorFaults:
         return detached
 
     def next(self, after: float) -> float:
-        """When the next tendon gives way after a time [s]; infinite where none does."""
-        return min(self._faults.next(kind, after) for kind in _TENDONS)
+        """When the next tendon gives way, or drive changes, after a time [s]; infinite where none does."""
+        creep = after + _CREEPS_BY if self.creeping(after) else self._faults.next("tendon-creeps", after)
+        return min(creep, *(self._faults.next(kind, after) for kind in (*_TENDONS, *_DRIVES)))
 
-    def _exchanged(self, edges: Edges) -> Edges:
-        if self._order == tuple(range(AXES)) or not len(edges):
+    def rescaled(self, time: float) -> list[float]:
+        """Times of the way that each drive makes with a step at a time [s], (4,)."""
+        scale = [1.0] * AXES
+        for fault in self._faults.active(("drive-rescaled",), time):
+            scale[fault.axis] *= fault.size
+        return scale
+
+    def holding(self, time: float) -> float:
+        """Largest pull [N] of any motor at a time [s], as far as faults bound it."""
+        return min((fault.size for fault in self._faults.active(("torque-lost",), time)), default=math.inf)
+
+    def creeping(self, time: float) -> list[tuple[int, float]]:
+        """Axes whose tendons slip on at a time [s], and how fast they pay out [m/s]."""
+        return [(fault.axis, 1e-3 * fault.size) for fault in self._faults.active(("tendon-creeps",), time)]
+
+    @staticmethod
+    def _exchanged(edges: Edges, order: Sequence[int]) -> Edges:
+        if tuple(order) == tuple(range(AXES)) or not len(edges):
             return edges
         edges = edges.copy()
         for port, width in ((_PORT_A, 2), (_PORT_C, 1)):
             on_port, field = edges[:, 1] == port, (1 << width) - 1
             levels = edges[on_port, 2]
             heard = levels & ~((1 << width * AXES) - 1)
-            for motor, axis in enumerate(self._order):
+            for motor, axis in enumerate(order):
                 heard |= (levels >> width * axis & field) << width * motor
             edges[on_port, 2] = heard
         return edges

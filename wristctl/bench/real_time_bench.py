@@ -100,7 +100,9 @@ def connect(
     camera, film = start_film(settings, wrist, markers, folder / "frame")
     context = multiprocessing.get_context("spawn")
     ours, theirs = context.Pipe()
-    bench = context.Process(target=_serve, args=(theirs, film, folder, settings, wrist, seed, record), daemon=True)
+    bench = context.Process(
+        target=_serve, args=(theirs, film, folder, settings, wrist, seed, markers, record), daemon=True
+    )
     with safe_path():
         bench.start()
     theirs.close()
@@ -122,6 +124,7 @@ def _serve(
     settings: BenchSettings,
     wrist: WristParameters,
     seed: int,
+    markers: Markers | None,
     record: Path | None,
 ) -> None:
     """The bench's process: Ctrl-C is the client's affair. It takes the camera's folder with it."""
@@ -132,7 +135,7 @@ def _serve(
 
     try:
         line = PtyLine()
-        server = BenchServer(Rig(settings, wrist, seed), line, film, record, control)
+        server = BenchServer(Rig(settings, wrist, seed, markers), line, film, record, control)
         signal.signal(signal.SIGTERM, lambda *_: server.stop())
         control.send(line.address)
         server.run()

@@ -18,33 +18,32 @@ from wristctl.bench.bench_wrist import BenchWrist, MotorMotion, Truth
 from wristctl.bench.faults import Faults
 from wristctl.bench.motors import PERIOD
 from wristctl.bench.rig import Bystander, Rig
+from wristctl.bench.usb_adapter import UsbAdapter, hand_over_of
 from wristctl.board.emulator.chip import FREQUENCY
 from wristctl.board.emulator.serve import Line, serve
+from wristctl.config.bench import SerialLine
 from wristctl.config.plant import Disturbances
 from wristctl.errors import UserError
 from wristctl.seeds import Entropy
 
 log = logging.getLogger(__name__)
 
-# A latency timer [s] that is no longer than this is that of USB itself: nothing is held back.
-_AT_ONCE = 1e-3
-
 
 class FaultyLine:
-    """Another line with faults: port-lost, for good, and host-silent; `clock` is the board's.
+    """Another line behind a USB adapter, with faults: port-lost, for good, and host-silent.
 
-    What the board says is handed over every `latency_timer` seconds of it, by `pass_on`.
+    `cycles` is the board's clock. What both sides say is passed on in its time, by `pass_on` and `receive`.
     """
 
-    def __init__(self, line: Line, faults: Faults, clock: Callable[[], float], latency_timer: float = 0.0) -> None:
+    def __init__(self, line: Line, faults: Faults, cycles: Callable[[], int], settings: SerialLine) -> None:
         self.address = line.address
         self.there = False
         """Whether a client is there."""
         self.heard: float | None = None
         """When the board was last sent something [s on its clock]; None: never."""
-        self._line, self._faults, self._clock = line, faults, clock
+        self._line, self._faults, self._cycles = line, faults, cycles
         self._lost = False
-        self._latency_timer, self._held, self._due = latency_timer, b"", 0.0
+        self._usb = UsbAdapter(hand_over_of(settings))
 
     def wait(self, timeout: float) -> bool:
         """Wait until there may be bytes, at most `timeout` s; whether a client is there."""
@@ -57,26 +56,27 @@ class FaultyLine:
         return self.there
 
     def receive(self) -> bytes:
-        """Receive the clients' bytes, as far as the board hears them."""
+        """Receive the clients' bytes that have arrived, as far as the board hears them."""
         received = b"" if self._lost else self._line.receive()
-        if not received or self._faults.on("host-silent", self._clock()):
-            return b""
-        self.heard = self._clock()
-        return received
+        if not self._faults.on("host-silent", self._clock()):
+            self._usb.take_from_host(received, self._cycles())
+        if arrived := self._usb.give_board(self._cycles()):
+            self.heard = self._clock()
+        return arrived
 
     def send(self, data: bytes) -> None:
         """Give bytes to every client, once their time has come."""
-        if not self._held:
-            timer = self._latency_timer
-            self._due = (self._clock() // timer + 1) * timer if timer > _AT_ONCE else 0.0
-        self._held += data
+        self._usb.take_from_board(data, self._cycles())
         self.pass_on()
 
     def pass_on(self) -> None:
         """Hand over what is held, if it is time."""
-        if self._held and not self._lost and self._clock() >= self._due:
-            self._line.send(self._held)
-            self._held = b""
+        self._usb.take_from_board(b"", self._cycles())
+        if (given := self._usb.give_host(self._cycles())) and not self._lost:
+            self._line.send(given)
+
+    def _clock(self) -> float:
+        return self._cycles() / FREQUENCY
 
     def close(self) -> None:
         """Send the clients away."""
@@ -146,7 +146,7 @@ class BenchServer:
         bystander: Bystander | None = None,
     ) -> None:  # fmt: skip
         self._rig, self._film, self._control, self._bystander = rig, film, control, bystander
-        self._line = FaultyLine(line, rig.faults, lambda: rig.chip.cycles / FREQUENCY, rig.settings.line.latency_timer)
+        self._line = FaultyLine(line, rig.faults, lambda: rig.chip.cycles, rig.settings.line)
         self._record = None if record is None else BenchRecord(record, rig.wrist, self._line)
         self._start, self._until = time.monotonic(), math.inf
         self._taken, self._reset = -1, -math.inf

@@ -144,12 +144,13 @@ class Shutter:
         moments = middle + half * np.linspace(-1.0, 1.0, 2 * count * _WITHIN + 1)[1::2]
         parts = self._wrist.angles(moments).reshape(count, _WITHIN, -1).mean(axis=1)
         covered, swapped = (faults.on(kind, middle) for kind in ("marker-covered", "markers-swapped"))
-        turned = math.radians(sum(fault.size for fault in faults.active(("marker-turned",), middle)))
+        turned = sum(fault.size for fault in faults.active(("marker-turned",), middle))
+        turned += sum(fault.size * (middle - faults.begun(fault)) for fault in faults.active(("marker-peels",), middle))
         spoiled = tuple((fault.kind, fault.size) for fault in faults.active(PICTURE_FAULTS, time))
         across = self._wrist.across(middle)
         stamp = self._stamp(time)
         return Exposure(
-            number, stamp, shown, parts, covered, swapped, self._noise(shown), across, turned, spoiled
+            number, stamp, shown, parts, covered, swapped, self._noise(shown), across, math.radians(turned), spoiled
         )  # fmt: skip
 
     def _shown(self, number: int, time: float) -> int:

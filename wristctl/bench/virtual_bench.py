@@ -1,7 +1,6 @@
 """The emulated bench in virtual time: board, wrist and camera in this process, the same in every run."""
 
 import math
-from collections import deque
 
 import numpy as np
 
@@ -9,10 +8,11 @@ from wristctl.bench.bench_wrist import MotorMotion, Truth
 from wristctl.bench.faults import Faults
 from wristctl.bench.rig import Rig
 from wristctl.bench.shutter import picture
+from wristctl.bench.usb_adapter import HandOver, UsbAdapter, hand_over_of
 from wristctl.board.board_errors import PortLost
 from wristctl.board.emulator.atmega2560 import Atmega2560, VirtualTransport
 from wristctl.board.emulator.chip import FREQUENCY
-from wristctl.config.bench import BenchSettings, FaultKind
+from wristctl.config.bench import BenchSettings, FaultKind, SerialLine
 from wristctl.config.camera import Markers
 from wristctl.config.plant import Disturbances
 from wristctl.config.wrist import WristParameters
@@ -25,46 +25,33 @@ _BUTTON = "G", 0
 class BenchTransport(VirtualTransport):
     """The wire to an emulated chip in the same process, with the faults of cable, host and board.
 
-    A lost port stays lost; the board runs on, also while the host can only `wait`. What the board says is handed over
-    every `latency_timer` seconds, by the board's USB chip.
+    A lost port stays lost; the board runs on, also while the host can only `wait`.
     """
 
-    def __init__(self, chip: Atmega2560, faults: Faults, latency_timer: float = 1e-3) -> None:
+    def __init__(self, chip: Atmega2560, faults: Faults, line: SerialLine | None = None) -> None:
         super().__init__(chip)
-        self._handed_over = round(latency_timer * FREQUENCY)
+        self._hand_over = hand_over_of(line or SerialLine())
+        self._usb = UsbAdapter(self._hand_over)
         self._faults, self._lost, self._reset = faults, False, -math.inf
         self._noise = np.random.default_rng(0)
         self._happened: set[tuple[FaultKind, float]] = set()
         self._pressed = False
-        self._on_the_way: deque[tuple[int, bytes]] = deque()
 
     def write(self, data: bytes) -> None:
-        """Put bytes on the line. Raises PortLost."""
+        """Give bytes to the adapter. Raises PortLost."""
         self._see_port()
         if not self._faults.on("host-silent", self.now()):
-            super().write(self._garbled(data))
+            self._usb.take_from_host(self._garbled(data), self.chip.cycles)
 
     def read(self, timeout: float) -> bytes:
         """Read the chip's bytes; runs it for up to `timeout` s until there are some. Raises PortLost."""
         self._see_port()
         self._stand_still("answers-held")
         end = self.chip.cycles + max(1, round(timeout * FREQUENCY))
-        late = round(1e-3 * self._sizes("answers-late") * FREQUENCY)
-        every = max(self._handed_over, round(1e-3 * self._sizes("usb-latency") * FREQUENCY))
-        while not (data := self._arrived(late)) and self.chip.cycles < end:
-            due = self._on_the_way[0][0] if self._on_the_way else end
-            self._run(min(end, due, (self.chip.cycles // every + 1) * every))
+        while not (data := self._usb.give_host(self.chip.cycles)) and self.chip.cycles < end:
+            self._run(end)
             self._see_port()
         return self._garbled(data)
-
-    def _arrived(self, late: int) -> bytes:
-        """Bytes of the chip that the cable, which takes so many cycles, has handed over by now."""
-        if sent := self.chip.read():
-            self._on_the_way.append((self.chip.cycles + late, sent))
-        data = b""
-        while self._on_the_way and self._on_the_way[0][0] <= self.chip.cycles:
-            data += self._on_the_way.popleft()[1]
-        return data
 
     def wait(self, seconds: float) -> None:
         """Run the chip for so long."""
@@ -76,12 +63,15 @@ class BenchTransport(VirtualTransport):
             self._run(end)
 
     def _run(self, end: int) -> None:
-        """Run towards `end`, at most to the next reset or press of the button that is due, and do that."""
+        """Run towards `end`, at most until the adapter has to be looked at, or to the next reset or press of the button
+        that is due; and do that."""
+        end = min(end, self._usb.next(self.chip.cycles))
         pressing = self._faults.next("estop-pressed", -math.inf) if not self._pressed else math.inf
         reset = self._faults.next("board-reset", self._reset)
         due = min(reset, max(pressing, self.now()))
         cycle = math.inf if math.isinf(due) else round(due * FREQUENCY)
         self.chip.run(max(0, int(min(end, cycle)) - self.chip.cycles))
+        self._pass_on()
         if self.chip.cycles < cycle:
             return
         if pressing <= due:
@@ -90,6 +80,16 @@ class BenchTransport(VirtualTransport):
         else:
             self.chip.reset()
             self._reset = due
+
+    def _pass_on(self) -> None:
+        """Let the adapter take and give what it is time for."""
+        now, usb = self.chip.cycles, self._usb
+        every = round(1e-3 * self._sizes("usb-latency") * FREQUENCY)
+        usb.hand_over = HandOver(every, 96) if every > self._hand_over.every else self._hand_over
+        usb.late = round(1e-3 * self._sizes("answers-late") * FREQUENCY)
+        usb.take_from_board(self.chip.read(), now)
+        if arrived := usb.give_board(now):
+            self.chip.write(arrived)
 
     def _see_port(self) -> None:
         self._lost = self._lost or self._faults.on("port-lost", self.now())
@@ -146,7 +146,7 @@ class VirtualBench:
         self, settings: BenchSettings, wrist: WristParameters, seed: int, markers: Markers | None = None
     ) -> None:
         self._rig = Rig(settings, wrist, seed, markers)
-        self.transport = BenchTransport(self._rig.chip, self._rig.faults, settings.line.latency_timer)
+        self.transport = BenchTransport(self._rig.chip, self._rig.faults, settings.line)
         self.camera = VirtualCamera(self._rig)
 
     def face(self, direction: str) -> None:

@@ -5,6 +5,7 @@ from typing import NamedTuple
 
 from wristctl.board.driver import Board
 from wristctl.board.messages import Command, Configure, Status
+from wristctl.board.transport import ports
 
 # A twentieth of a turn at 1/16 step.
 WIRING_STEPS = 160
@@ -44,11 +45,39 @@ def move_a_little(board: Board, axis: int) -> Status:
 
 SYSTEM = Path("/sys/bus/usb-serial/devices")
 
+# Seconds between two hand-overs, by adapter: a 16U2's timer (arduino-usbserial: 256 x 256 cycles of 16 MHz), FTDI's
+# latency timer unless it is told another, and a frame of USB, which every adapter waits for anyhow.
+_EVERY = {"16U2": 256 * 256 / 16e6, "FTDI": 16e-3, "CH340": 1e-3, "CP210x": 1e-3}
+
+
+class Adapter(NamedTuple):
+    """The USB adapter between this computer and a board."""
+
+    name: str
+    """16U2 (a genuine Mega's), FTDI, CH340, CP210x; empty where that is unknown."""
+    every: float | None
+    """Seconds between two hand-overs of what the board says; None: unknown."""
+
+    def __str__(self) -> str:
+        if not self.name or self.every is None:
+            return "unknown"
+        what = "latency timer of" if self.name == "FTDI" else "hands over every"
+        return f"{self.name}, {what} {1e3 * self.every:.3g} ms"
+
+
+def adapter_of(port: str, system: Path = SYSTEM) -> Adapter:
+    """The adapter of a port, by its USB vendor; an FTDI's latency timer as the system says."""
+    device = str(Path(port).resolve()) if "://" not in port else port
+    names = {str(Path(listed.device).resolve()): listed.adapter for listed in ports()}
+    timer = latency_timer(port, system)
+    name = names.get(device, "") or ("FTDI" if timer is not None else "")
+    return Adapter(name, _EVERY.get(name) if timer is None else timer)
+
 
 def latency_timer(port: str, system: Path = SYSTEM) -> float | None:
-    """Seconds for which the adapter holds back what the board says while its buffer is not full; None: unknown.
+    """Seconds for which an FTDI adapter holds back what the board says while its buffer is not full.
 
-    FTDI's adapters have one, of 16 ms unless told; a Mega's own USB chip has none.
+    None where there is none: others have no such setting.
     """
     try:
         return 1e-3 * int((system / Path(port).resolve().name / "latency_timer").read_text())

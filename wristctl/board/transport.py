@@ -14,8 +14,11 @@ from wristctl.processes import check_hardware_allowed
 # Seconds that a Mega's boot loader waits for a program after a reset, and some more.
 BOOT_TIME = 2.0
 
-# USB vendors: Arduino (two), and the makers of the serial chips CH340, FT232 and CP210x.
-_BOARD_VENDORS = {0x2341, 0x2A03, 0x1A86, 0x0403, 0x10C4}
+# Seconds of one frame of USB at full speed, for whose next what the host writes waits.
+_USB_FRAME = 1e-3
+
+# USB adapters of Arduinos and their clones by vendor (Arduino has two).
+ADAPTERS = {0x2341: "16U2", 0x2A03: "16U2", 0x1A86: "CH340", 0x0403: "FTDI", 0x10C4: "CP210x"}
 
 
 class Transport(Protocol):
@@ -103,6 +106,14 @@ class SerialTransport:
             raise PortLost(self.name, error) from error
 
 
+def underway(count: int, baud: int) -> float:
+    """Mean time [s] from the host's writing of `count` bytes until the board has the last.
+
+    They wait for the next frame of USB, of whose phase a host knows nothing: it may be half a frame more or less.
+    """
+    return 0.5 * _USB_FRAME + 10.0 * count / baud
+
+
 class PortFound(NamedTuple):
     """A serial port of this computer."""
 
@@ -110,12 +121,19 @@ class PortFound(NamedTuple):
     description: str
     serial_number: str
     board_like: bool  # made by someone who makes Arduinos or their serial chips
+    adapter: str = ""  # one of ADAPTERS, empty for another
 
 
 def ports() -> list[PortFound]:
     """The serial ports, those that may be a board first."""
     found_ports = [
-        PortFound(port.device, port.description or "", port.serial_number or "", port.vid in _BOARD_VENDORS)
+        PortFound(
+            port.device,
+            port.description or "",
+            port.serial_number or "",
+            port.vid in ADAPTERS,
+            ADAPTERS.get(port.vid, ""),
+        )
         for port in list_ports.comports()
     ]
     return sorted(found_ports, key=lambda port: (not port.board_like, port.device))

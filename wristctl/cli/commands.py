@@ -29,6 +29,8 @@ class Entry(NamedTuple):
     """Inputs and shortcuts that the help shows with `--all` only."""
     hidden: bool = False
     """Whether the help leaves it out: a former name."""
+    listing: tuple[str, str] | None = None
+    """Module and name of the lines that `--list` prints, and its help."""
 
 
 COMMANDS = {
@@ -184,7 +186,18 @@ COMMANDS = {
             "wristctl hysteresis --drive tensions --set 'ranges_deg=[[0, 30]]' --set 'sheaths=[0, 1]'",
         ),
     ),
-    "validate": Entry("wristctl.cli.validate:app", _MORE, "Hold the model against recordings of real robots."),
+    "validate": Entry(
+        "wristctl.commands.validate.command:VALIDATE",
+        _MORE,
+        "Hold the model against recordings of real robots.",
+        shortcuts=("data",),
+        examples=(
+            "wristctl validate --list",
+            "wristctl validate uc3m-soft-neck --data Data-and-Results",
+        ),
+        argument="robot",
+        listing=("wristctl.commands.validate.command:listed", "Say where the recordings of each robot are."),
+    ),
     "export-model": Entry("wristctl.cli.export_model:app", _MORE, "Write the wrist of a run for MuJoCo or MATLAB."),
     "paper": Entry("wristctl.cli.paper_commands:app", _MORE, "Check the paper's claims one by one."),
 }

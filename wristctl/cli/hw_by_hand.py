@@ -12,8 +12,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from wristctl.cli.hw_limits import tell_limits
 from wristctl.cli.operator import idle, typed_line
-from wristctl.cli.options import BAUD, RESULTS, Baud, Debug, Out, Port
+from wristctl.cli.options import BAUD, RESULTS, Baud, Debug, Json, Out, Port
 from wristctl.errors import UserError
 from wristctl.study_files.load import load_study
 
@@ -76,9 +77,21 @@ def home(
 
 def limits(
     port: Port = None, baud: Baud = BAUD, override: Override = None,
+    from_runs: Annotated[
+        list[str] | None,
+        typer.Option("--from", metavar="RUN", help="Instead: an hw-run run's residuals beside its limits; repeatable."),
+    ] = None,
+    figure: Annotated[Path | None, typer.Option("--figure", help="With --from: the picture to write.")] = None,
+    out: Out = RESULTS, as_json: Json = False,
     dry_run: Dry = False, yes: Yes = False, debug: Debug = False,
 ) -> None:  # fmt: skip
-    """Set the soft limits of safety.travel, and see that the board keeps them; nothing moves."""
+    """Set the soft limits of safety.travel, and see that the board keeps them; nothing moves.
+
+    With --from: how near a run came to each limit of safety, what stopped it, and limits that its rig would bear.
+    """
+    if from_runs:
+        tell_limits(from_runs, out, figure, as_json)
+        return
     plan = "soft limits are set, the drives switched on, and targets beyond the limits sent, which are to be refused"
     with _session(plan, port, baud, override, None, RESULTS, dry_run, yes) as hand:
         if hand is not None:
@@ -124,7 +137,8 @@ def _session(
     dry_run: bool, yes: bool,
 ) -> Iterator[ByHand | None]:  # fmt: skip
     """The drives on, after a yes, until the block ends (at once where that goes wrong); None in a dry run."""
-    settings = load_study((), override or (), "calibrate-wrist").calibrate_wrist
+    study = load_study((), override or (), "calibrate-wrist")
+    settings = study.calibrate_wrist.within(study.wrist)
     if dry_run:
         print(plan)
         yield None

@@ -45,7 +45,7 @@ def check(
     """Ask the board who it is and how it is, time its answers, and try one drive's wiring; --rig: the whole rig."""
     if rig:
         return check_rig(port, baud, camera, override or [], axis, yes, as_json, quiet)
-    from wristctl.board.check import move_a_little, round_trips
+    from wristctl.board.check import adapter_of, move_a_little, round_trips
     from wristctl.board.driver import Board
     from wristctl.board.messages import Command
     from wristctl.board.transport import EMULATED, open_transport
@@ -64,6 +64,7 @@ def check(
                 move_a_little(board, wiring)
             times = [round_trips(board, command, rounds) for command in (Command.PING, Command.STATUS)]
             status, counters = board.read(), board.counters()
+    adapter = adapter_of(transport.name)
     facts = facts_of({**board.hello._asdict(), **status._asdict()})
     counted = {**asdict(board.traffic), "bad_frames_here": board.bad_frames, **counters._asdict()}
     if as_json:
@@ -71,6 +72,7 @@ def check(
         shown = {
             "schema": "wristctl.board/1",
             "port": transport.name,
+            "adapter": adapter._asdict(),
             **facts,
             "round_trips_s": timed,
             "counters": counted,
@@ -80,7 +82,11 @@ def check(
     columns = ("command", "times", "median [ms]", "p99 [ms]", "worst [ms]")
     rows = [(timing.command, timing.rounds, *(1e3 * value for value in timing[2:])) for timing in times]
     for table in (
-        Table("Board", ("port", transport.name), [(name, str(value)) for name, value in facts.items()]),
+        Table(
+            "Board",
+            ("port", transport.name),
+            [(name, str(value)) for name, value in {"USB adapter": adapter, **facts}.items()],
+        ),
         Table("Round trips", columns, rows),
         Table("On the wire", ("what", "count"), list(counted.items())),
     ):
@@ -160,10 +166,9 @@ def _rows(facts: RigFacts) -> list[tuple[str, str]]:
     import numpy as np
 
     median, most = (1e3 * float(np.quantile(facts.woken, share)) for share in (0.5, 0.99))
-    timer = "unknown" if facts.timer is None else f"{1e3 * facts.timer:g} ms"
     rows = [
         ("round trip of STATUS", f"{1e3 * trips.median:.2f} ms, p99 {1e3 * trips.p99:.2f} ms"),
-        ("USB adapter's latency timer", timer),
+        ("USB adapter", str(facts.adapter)),
         ("computer wakes late by", f"{median:.2f} ms, p99 {most:.2f} ms"),
         ("camera", f"{pace.rate:.1f} pictures/s, uneven by {1e3 * pace.jitter:.1f} ms"),
         ("age of pictures when they come, by their stamps", f"{1e3 * pace.latency:.1f} ms"),
@@ -197,7 +202,7 @@ def _plain(facts: RigFacts, faults: list[Trouble]) -> dict[str, Any]:
             "fit": not any(trouble.grave for trouble in faults),
             "troubles": [trouble._asdict() for trouble in faults],
             "round_trip": facts.trips._asdict(),
-            "latency_timer": facts.timer,
+            "adapter": facts.adapter._asdict(),
             "woken_late": {"median": median, "p99": most},
             "camera": {"rate": pace.rate, "jitter": pace.jitter, "stamped_age": pace.latency},
             "latency": None if facts.latency is None else facts.latency._asdict(),

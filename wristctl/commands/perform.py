@@ -78,6 +78,8 @@ def prepare(
     check_motions(study, procedure.kind)
     study, foreign = adopted(study, procedure.kind)
     study = with_presets(study, procedure.kind)
+    if procedure.completed is not None:
+        study = procedure.completed(study)
     warn_of_plain(procedure, study)
     return Prepared(procedure, study, inputs, foreign)
 

@@ -42,6 +42,9 @@ class Procedure(Generic[Found]):
     size: Callable[[Study], Size] | None = None
     """The rollouts that it asks for, where it can be done at many values of its settings."""
 
+    completed: Callable[[Study], Study] | None = None
+    """Settings that follow from others, filled in before anything is written. Raises UserError."""
+
     @property
     def sweeps(self) -> bool:
         """Whether it can be done at many values of its settings."""

@@ -41,7 +41,7 @@ def advice(rankings: Sequence[Ranking]) -> str:
     for rig in (True, False):
         alike = [ranking for ranking in smooth or rankings if ranking.traits.rig == rig]
         if alike:
-            where = f"with {rig_whole(alike) if rig else 'ideal angles and torques'}"
+            where = f"with {rig_whole(alike) if rig else 'exact angles and torques'}"
             where = where.capitalize() if smooth else f"For steps {where}"
             others = [ranking for ranking in smooth or rankings if ranking.traits.rig and not rig]
             sentences.append(_use(where, alike, others))
@@ -72,7 +72,7 @@ def _use(where: str, alike: Sequence[Ranking], others: Sequence[Ranking]) -> str
     if any(map(open_loop, (chosen, *equal))):
         text += "; no controller is better than feedforward, which is open loop"
     elif gains:
-        text += f", {_ends([*map(two, gains)])} times less than feedforward"
+        text += f", {_times(gains[0], means[0])} less than feedforward"
     text += _seldom(named, [ranking for ranking, _ in places])
     if few := [condition(ranking) for ranking in alike if ranking.standing.untold]:
         text += f" (no ranking in {joined(few)}: too few cases)"
@@ -84,7 +84,7 @@ def _use(where: str, alike: Sequence[Ranking], others: Sequence[Ranking]) -> str
     if not bad:
         return f"{text}."
     worst = max(bad, key=lambda place: _lost(*place))
-    return f"{text}; with {rig_whole([worst[0]])} {'it' if len(named) == 1 else chosen} {fact(*worst)}."
+    return f"{text}. Do not use {chosen} with {rig_whole([worst[0]])}: it {fact(*worst)}."
 
 
 def _seldom(labels: Sequence[str], rankings: Sequence[Ranking]) -> str:
@@ -110,6 +110,12 @@ def _no_ranking(alike: Sequence[Ranking]) -> str:
     return f"there is no ranking: too few cases ({fewest.cases}, {LEAST_PAIRS} are needed). {lowest}"
 
 
+def _times(least: float, rmse: float) -> str:
+    """The least of some ratios of errors in words; of an RMSE that nobody could measure it is a bound."""
+    bound = degrees(rmse).startswith("<")
+    return f"{'more than ' * bound}{two(least)} times"
+
+
 def _ends(shown: Sequence[str]) -> str:
     """The first and the last of sorted numbers in words; one where they are equal."""
     return shown[0] if shown[0] == shown[-1] else f"{shown[0]} to {shown[-1]}"
@@ -127,9 +133,9 @@ def ranking_table(rankings: Sequence[Ranking], names: Mapping[str, str]) -> Tabl
     heads = (
         f"condition ({unit})",
         "best: RMSE [deg]",
-        "as good",
+        "tied",
         "next: RMSE [deg]",
-        "feedforward, times",
+        "feedforward (x)",
         "unusable",
     )
     rows = []
@@ -139,9 +145,10 @@ def ranking_table(rankings: Sequence[Ranking], names: Mapping[str, str]) -> Tabl
         best = why if row is None else f"{names[ranking.labels[row]]} {error(ranking, row)}"
         after = groups[1][0] if len(groups) > 1 else None
         following = "-" if after is None else f"{names[ranking.labels[after]]} {error(ranking, after)}"
-        ratio = "" if row is None or base is None else f" ({two(ranking.gains[row].value)})"
+        bound = ">" if best.endswith(degrees(0.0)) else ""
+        ratio = "" if row is None or base is None else f" ({bound}{two(ranking.gains[row].value)})"
         open_loop = "-" if base is None else f"{error(ranking, base)}{ratio}"
-        others = f"{len(groups[0]) - 1} more" if groups and len(groups[0]) > 1 else "-"
+        others = f"{len(groups[0]) - 1}" if groups and len(groups[0]) > 1 else "-"
         begin, end = (
             f"{condition(ranking)} ({ranking.count})",
             f"{len(ranking.standing.unusable)} of {len(ranking.labels)}",
@@ -159,7 +166,8 @@ def ties(rankings: Sequence[Ranking], names: Mapping[str, str]) -> str:
             others = tuple(names[ranking.labels[other]] for other in ranking.standing.groups[0] if other != row)
             same.setdefault(others, []).append(condition(ranking))
     listed = [f"{joined(where)}: {', '.join(others)}" for others, where in same.items()]
-    return f"As good as the best. {'. '.join(_capital(one) for one in listed)}." if listed else ""
+    listing = ". ".join(_capital(one) for one in listed)
+    return f"Tied with the best, as paired tests at 95 % do not tell them apart. {listing}." if listed else ""
 
 
 def _capital(text: str) -> str:
@@ -202,20 +210,22 @@ def do_not_use(rankings: Sequence[Ranking], names: Mapping[str, str]) -> str:
 
 
 def _elsewhere(rankings: Sequence[Ranking], names: Mapping[str, str]) -> str:
-    """Those that must not be used in further conditions, and why; those with one fault in the same ones together."""
-    where: dict[tuple[str, str], list[str]] = {}
+    """Those that must not be used in further conditions, and why; those with the same faults together."""
+    faults: dict[str, dict[str, list[str]]] = {}
     for ranking in rankings:
         for row in ranking.standing.unusable:
             verb = next(iter(facts(ranking, row)))
-            where.setdefault((ranking.labels[row], verb), []).append(condition(ranking))
-    alike: dict[tuple[str, tuple[str, ...]], list[str]] = {}
-    for (label, verb), places in where.items():
-        alike.setdefault((verb, tuple(places)), []).append(names[label])
-    listed = [
-        f"{joined(who)}, which {_THEY[verb].removeprefix('these ') if len(who) > 1 else verb} in {joined(places)}"
-        for (verb, places), who in alike.items()
-    ]
-    return f" Elsewhere do not use {'; '.join(listed)}." if listed else ""
+            faults.setdefault(names[ranking.labels[row]], {}).setdefault(verb, []).append(condition(ranking))
+    alike: dict[str, list[str]] = {}
+    for name, places in faults.items():
+        several = name not in alike and sum(places == other for other in faults.values()) > 1
+        verbs = [
+            f"{_THEY[verb].removeprefix('these ') if several else verb} in {joined(where)}"
+            for verb, where in places.items()
+        ]
+        alike.setdefault(joined(verbs), []).append(name)
+    listed = [f"{joined(who)} {clause}" for clause, who in alike.items()]
+    return f" Elsewhere {'; '.join(listed)}." if listed else ""
 
 
 def _lost(ranking: Ranking, row: int) -> float:

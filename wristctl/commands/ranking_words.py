@@ -12,8 +12,9 @@ from wristctl.commands.printed_table import degrees, two
 if TYPE_CHECKING:
     from wristctl.comparison.controller_ranking import Ranking, Traits
 
-# Name of gains that the paper prints: never left out of a label.
+# Names of gains that the paper prints, and of those with P1 and P2 exchanged: never left out of a label.
 PRINTED = "printed"
+PAPERS_GAINS = {PRINTED, "exchanged"}
 # Letters of a name, at most.
 _LETTERS = 18
 
@@ -45,14 +46,20 @@ def rig_whole(rankings: Sequence[Ranking]) -> str:
     return "a camera" if all(one.camera for one in traits) else "motors, tendons or a camera"
 
 
-def names_of(rankings: Sequence[Ranking]) -> dict[str, str]:
-    """Short name of each row: its controller alone where that has no other gains; printed gains are always named."""
+def names_of(rankings: Sequence[Ranking], short: bool = False) -> dict[str, str]:
+    """Name of each row: its label, without gains where all that are not the paper's are the same, or none matter.
+
+    With `short` a controller that has one set of gains is its name alone.
+    """
     labels = list(dict.fromkeys(label for ranking in rankings for label in ranking.labels))
-    controllers = Counter(label.split("/")[0] for label in labels)
+    ours = {label.partition("/")[2] for label in labels if not open_loop(label)} - PAPERS_GAINS
+    controllers = Counter(label.partition("/")[0] for label in labels)
     names = {}
     for label in labels:
         name, _, gains = label.partition("/")
-        names[label] = name if controllers[name] == 1 and gains != PRINTED else label
+        alone = len(ours) == 1 and gains in ours
+        one = short and controllers[name] == 1 and gains != PRINTED
+        names[label] = name if open_loop(label) or alone or one else label
     return _shortened(names)
 
 
@@ -96,7 +103,7 @@ def interval(ranking: Ranking, row: int) -> str:
     mean = ranking.means[row]
     if not (math.isfinite(mean.high) and mean.high > mean.low):
         return ""
-    return f" (95 %: {degrees(mean.low)} to {degrees(mean.high)})"
+    return f" (95 % interval: {degrees(mean.low)} to {degrees(mean.high)})"
 
 
 def called(label: str) -> str:

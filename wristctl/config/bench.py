@@ -26,9 +26,14 @@ FAULTS = {
     "motor-stalled": "the rotor stands; its drive goes on counting",
     "drive-off": "the drive has no power; its tendon is let go",
     "supply-off": "no drive has power",
+    "drive-rescaled": "the drive makes `size` times the way with each step: another microstep, or steps that are lost",
+    "motors-exchanged": "the cables of the motor and of motor `size` are exchanged",
+    "torque-lost": "no motor holds more than `size` N: the supply sags, or a drive is too hot",
     "tendon-detached": "the tendon is off its pulley",
     "tendon-slipped": "the tendon slips on its pulley, once, paying out `size` mm",
+    "tendon-creeps": "the tendon slips on, paying out `size` mm/s; negative: its motor makes steps that nobody counts",
     "marker-turned": "the tip's marker has slipped on its disc by `size` deg",
+    "marker-peels": "the tip's marker turns on its disc by `size` deg/s",
     "camera-repeats": "the camera shows its last `size` pictures again and again",
     "camera-frozen-clock": "as camera-frozen, but for one pixel that changes",
     "frames-thinned": "one frame of `size` arrives",
@@ -56,7 +61,8 @@ FAULTS = {
 FaultKind = Literal[
     "port-lost", "board-reset", "frames-dropped", "marker-covered", "markers-swapped", "camera-frozen", "host-silent",
     "controller-exception", "model-nan", "disk-full", "direction-flipped", "direction-stuck", "motor-stalled",
-    "drive-off", "supply-off", "tendon-detached", "tendon-slipped", "marker-turned", "camera-repeats",
+    "drive-off", "supply-off", "drive-rescaled", "motors-exchanged", "torque-lost", "tendon-detached",
+    "tendon-slipped", "tendon-creeps", "marker-turned", "marker-peels", "camera-repeats",
     "camera-frozen-clock", "frames-thinned", "pictures-late", "stamps-shifted", "stamps-stuck", "camera-lost",
     "picture-dark", "picture-bright", "picture-blurred", "picture-smeared", "picture-mirrored", "picture-turned",
     "picture-shifted", "picture-other", "marker-twice", "usb-latency", "answers-late", "answers-held", "host-pause",
@@ -92,7 +98,9 @@ class Motors(Section):
     step_scale: tuple[float, float, float, float] = quantity(
         (1.0, 1.0, 1.0, 1.0), "", "tendon per step, over what actuator says: a drive's own switches, or its pulley"
     )
-    holding_torque: float = quantity(1.2, "N m", "beyond it an energised motor slips four full steps", "assumed", gt=0)
+    holding_torque: float = quantity(
+        0.32, "N m", "beyond it an energised motor slips four full steps", "1.26 N m at 2.8 A, set to 1.0 A", gt=0
+    )
     top_speed: float | None = quantity(
         None, "1/s", "microsteps per second at which its torque has fallen to none; null: it does not fall", gt=0
     )
@@ -123,9 +131,12 @@ class RenderedCamera(Section):
 class SerialLine(Section):
     """The wire between the host and the emulated board."""
 
-    latency_timer: float = quantity(
-        1e-3, "s", "the USB adapter hands over what the board says at this interval", "USB's frames", ge=1e-3, le=0.255
+    adapter: Literal["16u2", "ftdi", "ch340"] = choice(
+        "16u2",
+        "USB adapter, which hands over what the board says; 16u2, a genuine Mega's: every 4.096 ms; ftdi: every "
+        "latency_timer; ch340: in each of USB's frames of 1 ms",
     )
+    latency_timer: float = quantity(16e-3, "s", "of an ftdi adapter", "FTDI's default", ge=1e-3, le=0.255)
 
 
 class WeakenedPlant(TrueWrist):

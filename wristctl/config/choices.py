@@ -212,6 +212,16 @@ OPTIMISERS: Choices[Any] = Choices(
 )
 
 # Table of `wristctl.wrist.plant.PlantModel`.
+ROBOTS: Choices[Any] = Choices(
+    "real robot",
+    {
+        "uc3m-soft-neck": "wristctl.identification.real_robots:SOFT_NECK",
+        "opencr-v4": "wristctl.identification.real_robots:OPENCR_V4",
+        "opencr-v6": "wristctl.identification.real_robots:OPENCR_V6",
+        "deepc-arm": "wristctl.identification.real_robots:DEEPC_ARM",
+        "tee-probe": "wristctl.identification.real_robots:TEE_PROBE",
+    },
+)
 PLANTS: Choices[Any] = Choices(
     "plant",
     {

@@ -10,6 +10,7 @@ from wristctl.config.controller_row import Row
 from wristctl.config.loop import DirectionName, Loop, Reference
 from wristctl.config.plant import Actuator, Plant, Push, Sensor, TrueActuator, TrueSensor, TrueWrist
 from wristctl.config.section import Section, choice, quantity
+from wristctl.config.wrist import WristParameters
 from wristctl.errors import Unfitting
 
 # Lifetime of a step rate on the board: least time [s], and number of ticks.
@@ -41,7 +42,13 @@ class Safety(Section):
 
     angle_deg: float = quantity(55.0, "deg", "largest bending angle, as estimated", "range and a tenth", gt=0)
     rate: float = quantity(10.0, "rad/s", "largest bending rate, as estimated", "assumed", gt=0)
-    tension: float = quantity(80.0, "N", "largest tension by spool position and estimated angle", "assumed", gt=0)
+    motor_pull: float = quantity(
+        42.0, "N", "largest pull of a motor at its drive's current, beyond which it slips", "1.0 A: rig.md", gt=0
+    )
+    tension: float = quantity(
+        60.0, "N", "largest by spool position and estimated angle; motor_pull or wrist.tension_limit where less",
+        "assumed", gt=0,
+    )  # fmt: skip
     travel: float = quantity(0.020, "m", "furthest a spool may reel in or pay out from zero", "assumed", gt=0)
     follow_deg: float = quantity(
         3.5, "deg", "furthest that the marker may be from where the spools should have the wrist", "measured", gt=0
@@ -96,6 +103,11 @@ class RigSettings(Section):
     bench: BenchSettings = choice(BenchSettings(), "the emulated rig, where there is no port")
     optics: str | None = choice(None, "calibrate-camera run; without one the camera looks square at the plane")
 
+    def within(self, wrist: WristParameters) -> Self:
+        """Settings whose largest tension is no more than the wrist bears and the motors can pull."""
+        tension = min(self.safety.tension, self.safety.motor_pull, wrist.tension_limit)
+        return self.model_copy(update={"safety": self.safety.model_copy(update={"tension": tension})})
+
     @model_validator(mode="after")
     def _spools_and_frames(self) -> Self:
         if self.actuator.level != "tendon" or self.sensor.level != "camera":
@@ -131,7 +143,7 @@ class HwRunSettings(RigSettings):
     back: float = quantity(1.0, "s", "duration of the return to zero", "assumed", gt=0)
     rest: float = quantity(0.5, "s", "rest at zero before each trial", "assumed", ge=0.1)
     control_period: float = quantity(
-        5e-3, "s", "time between two evaluations of the controller", "assumed", ge=2e-3, le=0.05
+        10e-3, "s", "time between two evaluations of the controller", "a Mega answers within 9 ms", ge=2e-3, le=0.05
     )
     calibration: str | None = choice(None, "calibrate-wrist run; without one the rig is homed from scratch")
     positions: Literal["find", "stored"] = choice("find", "zero positions: found anew, or as the calibration left them")

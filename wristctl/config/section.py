@@ -43,9 +43,10 @@ class OneOf:
 
     def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
         """The string's schema, and then that the table has it; the error is that of a Literal."""
-        return core_schema.no_info_after_validator_function(self._known, handler(source))
+        return core_schema.no_info_after_validator_function(self.checked, handler(source))
 
-    def _known(self, name: str) -> str:
+    def checked(self, name: str) -> str:
+        """The name, where the table has it; PydanticCustomError where not."""
         if self.table.group and is_reference(name):
             file, _ = split(name)
             if not file.is_file():

@@ -14,6 +14,7 @@ from wristctl.config.hw_run import CalibrateWristSettings, HwRunSettings
 from wristctl.config.hysteresis import HysteresisSettings
 from wristctl.config.identify import IdentifySettings
 from wristctl.config.learning import DataSettings, TrainSettings
+from wristctl.config.real_robot import RealRobotSettings
 from wristctl.config.recommend import RecommendSettings
 from wristctl.config.section import Section
 from wristctl.config.simulate import AnalyseSettings, SimulateSettings
@@ -51,6 +52,7 @@ class Study(Section):
     audit: AuditSettings = AuditSettings()
     hysteresis: HysteresisSettings = HysteresisSettings()
     identify: IdentifySettings = IdentifySettings()
+    real_robot: RealRobotSettings = Field(RealRobotSettings(), alias="real-robot")
     calibrate_camera: CalibrateCameraSettings = Field(CalibrateCameraSettings(), alias="calibrate-camera")
     calibrate_wrist: CalibrateWristSettings = Field(CalibrateWristSettings(), alias="calibrate-wrist")
     track: TrackSettings = TrackSettings()

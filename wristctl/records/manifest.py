@@ -20,7 +20,7 @@ TABLES, OVERVIEW = "tables.json", "overview.json"
 # Commands that make runs.
 KINDS = (
     "gen-data", "train", "tune", "compare", "study", "recommend", "simulate", "analyse", "hysteresis", "audit",
-    "hw-run", "identify", "track", "calibrate-camera", "calibrate-wrist",
+    "hw-run", "identify", "validate", "track", "calibrate-camera", "calibrate-wrist",
 )  # fmt: skip
 
 EndState = Literal["running", "ok", "failed", "interrupted"]

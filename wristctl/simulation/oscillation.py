@@ -25,6 +25,8 @@ FASTEST = 25.0
 # Rest [s] that shows whether a loop hunts.
 LONG_HOLD = 20.0
 _HARMONICS = 4.0
+# Share of a reference's range within one sample that is a jump.
+_JUMP = 0.25
 # [rad] below which there is nothing but rounding.
 _STILL = 1e-9
 _UNKNOWN = math.nan
@@ -52,11 +54,14 @@ def sustained(theta: Array, references: Array, which: NDArray[np.int64], step: f
     """Amplitude [rad] of a sinusoid that is as far from zero for half of the time as what `oscillations` looks at.
 
     Of a swing that goes on it is the swing's amplitude. What a friction that turns leaves is large for a short time,
-    twice a period, and small here. Arguments and shape are those of `oscillations`.
+    twice a period, and small here. Arguments and shape are those of `oscillations`. Unknown where a reference jumps: no
+    wrist jumps, and what is left then is its answer to the jump.
     """
     amplitudes = np.full(len(theta), _UNKNOWN)
     for indices, left in _remaining(theta, references, which, step):
         amplitudes[indices] = math.sqrt(2.0) * np.median(np.abs(left), axis=1)
+    jumps = np.abs(np.diff(references, axis=1)).max(axis=1) > _JUMP * np.ptp(references, axis=1)
+    amplitudes[jumps[which]] = _UNKNOWN
     return amplitudes
 
 

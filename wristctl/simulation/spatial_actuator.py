@@ -91,7 +91,7 @@ def _as_commanded(
 @implements(drive_tendons, LaggedDrive)
 def _lagging(drive: Any, motors: Any, known: Any, bend_ref: Any, rate_ref: Any, pulls: Any, h: float, out: Any) -> None:
     for t in range(len(pulls)):
-        out[t] = lag_pull(motor_at(drive.motor, known.alike[t]), motors, 2 * t, pulls[t], h)
+        out[t], _ = lag_pull(motor_at(drive.motor, known.alike[t]), motors, 2 * t, pulls[t], h)
 
 
 @implements(drive_tendons, SpoolDrive)
@@ -104,7 +104,7 @@ def _reeling(drive: Any, motors: Any, known: Any, bend_ref: Any, rate_ref: Any, 
         speed = arms[0] * rate_ref[0] + arms[1] * rate_ref[1]
         ahead = speed * (abs(speed) / (2.0 * motor.acceleration) + h)
         target = spool_target(pulls[t], motor.stiffness, straight_length(known.wrist, t), out[t])
-        out[t] = reel_in(motor, motors, 2 * t, target + known.lead * ahead, h)
+        out[t], _ = reel_in(motor, motors, 2 * t, target + known.lead * ahead, h)
 
 
 @by_type

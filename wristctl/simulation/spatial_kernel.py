@@ -193,8 +193,12 @@ def run_spatial(setup: Any, course: Any, world: Any, states: Any, scratch: Any, 
                     high_y = high_y + lever[0] * where(lever[0] > 0.0, back, forth)
                     low_z = low_z + lever[1] * where(lever[1] > 0.0, forth, back)
                     high_z = high_z + lever[1] * where(lever[1] > 0.0, back, forth)
-                perceive_within(control_y, Estimate(seen[0], seen[1], seen[2]), low_y, high_y, tick * period, period)
-                perceive_within(control_z, Estimate(seen[3], seen[4], seen[5]), low_z, high_z, tick * period, period)
+                perceive_within(
+                    control_y, Estimate(seen[0], seen[1], seen[2]), zero, (low_y, high_y), tick * period, period
+                )
+                perceive_within(
+                    control_z, Estimate(seen[3], seen[4], seen[5]), zero, (low_z, high_z), tick * period, period
+                )
                 wanted_y, wanted_z = wanted_torque(control_y) + extra[0], wanted_torque(control_z) + extra[1]
                 share = allocate(arms, planar(wanted_y, wanted_z), least, greatest, pulls)
                 since, time = tick * period, now_tick * period + zero

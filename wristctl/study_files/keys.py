@@ -40,8 +40,8 @@ def _given(annotation: Any) -> Any:
     return kinds[0] if isinstance(annotation, UnionType) and len(kinds) == 1 else annotation
 
 
-# Commands that work on what another command's section describes: its keys are theirs too.
-SUBJECTS = {"analyse": "simulate"}
+# Commands that work on what a section of another name describes: its keys are theirs too.
+SUBJECTS = {"analyse": "simulate", "validate": "real-robot"}
 
 
 def section_keys(command: str | None) -> dict[str, FieldInfo]:

@@ -13,6 +13,7 @@ import numpy as np
 from wristctl.arrays import Array
 from wristctl.board.driver import Board
 from wristctl.board.messages import AXES, Fault, Flag
+from wristctl.board.transport import underway
 from wristctl.config.hw_run import HwRunSettings
 from wristctl.config.wrist import WristParameters
 from wristctl.control.law import Controller
@@ -31,10 +32,9 @@ from wristctl.trial.watch import Tick, Watch
 # Takes each tick's row of the log, to show it.
 Shown = Callable[[dict[str, Any]], None]
 
-# Share of a command's round trip until the board has read it, by the bytes of command and answer; and by how much
-# longer [s] that takes for each step/s of all axes together, whose interrupts come first.
-_UNDERWAY, _BUSY = 0.37, 6.6e-9
-
+# Bytes of a RATE; seconds from the last of them until the board's positions are read, and by how much longer that
+# takes for each step/s of all axes together, whose interrupts come first: by the firmware's cycles.
+_RATE_BYTES, _OBEYED, _BUSY = 26, 0.44e-3, 6.6e-9
 
 # Seconds within which motors at any speed have ramped down.
 _COMING_TO_REST = 0.5
@@ -70,7 +70,8 @@ class ControlLoop:
         self._steering = Steering(wrist, settings.actuator, settings.sensor, timing.period, 0.0)
         self._status, self._sent = board.read(), np.zeros(AXES)
         self._epoch = self._last_usable = self._clock.now()
-        self._underway, self._skipped = 0.0, 0
+        self._underway = min(underway(_RATE_BYTES, settings.baud) + _OBEYED, 0.5 * self._period)
+        self._skipped = 0
         self._counted = self._epoch
 
     @property
@@ -202,6 +203,8 @@ class ControlLoop:
         # the command acts once the board has read it; by then the one before has moved the spools for a whole period
         gap = target + moving * self._underway - (position + self._sent * self._period)
         self._send(self._signs * self._spools.rate(gap, moving, self._sent, self._period))
+        behind = self._spools.behind(gap, moving, self._sent, self._period)
+        self._steering.withheld = float(arm @ self._spools.tension(behind, np.zeros(AXES)))
         return target
 
     def _send(self, rates: Array) -> None:
@@ -209,7 +212,6 @@ class ControlLoop:
         began, busy = self._clock.now(), _BUSY * float(np.abs(self._sent).sum())
         sent, self._status = self._board.turn(rates.tolist(), self._life)
         self._sent = self._signs * np.array(sent)
-        self._underway = min(_UNDERWAY * self._board.round_trip, 0.5 * self._period)
         self._counted = began + self._underway + busy
 
     def _go_on(self) -> None:

@@ -16,7 +16,7 @@ from wristctl.interrupt import undisturbed
 from wristctl.simulation.worlds import Draws
 from wristctl.trial.calibration import WristCalibration
 from wristctl.trial.control_loop import ControlLoop, Shown
-from wristctl.trial.homing import Zero, check_zero, find_zero, slacken
+from wristctl.trial.homing import Zero, find_zero, slacken
 from wristctl.trial.log import TrialLog
 from wristctl.trial.motors_ready import Halt, halt, prepare
 from wristctl.trial.safety import SafetyStop
@@ -28,6 +28,7 @@ from wristctl.trial.tick_timing import TickTiming
 from wristctl.trial.tracking import Tracking
 from wristctl.trial.trials import Trial, at_rest, back, motion_of
 from wristctl.trial.watch import Watch
+from wristctl.trial.zero_checks import check_cocontraction, check_zero
 from wristctl.vision.camera_pose import CameraPose
 from wristctl.wrist.directions import in_plane
 from wristctl.wrist.kinematics import Inverse
@@ -75,7 +76,8 @@ class Experiment:
         network: Inverse | None = None, tuned: Mapping[str, Mapping[str, float]] | None = None,
         calibration: WristCalibration | None = None, seed: int = 0,
     ) -> None:  # fmt: skip
-        self._settings, self._wrist, self._trials, self._log = settings, wrist, trials, kept
+        settings = settings.within(wrist)
+        self._settings, self._wrist, self._trials, self._log = settings, spared(wrist, settings), trials, kept
         self._calibration, self._draws = calibration, Draws(seed, "bench")
         chosen = [(controller(row.controller), row.gains) for row in settings.rows]
         self._laws = [(law, gains_of(law, gains, tuned)) for law, gains in chosen]
@@ -133,13 +135,17 @@ class Experiment:
         for trial in self._trials:
             if trial.plane != plane:
                 testbed.face(trial.direction, patience.pulse)
-                loop = self._loop(testbed, board, trial.plane, shown)
+                loop, tracking = self._loop(testbed, board, trial.plane, shown)
                 plane = trial.plane
             self._one(testbed, loop, trial)
+            loop = self._relaxed(board, tracking, trial.plane, shown)
             patience = loop.patience()
 
-    def _loop(self, testbed: Testbed, board: Board, plane: str, shown: Shown | None) -> ControlLoop:
-        """A loop at rest at zero in this plane; the first one homes the board, others read the slack wrist's marker."""
+    def _loop(
+        self, testbed: Testbed, board: Board, plane: str, shown: Shown | None
+    ) -> tuple[ControlLoop, Tracking]:  # fmt: skip
+        """A loop at rest at zero in this plane, and its camera; the first one homes the board, others read the slack
+        wrist's marker."""
         settings, tracking = self._settings, testbed.tracking()
         if self.zero is not None:
             self._let_go(board, self.zero)
@@ -155,13 +161,24 @@ class Experiment:
         else:
             check_zero(board, tracking, settings, self._wrist, plane, self.zero)
         tracking.zero = marker
-        pose = self.poses[plane]
+        return self._at_rest(board, tracking, plane, shown), tracking
+
+    def _at_rest(self, board: Board, tracking: Tracking, plane: str, shown: Shown | None) -> ControlLoop:
+        """A loop that has brought the homed, slack wrist to rest at zero."""
+        settings, pose, zero = self._settings, self.poses[plane], self.zero
+        assert zero is not None
         loop = ControlLoop(
-            board, tracking, settings, in_plane(self._wrist, plane), plane, self.zero.signs, self.timing, self._log,
+            board, tracking, settings, in_plane(self._wrist, plane), plane, zero.signs, self.timing, self._log,
             shown, 0.0 if pose is None else pose.oblique,
         )  # fmt: skip
         loop.follow(at_rest(settings.rest, settings.control_period), self._back, ())
         return loop
+
+    def _relaxed(self, board: Board, tracking: Tracking, plane: str, shown: Shown | None) -> ControlLoop:
+        """After a trial see that no tendons pull against each other, and come to rest at zero again."""
+        assert self.zero is not None
+        check_cocontraction(board, tracking, self._settings, self._wrist, plane, self.zero)
+        return self._at_rest(board, tracking, plane, shown)
 
     def _home(self, board: Board, tracking: Tracking, plane: str) -> Zero:
         settings, calibration = self._settings, self._calibration
@@ -192,7 +209,7 @@ class Experiment:
             self.most = {name: max(value, self.most.get(name, 0.0)) for name, value in loop.watch.most.items()}
             self.odd[trial.number] = loop.watch.words()
         self._trial_ended(testbed, "ok")
-        loop.follow(back(followed.final, settings.back, settings.rest, settings.control_period), self._back, ())
+        loop.follow(back(followed.final, settings.back, 0.0, settings.control_period), self._back, ())
 
     def _trial_ended(self, testbed: Testbed, outcome: str) -> None:
         if self._under_way is not None:
@@ -215,6 +232,19 @@ class Experiment:
             self._trial_ended(testbed, self.stop.reason)
         except (OSError, UserError) as lost:
             error.add_note(f"what the bench knows of the trial is lost: {lost}")
+
+
+# Share of the motors' pull that a law may ask for: they turn meanwhile, and the wrist may be pushed.
+_ASKED = 0.8
+
+
+def spared(wrist: WristParameters, settings: HwRunSettings) -> WristParameters:
+    """The wrist with tensions that its motors can hold. Raises UserError where these are not above pretension."""
+    limit = min(wrist.tension_limit, _ASKED * settings.safety.motor_pull)
+    if limit <= wrist.pretension:
+        problem = f"motors of {settings.safety.motor_pull:g} N cannot hold a pretension of {wrist.pretension:g} N"
+        raise UserError(problem, "safety.motor_pull", "more current (docs/hardware/rig.md), or less wrist.pretension")
+    return wrist.model_copy(update={"tension_limit": limit})
 
 
 def _of_the_log(error: BaseException) -> BaseException:

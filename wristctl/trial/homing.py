@@ -144,6 +144,19 @@ class ExpectedMoves:
         fix = "see tendons and motors, then calibrate the wrist again"
         raise SafetyStop(f"{problem}; likely {likely}", "homing", fix)
 
+    def judge_cocontraction(self, bend: Bend) -> None:
+        """Raises SafetyStop where a slackened wrist bends when one side's tendons are let out further."""
+        if bend.askew <= _SLACK * math.radians(self._homing.bend_deg):
+            return
+        pulls = self._axis_of(bend.theta > 0.0, 1 if bend.away > 0.0 else -1)
+        problem = (
+            f"tendons pull against each other: the slackened wrist bent by {math.degrees(bend.askew):.1f} deg when one "
+            f"side was let out; likely tendon {ACTIVE[pulls]} (axis {pulls}) and one opposite are shorter than the "
+            "motors' positions say: steps that nobody counted, a knot, or zero positions that are wrong"
+        )
+        fix = "see tendons, motor cables and their shields, then calibrate the wrist again"
+        raise SafetyStop(problem, "homing", fix)
+
     def judge_small_move(self, axis: int, reeled: float, bend: Bend) -> None:
         """Raises SafetyStop where reeling in by so many steps beyond the taut point did not bend as it should."""
         meant = reeled / self.steps()
@@ -159,8 +172,6 @@ class ExpectedMoves:
             self.judge_steps(axis, reeled / abs(bend.theta))
 
 
-# Share of `homing.pull` by which a tendon is reeled in to check it.
-_CHECKED = 1.2
 # Times as long for each reading, where a result is doubtful.
 _AGAIN = 4
 # A bend at which homing stops.
@@ -328,39 +339,3 @@ def find_zero(
     for tendon, sense, length, slope in zip(ACTIVE, senses, slack, slopes, strict=True):
         log.info("tendon %d: sense %+d, slack %.2f mm, %.0f steps per rad", tendon, sense, 1e3 * length, slope)
     return Zero(senses, slopes, finder.straight, slack, sticking)
-
-
-def check_zero(
-    board: Board, tracking: Tracking, settings: RigSettings, wrist: WristParameters, plane: str, zero: Zero
-) -> None:
-    """Let each tendon of a homed, slack wrist bend it a little, and leave it slack again; all must do as they should.
-
-    Raises SafetyStop where a tendon is not slack, or a motor turns the wrong way or winds another tendon than its own.
-    """
-    expected, spools, homing = ExpectedMoves(settings, wrist, plane), spools_of(settings.actuator), settings.homing
-    slack, reeled = -round(homing.pull / spools.step), round(_CHECKED * homing.pull / spools.step)
-    patience = Patience(board)
-    held = patience.reading(tracking, 4 * homing.frames)
-    slacken(board, spools, homing, zero.signs, 2.0)
-    patience = Patience(board)
-    patience.wait(0.5 * homing.let_go)
-    straight = patience.reading(tracking, 4 * homing.frames)
-    expected.judge_slackened(expected.bend(held, straight))
-    for axis in range(AXES):
-        positions = np.full(AXES, slack)
-        positions[axis] = reeled
-        one, two, four, five = map(int, np.array(zero.signs) * positions)
-        board.go_to((one, two, four, five), JOG_RATE)
-        patience = Patience(board)
-        patience.wait(2.0 * homing.rest)
-        bend = expected.bend(straight, patience.reading(tracking, homing.frames))
-        slacken(board, spools, homing, zero.signs)
-        expected.judge_small_move(axis, reeled, bend)
-        _straighten(board, tracking, homing, straight.theta)
-
-
-def _straighten(board: Board, tracking: Tracking, homing: Homing, straight: float) -> None:
-    patience, clock = Patience(board), board.transport
-    deadline = clock.now() + homing.let_go
-    while abs(patience.angle(tracking, 1) - straight) > 0.5 * math.radians(homing.bend_deg) and clock.now() < deadline:
-        pass

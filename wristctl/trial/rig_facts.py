@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from wristctl.arrays import Array
-from wristctl.board.check import RoundTrips, latency_timer, round_trips, shorter
+from wristctl.board.check import Adapter, RoundTrips, adapter_of, round_trips, shorter
 from wristctl.board.driver import Board
 from wristctl.board.messages import LAYOUTS, Command, Rate
 from wristctl.config.hw_run import HwRunSettings
@@ -40,8 +40,7 @@ class RigFacts(NamedTuple):
     """Times [s]."""
 
     trips: RoundTrips
-    timer: float | None
-    """Latency timer of the USB adapter."""
+    adapter: Adapter
     pace: CameraPace
     quality: PictureQuality | None
     """Medians over the pictures; None where the tip's marker is not seen."""
@@ -84,7 +83,7 @@ def measure(
 
     Raises SafetyStop, BoardError and CameraError.
     """
-    trips, timer = round_trips(board, Command.STATUS, _TRIPS), latency_timer(testbed.transport.name)
+    trips, adapter = round_trips(board, Command.STATUS, _TRIPS), adapter_of(testbed.transport.name)
     tracking = testbed.tracking()
     pace, sightings = _watched(tracking, testbed)
     angles = [sighting.theta for sighting in sightings if math.isfinite(sighting.theta)]
@@ -101,7 +100,7 @@ def measure(
         strokes.let_go()
     quality = PictureQuality(*np.median(pictures.qualities, axis=0)) if pictures.qualities else None
     noise = float(np.std(angles)) if len(angles) > 2 else math.nan
-    return RigFacts(trips, timer, pace, quality, noise, woken, latency, pose)
+    return RigFacts(trips, adapter, pace, quality, noise, woken, latency, pose)
 
 
 def _watched(tracking: Tracking, testbed: Testbed) -> tuple[CameraPace, list[Sighting]]:
@@ -144,11 +143,13 @@ def _of_the_link(facts: RigFacts, settings: HwRunSettings, port: str) -> list[Tr
     if trip <= settings.safety.round_trip * period:
         return []
     problem = f"the board's answers take {1e3 * trip:.1f} ms of a tick's {1e3 * period:g} ms"
-    if facts.timer is not None and facts.timer > 1e-3:
-        return [Trouble(True, f"{problem}: the USB adapter's latency timer is {1e3 * facts.timer:g} ms", shorter(port))]
+    adapter = facts.adapter
+    if adapter.name == "FTDI" and adapter.every is not None and adapter.every > 1e-3:
+        latency = f"the USB adapter's latency timer is {1e3 * adapter.every:g} ms"
+        return [Trouble(True, f"{problem}: {latency}", shorter(port))]
     fix = (
-        "a USB adapter that holds answers back (an FTDI's latency timer is 16 ms unless told), a hub, or a longer "
-        f"control_period (--set control_period={math.ceil(1e3 * trip / settings.safety.round_trip) / 1e3:g})"
+        "a USB adapter that holds answers back (a Mega's own for 4.1 ms, an FTDI for 16 ms unless told), a hub, or a "
+        f"longer control_period (--set control_period={math.ceil(1e3 * trip / settings.safety.round_trip) / 1e3:g})"
     )
     return [Trouble(True, problem, fix)]
 

@@ -11,6 +11,7 @@ from scipy.signal import bilinear, lfilter
 from wristctl.arrays import Array
 from wristctl.board.driver import Board
 from wristctl.board.messages import AXES, JOG_RATE, Flag, State, Target
+from wristctl.board.transport import underway
 from wristctl.config.hw_run import CalibrateWristSettings, RigSettings
 from wristctl.trial.motors_ready import in_sight, prepare
 from wristctl.trial.safety import SafetyStop
@@ -160,8 +161,8 @@ _MOVE, _REST = 0.12e-3, 0.15
 _BEFORE, _AFTER, _BACK, _SETTLED = 0.15, 0.35, 0.4, 0.8
 # Seconds of silence that the board bears: moves end at their goals, whatever becomes of this computer.
 _SILENCE = 0.5
-# Seconds until the board has read a command.
-_UNDERWAY = 0.5e-3
+# Bytes of a STATUS; seconds from the last of them until the board's positions are read, by the firmware's cycles.
+_STATUS_BYTES, _READ = 7, 0.08e-3
 
 
 class RigStrokes:
@@ -175,6 +176,7 @@ class RigStrokes:
     ) -> None:
         self._furthest, self._taut = furthest, min(_TAKEN_UP, 0.5 * furthest)
         self._board, self._tracking, self._axis = board, tracking, axis
+        self._underway = underway(_STATUS_BYTES, settings.baud) + _READ
         spools = spools_of(settings.actuator)
         self._step, self._acceleration, self._slack = spools.step, spools.acceleration, settings.homing.slack
         patient = settings.safety.model_copy(update={"watchdog": max(_SILENCE, settings.safety.watchdog)})
@@ -258,7 +260,7 @@ class RigStrokes:
             if status.state is not State.ENABLED:
                 raise board.faulted(status)
             moving = Flag.MOVING in status.flags
-            positions.append((now + _UNDERWAY, status.position[self._axis]))
+            positions.append((now + self._underway, status.position[self._axis]))
             if now - fed > 0.2 * _SILENCE:
                 board.ping()
                 fed = now

@@ -27,7 +27,8 @@ Ask = Callable[[str, Meanwhile], None]
 
 BEFORE_MOTION = (
     "The motors will now move. Emergency stop within reach, nobody's hands in the tendons, wrist straight, tendons "
-    "slack, both markers in the camera's picture?"
+    "slack, both markers in the camera's picture; and do the drives' switches let a motor pull {:g} N at most "
+    "(safety.motor_pull; docs/hardware/rig.md)?"
 )
 
 
@@ -131,7 +132,7 @@ class RealTestbed:
 
     def confirm(self, meanwhile: Meanwhile) -> None:
         """Ask."""
-        self._ask(BEFORE_MOTION, meanwhile)
+        self._ask(BEFORE_MOTION.format(self._settings.safety.motor_pull), meanwhile)
 
     def tracking(self) -> Tracking:
         """The camera with a fresh tracker."""

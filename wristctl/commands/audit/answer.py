@@ -67,24 +67,25 @@ def _tried(loops: Sequence[str], limit: float) -> list[str]:
     kinds = [f"{_word(name)} ({_described(name, limit)})" if name in LOOPS else name for name in loops]
     count = _COUNTS[len(loops)] if len(loops) < len(_COUNTS) else len(loops)
     plural = "s" * (len(loops) > 1)
-    return [f"The paper's controllers on {count} simulated loop{plural}: {_and(kinds)}."] * bool(loops)
+    return [f"The paper's controllers in moves of 30 deg on {count} simulated loop{plural}: {_and(kinds)}."] * bool(
+        loops
+    )
 
 
 def _word(name: str) -> str:
-    """A built-in loop by what distinguishes it: ideal, 1 kHz or 4-segment."""
+    """A built-in loop by what distinguishes it: ideal, sampled or 4-segment."""
     builtin = LOOPS.get(name)
     if builtin is None:
         return name
     if builtin.plant_segments > 1:
         return f"{builtin.plant_segments}-segment"
-    rate = 1e-3 / builtin.control_period
-    return "ideal" if rate >= _CONTINUOUS else f"{rate:g} kHz"
+    return "ideal" if 1e-3 / builtin.control_period >= _CONTINUOUS else "sampled"
 
 
 def _described(name: str, limit: float) -> str:
     """What the word for a built-in loop leaves unsaid."""
     n, rate = LOOPS[name].plant_segments, 1e-3 / LOOPS[name].control_period
-    ticks = f"{1e-3 * rate:g} MHz" if rate >= _CONTINUOUS else f"{rate:g} kHz" if n > 1 else ""
+    ticks = f"{1e-3 * rate:g} MHz" if rate >= _CONTINUOUS else f"{rate:g} kHz"
     tensions = f"tensions to {limit:g} N" if LOOPS[name].limits and math.isfinite(limit) else "no tension limit"
     return ", ".join(part for part in ("one segment" * (n == 1), ticks, tensions) if part)
 
@@ -92,8 +93,8 @@ def _described(name: str, limit: float) -> str:
 # What the paper prints, and the one of ours.
 _GAINS = {
     "smc/printed": "its sliding mode controller (SMC) with the printed gains",
-    "smc/exchanged": "SMC with P1 and P2 exchanged (a guess of ours)",
-    "pid/printed": "its PID with the printed gains (its feedback made negative)",
+    "smc/exchanged": "SMC with its gains P1 and P2 exchanged (a guess of ours)",
+    "pid/printed": "its PID with the printed gains (the sign of its feedback corrected)",
 }
 
 
@@ -139,8 +140,8 @@ def _ranking(claims: Sequence[Judgement], loops: Sequence[str]) -> list[str]:
     pairs = []
     for gains, wording in (("printed", "with the printed gains"), ("exchanged", "with P1 and P2 exchanged")):
         one = _one(j for j in claims if _is_order(j.claim, f"smc/{gains}", "pid/printed"))
-        pairs += [f"{wording}, {_places(one.found)}"] if one else []
-    sentences = [f"SMC has a smaller RMSE than PID: {'; '.join(pairs)}."] if pairs else []
+        pairs += [f"{wording} {_places(one.found)}"] if one else []
+    sentences = [f"SMC has a smaller RMSE than PID {'; '.join(pairs)}."] if pairs else []
     order = sorted(T2, key=lambda name: T2[name].rmse)
     links = [_one(j for j in claims if _is_order(j.claim, f"{a}/", f"{b}/")) for a, b in pairwise(order)]
     tried = [link for link in links if link is not None]
@@ -278,8 +279,8 @@ def _numbers(claims: Sequence[Judgement], loops: Sequence[str], most: int) -> Ta
         paper = _range(j.claim, float(j.claim.value or 0.0), float(j.claim.value or 0.0))
         rows.append(((j.claim.topic or j.claim.says) + unit, paper, *ours, _agree(j.found)))
     common = f" [{min(units)}]" if len(units) == 1 and min(units) else ""
-    title = f"Errors{common}: ours of a move of 30 deg in 1 s and in 2 s; they agree within a factor of {FACTOR:g}"
-    return Table(title, ("the paper's claim", "paper", *map(_word, loops), "agree on"), rows)
+    title = f"Errors{common}: smaller to larger of moves in 1 s and 2 s; a loop agrees within a factor of {FACTOR:g}"
+    return Table(title, ("the paper's claim", "paper", *map(_word, loops), "agrees on"), rows)
 
 
 def _unit(claim: Claim) -> str:
@@ -312,8 +313,9 @@ def _places(findings: Mapping[str, Finding]) -> str:
     loops, open_ = [name for name in findings if name], _where(findings, "not specified enough")
     alike = [name for name in open_ if findings[name].reason.startswith("alike")]
     some = [name for name in open_ if name not in alike]
-    places = [_on(_where(findings, "reproduced"), loops)]
-    places += [f"undecided {_on(some)}, where the two moves differ"] * bool(some)
+    holding = _where(findings, "reproduced")
+    places = [_on(holding, loops)] * bool(holding or not some)
+    places += [f"in one of two moves {_on(some, () if holding else loops)}"] * bool(some)
     places += [f"with equal errors {_on(alike)}"] * bool(alike)
     return ", ".join(places)
 

@@ -7,7 +7,7 @@ from collections.abc import Container, Iterable, Sequence
 from typing import TYPE_CHECKING
 
 from wristctl.commands.answer import Answer
-from wristctl.commands.printed_table import Table, joined
+from wristctl.commands.printed_table import COLUMNS, Table, joined
 from wristctl.commands.ranking_answer import advice, certainty, do_not_use, fitted, ranking_table, ties
 from wristctl.commands.ranking_words import PRINTED, condition, error, facts, names_of
 from wristctl.commands.results import Findings
@@ -26,6 +26,9 @@ def answer_of(rankings: Sequence[Ranking], run: str = "") -> Answer | None:
     if not rankings:
         return None
     names = names_of(rankings)
+    whole = ranking_table(rankings, names)
+    if len(whole.within(COLUMNS).columns) < len(whole.columns):
+        names = names_of(rankings, short=True)
     more = f"All figures of every controller: `--all`, or {run}/report.html." if run else "All figures: `.tables`."
     unusable = do_not_use(rankings, names)
     notes = [

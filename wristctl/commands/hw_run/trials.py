@@ -171,7 +171,7 @@ def _summarise(session: Session, experiment: Experiment, trial_log: TrialLog) ->
     if timing.late:
         findings.summary(timing.camera.summary())
     _tell_oddities(session, experiment)
-    findings.plain(FILE, plain(limits_of(settings)))
+    findings.plain(FILE, plain(limits_of(settings.within(session.study.wrist))))
     findings.plain("data/camera_pose.json", {plane: pose and pose.plain() for plane, pose in experiment.poses.items()})
     if experiment.zero is not None:
         findings.plain("data/zero.json", experiment.zero.plain())
@@ -190,7 +190,7 @@ def _tell_oddities(session: Session, experiment: Experiment) -> None:
     """Report how near trials came to the limits on unexpected motion, and anything odd."""
     findings, most = session.findings, experiment.most
     parts = []
-    for name, unit, limit, *_ in limits_of(session.study.hw_run):
+    for name, unit, limit, *_ in limits_of(session.study.hw_run.within(session.study.wrist)):
         line = RESIDUALS[name]
         if math.isfinite(limit) and limit > 0.0 and name in most:
             meaning = f"{line.meaning}; limit {limit:.4g} {unit}"

@@ -6,19 +6,23 @@ from numpy.typing import ArrayLike
 from wristctl.arrays import Array
 
 
-def spatial_tips(q: ArrayLike, length: float) -> Array:
-    """Tips (..., 3) [m] of wrists of equal segments with a total length [m] at coordinates (..., 2n) [rad]."""
+def spatial_tips(q: ArrayLike, length: ArrayLike) -> Array:
+    """Tips (..., 3) [m] of wrists at coordinates (..., 2n) [rad].
+
+    `length` is that of the whole wrist, whose segments are equal, or of each segment (n,) [m].
+    """
     return spatial_backbone(q, length, 1)[..., -1, :]
 
 
-def spatial_backbone(q: ArrayLike, length: float, points: int) -> Array:
-    """Points (..., n points + 1, 3) [m] along the backbone from the base, so many to a segment.
+def spatial_backbone(q: ArrayLike, length: ArrayLike, points: int) -> Array:
+    """Points (..., n points + 1, 3) [m] along the backbone from the base, so many to a segment; length as for tips.
 
     A segment bent by u ends at l S(|u|) along its chord, which leans by u/2; S(x) = sin(x)/x.
     """
     bends = np.asarray(q, float)
     bends = bends.reshape(*bends.shape[:-1], -1, 2)
     n = bends.shape[-2]
+    lengths = np.broadcast_to(np.asarray(length, float) / (1 if np.ndim(length) else n), n)
     place = np.zeros((*bends.shape[:-2], 3))
     frame = np.broadcast_to(np.eye(3), (*bends.shape[:-2], 3, 3))
     line = [place]
@@ -26,7 +30,7 @@ def spatial_backbone(q: ArrayLike, length: float, points: int) -> Array:
         for i in range(1, points + 1):
             u = bends[..., k, :] * (i / points)
             size = np.hypot(u[..., 0], u[..., 1])
-            chord = length / n * (i / points) * np.sinc(0.5 * size / np.pi)
+            chord = lengths[k] * (i / points) * np.sinc(0.5 * size / np.pi)
             across = 0.5 * np.sinc(0.5 * size / np.pi)[..., None] * u
             along = np.concatenate([np.cos(0.5 * size)[..., None], across], axis=-1)
             line.append(place + np.einsum("...ij,...j->...i", frame, chord[..., None] * along))

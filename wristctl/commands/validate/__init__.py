@@ -1,0 +1,1 @@
+"""`validate`: the model held against recordings of a real robot."""

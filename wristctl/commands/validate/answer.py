@@ -1,0 +1,103 @@
+"""What `validate` says of a real robot: errors beside its authors' own, what its recordings want, what they tell."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+from wristctl.commands.answer import Answer
+from wristctl.commands.printed_table import Table, joined, number
+
+if TYPE_CHECKING:
+    from wristctl.identification.arc_fit import ArcFit
+    from wristctl.identification.model_choice import TriedModel
+    from wristctl.identification.real_robots import RealRobot
+
+
+def validated_answer(robot: RealRobot, models: Sequence[TriedModel], chosen: TriedModel, run: str) -> Answer:
+    """The authors' own error in the first row, then ours; `run` is the path of the run, empty in memory."""
+    what = "bend" if robot.unit == "deg" else "tip"
+    score, scale = chosen.score, robot.scale
+    error, low, high = (f"{scale * value:.2f}" for value in score[:3])
+    verb = "fits" if robot.in_sample else "predicts"
+    beside = ""
+    if robot.authors:
+        theirs = robot.authors[0][1]
+        than = (
+            "below" if scale * score.high < theirs else "above" if scale * score.low > theirs else "not told apart from"
+        )
+        beside = f", {than} the {theirs:.2f} {robot.unit} of its authors' own model"
+    sentence = (
+        f"The model {verb} the {what} of {robot.title} to {error} {robot.unit} RMS (95 % {low} to {high}){beside}."
+    )
+    notes: list[str | Table] = [
+        _wanted(models),
+        f"{robot.parts[0].upper()}{robot.parts[1:]}. {_caveats(robot, chosen)}",
+    ]
+    more = f"Parameters, each recording, residuals: --all, or {run}/report.html." if run else ""
+    return Answer(sentence, models_table(robot, models), notes, f"{robot.citation}. {more}".strip())
+
+
+def _wanted(models: Sequence[TriedModel]) -> str:
+    """Which terms the data want, in words."""
+    by_verdict = {
+        verdict: [model.terms[-1] for model in models if model.verdict == verdict and len(model.terms) <= 2]
+        for verdict in ("wanted", "unwanted", "not told")
+    }
+    wanted = joined(by_verdict["wanted"]) or "nothing beside elastic arcs and tendons"
+    parts = [f"The data want {wanted}"]
+    if by_verdict["unwanted"]:
+        parts.append(f"predict worse with {joined(by_verdict['unwanted'])}")
+    if by_verdict["not told"]:
+        parts.append(f"do not tell whether there is {joined(by_verdict['not told'], 'or')}")
+    return f"{'; they '.join(parts)}."
+
+
+def _caveats(robot: RealRobot, chosen: TriedModel) -> str:
+    """What the comparison is not."""
+    parts = [f"The interval is by {chosen.score.blocks} blocks"]
+    if robot.authors:
+        parts.append(f"the model has {chosen.numbers} free numbers, more than its authors' own")
+    if not robot.in_sample:
+        parts.append("which terms it has was chosen by the same prediction")
+    if robot.centred:
+        parts.append("the mean error does not count, as its authors have it")
+    return f"{'; '.join(parts)}."
+
+
+def models_table(robot: RealRobot, models: Sequence[TriedModel]) -> Table:
+    """Errors of the authors' models, then of ours with the ratio to the model without the last term."""
+    scale, rows = robot.scale, list[tuple[str, int | None, str, str, str]]()
+    rows += [(name, None, f"{error:.2f}", "", "") for name, error in robot.authors]
+    for model in models:
+        error, low, high = (f"{scale * value:.2f}" for value in model.score[:3])
+        ratio = "{:.3f} [{:.3f}, {:.3f}]".format(*model.ratio[:3]) if model.ratio else ""
+        name = f"+ {model.terms[-1]}" if len(model.terms) == 2 else model.words.replace("elastic ", "")
+        rows.append((name, model.numbers, f"{error} [{low}, {high}]", ratio, model.verdict))
+    heads = ("model", "numbers", f"{robot.asked} [{robot.unit}]", "over that without", "")
+    return Table("", heads, rows)
+
+
+def parameters_table(fits: Sequence[ArcFit]) -> Table:
+    """Unknowns of the chosen model with their 95 % intervals, or that the data do not tell them."""
+    several, rows = len(fits) > 1, []
+    for fit in fits:
+        for name, told in fit.told.items():
+            value = number(told.value) if told.known else "not told"
+            interval = f"{number(told.low)} to {number(told.high)}" if told.known else ""
+            rows.append((*([fit.recordings[0].name] * several), name, value, interval, told.unit, told.meaning))
+    heads = (*["recording"] * several, "parameter", "value", "95 %", "unit", "meaning")
+    return Table("What the data tell of the chosen model", heads, rows)
+
+
+def steps_table(robot: RealRobot, steps: Sequence[ArcFit]) -> Table:
+    """Errors of further recordings, over all of what was predicted and over its last second."""
+    rows = []
+    for step in steps:
+        recording, wrong = step.recordings[0], step.errors[0]
+        end = recording.time > recording.time[-1] - 1.0
+        last = math.sqrt(float((wrong[end] ** 2).sum(axis=1).mean()))
+        rows.append((recording.name, *(f"{robot.scale * error:.2f}" for error in (step.rms("asked"), last))))
+    title = "Steps in a closed loop, predicted from the motors with the same fit; zero from the first 0.15 s, no slack"
+    return Table(title, ("recording", f"RMS error [{robot.unit}]", "last second"), rows)

@@ -1,0 +1,82 @@
+"""Figures of a validation: the motion and its prediction, what is left of it, and the error of each model."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from wristctl.identification.arc_fit import ArcFit
+from wristctl.identification.model_choice import TriedModel
+from wristctl.identification.real_robots import RealRobot
+from wristctl.plotting.style import BLACK, BLUE, GREY, VERMILLION, figure, legend, legend_below, title
+
+# Recordings drawn at most.
+_SHOWN = 3
+
+
+def _parts(fits: Sequence[ArcFit]) -> list[tuple[ArcFit, int]]:
+    """Fits with the number of a recording in which something is predicted."""
+    parts = [(fit, k) for fit in fits for k, recording in enumerate(fit.recordings) if recording.asked.any()]
+    return parts[:_SHOWN]
+
+
+def motion(robot: RealRobot, fits: Sequence[ArcFit]) -> Figure:
+    """Measured and predicted coordinates [deg or mm] of the predicted samples, in their order."""
+    parts = _parts(fits)
+    axes_of = ("y", "z") if robot.robot.measured == "bend" else ("x", "y", "z")
+    picture, axes = figure(len(axes_of), len(parts), height=1.0 + 1.6 * len(axes_of), sharex="col")
+    for column, (fit, k) in enumerate(parts):
+        recording, wrong = fit.recordings[k], fit.errors[k]
+        asked = recording.asked
+        across = np.arange(int(asked.sum()))
+        for row, name in enumerate(axes_of):
+            panel, measured = axes[row, column], robot.scale * recording.measured[asked, row]
+            panel.plot(across, measured, ".", color=GREY, markersize=2.5, label="measured")
+            panel.plot(across, measured + robot.scale * wrong[asked, row], color=BLUE, linewidth=1.0, label="model")
+            if column == 0:
+                what = "bend" if robot.robot.measured == "bend" else "tip"
+                panel.set_ylabel(f"{what} {name} [{robot.unit}]")
+        title(axes[0, column], recording.name if recording.name != "all" else robot.asked)
+        axes[-1, column].set_xlabel("predicted sample")
+    legend_below(picture)
+    return picture
+
+
+def left_over(robot: RealRobot, fits: Sequence[ArcFit]) -> Figure:
+    """Length of the error of each predicted sample [deg or mm], and its distribution."""
+    picture, ((left, right),) = figure(1, 2, height=3.2, width_ratios=(2, 1))
+    whole, first = [], 0
+    for fit, k in _parts(fits):
+        recording, wrong = fit.recordings[k], fit.errors[k][fit.recordings[k].asked]
+        if robot.centred:
+            wrong = wrong - wrong.mean(axis=0)
+        sizes = robot.scale * np.sqrt(np.sum(wrong**2, axis=1))
+        left.plot(first + np.arange(len(sizes)), sizes, ".", markersize=2.5, label=recording.name)
+        whole.append(sizes)
+        first += len(sizes)
+    sizes = np.concatenate(whole)
+    right.hist(sizes, bins=40, color=GREY, orientation="horizontal")
+    for panel in (left, right):
+        panel.axhline(float(np.sqrt(np.mean(sizes**2))), color=BLACK, linewidth=0.8)
+    left.set(xlabel="predicted sample", ylabel=f"error [{robot.unit}]")
+    right.set_xlabel("samples")
+    title(right, "line: root mean square")
+    return picture
+
+
+def errors_of_models(robot: RealRobot, models: Sequence[TriedModel]) -> Figure:
+    """Error of the predicted part of each model with its 95 % interval, and of the authors' own."""
+    picture, ((axes,),) = figure(1, 1, height=1.2 + 0.35 * len(models))
+    for place, model in enumerate(models):
+        error, low, high = (robot.scale * value for value in model.score[:3])
+        axes.plot([low, high], [place, place], color=BLUE, linewidth=1.5)
+        axes.plot(error, place, "o", color=BLUE, markersize=5.0)
+    for name, error in robot.authors[:1]:
+        axes.axvline(error, color=VERMILLION, linewidth=1.2, label=name)
+    axes.set_yticks(range(len(models)), [model.words.replace("elastic ", "") for model in models])
+    axes.invert_yaxis()
+    axes.set_xlabel(f"RMS error, {robot.asked} [{robot.unit}]")
+    axes.set_xlim(left=0.0)
+    if robot.authors:
+        legend(axes)
+    return picture

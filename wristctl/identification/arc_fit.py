@@ -1,0 +1,308 @@
+"""Arcs on elastic tendons fitted to a part of a real robot's recordings, and asked for the rest."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import least_squares
+
+from wristctl.arrays import Array
+from wristctl.identification.arc_robot import SLACK_ERROR, ArcRecording, ArcRobot, Term
+
+_DRAWS, _SEED = 4000, 0
+_ZERO_SCALE = {"bend": 0.02, "tip": 2e-3}
+# Range in which zero and slack are looked for [rad or m, m], and change of a difference over the usual change.
+_ZERO_RANGE, _SLACK_RANGE, _STEP = 1.0, 1.5e-2, 1e-4
+# Error of a single sample that the priors are held against: 1 deg, or 2 mm.
+_ERROR = {"bend": math.radians(1.0), "tip": 2e-3}
+
+
+class Score(NamedTuple):
+    """RMS error with its 95 % interval, and the number of blocks that were drawn for it."""
+
+    error: float
+    low: float
+    high: float
+    blocks: int
+
+
+class Told(NamedTuple):
+    """An unknown's value with its 95 % interval; one that the data do not tell has an interval without ends."""
+
+    value: float
+    low: float
+    high: float
+    unit: str
+    meaning: str
+
+    @property
+    def known(self) -> bool:
+        """Whether the data tell it."""
+        return math.isfinite(self.low + self.high)
+
+
+@dataclass(frozen=True)
+class ArcFit:
+    """A robot's model with some terms, fitted to recordings."""
+
+    robot: ArcRobot
+    terms: tuple[Term, ...]
+    recordings: tuple[ArcRecording, ...]
+    x: Array
+    """Unknowns, then zero and slack of each session that is fitted."""
+    own: Mapping[str, Array]
+    """Zero and slack of each session."""
+    centred: bool
+    """Whether the mean of the error over what is predicted does not count, as its authors have it."""
+
+    @property
+    def numbers(self) -> int:
+        """Free numbers of what is fitted."""
+        return len(self.x)
+
+    @cached_property
+    def values(self) -> dict[str, float]:
+        """The unknowns by name."""
+        return dict(zip(self.robot.unknowns(self.terms), self.x.tolist(), strict=False))
+
+    @cached_property
+    def errors(self) -> list[Array]:
+        """Expected less measured (T, d) of each recording [rad or m]."""
+        values = {name: np.array([value]) for name, value in self.values.items()}
+        return [
+            self.robot.expected(values, *_parted(self.own[recording.session][None], self.robot), recording)[0]
+            - recording.measured
+            for recording in self.recordings
+        ]
+
+    @property
+    def cost(self) -> float:
+        """Sum of the squares that the fit makes small."""
+        problem = _Problem(self.robot, self.terms, self.recordings)
+        return float(np.sum(problem.residuals(self.x[None]) ** 2))
+
+    def rms(self, part: str = "fitted") -> float:
+        """RMS length of the errors over a part: fitted, zeroing or asked [rad or m]; nan where there is none."""
+        wrong = np.concatenate([e[getattr(r, part)] for e, r in zip(self.errors, self.recordings, strict=True)])
+        return float(np.sqrt(np.mean(np.sum(wrong**2, axis=1)))) if len(wrong) else math.nan
+
+    @cached_property
+    def squares(self) -> tuple[Array, Array]:
+        """Sum of squared errors and number of samples of each block of what was predicted."""
+        parts = [(e[r.asked], r.block[r.asked]) for e, r in zip(self.errors, self.recordings, strict=True)]
+        wrong, block = np.concatenate([part[0] for part in parts]), np.concatenate([part[1] for part in parts])
+        if self.centred:
+            wrong = wrong - wrong.mean(axis=0)
+        squares, numbers = np.sum(wrong**2, axis=1), np.unique(block, return_inverse=True)[1]
+        return np.bincount(numbers, squares).astype(float), np.bincount(numbers).astype(float)
+
+    def asked_of(self, recording: ArcRecording) -> ArcFit:
+        """The same unknowns on another recording, whose zeroing samples give its zero; it is taken to have no slack."""
+        problem = _Problem(self.robot, tuple(term for term in self.terms if term != "slack"), (recording,))
+        return replace(
+            self,
+            recordings=(recording,),
+            own={recording.session: problem.zeroed(self.x[: len(self.values)], recording)},
+        )
+
+    @cached_property
+    def told(self) -> dict[str, Told]:
+        """The unknowns with intervals, by blocks of what was fitted: errors of neighbouring samples are alike."""
+        problem = _Problem(self.robot, self.terms, self.recordings)
+        jacobian, residual = problem.jacobian(self.x) * problem.scale, problem.residuals(self.x[None])[0]
+        blocks = problem.blocks(len(residual))
+        scores = np.zeros((blocks.max() + 1, len(self.x)))
+        np.add.at(scores, blocks, residual[:, None] * jacobian)
+        normal = jacobian.T @ jacobian
+        inverse = np.linalg.inv(normal + 1e-12 * normal.diagonal().max() * np.eye(len(normal)))
+        count = len(scores)
+        by_blocks = (inverse @ (scores.T @ scores) @ inverse).diagonal() * count / max(1, count - 1)
+        alone = inverse.diagonal() * float(np.mean(residual**2))  # wide where residuals depend on no such change
+        variance = np.maximum(by_blocks, alone)
+        told = {}
+        for k, (name, unknown) in enumerate(self.robot.unknowns(self.terms).items()):
+            value, half = float(self.x[k]), 1.96 * problem.scale[k] * math.sqrt(max(0.0, float(variance[k])))
+            low, high = value - float(half), value + float(half)
+            at_end = min(value - unknown.low, unknown.high - value) < 1e-3 * (unknown.high - unknown.low)
+            wide = half > max(abs(value), 3.0 * unknown.scale)
+            ends = (max(low, unknown.low), high)
+            if wide or (at_end and unknown.low != 0.0):
+                ends = (-math.inf, math.inf)
+            told[name] = Told(value, ends[0], ends[1], unknown.unit, unknown.meaning)
+        return told
+
+
+def score_of(fits: Sequence[ArcFit]) -> Score:
+    """RMS error of what was predicted, with an interval by a bootstrap of its blocks."""
+    sums, counts = (np.concatenate(parts) for parts in zip(*(fit.squares for fit in fits), strict=True))
+    drawn = _drawn(len(sums))
+    low, high = np.quantile(np.sqrt(sums[drawn].sum(axis=1) / counts[drawn].sum(axis=1)), [0.025, 0.975])
+    return Score(math.sqrt(sums.sum() / counts.sum()), float(low), float(high), len(sums))
+
+
+def ratio_of(fits: Sequence[ArcFit], others: Sequence[ArcFit]) -> Score:
+    """Error of what was predicted over that of other fits of the same, paired by blocks."""
+    mine, theirs = (np.concatenate([fit.squares[0] for fit in some]) for some in (fits, others))
+    drawn = _drawn(len(mine))
+    low, high = np.quantile(np.sqrt(mine[drawn].sum(axis=1) / theirs[drawn].sum(axis=1)), [0.025, 0.975])
+    return Score(math.sqrt(mine.sum() / theirs.sum()), float(low), float(high), len(mine))
+
+
+def fit_arcs(
+    robot: ArcRobot, terms: Sequence[Term], recordings: Sequence[ArcRecording], centred: bool = False,
+    begin: Mapping[str, float] | None = None,
+) -> ArcFit:  # fmt: skip
+    """Fit a robot's model by least squares, then zero and slack of sessions that only give these.
+
+    Parameters
+    ----------
+    terms : what the model has beside elastic arcs and tendons
+    recordings : what is fitted and what is predicted
+    centred : whether the mean error of what is predicted does not count
+    begin : where the search begins, by unknown
+    """
+    problem = _Problem(robot, tuple(terms), tuple(recordings))
+    x = problem.solved(begin or {})
+    own = problem.own_of(x[None])
+    whole = {session: part[0] for session, part in own.items()}
+    unknowns = x[: len(problem.unknowns)]
+    for recording in recordings:
+        if recording.session not in whole:
+            whole[recording.session] = problem.zeroed(unknowns, recording)
+    return ArcFit(robot, tuple(terms), tuple(recordings), x, whole, centred)
+
+
+def _drawn(blocks: int) -> NDArray[np.int64]:
+    return np.random.default_rng(_SEED).integers(blocks, size=(_DRAWS, blocks))
+
+
+def _parted(own: Array, robot: ArcRobot) -> tuple[Array, Array]:
+    """Zero (V, 2 or 3) and slack (V, M)."""
+    return own[:, : robot.zeros], own[:, robot.zeros :]
+
+
+@dataclass(frozen=True)
+class _Problem:
+    robot: ArcRobot
+    terms: tuple[Term, ...]
+    recordings: tuple[ArcRecording, ...]
+
+    @cached_property
+    def unknowns(self) -> list[str]:
+        return list(self.robot.unknowns(self.terms))
+
+    @cached_property
+    def fitted(self) -> list[ArcRecording]:
+        return [recording for recording in self.recordings if recording.fitted.any()]
+
+    @cached_property
+    def sessions(self) -> list[str]:
+        return list(dict.fromkeys(recording.session for recording in self.fitted))
+
+    @cached_property
+    def own_scale(self) -> Array:
+        slack = [5e-4] * (len(self.robot.ends) if "slack" in self.terms else 0)
+        return np.array([_ZERO_SCALE[self.robot.measured]] * self.robot.zeros + slack)
+
+    @cached_property
+    def scale(self) -> Array:
+        chosen = self.robot.unknowns(self.terms).values()
+        scale: Array = np.r_[[unknown.scale for unknown in chosen], np.tile(self.own_scale, len(self.sessions))]
+        return scale
+
+    def bounds(self) -> tuple[Array, Array]:
+        chosen = self.robot.unknowns(self.terms).values()
+        zero, tendons = self.robot.zeros, len(self.own_scale) - self.robot.zeros
+        high = np.tile([_ZERO_RANGE] * zero + [_SLACK_RANGE] * tendons, len(self.sessions))
+        low = [unknown.low for unknown in chosen]
+        return np.r_[low, -high], np.r_[[unknown.high for unknown in chosen], high]
+
+    def own_of(self, x: Array) -> dict[str, Array]:
+        """Zero and slack (V, ...) of each fitted session; slack is 0 where the model has none."""
+        parts = x[:, len(self.unknowns) :].reshape(len(x), len(self.sessions), len(self.own_scale))
+        return {session: self._whole(parts[:, k]) for k, session in enumerate(self.sessions)}
+
+    def _whole(self, own: Array) -> Array:
+        missing = self.robot.zeros + len(self.robot.ends) - own.shape[1]
+        whole: Array = np.concatenate([own, np.zeros((len(own), missing))], axis=1)
+        return whole
+
+    def residuals(self, x: Array) -> Array:
+        """Errors of what is fitted, and of the slack from none, over the error of a sample: (V, ...)."""
+        values = dict(zip(self.unknowns, x.T, strict=False))
+        own = self.own_of(x)
+        rows = [self._of(values, own[recording.session], recording, "fitted") for recording in self.fitted]
+        slacks = [own[session][:, self.robot.zeros :] / SLACK_ERROR for session in self.sessions]
+        residuals: Array = np.concatenate(rows + slacks, axis=1)
+        return residuals
+
+    def _of(self, values: Mapping[str, Array], own: Array, recording: ArcRecording, part: str) -> Array:
+        expected = self.robot.expected(values, *_parted(own, self.robot), recording)
+        wrong = (expected - recording.measured)[:, getattr(recording, part)]
+        return np.asarray(wrong.reshape(len(own), -1) / _ERROR[self.robot.measured])
+
+    def blocks(self, count: int) -> NDArray[np.int64]:
+        """Block of each residual; those of the slack have one for themselves."""
+        numbers, first = [], 0
+        for recording in self.fitted:
+            block = np.unique(recording.block[recording.fitted], return_inverse=True)[1] + first
+            first = int(block.max()) + 1
+            numbers.append(np.repeat(block, recording.measured.shape[1]))
+        of_samples = np.concatenate(numbers)
+        return np.concatenate([of_samples, np.full(count - len(of_samples), first)])
+
+    def jacobian(self, x: Array) -> Array:
+        """Derivatives of the residuals by differences."""
+        return _slopes(self.residuals, x, self.scale)
+
+    def solved(self, begin: Mapping[str, float]) -> Array:
+        chosen = self.robot.unknowns(self.terms)
+        unknowns = [begin.get(name, unknown.begin) for name, unknown in chosen.items()]
+        zeros = np.tile(0.0 * self.own_scale, len(self.sessions))
+        for k, session in enumerate(self.sessions):
+            first = next(recording for recording in self.fitted if recording.session == session)
+            if self.robot.measured == "tip":
+                straight = first.measured[first.fitted][0] - [sum(self.robot.lengths), 0.0, 0.0]
+                zeros[k * len(self.own_scale) :][:3] = straight
+        x = np.r_[unknowns, zeros]
+        low, high = self.bounds()
+        return _least(self.residuals, np.clip(x, low + 1e-9, high - 1e-9), self.scale, (low, high))
+
+    def zeroed(self, unknowns: Array, recording: ArcRecording) -> Array:
+        """Zero and slack of a session of its own, from a part of its recording."""
+
+        def residuals(own: Array) -> Array:
+            values = dict(zip(self.unknowns, np.tile(unknowns, (len(own), 1)).T, strict=True))
+            whole = self._whole(own)
+            rows = self._of(values, whole, recording, "zeroing")
+            return np.concatenate([rows, whole[:, self.robot.zeros :] / SLACK_ERROR], axis=1)
+
+        unbound = np.full(len(self.own_scale), math.inf)
+        found = _least(residuals, np.zeros(len(self.own_scale)), self.own_scale, (-unbound, unbound))
+        return np.asarray(self._whole(found[None])[0])
+
+
+def _least(residuals: Callable[[Array], Array], begin: Array, scale: Array, bounds: tuple[Array, Array]) -> Array:
+    """Values with the least squares of residuals, which rows of values (V, ...) have."""
+
+    def of_one(x: Array) -> Array:
+        return np.asarray(residuals(x[None])[0])
+
+    def slopes(x: Array) -> Array:
+        return _slopes(residuals, x, scale)
+
+    fitted = least_squares(of_one, begin, slopes, bounds, x_scale=scale, ftol=1e-6, xtol=1e-6, max_nfev=100)
+    return np.asarray(fitted.x)
+
+
+def _slopes(residuals: Callable[[Array], Array], x: Array, scale: Array) -> Array:
+    """Derivatives of the residuals of rows (V, ...) by differences."""
+    steps = _STEP * scale
+    rows = residuals(np.concatenate([x[None], x + np.diag(steps)]))
+    return np.asarray((rows[1:] - rows[0]).T / steps)
