@@ -29,7 +29,7 @@ COMMANDS = (
     "simulate --controller smc --gains exchanged",
     "analyse --controller gvsc --gains default",
     "study fair_study --executor processes",
-    "audit claims",
+    "paper audit claims",
     "hysteresis hysteresis",
     "hw-run --set directions=[ulnar] --set push.force=0",
     "identify latest:hw-run --dry-run",
