@@ -18,7 +18,7 @@ import tempfile
 import time
 from pathlib import Path
 
-from installed import ROOT, environment, tried
+from installed import ROOT, environment, installer, tried
 
 OLDEST = (3, 11)
 COMMANDS = ("--version", "--help", "simulate --controller ct-dob", "runs verify")
@@ -53,8 +53,7 @@ def tests(commands: Path, folder: Path) -> str:
     """Why a test of a copy of the tests failed with the installed package; empty where all pass."""
     shutil.copytree(ROOT / "tests", folder / "tests", ignore=shutil.ignore_patterns("__pycache__"))
     shutil.copy(ROOT / "pyproject.toml", folder)
-    pip = [str(commands / "pip"), "install", "--quiet", "--disable-pip-version-check"]
-    subprocess.run([*pip, "pytest>=8", "pytest-xdist", "hypothesis", "mpmath"], check=True)
+    subprocess.run([*installer(commands), "pytest>=8", "pytest-xdist", "hypothesis", "mpmath"], check=True)
     plain = {key: value for key, value in os.environ.items() if key not in ("PYTHONPATH", "VIRTUAL_ENV")}
     call = [str(commands / "python"), "-m", "pytest", "-n", "0", "-p", "no:cacheprovider", *TESTS]
     done = subprocess.run(call, cwd=folder, env=plain, capture_output=True, text=True)
@@ -70,6 +69,7 @@ def attempt(python: str, oldest: bool) -> tuple[str, list[str]]:
         version = subprocess.run([commands / "python", "-V"], capture_output=True, text=True).stdout.strip()
         about = f"{version}, {'lowest' if oldest else 'newest'} dependencies{'' if with_torch else ', without torch'}"
         sys.stdout.write(f"{about}\n")
+        sys.stdout.flush()
         for place in ("empty", "tried"):
             (folder / place).mkdir()
         for step in (*COMMANDS, "tests"):
