@@ -36,7 +36,7 @@ good are controllers that paired differences do not tell from the lowest RMSE, a
 moves the tendons least. Do not use what is shown to fail or swing in more than 1 % of the worlds. Shipped gains:
 [gains](gains.md). For a wrist of your own: [recommend](recommend.md).""".splitlines()
 
-Row = Mapping[str, Any]
+Row = Mapping[Any, Any]
 
 
 @dataclass(frozen=True)

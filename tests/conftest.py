@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Any
 import pytest
 from hypothesis import HealthCheck, settings
 
+from wristctl.config.choices import CONTROLLERS, OPTIMISERS, REFERENCES
 from wristctl.records import formats, provenance, start
 from wristctl.records.manifest import Code
 
@@ -35,6 +36,17 @@ settings.load_profile("wristctl")
 def _log_level() -> None:
     """A command that was called in this process has set how much is logged; the next test begins anew."""
     logging.getLogger("wristctl").setLevel(logging.NOTSET)
+
+
+@pytest.fixture(autouse=True)
+def _forgotten() -> Iterator[None]:
+    """What a test lends to the tables of controllers, optimisers and references is gone after it."""
+    tables = CONTROLLERS, OPTIMISERS, REFERENCES
+    before = [{name for name in table if table.origin(name)} for table in tables]
+    yield
+    for table, names in zip(tables, before, strict=True):
+        for name in [one for one in table if one not in names and table.origin(one)]:
+            del table[name]
 
 
 @pytest.fixture(autouse=True, scope="session")

@@ -124,7 +124,7 @@ def test_a_sweep_is_one_run_with_a_table_with_units_and_a_figure_for_each_key(tm
 def test_the_answer_of_a_sweep_is_in_degrees_in_the_order_of_its_values_and_fits_one_screen() -> None:
     done = wristctl.simulate(swept(wristctl.load_study(None, *FAST), "wrist.stiffness=~0.4..0.9:30"))
     table, lines = done.frame(), done.summary
-    best = table.loc[table["rmse"].idxmin()]
+    best = table.iloc[int(table["rmse"].argmin())]
     assert f"rmse is least, {np.rad2deg(best['rmse']):.3g} deg at wrist.stiffness = " in " ".join(lines)
     shown = [float(line.split()[0]) for line in lines if re.match(r" *0\.\d+  ", line)]
     assert shown == sorted(shown) and 6 < len(shown) < 30

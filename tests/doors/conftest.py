@@ -10,8 +10,6 @@ from pathlib import Path
 
 import pytest
 
-from wristctl.config.choices import CONTROLLERS, OPTIMISERS, REFERENCES
-
 ROOT = Path(__file__).parents[2]
 
 LAW = """
@@ -37,16 +35,13 @@ def scaled(k, e):
 
 
 @pytest.fixture(autouse=True)
-def _forgotten() -> Iterator[None]:
-    """What a test lends to the tables, and agrees to, is gone after it."""
+def _distrusted() -> Iterator[None]:
+    """What a test agrees to is gone after it."""
     before = os.environ.pop("WRISTCTL_TRUSTED_CODE", None)
     yield
     os.environ.pop("WRISTCTL_TRUSTED_CODE", None)
     if before is not None:
         os.environ["WRISTCTL_TRUSTED_CODE"] = before
-    for table in (CONTROLLERS, OPTIMISERS, REFERENCES):
-        for name in [each for each in table if table.origin(each)]:
-            del table[name]
 
 
 @pytest.fixture

@@ -13,7 +13,16 @@ from wristctl.config.wrist import WristParameters
 from wristctl.control.table import controller
 from wristctl.lanes.compiled import kernel
 from wristctl.lanes.rows import rows_of
-from wristctl.simulation.actuator import Drive, IdealDrive, LaggedDrive, SpoolDrive, actuate, at_rest, drive_of
+from wristctl.simulation.actuator import (
+    WITHHELD,
+    Drive,
+    IdealDrive,
+    LaggedDrive,
+    SpoolDrive,
+    actuate,
+    at_rest,
+    drive_of,
+)
 from wristctl.simulation.outcome import Outcome
 from wristctl.simulation.reference import motion
 from wristctl.simulation.rollout import rollout
@@ -30,11 +39,12 @@ def _drive(drive: Any, state: Any, model: Any, commands: Any, out: Any, h: float
     for tick in range(commands.shape[0]):
         command, result = rows_of(commands[tick]), rows_of(out[tick])
         result[0], result[1] = actuate(drive, motors, known, command[2], command[0], command[1], h)
+        result[2] = motors[WITHHELD]
 
 
 def delivered(drive: Drive, commands: np.ndarray) -> np.ndarray:
-    """What both sides deliver (T, 2) to commands (T, 3): pulls [N] and the reference angle."""
-    out = np.zeros((len(commands), 2))
+    """What both sides deliver to commands (T, 3), pulls [N] and a reference angle; and the withheld torque; (T, 3)."""
+    out = np.zeros((len(commands), 3))
     _drive(
         drive, at_rest(drive, WRIST, PCC, np.zeros(1)), segments(WRIST, 1), np.ascontiguousarray(commands), out, PERIOD
     )
@@ -62,7 +72,8 @@ def test_lagged_pull_approaches_a_step_with_its_time_constant_in_whole_steps() -
     time = (np.arange(500) + 1) * PERIOD
     quantum = drive.motor.stiffness * drive.motor.step
     assert np.abs(pull[:, 0] - (44.0 - 40.0 * np.exp(-time / 0.05))).max() < 0.5 * quantum + 0.4
-    np.testing.assert_allclose(pull / quantum, np.rint(pull / quantum), atol=1e-9)
+    np.testing.assert_allclose(pull[:, :2] / quantum, np.rint(pull[:, :2] / quantum), atol=1e-9)
+    assert (pull[:, 2] == 0.0).all(), "a lag is no limit"
     assert np.abs(pull[:, 1] - 4.0).max() <= 0.5 * quantum + 1e-9
 
 
@@ -85,6 +96,38 @@ def test_a_stepper_keeps_its_speed_and_acceleration_and_stops_within_a_step_of_i
     target = 4.0 / drive.motor.stiffness + WRIST.length - _plus_length(0.8)
     assert length[-1] == pytest.approx(target, abs=drive.motor.step)
     assert length.max() <= target + 2 * drive.motor.step
+
+
+@pytest.mark.parametrize("side", [0, 1])
+def test_a_stepper_withholds_the_torque_of_what_it_cannot_reel_in_before_it_stops(side: int) -> None:
+    """After a period from rest it moves at a h and has come a h^2; to stop takes a h^2/2 more. The arm is c."""
+    drive = driven(Actuator(level="tendon"))
+    commands = np.tile([4.0, 4.0, 0.0], (1000, 1))
+    commands[0:, side] = 44.0
+    torque = delivered(drive, commands)[:, 2]
+    motor, sign = drive.motor, 1.0 - 2.0 * side
+    short = 40.0 / motor.stiffness - 1.5 * motor.acceleration * PERIOD**2
+    arm = WRIST.tendon_offset
+    assert torque[0] == pytest.approx(sign * arm * motor.stiffness * short, rel=1e-9)
+    assert (np.diff(sign * torque) <= 0.0).all() and (torque[-500:] == 0.0).all(), "it catches up"
+
+
+def test_a_stepper_that_keeps_up_withholds_nothing() -> None:
+    """Speed and acceleration are within the motor's; the profile's own braking distance is no shortfall."""
+    drive = driven(Actuator(level="tendon"))
+    time = PERIOD * np.arange(2000)
+    commands = np.stack([4.0 + 0.0 * time, 4.0 + 0.0 * time, 0.2 * (1.0 - np.cos(2.0 * time))], axis=1)
+    length, _, torque = delivered(drive, commands).T
+    assert np.ptp(length) > 50 * drive.motor.step and (torque == 0.0).all()
+
+
+def test_a_lagged_motor_withholds_what_its_speed_does() -> None:
+    drive = driven(Actuator(level="lagged", lag=1e-4, step_rate=500.0))
+    torque = delivered(drive, np.tile([4.0, 100.0, 0.0], (100, 1)))[:, 2]
+    motor = drive.motor
+    share = PERIOD / (motor.lag + PERIOD)
+    most = motor.stiffness * motor.speed * PERIOD
+    assert torque[0] == pytest.approx(-WRIST.tendon_offset * (96.0 * share - most), rel=1e-9)
 
 
 def _plus_length(theta: float) -> float:

@@ -22,7 +22,7 @@ from wristctl.errors import UserError
 from wristctl.lanes.compiled import kernel
 from wristctl.lanes.lane import zero_like
 from wristctl.lanes.rows import rows_of
-from wristctl.simulation.actuator import actuate, drive_in_lanes, winding_of
+from wristctl.simulation.actuator import WITHHELD, actuate, drive_in_lanes, winding_of
 from wristctl.simulation.batch import Batch, Lanes, batch
 from wristctl.simulation.closed_loop import simulate
 from wristctl.simulation.kernel import run_blocks
@@ -128,7 +128,9 @@ def _controller_side(setup: Any, course: Any, world: Any, state: Any, scratch: A
         for value in range(3):
             target[value] = course.references[0, value, tick] + zero
         estimate = sense(state.watch, world.schedule, drive, believed, tick, zero, zero, setup.period)
-        wanted, _, _, plus, minus = respond(control, believed, estimate, (low, high), 0.0, setup.period)
+        wanted, _, _, plus, minus = respond(
+            control, believed, estimate, motor[WITHHELD], (low, high), 0.0, setup.period
+        )
         row = rows_of(out[tick])
         row[0], row[1], row[2] = wanted, plus, minus
         counted_plus, counted_minus = actuate(drive, motor, believed, view.theta_ref, plus, minus, setup.period)

@@ -73,3 +73,15 @@ def test_a_spool_reaches_a_moving_target_without_exceeding_speed_or_acceleration
     assert abs(target - position) < 0.01
     if gap * moving >= 0.0:
         assert furthest < 1.0 + abs(moving) ** 2 / SPOOLS.acceleration
+
+
+@pytest.mark.parametrize("way", [1.0, -1.0])
+def test_spools_are_behind_by_what_is_left_when_they_have_braked(way: float) -> None:
+    """From v over a period h and then braking they go h v + v^2/(2 a); at the speed that closes the gap that is all."""
+    period, moving, speeds = 5e-3, np.array([0.0, 300.0, -300.0, 0.0]), np.array([2000.0, 500.0, 4000.0, 0.0])
+    to_stop = way * (period * speeds + speeds**2 / (2.0 * SPOOLS.acceleration))
+    sent = moving + way * speeds
+    assert SPOOLS.rate(to_stop, moving, sent, period) == pytest.approx(sent)
+    assert (SPOOLS.behind(to_stop, moving, sent, period) == 0.0).all()
+    assert SPOOLS.behind(to_stop + 120.0, moving, sent, period) == pytest.approx(np.full(4, 120.0))
+    assert (SPOOLS.behind(to_stop - 0.9, moving, sent, period) == 0.0).all(), "less than a step"

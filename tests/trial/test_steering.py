@@ -142,3 +142,17 @@ def test_a_law_taken_up_again_has_forgotten_what_it_did() -> None:
     steered.use(law, gains)
     assert later.torque_wanted != pytest.approx(first.torque_wanted, rel=1e-6)
     assert steered.respond(still(1e-6)) == first
+
+
+def test_the_law_is_told_what_the_motors_withhold_until_it_is_taken_up_again() -> None:
+    steered, toward = steering(), np.array([[0.1, 0.0, 0.0]])
+    law = controller("pid")
+    gains, wanted = law.values({"Kp": 1.0, "Ki": 10.0, "Kd": 0.1}), []
+    for withheld in (0.0, 0.3, -0.3):
+        steered.use(law, gains)
+        steered.withheld = withheld
+        wanted.append([steered.respond(toward).torque_wanted for _ in range(3)][-1])
+    assert wanted[0] == wanted[2] > wanted[1], "an integral does not push on what is behind"
+    steered.withheld = 0.3
+    steered.use(law, gains)
+    assert steered.withheld == 0.0

@@ -19,6 +19,7 @@ from wristctl.comparison.controller_ranking import STREAM
 from wristctl.comparison.repeated_tunings import Firsts, Order, RepeatedTunings, median_tuning
 from wristctl.comparison.tie_groups import share
 from wristctl.comparison.world_ranking import RankedRow, WorldRanking, ranking
+from wristctl.config.families import TOLERATED
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -92,7 +93,7 @@ def tuned_ranking(
     family: Family,
     tunings: Sequence[Sequence[RankedRow]],
     published: Sequence[int],
-    tolerated: float = 0.0,
+    tolerated: float = TOLERATED,
     steps: bool | None = None,
 ) -> TunedRanking:
     """The ranking of rows, each with one tuning or as many as the others, measured on the same worlds and noise.

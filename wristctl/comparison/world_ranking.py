@@ -18,7 +18,7 @@ from wristctl.arrays import Array
 from wristctl.comparison.controller_ranking import STREAM, Ranking, Traits, counted
 from wristctl.comparison.tie_groups import Comparisons, standing
 from wristctl.config.controller_row import Row
-from wristctl.config.families import Family, Worlds
+from wristctl.config.families import TOLERATED, Family, Worlds
 from wristctl.config.study import Study
 from wristctl.control.table import TunedGains, controller, gains_of
 from wristctl.simulation.cases import Measured, measure
@@ -142,7 +142,7 @@ def ranking(
     name: str,
     family: Family,
     rows: Sequence[RankedRow],
-    tolerated: float = 0.0,
+    tolerated: float = TOLERATED,
     steps: bool | None = None,
     compared: Comparisons | None = None,
 ) -> WorldRanking:

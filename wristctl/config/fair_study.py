@@ -6,6 +6,7 @@ from pydantic import model_validator
 
 from wristctl.config.choices import OPTIMISERS
 from wristctl.config.controller_row import ControllerName, Row
+from wristctl.config.families import TOLERATED
 from wristctl.config.section import OneOf, Section, choice
 from wristctl.config.tune import Objective
 
@@ -54,7 +55,7 @@ class FairStudySettings(Section):
     optimiser: Annotated[str, OneOf(OPTIMISERS)] = choice("differential-evolution", "ask/tell optimiser of searches")
     objective: Objective = Objective()
     tolerated: float = choice(
-        0.01,
+        TOLERATED,
         "share of the worlds in which a controller may fail, swing or chatter; shown to do so in more, it is not "
         "recommended",
         ge=0,

@@ -122,6 +122,10 @@ class TuningWorlds(Section):
     validation: int = choice(20, "other worlds of it to choose by", ge=1, le=10_000)
 
 
+# Share of the worlds in which a controller may fail, swing or chatter; shown to do so in more, it is not ranked.
+TOLERATED = 0.01
+
+
 class Worlds(Section):
     """Worlds on which rows are ranked: draws that no search has seen."""
 

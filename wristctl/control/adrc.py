@@ -16,13 +16,14 @@ def law(now: Any, wrist: Any, gains: Any, memory: Any) -> Any:
     z is what a linear observer with a triple pole at -wo makes of the angle alone: angle, rate, and the acceleration
     that is not b times the torque: spring, damper, gravity and loads together. b is beta/M, M the inertia of the
     one-segment wrist. The observer is sampled exactly (Miklosovic, Radke and Gao, ACC 2006, 3071) and so stable for any
-    wo; it is told the torque that tendons reach, so nothing winds up.
+    wo; it is told the torque that tendons reach and motors deliver, so nothing winds up.
     """
     h = now.period
     inertia, _, _ = one_segment_terms(wrist, now.theta)
     effect = gains.beta / inertia
     started = memory[_STARTED] > 0.0
     angle, rate = where(started, memory[_ANGLE], now.theta), where(started, memory[_RATE], now.rate)
+    angle, rate = angle - 0.5 * h * h * effect * now.withheld, rate - h * effect * now.withheld
     load = memory[_LOAD]
     lost = -expm1_of_negative(-gains.wo * h)  # 1 - pole
     pole, innovation = 1.0 - lost, now.theta - angle

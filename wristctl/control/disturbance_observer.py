@@ -21,10 +21,11 @@ def disturbance(now: Any, wrist: Any, bandwidth: Any, memory: Any, first: int) -
 
     What the momentum has gained over a period beyond the model's is the error of the load held until now; a share
     1 - exp(-bandwidth period) of it is taken up, so that any bandwidth is stable, and an infinite one takes the last
-    period's load.
+    period's load. What slow motors have withheld is no load (anti-windup).
     """
     inertia, _, _ = one_segment_terms(wrist, now.theta)
-    gained = where(memory[first + 2] > 0.0, inertia * now.rate - memory[first + 1], 0.0)
+    expected = memory[first + 1] - now.period * now.withheld
+    gained = where(memory[first + 2] > 0.0, inertia * now.rate - expected, 0.0)
     return memory[first] - expm1_of_negative(-bandwidth * now.period) * gained / now.period
 
 

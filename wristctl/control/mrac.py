@@ -2,6 +2,7 @@
 
 from typing import Any
 
+from wristctl.control.clamped_integral import delivered
 from wristctl.control.law import Conditions, Controller, Gain
 from wristctl.control.model import one_segment_terms
 from wristctl.lanes.functions import clip
@@ -44,11 +45,11 @@ def law(now: Any, wrist: Any, gains: Any, memory: Any) -> Any:
     for k in range(len(regressor)):
         torque = torque + regressor[k] * memory[PARAMETERS + k]
 
-    within = (torque <= now.torque_high) & (torque >= now.torque_low)
+    learns = delivered(now, torque)
     for k in range(len(regressor)):
         old = memory[PARAMETERS + k]
         adapted = (old - h * rate_of_adaptation * regressor[k] * s) / (1.0 + h * leak)
-        memory[PARAMETERS + k] = where(within, clip(adapted, LOWEST[k] + zero, HIGHEST[k] + zero), old)
+        memory[PARAMETERS + k] = where(learns, clip(adapted, LOWEST[k] + zero, HIGHEST[k] + zero), old)
     # implicit Euler on the lag: stable for every w
     pole = 1.0 + frequency * h
     lag_rate = (lag_rate - h * frequency * frequency * lag) / (pole * pole)

@@ -4,6 +4,7 @@ from typing import Any
 
 import numpy as np
 
+from wristctl.control.clamped_integral import delivered
 from wristctl.control.law import Conditions, Controller, Gain
 from wristctl.lanes.compiled import compiled
 from wristctl.lanes.functions import tanh
@@ -48,12 +49,12 @@ def law(now: Any, wrist: Any, gains: Any, memory: Any) -> Any:
     torque = memory[UNITS] - feedback * r
     for j in range(UNITS):
         torque = torque + memory[j] * _unit(j, inputs)
-    within = (torque <= now.torque_high) & (torque >= now.torque_low)
     step = now.period * rate_of_learning
     kept = 1.0 / (1.0 + step * forgetting * abs(r))
+    learns = delivered(now, torque)
     for j in range(UNITS):
-        memory[j] = where(within, kept * (memory[j] - step * r * _unit(j, inputs)), memory[j])
-    memory[UNITS] = where(within, kept * (memory[UNITS] - step * r), memory[UNITS])
+        memory[j] = where(learns, kept * (memory[j] - step * r * _unit(j, inputs)), memory[j])
+    memory[UNITS] = where(learns, kept * (memory[UNITS] - step * r), memory[UNITS])
     return torque
 
 

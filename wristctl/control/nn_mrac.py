@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from wristctl.control.clamped_integral import delivered
 from wristctl.control.law import BY_TRIAL, Conditions, Controller, Gain
 from wristctl.lanes.functions import clip, tanh
 from wristctl.lanes.lane import where, zero_like
@@ -55,8 +56,8 @@ def law(now: Any, wrist: Any, gains: Any, memory: Any) -> Any:
             total = total + (_FIRST[(INPUTS + 1) * j + k] + memory[first + k]) * inputs[k]
         output = output + memory[first + INPUTS + 1] * tanh(total)
     torque = reach * output - gains.Kd * error_rate
-    within = (torque <= now.torque_high) & (torque >= now.torque_low)
-    step = where(within, -h * gains.eta * (error + error_rate / w), zero)
+    learns = delivered(now, torque)
+    step = where(learns, -h * gains.eta * (error + error_rate / w), zero)
     for j in range(UNITS):
         first = _PER_UNIT * j
         total = _FIRST[(INPUTS + 1) * j + INPUTS] + memory[first + INPUTS]

@@ -8,7 +8,7 @@ from wristctl.lanes.lane import zero_like
 from wristctl.lanes.rows import rows_of
 from wristctl.wrist.tendons import allocate, reach
 
-_THETA, _RATE, _THETA_REF, _RATE_REF, _ACCELERATION_REF, _LOW, _HIGH, _PERIOD, _LOAD = range(len(NOW))
+_THETA, _RATE, _THETA_REF, _RATE_REF, _ACCELERATION_REF, _LOW, _HIGH, _PERIOD, _LOAD, _WITHHELD = range(len(NOW))
 
 
 class Estimate(NamedTuple):
@@ -47,23 +47,24 @@ def _continued(control: Any, first: int, since: float) -> None:
 
 
 @compiled
-def perceive(control: Any, believed: Any, estimate: Any, bounds: Any, since: float, period: float) -> Any:
+def perceive(
+    control: Any, believed: Any, estimate: Any, withheld: Any, bounds: Any, since: float, period: float
+) -> Any:
     """Put what a law sees into its signals; the least and the largest torque [N m] in reach. Arguments as `respond`."""
     low, high = bounds
     torque_low, torque_high = reach(estimate.theta, believed, low, high)
-    perceive_within(control, estimate, torque_low, torque_high, since, period)
+    perceive_within(control, estimate, withheld, (torque_low, torque_high), since, period)
     return torque_low, torque_high
 
 
 @compiled
-def perceive_within(
-    control: Any, estimate: Any, torque_low: Any, torque_high: Any, since: float, period: float
-) -> None:
-    """Put what a law sees into its signals, where the torques in reach [N m] are known."""
-    signals = rows_of(control.signals)
+def perceive_within(control: Any, estimate: Any, withheld: Any, within: Any, since: float, period: float) -> None:
+    """Put what a law sees into its signals, where the torques `within` reach [N m] are known."""
+    signals, (torque_low, torque_high) = rows_of(control.signals), within
     signals[_THETA] = estimate.theta
     signals[_RATE] = estimate.rate
     signals[_LOAD] = estimate.load
+    signals[_WITHHELD] = withheld
     _continued(control, _THETA_REF, since)
     signals[_LOW] = torque_low
     signals[_HIGH] = torque_high
@@ -78,14 +79,15 @@ def wanted_torque(control: Any) -> Any:
 
 
 @compiled
-def respond(control: Any, believed: Any, estimate: Any, bounds: Any, since: float, period: float) -> Any:
+def respond(control: Any, believed: Any, estimate: Any, withheld: Any, bounds: Any, since: float, period: float) -> Any:
     """Torque that the law wants [N m], the least and largest in reach, and pulls of the + and the - side [N].
 
-    `believed` is the controller's wrist as Segments, `estimate` an Estimate; `bounds` are the least and largest pull
-    of a side. The reference is what it was `since` seconds ago, continued by its own derivatives.
+    `believed` is the controller's wrist as Segments, `estimate` an Estimate, `withheld` the torque of the last command
+    that the motors were too slow for [N m]; `bounds` are the least and largest pull of a side [N]. The reference is
+    what it was `since` seconds ago, continued by its own derivatives.
     """
     low, high = bounds
-    torque_low, torque_high = perceive(control, believed, estimate, bounds, since, period)
+    torque_low, torque_high = perceive(control, believed, estimate, withheld, bounds, since, period)
     wanted = wanted_torque(control)
     plus, minus = allocate(estimate.theta, believed, wanted, low, high)
     return wanted, torque_low, torque_high, plus, minus

@@ -2,6 +2,7 @@
 
 from typing import Any
 
+from wristctl.control.clamped_integral import delivered
 from wristctl.control.law import Conditions, Controller, Gain, Surface
 from wristctl.control.model import one_segment
 from wristctl.lanes.functions import tanh
@@ -23,8 +24,7 @@ def law(now: Any, wrist: Any, gains: Any, memory: Any) -> Any:
     sigma = error_rate + slope * error + restoring * integral
     wanted = now.acceleration_ref - slope * error_rate - restoring * error - reaching * layer * tanh(sigma / layer)
     torque = load + inertia * wanted
-    within = (torque <= now.torque_high) & (torque >= now.torque_low)
-    memory[0] = where(within, integral, memory[0])
+    memory[0] = where(delivered(now, torque), integral, memory[0])
     return torque
 
 

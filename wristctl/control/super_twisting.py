@@ -2,6 +2,7 @@
 
 from typing import Any
 
+from wristctl.control.clamped_integral import delivered
 from wristctl.control.law import Conditions, Controller, Gain, Surface
 from wristctl.control.model import one_segment
 from wristctl.lanes.lane import sqrt, where
@@ -27,8 +28,7 @@ def law(now: Any, wrist: Any, gains: Any, memory: Any) -> Any:
     root = 2.0 * s / (width + spread)
     twist = memory[0] - now.period * 2.0 * k2 * root / spread
     torque = load + inertia * (now.acceleration_ref - slope * error_rate - k1 * root + twist)
-    within = (torque <= now.torque_high) & (torque >= now.torque_low)
-    memory[0] = where(within, twist, memory[0])
+    memory[0] = where(delivered(now, torque), twist, memory[0])
     return torque
 
 

@@ -23,7 +23,12 @@ from wristctl.lanes.named_tuples import tuple_of
 from wristctl.lanes.rows import rows_of
 from wristctl.wrist.plant import PlantModel
 from wristctl.wrist.tendon_mechanics import travel
-from wristctl.wrist.tendons import TENDONS_PER_SIDE, lengths, moment_arms
+from wristctl.wrist.tendons import TENDONS_PER_SIDE, lengths, moment_arms, torque_of
+
+# Place of the torque that both sides' motors withhold [N m] in their state, after each side's count and speed.
+WITHHELD = 4
+# Length of tendon [m] that is none, however fine the microsteps.
+_ROUNDING = 1e-9
 
 
 class Motor(NamedTuple):
@@ -134,24 +139,27 @@ def winding_of(believed: Actuator, actual: Actuator, pull: float, creep: float =
 
 
 def at_rest(drive: Drive, wrist: WristParameters, model: PlantModel, q: Array, scale: float = 1.0) -> Array:
-    """Counts of both sides at pretension with the plant at q: pull or reeled length, then speed; (4,).
+    """State of the motors at pretension with the plant at q: of each side its count, a pull or a reeled length, and its
+    speed, then the torque that both withhold, none; (5,).
 
     `wrist` is the one that is wound, `drive` as its host counts, `scale` that of the winding.
     """
     pull = TENDONS_PER_SIDE * wrist.pretension
     if not isinstance(drive, SpoolDrive):
-        return np.array([pull, 0.0, pull, 0.0])
+        return np.array([pull, 0.0, pull, 0.0, 0.0])
     plus, minus = pull / drive.motor.stiffness + wrist.length / scale - model.taut(wrist, q) / scale
-    return np.array([plus, 0.0, minus, 0.0])
+    return np.array([plus, 0.0, minus, 0.0, 0.0])
 
 
 @compiled
-def _lag(motor: Any, state: Any, side: int, command: Any, h: float) -> Any:
+def lag_pull(motor: Any, state: Any, side: int, command: Any, h: float) -> Any:
+    """Let a pull follow its command; returns it in whole microsteps, and the pull that the motor's speed withholds."""
     fastest = motor.stiffness * motor.speed * h
-    change = clip((command - state[side]) * (h / (motor.lag + h)), -fastest, fastest)
+    wanted = rounded((command - state[side]) * (h / (motor.lag + h)))
+    change = clip(wanted, -fastest, fastest)
     state[side] = state[side] + change
     quantum = rounded(motor.stiffness * motor.step)
-    return quantum * floor(state[side] / quantum + 0.5)
+    return quantum * floor(state[side] / quantum + 0.5), wanted - change
 
 
 @compiled
@@ -162,8 +170,9 @@ def reeling(gap: Any, acceleration: Any, h: float) -> Any:
 
 
 @compiled
-def _reel(motor: Any, state: Any, side: int, target: Any, h: float) -> Any:
-    """Move a stepper towards its target with bounded speed and acceleration; returns whole microsteps."""
+def reel_in(motor: Any, state: Any, side: int, target: Any, h: float) -> Any:
+    """Move a stepper towards its target with bounded speed and acceleration; returns whole microsteps, and its withheld
+    pull: of the length from where it can stop to its target, where that is more than a microstep."""
     gap = target - state[side]
     change = rounded(motor.acceleration * h)
     wanted = minimum(reeling(gap, motor.acceleration, h), motor.speed)
@@ -171,7 +180,9 @@ def _reel(motor: Any, state: Any, side: int, target: Any, h: float) -> Any:
     speed = clip(wanted, state[side + 1] - change, state[side + 1] + change)
     state[side + 1] = speed
     state[side] = state[side] + h * speed
-    return motor.step * floor(state[side] / motor.step + 0.5)
+    behind = target - state[side] - 0.5 * speed * abs(speed) / motor.acceleration
+    withheld = where(abs(behind) > motor.step + _ROUNDING, motor.stiffness * behind, 0.0)
+    return motor.step * floor(state[side] / motor.step + 0.5), withheld
 
 
 @compiled
@@ -184,7 +195,8 @@ def spool_target(pull: Any, stiffness: Any, length: Any, path: Any) -> Any:
 def actuate(drive: Any, state: Any, believed: Any, theta_ref: Any, plus: Any, minus: Any, h: float) -> Any:
     """Host's counts of both sides a period after commanded pulls [N]: pulls, or lengths on spools [m].
 
-    `believed` is the controller's wrist as Segments.
+    `believed` is the controller's wrist as Segments. The state's last value becomes the torque [N m] that the motors
+    withhold, by this belief: what of the command their speed and acceleration keep from the wrist over this period.
     """
     raise NotImplementedError("compiled code only")
 
@@ -196,14 +208,20 @@ def _as_commanded(drive: Any, state: Any, believed: Any, theta_ref: Any, plus: A
 
 @implements(actuate, LaggedDrive)
 def _lagged(drive: Any, state: Any, believed: Any, theta_ref: Any, plus: Any, minus: Any, h: float) -> Any:
-    return _lag(drive.motor, state, 0, plus, h), _lag(drive.motor, state, 2, minus, h)
+    pull_plus, less_plus = lag_pull(drive.motor, state, 0, plus, h)
+    pull_minus, less_minus = lag_pull(drive.motor, state, 2, minus, h)
+    state[WITHHELD] = torque_of(theta_ref, believed, less_plus, less_minus)
+    return pull_plus, pull_minus
 
 
 @implements(actuate, SpoolDrive)
 def _reeled(drive: Any, state: Any, believed: Any, theta_ref: Any, plus: Any, minus: Any, h: float) -> Any:
     motor, (path_plus, path_minus) = drive.motor, lengths(theta_ref, believed)
-    reeled_plus = _reel(motor, state, 0, spool_target(plus, motor.stiffness, believed.length, path_plus), h)
-    reeled_minus = _reel(motor, state, 2, spool_target(minus, motor.stiffness, believed.length, path_minus), h)
+    target_plus = spool_target(plus, motor.stiffness, believed.length, path_plus)
+    target_minus = spool_target(minus, motor.stiffness, believed.length, path_minus)
+    reeled_plus, less_plus = reel_in(motor, state, 0, target_plus, h)
+    reeled_minus, less_minus = reel_in(motor, state, 2, target_minus, h)
+    state[WITHHELD] = torque_of(theta_ref, believed, less_plus, less_minus)
     return reeled_plus, reeled_minus
 
 

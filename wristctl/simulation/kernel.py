@@ -11,7 +11,7 @@ from wristctl.lanes.compiled import by_type, compiled, implements, spelled_out
 from wristctl.lanes.lane import where, zero_like
 from wristctl.lanes.named_tuples import block_of
 from wristctl.lanes.rows import part, rows_of
-from wristctl.simulation.actuator import actuate, drive_in_lanes, read_winding, wound
+from wristctl.simulation.actuator import WITHHELD, actuate, drive_in_lanes, read_winding, wound
 from wristctl.simulation.nonideal import spools_after_slip
 from wristctl.simulation.observer import go_on, sense
 from wristctl.simulation.sums import SUMS, gather, goals_of, watch_range
@@ -166,7 +166,7 @@ def _run_block(setup: Any, course: Any, world: Any, state: Any, scratch: Any, fi
             if setup.preview > 0:
                 gather_lanes(course.references, state.which, sample, targets)
             wanted, torque_low, torque_high, plus, minus = respond(
-                control, believed, estimate, (low, high), tick * period, period
+                control, believed, estimate, motor[WITHHELD], (low, high), tick * period, period
             )
             theta_ref = view.theta_ref
             counted_plus, counted_minus = actuate(drive, motor, believed, theta_ref, plus, minus, period)

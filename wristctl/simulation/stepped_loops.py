@@ -20,7 +20,7 @@ from wristctl.lanes.compiled import kernel, spelled_out
 from wristctl.lanes.lane import where, zero_like
 from wristctl.lanes.named_tuples import block_of
 from wristctl.lanes.rows import part, rows_of
-from wristctl.simulation.actuator import drive_in_lanes
+from wristctl.simulation.actuator import WITHHELD, drive_in_lanes
 from wristctl.simulation.batch import Lanes, Start, batch
 from wristctl.simulation.cases import Case
 from wristctl.simulation.convergence import has_kinks, in_one_go
@@ -142,7 +142,8 @@ def _look_block(setup: Any, course: Any, world: Any, state: Any, scratch: Any, s
     gather_lanes(course.references, state.which, sample, scratch.target.reshape(3, len(state.which)))
     angle, rate = tip_angle(plant, q, rates)
     estimate = sense(state.watch, world.schedule, drive, believed, sample * setup.ticks, angle, rate, period)
-    perceive(control, believed, estimate, (_SIDE * bound[0], _SIDE * bound[1]), 0.0, period)
+    withheld = rows_of(state.motors)[WITHHELD]
+    perceive(control, believed, estimate, withheld, (_SIDE * bound[0], _SIDE * bound[1]), 0.0, period)
     for i in range(_TRUE):
         out[i] = signals[i]
     out[_TRUE] = angle

@@ -203,6 +203,8 @@ class ControlLoop:
         # the command acts once the board has read it; by then the one before has moved the spools for a whole period
         gap = target + moving * self._underway - (position + self._sent * self._period)
         self._send(self._signs * self._spools.rate(gap, moving, self._sent, self._period))
+        behind = self._spools.behind(gap, moving, self._sent, self._period)
+        self._steering.withheld = float(arm @ self._spools.tension(behind, np.zeros(AXES)))
         return target
 
     def _send(self, rates: Array) -> None:

@@ -72,6 +72,15 @@ class Spools:
         _rates((self.speed, self.acceleration), gap, moving, before, period, rates)
         return rates
 
+    def behind(self, gap: Array, moving: Array, sent: Array, period: float) -> Array:
+        """Distances [steps] from where spools can stop to their targets, after a period at the step rates `sent`.
+
+        `gap` and `moving` are those of `rate`. Less than a step is none, and so it is at the speeds that close the gap.
+        """
+        closing = sent - moving
+        left: Array = gap - closing * period - 0.5 * closing * np.abs(closing) / self.acceleration
+        return np.where(np.abs(left) > 1.0, left, 0.0)
+
 
 def spools_of(actuator: Actuator) -> Spools:
     """The spools of an actuator section."""

@@ -50,6 +50,8 @@ class Steering:
         self._preview = 0
         self._gains = self._memory = np.zeros(1)
         self.tick = 0
+        self.withheld = 0.0
+        """Torque of the last command that the motors are too slow to deliver [N m]."""
 
     @property
     def estimate(self) -> Estimate:
@@ -58,7 +60,8 @@ class Steering:
         return Estimate(float(theta), float(rate), float(load))
 
     def use(self, controller: Controller, gains: Sequence[float]) -> None:
-        """Take up a law, its memory empty."""
+        """Take up a law, its memory empty, with motors that have caught up."""
+        self.withheld = 0.0
         self._law = controller.compiled()
         self._signals = np.zeros(signals_of(controller.preview))
         self._preview = controller.preview
@@ -82,7 +85,8 @@ class Steering:
         has raised.
         """
         control = Controlled(self._law, self._signals, self._model, self._gains, self._memory, self._target)
-        _respond(control, self._bounds, self._observer.now, (course, tick, self._preview), self._period, self._found)
+        to_follow = course, tick, self._preview
+        _respond(control, self._bounds, self._observer.now, self.withheld, to_follow, self._period, self._found)
         self._law.check()
         wanted, torque, plus, minus, low, high = map(float, self._found)
         return Answer(wanted, torque, plus / TENDONS_PER_SIDE, minus / TENDONS_PER_SIDE, not low <= wanted <= high)
@@ -94,7 +98,7 @@ class Steering:
 
 
 @kernel
-def _respond(control: Any, bounds: Any, now: Any, to_follow: Any, period: float, result: Any) -> None:
+def _respond(control: Any, bounds: Any, now: Any, withheld: float, to_follow: Any, period: float, result: Any) -> None:
     believed, x, bound, row = load_segments(rows_of(control.model)), rows_of(now), rows_of(bounds), rows_of(result)
     course, tick, preview = to_follow
     for ahead in range(preview, -1, -1):  # the present last: it is what the law follows
@@ -102,7 +106,8 @@ def _respond(control: Any, bounds: Any, now: Any, to_follow: Any, period: float,
         if ahead > 0:
             look_ahead(control, ahead, 0.0)
     estimate = Estimate(x[0], x[1], x[2])
-    wanted, low, high, plus, minus = respond(control, believed, estimate, (bound[0], bound[1]), 0.0, period)
+    less = withheld + zero_like(x[0])
+    wanted, low, high, plus, minus = respond(control, believed, estimate, less, (bound[0], bound[1]), 0.0, period)
     row[0] = wanted
     row[1] = torque_of(x[0], believed, plus, minus)
     row[2] = plus

@@ -38,7 +38,8 @@ def sweep_units(study: Study, command: str, axes: Sequence[SweepAxis], points: S
     from wristctl.work.worker import Unit
 
     content = json.loads(study.model_dump_json(by_alias=True, include=_SECTIONS.get(command, _WHOLE | {command})))
-    together, does = (_LANES, "simulated") if command == "simulate" else (1, "performed_at")
+    as_lanes = command == "simulate" and not _any_in_two_planes(study, axes)
+    together, does = (_LANES, "simulated") if as_lanes else (1, "performed_at")
     keys = [(axis.key, axis.text) for axis in axes]
     units = []
     for first in range(0, len(points), together):
@@ -47,6 +48,12 @@ def sweep_units(study: Study, command: str, axes: Sequence[SweepAxis], points: S
         name = f"{command} at {', '.join(f'{k}={v}' for (k, _), v in zip(keys, block[0], strict=True))}"
         units.append(Unit(f"wristctl.commands.sweep.command:{does}", spec, name, len(block)))
     return units
+
+
+def _any_in_two_planes(study: Study, axes: Sequence[SweepAxis]) -> bool:
+    from wristctl.commands.simulate.in_two_planes import in_two_planes
+
+    return any(in_two_planes(study_at(study, axes, corner)) for corner in _corners(axes))
 
 
 def _studies(spec: Mapping[str, Any]) -> Iterator[Study]:
@@ -104,6 +111,7 @@ def performed_at(spec: Mapping[str, Any]) -> dict[str, np.ndarray]:
 
 
 _PROCEDURES: Mapping[str, str] = {
+    "simulate": "wristctl.commands.simulate.command:SIMULATE",
     "tune": "wristctl.commands.tune.command:TUNE",
     "compare": "wristctl.commands.compare.command:COMPARE",
 }
