@@ -49,11 +49,11 @@ def page(content: dict[str, Any]) -> str:
         "longer one may find less error.",
     ]
     for name, of_family in content.items():
-        lines += ["", f"## {name}", "", *_family(of_family)]
+        lines += ["", f"## {name}", "", *_family(name, of_family)]
     return "\n".join([*lines, "", "Made by `python docs/published_gains.py RUN`."]) + "\n"
 
 
-def _family(of_family: dict[str, Any]) -> list[str]:
+def _family(name: str, of_family: dict[str, Any]) -> list[str]:
     limits, worlds = of_family["conditions"], of_family["worlds"]
     about = f"{of_family['about'][:1].upper()}{of_family['about'][1:]}."
     if limits:
@@ -61,12 +61,14 @@ def _family(of_family: dict[str, Any]) -> list[str]:
         about += f" Made for a tick of {1e3 * fast:g} ms and tendons of {soft / 1e3:g} to {stiff / 1e3:g} kN/m."
     heads = ("controller", "gains", "RMSE [deg], 95 %", "tunings [deg]", f"lost of {worlds} worlds", "to rely on")
     rows = sorted(of_family["controllers"].items(), key=lambda item: (not item[1]["reliable"], item[1]["rmse"]))
+    if rows[0][1]["reliable"]:
+        about += f" On {name} {rows[0][0]} errs least of those to rely on."
     return [
         about,
         "",
         f"| {' | '.join(heads)} |",
         "| --- " * len(heads) + "|",
-        *(_row(name, row) for name, row in rows),
+        *(_row(controller, row) for controller, row in rows),
         "",
         f"`{of_family['command']}`, {of_family['run']},",
         f"hash `{of_family['result_sha256']}`.",
