@@ -144,7 +144,7 @@ def page(found: list[Row], steps: list[tuple[int, str, float, float, float]]) ->
         "Made by `python docs/accuracy.py`: a 30 deg minimum jerk, 4 s, 4 segments, friction off or 0.1 with a sheath",
         "of 3 rad, periods of 1, 5 and 10 ms, tendons of 2, 20 and 100 kN/m: 9 loops in each cell.",
         "",
-        "| law | sensing | worst, friction off | worst, sheath of 3 rad | swing, friction off | swing, sheath |",
+        "| controller | sensing | worst, friction off | worst, sheath of 3 rad | swing, friction off | swing, sheath |",
         "| --- | --- | --- | --- | --- | --- |",
     ]
     for law, sensor in dict.fromkeys((row.law, row.sensor) for row in found):

@@ -129,7 +129,7 @@ step. `python docs/best_case.py` writes this page.
 
 {answer}
 
-![best case](images/best_case.png)
+![Angle and tensions under the paper's exchanged gains in the setting nearest to its numbers](images/best_case.png)
 
 ## What is left at best (a)
 
@@ -171,8 +171,8 @@ Four segments at 1 kHz, 512 draws each. With the tension limit alone drawn, 10 t
 At 60 N {arrivals}:
 RMSE {measured} (a minimum-jerk move of 1 s).
 The mechanism is a held tick that turns the tip too far (`wristctl/comparison/best_case.py`). Where the tendons can hold
-30 deg, and one tick turns the tip by no more than the law's own limit of rate would, the wrist arrives: that rule says
-{rule:.1f} N here, and is right in {right} of the draws over the whole box.
+30 deg, and one tick turns the tip by no more than the controller's own limit of rate would, the wrist arrives: that
+rule says {rule:.1f} N here, and is right in {right} of the draws over the whole box.
 {shares}"""
 
 
@@ -277,7 +277,7 @@ def _orderings(shares: Any) -> str:
         "",
         "## In which share of the settings its orderings hold",
         "",
-        f"{int(shares['draws'].iloc[0])} draws, less those that did not converge; mrac, gvsc and nc are our own laws.",
+        f"{int(shares['draws'].iloc[0])} draws, less those that did not converge; mrac, gvsc and nc are our own.",
         "",
         "| claim | holds in | 95 % | by what decides most |",
         "|---|---|---|---|",

@@ -26,7 +26,7 @@ from wristctl.plotting.style import (
 
 
 class Move(NamedTuple):
-    """One minimum-jerk move under the exchanged law in nearly continuous time."""
+    """One minimum-jerk move under the exchanged controller in nearly continuous time."""
 
     duration: float
     rmse: float

@@ -47,6 +47,15 @@ def assemble(source: Path) -> None:
         (source / name).symlink_to(ROOT / name)
 
 
+def add_index(source: Path) -> None:
+    """Put the words of docs/index_words.toml below the title of their pages, as main entries of the index."""
+    for name, words in tomllib.loads((ROOT / "docs" / "index_words.toml").read_text(encoding="utf-8")).items():
+        page = source / "docs" / f"{name}.md"
+        title, rest = page.read_text(encoding="utf-8").split("\n", 1)
+        entries = ", ".join(f"! {word}" for word in words)
+        page.write_text(f"{title}\n\n```{{index}} {entries}\n```\n{rest}", encoding="utf-8")
+
+
 def calls() -> Iterator[list[str]]:
     """Every command that the help shows, and behind each group the commands in it."""
 
@@ -171,6 +180,7 @@ def main() -> None:
     asked = parser.parse_args()
     source, html = asked.into / "source", asked.into / "html"
     assemble(source)
+    add_index(source)
     command_pages(source)
     board_page(source)
     manifest_page(source)

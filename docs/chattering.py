@@ -83,7 +83,7 @@ def page(found: list[Swings]) -> str:
     rows, lengths = len({each.row for each in found}), " and ".join(f"{1e3 * each:g}" for each in LENGTHS)
     made = f"""Made by `python docs/chattering.py`: {rows} rows, each a controller with a preset, a step, a minimum jerk
     and a sine of 30 deg, wrists of {lengths} mm. [What is counted](worlds.md#chattering)."""
-    lines = ["# How fast tensions cross their range", ""]
+    lines = ["# Chattering: how fast tensions cross their range", ""]
     lines += [*textwrap.wrap(" ".join(said.split()), 120), "", *textwrap.wrap(" ".join(made.split()), 120), ""]
     lines += [
         "| loop | fastest without the mark [1/s] | which | marked | from [1/s] | to [1/s] | most often |",

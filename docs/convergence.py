@@ -183,7 +183,7 @@ def page(found: list[Drawn], rows: dict[str, tuple[int, int, list[Changed]]], li
         + (f"(by at most {max(each.farthest for each in found):.1g} deg) " if unmarked else "")
         + "remain so without the mark `NOT CONVERGED`. Loops that need no more than one step keep it, to the bit."
     )
-    lines = ["# Numbers and the integration step", "", *textwrap.wrap(said, 120), ""]
+    lines = ["# Convergence: numbers and the integration step", "", *textwrap.wrap(said, 120), ""]
     made = f"""Made by `python docs/convergence.py`: {SETTINGS} settings drawn from experiments/unknowns.yaml at periods
     of 1, 2, 5 and 10 ms and limits of 40 to 100 N, against twenty times the steps."""
     lines += [

@@ -1,4 +1,4 @@
-"""What rollouts cost here, by law and world, and what a cluster adds: `python docs/cost.py` writes docs/cost.md.
+"""What rollouts cost here, by controller and world, and what a cluster adds: `python docs/cost.py` writes docs/cost.md.
 
 Processor time of this process and its threads, which a busy machine changes little; the best of three.
 """
@@ -38,7 +38,7 @@ SLEEPS, TAKES = 40, 0.25
 
 
 def cost(law: str, cases: list[Case], study: Study) -> float:
-    """Seconds of one core for a rollout of a law, as a study measures it."""
+    """Seconds of one core for a rollout of a controller, as a study measures it."""
     chosen = controller(law)
     gains = np.array([chosen.values(list(chosen.presets.values())[-1])] * ROWS)
     measure(chosen, gains[:1], cases[:20], study.wrist, RANKED)
@@ -90,7 +90,7 @@ def main() -> None:
     laws = [name for name in CONTROLLERS if name == "feedforward" or name in study.study.laws]
     known = {each: drawn_cases(study.families[each], each, "test", 0, WORLDS, study.wrist) for each in families}
     costs = {family: {law: cost(law, cases, study) for law in laws} for family, cases in known.items()}
-    lines = [f"| law | {' | '.join(families)} |", f"| --- |{' --- |' * len(families)}"]
+    lines = [f"| controller | {' | '.join(families)} |", f"| --- |{' --- |' * len(families)}"]
     for law in laws:
         lines.append(f"| {law} | {' | '.join(f'{1.0 / costs[family][law]:.0f}' for family in families)} |")
     means = {family: float(np.mean(list(own.values()))) for family, own in costs.items()}
@@ -112,7 +112,7 @@ def _over(added: dict[str, float], unit: float) -> list[str]:
     return [
         "", "## What an executor adds", "",
         f"To a unit of work, measured on {SLEEPS} units that only wait, the file written and synced included; beside a",
-        f"unit of judgements on `camera`, 8,000 rollouts or {unit:.1f} s of one core.", "",
+        f"unit of tests on `camera`, 8,000 rollouts or {unit:.1f} s of one core.", "",
         "| executor | ms a unit | % of a unit |", "| --- | --- | --- |", *rows,
     ]  # fmt: skip
 
@@ -134,7 +134,7 @@ def _study(study: Study, costs: dict[str, dict[str, float]]) -> list[str]:
         "", "## The full study", "",
         f"`--budget full`: {plan(study, Inputs())}.", "",
         f"By the costs above {searched / 60.0:.0f} core-minutes of searches and",
-        f"{judged / 60.0:.0f} of judgements: {minutes:.0f} minutes on {CORES} cores, an estimate.",
+        f"{judged / 60.0:.0f} of tests: {minutes:.0f} minutes on {CORES} cores, an estimate.",
         "A run of it: [study](study.md).",
     ]  # fmt: skip
 
@@ -155,7 +155,7 @@ _BEGIN = [
 ]  # fmt: skip
 _MANY = [
     "", f"## {MANY:.0e} rollouts", "",
-    "At the mean of all laws, with the dearest executor's share on the cluster.", "",
+    "At the mean of all controllers, with the dearest executor's share on the cluster.", "",
     f"| family | core-hours | days on these {CORES} cores | hours on 1,000 cores |", "| --- | --- | --- | --- |",
 ]  # fmt: skip
 

@@ -40,7 +40,7 @@ WORLDS = {
 """Coefficient of the tendons' friction, and the sheath's angle [rad]."""
 MOVE, HOLD, STREAMS = 4.0, 61.0, 5
 CLOSED = 0.01
-"""Error [deg] below which a law is said to have closed the dead band."""
+"""Error [deg] below which a controller is said to have closed the dead band."""
 
 
 class Measured(NamedTuple):
@@ -159,7 +159,7 @@ def told(found: Found) -> list[str]:
         f"deg is left, with 3 rad of sheath too ({', '.join(np.array(names)[closing])}). The others stay where "
         f"friction holds them, {open_.min():.2g} to {open_.max():.2g} deg off on average.",
         f"A move's RMSE grows by {_growth(one[:, rmse] / none[:, rmse])} with 1 rad of sheath and by "
-        f"{_growth(three[:, rmse] / none[:, rmse])} with 3 rad; the best law without friction, {names[first]}, goes "
+        f"{_growth(three[:, rmse] / none[:, rmse])} with 3 rad; without friction the best, {names[first]}, goes "
         f"from {none[first, rmse]:.2g} to {three[first, rmse]:.2g} deg.",
         f"Friction damps: {better} of {len(names)} presets swing less at rest with 3 rad of sheath than without "
         f"friction. Nowhere inside their conditions do they swing by more than {outermost:.2g} deg.",
@@ -186,13 +186,13 @@ to the wrist itself: [hysteresis.md](hysteresis.md). Made by `python docs/fricti
 
 def page(found: Found) -> str:
     """The page."""
-    lines = ["# What friction of the tendons does to each law", ""]
+    lines = ["# Friction of the tendons: what it does to each controller", ""]
     for each in told(found):
         first, *rest = textwrap.wrap(each, 117)
         lines += [f"- {first}", *(f"  {line}" for line in rest)]
     lines += [
         "",
-        "![each preset in four worlds](images/friction.png)",
+        "![Errors of each preset without friction and with three angles of sheath](images/friction.png)",
         "",
         *_HOW.strip().splitlines(),
         "",

@@ -13,15 +13,23 @@ from pathlib import Path
 PROGRAM = [sys.executable, "-m", "wristctl"]
 
 
+# A loop with motors, elastic tendons and a camera.
+RIG = "--set loop.control_period=0.005 --set loop.actuator.level=tendon --set loop.sensor.level=camera"
+
+
 @dataclass(frozen=True)
 class Exhibit:
-    """One run of the gallery: name of its page, title, what to see in it, command, and stem of the figure shown."""
+    """One run of the gallery: name of its page, title, what to see in it, command, and stem of the figure shown.
+
+    `before` is a command that makes what the run reads.
+    """
 
     name: str
     title: str
     about: str
     command: str
     figure: str
+    before: str = ""
 
 
 EXHIBITS = (
@@ -31,14 +39,15 @@ EXHIBITS = (
         "Computed torque with a disturbance observer moves a wrist of four segments, which its one-segment model does "
         "not know. What the model lacks is measured and cancelled.",
         "simulate --controller ct-dob",
-        "motion",
+        "course",
     ),
     Exhibit(
         "printed-gains",
         "The paper's gains as printed",
-        "The sliding mode controller with the printed gains turns its torque at every tick; the wrist hardly moves.",
+        "The paper's sliding mode controller with its gains as printed asks for so little torque that the wrist does "
+        "not move.",
         "simulate --controller smc --gains printed",
-        "angle",
+        "course",
     ),
     Exhibit(
         "exchanged-gains",
@@ -53,22 +62,21 @@ EXHIBITS = (
         "A camera, elastic tendons and friction",
         "The same motion as a rig has it: stepper motors, elastic tendons with friction in their sheaths, and a camera "
         "that is two frames late.",
-        "simulate --controller smc-dob --gains hardware --set loop.control_period=0.005 "
-        "--set loop.actuator.level=tendon --set loop.actuator.sheath=1.0 --set loop.sensor.level=camera",
-        "angle",
+        f"simulate --controller smc-dob --gains hardware {RIG} --set loop.actuator.sheath=1.0",
+        "course",
     ),
     Exhibit(
-        "length",
-        "Which length?",
-        "Any number of a study can be swept. Here forty wrists differ in length alone.",
-        "simulate --controller pid-ff --sweep wrist.length=0.05..0.12:40",
-        "sweep-wrist.length",
+        "control-period",
+        "How slow may the controller be?",
+        "Any number of a study can be swept. Here it is the control period, with motors, elastic tendons and a camera.",
+        f"simulate --controller ct-dob --gains hardware {RIG} --sweep loop.control_period=0.002..0.016:29",
+        "sweep-simulate.loop.control_period",
     ),
     Exhibit(
         "payload",
         "An unknown payload",
-        "A hundred payloads are drawn at random, of which the controller knows nothing.",
-        "simulate --controller pid-dob --sweep loop.plant.payload=~0..0.3:100",
+        "A hundred payloads are drawn at random. The controller knows of none.",
+        f"simulate --controller pid-dob --gains hardware {RIG} --sweep loop.plant.payload=~0..0.3:100",
         "sweep-simulate.loop.plant.payload",
     ),
     Exhibit(
@@ -106,14 +114,16 @@ EXHIBITS = (
         "The paper's experiment, emulated",
         "Motors, board, tendons and camera are emulated; the commands are those of the real rig.",
         "hw-run first-motion",
-        "trials",
+        "directions",
     ),
     Exhibit(
         "identification",
         "A wrist's parameters from its trials",
-        "Stiffness, damping, tendons and delay of the emulated wrist, from the trials of the run before.",
-        "identify latest:hw-run",
-        "fit",
+        "Quick steps of the emulated wrist give its damping, its tendons and the camera's delay. Its stiffness was "
+        "measured before, with a spring scale. What the emulation has: 0.105 N m s/rad, 20 kN/m, friction 0.1.",
+        "identify latest:hw-run --set fix.stiffness=0.4305",
+        "angles",
+        before="hw-run identify --set hw-run.directions=[ulnar]",
     ),
 )
 
@@ -148,12 +158,15 @@ def write_gallery(docs: Path, work: Path, run: bool = True) -> None:
 
 def page(exhibit: Exhibit, pages: Path, work: Path) -> str:
     """The page of an exhibit, after running it; its figure, report and archive are put into the folder `pages`."""
+    if exhibit.before:
+        wristctl(shlex.split(exhibit.before), work)
     answer = wristctl(shlex.split(exhibit.command), work).rstrip()
     folder = work / answer.splitlines()[-1]
     figure = folder / "figures" / f"{exhibit.figure}.png"
     if not figure.is_file():
         drawn = sorted(file.stem for file in figure.parent.glob("*.png"))
         raise FileNotFoundError(f"{exhibit.name}: no figure {exhibit.figure}, there are {', '.join(drawn)}")
+    calls = "\n".join(f"$ wristctl {call}" for call in (exhibit.before, exhibit.command) if call)
     shutil.copy(figure, pages / f"{exhibit.name}.png")
     shutil.copy(folder / "report.html", pages / f"{exhibit.name}-report.html")
     wristctl(["runs", "pack", folder.name, "--file", str(pages / f"{exhibit.name}.zip")], work)
@@ -163,7 +176,7 @@ def page(exhibit: Exhibit, pages: Path, work: Path) -> str:
 {exhibit.about}
 
 ```console
-$ wristctl {exhibit.command}
+{calls}
 {answer}
 ```
 

@@ -63,7 +63,8 @@ def main() -> None:
     lines = [f"| experiment | {' | '.join(heads)} |", "|---" * (len(heads) + 1) + "|"]
     lines += [f"| {name} | {' | '.join(row(*experiment))} |" for name, experiment in EXPERIMENTS.items()]
     (HERE / "identifiability.md").write_text(
-        "# What can be identified from what\n\nMade by `python docs/identifiability.py`: half the 95 % interval that "
+        "# Identifiability: which trials tell which parameters\n\n"
+        "Made by `python docs/identifiability.py`: half the 95 % interval that "
         "each experiment promises, all of its parameters found together, by the Jacobian at the true ones (springs 30 "
         "% softer than believed, 20 kN/m tendons, 60 frames a second with 0.05 deg of noise, four directions of 5 s "
         "for each pose; level: the forearm level and rolled by 45 deg, gravity across both planes). Struck out: too "

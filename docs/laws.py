@@ -1,4 +1,4 @@
-"""Which law for which rig: `python docs/laws.py` ranks the presets on drawn worlds and writes docs/laws.md.
+"""Which controller for which rig: `python docs/laws.py` ranks the presets on drawn worlds and writes docs/laws.md.
 
 The worlds are of the families in experiments/scenarios; then, of nominal wrists behind tendons of 8 to 40 kN/m, how
 many times less the RMSE is than that of smc-tracking/camera at each of three sheaths.
@@ -103,30 +103,32 @@ def main() -> None:
     (HERE / "laws.md").write_text("\n".join(page).rstrip() + "\n")
 
 
-_BEGIN = f"""# Which law for which rig
+_BEGIN = f"""# Which controller for which rig, with presets
+
+With motors, tendons and a camera use computed torque with a disturbance observer for smooth motions, and feedforward
+for jumps. This page ranks presets; tuned at equal budget the answer is [the study's](study.md).
 
 Presets on {WORLDS} drawn worlds of each family of experiments/scenarios, all on the same worlds, motions and noise: the
-geometric mean of the RMSE with its 95 % interval over worlds. Rows of one group are not told apart from its first
-([how](worlds.md#who-is-best)); a row that fails or swings in any world stands in none. Made by `python docs/laws.py`.
-Every law is tuned first, with one budget, by
-`wristctl compare experiments/scenarios/camera.yaml experiments/rivals.yaml`.
+geometric mean of the RMSE with its 95 % interval over worlds. Controllers of one group are not told apart from its
+first ([how](worlds.md#who-is-best)); one that fails or swings in any world has no group. Made by `python docs/laws.py`.
+`wristctl compare experiments/scenarios/camera.yaml experiments/rivals.yaml` tunes each first, with one budget.
 
 ## When each wins
 
 - **Computed torque or MPC with a disturbance observer** (ct-dob, mpc, pid-dob, smc-dob): smooth motions behind motors,
   tendons and a camera, at 5 to 10 ms, where tendons are 8 kN/m or stiffer and known. Its bandwidth is what buys. MPC is
-  the same law wherever no tendon saturates, and a step costs a hundred times as much (some 13 us). After a jump they
-  swing: motors that are short of acceleration are no load, but look like one.
+  the same controller wherever no tendon saturates, and a step costs a hundred times as much (some 13 us). After a
+  jump they swing: motors that are short of acceleration are no load, but look like one.
 - **Feedforward and PID** (pid-ff): no model but the feedforward; quiet from 1 to 10 ms. Tuned it ties with the former.
   PD alone (pd-ff) leaves what an integral would take away.
 - **LQI**: like pid-ff, with weights instead of gains; it keeps the wrist's own spring in the loop.
 - **ADRC**: needs an inertia and nothing else, and pays for it in accuracy: it has to observe spring and gravity too.
 - **Super-twisting and adaptive control** (super-twisting, mrac): best by far with torques as commanded and angles as
   they are at 1 kHz; behind motors and a camera second to an observer, and best on a wrist that is no arc (uneven).
-- **Sliding terms** elsewhere (smc-tracking, smc-dob): tuned they tie with the same law without one.
+- **Sliding terms** elsewhere (smc-tracking, smc-dob): tuned they tie with the same controller without one.
 - **Networks** (nc, nn-mrac): no better than an integral here. nn-mrac is the group's law (arXiv 2510.19068) as far as
   it is specified; its published reference model is far slower.
-- **Jumps**: behind motors (steps) no law beats feedforward by more than a hundredth, and most swing; ask for motions
+- **Jumps**: behind motors (steps) none beats feedforward by more than a hundredth, and most swing. Ask for motions
   instead. With torques as commanded (ideal, steps) MPC is best, and all that have feedback beat feedforward.
 - **The paper's law** (smc): exchanged gains swing, and with gains of ours it is a feedforward.
 
@@ -136,7 +138,7 @@ _SHEATHS = """## Against smc-tracking/camera, by sheath
 
 Wrists as believed, with friction of 0.1 and tendons of 8 to 40 kN/m: how many times less the RMSE is than that of
 smc-tracking/camera, with 95 % intervals. Where springs, loads, latency and tendons differ from the belief too (family
-`camera`), the best are 1.3 to 1.5 times better: what is left is then the model's error, not the law's.
+`camera`), the best are 1.3 to 1.5 times better: what is left is then the model's error, not the controller's.
 """.splitlines()
 
 

@@ -44,7 +44,7 @@ STILL = 1e-3
 """Swing [deg] that is none: a quantised loop that does not oscillate comes to a complete rest."""
 CLOSE = 0.15
 LATEST = 40
-"""Ticks by which a law's torque can be late here."""
+"""Ticks by which a controller's torque can be late here."""
 STEP = 1.25e-4
 """Integration step [s] of the simulated loops, with which the linear wrist has converged."""
 QUICK, TAUT = Plant(actuator=TrueActuator(step_acceleration="x100")), WRIST.model_copy(update={"pretension": 20.0})
@@ -98,7 +98,7 @@ ROWS = (
 
 @cache
 def altered(name: str) -> Controller:
-    """The law with a torque that is multiplied about the resting one and comes late: gains factor, rest and late."""
+    """The controller with a torque that is multiplied about the resting one and late: gains factor, rest and late."""
     own = controller(name)
     inner, memory = compiled(own.law), own.memory
 
@@ -120,7 +120,7 @@ def swings(judged: Judged, kick: float, factors: Array, delays: Array) -> Array:
     """What is left [deg] of the loop's swing about straight after a kick [deg] where its gain is multiplied and it is
     late [s]; inf where the wrist leaves its range.
 
-    An ideal sensor's loop is changed at its law's torque, a camera's where its controller cannot know of it: pulleys
+    An ideal sensor's loop is changed at its controller's torque, a camera's where no controller can know of it: pulleys
     are larger than believed, and frames older.
     """
     row, loop, count = judged.row, judged.loop, len(factors)
@@ -252,17 +252,17 @@ _BEGIN = [
     "elastic tendons and the steppers' acceleration, let go so far from straight, for 20 s: numbers are the first",
     "gain or delay with which they do not come to rest, over the predicted one, in steps of 2.5 % and of whole",
     "control periods. Of the camera's loops the gain is changed by larger pulleys and the delay by older frames,",
-    "which their controllers do not know of; of the others at the law's torque. Noise and lost frames are off. Made",
+    "which no controller knows of; of the others at the controller's torque. Noise and lost frames are off. Made",
     "by `python docs/loop_analysis.py`.",
     "",
-    "The two sides share the equations of motion and the law, not their integration. Predictions hold the linear",
+    "Both sides share the equations of motion and the controller, not their integration. Predictions hold the linear",
     "wrist exactly between ticks: the tests take the matrix exponential of its mass, damping and stiffness matrices",
     "with SciPy and python-control, and find the same limits to 2e-6. Simulated loops take steps of "
     f"{1e3 * STEP:g} ms.",
     "",
-    "![simulated over predicted](images/loop-analysis.png)",
+    "![Simulated over predicted gain and delay at which loops begin to oscillate](images/loop-analysis.png)",
     "",
-    f"Bold is what a row is judged by: within {100.0 * CLOSE:g} %, else the script ends with exit code 1.",
+    f"Bold decides on a row: within {100.0 * CLOSE:g} %, else the script ends with exit code 1.",
     "",
     f"| row | predicted gain | delay | gain: {_KICKS} | delay: {_KICKS} |",
     f"| --- | --- | --- {_RULE}{_RULE}|",

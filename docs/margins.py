@@ -1,4 +1,4 @@
-"""Where each law's preset comes to rest behind motors, elastic tendons and a camera: `python docs/margins.py`.
+"""Where each controller's preset comes to rest behind motors, elastic tendons and a camera: `python docs/margins.py`.
 
 A cell is the largest oscillation at rest over targets of 5, 15, 30 and 45 deg to both sides. Writes docs/margins.md and
 docs/images/margins.png; exit code 1 where a preset swings inside the conditions that it states.
@@ -171,14 +171,14 @@ def main() -> int:
 
 
 _BEGIN = [
-    "# Where a preset comes to rest",
+    "# Limit cycles: where a preset comes to rest",
     "",
     "Behind steppers, elastic tendons with friction (0.1, sheaths of 0, 1 and 3 rad) and a camera of 60 Hz, two frames",
     "late with 0.1 deg of noise. A preset is quiet where no target of 5, 15, 30 and 45 deg to either side leaves an",
     "oscillation above 0.1 deg. Presets without conditions are made for tensions as commanded; the paper's are shown",
     "as they are. A command warns where a loop lies outside a preset's conditions. Made by `python docs/margins.py`.",
     "",
-    "![map](images/margins.png)",
+    "![Map of the oscillation at rest of each preset over control periods and tendon stiffness](images/margins.png)",
     "",
     "Soft tendons swing because a stepper has to reel in command/stiffness, and its acceleration ends: with 2 kN/m and",
     "eight times the acceleration smc-tracking/camera is quiet.",

@@ -1,6 +1,6 @@
-"""Which laws follow daily living: `python docs/motions.py` writes the table of docs/motions.md and its picture.
+"""Which controllers follow daily living: `python docs/motions.py` writes the table of docs/motions.md and its picture.
 
-Each law follows each task behind motors, tendons and a camera (the loop of experiments/scenarios/camera.yaml), and of
+Each controller follows each task with motors, tendons and a camera (loop of experiments/scenarios/camera.yaml), and of
 each task's range the share is counted in which it never was off by more than 2 deg.
 """
 
@@ -54,7 +54,7 @@ def width(task: str) -> float:
 
 
 def table() -> str:
-    """The share tracked of every task by every law, and of all of them, weighted by their ranges."""
+    """The share tracked of every task by every controller, and of all of them, weighted by their ranges."""
     widths = np.array([width(task) for task in TASKS])
     heads = ["task", "range [deg]", *LAWS]
     tracked = 100.0 * (1.0 - np.array([[untracked(law, task) for law in LAWS] for task in TASKS]))

@@ -1,6 +1,6 @@
 """Does the tuning objective tell good gains from bad? `python docs/objective.py` measures it: docs/objective.md.
 
-Gains within a decade of three laws' presets: the rank correlation of the objective on a few worlds of the tuning split
+Gains within a decade of three presets: the rank correlation of the objective on a few worlds of the tuning split
 with the RMSE on worlds of the test split.
 """
 
@@ -51,7 +51,7 @@ def around(law: Controller, preset: str, rng: np.random.Generator) -> Array:
 
 
 def judged(study: Study, family: str, name: str) -> Judged:
-    """What gains of a law are worth, as the search sees it and as the test worlds do."""
+    """What gains of a controller are worth, as the search sees it and as the test worlds do."""
     law, own = controller(name), study.families[family]
     gains = around(law, LAWS[name], np.random.default_rng(1))
     most = max(TUNED_ON)
@@ -82,7 +82,7 @@ def _rank(values: Array, rmse: Array) -> float:
 
 
 def line(family: str, worlds: int, objective: str, found: dict[str, Judged]) -> str:
-    """A row of the table: rank correlation of each law, of all together, and of the better half of all."""
+    """A row of the table: rank correlation of each controller, of all together, and of the better half of all."""
     each = [_rank(found[name].objectives[worlds, objective], found[name].rmse) for name in LAWS]
     values = np.concatenate([found[name].objectives[worlds, objective] for name in LAWS])
     rmse = np.concatenate([found[name].rmse for name in LAWS])
@@ -104,7 +104,7 @@ def main() -> None:
 
 
 _BEGIN = [
-    "# What gains are judged by",
+    "# The objective: what a search for gains minimises",
     "",
     "A case's value is a weighted sum of decades beside `feedforward` on the same world, motion and noise:",
     "log10((metric + floor)/(feedforward's + floor)), of the RMSE (weight 1), the error at the end and the oscillation",
@@ -113,9 +113,9 @@ _BEGIN = [
     "counts 3 to 4 decades, by how early it does. 0 is feedforward, -1 ten times better. All weights are in",
     "`tune.objective`, and one for the worst case, which is 0: it makes the objective a matter of one unlucky world.",
     "",
-    f"Does it tell good gains from bad ones? {GAINS} gains of each of three laws, within a decade of a preset to",
+    f"Does it tell good gains from bad ones? {GAINS} gains of three controllers, within a decade of a preset to",
     f"either side, on the first worlds of the tuning split, against their geometric-mean RMSE on {JUDGED_ON} worlds of",
-    "the test split that no search sees: Spearman's rank correlation, of each law, of all 1,500, and of their better",
+    "the test split that no search sees: Spearman's rank correlation, by controller, of all 1,500, and of their better",
     "half; then what the best by the objective has on the test worlds, beside the best there is. Sixteen worlds tell",
     "the better half apart, eight do not, by whatever objective. By `python docs/objective.py`.",
     "",
@@ -124,7 +124,7 @@ _BEGIN = [
 ]
 _END = [
     "",
-    "Gains are then chosen, among the search's best and the law's presets, on worlds of a third split",
+    "Gains are then chosen, among the search's best and the controller's presets, on worlds of a third split",
     "(`worlds.validation`), so that they are not the luck of the worlds that were searched on.",
 ]
 

@@ -68,14 +68,15 @@ def page(results: list[ComparedRow]) -> str:
     return f"""\
 # The paper's gains on three loops
 
-Made by `python docs/pictures.py`; the angle is given directly (no network). Loops: `exact` is the model as its own
-plant, torque held for a microsecond, no limits; `sampled` the same at 1 kHz with 60 N tendons; `four-segments`
-a four-segment plant under the one-segment model. An RMSE with {MARK} changes with the integration step, however short:
-[convergence](convergence.md).
+{textwrap.fill(said(results), 120)}
+
+The angle is given directly (no network). Loops: `exact` is the model as its own plant, torque held for a microsecond,
+no limits; `sampled` the same at 1 kHz with 60 N tendons; `four-segments` a four-segment plant under the one-segment
+model. An RMSE with {MARK} changes with the integration step, however short: [convergence](convergence.md).
 
 {table(results)}
 
-{textwrap.fill(said(results), 120)}
+Made by `python docs/pictures.py`.
 """
 
 
@@ -131,7 +132,7 @@ def hysteresis() -> None:
 
 
 def answer() -> None:
-    """What `make run` answers: every law in each class of conditions, but for the rows that are tuned first."""
+    """What `make run` answers: every controller in each class of conditions, but for the rows that are tuned first."""
     study = load_study([HERE.parent / "experiments" / "quick.yaml"], [])
     rows = tuple(row for row in study.compare.rows if row.gains != "tuned")
     chosen = study.compare.model_copy(update={"rows": rows})

@@ -40,7 +40,7 @@ ALIKE = ("plant_segments", "plant.model")
 """What environments that step together cannot draw: every wrist here bends in four segments."""
 REFERENCE = [each.name for each in OBSERVED].index("theta_ref")
 RIVALS = ("pid", "smc", "pid-ff")
-"""The laws that are tuned beside it: the paper's two, and the ladder's that integrates."""
+"""The controllers that are tuned beside it: the paper's two, and the ladder's that integrates."""
 
 
 class Wrists(VecEnv):
@@ -144,7 +144,7 @@ def steps_of(study: Study) -> int:
 
 
 def judged(study: Study, policy: Learnt) -> Measured:
-    """What the policy does on the cases that the laws are judged on, in their order, a sample a control period."""
+    """What the policy does on the cases of the controllers' test, in their order, a sample a control period."""
     family = study.families[RIG]
     cases = drawn_cases(family, RIG, "test", study.seed, WORLDS, study.wrist)
     env = WristVectorEnv(len(cases), study, RIG, split="test")
@@ -182,7 +182,7 @@ def row_of(name: str, found: Measured) -> Row:
 
 
 def rivals(study: Study) -> list[Row]:
-    """Feedforward, and each law's gains, tuned with the budget of experiments/rivals.yaml."""
+    """Feedforward, and each controller's gains, tuned with the budget of experiments/rivals.yaml."""
     searched, chosen = tuning_cases(study)
     judges = Judge(searched, study.wrist, study.tune.objective), Judge(chosen, study.wrist, study.tune.objective)
     cases = drawn_cases(study.families[RIG], RIG, "test", study.seed, WORLDS, study.wrist)
@@ -245,8 +245,8 @@ def main() -> None:
         f"PPO is Stable-Baselines3's, two layers of 64, observations and rewards normalised, one seed: "
         f"{policy.steps / 1e6:.1f} million",
         f"steps of 5 ms in {policy.minutes:.0f} minutes, {COUNT} wrists at a time, on worlds of the `learn` split. It",
-        "sees what a law sees: no integral, and no past but the observer's. Gains are tuned with",
-        f"{evaluations} evaluations a law on drawn worlds, and chosen on others.",
+        "sees what a controller sees: no integral, and no past but the observer's. Gains are tuned with",
+        f"{evaluations} evaluations a controller on drawn worlds, and chosen on others.",
         "",
         "Made by `python docs/ppo.py`. A time limit makes no two of its runs the same.",
     ]

@@ -1,4 +1,4 @@
-"""Gains of a law that come to rest behind motors, tendons and a camera: `python docs/preset_search.py LAW [--seed 1]`.
+"""Gains that come to rest behind motors, tendons and a camera: `python docs/preset_search.py CONTROLLER [--seed 1]`.
 
 The cross-entropy method on the logarithms of the gains (Rubinstein, Eur. J. Oper. Res. 99 (1997) 89): the geometric
 mean of the RMSE over a family of worlds, and ten times over where any of them swings by more than 0.06 deg. Prints the

@@ -1,4 +1,4 @@
-"""The answer of a study of all laws, as a page: `python docs/study.py RUN` writes docs/study.md from a sealed run.
+"""The answer of a study of controllers, as a page: `python docs/study.py RUN` writes docs/study.md from a sealed run.
 
 RUN is of `wristctl study experiments/fair_study.yaml --budget full --executor processes`.
 """
@@ -10,48 +10,197 @@ import math
 import shlex
 import shutil
 import sys
+import textwrap
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
+from wristctl.plotting.style import in_words
 from wristctl.records import Run
 
 HERE = Path(__file__).parent
-FIGURES = {"laws": "Every law on every rig", "terms": "What each term of a law buys"}
+FIGURES = {"laws": "RMSE of every controller on every rig", "terms": "What each term of a controller buys"}
+RIGS = {
+    "camera": "stepper motors, elastic tendons with friction, a camera of 60 Hz, 200 Hz",
+    "uneven": "the same, the wrist being a chain of uneven hinges",
+    "ideal": "torques as commanded, angles as they are, 1 kHz",
+    "steps": "jumps instead of smooth motions, on the rig of `camera`",
+}
+"""Families of worlds in the order of the page, and what they are."""
+BASELINE = "feedforward/default"
+PAPER = ("smc/tuned", "smc/printed", "smc/exchanged", "pid/printed")
+
+_ABOUT = """RMSE is the geometric mean over 250 worlds that no search saw, each a wrist and a rig drawn anew. As
+good are controllers that paired differences do not tell from the lowest RMSE, at 95 %; to run is the one of them that
+moves the tendons least. Do not use what is shown to fail or swing in more than 1 % of the worlds. Shipped gains:
+[gains](gains.md). For a wrist of your own: [recommend](recommend.md).""".splitlines()
+
+Row = Mapping[Any, Any]
 
 
-def answer_of(run: Run) -> list[str]:
-    """The lines of its first screen, as a terminal shows them."""
-    lines: list[str] = json.loads((run.path / "overview.json").read_text(encoding="utf-8"))["answer"]
-    return ["```", *lines, "```"]
+@dataclass(frozen=True)
+class Study:
+    """What the page shows of a run: rankings by family, best first, values of terms, and orders tuned otherwise."""
+
+    rankings: Mapping[str, Sequence[Row]]
+    terms: Sequence[Row]
+    sensitivity: Sequence[Row]
 
 
-def ranking(run: Run, family: str) -> list[str]:
-    """The table of a family of worlds, the best row first."""
-    rows = [
-        f"| {'-' if math.isnan(each['group']) else round(each['group'])} | {each['row']} | {_deg(each['rmse'])} "
-        f"[{_deg(each['rmse_low'])}, {_deg(each['rmse_high'])}] | {each['times_better']:.3g} "
-        f"[{each['times_better_low']:.3g}, {each['times_better_high']:.3g}] | {100.0 * each['failures']:.3g} "
-        f"| {100.0 * each['swings']:.3g} | {each['chattering']:.3g} |"
-        for each in run.data(f"ranking-{family}").to_dict("records")
+def group(row: Row) -> int | None:
+    """Number of the row's group; None for what must not be used."""
+    return None if math.isnan(row["group"]) else round(row["group"])
+
+
+def first_group(rows: Sequence[Row]) -> list[Row]:
+    """Rows that nothing is told apart from for the better; the one that moves the tendons least comes first."""
+    return sorted((row for row in rows if group(row) == 1), key=lambda row: float(row["chattering"]))
+
+
+def sentence(rankings: Mapping[str, Sequence[Row]]) -> str:
+    """Which controller to run on which rig."""
+    best = {name: first_group(rows)[0] for name, rows in rankings.items()}
+    of: dict[str, list[str]] = {}
+    for name, row in best.items():
+        of.setdefault(row["row"], []).append(f"{name} (RMSE {_deg(row['rmse'])} deg)")
+    parts = [f"**{label}** ({_words(label)}) on {', '.join(rigs)}" for label, rigs in of.items()]
+    return "\n".join(textwrap.wrap(f"Run {'; run '.join(parts)}.", 120))
+
+
+def decision(rankings: Mapping[str, Sequence[Row]]) -> list[str]:
+    """A line for each rig: what to run, what is as good, what comes next, and how much is gained."""
+    lines = [
+        "| rig | run | RMSE [deg], 95 % | as good | next: RMSE [deg] | feedforward's over it | do not use |",
+        "| --- | --- | --- | --- | --- | --- | --- |",
     ]
+    for name, rows in rankings.items():
+        best, *ties = first_group(rows)
+        following = [row for row in rows if group(row) == 2]
+        after = min(following, key=lambda row: float(row["rmse"])) if following else None
+        lost = sum(group(row) is None for row in rows)
+        same = ", ".join(_short(row["row"]) for row in ties[:3]) + (f", {len(ties) - 3} more" if len(ties) > 3 else "")
+        then = f"{_short(after['row'])} {_deg(after['rmse'])}" if after else "-"
+        lines.append(
+            f"| {name} | **{best['row']}** | {_interval(best)} | {same or '-'} | {then} "
+            f"| {_three(best['times_better'])} | {lost} of {len(rows)} |"
+        )
+    return lines
+
+
+def unusable(rankings: Mapping[str, Sequence[Row]]) -> list[str]:
+    """What must not be used on each rig, with the share of the worlds in which it fails or swings."""
+    lines = []
+    for name, rows in rankings.items():
+        lost = {row["row"]: 100.0 * (row["failures"] + row["swings"]) for row in rows if group(row) is None}
+        worst = sorted(lost, key=lambda label: -lost[label])
+        lines.append(f"- {name}: {', '.join(f'{_short(label)} {lost[label]:.3g} %' for label in worst) or 'none'}")
+    return lines
+
+
+def of_the_paper(rankings: Mapping[str, Sequence[Row]]) -> list[str]:
+    """How many times the best's error the paper's controllers have on each rig; a dash where they must not be used."""
+    lines = [f"| the paper's | {' | '.join(rankings)} |", "| --- |" + " --- |" * len(rankings)]
+    for label in PAPER:
+        cells = []
+        for rows in rankings.values():
+            row = next(row for row in rows if row["row"] == label)
+            ratio = f"{row['rmse'] / first_group(rows)[0]['rmse']:.3g}"
+            cells.append(
+                ratio if group(row) else f"do not use ({100.0 * (row['failures'] + row['swings']):.3g} % lost)"
+            )
+        lines.append(f"| {label} | {' | '.join(cells)} |")
+    return lines
+
+
+def bought(terms: Sequence[Row], families: Sequence[str]) -> list[str]:
+    """How many times less the RMSE is with each term, by rig."""
+    lines = [f"| term | {' | '.join(families)} |", "| --- |" + " --- |" * len(families)]
+    for term in dict.fromkeys(row["term"] for row in terms):
+        values = {row["family"]: row for row in terms if row["term"] == term}
+        lines.append(f"| {term} | {' | '.join(_times(values[name]) for name in families)} |")
+    return lines
+
+
+def _times(row: Row) -> str:
+    """A ratio with its interval, in brackets where the interval holds 1."""
+    text = f"{_three(row['times'])} [{_three(row['low'])}, {_three(row['high'])}]"
+    return f"({text})" if row["low"] <= 1.0 <= row["high"] else text
+
+
+def ranking(rows: Sequence[Row]) -> list[str]:
+    """The table of a family of worlds, the best row first."""
     heads = (
-        "group", "row", "RMSE [deg], 95 %", "times below feedforward's, 95 %", "fails [%]", "swings [%]",
+        "group", "controller", "RMSE [deg], 95 %", "times below feedforward's, 95 %", "fails [%]", "swings [%]",
         "tension varies by [N/s]",
     )  # fmt: skip
-    return [f"| {' | '.join(heads)} |", "| --- " * len(heads) + "|", *rows]
+    lines = []
+    for row in rows:
+        times = [_three(row[f"times_better{end}"]) for end in ("", "_low", "_high")]
+        lost = [f"{100.0 * row[fate]:.3g}" for fate in ("failures", "swings")]
+        cells = (
+            str(group(row) or "-"), row["row"], _interval(row), f"{times[0]} [{times[1]}, {times[2]}]", *lost,
+            _three(row["chattering"]),
+        )  # fmt: skip
+        lines.append(f"| {' | '.join(cells)} |")
+    return [f"| {' | '.join(heads)} |", "| --- " * len(heads) + "|", *lines]
 
 
-def sensitivity(run: Run) -> list[str]:
+def sensitivity(rows: Sequence[Row]) -> list[str]:
     """What another way to tune does to the order."""
-    rows = [
-        f"| {each['variant']} | {each['pairs']} | {each['resolved']} | {each['reversed']} | {each['tau']:.2f} "
-        f"| {each['best']} | {each['ratio']:.3f} |"
-        for each in run.data("sensitivity").to_dict("records")
-    ]
     heads = (
-        "tuned otherwise", "pairs of laws", "told apart both times", "the other way round", "Kendall's tau",
+        "tuned otherwise", "pairs of controllers", "told apart both times", "the other way round", "Kendall's tau",
         "lowest before -> after", "all RMSE times",
     )  # fmt: skip
-    return [f"| {' | '.join(heads)} |", "| --- " * len(heads) + "|", *rows]
+    lines = [
+        f"| {row['variant']} | {row['pairs']} | {row['resolved']} | {row['reversed']} | {row['tau']:.2f} "
+        f"| {row['best']} | {row['ratio']:.3f} |"
+        for row in rows
+    ]
+    return [f"| {' | '.join(heads)} |", "| --- " * len(heads) + "|", *lines]
+
+
+def page(study: Study, made: str) -> str:
+    """The page: answer and tables; `made` is the paragraph on the run."""
+    rankings = {name: study.rankings[name] for name in RIGS if name in study.rankings}
+    lines = [
+        "# Which controller for which rig, tuned at equal budget", "", sentence(rankings), "",
+        *decision(rankings), "",
+        *(f"- **{name}**: {about}" for name, about in RIGS.items() if name in rankings), "",
+        *_ABOUT, "",
+        "## The paper's controllers", "", "RMSE over that of the controller to run:", "",
+        *of_the_paper(rankings), "",
+        "## What a term buys", "",
+        "RMSE without the term over RMSE with it: above 1 it helps. In parentheses no effect is shown.", "",
+        *bought(study.terms, list(rankings)), "",
+        "## What not to use", "", "With the share of worlds in which it fails or swings:", "",
+        *unusable(rankings), "",
+        *(part for name, told in FIGURES.items() for part in (f"![{told}](images/study-{name}.png)", "")),
+        made, "",
+        *(part for name, rows in rankings.items() for part in (f"## {name}", "", *ranking(rows), "")),
+        "## Tuned otherwise", "", *sensitivity(study.sensitivity), "", "Made by `python docs/study.py RUN`.",
+    ]  # fmt: skip
+    return "\n".join(lines) + "\n"
+
+
+def _words(label: str) -> str:
+    """What a controller is: `computed torque, observer`."""
+    return in_words(label.split("/")[0]).partition(" (")[2].removesuffix(")")
+
+
+def _short(label: str) -> str:
+    """A label without what most have: tuned gains."""
+    return label.removesuffix("/tuned")
+
+
+def _interval(row: Row) -> str:
+    """RMSE of a row [deg] with its interval."""
+    return f"{_deg(row['rmse'])} [{_deg(row['rmse_low'])}, {_deg(row['rmse_high'])}]"
+
+
+def _three(value: float) -> str:
+    """Three digits, without a power of ten."""
+    return f"{float(f'{value:.3g}'):,.0f}" if value >= 1000.0 else f"{value:.3g}"
 
 
 def _deg(value: float) -> str:
@@ -62,30 +211,24 @@ def main() -> None:
     """Write the page and its pictures."""
     run = Run(Path(sys.argv[1]))
     manifest = json.loads((run.path / "run.json").read_text(encoding="utf-8"))
-    families = sorted(each.stem.removeprefix("ranking-") for each in (run.path / "data").glob("ranking-*.csv"))
     for name in FIGURES:
         shutil.copyfile(run.path / "figures" / f"{name}.png", HERE / "images" / f"study-{name}.png")
-    minutes = manifest["timing"]["wall_s"] / 60.0
+    names = [file.stem.removeprefix("ranking-") for file in (run.path / "data").glob("ranking-*.csv")]
+    study = Study(
+        {name: run.data(f"ranking-{name}").to_dict("records") for name in names},
+        run.data("terms").to_dict("records"),
+        run.data("sensitivity").to_dict("records"),
+    )
     command = shlex.join(["wristctl", *manifest["argv"][1:]])
-    pictures = [f"![{told}](images/study-{name}.png)" for name, told in FIGURES.items()]
-    lines = [
-        "# Which law for which rig",
-        "",
-        *answer_of(run),
-        "",
-        *(part for each in pictures for part in (each, "")),
-        f"`{command}`, {minutes:.0f} minutes on two cores, {run.id}. Its result, the same by any executor and",
-        f"after any interruption, has the hash `{manifest['result_sha256']}`. What it costs",
-        "elsewhere: [cost](cost.md).",
-        "",
-        *(part for name in families for part in (f"## {name}", "", *ranking(run, name), "")),
-        "## Tuned otherwise",
-        "",
-        *sensitivity(run),
-        "",
-        "Made by `python docs/study.py RUN`.",
-    ]
-    (HERE / "study.md").write_text("\n".join(lines) + "\n", encoding="utf-8")
+    minutes = manifest["timing"]["wall_s"] / 60.0
+    made = "\n".join(
+        [
+            f"`{command}`, {minutes:.0f} minutes on two cores, {run.id}.",
+            "Its result, the same by any executor and after any interruption, has the hash",
+            f"`{manifest['result_sha256']}`. What it costs elsewhere: [cost](cost.md).",
+        ]
+    )
+    (HERE / "study.md").write_text(page(study, made), encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -1,6 +1,6 @@
-"""What hw-run's laws do on the emulated rig: `python docs/trial_accuracy.py` writes docs/hardware/accuracy.md.
+"""What hw-run's controllers do on the emulated rig: `python docs/trial_accuracy.py` writes docs/hardware/accuracy.md.
 
-The default trial over twenty seeds, then every law that hw-run allows, with Dahl friction in sheaths of 1 and 3 rad.
+The default trial over twenty seeds, then each controller that hw-run allows, with friction in sheaths of 1 and 3 rad.
 All by the emulated wrist's own angle. Ends with 1 where the default trial is worse than its bounds.
 """
 
@@ -28,7 +28,7 @@ BOUNDS = {"RMSE [rad]": 0.0015, "settling [s]": 1.0, "pushed: RMSE [rad]": 0.002
 
 
 class Rig(NamedTuple):
-    """One run: a law, a sheath [rad], a seed."""
+    """One run: a controller, a sheath [rad], a seed."""
 
     law: tuple[str, str]
     sheath: float
@@ -36,7 +36,7 @@ class Rig(NamedTuple):
 
 
 def allowed() -> list[tuple[str, str]]:
-    """Laws with a preset for motors and a camera."""
+    """Controllers with a preset for motors and a camera."""
     return [(name, "hardware") for name, law in CONTROLLERS.items() if "hardware" in law.presets]
 
 
@@ -96,7 +96,7 @@ def main() -> None:
 
 
 _BEGIN = [
-    "# What the laws do on the emulated rig",
+    "# What the controllers do on the emulated rig",
     "",
     "By the emulated wrist's own angle: 30 deg in 1 s, springs 30 % weaker than the controller knows, tendons with",
     f"Dahl friction ({Study().hw_run.bench.actuator.friction:g}), a push of 2 N; settling from the start of the move.",

@@ -1,4 +1,4 @@
-"""Are tuned gains ever worse than a law's preset? `python docs/tuned.py` tunes every law: docs/tuned.md.
+"""Are tuned gains ever worse than a controller's preset? `python docs/tuned.py` tunes all: docs/tuned.md.
 
 On worlds of the tune split of a family, chosen on its validation split, and compared on its test split. As in a
 ranking, what swings or fails in more cases is worse, and of two that do so alike the one whose RMSE is greater. Ends
@@ -37,7 +37,7 @@ CONDITIONS = {"ideal": ("default", "exchanged", "printed"), "camera": ("hardware
 
 
 class Tuning(NamedTuple):
-    """What tuning did for a law on a family: its RMSE [rad] and the ratio of the preset's to it, over test worlds."""
+    """What tuning did for a controller on a family: RMSE [rad] and the preset's over it, over test worlds."""
 
     law: str
     preset: str
@@ -51,12 +51,12 @@ class Tuning(NamedTuple):
 
 
 def preset_of(law: Controller, family: str) -> str:
-    """The preset that a law is used with there; empty where it has none for such conditions."""
+    """The preset that a controller is used with there; empty where it has none for such conditions."""
     return next((name for name in CONDITIONS[family] if name in law.presets), "")
 
 
 def tuned(study: Study, law: Controller, judges: tuple[Judge, Judge], family: str, chance: float) -> Tuning:
-    """Tune a law, and compare on the test split; worse is what is so beyond this chance."""
+    """Tune a controller, and compare on the test split; worse is what is so beyond this chance."""
     found = search(study, law, lambda name: stream(study.seed, name), judges)
     preset = preset_of(law, family)
     gains = np.array([[found.gains[name] for name in law.gains], gains_of(law, preset)])
@@ -80,7 +80,7 @@ def chance_of(one: NDArray[np.bool_], other: NDArray[np.bool_]) -> float:
 
 
 def study_of(family: str) -> Study:
-    """The study that tunes all laws on a family, but for those without a preset for it."""
+    """The study that tunes all controllers on a family, but for those without a preset for it."""
     study = load_study([EXPERIMENTS / "scenarios" / f"{family}.yaml", EXPERIMENTS / "rivals.yaml"])
     budget = study.compare.tuning
     assert budget is not None
@@ -90,7 +90,7 @@ def study_of(family: str) -> Study:
 
 
 def lines_of(study: Study, family: str, chance: float) -> tuple[list[str], list[str]]:
-    """The table of a family, and the laws whose tuned gains are worse."""
+    """The table of a family, and the controllers whose tuned gains are worse."""
     given = study.tune
     searched, chosen = tuning_cases(study)
     judges = Judge(searched, study.wrist, given.objective), Judge(chosen, study.wrist, given.objective)
@@ -107,7 +107,7 @@ def lines_of(study: Study, family: str, chance: float) -> tuple[list[str], list[
 
 
 _HEAD = [
-    "| law | RMSE, tuned [deg] | gains from | preset | preset's RMSE over the tuned | swings or fails: tuned, preset |",
+    "| controller | RMSE, tuned [deg] | gains from | preset | preset's over tuned | swings or fails: tuned, preset |",
     "| --- | --- | --- | --- | --- | --- |",
 ]
 
@@ -122,8 +122,8 @@ def main() -> None:
     begin = [
         "# Tuned gains beside presets",
         "",
-        f"{said} Every law is tuned by the budget of experiments/rivals.yaml on drawn worlds of a family; among the",
-        "best candidates and its presets the gains are chosen on worlds of a second split, and judged here on",
+        f"{said} Each is tuned by the budget of experiments/rivals.yaml on drawn worlds of a family; among the",
+        "best candidates and its presets the gains are chosen on worlds of a second split, and tested here on",
         f"{TEST_WORLDS} worlds of a third: how many times less the RMSE is than the preset's (geometric mean, 95 %",
         "interval over worlds), and in how many cases either swings by more than 0.1 deg at rest or fails. As in every",
         "ranking, what swings or fails in more of the worlds is worse, whatever its RMSE. Worse is what is so beyond",

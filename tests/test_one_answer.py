@@ -24,7 +24,7 @@ _NAMES = "|".join(sorted((re.escape(name) for name in CONTROLLERS), key=len, rev
 _WHO = re.compile(rf"(?<![\w/.-])`?({_NAMES})(?:/[a-z:-]+)?`?(?![\w-])", re.IGNORECASE)
 _BEST = re.compile(
     r"\b(best|lowest|least error|errs? (?:the )?least|comes? first|wins?|winner|recommended)\b"
-    rf"|\b(?:run|use) (?:{_NAMES})\b",
+    rf"|\b(?:run|use) \W*(?:{_NAMES})\b",
     re.IGNORECASE,
 )
 
@@ -82,7 +82,14 @@ def test_the_answers_of_the_shipped_gains_are_what_is_shipped() -> None:
 
 
 @pytest.mark.parametrize(
-    "text", ["Use ct-dob.", "On a rig `pid-ff/hardware` is best.", "mpc has the lowest error.", "The winner:\nsmc."]
+    "text",
+    [
+        "Use ct-dob.",
+        "Run **mpc/tuned** here.",
+        "On a rig `pid-ff/hardware` is best.",
+        "mpc has the lowest error.",
+        "The winner:\nsmc.",
+    ],
 )
 def test_a_sentence_that_names_a_winner_is_found(text: str) -> None:
     assert len(list(sentences(text))) == 1

@@ -36,6 +36,11 @@ def test_every_link_of_a_page_leads_somewhere(page: Path) -> None:
         assert not anchor or file.suffix != ".md" or anchor in anchors(file), target
 
 
+def test_every_picture_says_what_it_shows_to_who_cannot_see_it() -> None:
+    shown = [(page.name, text) for page in PAGES for text in re.findall(r"!\[([^\]]*)\]\(", page.read_text("utf-8"))]
+    assert len(shown) > 10 and not [picture for picture in shown if len(picture[1]) < 25]
+
+
 def test_the_readme_is_one_screen_and_names_every_controller() -> None:
     text = (ROOT / "README.md").read_text(encoding="utf-8")
     assert len(text.splitlines()) <= 80
@@ -55,3 +60,15 @@ def test_one_version_is_said_everywhere() -> None:
     assert citation["version"] == __version__ and citation["license"] == "MIT"
     assert __version__ in (ROOT / "CHANGELOG.md").read_text(encoding="utf-8")
     assert 'dynamic = ["version"]' in (ROOT / "pyproject.toml").read_text(encoding="utf-8")
+
+
+def test_the_draft_paper_has_what_a_journal_of_software_asks_and_cites_what_it_lists() -> None:
+    text = (ROOT / "paper" / "paper.md").read_text(encoding="utf-8")
+    heads = re.findall(r"^# (.*)", text, re.MULTILINE)
+    assert heads == [
+        "Summary", "Statement of need", "State of the field", "Software design", "Research impact statement",
+        "AI usage disclosure", "References",
+    ]  # fmt: skip
+    assert 750 <= len(text.partition("# Summary")[2].split()) <= 1750
+    listed = re.findall(r"^@\w+\{(\w+),", (ROOT / "paper" / "paper.bib").read_text(encoding="utf-8"), re.MULTILINE)
+    assert set(re.findall(r"@(\w+\d{4})", text)) == set(listed) and len(listed) == len(set(listed))

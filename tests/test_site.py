@@ -5,8 +5,10 @@ from __future__ import annotations
 import json
 import os
 import re
+import shutil
 import subprocess
 import sys
+import tomllib
 from collections import deque
 from pathlib import Path
 from urllib.parse import unquote
@@ -73,3 +75,34 @@ def test_the_index_of_the_search_knows_words_of_the_field(site: Path, word: str,
         places = terms.get(stem, [])
         pages |= {index["docnames"][place] for place in ([places] if isinstance(places, int) else places)}
     assert page in pages
+
+
+# Words that a reader of the field may type, and pages that answer them.
+SEARCHED = {
+    "hysteresis": "docs/hysteresis", "friction": "docs/friction", "convergence": "docs/convergence",
+    "chattering": "docs/chattering", "identification": "docs/identify", "phase margin": "docs/analyse",
+    "limit cycle": "docs/margins", "camera": "docs/hardware/camera", "wiring": "docs/hardware/wiring",
+    "emergency stop": "docs/hardware/stopping", "homing": "docs/hardware/trials", "latency": "docs/hardware/real-time",
+    "replay": "docs/runs", "payload": "docs/worlds", "bootstrap": "docs/worlds", "tuning": "docs/tuned",
+    "MPC": "docs/your-own-controller", "reinforcement learning": "docs/gym", "Slurm": "docs/cluster",
+    "MuJoCo": "docs/models", "neural network": "docs/networks", "CSV": "docs/measured-data",
+    "minimum jerk": "docs/motions", "stiffness": "docs/identify", "exit codes": "docs/reference",
+}  # fmt: skip
+
+
+def test_a_search_for_words_of_the_field_gives_the_right_page_first(site: Path) -> None:
+    node = shutil.which("node")
+    if node is None:
+        pytest.skip("without Node.js nothing here runs the site's search")
+    script = [node, str(ROOT / "tests" / "data" / "search.js"), str(site), json.dumps(list(SEARCHED))]
+    answer = subprocess.run(script, text=True, capture_output=True, check=True)
+    first = {word: pages[0] if pages else "" for word, pages in json.loads(answer.stdout).items()}
+    assert {word: page for word, page in first.items() if page != SEARCHED[word]} == {}
+
+
+def test_a_word_of_the_index_names_one_page(site: Path) -> None:
+    words = tomllib.loads((ROOT / "docs" / "index_words.toml").read_text(encoding="utf-8"))
+    every = [word.casefold() for of_page in words.values() for word in of_page]
+    assert len(every) == len(set(every)) > 150
+    written = {page.relative_to(ROOT / "docs").with_suffix("").as_posix() for page in (ROOT / "docs").rglob("*.md")}
+    assert words.keys() <= written

@@ -32,7 +32,7 @@ def about(result: Result) -> str:
     lines = [
         "# How fast\n",
         "Made by `make bench-all`, which measures, and writes this page. One closed loop, run by everything that can "
-        "run it: the planar wrist of n segments, the paper's sliding mode law at 1 kHz (P1, P2, P3 = "
+        "run it: the planar wrist of n segments, the paper's sliding mode control at 1 kHz (P1, P2, P3 = "
         f"{', '.join(f'{g:g}' for g in raw['task']['gains'])}), tendons with limits, a 30 degree minimum-jerk move of "
         f"{raw['task']['move']:g} s. Speed is simulated seconds per second of wall time, compiled before, the median "
         "of alternating runs; one thread means one core. Error is the largest difference of the tip angle over the "
@@ -159,7 +159,11 @@ def main() -> None:
             claims += claimed(found[name])
             parts.append(section(found[name]))
     page = [about(result), "## Wanted and measured\n", claims_table(claims), ONE_LANE]
-    page += ["![rates and ratios](images/benchmarks.svg)\n", "## Rates\n", *parts]
+    page += [
+        "![Closed loops a second by wristctl and its peers, and their ratios](images/benchmarks.svg)\n",
+        "## Rates\n",
+        *parts,
+    ]
     (DOCS / "images").mkdir(parents=True, exist_ok=True)
     (DOCS / "benchmarks.md").write_text("\n".join(page))
     figure(result, DOCS / "images" / "benchmarks")

@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+import re
 import time
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+import pandas as pd
 import pytest
 from pandas.testing import assert_frame_equal
 
 import wristctl
 from wristctl.commands.simulate.command import Simulated
+from wristctl.commands.sweep.answer import headline
 from wristctl.config.study import Study
 from wristctl.errors import UserError
 from wristctl.simulation import swept_loops
@@ -115,6 +119,24 @@ def test_a_sweep_is_one_run_with_a_table_with_units_and_a_figure_for_each_key(tm
     assert f"simulate.controller = {best['simulate.controller']}" in said and "rmse is least" in said
     listed = wristctl.runs("points=8", kind="simulate", out=tmp_path)
     assert listed["rmse_least"].iloc[0] == best["rmse"]
+
+
+def test_the_answer_of_a_sweep_is_in_degrees_in_the_order_of_its_values_and_fits_one_screen() -> None:
+    done = wristctl.simulate(swept(wristctl.load_study(None, *FAST), "wrist.stiffness=~0.4..0.9:30"))
+    table, lines = done.frame(), done.summary
+    best = table.iloc[int(table["rmse"].argmin())]
+    assert f"rmse is least, {np.rad2deg(best['rmse']):.3g} deg at wrist.stiffness = " in " ".join(lines)
+    shown = [float(line.split()[0]) for line in lines if re.match(r" *0\.\d+  ", line)]
+    assert shown == sorted(shown) and 6 < len(shown) < 30
+    assert shown[0] == pytest.approx(table["wrist.stiffness"].min(), rel=5e-3)
+    assert shown[-1] == pytest.approx(table["wrist.stiffness"].max(), rel=5e-3)
+    assert len(lines) <= 24 and max(map(len, lines)) <= 100 and "[rad]" not in "".join(lines)
+
+
+def test_angles_that_nobody_could_measure_are_not_shown() -> None:
+    names = ["rmse", "oscillation", "steady_state"]
+    frame = pd.DataFrame({"rmse": [1e-9, 1e-8], "oscillation": [1e-12, 1e-9], "steady_state": [1e-9, 1e-3]})
+    assert headline(frame, names, dict.fromkeys(names, "rad")) == ["rmse", "steady_state"]
 
 
 def test_processes_find_what_one_finds(tmp_path: Path) -> None:

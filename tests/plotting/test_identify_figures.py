@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
 from wristctl.arrays import Array
-from wristctl.commands.identify.figures import angles, correlations, residuals
+from wristctl.commands.identify.figures import _short, angles, correlations, residuals
 from wristctl.config.identify import IdentifySettings
 from wristctl.config.plant import Actuator
 from wristctl.config.wrist import WristParameters
@@ -43,6 +43,14 @@ def rows(made: Figure) -> list[str]:
     return [axes.get_title("left") for axes in made.axes[::2]]
 
 
+def test_titles_of_trials_leave_out_what_all_share() -> None:
+    one = "20261125T093454Z-hw-run-identify-3a8c89"
+    assert _short([f"{one}, trial 0: ulnar", f"{one}, trial 1: radial"]) == ["trial 0: ulnar", "trial 1: radial"]
+    assert _short([f"{one}, trial 0: ulnar", "20261125-hw-run-bbbbbb, trial 0: ulnar"]) == [
+        "3a8c89, trial 0: ulnar", "bbbbbb, trial 0: ulnar",
+    ]  # fmt: skip
+
+
 def test_marker_and_model_are_drawn_in_degrees_with_their_difference_beside() -> None:
     one = fit(noise(3))
     made = angles(one)
@@ -57,7 +65,7 @@ def test_marker_and_model_are_drawn_in_degrees_with_their_difference_beside() ->
             np.testing.assert_array_equal(each.get_xdata(), trial.captured)
         assert left.get_ylabel() == "angle [deg]"
     assert rows(made) == ["trial 0", "trial 1", "trial 2"]
-    assert [axes.get_title("left") for axes in made.axes[1::2]] == ["marker less model [deg]", "", ""]
+    assert [axes.get_title("left") for axes in made.axes[1::2]] == ["difference [deg]", "", ""]
     assert [axes.get_xlabel() for axes in made.axes] == ["", "", "", "", "time [s]", "time [s]"]
 
 

@@ -19,9 +19,25 @@ def test_convergence_shows_each_search_and_their_median_against_the_budget(searc
     *each, median, feedforward = (np.asarray(line.get_ydata()) for line in axes.lines)
     assert len(each) == (len(best) if len(best) > 1 else 0)
     np.testing.assert_array_equal(median, np.median(best, axis=0))
-    assert list(feedforward) == [0.0, 0.0] and axes.get_xscale() == "log" and axes.get_yscale() == "linear"
+    assert list(feedforward) == [0.0, 0.0] and axes.get_xscale() == axes.get_yscale() == "linear"
     own = axes.lines[-2]
     np.testing.assert_array_equal(own.get_xdata(), candidates * np.arange(1, iterations // search.restarts + 1))
+
+
+def test_convergence_shows_every_candidate_and_its_axis_reaches_three_quarters_of_them(search: Search) -> None:
+    (axes,) = convergence([search]).axes
+    (dots,) = axes.collections
+    shown = np.asarray(dots.get_offsets())
+    np.testing.assert_array_equal(shown[:, 1], search.tried.values.ravel())
+    shown = shown[np.isfinite(shown[:, 1])]
+    low, high = axes.get_ylim()
+    assert np.mean((low < shown[:, 1]) & (shown[:, 1] < high)) >= 0.75 and low < search.tried.values.min()
+
+
+def test_convergence_says_where_feedforward_lies_beyond_its_axis(search: Search) -> None:
+    far = dataclasses.replace(search, tried=search.tried._replace(values=search.tried.values - 100.0))
+    (axes,) = convergence([far]).axes
+    assert axes.lines[-1].get_label() == "feedforward (0, beyond the axis)"
 
 
 def test_convergence_shows_a_thin_line_for_each_restart(search: Search) -> None:

@@ -9,19 +9,21 @@ from wristctl.config.wrist import WristParameters
 from wristctl.control.table import controller, gains_of
 from wristctl.errors import UserError
 from wristctl.plotting.bend_figure import bend_figure
+from wristctl.simulation.bend_course import BendCourse
 from wristctl.simulation.bend_paths import BEND_PATHS
 from wristctl.simulation.motion import Angles, Motion
 from wristctl.simulation.rollout import rollout
-from wristctl.simulation.two_planes import BendCourse, bend_path, reach_of_bends, simulate_two_planes
+from wristctl.simulation.two_planes import bend_path, reach_of_bends, simulate_two_planes
 from wristctl.wrist.tendon_layout import TendonLayout
 
 LAW = controller("pid-ff")
 GAINS = np.array(gains_of(LAW, "default"))
 WRIST = WristParameters()
+IGNORED = Loop(coupling="ignored")
 
 
-def followed(path: Array, wrist: WristParameters = WRIST, **how: object) -> BendCourse:
-    return simulate_two_planes(LAW, GAINS, path, wrist, **how)  # type: ignore[arg-type]
+def followed(path: Array, wrist: WristParameters = WRIST, loop: Loop = IGNORED, **how: object) -> BendCourse:
+    return simulate_two_planes(LAW, GAINS, path, wrist, loop=loop, **how)  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize("name", BEND_PATHS)
@@ -137,5 +139,5 @@ def test_what_cannot_run_is_said() -> None:
         bend_path("square", 10.0, 1.0, 1.0)
     with pytest.raises(UserError, match="beyond the wrist's range"):
         followed(bend_path("circumduction", WRIST.range_deg + 1.0, 1.0, 2.0))
-    with pytest.raises(UserError, match="control period"):
-        followed(bend_path("circle", 10.0, 1.0, 1.0), control_period=3e-4)
+    with pytest.raises(UserError, match=r"no loop in two planes has plant\.creep"):
+        followed(bend_path("circle", 10.0, 1.0, 1.0), loop=Loop.model_validate({"plant": {"creep": 0.1}}))

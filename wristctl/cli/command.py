@@ -4,7 +4,7 @@ import inspect
 import json
 import re
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import partial
 from importlib import import_module
 from typing import Any, get_origin
@@ -12,11 +12,11 @@ from typing import Any, get_origin
 import typer
 
 from wristctl.cli.commands import Entry
-from wristctl.cli.options import Options, Own, StudyCommand, controllers, run_ids, signature
+from wristctl.cli.options import Options, Own, StudyCommand, controllers, references, run_ids, signature
 from wristctl.commands.procedure import Procedure
 from wristctl.errors import UserError
 from wristctl.plugins.trust import asking
-from wristctl.study_files.keys import section_keys, whole_key
+from wristctl.study_files.keys import field_at, section_keys, whole_key
 
 
 def asked_to_trust(trust: bool, shown: str) -> bool:
@@ -48,7 +48,7 @@ def study_command(procedure: Procedure[Any], entry: Entry) -> typer.Typer:
     def call(**arguments: Any) -> None:
         if entry.listing is not None and arguments.pop("list"):
             return _list(entry.listing[0])
-        leaves = {leaf: arguments.pop(leaf) for leaf in (*first, *named, *shortcuts)}
+        leaves = {leaf: arguments.pop(_option_of(leaf)) for leaf in (*first, *named, *shortcuts)}
         raised = frozenset(name for name in flags if arguments.pop(name))
         sweeps = arguments.pop("sweep") if procedure.sweeps else None
         executor = (procedure.in_units and arguments.pop("executor")) or "serial"
@@ -59,14 +59,25 @@ def study_command(procedure: Procedure[Any], entry: Entry) -> typer.Typer:
         _execute(procedure, options, set_, raised | ({"force"} if options.force else set()), executor)
 
     keys = section_keys(procedure.kind)
+    for leaf in shortcuts:
+        _, field = field_at((procedure.kind, *leaf.split(".")))
+        if field is not None:
+            keys[leaf] = field
     switches = {leaf for leaf in shortcuts if keys[leaf].annotation is bool}
     texts = {leaf for leaf in shortcuts if keys[leaf].annotation in (str, str | None)}
     quoted = {*first, *named, *switches, *texts}
     kinds: dict[str, Any] = dict.fromkeys(switches, bool)
     kinds |= {leaf: list[str] for leaf in (*first, *named) if get_origin(keys[leaf].annotation) is tuple}
-    completed = {"controller": controllers} | {need.leaf: run_ids for need in procedure.needs}
+    completed: dict[str, Callable[..., list[str]]] = {"controller": controllers, "reference.kind": references}
+    completed |= {need.leaf: run_ids for need in procedure.needs}
     parameters = [
-        Own(leaf, keys[leaf].description or "", kinds.get(leaf, str), completed.get(leaf), leaf in entry.advanced)
+        Own(
+            _option_of(leaf),
+            keys[leaf].description or "",
+            kinds.get(leaf, str),
+            completed.get(leaf),
+            leaf in entry.advanced,
+        )
         for leaf in (*first, *shortcuts, *named)
     ]
     parameters += [Own(name, text, bool) for name, text in flags.items()]
@@ -87,6 +98,11 @@ def _list(place: str) -> None:
     module, _, name = place.partition(":")
     for line in getattr(import_module(module), name)():
         say(line)
+
+
+def _option_of(leaf: str) -> str:
+    """Name of the option for a leaf: `reference` for `reference.kind`."""
+    return leaf.partition(".")[0]
 
 
 def _execute(

@@ -19,7 +19,7 @@ class Entry(NamedTuple):
     line: str
     """Line of the command in the help."""
     shortcuts: Sequence[str] = ()
-    """Leaves of its section that are options too."""
+    """Leaves of its section that are options too, named by the first part of a dotted key."""
     flags: Mapping[str, str] = MappingProxyType({})
     """Switches of a call that are no settings, and their help."""
     examples: Sequence[str] = ()
@@ -41,10 +41,11 @@ COMMANDS = {
         "wristctl.commands.simulate.command:SIMULATE",
         _MAIN,
         "Simulate one controller on one wrist.",
-        shortcuts=("controller", "gains"),
+        shortcuts=("controller", "gains", "reference.kind"),
         examples=(
             "wristctl simulate --controller smc --gains exchanged",
-            "wristctl simulate --set reference.kind=step --set loop.plant_segments=1",
+            "wristctl simulate --reference dart-thrower --controller ct-dob",
+            "wristctl simulate --reference step --set loop.plant_segments=1",
             "wristctl simulate --gains tuned --tuned latest:tune",
         ),
     ),

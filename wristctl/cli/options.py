@@ -12,7 +12,7 @@ from typing import Annotated, Any, NamedTuple
 import typer
 from typer.core import TyperCommand, TyperOption
 
-from wristctl.config.choices import CONTROLLERS
+from wristctl.config.choices import CONTROLLERS, REFERENCES
 from wristctl.study_files.shipped import shipped_names
 
 # Runs offered: of many thousands nobody reads the list, and a shell asks at every key.
@@ -47,6 +47,11 @@ def study_files(incomplete: str) -> list[str]:
 def controllers(incomplete: str) -> list[str]:
     """Names of the table of controllers."""
     return sorted(name for name in CONTROLLERS if name.startswith(incomplete))
+
+
+def references(incomplete: str) -> list[str]:
+    """Names of the table of references."""
+    return sorted(name for name in REFERENCES if name.startswith(incomplete))
 
 
 def _commands() -> list[str]:

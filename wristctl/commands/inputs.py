@@ -157,12 +157,17 @@ def _stopped(ref: str | Path, wanted: EarlierRun, out: Path) -> Run:
     return run
 
 
-def check_tendons(study: Study) -> None:
-    """UserError where the wrist's tendons are none that it can bend in one plane with, as all commands have it."""
+def check_tendons(study: Study, command: str) -> None:
+    """UserError where the wrist's tendons are none that it can bend with in one plane, or in two where it does."""
     if study.wrist.tendons != "four":
-        from wristctl.wrist.tendon_layout import check_planar
+        from wristctl.simulation.bend_loops import planes_of
+        from wristctl.wrist.tendon_layout import TendonLayout, check_planar
 
-        check_planar(study.wrist)
+        chosen = study.simulate
+        if command == "simulate" and planes_of(chosen.loop, chosen.reference) == 2:
+            TendonLayout.of(study.wrist)
+        else:
+            check_planar(study.wrist)
 
 
 def check_motions(study: Study, command: str) -> None:

@@ -74,7 +74,7 @@ def prepare(
     if inputs:
         named = {procedure.subject.replace("-", "_"): named_for_good(inputs, section, out)}
         study = study.model_copy(update=named)
-    check_tendons(study)
+    check_tendons(study, procedure.kind)
     check_motions(study, procedure.kind)
     study, foreign = adopted(study, procedure.kind)
     study = with_presets(study, procedure.kind)

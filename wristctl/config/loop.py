@@ -11,7 +11,7 @@ from pydantic import BeforeValidator, model_validator
 from wristctl.config.choices import REFERENCES
 from wristctl.config.given_files import columns_of_file, given_file, of_file
 from wristctl.config.plant import Actuator, Disturbances, Plant, Sensor
-from wristctl.config.section import OneOf, OpenSection, Parameter, Section, choice, quantity
+from wristctl.config.section import OneOf, OpenSection, Parameter, Section, choice, quantity, seldom
 
 # Former names of plant models in older studies. A loop had the same name.
 _WRITTEN = {"exact": "closed-form"}
@@ -58,6 +58,16 @@ class Loop(Section):
         le=MOST_SUBSTEPS,
     )
     limits: bool = choice(True, "tensions stay within pretension and tension_limit; false: no upper limit")
+    planes: Literal[1, 2] | None = seldom(
+        None, "", "planes that the wrist bends in; null: two for a reference in two planes, else one"
+    )
+    coupling: Literal["compensated", "ignored"] = seldom(
+        "compensated", "", "in two planes: whether their effect on each other is added to the controller's torques"
+    )
+
+    spool_lead: bool = seldom(
+        True, "", "in two planes: whether spools run ahead of the reference by what they lag behind a moving target"
+    )
 
     @property
     def steps(self) -> int:
@@ -81,10 +91,10 @@ class Reference(OpenSection):
 
     step and minimum-jerk move to an angle or a tip position, sine swings between straight and the angle, multi-step
     jumps through angles, tip-path moves through tip positions, each move a minimum jerk of `duration`. Others have a
-    course of their own: recordings, excitations, motions of daily living.
+    course of their own: recordings, excitations, motions of daily living, paths in two planes.
     """
 
-    kind: Annotated[str, OneOf(REFERENCES)] = choice("minimum-jerk", "shape of it (or file.py:NAME)")
+    kind: Annotated[str, OneOf(REFERENCES)] = choice("minimum-jerk", "shape of the wanted motion (or file.py:NAME)")
     angle_deg: float | None = quantity(None, "deg", "wanted angle at the end; 30 deg where no target is given", "paper")
     tip: tuple[float, float] | None = quantity(None, "m", "wanted tip position at the end, instead of the angle")
     angles_deg: tuple[float, ...] = quantity((20.0, -10.0, 30.0), "deg", "angles of a multi-step", min_length=1)

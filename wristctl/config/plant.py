@@ -14,7 +14,7 @@ from pydantic.fields import FieldInfo
 from pydantic_core import PydanticCustomError
 
 from wristctl.config.choices import DISTURBANCES, PLANTS
-from wristctl.config.section import OneOf, OpenSection, Parameter, Section, choice, quantity
+from wristctl.config.section import OneOf, OpenSection, Parameter, Section, choice, quantity, seldom
 
 _SCALE = re.compile(r"x ?([0-9]+\.?[0-9]*(?:e[+-]?[0-9]+)?)", re.IGNORECASE)
 
@@ -109,6 +109,8 @@ class TendonFacts(Section):
     creep: float = fact(0.0, "", "share of a tendon's stiffness that relaxes (one Maxwell branch)", ge=0, lt=1)
     creep_time: float = fact(10.0, "s", "time constant of that", gt=0)
     broken_at: float | None = fact(None, "s", "when one of the + side's two tendons breaks; null: never", ge=0)
+    broken_tendon: int = fact(1, "", "which of the tendons' places breaks, of a wrist in two planes", ge=1)
+    slack: tuple[float, ...] = fact((), "m", "slack that homing left in each place's tendons, in two planes")
     slips_at: float | None = fact(None, "s", "when the + side's tendons slip on their spool; null: never", ge=0)
     slip: float = fact(1e-3, "m", "by how much", gt=0)
 
@@ -160,6 +162,7 @@ class TrueWrist(Overrides):
     hand_offset: NotNegative = truth("m", "hand's centre of mass beyond the last disc")
     stiffness: Positive = truth("N m/rad", "bending stiffness of the whole wrist")
     flexion_ratio: Positive = truth("", "stiffness toward flexion over that toward ulnar")
+    stiffness_axis_deg: float | None = truth("deg", "direction of the bends that meet `stiffness`")
     taper: Positive = truth("", "stiffness at the base over that at the tip (hinges)")
     damping: NotNegative = truth("N m s/rad", "bending damping of the whole wrist")
     tendon_radius: Positive = truth("m", "radius of the circle of tendons")
@@ -214,6 +217,9 @@ class Disturbances(OpenSection):
     load: float = quantity(0.0, "N", "constant force on the last disc, across the straight wrist")
     drift: Drift = Drift()
     grasp: Grasp = Grasp()
+    toward_deg: float = seldom(
+        0.0, "deg", "direction of push, load and grasp in two planes, from ulnar (0) toward flexion (90)"
+    )
 
     def added(self) -> Mapping[str, Parameter]:
         """Parameters that disturbances from outside the package add."""

@@ -29,6 +29,12 @@ def choice(default: Any, meaning: str, source: str = "", **constraints: Any) -> 
     return quantity(default, "", meaning, source, **constraints)
 
 
+def seldom(default: Any, unit: str, meaning: str, **constraints: Any) -> Any:
+    """A leaf that config.yaml leaves out where it has its default."""
+    extra: JsonDict = {"unit": unit, "source": "", "unsaid": True}
+    return Field(default, description=meaning, json_schema_extra=extra, **constraints)
+
+
 @dataclass(frozen=True)
 class OneOf:
     """The type of a leaf that names an entry of a table: `Annotated[str, OneOf(CONTROLLERS)]`."""

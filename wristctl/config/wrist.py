@@ -5,7 +5,7 @@ from typing import Literal, Self
 
 from pydantic import model_validator
 
-from wristctl.config.section import Section, choice, quantity
+from wristctl.config.section import Section, choice, quantity, seldom
 
 
 class TendonPlace(Section):
@@ -27,6 +27,9 @@ class WristParameters(Section):
     hand_offset: float = quantity(0.060, "m", "hand's centre of mass beyond the last disc", "assumed", ge=0)
     stiffness: float = quantity(0.615, "N m/rad", "bending stiffness of the whole wrist", "paper, C1", gt=0)
     flexion_ratio: float = quantity(1.0, "", "stiffness toward flexion over that toward ulnar", "assumed: alike", gt=0)
+    stiffness_axis_deg: float = seldom(
+        0.0, "deg", "direction of the bends that meet `stiffness`, from ulnar (0) toward flexion (90)"
+    )
     taper: float = quantity(
         1.0, "", "stiffness at the base over that at the tip, the whole's staying (plant hinges)", "assumed: even", gt=0
     )

@@ -1,22 +1,50 @@
-"""Figure of a motion in two planes: the bend toward ulnar and flexion, wanted and followed, with the tendons' reach."""
+"""Figures of a motion in two planes: the plane of bends with the tendons' reach, and errors and pulls over time."""
 
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from wristctl.arrays import Array
-from wristctl.plotting.style import BLACK, BLUE, SILVER
-from wristctl.simulation.two_planes import BendCourse
+from wristctl.plotting.loop_figures import draw_course
+from wristctl.plotting.style import BLACK, BLUE, GREY, ORANGE, PURPLE, SILVER, VERMILLION, figure, legend_below, title
+from wristctl.simulation.bend_course import BendCourse
+
+_OF_PLANES = (("toward ulnar", BLUE), ("toward flexion", VERMILLION))
+_OF_TENDONS = (BLUE, VERMILLION, ORANGE, PURPLE, GREY, BLACK)
 
 
-def bend_figure(course: BendCourse, reach: Array) -> Figure:
+def bend_figure(course: BendCourse, reach: Array, heading: str = "") -> Figure:
     """The plane of bends; `reach` is a closed line (K, 2) [rad], as `reach_of_bends` gives it."""
-    figure = Figure(figsize=(5.0, 5.0), layout="constrained")
-    axes = figure.add_subplot()
+    picture = Figure(figsize=(5.0, 5.0), layout="constrained")
+    _plane_of_bends(picture.add_subplot(), course, reach, heading).legend(loc="upper right")
+    return picture
+
+
+def bend_motion(course: BendCourse, reach: Array, heading: str = "") -> Figure:
+    """Left the plane of bends; right the errors of both planes [deg] and the pulls at all places [N] over time [s]."""
+    picture, axes = figure(2, 2, height=4.6, width_ratios=(1.0, 1.25))
+    for panel in axes[:, 0]:
+        panel.remove()
+    _plane_of_bends(picture.add_subplot(axes[0, 0].get_gridspec()[:, 0]), course, reach, heading)
+    errors, pulls = axes[:, 1]
+    for error, (name, shade) in zip(course.error.T, _OF_PLANES, strict=True):
+        draw_course(errors, course.time, np.degrees(error), shade, f"error {name}")
+    errors.axhline(0.0, color=BLACK, linewidth=0.8, zorder=1.0)
+    errors.set_ylabel("error [deg]")
+    for number, pull in enumerate(course.acting.T):
+        shade = _OF_TENDONS[number % len(_OF_TENDONS)]
+        draw_course(pulls, course.time, pull, shade, f"tendon {number + 1}")
+    pulls.set(xlabel="time [s]", ylabel="pull on the wrist [N]")
+    legend_below(picture)
+    return picture
+
+
+def _plane_of_bends(axes: Axes, course: BendCourse, reach: Array, heading: str) -> Axes:
     axes.plot(*np.rad2deg(reach).T, color=SILVER, label="in reach")
     axes.plot(*np.rad2deg(course.bend_ref).T, color=BLACK, linestyle="--", label="wanted")
     axes.plot(*np.rad2deg(course.bend).T, color=BLUE, label="followed")
     axes.set_aspect("equal")
     axes.set_xlabel("bend toward ulnar [deg]")
     axes.set_ylabel("bend toward flexion [deg]")
-    axes.legend(loc="upper right")
-    return figure
+    title(axes, heading)
+    return axes

@@ -54,7 +54,7 @@ def answer_figure(rankings: Sequence[Ranking], places: Mapping[str, str]) -> Fig
     for band, ranking in enumerate(rankings):
         for step, row in enumerate(ranking.standing.order):
             name, _, gains = ranking.labels[row].partition("/")
-            mean, height = ranking.means[row], band + 0.86 * (step / max(1, most - 1) - 0.5)
+            mean, height = ranking.means[row], band + 0.9 * ((step + 0.5) / most - 0.5)
             ends, shade = np.degrees([mean.low, mean.high]), colour(name)
             if np.isfinite(ends).all():
                 axes.plot(ends, [height, height], color=shade, linewidth=1.0, zorder=1.8)
@@ -69,9 +69,10 @@ def answer_figure(rankings: Sequence[Ranking], places: Mapping[str, str]) -> Fig
     axes.tick_params(axis="y", length=0.0)
     logarithmic(axes.xaxis)
     axes.tick_params(axis="x", which="minor", labelbottom=False)
-    axes.set_xlabel("RMSE [deg]: geometric mean with 95 % interval")
+    wide = picture.get_figwidth() >= _ROOM
+    axes.set_xlabel("RMSE [deg]: geometric mean with 95 % interval" if wide else "RMSE [deg], 95 % interval")
     every: dict[str, Any] = {"linestyle": "none", "markersize": 4.5}
-    called = in_words if picture.get_figwidth() >= _ROOM else str
+    called = in_words if wide else str
     names = dict.fromkeys(label.split("/")[0] for label in labels)
     handles = [Line2D([], [], marker="o", color=colour(name), label=called(name), **every) for name in names]
     handles += [

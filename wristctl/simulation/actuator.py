@@ -152,7 +152,7 @@ def at_rest(drive: Drive, wrist: WristParameters, model: PlantModel, q: Array, s
 
 
 @compiled
-def _lag(motor: Any, state: Any, side: int, command: Any, h: float) -> Any:
+def lag_pull(motor: Any, state: Any, side: int, command: Any, h: float) -> Any:
     """Let a pull follow its command; returns it in whole microsteps, and the pull that the motor's speed withholds."""
     fastest = motor.stiffness * motor.speed * h
     wanted = rounded((command - state[side]) * (h / (motor.lag + h)))
@@ -170,7 +170,7 @@ def reeling(gap: Any, acceleration: Any, h: float) -> Any:
 
 
 @compiled
-def _reel(motor: Any, state: Any, side: int, target: Any, h: float) -> Any:
+def reel_in(motor: Any, state: Any, side: int, target: Any, h: float) -> Any:
     """Move a stepper towards its target with bounded speed and acceleration; returns whole microsteps, and its withheld
     pull: of the length from where it can stop to its target, where that is more than a microstep."""
     gap = target - state[side]
@@ -208,8 +208,8 @@ def _as_commanded(drive: Any, state: Any, believed: Any, theta_ref: Any, plus: A
 
 @implements(actuate, LaggedDrive)
 def _lagged(drive: Any, state: Any, believed: Any, theta_ref: Any, plus: Any, minus: Any, h: float) -> Any:
-    pull_plus, less_plus = _lag(drive.motor, state, 0, plus, h)
-    pull_minus, less_minus = _lag(drive.motor, state, 2, minus, h)
+    pull_plus, less_plus = lag_pull(drive.motor, state, 0, plus, h)
+    pull_minus, less_minus = lag_pull(drive.motor, state, 2, minus, h)
     state[WITHHELD] = torque_of(theta_ref, believed, less_plus, less_minus)
     return pull_plus, pull_minus
 
@@ -219,8 +219,8 @@ def _reeled(drive: Any, state: Any, believed: Any, theta_ref: Any, plus: Any, mi
     motor, (path_plus, path_minus) = drive.motor, lengths(theta_ref, believed)
     target_plus = spool_target(plus, motor.stiffness, believed.length, path_plus)
     target_minus = spool_target(minus, motor.stiffness, believed.length, path_minus)
-    reeled_plus, less_plus = _reel(motor, state, 0, target_plus, h)
-    reeled_minus, less_minus = _reel(motor, state, 2, target_minus, h)
+    reeled_plus, less_plus = reel_in(motor, state, 0, target_plus, h)
+    reeled_minus, less_minus = reel_in(motor, state, 2, target_minus, h)
     state[WITHHELD] = torque_of(theta_ref, believed, less_plus, less_minus)
     return reeled_plus, reeled_minus
 

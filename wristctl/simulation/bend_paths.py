@@ -8,12 +8,15 @@ from collections.abc import Callable
 import numpy as np
 
 from wristctl.arrays import Array
+from wristctl.config.loop import Reference
+from wristctl.config.section import Parameter
+from wristctl.simulation.reference import ReferenceKind
 from wristctl.simulation.references import minimum_jerk
 
 # Share of a turn in which a motion gets up to its speed.
 _SPEEDING = 0.25
-# Direction of the dart-thrower's line, from ulnar toward flexion [rad].
-_DIAGONAL = np.deg2rad(40.0)
+# Direction of the dart-thrower's line, from ulnar toward flexion [deg].
+_DIAGONAL_DEG = 40.0
 
 
 def _phase(time: Array, turn: float) -> tuple[Array, Array, Array]:
@@ -76,7 +79,8 @@ def dart_thrower(time: Array, size: float, turn: float) -> Array:
     """There and back on the line from radial extension to ulnar flexion; parameters as `circumduction`."""
     phase = _phase(time, turn)
     swing = _of_phase(np.sin(phase[0]), np.cos(phase[0]), -np.sin(phase[0]), phase)
-    return size * np.stack([np.cos(_DIAGONAL) * swing, np.sin(_DIAGONAL) * swing])
+    diagonal = np.deg2rad(_DIAGONAL_DEG)
+    return size * np.stack([np.cos(diagonal) * swing, np.sin(diagonal) * swing])
 
 
 # Bend paths by name: of the times, the largest bend and the time of a turn.
@@ -86,3 +90,42 @@ BEND_PATHS: dict[str, Callable[[Array, float, float], Array]] = {
     "circumduction": circumduction,
     "dart-thrower": dart_thrower,
 }
+
+
+def turned(path: Array, toward_deg: float) -> Array:
+    """A path (2, 3, T) turned by an angle from ulnar toward flexion [deg]."""
+    c, s = np.cos(np.deg2rad(toward_deg)), np.sin(np.deg2rad(toward_deg))
+    result: Array = np.einsum("ij,jkt->ikt", np.array([[c, -s], [s, c]]), path)
+    return result
+
+
+def _kind(name: str, meaning: str, turn: float) -> ReferenceKind:
+    """A bend path as a reference: `angle_deg` is its largest bend."""
+
+    def course(reference: Reference, time: Array) -> Array:
+        size = np.deg2rad(reference.end_deg)
+        path = BEND_PATHS[name](np.maximum(time, 0.0), size, reference.value("turn"))
+        return turned(path, reference.value("toward_deg"))
+
+    def described(reference: Reference) -> str:
+        toward = reference.value("toward_deg")
+        aside = f", turned by {toward:g} deg" if toward else ""
+        return f"{name} of {reference.end_deg:g} deg in {reference.value('turn'):g} s{aside}"
+
+    return ReferenceKind(
+        meaning,
+        course=course,
+        described=described,
+        targets="none",
+        parameters={
+            "turn": Parameter(turn, "s", "time of a turn"),
+            "toward_deg": Parameter(0.0, "deg", "angle by which the path is turned, from ulnar toward flexion"),
+        },
+        planes=2,
+    )
+
+
+CIRCLE = _kind("circle", "bends on a circle through straight and `angle_deg` toward ulnar", 4.0)
+FIGURE_OF_8 = _kind("figure-of-8", "a figure of 8 by `angle_deg` toward ulnar and radial", 4.0)
+CIRCUMDUCTION = _kind("circumduction", "the hand circles about the straight wrist, bent by `angle_deg`", 4.0)
+DART_THROWER = _kind("dart-thrower", "from radial extension to ulnar flexion and back, by `angle_deg` each", 1.5)

@@ -207,10 +207,23 @@ def _steps(loop: Loop, horizon: float) -> float:
     return horizon / loop.control_period * loop.steps
 
 
-def check_size(size: Size) -> None:
-    """UserError, with the most that there is room for, where rollouts ask for too much one by one or together."""
+def check_one_plane(loop: Loop) -> None:
+    """UserError for a loop that asks for two planes where there is one."""
+    if loop.planes == 2 or loop.disturbances.toward_deg:
+        key = "planes" if loop.planes == 2 else "disturbances.toward_deg"
+        fix = "leave it out, or `wristctl simulate`, which bends in two planes too"
+        raise UserError("this loop bends in one plane", f"loop.{key}", fix)
+
+
+def check_size(size: Size, planes: int = 1) -> None:
+    """UserError, with the most that there is room for, where rollouts ask for too much one by one or together.
+
+    Also for loops of two planes where all that is run has one.
+    """
     horizon = size.horizon
     for loop in size.loops:
+        if planes == 1:
+            check_one_plane(loop)
         steps = _steps(loop, horizon)
         if steps > MOST_STEPS:
             most, problem = MOST_STEPS * loop.control_period / loop.steps, f"{steps:.2g} integration steps of a rollout"

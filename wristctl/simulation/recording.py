@@ -144,6 +144,31 @@ def _splined(time: Array, samples: Array, noise: float, times: Array) -> Array:
     return np.stack([smooth(times), smooth.derivative(1)(times), smooth.derivative(2)(times)])
 
 
+def recorded_bends(reference: Reference, time: Array) -> Array:
+    """Bends of a recording's two planes with two derivatives, (2, 3, T) [rad], at times (T,) [s].
+
+    Its columns are bends toward ulnar and flexion, or inclination and orientation. Raises UserError where it has one
+    alone.
+    """
+    file = Path(reference.file or "")
+    log = read_log(file, reference.columns or "", "recording", others=True)
+    log.whole("time", _EXAMPLE)
+    bends = log.bends()
+    if bends is None or not ({"bend_y", "bend_z"} <= log.columns.keys() or "orientation" in log.columns):
+        fix = "a header such as time [s],bend_y [deg],bend_z [deg], or loop.planes: 1"
+        raise UserError("no bends in two planes", str(file), fix)
+    whole = np.asarray(np.isfinite(bends).all(axis=1))
+    log, bends = log.only(whole), bends[whole]
+    recorded_time = log.columns["time"]
+    for plane in bends.T:
+        _check(log, recorded_time, plane)
+    since, noise = recorded_time - recorded_time[0], np.deg2rad(reference.value("noise_deg"))
+    within = np.clip(time, 0.0, since[-1])
+    course = np.stack([_splined(since, plane, noise, within) for plane in reference.value("scale") * bends.T])
+    course[:, 1:, (time < 0.0) | (time > since[-1] + 1e-12)] = 0.0
+    return course
+
+
 def _rest(reference: Reference, begin: float, horizon: float) -> float:
     return min(float(recording_of(reference).time[-1]), horizon)
 

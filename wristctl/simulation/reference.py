@@ -110,6 +110,8 @@ class ReferenceKind:
     """Leaves that it adds to a reference's section; `reference.value(name)` reads one."""
     plane: Literal["", "ulnar", "flexion"] = ""
     """Plane in which its angles are anatomical, whatever direction is named; empty: they count toward the direction."""
+    planes: Literal[1, 2] = 1
+    """Planes that it bends in. Of two the course is the bend toward ulnar and toward flexion, (2, 3, T)."""
     jumps: bool = False
     """Whether it asks for steps, which no wrist can follow: their errors are compared with each other alone."""
 
@@ -129,6 +131,8 @@ def jumps(reference: Reference) -> bool:
 
 def toward(reference: Reference, direction: DirectionName) -> Reference:
     """The reference whose angles count toward this direction. Raises UserError for a motion of the other plane."""
+    if REFERENCES[reference.kind].planes == 2:
+        return reference
     if plane := REFERENCES[reference.kind].plane:
         if plane != DIRECTIONS[direction].plane:
             problem = f"{reference.kind} is a motion of the {plane} plane, and {direction} is not in it"
@@ -153,6 +157,9 @@ def motion(
     moves when they are asked for; with `later` also of courses without targets, which then may fail or bend too far
     only there. The arrays are read-only.
     """
+    if REFERENCES[reference.kind].planes == 2:
+        problem = f"{reference.kind} bends in two planes, and this loop in one"
+        raise UserError(problem, "reference.kind", "`wristctl simulate` runs it in two, with loop.planes: null")
     if reference.inverse == "network" or reference.file:  # a file may be another by now
         result = _evaluated(reference, wrist, horizon, period, network)
     else:
@@ -222,7 +229,7 @@ def _unstretched(length: float, samples: int) -> Array:
     return np.broadcast_to(np.array([[length], [0.0], [0.0]]), (3, samples))
 
 
-def _course(reference: Reference, kind: ReferenceKind, time: Array) -> Array:
+def course_of(reference: Reference, kind: ReferenceKind, time: Array) -> Array:
     """Course of a reference; UserError where a plugin fails, or is no angle with two derivatives everywhere."""
     name, key = reference.kind, "reference.kind"
     if REFERENCES.belongs(name):
@@ -255,7 +262,7 @@ def _moves(
             begin = number * reference.duration
             first = np.searchsorted(time, begin - _EARLY) if number else 0
             if change and first < len(time):
-                course = _course(reference, kind, time[first:] - begin if number else time)
+                course = course_of(reference, kind, time[first:] - begin if number else time)
                 course *= change
                 out[:, first:] += course
 
@@ -277,13 +284,13 @@ def _whole(
     """Angles and arc length of a course without targets: its last move is from straight to where it ends."""
 
     def bend(out: Array) -> None:
-        course = _course(reference, kind, time)
+        course = course_of(reference, kind, time)
         out[:] = course if course.ndim == 2 else course[0]
         if max(out[0].max(initial=0.0), -out[0].min(initial=0.0)) > np.deg2rad(wrist.range_deg) * (1.0 + 1e-12):
             raise _beyond(reference, wrist, time, out[0])
 
     def length() -> Array:
-        course = _course(reference, kind, time)
+        course = course_of(reference, kind, time)
         return course[1] if course.ndim == 3 else _unstretched(wrist.length, len(time))
 
     return Angles(len(time), bend), length, None, 0.0

@@ -1,8 +1,9 @@
 """The compiled closed loop of a wrist in two planes: a scalar law once for each plane, and one allocation for both.
 
-reference -> law of each plane -> allocation to the tendons -> plant with its disturbances -> bend measured -> laws.
-Each law knows its plane's one-segment model; what the planes do to each other is a disturbance to both. Tensions act as
-commanded, and the bend is measured as it is.
+reference -> law of each plane -> allocation to the tendons -> motors and tendons -> plant with its disturbances ->
+camera and observer -> laws. Each law knows its plane's one-segment model; what the planes do to each other is added to
+what the laws want, or left to them as a disturbance. Without motors tensions act as commanded, and without a camera the
+bend is measured as it is.
 """
 
 from typing import Any, NamedTuple
@@ -10,19 +11,25 @@ from typing import Any, NamedTuple
 from wristctl.control.response import Controlled, Estimate, look_ahead, perceive_within, wanted_torque
 from wristctl.lanes.compiled import kernel
 from wristctl.lanes.lane import planar, sqrt, where, zero_like
+from wristctl.lanes.named_tuples import block_of
 from wristctl.lanes.rows import lanes_like, part, planes_like, rows_of
+from wristctl.simulation.actuator import drive_in_lanes
+from wristctl.simulation.spatial_actuator import deliver, drive_tendons, friction_in_lanes, lose, tendons_on
+from wristctl.simulation.spatial_observer import Knowledge, coupling, predict_bends, sense_bends
 from wristctl.wrist.allocation import allocate
+from wristctl.wrist.segments import load_segments
 from wristctl.wrist.spatial.posture import tip_bend
 from wristctl.wrist.spatial.spatial_segments import FIELDS, SpatialWrist, load_spatial_segments, load_tip
 from wristctl.wrist.spatial.spatial_step import spatial_step
 from wristctl.wrist.spatial.spatial_tendons import moment_arms_of
-from wristctl.wrist.tendon_mechanics import NoTendons
+from wristctl.wrist.spatial.spooled_tendons import pulls_of_tendons, remember_travel
 
-# Columns of a recorded sample, followed by the pull at each place of tendons [N] and the plant's coordinates. The share
-# is what of the wanted torque the tendons could give; the bend is nan where the wrist has failed.
+# Columns of a recorded sample, followed by the commanded pull at each place of tendons [N], those that act, and the
+# plant's coordinates. The share is what of the wanted torque the tendons could give; the bend is nan where the wrist
+# has failed.
 SPATIAL_RECORDED = (
     "bend_ulnar", "bend_flexion", "rate_ulnar", "rate_flexion", "torque_wanted_ulnar", "torque_wanted_flexion",
-    "torque_ulnar", "torque_flexion", "share",
+    "torque_ulnar", "torque_flexion", "share", "seen_ulnar", "seen_flexion", "load_ulnar", "load_flexion",
 )  # fmt: skip
 _COLUMNS = len(SPATIAL_RECORDED)
 # Bend of a segment [rad] up to which the plant's series hold.
@@ -46,21 +53,26 @@ class SpatialSetup(NamedTuple):
     substeps: int
     ticks: int
     preview: int
+    coupling: Any
 
 
 class SpatialCourse(NamedTuple):
-    """References [plane, (bend, rate, acceleration), sample]; what acts, [(force x, y, z, stiffness scale), sample]."""
+    """References [plane, (bend, rate, acceleration), sample]; what acts, [(force x, y, z, stiffness scale), sample];
+    the ticks of frames, or NoCamera."""
 
     references: Any
     acting: Any
+    schedule: Any
 
 
 class SpatialValues(NamedTuple):
     """Values that stay, [block, row, lane].
 
-    The plant as it is and as one segment that the allocation believes in; each plane's one-segment model (Segments);
-    gains; and limits: least and greatest pull at each place of tendons [N], then the bend [rad] beyond which a wrist
-    has failed.
+    The plant as it is and as one segment that the controller's side believes in; each plane's one-segment model
+    (Segments); gains; and limits: least and greatest pull at each place of tendons [N], then the bend [rad] beyond
+    which a wrist has failed. Of the motors: the drive as its host counts, the scale of the counts and the offset at
+    each place. Of each place's tendons: their number, all their stiffness [N/m], the time at which they break, and the
+    backlash of all; 1 where spools run ahead of the reference. Friction is that of tendons, or NoFriction.
     """
 
     plant: Any
@@ -69,16 +81,32 @@ class SpatialValues(NamedTuple):
     model_z: Any
     gains: Any
     limits: Any
+    drive: Any
+    winding: Any
+    alike: Any
+    stiffness: Any
+    broken_at: Any
+    backlash: Any
+    lead: Any
+    friction: Any
 
 
 class SpatialState(NamedTuple):
-    """State of the rollouts, [block, row, lane]; `record` is [block, sample, column, lane]."""
+    """State of the rollouts, [block, row, lane]; `record` is [block, sample, column, lane].
+
+    `motors` has two rows for each place, `delivered` what each motor delivers, `tendons` what rubbing tendons remember;
+    `watch` is the camera with its observer, or NoCamera.
+    """
 
     coordinates: Any
     memory_y: Any
     memory_z: Any
     alive: Any
+    motors: Any
+    delivered: Any
+    tendons: Any
     record: Any
+    watch: Any
 
 
 class SpatialScratch(NamedTuple):
@@ -91,31 +119,39 @@ class SpatialScratch(NamedTuple):
 
 
 @kernel
-def run_spatial(setup: Any, course: Any, values: Any, state: Any, scratch: Any, first: int, last: int) -> None:
+def run_spatial(setup: Any, course: Any, world: Any, states: Any, scratch: Any, first: int, last: int) -> None:
     """Advance all blocks over the samples `first` to `last` of `setup.ticks` control periods each.
 
     A wrist that bends beyond its limit stays where it was for good.
     """
     period, ticks, m, count = setup.period, setup.ticks, len(setup.coordinates), len(setup.pulls)
-    for block in range(values.plant.shape[0]):
-        rows, model = rows_of(values.plant[block]), rows_of(values.believed[block])
+    for block in range(states.coordinates.shape[0]):
+        values, state = block_of(world, block), block_of(states, block)
+        rows, model = rows_of(values.plant), rows_of(values.believed)
         still = load_spatial_segments(rows)
         believed = SpatialWrist(load_spatial_segments(model), part(model, FIELDS, setup.tendons))
-        gains = values.gains[block]
-        control_y = Controlled(
-            setup.law, scratch.now_y, values.model_y[block], gains, state.memory_y[block], scratch.target_y
-        )
-        control_z = Controlled(
-            setup.law, scratch.now_z, values.model_z[block], gains, state.memory_z[block], scratch.target_z
-        )
+        alike = part(rows_of(values.alike), 0, setup.pulls)
+        drive, friction = drive_in_lanes(values.drive), friction_in_lanes(values.friction)
+        known = Knowledge(
+            believed, load_segments(rows_of(values.model_y)), load_segments(rows_of(values.model_z)), alike, drive,
+            setup.coupling, rows_of(values.lead)[0],
+        )  # fmt: skip
+        control_y = Controlled(setup.law, scratch.now_y, values.model_y, values.gains, state.memory_y, scratch.target_y)
+        control_z = Controlled(setup.law, scratch.now_z, values.model_z, values.gains, state.memory_z, scratch.target_z)
         target_y, target_z = rows_of(scratch.target_y), rows_of(scratch.target_z)
-        limits, alive = rows_of(values.limits[block]), rows_of(state.alive[block])
+        limits, alive = rows_of(values.limits), rows_of(state.alive)
         least, greatest = part(limits, 0, setup.pulls), part(limits, count, setup.pulls)
-        coordinates = rows_of(state.coordinates[block])
+        winding, broken_at = rows_of(values.winding), rows_of(values.broken_at)
+        whole, backlash = rows_of(values.stiffness), rows_of(values.backlash)[0]
+        motors, delivered = rows_of(state.motors), part(rows_of(state.delivered), 0, setup.pulls)
+        coordinates = rows_of(state.coordinates)
         q, rate = part(coordinates, 0, setup.coordinates), part(coordinates, m, setup.coordinates)
-        before, pulls, lever = lanes_like(q), lanes_like(least), lanes_like(part(q, 0, setup.bend))
-        bend, arms = lanes_like(lever), planes_like(least)
-        zero = zero_like(still.length)
+        before, pulls, counts, spools = lanes_like(q), lanes_like(least), lanes_like(least), lanes_like(least)
+        acts, left, stiffness = lanes_like(least), lanes_like(least), lanes_like(least)
+        bend, lever = lanes_like(part(q, 0, setup.bend)), lanes_like(part(q, 0, setup.bend))
+        speed, wish, extra = lanes_like(bend), lanes_like(bend), lanes_like(bend)
+        at, seen = lanes_like(part(coordinates, 0, (0, 0, 0, 0))), lanes_like(part(coordinates, 0, (0, 0, 0, 0, 0, 0)))
+        arms, zero = planes_like(least), zero_like(still.length)
         for sample in range(first, last):
             acting = course.acting
             scale = acting[3, sample] + zero
@@ -130,9 +166,10 @@ def run_spatial(setup: Any, course: Any, values: Any, state: Any, scratch: Any, 
             plant = SpatialWrist(segment, part(rows, FIELDS, setup.tendons))
             for tick in range(ticks):
                 now_tick = sample * ticks + tick
-                bend_y, bend_z, rate_y, rate_z = tip_bend(segment, q, rate)
-                bent = sqrt(bend_y * bend_y + bend_z * bend_z)
+                at[0], at[1], at[2], at[3] = tip_bend(segment, q, rate)
+                bent = sqrt(at[0] * at[0] + at[1] * at[1])
                 alive[0] = where(bent < limits[2 * count], alive[0], zero)
+                sense_bends(state.watch, course.schedule, known, now_tick, at, counts, bend, period, seen)
                 for ahead in range(1, setup.preview + 1):
                     to_come = min((now_tick + ahead) // ticks, course.references.shape[2] - 1)
                     for i in range(3):
@@ -144,9 +181,10 @@ def run_spatial(setup: Any, course: Any, values: Any, state: Any, scratch: Any, 
                 for i in range(3):
                     target_y[i] = course.references[0, i, sample] + zero
                     target_z[i] = course.references[1, i, sample] + zero
-                bend[0] = bend_y
-                bend[1] = bend_z
-                low_y, high_y, low_z, high_z = zero, zero, zero, zero
+                wish[0], wish[1] = target_y[2], target_z[2]
+                bend[0], bend[1], speed[0], speed[1] = seen[0], seen[3], seen[1], seen[4]
+                coupling(setup.coupling, known, bend, speed, wish, extra)
+                low_y, high_y, low_z, high_z = -extra[0], -extra[0], -extra[1], -extra[1]
                 for t in range(count):
                     moment_arms_of(believed, bend, t, lever)
                     arms[t] = planar(lever[0], lever[1])
@@ -155,33 +193,47 @@ def run_spatial(setup: Any, course: Any, values: Any, state: Any, scratch: Any, 
                     high_y = high_y + lever[0] * where(lever[0] > 0.0, back, forth)
                     low_z = low_z + lever[1] * where(lever[1] > 0.0, forth, back)
                     high_z = high_z + lever[1] * where(lever[1] > 0.0, back, forth)
-                perceive_within(control_y, Estimate(bend_y, rate_y, zero), zero, (low_y, high_y), tick * period, period)
-                perceive_within(control_z, Estimate(bend_z, rate_z, zero), zero, (low_z, high_z), tick * period, period)
-                wanted_y, wanted_z = wanted_torque(control_y), wanted_torque(control_z)
+                perceive_within(
+                    control_y, Estimate(seen[0], seen[1], seen[2]), zero, (low_y, high_y), tick * period, period
+                )
+                perceive_within(
+                    control_z, Estimate(seen[3], seen[4], seen[5]), zero, (low_z, high_z), tick * period, period
+                )
+                wanted_y, wanted_z = wanted_torque(control_y) + extra[0], wanted_torque(control_z) + extra[1]
                 share = allocate(arms, planar(wanted_y, wanted_z), least, greatest, pulls)
+                since, time = tick * period, now_tick * period + zero
+                wish[0] = target_y[0] + since * (target_y[1] + 0.5 * since * target_y[2])
+                wish[1] = target_z[0] + since * (target_z[1] + 0.5 * since * target_z[2])
+                speed[0], speed[1] = target_y[1] + since * target_y[2], target_z[1] + since * target_z[2]
+                drive_tendons(drive, motors, known, wish, speed, pulls, period, counts)
+                deliver(drive, winding, backlash, counts, delivered)
+                for t in range(count):
+                    left[t] = where(time >= broken_at[t], zero, 1.0)
+                    stiffness[t] = left[t] * whole[t]
+                lose(drive, left, delivered, spools)
+                tendons = tendons_on(drive, friction, stiffness, rows_of(state.tendons))
                 if tick == 0:
-                    row = rows_of(state.record[block, sample])
+                    row = rows_of(state.record[sample])
+                    pulls_of_tendons(tendons, plant, q, spools, acts)
                     torque_y, torque_z = zero, zero
                     for t in range(count):
                         moment_arms_of(believed, bend, t, lever)
                         torque_y = torque_y + pulls[t] * lever[0]
                         torque_z = torque_z + pulls[t] * lever[1]
                         row[_COLUMNS + t] = pulls[t]
-                    row[0] = where(alive[0] > 0.0, bend_y, _NAN)
-                    row[1] = where(alive[0] > 0.0, bend_z, _NAN)
-                    row[2] = rate_y
-                    row[3] = rate_z
-                    row[4] = wanted_y
-                    row[5] = wanted_z
-                    row[6] = torque_y
-                    row[7] = torque_z
-                    row[8] = share
+                        row[_COLUMNS + count + t] = acts[t]
+                    row[0] = where(alive[0] > 0.0, at[0], _NAN)
+                    row[1] = where(alive[0] > 0.0, at[1], _NAN)
+                    row[2], row[3], row[4], row[5] = at[2], at[3], wanted_y, wanted_z
+                    row[6], row[7], row[8] = torque_y, torque_z, share
+                    row[9], row[10], row[11], row[12] = seen[0], seen[3], seen[2], seen[5]
                     for i in range(m):
-                        row[_COLUMNS + count + i] = q[i]
+                        row[_COLUMNS + 2 * count + i] = q[i]
+                predict_bends(state.watch, known, now_tick, counts, bend, period)
                 for _ in range(setup.substeps):
                     for i in range(m):
                         before[i] = q[i]
-                    spatial_step(plant, q, rate, pulls, NoTendons(), period / setup.substeps + zero)
+                    spatial_step(plant, q, rate, spools, tendons, period / setup.substeps + zero)
                     well = alive[0]
                     for k in range(m // 2):
                         size = q[2 * k] * q[2 * k] + q[2 * k + 1] * q[2 * k + 1]
@@ -190,3 +242,4 @@ def run_spatial(setup: Any, course: Any, values: Any, state: Any, scratch: Any, 
                     for i in range(m):
                         q[i] = where(well > 0.0, q[i], before[i])
                         rate[i] = where(well > 0.0, rate[i], zero)
+                    remember_travel(tendons, plant, q)

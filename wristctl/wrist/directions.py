@@ -1,5 +1,6 @@
 """The four anatomical directions: bending planes, tendons that pull, and gravity as each plane sees it."""
 
+import math
 from typing import NamedTuple
 
 from wristctl.config.wrist import WristParameters
@@ -49,8 +50,11 @@ def tendons_of(plane: str) -> tuple[int, int, int, int]:
 def in_plane(wrist: WristParameters, direction: str) -> WristParameters:
     """The wrist as its motion in this direction's bending plane sees it: stiffness and gravity across are that plane's.
 
-    The cross-section is square, so the planes differ in these alone. Seen twice it is as before.
+    The cross-section is square, so the planes differ in these alone. Seen twice it is as before. Springs that are
+    softer along an oblique axis are as each plane alone meets them.
     """
+    if wrist.stiffness_axis_deg:
+        wrist = _along_planes(wrist)
     if DIRECTIONS[direction].plane == "ulnar":
         return wrist
     along, ulnar = wrist.gravity
@@ -61,3 +65,12 @@ def in_plane(wrist: WristParameters, direction: str) -> WristParameters:
         "flexion_ratio": 1.0 / wrist.flexion_ratio,
     }
     return wrist.model_copy(update=turned)
+
+
+def _along_planes(wrist: WristParameters) -> WristParameters:
+    """The wrist with the stiffness that each plane alone meets, along the planes themselves."""
+    axis = math.radians(wrist.stiffness_axis_deg)
+    c, s = math.cos(axis) ** 2, math.sin(axis) ** 2
+    ulnar, flexion = c + s * wrist.flexion_ratio, s + c * wrist.flexion_ratio
+    along = {"stiffness": ulnar * wrist.stiffness, "flexion_ratio": flexion / ulnar, "stiffness_axis_deg": 0.0}
+    return wrist.model_copy(update=along)

@@ -22,6 +22,10 @@ if TYPE_CHECKING:
 Columns = dict[str, Array]
 # Columns of a table of a motion in one plane, by their names in an open log.
 _MOTION = {"time": "time", "theta": "bend_y", "tip_x": "tip_x", "tip_y": "tip_y"}
+# The same in two planes; those of tendons follow.
+_BENDS = {"time": "time", "bend_ulnar": "bend_y", "bend_flexion": "bend_z"} | {
+    name: name for name in ("tip_x", "tip_y", "tip_z")
+}
 
 
 def open_log_of(run: Run) -> OpenLog:
@@ -87,6 +91,13 @@ def _motion(file: str) -> Callable[[Run], tuple[Columns, Mapping[str, np.ndarray
     return columns
 
 
+def _bends(run: Run) -> tuple[Columns, Mapping[str, np.ndarray]]:
+    """A motion in two planes with the pulls of all tendons that act on the wrist."""
+    table = read_table(run.file("data/bends.csv"))
+    names = _BENDS | {f"acting_{t}": f"tension_{t}" for t in range(1, len(table.columns)) if f"acting_{t}" in table}
+    return {name: table[old].to_numpy(float) for old, name in names.items()}, {}
+
+
 def _compared(run: Run) -> tuple[Columns, Mapping[str, np.ndarray]]:
     """Every motion of a comparison is a trial, by its number."""
     arrays = read_arrays(run.file("data/trajectories.npz"))
@@ -113,6 +124,7 @@ def _loops(run: Run) -> tuple[Columns, Mapping[str, np.ndarray]]:
 _CONVERTED: Mapping[str, Callable[[Run], tuple[Columns, Mapping[str, np.ndarray]]]] = {
     "log.csv": _trials,
     "trajectory.csv": _motion("trajectory.csv"),
+    "bends.csv": _bends,
     "track.csv": _motion("track.csv"),
     "trajectories.npz": _compared,
     "courses.csv": _loops,

@@ -17,6 +17,7 @@ from wristctl.plotting.style import (
     SKY,
     THIN,
     VERMILLION,
+    columns_within,
     figure,
     legend_below,
     logarithmic,
@@ -28,8 +29,8 @@ from wristctl.wrist.tendons import TENDONS_PER_SIDE
 
 _COLOURS = (BLUE, VERMILLION, GREEN, PURPLE, ORANGE, SKY)
 _WORKS = {"friction_work": "-", "damped_work": ":", "raw_work": (0, (6, 2))}
-# Panels beside each other.
-_MOST = 3
+# Panels beside each other, and the width of one [in] that has room for its title in one line.
+_MOST, _PANEL = 3, 1.6
 
 
 def case_text(case: FrictionCase) -> str:
@@ -50,6 +51,7 @@ def loops(all_strokes: Strokes, driven: Sequence[HysteresisLoop]) -> Figure:
     wrist; and by how much the angle differs from that without friction, between the roots of the statics."""
     outer, cases = _outer(driven), _some(with_sheaths(all_strokes.settings))
     picture, axes = figure(2, len(cases), height=6.2, sharey="row")
+    narrow = columns_within(len(cases), _PANEL) < len(cases)
     for (above, below), case in zip(axes.T, cases, strict=True):
         mine = sorted((loop for loop in outer if loop.case.tendons == case), key=lambda each: each.case.frequency)
         for loop, colour in zip(mine[::-1], _COLOURS[: len(mine)][::-1], strict=False):
@@ -63,9 +65,9 @@ def loops(all_strokes: Strokes, driven: Sequence[HysteresisLoop]) -> Figure:
         angle = np.linspace(slow.case.low, slow.case.high, 61)
         for edge in all_strokes.exact([case] * len(angle), angle).T:
             below.plot(np.degrees(angle), np.degrees(edge - angle), label="roots of the statics", **_ROOTS)
-        title(above, case_text(case))
+        title(above, case_text(case).replace(", ", ",\n") if narrow else case_text(case))
         above.set_xlabel("angle [deg]")
-        below.set_xlabel("without friction [deg]")
+        below.set_xlabel("without friction [deg]".replace(" ", "\n") if narrow else "without friction [deg]")
     axes[0, 0].set_ylabel("tension of a + tendon [N]")
     axes[1, 0].set_ylabel("angle less that [deg]")
     legend_below(picture, 3)

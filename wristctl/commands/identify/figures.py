@@ -1,5 +1,7 @@
 """Figures of an identification: measured and expected angles, what is left over, and what depends on what."""
 
+from collections.abc import Sequence
+
 import numpy as np
 from matplotlib.figure import Figure
 
@@ -16,9 +18,10 @@ def angles(fit: Fit) -> Figure:
     """Marker's angle and the model's at the frames [deg], and the difference, of up to eight trials."""
     count = len(fit.problem.trials)
     chosen = np.unique(np.linspace(0, count - 1, min(count, _SHOWN)).round().astype(int))
-    picture, axes = figure(len(chosen), 2, height=0.7 + 1.35 * len(chosen), sharex=True, width_ratios=(3, 2))
+    titles = _short([fit.problem.trials[index].label for index in chosen])
+    picture, axes = figure(len(chosen), 2, height=max(2.6, 0.7 + 1.35 * len(chosen)), sharex=True, width_ratios=(3, 2))
     most = 1.05 * max(float(np.abs(np.degrees(fit.residuals[index])).max()) for index in chosen)
-    for (left, right), index in zip(axes, chosen, strict=True):
+    for (left, right), index, text in zip(axes, chosen, titles, strict=True):
         trial, residual = fit.problem.trials[index], fit.residuals[index]
         left.plot(trial.captured, np.degrees(trial.angle), ".", color=GREY, markersize=3.0, label="marker")
         left.plot(trial.captured, np.degrees(trial.angle - residual), color=BLUE, linewidth=1.0, label="model")
@@ -26,12 +29,19 @@ def angles(fit: Fit) -> Figure:
         right.axhline(0.0, color=BLACK, linewidth=0.8)
         right.set_ylim(-most, most)
         left.set_ylabel("angle [deg]")
-        title(left, trial.label)
-    title(axes[0, 1], "marker less model [deg]")
+        title(left, text)
+    title(axes[0, 1], "difference [deg]")
     for panel in axes[-1]:
         panel.set_xlabel("time [s]")
     legend_below(picture)
     return picture
+
+
+def _short(labels: Sequence[str]) -> list[str]:
+    """Labels `RUN, TRIAL` as titles of narrow panels: of several runs their last six letters, of one run none."""
+    parts = [label.rpartition(", ") for label in labels]
+    alike = len({run for run, _, _ in parts}) == 1
+    return [trial if alike or not run else f"{run[-6:]}, {trial}" for run, _, trial in parts]
 
 
 def residuals(fit: Fit, knowledge: Knowledge) -> Figure:
@@ -44,6 +54,7 @@ def residuals(fit: Fit, knowledge: Knowledge) -> Figure:
     normal = np.exp(-0.5 * (grid / sd) ** 2) / (sd * np.sqrt(2.0 * np.pi))
     left.plot(grid, normal, color=BLACK, linewidth=1.0, label="normal")
     left.set(xlabel="marker less model [deg]", ylabel="density [1/deg]")
+    left.margins(y=0.3)
     legend(left, loc="upper left")
     lags = np.arange(1, _LAGS + 1)
     power = sum(float(residual @ residual) for residual in fit.residuals)

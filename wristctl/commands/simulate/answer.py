@@ -46,12 +46,12 @@ def answer(study: Study, repeated: Repeated, reason: str = "", advice: Sequence[
     """
     chosen, count = study.simulate, len(repeated.failed)
     scenario = (
-        f"{_motion_words(chosen.reference, chosen.direction)} on {_wrist_words(study.wrist)} "
-        f"({_loop_words(chosen.loop, study.wrist)})"
+        f"{motion_words(chosen.reference, chosen.direction)} on {wrist_words(study.wrist)} "
+        f"({loop_words(chosen.loop, study.wrist)})"
     )
     verdicts = [*_faults(repeated), *([reason] if reason else [])]
     figures = "" if repeated.first.failed else joined(_told(repeated))
-    subject = _controller_words(chosen.controller, chosen.gains)
+    subject = controller_words(chosen.controller, chosen.gains)
     there = f". There: {figures}" if figures else ""
     does = f"{joined(verdicts)}{there}" if verdicts else f"follows with {figures}"
     median = f" Figures are medians of {count} repetitions." * (count > 1)
@@ -125,7 +125,7 @@ def _table(repeated: Repeated) -> Table:
     return Table("", ("figure", "median", f"95 % interval, {len(repeated.failed)} repetitions"), rows)
 
 
-def _controller_words(name: str, gains: str | Mapping[str, float]) -> str:
+def controller_words(name: str, gains: str | Mapping[str, float]) -> str:
     """A controller with its gains: smc with its printed gains, pid with Kp = 10, Ki = 2."""
     from wristctl.control.table import controller
 
@@ -137,12 +137,12 @@ def _controller_words(name: str, gains: str | Mapping[str, float]) -> str:
     return f"{law.name} with {', '.join(f'{gain} = {value:.3g}' for gain, value in gains.items())}"
 
 
-def _motion_words(reference: Reference, direction: DirectionName = "ulnar") -> str:
+def motion_words(reference: Reference, direction: DirectionName = "ulnar") -> str:
     """A wanted motion: 30 deg ulnar in 1 s (minimum jerk)."""
     from wristctl.config.choices import REFERENCES
     from wristctl.simulation.reference import reference_name
 
-    if REFERENCES[reference.kind].plane:
+    if REFERENCES[reference.kind].plane or REFERENCES[reference.kind].planes == 2:
         return reference_name(reference)
     if reference.tip is None and reference.kind == "minimum-jerk":
         return f"{reference.end_deg:g} deg {direction} in {reference.duration:g} s (minimum jerk)"
@@ -151,14 +151,14 @@ def _motion_words(reference: Reference, direction: DirectionName = "ulnar") -> s
     return f"{reference_name(reference)}, {direction}"
 
 
-def _wrist_words(wrist: WristParameters) -> str:
+def wrist_words(wrist: WristParameters) -> str:
     """The paper's wrist, or another one by its length and stiffness."""
     if wrist == WristParameters():
         return "the paper's wrist"
     return f"a wrist of {1e3 * wrist.length:g} mm and {wrist.stiffness:g} N m/rad"
 
 
-def _loop_words(loop: Loop, wrist: WristParameters) -> str:
+def loop_words(loop: Loop, wrist: WristParameters) -> str:
     """Segments, motors, camera, what the controller does not know, and how often it acts."""
     from wristctl.simulation.worlds import World, mismatches
 
@@ -167,13 +167,13 @@ def _loop_words(loop: Loop, wrist: WristParameters) -> str:
     parts += [_ACTUATORS[loop.actuator.level]] * (loop.actuator.level != "ideal")
     parts += [f"a camera of {sensor.frame_rate:g} Hz"] * (sensor.level == "camera")
     parts += ["tensions without a limit"] * (not loop.limits)
-    parts += _disturbances(loop)
+    parts += disturbance_words(loop)
     if unknown := [mismatch.key.rpartition(".")[2].replace("_", " ") for mismatch in mismatches(World(loop, wrist))]:
         parts.append(f"a plant unlike the controller's model in {joined(unknown)}")
     return ", ".join([*parts, f"controller every {1e3 * loop.control_period:g} ms"])
 
 
-def _disturbances(loop: Loop) -> list[str]:
+def disturbance_words(loop: Loop) -> list[str]:
     disturbances = loop.disturbances
     parts = []
     if disturbances.push.force:

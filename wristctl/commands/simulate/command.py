@@ -7,7 +7,7 @@ import shlex
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 from wristctl.commands.answer import Answer
 from wristctl.commands.inputs import EarlierRun, Inputs
@@ -33,6 +33,7 @@ from wristctl.commands.printed_table import Table
 from wristctl.commands.procedure import Procedure
 from wristctl.commands.results import Findings, StudyResult
 from wristctl.commands.session import Session
+from wristctl.commands.simulate.in_two_planes import check_two_planes, in_two_planes, simulate_in_two_planes
 from wristctl.commands.sweep.command import sweepable
 from wristctl.config.study import Study
 from wristctl.errors import UserError, under
@@ -40,6 +41,7 @@ from wristctl.errors import UserError, under
 if TYPE_CHECKING:
     import pandas as pd
 
+    from wristctl.config.wrist import WristParameters
     from wristctl.simulation.closed_loop import Size
     from wristctl.simulation.repetitions import Repeated
     from wristctl.simulation.trajectory import Trajectory
@@ -97,18 +99,29 @@ class Simulated(StudyResult):
 def plan(study: Study, inputs: Inputs) -> str:
     """Check the controller and its gains."""
     settings = study.simulate
-    from wristctl.commands.truth_table import truth_told
     from wristctl.simulation.closed_loop import check_size
 
     with under("simulate"):
+        if in_two_planes(study):
+            check_row(settings, tuned_gains(inputs), inputs.runs().get("tuned"))
+            check_two_planes(identified(study, "simulate", inputs))
+            check_size(size(study), planes=2)
+            return _in_words(study, " in two planes", identified(study, "simulate", inputs).wrist)
         check_row(settings, tuned_gains(inputs), inputs.runs().get("tuned"))
         check_reach([settings.reference], identified(study, "simulate", inputs).wrist, "reference")
         check_inverses(inverses_of([settings.reference]), inputs)
         check_size(size(study))
 
-    times = size(study).rollouts
-    truth = truth_told(identified(study, "simulate", inputs).wrist, {"simulate": settings.loop})
-    return f"{'one rollout' if times == 1 else f'{times} rollouts'} of {settings.horizon:g} s{truth}"
+    return _in_words(study, "", identified(study, "simulate", inputs).wrist)
+
+
+def _in_words(study: Study, where: str, wrist: WristParameters) -> str:
+    """The rollouts of a plan, and what of their world is not as believed."""
+    from wristctl.commands.truth_table import truth_told
+
+    times, settings = size(study).rollouts, study.simulate
+    truth = truth_told(wrist, {"simulate": settings.loop})
+    return f"{'one rollout' if times == 1 else f'{times} rollouts'} of {settings.horizon:g} s{where}{truth}"
 
 
 def size(study: Study) -> Size:
@@ -121,7 +134,9 @@ def size(study: Study) -> Size:
 
 
 def simulate(session: Session) -> Simulated:
-    """Simulate one closed loop and draw it."""
+    """Simulate one closed loop and draw it, in one plane or, on a reference in two, in two."""
+    if in_two_planes(session.study):
+        return cast(Simulated, simulate_in_two_planes(session))  # a result with the same doors
     from wristctl.commands.simulate.figures import consistency, sliding
     from wristctl.commands.truth_table import truth_heading, truth_tables
     from wristctl.control.table import controller, gains_of

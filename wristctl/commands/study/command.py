@@ -80,10 +80,10 @@ def plan(study: Study, inputs: Inputs) -> str:
         check_steps((searches + judged) * longest, searches + judged)
     evaluations = budget.candidates * budget.iterations
     return (
-        f"{len(settings.laws)} laws, each tuned {budget.tunings} times with {evaluations} evaluations on "
-        f"{budget.draws} worlds of {', '.join(families)}, judged with "
+        f"{len(settings.laws)} controllers, each tuned {budget.tunings} times with {evaluations} evaluations on "
+        f"{budget.draws} worlds of {', '.join(families)}, tested with "
         f"{len(labels) - len(settings.laws)} presets on {budget.worlds} held-out worlds of each: "
-        f"{searches} rollouts of searches and {judged} of judgements"
+        f"{searches} rollouts of searches and {judged} of tests"
     )
 
 

@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 import json
-from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import wraps
 from typing import TYPE_CHECKING, Any, TypeVar, cast
 
+from wristctl.commands.answer import Answer
 from wristctl.commands.inputs import Inputs
 from wristctl.commands.inputs_of_loops import identified, tuned_gains
-from wristctl.commands.printed_table import Table, number
 from wristctl.commands.procedure import Procedure
 from wristctl.commands.results import StudyResult
 from wristctl.commands.session import Session
+from wristctl.commands.sweep.answer import answer, fates, for_people, headline, rows_of
 from wristctl.config.study import Study
 from wristctl.errors import Argument, UserError
 from wristctl.study_files.sweeps import SweepAxis, axes_of, points_of, study_at, unit_at
@@ -38,7 +38,8 @@ def sweep_units(study: Study, command: str, axes: Sequence[SweepAxis], points: S
     from wristctl.work.worker import Unit
 
     content = json.loads(study.model_dump_json(by_alias=True, include=_SECTIONS.get(command, _WHOLE | {command})))
-    together, does = (_LANES, "simulated") if command == "simulate" else (1, "performed_at")
+    as_lanes = command == "simulate" and not _any_in_two_planes(study, axes)
+    together, does = (_LANES, "simulated") if as_lanes else (1, "performed_at")
     keys = [(axis.key, axis.text) for axis in axes]
     units = []
     for first in range(0, len(points), together):
@@ -47,6 +48,12 @@ def sweep_units(study: Study, command: str, axes: Sequence[SweepAxis], points: S
         name = f"{command} at {', '.join(f'{k}={v}' for (k, _), v in zip(keys, block[0], strict=True))}"
         units.append(Unit(f"wristctl.commands.sweep.command:{does}", spec, name, len(block)))
     return units
+
+
+def _any_in_two_planes(study: Study, axes: Sequence[SweepAxis]) -> bool:
+    from wristctl.commands.simulate.in_two_planes import in_two_planes
+
+    return any(in_two_planes(study_at(study, axes, corner)) for corner in _corners(axes))
 
 
 def _studies(spec: Mapping[str, Any]) -> Iterator[Study]:
@@ -104,6 +111,7 @@ def performed_at(spec: Mapping[str, Any]) -> dict[str, np.ndarray]:
 
 
 _PROCEDURES: Mapping[str, str] = {
+    "simulate": "wristctl.commands.simulate.command:SIMULATE",
     "tune": "wristctl.commands.tune.command:TUNE",
     "compare": "wristctl.commands.compare.command:COMPARE",
 }
@@ -112,9 +120,8 @@ _PROCEDURES: Mapping[str, str] = {
 Found = TypeVar("Found", bound=StudyResult)
 # Points that are made before anything is computed, so that a value that cannot be is known by then.
 _CHECKED = 20_000
-_FIRST = ("rmse", "steady_state", "oscillation", "chattering")
-# Rows and metrics that are printed and drawn of a sweep.
-_SHOWN, _SAID = 20, 4
+# Rows that `--all` prints; data/sweep.csv has the others.
+_PRINTED = 200
 
 
 @dataclass(frozen=True, repr=False, eq=False)
@@ -125,6 +132,12 @@ class Swept(StudyResult):
 
     table: pd.DataFrame
     poisoned: list[Poisoned]
+    first_screen: Answer
+
+    @property
+    def answer(self) -> Answer:
+        """Where the main metric is least and most, and some of the points."""
+        return self.first_screen
 
     def frame(self) -> pd.DataFrame:
         """A row for each point and repetition: what was set, and every metric."""
@@ -133,7 +146,7 @@ class Swept(StudyResult):
     @property
     def marks(self) -> list[str]:
         """Number of rollouts with each mark."""
-        return [f"{mark}: {count} of {len(self.table)}" for mark, count in _fates(self.table).items()]
+        return [f"{mark}: {count} of {len(self.table)}" for mark, count in fates(self.table).items()]
 
     @property
     def fault(self) -> UserError | None:
@@ -250,25 +263,19 @@ def _swept(session: Session, command: str) -> Swept:
     keys = {axis.key: [points[index][number] for index in table["point"]] for number, axis in enumerate(axes)}
     table = pd.concat([pd.DataFrame(keys), table], axis=1)
     metrics = [str(name) for name in table if name not in {*keys, "point", "repetition", "failed", "until", "fate"}]
-    findings.table(
-        "data/sweep.csv", table, {axis.key: unit_at(base, axis.path) for axis in axes} | _units(metrics, known_units)
-    )
-    measured = [name for name in metrics if table[name].notna().any()]
-    headline = [*(name for name in _FIRST if name in measured), *(name for name in measured if name not in _FIRST)][
-        :_SAID
-    ]
-    _note(session, table, headline, known_units)
+    columns = {axis.key: unit_at(base, axis.path) for axis in axes} | _units(metrics, known_units)
+    findings.table("data/sweep.csv", table, columns)
+    shown = headline(table, metrics, columns)
+    _note(session, table, shown, known_units)
+    told, units_told = for_people(table, columns)
     with session.progress("drawing"):
         for axis in axes:
             others = [other_axis.key for other_axis in axes if other_axis is not axis]
-            figure_units = {axis.key: unit_at(base, axis.path)} | _units(headline, known_units)
-            findings.figure(f"sweep-{axis.key}", over_key, table, axis.key, others, headline, figure_units)
-    title = _answer(command, table, axes, headline, _units(headline, known_units))
-    findings.summary(f"**{title}**\n\n![sweep](figures/sweep-{axes[0].key}.png)")
-    heads = [*keys, *(["fate"] if "fate" in table else []), *headline]
-    lines = [tuple(line) for line in table[heads].head(_SHOWN).itertuples(index=False)]
-    more = f" The first {_SHOWN} of {len(table)} rows; data/sweep.csv has all." if len(table) > _SHOWN else ""
-    return Swept(study, findings, [Table(title + more, heads, lines)], table, outcome.poisoned)
+            findings.figure(f"sweep-{axis.key}", over_key, told, axis.key, others, shown, units_told)
+    place = str(findings.run.path) if findings.run else ""
+    screen = answer(command, told, list(keys), shown, units_told, place)
+    lines = rows_of(told.head(_PRINTED), list(keys), shown, units_told)
+    return Swept(study, findings, [lines], table, outcome.poisoned, screen)
 
 
 def _golden(study: Study, command: str) -> Golden:
@@ -294,48 +301,15 @@ def _units(metrics: Sequence[str], units: dict[str, str]) -> dict[str, str]:
     )
 
 
-def _note(session: Session, table: pd.DataFrame, headline: Sequence[str], known_units: dict[str, str]) -> None:
+def _note(session: Session, table: pd.DataFrame, shown: Sequence[str], known_units: dict[str, str]) -> None:
     """Note the metrics that `runs ls` can filter by."""
-    findings, units = session.findings, _units(headline, known_units)
+    findings, units = session.findings, _units(shown, known_units)
     findings.metric("points", int(table["point"].nunique()), meaning="of the sweep")
     if "failed" in table:
         findings.metric(
             "failed", float(table["failed"].mean()), better="lower", n=len(table), meaning="share that left its range"
         )
-    for name in headline:
+    for name in shown:
         values = table[name].dropna()
         findings.metric(f"{name}_least", float(values.min()), units[name], "lower", len(values))
         findings.metric(f"{name}_most", float(values.max()), units[name], "lower", len(values))
-
-
-def _answer(
-    command: str, table: pd.DataFrame, axes: Sequence[SweepAxis], headline: Sequence[str], units: dict[str, str]
-) -> str:
-    """Points where the first metric is least and most, and how often the wrist fails."""
-    text = f"{command} at {table['point'].nunique()} points"
-    if headline:
-        sound = table[~table["failed"].astype(bool)] if "failed" in table and not table["failed"].all() else table
-        unit = "" if units[headline[0]] == "1" else f" {units[headline[0]]}"
-        least, most = (sound.loc[getattr(sound[headline[0]], extreme)()] for extreme in ("idxmin", "idxmax"))
-        ends = [
-            f"{number(float(row[headline[0]]))}{unit} at {', '.join(f'{a.key} = {_told(row[a.key])}' for a in axes)}"
-            for row in (least, most)
-        ]
-        text += f": {headline[0]} is least, {ends[0]}, and most, {ends[1]}"
-    for fate, count in _fates(table).items():
-        text += f"; {count} of {len(table)} rollouts: {fate}"
-    return f"{text}."
-
-
-def _fates(table: pd.DataFrame) -> dict[str, int]:
-    """Number of rollouts with each mark. A rollout may have several."""
-    if "fate" not in table:
-        return {}
-    from wristctl.simulation.repetitions import MARKS
-
-    counts = Counter(mark for fate in table["fate"] for mark in fate.split(", ") if mark)
-    return {mark: counts[mark] for mark in MARKS if counts[mark]}
-
-
-def _told(value: Any) -> str:
-    return number(float(value)) if isinstance(value, int | float) and not isinstance(value, bool) else str(value)

@@ -12,10 +12,19 @@ from wristctl.control.law import Gain
 from wristctl.plotting.style import BLACK, ORANGE, SKY, colour, figure, legend_below, logarithmic, title
 from wristctl.tuning.search import Search
 
+# Share of the candidates that the axis of a search reaches, and its least height [decades].
+_TYPICAL, _FLAT = 0.75, 0.05
+# Candidates beyond which their axis is logarithmic.
+_LONG = 500
+
 
 def convergence(searches: Sequence[Search]) -> Figure:
-    """Best objective against the budget of each search; a thin line for each restart, a thick one for their median."""
+    """Best objective against the budget of each search; a thin line for each restart, a thick one for their median.
+
+    Dots are candidates; the worst quarter of them may lie beyond the axis.
+    """
     picture, ((axes,),) = figure(height=3.6)
+    lowest, highest, last = np.inf, -np.inf, 1
     for search in searches:
         best, line_colour = search.best_so_far, colour(search.controller)
         budget = search.tried.values.shape[1] * np.arange(1, best.shape[1] + 1)
@@ -23,8 +32,30 @@ def convergence(searches: Sequence[Search]) -> Figure:
             axes.plot(budget, best.T, color=line_colour, linewidth=0.6, alpha=0.6)
         complete = best[np.isfinite(best).all(axis=1)] if np.isfinite(best).all(axis=1).any() else best[:1]
         axes.plot(budget, np.median(complete, axis=0), color=line_colour, linewidth=1.6, label=search.controller)
-    axes.axhline(0.0, color=BLACK, linewidth=0.8, linestyle=":", label="feedforward")
-    axes.set_xscale("log")
+        tried = search.tried.values
+        axes.scatter(
+            np.arange(1, tried.size + 1),
+            tried.ravel(),
+            s=4.0,
+            color=line_colour,
+            alpha=0.35,
+            linewidths=0.0,
+            zorder=1.5,
+        )
+        finite = tried[np.isfinite(tried)]
+        lowest, highest, last = (
+            min(lowest, finite.min(initial=lowest)),
+            max(highest, np.quantile(finite, _TYPICAL) if finite.size else highest),
+            max(last, tried.size),
+        )
+    if np.isfinite([lowest, highest]).all():
+        margin = 0.05 * max(highest - lowest, _FLAT)
+        axes.set_ylim(lowest - margin, highest + margin)
+    below, above = axes.get_ylim()
+    beyond = "" if below < 0.0 < above else " (0, beyond the axis)"
+    axes.axhline(0.0, color=BLACK, linewidth=0.8, linestyle=":", label=f"feedforward{beyond}")
+    if last > _LONG:
+        axes.set_xscale("log")
     axes.set(xlabel="candidates tried [1]", ylabel="objective [decades beside feedforward]")
     legend_below(picture, 4)
     return picture

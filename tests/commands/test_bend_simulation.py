@@ -1,0 +1,122 @@
+"""`simulate` in two planes: what is run, told, written and refused."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import wristctl
+from wristctl.commands.export.open_log_of_run import open_log_of
+from wristctl.commands.inputs import Inputs
+from wristctl.commands.simulate.command import SIMULATE
+from wristctl.commands.simulate.in_two_planes import SimulatedBends
+from wristctl.config.study import Study
+from wristctl.errors import UserError
+from wristctl.records import Run
+from wristctl.simulation.bend_course import BEND_METRICS
+from wristctl.simulation.bend_loops import bends_of, planes_of
+
+# The kernel that tests of the loop in two planes compile.
+LOOP = ("simulate.controller=pid-ff", "simulate.gains=default", "simulate.loop.coupling=ignored", "simulate.horizon=1")
+
+
+def study_of(*settings: str) -> Study:
+    return wristctl.load_study(None, *LOOP, *settings)
+
+
+def simulated(*settings: str, out: Path | None = None) -> SimulatedBends:
+    result: object = wristctl.simulate(study_of(*settings), out=out)
+    assert isinstance(result, SimulatedBends)
+    return result
+
+
+def test_a_dart_throw_is_answered_by_plane_and_as_one_norm_in_a_sealed_run(tmp_path: Path) -> None:
+    done = simulated("simulate.reference.kind=dart-thrower", out=tmp_path)
+    assert list(done.metrics) == list(BEND_METRICS)
+    error = done.course.error
+    assert done.metrics["rmse_ulnar"] == pytest.approx(np.sqrt(np.mean(error[:, 0] ** 2)))
+    assert done.metrics["rmse"] == pytest.approx(np.hypot(done.metrics["rmse_ulnar"], done.metrics["rmse_flexion"]))
+    text = " ".join(done.summary)
+    assert "dart-thrower of 30 deg in 1.5 s on the paper's wrist in two planes (4 tendons" in text
+    assert "toward ulnar" in text and "toward flexion" in text and "over both" in text and not done.marks
+    run = done.run
+    assert run is not None and not run.problems()
+    table = Run(run.path).data("bends")
+    np.testing.assert_allclose(table["bend_flexion"], done.course.bend[:, 1], rtol=1e-12)
+    assert {"acting_4", "pull_1", "tip_z", "bend_4_ulnar", "load_seen_flexion"} <= set(table)
+    log = open_log_of(Run(run.path))
+    bends = log.bends()
+    assert bends is not None
+    np.testing.assert_allclose(bends, done.course.bend, rtol=1e-12)
+    assert sorted(log.tendons("tension")) == [1, 2, 3, 4]
+    assert "figures/bends.png" in (run.path / "README.md").read_text()
+
+
+def test_a_recording_of_two_planes_is_followed_in_both(tmp_path: Path) -> None:
+    time = np.arange(0.0, 1.0, 0.02)
+    bends = np.array([12.0 * np.sin(np.pi * time) ** 2, -7.0 * time**2])
+    rows = "\n".join(f"{t:.3f},{y:.9f},{z:.9f}" for t, y, z in zip(time, *bends, strict=True))
+    file = tmp_path / "both.csv"
+    file.write_text(f"time [s],bend_y [deg],bend_z [deg]\n{rows}\n")
+    study = study_of("simulate.reference.kind=recording", f"simulate.reference.file={file}", "simulate.loop.planes=2")
+    chosen = study.simulate
+    wanted = bends_of(chosen.reference, chosen.direction, study.wrist, 0.98, 1e-3)
+    assert np.rad2deg(wanted[:, 0, ::20]) == pytest.approx(bends[:, : wanted[:, 0, ::20].shape[1]], abs=1e-6)
+    assert wanted[1, 2, 500] == pytest.approx(np.deg2rad(-14.0), rel=1e-4)
+    one = tmp_path / "one.csv"
+    rows = "\n".join(f"{t:.3f},{y:.6f}" for t, y in zip(time, bends[0], strict=True))
+    one.write_text(f"time [s],angle [deg]\n{rows}\n")
+    alone = study_of("simulate.reference.kind=recording", f"simulate.reference.file={one}", "simulate.loop.planes=2")
+    with pytest.raises(UserError, match="no bends in two planes"):
+        SIMULATE.plan(alone, Inputs())
+    one_plane = alone.simulate.model_copy(update={"loop": alone.simulate.loop.model_copy(update={"planes": None})})
+    assert planes_of(one_plane.loop, one_plane.reference) == 1
+
+
+@pytest.mark.parametrize(("direction", "plane", "sign"), [("ulnar", 0, 1), ("radial", 0, -1), ("extension", 1, -1)])
+def test_a_motion_in_one_plane_is_the_same_with_gravity_from_the_side(direction: str, plane: int, sign: int) -> None:
+    done = simulated(
+        "simulate.loop.planes=2", f"simulate.direction={direction}", "simulate.reference.angle_deg=20",
+        "simulate.reference.duration=0.5", "wrist.gravity=[0.0, -9.81]",
+    )  # fmt: skip
+    assert done.course.bend_ref[-1, plane] == pytest.approx(sign * np.deg2rad(20.0))
+    assert not done.course.bend_ref[:, 1 - plane].any()
+
+
+def test_three_tendons_bend_in_two_planes_and_not_in_one() -> None:
+    with pytest.raises(UserError, match="two sides of two tendons"):
+        wristctl.simulate(study_of("wrist.tendons=three"))
+    assert simulated("wrist.tendons=three", "simulate.reference.kind=circle").course.pulls.shape[1] == 3
+
+
+@pytest.mark.parametrize(
+    ("settings", "what"),
+    [
+        (("simulate.reference.angle_deg=60", "simulate.reference.turn=1"), "beyond the wrist's range"),
+        (("simulate.loop.planes=1",), "bends in two planes, and the loop in one"),
+        (("simulate.loop.plant.creep=0.1",), r"plant\.creep"),
+        (("simulate.loop.plant.model=hinges",), r"plant\.model"),
+        (("simulate.start=equilibrium",), "begins straight"),
+        (("simulate.reference.inverse=network",), "no network"),
+        (("simulate.gains=nothing",), "nothing"),
+    ],
+)
+def test_what_cannot_run_in_two_planes_is_refused_before_it_runs(settings: tuple[str, ...], what: str) -> None:
+    study = study_of("simulate.reference.kind=circumduction", *settings)
+    with pytest.raises(UserError, match=what):
+        SIMULATE.plan(study, Inputs())
+
+
+def test_other_commands_refuse_a_reference_in_two_planes() -> None:
+    study = wristctl.load_study(None, "compare.references=[{kind: circumduction}]", "compare.inverses=[none]")
+    with pytest.raises(UserError, match="bends in two planes"):
+        wristctl.compare(study)
+
+
+def test_a_bend_out_of_reach_is_said_with_what_holds_it_not() -> None:
+    done = simulated("simulate.reference.kind=circumduction", "simulate.reference.turn=1", "wrist.tension_limit=6")
+    assert done.marks == ["does not arrive"]
+    assert "tensions of 6 N do not hold" in done.short_of and done.metrics["saturation"] > 0.1
+    assert any("tension_limit" in note for note in done.advice)

@@ -1,0 +1,203 @@
+"""The loop of a study's `simulate` section in two planes, repeated: its motion, results, and in words how it ended."""
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wristctl.arrays import Array
+from wristctl.config.loop import DirectionName, Loop, Reference
+from wristctl.config.study import Study
+from wristctl.config.wrist import WristParameters
+from wristctl.control.table import controller, gains_of
+from wristctl.errors import UserError
+from wristctl.simulation.arrival import SHORT
+from wristctl.simulation.bend_course import BendCourse
+from wristctl.simulation.closed_loop import scenario_of
+from wristctl.simulation.convergence import FINER, HALF, more_finely, tolerance
+from wristctl.simulation.oscillation import LIMIT_CYCLE, REST, chatter
+from wristctl.simulation.recording import recorded_bends
+from wristctl.simulation.reference import REFERENCES, course_of, motion, toward
+from wristctl.simulation.repetitions import MARKS, STRAIN
+from wristctl.simulation.spatial_batch import sample_step
+from wristctl.simulation.two_planes import check_bends, rollout_bends
+from wristctl.simulation.worlds import Draws, World, is_random, loops_of
+from wristctl.wrist.directions import DIRECTIONS, in_plane
+from wristctl.wrist.tendon_layout import TendonLayout
+
+# Rollouts that are recorded at once.
+_TOGETHER = 32
+# Error [rad] that is none where nothing is asked for.
+_STILL = math.radians(0.5)
+# Two sides, of which the frequency of chattering is told in one plane.
+_SIDES = 2
+
+
+def planes_of(loop: Loop, reference: Reference) -> int:
+    """Planes that a loop bends in on a reference. Raises UserError where these are more than the loop has."""
+    kind = REFERENCES[reference.kind]
+    if loop.planes == 1 and kind.planes == 2:
+        fix = "loop.planes: null, or 2"
+        raise UserError(f"{reference.kind} bends in two planes, and the loop in one", "loop.planes", fix)
+    return loop.planes or int(kind.planes)
+
+
+def bends_of(
+    reference: Reference, direction: DirectionName, wrist: WristParameters, horizon: float, period: float
+) -> Array:
+    """Wanted bends with two derivatives, (2, 3, T), on the grid of `period` [s] over the horizon [s].
+
+    A reference in one plane bends toward the direction; of a recording both columns are taken.
+    """
+    if reference.inverse == "network":
+        fix = "inverse: closed-form, or loop.planes: 1"
+        raise UserError("no network gives bends in two planes", "reference.inverse", fix)
+    kind = REFERENCES[reference.kind]
+    time = np.arange(round(horizon / period), dtype=np.float64) * period
+    if kind.planes == 2:
+        return course_of(reference, kind, time)
+    if reference.file:
+        return recorded_bends(reference, time)
+    aim = DIRECTIONS[direction]
+    references = np.zeros((2, 3, len(time)))
+    facing = in_plane(wrist, direction)
+    references[int(aim.plane == "flexion")] = motion(toward(reference, direction), facing, horizon, period).angles.rows
+    return references
+
+
+@dataclass(frozen=True)
+class RepeatedBends:
+    """Repetitions of one loop in two planes, each with noise and a drawn plant of its own."""
+
+    first: BendCourse
+    metrics: dict[str, Array]
+    """Metrics of each repetition, (R,)."""
+    failed: NDArray[np.bool_]
+    """(R,)"""
+    until: Array
+    """(R,) when each was last within its range [s]."""
+    wrist: WristParameters
+    layout: TendonLayout
+    substeps: int
+    """Integration steps in a control period that it took."""
+    drift: float
+    """Change of the first repetition's numbers with the integration step [rad]; 0 where they have converged."""
+
+    @property
+    def failure(self) -> str:
+        """In words how it failed; empty where it did not."""
+        if not self.failed.any():
+            return ""
+        count = f" in {self.failed.sum()} of {len(self.failed)} repetitions" if len(self.failed) > 1 else ""
+        return f"left its range at {self.until[self.failed].min():.3g} s{count}"
+
+    @property
+    def arrives(self) -> bool:
+        """Whether at most a fifth of the largest bend is missing at the end."""
+        largest = float(np.hypot(*self.first.bend_ref.T).max())
+        return not self.first.failed and self.first.metrics()["steady_state"] <= max(SHORT * largest, _STILL)
+
+    @property
+    def swing(self) -> float:
+        """Half of the swing at rest, the repetitions' median, where it is a limit cycle, else 0 [rad]."""
+        course = self.first
+        late = course.bend_ref[-round(REST / float(course.time[1])) :]
+        if len(course.time) * course.time[1] < REST or np.ptp(late, axis=0).any():
+            return 0.0
+        ripple = _median(self.metrics["oscillation"])
+        return ripple if ripple > LIMIT_CYCLE else 0.0
+
+    @property
+    def chatter(self) -> float:
+        """Frequency at which pulls go from limit to limit and back, where it chatters, else 0 [1/s]."""
+        places = len(self.layout.places)
+        variation = _median(self.metrics["chattering"]) * _SIDES / places
+        return float(chatter(variation, self.wrist.tension_range)) if math.isfinite(variation) else 0.0
+
+    @property
+    def beyond(self) -> float:
+        """Largest pull, where it is above what a tendon bears, else 0 [N]."""
+        peak = float(np.nanmax((self.first.acting / self.layout.multiplicity).max(initial=0.0)))
+        return peak if peak > STRAIN * self.wrist.tension_limit else 0.0
+
+    @property
+    def marks(self) -> list[str]:
+        """Why it is no good, in a word or two each; empty where it is sound."""
+        if self.failure:
+            return [MARKS[0]]
+        holds = not self.arrives, self.swing > 0.0, self.chatter > 0.0, self.beyond > 0.0, self.drift > 0.0
+        return [mark for mark, one in zip(MARKS[1:], holds, strict=True) if one]
+
+
+def _median(values: Array) -> float:
+    finite = values[np.isfinite(values)]
+    return float(np.median(finite)) if len(finite) else math.nan
+
+
+def simulate_bends(
+    study: Study,
+    tuned: Mapping[str, Mapping[str, float]] | None = None,
+    progress: Callable[[float], None] | None = None,
+) -> RepeatedBends:
+    """Run the study's `simulate` section in two planes: one closed loop, as often as it says.
+
+    Raises UserError for an unknown controller or preset, a reference out of reach, or what no loop in two planes has.
+    """
+    chosen, draws, wrist = study.simulate, Draws(study.seed), study.wrist
+    loop, layout, law = chosen.loop, TendonLayout.of(study.wrist), controller(chosen.controller)
+    gains = np.array([gains_of(law, chosen.gains, tuned)])
+    references = bends_of(chosen.reference, chosen.direction, wrist, chosen.horizon, sample_step(loop.control_period))
+    check_bends(law, references[:, 0], wrist, loop)
+    if chosen.start != "straight":
+        raise UserError("a loop in two planes begins straight", "start", "start: straight")
+    times = chosen.repetitions if is_random(loop) else 1
+    loops = loops_of(loop, [draws.plant(repetition) for repetition in range(times)])
+    scenario = scenario_of(chosen.reference, chosen.direction)
+    streams = [draws.camera(scenario, repetition) for repetition in range(times)]
+
+    def courses(which: range, factor: int) -> list[BendCourse]:
+        worlds = [World(more_finely(loops[k], factor) if factor > 1 else loops[k], wrist) for k in which]
+        return rollout_bends(
+            law, np.repeat(gains, len(which), axis=0), references, worlds, layout, None, [streams[k] for k in which]
+        )
+
+    first, factor, drift = _converged(courses, loop)
+    metrics, failed, until = [first.metrics()], [first.failed], [first.until]
+    for begin in range(1, times, _TOGETHER):
+        for course in courses(range(begin, min(begin + _TOGETHER, times)), factor):
+            metrics.append(course.metrics())
+            failed.append(course.failed)
+            until.append(course.until)
+        if progress is not None:
+            progress(len(metrics) / times)
+    gathered = {name: np.array([values[name] for values in metrics]) for name in metrics[0]}
+    return RepeatedBends(first, gathered, np.array(failed), np.array(until), wrist, layout, factor * loop.steps, drift)
+
+
+def _converged(courses: Callable[[range, int], list[BendCourse]], loop: Loop) -> tuple[BendCourse, int, float]:
+    """The first repetition at a step that is short enough, the factor on its steps, and what still changes [rad].
+
+    The step is halved until RMSE and error at the end stay what they are; one given by hand stays.
+    """
+    before, change = courses(range(1), 1)[0], math.inf
+    for last, factor in zip((1, *FINER), FINER, strict=False):
+        (fine,) = courses(range(1), factor)
+        change = _difference(before, fine)
+        if change == 0.0 or loop.substeps is not None:
+            return before, last, change
+        before = fine
+    return before, FINER[-1], change
+
+
+def _difference(one: BendCourse, finer: BendCourse) -> float:
+    """Greater difference of RMSE and of the error at the end [rad]; 0 where both are as good as the same."""
+    if one.failed or finer.failed:
+        return 0.0 if one.failed == finer.failed else math.inf
+    coarse, fine, largest = one.metrics(), finer.metrics(), 0.0
+    for name in ("rmse", "steady_state"):
+        apart = abs(coarse[name] - fine[name])
+        if apart > HALF * float(tolerance(np.array(fine[name]))):
+            largest = max(largest, apart)
+    return largest

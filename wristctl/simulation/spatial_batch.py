@@ -1,0 +1,243 @@
+"""Loops in two planes as the kernel wants them: blocks of lanes that share reference, timing and what pushes."""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from wristctl.arrays import Array
+from wristctl.config.loop import Loop
+from wristctl.config.plant import TendonFacts, TrueWrist
+from wristctl.config.wrist import WristParameters
+from wristctl.control.law import REFERENCE, Controller, signals_of
+from wristctl.errors import UserError
+from wristctl.lanes.blocks import lanes_of, spread
+from wristctl.seeds import Entropy
+from wristctl.simulation.actuator import counted_motor, drive_with, motor_of, winding_of
+from wristctl.simulation.frames import frame_counts, readings, remembered, schedule
+from wristctl.simulation.observer import NoCamera
+from wristctl.simulation.spatial_actuator import FrictionRows, NoFriction
+from wristctl.simulation.spatial_kernel import (
+    SPATIAL_RECORDED,
+    SpatialCourse,
+    SpatialScratch,
+    SpatialSetup,
+    SpatialState,
+    SpatialValues,
+)
+from wristctl.simulation.spatial_observer import Compensated, Ignored, SpatialSchedule, SpatialWatch
+from wristctl.simulation.stationary_filter import Belief, stationary_gains
+from wristctl.simulation.worlds import World, bending_limit
+from wristctl.wrist.directions import in_plane
+from wristctl.wrist.segments import segments
+from wristctl.wrist.spatial.spatial_segments import OF_A_TENDON, spatial_values
+from wristctl.wrist.spatial.spooled_tendons import OF_A_STATE
+from wristctl.wrist.tendon_layout import TendonLayout
+from wristctl.wrist.tendons import TENDONS_PER_SIDE
+
+# Pull [N] for tensions without a limit: no wrist's wants are as large.
+_NO_LIMIT = 1e6
+# Facts of a world that loops in two planes do not have, where they are not at their defaults.
+_NOT_OF_THE_WRIST = ("model", "creep", "inner_friction", "end_stop_deg", "taper")
+_NOT_OF_THE_TENDONS = ("creep", "slips_at", "torque", "top_speed")
+
+
+class SpatialBatch(NamedTuple):
+    """Arguments of `run_spatial`."""
+
+    setup: SpatialSetup
+    course: SpatialCourse
+    values: SpatialValues
+    state: SpatialState
+    scratch: SpatialScratch
+
+
+def check_spatial(loop: Loop) -> None:
+    """UserError for what a loop has in one plane and not in two."""
+    plant, facts = loop.plant, loop.plant.actuator
+    default, of_tendons = TrueWrist(), TendonFacts()
+    beyond = [f"plant.{name}" for name in _NOT_OF_THE_WRIST if getattr(plant, name) != getattr(default, name)]
+    beyond += [
+        f"plant.actuator.{name}"
+        for name in _NOT_OF_THE_TENDONS
+        if getattr(facts, name) != getattr(of_tendons, name, None)
+    ]
+    if beyond:
+        raise UserError(f"no loop in two planes has {beyond[0]}", f"loop.{beyond[0]}", "leave it at its default")
+
+
+def _as_pairs(wrist: WristParameters, layout: TendonLayout, axis: int) -> WristParameters:
+    """The wrist in one plane whose four tendons stiffen it as those of the layout do, on held spools."""
+    square = float(layout.multiplicity @ layout.cross_section[:, axis] ** 2) / TENDONS_PER_SIDE
+    return wrist.model_copy(update={"tendon_radius": float(np.sqrt(square))})
+
+
+def spatial_batch(
+    law: Controller,
+    gains: Array,
+    references: Array,
+    worlds: Sequence[World],
+    layout: TendonLayout,
+    acting: Array,
+    streams: Sequence[Entropy],
+    compensated: bool,
+) -> SpatialBatch:
+    """The batch of rollouts of gains (count, g), each in its world and with a stream of its own.
+
+    All worlds have the same structure, timing and camera.
+    """
+    loop, count, places = worlds[0].loop, len(gains), len(layout.places)
+    check_spatial(loop)
+    n, period, alike = loop.plant_segments, loop.control_period, layout.multiplicity.astype(float)
+    actual, actuators = [world.plant for world in worlds], [world.actuator for world in worlds]
+    facts, wide = [world.loop.plant for world in worlds], lanes_of(count).shape[1:]
+    blocks = 1 if count == 1 else len(lanes_of(count))
+    samples = references.shape[2]
+    ticks = max(1, round(sample_step(period) / period))
+
+    def rows(values: Sequence[Array]) -> Array:
+        return spread(np.array([np.asarray(row, float) for row in values]).reshape(count, -1), count)
+
+    def limits(world: World, wrist: WristParameters) -> Array:
+        most = world.wrist.tension_limit if world.loop.limits else _NO_LIMIT
+        return np.concatenate([alike * world.wrist.pretension, alike * most, [bending_limit(wrist)]])
+
+    counted = [
+        counted_motor(world.loop.actuator, actuator)._replace(stiffness=world.loop.actuator.tendon_stiffness)
+        for world, actuator in zip(worlds, actuators, strict=True)
+    ]
+    windings = [
+        winding_of(world.loop.actuator, actuator, TENDONS_PER_SIDE * world.wrist.pretension)
+        for world, actuator in zip(worlds, actuators, strict=True)
+    ]
+    elastic = loop.actuator.level == "tendon"
+    drive = drive_with(loop.actuator.level, rows([np.array(motor) for motor in counted]))
+    offsets = [
+        [winding.scale, *(winding.offset - _slack(fact.actuator, places))]
+        for winding, fact in zip(windings, facts, strict=True)
+    ]
+    rubbing = elastic and any(actuator.friction for actuator in actuators)
+    friction = [[actuator.friction, actuator.sheath, 1.0 / actuator.presliding] for actuator in actuators]
+    begin = [np.full(places, motor.stiffness) for motor in counted]
+    at_rest = [
+        world.wrist.pretension / stiffness if elastic else alike * world.wrist.pretension
+        for world, stiffness in zip(worlds, begin, strict=True)
+    ]
+    motors = [np.stack([counts, 0.0 * counts], axis=1).ravel() for counts in at_rest]
+    delivered = [
+        row[0] * counts + np.array(row[1:]) if loop.actuator.level != "ideal" else counts
+        for row, counts in zip(offsets, at_rest, strict=True)
+    ]
+    memory = max(1, law.memory)
+    values = SpatialValues(
+        plant=rows([
+            spatial_values(wrist, layout_of(world, wrist, layout), n, axis=np.radians(wrist.stiffness_axis_deg))
+            for world, wrist in zip(worlds, actual, strict=True)
+        ]),
+        believed=rows([
+            spatial_values(world.wrist, layout, 1, axis=np.radians(world.wrist.stiffness_axis_deg)) for world in worlds
+        ]),
+        model_y=rows([segments(in_plane(world.wrist, "ulnar"), 1) for world in worlds]),
+        model_z=rows([segments(in_plane(world.wrist, "flexion"), 1) for world in worlds]),
+        gains=spread(gains.reshape(count, -1), count),
+        limits=rows([limits(world, wrist) for world, wrist in zip(worlds, actual, strict=True)]),
+        drive=drive,
+        winding=rows([np.array(row) for row in offsets]),
+        alike=rows([alike] * count),
+        stiffness=rows([alike * motor_of(actuator).stiffness / TENDONS_PER_SIDE for actuator in actuators]),
+        broken_at=rows([_broken_at(fact.actuator, places) for fact in facts]),
+        backlash=rows([np.array([fact.actuator.backlash]) for fact in facts]),
+        lead=rows([np.array([float(world.loop.spool_lead)]) for world in worlds]),
+        friction=FrictionRows(rows([np.array(row) for row in friction])) if rubbing else NoFriction(),
+    )  # fmt: skip
+    watch, frames = _watch(worlds, layout, streams, period, samples * ticks * period)
+    columns = len(SPATIAL_RECORDED) + 2 * places + 2 * n
+    state = SpatialState(
+        coordinates=spread(np.zeros(4 * n), count),
+        memory_y=spread(np.zeros(memory), count),
+        memory_z=spread(np.zeros(memory), count),
+        alive=spread(np.ones(1), count),
+        motors=rows(motors),
+        delivered=rows(delivered),
+        tendons=spread(np.zeros(OF_A_STATE * places), count),
+        record=np.empty((blocks, samples, columns, *wide)),
+        watch=watch,
+    )
+    setup = SpatialSetup(
+        law.compiled(count), (0,) * (2 * n), (0,) * (OF_A_TENDON * places), (0,) * places, (0, 0), period, loop.steps,
+        ticks, law.preview, Compensated() if compensated else Ignored(),
+    )  # fmt: skip
+    now, target = np.zeros((signals_of(law.preview), *wide)), np.zeros((len(REFERENCE), *wide))
+    scratch = SpatialScratch(now, now.copy(), target, target.copy())
+    return SpatialBatch(
+        setup, SpatialCourse(np.ascontiguousarray(references, float), acting, frames), values, state, scratch
+    )
+
+
+def sample_step(control_period: float) -> float:
+    """Time between samples of references and records: 1 ms, or the control period where that is longer [s]."""
+    return max(control_period, round(1e-3 / control_period) * control_period)
+
+
+def layout_of(world: World, wrist: WristParameters, layout: TendonLayout) -> TendonLayout:
+    """The places of the tendons as they are: those of the study on the true circle of tendons."""
+    return layout if wrist.tendon_radius == world.wrist.tendon_radius else TendonLayout.of(wrist)
+
+
+def _slack(facts: TendonFacts, places: int) -> Array:
+    slack = np.zeros(places)
+    if len(facts.slack) > places:
+        what = f"{len(facts.slack)} tendons with slack of {places}"
+        raise UserError(what, "loop.plant.actuator.slack", f"at most {places} values")
+    slack[: len(facts.slack)] = facts.slack
+    return slack
+
+
+def _broken_at(facts: TendonFacts, places: int) -> Array:
+    times = np.full(places, np.inf)
+    if facts.broken_at is not None:
+        if facts.broken_tendon > places:
+            what = f"tendon {facts.broken_tendon} of {places} cannot break"
+            raise UserError(what, "loop.plant.actuator.broken_tendon", f"1 to {places}")
+        times[facts.broken_tendon - 1] = facts.broken_at
+    return times
+
+
+def _watch(
+    worlds: Sequence[World], layout: TendonLayout, streams: Sequence[Entropy], period: float, horizon: float
+) -> tuple[SpatialWatch, SpatialSchedule] | tuple[NoCamera, NoCamera]:
+    """One camera for all lanes, with an observer for each."""
+    if worlds[0].loop.sensor.level == "ideal":
+        return NoCamera(), NoCamera()
+    count, places = len(worlds), len(layout.places)
+    sensors, believed = [world.sensor for world in worlds], [world.loop.sensor for world in worlds]
+    first = schedule(sensors[0], period, horizon, believed[0])
+    bursts = [world.loop.plant.sensor.burst for world in worlds]
+    counts = frame_counts(sensors, horizon).tolist()
+    ulnar = readings(counts, sensors, streams, bursts)
+    flexion = readings(counts, sensors, [(*stream, 1) for stream in streams], bursts)
+    zero = np.radians([world.loop.plant.sensor.zero_deg for world in worlds])[:, None]
+    taken = np.stack([ulnar[:, :, 0] + zero, flexion[:, :, 0], ulnar[:, :, 1]], axis=2)
+    order = lanes_of(count)
+    blocks, wide = 1 if count == 1 else len(order), order.shape[1:]
+    by_block = np.array([np.moveaxis(taken[lanes], 0, -1) for lanes in order.reshape(blocks, -1)])
+    beliefs = [
+        [
+            Belief(world.loop.sensor, world.loop.actuator, _as_pairs(wrist, layout, axis), period)
+            for axis, wrist in enumerate(in_plane(world.wrist, plane) for plane in ("ulnar", "flexion"))
+        ]
+        for world in worlds
+    ]
+    gains = np.concatenate([stationary_gains([pair[axis] for pair in beliefs]) for axis in range(2)], axis=1)
+    still = spread(np.zeros(6), count)
+    watch = SpatialWatch(
+        readings=np.ascontiguousarray(by_block.reshape(blocks, taken.shape[1], 3, *wide)),
+        pictures=np.zeros((blocks, taken.shape[1], 2, *wide)),
+        turn=np.zeros((blocks, 3), np.int64),
+        gain=spread(gains, count),
+        delivered=np.zeros((blocks, remembered(sensors[:1], believed[:1], period), places, *wide)),
+        fused=still,
+        now=still.copy(),
+    )
+    ticks = SpatialSchedule(first.captures, np.atleast_1d(first.late), np.atleast_1d(first.believed))
+    return watch, ticks
