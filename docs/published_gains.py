@@ -48,7 +48,7 @@ def with_comparison(content: dict[str, Any], run: Run) -> dict[str, Any]:
     of_family, lines = content[worlds.family], run.data(RANKING).set_index("row")
     controllers = dict(of_family["controllers"])
     for name, row in controllers.items():
-        line = lines.loc[f"{name}/{PREFIX}{worlds.family}"]
+        line: dict[Any, Any] = lines.loc[f"{name}/{PREFIX}{worlds.family}"].to_dict()
         errors = {key: float(line[key]) for key in ("rmse", "rmse_low", "rmse_high")}
         lost = round(float(line["lost"]) * worlds.draws)
         controllers[name] = row | errors | {"lost": lost, "reliable": line["fate"] not in UNUSABLE}

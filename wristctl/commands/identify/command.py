@@ -74,12 +74,18 @@ class _Logged(NamedTuple):
     kinds: pd.DataFrame
 
 
+# Endings of the names of open logs.
+LOGS = (".csv", ".parquet")
+
+
 def with_logs(study: Study) -> Study:
     """The study with files among its runs named as open logs."""
     runs = study.identify.runs
-    logs = tuple(run for run in runs if Path(run).is_file())
+    logs = tuple(run for run in runs if (Path(run).suffix in LOGS and not Path(run).is_dir()) or Path(run).is_file())
     if not logs:
         return study
+    for missing in (log for log in logs if not Path(log).is_file()):
+        raise UserError("no such file", missing, "an open log: docs/open-log.md")
     changed = {"runs": tuple(run for run in runs if run not in logs), "logs": (*study.identify.logs, *logs)}
     return study.model_copy(update={"identify": study.identify.model_copy(update=changed)})
 
