@@ -7,7 +7,7 @@ CLAIMS ?= experiments/claims.yaml
 BIN := .venv/bin
 
 .PHONY: run test lint bench bench-sweeps bench-peers bench-all firmware test-firmware test-faults test-trust test-vision test-identify \
-	test-allocation test-rig test-statistics converge worlds docs clean venv mutants coverage installed matrix
+	test-allocation test-rig fault-table sound-rigs test-statistics converge worlds docs clean venv mutants coverage installed matrix
 
 run: .venv/run
 	@set -eo pipefail; \
@@ -72,6 +72,15 @@ test-vision: .venv/dev
 test-faults: .venv/dev
 	WRISTCTL_THOROUGH=1 $(BIN)/pytest -s tests/trial/test_fault_table.py
 	WRISTCTL_THOROUGH=1 $(BIN)/pytest -s tests/cli/test_hw_run_stops.py tests/cli/test_hw_run_killed.py
+
+# Faults that creep, cancel each other or come again: docs/hardware/fault-table.md. Keeps what it has tried in
+# build/fault-table and goes on from there; WHICH="--phase moving --count 10" tries some.
+fault-table: .venv/dev
+	$(BIN)/python -m tests.trial.further_faults $(WHICH)
+
+# Sound rigs drawn with pose, light, link and friction: which are stopped all the same? WHICH="--first 40 --count 20"
+sound-rigs: .venv/dev
+	$(BIN)/python -m tests.trial.sound_rigs $(WHICH)
 
 # The real path, serial port and camera device, against the emulated rig in real time: first-power-up.md walked, a slow
 # link and camera found out, hostile bytes. Alone: beside other work they end as skipped.

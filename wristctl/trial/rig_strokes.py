@@ -148,9 +148,10 @@ def _courses(strokes: Sequence[MotorStroke], rate: float, damping: float) -> lis
 
 # Strokes after which one may know enough; that are made at most.
 COUNT, MOST = 24, 96
-# Bend [rad] between which strokes go, the tendon taut at both ends; how much of it [m] they reel in at most, and how
-# fast [m/s].
-_BEGUN, _ENDED, _LONGEST, _SPEED = math.radians(3.0), math.radians(6.0), 6e-3, 40e-3
+# Bend [rad] between which strokes go, the tendon and those opposite taut at both ends, which keeps the wrist linear: at
+# 3.5 deg they pull some 30 N against each other, at 6 deg 56 N, more than motors at 1 A hold; how much tendon [m] they
+# reel in at most, and how fast [m/s].
+_BEGUN, _ENDED, _LONGEST, _SPEED = math.radians(1.5), math.radians(3.5), 6e-3, 40e-3
 # Seconds between two points of a stroke's course.
 _SAMPLED = 1e-3
 # Bend [rad] at which the tendon counts as taut; at which strokes end.
