@@ -9,6 +9,7 @@ from __future__ import annotations
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 from wristctl.records import Run, list_runs
 
@@ -31,11 +32,11 @@ def validated(results: Path, robot: str, data: str) -> Run:
     return runs[-1]
 
 
-def with_interval(metric: dict[str, object] | None, digits: int = 2) -> str:
+def with_interval(metric: dict[str, Any] | None, digits: int = 2) -> str:
     """A metric with its interval; a dash where there is none."""
     if metric is None:
         return "-"
-    low, high = metric["interval"]  # type: ignore[misc]
+    low, high = metric["interval"]
     return f"{metric['value']:.{digits}f} [{low:.{digits}f}, {high:.{digits}f}]"
 
 
