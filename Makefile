@@ -7,7 +7,7 @@ CLAIMS ?= experiments/claims.yaml
 BIN := .venv/bin
 
 .PHONY: run test lint bench bench-sweeps bench-peers bench-all firmware test-firmware test-faults test-trust test-vision test-identify \
-	test-allocation test-rig test-statistics converge worlds docs clean venv mutants coverage installed
+	test-allocation test-rig test-statistics converge worlds docs clean venv mutants coverage installed matrix
 
 run: .venv/run
 	@set -eo pipefail; \
@@ -82,7 +82,11 @@ test-rig: .venv/dev
 installed: .venv/dev
 	$(BIN)/python benchmarks/installed.py $(WITH) $(OLDEST)
 
-# A sweep over each kind of leaf beside a batch of as many gains, 6 min.
+# Every Python that is here, one after the other: the wheel, commands and tests, some minutes each.
+matrix: .venv/dev
+	$(BIN)/python benchmarks/matrix.py
+
+# A sweep over each kind of setting beside a batch of as many gains, 6 min.
 bench-sweeps: .venv/run
 	$(BIN)/python benchmarks/sweeps.py
 

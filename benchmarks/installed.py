@@ -10,6 +10,7 @@ from __future__ import annotations
 import argparse
 import os
 import re
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -29,7 +30,7 @@ COMMANDS = (
     "simulate --controller smc --gains exchanged",
     "analyse --controller gvsc --gains default",
     "study fair_study --executor processes",
-    "audit claims",
+    "paper audit claims",
     "hysteresis hysteresis",
     "hw-run --set directions=[ulnar] --set push.force=0",
     "identify latest:hw-run --dry-run",
@@ -48,16 +49,25 @@ def lowest(requirements: list[str]) -> list[str]:
     return [re.sub(r">=([\d.]+).*", r"==\1", each) for each in requirements]
 
 
+def installer(commands: Path) -> list[str]:
+    """The call that installs into an environment, but for what it installs."""
+    if uv := shutil.which("uv"):
+        return [uv, "pip", "install", "--quiet", "--python", str(commands / "python")]
+    return [str(commands / "pip"), "install", "--quiet", "--disable-pip-version-check"]
+
+
 def environment(folder: Path, python: str, oldest: bool) -> tuple[Path, bool]:
     """The environment's folder of commands, and whether torch is there."""
-    subprocess.run([python, "-m", "venv", folder / "env"], check=True)
     commands = folder / "env" / "bin"
+    uv = shutil.which("uv")  # much faster, where it is there
+    made = [uv, "venv", "--quiet", "--python", python] if uv else [python, "-m", "venv"]
+    subprocess.run([*made, folder / "env"], check=True)
     build = [sys.executable, "-m", "hatchling", "build", "-t", "wheel", "-d", str(folder)]
     subprocess.run(build, cwd=ROOT, check=True, capture_output=True)
     (wheel,) = folder.glob("*.whl")
     project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
     wanted = [each for each in project["dependencies"] if not TORCH.match(each)]
-    pip = [str(commands / "pip"), "install", "--quiet", "--disable-pip-version-check"]
+    pip = installer(commands)
     subprocess.run([*pip, *(lowest(wanted) if oldest else wanted)], check=True)
     pins = (ROOT / "constraints.txt").read_text(encoding="utf-8").splitlines()
     (pinned,) = [each for each in pins if TORCH.match(each)]

@@ -129,7 +129,7 @@ step. `python docs/best_case.py` writes this page.
 
 {answer}
 
-![Angle and tensions under the paper's exchanged gains in the setting nearest to its numbers](images/best_case.png)
+![Our numbers over the paper's, by seed and by the move's duration, and the objective's weight](images/best_case.png)
 
 ## What is left at best (a)
 

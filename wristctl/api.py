@@ -20,6 +20,7 @@ from wristctl.commands.compare.command import COMPARE, Compared
 from wristctl.commands.gen_data.command import GEN_DATA, Generated
 from wristctl.commands.hysteresis.command import HYSTERESIS, Hysteresis
 from wristctl.commands.identify.command import IDENTIFY, Identified
+from wristctl.commands.identify.logs import LogTold
 from wristctl.commands.perform import RESULTS, Folder, Ref, StudyOrFile, carry_out, in_python
 from wristctl.commands.progress import Watch
 from wristctl.commands.recommend.answer import Recommended
@@ -208,8 +209,10 @@ def hysteresis(
 def identify(
     study: StudyOrFile, *, runs: Ref | Sequence[Ref] | None = None, out: Folder | None = None, label: str = "",
     progress: Watch | None = None,
-) -> Identified:  # fmt: skip
+) -> Identified | LogTold:  # fmt: skip
     """Stiffness, damping, tendons and delay of a real wrist from the logged trials of `runs` (hw-run).
+
+    A run that is a file is an open log (docs/open-log.md): the result then is a `LogTold`, what such logs tell.
 
     By the study's `identify` section. The result has `.values`, `.fit`, `.knowledge` and `.yaml`, a study file of what
     was found; `.frame()` is a row per parameter with its 95 % interval and unit. Raises UserError without runs, and

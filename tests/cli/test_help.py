@@ -119,6 +119,7 @@ def test_former_names_are_the_same_commands() -> None:
 
 
 TAKEN_FOR_GRANTED = (
+    r"no such file - my.csv ",
     r"no such run - \w*RUN in ",
     r"no such video - ",
     r"cannot read the measured (loop|data): No such file",

@@ -12,6 +12,7 @@ import pytest
 import wristctl
 from tests.identification.benches import UPRIGHT, write_run
 from wristctl import commands
+from wristctl.commands.identify.command import Identified
 from wristctl.comparison.combinations import count_rollouts
 
 
@@ -23,6 +24,7 @@ def test_identified_parameters_reach_a_loop_from_memory(tmp_path: Path) -> None:
     study = wristctl.load_study(None, settings, "simulate={horizon: 0.3, loop: {plant_segments: 1}}")
     memory = wristctl.identify(study, runs=run)
     kept = wristctl.identify(study, runs=[str(run.path)], out=tmp_path)
+    assert isinstance(memory, Identified) and isinstance(kept, Identified)
     assert kept.run is not None and memory.run is None and memory.metrics == kept.metrics
     assert [each.run for each in kept.run.manifest.inputs] == [run.id] and kept.study.identify.runs == (run.id,)
     pd.testing.assert_frame_equal(memory.frame(), kept.frame())
