@@ -137,3 +137,14 @@ def test_a_bend_out_of_reach_is_said_with_what_holds_it_not() -> None:
     assert done.marks == ["does not arrive"]
     assert "tensions of 6 N do not hold" in done.short_of and done.metrics["saturation"] > 0.1
     assert any("tension_limit" in note for note in done.advice)
+
+
+def test_a_push_from_the_side_bends_toward_its_direction_and_is_told_with_it() -> None:
+    settings = (
+        "simulate.loop.planes=2", "simulate.reference.angle_deg=0", "simulate.loop.disturbances.toward_deg=130",
+        "simulate.loop.disturbances.push={force: 5.0, start: 0.1, duration: 0.5}", "simulate.horizon=0.4",
+    )  # fmt: skip
+    done = simulated(*settings)
+    ulnar, flexion = done.course.bend[200]
+    assert np.rad2deg(np.arctan2(flexion, ulnar)) == pytest.approx(130.0, abs=1.0)
+    assert "a push of 5 N at 0.1 s, toward 130 deg from ulnar" in " ".join(done.summary)

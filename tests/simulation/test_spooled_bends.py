@@ -14,6 +14,7 @@ from wristctl.simulation.motion import Angles, Motion
 from wristctl.simulation.rollout import rollout
 from wristctl.simulation.two_planes import rollout_bends, simulate_two_planes
 from wristctl.simulation.worlds import World
+from wristctl.wrist.directions import in_plane
 
 LAW = controller("pid-ff")
 GAINS = np.array(gains_of(LAW, "hardware"))
@@ -49,10 +50,12 @@ def line() -> Array:
 def test_camera_motors_and_rubbing_tendons_are_those_of_one_plane(side: int) -> None:
     path = np.zeros((2, 3, len(TIME)))
     path[side] = line()
-    course = followed(path, real())
+    wrist = WRIST.model_copy(update={"flexion_ratio": 1.4})
+    course = simulate_two_planes(LAW, GAINS, path, wrist, loop=real())
+    facing = in_plane(wrist, ("ulnar", "flexion")[side])
     motion = Motion(TIME, Angles.of(line()), np.zeros((len(TIME), 2)), None, 0.0, HORIZON, HORIZON)
     planar = rollout(
-        LAW, GAINS[None], [motion], np.zeros(1, np.int64), real(substeps=5), WRIST, streams=[(0,)], record=True
+        LAW, GAINS[None], [motion], np.zeros(1, np.int64), real(substeps=5), facing, streams=[(0,)], record=True
     )
     assert course.bend[:, side] == pytest.approx(planar.column("theta", 0), abs=1e-6)
     assert course.bend_seen[:, side] == pytest.approx(planar.column("seen", 0), abs=1e-6)

@@ -174,6 +174,7 @@ def loop_words(loop: Loop, wrist: WristParameters) -> str:
 
 
 def disturbance_words(loop: Loop) -> list[str]:
+    """What acts on a loop's wrist unknown to its controller, with the direction of what pushes in two planes."""
     disturbances = loop.disturbances
     parts = []
     if disturbances.push.force:
@@ -182,6 +183,8 @@ def disturbance_words(loop: Loop) -> list[str]:
         parts.append(f"a constant load of {disturbances.load:g} N")
     if disturbances.grasp.mass:
         parts.append(f"an object of {abs(disturbances.grasp.mass):g} kg taken up at {disturbances.grasp.start:g} s")
+    if parts and disturbances.toward_deg:
+        parts[-1] += f", toward {disturbances.toward_deg:g} deg from ulnar"
     if disturbances.drift.scale != 1.0:
         parts.append(f"a stiffness that drifts to {disturbances.drift.scale:g} times")
     return parts
