@@ -96,7 +96,7 @@ def test_jogs_together_lead_no_further_than_a_taut_tendon_may_be_pulled_until_th
             "--port",
             "emulated",
             "--set",
-            "safety.motor_pull=60",
+            "safety.tension=60",
         )
         code, out, err = call(*words)
         assert code == 0 and out.count("\n") == 3, "the third word alone is refused"
@@ -104,7 +104,7 @@ def test_jogs_together_lead_no_further_than_a_taut_tendon_may_be_pulled_until_th
         position = sum(round(mm * sign / STEP_MM) for mm in (2.0, 0.9, -5.0))
         assert Board(Emulated.made[-1]).read().position == (0, 0, position, 0)
     for length, refused in (("3", 0), ("3.1", 2)):
-        again = ("hw", "slacken", "--mm", length, "--port", "emulated", "--yes", "--set", "safety.motor_pull=60")
+        again = ("hw", "slacken", "--mm", length, "--port", "emulated", "--yes", "--set", "safety.tension=60")
         assert call(*again)[0] == refused
 
 

@@ -76,7 +76,7 @@ def _watch(video: Path, in_trial: int) -> None:
         assert read[1][:20, :60].mean() > 150  # clock and angle on white
         aside.append(np.nonzero((green > red + 60) & (green > blue))[1].mean())
     assert len(aside) > in_trial > 25
-    trial, home = aside[-in_trial - 20 :], np.median(aside[:20])
+    trial, home = aside[-in_trial - 240 :], np.median(aside[:20])  # behind it the way back, and tendons let out
     assert max(trial) - home > 15.0 and abs(aside[-1] - home) < 3.0
 
 

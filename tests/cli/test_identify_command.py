@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from tests.cli.conftest import Call
@@ -41,6 +42,10 @@ def test_two_poses_give_a_run_that_simulate_starts_from(call: Call, tmp_path: Pa
     assert "fixed" in shown["friction"] and "fixed" not in shown["stiffness"]
     pasted = load_study([found.file("data/identified.yaml")])
     assert pasted.wrist.damping == table.value["damping"]
+    family = load_study([found.file("data/posterior.yaml")]).families["posterior"]
+    drawn = np.array([row["plant.stiffness"] for row in family.together])
+    low, high = table.low["stiffness"], table.high["stiffness"]
+    assert len(drawn) == 200 and 0.88 < np.mean((low < drawn) & (drawn < high)) < 0.995
     sensor = pasted.simulate.loop.sensor
     assert sensor.frame_rate == pytest.approx(60.0, rel=1e-6) and sensor.dropped == pytest.approx(0.05, abs=0.03)
     assert sensor.delay_frames == pytest.approx(60.0 * (0.01 + 0.03), abs=0.1)
@@ -93,3 +98,41 @@ def test_identified_values_replace_what_a_command_knows_and_leave_its_levels() -
     tuned = with_identified(study, "tune", text).tune
     assert {loop.sensor.delay_frames for loop in tuned.loops.values()} == {1.5}
     assert {loop.sensor.level for loop in tuned.loops.values()} == {"ideal"}
+
+
+def _log_of(file: Path, noise: float, backward: bool = False) -> None:
+    """An open log of a wrist in one plane that follows its spools 40 ms late."""
+    time = np.arange(0.0, 8.0, 0.02)
+    bend = 20.0 * np.sin(1.5 * time) * np.minimum(1.0, time)
+    late = np.interp(time - 0.04, time, bend) + noise * np.random.default_rng(0).normal(size=len(time))
+    spool = 14.142 * np.radians(bend) * (-1.0 if backward else 1.0)
+    rows = [f"{t:.3f},{s:.5f},{-s:.5f},{b:.4f}" for t, s, b in zip(time, spool, late, strict=True)]
+    file.write_text("\n".join(["time [s],spool_1 [mm],spool_2 [mm],bend_y [deg]", *rows]) + "\n")
+
+
+@pytest.mark.painted
+def test_an_open_log_tells_what_it_can_in_a_run_of_its_own(call: Call, tmp_path: Path) -> None:
+    _log_of(tmp_path / "my.csv", 0.05)
+    code, out, err = call("identify", str(tmp_path / "my.csv"))
+    assert code == 0, err
+    assert (
+        out.startswith("These data tell") and "delay" in out.split(".")[0] and "Stiffness in N m/rad is not told" in out
+    )
+    found = open_run(out.splitlines()[-1])
+    delay = found.metrics["delay"]
+    assert delay["interval"][0] - 2e-3 < 0.04 < delay["interval"][1] + 2e-3
+    assert found.metrics["tendon"]["value"] is None and found.metrics["error"]["value"] < 0.1
+    assert "not told" in out and all(len(line) <= 100 for line in out.splitlines()[:-1])
+    (tmp_path / "my.csv").unlink()
+    assert call("runs", "verify", found.id)[0] == 0
+    assert call("runs", "replay", found.id)[0] == 0
+
+
+def test_a_log_that_no_model_predicts_is_refused_with_its_answer(call: Call, tmp_path: Path) -> None:
+    _log_of(tmp_path / "back.csv", 0.05, backward=True)
+    code, out, err = call("identify", str(tmp_path / "back.csv"))
+    assert code == 3 and out == "" and "nothing of it is to be relied on" in err and "misfit=tell" in err
+    failed = open_run(next((tmp_path / "results").glob("*-identify-*")))
+    assert failed.state == "failed" and "not told" in (failed.path / "README.md").read_text()
+    code, _, err = call("identify", str(tmp_path / "back.csv"), "--dry-run")
+    assert code == 0

@@ -35,7 +35,7 @@ def arm_log(file: Path, seed: int) -> None:
     recording = ArcRecording("", "", time, ARM_STEP * steps, np.zeros((samples, 3)), pause, nothing, nothing, nothing,
                              np.zeros(samples, np.int64))  # fmt: skip
     values = {name: np.array([value]) for name, value in ARM.items()}
-    x, y, z = 1e3 * robot.expected(values, np.zeros((1, 3)), np.array([[1e-3, 0.0, 5e-4]]), recording)[0].T
+    x, y, z = 1e3 * robot.expected(values, np.zeros((1, 3)), np.array([[1e-3, 0.0, 5e-4]]), recording)[0][0].T
     tips = np.stack([y, -z, -x], axis=1) + 0.2 * rng.normal(size=(samples, 3))
     rows = [", ".join(f"{value:.6g}" for value in (*step, *tip)) for step, tip in zip(steps, tips, strict=True)]
     file.write_text("\n".join(rows) + "\n")

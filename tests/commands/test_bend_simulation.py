@@ -91,6 +91,23 @@ def test_three_tendons_bend_in_two_planes_and_not_in_one() -> None:
     assert simulated("wrist.tendons=three", "simulate.reference.kind=circle").course.pulls.shape[1] == 3
 
 
+def test_what_the_controller_does_not_know_is_told_by_tendon() -> None:
+    settings = ("simulate.loop.plant.actuator.slack=[0.0, 1e-3]", "simulate.loop.plant.stiffness_axis_deg=30")
+    study = study_of("simulate.reference.kind=circle", *settings)
+    plan = SIMULATE.plan(study, Inputs())
+    assert plan.startswith("one rollout of 1 s in two planes")
+    assert "actuator.slack.2 is 0.001 m" in plan and "stiffness_axis_deg is 30 deg, believed 0" in plan
+
+
+def test_a_sweep_runs_at_every_point_in_two_planes() -> None:
+    study = study_of("simulate.reference.kind=circle", "simulate.reference.turn=1").model_copy(
+        update={"sweep": ("reference.angle_deg=5,15",)}
+    )
+    table = wristctl.simulate(study).frame()
+    small, large = table["tip_rmse"]
+    assert table["simulate.reference.angle_deg"].tolist() == [5, 15] and 0.0 < small < large
+
+
 @pytest.mark.parametrize(
     ("settings", "what"),
     [

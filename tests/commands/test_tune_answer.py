@@ -34,9 +34,10 @@ def _search(name: str, values: Sequence[float] = (), origin: str = "search") -> 
     return Search(name, gains, -1.0, 4, Tried(np.zeros((1, 1)), np.zeros((1, 1, len(gains)))), 1, (finalist,))
 
 
-def _text(search: Search, lost: dict[str, int]) -> str:
+def _text(search: Search, lost: dict[str, int], elsewhere: dict[str, dict[str, int]] | None = None) -> str:
     name = search.controller
-    answer = answer_of({name: search}, {name: Beside(1e-3, 2e-2, 8)}, {name: lost}, 8, "")
+    others = {name: elsewhere or {}}
+    answer = answer_of({name: search}, {name: Beside(1e-3, 2e-2, 8)}, {name: lost}, 8, "", others)
     assert answer is not None
     return "\n".join(answer.lines())
 
@@ -83,3 +84,22 @@ def test_what_the_gains_do_wrong_is_told_with_the_number_of_cases() -> None:
     text = _text(_search("smc"), {"limit cycle": 3, "failed": 2})
     assert "swings in 3 of 8 cases" in text and "fails in 2 of 8 cases" in text
     assert " of 8 cases" not in _text(_search("smc"), {})
+
+
+def test_the_loops_that_it_was_not_tuned_on_are_told_by_what_the_gains_do_there() -> None:
+    text = " ".join(_text(_search("smc"), {}, {"camera": {"limit cycle": 2}, "exact": {}, "sampled": {}}).split())
+    assert "on other loops: smc holds on exact and sampled, swings on camera." in text
+    assert "other loops" not in _text(_search("smc"), {})
+
+
+def test_a_search_tries_its_gains_on_the_loops_that_no_scenario_is_on() -> None:
+    """A rate that is seen late makes swing what is calm where it is seen at once. By default a rig is searched on."""
+    loops = "{fast: {plant_segments: 1, control_period: 1.0e-3}, slow: {plant_segments: 1, control_period: 0.1}}"
+    done = tune(load_study(None, *STUDY, f"tune.loops={loops}", "tune.controllers=[pid]", "tune.horizon=2.5"))
+    assert done.elsewhere["pid"].keys() == {"slow"} and done.elsewhere["pid"]["slow"]
+    assert done.answer is not None and "on slow" in "\n".join(done.answer.lines())
+    default = load_study(None).tune
+    assert {scenario.loop for scenario in default.scenarios} == {"camera"}
+    assert default.loops["camera"].actuator.level == "tendon" and default.loops["camera"].sensor.level == "camera"
+    named = load_study(None, "tune.loops={mine: {plant_segments: 1}}").tune
+    assert [scenario.loop for scenario in named.scenarios] == ["mine", "mine"]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import replace
 from typing import Any
 
@@ -42,7 +41,7 @@ def unaware(law: Controller) -> Controller:
 
 
 def stroke(law: Controller, gains: str, side: float = 1.0) -> Outcome:
-    reference = STROKE.model_copy(update={"angle_deg": side * (STROKE.angle_deg or math.nan)})
+    reference = STROKE.model_copy(update={"angle_deg": side * STROKE.end_deg})
     followed = motion(reference, WRIST, 4.0, RIG.control_period)
     row = np.array([gains_of(law, gains)])
     return rollout(law, row, [followed], np.zeros(1, np.int64), RIG, WRIST, record="briefly", threads=1)

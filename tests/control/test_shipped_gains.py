@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
+import json
+import math
 import re
+from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
+import pandas as pd
 import pytest
 
 import wristctl
@@ -94,3 +99,31 @@ def test_the_page_prints_what_is_shipped_with_its_run() -> None:
     for family in families():
         for name in shipped_gains._shipped()[family]["controllers"]:
             assert shipped_gains.shipped_gains(name, PREFIX + family).run in text and f"| {name} |" in text
+
+
+def test_a_comparison_renews_errors_and_lost_worlds_and_leaves_the_gains(tmp_path: Path) -> None:
+    """Of two controllers one is lost in 3 of 50 worlds, which is unreliable; their study stays named."""
+    script = script_of_docs("published_gains")
+    argv = ["wristctl", "compare", "camera.yaml", "--out", "/elsewhere", "--set", "a=b"]
+    (tmp_path / "run.json").write_text(json.dumps({"argv": argv, "result_sha256": "abc"}))
+    fates = pd.DataFrame(
+        {"row": ["pid-ff/tuned:camera", "feedforward/default", "pd-ff/tuned:camera"], "rmse": [1e-3, 1.0, 2e-3],
+         "rmse_low": [5e-4, 1.0, 1e-3], "rmse_high": [2e-3, 1.0, 3e-3], "lost": [0.0, 0.0, 3 / 50],
+         "fate": ["ranked", "ranked", "unreliable"]}
+    )  # fmt: skip
+    worlds = SimpleNamespace(family="camera", draws=50)
+    run = SimpleNamespace(
+        path=tmp_path, id="20270101T000000Z-compare-x", data=lambda name: fates,
+        config=SimpleNamespace(compare=SimpleNamespace(worlds=worlds)),
+    )  # fmt: skip
+    before = {name: row | {"tunings": [1e-3, 2e-3]} for name, row in CAMERA["controllers"].items()}  # type: ignore[attr-defined]
+    content = {"camera": CAMERA | {"controllers": before, "command": "wristctl study", "result_sha256": "def"}}
+    renewed = script.with_comparison(content, run)["camera"]
+    rows = renewed["controllers"]
+    assert renewed["worlds"] == 50 and renewed["run"] == CAMERA["run"] and renewed["compared"]["run"] == run.id
+    assert renewed["compared"]["command"] == "wristctl compare camera.yaml --set a=b"
+    assert [rows[name]["lost"] for name in ("pd-ff", "pid-ff")] == [3, 0]
+    assert [rows[name]["reliable"] for name in ("pd-ff", "pid-ff")] == [False, True]
+    assert rows["pd-ff"]["gains"] == before["pd-ff"]["gains"] and rows["pd-ff"]["rmse"] == 2e-3
+    page = script.page({"camera": renewed})
+    assert f"{math.degrees(1e-3):.3g} [" in page and "abc" in page and "def" in page and "On camera pid-ff errs" in page

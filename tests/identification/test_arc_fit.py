@@ -12,6 +12,7 @@ from wristctl.arrays import Array
 from wristctl.identification.arc_fit import ArcFit, fit_arcs, ratio_of, score_of
 from wristctl.identification.arc_robot import ArcRecording, ArcRobot, window_means
 from wristctl.identification.model_choice import chosen_of, tried_models
+from wristctl.identification.real_robots import TEE_PROBE
 from wristctl.wrist.spatial.spatial_kinematics import spatial_backbone, spatial_tips
 
 THIRDS = tuple(k * math.tau / 3.0 for k in range(3))
@@ -36,7 +37,7 @@ def made(
                         np.arange(samples) // 20)  # fmt: skip
     whole = {name: np.array([value]) for name, value in values.items()}
     zero = np.full((1, robot.zeros), 0.01)
-    measured = robot.expected(whole, zero, np.array([slack]), bare)[0]
+    measured = robot.expected(whole, zero, np.array([slack]), bare)[0][0]
     shaken = measured + noise * np.random.default_rng(seed).normal(size=measured.shape)
     return replace(bare, measured=shaken)
 
@@ -78,6 +79,28 @@ def test_friction_that_a_made_robot_has_is_what_its_data_want(term: str, added: 
         found = next(model for model in models if model.terms == ("slack", term)).fits[0].values
         held = [x["inner_friction"] / (1.0 + 1.5 * x["tendon"]) for x in (found, TRUE | added)]
         assert held[0] == pytest.approx(held[1], rel=0.15)
+
+
+def test_a_probe_that_stays_bent_while_its_tendons_are_slack_wants_inner_friction() -> None:
+    samples = 600
+    phase = np.linspace(0.0, 4.0, samples)
+    there = np.where(phase < 1.0, phase, np.where(phase < 3.0, 2.0 - phase, phase - 4.0))
+    spools = 7e-3 * np.stack([there, -there], axis=1)
+    whole, pause = np.ones(samples, bool), np.r_[math.nan, np.ones(samples - 1)]
+    time, still = np.arange(samples, dtype=np.float64), np.zeros((samples, 2))
+    block = np.arange(samples) // 60
+    bare = ArcRecording("loop", "loop", time, spools, still, pause, whole, ~whole, whole, block)
+    values = {"gain": 1.6, "tendon": 6.0, "inner_friction": 0.17, "inner_presliding": 0.03}
+    robot = TEE_PROBE.robot
+    named = {name: np.array([value]) for name, value in values.items()}
+    measured = robot.expected(named, np.array([[0.02, 0.0]]), np.array([[2e-3, 1.5e-3]]), bare)[0][0]
+    measured[:, 0] += math.radians(0.5) * np.random.default_rng(0).normal(size=samples)
+    models = list(tried_models(robot, [[replace(bare, measured=measured)]], False))
+    assert all("creep" not in model.terms for model in models)
+    chosen = chosen_of(models)
+    assert chosen.terms[:2] == ("slack", "inner friction") and math.degrees(chosen.score.error) < 0.6
+    assert chosen.fits[0].values["inner_friction"] == pytest.approx(0.17, rel=0.1)
+    assert math.degrees(models[0].score.error) > 3.0
 
 
 def test_a_robot_without_friction_does_not_want_it() -> None:
@@ -126,10 +149,14 @@ def test_window_means_are_those_of_a_line_and_stay_beyond_its_ends() -> None:
     assert means == pytest.approx(np.array([[0.4, 3.0], [1.1, 3.0], [0.0, 3.0]]), abs=1e-9)
 
 
-def test_a_delay_moves_the_spools_of_a_recording() -> None:
+def test_a_motion_is_seen_later_by_a_delay_whether_samples_are_instants_or_means() -> None:
     recording = made(NECK, TRUE, SLACK, 0.0)
-    moved = recording.delayed(0.25)
-    assert moved[5:] == pytest.approx(recording.spools[4:-1])
+    seen = recording.later(recording.spools, 0.25)
+    assert seen[1:] == pytest.approx(recording.spools[:-1])
+    fine = np.arange(0.0, 60.0, 0.05)
+    course = np.stack([np.interp(fine, recording.time, spool) for spool in recording.spools.T], axis=1)
+    means = replace(recording, course=(fine, course)).delayed(0.25)
+    assert means[20:-20] == pytest.approx(recording.spools[19:-21], abs=2e-4)
 
 
 def test_arcs_of_unequal_length_end_where_equal_ones_do_when_cut_apart() -> None:

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from pydantic import ValidationError
 from scipy import stats
 
 from wristctl.config.families import Family, drawn_value
@@ -115,3 +116,18 @@ def test_the_families_that_are_shipped_are_drawn(file: Path) -> None:
     ((name, family),) = load_study([file]).families.items()
     assert name == file.stem and family.about
     assert len(drawn_cases(family, name, "test", 0, 2, WRIST)) == 2 * len(family.references)
+
+
+def test_settings_that_are_drawn_together_come_from_one_row() -> None:
+    rows = ({"plant.stiffness": 0.5, "plant.damping": 0.05}, {"plant.stiffness": 0.9, "plant.damping": 0.12})
+    family = Family(together=rows, draw={"plant.payload": "0..0.1"})
+    worlds = [world_of(family, "posterior", "test", 0, number).plant for number in range(40)]
+    pairs = {(plant.stiffness, plant.damping) for plant in worlds}
+    assert pairs == {(0.5, 0.05), (0.9, 0.12)}
+    assert len({plant.payload for plant in worlds}) == 40
+    apart = Family(draw={"plant.payload": "0..0.1"})
+    assert [world_of(apart, "posterior", "test", 0, k).plant.payload for k in range(3)] == [
+        plant.payload for plant in worlds[:3]
+    ]
+    with pytest.raises(ValidationError, match="row 1 of together is no world"):
+        Family(together=({"plant.stiffnes": 0.5},))

@@ -189,7 +189,7 @@ def camera_before(rng: np.random.Generator) -> dict[str, Any]:
 def rig_settings(rng: np.random.Generator, number: int) -> dict[str, Any]:
     """A sound rig drawn from those that there may be, homed, in one plane, pushed by a person."""
     late = rng.uniform(-0.02, 0.02)
-    bench = {
+    bench: dict[str, Any] = {
         "plant": {
             "stiffness_scale": rng.uniform(0.6, 1.2), "tendon_radius": WRIST.tendon_radius * rng.uniform(0.97, 1.03),
             "creep": 0.04,
@@ -202,6 +202,10 @@ def rig_settings(rng: np.random.Generator, number: int) -> dict[str, Any]:
         "motors": {"slack": tuple(rng.uniform(1e-4, 5e-4, 4).tolist())},
         "person": {"takes": 1.0},
     }  # fmt: skip
+    link, timer = (("16u2", 16e-3), ("ch340", 16e-3), ("ftdi", 1e-3))[rng.integers(3)]
+    bench["line"] = {"adapter": link, "latency_timer": timer}
+    bench["plant"]["inner_friction"] = rng.uniform(0.0, 0.02)
+    bench["actuator"]["friction"] = rng.uniform(0.05, 0.2)
     own = {
         "calibration": None, "positions": "find",
         "directions": (("ulnar", "flexion", "radial", "extension")[number % 4],),

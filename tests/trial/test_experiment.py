@@ -148,13 +148,12 @@ def test_co_contraction_in_a_trial_is_found_behind_it_and_never_beyond_the_motor
     assert 30.0 < done.bench.truth().pull.max() < 43.5
 
 
-def test_no_law_asks_for_more_than_the_motors_hold_and_nothing_is_pulled_beyond_the_least_of_limits(
+def test_no_law_asks_for_more_than_the_motors_hold_and_no_tension_is_let_pass_beyond_the_wrists(
     experiment: Run,
 ) -> None:
     done = experiment(safety={"motor_pull": 30.0, "tension": 45.0})
     assert done.experiment._wrist.tension_limit == pytest.approx(24.0)
-    assert done.experiment._settings.safety.tension == 30.0
-    strong = settings_of(safety={"motor_pull": 200.0, "tension": 150.0}).within(WRIST)
-    assert strong.safety.tension == WRIST.tension_limit == 60.0
+    assert done.experiment._settings.safety.tension == 45.0
+    assert settings_of(safety={"tension": 150.0}).within(WRIST).safety.tension == WRIST.tension_limit == 60.0
     with pytest.raises(UserError, match="cannot hold a pretension of 2 N"):
         spared(WRIST, settings_of(safety={"motor_pull": 2.4}))

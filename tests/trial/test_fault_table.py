@@ -6,14 +6,14 @@ import itertools
 import os
 from concurrent.futures import ProcessPoolExecutor
 from multiprocessing import get_context
-from typing import Any
 
 import numpy as np
 import pytest
 
 from tests.trial.fault_cases import CASES, EXCEPTED, PHASES, Case, Phase
 from tests.trial.fault_judging import Judged, by_phase, table
-from tests.trial.fault_runs import fan_out, from_power_on, perform, rig_settings, sound_course
+from tests.trial.fault_runs import fan_out, from_power_on, sound_course
+from tests.trial.sound_rigs import ended_on
 
 THOROUGH = bool(os.environ.get("WRISTCTL_THOROUGH"))
 thorough = pytest.mark.skipif(not THOROUGH, reason="with WRISTCTL_THOROUGH: takes minutes")
@@ -82,16 +82,11 @@ def test_two_faults_at_once_are_caught(phase: Phase) -> None:
     assert not [each for each in wrong(judged) if not set(each.name.split(" + ")) & set(EXCEPTED)]
 
 
-def _alarm(number: int) -> tuple[int, str, dict[str, Any]]:
-    settings = rig_settings(np.random.default_rng([20261123, number]), number)
-    return number, perform(settings, number).reason, settings
-
-
 @thorough
 def test_no_sound_rig_raises_a_false_alarm() -> None:
     sound_course("homing")
     with ProcessPoolExecutor(WORKERS, get_context("fork")) as pool:
-        ended = list(pool.map(_alarm, range(RIGS)))
+        ended = list(pool.map(ended_on, range(RIGS)))
     alarms = [each for each in ended if each[1]]
     print(f"\n{RIGS - len(alarms)} of {RIGS} sound rigs without a false alarm")
     assert not alarms

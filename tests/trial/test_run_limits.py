@@ -86,11 +86,11 @@ def test_a_proposed_setting_makes_the_proposed_limit_and_has_its_margin(name: st
     assert made == pytest.approx(line.proposed)
 
 
-def test_no_pull_is_proposed_beyond_what_motors_and_wrist_bear() -> None:
-    (line,) = (line for line in nearness([logged(pull=41.0)]) if line.limit.name == "pull")
-    assert line.setting == "safety.tension=42" and line.proposed == 42.0
-    (less,) = (line for line in nearness([logged(pull=20.0)]) if line.limit.name == "pull")
-    assert less.setting == "safety.tension=30"
+def test_no_pull_is_proposed_beyond_what_the_wrist_bears() -> None:
+    (line,) = (line for line in nearness([logged(pull=50.0)]) if line.limit.name == "pull")
+    assert line.setting == "safety.tension=60" and line.proposed == 60.0
+    (less,) = (line for line in nearness([logged(pull=22.0)]) if line.limit.name == "pull")
+    assert less.setting == "safety.tension=33"
 
 
 def test_what_a_stopped_run_shows_proposes_nothing() -> None:

@@ -17,7 +17,7 @@ ENDS = np.array([1, 1, 1])
 
 def _one(variants: int = 1, arms: Array = RADIUS * TOWARD, ends: Array = ENDS, **ways: float) -> QuasistaticArcs:
     values = {"friction": 0.0, "sheath": 0.0, "presliding": 1e-4, "inner": 0.0, "inner_presliding": 0.01} | ways
-    values = {"creep": 0.0, "creep_time": 1.0} | values
+    values = {"creep": 0.0, "creep_time": 1.0, "damping": 0.0} | values
     rows = {name: np.full(variants, value) for name, value in values.items()}
     count, tendons = arms.shape[1], len(arms)
     return QuasistaticArcs(
@@ -86,6 +86,25 @@ def test_creep_lets_a_held_bend_grow_by_the_relaxed_stiffness() -> None:
     assert bend[-1] == pytest.approx(0.4 * STIFF / (0.5 + STIFF), rel=1e-3)
     half = bend[0] + 0.5 * (bend[-1] - bend[0])
     assert 0.8 < np.interp(half, bend, 0.1 * np.arange(400)) < 1.6
+
+
+def test_damping_lets_a_bend_come_late_by_its_time_over_the_whole_stiffness() -> None:
+    arcs = _one(arms=np.array([[RADIUS, 0.0]]), ends=np.array([1]), damping=1.8)
+    step, samples = 0.002, 500
+    reeled = np.r_[0.0, np.full(samples - 1, 0.02)][None, :, None]
+    bend = arcs.rest(reeled, _pause(samples, step))[0, :, 0]
+    end = 0.4 * STIFF / (1.0 + STIFF)
+    late = 1.8 / (1.0 + STIFF)
+    time = step * np.arange(samples)
+    assert bend == pytest.approx(end * -np.expm1(-time / late), abs=0.01 * end)
+
+
+def test_pulls_at_the_spools_balance_the_arc() -> None:
+    bend = 0.3 * np.array([[0.6, -0.8]])
+    reeled = _reeled(bend)
+    rest = _one().rest(reeled, _pause(1))
+    pulls = _one().pulls(reeled, rest)[0, 0]
+    assert RADIUS * pulls @ TOWARD == pytest.approx(rest[0, 0], rel=1e-6) and (pulls >= 0.0).all()
 
 
 def test_variants_and_recordings_one_after_the_other_are_as_alone() -> None:

@@ -110,9 +110,12 @@ COMMANDS = {
         "wristctl.commands.identify.command:IDENTIFY",
         _MAIN,
         "Find a real wrist's parameters from measured motions.",
+        shortcuts=("columns",),
         argument="runs",
+        advanced=("columns",),
         examples=(
             "wristctl identify latest:hw-run",
+            "wristctl identify my.csv",
             "wristctl identify UPRIGHT_RUN LEVEL_RUN --set fix.friction=0.1",
             "wristctl tune experiments/paper.yaml --from-identified latest:identify",
         ),

@@ -112,10 +112,15 @@ def opened(
         elif chosen:
             by_role[need.leaf] = _one(chosen, need, out)
         elif not need.optional:
-            latest = Argument(need.leaf, f"latest:{need.kind}", positional=several)
-            fix = (latest, f", or the path or id of a {need.kind} run")
-            raise UserError(f"{kind} needs a {need.kind} run", f"{kind}.{need.leaf}", fix)
+            raise missing_run(kind, need, several)
     return Inputs(by_role)
+
+
+def missing_run(kind: str, need: EarlierRun, several: bool) -> UserError:
+    """Error for a command that was not told an earlier run that it needs."""
+    latest = Argument(need.leaf, f"latest:{need.kind}", positional=several)
+    fix = (latest, f", or the path or id of a {need.kind} run")
+    return UserError(f"{kind} needs a {need.kind} run", f"{kind}.{need.leaf}", fix)
 
 
 def named_for_good(inputs: Inputs, section: Any, out: Path) -> Any:

@@ -68,6 +68,8 @@ def prepare(
     files
         Files of the study; where one is the configuration of a run, inputs may also be beside that run.
     """
+    if procedure.completed is not None:
+        study = procedure.completed(study)
     section = procedure.section(study)
     beside = [file.absolute().parent.parent for file in files if (file.parent / MANIFEST).is_file()]
     inputs = opened(procedure.kind, section, procedure.needs, named_inputs or {}, out, beside)
@@ -78,8 +80,6 @@ def prepare(
     check_motions(study, procedure.kind)
     study, foreign = adopted(study, procedure.kind)
     study = with_presets(study, procedure.kind)
-    if procedure.completed is not None:
-        study = procedure.completed(study)
     warn_of_plain(procedure, study)
     return Prepared(procedure, study, inputs, foreign)
 

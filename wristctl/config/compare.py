@@ -2,7 +2,7 @@
 
 from wristctl.config.controller_row import REPETITIONS, Row
 from wristctl.config.families import Worlds
-from wristctl.config.loop import LOOPS, DirectionName, InverseName, Loop, Loops, Reference
+from wristctl.config.loop import CAMERA, LOOPS, DirectionName, InverseName, Loop, Loops, Reference
 from wristctl.config.section import Section, choice, quantity
 from wristctl.config.tune import TuneSettings
 
@@ -18,9 +18,7 @@ _ROWS = tuple(Row(controller=name, gains=gains) for presets in _PRESETS for name
 # Loops compared on where none are named: as believed, behind a rig, pushed, and of a wrist softer than believed.
 _LOOPS: dict[str, Loop] = {
     **{name: loop for name, loop in LOOPS.items() if loop == Loop()},
-    "camera": Loop.model_validate(
-        {"control_period": 5e-3, "actuator": {"level": "tendon", "sheath": 1.0}, "sensor": {"level": "camera"}}
-    ),
+    "camera": CAMERA,
     "push": Loop.model_validate({"disturbances": {"push": {"force": 2.0}}}),
     "soft": Loop.model_validate({"plant": {"stiffness_scale": 0.8}}),
 }

@@ -15,6 +15,8 @@ SplitName = Literal["test", "sealed"]
 _NUMBER = r"([-+]?[0-9]+\.?[0-9]*(?:e[+-]?[0-9]+)?)"
 _RANGE = re.compile(rf"(x?){_NUMBER} ?\.\. ?x?{_NUMBER}( log)?", re.IGNORECASE)
 _OF_REFERENCE = "reference."
+TOGETHER = "together"
+"""Share that chooses the row of settings that are drawn together."""
 
 # Source of a drawn leaf: `0..3` evenly, `8e3..4e4 log` evenly in the logarithm, `x0.7..1.3` as multiples of the
 # believed value, or a list to choose from.
@@ -65,6 +67,9 @@ class Family(Section):
     draw: dict[str, Drawn] = choice(
         {}, "settings of the loop, or of its references as reference.angle_deg, and what each is drawn from"
     )
+    together: tuple[dict[str, float], ...] = choice(
+        (), "rows of settings that are drawn together, one row a world, as an identification's posterior has them"
+    )
     references: tuple[Reference, ...] = choice((Reference(),), "motions, each followed in every world", min_length=1)
     horizon: float = quantity(3.0, "s", "duration of one rollout", "assumed", gt=0)
     about: str = choice("", "what is asked of a controller here, in a few words")
@@ -75,6 +80,9 @@ class Family(Section):
         for key, source in self.draw.items():
             if not key.startswith(_OF_REFERENCE):
                 _put(data, key, drawn_value(source, shares[key]))
+        if self.together:
+            for key, value in self.together[int(shares.get(TOGETHER, 0.0) * len(self.together))].items():
+                _put(data, key, value)
         return Loop.model_validate(data)
 
     def motion(self, number: int, shares: Mapping[str, float]) -> Reference:
@@ -88,6 +96,12 @@ class Family(Section):
     @model_validator(mode="after")
     def _all_worlds_can_be(self) -> Self:
         """Check the worlds with one leaf at either end and the others in the middle."""
+        for number in range(len(self.together)):
+            try:
+                self.world(dict.fromkeys(self.draw, 0.5) | {TOGETHER: (number + 0.5) / len(self.together)})
+            except ValidationError as error:
+                context = {"number": number + 1, "why": error.errors()[0]["msg"]}
+                raise PydanticCustomError("draw", "row {number} of together is no world: {why}", context) from error
         for key, source in self.draw.items():
             if not isinstance(source, str) and not source:
                 raise PydanticCustomError("empty_draw", "{key} is drawn from nothing", {"key": key})

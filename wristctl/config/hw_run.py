@@ -46,7 +46,7 @@ class Safety(Section):
         42.0, "N", "largest pull of a motor at its drive's current, beyond which it slips", "1.0 A: rig.md", gt=0
     )
     tension: float = quantity(
-        60.0, "N", "largest by spool position and estimated angle; motor_pull or wrist.tension_limit where less",
+        60.0, "N", "largest tension by spool position and estimated angle; wrist.tension_limit if less",
         "assumed", gt=0,
     )  # fmt: skip
     travel: float = quantity(0.020, "m", "furthest a spool may reel in or pay out from zero", "assumed", gt=0)
@@ -104,8 +104,8 @@ class RigSettings(Section):
     optics: str | None = choice(None, "calibrate-camera run; without one the camera looks square at the plane")
 
     def within(self, wrist: WristParameters) -> Self:
-        """Settings whose largest tension is no more than the wrist bears and the motors can pull."""
-        tension = min(self.safety.tension, self.safety.motor_pull, wrist.tension_limit)
+        """Settings whose largest tension is no more than the wrist bears."""
+        tension = min(self.safety.tension, wrist.tension_limit)
         return self.model_copy(update={"safety": self.safety.model_copy(update={"tension": tension})})
 
     @model_validator(mode="after")

@@ -2,6 +2,7 @@
 
 from typing import Literal
 
+from wristctl.config.given_files import columns_of_file, given_file
 from wristctl.config.section import Section, choice, quantity
 
 
@@ -22,7 +23,9 @@ class Fixed(Section):
 class IdentifySettings(Section):
     """Parameters of a real wrist from its spools' logged positions and its marker's angles."""
 
-    runs: tuple[str, ...] = choice((), "hw-run runs: paths, ids or latest:hw-run")
+    runs: tuple[str, ...] = choice((), "hw-run runs: paths, ids or latest:hw-run; or open logs (docs/open-log.md)")
+    logs: tuple[str, ...] = given_file("open logs (docs/open-log.md)", ())
+    columns: str | None = columns_of_file()
     fix: Fixed = Fixed()
     segments: int = choice(4, "constant-curvature segments of the model", "as simulated", ge=1, le=8)
     step: float = quantity(1e-3, "s", "integration step", "as simulated", gt=0, le=5e-3)

@@ -185,6 +185,10 @@ LOOPS: dict[str, Loop] = {
     "sampled": Loop(plant_segments=1),
     "four-segments": Loop(),
 }
+# A rig as it is believed: steppers, elastic tendons in sheaths and a camera of 60 Hz, at 200 Hz.
+CAMERA = Loop.model_validate(
+    {"control_period": 5e-3, "actuator": {"level": "tendon", "sheath": 1.0}, "sensor": {"level": "camera"}}
+)
 
 
 def _from_built_in(loops: Any) -> Any:

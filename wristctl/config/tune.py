@@ -1,14 +1,14 @@
 """Settings of `tune`: a search for gains."""
 
 from collections.abc import Mapping
-from typing import Annotated, Self
+from typing import Annotated, Any, Self
 
 from pydantic import AfterValidator, model_validator
 
 from wristctl.config.choices import METRICS, OPTIMISERS
 from wristctl.config.controller_row import REPETITIONS, ControllerName
 from wristctl.config.families import TuningWorlds
-from wristctl.config.loop import LOOPS, Loops, Reference, Scenario
+from wristctl.config.loop import CAMERA, LOOPS, Loops, Reference, Scenario
 from wristctl.config.section import OneOf, OpenSection, Parameter, Section, choice, quantity
 from wristctl.errors import Unfitting
 
@@ -54,6 +54,17 @@ def _each_once(names: tuple[str, ...]) -> tuple[str, ...]:
     return names
 
 
+# Motions searched on where none are named: a move, and a sine to both sides.
+_MOTIONS = (
+    Reference(kind="minimum-jerk", angle_deg=20.0, duration=1.5),
+    Reference(kind="two-sided-sine", angle_deg=20.0, frequency=0.5),
+)
+
+
+def _scenarios(loop: str) -> tuple[Scenario, ...]:
+    return tuple(Scenario(loop=loop, reference=reference) for reference in _MOTIONS)
+
+
 Controllers = Annotated[tuple[ControllerName, ...], AfterValidator(_each_once)]
 
 
@@ -71,16 +82,15 @@ class TuneSettings(Section):
     objective: Objective = Objective()
     worlds: TuningWorlds = TuningWorlds()
     scenarios: tuple[Scenario, ...] = choice(
-        (
-            Scenario(reference=Reference(kind="step", angle_deg=20.0)),
-            Scenario(reference=Reference(kind="minimum-jerk", angle_deg=20.0, duration=1.5)),
-        ),
-        "tuning scenarios, where no worlds are named; compare refuses any of them",
+        _scenarios("camera"),
+        "tuning scenarios, where no worlds are named; without any, two motions on the first of the loops; compare "
+        "refuses any of them",
         min_length=1,
     )
     loops: Loops = choice(
-        LOOPS,
-        "the loops that scenarios may name; naming any replaces these (`exact: {}` is the built-in one)",
+        {"camera": CAMERA, **LOOPS},
+        "the loops that scenarios may name, on the others of which the gains are tried when they are found; naming any "
+        "replaces these (`exact: {}` is the built-in one)",
         min_length=1,
     )
     horizon: float = quantity(5.0, "s", "duration of one rollout", "assumed", gt=0)
@@ -88,3 +98,12 @@ class TuneSettings(Section):
     network: str | None = choice(None, "train run behind references with inverse: network")
     from_identified: str | None = choice(None, "identify run whose parameters replace the study's")
     resume: str | None = choice(None, "tune run that was cut short: what it has tried is not run again")
+
+    @model_validator(mode="before")
+    @classmethod
+    def _on_the_first_loop(cls, settings: Any) -> Any:
+        """Settings that name loops and no scenario have the usual motions on the first of these loops."""
+        loops = settings.get("loops") if isinstance(settings, Mapping) else None
+        if not isinstance(loops, Mapping) or not loops or "scenarios" in settings:
+            return settings
+        return {**settings, "scenarios": _scenarios(str(next(iter(loops))))}

@@ -33,7 +33,7 @@ class ShippedGains(NamedTuple):
     reliable: bool
     """Whether they are not shown to be lost in more than the tolerated share of the worlds."""
     run: str
-    """Identifier of the study's run."""
+    """Identifier of the run that counted them: the study's, or a comparison of controllers that changed since."""
 
 
 def is_shipped(gains: object) -> bool:
@@ -60,7 +60,7 @@ def shipped_gains(controller: str, gains: str) -> ShippedGains:
     conditions = Conditions(tuple(limits["period"]), tuple(limits["tendon_stiffness"])) if limits else None
     return ShippedGains(
         dict(row["gains"]), of_family["about"], conditions, row["rmse"], row["lost"], of_family["worlds"],
-        row["reliable"], of_family["run"],
+        row["reliable"], of_family.get("compared", of_family)["run"],
     )  # fmt: skip
 
 

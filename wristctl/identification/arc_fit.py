@@ -21,6 +21,8 @@ _ZERO_SCALE = {"bend": 0.02, "tip": 2e-3}
 _ZERO_RANGE, _SLACK_RANGE, _STEP = 1.0, 1.5e-2, 1e-4
 # Error of a single sample that the priors are held against: 1 deg, or 2 mm.
 _ERROR = {"bend": math.radians(1.0), "tip": 2e-3}
+# The same of a tension [N].
+_TENSION_ERROR = 0.5
 
 
 class Score(NamedTuple):
@@ -76,8 +78,10 @@ class ArcFit:
         """Expected less measured (T, d) of each recording [rad or m]."""
         values = {name: np.array([value]) for name, value in self.values.items()}
         return [
-            self.robot.expected(values, *_parted(self.own[recording.session][None], self.robot), recording)[0]
-            - recording.measured
+            np.nan_to_num(
+                self.robot.expected(values, *_parted(self.own[recording.session][None], self.robot), recording)[0][0]
+                - recording.measured
+            )
             for recording in self.recordings
         ]
 
@@ -129,7 +133,7 @@ class ArcFit:
         for k, (name, unknown) in enumerate(self.robot.unknowns(self.terms).items()):
             value, half = float(self.x[k]), 1.96 * problem.scale[k] * math.sqrt(max(0.0, float(variance[k])))
             low, high = value - float(half), value + float(half)
-            at_end = min(value - unknown.low, unknown.high - value) < 1e-3 * (unknown.high - unknown.low)
+            at_end = min(value - unknown.low, unknown.high - value) < 1e-2 * unknown.scale
             wide = half > max(abs(value), 3.0 * unknown.scale)
             ends = (max(low, unknown.low), high)
             if wide or (at_end and unknown.low != 0.0):
@@ -239,13 +243,22 @@ class _Problem:
         own = self.own_of(x)
         rows = [self._of(values, own[recording.session], recording, "fitted") for recording in self.fitted]
         slacks = [own[session][:, self.robot.zeros :] / SLACK_ERROR for session in self.sessions]
-        residuals: Array = np.concatenate(rows + slacks, axis=1)
+        beforehand = [
+            ((values[name] - self.robot.begin[name]) / error)[:, None] for name, error in self.robot.known_to.items()
+        ]
+        residuals: Array = np.concatenate(rows + slacks + beforehand, axis=1)
         return residuals
 
     def _of(self, values: Mapping[str, Array], own: Array, recording: ArcRecording, part: str) -> Array:
-        expected = self.robot.expected(values, *_parted(own, self.robot), recording)
-        wrong = (expected - recording.measured)[:, getattr(recording, part)]
-        return np.asarray(wrong.reshape(len(own), -1) / _ERROR[self.robot.measured])
+        expected, pulls = self.robot.expected(values, *_parted(own, self.robot), recording)
+        chosen = getattr(recording, part)
+        error = _ERROR[self.robot.measured]
+        wrong = np.nan_to_num((expected - recording.measured)[:, chosen].reshape(len(own), -1)) / error
+        if recording.tensions is None:
+            return np.asarray(wrong)
+        tensions = recording.tensions[chosen]
+        off = np.where(np.isfinite(tensions), pulls[:, chosen] - tensions, 0.0).reshape(len(own), -1)
+        return np.concatenate([wrong, off / _TENSION_ERROR], axis=1)
 
     def blocks(self, count: int) -> NDArray[np.int64]:
         """Block of each residual; those of the slack have one for themselves."""
@@ -254,6 +267,8 @@ class _Problem:
             block = np.unique(recording.block[recording.fitted], return_inverse=True)[1] + first
             first = int(block.max()) + 1
             numbers.append(np.repeat(block, recording.measured.shape[1]))
+            if recording.tensions is not None:
+                numbers.append(np.repeat(block, recording.tensions.shape[1]))
         of_samples = np.concatenate(numbers)
         return np.concatenate([of_samples, np.full(count - len(of_samples), first)])
 
@@ -268,7 +283,7 @@ class _Problem:
         for k, session in enumerate(self.sessions):
             first = next(recording for recording in self.fitted if recording.session == session)
             if self.robot.measured == "tip":
-                straight = first.measured[first.fitted][0] - [sum(self.robot.lengths), 0.0, 0.0]
+                straight = np.nan_to_num(first.measured[first.fitted][0]) - [sum(self.robot.lengths), 0.0, 0.0]
                 zeros[k * len(self.own_scale) :][:3] = straight
         x = np.r_[unknowns, zeros]
         low, high = self.bounds()
@@ -297,7 +312,7 @@ def _least(residuals: Callable[[Array], Array], begin: Array, scale: Array, boun
     def slopes(x: Array) -> Array:
         return _slopes(residuals, x, scale)
 
-    fitted = least_squares(of_one, begin, slopes, bounds, x_scale=scale, ftol=1e-6, xtol=1e-6, max_nfev=100)
+    fitted = least_squares(of_one, begin, slopes, bounds, x_scale=scale, ftol=1e-5, xtol=1e-6, max_nfev=60)
     return np.asarray(fitted.x)
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Literal, NamedTuple
 
@@ -16,7 +16,6 @@ from wristctl.wrist.quasistatic_arcs import QuasistaticArcs
 from wristctl.wrist.spatial.spatial_kinematics import spatial_tips
 
 Term = Literal["tendon friction", "inner friction", "slack", "creep"]
-TERMS: tuple[Term, ...] = ("tendon friction", "inner friction", "slack", "creep")
 """What a model may have beside elastic arcs and tendons."""
 
 
@@ -32,7 +31,7 @@ class ArcUnknown(NamedTuple):
 
 
 UNKNOWNS: dict[str, ArcUnknown] = {
-    "gain": ArcUnknown(1.0, 0.5, 1.5, 0.1, "", "length reeled in, over that published for the winch and radius"),
+    "gain": ArcUnknown(1.0, 0.2, 5.0, 0.1, "", "length reeled in, over that published for the winch and radius"),
     "tendon": ArcUnknown(10.0, 0.05, 200.0, 3.0, "", "stiffness of a tendon times squared radius over the first arc's"),
     "stiffness": ArcUnknown(1.0, 0.1, 10.0, 0.3, "", "bending stiffness of an arc over that of the first"),
     "softening": ArcUnknown(0.8, -0.5, 0.999, 0.1, "1/kg", "share of the bending stiffness that a kilogram takes away"),
@@ -48,6 +47,8 @@ UNKNOWNS: dict[str, ArcUnknown] = {
     "inner_presliding": ArcUnknown(0.03, 1e-3, 0.5, 0.02, "rad", "bend in which that turns round"),
     "creep": ArcUnknown(0.1, 0.0, 0.9, 0.1, "", "share of the bending stiffness that relaxes"),
     "creep_time": ArcUnknown(5.0, 0.5, 100.0, 5.0, "s", "time constant of that"),
+    "damping": ArcUnknown(0.05, 0.0, 5.0, 0.05, "s", "damping of bending over its stiffness"),
+    "force": ArcUnknown(0.6, 1e-4, 1e3, 0.2, "N m/rad", "bending stiffness of the first arc, by the tendons' tensions"),
 }  # fmt: skip
 """By name; of a number for each arc the name is followed by _ and the arc's number."""
 OF_TERM: dict[Term, tuple[str, ...]] = {
@@ -78,10 +79,14 @@ class ArcRobot:
     """Unknowns of its model without any term."""
     begin: Mapping[str, float]
     """Where the search begins, other than UNKNOWNS have it."""
+    known_to: Mapping[str, float] = field(default_factory=dict)
+    """How well unknowns are known beforehand: standard deviations from where the search begins."""
+    timed: bool = True
+    """Whether its recordings have times, without which nothing is told of creep."""
 
     def unknowns(self, terms: Sequence[Term]) -> dict[str, ArcUnknown]:
         """The unknowns of its model with these terms, those of arcs numbered."""
-        names = [*self.base, *(name for term in TERMS if term in terms for name in OF_TERM[term])]
+        names = [*self.base, *(name for term in OF_TERM if term in terms for name in OF_TERM[term])]
         chosen = {}
         for name in names:
             unknown = UNKNOWNS[name] if name in UNKNOWNS else UNKNOWNS[name.rpartition("_")[0]]
@@ -93,8 +98,12 @@ class ArcRobot:
         """Numbers of the sensor's zero: of two bends, or of the tip's place."""
         return 2 if self.measured == "bend" else 3
 
-    def expected(self, values: Mapping[str, Array], zero: Array, slack: Array, recording: ArcRecording) -> Array:
-        """Bends (V, T, 2) [rad] or tips (V, T, 3) [m] of V variants.
+    def expected(
+        self, values: Mapping[str, Array], zero: Array, slack: Array, recording: ArcRecording
+    ) -> tuple[Array, Array]:
+        """Bends (V, T, 2) [rad] or tips (V, T, 3) [m] of V variants, and the pulls at their spools (V, T, M) [N].
+
+        Without the unknown "force" pulls are over the first arc's stiffness [1/m].
 
         Parameters
         ----------
@@ -105,25 +114,25 @@ class ArcRobot:
         """
         gain = values.get("gain", np.ones(len(zero)))
         delays = values.get("delay")
-        if delays is None:
-            spools = np.broadcast_to(recording.spools, (len(zero), *recording.spools.shape))
-        else:
+        spools = np.broadcast_to(recording.spools, (len(zero), *recording.spools.shape))
+        if delays is not None and recording.course is not None:
             different, which = np.unique(delays, return_inverse=True)
             spools = np.stack([recording.delayed(delay) for delay in different])[which]
-        coordinates = self.arcs(values, recording.mass, len(zero)).rest(
-            gain[:, None, None] * spools - slack[:, None, :], recording.pause
-        )
+        reeled = gain[:, None, None] * spools - slack[:, None, :]
+        robot = self.arcs(values, recording.mass, len(zero))
+        coordinates = robot.rest(reeled, recording.pause)
+        pulls = robot.pulls(reeled, coordinates) * values.get("force", np.ones(len(zero)))[:, None, None]
+        if delays is not None and recording.course is None:
+            coordinates = np.stack([recording.later(*late) for late in zip(coordinates, delays, strict=True)])
         arcs = len(self.lengths)
         bends = coordinates[..., : 2 * arcs].reshape(*coordinates.shape[:2], arcs, 2)
         if self.measured == "bend":
-            total: Array = bends.sum(axis=2) + zero[:, None, :]
-            return total
+            return bends.sum(axis=2) + zero[:, None, :], pulls
         tips = spatial_tips(coordinates[..., : 2 * arcs], self.lengths)
         tilt_y, tilt_z = (values.get(name, np.zeros(len(zero)))[:, None] for name in ("tilt_y", "tilt_z"))
         x, y, z = np.moveaxis(tips, -1, 0)
         leant = np.stack([x - tilt_y * y - tilt_z * z, y + tilt_y * x, z + tilt_z * x], axis=-1)
-        placed: Array = leant + zero[:, None, :]
-        return placed
+        return leant + zero[:, None, :], pulls
 
     def arcs(self, values: Mapping[str, Array], mass: float, variants: int) -> QuasistaticArcs:
         """The arcs under a mass [kg] on top; stiffness is over that of the first arc."""
@@ -148,12 +157,13 @@ class ArcRobot:
         return QuasistaticArcs(
             arms, ends, stiffness, tendon, others["friction"], others["sheath"], others["presliding"],
             others["inner_friction"], others["inner_presliding"], others["creep"], others["creep_time"],
+            others["damping"],
         )  # fmt: skip
 
 
 _ABSENT = {
     "friction": 0.0, "sheath": 0.0, "presliding": 1.0, "inner_friction": 0.0, "inner_presliding": 1.0, "creep": 0.0,
-    "creep_time": 1.0,
+    "creep_time": 1.0, "damping": 0.0,
 }  # fmt: skip
 
 
@@ -174,7 +184,7 @@ class ArcRecording:
     spools: Array
     """Length that each spool has reeled in (T, M) [m]."""
     measured: Array
-    """Bends (T, 2) [rad] or tips (T, 3) [m]."""
+    """Bends (T, 2) [rad] or tips (T, 3) [m]; a column is nan where nobody measured it."""
     pause: Array
     """Time since the sample before (T,) [s]; nan where a motion begins at the straight robot."""
     fitted: NDArray[np.bool_]
@@ -187,15 +197,20 @@ class ArcRecording:
     """Number of the block of samples that are drawn together (T,)."""
     mass: float = 0.0
     """On top of the robot [kg]."""
+    tensions: Array | None = None
+    """Measured pulls at the spools (T, M) [N], nan where there is none."""
     course: tuple[Array, Array] | None = None
     """Fine times (F,) [s] and spools (F, M) [m], where samples are means over the time between two."""
 
     def delayed(self, delay: float) -> Array:
-        """Spools (T, M) [m] a delay [s] earlier: means over the time of a sample."""
-        if self.course is None:
-            moved = [np.interp(self.time - delay, self.time, spool) for spool in self.spools.T]
-            return np.stack(moved, axis=1)
+        """Spools (T, M) [m] a delay [s] earlier, by their course: means over the time of a sample."""
+        assert self.course is not None
         return window_means(*self.course, self.time - delay, float(np.median(np.diff(self.time))))
+
+    def later(self, coordinates: Array, delay: float) -> Array:
+        """Coordinates (T, N) as they are seen a delay [s] later."""
+        moved = [np.interp(self.time - delay, self.time, column) for column in coordinates.T]
+        return np.stack(moved, axis=1)
 
 
 def window_means(time: Array, values: Array, at: Array, width: float) -> Array:

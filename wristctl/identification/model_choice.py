@@ -13,7 +13,8 @@ from functools import cached_property
 from wristctl.identification.arc_fit import ArcFit, Score, fit_arcs, ratio_of, score_of
 from wristctl.identification.arc_robot import OF_TERM, ArcRecording, ArcRobot, Term
 
-# Beginnings of the search for presliding [m] and [rad]: its errors have several minima.
+# Beginnings of the search for presliding [m] and [rad]: its errors have several minima. Else it begins where the model
+# without the term ends.
 _BEGINS = ({"presliding": 5e-5, "inner_presliding": 0.01}, {"presliding": 5e-4, "inner_presliding": 0.1})
 
 
@@ -75,7 +76,7 @@ def tried_models(
     yield slack
     base = plain if slack.verdict == "unwanted" else slack
     others = list[TriedModel]()
-    for term in (term for term in OF_TERM if term != "slack"):
+    for term in (term for term in OF_TERM if term != "slack" and (robot.timed or term != "creep")):
         others.append(_tried(robot, cases, centred, (*base.terms, term), base))
         yield others[-1]
     wanted = sorted((model for model in others if model.verdict == "wanted"), key=lambda model: model.score.error)
@@ -96,11 +97,12 @@ def _tried(
     robot: ArcRobot, cases: Sequence[Sequence[ArcRecording]], centred: bool, terms: tuple[Term, ...],
     without: TriedModel | None,
 ) -> TriedModel:  # fmt: skip
+    added = [name for term in terms for name in OF_TERM[term]]
+    begins = _BEGINS if any(name.endswith("presliding") for name in added) else ({},)
     fits = []
     for number, recordings in enumerate(cases):
-        begin = without.fits[number].values if without else {}
-        added = [name for term in terms for name in OF_TERM[term]]
-        begins = _BEGINS if any(name.endswith("presliding") for name in added) else ({},)
-        tried = [fit_arcs(robot, terms, recordings, centred, {**start, **begin}) for start in begins]
+        before = without.fits[number].values if without else {}
+        starts = [{**begin, **before} for begin in begins] + [{}] * (terms == ("slack",))
+        tried = [fit_arcs(robot, terms, recordings, centred, start) for start in starts]
         fits.append(min(tried, key=lambda fit: fit.cost))
     return TriedModel(terms, tuple(fits), without)

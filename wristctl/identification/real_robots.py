@@ -80,7 +80,7 @@ def _neck_recording(file: Path, name: str, fitted: bool, zeroing: float) -> ArcR
     return ArcRecording(
         name, name, at, window_means(time, spools, at, _PERIOD), window_means(time, bends, at, _PERIOD), pause,
         whole & fitted, begin & (not fitted), ~begin & (not fitted), (at // _BLOCK).astype(np.int64),
-        float(log.columns["mass"][0]), (time, spools),
+        float(log.columns["mass"][0]), course=(time, spools),
     )  # fmt: skip
 
 
@@ -220,7 +220,7 @@ DEEPC_ARM = RealRobot(
 TEE_PROBE = RealRobot(
     title="the TEE probe",
     citation="bfortuno/TEE-Probe_hysteresis_id @dba400e, no licence",
-    robot=ArcRobot((0.08,), (0.0, math.pi), 0.010, (1, 1), "bend", ("gain", "tendon"), {"gain": 1.0}),
+    robot=ArcRobot((0.08,), (0.0, math.pi), 0.010, (1, 1), "bend", ("gain", "tendon"), {}, timed=False),
     read=_probe,
     parts="each sheet is fitted, whole: what is predicted was fitted too",
     asked="all samples, in sample",

@@ -5,12 +5,14 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from wristctl.arrays import Array
 from wristctl.simulation.oscillation import oscillations
+from wristctl.wrist.spatial.spatial_kinematics import spatial_tips
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -65,10 +67,20 @@ class BendCourse:
     """As they act on the wrist (T, places of tendons) [N]."""
     coordinates: Array
     """Bends of the plant's segments (T, 2n) [rad]."""
-    tip: Array
-    """(T, 3) [m]: along the base, toward ulnar, toward flexion."""
-    tip_desired: Array
-    """Tip of one arc that is bent as wanted (T, 3) [m]."""
+    length: float
+    """Of the wrist as it is [m]."""
+    length_known: float
+    """Of the wrist as its controller knows it [m]."""
+
+    @cached_property
+    def tip(self) -> Array:
+        """Last disc's centre (T, 3) [m]: along the base, toward ulnar, toward flexion."""
+        return spatial_tips(self.coordinates, self.length)
+
+    @cached_property
+    def tip_desired(self) -> Array:
+        """Tip of one arc that is bent as wanted (T, 3) [m]."""
+        return spatial_tips(self.bend_ref, self.length_known)
 
     @property
     def failed(self) -> bool:

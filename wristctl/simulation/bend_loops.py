@@ -163,28 +163,30 @@ def simulate_bends(
             law, np.repeat(gains, len(which), axis=0), references, worlds, layout, None, [streams[k] for k in which]
         )
 
-    first, factor, drift = _converged(courses, loop)
-    metrics, failed, until = [first.metrics()], [first.failed], [first.until]
-    for begin in range(1, times, _TOGETHER):
-        for course in courses(range(begin, min(begin + _TOGETHER, times)), factor):
+    first, factor, drift = _converged(lambda factor: courses(range(min(times, _TOGETHER)), factor), loop)
+    metrics, failed, until = list[dict[str, float]](), list[bool](), list[float]()
+    for begin in range(0, times, _TOGETHER):
+        for course in courses(range(begin, min(begin + _TOGETHER, times)), factor) if begin else first:
             metrics.append(course.metrics())
             failed.append(course.failed)
             until.append(course.until)
         if progress is not None:
             progress(len(metrics) / times)
     gathered = {name: np.array([values[name] for values in metrics]) for name in metrics[0]}
-    return RepeatedBends(first, gathered, np.array(failed), np.array(until), wrist, layout, factor * loop.steps, drift)
+    return RepeatedBends(
+        first[0], gathered, np.array(failed), np.array(until), wrist, layout, factor * loop.steps, drift
+    )
 
 
-def _converged(courses: Callable[[range, int], list[BendCourse]], loop: Loop) -> tuple[BendCourse, int, float]:
-    """The first repetition at a step that is short enough, the factor on its steps, and what still changes [rad].
+def _converged(courses: Callable[[int], list[BendCourse]], loop: Loop) -> tuple[list[BendCourse], int, float]:
+    """The first repetitions at a step that is short enough, the factor on its steps, and what still changes [rad].
 
-    The step is halved until RMSE and error at the end stay what they are; one given by hand stays.
+    The step is halved until RMSE and error at the end of the first stay what they are; one given by hand stays.
     """
-    before, change = courses(range(1), 1)[0], math.inf
+    before, change = courses(1), math.inf
     for last, factor in zip((1, *FINER), FINER, strict=False):
-        (fine,) = courses(range(1), factor)
-        change = _difference(before, fine)
+        fine = courses(factor)
+        change = _difference(before[0], fine[0])
         if change == 0.0 or loop.substeps is not None:
             return before, last, change
         before = fine

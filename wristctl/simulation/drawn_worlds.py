@@ -6,7 +6,7 @@ are draws of different names.
 
 import numpy as np
 
-from wristctl.config.families import Family
+from wristctl.config.families import TOGETHER, Family
 from wristctl.config.loop import Loop
 from wristctl.config.wrist import WristParameters
 from wristctl.seeds import Entropy, stream
@@ -19,13 +19,15 @@ from wristctl.wrist.kinematics import Inverse
 
 def world_of(family: Family, name: str, split: str, seed: int, number: int) -> Loop:
     """The world of this number in a split."""
-    return family.world({key: _share(stream(seed, _leaf(split, name, key)), number) for key in family.draw})
+    keys = [*family.draw, *[TOGETHER] * bool(family.together)]
+    return family.world({key: _share(stream(seed, _leaf(split, name, key)), number) for key in keys})
 
 
 def streams_of(family: Family, name: str, split: str) -> list[str]:
     """The names of the streams that its worlds are drawn from."""
     numbers = range(len(family.references))
     leaves = [_leaf(split, name, key) for key in family.draw if not key.startswith("reference.")]
+    leaves += [_leaf(split, name, TOGETHER)] * bool(family.together)
     motions = [
         _leaf(split, name, key, number) for key in family.draw if key.startswith("reference.") for number in numbers
     ]

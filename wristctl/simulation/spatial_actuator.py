@@ -1,7 +1,7 @@
 """Motors of a wrist in two planes: one for each place of tendons, from commanded to delivered pulls or reeled lengths.
 
 The same motors as in one plane (`wristctl.simulation.actuator`), whose two sides are here as many places as there are.
-A row of `motors` and one of its speed belong to each.
+A row of `motors` and one of its speed belong to each; two rows for the torque that all withhold in both planes follow.
 """
 
 from typing import Any, NamedTuple
@@ -68,43 +68,55 @@ def motor_at(motor: Any, alike: Any) -> Any:
     return Motor(motor.lag, alike * motor.stiffness, motor.step, motor.speed, motor.acceleration)
 
 
+class Aim(NamedTuple):
+    """The reference that spools are paid out by: bends [rad] and rates [rad/s], 2 rows each."""
+
+    bend: Any
+    rate: Any
+
+
 @by_type
-def drive_tendons(
-    drive: Any, motors: Any, known: Any, bend_ref: Any, rate_ref: Any, pulls: Any, h: float, out: Any
-) -> Any:
-    """Host's counts a period after commanded pulls [N], into `out`: pulls, or lengths on spools [m].
+def drive_tendons(drive: Any, motors: Any, known: Any, aim: Any, pulls: Any, h: float, counts: Any) -> None:
+    """Host's counts a period after commanded pulls [N], into `counts`: pulls, or lengths on spools [m].
 
     `known` is Knowledge. With its `lead` a spool runs ahead of the reference by the distance by which it lags behind
-    a target that moves: what it takes to brake, and a period.
+    a target that moves: what it takes to brake, and a period. The last two rows of `motors` become the torque that
+    the motors withhold in each plane [N m], as in one plane.
     """
     raise NotImplementedError("compiled code only")
 
 
 @implements(drive_tendons, IdealDrive)
-def _as_commanded(
-    drive: Any, motors: Any, known: Any, bend_ref: Any, rate_ref: Any, pulls: Any, h: float, out: Any
-) -> Any:
+def _as_commanded(drive: Any, motors: Any, known: Any, aim: Any, pulls: Any, h: float, counts: Any) -> None:
     for t in range(len(pulls)):
-        out[t] = pulls[t]
+        counts[t] = pulls[t]
 
 
 @implements(drive_tendons, LaggedDrive)
-def _lagging(drive: Any, motors: Any, known: Any, bend_ref: Any, rate_ref: Any, pulls: Any, h: float, out: Any) -> None:
+def _lagging(drive: Any, motors: Any, known: Any, aim: Any, pulls: Any, h: float, counts: Any) -> None:
+    arms, last = lanes_like(aim.bend), 2 * len(pulls)
+    withheld_y, withheld_z = zero_like(aim.bend[0]), zero_like(aim.bend[0])
     for t in range(len(pulls)):
-        out[t], _ = lag_pull(motor_at(drive.motor, known.alike[t]), motors, 2 * t, pulls[t], h)
+        counts[t], less = lag_pull(motor_at(drive.motor, known.alike[t]), motors, 2 * t, pulls[t], h)
+        moment_arms_of(known.wrist, aim.bend, t, arms)
+        withheld_y, withheld_z = withheld_y + less * arms[0], withheld_z + less * arms[1]
+    motors[last], motors[last + 1] = withheld_y, withheld_z
 
 
 @implements(drive_tendons, SpoolDrive)
-def _reeling(drive: Any, motors: Any, known: Any, bend_ref: Any, rate_ref: Any, pulls: Any, h: float, out: Any) -> None:
-    arms = lanes_like(bend_ref)
-    lengths_along(known.wrist, bend_ref, out)
+def _reeling(drive: Any, motors: Any, known: Any, aim: Any, pulls: Any, h: float, counts: Any) -> None:
+    arms, last = lanes_like(aim.bend), 2 * len(pulls)
+    withheld_y, withheld_z = zero_like(aim.bend[0]), zero_like(aim.bend[0])
+    lengths_along(known.wrist, aim.bend, counts)
     for t in range(len(pulls)):
         motor = motor_at(drive.motor, known.alike[t])
-        moment_arms_of(known.wrist, bend_ref, t, arms)
-        speed = arms[0] * rate_ref[0] + arms[1] * rate_ref[1]
+        moment_arms_of(known.wrist, aim.bend, t, arms)
+        speed = arms[0] * aim.rate[0] + arms[1] * aim.rate[1]
         ahead = speed * (abs(speed) / (2.0 * motor.acceleration) + h)
-        target = spool_target(pulls[t], motor.stiffness, straight_length(known.wrist, t), out[t])
-        out[t], _ = reel_in(motor, motors, 2 * t, target + known.lead * ahead, h)
+        target = spool_target(pulls[t], motor.stiffness, straight_length(known.wrist, t), counts[t])
+        counts[t], less = reel_in(motor, motors, 2 * t, target + known.lead * ahead, h)
+        withheld_y, withheld_z = withheld_y + less * arms[0], withheld_z + less * arms[1]
+    motors[last], motors[last + 1] = withheld_y, withheld_z
 
 
 @by_type

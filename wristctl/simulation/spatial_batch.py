@@ -49,7 +49,13 @@ class SpatialBatch(NamedTuple):
     course: SpatialCourse
     values: SpatialValues
     state: SpatialState
-    scratch: SpatialScratch
+    preview: int
+
+    def scratch(self) -> SpatialScratch:
+        """Rows to work on, for one thread."""
+        wide = self.state.alive.shape[2:]
+        now, target = np.zeros((signals_of(self.preview), *wide)), np.zeros((len(REFERENCE), *wide))
+        return SpatialScratch(now, now.copy(), target, target.copy())
 
 
 def check_spatial(loop: Loop) -> None:
@@ -123,7 +129,7 @@ def spatial_batch(
         world.wrist.pretension / stiffness if elastic else alike * world.wrist.pretension
         for world, stiffness in zip(worlds, begin, strict=True)
     ]
-    motors = [np.stack([counts, 0.0 * counts], axis=1).ravel() for counts in at_rest]
+    motors = [np.append(np.stack([counts, 0.0 * counts], axis=1).ravel(), [0.0, 0.0]) for counts in at_rest]
     delivered = [
         row[0] * counts + np.array(row[1:]) if loop.actuator.level != "ideal" else counts
         for row, counts in zip(offsets, at_rest, strict=True)
@@ -167,11 +173,8 @@ def spatial_batch(
         law.compiled(count), (0,) * (2 * n), (0,) * (OF_A_TENDON * places), (0,) * places, (0, 0), period, loop.steps,
         ticks, law.preview, Compensated() if compensated else Ignored(),
     )  # fmt: skip
-    now, target = np.zeros((signals_of(law.preview), *wide)), np.zeros((len(REFERENCE), *wide))
-    scratch = SpatialScratch(now, now.copy(), target, target.copy())
-    return SpatialBatch(
-        setup, SpatialCourse(np.ascontiguousarray(references, float), acting, frames), values, state, scratch
-    )
+    course = SpatialCourse(np.ascontiguousarray(references, float), acting, frames)
+    return SpatialBatch(setup, course, values, state, law.preview)
 
 
 def sample_step(control_period: float) -> float:

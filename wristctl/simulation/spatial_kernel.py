@@ -14,7 +14,7 @@ from wristctl.lanes.lane import planar, sqrt, where, zero_like
 from wristctl.lanes.named_tuples import block_of
 from wristctl.lanes.rows import lanes_like, part, planes_like, rows_of
 from wristctl.simulation.actuator import drive_in_lanes
-from wristctl.simulation.spatial_actuator import deliver, drive_tendons, friction_in_lanes, lose, tendons_on
+from wristctl.simulation.spatial_actuator import Aim, deliver, drive_tendons, friction_in_lanes, lose, tendons_on
 from wristctl.simulation.spatial_observer import Knowledge, coupling, predict_bends, sense_bends
 from wristctl.wrist.allocation import allocate
 from wristctl.wrist.segments import load_segments
@@ -94,8 +94,8 @@ class SpatialValues(NamedTuple):
 class SpatialState(NamedTuple):
     """State of the rollouts, [block, row, lane]; `record` is [block, sample, column, lane].
 
-    `motors` has two rows for each place, `delivered` what each motor delivers, `tendons` what rubbing tendons remember;
-    `watch` is the camera with its observer, or NoCamera.
+    `motors` has two rows for each place and one for each plane, `delivered` what each motor delivers, `tendons` what
+    rubbing tendons remember; `watch` is the camera with its observer, or NoCamera.
     """
 
     coordinates: Any
@@ -119,13 +119,13 @@ class SpatialScratch(NamedTuple):
 
 
 @kernel
-def run_spatial(setup: Any, course: Any, world: Any, states: Any, scratch: Any, first: int, last: int) -> None:
-    """Advance all blocks over the samples `first` to `last` of `setup.ticks` control periods each.
+def run_spatial(setup: Any, course: Any, world: Any, states: Any, scratch: Any, span: Any) -> None:
+    """Advance the span's blocks over its samples of `setup.ticks` control periods each.
 
     A wrist that bends beyond its limit stays where it was for good.
     """
     period, ticks, m, count = setup.period, setup.ticks, len(setup.coordinates), len(setup.pulls)
-    for block in range(states.coordinates.shape[0]):
+    for block in range(span.begin, span.end):
         values, state = block_of(world, block), block_of(states, block)
         rows, model = rows_of(values.plant), rows_of(values.believed)
         still = load_spatial_segments(rows)
@@ -152,7 +152,7 @@ def run_spatial(setup: Any, course: Any, world: Any, states: Any, scratch: Any, 
         speed, wish, extra = lanes_like(bend), lanes_like(bend), lanes_like(bend)
         at, seen = lanes_like(part(coordinates, 0, (0, 0, 0, 0))), lanes_like(part(coordinates, 0, (0, 0, 0, 0, 0, 0)))
         arms, zero = planes_like(least), zero_like(still.length)
-        for sample in range(first, last):
+        for sample in range(span.first, span.last):
             acting = course.acting
             scale = acting[3, sample] + zero
             segment = load_tip(
@@ -193,19 +193,17 @@ def run_spatial(setup: Any, course: Any, world: Any, states: Any, scratch: Any, 
                     high_y = high_y + lever[0] * where(lever[0] > 0.0, back, forth)
                     low_z = low_z + lever[1] * where(lever[1] > 0.0, forth, back)
                     high_z = high_z + lever[1] * where(lever[1] > 0.0, back, forth)
-                perceive_within(
-                    control_y, Estimate(seen[0], seen[1], seen[2]), zero, (low_y, high_y), tick * period, period
-                )
-                perceive_within(
-                    control_z, Estimate(seen[3], seen[4], seen[5]), zero, (low_z, high_z), tick * period, period
-                )
+                less_y, less_z, since = motors[2 * count], motors[2 * count + 1], tick * period
+                seen_y, seen_z = Estimate(seen[0], seen[1], seen[2]), Estimate(seen[3], seen[4], seen[5])
+                perceive_within(control_y, seen_y, less_y, (low_y, high_y), since, period)
+                perceive_within(control_z, seen_z, less_z, (low_z, high_z), since, period)
                 wanted_y, wanted_z = wanted_torque(control_y) + extra[0], wanted_torque(control_z) + extra[1]
                 share = allocate(arms, planar(wanted_y, wanted_z), least, greatest, pulls)
-                since, time = tick * period, now_tick * period + zero
+                time = now_tick * period + zero
                 wish[0] = target_y[0] + since * (target_y[1] + 0.5 * since * target_y[2])
                 wish[1] = target_z[0] + since * (target_z[1] + 0.5 * since * target_z[2])
                 speed[0], speed[1] = target_y[1] + since * target_y[2], target_z[1] + since * target_z[2]
-                drive_tendons(drive, motors, known, wish, speed, pulls, period, counts)
+                drive_tendons(drive, motors, known, Aim(wish, speed), pulls, period, counts)
                 deliver(drive, winding, backlash, counts, delivered)
                 for t in range(count):
                     left[t] = where(time >= broken_at[t], zero, 1.0)

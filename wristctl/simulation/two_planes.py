@@ -1,6 +1,7 @@
 """Closed loops in two planes: a controller's law once for each plane, and pulls by one allocation for both."""
 
 from collections.abc import Sequence
+from threading import Event
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,21 +12,24 @@ from wristctl.config.wrist import WristParameters
 from wristctl.control.law import Controller
 from wristctl.errors import UserError
 from wristctl.lanes.blocks import to_rows
+from wristctl.processes import cores, stoppable
 from wristctl.seeds import Entropy
 from wristctl.simulation.bend_course import BendCourse
 from wristctl.simulation.bend_paths import BEND_PATHS, turned
 from wristctl.simulation.disturbances import acting
-from wristctl.simulation.spatial_batch import check_spatial, sample_step, spatial_batch
+from wristctl.simulation.kernel import Span
+from wristctl.simulation.spatial_batch import SpatialBatch, check_spatial, sample_step, spatial_batch
 from wristctl.simulation.spatial_kernel import SPATIAL_RECORDED, run_spatial
 from wristctl.simulation.worlds import World
 from wristctl.wrist.allocation import allocated
-from wristctl.wrist.spatial.spatial_kinematics import spatial_tips
 from wristctl.wrist.spatial.spatial_model import spatial_terms
 from wristctl.wrist.spatial.spatial_segments import ellipse, spatial_values
 from wristctl.wrist.tendon_layout import TendonLayout
 
 # Time between samples of a bend path [s].
 SAMPLE = 1e-3
+# Integration steps of a block between two looks at whether the user has asked to stop.
+_PIECE = 20_000
 
 
 def bend_path(name: str, size_deg: float, turn: float, horizon: float, toward_deg: float = 0.0) -> Array:
@@ -132,6 +136,7 @@ def rollout_bends(
     layout: TendonLayout | None = None,
     force: Array | None = None,
     streams: Sequence[Entropy] | None = None,
+    threads: int | None = None,
 ) -> list[BendCourse]:
     """Follow one path by several loops at once, as lanes: gains (count, g), their worlds and streams (count,).
 
@@ -147,17 +152,15 @@ def rollout_bends(
         law, gains, references, worlds, layout, _acting(loop, time, force), streams or [(0,)] * count,
         loop.coupling == "compensated",
     )  # fmt: skip
-    run_spatial(lanes.setup, lanes.course, lanes.values, lanes.state, lanes.scratch, 0, samples)
+    _advance(lanes, samples, threads or cores())
     record = lanes.state.record
     columns = record.shape[2]
     flat = record.reshape(len(record), samples * columns, *record.shape[3:])
     kept = to_rows(flat, count).reshape(count, samples, columns)
     wanted = references[:, 0].T
-    desired = spatial_tips(wanted, wrist.length)
     courses = []
     for rows, world in zip(kept, worlds, strict=True):
         places, first = len(layout.places), len(SPATIAL_RECORDED)
-        coordinates = rows[:, first + 2 * places :]
         courses.append(
             BendCourse(
                 time=time,
@@ -171,12 +174,29 @@ def rollout_bends(
                 share=rows[:, 8],
                 pulls=rows[:, first : first + places],
                 acting=rows[:, first + places : first + 2 * places],
-                coordinates=coordinates,
-                tip=spatial_tips(coordinates, world.plant.length),
-                tip_desired=desired,
+                coordinates=rows[:, first + 2 * places :],
+                length=world.plant.length,
+                length_known=world.wrist.length,
             )
         )
     return courses
+
+
+def _advance(lanes: SpatialBatch, samples: int, workers: int) -> None:
+    """Run all blocks to the end, on so many threads, in pieces between which an interrupt is heard."""
+    stop, blocks = Event(), len(lanes.state.alive)
+    piece = max(1, _PIECE // (lanes.setup.ticks * lanes.setup.substeps))
+
+    def run(block: int) -> None:
+        scratch = lanes.scratch()
+        for first in range(0, samples, piece):
+            if not stop.is_set():
+                span = Span(block, block + 1, first, min(first + piece, samples))
+                run_spatial(lanes.setup, lanes.course, lanes.values, lanes.state, scratch, span)
+
+    with stoppable(min(workers, blocks), stop) as pool:
+        for _ in pool.map(run, range(blocks)):
+            pass
 
 
 def _acting(loop: Loop, time: Array, force: Array | None) -> Array:

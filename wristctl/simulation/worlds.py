@@ -88,7 +88,12 @@ def mismatches(world: World) -> list[Mismatch]:
         for name, field in type(section).model_fields.items():
             value = getattr(section, name)
             own_fact = is_unsaid(field) and name not in type(sides[begin][0]).model_fields
-            if own_fact and value != field.default and not isinstance(value, Section):
+            if not own_fact or value == field.default or isinstance(value, Section):
+                continue
+            if isinstance(value, tuple):  # of each tendon
+                named = {f"{begin}{name}.{number}": one for number, one in enumerate(value, 1)}
+                differences += [Mismatch(key, None, one, unit_of(field)) for key, one in named.items()]
+            else:
                 differences.append(Mismatch(begin + name, field.default, value, unit_of(field)))
     return differences
 

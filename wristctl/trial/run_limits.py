@@ -107,8 +107,8 @@ def _proposed(run: Logged, limit: Limit, seen: float) -> tuple[float | None, str
     if name is None or seen <= 0.0:
         return None, ""
     wanted, present = max(MARGIN * seen, LEAST * limit.limit), getattr(run.settings.safety, name)
-    if limit.name == "pull":  # whatever a rig has shown: wrist and motors bear no more
-        wanted = min(wanted, run.settings.safety.motor_pull, run.wrist.tension_limit)
+    if limit.name == "pull":  # whatever a rig has shown: the wrist bears no more
+        wanted = min(wanted, run.wrist.tension_limit)
     factor = (present if limit.name != "pull" else limit.limit) / limit.limit
     value = float(f"{wanted * factor:.2g}")
     return value / factor, f"safety.{name}={value:g}"

@@ -19,11 +19,19 @@ _FAILED = 3.0
 
 
 def marks_of(law: Controller, gains: Array, cases: Sequence[Case], wrist: WristParameters) -> dict[str, int]:
-    """On how many cases gains (g,) fail, swing, chatter, or do not converge, by mark; without those of none."""
-    measured = measure(law, gains[None], cases, wrist, ["oscillation"])
+    """On how many cases gains (g,) fail, swing, chatter, or do not converge, by mark; without those of none.
+
+    They swing at rest, or in motion beside feedforward (`Measured.swings_in_motion`).
+    """
+    metrics = ["oscillation", "sustained"]
+    measured = measure(law, gains[None], cases, wrist, metrics)
+    cycles = measured.limit_cycles
+    if not measured.rests.all():
+        open_loop = measure(controller(YARDSTICK), np.zeros((1, 0)), cases, wrist, metrics)
+        cycles = cycles | measured.swings_in_motion(open_loop)
     holds = {
         "failed": measured.failed,
-        "limit cycle": measured.limit_cycles & ~measured.failed,
+        "limit cycle": cycles & ~measured.failed,
         "chatters": (measured.chatter > 0.0) & ~measured.failed,
         "not converged": measured.unconverged & ~measured.failed,
     }

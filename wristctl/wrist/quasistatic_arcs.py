@@ -1,10 +1,10 @@
-"""Rest of arcs on elastic tendons whose spools turn slowly, with friction of tendons and arcs, slack and creep.
+"""Slow motion of arcs on elastic tendons, with damping, friction of tendons and arcs, and creep; spools are given.
 
 Each arc bends by a vector (u_y, u_z) and may shorten. A tendon shortens in proportion to the bends of the arcs that it
 runs along and to their shortening, and pulls only where it is stretched. Its friction is capstan friction by Dahl's
 bristle, as in `wristctl.wrist.tendon_mechanics`: from the spool to the middle of an arc, bent by the angle phi until
 there, the pull falls to exp(-(mu phi + sheath) z). Friction inside an arc is a bristle too, a vector along the way of
-its bend (`wristctl.wrist.dahl` in one plane). Inertia and damping are left out: the robot is at rest at each sample.
+its bend (`wristctl.wrist.dahl` in one plane). Inertia is left out: without damping the robot is at rest at each sample.
 """
 
 import math
@@ -51,6 +51,8 @@ class QuasistaticArcs:
     """Share of the bending stiffness that relaxes, by one Maxwell branch (V,)."""
     creep_time: Array
     """Time constant of that (V,) [s]."""
+    damping: Array
+    """Damping of bending over its stiffness (V,) [s]."""
 
     def rest(self, reeled: Array, pause: Array) -> Array:
         """Coordinates (V, T, N) at rest, sample by sample.
@@ -63,7 +65,7 @@ class QuasistaticArcs:
         out = np.empty((*reeled.shape[:2], self.stiffness.shape[1]))
         ways = (
             self.friction, 1.0 / self.presliding, self.inner, 1.0 / self.inner_presliding, self.creep, self.creep_time,
-            self.sheath,
+            self.sheath, self.damping,
         )  # fmt: skip
         reeled, arms, stiffness, tendon, pause, coefficients = (
             np.ascontiguousarray(array, np.float64)
@@ -72,6 +74,12 @@ class QuasistaticArcs:
         ends = self.ends.astype(np.int64)
         _rest(reeled, arms, stiffness, tendon, coefficients, pause, ends, int(ends.max()), out)
         return out
+
+    def pulls(self, reeled: Array, coordinates: Array) -> Array:
+        """Pulls of the tendons at their spools (V, T, M) at coordinates (V, T, N)."""
+        stretch = reeled - np.einsum("vmn,vtn->vtm", self.arms, coordinates)
+        pulls: Array = 0.5 * self.tendon[:, None, :] * (stretch + np.hypot(stretch, _SMOOTH))
+        return pulls
 
 
 @compiled
@@ -130,6 +138,7 @@ def _rest(
     for v in range(reeled.shape[0]):
         friction, bristle, inner = ways[v, 0], ways[v, 1], ways[v, 2]
         inner_bristle, creep, creep_time, sheath = ways[v, 3], ways[v, 4], ways[v, 5], ways[v, 6]
+        damping = ways[v, 7]
         for sample in range(reeled.shape[1]):
             if math.isnan(pause[sample]):
                 for memory in (q, crept, inside, path, z):
@@ -149,6 +158,13 @@ def _rest(
                     bend = math.hypot(q[y], q[w])
                     wrapped[k] = angle + 0.5 * bend
                     angle += bend
+                    if damping > 0.0 and not math.isnan(pause[sample]):
+                        slower_y = damping * stiffness[v, y] / pause[sample]
+                        slower_w = damping * stiffness[v, w] / pause[sample]
+                        r[y] += slower_y * (q[y] - before[y])
+                        r[w] += slower_w * (q[w] - before[w])
+                        slope[y, y] += slower_y
+                        slope[w, w] += slower_w
                     if creep > 0.0:
                         r[y] -= creep * stiffness[v, y] * crept[y]
                         r[w] -= creep * stiffness[v, w] * crept[w]

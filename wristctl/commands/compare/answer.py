@@ -6,6 +6,8 @@ import math
 from collections.abc import Container, Iterable, Sequence
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from wristctl.commands.answer import Answer
 from wristctl.commands.printed_table import COLUMNS, Table, joined
 from wristctl.commands.ranking_answer import advice, certainty, do_not_use, fitted, ranking_table, ties
@@ -32,6 +34,7 @@ def answer_of(rankings: Sequence[Ranking], run: str = "") -> Answer | None:
     more = f"All figures of every controller: `--all`, or {run}/report.html." if run else "All figures: `.tables`."
     unusable = do_not_use(rankings, names)
     notes = [
+        (best_on_yours(rankings), ""),
         (ties(rankings, names), ""),
         (unusable, "Some must not be used; which, and why: `--all`." if unusable else ""),
         (papers(rankings), ""),
@@ -39,6 +42,29 @@ def answer_of(rankings: Sequence[Ranking], run: str = "") -> Answer | None:
         (f"Your own wrist: `wristctl compare controllers mywrist.yaml` (docs/your-own-wrist.md). {more}", more),
     ]
     return fitted(Answer(advice(rankings), ranking_table(rankings, names)), notes)
+
+
+def best_on_yours(rankings: Sequence[Ranking]) -> str:
+    """Probability that a controller is the best on an identified robot: its share of the draws of what is open of it.
+
+    Empty where the worlds are no draws of an identification's posterior.
+    """
+    from wristctl.comparison.tie_groups import share
+    from wristctl.comparison.world_ranking import WorldRanking
+
+    posteriors = [one for one in rankings if isinstance(one, WorldRanking) and one.family.together]
+    sentences = []
+    for ranking in posteriors:
+        best = ranking.scores == ranking.scores.min(axis=0)
+        shares = [share(best[row] & np.isfinite(ranking.scores[row])) for row in range(len(ranking.labels))]
+        row = max(range(len(shares)), key=lambda number: shares[number].times)
+        steps = " of steps" if ranking.jumps else ""
+        sentences.append(
+            f"{ranking.labels[row]} is best{steps} on your robot with probability {shares[row].value:.2f} (95 % "
+            f"{shares[row].low:.2f} to {shares[row].high:.2f}): it has the least error on {shares[row].times} of "
+            f"{shares[row].n} wrists that your trials leave possible."
+        )
+    return " ".join(sentences)
 
 
 def papers(rankings: Sequence[Ranking]) -> str:

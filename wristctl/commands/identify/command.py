@@ -6,11 +6,13 @@ import logging
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
 from wristctl.commands.answer import Answer
 from wristctl.commands.identify.answer import found_answer, refused_answer
-from wristctl.commands.inputs import EarlierRun, Inputs
+from wristctl.commands.identify.logs import LogTold, identify_logs, log_plan
+from wristctl.commands.inputs import EarlierRun, Inputs, missing_run
 from wristctl.commands.printed_table import Table
 from wristctl.commands.procedure import Procedure
 from wristctl.commands.results import StudyResult
@@ -27,6 +29,9 @@ if TYPE_CHECKING:
     from wristctl.identification.lack_of_fit import Suspicion
 
 log = logging.getLogger(__name__)
+
+# Draws of the posterior that a run keeps as a family of worlds.
+_DRAWS = 200
 
 
 @dataclass(frozen=True, repr=False, eq=False)
@@ -69,22 +74,44 @@ class _Logged(NamedTuple):
     kinds: pd.DataFrame
 
 
+def with_logs(study: Study) -> Study:
+    """The study with files among its runs named as open logs."""
+    runs = study.identify.runs
+    logs = tuple(run for run in runs if Path(run).is_file())
+    if not logs:
+        return study
+    changed = {"runs": tuple(run for run in runs if run not in logs), "logs": (*study.identify.logs, *logs)}
+    return study.model_copy(update={"identify": study.identify.model_copy(update=changed)})
+
+
 def plan(study: Study, inputs: Inputs) -> str:
     """Say what will be found from which trials."""
+    if study.identify.logs:
+        return log_plan(study, inputs)
     problem = _problem(study, inputs)
     poses = len({(trial.wrist.gravity, trial.wrist.hand_mass) for trial in problem.trials})
     frames = sum(len(trial.angle) for trial in problem.trials)
     return f"{', '.join(problem.free)} from {len(problem.trials)} trials, {frames} frames, {poses} poses or masses"
 
 
-def identify(session: Session) -> Identified:
-    """Find stiffness, damping, tendons and delay of a real wrist from logged trials, with 95 % intervals."""
+def identify(session: Session) -> Identified | LogTold:
+    """Find stiffness, damping, tendons and delay of a real wrist from logged trials, with 95 % intervals.
+
+    Trials are those of hw-run runs, or of open logs (FILE.csv, docs/open-log.md) of wrists with two or more tendons in
+    one plane or two: of these each parameter comes with its interval or is not told, and which of slack, friction and
+    creep the data want is found by predicting a part of them.
+    """
+    if session.study.identify.logs:
+        return identify_logs(session)
+    import numpy as np
+
     from wristctl.commands.identify.figures import angles, correlations, residuals
     from wristctl.commands.identify.tables import budget_table, causes, fit_table, offers, parameters, residual_table
     from wristctl.identification.fit import fit
     from wristctl.identification.identifiability import FINER, additions, budget, not_identified, refuse
     from wristctl.identification.intervals import knowledge
     from wristctl.identification.lack_of_fit import misfits, refuse_misfit, suspicions, widened
+    from wristctl.identification.posterior import posterior_draws, posterior_yaml
     from wristctl.identification.unknowns import identified_yaml
 
     findings, settings = session.findings, session.study.identify
@@ -118,8 +145,12 @@ def identify(session: Session) -> Identified:
         if settings.misfit == "refuse":
             refuse_misfit(fitted, sure, suspected, missed)
         refuse(lacking, offered, estimated.condition, problem.start)
-    yaml = identified_yaml(fitted.values, _camera(session.inputs, fitted))
+    camera = _camera(session.inputs, fitted)
+    yaml = identified_yaml(fitted.values, camera)
     findings.text("data/identified.yaml", yaml)
+    rng = np.random.default_rng(findings.stream("posterior"))
+    draws = posterior_draws(fitted, estimated, _DRAWS, rng)
+    findings.text("data/posterior.yaml", yaml + posterior_yaml(draws, fitted.values, camera))
     return Identified(session.study, findings, tables, fitted, estimated, yaml, suspected)
 
 
@@ -142,6 +173,8 @@ def _problem(study: Study, inputs: Inputs) -> Problem:
     from wristctl.identification.measured_trials import measured_trials
     from wristctl.identification.unknowns import believed_of
 
+    if not inputs.runs():
+        raise missing_run("identify", _RUNS, several=True)
     settings, trials = study.identify, []
     start: dict[str, float] = {}
     believed = Actuator()
@@ -175,4 +208,5 @@ def _camera(inputs: Inputs, fitted: Fit) -> dict[str, float]:
     return camera_parameters(frames, fitted.values["delay"], fitted.noise)
 
 
-IDENTIFY = Procedure("identify", plan, identify, (EarlierRun("runs", kind="hw-run"),))
+_RUNS = EarlierRun("runs", kind="hw-run", optional=True)
+IDENTIFY: Procedure[Identified | LogTold] = Procedure("identify", plan, identify, (_RUNS,), completed=with_logs)

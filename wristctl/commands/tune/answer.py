@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
 from wristctl.commands.answer import LINES, Answer
-from wristctl.commands.printed_table import Table, degrees, two
+from wristctl.commands.printed_table import Table, degrees, joined, two
 
 if TYPE_CHECKING:
     from wristctl.arrays import Array
@@ -71,13 +71,18 @@ def answer_of(
     lost: Mapping[str, Mapping[str, int]],
     cases: int,
     run: str,
+    elsewhere: Mapping[str, Mapping[str, Mapping[str, int]]],
 ) -> Answer | None:
-    """The answer of a search on so many `cases`; None where nothing was searched. `run` is its path, if it has one."""
+    """The answer of a search on so many `cases`; None where nothing was searched. `run` is its path, if it has one.
+
+    `elsewhere` has the marks of the gains on other loops, by controller and loop.
+    """
     if not searches:
         return None
     ordered = sorted(searches, key=lambda name: searches[name].objective)
     best = ordered[0]
     notes = [*_edges(ordered, searches), *_presets(ordered, searches), *_lost(ordered, lost, cases)]
+    notes += _elsewhere(ordered, elsewhere)
     if run:
         words = ["wristctl", "simulate", f"{run}/config.yaml", "--controller", best, "--gains", "tuned", "--tuned", run]
         notes += ["Next, one motion with these gains:", f"$ {shlex.join(words)}"]
@@ -168,3 +173,15 @@ def _lost(ordered: Sequence[str], lost: Mapping[str, Mapping[str, int]], cases: 
     if facts:
         return [f"Do not rely on these: {'; '.join(facts)}."]
     return [f"In none of the {cases} cases does any of them fail, swing or chatter."]
+
+
+def _elsewhere(ordered: Sequence[str], elsewhere: Mapping[str, Mapping[str, Mapping[str, int]]]) -> list[str]:
+    """Loops beyond those of the search on which gains hold, and what they do on the others."""
+    facts = []
+    for name in ordered:
+        marks = elsewhere.get(name, {})
+        holds = [loop for loop, wrong in marks.items() if not wrong]
+        words = [f"holds on {joined(holds)}"] * bool(holds)
+        words += [f"{' and '.join(_VERBS[mark] for mark in wrong)} on {loop}" for loop, wrong in marks.items() if wrong]
+        facts += [f"{name} {', '.join(words)}"] * bool(words)
+    return [f"The same motions on other loops: {'; '.join(facts)}."] * bool(facts)

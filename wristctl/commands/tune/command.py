@@ -63,11 +63,14 @@ class Tuned(StudyResult):
     """by controller, its error beside feedforward's on those cases"""
     cases: int
     """Number of those cases."""
+    elsewhere: dict[str, dict[str, dict[str, int]]]
+    """by controller and loop, on how many of the same motions its best gains are lost on loops that no scenario is
+    on; none for a family of worlds"""
 
     @property
     def answer(self) -> Answer | None:
         """Best gains, their error beside feedforward, and what they do wrong."""
-        return answer_of(self.searches, self.errors, self.lost, self.cases, self.place)
+        return answer_of(self.searches, self.errors, self.lost, self.cases, self.place, self.elsewhere)
 
     @property
     def marks(self) -> list[str]:
@@ -185,8 +188,40 @@ def tune(session: Session) -> Tuned:
     columns = ("controller", "objective", "fate", "found by", "evaluations", "gains")
     tables = [Table("Tuned gains, best first; objective in decades beside feedforward", columns, rows)]
     tables += truth_tables(study.wrist, judged_loops(study, study.tune))
-    errors = beside_feedforward({name: best.gains for name, best in searches.items()}, cases, study.wrist)
-    return Tuned(session.study, session.findings, tables, searches, lost, errors, len(cases))
+    gains = {name: best.gains for name, best in searches.items()}
+    errors = beside_feedforward(gains, cases, study.wrist)
+    elsewhere = _elsewhere(session, study, network, gains)
+    return Tuned(session.study, session.findings, tables, searches, lost, errors, len(cases), elsewhere)
+
+
+def _elsewhere(
+    session: Session, study: Study, network: Inverse | None, gains: Mapping[str, Mapping[str, float]]
+) -> dict[str, dict[str, dict[str, int]]]:
+    """Try gains with the motions of the scenarios on the loops that none of these is on: marks by controller and loop.
+
+    Plain Python is not tried on loops that it cannot keep up with.
+    """
+    import numpy as np
+
+    from wristctl.control.table import controller
+    from wristctl.tuning.objective import marks_of
+    from wristctl.tuning.search import tuning_cases
+
+    settings = study.tune
+    searched = {scenario.loop for scenario in settings.scenarios}
+    others = [] if settings.worlds.family else [name for name in settings.loops if name not in searched]
+    tried: dict[str, dict[str, dict[str, int]]] = {name: {} for name in gains}
+    with session.progress("trying the gains on other loops", total=len(others), unit="loops") as advance:
+        for number, loop in enumerate(others, start=1):
+            scenarios = tuple(dict.fromkeys(one.model_copy(update={"loop": loop}) for one in settings.scenarios))
+            elsewhere = study.model_copy(update={"tune": settings.model_copy(update={"scenarios": scenarios})})
+            cases = tuning_cases(elsewhere, network)[0]
+            for name, values in gains.items():
+                law = controller(name)
+                if law.keeps_up(settings.loops[loop].control_period):
+                    tried[name][loop] = marks_of(law, np.array(law.values(values)), cases, study.wrist)
+            advance(number)
+    return tried
 
 
 def search_all(session: Session, study: Study, network: Inverse | None) -> dict[str, Search]:

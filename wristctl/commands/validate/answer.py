@@ -32,14 +32,14 @@ def validated_answer(robot: RealRobot, models: Sequence[TriedModel], chosen: Tri
         f"The model {verb} the {what} of {robot.title} to {error} {robot.unit} RMS (95 % {low} to {high}){beside}."
     )
     notes: list[str | Table] = [
-        _wanted(models),
+        wanted_terms(models),
         f"{robot.parts[0].upper()}{robot.parts[1:]}. {_caveats(robot, chosen)}",
     ]
     more = f"Parameters, each recording, residuals: --all, or {run}/report.html." if run else ""
     return Answer(sentence, models_table(robot, models), notes, f"{robot.citation}. {more}".strip())
 
 
-def _wanted(models: Sequence[TriedModel]) -> str:
+def wanted_terms(models: Sequence[TriedModel]) -> str:
     """Which terms the data want, in words."""
     by_verdict = {
         verdict: [model.terms[-1] for model in models if model.verdict == verdict and len(model.terms) <= 2]
@@ -68,15 +68,22 @@ def _caveats(robot: RealRobot, chosen: TriedModel) -> str:
 
 def models_table(robot: RealRobot, models: Sequence[TriedModel]) -> Table:
     """Errors of the authors' models, then of ours with the ratio to the model without the last term."""
-    scale, rows = robot.scale, list[tuple[str, int | None, str, str, str]]()
-    rows += [(name, None, f"{error:.2f}", "", "") for name, error in robot.authors]
+    rows = [(name, None, f"{error:.2f}", "", "") for name, error in robot.authors]
+    heads = ("model", "numbers", f"{robot.asked} [{robot.unit}]", "over that without", "")
+    return Table("", heads, [*rows, *model_rows(models, robot.scale)])
+
+
+def model_rows(models: Sequence[TriedModel], scale: float) -> list[tuple[str, int, str, str, str]]:
+    """Name, free numbers, error and ratio with intervals, verdict of each model; `scale` is of a unit over SI."""
+    rows = []
     for model in models:
         error, low, high = (f"{scale * value:.2f}" for value in model.score[:3])
         ratio = "{:.3f} [{:.3f}, {:.3f}]".format(*model.ratio[:3]) if model.ratio else ""
-        name = f"+ {model.terms[-1]}" if len(model.terms) == 2 else model.words.replace("elastic ", "")
+        name = model.words.replace("elastic ", "")
+        if len(model.terms) > 1 and model.terms[0] == "slack":
+            name = f"+ {model.terms[-1]}" if len(model.terms) == 2 else "+ all that is wanted"
         rows.append((name, model.numbers, f"{error} [{low}, {high}]", ratio, model.verdict))
-    heads = ("model", "numbers", f"{robot.asked} [{robot.unit}]", "over that without", "")
-    return Table("", heads, rows)
+    return rows
 
 
 def parameters_table(fits: Sequence[ArcFit]) -> Table:

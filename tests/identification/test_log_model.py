@@ -1,0 +1,117 @@
+"""Open logs as recordings: whose tendons they are, even steps, what serves for what, and what they tell."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from wristctl.config.wrist import WristParameters
+from wristctl.errors import UserError
+from wristctl.identification.arc_fit import fit_arcs
+from wristctl.identification.log_model import everything_fitted, recordings_of_logs, robot_of_log
+from wristctl.records.open_log import OpenLog
+
+WRIST = WristParameters()
+OFFSET = WRIST.tendon_offset
+
+
+def planar(
+    seed: int = 0, mass: float | None = None, tension: bool = False, sign: float = 1.0, trials: int = 1
+) -> OpenLog:
+    """A wrist in one plane on an antagonist pair of 8 over its stiffness, 40 ms late, its stiffness 0.5 N m/rad."""
+    rng = np.random.default_rng(seed)
+    parts = []
+    for trial in range(trials):
+        time = np.arange(0.0, 6.0, 0.02)
+        wanted = 0.4 * np.sin((1.3 + 0.4 * trial) * time) * np.minimum(1.0, time)
+        late = 0.4 * np.sin((1.3 + 0.4 * trial) * (time - 0.04)) * np.clip(time - 0.04, 0.0, 1.0)
+        tight = 6e-4  # both tendons stay taut
+        stiff = 8.0 / (1.0 + 2.0 * 8.0)
+        bend = 2.0 * stiff * late * (1.0 if mass is None else (1.0 + 16.0) / (1.0 - 0.4 * mass + 16.0))
+        here = 2.0 * stiff * wanted
+        pulls = 0.5 * 8.0 / OFFSET * np.stack([wanted - here + tight / OFFSET, here - wanted + tight / OFFSET])
+        columns = {"time": time, "spool_1": OFFSET * sign * wanted + tight, "spool_2": -OFFSET * sign * wanted + tight,
+                   "bend_y": sign * bend + 1e-4 * rng.normal(size=len(time))}  # fmt: skip
+        if tension:
+            columns |= {f"tension_{k + 1}": pulls[k if sign > 0 else 1 - k] for k in (0, 1)}
+        if mass is not None:
+            columns["mass"] = np.full(len(time), mass)
+        parts.append(columns)
+    whole = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
+    words = {"trial": np.repeat([f"t{k}" for k in range(trials)], len(parts[0]["time"]))}
+    return OpenLog(Path("made.csv"), "log", whole, words)
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_a_late_planar_wrist_tells_its_delay_and_with_tensions_its_stiffness(sign: float) -> None:
+    log = planar(tension=True, sign=sign)
+    robot = robot_of_log(log, WRIST, 0.01)
+    fit = fit_arcs(robot, (), everything_fitted(recordings_of_logs([log], robot)))
+    told = fit.told
+    assert told["delay"].known and told["delay"].low - 2e-3 < 0.04 < told["delay"].high + 2e-3
+    assert told["force"].known and fit.values["force"] == pytest.approx(0.5, rel=0.1)
+    assert math.degrees(fit.rms()) < 0.1
+
+
+def test_without_tensions_or_masses_nothing_in_newton_metres_is_looked_for() -> None:
+    robot = robot_of_log(planar(), WRIST, 0.01)
+    assert set(robot.unknowns(())) == {"gain", "tendon", "delay", "damping"}
+    log = planar(mass=0.2, trials=2)
+    log.columns["mass"][300:] = 0.6
+    assert "softening" in robot_of_log(log, WRIST, 0.01).unknowns(())
+
+
+def test_of_many_trials_whole_ones_are_predicted_and_of_few_parts() -> None:
+    robot = robot_of_log(planar(), WRIST, 0.01)
+    few, many = (recordings_of_logs([planar(trials=n)], robot) for n in (2, 4))
+    assert [bool(one.fitted.all()) for one in many] == [True, False, True, False]
+    assert [bool(one.asked.all()) for one in many] == [False, True, False, True]
+    for one in few:
+        assert 0.4 < one.fitted.mean() < 0.6 and (one.fitted ^ one.asked).all()
+    blocks = [set(one.block.tolist()) for one in few]
+    assert not blocks[0] & blocks[1] and len(blocks[1]) >= 8
+
+
+def test_tendons_are_those_of_the_square_wrist_of_the_study_or_evenly_around() -> None:
+    log = planar()
+    square = OpenLog(
+        log.file, "log", {**log.columns, "spool_4": log.columns["spool_1"], "spool_5": log.columns["spool_2"]}
+    )
+    four = robot_of_log(square, WRIST, 0.01)
+    toward_y = np.cos(four.angles)
+    assert toward_y[2:] == pytest.approx([math.sqrt(0.5)] * 2) and toward_y[:2] == pytest.approx([-math.sqrt(0.5)] * 2)
+    assert four.radius == WRIST.tendon_radius
+    three = OpenLog(log.file, "log", {**log.columns, "spool_3": log.columns["spool_1"]})
+    around = robot_of_log(three, WRIST.model_copy(update={"tendons": "three"}), 0.01)
+    assert np.degrees(around.angles) == pytest.approx([0.0, 120.0, 240.0])
+
+
+def test_spools_and_motion_may_have_times_of_their_own() -> None:
+    log = planar()
+    odd = np.arange(len(log)) % 2 == 1
+    gaps = {
+        name: np.where(odd, math.nan, column) if name.startswith("spool") else column
+        for name, column in log.columns.items()
+    }
+    gaps["bend_y"] = np.where(odd, gaps["bend_y"], math.nan)
+    apart = OpenLog(log.file, "log", gaps)
+    robot = robot_of_log(apart, WRIST, 0.01)
+    (whole,), (with_gaps,) = (
+        recordings_of_logs([OpenLog(log.file, "log", dict(log.columns))], robot),
+        recordings_of_logs([apart], robot),
+    )
+    at = np.interp(with_gaps.time, whole.time, whole.measured[:, 0])
+    assert with_gaps.measured[:, 0] == pytest.approx(at, abs=5e-3)
+
+
+def test_logs_without_spools_or_motion_are_refused() -> None:
+    log = planar()
+    bare = {name: log.columns[name] for name in ("time", "bend_y")}
+    with pytest.raises(UserError, match="0 spools"):
+        robot_of_log(OpenLog(log.file, "log", bare), WRIST, 0.01)
+    still = {name: log.columns[name] for name in ("time", "spool_1", "spool_2")}
+    with pytest.raises(UserError, match="neither a bend nor the tip"):
+        robot_of_log(OpenLog(log.file, "log", still), WRIST, 0.01)

@@ -1,0 +1,174 @@
+"""What open logs tell of the robot that they are of: each parameter with its interval, or that they do not tell it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from wristctl.commands.answer import Answer
+from wristctl.commands.inputs import Inputs
+from wristctl.commands.printed_table import COLUMNS, Table, joined, number
+from wristctl.commands.results import StudyResult
+from wristctl.commands.session import Session
+from wristctl.config.study import Study
+from wristctl.errors import Setting, UserError
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from wristctl.identification.arc_fit import ArcFit
+    from wristctl.identification.arc_robot import ArcRecording, ArcRobot
+    from wristctl.identification.model_choice import TriedModel
+
+# Share of the motion's mean square that a prediction may miss before nothing is told.
+_MISSED = 0.5
+_DIGITS = {"bend": ("deg", math.degrees(1.0)), "tip": ("mm", 1e3)}
+
+
+@dataclass(frozen=True, repr=False, eq=False)
+class LogTold(StudyResult):
+    """What open logs tell: parameters with intervals, and which terms of the model the data want."""
+
+    kind = "identify"
+
+    fit: ArcFit
+    """The chosen model, fitted to all trials."""
+    models: list[TriedModel]
+    chosen: TriedModel
+
+    @property
+    def answer(self) -> Answer:
+        """Parameters with intervals or not told, the terms that the data want, and what would tell more."""
+        return told_answer(self.fit, self.models, self.chosen)
+
+    def frame(self) -> pd.DataFrame:
+        """One row per parameter: value and ends of its interval, nan where the data do not tell it, and unit."""
+        import pandas as pd
+
+        rows = [
+            (name, *((told.value, told.low, told.high) if told.known else [math.nan] * 3), told.unit, told.meaning)
+            for name, told in self.fit.told.items()
+        ]
+        return pd.DataFrame(rows, columns=["parameter", "value", "low", "high", "unit", "meaning"])
+
+
+def _read(study: Study) -> tuple[ArcRobot, list[ArcRecording]]:
+    from wristctl.identification.log_model import recordings_of_logs, robot_of_log
+    from wristctl.records.log_converters import read_log
+
+    settings = study.identify
+    logs = [read_log(Path(file), settings.columns or "", "log") for file in settings.logs]
+    robot = robot_of_log(logs[0], study.wrist, settings.radius_error)
+    return robot, recordings_of_logs(logs, robot)
+
+
+def log_plan(study: Study, inputs: Inputs) -> str:
+    """Say what is looked for in which logs."""
+    if inputs.runs():
+        raise UserError("runs and logs at once", "identify.runs", "identify one or the other")
+    robot, recordings = _read(study)
+    samples = sum(len(recording.time) for recording in recordings)
+    names = ", ".join(robot.unknowns(()))
+    return f"{names}, then slack, friction and creep, from {len(recordings)} trials of open logs, {samples} samples"
+
+
+def identify_logs(session: Session) -> LogTold:
+    """Find what open logs tell, in their run."""
+    from wristctl.commands.validate.figures import errors_of_models, left_over, motion
+    from wristctl.identification.arc_fit import fit_arcs
+    from wristctl.identification.log_model import everything_fitted
+    from wristctl.identification.model_choice import chosen_of, tried_models
+    from wristctl.identification.real_robots import RealRobot
+
+    findings, study = session.findings, session.study
+    robot, recordings = _read(study)
+    models = list["TriedModel"]()
+    with session.progress("fitting models") as report:
+        for model in tried_models(robot, [recordings], False):
+            models.append(model)
+            report(len(models))
+        chosen = chosen_of(models)
+        begin = chosen.fits[0].values
+        fit = fit_arcs(robot, chosen.terms, everything_fitted(recordings), begin=begin)
+    unit, scale = _DIGITS[robot.measured]
+    score = chosen.score
+    findings.metric("error", scale * score.error, unit, "lower", score.blocks, (scale * score.low, scale * score.high),
+                    "RMS of the part that was predicted")  # fmt: skip
+    for name, told in fit.told.items():
+        ends = (told.low, told.high) if told.known else None
+        findings.metric(name, told.value if told.known else None, told.unit, "", 1, ends, told.meaning)
+    about = RealRobot("this robot", "", robot, lambda files: [], "", "predicted part")
+    with session.progress("drawing"):
+        findings.figure("motion", motion, about, chosen.fits, caption="measured motion and prediction")
+        findings.figure("left-over", left_over, about, chosen.fits, caption="what is left of the motion")
+        findings.figure("models", errors_of_models, about, models, caption="error of each model")
+    findings.overview.figure = "motion"
+    result = LogTold(study, findings, [_models_table(models, robot), told_table(fit)], fit, models, chosen)
+    findings.table("data/parameters.csv", result.frame())
+    _refuse(session, result, recordings)
+    return result
+
+
+def _refuse(session: Session, result: LogTold, recordings: Sequence[ArcRecording]) -> None:
+    """UserError where the model does not predict the motion, with the answer told all the same."""
+    import numpy as np
+
+    asked = np.concatenate([recording.measured[recording.asked] for recording in recordings])
+    moved = float(np.sqrt(np.nanvar(asked, axis=0).sum()))
+    score = result.chosen.score
+    if score.error**2 <= _MISSED * moved**2 or session.study.identify.misfit == "tell":
+        return
+    unit, scale = _DIGITS[result.fit.robot.measured]
+    text = "\n".join(result.answer.lines())
+    session.findings.summary(f"```\n{text}\n```")
+    session.operator.tell(text)
+    problem = (
+        f"the model misses {scale * score.error:.3g} {unit} of a motion of {scale * moved:.3g} {unit} that it was to "
+        "predict: nothing of it is to be relied on"
+    )
+    accept = ("check senses of spools and bend; or take it as it is: ", Setting("misfit=tell", "identify"))
+    raise UserError(problem, recordings[0].name, accept, exit_code=3)
+
+
+def told_answer(fit: ArcFit, models: Sequence[TriedModel], chosen: TriedModel) -> Answer:
+    """Parameters with intervals or not told, the terms that the data want, and what would tell more."""
+    from wristctl.commands.validate.answer import wanted_terms
+
+    unit, scale = _DIGITS[fit.robot.measured]
+    error, low, high = (f"{scale * value:.3g}" for value in chosen.score[:3])
+    told = [name for name, one in fit.told.items() if one.known and one.low > 0.0]
+    sentence = (
+        f"These data tell {joined(told) or 'nothing of the parameters'}. Of the part that was not fitted the model "
+        f"predicts the {fit.robot.measured} to {error} {unit} RMS (95 % {low} to {high})."
+    )
+    notes: list[str | Table] = [wanted_terms(models)]
+    if "force" not in fit.values and "softening" not in fit.values:
+        notes.append("Stiffness in N m/rad is not told: it needs tension_1 [N], ..., or trials with several masses.")
+    return Answer(
+        sentence,
+        told_table(fit).within(COLUMNS),
+        notes,
+        "Errors of each model, figures: --all, or the run's report.html.",
+    )
+
+
+def told_table(fit: ArcFit) -> Table:
+    """Each parameter and each slack with its 95 % interval, or not told."""
+    rows: list[tuple[str, str, str, str, str]] = []
+    for name, told in fit.told.items():
+        value, interval = ("not told", "")
+        if told.known:
+            value, interval = number(told.value), f"{number(told.low)} to {number(told.high)}"
+        rows.append((name, value, interval, told.unit, told.meaning))
+    return Table("", ("parameter", "value", "95 %", "unit", "meaning"), rows)
+
+
+def _models_table(models: Sequence[TriedModel], robot: ArcRobot) -> Table:
+    from wristctl.commands.validate.answer import model_rows
+
+    unit, scale = _DIGITS[robot.measured]
+    heads = ("model", "numbers", f"predicted part [{unit}]", "over that without", "")
+    return Table("What each model misses", heads, model_rows(models, scale))

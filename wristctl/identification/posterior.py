@@ -1,0 +1,59 @@
+"""Draws of what trials leave open of a wrist's parameters, as a family of worlds."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from wristctl.identification.fit import Fit
+from wristctl.identification.intervals import Knowledge
+from wristctl.identification.unknowns import tendons_of_values
+
+FAMILY = "posterior"
+_OF_WRIST = ("stiffness", "flexion_ratio", "damping", "tendon_radius")
+# Half the range of angles [deg] that every motion of the family is drawn from.
+_ANGLE = 30
+
+
+def posterior_draws(fit: Fit, knowledge: Knowledge, count: int, rng: np.random.Generator) -> list[dict[str, float]]:
+    """Parameters drawn from the normal distribution of the fit's coordinates, with their correlations, within bounds.
+
+    Parameters
+    ----------
+    fit : the fit, of whose coordinates the parameters follow
+    knowledge : deviations, as wide as the intervals are, and correlations
+    count : number of draws
+    rng : random generator
+    """
+    free = len(fit.problem.free)
+    deviation, correlation = knowledge.deviation[:free], knowledge.correlation[:free, :free]
+    root = np.linalg.cholesky(correlation + 1e-9 * np.eye(free))
+    low, high = (np.asarray(bound)[:free] for bound in fit.problem.bounds())
+    draws = []
+    for _ in range(count):
+        x = fit.x.copy()
+        x[:free] = np.clip(x[:free] + deviation * (root @ rng.normal(size=free)), low, high)
+        draws.append(fit.problem.values(x))
+    return draws
+
+
+def posterior_yaml(draws: list[dict[str, float]], values: Mapping[str, float], camera: Mapping[str, float]) -> str:
+    """The part of a study file with the family of these draws; `values` are those of the fit, `camera` its sensor."""
+    lines = [
+        "families:", f"  {FAMILY}:", "    about: wrists that the identified trials leave possible", "    loop:",
+        "      control_period: 0.005", "      actuator:", "        level: tendon",
+        *(f"        {name}: {value!r}" for name, value in tendons_of_values(values).items()), "      sensor:",
+        "        level: camera", *(f"        {name}: {value!r}" for name, value in camera.items()),
+        f"    draw: {{reference.angle_deg: -{_ANGLE}..{_ANGLE}}}", "    horizon: 4.0", "    references:",
+        "      - {kind: minimum-jerk, duration: 1.0}", "      - {kind: two-sided-sine, frequency: 0.5}",
+        "    together:",
+    ]  # fmt: skip
+    for draw in draws:
+        row = {f"plant.{name}": draw[name] for name in _OF_WRIST}
+        row |= {f"plant.actuator.{name}": value for name, value in tendons_of_values(draw).items()}
+        if "delay_frames" in camera and "frame_rate" in camera:
+            late = camera["delay_frames"] + camera["frame_rate"] * (draw["delay"] - values["delay"])
+            row["plant.sensor.delay_frames"] = max(0.0, late)
+        lines.append("      - {" + ", ".join(f"{key}: {float(value)!r}" for key, value in row.items()) + "}")
+    return "\n".join(lines) + "\n"
