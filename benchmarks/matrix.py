@@ -53,7 +53,7 @@ def tests(commands: Path, folder: Path) -> str:
     """Why a test of a copy of the tests failed with the installed package; empty where all pass."""
     shutil.copytree(ROOT / "tests", folder / "tests", ignore=shutil.ignore_patterns("__pycache__"))
     shutil.copy(ROOT / "pyproject.toml", folder)
-    subprocess.run([*installer(commands), "pytest>=8", "pytest-xdist", "hypothesis", "cobs"], check=True)
+    subprocess.run([*installer(commands), "pytest>=8", "pytest-xdist", "hypothesis", "cobs", "mpmath"], check=True)
     plain = {key: value for key, value in os.environ.items() if key not in ("PYTHONPATH", "VIRTUAL_ENV")}
     call = [str(commands / "python"), "-m", "pytest", "-n", "0", "-p", "no:cacheprovider", *TESTS]
     done = subprocess.run(call, cwd=folder, env=plain, capture_output=True, text=True)
