@@ -118,7 +118,7 @@ first ([how](worlds.md#who-is-best)); one that fails or swings in any world has 
 - **Computed torque or MPC with a disturbance observer** (ct-dob, mpc, pid-dob, smc-dob): smooth motions behind motors,
   tendons and a camera, at 5 to 10 ms, where tendons are 8 kN/m or stiffer and known. Its bandwidth is what buys. MPC is
   the same controller wherever no tendon saturates, and a step costs a hundred times as much (some 13 us). After a
-  jump they swing: motors that are short of acceleration are no load, but look like one.
+  jump they come to rest, since they know what their motors withhold.
 - **Feedforward and PID** (pid-ff): no model but the feedforward; quiet from 1 to 10 ms. Tuned it ties with the former.
   PD alone (pd-ff) leaves what an integral would take away.
 - **LQI**: like pid-ff, with weights instead of gains; it keeps the wrist's own spring in the loop.
