@@ -121,14 +121,16 @@ def wrong(judged: Sequence[Judged]) -> list[tuple[Judged, str]]:
 def page(judged: Sequence[Judged]) -> str:
     """The table: a row for each fault and moment."""
     caught = sum(each.end == "caught" for each in judged)
-    odd = sum(each.end == "tolerated" for each in judged)
+    odd = sum(each.end == "tolerated" and bool(each.said) for each in judged)
+    silent = sum(each.end == "tolerated" and not each.said for each in judged)
     most = max(each.pull for each in judged)
+    alike = len(judged) - caught - odd - silent
     left = len(PHASES) * len(INJECTED) + 2 * len(BUILT) - len(judged)
     lines = [
         "# Faults that creep, cancel each other or come again",
         "",
         f"{len(judged)} runs on the emulated rig, motors at 1.0 A (42.7 N): {caught} were stopped, {odd} went through",
-        f"and said what was odd, {len(judged) - caught - odd} went as a sound run does. The largest true pull was",
+        f"and said what was odd, {silent} said nothing and {alike} went as a sound run does. The largest true pull was",
         f"{most:.0f} N. These come beside the [table of all faults](faults.md#every-fault-tried).",
         "Made by `make fault-table`" + (f"; {left} more runs of it have not been made yet." if left else "."),
         "",
@@ -137,8 +139,14 @@ def page(judged: Sequence[Judged]) -> str:
     ]
     for each in judged:
         after = "" if np.isnan(each.seconds) else f"{1e3 * each.seconds:.0f}"
-        end = {"caught": "stopped", "tolerated": "ok, odd", "no effect": "ok, as sound"}[each.end]
-        said = each.said.removeprefix("stopped: ").partition("; likely")[0].replace("|", "/")
+        quiet = each.end == "tolerated" and not each.said
+        end = (
+            "ok, silent"
+            if quiet
+            else {"caught": "stopped", "tolerated": "ok, odd", "no effect": "ok, as sound"}[each.end]
+        )
+        why = SILENT.get(each.name, "") if quiet else each.said
+        said = why.removeprefix("stopped: ").partition("; likely")[0].replace("|", "/")
         lines.append(
             f"| {each.name} | {each.phase} | {end} | {after} | {each.pull:.0f} | {each.error:.1f} | {said[:160]} |"
         )
