@@ -10,10 +10,14 @@ from multiprocessing import get_context
 import numpy as np
 import pytest
 
-from tests.trial.fault_cases import CASES, EXCEPTED, PHASES, Case, Phase
+from tests.trial.fault_cases import AT, CASES, EXCEPTED, PHASES, Case, Phase
 from tests.trial.fault_judging import Judged, by_phase, table
 from tests.trial.fault_runs import fan_out, from_power_on, sound_course
+from tests.trial.further_faults import FURTHER, SILENT, page
+from tests.trial.further_faults import INJECTED as INJECTED_FURTHER
+from tests.trial.further_faults import wrong as wrong_further
 from tests.trial.sound_rigs import ended_on
+from wristctl.config.bench import InjectedFault
 
 THOROUGH = bool(os.environ.get("WRISTCTL_THOROUGH"))
 thorough = pytest.mark.skipif(not THOROUGH, reason="with WRISTCTL_THOROUGH: takes minutes")
@@ -90,3 +94,17 @@ def test_no_sound_rig_raises_a_false_alarm() -> None:
     alarms = [each for each in ended if each[1]]
     print(f"\n{RIGS - len(alarms)} of {RIGS} sound rigs without a false alarm")
     assert not alarms
+
+
+def test_further_faults_are_named_once_and_silence_is_judged() -> None:
+    """What may end either way is wrong where a pull exceeds the motors', or a wrist that differed is passed over."""
+    names = [case.name for case in FURTHER]
+    assert len(names) == len(set(names)) >= 40 and set(SILENT) < set(names)
+    for case in INJECTED_FURTHER:
+        parts = [InjectedFault.model_validate(part) for part in case.faults("moving")]
+        assert len(parts) == 1 + len(case.parts) and all(part.at >= AT["moving"] for part in parts)
+    sound = Judged("all tendons shorter by 1 mm", "moving", "caught", True, 0.1, 42.0, 0.2, "stopped: pulls")
+    assert not wrong_further([sound, sound._replace(end="no effect", said="")])
+    ended = [sound._replace(pull=45.0), sound._replace(end="tolerated", said=""), sound._replace(end="tolerated")]
+    assert [why for _, why in wrong_further(ended)] == ["45 N", "went through, and said nothing"]
+    assert "| all tendons shorter by 1 mm | moving | stopped | 100 | 42 | 0.2 | pulls |" in page([sound])
