@@ -6,8 +6,6 @@ import math
 from collections.abc import Container, Iterable, Sequence
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from wristctl.commands.answer import Answer
 from wristctl.commands.printed_table import COLUMNS, Table, joined
 from wristctl.commands.ranking_answer import advice, certainty, do_not_use, fitted, ranking_table, ties
@@ -49,6 +47,8 @@ def best_on_yours(rankings: Sequence[Ranking]) -> str:
 
     Empty where the worlds are no draws of an identification's posterior.
     """
+    import numpy as np
+
     from wristctl.comparison.tie_groups import share
     from wristctl.comparison.world_ranking import WorldRanking
 

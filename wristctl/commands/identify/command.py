@@ -30,6 +30,8 @@ if TYPE_CHECKING:
 
 log = logging.getLogger(__name__)
 
+# Endings of names that are of tables and never of runs.
+_TABLES = (".csv", ".txt", ".parquet")
 # Draws of the posterior that a run keeps as a family of worlds.
 _DRAWS = 200
 
@@ -77,7 +79,7 @@ class _Logged(NamedTuple):
 def with_logs(study: Study) -> Study:
     """The study with files among its runs named as open logs."""
     runs = study.identify.runs
-    logs = tuple(run for run in runs if Path(run).is_file())
+    logs = tuple(run for run in runs if Path(run).is_file() or Path(run).suffix in _TABLES)
     if not logs:
         return study
     changed = {"runs": tuple(run for run in runs if run not in logs), "logs": (*study.identify.logs, *logs)}
