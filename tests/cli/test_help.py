@@ -119,10 +119,9 @@ def test_former_names_are_the_same_commands() -> None:
 
 
 TAKEN_FOR_GRANTED = (
-    r"no such file - my.csv ",
     r"no such run - \w*RUN in ",
     r"no such video - ",
-    r"cannot read the measured (loop|data): No such file",
+    r"cannot read the (measured loop|measured data|log): No such file",
     r"no such folder - ",
     r"no [a-z-]+ run that ended ok - latest:[a-z-]+ in ",
 )

@@ -189,6 +189,6 @@ def test_a_label_after_a_dash_and_a_csv_are_no_runs_and_what_is_meant_is_said(ca
     assert code == 2 and "latest:compare:quick" in err
     assert call("runs", "show", "latest:compare:quick")[1].rstrip().endswith(str(live.id))
     Path("my.csv").write_text("t [s]\n0\n")
-    for command in (("identify", "my.csv"), ("train", "--data", "my.csv"), ("runs", "show", "my.csv")):
+    for command in (("train", "--data", "my.csv"), ("runs", "show", "my.csv")):
         code, _, err = call(*command)
         assert code == 2 and "gen-data --source csv" in err and "hysteresis --measured" in err, command

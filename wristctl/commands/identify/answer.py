@@ -24,7 +24,11 @@ def found_answer(fit: Fit, knowledge: Knowledge, suspected: Sequence[Suspicion],
     )
     notes = [*_misses(knowledge, suspected)]
     if run:
-        notes += ["Next, simulate the wrist that was found:", f"$ wristctl simulate --from-identified {run}"]
+        notes += [
+            "Next, simulate the wrist that was found, or compare controllers on those that the trials leave possible:",
+            f"$ wristctl simulate --from-identified {run}",
+            f"$ wristctl compare {run}/data/posterior.yaml --set worlds.family=posterior",
+        ]
     more = f"Correlations, residuals and assumptions: --all. The study file: {run}/data/identified.yaml" if run else ""
     return Answer(sentence, parameter_table(fit, knowledge, {}), notes, more)
 

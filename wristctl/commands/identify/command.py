@@ -30,6 +30,8 @@ if TYPE_CHECKING:
 
 log = logging.getLogger(__name__)
 
+# Endings of names that are of tables and never of runs.
+_TABLES = (".csv", ".txt", ".parquet")
 # Draws of the posterior that a run keeps as a family of worlds.
 _DRAWS = 200
 
@@ -74,18 +76,12 @@ class _Logged(NamedTuple):
     kinds: pd.DataFrame
 
 
-# Endings of the names of open logs.
-LOGS = (".csv", ".parquet")
-
-
 def with_logs(study: Study) -> Study:
     """The study with files among its runs named as open logs."""
     runs = study.identify.runs
-    logs = tuple(run for run in runs if (Path(run).suffix in LOGS and not Path(run).is_dir()) or Path(run).is_file())
+    logs = tuple(run for run in runs if Path(run).is_file() or Path(run).suffix in _TABLES)
     if not logs:
         return study
-    for missing in (log for log in logs if not Path(log).is_file()):
-        raise UserError("no such file", missing, "an open log: docs/open-log.md")
     changed = {"runs": tuple(run for run in runs if run not in logs), "logs": (*study.identify.logs, *logs)}
     return study.model_copy(update={"identify": study.identify.model_copy(update=changed)})
 
