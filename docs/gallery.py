@@ -1,4 +1,4 @@
-"""The gallery of the site: a dozen runs of one command each, with figure, answer, archive and report."""
+"""The gallery of the site: runs of one command each, with figure, answer, archive and report."""
 
 from __future__ import annotations
 
@@ -19,17 +19,13 @@ RIG = "--set loop.control_period=0.005 --set loop.actuator.level=tendon --set lo
 
 @dataclass(frozen=True)
 class Exhibit:
-    """One run of the gallery: name of its page, title, what to see in it, command, and stem of the figure shown.
-
-    `before` is a command that makes what the run reads.
-    """
+    """One run of the gallery: name of its page, title, what to see in it, command, and stem of the figure shown."""
 
     name: str
     title: str
     about: str
     command: str
     figure: str
-    before: str = ""
 
 
 EXHIBITS = (
@@ -116,15 +112,6 @@ EXHIBITS = (
         "hw-run first-motion",
         "directions",
     ),
-    Exhibit(
-        "identification",
-        "A wrist's parameters from its trials",
-        "Quick steps of the emulated wrist give its damping, its tendons and the camera's delay. Its stiffness was "
-        "measured before, with a spring scale. What the emulation has: 0.105 N m s/rad, 20 kN/m, friction 0.1.",
-        "identify latest:hw-run --set fix.stiffness=0.4305",
-        "angles",
-        before="hw-run identify --set hw-run.directions=[ulnar]",
-    ),
 )
 
 
@@ -158,15 +145,12 @@ def write_gallery(docs: Path, work: Path, run: bool = True) -> None:
 
 def page(exhibit: Exhibit, pages: Path, work: Path) -> str:
     """The page of an exhibit, after running it; its figure, report and archive are put into the folder `pages`."""
-    if exhibit.before:
-        wristctl(shlex.split(exhibit.before), work)
     answer = wristctl(shlex.split(exhibit.command), work).rstrip()
     folder = work / answer.splitlines()[-1]
     figure = folder / "figures" / f"{exhibit.figure}.png"
     if not figure.is_file():
         drawn = sorted(file.stem for file in figure.parent.glob("*.png"))
         raise FileNotFoundError(f"{exhibit.name}: no figure {exhibit.figure}, there are {', '.join(drawn)}")
-    calls = "\n".join(f"$ wristctl {call}" for call in (exhibit.before, exhibit.command) if call)
     shutil.copy(figure, pages / f"{exhibit.name}.png")
     shutil.copy(folder / "report.html", pages / f"{exhibit.name}-report.html")
     wristctl(["runs", "pack", folder.name, "--file", str(pages / f"{exhibit.name}.zip")], work)
@@ -176,7 +160,7 @@ def page(exhibit: Exhibit, pages: Path, work: Path) -> str:
 {exhibit.about}
 
 ```console
-{calls}
+$ wristctl {exhibit.command}
 {answer}
 ```
 
