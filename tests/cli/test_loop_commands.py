@@ -258,8 +258,8 @@ def test_a_run_names_the_streams_that_it_drew_from(call: Call) -> None:
 
 
 def test_simulate_exits_3_where_the_wrist_left_its_range_and_its_run_stands(call: Call) -> None:
-    loop = "simulate.loop={sensor: {level: camera}, actuator: {level: tendon, tendon_stiffness: 2000.0}}"
-    settings = ("simulate.controller=smc-tracking", "simulate.gains=camera", loop)
+    """Pushed by more than any tendon holds."""
+    settings = ("simulate.loop={disturbances: {push: {force: 100.0, duration: 0.5}}}",)
     code, out, err = call("simulate", *(part for each in settings for part in ("--set", each)))
     run = Run(Path(out.splitlines()[-1]))
     assert (
