@@ -97,7 +97,8 @@ def test_identified_values_replace_what_a_command_knows_and_leave_its_levels() -
     assert simulated.simulate.loop.actuator == Actuator(level="tendon", sheath=0.3 / 0.2).model_copy(update=tendons)
     tuned = with_identified(study, "tune", text).tune
     assert {loop.sensor.delay_frames for loop in tuned.loops.values()} == {1.5}
-    assert {loop.sensor.level for loop in tuned.loops.values()} == {"ideal"}
+    levels = {name: loop.sensor.level for name, loop in study.tune.loops.items()}
+    assert {name: loop.sensor.level for name, loop in tuned.loops.items()} == levels
 
 
 def _log_of(file: Path, noise: float, backward: bool = False) -> None:

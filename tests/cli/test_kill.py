@@ -88,7 +88,7 @@ def _told(folder: Path, at: int, *arguments: str) -> tuple[int, list[str]]:
 
 
 def test_every_command_that_makes_a_run_is_known() -> None:
-    assert set(QUICKLY) | {"identify", "hw", "hw-run", "track"} == set(_that_write())
+    assert set(QUICKLY) | {"identify", "hw", "hw-run", "track", "validate"} == set(_that_write())
 
 
 def test_killed_before_any_change_of_a_file_no_run_looks_complete_that_is_not(tmp_path: Path) -> None:

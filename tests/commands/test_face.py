@@ -217,8 +217,8 @@ def test_nothing_is_printed_and_progress_is_told_to_whom_asks(
 ) -> None:
     told: list[tuple[str, int, int | None, Mapping[str, float]]] = []
     wristctl.tune(study, network=in_memory["train"], progress=lambda *all_: told.append(all_))  # type: ignore[arg-type]
-    counts = [(count, total) for what, count, total, _ in told if what == "tuning smc"]
-    assert counts == [(0, 2), (1, 2), (2, 2)] and np.isfinite(told[-1][3]["best"])
+    counts = [(count, total, facts) for what, count, total, facts in told if what == "tuning smc"]
+    assert [told_of[:2] for told_of in counts] == [(0, 2), (1, 2), (2, 2)] and np.isfinite(counts[-1][2]["best"])
     assert capfd.readouterr() == ("", "")
 
 

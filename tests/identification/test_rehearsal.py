@@ -118,17 +118,19 @@ WITH: dict[str, dict[str, Any]] = {
     "plant.creep_time": LATE, "plant.end_stop_stiffness": STOPPED, "plant.end_stop_dissipation": STOPPED,
     "facts.creep_time": LATE, "facts.slip": {"slips_at": 0.2, "slip": 1e-4}, "plant.taper": {"model": "hinges"},
     "plant.flexion_ratio": {}, "actuator.presliding": {}, "plant.inner_presliding_deg": {"inner_friction": 0.02},
+    "plant.stiffness_axis_deg": {"flexion_ratio": 1.3},
 }  # fmt: skip
 """What a leaf needs beside it to mean anything."""
 OTHERS: dict[str, Any] = {
     "plant.model": "hinges", "plant.end_stop_deg": 12.0, "facts.broken_at": 0.2, "facts.slips_at": 0.2,
     "facts.backlash": 3e-4, "plant.tilt_deg": 10.0, "plant.payload": 0.2, "actuator.step_rate": 2e3,
+    "plant.stiffness_axis_deg": 30.0,
 }  # fmt: skip
 NOT_OF_TENDONS = {"lag", "torque", "top_speed", *TendonFacts.model_fields}
 """Of motors with a lag, of a motor that falls back, and what `facts` say."""
 LEAVES = [
     *(f"plant.{name}" for name in TrueWrist.model_fields if not name.endswith("_spread")),
-    *(f"facts.{name}" for name in TendonFacts.model_fields),
+    *(f"facts.{name}" for name in TendonFacts.model_fields if name not in ("slack", "broken_tendon")),  # of two planes
     *(f"actuator.{name}" for name in TrueActuator.model_fields.keys() - NOT_OF_TENDONS),
     *(each for each in ("delay", "noise_deg", "zero_deg", "taut", "frame_rate", "exposure", "dropped", "segments")),
 ]

@@ -35,7 +35,7 @@ def draw_rankings(findings: Findings, rankings: Sequence[Ranking], later: bool =
     caption = f"Share of the {unit}s in which a controller's RMSE is within a factor of the least one there"
     findings.figure("performance-profile", performance_profile, rankings, places, caption=caption, later=later)
     baseline = next((one.labels[one.yardstick] for one in rankings if one.yardstick is not None), None)
-    if baseline is not None:
+    if baseline is not None and any(len(one.labels) > 1 for one in rankings):
         caption = f"RMSE over feedforward's in the same {unit}s: geometric mean with 95 % interval, and every {unit}"
         findings.figure("ratio-to-feedforward", paired_ratios, rankings, baseline, places, caption=caption, later=later)
     for ranking in rankings:

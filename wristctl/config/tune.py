@@ -1,7 +1,7 @@
 """Settings of `tune`: a search for gains."""
 
 from collections.abc import Mapping
-from typing import Annotated, Any, Self
+from typing import Annotated, Self
 
 from pydantic import AfterValidator, model_validator
 
@@ -99,11 +99,9 @@ class TuneSettings(Section):
     from_identified: str | None = choice(None, "identify run whose parameters replace the study's")
     resume: str | None = choice(None, "tune run that was cut short: what it has tried is not run again")
 
-    @model_validator(mode="before")
-    @classmethod
-    def _on_the_first_loop(cls, settings: Any) -> Any:
+    @model_validator(mode="after")
+    def _on_the_first_loop(self) -> Self:
         """Settings that name loops and no scenario have the usual motions on the first of these loops."""
-        loops = settings.get("loops") if isinstance(settings, Mapping) else None
-        if not isinstance(loops, Mapping) or not loops or "scenarios" in settings:
-            return settings
-        return {**settings, "scenarios": _scenarios(str(next(iter(loops))))}
+        if "scenarios" not in self.model_fields_set and "loops" in self.model_fields_set:
+            self.__dict__["scenarios"] = _scenarios(next(iter(self.loops)))
+        return self

@@ -209,8 +209,12 @@ def _steps(loop: Loop, horizon: float) -> float:
 
 def check_one_plane(loop: Loop) -> None:
     """UserError for a loop that asks for two planes where there is one."""
-    if loop.planes == 2 or loop.disturbances.toward_deg:
-        key = "planes" if loop.planes == 2 else "disturbances.toward_deg"
+    tendons = loop.plant.actuator
+    asked = {
+        "planes": loop.planes == 2, "disturbances.toward_deg": loop.disturbances.toward_deg,
+        "plant.actuator.slack": any(tendons.slack), "plant.actuator.broken_tendon": tendons.broken_tendon > 1,
+    }  # fmt: skip
+    for key in (key for key, is_asked in asked.items() if is_asked):
         fix = "leave it out, or `wristctl simulate`, which bends in two planes too"
         raise UserError("this loop bends in one plane", f"loop.{key}", fix)
 

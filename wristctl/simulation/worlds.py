@@ -113,10 +113,11 @@ def plant_of(wrist: WristParameters, plant: TrueWrist) -> WristParameters:
 
 def facing(wrist: WristParameters, plant: P, direction: str) -> tuple[WristParameters, P]:
     """A wrist as it is known, and the plant that it is, as this direction's bending plane sees them."""
-    believed = in_plane(wrist, direction)
-    if believed is wrist:
+    believed, own = in_plane(wrist, direction), plant.of(wrist)
+    true = in_plane(own, direction)
+    if believed is wrist and true is own:
         return wrist, plant
-    actual = TrueWrist.between(believed, in_plane(plant.of(wrist), direction))
+    actual = TrueWrist.between(believed, true)
     leaves = TrueWrist.model_fields.keys() & WristParameters.model_fields.keys()
     return believed, plant.model_copy(update={name: getattr(actual, name) for name in leaves})
 

@@ -72,7 +72,7 @@ class QuasistaticArcs:
             for array in (reeled, self.arms, self.stiffness, self.tendon, pause, np.stack(ways, axis=1))
         )
         ends = self.ends.astype(np.int64)
-        _rest(reeled, arms, stiffness, tendon, coefficients, pause, ends, int(ends.max()), out)
+        _rest(reeled, arms, stiffness, tendon, coefficients, pause, ends, out)
         return out
 
     def pulls(self, reeled: Array, coordinates: Array) -> Array:
@@ -127,10 +127,10 @@ def _turned(z: float, travel: float, slope: float) -> tuple[float, float]:
 
 
 @kernel
-def _rest(
-    reeled: Any, arms: Any, stiffness: Any, tendon: Any, ways: Any, pause: Any, ends: Any, arcs: int, out: Any
-) -> None:
-    count, tendons = arms.shape[2], arms.shape[1]
+def _rest(reeled: Any, arms: Any, stiffness: Any, tendon: Any, ways: Any, pause: Any, ends: Any, out: Any) -> None:
+    count, tendons, arcs = arms.shape[2], arms.shape[1], 0
+    for t in range(tendons):
+        arcs = max(arcs, ends[t])
     bends, coordinates = 2 * arcs, count // arcs
     q, before, r, slope = np.zeros(count), np.zeros(count), np.zeros(count), np.zeros((count, count))
     crept, inside, inside_now, wrapped = np.zeros(bends), np.zeros(bends), np.zeros(bends), np.zeros(arcs)
