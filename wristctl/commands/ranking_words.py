@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 PRINTED = "printed"
 PAPERS_GAINS = {PRINTED, "exchanged"}
 # Letters of a name, at most.
-_LETTERS = 18
+_LETTERS = 24
 
 
 def condition(ranking: Ranking) -> str:

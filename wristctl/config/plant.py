@@ -95,7 +95,9 @@ class Overrides(Section):
         unsaid = {key for key, field in fields.items() if is_unsaid(field)}
         written = handler(self)
         return {
-            key: entry for key, entry in written.items() if key not in unsaid or entry not in (fields[key].default, {})
+            key: entry
+            for key, entry in written.items()
+            if key not in unsaid or entry not in (fields[key].default, {}, [])
         }
 
 
@@ -110,7 +112,9 @@ class TendonFacts(Section):
     creep_time: float = fact(10.0, "s", "time constant of that", gt=0)
     broken_at: float | None = fact(None, "s", "when one of the + side's two tendons breaks; null: never", ge=0)
     broken_tendon: int = fact(1, "", "which of the tendons' places breaks, of a wrist in two planes", ge=1)
-    slack: tuple[float, ...] = fact((), "m", "slack that homing left in each place's tendons, in two planes")
+    slack: tuple[float, ...] = fact(
+        (), "m", "slack that homing left in each place's tendons, in two planes", strict=False
+    )
     slips_at: float | None = fact(None, "s", "when the + side's tendons slip on their spool; null: never", ge=0)
     slip: float = fact(1e-3, "m", "by how much", gt=0)
 

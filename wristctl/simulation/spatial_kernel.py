@@ -169,7 +169,7 @@ def run_spatial(setup: Any, course: Any, world: Any, states: Any, scratch: Any, 
                 at[0], at[1], at[2], at[3] = tip_bend(segment, q, rate)
                 bent = sqrt(at[0] * at[0] + at[1] * at[1])
                 alive[0] = where(bent < limits[2 * count], alive[0], zero)
-                sense_bends(state.watch, course.schedule, known, now_tick, at, counts, bend, period, seen)
+                sense_bends(state.watch, course.schedule, known, now_tick, at, (counts, bend), period, seen)
                 for ahead in range(1, setup.preview + 1):
                     to_come = min((now_tick + ahead) // ticks, course.references.shape[2] - 1)
                     for i in range(3):

@@ -136,30 +136,25 @@ def _advanced(model: Any, angle: Any, speed: Any, torque: Any, tendons: Any, h: 
 
 
 @by_type
-def sense_bends(
-    watch: Any, schedule: Any, known: Any, tick: int, at: Any, counts: Any, bend: Any, h: float, out: Any
-) -> None:
+def sense_bends(watch: Any, schedule: Any, known: Any, tick: int, at: Any, before: Any, h: float, out: Any) -> None:
     """What the laws see at a tick, bend, rate and load of each plane, into `out` (6 rows).
 
-    `at` has the true bends and rates (y, z, y, z). Without a camera the laws see these.
+    `at` has the true bends and rates (y, z, y, z). Without a camera the laws see these. `before` are the motors' counts
+    and the bends that were seen at the last tick.
     """
     raise NotImplementedError("compiled code only")
 
 
 @implements(sense_bends, NoCamera)
-def _as_it_is(
-    watch: Any, schedule: Any, known: Any, tick: int, at: Any, counts: Any, bend: Any, h: float, out: Any
-) -> None:
+def _as_it_is(watch: Any, schedule: Any, known: Any, tick: int, at: Any, before: Any, h: float, out: Any) -> None:
     zero = zero_like(out[0])
     out[0], out[1], out[2] = at[0], at[2], zero
     out[3], out[4], out[5] = at[1], at[3], zero
 
 
 @implements(sense_bends, SpatialWatch)
-def _observed(
-    watch: Any, schedule: Any, known: Any, tick: int, at: Any, counts: Any, bend: Any, h: float, out: Any
-) -> None:
-    turn, frames = watch.turn, len(schedule.captures)
+def _observed(watch: Any, schedule: Any, known: Any, tick: int, at: Any, before: Any, h: float, out: Any) -> None:
+    turn, frames, (counts, bend) = watch.turn, len(schedule.captures), before
     now = rows_of(watch.now)
     taken, arrived = turn[0], turn[1]
     if taken < frames and schedule.captures[taken] == tick:
