@@ -18,6 +18,8 @@ from wristctl.wrist.segments import load_segments, segments
 
 # Ticks.
 _REMEMBERED = 256
+# Seconds for which a spool's length may be taken to stand still: a wrist of 300 deg/s goes on by 0.4 deg meanwhile.
+_STILL = 2.5e-3
 
 
 class BlindModel:
@@ -35,12 +37,16 @@ class BlindModel:
         self._observers = [observer_of(Belief(sensor, actuator, wrist, period), 1, 0.0) for _ in self._drives]
         self._model, self._period, self._tick = segments(wrist, 1), period, 0
         self._angles = np.zeros((_REMEMBERED, 2))
+        self._parts, self._reeled = max(1, math.ceil(period / _STILL - 1e-9)), np.zeros(2)
 
     def predict(self, reeled_plus: float, reeled_minus: float) -> None:
-        """Go on to the next tick, with the sides reeled in by so much [m] until then."""
+        """Go on to the next tick, with the sides reeled in by so much [m] until then, evenly since the last one."""
         self._tick += 1
+        before, self._reeled = self._reeled, np.array([reeled_plus, reeled_minus])
         for k, (observer, drive) in enumerate(zip(self._observers, self._drives, strict=True)):
-            _predict(observer, drive, self._model, reeled_plus, reeled_minus, self._period)
+            for part in range(self._parts):
+                plus, minus = before + (part + 0.5) / self._parts * (self._reeled - before)
+                _predict(observer, drive, self._model, plus, minus, self._period / self._parts)
             self._angles[self._tick % _REMEMBERED, k] = observer.now[0]
 
     def angles(self, time: float) -> Array:
