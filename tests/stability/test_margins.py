@@ -120,6 +120,13 @@ def loops(draw: st.DrawFn) -> tuple[Array, Array, Array]:
     return a * rng.uniform(0.3, 0.98) / np.abs(np.linalg.eigvals(a)).max(), rng.normal(size=n), rng.normal(size=n)
 
 
+def test_a_pair_that_leaves_the_unit_circle_just_before_it_is_real_is_found() -> None:
+    """z^2 + 1.9995 z + 0.8 + 0.1995 k: a pair that leaves the circle at k = 0.2/0.1995, 1.3 deg before -1."""
+    transition = np.array([[-1.9995, -0.8], [1.0, 0.0]])
+    found = margins(closed(transition, np.array([-1.0, 0.0]), np.array([0.0, -0.1995]), PERIOD))
+    assert found.stable and found.most.value == pytest.approx(0.2 / 0.1995, rel=1e-6)
+
+
 @settings(max_examples=40, deadline=None)
 @given(loops())
 def test_limits_of_any_loop_are_where_eigenvalues_leave_the_unit_circle(own: tuple[Array, Array, Array]) -> None:

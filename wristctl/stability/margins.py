@@ -70,7 +70,7 @@ _ROUNDING = 1e-7
 
 # Growth [1/s] below which a mode stays as it is: an integrator that nothing drives, a slow leak.
 NEUTRAL = 1e-3
-_LEAST_OMEGA, _PER_DECADE = 1e-2, 120
+_LEAST_OMEGA, _PER_DECADE, _CLOSE_BELOW = 1e-2, 120, 40
 # Damping of poles near which a response is looked at too, and at which distances from their frequency, in it.
 _LIGHT, _CLOSE = 0.1, (0.0, 0.1, 0.3, 1.0, 3.0)
 
@@ -113,10 +113,14 @@ class Margins:
 
 
 def frequencies(loop: SampledLoop) -> Array:
-    """Frequencies [rad/s] to evaluate a loop at, to half its sampling rate: even by decades, dense near its poles."""
+    """Frequencies [rad/s] to evaluate a loop at, to half its sampling rate: even by decades, dense near its poles and
+    below half the rate, where a pair may leave the unit circle just before both its poles are real."""
     most = half_rate(loop)
     count = max(2, round(_PER_DECADE * math.log10(most / _LEAST_OMEGA)))
-    grids = [np.geomspace(min(_LEAST_OMEGA, 0.1 * most), most, count)]
+    grids = [
+        np.geomspace(min(_LEAST_OMEGA, 0.1 * most), most, count),
+        most * (1.0 - np.geomspace(1e-5, 0.03, _CLOSE_BELOW)),
+    ]
     for pole in swinging(loop):
         grids.append(abs(pole.imag) + np.outer((-1.0, 1.0), _CLOSE).ravel() * abs(pole.real))
     every = np.unique(np.concatenate(grids))
