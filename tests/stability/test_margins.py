@@ -121,10 +121,21 @@ def loops(draw: st.DrawFn) -> tuple[Array, Array, Array]:
 
 
 def test_a_pair_that_leaves_the_unit_circle_just_before_it_is_real_is_found() -> None:
-    """z^2 + 1.9995 z + 0.8 + 0.1995 k: a pair that leaves the circle at k = 0.2/0.1995, 1.3 deg before -1."""
-    transition = np.array([[-1.9995, -0.8], [1.0, 0.0]])
-    found = margins(closed(transition, np.array([-1.0, 0.0]), np.array([0.0, -0.1995]), PERIOD))
-    assert found.stable and found.most.value == pytest.approx(0.2 / 0.1995, rel=1e-6)
+    """It does so 0.1 % before the gain at which a real pole is -1, where the frequency is half the rate's."""
+    transition = np.array([
+        [-0.42888677, 0.29847215, 0.43372576, -0.00081722, 0.03077173],
+        [-0.38423056, 0.48516206, -0.51023281, 0.28142618, 0.08813508],
+        [0.05381203, 0.37282349, 0.31764966, -0.19466348, -0.25315414],
+        [0.00443367, -0.2471016, -0.15918452, 0.52649928, 0.07873879],
+        [0.57293668, 0.35749691, 0.34073549, -0.43949077, -0.02533142],
+    ])  # fmt: skip
+    into = np.array([-0.14470932, 0.30681288, -0.07034799, 1.92042424, -1.633986])
+    back = np.array([-0.2770713, 1.283875, -0.58385162, -0.47863667, -1.399153])
+    limit = margins(closed(transition, into, back, 1.0)).most.value
+    largest = [
+        np.abs(np.linalg.eigvals(transition - side * limit * np.outer(into, back))).max() for side in (0.9999, 1.0001)
+    ]
+    assert largest[0] < 1.0 < largest[1]
 
 
 @settings(max_examples=40, deadline=None)
