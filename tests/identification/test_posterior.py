@@ -6,6 +6,7 @@ from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
+import pytest
 
 from wristctl.commands.compare.answer import best_on_yours
 from wristctl.comparison.world_ranking import WorldRanking
@@ -49,13 +50,15 @@ def test_draws_spread_as_the_intervals_and_keep_correlations() -> None:
     )
 
 
-def test_the_family_of_a_posterior_is_worlds_of_these_wrists(tmp_path: Path) -> None:
+@pytest.mark.parametrize("period", [0.01, 0.02])
+def test_the_family_of_a_posterior_is_worlds_of_these_wrists(tmp_path: Path, period: float) -> None:
     fit, knowledge = _known()
     draws = posterior_draws(fit, knowledge, 20, np.random.default_rng(1))
     values = fit.problem.values(fit.x)
     file = tmp_path / "posterior.yaml"
-    file.write_text(identified_yaml(values, CAMERA) + posterior_yaml(draws, values, CAMERA))
+    file.write_text(identified_yaml(values, CAMERA) + posterior_yaml(draws, values, CAMERA, period))
     family = load_study([file]).families[FAMILY]
+    assert family.loop.control_period == min(period, 1.0 / CAMERA["frame_rate"])
     plants = [world_of(family, FAMILY, "test", 0, number).plant for number in range(30)]
     assert {plant.stiffness for plant in plants} <= {draw["stiffness"] for draw in draws}
     by_stiffness = {draw["stiffness"]: draw["damping"] for draw in draws}

@@ -13,6 +13,8 @@ from wristctl.config.section import Section, choice, quantity
 from wristctl.config.wrist import WristParameters
 from wristctl.errors import Unfitting
 
+# Time between two ticks of a trial [s]: a genuine Mega answers within 9 ms.
+TICK = 10e-3
 # Lifetime of a step rate on the board: least time [s], and number of ticks.
 _LEAST_LIFE, _LIFE_PERIODS = 0.05, 2.5
 
@@ -143,7 +145,7 @@ class HwRunSettings(RigSettings):
     back: float = quantity(1.0, "s", "duration of the return to zero", "assumed", gt=0)
     rest: float = quantity(0.5, "s", "rest at zero before each trial", "assumed", ge=0.1)
     control_period: float = quantity(
-        10e-3, "s", "time between two evaluations of the controller", "a Mega answers within 9 ms", ge=2e-3, le=0.05
+        TICK, "s", "time between two evaluations of the controller", "a Mega answers within 9 ms", ge=2e-3, le=0.05
     )
     calibration: str | None = choice(None, "calibrate-wrist run; without one the rig is homed from scratch")
     positions: Literal["find", "stored"] = choice("find", "zero positions: found anew, or as the calibration left them")

@@ -6,6 +6,7 @@ from typing import Annotated, Any
 from pydantic import BeforeValidator, Field
 
 from wristctl.config.families import Drawn, Family
+from wristctl.config.hw_run import TICK
 from wristctl.config.loop import Loop, Reference
 from wristctl.config.section import Section, choice, quantity
 from wristctl.config.tune import Controllers
@@ -32,7 +33,7 @@ _MOTIONS = (
     Reference(kind="two-sided-sine", frequency=0.5),
 )
 _RIG: dict[str, Any] = {
-    "control_period": 5e-3,
+    "control_period": TICK,
     "actuator": {"level": "tendon", "friction": 0.1, "sheath": 1.0},
     "sensor": {"level": "camera"},
 }

@@ -38,11 +38,24 @@ def posterior_draws(fit: Fit, knowledge: Knowledge, count: int, rng: np.random.G
     return draws
 
 
-def posterior_yaml(draws: list[dict[str, float]], values: Mapping[str, float], camera: Mapping[str, float]) -> str:
-    """The part of a study file with the family of these draws; `values` are those of the fit, `camera` its sensor."""
+def posterior_yaml(
+    draws: list[dict[str, float]], values: Mapping[str, float], camera: Mapping[str, float], period: float
+) -> str:
+    """The part of a study file with the family of these draws.
+
+    Parameters
+    ----------
+    draws : parameters of each wrist
+    values : parameters of the fit
+    camera : its sensor
+    period : time between two ticks of the trials [s], which is the loop's; of a longer one than a frame of the camera
+        lasts, a frame's, since no simulated loop takes more than one
+    """
+    if "frame_rate" in camera:
+        period = min(period, 1.0 / camera["frame_rate"])
     lines = [
         "families:", f"  {FAMILY}:", "    about: wrists that the identified trials leave possible", "    loop:",
-        "      control_period: 0.005", "      actuator:", "        level: tendon",
+        f"      control_period: {period!r}", "      actuator:", "        level: tendon",
         *(f"        {name}: {value!r}" for name, value in tendons_of_values(values).items()), "      sensor:",
         "        level: camera", *(f"        {name}: {value!r}" for name, value in camera.items()),
         f"    draw: {{reference.angle_deg: -{_ANGLE}..{_ANGLE}}}", "    horizon: 4.0", "    references:",

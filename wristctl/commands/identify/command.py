@@ -152,7 +152,7 @@ def identify(session: Session) -> Identified | LogTold:
     findings.text("data/identified.yaml", yaml)
     rng = np.random.default_rng(findings.stream("posterior"))
     draws = posterior_draws(fitted, estimated, _DRAWS, rng)
-    findings.text("data/posterior.yaml", yaml + posterior_yaml(draws, fitted.values, camera))
+    findings.text("data/posterior.yaml", yaml + posterior_yaml(draws, fitted.values, camera, _period(session.inputs)))
     return Identified(session.study, findings, tables, fitted, estimated, yaml, suspected)
 
 
@@ -195,6 +195,11 @@ def _problem(study: Study, inputs: Inputs) -> Problem:
 
 def _logged(run: Run) -> _Logged:
     return _Logged(*(run.data(name) for name in ("log", "frames", "trials")))
+
+
+def _period(inputs: Inputs) -> float:
+    """Time between two ticks of the trials, the longest of all runs [s]."""
+    return max(float(run.config.hw_run.control_period) for run in inputs.runs().values())
 
 
 def _camera(inputs: Inputs, fitted: Fit) -> dict[str, float]:
