@@ -123,7 +123,7 @@ def test_a_plan_says_what_would_be_drawn() -> None:
 
 def simulated() -> Any:
     study = wristctl.load_study(None)
-    return Simulated(study, session(study).findings, [], repeated("one"), False)
+    return Simulated(study, session(study).findings, [], repeated("one"))
 
 
 def test_courses_of_a_result_are_what_is_sampled() -> None:

@@ -26,7 +26,7 @@ def made(out: Path, kind: str) -> Run:
 
 
 def in_memory() -> Simulated:
-    return Simulated(STUDY, session(STUDY).findings, [], repeated("one"), False)
+    return Simulated(STUDY, session(STUDY).findings, [], repeated("one"))
 
 
 def test_of_a_need_nothing_is_optional_or_unfinished_unless_said() -> None:

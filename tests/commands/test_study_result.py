@@ -27,7 +27,8 @@ def test_every_result_is_told_in_a_line_and_is_a_thing_of_its_own() -> None:
     """Tables and arrays have no plain equality, and whole trajectories are nothing to print."""
     for module in pkgutil.walk_packages(commands.__path__, "wristctl.commands."):
         importlib.import_module(module.name)
-    kinds = StudyResult.__subclasses__()
+    direct = StudyResult.__subclasses__()
+    kinds = [kind for parent in direct for kind in (parent.__subclasses__() or [parent])]
     assert len(kinds) >= 11
     study = wristctl.load_study(None)
     for kind in kinds:
@@ -46,7 +47,7 @@ def test_numbers_that_are_missing_are_nan_and_tables_stand_apart() -> None:
     findings.metric("known", 2.0)
     findings.metric("missing", None)
     tables = [Table("One", ("a",), [(1,)]), Table("Two", ("b",), [(2,)])]
-    made = Simulated(study, findings, tables, repeated("one"), False)
+    made = Simulated(study, findings, tables, repeated("one"))
     assert made.metrics["known"] == 2.0 and math.isnan(made.metrics["missing"]) and made.run is None
     assert str(made).endswith(f"\n\n{tables[0].text()}\n\n{tables[1].text()}")
 
@@ -56,7 +57,7 @@ def test_an_unknown_metric_or_figure_is_told_what_is_meant() -> None:
     findings = session(study).findings
     findings.metric("rmse", 2.0)
     findings.figure("angle", Figure)
-    made = Simulated(study, findings, [], repeated("one"), False)
+    made = Simulated(study, findings, [], repeated("one"))
     with pytest.raises(KeyError, match="did you mean 'rmse'"):
         made.metrics["rmsee"]
     with pytest.raises(KeyError, match="did you mean 'angle'"):
@@ -67,7 +68,7 @@ def test_an_unknown_metric_or_figure_is_told_what_is_meant() -> None:
 def test_a_notebook_shows_the_tables_or_the_answer_and_a_picture() -> None:
     study = wristctl.load_study(None)
     findings = session(study).findings
-    made = Simulated(study, findings, [Table("One", ("a<b",), [(1,)])], repeated("one"), False)
+    made = Simulated(study, findings, [Table("One", ("a<b",), [(1,)])], repeated("one"))
     shown = made._repr_html_()
     assert ("a&lt;b" in shown) == (not made.summary) and "<img" not in shown and "a<b" not in shown
     findings.figure("angle", Figure)

@@ -20,7 +20,7 @@ from wristctl.simulation.convergence import FINER, HALF, more_finely, tolerance
 from wristctl.simulation.oscillation import LIMIT_CYCLE, REST, chatter
 from wristctl.simulation.recording import recorded_bends
 from wristctl.simulation.reference import REFERENCES, course_of, motion, toward
-from wristctl.simulation.repetitions import MARKS, STRAIN
+from wristctl.simulation.repetitions import STRAIN, Repetitions
 from wristctl.simulation.spatial_batch import sample_step
 from wristctl.simulation.two_planes import check_bends, rollout_bends
 from wristctl.simulation.worlds import Draws, World, is_random, loops_of
@@ -68,7 +68,7 @@ def bends_of(
 
 
 @dataclass(frozen=True)
-class RepeatedBends:
+class RepeatedBends(Repetitions):
     """Repetitions of one loop in two planes, each with noise and a drawn plant of its own."""
 
     first: BendCourse
@@ -78,20 +78,20 @@ class RepeatedBends:
     """(R,)"""
     until: Array
     """(R,) when each was last within its range [s]."""
-    wrist: WristParameters
+    bears: float
+    """Largest tension that a tendon bears [N]."""
+    tension_range: float
+    """Largest tension less the least one [N]."""
     layout: TendonLayout
     substeps: int
     """Integration steps in a control period that it took."""
-    drift: float
+    step_change: float
     """Change of the first repetition's numbers with the integration step [rad]; 0 where they have converged."""
 
     @property
-    def failure(self) -> str:
-        """In words how it failed; empty where it did not."""
-        if not self.failed.any():
-            return ""
-        count = f" in {self.failed.sum()} of {len(self.failed)} repetitions" if len(self.failed) > 1 else ""
-        return f"left its range at {self.until[self.failed].min():.3g} s{count}"
+    def drift(self) -> float:
+        """`step_change`."""
+        return self.step_change
 
     @property
     def arrives(self) -> bool:
@@ -102,38 +102,42 @@ class RepeatedBends:
     @property
     def swing(self) -> float:
         """Half of the swing at rest, the repetitions' median, where it is a limit cycle, else 0 [rad]."""
+        ripple = self.median("oscillation") if self.rests else 0.0
+        return ripple if ripple > LIMIT_CYCLE else 0.0
+
+    @property
+    def frequency(self) -> float:
+        """Unknown: the swing may go round."""
+        return math.nan
+
+    @property
+    def rests(self) -> bool:
+        """Whether the reference rests at the end, for as long as shows a swing of the loop's own."""
         course = self.first
         late = course.bend_ref[-round(REST / float(course.time[1])) :]
-        if len(course.time) * course.time[1] < REST or np.ptp(late, axis=0).any():
-            return 0.0
-        ripple = _median(self.metrics["oscillation"])
-        return ripple if ripple > LIMIT_CYCLE else 0.0
+        return bool(len(course.time) * course.time[1] >= REST and not np.ptp(late, axis=0).any())
 
     @property
     def chatter(self) -> float:
         """Frequency at which pulls go from limit to limit and back, where it chatters, else 0 [1/s]."""
         places = len(self.layout.places)
-        variation = _median(self.metrics["chattering"]) * _SIDES / places
-        return float(chatter(variation, self.wrist.tension_range)) if math.isfinite(variation) else 0.0
+        return float(chatter(self.median("chattering") * _SIDES / places, self.tension_range))
 
     @property
     def beyond(self) -> float:
         """Largest pull, where it is above what a tendon bears, else 0 [N]."""
         peak = float(np.nanmax((self.first.acting / self.layout.multiplicity).max(initial=0.0)))
-        return peak if peak > STRAIN * self.wrist.tension_limit else 0.0
-
-    @property
-    def marks(self) -> list[str]:
-        """Why it is no good, in a word or two each; empty where it is sound."""
-        if self.failure:
-            return [MARKS[0]]
-        holds = not self.arrives, self.swing > 0.0, self.chatter > 0.0, self.beyond > 0.0, self.drift > 0.0
-        return [mark for mark, one in zip(MARKS[1:], holds, strict=True) if one]
+        return peak if peak > STRAIN * self.bears else 0.0
 
 
-def _median(values: Array) -> float:
-    finite = values[np.isfinite(values)]
-    return float(np.median(finite)) if len(finite) else math.nan
+def wanted_bends(study: Study, period: float) -> Array:
+    """`bends_of` the study's `simulate` section. Raises UserError for what can be known of its loop before it runs."""
+    chosen = study.simulate
+    bends = bends_of(chosen.reference, chosen.direction, study.wrist, chosen.horizon, period)
+    check_bends(controller(chosen.controller), bends[:, 0], study.wrist, chosen.loop)
+    if chosen.start != "straight":
+        raise UserError("a loop in two planes begins straight", "start", "start: straight")
+    return bends
 
 
 def simulate_bends(
@@ -148,10 +152,7 @@ def simulate_bends(
     chosen, draws, wrist = study.simulate, Draws(study.seed), study.wrist
     loop, layout, law = chosen.loop, TendonLayout.of(study.wrist), controller(chosen.controller)
     gains = np.array([gains_of(law, chosen.gains, tuned)])
-    references = bends_of(chosen.reference, chosen.direction, wrist, chosen.horizon, sample_step(loop.control_period))
-    check_bends(law, references[:, 0], wrist, loop)
-    if chosen.start != "straight":
-        raise UserError("a loop in two planes begins straight", "start", "start: straight")
+    references = wanted_bends(study, sample_step(loop.control_period))
     times = chosen.repetitions if is_random(loop) else 1
     loops = loops_of(loop, [draws.plant(repetition) for repetition in range(times)])
     scenario = scenario_of(chosen.reference, chosen.direction)
@@ -174,7 +175,15 @@ def simulate_bends(
             progress(len(metrics) / times)
     gathered = {name: np.array([values[name] for values in metrics]) for name in metrics[0]}
     return RepeatedBends(
-        first[0], gathered, np.array(failed), np.array(until), wrist, layout, factor * loop.steps, drift
+        first[0],
+        gathered,
+        np.array(failed),
+        np.array(until),
+        wrist.tension_limit,
+        wrist.tension_range,
+        layout,
+        factor * loop.steps,
+        drift,
     )
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from abc import ABC, abstractmethod
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -32,8 +33,69 @@ class Simulation:
     until: float
 
 
+class Repetitions(ABC):
+    """Results of a loop that ran once or several times, in one plane or two: whether it failed, and what is wrong."""
+
+    metrics: dict[str, Array]
+    failed: NDArray[np.bool_]
+    until: Array
+    bears: float
+
+    @property
+    def failure(self) -> str:
+        """In words how it failed; empty where it did not."""
+        if not self.failed.any():
+            return ""
+        count = f" in {self.failed.sum()} of {len(self.failed)} repetitions" if len(self.failed) > 1 else ""
+        return f"left its range at {self.until[self.failed].min():.3g} s{count}"
+
+    @property
+    def marks(self) -> list[str]:
+        """Why it is no good, in a word or two each; empty where it is sound."""
+        if self.failure:
+            return [MARKS[0]]
+        holds = not self.arrives, self.swing > 0.0, self.chatter > 0.0, self.beyond > 0.0, self.drift > 0.0
+        return [mark for mark, one in zip(MARKS[1:], holds, strict=True) if one]
+
+    @property
+    @abstractmethod
+    def arrives(self) -> bool:
+        """Whether the first repetition ends where it was asked to."""
+
+    @property
+    @abstractmethod
+    def swing(self) -> float:
+        """Half of the swing at rest, the repetitions' median, where it is a limit cycle, else 0 [rad]."""
+
+    @property
+    @abstractmethod
+    def frequency(self) -> float:
+        """Strongest frequency of the first repetition's swing [1/s]; nan where none is known."""
+
+    @property
+    @abstractmethod
+    def chatter(self) -> float:
+        """Frequency at which tensions go from limit to limit and back, the median, where it chatters, else 0 [1/s]."""
+
+    @property
+    @abstractmethod
+    def beyond(self) -> float:
+        """Largest tension, where it is above what a tendon bears, else 0 [N]."""
+
+    @property
+    @abstractmethod
+    def drift(self) -> float:
+        """Largest change of a repetition's numbers with the integration step [rad]; 0 where all have converged."""
+
+    def median(self, name: str) -> float:
+        """Median of a metric over the repetitions in which it is a number; nan where there is none."""
+        values = self.metrics.get(name, np.empty(0))
+        finite = values[np.isfinite(values)]
+        return float(np.median(finite)) if len(finite) else math.nan
+
+
 @dataclass(frozen=True)
-class Repeated:
+class Repeated(Repetitions):
     """Repetitions of one loop, each with noise and a drawn plant of its own."""
 
     first: Simulation
@@ -63,25 +125,9 @@ class Repeated:
         )
 
     @property
-    def failure(self) -> str:
-        """In words how it failed; empty where it did not."""
-        if not self.failed.any():
-            return ""
-        count = f" in {self.failed.sum()} of {len(self.failed)} repetitions" if len(self.failed) > 1 else ""
-        return f"left its range at {self.until[self.failed].min():.3g} s{count}"
-
-    @property
     def fate(self) -> str:
         """In words why it is no good, or may be: its marks with their numbers, and ripples; else empty."""
         return "; ".join(remark for remark in (self._end, self._strain, self._accuracy) if remark)
-
-    @property
-    def marks(self) -> list[str]:
-        """Why it is no good, in a word or two each; empty where it is sound."""
-        if self.failure:
-            return [MARKS[0]]
-        holds = not self.arrives, self.swing > 0.0, self.chatter > 0.0, self.beyond > 0.0, self.drift > 0.0
-        return [mark for mark, one in zip(MARKS[1:], holds, strict=True) if one]
 
     @property
     def beyond(self) -> float:
@@ -96,18 +142,20 @@ class Repeated:
         return self._ripple if at_rest(self.first.trajectory) else 0.0
 
     @property
+    def frequency(self) -> float:
+        """Strongest frequency of the first repetition's swing [1/s]; nan where there is none."""
+        return oscillation_frequency(self.first.trajectory)
+
+    @property
     def _ripple(self) -> float:
         """Ripple, also where the reference has not rested, and a move's tail or friction looks like a swing."""
-        amplitudes = self.metrics.get("oscillation", np.empty(0))
-        ripple = float(np.median(amplitudes[np.isfinite(amplitudes)])) if np.isfinite(amplitudes).any() else 0.0
+        ripple = self.median("oscillation")
         return ripple if ripple > LIMIT_CYCLE else 0.0
 
     @property
     def chatter(self) -> float:
         """Frequency at which tensions go from limit to limit and back, the median, where it chatters, else 0 [1/s]."""
-        variations = self.metrics.get("chattering", np.empty(0))
-        variation = float(np.median(variations[np.isfinite(variations)])) if np.isfinite(variations).any() else 0.0
-        return float(chatter(variation, self.tension_range))
+        return float(chatter(self.median("chattering"), self.tension_range))
 
     @property
     def drift(self) -> float:

@@ -21,7 +21,7 @@ from wristctl.simulation.actuator import (
     spool_target,
 )
 from wristctl.wrist.spatial.spatial_tendons import lengths_along, moment_arms_of
-from wristctl.wrist.spatial.spooled_tendons import RubbingTendons, straight_length
+from wristctl.wrist.spatial.spooled_tendons import RubbingTendons, straight_length, travel_of
 from wristctl.wrist.tendon_mechanics import ElasticTendons, NoTendons
 
 
@@ -213,7 +213,7 @@ def _counted_pulls(drive: Any, believed: Any, alike: Any, bend: Any, counts: Any
 def _stretched(drive: Any, believed: Any, alike: Any, bend: Any, counts: Any, pulls: Any) -> None:
     lengths_along(believed, bend, pulls)
     for t in range(len(pulls)):
-        stretch = counts[t] - (straight_length(believed, t) - pulls[t])
+        stretch = counts[t] - travel_of(believed, t, pulls[t])
         pulls[t] = alike[t] * drive.motor.stiffness * maximum(0.0, stretch)
 
 

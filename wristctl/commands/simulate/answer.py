@@ -13,7 +13,7 @@ from wristctl.config.wrist import WristParameters
 if TYPE_CHECKING:
     from wristctl.config.loop import DirectionName, Loop, Reference
     from wristctl.config.study import Study
-    from wristctl.simulation.repetitions import Repeated
+    from wristctl.simulation.repetitions import Repeated, Repetitions
 
 # Actuators in words, by level.
 _ACTUATORS = {"ideal": "", "lagged": "motors with a lag", "tendon": "stepper motors and elastic tendons"}
@@ -49,15 +49,19 @@ def answer(study: Study, repeated: Repeated, reason: str = "", advice: Sequence[
         f"{motion_words(chosen.reference, chosen.direction)} on {wrist_words(study.wrist)} "
         f"({loop_words(chosen.loop, study.wrist)})"
     )
+    sentence = outcome(study, scenario, repeated, "" if repeated.first.failed else joined(_told(repeated)), reason)
+    more = "All metrics: `--all`; the motion and its figures: report.html of the run."
+    return Answer(sentence, figures_table(repeated, _FIGURES) if count > 1 else None, advice, more)
+
+
+def outcome(study: Study, scenario: str, repeated: Repetitions, figures: str, reason: str) -> str:
+    """What a controller does in a loop of one plane or two: why it is no good, or that it follows; with its figures."""
+    chosen, count = study.simulate, len(repeated.failed)
     verdicts = [*_faults(repeated), *([reason] if reason else [])]
-    figures = "" if repeated.first.failed else joined(_told(repeated))
-    subject = controller_words(chosen.controller, chosen.gains)
     there = f". There: {figures}" if figures else ""
     does = f"{joined(verdicts)}{there}" if verdicts else f"follows with {figures}"
     median = f" Figures are medians of {count} repetitions." * (count > 1)
-    sentence = f"{scenario}: {subject} {does}.{median}"
-    more = "All metrics: `--all`; the motion and its figures: report.html of the run."
-    return Answer(sentence, _table(repeated) if count > 1 else None, advice, more)
+    return f"{scenario}: {controller_words(chosen.controller, chosen.gains)} {does}.{median}"
 
 
 def _rests(repeated: Repeated) -> bool:
@@ -66,18 +70,14 @@ def _rests(repeated: Repeated) -> bool:
     return at_rest(repeated.first.trajectory)
 
 
-def _faults(repeated: Repeated) -> list[str]:
+def _faults(repeated: Repetitions) -> list[str]:
     """Why the loop is no good, as what the controller does; where it does not arrive, that has a reason of its own."""
-    from wristctl.simulation.oscillation import oscillation_frequency
-
     if repeated.failure:
         return [f"fails: the wrist {repeated.failure}"]
     faults = []
     if repeated.swing > 0.0:
-        frequency = oscillation_frequency(repeated.first.trajectory)
-        faults.append(
-            f"swings by {degrees(repeated.swing)} deg to either side at {two(frequency)} Hz and does not rest"
-        )
+        at = f" at {two(repeated.frequency)} Hz" if math.isfinite(repeated.frequency) else ""
+        faults.append(f"swings by {degrees(repeated.swing)} deg to either side{at} and does not rest")
     if repeated.chatter > 0.0:
         faults.append(f"chatters: tensions go from limit to limit and back {repeated.chatter:.0f} times a second")
     if repeated.beyond > 0.0:
@@ -90,7 +90,7 @@ def _faults(repeated: Repeated) -> list[str]:
 
 def _told(repeated: Repeated) -> list[str]:
     """The main figures in words, medians of several repetitions."""
-    values = {name: _median(repeated, name) for name, *_ in _FIGURES}
+    values = {name: figure_of(repeated, name) for name, *_ in _FIGURES}
     parts = [f"RMSE {degrees(values['rmse'])} deg"]
     if math.isfinite(values["settling"]):
         parts.append(f"settled after {two(values['settling'])} s")
@@ -102,18 +102,23 @@ def _told(repeated: Repeated) -> list[str]:
     return [*parts, f"at most {two(values['peak_tension'])} N in a tendon"]
 
 
-def _median(repeated: Repeated, name: str) -> float:
+def figure_of(repeated: Repetitions, name: str) -> float:
+    """A metric of a loop, of several repetitions the median; nan where there is none."""
     from wristctl.comparison.repetition_spread import spread
 
     return spread(repeated.metrics[name]).median if name in repeated.metrics else math.nan
 
 
-def _table(repeated: Repeated) -> Table:
-    """Median and 95 % interval of the main figures; `-` where there is none."""
+def figures_table(repeated: Repetitions, figures: Sequence[tuple[str, str, bool]]) -> Table:
+    """Figures of a loop, of several repetitions medians with 95 % intervals; `-` where there is none.
+
+    Each is a metric, its heading, and whether it is an angle.
+    """
     from wristctl.comparison.repetition_spread import spread
 
-    rows = []
-    for name, heading, angle in _FIGURES:
+    rows: list[tuple[str, ...]] = []
+    several = len(repeated.failed) > 1
+    for name, heading, angle in figures:
         if name not in repeated.metrics:
             continue
         estimate = spread(repeated.metrics[name])
@@ -121,8 +126,9 @@ def _table(repeated: Repeated) -> Table:
             "-" if not math.isfinite(value) else degrees(value) if angle else two(value, 3)
             for value in (estimate.median, estimate.low, estimate.high)
         ]
-        rows.append((heading, shown[0], f"{shown[1]} to {shown[2]}"))
-    return Table("", ("figure", "median", f"95 % interval, {len(repeated.failed)} repetitions"), rows)
+        rows.append((heading, shown[0], f"{shown[1]} to {shown[2]}") if several else (heading, shown[0]))
+    heads = ("figure", "median", f"95 % interval, {len(repeated.failed)} repetitions")
+    return Table("", heads if several else ("figure", "value"), rows)
 
 
 def controller_words(name: str, gains: str | Mapping[str, float]) -> str:

@@ -29,14 +29,13 @@ from wristctl.commands.loop_warnings import (
     warn_out_of_reach,
     warn_outside_conditions,
 )
-from wristctl.commands.printed_table import Table
 from wristctl.commands.procedure import Procedure
-from wristctl.commands.results import Findings, StudyResult
 from wristctl.commands.session import Session
 from wristctl.commands.simulate.in_two_planes import check_two_planes, in_two_planes, simulate_in_two_planes
+from wristctl.commands.simulate.results import SimulatedLoop, metrics_table
 from wristctl.commands.sweep.command import sweepable
 from wristctl.config.study import Study
-from wristctl.errors import UserError, under
+from wristctl.errors import under
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -49,26 +48,10 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, repr=False, eq=False)
-class Simulated(StudyResult):
-    """One closed loop, as often as the study says, and whether the wrist ever left its range."""
-
-    kind = "simulate"
+class Simulated(SimulatedLoop):
+    """One closed loop in one plane, as often as the study says, and whether the wrist ever left its range."""
 
     repeated: Repeated
-    """Metrics of every repetition."""
-    failed: bool
-    short_of: str = ""
-    """Reason why the loop does not arrive at its reference; empty where it does."""
-    advice: Sequence[str] = ()
-    """What may help where it does not: sentences, and a command after `$ `."""
-
-    @property
-    def fault(self) -> UserError | None:
-        """Error of a wrist that left its range; None where it stayed within."""
-        if not self.failed:
-            return None
-        fix = "look at the figures; try other gains or a slower move"
-        return UserError(f"the wrist {self.repeated.failure}", self.place, fix, exit_code=3)
 
     @property
     def answer(self) -> Answer:
@@ -76,11 +59,6 @@ class Simulated(StudyResult):
         from wristctl.commands.simulate.answer import answer
 
         return answer(self.study, self.repeated, self.short_of, self.advice)
-
-    @property
-    def marks(self) -> list[str]:
-        """Verdicts on the loop: failed, does not arrive, limit cycle, chatters, not physical, not converged."""
-        return self.repeated.marks
 
     @property
     def trajectory(self) -> Trajectory:
@@ -136,7 +114,7 @@ def size(study: Study) -> Size:
 def simulate(session: Session) -> Simulated:
     """Simulate one closed loop and draw it, in one plane or, on a reference in two, in two."""
     if in_two_planes(session.study):
-        return cast(Simulated, simulate_in_two_planes(session))  # a result with the same doors
+        return cast(Simulated, simulate_in_two_planes(session))  # which has no trajectory, but a course
     from wristctl.commands.simulate.figures import consistency, sliding
     from wristctl.commands.truth_table import truth_heading, truth_tables
     from wristctl.control.table import controller, gains_of
@@ -144,6 +122,7 @@ def simulate(session: Session) -> Simulated:
     from wristctl.plotting.wrist_drawing import stroboscope
     from wristctl.simulation.closed_loop import scenario_of
     from wristctl.simulation.closed_loop import simulate as run_simulation
+    from wristctl.simulation.metrics import METRICS
     from wristctl.simulation.trajectory import COLUMNS
     from wristctl.simulation.worlds import Draws
 
@@ -156,6 +135,7 @@ def simulate(session: Session) -> Simulated:
     network = network_for(session.inputs, wrist, [settings.loop])
     with session.progress("compiling and simulating the loop"):
         repeated = run_simulation(study, network, tuned_gains(session.inputs))
+    findings.headline("rmse", "settling", "steady_state", "overshoot", "chattering", "peak_tension")
     scenario = scenario_of(settings.reference, settings.direction)
     findings.note_streams(Draws(study.seed).names([settings.loop], [scenario]))
     course, failed = repeated.first.trajectory, bool(repeated.failed.any())
@@ -165,7 +145,7 @@ def simulate(session: Session) -> Simulated:
     units, meaning = ({name: column[i] for name, column in columns.items()} for i in range(2))
     findings.table("data/trajectory.csv", course.columns(), units=units, meaning=meaning)
     title = ", ".join(part for part in (course.label, repeated.fate) if part)
-    tables = [_table(findings, title, repeated), *truth_tables(wrist, {"simulate": settings.loop})]
+    tables = [metrics_table(findings, title, METRICS, repeated), *truth_tables(wrist, {"simulate": settings.loop})]
     with session.progress("drawing"):
         world = truth_heading(wrist, settings.loop)
         caption = "Bending angle, error and tensions over time; what changes faster is a band about its mean"
@@ -185,7 +165,7 @@ def simulate(session: Session) -> Simulated:
             later("sliding", sliding, course, law.surface, gains, caption=caption)
         later("motion", stroboscope, course, wrist, plant=settings.loop.plant.model)
     short_of, advice = ("", []) if failed or repeated.arrives else _short_of(session, study, repeated, network, beyond)
-    return Simulated(session.study, findings, tables, repeated, failed, short_of, advice)
+    return Simulated(session.study, findings, tables, repeated, short_of, advice)
 
 
 def _short_of(
@@ -215,34 +195,6 @@ def _short_of(
         return short, [f"On the same loop these gains arrive: --gains {' or --gains '.join(arriving)}."]
     tune = shlex.join(["wristctl", "tune", *session.typed, "--set", f"tune.controllers=[{chosen.controller}]"])
     return short, [f"No preset of {chosen.controller} arrives here. Search its gains:", f"$ {tune}"]
-
-
-def _table(findings: Findings, title: str, repeated: Repeated) -> Table:
-    """Every metric: its value, or of several repetitions the median with its 95 % interval."""
-    import numpy as np
-
-    from wristctl.comparison.repetition_spread import spread
-    from wristctl.simulation.metrics import METRICS
-
-    findings.headline("rmse", "settling", "steady_state", "overshoot", "chattering", "peak_tension")
-    once, rows = len(repeated.failed) == 1, list[tuple[object, ...]]()
-    for name, metric in METRICS.items():
-        if once:
-            value = repeated.first.metrics[name]
-            findings.metric(name, value, metric.unit, "lower", meaning=metric.formula)
-            rows.append((name, value, metric.unit, metric.formula))
-        else:
-            estimate = spread(repeated.metrics[name])
-            meaning = f"{metric.formula}; median"
-            findings.metric(name, estimate.median, metric.unit, "lower", estimate.n, estimate.interval, meaning)
-            rows.append((name, estimate.median, estimate.low, estimate.high, metric.unit, metric.formula))
-    if once:
-        return Table(title, ("metric", "value", "unit", "meaning"), rows)
-    count = len(repeated.failed)
-    every = {"repetition": np.arange(count), "failed": repeated.failed, **repeated.metrics}
-    findings.table("data/repetitions.csv", every, {name: metric.unit for name, metric in METRICS.items()})
-    heads = ("metric", "median", "95 % low", "95 % high", "unit", "meaning")
-    return Table(f"{title}, {count} repetitions", heads, rows)
 
 
 SIMULATE = sweepable(

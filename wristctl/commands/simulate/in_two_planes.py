@@ -1,4 +1,4 @@
-"""One closed loop in two planes, with pictures."""
+"""One closed loop in two planes, with pictures, and its answer: errors by plane and as one norm, and how it ends."""
 
 from __future__ import annotations
 
@@ -10,11 +10,18 @@ from typing import TYPE_CHECKING, Any
 from wristctl.commands.answer import Answer
 from wristctl.commands.inputs_of_loops import identified, tuned_gains
 from wristctl.commands.loop_warnings import warn_if_coarse, warn_outside_conditions
-from wristctl.commands.printed_table import Table
-from wristctl.commands.results import Findings, StudyResult
+from wristctl.commands.printed_table import degrees, joined, two
 from wristctl.commands.session import Session
+from wristctl.commands.simulate.answer import (
+    figure_of,
+    figures_table,
+    loop_words,
+    motion_words,
+    outcome,
+    wrist_words,
+)
+from wristctl.commands.simulate.results import SimulatedLoop, metrics_table
 from wristctl.config.study import Study
-from wristctl.errors import UserError
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -23,38 +30,30 @@ if TYPE_CHECKING:
     from wristctl.simulation.bend_loops import RepeatedBends
 
 
+# Figures of the table: metric, heading, and whether it is an angle.
+_FIGURES = (
+    ("rmse_ulnar", "RMSE toward ulnar [deg]", True),
+    ("rmse_flexion", "RMSE toward flexion [deg]", True),
+    ("rmse", "RMSE over both planes [deg]", True),
+    ("largest_error", "largest error [deg]", True),
+    ("steady_state", "error at the end [deg]", True),
+    ("oscillation", "half the swing at the end [deg]", True),
+    ("tip_rmse", "RMS distance of the tip [mm]", False),
+    ("peak_tension", "largest tension [N]", False),
+    ("saturation", "share of time out of reach", False),
+)
+
+
 @dataclass(frozen=True, repr=False, eq=False)
-class SimulatedBends(StudyResult):
+class SimulatedBends(SimulatedLoop):
     """One closed loop in two planes, as often as the study says, and whether the wrist ever left its range."""
 
-    kind = "simulate"
-
     repeated: RepeatedBends
-    """Metrics of every repetition."""
-    short_of: str = ""
-    """Reason why the loop does not arrive at its reference; empty where it does."""
-    advice: Sequence[str] = ()
-    """What may help where it does not."""
-
-    @property
-    def fault(self) -> UserError | None:
-        """Error of a wrist that left its range; None where it stayed within."""
-        if not self.repeated.failure:
-            return None
-        fix = "look at the figures; try other gains or a slower motion"
-        return UserError(f"the wrist {self.repeated.failure}", self.place, fix, exit_code=3)
 
     @property
     def answer(self) -> Answer:
         """The scenario and how it ends, errors by plane and as one norm."""
-        from wristctl.commands.simulate.bend_answer import answer
-
-        return answer(self.study, self.repeated, self.short_of, self.advice)
-
-    @property
-    def marks(self) -> list[str]:
-        """Verdicts on the loop: failed, does not arrive, limit cycle, chatters, not physical, not converged."""
-        return self.repeated.marks
+        return _answer(self.study, self.repeated, self.short_of, self.advice)
 
     @property
     def course(self) -> BendCourse:
@@ -77,24 +76,22 @@ def in_two_planes(study: Study) -> bool:
     return planes_of(study.simulate.loop, study.simulate.reference) == 2
 
 
+# Time between two samples of a reference by which it is checked before a run [s].
+_CHECKED = 0.01
+
+
 def check_two_planes(study: Study) -> None:
     """UserError for what can be known of a loop in two planes before it runs."""
-    from wristctl.control.table import controller
-    from wristctl.simulation.bend_loops import bends_of
-    from wristctl.simulation.two_planes import check_bends
+    from wristctl.simulation.bend_loops import wanted_bends
 
-    chosen = study.simulate
-    bends = bends_of(chosen.reference, chosen.direction, study.wrist, chosen.horizon, 0.01)
-    check_bends(controller(chosen.controller), bends[:, 0], study.wrist, chosen.loop)
-    if chosen.start != "straight":
-        raise UserError("a loop in two planes begins straight", "start", "start: straight")
+    wanted_bends(study, _CHECKED)
 
 
 def simulate_in_two_planes(session: Session) -> SimulatedBends:
     """Simulate one closed loop in two planes and draw it."""
     from wristctl.commands.truth_table import truth_heading, truth_tables
     from wristctl.plotting.bend_figure import bend_motion
-    from wristctl.simulation.bend_course import column_meanings
+    from wristctl.simulation.bend_course import BEND_METRICS, column_meanings
     from wristctl.simulation.bend_loops import simulate_bends
     from wristctl.simulation.closed_loop import scenario_of
     from wristctl.simulation.two_planes import reach_of_bends
@@ -114,7 +111,9 @@ def simulate_in_two_planes(session: Session) -> SimulatedBends:
     meanings = column_meanings(list(columns))
     units, meaning = ({name: column[i] for name, column in meanings.items()} for i in range(2))
     findings.table("data/bends.csv", columns, units=units, meaning=meaning)
-    tables = [_table(findings, study, repeated), *truth_tables(wrist, {"simulate": settings.loop})]
+    findings.headline("rmse", "rmse_ulnar", "rmse_flexion", "largest_error", "tip_rmse", "peak_tension")
+    label = f"{settings.controller}/{settings.gains if isinstance(settings.gains, str) else 'given'} in two planes"
+    tables = [metrics_table(findings, label, BEND_METRICS, repeated), *truth_tables(wrist, {"simulate": settings.loop})]
     with session.progress("drawing"):
         reach = reach_of_bends(wrist, repeated.layout)
         caption = "The plane of bends with what the tendons reach; errors of both planes and pulls over time"
@@ -139,33 +138,22 @@ def _short_of(study: Study, repeated: RepeatedBends) -> tuple[str, list[str]]:
         )
         fix = "No gains can help: a larger tension_limit or tendon_radius, or a smaller angle_deg."
         return reason, [fix]
-    return f"does not arrive: {off:.2g} deg off at the end", ["Other gains or another controller may hold it."]
+    what = "arrive" if repeated.rests else "follow"
+    return f"does not {what}: {off:.2g} deg off at the end", ["Other gains or another controller may hold it."]
 
 
-def _table(findings: Findings, study: Study, repeated: RepeatedBends) -> Table:
-    """Every metric: its value, or of several repetitions the median with its 95 % interval."""
-    import numpy as np
-
-    from wristctl.comparison.repetition_spread import spread
-    from wristctl.simulation.bend_course import BEND_METRICS
-
-    findings.headline("rmse", "rmse_ulnar", "rmse_flexion", "largest_error", "tip_rmse", "peak_tension")
-    chosen, count = study.simulate, len(repeated.failed)
-    label = f"{chosen.controller}/{chosen.gains if isinstance(chosen.gains, str) else 'given'} in two planes"
-    rows = list[tuple[object, ...]]()
-    for name, metric in BEND_METRICS.items():
-        estimate = spread(repeated.metrics[name])
-        if count == 1:
-            value = float(repeated.metrics[name][0])
-            findings.metric(name, value, metric.unit, "lower", meaning=metric.formula)
-            rows.append((name, value, metric.unit, metric.formula))
-        else:
-            meaning = f"{metric.formula}; median"
-            findings.metric(name, estimate.median, metric.unit, "lower", estimate.n, estimate.interval, meaning)
-            rows.append((name, estimate.median, estimate.low, estimate.high, metric.unit, metric.formula))
-    if count == 1:
-        return Table(label, ("metric", "value", "unit", "meaning"), rows)
-    every = {"repetition": np.arange(count), "failed": repeated.failed, **repeated.metrics}
-    findings.table("data/repetitions.csv", every, {name: metric.unit for name, metric in BEND_METRICS.items()})
-    heads = ("metric", "median", "95 % low", "95 % high", "unit", "meaning")
-    return Table(f"{label}, {count} repetitions", heads, rows)
+def _answer(study: Study, repeated: RepeatedBends, reason: str, advice: Sequence[str]) -> Answer:
+    chosen, places = study.simulate, len(repeated.layout.places)
+    scenario = (
+        f"{motion_words(chosen.reference, chosen.direction)} on {wrist_words(study.wrist)} in two planes "
+        f"({places} tendons, {loop_words(chosen.loop, study.wrist)})"
+    )
+    values = {name: figure_of(repeated, name) for name, *_ in _FIGURES}
+    figures = [
+        f"RMSE {degrees(values['rmse_ulnar'])} deg toward ulnar",
+        f"{degrees(values['rmse_flexion'])} deg toward flexion",
+        f"{degrees(values['rmse'])} deg over both", f"at most {two(values['peak_tension'])} N in a tendon",
+    ]  # fmt: skip
+    sentence = outcome(study, scenario, repeated, "" if repeated.first.failed else joined(figures), reason)
+    more = "All metrics: `--all`; the path in the plane of bends: report.html of the run."
+    return Answer(sentence, figures_table(repeated, _FIGURES), advice, more)

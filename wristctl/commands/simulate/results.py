@@ -1,0 +1,83 @@
+"""What a simulated loop is as a result, in one plane or two: its fault, its marks, and the table of its metrics."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Protocol
+
+from wristctl.commands.printed_table import Table
+from wristctl.commands.results import Findings, StudyResult
+from wristctl.errors import UserError
+
+if TYPE_CHECKING:
+    from wristctl.simulation.repetitions import Repetitions
+
+
+@dataclass(frozen=True, repr=False, eq=False)
+class SimulatedLoop(StudyResult):
+    """One closed loop, as often as the study says."""
+
+    kind = "simulate"
+
+    repeated: Repetitions
+    """Metrics of every repetition."""
+    short_of: str = ""
+    """Reason why the loop does not arrive at its reference; empty where it does."""
+    advice: Sequence[str] = ()
+    """What may help where it does not: sentences, and a command after `$ `."""
+
+    @property
+    def failed(self) -> bool:
+        """Whether the wrist left its range in any repetition."""
+        return bool(self.repeated.failed.any())
+
+    @property
+    def fault(self) -> UserError | None:
+        """Error of a wrist that left its range; None where it stayed within."""
+        if not self.failed:
+            return None
+        fix = "look at the figures; try other gains or a slower motion"
+        return UserError(f"the wrist {self.repeated.failure}", self.place, fix, exit_code=3)
+
+    @property
+    def marks(self) -> list[str]:
+        """Verdicts on the loop: failed, does not arrive, limit cycle, chatters, not physical, not converged."""
+        return self.repeated.marks
+
+
+class Explained(Protocol):
+    """A metric with its unit and how it is computed."""
+
+    @property
+    def unit(self) -> str:
+        """Unit of its values."""
+
+    @property
+    def formula(self) -> str:
+        """How it is computed."""
+
+
+def metrics_table(findings: Findings, title: str, metrics: Mapping[str, Explained], repeated: Repetitions) -> Table:
+    """Every metric, kept in the run: its value, or of several repetitions the median with its 95 % interval."""
+    import numpy as np
+
+    from wristctl.comparison.repetition_spread import spread
+
+    count, rows = len(repeated.failed), list[tuple[object, ...]]()
+    for name, metric in metrics.items():
+        if count == 1:
+            value = float(repeated.metrics[name][0])
+            findings.metric(name, value, metric.unit, "lower", meaning=metric.formula)
+            rows.append((name, value, metric.unit, metric.formula))
+        else:
+            estimate = spread(repeated.metrics[name])
+            meaning = f"{metric.formula}; median"
+            findings.metric(name, estimate.median, metric.unit, "lower", estimate.n, estimate.interval, meaning)
+            rows.append((name, estimate.median, estimate.low, estimate.high, metric.unit, metric.formula))
+    if count == 1:
+        return Table(title, ("metric", "value", "unit", "meaning"), rows)
+    every = {"repetition": np.arange(count), "failed": repeated.failed, **repeated.metrics}
+    findings.table("data/repetitions.csv", every, {name: metric.unit for name, metric in metrics.items()})
+    heads = ("metric", "median", "95 % low", "95 % high", "unit", "meaning")
+    return Table(f"{title}, {count} repetitions", heads, rows)
