@@ -13,7 +13,7 @@ import pytest
 from tests.trial.conftest import WRIST, Run, settings_of
 from wristctl.plotting.residual_figure import residuals_over_time
 from wristctl.trial.residuals import RESIDUALS, limits_of, load, plain
-from wristctl.trial.run_limits import LEAST, MARGIN, SETTINGS, Logged, nearness, stop_of
+from wristctl.trial.run_limits import LEAST, MARGIN, SETTINGS, Logged, Nearness, nearness, stop_of
 
 SETTINGS_OF_RUN = settings_of().within(WRIST)
 LIMITS = limits_of(SETTINGS_OF_RUN)
@@ -28,6 +28,11 @@ def logged(trial: int = 0, **sizes: Any) -> Logged:
     values.insert(0, "clock", 10.0 + PERIOD * np.arange(50))
     values.insert(0, "trial", trial)
     return Logged(values, LIMITS, SETTINGS_OF_RUN, WRIST)
+
+
+def near(runs: list[Logged]) -> list[Nearness]:
+    """Nearness of runs, each judged by its ticks."""
+    return nearness(runs, [stop_of(run) for run in runs])
 
 
 @pytest.mark.parametrize(
@@ -62,7 +67,7 @@ def test_the_files_of_a_stopped_trial_stop_at_the_very_tick(
 def test_of_several_runs_the_largest_is_named_with_its_run_trial_and_time() -> None:
     sizes = np.zeros(50)
     sizes[[10, 30]] = 0.4, -0.9
-    lines = nearness([logged(load=0.2), logged(trial=3, load=sizes, apart=math.nan)])
+    lines = near([logged(load=0.2), logged(trial=3, load=sizes, apart=math.nan)])
     line = next(line for line in lines if line.limit.name == "load")
     assert (line.largest, line.run, line.trial) == (0.9, 1, 3) and line.clock == pytest.approx(10.0 + 30 * PERIOD)
     assert line.share == pytest.approx(0.9 / 1.6) and lines[0] == line, "nearest first"
@@ -78,7 +83,7 @@ def test_a_proposed_setting_makes_the_proposed_limit_and_has_its_margin(name: st
     sizes = np.zeros(50)
     sizes[20] = share * present.limit
     seen: dict[str, Any] = {name: sizes}
-    line = next(line for line in nearness([logged(**seen)]) if line.limit.name == name)
+    line = next(line for line in near([logged(**seen)]) if line.limit.name == name)
     assert line.proposed == pytest.approx(max(MARGIN * share, LEAST) * present.limit, rel=0.05)
     key, _, value = line.setting.removeprefix("safety.").partition("=")
     changed = settings_of(safety={key: float(value)})
@@ -87,16 +92,16 @@ def test_a_proposed_setting_makes_the_proposed_limit_and_has_its_margin(name: st
 
 
 def test_no_pull_is_proposed_beyond_what_the_wrist_bears() -> None:
-    (line,) = (line for line in nearness([logged(pull=50.0)]) if line.limit.name == "pull")
+    (line,) = (line for line in near([logged(pull=50.0)]) if line.limit.name == "pull")
     assert line.setting == "safety.tension=60" and line.proposed == 60.0
-    (less,) = (line for line in nearness([logged(pull=22.0)]) if line.limit.name == "pull")
+    (less,) = (line for line in near([logged(pull=22.0)]) if line.limit.name == "pull")
     assert less.setting == "safety.tension=33"
 
 
 def test_what_a_stopped_run_shows_proposes_nothing() -> None:
     stopped, sound = logged(load=1.7), logged(load=0.7)
     assert stop_of(stopped) is not None and stop_of(sound) is None
-    (alone,) = (line for line in nearness([stopped]) if line.limit.name == "load")
+    (alone,) = (line for line in near([stopped]) if line.limit.name == "load")
     assert alone.largest == 1.7 and alone.proposed is None
-    (both,) = (line for line in nearness([stopped, sound]) if line.limit.name == "load")
+    (both,) = (line for line in near([stopped, sound]) if line.limit.name == "load")
     assert both.largest == 1.7 and both.proposed == pytest.approx(MARGIN * 0.7, rel=0.05)

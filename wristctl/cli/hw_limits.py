@@ -14,6 +14,7 @@ from wristctl.commands.printed_table import Table
 from wristctl.errors import UserError
 
 if TYPE_CHECKING:
+    from wristctl.records import Run
     from wristctl.trial.run_limits import Logged, Nearness, StopTick
 
 _WIDTH = 100
@@ -24,12 +25,13 @@ def tell_limits(names: Sequence[str], out: Path, figure: Path | None, as_json: b
     from wristctl.records import open_run
     from wristctl.trial.run_limits import nearness, stop_of
 
-    runs = [_logged(open_run(name, out).path) for name in names]
+    runs = [_logged(open_run(name, out)) for name in names]
     for name, run in zip(names, runs, strict=True):
         if run.limits != runs[0].limits:
             problem = f"its limits are not those of {names[0]}"
             raise UserError(problem, name, "runs with the same safety and control_period")
-    stops, lines = [stop_of(run) for run in runs], nearness(runs)
+    stops = [stop_of(run) for run in runs]
+    lines = nearness(runs, stops)
     if figure is not None:
         from wristctl.plotting.residual_figure import residuals_over_time
 
@@ -48,18 +50,16 @@ def tell_limits(names: Sequence[str], out: Path, figure: Path | None, as_json: b
         print(f"\nEvery residual with its limit: {figure}")
 
 
-def _logged(folder: Path) -> Logged:
+def _logged(run: Run) -> Logged:
     import pandas as pd
 
-    from wristctl.records import open_run
     from wristctl.trial.residuals import FILE, load
     from wristctl.trial.run_limits import Logged
 
-    run = open_run(folder)
     try:
-        values, limits = pd.read_csv(folder / "data" / "residuals.csv"), load(folder / FILE)
+        values, limits = pd.read_csv(run.path / "data" / "residuals.csv"), load(run.path / FILE)
     except (OSError, ValueError, KeyError) as error:
-        raise UserError("a run without residuals and limits", str(folder), "an hw-run run") from error
+        raise UserError("a run without residuals and limits", str(run.path), "an hw-run run") from error
     return Logged(values, limits, run.config.hw_run, run.config.wrist)
 
 

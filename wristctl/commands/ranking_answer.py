@@ -293,7 +293,8 @@ def _leaf(ranking: Ranking, rankings: Sequence[Ranking], names: Mapping[str, str
 
 def certainty(rankings: Sequence[Ranking]) -> str:
     """By how much errors must differ to be told apart, at which level."""
-    floors = sorted(one.standing.floor for one in rankings if one.standing.groups and math.isfinite(one.standing.floor))
+    ranked = [one.standing.floor for one in rankings if one.standing.groups]
+    floors = sorted(floor for floor in ranked if 1.0 < floor < math.inf)
     if not floors:
         return ""
     size = _ends([two(100.0 * (floor - 1.0)) for floor in floors])

@@ -84,6 +84,16 @@ class ArcRobot:
     timed: bool = True
     """Whether its recordings have times, without which nothing is told of creep."""
 
+    @property
+    def unit(self) -> str:
+        """Unit in which people read what is measured."""
+        return "deg" if self.measured == "bend" else "mm"
+
+    @property
+    def scale(self) -> float:
+        """What is measured in that unit, over the same in SI units."""
+        return math.degrees(1.0) if self.measured == "bend" else 1e3
+
     def unknowns(self, terms: Sequence[Term]) -> dict[str, ArcUnknown]:
         """The unknowns of its model with these terms, those of arcs numbered."""
         names = [*self.base, *(name for term in OF_TERM if term in terms for name in OF_TERM[term])]

@@ -52,12 +52,12 @@ class RealRobot:
     @property
     def unit(self) -> str:
         """Unit of errors."""
-        return "deg" if self.robot.measured == "bend" else "mm"
+        return self.robot.unit
 
     @property
     def scale(self) -> float:
         """Error in its unit, over that in SI units."""
-        return math.degrees(1.0) if self.robot.measured == "bend" else 1e3
+        return self.robot.scale
 
 
 def _spools(log: OpenLog, tendons: int) -> Array:

@@ -76,22 +76,22 @@ def stop_of(logged: Logged) -> StopTick | None:
     return None
 
 
-def nearness(runs: Sequence[Logged]) -> list[Nearness]:
+def nearness(runs: Sequence[Logged], stops: Sequence[StopTick | None]) -> list[Nearness]:
     """Largest of each residual over runs that share their limits, nearest to its limit first.
 
-    Limits are proposed by ticks of runs that no limit has stopped: what stopped the others is what limits are for.
+    Limits are proposed by ticks of runs that no limit has stopped, as `stop_of` each says: what stopped the others is
+    what limits are for.
     """
-    sound = [stop_of(run) is None for run in runs]
     lines = []
-    for k, limit in enumerate(runs[0].limits):
+    for limit in runs[0].limits:
         if not math.isfinite(limit.limit):
             continue
         sizes = [np.abs(run.values[limit.name].to_numpy(float)) for run in runs]
         number = int(np.argmax([_largest(size) for size in sizes]))
         values, largest = runs[number].values, _largest(sizes[number])
         row = int(np.nanargmax(sizes[number])) if np.isfinite(sizes[number]).any() else 0
-        seen = max((_largest(size) for size, good in zip(sizes, sound, strict=True) if good), default=0.0)
-        proposed, setting = _proposed(runs[number], runs[0].limits[k], seen)
+        seen = max((_largest(size) for size, stop in zip(sizes, stops, strict=True) if stop is None), default=0.0)
+        proposed, setting = _proposed(runs[number], limit, seen)
         place = int(values["trial"].iloc[row]), float(values["clock"].iloc[row])
         lines.append(Nearness(limit, largest, number, *place, proposed, setting))
     return sorted(lines, key=lambda line: -line.share)
@@ -109,7 +109,7 @@ def _proposed(run: Logged, limit: Limit, seen: float) -> tuple[float | None, str
     wanted, present = max(MARGIN * seen, LEAST * limit.limit), getattr(run.settings.safety, name)
     if limit.name == "pull":  # whatever a rig has shown: the wrist bears no more
         wanted = min(wanted, run.wrist.tension_limit)
-    factor = (present if limit.name != "pull" else limit.limit) / limit.limit
+    factor = 1.0 if limit.name == "pull" else present / limit.limit
     value = float(f"{wanted * factor:.2g}")
     return value / factor, f"safety.{name}={value:g}"
 

@@ -3,6 +3,7 @@
 import math
 
 import numpy as np
+from numpy.typing import NDArray
 
 from wristctl.board.driver import Board
 from wristctl.board.messages import AXES, JOG_RATE
@@ -38,9 +39,7 @@ def check_zero(
     for axis in range(AXES):
         positions = np.full(AXES, slack)
         positions[axis] = reeled
-        one, two, four, five = map(int, np.array(zero.signs) * positions)
-        board.go_to((one, two, four, five), JOG_RATE)
-        patience = Patience(board)
+        patience = _reeled(board, zero, positions)
         patience.wait(2.0 * homing.rest)
         bend = expected.bend(straight, patience.reading(tracking, homing.frames))
         slacken(board, spools, homing, zero.signs)
@@ -62,14 +61,18 @@ def check_cocontraction(
     patience = Patience(board)
     patience.wait(_SETTLES)
     held = patience.reading(tracking, 4 * homing.frames)
-    reeled = np.where(on_plus_side(plane), -3 * slack, -slack)
-    one, two, four, five = map(int, np.array(zero.signs) * reeled)
-    board.go_to((one, two, four, five), JOG_RATE)
-    patience = Patience(board)
+    patience = _reeled(board, zero, np.where(on_plus_side(plane), -3 * slack, -slack))
     patience.wait(_SETTLES)
     bend = expected.bend(held, patience.reading(tracking, 4 * homing.frames))
     slacken(board, spools, homing, zero.signs)
     expected.judge_cocontraction(bend)
+
+
+def _reeled(board: Board, zero: Zero, positions: NDArray[np.int64]) -> Patience:
+    """Reel all tendons in by so many microsteps (4,); who waits while they stand."""
+    one, two, four, five = map(int, np.array(zero.signs) * positions)
+    board.go_to((one, two, four, five), JOG_RATE)
+    return Patience(board)
 
 
 def _straighten(board: Board, tracking: Tracking, homing: Homing, straight: float) -> None:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from wristctl.commands.answer import Answer
 from wristctl.commands.inputs import Inputs
-from wristctl.commands.printed_table import COLUMNS, Table, joined, number
+from wristctl.commands.printed_table import COLUMNS, Table, joined
 from wristctl.commands.results import StudyResult
 from wristctl.commands.session import Session
 from wristctl.config.study import Study
@@ -25,7 +25,6 @@ if TYPE_CHECKING:
 
 # Share of the motion's mean square that a prediction may miss before nothing is told.
 _MISSED = 0.5
-_DIGITS = {"bend": ("deg", math.degrees(1.0)), "tip": ("mm", 1e3)}
 
 
 @dataclass(frozen=True, repr=False, eq=False)
@@ -77,6 +76,7 @@ def log_plan(study: Study, inputs: Inputs) -> str:
 
 def identify_logs(session: Session) -> LogTold:
     """Find what open logs tell, in their run."""
+    from wristctl.commands.validate.answer import parameters_table
     from wristctl.commands.validate.figures import errors_of_models, left_over, motion
     from wristctl.identification.arc_fit import fit_arcs
     from wristctl.identification.log_model import everything_fitted
@@ -93,7 +93,7 @@ def identify_logs(session: Session) -> LogTold:
         chosen = chosen_of(models)
         begin = chosen.fits[0].values
         fit = fit_arcs(robot, chosen.terms, everything_fitted(recordings), begin=begin)
-    unit, scale = _DIGITS[robot.measured]
+    unit, scale = robot.unit, robot.scale
     score = chosen.score
     findings.metric("error", scale * score.error, unit, "lower", score.blocks, (scale * score.low, scale * score.high),
                     "RMS of the part that was predicted")  # fmt: skip
@@ -106,7 +106,7 @@ def identify_logs(session: Session) -> LogTold:
         findings.figure("left-over", left_over, about, chosen.fits, caption="what is left of the motion")
         findings.figure("models", errors_of_models, about, models, caption="error of each model")
     findings.overview.figure = "motion"
-    result = LogTold(study, findings, [_models_table(models, robot), told_table(fit)], fit, models, chosen)
+    result = LogTold(study, findings, [_models_table(models, robot), parameters_table([fit], "")], fit, models, chosen)
     findings.table("data/parameters.csv", result.frame())
     _refuse(session, result, recordings)
     return result
@@ -121,7 +121,7 @@ def _refuse(session: Session, result: LogTold, recordings: Sequence[ArcRecording
     score = result.chosen.score
     if score.error**2 <= _MISSED * moved**2 or session.study.identify.misfit == "tell":
         return
-    unit, scale = _DIGITS[result.fit.robot.measured]
+    unit, scale = result.fit.robot.unit, result.fit.robot.scale
     text = "\n".join(result.answer.lines())
     session.findings.summary(f"```\n{text}\n```")
     session.operator.tell(text)
@@ -135,9 +135,9 @@ def _refuse(session: Session, result: LogTold, recordings: Sequence[ArcRecording
 
 def told_answer(fit: ArcFit, models: Sequence[TriedModel], chosen: TriedModel) -> Answer:
     """Parameters with intervals or not told, the terms that the data want, and what would tell more."""
-    from wristctl.commands.validate.answer import wanted_terms
+    from wristctl.commands.validate.answer import parameters_table, wanted_terms
 
-    unit, scale = _DIGITS[fit.robot.measured]
+    unit, scale = fit.robot.unit, fit.robot.scale
     error, low, high = (f"{scale * value:.3g}" for value in chosen.score[:3])
     told = [name for name, one in fit.told.items() if one.known and one.low > 0.0]
     sentence = (
@@ -149,26 +149,15 @@ def told_answer(fit: ArcFit, models: Sequence[TriedModel], chosen: TriedModel) -
         notes.append("Stiffness in N m/rad is not told: it needs tension_1 [N], ..., or trials with several masses.")
     return Answer(
         sentence,
-        told_table(fit).within(COLUMNS),
+        parameters_table([fit], "").within(COLUMNS),
         notes,
         "Errors of each model, figures: --all, or the run's report.html.",
     )
 
 
-def told_table(fit: ArcFit) -> Table:
-    """Each parameter and each slack with its 95 % interval, or not told."""
-    rows: list[tuple[str, str, str, str, str]] = []
-    for name, told in fit.told.items():
-        value, interval = ("not told", "")
-        if told.known:
-            value, interval = number(told.value), f"{number(told.low)} to {number(told.high)}"
-        rows.append((name, value, interval, told.unit, told.meaning))
-    return Table("", ("parameter", "value", "95 %", "unit", "meaning"), rows)
-
-
 def _models_table(models: Sequence[TriedModel], robot: ArcRobot) -> Table:
     from wristctl.commands.validate.answer import model_rows
 
-    unit, scale = _DIGITS[robot.measured]
+    unit, scale = robot.unit, robot.scale
     heads = ("model", "numbers", f"predicted part [{unit}]", "over that without", "")
     return Table("What each model misses", heads, model_rows(models, scale))

@@ -86,8 +86,8 @@ def model_rows(models: Sequence[TriedModel], scale: float) -> list[tuple[str, in
     return rows
 
 
-def parameters_table(fits: Sequence[ArcFit]) -> Table:
-    """Unknowns of the chosen model with their 95 % intervals, or that the data do not tell them."""
+def parameters_table(fits: Sequence[ArcFit], title: str = "What the data tell of the chosen model") -> Table:
+    """Unknowns of a model with their 95 % intervals, or that the data do not tell them."""
     several, rows = len(fits) > 1, []
     for fit in fits:
         for name, told in fit.told.items():
@@ -95,7 +95,7 @@ def parameters_table(fits: Sequence[ArcFit]) -> Table:
             interval = f"{number(told.low)} to {number(told.high)}" if told.known else ""
             rows.append((*([fit.recordings[0].name] * several), name, value, interval, told.unit, told.meaning))
     heads = (*["recording"] * several, "parameter", "value", "95 %", "unit", "meaning")
-    return Table("What the data tell of the chosen model", heads, rows)
+    return Table(title, heads, rows)
 
 
 def steps_table(robot: RealRobot, steps: Sequence[ArcFit]) -> Table:

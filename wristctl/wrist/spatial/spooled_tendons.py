@@ -42,6 +42,12 @@ def straight_length(wrist: Any, t: int) -> Any:
 
 
 @compiled
+def travel_of(wrist: Any, t: int, length: Any) -> Any:
+    """By how much a tendon's path is shorter than on the straight wrist [m], of its length [m]."""
+    return straight_length(wrist, t) - length
+
+
+@compiled
 def _wrapped(tendons: Any, wrist: Any, q: Any, t: int) -> Any:
     """Coefficient of friction times the angle by which a tendon is wrapped."""
     angle = tendons.sheath
@@ -95,7 +101,7 @@ def _nothing(tendons: Any, wrist: Any, q: Any) -> None:
 def _stretched(tendons: Any, wrist: Any, q: Any, spool_input: Any, pulls: Any) -> None:
     lengths_along(wrist, q, pulls)
     for t in range(len(pulls)):
-        stretch = spool_input[t] - (straight_length(wrist, t) - pulls[t])
+        stretch = spool_input[t] - travel_of(wrist, t, pulls[t])
         pulls[t] = tendons.stiffness[t] * maximum(0.0, stretch)
 
 
@@ -103,7 +109,7 @@ def _stretched(tendons: Any, wrist: Any, q: Any, spool_input: Any, pulls: Any) -
 def _rubbed(tendons: Any, wrist: Any, q: Any, spool_input: Any, pulls: Any) -> None:
     lengths_along(wrist, q, pulls)
     for t in range(len(pulls)):
-        travel = straight_length(wrist, t) - pulls[t]
+        travel = travel_of(wrist, t, pulls[t])
         left = capstan(_wrapped(tendons, wrist, q, t), 1.0, _slid(tendons, t, travel))
         pulls[t] = tendons.stiffness[t] * maximum(0.0, spool_input[t] - travel) * left
 
@@ -144,6 +150,6 @@ def _remember(tendons: Any, wrist: Any, q: Any) -> None:
     lengths = lanes_like(tendons.stiffness)
     lengths_along(wrist, q, lengths)
     for t in range(count):
-        travel = straight_length(wrist, t) - lengths[t]
+        travel = travel_of(wrist, t, lengths[t])
         state[OF_A_STATE * t + 1] = _slid(tendons, t, travel)
         state[OF_A_STATE * t] = travel
