@@ -91,6 +91,15 @@ def test_three_tendons_bend_in_two_planes_and_not_in_one() -> None:
     assert simulated("wrist.tendons=three", "simulate.reference.kind=circle").course.pulls.shape[1] == 3
 
 
+@pytest.mark.parametrize("setting", ["slack=[1e-3]", "broken_tendon=2"])
+def test_what_only_two_planes_have_is_refused_in_one(setting: str) -> None:
+    rig = ("simulate.loop.actuator.level=tendon", f"simulate.loop.plant.actuator.{setting}")
+    study = wristctl.load_study(None, "simulate.horizon=0.1", *rig)
+    with pytest.raises(UserError, match="bends in one plane") as refused:
+        wristctl.simulate(study)
+    assert setting.split("=")[0] in str(refused.value)
+
+
 def test_what_the_controller_does_not_know_is_told_by_tendon() -> None:
     settings = ("simulate.loop.plant.actuator.slack=[0.0, 1e-3]", "simulate.loop.plant.stiffness_axis_deg=30")
     study = study_of("simulate.reference.kind=circle", *settings)

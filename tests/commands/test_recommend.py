@@ -153,6 +153,11 @@ def test_where_every_controller_chatters_nothing_is_recommended() -> None:
     assert done.marks and len(done.answer.lines()) <= 32
 
 
+def test_a_recommendation_is_for_the_ticks_of_a_trial_unless_a_study_says_otherwise() -> None:
+    study = wristctl.load_study(None)
+    assert study.recommend.loop.control_period == study.hw_run.control_period
+
+
 def measured_on(cases: list[Any], name: str, gains: dict[str, float]) -> Any:
     law = controller(name)
     return measure(law, np.array([list(law.values(gains))]), cases, WRIST, ["rmse", "oscillation", "sustained"])
