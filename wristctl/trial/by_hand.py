@@ -73,6 +73,7 @@ class ByHand:
         for axis in range(AXES):
             for beyond in (-self._furthest - 1, self._furthest + 1):
                 goal = [beyond * (k == axis) for k in range(AXES)]
+                self._board.ping()  # what the board refuses does not feed its watchdog
                 try:
                     self._board.send(Target((goal[0], goal[1], goal[2], goal[3]), (1, 1, 1, 1)))
                 except Refused as error:
