@@ -15,6 +15,7 @@ from wristctl.lanes.compiled import kernel
 from wristctl.lanes.rows import rows_of
 from wristctl.simulation.actuator import (
     WITHHELD,
+    Aim,
     Drive,
     IdealDrive,
     LaggedDrive,
@@ -38,16 +39,16 @@ def _drive(drive: Any, state: Any, model: Any, commands: Any, out: Any, h: float
     known, motors = load_segments(rows_of(model)), rows_of(state)
     for tick in range(commands.shape[0]):
         command, result = rows_of(commands[tick]), rows_of(out[tick])
-        result[0], result[1] = actuate(drive, motors, known, command[2], command[0], command[1], h)
+        result[0], result[1] = actuate(drive, motors, known, Aim(command[2], command[3]), command[0], command[1], h)
         result[2] = motors[WITHHELD]
 
 
 def delivered(drive: Drive, commands: np.ndarray) -> np.ndarray:
-    """What both sides deliver to commands (T, 3), pulls [N] and a reference angle; and the withheld torque; (T, 3)."""
-    out = np.zeros((len(commands), 3))
-    _drive(
-        drive, at_rest(drive, WRIST, PCC, np.zeros(1)), segments(WRIST, 1), np.ascontiguousarray(commands), out, PERIOD
-    )
+    """What both sides deliver to commands (T, 3 or 4), pulls [N], a reference angle and its rate, else 0; and the
+    withheld torque; (T, 3)."""
+    out, aimed = np.zeros((len(commands), 3)), np.zeros((len(commands), 4))
+    aimed[:, : commands.shape[1]] = commands
+    _drive(drive, at_rest(drive, WRIST, PCC, np.zeros(1)), segments(WRIST, 1), aimed, out, PERIOD)
     return out
 
 

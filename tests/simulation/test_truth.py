@@ -22,7 +22,7 @@ from wristctl.errors import UserError
 from wristctl.lanes.compiled import kernel
 from wristctl.lanes.lane import zero_like
 from wristctl.lanes.rows import rows_of
-from wristctl.simulation.actuator import WITHHELD, actuate, drive_in_lanes, winding_of
+from wristctl.simulation.actuator import WITHHELD, Aim, actuate, drive_in_lanes, winding_of
 from wristctl.simulation.batch import Batch, Lanes, batch
 from wristctl.simulation.closed_loop import simulate
 from wristctl.simulation.kernel import run_blocks
@@ -133,7 +133,9 @@ def _controller_side(setup: Any, course: Any, world: Any, state: Any, scratch: A
         )
         row = rows_of(out[tick])
         row[0], row[1], row[2] = wanted, plus, minus
-        counted_plus, counted_minus = actuate(drive, motor, believed, view.theta_ref, plus, minus, setup.period)
+        counted_plus, counted_minus = actuate(
+            drive, motor, believed, Aim(view.theta_ref, view.rate_ref), plus, minus, setup.period
+        )
         go_on(state.watch, drive, believed, tick, counted_plus, counted_minus, setup.period)
 
 

@@ -65,9 +65,7 @@ class Loop(Section):
         "compensated", "", "in two planes: whether their effect on each other is added to the controller's torques"
     )
 
-    spool_lead: bool = seldom(
-        True, "", "in two planes: whether spools run ahead of the reference by what they lag behind a moving target"
-    )
+    spool_lead: bool = seldom(True, "", "whether spools move at the speed of the reference, and close their gap on top")
 
     @property
     def steps(self) -> int:

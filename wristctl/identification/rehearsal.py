@@ -21,7 +21,7 @@ from wristctl.errors import UserError
 from wristctl.identification.forward import SupposedWrist, angles
 from wristctl.lanes.compiled import kernel
 from wristctl.lanes.rows import rows_of
-from wristctl.simulation.actuator import Motor, SpoolDrive, actuate, at_rest, counted_motor
+from wristctl.simulation.actuator import Aim, Motor, SpoolDrive, actuate, at_rest, counted_motor
 from wristctl.simulation.reference import motion, toward
 from wristctl.simulation.rollout import rollout
 from wristctl.simulation.worlds import facing, plant_of
@@ -77,7 +77,7 @@ def _reel_in(drive: Any, motors: Any, model: Any, commands: Any, out: Any, h: fl
     known, motor = load_segments(rows_of(model)), rows_of(motors)
     for tick in range(commands.shape[0]):
         command, reeled = rows_of(commands[tick]), rows_of(out[tick])
-        reeled[0], reeled[1] = actuate(drive, motor, known, command[2], command[0], command[1], h)
+        reeled[0], reeled[1] = actuate(drive, motor, known, Aim(command[2], command[3]), command[0], command[1], h)
 
 
 def spools(wrist: WristParameters, reference: Reference, actuator: Actuator, horizon: float, motor: Motor) -> Array:
@@ -89,7 +89,7 @@ def spools(wrist: WristParameters, reference: Reference, actuator: Actuator, hor
     loop = Loop(actuator=actuator)
     rolled = rollout(law, np.zeros((1, 0)), [followed], np.zeros(1, np.int64), loop, wrist, record=True, threads=1)
     sides = [2.0 * rolled.column(name, 0) for name in ("tension_plus", "tension_minus")]
-    commands = np.stack([*sides, followed.theta_ref], axis=1)
+    commands = np.stack([*sides, followed.theta_ref, followed.rate_ref], axis=1)
     drive = SpoolDrive(motor)
     out = np.empty((len(commands), 2))
     _reel_in(drive, at_rest(drive, wrist, PCC, np.zeros(1)), segments(wrist, 1), commands, out, _PERIOD)

@@ -3,7 +3,7 @@
 lagged: T' = (command - T)/lag, no faster than the motor can stretch the tendon, in whole microsteps of it.
 tendon: a stepper reels tendon in; what its elastic tendons then pull is `wristctl.wrist.tendon_mechanics`'s.
 The spool's target is command/k + the shortening at theta_ref: at the measured angle, delayed, it would feed back
-positively with a gain near 1.
+positively with a gain near 1. A spool moves at the speed of the reference's shortening, and closes its gap on top.
 
 A host sends steps and believes what they are: it counts in lengths and pulls of its own belief, and what the motors
 deliver for that count is the world's (`Winding`).
@@ -17,7 +17,7 @@ from wristctl.arrays import Array
 from wristctl.config.plant import Actuator
 from wristctl.config.wrist import WristParameters
 from wristctl.lanes.compiled import by_type, compiled, implements
-from wristctl.lanes.functions import clip, maximum, minimum
+from wristctl.lanes.functions import clip, maximum
 from wristctl.lanes.lane import floor, rounded, sqrt, where, zero_like
 from wristctl.lanes.named_tuples import tuple_of
 from wristctl.lanes.rows import rows_of
@@ -163,24 +163,28 @@ def lag_pull(motor: Any, state: Any, side: int, command: Any, h: float) -> Any:
 
 
 @compiled
-def reeling(gap: Any, acceleration: Any, h: float) -> Any:
-    """Speed from which one more period and then braking stay within the gap: v^2/(2 a) + h v = |gap|."""
+def spool_speed(fastest: Any, acceleration: Any, gap: Any, moving: Any, before: Any, h: float) -> Any:
+    """Speed for one period that closes the gap to a target moving at a known speed; it was `before`.
+
+    On top of `moving` it is the speed v from which one more period and then braking stay within the gap,
+    v^2/(2 a) + h v = |gap|: for a small gap v = gap/h. It is no more than `fastest`, and changes by no more than a h.
+    """
     change = rounded(acceleration * h)
-    return sqrt(2.0 * acceleration * abs(gap) + rounded(change * change)) - change
+    closing = sqrt(2.0 * acceleration * abs(gap) + rounded(change * change)) - change
+    wanted = clip(moving + where(gap < 0.0, -closing, closing), -fastest, fastest)
+    return clip(wanted, before - change, before + change)
 
 
 @compiled
-def reel_in(motor: Any, state: Any, side: int, target: Any, h: float) -> Any:
-    """Move a stepper towards its target with bounded speed and acceleration; returns whole microsteps, and its withheld
-    pull: of the length from where it can stop to its target, where that is more than a microstep."""
+def reel_in(motor: Any, state: Any, side: int, target: Any, moving: Any, h: float) -> Any:
+    """Move a stepper towards its moving target with bounded speed and acceleration; returns whole microsteps, and its
+    withheld pull: of the length from where it can stop to its target, where that is more than a microstep."""
     gap = target - state[side]
-    change = rounded(motor.acceleration * h)
-    wanted = minimum(reeling(gap, motor.acceleration, h), motor.speed)
-    wanted = where(gap < 0.0, -wanted, wanted)
-    speed = clip(wanted, state[side + 1] - change, state[side + 1] + change)
+    speed = spool_speed(motor.speed, motor.acceleration, gap, moving, state[side + 1], h)
+    closing = speed - moving
     state[side + 1] = speed
     state[side] = state[side] + h * speed
-    behind = target - state[side] - 0.5 * speed * abs(speed) / motor.acceleration
+    behind = gap - h * closing - 0.5 * closing * abs(closing) / motor.acceleration
     withheld = where(abs(behind) > motor.step + _ROUNDING, motor.stiffness * behind, 0.0)
     return motor.step * floor(state[side] / motor.step + 0.5), withheld
 
@@ -191,37 +195,47 @@ def spool_target(pull: Any, stiffness: Any, length: Any, path: Any) -> Any:
     return pull / stiffness + length - path
 
 
+class Aim(NamedTuple):
+    """The reference that spools are paid out by: angle [rad], and the rate [rad/s] that they move with; in two planes
+    both are rows."""
+
+    angle: Any
+    rate: Any
+
+
 @by_type
-def actuate(drive: Any, state: Any, believed: Any, theta_ref: Any, plus: Any, minus: Any, h: float) -> Any:
+def actuate(drive: Any, state: Any, believed: Any, aim: Any, plus: Any, minus: Any, h: float) -> Any:
     """Host's counts of both sides a period after commanded pulls [N]: pulls, or lengths on spools [m].
 
-    `believed` is the controller's wrist as Segments. The state's last value becomes the torque [N m] that the motors
-    withhold, by this belief: what of the command their speed and acceleration keep from the wrist over this period.
+    `believed` is the controller's wrist as Segments; at a rate of 0 in `aim` spools only close their gap. The state's
+    last value becomes the torque [N m] that the motors withhold, by this belief: what of the command their speed and
+    acceleration keep from the wrist over this period.
     """
     raise NotImplementedError("compiled code only")
 
 
 @implements(actuate, IdealDrive)
-def _as_commanded(drive: Any, state: Any, believed: Any, theta_ref: Any, plus: Any, minus: Any, h: float) -> Any:
+def _as_commanded(drive: Any, state: Any, believed: Any, aim: Any, plus: Any, minus: Any, h: float) -> Any:
     return plus, minus
 
 
 @implements(actuate, LaggedDrive)
-def _lagged(drive: Any, state: Any, believed: Any, theta_ref: Any, plus: Any, minus: Any, h: float) -> Any:
+def _lagged(drive: Any, state: Any, believed: Any, aim: Any, plus: Any, minus: Any, h: float) -> Any:
     pull_plus, less_plus = lag_pull(drive.motor, state, 0, plus, h)
     pull_minus, less_minus = lag_pull(drive.motor, state, 2, minus, h)
-    state[WITHHELD] = torque_of(theta_ref, believed, less_plus, less_minus)
+    state[WITHHELD] = torque_of(aim.angle, believed, less_plus, less_minus)
     return pull_plus, pull_minus
 
 
 @implements(actuate, SpoolDrive)
-def _reeled(drive: Any, state: Any, believed: Any, theta_ref: Any, plus: Any, minus: Any, h: float) -> Any:
-    motor, (path_plus, path_minus) = drive.motor, lengths(theta_ref, believed)
+def _reeled(drive: Any, state: Any, believed: Any, aim: Any, plus: Any, minus: Any, h: float) -> Any:
+    motor, (path_plus, path_minus) = drive.motor, lengths(aim.angle, believed)
+    arm_plus, arm_minus = moment_arms(aim.angle, believed)
     target_plus = spool_target(plus, motor.stiffness, believed.length, path_plus)
     target_minus = spool_target(minus, motor.stiffness, believed.length, path_minus)
-    reeled_plus, less_plus = reel_in(motor, state, 0, target_plus, h)
-    reeled_minus, less_minus = reel_in(motor, state, 2, target_minus, h)
-    state[WITHHELD] = torque_of(theta_ref, believed, less_plus, less_minus)
+    reeled_plus, less_plus = reel_in(motor, state, 0, target_plus, rounded(arm_plus * aim.rate), h)
+    reeled_minus, less_minus = reel_in(motor, state, 2, target_minus, rounded(arm_minus * aim.rate), h)
+    state[WITHHELD] = torque_of(aim.angle, believed, less_plus, less_minus)
     return reeled_plus, reeled_minus
 
 

@@ -140,6 +140,7 @@ def batch(
         model=of_worlds(lambda index: segments(worlds[index].wrist, 1)),
         limits=of_worlds(limits),
         drive=drive_with(level, of_worlds(lambda index: np.array(counted[index]))),
+        lead=of_worlds(lambda index: np.array([float(worlds[index].loop.spool_lead)])),
         winding=of_worlds(lambda index: np.array(windings[index])),
         gains=spread(gains.reshape(count, -1), count),
         goals=spread(goals, count),
@@ -169,7 +170,7 @@ def _bodies(worlds: Sequence[World]) -> tuple[list[World], Indices]:
     bodies, which = dict[tuple[object, ...], tuple[int, World]](), []
     for world in worlds:
         loop = world.loop
-        parts = id(world.wrist), id(loop.plant), id(loop.actuator), id(loop.disturbances), loop.limits
+        parts = id(world.wrist), id(loop.plant), id(loop.actuator), id(loop.disturbances), loop.limits, loop.spool_lead
         which.append(bodies.setdefault(parts, (len(bodies), world))[0])
     return [world for _, world in bodies.values()], np.array(which)
 

@@ -11,7 +11,7 @@ from wristctl.lanes.compiled import by_type, compiled, implements, spelled_out
 from wristctl.lanes.lane import where, zero_like
 from wristctl.lanes.named_tuples import block_of
 from wristctl.lanes.rows import part, rows_of
-from wristctl.simulation.actuator import WITHHELD, actuate, drive_in_lanes, read_winding, wound
+from wristctl.simulation.actuator import WITHHELD, Aim, actuate, drive_in_lanes, read_winding, wound
 from wristctl.simulation.nonideal import spools_after_slip
 from wristctl.simulation.observer import go_on, sense
 from wristctl.simulation.sums import SUMS, gather, goals_of, watch_range
@@ -74,14 +74,15 @@ class LoopCourse(NamedTuple):
 class LoopValues(NamedTuple):
     """Values that stay, [block, row, lane]; with one block only they are every block's.
 
-    `plant` and `winding` are what is, `model`, `limits` and `drive` what the controller's side believes. `schedule` has
-    the ticks of frames, or is NoCamera.
+    `plant` and `winding` are what is, `model`, `limits` and `drive` what the controller's side believes. `lead` is 1
+    where spools move with the reference, else 0. `schedule` has the ticks of frames, or is NoCamera.
     """
 
     plant: Any
     model: Any
     limits: Any
     drive: Any
+    lead: Any
     winding: Any
     gains: Any
     goals: Any
@@ -141,7 +142,7 @@ def _run_block(setup: Any, course: Any, world: Any, state: Any, scratch: Any, fi
     undisturbed = parameters_of(setup.plant, rows_of(world.plant))
     believed, drive = load_segments(rows_of(world.model)), drive_in_lanes(world.drive)
     tendons = tendons_in_lanes(state.tendons)
-    winding = read_winding(rows_of(world.winding))
+    winding, lead = read_winding(rows_of(world.winding)), rows_of(world.lead)[0]
     control = Controlled(setup.law, scratch.now, world.model, world.gains, state.memory, scratch.target)
     view, bound, goal = now_of(scratch.now), rows_of(world.limits), goals_of(world.goals)
     motor, sum_ = rows_of(state.motors), rows_of(state.sums)
@@ -169,7 +170,8 @@ def _run_block(setup: Any, course: Any, world: Any, state: Any, scratch: Any, fi
                 control, believed, estimate, motor[WITHHELD], (low, high), tick * period, period
             )
             theta_ref = view.theta_ref
-            counted_plus, counted_minus = actuate(drive, motor, believed, theta_ref, plus, minus, period)
+            aim = Aim(theta_ref, lead * view.rate_ref)
+            counted_plus, counted_minus = actuate(drive, motor, believed, aim, plus, minus, period)
             time, path = now_tick * period + zero, path_before(tendons, plant, q)
             delivered = wound(drive, winding, counted_plus, counted_minus)
             speeds = winding.scale * motor[1], winding.scale * motor[3]

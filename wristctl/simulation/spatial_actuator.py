@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 from wristctl.lanes.compiled import by_type, compiled, implements
 from wristctl.lanes.functions import clip, maximum
-from wristctl.lanes.lane import zero_like
+from wristctl.lanes.lane import rounded, zero_like
 from wristctl.lanes.named_tuples import tuple_of
 from wristctl.lanes.rows import lanes_like, rows_of
 from wristctl.simulation.actuator import (
@@ -68,19 +68,11 @@ def motor_at(motor: Any, alike: Any) -> Any:
     return Motor(motor.lag, alike * motor.stiffness, motor.step, motor.speed, motor.acceleration)
 
 
-class Aim(NamedTuple):
-    """The reference that spools are paid out by: bends [rad] and rates [rad/s], 2 rows each."""
-
-    bend: Any
-    rate: Any
-
-
 @by_type
 def drive_tendons(drive: Any, motors: Any, known: Any, aim: Any, pulls: Any, h: float, counts: Any) -> None:
     """Host's counts a period after commanded pulls [N], into `counts`: pulls, or lengths on spools [m].
 
-    `known` is Knowledge. With its `lead` a spool runs ahead of the reference by the distance by which it lags behind
-    a target that moves: what it takes to brake, and a period. The last two rows of `motors` become the torque that
+    `known` is Knowledge, `aim` of two rows each. The last two rows of `motors` become the torque that
     the motors withhold in each plane [N m], as in one plane.
     """
     raise NotImplementedError("compiled code only")
@@ -94,27 +86,26 @@ def _as_commanded(drive: Any, motors: Any, known: Any, aim: Any, pulls: Any, h: 
 
 @implements(drive_tendons, LaggedDrive)
 def _lagging(drive: Any, motors: Any, known: Any, aim: Any, pulls: Any, h: float, counts: Any) -> None:
-    arms, last = lanes_like(aim.bend), 2 * len(pulls)
-    withheld_y, withheld_z = zero_like(aim.bend[0]), zero_like(aim.bend[0])
+    arms, last = lanes_like(aim.angle), 2 * len(pulls)
+    withheld_y, withheld_z = zero_like(aim.angle[0]), zero_like(aim.angle[0])
     for t in range(len(pulls)):
         counts[t], less = lag_pull(motor_at(drive.motor, known.alike[t]), motors, 2 * t, pulls[t], h)
-        moment_arms_of(known.wrist, aim.bend, t, arms)
+        moment_arms_of(known.wrist, aim.angle, t, arms)
         withheld_y, withheld_z = withheld_y + less * arms[0], withheld_z + less * arms[1]
     motors[last], motors[last + 1] = withheld_y, withheld_z
 
 
 @implements(drive_tendons, SpoolDrive)
 def _reeling(drive: Any, motors: Any, known: Any, aim: Any, pulls: Any, h: float, counts: Any) -> None:
-    arms, last = lanes_like(aim.bend), 2 * len(pulls)
-    withheld_y, withheld_z = zero_like(aim.bend[0]), zero_like(aim.bend[0])
-    lengths_along(known.wrist, aim.bend, counts)
+    arms, last = lanes_like(aim.angle), 2 * len(pulls)
+    withheld_y, withheld_z = zero_like(aim.angle[0]), zero_like(aim.angle[0])
+    lengths_along(known.wrist, aim.angle, counts)
     for t in range(len(pulls)):
         motor = motor_at(drive.motor, known.alike[t])
-        moment_arms_of(known.wrist, aim.bend, t, arms)
-        speed = arms[0] * aim.rate[0] + arms[1] * aim.rate[1]
-        ahead = speed * (abs(speed) / (2.0 * motor.acceleration) + h)
+        moment_arms_of(known.wrist, aim.angle, t, arms)
+        moving = rounded(arms[0] * aim.rate[0]) + rounded(arms[1] * aim.rate[1])
         target = spool_target(pulls[t], motor.stiffness, straight_length(known.wrist, t), counts[t])
-        counts[t], less = reel_in(motor, motors, 2 * t, target + known.lead * ahead, h)
+        counts[t], less = reel_in(motor, motors, 2 * t, target, moving, h)
         withheld_y, withheld_z = withheld_y + less * arms[0], withheld_z + less * arms[1]
     motors[last], motors[last + 1] = withheld_y, withheld_z
 

@@ -13,8 +13,8 @@ from wristctl.lanes.compiled import kernel
 from wristctl.lanes.lane import planar, sqrt, where, zero_like
 from wristctl.lanes.named_tuples import block_of
 from wristctl.lanes.rows import lanes_like, part, planes_like, rows_of
-from wristctl.simulation.actuator import drive_in_lanes
-from wristctl.simulation.spatial_actuator import Aim, deliver, drive_tendons, friction_in_lanes, lose, tendons_on
+from wristctl.simulation.actuator import Aim, drive_in_lanes
+from wristctl.simulation.spatial_actuator import deliver, drive_tendons, friction_in_lanes, lose, tendons_on
 from wristctl.simulation.spatial_observer import Knowledge, coupling, predict_bends, sense_bends
 from wristctl.wrist.allocation import allocate
 from wristctl.wrist.segments import load_segments
@@ -72,7 +72,7 @@ class SpatialValues(NamedTuple):
     (Segments); gains; and limits: least and greatest pull at each place of tendons [N], then the bend [rad] beyond
     which a wrist has failed. Of the motors: the drive as its host counts, the scale of the counts and the offset at
     each place. Of each place's tendons: their number, all their stiffness [N/m], the time at which they break, and the
-    backlash of all; 1 where spools run ahead of the reference. Friction is that of tendons, or NoFriction.
+    backlash of all; 1 where spools move with the reference, else 0. Friction is that of tendons, or NoFriction.
     """
 
     plant: Any
@@ -134,7 +134,7 @@ def run_spatial(setup: Any, course: Any, world: Any, states: Any, scratch: Any, 
         drive, friction = drive_in_lanes(values.drive), friction_in_lanes(values.friction)
         known = Knowledge(
             believed, load_segments(rows_of(values.model_y)), load_segments(rows_of(values.model_z)), alike, drive,
-            setup.coupling, rows_of(values.lead)[0],
+            setup.coupling,
         )  # fmt: skip
         control_y = Controlled(setup.law, scratch.now_y, values.model_y, values.gains, state.memory_y, scratch.target_y)
         control_z = Controlled(setup.law, scratch.now_z, values.model_z, values.gains, state.memory_z, scratch.target_z)
@@ -142,7 +142,7 @@ def run_spatial(setup: Any, course: Any, world: Any, states: Any, scratch: Any, 
         limits, alive = rows_of(values.limits), rows_of(state.alive)
         least, greatest = part(limits, 0, setup.pulls), part(limits, count, setup.pulls)
         winding, broken_at = rows_of(values.winding), rows_of(values.broken_at)
-        whole, backlash = rows_of(values.stiffness), rows_of(values.backlash)[0]
+        whole, backlash, lead = rows_of(values.stiffness), rows_of(values.backlash)[0], rows_of(values.lead)[0]
         motors, delivered = rows_of(state.motors), part(rows_of(state.delivered), 0, setup.pulls)
         coordinates = rows_of(state.coordinates)
         q, rate = part(coordinates, 0, setup.coordinates), part(coordinates, m, setup.coordinates)
@@ -202,7 +202,8 @@ def run_spatial(setup: Any, course: Any, world: Any, states: Any, scratch: Any, 
                 time = now_tick * period + zero
                 wish[0] = target_y[0] + since * (target_y[1] + 0.5 * since * target_y[2])
                 wish[1] = target_z[0] + since * (target_z[1] + 0.5 * since * target_z[2])
-                speed[0], speed[1] = target_y[1] + since * target_y[2], target_z[1] + since * target_z[2]
+                speed[0] = lead * (target_y[1] + since * target_y[2])
+                speed[1] = lead * (target_z[1] + since * target_z[2])
                 drive_tendons(drive, motors, known, Aim(wish, speed), pulls, period, counts)
                 deliver(drive, winding, backlash, counts, delivered)
                 for t in range(count):

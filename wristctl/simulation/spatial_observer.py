@@ -41,7 +41,6 @@ class Knowledge(NamedTuple):
     alike: Any
     drive: Any
     coupling: Any
-    lead: Any
 
 
 class SpatialSchedule(NamedTuple):

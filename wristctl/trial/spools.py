@@ -20,10 +20,9 @@ from wristctl.arrays import Array
 from wristctl.config.plant import Actuator
 from wristctl.config.wrist import WristParameters
 from wristctl.lanes.compiled import kernel
-from wristctl.lanes.functions import clip
-from wristctl.lanes.lane import where, zero_like
+from wristctl.lanes.lane import zero_like
 from wristctl.lanes.rows import rows_of
-from wristctl.simulation.actuator import reeling, spool_target
+from wristctl.simulation.actuator import spool_speed, spool_target
 from wristctl.wrist.directions import ACTIVE, tendons_of
 from wristctl.wrist.segments import load_segments, segments
 from wristctl.wrist.tendons import lengths, moment_arms
@@ -65,8 +64,7 @@ class Spools:
     def rate(self, gap: Array, moving: Array, before: Array, period: float) -> Array:
         """Step rates [1/s] for one period that close the gap [steps] to targets moving at a known rate [1/s].
 
-        On top of `moving` each spool takes the speed v from which one more period and then braking stay within the
-        gap, v^2/(2 a) + h v = |gap|, and changes from `before` by no more than a h: for a small gap v = gap/h.
+        They are those of `wristctl.simulation.actuator.spool_speed`, from `before` [1/s].
         """
         rates = np.empty(len(gap))
         _rates((self.speed, self.acceleration), gap, moving, before, period, rates)
@@ -127,11 +125,9 @@ def _targets(tension: Any, stiffness: float, taut: Any, reeled: Any) -> None:
 def _rates(motor: Any, gap: Any, moving: Any, before: Any, period: float, rates: Any) -> None:
     speed, acceleration = motor
     gaps, speeds, last, out = rows_of(gap), rows_of(moving), rows_of(before), rows_of(rates)
-    change = acceleration * period
     for axis in range(len(gap)):
-        closing = reeling(gaps[axis], acceleration + zero_like(gaps[axis]), period)
-        wanted = clip(speeds[axis] + where(gaps[axis] < 0.0, -closing, closing), -speed, speed)
-        out[axis] = clip(wanted, last[axis] - change, last[axis] + change)
+        most = acceleration + zero_like(gaps[axis])
+        out[axis] = spool_speed(speed, most, gaps[axis], speeds[axis], last[axis], period)
 
 
 @kernel
