@@ -122,6 +122,23 @@ def test_a_stepper_that_keeps_up_withholds_nothing() -> None:
     assert np.ptp(length) > 50 * drive.motor.step and (torque == 0.0).all()
 
 
+@pytest.mark.parametrize("way", [1.0, -1.0])
+def test_spools_told_a_rate_move_with_the_reference_and_else_lag_by_braking(
+    way: float,
+) -> None:
+    drive = driven(Actuator(level="tendon"))
+    rate, time = 0.8 * way, PERIOD * np.arange(500)
+    still = np.full_like(time, 4.0)
+    told = delivered(drive, np.stack([still, still, rate * time, np.full_like(time, rate)], axis=1))
+    late = delivered(drive, np.stack([still, still, rate * time], axis=1))
+    angle, motor = rate * time[400:], drive.motor
+    wanted = 4.0 / motor.stiffness + WRIST.length - np.array([_plus_length(theta) for theta in angle])
+    speed = abs(np.diff(wanted) / PERIOD).max()
+    lag = way * (wanted - late[400:, 0])
+    assert lag == pytest.approx(speed**2 / (2.0 * motor.acceleration), abs=2.0 * motor.step)
+    assert told[400:, 0] == pytest.approx(wanted + way * speed * PERIOD, abs=1.1 * motor.step)
+
+
 def test_a_lagged_motor_withholds_what_its_speed_does() -> None:
     drive = driven(Actuator(level="lagged", lag=1e-4, step_rate=500.0))
     torque = delivered(drive, np.tile([4.0, 100.0, 0.0], (100, 1)))[:, 2]

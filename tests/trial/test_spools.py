@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import FrozenInstanceError
+from typing import Any
 
 import numpy as np
 import pytest
@@ -12,11 +13,19 @@ from hypothesis import strategies as st
 
 from wristctl.config.plant import Actuator
 from wristctl.config.wrist import WristParameters
+from wristctl.lanes.compiled import kernel
+from wristctl.lanes.rows import rows_of
+from wristctl.simulation.actuator import motor_of, reel_in
 from wristctl.trial.spools import Paths, on_plus_side, spools_of
 from wristctl.wrist.directions import ACTIVE
 
 WRIST, ACTUATOR = WristParameters(), Actuator(level="tendon")
 SPOOLS = spools_of(ACTUATOR)
+
+
+@kernel
+def _reel_in(motor: Any, state: Any, target: float, moving: float, h: float) -> None:
+    reel_in(motor, rows_of(state), 0, target, moving, h)
 
 
 @settings(deadline=None)
@@ -85,3 +94,13 @@ def test_spools_are_behind_by_what_is_left_when_they_have_braked(way: float) -> 
     assert (SPOOLS.behind(to_stop, moving, sent, period) == 0.0).all()
     assert SPOOLS.behind(to_stop + 120.0, moving, sent, period) == pytest.approx(np.full(4, 120.0))
     assert (SPOOLS.behind(to_stop - 0.9, moving, sent, period) == 0.0).all(), "less than a step"
+
+
+@settings(deadline=None)
+@given(st.floats(-2000.0, 2000.0), st.floats(-3000.0, 3000.0), st.floats(-4000.0, 4000.0))
+def test_a_trial_and_a_simulation_turn_a_spool_by_the_same_law(gap: float, moving: float, before: float) -> None:
+    h = 1e-3
+    out = np.array([0.0, before * SPOOLS.step])
+    _reel_in(motor_of(ACTUATOR), out, gap * SPOOLS.step, moving * SPOOLS.step, h)
+    wanted = SPOOLS.rate(np.array([gap]), np.array([moving]), np.array([before]), h)[0]
+    assert out[1] / SPOOLS.step == pytest.approx(wanted, abs=1e-6)
