@@ -67,6 +67,7 @@ def test_the_time_that_is_left_is_told_at_the_pace_so_far(monkeypatch: pytest.Mo
     for now, left in ((1.0, ""), (20.0, "about 60 s left"), (200.0, "about 10 min left"), (2400.0, "about 2 h left")):
         monkeypatch.setattr("time.monotonic", lambda now=now: now)
         assert count.remaining() == left
+        assert Count("drawing", 1750, "samples", 1000, began=0.0, kept=750).remaining() == left, "at the pace of today"
     for known in (Count("drawing", 1000, "samples", 1000, began=0.0), Count("drawing", None, "samples", 3, began=0.0)):
         assert known.seconds_left() is None and known.remaining() == ""
 

@@ -33,13 +33,15 @@ class Count:
     count: int = 0
     figures: dict[str, float] = field(default_factory=dict)
     began: float = field(default_factory=lambda: time.monotonic())
+    kept: int = 0
+    """Part of the count that an earlier run had done, which says nothing of the pace."""
 
     def seconds_left(self) -> float | None:
         """Time left at the pace so far [s]; None where it is unknown, or all is done."""
         passed = time.monotonic() - self.began
-        if self.total is None or not 0 < self.count < self.total or passed < _TELLS:
+        if self.total is None or not self.kept < self.count < self.total or passed < _TELLS:
             return None
-        return passed * (self.total - self.count) / self.count
+        return passed * (self.total - self.count) / (self.count - self.kept)
 
     def remaining(self) -> str:
         """Time left in words; empty where it is unknown."""
@@ -84,9 +86,9 @@ def counting(event: Event, task: str, total: int | None, unit: str, show: Callab
     state = Count(task, total, unit)
     last_event = state.began - _EVENT_EVERY
 
-    def done(count: int = 0, **figures: float) -> None:
+    def done(count: int = 0, kept: int = 0, **figures: float) -> None:
         nonlocal last_event
-        state.count = count
+        state.count, state.kept = count, kept
         state.figures |= figures
         show(state)
         instant = time.monotonic()

@@ -19,9 +19,9 @@ if TYPE_CHECKING:
 
 
 class Done(Protocol):
-    """Called with how much is done by now, and figures to show beside it."""
+    """Called with how much is done by now, how much of it an earlier run had done, and figures to show beside it."""
 
-    def __call__(self, count: int = 0, **figures: float) -> None:
+    def __call__(self, count: int = 0, kept: int = 0, **figures: float) -> None:
         """Say it."""
 
 

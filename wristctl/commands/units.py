@@ -55,13 +55,14 @@ def performed(
     if sources := sources_in(session.study):
         units = [replace(unit, spec={**unit.spec, "sources": sources}) for unit in units]
         furnish = Furnish("wristctl.commands.adoption:adopt", adoption(session.study, command))
-    count = 0
+    count = kept = 0
     with session.progress(task, total=sum(unit.size for unit in units), unit=counted) as report:
 
         def told(unit: Unit, computed: Computed | None) -> None:
-            nonlocal count
+            nonlocal count, kept
             count += unit.size
-            report(count)
+            kept += unit.size * (computed is None)
+            report(count, kept)
             if computed is not None:
                 spent = {"host": computed.host, "seconds": computed.seconds, "processor": computed.processor}
                 session.findings.event("unit", name=unit.name, key=unit.key, **{counted: unit.size}, **spent)
