@@ -7,14 +7,12 @@ from pydantic import model_validator
 from wristctl.config.bench import BenchSettings
 from wristctl.config.camera import Device, Gates, Markers
 from wristctl.config.controller_row import Row
-from wristctl.config.loop import DirectionName, Loop, Reference
+from wristctl.config.loop import TICK, DirectionName, Loop, Reference
 from wristctl.config.plant import Actuator, Plant, Push, Sensor, TrueActuator, TrueSensor, TrueWrist
 from wristctl.config.section import Section, choice, quantity
 from wristctl.config.wrist import WristParameters
 from wristctl.errors import Unfitting
 
-# Time between two ticks of a trial [s]: a genuine Mega answers within 9 ms.
-TICK = 10e-3
 # Lifetime of a step rate on the board: least time [s], and number of ticks.
 _LEAST_LIFE, _LIFE_PERIODS = 0.05, 2.5
 

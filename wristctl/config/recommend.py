@@ -6,8 +6,7 @@ from typing import Annotated, Any
 from pydantic import BeforeValidator, Field
 
 from wristctl.config.families import Drawn, Family
-from wristctl.config.hw_run import TICK
-from wristctl.config.loop import Loop, Reference
+from wristctl.config.loop import TICK, Loop, Reference
 from wristctl.config.section import Section, choice, quantity
 from wristctl.config.tune import Controllers
 
