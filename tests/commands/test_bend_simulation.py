@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -17,6 +18,8 @@ from wristctl.errors import UserError
 from wristctl.records import Run
 from wristctl.simulation.bend_course import BEND_METRICS
 from wristctl.simulation.bend_loops import bends_of, planes_of
+from wristctl.simulation.two_planes import bend_path
+from wristctl.wrist.spatial.spatial_kinematics import exact_bend, spatial_tips
 
 # The kernel that tests of the loop in two planes compile.
 LOOP = ("simulate.controller=pid-ff", "simulate.gains=default", "simulate.loop.coupling=ignored", "simulate.horizon=1")
@@ -73,6 +76,61 @@ def test_a_recording_of_two_planes_is_followed_in_both(tmp_path: Path) -> None:
         SIMULATE.plan(alone, Inputs())
     one_plane = alone.simulate.model_copy(update={"loop": alone.simulate.loop.model_copy(update={"planes": None})})
     assert planes_of(one_plane.loop, one_plane.reference) == 1
+
+
+def tips_file(folder: Path, tips: np.ndarray, more: str = "") -> Study:
+    """A study that follows tips (T, 3) [m], 50 a second, in two planes."""
+    rows = "\n".join(f"{0.02 * k:.3f},{x:.7f},{y:.7f},{z:.7f}" for k, (x, y, z) in enumerate(1e3 * tips))
+    (folder / "tips.csv").write_text(f"time [s],x [mm],y [mm],z [mm]\n{rows}\n")
+    named = ("simulate.reference.kind=recording", f"simulate.reference.file={folder / 'tips.csv'}", more)
+    return study_of("simulate.loop.planes=2", *filter(None, named))
+
+
+def test_recorded_tips_are_followed_in_both_planes(tmp_path: Path) -> None:
+    bends = bend_path("circumduction", 25.0, 0.5, 1.0)[:, 0, ::20].T
+    study = tips_file(tmp_path, spatial_tips(bends, 0.08))
+    chosen = study.simulate
+    wanted = bends_of(chosen.reference, chosen.direction, study.wrist, 1.0, 0.02)
+    np.testing.assert_allclose(wanted[:, 0].T, bends[:50], atol=1e-7)
+    assert SIMULATE.plan(study, Inputs()).startswith("one rollout of 1 s in two planes")
+
+
+@pytest.mark.parametrize(
+    ("at", "tip", "why"),
+    [
+        (30, (0.084, 0.0, 0.0), "4 mm from where an arc of 80 mm can end"),
+        (31, (0.0, 0.0, 0.0), "from where an arc of 80 mm can end"),
+        (32, (0.05, -0.03, 0.04), r"asks for 90\.0 deg, beyond the range of \+-50"),
+        (33, (-0.08, 0.0, 0.0), "beyond the range"),
+    ],
+)
+def test_a_tip_out_of_reach_is_refused_with_its_line_and_the_nearest_in_reach(
+    tmp_path: Path, at: int, tip: tuple[float, float, float], why: str
+) -> None:
+    tips = spatial_tips(bend_path("circle", 20.0, 1.0, 1.0)[:, 0, ::20].T, 0.08)
+    tips[at] = tip
+    study = tips_file(tmp_path, tips)
+    with pytest.raises(UserError, match=why) as refused:
+        SIMULATE.plan(study, Inputs())
+    assert refused.value.where == f"{tmp_path / 'tips.csv'}:{at + 2}"
+    x, y, z = (1e-3 * float(number) for number in re.findall(r"-?[\d.]+", refused.value.fix.partition(";")[0]))
+    bend, length = exact_bend(np.array([x, y, z]))
+    assert length == pytest.approx(0.08, abs=1e-4) and np.rad2deg(np.hypot(*bend)) <= 50.1
+    assert y * tip[2] == pytest.approx(z * tip[1], abs=1e-6), "in the plane of the tip, if it has one"
+
+
+def test_tips_are_taken_where_a_recording_has_bends_too_and_they_are_named(tmp_path: Path) -> None:
+    bends = bend_path("circle", 20.0, 1.0, 1.0)[:, 0, ::20].T
+    study = tips_file(tmp_path, spatial_tips(bends, 0.08), "simulate.reference.column=tip")
+    text = (tmp_path / "tips.csv").read_text().splitlines()
+    rows = [f"{text[0]},bend_y [deg],bend_z [deg]", *(f"{line},1,2" for line in text[1:])]
+    (tmp_path / "tips.csv").write_text("\n".join(rows))
+    for reference, expected in (
+        (study.simulate.reference, bends[40]),
+        (study.simulate.reference.model_copy(update={"column": None}), np.deg2rad([1.0, 2.0])),
+    ):
+        wanted = bends_of(reference, "ulnar", study.wrist, 1.0, 0.02)
+        np.testing.assert_allclose(wanted[:, 0, 40], expected, atol=1e-7)
 
 
 @pytest.mark.parametrize(("direction", "plane", "sign"), [("ulnar", 0, 1), ("radial", 0, -1), ("extension", 1, -1)])

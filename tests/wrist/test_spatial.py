@@ -14,6 +14,7 @@ from wristctl.errors import UserError
 from wristctl.wrist import compiled_model, statics
 from wristctl.wrist.segments import segments
 from wristctl.wrist.spatial.spatial_augmented import augmented_residual, augmented_tendons, spatial_augmented
+from wristctl.wrist.spatial.spatial_kinematics import exact_bend, spatial_frames, spatial_tips
 from wristctl.wrist.spatial.spatial_model import spatial_integrate, spatial_linearised, spatial_terms
 from wristctl.wrist.spatial.spatial_segments import FIELDS, SpatialSegments, ellipse, spatial_values
 from wristctl.wrist.spatial.spatial_statics import (
@@ -53,6 +54,24 @@ def turned(values: np.ndarray, by: float) -> np.ndarray:
     tendons = values[FIELDS:].reshape(-1, 3).copy()
     tendons[:, :2] = tendons[:, :2] @ turn.T
     return np.concatenate([np.array(list(out.values())), tendons.ravel()])
+
+
+@given(q=bends)
+def test_cross_sections_end_at_the_compiled_models_tip_and_hold_its_tendons(q: np.ndarray) -> None:
+    terms = spatial_terms(VALUES, q, 0.0 * q)
+    centres, frames = spatial_frames(q, WRIST.length, np.linspace(0.0, 1.0, WRIST.discs))
+    np.testing.assert_allclose(centres[-1], terms.tip, atol=1e-15)
+    np.testing.assert_allclose(frames[-1], terms.frame, atol=1e-14)
+    for place, (y, z), length in zip(UNEVEN.places, UNEVEN.cross_section, terms.lengths, strict=True):
+        through = (centres + frames @ np.array([0.0, y, z]))[: place.ends_at]
+        assert np.linalg.norm(np.diff(through, axis=0), axis=1).sum() == pytest.approx(length, abs=1e-14)
+
+
+@given(bend=st.tuples(st.floats(-2.2, 2.2), st.floats(-2.2, 2.2)).map(np.array), length=st.floats(0.01, 1.0))
+def test_the_one_arc_that_ends_at_a_tip_is_found_again(bend: np.ndarray, length: float) -> None:
+    found, along = exact_bend(spatial_tips(bend, length))
+    np.testing.assert_allclose(found, bend, atol=1e-12)
+    assert along == pytest.approx(length, rel=1e-12)
 
 
 @settings(max_examples=25)

@@ -6,11 +6,10 @@ from matplotlib.figure import Figure
 
 from wristctl.arrays import Array
 from wristctl.plotting.loop_figures import draw_course
-from wristctl.plotting.style import BLACK, BLUE, GREY, ORANGE, PURPLE, SILVER, VERMILLION, figure, legend_below, title
+from wristctl.plotting.style import BLACK, BLUE, SILVER, TENDON_COLOURS, VERMILLION, figure, legend_below, title
 from wristctl.simulation.bend_course import BendCourse
 
 _OF_PLANES = (("toward ulnar", BLUE), ("toward flexion", VERMILLION))
-_OF_TENDONS = (BLUE, VERMILLION, ORANGE, PURPLE, GREY, BLACK)
 
 
 def bend_figure(course: BendCourse, reach: Array, heading: str = "") -> Figure:
@@ -32,7 +31,7 @@ def bend_motion(course: BendCourse, reach: Array, heading: str = "") -> Figure:
     errors.axhline(0.0, color=BLACK, linewidth=0.8, zorder=1.0)
     errors.set_ylabel("error [deg]")
     for number, pull in enumerate(course.acting.T):
-        shade = _OF_TENDONS[number % len(_OF_TENDONS)]
+        shade = TENDON_COLOURS[number % len(TENDON_COLOURS)]
         draw_course(pulls, course.time, pull, shade, f"tendon {number + 1}")
     pulls.set(xlabel="time [s]", ylabel="pull on the wrist [N]")
     legend_below(picture)

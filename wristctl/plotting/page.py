@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 from wristctl.escape import printable, printable_lines
 from wristctl.plotting.animation import animation
 from wristctl.plotting.page_tables import in_degrees, shown_tables
+from wristctl.plotting.spatial_view import spatial_view
 from wristctl.records.difference import difference
 from wristctl.records.lineage import Ancestor, ancestry
 from wristctl.records.manifest import CONFIG, Manifest, command_of, read_overview
@@ -162,6 +163,7 @@ def page(run: Run, manifest: Manifest, beside: Path | None = None) -> str:
         first=first,
         undrawn=[caption or name for name, caption in overview.captions.items() if name not in drawn_names],
         animation=animation(run),
+        space=spatial_view(run),
         lineage=lineage_picture(ancestry(run, state=manifest.state)),
         provenance=_provenance(manifest),
         files=[(output.path, output.bytes, output.sha256, not output.volatile) for output in manifest.outputs],

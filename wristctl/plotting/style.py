@@ -26,6 +26,8 @@ BLACK, GREY, SILVER, LIGHT = "#000000", "#7F7F7F", "#C8C8C8", "#D9D9D9"
 ORANGE, SKY, GREEN = "#E69F00", "#56B4E9", "#009E73"
 # Okabe and Ito's colours without the yellow, which is lost on white; black is kept for what is wanted.
 BLUE, VERMILLION, PURPLE = "#0072B2", "#D55E00", "#CC79A7"
+# Colours of tendons by their numbers, from the first.
+TENDON_COLOURS = (BLUE, VERMILLION, ORANGE, PURPLE, GREY, BLACK)
 # From Tol's muted scheme, for what Okabe and Ito's eight do not reach.
 INDIGO, WINE, OLIVE, FOREST, ROSE = "#332288", "#882255", "#999933", "#117733", "#CC6677"
 

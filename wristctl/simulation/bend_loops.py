@@ -49,7 +49,7 @@ def bends_of(
 ) -> Array:
     """Wanted bends with two derivatives, (2, 3, T), on the grid of `period` [s] over the horizon [s].
 
-    A reference in one plane bends toward the direction; of a recording both columns are taken.
+    A reference in one plane bends toward the direction; of a recording both planes are taken.
     """
     if reference.inverse == "network":
         fix = "inverse: closed-form, or loop.planes: 1"
@@ -59,7 +59,7 @@ def bends_of(
     if kind.planes == 2:
         return course_of(reference, kind, time)
     if reference.file:
-        return recorded_bends(reference, time)
+        return recorded_bends(reference, wrist, time)
     aim = DIRECTIONS[direction]
     references = np.zeros((2, 3, len(time)))
     facing = in_plane(wrist, direction)

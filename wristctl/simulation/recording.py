@@ -6,6 +6,7 @@ are the rate and the acceleration. With `noise_deg` a quintic smoothing spline p
 Curve and Surface Fitting with Splines, 1993). Time counts from the first sample; after the last the angle is held.
 """
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
@@ -15,13 +16,16 @@ import numpy as np
 from wristctl.arrays import Array
 from wristctl.config.loop import Reference
 from wristctl.config.section import Parameter
+from wristctl.config.wrist import WristParameters
 from wristctl.errors import UserError, meant
 from wristctl.records.log_converters import read_log
 from wristctl.records.open_log import ANGLE, SYNONYMS, OpenLog
-from wristctl.simulation.reference import ReferenceKind
+from wristctl.simulation.reference import TIP_TOLERANCE, ReferenceKind, beyond_reach
 from wristctl.wrist.kinematics import exact_arc
+from wristctl.wrist.spatial.spatial_kinematics import exact_bend
 
 TIP = ("tip_x", "tip_y")
+SPATIAL_TIP = (*TIP, "tip_z")
 _EXAMPLE = "time [s],angle [deg]"
 _FEWEST = 4
 # Number of its usual steps that a recording's time may skip.
@@ -144,18 +148,22 @@ def _splined(time: Array, samples: Array, noise: float, times: Array) -> Array:
     return np.stack([smooth(times), smooth.derivative(1)(times), smooth.derivative(2)(times)])
 
 
-def recorded_bends(reference: Reference, time: Array) -> Array:
+def recorded_bends(reference: Reference, wrist: WristParameters, time: Array) -> Array:
     """Bends of a recording's two planes with two derivatives, (2, 3, T) [rad], at times (T,) [s].
 
-    Its columns are bends toward ulnar and flexion, or inclination and orientation. Raises UserError where it has one
-    alone.
+    Its columns are bends toward ulnar and flexion, inclination and orientation, or all three of the tip, which stand
+    for the bend of the one arc that ends there. Raises UserError where it has one plane alone, and with the line for a
+    tip where no arc of the wrist ends.
     """
     file = Path(reference.file or "")
     log = read_log(file, reference.columns or "", "recording", others=True)
     log.whole("time", _EXAMPLE)
-    bends = log.bends()
-    if bends is None or not ({"bend_y", "bend_z"} <= log.columns.keys() or "orientation" in log.columns):
-        fix = "a header such as time [s],bend_y [deg],bend_z [deg], or loop.planes: 1"
+    bends = log.bends() if {"bend_y", "bend_z"} <= log.columns.keys() or "orientation" in log.columns else None
+    if (bends is None or reference.column == "tip") and all(name in log.columns for name in SPATIAL_TIP):
+        log = log.only(np.asarray(np.isfinite([log.columns[name] for name in SPATIAL_TIP]).all(axis=0)))
+        bends = _bends_of_tips(log, wrist)
+    elif bends is None or reference.column == "tip":
+        fix = "a header such as time [s],bend_y [deg],bend_z [deg] or time [s],x [mm],y [mm],z [mm], or loop.planes: 1"
         raise UserError("no bends in two planes", str(file), fix)
     whole = np.asarray(np.isfinite(bends).all(axis=1))
     log, bends = log.only(whole), bends[whole]
@@ -167,6 +175,27 @@ def recorded_bends(reference: Reference, time: Array) -> Array:
     course = np.stack([_splined(since, plane, noise, within) for plane in reference.value("scale") * bends.T])
     course[:, 1:, (time < 0.0) | (time > since[-1] + 1e-12)] = 0.0
     return course
+
+
+def _bends_of_tips(log: OpenLog, wrist: WristParameters) -> Array:
+    """Bends (T, 2) [rad] of arcs of the wrist that end at a log's tips. Raises UserError for a tip where none ends."""
+    tips = np.column_stack([log.columns[name] for name in SPATIAL_TIP])
+    bends, length = exact_bend(tips)
+    size, across = np.hypot(*bends.T), np.hypot(tips[:, 1], tips[:, 2])
+    off = np.abs(length - wrist.length) * np.abs(np.sinc(size / (2.0 * np.pi)))  # along the chord: no less than it is
+    sound = (size <= np.deg2rad(wrist.range_deg)) & (off <= TIP_TOLERANCE * wrist.length)
+    for sample in np.flatnonzero(~sound):
+        if (missed := beyond_reach((float(tips[sample, 0]), float(across[sample])), wrist)) is not None:
+            why, (x, r) = missed
+            toward = tips[sample, 1:] / across[sample] if across[sample] else np.array([1.0, 0.0])
+            nearest, there = (_millimetres(point) for point in ((x, *(r * toward)), tips[sample]))
+            fix = f"the nearest tip within reach, {nearest}; x is along the straight wrist, from its first disc"
+            raise UserError(f"tip {there} {why}", log.at(int(sample)), fix)
+    return bends
+
+
+def _millimetres(tip: Iterable[float]) -> str:
+    return f"({', '.join(f'{1e3 * value + 0.0:.2f}' for value in tip)}) mm"
 
 
 def _rest(reference: Reference, begin: float, horizon: float) -> float:

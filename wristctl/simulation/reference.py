@@ -52,21 +52,28 @@ def _angle_target(degrees: float, where: str, wrist: WristParameters) -> tuple[f
 
 
 def _tip_target(tip: tuple[float, float], where: str, wrist: WristParameters) -> tuple[float, float]:
-    angle, length = _arc_to(tip)
-    bent = abs(angle) > np.deg2rad(wrist.range_deg) or not 0.0 < length < np.inf
-    nearest = _nearest(tip, wrist.length, wrist.range_deg)
-    off = math.dist(tip, nearest)
-    if bent or off > TIP_TOLERANCE * wrist.length:
-        why = (
-            f"asks for {np.rad2deg(angle):.1f} deg, beyond the range of +-{wrist.range_deg} deg"
-            if bent
-            else f"is {1e3 * off:.3g} mm from where an arc of {1e3 * wrist.length:g} mm can end"
-        )
+    if (missed := beyond_reach(tip, wrist)) is not None:
+        why, nearest = missed
         fix = f"the nearest tip within reach, [{nearest[0]:.5f}, {nearest[1]:.5f}] m"
         if where != "reference.tip":
             fix += "; tip_ratios are multiples of the wrist's length"
         raise UserError(f"tip {tip} m {why}", where, fix)
-    return angle, length
+    return _arc_to(tip)
+
+
+def beyond_reach(tip: tuple[float, float], wrist: WristParameters) -> tuple[str, tuple[float, float]] | None:
+    """Why no arc of the wrist ends at a tip, and the nearest tip where one does; None where one ends there.
+
+    Tips are (along the base's tangent, across it) [m], in the plane of the bend.
+    """
+    angle, _ = _arc_to(tip)
+    nearest = _nearest(tip, wrist.length, wrist.range_deg)
+    off = math.dist(tip, nearest)
+    if abs(angle) > np.deg2rad(wrist.range_deg):
+        return f"asks for {np.rad2deg(angle):.1f} deg, beyond the range of +-{wrist.range_deg} deg", nearest
+    if off > TIP_TOLERANCE * wrist.length:
+        return f"is {1e3 * off:.3g} mm from where an arc of {1e3 * wrist.length:g} mm can end", nearest
+    return None
 
 
 @lru_cache(maxsize=64)

@@ -91,11 +91,12 @@ def simulate_in_two_planes(session: Session) -> SimulatedBends:
     """Simulate one closed loop in two planes and draw it."""
     from wristctl.commands.truth_table import truth_heading, truth_tables
     from wristctl.plotting.bend_figure import bend_motion
+    from wristctl.plotting.spatial_view import motion_in_space
     from wristctl.simulation.bend_course import BEND_METRICS, column_meanings
     from wristctl.simulation.bend_loops import simulate_bends
     from wristctl.simulation.closed_loop import scenario_of
     from wristctl.simulation.two_planes import reach_of_bends
-    from wristctl.simulation.worlds import Draws
+    from wristctl.simulation.worlds import Draws, plant_of
 
     study, findings = identified(session.study, "simulate", session.inputs), session.findings
     settings, wrist = study.simulate, study.wrist
@@ -118,7 +119,10 @@ def simulate_in_two_planes(session: Session) -> SimulatedBends:
         reach = reach_of_bends(wrist, repeated.layout)
         caption = "The plane of bends with what the tendons reach; errors of both planes and pulls over time"
         findings.overview.figure = "bends"
-        findings.figure("bends", bend_motion, course, reach, truth_heading(wrist, settings.loop), caption=caption)
+        world = truth_heading(wrist, settings.loop)
+        findings.figure("bends", bend_motion, course, reach, world, caption=caption)
+        caption = "The wrist in space where it is bent most, and the path of its tip, wanted and reached"
+        findings.figure("space", motion_in_space, course, plant_of(wrist, settings.loop.plant), world, caption=caption)
     short_of, advice = ("", []) if repeated.failure or repeated.arrives else _short_of(study, repeated)
     return SimulatedBends(session.study, findings, tables, repeated, short_of, advice)
 
@@ -155,5 +159,5 @@ def _answer(study: Study, repeated: RepeatedBends, reason: str, advice: Sequence
         f"{degrees(values['rmse'])} deg over both", f"at most {two(values['peak_tension'])} N in a tendon",
     ]  # fmt: skip
     sentence = outcome(study, scenario, repeated, "" if repeated.first.failed else joined(figures), reason)
-    more = "All metrics: `--all`; the path in the plane of bends: report.html of the run."
+    more = "All metrics: `--all`; the path in the plane of bends and the wrist in 3D: report.html of the run."
     return Answer(sentence, figures_table(repeated, _FIGURES), advice, more)

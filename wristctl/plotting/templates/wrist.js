@@ -4,10 +4,8 @@
   const { wrist, step, duration, courses } = JSON.parse(document.getElementById("courses").textContent);
   const UNIT = 1e-4, SPACE = "http://www.w3.org/2000/svg", GREY = "#7F7F7F", PLOT = 34;
   const length = 1e3 * wrist.length, rim = 1250 * wrist.radius, reach = length + 2e3 * wrist.hand, half = 0.72 * reach;
-  const play = document.getElementById("play"), slider = document.getElementById("instant");
-  const clock = document.getElementById("clock"), speed = document.getElementById("speed");
   const groups = document.getElementById("group"), place = document.getElementById("wrists");
-  let panels = [], instant = duration / 4, last = null;  // where a move shows, not all straight
+  let panels = [];
 
   const element = (name, attributes) => {
     const made = document.createElementNS(SPACE, name);
@@ -87,35 +85,15 @@
     };
   }
 
-  function show() {
-    for (const draw of panels) draw(instant);
-    slider.value = 1000 * instant / duration;
-    clock.textContent = `${instant.toFixed(2)} s`;
-  }
-  function tick(now) {
-    if (last === null) return;
-    // a page that was busy or hidden goes on where it was, rather than jumping to the end
-    instant += Math.min(Math.max(now - last, 0), 100) / 1e3 * Number(speed.value);
-    last = now;
-    if (instant >= duration) { instant = duration; stop(); }
-    show();
-    requestAnimationFrame(tick);
-  }
-  function stop() { last = null; play.textContent = "Play"; }
-  play.addEventListener("click", () => {
-    if (last !== null) return stop();
-    if (instant >= duration) instant = 0;
-    play.textContent = "Pause";
-    last = performance.now();
-    requestAnimationFrame(tick);
+  const draw = player(duration, duration / 4, instant => {  // where a move shows, not all straight
+    for (const drawn of panels) drawn(instant);
   });
-  slider.addEventListener("input", () => { instant = duration * slider.value / 1000; show(); });
   groups.addEventListener("change", fill);
 
   function fill() {
     place.replaceChildren();
     panels = courses.filter(course => course.group === groups.value).map(panel);
-    show();
+    draw();
   }
   for (const name of new Set(courses.map(course => course.group))) groups.append(new Option(name, name));
   groups.hidden = groups.options.length < 2;

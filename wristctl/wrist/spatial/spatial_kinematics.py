@@ -1,9 +1,10 @@
-"""Where a wrist that bends in two planes is, along its backbone; NumPy, any batch shape."""
+"""Where a wrist that bends in two planes is, along its backbone, and which arc ends at a tip; NumPy."""
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from wristctl.arrays import Array
+from wristctl.wrist.kinematics import exact_arc
 
 
 def spatial_tips(q: ArrayLike, length: ArrayLike) -> Array:
@@ -15,10 +16,7 @@ def spatial_tips(q: ArrayLike, length: ArrayLike) -> Array:
 
 
 def spatial_backbone(q: ArrayLike, length: ArrayLike, points: int) -> Array:
-    """Points (..., n points + 1, 3) [m] along the backbone from the base, so many to a segment; length as for tips.
-
-    A segment bent by u ends at l S(|u|) along its chord, which leans by u/2; S(x) = sin(x)/x.
-    """
+    """Points (..., n points + 1, 3) [m] along the backbone from the base, so many to a segment; length as for tips."""
     bends = np.asarray(q, float)
     bends = bends.reshape(*bends.shape[:-1], -1, 2)
     n = bends.shape[-2]
@@ -28,15 +26,47 @@ def spatial_backbone(q: ArrayLike, length: ArrayLike, points: int) -> Array:
     line = [place]
     for k in range(n):
         for i in range(1, points + 1):
-            u = bends[..., k, :] * (i / points)
-            size = np.hypot(u[..., 0], u[..., 1])
-            chord = lengths[k] * (i / points) * np.sinc(0.5 * size / np.pi)
-            across = 0.5 * np.sinc(0.5 * size / np.pi)[..., None] * u
-            along = np.concatenate([np.cos(0.5 * size)[..., None], across], axis=-1)
-            line.append(place + np.einsum("...ij,...j->...i", frame, chord[..., None] * along))
+            chord = _chord(bends[..., k, :] * (i / points), lengths[k] * (i / points))
+            line.append(place + np.einsum("...ij,...j->...i", frame, chord))
         place = line[-1]
         frame = frame @ turned_by(bends[..., k, :])
     return np.stack(line, axis=-2)
+
+
+def spatial_frames(q: ArrayLike, length: float, shares: ArrayLike) -> tuple[Array, Array]:
+    """Centres (m, 3) [m] and frames (m, 3, 3) of cross-sections of a wrist of equal segments.
+
+    Parameters
+    ----------
+    q
+        Coordinates (2n,) [rad].
+    length
+        Length of the whole wrist [m].
+    shares
+        Where the cross-sections are (m,), from 0 at the base to 1 at the tip.
+
+    Columns of a frame: along the backbone, and what points toward ulnar and toward flexion on the straight wrist.
+    """
+    bends, at = np.asarray(q, float).reshape(-1, 2), np.asarray(shares, float)
+    n = len(bends)
+    places, frames = np.zeros((n, 3)), np.broadcast_to(np.eye(3), (n, 3, 3)).copy()
+    for k in range(1, n):
+        places[k] = places[k - 1] + frames[k - 1] @ _chord(bends[k - 1], length / n)
+        frames[k] = frames[k - 1] @ turned_by(bends[k - 1])
+    segment = np.clip((at * n).astype(np.int64), 0, n - 1)
+    along = at * n - segment
+    bent = bends[segment] * along[:, None]
+    centres = places[segment] + np.einsum("mij,mj->mi", frames[segment], _chord(bent, length / n * along))
+    return centres, frames[segment] @ turned_by(bent)
+
+
+def _chord(u: Array, length: ArrayLike) -> Array:
+    """From the beginning of an arc to its end (..., 3) [m]: l S(|u|/2) long, S(x) = sin(x)/x, and leaning by u/2."""
+    half = 0.5 * np.hypot(u[..., 0], u[..., 1])
+    sinc = np.sinc(half / np.pi)
+    along = np.concatenate([np.cos(half)[..., None], (0.5 * sinc)[..., None] * u], axis=-1)
+    chord: Array = (length * sinc)[..., None] * along
+    return chord
 
 
 def turned_by(u: Array) -> Array:
@@ -48,3 +78,14 @@ def turned_by(u: Array) -> Array:
     w[..., 1, 0], w[..., 2, 0] = u[..., 0], u[..., 1]
     turned: Array = np.eye(3) + sinc[..., None, None] * w + (0.5 * half**2)[..., None, None] * (w @ w)
     return turned
+
+
+def exact_bend(tip: Array) -> tuple[Array, Array]:
+    """Bend (..., 2) [rad] and length (...) [m] of the one arc from the base to each tip (..., 3) [m].
+
+    It is `exact_arc` in the plane of the tip and the base's tangent.
+    """
+    across = np.hypot(tip[..., 1], tip[..., 2])
+    angle, length = exact_arc(np.stack([tip[..., 0], across], axis=-1))
+    toward = np.arctan2(tip[..., 2], tip[..., 1])
+    return angle[..., None] * np.stack([np.cos(toward), np.sin(toward)], axis=-1), length
