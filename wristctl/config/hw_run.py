@@ -1,8 +1,9 @@
 """Trials on hardware, real or emulated: what the controller drives and sees, and when it must stop."""
 
-from typing import Literal, Self
+from collections.abc import Mapping
+from typing import Any, Literal, Self
 
-from pydantic import model_validator
+from pydantic import ValidationInfo, field_validator, model_validator
 
 from wristctl.config.bench import BenchSettings
 from wristctl.config.camera import Device, Gates, Markers
@@ -107,6 +108,13 @@ class RigSettings(Section):
         """Settings whose largest tension is no more than the wrist bears."""
         tension = min(self.safety.tension, wrist.tension_limit)
         return self.model_copy(update={"safety": self.safety.model_copy(update={"tension": tension})})
+
+    @field_validator("actuator", "sensor", mode="before")
+    @classmethod
+    def _level_of_a_rig(cls, given: Any, field: ValidationInfo) -> Any:
+        """A rig's level, where a study gives other keys of the section alone."""
+        level = "tendon" if field.field_name == "actuator" else "camera"
+        return {"level": level, **given} if isinstance(given, Mapping) else given
 
     @model_validator(mode="after")
     def _spools_and_frames(self) -> Self:

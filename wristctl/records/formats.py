@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from wristctl.errors import UserError
+from wristctl.errors import OUT, Phrase, UserError
 from wristctl.records.files import replacing
 
 if TYPE_CHECKING:
@@ -87,8 +87,11 @@ def _check_header(archive: zipfile.ZipFile, entry: zipfile.ZipInfo) -> None:
         raise ValueError(f"{entry.filename} is no array, or less than its header says")
 
 
-def write_figure_for_paper(file: Path, figure: Figure, dpi: int = 300) -> None:
-    """A figure made without pyplot in the format that the file's name ends with, as large as it was laid out."""
+def write_figure_for_paper(file: Path, figure: Figure, dpi: int = 300, by: Phrase = OUT) -> None:
+    """A figure made without pyplot in the format that the file's name ends with, as large as it was laid out.
+
+    `by` is the argument that names another place, where this one cannot be written.
+    """
     import matplotlib as mpl
 
     metadata: dict[str, dict[str, Any]] = {
@@ -97,7 +100,7 @@ def write_figure_for_paper(file: Path, figure: Figure, dpi: int = 300) -> None:
         ".png": {"Software": None},
     }
     fixed: Any = {"svg.hashsalt": file.stem, "agg.path.chunksize": 500, "pdf.fonttype": 42}
-    with mpl.rc_context(fixed), replacing(file) as temporary:
+    with mpl.rc_context(fixed), replacing(file, by) as temporary:
         figure.savefig(temporary, format=file.suffix[1:], dpi=dpi, metadata=metadata[file.suffix])
 
 

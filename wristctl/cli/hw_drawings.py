@@ -1,0 +1,52 @@
+"""`wristctl hw drawings`: the parts of a rig as drawings at true scale, and its spool for a 3D printer."""
+
+from pathlib import Path
+from typing import Annotated, Literal
+
+import typer
+
+from wristctl.cli.options import Debug
+from wristctl.errors import Argument, writing
+
+
+def drawings(
+    folder: Annotated[Path, typer.Argument(metavar="FOLDER", help="Where to write them.")] = Path("wrist-drawings"),
+    tendon_mm: Annotated[float, typer.Option("--tendon-mm", min=0.1, max=3.0, help="Diameter of the tendon.")] = 0.7,
+    shaft_mm: Annotated[
+        float, typer.Option("--shaft-mm", min=1.0, help="Diameter of the motors' shaft: 5 of most NEMA 17.")
+    ] = 6.35,
+    paper: Annotated[Literal["a4", "letter"], typer.Option("--paper", help="What the printer holds.")] = "a4",
+    config: Annotated[
+        list[Path] | None, typer.Option("--config", "-c", metavar="FILE", help="Study file of the rig.")
+    ] = None,
+    override: Annotated[
+        list[str] | None,
+        typer.Option("--set", metavar="KEY=VALUE", help="Override one: actuator.pulley_radius=0.01 [m]."),
+    ] = None,
+    debug: Debug = False,
+) -> None:
+    """Write spool, tendon clamp, wrist disc, marker flag and markers as SVG at true scale; the spool as STL too.
+
+    All of them follow from the settings of hw-run and the wrist. Each page has a ruler to check the print.
+    """
+    from wristctl.commands.calibrate.part_drawings import part_pages
+    from wristctl.commands.calibrate.print_sheet import marker_page
+    from wristctl.records.files import replacing
+    from wristctl.records.formats import write_figure_for_paper
+    from wristctl.study_files.load import load_study
+    from wristctl.trial.spool_part import SpoolPart, write_stl
+
+    study = load_study(config or (), override or (), "hw-run")
+    settings = study.hw_run
+    spool = SpoolPart.of(settings, tendon_mm, shaft_mm)
+    pages = {**part_pages(settings, study.wrist, spool, paper), "markers": marker_page(paper, settings.markers)}
+    place = Argument("folder", metavar="FOLDER", positional=True)
+    with writing(folder, place):
+        folder.mkdir(parents=True, exist_ok=True)
+    for name, page in pages.items():
+        write_figure_for_paper(folder / f"{name}.svg", page, by=place)
+        print(folder / f"{name}.svg")
+    with replacing(folder / "spool.stl", place) as temporary:
+        write_stl(temporary, spool.mesh(), f"wristctl spool, pulley radius {spool.pulley_radius:g} mm")
+    print(folder / "spool.stl")
+    typer.echo("print at 100 % (no 'fit to page'), then measure the rulers", err=True)
