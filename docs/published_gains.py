@@ -1,9 +1,9 @@
 """Ship the gains that a study published: `python docs/published_gains.py RUN` writes them and docs/gains.md.
 
-RUN is of `wristctl study experiments/shipped_gains.yaml --executor processes`. Families that it has not are left as
-they were, each with the run that it is from. Where controllers have changed since, RUN is of `wristctl compare` with
-the shipped gains over worlds of a family: errors and lost worlds are then that run's, the gains stay. Without RUN the
-page alone is written, from what is shipped.
+RUN is of `wristctl study experiments/fair_study.yaml --budget full --executor processes`. Families that it has not are
+left as they were, each with the run that it is from. Where controllers have changed since, RUN is of `wristctl compare`
+with the shipped gains over worlds of a family: errors and lost worlds are then that run's, the gains stay. Without RUN
+the page alone is written, from what is shipped.
 """
 
 from __future__ import annotations
@@ -68,7 +68,7 @@ def page(content: dict[str, Any]) -> str:
         "worlds, and over tunings where a study is named alone; beside it that of the best and of the worst tuning, as",
         "the study found them. Lost are worlds where the gains fail, swing or chatter; on gains that are shown to lose",
         "more than one in a hundred nobody should rely. Outside a family's conditions, and with such gains, a command",
-        "warns. The searches were short (experiments/shipped_gains.yaml): a longer one may find less error.",
+        "warns. How the controllers of a family compare: [study](study.md).",
     ]
     for name, of_family in content.items():
         lines += ["", f"## {name}", "", *_family(name, of_family)]

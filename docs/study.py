@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import json
 import math
+import re
 import shlex
 import shutil
 import sys
@@ -16,36 +17,40 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from wristctl.config.families import Family
 from wristctl.plotting.style import in_words
 from wristctl.records import Run
 
 HERE = Path(__file__).parent
 FIGURES = {"laws": "RMSE of every controller on every rig", "terms": "What each term of a controller buys"}
-RIGS = {
-    "camera": "stepper motors, elastic tendons with friction, a camera of 60 Hz, 200 Hz",
-    "uneven": "the same, the wrist being a chain of uneven hinges",
-    "ideal": "torques as commanded, angles as they are, 1 kHz",
-    "steps": "jumps instead of smooth motions, on the rig of `camera`",
-}
-"""Families of worlds in the order of the page, and what they are."""
 BASELINE = "feedforward/default"
 PAPER = ("smc/tuned", "smc/printed", "smc/exchanged", "pid/printed")
 
-_ABOUT = """RMSE is the geometric mean over 250 worlds that no search saw, each a wrist and a rig drawn anew. As
-good are controllers that paired differences do not tell from the lowest RMSE, at 95 %; to run is the one of them that
-moves the tendons least. Do not use what is shown to fail or swing in more than 1 % of the worlds. Shipped gains:
-[gains](gains.md). For a wrist of your own: [recommend](recommend.md).""".splitlines()
+_ABOUT = """RMSE is the geometric mean over {worlds} worlds that no search saw, each a wrist and a rig drawn anew, and
+over {tunings} tunings of each controller. As good are controllers that paired differences do not tell from the lowest
+RMSE, at 95 %; to run is the one of them that moves the tendons least. Do not use what is shown to fail or swing in
+more than 1 % of the worlds. Their gains are shipped: `--gains tuned:camera`, [gains](gains.md). For a wrist of your
+own: [recommend](recommend.md)."""
+_SURE = re.compile(r"How sure: .*?(?=\s+Every controller: )", re.DOTALL)
 
 Row = Mapping[Any, Any]
 
 
 @dataclass(frozen=True)
 class Study:
-    """What the page shows of a run: rankings by family, best first, values of terms, and orders tuned otherwise."""
+    """What the page shows of a run.
+
+    Rankings by family, best first, what the families are, values of terms, orders tuned otherwise, how sure the answer
+    is in words, and the numbers of worlds and of tunings.
+    """
 
     rankings: Mapping[str, Sequence[Row]]
+    about: Mapping[str, str]
     terms: Sequence[Row]
     sensitivity: Sequence[Row]
+    sure: str
+    worlds: int
+    tunings: int
 
 
 def group(row: Row) -> int | None:
@@ -59,13 +64,16 @@ def first_group(rows: Sequence[Row]) -> list[Row]:
 
 
 def sentence(rankings: Mapping[str, Sequence[Row]]) -> str:
-    """Which controller to run on which rig."""
-    best = {name: first_group(rows)[0] for name, rows in rankings.items()}
+    """Which controller to run on which rig; none where all must not be used."""
     of: dict[str, list[str]] = {}
-    for name, row in best.items():
-        of.setdefault(row["row"], []).append(f"{name} (RMSE {_deg(row['rmse'])} deg)")
-    parts = [f"**{label}** ({_words(label)}) on {', '.join(rigs)}" for label, rigs in of.items()]
-    return "\n".join(textwrap.wrap(f"Run {'; run '.join(parts)}.", 120))
+    for name, rows in rankings.items():
+        for row in first_group(rows)[:1]:
+            of.setdefault(row["row"], []).append(f"{name} (RMSE {_deg(row['rmse'])} deg)")
+    parts = [f"run **{label}** ({_words(label)}) on {', '.join(rigs)}" for label, rigs in of.items()]
+    if none := [name for name, rows in rankings.items() if not first_group(rows)]:
+        parts.append(f"none of these can be relied on on {', '.join(none)}")
+    text = "; ".join(parts)
+    return "\n".join(textwrap.wrap(f"{text[:1].upper()}{text[1:]}.", 120))
 
 
 def decision(rankings: Mapping[str, Sequence[Row]]) -> list[str]:
@@ -75,10 +83,13 @@ def decision(rankings: Mapping[str, Sequence[Row]]) -> list[str]:
         "| --- | --- | --- | --- | --- | --- | --- |",
     ]
     for name, rows in rankings.items():
+        lost = sum(group(row) is None for row in rows)
+        if not first_group(rows):
+            lines.append(f"| {name} | none | - | - | - | - | {lost} of {len(rows)} |")
+            continue
         best, *ties = first_group(rows)
         following = [row for row in rows if group(row) == 2]
         after = min(following, key=lambda row: float(row["rmse"])) if following else None
-        lost = sum(group(row) is None for row in rows)
         same = ", ".join(_short(row["row"]) for row in ties[:3]) + (f", {len(ties) - 3} more" if len(ties) > 3 else "")
         then = f"{_short(after['row'])} {_deg(after['rmse'])}" if after else "-"
         lines.append(
@@ -105,10 +116,8 @@ def of_the_paper(rankings: Mapping[str, Sequence[Row]]) -> list[str]:
         cells = []
         for rows in rankings.values():
             row = next(row for row in rows if row["row"] == label)
-            ratio = f"{row['rmse'] / first_group(rows)[0]['rmse']:.3g}"
-            cells.append(
-                ratio if group(row) else f"do not use ({100.0 * (row['failures'] + row['swings']):.3g} % lost)"
-            )
+            lost = f"do not use ({100.0 * (row['failures'] + row['swings']):.3g} % lost)"
+            cells.append(f"{row['rmse'] / first_group(rows)[0]['rmse']:.3g}" if group(row) else lost)
         lines.append(f"| {label} | {' | '.join(cells)} |")
     return lines
 
@@ -162,12 +171,14 @@ def sensitivity(rows: Sequence[Row]) -> list[str]:
 
 def page(study: Study, made: str) -> str:
     """The page: answer and tables; `made` is the paragraph on the run."""
-    rankings = {name: study.rankings[name] for name in RIGS if name in study.rankings}
+    rankings = study.rankings
+    about = _ABOUT.format(worlds=study.worlds, tunings=study.tunings)
     lines = [
         "# Which controller for which rig, tuned at equal budget", "", sentence(rankings), "",
         *decision(rankings), "",
-        *(f"- **{name}**: {about}" for name, about in RIGS.items() if name in rankings), "",
-        *_ABOUT, "",
+        *(f"- **{name}**: {about}" for name, about in study.about.items()), "",
+        study.sure, "",
+        about, "",
         "## The paper's controllers", "", "RMSE over that of the controller to run:", "",
         *of_the_paper(rankings), "",
         "## What a term buys", "",
@@ -207,18 +218,32 @@ def _deg(value: float) -> str:
     return f"{math.degrees(value):.3g}"
 
 
+def named(families: Mapping[str, Family]) -> dict[str, str]:
+    """What the rankings that families may have are of: the family's motions, and its jumps beside smooth ones."""
+    return {
+        name: about
+        for family, content in families.items()
+        for name, about in ((family, content.about), (f"{family}, steps", f"{content.about}; its jumps alone"))
+    }
+
+
 def main() -> None:
     """Write the page and its pictures."""
     run = Run(Path(sys.argv[1]))
     manifest = json.loads((run.path / "run.json").read_text(encoding="utf-8"))
     for name in FIGURES:
         shutil.copyfile(run.path / "figures" / f"{name}.png", HERE / "images" / f"study-{name}.png")
-    names = [file.stem.removeprefix("ranking-") for file in (run.path / "data").glob("ranking-*.csv")]
-    study = Study(
-        {name: run.data(f"ranking-{name}").to_dict("records") for name in names},
-        run.data("terms").to_dict("records"),
-        run.data("sensitivity").to_dict("records"),
-    )
+    settings = run.config.study
+    budget = settings.budgets[settings.budget]
+    terms = run.data("terms").to_dict("records")
+    families = {name: run.config.families[name] for name in settings.families}
+    files = {name: f"ranking-{name.replace(', ', '-')}" for name in named(families)}
+    files = {name: file for name, file in files.items() if (run.path / "data" / f"{file}.csv").exists()}
+    about = {name: told for name, told in named(families).items() if name in files}
+    (sure,) = _SURE.findall((run.path / "README.md").read_text(encoding="utf-8"))
+    rankings = {name: run.data(file).to_dict("records") for name, file in files.items()}
+    otherwise = run.data("sensitivity").to_dict("records")
+    study = Study(rankings, about, terms, otherwise, sure, budget.worlds, budget.tunings)
     command = shlex.join(["wristctl", *manifest["argv"][1:]])
     minutes = manifest["timing"]["wall_s"] / 60.0
     made = "\n".join(

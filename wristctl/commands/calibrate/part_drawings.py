@@ -91,13 +91,9 @@ def _dimension_spool(axes: Axes, spool: SpoolPart, left: float, middle: float, s
         _upright(axes, left - 8.0 - 12.0 * number, middle, 0.5 * scale * diameter, f"{name} \u00d8{diameter:.4g}")
     end = middle + scale * spool.pulley_radius
     axes.plot((groove + 0.5 * scale * spool.width,) * 2, (middle, end), **_THIN)
-    text = {"rotation": 90, "ha": "right", "va": "center", "fontsize": 7.0, "color": BLUE}
-    axes.text(
-        groove + 0.5 * scale * spool.width - 0.6,
-        middle + 0.12 * scale * spool.bore,
-        f"r {spool.pulley_radius:g}",
-        **text,
-    )
+    at, above = groove + 0.5 * scale * spool.width - 0.6, middle + 0.12 * scale * spool.bore
+    radius = f"r {spool.pulley_radius:g}"
+    axes.text(at, above, radius, rotation=90, ha="right", va="center", fontsize=7.0, color=BLUE)
 
 
 def _clamp_page(settings: RigSettings, wrist: WristParameters, tendon: float, paper: Paper) -> Figure:

@@ -54,8 +54,8 @@ def spatial_frames(q: ArrayLike, length: float, shares: ArrayLike) -> tuple[Arra
         places[k] = places[k - 1] + frames[k - 1] @ _chord(bends[k - 1], length / n)
         frames[k] = frames[k - 1] @ turned_by(bends[k - 1])
     segment = np.clip((at * n).astype(np.int64), 0, n - 1)
-    along = at * n - segment
-    bent = bends[segment] * along[:, None]
+    along: Array = at * n - segment
+    bent: Array = bends[segment] * along[:, None]
     centres = places[segment] + np.einsum("mij,mj->mi", frames[segment], _chord(bent, length / n * along))
     return centres, frames[segment] @ turned_by(bent)
 
@@ -65,7 +65,7 @@ def _chord(u: Array, length: ArrayLike) -> Array:
     half = 0.5 * np.hypot(u[..., 0], u[..., 1])
     sinc = np.sinc(half / np.pi)
     along = np.concatenate([np.cos(half)[..., None], (0.5 * sinc)[..., None] * u], axis=-1)
-    chord: Array = (length * sinc)[..., None] * along
+    chord: Array = (np.asarray(length) * sinc)[..., None] * along
     return chord
 
 
