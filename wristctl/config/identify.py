@@ -26,6 +26,10 @@ class IdentifySettings(Section):
     runs: tuple[str, ...] = choice((), "hw-run runs: paths, ids or latest:hw-run; or open logs (docs/open-log.md)")
     logs: tuple[str, ...] = given_file("open logs (docs/open-log.md)", ())
     columns: str | None = columns_of_file()
+    model: Literal["arcs", "wrist"] = choice(
+        "arcs",
+        "what logs are of: any robot, as arcs without weight; or the study's wrist, in two planes",
+    )
     fix: Fixed = Fixed()
     segments: int = choice(4, "constant-curvature segments of the model", "as simulated", ge=1, le=8)
     step: float = quantity(1e-3, "s", "integration step", "as simulated", gt=0, le=5e-3)

@@ -1,6 +1,6 @@
 """Nonlinear least squares of the forward model's angle against the marker's, at the times of the frames."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import cached_property
@@ -15,7 +15,7 @@ from wristctl.config.identify import IdentifySettings
 from wristctl.config.plant import Actuator
 from wristctl.identification.forward import SupposedWrist, angles
 from wristctl.identification.measured_trials import MeasuredTrial
-from wristctl.identification.unknowns import NOT_NEGATIVE, SIMULATED, UNKNOWNS, tendons_of_values
+from wristctl.identification.unknowns import NOT_NEGATIVE, SIMULATED, UNKNOWNS, Unknown, tendons_of_values
 from wristctl.processes import cores
 
 # Steps of the finite differences, in parameters and in spools; forward ones are good to about 1e-4 of themselves.
@@ -58,6 +58,16 @@ class Problem:
     actuator: Actuator
     """As believed: what of the tendons is not found."""
 
+    @property
+    def unknowns(self) -> Mapping[str, Unknown]:
+        """Parameters of the model, found or held, by name."""
+        return UNKNOWNS
+
+    @property
+    def simulated(self) -> Collection[str]:
+        """Parameters on which a simulated course depends."""
+        return SIMULATED
+
     @cached_property
     def free(self) -> tuple[str, ...]:
         """The parameters to find; how the planes differ only where there are trials of both."""
@@ -69,15 +79,15 @@ class Problem:
     def coordinates(self) -> dict[Coordinate, int]:
         """Index of every coordinate of the search: free parameters, zeros, spools."""
         free = [Coordinate(name) for name in self.free]
-        zeros = [_zero(trial) for trial in self.trials]
-        spools = [_spool(trial, tendon) for trial in self.trials for tendon in trial.tendons]
+        zeros = [zero for trial in self.trials for zero in self.zeros(trial)]
+        spools = [spool_zero(trial, tendon) for trial in self.trials for tendon in trial.tendons]
         return {coordinate: index for index, coordinate in enumerate(dict.fromkeys([*free, *zeros, *spools]))}
 
     def begin(self) -> Array:
         """The coordinates at the start; at an edge the search would stay there."""
         x = np.zeros(len(self.coordinates))
         for index, name in enumerate(self.free):
-            x[index] = UNKNOWNS[name].coordinate(self.start[name], self.start[name])
+            x[index] = self.unknowns[name].coordinate(self.start[name], self.start[name])
             if name in NOT_NEGATIVE:
                 x[index] = max(x[index], _OFF_THE_EDGE)
         return x
@@ -85,7 +95,7 @@ class Problem:
     def bounds(self) -> tuple[Array, Array]:
         """Least and largest coordinates."""
         widest = np.array([_WIDEST[coordinate.kind] for coordinate in self.coordinates if coordinate.kind in _WIDEST])
-        low, high = np.array([UNKNOWNS[name].bounds() for name in self.free]).reshape(-1, 2).T
+        low, high = np.array([self.unknowns[name].bounds() for name in self.free]).reshape(-1, 2).T
         return np.concatenate([low, -widest]), np.concatenate([high, widest])
 
     def prior(self) -> Array:
@@ -102,8 +112,16 @@ class Problem:
         """Every parameter at coordinates x, found or held."""
         held = {**self.start, **self.settings.fixed}
         for name, value in zip(self.free, x, strict=False):
-            held[name] = UNKNOWNS[name].value(float(value), self.start[name])
-        return {name: held[name] for name in UNKNOWNS}
+            held[name] = self.unknowns[name].value(float(value), self.start[name])
+        return {name: held[name] for name in self.unknowns}
+
+    def zeros(self, trial: MeasuredTrial) -> dict[Coordinate, Array]:
+        """The camera's zeros that a trial's angles (F,) hold, each with its share in every angle."""
+        return {Coordinate(ZERO, trial.run, trial.plane): np.ones(len(trial.angle))}
+
+    def courses(self, trial: MeasuredTrial, points: Sequence[Array]) -> Array:
+        """What a trial's wrist does at each of some coordinates: (count, T), as `trial.shown` takes it."""
+        return self.simulate(trial, [self.candidate(trial, x) for x in points])
 
     def candidate(self, trial: MeasuredTrial, x: Array) -> SupposedWrist:
         """The trial's wrist and tendons at coordinates x."""
@@ -111,7 +129,7 @@ class Problem:
         wrist_values = {name: values[name] for name in ("stiffness", "damping", "tendon_radius")}
         if trial.plane == "flexion":
             wrist_values["stiffness"] *= values["flexion_ratio"]
-        one, two, three, four = (float(x[self.coordinates[_spool(trial, tendon)]]) for tendon in trial.tendons)
+        one, two, three, four = (float(x[self.coordinates[spool_zero(trial, tendon)]]) for tendon in trial.tendons)
         tendons = self.actuator.model_copy(update=tendons_of_values(values))
         return SupposedWrist(trial.wrist.model_copy(update=wrist_values), tendons, (one, two, three, four))
 
@@ -124,11 +142,8 @@ class Problem:
 _WIDEST = {ZERO: 0.2, SPOOL: 2e-3}
 
 
-def _zero(trial: MeasuredTrial) -> Coordinate:
-    return Coordinate(ZERO, trial.run, trial.plane)
-
-
-def _spool(trial: MeasuredTrial, tendon: int) -> Coordinate:
+def spool_zero(trial: MeasuredTrial, tendon: int) -> Coordinate:
+    """What a tendon's spool has reeled in unknown, in a trial's run."""
     return Coordinate(SPOOL, trial.run, tendon)
 
 
@@ -147,14 +162,14 @@ def linearise(problem: Problem, x: Array) -> Linearisation:
     coordinates, delay = problem.coordinates, problem.values(x)["delay"]
 
     def one(trial: MeasuredTrial) -> tuple[Array, Array]:
-        moved = [Coordinate(name) for name in problem.free if name in SIMULATED]
-        moved += [_spool(trial, tendon) for tendon in trial.tendons]
+        moved = [Coordinate(name) for name in problem.free if name in problem.simulated]
+        moved += [spool_zero(trial, tendon) for tendon in trial.tendons]
         nudges = [_NUDGE_M if coordinate.kind == SPOOL else _NUDGE for coordinate in moved]
         near = [
             x + nudge * (np.arange(len(x)) == coordinates[coordinate])
             for coordinate, nudge in zip(moved, nudges, strict=True)
         ]
-        course = problem.simulate(trial, [problem.candidate(trial, point) for point in (x, *near)])
+        course = problem.courses(trial, (x, *near))
         expected, *nudged = (trial.shown(angle, delay) for angle in course)
         slopes = np.zeros((len(expected), len(x)))
         for coordinate, nudge, nudged_angle in zip(moved, nudges, nudged, strict=True):
@@ -163,8 +178,10 @@ def linearise(problem: Problem, x: Array) -> Linearisation:
             h = problem.settings.step
             early, late = (trial.shown(course[0], delay - shift) for shift in (-h, h))
             slopes[:, coordinates[Coordinate("delay")]] = (early - late) / (2.0 * h)
-        slopes[:, coordinates[_zero(trial)]] = 1.0
-        return expected + x[coordinates[_zero(trial)]], slopes
+        for zero, share in problem.zeros(trial).items():
+            slopes[:, coordinates[zero]] = share
+            expected = expected + share * x[coordinates[zero]]
+        return expected, slopes
 
     with ThreadPoolExecutor(cores()) as pool:
         columns = list(pool.map(one, problem.trials))

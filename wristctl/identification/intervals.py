@@ -15,7 +15,7 @@ from threadpoolctl import threadpool_limits
 
 from wristctl.arrays import Array
 from wristctl.identification.fit import Coordinate, Fit, Problem
-from wristctl.identification.unknowns import NOT_NEGATIVE, UNKNOWNS
+from wristctl.identification.unknowns import NOT_NEGATIVE
 
 NORMAL_95 = 1.959964
 # Autocorrelation of neighbouring residuals beyond which the model is said to miss something.
@@ -166,6 +166,6 @@ def long_run(scores: Array, lags: int) -> Array:
 def interval(fit: Fit, known: Knowledge, name: str) -> tuple[float, float]:
     """The 95 % interval of a free parameter in its own unit; friction's end at 0."""
     index = fit.problem.free.index(name)
-    half, start, unknown = known.half_widths[index], fit.problem.start[name], UNKNOWNS[name]
+    half, start, unknown = known.half_widths[index], fit.problem.start[name], fit.problem.unknowns[name]
     low, high = (unknown.value(fit.x[index] + side * min(half, 50.0), start) for side in (-1.0, 1.0))
     return (max(low, 0.0) if name in NOT_NEGATIVE else low), high

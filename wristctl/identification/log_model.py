@@ -32,7 +32,7 @@ def robot_of_log(log: OpenLog, wrist: WristParameters, radius_error: float) -> A
     Two tendons alone are antagonists in one plane; 1, 2, 4 and 5 are those of the square wrist; as many as the wrist
     has are those of `wrist.tendons`; else they are evenly around it. Raises UserError without spools or motion.
     """
-    numbers = _tendons(log)
+    numbers = spools_of_log(log)
     if len(numbers) < 2:
         raise UserError(f"{len(numbers)} spools", log.header or str(log.file), "columns spool_1 [mm], spool_2 [mm]")
     layout = TendonLayout.of(wrist)
@@ -67,7 +67,7 @@ def robot_of_log(log: OpenLog, wrist: WristParameters, radius_error: float) -> A
     )  # fmt: skip
 
 
-def _tendons(log: OpenLog) -> list[int]:
+def spools_of_log(log: OpenLog) -> list[int]:
     """Numbers of the tendons whose spools are in a log, sorted."""
     return sorted(int(name.removeprefix("spool_")) for name in log.columns if name.startswith("spool_"))
 
@@ -88,11 +88,11 @@ def recordings_of_logs(logs: Sequence[OpenLog], robot: ArcRobot) -> list[ArcReco
     Raises UserError for a trial with too few samples or for logs of different robots.
     """
     trials = [(trial, name) for log in logs for name, trial in log.trials().items()]
-    numbers = _tendons(logs[0])
+    numbers = spools_of_log(logs[0])
     recordings = []
     for log, name in trials:
-        if _tendons(log) != numbers:
-            problem = f"tendons {', '.join(map(str, _tendons(log)))}, elsewhere {', '.join(map(str, numbers))}"
+        if spools_of_log(log) != numbers:
+            problem = f"tendons {', '.join(map(str, spools_of_log(log)))}, elsewhere {', '.join(map(str, numbers))}"
             raise UserError(problem, str(log.file), "logs of one robot")
         recordings.append(_recording(log, robot, numbers, len(trials), Path(log.file).stem, name))
     whole = len(recordings) >= _WHOLE

@@ -49,14 +49,18 @@ class MeasuredTrial:
         return DIRECTIONS[self.direction].plane
 
     @property
-    def tendons(self) -> tuple[int, int, int, int]:
+    def tendons(self) -> tuple[int, ...]:
         """The tendons in the order of `reeled`."""
         return tendons_of(self.plane)
 
     def shown(self, course: Array, delay: float) -> Array:
         """Angles that the frames (F,) show of a course (T,) on the grid, `delay` [s] before their time stamps."""
+        return self.seen(self.captured, course, delay)
+
+    def seen(self, captured: Array, course: Array, delay: float) -> Array:
+        """Angles that frames with these time stamps (F,) [s] show of a course (T,), `delay` [s] before them."""
         since = self.exposure * ((np.arange(_INSTANTS) + 0.5) / _INSTANTS - 0.5)
-        angle: Array = np.interp(self.captured - delay + since[:, None], self.time, course).mean(axis=0)
+        angle: Array = np.interp(captured - delay + since[:, None], self.time, course).mean(axis=0)
         return angle
 
     def faster(self, factor: float) -> MeasuredTrial:

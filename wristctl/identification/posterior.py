@@ -11,7 +11,7 @@ from wristctl.identification.intervals import Knowledge
 from wristctl.identification.unknowns import tendons_of_values
 
 FAMILY = "posterior"
-_OF_WRIST = ("stiffness", "flexion_ratio", "damping", "tendon_radius")
+_OF_WRIST = ("stiffness", "flexion_ratio", "stiffness_axis_deg", "damping", "tendon_radius")
 # Half the range of angles [deg] that every motion of the family is drawn from.
 _ANGLE = 30
 
@@ -63,7 +63,7 @@ def posterior_yaml(
         "    together:",
     ]  # fmt: skip
     for draw in draws:
-        row = {f"plant.{name}": draw[name] for name in _OF_WRIST}
+        row = {f"plant.{name}": draw[name] for name in _OF_WRIST if name in draw}
         row |= {f"plant.actuator.{name}": value for name, value in tendons_of_values(draw).items()}
         if "delay_frames" in camera and "frame_rate" in camera:
             late = camera["delay_frames"] + camera["frame_rate"] * (draw["delay"] - values["delay"])

@@ -1,13 +1,14 @@
 """Identifiable parameters and their coordinates: logarithms of what is positive, friction and delay as they are."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 from wristctl.config.loop import Loop
 from wristctl.config.plant import Actuator
 from wristctl.config.study import Study
-from wristctl.config.wrist import WristParameters
+from wristctl.config.wrist import TendonPlace, WristParameters
+from wristctl.simulation.bend_loops import planes_of
 from wristctl.study_files.strict_yaml import parse_yaml
 
 
@@ -82,12 +83,21 @@ NOT_NEGATIVE = ("friction", "sheath_friction")
 SIMULATED = tuple(name for name in UNKNOWNS if name != "delay")
 
 
-_WRIST = ("stiffness", "flexion_ratio", "damping", "tendon_radius")
+_WRIST = ("stiffness", "flexion_ratio", "stiffness_axis_deg", "damping", "tendon_radius")
 
 
-def identified_yaml(values: Mapping[str, float], camera: Mapping[str, float]) -> str:
-    """A study file: the wrist, and the actuator and sensor of `simulate`, with these parameters."""
-    lines = ["wrist:", *(f"  {name}: {values[name]!r}" for name in _WRIST), "simulate:", "  loop:"]
+def identified_yaml(
+    values: Mapping[str, float], camera: Mapping[str, float], places: Sequence[tuple[float, float]] = ()
+) -> str:
+    """A study file: the wrist, and the actuator and sensor of `simulate`, with these parameters.
+
+    `places` are directions [rad] and radii [m] of the tendons, where they are not those of `wrist.tendons`.
+    """
+    lines = ["wrist:", *(f"  {name}: {values[name]!r}" for name in _WRIST if name in values)]
+    if places:
+        lines.append("  tendons:")
+        lines += [f"    - {{angle_deg: {math.degrees(angle)!r}, radius: {radius!r}}}" for angle, radius in places]
+    lines += ["simulate:", "  loop:"]
     lines += [
         "    actuator:",
         "      level: tendon",
@@ -100,7 +110,7 @@ def identified_yaml(values: Mapping[str, float], camera: Mapping[str, float]) ->
 def with_identified(study: Study, command: str, text: str) -> Study:
     """The study with the values of an identified.yaml in its wrist and in every actuator and sensor of the command.
 
-    Their levels stay as they are.
+    Their levels stay as they are. Places of tendons, which no loop in one plane has, are for a loop in two.
     """
     mapping = parse_yaml(text, "identified.yaml").data
     loop = mapping["simulate"]["loop"]
@@ -116,7 +126,11 @@ def with_identified(study: Study, command: str, text: str) -> Study:
             changed[leaf] = {key: _known(part, parts) for key, part in value.items()}
         elif leaf in parts:
             changed[leaf] = value.model_copy(update=parts[leaf])
-    wrist = study.wrist.model_copy(update=mapping["wrist"])
+    found = dict(mapping["wrist"])
+    places = tuple(TendonPlace.model_validate(place) for place in found.pop("tendons", ()))
+    if places and command == "simulate" and planes_of(study.simulate.loop, study.simulate.reference) == 2:
+        found["tendons"] = places
+    wrist = study.wrist.model_copy(update=found)
     return study.model_copy(update={"wrist": wrist, name: settings.model_copy(update=changed)})
 
 

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from wristctl.commands.answer import Answer
 from wristctl.commands.identify.answer import found_answer, refused_answer
+from wristctl.commands.identify.bends import BendsTold, bends_plan, identify_bends
 from wristctl.commands.identify.logs import LogTold, identify_logs, log_plan
 from wristctl.commands.inputs import EarlierRun, Inputs, missing_run
 from wristctl.commands.printed_table import Table
@@ -89,22 +90,23 @@ def with_logs(study: Study) -> Study:
 def plan(study: Study, inputs: Inputs) -> str:
     """Say what will be found from which trials."""
     if study.identify.logs:
-        return log_plan(study, inputs)
+        return (bends_plan if study.identify.model == "wrist" else log_plan)(study, inputs)
     problem = _problem(study, inputs)
     poses = len({(trial.wrist.gravity, trial.wrist.hand_mass) for trial in problem.trials})
     frames = sum(len(trial.angle) for trial in problem.trials)
     return f"{', '.join(problem.free)} from {len(problem.trials)} trials, {frames} frames, {poses} poses or masses"
 
 
-def identify(session: Session) -> Identified | LogTold:
+def identify(session: Session) -> Identified | LogTold | BendsTold:
     """Find stiffness, damping, tendons and delay of a real wrist from logged trials, with 95 % intervals.
 
     Trials are those of hw-run runs, or of open logs (FILE.csv, docs/open-log.md) of wrists with two or more tendons in
     one plane or two: of these each parameter comes with its interval or is not told, and which of slack, friction and
-    creep the data want is found by predicting a part of them.
+    creep the data want is found by predicting a part of them. With `model: wrist` logs in two planes are of the study's
+    wrist: both stiffnesses, the axis of the springs, and the direction and gain of each tendon.
     """
     if session.study.identify.logs:
-        return identify_logs(session)
+        return identify_bends(session) if session.study.identify.model == "wrist" else identify_logs(session)
     import numpy as np
 
     from wristctl.commands.identify.figures import angles, correlations, residuals
@@ -216,4 +218,6 @@ def _camera(inputs: Inputs, fitted: Fit) -> dict[str, float]:
 
 
 _RUNS = EarlierRun("runs", kind="hw-run", optional=True)
-IDENTIFY: Procedure[Identified | LogTold] = Procedure("identify", plan, identify, (_RUNS,), completed=with_logs)
+IDENTIFY: Procedure[Identified | LogTold | BendsTold] = Procedure(
+    "identify", plan, identify, (_RUNS,), completed=with_logs
+)

@@ -5,6 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 from matplotlib.figure import Figure
 
+from wristctl.identification.bend_trials import PLANES, BendTrial
 from wristctl.identification.fit import Fit
 from wristctl.identification.intervals import Knowledge
 from wristctl.plotting.style import BLACK, BLUE, GREY, VERMILLION, figure, legend, legend_below, title
@@ -29,6 +30,31 @@ def angles(fit: Fit) -> Figure:
         right.axhline(0.0, color=BLACK, linewidth=0.8)
         right.set_ylim(-most, most)
         left.set_ylabel("angle [deg]")
+        title(left, text)
+    title(axes[0, 1], "difference [deg]")
+    for panel in axes[-1]:
+        panel.set_xlabel("time [s]")
+    legend_below(picture)
+    return picture
+
+
+def bends(fit: Fit) -> Figure:
+    """Readings of both bends and the model's [deg], and the difference, of up to four trials."""
+    count = len(fit.problem.trials)
+    chosen = np.unique(np.linspace(0, count - 1, min(count, _SHOWN // 2)).round().astype(int))
+    titles = _short([fit.problem.trials[index].label for index in chosen])
+    picture, axes = figure(len(chosen), 2, height=0.9 + 1.8 * len(chosen), sharex=True, width_ratios=(3, 2))
+    for (left, right), index, text in zip(axes, chosen, titles, strict=True):
+        trial, residual = fit.problem.trials[index], fit.residuals[index]
+        assert isinstance(trial, BendTrial)
+        for channel, (plane, color) in enumerate(zip(PLANES, (BLUE, VERMILLION), strict=True)):
+            own = trial.channel == channel
+            time, angle, less = trial.captured[own], np.degrees(trial.angle[own]), np.degrees(residual[own])
+            left.plot(time, angle, ".", color=GREY, markersize=2.5, label="" if channel else "measured")
+            left.plot(time, angle - less, color=color, linewidth=1.0, label=f"model, {plane}")
+            right.plot(time, less, ".", color=color, markersize=2.0)
+        right.axhline(0.0, color=BLACK, linewidth=0.8)
+        left.set_ylabel("bend [deg]")
         title(left, text)
     title(axes[0, 1], "difference [deg]")
     for panel in axes[-1]:

@@ -1,0 +1,51 @@
+"""`wristctl identify` on logs in two planes, and what `simulate` makes of its result."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tests.cli.conftest import Call
+from tests.identification.bend_rigs import drawn_rig, logs_of
+from wristctl.config.loop import Reference
+from wristctl.config.study import Study
+from wristctl.identification.unknowns import with_identified
+from wristctl.records import open_run
+from wristctl.records.open_log import write_log
+from wristctl.study_files.load import load_study
+from wristctl.wrist.tendon_layout import TendonLayout
+
+
+@pytest.mark.painted
+def test_logs_in_two_planes_tell_springs_and_tendons_in_a_run_of_their_own(call: Call, tmp_path: Path) -> None:
+    rng = np.random.default_rng(0)
+    rig = drawn_rig(rng)
+    logs = logs_of(rig, rng)
+    files = [tmp_path / log.file.name for log in logs]
+    for log, file in zip(logs, files, strict=True):
+        write_log(log, file)
+    options = ("--set", "model=wrist", "--set", "segments=2", "--set", "exposure=0.004")
+    code, out, err = call("identify", *map(str, files), *options)
+    assert code == 0, err
+    found = open_run(out.splitlines()[-1])
+    axis = found.metrics["stiffness_axis_deg"]
+    truth = rig.truth(axis["value"])
+    assert axis["value"] == pytest.approx(truth["stiffness_axis_deg"], abs=2.0)
+    for name in ("stiffness", "stiffness_across"):
+        assert found.metrics[name]["value"] == pytest.approx(truth[name], rel=0.02)
+    lines = [line for line in out.splitlines()[:-1] if not line.startswith("wristctl")]
+    assert "N m/rad toward" in " ".join(out.split()) and all(len(line) <= 100 for line in lines)
+    text = found.file("data/identified.yaml").read_text()
+    two = with_identified(Study(simulate={"reference": Reference(kind="circle")}), "simulate", text)  # type: ignore[arg-type]
+    places = TendonLayout.of(two.wrist).cross_section
+    assert places == pytest.approx(rig.layout.cross_section, abs=1e-4)
+    assert two.wrist.stiffness_axis_deg == axis["value"]
+    assert with_identified(Study(), "simulate", text).wrist.tendons == "four"
+    family = load_study([found.file("data/posterior.yaml")]).families["posterior"]
+    axes = [row["plant.stiffness_axis_deg"] for row in family.together]
+    assert len(axes) == 200 and np.std(axes) == pytest.approx(
+        (axis["interval"][1] - axis["interval"][0]) / 3.92, rel=0.3
+    )
+    assert call("runs", "verify", found.id)[0] == 0

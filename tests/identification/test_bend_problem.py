@@ -1,0 +1,149 @@
+"""The ellipse of springs, the plan of spools, and the log of a rehearsed bench in two planes."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from tests.identification.bend_rigs import KNOWN, LAYOUT, SETTINGS, TENDONS, drawn_rig, logs_of, spools
+from wristctl.config.identify import IdentifySettings
+from wristctl.config.wrist import TendonPlace
+from wristctl.errors import UserError
+from wristctl.identification.bend_problem import bend_problem, oblique_of, springs_of, told_of_bends
+from wristctl.identification.bend_rehearsal import Hold, RehearsedBends, planned_spools, rehearse_bends
+from wristctl.identification.bend_trials import bend_trials, places_of_log
+from wristctl.identification.fit import Fit
+from wristctl.identification.intervals import Knowledge
+from wristctl.identification.spatial_forward import SupposedBends, courses_of_bends
+from wristctl.records.log_converters import read_log
+from wristctl.records.open_log import write_log
+from wristctl.wrist.spatial.spatial_model import spatial_terms
+from wristctl.wrist.spatial.spatial_segments import ellipse, spatial_values
+
+
+@given(st.floats(0.1, 2.0), st.floats(0.3, 3.0), st.floats(-180.0, 180.0))
+def test_springs_are_the_same_by_their_axis_and_by_the_numbers_of_the_search(
+    stiffness: float, ratio: float, axis: float
+) -> None:
+    wrist = KNOWN.model_copy(update={"stiffness": stiffness, "flexion_ratio": ratio, "stiffness_axis_deg": axis})
+    again = springs_of(*oblique_of(wrist))
+    assert abs(again["stiffness_axis_deg"]) <= 45.0 + 1e-6
+    one, other = (
+        ellipse(values["stiffness"], values["stiffness"] * values["flexion_ratio"], math.radians(values["axis"]))
+        for values in (
+            {"stiffness": stiffness, "flexion_ratio": ratio, "axis": axis},
+            {**again, "axis": again["stiffness_axis_deg"]},
+        )
+    )
+    assert other == pytest.approx(one, rel=1e-9, abs=1e-12)
+
+
+def test_a_wrist_on_held_spools_comes_to_rest_where_its_tendons_hold_springs_and_weight() -> None:
+    wrist = KNOWN.model_copy(update={"flexion_ratio": 1.3, "stiffness_axis_deg": 25.0, "gravity_flexion": 3.0})
+    sliding = TENDONS.model_copy(update={"friction": 0.0})
+    reeled = np.tile([-2e-3, 1e-3, -1.5e-3, 6e-3], (1500, 1))
+    supposed = SupposedBends(wrist, sliding, LAYOUT.cross_section, (1e-4, 0.0, 0.0, -1e-4))
+    (course,) = courses_of_bends([supposed], reeled, 1e-3, 1)
+    bend, pulls = course[-1, :2], course[-1, 2:]
+    assert np.hypot(*bend) > 0.1 and pulls.min() == 0.0 and np.abs(course[-1] - course[-200]).max() < 1e-6
+    at_rest = spatial_terms(spatial_values(wrist, LAYOUT, 1, axis=math.radians(25.0)), bend, 0.0 * bend)
+    yy, yz, zz = ellipse(wrist.stiffness, 1.3 * wrist.stiffness, math.radians(25.0))
+    held = at_rest.bias + np.array([[yy, yz], [yz, zz]]) @ bend
+    assert pulls @ at_rest.moment_arms == pytest.approx(held, abs=1e-5)
+    stretch = np.array(supposed.taut) + reeled[-1] - (wrist.length - at_rest.lengths)
+    assert pulls == pytest.approx(2e4 * stretch.clip(0.0), abs=1e-3)
+
+
+def test_planned_spools_keep_to_what_motors_can_do() -> None:
+    counts = spools()
+    speed, acceleration = (np.abs(np.diff(counts, order, axis=0)).max() * 1e3**order for order in (1, 2))
+    assert (counts == np.rint(counts)).all() and speed < TENDONS.step_rate
+    smooth = np.diff(counts[::20], 2, axis=0) / 0.02**2  # without the rounding to whole steps
+    assert np.abs(smooth).max() < 1.1 * TENDONS.step_acceleration < acceleration
+    with pytest.raises(UserError, match="takes the motors"):
+        planned_spools(KNOWN, TENDONS, LAYOUT, [Hold(30.0, 0.0), Hold(30.0, 180.0)], hold=0.2)
+    with pytest.raises(UserError, match="out of the tendons' reach"):
+        planned_spools(KNOWN, TENDONS, LAYOUT, [Hold(45.0, 45.0, 25.0)])
+
+
+def test_a_rehearsed_log_is_read_back_as_it_was_written(tmp_path: Path) -> None:
+    rng = np.random.default_rng(0)
+    log = logs_of(drawn_rig(rng), rng, tension_noise=0.2)[0]
+    write_log(log, tmp_path / "hand.csv")
+    written, again = (bend_trials([one], KNOWN, 1e-3, 4e-3)[0] for one in (log, read_log(tmp_path / "hand.csv")))
+    assert written.wrist.hand_mass == again.wrist.hand_mass == pytest.approx(0.3)
+    assert again.angle == pytest.approx(written.angle) and (again.channel == written.channel).all()
+    bends = [written.angle[written.channel == plane] for plane in (0, 1)]
+    assert len(bends[0]) == len(bends[1]) == pytest.approx(0.95 * 60.0 * 9.6, rel=0.05)
+    assert max(np.degrees(np.abs(bend).max()) for bend in bends) > 20.0
+    # readings of tensions are weighed as bends are, of which quick moves look like noise
+    assert 1.0 < written.per_newton * 0.2 / math.radians(0.05) < 2.0
+
+
+def test_at_the_truth_nothing_but_noise_is_left_of_bends_and_tensions() -> None:
+    rng = np.random.default_rng(5)
+    rig = drawn_rig(rng)
+    bench = RehearsedBends(rig.wrist, rig.actuator, rig.layout, tension_noise=0.2, segments=2)
+    log = rehearse_bends(bench, spools(), TENDONS.step_length, rng)
+    (trial,) = bend_trials([log], KNOWN, 1e-3, bench.exposure)
+    problem = bend_problem([trial], places_of_log(log, KNOWN), KNOWN, TENDONS, SETTINGS)
+    mean, p, q = oblique_of(rig.wrist)
+    true = rig.truth(0.0) | {"stiffness": mean, "oblique_cos": p, "oblique_sin": q}
+    true |= {name: math.radians(value) for name, value in true.items() if name.startswith("direction")}
+    x = np.zeros(len(problem.coordinates))
+    for index, name in enumerate(problem.free):
+        x[index] = problem.unknowns[name].coordinate(true[name], problem.start[name])
+    left = trial.angle - trial.shown(problem.courses(trial, [x])[0], true["delay"])
+    for channel, noise in enumerate([math.radians(0.05)] * 2 + [0.2 * trial.per_newton] * 4):
+        spread = np.median(np.abs(left[trial.channel == channel])) / 0.6745
+        assert spread == pytest.approx(noise, rel=0.12)
+
+
+def test_a_log_of_another_wrist_or_of_one_plane_is_refused() -> None:
+    rng = np.random.default_rng(0)
+    log = logs_of(drawn_rig(rng), rng)[0]
+    three = KNOWN.model_copy(update={"tendons": "three"})
+    with pytest.raises(UserError, match="3 places"):
+        places_of_log(log, three)
+    twice = KNOWN.model_copy(update={"tendons": tuple(
+        TendonPlace(angle_deg=angle, multiplicity=2) for angle in (0.0, 90.0, 180.0, 270.0))})  # fmt: skip
+    with pytest.raises(UserError, match="several tendons"):
+        places_of_log(log, twice)
+    columns = {name: column for name, column in log.columns.items() if name != "bend_z"}
+    with pytest.raises(UserError, match="bend_z is not in the log"):
+        bend_trials([type(log)(log.file, "log", columns)], KNOWN, 1e-3)
+    trials = bend_trials([log], KNOWN, 1e-3)
+    held = IdentifySettings.model_validate({"fix": {"flexion_ratio": 1.0}})
+    with pytest.raises(UserError, match="flexion_ratio"):
+        bend_problem(trials, places_of_log(log, KNOWN), KNOWN, TENDONS, held)
+
+
+def test_what_the_readings_leave_open_is_not_told() -> None:
+    """Springs alike all around have no axis, and what was known beforehand is nothing that the readings told."""
+    rng = np.random.default_rng(0)
+    log = logs_of(drawn_rig(rng), rng)[0]
+    problem = bend_problem(bend_trials([log], KNOWN, 1e-3), places_of_log(log, KNOWN), KNOWN, TENDONS, SETTINGS)
+    x = problem.begin()
+    x[problem.free.index("oblique_cos")] = 1e-3
+    deviation = np.full(len(x), 2e-3)
+    deviation[problem.free.index("damping")] = 1.0
+    deviation[problem.free.index("gain_4")] = 0.95 * SETTINGS.radius_error
+    found = Fit(problem, x, 1e-3, [], [], 1)
+    told = told_of_bends(found, Knowledge(deviation, np.diag(deviation**-2.0), 1.0, 0.0, 1.0, problem.prior()))
+    assert {name for name, one in told.items() if not one.known} == {"stiffness_axis_deg", "damping", "gain_4"}
+    assert told["stiffness"].value == pytest.approx(1.001 * KNOWN.stiffness)
+    # of the mean and of the two numbers the same share
+    half = 1.96 * KNOWN.stiffness * math.hypot(2e-3, 2e-3)
+    assert told["stiffness"].high - told["stiffness"].value == pytest.approx(half, rel=1e-2)
+    assert told["direction_5"].value == pytest.approx(45.0)
+    x[problem.free.index("oblique_cos")], x[problem.free.index("oblique_sin")] = 0.05, 0.05
+    axis = told_of_bends(found, Knowledge(deviation, np.diag(deviation**-2.0), 1.0, 0.0, 1.0, problem.prior()))[
+        "stiffness_axis_deg"
+    ]
+    assert axis.known and axis.value == pytest.approx(22.5)
+    assert axis.high - axis.value == pytest.approx(math.degrees(1.96 * 2e-3 / (2.0 * math.hypot(0.05, 0.05))), rel=1e-3)

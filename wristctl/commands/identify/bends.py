@@ -1,0 +1,167 @@
+"""What open logs in two planes tell of the study's wrist: springs as an ellipse, and the place of each tendon."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from wristctl.commands.answer import Answer
+from wristctl.commands.inputs import Inputs
+from wristctl.commands.printed_table import COLUMNS, Table, degrees, joined, number
+from wristctl.commands.results import StudyResult
+from wristctl.commands.session import Session
+from wristctl.config.study import Study
+from wristctl.errors import Setting, UserError
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from wristctl.identification.arc_fit import Told
+    from wristctl.identification.bend_problem import BendProblem
+    from wristctl.identification.fit import Fit
+    from wristctl.identification.intervals import Knowledge
+    from wristctl.identification.lack_of_fit import Misfit
+
+# Draws of the posterior that a run keeps as a family of worlds.
+_DRAWS = 200
+# What has to be told before a wrist is written down.
+_NEEDED = ("stiffness", "stiffness_across", "damping", "tendon_stiffness")
+
+
+@dataclass(frozen=True, repr=False, eq=False)
+class BendsTold(StudyResult):
+    """A wrist's springs in two planes, its tendons' places, damping and delay, each with its interval or not told."""
+
+    kind = "identify"
+
+    fit: Fit
+    knowledge: Knowledge
+    told: Mapping[str, Told]
+    yaml: str
+    """A study file with the wrist, actuator and sensor that were found; empty where too little is told."""
+
+    @property
+    def answer(self) -> Answer:
+        """Springs in the sentence, then each parameter with its interval or not told."""
+        return _answer(self.fit, self.told, self.place if self.yaml else "")
+
+    @property
+    def values(self) -> dict[str, float]:
+        """Every parameter that is told, in the units of `frame`."""
+        return {name: one.value for name, one in self.told.items() if one.known}
+
+    def frame(self) -> pd.DataFrame:
+        """One row per parameter: value and ends of its interval, nan where the readings do not tell it, and unit."""
+        import pandas as pd
+
+        rows = [
+            (name, *((one.value, one.low, one.high) if one.known else [math.nan] * 3), one.unit, one.meaning)
+            for name, one in self.told.items()
+        ]
+        return pd.DataFrame(rows, columns=["parameter", "value", "low", "high", "unit", "meaning"])
+
+
+def _problem(study: Study) -> BendProblem:
+    from wristctl.config.plant import Actuator
+    from wristctl.identification.bend_problem import bend_problem
+    from wristctl.identification.bend_trials import bend_trials, places_of_log
+    from wristctl.records.log_converters import read_log
+
+    settings = study.identify
+    logs = [read_log(Path(file), settings.columns or "", "log") for file in settings.logs]
+    places = places_of_log(logs[0], study.wrist)
+    trials = bend_trials(logs, study.wrist, settings.step, settings.exposure or 0.0)
+    return bend_problem(trials, places, study.wrist, Actuator(level="tendon"), settings)
+
+
+def bends_plan(study: Study, inputs: Inputs) -> str:
+    """Say what is looked for in which logs."""
+    if inputs.runs():
+        raise UserError("runs and logs at once", "identify.runs", "identify one or the other")
+    problem = _problem(study)
+    readings = sum(len(trial.angle) for trial in problem.trials)
+    masses = len({trial.wrist.hand_mass for trial in problem.trials})
+    return f"{', '.join(problem.free)} from {len(problem.trials)} trials, {readings} readings, {masses} masses"
+
+
+def identify_bends(session: Session) -> BendsTold:
+    """Find what open logs in two planes tell of the study's wrist, in their run."""
+    import numpy as np
+
+    from wristctl.commands.identify.figures import bends, residuals
+    from wristctl.commands.identify.tables import fit_table, residual_table
+    from wristctl.identification.bend_problem import bends_yaml, misfits_of_bends, told_of_bends
+    from wristctl.identification.fit import fit
+    from wristctl.identification.intervals import knowledge
+
+    findings, settings = session.findings, session.study.identify
+    with session.progress("compiling and searching"):
+        fitted = fit(_problem(session.study))
+        known = knowledge(fitted)
+    told, missed = told_of_bends(fitted, known), misfits_of_bends(fitted)
+    findings.numerics(integrator="RODAS3", step=settings.step, segments=settings.segments, planes=2)
+    for name, one in told.items():
+        ends = (one.low, one.high) if one.known else None
+        findings.metric(name, one.value if one.known else None, one.unit, "", 1, ends, one.meaning)
+    tables = [_told_table(told), fit_table(findings, fitted, known), residual_table(missed)]
+    with session.progress("drawing"):
+        findings.figure("bends", bends, fitted, caption="measured bends, the model's, and the difference")
+        findings.figure("residuals", residuals, fitted, known)
+    _refuse(session, fitted, told, missed)
+    yaml = ""
+    if all(told[name].known for name in _NEEDED):
+        rng = np.random.default_rng(findings.stream("posterior"))
+        yaml, family = bends_yaml(fitted, known, _DRAWS, rng)
+        findings.text("data/identified.yaml", yaml)
+        findings.text("data/posterior.yaml", family)
+    result = BendsTold(session.study, findings, tables, fitted, known, told, yaml)
+    findings.table("data/parameters.csv", result.frame())
+    return result
+
+
+def _refuse(session: Session, fitted: Fit, told: Mapping[str, Told], missed: Sequence[Misfit]) -> None:
+    """UserError where the model does not fit the readings, with the answer told all the same."""
+    settings, worst = session.study.identify, max(missed, key=lambda misfit: misfit.ratio)
+    if settings.misfit == "tell" or worst.ratio <= settings.lack_of_fit:
+        return
+    text = "\n".join(_answer(fitted, told, "").lines())
+    session.findings.summary(f"```\n{text}\n```")
+    session.operator.tell(text)
+    problem = f"{worst.direction}: the model is off by {math.sqrt(worst.ratio):.2g} times the readings' own noise"
+    accept = ("check geometry, masses and senses; or take it as it is: ", Setting("misfit=tell", "identify"))
+    raise UserError(problem, "identify", accept, exit_code=3)
+
+
+def _told_table(told: Mapping[str, Told]) -> Table:
+    rows = []
+    for name, one in told.items():
+        value, interval = number(one.value), f"{number(one.low)} to {number(one.high)}"
+        rows.append((name, *((value, interval) if one.known else ("not told", "")), one.unit, one.meaning))
+    return Table("What the readings tell", ("parameter", "value", "95 %", "unit", "meaning"), rows)
+
+
+def _answer(fit: Fit, told: Mapping[str, Told], run: str) -> Answer:
+    along, across, axis = (told[name] for name in ("stiffness", "stiffness_across", "stiffness_axis_deg"))
+    if along.known and across.known:
+        where = f"toward {axis.value:.3g} deg from ulnar" if axis.known else "along an axis that is not told"
+        springs = f"The springs have {along.value:.3g} N m/rad {where}, and {across.value:.3g} across."
+    else:
+        springs = "These readings do not tell the springs."
+    readings = sum(map(len, fit.residuals))
+    left = f"{degrees(float(fit.noise))} deg are left over of {readings} readings (standard deviation)."
+    notes = list[str | Table]()
+    if lacking := [name for name, one in told.items() if not one.known]:
+        notes.append(
+            f"Not told: {joined(lacking)}. Several masses, slack tendons and tensions tell more (docs/identify.md)."
+        )
+    if run:
+        notes += [
+            "Next, bend the wrist that was found, or compare controllers on those that the readings leave possible:",
+            f"$ wristctl simulate --from-identified {run} --reference circumduction",
+            f"$ wristctl compare {run}/data/posterior.yaml --set worlds.family=posterior",
+        ]
+    table = _told_table(told)
+    return Answer(f"{springs} {left}", Table("", table.columns, table.rows).within(COLUMNS), notes, "Figures: --all.")
