@@ -99,7 +99,7 @@ def planned_spools(
     ends = np.concatenate([[[0.0, 0.0, 1.0]], np.column_stack([bends, [step.tightness for step in plan]])])
     reeled = _reeled(wrist, actuator, layout, ends)
     acceleration = _CAREFUL * actuator.step_acceleration * actuator.step_length
-    time = _PERIOD * np.arange(round(hold / _PERIOD))
+    time: Array = _PERIOD * np.arange(round(hold / _PERIOD))
     parts = []
     for before, after in itertools.pairwise(reeled):
         duration = max(0.1, math.sqrt(_JERK * float(np.abs(after - before).max()) / acceleration))
