@@ -10,6 +10,7 @@ import pytest
 from wristctl.board.dictionary import load
 from wristctl.config.bench import FAULTS
 from wristctl.vision.marker import MEANING
+from wristctl.wrist.directions import ACTIVE
 
 DOCUMENTS = Path(__file__).parents[2] / "docs" / "hardware"
 FIRMWARE = Path(__file__).parents[2] / "wristctl" / "board" / "firmware"
@@ -46,3 +47,12 @@ def test_wiring_names_the_pins_the_firmware_uses() -> None:
             assert f"D{digital} (P{port}{bit})" in text
             assert re.search(rf"P{port}{bit}\b", pins) and re.search(rf"\bD{digital}\b", pins)
     assert "D41 (PG0)" in text and "D13 (PB7)" in text
+
+
+def test_load_cells_are_wired_to_the_pins_the_firmware_reads() -> None:
+    text, pins = (DOCUMENTS / "load-cells.md").read_text(), (FIRMWARE / "pins.h").read_text()
+    for axis, tendon in enumerate(ACTIVE):
+        data, clock = 2 * axis, 2 * axis + 1
+        assert f"| {tendon} | {axis} | A{data} (PF{data}) | A{clock} (PF{clock}) |" in text
+        assert all(re.search(rf"\b(P?)[FA]{bit}\b", pins) for bit in (data, clock))
+    assert "LOAD_DATA_BIT(axis) (1 << (2 * (axis)))" in pins and "LOAD_CLOCK_BIT(axis) (2 << (2 * (axis)))" in pins

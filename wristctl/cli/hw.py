@@ -10,6 +10,7 @@ from wristctl.cli.hw_bench import emulate, watch
 from wristctl.cli.hw_by_hand import clear, home, jog, limits, slacken
 from wristctl.cli.hw_calibrate import app as calibrations
 from wristctl.cli.hw_check import check
+from wristctl.cli.hw_weigh import weigh
 from wristctl.cli.options import BAUD, Baud, Debug, Image, Json, Port, Quiet, facts_of
 from wristctl.cli.progress import listening, progress
 from wristctl.commands.printed_table import Table
@@ -97,5 +98,5 @@ app = typer.Typer(
 )
 
 app.add_typer(calibrations, name="calibrate")
-for command in (watch, ports, check, flash, emulate, stop, jog, home, limits, slacken, clear):
+for command in (watch, ports, check, flash, emulate, stop, jog, home, limits, slacken, clear, weigh):
     app.command(command.__name__)(command)
