@@ -14,6 +14,7 @@ from wristctl.config.hw_run import HwRunSettings
 from wristctl.config.wrist import WristParameters
 from wristctl.vision.detector import print_of
 from wristctl.vision.marker import MEANING
+from wristctl.wrist.directions import ACTIVE
 
 DOCUMENTS = Path(__file__).parents[2] / "docs" / "hardware"
 FIRMWARE = Path(__file__).parents[2] / "wristctl" / "board" / "firmware"
@@ -109,3 +110,12 @@ def test_pulls_of_the_example_motors_follow_from_their_data_sheets(
     torque = rated * peak / (math.sqrt(2.0) * current)
     assert round(torque / HwRunSettings().actuator.pulley_radius) == pull
     assert f"{rated:g} N m at {current:.1f} A" in text and f"{pull} N" in text
+
+
+def test_load_cells_are_wired_to_the_pins_the_firmware_reads() -> None:
+    text, pins = (DOCUMENTS / "load-cells.md").read_text(), (FIRMWARE / "pins.h").read_text()
+    for axis, tendon in enumerate(ACTIVE):
+        data, clock = 2 * axis, 2 * axis + 1
+        assert f"| {tendon} | {axis} | A{data} (PF{data}) | A{clock} (PF{clock}) |" in text
+        assert all(re.search(rf"\b(P?)[FA]{bit}\b", pins) for bit in (data, clock))
+    assert "LOAD_DATA_BIT(axis) (1 << (2 * (axis)))" in pins and "LOAD_CLOCK_BIT(axis) (2 << (2 * (axis)))" in pins

@@ -81,6 +81,7 @@ static void note_port(struct board *b, uint8_t port, uint8_t value) {
 
 static void on_port_a(avr_irq_t *irq, uint32_t value, void *b) { (void)irq, note_port(b, 'A', (uint8_t)value); }
 static void on_port_c(avr_irq_t *irq, uint32_t value, void *b) { (void)irq, note_port(b, 'C', (uint8_t)value); }
+static void on_port_f(avr_irq_t *irq, uint32_t value, void *b) { (void)irq, note_port(b, 'F', (uint8_t)value); }
 static void no_sleep(avr_t *avr, avr_cycle_count_t cycles) { (void)avr, (void)cycles; }
 static void no_log(avr_t *avr, const int level, const char *format, va_list args) {
   (void)avr, (void)level, (void)format, (void)args;
@@ -158,6 +159,7 @@ struct board *board_new(const char *hex, uint32_t baud, int start_in_bootloader)
   avr_irq_register_notify(avr_io_getirq(avr, AVR_IOCTL_UART_GETIRQ('0'), UART_IRQ_OUTPUT), on_sent_byte, b);
   avr_irq_register_notify(avr_io_getirq(avr, AVR_IOCTL_IOPORT_GETIRQ('A'), IOPORT_IRQ_PIN_ALL), on_port_a, b);
   avr_irq_register_notify(avr_io_getirq(avr, AVR_IOCTL_IOPORT_GETIRQ('C'), IOPORT_IRQ_PIN_ALL), on_port_c, b);
+  avr_irq_register_notify(avr_io_getirq(avr, AVR_IOCTL_IOPORT_GETIRQ('F'), IOPORT_IRQ_PIN_ALL), on_port_f, b);
   return b;
 }
 

@@ -68,7 +68,7 @@ class SimavrBoard:
         return out.raw
 
     def pin(self, port: str, bit: int) -> bool:
-        """Return the level of a pin of port A or C."""
+        """Return the level of a pin of port A, C or F."""
         return bool(self._lib.board_port(self._board, ord(port)) >> bit & 1)
 
     def drive(self, port: str, bit: int, level: bool) -> None:
@@ -76,7 +76,7 @@ class SimavrBoard:
         self._lib.board_drive(self._board, ord(port), bit, level)
 
     def events(self) -> np.ndarray:
-        """Return the changes of ports A and C since the last call: cycle, port letter, new value."""
+        """Return the changes of ports A, C and F since the last call: cycle, port letter, new value."""
         out = np.empty(self._lib.board_event_count(self._board), EVENT)
         self._lib.board_take_events(self._board, out.ctypes.data)
         return out[["cycle", "port", "value"]]

@@ -76,7 +76,8 @@ def experiment(tmp_path: Path, at_zero: WristCalibration) -> Run:
     def run(shown: Callable[[dict[str, Any]], None] | None = None, seed: int = 0, **changes: Any) -> Done:
         settings = settings_of(**changes)
         bench = VirtualBench(settings.bench, WRIST, seed, settings.markers)
-        log = TrialLog(tmp_path, settings.bench.segments, settings.control_period)
+        weighed = settings.load_cells is not None
+        log = TrialLog(tmp_path, settings.bench.segments, settings.control_period, weighed=weighed)
         trials = trials_of(settings, np.random.default_rng(0))
         performed = Experiment(settings, WRIST, trials, log, calibration=at_zero, seed=seed)
         error = None

@@ -79,7 +79,8 @@ def perform(
     def shown(row: dict[str, Any]) -> None:
         rows.append((row["trial"], row["clock"], row["theta_ref"], row["rate_ref"]))
 
-    log = TrialLog(Path(tempfile.mkdtemp()), settings.bench.segments, settings.control_period)
+    folder, weighed = Path(tempfile.mkdtemp()), settings.load_cells is not None
+    log = TrialLog(folder, settings.bench.segments, settings.control_period, weighed=weighed)
     trials = trials_of(settings, np.random.default_rng(0))
     done = _Watched(settings, WRIST, trials, log, calibration=stored, seed=seed)
     reason, fix, code = "", "", 0

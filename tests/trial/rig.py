@@ -46,6 +46,7 @@ class RigBoard:
         self.lives: list[float] = []
         self.traffic = SimpleNamespace(resent=0)
         self.hello: Any = SimpleNamespace(boot_nonce=7)
+        self.cells = None
 
     def read(self) -> Status:
         position: Any = tuple(int(each) for each in np.rint(self.position))

@@ -22,7 +22,7 @@ from wristctl.trial.tick_timing import LINK, SCHEDULING, WORK, TickTiming
 from wristctl.trial.watch import Tick, Watch
 from wristctl.vision.marker import Sighting, SightingVerdict
 
-SETTINGS = settings_of()
+SETTINGS = settings_of(load_cells={})
 LIMITS = limits_of(SETTINGS)
 BY_NAME = {limit.name: limit for limit in LIMITS}
 SOUND = dict.fromkeys(RESIDUALS, 0.0)

@@ -16,6 +16,7 @@ from wristctl.trial.residuals import RESIDUALS, limits_of, load, plain
 from wristctl.trial.run_limits import LEAST, MARGIN, SETTINGS, Logged, Nearness, nearness, stop_of
 
 SETTINGS_OF_RUN = settings_of().within(WRIST)
+WEIGHED_RUN = settings_of(load_cells={}).within(WRIST)
 LIMITS = limits_of(SETTINGS_OF_RUN)
 PERIOD = SETTINGS_OF_RUN.control_period
 
@@ -79,14 +80,16 @@ def test_of_several_runs_the_largest_is_named_with_its_run_trial_and_time() -> N
 @pytest.mark.parametrize("name", [name for name in SETTINGS if name not in ("pull", "late", "age")])
 def test_a_proposed_setting_makes_the_proposed_limit_and_has_its_margin(name: str, share: float) -> None:
     """Read back as a setting: 1.5 times the largest, half of the present one at least, to two digits."""
-    present = next(limit for limit in LIMITS if limit.name == name)
+    limits = limits_of(WEIGHED_RUN)
+    present = next(limit for limit in limits if limit.name == name)
     sizes = np.zeros(50)
     sizes[20] = share * present.limit
     seen: dict[str, Any] = {name: sizes}
-    line = next(line for line in near([logged(**seen)]) if line.limit.name == name)
+    run = logged(**seen)._replace(limits=limits, settings=WEIGHED_RUN)
+    line = next(line for line in near([run]) if line.limit.name == name)
     assert line.proposed == pytest.approx(max(MARGIN * share, LEAST) * present.limit, rel=0.05)
     key, _, value = line.setting.removeprefix("safety.").partition("=")
-    changed = settings_of(safety={key: float(value)})
+    changed = settings_of(load_cells={}, safety={key: float(value)})
     (made,) = (limit.limit for limit in limits_of(changed) if limit.name == name)
     assert made == pytest.approx(line.proposed)
 

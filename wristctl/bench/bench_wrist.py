@@ -23,6 +23,8 @@ from wristctl.wrist.directions import ACTIVE, DIRECTIONS, away_of, tendons_of
 from wristctl.wrist.out_of_plane import across_of
 from wristctl.wrist.plant import kernel_of
 
+# Ports whose pins turn motors.
+_MOTOR_PORTS = ord("A"), ord("C")
 # Periods that are remembered at least.
 _KEPT = 60_000
 
@@ -115,7 +117,8 @@ class BenchWrist:
         self._disturbances, self._start = disturbances, start
 
     def hear(self, edges: NDArray[np.void]) -> None:
-        """Changes of the chip's output latches, as it gives them: to be followed later."""
+        """Changes of the chip's output latches, as it gives them: to be followed later, those that turn motors."""
+        edges = edges[np.isin(edges["port"], _MOTOR_PORTS)]
         if len(edges):
             columns = [edges[name].astype(np.int64) for name in ("cycle", "port", "value")]
             self._heard = np.concatenate([self._heard, np.stack(columns, axis=1)])

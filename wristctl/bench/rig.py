@@ -2,6 +2,7 @@
 
 import logging
 import os
+import re
 import select
 from functools import cached_property
 
@@ -10,8 +11,10 @@ from numpy.typing import NDArray
 
 from wristctl.bench.bench_wrist import BenchWrist
 from wristctl.bench.faults import Faults
+from wristctl.bench.load_cells import LoadCells
 from wristctl.bench.shutter import Shutter
 from wristctl.board.emulator.atmega2560 import Atmega2560
+from wristctl.board.emulator.chip import NEVER
 from wristctl.config.bench import BenchSettings
 from wristctl.config.camera import Markers
 from wristctl.config.plant import Disturbances
@@ -26,8 +29,8 @@ log = logging.getLogger(__name__)
 class Rig:
     """A wrist that hangs on a chip's pins, before a camera; all times are of the chip's clock [s].
 
-    The wrist does not act back on the board, so it may follow when somebody looks; what it does is the same however
-    often that is. `seed` is the root of its random streams.
+    Only through load cells does the wrist act back on the board: beyond `weigh`, which is to be called in time, it may
+    follow when somebody looks, and does the same however often that is. `seed` is the root of its random streams.
     """
 
     def __init__(
@@ -44,6 +47,10 @@ class Rig:
         positive = (markers or Markers()).positive
         self.wrist = BenchWrist(settings, wrist, stream(seed, "bench plant"), self.faults, positive)
         self.shutter = Shutter(settings.camera, self.faults, self.wrist, stream(seed, "bench camera"))
+        cells = settings.load_cells
+        self.cells = (
+            None if cells is None else LoadCells(cells, self.chip, self.faults, stream(seed, "bench load cells"))
+        )
         self._drawn = settings.camera.scene, wrist, markers, settings.plant.model
 
     @cached_property
@@ -55,6 +62,15 @@ class Rig:
         """Let the wrist follow the chip; `edges` where somebody has taken them from it already."""
         self.wrist.hear(self.chip.events() if edges is None else edges)
         self.wrist.follow(self.chip.cycles)
+
+    def weigh(self) -> int:
+        """Let load cells convert what is due by now; the cycle at which the next conversion ends, NEVER without any."""
+        if self.cells is None:
+            return NEVER
+        if self.cells.next <= self.chip.cycles:
+            self.catch_up()
+            self.cells.convert(self.wrist)
+        return self.cells.next
 
     def face(self, direction: str) -> None:
         """Turn the bench so that this direction's plane is the one that bends and is seen."""
@@ -76,7 +92,8 @@ class Rig:
 
 
 _BUTTON = "G", 0
-_ACTS = f"press, release, or one of {', '.join(DIRECTIONS)}"
+_HANG = re.compile(r"hang (?P<axis>[0-3]) (?P<mass>\d+(\.\d*)?)")
+_ACTS = f"press, release, hang AXIS KG, or one of {', '.join(DIRECTIONS)}"
 
 
 class Bystander:
@@ -97,11 +114,14 @@ class Bystander:
                 self.do(line.decode(errors="replace").strip())
 
     def do(self, act: str) -> None:
-        """Press or release the button, or turn the wrist to bend toward a direction."""
+        """Press or release the button, hang a weight on a load cell, or turn the wrist to bend toward a direction."""
+        cells, hung = self._rig.cells, _HANG.fullmatch(act)
         if act in ("press", "release"):
             self._rig.chip.drive(*_BUTTON, act == "press")  # an open contact stops
         elif act in DIRECTIONS:
             self._rig.face(act)
+        elif cells is not None and hung is not None:
+            cells.hanging[int(hung["axis"])] = float(hung["mass"])
         else:
             log.warning("nobody knows how to %r: %s", act, _ACTS)
             return

@@ -212,6 +212,7 @@ class BenchServer:
             return
         self._rig.catch_up(np.concatenate(self._edges))
         self._edges.clear()
+        self._rig.weigh()
         self._reset_board()
         self._take_frame()
         if self._control is not None:

@@ -1,6 +1,7 @@
 """The emulated bench in virtual time: board, wrist and camera in this process, the same in every run."""
 
 import math
+from collections.abc import Callable
 
 import numpy as np
 
@@ -11,7 +12,7 @@ from wristctl.bench.shutter import picture
 from wristctl.bench.usb_adapter import HandOver, UsbAdapter, hand_over_of
 from wristctl.board.board_errors import PortLost
 from wristctl.board.emulator.atmega2560 import Atmega2560, VirtualTransport
-from wristctl.board.emulator.chip import FREQUENCY
+from wristctl.board.emulator.chip import FREQUENCY, NEVER
 from wristctl.config.bench import BenchSettings, FaultKind, SerialLine
 from wristctl.config.camera import Markers
 from wristctl.config.plant import Disturbances
@@ -25,11 +26,15 @@ _BUTTON = "G", 0
 class BenchTransport(VirtualTransport):
     """The wire to an emulated chip in the same process, with the faults of cable, host and board.
 
-    A lost port stays lost; the board runs on, also while the host can only `wait`.
+    A lost port stays lost; the board runs on, also while the host can only `wait`. `weigh` gives the board's load cells
+    what they have measured by now, and says when to be called again [cycles].
     """
 
-    def __init__(self, chip: Atmega2560, faults: Faults, line: SerialLine | None = None) -> None:
+    def __init__(
+        self, chip: Atmega2560, faults: Faults, line: SerialLine | None = None, weigh: Callable[[], int] = lambda: NEVER
+    ) -> None:
         super().__init__(chip)
+        self._weigh = weigh
         self._hand_over = hand_over_of(line or SerialLine())
         self._usb = UsbAdapter(self._hand_over)
         self._faults, self._lost, self._reset = faults, False, -math.inf
@@ -65,7 +70,7 @@ class BenchTransport(VirtualTransport):
     def _run(self, end: int) -> None:
         """Run towards `end`, at most until the adapter has to be looked at, or to the next reset or press of the button
         that is due; and do that."""
-        end = min(end, self._usb.next(self.chip.cycles))
+        end = min(end, self._usb.next(self.chip.cycles), self._weigh())
         pressing = self._faults.next("estop-pressed", -math.inf) if not self._pressed else math.inf
         reset = self._faults.next("board-reset", self._reset)
         due = min(reset, max(pressing, self.now()))
@@ -146,7 +151,7 @@ class VirtualBench:
         self, settings: BenchSettings, wrist: WristParameters, seed: int, markers: Markers | None = None
     ) -> None:
         self._rig = Rig(settings, wrist, seed, markers)
-        self.transport = BenchTransport(self._rig.chip, self._rig.faults, settings.line)
+        self.transport = BenchTransport(self._rig.chip, self._rig.faults, settings.line, self._rig.weigh)
         self.camera = VirtualCamera(self._rig)
 
     def face(self, direction: str) -> None:

@@ -5,7 +5,7 @@ from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from types import TracebackType
-from typing import Any, Self
+from typing import Any, Protocol, Self
 
 from wristctl.board.board_errors import BoardError, Faulted, NoAnswer, Refused, Restarted, WrongFirmware
 from wristctl.board.framing import Decoder, crc, encode
@@ -31,11 +31,13 @@ from wristctl.board.messages import (
     Home,
     Jog,
     Limits,
+    Pulls,
     Rate,
     Result,
     State,
     Status,
     Target,
+    Turn,
 )
 from wristctl.board.transport import Transport
 
@@ -152,6 +154,21 @@ _START_PATIENCE, _START_TIME = 0.1, 3.0
 _FIRST_OF_HELLO = struct.Struct("<BI3B")  # protocol, dictionary, firmware: in this place in every version
 
 
+class Cells(Protocol):
+    """The load cells of the tendons, for whoever has some."""
+
+    def take(self, pulls: Pulls) -> None:
+        """Take in a reading; never raises."""
+
+    def judge(self) -> None:
+        """Raises what ends a wait beside motors that stand."""
+
+
+def _status(content: tuple[Any, ...]) -> Status:
+    """The status that an answer begins with."""
+    return Status(*content[: len(Status._fields)])
+
+
 class Board:
     """A motor board behind a transport. As a context manager it connects, and stops the motors in the end.
 
@@ -162,6 +179,8 @@ class Board:
     def __init__(self, transport: Transport, overheard: Overheard = nobody) -> None:
         self.transport = transport
         self.hello: Hello | None = None
+        self.cells: Cells | None = None
+        """Load cells that are shown every reading: `read` and `turn` ask for them too, where there are any."""
         self._exchange = Exchange(transport, overheard)
         self._configured, self._limits, self._watchdog = Configure(), Limits(), Configure().watchdog
         self._connection = 0
@@ -222,7 +241,7 @@ class Board:
 
     def read(self) -> Status:
         """State, positions and rates; does not feed the watchdog."""
-        return self.send(Command.STATUS)
+        return self.send(Command.STATUS if self.cells is None else Command.PULLS)
 
     def counters(self) -> Counters:
         """Counters of the board's traffic on the wire since its reset."""
@@ -239,7 +258,7 @@ class Board:
         The rates really sent, and the status.
         """
         sent = within_reach(rates)
-        return sent, self.send(Rate(sent, life))
+        return sent, self.send((Rate if self.cells is None else Turn)(sent, life))
 
     def jog(self, positions: Sequence[int]) -> Status:
         """Creep to `positions` (steps) before homing, and wait until the axes stand there."""
@@ -296,8 +315,10 @@ class Board:
             command, payload = message, b""
         else:
             command, payload = COMMAND_OF[type(message)], LAYOUTS[type(message)].pack(message)
-        _result, status = self._ask(command, payload)
-        return Status(*status)
+        _result, content = self._ask(command, payload)
+        if self.cells is not None and ANSWER_TO[command] is Pulls:
+            self.cells.take(Pulls(*content))
+        return _status(content)
 
     def close(self, emergency: bool = False) -> None:
         """Stop the motors (at once in an `emergency`), as far as the board can be reached, and let it go."""
@@ -326,7 +347,7 @@ class Board:
             raise BoardError("cable", f"{command.name} is answered by {len(answer)} bytes", self.transport.name)
         content: tuple[Any, ...] = LAYOUTS[kind].unpack(kind, answer[1:]) if kind else ()
         if result == Result.FAULTED:
-            status = Status(*content) if kind is Status else self.read()
+            status = _status(content) if kind in (Status, Pulls) else self.read()
             raise self.faulted(status)
         if result != Result.OK:
             self.see_restart()

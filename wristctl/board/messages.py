@@ -7,9 +7,9 @@ from typing import NamedTuple
 
 from wristctl.board.layout import Field, Layout
 
-PROTOCOL_VERSION = 3
-FIRMWARE_VERSION = (3, 0, 0)
-DICTIONARY_HASH = 0xED3418D2
+PROTOCOL_VERSION = 4
+FIRMWARE_VERSION = (4, 0, 0)
+DICTIONARY_HASH = 0xF68DEC2D
 BAUD = 250000
 AXES = 4  # 1: step/direction drives
 MAX_RATE = 20000  # steps/s: of one axis
@@ -69,6 +69,8 @@ class Command(IntEnum):
     CONFIGURE = 14  # ramps, watchdog and what the drives do in a fault; only in DISABLED, kept until reset
     LIMITS = 15  # soft limits of TARGET, RATE and HOME, and how far JOG may creep; only in DISABLED, kept until reset
     CONNECT = 16  # a connection begins, the next after HELLO's: bound commands of those before are refused
+    PULLS = 17  # as STATUS, and what the tendons' load cells read
+    TURN = 18  # as RATE, answered with what the tendons' load cells read
 
 
 class Fault(IntFlag):
@@ -218,6 +220,13 @@ class Connect(NamedTuple):
     number: int  # 1, 0 to 65535
 
 
+class Turn(NamedTuple):
+    """As RATE, answered with what the tendons' load cells read."""
+
+    rate: tuple[float, float, float, float]  # steps/s, -20000 to 20000
+    life: float = 0.05  # s, 0.01 to 0.2
+
+
 class Hello(NamedTuple):
     """Who the board is."""
 
@@ -243,6 +252,21 @@ class Status(NamedTuple):
     position: tuple[int, int, int, int]  # steps
     rate: tuple[int, int, int, int]  # steps/s
     lapses: int  # 1
+
+
+class Pulls(NamedTuple):
+    """A Status, and the newest reading of each tendon's load cell with its age; an age of 0.255 s: none for as long."""
+
+    time: float  # s
+    state: State  # State
+    faults: Fault  # Fault
+    flags: Flag  # Flag
+    watchdog_left: float  # s
+    position: tuple[int, int, int, int]  # steps
+    rate: tuple[int, int, int, int]  # steps/s
+    lapses: int  # 1
+    counts: tuple[int, int, int, int]  # 256 counts
+    age: tuple[float, float, float, float]  # s
 
 
 class Counters(NamedTuple):
@@ -289,6 +313,10 @@ LAYOUTS: dict[type, Layout] = {
     Connect: Layout(
         Field("number", "H", 1, 1, "1", 0, 65535, None),
     ),
+    Turn: Layout(
+        Field("rate", "i", 4, 65536, "steps/s", -20000, 20000, None),
+        Field("life", "B", 1, 1000, "s", 0.01, 0.2, None),
+    ),
     Hello: Layout(
         Field("protocol", "B", 1, 1, "1", None, None, None),
         Field("dictionary", "I", 1, 1, "1", None, None, None),
@@ -310,6 +338,18 @@ LAYOUTS: dict[type, Layout] = {
         Field("rate", "h", 4, 1, "steps/s", None, None, None),
         Field("lapses", "B", 1, 1, "1", None, None, None),
     ),
+    Pulls: Layout(
+        Field("time", "I", 1, 1000000, "s", None, None, None),
+        Field("state", "B", 1, 1, "State", None, None, State),
+        Field("faults", "B", 1, 1, "Fault", None, None, Fault),
+        Field("flags", "B", 1, 1, "Flag", None, None, Flag),
+        Field("watchdog_left", "H", 1, 1000, "s", None, None, None),
+        Field("position", "i", 4, 1, "steps", None, None, None),
+        Field("rate", "h", 4, 1, "steps/s", None, None, None),
+        Field("lapses", "B", 1, 1, "1", None, None, None),
+        Field("counts", "h", 4, 1, "256 counts", None, None, None),
+        Field("age", "B", 4, 1000, "s", None, None, None),
+    ),
     Counters: Layout(
         Field("frames", "I", 1, 1, "1", None, None, None),
         Field("bad_crc", "H", 1, 1, "1", None, None, None),
@@ -328,6 +368,7 @@ COMMAND_OF: dict[type, Command] = {
     Configure: Command.CONFIGURE,
     Limits: Command.LIMITS,
     Connect: Command.CONNECT,
+    Turn: Command.TURN,
 }
 ANSWER_TO: dict[Command, type] = {
     Command.HELLO: Hello,
@@ -344,6 +385,8 @@ ANSWER_TO: dict[Command, type] = {
     Command.CLEAR: Status,
     Command.CONFIGURE: Status,
     Command.LIMITS: Status,
+    Command.PULLS: Pulls,
+    Command.TURN: Pulls,
 }
 BOUND = frozenset(
     {
@@ -356,6 +399,7 @@ BOUND = frozenset(
         Command.CLEAR,
         Command.CONFIGURE,
         Command.LIMITS,
+        Command.TURN,
     }
 )
 FEEDS_WATCHDOG = frozenset(
@@ -367,5 +411,6 @@ FEEDS_WATCHDOG = frozenset(
         Command.JOG,
         Command.HOME,
         Command.STOP,
+        Command.TURN,
     }
 )

@@ -11,6 +11,7 @@ from wristctl.cli.hw_by_hand import clear, home, jog, limits, slacken
 from wristctl.cli.hw_calibrate import app as calibrations
 from wristctl.cli.hw_check import check
 from wristctl.cli.hw_drawings import drawings
+from wristctl.cli.hw_weigh import weigh
 from wristctl.cli.options import BAUD, Baud, Debug, Image, Json, Port, Quiet, facts_of
 from wristctl.cli.progress import listening, progress
 from wristctl.commands.printed_table import Table
@@ -98,5 +99,5 @@ app = typer.Typer(
 )
 
 app.add_typer(calibrations, name="calibrate")
-for command in (watch, ports, check, flash, emulate, stop, jog, home, limits, slacken, clear, drawings):
+for command in (watch, ports, check, flash, emulate, stop, jog, home, limits, slacken, clear, weigh, drawings):
     app.command(command.__name__)(command)

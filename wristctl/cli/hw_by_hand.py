@@ -149,9 +149,11 @@ def _session(
     from wristctl.trial.by_hand import ByHand
     from wristctl.trial.calibration import WristCalibration
     from wristctl.trial.supervised_wait import Patience
+    from wristctl.trial.tendon_pulls import tendon_pulls_of
 
     signs = WristCalibration.load(open_run(calibration, out)).zero.signs if calibration else (1, 1, 1, 1)
     with Board(open_transport(port, baud)) as board:
+        board.cells = tendon_pulls_of(settings)
         _agree(f"{plan}. {_TENDONS}", yes, Patience(board).pulse)
         yield ByHand(board, settings, signs)
 

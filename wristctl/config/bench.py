@@ -50,6 +50,7 @@ FAULTS = {
     "picture-shifted": "the camera is turned aside by `size` px",
     "picture-other": "the camera sees something else",
     "marker-twice": "another marker of id `size` comes into view",
+    "cell-unplugged": "the amplifier of the tendon's load cell is unplugged",
     "usb-latency": "answers are handed over every `size` ms only",
     "answers-late": "each answer comes `size` ms late",
     "answers-held": "answers are held back once, for `size` ms",
@@ -65,8 +66,8 @@ FaultKind = Literal[
     "tendon-slipped", "tendon-creeps", "marker-turned", "marker-peels", "camera-repeats",
     "camera-frozen-clock", "frames-thinned", "pictures-late", "stamps-shifted", "stamps-stuck", "camera-lost",
     "picture-dark", "picture-bright", "picture-blurred", "picture-smeared", "picture-mirrored", "picture-turned",
-    "picture-shifted", "picture-other", "marker-twice", "usb-latency", "answers-late", "answers-held", "host-pause",
-    "bytes-garbled", "estop-pressed",
+    "picture-shifted", "picture-other", "marker-twice", "cell-unplugged", "usb-latency", "answers-late", "answers-held",
+    "host-pause", "bytes-garbled", "estop-pressed",
 ]  # fmt: skip
 
 
@@ -139,6 +140,25 @@ class SerialLine(Section):
     latency_timer: float = quantity(16e-3, "s", "of an ftdi adapter", "FTDI's default", ge=1e-3, le=0.255)
 
 
+class EmulatedCells(Section):
+    """Load cells between motors and tendons, each behind an HX711; one entry per tendon 1, 2, 4, 5.
+
+    A count is 256 of the amplifier's 24 bits.
+    """
+
+    rate: Literal[10, 80] = choice(80, "conversions per second; a reading is the mean of the last four", "data sheet")
+    clock_error: tuple[float, float, float, float] = quantity(
+        (0.01, -0.02, 0.015, 0.0), "", "by which share each amplifier converts faster", "assumed"
+    )
+    counts_per_newton: tuple[float, float, float, float] = quantity(
+        (84.0, 87.5, 86.1, 83.2), "1/N", "of each cell", "2 mV/V at 196 N: 85.5, and its tolerance"
+    )
+    offset: tuple[float, float, float, float] = quantity(
+        (60.0, -85.0, 25.0, 110.0), "", "counts without a pull", "assumed: 1 N and less"
+    )
+    noise: float = quantity(0.5, "", "standard deviation of a reading, in counts", "thrice the data sheet's", ge=0)
+
+
 class WeakenedPlant(TrueWrist):
     """The wrist as it is; a controller knows it with its stiffness when new."""
 
@@ -170,4 +190,5 @@ class BenchSettings(Section):
     camera: RenderedCamera = RenderedCamera()
     line: SerialLine = SerialLine()
     person: Person = Person()
+    load_cells: EmulatedCells | None = choice(None, "load cells of the tendons; null: none are wired")
     faults: tuple[InjectedFault, ...] = choice((), "what goes wrong")

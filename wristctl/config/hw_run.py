@@ -57,8 +57,25 @@ class Safety(Section):
     jump_deg: float = quantity(
         2.0, "deg", "furthest that it may come off that from a frame to the next", "measured", gt=0
     )
+    excess_pull: float = quantity(
+        10.0, "N", "furthest that a tendon's load cell may show more than its spool explains", "measured", gt=0
+    )
+    missing_pull: float = quantity(
+        2.0, "N", "pull that a spool makes of the softest tendon, and of which its load cell must show a quarter",
+        "assumed", gt=0,
+    )  # fmt: skip
+    cell_age: float = quantity(
+        0.2, "s", "longest time without a reading of a load cell; the board says up to 0.25", "assumed", gt=0, le=0.25
+    )
     softest: float = quantity(
         5e3, "N/m", "stiffness that tendons have at least: how far spools may lead", "assumed", gt=0
+    )
+    stiffest: float = quantity(
+        50e3,
+        "N/m",
+        "stiffness that tendons have at most: how much a spool explains of a measured pull",
+        "assumed",
+        gt=0,
     )
     load: float = quantity(1.6, "N m", "largest load torque that the observer may find", "measured", gt=0)
     across_deg: float = quantity(
@@ -86,6 +103,27 @@ class Safety(Section):
         return self
 
 
+class LoadCells(Section):
+    """Load cells of the tendons behind HX711 amplifiers, as `wristctl hw weigh` finds them.
+
+    One entry per tendon 1, 2, 4, 5. A count is 256 of an amplifier's 24 bits.
+    """
+
+    rate: Literal[10, 80] = choice(80, "conversions per second, by the amplifiers' RATE pin", "data sheet")
+    counts_per_newton: tuple[float, float, float, float] = quantity(
+        (85.5, 85.5, 85.5, 85.5), "1/N", "of each cell; negative: mounted the other way round", "2 mV/V at 196 N"
+    )
+    offset: tuple[float, float, float, float] = quantity(
+        (0.0, 0.0, 0.0, 0.0), "", "counts of each cell without a pull", "wristctl hw weigh"
+    )
+
+    @model_validator(mode="after")
+    def _each_shows_something(self) -> Self:
+        if 0.0 in self.counts_per_newton:
+            raise ValueError("counts_per_newton of 0: such a cell shows nothing")
+        return self
+
+
 class RigSettings(Section):
     """Motors, camera and how they are known. Without a port the whole rig is emulated."""
 
@@ -98,6 +136,7 @@ class RigSettings(Section):
     sensor: Sensor = choice(Sensor(level="camera"), "camera as the observer knows it")
     homing: Homing = Homing()
     safety: Safety = Safety()
+    load_cells: LoadCells | None = choice(None, "load cells of the tendons; null: pulls are not measured")
     markers: Markers = Markers()
     gates: Gates = Gates()
     device: Device = Device()

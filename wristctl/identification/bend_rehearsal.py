@@ -99,13 +99,13 @@ def planned_spools(
     ends = np.concatenate([[[0.0, 0.0, 1.0]], np.column_stack([bends, [step.tightness for step in plan]])])
     reeled = _reeled(wrist, actuator, layout, ends)
     acceleration = _CAREFUL * actuator.step_acceleration * actuator.step_length
-    time: Array = _PERIOD * np.arange(round(hold / _PERIOD))
+    time = _PERIOD * np.arange(round(hold / _PERIOD))
     parts = []
     for before, after in itertools.pairwise(reeled):
         duration = max(0.1, math.sqrt(_JERK * float(np.abs(after - before).max()) / acceleration))
         if duration > hold:
             raise UserError(f"a move takes the motors {duration:.2g} s", "hold", f"more than {hold:g} s")
-        parts.append(before + minimum_jerk(time, duration)[0][:, None] * (after - before))
+        parts.append(before + minimum_jerk(time.astype(float), duration)[0][:, None] * (after - before))
     counts: Array = np.rint(np.concatenate(parts) / actuator.step_length)
     return counts
 

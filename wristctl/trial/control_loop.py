@@ -25,6 +25,7 @@ from wristctl.trial.safety import SafetyStop
 from wristctl.trial.spools import Paths, spools_of
 from wristctl.trial.steering import Answer, HostFaults, Steering
 from wristctl.trial.supervised_wait import InSight, Patience
+from wristctl.trial.tendon_pulls import TendonPulls
 from wristctl.trial.tick_timing import TickTiming
 from wristctl.trial.tracking import Tracking
 from wristctl.trial.watch import Tick, Watch
@@ -61,12 +62,13 @@ class ControlLoop:
     def __init__(
         self, board: Board, tracking: Tracking, settings: HwRunSettings, wrist: WristParameters, plane: str,
         signs: Sequence[int], timing: TickTiming, log: TrialLog, shown: Shown | None = None, oblique: float = 0.0,
+        pulls: TendonPulls | None = None,
     ) -> None:  # fmt: skip
         self._board, self._tracking, self._log, self._timing, self._shown = board, tracking, log, timing, shown
         self._clock, self._period, self._signs = board.transport, timing.period, np.array(signs)
         self._life, self._stale = settings.rate_life, settings.safety.stale
         self._spools, self._paths = spools_of(settings.actuator), Paths(wrist, plane)
-        self.watch = Watch(settings, wrist, plane, timing, oblique)
+        self._pulls, self.watch = pulls, Watch(settings, wrist, plane, timing, oblique, pulls)
         self._steering = Steering(wrist, settings.actuator, settings.sensor, timing.period, 0.0)
         self._status, self._sent = board.read(), np.zeros(AXES)
         self._epoch = self._last_usable = self._clock.now()
@@ -151,6 +153,8 @@ class ControlLoop:
         }
         self._log.disk.pretend_full = task.faults.disk(clock - task.begin)
         row = values | of_axes(tension=tension, target=target, position=self._reeled(), sent=self._sent)
+        if self._pulls is not None:
+            row |= of_axes(pull=self._pulls.pull)
         self._log.tick(row)
         if self._shown is not None:
             self._shown(row)

@@ -23,6 +23,7 @@ from wristctl.trial.safety import SafetyStop
 from wristctl.trial.spools import Paths, spools_of
 from wristctl.trial.steering import HostFaults, Steering
 from wristctl.trial.supervised_wait import Patience
+from wristctl.trial.tendon_pulls import tendon_pulls_of
 from wristctl.trial.testbeds import Testbed
 from wristctl.trial.tick_timing import TickTiming
 from wristctl.trial.tracking import Tracking
@@ -78,6 +79,7 @@ class Experiment:
     ) -> None:  # fmt: skip
         settings = settings.within(wrist)
         self._settings, self._wrist, self._trials, self._log = settings, spared(wrist, settings), trials, kept
+        self._pulls = tendon_pulls_of(settings)
         self._calibration, self._draws = calibration, Draws(seed, "bench")
         chosen = [(controller(row.controller), row.gains) for row in settings.rows]
         self._laws = [(law, gains_of(law, gains, tuned)) for law, gains in chosen]
@@ -97,6 +99,7 @@ class Experiment:
         Raises SafetyStop, BoardError, CameraError, KeyboardInterrupt, and what a bug raises.
         """
         board = Board(testbed.transport, self._log.wire)
+        board.cells = self._pulls
         try:
             self._warm_up()
             board.connect()
@@ -169,7 +172,7 @@ class Experiment:
         assert zero is not None
         loop = ControlLoop(
             board, tracking, settings, in_plane(self._wrist, plane), plane, zero.signs, self.timing, self._log,
-            shown, 0.0 if pose is None else pose.oblique,
+            shown, 0.0 if pose is None else pose.oblique, self._pulls,
         )  # fmt: skip
         loop.follow(at_rest(settings.rest, settings.control_period), self._back, ())
         return loop

@@ -57,6 +57,7 @@ LOG: Columns = {
     "woken": ("s", "part of that for which the computer slept on; the rest is what the tick before took too long"),
     "round_trip": ("s", "from the tick's command to the board's answer"),
 }
+OF_LOAD_CELLS: Columns = _of_tendons("pull", "N", "by load cell as read last; empty where it gives nothing")
 WIRE: Columns = {
     "clock": ("s", "the run's one clock"),
     "way": ("", "sent to the board, or came from it"),
@@ -84,15 +85,18 @@ FRAMES: Columns = {
         for axis, meaning in (("x", "rightward"), ("y", "downward"))
     },
 }
-RESIDUALS: Columns = {
-    "trial": ("", "number, from 0; -1 between trials"),
-    "clock": ("s", "the run's one clock"),
-    **columns(),
-}
-
 _RESERVED = 4 << 20
 # Rows of truth written in one tick: well above the five that it adds, and nothing that a tick would be late by.
 _AT_ONCE = 40
+
+
+def residual_columns(weighed: bool) -> Columns:
+    """Columns of the residuals of a rig with load cells, or without."""
+    return {
+        "trial": ("", "number, from 0; -1 between trials"),
+        "clock": ("s", "the run's one clock"),
+        **columns(weighed),
+    }
 
 
 def truth_columns(segments: int) -> Columns:
@@ -173,12 +177,17 @@ class Stream:
 
 class TrialLog:
     """log.csv and frames.csv of trials; between.csv for the moves between them; residuals.csv of both; wire.csv with
-    all bytes of the whole run; truth.csv of an emulated bench. The clock is `monotonic`, or virtual.
+    all bytes of the whole run; truth.csv of an emulated bench. The clock is `monotonic`, or virtual; a rig is `weighed`
+    where it has load cells.
     """
 
-    def __init__(self, folder: Path, segments: int | None, period: float, monotonic: bool = False) -> None:
+    def __init__(
+        self, folder: Path, segments: int | None, period: float, monotonic: bool = False, weighed: bool = False
+    ) -> None:
         self.disk, self._monotonic = Disk(folder), monotonic
-        tables = {"log": LOG, "between": LOG, "frames": FRAMES, "residuals": RESIDUALS, "wire": WIRE}
+        ticks = {**LOG, **OF_LOAD_CELLS} if weighed else LOG
+        tables = {"log": ticks, "between": ticks, "frames": FRAMES, "wire": WIRE}
+        tables["residuals"] = residual_columns(weighed)
         if segments is not None:
             tables["truth"] = truth_columns(segments)
         try:
@@ -194,7 +203,8 @@ class TrialLog:
         """One control tick; in between.csv where it belongs to no trial. Some of the truth that waits goes with it."""
         self.last.append(dict(row))
         values = {**row, "utc": row["clock"] + time.time() - time.monotonic() if self._monotonic else math.nan}
-        self.streams["between" if row["trial"] < 0 else "log"].row(values[name] for name in LOG)
+        stream = self.streams["between" if row["trial"] < 0 else "log"]
+        stream.row(values[name] for name in stream.columns)
         self.streams["residuals"].flush()
         self.streams["wire"].flush()
         self._write_truth(_AT_ONCE)

@@ -11,6 +11,7 @@ from wristctl.config.hw_run import CalibrateWristSettings, RigSettings
 from wristctl.interrupt import undisturbed
 from wristctl.trial.spools import spools_of
 from wristctl.trial.supervised_wait import Patience
+from wristctl.trial.tendon_pulls import tendon_pulls_of
 from wristctl.trial.testbeds import Testbed
 from wristctl.trial.tracking import Tracking
 
@@ -70,6 +71,7 @@ def in_sight(testbed: Testbed, settings: CalibrateWristSettings) -> Iterator[tup
     CameraError.
     """
     board = Board(testbed.transport)
+    board.cells = tendon_pulls_of(settings)
     try:
         hello = board.connect()
         try:

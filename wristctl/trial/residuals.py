@@ -25,6 +25,7 @@ class Shown(NamedTuple):
         return f"{value / self.size:{self.form}}{' ' * bool(self.unit)}{self.unit}"
 
 
+_N = Shown("N", 1.0, ".0f")
 _MS, _DEG, _MM = Shown("ms", 1e-3, ".0f"), Shown("deg", math.radians(1.0), ".1f"), Shown("mm", 1e-3, ".1f")
 _SHARE, _COUNT = Shown("%", 0.01, ".0f"), Shown("", 1.0, ".0f")
 
@@ -44,6 +45,8 @@ class Residual(NamedTuple):
     notes: str = ""
     lasting: bool = False
     """Whether it may exceed its limit for `safety.odd_for`; others stop at once."""
+    weighed: bool = False
+    """Whether it needs load cells: without them it has no line."""
 
 
 def _never(settings: HwRunSettings) -> float:
@@ -85,9 +88,32 @@ RESIDUALS: Mapping[str, Residual] = {
         "no usable marker angle for {value}", "no usable marker angle for {value} (limit {limit})",
     ),
     "pull": Residual(
-        Shown("N", 1.0, ".0f"), "largest tension by spool position and estimated angle",
+        _N, "largest tension by spool position and estimated angle",
         lambda s: s.safety.tension, math.inf, "something holds the wrist, or the zero positions are wrong: home again",
         "tension of about {value} beyond {limit}",
+    ),
+    "cell_age": Residual(
+        _MS, "time since the last reading of a load cell, of the oldest", lambda s: s.safety.cell_age, math.inf,
+        "an amplifier is unplugged or without supply, or a wire of its cell is broken",
+        "no reading of a load cell for {value} (limit {limit})", weighed=True,
+    ),
+    "measured_pull": Residual(
+        _N, "largest pull by load cell", lambda s: min(s.safety.tension, s.safety.motor_pull), 0.8,
+        "tendons pull against each other; something holds the wrist; the drives' current is above safety.motor_pull",
+        "a tendon pulls {value} by its load cell, beyond {limit}", "a pull of {value} by load cell (limit {limit})",
+        True, weighed=True,
+    ),
+    "excess_pull": Residual(
+        _N, "pull by load cell beyond what its spool explains", lambda s: s.safety.excess_pull, 0.8,
+        "tendons pull against each other, are caught or stiffer than safety.stiffest; a cell's zero: wristctl hw weigh",
+        "a tendon pulls {value} more than its spool explains, beyond {limit}",
+        "{value} of pull that no spool explains (limit {limit})", True, weighed=True,
+    ),
+    "missing_pull": Residual(
+        _N, "pull that a spool should make at least, of a tendon whose load cell shows less than a quarter",
+        lambda s: s.safety.missing_pull, 0.8, "a tendon is off its pulley, cut or slipped; a stalled motor",
+        "a tendon does not pull: its spool should make {value} at least, beyond {limit}",
+        "{value} that a spool should make and no load cell shows (limit {limit})", True, weighed=True,
     ),
     "travel": Residual(
         _MM, "spool furthest from zero", lambda s: s.safety.travel, math.inf,
@@ -167,7 +193,7 @@ class Limit(NamedTuple):
 def limits_of(settings: HwRunSettings) -> tuple[Limit, ...]:
     """The table for these settings."""
     limits = []
-    for name, residual in RESIDUALS.items():
+    for name, residual in _lines(settings.load_cells is not None).items():
         most, held = residual.limit(settings), settings.safety.odd_for if residual.lasting else 0.0
         odd = residual.odd * most if math.isfinite(most) and math.isfinite(residual.odd) else residual.odd
         limits.append(Limit(name, _SI.get(residual.shown.unit, residual.shown.unit), most, held, odd))
@@ -177,9 +203,13 @@ def limits_of(settings: HwRunSettings) -> tuple[Limit, ...]:
 _SI = {"ms": "s", "mm": "m", "deg": "rad", "%": ""}
 
 
-def columns() -> dict[str, tuple[str, str]]:
-    """Unit and meaning of each residual, as the log has them."""
-    return {name: (_SI.get(line.shown.unit, line.shown.unit), line.meaning) for name, line in RESIDUALS.items()}
+def columns(weighed: bool) -> dict[str, tuple[str, str]]:
+    """Unit and meaning of each residual, as the log has them of a rig with load cells or without."""
+    return {name: (_SI.get(line.shown.unit, line.shown.unit), line.meaning) for name, line in _lines(weighed).items()}
+
+
+def _lines(weighed: bool) -> dict[str, Residual]:
+    return {name: line for name, line in RESIDUALS.items() if weighed or not line.weighed}
 
 
 class Judge:
@@ -211,7 +241,7 @@ _APART = 0.5
 def worst(values: Mapping[str, float], most: Mapping[str, float]) -> dict[str, float]:
     """The larger size of each residual; of `lag`, which sums a motion up, the newest."""
     sizes = {name: 0.0 if math.isnan(value) else abs(value) for name, value in values.items()}
-    return {name: sizes[name] if name == "lag" else max(sizes[name], most.get(name, 0.0)) for name in RESIDUALS}
+    return {name: sizes[name] if name == "lag" else max(sizes[name], most.get(name, 0.0)) for name in values}
 
 
 def notes(most: Mapping[str, float], limits: Sequence[Limit]) -> list[str]:

@@ -9,7 +9,7 @@ import numpy as np
 from wristctl.arrays import Array
 from wristctl.board.check import Adapter, RoundTrips, adapter_of, round_trips, shorter
 from wristctl.board.driver import Board
-from wristctl.board.messages import LAYOUTS, Command, Rate
+from wristctl.board.messages import LAYOUTS, Command, Pulls, Rate, Status
 from wristctl.config.hw_run import HwRunSettings
 from wristctl.trial.camera_pace import FIX, CameraPace
 from wristctl.trial.rig_strokes import Latency, RigStrokes, find_latency
@@ -137,8 +137,10 @@ def troubles(facts: RigFacts, settings: HwRunSettings, port: str) -> list[Troubl
 
 
 def _of_the_link(facts: RigFacts, settings: HwRunSettings, port: str) -> list[Trouble]:
-    command = len(LAYOUTS[Rate].pack(Rate((0.0,) * 4)))  # a tick's is longer than the one that was timed
-    longer = command * 10.0 / settings.baud
+    more = len(LAYOUTS[Rate].pack(Rate((0.0,) * 4)))  # a tick's command is longer than the one that was timed
+    if settings.load_cells is not None:  # and so is its answer
+        more += LAYOUTS[Pulls].struct.size - LAYOUTS[Status].struct.size
+    longer = more * 10.0 / settings.baud
     trip, period = facts.trips.median + longer, settings.control_period
     if trip <= settings.safety.round_trip * period:
         return []

@@ -19,7 +19,7 @@ MARGIN, LEAST = 1.5, 0.5
 # Setting of `safety` by which each limit is set, where a rig's own scatter may ask for another.
 SETTINGS = {
     "late": "late", "rate": "rate", "age": "stale", "pull": "tension", "jump": "jump_deg", "across": "across_deg",
-    "load": "load", "apart": "follow_deg",
+    "load": "load", "apart": "follow_deg", "excess_pull": "excess_pull",
 }  # fmt: skip
 
 

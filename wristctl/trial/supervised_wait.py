@@ -57,6 +57,8 @@ class Patience:
         """Wait for a moment of at most `longest` seconds: the `Meanwhile` of whoever asks a person."""
         status = self._board.read()
         self._see(status)
+        if self._board.cells is not None:
+            self._board.cells.judge()
         self._judge(status)
         self._board.ping()
         self._board.transport.wait(min(longest, _PULSE))
@@ -145,4 +147,4 @@ class InSight:
         for sighting in looked:
             if math.isfinite(sighting.theta):
                 self._seen = sighting.time
-                self._watch.standing(sighting.theta, reeled, self._paths.taut(sighting.theta)[0])
+                self._watch.standing(sighting.theta, reeled, self._paths.taut(sighting.theta)[0], now)

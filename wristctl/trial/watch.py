@@ -18,6 +18,7 @@ from wristctl.trial.marker_lag import MarkerLag
 from wristctl.trial.residuals import RESIDUALS, Judge, Limit, limits_of, notes, stopped_by, worst
 from wristctl.trial.safety import SafetyStop
 from wristctl.trial.spools import on_plus_side, spools_of
+from wristctl.trial.tendon_pulls import TendonPulls
 from wristctl.trial.tick_timing import FIX, TickTiming
 from wristctl.vision.marker import Sighting, SightingVerdict
 from wristctl.wrist.directions import away_of
@@ -87,13 +88,14 @@ class _Recent:
 class Watch:
     """Residuals of one loop, which begins with the wrist at rest at zero: the marker's size is that of no bend across.
 
-    `oblique` is how far off square an uncalibrated camera looks [rad].
+    `oblique` is how far off square an uncalibrated camera looks [rad]. `pulls` are those of a rig with load cells.
     """
 
     def __init__(
-        self, settings: HwRunSettings, wrist: WristParameters, plane: str, timing: TickTiming, oblique: float = 0.0
-    ) -> None:
-        self._settings, self._timing, self._oblique = settings, timing, oblique
+        self, settings: HwRunSettings, wrist: WristParameters, plane: str, timing: TickTiming, oblique: float = 0.0,
+        pulls: TendonPulls | None = None,
+    ) -> None:  # fmt: skip
+        self._settings, self._timing, self._oblique, self._pulls = settings, timing, oblique, pulls
         self._plus, self._away = tuple(on_plus_side(plane).tolist()), away_of(plane, settings.markers.positive)
         self._spools, self._period = spools_of(settings.actuator), timing.period
         self._blind = BlindModel(wrist, settings.actuator, settings.safety.softest, settings.sensor, self._period)
@@ -165,6 +167,7 @@ class Watch:
             "rate": tick.estimate.rate,
             "age": tick.clock - last_usable,
             "pull": max(0.0, float(self._spools.tension(tick.position, tick.taut).max())) if finite else math.nan,
+            **self._weighed(tick.clock, tick.position, tick.taut),
             "travel": float(np.abs(tick.position).max()) * self._spools.step,
             "disabled": float(tick.state != State.ENABLED),
             **self._following(tick),
@@ -184,13 +187,18 @@ class Watch:
         if beyond is not None:
             raise self._stop(beyond, tick)
 
-    def standing(self, theta: float, position: Array, taut: Array) -> None:
+    def _weighed(self, clock: float, position: Array, taut: Array) -> dict[str, float]:
+        stretch = self._spools.step * position - taut
+        return {} if self._pulls is None else self._pulls.residuals(clock, stretch)
+
+    def standing(self, theta: float, position: Array, taut: Array, clock: float) -> None:
         """Raises SafetyStop where a wrist whose motors stand is bent, or its tendons are pulled, beyond the limits."""
         pull = max(0.0, float(self._spools.tension(position, taut).max()))
+        values = {"angle": theta, "pull": pull, **self._weighed(clock, position, taut)}
         for limit in self.limits:
-            value = {"angle": theta, "pull": pull}.get(limit.name, 0.0)
+            value = values.get(limit.name, 0.0)
             if abs(value) > limit.limit:
-                raise SafetyStop(stopped_by(limit, value), fix=RESIDUALS[limit.name].causes)
+                raise SafetyStop(stopped_by(limit, value) + self._named(limit.name), fix=RESIDUALS[limit.name].causes)
 
     def ticked(self, clock: float, round_trip: float, skipped: int, culprit: str) -> None:
         """A tick has ended: its command's round trip, the ticks after it that are skipped, and by whose fault."""
@@ -241,9 +249,16 @@ class Watch:
             blamed = Counter(who for who in self._blamed.values(tick.clock) if math.isfinite(who))
             culprit = list(FIX)[int(blamed.most_common(1)[0][0])]
             problem, fix = f"{problem}: {culprit}", FIX[culprit]
+        elif RESIDUALS[name].weighed:
+            problem += self._named(name)
         elif name in _FOLLOWING:
             problem, fix = f"{problem}; likely {', or '.join(self._causes()[:4])}", _FIX
         return SafetyStop(problem, fix=fix)
+
+    def _named(self, name: str) -> str:
+        if self._pulls is None or not RESIDUALS[name].weighed:
+            return ""
+        return f"; likely {self._pulls.causes(name)}"
 
     def _causes(self) -> list[str]:
         if not self._past:

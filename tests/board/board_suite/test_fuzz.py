@@ -124,7 +124,7 @@ def test_every_value_out_of_range_is_refused_and_moves_nothing(bench: Bench, rea
     if ready:
         bench.get_ready()
     cases = out_of_range_payloads()
-    assert len({command for command, _, _ in cases}) == 6  # all with fields but ENABLE, whose key takes all 32 bits
+    assert len({command for command, _, _ in cases}) == 7  # all with fields but ENABLE, whose key takes all 32 bits
     for i, (command, what, payload) in enumerate(cases):
         bench.chip.write(bench.frame(command, 1, payload) + bench.frame(Command.PING, i % 256))
         until = bench.chip.cycles + 20 * MS

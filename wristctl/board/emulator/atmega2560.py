@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from wristctl.board.emulator import amplifiers
 from wristctl.board.emulator import chip as state
 from wristctl.board.emulator.chip import FREQUENCY
 from wristctl.board.emulator.execute import run
@@ -109,6 +110,14 @@ class Atmega2560:
         row = self._chip.inputs[LETTERS.index(port)]
         row[0] |= 1 << bit
         row[1] = (row[1] & ~(1 << bit)) | level << bit
+
+    def fit_amplifier(self, axis: int, fitted: bool) -> None:
+        """Plug the HX711 of an axis in, or unplug it; at power-on there is none."""
+        amplifiers.fit(self._chip, axis, int(fitted))
+
+    def convert(self, axis: int, counts: int, since: int) -> None:
+        """Let the HX711 of an axis have converted so many of its 24 bits' counts from the cycle `since` until now."""
+        amplifiers.convert(self._chip, axis, counts, since)
 
     def events(self) -> NDArray[np.void]:
         """Changes of the output latches since the last call: cycle, port (ord of its letter), value."""

@@ -58,6 +58,7 @@ class Chip(Protocol):
     stop_when_sent: int
     edges: NDArray[np.int64]  # changed output latches: cycle, port letter, value
     edge_count: int
+    amplifiers: NDArray[np.int64]  # columns in amplifiers.py
 
 
 _ARRAYS = {
@@ -72,6 +73,7 @@ _ARRAYS = {
     "line": (np.uint8, 1 << 16),
     "sent": (np.uint8, 1 << 12),
     "edges": (np.int64, (1 << 16, 3)),
+    "amplifiers": (np.int64, (4, 5)),
 }
 
 

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from wristctl.board.emulator.amplifiers import LATCH, clock_amplifiers
 from wristctl.board.emulator.chip import NEVER, RX_BYTE, TX_BYTE, WATCHDOG, Chip
 from wristctl.board.emulator.peripherals import (
     MCUSR,
@@ -68,6 +69,7 @@ def reset(chip: Chip, cause: int) -> None:
     """Reset: I/O registers and the program counter; registers and RAM keep what they hold."""
     memory = chip.memory
     causes = (memory[MCUSR] & 0x0F if cause != POWER_ON else 0) | cause
+    clock_amplifiers(chip, memory[LATCH], 0)
     memory[IO_FIRST : IO_LAST + 1] = 0
     memory[UCSRA], memory[SPL], memory[SPH], memory[MCUSR] = UDRE, 0xFF, 0x21, causes
     chip.due[:] = NEVER

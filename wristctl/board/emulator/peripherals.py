@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from wristctl.board.emulator.amplifiers import PORT, clock_amplifiers
 from wristctl.board.emulator.chip import BUFFER_FULL, LOOK, NEVER, WATCHDOG, Chip
 from wristctl.lanes.compiled import compiled, kernel
 
@@ -92,6 +93,8 @@ def write_port(chip: Chip, port: int, address: int, value: int) -> None:
         return
     latch = memory[pin + 2] ^ value if address == pin else value
     if latch != memory[pin + 2]:
+        if port == PORT:
+            clock_amplifiers(chip, memory[pin + 2], latch)
         memory[pin + 2] = latch
         edge = chip.edges[chip.edge_count]
         edge[0], edge[1], edge[2] = chip.cycles, _LETTER[port], latch

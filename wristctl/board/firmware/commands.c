@@ -1,10 +1,12 @@
 #include "commands.h"
 #include "axis.h"
 #include "boot.h"
+#include "load_cells.h"
 #include "motion.h"
 #include "safety.h"
 #include "uart.h"
 #include <math.h>
+#include <stddef.h>
 #include <string.h>
 
 #define RATE_SCALE (1.0f / 65536) /* of RATE on the wire */
@@ -14,6 +16,7 @@ uint8_t on_hello(void) { return RESULT_OK; }
 uint8_t on_ping(void) { return RESULT_OK; }
 uint8_t on_status(void) { return RESULT_OK; }
 uint8_t on_counters(void) { return RESULT_OK; }
+uint8_t on_pulls(void) { return RESULT_OK; }
 
 /* The number that bound commands must name. Each start of the board has its own 256. */
 static uint16_t connection;
@@ -69,6 +72,9 @@ uint8_t on_rate(const struct rate_command *c) {
   motion_turn(rates, c->life);
   return RESULT_OK;
 }
+
+_Static_assert(sizeof(struct turn_command) == sizeof(struct rate_command), "TURN is a RATE");
+uint8_t on_turn(const struct turn_command *c) { return on_rate((const struct rate_command *)c); }
 
 uint8_t on_target(const struct target_command *c) {
   uint32_t total = 0;
@@ -169,6 +175,15 @@ void answer_status(struct status_answer *a) {
   }
   if (motion_lapsed()) a->flags |= FLAG_LAPSED;
   a->lapses = motion_lapses();
+}
+
+_Static_assert(offsetof(struct pulls_answer, counts) == sizeof(struct status_answer), "Pulls begins with a Status");
+void answer_pulls(struct pulls_answer *a) {
+  answer_status((struct status_answer *)a);
+  for (uint8_t i = 0; i < AXES; i++) {
+    a->counts[i] = load_cell_counts(i);
+    a->age[i] = load_cell_age_ms(i);
+  }
 }
 
 void answer_counters(struct counters_answer *a) {

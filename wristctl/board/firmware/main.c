@@ -1,10 +1,11 @@
 /* wristctl motor board: ATmega2560 at 16 MHz, four DM542 drives, one serial line.
  * Interrupts step the axes (axis.c), keep the millisecond and the safety (safety.c) and move bytes (uart.c);
- * this loop answers commands and works out rates. Nothing here waits and nothing is allocated. */
+ * this loop answers commands, works out rates and reads load cells. Nothing here waits and nothing is allocated. */
 #include "axis.h"
 #include "boot.h"
 #include "commands.h"
 #include "frame.h"
+#include "load_cells.h"
 #include "motion.h"
 #include "pins.h"
 #include "safety.h"
@@ -40,6 +41,7 @@ int main(void) {
       frame_send(&frame);
     }
     motion_poll();
+    load_cells_poll();
     sleep_until_interrupt();
   }
 }

@@ -7,6 +7,9 @@
  *
  *   ALM  (port L) PL0  PL1  PL2  PL3    Mega D49 D48 D47 D46   closed to GND while all is well, open in an alarm
  *
+ *   load cells' HX711 (port F): PF0  PF2  PF4  PF6    Mega A0 A2 A4 A6   DOUT, low when it has something new
+ *                               PF1  PF3  PF5  PF7    Mega A1 A3 A5 A7   PD_SCK
+ *
  *   emergency stop input PG0 (D41), closed to GND while all is well: a broken wire stops too
  *   state lamp           PB7 (D13, the board's own)                                                */
 #ifndef PINS_H
@@ -18,6 +21,8 @@
 #define DIR_BIT(axis) (2 << (2 * (axis)))
 #define ENA_BITS 0x0F
 #define ALARM_BITS 0x0F
+#define LOAD_DATA_BIT(axis) (1 << (2 * (axis)))
+#define LOAD_CLOCK_BIT(axis) (2 << (2 * (axis)))
 
 static inline void pins_init(void) {
   PORTC |= ENA_BITS; /* before the direction, so that the drives never see an enabling level */
@@ -26,6 +31,8 @@ static inline void pins_init(void) {
   DDRA = 0xFF;
   PORTG |= _BV(PG0); /* pull-up */
   PORTL |= ALARM_BITS; /* pull-ups */
+  PORTF = 0x55;        /* pull-ups of DOUT: where there is no amplifier it reads high, nothing new */
+  DDRF = 0xAA;
   DDRB |= _BV(PB7);
 }
 

@@ -70,7 +70,8 @@ def perform_trials(
     plant = PLANTS[settings.bench.plant.model]
     coordinates = plant.coordinates(settings.bench.segments) if settings.port is None else None
     monotonic = settings.port is not None or settings.real_time
-    trial_log = TrialLog(run.file("data/log.csv").parent, coordinates, settings.control_period, monotonic)
+    folder, weighed = run.file("data/log.csv").parent, settings.load_cells is not None
+    trial_log = TrialLog(folder, coordinates, settings.control_period, monotonic, weighed)
     try:
         experiment = Experiment(settings, study.wrist, trials, trial_log, network, tuned, calibration, study.seed)
         films = _films(run, settings)
