@@ -103,3 +103,10 @@ def test_a_search_tries_its_gains_on_the_loops_that_no_scenario_is_on() -> None:
     assert default.loops["camera"].actuator.level == "tendon" and default.loops["camera"].sensor.level == "camera"
     named = load_study(None, "tune.loops={mine: {plant_segments: 1}}").tune
     assert [scenario.loop for scenario in named.scenarios] == ["mine", "mine"]
+
+
+@pytest.mark.parametrize(("beside", "use"), [(Beside(1e-3, 2e-2, 8), True), (Beside(2e-2, 1e-3, 8), False),
+                                             (Beside(math.nan, math.nan, 0), False)])  # fmt: skip
+def test_gains_that_are_worse_than_feedforward_or_always_fail_are_not_to_be_used(beside: Beside, use: bool) -> None:
+    answer = answer_of({"smc": _search("smc")}, {"smc": beside}, {"smc": {}}, 8, "", {"smc": {}})
+    assert answer is not None and answer.sentence.startswith("Use smc with") == use

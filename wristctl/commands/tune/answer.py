@@ -26,6 +26,9 @@ _VERBS = {
     "not converged": "depends on the integration step",
 }
 
+# Difference of two errors' ratio from 1 that counts as none.
+_SAME = 0.01
+
 
 class Beside(NamedTuple):
     """RMSE of tuned gains and of feedforward on the same cases, [rad]: the geometric mean of those where both last."""
@@ -94,16 +97,20 @@ def answer_of(
 
 
 def _sentence(name: str, search: Search, beside: Beside, cases: int) -> str:
-    begin = f"Use {name} with {_gains(search)}."
+    gains = f"{name} with {_gains(search)}."
     if not beside.cases:
-        return f"{begin} It fails in each of {cases} cases (objective {search.objective:.3g})."
+        return (
+            f"Nothing to use was found: {gains} It fails in each of {cases} cases (objective {search.objective:.3g})."
+        )
+    worse = beside.ratio < 1.0 - _SAME
+    begin = f"Feedforward alone is better than what was found, {gains}" if worse else f"Use {gains}"
     times = f"{_times(beside)} feedforward's {degrees(beside.feedforward)} deg"
     where = f"{cases} cases" if beside.cases == cases else f"{beside.cases} of {cases} cases (in the others it fails)"
     return f"{begin} Its error is {degrees(beside.error)} deg RMSE over {where}: {times}."
 
 
 def _times(beside: Beside) -> str:
-    if abs(beside.ratio - 1.0) < 0.01:
+    if abs(beside.ratio - 1.0) < _SAME:
         return "the same as"
     return f"{two(beside.ratio)} times less than" if beside.ratio > 1.0 else f"{two(1.0 / beside.ratio)} times"
 
