@@ -83,8 +83,6 @@ def _family(name: str, of_family: dict[str, Any]) -> list[str]:
         about += f" Made for a tick of {1e3 * fast:g} ms and tendons of {soft / 1e3:g} to {stiff / 1e3:g} kN/m."
     heads = ("controller", "gains", "RMSE [deg], 95 %", "tunings [deg]", f"lost of {worlds} worlds", "to rely on")
     rows = sorted(of_family["controllers"].items(), key=lambda item: (not item[1]["reliable"], item[1]["rmse"]))
-    if rows[0][1]["reliable"]:
-        about += f" On {name} {rows[0][0]} errs least of those to rely on."
     return [
         about,
         "",

@@ -11,26 +11,27 @@ import re
 import shlex
 import shutil
 import sys
-import textwrap
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from wristctl.config.families import Family
-from wristctl.plotting.style import in_words
 from wristctl.records import Run
 
 HERE = Path(__file__).parent
 FIGURES = {"laws": "RMSE of every controller on every rig", "terms": "What each term of a controller buys"}
+ONE_MACHINES = {"--out", "--resume"}
+"""Options that say where a run lies, and what it was cut short as: no part of how it is asked for again."""
 BASELINE = "feedforward/default"
 PAPER = ("smc/tuned", "smc/printed", "smc/exchanged", "pid/printed")
 
 _ABOUT = """RMSE is the geometric mean over {worlds} worlds that no search saw, each a wrist and a rig drawn anew, and
 over {tunings} tunings of each controller. As good are controllers that paired differences do not tell from the lowest
-RMSE, at 95 %; to run is the one of them that moves the tendons least. Do not use what is shown to fail or swing in
-more than 1 % of the worlds. Their gains are shipped: `--gains tuned:camera`, [gains](gains.md). For a wrist of your
-own: [recommend](recommend.md)."""
+RMSE, at 95 %; what has no gains after its name is tuned. Do not use what is shown to fail or swing in more than 1 % of
+the worlds. Their gains are shipped: `--gains tuned:camera`, [gains](gains.md). For a wrist of your own:
+[recommend](recommend.md)."""
+_ANSWER = re.compile(r"## Result\n\n```\n(.*?)\n\n", re.DOTALL)
 _SURE = re.compile(r"How sure: .*?(?=\s+Every controller: )", re.DOTALL)
 
 Row = Mapping[Any, Any]
@@ -40,10 +41,11 @@ Row = Mapping[Any, Any]
 class Study:
     """What the page shows of a run.
 
-    Rankings by family, best first, what the families are, values of terms, orders tuned otherwise, how sure the answer
-    is in words, and the numbers of worlds and of tunings.
+    Its answer in words, rankings by family, best first, what the families are, values of terms, orders tuned otherwise,
+    how sure the answer is, and the numbers of worlds and of tunings.
     """
 
+    answer: str
     rankings: Mapping[str, Sequence[Row]]
     about: Mapping[str, str]
     terms: Sequence[Row]
@@ -59,27 +61,14 @@ def group(row: Row) -> int | None:
 
 
 def first_group(rows: Sequence[Row]) -> list[Row]:
-    """Rows that nothing is told apart from for the better; the one that moves the tendons least comes first."""
-    return sorted((row for row in rows if group(row) == 1), key=lambda row: float(row["chattering"]))
-
-
-def sentence(rankings: Mapping[str, Sequence[Row]]) -> str:
-    """Which controller to run on which rig; none where all must not be used."""
-    of: dict[str, list[str]] = {}
-    for name, rows in rankings.items():
-        for row in first_group(rows)[:1]:
-            of.setdefault(row["row"], []).append(f"{name} (RMSE {_deg(row['rmse'])} deg)")
-    parts = [f"run **{label}** ({_words(label)}) on {', '.join(rigs)}" for label, rigs in of.items()]
-    if none := [name for name, rows in rankings.items() if not first_group(rows)]:
-        parts.append(f"none of these can be relied on on {', '.join(none)}")
-    text = "; ".join(parts)
-    return "\n".join(textwrap.wrap(f"{text[:1].upper()}{text[1:]}.", 120))
+    """Rows that nothing is told apart from for the better; the one of the lowest RMSE comes first."""
+    return sorted((row for row in rows if group(row) == 1), key=lambda row: float(row["rmse"]))
 
 
 def decision(rankings: Mapping[str, Sequence[Row]]) -> list[str]:
     """A line for each rig: what to run, what is as good, what comes next, and how much is gained."""
     lines = [
-        "| rig | run | RMSE [deg], 95 % | as good | next: RMSE [deg] | feedforward's over it | do not use |",
+        "| rig | lowest RMSE | RMSE [deg], 95 % | as good | next: RMSE [deg] | feedforward's over it | do not use |",
         "| --- | --- | --- | --- | --- | --- | --- |",
     ]
     for name, rows in rankings.items():
@@ -90,7 +79,7 @@ def decision(rankings: Mapping[str, Sequence[Row]]) -> list[str]:
         best, *ties = first_group(rows)
         following = [row for row in rows if group(row) == 2]
         after = min(following, key=lambda row: float(row["rmse"])) if following else None
-        same = ", ".join(_short(row["row"]) for row in ties[:3]) + (f", {len(ties) - 3} more" if len(ties) > 3 else "")
+        same = ", ".join(_short(row["row"]) for row in ties)
         then = f"{_short(after['row'])} {_deg(after['rmse'])}" if after else "-"
         lines.append(
             f"| {name} | **{best['row']}** | {_interval(best)} | {same or '-'} | {then} "
@@ -174,7 +163,7 @@ def page(study: Study, made: str) -> str:
     rankings = study.rankings
     about = _ABOUT.format(worlds=study.worlds, tunings=study.tunings)
     lines = [
-        "# Which controller for which rig, tuned at equal budget", "", sentence(rankings), "",
+        "# Which controller for which rig, tuned at equal budget", "", study.answer, "",
         *decision(rankings), "",
         *(f"- **{name}**: {about}" for name, about in study.about.items()), "",
         study.sure, "",
@@ -192,11 +181,6 @@ def page(study: Study, made: str) -> str:
         "## Tuned otherwise", "", *sensitivity(study.sensitivity), "", "Made by `python docs/study.py RUN`.",
     ]  # fmt: skip
     return "\n".join(lines) + "\n"
-
-
-def _words(label: str) -> str:
-    """What a controller is: `computed torque, observer`."""
-    return in_words(label.split("/")[0]).partition(" (")[2].removesuffix(")")
 
 
 def _short(label: str) -> str:
@@ -240,15 +224,19 @@ def main() -> None:
     files = {name: f"ranking-{name.replace(', ', '-')}" for name in named(families)}
     files = {name: file for name, file in files.items() if (run.path / "data" / f"{file}.csv").exists()}
     about = {name: told for name, told in named(families).items() if name in files}
-    (sure,) = _SURE.findall((run.path / "README.md").read_text(encoding="utf-8"))
+    (answer,), (sure,) = (
+        part.findall((run.path / "README.md").read_text(encoding="utf-8")) for part in (_ANSWER, _SURE)
+    )
     rankings = {name: run.data(file).to_dict("records") for name, file in files.items()}
     otherwise = run.data("sensitivity").to_dict("records")
-    study = Study(rankings, about, terms, otherwise, sure, budget.worlds, budget.tunings)
-    command = shlex.join(["wristctl", *manifest["argv"][1:]])
-    minutes = manifest["timing"]["wall_s"] / 60.0
+    study = Study(answer, rankings, about, terms, otherwise, sure, budget.worlds, budget.tunings)
+    words = manifest["argv"][1:]
+    kept = [word for word, before in zip(words, ["", *words], strict=False) if not {word, before} & ONE_MACHINES]
+    command, minutes = shlex.join(["wristctl", *kept]), manifest["timing"]["wall_s"] / 60.0
+    part = " for the last part of a run that was resumed" if "--resume" in words else ""
     made = "\n".join(
         [
-            f"`{command}`, {minutes:.0f} minutes on two cores, {run.id}.",
+            f"`{command}`, {minutes:.0f} minutes on two cores{part}, {run.id}.",
             "Its result, the same by any executor and after any interruption, has the hash",
             f"`{manifest['result_sha256']}`. What it costs elsewhere: [cost](cost.md).",
         ]

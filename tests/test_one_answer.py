@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import re
 from collections.abc import Iterator
 from pathlib import Path
@@ -12,13 +11,11 @@ import pytest
 import yaml
 
 from wristctl.config.choices import CONTROLLERS
-from wristctl.control.shipped_gains import FILE, PREFIX
 
 ROOT = Path(__file__).parents[1]
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
 ANSWERS: list[dict[str, Any]] = yaml.safe_load((ROOT / "docs" / "answers.yaml").read_text(encoding="utf-8"))
 OLDER = "**Older than today's controllers**"
-SHIPPED = json.loads((ROOT / "wristctl" / "control" / FILE).read_text(encoding="utf-8"))
 
 _NAMES = "|".join(sorted((re.escape(name) for name in CONTROLLERS), key=len, reverse=True))
 _WHO = re.compile(rf"(?<![\w/.-])`?({_NAMES})(?:/[a-z:-]+)?`?(?![\w-])", re.IGNORECASE)
@@ -51,12 +48,6 @@ def contradictions(answers: list[dict[str, Any]]) -> list[tuple[str, str]]:
     return pairs
 
 
-def shipped_best(family: str) -> str:
-    """The controller of a family with the least error of those to rely on."""
-    reliable = {name: row["rmse"] for name, row in SHIPPED[family]["controllers"].items() if row["reliable"]}
-    return min(reliable, key=lambda name: reliable[name])
-
-
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.relative_to(ROOT).as_posix())
 def test_a_page_names_a_best_controller_only_with_its_run_and_worlds(page: Path) -> None:
     name, text = page.relative_to(ROOT).as_posix(), page.read_text(encoding="utf-8")
@@ -74,11 +65,6 @@ def test_no_page_contradicts_another_and_one_that_did_would_be_seen() -> None:
     other = one | {"best": ["mpc"], "sentence": "run mpc"}
     assert contradictions([one, other]) == [("run pid", "run mpc")]
     assert contradictions([one, other | {"older": True}]) == contradictions([one, other | {"gains": "presets"}]) == []
-
-
-def test_the_answers_of_the_shipped_gains_are_what_is_shipped() -> None:
-    told = {answer["worlds"]: answer["best"] for answer in ANSWERS if answer["gains"].startswith(PREFIX)}
-    assert told == {family: [shipped_best(family)] for family in SHIPPED}
 
 
 @pytest.mark.parametrize(

@@ -126,4 +126,4 @@ def test_a_comparison_renews_errors_and_lost_worlds_and_leaves_the_gains(tmp_pat
     assert [rows[name]["reliable"] for name in ("pd-ff", "pid-ff")] == [False, True]
     assert rows["pd-ff"]["gains"] == before["pd-ff"]["gains"] and rows["pd-ff"]["rmse"] == 2e-3
     page = script.page({"camera": renewed})
-    assert f"{math.degrees(1e-3):.3g} [" in page and "abc" in page and "def" in page and "On camera pid-ff errs" in page
+    assert f"{math.degrees(1e-3):.3g} [" in page and "abc" in page and "def" in page
