@@ -26,13 +26,15 @@ ONE_MACHINES = {"--out", "--resume"}
 BASELINE = "feedforward/default"
 PAPER = ("smc/tuned", "smc/printed", "smc/exchanged", "pid/printed")
 
-_ABOUT = """RMSE is the geometric mean over {worlds} worlds that no search saw, each a wrist and a rig drawn anew, and
-over {tunings} tunings of each controller. As good are controllers that paired differences do not tell from the lowest
-RMSE, at 95 %; what has no gains after its name is tuned. Do not use what is shown to fail or swing in more than 1 % of
-the worlds. Their gains are shipped: `--gains tuned:camera`, [gains](gains.md). For a wrist of your own:
-[recommend](recommend.md)."""
+_ABOUT = """All of it is simulated: {worlds} worlds of each family, wrists and rigs drawn anew and held out from tuning.
+Each controller was tuned {tunings} times, each time with {evaluations} evaluations on {draws} other worlds. RMSE is the
+geometric mean over worlds and tunings; intervals and ties are of 95 %, by paired differences. The first sentence names
+what is in the first group on all rigs of its kind. A world is lost where a controller fails, swings or chatters. Do not
+use what is shown, at 95 %, to lose more than 1 % of the worlds; a few of so many do not show it. Names without a suffix
+are tuned; [what they mean](choices.md#controllers). The gains: `wristctl simulate --gains tuned:camera`, [of all
+families](gains.md). For a wrist of your own: [recommend](recommend.md)."""
 _ANSWER = re.compile(r"## Result\n\n```\n(.*?)\n\n", re.DOTALL)
-_SURE = re.compile(r"How sure: .*?(?=\s+Every controller: )", re.DOTALL)
+_FIRST = re.compile(r"([\w-]+(?: \(steps\))?) [\w-]+ (\d+) and (\d+ of \d+)(?=[;.])")
 
 Row = Mapping[Any, Any]
 
@@ -42,7 +44,7 @@ class Study:
     """What the page shows of a run.
 
     Its answer in words, rankings by family, best first, what the families are, values of terms, orders tuned otherwise,
-    how sure the answer is, and the numbers of worlds and of tunings.
+    how often the best of a family is first, and how it was tuned and judged.
     """
 
     answer: str
@@ -50,9 +52,8 @@ class Study:
     about: Mapping[str, str]
     terms: Sequence[Row]
     sensitivity: Sequence[Row]
-    sure: str
-    worlds: int
-    tunings: int
+    first: Mapping[str, str]
+    settings: str
 
 
 def group(row: Row) -> int | None:
@@ -65,16 +66,17 @@ def first_group(rows: Sequence[Row]) -> list[Row]:
     return sorted((row for row in rows if group(row) == 1), key=lambda row: float(row["rmse"]))
 
 
-def decision(rankings: Mapping[str, Sequence[Row]]) -> list[str]:
-    """A line for each rig: what to run, what is as good, what comes next, and how much is gained."""
+def decision(rankings: Mapping[str, Sequence[Row]], first: Mapping[str, str]) -> list[str]:
+    """A line for each rig: what to run, how often it is first, what is as good, what comes next, and the gain."""
     lines = [
-        "| rig | lowest RMSE | RMSE [deg], 95 % | as good | next: RMSE [deg] | feedforward's over it | do not use |",
-        "| --- | --- | --- | --- | --- | --- | --- |",
+        "| rig | lowest RMSE | RMSE [deg], 95 % | first in halves of the worlds, in tunings | not told from it "
+        "| the next that is: RMSE [deg] | feedforward's RMSE over the lowest | [do not use](#what-not-to-use) |",
+        "| --- | --- | --- | --- | --- | --- | --- | --- |",
     ]
     for name, rows in rankings.items():
         lost = sum(group(row) is None for row in rows)
         if not first_group(rows):
-            lines.append(f"| {name} | none | - | - | - | - | {lost} of {len(rows)} |")
+            lines.append(f"| {name} | none | - | - | - | - | - | {lost} of {len(rows)} |")
             continue
         best, *ties = first_group(rows)
         following = [row for row in rows if group(row) == 2]
@@ -82,7 +84,7 @@ def decision(rankings: Mapping[str, Sequence[Row]]) -> list[str]:
         same = ", ".join(_short(row["row"]) for row in ties)
         then = f"{_short(after['row'])} {_deg(after['rmse'])}" if after else "-"
         lines.append(
-            f"| {name} | **{best['row']}** | {_interval(best)} | {same or '-'} | {then} "
+            f"| {name} | **{best['row']}** | {_interval(best)} | {first.get(name, '-')} | {same or '-'} | {then} "
             f"| {_three(best['times_better'])} | {lost} of {len(rows)} |"
         )
     return lines
@@ -105,18 +107,20 @@ def of_the_paper(rankings: Mapping[str, Sequence[Row]]) -> list[str]:
         cells = []
         for rows in rankings.values():
             row = next(row for row in rows if row["row"] == label)
-            lost = f"do not use ({100.0 * (row['failures'] + row['swings']):.3g} % lost)"
+            lost = f"{100.0 * (row['failures'] + row['swings']):.3g} % lost"
             cells.append(f"{row['rmse'] / first_group(rows)[0]['rmse']:.3g}" if group(row) else lost)
         lines.append(f"| {label} | {' | '.join(cells)} |")
     return lines
 
 
 def bought(terms: Sequence[Row], families: Sequence[str]) -> list[str]:
-    """How many times less the RMSE is with each term, by rig."""
+    """How many times less the RMSE is with each term, by rig, and which two controllers tell it."""
     lines = [f"| term | {' | '.join(families)} |", "| --- |" + " --- |" * len(families)]
     for term in dict.fromkeys(row["term"] for row in terms):
         values = {row["family"]: row for row in terms if row["term"] == term}
-        lines.append(f"| {term} | {' | '.join(_times(values[name]) for name in families)} |")
+        pair = next(iter(values.values()))
+        named = f"{term}: {_short(pair['without'])} to {_short(pair['with'])}"
+        lines.append(f"| {named} | {' | '.join(_times(values[name]) for name in families)} |")
     return lines
 
 
@@ -161,19 +165,20 @@ def sensitivity(rows: Sequence[Row]) -> list[str]:
 def page(study: Study, made: str) -> str:
     """The page: answer and tables; `made` is the paragraph on the run."""
     rankings = study.rankings
-    about = _ABOUT.format(worlds=study.worlds, tunings=study.tunings)
     lines = [
         "# Which controller for which rig, tuned at equal budget", "", study.answer, "",
-        *decision(rankings), "",
+        *decision(rankings, study.first), "",
         *(f"- **{name}**: {about}" for name, about in study.about.items()), "",
-        study.sure, "",
-        about, "",
-        "## The paper's controllers", "", "RMSE over that of the controller to run:", "",
+        study.settings, "",
+        "## The paper's controllers", "",
+        "RMSE over the lowest on the rig, or the share of worlds that are lost. `printed`: with the paper's gains;",
+        "`exchanged`: with P1 and P2 of these exchanged.", "",
         *of_the_paper(rankings), "",
         "## What a term buys", "",
-        "RMSE without the term over RMSE with it: above 1 it helps. In parentheses no effect is shown.", "",
+        "RMSE of the first controller over that of the second, which has the term: above 1 it helps, below it harms.",
+        "In parentheses the 95 % interval holds 1: no effect is shown.", "",
         *bought(study.terms, list(rankings)), "",
-        "## What not to use", "", "With the share of worlds in which it fails or swings:", "",
+        "## What not to use", "", "With the share of worlds that are lost:", "",
         *unusable(rankings), "",
         *(part for name, told in FIGURES.items() for part in (f"![{told}](images/study-{name}.png)", "")),
         made, "",
@@ -207,7 +212,7 @@ def named(families: Mapping[str, Family]) -> dict[str, str]:
     return {
         name: about
         for family, content in families.items()
-        for name, about in ((family, content.about), (f"{family}, steps", f"{content.about}; its jumps alone"))
+        for name, about in ((family, content.about), (f"{family}, steps", f"{content.about}; its steps alone"))
     }
 
 
@@ -224,12 +229,21 @@ def main() -> None:
     files = {name: f"ranking-{name.replace(', ', '-')}" for name in named(families)}
     files = {name: file for name, file in files.items() if (run.path / "data" / f"{file}.csv").exists()}
     about = {name: told for name, told in named(families).items() if name in files}
-    (answer,), (sure,) = (
-        part.findall((run.path / "README.md").read_text(encoding="utf-8")) for part in (_ANSWER, _SURE)
-    )
+    told = (run.path / "README.md").read_text(encoding="utf-8")
+    (answer,) = _ANSWER.findall(told)
+    firsts = _FIRST.findall(" ".join(told.partition("First in how many")[2].partition("\n```")[0].split()))
+    first = {
+        name.replace(" (steps)", ", steps"): f"{halves} of 50, {of_tunings}" for name, halves, of_tunings in firsts
+    }
     rankings = {name: run.data(file).to_dict("records") for name, file in files.items()}
     otherwise = run.data("sensitivity").to_dict("records")
-    study = Study(answer, rankings, about, terms, otherwise, sure, budget.worlds, budget.tunings)
+    how = _ABOUT.format(
+        worlds=budget.worlds,
+        tunings=budget.tunings,
+        evaluations=budget.candidates * budget.iterations,
+        draws=budget.draws,
+    )
+    study = Study(answer, rankings, about, terms, otherwise, first, how)
     words = manifest["argv"][1:]
     kept = [word for word, before in zip(words, ["", *words], strict=False) if not {word, before} & ONE_MACHINES]
     command, minutes = shlex.join(["wristctl", *kept]), manifest["timing"]["wall_s"] / 60.0

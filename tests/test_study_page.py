@@ -30,9 +30,14 @@ ROWS = [row("mpc/tuned", 1, 0.1, 9.0), row("ct-dob/tuned", 1, 0.11, 3.0), row("l
 
 def test_a_rigs_line_has_the_lowest_error_of_what_may_be_used_what_is_as_good_and_what_comes_next() -> None:
     script = script_of_docs("study")
-    lines = script.decision({"camera": ROWS, "hard": [row("pid/tuned", math.nan, 0.1, 1.0, 0.5)]})[2:]
-    assert lines[0] == "| camera | **mpc/tuned** | 0.1 [0.09, 0.11] | ct-dob | lqi 0.2 | 2,000 | 1 of 4 |"
-    assert lines[1] == "| hard | none | - | - | - | - | 1 of 1 |"
+    lines = script.decision(
+        {"camera": ROWS, "hard": [row("pid/tuned", math.nan, 0.1, 1.0, 0.5)]}, {"camera": "31 of 50, 2 of 5"}
+    )[2:]
+    assert (
+        lines[0]
+        == "| camera | **mpc/tuned** | 0.1 [0.09, 0.11] | 31 of 50, 2 of 5 | ct-dob | lqi 0.2 | 2,000 | 1 of 4 |"
+    )
+    assert lines[1] == "| hard | none | - | - | - | - | - | 1 of 1 |"
 
 
 def test_what_has_no_group_must_not_be_used_however_small_its_error() -> None:
@@ -44,11 +49,27 @@ def test_what_has_no_group_must_not_be_used_however_small_its_error() -> None:
 def test_an_effect_whose_interval_holds_one_stands_in_parentheses() -> None:
     script = script_of_docs("study")
     terms = [
-        {"term": "an integral", "family": "camera", "times": 1.284, "low": 1.21, "high": 1.35},
-        {"term": "an integral", "family": "steps", "times": 0.998, "low": 0.99, "high": 1.01},
+        {
+            "term": "an integral",
+            "family": "camera",
+            "without": "pd-ff/tuned",
+            "with": "pid/printed",
+            "times": 1.284,
+            "low": 1.21,
+            "high": 1.35,
+        },
+        {
+            "term": "an integral",
+            "family": "steps",
+            "without": "pd-ff/tuned",
+            "with": "pid/printed",
+            "times": 0.998,
+            "low": 0.99,
+            "high": 1.01,
+        },
     ]
     assert script.bought(terms, ["camera", "steps"])[-1] == (
-        "| an integral | 1.28 [1.21, 1.35] | (0.998 [0.99, 1.01]) |"
+        "| an integral: pd-ff to pid/printed | 1.28 [1.21, 1.35] | (0.998 [0.99, 1.01]) |"
     )
 
 
