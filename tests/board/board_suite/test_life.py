@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from itertools import pairwise
 from typing import Any
 
@@ -69,7 +70,8 @@ def test_a_rate_without_another_ramps_to_rest_after_its_life_whatever_feeds_the_
         ramp = since[:-1][gaps > 1.02 * 1e3 / RATE]
         assert 1e3 * life < ramp[0] + 1.0 and ramp[0] < 1e3 * life + POLL + UPDATE
         down = 1e3 * RATE / ACCELERATION
-        assert 1e3 * life + down - 5.0 < since[-1] < 1e3 * life + POLL + UPDATE + down + 5.0
+        last = 1e3 * math.sqrt(2.0 / ACCELERATION)  # from the last step to rest, where no further one fits in
+        assert 1e3 * life + down - last < since[-1] < 1e3 * life + POLL + UPDATE + down + 5.0
         late = gaps[since[:-1] > 1e3 * life + 4.0]
         assert all(after > 0.95 * before - WAITS for before, after in pairwise(late))
     bench.do(Rate((RATE, 0.0, 0.0, 0.0), life))
