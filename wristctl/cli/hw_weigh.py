@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from wristctl.cli.hw_by_hand import Dry
 from wristctl.cli.operator import idle, typed_line
 from wristctl.cli.options import BAUD, Baud, Debug, Port, study_files
 from wristctl.commands.printed_table import Table
@@ -28,7 +29,7 @@ def weigh(
         float | None, typer.Option("--kg", min=0.1, help="Weight that is hung on one tendon's cell after the other.")
     ] = None,
     axis: Annotated[int | None, typer.Option("--axis", min=0, max=3, help="Weigh with this axis's cell alone.")] = None,
-    port: Port = None, baud: Baud = BAUD, debug: Debug = False,
+    port: Port = None, baud: Baud = BAUD, dry_run: Dry = False, debug: Debug = False,
 ) -> None:  # fmt: skip
     """Read the tendons' load cells, take what they show as no pull, and with --kg find their scale; nothing moves.
 
@@ -41,6 +42,10 @@ def weigh(
     from wristctl.wrist.directions import ACTIVE
 
     cells = load_study(files or (), (), "hw-run").hw_run.load_cells or LoadCells()
+    if dry_run:
+        weighed = "" if mass is None else f", then {mass:g} kg on each in turn, or on that of --axis"
+        print(f"the load cells are read without a pull{weighed}; nothing moves")
+        return
     with Board(open_transport(port, baud)) as board:
         _ask("All tendons slack, nothing hangs on a cell; then press Enter: ")
         empty = weighing.weigh(board)
@@ -72,7 +77,7 @@ def _tell(cells: LoadCells, weighing: Weighing) -> None:
     from wristctl.trial.weighing import newtons
     from wristctl.wrist.directions import ACTIVE
 
-    pulls = newtons(cells, weighing)
+    pulls = newtons(cells, weighing.counts)
     rows = [
         (axis, ACTIVE[axis], "silent", "", "") if pull != pull
         else (axis, ACTIVE[axis], f"{counts:.1f}", f"{scatter:.1f}", f"{pull:.2f}")
