@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import json
 import math
-import shlex
 import sys
 from pathlib import Path
 from typing import Any
@@ -18,10 +17,9 @@ from typing import Any
 from wristctl.commands.study.published import PUBLISHED
 from wristctl.control.shipped_gains import FILE, PREFIX
 from wristctl.records import Run
+from wristctl.records.manifest import asked_again
 
 HERE = Path(__file__).parent
-ONE_MACHINES = {"--out", "--resume"}
-"""Options that say where a run lies, and what it was cut short as: no part of how it is asked for again."""
 # Table of a comparison over worlds, and the fates of its rows on which nobody should rely.
 RANKING = "ranking"
 UNUSABLE = ("unreliable", "does not arrive", "not physical")
@@ -31,9 +29,7 @@ SHIPPED = HERE.parent / "wristctl" / "control" / FILE
 def source_of(run: Run) -> dict[str, str]:
     """A run's identifier, the hash of its result, and how it is asked for again."""
     manifest = json.loads((run.path / "run.json").read_text(encoding="utf-8"))
-    words = manifest["argv"][1:]
-    kept = [word for word, before in zip(words, ["", *words], strict=False) if not {word, before} & ONE_MACHINES]
-    return {"run": run.id, "result_sha256": manifest["result_sha256"], "command": shlex.join(["wristctl", *kept])}
+    return {"run": run.id, "result_sha256": manifest["result_sha256"], "command": asked_again(manifest["argv"])}
 
 
 def with_run(content: dict[str, Any], run: Run) -> dict[str, Any]:

@@ -8,7 +8,6 @@ from __future__ import annotations
 import json
 import math
 import re
-import shlex
 import shutil
 import sys
 from collections.abc import Mapping, Sequence
@@ -18,12 +17,10 @@ from typing import Any
 
 from wristctl.config.families import Family
 from wristctl.records import Run
+from wristctl.records.manifest import asked_again
 
 HERE = Path(__file__).parent
 FIGURES = {"laws": "RMSE of every controller on every rig", "terms": "What each term of a controller buys"}
-ONE_MACHINES = {"--out", "--resume"}
-"""Options that say where a run lies, and what it was cut short as: no part of how it is asked for again."""
-BASELINE = "feedforward/default"
 PAPER = ("smc/tuned", "smc/printed", "smc/exchanged", "pid/printed")
 
 _ABOUT = """All of it is simulated: {worlds} worlds of each family, wrists and rigs drawn anew and held out from tuning.
@@ -244,10 +241,8 @@ def main() -> None:
         draws=budget.draws,
     )
     study = Study(answer, rankings, about, terms, otherwise, first, how)
-    words = manifest["argv"][1:]
-    kept = [word for word, before in zip(words, ["", *words], strict=False) if not {word, before} & ONE_MACHINES]
-    command, minutes = shlex.join(["wristctl", *kept]), manifest["timing"]["wall_s"] / 60.0
-    part = " for the last part of a run that was resumed" if "--resume" in words else ""
+    command, minutes = asked_again(manifest["argv"]), manifest["timing"]["wall_s"] / 60.0
+    part = " for the last part of a run that was resumed" if "--resume" in manifest["argv"] else ""
     made = "\n".join(
         [
             f"`{command}`, {minutes:.0f} minutes on two cores{part}, {run.id}.",

@@ -5,13 +5,12 @@ from __future__ import annotations
 import json
 import sys
 import tempfile
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-from tests.plotting.browser import CHROMIUM, DRIVER, Browser
+from tests.plotting.browser import Browser
 from wristctl.cli.app import main
 from wristctl.config.study import Study
 from wristctl.plotting.page import page, several_page
@@ -54,15 +53,6 @@ def foreign(tmp_path_factory: pytest.TempPathFactory) -> Run:
     (live.path / "figures" / "\x1b[2J\nforged.svg").write_text(SVG)
     write_seal(live.path, {})
     return Run(live.path)
-
-
-@pytest.fixture(scope="module")
-def browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
-    if not (CHROMIUM and DRIVER):
-        pytest.skip("needs Debian's chromium and chromium-driver")
-    made = Browser(tmp_path_factory.mktemp("profile"))
-    yield made
-    made.close()
 
 
 @pytest.mark.parametrize("many", [False, True], ids=["one run", "several runs"])

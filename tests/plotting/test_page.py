@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import importlib.util
 import json
 import re
 import time
-from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -24,12 +22,7 @@ from wristctl.records import InputRun, Run, start_run
 from wristctl.records.manifest import OVERVIEW, Overview
 from wristctl.simulation.repetitions import Repeated
 
-HERE = Path(__file__).parent
-KEPT = HERE.parents[1] / "build" / "screenshots"
-SPEC = importlib.util.spec_from_file_location("browser", HERE / "browser.py")
-assert SPEC is not None and SPEC.loader is not None
-BROWSER = importlib.util.module_from_spec(SPEC)
-SPEC.loader.exec_module(BROWSER)
+KEPT = Path(__file__).parents[2] / "build" / "screenshots"
 
 TABLE_ROWS = "[...document.querySelector('table.sortable').tBodies[0].rows]"
 MARKUP = "</script><b>bold</b>"
@@ -62,15 +55,6 @@ def compared(tmp_path_factory: pytest.TempPathFactory, results: list[ComparedRow
 def _complete(result: ComparedRow) -> ComparedRow:
     metrics = {"settling": 1.0, "steady_state": 1e-4} | result.simulation.metrics
     return replace(result, repeated=Repeated.once(replace(result.simulation, metrics=metrics)))
-
-
-@pytest.fixture(scope="module")
-def browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Any]:
-    if not (BROWSER.CHROMIUM and BROWSER.DRIVER):
-        pytest.skip("needs Debian's chromium and chromium-driver")
-    made = BROWSER.Browser(tmp_path_factory.mktemp("profile"))
-    yield made
-    made.close()
 
 
 def test_the_page_is_one_file_that_asks_for_nothing(compared: Run) -> None:

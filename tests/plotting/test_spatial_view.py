@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +10,7 @@ import numpy as np
 import pytest
 
 import wristctl
-from tests.plotting.browser import CHROMIUM, DRIVER, Browser
+from tests.plotting.browser import Browser
 from wristctl.arrays import Array
 from wristctl.config.study import Study
 from wristctl.config.wrist import WristParameters
@@ -143,15 +142,6 @@ def test_the_figure_shows_both_paths_of_the_tip_and_every_tendon(tendons: int) -
     assert [colours.count(colour) for colour in TENDON_COLOURS[:4]] == [4] * tendons + [0] * (4 - tendons)
     assert len(left.patches) == wrist.discs and left.get_title(loc="left") == "as believed"
     assert rim(wrist) > wrist.tendon_radius
-
-
-@pytest.fixture(scope="module")
-def browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
-    if not (CHROMIUM and DRIVER):
-        pytest.skip("needs Debian's chromium and chromium-driver")
-    made = Browser(tmp_path_factory.mktemp("profile"))
-    yield made
-    made.close()
 
 
 SEEK = "const s = document.getElementById('instant'); s.value = {}; s.dispatchEvent(new Event('input'));"

@@ -4,6 +4,8 @@ What others act on (ids, kinds, roles, hashes, names of files) has one form, and
 """
 
 import json
+import shlex
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field
 from pathlib import Path, PurePosixPath
 from typing import Annotated, Any, Literal
@@ -22,6 +24,8 @@ KINDS = (
     "gen-data", "train", "tune", "compare", "study", "recommend", "simulate", "analyse", "hysteresis", "audit",
     "hw-run", "identify", "validate", "track", "calibrate-camera", "calibrate-wrist",
 )  # fmt: skip
+# Options that say where a run lies, and what it was cut short as.
+_ONE_MACHINES = {"--out", "--resume"}
 
 EndState = Literal["running", "ok", "failed", "interrupted"]
 
@@ -216,3 +220,10 @@ def read_overview(folder: Path) -> Overview:
 
 def _texts(value: Any) -> list[str]:
     return [text for text in value if isinstance(text, str)] if isinstance(value, list) else []
+
+
+def asked_again(argv: Sequence[str]) -> str:
+    """A run's command line as anybody asks for it again: without where the run lies, and what it was cut short as."""
+    words = argv[1:]
+    kept = [word for word, before in zip(words, ["", *words], strict=False) if not {word, before} & _ONE_MACHINES]
+    return shlex.join(["wristctl", *kept])

@@ -176,6 +176,12 @@ def spool_speed(fastest: Any, acceleration: Any, gap: Any, moving: Any, before: 
 
 
 @compiled
+def left_behind(acceleration: Any, gap: Any, closing: Any, h: float) -> Any:
+    """Gap that is left from where a spool can stop, after a period of closing it at this speed."""
+    return gap - h * closing - 0.5 * closing * abs(closing) / acceleration
+
+
+@compiled
 def reel_in(motor: Any, state: Any, side: int, target: Any, moving: Any, h: float) -> Any:
     """Move a stepper towards its moving target with bounded speed and acceleration; returns whole microsteps, and its
     withheld pull: of the length from where it can stop to its target, where that is more than a microstep."""
@@ -184,7 +190,7 @@ def reel_in(motor: Any, state: Any, side: int, target: Any, moving: Any, h: floa
     closing = speed - moving
     state[side + 1] = speed
     state[side] = state[side] + h * speed
-    behind = gap - h * closing - 0.5 * closing * abs(closing) / motor.acceleration
+    behind = left_behind(motor.acceleration, gap, closing, h)
     withheld = where(abs(behind) > motor.step + _ROUNDING, motor.stiffness * behind, 0.0)
     return motor.step * floor(state[side] / motor.step + 0.5), withheld
 

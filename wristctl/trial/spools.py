@@ -22,7 +22,7 @@ from wristctl.config.wrist import WristParameters
 from wristctl.lanes.compiled import kernel
 from wristctl.lanes.lane import zero_like
 from wristctl.lanes.rows import rows_of
-from wristctl.simulation.actuator import spool_speed, spool_target
+from wristctl.simulation.actuator import left_behind, spool_speed, spool_target
 from wristctl.wrist.directions import ACTIVE, tendons_of
 from wristctl.wrist.segments import load_segments, segments
 from wristctl.wrist.tendons import lengths, moment_arms
@@ -75,8 +75,8 @@ class Spools:
 
         `gap` and `moving` are those of `rate`. Less than a step is none, and so it is at the speeds that close the gap.
         """
-        closing = sent - moving
-        left: Array = gap - closing * period - 0.5 * closing * np.abs(closing) / self.acceleration
+        left = np.empty(len(gap))
+        _behind(self.acceleration, gap, sent - moving, period, left)
         return np.where(np.abs(left) > 1.0, left, 0.0)
 
 
@@ -128,6 +128,13 @@ def _rates(motor: Any, gap: Any, moving: Any, before: Any, period: float, rates:
     for axis in range(len(gap)):
         most = acceleration + zero_like(gaps[axis])
         out[axis] = spool_speed(speed, most, gaps[axis], speeds[axis], last[axis], period)
+
+
+@kernel
+def _behind(acceleration: float, gap: Any, closing: Any, period: float, left: Any) -> None:
+    gaps, speeds, out = rows_of(gap), rows_of(closing), rows_of(left)
+    for axis in range(len(gap)):
+        out[axis] = left_behind(acceleration, gaps[axis], speeds[axis], period)
 
 
 @kernel

@@ -11,10 +11,9 @@ from wristctl.arrays import Array
 from wristctl.board.messages import AXES, Pulls
 from wristctl.config.hw_run import RigSettings
 from wristctl.trial.safety import SafetyStop
+from wristctl.trial.weighing import at_an_end, newtons
 from wristctl.wrist.directions import ACTIVE
 
-# Counts from which an amplifier is at an end of its range: a wire of the cell is broken, or it is overloaded.
-_END = 32_700
 # Seconds after the board's start within which amplifiers may be settling; at 10 conversions a second it takes them 0.4.
 _SETTLING = 1.0
 # Conversions of which an amplifier takes the mean, and one that may not have been read yet; seconds on the way to here.
@@ -43,7 +42,7 @@ class TendonPulls:
     def __init__(self, settings: RigSettings) -> None:
         cells = settings.load_cells
         assert cells is not None
-        self._offset, self._scale = np.array(cells.offset), np.array(cells.counts_per_newton)
+        self._cells = cells
         self._limits = settings.safety
         self._window = _CONVERSIONS / cells.rate + _UNDERWAY
         self._past: deque[_Past] = deque()
@@ -62,9 +61,10 @@ class TendonPulls:
         """Take in a reading."""
         counts, age = np.array(pulls.counts, float), np.array(pulls.age)
         settling = pulls.time < _SETTLING
-        silent = (age > self._limits.cell_age) | (np.abs(counts) >= _END)
-        self.age = np.where(silent & settling, 0.0, np.where(np.abs(counts) >= _END, math.inf, age))
-        self.pull = np.where(silent, math.nan, (counts - self._offset) / self._scale)
+        ended = at_an_end(counts)
+        silent = (age > self._limits.cell_age) | ended
+        self.age = np.where(silent & settling, 0.0, np.where(ended, math.inf, age))
+        self.pull = np.where(silent, math.nan, newtons(self._cells, counts))
 
     def judge(self) -> None:
         """Raises SafetyStop where a cell is silent, or a tendon beside motors that stand pulls beyond all limits."""

@@ -3,6 +3,7 @@
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from wristctl.arrays import Array
 from wristctl.board.driver import Board
@@ -16,8 +17,10 @@ GRAVITY = 9.80665
 # Seconds of one weighing, between two looks, for which amplifiers may be starting, and in which they settle on a new
 # weight: 0.4 at ten conversions a second.
 _WEIGHED, _LOOK, _STARTING, _SETTLES = 2.0, 0.01, 1.0, 0.5
-# Age [s] that the board has for a cell that gives nothing, and counts at an end of an amplifier's range.
-_SILENT, _END = 0.255, 32_700
+# Age [s] that the board has for a cell that gives nothing.
+_SILENT = 0.255
+# Counts from which an amplifier is at an end of its range: a wire of the cell is broken, or it is overloaded.
+_END = 32_700
 # Counts that a weight makes at least.
 _LEAST = 50.0
 
@@ -55,7 +58,7 @@ def weigh(board: Board) -> Weighing:
         board.read()
         clock.wait(_LOOK)
     counts = np.array([pulls.counts for pulls in kept.readings], float)
-    silent = (np.array([pulls.age for pulls in kept.readings]) >= _SILENT) | (np.abs(counts) >= _END)
+    silent = (np.array([pulls.age for pulls in kept.readings]) >= _SILENT) | at_an_end(counts)
     counts[:, silent.any(axis=0)] = np.nan
     return Weighing(counts.mean(axis=0), counts.std(axis=0))
 
@@ -88,9 +91,15 @@ def scaled(cells: LoadCells, axis: int, mass: float, empty: Weighing, loaded: We
     return cells.model_copy(update={"counts_per_newton": tuple(scale)})
 
 
-def newtons(cells: LoadCells, weighing: Weighing) -> Array:
-    """Pulls [N] of a weighing by these cells."""
-    pulls: Array = (weighing.counts - np.array(cells.offset)) / np.array(cells.counts_per_newton)
+def at_an_end(counts: Array) -> NDArray[np.bool_]:
+    """Which counts are at an end of an amplifier's range."""
+    ended: NDArray[np.bool_] = np.abs(counts) >= _END
+    return ended
+
+
+def newtons(cells: LoadCells, counts: Array) -> Array:
+    """Pulls (4,) [N] that these cells show by their counts (4,)."""
+    pulls: Array = (counts - np.array(cells.offset)) / np.array(cells.counts_per_newton)
     return pulls
 
 
