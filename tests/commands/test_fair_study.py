@@ -17,6 +17,7 @@ import pytest
 
 import wristctl
 from tests.documented import script_of_docs
+from wristctl.commands import progress
 from wristctl.commands.study.units import Studied, StudyPlace
 from wristctl.comparison import world_ranking as judge_unit
 from wristctl.comparison.bootstrap import plain
@@ -168,6 +169,25 @@ def test_a_study_killed_and_resumed_by_other_processes_has_the_same_hash(
     assert noted is not None and noted.run == stopped.id and noted.computed_again >= 1
     assert noted.taken_over + noted.computed_again == len(kept)
     assert [each.role for each in run_of(again).manifest.inputs] == ["resume"]
+
+
+def test_what_a_resumed_study_keeps_says_nothing_of_the_time_that_is_left(
+    done: Studied, study: Study, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """All units are there but the one that is tried again."""
+    fresh: dict[str, set[int]] = {}
+    fields = progress.Count.fields
+
+    def noted(count: progress.Count) -> dict[str, object]:
+        fresh.setdefault(count.what, set()).add(count.count - count.kept)
+        return fields(count)
+
+    monkeypatch.setattr(progress.Count, "fields", noted)
+    wristctl.study(study, resume=run_of(done).path, out=tmp_path)
+    total = {name: max(numbers) for name, numbers in fresh.items()}
+    events = [json.loads(line) for line in (run_of(done).path / "events.jsonl").read_text().splitlines()]
+    sizes = {one["what"]: one["total"] for one in events if one["event"] == "progress"}
+    assert 0 < total["tuning"] < sizes["tuning"] / 2
 
 
 def test_whoever_resumes_with_other_code_is_told_once_that_all_is_computed_anew(
