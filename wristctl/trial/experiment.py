@@ -126,6 +126,7 @@ class Experiment:
         taut, _ = Paths(self._wrist, plane).taut(0.0)
         spools.target(still, taut)
         spools.rate(still, still, still, settings.control_period)
+        spools.behind(still, still, still, settings.control_period)
         Watch(settings, self._wrist, plane, self.timing).predict(float(taut[0]), float(taut[0]))
         for law, gains in [*self._laws, (self._back, ())]:
             steering.use(law, gains)
