@@ -77,7 +77,7 @@ def trained(best: set[str] = frozenset(), beaten: set[str] = frozenset(), dead: 
 NOTHING = {"smc/printed": 1.0, "smc/exchanged": 1.0, "pid/printed": 1.0}
 
 
-SMC, SWAPPED, PID = "(SMC)", "SMC with its gains P1 and P2 exchanged", "its PID"
+SMC, SWAPPED, PID = "(SMC)", "SMC with P1 and P2 exchanged", "PID with the paper"
 
 
 def test_each_loop_is_named_by_what_it_is() -> None:
@@ -93,7 +93,7 @@ def test_whatever_arrives_is_said_to_and_nothing_else() -> None:
     names = list(LOOPS)
     there, away = loop({}, {}), loop(NOTHING, dict.fromkeys(NOTHING, 0.5))
     everywhere, nowhere = said(dict.fromkeys(LOOPS, there)), said(dict.fromkeys(LOOPS, away))
-    for who in (SMC, SWAPPED + " (", "Its PID"):
+    for who in (SMC, SWAPPED + " (", PID):
         assert "on all loops" in sentence(everywhere, who, "30 deg") and "any loop" not in everywhere
         assert "on any loop" in sentence(nowhere, who, "30 deg") and "all loops" not in sentence(nowhere, who, "30 deg")
     some = said({names[0]: there, names[1]: loop({"smc/printed": 1.0}, {}), names[2]: away})
@@ -107,10 +107,10 @@ def test_the_printed_error_comes_out_where_it_does_and_beyond_the_tendons_streng
     mixed = sentence(said({ideal: loop({}, {}, 1e5), sampled: loop({}, {}), segments: loop({}, off)}), SMC)
     assert "on the ideal and sampled loops" in mixed and mixed.endswith("no tendon bears on the ideal loop")
     alone = said({ideal: loop({}, {}, 1e5), sampled: loop({}, off), segments: loop({}, off)})
-    assert re.search("RMSE on the ideal loop only, .*no tendon bears$", sentence(alone, "Its PID"))
+    assert re.search("RMSE on the ideal loop only, .*no tendon bears$", sentence(alone, PID))
     sound = said(dict.fromkeys(LOOPS, loop({}, {})))
-    assert "RMSE on all loops" in sentence(sound, "Its PID") and "no tendon" not in sound
-    assert "RMSE on no loop" in sentence(said(dict.fromkeys(LOOPS, loop({}, off))), "Its PID")
+    assert "RMSE on all loops" in sentence(sound, PID) and "no tendon" not in sound
+    assert "RMSE on no loop" in sentence(said(dict.fromkeys(LOOPS, loop({}, off))), PID)
 
 
 def test_the_ranking_is_that_of_the_numbers() -> None:
@@ -129,6 +129,23 @@ def test_the_ranking_is_that_of_the_numbers() -> None:
     differ.loc[(differ["gains"] == "exchanged") & differ["reference"].str.contains(" 2 s"), "rmse"] = 1.0
     told = sentence(said({**printed, last: differ}), "smaller RMSE")
     assert told.endswith("on the ideal and sampled loops, in one of two moves on the 4-segment loop")
+
+
+def test_an_error_below_the_papers_is_told_apart_from_one_above() -> None:
+    ideal, sampled, segments = LOOPS
+    found = {ideal: loop({}, {"pid/printed": 1e-9}), sampled: loop({}, {}), segments: loop({}, {"pid/printed": 0.5})}
+    assert "on the sampled loop only (a smaller one on the ideal loop)" in sentence(said(found), PID)
+    above = {**found, ideal: loop({}, {"pid/printed": 0.5})}
+    assert "smaller" not in sentence(said(above), PID)
+
+
+def test_soft_springs_are_told_by_what_they_add() -> None:
+    stiff = dict.fromkeys(LOOPS, loop({}, {}))
+    assert "add as much on no loop" in said(stiff), "here both stiffnesses have one error"
+    shown: dict[LoopCondition, pd.DataFrame] = {(name, 1.0): loop({}, {}) for name in LOOPS}
+    shown |= {(name, 0.7): loop({}, {"smc/exchanged": 0.157}) for name in LOOPS}
+    judged = judge_all(CLAIMS, Grounds(shown, {}, None, 60.0))
+    assert "add as much on all loops (at 70 %" in " ".join(map(str, answer_of(judged, (), 60.0).notes))
 
 
 def test_the_networks_are_told_by_the_ways_to_train_them() -> None:

@@ -26,7 +26,7 @@ _HEAVIEST, _BESIDE_A_BOX = 5, 3
 # Sample rate from which control is as good as continuous [kHz].
 _CONTINUOUS = 100.0
 _COUNTS = ("no", "one", "two", "three", "four", "five", "six", "seven", "eight", "nine")
-_MORE = "Every claim with its reason: add --all, or see report.html of the run. Words: docs/glossary.md."
+_MORE = "Settling, pushes and every claim with its reason: add --all, or see report.html of the run."
 
 
 def answer_of(judged: Sequence[Judgement], strips: Sequence[Strip] = (), limit: float = math.inf) -> Answer:
@@ -47,10 +47,11 @@ def answer_of(judged: Sequence[Judgement], strips: Sequence[Strip] = (), limit: 
     loops = list(dict.fromkeys(name for j in claims for name in j.found if name))
     sentence = " ".join([*_tried(loops, limit), *_controllers(claims)]) or "No claim of this ledger is tried on a loop."
     table = _numbers(claims, loops, _BESIDE_A_BOX if strips else _HEAVIEST)
-    first, *second = [" ".join(part) for part in (_over_the_box(strips), _ranking(claims, loops)) if part] or [""]
+    ranked = [*_ranking(claims, loops), *_softened(claims)]
+    first, *second = [" ".join(part) for part in (_over_the_box(strips), ranked) if part] or [""]
     networks = " ".join(_networks(claims))
     decided = [first] if first else []
-    rest = [*_by_topic(claims), *second, *[networks] * bool(networks), *_untested(claims)]
+    rest = [*[networks] * bool(networks), *_by_topic(claims), *second, *_untested(claims)]
     apart = Answer(sentence, table, [*decided, *rest], _MORE)
     return apart if len(apart.lines()) <= LINES else _fitted(sentence, table, decided, rest)
 
@@ -67,9 +68,8 @@ def _tried(loops: Sequence[str], limit: float) -> list[str]:
     kinds = [f"{_word(name)} ({_described(name, limit)})" if name in LOOPS else name for name in loops]
     count = _COUNTS[len(loops)] if len(loops) < len(_COUNTS) else len(loops)
     plural = "s" * (len(loops) > 1)
-    return [f"The paper's controllers in moves of 30 deg on {count} simulated loop{plural}: {_and(kinds)}."] * bool(
-        loops
-    )
+    text = f"Smooth moves of 30 deg in 1 s and in 2 s on {count} simulated loop{plural}, ours, as the paper tells of none"
+    return [f"{text}: {_and(kinds)}."] * bool(loops)
 
 
 def _word(name: str) -> str:
@@ -86,15 +86,15 @@ def _described(name: str, limit: float) -> str:
     """What the word for a built-in loop leaves unsaid."""
     n, rate = LOOPS[name].plant_segments, 1e-3 / LOOPS[name].control_period
     ticks = f"{1e-3 * rate:g} MHz" if rate >= _CONTINUOUS else f"{rate:g} kHz"
-    tensions = f"tensions to {limit:g} N" if LOOPS[name].limits and math.isfinite(limit) else "no tension limit"
+    tensions = f"at most {limit:g} N" if LOOPS[name].limits and math.isfinite(limit) else "no tension limit"
     return ", ".join(part for part in ("one segment" * (n == 1), ticks, tensions) if part)
 
 
 # What the paper prints, and the one of ours.
 _GAINS = {
-    "smc/printed": "its sliding mode controller (SMC) with the printed gains",
-    "smc/exchanged": "SMC with its gains P1 and P2 exchanged (a guess of ours)",
-    "pid/printed": "its PID with the printed gains (the sign of its feedback corrected)",
+    "smc/printed": "sliding mode control (SMC) with the paper's gains",
+    "smc/exchanged": "SMC with P1 and P2 exchanged (our guess)",
+    "pid/printed": "PID with the paper's gains (the sign of its feedback turned)",
 }
 
 
@@ -107,10 +107,10 @@ def _controllers(claims: Sequence[Judgement]) -> list[str]:
         number = _one(j for j in labelled if _is_number(j.claim, "rmse"))
         who = f"{who[0].upper()}{who[1:]}"
         if arrival and number and not any(_ever(found) for found in (arrival.found, number.found)):
-            sentences.append(f"{who} neither reaches 30 deg nor has the printed RMSE on any loop.")
+            sentences.append(f"{who} neither reaches 30 deg nor has the paper's RMSE on any loop.")
             continue
         facts = [f"reaches 30 deg {_places(arrival.found)}"] if arrival else []
-        facts += [f"has the printed RMSE {_places(number.found)}{_beyond(number.found)}"] if number else []
+        facts += [f"has the paper's RMSE {_places(number.found)}{_beyond(number.found)}"] if number else []
         sentences += [f"{who} {' and '.join(facts)}."] if facts else []
     return sentences
 
@@ -126,11 +126,13 @@ def _is_number(claim: Claim, metric: str) -> bool:
 
 
 def _beyond(findings: Mapping[str, Finding]) -> str:
-    """Where the number takes tensions above the limit."""
+    """Where the number is smaller than the paper's, and where it takes tensions above the limit."""
     reproduced = _where(findings, "reproduced")
     beyond = [name for name in reproduced if "not physical" in findings[name].mark]
     where = f" {_on(beyond)}" * (len(reproduced) > len(beyond))
-    return f", with tensions that no tendon bears{where}" * bool(beyond)
+    better = _where(findings, "better than the paper")
+    less = f" (a smaller one {_on(better)})" * bool(better)
+    return f"{less}{f', with tensions that no tendon bears{where}' * bool(beyond)}"
 
 
 def _ranking(claims: Sequence[Judgement], loops: Sequence[str]) -> list[str]:
@@ -138,10 +140,10 @@ def _ranking(claims: Sequence[Judgement], loops: Sequence[str]) -> list[str]:
     from wristctl.comparison.paper import T2
 
     pairs = []
-    for gains, wording in (("printed", "with the printed gains"), ("exchanged", "with P1 and P2 exchanged")):
+    for gains, wording in (("printed", "with the paper's gains"), ("exchanged", "with P1 and P2 exchanged")):
         one = _one(j for j in claims if _is_order(j.claim, f"smc/{gains}", "pid/printed"))
         pairs += [f"{wording} {_places(one.found)}"] if one else []
-    sentences = [f"SMC has a smaller RMSE than PID {'; '.join(pairs)}."] if pairs else []
+    sentences = [f"SMC has a smaller RMSE than PID: {'; '.join(pairs)}."] if pairs else []
     order = sorted(T2, key=lambda name: T2[name].rmse)
     links = [_one(j for j in claims if _is_order(j.claim, f"{a}/", f"{b}/")) for a, b in pairwise(order)]
     tried = [link for link in links if link is not None]
@@ -157,8 +159,19 @@ def _ranking(claims: Sequence[Judgement], loops: Sequence[str]) -> list[str]:
     ]
     return [
         *sentences,
-        f"The ranking {' < '.join(name.upper() for name in order)} cannot be tested: the paper gives no equations of "
-        f"{_and(named)}. With designs of ours, and P1 and P2 exchanged, it holds {_on(holds, loops)}.",
+        f"The paper's ranking ({', '.join(name.upper() for name in order)}) cannot be tested: it gives no "
+        f"equations of {_and(named)}. With designs of ours for these, and P1 and P2 exchanged, it holds "
+        f"{_on(holds, loops)}.",
+    ]
+
+
+def _softened(claims: Sequence[Judgement]) -> list[str]:
+    """Whether springs that lost stiffness add as much error as the experiment has, by the heaviest claim of that."""
+    found = [j for j in claims if j.claim.stiffness_scale < 1.0 and j.claim.weight and j.claim.value]
+    return [
+        f"Soft springs, to which the paper puts the {degrees(float(j.claim.value or 0.0))} deg of its experiment, add as "
+        f"much {_places(j.found)} (at {_percent(j.claim.stiffness_scale)} of the stiffness, our number)."
+        for j in found[:1]
     ]
 
 
@@ -229,7 +242,7 @@ def _networks(claims: Sequence[Judgement]) -> list[str]:
         also = f", and another to be more accurate in {count or 'none'}" * bool(beaten)
         which = f" ({'; '.join(shown)})" if 0 < len(shown) < len(best) else ""
         sentences.append(
-            f"Of {len(best)} ways to train its networks, between which it does not tell, sigmoid is shown to be the "
+            f"Of {len(best)} ways to train its networks (it does not say which) sigmoid is shown to be the "
             f"most accurate in {len(shown) or 'none'}{which}{also}."
         )
     for verdict, wording in (("does not hold", "does not learn"), ("open", "may or may not learn")):
@@ -279,8 +292,8 @@ def _numbers(claims: Sequence[Judgement], loops: Sequence[str], most: int) -> Ta
         paper = _range(j.claim, float(j.claim.value or 0.0), float(j.claim.value or 0.0))
         rows.append(((j.claim.topic or j.claim.says) + unit, paper, *ours, _agree(j.found)))
     common = f" [{min(units)}]" if len(units) == 1 and min(units) else ""
-    title = f"Errors{common}: smaller to larger of moves in 1 s and 2 s; a loop agrees within a factor of {FACTOR:g}"
-    return Table(title, ("the paper's claim", "paper", *map(_word, loops), "agrees on"), rows)
+    title = f"Errors{common} of both moves, smaller first; agrees: their range is within {FACTOR:g} times of the paper's"
+    return Table(title, ("quantity", "paper", *map(_word, loops), "agrees on"), rows)
 
 
 def _unit(claim: Claim) -> str:
@@ -314,7 +327,7 @@ def _places(findings: Mapping[str, Finding]) -> str:
     alike = [name for name in open_ if findings[name].reason.startswith("alike")]
     some = [name for name in open_ if name not in alike]
     holding = _where(findings, "reproduced")
-    places = [_on(holding, loops)] * bool(holding or not some)
+    places = [_on(holding, () if some else loops)] * bool(holding or not some)
     places += [f"in one of two moves {_on(some, () if holding else loops)}"] * bool(some)
     places += [f"with equal errors {_on(alike)}"] * bool(alike)
     return ", ".join(places)
