@@ -68,8 +68,8 @@ def _tried(loops: Sequence[str], limit: float) -> list[str]:
     kinds = [f"{_word(name)} ({_described(name, limit)})" if name in LOOPS else name for name in loops]
     count = _COUNTS[len(loops)] if len(loops) < len(_COUNTS) else len(loops)
     plural = "s" * (len(loops) > 1)
-    text = f"Smooth moves of 30 deg in 1 s and in 2 s on {count} simulated loop{plural}, ours, as the paper tells of none"
-    return [f"{text}: {_and(kinds)}."] * bool(loops)
+    where = f"{count} simulated loop{plural}, ours, as the paper tells of none"
+    return [f"Smooth moves of 30 deg in 1 s and in 2 s on {where}: {_and(kinds)}."] * bool(loops)
 
 
 def _word(name: str) -> str:
@@ -169,8 +169,8 @@ def _softened(claims: Sequence[Judgement]) -> list[str]:
     """Whether springs that lost stiffness add as much error as the experiment has, by the heaviest claim of that."""
     found = [j for j in claims if j.claim.stiffness_scale < 1.0 and j.claim.weight and j.claim.value]
     return [
-        f"Soft springs, to which the paper puts the {degrees(float(j.claim.value or 0.0))} deg of its experiment, add as "
-        f"much {_places(j.found)} (at {_percent(j.claim.stiffness_scale)} of the stiffness, our number)."
+        f"Soft springs, to which the paper puts the {degrees(float(j.claim.value or 0.0))} deg of its experiment, add "
+        f"as much {_places(j.found)} (at {_percent(j.claim.stiffness_scale)} of the stiffness, our number)."
         for j in found[:1]
     ]
 
@@ -292,8 +292,12 @@ def _numbers(claims: Sequence[Judgement], loops: Sequence[str], most: int) -> Ta
         paper = _range(j.claim, float(j.claim.value or 0.0), float(j.claim.value or 0.0))
         rows.append(((j.claim.topic or j.claim.says) + unit, paper, *ours, _agree(j.found)))
     common = f" [{min(units)}]" if len(units) == 1 and min(units) else ""
-    title = f"Errors{common} of both moves, smaller first; agrees: their range is within {FACTOR:g} times of the paper's"
-    return Table(title, ("quantity", "paper", *map(_word, loops), "agrees on"), rows)
+    rule = f"their range is within {FACTOR:g} times of the paper's"
+    return Table(
+        f"Errors{common} of both moves, smaller first; agrees: {rule}",
+        ("quantity", "paper", *map(_word, loops), "agrees on"),
+        rows,
+    )
 
 
 def _unit(claim: Claim) -> str:
