@@ -94,7 +94,7 @@ def test_the_rig_is_answered_first_and_what_is_best_elsewhere_is_warned_of_where
     warned = said[said.index("use mrac/default") :]
     assert "(sampled, push) use mrac/default" in said
     assert re.search(r"a camera: it swings by 2\.9 deg in 12 of 12 cases", warned)
-    avoided = said[said.index("Do not use") :]
+    avoided = said[said.index("o not use these") :]
     assert all(f"{name} by 2.9 deg" in avoided for name in ("mrac", "pid/printed"))
 
 
@@ -105,7 +105,7 @@ def test_every_fault_is_named_with_its_size_and_its_number_of_cases() -> None:
             unconverged=("nc/default",), failed={"pd-ff/default": 5},
         )
     )  # fmt: skip
-    avoided = said[said.index("Do not use") : said.index("The paper")].lower()
+    avoided = said[said.index("o not use these") : said.index("The paper")].lower()
     for fact in (
         "swings: smc/exchanged by 2.9 deg (in 12 of 12 cases)",
         "does not arrive: smc/printed (in 12 of 12 motions)",
@@ -123,7 +123,7 @@ def test_what_must_not_be_used_without_a_rig_is_named_after_the_rigs_with_its_co
         stands(away=("smc/printed",), swings=("nc/default",)), stands("pushed", swings=("nc/default",)),
         stands("camera and tendons", swings=("mrac/default",)),
     )  # fmt: skip
-    rig, elsewhere = said[said.index("Do not use") : said.index("The paper")].split("Elsewhere")
+    rig, elsewhere = said[said.index("o not use these") : said.index("The paper")].split("In other conditions")
     assert "mrac by 2.9 deg" in rig and "nc" not in rig.split() and "mrac" not in elsewhere
     assert "smc/printed does not arrive in sampled;" in elsewhere
     assert "nc swings in sampled and push." in elsewhere
@@ -131,7 +131,7 @@ def test_what_must_not_be_used_without_a_rig_is_named_after_the_rigs_with_its_co
 
 def test_a_row_that_fails_and_swings_is_named_once_by_the_graver_fault() -> None:
     said = told(stands(swings=("pd-ff/default",), failed={"pd-ff/default": 5}))
-    avoided = said[said.index("Do not use") : said.index("The paper")]
+    avoided = said[said.index("o not use these") : said.index("The paper")]
     assert avoided.count("pd-ff") == 1 and "eaves its range: pd-ff (in 5 of 12 cases)" in avoided
 
 

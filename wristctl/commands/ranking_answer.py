@@ -41,7 +41,7 @@ def advice(rankings: Sequence[Ranking]) -> str:
     for rig in (True, False):
         alike = [ranking for ranking in smooth or rankings if ranking.traits.rig == rig]
         if alike:
-            where = f"with {rig_whole(alike) if rig else 'exact angles and torques'}"
+            where = f"with {f'simulated {rig_whole(alike)}' if rig else 'exact angles and torques'}"
             where = where.capitalize() if smooth else f"For steps {where}"
             others = [ranking for ranking in smooth or rankings if ranking.traits.rig and not rig]
             sentences.append(_use(where, alike, others))
@@ -68,7 +68,8 @@ def _use(where: str, alike: Sequence[Ranking], others: Sequence[Ranking]) -> str
         text += interval(*places[0])
     if len(alike) > 1 and not everywhere:
         text += f", and nothing is better in {joined([condition(ranking) for ranking, _ in places])}"
-    gains = sorted(ranking.gains[row].value for ranking, row in places if math.isfinite(ranking.gains[row].value))
+    compared = [place for place in places if place[0].yardstick not in place[0].standing.unusable]
+    gains = sorted(ranking.gains[row].value for ranking, row in compared if math.isfinite(ranking.gains[row].value))
     if any(map(open_loop, (chosen, *equal))):
         text += "; no controller is better than feedforward, which is open loop"
     elif gains:
@@ -84,7 +85,8 @@ def _use(where: str, alike: Sequence[Ranking], others: Sequence[Ranking]) -> str
     if not bad:
         return f"{text}."
     worst = max(bad, key=lambda place: _lost(*place))
-    return f"{text}. Do not use {chosen} with {rig_whole([worst[0]])}: it {fact(*worst)}."
+    also = ", as do others below" * (len(worst[0].standing.unusable) > 1)
+    return f"{text}. Do not use {chosen} with {rig_whole([worst[0]])}: it {fact(*worst)}{also}."
 
 
 def _seldom(labels: Sequence[str], rankings: Sequence[Ranking]) -> str:
@@ -133,9 +135,9 @@ def ranking_table(rankings: Sequence[Ranking], names: Mapping[str, str]) -> Tabl
     heads = (
         f"condition ({unit})",
         "best: RMSE [deg]",
-        "tied",
+        "as good",
         "next: RMSE [deg]",
-        "feedforward (x)",
+        "open loop (times)",
         "unusable",
     )
     rows = []
@@ -148,7 +150,7 @@ def ranking_table(rankings: Sequence[Ranking], names: Mapping[str, str]) -> Tabl
         bound = ">" if best.endswith(degrees(0.0)) else ""
         ratio = "" if row is None or base is None else f" ({bound}{two(ranking.gains[row].value)})"
         open_loop = "-" if base is None else f"{error(ranking, base)}{ratio}"
-        others = f"{len(groups[0]) - 1}" if groups and len(groups[0]) > 1 else "-"
+        others = f"{len(groups[0]) - 1}" if groups else "-"
         begin, end = (
             f"{condition(ranking)} ({ranking.count})",
             f"{len(ranking.standing.unusable)} of {len(ranking.labels)}",
@@ -206,7 +208,8 @@ def do_not_use(rankings: Sequence[Ranking], names: Mapping[str, str]) -> str:
             text = joined([f"{name} ({count})" for name, count in rows])
         sentences.append(f"{_THEY[verb] if len(rows) > 1 else verb}: {text}")
     elsewhere = _elsewhere([ranking for ranking in rankings if ranking not in chosen], names)
-    return f"Do not use{where}. {'. '.join(_capital(sentence) for sentence in sentences)}.{elsewhere}"
+    them = f"{where.strip().capitalize()} do not use these" if where else "Do not use these"
+    return f"{them}. {'. '.join(_capital(sentence) for sentence in sentences)}.{elsewhere}"
 
 
 def _elsewhere(rankings: Sequence[Ranking], names: Mapping[str, str]) -> str:
@@ -225,7 +228,7 @@ def _elsewhere(rankings: Sequence[Ranking], names: Mapping[str, str]) -> str:
         ]
         alike.setdefault(joined(verbs), []).append(name)
     listed = [f"{joined(who)} {clause}" for clause, who in alike.items()]
-    return f" Elsewhere {'; '.join(listed)}." if listed else ""
+    return f" In other conditions {'; '.join(listed)}." if listed else ""
 
 
 def _lost(ranking: Ranking, row: int) -> float:
