@@ -60,7 +60,7 @@ def test_a_stroke_faster_than_the_motors_ends_at_rest_and_not_in_a_swing(name: s
 
 
 @pytest.mark.parametrize("side", [1.0, -1.0])
-@pytest.mark.parametrize("name", ["pid", "pid-ff", "pid-dob", "lqi"])
+@pytest.mark.parametrize("name", ["pid", "pid-ff", "pid-dob", "lqi", "fopi"])
 def test_an_integral_holds_while_a_motor_is_behind_and_unwinds(name: str, side: float) -> None:
     law = controller(name)
     gains = tuple(1.0 for _ in law.gains)

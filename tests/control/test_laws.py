@@ -149,7 +149,8 @@ def test_every_law_is_finite_for_any_state_and_gains_in_the_box(
 @pytest.mark.parametrize("name", sorted(set(CONTROLLERS) - {"feedforward"}))
 def test_every_gain_is_searched_over_six_decades_around_its_presets(name: str) -> None:
     for key, gain in controller(name).gains.items():
-        assert gain.high / gain.low == pytest.approx(1e6)
+        order = (name, key) == ("fopi", "lambda")  # of an integral: between none and two
+        assert 0.0 < gain.low < gain.high < 2.0 if order else gain.high / gain.low == pytest.approx(1e6)
         assert gain.low <= controller(name).presets.get("default", {key: gain.low})[key] <= gain.high
 
 

@@ -13,6 +13,7 @@ from tests.control.test_laws import torque
 from wristctl.config.loop import Loop, Reference
 from wristctl.config.plant import Plant, Sensor
 from wristctl.config.wrist import WristParameters
+from wristctl.control.fopi import SECTIONS, fractional
 from wristctl.control.law import Controller, ahead
 from wristctl.control.lqi import spectral_factor
 from wristctl.control.table import controller, gains_of
@@ -136,6 +137,53 @@ def test_the_network_learns_to_follow_its_reference_model() -> None:
         done = followed(law, gains, Loop(plant_segments=1), sine, horizon=8.0)
         error.append(np.abs(done.column("theta", 0) - modelled)[4000:].mean())
     assert error[0] < 0.02 * error[1]
+
+
+@pytest.mark.parametrize("order", [0.5, -0.3, 0.0, 0.9])
+@pytest.mark.parametrize("frequency", [1.0, 10.0, 60.0])
+def test_the_fractional_derivative_has_the_gain_and_phase_of_its_order(order: float, frequency: float) -> None:
+    """Of a sine within the band: |jw|^order, and order times a right angle ahead."""
+    period = 1e-4
+    time = period * np.arange(round(30.0 * 2.0 * np.pi / frequency / period))
+    value, found = np.sin(frequency * time), np.zeros(len(time))
+    _fractional(value, np.array([order, period]), np.zeros(SECTIONS), found)
+    last = slice(len(time) // 2, None)
+    phasor = 2.0 * np.mean(found[last] * np.exp(-1j * frequency * time[last]) * 1j)
+    assert abs(phasor) == pytest.approx(frequency**order, rel=0.05)
+    assert np.angle(phasor) == pytest.approx(0.5 * np.pi * order, abs=0.1)
+
+
+@kernel
+def _fractional(value: Any, settings: Any, memory: Any, out: Any) -> None:
+    values, given, kept, found = rows_of(value), rows_of(settings), rows_of(memory), rows_of(out)
+    for k in range(len(value)):
+        found[k] = fractional(values[k], given[0], given[1], kept, 0)
+
+
+def test_the_impedance_answers_an_error_as_spring_and_damper() -> None:
+    """Torques that differ by K and D alone, the model cancelled."""
+    gains, quick = (3.0, 0.2, 10.0, 1e3), {"theta": 0.1, "rate": 0.2}
+    there = torque("impedance", gains, np.zeros(12), **quick, theta_ref=0.1, rate_ref=0.2)
+    off = torque("impedance", gains, np.zeros(12), **quick, theta_ref=0.3, rate_ref=0.7)
+    assert off - there == pytest.approx(3.0 * 0.2 + 0.2 * 0.5, rel=1e-12)
+
+
+def test_the_impedances_network_learns_what_the_model_lacks() -> None:
+    """A softer spring and a payload, again and again: with learning a small part of the error is left."""
+    law, sine = controller("impedance"), Reference(kind="sine", angle_deg=15.0, frequency=0.5)
+    error = []
+    for learning in (50.0, 1e-9):
+        gains = dict(law.presets["default"]) | {"eta": learning}
+        done = followed(law, gains, SOFTER, sine, horizon=6.0)
+        wanted = motion(sine, WRIST, 6.0, 1e-3).theta_ref
+        error.append(np.abs(done.column("theta", 0) - wanted)[4000:].mean())
+    assert error[0] < 0.1 * error[1]
+
+
+@pytest.mark.parametrize("name", ["impedance", "fopi"])
+def test_the_rivals_leave_no_error_at_rest(name: str) -> None:
+    done = followed(controller(name), "default", SOFTER, horizon=8.0)
+    assert abs(done.column("theta", 0)[-1] - np.deg2rad(30.0)) < 1e-4
 
 
 @pytest.mark.parametrize("period", [1e-3, 5e-3, 2.5e-4])

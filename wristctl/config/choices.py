@@ -113,6 +113,8 @@ CONTROLLERS: Choices[Any] = Choices(
         "lqi": "wristctl.control.lqi:LQI",
         "mpc": "wristctl.control.mpc:MPC",
         "nn-mrac": "wristctl.control.nn_mrac:NN_MRAC",
+        "impedance": "wristctl.control.impedance:IMPEDANCE",
+        "fopi": "wristctl.control.fopi:FOPI",
         "feedforward": "wristctl.control.feedforward:FEEDFORWARD",
         "pd-ff": "wristctl.control.pd_ff:PD_FF",
         "pid-ff": "wristctl.control.pid_ff:PID_FF",
