@@ -179,6 +179,11 @@ def _rim(centre: complex, normal: complex, radius: float) -> Array:
     return np.stack([places.real, places.imag, radius * np.sin(_AROUND)], axis=-1)
 
 
+def unit_rim(radius: float, height: float) -> Array:
+    """Rim (m, 3) [m] of a straight disc, so high above its middle."""
+    return np.stack([np.full(len(_AROUND), height), radius * np.cos(_AROUND), radius * np.sin(_AROUND)], axis=-1)
+
+
 def _flat(places: Planar, depth: float) -> Array:
     return np.stack([places.real, places.imag, np.full(len(places), depth)], axis=-1)
 
