@@ -142,7 +142,7 @@ class RigSettings(Section):
         1, "bending planes: 1, the wrist is turned for the other one; 2, one camera for each, at a right angle"
     )
     camera: str = choice("0", "camera beside a real board: its number, or device path")
-    camera_2: str = choice("2", "of two planes, the camera that looks at the flexion-extension plane")
+    camera_2: str = choice("2", "second camera, of two planes: it looks at the flexion-extension plane")
     real_time: bool = choice(False, "emulated rig: against the wall clock, in a process of its own")
     priority: bool = choice(False, "real-time scheduling and locked memory for the loop, as far as the system allows")
     actuator: Actuator = choice(Actuator(level="tendon"), "motors and tendons as the controller knows them")
@@ -151,12 +151,12 @@ class RigSettings(Section):
     safety: Safety = Safety()
     load_cells: LoadCells | None = choice(None, "load cells of the tendons; null: pulls are not measured")
     markers: Markers = Markers()
-    markers_2: Markers = choice(Markers(base=2, tip=3), "of two planes, the markers that the second camera looks at")
+    markers_2: Markers = choice(Markers(base=2, tip=3), "markers of the second camera, of two planes")
     gates: Gates = Gates()
     device: Device = Device()
     bench: BenchSettings = choice(BenchSettings(), "the emulated rig, where there is no port")
     optics: str | None = choice(None, "calibrate-camera run; without one the camera looks square at the plane")
-    optics_2: str | None = choice(None, "of two planes, the same for the second camera")
+    optics_2: str | None = choice(None, "calibrate-camera run of the second camera, of two planes")
 
     def within(self, wrist: WristParameters) -> Self:
         """Settings whose largest tension is no more than the wrist bears."""

@@ -25,7 +25,7 @@ from wristctl.vision.scene_parts import (
     with_last_disc,
 )
 from wristctl.wrist.kinematics import Backbone, Planar
-from wristctl.wrist.spatial.spatial_kinematics import spatial_backbone, spatial_frames
+from wristctl.wrist.spatial.spatial_kinematics import spatial_frames
 
 # Points (m, 3) [m] moved to where they are.
 Carry = Callable[[Array], Array]
@@ -98,7 +98,7 @@ class SpatialBody:
             for outline in (outlines if self._edge_on else outlines[::-1])
         ]
         parts += _pairs(centres, frames, c, behind=True)
-        line = spatial_backbone(q, wrist.length, -(-24 // (len(q) // 2))) @ self._axes.T
+        line, _ = self._frames(q, np.linspace(0.0, 1.0, 24))
         parts.append(Stroke(line, 92, "line", 4))
         for centre, frame in zip(centres, frames, strict=True):
             rims = [centre + unit_rim(radius, end * THICK) @ frame.T for end in (-0.5, 0.5)]
