@@ -335,3 +335,20 @@ def test_a_fault_of_one_camera_leaves_the_other_as_it_is(camera: Literal[1, 2]) 
         for _, frame in frames
     )  # fmt: skip
     assert kinds["ok"] > 3 and kinds["no tip"] > 3
+
+
+@pytest.mark.parametrize(
+    ("kind", "size"),
+    [
+        ("direction-flipped", 1.0), ("direction-stuck", 1.0), ("motor-stalled", 1.0), ("drive-off", 1.0),
+        ("supply-off", 1.0), ("drive-rescaled", 0.5), ("motors-exchanged", 3.0), ("torque-lost", 5.0),
+        ("tendon-detached", 1.0), ("tendon-slipped", 0.4), ("tendon-creeps", 0.3),
+    ],
+)  # fmt: skip
+def test_faults_of_motors_and_tendons_act_as_on_the_bench_in_one_plane(kind: FaultKind, size: float) -> None:
+    """On the spools alike, and in the plane within a degree, where the bend across is small; without them otherwise."""
+    fault = (InjectedFault(kind=kind, axis=0, at=0.02, size=size),)
+    sound, flat, spatial = course(BEND), course(BEND, planes=1, faults=fault), course(BEND, faults=fault)
+    assert np.abs(spatial.reeled[-1] - flat.reeled[-1]).max() < 6.0 * SLIDING.step_length
+    assert np.degrees(abs(spatial.angle[-1, 0] - flat.angle[-1])) < 1.0
+    assert np.degrees(np.abs(spatial.angle - sound.angle).max()) > 0.2
