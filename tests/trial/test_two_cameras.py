@@ -159,8 +159,8 @@ def test_a_second_camera_that_cannot_be_opened_gives_the_first_one_back(port: Po
     ("settings", "said"),
     [
         ({"real_time": True}, "real time"),
-        ({"bench": {"plant": {"model": "hinges"}}}, "no bench in two planes has model"),
-        ({"bench": {"actuator": {"creep": 0.1}}}, "no bench in two planes has actuator.creep"),
+        ({"bench": {"plant": {"model": "hinges"}}}, "no bench in two planes has bench.plant.model"),
+        ({"bench": {"actuator": {"creep": 0.1}}}, "no bench in two planes has bench.actuator.creep"),
         ({"markers_2": {"base": 1, "tip": 2}}, "different ids"),
     ],
 )

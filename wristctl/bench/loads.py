@@ -10,7 +10,7 @@ from wristctl.bench.motors import PERIOD, Hanging, SpoolState, Stepper, follow
 from wristctl.board.messages import AXES
 from wristctl.config.bench import BenchSettings
 from wristctl.config.choices import PLANTS
-from wristctl.config.plant import Disturbances, in_one_plane_only
+from wristctl.config.plant import Disturbances
 from wristctl.config.wrist import WristParameters
 from wristctl.errors import UserError
 from wristctl.seeds import Entropy
@@ -198,9 +198,8 @@ class SpatialLoad:
 
 def check_in_space(settings: BenchSettings) -> None:
     """UserError for what a bench has in one plane and not in two."""
-    if beyond := in_one_plane_only(settings.plant, settings.actuator):
-        key = beyond[0] if beyond[0].startswith("actuator") else f"plant.{beyond[0]}"
-        raise UserError(f"no bench in two planes has {key}", f"bench.{key}", "leave it at its default")
+    if beyond := settings.in_one_plane_only:
+        raise UserError(f"no bench in two planes has {beyond[0]}", beyond[0], "leave it at its default")
     if settings.actuator.broken_tendon > AXES:
         problem = f"tendon {settings.actuator.broken_tendon} of {AXES} cannot break"
         raise UserError(problem, "bench.actuator.broken_tendon", f"1 to {AXES}")

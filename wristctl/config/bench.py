@@ -5,7 +5,7 @@ from typing import Literal, Self
 from pydantic import model_validator
 
 from wristctl.config.camera import SceneSettings
-from wristctl.config.plant import Actuator, TendonFacts, TrueWrist
+from wristctl.config.plant import Actuator, TendonFacts, TrueWrist, in_one_plane_only
 from wristctl.config.section import Section, choice, quantity
 
 # Every kind of fault that can be injected: controller-exception, model-nan and disk-full are the control loop's, the
@@ -202,3 +202,9 @@ class BenchSettings(Section):
     person: Person = Person()
     load_cells: EmulatedCells | None = choice(None, "load cells of the tendons; null: none are wired")
     faults: tuple[InjectedFault, ...] = choice((), "what goes wrong")
+
+    @property
+    def in_one_plane_only(self) -> list[str]:
+        """Keys that are set, of what a bench in two planes has not."""
+        keys = in_one_plane_only(self.plant, self.actuator)
+        return [f"bench.{key}" if key.startswith("actuator.") else f"bench.plant.{key}" for key in keys]

@@ -9,16 +9,7 @@ from wristctl.config.bench import BenchSettings
 from wristctl.config.camera import Device, Gates, Markers
 from wristctl.config.controller_row import Row
 from wristctl.config.loop import TICK, DirectionName, Loop, Reference
-from wristctl.config.plant import (
-    Actuator,
-    Plant,
-    Push,
-    Sensor,
-    TrueActuator,
-    TrueSensor,
-    TrueWrist,
-    in_one_plane_only,
-)
+from wristctl.config.plant import Actuator, Plant, Push, Sensor, TrueActuator, TrueSensor, TrueWrist
 from wristctl.config.section import Section, choice, quantity
 from wristctl.config.wrist import WristParameters
 from wristctl.errors import Unfitting
@@ -177,7 +168,7 @@ class RigSettings(Section):
         if self.port is None and self.real_time:
             problem = "an emulated rig in two planes draws two cameras' pictures, too much beside a board in real time"
             raise Unfitting(problem, "real_time: false, or planes: 1")
-        if self.port is None and (beyond := in_one_plane_only(self.bench.plant, self.bench.actuator)):
+        if self.port is None and (beyond := self.bench.in_one_plane_only):
             raise Unfitting(f"no bench in two planes has {beyond[0]}", "leave it at its default, or planes: 1")
         numbers = [self.markers.base, self.markers.tip, self.markers_2.base, self.markers_2.tip]
         if len(set(numbers)) < len(numbers):
