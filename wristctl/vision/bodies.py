@@ -11,20 +11,8 @@ import numpy as np
 
 from wristctl.arrays import Array
 from wristctl.config.wrist import WristParameters
-from wristctl.vision.scene_parts import (
-    FACE,
-    RIM,
-    THICK,
-    Stroke,
-    bent_across,
-    coil,
-    hand,
-    last_disc,
-    moving,
-    unit_rim,
-    with_last_disc,
-)
-from wristctl.wrist.kinematics import Backbone, Planar
+from wristctl.vision.scene_parts import Stroke, bent_across, last_disc, moving, moving_in_space, with_last_disc
+from wristctl.wrist.kinematics import Backbone
 from wristctl.wrist.spatial.spatial_kinematics import spatial_frames
 
 # Points (m, 3) [m] moved to where they are.
@@ -89,22 +77,9 @@ class SpatialBody:
 
     def strokes(self, q: Array) -> list[Stroke]:
         """Everything that moves."""
-        wrist = self._wrist
-        centres, frames = self._frames(q, np.linspace(0.0, 1.0, wrist.discs))
-        c, radius = wrist.tendon_offset, RIM * wrist.tendon_radius
-        outlines = hand(max(wrist.hand_offset, 0.02), edge_on=self._edge_on)
-        parts = [
-            Stroke(centres[-1] + _flat(outline, 0.0) @ frames[-1].T, 164, "hull")
-            for outline in (outlines if self._edge_on else outlines[::-1])
-        ]
-        parts += _pairs(centres, frames, c, behind=True)
         line, _ = self._frames(q, np.linspace(0.0, 1.0, 24))
-        parts.append(Stroke(line, 92, "line", 4))
-        for centre, frame in zip(centres, frames, strict=True):
-            rims = [centre + unit_rim(radius, end * THICK) @ frame.T for end in (-0.5, 0.5)]
-            parts.append(Stroke(np.concatenate(rims), 150, "hull"))
-            parts += [Stroke(rims[0], 118, "face"), Stroke(rims[1][::-1], FACE, "face")]
-        return parts + _pairs(centres, frames, c, behind=False)
+        frames = self._frames(q, np.linspace(0.0, 1.0, self._wrist.discs))
+        return moving_in_space(line, frames, self._wrist, self._edge_on)
 
     def carry(self, across: float) -> Carry:
         """Nothing: coordinates have both bends."""
@@ -124,21 +99,3 @@ class SpatialBody:
         """Centres (m, 3) [m] and rotations (m, 3, 3) of cross-sections at shares (m,) of the length."""
         centres, frames = spatial_frames(q, self._wrist.length, shares)
         return centres @ self._axes.T, self._axes @ frames @ self._axes.T
-
-
-def _flat(places: Planar, depth: float) -> Array:
-    return np.stack([places.real, places.imag, np.full(len(places), depth)], axis=-1)
-
-
-def _pairs(centres: Array, frames: Array, c: float, behind: bool) -> list[Stroke]:
-    """On either side the tendon and the springs around it, behind the backbone or in front of it."""
-    parts = []
-    for offset in (-c, c):
-        tendon = centres + frames @ np.array([0.0, offset, c if behind else -c])
-        flat = tendon[:, 0] + 1j * tendon[:, 1]
-        springs = coil(flat[:-1, None], flat[1:, None], 0.17 * c, turns=3)[:, ::2]
-        depth = np.linspace(tendon[:-1, 2], tendon[1:, 2], springs.shape[1], axis=-1)
-        wound = np.stack([springs.real, springs.imag, depth], axis=-1).reshape(-1, 3)
-        parts.append(Stroke(wound, 140 if behind else 158, "line"))
-        parts.append(Stroke(tendon, 62 if behind else 40, "line", 2))
-    return parts
