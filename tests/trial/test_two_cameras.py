@@ -63,8 +63,9 @@ def test_uncalibrated_cameras_that_were_set_square_tell_both_true_bends() -> Non
     still = watched(board, tracking, 0.4)
     assert {sighting.plane for sighting in still} == {0, 1}
     for plane in (0, 1):
-        pose = tracking.stand_square([sighting for sighting in still if sighting.plane == plane])
+        pose = tracking.stand_square(sorted(still, key=lambda sighting: abs(sighting.plane - plane)))
         assert pose is not None and pose.oblique < np.radians(3.0)
+    assert tracking.stand_square([]) is None
     straight = watched(board, tracking, 0.3)
     tracking.zero = tuple(
         float(np.mean([sighting.theta for sighting in straight if sighting.plane == plane])) for plane in (0, 1)

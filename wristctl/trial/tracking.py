@@ -85,7 +85,7 @@ class Tracking(Protocol):
     def stand_square(self, sightings: Sequence[Sighting]) -> CameraPose | None:
         """Set the bending plane square, for a camera that has not been calibrated: `Tracker.stand_square`.
 
-        All sightings are of one camera, which it is done for.
+        Of two cameras it is done for the one that the first sighting is of.
         """
 
     def close(self) -> None:
@@ -211,8 +211,11 @@ class PairedTracking:
         return self._trackings[sighting.plane].bend(sighting, other)
 
     def stand_square(self, sightings: Sequence[Sighting]) -> CameraPose | None:
-        """As `Tracking.stand_square`, of the camera that these sightings are of."""
-        return self._trackings[sightings[0].plane].stand_square(sightings) if sightings else None
+        """As `Tracking.stand_square`, of the camera that the first of these sightings is of, by its own alone."""
+        if not sightings:
+            return None
+        plane = sightings[0].plane
+        return self._trackings[plane].stand_square([sighting for sighting in sightings if sighting.plane == plane])
 
     def close(self) -> None:
         """Stop looking."""
