@@ -48,6 +48,18 @@ class Faults:
         return self._starts[fault.since] + fault.at
 
 
+class CameraFaults(Faults):
+    """Those of a schedule that are one camera's, 1 or 2."""
+
+    def __init__(self, faults: Faults, camera: int) -> None:
+        self._whole, self._camera = faults, camera
+        self._starts = faults._starts
+
+    def of(self, kinds: Sequence[FaultKind]) -> list[InjectedFault]:
+        """Faults of these kinds of this camera, on or not."""
+        return [fault for fault in self._whole.of(kinds) if fault.camera == self._camera]
+
+
 # (E, 3) changes of output latches: cycle, port, value.
 Edges = NDArray[np.int64]
 
