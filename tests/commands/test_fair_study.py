@@ -139,6 +139,14 @@ def test_what_is_shipped_of_it_is_the_median_tuning_with_its_figures_and_run(don
         assert row["rmse_low"] <= row["rmse"] and row["reliable"] == (place not in ranking.standing.unusable)
 
 
+def test_how_often_a_controller_is_first_is_data(done: Studied) -> None:
+    ranking, table = done.rankings["rig"], run_of(done).data("firsts").set_index("row")
+    for label, line in table.iterrows():
+        firsts = ranking.firsts(ranking.labels.index(str(label)))
+        assert tuple(line[["first_in_halves", "first_in_tunings", "tunings"]]) == firsts and line["halves"] == 50
+    assert table["first_in_halves"].sum() == 50 and table["first_in_tunings"].sum() == 2, "one is first in every half"
+
+
 def test_a_variant_is_held_against_the_one_that_it_names(done: Studied) -> None:
     """The same search twice finds the same gains: nothing turns round, and no RMSE changes."""
     table = pd.read_csv(run_of(done).path / "data" / "sensitivity.csv", comment="#").set_index("variant")

@@ -16,7 +16,7 @@ import numpy as np
 from wristctl.arrays import Array
 from wristctl.comparison.bootstrap import GeometricMean, penalised
 from wristctl.comparison.controller_ranking import STREAM
-from wristctl.comparison.repeated_tunings import Firsts, Order, RepeatedTunings, median_tuning
+from wristctl.comparison.repeated_tunings import HALVES, Firsts, Order, RepeatedTunings, median_tuning
 from wristctl.comparison.tie_groups import share
 from wristctl.comparison.world_ranking import RankedRow, WorldRanking, ranking
 from wristctl.config.families import TOLERATED
@@ -55,6 +55,23 @@ class TunedRanking(WorldRanking):
     def firsts(self, row: int) -> Firsts:
         """In how many halves of the worlds, and with how many tunings, a ranked row has the least error."""
         return self._order.firsts(row)
+
+    def firsts_frame(self) -> pd.DataFrame:
+        """A line for each ranked row: in how many halves of the worlds, and with how many tunings, it is first.
+
+        Empty where fewer than two rows are ranked: nothing could come before the one.
+        """
+        import pandas as pd
+
+        ranked_rows = [row for group in self.standing.groups for row in group]
+        lines = []
+        for row in ranked_rows if len(ranked_rows) > 1 else []:
+            halves, tunings, of_tunings = self.firsts(row)
+            lines.append(
+                {"family": self.name, "row": self.labels[row], "first_in_halves": halves, "halves": HALVES,
+                 "first_in_tunings": tunings, "tunings": of_tunings}
+            )  # fmt: skip
+        return pd.DataFrame(lines)
 
     @cached_property
     def _order(self) -> Order:
