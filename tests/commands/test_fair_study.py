@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -16,7 +17,7 @@ import pandas as pd
 import pytest
 
 import wristctl
-from tests.documented import script_of_docs
+from tests.documented import DOCS, script_of_docs
 from wristctl.commands import progress
 from wristctl.commands.study.units import Studied, StudyPlace
 from wristctl.comparison import world_ranking as judge_unit
@@ -139,12 +140,24 @@ def test_what_is_shipped_of_it_is_the_median_tuning_with_its_figures_and_run(don
         assert row["rmse_low"] <= row["rmse"] and row["reliable"] == (place not in ranking.standing.unusable)
 
 
-def test_how_often_a_controller_is_first_is_data(done: Studied) -> None:
-    ranking, table = done.rankings["rig"], run_of(done).data("firsts").set_index("row")
+def test_how_often_a_controller_is_first_is_data_that_the_page_reads(
+    done: Studied, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Of a run from before there was such a table the page takes it from the words of the answer: the same."""
+    monkeypatch.syspath_prepend(DOCS)
+    script, run, ranking = script_of_docs("study"), run_of(done), done.rankings["rig"]
+    table = run.data("firsts").set_index("row")
     for label, line in table.iterrows():
         firsts = ranking.firsts(ranking.labels.index(str(label)))
         assert tuple(line[["first_in_halves", "first_in_tunings", "tunings"]]) == firsts and line["halves"] == 50
     assert table["first_in_halves"].sum() == 50 and table["first_in_tunings"].sum() == 2, "one is first in every half"
+    rankings = script.rankings_of(run)
+    (told,) = script.first_of(run, rankings).values()
+    best = table.loc[script.first_group(rankings["rig"])[0]["row"]]
+    assert told == f"{best['first_in_halves']} of 50, {best['first_in_tunings']} of 2"
+    shutil.copytree(run.path, tmp_path / run.id)
+    (tmp_path / run.id / "data" / "firsts.csv").unlink()
+    assert script.first_of(Run(tmp_path / run.id), rankings) == {"rig": told}
 
 
 def test_a_variant_is_held_against_the_one_that_it_names(done: Studied) -> None:
