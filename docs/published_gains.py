@@ -97,10 +97,11 @@ def _source(subject: str, source: dict[str, Any]) -> list[str]:
 
 def _row(name: str, row: dict[str, Any]) -> str:
     gains = ", ".join(f"{gain} = {value:.4g}" for gain, value in row["gains"].items())
-    mean, low, high = (_deg(row[key]) for key in ("rmse", "rmse_low", "rmse_high"))
+    mean, ends = _deg(row["rmse"]), (row["rmse_low"], row["rmse_high"])
+    interval = f" [{_deg(ends[0])}, {_deg(ends[1])}]" if None not in ends else ""
     best, worst = map(_deg, row["tunings"])
     reliable = "yes" if row["reliable"] else "no"
-    return f"| {name} | {gains} | {mean} [{low}, {high}] | {best} to {worst} | {row['lost']} | {reliable} |"
+    return f"| {name} | {gains} | {mean}{interval} | {best} to {worst} | {row['lost']} | {reliable} |"
 
 
 def _deg(value: float) -> str:

@@ -26,7 +26,9 @@ def short(label: str) -> str:
 
 
 def interval(row: Row) -> str:
-    """RMSE of a row [deg] with its interval."""
+    """RMSE of a row [deg] with its interval; without one where its tunings tell none."""
+    if not row["rmse_high"] < math.inf:
+        return deg(row["rmse"])
     return f"{deg(row['rmse'])} [{deg(row['rmse_low'])}, {deg(row['rmse_high'])}]"
 
 

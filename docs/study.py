@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import itertools
 import json
+import math
 import re
 import shutil
 import sys
@@ -118,7 +119,9 @@ def bought(terms: Sequence[Row], families: Sequence[str]) -> list[str]:
 
 
 def _times(row: Row) -> str:
-    """A ratio with its interval, in brackets where the interval holds 1."""
+    """A ratio with its interval, in brackets where the interval holds 1; undecided where its tunings tell none."""
+    if not row["high"] < math.inf:
+        return f"({three(row['times'])})"
     text = f"{three(row['times'])} [{three(row['low'])}, {three(row['high'])}]"
     return f"({text})" if row["low"] <= 1.0 <= row["high"] else text
 
@@ -132,9 +135,10 @@ def ranking(rows: Sequence[Row]) -> list[str]:
     lines = []
     for row in rows:
         times = [three(row[f"times_better{end}"]) for end in ("", "_low", "_high")]
+        ratio = f"{times[0]} [{times[1]}, {times[2]}]" if row["times_better_high"] < math.inf else times[0]
         lost = [f"{100.0 * row[fate]:.3g}" for fate in ("failures", "swings")]
         cells = (
-            str(group(row) or "-"), row["row"], interval(row), f"{times[0]} [{times[1]}, {times[2]}]", *lost,
+            str(group(row) or "-"), row["row"], interval(row), ratio, *lost,
             three(row["chattering"]),
         )  # fmt: skip
         lines.append(f"| {' | '.join(cells)} |")

@@ -43,6 +43,11 @@ class TunedRanking(WorldRanking):
         """Errors of all rows over tunings, worlds and noise."""
         return RepeatedTunings(self.logarithms, STREAM)
 
+    @property
+    def more(self) -> str:
+        """What would tell rows apart that these worlds and tunings do not, in words."""
+        return "more worlds and tunings" if self.logarithms.shape[1] > 1 else super().more
+
     @cached_property
     def means(self) -> list[GeometricMean]:
         """Geometric mean of each row's RMSE [rad] over its tunings; a failure counts as 90 deg."""
