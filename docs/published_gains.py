@@ -65,6 +65,11 @@ def page(content: dict[str, Any]) -> str:
         "the study found them. Lost are worlds where the gains fail, swing or chatter; on gains that are shown to lose",
         "more than one in a hundred nobody should rely. Outside a family's conditions, and with such gains, a command",
         "warns. How the controllers of a family compare: [study](study.md).",
+        "",
+        "The same worlds again, with these gains: `wristctl compare experiments/shipped.yaml`, for another family with",
+        "`--set worlds.family=uneven`. The RMSE of every controller in every world (`data/worlds.csv`) is to the last",
+        "bit that in `data/worlds-FAMILY.csv` of the study's run, and as many worlds are lost. Intervals are over",
+        "worlds alone, since these gains are of one tuning.",
     ]
     for name, of_family in content.items():
         lines += ["", f"## {name}", "", *_family(name, of_family)]

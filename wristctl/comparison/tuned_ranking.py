@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from wristctl.arrays import Array
-from wristctl.comparison.bootstrap import GeometricMean, penalised
+from wristctl.comparison.bootstrap import GeometricMean, Resampled, penalised
 from wristctl.comparison.controller_ranking import STREAM
 from wristctl.comparison.repeated_tunings import HALVES, Firsts, Order, RepeatedTunings, median_tuning
 from wristctl.comparison.tie_groups import share
@@ -90,9 +90,11 @@ class TunedRanking(WorldRanking):
         return [(float(errors.min()), float(errors.max())) for errors in means]
 
     def published_error(self, row: int) -> float:
-        """Geometric mean of the RMSE [rad] of a row's published gains; a failure counts as 90 deg."""
-        tunings = self.logarithms[row]
-        return float(np.exp(tunings[self.published[row] % len(tunings)].mean()))
+        """Geometric mean of the RMSE [rad] of a row's published gains, as a comparison of them has it to the last bit.
+
+        A failure counts as 90 deg.
+        """
+        return float(np.exp(Resampled(np.log(penalised(self.scores[row])), STREAM).means[0]))
 
     def tunings_frame(self) -> pd.DataFrame:
         """A line for each tuning of each row that was tuned: its error [rad], and in how many worlds it is lost."""
