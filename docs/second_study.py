@@ -16,15 +16,18 @@ NOMINAL = 83
 # Rows of which an order may come out again beyond chance (Kendall's tau, exact, at 5 %), and disagreements shown.
 FEWEST_ORDERED, LARGEST = 5, 5
 
+_CHOOSE = """Choose among what both studies have in their first groups. What only one has there, it may owe to its
+worlds or to the luck of its searches. An order comes out again where Kendall's tau of both is above 0 at 5 %."""
+
 
 def again(first: Rankings, second: Rankings, rigs: Sequence[str]) -> list[str]:
     """Which controllers are in the first group of all these rigs in both studies, as a paragraph."""
     if not rigs:
         return []
     one, other = (set.intersection(*(_top(rankings[name]) for name in rigs)) for rankings in (first, second))
-    text = f"""[Asked twice](#asked-twice), with other worlds and searches: in the first group of all of {joined(rigs)}
-        are both times {_names(one & other)}; this time alone {_names(one - other)}; the other time alone
-        {_names(other - one)}."""
+    where = f"all of {joined(rigs)}" if len(rigs) > 1 else rigs[0]
+    text = f"""[Asked twice](#asked-twice), with other worlds and searches: in the first group of {where} are both times
+        {_names(one & other)}; this time alone {_names(one - other)}; the other time alone {_names(other - one)}."""
     return [*textwrap.wrap(" ".join(text.split()), 120), ""]
 
 
@@ -38,7 +41,7 @@ def asked_twice(first: Rankings, second: Rankings, made: str) -> list[str]:
     lines = [_compared(name, rows, second[name]) for name, rows in shared.items()]
     words = [line for name, rows in shared.items() for line in _for_whoever_chooses(name, rows, second[name])]
     return [
-        "## Asked twice", "", made, "", *words, "",
+        "## Asked twice", "", made, "", _CHOOSE, "", *words, "",
         f"| {' | '.join(heads)} |", "| --- " * len(heads) + "|", *lines, "", *_intervals(shared, second), "",
     ]  # fmt: skip
 
@@ -71,7 +74,7 @@ def _order(labels: Sequence[str], first: Sequence[Row], second: Sequence[Row]) -
     errors = [{row["row"]: row["rmse"] for row in rows} for rows in (first, second)]
     found = kendalltau(*([of_study[label] for label in labels] for of_study in errors))
     kept = found.pvalue < 0.05 and found.statistic > 0.0
-    words = "their order comes out again" if kept else "the order within them is not to be read"
+    words = "their order comes out again" if kept else "the order within them does not, and is not to be read"
     return f"; {words} (Kendall's tau {found.statistic:.2f})"
 
 

@@ -15,6 +15,7 @@ import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from ranking_rows import Rankings, Row, deg, first_group, group, interval, short, three
 from second_study import again, asked_twice
@@ -237,19 +238,35 @@ def studied(run: Run) -> dict[str, Family]:
 
 
 def second_of(run: Run, second: Run) -> tuple[list[str], list[str]]:
-    """What a second study of the same finds again: a sentence, and a section. SystemExit where it is of another."""
-    asked = [one.config.model_dump(include={"wrist", "families", "study"}) for one in (run, second)]
-    if asked[0] != asked[1] or run.config.seed == second.config.seed:
-        sys.exit("two studies of the same question are to differ in their seed, and in nothing else")
+    """What a second study finds again of the families that both have: a sentence, and a section.
+
+    SystemExit where it asked something else of them, or had the same seed.
+    """
+    shared = [name for name in studied(run) if name in studied(second)]
+    if not shared or asked_of(run, shared) != asked_of(second, shared) or run.config.seed == second.config.seed:
+        sys.exit("two studies of the same question differ in their seed, in their families, and in nothing else")
     rankings = rankings_of(run), rankings_of(second)
-    rigs = [name for name, family in studied(run).items() if family.loop.sensor.level == "camera"]
-    smooth = [name for name in rigs if False in kinds_of(studied(run)[name])]
-    hash_of = second.manifest.result_sha256
+    families = {name: studied(run)[name] for name in shared}
+    rigs = [name for name, family in families.items() if family.loop.sensor.level == "camera"]
+    smooth = [name for name in rigs if False in kinds_of(families[name])]
     made = [
-        f"`{asked_again(second.manifest.argv)}`, {second.id}, has the hash",
-        f"`{hash_of}`; worlds, searches and noise are all others than the first study's.",
+        f"`{asked_again(second.manifest.argv)}`, {second.id},",
+        f"has the hash `{second.manifest.result_sha256}`.",
+        "Its worlds, searches and noise are all others than the first study's.",
     ]
     return again(*rankings, smooth), asked_twice(*rankings, "\n".join(made))
+
+
+def asked_of(run: Run, families: Sequence[str]) -> dict[str, Any]:
+    """What a study asked of these families: all but its seed, and what it asked beside."""
+    beside = {"families", "variants", "varied", "resume"}
+    asked = run.config.model_dump(include={"wrist", "families", "study"})
+    of_families = {name: asked["families"][name] for name in families}
+    return {
+        "wrist": asked["wrist"],
+        "families": of_families,
+        "study": {key: value for key, value in asked["study"].items() if key not in beside},
+    }
 
 
 def main() -> None:

@@ -183,6 +183,29 @@ def test_a_comparison_of_what_a_study_ships_has_its_figures_to_the_last_bit(
         assert again.standing.lost[row].times == shipped["rig"]["controllers"][law]["lost"]
 
 
+def test_only_another_seed_makes_a_second_study_of_the_same_question(
+    done: Studied, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Families and variants that one of them lacks do not matter."""
+    monkeypatch.syspath_prepend(DOCS)
+    script, run = script_of_docs("study"), run_of(done)
+
+    def copied(name: str, *changes: tuple[str, str]) -> Run:
+        shutil.copytree(run.path, tmp_path / name)
+        text = (tmp_path / name / "config.yaml").read_text()
+        for before, after in changes:
+            assert before in text
+            text = text.replace(before, after)
+        (tmp_path / name / "config.yaml").write_text(text)
+        return Run(tmp_path / name)
+
+    _, section = script.second_of(run, copied("again", ("seed: 3", "seed: 4"), ("RMSE alone:", "another:")))
+    assert "## Asked twice" in section and any(line.startswith("- **rig**: in both") for line in section)
+    for other in (run, copied("longer", ("seed: 3", "seed: 4"), ("horizon: 1.0", "horizon: 2.0"))):
+        with pytest.raises(SystemExit, match="differ in their seed"):
+            script.second_of(run, other)
+
+
 def test_a_variant_is_held_against_the_one_that_it_names(done: Studied) -> None:
     """The same search twice finds the same gains: nothing turns round, and no RMSE changes."""
     table = pd.read_csv(run_of(done).path / "data" / "sensitivity.csv", comment="#").set_index("variant")
