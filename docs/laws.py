@@ -118,7 +118,7 @@ each first, with one budget.
 ## When each wins
 
 - **Computed torque or MPC with a disturbance observer** (ct-dob, mpc, pid-dob, smc-dob): behind motors, tendons and a
-  camera about a tenth behind LQI or alike. They were ahead with a tick of 5 ms and with spools that
+  camera about a tenth behind LQI or alike. They were ahead where spools
   [lagged](corrected.md#simulated-spools-that-lagged-where-a-rigs-do-not), which a rig's do not. MPC is the same
   controller wherever no tendon saturates, and a step costs a hundred times as much (some 13 us). After a jump they come
   to rest, since they know what their motors withhold.
