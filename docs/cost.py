@@ -9,6 +9,7 @@ import os
 import platform
 import sys
 import tempfile
+import textwrap
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -17,10 +18,12 @@ from typing import Any
 import numpy as np
 
 from wristctl.commands.inputs import Inputs
+from wristctl.commands.printed_table import joined
 from wristctl.commands.study.command import plan
 from wristctl.commands.study.units import search_units
 from wristctl.comparison.world_ranking import RANKED
 from wristctl.config.study import Study
+from wristctl.control.shipped_gains import PREFIX, shipped_gains
 from wristctl.control.table import CONTROLLERS, controller
 from wristctl.processes import cores
 from wristctl.simulation.cases import Case, measure
@@ -37,10 +40,14 @@ SLEEPS, TAKES = 40, 0.25
 """Units without work, and the seconds that each takes."""
 
 
-def cost(law: str, cases: list[Case], study: Study) -> float:
-    """Seconds of one core for a rollout of a controller, as a study measures it."""
+def cost(law: str, family: str, cases: list[Case], study: Study) -> float:
+    """Seconds of one core for a rollout of a controller with the gains shipped for a family, as a study measures it.
+
+    With gains that chatter it takes many times that: it is repeated with shorter steps until its numbers settle.
+    """
     chosen = controller(law)
-    gains = np.array([chosen.values(list(chosen.presets.values())[-1])] * ROWS)
+    values = shipped_gains(law, f"{PREFIX}{family}").gains if chosen.gains else {}
+    gains = np.array([chosen.values(values)] * ROWS)
     measure(chosen, gains[:1], cases[:20], study.wrist, RANKED)
     return min(_processor(lambda: measure(chosen, gains, cases, study.wrist, RANKED)) for _ in range(TRIES)) / (
         ROWS * len(cases)
@@ -89,7 +96,7 @@ def main() -> None:
     families = study.study.families
     laws = [name for name in CONTROLLERS if name == "feedforward" or name in study.study.laws]
     known = {each: drawn_cases(study.families[each], each, "test", 0, WORLDS, study.wrist) for each in families}
-    costs = {family: {law: cost(law, cases, study) for law in laws} for family, cases in known.items()}
+    costs = {family: {law: cost(law, family, cases, study) for law in laws} for family, cases in known.items()}
     lines = [f"| controller | {' | '.join(families)} |", f"| --- |{' --- |' * len(families)}"]
     for law in laws:
         lines.append(f"| {law} | {' | '.join(f'{1.0 / costs[family][law]:.0f}' for family in families)} |")
@@ -103,7 +110,7 @@ def main() -> None:
         f"| {MANY * each / 3600.0 / 1000.0 * (1.0 + dearest / unit):.2g} |"
         for family, each in means.items()
     ]
-    page = _BEGIN + lines + _MANY + many + _over(added, unit) + _study(study, costs)
+    page = _begin(study) + lines + _MANY + many + _over(added, unit) + _study(study, costs)
     (HERE / "cost.md").write_text("\n".join(page).rstrip() + "\n")
 
 
@@ -145,14 +152,26 @@ def _cpu() -> str:
     return names[0] if names else platform.machine()
 
 
-_BEGIN = [
-    "# What rollouts cost", "",
-    "Made by `python docs/cost.py`.", "",
-    "## Rollouts per core-second", "",
-    f"Of 3 s each, with all metrics of a ranking, {ROWS} gains on {WORLDS} worlds of each family at once; {_cpu()},",
-    "processor time, the best of three. `ideal` is a loop of 1 kHz; the others are of 200 Hz with steps of 1 ms on",
-    "elastic tendons.", "",
-]  # fmt: skip
+def _begin(study: Study) -> list[str]:
+    """Head of the page, with what a rollout of each family is: duration, rate of the loop, integration step."""
+    of_loops: dict[str, list[str]] = {}
+    for name in study.study.families:
+        family = study.families[name]
+        period, step = family.loop.control_period, family.loop.control_period / family.loop.steps
+        words = f"{family.horizon:g} s of a loop of {1.0 / period:g} Hz, integrated by {1e3 * step:g} ms"
+        of_loops.setdefault(words, []).append(f"`{name}`")
+    rollouts = "; ".join(f"{joined(names)}: {words}" for words, names in of_loops.items())
+    told = f"""With all metrics of a ranking and the gains that are shipped for the family, {ROWS} rows on {WORLDS}
+        worlds of it at once; {_cpu()}, processor time, the best of {TRIES} tries. Gains that chatter cost many times as
+        much: a rollout is repeated with shorter steps until its numbers [settle](convergence.md). {rollouts}."""
+    return [
+        "# What rollouts cost", "",
+        "Made by `python docs/cost.py`.", "",
+        "## Rollouts per core-second", "",
+        *textwrap.wrap(" ".join(told.split()), 120), "",
+    ]  # fmt: skip
+
+
 _MANY = [
     "", f"## {MANY:.0e} rollouts", "",
     "At the mean of all controllers, with the dearest executor's share on the cluster.", "",

@@ -149,7 +149,7 @@ def told(found: Found) -> list[str]:
     remains, swings = Measured._fields.index("remains"), Measured._fields.index("oscillation")
     closing = three[:, remains] < CLOSED
     open_ = three[~closing, remains]
-    first = int(np.argmin(none[:, rmse]))
+    first, last = int(np.argmin(none[:, rmse])), int(np.argmin(three[:, rmse]))
     better = int(np.sum(three[:, swings] < none[:, swings]))
     outermost = max(float(each.outermost) for row in found.values() for each in row)
     hunting = np.array([[each.hunting for each in row] for row in found.values()])
@@ -159,8 +159,8 @@ def told(found: Found) -> list[str]:
         f"deg is left, with 3 rad of sheath too ({', '.join(np.array(names)[closing])}). The others stay where "
         f"friction holds them, {open_.min():.2g} to {open_.max():.2g} deg off on average.",
         f"A move's RMSE grows by {_growth(one[:, rmse] / none[:, rmse])} with 1 rad of sheath and by "
-        f"{_growth(three[:, rmse] / none[:, rmse])} with 3 rad; without friction the best, {names[first]}, goes "
-        f"from {none[first, rmse]:.2g} to {three[first, rmse]:.2g} deg.",
+        f"{_growth(three[:, rmse] / none[:, rmse])} with 3 rad. The lowest is {none[first, rmse]:.2g} deg without "
+        f"friction ({names[first]}) and {three[last, rmse]:.2g} deg with 3 rad ({names[last]}).",
         f"Friction damps: {better} of {len(names)} presets swing less at rest with 3 rad of sheath than without "
         f"friction. Nowhere inside their conditions do they swing by more than {outermost:.2g} deg.",
         f"None hunts: over the second half of a minute, with a camera without noise, friction leaves at most "
@@ -176,11 +176,12 @@ def _growth(ratios: np.ndarray) -> str:
 _HOW = """
 What closes the band is an integral of the error, or what is adapted; stiffness and feedback alone do not. Every preset
 that states its conditions, behind steppers, tendons of 20 kN/m and a camera of 60 Hz, two frames late with 0.1 deg of
-noise, at 5 ms; minimum-jerk moves of 1 s to 5, 15, 30 and 45 deg on both sides, 5 streams of noise, 4 s each. Columns
-have four numbers: without friction, and with a coefficient of 0.1 and no sheath, 1 rad and 3 rad of it. `left` is the
-mean error over the second half of a minute's hold, `hunting` half the peak-to-peak there, trend removed, both with a
-camera without noise; `corners` is the largest oscillation at the corners of the preset's conditions. What friction does
-to the wrist itself: [hysteresis.md](hysteresis.md). Made by `python docs/friction.py`.
+noise, at 5 ms, which is within the conditions of them all (a rig ticks every 10 ms); minimum-jerk moves of 1 s to 5,
+15, 30 and 45 deg on both sides, 5 streams of noise, 4 s each. Columns have four numbers: without friction, and with a
+coefficient of 0.1 and no sheath, 1 rad and 3 rad of it. `left` is the mean error over the second half of a minute's
+hold, `hunting` half the peak-to-peak there, trend removed, both with a camera without noise; `corners` is the largest
+oscillation at the corners of the preset's conditions. What friction does to the wrist itself:
+[hysteresis.md](hysteresis.md). Made by `python docs/friction.py`.
 """
 
 

@@ -65,6 +65,11 @@ def page(content: dict[str, Any]) -> str:
         "the study found them. Lost are worlds where the gains fail, swing or chatter; on gains that are shown to lose",
         "more than one in a hundred nobody should rely. Outside a family's conditions, and with such gains, a command",
         "warns. How the controllers of a family compare: [study](study.md).",
+        "",
+        "The same worlds again, with these gains: `wristctl compare experiments/shipped.yaml`, for another family with",
+        "`--set worlds.family=uneven`. The RMSE of every controller in every world (`data/worlds.csv`) is to the last",
+        "bit that in `data/worlds-FAMILY.csv` of the study's run, and as many worlds are lost. Intervals are over",
+        "worlds alone, since these gains are of one tuning.",
     ]
     for name, of_family in content.items():
         lines += ["", f"## {name}", "", *_family(name, of_family)]
@@ -97,10 +102,11 @@ def _source(subject: str, source: dict[str, Any]) -> list[str]:
 
 def _row(name: str, row: dict[str, Any]) -> str:
     gains = ", ".join(f"{gain} = {value:.4g}" for gain, value in row["gains"].items())
-    mean, low, high = (_deg(row[key]) for key in ("rmse", "rmse_low", "rmse_high"))
+    mean, ends = _deg(row["rmse"]), (row["rmse_low"], row["rmse_high"])
+    interval = f" [{_deg(ends[0])}, {_deg(ends[1])}]" if None not in ends else ""
     best, worst = map(_deg, row["tunings"])
     reliable = "yes" if row["reliable"] else "no"
-    return f"| {name} | {gains} | {mean} [{low}, {high}] | {best} to {worst} | {row['lost']} | {reliable} |"
+    return f"| {name} | {gains} | {mean}{interval} | {best} to {worst} | {row['lost']} | {reliable} |"
 
 
 def _deg(value: float) -> str:

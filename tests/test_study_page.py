@@ -5,13 +5,20 @@ from __future__ import annotations
 import math
 import re
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
 import pytest
 
-from tests.documented import script_of_docs
+from tests.documented import DOCS, script_of_docs
 
 PAGE = Path(__file__).parents[1] / "docs" / "study.md"
+
+
+@pytest.fixture
+def script(monkeypatch: pytest.MonkeyPatch) -> ModuleType:
+    monkeypatch.syspath_prepend(DOCS)  # where what it shares with the second study's section lies
+    return script_of_docs("study")
 
 
 def row(label: str, group: float, rmse: float, chattering: float, swings: float = 0.0) -> dict[str, Any]:
@@ -28,8 +35,9 @@ ROWS = [row("mpc/tuned", 1, 0.1, 9.0), row("ct-dob/tuned", 1, 0.11, 3.0), row("l
         row("smc/exchanged", math.nan, 0.05, 1.0, 0.5)]  # fmt: skip
 
 
-def test_a_rigs_line_has_the_lowest_error_of_what_may_be_used_what_is_as_good_and_what_comes_next() -> None:
-    script = script_of_docs("study")
+def test_a_rigs_line_has_the_lowest_error_of_what_may_be_used_what_is_as_good_and_what_comes_next(
+    script: ModuleType,
+) -> None:
     lines = script.decision(
         {"camera": ROWS, "hard": [row("pid/tuned", math.nan, 0.1, 1.0, 0.5)]}, {"camera": "31 of 50, 2 of 5"}
     )[2:]
@@ -40,14 +48,12 @@ def test_a_rigs_line_has_the_lowest_error_of_what_may_be_used_what_is_as_good_an
     assert lines[1] == "| hard | none | - | - | - | - | - | 1 of 1 |"
 
 
-def test_what_has_no_group_must_not_be_used_however_small_its_error() -> None:
-    script = script_of_docs("study")
+def test_what_has_no_group_must_not_be_used_however_small_its_error(script: ModuleType) -> None:
     assert script.unusable({"camera": ROWS}) == ["- camera: smc/exchanged 50 %"]
     assert script.ranking(ROWS)[-1].startswith("| - | smc/exchanged | 0.05")
 
 
-def test_an_effect_whose_interval_holds_one_stands_in_parentheses() -> None:
-    script = script_of_docs("study")
+def test_an_effect_whose_interval_holds_one_stands_in_parentheses(script: ModuleType) -> None:
     terms = [
         {
             "term": "an integral",

@@ -15,7 +15,7 @@ from wristctl.commands.compare.answer import answer_of
 from wristctl.commands.printed_table import COLUMNS, two
 from wristctl.commands.ranking_answer import ranking_table
 from wristctl.commands.ranking_tables import answer_tables
-from wristctl.commands.ranking_words import condition, names_of, winner
+from wristctl.commands.ranking_words import DIGITS, condition, names_of, winner
 from wristctl.comparison.combinations import CLASSES
 from wristctl.comparison.controller_ranking import Ranking, Traits
 from wristctl.comparison.model_confidence_set import LEAST_PAIRS
@@ -80,11 +80,11 @@ def test_a_condition_is_a_line_with_the_best_the_next_and_the_gain_over_feedforw
     one = stands()
     table = ranking_table([one], names_of([one]))
     (line,) = table.rows
-    assert line[:2] == ("sampled (12)", f"mrac {two(np.degrees(one.means[0].value))}")
+    assert line[:2] == ("sampled (12)", f"mrac {two(np.degrees(one.means[0].value), DIGITS)}")
     assert line[3].startswith("pid-ff ") and line[5] == "0 of 9"
     ratio = one.means[one.labels.index("feedforward/default")].value / one.means[0].value
-    assert line[4].endswith(f"({two(ratio)})")
-    assert "use mrac/default: RMSE" in told(one) and f"{two(ratio)} times less than feedforward" in told(one)
+    assert line[4].endswith(f"({two(ratio, DIGITS)})")
+    assert "use mrac/default: RMSE" in told(one) and f"{two(ratio, DIGITS)} times less than feedforward" in told(one)
 
 
 def test_the_rig_is_answered_first_and_what_is_best_elsewhere_is_warned_of_where_it_swings() -> None:

@@ -112,6 +112,31 @@ def test_a_controller_that_is_seldom_lost_keeps_its_place_until_more_is_shown() 
     assert "use bb/tuned" in often and lost(often, "a", 3)
 
 
+def test_a_seldom_fault_of_several_is_told_once_with_its_largest_size() -> None:
+    rows = [row("a/tuned", 1.0, 0.3, swings=1), row("bb/tuned", 1.0, 0.3, swings=2), row("ccc/tuned", 3.0)]
+    text = said(*rows, tolerated=0.05)
+    assert re.search(r"(a/tuned and bb/tuned|bb/tuned and a/tuned) swing .*in 2 of 40 worlds at most", text)
+
+
+def test_what_can_be_told_apart_is_a_range_or_where_it_differs_much_by_condition() -> None:
+    fine, coarse = ((row("a/tuned", 1.0, spread), row("bb/tuned", 1.0, spread)) for spread in (0.02, 1.0))
+    alike = told(ranked(*fine), ranked(*fine, family="rig"))
+    assert re.search(r"differ by less than [\d.]+ % cannot be told apart here; more worlds can", alike)
+    apart = told(ranked(*fine), ranked(*coarse, family="rig"))
+    assert re.search(r"less than this cannot be told apart here: bench [\d.]+ %, rig [\d.]+ %; more worlds can", apart)
+
+
+def test_two_tunings_tell_no_interval_and_the_answer_says_so() -> None:
+    def tuned(*factors: float) -> str:
+        rows = [[row("feedforward/default", 4.0)], [row("a/tuned", one, 0.3) for one in factors]]
+        rows.append([row("bb/tuned", 1.3 * one, 0.3) for one in factors])
+        return told(tuned_ranking("bench", FAMILIES["bench"], rows, [0, 0, 0]))
+
+    both, three = tuned(1.0, 1.1), tuned(1.0, 1.1, 0.9)
+    assert "Two tunings tell no interval" in both and "interval:" not in both and "cannot be told apart" not in both
+    assert "Two tunings" not in three and "interval:" in three and "more worlds and tunings can" in three
+
+
 def test_every_controller_that_must_not_be_used_is_named_with_its_worlds_and_the_worst_fault() -> None:
     rows = [row(f"{name}/tuned", 1.0, swings=count) for name, count in (("a", 2), ("b", 7), ("d", 1))]
     text = said(*rows, row("e/tuned", 1.0, swings=3, failed=2), row("ff/tuned", 2.0))

@@ -54,6 +54,18 @@ def test_an_interval_over_worlds_alone_holds_it_far_too_seldom() -> None:
     assert held / trials < 0.5
 
 
+def test_two_tunings_tell_no_interval_but_of_what_is_not_tuned() -> None:
+    """Student's t with one degree of freedom would allow any error; worlds tell that of a preset all the same."""
+    rng = np.random.default_rng(4)
+    both = errors(rng, SPREADS["tunings differ"], (5, 40, 1))[:, :2]
+    preset = np.repeat(errors(rng, SPREADS["tunings differ"], (5, 40, 1))[:, :1], 2, axis=1)
+    tuned, untuned = (repeated := RepeatedTunings(np.concatenate([both, preset]), 1)).estimates()
+    assert (tuned.low, tuned.high) == (0.0, np.inf) and 0.0 < untuned.low < untuned.value < untuned.high < np.inf
+    assert repeated.ratio(0, 1).is_one and np.isnan(repeated.resolution([0, 1]))
+    (three,) = RepeatedTunings(errors(rng, SPREADS["tunings differ"], (5, 40, 1))[:, :3], 1).estimates()
+    assert 0.0 < three.low < three.high < np.inf
+
+
 def test_an_interval_is_as_wide_as_tunings_and_worlds_make_it() -> None:
     """Of tunings alone it is Student's with 4 degrees of freedom, of worlds alone nearly the normal one."""
     rng = np.random.default_rng(3)

@@ -69,10 +69,17 @@ def check_row(row: Row | SimulateSettings, tuned: Gains | None, run: Run | None 
 def with_what_there_is(study: Study, inputs: Inputs) -> tuple[Study, list[str]]:
     """A comparison without the rows that want a tune run, and the inverse that wants a network, where none is given.
 
-    And what is left out, in words. Where nothing would be left, and where a run is given that lacks some gains, the
-    study stays as it is: what it lacks is an error.
+    And what is left out, in words. Gains `tuned:worlds` are those shipped of the family that is compared on. Where
+    nothing would be left, and where a run is given that lacks some gains, the study stays as it is: what it lacks is an
+    error.
     """
+    from wristctl.control.shipped_gains import OF_WORLDS, PREFIX
+
     settings, left_out = study.compare, list[str]()
+    if family := settings.worlds.family:
+        of_family = {"gains": f"{PREFIX}{family}"}
+        rows = tuple(row.model_copy(update=of_family) if row.gains == OF_WORLDS else row for row in settings.rows)
+        settings = settings.model_copy(update={"rows": rows})
     searched = settings.tuning.controllers if settings.tuning is not None else ()
     if "tuned" not in inputs:
         rows = tuple(row for row in settings.rows if row.gains != "tuned" or row.controller in searched)
@@ -84,7 +91,7 @@ def with_what_there_is(study: Study, inputs: Inputs) -> tuple[Study, list[str]]:
     if "network" not in inputs and inverses and inverses != settings.inverses and not settings.worlds.family:
         left_out.append("references through a network (no train run is given)")
         settings = settings.model_copy(update={"inverses": inverses})
-    return study.model_copy(update={"compare": settings}) if left_out else study, left_out
+    return study if settings is study.compare else study.model_copy(update={"compare": settings}), left_out
 
 
 def check_reach(references: Iterable[Reference], wrist: WristParameters, where: str) -> None:

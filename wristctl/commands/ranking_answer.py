@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 from wristctl.commands.answer import LINES, Answer
 from wristctl.commands.printed_table import COLUMNS, Table, degrees, joined, two
 from wristctl.commands.ranking_words import (
+    DIGITS,
     called,
     condition,
     counted_in,
@@ -63,7 +64,8 @@ def _use(where: str, alike: Sequence[Ranking], others: Sequence[Ranking]) -> str
     named = [chosen, *equal] if len(equal) <= 3 else [chosen]
     everywhere = len(places) == len(alike) > 1
     names = f" ({', '.join(map(condition, alike))})" if everywhere else ""
-    text = f"{where}{names} use {joined([*map(called, named)], 'or')}: RMSE {_ends([*map(degrees, means)])} deg"
+    errors = _ends([degrees(mean, DIGITS) for mean in means])
+    text = f"{where}{names} use {joined([*map(called, named)], 'or')}: RMSE {errors} deg"
     if len(places) == 1:
         text += interval(*places[0])
     if len(alike) > 1 and not everywhere:
@@ -91,13 +93,30 @@ def _use(where: str, alike: Sequence[Ranking], others: Sequence[Ranking]) -> str
 
 def _seldom(labels: Sequence[str], rankings: Sequence[Ranking]) -> str:
     """Faults of controllers that have them too seldom to be shown to exceed what is tolerated, the worst of each."""
-    words = ""
+    worst: dict[str, list[tuple[str, Ranking, int]]] = {}
     for label in labels:
         lost = [(ranking, ranking.labels.index(label)) for ranking in rankings if label in ranking.labels]
         ranking, row = max(lost, key=lambda place: _lost(*place))
         if ranking.standing.lost[row].times:
-            words += f"; {label} {fact(ranking, row)}"
-    return words
+            worst.setdefault(next(iter(facts(ranking, row))), []).append((label, ranking, row))
+    return "".join(f"; {_together(verb, places)}" for verb, places in worst.items())
+
+
+def _together(verb: str, places: Sequence[tuple[str, Ranking, int]]) -> str:
+    """A fault that one or several controllers have, with the largest size and number of cases."""
+    label, ranking, row = max(places, key=lambda place: _lost(*place[1:]))
+    if len(places) == 1:
+        return f"{label} {fact(ranking, row)}"
+    _, sized, largest = max(places, key=lambda place: _size(verb, *place[1:]))
+    size, often = facts(sized, largest)[verb][0], max(facts(*place[1:])[verb][1] for place in places)
+    words = f"{joined([label for label, *_ in places])} {_THEY[verb].removeprefix('these ')}"
+    return f"{words} {f'{size} at most, ' if size else ''}in {often} of {counted_in(ranking, verb)} at most"
+
+
+def _size(verb: str, ranking: Ranking, row: int) -> float:
+    """How large a fault of a row is; 0 where it has no size."""
+    sizes = {"swings": ranking.swing, "chatters": ranking.chatter, "pulls harder than a tendon bears": ranking.peak}
+    return float(sizes[verb][row]) if verb in sizes else 0.0
 
 
 def _no_ranking(alike: Sequence[Ranking]) -> str:
@@ -115,7 +134,7 @@ def _no_ranking(alike: Sequence[Ranking]) -> str:
 def _times(least: float, rmse: float) -> str:
     """The least of some ratios of errors in words; of an RMSE that nobody could measure it is a bound."""
     bound = degrees(rmse).startswith("<")
-    return f"{'more than ' * bound}{two(least)} times"
+    return f"{'more than ' * bound}{two(least, DIGITS)} times"
 
 
 def _ends(shown: Sequence[str]) -> str:
@@ -148,7 +167,7 @@ def ranking_table(rankings: Sequence[Ranking], names: Mapping[str, str]) -> Tabl
         after = groups[1][0] if len(groups) > 1 else None
         following = "-" if after is None else f"{names[ranking.labels[after]]} {error(ranking, after)}"
         bound = ">" if best.endswith(degrees(0.0)) else ""
-        ratio = "" if row is None or base is None else f" ({bound}{two(ranking.gains[row].value)})"
+        ratio = "" if row is None or base is None else f" ({bound}{two(ranking.gains[row].value, DIGITS)})"
         open_loop = "-" if base is None else f"{error(ranking, base)}{ratio}"
         others = f"{len(groups[0]) - 1}" if groups else "-"
         begin, end = (
@@ -235,6 +254,8 @@ def _lost(ranking: Ranking, row: int) -> float:
     return ranking.standing.lost[row].value
 
 
+# Ratio of two errors from which it is told as a factor, and of two resolutions up to which they are told as a range.
+_FACTOR, _ALIKE = 2.0, 5.0
 # Faults of several.
 _THEY = {
     "leaves its range": "these leave their range",
@@ -284,29 +305,36 @@ def _leaf(ranking: Ranking, rankings: Sequence[Ranking], names: Mapping[str, str
     if row is None:
         return "too few to rank" if ranking.standing.untold else "none", "", "", ""
     mean = ranking.means[row]
-    ends = f" [{degrees(mean.low)}, {degrees(mean.high)}]" if mean.low < mean.high < math.inf else ""
+    ends = f" [{degrees(mean.low, DIGITS)}, {degrees(mean.high, DIGITS)}]" if mean.low < mean.high < math.inf else ""
     others = [names[ranking.labels[other]] for other in groups[0] if other != row]
     following = "-"
     if len(groups) > 1:
         after = groups[1][0]
-        following = f"{names[ranking.labels[after]]} {two(ranking.means[after].value / mean.value, 3)}"
+        following = f"{names[ranking.labels[after]]} {two(ranking.means[after].value / mean.value, DIGITS)}"
     equal = "-" if not others else others[0] if len(others) == 1 else f"{len(others)} more"
-    return names[ranking.labels[row]], f"{degrees(mean.value)}{ends}", equal, following
+    return names[ranking.labels[row]], f"{degrees(mean.value, DIGITS)}{ends}", equal, following
 
 
 def certainty(rankings: Sequence[Ranking]) -> str:
-    """By how much errors must differ to be told apart, at which level."""
-    ranked = [one.standing.floor for one in rankings if one.standing.groups]
-    floors = sorted(floor for floor in ranked if 1.0 < floor < math.inf)
+    """By how much errors must differ to be told apart, by condition where that differs much."""
+    ranked = {condition(one): one.standing.floor for one in rankings if one.standing.groups}
+    floors = {name: floor for name, floor in ranked.items() if 1.0 < floor < math.inf}
     if not floors:
         return ""
-    size = _ends([two(100.0 * (floor - 1.0)) for floor in floors])
-    more = "more worlds" if rankings[0].unit == "world" else "more motions or --repetitions"
-    unit = f"{rankings[0].unit}s"
+    least, most = min(floors.values()), max(floors.values())
+    if most - 1.0 <= _ALIKE * (least - 1.0):
+        size, rest = _ends([_apart(least), _apart(most)]), ""
+    else:
+        size, rest = "this", f": {', '.join(f'{name} {_apart(floor)}' for name, floor in floors.items())}"
     return (
-        f"How sure: 95 %. RMSE is a geometric mean over the {unit}. Controllers whose RMSE differ by less than "
-        f"{size} % cannot be told apart with so few {unit}; {more} can."
+        f"How sure: 95 %. RMSE is a geometric mean over the {rankings[0].unit}s. Controllers whose RMSE differ by less "
+        f"than {size} cannot be told apart here{rest}; {rankings[0].more} can."
     )
+
+
+def _apart(ratio: float) -> str:
+    """By how much two errors differ, in words: 12 %, a factor of 4.8."""
+    return f"{two(100.0 * (ratio - 1.0))} %" if ratio < _FACTOR else f"a factor of {two(ratio)}"
 
 
 def fitted(answer: Answer, notes: Sequence[tuple[str | Table, str | Table]]) -> Answer:

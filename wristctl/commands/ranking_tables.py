@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from wristctl.commands.printed_table import Table, degrees, two
 from wristctl.commands.ranking_answer import decision_table, ranking_table
-from wristctl.commands.ranking_words import condition, names_of
+from wristctl.commands.ranking_words import DIGITS, condition, names_of
 
 if TYPE_CHECKING:
     from wristctl.comparison.controller_ranking import Ranking
@@ -42,11 +42,11 @@ def every_row(ranking: WorldRanking, times: Mapping[str, StepTime] | None = None
         failures, swings = ranking.standing.failures[row], ranking.standing.swings[row]
         lost = [f"{100 * share.value:.3g} % (< {100 * share.high:.2g})" for share in (failures, swings)]
         tick = (times or {}).get(ranking.labels[row].split("/")[0])
-        ends = tuple(degrees(end, 3) for end in (mean.value, mean.low, mean.high))
-        ratio = f"{two(gain.low, 3)} to {two(gain.high, 3)}"
+        ends = [degrees(end, DIGITS) if mean.high < np.inf else "-" for end in (mean.low, mean.high)]
+        ratio = f"{two(gain.low, DIGITS)} to {two(gain.high, DIGITS)}" if gain.high < np.inf else "-"
         rows.append((
-            "-" if group is None else str(group), ranking.labels[row], *ends,
-            degrees(float(ranking.scores[row].max()), 3), gain.value, ratio, *lost, chattering[row], energy[row],
+            "-" if group is None else str(group), ranking.labels[row], degrees(mean.value, DIGITS), *ends,
+            degrees(float(ranking.scores[row].max()), DIGITS), gain.value, ratio, *lost, chattering[row], energy[row],
             tick.median if tick else None, "yes" if front[row] and group else "",
         ))  # fmt: skip
     heads = (

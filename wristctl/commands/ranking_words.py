@@ -15,6 +15,8 @@ if TYPE_CHECKING:
 # Names of gains that the paper prints, and of those with P1 and P2 exchanged: never left out of a label.
 PRINTED = "printed"
 PAPERS_GAINS = {PRINTED, "exchanged"}
+# Digits of an error and of a ratio of errors: everywhere the same.
+DIGITS = 3
 # Letters of a name, at most.
 _LETTERS = 24
 
@@ -95,7 +97,7 @@ def first_group(ranking: Ranking) -> list[str]:
 
 def error(ranking: Ranking, row: int) -> str:
     """Geometric mean of a row's RMSE [deg]."""
-    return degrees(ranking.means[row].value)
+    return degrees(ranking.means[row].value, DIGITS)
 
 
 def interval(ranking: Ranking, row: int) -> str:
@@ -103,7 +105,7 @@ def interval(ranking: Ranking, row: int) -> str:
     mean = ranking.means[row]
     if not (math.isfinite(mean.high) and mean.high > mean.low):
         return ""
-    return f" (95 % interval: {degrees(mean.low)} to {degrees(mean.high)})"
+    return f" (95 % interval: {degrees(mean.low, DIGITS)} to {degrees(mean.high, DIGITS)})"
 
 
 def called(label: str) -> str:

@@ -100,6 +100,11 @@ class Ranking:
         """Their number and kind: 8 cases, 30 repetitions, 60 worlds."""
         return f"{self.count} {self.unit}{'s' * (self.count != 1)}"
 
+    @property
+    def more(self) -> str:
+        """What would tell rows apart that these cases do not, in words."""
+        return "more worlds" if self.unit == "world" else "more motions or --repetitions"
+
     @cached_property
     def means(self) -> list[GeometricMean]:
         """Geometric mean of each row's RMSE [rad]; a failure counts as 90 deg."""

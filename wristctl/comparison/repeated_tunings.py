@@ -18,6 +18,8 @@ from wristctl.arrays import Array
 from wristctl.comparison.bootstrap import LEVEL, GeometricMean
 from wristctl.seeds import Entropy
 
+# Tunings below which no interval is given: of two, Student's t allows a factor of a million.
+FEWEST_TUNINGS = 3
 _RESAMPLES, _AT_ONCE = 3999, 250
 # Halves of the worlds in which the order is looked at.
 HALVES = 50
@@ -37,7 +39,8 @@ class RepeatedTunings:
 
     A tuning of one row is drawn with the tuning of the same number of another, which is searched on the same worlds.
     What few tunings do to a mean is spread as Student's t with T - 1 degrees of freedom, and likewise with worlds:
-    resamples of 5 tunings alone are too narrow by a third.
+    resamples of 5 tunings alone are too narrow by a third. Two tunings of a row tell no interval: it is then without
+    end. With a single one all that is said is of those gains.
 
     Parameters
     ----------
@@ -50,6 +53,7 @@ class RepeatedTunings:
     def __init__(self, logarithms: Array, seed: int | Entropy) -> None:
         rows, tunings, worlds, streams = logarithms.shape
         flat = logarithms.reshape(rows, tunings, worlds * streams)
+        self._told = (tunings == 1) | (tunings >= FEWEST_TUNINGS) | np.all(flat == flat[:, :1], axis=(1, 2))
         self.means: Array = flat.mean(axis=(1, 2))
         drawn = _resamples(tunings, worlds, streams, seed)
         by_worlds = (drawn.streams @ flat.reshape(rows * tunings, -1).T).reshape(-1, rows, tunings)
@@ -63,11 +67,13 @@ class RepeatedTunings:
 
     def estimates(self, level: float = LEVEL) -> list[GeometricMean]:
         """Geometric mean of each row's errors with its interval."""
-        return [_estimate(mean, self._deviations[:, row], level) for row, mean in enumerate(self.means)]
+        deviations = [self._deviations[:, row] if self._told[row] else None for row in range(len(self.means))]
+        return [_estimate(mean, apart, level) for mean, apart in zip(self.means, deviations, strict=True)]
 
     def ratio(self, row: int, other: int, level: float = LEVEL) -> GeometricMean:
         """Geometric mean of a row's errors over another's, with its interval."""
-        apart = self._deviations[:, row] - self._deviations[:, other]
+        told = self._told[row] and self._told[other]
+        apart = self._deviations[:, row] - self._deviations[:, other] if told else None
         return _estimate(self.means[row] - self.means[other], apart, level)
 
     def best(self, rows: Sequence[int]) -> list[int]:
@@ -87,8 +93,8 @@ class RepeatedTunings:
         return left
 
     def resolution(self, rows: Sequence[int]) -> float:
-        """The smallest ratio that is told from 1 as a rule among so many rows; nan for fewer than two."""
-        if len(rows) < 2:
+        """The smallest ratio that is told from 1 as a rule among so many rows; nan for fewer than two, or tunings."""
+        if len(rows) < 2 or not self._told[list(rows)].all():
             return float("nan")
         resampled, bounds = self._bounded(np.array(list(combinations(rows, 2))))
         return float(np.exp(np.quantile(resampled.max(axis=1), LEVEL) * np.median(bounds)))
@@ -100,7 +106,9 @@ class RepeatedTunings:
         return np.divide(apart, bounds, out=np.zeros_like(apart), where=bounds > 0.0), bounds
 
 
-def _estimate(mean: float, deviations: Array, level: float) -> GeometricMean:
+def _estimate(mean: float, deviations: Array | None, level: float) -> GeometricMean:
+    if deviations is None:
+        return GeometricMean(float(np.exp(mean)), 0.0, np.inf, level)
     low, high = np.quantile(deviations, [0.5 - 0.5 * level, 0.5 + 0.5 * level])
     return GeometricMean(float(np.exp(mean)), float(np.exp(mean + low)), float(np.exp(mean + high)), level)
 

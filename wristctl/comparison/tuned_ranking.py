@@ -14,9 +14,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from wristctl.arrays import Array
-from wristctl.comparison.bootstrap import GeometricMean, penalised
+from wristctl.comparison.bootstrap import GeometricMean, Resampled, penalised
 from wristctl.comparison.controller_ranking import STREAM
-from wristctl.comparison.repeated_tunings import Firsts, Order, RepeatedTunings, median_tuning
+from wristctl.comparison.repeated_tunings import HALVES, Firsts, Order, RepeatedTunings, median_tuning
 from wristctl.comparison.tie_groups import share
 from wristctl.comparison.world_ranking import RankedRow, WorldRanking, ranking
 from wristctl.config.families import TOLERATED
@@ -43,6 +43,11 @@ class TunedRanking(WorldRanking):
         """Errors of all rows over tunings, worlds and noise."""
         return RepeatedTunings(self.logarithms, STREAM)
 
+    @property
+    def more(self) -> str:
+        """What would tell rows apart that these worlds and tunings do not, in words."""
+        return "more worlds and tunings" if self.logarithms.shape[1] > 1 else super().more
+
     @cached_property
     def means(self) -> list[GeometricMean]:
         """Geometric mean of each row's RMSE [rad] over its tunings; a failure counts as 90 deg."""
@@ -56,6 +61,23 @@ class TunedRanking(WorldRanking):
         """In how many halves of the worlds, and with how many tunings, a ranked row has the least error."""
         return self._order.firsts(row)
 
+    def firsts_frame(self) -> pd.DataFrame:
+        """A line for each ranked row: in how many halves of the worlds, and with how many tunings, it is first.
+
+        Empty where fewer than two rows are ranked: nothing could come before the one.
+        """
+        import pandas as pd
+
+        ranked_rows = [row for group in self.standing.groups for row in group]
+        lines = []
+        for row in ranked_rows if len(ranked_rows) > 1 else []:
+            halves, tunings, of_tunings = self.firsts(row)
+            lines.append(
+                {"family": self.name, "row": self.labels[row], "first_in_halves": halves, "halves": HALVES,
+                 "first_in_tunings": tunings, "tunings": of_tunings}
+            )  # fmt: skip
+        return pd.DataFrame(lines)
+
     @cached_property
     def _order(self) -> Order:
         ranked_rows = [row for group in self.standing.groups for row in group]
@@ -68,9 +90,11 @@ class TunedRanking(WorldRanking):
         return [(float(errors.min()), float(errors.max())) for errors in means]
 
     def published_error(self, row: int) -> float:
-        """Geometric mean of the RMSE [rad] of a row's published gains; a failure counts as 90 deg."""
-        tunings = self.logarithms[row]
-        return float(np.exp(tunings[self.published[row] % len(tunings)].mean()))
+        """Geometric mean of the RMSE [rad] of a row's published gains, as a comparison of them has it to the last bit.
+
+        A failure counts as 90 deg.
+        """
+        return float(np.exp(Resampled(np.log(penalised(self.scores[row])), STREAM).means[0]))
 
     def tunings_frame(self) -> pd.DataFrame:
         """A line for each tuning of each row that was tuned: its error [rad], and in how many worlds it is lost."""

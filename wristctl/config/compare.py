@@ -29,7 +29,12 @@ _MOVES = ((30, 1.0), (30, 2.0), (-30, 1.0), (-30, 2.0), (15, 1.0), (-15, 1.0), (
 class CompareSettings(Section):
     """Controllers x loops x references x inverses, beside the paper's T2."""
 
-    rows: tuple[Row, ...] = choice(_ROWS, "controllers with their gains", min_length=1, alias="controllers")
+    rows: tuple[Row, ...] = choice(
+        _ROWS,
+        "controllers with their gains; `tuned:worlds`: those shipped of `worlds.family`",
+        min_length=1,
+        alias="controllers",
+    )
     loops: Loops = choice(
         _LOOPS,
         "the loops to compare on; naming any replaces these (`exact: {}` is the built-in one)",

@@ -14,6 +14,8 @@ from wristctl.errors import UserError, meant
 
 # What the name of shipped gains begins with; the family follows.
 PREFIX = "tuned:"
+# Gains of the family on whose worlds rows are compared.
+OF_WORLDS = "tuned:worlds"
 FILE = "tuned_gains.json"
 
 

@@ -36,13 +36,22 @@ def answer_of(
         return None
     names = names_of(rankings)
     more = f"Every controller: `--all`, or {run}/report.html." if run else "Every controller: `.tables`."
-    sure = f"{certainty(rankings)} {first_again(rankings)}".strip()
+    sure = " ".join(filter(None, [certainty(rankings), few_tunings(rankings), first_again(rankings)]))
     notes: list[tuple[str | Table, str | Table]] = [
         (terms_table(terms) if terms else "", ""),
         (do_not_use(rankings, names), _fewer(rankings)),
         (f"{sure} {tuned_otherwise(shifts)} {more}".strip(), f"{sure} {more}".strip()),
     ]
     return fitted(Answer(advice(rankings), decision_table(rankings, names)), notes)
+
+
+def few_tunings(rankings: Sequence[TunedRanking]) -> str:
+    """That two tunings tell no interval, where there are no more."""
+    from wristctl.comparison.repeated_tunings import FEWEST_TUNINGS
+
+    if not any(1 < len(tunings) < FEWEST_TUNINGS for ranking in rankings for tunings in ranking.tunings):
+        return ""
+    return f"Two tunings tell no interval of an RMSE, nor of a ratio: {FEWEST_TUNINGS} or more do (`study.budgets`)."
 
 
 def first_again(rankings: Sequence[TunedRanking]) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
@@ -28,16 +29,20 @@ def published_gains(ranking: TunedRanking, searches: Mapping[StudyPlace, Search]
 
 
 def published(ranking: TunedRanking, searches: Mapping[StudyPlace, Search]) -> dict[str, Any]:
-    """What is published of a family: its conditions, and of each controller gains, errors [rad] and lost worlds."""
+    """What is published of a family: its conditions, and of each controller gains, errors [rad] and lost worlds.
+
+    An interval that the tunings do not tell has no ends.
+    """
     controllers = {}
     for law, gains in published_gains(ranking, searches).items():
         row = ranking.labels.index(f"{law}/tuned")
         mean, (least, largest) = ranking.means[row], ranking.spreads[row]
+        ends = (mean.low, mean.high) if math.isfinite(mean.high) else (None, None)
         controllers[law] = {
             "gains": gains,
             "rmse": ranking.published_error(row),
-            "rmse_low": mean.low,
-            "rmse_high": mean.high,
+            "rmse_low": ends[0],
+            "rmse_high": ends[1],
             "tunings": [least, largest],
             "lost": ranking.standing.lost[row].times,
             "reliable": row not in ranking.standing.unusable,

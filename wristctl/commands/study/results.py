@@ -161,6 +161,9 @@ def _tables(
             findings.metric(f"rmse_{slug}_{row.label}", mean.value, "rad", "lower", ranking.count, interval)
         if len(tunings := ranking.tunings_frame()):
             findings.table(f"data/tunings-{slug}.csv", tunings, dict.fromkeys(map(str, tunings.columns), "1"))
+    if firsts := [frame for ranking in rankings.values() if len(frame := ranking.firsts_frame())]:
+        whole = pd.concat(firsts, ignore_index=True)
+        findings.table("data/firsts.csv", whole, dict.fromkeys(map(str, whole.columns), "1"))
     for family in families_of(session.study):
         if family in rankings and (file := findings.file(f"data/gains-{family}.json")):
             write_gains(file, published_gains(rankings[family], searches))
