@@ -31,12 +31,14 @@ BEHIND_TENDONS = (
     "ct-dob/hardware", "mpc/hardware", "smc-dob/hardware", "pid-dob/hardware", "pid-ff/hardware", "pd-ff/hardware",
     "lqi/hardware", "adrc/hardware", "nn-mrac/hardware", "smc-tracking/camera", "super-twisting/hardware",
     "mrac/hardware",
-    "nc/hardware", "gvsc/default", "computed-torque/default", "smc/hardware", "feedforward/default",
+    "nc/hardware", "impedance/hardware", "fopi/hardware",
+    "gvsc/default", "computed-torque/default", "smc/hardware", "feedforward/default",
 )  # fmt: skip
 AS_COMMANDED = (
     "ct-dob/default", "mpc/default", "smc-dob/default", "pid-dob/default", "pid-ff/default", "pd-ff/default",
     "lqi/default", "adrc/default", "nn-mrac/default", "smc-tracking/default", "super-twisting/default", "mrac/default",
-    "nc/default", "gvsc/default", "computed-torque/default", "smc/exchanged", "pid/printed", "feedforward/default",
+    "nc/default", "impedance/default", "fopi/default",
+    "gvsc/default", "computed-torque/default", "smc/exchanged", "pid/printed", "feedforward/default",
 )  # fmt: skip
 RANKED = {"ideal": AS_COMMANDED, "camera": BEHIND_TENDONS, "uneven": BEHIND_TENDONS, "steps": BEHIND_TENDONS}
 BEST, BESIDE = ("ct-dob/hardware", "mpc/hardware", "smc-dob/hardware", "pid-ff/hardware"), "smc-tracking/camera"
@@ -132,6 +134,9 @@ each first, with one budget.
 - **Sliding terms** elsewhere (smc-tracking, smc-dob): tuned they tie with the same controller without one.
 - **Networks** (nc, nn-mrac): no better than an integral here. nn-mrac is the group's law (arXiv 2510.19068) as far as
   it is specified; its published reference model is far slower.
+- **Rivals of other groups** (impedance, fopi): an impedance with a network for what the model lacks, and a fractional
+  integral of the error. DeePC is not among them: its data are those of one rig at one period, and on data of the
+  believed wrist without noise it is the predictive control that `mpc` is (Coulson, Lygeros and Dorfler, ECC 2019).
 - **Jumps**: behind motors (steps) none is told from feedforward for the better. Ask for motions instead. With torques
   as commanded (ideal, steps) MPC errs least, and all that have feedback beat feedforward.
 - **The paper's law** (smc): exchanged gains swing, and with gains of ours it is a feedforward.
