@@ -38,7 +38,7 @@ class Stage:
 
     def __init__(self, camera: RenderedCamera, *faults: InjectedFault, seed: int = 0) -> None:
         self.rig = Rig(BenchSettings(motors=TAUT, camera=camera, faults=faults), WRIST, seed)
-        self.rig.scene = self.sketch = Sketch()
+        self.rig.eyes[0].scene = self.sketch = Sketch()
         self.transport = BenchTransport(self.rig.chip, self.rig.faults)
         self.camera = VirtualCamera(self.rig)
 
@@ -179,3 +179,13 @@ def test_the_whole_bench_gives_the_same_bytes_in_every_run() -> None:
         assert frame is not None
         runs.append(frame.image.tobytes() + bench.truth().theta.tobytes())
     assert runs[0] == runs[1]
+
+
+def test_frames_that_jitter_come_in_order_each_by_its_own_delay() -> None:
+    jitter = 0.9 / 60.0
+    stage = Stage(RenderedCamera(dropped=0.1, jitter=jitter))
+    seen = stage.look(3.0, every=0.001)
+    numbers, delay = [frame.number for _, frame in seen], 2.0 / 60.0
+    late = np.array([now - frame.time for now, frame in seen]) - delay
+    assert (np.diff(numbers) > 0).all() and len(numbers) > 150
+    assert late.min() >= -1e-9 and 0.8 * jitter < late.max() <= jitter + 0.0021 and np.std(late) > 0.2 * jitter

@@ -24,8 +24,8 @@ class Turning:
     def across(self, time: float) -> float:
         return 0.1 * self.rate * time
 
-    def tip_angle(self, coordinates: np.ndarray) -> np.ndarray:
-        return np.asarray(coordinates.sum(axis=-1))
+    def turned(self, ends: np.ndarray) -> float:
+        return abs(float(np.diff(ends.sum(axis=-1))[0]))
 
 
 def shutter(wrist: Any = None, *faults: InjectedFault, **camera: Any) -> Shutter:
@@ -98,3 +98,30 @@ def test_frames_are_lost_by_chance_and_by_fault() -> None:
     assert all(shutter().arrives(k) for k in range(100))
     faulty = shutter(None, InjectedFault(kind="frames-dropped", at=0.5, duration=0.1))
     assert [faulty.arrives(k) for k in (24, 25, 29, 31)] == [True, False, False, True]
+
+
+def test_a_phase_puts_exposures_off_by_a_share_of_a_frame() -> None:
+    """Of 50 frames a second by 8 ms: frame 49 is from 0.988 s, and there 20 ms later."""
+    late = shutter(Turning(time=1.0079), phase=0.4)
+    assert late.expose(49).time == pytest.approx(0.988)
+    assert late.newest(0.02) == 48 and shutter(Turning(time=1.0081), phase=0.4).newest(0.02) == 49
+    late.begin(0.99, (7,))
+    assert late.expose(50).noise == (7, 0) and late.expose(49).noise == (1, 2, 49)
+
+
+def test_a_jitter_holds_each_frame_back_by_a_time_of_its_own_and_changes_no_picture() -> None:
+    wrist = Turning(time=1.0)
+    jittered, steady = shutter(wrist, jitter=0.02, delay_frames=1.0), shutter(wrist, delay_frames=1.0)
+    late = np.array([jittered.late(number) for number in range(200)])
+    assert 0.0 <= late.min() < 0.002 and 0.018 < late.max() < 0.02 and late.mean() == pytest.approx(0.01, abs=0.002)
+    assert [jittered.late(number) for number in range(200)] == late.tolist()
+    for number in (46, 47, 48, 49):
+        there = number * 0.02 + 0.02 + late[number] <= 1.0 + 1e-9
+        assert jittered.has_arrived(number) == there and steady.has_arrived(number)
+        assert jittered.expose(number).noise == steady.expose(number).noise
+    assert jittered.expose(46).late == late[46] and steady.expose(46).late == 0.0
+
+
+def test_a_jitter_of_more_than_a_frame_is_refused() -> None:
+    with pytest.raises(ValueError, match="jitter"):
+        RenderedCamera(frame_rate=50.0, jitter=0.021)

@@ -103,3 +103,11 @@ def test_a_folder_that_cannot_be_is_named(call: Call, tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
     code, _, err = call("hw", "drawings", "file/parts")
     assert code == 2 and "file/parts" in err
+
+
+def test_a_rig_in_two_planes_has_the_second_cameras_markers_too(call: Call, tmp_path: Path) -> None:
+    code, out, _ = call("hw", "drawings", "parts", "--set", "planes=2")
+    assert code == 0 and "parts/markers_2.svg" in out.split()
+    pages = [(tmp_path / "parts" / f"{name}.svg").read_text(encoding="utf-8") for name in ("markers", "markers_2")]
+    named = [set(re.findall(r"4x4_50, id (\d+)", page)) for page in pages]
+    assert named == [{"0", "1"}, {"2", "3"}]

@@ -107,8 +107,8 @@ Perform = Callable[..., tuple[pd.DataFrame, Run, Watched, Any]]
 def perform(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Perform:
     """The trials of such an experiment: their table, the run, who was told, the findings."""
 
-    def opened(settings: Any, bench: Any, seed: int, view: Any, confirm: Any, keep: Any) -> str:
-        assert (bench, seed, view.size, keep) == ("weaker", 4, None, None)
+    def opened(settings: Any, bench: Any, seed: int, view: Any, confirm: Any, keep: Any, view_2: Any) -> str:
+        assert (bench, seed, view.size, keep, view_2.size) == ("weaker", 4, None, None, None)
         return "testbed"
 
     monkeypatch.setattr(hw_trials, "Experiment", Bench)

@@ -126,6 +126,7 @@ def test_an_earlier_run_serves_as_an_input(call: Call, earlier: Path, use: str) 
         ("hw-run", "--from-identified", "identify"),
         ("hw-run", "--calibration", "calibrate-wrist"),
         ("hw-run", "--optics", "calibrate-camera"),
+        ("hw-run", "--optics-2", "calibrate-camera"),
         ("hw-run", "--tuned", "tune"),
         ("hw-run", "--network", "train"),
         ("hw calibrate wrist", "--optics", "calibrate-camera"),

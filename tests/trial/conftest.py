@@ -82,7 +82,7 @@ def experiment(tmp_path: Path, at_zero: WristCalibration) -> Run:
         performed = Experiment(settings, WRIST, trials, log, calibration=at_zero, seed=seed)
         error = None
         try:
-            performed.run(EmulatedTestbed(bench, settings, View(), None), shown)
+            performed.run(EmulatedTestbed(bench, settings, [View()], None), shown)
         except BaseException as raised:
             error = raised
         log.close()

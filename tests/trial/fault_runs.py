@@ -85,7 +85,7 @@ def perform(
     done = _Watched(settings, WRIST, trials, log, calibration=stored, seed=seed)
     reason, fix, code = "", "", 0
     try:
-        done.run(EmulatedTestbed(bench, settings, View(), None), shown)
+        done.run(EmulatedTestbed(bench, settings, [View()], None), shown)
     except UserError as raised:
         reason, fix, code = raised.what, str(raised.fix), raised.exit_code
     finally:

@@ -93,14 +93,14 @@ class Marker:
 
     def __init__(self, board: RigBoard, angle: Callable[[], float], verdict: SightingVerdict | None = None) -> None:
         self._board, self._angle, self._verdict = board, angle, verdict
-        self.zero, self.number, self.delay = 0.0, -1, 0.0
+        self.zero, self.number, self.delay = (0.0,), -1, 0.0
 
     def look(self) -> list[Sighting]:
         self.number += 1
         theta = self._angle()
         verdict = self._verdict or (SightingVerdict.OK if np.isfinite(theta) else SightingVerdict.NO_TIP)
         time = self._board.transport.now() - self.delay
-        return [Sighting(time, self.number, theta - self.zero, verdict, np.zeros((2, 4, 2)))]
+        return [Sighting(time, self.number, theta - self.zero[0], verdict, np.zeros((2, 4, 2)))]
 
     def stand_square(self, sightings: Sequence[Sighting]) -> None:
         """It is square."""

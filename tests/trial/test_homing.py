@@ -23,7 +23,7 @@ SLACK = (3e-4, 2e-4, 4e-4, 2.5e-4)
 def homed(signs: tuple[int, ...] | None = None, **motors: Any) -> tuple[Zero, VirtualBench]:
     settings = settings_of(homing=QUICK, bench={"motors": {"slack": SLACK, **motors}})
     bench = VirtualBench(settings.bench, WRIST, 0)
-    tracking = EmulatedTestbed(bench, settings, View(), None).tracking()
+    tracking = EmulatedTestbed(bench, settings, [View()], None).tracking()
     board = Board(bench.transport)
     board.connect()
     prepare(board, settings)

@@ -20,7 +20,7 @@ def bench_of(**motors: object) -> tuple[VirtualBench, EmulatedTestbed, Calibrate
     given = {"bench": {"motors": motors, "person": {"takes": 0.0}, "camera": camera}, "homing": {"frames": 2}}
     settings = CalibrateWristSettings.model_validate(given)
     bench = VirtualBench(settings.bench, WristParameters(), 0)
-    return bench, EmulatedTestbed(bench, settings, View(), None), settings
+    return bench, EmulatedTestbed(bench, settings, [View()], None), settings
 
 
 @pytest.mark.parametrize(("axis", "reversed_axis"), [(2, None), (0, 0)])

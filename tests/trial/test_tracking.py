@@ -58,7 +58,7 @@ def test_what_is_kept_of_a_frame_is_what_the_loop_is_told(kind: type[InlineTrack
 
     camera = Shown([])
     tracking = kind(camera, Tracker(Markers(), View(), Gates()), keep)
-    tracking.zero = 0.1
+    tracking.zero = (0.1,)
     camera._frames.append(Frame(scene.render(np.full((1, 4), 0.05), np.random.default_rng(0)), 0.0, 0))
     told = tracking.look()
     assert done.wait(30.0)

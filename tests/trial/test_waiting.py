@@ -164,7 +164,7 @@ def test_at_a_real_rig_a_person_is_asked_with_the_wait_that_a_fault_may_end(monk
     asked: list[str] = []
     monkeypatch.setattr(testbeds, "DeviceCamera", Dark)
     monkeypatch.setattr(testbeds, "open_transport", Dark)
-    real = RealTestbed(settings_of(port="x", safety={"motor_pull": 30.0}), View(), None, ask)
+    real = RealTestbed(settings_of(port="x", safety={"motor_pull": 30.0}), [View()], None, ask)
     for question in (real.confirm, lambda meanwhile: real.face("flexion", meanwhile)):
         with pytest.raises(TimeoutError):
             question(_fault)

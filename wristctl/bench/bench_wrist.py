@@ -8,20 +8,14 @@ from numpy.typing import NDArray
 
 from wristctl.arrays import Array
 from wristctl.bench.faults import Faults, MotorFaults
-from wristctl.bench.motors import CYCLES, PERIOD, Hanging, Stepper, follow, spool_state_of, stepper_of
+from wristctl.bench.loads import Load, PlanarLoad, SpatialLoad
+from wristctl.bench.motors import CYCLES, PERIOD, Stepper, spool_state_of, stepper_of
 from wristctl.board.emulator.chip import FREQUENCY
 from wristctl.board.messages import AXES
 from wristctl.config.bench import BenchSettings
-from wristctl.config.choices import PLANTS
 from wristctl.config.plant import Disturbances
 from wristctl.config.wrist import WristParameters
 from wristctl.seeds import Entropy
-from wristctl.simulation.disturbances import acting
-from wristctl.simulation.nonideal import inner_of, nonideal_of, of_tendons, unmoved
-from wristctl.simulation.worlds import drawn, facing, plant_of
-from wristctl.wrist.directions import ACTIVE, DIRECTIONS, away_of, tendons_of
-from wristctl.wrist.out_of_plane import across_of
-from wristctl.wrist.plant import kernel_of
 
 # Ports whose pins turn motors.
 _MOTOR_PORTS = ord("A"), ord("C")
@@ -35,9 +29,9 @@ class Truth(NamedTuple):
     time: Array
     """(T,) [s] on the board's clock"""
     theta: Array
-    """(T, q) the plant's coordinates: segment angles [rad]"""
+    """(T, q) the plant's coordinates: segment angles [rad], in two planes toward ulnar and flexion by turns"""
     angle: Array
-    """(T,) of the last disc [rad]"""
+    """(T,) of the last disc [rad], in two planes its bends (T, 2)"""
     rate: Array
     """(T, q) [rad/s]"""
     pull: Array
@@ -46,7 +40,7 @@ class Truth(NamedTuple):
     """(T, 4) tendon on the spools [m] in the middle of that millisecond, 0 where it is taut without pulling on the
     straight wrist"""
     across: Array
-    """(T,) [rad] bend across the plane, away from the camera, when the millisecond ended"""
+    """(T,) [rad] bend across the plane, away from the camera, when the millisecond ended; in two planes 0"""
 
 
 class MotorMotion(NamedTuple):
@@ -62,32 +56,27 @@ class MotorMotion(NamedTuple):
 class BenchWrist:
     """Straight and at rest at power-on, facing ulnar; it follows the board's pins in whole milliseconds.
 
-    `stream` draws what the settings leave to chance of the plant: a bench has one wrist for as long as it stands. The
-    camera stands where it sees theta > 0 on its `positive` side.
+    `stream` draws what the settings leave to chance of the plant: a bench has one wrist for as long as it stands. It
+    bends in one plane at a time, before a camera that sees theta > 0 on its `positive` side, or in two `planes`.
     """
 
     def __init__(
         self, settings: BenchSettings, wrist: WristParameters, stream: Entropy = (0,), faults: Faults | None = None,
-        positive: Literal["right", "left"] = "right",
+        positive: Literal["right", "left"] = "right", planes: Literal[1, 2] = 1,
     ) -> None:  # fmt: skip
         self._faults = MotorFaults(faults or Faults(()), settings.motors.order)
-        self._settings, self._wrist, self._positive = settings, wrist, positive
-        self._drawn = drawn(settings.plant, stream)
-        self._model = PLANTS[settings.plant.model]
-        self._n = self._model.coordinates(settings.segments)
-        self._follow = kernel_of(follow, self._model)
-        motors = settings.actuator
-        self._nonideal = np.array(nonideal_of(settings.plant, motors, motors, PERIOD))
         self._stepper, self._spools = stepper_of(settings), spool_state_of(settings)
         self._steps = self._spools.step.copy()
-        self._state = np.zeros(2 * self._n)
-        self._axes = np.arange(AXES)
-        self._tendons = unmoved(self._spools.reeled, np.zeros(3), np.zeros(AXES), self._state[: self._n])
+        self._load: Load
+        if planes == 1:
+            self._load = PlanarLoad(settings, wrist, stream, positive, self._spools)
+        else:
+            self._load = SpatialLoad(settings, wrist, stream, self._spools)
+        self._n = self._load.coordinates
         self._edges = self._heard = np.empty((0, 3), np.int64)
         self._periods = self._rows = 0
         self._record = np.empty((2 * _KEPT, 2 * self._n + 2 * AXES + 1))
         self.begin(Disturbances(), math.inf)  # no trial yet: nothing breaks while it is homed
-        self._face("ulnar")
 
     @property
     def time(self) -> float:
@@ -101,11 +90,17 @@ class BenchWrist:
         last = tuple(None if cycle < 0 else float(cycle) / FREQUENCY for cycle in spools.stepped)
         return MotorMotion(tuple(map(int, spools.counted)), last, tuple(map(bool, spools.energised)))
 
+    @property
+    def plane(self) -> str | None:
+        """Name of +y in the plane that it bends in; None: it bends in two."""
+        return self._load.plane
+
     def face(self, direction: str) -> None:
-        """Bend in this direction's plane from here on; where that is another plane, straight and at rest at first."""
-        if DIRECTIONS[direction].plane != self._plane:
-            self._state[:] = 0.0
-            self._face(direction)
+        """Bend in this direction's plane from here on; where that is another plane, straight and at rest at first.
+
+        In two planes nothing changes.
+        """
+        self._load.face(direction, self._spools)
 
     def begin(self, disturbances: Disturbances, start: float) -> None:
         """A trial: what breaks in it, and these disturbances, count from `start` on the board's clock."""
@@ -139,17 +134,10 @@ class BenchWrist:
                 self._spools.reeled[axis] -= rate * count * PERIOD
             self._make_room(count)
             time = PERIOD * np.arange(self._periods, self._periods + count, dtype=np.float64)
-            disturbed = acting(self._disturbances, time - self._start)
-            if disturbed is None:
-                disturbed = np.tile((0.0, 1.0), (count, 1))
+            acting = self._disturbances, time - self._start
             out = self._record[self._rows : self._rows + count]
-            hanging = Hanging(
-                self._model, self._values, self._settings.actuator.tendon_stiffness, self._nonideal, self._tendons,
-                self._inner, self._held(), self._sides, self._across,
-            )  # fmt: skip
-            heard = self._follow(
-                hanging, self._spools, self._state, disturbed, self._edges, self._periods, self._begun, out,
-                (0,) * self._n
+            heard = self._load.follow(
+                self._spools, self._held(), acting, self._edges, self._periods, self._begun, out
             )  # fmt: skip
             self._edges = self._edges[heard:]
             self._rows += count
@@ -172,12 +160,11 @@ class BenchWrist:
         rows, n = self._record[self._rows - fresh : self._rows].copy(), self._n
         time = PERIOD * np.arange(self._periods - fresh + 1, self._periods + 1, dtype=np.float64)
         theta, rate, pull, reeled, across = np.split(rows, [n, 2 * n, 2 * n + AXES, 2 * n + 2 * AXES], axis=1)
-        return Truth(time, theta, self._model.angle(theta), rate, pull, reeled, across[:, 0])
+        return Truth(time, theta, self._load.bend(theta), rate, pull, reeled, across[:, 0])
 
-    def tip_angle(self, coordinates: Array) -> Array:
-        """Bending angles (...) [rad] of the last disc at coordinates (..., q)."""
-        angles: Array = self._model.angle(coordinates)
-        return angles
+    def turned(self, ends: Array) -> float:
+        """How far the last disc turns between two places (2, q) [rad]."""
+        return self._load.turned(ends)
 
     def angles(self, times: Array) -> Array:
         """Coordinates (k, q) at k times within what `truth` remembers, straight lines between milliseconds."""
@@ -189,22 +176,6 @@ class BenchWrist:
         """The bend across the plane at a time within what `truth` remembers [rad]."""
         truth = self.truth(max(0.0, time - 2.0 * PERIOD))
         return float(np.interp(time, truth.time, truth.across))
-
-    def _face(self, direction: str) -> None:
-        self._plane = DIRECTIONS[direction].plane
-        plant = plant_of(*facing(self._wrist, self._drawn, direction))
-        across = next(across for across in DIRECTIONS.values() if across.plane != self._plane)
-        beside = plant_of(*facing(self._wrist, self._drawn, across.name))
-        self._across = across_of(beside, away_of(self._plane, self._positive))
-        self._spools.bent[:] = 0.0
-        self._values = self._model.values(plant, self._settings.segments)
-        self._sides = np.array([ACTIVE.index(tendon) for tendon in tendons_of(self._plane)])
-        axes = self._sides[[0, 2, 1, 3]]  # as they are given: both sides' first, both sides' second
-        tendon_states = of_tendons(self._tendons, AXES)[np.argsort(self._axes)][axes]
-        self._tendons = unmoved(self._spools.reeled[axes], np.zeros(3), np.zeros(AXES), self._state[: self._n])
-        of_tendons(self._tendons, AXES)[:] = tendon_states
-        self._inner = inner_of([self._drawn], self._state[None, : self._n], np.zeros(1), lambda rows: rows[0])
-        self._axes = axes
 
     def _make_room(self, count: int) -> None:
         if self._rows + count > len(self._record):

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Sequence
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +18,12 @@ class Faults:
     def __init__(self, faults: Sequence[InjectedFault]) -> None:
         self._faults = tuple(faults)
         self._starts = {"power-on": 0.0, "first trial": math.inf, "trial": math.inf}
+
+    def of_camera(self, camera: int) -> Self:
+        """Those of one camera, 1 or 2; they begin as these do."""
+        faults = type(self)([fault for fault in self._faults if fault.camera == camera])
+        faults._starts = self._starts
+        return faults
 
     def begin(self, start: float) -> None:
         """A trial's motion starts at this time."""

@@ -175,7 +175,7 @@ def _develop(
         exposed.send(stream and stream.address)
         while True:
             exposure, start = _next(exposed)
-            arrival = start + exposure.time + delay
+            arrival = start + exposure.time + delay + exposure.late
             if time.monotonic() > arrival and exposed.poll():
                 continue
             frame = picture(exposure, painter)

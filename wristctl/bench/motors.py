@@ -89,7 +89,7 @@ def spool_state_of(settings: BenchSettings) -> SpoolState:
 
 
 @compiled
-def _hear(spools: Any, motor: Any, cycle: int, port: int, value: int) -> None:
+def hear_edge(spools: Any, motor: Any, cycle: int, port: int, value: int) -> None:
     """Take in one change of an output latch: STEP and DIR alternate on port A, ENA (high: off) is on port C."""
     if port == _PORT_A:
         risen = value & ~spools.latch[0]
@@ -109,7 +109,7 @@ def _hear(spools: Any, motor: Any, cycle: int, port: int, value: int) -> None:
 
 
 @compiled
-def _turn(spools: Any, motor: Any, stiffness: float) -> None:
+def turn_spools(spools: Any, motor: Any, stiffness: float) -> None:
     """Turn the spools for a period, by the pulls at its start."""
     for axis in range(AXES):
         pull = spools.pull[axis]
@@ -183,9 +183,9 @@ def follow(
     for k in range(acting.shape[0]):
         middle = (first + k) * CYCLES + CYCLES // 2
         while edge < edges.shape[0] and edges[edge, 0] < middle:
-            _hear(spools, motor, edges[edge, 0], edges[edge, 1], edges[edge, 2])
+            hear_edge(spools, motor, edges[edge, 0], edges[edge, 1], edges[edge, 2])
             edge += 1
-        _turn(spools, motor, hanging.stiffness)
+        turn_spools(spools, motor, hanging.stiffness)
         plant = disturbed(undisturbed, acting[k, 0], acting[k, 1])
         time, path = (first + k) * PERIOD - start + zero, travel(plant, q)
         on_spools = (

@@ -38,6 +38,7 @@ class RealTimeBench:
         self._processes, self._control = processes, control
         self.transport = SerialTransport(address, BAUD, emulated=True)
         self.camera = SharedCamera(pictures)
+        self.cameras = (self.camera,)
 
     def __enter__(self) -> Self:
         return self

@@ -4,6 +4,7 @@ import logging
 import os
 import re
 import select
+from collections.abc import Callable
 from functools import cached_property
 
 import numpy as np
@@ -26,11 +27,29 @@ from wristctl.wrist.directions import DIRECTIONS
 log = logging.getLogger(__name__)
 
 
+class Eye:
+    """A camera of the rig: when it takes which pictures, and what goes wrong with it."""
+
+    def __init__(
+        self, settings: BenchSettings, wrist: BenchWrist, faults: Faults, stream: Entropy, scene: Callable[[], Scene],
+        second: bool = False,
+    ) -> None:  # fmt: skip
+        self.faults = faults.of_camera(2 if second else 1)
+        self.shutter = Shutter(settings.camera_2 if second else settings.camera, self.faults, wrist, stream)
+        self._scene = scene
+
+    @cached_property
+    def scene(self) -> Scene:
+        """Scene that draws its pictures; made when the first is wanted."""
+        return self._scene()
+
+
 class Rig:
-    """A wrist that hangs on a chip's pins, before a camera; all times are of the chip's clock [s].
+    """A wrist that hangs on a chip's pins, before its cameras; all times are of the chip's clock [s].
 
     Only through load cells does the wrist act back on the board: beyond `weigh`, which is to be called in time, it may
-    follow when somebody looks, and does the same however often that is. `seed` is the root of its random streams.
+    follow when somebody looks, and does the same however often that is. `seed` is the root of its random streams. With
+    the markers of a second camera, `markers_2`, the wrist bends in two planes.
     """
 
     def __init__(
@@ -40,23 +59,29 @@ class Rig:
         seed: int,
         markers: Markers | None = None,
         chip: Atmega2560 | None = None,
+        markers_2: Markers | None = None,
     ) -> None:
         self.settings = settings
         self.chip = chip or Atmega2560()
         self.faults = Faults(settings.faults)
-        positive = (markers or Markers()).positive
-        self.wrist = BenchWrist(settings, wrist, stream(seed, "bench plant"), self.faults, positive)
-        self.shutter = Shutter(settings.camera, self.faults, self.wrist, stream(seed, "bench camera"))
+        positive, plant = (markers or Markers()).positive, stream(seed, "bench plant")
+        self.wrist = BenchWrist(settings, wrist, plant, self.faults, positive, 1 if markers_2 is None else 2)
+        model, camera, camera_2 = settings.plant.model, settings.camera.scene, settings.camera_2.scene
+        drawn = stream(seed, "bench camera")
+        self.eyes: tuple[Eye, ...]
+        if markers_2 is None:
+            self.eyes = (Eye(settings, self.wrist, self.faults, drawn, lambda: Scene(camera, wrist, markers, model)),)
+        else:
+            first = Eye(settings, self.wrist, self.faults, drawn, lambda: Scene(camera, wrist, markers, model, plane=0))
+            second = Eye(
+                settings, self.wrist, self.faults, stream(seed, "bench camera 2"),
+                lambda: Scene(camera_2, wrist, markers_2, model, plane=1), second=True,
+            )  # fmt: skip
+            self.eyes = first, second
         cells = settings.load_cells
         self.cells = (
             None if cells is None else LoadCells(cells, self.chip, self.faults, stream(seed, "bench load cells"))
         )
-        self._drawn = settings.camera.scene, wrist, markers, settings.plant.model
-
-    @cached_property
-    def scene(self) -> Scene:
-        """Scene that draws the camera's pictures; made when the first is wanted."""
-        return Scene(*self._drawn)
 
     def catch_up(self, edges: NDArray[np.void] | None = None) -> None:
         """Let the wrist follow the chip; `edges` where somebody has taken them from it already."""
@@ -73,7 +98,7 @@ class Rig:
         return self.cells.next
 
     def face(self, direction: str) -> None:
-        """Turn the bench so that this direction's plane is the one that bends and is seen."""
+        """Turn the bench so that this direction's plane is the one that bends and is seen; in two planes nothing."""
         self.catch_up()
         self.wrist.face(direction)
 
@@ -87,7 +112,8 @@ class Rig:
         self.catch_up()
         self.wrist.begin(disturbances or Disturbances(), start)
         if noise is not None:
-            self.shutter.begin(start, noise)
+            for number, eye in enumerate(self.eyes):
+                eye.shutter.begin(start, (*noise, number) if number else noise)
         self.faults.begin(start)
 
 

@@ -230,7 +230,7 @@ class BenchServer:
             self._reset = due
 
     def _take_frame(self) -> None:
-        shutter = self._rig.shutter
+        shutter = self._rig.eyes[0].shutter
         number = shutter.newest(0.0)
         if number > self._taken:
             self._taken = number

@@ -69,7 +69,7 @@ class Exposure(NamedTuple):
     """middle of the exposure [s]"""
     shown: int
     theta: Array
-    """(k, n) of k parts of the exposure [rad]"""
+    """(k, q) coordinates of k parts of the exposure [rad]"""
     covered: bool
     swapped: bool
     noise: Entropy
@@ -80,6 +80,8 @@ class Exposure(NamedTuple):
     """slip of the tip's marker [rad]"""
     spoiled: tuple[tuple[FaultKind, float], ...] = ()
     """kinds and sizes of what spoils the picture"""
+    late: float = 0.0
+    """how much later than by the camera's delay it arrives [s]"""
 
 
 def picture(exposure: Exposure, painter: Painter) -> Frame:
@@ -112,7 +114,8 @@ class Shutter:
 
     def begin(self, start: float, stream: Entropy) -> None:
         """Frames from `start` [s] on belong to this stream."""
-        self._streams.append((math.ceil(start * self._settings.frame_rate - 1e-9), stream))
+        first = start * self._settings.frame_rate - self._settings.phase
+        self._streams.append((math.ceil(first - 1e-9), stream))
 
     @property
     def delay(self) -> float:
@@ -122,7 +125,16 @@ class Shutter:
     def newest(self, delay: float) -> int:
         """The newest frame whose exposure is over, and its middle `delay` s past; negative where there is none."""
         past = max(delay, 0.5 * self._settings.exposure)
-        return math.floor((self._wrist.time - past) * self._settings.frame_rate + 1e-9)
+        return math.floor((self._wrist.time - past) * self._settings.frame_rate - self._settings.phase + 1e-9)
+
+    def late(self, number: int) -> float:
+        """How much later than by its delay this frame arrives [s]."""
+        jitter = self._settings.jitter
+        return jitter and jitter * float(np.random.default_rng((*self._noise(number), 0)).random())
+
+    def has_arrived(self, number: int) -> bool:
+        """Whether a frame whose delay is over is there by now."""
+        return self._time(number) + self.delay + self.late(number) <= self._wrist.time + 1e-9
 
     def arrives(self, number: int) -> bool:
         """Whether this frame gets through."""
@@ -139,7 +151,7 @@ class Shutter:
         middle = self._time(shown) - late
         half = 0.5 * self._settings.exposure
         ends = self._wrist.angles(np.array([middle - half, middle + half]))
-        turned = abs(float(np.diff(self._wrist.tip_angle(ends))[0]))
+        turned = self._wrist.turned(ends)
         count = min(_MOST_INSTANTS, max(1, math.ceil(turned / _SMEAR)))
         moments = middle + half * np.linspace(-1.0, 1.0, 2 * count * _WITHIN + 1)[1::2]
         parts = self._wrist.angles(moments).reshape(count, _WITHIN, -1).mean(axis=1)
@@ -150,14 +162,15 @@ class Shutter:
         across = self._wrist.across(middle)
         stamp = self._stamp(time)
         return Exposure(
-            number, stamp, shown, parts, covered, swapped, self._noise(shown), across, math.radians(turned), spoiled
+            number, stamp, shown, parts, covered, swapped, self._noise(shown), across, math.radians(turned), spoiled,
+            self.late(number),
         )  # fmt: skip
 
     def _shown(self, number: int, time: float) -> int:
         """The frame whose picture this one shows."""
         shown = [number]
         for fault in self._faults.active(("camera-frozen", "camera-frozen-clock", "camera-repeats"), time):
-            first = math.floor(self._faults.begun(fault) * self._settings.frame_rate)
+            first = math.floor(self._faults.begun(fault) * self._settings.frame_rate - self._settings.phase)
             shown.append(first - (number % round(fault.size) if fault.kind == "camera-repeats" else 0))
         return min(shown)
 
@@ -172,4 +185,4 @@ class Shutter:
         return *stream, number - first
 
     def _time(self, number: int) -> float:
-        return number / self._settings.frame_rate
+        return (number + self._settings.phase) / self._settings.frame_rate

@@ -119,23 +119,25 @@ class BenchTransport(VirtualTransport):
 
 
 class VirtualCamera:
-    """Sees what stands on a rig; frames arrive as the chip's clock goes on."""
+    """Sees what stands on a rig; frames arrive as the chip's clock goes on. `number` is which of its cameras it is."""
 
-    name = "rendered"
-
-    def __init__(self, rig: Rig) -> None:
-        self._rig, self._seen = rig, -1
+    def __init__(self, rig: Rig, number: int = 0) -> None:
+        self.name = f"rendered {number + 1}" if number else "rendered"
+        self._rig, self._eye, self._seen = rig, rig.eyes[number], -1
 
     def newest(self) -> Frame | None:
         """The newest frame that has arrived since the last call, None if none has. Raises CameraError."""
         self._rig.catch_up()
-        if self._rig.faults.on("camera-lost", self._rig.wrist.time):
+        if self._eye.faults.on("camera-lost", self._rig.wrist.time):
             raise CameraError("the camera gives no more pictures", self.name, "injected fault")
-        shutter = self._rig.shutter
+        shutter = self._eye.shutter
         newest = shutter.newest(shutter.delay)
         unseen, self._seen = range(newest, self._seen, -1), max(newest, self._seen)
-        number = next(filter(shutter.arrives, unseen), None)
-        return None if number is None else picture(shutter.expose(number), self._rig.scene)
+        for number in filter(shutter.arrives, unseen):
+            if shutter.has_arrived(number):
+                return picture(shutter.expose(number), self._eye.scene)
+            self._seen = number - 1  # it is still on its way
+        return None
 
     def close(self) -> None:
         """Nothing to give back."""
@@ -144,18 +146,25 @@ class VirtualCamera:
 class VirtualBench:
     """A wrist pulled by the step pulses of an emulated board, and a camera that sees it.
 
-    Time passes while `transport` is waited on, and is of its clock.
+    Time passes while `transport` is waited on, and is of its clock. With the markers of a second camera, `markers_2`,
+    the wrist bends in two planes, and each camera sees one.
     """
 
     def __init__(
-        self, settings: BenchSettings, wrist: WristParameters, seed: int, markers: Markers | None = None
+        self,
+        settings: BenchSettings,
+        wrist: WristParameters,
+        seed: int,
+        markers: Markers | None = None,
+        markers_2: Markers | None = None,
     ) -> None:
-        self._rig = Rig(settings, wrist, seed, markers)
+        self._rig = Rig(settings, wrist, seed, markers, markers_2=markers_2)
         self.transport = BenchTransport(self._rig.chip, self._rig.faults, settings.line, self._rig.weigh)
-        self.camera = VirtualCamera(self._rig)
+        self.cameras = tuple(VirtualCamera(self._rig, number) for number in range(len(self._rig.eyes)))
+        self.camera = self.cameras[0]
 
     def face(self, direction: str) -> None:
-        """Turn the bench so that this direction's plane is the one that bends and is seen."""
+        """Turn the bench so that this direction's plane is the one that bends and is seen; in two planes nothing."""
         self._rig.face(direction)
 
     def disturb(self, disturbances: Disturbances, start: float) -> None:

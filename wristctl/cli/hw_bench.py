@@ -65,6 +65,9 @@ def _serve_with_wrist(chip: Any, line: Any, override: list[str], console: Any, q
     from wristctl.study_files.load import load_study
 
     study = load_study((), override, "hw-run")
+    if study.hw_run.planes == 2:
+        problem = "an emulated rig in two planes runs in virtual time alone"
+        raise UserError(problem, "hw-run.planes", "planes: 1, or wristctl hw-run without --port")
     priority = prioritised(study.hw_run.priority)
     with TemporaryDirectory(prefix="wristctl-bench-") as folder, priority as allowed:
         if allowed:

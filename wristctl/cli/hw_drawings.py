@@ -27,6 +27,8 @@ def drawings(
 ) -> None:
     """Write spool, tendon clamp, wrist disc, marker flag and markers as SVG at true scale; the spool as STL too.
 
+    Of a rig in two planes the second camera's markers too.
+
     All of them follow from the settings of hw-run and the wrist. Each page has a ruler to check the print.
     """
     from wristctl.commands.calibrate.part_drawings import part_pages
@@ -40,6 +42,8 @@ def drawings(
     settings = study.hw_run
     spool = SpoolPart.of(settings, tendon_mm, shaft_mm)
     pages = {**part_pages(settings, study.wrist, spool, paper), "markers": marker_page(paper, settings.markers)}
+    if settings.planes == 2:
+        pages["markers_2"] = marker_page(paper, settings.markers_2)
     place = Argument("folder", metavar="FOLDER", positional=True)
     with writing(folder, place):
         folder.mkdir(parents=True, exist_ok=True)

@@ -5,7 +5,7 @@ from typing import Literal, Self
 from pydantic import model_validator
 
 from wristctl.config.camera import SceneSettings
-from wristctl.config.plant import Actuator, TendonFacts, TrueWrist
+from wristctl.config.plant import Actuator, TendonFacts, TrueWrist, in_one_plane_only
 from wristctl.config.section import Section, choice, quantity
 
 # Every kind of fault that can be injected: controller-exception, model-nan and disk-full are the control loop's, the
@@ -81,6 +81,7 @@ class InjectedFault(Section):
     )
     duration: float | None = quantity(None, "s", "how long it lasts; null: for good", gt=0)
     axis: int = choice(0, "whose motor or tendon", ge=0, lt=4)
+    camera: Literal[1, 2] = choice(1, "of two planes, whose pictures: 1 the ulnar-radial plane's, 2 the other's")
     size: float = quantity(1.0, "", "how much, in the unit that the kind says")
 
 
@@ -118,6 +119,10 @@ class RenderedCamera(Section):
     delay_frames: float = quantity(
         2.0, "", "frames from the middle of an exposure to its arrival", "assumed", ge=0, le=20
     )
+    jitter: float = quantity(
+        0.0, "s", "longest further delay of a frame's arrival, drawn evenly for each; at most a frame", ge=0
+    )
+    phase: float = quantity(0.0, "", "share of a frame by which its exposures follow the board's clock", ge=0, lt=1)
     exposure: float = quantity(4e-3, "s", "exposure; a motion in it smears the picture", "assumed", gt=0, le=0.1)
     dropped: float = quantity(0.05, "", "share of frames that never arrive", "assumed", ge=0, lt=1)
     scene: SceneSettings = SceneSettings()
@@ -126,6 +131,8 @@ class RenderedCamera(Section):
     def _one_exposure_at_a_time(self) -> Self:
         if self.exposure * self.frame_rate > 1.0:
             raise ValueError(f"an exposure of {self.exposure} s is longer than a frame at {self.frame_rate} per second")
+        if self.jitter * self.frame_rate > 1.0:
+            raise ValueError(f"a jitter of {self.jitter} s is longer than a frame at {self.frame_rate} per second")
         return self
 
 
@@ -188,7 +195,16 @@ class BenchSettings(Section):
     actuator: StepperActuator = StepperActuator()
     motors: Motors = Motors()
     camera: RenderedCamera = RenderedCamera()
+    camera_2: RenderedCamera = choice(
+        RenderedCamera(phase=0.4), "of two planes, the camera before the flexion-extension plane"
+    )
     line: SerialLine = SerialLine()
     person: Person = Person()
     load_cells: EmulatedCells | None = choice(None, "load cells of the tendons; null: none are wired")
     faults: tuple[InjectedFault, ...] = choice((), "what goes wrong")
+
+    @property
+    def in_one_plane_only(self) -> list[str]:
+        """Keys that are set, of what a bench in two planes has not."""
+        keys = in_one_plane_only(self.plant, self.actuator)
+        return [f"bench.{key}" if key.startswith("actuator.") else f"bench.plant.{key}" for key in keys]

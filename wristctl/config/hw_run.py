@@ -129,7 +129,11 @@ class RigSettings(Section):
 
     port: str | None = choice(None, "serial port of the motor board; without one the whole rig is emulated")
     baud: int = choice(250_000, "of the serial line", gt=0)
+    planes: Literal[1, 2] = choice(
+        1, "bending planes: 1, the wrist is turned for the other one; 2, one camera for each, at a right angle"
+    )
     camera: str = choice("0", "camera beside a real board: its number, or device path")
+    camera_2: str = choice("2", "second camera, of two planes: it looks at the flexion-extension plane")
     real_time: bool = choice(False, "emulated rig: against the wall clock, in a process of its own")
     priority: bool = choice(False, "real-time scheduling and locked memory for the loop, as far as the system allows")
     actuator: Actuator = choice(Actuator(level="tendon"), "motors and tendons as the controller knows them")
@@ -138,10 +142,12 @@ class RigSettings(Section):
     safety: Safety = Safety()
     load_cells: LoadCells | None = choice(None, "load cells of the tendons; null: pulls are not measured")
     markers: Markers = Markers()
+    markers_2: Markers = choice(Markers(base=2, tip=3), "markers of the second camera, of two planes")
     gates: Gates = Gates()
     device: Device = Device()
     bench: BenchSettings = choice(BenchSettings(), "the emulated rig, where there is no port")
     optics: str | None = choice(None, "calibrate-camera run; without one the camera looks square at the plane")
+    optics_2: str | None = choice(None, "calibrate-camera run of the second camera, of two planes")
 
     def within(self, wrist: WristParameters) -> Self:
         """Settings whose largest tension is no more than the wrist bears."""
@@ -154,6 +160,20 @@ class RigSettings(Section):
         """A rig's level, where a study gives other keys of the section alone."""
         level = "tendon" if field.field_name == "actuator" else "camera"
         return {"level": level, **given} if isinstance(given, Mapping) else given
+
+    @model_validator(mode="after")
+    def _two_planes(self) -> Self:
+        if self.planes == 1:
+            return self
+        if self.port is None and self.real_time:
+            problem = "an emulated rig in two planes draws two cameras' pictures, too much beside a board in real time"
+            raise Unfitting(problem, "real_time: false, or planes: 1")
+        if self.port is None and (beyond := self.bench.in_one_plane_only):
+            raise Unfitting(f"no bench in two planes has {beyond[0]}", "leave it at its default, or planes: 1")
+        numbers = [self.markers.base, self.markers.tip, self.markers_2.base, self.markers_2.tip]
+        if len(set(numbers)) < len(numbers):
+            raise Unfitting(f"four markers need different ids, they are {numbers}", "other ids in markers_2")
+        return self
 
     @model_validator(mode="after")
     def _spools_and_frames(self) -> Self:

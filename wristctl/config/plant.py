@@ -180,6 +180,22 @@ class TrueWrist(Overrides):
     end_stop_dissipation: float = fact(1.0, "s/rad", "Hunt and Crossley's: share of that per rate of impact", ge=0)
 
 
+# Facts of a wrist and of its tendons that there are in one plane only.
+WRIST_IN_ONE_PLANE = ("model", "creep", "inner_friction", "end_stop_deg", "taper")
+TENDONS_IN_ONE_PLANE = ("creep", "slips_at", "torque", "top_speed")
+
+
+def in_one_plane_only(wrist: TrueWrist, tendons: TendonFacts) -> list[str]:
+    """Keys of such facts that are not at their defaults."""
+    facts = wrist, TrueWrist(), tendons, TendonFacts()
+    of_wrist = [name for name in WRIST_IN_ONE_PLANE if getattr(facts[0], name) != getattr(facts[1], name)]
+    return of_wrist + [
+        f"actuator.{name}"
+        for name in TENDONS_IN_ONE_PLANE
+        if getattr(facts[2], name, None) != getattr(facts[3], name, None)
+    ]
+
+
 class Plant(TrueWrist):
     """Differences of the simulated world from the controller's model: wrist, motors with tendons, camera."""
 

@@ -51,6 +51,18 @@ def acting(settings: Disturbances, time: Array) -> Array | None:
     return np.stack([force, scale], axis=1)
 
 
+def acting_in_space(settings: Disturbances, time: Array) -> Array | None:
+    """Tip force [N] along the straight wrist, toward ulnar and toward flexion, and stiffness over the plant's own.
+
+    (T, 4); None if nothing acts.
+    """
+    if (pushes := acting(settings, time)) is None:
+        return None
+    toward = np.deg2rad(settings.toward_deg)
+    force, scale = pushes.T
+    return np.stack([np.zeros_like(force), np.cos(toward) * force, np.sin(toward) * force, scale], axis=1)
+
+
 def _push(settings: Disturbances, time: Array) -> Array:
     push = settings.push
     phase = (time - push.start) / push.duration

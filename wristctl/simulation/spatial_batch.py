@@ -7,7 +7,7 @@ import numpy as np
 
 from wristctl.arrays import Array
 from wristctl.config.loop import Loop
-from wristctl.config.plant import TendonFacts, TrueWrist
+from wristctl.config.plant import TendonFacts, in_one_plane_only
 from wristctl.config.wrist import WristParameters
 from wristctl.control.law import REFERENCE, Controller, signals_of
 from wristctl.errors import UserError
@@ -37,9 +37,6 @@ from wristctl.wrist.tendons import TENDONS_PER_SIDE
 
 # Pull [N] for tensions without a limit: no wrist's wants are as large.
 _NO_LIMIT = 1e6
-# Facts of a world that loops in two planes do not have, where they are not at their defaults.
-_NOT_OF_THE_WRIST = ("model", "creep", "inner_friction", "end_stop_deg", "taper")
-_NOT_OF_THE_TENDONS = ("creep", "slips_at", "torque", "top_speed")
 
 
 class SpatialBatch(NamedTuple):
@@ -60,16 +57,9 @@ class SpatialBatch(NamedTuple):
 
 def check_spatial(loop: Loop) -> None:
     """UserError for what a loop has in one plane and not in two."""
-    plant, facts = loop.plant, loop.plant.actuator
-    default, of_tendons = TrueWrist(), TendonFacts()
-    beyond = [f"plant.{name}" for name in _NOT_OF_THE_WRIST if getattr(plant, name) != getattr(default, name)]
-    beyond += [
-        f"plant.actuator.{name}"
-        for name in _NOT_OF_THE_TENDONS
-        if getattr(facts, name) != getattr(of_tendons, name, None)
-    ]
-    if beyond:
-        raise UserError(f"no loop in two planes has {beyond[0]}", f"loop.{beyond[0]}", "leave it at its default")
+    if beyond := in_one_plane_only(loop.plant, loop.plant.actuator):
+        key = f"plant.{beyond[0]}"
+        raise UserError(f"no loop in two planes has {key}", f"loop.{key}", "leave it at its default")
 
 
 def _as_pairs(wrist: WristParameters, layout: TendonLayout, axis: int) -> WristParameters:

@@ -16,7 +16,7 @@ from wristctl.processes import cores, stoppable
 from wristctl.seeds import Entropy
 from wristctl.simulation.bend_course import BendCourse
 from wristctl.simulation.bend_paths import BEND_PATHS, turned
-from wristctl.simulation.disturbances import acting
+from wristctl.simulation.disturbances import acting_in_space
 from wristctl.simulation.kernel import Span
 from wristctl.simulation.spatial_batch import SpatialBatch, check_spatial, sample_step, spatial_batch
 from wristctl.simulation.spatial_kernel import SPATIAL_RECORDED, run_spatial
@@ -203,9 +203,8 @@ def _acting(loop: Loop, time: Array, force: Array | None) -> Array:
     """What acts: force on the tip [N] and scale of the stiffness, (4, T)."""
     result = np.zeros((4, len(time)))
     result[3] = 1.0
-    if (pushes := acting(loop.disturbances, time)) is not None:
-        toward = np.deg2rad(loop.disturbances.toward_deg)
-        result[1], result[2], result[3] = np.cos(toward) * pushes[:, 0], np.sin(toward) * pushes[:, 0], pushes[:, 1]
+    if (pushes := acting_in_space(loop.disturbances, time)) is not None:
+        result[:] = pushes.T
     if force is not None:
         result[:3] += np.reshape(force, (3, -1))
     return result

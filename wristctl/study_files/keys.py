@@ -73,7 +73,7 @@ def choices_of(field: FieldInfo) -> Sequence[str]:
     tables = [marker.table for marker in field.metadata if isinstance(marker, OneOf)]
     if tables:
         return tuple(name for name in tables[0] if tables[0].belongs(name))
-    return get_args(field.annotation) if get_origin(field.annotation) is Literal else ()
+    return tuple(map(str, get_args(field.annotation))) if get_origin(field.annotation) is Literal else ()
 
 
 def source_of(field: FieldInfo) -> str:

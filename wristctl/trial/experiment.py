@@ -164,7 +164,7 @@ class Experiment:
             marker = self.zero.marker
         else:
             check_zero(board, tracking, settings, self._wrist, plane, self.zero)
-        tracking.zero = marker
+        tracking.zero = (marker,)
         return self._at_rest(board, tracking, plane, shown), tracking
 
     def _at_rest(self, board: Board, tracking: Tracking, plane: str, shown: Shown | None) -> ControlLoop:

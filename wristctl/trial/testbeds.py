@@ -1,6 +1,7 @@
 """Testbeds of trials: the emulated bench in virtual or in real time, or a real board and camera with an operator."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from functools import partial
 from typing import Protocol
 
 import numpy as np
@@ -14,7 +15,8 @@ from wristctl.config.plant import Disturbances, Push
 from wristctl.config.wrist import WristParameters
 from wristctl.seeds import Entropy
 from wristctl.trial.supervised_wait import Meanwhile
-from wristctl.trial.tracking import InlineTracking, Kept, ThreadedTracking, Tracking
+from wristctl.trial.tracking import InlineTracking, Kept, PairedTracking, ThreadedTracking, Tracking
+from wristctl.vision.camera import Camera
 from wristctl.vision.device_camera import DeviceCamera
 from wristctl.vision.marker import Tracker
 from wristctl.vision.view import View
@@ -42,19 +44,35 @@ class Testbed(Protocol):
         """Have a person agree to the first motion. Raises UserError, and what `meanwhile` raises."""
 
     def tracking(self) -> Tracking:
-        """The camera with a fresh tracker."""
+        """The camera, or both, with fresh trackers."""
 
     def face(self, direction: str, meanwhile: Meanwhile) -> None:
-        """Have the wrist turned so that this direction's plane is the one that bends and is seen."""
+        """Have the wrist turned so that this direction's plane is the one that bends and is seen.
+
+        Of a wrist that bends in two planes nothing is asked.
+        """
 
     def begin(self, start: float, disturbances: Disturbances, noise: Entropy) -> None:
         """A trial's motion starts at `start` on the transport's clock; what is drawn of it comes from this stream."""
 
     def truth(self, since: float) -> Array:
-        """Rows (time since then, segment angles, their sum, pulls) of an emulated wrist; none of a real one."""
+        """Rows (time since then, coordinates, the last disc's bend or bends, pulls) of an emulated wrist; none of a
+        real one."""
 
     def close(self) -> None:
         """Give everything back."""
+
+
+def _tracking(
+    make: Callable[[Camera, Tracker], InlineTracking | ThreadedTracking], cameras: Sequence[Camera],
+    settings: RigSettings, views: Sequence[View],
+) -> Tracking:  # fmt: skip
+    """Cameras in the order of their planes, each with a fresh tracker."""
+    if settings.planes == 1:
+        return make(cameras[0], Tracker(settings.markers, views[0], settings.gates))
+    first = Tracker(settings.markers, views[0], settings.gates, plane=0)
+    second = Tracker(settings.markers_2, views[1], settings.gates, plane=1)
+    return PairedTracking([make(camera, tracker) for camera, tracker in zip(cameras, (first, second), strict=True)])
 
 
 class EmulatedTestbed:
@@ -63,9 +81,9 @@ class EmulatedTestbed:
     emulated = True
 
     def __init__(
-        self, bench: VirtualBench | RealTimeBench, settings: RigSettings, view: View, keep: Kept | None
+        self, bench: VirtualBench | RealTimeBench, settings: RigSettings, views: Sequence[View], keep: Kept | None
     ) -> None:
-        self._bench, self._settings, self._view, self._keep = bench, settings, view, keep
+        self._bench, self._settings, self._views, self._keep = bench, settings, views, keep
         self.transport: Transport = bench.transport
         self._tracking: Tracking | None = None
 
@@ -74,18 +92,19 @@ class EmulatedTestbed:
         self._person(meanwhile)
 
     def tracking(self) -> Tracking:
-        """The rendered camera with a fresh tracker."""
+        """The rendered camera, or both, with fresh trackers."""
         if self._tracking is not None:
             self._tracking.close()
         kind = ThreadedTracking if isinstance(self._bench, RealTimeBench) else InlineTracking
-        tracker = Tracker(self._settings.markers, self._view, self._settings.gates)
-        self._tracking = kind(self._bench.camera, tracker, self._keep, self.transport.now)
+        make = partial(kind, keep=self._keep, now=self.transport.now)
+        self._tracking = _tracking(make, self._bench.cameras, self._settings, self._views)
         return self._tracking
 
     def face(self, direction: str, meanwhile: Meanwhile) -> None:
-        """Wait for a while, then turn the wrist."""
-        self._person(meanwhile)
-        self._bench.face(direction)
+        """Wait for a while, then turn the wrist; in two planes nobody needs to."""
+        if self._settings.planes == 1:
+            self._person(meanwhile)
+            self._bench.face(direction)
 
     def begin(self, start: float, disturbances: Disturbances, noise: Entropy) -> None:
         """Disturbances and faults count from here."""
@@ -120,13 +139,15 @@ class RealTestbed:
 
     emulated = False
 
-    def __init__(self, settings: RigSettings, view: View, keep: Kept | None, ask: Ask) -> None:
-        self._settings, self._view, self._keep, self._ask = settings, view, keep, ask
+    def __init__(self, settings: RigSettings, views: Sequence[View], keep: Kept | None, ask: Ask) -> None:
+        self._settings, self._views, self._keep, self._ask = settings, views, keep, ask
         self.transport: Transport = open_transport(settings.port, settings.baud)
+        self._cameras: list[DeviceCamera] = []
         try:
-            self._camera = DeviceCamera(settings.camera, settings.device)
+            for source in (settings.camera, settings.camera_2)[: settings.planes]:
+                self._cameras.append(DeviceCamera(source, settings.device))
         except BaseException:
-            self.transport.close()
+            self._close_devices()
             raise
         self._tracking: Tracking | None = None
 
@@ -135,15 +156,17 @@ class RealTestbed:
         self._ask(BEFORE_MOTION.format(self._settings.safety.motor_pull), meanwhile)
 
     def tracking(self) -> Tracking:
-        """The camera with a fresh tracker."""
+        """The camera, or both, with fresh trackers."""
         if self._tracking is not None:
             self._tracking.close()
-        tracker = Tracker(self._settings.markers, self._view, self._settings.gates)
-        self._tracking = ThreadedTracking(self._camera, tracker, self._keep)
+        make = partial(ThreadedTracking, keep=self._keep)
+        self._tracking = _tracking(make, self._cameras, self._settings, self._views)
         return self._tracking
 
     def face(self, direction: str, meanwhile: Meanwhile) -> None:
-        """Ask the operator to turn the wrist."""
+        """Ask the operator to turn the wrist; in two planes nobody needs to."""
+        if self._settings.planes == 2:
+            return
         request = f"Set the wrist up so that it bends toward {direction} in the camera's picture, both markers in view."
         self._ask(request, meanwhile)
 
@@ -155,18 +178,30 @@ class RealTestbed:
         return np.empty((0, 0))
 
     def close(self) -> None:
-        """Give back camera and port."""
+        """Give back cameras and port."""
         if self._tracking is not None:
             self._tracking.close()
-        self._camera.close()
+        self._close_devices()
+
+    def _close_devices(self) -> None:
+        for camera in self._cameras:
+            camera.close()
         self.transport.close()
 
 
 def open_testbed(
-    settings: RigSettings, wrist: WristParameters, seed: int, view: View, ask: Ask, keep: Kept | None = None
-) -> EmulatedTestbed | RealTestbed:
-    """The stand of these settings. Raises BoardError and CameraError."""
+    settings: RigSettings, wrist: WristParameters, seed: int, view: View, ask: Ask, keep: Kept | None = None,
+    view_2: View | None = None,
+) -> EmulatedTestbed | RealTestbed:  # fmt: skip
+    """The stand of these settings, with the views of its cameras. Raises BoardError and CameraError.
+
+    `keep` takes what both cameras see; of a real rig, or in real time, each calls it from a thread of its own.
+    """
+    views = view, view_2 or View()
     if settings.port is not None:
-        return RealTestbed(settings, view, keep, ask)
+        return RealTestbed(settings, views, keep, ask)
+    if settings.planes == 2:
+        bench = VirtualBench(settings.bench, wrist, seed, settings.markers, settings.markers_2)
+        return EmulatedTestbed(bench, settings, views, keep)
     build = connect if settings.real_time else VirtualBench
-    return EmulatedTestbed(build(settings.bench, wrist, seed, settings.markers), settings, view, keep)
+    return EmulatedTestbed(build(settings.bench, wrist, seed, settings.markers), settings, views, keep)

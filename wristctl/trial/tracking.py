@@ -15,6 +15,7 @@ from wristctl.loop_priority import beside_the_loop
 from wristctl.vision.camera import Camera, Frame
 from wristctl.vision.camera_pose import CameraPose
 from wristctl.vision.marker import Sighting, SightingVerdict, Tracker
+from wristctl.vision.two_views import bend_seen
 
 # Seconds for which a picture is known again: longer than any ring of buffers lasts.
 _REMEMBERED = 1.0
@@ -72,14 +73,20 @@ Kept = Callable[[Frame, Sighting], None]
 class Tracking(Protocol):
     """Gives sightings to the loop."""
 
-    zero: float
-    """Marker angle of the straight wrist [rad], taken off every angle."""
+    zero: tuple[float, ...]
+    """Marker angle of the straight wrist [rad] as each camera sees it, taken off its every angle."""
 
     def look(self) -> list[Sighting]:
-        """Sightings since the last look, oldest first; never waits for a frame."""
+        """Sightings since the last look, oldest first, of one camera or of both; never waits for a frame."""
+
+    def bend(self, sighting: Sighting, other: float) -> float:
+        """Bend about the sighting's plane [rad] of a wrist in two planes, where that about the other one is `other`."""
 
     def stand_square(self, sightings: Sequence[Sighting]) -> CameraPose | None:
-        """Set the bending plane square, for a camera that has not been calibrated: `Tracker.stand_square`."""
+        """Set the bending plane square, for a camera that has not been calibrated: `Tracker.stand_square`.
+
+        Of two cameras it is done for the one that the first sighting is of.
+        """
 
     def close(self) -> None:
         """Look no more; the camera stays open."""
@@ -95,7 +102,7 @@ class InlineTracking:
         self._truth = CameraTruth()
         self.frame: Frame | None = None
         """The newest."""
-        self.zero = 0.0
+        self.zero: tuple[float, ...] = (0.0,)
 
     def look(self) -> list[Sighting]:
         """The newest frame's sighting, if there is one."""
@@ -104,10 +111,18 @@ class InlineTracking:
             return []
         came = self._now()
         sighting = self._truth.judge(frame, self._tracker.see(frame)._replace(came=came))
-        self.frame, sighting = frame, sighting._replace(theta=sighting.theta - self.zero)
+        self.frame, sighting = frame, sighting._replace(theta=sighting.theta - self.zero[0])
         if self._keep is not None:
             self._keep(frame, sighting)
         return [sighting]
+
+    def bend(self, sighting: Sighting, other: float) -> float:
+        """As `Tracking.bend`."""
+        return self.bend_with_zero(sighting, other, self.zero[0])
+
+    def bend_with_zero(self, sighting: Sighting, other: float, zero: float) -> float:
+        """The same where this zero has been taken off the sighting's angle [rad]."""
+        return bend_seen(sighting, self._tracker.view, other, zero, self._tracker.side)
 
     def stand_square(self, sightings: Sequence[Sighting]) -> CameraPose | None:
         """The frames to come are seen so; the marker's zero is to be read anew."""
@@ -127,7 +142,7 @@ class ThreadedTracking:
         self, camera: Camera, tracker: Tracker, keep: Kept | None = None, now: Callable[[], float] = time.monotonic
     ) -> None:
         self._inner, self._keep = InlineTracking(camera, tracker, now=now), keep
-        self.zero = 0.0
+        self.zero: tuple[float, ...] = (0.0,)
         self._seen: deque[Sighting] = deque(maxlen=64)
         self._error: BaseException | None = None
         self._stop = threading.Event()
@@ -141,7 +156,11 @@ class ThreadedTracking:
         sightings = []
         while self._seen:
             sightings.append(self._seen.popleft())
-        return [sighting._replace(theta=sighting.theta - self.zero) for sighting in sightings]
+        return [sighting._replace(theta=sighting.theta - self.zero[0]) for sighting in sightings]
+
+    def bend(self, sighting: Sighting, other: float) -> float:
+        """As `Tracking.bend`."""
+        return self._inner.bend_with_zero(sighting, other, self.zero[0])
 
     def stand_square(self, sightings: Sequence[Sighting]) -> CameraPose | None:
         """The frames to come are seen so; the marker's zero is to be read anew."""
@@ -159,8 +178,46 @@ class ThreadedTracking:
                 if sightings := self._inner.look():
                     self._seen.extend(sightings)
                     if self._keep is not None and self._inner.frame is not None:
-                        self._keep(self._inner.frame, sightings[0]._replace(theta=sightings[0].theta - self.zero))
+                        self._keep(self._inner.frame, sightings[0]._replace(theta=sightings[0].theta - self.zero[0]))
                 else:
                     time.sleep(1e-3)
         except BaseException as error:  # handed to the loop, which stops the motors
             self._error = error
+
+
+class PairedTracking:
+    """Both cameras of a wrist in two planes, each with a tracking of its own, in the order of their planes."""
+
+    def __init__(self, trackings: Sequence[InlineTracking | ThreadedTracking]) -> None:
+        self._trackings = tuple(trackings)
+
+    @property
+    def zero(self) -> tuple[float, ...]:
+        """Marker angle of the straight wrist as each camera sees it [rad]."""
+        return tuple(tracking.zero[0] for tracking in self._trackings)
+
+    @zero.setter
+    def zero(self, angles: tuple[float, ...]) -> None:
+        for tracking, angle in zip(self._trackings, angles, strict=True):
+            tracking.zero = (angle,)
+
+    def look(self) -> list[Sighting]:
+        """Both cameras' sightings, by the time of capture. Raises the error that ended a camera's thread."""
+        sightings = [sighting for tracking in self._trackings for sighting in tracking.look()]
+        return sorted(sightings, key=lambda sighting: sighting.time)
+
+    def bend(self, sighting: Sighting, other: float) -> float:
+        """As `Tracking.bend`."""
+        return self._trackings[sighting.plane].bend(sighting, other)
+
+    def stand_square(self, sightings: Sequence[Sighting]) -> CameraPose | None:
+        """As `Tracking.stand_square`, of the camera that the first of these sightings is of, by its own alone."""
+        if not sightings:
+            return None
+        plane = sightings[0].plane
+        return self._trackings[plane].stand_square([sighting for sighting in sightings if sighting.plane == plane])
+
+    def close(self) -> None:
+        """Stop looking."""
+        for tracking in self._trackings:
+            tracking.close()

@@ -1,5 +1,6 @@
 """Finding square markers in a picture, their print, and the angle of a square."""
 
+import math
 from typing import Any, NamedTuple
 
 import cv2
@@ -85,6 +86,12 @@ def square_angle(corners: Array) -> float:
     z = corners[:, 0] + 1j * corners[:, 1]
     upright = np.array([-1 - 1j, 1 - 1j, 1 + 1j, -1 + 1j])
     return float(np.angle(np.vdot(upright, z - z.mean())))
+
+
+def side_angle(corners: Array) -> float:
+    """Angle [rad] by which the left and right sides of a marker of corners (4, 2) are turned, as `square_angle`."""
+    right, down = corners[0] + corners[1] - corners[2] - corners[3]
+    return math.atan2(right, -down)
 
 
 def edges(corners: Array) -> Array:

@@ -3,7 +3,7 @@
 import math
 from collections.abc import Sequence
 from enum import StrEnum
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 import numpy as np
 
@@ -11,11 +11,13 @@ from wristctl.arrays import Array
 from wristctl.config.camera import Gates, Markers
 from wristctl.vision.camera import Frame, Image
 from wristctl.vision.camera_pose import CameraPose, pose_of
-from wristctl.vision.detector import Detector, edges, square_angle
+from wristctl.vision.detector import Detector, edges, side_angle, square_angle
 from wristctl.vision.view import View
 
 _UNSEEN = np.full((4, 2), np.nan)
 _BEFORE = [3, 0, 1, 2]
+# Least length over width of a marker on a tilted disc: 66 deg.
+_TILTED = 0.4
 # Seconds between two searches of the whole picture for a second marker of the same id.
 _LOOK_ROUND = 0.15
 
@@ -69,6 +71,8 @@ class Sighting(NamedTuple):
     """Distance of the tip's marker from the first disc, along the base's marker [m]; nan unless the verdict is ok"""
     tip_y: float = math.nan
     """Distance of the tip's marker across the base's, toward theta > 0 [m]"""
+    plane: int = 0
+    """Bending plane that the camera looks at: 0 ulnar-radial, 1 flexion-extension"""
 
 
 class _Base(NamedTuple):
@@ -86,9 +90,15 @@ class Tracker:
     Markers are looked for around their last place, and in the whole picture where they are not found there, and several
     times a second for others of the same id, at every frame while there is one: finely, which takes longer, as long as
     no usual search has found both.
+
+    Of a wrist that bends in two planes `plane` is the one that the camera looks at. The tip's marker may then be tilted
+    by the other bend: the angle is that of its sides alone, and what is judged of its shape is that they are parallel.
     """
 
-    def __init__(self, markers: Markers, view: View, gates: Gates, zero: float = 0.0) -> None:
+    def __init__(
+        self, markers: Markers, view: View, gates: Gates, zero: float = 0.0, plane: Literal[0, 1] | None = None
+    ) -> None:
+        self._plane = plane
         self._markers, self._view, self._gates, self.zero = markers, view, gates, zero
         self._detector, self._calibrated = Detector(), view.size is not None
         self._last_seen: dict[int, Array] = {}
@@ -98,6 +108,16 @@ class Tracker:
         self._small = True
         self._picture = 0, 0
         self._pose: CameraPose | None = None
+
+    @property
+    def side(self) -> float:
+        """1 where the angle counts positive toward the right of the picture, else -1."""
+        return 1.0 if self._markers.positive == "right" else -1.0
+
+    @property
+    def view(self) -> View:
+        """The view by which the next frame is seen."""
+        return self._view if self._pose is None else self._pose.view
 
     def stand_square(self, sightings: Sequence[Sighting]) -> CameraPose | None:
         """Set the plane square by the markers of these sightings of a wrist at rest, from the next frame on.
@@ -125,7 +145,7 @@ class Tracker:
             rectified = self._view.rectify(tips[0])
             size, tip = _width(rectified) / _width(self._base.corners), self._place(self._base.corners, rectified)
         shown = np.stack([corners[0] if corners else _UNSEEN for corners in (bases, tips)])
-        return Sighting(frame.time, frame.number, theta, verdict, shown, size, math.nan, *tip)
+        return Sighting(frame.time, frame.number, theta, verdict, shown, size, math.nan, *tip, self._plane or 0)
 
     def _find(self, frame: Frame) -> dict[int, list[Array]]:
         wanted = (self._markers.base, self._markers.tip)
@@ -161,7 +181,7 @@ class Tracker:
             return SightingVerdict.TWICE, math.nan
         base, tip = ([self._view.rectify(marker) for marker in corners] for corners in (bases, tips))
         base = [marker for marker in base if self._is_square(marker)]
-        if tip and not self._is_square(tip[0]):
+        if tip and not (self._is_square(tip[0]) if self._plane is None else self._is_tilted_square(tip[0])):
             return SightingVerdict.SHAPE, math.nan
         if self._base is not None and time - self._base.seen > self._gates.base_memory:
             self._base = None
@@ -185,17 +205,16 @@ class Tracker:
         return SightingVerdict.OK, theta
 
     def _angle(self, base: Array, tip: Array) -> float:
-        sign = 1.0 if self._markers.positive == "right" else -1.0
-        turned = sign * (square_angle(tip) - square_angle(base)) - self.zero
+        angle = square_angle if self._plane is None else side_angle
+        turned = self.side * (angle(tip) - square_angle(base)) - self.zero
         return math.remainder(turned, math.tau)
 
     def _place(self, base: Array, tip: Array) -> tuple[float, float]:
         """Middle of the tip's marker in the base's axes [m]; the base's own sides are the scale, so none is asked."""
         along, right = base[0] + base[1] - base[2] - base[3], base[1] + base[2] - base[0] - base[3]
         away, side = tip.mean(axis=0) - base.mean(axis=0), self._markers.side
-        sign = 1.0 if self._markers.positive == "right" else -1.0
         x, y = (2.0 * side * float(away @ axis) / float(axis @ axis) for axis in (along, right))
-        return self._markers.base_at + x, sign * y
+        return self._markers.base_at + x, self.side * y
 
     def _is_square(self, corners: Array) -> bool:
         along = edges(corners)
@@ -203,6 +222,16 @@ class Tracker:
         cosines = (along * along[_BEFORE]).sum(axis=1) / (sides * sides[_BEFORE])
         skew = math.degrees(math.asin(min(1.0, float(np.abs(cosines).max()))))
         return bool(sides.max() <= self._gates.side_ratio * sides.min()) and skew <= self._gates.corner_deg
+
+    def _is_tilted_square(self, corners: Array) -> bool:
+        """Whether opposite sides are alike and parallel, and the print is not seen from too far aside."""
+        along = edges(corners)
+        ratio = along[:2, 0] + 1j * along[:2, 1]
+        ratio /= -(along[2:, 0] + 1j * along[2:, 1])
+        alike = np.abs(np.log(np.abs(ratio))).max() <= math.log(self._gates.side_ratio)
+        parallel = np.abs(np.angle(ratio)).max() <= math.radians(self._gates.corner_deg)
+        least, most = np.linalg.svd(along[:2] - along[2:], compute_uv=False)[::-1]
+        return bool(alike and parallel and least >= _TILTED * most)
 
     def _has_moved(self, corners: Array) -> bool:
         if self._base is None:

@@ -3,7 +3,7 @@
 import cmath
 import math
 from collections.abc import Iterator, Sequence
-from typing import Any
+from typing import Any, Literal
 
 import cv2
 import numpy as np
@@ -14,10 +14,11 @@ from wristctl.arrays import Array
 from wristctl.config.camera import CharucoBoard, Markers, SceneSettings
 from wristctl.config.choices import PLANTS
 from wristctl.config.wrist import WristParameters
+from wristctl.vision.bodies import Body, Carry, PlanarBody, SpatialBody
 from wristctl.vision.camera import Frame, Image
 from wristctl.vision.charuco import board_of
 from wristctl.vision.detector import print_of
-from wristctl.vision.scene_parts import BASE_AT, Stroke, bent_across, clamp, fingers, last_disc, moving, with_last_disc
+from wristctl.vision.scene_parts import BASE_AT, Stroke, clamp, fingers
 from wristctl.vision.view import Pinhole, View
 
 # Pixels of a print's cell, samples along a pixel's side under a marker, fraction bits of drawn corners.
@@ -27,18 +28,23 @@ _LEVELS = 2**16
 
 
 class Scene:
-    """A camera before the wrist, with the two markers on flags in front of the bending plane."""
+    """A camera before the wrist, with the two markers on flags in front of the bending plane.
+
+    Of a wrist in two planes `plane` is the one that the camera looks at; None: it bends in that one alone.
+    """
 
     def __init__(
-        self, settings: SceneSettings, wrist: WristParameters, markers: Markers | None = None, plant: str = "pcc"
-    ) -> None:
-        self._backbone = PLANTS[plant].backbone
-        self._settings, self._wrist, self._markers = settings, wrist, markers or Markers()
+        self, settings: SceneSettings, wrist: WristParameters, markers: Markers | None = None, plant: str = "pcc",
+        plane: Literal[0, 1] | None = None,
+    ) -> None:  # fmt: skip
+        self._settings, self._markers = settings, markers or Markers()
         self.camera = Pinhole(settings, self._markers.positive)
+        self._body: Body = PlanarBody(PLANTS[plant].backbone, wrist)
+        if plane is not None:
+            self._body = SpatialBody(wrist, plane, self.camera.side)
         numbers = self._markers.base, self._markers.tip
         self._prints = [self._printed(number) for number in numbers]
         self._film = Film(settings)
-        self._across = 0.0
         still = np.full((settings.height, settings.width), _WALL, np.uint8)
         self._draw(still, *self._projected([clamp()]))
         self._still = [self._with_marker(still.copy(), tag, complex(BASE_AT), 1.0) for tag in self._prints]
@@ -57,17 +63,16 @@ class Scene:
         `covered`: a hand lies over the tip's marker; `swapped`: the two markers have changed places; `across`: the
         wrist is bent away from the camera [rad]; `turned`: the tip's marker has slipped on its flag [rad].
         """
-        self._across = across
         instants = np.atleast_2d(theta)
         total = np.zeros(self._still[0].shape, np.float32)
-        drawings = self._projected([moving(self._backbone, instant, self._wrist) for instant in instants], True)
+        drawings = self._projected([self._body.strokes(instant) for instant in instants], self._body.carry(across))
         for angles, drawing in zip(instants, drawings, strict=True):
             image = self._still[swapped].copy()
             self._draw(image, drawing)
-            place = last_disc(self._backbone, angles, self._wrist)
-            self._with_marker(image, self._prints[not swapped], place[0], place[1] * cmath.exp(1j * turned), place)
+            centre, normal, marker, grip = self._body.disc(angles, across)
+            self._with_marker(image, self._prints[not swapped], centre, normal * cmath.exp(1j * turned), marker)
             if covered:
-                self._draw(image, *self._projected([fingers(*place, -self._settings.marker_offset)], True))
+                self._draw(image, *self._projected([fingers(centre, normal, -self._settings.marker_offset)], grip))
             cv2.accumulate(image, total)
         return self._film.expose(total, len(instants), rng)
 
@@ -77,12 +82,12 @@ class Scene:
         return np.rint(grey).astype(np.uint8).repeat(_CELL, axis=0).repeat(_CELL, axis=1)
 
     def _projected(
-        self, drawings: Sequence[Sequence[Stroke]], moving: bool = False
+        self, drawings: Sequence[Sequence[Stroke]], carry: Carry | None = None
     ) -> list[list[tuple[Stroke, Array]]]:
-        """Project strokes to pixels, bent across where they move; all are projected at once."""
+        """Project strokes to pixels, carried where they move; all are projected at once."""
         strokes = [stroke for drawing in drawings for stroke in drawing]
         points = np.concatenate([stroke.points for stroke in strokes])
-        pixels = self.camera.project(bent_across(points, self._across if moving else 0.0, self._wrist.length))
+        pixels = self.camera.project(points if carry is None else carry(points))
         parts = iter(np.split(pixels, np.cumsum([len(stroke.points) for stroke in strokes])[:-1]))
         return [[(stroke, next(parts)) for stroke in drawing] for drawing in drawings]
 
@@ -98,9 +103,9 @@ class Scene:
                 cv2.fillConvexPoly(image, _fixed(pixels), stroke.grey, cv2.LINE_AA, _BITS)
 
     def _with_marker(
-        self, image: Image, print_: Image, centre: complex, along: complex, disc: tuple[complex, complex] | None = None
+        self, image: Image, print_: Image, centre: complex, along: complex, carry: Carry | None = None
     ) -> Image:
-        """Paint a print on its flag, its top edge toward `along`, and fixed to the last disc if that is given.
+        """Paint a print on its flag, its top edge toward `along`, carried with what it is fixed to.
 
         The lens's distortion within it is left out.
         """
@@ -109,9 +114,7 @@ class Scene:
         places = centre + along * half * np.array([1 - right, 1 + right, -1 + right, -1 - right])
         depth = np.full(4, -self._settings.marker_offset)
         points = np.stack([places.real, places.imag, depth], axis=-1)
-        if disc is not None:
-            points = with_last_disc(points, self._across, self._wrist.length, disc)
-        corners = self.camera.project(points)
+        corners = self.camera.project(points if carry is None else carry(points))
         start = np.maximum(np.floor(corners.min(axis=0)).astype(int) - 1, 0)
         width, height = np.minimum(np.ceil(corners.max(axis=0)).astype(int) + 2, self.camera.size) - start
         if width <= 0 or height <= 0:

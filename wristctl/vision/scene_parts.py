@@ -101,6 +101,24 @@ def moving(backbone: Backbone, q: Array, wrist: WristParameters) -> list[Stroke]
     return parts + _pairs(frames, c, behind=False)
 
 
+def moving_in_space(line: Array, frames: tuple[Array, Array], wrist: WristParameters, edge_on: bool) -> list[Stroke]:
+    """The wrist in two planes, and its hand, seen on the palm or `edge_on`.
+
+    `line` (m, 3) is its backbone [m], `frames` are centres (discs, 3) [m] and rotations (discs, 3, 3) of its discs.
+    """
+    centres, turned = frames
+    c, radius = wrist.tendon_offset, RIM * wrist.tendon_radius
+    outlines = hand(max(wrist.hand_offset, 0.02), edge_on=True) if edge_on else _hand(max(wrist.hand_offset, 0.02))
+    parts = [Stroke(centres[-1] + _flat(outline, 0.0) @ turned[-1].T, 164, "hull") for outline in outlines]
+    parts += _pairs_in_space(centres, turned, c, behind=True)
+    parts.append(Stroke(line, 92, "line", 4))
+    for centre, frame in zip(centres, turned, strict=True):
+        rims = [centre + _rim(complex(end * THICK), 1.0 + 0j, radius) @ frame.T for end in (-0.5, 0.5)]
+        parts.append(Stroke(np.concatenate(rims), 150, "hull"))
+        parts += [Stroke(rims[0], 118, "face"), Stroke(rims[1][::-1], FACE, "face")]
+    return parts + _pairs_in_space(centres, turned, c, behind=False)
+
+
 def bent_across(points: Array, bend: float, length: float) -> Array:
     """Points (m, 3) that a bend [rad] away from the camera carries along, of constant curvature up to x = `length`.
 
@@ -165,6 +183,20 @@ def _pairs(frames: tuple[Planar, Planar], c: float, behind: bool) -> list[Stroke
         springs = coil(tendon[:-1, None], tendon[1:, None], 0.17 * c, turns=3)[:, ::2].ravel()
         parts.append(Stroke(_flat(springs, depth), 140 if behind else 158, "line"))
         parts.append(Stroke(_flat(tendon, depth), 62 if behind else 40, "line", 2))
+    return parts
+
+
+def _pairs_in_space(centres: Array, turned: Array, c: float, behind: bool) -> list[Stroke]:
+    """The same of a wrist in two planes."""
+    parts = []
+    for offset in (-c, c):
+        tendon = centres + turned @ np.array([0.0, offset, c if behind else -c])
+        flat = tendon[:, 0] + 1j * tendon[:, 1]
+        springs = coil(flat[:-1, None], flat[1:, None], 0.17 * c, turns=3)[:, ::2]
+        depth = np.linspace(tendon[:-1, 2], tendon[1:, 2], springs.shape[1], axis=-1)
+        wound = np.stack([springs.real, springs.imag, depth], axis=-1).reshape(-1, 3)
+        parts.append(Stroke(wound, 140 if behind else 158, "line"))
+        parts.append(Stroke(tendon, 62 if behind else 40, "line", 2))
     return parts
 
 

@@ -79,10 +79,12 @@ def calibrate_wrist(session: Session) -> WristCalibrated | AxisFound:
 
     findings, study = session.findings, session.study
     settings = study.calibrate_wrist
-    view = View.of(session.inputs.runs().get("optics"))
+    runs = session.inputs.runs()
+    view, view_2 = View.of(runs.get("optics")), View.of(runs.get("optics_2"))
     with coming_first(session, settings):
         with session.progress("opening board and camera"):
-            testbed = open_testbed(settings, study.wrist, study.seed, view, session.operator.confirm)
+            confirm = session.operator.confirm
+            testbed = open_testbed(settings, study.wrist, study.seed, view, confirm, view_2=view_2)
         if settings.axis is not None:
             return _one_axis(session, testbed, settings.axis)
         with session.progress("homing"):
@@ -117,5 +119,8 @@ def _one_axis(session: Session, testbed: Testbed, axis: int) -> AxisFound:
 
 
 CALIBRATE_WRIST: Procedure[WristCalibrated | AxisFound] = Procedure(
-    "calibrate-wrist", plan, calibrate_wrist, (EarlierRun("optics", kind="calibrate-camera", optional=True),)
+    "calibrate-wrist",
+    plan,
+    calibrate_wrist,
+    tuple(EarlierRun(name, kind="calibrate-camera", optional=True) for name in ("optics", "optics_2")),
 )

@@ -112,6 +112,7 @@ HW_RUN = Procedure(
     (
         EarlierRun("calibration", kind="calibrate-wrist", optional=True),
         EarlierRun("optics", kind="calibrate-camera", optional=True),
+        EarlierRun("optics_2", kind="calibrate-camera", optional=True),
         EarlierRun("from_identified", kind="identify", optional=True),
         EarlierRun("tuned", kind="tune", optional=True),
         EarlierRun("network", kind="train", optional=True),

@@ -106,9 +106,10 @@ def _perform(
 ) -> None:
     study, settings = session.study, session.study.hw_run
     with session.progress("preparing the emulated bench" if settings.port is None else "opening board and camera"):
-        view = View.of(session.inputs.runs().get("optics"))
+        runs = session.inputs.runs()
+        view, view_2 = View.of(runs.get("optics")), View.of(runs.get("optics_2"))
         keep = partial(_add, films) if films else None
-        testbed = open_testbed(settings, bench, study.seed, view, session.operator.confirm, keep)
+        testbed = open_testbed(settings, bench, study.seed, view, session.operator.confirm, keep, view_2)
     with session.operator.watch(trials, session) as shown:
         experiment.run(testbed, shown)
 

@@ -80,6 +80,18 @@ def turned_by(u: Array) -> Array:
     return turned
 
 
+def tip_bends(q: ArrayLike) -> Array:
+    """Bends (..., 2) [rad] of the last disc's tangent from the base's, at coordinates (..., 2n) [rad]."""
+    bends = np.asarray(q, float)
+    bends = bends.reshape(*bends.shape[:-1], -1, 2)
+    tangent = np.broadcast_to(np.array([1.0, 0.0, 0.0]), (*bends.shape[:-2], 3))
+    for k in reversed(range(bends.shape[-2])):
+        tangent = np.einsum("...ij,...j->...i", turned_by(bends[..., k, :]), tangent)
+    size = np.arctan2(np.hypot(tangent[..., 1], tangent[..., 2]), tangent[..., 0])
+    bend: Array = tangent[..., 1:] / np.sinc(size / np.pi)[..., None]
+    return bend
+
+
 def exact_bend(tip: Array) -> tuple[Array, Array]:
     """Bend (..., 2) [rad] and length (...) [m] of the one arc from the base to each tip (..., 3) [m].
 

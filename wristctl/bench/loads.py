@@ -1,0 +1,205 @@
+"""What hangs on the motors of the emulated bench: the wrist in the plane that it faces, or in both planes."""
+
+from typing import Literal, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wristctl.arrays import Array
+from wristctl.bench.motors import PERIOD, Hanging, SpoolState, Stepper, follow
+from wristctl.board.messages import AXES
+from wristctl.config.bench import BenchSettings
+from wristctl.config.choices import PLANTS
+from wristctl.config.plant import Disturbances
+from wristctl.config.wrist import WristParameters
+from wristctl.errors import UserError
+from wristctl.seeds import Entropy
+from wristctl.simulation.disturbances import acting, acting_in_space
+from wristctl.simulation.nonideal import inner_of, nonideal_of, of_tendons, unmoved
+from wristctl.simulation.worlds import drawn, facing, plant_of
+from wristctl.wrist.directions import ACTIVE, DIRECTIONS, away_of, tendons_of
+from wristctl.wrist.out_of_plane import across_of
+from wristctl.wrist.plant import kernel_of
+from wristctl.wrist.spatial.spatial_kinematics import tip_bends
+from wristctl.wrist.spatial.spatial_segments import OF_A_TENDON, spatial_values
+from wristctl.wrist.spatial.spooled_tendons import OF_A_STATE
+from wristctl.wrist.tendon_layout import TendonLayout
+
+# (E, 3) changes of output latches: cycle, port, value.
+Edges = NDArray[np.int64]
+
+
+class Load(Protocol):
+    """A wrist with its tendons; it moves as the spools turn."""
+
+    coordinates: int
+    plane: str | None
+    """Name of +y in the plane that it bends in; None: it bends in two."""
+
+    def face(self, direction: str, spools: SpoolState) -> None:
+        """Bend in this direction's plane from here on; where that is another plane, straight and at rest at first."""
+
+    def follow(
+        self, spools: SpoolState, stepper: Stepper, acting: tuple[Disturbances, Array], edges: Edges, first: int,
+        begun: float, out: Array,
+    ) -> int:  # fmt: skip
+        """Advance by periods, the first of this number, into rows of `out`; how many edges have been used up.
+
+        `acting` has the disturbances, and their times (T,) at the periods' beginnings [s]. Tendons break so long after
+        `begun` [s].
+        """
+
+    def bend(self, coordinates: Array) -> Array:
+        """Bend of the last disc at coordinates (..., q) [rad]: (...), or (..., 2) in two planes."""
+
+    def turned(self, ends: Array) -> float:
+        """How far the last disc turns between two places (2, q) [rad]."""
+
+
+class PlanarLoad:
+    """The wrist in the plane that it faces, ulnar at first."""
+
+    plane: str | None
+
+    def __init__(
+        self, settings: BenchSettings, wrist: WristParameters, stream: Entropy, positive: Literal["right", "left"],
+        spools: SpoolState,
+    ) -> None:  # fmt: skip
+        self._settings, self._wrist, self._positive = settings, wrist, positive
+        self._drawn = drawn(settings.plant, stream)
+        self._model = PLANTS[settings.plant.model]
+        self.coordinates = self._model.coordinates(settings.segments)
+        self._follow = kernel_of(follow, self._model)
+        motors = settings.actuator
+        self._nonideal = np.array(nonideal_of(settings.plant, motors, motors, PERIOD))
+        self._state = np.zeros(2 * self.coordinates)
+        self._axes = np.arange(AXES)
+        self._tendons = unmoved(spools.reeled, np.zeros(3), np.zeros(AXES), self._state[: self.coordinates])
+        self._face("ulnar", spools)
+
+    def face(self, direction: str, spools: SpoolState) -> None:
+        """Bend in this direction's plane from here on; where that is another plane, straight and at rest at first."""
+        if DIRECTIONS[direction].plane != self.plane:
+            self._state[:] = 0.0
+            self._face(direction, spools)
+
+    def follow(
+        self, spools: SpoolState, stepper: Stepper, acting: tuple[Disturbances, Array], edges: Edges, first: int,
+        begun: float, out: Array,
+    ) -> int:  # fmt: skip
+        """As `Load.follow`."""
+        disturbed = _acting(*acting)
+        if disturbed is None:
+            disturbed = np.tile((0.0, 1.0), (len(out), 1))
+        hanging = Hanging(
+            self._model, self._values, self._settings.actuator.tendon_stiffness, self._nonideal, self._tendons,
+            self._inner, stepper, self._sides, self._across,
+        )  # fmt: skip
+        heard: int = self._follow(
+            hanging, spools, self._state, disturbed, edges, first, begun, out, (0,) * self.coordinates
+        )
+        return heard
+
+    def bend(self, coordinates: Array) -> Array:
+        """Bending angles (...) [rad] of the last disc at coordinates (..., q)."""
+        angles: Array = self._model.angle(coordinates)
+        return angles
+
+    def turned(self, ends: Array) -> float:
+        """How far the last disc turns between two places (2, q) [rad]."""
+        return abs(float(np.diff(self.bend(ends))[0]))
+
+    def _face(self, direction: str, spools: SpoolState) -> None:
+        n = self.coordinates
+        self.plane = DIRECTIONS[direction].plane
+        plant = plant_of(*facing(self._wrist, self._drawn, direction))
+        across = next(across for across in DIRECTIONS.values() if across.plane != self.plane)
+        beside = plant_of(*facing(self._wrist, self._drawn, across.name))
+        self._across = across_of(beside, away_of(self.plane, self._positive))
+        spools.bent[:] = 0.0
+        self._values = self._model.values(plant, self._settings.segments)
+        self._sides = np.array([ACTIVE.index(tendon) for tendon in tendons_of(self.plane)])
+        axes = self._sides[[0, 2, 1, 3]]  # as they are given: both sides' first, both sides' second
+        tendon_states = of_tendons(self._tendons, AXES)[np.argsort(self._axes)][axes]
+        self._tendons = unmoved(spools.reeled[axes], np.zeros(3), np.zeros(AXES), self._state[:n])
+        of_tendons(self._tendons, AXES)[:] = tendon_states
+        self._inner = inner_of([self._drawn], self._state[None, :n], np.zeros(1), lambda rows: rows[0])
+        self._axes = axes
+
+
+_acting = acting
+
+
+class SpatialLoad:
+    """The wrist in both planes, in so many steps of integration a period.
+
+    UserError for what no wrist in two planes has.
+    """
+
+    plane: str | None = None
+
+    def __init__(
+        self, settings: BenchSettings, wrist: WristParameters, stream: Entropy, spools: SpoolState, substeps: int = 1
+    ) -> None:
+        check_in_space(settings)
+        plant, actuator = plant_of(wrist, drawn(settings.plant, stream)), settings.actuator
+        n = settings.segments
+        self.coordinates = 2 * n
+        layout = TendonLayout.four(plant.tendon_radius)
+        broken_at = np.full(AXES, np.inf)
+        if actuator.broken_at is not None:
+            broken_at[actuator.broken_tendon - 1] = actuator.broken_at
+        from wristctl.bench.spatial_motors import SpatialHanging
+
+        self._hanging = SpatialHanging(
+            values=spatial_values(plant, layout, n, axis=np.radians(plant.stiffness_axis_deg)),
+            stiffness=actuator.tendon_stiffness,
+            friction=actuator.friction,
+            sheath=actuator.sheath,
+            slope=1.0 / actuator.presliding,
+            backlash=actuator.backlash,
+            broken_at=broken_at,
+            rubbed=np.zeros(OF_A_STATE * AXES),
+            play=spools.reeled.copy(),
+            left=np.ones(AXES),
+            motor=None,
+            substeps=substeps,
+            coordinates=(0,) * self.coordinates,
+            of_tendons=(0,) * (OF_A_TENDON * AXES),
+            pulls=(0,) * AXES,
+        )
+        self._state = np.zeros(2 * self.coordinates)
+
+    def face(self, direction: str, spools: SpoolState) -> None:
+        """Nothing: it bends in both planes."""
+
+    def follow(
+        self, spools: SpoolState, stepper: Stepper, acting: tuple[Disturbances, Array], edges: Edges, first: int,
+        begun: float, out: Array,
+    ) -> int:  # fmt: skip
+        """As `Load.follow`."""
+        from wristctl.bench.spatial_motors import follow_in_space
+
+        disturbed = acting_in_space(*acting)
+        if disturbed is None:
+            disturbed = np.tile((0.0, 0.0, 0.0, 1.0), (len(out), 1))
+        hanging = self._hanging._replace(motor=stepper)
+        heard: int = follow_in_space(hanging, spools, self._state, disturbed, edges, first, begun, out)
+        return heard
+
+    def bend(self, coordinates: Array) -> Array:
+        """Bends (..., 2) [rad] of the last disc at coordinates (..., 2n)."""
+        return tip_bends(coordinates)
+
+    def turned(self, ends: Array) -> float:
+        """How far the last disc turns between two places (2, 2n) [rad], in either plane or between."""
+        return float(np.hypot(*np.diff(self.bend(ends), axis=0)[0]))
+
+
+def check_in_space(settings: BenchSettings) -> None:
+    """UserError for what a bench has in one plane and not in two."""
+    if beyond := settings.in_one_plane_only:
+        raise UserError(f"no bench in two planes has {beyond[0]}", beyond[0], "leave it at its default")
+    if settings.actuator.broken_tendon > AXES:
+        problem = f"tendon {settings.actuator.broken_tendon} of {AXES} cannot break"
+        raise UserError(problem, "bench.actuator.broken_tendon", f"1 to {AXES}")
