@@ -12,8 +12,10 @@ from pydantic import ValidationError
 
 from tests.trial.conftest import WRIST, Done
 from tests.trial.in_two_planes import PLANES, circling, performed, rmse, true_errors
+from wristctl.config.choices import IN_TWO_PLANES
 from wristctl.errors import UserError
 from wristctl.simulation.bend_course import BEND_METRICS
+from wristctl.simulation.reference import REFERENCES
 from wristctl.trial.bend_motion import BendMotion
 from wristctl.trial.bend_results import bends_evaluated, logged_course
 from wristctl.trial.residuals import Limit, limits_of
@@ -144,6 +146,10 @@ def test_a_path_in_two_planes_makes_the_rig_one_in_two_planes() -> None:
         circling(reference=straight, directions=("ulnar-flexion",))
     with pytest.raises(ValidationError, match="push_toward_deg is of a rig in two planes"):
         circling(reference=straight, push_toward_deg=30.0)
+
+
+def test_the_paths_that_do_so_are_those_of_the_table() -> None:
+    assert {name for name, kind in REFERENCES.items() if kind.planes == 2} == set(IN_TWO_PLANES)
 
 
 def test_directions_are_shuffled_together_where_nobody_turns_the_wrist() -> None:

@@ -7,7 +7,7 @@ from pydantic import ValidationInfo, field_validator, model_validator
 
 from wristctl.config.bench import BenchSettings
 from wristctl.config.camera import Device, Gates, Markers
-from wristctl.config.choices import REFERENCES
+from wristctl.config.choices import IN_TWO_PLANES
 from wristctl.config.controller_row import Row
 from wristctl.config.loop import TICK, DirectionName, Loop, Reference
 from wristctl.config.plant import Actuator, Plant, Push, Sensor, TrueActuator, TrueSensor, TrueWrist
@@ -243,15 +243,13 @@ class HwRunSettings(RigSettings):
             return given
         reference = given.get("reference")
         kind = reference.get("kind") if isinstance(reference, Mapping) else getattr(reference, "kind", None)
-        if not isinstance(kind, str) or kind not in REFERENCES or REFERENCES[kind].planes == 1:
-            return given
-        return {**given, "planes": 2}
+        return {**given, "planes": 2} if kind in IN_TWO_PLANES else given
 
     @model_validator(mode="after")
     def _planes_for_the_motion(self) -> Self:
         if self.planes == 2:
             return self
-        if REFERENCES[self.reference.kind].planes == 2:
+        if self.reference.kind in IN_TWO_PLANES:
             raise Unfitting(f"{self.reference.kind} bends in two planes, and the rig in one", "planes: 2")
         if between := [name for name in self.directions if name in get_args(Between)]:
             raise Unfitting(f"{between[0]} lies between two planes, and the rig bends in one", "planes: 2")

@@ -87,10 +87,13 @@ def plan(study: Study, inputs: Inputs) -> str:
         else:
             check_bends_of_trials(settings, known)
         check_inverses(inverses_of([settings.reference]), inputs)
-    from wristctl.trial.trials import motions_of
-
     pushes = settings.without_push + (settings.push.force != 0.0)
-    count = len(settings.rows) * len(motions_of(settings)) * settings.repetitions * pushes
+    motions = len(set(settings.directions))
+    if settings.planes == 2:
+        from wristctl.trial.trials import motions_of
+
+        motions = len(motions_of(settings))
+    count = len(settings.rows) * motions * settings.repetitions * pushes
     trial_seconds = settings.horizon + settings.back + settings.rest
     return f"{describe_rig(settings)}\n{count} trials, about {count * trial_seconds:.0f} s of motion after homing"
 
