@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from wristctl.bench.faults import Faults
+from wristctl.bench.faults import CameraFaults, Faults
 from wristctl.bench.shutter import Shutter
 from wristctl.config.bench import InjectedFault, RenderedCamera
 
@@ -125,3 +125,18 @@ def test_a_jitter_holds_each_frame_back_by_a_time_of_its_own_and_changes_no_pict
 def test_a_jitter_of_more_than_a_frame_is_refused() -> None:
     with pytest.raises(ValueError, match="jitter"):
         RenderedCamera(frame_rate=50.0, jitter=0.021)
+
+
+@pytest.mark.parametrize(("phase", "shown"), [(0.0, 25), (0.4, 24)])
+def test_a_frozen_camera_shows_the_last_frame_exposed_before_it_froze(phase: float, shown: int) -> None:
+    frozen = shutter(None, InjectedFault(kind="camera-frozen", at=0.5), phase=phase)
+    assert frozen.expose(40).shown == shown and frozen.expose(shown).shown == shown
+
+
+def test_a_fault_added_while_the_rig_stands_reaches_the_camera_it_is_of() -> None:
+    schedule = Faults(())
+    first, second = CameraFaults(schedule, 1), CameraFaults(schedule, 2)
+    schedule._faults = (InjectedFault(kind="camera-lost", at=1.0, camera=2),)
+    schedule.begin(3.0)
+    assert second.on("camera-lost", 4.0) and not second.on("camera-lost", 3.9)
+    assert not first.on("camera-lost", 4.0) and second.next("camera-lost", 0.0) == 4.0

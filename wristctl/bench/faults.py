@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Sequence
-from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,12 +17,6 @@ class Faults:
     def __init__(self, faults: Sequence[InjectedFault]) -> None:
         self._faults = tuple(faults)
         self._starts = {"power-on": 0.0, "first trial": math.inf, "trial": math.inf}
-
-    def of_camera(self, camera: int) -> Self:
-        """Those of one camera, 1 or 2; they begin as these do."""
-        faults = type(self)([fault for fault in self._faults if fault.camera == camera])
-        faults._starts = self._starts
-        return faults
 
     def begin(self, start: float) -> None:
         """A trial's motion starts at this time."""
@@ -53,6 +46,18 @@ class Faults:
     def begun(self, fault: InjectedFault) -> float:
         """When a fault begins; infinite where what it counts from has not come."""
         return self._starts[fault.since] + fault.at
+
+
+class CameraFaults(Faults):
+    """Those of a schedule that are one camera's, 1 or 2."""
+
+    def __init__(self, faults: Faults, camera: int) -> None:
+        self._whole, self._camera = faults, camera
+        self._starts = faults._starts
+
+    def of(self, kinds: Sequence[FaultKind]) -> list[InjectedFault]:
+        """Faults of these kinds of this camera, on or not."""
+        return [fault for fault in self._whole.of(kinds) if fault.camera == self._camera]
 
 
 # (E, 3) changes of output latches: cycle, port, value.

@@ -3,9 +3,9 @@
 from typing import Literal, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
 from wristctl.arrays import Array
+from wristctl.bench.faults import Edges
 from wristctl.bench.motors import PERIOD, Hanging, SpoolState, Stepper, follow
 from wristctl.board.messages import AXES
 from wristctl.config.bench import BenchSettings
@@ -24,9 +24,6 @@ from wristctl.wrist.spatial.spatial_kinematics import tip_bends
 from wristctl.wrist.spatial.spatial_segments import OF_A_TENDON, spatial_values
 from wristctl.wrist.spatial.spooled_tendons import OF_A_STATE
 from wristctl.wrist.tendon_layout import TendonLayout
-
-# (E, 3) changes of output latches: cycle, port, value.
-Edges = NDArray[np.int64]
 
 
 class Load(Protocol):

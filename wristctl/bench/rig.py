@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wristctl.bench.bench_wrist import BenchWrist
-from wristctl.bench.faults import Faults
+from wristctl.bench.faults import CameraFaults, Faults
 from wristctl.bench.load_cells import LoadCells
 from wristctl.bench.shutter import Shutter
 from wristctl.board.emulator.atmega2560 import Atmega2560
@@ -34,7 +34,7 @@ class Eye:
         self, settings: BenchSettings, wrist: BenchWrist, faults: Faults, stream: Entropy, scene: Callable[[], Scene],
         second: bool = False,
     ) -> None:  # fmt: skip
-        self.faults = faults.of_camera(2 if second else 1)
+        self.faults = CameraFaults(faults, 2 if second else 1)
         self.shutter = Shutter(settings.camera_2 if second else settings.camera, self.faults, wrist, stream)
         self._scene = scene
 
