@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from wristctl.arrays import Array
+from wristctl.config.plant import Sensor
 from wristctl.trial.marker_lag import MarkerLag
 from wristctl.vision.marker import Sighting, SightingVerdict
 
@@ -94,9 +95,10 @@ class CameraRecord:
         """Number of pictures in the last second that were no news."""
         return len(self._repeated.values(clock))
 
-    def unseen(self, clock: float, since: float, rate: float) -> float:
+    def unseen(self, clock: float, since: float, sensor: Sensor) -> float:
         """Share of the expected usable angles that did not come, `since` seconds after the loop began; nan at first."""
-        usable, expected = len(self._usable.values(clock)), min(since, _SEEN) * rate
+        usable = len(self._usable.values(clock))
+        expected = min(since, _SEEN) * sensor.frame_rate * (1.0 - sensor.dropped)
         return 1.0 - (usable + 1.0) / expected if since > 0.5 * _SEEN else math.nan
 
 

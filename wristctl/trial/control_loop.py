@@ -75,6 +75,7 @@ class ControlLoop:
         self._pulls, self.watch = pulls, Watch(settings, wrist, plane, timing, oblique, pulls)
         self._steering = self._bending.steering
         self._status, self._sent = board.read(), np.zeros(AXES)
+        timing.camera.expect(settings.planes)
         self._epoch = self._clock.now()
         self._last_usable = [self._epoch] * settings.planes
         self._underway = min(underway(_RATE_BYTES, settings.baud) + _OBEYED, 0.5 * self._period)

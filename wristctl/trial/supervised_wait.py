@@ -11,7 +11,7 @@ from wristctl.board.driver import Board
 from wristctl.board.messages import State, Status
 from wristctl.config.hw_run import Homing
 from wristctl.trial.bending import Bending
-from wristctl.trial.camera_pace import CameraPace
+from wristctl.trial.camera_pace import CameraPaces
 from wristctl.trial.safety import SafetyStop
 from wristctl.trial.tracking import Tracking
 from wristctl.trial.watch import Watch
@@ -52,8 +52,8 @@ class Patience:
     def __init__(self, board: Board, judge: Callable[[Status], None] = lambda status: None) -> None:
         self._board, self._judge = board, judge
         self._stood = board.read()
-        self.pace = CameraPace()
-        """Pace of the pictures looked at here."""
+        self.pace = CameraPaces()
+        """Pace of the pictures looked at here, by camera."""
 
     def pulse(self, longest: float = _PULSE) -> None:
         """Wait for a moment of at most `longest` seconds: the `Meanwhile` of whoever asks a person."""
@@ -99,6 +99,7 @@ class Patience:
         """The next usable frames, so many of each camera at least. Raises SafetyStop where none come."""
         usable: list[Sighting] = []
         counts = [0] * len(tracking.zero)
+        self.pace.expect(len(counts))
         tracking.look()
         began = self._board.transport.now()
         while min(counts) < frames:

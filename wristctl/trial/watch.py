@@ -203,8 +203,8 @@ class Watch:
         return {"round_trip": float(np.median(trips)), "skipped": skipped / (skipped + len(trips))}
 
     def _unseen(self, camera: CameraRecord, clock: float) -> float:
-        sensor, since = self._settings.sensor, clock - (clock if self._began is None else self._began)
-        return camera.unseen(clock, since, sensor.frame_rate * (1.0 - sensor.dropped))
+        since = clock - (clock if self._began is None else self._began)
+        return camera.unseen(clock, since, self._settings.sensor)
 
     def _stop(self, limit: Limit, tick: Tick) -> SafetyStop:
         name, fix = limit.name, RESIDUALS[limit.name].causes
