@@ -13,7 +13,7 @@ from wristctl.board.driver import Board
 from wristctl.config.hw_run import HwRunSettings
 from wristctl.trial.calibration import WristCalibration
 from wristctl.trial.experiment import Experiment
-from wristctl.trial.homing import SpatialZero
+from wristctl.trial.homing import SpatialZero, Zero
 from wristctl.trial.log import TrialLog
 from wristctl.trial.testbeds import EmulatedTestbed
 from wristctl.trial.trials import trials_of
@@ -43,11 +43,13 @@ def bench_of(settings: HwRunSettings, seed: int = 0) -> VirtualBench:
     return VirtualBench(settings.bench, WRIST, seed, settings.markers, settings.markers_2)
 
 
-def performed(folder: Path, seed: int = 0, **changes: Any) -> Done:
+AT_ZERO = SpatialZero((1, 1, 1, 1), (1380.0,) * 4, 0.0, (0.0,) * 4)
+
+
+def performed(folder: Path, seed: int = 0, zero: Zero = AT_ZERO, **changes: Any) -> Done:
     """The short experiment, changed, done on a bench that stands at zero; what stopped it is kept."""
     settings = circling(**changes)
     nonce = Board(bench_of(settings).transport).connect().boot_nonce
-    zero = SpatialZero((1, 1, 1, 1), (1380.0,) * 4, 0.0, (0.0,) * 4)
     at_zero = WristCalibration(zero, "ulnar", nonce, (0, 0, 0, 0))
     bench, log = bench_of(settings, seed), TrialLog(folder, 2 * settings.bench.segments, 1e-2, planes=2)
     trials = trials_of(settings, np.random.default_rng(0))

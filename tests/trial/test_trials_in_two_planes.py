@@ -18,6 +18,7 @@ from wristctl.simulation.bend_course import BEND_METRICS
 from wristctl.simulation.reference import REFERENCES
 from wristctl.trial.bend_motion import BendMotion
 from wristctl.trial.bend_results import bends_evaluated, logged_course
+from wristctl.trial.homing import Zero
 from wristctl.trial.residuals import Limit, limits_of
 from wristctl.trial.run_limits import Logged, stop_of
 from wristctl.trial.safety import SafetyStop
@@ -133,6 +134,12 @@ def test_a_diagonal_direction_bends_alike_in_both_planes(tmp_path: Path) -> None
     log = done.table("log").iloc[-1]
     ends = np.degrees([log["bend_ulnar"], log["bend_flexion"]])
     assert ends == pytest.approx(10.0 * np.array([-1.0, 1.0]) / math.sqrt(2.0), abs=0.4)
+
+
+def test_stored_positions_of_a_rig_with_one_camera_are_refused(tmp_path: Path) -> None:
+    done = performed(tmp_path, zero=Zero((1, 1, 1, 1), (1380.0,) * 4, 0.0, (0.0,) * 4))
+    assert isinstance(done.error, UserError) and done.error.what == "the calibration knows 1 cameras of 2"
+    assert not any(done.bench.motion().steps)
 
 
 def test_a_path_in_two_planes_makes_the_rig_one_in_two_planes() -> None:
