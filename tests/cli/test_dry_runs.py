@@ -49,6 +49,8 @@ LONG = ("--set", "wrist.length=0.12", "--set")
         (("hw-run", "--set", "reference.angle_deg=170"), "hw-run.reference.angle_deg - fix: ask for less"),
         (("hw-run", "--set", "reference.inverse=network"), "hw-run.reference.inverse - fix: --network RUN"),
         (("hw-run", "--set", "push.force=1e6"), "hw-run.push.force - fix: is that meant? go on with --force"),
+        (("hw-run", "--reference", "dart-thrower", "--set", "reference.angle_deg=70"), "a bend of 70 deg is beyond"),
+        (("hw-run", "--reference", "circle", "--set", "planes=1"), "the rig in one"),
         (("train", "--set", "hidden=[]"), "[] is too few: at least 1"),
     ],
 )

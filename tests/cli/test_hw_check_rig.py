@@ -35,6 +35,11 @@ def _milliseconds(out: str, name: str) -> float:
     return float(found[1])
 
 
+def test_a_rig_with_two_cameras_is_checked_by_each_of_them(call: Call) -> None:
+    code, _, err = call("hw", "check", "--rig", "--port", "emulated", "--yes", "--set", "planes=2")
+    assert code == 2 and "a check looks at one camera, and this rig has two" in err and "planes=1" in err
+
+
 def test_a_rig_is_measured_and_each_trouble_named_answer_first(call: Call, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(rig_strokes, "COUNT", 8)
     monkeypatch.setattr(rig_strokes, "MOST", 8)

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from wristctl.trial.camera_pace import FIX, CameraPace
+from wristctl.trial.camera_pace import FIX, CameraPace, CameraPaces
 from wristctl.vision.camera import CameraError
 from wristctl.vision.marker import Sighting, SightingVerdict
 
@@ -75,3 +75,27 @@ def test_the_summary_counts_what_could_not_be_used() -> None:
     assert made.summary() == "The camera gives 60 pictures/s, 33 ms old when they come."
     made.add(Sighting(2.0, 99, math.nan, SightingVerdict.TWICE, np.zeros((2, 4, 2)), came=2.03))
     assert made.summary().endswith("; of 61 pictures 1 twice.")
+
+
+def test_of_two_cameras_the_one_whose_angles_are_missing_is_named() -> None:
+    paces = CameraPaces()
+    paces.expect(2)
+    assert paces.missing(0.5, 0.15)[0] == "no picture of camera 1 has come"
+    for k in range(60):
+        for plane, verdict in ((0, OK), (1, OK if k < 20 else SightingVerdict.NO_TIP)):
+            time = k / 60.0
+            paces.add(Sighting(time, k, 0.1, verdict, np.zeros((2, 4, 2)), came=time + 0.03, plane=plane))
+    assert paces.missing(1.0, 0.15)[0] == "newest frame of camera 2: no tip"
+    assert (
+        paces.summary().startswith("Camera 1 gives 60 pictures/s") and "Camera 2 gives 60 pictures/s" in paces.summary()
+    )
+    paces.fits(0.15)
+    with pytest.raises(CameraError, match="camera 1 gives 60 pictures/s"):
+        paces.fits(0.05)
+
+
+def test_one_camera_is_the_camera() -> None:
+    paces = CameraPaces()
+    paces.expect(1)
+    assert paces.missing(0.5, 0.15)[0] == "no picture has come"
+    assert paces.summary() == "The camera gives no pictures."

@@ -15,7 +15,8 @@ from tests.trial.rig import Marker, RigBoard
 from wristctl.board.messages import JOG_RATE, Status
 from wristctl.config.hw_run import Homing
 from wristctl.config.plant import Actuator
-from wristctl.trial.homing import Bend, ExpectedMoves, Zero, find_zero, slacken
+from wristctl.trial.expected_moves import Bend, ExpectedMoves
+from wristctl.trial.homing import Zero, find_zero, slacken
 from wristctl.trial.safety import SafetyStop
 from wristctl.trial.spools import on_plus_side, spools_of
 from wristctl.trial.zero_checks import check_cocontraction, check_zero

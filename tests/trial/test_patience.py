@@ -62,7 +62,7 @@ def test_a_camera_too_oblique_for_its_markers_is_refused_and_one_that_is_not_is_
     tracking: Any = Marker(board, lambda: 0.0)
     for pan, most in ((-14.0, 15.0), (14.0, 15.0), (4.0, 5.0)):
         tracking.stand_square = lambda seen, pan=pan: posed(0.0, pan)
-        pose = Patience(board).stand_square(tracking, Homing(oblique_deg=most))
+        (pose,) = Patience(board).stand_square(tracking, Homing(oblique_deg=most))
         assert pose is not None and math.degrees(pose.oblique) == pytest.approx(abs(pan))
         with pytest.raises(SafetyStop, match=f"looks {abs(pan):.0f} deg off square .*, beyond") as stopped:
             Patience(board).stand_square(tracking, Homing(oblique_deg=abs(pan) - 0.5))

@@ -38,9 +38,13 @@ QUICK = ("bench.person.takes=0", "homing.frames=1", "homing.rest=0.05", "bench.m
 TRIAL = (*QUICK, "directions=[ulnar, flexion]", "horizon=0.5", "reference.duration=0.3", "push.force=0")
 COMMANDS = {
     "trials": ("hw-run", *TRIAL),
+    "trials in two planes": (
+        "hw-run", *QUICK, "reference.kind=dart-thrower", "reference.angle_deg=6", "horizon=0.4", "push.force=0",
+    ),
     "calibration": ("hw calibrate wrist", *QUICK),
+    "calibration in two planes": ("hw calibrate wrist", *QUICK, "planes=2"),
     "one axis": ("hw calibrate wrist --axis 2 --max-deg 2", *QUICK),
-}
+}  # fmt: skip
 
 
 @pytest.mark.parametrize("name", COMMANDS)

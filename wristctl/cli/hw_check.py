@@ -119,6 +119,9 @@ def check_rig(
     study = load_study((), override, "hw-run")
     overrides: dict[str, Any] = {"baud": baud, "port": None if port == EMULATED else port or only_board()}
     settings = study.hw_run.model_copy(update=overrides | ({"camera": camera} if camera is not None else {}))
+    if settings.planes == 2:
+        problem = "a check looks at one camera, and this rig has two"
+        raise UserError(problem, "planes", "--set hw-run.planes=1 with --camera of either")
     pictures = Pictures()
     with listening(quiet, False) as console, prioritised(settings.priority) as priority:
         if priority:

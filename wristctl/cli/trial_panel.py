@@ -29,7 +29,8 @@ class _Panel:
 
     def take(self, row: dict[str, Any]) -> None:
         self._row, self._begun = row, max(self._begun, row["trial"] + 1)
-        self._verdict = str(row["verdict"]) or self._verdict  # most ticks have no new frame
+        newest = [str(value) for name, value in row.items() if name.startswith("verdict") and value]
+        self._verdict = ", ".join(newest) or self._verdict  # most ticks have no new frame
 
     def __rich__(self) -> Panel:
         row = self._row
@@ -37,8 +38,11 @@ class _Panel:
             return Panel("homing: each motor reels in until its tendon bends the wrist", title="hw-run")
         number = row["trial"]
         grid = Grid.grid(padding=(0, 2))
-        angle, wanted = math.degrees(row["theta"]), math.degrees(row["theta_ref"])
-        grid.add_row("angle", f"{angle:7.2f} deg", "reference", f"{wanted:7.2f} deg", "load", f"{row['load']:+.3f} N m")
+        for angle, suffix in (("theta", ""),) if "theta" in row else (("bend", "_ulnar"), ("bend", "_flexion")):
+            bent, wanted = (math.degrees(row[f"{name}{suffix}"]) for name in (angle, f"{angle}_ref"))
+            load = f"{row[f'load{suffix}']:+.3f} N m"
+            name = f"toward {suffix[1:]}" if suffix else "angle"
+            grid.add_row(name, f"{bent:7.2f} deg", "reference", f"{wanted:7.2f} deg", "load", load)
         for name, unit in (("tension", "N"), ("sent", "steps/s")):
             values = (f"{tendon}: {row[f'{name}_{tendon}']:6.1f}" for tendon in ACTIVE)
             grid.add_row(name, *values, unit)

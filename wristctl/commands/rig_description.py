@@ -10,10 +10,13 @@ from wristctl.loop_priority import prioritised
 
 def describe_rig(settings: RigSettings) -> str:
     """In one line, the first that a command on a rig says."""
+    two = settings.planes == 2
     if settings.port is not None:
-        return f"on hardware: board at {settings.port}, camera {settings.camera}"
+        cameras = f"cameras {settings.camera} and {settings.camera_2}" if two else f"camera {settings.camera}"
+        return f"on hardware: board at {settings.port}, {cameras}"
     clock = "against the wall clock" if settings.real_time else "in virtual time"
-    return f"all emulated, {clock}: motor board with its firmware, motors, tendons, wrist and camera"
+    cameras = "two cameras" if two else "camera"
+    return f"all emulated, {clock}: motor board with its firmware, motors, tendons, wrist and {cameras}"
 
 
 @contextmanager

@@ -1,18 +1,23 @@
 """Trials on hardware, real or emulated: what the controller drives and sees, and when it must stop."""
 
 from collections.abc import Mapping
-from typing import Any, Literal, Self
+from typing import Any, Literal, Self, get_args
 
 from pydantic import ValidationInfo, field_validator, model_validator
 
 from wristctl.config.bench import BenchSettings
 from wristctl.config.camera import Device, Gates, Markers
+from wristctl.config.choices import IN_TWO_PLANES
 from wristctl.config.controller_row import Row
 from wristctl.config.loop import TICK, DirectionName, Loop, Reference
 from wristctl.config.plant import Actuator, Plant, Push, Sensor, TrueActuator, TrueSensor, TrueWrist
-from wristctl.config.section import Section, choice, quantity
+from wristctl.config.section import Section, choice, quantity, seldom
 from wristctl.config.wrist import WristParameters
 from wristctl.errors import Unfitting
+
+# Directions of bending; those between the planes are of a rig in two.
+Between = Literal["ulnar-flexion", "radial-flexion", "radial-extension", "ulnar-extension"]
+RigDirection = DirectionName | Between
 
 # Lifetime of a step rate on the board: least time [s], and number of ticks.
 _LEAST_LIFE, _LIFE_PERIODS = 0.05, 2.5
@@ -34,6 +39,9 @@ class Homing(Section):
     taut: float = quantity(0.15e-3, "m", "by how much a tendon may be taut when homing begins", "assumed", ge=0)
     oblique_deg: float = quantity(
         15.0, "deg", "how far off square the markers may show an uncalibrated camera", "emulated: +-10", gt=0, lt=45
+    )
+    direction_deg: float = quantity(
+        20.0, "deg", "in two planes: how far from its place a tendon may bend the wrist", "assumed", gt=0, lt=45
     )
     sticks: float = quantity(0.3e-3, "m", "path between reeling in and letting go: friction", "assumed", gt=0)
 
@@ -199,11 +207,19 @@ class HwRunSettings(RigSettings):
         min_length=1,
         alias="controllers",
     )
-    directions: tuple[DirectionName, ...] = choice(
-        ("ulnar", "radial", "flexion", "extension"), "directions of bending", "paper", min_length=1
+    directions: tuple[RigDirection, ...] = choice(
+        ("ulnar", "radial", "flexion", "extension"),
+        "directions of bending, in two planes also between them; a path in two planes has its own",
+        "paper",
+        min_length=1,
     )
     repetitions: int = choice(1, "of each direction", ge=1, le=1000)
     push: Push = choice(Push(force=2.0), "a person's push against the bend; force 0: none", "assumed")
+    push_toward_deg: float | None = seldom(
+        None,
+        "deg",
+        "in two planes: where it pushes to, from ulnar (0) toward flexion (90); null: against the bend at its start",
+    )
     without_push: bool = choice(True, "trials without the push too")
     reference: Reference = choice(Reference(), "motion of each trial; its angle counts toward the direction")
     horizon: float = quantity(5.0, "s", "duration of a trial", "assumed", gt=0)
@@ -218,6 +234,28 @@ class HwRunSettings(RigSettings):
     tuned: str | None = choice(None, "tune run behind gains: tuned")
     network: str | None = choice(None, "train run behind a reference with inverse: network")
     video: bool = choice(False, "keep the frames that were looked at as videos: raw, and with clock and marker angle")
+
+    @model_validator(mode="before")
+    @classmethod
+    def _planes_of_the_reference(cls, given: Any) -> Any:
+        """Two planes, where the reference has two and nothing is said of the rig's."""
+        if not isinstance(given, Mapping) or "planes" in given:
+            return given
+        reference = given.get("reference")
+        kind = reference.get("kind") if isinstance(reference, Mapping) else getattr(reference, "kind", None)
+        return {**given, "planes": 2} if kind in IN_TWO_PLANES else given
+
+    @model_validator(mode="after")
+    def _planes_for_the_motion(self) -> Self:
+        if self.planes == 2:
+            return self
+        if self.reference.kind in IN_TWO_PLANES:
+            raise Unfitting(f"{self.reference.kind} bends in two planes, and the rig in one", "planes: 2")
+        if between := [name for name in self.directions if name in get_args(Between)]:
+            raise Unfitting(f"{between[0]} lies between two planes, and the rig bends in one", "planes: 2")
+        if self.push_toward_deg is not None:
+            raise Unfitting("push_toward_deg is of a rig in two planes, and this one bends in one", "planes: 2")
+        return self
 
     @model_validator(mode="after")
     def _something_to_do(self) -> Self:
@@ -258,10 +296,11 @@ class HwRunSettings(RigSettings):
         wrist = {name: getattr(self.bench.plant, name) for name in TrueWrist.model_fields}
         camera = self.sensor.model_copy(update={n: getattr(self.bench.camera, n) for n in ("delay_frames", "dropped")})
         motors = TrueActuator.between(self.actuator, self.bench.actuator)
+        # a loop in two planes has motors that do not slip
         holding = {"torque": self.bench.motors.holding_torque, "top_speed": self.bench.motors.top_speed}
         return Plant(
             **wrist,
-            actuator=motors.model_copy(update=holding),
+            actuator=motors if self.planes == 2 else motors.model_copy(update=holding),
             sensor=TrueSensor.between(self.sensor, camera),
         )
 
@@ -271,6 +310,7 @@ class HwRunSettings(RigSettings):
         emulated = self.port is None and self.from_identified is None
         return Loop(
             plant_segments=self.bench.segments,
+            planes=self.planes if self.planes == 2 else None,
             plant=self._emulated_world() if emulated else Plant(),
             actuator=self.actuator,
             sensor=self.sensor,

@@ -147,9 +147,12 @@ def _at_rest(run: Run) -> dict[str, float]:
     """Stiffness, and spool steps per radian, of each plane, by where trials without a push come to rest.
 
     At rest a torque tau bends the wrist by tau = K theta, and the observer, which believes K_b, finds the load
-    (K_b - K) theta. Means over directions, so that a constant load cancels between both sides of a plane.
+    (K_b - K) theta. Means over directions, so that a constant load cancels between both sides of a plane. Nothing of
+    trials in two planes.
     """
     log, trials = run.data("log"), run.data("trials")
+    if "theta" not in log:
+        return {}
     sound = trials[(trials["outcome"] == "ok") & (trials["push"] == 0.0)]
     believed = run.config.wrist
     found = []

@@ -27,7 +27,7 @@ def animation(run: Run) -> dict[str, Any] | None:
         courses, time = _compared(run)
     elif (run.path / "data/trajectory.csv").is_file():
         courses, time = _single(run)
-    elif run.kind == "hw-run" and (run.path / "data/trials.csv").is_file():
+    elif run.kind == "hw-run" and run.config.hw_run.planes == 1 and (run.path / "data/trials.csv").is_file():
         courses, time = _trials(run)
     else:
         return None

@@ -34,6 +34,7 @@ from wristctl.plotting.wrist_drawing import RIM
 from wristctl.records.run import Run
 from wristctl.simulation.bend_course import BendCourse
 from wristctl.simulation.worlds import plant_of
+from wristctl.trial.bend_results import first_course
 from wristctl.wrist.spatial.spatial_kinematics import spatial_frames
 from wristctl.wrist.tendon_layout import TendonLayout
 
@@ -72,13 +73,12 @@ def rim(wrist: WristParameters) -> float:
 def spatial_view(run: Run) -> dict[str, Any] | None:
     """Wrist, tendons and motion of a run in two planes, as the page plays them; None of any other run.
 
+    Of trials on a rig it is the first one.
+
     Numbers are whole: a picture has the bends of all segments and both wanted ones [0.1 mrad], each tendon's pull
     [0.1 N], and the tip where it is and where it is wanted [0.01 mm]. Pictures end where the wrist left its range.
     """
-    file = run.path / "data/bends.csv"
-    if run.kind != "simulate" or not file.is_file():
-        return None
-    loop = run.config.simulate.loop
+    loop = run.config.hw_run.loop if run.kind == "hw-run" else run.config.simulate.loop
     wrist, planes = plant_of(run.config.wrist, loop.plant), ("ulnar", "flexion")
     places = cables(wrist)
     groups = {
@@ -88,10 +88,10 @@ def spatial_view(run: Run) -> dict[str, Any] | None:
         "tip": ([f"tip_{axis}" for axis in "xyz"], PLACE),
         "tip_desired": ([f"tip_desired_{axis}" for axis in "xyz"], PLACE),
     }
-    with file.open(encoding="utf-8", newline="") as lines:  # sooner than pandas is loaded
-        heads, *rows = csv.reader(lines)
-    at = [heads.index(name) for name in ("time", *(name for names, _ in groups.values() for name in names))]
-    table = np.array([[float(row[column] or "nan") for column in at] for row in rows])
+    columns = ["time", *(name for names, _ in groups.values() for name in names)]
+    table = _simulated(run, columns) if run.kind == "simulate" else _performed(run, columns)
+    if table is None:
+        return None
     sound = np.isfinite(table).all(axis=1)
     table = table[: len(table) if sound.all() else int(np.argmin(sound))]
     if len(table) < 2:
@@ -113,6 +113,32 @@ def spatial_view(run: Run) -> dict[str, Any] | None:
         name: np.rint(part / unit).astype(np.int64).tolist()
         for part, (name, (_, unit)) in zip(parts, groups.items(), strict=True)
     }
+
+
+def _simulated(run: Run, columns: list[str]) -> Array | None:
+    """Columns of a loop in two planes, (T, columns)."""
+    file = run.path / "data/bends.csv"
+    if not file.is_file():
+        return None
+    with file.open(encoding="utf-8", newline="") as lines:  # sooner than pandas is loaded
+        heads, *rows = csv.reader(lines)
+    at = [heads.index(name) for name in columns]
+    return np.array([[float(row[column] or "nan") for column in at] for row in rows])
+
+
+def _performed(run: Run, columns: list[str]) -> Array | None:
+    """The same of the first trial of a rig in two planes that went to its end: as it truly was, where that is known."""
+    if run.kind != "hw-run" or run.config.hw_run.planes == 1 or not (run.path / "data/trials.csv").is_file():
+        return None
+    course = first_course(run)
+    if course is None:
+        return None
+    of_course = course.columns()
+    segments = sum(name.startswith("bend_") and name[5].isdigit() for name in columns)
+    known = course.coordinates.shape[1]
+    if known < segments:  # of a real wrist one arc is all that is seen
+        of_course |= {name: of_course[f"bend_1_{name[7:]}"] * known / segments for name in columns[1 : 1 + segments]}
+    return np.stack([of_course[name] for name in columns], axis=1)
 
 
 def seen(points: Array) -> Array:

@@ -62,7 +62,7 @@ def check_spatial(loop: Loop) -> None:
         raise UserError(f"no loop in two planes has {key}", f"loop.{key}", "leave it at its default")
 
 
-def _as_pairs(wrist: WristParameters, layout: TendonLayout, axis: int) -> WristParameters:
+def as_pairs(wrist: WristParameters, layout: TendonLayout, axis: int) -> WristParameters:
     """The wrist in one plane whose four tendons stiffen it as those of the layout do, on held spools."""
     square = float(layout.multiplicity @ layout.cross_section[:, axis] ** 2) / TENDONS_PER_SIDE
     return wrist.model_copy(update={"tendon_radius": float(np.sqrt(square))})
@@ -216,7 +216,7 @@ def _watch(
     by_block = np.array([np.moveaxis(taken[lanes], 0, -1) for lanes in order.reshape(blocks, -1)])
     beliefs = [
         [
-            Belief(world.loop.sensor, world.loop.actuator, _as_pairs(wrist, layout, axis), period)
+            Belief(world.loop.sensor, world.loop.actuator, as_pairs(wrist, layout, axis), period)
             for axis, wrist in enumerate(in_plane(world.wrist, plane) for plane in ("ulnar", "flexion"))
         ]
         for world in worlds

@@ -8,15 +8,15 @@ bend is measured as it is.
 
 from typing import Any, NamedTuple
 
-from wristctl.control.response import Controlled, Estimate, look_ahead, perceive_within, wanted_torque
+from wristctl.control.response import Controlled, look_ahead
 from wristctl.lanes.compiled import kernel
-from wristctl.lanes.lane import planar, sqrt, where, zero_like
+from wristctl.lanes.lane import sqrt, where, zero_like
 from wristctl.lanes.named_tuples import block_of
 from wristctl.lanes.rows import lanes_like, part, planes_like, rows_of
 from wristctl.simulation.actuator import Aim, drive_in_lanes
 from wristctl.simulation.spatial_actuator import deliver, drive_tendons, friction_in_lanes, lose, tendons_on
-from wristctl.simulation.spatial_observer import Knowledge, coupling, predict_bends, sense_bends
-from wristctl.wrist.allocation import allocate
+from wristctl.simulation.spatial_observer import Knowledge, predict_bends, sense_bends
+from wristctl.simulation.spatial_response import Laws, Room, Seen, respond_in_planes
 from wristctl.wrist.segments import load_segments
 from wristctl.wrist.spatial.posture import tip_bend
 from wristctl.wrist.spatial.spatial_segments import FIELDS, SpatialWrist, load_spatial_segments, load_tip
@@ -152,6 +152,7 @@ def run_spatial(setup: Any, course: Any, world: Any, states: Any, scratch: Any, 
         speed, wish, extra = lanes_like(bend), lanes_like(bend), lanes_like(bend)
         at, seen = lanes_like(part(coordinates, 0, (0, 0, 0, 0))), lanes_like(part(coordinates, 0, (0, 0, 0, 0, 0, 0)))
         arms, zero = planes_like(least), zero_like(still.length)
+        laws, room = Laws(control_y, control_z, least, greatest), Room(bend, speed, wish, extra, lever, arms)
         for sample in range(span.first, span.last):
             acting = course.acting
             scale = acting[3, sample] + zero
@@ -181,24 +182,9 @@ def run_spatial(setup: Any, course: Any, world: Any, states: Any, scratch: Any, 
                 for i in range(3):
                     target_y[i] = course.references[0, i, sample] + zero
                     target_z[i] = course.references[1, i, sample] + zero
-                wish[0], wish[1] = target_y[2], target_z[2]
-                bend[0], bend[1], speed[0], speed[1] = seen[0], seen[3], seen[1], seen[4]
-                coupling(setup.coupling, known, bend, speed, wish, extra)
-                low_y, high_y, low_z, high_z = -extra[0], -extra[0], -extra[1], -extra[1]
-                for t in range(count):
-                    moment_arms_of(believed, bend, t, lever)
-                    arms[t] = planar(lever[0], lever[1])
-                    forth, back = least[t], greatest[t]
-                    low_y = low_y + lever[0] * where(lever[0] > 0.0, forth, back)
-                    high_y = high_y + lever[0] * where(lever[0] > 0.0, back, forth)
-                    low_z = low_z + lever[1] * where(lever[1] > 0.0, forth, back)
-                    high_z = high_z + lever[1] * where(lever[1] > 0.0, back, forth)
-                less_y, less_z, since = motors[2 * count], motors[2 * count + 1], tick * period
-                seen_y, seen_z = Estimate(seen[0], seen[1], seen[2]), Estimate(seen[3], seen[4], seen[5])
-                perceive_within(control_y, seen_y, less_y, (low_y, high_y), since, period)
-                perceive_within(control_z, seen_z, less_z, (low_z, high_z), since, period)
-                wanted_y, wanted_z = wanted_torque(control_y) + extra[0], wanted_torque(control_z) + extra[1]
-                share = allocate(arms, planar(wanted_y, wanted_z), least, greatest, pulls)
+                since = tick * period
+                sees = Seen(seen, motors[2 * count], motors[2 * count + 1])
+                wanted_y, wanted_z, share = respond_in_planes(laws, known, sees, room, since, period, pulls)
                 time = now_tick * period + zero
                 wish[0] = target_y[0] + since * (target_y[1] + 0.5 * since * target_y[2])
                 wish[1] = target_z[0] + since * (target_z[1] + 0.5 * since * target_z[2])

@@ -134,6 +134,25 @@ def _advanced(model: Any, angle: Any, speed: Any, torque: Any, tendons: Any, h: 
     return angle + h * speed, speed
 
 
+@compiled
+def go_over(delivered: Any, known: Any, x: Any, ticks: Any, counts: Any, bend: Any, h: float) -> None:
+    """Advance x over the ticks from the first up to the last, by what is remembered as delivered (ring, T).
+
+    `counts` and `bend` are rows to work on.
+    """
+    first, last = ticks
+    for past in range(first, last):
+        _recall(delivered[past % delivered.shape[0]], counts)
+        propagate_bends(known, x, counts, bend, h)
+
+
+@compiled
+def correct_bend(x: Any, gain: Any, plane: int, innovation: Any) -> None:
+    """Correct one plane's part of x (6 rows) by the innovation of its bend [rad]."""
+    for i in range(OF_A_PLANE * plane, OF_A_PLANE * (plane + 1)):
+        x[i] = x[i] + gain[i] * innovation
+
+
 @by_type
 def sense_bends(watch: Any, schedule: Any, known: Any, tick: int, at: Any, before: Any, h: float, out: Any) -> None:
     """What the laws see at a tick, bend, rate and load of each plane, into `out` (6 rows).
@@ -163,23 +182,16 @@ def _observed(watch: Any, schedule: Any, known: Any, tick: int, at: Any, before:
         taken += 1
         turn[0] = taken
     if arrived < taken and schedule.captures[arrived] + schedule.late[0] == tick:
-        captured, size = max(tick - schedule.believed[0], 0), watch.delivered.shape[0]
+        captured = max(tick - schedule.believed[0], 0)
         fused, gain = rows_of(watch.fused), rows_of(watch.gain)
         picture, reading = rows_of(watch.pictures[arrived]), rows_of(watch.readings[arrived])
         sent = lanes_like(counts)
-        for past in range(turn[2], captured):
-            _recall(watch.delivered[past % size], sent)
-            propagate_bends(known, fused, sent, bend, h)
+        go_over(watch.delivered, known, fused, (turn[2], captured), sent, bend, h)
         for plane in range(2):
-            first = OF_A_PLANE * plane
-            innovation = reading[2] * (picture[plane] - fused[first])
-            for i in range(first, first + OF_A_PLANE):
-                fused[i] = fused[i] + gain[i] * innovation
+            correct_bend(fused, gain, plane, reading[2] * (picture[plane] - fused[OF_A_PLANE * plane]))
         for i in range(2 * OF_A_PLANE):
             now[i] = fused[i]
-        for past in range(captured, tick):
-            _recall(watch.delivered[past % size], sent)
-            propagate_bends(known, now, sent, bend, h)
+        go_over(watch.delivered, known, now, (captured, tick), sent, bend, h)
         turn[1], turn[2] = arrived + 1, captured
     for i in range(2 * OF_A_PLANE):
         out[i] = now[i]

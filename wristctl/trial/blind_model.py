@@ -6,14 +6,17 @@ from typing import Any
 import numpy as np
 
 from wristctl.arrays import Array
+from wristctl.board.messages import AXES
 from wristctl.config.plant import Actuator, Sensor
 from wristctl.config.wrist import WristParameters
 from wristctl.lanes.compiled import kernel
 from wristctl.lanes.lane import zero_like
-from wristctl.lanes.rows import rows_of
+from wristctl.lanes.rows import lanes_like, part, rows_of
 from wristctl.simulation.actuator import drive_of
 from wristctl.simulation.observer import predict
+from wristctl.simulation.spatial_observer import OF_A_PLANE, propagate_bends
 from wristctl.simulation.stationary_filter import Belief, observer_of
+from wristctl.trial.spatial_belief import belief_of, known_of
 from wristctl.wrist.segments import load_segments, segments
 
 # Ticks.
@@ -22,35 +25,73 @@ _REMEMBERED = 256
 _STILL = 2.5e-3
 
 
+class _OneSegment:
+    """A wrist that bends in one plane, at rest at zero: its spools are the + and the - side's."""
+
+    spools, shape = 2, ()
+
+    def __init__(
+        self, wrist: WristParameters, actuator: Actuator, believed: Actuator, sensor: Sensor, period: float
+    ) -> None:
+        self._drive, self._model = drive_of(actuator), segments(wrist, 1)
+        self._observer = observer_of(Belief(sensor, believed, wrist, period), 1, 0.0)
+
+    def advanced(self, reeled: Array, h: float) -> Array:
+        """The angle () [rad] after h [s] with spools that hold so much [m]."""
+        plus, minus = reeled
+        _predict(self._observer, self._drive, self._model, plus, minus, h)
+        angle: Array = self._observer.now[0]
+        return angle
+
+
+class _InTwoPlanes:
+    """The same in two planes, with a spool for each axis of the board."""
+
+    spools, shape = AXES, (2,)
+
+    def __init__(
+        self, wrist: WristParameters, actuator: Actuator, believed: Actuator, sensor: Sensor, period: float
+    ) -> None:
+        self._belief, self._x = belief_of(wrist, actuator), np.zeros(2 * OF_A_PLANE)
+
+    def advanced(self, reeled: Array, h: float) -> Array:
+        """The bend (2,) [rad] after h [s] with spools that hold so much [m]."""
+        _predict_bends(self._belief, self._x, np.array(reeled, np.float64), h)
+        bend: Array = self._x[::OF_A_PLANE]
+        return bend
+
+
 class BlindModel:
     """Two one-segment wrists at rest at zero: with tendons as believed, and with the softest that there may be.
 
     Tendons that are softer than believed bend a wrist less; what is true lies between the two. Ticks are numbered from
-    0, `period` [s] apart.
+    0, `period` [s] apart. Of a wrist in two planes an angle is its bend (2,).
     """
 
     def __init__(
-        self, wrist: WristParameters, actuator: Actuator, softest: float, sensor: Sensor, period: float
+        self, wrist: WristParameters, actuator: Actuator, softest: float, sensor: Sensor, period: float, planes: int = 1
     ) -> None:
         soft = actuator.model_copy(update={"tendon_stiffness": min(softest, actuator.tendon_stiffness)})
-        self._drives = [drive_of(parameters) for parameters in (actuator, soft)]
-        self._observers = [observer_of(Belief(sensor, actuator, wrist, period), 1, 0.0) for _ in self._drives]
-        self._model, self._period, self._tick = segments(wrist, 1), period, 0
-        self._angles = np.zeros((_REMEMBERED, 2))
-        self._parts, self._reeled = max(1, math.ceil(period / _STILL - 1e-9)), np.zeros(2)
+        kind = _OneSegment if planes == 1 else _InTwoPlanes
+        self._wrists = [kind(wrist, parameters, actuator, sensor, period) for parameters in (actuator, soft)]
+        self._period, self._tick = period, 0
+        self._angles = np.zeros((_REMEMBERED, 2, *kind.shape))
+        self._parts, self._reeled = max(1, math.ceil(period / _STILL - 1e-9)), np.zeros(kind.spools)
 
-    def predict(self, reeled_plus: float, reeled_minus: float) -> None:
-        """Go on to the next tick, with the sides reeled in by so much [m] until then, evenly since the last one."""
+    def predict(self, *reeled: float) -> None:
+        """Go on to the next tick, with spools reeled in by so much [m] until then, evenly since the last one.
+
+        They are those of the + and the - side, or in two planes of the four axes.
+        """
         self._tick += 1
-        before, self._reeled = self._reeled, np.array([reeled_plus, reeled_minus])
-        for k, (observer, drive) in enumerate(zip(self._observers, self._drives, strict=True)):
-            for part in range(self._parts):
-                plus, minus = before + (part + 0.5) / self._parts * (self._reeled - before)
-                _predict(observer, drive, self._model, plus, minus, self._period / self._parts)
-            self._angles[self._tick % _REMEMBERED, k] = observer.now[0]
+        before, self._reeled = self._reeled, np.array(reeled)
+        for k, wrist in enumerate(self._wrists):
+            for share in range(self._parts):
+                held = before + (share + 0.5) / self._parts * (self._reeled - before)
+                self._angles[self._tick % _REMEMBERED, k] = wrist.advanced(held, self._period / self._parts)
 
     def angles(self, time: float) -> Array:
-        """Predicted angles (2,) [rad] `time` seconds after tick 0, as far as they are remembered."""
+        """Predicted angles (2,), or bends (2, 2), [rad] `time` seconds after tick 0, as far as they are remembered."""
         tick = min(max(math.floor(time / self._period), self._tick - _REMEMBERED + 1), self._tick)
         share = min(max(time / self._period - tick, 0.0), 1.0)
         before, after = self._angles[tick % _REMEMBERED], self._angles[min(tick + 1, self._tick) % _REMEMBERED]
@@ -63,3 +104,10 @@ def _predict(observer: Any, drive: Any, model: Any, plus: float, minus: float, h
     believed = load_segments(rows_of(model))
     zero = zero_like(believed.length)
     predict(observer, drive, believed, 0, plus + zero, minus + zero, h)
+
+
+@kernel
+def _predict_bends(belief: Any, x: Any, reeled: Any, h: float) -> None:
+    known, rows = known_of(belief), rows_of(x)
+    counts = part(rows_of(reeled), 0, belief.pulls)
+    propagate_bends(known, rows, counts, lanes_like(part(rows, 0, (0, 0))), h)

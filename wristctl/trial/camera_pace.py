@@ -1,5 +1,6 @@
 """Pace of a camera: rate, age and faults of its pictures, also in words."""
 
+import math
 from collections import Counter, deque
 
 import numpy as np
@@ -8,6 +9,7 @@ from wristctl.vision.camera import CameraError
 from wristctl.vision.marker import Sighting, SightingVerdict
 
 _REMEMBERED = 90
+_ONLY = "the camera"
 # Relative scatter of the time between two pictures that is worth a word.
 _UNEVEN = 0.3
 
@@ -26,9 +28,11 @@ FIX = {
 
 
 class CameraPace:
-    """The pictures of the last seconds; times are of the loop's clock [s]."""
+    """The pictures of the last seconds; times are of the loop's clock [s]. `name` is what the camera is called."""
 
-    def __init__(self) -> None:
+    def __init__(self, name: str = _ONLY) -> None:
+        self._name, self.used = name, -math.inf
+        """When its newest usable picture came."""
         self._seen: deque[Sighting] = deque(maxlen=_REMEMBERED)
         self.verdicts: Counter[SightingVerdict] = Counter()
         """Count of all pictures by verdict."""
@@ -36,7 +40,13 @@ class CameraPace:
     def add(self, sighting: Sighting) -> None:
         """The next picture."""
         self._seen.append(sighting)
+        if sighting.verdict is SightingVerdict.OK:
+            self.used = sighting.came
         self.verdicts[sighting.verdict] += 1
+
+    @property
+    def _whose(self) -> str:
+        return "" if self._name == _ONLY else f" of {self._name}"
 
     @property
     def rate(self) -> float:
@@ -67,27 +77,31 @@ class CameraPace:
     def said(self) -> str:
         """In words."""
         if len(self._seen) < 2:
-            return "the camera gives no pictures"
+            return f"{self._name} gives no pictures"
         old = f", {1e3 * self.latency:.0f} ms old when they come" if self.latency > 1e-3 else ""
         uneven = f", unevenly (+-{1e3 * self.jitter:.0f} ms)" if self.jitter * self.rate > _UNEVEN else ""
-        return f"the camera gives {self.rate:.3g} pictures/s{old}{uneven}"
+        return f"{self._name} gives {self.rate:.3g} pictures/s{old}{uneven}"
 
     def summary(self) -> str:
         """In words, with what could not be used of all pictures."""
         of = sum(self.verdicts.values())
         odd = [f"{count} {verdict}" for verdict, count in self.verdicts.most_common() if verdict != SightingVerdict.OK]
         unusable = f"; of {of} pictures {', '.join(odd)}" if odd else ""
-        return f"{self.said()}{unusable}".replace("the camera", "The camera", 1) + "."
+        told = f"{self.said()}{unusable}."
+        return told[0].upper() + told[1:]
 
     def missing(self, now: float, stale: float) -> tuple[str, str]:
         """Why there has been no angle for `stale` seconds, and what to do about it."""
         if not self._seen or now - self._seen[-1].came > stale:
-            until_then = f"; until then {self.said()[len('the ') :]}" if len(self._seen) > 1 else ""
-            return f"no picture has come{until_then}", "see the camera's cable, and that no other program uses it"
+            until_then = f"; until then {self.said().removeprefix('the ')}" if len(self._seen) > 1 else ""
+            return (
+                f"no picture{self._whose} has come{until_then}",
+                "see the camera's cable, and that no other program uses it",
+            )
         newest = self._seen[-1].verdict
         if newest is not SightingVerdict.OK:
-            return f"newest frame: {newest}", FIX[newest]
-        return f"newest frame: {newest}; {self.said()}", self._faster()
+            return f"newest frame{self._whose}: {newest}", FIX[newest]
+        return f"newest frame{self._whose}: {newest}; {self.said()}", self._faster()
 
     def fits(self, stale: float, hidden: float = 0.0) -> None:
         """Raises CameraError for a camera whose pictures are too few, or too old when they come, for this limit [s].
@@ -107,3 +121,32 @@ class CameraPace:
             "a faster mode of the camera (device.fourcc: MJPG, device.frame_rate, a shorter device.exposure), or "
             f"safety.stale of {least:g} s at least, with a slower reference"
         )
+
+
+class CameraPaces:
+    """The pace of a rig's only camera, or of each of its two."""
+
+    def __init__(self) -> None:
+        self._each = [CameraPace()]
+
+    def expect(self, cameras: int) -> None:
+        """Know how many cameras there are, before the first picture of two."""
+        if cameras > len(self._each):
+            self._each = [CameraPace(f"camera {number + 1}") for number in range(cameras)]
+
+    def add(self, sighting: Sighting) -> None:
+        """The next picture, of the camera that looks at its plane."""
+        self._each[sighting.plane].add(sighting)
+
+    def summary(self) -> str:
+        """In words, with what could not be used of all pictures."""
+        return " ".join(pace.summary() for pace in self._each)
+
+    def missing(self, now: float, stale: float) -> tuple[str, str]:
+        """Why one camera, that with the oldest angle, has given none for `stale` seconds, and what to do about it."""
+        return min(self._each, key=lambda pace: pace.used).missing(now, stale)
+
+    def fits(self, stale: float) -> None:
+        """Raises CameraError where a camera's pictures are too few, or too old when they come, for this limit [s]."""
+        for pace in self._each:
+            pace.fits(stale)

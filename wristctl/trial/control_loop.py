@@ -20,10 +20,13 @@ from wristctl.control.law import Controller
 from wristctl.control.response import Estimate
 from wristctl.errors import UserError
 from wristctl.simulation.motion import Motion
+from wristctl.trial.bend_motion import BendMotion
+from wristctl.trial.bending import bending_of
 from wristctl.trial.log import TrialLog, of_axes
 from wristctl.trial.safety import SafetyStop
-from wristctl.trial.spools import Paths, spools_of
-from wristctl.trial.steering import Answer, HostFaults, Steering
+from wristctl.trial.spatial_steering import SpatialAnswer
+from wristctl.trial.spools import spools_of
+from wristctl.trial.steering import Answer, HostFaults
 from wristctl.trial.supervised_wait import InSight, Patience
 from wristctl.trial.tendon_pulls import TendonPulls
 from wristctl.trial.tick_timing import TickTiming
@@ -39,16 +42,15 @@ _RATE_BYTES, _OBEYED, _BUSY = 26, 0.44e-3, 6.6e-9
 
 # Seconds within which motors at any speed have ramped down.
 _COMING_TO_REST = 0.5
-_NO_ANSWER = Answer(math.nan, math.nan, math.nan, math.nan, False)
 
 
 class Task(NamedTuple):
     """Motion that the loop follows, with its trial."""
 
-    motion: Motion
+    motion: Motion | BendMotion
     """Sampled at the loop's period."""
     course: Array
-    """Reference angle, rate and acceleration of the motion, (T, 3)."""
+    """The motion as `Bending.course` has it."""
     trial: int
     """Number of the trial; -1 between trials."""
     begin: float
@@ -57,7 +59,9 @@ class Task(NamedTuple):
 
 
 class ControlLoop:
-    """Drives a homed, enabled board in one bending plane; `signs` say which way each motor's positive steps turn."""
+    """Drives a homed, enabled board in a bending plane, or in both; `signs` say which way each motor's positive steps
+    turn.
+    """
 
     def __init__(
         self, board: Board, tracking: Tracking, settings: HwRunSettings, wrist: WristParameters, plane: str,
@@ -67,11 +71,13 @@ class ControlLoop:
         self._board, self._tracking, self._log, self._timing, self._shown = board, tracking, log, timing, shown
         self._clock, self._period, self._signs = board.transport, timing.period, np.array(signs)
         self._life, self._stale = settings.rate_life, settings.safety.stale
-        self._spools, self._paths = spools_of(settings.actuator), Paths(wrist, plane)
+        self._spools, self._bending = spools_of(settings.actuator), bending_of(settings, wrist, plane, timing.period)
         self._pulls, self.watch = pulls, Watch(settings, wrist, plane, timing, oblique, pulls)
-        self._steering = Steering(wrist, settings.actuator, settings.sensor, timing.period, 0.0)
+        self._steering = self._bending.steering
         self._status, self._sent = board.read(), np.zeros(AXES)
-        self._epoch = self._last_usable = self._clock.now()
+        timing.camera.expect(settings.planes)
+        self._epoch = self._clock.now()
+        self._last_usable = [self._epoch] * settings.planes
         self._underway = min(underway(_RATE_BYTES, settings.baud) + _OBEYED, 0.5 * self._period)
         self._skipped = 0
         self._counted = self._epoch
@@ -79,10 +85,10 @@ class ControlLoop:
     @property
     def next_tick(self) -> float:
         """When the next tick is due, on the clock [s]."""
-        return self._epoch + self._steering.tick * self._period
+        return self._epoch + float(self._steering.tick) * self._period
 
     def follow(
-        self, motion: Motion, controller: Controller, gains: Sequence[float], trial: int = -1,
+        self, motion: Motion | BendMotion, controller: Controller, gains: Sequence[float], trial: int = -1,
         faults: HostFaults | None = None, pushed: bool = False,
     ) -> None:  # fmt: skip
         """Follow a motion sampled at the period; its ticks are logged under the number of the trial.
@@ -93,8 +99,7 @@ class ControlLoop:
         """
         self._steering.use(controller, gains)
         self.watch.begin(pushed)
-        course = np.stack([motion.theta_ref, motion.rate_ref, motion.acceleration_ref], axis=1)
-        task = Task(motion, course, trial, self.next_tick, faults or HostFaults(()))
+        task = Task(motion, self._bending.course(motion), trial, self.next_tick, faults or HostFaults(()))
         first = self._steering.tick
         while (k := self._steering.tick - first) < len(motion.time):
             self._tick(task, k)
@@ -102,7 +107,7 @@ class ControlLoop:
 
     def patience(self) -> Patience:
         """For waiting between two motions, the wrist in sight."""
-        sight = InSight(self._tracking, self.watch, self._stale, self._paths, self._clock.now, self._signs)
+        sight = InSight(self._tracking, self.watch, self._stale, self._bending, self._clock.now, self._signs)
         return Patience(self._board, sight)
 
     def _come_to_rest(self, task: Task) -> None:
@@ -117,32 +122,24 @@ class ControlLoop:
         if (ahead := self.next_tick - self._clock.now()) > 0.0:
             self._clock.wait(ahead)
         woken = self._clock.now() - self.next_tick if ahead > 0.0 else 0.0
-        clock, due, steering, motion = self._clock.now(), self.next_tick, self._steering, task.motion
+        clock, due = self._clock.now(), self.next_tick
         marker = self._look(task)
-        estimate, position = steering.estimate, self._reeled()
+        estimate, position = self._steering.estimate, self._reeled()
         self._judge(task.trial, estimate, position, clock, clock - due)
+        answer: Answer | SpatialAnswer | None = None
+        tension, target = np.full(AXES, math.nan), position
         if k is None:
-            reference, answer = (float(motion.theta_ref[-1]), 0.0, 0.0), _NO_ANSWER
-            tension, target = np.full(AXES, math.nan), position
             self._send(np.zeros(AXES))
         else:
-            reference = float(motion.theta_ref[k]), float(motion.rate_ref[k]), float(motion.acceleration_ref[k])
             answer = self._answer(task, k, clock - task.begin)
-            tension = self._paths.each(answer.plus, answer.minus)
-            target = self._turn(tension, position, *reference[:2])
+            tension = self._bending.tension(answer)
+            target = self._turn(tension, position, task.course[k])
         values = {
             "trial": task.trial,
             "time": clock - task.begin,
             "clock": clock,
-            **estimate._asdict(),
             **marker,
-            "theta_ref": reference[0],
-            "rate_ref": reference[1],
-            "acceleration_ref": reference[2],
-            "theta_desired": float(motion.theta_desired[-1 if k is None else k]),
-            "error": estimate.theta - reference[0],
-            "torque_wanted": answer.torque_wanted,
-            "torque": answer.torque,
+            **self._bending.values(estimate, task.motion, task.course, k, answer),
             "state": self._status.state.name,
             "faults": "+".join(fault.name or "" for fault in Fault if fault in self._status.faults),
             "counted": self._counted - task.begin,
@@ -165,50 +162,51 @@ class ControlLoop:
 
     def _look(self, task: Task) -> dict[str, Any]:
         """Fuse what was seen since the last tick; for the log the newest verdict and the newest angle used."""
-        marker: dict[str, Any] = {"theta_measured": math.nan, "captured": math.nan, "verdict": ""}
+        marker = self._bending.marker()
         for sighting in self._tracking.look():
-            marker["verdict"] = str(sighting.verdict)
+            captured = sighting.time - self._epoch
             now, frame = self._clock.now(), None
             self.watch.sighted(sighting, now)
             self._timing.camera.add(sighting)
-            captured = sighting.time - self._epoch
-            if math.isfinite(sighting.theta) and self._steering.see(sighting.theta, captured):
-                self._last_usable = sighting.time
+            if math.isfinite(sighting.theta):
+                sighting = self._bending.bend(self._tracking, sighting, captured)
+            if math.isfinite(sighting.theta) and self._bending.see(sighting, captured):
+                self._last_usable[sighting.plane] = sighting.time
                 frame = self.watch.saw(sighting, captured, now)
-                marker |= {"theta_measured": sighting.theta, "captured": sighting.time - task.begin}
+            marker |= self._bending.marked(sighting, None if frame is None else sighting.time - task.begin)
             if task.trial >= 0:
                 self._log.frame(task.trial, now - task.begin, task.begin, sighting, frame)
         return marker
 
     def _judge(self, trial: int, estimate: Estimate, position: Array, clock: float, late: float) -> None:
         """Raises SafetyStop where a residual is beyond its limit; all are logged before."""
-        taut, _ = self._paths.taut(estimate.theta)
+        taut = self._bending.taut(estimate.theta)
         delay, resent = late + self._skipped * self._period, self._board.traffic.resent
         tick = Tick(clock, delay, estimate, position, taut, self._status.state, self._status.lapses, resent)
-        self._log.residuals(trial, clock, self.watch.see(tick, self._last_usable))
+        self._log.residuals(trial, clock, self.watch.see(tick, min(self._last_usable)))
         self.watch.judge(tick)
 
-    def _answer(self, task: Task, k: int, time: float) -> Answer:
+    def _answer(self, task: Task, k: int, time: float) -> Answer | SpatialAnswer:
         try:
-            answer = task.faults.answer(self._steering.respond(task.course, k), time)
+            answer: Answer | SpatialAnswer = task.faults.answer(self._steering.respond(task.course, k), time)
         except UserError as error:
             raise SafetyStop(f"the controller failed: {error.what}", error.where, error.fix) from error
         except Exception as error:
             problem = f"the controller failed: {type(error).__name__}: {error}"
             raise SafetyStop(problem, fix="run again with --debug for the traceback") from error
-        if not all(map(math.isfinite, answer)):
+        if not np.isfinite(np.hstack(answer)).all():
             raise SafetyStop("the law's torque is not a number", fix="see its gains and model")
         return answer
 
-    def _turn(self, tension: Array, position: Array, theta_ref: float, rate_ref: float) -> Array:
-        """Send the step rates that lead to these tensions, and hear where the spools are; the targets [steps]."""
-        taut, arm = self._paths.taut(theta_ref)
-        target, moving = self._spools.target(tension, taut), arm * rate_ref / self._spools.step
+    def _turn(self, tension: Array, position: Array, sample: Array) -> Array:
+        """Send the step rates that lead to these tensions at a sample of the course; the targets [steps]."""
+        taut, speed = self._bending.aim(sample)
+        target, moving = self._spools.target(tension, taut), speed / self._spools.step
         # the command acts once the board has read it; by then the one before has moved the spools for a whole period
         gap = target + moving * self._underway - (position + self._sent * self._period)
         self._send(self._signs * self._spools.rate(gap, moving, self._sent, self._period))
         behind = self._spools.behind(gap, moving, self._sent, self._period)
-        self._steering.withheld = float(arm @ self._spools.tension(behind, np.zeros(AXES)))
+        self._bending.withhold(sample, self._spools.tension(behind, np.zeros(AXES)))
         return target
 
     def _send(self, rates: Array) -> None:
@@ -221,11 +219,11 @@ class ControlLoop:
     def _go_on(self) -> None:
         """To the next tick that is not over yet, with what the spools hold in the middle of this one."""
         middle = self._reeled() + self._sent * (0.5 * self._period - self._underway)
-        plus, minus = self._paths.sides(self._spools.step * middle)
+        reeled = self._bending.spools(self._spools.step * middle)
         self._skipped = max(0, int((self._clock.now() - self.next_tick - self._period) / self._period))
         for _ in range(1 + self._skipped):
-            self._steering.predict(plus, minus)
-            self.watch.predict(plus, minus)
+            self._steering.predict(*reeled)
+            self.watch.predict(*reeled)
 
     def _reeled(self) -> Array:
         """Steps that the spools have reeled in, by the last status."""

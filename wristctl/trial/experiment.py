@@ -1,5 +1,6 @@
 """The experiment from the first command to the last: connect, home, trials and returns, and the stop that ends it."""
 
+import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -8,29 +9,33 @@ import numpy as np
 from wristctl.board.driver import Board
 from wristctl.board.messages import AXES
 from wristctl.config.hw_run import HwRunSettings
-from wristctl.config.plant import Disturbances
 from wristctl.config.wrist import WristParameters
 from wristctl.control.table import controller, gains_of
 from wristctl.errors import UserError, fix_of
 from wristctl.interrupt import undisturbed
+from wristctl.simulation.motion import Motion
 from wristctl.simulation.worlds import Draws
+from wristctl.trial.bend_motion import BendMotion
+from wristctl.trial.bending import bending_of
 from wristctl.trial.calibration import WristCalibration
 from wristctl.trial.control_loop import ControlLoop, Shown
 from wristctl.trial.homing import Zero, find_zero, slacken
 from wristctl.trial.log import TrialLog
 from wristctl.trial.motors_ready import Halt, halt, prepare
 from wristctl.trial.safety import SafetyStop
-from wristctl.trial.spools import Paths, spools_of
-from wristctl.trial.steering import HostFaults, Steering
+from wristctl.trial.spatial_belief import PLANES
+from wristctl.trial.spools import spools_of
+from wristctl.trial.steering import HostFaults
 from wristctl.trial.supervised_wait import Patience
 from wristctl.trial.tendon_pulls import tendon_pulls_of
 from wristctl.trial.testbeds import Testbed
 from wristctl.trial.tick_timing import TickTiming
 from wristctl.trial.tracking import Tracking
-from wristctl.trial.trials import Trial, at_rest, back, motion_of
+from wristctl.trial.trials import Trial, back, motion_of, motions_of
 from wristctl.trial.watch import Watch
 from wristctl.trial.zero_checks import check_cocontraction, check_zero
 from wristctl.vision.camera_pose import CameraPose
+from wristctl.vision.marker import Sighting, SightingVerdict
 from wristctl.wrist.directions import in_plane
 from wristctl.wrist.kinematics import Inverse
 
@@ -84,7 +89,9 @@ class Experiment:
         chosen = [(controller(row.controller), row.gains) for row in settings.rows]
         self._laws = [(law, gains_of(law, gains, tuned)) for law, gains in chosen]
         self._back = controller("feedforward")
-        self.motions = {direction: motion_of(settings, wrist, direction, network) for direction in settings.directions}
+        self.motions: dict[str, Motion | BendMotion] = {
+            name: motion_of(settings, wrist, name, network) for name in motions_of(settings)
+        }
         self.timing = TickTiming(settings.control_period)
         self.outcomes: dict[int, str] = {}
         self.stop: Stop | None = None
@@ -120,22 +127,29 @@ class Experiment:
 
     def _warm_up(self) -> None:
         """Have everything compiled or loaded before the first motor is on: from then on the board wants to be fed."""
-        settings = self._settings
-        steering = Steering(self._wrist, settings.actuator, settings.sensor, settings.control_period, 0.0)
-        plane, spools, still = self._trials[0].plane, spools_of(settings.actuator), np.zeros(AXES)
-        taut, _ = Paths(self._wrist, plane).taut(0.0)
+        settings, plane = self._settings, self._trials[0].plane
+        bending = bending_of(settings, self._facing(plane), plane, settings.control_period)
+        spools, still = spools_of(settings.actuator), np.zeros(AXES)
+        motion = back(0.0, settings.rest, 0.0, settings.control_period, settings.planes)
+        course = bending.course(motion)
+        taut, _ = bending.aim(course[0])
         spools.target(still, taut)
         spools.rate(still, still, still, settings.control_period)
         spools.behind(still, still, still, settings.control_period)
-        Watch(settings, self._wrist, plane, self.timing).predict(float(taut[0]), float(taut[0]))
+        bending.withhold(course[0], still)
+        reeled = bending.spools(taut)
+        Watch(settings, self._facing(plane), plane, self.timing).predict(*reeled)
+        steering = bending.steering
         for law, gains in [*self._laws, (self._back, ())]:
             steering.use(law, gains)
-            steering.respond(np.zeros((1, 3)))
-            steering.predict(float(taut[0]), float(taut[0]))
-        steering.see(0.0, 0.0)
+            steering.respond(course)
+            steering.predict(*reeled)
+        sighting = Sighting(0.0, 0, 0.0, SightingVerdict.OK, np.full((2, 4, 2), math.nan))
+        bending.see(sighting, 0.0)
 
     def _all(self, testbed: Testbed, board: Board, shown: Shown | None) -> None:
-        plane, patience = "", Patience(board)
+        plane: str | None = None
+        patience = Patience(board)
         for trial in self._trials:
             if trial.plane != plane:
                 testbed.face(trial.direction, patience.pulse)
@@ -154,29 +168,36 @@ class Experiment:
         if self.zero is not None:
             self._let_go(board, self.zero)
         watching = Patience(board)
-        self.poses[plane] = watching.stand_square(tracking, settings.homing)
-        marker = watching.angle(tracking, 4 * settings.homing.frames)
+        names = (plane,) if settings.planes == 1 else PLANES
+        self.poses |= dict(zip(names, watching.stand_square(tracking, settings.homing), strict=True))
+        markers = watching.markers(tracking, 4 * settings.homing.frames)
         watching.pace.fits(settings.safety.stale)
+        if settings.planes == 2:  # what one camera sees of a bend depends on the other
+            tracking.zero = markers
         if self.zero is None:  # the marker is seen, and nothing moves yet
             testbed.confirm(Patience(board).pulse)
             prepare(board, settings)
             self.zero = self._home(board, tracking, plane)
-            marker = self.zero.marker
+            markers = self.zero.markers
         else:
             check_zero(board, tracking, settings, self._wrist, plane, self.zero)
-        tracking.zero = (marker,)
+        tracking.zero = markers
         return self._at_rest(board, tracking, plane, shown), tracking
 
     def _at_rest(self, board: Board, tracking: Tracking, plane: str, shown: Shown | None) -> ControlLoop:
         """A loop that has brought the homed, slack wrist to rest at zero."""
-        settings, pose, zero = self._settings, self.poses[plane], self.zero
+        settings, pose, zero = self._settings, self.poses.get(plane), self.zero
         assert zero is not None
         loop = ControlLoop(
-            board, tracking, settings, in_plane(self._wrist, plane), plane, zero.signs, self.timing, self._log,
+            board, tracking, settings, self._facing(plane), plane, zero.signs, self.timing, self._log,
             shown, 0.0 if pose is None else pose.oblique, self._pulls,
         )  # fmt: skip
-        loop.follow(at_rest(settings.rest, settings.control_period), self._back, ())
+        loop.follow(back(0.0, settings.rest, 0.0, settings.control_period, settings.planes), self._back, ())
         return loop
+
+    def _facing(self, plane: str) -> WristParameters:
+        """The wrist as a loop in this plane knows it, or in both."""
+        return self._wrist if self._settings.planes == 2 else in_plane(self._wrist, plane)
 
     def _relaxed(self, board: Board, tracking: Tracking, plane: str, shown: Shown | None) -> ControlLoop:
         """After a trial see that no tendons pull against each other, and come to rest at zero again."""
@@ -187,6 +208,9 @@ class Experiment:
     def _home(self, board: Board, tracking: Tracking, plane: str) -> Zero:
         settings, calibration = self._settings, self._calibration
         if calibration is not None and settings.positions == "stored":
+            if len(calibration.zero.markers) != settings.planes:
+                problem = f"the calibration knows {len(calibration.zero.markers)} cameras of {settings.planes}"
+                raise UserError(problem, "calibration", "positions: find, or calibrate the wrist with the same planes")
             calibration.restore(board)
             self._let_go(board, calibration.zero)
             check_zero(board, tracking, settings, self._wrist, plane, calibration.zero)
@@ -204,8 +228,9 @@ class Experiment:
         settings, followed, start = self._settings, self.motions[trial.direction], loop.next_tick
         law, gains = self._laws[trial.row]
         self._under_way, self.outcomes[trial.number] = (trial.number, start), "begun"
-        disturbances = Disturbances(push=trial.pushed(settings.push))
-        testbed.begin(start, disturbances, self._draws.camera(trial.scenario, trial.repetition))
+        testbed.begin(
+            start, trial.disturbances(settings, followed), self._draws.camera(trial.scenario, trial.repetition)
+        )
         faults = HostFaults(settings.bench.faults) if testbed.emulated else None
         try:
             loop.follow(followed, law, gains, trial.number, faults, pushed=trial.push != 0.0)
@@ -213,7 +238,7 @@ class Experiment:
             self.most = {name: max(value, self.most.get(name, 0.0)) for name, value in loop.watch.most.items()}
             self.odd[trial.number] = loop.watch.words()
         self._trial_ended(testbed, "ok")
-        loop.follow(back(followed.final, settings.back, 0.0, settings.control_period), self._back, ())
+        loop.follow(back(followed.final, settings.back, 0.0, settings.control_period, settings.planes), self._back, ())
 
     def _trial_ended(self, testbed: Testbed, outcome: str) -> None:
         if self._under_way is not None:

@@ -8,18 +8,18 @@ from wristctl.arrays import Array
 from wristctl.wrist.directions import ACTIVE
 
 # Steps in the time looked at from which a motor has turned.
-_TURNED = 40.0
+TURNED = 40.0
 # Bend in that time from which the wrist was meant to move.
-_MEANT = math.radians(2.0)
+MEANT = math.radians(2.0)
 # Turnings back, in the time looked at for them, from which a loop swings: a motion there and back has one.
-_SWINGS = 3
-_LOOP_SWINGS = "the loop swings: friction in the sheaths, a camera later than is believed, or gains too high for them"
+SWINGS = 3
+LOOP_SWINGS = "the loop swings: friction in the sheaths, a camera later than is believed, or gains too high for them"
 _PUSHED = "this trial's push was harder than safety.load and safety.follow_deg allow, or went across the plane"
 _OBLIQUE = "the camera does not look square at the plane: calibrate it, then --optics"
 # Share of a camera's angle off square that it may show a bend in the plane as one across it.
 _SLIGHTLY = 0.3
 # Change from one frame to the next that no motion at rest makes.
-_JUMP = math.radians(2.0)
+JUMP = math.radians(2.0)
 
 
 class Evidence(NamedTuple):
@@ -54,9 +54,9 @@ def _turned_back(course: Sequence[float]) -> int:
     turns, sense, low, high = 0, 0, course[0], course[0]
     for position in course:
         low, high = min(low, position), max(high, position)
-        if sense >= 0 and high - position >= _TURNED:
+        if sense >= 0 and high - position >= TURNED:
             turns, sense, low = turns + sense, -1, position
-        elif sense <= 0 and position - low >= _TURNED:
+        elif sense <= 0 and position - low >= TURNED:
             turns, sense, high = turns - sense, 1, position
     return turns
 
@@ -68,19 +68,19 @@ def likely_causes(evidence: Evidence, plus: Sequence[bool], away: Sequence[int])
     more. Of each pair the bend across tells which: it is away from a camera for a tendon that pulls too much on the
     far side, or too little on the near one.
     """
-    swings = [_PUSHED] * evidence.pushed + [_LOOP_SWINGS] * (evidence.reversals >= _SWINGS)
-    if abs(evidence.across) > 0.5 * evidence.bends and evidence.jump <= _JUMP:
+    swings = [_PUSHED] * evidence.pushed + [LOOP_SWINGS] * (evidence.reversals >= SWINGS)
+    if abs(evidence.across) > 0.5 * evidence.bends and evidence.jump <= JUMP:
         slight = abs(evidence.across) < _SLIGHTLY * evidence.oblique
         return [*swings, *[_OBLIQUE] * slight, *_of_one_tendon(evidence, plus, away)]
-    causes, meant = swings, abs(evidence.meant) > _MEANT
-    if evidence.jump > _JUMP:
+    causes, meant = swings, abs(evidence.meant) > MEANT
+    if evidence.jump > JUMP:
         causes += ["the tip's marker has slipped on its disc", "the camera shows or dates pictures wrongly"]
     share = evidence.bent / evidence.meant if meant else math.nan
     if abs(share) < 0.15:
         causes.append("the motors have no supply")
     if share < 0.15:
         causes.append("both motors of a side turn the wrong way, are stuck, or are exchanged with the other side's")
-    turning = bool((abs(evidence.turned) > _TURNED).any())
+    turning = bool((abs(evidence.turned) > TURNED).any())
     if meant and share >= 0.15:
         much = "more" if share > 1.0 else "less"
         causes.append(f"the wrist bends by {much} than its spools say: wrong pulley or microsteps (DIP switches)")
@@ -88,7 +88,7 @@ def likely_causes(evidence: Evidence, plus: Sequence[bool], away: Sequence[int])
         causes.append("motors exchanged, detached or slipped tendons on a side, or a stalled motor")
     else:
         causes.append("a side's tendons slipped or came off, or the motors' supply was lost")
-    if evidence.jump <= _JUMP:
+    if evidence.jump <= JUMP:
         causes += ["the camera shows old pictures", "the tip's marker has slipped on its disc"]
     return [*dict.fromkeys(causes), *["something holds or pushes the wrist"] * (not evidence.pushed)]
 
@@ -99,14 +99,14 @@ def _of_one_tendon(evidence: Evidence, plus: Sequence[bool], away: Sequence[int]
     little = next(k for k in range(4) if plus[k] != toward_plus and (away[k] > 0) != far)
     named = {axis: f"axis {axis} (tendon {ACTIVE[axis]})" for axis in (much, little)}
     causes = []
-    if evidence.turned[much] < -_TURNED:
+    if evidence.turned[much] < -TURNED:
         causes.append(f"{named[much]} turns the wrong way, or its direction is stuck")
-    if evidence.turned[little] > _TURNED:
+    if evidence.turned[little] > TURNED:
         causes.append(f"{named[little]} turns the wrong way")
-    if abs(evidence.turned[much]) > _TURNED or abs(evidence.turned[little]) > _TURNED:
+    if abs(evidence.turned[much]) > TURNED or abs(evidence.turned[little]) > TURNED:
         causes.append("motors exchanged")
     causes.append(f"the tendon of {named[little]} is off its pulley")
     causes.append(f"it has slipped on it, or that of {named[much]} has")
-    if abs(evidence.turned[little]) > _TURNED:
+    if abs(evidence.turned[little]) > TURNED:
         causes.append(f"{named[little]} has stalled or has no power")
     return [*causes, *["something pushes the wrist across its plane"] * (not evidence.pushed)]

@@ -14,8 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wristctl.records.run_writer import RESERVE
+from wristctl.trial.camera_record import Frame
 from wristctl.trial.residuals import columns
-from wristctl.trial.watch import Frame
+from wristctl.trial.spatial_belief import PLANES
 from wristctl.vision.marker import Sighting
 from wristctl.wrist.directions import ACTIVE
 
@@ -27,11 +28,31 @@ def _of_tendons(name: str, unit: str, meaning: str) -> dict[str, tuple[str, str]
     return {f"{name}_{tendon}": (unit, f"{meaning}, tendon {tendon}") for tendon in ACTIVE}
 
 
-LOG: Columns = {
+def _of_planes(name: str, unit: str, meaning: str) -> dict[str, tuple[str, str]]:
+    return {f"{name}_{plane}": (unit, f"{meaning}, toward {plane}") for plane in PLANES}
+
+
+_CLOCKS: Columns = {
     "trial": ("", "number, from 0"),
     "time": ("s", "since the trial's motion began"),
     "clock": ("s", "the run's one clock"),
     "utc": ("s", "the same moment since 1970-01-01T00:00Z; empty in virtual time"),
+}
+_AXES: Columns = {
+    **_of_tendons("tension", "N", "commanded"),
+    **_of_tendons("target", "steps", "wanted spool position, 0 where straight and just taut, positive reeled in"),
+    **_of_tendons("position", "steps", "spool position by the board's status"),
+    "counted": ("s", "when the board had those positions, on the trial's time"),
+    "board": ("s", "the board's own clock then"),
+    **_of_tendons("sent", "1/s", "step rate really sent"),
+    "state": ("", "of the board"),
+    "faults": ("", "of the board"),
+    "late": ("s", "from the tick's due time to its beginning"),
+    "woken": ("s", "part of that for which the computer slept on; the rest is what the tick before took too long"),
+    "round_trip": ("s", "from the tick's command to the board's answer"),
+}
+LOG: Columns = {
+    **_CLOCKS,
     "theta": ("rad", "bending angle as estimated"),
     "rate": ("rad/s", "its rate as estimated"),
     "load": ("N m", "load torque as estimated: what the model does not explain"),
@@ -45,17 +66,24 @@ LOG: Columns = {
     "error": ("rad", "theta - theta_ref (E12)"),
     "torque_wanted": ("N m", "the law's torque"),
     "torque": ("N m", "torque of the commanded tensions on the one-segment model"),
-    **_of_tendons("tension", "N", "commanded"),
-    **_of_tendons("target", "steps", "wanted spool position, 0 where straight and just taut, positive reeled in"),
-    **_of_tendons("position", "steps", "spool position by the board's status"),
-    "counted": ("s", "when the board had those positions, on the trial's time"),
-    "board": ("s", "the board's own clock then"),
-    **_of_tendons("sent", "1/s", "step rate really sent"),
-    "state": ("", "of the board"),
-    "faults": ("", "of the board"),
-    "late": ("s", "from the tick's due time to its beginning"),
-    "woken": ("s", "part of that for which the computer slept on; the rest is what the tick before took too long"),
-    "round_trip": ("s", "from the tick's command to the board's answer"),
+    **_AXES,
+}
+SPATIAL_LOG: Columns = {
+    **_CLOCKS,
+    **_of_planes("bend", "rad", "bend of the last disc as estimated"),
+    **_of_planes("rate", "rad/s", "its rate as estimated"),
+    **_of_planes("load", "N m", "load torque as estimated: what the model does not explain"),
+    **_of_planes("bend_measured", "rad", "newest usable bend by this plane's camera; empty where none came"),
+    **_of_planes("captured", "s", "when that frame was taken, on the trial's time"),
+    **_of_planes("verdict", "", "on the newest frame of this plane's camera; empty where none came"),
+    **_of_planes("bend_ref", "rad", "reference that the controller follows"),
+    **_of_planes("rate_ref", "rad/s", "its rate"),
+    **_of_planes("acceleration_ref", "rad/s^2", "its acceleration"),
+    **_of_planes("error", "rad", "bend less its reference"),
+    **_of_planes("torque_wanted", "N m", "torque that the controller wants"),
+    **_of_planes("torque", "N m", "torque of the commanded tensions on the one-segment model"),
+    "share": ("1", "share of the wanted torque that the tendons could give"),
+    **_AXES,
 }
 OF_LOAD_CELLS: Columns = _of_tendons("pull", "N", "by load cell as read last; empty where it gives nothing")
 WIRE: Columns = {
@@ -85,6 +113,12 @@ FRAMES: Columns = {
         for axis, meaning in (("x", "rightward"), ("y", "downward"))
     },
 }
+SPATIAL_FRAMES: Columns = {
+    "trial": FRAMES["trial"],
+    "plane": ("", "ulnar or flexion: the bending plane that the camera looks at"),
+    **{"bend" if name == "theta" else name: meaning for name, meaning in FRAMES.items() if name != "trial"},
+    "bend": ("rad", "bend in that plane, by the marker's angle and the other bend; empty where unusable"),
+}
 _RESERVED = 4 << 20
 # Rows of truth written in one tick: well above the five that it adds, and nothing that a tick would be late by.
 _AT_ONCE = 40
@@ -99,14 +133,21 @@ def residual_columns(weighed: bool) -> Columns:
     }
 
 
-def truth_columns(segments: int) -> Columns:
-    """Columns of the emulated bench's true values, for a wrist of so many segments."""
-    segment_angles = {f"theta_{k + 1}": ("rad", "true angle of one segment") for k in range(segments)}
+def truth_columns(coordinates: int, planes: int = 1) -> Columns:
+    """Columns of the emulated bench's true values, for a wrist of so many coordinates."""
+    of_segments = {f"theta_{k + 1}": ("rad", "true angle of one segment") for k in range(coordinates)}
+    bend = {"theta": ("rad", "true bending angle")}
+    if planes == 2:
+        of_segments = {
+            f"bend_{k // 2 + 1}_{PLANES[k % 2]}": ("rad", f"true bend of one segment, toward {PLANES[k % 2]}")
+            for k in range(coordinates)
+        }
+        bend = _of_planes("bend", "rad", "true bend of the last disc")
     return {
         "trial": ("", "number, from 0"),
         "time": ("s", "since the trial's motion began"),
-        **segment_angles,
-        "theta": ("rad", "true bending angle"),
+        **of_segments,
+        **bend,
         **_of_tendons("pull", "N", "true tension at the spool"),
     }
 
@@ -178,18 +219,21 @@ class Stream:
 class TrialLog:
     """log.csv and frames.csv of trials; between.csv for the moves between them; residuals.csv of both; wire.csv with
     all bytes of the whole run; truth.csv of an emulated bench. The clock is `monotonic`, or virtual; a rig is `weighed`
-    where it has load cells.
+    where it has load cells. The true wrist of a bench has so many `coordinates`.
     """
 
     def __init__(
-        self, folder: Path, segments: int | None, period: float, monotonic: bool = False, weighed: bool = False
-    ) -> None:
+        self, folder: Path, coordinates: int | None, period: float, monotonic: bool = False, weighed: bool = False,
+        planes: int = 1,
+    ) -> None:  # fmt: skip
         self.disk, self._monotonic = Disk(folder), monotonic
-        ticks = {**LOG, **OF_LOAD_CELLS} if weighed else LOG
-        tables = {"log": ticks, "between": ticks, "frames": FRAMES, "wire": WIRE}
+        self._planes = planes
+        of_ticks, frames = (LOG, FRAMES) if planes == 1 else (SPATIAL_LOG, SPATIAL_FRAMES)
+        ticks = {**of_ticks, **OF_LOAD_CELLS} if weighed else of_ticks
+        tables = {"log": ticks, "between": ticks, "frames": frames, "wire": WIRE}
         tables["residuals"] = residual_columns(weighed)
-        if segments is not None:
-            tables["truth"] = truth_columns(segments)
+        if coordinates is not None:
+            tables["truth"] = truth_columns(coordinates, planes)
         try:
             self.streams = {name: Stream(folder / f"{name}.csv", table, self.disk) for name, table in tables.items()}
         except OSError:
@@ -213,7 +257,8 @@ class TrialLog:
         """One frame of a trial that began at `begin`, there at `used` on its time; `frame` where its angle counts."""
         predicted = (math.nan, math.nan) if frame is None else frame.predicted.tolist()
         seen = sighting.theta, sighting.verdict, sighting.tip_x, sighting.tip_y, sighting.size
-        place = trial, sighting.number, sighting.time - begin, used
+        plane = (PLANES[sighting.plane],) if self._planes == 2 else ()
+        place = trial, *plane, sighting.number, sighting.time - begin, used
         self.streams["frames"].row((*place, *seen, *predicted, *sighting.corners.ravel().tolist()))
 
     def residuals(self, trial: int, clock: float, values: Mapping[str, float]) -> None:

@@ -137,8 +137,8 @@ class HostFaults:
         self._faults = Faults(faults)
         self._faults.begin(0.0)
 
-    def answer(self, answer: Answer, time: float) -> Answer:
-        """The law's answer; NaN under model-nan. Raises ArithmeticError under controller-exception."""
+    def answer(self, answer: Any, time: float) -> Any:
+        """The law's answer, in any planes; NaN under model-nan. Raises ArithmeticError under controller-exception."""
         if self._faults.on("controller-exception", time):
             raise ArithmeticError("injected fault")
         return answer._replace(torque_wanted=math.nan) if self._faults.on("model-nan", time) else answer

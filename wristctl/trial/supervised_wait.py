@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Callable
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -10,9 +10,9 @@ from wristctl.arrays import Array
 from wristctl.board.driver import Board
 from wristctl.board.messages import State, Status
 from wristctl.config.hw_run import Homing
-from wristctl.trial.camera_pace import CameraPace
+from wristctl.trial.bending import Bending
+from wristctl.trial.camera_pace import CameraPaces
 from wristctl.trial.safety import SafetyStop
-from wristctl.trial.spools import Paths
 from wristctl.trial.tracking import Tracking
 from wristctl.trial.watch import Watch
 from wristctl.vision.camera_pose import CameraPose
@@ -38,6 +38,8 @@ class Reading(NamedTuple):
     """Angle of the marker [rad]."""
     size: float
     """Over the base's; nan where it is not measured."""
+    beside: float = math.nan
+    """Bend in the second plane [rad], of a rig with two cameras; `theta` is then that in the first."""
 
 
 class Patience:
@@ -50,8 +52,8 @@ class Patience:
     def __init__(self, board: Board, judge: Callable[[Status], None] = lambda status: None) -> None:
         self._board, self._judge = board, judge
         self._stood = board.read()
-        self.pace = CameraPace()
-        """Pace of the pictures looked at here."""
+        self.pace = CameraPaces()
+        """Pace of the pictures looked at here, by camera."""
 
     def pulse(self, longest: float = _PULSE) -> None:
         """Wait for a moment of at most `longest` seconds: the `Meanwhile` of whoever asks a person."""
@@ -76,38 +78,58 @@ class Patience:
     def reading(self, tracking: Tracking, frames: int) -> Reading:
         """Medians of the next usable frames. Raises SafetyStop where none come."""
         usable = self.sightings(tracking, frames)
-        theta, size = np.median([(sighting.theta, sighting.size) for sighting in usable], axis=0)
-        return Reading(float(theta), float(size))
+        if len(tracking.zero) == 1:
+            theta, size = np.median([(sighting.theta, sighting.size) for sighting in usable], axis=0)
+            return Reading(float(theta), float(size))
+        planes = [[sighting for sighting in usable if sighting.plane == plane] for plane in range(2)]
+        seen = [float(np.median([sighting.theta for sighting in sightings])) for sightings in planes]
+        bends = [
+            float(np.median([tracking.bend(sighting, seen[1 - plane]) for sighting in sightings]))
+            for plane, sightings in enumerate(planes)
+        ]
+        return Reading(bends[0], math.nan, bends[1])
+
+    def markers(self, tracking: Tracking, frames: int) -> tuple[float, ...]:
+        """Median marker angle [rad] of each camera's next usable frames, as it is seen. Raises SafetyStop."""
+        usable = self.sightings(tracking, frames)
+        cameras = range(len(tracking.zero))
+        return tuple(float(np.median([s.theta for s in usable if s.plane == plane])) for plane in cameras)
 
     def sightings(self, tracking: Tracking, frames: int) -> list[Sighting]:
-        """The next usable frames. Raises SafetyStop where none come."""
+        """The next usable frames, so many of each camera at least. Raises SafetyStop where none come."""
         usable: list[Sighting] = []
+        counts = [0] * len(tracking.zero)
+        self.pace.expect(len(counts))
         tracking.look()
         began = self._board.transport.now()
-        while len(usable) < frames:
+        while min(counts) < frames:
             self.pulse()
             for sighting in tracking.look():
                 self.pace.add(sighting)
                 if sighting.time >= began and math.isfinite(sighting.theta):
                     usable.append(sighting)
+                    counts[sighting.plane] += 1
             if self._board.transport.now() - began > _READING:
                 why, fix = self.pace.missing(self._board.transport.now(), _READING)
                 raise SafetyStop(f"the marker's angle could not be read ({why})", "homing", fix)
         return usable
 
-    def stand_square(self, tracking: Tracking, homing: Homing) -> CameraPose | None:
-        """Fit the camera's pose to a wrist at rest; None for a calibrated camera.
+    def stand_square(self, tracking: Tracking, homing: Homing) -> tuple[CameraPose | None, ...]:
+        """Fit each camera's pose to a wrist at rest; None for a calibrated camera.
 
-        Raises SafetyStop where it is too oblique for that, or where no markers can be read.
+        Raises SafetyStop where one is too oblique for that, or where no markers can be read.
         """
-        pose = tracking.stand_square(self.sightings(tracking, 4 * homing.frames))
-        if pose is not None and pose.oblique > math.radians(homing.oblique_deg):
-            problem = (
-                f"the camera looks {math.degrees(pose.oblique):.0f} deg off square at the bending plane, beyond "
-                f"{homing.oblique_deg:g} deg"
-            )
-            raise SafetyStop(problem, "homing", OBLIQUE_FIX)
-        return pose
+        usable, poses = self.sightings(tracking, 4 * homing.frames), list[CameraPose | None]()
+        for plane in range(len(tracking.zero)):
+            poses.append(pose := tracking.stand_square([sighting for sighting in usable if sighting.plane == plane]))
+            if pose is not None and pose.oblique > math.radians(homing.oblique_deg):
+                which = "the camera" if len(tracking.zero) == 1 else f"camera {plane + 1}"
+                problem = (
+                    f"{which} looks {math.degrees(pose.oblique):.0f} deg off square at the bending plane, beyond "
+                    f"{homing.oblique_deg:g} deg"
+                )
+                raise SafetyStop(problem, "homing", OBLIQUE_FIX)
+        return tuple(poses)
 
     def _see(self, status: Status) -> None:
         stood = self._stood
@@ -129,11 +151,12 @@ class InSight:
     """
 
     def __init__(
-        self, tracking: Tracking, watch: Watch, stale: float, paths: Paths, now: Callable[[], float], signs: Array
+        self, tracking: Tracking, watch: Watch, stale: float, bending: Bending, now: Callable[[], float], signs: Array
     ) -> None:
         self._tracking, self._watch, self._stale = tracking, watch, stale
-        self._paths, self._now, self._signs = paths, now, signs
+        self._bending, self._now, self._signs = bending, now, signs
         self._seen = self._looked = now()
+        self._bend: Any = None
 
     def __call__(self, status: Status) -> None:
         """Raises SafetyStop where the wrist is bent, or its tendons are pulled, beyond the limits."""
@@ -147,4 +170,5 @@ class InSight:
         for sighting in looked:
             if math.isfinite(sighting.theta):
                 self._seen = sighting.time
-                self._watch.standing(sighting.theta, reeled, self._paths.taut(sighting.theta)[0], now)
+                self._bend = self._bending.stands(self._tracking, sighting, self._bend)
+                self._watch.standing(self._bend, reeled, self._bending.taut(self._bend), now)

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from wristctl.trial.camera_pace import CameraPace
+from wristctl.trial.camera_pace import CameraPaces
 
 # Share of a period that the board's answer may take without being blamed.
 _SOUND = 0.6
@@ -31,7 +31,7 @@ class TickTiming:
     """Ticks that were skipped because one before took too long."""
     culprits: Counter[str] = field(default_factory=Counter)
     """Who made how many ticks end after the next was due."""
-    camera: CameraPace = field(default_factory=CameraPace)
+    camera: CameraPaces = field(default_factory=CameraPaces)
 
     def jitter(self, share: float) -> float:
         """This quantile of lateness [s]."""

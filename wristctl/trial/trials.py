@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple, cast, overload
 
 import numpy as np
 
@@ -22,6 +22,7 @@ from wristctl.simulation.motion import Angles, Motion
 from wristctl.simulation.reference import motion
 from wristctl.simulation.references import minimum_jerk
 from wristctl.simulation.repetitions import Simulation
+from wristctl.trial.bend_motion import BendMotion, bend_back, bend_motion_of, has_path
 from wristctl.trial.spools import on_plus_side
 from wristctl.wrist.directions import ACTIVE, DIRECTIONS, in_plane
 from wristctl.wrist.kinematics import Inverse
@@ -30,6 +31,8 @@ if TYPE_CHECKING:
     import pandas as pd
 
 
+# Bend [rad] below which a push has nothing to be against.
+_STRAIGHT = math.radians(1.0)
 # Seconds before the push over which the load is taken as quiet.
 _BEFORE = 0.5
 
@@ -38,7 +41,8 @@ class Trial(NamedTuple):
     """One move and back."""
 
     number: int
-    direction: DirectionName
+    direction: str
+    """Of bending; of a path in two planes its name."""
     repetition: int
     push: float
     """Largest force against the bend [N], 0 without a push."""
@@ -52,28 +56,52 @@ class Trial(NamedTuple):
 
     @property
     def plane(self) -> str:
-        """The bending plane."""
-        return DIRECTIONS[self.direction].plane
+        """The bending plane; empty where it is no direction of one plane."""
+        return DIRECTIONS[self.direction].plane if self.direction in DIRECTIONS else ""
 
     def pushed(self, push: Push) -> Push:
         """The push of an experiment as it acts in this trial, on a bench and in simulation: against the bend."""
         return push.model_copy(update={"force": -DIRECTIONS[self.direction].sign * self.push})
 
+    def disturbances(self, settings: HwRunSettings, followed: Motion | BendMotion) -> Disturbances:
+        """What disturbs this trial: in one plane its push against the bend, in two toward `push_toward_deg`.
+
+        Without that it is against the bend that is wanted where the push begins.
+        """
+        if not isinstance(followed, BendMotion):
+            return Disturbances(push=self.pushed(settings.push))
+        toward = settings.push_toward_deg
+        if toward is None:
+            bend = followed.bend_at(settings.push.start)
+            toward = math.degrees(math.atan2(-bend[1], -bend[0])) if np.hypot(*bend) > _STRAIGHT else 90.0
+        push = settings.push.model_copy(update={"force": self.push})
+        return Disturbances(push=push, toward_deg=toward)
+
+
+def motions_of(settings: HwRunSettings) -> list[str]:
+    """Names of the motions: directions, or the one path in two planes that the reference is."""
+    if settings.planes == 2 and has_path(settings):
+        return [settings.reference.kind]
+    return list(dict.fromkeys(settings.directions))
+
 
 def trials_of(settings: HwRunSettings, rng: np.random.Generator) -> list[Trial]:
-    """All trials: planes in random order, since the wrist must be turned between them, and all of a plane shuffled."""
+    """All trials: planes in random order, since the wrist must be turned between them, and all of a plane shuffled.
+
+    On a rig that bends in two planes nobody turns the wrist, and all are shuffled.
+    """
     pushes = [0.0] * settings.without_push + [settings.push.force] * (settings.push.force != 0.0)
     every = [
         (direction, repetition, push, row)
-        for direction in dict.fromkeys(settings.directions)
+        for direction in motions_of(settings)
         for repetition in range(settings.repetitions)
         for push in pushes
         for row in range(len(settings.rows))
     ]
-    planes = list(dict.fromkeys(DIRECTIONS[direction].plane for direction, *_ in every))
+    turned = {name: "" if settings.planes == 2 else DIRECTIONS[name].plane for name in motions_of(settings)}
     ordered = []
-    for plane in rng.permutation(planes):
-        members = [combination for combination in every if DIRECTIONS[combination[0]].plane == plane]
+    for plane in rng.permutation(list(dict.fromkeys(turned.values()))):
+        members = [combination for combination in every if turned[combination[0]] == plane]
         ordered += [members[k] for k in rng.permutation(len(members))]
     return [Trial(number, *combination) for number, combination in enumerate(ordered)]
 
@@ -113,13 +141,27 @@ def recovery(time: Array, error: Array, move: float, end: float) -> float:
     return float(time[outside[-1] + 1] - end) if outside[-1] + 1 < len(time) else float("nan")
 
 
+@overload
 def motion_of(
     settings: HwRunSettings, wrist: WristParameters, direction: DirectionName, network: Inverse | None = None
-) -> Motion:
+) -> Motion: ...
+
+
+@overload
+def motion_of(
+    settings: HwRunSettings, wrist: WristParameters, direction: str, network: Inverse | None = None
+) -> Motion | BendMotion: ...
+
+
+def motion_of(
+    settings: HwRunSettings, wrist: WristParameters, direction: str, network: Inverse | None = None
+) -> Motion | BendMotion:
     """A trial's motion in this direction, sampled at the control period, and worked out before any motor turns.
 
     Raises UserError for one out of reach.
     """
+    if settings.planes == 2:
+        return bend_motion_of(settings, wrist, direction, network)
     reference = settings.reference if DIRECTIONS[direction].sign > 0 else settings.reference.mirrored()
     course = motion(reference, in_plane(wrist, direction), settings.horizon, settings.control_period, network)
     if not np.isfinite(course.angles.rows).all():
@@ -129,8 +171,18 @@ def motion_of(
     return course
 
 
-def back(theta: float, duration: float, rest: float, period: float) -> Motion:
-    """From theta [rad] to straight in `duration` [s], and rest there."""
+@overload
+def back(theta: float, duration: float, rest: float, period: float) -> Motion: ...
+
+
+@overload
+def back(theta: Any, duration: float, rest: float, period: float, planes: int) -> Motion | BendMotion: ...
+
+
+def back(theta: Any, duration: float, rest: float, period: float, planes: int = 1) -> Motion | BendMotion:
+    """From theta [rad], in two planes a bend (2,), to straight in `duration` [s], and rest there."""
+    if planes == 2:
+        return bend_back(np.broadcast_to(theta, 2), duration, rest, period)
     time: Array = np.arange(round((duration + rest) / period), dtype=np.float64) * period
     course = -theta * minimum_jerk(time, duration)
     course[0] += theta
@@ -150,9 +202,9 @@ def at_rest(duration: float, period: float) -> Motion:
 JUDGED = ("rmse", "settling", "steady_state")
 
 # Seconds by which a person may push too early.
-_EARLY = 0.5
+EARLY = 0.5
 # Load torque [N m] that counts as a push.
-_LEAST_PUSH = 0.01
+LEAST_PUSH = 0.01
 
 
 def evaluated(
@@ -181,7 +233,7 @@ def evaluated(
 
     metrics |= judged(np.interp(grid, time, theta))
     if trial.push:
-        pushed = push_seen(time, course["load"].to_numpy(float), max(followed.rest, push.start - _EARLY), _LEAST_PUSH)
+        pushed = push_seen(time, course["load"].to_numpy(float), max(followed.rest, push.start - EARLY), LEAST_PUSH)
         if pushed is not None:
             metrics["push_torque"] = pushed.torque
             metrics["recovery"] = recovery(time, error, goals.move, pushed.end)
@@ -206,7 +258,7 @@ def twin(
         gains=row.gains,
         loop=settings.loop.model_copy(update={"disturbances": disturbances}),
         reference=settings.reference,
-        direction=trial.direction,
+        direction=cast(DirectionName, trial.direction),
         horizon=settings.horizon,
     )
     return simulate(study.model_copy(update={"simulate": chosen}), network, tuned).first

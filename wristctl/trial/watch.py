@@ -2,8 +2,9 @@
 
 import math
 from collections import Counter, deque
+from collections.abc import Sequence
 from itertools import pairwise
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -13,6 +14,8 @@ from wristctl.config.hw_run import HwRunSettings
 from wristctl.config.wrist import WristParameters
 from wristctl.control.response import Estimate
 from wristctl.trial.blind_model import BlindModel
+from wristctl.trial.camera_record import CameraRecord, Frame, Recent, jump_between
+from wristctl.trial.causes_in_space import SpatialEvidence, causes_in_space
 from wristctl.trial.likely_causes import Evidence, likely_causes, reversals
 from wristctl.trial.marker_lag import MarkerLag
 from wristctl.trial.residuals import RESIDUALS, Judge, Limit, limits_of, notes, stopped_by, worst
@@ -20,23 +23,19 @@ from wristctl.trial.safety import SafetyStop
 from wristctl.trial.spools import on_plus_side, spools_of
 from wristctl.trial.tendon_pulls import TendonPulls
 from wristctl.trial.tick_timing import FIX, TickTiming
-from wristctl.vision.marker import Sighting, SightingVerdict
+from wristctl.vision.marker import Sighting
 from wristctl.wrist.directions import away_of
 
 # Seconds over which causes are judged, and whether the loop swings.
 _HISTORY, _SWINGING = 0.2, 1.0
-# Seconds between two frames from which the wrist may have gone anywhere.
-_SUCCESSIVE = 0.06
-# Frames at rest at zero by whose median the bend across is none.
-_REFERENCE_FRAMES = 5
-# Seconds that are summed up: of ticks, of lapsed rates and repeated pictures, of usable angles and commands sent again.
+# Seconds that are summed up: of ticks, of lapsed rates, of commands sent again.
 _TICKS, _EVENTS, _SEEN = 0.5, 1.0, 2.0
 _FIX = "cut the motors' supply, slacken the tendons by hand, and look; docs/hardware/faults.md says how each shows"
 _FOLLOWING = "jump", "across", "load", "apart"
 
 
 class Tick(NamedTuple):
-    """What is there to be looked at at a tick; SI units."""
+    """What is there to be looked at at a tick; SI units. In two planes the estimate's values are (2,) each."""
 
     clock: float
     late: float
@@ -53,42 +52,17 @@ class Tick(NamedTuple):
     """Commands sent again, as the host counts."""
 
 
-class Frame(NamedTuple):
-    """A usable frame, against what spools should have made of the wrist at its capture; SI units."""
-
-    captured: float
-    seen: float
-    predicted: Array
-    """Angles with tendons as believed and as soft as may be, (2,)."""
-    away: float
-    """Bend away from the camera, by the size of the tip's marker; nan where it is not known."""
-
-
 class _Past(NamedTuple):
     clock: float
-    frame: Frame
+    frames: tuple[Frame, ...]
     position: Array
-
-
-class _Recent:
-    """Values of the last so many seconds."""
-
-    def __init__(self, seconds: float) -> None:
-        self._seconds, self._values = seconds, deque[tuple[float, float]]()
-
-    def add(self, clock: float, value: float = 1.0) -> None:
-        self._values.append((clock, value))
-
-    def values(self, clock: float) -> list[float]:
-        while self._values and clock - self._values[0][0] >= self._seconds:
-            self._values.popleft()
-        return [value for _, value in self._values]
 
 
 class Watch:
     """Residuals of one loop, which begins with the wrist at rest at zero: the marker's size is that of no bend across.
 
-    `oblique` is how far off square an uncalibrated camera looks [rad]. `pulls` are those of a rig with load cells.
+    `oblique` is how far off square an uncalibrated camera looks [rad]. `pulls` are those of a rig with load cells. A
+    rig in two planes has a camera for each; `plane` then says nothing, and residuals are norms over both.
     """
 
     def __init__(
@@ -96,29 +70,30 @@ class Watch:
         pulls: TendonPulls | None = None,
     ) -> None:  # fmt: skip
         self._settings, self._timing, self._oblique, self._pulls = settings, timing, oblique, pulls
-        self._plus, self._away = tuple(on_plus_side(plane).tolist()), away_of(plane, settings.markers.positive)
-        self._spools, self._period = spools_of(settings.actuator), timing.period
-        self._blind = BlindModel(wrist, settings.actuator, settings.safety.softest, settings.sensor, self._period)
-        self._nearer = 2.0 * settings.markers.distance / wrist.length
+        self._plus = () if settings.planes == 2 else tuple(on_plus_side(plane).tolist())
+        self._away = () if settings.planes == 2 else away_of(plane, settings.markers.positive)
+        self._spools, self._period, self._radius = spools_of(settings.actuator), timing.period, wrist.tendon_radius
+        self._blind = BlindModel(
+            wrist, settings.actuator, settings.safety.softest, settings.sensor, self._period, settings.planes
+        )
+        nearer = 2.0 * settings.markers.distance / wrist.length if settings.planes == 1 else math.nan
+        self._cameras = tuple(CameraRecord(nearer) for _ in range(settings.planes))
         self.limits = limits_of(settings)
         self._judge = Judge(self.limits)
-        self._frame: Frame | None = None
-        self._straight: list[float] = []
-        self._base: Array | None = None
-        self._moved = 0.0
         self._past: deque[_Past] = deque()
         self._positions: deque[Array] = deque(maxlen=round(_SWINGING / self._period))
         self._counts: tuple[int, int] | None = None
-        self._trips, self._skipped, self._blamed = _Recent(_TICKS), _Recent(_TICKS), _Recent(_TICKS)
-        self._lapsed, self._repeated = _Recent(_EVENTS), _Recent(_EVENTS)
-        self._usable, self._resent = _Recent(_SEEN), _Recent(_SEEN)
+        self._trips, self._skipped, self._blamed = Recent(_TICKS), Recent(_TICKS), Recent(_TICKS)
+        self._lapsed, self._resent = Recent(_EVENTS), Recent(_SEEN)
         self._began: float | None = None
         self._values: dict[str, float] = {}
         self.begin()
 
     def begin(self, pushed: bool = False) -> None:
         """A motion begins; whether a person pushes in it."""
-        self._pushed, self._lag = pushed, MarkerLag()
+        self._pushed = pushed
+        for camera in self._cameras:
+            camera.lag = MarkerLag()
         self.most: dict[str, float] = {}
         """Largest of each residual in the motion."""
 
@@ -126,45 +101,35 @@ class Watch:
         """What was odd in the motion, in one line."""
         return "; ".join(notes(self.most, self.limits))
 
-    def predict(self, reeled_plus: float, reeled_minus: float) -> None:
-        """Go on to the next tick, with the sides reeled in by so much [m] until then."""
-        self._blind.predict(reeled_plus, reeled_minus)
+    def predict(self, *reeled: float) -> None:
+        """Go on to the next tick, with the sides, or in two planes the axes, reeled in by so much [m] until then."""
+        self._blind.predict(*reeled)
 
     def sighted(self, sighting: Sighting, clock: float) -> None:
         """Take in any picture."""
-        if sighting.verdict in (SightingVerdict.FROZEN, SightingVerdict.STAMP):
-            self._repeated.add(clock)
-        base = sighting.corners[0]
-        if not np.isfinite(base).all():
-            return
-        self._base = base if self._base is None else self._base
-        side = math.dist(*self._base[:2])
-        self._moved = float(np.hypot(*(base - self._base).mean(axis=0))) / side if side > 0.0 else 0.0
+        self._cameras[sighting.plane].sighted(sighting, clock)
 
     def saw(self, sighting: Sighting, captured: float, clock: float) -> Frame:
-        """Take in a usable frame, taken `captured` seconds after tick 0."""
-        away = -self._nearer * math.log(sighting.size)  # a marker at a bend b is b L/2 further off
-        if math.isfinite(away) and len(self._straight) < _REFERENCE_FRAMES:
-            self._straight.append(away)
-        known = len(self._straight) == _REFERENCE_FRAMES
-        across = away - float(np.median(self._straight)) if known else math.nan
-        self._frame = Frame(sighting.time, sighting.theta, self._blind.angles(captured), across)
-        self._usable.add(clock)
-        before, after = (self._blind.angles(captured + half)[0] for half in (-self._period / 2.0, self._period / 2.0))
-        self._lag.add(sighting.theta, float(self._frame.predicted[0]), float(after - before) / self._period)
-        return self._frame
+        """Take in a usable frame, taken `captured` seconds after tick 0; its angle is its plane's bend."""
+        plane = sighting.plane
+        predicted, before, after = (
+            self._blind.angles(captured + since).reshape(2, -1)[:, plane]
+            for since in (0.0, -self._period / 2.0, self._period / 2.0)
+        )
+        rate = float(after[0] - before[0]) / self._period
+        return self._cameras[plane].saw(sighting, captured, predicted, rate, clock)
 
     def see(self, tick: Tick, last_usable: float) -> dict[str, float]:
         """All residuals of a tick; nan where one is not known yet."""
         self._began = tick.clock if self._began is None else self._began
         self._count(tick)
-        finite = all(map(math.isfinite, tick.estimate))
+        finite = bool(np.isfinite(np.hstack(tick.estimate)).all())
         self._values = {
             "late": tick.late,
             "lapses": float(len(self._lapsed.values(tick.clock))),
-            "no_number": float(sum(not math.isfinite(value) for value in tick.estimate)),
-            "angle": tick.estimate.theta,
-            "rate": tick.estimate.rate,
+            "no_number": float((~np.isfinite(np.hstack(tick.estimate))).sum()),
+            "angle": _size(tick.estimate.theta),
+            "rate": _size(tick.estimate.rate),
             "age": tick.clock - last_usable,
             "pull": max(0.0, float(self._spools.tension(tick.position, tick.taut).max())) if finite else math.nan,
             **self._weighed(tick.clock, tick.position, tick.taut),
@@ -172,11 +137,11 @@ class Watch:
             "disabled": float(tick.state != State.ENABLED),
             **self._following(tick),
             **self._of_timing(tick.clock),
-            "unseen": self._unseen(tick.clock),
-            "repeated": float(len(self._repeated.values(tick.clock))),
+            "unseen": max(self._unseen(camera, tick.clock) for camera in self._cameras),
+            "repeated": float(max(camera.repeated(tick.clock) for camera in self._cameras)),
             "resent": sum(self._resent.values(tick.clock)),
-            "moved": self._moved,
-            "lag": self._lag.least(),
+            "moved": max(camera.moved for camera in self._cameras),
+            "lag": _largest([camera.lag.least() for camera in self._cameras]),
         }
         self.most = worst(self._values, self.most)
         return self._values
@@ -191,10 +156,13 @@ class Watch:
         stretch = self._spools.step * position - taut
         return {} if self._pulls is None else self._pulls.residuals(clock, stretch)
 
-    def standing(self, theta: float, position: Array, taut: Array, clock: float) -> None:
-        """Raises SafetyStop where a wrist whose motors stand is bent, or its tendons are pulled, beyond the limits."""
+    def standing(self, theta: Any, position: Array, taut: Array, clock: float) -> None:
+        """Raises SafetyStop where a wrist whose motors stand is bent, or its tendons are pulled, beyond the limits.
+
+        In two planes `theta` is its bend (2,).
+        """
         pull = max(0.0, float(self._spools.tension(position, taut).max()))
-        values = {"angle": theta, "pull": pull, **self._weighed(clock, position, taut)}
+        values = {"angle": _size(theta), "pull": pull, **self._weighed(clock, position, taut)}
         for limit in self.limits:
             value = values.get(limit.name, 0.0)
             if abs(value) > limit.limit:
@@ -214,16 +182,19 @@ class Watch:
         self._counts = tick.lapses, tick.resent
 
     def _following(self, tick: Tick) -> dict[str, float]:
-        if self._frame is None:
-            return dict.fromkeys(_FOLLOWING, math.nan) | {"load": tick.estimate.load}
-        self._past.append(_Past(tick.clock, self._frame, tick.position))
+        load = _size(tick.estimate.load)
+        frames = tuple(camera.frame for camera in self._cameras if camera.frame is not None)
+        if len(frames) < len(self._cameras):
+            return dict.fromkeys(_FOLLOWING, math.nan) | {"load": load}
+        self._past.append(_Past(tick.clock, frames, tick.position))
         self._positions.append(tick.position)
         while tick.clock - self._past[0].clock > _HISTORY:
             self._past.popleft()
-        frame = self._frame
-        apart = frame.seen - float(np.clip(frame.seen, frame.predicted.min(), frame.predicted.max()))
-        jump = _jump(self._past[-2].frame, frame) if len(self._past) > 1 else 0.0
-        return {"jump": jump, "across": frame.away, "load": tick.estimate.load, "apart": apart}
+        jumps = [0.0]
+        if len(self._past) > 1:
+            jumps = [jump_between(*both) for both in zip(self._past[-2].frames, frames, strict=True)]
+        across = frames[0].away if len(frames) == 1 else math.nan
+        return {"jump": _size(jumps), "across": across, "load": load, "apart": _size([each.apart for each in frames])}
 
     def _of_timing(self, clock: float) -> dict[str, float]:
         trips, skipped = self._trips.values(clock), sum(self._skipped.values(clock))
@@ -231,11 +202,9 @@ class Watch:
             return {"round_trip": math.nan, "skipped": math.nan}
         return {"round_trip": float(np.median(trips)), "skipped": skipped / (skipped + len(trips))}
 
-    def _unseen(self, clock: float) -> float:
-        sensor = self._settings.sensor
-        usable, since = len(self._usable.values(clock)), clock - (clock if self._began is None else self._began)
-        expected = min(since, _SEEN) * sensor.frame_rate * (1.0 - sensor.dropped)
-        return 1.0 - (usable + 1.0) / expected if since > 0.5 * _SEEN else math.nan
+    def _unseen(self, camera: CameraRecord, clock: float) -> float:
+        since = clock - (clock if self._began is None else self._began)
+        return camera.unseen(clock, since, self._settings.sensor)
 
     def _stop(self, limit: Limit, tick: Tick) -> SafetyStop:
         name, fix = limit.name, RESIDUALS[limit.name].causes
@@ -251,8 +220,8 @@ class Watch:
             problem, fix = f"{problem}: {culprit}", FIX[culprit]
         elif RESIDUALS[name].weighed:
             problem += self._named(name)
-        elif name in _FOLLOWING:
-            problem, fix = f"{problem}; likely {', or '.join(self._causes()[:4])}", _FIX
+        elif name in _FOLLOWING or (name == "pull" and self._settings.planes == 2):
+            problem, fix = f"{problem}; likely {', or '.join(self._causes(tick)[:4])}", _FIX
         return SafetyStop(problem, fix=fix)
 
     def _named(self, name: str) -> str:
@@ -260,28 +229,51 @@ class Watch:
             return ""
         return f"; likely {self._pulls.causes(name)}"
 
-    def _causes(self) -> list[str]:
+    def _causes(self, tick: Tick) -> list[str]:
         if not self._past:
             return [RESIDUALS["load"].causes]
         first, last = self._past[0], self._past[-1]
+        jumps = [
+            max((abs(jump_between(one.frames[k], two.frames[k])) for one, two in pairwise(self._past)), default=0.0)
+            for k in range(len(last.frames))
+        ]
+        turned, swings = last.position - first.position, reversals(np.array(self._positions))
+        ends = list(zip(first.frames, last.frames, strict=True))
+        if len(last.frames) == 2:
+            return causes_in_space(
+                SpatialEvidence(
+                    turned=turned,
+                    torque=self._radius * np.maximum(0.0, self._spools.tension(tick.position, tick.taut)),
+                    load=np.array(tick.estimate.load),
+                    apart=np.array([frame.apart for frame in last.frames]),
+                    bent=np.array([two.seen - one.seen for one, two in ends]),
+                    meant=np.array([(two.predicted - one.predicted)[0] for one, two in ends]),
+                    jump=np.array(jumps),
+                    reversals=swings,
+                    pushed=self._pushed,
+                )
+            )
+        ((one, two),) = ends
         evidence = Evidence(
-            turned=last.position - first.position,
+            turned=turned,
             load=self._values["load"],
-            across=0.0 if math.isnan(last.frame.away) else last.frame.away,
-            bent=last.frame.seen - first.frame.seen,
-            meant=float((last.frame.predicted - first.frame.predicted)[0]),
-            jump=max((abs(_jump(one.frame, two.frame)) for one, two in pairwise(self._past)), default=0.0),
+            across=0.0 if math.isnan(two.away) else two.away,
+            bent=two.seen - one.seen,
+            meant=float((two.predicted - one.predicted)[0]),
+            jump=jumps[0],
             bends=math.radians(self._settings.safety.across_deg),
-            reversals=reversals(np.array(self._positions)),
+            reversals=swings,
             pushed=self._pushed,
             oblique=self._oblique,
         )
         return likely_causes(evidence, self._plus, self._away)
 
 
-def _jump(one: Frame, two: Frame) -> float:
-    """Jump of a second frame off the motion that the spools should have made since the first; the least of both."""
-    if not 0.0 < two.captured - one.captured <= _SUCCESSIVE:
-        return 0.0
-    jumps = two.seen - one.seen - (two.predicted - one.predicted)
-    return float(jumps[np.abs(jumps).argmin()])
+def _size(value: Any) -> float:
+    """The value of one plane as it is, or the norm over two."""
+    parts = np.atleast_1d(value).tolist()
+    return float(parts[0]) if len(parts) == 1 else math.hypot(*parts)
+
+
+def _largest(values: Sequence[float]) -> float:
+    return max((value for value in values if not math.isnan(value)), default=math.nan)

@@ -9,9 +9,10 @@ from wristctl.board.driver import Board
 from wristctl.board.messages import AXES, JOG_RATE
 from wristctl.config.hw_run import Homing, RigSettings
 from wristctl.config.wrist import WristParameters
-from wristctl.trial.homing import ExpectedMoves, Zero, slacken
+from wristctl.trial.expected_moves import ExpectedMoves
+from wristctl.trial.homing import Zero, moves_of, slacken
 from wristctl.trial.spools import on_plus_side, spools_of
-from wristctl.trial.supervised_wait import Patience
+from wristctl.trial.supervised_wait import Patience, Reading
 from wristctl.trial.tracking import Tracking
 
 # Share of `homing.pull` by which a tendon is reeled in to check it.
@@ -27,7 +28,7 @@ def check_zero(
 
     Raises SafetyStop where a tendon is not slack, or a motor turns the wrong way or winds another tendon than its own.
     """
-    expected, spools, homing = ExpectedMoves(settings, wrist, plane), spools_of(settings.actuator), settings.homing
+    expected, spools, homing = moves_of(settings, wrist, plane), spools_of(settings.actuator), settings.homing
     slack, reeled = -round(homing.pull / spools.step), round(_CHECKED * homing.pull / spools.step)
     patience = Patience(board)
     held = patience.reading(tracking, 4 * homing.frames)
@@ -44,7 +45,7 @@ def check_zero(
         bend = expected.bend(straight, patience.reading(tracking, homing.frames))
         slacken(board, spools, homing, zero.signs)
         expected.judge_small_move(axis, reeled, bend)
-        _straighten(board, tracking, homing, straight.theta)
+        _straighten(board, tracking, homing, expected, straight)
 
 
 def check_cocontraction(
@@ -53,15 +54,16 @@ def check_cocontraction(
     """See that no tendons of a wrist at rest at zero pull against each other; leaves it slack.
 
     Pulls that balance bend nothing, so they show in no residual. All tendons are let out by `homing.pull`, then those
-    of one side twice as far again: where the other side pulls, the wrist bends to it. Raises SafetyStop.
+    of one side twice as far again: where the other side pulls, the wrist bends to it. In two planes one tendon of both
+    opposite pairs is let out so. Raises SafetyStop.
     """
-    expected, spools, homing = ExpectedMoves(settings, wrist, plane), spools_of(settings.actuator), settings.homing
+    expected, spools, homing = moves_of(settings, wrist, plane), spools_of(settings.actuator), settings.homing
     slack = round(homing.pull / spools.step)
     slacken(board, spools, homing, zero.signs)
     patience = Patience(board)
     patience.wait(_SETTLES)
     held = patience.reading(tracking, 4 * homing.frames)
-    patience = _reeled(board, zero, np.where(on_plus_side(plane), -3 * slack, -slack))
+    patience = _reeled(board, zero, np.where(on_plus_side(plane or "ulnar"), -3 * slack, -slack))
     patience.wait(_SETTLES)
     bend = expected.bend(held, patience.reading(tracking, 4 * homing.frames))
     slacken(board, spools, homing, zero.signs)
@@ -75,8 +77,10 @@ def _reeled(board: Board, zero: Zero, positions: NDArray[np.int64]) -> Patience:
     return Patience(board)
 
 
-def _straighten(board: Board, tracking: Tracking, homing: Homing, straight: float) -> None:
+def _straighten(
+    board: Board, tracking: Tracking, homing: Homing, expected: ExpectedMoves, straight: Reading
+) -> None:  # fmt: skip
     patience, clock = Patience(board), board.transport
-    deadline = clock.now() + homing.let_go
-    while abs(patience.angle(tracking, 1) - straight) > 0.5 * math.radians(homing.bend_deg) and clock.now() < deadline:
+    deadline, least = clock.now() + homing.let_go, 0.5 * math.radians(homing.bend_deg)
+    while expected.size(expected.bend(straight, patience.reading(tracking, 1))) > least and clock.now() < deadline:
         pass

@@ -72,7 +72,7 @@ def calibrate_wrist(session: Session) -> WristCalibrated | AxisFound:
     import numpy as np
 
     from wristctl.trial.calibration import FILE, calibrated
-    from wristctl.trial.homing import ExpectedMoves
+    from wristctl.trial.homing import SpatialZero, moves_of
     from wristctl.trial.testbeds import open_testbed
     from wristctl.vision.view import View
     from wristctl.wrist.directions import ACTIVE
@@ -92,7 +92,7 @@ def calibrate_wrist(session: Session) -> WristCalibrated | AxisFound:
     findings.plain(FILE, calibration.plain())
     zero = calibration.zero
     findings.metric("marker", zero.marker, "rad", meaning="angle between the markers on the straight wrist")
-    by_model = ExpectedMoves(settings, study.wrist, settings.plane).steps()
+    by_model = moves_of(settings, study.wrist, settings.plane).steps()
     rows = []
     for axis, tendon in enumerate(ACTIVE):
         slope, slack, near = zero.steps_per_radian[axis], zero.slack[axis], f"tendon {tendon}, near the straight wrist"
@@ -100,7 +100,14 @@ def calibrate_wrist(session: Session) -> WristCalibrated | AxisFound:
         findings.metric(f"slack_{tendon}", slack, "m", meaning=f"tendon {tendon}, when homing began")
         rows.append((axis, tendon, f"{zero.signs[axis]:+d}", slope, by_model, 1e3 * slack, 1e3 * zero.friction[axis]))
     findings.summary(f"Marker angle of the straight wrist: {np.degrees(zero.marker):.3f} deg")
-    return WristCalibrated(study, findings, [Table("Zero", _COLUMNS, rows)], calibration)
+    tables = [Table("Zero", _COLUMNS, rows)]
+    if isinstance(zero, SpatialZero):
+        findings.metric("marker_2", zero.marker_2, "rad", meaning="the same before the second camera")
+        for tendon, toward in zip(ACTIVE, zero.directions, strict=True):
+            findings.metric(f"direction_{tendon}", toward, "rad", meaning=f"tendon {tendon}, from ulnar toward flexion")
+        cells = [(tendon, float(np.degrees(y))) for tendon, y in zip(ACTIVE, zero.directions, strict=True)]
+        tables.append(Table("Directions, from ulnar toward flexion", ("tendon", "bends toward [deg]"), cells))
+    return WristCalibrated(study, findings, tables, calibration)
 
 
 def _one_axis(session: Session, testbed: Testbed, axis: int) -> AxisFound:

@@ -45,14 +45,18 @@ def write_open_log(run: Run, path: Path) -> None:
 
 
 def _trials(run: Run) -> tuple[Columns, Mapping[str, np.ndarray]]:
-    """Trials of a rig: spools at the times of the ticks, bends and tips at those of the frames, in either plane."""
+    """Trials of a rig: spools at the times of the ticks, bends at those of the frames, in one plane tips too."""
     log, frames, kinds = (run.data(name) for name in ("log", "frames", "trials"))
     step = run.config.hw_run.actuator.step_length
     parts: list[tuple[Columns, str]] = []
     for row in kinds.itertuples():
-        number, flexion = row.trial, DIRECTIONS[str(row.direction)].plane == "flexion"
+        number, direction = row.trial, DIRECTIONS.get(str(row.direction))
+        flexion = direction is not None and direction.plane == "flexion"
         ticks, seen = log[log.trial == number], frames[(frames.trial == number) & (frames.verdict == "ok")]
         spools = {f"spool_{tendon}": step * ticks[f"position_{tendon}"].to_numpy(float) for tendon in ACTIVE}
+        if "plane" in seen:
+            parts.append((_merged([(ticks.counted.to_numpy(float), spools), *_bends_seen(seen)]), f"{number}"))
+            continue
         bend, tip = ("bend_z", "tip_z") if flexion else ("bend_y", "tip_y")
         sights = {bend: seen.theta.to_numpy(float)}
         if "tip_x" in seen:
@@ -65,6 +69,15 @@ def _trials(run: Run) -> tuple[Columns, Mapping[str, np.ndarray]]:
         for name in names
     }
     return columns, {"trial": np.concatenate([np.full(len(part["time"]), trial) for part, trial in parts])}
+
+
+def _bends_seen(frames: pd.DataFrame) -> list[tuple[Array, Columns]]:
+    """Bends at the times of the frames that show them, of a rig in two planes."""
+    parts = []
+    for plane, name in (("ulnar", "bend_y"), ("flexion", "bend_z")):
+        of_plane = frames[frames.plane == plane]
+        parts.append((of_plane.captured.to_numpy(float), {name: of_plane.bend.to_numpy(float)}))
+    return parts
 
 
 def _order(name: str) -> tuple[bool, str]:

@@ -147,10 +147,15 @@ def _apart(done: pd.DataFrame, labels: Sequence[str], twins: Mapping[int, Simula
 
 def _unsound(trials: pd.DataFrame, marks: Sequence[str], metrics: Mapping[str, float]) -> list[str]:
     """Trials that ended early or were odd, what the wrist does wrong, and ticks that were skipped."""
+    marked = [f"Of the completed trials: {'; '.join(marks)}."] if marks else []
+    early, slow = notes_on(trials, {}), notes_on(trials.iloc[:0], metrics)
+    return [*early, *marked, *slow]
+
+
+def notes_on(trials: pd.DataFrame, metrics: Mapping[str, float]) -> list[str]:
+    """Trials that ended early or were odd, and ticks that were skipped."""
     notes = [f"Trial {row['trial']} ended early: {row['outcome']}." for row in _records(trials, "outcome", "ok")[:3]]
     notes += [f"Trial {row['trial']} was odd: {row['odd']}." for row in _records(trials, "odd", "")[:3]]
-    if marks:
-        notes.append(f"Of the completed trials: {'; '.join(marks)}.")
     if metrics.get("overruns", 0.0) > 0.0:
         skipped, ticks = int(metrics["overruns"]), int(metrics["ticks"])
         notes.append(f"The controller was too slow for its period: {skipped} of {ticks} control ticks were skipped.")

@@ -28,7 +28,13 @@ from wristctl.errors import under
 if TYPE_CHECKING:
     import pandas as pd
 
+    from wristctl.commands.hw_run.trial_bends import PerformedBends
+    from wristctl.config.hw_run import HwRunSettings
+    from wristctl.config.wrist import WristParameters
     from wristctl.simulation.repetitions import Simulation
+
+# Time between two samples of a motion by which it is checked before a run [s].
+_CHECKED = 0.01
 
 
 @dataclass(frozen=True, repr=False, eq=False)
@@ -74,19 +80,47 @@ def plan(study: Study, inputs: Inputs) -> str:
     for number, row in enumerate(settings.rows):
         with under(f"hw-run.controllers.{number}"):
             check_row(row, tuned)
+    known = identified(study, "hw-run", inputs).wrist
     with under("hw-run"):
-        check_reach([settings.reference], identified(study, "hw-run", inputs).wrist, "reference")
+        if settings.planes == 1:
+            check_reach([settings.reference], known, "reference")
+        else:
+            check_bends_of_trials(settings, known)
         check_inverses(inverses_of([settings.reference]), inputs)
     pushes = settings.without_push + (settings.push.force != 0.0)
-    count = len(settings.rows) * len(set(settings.directions)) * settings.repetitions * pushes
+    motions = len(set(settings.directions))
+    if settings.planes == 2:
+        from wristctl.trial.trials import motions_of
+
+        motions = len(motions_of(settings))
+    count = len(settings.rows) * motions * settings.repetitions * pushes
     trial_seconds = settings.horizon + settings.back + settings.rest
     return f"{describe_rig(settings)}\n{count} trials, about {count * trial_seconds:.0f} s of motion after homing"
 
 
-def hw_run(session: Session) -> Performed:
-    """Perform the paper's experiment: four directions, with and without a push, on hardware or all emulated."""
+def check_bends_of_trials(settings: HwRunSettings, wrist: WristParameters) -> None:
+    """UserError for motions or controllers of trials in two planes that cannot be."""
+    from wristctl.control.table import controller
+    from wristctl.simulation.two_planes import check_bends
+    from wristctl.trial.bend_motion import bend_motion_of
+    from wristctl.trial.spatial_belief import layout_of_axes
+    from wristctl.trial.trials import motions_of
+
+    layout_of_axes(wrist)
+    for name in motions_of(settings):
+        followed = bend_motion_of(settings.model_copy(update={"control_period": _CHECKED}), wrist, name)
+        for row in settings.rows:
+            check_bends(controller(row.controller), followed.references[:, 0], wrist, settings.loop)
+
+
+def hw_run(session: Session) -> Performed | PerformedBends:
+    """Perform the paper's experiment: four directions, with and without a push, on hardware or all emulated.
+
+    A reference in two planes, or `planes: 2`, bends the wrist in both at once, before two cameras.
+    """
     session.operator.tell(describe_rig(session.study.hw_run))
     from wristctl.commands.hw_run.results import trial_tables
+    from wristctl.commands.hw_run.trial_bends import bends_performed
     from wristctl.commands.hw_run.trials import perform_trials
 
     study, bench = session.study, session.study.wrist
@@ -101,11 +135,14 @@ def hw_run(session: Session) -> Performed:
     elif swinging := outside_conditions(believed.rows, [believed.loop]):
         session.operator.dare("; ".join(swinging))
     trials = perform_trials(identified_session, bench, network, tuned)
+    if believed.planes == 2:
+        performed = bends_performed(identified_session, trials, tuned)
+        return replace(performed, study=study)
     tables, twins = trial_tables(identified_session, trials, network, tuned)
     return Performed(study, session.findings, tables, trials, twins)
 
 
-HW_RUN = Procedure(
+HW_RUN: Procedure[Performed | PerformedBends] = Procedure(
     "hw-run",
     plan,
     hw_run,

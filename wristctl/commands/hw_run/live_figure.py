@@ -36,10 +36,14 @@ def recent(rows: pd.DataFrame) -> Figure:
     picture, ((above,), (below,)) = figure(2, height=5.0, sharex=True)
     if len(rows):
         time = rows["clock"] - rows["clock"].iloc[-1]
-        above.plot(time, np.degrees(rows["theta_ref"]), **WANTED | {"label": "reference"})
-        above.plot(time, np.degrees(rows["theta"]), color=BLUE, label="angle")
-        capture_time = time + rows["captured"] - rows["time"]
-        above.plot(capture_time, np.degrees(rows["theta_measured"]), ".", color=BLACK, markersize=2.0, label="marker")
+        of_angle = [("theta", "", BLUE, "angle")]
+        if "theta" not in rows:
+            of_angle = [("bend", "_ulnar", BLUE, "toward ulnar"), ("bend", "_flexion", ORANGE, "toward flexion")]
+        for name, plane, colour, label in of_angle:
+            above.plot(time, np.degrees(rows[f"{name}_ref{plane}"]), **WANTED | {"label": "reference"})
+            above.plot(time, np.degrees(rows[f"{name}{plane}"]), color=colour, label=label)
+            captured, seen = time + rows[f"captured{plane}"] - rows["time"], np.degrees(rows[f"{name}_measured{plane}"])
+            above.plot(captured, seen, ".", color=BLACK, markersize=2.0, label="marker")
         for tendon, colour in zip(ACTIVE, _COLOURS, strict=True):
             below.plot(time, rows[f"tension_{tendon}"], color=colour, label=f"tendon {tendon}")
         newest = rows.iloc[-1]

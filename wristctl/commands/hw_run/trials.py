@@ -17,12 +17,16 @@ from wristctl.config.wrist import WristParameters
 from wristctl.control.table import Gains
 from wristctl.errors import fix_of
 from wristctl.records import LiveRun
+from wristctl.simulation.bend_course import BEND_METRICS
 from wristctl.simulation.metrics import METRICS
+from wristctl.trial.bend_motion import BendMotion
+from wristctl.trial.bend_results import FURTHER, LOGGED, TRULY, bends_evaluated
 from wristctl.trial.calibration import WristCalibration
 from wristctl.trial.experiment import Experiment
 from wristctl.trial.log import TrialLog
 from wristctl.trial.residuals import FILE, RESIDUALS, limits_of, plain
 from wristctl.trial.safety import SafetyStop
+from wristctl.trial.spatial_belief import PLANES
 from wristctl.trial.testbeds import open_testbed
 from wristctl.trial.trials import JUDGED, Trial, evaluated, trials_of
 from wristctl.vision.camera import Frame
@@ -35,9 +39,10 @@ from wristctl.wrist.kinematics import Inverse
 
 log = logging.getLogger(__name__)
 
-Films = list[AnnotatedVideo | RawVideo]
+# Films of each camera.
+Films = list[list[AnnotatedVideo | RawVideo]]
 
-_OF_TRIALS: dict[str, tuple[str, str]] = {
+_OF_ANY: dict[str, tuple[str, str]] = {
     "trial": ("", "number, from 0, in the order done"),
     "direction": ("", "of bending"),
     "repetition": ("", "number, from 0"),
@@ -46,11 +51,22 @@ _OF_TRIALS: dict[str, tuple[str, str]] = {
     "gains": ("", "preset, tuned or own"),
     "outcome": ("", "ok, or why it ended early"),
     "odd": ("", "what was odd all the same: beyond what a sound rig shows, within the limits"),
+}
+_OF_TRIALS: dict[str, tuple[str, str]] = {
+    **_OF_ANY,
     **{name: (metric.unit, metric.formula) for name, metric in METRICS.items()},
     **{f"true_{name}": (METRICS[name].unit, f"{METRICS[name].formula}; of the true angle") for name in JUDGED},
     "recovery": ("s", "from the end of the push in the estimated load until |e| stays within 2 % of the move"),
     "true_recovery": ("s", "the same by the emulated wrist's true angle, from the true end of the push"),
     "push_torque": ("N m", "largest load torque of the push, as estimated"),
+}
+_OF_BENDS: dict[str, tuple[str, str]] = {
+    **_OF_ANY,
+    "direction": ("", "of bending, or the path in two planes"),
+    "push": ("N", "largest force"),
+    **{name: BEND_METRICS[name][:2] for name in LOGGED},
+    **{f"true_{name}": (BEND_METRICS[name].unit, f"{BEND_METRICS[name].formula}; of the true bend") for name in TRULY},
+    **FURTHER,
 }
 
 
@@ -71,7 +87,9 @@ def perform_trials(
     coordinates = plant.coordinates(settings.bench.segments) if settings.port is None else None
     monotonic = settings.port is not None or settings.real_time
     folder, weighed = run.file("data/log.csv").parent, settings.load_cells is not None
-    trial_log = TrialLog(folder, coordinates, settings.control_period, monotonic, weighed)
+    if coordinates is not None:
+        coordinates *= settings.planes
+    trial_log = TrialLog(folder, coordinates, settings.control_period, monotonic, weighed, settings.planes)
     try:
         experiment = Experiment(settings, study.wrist, trials, trial_log, network, tuned, calibration, study.seed)
         films = _films(run, settings)
@@ -88,13 +106,13 @@ def perform_trials(
         trial_log.close()
     except OSError as error:
         stopped = stopped or SafetyStop(f"the log cannot be written: {error.strerror}", "data", fix_of(error))
-    for film in films:
-        film.close()
-    if films:
-        run.columns("data/raw.csv", RAW)
+    for number, of_camera in enumerate(films):
+        for film in of_camera:
+            film.close()
+        run.columns(f"data/raw{_number(number)}.csv", RAW)
     for name, stream in trial_log.streams.items():
         run.columns(f"data/{name}.csv", stream.columns)
-    table = _evaluate(run, settings, experiment, trials)
+    table = _evaluate(run, settings, study.wrist, experiment, trials)
     _summarise(session, experiment, trial_log)
     if stopped is not None:
         raise stopped
@@ -117,16 +135,26 @@ def _perform(
 def _films(run: LiveRun, settings: HwRunSettings) -> Films:
     if not settings.video:
         return []
-    rate = settings.sensor.frame_rate
-    return [AnnotatedVideo(run.file("data/video.avi"), rate), RawVideo(run.file("data/raw.avi"), rate)]
+    rate, names = settings.sensor.frame_rate, [_number(camera) for camera in range(settings.planes)]
+    return [
+        [AnnotatedVideo(run.file(f"data/video{name}.avi"), rate), RawVideo(run.file(f"data/raw{name}.avi"), rate)]
+        for name in names
+    ]
+
+
+def _number(camera: int) -> str:
+    """What a camera's files are called beside those of the first."""
+    return f"_{camera + 1}" if camera else ""
 
 
 def _add(films: Films, frame: Frame, sighting: Sighting) -> None:
-    for film in films:
+    for film in films[sighting.plane]:
         film.add(frame, sighting)
 
 
-def _evaluate(run: LiveRun, settings: HwRunSettings, experiment: Experiment, trials: list[Trial]) -> pd.DataFrame:
+def _evaluate(
+    run: LiveRun, settings: HwRunSettings, wrist: WristParameters, experiment: Experiment, trials: list[Trial]
+) -> pd.DataFrame:
     """trials.csv: a row for each trial that began, by the log alone."""
     courses = pd.read_csv(run.file("data/log.csv"))
     file = run.path / "data/truth.csv"
@@ -139,6 +167,10 @@ def _evaluate(run: LiveRun, settings: HwRunSettings, experiment: Experiment, tri
         course = courses[courses["trial"] == trial.number]
         truth = None if truths is None else truths[truths["trial"] == trial.number]
         followed = experiment.motions[trial.direction]
+        if isinstance(followed, BendMotion):
+            values = bends_evaluated(trial, course, followed, settings.push, wrist, truth)
+        else:
+            values = evaluated(trial, course, followed, settings.push, settings.control_period, truth)
         rows.append(
             {
                 "trial": trial.number,
@@ -149,11 +181,12 @@ def _evaluate(run: LiveRun, settings: HwRunSettings, experiment: Experiment, tri
                 "gains": row.gains_name,
                 "outcome": experiment.outcomes[trial.number],
                 "odd": experiment.odd.get(trial.number, ""),
-                **evaluated(trial, course, followed, settings.push, settings.control_period, truth),
+                **values,
             }
         )
-    table = pd.DataFrame(rows, columns=list(_OF_TRIALS))
-    units, meaning = ({name: column[i] for name, column in _OF_TRIALS.items()} for i in range(2))
+    columns = _OF_BENDS if settings.planes == 2 else _OF_TRIALS
+    table = pd.DataFrame(rows, columns=list(columns))
+    units, meaning = ({name: column[i] for name, column in columns.items()} for i in range(2))
     run.table("data/trials.csv", table, units=units, meaning=meaning)
     return table
 
@@ -210,13 +243,18 @@ def _last_second(trial_log: TrialLog) -> Table:
     """The last second of ticks, every tenth of it."""
     rows = list(trial_log.last)
     shown = rows[:: -max(1, len(rows) // 10)][::-1]
-    columns = ("time [s]", "theta [deg]", "reference [deg]", "marker", *(f"T{k} [N]" for k in ACTIVE), "state")
+    angles = {"theta": "theta [deg]", "theta_ref": "reference [deg]"}
+    verdicts = {"verdict": "marker"}
+    if shown and "bend_ulnar" in shown[0]:
+        both = {"bend": "", "bend_ref": "wanted "}
+        angles = {f"{name}_{plane}": f"{word}{plane} [deg]" for name, word in both.items() for plane in PLANES}
+        verdicts = {f"verdict_{plane}": f"{plane} marker" for plane in PLANES}
+    columns = ("time [s]", *angles.values(), *verdicts.values(), *(f"T{k} [N]" for k in ACTIVE), "state")
     cells = [
         (
             round(row["time"], 3),
-            round(float(np.degrees(row["theta"])), 2),
-            round(float(np.degrees(row["theta_ref"])), 2),
-            str(row["verdict"]) or "-",
+            *(round(float(np.degrees(row[name])), 2) for name in angles),
+            *(str(row[name]) or "-" for name in verdicts),
             *(round(row[f"tension_{k}"], 2) for k in ACTIVE),
             row["state"],
         )

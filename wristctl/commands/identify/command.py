@@ -183,6 +183,9 @@ def _problem(study: Study, inputs: Inputs) -> Problem:
     start: dict[str, float] = {}
     believed = Actuator()
     for role, run in inputs.runs().items():
+        if run.config.hw_run.planes == 2:
+            fix = "wristctl runs export RUN, then wristctl identify FILE --set model=wrist"
+            raise UserError("its trials bend in two planes, which are fitted by their open log", run.id, fix)
         config, logged = run.config, inputs.read(role, _logged)
         assert logged is not None
         actuator, wrist = config.hw_run.actuator, config.wrist

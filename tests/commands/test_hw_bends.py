@@ -1,0 +1,116 @@
+"""`hw-run` in two planes, from homing to the page: what is written, said, drawn and exported."""
+
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import pytest
+
+import wristctl
+from tests.commands.conftest import columns_of, session
+from wristctl.commands.export.open_log_of_run import open_log_of
+from wristctl.commands.hw_run.command import hw_run, plan
+from wristctl.commands.hw_run.trial_bends import PerformedBends
+from wristctl.commands.inputs import Inputs
+from wristctl.config.wrist import WristParameters
+from wristctl.errors import UserError
+from wristctl.identification.bend_trials import bend_trials
+from wristctl.plotting.animation import animation
+from wristctl.plotting.spatial_view import spatial_view
+from wristctl.records import Run, start_run
+from wristctl.simulation.bend_course import BEND_METRICS
+from wristctl.wrist.directions import ACTIVE
+
+SETTINGS = (
+    "hw-run={reference: {kind: dart-thrower, angle_deg: 8.0, turn: 1.0}, horizon: 1.2, back: 0.4, rest: 0.1, "
+    "push: {force: 1.0, start: 0.6, duration: 0.2}, push_toward_deg: 130, "
+    "homing: {frames: 2, rest: 0.1, move: 1.0e-4, slack: 4.0e-4, let_go: 0.6}, "
+    "controllers: [{controller: ct-dob, gains: hardware}], "
+    "bench: {person: {takes: 0.0}, motors: {slack: [0.0, 0.0, 0.0, 0.0]}}}",
+)  # fmt: skip
+
+
+@dataclass
+class Whole:
+    """A result with its run."""
+
+    result: PerformedBends
+    run: Run
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory: pytest.TempPathFactory) -> Whole:
+    """Two trials, of which one is pushed."""
+    study = wristctl.load_study(None, *SETTINGS)
+    with start_run("hw-run", study, "", tmp_path_factory.mktemp("whole")) as live:
+        result = hw_run(session(study, live))
+    assert isinstance(result, PerformedBends)
+    return Whole(result, Run(live.path))
+
+
+def test_a_row_has_errors_by_plane_estimated_and_true(whole: Whole) -> None:
+    table, columns = whole.run.data("trials"), columns_of(whole.run, "data/trials.csv")
+    assert sorted(table["push"]) == [0.0, 1.0] and set(table["direction"]) == {"dart-thrower"}
+    assert set(table["outcome"]) == {"ok"} and table["odd"].isna().all()
+    for name in ("rmse_ulnar", "rmse_flexion", "rmse"):
+        assert columns[name] == (BEND_METRICS[name].unit, BEND_METRICS[name].formula)
+        assert columns[f"true_{name}"][1].endswith("of the true bend")
+        assert (np.degrees(table[f"true_{name}"]) < 0.5).all()
+    pushed = table[table["push"] > 0.0].iloc[0]
+    assert math.isnan(pushed["push_torque"]), "the wrist moves meanwhile"
+    assert columns["true_recovery"][0] == "s" and columns["push_torque"][0] == "N m"
+
+
+def test_the_answer_has_both_planes_beside_simulation(whole: Whole) -> None:
+    answer = whole.result.answer
+    assert answer.sentence.startswith("ct-dob/hardware in two planes: error 0.")
+    assert "toward ulnar" in answer.sentence and "toward flexion" in answer.sentence
+    assert "with a push of 1 N" in answer.sentence and "No trial ended early." in answer.sentence
+    assert answer.table is not None and len(answer.table.rows) == 2
+    simulated = [course.metrics()["rmse"] for course in whole.result.twins.values()]
+    assert np.degrees(simulated) == pytest.approx([0.1, 0.1], abs=0.15)
+
+
+def test_it_is_drawn_in_the_plane_of_bends_and_in_space(whole: Whole) -> None:
+    names = {"bends", "errors", "pushed-bends", "pushed-errors"}
+    assert names <= set(whole.result.findings.figures)
+    assert all((whole.run.path / f"figures/{name}.svg").is_file() for name in names)
+    space = spatial_view(whole.run)
+    assert space is not None and len(space["tendons"]) == 4 and space["duration"] == pytest.approx(1.2, abs=0.02)
+    wanted = np.array(space["wanted"]) * space["units"]["angle"]
+    assert np.degrees(np.hypot(*wanted.T)).max() == pytest.approx(8.0, abs=0.1)
+    assert animation(whole.run) is None
+
+
+def test_what_homing_has_found_is_kept_by_tendon_and_camera(whole: Whole) -> None:
+    zero: dict[str, Any] = json.loads(whole.run.file("data/zero.json").read_text())
+    assert np.degrees(zero["directions"]) == pytest.approx([-135.0, 135.0, -45.0, 45.0], abs=2.5)
+    assert {"marker", "marker_2"} < set(zero)
+    assert set(json.loads(whole.run.file("data/camera_pose.json").read_text())) == {"ulnar", "flexion"}
+
+
+def test_its_open_log_is_one_that_identification_reads(whole: Whole) -> None:
+    log = open_log_of(whole.run)
+    assert {"time", "bend_y", "bend_z", *(f"spool_{tendon}" for tendon in ACTIVE)} <= set(log.columns)
+    trials = bend_trials([log], WristParameters(), 0.005)
+    assert len(trials) == 2 and all(len(trial.angle) > 80 for trial in trials)
+    assert {0, 1} == {int(channel) for trial in trials for channel in trial.channel}
+    assert "theta" not in whole.run.data("frames"), "no sample of an angle in one plane"
+
+
+@pytest.mark.parametrize(
+    ("change", "problem"),
+    [
+        ("hw-run.reference.angle_deg=70", "a bend of 70 deg is beyond the wrist's range"),
+        ("wrist.tendons=three", "winds the four tendons 1, 2, 4 and 5"),
+    ],
+)
+def test_what_cannot_be_is_refused_before_a_rig_is_opened(change: str, problem: str) -> None:
+    with pytest.raises(UserError, match=problem):
+        plan(wristctl.load_study(None, *SETTINGS, change), Inputs({}))
+    said = plan(wristctl.load_study(None, *SETTINGS), Inputs({}))
+    assert "2 trials" in said

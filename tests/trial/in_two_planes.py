@@ -1,0 +1,78 @@
+"""A short experiment on the emulated bench in two planes, at zero from the start."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from tests.trial.conftest import WRIST, Done
+from wristctl.bench.virtual_bench import VirtualBench
+from wristctl.board.driver import Board
+from wristctl.config.hw_run import HwRunSettings
+from wristctl.trial.calibration import WristCalibration
+from wristctl.trial.experiment import Experiment
+from wristctl.trial.homing import SpatialZero, Zero
+from wristctl.trial.log import TrialLog
+from wristctl.trial.testbeds import EmulatedTestbed
+from wristctl.trial.trials import trials_of
+from wristctl.vision.view import View
+
+CIRCLING: dict[str, Any] = {
+    "rows": ({"controller": "ct-dob", "gains": "hardware"},),
+    "reference": {"kind": "circumduction", "angle_deg": 12.0, "turn": 1.2},
+    "horizon": 1.4,
+    "back": 0.4,
+    "rest": 0.1,
+    "push": {"force": 0.0},
+    "calibration": "given",
+    "positions": "stored",
+    "homing": {"frames": 1, "rest": 0.1, "let_go": 0.5},
+    "bench": {"motors": {"slack": (0.0, 0.0, 0.0, 0.0)}, "person": {"takes": 0.1}},
+}
+
+
+def circling(**changes: Any) -> HwRunSettings:
+    """The short experiment, changed."""
+    return HwRunSettings.model_validate({**CIRCLING, **changes})
+
+
+def bench_of(settings: HwRunSettings, seed: int = 0) -> VirtualBench:
+    """The bench of these settings."""
+    return VirtualBench(settings.bench, WRIST, seed, settings.markers, settings.markers_2)
+
+
+AT_ZERO = SpatialZero((1, 1, 1, 1), (1380.0,) * 4, 0.0, (0.0,) * 4)
+
+
+def performed(folder: Path, seed: int = 0, zero: Zero = AT_ZERO, **changes: Any) -> Done:
+    """The short experiment, changed, done on a bench that stands at zero; what stopped it is kept."""
+    settings = circling(**changes)
+    nonce = Board(bench_of(settings).transport).connect().boot_nonce
+    at_zero = WristCalibration(zero, "ulnar", nonce, (0, 0, 0, 0))
+    bench, log = bench_of(settings, seed), TrialLog(folder, 2 * settings.bench.segments, 1e-2, planes=2)
+    trials = trials_of(settings, np.random.default_rng(0))
+    experiment, error = Experiment(settings, WRIST, trials, log, calibration=at_zero, seed=seed), None
+    try:
+        experiment.run(EmulatedTestbed(bench, settings, [View(), View()], None))
+    except BaseException as raised:
+        error = raised
+    log.close()
+    return Done(experiment, bench, folder, error)
+
+
+def true_errors(done: Done, trial: int = 0) -> np.ndarray:
+    """True bend less its reference at every tick (T, 2) [deg]."""
+    log, truth = (table[table["trial"] == trial] for table in (done.table("log"), done.table("truth")))
+    apart = [np.interp(log["time"], truth["time"], truth[f"bend_{p}"]) - log[f"bend_ref_{p}"] for p in PLANES]
+    return np.degrees(np.stack(apart, axis=1))
+
+
+PLANES = ("ulnar", "flexion")
+
+
+def rmse(errors: np.ndarray) -> np.ndarray:
+    """By plane (2,)."""
+    values: np.ndarray = np.sqrt(np.mean(errors**2, axis=0))
+    return values

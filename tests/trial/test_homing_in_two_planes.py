@@ -1,0 +1,116 @@
+"""Homing before two cameras: each tendon's direction, slack and sense, and what says that one is another's."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+
+from tests.trial.conftest import WRIST
+from tests.trial.in_two_planes import bench_of, circling
+from wristctl.board.driver import Board
+from wristctl.config.wrist import WristParameters
+from wristctl.trial.expected_moves import Bend
+from wristctl.trial.homing import SpatialZero, find_zero
+from wristctl.trial.motors_ready import prepare
+from wristctl.trial.safety import SafetyStop
+from wristctl.trial.spatial_belief import pull_directions
+from wristctl.trial.spatial_moves import SpatialMoves
+from wristctl.trial.supervised_wait import Patience
+from wristctl.trial.testbeds import EmulatedTestbed
+from wristctl.vision.view import View
+from wristctl.wrist.directions import ACTIVE
+
+QUICK = {"move": 1e-4, "rest": 0.15, "frames": 5, "slack": 8e-4, "let_go": 1.0}
+SLACK = (3e-4, 2e-4, 4e-4, 2.5e-4)
+
+
+def homed(seed: int = 0, **motors: Any) -> SpatialZero:
+    settings = circling(homing=QUICK, bench={"motors": {"slack": SLACK, **motors}})
+    bench = bench_of(settings, seed)
+    tracking = EmulatedTestbed(bench, settings, [View(), View()], None).tracking()
+    board = Board(bench.transport)
+    board.connect()
+    patience = Patience(board)
+    patience.stand_square(tracking, settings.homing)
+    tracking.zero = patience.markers(tracking, 10)
+    prepare(board, settings)
+    zero = find_zero(board, tracking, settings, WRIST, "")
+    assert isinstance(zero, SpatialZero)
+    return zero
+
+
+def test_every_tendon_is_found_where_it_is_within_a_degree() -> None:
+    zero = homed(reversed=(False, True, False, False))
+    off = np.angle(np.exp(1j * (np.array(zero.directions) - pull_directions())))
+    assert np.degrees(np.abs(off)).max() < 1.0
+    assert zero.signs == (1, -1, 1, 1)
+    assert zero.slack == pytest.approx(SLACK, abs=5e-5)
+    assert zero.steps_per_radian == pytest.approx([SpatialMoves(circling(), WRIST).steps()] * 4, rel=0.1)
+    assert len(zero.markers) == 2 and max(map(abs, zero.markers)) < math.radians(1.0)
+
+
+def test_exchanged_motors_are_named_by_direction_alone() -> None:
+    with pytest.raises(SafetyStop) as stopped:
+        homed(order=(1, 0, 2, 3))
+    said = stopped.value.what
+    assert said.startswith("stopped: axis 0 bends the wrist toward 1")
+    assert "tendon 1 is at 225 deg: as tendon 2 would" in said
+    assert "likely motors of axes 0 and 1 exchanged, or tendons 1 and 2" in said
+
+
+MOVES = SpatialMoves(circling(), WRIST)
+
+
+def bend(degrees: float, size: float = 0.02) -> Bend:
+    return Bend(size * math.cos(math.radians(degrees)), size * math.sin(math.radians(degrees)))
+
+
+@pytest.mark.parametrize("axis", range(4))
+def test_a_bend_is_an_axis_own_within_the_stated_angle_and_another_tendons_beyond(axis: int) -> None:
+    place = math.degrees(pull_directions()[axis])
+    limit = circling().homing.direction_deg
+    for off in (-limit + 0.5, 0.0, limit - 0.5):
+        MOVES.judge_side(axis, bend(place + off))
+    for off in (-limit - 0.5, limit + 0.5):
+        with pytest.raises(SafetyStop, match="tendons that run through other holes"):
+            MOVES.judge_side(axis, bend(place + off))
+    for other, tendon in enumerate(ACTIVE):
+        if other == axis:
+            continue
+        with pytest.raises(
+            SafetyStop, match=rf"as tendon {tendon} would.*axes {axis} and {other} exchanged"
+        ) as stopped:
+            MOVES.judge_side(axis, bend(math.degrees(pull_directions()[other])))
+        assert ("turns the wrong way" in stopped.value.what) == (other == 3 - axis)
+
+
+def test_oblique_springs_turn_where_a_tendon_bends_the_wrist() -> None:
+    """One that is twice as stiff across 30 deg pulls the wrist further toward 30 deg than it lies."""
+    oblique = SpatialMoves(circling(), WristParameters(stiffness_axis_deg=30.0, flexion_ratio=2.0))
+    toward = [math.degrees(math.atan2(y, x)) for x, y in oblique._toward]
+    assert 31.0 < toward[3] < 40.0 and toward[0] == pytest.approx(toward[3] - 180.0, abs=1e-6)
+    assert toward[1] > 150.0 and toward[2] == pytest.approx(toward[1] - 180.0, abs=1e-6)
+
+
+def test_a_slackened_wrist_that_moves_names_the_tendons_by_its_direction() -> None:
+    with pytest.raises(SafetyStop, match=r"tendon 1 is shorter than it was.*axis 3 \(tendon 5\) turns the wrong way"):
+        MOVES.judge_slackened(bend(45.0))
+    with pytest.raises(SafetyStop, match=r"pull against each other.*likely tendon 2 \(axis 1\)"):
+        MOVES.judge_cocontraction(bend(135.0))
+    MOVES.judge_slackened(bend(45.0, 0.004))
+    MOVES.judge_cocontraction(bend(-45.0, 0.004))
+
+
+def test_a_small_move_is_as_large_as_the_model_says() -> None:
+    reeled, place = 30, math.degrees(pull_directions()[2])
+    meant = reeled / MOVES.steps()
+    MOVES.judge_small_move(2, reeled, bend(place, meant))
+    with pytest.raises(SafetyStop, match=r"axis 2 \(tendon 4\) bends the wrist by .* instead of"):
+        MOVES.judge_small_move(2, reeled, bend(place, 0.3 * meant))
+    with pytest.raises(SafetyStop, match="axes 2 and 0 exchanged"):
+        MOVES.judge_small_move(2, reeled, bend(math.degrees(pull_directions()[0]), meant))
+    with pytest.raises(SafetyStop, match="times what the model says"):
+        MOVES.judge_small_move(2, reeled, bend(place, 1.6 * meant))

@@ -1,0 +1,146 @@
+"""Laws, allocation and observers of a rig in two planes: those of simulation, asked tick by tick."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from wristctl.config.loop import Loop
+from wristctl.config.plant import Actuator, Sensor
+from wristctl.config.wrist import WristParameters
+from wristctl.control.table import controller, gains_of
+from wristctl.errors import UserError
+from wristctl.simulation.two_planes import bend_path, simulate_two_planes
+from wristctl.trial.blind_model import BlindModel
+from wristctl.trial.spatial_belief import SpatialPaths, belief_of, layout_of_axes
+from wristctl.trial.spatial_steering import SpatialSteering
+from wristctl.trial.steering import REMEMBERED
+from wristctl.wrist.tendon_layout import TendonLayout
+
+WRIST, PERIOD = WristParameters(stiffness_axis_deg=30.0, flexion_ratio=1.4), 1e-2
+ACTUATOR, SENSOR = Actuator(level="tendon"), Sensor(level="camera")
+PATHS = SpatialPaths(belief_of(WRIST, ACTUATOR))
+
+
+def steering(law: str = "feedforward", gains: str = "") -> SpatialSteering:
+    made, chosen = SpatialSteering(WRIST, ACTUATOR, SENSOR, PERIOD), controller(law)
+    made.use(chosen, gains_of(chosen, gains, None) if gains else ())
+    return made
+
+
+def reeled(tension: float, bend: tuple[float, float] = (0.0, 0.0)) -> tuple[float, ...]:
+    """Length on the spools of tendons that all pull like that on a wrist held at this bend."""
+    return tuple((PATHS.taut(bend)[0] + tension / ACTUATOR.tendon_stiffness).tolist())
+
+
+@pytest.mark.parametrize("law", ["ct-dob", "pid-dob"])
+def test_torques_and_pulls_are_those_of_the_simulated_loop_at_every_tick(law: str) -> None:
+    """Given what the simulated laws saw, oblique springs and all: the same law with its memory, and one allocation."""
+    chosen = controller(law)
+    gains = gains_of(chosen, "hardware")
+    path = bend_path("figure-of-8", 20.0, 1.5, 1.2, 25.0)[:, :, ::10].copy()
+    loop = Loop(control_period=PERIOD, plant_segments=1)
+    course = simulate_two_planes(chosen, np.array(gains), path, WRIST, layout_of_axes(WRIST), loop)
+    steered = SpatialSteering(WRIST, ACTUATOR, SENSOR, PERIOD)
+    steered.use(chosen, gains)
+    references = np.ascontiguousarray(path.transpose(2, 0, 1))
+    for tick, (bend, rate) in enumerate(zip(course.bend, course.rate, strict=True)):
+        steered._observer.now[:] = [bend[0], rate[0], 0.0, bend[1], rate[1], 0.0]
+        answer = steered.respond(references, tick)
+        assert answer.tension == pytest.approx(course.pulls[tick], rel=1e-12, abs=1e-12)
+        assert answer.torque_wanted == pytest.approx(course.torque_wanted[tick], rel=1e-12, abs=1e-12)
+        assert answer.torque == pytest.approx(course.torque[tick], rel=1e-12, abs=1e-12)
+        assert answer.share == course.share[tick]
+
+
+def test_paths_are_those_of_the_exact_arc() -> None:
+    bend, h = np.array([0.3, -0.2]), 1e-6
+    taut, arms = PATHS.taut(bend)
+    layout = TendonLayout.four(WRIST.tendon_radius)
+    assert arms == pytest.approx(layout.moment_arms(bend, WRIST.length, WRIST.discs), rel=1e-12)
+    for plane in range(2):
+        step = h * np.eye(2)[plane]
+        slope = (PATHS.taut(bend + step)[0] - PATHS.taut(bend - step)[0]) / (2.0 * h)
+        assert slope == pytest.approx(arms[:, plane], abs=1e-9)
+    assert PATHS.taut((0.0, 0.0))[0] == pytest.approx(np.zeros(4), abs=1e-15) and taut[0] < 0.0
+
+
+def test_it_bends_toward_the_tendon_that_is_reeled_in() -> None:
+    for axis, (ulnar, flexion) in enumerate(((-1, -1), (-1, 1), (1, -1), (1, 1))):
+        steered = steering()
+        more = 5e-4 * np.eye(4)[axis]
+        for _ in range(100):
+            steered.predict(*(np.array(reeled(10.0)) + more))
+        bend = steered.estimate.theta
+        assert ulnar * bend[0] > 0.005 and flexion * bend[1] > 0.005
+
+
+def test_each_camera_tells_of_its_plane_when_its_picture_was_taken() -> None:
+    steered = steering()
+    for _ in range(40):
+        steered.predict(*reeled(10.0))
+    assert steered.see(0, 0.05, 0.35)
+    first = steered.estimate.theta.copy()
+    assert first[0] > 0.005 and abs(first[1]) < 1e-3
+    assert steered.see(1, -0.05, 0.345), "a little older than the other camera's"
+    second = steered.estimate.theta
+    assert second[1] < -0.005 and second[0] == pytest.approx(first[0], abs=2e-3)
+
+
+@pytest.mark.parametrize(
+    ("captured", "taken"), [(-0.001, False), (0.4, True), (0.409, True), (0.411, False), (0.29, False), (0.32, True)]
+)
+def test_pictures_that_are_too_old_or_yet_to_come_are_refused(captured: float, taken: bool) -> None:
+    steered = steering()
+    for _ in range(40):
+        steered.predict(*reeled(10.0))
+    assert steered.see(1, 0.0, 0.35)
+    before = steered.estimate.theta.copy()
+    assert steered.see(0, 0.05, captured) == taken
+    assert (steered.estimate.theta[0] != pytest.approx(before[0], abs=1e-9)) == taken
+
+
+def test_the_bend_is_remembered_as_it_was_believed() -> None:
+    steered, past = steering(), []
+    for tick in range(REMEMBERED + 20):
+        past.append(steered.estimate.theta.copy())
+        steered.predict(*(np.array(reeled(10.0)) + 1e-6 * tick * np.array([0, 0, 1, 0])))
+    at = (REMEMBERED + 5.25) * PERIOD
+    between = past[REMEMBERED + 5] + 0.25 * (past[REMEMBERED + 6] - past[REMEMBERED + 5])
+    assert steered.bend_at(at) == pytest.approx(between, abs=1e-12)
+    assert steered.bend_at(99.0) == pytest.approx(steered.estimate.theta)
+
+
+def test_what_motors_withhold_is_no_error_to_the_laws() -> None:
+    """An integral that knows of withheld torque grows by less."""
+    wanted = []
+    for withheld in (0.0, 0.3):
+        steered = steering("pid-dob", "hardware")
+        for _ in range(30):
+            steered.withheld = np.array([withheld, 0.0])
+            answer = steered.respond(np.array([[[0.2, 0.0, 0.0], [0.2, 0.0, 0.0]]]))
+        wanted.append(answer.torque_wanted)
+    assert wanted[0][0] != pytest.approx(wanted[1][0], rel=1e-3) and wanted[0][1] == pytest.approx(wanted[1][1])
+
+
+def test_a_torque_out_of_reach_keeps_its_direction_and_is_said() -> None:
+    answer = steering().respond(np.array([[[8.0, 0.0, 0.0], [8.0, 0.0, 0.0]]]))
+    assert answer.saturated and answer.share < 1.0
+    turned = [math.atan2(torque[1], torque[0]) for torque in (answer.torque, answer.torque_wanted)]
+    assert turned[0] == pytest.approx(turned[1], abs=1e-6)
+    assert answer.tension.max() <= WRIST.tension_limit + 1e-9 and answer.tension.min() >= WRIST.pretension - 1e-9
+
+
+def test_tendons_at_other_places_are_refused() -> None:
+    with pytest.raises(UserError, match="winds the four tendons 1, 2, 4 and 5"):
+        belief_of(WristParameters(tendons="three"), ACTUATOR)
+
+
+def test_soft_tendons_bend_the_blind_wrist_less_in_both_planes() -> None:
+    model = BlindModel(WRIST, ACTUATOR, 5e3, SENSOR, PERIOD, 2)
+    for _ in range(150):
+        model.predict(*(np.array(reeled(10.0)) + 5e-4 * np.array([0, 0, 0, 1])))
+    believed, soft = model.angles(150 * PERIOD)
+    assert (soft > 0.005).all() and (believed > 1.03 * soft).all()

@@ -1,0 +1,252 @@
+"""Trials in two planes as a result: errors by plane and over both, beside the same trials in simulation."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, NamedTuple
+
+from wristctl.commands.answer import Answer
+from wristctl.commands.hw_run.answer import APART, notes_on
+from wristctl.commands.printed_table import Table, degrees, two
+from wristctl.commands.results import Findings, StudyResult
+from wristctl.commands.session import Session
+from wristctl.control.table import Gains
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from wristctl.simulation.bend_course import BendCourse
+
+# Rows of a table by motion; with more there is a row for each controller.
+_ROWS = 16
+_MEANS = (
+    "rmse_ulnar", "rmse_flexion", "rmse", "steady_state", "settling", "recovery", "true_rmse_ulnar",
+    "true_rmse_flexion", "true_rmse", "true_recovery",
+)  # fmt: skip
+_UNITS = ("rad", "rad", "rad", "rad", "s", "s", "rad", "rad", "rad", "s")
+_OF_PUSH = ("recovery", "true_recovery")
+_BY_TRIAL = {
+    "trial": "trial", "direction": "motion", "push": "push [N]", "label": "controller",
+    "rmse_ulnar": "RMSE toward ulnar [rad]", "rmse_flexion": "RMSE toward flexion [rad]", "rmse": "RMSE [rad]",
+    "true_rmse": "true RMSE [rad]", "largest_error": "largest error [rad]", "settling": "settling [s]",
+    "true_recovery": "true recovery [s]", "peak_tension": "peak tension [N]", "outcome": "outcome",
+}  # fmt: skip
+
+
+@dataclass(frozen=True, repr=False, eq=False)
+class PerformedBends(StudyResult):
+    """Trials on a rig in two planes, and the same in simulation."""
+
+    kind = "hw-run"
+
+    trials: pd.DataFrame
+    twins: dict[int, BendCourse]
+    """by the trial's number"""
+
+    @property
+    def answer(self) -> Answer:
+        """Error by plane and over both, what a push does, and how far simulation agrees."""
+        return _answer(self.trials, self.twins, self.metrics, self.place)
+
+    def frame(self) -> pd.DataFrame:
+        """One row per trial that began."""
+        return self.trials
+
+
+class _Errors(NamedTuple):
+    """Means over trials that ended well; nan where there is none."""
+
+    trials: int
+    ulnar: float
+    flexion: float
+    both: float
+    true: float
+    """Of the worse axis, by the true bend [rad]."""
+    simulated: float
+    """Of the worse axis, in simulation [rad]."""
+    settling: float
+    recovery: float
+
+
+def _errors(trials: pd.DataFrame, twins: Mapping[int, BendCourse]) -> _Errors:
+    def mean(name: str) -> float:
+        return float(trials[name].mean(skipna=False)) if len(trials) else math.nan
+
+    courses = [twins[number].metrics() for number in trials["trial"]]
+    worse = [max(metrics["rmse_ulnar"], metrics["rmse_flexion"]) for metrics in courses]
+    true = trials[["true_rmse_ulnar", "true_rmse_flexion"]].max(axis=1, skipna=False)
+    recovery = "true_recovery" if trials["true_recovery"].notna().any() else "recovery"
+    return _Errors(
+        len(trials), mean("rmse_ulnar"), mean("rmse_flexion"), mean("rmse"),
+        float(true.mean(skipna=False)) if len(trials) else math.nan,
+        float(sum(worse) / len(worse)) if worse else math.nan, mean("settling"), mean(recovery),
+    )  # fmt: skip
+
+
+def bends_performed(session: Session, trials: pd.DataFrame, tuned: Gains | None) -> PerformedBends:
+    """Tables, metrics and figures of trials in two planes, with the simulation of each."""
+    from wristctl.trial.bend_motion import bend_motion_of
+    from wristctl.trial.bend_results import bend_twin
+    from wristctl.trial.trials import Trial
+
+    study, findings, settings = session.study, session.findings, session.study.hw_run
+    done = trials[trials["outcome"] == "ok"].assign(label=trials["controller"] + "/" + trials["gains"])
+    names, twins = [row.label for row in settings.rows], dict[int, "BendCourse"]()
+    simulated = dict[tuple[str, float, str], "BendCourse"]()
+    with session.progress("compiling and simulating the same trials"):
+        for row in done.to_dict("records"):
+            key = row["direction"], row["push"], row["label"]
+            if key not in simulated:
+                trial = Trial(row["trial"], row["direction"], 0, row["push"], names.index(row["label"]))
+                followed = bend_motion_of(settings, study.wrist, row["direction"])
+                simulated[key] = bend_twin(study, trial, followed, tuned)
+            twins[row["trial"]] = simulated[key]
+    rows = _means(findings, done, names, twins)
+    with session.progress("drawing"):
+        _draw(session, done, twins)
+    columns = ("", "trials", *(f"{name.replace('_', ' ')} [{unit}]" for name, unit in zip(_MEANS, _UNITS, strict=True)))
+    simulated_columns = "simulated RMSE toward ulnar [rad]", "simulated RMSE toward flexion [rad]"
+    by_trial = Table("Trials, in the order done", list(_BY_TRIAL.values()), done[list(_BY_TRIAL)].to_numpy().tolist())
+    tables = [Table("Means over the trials", (*columns, *simulated_columns), rows), by_trial]
+    findings.headline("rmse", "rmse_ulnar", "rmse_flexion", "true_rmse", "pushed_true_rmse")
+    return PerformedBends(study, findings, tables, trials, twins)
+
+
+def _means(
+    findings: Findings, done: pd.DataFrame, labels: Sequence[str], twins: Mapping[int, BendCourse]
+) -> list[tuple[object, ...]]:
+    """A row for each controller with and without a push; a metric for each number."""
+    rows: list[tuple[object, ...]] = []
+    for label, pushed in ((label, pushed) for pushed in (False, True) for label in labels):
+        group = done[(done["label"] == label) & ((done["push"] != 0.0) == pushed)]
+        if group.empty:
+            continue
+        means = {name: float(group[name].mean(skipna=False)) for name in _MEANS}
+        for name, unit in zip(_MEANS, _UNITS, strict=True):
+            if math.isfinite(means[name]) and (pushed or name not in _OF_PUSH):
+                whose = [label.replace("/", "-").replace(" ", "-")] if len(labels) > 1 else []
+                full = "_".join([*["pushed"] * pushed, name, *whose])
+                meaning = f"mean over trials{' with a push' * pushed}, {label}"
+                findings.metric(full, means[name], unit, "lower", n=len(group), meaning=meaning)
+        courses = [twins[number].metrics() for number in group["trial"]]
+        simulated = [sum(course[name] for course in courses) / len(courses) for name in ("rmse_ulnar", "rmse_flexion")]
+        rows.append((f"{label}{', pushed' * pushed}", len(group), *means.values(), *simulated))
+    return rows
+
+
+def _draw(session: Session, done: pd.DataFrame, twins: Mapping[int, BendCourse]) -> None:
+    import pandas as pd
+
+    from wristctl.commands.hw_run.trial_bend_figures import TrialBends, errors_of_bends, paths_of_bends
+    from wristctl.simulation.two_planes import reach_of_bends
+    from wristctl.trial.bend_motion import bend_motion_of
+    from wristctl.trial.bend_results import logged_course, true_course
+    from wristctl.trial.spatial_belief import layout_of_axes
+
+    findings, study, settings = session.findings, session.study, session.study.hw_run
+    assert findings.run is not None
+    log = pd.read_csv(findings.run.file("data/log.csv"))
+    file = findings.run.path / "data/truth.csv"
+    truth = pd.read_csv(file) if file.is_file() else None
+    courses = []
+    for record in done.to_dict("records"):
+        if record["repetition"] or record["label"] != settings.rows[0].label:
+            continue
+        followed = bend_motion_of(settings, study.wrist, record["direction"])
+        logged = logged_course(log[log["trial"] == record["trial"]], followed, study.wrist)
+        true = None if truth is None else true_course(logged, truth[truth["trial"] == record["trial"]])
+        push = (settings.push.start, settings.push.start + settings.push.duration) if record["push"] else None
+        courses.append(TrialBends(record["direction"], logged, true, twins[record["trial"]], push))
+    reach = reach_of_bends(study.wrist, layout_of_axes(study.wrist))
+    for prefix, pushed in (("", False), ("pushed-", True)):
+        some = [course for course in courses if (course.push is not None) == pushed]
+        if not some:
+            continue
+        caption = "The plane of bends: wanted, measured and true, within what the tendons reach"
+        findings.figure(f"{prefix}bends", paths_of_bends, some, reach, settings.rows[0].label, caption=caption)
+        caption = "Errors by plane over time, measured, true and simulated"
+        findings.figure(f"{prefix}errors", errors_of_bends, some, settings.rows[0].label, caption=caption)
+    if courses:
+        findings.overview.figure = "bends" if courses[0].push is None or len(courses) > 1 else "pushed-bends"
+
+
+def _answer(trials: pd.DataFrame, twins: Mapping[int, BendCourse], metrics: Mapping[str, float], run: str) -> Answer:
+    done = trials[trials["outcome"] == "ok"].assign(label=lambda table: table["controller"] + "/" + table["gains"])
+    labels = list(dict.fromkeys(done["label"]))
+    more = f"All tables: --all. Every trial: {run}/report.html" if run else "All tables: `.tables`."
+    notes = [*_apart(done, labels, twins), *notes_on(trials, metrics)]
+    if not labels:
+        return Answer(f"None of {len(trials)} trials was completed.", None, notes, more)
+    sentences = [_sentence(done[done["label"] == label], label, twins) for label in labels[:2]]
+    stopped = len(trials) - len(done)
+    sentences.append(f"{stopped} of {len(trials)} trials ended early." if stopped else "No trial ended early.")
+    return Answer(" ".join(sentences), _table(done, labels, twins), notes, more)
+
+
+def _sentence(trials: pd.DataFrame, label: str, twins: Mapping[int, BendCourse]) -> str:
+    parts = []
+    for pushed in (False, True):
+        group = trials[(trials["push"] != 0.0) == pushed]
+        if group.empty:
+            continue
+        errors = _errors(group, twins)
+        words = f"error {_deg(errors.ulnar)} deg RMSE toward ulnar, {_deg(errors.flexion)} deg toward flexion"
+        if math.isfinite(errors.true):
+            words += f" (truly {_deg(errors.true)} deg on the worse axis)"
+        if pushed:
+            force = ", ".join(f"{newtons:g}" for newtons in sorted({abs(force) for force in group["push"]}))
+            back = "at once" if errors.recovery == 0.0 else f"within {two(errors.recovery)} s"
+            words = f"with a push of {force} N {words}" + f", back {back}" * math.isfinite(errors.recovery)
+        parts.append(words)
+    return f"{label} in two planes: {'; '.join(parts)}."
+
+
+def _deg(angle: float) -> str:
+    return degrees(angle) if math.isfinite(angle) else "-"
+
+
+def _seconds(value: float) -> str:
+    return two(value) if math.isfinite(value) else "-"
+
+
+def _table(done: pd.DataFrame, labels: Sequence[str], twins: Mapping[int, BendCourse]) -> Table:
+    """A row for each motion and controller, with and without a push; for very many a row for each controller."""
+    motions = list(dict.fromkeys(done["direction"]))
+    heads = (
+        "controller", "motion", "push [N]", "toward ulnar [deg]", "toward flexion [deg]", "over both [deg]",
+        "true, worse axis [deg]", "simulated, worse axis [deg]", "settling [s]", "recovery [s]",
+    )  # fmt: skip
+    rows = []
+    for label in labels:
+        of_label = done[done["label"] == label]
+        for motion in motions if len(motions) * len(labels) <= _ROWS else ["all"]:
+            of_motion = of_label if motion == "all" else of_label[of_label["direction"] == motion]
+            for push, group in of_motion.groupby("push"):
+                errors = _errors(group, twins)
+                angles = errors.ulnar, errors.flexion, errors.both, errors.true, errors.simulated
+                after = _seconds(errors.recovery) if push else "-"
+                rows.append(
+                    (label, motion, f"{push:g}", *map(_deg, angles), _seconds(errors.settling), after)
+                )  # fmt: skip
+    several = len(labels) > 1
+    return Table("", heads[not several :], [row[not several :] for row in rows])
+
+
+def _apart(done: pd.DataFrame, labels: Sequence[str], twins: Mapping[int, BendCourse]) -> list[str]:
+    """Where measured and simulated errors differ much."""
+    facts = []
+    for label in labels:
+        for pushed in (False, True):
+            group = done[(done["label"] == label) & ((done["push"] != 0.0) == pushed)]
+            errors = _errors(group, twins)
+            measured = errors.true if math.isfinite(errors.true) else max(errors.ulnar, errors.flexion)
+            ratio = measured / errors.simulated if errors.simulated > 0.0 else math.nan
+            if math.isfinite(ratio) and not 1.0 / APART <= ratio <= APART:
+                times = f"{two(max(ratio, 1.0 / ratio))} times {'larger' if ratio > 1.0 else 'smaller'}"
+                where = f"{f'{label} ' * (len(labels) > 1)}{'with' if pushed else 'without'} a push"
+                facts.append(
+                    f"{where} {_deg(measured)} deg on the worse axis, {times} than {_deg(errors.simulated)} deg"
+                )
+    return [f"Measured and simulated errors do not agree: {'; '.join(facts)} simulated."] if facts else []

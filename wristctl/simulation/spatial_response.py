@@ -1,0 +1,71 @@
+"""One control tick in two planes, in simulation and on hardware: a law once for each plane, and one allocation."""
+
+from typing import Any, NamedTuple
+
+from wristctl.control.response import Estimate, perceive_within, wanted_torque
+from wristctl.lanes.compiled import compiled
+from wristctl.lanes.lane import planar, where
+from wristctl.lanes.rows import rows_of
+from wristctl.simulation.spatial_observer import coupling
+from wristctl.wrist.allocation import allocate
+from wristctl.wrist.spatial.spatial_tendons import moment_arms_of
+
+
+class Laws(NamedTuple):
+    """A law in both planes (Controlled), with the least and the greatest pull at each place of tendons [N]."""
+
+    ulnar: Any
+    flexion: Any
+    least: Any
+    greatest: Any
+
+
+class Seen(NamedTuple):
+    """What both laws see: rows of bend, rate and load of each plane, and the torque that motors withhold in each."""
+
+    rows: Any
+    withheld_y: Any
+    withheld_z: Any
+
+
+class Room(NamedTuple):
+    """Rows to work on: two each, and a planar vector for each place of tendons.
+
+    Behind a tick `bend` is what the laws have seen.
+    """
+
+    bend: Any
+    speed: Any
+    wish: Any
+    extra: Any
+    lever: Any
+    arms: Any
+
+
+@compiled
+def respond_in_planes(laws: Any, known: Any, seen: Any, room: Any, since: float, period: float, pulls: Any) -> Any:
+    """Write the pulls (T rows) [N] of a tick; the torques that the laws want [N m], and the share that is reached.
+
+    `known` is Knowledge. The references are what they were `since` seconds ago, continued by their own derivatives.
+    """
+    ulnar, flexion, least, greatest = laws
+    target_y, target_z = rows_of(ulnar.reference), rows_of(flexion.reference)
+    rows, bend, speed, wish, extra, lever = seen.rows, room.bend, room.speed, room.wish, room.extra, room.lever
+    wish[0], wish[1] = target_y[2], target_z[2]
+    bend[0], bend[1], speed[0], speed[1] = rows[0], rows[3], rows[1], rows[4]
+    coupling(known.coupling, known, bend, speed, wish, extra)
+    low_y, high_y, low_z, high_z = -extra[0], -extra[0], -extra[1], -extra[1]
+    for t in range(len(pulls)):
+        moment_arms_of(known.wrist, bend, t, lever)
+        room.arms[t] = planar(lever[0], lever[1])
+        forth, back = least[t], greatest[t]
+        low_y = low_y + lever[0] * where(lever[0] > 0.0, forth, back)
+        high_y = high_y + lever[0] * where(lever[0] > 0.0, back, forth)
+        low_z = low_z + lever[1] * where(lever[1] > 0.0, forth, back)
+        high_z = high_z + lever[1] * where(lever[1] > 0.0, back, forth)
+    seen_y, seen_z = Estimate(rows[0], rows[1], rows[2]), Estimate(rows[3], rows[4], rows[5])
+    perceive_within(ulnar, seen_y, seen.withheld_y, (low_y, high_y), since, period)
+    perceive_within(flexion, seen_z, seen.withheld_z, (low_z, high_z), since, period)
+    wanted_y, wanted_z = wanted_torque(ulnar) + extra[0], wanted_torque(flexion) + extra[1]
+    share = allocate(room.arms, planar(wanted_y, wanted_z), least, greatest, pulls)
+    return wanted_y, wanted_z, share

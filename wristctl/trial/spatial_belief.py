@@ -1,0 +1,130 @@
+"""What a rig in two planes knows of its wrist, for compiled code: the one-segment model, its tendons and motors."""
+
+import math
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from wristctl.arrays import Array
+from wristctl.board.messages import AXES
+from wristctl.config.plant import Actuator
+from wristctl.config.wrist import WristParameters
+from wristctl.errors import UserError
+from wristctl.lanes.compiled import compiled, kernel
+from wristctl.lanes.lane import zero_like
+from wristctl.lanes.rows import lanes_like, part, rows_of
+from wristctl.simulation.actuator import SpoolDrive, drive_in_lanes, motor_of
+from wristctl.simulation.spatial_observer import Compensated, Knowledge
+from wristctl.wrist.directions import ACTIVE, TENDONS, in_plane
+from wristctl.wrist.segments import load_segments, segments
+from wristctl.wrist.spatial.spatial_segments import (
+    FIELDS,
+    OF_A_TENDON,
+    SpatialWrist,
+    load_spatial_segments,
+    spatial_values,
+)
+from wristctl.wrist.spatial.spatial_tendons import lengths_along, moment_arms_of
+from wristctl.wrist.spatial.spooled_tendons import straight_length
+from wristctl.wrist.tendon_layout import TendonLayout
+
+# Planes of the two bends, in their order: also that of the cameras.
+PLANES = ("ulnar", "flexion")
+# Directions of bending [deg], from ulnar toward flexion.
+TOWARD = {
+    "ulnar": 0.0, "ulnar-flexion": 45.0, "flexion": 90.0, "radial-flexion": 135.0, "radial": 180.0,
+    "radial-extension": 225.0, "extension": 270.0, "ulnar-extension": 315.0,
+}  # fmt: skip
+
+
+class SpatialBelief(NamedTuple):
+    """Rows of the wrist as one segment with its four tendons, of each plane's Segments, and the drive of one tendon.
+
+    The last two are tuples with an entry, of no meaning, for each value of the tendons and for each tendon.
+    """
+
+    wrist: Any
+    model_y: Any
+    model_z: Any
+    alike: Any
+    drive: Any
+    coupling: Any
+    tendons: Any
+    pulls: Any
+
+
+def belief_of(wrist: WristParameters, actuator: Actuator) -> SpatialBelief:
+    """The belief in a wrist that this actuator winds. Raises UserError for tendons that no axis winds."""
+    motor = motor_of(actuator)._replace(stiffness=actuator.tendon_stiffness)
+    return SpatialBelief(
+        spatial_values(wrist, layout_of_axes(wrist), 1, axis=math.radians(wrist.stiffness_axis_deg)),
+        segments(in_plane(wrist, "ulnar"), 1), segments(in_plane(wrist, "flexion"), 1), np.ones(AXES),
+        SpoolDrive(np.array(motor)), Compensated(), (0,) * (OF_A_TENDON * AXES), (0,) * AXES,
+    )  # fmt: skip
+
+
+def layout_of_axes(wrist: WristParameters) -> TendonLayout:
+    """Places of the tendons that the board's axes wind. Raises UserError where they are not the paper's 1, 2, 4, 5."""
+    layout = TendonLayout.four(wrist.tendon_radius)
+    places = TendonLayout.of(wrist)
+    around = [place for place in places.places if place.radius > 0.0]
+    if len(around) != AXES or not np.allclose([place.angle % math.tau for place in around], _angles(layout)):
+        fix = "wrist.tendons: four"
+        raise UserError("a rig in two planes winds the four tendons 1, 2, 4 and 5", "wrist.tendons", fix)
+    return layout
+
+
+def _angles(layout: TendonLayout) -> list[float]:
+    return [place.angle % math.tau for place in layout.places]
+
+
+def pull_directions() -> Array:
+    """Direction (4,) [rad], from ulnar toward flexion, in which the tendon of each axis bends the wrist."""
+    places = np.array([TENDONS[tendon] for tendon in ACTIVE], float)
+    directions: Array = np.arctan2(places[:, 1], places[:, 0])
+    return directions
+
+
+def unit_toward(degrees: float) -> Array:
+    """Unit vector (2,) toward so many degrees from ulnar toward flexion; exact along the planes."""
+    unit = np.array([math.cos(math.radians(degrees)), math.sin(math.radians(degrees))])
+    unit[np.abs(unit) < 1e-15] = 0.0
+    return unit
+
+
+@compiled
+def known_of(belief: Any) -> Any:
+    """The belief as Knowledge of compiled code."""
+    rows = rows_of(belief.wrist)
+    wrist = SpatialWrist(load_spatial_segments(rows), part(rows, FIELDS, belief.tendons))
+    model_y, model_z = load_segments(rows_of(belief.model_y)), load_segments(rows_of(belief.model_z))
+    alike = part(rows_of(belief.alike), 0, belief.pulls)
+    return Knowledge(wrist, model_y, model_z, alike, drive_in_lanes(belief.drive), belief.coupling)
+
+
+class SpatialPaths:
+    """The tendons' paths through the one-segment wrist in two planes, for each axis of the board."""
+
+    def __init__(self, belief: SpatialBelief) -> None:
+        self._belief, self._found = belief, np.zeros(3 * AXES)
+
+    def taut(self, bend: Sequence[float] | Array) -> tuple[Array, Array]:
+        """Reeled-in lengths (4,) of tendons that are just taut at this bend (2,) [m], and their changes by the bend
+        (4, 2) [m/rad]."""
+        _paths(self._belief, np.ascontiguousarray(bend, np.float64), self._found)
+        return self._found[:AXES].copy(), self._found[AXES:].reshape(AXES, 2).copy()
+
+
+@kernel
+def _paths(belief: Any, bend: Any, found: Any) -> None:
+    known, row = known_of(belief), rows_of(found)
+    at = part(rows_of(bend), 0, (0, 0))
+    arms, lengths = lanes_like(at), lanes_like(known.alike)
+    lengths_along(known.wrist, at, lengths)
+    zero = zero_like(at[0])
+    for t in range(len(lengths)):
+        moment_arms_of(known.wrist, at, t, arms)
+        row[t] = straight_length(known.wrist, t) - lengths[t] + zero
+        row[len(lengths) + 2 * t] = arms[0]
+        row[len(lengths) + 2 * t + 1] = arms[1]

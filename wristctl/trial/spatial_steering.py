@@ -1,0 +1,196 @@
+"""The controller on hardware in two planes: the same compiled laws, allocation and observer as in simulation."""
+
+import math
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from wristctl.arrays import Array
+from wristctl.board.messages import AXES
+from wristctl.config.plant import Actuator, Sensor
+from wristctl.config.wrist import WristParameters
+from wristctl.control.law import REFERENCE, Controller, signals_of
+from wristctl.control.response import Controlled, Estimate, look_ahead
+from wristctl.errors import UserError
+from wristctl.lanes.compiled import kernel
+from wristctl.lanes.lane import zero_like
+from wristctl.lanes.rows import lanes_like, part, planes_like, rows_of
+from wristctl.simulation.spatial_batch import as_pairs
+from wristctl.simulation.spatial_observer import OF_A_PLANE, correct_bend, go_over, propagate_bends
+from wristctl.simulation.spatial_response import Laws, Room, Seen, respond_in_planes
+from wristctl.simulation.stationary_filter import Belief, stationary_gains
+from wristctl.trial.spatial_belief import PLANES, belief_of, known_of, layout_of_axes
+from wristctl.trial.steering import REMEMBERED
+from wristctl.wrist.directions import in_plane
+from wristctl.wrist.spatial.spatial_tendons import moment_arms_of
+
+# Share of a wanted torque below which it was out of the tendons' reach.
+_FULL = 1.0 - 1e-9
+# Seconds by which a frame may be older than the last one of the other camera: it is fused there.
+_UNEVEN = 0.05
+
+
+class SpatialAnswer(NamedTuple):
+    """Answer of the laws: torques wanted and commanded (2,) [N m], share reached, and tensions of the axes (4,) [N]."""
+
+    torque_wanted: Array
+    torque: Array
+    share: float
+    tension: Array
+
+    @property
+    def saturated(self) -> bool:
+        """Whether the wanted torque is out of the tendons' reach."""
+        return not self.share >= _FULL
+
+
+class _Observer(NamedTuple):
+    """Gain (6,), what was delivered (ring, 4), and x (6,) at the last fused frame and at the present tick."""
+
+    gain: Any
+    delivered: Any
+    fused: Any
+    now: Any
+
+
+class SpatialSteering:
+    """Observers and laws of both bending planes. Ticks are numbered from 0, `period` [s] apart."""
+
+    def __init__(self, wrist: WristParameters, actuator: Actuator, sensor: Sensor, period: float) -> None:
+        layout = layout_of_axes(wrist)
+        self._belief = belief_of(wrist, actuator)
+        self._limits = np.full(AXES, wrist.pretension), np.full(AXES, wrist.tension_limit)
+        beliefs = [
+            Belief(sensor, actuator, as_pairs(in_plane(wrist, plane), layout, axis), period)
+            for axis, plane in enumerate(PLANES)
+        ]
+        gain = np.concatenate([stationary_gains([belief])[0] for belief in beliefs])
+        x = np.zeros(2 * OF_A_PLANE)
+        self._observer = _Observer(gain, np.zeros((REMEMBERED, AXES)), x, x.copy())
+        self._bends = np.zeros((REMEMBERED, 2))
+        self._fused_at, self._period, self._found = 0, period, np.zeros(AXES + 5)
+        self._laws: Any = None
+        self._preview = 0
+        self.tick = 0
+        self.withheld: Array = np.zeros(2)
+        """Torque of the last command that the motors are too slow to deliver, by plane [N m]."""
+
+    @property
+    def estimate(self) -> Estimate:
+        """As of the present tick; bend, rate and load are (2,) each."""
+        return Estimate(*self._observer.now.reshape(2, OF_A_PLANE).T.copy())
+
+    def bend_at(self, captured: float) -> Array:
+        """Bend (2,) [rad] as it was believed `captured` seconds after tick 0, as far as it is remembered."""
+        since = min(max(captured / self._period, self.tick - REMEMBERED + 1, 0), self.tick)
+        tick = math.floor(since)
+        before, after = self._bends[tick % REMEMBERED], self._bends[min(tick + 1, self.tick) % REMEMBERED]
+        believed: Array = before + (since - tick) * (after - before)
+        return believed
+
+    def use(self, controller: Controller, gains: Sequence[float]) -> None:
+        """Take up a law in both planes, its memory empty, with motors that have caught up.
+
+        Raises UserError for one in plain Python.
+        """
+        if controller.plain:
+            problem = f"{controller.name} is plain Python, which no loop in two planes runs"
+            raise UserError(problem, "controllers", "one that compiles")
+        self.withheld, self._preview = np.zeros(2), controller.preview
+        law = controller.compiled()
+        ulnar, flexion = (
+            Controlled(
+                law, np.zeros(signals_of(controller.preview)), model, np.array([*gains, 0.0]),
+                np.zeros(max(1, controller.memory)), np.zeros(len(REFERENCE)),
+            )
+            for model in (self._belief.model_y, self._belief.model_z)
+        )  # fmt: skip
+        self._laws = Laws(ulnar, flexion, *self._limits)
+
+    def see(self, plane: int, bend: float, captured: float) -> bool:
+        """Fuse one plane's bend [rad] seen `captured` seconds after tick 0; False where that is too old or yet to come.
+
+        One that was taken before the last frame of the other camera is compared with what was believed then.
+        """
+        tick = math.floor(captured / self._period)
+        late = self._fused_at * self._period - captured
+        if late > _UNEVEN or not max(0, self.tick - REMEMBERED + 1) <= tick <= self.tick:
+            return False
+        at = max(tick, self._fused_at)
+        ticks = self._fused_at, at, self.tick
+        _fuse(self._belief, self._observer, ticks, plane, captured - at * self._period, bend, self._period)
+        self._fused_at = at
+        self._bends[self.tick % REMEMBERED] = self._observer.now[::OF_A_PLANE]
+        return True
+
+    def respond(self, course: Array, tick: int = 0) -> SpatialAnswer:
+        """The laws' answer, at the present estimate, to a reference (T, 2, 3) of bend, rate and acceleration at its
+        tick.
+
+        It goes by periods; beyond its end it stays as it is there, for a law that looks ahead.
+        """
+        to_follow = course, tick, self._preview
+        _respond(self._belief, self._laws, self._observer.now, self.withheld, to_follow, self._period, self._found)
+        found = self._found.copy()
+        return SpatialAnswer(found[AXES : AXES + 2], found[AXES + 2 : AXES + 4], float(found[AXES + 4]), found[:AXES])
+
+    def predict(self, *reeled: float) -> None:
+        """Go on to the next tick, with each axis reeled in by so much [m] until then."""
+        _predict(self._belief, self._observer, self.tick, np.array(reeled, np.float64), self._period)
+        self.tick += 1
+        self._bends[self.tick % REMEMBERED] = self._observer.now[::OF_A_PLANE]
+
+
+@kernel
+def _respond(belief: Any, laws: Any, now: Any, withheld: Any, to_follow: Any, period: float, found: Any) -> None:
+    known, row = known_of(belief), rows_of(found)
+    course, tick, preview = to_follow
+    ulnar, flexion = laws.ulnar, laws.flexion
+    for ahead in range(preview, -1, -1):  # the present last: it is what the laws follow
+        sample = min(tick + ahead, course.shape[0] - 1)
+        ulnar.reference[:] = course[sample, 0]
+        flexion.reference[:] = course[sample, 1]
+        if ahead > 0:
+            look_ahead(ulnar, ahead, 0.0)
+            look_ahead(flexion, ahead, 0.0)
+    least, greatest = part(rows_of(laws.least), 0, belief.pulls), part(rows_of(laws.greatest), 0, belief.pulls)
+    x, less = rows_of(now), rows_of(withheld)
+    two = part(x, 0, (0, 0))
+    room = Room(lanes_like(two), lanes_like(two), lanes_like(two), lanes_like(two), lanes_like(two), planes_like(least))
+    pulls = part(row, 0, belief.pulls)
+    wanted_y, wanted_z, share = respond_in_planes(
+        Laws(ulnar, flexion, least, greatest), known, Seen(x, less[0], less[1]), room, 0.0, period, pulls
+    )
+    torque_y, torque_z = zero_like(x[0]), zero_like(x[0])
+    for t in range(len(pulls)):
+        moment_arms_of(known.wrist, room.bend, t, room.lever)
+        torque_y = torque_y + pulls[t] * room.lever[0]
+        torque_z = torque_z + pulls[t] * room.lever[1]
+    count = len(pulls)
+    row[count], row[count + 1], row[count + 2], row[count + 3] = wanted_y, wanted_z, torque_y, torque_z
+    row[count + 4] = share
+
+
+@kernel
+def _fuse(belief: Any, observer: Any, ticks: Any, plane: int, since: float, bend: float, h: float) -> None:
+    known = known_of(belief)
+    before, captured, tick = ticks
+    gain, fused, now = rows_of(observer.gain), rows_of(observer.fused), rows_of(observer.now)
+    counts, two = lanes_like(known.alike), lanes_like(part(now, 0, (0, 0)))
+    go_over(observer.delivered, known, fused, (before, captured), counts, two, h)
+    first = OF_A_PLANE * plane
+    correct_bend(fused, gain, plane, bend - fused[first] - since * fused[first + 1])
+    for i in range(2 * OF_A_PLANE):
+        now[i] = fused[i]
+    go_over(observer.delivered, known, now, (captured, tick), counts, two, h)
+
+
+@kernel
+def _predict(belief: Any, observer: Any, tick: int, reeled: Any, h: float) -> None:
+    known = known_of(belief)
+    counts, now = part(rows_of(reeled), 0, belief.pulls), rows_of(observer.now)
+    sent = rows_of(observer.delivered[tick % observer.delivered.shape[0]])
+    for t in range(len(counts)):
+        sent[t] = counts[t]
+    propagate_bends(known, now, counts, lanes_like(part(now, 0, (0, 0))), h)
