@@ -19,10 +19,10 @@ root_doc = "docs/index"
 source_suffix = {".md": "markdown"}
 exclude_patterns = ["experiments/**", "wristctl/**", "tests/**", "benchmarks/**"]  # linked files, no pages
 
-myst_enable_extensions = ["colon_fence", "dollarmath"]
+myst_enable_extensions = ["colon_fence", "dollarmath", "strikethrough"]
 myst_heading_anchors = 4
 # Code fences of the README say what they show; these have no lexer of their own.
-suppress_warnings = ["misc.highlighting_failure"]
+suppress_warnings = ["misc.highlighting_failure", "myst.strikethrough"]  # it is for HTML alone, as this site is
 
 autodoc_typehints = "signature"
 autodoc_member_order = "bysource"

@@ -155,10 +155,11 @@ def test_one_row_of_controllers_needs_no_name_in_its_metrics(tmp_path: Path, ask
 
 @pytest.mark.parametrize("side", [-1.0, 1.0])
 @pytest.mark.parametrize(("short", "fast"), [(0, 0), (1, 0), (0, 2), (2, 1)])
-def test_trials_that_do_not_arrive_or_chatter_are_the_verdict_on_the_run(short: int, fast: int, side: float) -> None:
+def test_trials_that_do_not_arrive_swing_or_chatter_are_the_verdict(short: int, fast: int, side: float) -> None:
     """Of those that ended well; the stopped one is told by itself."""
     table, ok = trials(), np.array([outcome == "ok" for *_, outcome in FACTS])
     table["steady_state"], table["chattering"] = np.where(ok, 0.01, 9.0), np.where(ok, 100.0, 1e9)
+    table["oscillation"] = np.where(ok, 0.0, 1.0)
     last = np.flatnonzero(ok)[::-1]
     table.loc[last[:short], "steady_state"] = 0.21 * np.radians(30.0)
     table.loc[last[:fast], "chattering"] = 4.0 * 58.0 * 30.0
@@ -169,6 +170,8 @@ def test_trials_that_do_not_arrive_or_chatter_are_the_verdict_on_the_run(short: 
     done = Performed(study, Findings(0), [], table, twins)
     expected = {"does not arrive": short, "chatters": fast}
     assert done.marks == [f"{mark}: {count} of 5 trials" for mark, count in expected.items() if count]
+    table.loc[last[:3], "oscillation"] = np.radians([0.09, 0.3, 0.7])
+    assert replace(done, trials=table).marks[bool(short)] == "swings by up to 0.7 deg at rest: 2 of 5 trials"
 
 
 def _twins(rmse: float) -> dict[int, Simulation]:

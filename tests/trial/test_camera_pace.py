@@ -42,6 +42,16 @@ def test_pictures_that_nobody_saw_are_no_jitter_but_cost_rate() -> None:
     assert made.rate == pytest.approx(30.0) and math.isnan(made.jitter)
 
 
+def test_a_pause_between_two_looks_costs_no_rate_and_a_lost_picture_does() -> None:
+    made = CameraPace()
+    times = [*np.arange(40) / 60.0, *(5.0 + np.arange(40) / 60.0)]
+    for k, time in enumerate(times):
+        made.add(Sighting(time, k, 0.0, OK, np.zeros((2, 4, 2)), came=time))
+    assert made.rate == pytest.approx(60.0)
+    made.add(Sighting(5.0 + 49 / 60.0, 90, 0.0, OK, np.zeros((2, 4, 2)), came=5.0 + 49 / 60.0))
+    assert made.rate == pytest.approx(79.0 / (88.0 / 60.0))
+
+
 def test_the_cause_of_a_missing_angle_is_the_cameras_own() -> None:
     slow = pace(15.0, 0.133)
     why, fix = slow.missing(59 / 15.0 + 0.14, 0.15)

@@ -52,6 +52,13 @@ def test_a_constant_error_is_its_own_rmse_and_steady_state() -> None:
     assert values["overshoot"] == pytest.approx(100.0 * 0.01 / MOTION.final, rel=1e-6)
 
 
+@pytest.mark.parametrize("size", [0.012, 0.001])
+def test_a_swing_that_goes_on_at_rest_has_its_size(size: float) -> None:
+    values = found(course(error=size * np.sin(2.0 * np.pi * 8.0 * TIME)))
+    assert values["oscillation"] == pytest.approx(size, rel=0.05)
+    assert found(course(error=0.02))["oscillation"] < 1e-6
+
+
 def test_no_error_settles_with_the_reference() -> None:
     assert MOTION.rest - 0.15 < found(course())["settling"] < MOTION.rest
 

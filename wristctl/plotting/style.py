@@ -29,7 +29,7 @@ BLUE, VERMILLION, PURPLE = "#0072B2", "#D55E00", "#CC79A7"
 # Colours of tendons by their numbers, from the first.
 TENDON_COLOURS = (BLUE, VERMILLION, ORANGE, PURPLE, GREY, BLACK)
 # From Tol's muted scheme, for what Okabe and Ito's eight do not reach.
-INDIGO, WINE, OLIVE, FOREST, ROSE = "#332288", "#882255", "#999933", "#117733", "#CC6677"
+INDIGO, WINE, OLIVE, BLACK, ROSE = "#332288", "#882255", "#999933", "#000000", "#CC6677"
 
 # Width of a figure [in]; text is 9 to 10 points.
 WIDTH = 7.0
@@ -76,7 +76,7 @@ _IN_WORDS = {
     "pid-dob": "PID, observer",
     "smc-dob": "sliding mode, observer",
 }
-_OTHERS = (OLIVE, FOREST, ROSE)
+_OTHERS = (OLIVE, BLACK, ROSE)
 # Line style of the desired angle: a band behind the lines. Long lines are drawn in pieces, so it must hide its own.
 WANTED: dict[str, Any] = {"color": SILVER, "linewidth": 5.0, "zorder": 1.9, "label": "desired"}
 # Line style of what differs a little from a line beside it: seen, not so; acting, not commanded.

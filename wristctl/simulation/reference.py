@@ -166,7 +166,8 @@ def motion(
     """
     if REFERENCES[reference.kind].planes == 2:
         problem = f"{reference.kind} bends in two planes, and this loop in one"
-        raise UserError(problem, "reference.kind", "`wristctl simulate` runs it in two, with loop.planes: null")
+        fix = "`wristctl simulate` runs it in two, with loop.planes: null; --sweep controller=ct-dob,pid-ff compares"
+        raise UserError(problem, "reference.kind", fix)
     if reference.inverse == "network" or reference.file:  # a file may be another by now
         result = _evaluated(reference, wrist, horizon, period, network)
     else:

@@ -19,6 +19,7 @@ from wristctl.errors import UserError
 from wristctl.simulation.closed_loop import simulate
 from wristctl.simulation.metrics import metrics_of, summed
 from wristctl.simulation.motion import Angles, Motion
+from wristctl.simulation.oscillation import oscillations
 from wristctl.simulation.reference import motion
 from wristctl.simulation.references import minimum_jerk
 from wristctl.simulation.repetitions import Simulation
@@ -216,7 +217,7 @@ def evaluated(
     it ends when the estimated load has fallen again. All values are nan where the log is not whole.
     """
     time, theta, error = (course[name].to_numpy(float) for name in ("time", "theta", "error"))
-    names = [*summed(), *(f"true_{name}" for name in JUDGED), "recovery", "true_recovery", "push_torque"]
+    names = [*summed(), "oscillation", *(f"true_{name}" for name in JUDGED), "recovery", "true_recovery", "push_torque"]
     metrics = dict.fromkeys(names, math.nan)
     if not len(time) or time[-1] < followed.horizon - 1.5 * period:
         return metrics
@@ -231,7 +232,10 @@ def evaluated(
         flags = np.interp(grid, time, saturated.astype(float)) > 0.5
         return metrics_of(period, angle, followed.theta_ref, tension, goals, flags)
 
-    metrics |= judged(np.interp(grid, time, theta))
+    estimated = np.interp(grid, time, theta)
+    metrics |= judged(estimated)
+    which = np.zeros(1, np.int64)
+    metrics["oscillation"] = float(oscillations(estimated[None], followed.theta_ref[None], which, period)[0])
     if trial.push:
         pushed = push_seen(time, course["load"].to_numpy(float), max(followed.rest, push.start - EARLY), LEAST_PUSH)
         if pushed is not None:

@@ -54,11 +54,12 @@ class Performed(StudyResult):
 
     @property
     def marks(self) -> list[str]:
-        """In how many of the trials that ended well the wrist does not arrive, or tensions chatter."""
+        """In how many of the trials that ended well the wrist does not arrive, swings at rest, or tensions chatter."""
         import numpy as np
 
+        from wristctl.commands.printed_table import degrees
         from wristctl.simulation.arrival import SHORT
-        from wristctl.simulation.oscillation import chatter
+        from wristctl.simulation.oscillation import LIMIT_CYCLE, at_rest, chatter
         from wristctl.simulation.trajectory import rests
 
         completed = self.trials[self.trials["outcome"] == "ok"]
@@ -66,7 +67,14 @@ class Performed(StudyResult):
         most = np.array([np.abs(course.theta_ref).max() if rests(course) else np.inf for course in courses])
         short = int((completed["steady_state"].to_numpy(float) > SHORT * most).sum())
         chatters = int((chatter(completed["chattering"].to_numpy(float), self.study.wrist.tension_range) > 0.0).sum())
-        counts = {"does not arrive": short, "chatters": chatters}
+        swing = np.where([at_rest(course) for course in courses], completed["oscillation"].to_numpy(float), 0.0)
+        swings = swing > LIMIT_CYCLE
+        size = degrees(float(swing[swings].max())) if swings.any() else ""
+        counts = {
+            "does not arrive": short,
+            f"swings by up to {size} deg at rest": int(swings.sum()),
+            "chatters": chatters,
+        }
         return [f"{mark}: {count} of {len(completed)} trials" for mark, count in counts.items() if count]
 
     def frame(self) -> pd.DataFrame:

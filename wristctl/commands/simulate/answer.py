@@ -161,7 +161,7 @@ def wrist_words(wrist: WristParameters) -> str:
     """The paper's wrist, or another one by its length and stiffness."""
     if wrist == WristParameters():
         return "the paper's wrist"
-    return f"a wrist of {1e3 * wrist.length:g} mm and {wrist.stiffness:g} N m/rad"
+    return f"a wrist of {1e3 * wrist.length:.3g} mm and {wrist.stiffness:.3g} N m/rad"
 
 
 def loop_words(loop: Loop, wrist: WristParameters) -> str:
