@@ -111,8 +111,12 @@ def found(tmp_path_factory: pytest.TempPathFactory) -> Recommended:
 def test_what_is_recommended_is_best_of_what_holds_on_every_rig(found: Recommended) -> None:
     ranked, best = found.ranking, found.best
     assert best is not None and best.controller in ("pid-ff", "ct-dob")
-    first = ranked.standing.groups[0][0]
-    assert found.candidates[first] == best and ranked.standing.lost[first].low <= TOLERATED
+    first = found.best_row
+    assert (
+        first in ranked.standing.groups[0]
+        and found.candidates[first] == best
+        and ranked.standing.lost[first].low <= TOLERATED
+    )
     medians = [np.median(row.rmse) for row in ranked.rows]
     assert found.metrics["rmse"] == pytest.approx(medians[first], rel=0.2) and medians[first] < medians[-1]
     assert found.metrics["rmse_low"] <= found.metrics["rmse"] <= found.metrics["rmse_high"]
@@ -244,6 +248,22 @@ def test_where_no_feedback_is_better_than_none_that_is_the_reason_and_not_that_a
     assert nothing.best is None and nothing.fault is not None and "swings" in nothing.fault.what
     tied = replace(ranked, standing=ranked.standing._replace(groups=[[len(done.candidates) - 1, 0]]))
     assert replace(found, ranking=tied).best == done.candidates[0]
+
+
+def test_of_what_no_test_tells_apart_the_one_is_taken_that_holds_on_most_rigs_with_the_fewest_gains(
+    found: Recommended,
+) -> None:
+    standing, rows = found.ranking.standing, [row for row, one in enumerate(found.candidates) if one.gains]
+    few, many = rows[0], rows[-1]
+    rest = {row: found.candidates[row]._replace(gains=dict.fromkeys("abcdef"[: 2 + row], 1.0)) for row in rows}
+    candidates = [rest.get(row, one) for row, one in enumerate(found.candidates)]
+
+    def taken(lost: dict[int, int]) -> int | None:
+        counts = [one._replace(times=lost.get(row, 0)) for row, one in enumerate(standing.lost)]
+        tied = standing._replace(groups=[[many, few, len(candidates) - 1]], lost=counts)
+        return replace(found, candidates=candidates, ranking=replace(found.ranking, standing=tied)).best_row
+
+    assert taken({}) == few and taken({few: 1}) == many and taken({few: 1, many: 1}) == few
 
 
 def test_a_rig_of_which_one_thing_is_stated_keeps_its_motors_tendons_camera_and_period() -> None:

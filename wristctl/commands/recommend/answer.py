@@ -50,7 +50,7 @@ class Candidate(NamedTuple):
     @property
     def label(self) -> str:
         """Controller and origin."""
-        return f"{self.controller}, {self.origin}" if self.gains else self.controller
+        return f"{self.controller} ({self.origin})" if self.gains else self.controller
 
 
 @dataclass(frozen=True, repr=False, eq=False)
@@ -77,9 +77,13 @@ class Recommended(StudyResult):
 
     @property
     def best_row(self) -> int | None:
-        """Its number among the candidates and the ranking's rows."""
-        groups = self.ranking.standing.groups
-        return next((row for row in groups[0] if self.candidates[row].gains), None) if groups else None
+        """Its number among the candidates and the ranking's rows.
+
+        Of those that no test tells apart, the one that is lost on the fewest rigs, with the fewest gains.
+        """
+        standing = self.ranking.standing
+        alike = [row for row in standing.groups[0] if self.candidates[row].gains] if standing.groups else []
+        return min(alike, key=lambda row: (standing.lost[row].times, len(self.candidates[row].gains)), default=None)
 
     @property
     def why_none(self) -> str:
@@ -129,7 +133,8 @@ def _sentence(result: Recommended) -> str:
     if lost := _lost(ranked, row):
         sentence += f" It {lost} of {ranked.count} rigs."
     alike = [result.candidates[other].label for other in ranked.standing.groups[0] if other != row]
-    return f"{sentence} It cannot be told apart from {joined(alike)}." if alike else sentence
+    why = "it is the one that is lost on the fewest rigs, with the fewest gains"
+    return f"{sentence} No test tells {joined(alike)} from it: {why}." if alike else sentence
 
 
 def _gain(candidate: Candidate, name: str) -> str:
@@ -153,7 +158,7 @@ def _table(result: Recommended) -> Table:
         low, median, high = (degrees(error) if math.isfinite(error) else "-" for error in spread(ranked.rows[k].rmse))
         lost = _lost(ranked, k)
         rows.append((result.candidates[k].label, median, f"{low} to {high}", lost or "holds on all"))
-    heads = ("controller, gains", "error [deg]", "on 8 of 10 rigs [deg]", f"of {ranked.count} simulated rigs")
+    heads = ("controller (gains)", "error [deg]", "on 8 of 10 rigs [deg]", f"of {ranked.count} simulated rigs")
     return Table("", heads, rows)
 
 
@@ -176,7 +181,11 @@ def _notes(result: Recommended) -> list[str]:
         f"{_up_to(result.motions, 'Hz', sine)} {_up_to(result.payloads, 'kg', 'an unknown payload in the hand')}"
     )
     emulated = result.next_command.startswith("wristctl hw-run")
-    how = "emulated (on a real rig: --set port=/dev/ttyACM0)" if emulated else "simulated (hw-run has no such rig)"
+    how = (
+        "emulated (on a real rig also --port /dev/ttyACM0 --camera 0 --optics latest:calibrate-camera)"
+        if emulated
+        else "simulated (hw-run has no such rig)"
+    )
     return [*notes, f"Next, {how}:", f"$ {result.next_command}"]
 
 
