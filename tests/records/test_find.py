@@ -32,6 +32,18 @@ def test_latest_passes_over_runs_that_did_not_end_well(make: Make, results: Path
     assert open_run("latest:gen-data", results).path == good.path
 
 
+def test_where_none_ended_well_the_last_that_did_not_is_named(make: Make, results: Path) -> None:
+    make(label="other")
+    for label in ("mine", "yours"):
+        with pytest.raises(RuntimeError), start_run("gen-data", Study(), label, results):
+            raise RuntimeError
+    failed = {run.id.split("-")[3]: run.id for run in list_runs(results) if run.state == "failed"}
+    for label, found in failed.items():
+        with pytest.raises(UserError) as caught:
+            open_run(f"latest:gen-data:{label}", results)
+        assert str(caught.value).endswith(f"{found} (state: failed)")
+
+
 def test_the_latest_is_the_one_that_began_last_whatever_it_is_called(make: Make, results: Path) -> None:
     first, last = make(label="a"), make(label="b")
     last.path.rename(results / "20200101T000000Z-gen-data-b")

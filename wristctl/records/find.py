@@ -106,6 +106,11 @@ def _latest(ref: str, results: Path) -> Run:
         ):
             return run  # whoever reads it is told what is wrong; an older one in its place would go unnoticed
     if latest is None:
+        others = [run for run in entries if run.kind == kind and label in ("", run.label) and run.state != "broken"]
+        if others:
+            last = max(others, key=lambda run: run.started)
+            problem = f"no {kind} run{f' with the label {label!r}' if label else ''} that ended ok"
+            raise UserError(problem, f"{ref} in {results}", f"{last.id} (state: {last.state})")
         kinds, labels = {run.kind for run in ended}, {run.label for run in ended if run.kind == kind}
         if labels:
             raise UserError(f"no {kind} run with the label {label!r}", f"{ref} in {results}", meant(label, labels))
