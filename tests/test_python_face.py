@@ -96,6 +96,7 @@ def test_every_public_name_has_a_docstring() -> None:
         names = [n for n in tree.body if isinstance(n, ast.FunctionDef | ast.ClassDef)]
         for parent in [n for n in names if isinstance(n, ast.ClassDef) and not n.name.startswith("_")]:
             names += [n for n in parent.body if isinstance(n, ast.FunctionDef)]
+        names = [n for n in names if "overload" not in map(ast.unparse, n.decorator_list)]  # signatures alone
         missing += [f"{file.name}:{n.name}" for n in names if not n.name.startswith("_") and not ast.get_docstring(n)]
         assert ast.get_docstring(tree), file
     assert not missing

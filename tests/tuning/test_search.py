@@ -275,7 +275,8 @@ def test_history_lists_every_candidate() -> None:
 def test_every_controllers_search_box_spans_six_decades() -> None:
     for chosen in CONTROLLERS.values():
         if chosen.gains:
-            np.testing.assert_allclose(GainSpace.of(chosen.gains).decades, 6.0)
+            orders = [chosen.name == "fopi" and name == "lambda" for name in chosen.gains]  # of an integral: below 2
+            np.testing.assert_allclose(GainSpace.of(chosen.gains).decades[~np.array(orders)], 6.0)
 
 
 def test_gains_read_back_exactly(tmp_path: Path) -> None:

@@ -31,6 +31,7 @@ from wristctl.plotting.style import (
     undress,
 )
 from wristctl.plotting.wrist_drawing import RIM
+from wristctl.records.manifest import CONFIG
 from wristctl.records.run import Run
 from wristctl.simulation.bend_course import BendCourse
 from wristctl.simulation.worlds import plant_of
@@ -78,6 +79,11 @@ def spatial_view(run: Run) -> dict[str, Any] | None:
     Numbers are whole: a picture has the bends of all segments and both wanted ones [0.1 mrad], each tendon's pull
     [0.1 N], and the tip where it is and where it is wanted [0.01 mm]. Pictures end where the wrist left its range.
     """
+    table_of = {"simulate": "data/bends.csv", "hw-run": "data/trials.csv"}.get(run.kind)
+    if table_of is None or not (run.path / table_of).is_file():
+        return None
+    for name in (CONFIG, table_of):  # no link
+        run.file(name)
     loop = run.config.hw_run.loop if run.kind == "hw-run" else run.config.simulate.loop
     wrist, planes = plant_of(run.config.wrist, loop.plant), ("ulnar", "flexion")
     places = cables(wrist)
@@ -115,12 +121,9 @@ def spatial_view(run: Run) -> dict[str, Any] | None:
     }
 
 
-def _simulated(run: Run, columns: list[str]) -> Array | None:
+def _simulated(run: Run, columns: list[str]) -> Array:
     """Columns of a loop in two planes, (T, columns)."""
-    file = run.path / "data/bends.csv"
-    if not file.is_file():
-        return None
-    with file.open(encoding="utf-8", newline="") as lines:  # sooner than pandas is loaded
+    with (run.path / "data/bends.csv").open(encoding="utf-8", newline="") as lines:  # sooner than pandas is loaded
         heads, *rows = csv.reader(lines)
     at = [heads.index(name) for name in columns]
     return np.array([[float(row[column] or "nan") for column in at] for row in rows])
@@ -128,7 +131,7 @@ def _simulated(run: Run, columns: list[str]) -> Array | None:
 
 def _performed(run: Run, columns: list[str]) -> Array | None:
     """The same of the first trial of a rig in two planes that went to its end: as it truly was, where that is known."""
-    if run.kind != "hw-run" or run.config.hw_run.planes == 1 or not (run.path / "data/trials.csv").is_file():
+    if run.config.hw_run.planes == 1:
         return None
     course = first_course(run)
     if course is None:

@@ -198,6 +198,7 @@ class PairedTracking:
 
     @zero.setter
     def zero(self, angles: tuple[float, ...]) -> None:
+        """Take these angles, one for each camera [rad]."""
         for tracking, angle in zip(self._trackings, angles, strict=True):
             tracking.zero = (angle,)
 
