@@ -252,7 +252,7 @@ def second_of(run: Run, second: Run) -> tuple[list[str], list[str]]:
     made = [
         f"`{asked_again(second.manifest.argv)}`, {second.id},",
         f"has the hash `{second.manifest.result_sha256}`.",
-        "Its worlds, searches and noise are all others than the first study's.",
+        "None of its worlds, searches and noise are those of the first study.",
     ]
     return again(*rankings, smooth), asked_twice(*rankings, "\n".join(made))
 
