@@ -7,8 +7,12 @@ import math
 import pytest
 
 from wristctl.bench.virtual_bench import VirtualBench
+from wristctl.commands.calibrate.wrist import plan
+from wristctl.commands.inputs import Inputs
 from wristctl.config.hw_run import CalibrateWristSettings
+from wristctl.config.study import Study
 from wristctl.config.wrist import WristParameters
+from wristctl.errors import UserError
 from wristctl.trial.rig_strokes import axis_tried
 from wristctl.trial.safety import SafetyStop
 from wristctl.trial.testbeds import EmulatedTestbed
@@ -45,3 +49,9 @@ def test_a_tendon_that_is_off_bends_nothing_and_that_is_said() -> None:
     with pytest.raises(SafetyStop, match=r"axis 1 does not bend the wrist within 0\.5 mm"):
         axis_tried(testbed, short, 1)
     assert not any(bench.motion().energised)
+
+
+def test_one_axis_alone_is_not_tried_where_one_camera_sees_half_of_the_bend() -> None:
+    settings = CalibrateWristSettings(axis=1, planes=2)
+    with pytest.raises(UserError, match="this rig has two"):
+        plan(Study(calibrate_wrist=settings), Inputs())

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -13,6 +14,7 @@ from tests.trial.test_rig_facts import posed
 from wristctl.config.hw_run import Homing
 from wristctl.trial.safety import SafetyStop
 from wristctl.trial.supervised_wait import Patience
+from wristctl.vision.marker import Sighting, SightingVerdict
 
 
 def test_waiting_keeps_the_boards_link_alive() -> None:
@@ -67,3 +69,19 @@ def test_a_camera_too_oblique_for_its_markers_is_refused_and_one_that_is_not_is_
         with pytest.raises(SafetyStop, match=f"looks {abs(pan):.0f} deg off square .*, beyond") as stopped:
             Patience(board).stand_square(tracking, Homing(oblique_deg=abs(pan) - 0.5))
         assert "--optics" in str(stopped.value.fix)
+
+
+@pytest.mark.parametrize("lost", [None, 0, 1])
+def test_a_bend_that_two_cameras_do_not_give_is_no_reading(monkeypatch: pytest.MonkeyPatch, lost: int | None) -> None:
+    seen = [Sighting(0.0, k, 0.1, SightingVerdict.OK, np.zeros((2, 4, 2)), plane=k) for k in range(2)]
+    tracking: Any = SimpleNamespace(
+        zero=(0.0, 0.0), bend=lambda sighting, _: math.nan if sighting.plane == lost else 0.2
+    )
+    board: Any = RigBoard()
+    patience = Patience(board)
+    monkeypatch.setattr(patience, "sightings", lambda *_: seen)
+    if lost is None:
+        assert patience.reading(tracking, 1).beside == 0.2
+    else:
+        with pytest.raises(SafetyStop):
+            patience.reading(tracking, 1)

@@ -23,6 +23,8 @@ from wristctl.trial.residuals import Limit, limits_of
 from wristctl.trial.run_limits import Logged, stop_of
 from wristctl.trial.safety import SafetyStop
 from wristctl.trial.spatial_belief import TOWARD
+from wristctl.trial.testbeds import EmulatedTestbed
+from wristctl.trial.tracking import Tracking
 from wristctl.trial.trials import Trial, back, motion_of, motions_of, trials_of
 
 
@@ -164,6 +166,22 @@ def test_directions_are_shuffled_together_where_nobody_turns_the_wrist() -> None
     trials = trials_of(settings, np.random.default_rng(0))
     assert len(trials) == 16 and {trial.direction for trial in trials} == set(TOWARD)
     assert {trial.plane for trial in trials[:8]} >= {"", "ulnar", "flexion"}
+
+
+def test_one_set_up_serves_trials_in_all_directions(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    begun: list[object] = []
+    tracking = EmulatedTestbed.tracking
+
+    def counted(testbed: EmulatedTestbed) -> Tracking:
+        begun.append(testbed)
+        return tracking(testbed)
+
+    monkeypatch.setattr(EmulatedTestbed, "tracking", counted)
+    short = {"kind": "minimum-jerk", "angle_deg": 8.0, "duration": 0.3}
+    toward = ("ulnar", "flexion", "ulnar-flexion")
+    done = performed(tmp_path, planes=2, reference=short, directions=toward, horizon=0.5, back=0.3)
+    assert done.error is None and list(done.experiment.outcomes.values()) == ["ok"] * 3
+    assert len(begun) == 1
 
 
 @pytest.mark.parametrize(("name", "degrees"), TOWARD.items())

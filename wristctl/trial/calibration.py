@@ -13,6 +13,7 @@ from wristctl.records import Run
 from wristctl.trial.homing import SpatialZero, Zero, find_zero, slacken
 from wristctl.trial.motors_ready import in_sight, prepare
 from wristctl.trial.spools import spools_of
+from wristctl.trial.supervised_wait import Patience
 from wristctl.trial.testbeds import Testbed
 
 FILE, SCHEMA = "data/wrist.json", "wristctl.wrist/1"
@@ -71,6 +72,8 @@ def calibrated(testbed: Testbed, settings: CalibrateWristSettings, wrist: WristP
     Raises SafetyStop, BoardError and CameraError; the motors are stopped before.
     """
     with in_sight(testbed, settings) as (board, hello, tracking):
+        if settings.planes == 2:  # what one camera sees of a bend depends on the other
+            tracking.zero = Patience(board).markers(tracking, 4 * settings.homing.frames)
         prepare(board, settings)
         zero = find_zero(board, tracking, settings, wrist, settings.plane)
         position = slacken(board, spools_of(settings.actuator), settings.homing, zero.signs)

@@ -151,12 +151,13 @@ class Experiment:
         plane: str | None = None
         patience = Patience(board)
         for trial in self._trials:
-            if trial.plane != plane:
+            bends_in = trial.plane if self._settings.planes == 1 else ""  # one set-up sees both planes
+            if bends_in != plane:
                 testbed.face(trial.direction, patience.pulse)
-                loop, tracking = self._loop(testbed, board, trial.plane, shown)
-                plane = trial.plane
+                loop, tracking = self._loop(testbed, board, bends_in, shown)
+                plane = bends_in
             self._one(testbed, loop, trial)
-            loop = self._relaxed(board, tracking, trial.plane, shown)
+            loop = self._relaxed(board, tracking, bends_in, shown)
             patience = loop.patience()
 
     def _loop(

@@ -166,9 +166,8 @@ class _Finder:
         bend = self._expected.bend(self._straight, patience.reading(self._tracking, slowly * self._settings.frames))
         if self._expected.size(bend) > math.radians(_FURTHEST_DEG):
             self._reel(axis, -2 * self._pull)
-            problem = (
-                f"axis {axis} bent the wrist by {math.degrees(self._expected.along(axis, bend)):.1f} deg while homing"
-            )
+            bent = math.degrees(math.copysign(self._expected.size(bend), self._expected.along(axis, bend)))
+            problem = f"axis {axis} bent the wrist by {bent:.1f} deg while homing"
             raise SafetyStop(problem, "homing", "slacken all tendons first")
         return bend
 

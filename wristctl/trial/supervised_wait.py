@@ -87,6 +87,8 @@ class Patience:
             float(np.median([tracking.bend(sighting, seen[1 - plane]) for sighting in sightings]))
             for plane, sightings in enumerate(planes)
         ]
+        if not all(map(math.isfinite, bends)):
+            raise SafetyStop("what the cameras see is no bend of the wrist", fix="see both cameras and their markers")
         return Reading(bends[0], math.nan, bends[1])
 
     def markers(self, tracking: Tracking, frames: int) -> tuple[float, ...]:

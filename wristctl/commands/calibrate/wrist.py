@@ -12,6 +12,7 @@ from wristctl.commands.results import StudyResult
 from wristctl.commands.rig_description import coming_first, describe_rig
 from wristctl.commands.session import Session
 from wristctl.config.study import Study
+from wristctl.errors import UserError
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -55,6 +56,9 @@ def plan(study: Study, inputs: Inputs) -> str:
     """Plan of a calibration. Opens no device."""
     settings = study.calibrate_wrist
     slack = 1e3 * settings.homing.slack
+    if settings.axis is not None and settings.planes == 2:
+        problem = "one axis alone is watched by one camera, and this rig has two"
+        raise UserError(problem, "calibrate-wrist.axis", "planes: 1 with --camera of the plane that it bends in")
     if settings.axis is not None:
         until = f"until its tendon bends the wrist, by {settings.max_deg:g} deg at most"
         return f"{describe_rig(settings)}\naxis {settings.axis} reels in by at most {slack:g} mm {until}"
