@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, replace
 from typing import Any
 
 import numpy as np
@@ -114,3 +114,22 @@ def test_what_cannot_be_is_refused_before_a_rig_is_opened(change: str, problem: 
         plan(wristctl.load_study(None, *SETTINGS, change), Inputs({}))
     said = plan(wristctl.load_study(None, *SETTINGS), Inputs({}))
     assert "2 trials" in said
+
+
+def test_a_wrist_that_swings_at_rest_is_told_and_one_that_still_moves_is_not(whole: Whole) -> None:
+    """The whole run's motion goes on to its end: whatever swings there may be the motion."""
+    table = whole.result.trials.assign(oscillation=np.radians(0.7), steady_state=0.0, chattering=0.0)
+    moving = replace(whole.result, trials=table)
+    still = {}
+    for number, course in whole.result.twins.items():
+        arrays = {name: value for name, value in vars(course).items() if isinstance(value, np.ndarray)}
+        longer: dict[str, Any] = {name: np.resize(value, (300, *value.shape[1:])) for name, value in arrays.items()}
+        longer |= {"time": np.arange(300) * 0.01, "bend_ref": np.full((300, 2), 0.1)}
+        given = {field.name for field in fields(course)}
+        still[number] = replace(course, **{name: value for name, value in longer.items() if name in given})
+    assert moving.marks == []
+    resting = replace(moving, twins=still)
+    assert resting.marks == ["swings by up to 0.7 deg at rest: 2 of 2 trials"]
+    assert any("swings by up to 0.7 deg" in str(note) for note in resting.answer.notes)
+    away = replace(resting, trials=table.assign(oscillation=0.0, steady_state=[0.1, 0.0]))
+    assert away.marks == ["does not arrive: 1 of 2 trials"]

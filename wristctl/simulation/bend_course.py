@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from wristctl.arrays import Array
-from wristctl.simulation.oscillation import oscillations
+from wristctl.simulation.oscillation import REST, oscillations
 from wristctl.wrist.spatial.spatial_kinematics import spatial_tips
 
 if TYPE_CHECKING:
@@ -81,6 +81,12 @@ class BendCourse:
     def tip_desired(self) -> Array:
         """Tip of one arc that is bent as wanted (T, 3) [m]."""
         return spatial_tips(self.bend_ref, self.length_known)
+
+    @property
+    def rests(self) -> bool:
+        """Whether the reference rests at the end, for as long as shows a swing of the loop's own."""
+        late = self.bend_ref[-round(REST / float(self.time[1])) :]
+        return bool(len(self.time) * self.time[1] >= REST and not np.ptp(late, axis=0).any())
 
     @property
     def failed(self) -> bool:

@@ -17,7 +17,7 @@ from wristctl.simulation.arrival import SHORT
 from wristctl.simulation.bend_course import BendCourse
 from wristctl.simulation.closed_loop import scenario_of
 from wristctl.simulation.convergence import FINER, HALF, more_finely, tolerance
-from wristctl.simulation.oscillation import LIMIT_CYCLE, REST, chatter
+from wristctl.simulation.oscillation import LIMIT_CYCLE, chatter
 from wristctl.simulation.recording import recorded_bends
 from wristctl.simulation.reference import REFERENCES, course_of, motion, toward
 from wristctl.simulation.repetitions import STRAIN, Repetitions
@@ -32,7 +32,7 @@ _TOGETHER = 32
 # Error [rad] that is none where nothing is asked for.
 _STILL = math.radians(0.5)
 # Two sides, of which the frequency of chattering is told in one plane.
-_SIDES = 2
+SIDES = 2
 
 
 def planes_of(loop: Loop, reference: Reference) -> int:
@@ -102,7 +102,7 @@ class RepeatedBends(Repetitions):
     @property
     def swing(self) -> float:
         """Half of the swing at rest, the repetitions' median, where it is a limit cycle, else 0 [rad]."""
-        ripple = self.median("oscillation") if self.rests else 0.0
+        ripple = self.median("oscillation") if self.first.rests else 0.0
         return ripple if ripple > LIMIT_CYCLE else 0.0
 
     @property
@@ -111,17 +111,10 @@ class RepeatedBends(Repetitions):
         return math.nan
 
     @property
-    def rests(self) -> bool:
-        """Whether the reference rests at the end, for as long as shows a swing of the loop's own."""
-        course = self.first
-        late = course.bend_ref[-round(REST / float(course.time[1])) :]
-        return bool(len(course.time) * course.time[1] >= REST and not np.ptp(late, axis=0).any())
-
-    @property
     def chatter(self) -> float:
         """Frequency at which pulls go from limit to limit and back, where it chatters, else 0 [1/s]."""
         places = len(self.layout.places)
-        return float(chatter(self.median("chattering") * _SIDES / places, self.tension_range))
+        return float(chatter(self.median("chattering") * SIDES / places, self.tension_range))
 
     @property
     def beyond(self) -> float:

@@ -10,9 +10,14 @@ from wristctl.commands.answer import Answer
 from wristctl.commands.printed_table import Table, degrees, two
 
 if TYPE_CHECKING:
+    import numpy as np
     import pandas as pd
+    from numpy.typing import NDArray
 
+    from wristctl.arrays import Array
     from wristctl.simulation.repetitions import Simulation
+
+    Mask = NDArray[np.bool_]
 
 # Factor between measured and simulated error beyond which that is said.
 APART = 1.5
@@ -66,7 +71,7 @@ def answer_of(
     done = trials[trials["outcome"] == "ok"].assign(label=lambda table: table["controller"] + "/" + table["gains"])
     labels = list(dict.fromkeys(done["label"]))
     more = f"All tables: --all. Every trial: {run}/report.html" if run else "All tables: `.tables`."
-    notes = [*_apart(done, labels, twins), *_unsound(trials, marks, metrics)]
+    notes = [*_apart(done, labels, twins), *unsound(trials, marks, metrics)]
     if not labels:
         return Answer(f"None of {len(trials)} trials was completed.", None, notes, more)
     sentences = [_sentence(done[done["label"] == label], label, twins) for label in labels[:2]]
@@ -82,14 +87,14 @@ def _sentence(trials: pd.DataFrame, label: str, twins: Mapping[int, Simulation])
         means = means_of(free, twins)
         each = [means_of(group, twins).rmse for _, group in free.groupby("direction", sort=False)]
         spread = f" ({degrees(min(each))} to {degrees(max(each))} deg by direction)" if len(each) > 1 else ""
-        parts.append(f"error {_deg(means.rmse)} deg RMSE{spread}")
+        parts.append(f"error {in_deg(means.rmse)} deg RMSE{spread}")
         parts.append(_within("settles", means.settling))
     if len(pushed):
         means = means_of(pushed, twins)
         force = ", ".join(f"{newtons:g}" for newtons in sorted({abs(force) for force in pushed["push"]}))
         after = f"after a push of {force} N"
         recovers = "is back at once" if means.recovery == 0.0 else _within("recovers", means.recovery)
-        parts.append(f"{recovers} {after} (error {_deg(means.rmse)} deg RMSE with it)")
+        parts.append(f"{recovers} {after} (error {in_deg(means.rmse)} deg RMSE with it)")
     return f"{label}: {', '.join(parts)}."
 
 
@@ -97,12 +102,41 @@ def _within(verb: str, seconds: float) -> str:
     return f"{verb} within {two(seconds)} s" if math.isfinite(seconds) else f"never {verb} in some trial"
 
 
-def _deg(angle: float) -> str:
+def in_deg(angle: float) -> str:
+    """An angle [rad] in degrees; a dash where there is none."""
     return degrees(angle) if math.isfinite(angle) else "-"
 
 
-def _seconds(value: float) -> str:
-    return two(value) if math.isfinite(value) else "-"
+def in_s(seconds: float) -> str:
+    """A time [s]; a dash where there is none."""
+    return two(seconds) if math.isfinite(seconds) else "-"
+
+
+def marks_of(done: pd.DataFrame, goals: Array, still: Mask, chatters: Mask) -> list[str]:
+    """In how many of the trials that ended well the wrist does not arrive, swings at rest, or tensions chatter.
+
+    Parameters
+    ----------
+    done
+        Those trials, (N,).
+    goals
+        Largest angle [rad] of each one's reference, inf where it does not rest at the end, (N,).
+    still
+        Whether it rests for as long as shows a swing, (N,).
+    chatters
+        Whether tensions cross their range faster than any wrist follows, (N,).
+    """
+    import numpy as np
+
+    from wristctl.simulation.arrival import SHORT
+    from wristctl.simulation.oscillation import LIMIT_CYCLE
+
+    short = done["steady_state"].to_numpy(float) > SHORT * goals
+    swing = np.where(still, done["oscillation"].to_numpy(float), 0.0)
+    swings = swing > LIMIT_CYCLE
+    size = degrees(float(swing[swings].max())) if swings.any() else ""
+    found = {"does not arrive": short, f"swings by up to {size} deg at rest": swings, "chatters": chatters}
+    return [f"{mark}: {int(where.sum())} of {len(done)} trials" for mark, where in found.items() if where.any()]
 
 
 def _table(done: pd.DataFrame, labels: Sequence[str], twins: Mapping[int, Simulation]) -> Table:
@@ -122,8 +156,8 @@ def _table(done: pd.DataFrame, labels: Sequence[str], twins: Mapping[int, Simula
                 continue
             free, pushed = (means_of(group[(group["push"] != 0.0) == push], twins) for push in (False, True))
             rows.append(
-                (label, direction, _deg(free.rmse), _deg(free.simulated), _deg(free.steady_state),
-                 _seconds(free.settling), _deg(pushed.rmse), _seconds(pushed.recovery))
+                (label, direction, in_deg(free.rmse), in_deg(free.simulated), in_deg(free.steady_state),
+                 in_s(free.settling), in_deg(pushed.rmse), in_s(pushed.recovery))
             )  # fmt: skip
     several = len(labels) > 1
     return Table("", heads[not several :], [row[not several :] for row in rows])
@@ -139,23 +173,17 @@ def _apart(done: pd.DataFrame, labels: Sequence[str], twins: Mapping[int, Simula
                 ratio = means.rmse / means.simulated
                 times = f"{two(max(ratio, 1.0 / ratio))} times {'larger' if ratio > 1.0 else 'smaller'}"
                 where = f"{f'{label} ' * (len(labels) > 1)}{'with' if pushed else 'without'} a push"
-                facts.append(f"{where} {_deg(means.rmse)} deg, {times} than {_deg(means.simulated)} deg simulated")
+                facts.append(f"{where} {in_deg(means.rmse)} deg, {times} than {in_deg(means.simulated)} deg simulated")
     if not facts:
         return []
     return [f"Measured and simulated errors do not agree: {'; '.join(facts)}. Do not rely on that simulation here."]
 
 
-def _unsound(trials: pd.DataFrame, marks: Sequence[str], metrics: Mapping[str, float]) -> list[str]:
+def unsound(trials: pd.DataFrame, marks: Sequence[str], metrics: Mapping[str, float]) -> list[str]:
     """Trials that ended early or were odd, what the wrist does wrong, and ticks that were skipped."""
-    marked = [f"Of the completed trials: {'; '.join(marks)}."] if marks else []
-    early, slow = notes_on(trials, {}), notes_on(trials.iloc[:0], metrics)
-    return [*early, *marked, *slow]
-
-
-def notes_on(trials: pd.DataFrame, metrics: Mapping[str, float]) -> list[str]:
-    """Trials that ended early or were odd, and ticks that were skipped."""
     notes = [f"Trial {row['trial']} ended early: {row['outcome']}." for row in _records(trials, "outcome", "ok")[:3]]
     notes += [f"Trial {row['trial']} was odd: {row['odd']}." for row in _records(trials, "odd", "")[:3]]
+    notes += [f"Of the completed trials: {'; '.join(marks)}."] if marks else []
     if metrics.get("overruns", 0.0) > 0.0:
         skipped, ticks = int(metrics["overruns"]), int(metrics["ticks"])
         notes.append(f"The controller was too slow for its period: {skipped} of {ticks} control ticks were skipped.")

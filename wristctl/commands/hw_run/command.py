@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from wristctl.commands.answer import Answer
-from wristctl.commands.hw_run.answer import answer_of
+from wristctl.commands.hw_run.answer import answer_of, marks_of
 from wristctl.commands.inputs import EarlierRun, Inputs
 from wristctl.commands.inputs_of_loops import (
     check_inverses,
@@ -54,28 +54,17 @@ class Performed(StudyResult):
 
     @property
     def marks(self) -> list[str]:
-        """In how many of the trials that ended well the wrist does not arrive, swings at rest, or tensions chatter."""
+        """What the wrist does wrong in trials that ended well: `marks_of`."""
         import numpy as np
 
-        from wristctl.commands.printed_table import degrees
-        from wristctl.simulation.arrival import SHORT
-        from wristctl.simulation.oscillation import LIMIT_CYCLE, at_rest, chatter
+        from wristctl.simulation.oscillation import at_rest, chatter
         from wristctl.simulation.trajectory import rests
 
-        completed = self.trials[self.trials["outcome"] == "ok"]
-        courses = [self.twins[number].trajectory for number in completed["trial"]]
-        most = np.array([np.abs(course.theta_ref).max() if rests(course) else np.inf for course in courses])
-        short = int((completed["steady_state"].to_numpy(float) > SHORT * most).sum())
-        chatters = int((chatter(completed["chattering"].to_numpy(float), self.study.wrist.tension_range) > 0.0).sum())
-        swing = np.where([at_rest(course) for course in courses], completed["oscillation"].to_numpy(float), 0.0)
-        swings = swing > LIMIT_CYCLE
-        size = degrees(float(swing[swings].max())) if swings.any() else ""
-        counts = {
-            "does not arrive": short,
-            f"swings by up to {size} deg at rest": int(swings.sum()),
-            "chatters": chatters,
-        }
-        return [f"{mark}: {count} of {len(completed)} trials" for mark, count in counts.items() if count]
+        done = self.trials[self.trials["outcome"] == "ok"]
+        courses = [self.twins[number].trajectory for number in done["trial"]]
+        goals = np.array([np.abs(course.theta_ref).max() if rests(course) else np.inf for course in courses])
+        slams = chatter(done["chattering"].to_numpy(float), self.study.wrist.tension_range)
+        return marks_of(done, goals, np.array([at_rest(course) for course in courses], bool), slams > 0.0)
 
     def frame(self) -> pd.DataFrame:
         """One row per trial that began."""

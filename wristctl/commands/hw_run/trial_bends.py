@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
 from wristctl.commands.answer import Answer
-from wristctl.commands.hw_run.answer import APART, notes_on
-from wristctl.commands.printed_table import Table, degrees, two
+from wristctl.commands.hw_run.answer import APART, in_deg, in_s, marks_of, unsound
+from wristctl.commands.printed_table import Table, two
 from wristctl.commands.results import Findings, StudyResult
 from wristctl.commands.session import Session
 from wristctl.control.table import Gains
@@ -48,7 +48,22 @@ class PerformedBends(StudyResult):
     @property
     def answer(self) -> Answer:
         """Error by plane and over both, what a push does, and how far simulation agrees."""
-        return _answer(self.trials, self.twins, self.metrics, self.place)
+        return _answer(self.trials, self.twins, self.metrics, self.marks, self.place)
+
+    @property
+    def marks(self) -> list[str]:
+        """What the wrist does wrong in trials that ended well: `marks_of`."""
+        import numpy as np
+
+        from wristctl.board.messages import AXES
+        from wristctl.simulation.bend_loops import SIDES
+        from wristctl.simulation.oscillation import chatter
+
+        done = self.trials[self.trials["outcome"] == "ok"]
+        courses = [self.twins[number] for number in done["trial"]]
+        goals = np.array([np.hypot(*course.bend_ref.T).max() if course.rests else np.inf for course in courses])
+        slams = chatter(done["chattering"].to_numpy(float) * SIDES / AXES, self.study.wrist.tension_range)
+        return marks_of(done, goals, np.array([course.rests for course in courses], bool), slams > 0.0)
 
     def frame(self) -> pd.DataFrame:
         """One row per trial that began."""
@@ -172,11 +187,13 @@ def _draw(session: Session, done: pd.DataFrame, twins: Mapping[int, BendCourse])
         findings.overview.figure = "bends" if courses[0].push is None or len(courses) > 1 else "pushed-bends"
 
 
-def _answer(trials: pd.DataFrame, twins: Mapping[int, BendCourse], metrics: Mapping[str, float], run: str) -> Answer:
+def _answer(
+    trials: pd.DataFrame, twins: Mapping[int, BendCourse], metrics: Mapping[str, float], marks: Sequence[str], run: str
+) -> Answer:
     done = trials[trials["outcome"] == "ok"].assign(label=lambda table: table["controller"] + "/" + table["gains"])
     labels = list(dict.fromkeys(done["label"]))
     more = f"All tables: --all. Every trial: {run}/report.html" if run else "All tables: `.tables`."
-    notes = [*_apart(done, labels, twins), *notes_on(trials, metrics)]
+    notes = [*_apart(done, labels, twins), *unsound(trials, marks, metrics)]
     if not labels:
         return Answer(f"None of {len(trials)} trials was completed.", None, notes, more)
     sentences = [_sentence(done[done["label"] == label], label, twins) for label in labels[:2]]
@@ -192,23 +209,15 @@ def _sentence(trials: pd.DataFrame, label: str, twins: Mapping[int, BendCourse])
         if group.empty:
             continue
         errors = _errors(group, twins)
-        words = f"error {_deg(errors.ulnar)} deg RMSE toward ulnar, {_deg(errors.flexion)} deg toward flexion"
+        words = f"error {in_deg(errors.ulnar)} deg RMSE toward ulnar, {in_deg(errors.flexion)} deg toward flexion"
         if math.isfinite(errors.true):
-            words += f" (truly {_deg(errors.true)} deg on the worse axis)"
+            words += f" (truly {in_deg(errors.true)} deg on the worse axis)"
         if pushed:
             force = ", ".join(f"{newtons:g}" for newtons in sorted({abs(force) for force in group["push"]}))
             back = "at once" if errors.recovery == 0.0 else f"within {two(errors.recovery)} s"
             words = f"with a push of {force} N {words}" + f", back {back}" * math.isfinite(errors.recovery)
         parts.append(words)
     return f"{label} in two planes: {'; '.join(parts)}."
-
-
-def _deg(angle: float) -> str:
-    return degrees(angle) if math.isfinite(angle) else "-"
-
-
-def _seconds(value: float) -> str:
-    return two(value) if math.isfinite(value) else "-"
 
 
 def _table(done: pd.DataFrame, labels: Sequence[str], twins: Mapping[int, BendCourse]) -> Table:
@@ -226,9 +235,9 @@ def _table(done: pd.DataFrame, labels: Sequence[str], twins: Mapping[int, BendCo
             for push, group in of_motion.groupby("push"):
                 errors = _errors(group, twins)
                 angles = errors.ulnar, errors.flexion, errors.both, errors.true, errors.simulated
-                after = _seconds(errors.recovery) if push else "-"
+                after = in_s(errors.recovery) if push else "-"
                 rows.append(
-                    (label, motion, f"{push:g}", *map(_deg, angles), _seconds(errors.settling), after)
+                    (label, motion, f"{push:g}", *map(in_deg, angles), in_s(errors.settling), after)
                 )  # fmt: skip
     several = len(labels) > 1
     return Table("", heads[not several :], [row[not several :] for row in rows])
@@ -247,6 +256,6 @@ def _apart(done: pd.DataFrame, labels: Sequence[str], twins: Mapping[int, BendCo
                 times = f"{two(max(ratio, 1.0 / ratio))} times {'larger' if ratio > 1.0 else 'smaller'}"
                 where = f"{f'{label} ' * (len(labels) > 1)}{'with' if pushed else 'without'} a push"
                 facts.append(
-                    f"{where} {_deg(measured)} deg on the worse axis, {times} than {_deg(errors.simulated)} deg"
+                    f"{where} {in_deg(measured)} deg on the worse axis, {times} than {in_deg(errors.simulated)} deg"
                 )
     return [f"Measured and simulated errors do not agree: {'; '.join(facts)} simulated."] if facts else []

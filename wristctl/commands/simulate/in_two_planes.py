@@ -142,7 +142,7 @@ def _short_of(study: Study, repeated: RepeatedBends) -> tuple[str, list[str]]:
         )
         fix = "No gains can help: a larger tension_limit or tendon_radius, or a smaller angle_deg."
         return reason, [fix]
-    what = "arrive" if repeated.rests else "follow"
+    what = "arrive" if repeated.first.rests else "follow"
     return f"does not {what}: {off:.2g} deg off at the end", ["Other gains or another controller may hold it."]
 
 
