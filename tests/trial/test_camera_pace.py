@@ -52,6 +52,14 @@ def test_a_pause_between_two_looks_costs_no_rate_and_a_lost_picture_does() -> No
     assert made.rate == pytest.approx(79.0 / (88.0 / 60.0))
 
 
+def test_a_camera_that_freezes_for_a_second_again_and_again_is_slow() -> None:
+    made, time = CameraPace(), 0.0
+    for k in range(80):
+        time += 0.9 if k % 20 == 19 else 1.0 / 30.0
+        made.add(Sighting(time, k, 0.0, OK, np.zeros((2, 4, 2)), came=time))
+    assert made.rate < 15.0
+
+
 def test_the_cause_of_a_missing_angle_is_the_cameras_own() -> None:
     slow = pace(15.0, 0.133)
     why, fix = slow.missing(59 / 15.0 + 0.14, 0.15)

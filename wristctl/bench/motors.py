@@ -109,6 +109,15 @@ def hear_edge(spools: Any, motor: Any, cycle: int, port: int, value: int) -> Non
 
 
 @compiled
+def hear_edges(spools: Any, motor: Any, edges: Any, heard: int, until: int) -> int:
+    """Take in the changes (cycle, port, value) from `heard` on that come before a cycle; how many are heard then."""
+    while heard < edges.shape[0] and edges[heard, 0] < until:
+        hear_edge(spools, motor, edges[heard, 0], edges[heard, 1], edges[heard, 2])
+        heard += 1
+    return heard
+
+
+@compiled
 def turn_spools(spools: Any, motor: Any, stiffness: float) -> None:
     """Turn the spools for a period, by the pulls at its start."""
     for axis in range(AXES):
@@ -182,9 +191,7 @@ def follow(
     edge = 0
     for k in range(acting.shape[0]):
         middle = (first + k) * CYCLES + CYCLES // 2
-        while edge < edges.shape[0] and edges[edge, 0] < middle:
-            hear_edge(spools, motor, edges[edge, 0], edges[edge, 1], edges[edge, 2])
-            edge += 1
+        edge = hear_edges(spools, motor, edges, edge, middle)
         turn_spools(spools, motor, hanging.stiffness)
         plant = disturbed(undisturbed, acting[k, 0], acting[k, 1])
         time, path = (first + k) * PERIOD - start + zero, travel(plant, q)

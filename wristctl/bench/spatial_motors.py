@@ -5,7 +5,7 @@ Motors and spools are those of `wristctl.bench.motors`; each tendon has its plac
 
 from typing import Any, NamedTuple
 
-from wristctl.bench.motors import CYCLES, PERIOD, hear_edge, turn_spools
+from wristctl.bench.motors import CYCLES, PERIOD, hear_edges, turn_spools
 from wristctl.board.messages import AXES
 from wristctl.lanes.compiled import kernel
 from wristctl.lanes.functions import clip, maximum
@@ -67,9 +67,7 @@ def follow_in_space(
     edge = 0
     for k in range(acting.shape[0]):
         middle = (first + k) * CYCLES + CYCLES // 2
-        while edge < edges.shape[0] and edges[edge, 0] < middle:
-            hear_edge(spools, motor, edges[edge, 0], edges[edge, 1], edges[edge, 2])
-            edge += 1
+        edge = hear_edges(spools, motor, edges, edge, middle)
         turn_spools(spools, motor, hanging.stiffness)
         time, scale = (first + k) * PERIOD - start, acting[k, 3]
         segment = load_tip(
