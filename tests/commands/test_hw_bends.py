@@ -133,3 +133,6 @@ def test_a_wrist_that_swings_at_rest_is_told_and_one_that_still_moves_is_not(who
     assert any("swings by up to 0.7 deg" in str(note) for note in resting.answer.notes)
     away = replace(resting, trials=table.assign(oscillation=0.0, steady_state=[0.1, 0.0]))
     assert away.marks == ["does not arrive: 1 of 2 trials"]
+    crossing = 4.0 * 30.0 * WristParameters().tension_range  # of two sides 30 times a second, and of four tendons 15
+    slams = replace(resting, trials=table.assign(oscillation=0.0, chattering=[crossing, 2.0 * crossing]))
+    assert slams.marks == ["chatters: 1 of 2 trials"]

@@ -46,7 +46,7 @@ def paths_of_bends(trials: Sequence[TrialBends], reach: Array, heading: str = ""
         axes.plot(*np.rad2deg(trial.logged.bend).T, color=BLUE, linewidth=1.0, label="measured")
         if trial.true is not None:
             axes.plot(*np.rad2deg(trial.true.bend).T, color=VERMILLION, linewidth=0.8, label="true")
-    axes.set_aspect("equal")
+    axes.set_aspect("equal", adjustable="datalim")  # a box of another shape would push the title off the picture
     axes.set(xlabel="bend toward ulnar [deg]", ylabel="bend toward flexion [deg]")
     title(axes, heading)
     legend_below(picture)
