@@ -15,7 +15,7 @@ from wristctl.config.study import Study
 from wristctl.errors import UserError
 from wristctl.records import InputRun, Run, open_run, start, start_run
 from wristctl.records.find import entries
-from wristctl.records.lock import LOCK, RunLock, delete_folder
+from wristctl.records.lock import LOCK, RunLock, delete_folder, lock
 from wristctl.records.removal import Leftover, clear, foreign, leftovers, lost_repetitions, lost_tags, removable, remove
 from wristctl.records.tags import change_tags, read_tags
 
@@ -50,6 +50,15 @@ def test_what_others_put_into_a_run_is_named_before_it_goes(make: Make) -> None:
     run = make()
     (run.path / "my notes.txt").write_text("keep me")
     assert foreign(run) == ["my notes.txt"]
+
+
+def test_an_index_that_another_process_is_writing_is_no_leftover(results: Path) -> None:
+    results.mkdir(exist_ok=True)
+    unfinished = results / ".index-abcd1234"
+    with unfinished.open("w") as file:
+        lock(file.fileno())
+        assert list(leftovers(results)) == []
+    assert [leftover.path for leftover in leftovers(results)] == [unfinished]
 
 
 def test_leftovers_of_every_kind_are_found_and_runs_are_not(make: Make, results: Path) -> None:

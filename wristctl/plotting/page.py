@@ -16,7 +16,6 @@ from typing import TYPE_CHECKING, Any
 from wristctl.escape import printable, printable_lines
 from wristctl.plotting.animation import animation
 from wristctl.plotting.page_tables import in_degrees, shown_tables
-from wristctl.plotting.spatial_view import spatial_view
 from wristctl.records.difference import difference
 from wristctl.records.lineage import Ancestor, ancestry
 from wristctl.records.manifest import CONFIG, Manifest, command_of, read_overview
@@ -163,12 +162,22 @@ def page(run: Run, manifest: Manifest, beside: Path | None = None) -> str:
         first=first,
         undrawn=[caption or name for name, caption in overview.captions.items() if name not in drawn_names],
         animation=animation(run),
-        space=spatial_view(run),
+        space=_in_space(run),
         lineage=lineage_picture(ancestry(run, state=manifest.state)),
         provenance=_provenance(manifest),
         files=[(output.path, output.bytes, output.sha256, not output.volatile) for output in manifest.outputs],
         config=run.file(CONFIG).read_text(encoding="utf-8", errors="replace"),
     )
+
+
+def _in_space(run: Run) -> dict[str, Any] | None:
+    """What the page plays of a run in two planes; None of any other run, for which nothing more is imported."""
+    tried = (run.path / "data/trials.csv").is_file() and run.config.hw_run.planes > 1
+    if not tried and not (run.path / "data/bends.csv").is_file():
+        return None
+    from wristctl.plotting.spatial_view import spatial_view
+
+    return spatial_view(run)
 
 
 def render(template: str, **content: Any) -> str:

@@ -35,7 +35,6 @@ from wristctl.records.manifest import CONFIG
 from wristctl.records.run import Run
 from wristctl.simulation.bend_course import BendCourse
 from wristctl.simulation.worlds import plant_of
-from wristctl.trial.bend_results import first_course
 from wristctl.wrist.spatial.spatial_kinematics import spatial_frames
 from wristctl.wrist.tendon_layout import TendonLayout
 
@@ -133,6 +132,8 @@ def _performed(run: Run, columns: list[str]) -> Array | None:
     """The same of the first trial of a rig in two planes that went to its end: as it truly was, where that is known."""
     if run.config.hw_run.planes == 1:
         return None
+    from wristctl.trial.bend_results import first_course
+
     course = first_course(run)
     if course is None:
         return None

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from wristctl.errors import OUT, UserError
+from wristctl.records.lock import lock
 from wristctl.records.manifest import MANIFEST, SUMS, read_overview
 from wristctl.records.run import Run
 
@@ -154,8 +155,10 @@ def _write_index(results: Path, runs: dict[str, Any]) -> None:
         descriptor, temporary = tempfile.mkstemp(prefix=TEMPORARY, dir=results)
         try:
             with open(descriptor, "w", encoding="utf-8") as file:
+                lock(descriptor)  # `runs gc` takes it for no leftover
                 file.write(text)
-            os.chmod(temporary, stat.S_IMODE(os.stat(results).st_mode) & 0o666)  # whoever may read the folder
-            os.replace(temporary, results / INDEX)
+                file.flush()
+                os.chmod(temporary, stat.S_IMODE(os.stat(results).st_mode) & 0o666)  # whoever may read the folder
+                os.replace(temporary, results / INDEX)
         except OSError:
             os.unlink(temporary)

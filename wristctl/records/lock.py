@@ -60,10 +60,10 @@ def lock(descriptor: int) -> None:
             raise
 
 
-def is_locked(directory: Path) -> bool:
-    """Whether a living process holds the lock of a folder, as far as its file system can tell."""
+def is_locked(path: Path) -> bool:
+    """Whether a living process holds the lock of a folder or of a file, as far as its file system can tell."""
     try:
-        descriptor = os.open(directory / LOCK, os.O_RDONLY | os.O_NONBLOCK)
+        descriptor = os.open(path / LOCK if path.is_dir() else path, os.O_RDONLY | os.O_NONBLOCK)
     except OSError:
         return False
     try:
