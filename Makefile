@@ -18,7 +18,7 @@ run: .venv/run
 	step gen-data $(STUDY); data=$$made; \
 	step train $(STUDY) --data "$$data"; network=$$made; \
 	step tune $(STUDY) --network "$$network"; tuned=$$made; \
-	compared=$$(answer 1,2,4 compare $(STUDY) --network "$$network" --tuned "$$tuned"); \
+	compared=$$(answer 1,2,3,4,5 compare $(STUDY) --network "$$network" --tuned "$$tuned"); \
 	judged=$$(answer 1,2,3,4 paper audit $(CLAIMS)); \
 	printf '\nWhich controller to use\n%s\nWhat of the paper holds\n%s\n' "$$compared" "$$judged"
 

@@ -14,7 +14,7 @@ from wristctl.commands.answer import LINES
 from wristctl.commands.compare.answer import answer_of
 from wristctl.commands.printed_table import COLUMNS, two
 from wristctl.commands.ranking_answer import ranking_table
-from wristctl.commands.ranking_tables import answer_tables
+from wristctl.commands.ranking_tables import answer_tables, standings_table
 from wristctl.commands.ranking_words import DIGITS, condition, names_of, winner
 from wristctl.comparison.combinations import CLASSES
 from wristctl.comparison.controller_ranking import Ranking, Traits
@@ -75,6 +75,11 @@ def told(*rankings: Ranking) -> str:
     return " ".join(" ".join(answer.lines()).split())
 
 
+def avoided_in(said: str) -> str:
+    """What an answer says of controllers that must not be used."""
+    return re.split(r" \d+ compared:", said[said.index("o not use these") :])[0]
+
+
 def test_a_condition_is_a_line_with_the_best_the_next_and_the_gain_over_feedforward() -> None:
     """Errors and ratios are those of the rankings; the first sentence names the same controller."""
     one = stands()
@@ -94,7 +99,7 @@ def test_the_rig_is_answered_first_and_what_is_best_elsewhere_is_warned_of_where
     warned = said[said.index("use mrac/default") :]
     assert "(sampled, push) use mrac/default" in said
     assert re.search(r"a camera: it swings by 2\.9 deg in 12 of 12 cases", warned)
-    avoided = said[said.index("o not use these") :]
+    avoided = avoided_in(said)
     assert all(f"{name} by 2.9 deg" in avoided for name in ("mrac", "pid/printed"))
 
 
@@ -105,7 +110,7 @@ def test_every_fault_is_named_with_its_size_and_its_number_of_cases() -> None:
             unconverged=("nc/default",), failed={"pd-ff/default": 5},
         )
     )  # fmt: skip
-    avoided = said[said.index("o not use these") : said.index("The paper")].lower()
+    avoided = avoided_in(said).lower()
     for fact in (
         "swings: smc/exchanged by 2.9 deg (in 12 of 12 cases)",
         "does not arrive: smc/printed (in 12 of 12 motions)",
@@ -123,15 +128,47 @@ def test_what_must_not_be_used_without_a_rig_is_named_after_the_rigs_with_its_co
         stands(away=("smc/printed",), swings=("nc/default",)), stands("pushed", swings=("nc/default",)),
         stands("camera and tendons", swings=("mrac/default",)),
     )  # fmt: skip
-    rig, elsewhere = said[said.index("o not use these") : said.index("The paper")].split("In other conditions")
+    rig, elsewhere = avoided_in(said).split("Elsewhere")
     assert "mrac by 2.9 deg" in rig and "nc" not in rig.split() and "mrac" not in elsewhere
     assert "smc/printed does not arrive in sampled;" in elsewhere
-    assert "nc swings in sampled and push." in elsewhere
+    assert "nc swings by 2.9 deg in sampled and push." in elsewhere
+
+
+def test_faults_of_several_under_other_conditions_are_said_with_their_least_and_largest_size() -> None:
+    one, other = (stands(name, swings=("nc/default", "gvsc/default")) for name in ("sampled", "pushed"))
+    small = replace(other, swing=np.where(other.swing > 0.0, np.deg2rad(0.4), 0.0))
+    said = told(one, small, stands("camera and tendons"))
+    assert re.search("(gvsc and nc|nc and gvsc) swing by 0.4 to 2.9 deg in sampled and push.", said)
+
+
+def test_every_controller_that_took_part_is_named_with_its_gains_and_counted() -> None:
+    rows = {"smc/printed": 3e-3, "smc/tuned": 1e-3, "pd/default": 2e-3, "feedforward/default": 1e-1}
+    assert "4 compared: smc (printed, tuned); pd (default); feedforward." in told(stands(rmse=rows))
+
+
+def test_the_gains_of_what_is_recommended_are_printed_with_units_and_no_others() -> None:
+    rig = stands("camera and tendons", swings=("mrac/default",))
+    gains = {"pid-ff/default": {"Kp": 3.0, "Ki": 20.0, "Kd": 0.1}, "pd-ff/default": {"Kp": 7.0, "Kd": 0.1}}
+    answer = answer_of([stands(), rig], "", gains)
+    assert answer is not None
+    said = " ".join(" ".join(answer.lines()).split())
+    assert "Gains: pid-ff/default has Kp = 3 N m/rad, Ki = 20 N m/(rad s), Kd = 0.1 N m s/rad." in said
+    assert "Kp = 7" not in said and "Gains: " not in told(stands(), rig)
+
+
+def test_every_rank_of_every_controller_stands_in_a_table() -> None:
+    one, other = stands(away=("smc/printed",)), stands("pushed")
+    table = standings_table([one, other])
+    rows = {row[0]: row[1:] for row in table.rows}
+    assert set(rows) == set(RMSE) and table.columns[1:] == ("sampled", "push")
+    assert rows["smc/printed"][0].startswith("does not arrive in 12 of 12") and rows["mrac/default"][1][:3] == "1: "
+    for label, cells in rows.items():
+        assert cells[1].split(":")[0] == str(other.standing.group(other.labels.index(label)))
 
 
 def test_a_row_that_fails_and_swings_is_named_once_by_the_graver_fault() -> None:
     said = told(stands(swings=("pd-ff/default",), failed={"pd-ff/default": 5}))
-    avoided = said[said.index("o not use these") : said.index("The paper")]
+    avoided = avoided_in(said)
     assert avoided.count("pd-ff") == 1 and "eaves its range: pd-ff (in 5 of 12 cases)" in avoided
 
 
@@ -143,7 +180,7 @@ def test_the_paper_is_answered_by_its_gains_and_the_conditions_in_which_they_wor
         stands("camera and tendons", rmse=RMSE | {"smc/printed": 0.01}, swings=("smc/exchanged",)),
     )
     paper = said[said.index("The paper.") :]
-    assert re.search(r"smc/printed works in motors \+ camera \([\d.]+ deg\), leaves its range in push", paper)
+    assert re.search(r"smc/printed works in motors \+ camera \([\d.]+ deg, rank \d+\), leaves its range in push", paper)
     assert "does not arrive in the others" in paper
     assert re.search(
         r"pid/printed works in ideal .*, sampled .* and motors \+ camera .* swings or chatters in push", paper

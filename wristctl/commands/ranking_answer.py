@@ -15,16 +15,19 @@ from wristctl.commands.answer import LINES, Answer
 from wristctl.commands.printed_table import COLUMNS, Table, degrees, joined, two
 from wristctl.commands.ranking_words import (
     DIGITS,
+    between,
     called,
     condition,
     counted_in,
     error,
     fact,
     facts,
+    fault_size,
     first_group,
     interval,
     open_loop,
     rig_whole,
+    sized,
     winner,
 )
 
@@ -37,16 +40,33 @@ def advice(rankings: Sequence[Ranking]) -> str:
 
     It is of smooth motions; where all jump, of steps.
     """
-    smooth = [ranking for ranking in rankings if not ranking.jumps]
+    sides = _sides(rankings)
     sentences = []
-    for rig in (True, False):
-        alike = [ranking for ranking in smooth or rankings if ranking.traits.rig == rig]
-        if alike:
-            where = f"with {f'simulated {rig_whole(alike)}' if rig else 'exact angles and torques'}"
-            where = where.capitalize() if smooth else f"For steps {where}"
-            others = [ranking for ranking in smooth or rankings if ranking.traits.rig and not rig]
-            sentences.append(_use(where, alike, others))
+    for rig, alike in sides.items():
+        where = f"with {f'simulated {rig_whole(alike)}' if rig else 'exact angles and torques'}"
+        where = f"For steps {where}" if alike[0].jumps else where.capitalize()
+        sentences.append(_use(where, alike, sides.get(True, []) if not rig else []))
     return " ".join(sentences)
+
+
+def recommended(rankings: Sequence[Ranking]) -> list[str]:
+    """Labels that `advice` names first, each once: with motors or a camera, then in ideal conditions."""
+    sides = [[one for one in alike if one.standing.groups] for alike in _sides(rankings).values()]
+    return list(dict.fromkeys(_chosen(ranked)[0] for ranked in sides if ranked))
+
+
+def _sides(rankings: Sequence[Ranking]) -> dict[bool, list[Ranking]]:
+    """Rankings of smooth motions, or where all jump of steps: with motors or a camera, and ideal ones."""
+    spoken = [ranking for ranking in rankings if not ranking.jumps] or rankings
+    sides = {rig: [ranking for ranking in spoken if ranking.traits.rig == rig] for rig in (True, False)}
+    return {rig: alike for rig, alike in sides.items() if alike}
+
+
+def _chosen(ranked: Sequence[Ranking]) -> tuple[str, Counter[str]]:
+    """The controller that is best in most of these rankings, and how often any is among the best."""
+    often = Counter(label for ranking in ranked for label in first_group(ranking))
+    firsts = {ranking.labels[row] for ranking in ranked if (row := winner(ranking, ranked)) is not None}
+    return max(sorted(firsts), key=lambda label: (often[label], -_mean(ranked, label))), often
 
 
 def _use(where: str, alike: Sequence[Ranking], others: Sequence[Ranking]) -> str:
@@ -54,9 +74,7 @@ def _use(where: str, alike: Sequence[Ranking], others: Sequence[Ranking]) -> str
     ranked = [ranking for ranking in alike if ranking.standing.groups]
     if not ranked:
         return f"{where} {_no_ranking(alike)}."
-    often = Counter(label for ranking in ranked for label in first_group(ranking))
-    firsts = {ranking.labels[row] for ranking in ranked if (row := winner(ranking, ranked)) is not None}
-    chosen = max(sorted(firsts), key=lambda label: (often[label], -_mean(ranked, label)))
+    chosen, often = _chosen(ranked)
     places = [(ranking, ranking.labels.index(chosen)) for ranking in ranked if chosen in ranking.labels]
     places = [place for place in places if place[0].standing.group(place[1]) == 1]
     means = sorted(ranking.means[row].value for ranking, row in places)
@@ -64,7 +82,7 @@ def _use(where: str, alike: Sequence[Ranking], others: Sequence[Ranking]) -> str
     named = [chosen, *equal] if len(equal) <= 3 else [chosen]
     everywhere = len(places) == len(alike) > 1
     names = f" ({', '.join(map(condition, alike))})" if everywhere else ""
-    errors = _ends([degrees(mean, DIGITS) for mean in means])
+    errors = between([degrees(mean, DIGITS) for mean in means])
     text = f"{where}{names} use {joined([*map(called, named)], 'or')}: RMSE {errors} deg"
     if len(places) == 1:
         text += interval(*places[0])
@@ -107,16 +125,10 @@ def _together(verb: str, places: Sequence[tuple[str, Ranking, int]]) -> str:
     label, ranking, row = max(places, key=lambda place: _lost(*place[1:]))
     if len(places) == 1:
         return f"{label} {fact(ranking, row)}"
-    _, sized, largest = max(places, key=lambda place: _size(verb, *place[1:]))
-    size, often = facts(sized, largest)[verb][0], max(facts(*place[1:])[verb][1] for place in places)
+    largest = sized(verb, [max(fault_size(verb, *place[1:]) for place in places)])
+    often = max(facts(*place[1:])[verb][1] for place in places)
     words = f"{joined([label for label, *_ in places])} {_THEY[verb].removeprefix('these ')}"
-    return f"{words} {f'{size} at most, ' if size else ''}in {often} of {counted_in(ranking, verb)} at most"
-
-
-def _size(verb: str, ranking: Ranking, row: int) -> float:
-    """How large a fault of a row is; 0 where it has no size."""
-    sizes = {"swings": ranking.swing, "chatters": ranking.chatter, "pulls harder than a tendon bears": ranking.peak}
-    return float(sizes[verb][row]) if verb in sizes else 0.0
+    return f"{words} {f'{largest} at most, ' if largest else ''}in {often} of {counted_in(ranking, verb)} at most"
 
 
 def _no_ranking(alike: Sequence[Ranking]) -> str:
@@ -135,11 +147,6 @@ def _times(least: float, rmse: float) -> str:
     """The least of some ratios of errors in words; of an RMSE that nobody could measure it is a bound."""
     bound = degrees(rmse).startswith("<")
     return f"{'more than ' * bound}{two(least, DIGITS)} times"
-
-
-def _ends(shown: Sequence[str]) -> str:
-    """The first and the last of sorted numbers in words; one where they are equal."""
-    return shown[0] if shown[0] == shown[-1] else f"{shown[0]} to {shown[-1]}"
 
 
 def _mean(rankings: Sequence[Ranking], label: str) -> float:
@@ -209,8 +216,9 @@ def do_not_use(rankings: Sequence[Ranking], names: Mapping[str, str]) -> str:
             before = worst.get(ranking.labels[row])
             if before is None or _lost(ranking, row) > _lost(*before):
                 worst[ranking.labels[row]] = (ranking, row)
+    elsewhere = _elsewhere([ranking for ranking in rankings if ranking not in chosen], names)
     if not worst:
-        return f"Every controller here can be used{where}."
+        return f"Every controller here can be used{where}.{elsewhere}"
     by_verb: dict[str, list[tuple[str, str]]] = {}
     for label, (ranking, row) in sorted(worst.items(), key=lambda item: -item[1][0].swing[item[1][1]]):
         verb, (size, count) = next(iter(facts(ranking, row).items()))
@@ -226,28 +234,30 @@ def do_not_use(rankings: Sequence[Ranking], names: Mapping[str, str]) -> str:
         else:
             text = joined([f"{name} ({count})" for name, count in rows])
         sentences.append(f"{_THEY[verb] if len(rows) > 1 else verb}: {text}")
-    elsewhere = _elsewhere([ranking for ranking in rankings if ranking not in chosen], names)
     them = f"{where.strip().capitalize()} do not use these" if where else "Do not use these"
     return f"{them}. {'. '.join(_capital(sentence) for sentence in sentences)}.{elsewhere}"
 
 
 def _elsewhere(rankings: Sequence[Ranking], names: Mapping[str, str]) -> str:
     """Those that must not be used in further conditions, and why; those with the same faults together."""
-    faults: dict[str, dict[str, list[str]]] = {}
+    faults: dict[str, dict[str, list[Ranking]]] = {}
     for ranking in rankings:
         for row in ranking.standing.unusable:
             verb = next(iter(facts(ranking, row)))
-            faults.setdefault(names[ranking.labels[row]], {}).setdefault(verb, []).append(condition(ranking))
-    alike: dict[str, list[str]] = {}
-    for name, places in faults.items():
-        several = name not in alike and sum(places == other for other in faults.values()) > 1
-        verbs = [
-            f"{_THEY[verb].removeprefix('these ') if several else verb} in {joined(where)}"
-            for verb, where in places.items()
-        ]
-        alike.setdefault(joined(verbs), []).append(name)
-    listed = [f"{joined(who)} {clause}" for clause, who in alike.items()]
-    return f" In other conditions {'; '.join(listed)}." if listed else ""
+            faults.setdefault(ranking.labels[row], {}).setdefault(verb, []).append(ranking)
+    alike: dict[tuple[tuple[str, str], ...], list[str]] = {}
+    for label, places in faults.items():
+        where = tuple((verb, joined([condition(one) for one in among])) for verb, among in places.items())
+        alike.setdefault(where, []).append(label)
+    listed = []
+    for where, labels in alike.items():
+        clauses = []
+        for verb, places_named in where:
+            lost = [fault_size(verb, one, one.labels.index(label)) for label in labels for one in faults[label][verb]]
+            they = _THEY[verb].removeprefix("these ") if len(labels) > 1 else verb
+            clauses.append(" ".join(filter(None, [they, sized(verb, lost), f"in {places_named}"])))
+        listed.append(f"{joined([names[label] for label in labels])} {joined(clauses)}")
+    return f" Elsewhere {'; '.join(listed)}." if listed else ""
 
 
 def _lost(ranking: Ranking, row: int) -> float:
@@ -323,7 +333,7 @@ def certainty(rankings: Sequence[Ranking]) -> str:
         return ""
     least, most = min(floors.values()), max(floors.values())
     if most - 1.0 <= _ALIKE * (least - 1.0):
-        size, rest = _ends([_apart(least), _apart(most)]), ""
+        size, rest = between([_apart(least), _apart(most)]), ""
     else:
         size, rest = "this", f": {', '.join(f'{name} {_apart(floor)}' for name, floor in floors.items())}"
     return (

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from wristctl.commands.printed_table import Table, degrees, two
 from wristctl.commands.ranking_answer import decision_table, ranking_table
-from wristctl.commands.ranking_words import DIGITS, condition, names_of
+from wristctl.commands.ranking_words import DIGITS, condition, error, fact, names_of
 
 if TYPE_CHECKING:
     from wristctl.comparison.controller_ranking import Ranking
@@ -25,6 +25,23 @@ def answer_tables(rankings: Sequence[Ranking]) -> list[Table]:
     shown = [replace(ranking_table(rankings, names), title=title)]
     tree = decision_table(rankings, names, "Which controller for which rig")
     return [*shown, tree] if len(tree.rows) > 1 else shown
+
+
+def standings_table(rankings: Sequence[Ranking]) -> Table:
+    """A controller a line: its rank and RMSE under each condition, or what is wrong with it there."""
+    labels = list(dict.fromkeys(label for ranking in rankings for label in ranking.labels))
+
+    def cell(ranking: Ranking, label: str) -> str:
+        if label not in ranking.labels:
+            return "-"
+        row = ranking.labels.index(label)
+        if row in ranking.standing.unusable:
+            return fact(ranking, row)
+        return f"{ranking.standing.group(row) or '-'}: {error(ranking, row)}"
+
+    rows = [(label, *(cell(ranking, label) for ranking in rankings)) for label in labels]
+    title = "Every controller under each condition, rank: RMSE [deg]; those of one rank cannot be told apart"
+    return Table(title, ("controller", *map(condition, rankings)), rows)
 
 
 def every_row(ranking: WorldRanking, times: Mapping[str, StepTime] | None = None) -> Table:

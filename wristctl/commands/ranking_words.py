@@ -76,6 +76,14 @@ def _shortened(names: Mapping[str, str]) -> dict[str, str]:
     return shown
 
 
+def gains_words(name: str, gains: Mapping[str, float]) -> str:
+    """Gains of a controller with their units: Kp = 4672 N m/rad, Kd = 0.02105 N m s/rad."""
+    from wristctl.control.table import controller
+
+    table = controller(name).gains
+    return ", ".join(f"{gain} = {value:.4g} {table[gain].unit}".rstrip() for gain, value in gains.items())
+
+
 def winner(ranking: Ranking, rankings: Sequence[Ranking] = ()) -> int | None:
     """The first row of the first group; of those with the same error the one that most other rankings have in theirs.
 
@@ -122,20 +130,38 @@ def open_loop(label: str) -> bool:
 
 def facts(ranking: Ranking, row: int) -> dict[str, tuple[str, int]]:
     """What is wrong with a row by verb: by how much, and in how many cases; the gravest first."""
-    swing = f"by {two(math.degrees(ranking.swing[row]))} deg"
-    found = {
-        "leaves its range": ("", ranking.standing.failures[row].times),
-        "swings": (swing, int(ranking.unsound["limit cycle"][row])),
-        "chatters": (f"{two(ranking.chatter[row])} times a second", int(ranking.unsound["chatters"][row])),
-        "does not arrive": ("", int(ranking.away[row])),
+    counts = {
+        "leaves its range": ranking.standing.failures[row].times,
+        "swings": int(ranking.unsound["limit cycle"][row]),
+        "chatters": int(ranking.unsound["chatters"][row]),
+        "does not arrive": int(ranking.away[row]),
     }
     if ranking.peak[row] > 0.0:
-        found["pulls harder than a tendon bears"] = (f"with {two(ranking.peak[row])} N", ranking.count)
-    if not any(count for _, count in found.values()):
-        found["changes with the integration step"] = ("", int(ranking.unsound["not converged"][row]))
-    if not any(count for _, count in found.values()):
-        found["swings or chatters"] = ("", ranking.standing.swings[row].times)
-    return {verb: (size, count) for verb, (size, count) in found.items() if count}
+        counts["pulls harder than a tendon bears"] = ranking.count
+    if not any(counts.values()):
+        counts["changes with the integration step"] = int(ranking.unsound["not converged"][row])
+    if not any(counts.values()):
+        counts["swings or chatters"] = ranking.standing.swings[row].times
+    return {verb: (sized(verb, [fault_size(verb, ranking, row)]), count) for verb, count in counts.items() if count}
+
+
+def fault_size(verb: str, ranking: Ranking, row: int) -> float:
+    """Size of a fault of a row: a swing [rad], a rate of chatter [1/s] or a tension [N]; 0 for what has none."""
+    sizes = {"swings": ranking.swing, "chatters": ranking.chatter, "pulls harder than a tendon bears": ranking.peak}
+    return float(sizes[verb][row]) if verb in sizes else 0.0
+
+
+def sized(verb: str, sizes: Sequence[float]) -> str:
+    """Sizes of a fault in words, the least and the largest: by 0.4 to 2.7 deg; empty for what has no size."""
+    if verb == "swings":
+        return f"by {between([two(math.degrees(swing)) for swing in sorted(sizes)])} deg"
+    shown = between([two(value) for value in sorted(sizes)])
+    return {"chatters": f"{shown} times a second", "pulls harder than a tendon bears": f"with {shown} N"}.get(verb, "")
+
+
+def between(shown: Sequence[str]) -> str:
+    """The first and the last of sorted numbers in words; one where they are equal."""
+    return shown[0] if shown[0] == shown[-1] else f"{shown[0]} to {shown[-1]}"
 
 
 def fact(ranking: Ranking, row: int) -> str:

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Container, Iterable, Sequence
+from collections.abc import Container, Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from wristctl.commands.answer import Answer
 from wristctl.commands.printed_table import COLUMNS, Table, joined
-from wristctl.commands.ranking_answer import advice, certainty, do_not_use, fitted, ranking_table, ties
-from wristctl.commands.ranking_words import PRINTED, condition, error, facts, names_of
+from wristctl.commands.ranking_answer import advice, certainty, do_not_use, fitted, ranking_table, recommended, ties
+from wristctl.commands.ranking_words import PRINTED, condition, error, facts, gains_words, names_of, open_loop
 from wristctl.commands.results import Findings
 
 if TYPE_CHECKING:
@@ -17,27 +17,37 @@ if TYPE_CHECKING:
     from wristctl.comparison.controller_ranking import Ranking
     from wristctl.comparison.step_cost import StepTime
 
-# Name of the paper's own controller.
-PAPERS = "smc"
 
+def answer_of(
+    rankings: Sequence[Ranking], run: str = "", gains: Mapping[str, Mapping[str, float]] | None = None
+) -> Answer | None:
+    """The answer of a comparison for one screen; None where nothing was compared.
 
-def answer_of(rankings: Sequence[Ranking], run: str = "") -> Answer | None:
-    """The answer of a comparison for one screen, with the path of its run; None where nothing was compared."""
+    Parameters
+    ----------
+    rankings
+        Rankings of the controllers under each condition.
+    run
+        Path of the run; empty for a result in memory.
+    gains
+        Gains by name, in SI units, of every row by its label.
+    """
     if not rankings:
         return None
     names = names_of(rankings)
     whole = ranking_table(rankings, names)
     if len(whole.within(COLUMNS).columns) < len(whole.columns):
         names = names_of(rankings, short=True)
-    more = f"All figures of every controller: `--all`, or {run}/report.html." if run else "All figures: `.tables`."
+    more = f"Every rank and figure: `--all`, or {run}/report.html." if run else "Every rank and figure: `.tables`."
     unusable = do_not_use(rankings, names)
     notes = [
         (best_on_yours(rankings), ""),
-        (ties(rankings, names), ""),
-        (unusable, "Some must not be used; which, and why: `--all`." if unusable else ""),
         (papers(rankings), ""),
+        (unusable, "Some must not be used; which, and why: `--all`." if unusable else ""),
+        (" ".join(filter(None, [gains_of_best(rankings, gains or {}), compared(rankings), more])), more),
+        (ties(rankings, names), ""),
         (certainty(rankings), ""),
-        (f"Your own wrist: `wristctl compare controllers mywrist.yaml` (docs/your-own-wrist.md). {more}", more),
+        ("Your own wrist: `wristctl compare controllers mywrist.yaml` (docs/your-own-wrist.md).", ""),
     ]
     return fitted(Answer(advice(rankings), ranking_table(rankings, names)), notes)
 
@@ -65,6 +75,30 @@ def best_on_yours(rankings: Sequence[Ranking]) -> str:
             f"{shares[row].n} wrists that your trials leave possible."
         )
     return " ".join(sentences)
+
+
+def gains_of_best(rankings: Sequence[Ranking], gains: Mapping[str, Mapping[str, float]]) -> str:
+    """Gains of the controllers that are recommended, with units; empty where they have none or are not known."""
+    listed = [
+        f"{label} has {gains_words(label.split('/')[0], gains[label])}"
+        for label in recommended(rankings)
+        if gains.get(label)
+    ]
+    return f"Gains: {'; '.join(listed)}." if listed else ""
+
+
+def compared(rankings: Sequence[Ranking]) -> str:
+    """The names of all controllers that took part, each with its gains."""
+    gains: dict[str, list[str]] = {}
+    labels = dict.fromkeys(label for ranking in rankings for label in ranking.labels)
+    for label in labels:
+        name, _, named = label.partition("/")
+        gains.setdefault(name, []).extend([named] * (not open_loop(label)))
+    alike: dict[tuple[str, ...], list[str]] = {}
+    for name, several in gains.items():
+        alike.setdefault(tuple(several), []).append(name)
+    groups = [joined(names) + f" ({', '.join(several)})" * bool(several) for several, names in alike.items()]
+    return f"{len(labels)} compared: {'; '.join(groups)}."
 
 
 def papers(rankings: Sequence[Ranking]) -> str:
@@ -96,7 +130,8 @@ def _outcomes(rankings: Sequence[Ranking], label: str) -> str:
             verb = next(iter(facts(ranking, row)))
             bad.setdefault("swings or chatters" if verb in _UNSTEADY else verb, []).append(where)
         else:
-            works.append(f"{where} ({error(ranking, row)} deg)")
+            rank = ranking.standing.group(row)
+            works.append(f"{where} ({error(ranking, row)} deg{f', rank {rank}' if rank else ''})")
     ordered = sorted(bad.items(), key=lambda item: len(item[1]))
     if not works and len(ordered) == 1:
         return f"{ordered[0][0]} in every condition"

@@ -5,7 +5,7 @@ from __future__ import annotations
 import logging
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import partial
 from itertools import chain
 from typing import TYPE_CHECKING, Any
@@ -43,7 +43,7 @@ from wristctl.commands.loop_warnings import (
 )
 from wristctl.commands.procedure import Procedure
 from wristctl.commands.ranking_drawing import draw_rankings
-from wristctl.commands.ranking_tables import answer_tables, every_row
+from wristctl.commands.ranking_tables import answer_tables, every_row, standings_table
 from wristctl.commands.ranking_words import condition
 from wristctl.commands.results import Findings, StudyResult
 from wristctl.commands.session import Session
@@ -152,6 +152,8 @@ class Compared(StudyResult):
     rankings: Sequence[Ranking]
     """Rankings under each condition, or over the worlds of a named family: of its smooth motions, of its steps. `rows`
     is empty then."""
+    gains: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
+    """Gains by name, in SI units, of every row, by controller/gains."""
 
     @property
     def fault(self) -> UserError | None:
@@ -165,7 +167,7 @@ class Compared(StudyResult):
     @property
     def answer(self) -> Answer | None:
         """Which controller to use under which condition, and which must not be used."""
-        return answer_of(self.rankings, self.place)
+        return answer_of(self.rankings, self.place, self.gains)
 
     @property
     def marks(self) -> list[str]:
@@ -268,12 +270,13 @@ def compare(session: Session) -> Compared:
     if settings.tuning is not None:
         searches = search_all(session, study.model_copy(update={"tune": settings.tuning}), network)
     tuned = dict(tuned_gains(session.inputs) or {}) | {name: search.gains for name, search in searches.items()}
+    gains = _gains_of_rows(study, tuned)
     if settings.worlds.family:
         of_worlds = ranked(session, study, network, tuned)
         head_with_the_best(findings, of_worlds)
         draw_rankings(findings, of_worlds)
         shown = [*answer_tables(of_worlds), *map(every_row, of_worlds)]
-        return Compared(study, findings, shown, [], searches, {}, of_worlds)
+        return Compared(study, findings, shown, [], searches, {}, of_worlds, gains)
     with session.progress("comparing", total=100, unit="%") as report:
         results = run_comparison(study, network, tuned, lambda share: report(round(100 * share)))
     scenarios = [scenario_of(reference, way) for reference in settings.references for way in settings.directions]
@@ -296,11 +299,22 @@ def compare(session: Session) -> Compared:
     by_loop = [loop_tables(loop, [r for r in results if r.loop == loop], cells) for loop in settings.loops]
     tables = [
         *answer_tables(rankings),
+        *([standings_table(rankings)] if rankings else []),
         *chain.from_iterable(by_loop),
         step_table(times),
         *truth_tables(study.wrist, settings.loops),
     ]
-    return Compared(study, findings, tables, results, searches, times, rankings)
+    return Compared(study, findings, tables, results, searches, times, rankings, gains)
+
+
+def _gains_of_rows(study: Study, tuned: Gains) -> dict[str, dict[str, float]]:
+    """Gains by name of every row, by its label."""
+    from wristctl.control.table import controller, gains_of
+
+    laws = {row.label: (controller(row.controller), row.gains) for row in study.compare.rows}
+    return {
+        label: dict(zip(law.gains, gains_of(law, gains, tuned), strict=True)) for label, (law, gains) in laws.items()
+    }
 
 
 def _step_times(session: Session, study: Study, tuned: Gains) -> dict[str, StepTime]:

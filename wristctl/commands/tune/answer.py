@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from wristctl.commands.answer import LINES, Answer
 from wristctl.commands.printed_table import Table, degrees, joined, two
+from wristctl.commands.ranking_words import gains_words
 
 if TYPE_CHECKING:
     from wristctl.arrays import Array
@@ -97,7 +98,7 @@ def answer_of(
 
 
 def _sentence(name: str, search: Search, beside: Beside, cases: int) -> str:
-    gains = f"{name} with {_gains(search)}."
+    gains = f"{name} with {gains_words(search.controller, search.gains)}."
     if not beside.cases:
         return (
             f"Nothing to use was found: {gains} It fails in each of {cases} cases (objective {search.objective:.3g})."
@@ -115,13 +116,6 @@ def _times(beside: Beside) -> str:
     return f"{two(beside.ratio)} times less than" if beside.ratio > 1.0 else f"{two(1.0 / beside.ratio)} times"
 
 
-def _gains(search: Search) -> str:
-    from wristctl.control.table import controller
-
-    table = controller(search.controller).gains
-    return ", ".join(f"{name} = {value:.4g} {table[name].unit}".rstrip() for name, value in search.gains.items())
-
-
 def _table(
     ordered: Sequence[str], searches: Mapping[str, Search], errors: Mapping[str, Beside], with_gains: bool = True
 ) -> Table:
@@ -131,7 +125,7 @@ def _table(
     for name in ordered:
         beside = errors[name]
         figures = (degrees(beside.error), degrees(beside.feedforward)) if beside.cases else ("-", "-")
-        rows.append((name, searches[name].objective, *figures, *[_gains(searches[name])] * with_gains))
+        rows.append((name, searches[name].objective, *figures, *[gains_words(name, searches[name].gains)] * with_gains))
     return Table("", heads, rows)
 
 
