@@ -14,7 +14,8 @@ from pandas.testing import assert_frame_equal
 
 import wristctl
 from wristctl.commands.simulate.command import Simulated
-from wristctl.commands.sweep.answer import headline
+from wristctl.commands.sweep.answer import headline, sentence
+from wristctl.commands.sweep.figures import over_key
 from wristctl.config.study import Study
 from wristctl.errors import UserError
 from wristctl.simulation import swept_loops
@@ -131,6 +132,40 @@ def test_the_answer_of_a_sweep_is_in_degrees_in_the_order_of_its_values_and_fits
     assert shown[0] == pytest.approx(table["wrist.stiffness"].min(), rel=5e-3)
     assert shown[-1] == pytest.approx(table["wrist.stiffness"].max(), rel=5e-3)
     assert len(lines) <= 24 and max(map(len, lines)) <= 100 and "[rad]" not in "".join(lines)
+
+
+def test_of_errors_that_nobody_could_measure_none_is_least() -> None:
+    frame = pd.DataFrame({"k": ["a", "b", "c"], "point": [0, 1, 2], "rmse": [2e-4, 1e-4, 0.5]})
+    units = {"k": "1", "rmse": "deg"}
+    assert "below 0.001 deg at 2 of 3 rollouts, such as k = b, and most, 0.5 deg at k = c" in sentence(
+        "simulate", frame, ["k"], ["rmse"], units
+    )
+    tiny = sentence("simulate", frame[:2], ["k"], ["rmse"], units)
+    assert "below 0.001 deg at every point" in tiny and "most" not in tiny
+    assert "least, 0.5 deg at k = c" in sentence("simulate", frame[2:], ["k"], ["rmse"], units)
+
+
+def test_a_figure_of_a_sweep_has_a_line_for_each_value_of_a_second_setting_and_marks_what_is_no_good() -> None:
+    """The line of a controller is that of its own rollouts; a failed one has a cross and is part of no line."""
+    frame = pd.DataFrame(
+        {
+            "stiffness": [1.0, 2.0, 3.0] * 2, "controller": ["pid"] * 3 + ["smc"] * 3,
+            "rmse": [0.1, 0.2, 0.3, 4.0, 5.0, 90.0], "failed": [False] * 5 + [True],
+            "fate": ["", "", "does not arrive", "", "", "failed"],
+        }
+    )  # fmt: skip
+    units = {"stiffness": "N m/rad", "controller": "1", "rmse": "deg"}
+    picture = over_key(frame, "stiffness", ["controller"], ["rmse"], units)
+    (panel,) = picture.axes
+    drawn = [(line.get_marker(), line.get_linestyle(), np.asarray(line.get_xydata()).tolist()) for line in panel.lines]
+    lines = [points for _, style, points in drawn if style == "-"]
+    assert lines == [[[1.0, 0.1], [2.0, 0.2], [3.0, 0.3]], [[1.0, 4.0], [2.0, 5.0]]]
+    assert [points for marker, _, points in drawn if marker == "o"] == [[[3.0, 0.3]]]
+    assert [points[0][0] for marker, _, points in drawn if marker == "x"] == [3.0]
+    assert {text.get_text() for text in picture.legends[0].get_texts()} == {"controller = pid", "controller = smc"}
+    named = over_key(frame, "controller", [], ["rmse"], units)
+    assert [label.get_text() for label in named.axes[0].get_xticklabels()] == ["pid", "smc"]
+    assert not [line for line in named.axes[0].lines if line.get_linestyle() == "-"]
 
 
 def test_angles_that_nobody_could_measure_are_not_shown() -> None:

@@ -11,11 +11,17 @@ from wristctl.commands.answer import Answer
 from wristctl.commands.printed_table import COLUMNS, Table, number
 
 if TYPE_CHECKING:
+    import numpy as np
     import pandas as pd
+    from numpy.typing import ArrayLike, NDArray
+
+    from wristctl.arrays import Array
 
 # Rows of the table on the first screen, and metrics in it and in the figures.
 _ROWS, _METRICS = 12, 4
 _FIRST = ("rmse", "steady_state", "oscillation", "chattering")
+# Mark of a rollout that left its range.
+FAILED = "failed"
 # Digits of a swept value, and of a metric.
 _DIGITS = 3
 
@@ -88,17 +94,50 @@ def sentence(
     """Points where the main metric is least and most, and how often a wrist fails."""
     text = f"{command} at {table['point'].nunique()} points"
     if metrics:
-        sound = table[~table["failed"].astype(bool)] if "failed" in table and not table["failed"].all() else table
-        least, most = (sound.loc[getattr(sound[metrics[0]], extreme)()] for extreme in ("idxmin", "idxmax"))
-        ends = [
-            f"{_value(metrics[0], float(row[metrics[0]]), units)} at "
-            f"{', '.join(f'{key} = {_value(key, row[key], units)}' for key in keys)}"
-            for row in (least, most)
-        ]
-        text += f": {metrics[0]} is least, {ends[0]}, and most, {ends[1]}"
+        text += f": {least(table, keys, metrics[0], units)}"
+        if not unmeasurable(table[metrics[0]], units[metrics[0]]).all():
+            text += f", and most, {' at '.join(_extreme(table, keys, metrics[0], units, 'idxmax'))}"
     for fate, count in fates(table).items():
         text += f"; {count} of {len(table)} rollouts: {fate}"
     return f"{text}."
+
+
+def least(table: pd.DataFrame, keys: Sequence[str], metric: str, units: Mapping[str, str]) -> str:
+    """Where a metric is least, in words; at how many points nobody could measure it, where these are several."""
+    tiny, count = int(unmeasurable(table[metric], units[metric]).sum()), len(table)
+    if tiny > 1:
+        bound = in_unit(metric, float(measurable(0.0, units[metric])), units)
+        where = f"{tiny} of {count} rollouts, such as {_extreme(table, keys, metric, units, 'idxmin')[1]}"
+        return f"{metric} is below {bound} at {'every point' if tiny == count else where}"
+    return f"{metric} is least, {' at '.join(_extreme(table, keys, metric, units, 'idxmin'))}"
+
+
+def _extreme(
+    table: pd.DataFrame, keys: Sequence[str], metric: str, units: Mapping[str, str], which: str
+) -> tuple[str, str]:
+    """An extreme value of a metric, and where it is."""
+    sound = table[~table["failed"].astype(bool)] if "failed" in table and not table["failed"].all() else table
+    row = sound.loc[getattr(sound[metric], which)()]
+    where = ", ".join(f"{key} = {in_unit(key, row[key], units)}" for key in keys)
+    return in_unit(metric, float(row[metric]), units), where
+
+
+def measurable(values: ArrayLike, unit: str) -> Array:
+    """Values of a metric; angles in degrees that nobody could measure are raised to the least that one can."""
+    import numpy as np
+
+    from wristctl.comparison.bootstrap import MEASURABLE
+
+    given, floor = np.array(values, float), float(np.rad2deg(MEASURABLE))
+    return np.where(np.abs(given) < floor, floor, given) if unit == "deg" else given
+
+
+def unmeasurable(values: ArrayLike, unit: str) -> NDArray[np.bool_]:
+    """Mask of the angles in degrees that nobody could measure."""
+    import numpy as np
+
+    mask: NDArray[np.bool_] = np.asarray(measurable(values, unit) != np.array(values, float)) & np.isfinite(values)
+    return mask
 
 
 def fates(table: pd.DataFrame) -> dict[str, int]:
@@ -130,7 +169,8 @@ def _cell(value: Any) -> Any:
     return float(f"{value:.{_DIGITS}g}") if _is_number(value) and math.isfinite(value) else value
 
 
-def _value(name: str, value: Any, units: Mapping[str, str]) -> str:
+def in_unit(name: str, value: Any, units: Mapping[str, str]) -> str:
+    """A value of a column with its unit, to three digits."""
     unit = units[name]
     text = number(_cell(float(value))) if _is_number(value) else str(value)
     return text if unit in ("", "1") else f"{text} {unit}"

@@ -3,14 +3,31 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING
+from textwrap import fill
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
+from numpy.typing import NDArray
 
-from wristctl.plotting.style import BLUE, GREY, VERMILLION, columns_within, figure, logarithmic, with_unit
+from wristctl.commands.sweep.answer import FAILED, fates, in_unit, least, measurable
+from wristctl.plotting.style import (
+    BLACK,
+    BLUE,
+    GREEN,
+    GREY,
+    ORANGE,
+    PURPLE,
+    SKY,
+    VERMILLION,
+    columns_within,
+    figure,
+    legend_below,
+    logarithmic,
+    with_unit,
+)
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -23,6 +40,13 @@ _DECADES, _BINS = 20.0, 25
 _EVEN = 0.25
 # Ticks of an axis of swept values, at most.
 _TICKS = 5
+# Colours of lines: as many values as a second key may have to have lines.
+_HUES = (BLUE, ORANGE, GREEN, PURPLE, SKY, BLACK)
+_DOT: dict[str, Any] = {"markersize": 6.0}
+_RING: dict[str, Any] = {"markersize": 7.0, "fillstyle": "none"}
+_CROSS: dict[str, Any] = {"markersize": 5.0, "clip_on": False}
+# Letters of a heading to an inch.
+_LETTERS = 13.0
 # Width of a panel [in] that has room for the name of a setting.
 _PANEL = 2.2
 
@@ -30,42 +54,97 @@ _PANEL = 2.2
 def over_key(
     table: pd.DataFrame, key: str, other_keys: Sequence[str], metrics: Sequence[str], units: Mapping[str, str]
 ) -> Figure:
-    """Metrics over one key: a dot for each rollout, crosses where the wrist failed, a line of medians.
+    """Metrics over one key, under the answer in words.
 
-    What else was swept spreads the dots.
+    Where one further key was swept over few values, each of these has a line; else all else that was swept spreads the
+    dots, and a line runs through their medians. Rings and crosses mark rollouts that are no good; a failed one is of
+    no error, and its cross stands at the upper edge.
     """
     columns = columns_within(min(2, max(1, len(metrics))), _PANEL)
     rows = max(1, -(-len(metrics) // columns))
-    picture, axes = figure(rows, columns, height=0.4 + 2.3 * rows, sharex=True)
+    picture, axes = figure(rows, columns, height=0.6 + 2.3 * rows, sharex=True)
     values = table[key].to_numpy()
-    named = values.dtype.kind not in "if"
-    places, labels = (
-        (np.unique(values.astype(str), return_inverse=True)[::-1]) if named else (values.astype(float), None)
-    )
+    labels = list(dict.fromkeys(map(str, values))) if values.dtype.kind not in "if" else None
+    places = values.astype(float) if labels is None else np.array([labels.index(str(value)) for value in values], float)
+    fate = table["fate"].to_numpy(str) if "fate" in table else np.full(len(table), "")
     failed = table["failed"].to_numpy(bool) if "failed" in table else np.zeros(len(table), bool)
+    bad = (fate != "") & ~failed
+    lines = _lines(table, other_keys, units)
     panels = [panel for row in axes.tolist() for panel in row]
     for panel, name in zip(panels, metrics, strict=False):
-        heights = table[name].to_numpy(float)
-        panel.plot(places[~failed], heights[~failed], ".", color=BLUE, markersize=3.0, alpha=0.6)
-        panel.plot(places[failed], heights[failed], "x", color=VERMILLION, markersize=4.0)
-        _medians(panel, places[~failed], heights[~failed])
-        panel.set_ylabel(with_unit(name, units[name]))
+        heights = np.where(failed, np.nan, measurable(table[name], units[name]))
+        for (label, chosen), hue in zip(lines, _HUES, strict=False):
+            panel.plot(places[chosen], heights[chosen], ".", color=hue, label=label, **_DOT)
+            if labels is None:
+                _medians(panel, places[chosen], heights[chosen], hue if label else GREY)
+        if bad.any():
+            panel.plot(places[bad], heights[bad], "o", color=VERMILLION, **_RING)
+        if failed.any():
+            edge = panel.get_xaxis_transform()
+            panel.plot(places[failed], np.ones(failed.sum()), "x", color=VERMILLION, transform=edge, **_CROSS)
+        panel.set_ylabel(with_unit(_metric(name), units[name]))
         if _is_wide(heights):
             logarithmic(panel.yaxis)
     for panel in axes[-1]:
         panel.set_xlabel(with_unit(_setting(key), units[key]))
         if labels is not None:
             panel.set_xticks(range(len(labels)), labels, rotation=30, ha="right")
+            panel.margins(x=0.1)
         elif _is_logarithmic(places):
             logarithmic(panel.xaxis)
         else:
             panel.xaxis.set_major_locator(MaxNLocator(_TICKS))
     for panel in panels[len(metrics) :]:
         panel.set_visible(False)
-    spread = f"; {', '.join(other_keys)} as swept" if other_keys else ""
-    crosses = "; crosses left their range" if failed.any() else ""
-    picture.suptitle(f"over {_setting(key)}{spread}{crosses}", fontsize=10.0)
+    if len(lines) > 1:
+        legend_below(picture)
+    picture.suptitle(
+        fill(
+            _heading(table, [key, *other_keys], metrics, units, len(lines) > 1),
+            round(_LETTERS * picture.get_figwidth()),
+        ),
+        fontsize=10.0,
+    )
     return picture
+
+
+def _lines(
+    table: pd.DataFrame, other_keys: Sequence[str], units: Mapping[str, str]
+) -> list[tuple[str, NDArray[np.bool_]]]:
+    """Names and rows of what has a line of its own: each value of the other key; else one without a name for all."""
+    whole = [("", np.ones(len(table), bool))]
+    if len(other_keys) != 1:
+        return whole
+    (key,) = other_keys
+    values = list(dict.fromkeys(table[key]))
+    if not 1 < len(values) <= len(_HUES):
+        return whole
+    return [(f"{_setting(key)} = {in_unit(key, value, units)}", (table[key] == value).to_numpy()) for value in values]
+
+
+def _heading(
+    table: pd.DataFrame, keys: Sequence[str], metrics: Sequence[str], units: Mapping[str, str], lined: bool
+) -> str:
+    """Where the main metric is least, and the meaning of dots, line, rings and crosses."""
+    parts = [least(table, keys, metrics[0], units)] if metrics else []
+    if len(keys) > 1 and not lined:
+        line = ", line: median" * (table[keys[0]].dtype.kind in "if")
+        parts.append(f"dots: {', '.join(map(_setting, keys[1:]))} as swept{line}")
+    marks = fates(table)
+    crosses = marks.pop(FAILED, 0)
+    if marks:
+        parts.append(f"rings: {', '.join(marks)}")
+    if crosses:
+        parts.append("crosses: left the range")
+    return "; ".join([*parts, "less is better"])
+
+
+def _metric(name: str) -> str:
+    """What a metric is called in tables: RMSE; one without a heading has its name."""
+    from wristctl.simulation.metrics import METRICS
+
+    heading = METRICS[name].heading if name in METRICS else ""
+    return heading.partition(" [")[0] or name
 
 
 def _setting(key: str) -> str:
@@ -84,7 +163,7 @@ def _is_logarithmic(values: np.ndarray) -> bool:
     return _is_wide(values) and bool(np.median(values) < _EVEN * values.max())
 
 
-def _medians(panel: Axes, places: np.ndarray, heights: np.ndarray) -> None:
+def _medians(panel: Axes, places: np.ndarray, heights: np.ndarray, hue: str) -> None:
     finite = np.isfinite(heights)
     places, heights = places[finite], heights[finite]
     if not places.size:
@@ -96,4 +175,4 @@ def _medians(panel: Axes, places: np.ndarray, heights: np.ndarray) -> None:
     )
     levels = np.unique(group)
     line = [(float(np.median(places[group == level])), float(np.median(heights[group == level]))) for level in levels]
-    panel.plot(*np.array(line).T, color=GREY, linewidth=1.2)
+    panel.plot(*np.array(line).T, color=hue, linewidth=1.2)
