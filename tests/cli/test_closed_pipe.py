@@ -61,7 +61,9 @@ def test_an_interrupted_search_names_how_to_go_on(tmp_path: Path) -> None:
     child.send_signal(signal.SIGINT)
     _, said = child.communicate(timeout=120)
     (run,) = list_runs(tmp_path / "results")
-    assert child.returncode == 130 and f"go on: wristctl tune --resume {run.id}" in said.decode()
+    assert child.returncode == 130 and (
+        f"go on: wristctl tune results/{run.id}/config.yaml --resume results/{run.id}" in said.decode()
+    )
 
 
 def _events(folder: Path) -> str:

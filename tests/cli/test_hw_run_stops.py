@@ -190,7 +190,7 @@ def test_ctrl_c_stops_the_motors_and_seals_the_run(hw_run: HwRun, monkeypatch: p
     interrupted_at(moment, monkeypatch)
     ended = hw_run(*(("--set", "positions=find") if moment == "homing" else ()))
     assert ended.code == 130 and ended.run.state == "interrupted" and ended.run.problems() == []
-    assert "Traceback" not in ended.err and "interrupted; what was found is in" in ended.err
+    assert "Traceback" not in ended.err and "interrupted; what was found: wristctl runs show " in ended.err
     assert not any(ended.bench.motion().energised)
     if moment != "drawing":  # where all trials are done
         assert ended.stop["motors_stand"] and ended.stop["reason"] == STATED["Ctrl-C"].says

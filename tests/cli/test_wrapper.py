@@ -163,7 +163,7 @@ def test_interruption_ends_with_130_and_keeps_what_was_found(
     _, said = child.communicate()
     (run,) = list_runs(tmp_path / "results")
     assert child.returncode == 130
-    assert said.decode().splitlines() == [f"interrupted; what was found is in results/{run.id}"]
+    assert said.decode().splitlines() == [f"interrupted; what was found: wristctl runs show results/{run.id}"]
     assert run.state == "interrupted"
     assert run.file("data/samples.csv").is_file()
     run.check()

@@ -3,6 +3,7 @@
 import inspect
 import json
 import re
+import shlex
 import sys
 from collections.abc import Callable, Sequence
 from functools import partial
@@ -11,6 +12,7 @@ from typing import Any, get_origin
 
 import typer
 
+from wristctl.board.board_errors import HARDWARE, SAFETY_STOP
 from wristctl.cli.commands import Entry
 from wristctl.cli.options import Options, Own, StudyCommand, controllers, references, run_ids, signature
 from wristctl.commands.procedure import Procedure
@@ -147,10 +149,16 @@ def _perform(
             with recording(prepared, options.out, label, ["wristctl", *sys.argv[1:]]) as run:
                 outcome = perform(prepared, run, show, TerminalOperator(console, options.quiet, flags), executor, typed)
         except KeyboardInterrupt:
-            remark = f"; what was found is in {run.path}" if run else ""
-            if run and any(need.leaf == "resume" for need in procedure.needs):
-                remark += f"; go on: wristctl {procedure.kind} --resume {run.id}"
+            remark = ""
+            if run:
+                place, resumes = shlex.quote(str(run.path)), any(need.leaf == "resume" for need in procedure.needs)
+                go_on = f"go on: wristctl {procedure.kind} {place}/config.yaml --resume {place}"
+                remark = f"; {go_on if resumes else f'what was found: wristctl runs show {place}'}"
             console.print(f"interrupted{remark}", **PLAIN)
+            raise
+        except UserError as error:
+            if run and error.exit_code in (HARDWARE, SAFETY_STOP):
+                console.print(f"what was recorded: wristctl runs show {shlex.quote(str(run.path))}", **PLAIN)
             raise
     print_result(run.path, outcome.tables, options.as_json, outcome.summary, options.all_)
     if outcome.fault is not None:

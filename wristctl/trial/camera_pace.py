@@ -15,10 +15,11 @@ _PAUSE = 2.0
 # Relative scatter of the time between two pictures that is worth a word.
 _UNEVEN = 0.3
 
+_LIGHT = "and the camera's light and focus: wristctl hw check --rig"
 # Advice about pictures that cannot be used, by their verdict.
 FIX = {
-    SightingVerdict.NO_TIP: "see that nothing covers the tip's marker, and the camera's light and focus",
-    SightingVerdict.NO_BASE: "see that nothing covers the clamp's marker, and the camera's light and focus",
+    SightingVerdict.NO_TIP: f"see that nothing covers the tip's marker, {_LIGHT}",
+    SightingVerdict.NO_BASE: f"see that nothing covers the clamp's marker, {_LIGHT}",
     SightingVerdict.TWICE: "take away or cover whatever else shows a marker of the same id",
     SightingVerdict.SHAPE: "uncover the tip's marker whole and make it flat; a shorter exposure where it is smeared",
     SightingVerdict.BASE_MOVED: "fasten camera and clamp, and home again; wristctl hw calibrate camera",

@@ -110,7 +110,7 @@ class _Finder:
             self._let_go(axis, 0)
         slack, fix = 1e3 * self._settings.slack, "see that the tendon is on its pulley and the motor has power"
         problem = f"axis {axis} (tendon {ACTIVE[axis]}) does not bend the wrist within {slack:g} mm"
-        raise SafetyStop(problem, "homing", f"{fix}; or raise homing.slack")
+        raise SafetyStop(problem, "homing", f"{fix}: wristctl hw check --wiring {axis}; or raise homing.slack")
 
     def slacken(self) -> None:
         """Let all tendons go, so far that none holds against another while it is measured."""
