@@ -107,9 +107,9 @@ def main() -> None:
 
 _BEGIN = f"""# Which controller for which rig, with presets
 
-With motors, tendons and a camera LQI and smc-tracking are in the first group of both families of smooth motions, and
-for jumps nothing is told from feedforward for the better. This page ranks presets; tuned at equal budget the answer is
-[the study's](study.md).
+With motors, tendons and a camera LQI, smc-tracking, impedance and fopi are in the first group of both families of
+smooth motions, and for jumps nothing is told from feedforward for the better. This page ranks presets; tuned at equal
+budget the answer is [the study's](study.md).
 
 Presets on {WORLDS} drawn worlds of each family of experiments/scenarios, all on the same worlds, motions and noise: the
 geometric mean of the RMSE with its 95 % interval over worlds. Controllers of one group are not told apart from its
@@ -135,8 +135,9 @@ each first, with one budget.
 - **Networks** (nc, nn-mrac): no better than an integral here. nn-mrac is the group's law (arXiv 2510.19068) as far as
   it is specified; its published reference model is far slower.
 - **Rivals of other groups** (impedance, fopi): an impedance with a network for what the model lacks, and a fractional
-  integral of the error. DeePC is not among them: its data are those of one rig at one period, and on data of the
-  believed wrist without noise it is the predictive control that `mpc` is (Coulson, Lygeros and Dorfler, ECC 2019).
+  integral of the error; in smooth motions behind motors and a camera neither is told from LQI. DeePC is not among them:
+  its data are those of one rig at one period, and on data of the believed wrist without noise it is the predictive
+  control that `mpc` is (Coulson, Lygeros and Dorfler, ECC 2019).
 - **Jumps**: behind motors (steps) none is told from feedforward for the better. Ask for motions instead. With torques
   as commanded (ideal, steps) MPC errs least, and all that have feedback beat feedforward.
 - **The paper's law** (smc): exchanged gains swing, and with gains of ours it is a feedforward.
