@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import tomllib
 from pathlib import Path
 
 import pytest
@@ -72,3 +73,16 @@ def test_the_draft_paper_has_what_a_journal_of_software_asks_and_cites_what_it_l
     assert 750 <= len(text.partition("# Summary")[2].split()) <= 1750
     listed = re.findall(r"^@\w+\{(\w+),", (ROOT / "paper" / "paper.bib").read_text(encoding="utf-8"), re.MULTILINE)
     assert set(re.findall(r"@(\w+\d{4})", text)) == set(listed) and len(listed) == len(set(listed))
+
+
+def test_every_check_of_the_repository_that_is_left_out_has_its_reason() -> None:
+    ignored = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["tool"]["repo-review"]["ignore"]
+    rows = re.findall(
+        r"^\| ((?:[A-Z]+\d+(?:, )?)+) \| \w+", (ROOT / "CONTRIBUTING.md").read_text("utf-8"), re.MULTILINE
+    )
+    assert sorted(check for row in rows for check in row.split(", ")) == sorted(ignored)
+
+
+def test_every_reference_of_the_draft_paper_has_a_doi() -> None:
+    entries = re.split(r"^@", (ROOT / "paper" / "paper.bib").read_text(encoding="utf-8"), flags=re.MULTILINE)[1:]
+    assert entries and not [entry for entry in entries if not re.search(r"^  doi = \{10\.\d{4,}/\S+\},$", entry, re.M)]
