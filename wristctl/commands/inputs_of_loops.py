@@ -184,6 +184,19 @@ def identified(study: Study, command: str, inputs: Inputs) -> Study:
     return study if text is None else with_identified(study, command, text)
 
 
+def wrist_identified(inputs: Inputs) -> str:
+    """The wrist of the identification among the inputs, in words, by its run; empty without one."""
+    if "from_identified" not in inputs:
+        return ""
+    run = inputs.runs().get("from_identified")
+    return f"the wrist identified in {run.id}" if run else "the identified wrist"
+
+
+def with_option(run: str | None) -> list[str]:
+    """Words of a command that takes its wrist from an identification, by the name of its run; none without one."""
+    return ["--from-identified", run] if run else []
+
+
 def _gains(earlier: Run | _Tuning) -> Gains:
     from wristctl.control.table import read_gains
 
