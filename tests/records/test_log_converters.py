@@ -144,12 +144,16 @@ def test_the_probes_bend_is_its_turn_in_the_base_whichever_way_that_stands(tmp_p
     np.testing.assert_allclose(first.columns["spool_1"], 0.01 * np.radians(0.05 * (steps - 1600.0)), rtol=2e-3)
     np.testing.assert_allclose(first.columns["spool_2"], -first.columns["spool_1"])
     lost = [4.0, 1700.0, 0.1, 1.0, 2.0, 3.0, *[0.0] * 4, 0.0, 0.0, 0.0, *map(float, base.as_quat()[0])]
-    beside = {"First": [PROBE, *rows, lost, [5.0, 1700.0, "-", "lost"]], "Empty": [PROBE], "Still": [PROBE, rows[0]]}
+    measured: list[Sequence[str | float]] = [*rows, lost, [5.0, 1700.0, "-", "lost"]]
     other = [re.sub(r"[ _](.)", lambda letter: letter[1].upper(), head) for head in PROBE]
     other[1] = "MotorPosition [steps]"
     for heads in (PROBE, other):
-        beside["First"][0] = heads
-        again = read_log(workbook(tmp_path / "lost.xlsx", beside), "tee-probe")
+        sheets: dict[str, Sequence[Sequence[str | float]]] = {
+            "First": [heads, *measured],
+            "Empty": [heads],
+            "Still": [heads, rows[0]],
+        }
+        again = read_log(workbook(tmp_path / "lost.xlsx", sheets), "tee-probe")
         assert list(again.trials()) == ["First"]
         np.testing.assert_array_equal(again.columns["bend_y"], first.columns["bend_y"])
     with pytest.raises(UserError, match="no sheet has a motor position"):
