@@ -2,20 +2,45 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
 
 from tests.cli.conftest import Call
-from tests.identification.bend_rigs import drawn_rig, logs_of
+from tests.identification.bend_rigs import KNOWN, drawn_rig, logs_of
+from wristctl.commands.identify.bends import what_tells
 from wristctl.config.loop import Reference
 from wristctl.config.study import Study
+from wristctl.identification.bend_trials import bend_trials
 from wristctl.identification.unknowns import with_identified
 from wristctl.records import open_run
-from wristctl.records.open_log import write_log
+from wristctl.records.open_log import OpenLog, write_log
 from wristctl.study_files.load import load_study
 from wristctl.wrist.tendon_layout import TendonLayout
+
+
+def test_what_would_tell_more_is_what_the_logs_have_not() -> None:
+    rng = np.random.default_rng(1)
+    rig = drawn_rig(rng)
+    logs = logs_of(rig, rng)
+    assert len({float(log.columns["mass"][0]) for log in logs}) > 1
+
+    def said(used: list[OpenLog], *lacking: str) -> str:
+        trials = bend_trials(used, KNOWN, 1e-3)
+        fit: Any = SimpleNamespace(problem=SimpleNamespace(trials=trials))
+        return what_tells(fit, lacking)
+
+    assert "mass" not in said(logs, "stiffness") and "slack" in said(logs, "stiffness")
+    assert "another mass" in said(logs[:1], "stiffness_across")
+    assert said(logs, "gain_1", "direction_2") == ""
+    assert "mass" not in said(logs[:1], "delay") and "Quicker moves" in said(logs[:1], "delay")
+    cells = {f"tension_{k}": 5.0 + 0.0 * logs[0].columns["time"] for k in (1, 2, 4, 5)}
+    weighed = replace(logs[0], columns={**logs[0].columns, **cells})
+    assert "Tensions" in said(logs[:1], "friction") and said([weighed], "friction") == ""
 
 
 @pytest.mark.painted

@@ -13,7 +13,7 @@ from wristctl.config.loop import DirectionName, Loop
 from wristctl.config.plant import Actuator
 from wristctl.config.study import Study
 from wristctl.identification.unknowns import identified_yaml, with_identified
-from wristctl.records import open_run
+from wristctl.records import open_run, start_run
 from wristctl.simulation.closed_loop import simulate
 from wristctl.study_files.load import load_study
 
@@ -56,6 +56,31 @@ def test_two_poses_give_a_run_that_simulate_starts_from(call: Call, tmp_path: Pa
     assert [(each.role, each.run) for each in replaced.manifest.inputs] == [("from_identified", found.id)]
     expected = simulate(Study(wrist=pasted.wrist))
     assert replaced.metrics["rmse"]["value"] == expected.metrics["rmse"]
+    for text in (out, *((replaced.path / name).read_text() for name in ("README.md", "report.html"))):
+        words = " ".join(text.split())
+        assert f"the wrist identified in {found.id}" in words and "the paper's wrist" not in words
+
+
+def test_commands_say_whose_wrist_they_took_and_hand_it_on_in_what_they_advise(call: Call, tmp_path: Path) -> None:
+    wrist = {"stiffness": 0.4, "flexion_ratio": 1.1, "damping": 0.09, "tendon_radius": 0.021}
+    values = wrist | {"tendon_stiffness": 9e3, "friction": 0.2, "presliding": 3e-5, "sheath_friction": 0.3}
+    with start_run("identify", Study(), out=tmp_path / "results") as run:
+        path = run.file("data/identified.yaml")
+        path.parent.mkdir(exist_ok=True)
+        path.write_text(identified_yaml(values, {"frame_rate": 30.0, "delay_frames": 1.5}))
+    takes = ("--from-identified", run.id)
+    code, out, err = call("simulate", *takes, "--controller", "pd-ff", "--reference", "circle")
+    assert code == 0, err
+    assert f"the wrist identified in {run.id} in two planes" in " ".join(out.split())
+    short = ("--set", "simulate.horizon=0.06", "--set", "simulate.reference.duration=0.05")  # where nothing arrives
+    code, out, err = call("simulate", *takes, "--controller", "pd-ff", *short)
+    advised = next(line for line in out.splitlines() if line.startswith("wristctl tune "))
+    assert code == 0 and " ".join(takes) in advised
+    search = ("tune.controllers=[pd-ff]", "tune.iterations=1", "tune.candidates=2")
+    code, out, err = call("tune", *takes, *(word for key in search for word in ("--set", key)))
+    advised = next(line for line in out.splitlines() if line.startswith("wristctl simulate "))
+    assert code == 0 and " ".join(takes) in advised
+    assert "the paper's wrist" in " ".join(call("simulate")[1].split())
 
 
 def test_what_cannot_be_told_apart_is_refused_with_what_to_add(call: Call, tmp_path: Path) -> None:

@@ -110,6 +110,10 @@ def test_gains_and_parameters_in_memory_are_those_of_their_results() -> None:
     assert identified(STUDY, "simulate", Inputs()) is STUDY
     found: Any = SimpleNamespace(yaml="wrist: {stiffness: 55.5}\nsimulate: {loop: {actuator: {}, sensor: {}}}\n")
     assert identified(STUDY, "simulate", Inputs({"from_identified": found})).wrist.stiffness == 55.5
+    for nothing in (SimpleNamespace(), SimpleNamespace(yaml="")):
+        ratios: Any = nothing
+        with pytest.raises(UserError, match="no wrist was identified"):
+            identified(STUDY, "simulate", Inputs({"from_identified": ratios}))
 
 
 def test_tips_outside_are_warned_of_in_percent(caplog: pytest.LogCaptureFixture) -> None:

@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from wristctl.config.wrist import WristParameters
+from wristctl.commands.identify.logs import told_answer
+from wristctl.config.wrist import TendonPlace, WristParameters
 from wristctl.errors import UserError
 from wristctl.identification.arc_fit import fit_arcs
-from wristctl.identification.log_model import everything_fitted, recordings_of_logs, robot_of_log
+from wristctl.identification.log_model import everything_fitted, recordings_of_logs, robot_of_logs
+from wristctl.identification.model_choice import tried_models
 from wristctl.records.open_log import OpenLog
 
 WRIST = WristParameters()
@@ -48,7 +51,7 @@ def planar(
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 def test_a_late_planar_wrist_tells_its_delay_and_with_tensions_its_stiffness(sign: float) -> None:
     log = planar(tension=True, sign=sign)
-    robot = robot_of_log(log, WRIST, 0.01)
+    robot = robot_of_logs([log], WRIST, 0.01)
     fit = fit_arcs(robot, (), everything_fitted(recordings_of_logs([log], robot)))
     told = fit.told
     assert told["delay"].known and told["delay"].low - 2e-3 < 0.04 < told["delay"].high + 2e-3
@@ -57,15 +60,15 @@ def test_a_late_planar_wrist_tells_its_delay_and_with_tensions_its_stiffness(sig
 
 
 def test_without_tensions_or_masses_nothing_in_newton_metres_is_looked_for() -> None:
-    robot = robot_of_log(planar(), WRIST, 0.01)
+    robot = robot_of_logs([planar()], WRIST, 0.01)
     assert set(robot.unknowns(())) == {"gain", "tendon", "delay", "damping"}
     log = planar(mass=0.2, trials=2)
     log.columns["mass"][300:] = 0.6
-    assert "softening" in robot_of_log(log, WRIST, 0.01).unknowns(())
+    assert "softening" in robot_of_logs([log], WRIST, 0.01).unknowns(())
 
 
 def test_of_many_trials_whole_ones_are_predicted_and_of_few_parts() -> None:
-    robot = robot_of_log(planar(), WRIST, 0.01)
+    robot = robot_of_logs([planar()], WRIST, 0.01)
     few, many = (recordings_of_logs([planar(trials=n)], robot) for n in (2, 4))
     assert [bool(one.fitted.all()) for one in many] == [True, False, True, False]
     assert [bool(one.asked.all()) for one in many] == [False, True, False, True]
@@ -80,13 +83,94 @@ def test_tendons_are_those_of_the_square_wrist_of_the_study_or_evenly_around() -
     square = OpenLog(
         log.file, "log", {**log.columns, "spool_4": log.columns["spool_1"], "spool_5": log.columns["spool_2"]}
     )
-    four = robot_of_log(square, WRIST, 0.01)
+    four = robot_of_logs([square], WRIST, 0.01)
     toward_y = np.cos(four.angles)
     assert toward_y[2:] == pytest.approx([math.sqrt(0.5)] * 2) and toward_y[:2] == pytest.approx([-math.sqrt(0.5)] * 2)
     assert four.radius == WRIST.tendon_radius
     three = OpenLog(log.file, "log", {**log.columns, "spool_3": log.columns["spool_1"]})
-    around = robot_of_log(three, WRIST.model_copy(update={"tendons": "three"}), 0.01)
+    around = robot_of_logs([three], WRIST.model_copy(update={"tendons": "three"}), 0.01)
     assert np.degrees(around.angles) == pytest.approx([0.0, 120.0, 240.0])
+
+
+def four_in_a_plane(plus: tuple[int, ...], bend: str = "bend_y") -> OpenLog:
+    """The planar wrist with four tendons, of which `plus` make the bend grow."""
+    log = planar()
+    spools = {f"spool_{k}": log.columns["spool_1" if k in plus else "spool_2"] for k in range(1, 5)}
+    return OpenLog(log.file, "log", {"time": log.columns["time"], bend: log.columns["bend_y"], **spools})
+
+
+@pytest.mark.parametrize("plus", [(1, 2), (3, 4), (1, 3), (2, 4), (1, 4)])
+@pytest.mark.parametrize(("bend", "toward"), [("bend_y", 0.0), ("bend_z", 90.0)])
+def test_of_two_tendons_a_side_in_one_plane_the_motion_says_the_sides(
+    plus: tuple[int, ...], bend: str, toward: float
+) -> None:
+    robot = robot_of_logs([four_in_a_plane(plus, bend)], WRIST, 0.01)
+    directions = [toward if k in plus else toward + 180.0 for k in range(1, 5)]
+    assert np.degrees(robot.angles) == pytest.approx(directions)
+    assert robot.radius == OFFSET and "turn" not in robot.base
+    log = four_in_a_plane(plus, bend)
+    log.columns["time"][:] *= 2.0  # samples and motion stretch together
+    unseen = np.arange(len(log)) % 3 > 0
+    log.columns[bend][unseen] = math.nan
+    assert robot_of_logs([log], WRIST, 0.01).angles == robot.angles
+
+
+def test_a_spool_of_the_wrong_sense_is_refused_and_other_logs_keep_the_places_of_the_wrist() -> None:
+    for plus in ((1, 2, 3), (4,), (1, 2, 3, 4)):
+        with pytest.raises(UserError, match="not two on either side") as caught:
+            robot_of_logs([four_in_a_plane(plus)], WRIST, 0.01)
+        assert "senses" in str(caught.value.fix) and "wrist.tendons" in str(caught.value.fix)
+    square = [math.atan2(y, x) for x, y in ((-1, -1), (-1, 1), (1, -1), (1, 1))]
+    both = four_in_a_plane((1, 2))
+    both = replace(both, columns={**both.columns, "bend_z": 0.5 * both.columns["bend_y"]})
+    assert robot_of_logs([both], WRIST, 0.01).angles == pytest.approx(square)
+    held = four_in_a_plane((1, 2))
+    held.columns["spool_3"][:] = 1e-3
+    assert robot_of_logs([held], WRIST, 0.01).angles == pytest.approx(square)
+    places = tuple(TendonPlace(angle_deg=angle, radius=0.03) for angle in (0.0, 90.0, 180.0, 270.0))
+    given = robot_of_logs([four_in_a_plane((1, 2))], WRIST.model_copy(update={"tendons": places}), 0.01)
+    assert np.degrees(given.angles) == pytest.approx([0.0, 90.0, 180.0, 270.0]) and given.radius == 0.03
+    uneven = (*places[:3], TendonPlace(angle_deg=270.0, radius=0.02))
+    with pytest.raises(UserError, match="several circles"):
+        robot_of_logs([both], WRIST.model_copy(update={"tendons": uneven}), 0.01)
+    pair = tuple(TendonPlace(angle_deg=angle, radius=0.03, multiplicity=2) for angle in (0.0, 180.0))
+    assert robot_of_logs([four_in_a_plane((1, 2))], WRIST.model_copy(update={"tendons": pair}), 0.01).radius == 0.03
+
+
+def test_masses_and_tensions_count_in_whichever_of_several_logs_they_are() -> None:
+    light, heavy = planar(mass=0.1), planar(mass=0.4)
+    assert "softening" in robot_of_logs([light, heavy], WRIST, 0.01).base
+    assert "softening" not in robot_of_logs([light, planar(mass=0.1)], WRIST, 0.01).base
+    assert "force" in robot_of_logs([planar(), planar(tension=True)], WRIST, 0.01).base
+    with pytest.raises(UserError, match="no mass"):
+        robot_of_logs([light, planar()], WRIST, 0.01)
+    unweighed = planar(mass=0.1, trials=2)
+    unweighed.columns["mass"][300:] = math.nan
+    with pytest.raises(UserError, match="no mass"):
+        robot_of_logs([unweighed], WRIST, 0.01)
+    log = planar()
+    timeless = replace(log, columns={name: column for name, column in log.columns.items() if name != "time"})
+    robot = robot_of_logs([log, timeless], WRIST, 0.01)
+    assert not robot.timed and "delay" not in robot.base
+    spools = {name: log.columns[name] for name in ("time", "spool_1", "spool_2")}
+    tips = replace(log, columns={**spools, "tip_x": log.columns["bend_y"], "tip_y": log.columns["bend_y"]})
+    with pytest.raises(UserError, match="the tip, in"):
+        robot_of_logs([log, tips], WRIST, 0.01)
+
+
+@pytest.mark.parametrize(
+    ("masses", "tension", "asks_for_tensions", "asks_for_masses"),
+    [((None,), False, True, True), ((0.1, 0.4), False, True, False), ((0.1,), True, False, False)],
+)
+def test_masses_are_asked_for_only_where_the_logs_have_not_several_and_no_tensions(
+    masses: tuple[float | None, ...], tension: bool, asks_for_tensions: bool, asks_for_masses: bool
+) -> None:
+    logs = [planar(mass=mass, tension=tension) for mass in masses]
+    robot = robot_of_logs(logs, WRIST, 0.01)
+    model = next(iter(tried_models(robot, [recordings_of_logs(logs, robot)], False)))
+    said = " ".join(told_answer(model.fits[0], [model], model).lines())
+    assert ("tension_1 [N]" in said) == asks_for_tensions
+    assert ("several masses" in " ".join(said.split())) == asks_for_masses
 
 
 def test_spools_and_motion_may_have_times_of_their_own() -> None:
@@ -98,7 +182,7 @@ def test_spools_and_motion_may_have_times_of_their_own() -> None:
     }
     gaps["bend_y"] = np.where(odd, gaps["bend_y"], math.nan)
     apart = OpenLog(log.file, "log", gaps)
-    robot = robot_of_log(apart, WRIST, 0.01)
+    robot = robot_of_logs([apart], WRIST, 0.01)
     (whole,), (with_gaps,) = (
         recordings_of_logs([OpenLog(log.file, "log", dict(log.columns))], robot),
         recordings_of_logs([apart], robot),
@@ -111,7 +195,7 @@ def test_logs_without_spools_or_motion_are_refused() -> None:
     log = planar()
     bare = {name: log.columns[name] for name in ("time", "bend_y")}
     with pytest.raises(UserError, match="0 spools"):
-        robot_of_log(OpenLog(log.file, "log", bare), WRIST, 0.01)
+        robot_of_logs([OpenLog(log.file, "log", bare)], WRIST, 0.01)
     still = {name: log.columns[name] for name in ("time", "spool_1", "spool_2")}
     with pytest.raises(UserError, match="neither a bend nor the tip"):
-        robot_of_log(OpenLog(log.file, "log", still), WRIST, 0.01)
+        robot_of_logs([OpenLog(log.file, "log", still)], WRIST, 0.01)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import zipfile
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -142,6 +143,19 @@ def test_the_probes_bend_is_its_turn_in_the_base_whichever_way_that_stands(tmp_p
     np.testing.assert_allclose(second.columns["bend_y"], bend[::-1], atol=2e-3)
     np.testing.assert_allclose(first.columns["spool_1"], 0.01 * np.radians(0.05 * (steps - 1600.0)), rtol=2e-3)
     np.testing.assert_allclose(first.columns["spool_2"], -first.columns["spool_1"])
+    lost = [4.0, 1700.0, 0.1, 1.0, 2.0, 3.0, *[0.0] * 4, 0.0, 0.0, 0.0, *map(float, base.as_quat()[0])]
+    measured: list[Sequence[str | float]] = [*rows, lost, [5.0, 1700.0, "-", "lost"]]
+    other = [re.sub(r"[ _](.)", lambda letter: letter[1].upper(), head) for head in PROBE]
+    other[1] = "MotorPosition [steps]"
+    for heads in (PROBE, other):
+        sheets: dict[str, Sequence[Sequence[str | float]]] = {
+            "First": [heads, *measured],
+            "Empty": [heads],
+            "Still": [heads, rows[0]],
+        }
+        again = read_log(workbook(tmp_path / "lost.xlsx", sheets), "tee-probe")
+        assert list(again.trials()) == ["First"]
+        np.testing.assert_array_equal(again.columns["bend_y"], first.columns["bend_y"])
     with pytest.raises(UserError, match="no sheet has a motor position"):
         read_log(workbook(tmp_path / "other.xlsx", {"A": [["x", "y"], [1.0, 2.0]]}), "tee-probe")
     (tmp_path / "text.xlsx").write_text("no zip")
@@ -159,3 +173,30 @@ def test_the_spirobs_lengths_become_spools_and_its_joints_one_bend() -> None:
     assert log.columns["time"].tolist() == [0.0, 0.5] and log.columns["tension_2"].tolist() == [3.0, 4.0]
     with pytest.raises(UserError, match="0 forces, 0 lengths"):
         spirob_log(Path("a.parquet"), {"time": [0.0]})
+
+
+@pytest.mark.parametrize(("turn", "paid_out"), [(1.0, 1.0), (-1.0, 1.0), (1.0, -1.0), (-1.0, -1.0)])
+def test_the_spirobs_columns_are_those_of_its_authors_beside_commands_and_markers(
+    tmp_path: Path, turn: float, paid_out: float
+) -> None:
+    time = np.linspace(0.0, 2.0, 50)
+    swing = np.sin(3.0 * time)
+    joints = {f"joint_{k}_deg": turn * (0.5 * k * swing) for k in range(1, 14)}
+    table: dict[str, np.ndarray] = {"frame": np.arange(50.0), "video_timestamp_s": time}
+    table |= {f"{name}_{k}": 100.0 + k + swing for name in ("x", "y", "angle_deg") for k in range(14)}
+    table |= joints | {"global_timestamp_s": time + 12.5}
+    table |= {f"cmd_force_{k}_N": 5.0 + side * np.sign(swing) for k, side in ((0, 1.0), (1, -1.0))}
+    table |= {f"meas_force_{k}_N": 5.0 + 2.0 * side * swing for k, side in ((0, 1.0), (1, -1.0))}
+    table |= {f"meas_length_{k}_mm": 210.0 - paid_out * side * 8.0 * swing for k, side in ((0, 1.0), (1, -1.0))}
+    file = tmp_path / "spirob_tendon_trajectory_60s.csv"
+    heads, cells = ",".join(table), np.stack(list(table.values()), axis=1)
+    put(tmp_path, file.name, heads, *(",".join(f"{cell:.6f}" for cell in row) for row in cells))
+    log = read_log(file, "spirob")
+    np.testing.assert_allclose(log.columns["bend_y"], np.radians(0.5 * 91 * swing), atol=1e-6)
+    np.testing.assert_allclose(log.columns["time"], time, atol=1e-5)
+    np.testing.assert_allclose(log.columns["spool_1"], 8e-3 * swing, atol=1e-8)
+    np.testing.assert_allclose(log.columns["spool_2"], -8e-3 * swing, atol=1e-8)
+    np.testing.assert_allclose(log.columns["tension_1"], 5.0 + 2.0 * swing, atol=1e-6)
+    ringing = put(tmp_path, "spirob_messung.csv", "t_us,frame_id,accX,accY,accZ", "731515359,584614,1.0,0.0,0.0")
+    with pytest.raises(UserError, match="0 forces, 0 lengths, 0 angles"):
+        read_log(ringing, "spirob")

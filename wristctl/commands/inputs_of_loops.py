@@ -26,6 +26,9 @@ if TYPE_CHECKING:
 
 log = logging.getLogger(__name__)
 
+IDENTIFIED = "data/identified.yaml"
+"""File of an identify run with its wrist, a study file; missing where too little was told."""
+
 
 class _Tuning(Protocol):
     """Gains that were found, in memory."""
@@ -184,6 +187,19 @@ def identified(study: Study, command: str, inputs: Inputs) -> Study:
     return study if text is None else with_identified(study, command, text)
 
 
+def wrist_identified(inputs: Inputs) -> str:
+    """The wrist of the identification among the inputs, in words, by its run; empty without one."""
+    if "from_identified" not in inputs:
+        return ""
+    run = inputs.runs().get("from_identified")
+    return f"the wrist identified in {run.id}" if run else "the identified wrist"
+
+
+def with_option(run: str | None) -> list[str]:
+    """Words of a command that takes its wrist from an identification, by the name of its run; none without one."""
+    return ["--from-identified", run] if run else []
+
+
 def _gains(earlier: Run | _Tuning) -> Gains:
     from wristctl.control.table import read_gains
 
@@ -202,8 +218,16 @@ def _network(earlier: Run | _Training) -> Network:
 
 def _identified_yaml(earlier: Run | _Identification) -> str:
     if isinstance(earlier, Run):
-        return earlier.file("data/identified.yaml").read_text(encoding="utf-8")
-    return earlier.yaml
+        text = ""
+        if (earlier.path / IDENTIFIED).is_file():
+            text = earlier.file(IDENTIFIED).read_text(encoding="utf-8")
+    else:
+        text = getattr(earlier, "yaml", "")
+    if not text:
+        run = earlier.id if isinstance(earlier, Run) else "identify"
+        fix = "identify runs of hw-run, or logs in two planes with model: wrist (docs/identify.md)"
+        raise UserError("no wrist was identified there: its log told ratios alone, or too little", run, fix)
+    return text
 
 
 def family_of(families: Mapping[str, Family], name: str, where: str) -> Family:

@@ -14,7 +14,7 @@ from wristctl.arrays import Array
 from wristctl.config.wrist import WristParameters
 from wristctl.errors import UserError
 from wristctl.identification.fit import frame_noise
-from wristctl.identification.log_model import spools_of_log
+from wristctl.identification.log_model import mass_of_log, spools_of_log
 from wristctl.identification.measured_trials import MeasuredTrial
 from wristctl.records.open_log import OpenLog
 from wristctl.wrist.directions import TENDONS
@@ -110,8 +110,8 @@ def _trial(log: OpenLog, label: str, run: str, wrist: WristParameters, grid: flo
         raise UserError(f"{int(counted.sum())} samples with all spools", label, f"{_FEWEST} or more")
     ticks = clock[counted]
     time = np.arange(ticks[0], ticks[-1], grid)
-    if "mass" in log.columns:
-        wrist = wrist.model_copy(update={"hand_mass": float(np.nanmean(log.columns["mass"]))})
+    if (mass := mass_of_log(log)) is not None:
+        wrist = wrist.model_copy(update={"hand_mass": mass})
     names = ["bend_y", "bend_z", *(f"tension_{number}" for number in numbers)]
     within = (clock >= time[0]) & (clock <= time[-1])
     readings = list[tuple[Array, Array]]()

@@ -6,6 +6,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 
@@ -23,48 +24,131 @@ _MOST, _SHORTEST, _FEWEST, _BLOCKS = 800, 5e-3, 20, 8
 _NO_TIME = 1.0
 # Trials from which whole ones are predicted; of fewer every second part of each.
 _WHOLE = 4
+# Correlation with the motion from which a spool goes with it.
+_GOES_WITH = 0.5
 GRAVITY = 9.81
 
 
-def robot_of_log(log: OpenLog, wrist: WristParameters, radius_error: float) -> ArcRobot:
-    """The robot that a log is of: its tendons by their numbers, its geometry by a wrist.
+def robot_of_logs(logs: Sequence[OpenLog], wrist: WristParameters, radius_error: float) -> ArcRobot:
+    """The robot that logs are of: its tendons by their numbers, its geometry by a wrist.
 
-    Two tendons alone are antagonists in one plane; 1, 2, 4 and 5 are those of the square wrist; as many as the wrist
-    has are those of `wrist.tendons`; else they are evenly around it. Raises UserError without spools or motion.
+    Two tendons alone are antagonists in one plane; of four numbered 1 to 4 in a log of one plane the motion says which
+    side each pulls to (`plus_side`); 1, 2, 4 and 5 are those of the square wrist; as many as the wrist has are those of
+    `wrist.tendons`; else they are evenly around it. Raises UserError without spools or motion, for logs that are not
+    alike, and for tendons on several circles.
     """
-    numbers = spools_of_log(log)
+    log, numbers = logs[0], spools_of_log(logs[0])
     if len(numbers) < 2:
         raise UserError(f"{len(numbers)} spools", log.header or str(log.file), "columns spool_1 [mm], spool_2 [mm]")
-    layout = TendonLayout.of(wrist)
-    angles, radius = [math.tau * k / len(numbers) for k in range(len(numbers))], wrist.tendon_radius
-    if len(numbers) == 2:
-        angles, radius = [0.0, math.pi], wrist.tendon_offset
-    elif set(numbers) <= set(TENDONS) and 4 in numbers and 5 in numbers:
-        corners = [TENDONS[number] for number in numbers]
-        angles = [math.atan2(flexion, ulnar) for ulnar, flexion in corners]
-    elif len(layout.places) == len(numbers) and all(place.radius > 0.0 for place in layout.places):
-        angles, radius = [place.angle for place in layout.places], layout.places[0].radius
-    if log.bends() is not None:
-        measured = "bend"
-    elif {"tip_x", "tip_y"} <= set(log.columns):
-        measured = "tip"
-    else:
-        problem = "neither a bend nor the tip is in the log"
-        raise UserError(problem, log.header or str(log.file), "columns bend_y [deg], or tip_x [mm], tip_y [mm]")
+    _check_alike(logs, numbers)
+    measured = _measured(log)
+    angles, radius, paired = _tendons(logs, numbers, wrist)
     base = ["gain", "tendon"]
-    if len(numbers) > 2:
+    if not paired:
         base.append("turn")
-    if "time" in log.columns:
+    timed = all("time" in log.columns for log in logs)
+    if timed:
         base += ["delay", "damping"]
-    if len(_masses(log)) > 1:
+    if len(_masses(logs)) > 1:
         base.append("softening")
-    if _has_tensions(log, numbers):
+    if any(_has_tensions(log, numbers) for log in logs):
         base.append("force")
     return ArcRobot(
-        (wrist.length,), tuple(angles), radius, (1,) * len(numbers), "bend" if measured == "bend" else "tip",
-        tuple(base), {"gain": 1.0, "turn": 0.0, "delay": 0.03}, {"gain": radius_error},
-        "time" in log.columns,
+        (wrist.length,), tuple(angles), radius, (1,) * len(numbers), measured, tuple(base),
+        {"gain": 1.0, "turn": 0.0, "delay": 0.03}, {"gain": radius_error}, timed,
     )  # fmt: skip
+
+
+def _check_alike(logs: Sequence[OpenLog], numbers: Sequence[int]) -> None:
+    """UserError where logs have other tendons, measure something else, or where only some have masses."""
+    for log in logs:
+        if spools_of_log(log) != numbers:
+            problem = f"tendons {', '.join(map(str, spools_of_log(log)))}, elsewhere {', '.join(map(str, numbers))}"
+            raise UserError(problem, str(log.file), "logs of one robot")
+        if _measured(log) != _measured(logs[0]):
+            problem = f"the {_measured(log)}, in {logs[0].file.name} the {_measured(logs[0])}"
+            raise UserError(problem, log.header or str(log.file), "logs that measure the same")
+    trials = [(log, name, trial) for log in logs for name, trial in log.trials().items()]
+    weighed = [mass_of_log(trial) is not None for _, _, trial in trials]
+    if any(weighed) and not all(weighed):
+        log, name, _ = trials[weighed.index(False)]
+        where = f"{log.file}, trial {name}" if name else log.header or str(log.file)
+        raise UserError("no mass, which other trials have", where, "mass [kg] in every trial, or in none")
+
+
+def _measured(log: OpenLog) -> Literal["bend", "tip"]:
+    if log.bends() is not None:
+        return "bend"
+    if {"tip_x", "tip_y"} <= set(log.columns):
+        return "tip"
+    problem = "neither a bend nor the tip is in the log"
+    raise UserError(problem, log.header or str(log.file), "columns bend_y [deg], or tip_x [mm], tip_y [mm]")
+
+
+def _tendons(
+    logs: Sequence[OpenLog], numbers: Sequence[int], wrist: WristParameters
+) -> tuple[Sequence[float], float, bool]:
+    """Directions of the tendons [rad], radius of their circle [m], and whether they are of two sides alone."""
+    layout, plane = TendonLayout.of(wrist), _plane(logs)
+    pairs_radius = layout.places[0].radius if layout.planes == 1 else wrist.tendon_offset
+    places = [place for place in layout.places if place.radius > 0.0]
+    if not isinstance(wrist.tendons, str) and len(places) == len(numbers):
+        if max(place.radius for place in places) > 1.001 * min(place.radius for place in places):
+            fix = "one radius, for arcs have their tendons on a circle; model: wrist takes each place as it is"
+            raise UserError("tendons on several circles", "wrist.tendons", fix)
+        return [place.angle for place in places], places[0].radius, layout.planes == 1
+    if len(numbers) == 2:
+        return [plane or 0.0, math.pi + (plane or 0.0)], pairs_radius, True
+    if set(numbers) <= set(TENDONS) and 4 in numbers and 5 in numbers:
+        corners = [TENDONS[number] for number in numbers]
+        return [math.atan2(flexion, ulnar) for ulnar, flexion in corners], wrist.tendon_radius, False
+    if plane is not None and len(numbers) == 4 and (plus := plus_side(logs)) is not None:
+        return [plane if number in plus else plane + math.pi for number in numbers], pairs_radius, True
+    if len(places) == len(numbers):
+        return [place.angle for place in places], places[0].radius, False
+    return [math.tau * k / len(numbers) for k in range(len(numbers))], wrist.tendon_radius, False
+
+
+def _plane(logs: Sequence[OpenLog]) -> float | None:
+    """Direction of the one plane that logs measure [rad]; None where they measure two."""
+    names = {name for log in logs for name in log.columns}
+    if "inclination" in names or {"bend_y", "bend_z"} <= names:
+        return None
+    if _measured(logs[0]) == "tip":
+        return None if "tip_z" in names else 0.0
+    return 0.0 if "bend_y" in names else 0.5 * math.pi
+
+
+def plus_side(logs: Sequence[OpenLog]) -> tuple[int, ...] | None:
+    """Numbers of the two tendons of four that reel in as the one measured bend, or tip's place, grows.
+
+    None where a tendon does not go with the motion. Raises UserError where not two go either way.
+    """
+    numbers = spools_of_log(logs[0])
+    column = next(name for name in ("bend_y", "bend_z", "tip_y") if name in logs[0].columns)
+    products = np.zeros((len(numbers), 3))
+    for trial in (trial for log in logs for trial in log.trials().values()):
+        motion = trial.columns.get(column, np.full(len(trial), math.nan))
+        clock = trial.columns.get("time", np.arange(float(len(trial))))
+        seen = np.isfinite(motion)
+        spools = np.stack([trial.columns[f"spool_{number}"] for number in numbers], axis=1)
+        if not seen.any() or not np.isfinite(spools).any():
+            continue
+        reeled, moved = _at(clock[seen], clock, spools), motion[seen]
+        reeled, moved = reeled - reeled.mean(axis=0), moved - moved.mean()
+        products += np.stack([reeled.T @ moved, np.sum(reeled**2, axis=0), np.full(len(numbers), moved @ moved)], 1)
+    sizes = np.sqrt(products[:, 1] * products[:, 2])
+    likeness = np.divide(products[:, 0], sizes, out=np.zeros(len(numbers)), where=sizes > 0.0)
+    if not (np.abs(likeness) >= _GOES_WITH).all():
+        return None
+    plus = tuple(number for number, alike in zip(numbers, likeness, strict=True) if alike > 0.0)
+    minus = tuple(number for number in numbers if number not in plus)
+    if len(plus) != 2:
+        reel_in, pay_out = (", ".join(map(str, side)) or "none" for side in (plus, minus))
+        problem = f"as the motion grows spools {reel_in} reel in and {pay_out} pay out: not two on either side"
+        fix = "reeled in is positive: check the spools' senses; or give each tendon's place in wrist.tendons"
+        raise UserError(problem, logs[0].header or str(logs[0].file), fix)
+    return plus
 
 
 def spools_of_log(log: OpenLog) -> list[int]:
@@ -72,10 +156,16 @@ def spools_of_log(log: OpenLog) -> list[int]:
     return sorted(int(name.removeprefix("spool_")) for name in log.columns if name.startswith("spool_"))
 
 
-def _masses(log: OpenLog) -> list[float]:
+def mass_of_log(log: OpenLog) -> float | None:
+    """Mean mass [kg] of a log, or of one of its trials; None where nobody weighed it."""
+    column = log.columns.get("mass", np.empty(0))
+    return float(np.nanmean(column)) if np.isfinite(column).any() else None
+
+
+def _masses(logs: Sequence[OpenLog]) -> set[float]:
     """Masses of the trials [kg], each once."""
-    trials = log.trials().values()
-    return sorted({round(float(np.nanmean(trial.columns["mass"])), 4) for trial in trials if "mass" in trial.columns})
+    masses = [mass_of_log(trial) for log in logs for trial in log.trials().values()]
+    return {round(mass, 4) for mass in masses if mass is not None}
 
 
 def _has_tensions(log: OpenLog, numbers: Sequence[int]) -> bool:
@@ -85,15 +175,12 @@ def _has_tensions(log: OpenLog, numbers: Sequence[int]) -> bool:
 def recordings_of_logs(logs: Sequence[OpenLog], robot: ArcRobot) -> list[ArcRecording]:
     """Trials of logs at even steps. Of four or more every second one is predicted, of fewer every second part of each.
 
-    Raises UserError for a trial with too few samples or for logs of different robots.
+    Raises UserError for a trial with too few samples.
     """
     trials = [(trial, name) for log in logs for name, trial in log.trials().items()]
     numbers = spools_of_log(logs[0])
     recordings = []
     for log, name in trials:
-        if spools_of_log(log) != numbers:
-            problem = f"tendons {', '.join(map(str, spools_of_log(log)))}, elsewhere {', '.join(map(str, numbers))}"
-            raise UserError(problem, str(log.file), "logs of one robot")
         recordings.append(_recording(log, robot, numbers, len(trials), Path(log.file).stem, name))
     whole = len(recordings) >= _WHOLE
     first = 0
@@ -129,8 +216,8 @@ def _recording(
         raise UserError(problem, str(log.file), f"{_FEWEST} or more with spools and motion")
     most = max(_FEWEST, _MOST // trials)
     title = f"{file}, {name}" if name else file
-    mass = float(np.nanmean(log.columns["mass"])) if "mass" in log.columns else 0.0
-    if "time" not in log.columns:
+    mass = mass_of_log(log) or 0.0
+    if not robot.timed:
         kept = np.flatnonzero(seen & counted)
         kept = kept[:: max(1, math.ceil(len(kept) / most))]
         time, pause = kept.astype(float), np.full(len(kept), _NO_TIME)

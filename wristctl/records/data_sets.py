@@ -25,9 +25,10 @@ class DataSet:
     """SHA-256 of files by how their names end; empty where none was at hand."""
 
     def found(self, folder: Path) -> dict[str, Path]:
-        """The set's files in a folder by how their names end; of a set without hashes every table there.
+        """The set's files in a folder by how their names end; of a set without hashes every recording there, once.
 
-        Raises UserError where one is missing, or is not as published.
+        What else the authors keep beside them, and a recording that another file has too, are passed over. Raises
+        UserError where a file is missing, or is not as published.
         """
         if not folder.is_dir():
             raise UserError(f"no such folder - {folder}", "data", f"clone {self.place}")
@@ -35,15 +36,39 @@ class DataSet:
             tables = sorted(file for file in folder.rglob("*") if file.suffix in _SUFFIXES)
             if not tables:
                 raise UserError("no recordings", str(folder), f"clone {self.place}")
-            return {file.relative_to(folder).as_posix(): file for file in tables}
+            return {file.relative_to(folder).as_posix(): file for file in self._recordings(tables)}
         found = {}
-        for ending in self.hashes:
+        for ending, digest in self.hashes.items():
             files = sorted(file for file in folder.rglob(f"*{Path(ending).name}") if _named(file, ending))
             if not files:
                 raise UserError(f"no file {ending}", str(folder), f"clone {self.place}")
-            found[ending] = files[0]
+            found[ending] = next((file for file in files if sha256_of(file) == digest), files[0])
         self.check(found)
         return found
+
+    def _recordings(self, files: Sequence[Path]) -> list[Path]:
+        """Those of files that the set's converter reads, of two that hold the same the first.
+
+        Raises UserError of the first file where it reads none.
+        """
+        import numpy as np
+
+        from wristctl.records.log_converters import read_log
+
+        recordings, seen, errors = list[Path](), set[bytes](), list[UserError]()
+        for file in files:
+            try:
+                log = read_log(file, self.columns)
+            except UserError as error:
+                errors.append(error)
+                continue
+            content = b"".join(name.encode() + np.round(log.columns[name], 9).tobytes() for name in sorted(log.columns))
+            if content not in seen:
+                recordings.append(file)
+            seen.add(content)
+        if not recordings:
+            raise errors[0]
+        return recordings
 
     def by_content(self, files: Sequence[Path]) -> dict[str, Path]:
         """Files by how their names ended when they were published, whatever they are called now.

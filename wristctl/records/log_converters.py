@@ -30,6 +30,7 @@ PROBE_RADIUS = 0.010
 """Length of tendon [m] that the probe is taken to move for a radian of bend: its pulleys are not published."""
 
 _NECK_LOAD = re.compile(r"(\d+)gr")
+_COMMAND = re.compile("cmd|command|target|ref|angle_deg_")
 
 
 @dataclass(frozen=True)
@@ -88,6 +89,8 @@ def _silicone_arm(file: Path) -> OpenLog:
 
 
 def _arm(file: Path, rows: Sequence[Sequence[Any]], lines: Sequence[int]) -> OpenLog:
+    if not rows:
+        raise UserError("no sample of the arm", str(file), "six numbers a line: steps 1 to 3, then x, y, z [mm]")
     values = np.empty((len(rows), 6))
     for row, line, into in zip(rows, lines, values, strict=True):
         try:
@@ -105,10 +108,11 @@ def _arm(file: Path, rows: Sequence[Sequence[Any]], lines: Sequence[int]) -> Ope
 def _arm_of_matlab(file: Path) -> OpenLog:
     """Steps ud and tips yd, 3 x T, or tips of the closed loops, yex21 and yex22."""
     from scipy.io import loadmat
+    from scipy.io.matlab import MatReadError
 
     try:
         content = loadmat(file)
-    except (OSError, ValueError, NotImplementedError) as error:
+    except (OSError, ValueError, NotImplementedError, MatReadError) as error:
         raise UserError(f"cannot read the file of MATLAB: {error}", str(file), "check the path") from error
     if "ud" in content and "yd" in content:
         rows = np.concatenate([content["ud"], content["yd"]]).T
@@ -134,9 +138,12 @@ def _tee_probe(file: Path) -> OpenLog:
         if names is None:
             continue
         kept = [(number, row) for number, row in enumerate(rows, 2) if row[names[0]].strip()]
-        values = np.array([[float(row[place] or "nan") for place in names] for _, row in kept])
-        whole = np.isfinite(values).all(axis=1)
+        values = np.array([[_cell(row[place]) for place in names] for _, row in kept]).reshape(-1, len(names))
+        turned = [(part != 0.0).any(axis=1) for part in (values[:, 1:5], values[:, 5:9])]  # zeros: a lost sensor
+        whole = np.isfinite(values).all(axis=1) & turned[0] & turned[1]
         values, kept = values[whole], [row for row, there in zip(kept, whole, strict=True) if there]
+        if not len(values) or not np.ptp(values[:, 0]):
+            continue
         steps = values[:, 0] - 0.5 * (values[:, 0].max() + values[:, 0].min())
         bend = _turned(steps, values[:, 1:5], values[:, 5:9])
         spool = PROBE_RADIUS * float(np.ptp(bend) / np.ptp(steps)) * steps
@@ -150,12 +157,20 @@ def _tee_probe(file: Path) -> OpenLog:
     return OpenLog(file, "recording of the probe", columns, {"trial": np.array(words)}, {}, lines)
 
 
+def _cell(text: str) -> float:
+    """The number in a cell of a workbook; nan where there is none."""
+    try:
+        return float(text)
+    except ValueError:
+        return math.nan
+
+
 def _probe_columns(heads: Sequence[str]) -> list[int] | None:
     """Places of the motor's position and of both quaternions (x, y, z, w), None where one is missing."""
-    names = [rf"{part} orientation[ _]*\(?{axis}\)?\b.*" for part in ("tip", "base") for axis in "xyzw"]
+    letters = [re.sub(r"\[.*|[^a-z0-9]", "", head) for head in heads]
     places = list[int]()
-    for pattern in ("motor position.*", *names):
-        place = next((k for k, head in enumerate(heads) if re.fullmatch(pattern, head)), None)
+    for name in ("motorposition", *(f"{part}orientation{axis}" for part in ("tip", "base") for axis in "xyzw")):
+        place = next((k for k, head in enumerate(letters) if head.startswith(name)), None)
         if place is None:
             return None
         places.append(place)
@@ -182,7 +197,7 @@ def _spirob(file: Path) -> OpenLog:
     import pandas as pd
 
     try:
-        frame = pd.read_parquet(file)
+        frame = pd.read_csv(file) if file.suffix == ".csv" else pd.read_parquet(file)
     except ImportError:
         raise UserError("pandas cannot read parquet files here", str(file), "pip install pyarrow") from None
     except (OSError, ValueError) as error:
@@ -191,20 +206,40 @@ def _spirob(file: Path) -> OpenLog:
 
 
 def spirob_log(file: Path, table: Mapping[str, Any]) -> OpenLog:
-    """The columns of a recording of the SpiRob as an open log; tendons reel in what they are shorter than at first."""
+    """The columns of a recording of the SpiRob as an open log.
 
-    def like(pattern: str) -> list[Array]:
-        return [np.asarray(column, float) for name, column in table.items() if re.search(pattern, name.lower())]
+    Their authors' names are global_timestamp_s, joint_1_deg to joint_13_deg, meas_force_0_N and meas_length_0_mm;
+    commands and the markers' own angles and times stand beside them, and are passed over. Lengths count from the first
+    one. The bend grows where the first tendon pulls more, and a spool reels in as the bend goes to its tendon's side.
+    """
 
-    time, forces = like(r"^t$|time"), like("force|tension")
-    lengths, angles = like("length|position"), like("angle|joint|theta|aruco")
+    def like(*patterns: str) -> list[Array]:
+        """The columns that the first pattern finds that finds any, without commands."""
+        for pattern in patterns:
+            names = [name for name in table if re.search(pattern, name.lower()) and not _COMMAND.match(name.lower())]
+            if names:
+                return [np.asarray(table[name], float) for name in names]
+        return []
+
+    time, forces = like("^global_timestamp", "^t$|time"), like("^meas_force", "force|tension")
+    lengths, angles = like("^meas_length", "length|position"), like(r"^joint_\d+_deg", "angle|joint|theta|aruco")
     if len(forces) != 2 or len(lengths) != 2 or not angles:
         problem = f"{len(forces)} forces, {len(lengths)} lengths, {len(angles)} angles by the names of the columns"
         raise UserError(problem, str(file), "two forces [N], two lengths [mm] and the joints' angles [deg]")
-    columns = {"time": time[0] - time[0][0]} if time else {}
-    for number, (force, length) in enumerate(zip(forces, lengths, strict=True), 1):
-        columns |= {f"spool_{number}": 1e-3 * (length[0] - length), f"tension_{number}": force}
-    return OpenLog(file, "recording of the SpiRob", columns | {"bend_y": np.radians(np.sum(angles, axis=0))})
+    columns = {"time": time[0] - np.nanmin(time[0])} if time else {}
+    bend = _along(np.radians(np.sum(angles, axis=0)), forces[0] - forces[1])
+    shorter = [1e-3 * (length[np.isfinite(length)][:1] - length) for length in lengths]
+    side = 1.0 if np.array_equal(_along(shorter[0] - shorter[1], bend), shorter[0] - shorter[1]) else -1.0
+    for number, (force, reeled) in enumerate(zip(forces, shorter, strict=True), 1):
+        columns |= {f"spool_{number}": side * reeled, f"tension_{number}": force}
+    return OpenLog(file, "recording of the SpiRob", columns | {"bend_y": bend})
+
+
+def _along(values: Array, other: Array) -> Array:
+    """Values (T,) with the sign with which they grow with others (T,); as they are where these do not tell it."""
+    there = np.isfinite(values) & np.isfinite(other)
+    together = float(np.sum((values[there] - values[there].mean()) * (other[there] - other[there].mean())))
+    return -values if together < 0.0 else values
 
 
 def _heads(file: Path) -> list[str]:

@@ -34,8 +34,9 @@ _OF_A_PLANE = {
 _TIP = {"tip": "last disc's centre", "tip_desired": "tip of one arc that is bent as wanted"}
 _AXES = {"x": "along the base tangent", "y": "toward ulnar", "z": "toward flexion"}
 _OF_A_TENDON = {
-    "pull": "commanded pull at this place of tendons",
-    "acting": "pull as it acts on the wrist: late and in steps behind real motors",
+    "pull": ("N", "commanded pull at this place of tendons"),
+    "acting": ("N", "pull as it acts on the wrist: late and in steps behind real motors"),
+    "spool": ("m", "length that each spool of this place has reeled in until the next control period"),
 }
 
 
@@ -71,6 +72,8 @@ class BendCourse:
     """Of the wrist as it is [m]."""
     length_known: float
     """Of the wrist as its controller knows it [m]."""
+    spools: Array | None = None
+    """Length that each spool has reeled in (T, places of tendons) [m]; None without spools."""
 
     @cached_property
     def tip(self) -> Array:
@@ -117,6 +120,8 @@ class BendCourse:
             columns |= {f"{name}_{axis}": values for axis, values in zip(_AXES, getattr(self, name).T, strict=True)}
         for name, pulls in (("pull", self.pulls), ("acting", self.acting)):
             columns |= {f"{name}_{t}": values for t, values in enumerate(pulls.T, 1)}
+        if self.spools is not None:
+            columns |= {f"spool_{t}": reeled for t, reeled in enumerate(self.spools.T, 1)}
         for k in range(self.coordinates.shape[1] // 2):
             bends = self.coordinates[:, 2 * k : 2 * k + 2].T
             columns |= {f"bend_{k + 1}_{plane}": values for plane, values in zip(_PLANES, bends, strict=True)}
@@ -138,7 +143,7 @@ def column_meanings(names: list[str]) -> dict[str, tuple[str, str]]:
     for name in names:
         first, _, rest = name.partition("_")
         if name not in of:
-            of[name] = ("N", _OF_A_TENDON[first]) if rest.isdigit() else ("rad", "bend of one segment")
+            of[name] = _OF_A_TENDON[first] if rest.isdigit() else ("rad", "bend of one segment")
     return {name: of[name] for name in names}
 
 

@@ -74,7 +74,8 @@ def repeat(
         for lane, k in enumerate(k for k in now for _ in range(rows)):
             plant = plant_of(wrist, loops[k].plant)
             row = lane % rows
-            gathered[row].add(simulation(outcome, lane, motions[which[row]], plant, loop.plant.model, expected))
+            followed, wound = motions[which[row]], loop.actuator.level == "tendon"
+            gathered[row].add(simulation(outcome, lane, followed, plant, loop.plant.model, expected, wound))
     return [row_results.repeated(wrist) for row_results in gathered]
 
 
@@ -92,21 +93,34 @@ def _refuse_nan(law: Controller, outcome: Outcome, time: Array) -> None:
 
 
 def simulation(
-    outcome: Outcome, index: int, followed: Motion, plant: WristParameters, model: str, expected: float | None = None
+    outcome: Outcome,
+    index: int,
+    followed: Motion,
+    plant: WristParameters,
+    model: str,
+    expected: float | None = None,
+    wound: bool = False,
 ) -> Simulation:
     """The recorded rollout `index` with all its metrics; as `trajectory` has it."""
-    course = trajectory(outcome, index, followed, plant, model, expected)
+    course = trajectory(outcome, index, followed, plant, model, expected, wound)
     metrics = {name: float(values[index]) for name, values in outcome.metrics.items()}
     failed, until = bool(outcome.failed[index]), float(outcome.until[index])
     return Simulation(course, metrics | of_trajectory(course), failed, until)
 
 
 def trajectory(
-    outcome: Outcome, index: int, followed: Motion, plant: WristParameters, model: str, expected: float | None = None
+    outcome: Outcome,
+    index: int,
+    followed: Motion,
+    plant: WristParameters,
+    model: str,
+    expected: float | None = None,
+    wound: bool = False,
 ) -> Trajectory:
     """The recorded rollout `index` as a Trajectory; `plant` is the wrist as it is, of this plant model.
 
-    `expected` is the standard deviation of its observer's error by what that believes [rad], None without an observer.
+    `expected` is the standard deviation of its observer's error by what that believes [rad], None without an observer;
+    `wound` whether its tendons are on spools.
     """
     coordinates = outcome.coordinates(index)
     return Trajectory(
@@ -129,6 +143,7 @@ def trajectory(
         substeps=int(outcome.steps[index]),
         drift=float(outcome.drift[index]),
         outside=followed.outside,
+        spools=_sides(outcome, "delivered", index) if wound else None,
     )
 
 

@@ -21,10 +21,11 @@ from wristctl.wrist.tendon_mechanics import pulls_at_start, tendons_in_lanes
 from wristctl.wrist.tendons import TENDONS_PER_SIDE, torque_of
 
 # Columns of a recorded sample, followed by the plant's coordinates: tensions as commanded and as they act, the
-# angle that the law sees, and the load that its observer estimates. theta is nan where the lane has failed.
+# angle that the law sees, the load that its observer estimates, and what each side's motors deliver: pulls [N], or
+# lengths on spools [m]. theta is nan where the lane has failed.
 RECORDED = (
     "theta", "rate", "torque_wanted", "torque", "tension_plus", "tension_minus", "acting_plus", "acting_minus", "seen",
-    "load",
+    "load", "delivered_plus", "delivered_minus",
 )  # fmt: skip
 
 # Columns that are recorded where no more are asked for.
@@ -193,6 +194,8 @@ def _run_block(setup: Any, course: Any, world: Any, state: Any, scratch: Any, fi
                     row[7] = acting_minus / _SIDE
                     row[8] = estimate.theta
                     row[9] = estimate.load
+                    row[10] = delivered[0]
+                    row[11] = delivered[1]
                     for i in range(n):
                         row[_COLUMNS + i] = q[i]
             go_on(state.watch, drive, believed, now_tick, counted_plus, counted_minus, period)

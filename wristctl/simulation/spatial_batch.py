@@ -147,7 +147,7 @@ def spatial_batch(
         friction=FrictionRows(rows([np.array(row) for row in friction])) if rubbing else NoFriction(),
     )  # fmt: skip
     watch, frames = _watch(worlds, layout, streams, period, samples * ticks * period)
-    columns = len(SPATIAL_RECORDED) + 2 * places + 2 * n
+    columns = len(SPATIAL_RECORDED) + 3 * places + 2 * n
     state = SpatialState(
         coordinates=spread(np.zeros(4 * n), count),
         memory_y=spread(np.zeros(memory), count),

@@ -24,9 +24,9 @@ from wristctl.wrist.spatial.spatial_step import spatial_step
 from wristctl.wrist.spatial.spatial_tendons import moment_arms_of
 from wristctl.wrist.spatial.spooled_tendons import pulls_of_tendons, remember_travel
 
-# Columns of a recorded sample, followed by the commanded pull at each place of tendons [N], those that act, and the
-# plant's coordinates. The share is what of the wanted torque the tendons could give; the bend is nan where the wrist
-# has failed.
+# Columns of a recorded sample, followed by the commanded pull at each place of tendons [N], those that act, what each
+# motor delivers (pulls [N], or lengths on spools [m]), and the plant's coordinates. The share is what of the wanted
+# torque the tendons could give; the bend is nan where the wrist has failed.
 SPATIAL_RECORDED = (
     "bend_ulnar", "bend_flexion", "rate_ulnar", "rate_flexion", "torque_wanted_ulnar", "torque_wanted_flexion",
     "torque_ulnar", "torque_flexion", "share", "seen_ulnar", "seen_flexion", "load_ulnar", "load_flexion",
@@ -207,13 +207,14 @@ def run_spatial(setup: Any, course: Any, world: Any, states: Any, scratch: Any, 
                         torque_z = torque_z + pulls[t] * lever[1]
                         row[_COLUMNS + t] = pulls[t]
                         row[_COLUMNS + count + t] = acts[t]
+                        row[_COLUMNS + 2 * count + t] = delivered[t]
                     row[0] = where(alive[0] > 0.0, at[0], _NAN)
                     row[1] = where(alive[0] > 0.0, at[1], _NAN)
                     row[2], row[3], row[4], row[5] = at[2], at[3], wanted_y, wanted_z
                     row[6], row[7], row[8] = torque_y, torque_z, share
                     row[9], row[10], row[11], row[12] = seen[0], seen[3], seen[2], seen[5]
                     for i in range(m):
-                        row[_COLUMNS + 2 * count + i] = q[i]
+                        row[_COLUMNS + 3 * count + i] = q[i]
                 predict_bends(state.watch, known, now_tick, counts, bend, period)
                 for _ in range(setup.substeps):
                     for i in range(m):

@@ -35,6 +35,8 @@ COLUMNS: dict[str, tuple[str, str]] = {
     "tension_minus": ("N", "commanded tension of each tendon of the - side"),
     "acting_plus": ("N", "tension of the + side as it acts on the wrist: late and in steps behind real motors"),
     "acting_minus": ("N", "tension of the - side as it acts on the wrist"),
+    "spool_plus": ("m", "length that each spool of the + side has reeled in until the next control period"),
+    "spool_minus": ("m", "length that each spool of the - side has reeled in until the next control period"),
 }
 
 
@@ -76,6 +78,8 @@ class Trajectory:
     """Change of its numbers with the integration step [rad]; 0 where they have converged."""
     outside: float = 0.0
     """Share of the wanted tips outside the domain of the network behind the reference."""
+    spools: Array | None = None
+    """Length that each spool of the + and the - side has reeled in [m], (T, 2); None without spools."""
 
     @property
     def error(self) -> Array:
@@ -96,7 +100,7 @@ class Trajectory:
         return distance
 
     def columns(self) -> dict[str, Array]:
-        """Everything under the names of COLUMNS, (T,) each."""
+        """Everything under the names of COLUMNS, (T,) each; spools where there are any."""
         acting = self.tension if self.acting is None else self.acting
         columns = {
             "time": self.time,
@@ -118,6 +122,8 @@ class Trajectory:
             "acting_plus": acting[:, 0],
             "acting_minus": acting[:, 1],
         }
+        if self.spools is not None:
+            columns |= {"spool_plus": self.spools[:, 0], "spool_minus": self.spools[:, 1]}
         return columns | {f"theta_{k + 1}": column for k, column in enumerate(self.segment_theta.T)}
 
     def frame(self) -> pd.DataFrame:

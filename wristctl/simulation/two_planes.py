@@ -174,9 +174,10 @@ def rollout_bends(
                 share=rows[:, 8],
                 pulls=rows[:, first : first + places],
                 acting=rows[:, first + places : first + 2 * places],
-                coordinates=rows[:, first + 2 * places :],
+                coordinates=rows[:, first + 3 * places :],
                 length=world.plant.length,
                 length_known=world.wrist.length,
+                spools=rows[:, first + 2 * places : first + 3 * places] if loop.actuator.level == "tendon" else None,
             )
         )
     return courses

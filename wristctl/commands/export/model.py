@@ -22,13 +22,17 @@ def wrist_of(run: Run) -> tuple[WristParameters, str]:
     """The wrist that a run found, or else that its controller knew, and which it is, in words."""
     from wristctl.identification.unknowns import with_identified
 
-    source = run if run.kind == "identify" else None
-    for earlier in run.manifest.inputs:
-        source = input_run(run, earlier) if earlier.role == "from_identified" else source
+    source = run if run.kind == "identify" else identified_in(run)
     if source is None:
         return run.config.wrist, f"the wrist of run {run.id}"
     text = source.file("data/identified.yaml").read_text(encoding="utf-8")
     return with_identified(run.config, "simulate", text).wrist, f"the wrist that run {source.id} identified"
+
+
+def identified_in(run: Run) -> Run | None:
+    """The run that identified the wrist of a run; None where the study's own was taken."""
+    sources = [input_run(run, earlier) for earlier in run.manifest.inputs if earlier.role == "from_identified"]
+    return sources[-1] if sources else None
 
 
 def export_wrist(run: Run, program: str, file: Path | None, segments: int, direction: DirectionName) -> Path:

@@ -9,11 +9,17 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from wristctl.arrays import Array
+from wristctl.commands.export.model import identified_in
+from wristctl.commands.inputs_of_loops import IDENTIFIED
+from wristctl.config.loop import Loop
+from wristctl.config.study import Study
 from wristctl.errors import FILE, UserError
+from wristctl.identification.unknowns import with_identified
 from wristctl.records import Run
 from wristctl.records.formats import read_arrays, read_table
 from wristctl.records.open_log import OpenLog, write_log
-from wristctl.wrist.directions import ACTIVE, DIRECTIONS
+from wristctl.wrist.directions import ACTIVE, DIRECTIONS, tendons_of
+from wristctl.wrist.tendon_layout import TendonLayout
 from wristctl.wrist.tendons import TENDONS_PER_SIDE
 
 if TYPE_CHECKING:
@@ -96,6 +102,37 @@ def _merged(parts: list[tuple[Array, Columns]]) -> Columns:
     return {name: column[order] for name, column in merged.items()}
 
 
+def _simulated(run: Run) -> tuple[Columns, Mapping[str, np.ndarray]]:
+    """A simulated motion in one plane, with the spools of the four tendons where it has any."""
+    columns, _ = _motion("trajectory.csv")(run)
+    table, loop = read_table(run.file("data/trajectory.csv")), _study_of(run).simulate.loop
+    for tendon, side in zip(tendons_of("ulnar"), ("plus", "plus", "minus", "minus"), strict=True):
+        if f"spool_{side}" in table:
+            columns[f"spool_{tendon}"] = _between(table.time, table[f"spool_{side}"], loop.control_period)
+            columns |= {f"tension_{tendon}": table[f"acting_{side}"].to_numpy(float)} if _slides_freely(loop) else {}
+    return columns, {}
+
+
+def _between(time: pd.Series, reeled: pd.Series, period: float) -> Array:
+    """Stand of a spool at each time, from lengths that it keeps for a control period from then on."""
+    clock = time.to_numpy(float)
+    stands: Array = np.interp(clock, clock + 0.5 * period, reeled.to_numpy(float))
+    return stands
+
+
+def _study_of(run: Run) -> Study:
+    """The study of a simulate run, with the wrist, motors and sensor that were identified where they were."""
+    source = identified_in(run)
+    if source is None:
+        return run.config
+    return with_identified(run.config, "simulate", source.file(IDENTIFIED).read_text(encoding="utf-8"))
+
+
+def _slides_freely(loop: Loop) -> bool:
+    """Whether a tendon pulls as much at its spool as at the wrist."""
+    return loop.actuator.level != "tendon" or not loop.plant.actuator.of(loop.actuator).friction
+
+
 def _motion(file: str) -> Callable[[Run], tuple[Columns, Mapping[str, np.ndarray]]]:
     def columns(run: Run) -> tuple[Columns, Mapping[str, np.ndarray]]:
         table = read_table(run.file(f"data/{file}"))
@@ -105,10 +142,23 @@ def _motion(file: str) -> Callable[[Run], tuple[Columns, Mapping[str, np.ndarray
 
 
 def _bends(run: Run) -> tuple[Columns, Mapping[str, np.ndarray]]:
-    """A motion in two planes with the pulls of all tendons that act on the wrist."""
-    table = read_table(run.file("data/bends.csv"))
-    names = _BENDS | {f"acting_{t}": f"tension_{t}" for t in range(1, len(table.columns)) if f"acting_{t}" in table}
-    return {name: table[old].to_numpy(float) for old, name in names.items()}, {}
+    """A motion in two planes with the spools of all tendons, and with their pulls where these are the spools' too.
+
+    Tendons of the square wrist have the numbers 1, 2, 4 and 5, others those of `wrist.tendons`.
+    """
+    table, study = read_table(run.file("data/bends.csv")), _study_of(run)
+    wrist, loop = study.wrist, study.simulate.loop
+    columns = {name: table[old].to_numpy(float) for old, name in _BENDS.items()}
+    places = TendonLayout.of(wrist).places
+    square = ACTIVE if wrist.tendons == "four" else range(1, len(places) + 1)
+    for column, (number, place) in enumerate(zip(square, places, strict=True), 1):
+        if place.radius == 0.0:
+            continue
+        if f"spool_{column}" in table:
+            columns[f"spool_{number}"] = _between(table.time, table[f"spool_{column}"], loop.control_period)
+        if _slides_freely(loop):
+            columns[f"tension_{number}"] = table[f"acting_{column}"].to_numpy(float) / place.multiplicity
+    return columns, {}
 
 
 def _compared(run: Run) -> tuple[Columns, Mapping[str, np.ndarray]]:
@@ -136,7 +186,7 @@ def _loops(run: Run) -> tuple[Columns, Mapping[str, np.ndarray]]:
 
 _CONVERTED: Mapping[str, Callable[[Run], tuple[Columns, Mapping[str, np.ndarray]]]] = {
     "log.csv": _trials,
-    "trajectory.csv": _motion("trajectory.csv"),
+    "trajectory.csv": _simulated,
     "bends.csv": _bends,
     "track.csv": _motion("track.csv"),
     "trajectories.npz": _compared,

@@ -143,6 +143,28 @@ def _told_table(told: Mapping[str, Told]) -> Table:
     return Table("What the readings tell", ("parameter", "value", "95 %", "unit", "meaning"), rows)
 
 
+def what_tells(fit: Fit, lacking: Sequence[str]) -> str:
+    """What of it the logs have not, and would tell the parameters that are lacking; empty where nothing is known."""
+    from wristctl.identification.bend_trials import PLANES, BendTrial
+
+    trials = [trial for trial in fit.problem.trials if isinstance(trial, BendTrial)]
+    springs = any(name.startswith("stiffness") for name in lacking)
+    forces = springs or any(name in ("damping", "tendon_stiffness") for name in lacking)
+    parts = []
+    if forces and len({trial.wrist.hand_mass for trial in trials}) == 1:
+        parts.append("trials with another mass [kg]")
+    if springs:
+        parts.append("tendons that go slack")
+    if (forces or any("friction" in name for name in lacking)) and not any(
+        (trial.channel >= len(PLANES)).any() for trial in trials
+    ):
+        parts.append("tensions")
+    if any(name in ("delay", "damping") for name in lacking):
+        parts.append("quicker moves")
+    listed = joined(parts)
+    return f"{listed[0].upper()}{listed[1:]} tell more (docs/identify.md)." if parts else ""
+
+
 def _answer(fit: Fit, told: Mapping[str, Told], run: str) -> Answer:
     along, across, axis = (told[name] for name in ("stiffness", "stiffness_across", "stiffness_axis_deg"))
     if along.known and across.known:
@@ -154,9 +176,7 @@ def _answer(fit: Fit, told: Mapping[str, Told], run: str) -> Answer:
     left = f"{degrees(float(fit.noise))} deg are left over of {readings} readings (standard deviation)."
     notes = list[str | Table]()
     if lacking := [name for name, one in told.items() if not one.known]:
-        notes.append(
-            f"Not told: {joined(lacking)}. Several masses, slack tendons and tensions tell more (docs/identify.md)."
-        )
+        notes.append(f"Not told: {joined(lacking)}. {what_tells(fit, lacking)}".strip())
     if run:
         notes += [
             "Next, bend the wrist that was found, or compare controllers on those that the readings leave possible:",

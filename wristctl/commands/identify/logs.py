@@ -37,11 +37,13 @@ class LogTold(StudyResult):
     """The chosen model, fitted to all trials."""
     models: list[TriedModel]
     chosen: TriedModel
+    sides: str = ""
+    """Which tendons were taken to pull to which side, where the motion says it."""
 
     @property
     def answer(self) -> Answer:
         """Parameters with intervals or not told, the terms that the data want, and what would tell more."""
-        return told_answer(self.fit, self.models, self.chosen)
+        return told_answer(self.fit, self.models, self.chosen, self.sides)
 
     def frame(self) -> pd.DataFrame:
         """One row per parameter: value and ends of its interval, nan where the data do not tell it, and unit."""
@@ -54,21 +56,30 @@ class LogTold(StudyResult):
         return pd.DataFrame(rows, columns=["parameter", "value", "low", "high", "unit", "meaning"])
 
 
-def _read(study: Study) -> tuple[ArcRobot, list[ArcRecording]]:
-    from wristctl.identification.log_model import recordings_of_logs, robot_of_log
+def _read(study: Study) -> tuple[ArcRobot, list[ArcRecording], str]:
+    """The robot, its recordings, and in words which tendons pull to which side where the motion says it."""
+    from wristctl.identification.log_model import recordings_of_logs, robot_of_logs, spools_of_log
     from wristctl.records.log_converters import read_log
 
     settings = study.identify
     logs = [read_log(Path(file), settings.columns or "", "log") for file in settings.logs]
-    robot = robot_of_log(logs[0], study.wrist, settings.radius_error)
-    return robot, recordings_of_logs(logs, robot)
+    robot = robot_of_logs(logs, study.wrist, settings.radius_error)
+    sides = _sides(robot, spools_of_log(logs[0])) if len(robot.angles) > 2 and "turn" not in robot.base else ""
+    return robot, recordings_of_logs(logs, robot), sides
+
+
+def _sides(robot: ArcRobot, numbers: Sequence[int]) -> str:
+    first = robot.angles[0]
+    sides = [[str(k) for k, angle in zip(numbers, robot.angles, strict=True) if (angle == first) == one]
+             for one in (True, False)]  # fmt: skip
+    return f"Tendons {joined(sides[0])} pull to one side and {joined(sides[1])} to the other, as the motion says."
 
 
 def log_plan(study: Study, inputs: Inputs) -> str:
     """Say what is looked for in which logs."""
     if inputs.runs():
         raise UserError("runs and logs at once", "identify.runs", "identify one or the other")
-    robot, recordings = _read(study)
+    robot, recordings, _ = _read(study)
     samples = sum(len(recording.time) for recording in recordings)
     names = ", ".join(robot.unknowns(()))
     return f"{names}, then slack, friction and creep, from {len(recordings)} trials of open logs, {samples} samples"
@@ -84,7 +95,7 @@ def identify_logs(session: Session) -> LogTold:
     from wristctl.identification.real_robots import RealRobot
 
     findings, study = session.findings, session.study
-    robot, recordings = _read(study)
+    robot, recordings, sides = _read(study)
     models = list["TriedModel"]()
     with session.progress("fitting models") as report:
         for model in tried_models(robot, [recordings], False):
@@ -106,7 +117,9 @@ def identify_logs(session: Session) -> LogTold:
         findings.figure("left-over", left_over, about, chosen.fits, caption="what is left of the motion")
         findings.figure("models", errors_of_models, about, models, caption="error of each model")
     findings.overview.figure = "motion"
-    result = LogTold(study, findings, [_models_table(models, robot), parameters_table([fit], "")], fit, models, chosen)
+    result = LogTold(
+        study, findings, [_models_table(models, robot), parameters_table([fit], "")], fit, models, chosen, sides
+    )
     findings.table("data/parameters.csv", result.frame())
     _refuse(session, result, recordings)
     return result
@@ -129,11 +142,14 @@ def _refuse(session: Session, result: LogTold, recordings: Sequence[ArcRecording
         f"the model misses {scale * score.error:.3g} {unit} of a motion of {scale * moved:.3g} {unit} that it was to "
         "predict: nothing of it is to be relied on"
     )
-    accept = ("check senses of spools and bend; or take it as it is: ", Setting("misfit=tell", "identify"))
+    accept = (
+        "check senses of spools and bend, and wrist.tendon_radius; or take it as it is: ",
+        Setting("misfit=tell", "identify"),
+    )
     raise UserError(problem, recordings[0].name, accept, exit_code=3)
 
 
-def told_answer(fit: ArcFit, models: Sequence[TriedModel], chosen: TriedModel) -> Answer:
+def told_answer(fit: ArcFit, models: Sequence[TriedModel], chosen: TriedModel, sides: str = "") -> Answer:
     """Parameters with intervals or not told, the terms that the data want, and what would tell more."""
     from wristctl.commands.validate.answer import parameters_table, wanted_terms
 
@@ -144,9 +160,12 @@ def told_answer(fit: ArcFit, models: Sequence[TriedModel], chosen: TriedModel) -
         f"These data tell {joined(told) or 'nothing of the parameters'}. Of the part that was not fitted the model "
         f"predicts the {fit.robot.measured} to {error} {unit} RMS (95 % {low} to {high})."
     )
-    notes: list[str | Table] = [wanted_terms(models)]
-    if "force" not in fit.values and "softening" not in fit.values:
-        notes.append("Stiffness in N m/rad is not told: it needs tension_1 [N], ..., or trials with several masses.")
+    notes: list[str | Table] = [wanted_terms(models), *([sides] if sides else [])]
+    if "force" not in fit.values:
+        more = (
+            "" if "softening" in fit.values else "; trials with several masses tell how much a load softens the wrist"
+        )
+        notes.append(f"Stiffness in N m/rad is not told: it needs tension_1 [N], ... of all tendons{more}.")
     return Answer(
         sentence,
         parameters_table([fit], "").within(COLUMNS),

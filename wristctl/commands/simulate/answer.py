@@ -30,23 +30,25 @@ _FIGURES = (
 _OVERSHOOT = 0.5
 
 
-def answer(study: Study, repeated: Repeated, reason: str = "", advice: Sequence[str] = ()) -> Answer:
+def answer(study: Study, repeated: Repeated, reason: str = "", advice: Sequence[str] = (), wrist: str = "") -> Answer:
     """The answer of a loop that was simulated once or several times.
 
     Parameters
     ----------
     study
-        Study with the loop.
+        Study with the loop as it was simulated.
     repeated
         Its repetitions.
     reason
         Reason why it does not arrive; empty where it does.
     advice
         Paragraphs and commands on what to do about a loop that is no good.
+    wrist
+        The wrist in words; empty: by its parameters.
     """
     chosen, count = study.simulate, len(repeated.failed)
     scenario = (
-        f"{motion_words(chosen.reference, chosen.direction)} on {wrist_words(study.wrist)} "
+        f"{motion_words(chosen.reference, chosen.direction)} on {wrist or wrist_words(study.wrist)} "
         f"({loop_words(chosen.loop, study.wrist)})"
     )
     sentence = outcome(study, scenario, repeated, "" if repeated.first.failed else joined(_told(repeated)), reason)

@@ -19,6 +19,8 @@ from wristctl.commands.inputs_of_loops import (
     inverses_of,
     network_for,
     tuned_gains,
+    with_option,
+    wrist_identified,
 )
 from wristctl.commands.loop_warnings import (
     OutOfReach,
@@ -58,7 +60,7 @@ class Simulated(SimulatedLoop):
         """The scenario and how it ends, in a few lines; why a loop does not arrive, and what may help."""
         from wristctl.commands.simulate.answer import answer
 
-        return answer(self.study, self.repeated, self.short_of, self.advice)
+        return answer(self.simulated or self.study, self.repeated, self.short_of, self.advice, self.wrist)
 
     @property
     def trajectory(self) -> Trajectory:
@@ -165,7 +167,8 @@ def simulate(session: Session) -> Simulated:
             later("sliding", sliding, course, law.surface, gains, caption=caption)
         later("motion", stroboscope, course, wrist, plant=settings.loop.plant.model)
     short_of, advice = ("", []) if failed or repeated.arrives else _short_of(session, study, repeated, network, beyond)
-    return Simulated(session.study, findings, tables, repeated, short_of, advice)
+    words = wrist_identified(session.inputs)
+    return Simulated(session.study, findings, tables, repeated, short_of, advice, study, words)
 
 
 def _short_of(
@@ -193,7 +196,8 @@ def _short_of(
                 arriving.append(preset)
     if arriving:
         return short, [f"On the same loop these gains arrive: --gains {' or --gains '.join(arriving)}."]
-    tune = shlex.join(["wristctl", "tune", *session.typed, "--set", f"tune.controllers=[{chosen.controller}]"])
+    words = [*session.typed, *with_option(session.study.simulate.from_identified)]
+    tune = shlex.join(["wristctl", "tune", *words, "--set", f"tune.controllers=[{chosen.controller}]"])
     return short, [f"No preset of {chosen.controller} arrives here. Search its gains:", f"$ {tune}"]
 
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from wristctl.commands.answer import Answer
-from wristctl.commands.inputs_of_loops import identified, tuned_gains
+from wristctl.commands.inputs_of_loops import identified, tuned_gains, wrist_identified
 from wristctl.commands.loop_warnings import warn_if_coarse, warn_outside_conditions
 from wristctl.commands.printed_table import degrees, joined, two
 from wristctl.commands.session import Session
@@ -53,7 +53,7 @@ class SimulatedBends(SimulatedLoop):
     @property
     def answer(self) -> Answer:
         """The scenario and how it ends, errors by plane and as one norm."""
-        return _answer(self.study, self.repeated, self.short_of, self.advice)
+        return _answer(self.simulated or self.study, self.repeated, self.short_of, self.advice, self.wrist)
 
     @property
     def course(self) -> BendCourse:
@@ -124,7 +124,8 @@ def simulate_in_two_planes(session: Session) -> SimulatedBends:
         caption = "The wrist in space where it is bent most, and the path of its tip, wanted and reached"
         findings.figure("space", motion_in_space, course, plant_of(wrist, settings.loop.plant), world, caption=caption)
     short_of, advice = ("", []) if repeated.failure or repeated.arrives else _short_of(study, repeated)
-    return SimulatedBends(session.study, findings, tables, repeated, short_of, advice)
+    words = wrist_identified(session.inputs)
+    return SimulatedBends(session.study, findings, tables, repeated, short_of, advice, study, words)
 
 
 def _short_of(study: Study, repeated: RepeatedBends) -> tuple[str, list[str]]:
@@ -146,10 +147,10 @@ def _short_of(study: Study, repeated: RepeatedBends) -> tuple[str, list[str]]:
     return f"does not {what}: {off:.2g} deg off at the end", ["Other gains or another controller may hold it."]
 
 
-def _answer(study: Study, repeated: RepeatedBends, reason: str, advice: Sequence[str]) -> Answer:
+def _answer(study: Study, repeated: RepeatedBends, reason: str, advice: Sequence[str], wrist: str) -> Answer:
     chosen, places = study.simulate, len(repeated.layout.places)
     scenario = (
-        f"{motion_words(chosen.reference, chosen.direction)} on {wrist_words(study.wrist)} in two planes "
+        f"{motion_words(chosen.reference, chosen.direction)} on {wrist or wrist_words(study.wrist)} in two planes "
         f"({places} tendons, {loop_words(chosen.loop, study.wrist)})"
     )
     values = {name: figure_of(repeated, name) for name, *_ in _FIGURES}

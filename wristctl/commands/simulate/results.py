@@ -11,6 +11,7 @@ from wristctl.commands.results import Findings, StudyResult
 from wristctl.errors import UserError
 
 if TYPE_CHECKING:
+    from wristctl.config.study import Study
     from wristctl.simulation.repetitions import Repetitions
 
 
@@ -26,6 +27,10 @@ class SimulatedLoop(StudyResult):
     """Reason why the loop does not arrive at its reference; empty where it does."""
     advice: Sequence[str] = ()
     """What may help where it does not: sentences, and a command after `$ `."""
+    simulated: Study | None = None
+    """Study with the identified wrist, motors and sensor in it; None: `study`."""
+    wrist: str = ""
+    """The wrist in words, where it was identified."""
 
     @property
     def failed(self) -> bool:

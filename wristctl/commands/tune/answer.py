@@ -76,10 +76,12 @@ def answer_of(
     cases: int,
     run: str,
     elsewhere: Mapping[str, Mapping[str, Mapping[str, int]]],
+    wrist: Sequence[str] = (),
 ) -> Answer | None:
     """The answer of a search on so many `cases`; None where nothing was searched. `run` is its path, if it has one.
 
-    `elsewhere` has the marks of the gains on other loops, by controller and loop.
+    `elsewhere` has the marks of the gains on other loops, by controller and loop; `wrist` the words of a command that
+    takes the wrist on which they were found.
     """
     if not searches:
         return None
@@ -89,6 +91,7 @@ def answer_of(
     notes += _elsewhere(ordered, elsewhere)
     if run:
         words = ["wristctl", "simulate", f"{run}/config.yaml", "--controller", best, "--gains", "tuned", "--tuned", run]
+        words += wrist
         notes += ["Next, one motion with these gains:", f"$ {shlex.join(words)}"]
     more = f"All tables: --all. The gains: {run}/data/gains.json" if run else "All tables: `.tables`."
     whole = Answer(_sentence(best, searches[best], errors[best], cases), _table(ordered, searches, errors), notes, more)

@@ -17,6 +17,7 @@ from wristctl.commands.inputs_of_loops import (
     inverses_of,
     judged_loops,
     network_for,
+    with_option,
 )
 from wristctl.commands.loop_warnings import (
     asked_by,
@@ -70,7 +71,8 @@ class Tuned(StudyResult):
     @property
     def answer(self) -> Answer | None:
         """Best gains, their error beside feedforward, and what they do wrong."""
-        return answer_of(self.searches, self.errors, self.lost, self.cases, self.place, self.elsewhere)
+        wrist = with_option(self.study.tune.from_identified)
+        return answer_of(self.searches, self.errors, self.lost, self.cases, self.place, self.elsewhere, wrist)
 
     @property
     def marks(self) -> list[str]:

@@ -75,9 +75,12 @@ _MODELS = {
 
 
 def listed() -> list[str]:
-    """Each data set, where it is, its licence, and how many of its files have a hash here."""
-    rows = [(name, one.place, one.licence, one.columns, len(one.hashes)) for name, one in DATA_SETS.items()]
-    return Table("", ("robot", "where", "licence", "--columns", "hashes"), rows).text(100).split("\n")
+    """Each data set, where it is, its licence, how many of its files have a hash here, and what reads it."""
+    rows = [
+        (name, one.place, one.licence, one.columns, len(one.hashes), "validate" if name in ROBOTS else "identify")
+        for name, one in DATA_SETS.items()
+    ]
+    return Table("", ("robot", "where", "licence", "--columns", "hashes", "read by"), rows).text(100).split("\n")
 
 
 def with_recordings(study: Study) -> Study:
