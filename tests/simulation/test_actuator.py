@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
@@ -43,12 +44,12 @@ def _drive(drive: Any, state: Any, model: Any, commands: Any, out: Any, h: float
         result[2] = motors[WITHHELD]
 
 
-def delivered(drive: Drive, commands: np.ndarray) -> np.ndarray:
+def delivered(drive: Drive, commands: np.ndarray, period: float = PERIOD) -> np.ndarray:
     """What both sides deliver to commands (T, 3 or 4), pulls [N], a reference angle and its rate, else 0; and the
     withheld torque; (T, 3)."""
     out, aimed = np.zeros((len(commands), 3)), np.zeros((len(commands), 4))
     aimed[:, : commands.shape[1]] = commands
-    _drive(drive, at_rest(drive, WRIST, PCC, np.zeros(1)), segments(WRIST, 1), aimed, out, PERIOD)
+    _drive(drive, at_rest(drive, WRIST, PCC, np.zeros(1)), segments(WRIST, 1), aimed, out, period)
     return out
 
 
@@ -136,7 +137,21 @@ def test_spools_told_a_rate_move_with_the_reference_and_else_lag_by_braking(
     speed = abs(np.diff(wanted) / PERIOD).max()
     lag = way * (wanted - late[400:, 0])
     assert lag == pytest.approx(speed**2 / (2.0 * motor.acceleration), abs=2.0 * motor.step)
-    assert told[400:, 0] == pytest.approx(wanted + way * speed * PERIOD, abs=1.1 * motor.step)
+    assert told[400:, 0] == pytest.approx(wanted + 0.5 * way * speed * PERIOD, abs=1.1 * motor.step)
+
+
+def test_what_acts_over_a_coarse_period_is_the_spool_in_its_middle() -> None:
+    """It turns evenly, as at a step rate: it is not at the period's end from its beginning."""
+    drive, period = driven(Actuator(level="tendon")), 0.01
+    time, still = period * np.arange(60.0), np.full(60, 4.0)
+    angle, rate = 0.2 * (1.0 - np.cos(3.0 * time)), 0.6 * np.sin(3.0 * time)
+    length = delivered(drive, np.stack([still, still, angle, rate], axis=1), period)[:, 0]
+    middle, end = (
+        [_plus_length(0.2 * (1.0 - math.cos(3.0 * (begin + share * period)))) for begin in time] for share in (0.5, 1.0)
+    )
+    reeled = length - 4.0 / drive.motor.stiffness
+    assert np.abs(reeled - (WRIST.length - np.array(middle)))[5:].max() < 2.0 * drive.motor.step
+    assert np.abs(reeled - (WRIST.length - np.array(end)))[5:].max() > 3.0 * drive.motor.step
 
 
 def test_a_lagged_motor_withholds_what_its_speed_does() -> None:

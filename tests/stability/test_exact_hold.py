@@ -65,11 +65,12 @@ def _open_loop(n: int, period: float, theta: float, gains: dict[str, float], lev
     by_torque = _slope(lambda value: _pulls(value, theta), torque)
     by_angle = np.outer(_slope(lambda value: _pulls(torque, value), theta), angle)
     share = period / (actuator.lag + period) if level == "lagged" else 1.0
+    acts = 0.5 if level == "tendon" else share  # a spool is held in the middle of its way
     x = 2 * n
     whole, into = np.zeros((x + 3, x + 3)), np.zeros(x + 3)
-    whole[:x, :x], into[:x] = phi + share * gamma @ by_angle, share * gamma @ by_torque  # pulls that act at once
+    whole[:x, :x], into[:x] = phi + acts * gamma @ by_angle, acts * gamma @ by_torque  # pulls that act at once
     whole[x : x + 2, :x], into[x : x + 2] = share * by_angle, share * by_torque
-    whole[:x, x : x + 2], whole[x : x + 2, x : x + 2] = (1.0 - share) * gamma, (1.0 - share) * np.eye(2)
+    whole[:x, x : x + 2], whole[x : x + 2, x : x + 2] = (1.0 - acts) * gamma, (1.0 - share) * np.eye(2)
     whole[-1, :x], whole[-1, -1] = period * angle, 1.0
     back = np.concatenate([(gains["Kp"] + period * gains["Ki"]) * angle + gains["Kd"] * rate, [0.0, 0.0, gains["Ki"]]])
     return whole, into, back

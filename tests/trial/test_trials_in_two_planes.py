@@ -16,8 +16,9 @@ from wristctl.config.choices import IN_TWO_PLANES
 from wristctl.errors import UserError
 from wristctl.simulation.bend_course import BEND_METRICS
 from wristctl.simulation.reference import REFERENCES
+from wristctl.study_files.load import load_study
 from wristctl.trial.bend_motion import BendMotion
-from wristctl.trial.bend_results import bends_evaluated, logged_course
+from wristctl.trial.bend_results import bend_twin, bends_evaluated, logged_course
 from wristctl.trial.homing import Zero
 from wristctl.trial.residuals import Limit, limits_of
 from wristctl.trial.run_limits import Logged, stop_of
@@ -48,6 +49,32 @@ def test_the_true_wrist_goes_round_within_half_a_degree_in_both_planes(round_tri
     assert (rmse(true_errors(round_trip)) < 0.4).all()
     log = round_trip.table("log")
     assert np.degrees(log[[f"bend_{p}" for p in PLANES]].abs().max()).min() > 10.0, "in both planes"
+
+
+def test_a_fast_trial_and_its_simulation_agree(tmp_path: Path) -> None:
+    """Spools of both move with the reference, neither ahead of it: 120 deg/s at most, ticks of 10 ms."""
+    thrown: dict[str, Any] = {
+        "reference": {"kind": "dart-thrower", "angle_deg": 30.0, "turn": 1.5}, "horizon": 1.8,
+        "rows": ({"controller": "smc-tracking", "gains": "hardware"},),
+    }  # fmt: skip
+    done, settings = performed(tmp_path, **thrown), circling(**thrown)
+    assert done.error is None
+    study, followed = load_study([]).model_copy(update={"hw_run": settings}), motion_of(settings, WRIST, "dart-thrower")
+    assert isinstance(followed, BendMotion)
+    twin = bend_twin(study, Trial(0, "dart-thrower", 0, 0.0, 0), followed, None)
+    simulated, true = np.degrees(twin.error), true_errors(done)
+    assert rmse(simulated) == pytest.approx(rmse(true), rel=0.15)
+    ahead = [lead(errors, followed) for errors in (simulated, true)]
+    assert np.abs(ahead[0] - ahead[1]).max() < 1.5e-3
+
+
+def lead(errors: np.ndarray, followed: BendMotion) -> np.ndarray:
+    """Time (2,) [s] by which each plane's bend is ahead of its reference, of errors (T, 2) [deg]."""
+    times = []
+    for plane, (bend, rate, _) in enumerate(np.degrees(followed.references)):
+        terms = np.stack([rate, bend], axis=1)  # a wrong gain is no lead
+        times.append(np.linalg.lstsq(terms, errors[:, plane])[0][0])
+    return np.array(times)
 
 
 def test_every_frame_is_logged_with_its_camera_and_fused_where_it_was_taken(round_trip: Done) -> None:

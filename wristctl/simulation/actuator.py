@@ -4,6 +4,7 @@ lagged: T' = (command - T)/lag, no faster than the motor can stretch the tendon,
 tendon: a stepper reels tendon in; what its elastic tendons then pull is `wristctl.wrist.tendon_mechanics`'s.
 The spool's target is command/k + the shortening at theta_ref: at the measured angle, delayed, it would feed back
 positively with a gain near 1. A spool moves at the speed of the reference's shortening, and closes its gap on top.
+It turns evenly over a control period; what is held over the period is where it is in the middle.
 
 A host sends steps and believes what they are: it counts in lengths and pulls of its own belief, and what the motors
 deliver for that count is the world's (`Winding`).
@@ -183,8 +184,11 @@ def left_behind(acceleration: Any, gap: Any, closing: Any, h: float) -> Any:
 
 @compiled
 def reel_in(motor: Any, state: Any, side: int, target: Any, moving: Any, h: float) -> Any:
-    """Move a stepper towards its moving target with bounded speed and acceleration; returns whole microsteps, and its
-    withheld pull: of the length from where it can stop to its target, where that is more than a microstep."""
+    """Move a stepper towards its moving target with bounded speed and acceleration, evenly over a period.
+
+    Returns the length on its spool in the middle of the period, in whole microsteps, and its withheld pull: of the
+    length from where it can stop to its target, where that is more than a microstep.
+    """
     gap = target - state[side]
     speed = spool_speed(motor.speed, motor.acceleration, gap, moving, state[side + 1], h)
     closing = speed - moving
@@ -192,7 +196,8 @@ def reel_in(motor: Any, state: Any, side: int, target: Any, moving: Any, h: floa
     state[side] = state[side] + h * speed
     behind = left_behind(motor.acceleration, gap, closing, h)
     withheld = where(abs(behind) > motor.step + _ROUNDING, motor.stiffness * behind, 0.0)
-    return motor.step * floor(state[side] / motor.step + 0.5), withheld
+    middle = state[side] - rounded(0.5 * rounded(h * speed))
+    return motor.step * floor(middle / motor.step + 0.5), withheld
 
 
 @compiled
@@ -211,7 +216,7 @@ class Aim(NamedTuple):
 
 @by_type
 def actuate(drive: Any, state: Any, believed: Any, aim: Any, plus: Any, minus: Any, h: float) -> Any:
-    """Host's counts of both sides a period after commanded pulls [N]: pulls, or lengths on spools [m].
+    """Host's counts of both sides over a period of commanded pulls [N]: pulls, or lengths on spools in its middle [m].
 
     `believed` is the controller's wrist as Segments; at a rate of 0 in `aim` spools only close their gap. The state's
     last value becomes the torque [N m] that the motors withhold, by this belief: what of the command their speed and

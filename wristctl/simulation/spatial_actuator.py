@@ -70,7 +70,7 @@ def motor_at(motor: Any, alike: Any) -> Any:
 
 @by_type
 def drive_tendons(drive: Any, motors: Any, known: Any, aim: Any, pulls: Any, h: float, counts: Any) -> None:
-    """Host's counts a period after commanded pulls [N], into `counts`: pulls, or lengths on spools [m].
+    """Host's counts over a period of commanded pulls [N], into `counts`: pulls, or lengths on spools in its middle [m].
 
     `known` is Knowledge, `aim` of two rows each. The last two rows of `motors` become the torque that
     the motors withhold in each plane [N m], as in one plane.
