@@ -9,6 +9,8 @@ from typing import Any
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from tests.trial.conftest import WRIST, settings_of
 from tests.trial.rig import Marker, RigBoard
@@ -256,6 +258,70 @@ def test_what_a_slackened_wrist_moves_away_from_is_named_and_what_it_moves_to(pl
         assert f"axis {axis} (tendon {tendon}) turns the wrong way" in stopped.value.what
     expected.judge_slackened(Bend(0.004, 0.003))
     expected.judge_slackened(Bend(-0.005, math.nan))
+
+
+class StaysBent(Wrist):
+    """Tendons do not stretch; let go, the wrist stays where it is, up to `stays` [rad] from straight."""
+
+    stays, bend, slack = math.radians(2.0), 0.0, SLACK + 60
+
+    def angle(self) -> float:
+        """By the play operator: friction holds within `stays`, tendons pull beyond."""
+        reach = (self.signs * (self.board.position - START) - self.slack) * self.gain
+        self.bend = float(np.clip(self.bend, -self.stays, self.stays))
+        low, high = reach[self.sides > 0.0].max(), -reach[self.sides < 0.0].max()
+        self.bend = float(np.clip(self.bend, low, high))
+        self.bends.append(self.bend)
+        return GLUED + self.bend
+
+
+@settings(max_examples=30, deadline=None)
+@given(
+    stays=st.floats(0.0, 2.0), first=st.floats(-1.0, 1.0), plane=st.sampled_from(["ulnar", "flexion"]),
+    signs=st.sampled_from([(1, 1, 1, 1), (-1, 1, 1, -1)]),
+)  # fmt: skip
+def test_a_wrist_that_stays_bent_by_its_own_friction_is_homed(
+    stays: float, first: float, plane: str, signs: tuple[int, ...]
+) -> None:
+    """Zero lies where the wrist may rest, and there every tendon is just taut; it stands askew at first too."""
+    wrist = StaysBent(signs, plane, stays=math.radians(stays), bend=math.radians(first * stays))
+    zero = wrist.homed(slack=5e-3)
+    assert zero.signs == signs
+    askew = zero.marker - GLUED
+    assert abs(askew) <= math.radians(stays) + 1e-9
+    assert zero.slack == pytest.approx((wrist.slack + wrist.sides * askew / wrist.gain) * SPOOLS.step, abs=SPOOLS.step)
+    assert zero.steps_per_radian == pytest.approx(PER_RADIAN, rel=0.02)
+
+
+@settings(max_examples=20, deadline=None)
+@given(stays=st.floats(0.0, 1.0), first=st.floats(-1.0, 1.0), plane=st.sampled_from(["ulnar", "flexion"]))
+def test_a_wrist_that_stays_bent_passes_its_checks_and_a_dead_motor_does_not(
+    stays: float, first: float, plane: str
+) -> None:
+    """Whichever way it was bent at first."""
+    wrist = StaysBent(plane=plane, stays=math.radians(stays), bend=math.radians(first * stays), board=Slackened())
+    rig, at = settings_of(homing={"frames": 1, "rest": 0.0}), np.array(START)
+    board: Any = wrist.board
+    held = wrist.angle
+
+    def angle(dead: int | None = None) -> float:
+        moved = np.array(board.position, float)
+        if dead is not None:
+            moved[dead] = -200.0
+        board.position, there = moved + at + wrist.slack, board.position
+        bend = held()
+        board.position = there
+        return bend
+
+    slack = round(Homing().pull / SPOOLS.step)
+    board.position[:] = -slack
+    zero = Zero((1,) * 4, tuple(PER_RADIAN), GLUED, (0.0,) * 4)
+    straight = check_zero(board, Marker(board, angle), rig, WRIST, plane, zero)  # type: ignore[arg-type]
+    assert straight == pytest.approx((GLUED,), abs=math.radians(0.05))
+    for dead in range(4):
+        board.position[:] = -slack
+        with pytest.raises(SafetyStop, match=rf"axis {dead} .* bends the wrist by"):
+            check_zero(board, Marker(board, lambda dead=dead: angle(dead)), rig, WRIST, plane, zero)  # type: ignore
 
 
 @pytest.mark.parametrize(("share", "refused"), [(0.83, True), (0.87, False), (1.3, False), (1.45, True)])

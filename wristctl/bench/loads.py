@@ -91,6 +91,7 @@ class PlanarLoad:
         hanging = Hanging(
             self._model, self._values, self._settings.actuator.tendon_stiffness, self._nonideal, self._tendons,
             self._inner, stepper, self._sides, self._across,
+            (self._drawn.inner_friction, 1.0 / np.radians(self._drawn.inner_presliding_deg)),
         )  # fmt: skip
         heard: int = self._follow(
             hanging, spools, self._state, disturbed, edges, first, begun, out, (0,) * self.coordinates

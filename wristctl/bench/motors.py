@@ -15,10 +15,10 @@ from wristctl.board.emulator.chip import FREQUENCY
 from wristctl.board.messages import AXES
 from wristctl.config.bench import BenchSettings
 from wristctl.lanes.compiled import compiled
-from wristctl.lanes.lane import zero_like
+from wristctl.lanes.lane import where, zero_like
 from wristctl.lanes.rows import part, rows_of
 from wristctl.simulation.nonideal import electrical_turn, tendon_after_slip
-from wristctl.wrist.dahl import inner_in_lanes
+from wristctl.wrist.dahl import bristle, bristle_slope, inner_in_lanes
 from wristctl.wrist.plant import advance_or_stop, disturbed, parameters_of, travel
 from wristctl.wrist.tendon_mechanics import RealTendons, read_nonideal, spool_pull
 
@@ -66,7 +66,7 @@ class SpoolState(NamedTuple):
     latch: Any
     reeled: Any
     pull: Any
-    bent: Any  # (2,) across the plane, away from the camera [rad], and its rate [rad/s]
+    bent: Any  # (3,) across the plane, away from the camera [rad], its rate [rad/s], and the bristle of friction there
 
 
 def spool_state_of(settings: BenchSettings) -> SpoolState:
@@ -84,7 +84,7 @@ def spool_state_of(settings: BenchSettings) -> SpoolState:
         latch=np.zeros(1, np.int64),
         reeled=-slack,
         pull=np.zeros(AXES),
-        bent=np.zeros(2),
+        bent=np.zeros(3),
     )
 
 
@@ -137,7 +137,8 @@ class Hanging(NamedTuple):
 
     The plant (its model and the values of its parameters), a tendon's stiffness [N/m], the values of Nonideal and the
     state that go with four of them, friction inside the wrist, the motors, the axes of two tendons on the + and two on
-    the - side, and what bends across the plane (wrist.across.Across).
+    the - side, and what bends across the plane (`Across`) against friction inside the wrist: its torque [N m], and one
+    over the bend in which it turns round [1/rad].
     """
 
     model: Any
@@ -149,23 +150,24 @@ class Hanging(NamedTuple):
     motor: Any
     sides: Any
     across: Any
+    rubbing: tuple[float, float]
 
 
 @compiled
-def _bend_across(spools: Any, across: Any, stiffness: float) -> None:
-    """A period of the bend across the plane, linearly implicit in damping and stiffness."""
-    resisting = across.stiffness
-    moment = across.moment - across.stiffness * spools.bent[0]
+def _bend_across(bent: Any, pulls: Any, levers: Any, across: Any, rubbing: Any, stiffness: float) -> None:
+    """A period of the bend across the plane, linearly implicit in damping, stiffness and friction; lanes."""
+    torque, slope = rubbing
+    rate = bent[1]
+    resisting = across.stiffness + torque * bristle_slope(bent[2], rate, slope)
+    moment = across.moment - across.stiffness * bent[0] - torque * bent[2]
     for axis in range(AXES):
-        lever, pull = across.levers[axis], spools.pull[axis]
-        moment += lever * pull
-        if pull > 0.0:
-            resisting += stiffness * lever * lever
-    rate = spools.bent[1]
+        moment = moment + levers[axis] * pulls[axis]
+        resisting = resisting + where(pulls[axis] > 0.0, stiffness * levers[axis] * levers[axis], 0.0)
     push = moment - (across.damping + PERIOD * resisting) * rate
-    rate += PERIOD * push / (across.inertia + PERIOD * across.damping + PERIOD * PERIOD * resisting)
-    spools.bent[0] += PERIOD * rate
-    spools.bent[1] = rate
+    rate = rate + PERIOD * push / (across.inertia + PERIOD * across.damping + PERIOD * PERIOD * resisting)
+    bent[0] = bent[0] + PERIOD * rate
+    bent[1] = rate
+    bent[2] = bristle(bent[2], PERIOD * rate, slope)
 
 
 def follow(
@@ -205,7 +207,7 @@ def follow(
         pull[behind] = spool_pull(tendons, on_spools[1], 1, path[1])
         pull[ahead_too] = spool_pull(tendons, on_spools[2], 2, path[0])
         pull[behind_too] = spool_pull(tendons, on_spools[3], 3, path[1])
-        _bend_across(spools, across, hanging.stiffness)
+        _bend_across(bent, pull, levers, across, hanging.rubbing, hanging.stiffness)
         advance_or_stop(plant, q, rate, on_spools, tendons, PERIOD + zero, 1.0 + zero)
         for i in range(2 * n):
             out[k, i] = state[i]

@@ -35,6 +35,10 @@ class Bend(NamedTuple):
         """Size of the bend, in any direction."""
         return math.hypot(self.theta, self.away if math.isfinite(self.away) else 0.0)
 
+    def since(self, before: "Bend") -> "Bend":
+        """By how much it differs from one before."""
+        return Bend(self.theta - before.theta, self.away - before.away)
+
 
 class ExpectedMoves:
     """By the believed wrist: the side of each axis in the plane and across it, and steps for one radian.
@@ -68,6 +72,10 @@ class ExpectedMoves:
         """What of a bend counts as that by an axis [rad]."""
         return bend.theta
 
+    def toward(self, axis: int, bend: Bend) -> float:
+        """How far a bend goes toward the tendon of an axis [rad]."""
+        return bend.theta if self._plus[axis] else -bend.theta
+
     def size(self, bend: Bend) -> float:
         """Size of what counts of a bend, whichever axis has made it [rad]."""
         return abs(bend.theta)
@@ -91,12 +99,12 @@ class ExpectedMoves:
             likely = f"it turns the wrong way while others are taut, or {likely}"
         raise SafetyStop(f"{problem}; likely {likely}", "homing", _SCREWED)
 
-    def judge_line(self, axis: int, bend: Bend, reeled: Sequence[int], bends: Sequence[Bend]) -> float:
-        """Direction [rad] in which bends grow with what an axis has reeled in, nan in one plane; `bend` is the last.
+    def judge_line(self, axis: int, moved: Bend, reeled: Sequence[int], bends: Sequence[Bend]) -> float:
+        """Direction [rad] in which bends grow with what an axis has reeled in, nan in one plane.
 
-        Raises SafetyStop where it is another tendon's.
+        Raises SafetyStop where it is another tendon's; `moved` is the last bend against where the wrist rested before.
         """
-        self.judge_side(axis, bend)
+        self.judge_side(axis, moved)
         return math.nan
 
     def has_steps(self, steps: float) -> bool:
@@ -126,9 +134,13 @@ class ExpectedMoves:
         problem = f"tendon {ACTIVE[axis]} was taut by {-1e3 * slack:.2f} mm when homing began"
         raise SafetyStop(problem, "homing", "slacken all tendons first: wristctl hw slacken, or by hand")
 
-    def judge_friction(self, axis: int, friction: float) -> None:
-        """Raises SafetyStop where a tendon sticks by more than `homing.sticks` between reeling in and letting go."""
-        if friction <= self._homing.sticks:
+    def judge_friction(self, axis: int, friction: float, stays: float) -> None:
+        """Raises SafetyStop where a tendon sticks by more than `homing.sticks` between reeling in and letting go [m].
+
+        A wrist that stays bent by up to `stays` [rad] when nothing pulls has friction of its own, which stretches a
+        tendon by as much once more each way.
+        """
+        if friction <= self._homing.sticks + 2.0 * self._stiffness * stays / (self._offset * self._softest):
             return
         problem = f"tendon {ACTIVE[axis]} sticks: {1e3 * friction:.2f} mm between reeling in and letting go"
         fix = "see whether it chafes or its sheath is bent sharply; or raise homing.sticks"

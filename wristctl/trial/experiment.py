@@ -181,7 +181,7 @@ class Experiment:
             self.zero = self._home(board, tracking, plane)
             markers = self.zero.markers
         else:
-            check_zero(board, tracking, settings, self._wrist, plane, self.zero)
+            markers = check_zero(board, tracking, settings, self._wrist, plane, self.zero)
         tracking.zero = markers
         return self._at_rest(board, tracking, plane, shown), tracking
 

@@ -4,13 +4,16 @@ One motor after the other reels in by small moves until the marker shows a bend,
 steps pay out shows none and is tried the other way round. Then all tendons are slackened, so that none holds against
 another, and each in turn is reeled in through its taut point. From there the bend grows linearly with the tendon, so a
 line through the bent readings crosses the straight angle at the taut point; its slope gives steps per radian.
+
+Friction inside a wrist leaves it bent where it was let go. So a bend counts from where the wrist rested before, and
+straight is the middle of where it rests after bends to all sides.
 """
 
 import logging
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -22,7 +25,7 @@ from wristctl.trial.expected_moves import Bend, ExpectedMoves
 from wristctl.trial.safety import SafetyStop
 from wristctl.trial.spatial_moves import SpatialMoves
 from wristctl.trial.spools import Spools, spools_of
-from wristctl.trial.supervised_wait import Patience
+from wristctl.trial.supervised_wait import Patience, Reading
 from wristctl.trial.tracking import Tracking
 from wristctl.wrist.directions import ACTIVE
 
@@ -32,6 +35,8 @@ log = logging.getLogger(__name__)
 _AGAIN = 4
 # A bend at which homing stops.
 _FURTHEST_DEG = 10.0
+# Share of the least bend that a wrist at rest may seem to move by from one reading to the next.
+_STILL = 0.2
 
 
 @dataclass(frozen=True)
@@ -45,7 +50,7 @@ class Zero:
     marker: float
     """Angle between the markers on the straight wrist [rad]."""
     slack: tuple[float, ...]
-    """Reeled in until the tendon was taut [m]."""
+    """Reeled in until the tendon was taut on the straight wrist [m]."""
     friction: tuple[float, ...] = (0.0,) * AXES
     """Path between reeling in and letting go for the same bend [m]."""
 
@@ -74,6 +79,35 @@ class SpatialZero(Zero):
         return self.marker, self.marker_2
 
 
+class _Line(NamedTuple):
+    """Bend by what an axis has reeled in, a line; where the wrist rested after it was let go."""
+
+    slope: float
+    """Bend toward the axis, or away from it, by a microstep [rad]."""
+    offset: float
+    friction: float
+    """Path between reeling in and letting go for the same bend [steps]."""
+    rest: Bend
+
+    def taut(self, straight: float) -> float:
+        """Where the tendon is just taut on a wrist at this angle [steps]."""
+        return (straight - self.offset) / self.slope
+
+
+def rest_of(board: Board, tracking: Tracking, expected: ExpectedMoves, homing: Homing) -> Reading:
+    """Where a wrist rests that has been let go: once it moves no more, and at the latest after `homing.let_go`."""
+    patience, clock = Patience(board), board.transport
+    deadline, before = clock.now() + homing.let_go, None
+    while True:
+        patience.wait(homing.rest)
+        reading = patience.reading(tracking, homing.frames)
+        if before is not None:
+            moved = expected.size(expected.bend(before, reading))
+            if moved < _STILL * math.radians(homing.bend_deg) or clock.now() >= deadline:
+                return reading
+        before = reading
+
+
 class _Finder:
     """Moves one axis at a time; positions are microsteps reeled in from where the finder began."""
 
@@ -89,12 +123,13 @@ class _Finder:
         self._at, self._signs = np.zeros(AXES, int), np.ones(AXES, int)
         self._bend = math.radians(settings.bend_deg)
         self._straight = Patience(board).reading(tracking, 4 * settings.frames)
+        self._rest = expected.bend(self._straight, self._straight)
         self.directions = [math.nan] * AXES
         """Direction of each axis that has been measured in two planes [rad]."""
 
     @property
-    def straight(self) -> tuple[float, float]:
-        """Marker angles of the straight wrist [rad], the second one nan in one plane."""
+    def began(self) -> tuple[float, float]:
+        """Marker angles of the wrist as it stood at first [rad], the second one nan in one plane."""
         return self._straight.theta, self._straight.beside
 
     def sense(self, axis: int, tried: Sequence[int]) -> int:
@@ -102,10 +137,10 @@ class _Finder:
         for self._signs[axis] in tried:
             for reeled in range(2 * self._move, self._slack + 2 * self._move, 2 * self._move):
                 self._reel(axis, reeled)
-                bend = self._bent(axis)
-                if bend.askew > self._bend:
+                moved = self._bent(axis).since(self._rest)
+                if moved.askew > self._bend:
                     self._let_go(axis, 0)
-                    self._expected.judge_side(axis, bend)
+                    self._expected.judge_side(axis, moved)
                     return reeled
             self._let_go(axis, 0)
         slack, fix = 1e3 * self._settings.slack, "see that the tendon is on its pulley and the motor has power"
@@ -116,25 +151,26 @@ class _Finder:
         """Let all tendons go, so far that none holds against another while it is measured."""
         self._at[:] = -2 * self._pull
         self._go()
+        self._rest = self._rests()
 
-    def taut(self, axis: int, about: int) -> tuple[float, float, float]:
-        """Taut point [steps], steps per radian and friction [steps] of an axis that bends at `about`. Lets go again.
+    def line(self, axis: int, about: int) -> _Line:
+        """How the wrist bends by an axis that bends it at `about`. Lets go again.
 
         Steps that are not the model's are measured once more, with more time for each reading, before they are judged.
         """
         measured = self._measured(axis, about, 1)
-        if not self._expected.has_steps(measured[1]):
+        if not self._expected.has_steps(1.0 / abs(measured.slope)):
             measured = self._measured(axis, about, _AGAIN)
-        self._expected.judge_steps(axis, measured[1])
+        self._expected.judge_steps(axis, 1.0 / abs(measured.slope))
         return measured
 
-    def _measured(self, axis: int, about: int, slowly: int) -> tuple[float, float, float]:
+    def _measured(self, axis: int, about: int, slowly: int) -> _Line:
         reeled, bends = [], []
-        along = self._expected.along
-        for position in range(min(0, about - 3 * self._move), about + self._pull, self._move):
+        along, rested = self._expected.along, self._rest
+        for position in range(min(0, about - 3 * self._move), about + 2 * self._pull, self._move):
             self._reel(axis, position)
             bend = self._bent(axis, slowly)
-            if abs(along(axis, bend)) > self._bend:
+            if abs(along(axis, bend.since(rested))) > self._bend:
                 reeled.append(position)
                 bends.append(bend)
             if reeled and position - reeled[0] >= 0.7 * self._pull:  # any further, the tendons opposite may hold it
@@ -145,12 +181,15 @@ class _Finder:
         slope, offset = np.polyfit(reeled, [along(axis, bent) for bent in bends], 1)
         self._reel(axis, reeled[0])
         Patience(self._board).wait(4.0 * self._settings.rest)  # a wrist that is let go comes back by its springs alone
-        friction = (along(axis, self._bent(axis)) - offset) / slope - reeled[0]
+        back = self._bent(axis)
         self._let_go(axis, -2 * self._pull)
-        self.directions[axis] = self._expected.judge_line(axis, bend, reeled, bends)
+        self.directions[axis] = self._expected.judge_line(axis, bend.since(rested), reeled, bends)
+        held = abs(along(axis, back.since(self._rest))) > 0.5 * self._bend  # the tendon was not slack yet
+        friction = (along(axis, back) - offset) / slope - reeled[0] if held else 0.0
+        line = _Line(float(slope), float(offset), float(friction), self._rest)
         if reeled[0] <= 0:  # it bends the wrist where it was at the start: the line alone may err by friction
-            self._expected.judge_slack(axis, -offset / slope * self._spools.step)
-        return float(-offset / slope), float(1.0 / abs(slope)), float(friction)
+            self._expected.judge_slack(axis, line.taut(0.0) * self._spools.step)
+        return line
 
     def settle(self, taut: Sequence[float]) -> tuple[int, ...]:
         """Take up every tendon's slack, all at once, and call that zero. Senses of turning."""
@@ -173,10 +212,11 @@ class _Finder:
 
     def _let_go(self, axis: int, reeled: int) -> None:
         self._reel(axis, reeled)
-        clock = self._board.transport
-        deadline = clock.now() + self._settings.let_go
-        while self._expected.size(self._bent(axis)) > 0.5 * self._bend and clock.now() < deadline:
-            pass
+        self._rest = self._rests()
+
+    def _rests(self) -> Bend:
+        rest = self._expected.bend(self._straight, rest_of(self._board, self._tracking, self._expected, self._settings))
+        return rest
 
     def _reel(self, axis: int, reeled: int) -> None:
         self._at[axis] = reeled
@@ -216,14 +256,18 @@ def find_zero(
     finder = _Finder(board, tracking, spools, settings.homing, expected)
     about = [finder.sense(axis, (1, -1) if signs is None else (signs[axis],)) for axis in range(AXES)]
     finder.slacken()
-    taut, slopes, friction = zip(*[finder.taut(axis, about[axis]) for axis in range(AXES)], strict=True)
-    slack, sticking = (tuple(spools.step * steps for steps in lengths) for lengths in (taut, friction))
+    lines = [finder.line(axis, about[axis]) for axis in range(AXES)]
+    straight = Bend(*np.mean([line.rest for line in lines], axis=0).tolist())
+    taut = [line.taut(expected.along(axis, straight)) for axis, line in enumerate(lines)]
+    slopes = tuple(1.0 / abs(line.slope) for line in lines)
+    slack, sticking = tuple(spools.step * at for at in taut), tuple(spools.step * line.friction for line in lines)
+    stays = max(expected.size(line.rest.since(straight)) for line in lines)
     for axis in range(AXES):
-        expected.judge_friction(axis, sticking[axis])
+        expected.judge_friction(axis, sticking[axis], stays)
     senses = finder.settle(taut)
     for tendon, sense, length, slope in zip(ACTIVE, senses, slack, slopes, strict=True):
         log.info("tendon %d: sense %+d, slack %.2f mm, %.0f steps per rad", tendon, sense, 1e3 * length, slope)
-    first, second = finder.straight
+    first, second = finder.began[0] + straight.theta, finder.began[1] + straight.away
     if settings.planes == 1:
         return Zero(senses, slopes, first, slack, sticking)
     seen = first + tracking.zero[0], second + tracking.zero[1]

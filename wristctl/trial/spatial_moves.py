@@ -55,6 +55,10 @@ class SpatialMoves(ExpectedMoves):
         """The part of a bend toward an axis' direction [rad]."""
         return float(self._toward[axis] @ bend)
 
+    def toward(self, axis: int, bend: Bend) -> float:
+        """How far a bend goes toward the tendon of an axis [rad]."""
+        return self.along(axis, bend)
+
     def size(self, bend: Bend) -> float:
         """Size of the bend [rad]."""
         return bend.askew
@@ -81,7 +85,7 @@ class SpatialMoves(ExpectedMoves):
             likely, problem = f"{turns}{exchanged}", f"{problem}: as tendon {other} would"
         raise SafetyStop(f"{problem}; likely {likely}", "homing", _LAYOUT)
 
-    def judge_line(self, axis: int, bend: Bend, reeled: Sequence[int], bends: Sequence[Bend]) -> float:
+    def judge_line(self, axis: int, moved: Bend, reeled: Sequence[int], bends: Sequence[Bend]) -> float:
         """The direction [rad] of a line through the straight wrist and the bends, from ulnar toward flexion.
 
         Raises SafetyStop where it is not the axis' own.

@@ -1,51 +1,70 @@
 """Checks of a homed wrist: does each tendon do as it should, is each slack, do none pull against each other?"""
 
-import math
-
 import numpy as np
 from numpy.typing import NDArray
 
 from wristctl.board.driver import Board
 from wristctl.board.messages import AXES, JOG_RATE
-from wristctl.config.hw_run import Homing, RigSettings
+from wristctl.config.hw_run import RigSettings
 from wristctl.config.wrist import WristParameters
-from wristctl.trial.expected_moves import ExpectedMoves
-from wristctl.trial.homing import Zero, moves_of, slacken
+from wristctl.trial.expected_moves import LEAST, Bend
+from wristctl.trial.homing import Zero, moves_of, rest_of, slacken
 from wristctl.trial.spools import on_plus_side, spools_of
 from wristctl.trial.supervised_wait import Patience, Reading
 from wristctl.trial.tracking import Tracking
+from wristctl.wrist.directions import ACTIVE
 
 # Share of `homing.pull` by which a tendon is reeled in to check it.
 _CHECKED = 1.2
+# Axes of tendons 1 and 5, which are opposite in either plane.
+_OPPOSITE = ACTIVE.index(1), ACTIVE.index(5)
 # Seconds in which a wrist that has been let go comes to rest, but for creep.
 _SETTLES = 0.5
 
 
 def check_zero(
     board: Board, tracking: Tracking, settings: RigSettings, wrist: WristParameters, plane: str, zero: Zero
-) -> None:
+) -> tuple[float, ...]:
     """Let each tendon of a homed, slack wrist bend it a little, and leave it slack again; all must do as they should.
+
+    Friction inside a wrist leaves it bent where it was let go, and a tendon toward which it is bent is taut only
+    further on. So in one plane opposite tendons bend it first, and straight is the middle of where it rests after them.
+    Returns each camera's marker angle of the straight wrist [rad].
 
     Raises SafetyStop where a tendon is not slack, or a motor turns the wrong way or winds another tendon than its own.
     """
     expected, spools, homing = moves_of(settings, wrist, plane), spools_of(settings.actuator), settings.homing
     slack, reeled = -round(homing.pull / spools.step), round(_CHECKED * homing.pull / spools.step)
-    patience = Patience(board)
-    held = patience.reading(tracking, 4 * homing.frames)
+    held = Patience(board).reading(tracking, 4 * homing.frames)
     slacken(board, spools, homing, zero.signs, 2.0)
-    patience = Patience(board)
-    patience.wait(0.5 * homing.let_go)
-    straight = patience.reading(tracking, 4 * homing.frames)
-    expected.judge_slackened(expected.bend(held, straight))
-    for axis in range(AXES):
-        positions = np.full(AXES, slack)
-        positions[axis] = reeled
+    Patience(board).wait(0.5 * homing.let_go)
+    rest = Patience(board).reading(tracking, 4 * homing.frames)
+    expected.judge_slackened(expected.bend(held, rest))
+
+    def bent(axis: int, by: int, straight: Bend) -> tuple[Bend, Reading]:
+        """The bend that an axis makes of the wrist at rest, and where that rests after it."""
+        positions = np.full(AXES, 3 * slack)
+        positions[axis] = by + round(expected.toward(axis, _bend_of(rest).since(straight)) * expected.steps())
         patience = _reeled(board, zero, positions)
         patience.wait(2.0 * homing.rest)
-        bend = expected.bend(straight, patience.reading(tracking, homing.frames))
-        slacken(board, spools, homing, zero.signs)
+        bend = expected.bend(rest, patience.reading(tracking, homing.frames))
+        slacken(board, spools, homing, zero.signs, 2.0)
+        return bend, rest_of(board, tracking, expected, homing)
+
+    straight = _bend_of(rest)
+    if settings.planes == 1:
+        rests = []
+        for axis in _OPPOSITE:
+            bend, rest = bent(axis, 2 * reeled, _bend_of(rest))
+            if expected.size(bend) < LEAST * reeled / expected.steps():
+                raise expected.bends_too_little(axis, bend.theta, reeled / expected.steps())
+            rests.append(_bend_of(rest))
+        straight = Bend(*np.mean(rests, axis=0).tolist())
+    for axis in range(AXES):
+        bend, rest = bent(axis, reeled, straight)
         expected.judge_small_move(axis, reeled, bend)
-        _straighten(board, tracking, homing, expected, straight)
+    slacken(board, spools, homing, zero.signs)
+    return tuple(angle + bent for angle, bent in zip(tracking.zero, straight, strict=False))
 
 
 def check_cocontraction(
@@ -77,10 +96,6 @@ def _reeled(board: Board, zero: Zero, positions: NDArray[np.int64]) -> Patience:
     return Patience(board)
 
 
-def _straighten(
-    board: Board, tracking: Tracking, homing: Homing, expected: ExpectedMoves, straight: Reading
-) -> None:  # fmt: skip
-    patience, clock = Patience(board), board.transport
-    deadline, least = clock.now() + homing.let_go, 0.5 * math.radians(homing.bend_deg)
-    while expected.size(expected.bend(straight, patience.reading(tracking, 1))) > least and clock.now() < deadline:
-        pass
+def _bend_of(rest: Reading) -> Bend:
+    """A reading in its plane, or in both: what one camera sees across is left out."""
+    return Bend(rest.theta, rest.beside)
