@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import FrozenInstanceError
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -321,7 +322,7 @@ def test_a_wrist_that_stays_bent_passes_its_checks_and_a_dead_motor_does_not(
     for dead in range(4):
         board.position[:] = -slack
         with pytest.raises(SafetyStop, match=rf"axis {dead} .* bends the wrist by"):
-            check_zero(board, Marker(board, lambda dead=dead: angle(dead)), rig, WRIST, plane, zero)  # type: ignore
+            check_zero(board, Marker(board, partial(angle, dead)), rig, WRIST, plane, zero)  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize(("share", "refused"), [(0.83, True), (0.87, False), (1.3, False), (1.45, True)])

@@ -124,6 +124,7 @@ class _Finder:
         self._bend = math.radians(settings.bend_deg)
         self._straight = Patience(board).reading(tracking, 4 * settings.frames)
         self._rest = expected.bend(self._straight, self._straight)
+        self._stays = 0.0
         self.directions = [math.nan] * AXES
         """Direction of each axis that has been measured in two planes [rad]."""
 
@@ -159,9 +160,9 @@ class _Finder:
         Steps that are not the model's are measured once more, with more time for each reading, before they are judged.
         """
         measured = self._measured(axis, about, 1)
-        if not self._expected.has_steps(1.0 / abs(measured.slope)):
+        if not self._expected.has_steps(1.0 / abs(measured.slope), self._stays):
             measured = self._measured(axis, about, _AGAIN)
-        self._expected.judge_steps(axis, 1.0 / abs(measured.slope))
+        self._expected.judge_steps(axis, 1.0 / abs(measured.slope), self._stays)
         return measured
 
     def _measured(self, axis: int, about: int, slowly: int) -> _Line:
@@ -216,6 +217,7 @@ class _Finder:
 
     def _rests(self) -> Bend:
         rest = self._expected.bend(self._straight, rest_of(self._board, self._tracking, self._expected, self._settings))
+        self._stays = max(self._stays, self._expected.size(rest))
         return rest
 
     def _reel(self, axis: int, reeled: int) -> None:
