@@ -24,6 +24,7 @@ from wristctl.comparison.controller_ranking import Ranking, class_rankings
 from wristctl.config.wrist import WristParameters
 from wristctl.control.pid import PID
 from wristctl.control.smc import SMC
+from wristctl.control.table import CONTROLLERS
 from wristctl.plotting.loop_figures import angles, errors, overlay, tensions
 from wristctl.plotting.ranking_figures import (
     answer_figure,
@@ -97,6 +98,15 @@ def rankings() -> list[Ranking]:
     return class_rankings([each for each in results() if each.controller != "nc"], study.compare, study.wrist)
 
 
+def many_rankings() -> list[Ranking]:
+    """Every controller of the table in one condition, the first the best."""
+    study = load_study(None, "compare.loops={four-segments: {}}")
+    rows = [
+        result(f"{name}/default", move, 1e-5 * (k + 1)) for k, name in enumerate(CONTROLLERS) for move in REFERENCES
+    ]
+    return class_rankings(rows, study.compare, study.wrist)
+
+
 PLACES = {"sampled": "sampled", "sampled, steps": "sampled (steps)"}
 
 
@@ -153,6 +163,9 @@ FIGURES: dict[str, Callable[[], Figure]] = {
     "tensions, late": lambda: tensions(late()),
     "rmse map": lambda: rmse_map(results(), "Loop default"),
     "answer": lambda: answer_figure(rankings(), PLACES),
+    "answer, many": lambda: answer_figure(many_rankings(), PLACES),
+    "ratios, many": lambda: paired_ratios(many_rankings(), "feedforward/default", PLACES),
+    "who beats whom, many": lambda: probability_of_better(many_rankings()[0], "sampled"),
     "performance profile": lambda: performance_profile(rankings(), PLACES),
     "ratios to feedforward": lambda: paired_ratios(rankings(), "feedforward/default", PLACES),
     "who beats whom": lambda: probability_of_better(rankings()[0], "sampled"),

@@ -13,7 +13,7 @@ from wristctl.commands.compare.figures import rmse_map, variation_dots
 from wristctl.comparison.combinations import ComparedRow
 from wristctl.comparison.paper import T2
 from wristctl.plotting.loop_figures import error_sizes
-from wristctl.plotting.style import WIDTH
+from wristctl.plotting.style import WIDTH, for_paper
 from wristctl.simulation.repetitions import Repeated
 
 
@@ -125,6 +125,23 @@ def test_every_cell_of_the_map_stands_at_its_row_and_column(results: list[Compar
     assert bar.get_ylabel() == "RMSE [rad]" and ours.get_title("left") == "Loop default"
     assert [label.get_text() for label in paper.get_xticklabels()] == ["the paper's\nT2"]
     assert list(paper.get_xticks()) == [0]
+
+
+def test_numbers_of_the_map_lie_within_their_cells_on_a_page_of_180_mm(results: list[ComparedRow]) -> None:
+    """Eight references and the paper's column; in a column of 88 mm colours have to do."""
+    wide = [
+        dataclasses.replace(results[0], reference=f"minimum jerk {k} s", repeated=Repeated.once(
+            dataclasses.replace(results[0].simulation, metrics={"rmse": 1.1e-7 * 3.1**k})))
+        for k in range(8)
+    ]  # fmt: skip
+    with for_paper(180.0 / 25.4):
+        made = rmse_map(wide)
+        made.draw_without_rendering()
+        ours = made.axes[0]
+        cell = ours.get_window_extent().width / 8.0
+        assert len(ours.texts) == 8 and all(text.get_window_extent().width < cell for text in ours.texts)
+    with for_paper(88.0 / 25.4):
+        assert not any(axes.texts for axes in rmse_map(wide).axes)
 
 
 def test_numbers_on_dark_cells_are_white_and_on_bright_ones_black(results: list[ComparedRow]) -> None:

@@ -14,6 +14,7 @@ from matplotlib.text import Annotation, Text
 from matplotlib.ticker import FixedLocator
 from matplotlib.transforms import Bbox
 
+from wristctl.plotting.style import fit, for_paper
 from wristctl.records.formats import write_figure
 
 
@@ -53,15 +54,28 @@ def test_every_axis_of_numbers_has_a_label_with_its_unit_and_one_with_a_label_ha
 
 
 def test_no_text_is_cut_or_lies_on_another_or_is_too_small_to_read(drawn: Figure) -> None:
+    assert_in_its_place(drawn, 7.0)
+    assert not Gcf.get_all_fig_managers(), "drawing leaves no figure open"
+
+
+def test_in_a_column_of_88_mm_no_text_is_cut_or_lies_on_another(make: Callable[[], Figure]) -> None:
+    with for_paper(88.0 / 25.4):
+        made = make()
+        fit(made)
+        made.draw_without_rendering()
+        assert_in_its_place(made, 5.0)
+
+
+def assert_in_its_place(drawn: Figure, smallest: float) -> None:
+    """Every text within the figure, beside all others, and of at least the smallest size [pt]."""
     shown = texts(drawn)
     boxes = [extent(text) for text in shown]
     for text, box in zip(shown, boxes, strict=True):
         assert box.x0 >= 0 and box.y0 >= 0, text.get_text()
         assert box.x1 <= drawn.bbox.x1 and box.y1 <= drawn.bbox.y1, text.get_text()
-        assert float(text.get_fontsize()) >= 7.0, text.get_text()
+        assert float(text.get_fontsize()) >= smallest, text.get_text()
     for one, other in itertools.combinations(range(len(shown)), 2):
         assert not boxes[one].overlaps(boxes[other]), f"{shown[one].get_text()!r} on {shown[other].get_text()!r}"
-    assert not Gcf.get_all_fig_managers(), "drawing leaves no figure open"
 
 
 @pytest.mark.parametrize("make", ["errors, log", "rmse map", "directions", "stroboscope"], indirect=True)

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import re
+from itertools import pairwise
 
 import pytest
 
 from wristctl.control.table import CONTROLLERS
-from wristctl.plotting.style import colour, figure, legend_below, line, logarithmic
+from wristctl.plotting.style import colour, figure, legend_below, line, logarithmic, title
 
 
 def test_controllers_of_the_table_have_colours_of_their_own() -> None:
@@ -36,6 +37,31 @@ def test_legend_below_names_each_label_once() -> None:
         each.plot([0.0, 1.0], label="smc/tuned")
     legend_below(made)
     assert [text.get_text() for text in made.legends[0].get_texts()] == ["smc/tuned"]
+
+
+def test_axes_keep_their_height_above_a_legend_of_many_rows() -> None:
+    """Of names so long that one fills a row."""
+    heights = []
+    for rows in (2, 12):
+        made, ((axes,),) = figure(height=2.4)
+        for k in range(rows):
+            axes.plot([0.0, 1.0], label=f"{k} of {'names ' * 12}")
+        legend_below(made)
+        made.draw_without_rendering()
+        heights.append(axes.get_window_extent().height)
+    assert heights[1] == pytest.approx(heights[0], rel=0.1)
+
+
+def test_titles_of_axes_side_by_side_do_not_reach_the_next_ones() -> None:
+    words = "motors and a camera behind it"
+    made, axes = figure(1, 4)
+    for panel in axes.flat:
+        title(panel, words)  # type: ignore[arg-type]
+    made.draw_without_rendering()
+    titles = [panel._left_title for panel in axes.flat]  # type: ignore[attr-defined]
+    assert all(text.get_text().split() == words.split() for text in titles)
+    boxes = [text.get_window_extent() for text in titles]
+    assert all(left.x1 < right.x0 for left, right in pairwise(boxes))
 
 
 @pytest.mark.parametrize(("low", "high"), [(1e-7, 3e-2), (0.9, 40.0), (0.02, 0.05)])

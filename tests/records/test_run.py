@@ -76,6 +76,21 @@ def test_a_figure_has_150_dots_per_inch_in_both_formats(tmp_path: Path) -> None:
     assert 'width="144pt"' in (tmp_path / "a.svg").read_text()
 
 
+@pytest.mark.painted
+def test_a_figure_without_room_for_its_names_grows_until_they_fit(tmp_path: Path) -> None:
+    """Its layout says nothing of it: a warning would be an error here."""
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(2.0, 1.0), layout="constrained")
+    axes = figure.subplots()
+    axes.set_xlabel("name\n" * 12)
+    write_figure(tmp_path / "a", figure)
+    figure.draw_without_rendering()
+    label, within = axes.xaxis.label.get_window_extent(), figure.bbox
+    assert within.x0 <= label.x0 and within.y0 <= label.y0 and label.y1 < axes.get_window_extent().y0 + 1.0
+    assert axes.get_window_extent().height > 0.0
+
+
 def test_arrays_hold_numbers_and_no_objects(tmp_path: Path) -> None:
     file = tmp_path / "a.npz"
     with pytest.raises(ValueError, match="Object arrays"):

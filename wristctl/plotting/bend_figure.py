@@ -6,10 +6,22 @@ from matplotlib.figure import Figure
 
 from wristctl.arrays import Array
 from wristctl.plotting.loop_figures import draw_course
-from wristctl.plotting.style import BLACK, BLUE, SILVER, TENDON_COLOURS, VERMILLION, figure, legend_below, title
+from wristctl.plotting.style import (
+    BLACK,
+    DOTTED,
+    GREEN,
+    INDIGO,
+    SKY,
+    TENDON_COLOURS,
+    WANTED,
+    figure,
+    legend_below,
+    title,
+)
 from wristctl.simulation.bend_course import BendCourse
 
-_OF_PLANES = (("toward ulnar", BLUE), ("toward flexion", VERMILLION))
+# In colours that no tendon has: they share a legend.
+_OF_PLANES = (("toward ulnar", INDIGO), ("toward flexion", SKY))
 
 
 def bend_figure(course: BendCourse, reach: Array, heading: str = "") -> Figure:
@@ -33,15 +45,15 @@ def bend_motion(course: BendCourse, reach: Array, heading: str = "") -> Figure:
     for number, pull in enumerate(course.acting.T):
         shade = TENDON_COLOURS[number % len(TENDON_COLOURS)]
         draw_course(pulls, course.time, pull, shade, f"tendon {number + 1}")
-    pulls.set(xlabel="time [s]", ylabel="pull on the wrist [N]")
+    pulls.set(xlabel="time [s]", ylabel="pull [N]")
     legend_below(picture)
     return picture
 
 
 def _plane_of_bends(axes: Axes, course: BendCourse, reach: Array, heading: str) -> Axes:
-    axes.plot(*np.rad2deg(reach).T, color=SILVER, label="in reach")
-    axes.plot(*np.rad2deg(course.bend_ref).T, color=BLACK, linestyle="--", label="wanted")
-    axes.plot(*np.rad2deg(course.bend).T, color=BLUE, label="followed")
+    axes.plot(*np.rad2deg(reach).T, **DOTTED, label="in reach")
+    axes.plot(*np.rad2deg(course.bend_ref).T, **WANTED | {"label": "wanted"})
+    axes.plot(*np.rad2deg(course.bend).T, color=GREEN, label="followed")
     axes.set_aspect("equal")
     axes.set_xlabel("bend toward ulnar [deg]")
     axes.set_ylabel("bend toward flexion [deg]")

@@ -228,8 +228,16 @@ def probability_of_better(ranking: Ranking, place: str) -> Figure:
     axes.set_xticks(range(shares.shape[1]), names[-shares.shape[1] :], rotation=90.0)
     axes.set_yticks(range(shares.shape[0]), names[: shares.shape[0]])
     title(axes, f"{place}, {ranking.cases}")
-    bar = picture.colorbar(drawn, ax=axes, pad=0.02, label="row is better [%]")
-    bar.ax.set_ylim(0.0, 100.0)
+    wide = picture.get_figwidth() >= _ROOM
+    bar = picture.colorbar(
+        drawn,
+        ax=axes,
+        pad=0.02,
+        label="row is better [%]",
+        location="right" if wide else "bottom",
+        aspect=20 + 10 * wide,
+    )
+    (bar.ax.set_ylim if wide else bar.ax.set_xlim)(0.0, 100.0)
     return picture
 
 

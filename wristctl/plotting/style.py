@@ -7,6 +7,7 @@ import zlib
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
+from textwrap import fill
 from typing import Any
 
 import matplotlib as mpl
@@ -102,6 +103,10 @@ _LEGEND: dict[str, Any] = {"fontsize": 9.0, "frameon": False, "handlelength": 2.
 _PAPER: ContextVar[float | None] = ContextVar("_PAPER", default=None)
 # Scale of letters in a column of a page, and the width [in] below which a figure fills a column.
 _SMALLEST, _PRINTED = 0.72, 6.0
+# Mean width of a letter of a title [in]; height of a legend's row [in], and rows that figures have room for.
+_LETTER, _ROW, _ROWS = 0.076, 0.19, 2
+# Width [in] of a figure that axes in one column, and axes side by side, leave to labels.
+_BESIDE_ONE, _BESIDE_SEVERAL = 0.5, 1.5
 
 
 @contextmanager
@@ -188,7 +193,17 @@ def logarithmic(axis: Axis) -> None:
 
 
 def title(axes: Axes, text: str) -> None:
-    """A title at the left edge, no larger than the labels."""
+    """A title at the left edge, no larger than the labels, in as many lines as its axes' width needs."""
+    if place := axes.get_subplotspec():
+        ratios = np.array(place.get_gridspec().get_width_ratios() or np.ones(place.get_gridspec().ncols), float)
+        share = float(ratios[place.colspan.start : place.colspan.stop].sum() / ratios.sum())
+        picture = axes.get_figure()
+        width = picture.get_figwidth() if isinstance(picture, Figure) else WIDTH
+        room = share * (width - (_BESIDE_ONE if share == 1.0 else _BESIDE_SEVERAL))
+        letters = max(1, int(room / (_LETTER * _letters(width))))
+        text = "\n".join(
+            fill(part, letters, break_long_words=False, break_on_hyphens=False) for part in text.split("\n")
+        )
     axes.set_title(text, loc="left", fontsize=10.0)
 
 
@@ -210,14 +225,24 @@ def legend_below(figure: Figure, columns: int = 3) -> None:
 
 
 def legend_under(figure: Figure, handles: Sequence[Any], columns: int, labels: Sequence[str] | None = None) -> None:
-    """A legend of these below a figure's axes, in as many columns as there is room for."""
+    """A legend of these below a figure's axes, in as many columns as there is room for.
+
+    Figures have room for two rows; for each further one the figure grows, so that its axes keep their height.
+    """
     if not handles:
         return
     names = list(labels) if labels else [str(handle.get_label()) for handle in handles]
-    letter = 0.075 * (_SMALLEST if _PAPER.get() is not None and figure.get_figwidth() < _PRINTED else 1.0)
-    room = int(figure.get_figwidth() / (letter * (max(map(len, names)) + 8)))
-    place = {"loc": "outside lower center", "ncols": max(1, min(columns, len(handles), room))}
-    figure.legend(list(handles), names, **_LEGEND | place)
+    scale = _letters(figure.get_figwidth())
+    room = int(figure.get_figwidth() / (0.075 * scale * (max(map(len, names)) + 8.3)))
+    side_by_side = max(1, min(columns, len(handles), room))
+    further = max(0, -(-len(handles) // side_by_side) - _ROWS)
+    figure.set_figheight(figure.get_figheight() + _ROW * scale * further)
+    figure.legend(list(handles), names, **_LEGEND | {"loc": "outside lower center", "ncols": side_by_side})
+
+
+def _letters(width: float) -> float:
+    """Scale of letters in a figure of this width [in]: `fit` gives them to what is laid out for a column."""
+    return _SMALLEST if _PAPER.get() is not None and width < _PRINTED else 1.0
 
 
 def colour(controller: str) -> str:

@@ -18,7 +18,18 @@ from matplotlib.patches import Circle, Polygon
 from wristctl.arrays import Array
 from wristctl.config.choices import PLANTS
 from wristctl.config.wrist import WristParameters
-from wristctl.plotting.style import BLACK, BLUE, GREY, LIGHT, VERMILLION, figure, legend_below, title, undress
+from wristctl.plotting.style import (
+    BLACK,
+    BLUE,
+    GREY,
+    LIGHT,
+    VERMILLION,
+    columns_within,
+    figure,
+    legend_below,
+    title,
+    undress,
+)
 from wristctl.simulation.trajectory import Trajectory
 from wristctl.vision.scene_parts import coil, hand
 from wristctl.wrist.directions import DIRECTIONS, TENDONS, Direction
@@ -58,13 +69,15 @@ def directions(wrist: WristParameters, angle: float = math.radians(30.0)) -> Fig
     """The wrist bent by `angle` [rad] in the four directions, with the tendons that pull; cross-sections below."""
     picture, axes = figure(2, 4, width=9.0, height=5.6, height_ratios=(2.2, 1.0), sharey="row")
     reach = 1e3 * (wrist.length + 2.0 * wrist.hand_offset)
+    between = " " if columns_within(4, 1.2) == 4 else "\n"
     for direction, above, below in zip(DIRECTIONS.values(), *axes, strict=True):
         theta, (first, second) = direction.sign * angle, direction.tendons
         draw_wrist(above, np.array([theta]), wrist, direction.sign, direction.plane == "flexion")
         title(above, f"{direction.name}, {math.degrees(theta):+.3g} deg\ntendons {first} and {second} pull")
         above.set_xlim(sorted((-0.22 * reach * direction.sign, 0.58 * reach * direction.sign)))
-        above.set(ylim=(-0.1 * reach, 1.0 * reach), xlabel=f"y [mm], + {direction.plane}")
+        above.set(ylim=(-0.1 * reach, 1.0 * reach), xlabel=f"y [mm],{between}+ {direction.plane}")
         _draw_cross_section(below, wrist, direction)
+        below.set_xlabel(f"X [mm],{between}+ ulnar")
     axes[0, 0].set_ylabel("x [mm]")
     axes[1, 0].set_ylabel("Y [mm], + flexion")
     return picture
@@ -111,7 +124,7 @@ def _draw_cross_section(axes: Axes, wrist: WristParameters, direction: Direction
     near, far = direction.sign * 1.1 * rim, direction.sign * 1.65 * rim
     ends = ((far, 0.0), (near, 0.0)) if direction.plane == "ulnar" else ((0.0, far), (0.0, near))
     axes.annotate("", *ends, arrowprops={"arrowstyle": "-|>", "color": VERMILLION, "linewidth": 1.5})
-    axes.set(xlim=(-1.7 * rim, 1.7 * rim), ylim=(-1.7 * rim, 1.7 * rim), xlabel="X [mm], + ulnar")
+    axes.set(xlim=(-1.7 * rim, 1.7 * rim), ylim=(-1.7 * rim, 1.7 * rim))
     _frame(axes)
 
 

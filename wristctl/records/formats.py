@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import math
+import warnings
 import zipfile
 from collections.abc import Mapping
 from pathlib import Path
@@ -87,6 +88,27 @@ def _check_header(archive: zipfile.ZipFile, entry: zipfile.ZipInfo) -> None:
         raise ValueError(f"{entry.filename} is no array, or less than its header says")
 
 
+# Layouts that are tried, each of a quarter more: sixfold in all.
+_GROWTHS = 8
+
+
+def lay_out(figure: Figure, dpi: float) -> None:
+    """Lay a figure out for good; one whose names leave its axes no room grows until there is some."""
+    if not (layout := figure.get_layout_engine()):
+        return
+    figure.set_dpi(dpi)
+    for _ in range(_GROWTHS):
+        with warnings.catch_warnings():
+            warnings.filterwarnings("error", "constrained_layout not applied", UserWarning)
+            try:
+                layout.execute(figure)
+                break
+            except UserWarning:
+                pass
+        figure.set_size_inches(1.25 * figure.get_figwidth(), 1.25 * figure.get_figheight())
+    figure.set_layout_engine(None)
+
+
 def write_figure_for_paper(file: Path, figure: Figure, dpi: int = 300, by: Phrase = OUT) -> None:
     """A figure made without pyplot in the format that the file's name ends with, as large as it was laid out.
 
@@ -99,6 +121,7 @@ def write_figure_for_paper(file: Path, figure: Figure, dpi: int = 300, by: Phras
         ".svg": {"Date": None, "Creator": None},
         ".png": {"Software": None},
     }
+    lay_out(figure, dpi)
     fixed: Any = {"svg.hashsalt": file.stem, "agg.path.chunksize": 500, "pdf.fonttype": 42}
     with mpl.rc_context(fixed), replacing(file, by) as temporary:
         figure.savefig(temporary, format=file.suffix[1:], dpi=dpi, metadata=metadata[file.suffix])
@@ -108,10 +131,7 @@ def write_figure(stem: Path, figure: Figure, dpi: int = 150) -> None:
     """A figure made without pyplot as PNG and SVG, without date or program version; its layout stays as it is then."""
     import matplotlib as mpl
 
-    if layout := figure.get_layout_engine():  # once: savefig would lay out, and draw in vain, for each format
-        figure.set_dpi(dpi)
-        layout.execute(figure)
-        figure.set_layout_engine(None)
+    lay_out(figure, dpi)  # once: savefig would lay out, and draw in vain, for each format
     options: dict[str, dict[str, Any]] = {
         "png": {"metadata": {"Software": None}, "pil_kwargs": {"compress_level": 1}},  # 30 % larger, 10 ms sooner
         "svg": {"metadata": {"Date": None, "Creator": None}},

@@ -37,8 +37,10 @@ from wristctl.study_files.keys import field_at, unit_of
 # Subject of the columns of a figure.
 Across = Literal["reference", "loop"]
 
-# Width [in] of names and bar, and width [in] that a cell needs for its number.
-_BESIDE_CELLS, _NUMBER = 2.3, 0.45
+# Width [in] of names and bar, and width [in] that a cell needs for its number in small letters, and in the usual ones.
+_BESIDE_CELLS, _NUMBER, _USUAL_NUMBER = 2.3, 0.47, 0.6
+# Mean width of a letter of a column's name [in].
+_LETTER = 0.07
 # Hatch of a row that diverged.
 _FAILED = "///"
 
@@ -72,11 +74,14 @@ def rmse_map(
     beside = bool(np.isfinite(printed).any())
     fig, axes = figure(1, 1 + beside, width_ratios=widths[: 1 + beside], sharey=True, **size)
     ours = axes[0, 0]
-    narrow = (fig.get_figwidth() - _BESIDE_CELLS) / len(columns) < _NUMBER  # then colours and bar have to do
-    image = _cells(ours, values, norm, below, numbers=not narrow)
+    room = (fig.get_figwidth() - _BESIDE_CELLS) / (len(columns) + beside)
+    narrow = room < _NUMBER  # then colours and bar have to do
+    style: dict[str, Any] = {"numbers": not narrow, "size": 9.0 if room >= _USUAL_NUMBER else 7.5}
+    turned = 90.0 if room < _USUAL_NUMBER else 0.0
+    image = _cells(ours, values, norm, below, **style)
     if beside:
-        _cells(axes[0, 1], printed, norm)
-        axes[0, 1].set_xticks([0], ["the paper's\nT2"])
+        _cells(axes[0, 1], printed, norm, **style)
+        axes[0, 1].set_xticks([0], ["the paper's T2" if turned else "the paper's\nT2"], rotation=turned)
     ground = "none" if narrow else "w"
     for row, column in np.argwhere(np.isnan(values)):
         ours.add_patch(Rectangle((column - 0.5, row - 0.5), 1.0, 1.0, fill=False, hatch=_FAILED, edgecolor=GREY))
@@ -91,8 +96,10 @@ def rmse_map(
             backgroundcolor=ground,
         )
     ours.set_yticks(range(len(rows)), rows)
-    names = columns if narrow else [fill(name, 10) for name in columns]
-    ours.set_xticks(range(len(columns)), names, rotation=90.0 if narrow else 0.0)
+    names = columns if turned else [fill(name, 10) for name in columns]
+    if turned:  # upright names take their height from the cells
+        fig.set_figheight(fig.get_figheight() + _LETTER * max(map(len, names)))
+    ours.set_xticks(range(len(columns)), names, rotation=turned)
     title(ours, heading)
     bar = fig.colorbar(image, ax=axes[0].tolist(), pad=0.02, label="RMSE [rad]", format=PowersOfTen())
     bar.minorformatter = PowersOfTen()
@@ -164,15 +171,21 @@ def _cells(
     norm: LogNorm,
     below: Mapping[tuple[int, int], str] | None = None,
     numbers: bool = True,
+    size: float = 9.0,
 ) -> AxesImage:
-    """Values (rows, columns) as coloured cells with their numbers, texts below them; nothing where they are nan."""
+    """Values (rows, columns) as coloured cells with their numbers, texts below them; nothing where they are nan.
+
+    `size` is that of the numbers [pt].
+    """
     undress(axes)
     image = axes.imshow(values, norm=norm, cmap="cividis", aspect="auto")
     for row, column in np.argwhere(np.isfinite(values) & numbers):
         value = values[row, column]
         text = (below or {}).get((int(row), int(column)), "")
         ink = "w" if value <= 0.0 or norm(value) < 0.5 else "k"
-        axes.text(column, row, f"{value:.2g}{text}", ha="center", va="center", fontsize=7.5 if text else 9.0, color=ink)
+        axes.text(
+            column, row, f"{value:.2g}{text}", ha="center", va="center", fontsize=7.5 if text else size, color=ink
+        )
     return image
 
 

@@ -46,12 +46,21 @@ def _some(cases: Sequence[FrictionCase]) -> list[FrictionCase]:
     return [cases[index] for index in chosen]
 
 
+def _narrow(cases: Sequence[FrictionCase]) -> bool:
+    """Whether panels of these side by side have no room for their titles in one line."""
+    return columns_within(len(cases), _PANEL) < len(cases)
+
+
+def _heading(case: FrictionCase, narrow: bool) -> str:
+    return case_text(case).replace(", ", ",\n") if narrow else case_text(case)
+
+
 def loops(all_strokes: Strokes, driven: Sequence[HysteresisLoop]) -> Figure:
     """The outer loops with up to three sheaths: tension over angle, at the spool by speed and, of the slowest, at the
     wrist; and by how much the angle differs from that without friction, between the roots of the statics."""
     outer, cases = _outer(driven), _some(with_sheaths(all_strokes.settings))
     picture, axes = figure(2, len(cases), height=6.2, sharey="row")
-    narrow = columns_within(len(cases), _PANEL) < len(cases)
+    narrow = _narrow(cases)
     for (above, below), case in zip(axes.T, cases, strict=True):
         mine = sorted((loop for loop in outer if loop.case.tendons == case), key=lambda each: each.case.frequency)
         for loop, colour in zip(mine[::-1], _COLOURS[: len(mine)][::-1], strict=False):
@@ -65,7 +74,7 @@ def loops(all_strokes: Strokes, driven: Sequence[HysteresisLoop]) -> Figure:
         angle = np.linspace(slow.case.low, slow.case.high, 61)
         for edge in all_strokes.exact([case] * len(angle), angle).T:
             below.plot(np.degrees(angle), np.degrees(edge - angle), label="roots of the statics", **_ROOTS)
-        title(above, case_text(case).replace(", ", ",\n") if narrow else case_text(case))
+        title(above, _heading(case, narrow))
         above.set_xlabel("angle [deg]")
         below.set_xlabel("without friction [deg]".replace(" ", "\n") if narrow else "without friction [deg]")
     axes[0, 0].set_ylabel("tension of a + tendon [N]")
@@ -137,7 +146,7 @@ def minor_loops(all_strokes: Strokes, driven: Sequence[HysteresisLoop]) -> Figur
             label = f"{np.degrees(loop.case.low):g} to {np.degrees(loop.case.high):g} deg"
             tension = loop.course.spool_plus / TENDONS_PER_SIDE
             panel.plot(np.degrees(loop.course.theta), tension, color=colour, linewidth=1.2, label=label)
-        title(panel, case_text(case))
+        title(panel, _heading(case, _narrow(cases)))
         panel.set_xlabel("angle [deg]")
     axes[0, 0].set_ylabel(f"tension of a + tendon, {slowest:g} Hz [N]")
     legend_below(picture, 4)
