@@ -17,7 +17,7 @@ from wristctl.errors import UserError
 from wristctl.identification.bend_problem import bend_problem, oblique_of, springs_of, told_of_bends
 from wristctl.identification.bend_rehearsal import Hold, RehearsedBends, planned_spools, rehearse_bends
 from wristctl.identification.bend_trials import bend_trials, places_of_log
-from wristctl.identification.fit import Fit
+from wristctl.identification.fit import Fit, Rival
 from wristctl.identification.intervals import Knowledge
 from wristctl.identification.spatial_forward import SupposedBends, courses_of_bends
 from wristctl.records.log_converters import read_log
@@ -147,3 +147,32 @@ def test_what_the_readings_leave_open_is_not_told() -> None:
     ]
     assert axis.known and axis.value == pytest.approx(22.5)
     assert axis.high - axis.value == pytest.approx(math.degrees(1.96 * 2e-3 / (2.0 * math.hypot(0.05, 0.05))), rel=1e-3)
+
+
+@pytest.mark.parametrize("excess", [1.0, 8.0])
+def test_what_two_minima_have_different_is_told_only_where_one_fits_significantly_better(excess: float) -> None:
+    rng = np.random.default_rng(0)
+    log = logs_of(drawn_rig(rng), rng)[0]
+    problem = bend_problem(bend_trials([log], KNOWN, 1e-3), places_of_log(log, KNOWN), KNOWN, TENDONS, SETTINGS)
+    x, deviation = problem.begin(), np.full(len(problem.coordinates), 2e-3)
+    x[problem.free.index("oblique_cos")] = -0.1
+    residuals = [np.full(len(trial.angle), 1e-3) for trial in problem.trials]
+    count = sum(map(len, residuals))
+    other = x.copy()
+    other[problem.free.index("oblique_cos")] = -0.2
+    other[problem.free.index("damping")] += 0.1
+    other[problem.free.index("friction")] += 1e-3
+    found = Fit(problem, x, 1e-3, residuals, [], 1, (Rival(other, excess),))
+    known = Knowledge(deviation, np.diag(deviation**-2.0), 1.0, 0.0, count, problem.prior())
+    missing = {name for name, one in told_of_bends(found, known).items() if not one.known}
+    if excess < 1.96**2:
+        assert missing >= {"stiffness", "stiffness_across", "damping"} and not missing & {"friction", "delay"}
+    else:
+        assert not missing & {"stiffness", "stiffness_across", "damping", "stiffness_axis_deg"}
+    # of readings that are alike a quarter as many count, and the same difference is no more significant
+    alike = Knowledge(deviation, np.diag(deviation**-2.0), 1.0, 0.0, 0.25 * count, problem.prior())
+    assert not told_of_bends(found, alike)["damping"].known
+    turned = x.copy()
+    turned[problem.free.index("oblique_cos")], turned[problem.free.index("oblique_sin")] = -0.08, -0.06
+    told = told_of_bends(Fit(problem, x, 1e-3, residuals, [], 1, (Rival(turned, 1.0),)), known)
+    assert not told["stiffness_axis_deg"].known and told["damping"].known

@@ -101,6 +101,25 @@ def test_a_simulated_wrist_in_two_planes_is_found_again_from_its_log(tmp_path: P
         assert told[name].known and told[name].low < value < told[name].high, name
 
 
+@pytest.mark.parametrize("ratio", [1.3, 0.75])
+def test_springs_that_differ_between_planes_are_found_where_equal_ones_are_believed(
+    tmp_path: Path, ratio: float
+) -> None:
+    """No tendon of these motions goes slack; a search that lets some go slack ends in a wrong minimum."""
+    motion = ("simulate.reference.kind=circumduction", "simulate.controller=pd-ff", f"wrist.flexion_ratio={ratio}")
+    log, search = seen(simulated(tmp_path, MOTORS, *motion), 0.003, 4), IdentifySettings()
+    problem = bend_problem(bend_trials([log], WRIST, search.step), places_of_log(log, WRIST), WRIST, TENDONS, search)
+    found = fit(problem)
+    told = told_of_bends(found, knowledge(found))
+    truth = {"stiffness": WRIST.stiffness, "stiffness_across": ratio * WRIST.stiffness, "stiffness_axis_deg": 0.0,
+             "damping": WRIST.damping, "delay": 0.0}  # fmt: skip
+    for name, value in truth.items():
+        assert told[name].known and told[name].low < value < told[name].high, name
+    assert found.noise == pytest.approx(math.radians(0.003), rel=0.03)
+    (trial,) = problem.trials
+    assert problem.courses(trial, [found.x])[0][:, 2:].min() > 0.0
+
+
 @pytest.mark.parametrize(
     ("tendons", "numbers"),
     [("four", (1, 2, 4, 5)), ("five", (1, 2, 4, 5)), ("three", (1, 2, 3)), ("[{angle_deg: 0, multiplicity: 2}, "

@@ -21,7 +21,7 @@ from wristctl.config.wrist import WristParameters
 from wristctl.errors import UserError
 from wristctl.identification.arc_fit import Told
 from wristctl.identification.bend_trials import PLANES, BendTrial
-from wristctl.identification.fit import ZERO, Coordinate, Fit, Problem, frame_noise, spool_zero
+from wristctl.identification.fit import SPOOL, ZERO, Coordinate, Fit, Problem, frame_noise, spool_zero
 from wristctl.identification.intervals import NORMAL_95, Knowledge, interval
 from wristctl.identification.lack_of_fit import Misfit
 from wristctl.identification.measured_trials import MOST_DELAYED, MeasuredTrial
@@ -34,8 +34,12 @@ from wristctl.wrist.tendon_layout import TendonPlace
 # Largest part of the springs' mean that an axis may have more or less, and error of a tendon's direction [rad].
 _OBLIQUE, _ASIDE = 0.6, 0.6
 _SHARED = ("stiffness", "damping", "tendon_stiffness", "friction", "sheath_friction", "presliding", "delay")
+# Pull by which tendons are tighter than believed where a search begins on that side [N].
+_TIGHTER = 6.0
 # Half an interval of the axis [deg] beyond which it is not told.
 _WIDEST_AXIS = 15.0
+# Half intervals beyond which a parameter's value in another minimum is another value.
+_ELSEWHERE = 2.0
 
 
 def oblique_of(wrist: WristParameters) -> tuple[float, float, float]:
@@ -92,6 +96,18 @@ class BendProblem(Problem):
     def free(self) -> tuple[str, ...]:
         """The parameters to find."""
         return tuple(name for name in self.unknowns if name not in self.settings.fixed)
+
+    def begins(self) -> list[Array]:
+        """As believed, and with all tendons tighter.
+
+        A tendon that the search lets go slack where it was tight leaves the wrist to its springs, which then seem to be
+        told. As slack begins with a kink, such a minimum is not left again; a search from the tight side finds others.
+        """
+        tighter = self.begin()
+        for coordinate, index in self.coordinates.items():
+            if coordinate.kind == SPOOL:
+                tighter[index] = _TIGHTER / self.start["tendon_stiffness"]
+        return [self.begin(), tighter]
 
     def prior(self) -> Array:
         """One over the standard deviation with which each coordinate is known beforehand; 0 where nothing is known."""
@@ -165,8 +181,12 @@ def covariance_of(fit: Fit, knowledge: Knowledge) -> Array:
 
 
 def told_of_bends(fit: Fit, knowledge: Knowledge) -> dict[str, Told]:
-    """Every parameter found, with its 95 % interval; without its ends where the readings do not tell it."""
-    problem, told = fit.problem, _springs_told(fit, knowledge)
+    """Every parameter found, with its 95 % interval; without its ends where the readings do not tell it.
+
+    They do not where another minimum fits as well and has the parameter elsewhere.
+    """
+    rivals = _equals(fit, knowledge)
+    problem, told = fit.problem, _springs_told(fit, knowledge, rivals)
     low, high = problem.bounds()
     for index, name in enumerate(problem.free):
         if name == "stiffness" or name.startswith("oblique"):
@@ -176,14 +196,21 @@ def told_of_bends(fit: Fit, knowledge: Knowledge) -> dict[str, Told]:
         tolerated = problem.settings.widest * unknown.tolerance
         wide = half > (math.log1p(tolerated) if unknown.log else tolerated)
         at_edge = unknown.low != 0.0 and min(fit.x[index] - low[index], high[index] - fit.x[index]) < 1e-6
-        if wide or at_edge or knowledge.assumed(index):
+        elsewhere = any(abs(x[index] - fit.x[index]) > _ELSEWHERE * half for x in rivals)
+        if wide or at_edge or elsewhere or knowledge.assumed(index):
             ends = (-math.inf, math.inf)
         scale, unit = (math.degrees(1.0), "deg") if name.startswith("direction") else (1.0, unknown.unit)
         told[name] = Told(scale * fit.values[name], scale * ends[0], scale * ends[1], unit, unknown.meaning)
     return told
 
 
-def _springs_told(fit: Fit, knowledge: Knowledge) -> dict[str, Told]:
+def _equals(fit: Fit, knowledge: Knowledge) -> list[Array]:
+    """Coordinates of other minima whose chi-square is not significantly more, counting independent readings only."""
+    count = sum(map(len, fit.residuals))
+    return [rival.x for rival in fit.rivals if rival.excess * knowledge.effective < NORMAL_95**2 * count]
+
+
+def _springs_told(fit: Fit, knowledge: Knowledge, rivals: Sequence[Array]) -> dict[str, Told]:
     """Stiffness along the axis and across it, and the axis, by the first order of the ellipse's numbers."""
     free, values = fit.problem.free, fit.values
     at = [free.index(name) for name in ("stiffness", "oblique_cos", "oblique_sin")]
@@ -191,18 +218,26 @@ def _springs_told(fit: Fit, knowledge: Knowledge) -> dict[str, Told]:
     mean, p, q = (values[name] for name in ("stiffness", "oblique_cos", "oblique_sin"))
     springs, size = springs_of(mean, p, q), max(math.hypot(p, q), 1e-9)
     side = 1.0 if p >= 0.0 else -1.0
+    others = [
+        [values[name] for name in ("stiffness", "oblique_cos", "oblique_sin")]
+        for values in (fit.problem.values(x) for x in rivals)
+    ]
     told = {}
     for name, sign, meaning in (("stiffness", side, "along the axis"), ("stiffness_across", -side, "across the axis")):
         value = mean * (1.0 + sign * size)
         slope = np.array([value, sign * mean * p / size, sign * mean * q / size])
         half = NORMAL_95 * math.sqrt(slope @ covariance @ slope)
         ends = (value - half, value + half)
-        if half > fit.problem.settings.widest * value:
+        same_axis = (m * (1.0 + sign * (p * other_p + q * other_q) / size) for m, other_p, other_q in others)
+        elsewhere = any(abs(other - value) > _ELSEWHERE * half for other in same_axis)
+        if elsewhere or half > fit.problem.settings.widest * value:
             ends = (-math.inf, math.inf)
         told[name] = Told(value, *ends, "N m/rad", f"bending stiffness {meaning}")
     slope = np.degrees([0.0, -q, p]) / (2.0 * size**2)
     axis, half = springs["stiffness_axis_deg"], NORMAL_95 * math.sqrt(slope @ covariance @ slope)
-    ends = (axis - half, axis + half) if half < _WIDEST_AXIS else (-math.inf, math.inf)
+    turns = ((springs_of(*other)["stiffness_axis_deg"] - axis + 45.0) % 90.0 - 45.0 for other in others)
+    elsewhere = any(abs(turn) > _ELSEWHERE * half for turn in turns)
+    ends = (-math.inf, math.inf) if elsewhere or half >= _WIDEST_AXIS else (axis - half, axis + half)
     told["stiffness_axis_deg"] = Told(axis, *ends, "deg", "axis of the springs' ellipse, from ulnar toward flexion")
     return told
 

@@ -24,6 +24,13 @@ _NUDGE, _NUDGE_M = 1e-4, 1e-6
 _OFF_THE_EDGE = 0.02
 # Evaluations of one search; 10 to 20 are usual.
 _MOST = 200
+# Evaluations after which several beginnings are compared, and part of the best's chi-square by which others that go on
+# may have more.
+_FEW, _CLOSE = 12, 0.05
+# Chi-square by the parabola through a minimum below which another end is the same minimum.
+_APART = 4.0
+# Linearisations of so many last points are kept.
+_KEPT = 4
 
 
 # Least noise of a marker's angle [rad].
@@ -91,6 +98,10 @@ class Problem:
             if name in NOT_NEGATIVE:
                 x[index] = max(x[index], _OFF_THE_EDGE)
         return x
+
+    def begins(self) -> list[Array]:
+        """Coordinates at which searches begin, of which the best is taken."""
+        return [self.begin()]
 
     def bounds(self) -> tuple[Array, Array]:
         """Least and largest coordinates."""
@@ -188,6 +199,13 @@ def linearise(problem: Problem, x: Array) -> Linearisation:
     return Linearisation([each for each, _ in columns], [each for _, each in columns])
 
 
+class Rival(NamedTuple):
+    """Coordinates where another search ended, and by how much more chi-square [1] than the best one."""
+
+    x: Array
+    excess: float
+
+
 @dataclass(frozen=True)
 class Fit:
     """Result of a search over a wrist's parameters."""
@@ -200,6 +218,8 @@ class Fit:
     """Marker's less expected angle, of each trial (F,) [rad]."""
     slopes: list[Array]
     evaluations: int
+    rivals: tuple[Rival, ...] = ()
+    """Other minima, where searches ended that began elsewhere."""
 
     @property
     def values(self) -> dict[str, float]:
@@ -220,38 +240,84 @@ def fit(problem: Problem) -> Fit:
     """The coordinates of least squares, with what is known beforehand counting by its own standard deviation.
 
     Where the residuals are not of the size that they were weighed with, the search goes on from there with their own.
+    Of several beginnings the best after a few evaluations goes on, and those that are nearly as good.
     BLAS has one thread: on matrices this small its others only wait for each other, on cores that simulate.
     """
-    weights, evaluations = problem.prior(), 0
-    weighted = weights > 0.0
-    bounds = problem.bounds()
-    x = np.clip(problem.begin(), *bounds)
-    noise, weighed = max(frame_noise([trial.angle for trial in problem.trials]), _LEAST_NOISE), np.inf
-    last: tuple[Array, Linearisation] | None = None
-
-    def at(x: Array) -> Linearisation:
-        nonlocal last, evaluations
-        if last is None or not np.array_equal(last[0], x):
-            last, evaluations = (x.copy(), linearise(problem, x)), evaluations + 1
-        return last[1]
-
-    def rows(x: Array) -> Array:
-        parts = [(e - t.angle) / weighed for e, t in zip(at(x).expected, problem.trials, strict=True)]
-        return np.concatenate([*parts, (weights * x)[weighted]])
-
-    def slopes(x: Array) -> Array:
-        return np.concatenate([*(slope / weighed for slope in at(x).slopes), np.diag(weights)[weighted]])
-
+    search = _Search(problem)
+    noise = max(frame_noise([trial.angle for trial in problem.trials]), _LEAST_NOISE)
+    begins = [np.clip(x, *problem.bounds()) for x in problem.begins()]
     with threadpool_limits(limits=1, user_api="blas"):
-        while abs(np.log(weighed / noise)) > 0.05 and evaluations < _MOST:
+        if len(begins) > 1:
+            begins = sorted((search.descend(x, noise, _FEW) for x in begins), key=lambda x: search.cost(x, noise))
+        first, *others = begins
+        minima = [search.settle(first, noise)]
+        (x, noise), *_ = minima
+        for rival in search.rivals(others, x, noise):
+            if rival.excess < _CLOSE * search.cost(x, noise):
+                minima.append(search.settle(rival.x, noise))
+        x, noise = min(minima, key=lambda minimum: search.cost(minimum[0], noise))
+        rivals = search.rivals([end for end, _ in minima], x, noise)
+        return Fit(problem, x, noise, search.residuals(x), search.at(x).slopes, search.evaluations, tuple(rivals))
+
+
+class _Search:
+    """Least squares of a problem, its linearisations counted and kept while a search stays where it was."""
+
+    def __init__(self, problem: Problem) -> None:
+        self.problem, self.weights, self.evaluations = problem, problem.prior(), 0
+        self._kept: dict[bytes, Linearisation] = {}
+
+    def at(self, x: Array) -> Linearisation:
+        """Linearisation at coordinates x."""
+        if (key := x.tobytes()) not in self._kept:
+            if len(self._kept) >= _KEPT:
+                del self._kept[next(iter(self._kept))]
+            self._kept[key] = linearise(self.problem, x)
+            self.evaluations += 1
+        return self._kept[key]
+
+    def residuals(self, x: Array) -> list[Array]:
+        """Measured less expected readings of each trial."""
+        return [t.angle - e for e, t in zip(self.at(x).expected, self.problem.trials, strict=True)]
+
+    def cost(self, x: Array, noise: float) -> float:
+        """Chi-square of readings with this noise, and of what is known beforehand."""
+        squares = sum(float(residual @ residual) for residual in self.residuals(x))
+        return squares / noise**2 + float(np.sum((self.weights * x) ** 2))
+
+    def rivals(self, ends: Sequence[Array], x: Array, noise: float) -> list[Rival]:
+        """Those ends that are not on the slopes of the minimum x: a parabola through it would have them much higher."""
+        squares, rivals = self.weights**2, list[Rival]()
+        for end in ends:
+            away, excess = end - x, self.cost(end, noise) - self.cost(x, noise)
+            parabola = sum(float(np.sum((slope @ away) ** 2)) for slope in self.at(x).slopes) / noise**2
+            if parabola + float(squares @ away**2) > max(_APART, 2.0 * excess):
+                rivals.append(Rival(end, excess))
+        return rivals
+
+    def descend(self, x: Array, noise: float, most: int) -> Array:
+        """Coordinates after at most so many evaluations from x."""
+        weighted = self.weights > 0.0
+
+        def rows(x: Array) -> Array:
+            parts = [-residual / noise for residual in self.residuals(x)]
+            return np.concatenate([*parts, (self.weights * x)[weighted]])
+
+        def slopes(x: Array) -> Array:
+            return np.concatenate([*(slope / noise for slope in self.at(x).slopes), np.diag(self.weights)[weighted]])
+
+        bounds = self.problem.bounds()
+        solution = least_squares(rows, x, slopes, bounds=bounds, x_scale="jac", xtol=1e-5, ftol=1e-8, max_nfev=most)
+        end: Array = solution.x
+        return end
+
+    def settle(self, x: Array, noise: float) -> tuple[Array, float]:
+        """The minimum from x, and the standard deviation of its residuals, with which they are weighed there."""
+        weighed, last = np.inf, self.evaluations + _MOST
+        while abs(np.log(weighed / noise)) > 0.05 and self.evaluations < last:
             weighed = noise
-            solution = least_squares(
-                rows, x, slopes, bounds=bounds, x_scale="jac", xtol=1e-5, ftol=1e-8, max_nfev=_MOST
-            )
-            x = solution.x
-            residuals = [trial.angle - expected for trial, expected in zip(problem.trials, at(x).expected, strict=True)]
-            count = sum(map(len, residuals))
-            noise = float(
-                np.sqrt(sum(float(residual @ residual) for residual in residuals) / max(1, count - len(problem.free)))
-            )
-    return Fit(problem, x, noise, residuals, at(x).slopes, evaluations)
+            x = self.descend(x, weighed, _MOST)
+            residuals = self.residuals(x)
+            squares, count = sum(float(residual @ residual) for residual in residuals), sum(map(len, residuals))
+            noise = float(np.sqrt(squares / max(1, count - len(self.problem.free))))
+        return x, noise
