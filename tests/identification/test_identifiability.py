@@ -56,7 +56,7 @@ def test_what_is_predicted_of_a_faster_move_comes_true(slow: Slow) -> None:
 
 def test_a_hand_believed_heavier_makes_everything_stiffer_and_leaves_the_delay() -> None:
     """Angles at given spools depend on ratios, so that masses believed 1 % larger scale all the rest by 1 %."""
-    trials, _ = logged(3, poses=(LEVEL,), directions=("ulnar",))
+    trials, _ = logged(1, poses=(LEVEL,), directions=("ulnar",))
     fitted = fit(problem(trials))
     moved = budget(fitted, knowledge(fitted))
     heavier = {

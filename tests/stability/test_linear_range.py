@@ -50,7 +50,7 @@ def test_the_boundary_layer_ends_where_sigma_has_its_width() -> None:
     found = row("smc-tracking", gains, BEHIND).analysed(0.0)
     assert found is not None
     omega = found.margins.most.omega
-    assert wide[name].swing == pytest.approx(10.0 / abs(20.0 + 250.0 / (1j * omega) + 1j * omega), rel=0.06)
+    assert wide[name].swing == pytest.approx(10.0 / abs(20.0 + 250.0 / (1j * omega) + 1j * omega), rel=0.15)
     assert name not in _limits(row("computed-torque", "default", BEHIND))
 
 

@@ -118,6 +118,8 @@ def _taken(descriptor: int) -> bool:
     """Take a file's lock where nobody has it; also where the file system has none."""
     try:
         fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except OSError as error:
-        return error.errno in _NO_LOCKS
+    except BlockingIOError:
+        return False
+    except OSError:  # no room for a lock, or no locks at all
+        pass
     return True
