@@ -119,13 +119,13 @@ each first, with one budget.
 
 ## When each wins
 
-- **Computed torque or MPC with a disturbance observer** (ct-dob, mpc): behind motors, tendons and a camera alike with LQI.
-  MPC is the same controller wherever no tendon saturates, and a step costs a hundred times as much (some 13 us). After a
-  jump they come to rest, since they know what their motors withhold. With PID or a sliding term in front (pid-dob,
-  smc-dob) they err no less, and the latter swings in some worlds.
-- **Feedforward and PID** (pid-ff): no model but the feedforward. On the wrist as believed it is quiet from 1 to 10 ms; of
-  drawn ones behind a camera its preset swings on one in five to eight. PD alone (pd-ff) leaves what an integral would
-  take away.
+- **Computed torque or MPC with a disturbance observer** (ct-dob, mpc): behind motors, tendons and a camera alike with
+  LQI. MPC is the same controller wherever no tendon saturates, and a step costs a hundred times as much (some 13 us).
+  After a jump they come to rest, since they know what their motors withhold. With PID or a sliding term in front
+  (pid-dob, smc-dob) they err no less, and the latter swings in some worlds.
+- **Feedforward and PID** (pid-ff): no model but the feedforward. On the wrist as believed it is quiet from 1 to 10 ms;
+  of drawn ones behind a camera its preset swings on one in five to eight. PD alone (pd-ff) leaves what an integral
+  would take away.
 - **LQI**: like pid-ff, with weights instead of gains; it keeps the wrist's own spring in the loop.
 - **ADRC**: needs an inertia and nothing else, and pays for it in accuracy: it has to observe spring and gravity too.
 - **Super-twisting and adaptive control** (super-twisting, mrac): made for torques as commanded and angles as they are
@@ -135,8 +135,8 @@ each first, with one budget.
 - **Networks** (nc, nn-mrac): no better than an integral here. nn-mrac is the group's law (arXiv 2510.19068) as far as
   it is specified; its published reference model is far slower.
 - **Rivals of other groups** (impedance, fopi): an impedance with a network for what the model lacks, and a fractional
-  integral of the error; in smooth motions behind motors and a camera the former is not told from LQI. DeePC is not here:
-  its data are those of one rig at one period, and on data of the believed wrist without noise it is the predictive
+  integral of the error; in smooth motions behind motors and a camera the former is not told from LQI. DeePC is not
+  here: its data are those of one rig at one period, and on data of the believed wrist without noise it is the predictive
   control that `mpc` is (Coulson, Lygeros and Dorfler, ECC 2019).
 - **Jumps**: behind motors (steps) none is told from feedforward for the better. Ask for motions instead. With torques
   as commanded (ideal, steps) MPC errs least, and all that have feedback beat feedforward.
