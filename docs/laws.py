@@ -136,8 +136,8 @@ each first, with one budget.
   it is specified; its published reference model is far slower.
 - **Rivals of other groups** (impedance, fopi): an impedance with a network for what the model lacks, and a fractional
   integral of the error; in smooth motions behind motors and a camera the former is not told from LQI. DeePC is not
-  here: its data are those of one rig at one period, and on data of the believed wrist without noise it is the predictive
-  control that `mpc` is (Coulson, Lygeros and Dorfler, ECC 2019).
+  here: its data are those of one rig at one period, and on data of the believed wrist without noise it is the
+  predictive control that `mpc` is (Coulson, Lygeros and Dorfler, ECC 2019).
 - **Jumps**: behind motors (steps) none is told from feedforward for the better. Ask for motions instead. With torques
   as commanded (ideal, steps) MPC errs least, and all that have feedback beat feedforward.
 - **The paper's law** (smc): exchanged gains swing, and with gains of ours it is a feedforward.
