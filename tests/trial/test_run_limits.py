@@ -55,7 +55,7 @@ def test_the_files_of_a_stopped_trial_stop_at_the_very_tick(
     assert stop.clock - PERIOD == pytest.approx(log["clock"].iloc[-1], abs=1e-6)
     assert stop_of(run._replace(values=run.values.iloc[:-1])) is None
     picture = residuals_over_time(run, stop)
-    marked = [panel for panel in picture.axes if "stopped here" in panel.get_title(loc="left")]
+    marked = [panel for panel in picture.axes if "stopped here" in " ".join(panel.get_title(loc="left").split())]
     assert (
         len(picture.axes) == len(LIMITS) and len(marked) == 1 and marked[0].get_title(loc="left").startswith(residual)
     )
