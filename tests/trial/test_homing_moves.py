@@ -319,6 +319,8 @@ def test_a_wrist_that_stays_bent_passes_its_checks_and_a_dead_motor_does_not(
     zero = Zero((1,) * 4, tuple(PER_RADIAN), GLUED, (0.0,) * 4)
     straight = check_zero(board, Marker(board, angle), rig, WRIST, plane, zero)  # type: ignore[arg-type]
     assert straight == pytest.approx((GLUED,), abs=math.radians(0.05))
+    furthest = min(min(where) for _, where, _ in board.told)
+    assert furthest == -2 * slack, "a motor that is wired the other way round reels in what is let out"
     for dead in range(4):
         board.position[:] = -slack
         with pytest.raises(SafetyStop, match=rf"axis {dead} .* bends the wrist by"):

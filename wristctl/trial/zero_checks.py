@@ -43,7 +43,7 @@ def check_zero(
 
     def bent(axis: int, by: int, straight: Bend) -> tuple[Bend, Reading]:
         """The bend that an axis makes of the wrist at rest, and where that rests after it."""
-        positions = np.full(AXES, 3 * slack)
+        positions = np.full(AXES, 2 * slack)
         positions[axis] = by + round(expected.toward(axis, _bend_of(rest).since(straight)) * expected.steps())
         patience = _reeled(board, zero, positions)
         patience.wait(2.0 * homing.rest)
