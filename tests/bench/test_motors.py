@@ -10,9 +10,10 @@ import pytest
 from wristctl.bench.bench_wrist import BenchWrist
 from wristctl.bench.motors import spool_state_of, stepper_of
 from wristctl.board.emulator.atmega2560 import EDGE
-from wristctl.config.bench import BenchSettings, Motors, StepperActuator
+from wristctl.config.bench import BenchSettings, Motors, StepperActuator, WeakenedPlant
 from wristctl.config.plant import Disturbances, Push
 from wristctl.config.wrist import WristParameters
+from wristctl.wrist.out_of_plane import across_of
 
 WRIST = WristParameters()
 MS = 16_000
@@ -26,8 +27,9 @@ RADIUS = BenchSettings().actuator.pulley_radius
 class Pins:
     """A wrist whose board is a test: drives switched on at once, steps wherever they are wanted."""
 
-    def __init__(self, on: int = 0b1111, **motors: object) -> None:
-        self.settings = BenchSettings(motors=Motors.model_validate({"slack": TAUT, **motors}))
+    def __init__(self, on: int = 0b1111, plant: WeakenedPlant | None = None, **motors: object) -> None:
+        turned = Motors.model_validate({"slack": TAUT, **motors})
+        self.settings = BenchSettings(motors=turned, plant=plant or WeakenedPlant())
         self.wrist = BenchWrist(self.settings, WRIST)
         self.edge(0, "C", ~on & 0xF)
 
@@ -186,6 +188,22 @@ def test_a_tendon_alone_swings_the_wrist_as_much_across_the_plane_as_in_it_at_ev
     course = pins.after(600).truth()
     assert np.ptp(course.angle[60:150]) > 0.1 * course.angle[-1], "it swings"
     assert np.abs(course.angle + course.across).max() < 0.03 * np.abs(course.angle).max()
+
+
+def test_friction_inside_the_wrist_holds_it_across_the_plane_as_in_it() -> None:
+    """Let go, it stays bent toward the tendon that has pulled, by its torque over the stiffness less gravity's."""
+    pins = Pins(plant=WeakenedPlant(inner_friction=5e-3), slack=(1e-3, 1e-3, 0.0, 1e-3))
+    pins.steps(100, 2)
+    pulled = pins.after(600).truth()
+    assert np.abs(pulled.angle + pulled.across).max() < 0.03 * np.abs(pulled.angle).max()
+    pins.steps(140, 2, begin=600 * MS, back=True)
+    slack = pins.after(2000).truth()
+    assert slack.pull[-1].max() == 0.0
+    softer = WRIST.model_copy(update={"stiffness": pins.settings.plant.stiffness_scale * WRIST.stiffness})
+    stays = 5e-3 / across_of(softer, (1, 1, 1, 1)).stiffness
+    assert slack.angle[-1] == pytest.approx(-slack.across[-1], rel=0.1) and slack.angle[-1] == pytest.approx(
+        stays, rel=0.15
+    )
 
 
 def test_its_course_is_told_since_a_time_at_the_ends_of_milliseconds() -> None:

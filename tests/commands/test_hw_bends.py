@@ -20,6 +20,7 @@ from wristctl.config.wrist import WristParameters
 from wristctl.errors import UserError
 from wristctl.identification.bend_trials import bend_trials
 from wristctl.plotting.animation import animation
+from wristctl.plotting.page import page
 from wristctl.plotting.spatial_view import spatial_view
 from wristctl.records import Run, start_run
 from wristctl.simulation.bend_course import BEND_METRICS
@@ -84,6 +85,7 @@ def test_it_is_drawn_in_the_plane_of_bends_and_in_space(whole: Whole) -> None:
     wanted = np.array(space["wanted"]) * space["units"]["angle"]
     assert np.degrees(np.hypot(*wanted.T)).max() == pytest.approx(8.0, abs=0.1)
     assert animation(whole.run) is None
+    assert 'id="space"' in page(whole.run, whole.run.manifest)
 
 
 def test_what_homing_has_found_is_kept_by_tendon_and_camera(whole: Whole) -> None:

@@ -13,7 +13,7 @@ from tests.trial.conftest import WRIST, Run, settings_of
 from wristctl.board.driver import Board
 from wristctl.board.messages import State
 from wristctl.errors import UserError
-from wristctl.trial.experiment import spared
+from wristctl.trial.experiment import Experiment, spared
 from wristctl.trial.homing import slacken
 from wristctl.trial.log import LOG
 from wristctl.trial.safety import SafetyStop
@@ -117,15 +117,34 @@ def test_a_stored_zero_is_checked_on_a_wrist_that_has_had_time_to_straighten(
         times.append(board.transport.now())
         return position
 
-    def checked(board: Board, *given: Any) -> None:
+    def checked(board: Board, *given: Any) -> tuple[float, ...]:
         times.append(board.transport.now())
-        check_zero(board, *given)
+        return check_zero(board, *given)
 
     monkeypatch.setattr("wristctl.trial.experiment.slacken", slackened)
     monkeypatch.setattr("wristctl.trial.experiment.check_zero", checked)
     done = experiment()
     assert done.error is None and len(times) == 2
     assert times[1] - times[0] >= settings_of().homing.let_go > 0.0
+
+
+def test_the_zero_of_a_further_plane_is_what_its_checks_find(experiment: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+    seen: list[tuple[float, ...]] = []
+    at_rest = Experiment._at_rest
+
+    def resting(performed: Experiment, board: Board, tracking: Any, *given: Any) -> Any:
+        seen.append(tracking.zero)
+        return at_rest(performed, board, tracking, *given)
+
+    def checked(*given: Any) -> tuple[float, ...]:
+        return (check_zero(*given)[0] + 0.01,)
+
+    monkeypatch.setattr(Experiment, "_at_rest", resting)
+    monkeypatch.setattr("wristctl.trial.experiment.check_zero", checked)
+    done = experiment(directions=("ulnar", "flexion"))
+    assert done.error is None and len(seen) >= 3
+    assert seen[0] == (0.0,), "the calibration's"
+    assert seen[-1][0] == pytest.approx(0.01, abs=2e-3), "the wrist is straight, and the checks say 0.01 rad more"
 
 
 def test_stored_positions_of_another_start_of_the_board_are_refused(experiment: Run, at_zero: Any) -> None:
