@@ -171,9 +171,8 @@ def page(run: Run, manifest: Manifest, beside: Path | None = None) -> str:
 
 
 def _in_space(run: Run) -> dict[str, Any] | None:
-    """What the page plays of a run in two planes; None of any other run, for which nothing more is imported."""
-    tried = (run.path / "data/trials.csv").is_file() and run.config.hw_run.planes > 1
-    if not tried and not (run.path / "data/bends.csv").is_file():
+    """What the page plays of a run in two planes; None of any other run. Without its tables nothing is imported."""
+    if not any((run.path / "data" / table).is_file() for table in ("bends.csv", "trials.csv")):
         return None
     from wristctl.plotting.spatial_view import spatial_view
 

@@ -42,7 +42,8 @@ class DataSet:
             files = sorted(file for file in folder.rglob(f"*{Path(ending).name}") if _named(file, ending))
             if not files:
                 raise UserError(f"no file {ending}", str(folder), f"clone {self.place}")
-            found[ending] = next((file for file in files if sha256_of(file) == digest), files[0])
+            alike = (file for file in files if len(files) > 1 and sha256_of(file) == digest)
+            found[ending] = next(alike, files[0])
         self.check(found)
         return found
 

@@ -75,7 +75,8 @@ def repeat(
             plant = plant_of(wrist, loops[k].plant)
             row = lane % rows
             followed, wound = motions[which[row]], loop.actuator.level == "tendon"
-            gathered[row].add(simulation(outcome, lane, followed, plant, loop.plant.model, expected, wound))
+            course = trajectory(outcome, lane, followed, plant, loop.plant.model, expected, wound)
+            gathered[row].add(simulation(outcome, lane, course))
     return [row_results.repeated(wrist) for row_results in gathered]
 
 
@@ -92,17 +93,8 @@ def _refuse_nan(law: Controller, outcome: Outcome, time: Array) -> None:
             raise UserError(problem, origin.reference, "return a finite torque [N m] whatever it sees")
 
 
-def simulation(
-    outcome: Outcome,
-    index: int,
-    followed: Motion,
-    plant: WristParameters,
-    model: str,
-    expected: float | None = None,
-    wound: bool = False,
-) -> Simulation:
-    """The recorded rollout `index` with all its metrics; as `trajectory` has it."""
-    course = trajectory(outcome, index, followed, plant, model, expected, wound)
+def simulation(outcome: Outcome, index: int, course: Trajectory) -> Simulation:
+    """The recorded rollout `index`, its `trajectory`, with all its metrics."""
     metrics = {name: float(values[index]) for name, values in outcome.metrics.items()}
     failed, until = bool(outcome.failed[index]), float(outcome.until[index])
     return Simulation(course, metrics | of_trajectory(course), failed, until)

@@ -4,6 +4,8 @@ import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
+import numpy as np
+
 from wristctl.config.hw_run import RigSettings
 from wristctl.config.wrist import WristParameters
 from wristctl.trial.safety import SafetyStop
@@ -38,6 +40,11 @@ class Bend(NamedTuple):
     def since(self, before: "Bend") -> "Bend":
         """By how much it differs from one before."""
         return Bend(self.theta - before.theta, self.away - before.away)
+
+
+def middle(bends: Sequence[Bend]) -> Bend:
+    """Mean of bends."""
+    return Bend(*np.mean(bends, axis=0).tolist())
 
 
 class ExpectedMoves:

@@ -21,7 +21,7 @@ from wristctl.board.driver import Board
 from wristctl.board.messages import AXES, JOG_RATE
 from wristctl.config.hw_run import Homing, RigSettings
 from wristctl.config.wrist import WristParameters
-from wristctl.trial.expected_moves import Bend, ExpectedMoves
+from wristctl.trial.expected_moves import Bend, ExpectedMoves, middle
 from wristctl.trial.safety import SafetyStop
 from wristctl.trial.spatial_moves import SpatialMoves
 from wristctl.trial.spools import Spools, spools_of
@@ -88,6 +88,11 @@ class _Line(NamedTuple):
     friction: float
     """Path between reeling in and letting go for the same bend [steps]."""
     rest: Bend
+
+    @property
+    def per_radian(self) -> float:
+        """Microsteps that a radian takes."""
+        return 1.0 / abs(self.slope)
 
     def taut(self, straight: float) -> float:
         """Where the tendon is just taut on a wrist at this angle [steps]."""
@@ -160,9 +165,9 @@ class _Finder:
         Steps that are not the model's are measured once more, with more time for each reading, before they are judged.
         """
         measured = self._measured(axis, about, 1)
-        if not self._expected.has_steps(1.0 / abs(measured.slope), self._stays):
+        if not self._expected.has_steps(measured.per_radian, self._stays):
             measured = self._measured(axis, about, _AGAIN)
-        self._expected.judge_steps(axis, 1.0 / abs(measured.slope), self._stays)
+        self._expected.judge_steps(axis, measured.per_radian, self._stays)
         return measured
 
     def _measured(self, axis: int, about: int, slowly: int) -> _Line:
@@ -259,9 +264,9 @@ def find_zero(
     about = [finder.sense(axis, (1, -1) if signs is None else (signs[axis],)) for axis in range(AXES)]
     finder.slacken()
     lines = [finder.line(axis, about[axis]) for axis in range(AXES)]
-    straight = Bend(*np.mean([line.rest for line in lines], axis=0).tolist())
+    straight = middle([line.rest for line in lines])
     taut = [line.taut(expected.along(axis, straight)) for axis, line in enumerate(lines)]
-    slopes = tuple(1.0 / abs(line.slope) for line in lines)
+    slopes = tuple(line.per_radian for line in lines)
     slack, sticking = tuple(spools.step * at for at in taut), tuple(spools.step * line.friction for line in lines)
     stays = max(expected.size(line.rest.since(straight)) for line in lines)
     for axis in range(AXES):

@@ -7,7 +7,7 @@ from wristctl.board.driver import Board
 from wristctl.board.messages import AXES, JOG_RATE
 from wristctl.config.hw_run import RigSettings
 from wristctl.config.wrist import WristParameters
-from wristctl.trial.expected_moves import LEAST, Bend
+from wristctl.trial.expected_moves import LEAST, Bend, middle
 from wristctl.trial.homing import Zero, moves_of, rest_of, slacken
 from wristctl.trial.spools import on_plus_side, spools_of
 from wristctl.trial.supervised_wait import Patience, Reading
@@ -59,7 +59,7 @@ def check_zero(
             if expected.size(bend) < LEAST * reeled / expected.steps():
                 raise expected.bends_too_little(axis, bend.theta, reeled / expected.steps())
             rests.append(_bend_of(rest))
-        straight = Bend(*np.mean(rests, axis=0).tolist())
+        straight = middle(rests)
     for axis in range(AXES):
         bend, rest = bent(axis, reeled, straight)
         expected.judge_small_move(axis, reeled, bend)
