@@ -10,23 +10,34 @@ import pytest
 from tests.trial.conftest import WRIST, settings_of
 from wristctl.bench.virtual_bench import VirtualBench
 from wristctl.board.driver import Board
+from wristctl.config.hw_run import RigSettings
 from wristctl.trial.homing import Zero, find_zero
 from wristctl.trial.motors_ready import prepare
 from wristctl.trial.safety import SafetyStop
 from wristctl.trial.testbeds import EmulatedTestbed
+from wristctl.trial.tracking import Tracking
+from wristctl.trial.zero_checks import check_zero
 from wristctl.vision.view import View
 
 QUICK = {"move": 1e-4, "rest": 0.15, "frames": 2, "slack": 8e-4, "let_go": 1.0}
 SLACK = (3e-4, 2e-4, 4e-4, 2.5e-4)
 
 
-def homed(signs: tuple[int, ...] | None = None, **motors: Any) -> tuple[Zero, VirtualBench]:
-    settings = settings_of(homing=QUICK, bench={"motors": {"slack": SLACK, **motors}})
+def settings_with(plant: dict[str, Any] | None = None, **motors: Any) -> RigSettings:
+    return settings_of(homing=QUICK, bench={"motors": {"slack": SLACK, **motors}, "plant": plant or {}})
+
+
+def rig_of(settings: RigSettings) -> tuple[VirtualBench, Board, Tracking]:
     bench = VirtualBench(settings.bench, WRIST, 0)
-    tracking = EmulatedTestbed(bench, settings, [View()], None).tracking()
     board = Board(bench.transport)
     board.connect()
     prepare(board, settings)
+    return bench, board, EmulatedTestbed(bench, settings, [View()], None).tracking()
+
+
+def homed(signs: tuple[int, ...] | None = None, **motors: Any) -> tuple[Zero, VirtualBench]:
+    settings = settings_with(**motors)
+    bench, board, tracking = rig_of(settings)
     return find_zero(board, tracking, settings, WRIST, "ulnar", signs), bench
 
 
@@ -38,6 +49,18 @@ def test_slack_senses_and_steps_per_radian_are_found() -> None:
     assert zero.steps_per_radian == pytest.approx([2.0 * WRIST.tendon_offset / step] * 4, rel=0.12), "bends askew"
     assert max(zero.friction) < 5e-5
     assert bench.truth(bench.transport.now() - 0.01).reeled[-1] == pytest.approx(np.zeros(4), abs=5e-5)
+
+
+@pytest.mark.parametrize("friction", [2e-3, 5e-3])
+def test_friction_inside_the_wrist_turns_no_bend_aside(friction: float) -> None:
+    """Let go it stays bent by 0.6 and 1.6 deg, in its plane and across it."""
+    settings = settings_with({"inner_friction": friction})
+    bench, board, tracking = rig_of(settings)
+    zero = find_zero(board, tracking, settings, WRIST, "ulnar")
+    assert zero.slack == pytest.approx(SLACK, abs=5e-5 + 2e-2 * friction)
+    bench.face("flexion")
+    tracking.zero = (0.0,)
+    check_zero(board, tracking, settings, WRIST, "flexion", zero)
 
 
 def test_a_tendon_that_is_off_its_pulley_stops_homing() -> None:

@@ -327,13 +327,9 @@ def test_a_wrist_that_stays_bent_passes_its_checks_and_a_dead_motor_does_not(
             check_zero(board, Marker(board, partial(angle, dead)), rig, WRIST, plane, zero)  # type: ignore[arg-type]
 
 
-def test_a_wrist_that_stays_bent_may_take_other_steps_and_hold_its_tendons_longer() -> None:
-    """Twice as far from the model's; and by what its own friction stretches a tendon, both ways."""
-    expected, homing = ExpectedMoves(settings_of(), WRIST, "ulnar"), Homing()
-    steps, stays = expected.steps(), math.radians(1.0)
-    for share, with_friction, without in ((0.75, True, False), (0.65, False, False), (0.9, True, True)):
-        assert expected.has_steps(share * steps, stays) is with_friction
-        assert expected.has_steps(share * steps, math.radians(0.2)) is without, "noise"
+def test_a_wrist_that_stays_bent_may_hold_its_tendons_longer() -> None:
+    """By what its own friction stretches a tendon, both ways."""
+    expected, homing, stays = ExpectedMoves(settings_of(), WRIST, "ulnar"), Homing(), math.radians(1.0)
     softest = settings_of().safety.softest
     stretch = 2.0 * WRIST.stiffness * stays / (WRIST.tendon_offset * softest)
     for friction, refused in ((homing.sticks + 0.5 * stretch, False), (homing.sticks + 1.1 * stretch, True)):

@@ -114,17 +114,14 @@ class ExpectedMoves:
         self.judge_side(axis, moved)
         return math.nan
 
-    def has_steps(self, steps: float, stays: float = 0.0) -> bool:
-        """Whether steps per radian are those of the model, within `homing.steps_tolerance`.
-
-        Within twice that of a wrist that stays bent by `stays` [rad] where it is let go: friction turns a bend aside.
-        """
-        share = self._homing.steps_tolerance * (2.0 if stays > 0.5 * math.radians(self._homing.bend_deg) else 1.0)
+    def has_steps(self, steps: float) -> bool:
+        """Whether steps per radian are those of the model, within `homing.steps_tolerance`."""
+        share = self._homing.steps_tolerance
         return (1.0 - share) * self.steps() <= steps <= (1.0 + share) * self.steps(self._softest, _HARDER)
 
-    def judge_steps(self, axis: int, steps: float, stays: float = 0.0) -> None:
+    def judge_steps(self, axis: int, steps: float) -> None:
         """Raises SafetyStop where steps per radian are not those of the model, as `has_steps`."""
-        if self.has_steps(steps, stays):
+        if self.has_steps(steps):
             return
         fix = (
             "see the DIP switches of the drive and actuator.microstep, and measure the pulley (actuator.pulley_radius)"

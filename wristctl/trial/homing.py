@@ -5,8 +5,9 @@ steps pay out shows none and is tried the other way round. Then all tendons are 
 another, and each in turn is reeled in through its taut point. From there the bend grows linearly with the tendon, so a
 line through the bent readings crosses the straight angle at the taut point; its slope gives steps per radian.
 
-Friction inside a wrist leaves it bent where it was let go. So a bend counts from where the wrist rested before, and
-straight is the middle of where it rests after bends to all sides.
+Friction inside a wrist leaves it bent where it was let go. So a bend counts from where the wrist rested before: after a
+bend by the tendon opposite, since friction turns bends aside that follow another's. Straight is the middle of where it
+rests after bends to all sides.
 """
 
 import logging
@@ -27,7 +28,7 @@ from wristctl.trial.spatial_moves import SpatialMoves
 from wristctl.trial.spools import Spools, spools_of
 from wristctl.trial.supervised_wait import Patience, Reading
 from wristctl.trial.tracking import Tracking
-from wristctl.wrist.directions import ACTIVE
+from wristctl.wrist.directions import ACTIVE, OPPOSITE_AXES
 
 log = logging.getLogger(__name__)
 
@@ -129,7 +130,6 @@ class _Finder:
         self._bend = math.radians(settings.bend_deg)
         self._straight = Patience(board).reading(tracking, 4 * settings.frames)
         self._rest = expected.bend(self._straight, self._straight)
-        self._stays = 0.0
         self.directions = [math.nan] * AXES
         """Direction of each axis that has been measured in two planes [rad]."""
 
@@ -159,15 +159,21 @@ class _Finder:
         self._go()
         self._rest = self._rests()
 
+    def bend_once(self, axis: int, about: int) -> None:
+        """Let an axis that bends the wrist at `about` bend it, and go again: friction inside then holds it there."""
+        self._reel(axis, about + self._pull)
+        self._bent(axis)
+        self._let_go(axis, -2 * self._pull)
+
     def line(self, axis: int, about: int) -> _Line:
         """How the wrist bends by an axis that bends it at `about`. Lets go again.
 
         Steps that are not the model's are measured once more, with more time for each reading, before they are judged.
         """
         measured = self._measured(axis, about, 1)
-        if not self._expected.has_steps(measured.per_radian, self._stays):
+        if not self._expected.has_steps(measured.per_radian):
             measured = self._measured(axis, about, _AGAIN)
-        self._expected.judge_steps(axis, measured.per_radian, self._stays)
+        self._expected.judge_steps(axis, measured.per_radian)
         return measured
 
     def _measured(self, axis: int, about: int, slowly: int) -> _Line:
@@ -221,9 +227,8 @@ class _Finder:
         self._rest = self._rests()
 
     def _rests(self) -> Bend:
-        rest = self._expected.bend(self._straight, rest_of(self._board, self._tracking, self._expected, self._settings))
-        self._stays = max(self._stays, self._expected.size(rest))
-        return rest
+        rest = rest_of(self._board, self._tracking, self._expected, self._settings)
+        return self._expected.bend(self._straight, rest)
 
     def _reel(self, axis: int, reeled: int) -> None:
         self._at[axis] = reeled
@@ -263,7 +268,11 @@ def find_zero(
     finder = _Finder(board, tracking, spools, settings.homing, expected)
     about = [finder.sense(axis, (1, -1) if signs is None else (signs[axis],)) for axis in range(AXES)]
     finder.slacken()
-    lines = [finder.line(axis, about[axis]) for axis in range(AXES)]
+    measured: dict[int, _Line] = {}
+    for axis, opposite in OPPOSITE_AXES:
+        finder.bend_once(opposite, about[opposite])
+        measured |= {turn: finder.line(turn, about[turn]) for turn in (axis, opposite)}
+    lines = [measured[axis] for axis in range(AXES)]
     straight = middle([line.rest for line in lines])
     taut = [line.taut(expected.along(axis, straight)) for axis, line in enumerate(lines)]
     slopes = tuple(line.per_radian for line in lines)

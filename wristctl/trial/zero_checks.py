@@ -12,12 +12,10 @@ from wristctl.trial.homing import Zero, moves_of, rest_of, slacken
 from wristctl.trial.spools import on_plus_side, spools_of
 from wristctl.trial.supervised_wait import Patience, Reading
 from wristctl.trial.tracking import Tracking
-from wristctl.wrist.directions import ACTIVE
+from wristctl.wrist.directions import OPPOSITE_AXES
 
 # Share of `homing.pull` by which a tendon is reeled in to check it.
 _CHECKED = 1.2
-# Axes of tendons 1 and 5, which are opposite in either plane.
-_OPPOSITE = ACTIVE.index(1), ACTIVE.index(5)
 # Seconds in which a wrist that has been let go comes to rest, but for creep.
 _SETTLES = 0.5
 
@@ -27,8 +25,8 @@ def check_zero(
 ) -> tuple[float, ...]:
     """Let each tendon of a homed, slack wrist bend it a little, and leave it slack again; all must do as they should.
 
-    Friction inside a wrist leaves it bent where it was let go, and a tendon toward which it is bent is taut only
-    further on. So in one plane opposite tendons bend it first, and straight is the middle of where it rests after them.
+    Friction inside a wrist leaves it bent where it was let go, and turns a bend by another tendon aside. So opposite
+    tendons bend it in turn, each from where the other has left it, and straight is the middle of where it rests.
     Returns each camera's marker angle of the straight wrist [rad].
 
     Raises SafetyStop where a tendon is not slack, or a motor turns the wrong way or winds another tendon than its own.
@@ -41,30 +39,33 @@ def check_zero(
     rest = Patience(board).reading(tracking, 4 * homing.frames)
     expected.judge_slackened(expected.bend(held, rest))
 
-    def bent(axis: int, by: int, straight: Bend) -> tuple[Bend, Reading]:
+    def bent(axis: int, by: int) -> tuple[Bend, Reading]:
         """The bend that an axis makes of the wrist at rest, and where that rests after it."""
         positions = np.full(AXES, 2 * slack)
-        positions[axis] = by + round(expected.toward(axis, _bend_of(rest).since(straight)) * expected.steps())
+        positions[axis] = by
         patience = _reeled(board, zero, positions)
         patience.wait(2.0 * homing.rest)
         bend = expected.bend(rest, patience.reading(tracking, homing.frames))
         slacken(board, spools, homing, zero.signs, 2.0)
         return bend, rest_of(board, tracking, expected, homing)
 
-    straight = _bend_of(rest)
-    if settings.planes == 1:
-        rests = []
-        for axis in _OPPOSITE:
-            bend, rest = bent(axis, 2 * reeled, _bend_of(rest))
-            if expected.size(bend) < LEAST * reeled / expected.steps():
-                raise expected.bends_too_little(axis, bend.theta, reeled / expected.steps())
+    middles = []
+    for pair in OPPOSITE_AXES:
+        bend, rest = bent(pair[1], 2 * reeled)
+        if expected.size(bend) < LEAST * reeled / expected.steps():
+            raise expected.bends_too_little(pair[1], bend.theta, reeled / expected.steps())
+        rests, bends = [_bend_of(rest)], []
+        for axis in pair:
+            bend, rest = bent(axis, reeled)
+            bends.append(bend)
             rests.append(_bend_of(rest))
-        straight = middle(rests)
-    for axis in range(AXES):
-        bend, rest = bent(axis, reeled, straight)
-        expected.judge_small_move(axis, reeled, bend)
+        straight = middle(rests[1:])
+        for axis, before, bend in zip(pair, rests, bends, strict=False):
+            away = expected.toward(axis, straight.since(before)) * expected.steps()
+            expected.judge_small_move(axis, reeled + away, bend)
+        middles.append(straight)
     slacken(board, spools, homing, zero.signs)
-    return tuple(angle + bent for angle, bent in zip(tracking.zero, straight, strict=False))
+    return tuple(angle + bent for angle, bent in zip(tracking.zero, middle(middles), strict=False))
 
 
 def check_cocontraction(

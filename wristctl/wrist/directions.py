@@ -29,6 +29,8 @@ DIRECTIONS = {
 TENDONS = {1: (-1, -1), 2: (-1, 1), 3: (0, 0), 4: (1, -1), 5: (1, 1)}
 # Tendons that a motor winds, in the order of the board's axes; the one in the centre bends nothing.
 ACTIVE = tuple(number for number, place in TENDONS.items() if any(place))
+# Pairs of axes whose tendons lie opposite each other.
+OPPOSITE_AXES = tuple((ACTIVE.index(one), ACTIVE.index(other)) for one, other in ((1, 5), (2, 4)))
 
 
 def away_of(plane: str, positive: str) -> tuple[int, ...]:
