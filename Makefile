@@ -14,13 +14,15 @@ run: .venv/run
 	step() { echo; echo "== wristctl $$*"; said=$$($(BIN)/wristctl "$$@"); echo "$$said"; made=$${said##*$$'\n'}; }; \
 	answer() { kept=$$1; shift; echo "== wristctl $$*" >&2; \
 	  $(BIN)/wristctl "$$@" | awk -v RS= -v kept=",$$kept," \
-	    'index(kept, "," NR ",") { print } { made = $$0 } END { print "More: " made "/README.md" }'; }; \
+	    'index(kept, "," NR ",") { print } { made = $$0 } END { print made "/README.md" }'; }; \
+	page() { echo "$${1##*$$'\n'}"; }; \
 	step gen-data $(STUDY); data=$$made; \
 	step train $(STUDY) --data "$$data"; network=$$made; \
 	step tune $(STUDY) --network "$$network"; tuned=$$made; \
-	compared=$$(answer 1,2,3,4,5 compare $(STUDY) --network "$$network" --tuned "$$tuned"); \
+	compared=$$(answer 1,2,3,4 compare $(STUDY) --network "$$network" --tuned "$$tuned"); \
 	judged=$$(answer 1,2,3,4 paper audit $(CLAIMS)); \
-	printf '\nWhich controller to use\n%s\nWhat of the paper holds\n%s\n' "$$compared" "$$judged"
+	printf '\n%s\nWhat of the paper holds\n%s\n' "$${compared%$$'\n'*}" "$${judged%$$'\n'*}"; \
+	echo "More: $$(page "$$compared") and $$(page "$$judged")"
 
 test: lint
 	$(BIN)/pytest -n auto --maxprocesses 4

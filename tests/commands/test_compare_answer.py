@@ -77,7 +77,9 @@ def told(*rankings: Ranking) -> str:
 
 def avoided_in(said: str) -> str:
     """What an answer says of controllers that must not be used."""
-    return re.split(r" \d+ compared:", said[said.index("o not use these") :])[0]
+    rest = re.split(r" (?:Gains:|\d+ compared:)", said[said.index("o not use these") :])[0]
+    rig, _, later = rest.partition(" The paper.")
+    return f"{rig} {later[later.index('Elsewhere') :] if 'Elsewhere' in later else ''}"
 
 
 def test_a_condition_is_a_line_with_the_best_the_next_and_the_gain_over_feedforward() -> None:

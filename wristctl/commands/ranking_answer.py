@@ -207,7 +207,7 @@ def do_not_use(rankings: Sequence[Ranking], names: Mapping[str, str]) -> str:
 
     Where no condition has them, of all conditions. A row that is bad in several conditions is told for the worst.
     """
-    rigs = [ranking for ranking in rankings if ranking.traits.rig and not ranking.jumps]
+    rigs = _smooth_on_rigs(rankings)
     chosen = rigs or list(rankings)
     where = f" with {rig_whole(rigs)}" if rigs else ""
     worst: dict[str, tuple[Ranking, int]] = {}
@@ -216,9 +216,8 @@ def do_not_use(rankings: Sequence[Ranking], names: Mapping[str, str]) -> str:
             before = worst.get(ranking.labels[row])
             if before is None or _lost(ranking, row) > _lost(*before):
                 worst[ranking.labels[row]] = (ranking, row)
-    elsewhere = _elsewhere([ranking for ranking in rankings if ranking not in chosen], names)
     if not worst:
-        return f"Every controller here can be used{where}.{elsewhere}"
+        return f"Every controller here can be used{where}."
     by_verb: dict[str, list[tuple[str, str]]] = {}
     for label, (ranking, row) in sorted(worst.items(), key=lambda item: -item[1][0].swing[item[1][1]]):
         verb, (size, count) = next(iter(facts(ranking, row).items()))
@@ -235,13 +234,20 @@ def do_not_use(rankings: Sequence[Ranking], names: Mapping[str, str]) -> str:
             text = joined([f"{name} ({count})" for name, count in rows])
         sentences.append(f"{_THEY[verb] if len(rows) > 1 else verb}: {text}")
     them = f"{where.strip().capitalize()} do not use these" if where else "Do not use these"
-    return f"{them}. {'. '.join(_capital(sentence) for sentence in sentences)}.{elsewhere}"
+    return f"{them}. {'. '.join(_capital(sentence) for sentence in sentences)}."
 
 
-def _elsewhere(rankings: Sequence[Ranking], names: Mapping[str, str]) -> str:
-    """Those that must not be used in further conditions, and why; those with the same faults together."""
+def _smooth_on_rigs(rankings: Sequence[Ranking]) -> list[Ranking]:
+    return [ranking for ranking in rankings if ranking.traits.rig and not ranking.jumps]
+
+
+def not_elsewhere(rankings: Sequence[Ranking], names: Mapping[str, str]) -> str:
+    """Those that must not be used in conditions that `do_not_use` does not tell of, and why; alike ones together."""
+    rigs = _smooth_on_rigs(rankings)
     faults: dict[str, dict[str, list[Ranking]]] = {}
-    for ranking in rankings:
+    for ranking in rankings if rigs else []:
+        if ranking in rigs:
+            continue
         for row in ranking.standing.unusable:
             verb = next(iter(facts(ranking, row)))
             faults.setdefault(ranking.labels[row], {}).setdefault(verb, []).append(ranking)
@@ -257,7 +263,7 @@ def _elsewhere(rankings: Sequence[Ranking], names: Mapping[str, str]) -> str:
             they = _THEY[verb].removeprefix("these ") if len(labels) > 1 else verb
             clauses.append(" ".join(filter(None, [they, sized(verb, lost), f"in {places_named}"])))
         listed.append(f"{joined([names[label] for label in labels])} {joined(clauses)}")
-    return f" Elsewhere {'; '.join(listed)}." if listed else ""
+    return f"Elsewhere {'; '.join(listed)}." if listed else ""
 
 
 def _lost(ranking: Ranking, row: int) -> float:

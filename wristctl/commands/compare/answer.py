@@ -8,7 +8,16 @@ from typing import TYPE_CHECKING
 
 from wristctl.commands.answer import Answer
 from wristctl.commands.printed_table import COLUMNS, Table, joined
-from wristctl.commands.ranking_answer import advice, certainty, do_not_use, fitted, ranking_table, recommended, ties
+from wristctl.commands.ranking_answer import (
+    advice,
+    certainty,
+    do_not_use,
+    fitted,
+    not_elsewhere,
+    ranking_table,
+    recommended,
+    ties,
+)
 from wristctl.commands.ranking_words import PRINTED, condition, error, facts, gains_words, names_of, open_loop
 from wristctl.commands.results import Findings
 
@@ -42,8 +51,9 @@ def answer_of(
     unusable = do_not_use(rankings, names)
     notes = [
         (best_on_yours(rankings), ""),
-        (papers(rankings), ""),
         (unusable, "Some must not be used; which, and why: `--all`." if unusable else ""),
+        (papers(rankings), ""),
+        (not_elsewhere(rankings, names), ""),
         (" ".join(filter(None, [gains_of_best(rankings, gains or {}), compared(rankings), more])), more),
         (ties(rankings, names), ""),
         (certainty(rankings), ""),

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from wristctl.commands.answer import Answer
 from wristctl.commands.printed_table import Table, joined
-from wristctl.commands.ranking_answer import advice, certainty, decision_table, do_not_use, fitted
+from wristctl.commands.ranking_answer import advice, certainty, decision_table, do_not_use, fitted, not_elsewhere
 from wristctl.commands.ranking_words import condition, names_of, winner
 
 if TYPE_CHECKING:
@@ -39,7 +39,7 @@ def answer_of(
     sure = " ".join(filter(None, [certainty(rankings), few_tunings(rankings), first_again(rankings)]))
     notes: list[tuple[str | Table, str | Table]] = [
         (terms_table(terms) if terms else "", ""),
-        (do_not_use(rankings, names), _fewer(rankings)),
+        (f"{do_not_use(rankings, names)} {not_elsewhere(rankings, names)}".strip(), _fewer(rankings)),
         (f"{sure} {tuned_otherwise(shifts)} {more}".strip(), f"{sure} {more}".strip()),
     ]
     return fitted(Answer(advice(rankings), decision_table(rankings, names)), notes)
