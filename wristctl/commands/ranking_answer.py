@@ -79,11 +79,11 @@ def _use(where: str, alike: Sequence[Ranking], others: Sequence[Ranking]) -> str
     places = [place for place in places if place[0].standing.group(place[1]) == 1]
     means = sorted(ranking.means[row].value for ranking, row in places)
     equal = [label for label, times in often.items() if times == often[chosen] == len(ranked) and label != chosen]
-    named = [chosen, *equal] if len(equal) <= 3 else [chosen]
+    alternatives = equal if len(equal) <= 3 else []
     everywhere = len(places) == len(alike) > 1
     names = f" ({', '.join(map(condition, alike))})" if everywhere else ""
     errors = between([degrees(mean, DIGITS) for mean in means])
-    text = f"{where}{names} use {joined([*map(called, named)], 'or')}: RMSE {errors} deg"
+    text = f"{where}{names} use {called(chosen)}: RMSE {errors} deg"
     if len(places) == 1:
         text += interval(*places[0])
     if len(alike) > 1 and not everywhere:
@@ -94,7 +94,9 @@ def _use(where: str, alike: Sequence[Ranking], others: Sequence[Ranking]) -> str
         text += "; no controller is better than feedforward, which is open loop"
     elif gains:
         text += f", {_times(gains[0], means[0])} less than feedforward"
-    text += _seldom(named, [ranking for ranking, _ in places])
+    if alternatives:
+        text += f"; {joined([*map(called, alternatives)])} {'is' if len(alternatives) == 1 else 'are'} as good"
+    text += _seldom([chosen, *alternatives], [ranking for ranking, _ in places])
     if few := [condition(ranking) for ranking in alike if ranking.standing.untold]:
         text += f" (no ranking in {joined(few)}: too few cases)"
     bad = [
@@ -105,8 +107,7 @@ def _use(where: str, alike: Sequence[Ranking], others: Sequence[Ranking]) -> str
     if not bad:
         return f"{text}."
     worst = max(bad, key=lambda place: _lost(*place))
-    also = ", as do others below" * (len(worst[0].standing.unusable) > 1)
-    return f"{text}. Do not use {chosen} with {rig_whole([worst[0]])}: it {fact(*worst)}{also}."
+    return f"{text}. Do not use {chosen} with {rig_whole([worst[0]])}: it {fact(*worst)}."
 
 
 def _seldom(labels: Sequence[str], rankings: Sequence[Ranking]) -> str:
@@ -160,10 +161,10 @@ def ranking_table(rankings: Sequence[Ranking], names: Mapping[str, str]) -> Tabl
     unit = "worlds" if rankings[0].unit == "world" else "cases"
     heads = (
         f"condition ({unit})",
-        "best: RMSE [deg]",
+        "best",
         "as good",
-        "next: RMSE [deg]",
-        "open loop (times)",
+        "next",
+        "feedforward (times)",
         "unusable",
     )
     rows = []
@@ -182,7 +183,8 @@ def ranking_table(rankings: Sequence[Ranking], names: Mapping[str, str]) -> Tabl
             f"{len(ranking.standing.unusable)} of {len(ranking.labels)}",
         )
         rows.append((begin, best, others, following, open_loop, end))
-    return Table("", heads, rows)
+    title = "RMSE [deg]; as good: others that paired tests do not tell from the best; times: over the best"
+    return Table(title, heads, rows)
 
 
 def ties(rankings: Sequence[Ranking], names: Mapping[str, str]) -> str:
@@ -194,11 +196,11 @@ def ties(rankings: Sequence[Ranking], names: Mapping[str, str]) -> str:
             others = tuple(names[ranking.labels[other]] for other in ranking.standing.groups[0] if other != row)
             same.setdefault(others, []).append(condition(ranking))
     listed = [f"{joined(where)}: {', '.join(others)}" for others, where in same.items()]
-    listing = ". ".join(_capital(one) for one in listed)
+    listing = ". ".join(capital(one) for one in listed)
     return f"Tied with the best, as paired tests at 95 % do not tell them apart. {listing}." if listed else ""
 
 
-def _capital(text: str) -> str:
+def capital(text: str) -> str:
     return text[:1].upper() + text[1:]
 
 
@@ -209,7 +211,8 @@ def do_not_use(rankings: Sequence[Ranking], names: Mapping[str, str]) -> str:
     """
     rigs = _smooth_on_rigs(rankings)
     chosen = rigs or list(rankings)
-    where = f" with {rig_whole(rigs)}" if rigs else ""
+    alone = len(rigs) == 1 and rigs[0].unit == "case"
+    where = f" in {condition(rigs[0])}" if alone else f" with {rig_whole(rigs)}" if rigs else ""
     worst: dict[str, tuple[Ranking, int]] = {}
     for ranking in chosen:
         for row in ranking.standing.unusable:
@@ -232,9 +235,8 @@ def do_not_use(rankings: Sequence[Ranking], names: Mapping[str, str]) -> str:
             text = f"{joined([name for name, _ in rows])} ({'each ' * (len(rows) > 1)}{counts[0]})"
         else:
             text = joined([f"{name} ({count})" for name, count in rows])
-        sentences.append(f"{_THEY[verb] if len(rows) > 1 else verb}: {text}")
-    them = f"{where.strip().capitalize()} do not use these" if where else "Do not use these"
-    return f"{them}. {'. '.join(_capital(sentence) for sentence in sentences)}."
+        sentences.append(f"what {verb}: {text}")
+    return f"{capital(f'{where} do not use'.strip())} {'; '.join(sentences)}."
 
 
 def _smooth_on_rigs(rankings: Sequence[Ranking]) -> list[Ranking]:

@@ -68,8 +68,9 @@ def _tried(loops: Sequence[str], limit: float) -> list[str]:
     kinds = [f"{_word(name)} ({_described(name, limit)})" if name in LOOPS else name for name in loops]
     count = _COUNTS[len(loops)] if len(loops) < len(_COUNTS) else len(loops)
     plural = "s" * (len(loops) > 1)
-    where = f"{count} simulated loop{plural}, ours, as the paper tells of none"
-    return [f"Smooth moves of 30 deg in 1 s and in 2 s on {where}: {_and(kinds)}."] * bool(loops)
+    bare = all(name in LOOPS and LOOPS[name].actuator.level == "ideal" for name in loops)
+    where = f"{count} loop{plural} of ours{' without motors or camera' * bare}, as the paper describes none"
+    return [f"Smooth moves of 30 deg in 1 and 2 s on {where}: {_and(kinds)}."] * bool(loops)
 
 
 def _word(name: str) -> str:
@@ -86,7 +87,7 @@ def _described(name: str, limit: float) -> str:
     """What the word for a built-in loop leaves unsaid."""
     n, rate = LOOPS[name].plant_segments, 1e-3 / LOOPS[name].control_period
     ticks = f"{1e-3 * rate:g} MHz" if rate >= _CONTINUOUS else f"{rate:g} kHz"
-    tensions = f"at most {limit:g} N" if LOOPS[name].limits and math.isfinite(limit) else "no tension limit"
+    tensions = f"up to {limit:g} N" if LOOPS[name].limits and math.isfinite(limit) else "any tension"
     return ", ".join(part for part in ("one segment" * (n == 1), ticks, tensions) if part)
 
 
@@ -94,25 +95,31 @@ def _described(name: str, limit: float) -> str:
 _GAINS = {
     "smc/printed": "sliding mode control (SMC) with the paper's gains",
     "smc/exchanged": "SMC with P1 and P2 exchanged (our guess)",
-    "pid/printed": "PID with the paper's gains (the sign of its feedback turned)",
+    "pid/printed": "PID with the paper's gains (sign turned)",
 }
 
 
 def _controllers(claims: Sequence[Judgement]) -> list[str]:
-    """Of each set of gains the loops on which it reaches 30 deg, and those on which it has the printed RMSE."""
-    sentences = []
+    """Of each set of gains the loops on which it arrives, and those on which it has the printed RMSE."""
+    from wristctl.simulation.arrival import SHORT
+
+    sentences = list[str]()
     for label, who in _GAINS.items():
         labelled = [j for j in claims if j.claim.label == label]
         arrival = _one(j for j in labelled if j.claim.evidence == "arrival")
         number = _one(j for j in labelled if _is_number(j.claim, "rmse"))
         who = f"{who[0].upper()}{who[1:]}"
         if arrival and number and not any(_ever(found) for found in (arrival.found, number.found)):
-            sentences.append(f"{who} neither reaches 30 deg nor has the paper's RMSE on any loop.")
+            sentences.append(f"{who} {_arrives(SHORT, not sentences)} on no loop.")
             continue
-        facts = [f"reaches 30 deg {_places(arrival.found)}"] if arrival else []
+        facts = [f"{_arrives(SHORT, not sentences)} {_places(arrival.found)}"] if arrival else []
         facts += [f"has the paper's RMSE {_places(number.found)}{_beyond(number.found)}"] if number else []
         sentences += [f"{who} {' and '.join(facts)}."] if facts else []
     return sentences
+
+
+def _arrives(short: float, first: bool) -> str:
+    return f"arrives (to within {_percent(short)})" if first else "arrives"
 
 
 def _is_number(claim: Claim, metric: str) -> bool:
@@ -131,8 +138,8 @@ def _beyond(findings: Mapping[str, Finding]) -> str:
     beyond = [name for name in reproduced if "not physical" in findings[name].mark]
     where = f" {_on(beyond)}" * (len(reproduced) > len(beyond))
     better = _where(findings, "better than the paper")
-    less = f" (a smaller one {_on(better)})" * bool(better)
-    return f"{less}{f', with tensions that no tendon bears{where}' * bool(beyond)}"
+    less = f" (less {_on(better)})" * bool(better)
+    return f"{less}{f', at tensions no tendon bears{where}' * bool(beyond)}"
 
 
 def _ranking(claims: Sequence[Judgement], loops: Sequence[str]) -> list[str]:
@@ -159,9 +166,8 @@ def _ranking(claims: Sequence[Judgement], loops: Sequence[str]) -> list[str]:
     ]
     return [
         *sentences,
-        f"The paper's ranking ({', '.join(name.upper() for name in order)}) cannot be tested: it gives no "
-        f"equations of {_and(named)}. With designs of ours for these, and P1 and P2 exchanged, it holds "
-        f"{_on(holds, loops)}.",
+        f"Its ranking ({', '.join(name.upper() for name in order)}) cannot be tested, as it gives no equations of "
+        f"{_and(named)}; with designs of ours for these, and P1 and P2 exchanged, it holds {_on(holds, loops)}.",
     ]
 
 
@@ -169,10 +175,22 @@ def _softened(claims: Sequence[Judgement]) -> list[str]:
     """Whether springs that lost stiffness add as much error as the experiment has, by the heaviest claim of that."""
     found = [j for j in claims if j.claim.stiffness_scale < 1.0 and j.claim.weight and j.claim.value]
     return [
-        f"Soft springs, to which the paper puts the {degrees(float(j.claim.value or 0.0))} deg of its experiment, add "
-        f"as much {_places(j.found)} (at {_percent(j.claim.stiffness_scale)} of the stiffness, our number)."
+        f"Soft springs ({_percent(j.claim.stiffness_scale)} of the stiffness, our number) give the experiment's "
+        f"{degrees(float(j.claim.value or 0.0))} deg {_places(j.found)}{_missed(j)}."
         for j in found[:1]
     ]
+
+
+def _missed(judged: Judgement) -> str:
+    """On which loops a number is smaller, and on which it is larger, than the paper's, where it is not the paper's."""
+    value = float(judged.claim.value or 0.0)
+    off = {name: one for name, one in judged.found.items() if name and one.verdict != "reproduced"}
+    sides = {
+        "less": [name for name, one in off.items() if one.high < value],
+        "more": [name for name, one in off.items() if one.low > value],
+    }
+    parts = [f"{word} on {_and([_word(name) for name in loops])}" for word, loops in sides.items() if loops]
+    return f": {', '.join(parts)}" if parts else ""
 
 
 def _is_order(claim: Claim, less: str, more: str) -> bool:
@@ -292,9 +310,9 @@ def _numbers(claims: Sequence[Judgement], loops: Sequence[str], most: int) -> Ta
         paper = _range(j.claim, float(j.claim.value or 0.0), float(j.claim.value or 0.0))
         rows.append(((j.claim.topic or j.claim.says) + unit, paper, *ours, _agree(j.found)))
     common = f" [{min(units)}]" if len(units) == 1 and min(units) else ""
-    rule = f"their range is within {FACTOR:g} times of the paper's"
+    rule = f"the range comes within {FACTOR:g} times of the paper's"
     return Table(
-        f"Errors{common} of both moves, smaller first; agrees: {rule}",
+        f"Errors{common}, from one move to the other; agrees: {rule}",
         ("quantity", "paper", *map(_word, loops), "agrees on"),
         rows,
     )

@@ -10,6 +10,7 @@ from wristctl.commands.answer import Answer
 from wristctl.commands.printed_table import COLUMNS, Table, joined
 from wristctl.commands.ranking_answer import (
     advice,
+    capital,
     certainty,
     do_not_use,
     fitted,
@@ -50,10 +51,11 @@ def answer_of(
     more = f"Every rank and figure: `--all`, or {run}/report.html." if run else "Every rank and figure: `.tables`."
     unusable = do_not_use(rankings, names)
     notes = [
+        (conditions(rankings), ""),
         (best_on_yours(rankings), ""),
         (unusable, "Some must not be used; which, and why: `--all`." if unusable else ""),
         (papers(rankings), ""),
-        (not_elsewhere(rankings, names), ""),
+        (" ".join(filter(None, [not_elsewhere(rankings, names), papers_order(rankings)])), ""),
         (" ".join(filter(None, [gains_of_best(rankings, gains or {}), compared(rankings), more])), more),
         (ties(rankings, names), ""),
         (certainty(rankings), ""),
@@ -111,18 +113,36 @@ def compared(rankings: Sequence[Ranking]) -> str:
     return f"{len(labels)} compared: {'; '.join(groups)}."
 
 
+# What each condition is.
+_CONDITIONS = {
+    "ideal": "the believed wrist",
+    "sampled": "with ticks and a tension limit",
+    "camera and tendons": "spools follow the motion itself, so that feedforward is near",
+    "pushed": "an unknown force",
+    "off-nominal": "another wrist",
+}
+
+
+def conditions(rankings: Sequence[Ranking]) -> str:
+    """What the names of the conditions mean; empty for families of worlds, which a study describes."""
+    meanings = {
+        condition(one).removesuffix(" (steps)"): _CONDITIONS[name]
+        for one in rankings
+        if one.unit != "world" and (name := one.name.removesuffix(", steps")) in _CONDITIONS
+    }
+    return f"{capital('; '.join(f'{name}: {meaning}' for name, meaning in meanings.items()))}." if meanings else ""
+
+
 def papers(rankings: Sequence[Ranking]) -> str:
-    """What becomes of the paper's printed gains, of P1 and P2 exchanged, and of its ranking, condition by condition."""
+    """What becomes of the paper's printed gains, and of P1 and P2 exchanged, condition by condition."""
     labels = list(dict.fromkeys(label for ranking in rankings for label in ranking.labels))
     sentences = [
-        f"{label}{explained} {_outcomes(rankings, label)}."
-        for gains, explained in ((PRINTED, ""), ("exchanged", " (P1 and P2 exchanged)"))
+        f"{label}{explained} {_outcomes(rankings, label)}"
+        for gains, explained in ((PRINTED, ""), ("exchanged", " (P1 and P2)"))
         for label in labels
         if label.endswith(f"/{gains}")
     ]
-    if ranks := _papers_order(rankings):
-        sentences.append(ranks)
-    return f"The paper. {' '.join(sentences)}" if sentences else ""
+    return f"The paper's gains: {'; '.join(sentences)}." if sentences else ""
 
 
 # Faults that a word says of the paper's gains, the commonest last; others by their verb.
@@ -130,29 +150,27 @@ _UNSTEADY = ("swings", "chatters", "pulls harder than a tendon bears", "changes 
 
 
 def _outcomes(rankings: Sequence[Ranking], label: str) -> str:
-    """Conditions in which a row works, with its error, and in which it does not, by what is wrong there."""
-    works, bad = list[str](), dict[str, list[str]]()
+    """Conditions in which a row works, with its error and place, and what is wrong with it in the others."""
+    works, bad = list[str](), dict[str, None]()
     for ranking in rankings:
         if label not in ranking.labels:
             continue
-        row, where = ranking.labels.index(label), condition(ranking)
+        row = ranking.labels.index(label)
         if row in ranking.standing.unusable:
             verb = next(iter(facts(ranking, row)))
-            bad.setdefault("swings or chatters" if verb in _UNSTEADY else verb, []).append(where)
+            bad["swings or chatters" if verb in _UNSTEADY else verb] = None
         else:
-            rank = ranking.standing.group(row)
-            works.append(f"{where} ({error(ranking, row)} deg{f', rank {rank}' if rank else ''})")
-    ordered = sorted(bad.items(), key=lambda item: len(item[1]))
-    if not works and len(ordered) == 1:
-        return f"{ordered[0][0]} in every condition"
-    clauses = [f"works in {joined(works)}" if works else "works nowhere"]
-    for verb, places in ordered:
-        rest = verb == ordered[-1][0] and len(places) > 1
-        clauses.append(f"{verb} in {'the others' if rest else joined(places)}")
-    return joined(clauses)
+            group, groups = ranking.standing.group(row), ranking.standing.groups
+            better = sum(map(len, groups[: group - 1])) if group else 0
+            place = f" (place {better + 1} of {sum(map(len, groups))})" if group else ""
+            works.append(f"{error(ranking, row)} deg in {condition(ranking)}{place}")
+    verbs = joined(list(bad), "or")
+    if not works:
+        return f"{verbs} in every condition"
+    return f"{joined(works)}{f', else {verbs}' if bad else ''}"
 
 
-def _papers_order(rankings: Sequence[Ranking]) -> str:
+def papers_order(rankings: Sequence[Ranking]) -> str:
     """Whether the order of the paper's five controllers by RMSE is that of their best rows here."""
     from wristctl.comparison.paper import T2
 
@@ -166,8 +184,8 @@ def _papers_order(rankings: Sequence[Ranking]) -> str:
             holds.append(condition(ranking))
     if not complete:
         return ""
-    where = f"{joined(holds)} alone" if holds else f"none of {complete} conditions"
-    return f"Its ranking {' < '.join(printed)} holds in {where}."
+    where = f"{joined(holds)} alone" if holds else f"none of {complete}"
+    return f"The paper's ranking {' < '.join(printed)} holds in {where}."
 
 
 def head_with_the_best(findings: Findings, rankings: Sequence[Ranking]) -> None:
