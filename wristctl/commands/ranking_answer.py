@@ -163,7 +163,7 @@ def ranking_table(rankings: Sequence[Ranking], names: Mapping[str, str]) -> Tabl
         f"condition ({unit})",
         "best",
         "as good",
-        "next",
+        "first worse",
         "feedforward (times)",
         "unusable",
     )
@@ -183,7 +183,7 @@ def ranking_table(rankings: Sequence[Ranking], names: Mapping[str, str]) -> Tabl
             f"{len(ranking.standing.unusable)} of {len(ranking.labels)}",
         )
         rows.append((begin, best, others, following, open_loop, end))
-    title = "RMSE [deg]; as good: others that paired tests do not tell from the best; times: over the best"
+    title = "RMSE [deg]; as good: paired tests do not tell so many others from the best; times: over the best"
     return Table(title, heads, rows)
 
 

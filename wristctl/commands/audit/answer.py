@@ -310,7 +310,7 @@ def _numbers(claims: Sequence[Judgement], loops: Sequence[str], most: int) -> Ta
         paper = _range(j.claim, float(j.claim.value or 0.0), float(j.claim.value or 0.0))
         rows.append(((j.claim.topic or j.claim.says) + unit, paper, *ours, _agree(j.found)))
     common = f" [{min(units)}]" if len(units) == 1 and min(units) else ""
-    rule = f"the range comes within {FACTOR:g} times of the paper's"
+    rule = f"the range overlaps paper / {FACTOR:g} to paper x {FACTOR:g}"
     return Table(
         f"Errors{common}, from one move to the other; agrees: {rule}",
         ("quantity", "paper", *map(_word, loops), "agrees on"),

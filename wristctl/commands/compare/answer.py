@@ -117,7 +117,7 @@ def compared(rankings: Sequence[Ranking]) -> str:
 _CONDITIONS = {
     "ideal": "the believed wrist",
     "sampled": "with ticks and a tension limit",
-    "camera and tendons": "spools follow the motion itself, so that feedforward is near",
+    "camera and tendons": "spools follow the motion itself, so weak gains come near too",
     "pushed": "an unknown force",
     "off-nominal": "another wrist",
 }
