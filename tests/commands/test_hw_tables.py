@@ -13,7 +13,7 @@ import pytest
 import wristctl
 from tests.commands.conftest import repeated
 from wristctl.commands.hw_run import results as hw_tables
-from wristctl.commands.hw_run.answer import answer_of
+from wristctl.commands.hw_run.answer import answer_of, in_one_plane
 from wristctl.commands.hw_run.command import Performed
 from wristctl.commands.inputs import Inputs
 from wristctl.commands.printed_table import Table
@@ -186,7 +186,7 @@ def _small() -> pd.DataFrame:
 
 def test_the_answer_gives_error_settling_and_recovery_by_direction_in_degrees() -> None:
     table = _small()
-    answer = answer_of(table, _twins(0.03), {}, [], "")
+    answer = answer_of(table, in_one_plane(_twins(0.03)), {}, [], "")
     lines = answer.lines()
     assert len(lines) <= 32 and max(map(len, lines)) <= 100 and answer.table is not None
     rows = {(row[0], row[1]): row[2:] for row in answer.table.rows}
@@ -202,17 +202,18 @@ def test_the_answer_gives_error_settling_and_recovery_by_direction_in_degrees() 
 @pytest.mark.parametrize(("simulated", "told"), [(0.02, True), (0.031, False), (0.05, False), (0.06, True)])
 def test_a_measured_error_far_from_the_simulated_one_is_told(simulated: float, told: bool) -> None:
     table = _small().query("controller == 'smc' and push == 0.0 and outcome == 'ok'").assign(rmse=0.0345)
-    lines = " ".join(answer_of(table, _twins(simulated), {}, [], "").lines())
+    lines = " ".join(answer_of(table, in_one_plane(_twins(simulated)), {}, [], "").lines())
     assert ("simulated." in lines) == told
     assert not told or ("smaller" if simulated > 0.0345 else "larger") in lines
 
 
 def test_timing_is_told_only_where_ticks_were_skipped() -> None:
-    quiet, late = (answer_of(_small(), _twins(0.03), {"ticks": 500.0, "overruns": o}, [], "") for o in (0.0, 7.0))
+    words = in_one_plane(_twins(0.03))
+    quiet, late = (answer_of(_small(), words, {"ticks": 500.0, "overruns": o}, [], "") for o in (0.0, 7.0))
     assert "7 of 500" in " ".join(late.lines()) and "of 500" not in " ".join(quiet.lines())
 
 
 def test_a_trial_that_was_odd_or_never_settled_is_told() -> None:
     table = _small().assign(settling=np.nan, odd=["", "the marker jumped", "", "", "", ""])
-    lines = " ".join(answer_of(table, _twins(0.03), {}, ["chatters: 2 of 5 trials"], "").lines())
+    lines = " ".join(answer_of(table, in_one_plane(_twins(0.03)), {}, ["chatters: 2 of 5 trials"], "").lines())
     assert "the marker jumped" in lines and "never settles" in lines and "chatters: 2 of 5 trials" in lines

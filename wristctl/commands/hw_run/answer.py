@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Hashable, Mapping, Sequence
+from collections.abc import Callable, Hashable, Mapping, Sequence
+from functools import partial
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from wristctl.commands.answer import Answer
@@ -22,7 +23,7 @@ if TYPE_CHECKING:
 # Factor between measured and simulated error beyond which that is said.
 APART = 1.5
 # Rows of a table by direction; with more there is a row for each controller.
-_ROWS = 16
+ROWS = 16
 
 
 class Means(NamedTuple):
@@ -60,24 +61,35 @@ def means_of(trials: pd.DataFrame, twins: Mapping[int, Simulation]) -> Means:
     return Means(len(trials), rmse, rest, settling, recovery, model)
 
 
+class TrialWords(NamedTuple):
+    """What is said of trials that ended well, and of which controllers."""
+
+    sentence: Callable[[pd.DataFrame, str], str]
+    """of those of one controller"""
+    table: Callable[[pd.DataFrame, Sequence[str]], Table]
+    apart: Callable[[pd.DataFrame, Sequence[str]], list[str]]
+    """where they and their simulation do not agree"""
+
+
+def in_one_plane(twins: Mapping[int, Simulation]) -> TrialWords:
+    """Words for trials in one plane beside their simulation, by the trial's number."""
+    return TrialWords(partial(_sentence, twins=twins), partial(_table, twins=twins), partial(_apart, twins=twins))
+
+
 def answer_of(
-    trials: pd.DataFrame,
-    twins: Mapping[int, Simulation],
-    metrics: Mapping[str, float],
-    marks: Sequence[str],
-    run: str,
+    trials: pd.DataFrame, words: TrialWords, metrics: Mapping[str, float], marks: Sequence[str], run: str
 ) -> Answer:
     """What the trials came to; `trials` are all that began, `run` is the path of their run."""
     done = trials[trials["outcome"] == "ok"].assign(label=lambda table: table["controller"] + "/" + table["gains"])
     labels = list(dict.fromkeys(done["label"]))
     more = f"All tables: --all. Every trial: {run}/report.html" if run else "All tables: `.tables`."
-    notes = [*_apart(done, labels, twins), *unsound(trials, marks, metrics)]
+    notes = [*words.apart(done, labels), *unsound(trials, marks, metrics)]
     if not labels:
         return Answer(f"None of {len(trials)} trials was completed.", None, notes, more)
-    sentences = [_sentence(done[done["label"] == label], label, twins) for label in labels[:2]]
+    sentences = [words.sentence(done[done["label"] == label], label) for label in labels[:2]]
     stopped = len(trials) - len(done)
     sentences.append(f"{stopped} of {len(trials)} trials ended early." if stopped else "No trial ended early.")
-    return Answer(" ".join(sentences), _table(done, labels, twins), notes, more)
+    return Answer(" ".join(sentences), words.table(done, labels), notes, more)
 
 
 def _sentence(trials: pd.DataFrame, label: str, twins: Mapping[int, Simulation]) -> str:
@@ -142,7 +154,7 @@ def marks_of(done: pd.DataFrame, goals: Array, still: Mask, chatters: Mask) -> l
 def _table(done: pd.DataFrame, labels: Sequence[str], twins: Mapping[int, Simulation]) -> Table:
     """A row for each direction and controller, with and without a push; for very many a row for each controller."""
     directions = list(dict.fromkeys(done["direction"]))
-    by_direction = len(directions) * len(labels) <= _ROWS
+    by_direction = len(directions) * len(labels) <= ROWS
     heads = (
         "controller", "direction", "error [deg]", "simulated [deg]", "at the end [deg]", "settling [s]",
         "pushed: [deg]", "recovery [s]",

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from wristctl.commands.answer import Answer
-from wristctl.commands.hw_run.answer import answer_of, marks_of
+from wristctl.commands.hw_run.answer import answer_of, in_one_plane, marks_of
 from wristctl.commands.inputs import EarlierRun, Inputs
 from wristctl.commands.inputs_of_loops import (
     check_inverses,
@@ -50,7 +50,7 @@ class Performed(StudyResult):
     @property
     def answer(self) -> Answer:
         """Error by direction, settling and recovery, and how far simulation agrees."""
-        return answer_of(self.trials, self.twins, self.metrics, self.marks, self.place)
+        return answer_of(self.trials, in_one_plane(self.twins), self.metrics, self.marks, self.place)
 
     @property
     def marks(self) -> list[str]:

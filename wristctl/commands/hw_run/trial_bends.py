@@ -5,10 +5,11 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import TYPE_CHECKING, NamedTuple
 
 from wristctl.commands.answer import Answer
-from wristctl.commands.hw_run.answer import APART, in_deg, in_s, marks_of, unsound
+from wristctl.commands.hw_run.answer import APART, ROWS, TrialWords, answer_of, in_deg, in_s, marks_of
 from wristctl.commands.printed_table import Table, two
 from wristctl.commands.results import Findings, StudyResult
 from wristctl.commands.session import Session
@@ -19,8 +20,6 @@ if TYPE_CHECKING:
 
     from wristctl.simulation.bend_course import BendCourse
 
-# Rows of a table by motion; with more there is a row for each controller.
-_ROWS = 16
 _MEANS = (
     "rmse_ulnar", "rmse_flexion", "rmse", "steady_state", "settling", "recovery", "true_rmse_ulnar",
     "true_rmse_flexion", "true_rmse", "true_recovery",
@@ -48,7 +47,7 @@ class PerformedBends(StudyResult):
     @property
     def answer(self) -> Answer:
         """Error by plane and over both, what a push does, and how far simulation agrees."""
-        return _answer(self.trials, self.twins, self.metrics, self.marks, self.place)
+        return answer_of(self.trials, in_two_planes(self.twins), self.metrics, self.marks, self.place)
 
     @property
     def marks(self) -> list[str]:
@@ -187,19 +186,9 @@ def _draw(session: Session, done: pd.DataFrame, twins: Mapping[int, BendCourse])
         findings.overview.figure = "bends" if courses[0].push is None or len(courses) > 1 else "pushed-bends"
 
 
-def _answer(
-    trials: pd.DataFrame, twins: Mapping[int, BendCourse], metrics: Mapping[str, float], marks: Sequence[str], run: str
-) -> Answer:
-    done = trials[trials["outcome"] == "ok"].assign(label=lambda table: table["controller"] + "/" + table["gains"])
-    labels = list(dict.fromkeys(done["label"]))
-    more = f"All tables: --all. Every trial: {run}/report.html" if run else "All tables: `.tables`."
-    notes = [*_apart(done, labels, twins), *unsound(trials, marks, metrics)]
-    if not labels:
-        return Answer(f"None of {len(trials)} trials was completed.", None, notes, more)
-    sentences = [_sentence(done[done["label"] == label], label, twins) for label in labels[:2]]
-    stopped = len(trials) - len(done)
-    sentences.append(f"{stopped} of {len(trials)} trials ended early." if stopped else "No trial ended early.")
-    return Answer(" ".join(sentences), _table(done, labels, twins), notes, more)
+def in_two_planes(twins: Mapping[int, BendCourse]) -> TrialWords:
+    """Words for trials in two planes beside their simulation, by the trial's number."""
+    return TrialWords(partial(_sentence, twins=twins), partial(_table, twins=twins), partial(_apart, twins=twins))
 
 
 def _sentence(trials: pd.DataFrame, label: str, twins: Mapping[int, BendCourse]) -> str:
@@ -230,7 +219,7 @@ def _table(done: pd.DataFrame, labels: Sequence[str], twins: Mapping[int, BendCo
     rows = []
     for label in labels:
         of_label = done[done["label"] == label]
-        for motion in motions if len(motions) * len(labels) <= _ROWS else ["all"]:
+        for motion in motions if len(motions) * len(labels) <= ROWS else ["all"]:
             of_motion = of_label if motion == "all" else of_label[of_label["direction"] == motion]
             for push, group in of_motion.groupby("push"):
                 errors = _errors(group, twins)
