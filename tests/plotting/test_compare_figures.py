@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 
 import numpy as np
 import pytest
@@ -10,6 +11,7 @@ from matplotlib.axes import Axes
 
 from tests.plotting.conftest import result as compared_row
 from wristctl.commands.compare.figures import rmse_map, variation_dots
+from wristctl.commands.printed_table import degrees
 from wristctl.comparison.combinations import ComparedRow
 from wristctl.comparison.paper import T2
 from wristctl.plotting.loop_figures import error_sizes
@@ -27,10 +29,10 @@ def tick_labels(axes: Axes) -> list[str]:
 
 def test_map_prints_every_rmse_and_marks_what_failed(results: list[ComparedRow]) -> None:
     ours, paper, _ = rmse_map(results).axes
-    wanted = ["x" if r.simulation.failed else f"{r.simulation.metrics['rmse']:.2g}" for r in results]
+    wanted = ["x" if r.simulation.failed else degrees(r.simulation.metrics["rmse"]) for r in results]
     assert sorted(texts(ours)) == sorted(wanted)
     assert len([patch for patch in ours.patches if patch.get_hatch()]) == 1
-    assert texts(paper) == [f"{T2[name].rmse:.2g}" for name in ("smc", "smc", "smc", "pid")]
+    assert texts(paper) == [degrees(T2[name].rmse) for name in ("smc", "smc", "smc", "pid")]
 
 
 def test_map_takes_an_error_of_zero_and_a_comparison_in_which_all_failed(results: list[ComparedRow]) -> None:
@@ -39,14 +41,14 @@ def test_map_takes_an_error_of_zero_and_a_comparison_in_which_all_failed(results
         (ours, *_) = rmse_map(
             [dataclasses.replace(r, repeated=Repeated.once(s)) for r, s in zip(results, bad, strict=True)]
         ).axes
-        assert texts(ours) == ["0" if value == 0.0 else "x"] * len(results)
+        assert texts(ours) == ["<0.001" if value == 0.0 else "x"] * len(results)
 
 
 def repeated(values: list[float], failed: int = 0) -> Repeated:
-    """Repetitions with these RMSE, ten million times as much chattering, and errors as large as they are."""
+    """Repetitions with these RMSE, as large errors, and a hundred thousand times as much chattering as degrees."""
     flags = np.arange(len(values)) < failed
     rmse = np.where(flags, np.nan, values)
-    metrics = {"rmse": rmse, "chattering": 1e7 * np.array(values)}
+    metrics = {"rmse": rmse, "chattering": 1e5 * np.degrees(values)}
     return dataclasses.replace(one_result().repeated, metrics=metrics, failed=flags)
 
 
@@ -56,18 +58,18 @@ def one_result() -> ComparedRow:
 
 def test_of_repetitions_map_and_bars_show_the_median_with_its_interval_and_what_failed() -> None:
     """Of twelve the interval of the median ends at the third and the tenth (Conover, table of the sign test)."""
-    values = [1e-3 * k for k in range(1, 13)]
+    values = [math.radians(0.1 * k) for k in range(1, 13)]
     row = dataclasses.replace(one_result(), repeated=repeated(values))
-    assert texts(rmse_map([row]).axes[0]) == ["0.0065\n0.003 to 0.01"]
+    assert texts(rmse_map([row]).axes[0]) == ["0.65\n0.3 to 1"]
     (axes,) = variation_dots([row]).axes
     dot, median, whisker = axes.lines
     assert median.get_xdata() == pytest.approx([6.5e4] * 2)
     assert dot.get_xdata() == pytest.approx([6.5e4]) and whisker.get_xdata() == pytest.approx([3e4, 10e4])
     one_failed = dataclasses.replace(row, repeated=repeated(values, failed=1))
-    assert texts(rmse_map([one_failed]).axes[0]) == ["0.0075\n0.004 to 0.011\n1 of 12 failed"]
+    assert texts(rmse_map([one_failed]).axes[0]) == ["0.75\n0.4 to 1.1\n1 of 12 failed"]
     assert [variation_dots([each]).axes[0].lines[0].get_marker() for each in (row, one_failed)] == ["o", "x"]
     few = dataclasses.replace(row, repeated=repeated(values[:3]))
-    assert texts(rmse_map([few]).axes[0]) == ["0.002"]
+    assert texts(rmse_map([few]).axes[0]) == ["0.2"]
 
 
 def test_errors_of_repetitions_are_their_median_with_its_interval_at_every_moment() -> None:
@@ -112,17 +114,18 @@ def test_every_cell_of_the_map_stands_at_its_row_and_column(results: list[Compar
     made = rmse_map(results, "Loop default")
     ours, paper, bar = made.axes
     values = np.array([each.simulation.metrics["rmse"] for each in results]).reshape(6, 3)
-    np.testing.assert_allclose(np.asarray(ours.images[0].get_array(), float), values)
+    np.testing.assert_allclose(np.asarray(ours.images[0].get_array(), float), np.degrees(values))
     at = {text.get_position(): text.get_text() for text in ours.texts}
     for (row, column), value in np.ndenumerate(values):
-        assert at[column, row] == ("x" if np.isnan(value) else f"{value:.2g}")
+        assert at[column, row] == ("x" if np.isnan(value) else degrees(value))
     (hatched,) = (patch for patch in ours.patches if patch.get_hatch())
     assert hatched.get_xy() == (-0.5, 0.5)  # type: ignore[attr-defined]  # first column, second row
     assert {text.get_position(): text.get_text() for text in paper.texts} == {
-        (0, row): f"{T2[name].rmse:.2g}" for row, name in enumerate(("smc", "smc", "smc", "pid"))
+        (0, row): degrees(T2[name].rmse) for row, name in enumerate(("smc", "smc", "smc", "pid"))
     }
-    assert ours.images[0].get_clim() == pytest.approx((1e-5, T2["pid"].rmse)) == paper.images[0].get_clim()
-    assert bar.get_ylabel() == "RMSE [rad]" and ours.get_title("left") == "Loop default"
+    colours = pytest.approx((1e-3, math.degrees(T2["pid"].rmse)))
+    assert ours.images[0].get_clim() == colours == paper.images[0].get_clim(), "from what can be measured"
+    assert bar.get_ylabel() == "RMSE [deg]" and ours.get_title("left") == "Loop default"
     assert [label.get_text() for label in paper.get_xticklabels()] == ["the paper's\nT2"]
     assert list(paper.get_xticks()) == [0]
 
@@ -147,8 +150,8 @@ def test_numbers_of_the_map_lie_within_their_cells_on_a_page_of_180_mm(results: 
 def test_numbers_on_dark_cells_are_white_and_on_bright_ones_black(results: list[ComparedRow]) -> None:
     ours = rmse_map(results).axes[0]
     ink = {text.get_text(): text.get_color() for text in ours.texts}
-    assert (ink["1e-05"], ink["0.00018"]) == ("w", "k")
-    assert ink["5e-05"] == "w", "dark as the middle of the logarithm is 1.2e-4"
+    assert (ink["<0.001"], ink["0.01"]) == ("w", "k")
+    assert ink["0.0029"] == "w", "dark as the middle of the logarithm is 0.0093"
 
 
 def test_chattering_shows_each_reference_beside_the_median(results: list[ComparedRow]) -> None:

@@ -14,6 +14,8 @@ from matplotlib.patches import Rectangle
 
 from wristctl.arrays import Array
 from wristctl.commands.compare.csv_data import metrics_of
+from wristctl.commands.printed_table import degrees
+from wristctl.comparison.bootstrap import MEASURABLE
 from wristctl.comparison.combinations import ComparedRow
 from wristctl.comparison.paper import T2
 from wristctl.comparison.repetition_spread import spread
@@ -48,7 +50,7 @@ _FAILED = "///"
 def rmse_map(
     results: Sequence[ComparedRow], heading: str = "", across: Across = "reference", beside: bool = True
 ) -> Figure:
-    """RMSE [rad] of each controller as number and colour (log); columns as `across` says.
+    """RMSE [deg] of each controller as number and colour (log); columns as `across` says.
 
     `beside`: with the paper's T2 in a column of its own.
 
@@ -62,13 +64,13 @@ def rmse_map(
     for result in results:
         index = rows.index(_row(results, result))
         place = index, columns.index(getattr(result, across))
-        values[place] = metrics_of(result)["rmse"]
+        values[place] = np.degrees(metrics_of(result)["rmse"])
         if len(result.repeated.failed) > 1:
             below[place] = _below(result)
-        printed[index] = T2[result.controller].rmse if beside and result.controller in T2 else np.nan
+        printed[index] = np.degrees(T2[result.controller].rmse) if beside and result.controller in T2 else np.nan
     shown = np.concatenate([values, printed], axis=1)
     positive = shown[shown > 0.0]
-    norm = LogNorm(positive.min(initial=1e-1), positive.max(initial=1e-3))
+    norm = LogNorm(max(np.degrees(MEASURABLE), positive.min(initial=10.0)), positive.max(initial=0.01))
     widths = (len(columns), 1)
     size = {"width": max(WIDTH, 2.5 + 0.9 * len(columns)), "height": 1.2 + (0.62 if below else 0.34) * len(rows)}
     beside = bool(np.isfinite(printed).any())
@@ -101,7 +103,7 @@ def rmse_map(
         fig.set_figheight(fig.get_figheight() + _LETTER * max(map(len, names)))
     ours.set_xticks(range(len(columns)), names, rotation=turned)
     title(ours, heading)
-    bar = fig.colorbar(image, ax=axes[0].tolist(), pad=0.02, label="RMSE [rad]", format=PowersOfTen())
+    bar = fig.colorbar(image, ax=axes[0].tolist(), pad=0.02, label="RMSE [deg]", format=PowersOfTen())
     bar.minorformatter = PowersOfTen()
     bar.ax.tick_params(labelsize=9.0)
     return fig
@@ -161,7 +163,7 @@ def _names(results: Sequence[ComparedRow], across: Across) -> tuple[list[str], l
 def _below(result: ComparedRow) -> str:
     """The interval of a repeated row's RMSE, and how many repetitions failed."""
     rmse, failed = spread(result.repeated.metrics["rmse"]), result.repeated.failed
-    ends = "" if rmse.interval is None else "\n{:.2g} to {:.2g}".format(*rmse.interval)
+    ends = "" if rmse.interval is None else "\n{} to {}".format(*map(degrees, rmse.interval))
     return ends + (f"\n{failed.sum()} of {rmse.n} failed" if failed.any() else "")
 
 
@@ -173,7 +175,7 @@ def _cells(
     numbers: bool = True,
     size: float = 9.0,
 ) -> AxesImage:
-    """Values (rows, columns) as coloured cells with their numbers, texts below them; nothing where they are nan.
+    """Angles (rows, columns) [deg] as coloured cells with their numbers, texts below them; nothing where they are nan.
 
     `size` is that of the numbers [pt].
     """
@@ -184,7 +186,13 @@ def _cells(
         text = (below or {}).get((int(row), int(column)), "")
         ink = "w" if value <= 0.0 or norm(value) < 0.5 else "k"
         axes.text(
-            column, row, f"{value:.2g}{text}", ha="center", va="center", fontsize=7.5 if text else size, color=ink
+            column,
+            row,
+            f"{degrees(np.radians(value))}{text}",
+            ha="center",
+            va="center",
+            fontsize=7.5 if text else size,
+            color=ink,
         )
     return image
 
