@@ -1,4 +1,5 @@
-# make run: the paper's study in small, from data to which controller to use and what of the paper holds. make test: what CI runs.
+# make run: the paper's study in small, from data to which controller to use and what of the paper holds. make test: the
+# quick tests; make test-slow: the others. CI runs both.
 
 SHELL := /bin/bash
 PYTHON ?= $(shell command -v python3.11 || command -v python3)
@@ -7,7 +8,7 @@ CLAIMS ?= experiments/claims.yaml
 BIN := .venv/bin
 
 .PHONY: run test lint bench bench-sweeps bench-peers bench-all firmware test-firmware test-faults test-trust test-vision test-identify \
-	test-allocation test-rig fault-table sound-rigs test-statistics converge worlds docs clean venv mutants coverage installed matrix
+	test-allocation test-slow test-rig fault-table sound-rigs test-statistics converge worlds docs clean venv mutants coverage installed matrix
 
 run: .venv/run
 	@set -eo pipefail; \
@@ -25,7 +26,11 @@ run: .venv/run
 	echo "More: $$(page "$$compared") and $$(page "$$judged")"
 
 test: lint
-	$(BIN)/pytest -n auto --maxprocesses 4
+	$(BIN)/pytest -n auto --maxprocesses 4 -m "not slow"
+
+# Tests of some 2 s of processor time or more: whole commands, killed processes, the emulated rig.
+test-slow: .venv/dev
+	$(BIN)/pytest -n auto --maxprocesses 4 -m slow
 
 lint: .venv/dev
 	$(BIN)/ruff check .

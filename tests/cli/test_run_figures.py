@@ -111,7 +111,7 @@ def test_a_table_is_printed_whole_or_as_latex(call: Call) -> None:
     plain = call("runs", "table", "latest:compare")[1]
     assert plain.count("Loop fast") == 2 and "Control step" in plain
     whole = call("runs", "table", "latest:compare", "--latex")[1]
-    assert whole.count("\\begin{table}") == 6 and "overshoot [\\%]" in whole
+    assert whole.count("\\begin{table}") == 7 and "overshoot [\\%]" in whole
     answer = call("runs", "table", "latest:compare", "-n", "1", "--latex")[1]
     assert whole.startswith(answer.rstrip()) and "{llllll}" in answer, "the answer comes first, in six columns"
     assert answer.count("\\\\") == 3 and "sampled (steps)" in answer, "a head, moves and steps"

@@ -63,7 +63,8 @@ def test_another_machine_package_and_code_file_are_named(results: Path) -> None:
 
 def test_each_fact_of_the_machine_is_named(results: Path) -> None:
     a, b = _run(results, "tune", Study()), _run(results, "tune", Study())
-    other = {"python": "3.0.0", "os": "another", "machine": "arm64", "cores": 1000, "threads": {"OMP_NUM_THREADS": "7"}}
+    threads = a.manifest.environment.threads | {"OMP_NUM_THREADS": "7"}
+    other = {"python": "3.0.0", "os": "another", "machine": "arm64", "cores": 1000, "threads": threads}
     b.__dict__["manifest"] = a.manifest.model_copy(
         update={"environment": a.manifest.environment.model_copy(update=other)}
     )

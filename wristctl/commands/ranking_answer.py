@@ -201,6 +201,7 @@ def ties(rankings: Sequence[Ranking], names: Mapping[str, str]) -> str:
 
 
 def capital(text: str) -> str:
+    """A text that begins a sentence."""
     return text[:1].upper() + text[1:]
 
 
