@@ -97,6 +97,7 @@ def shared(names: Mapping[str, list[str]]) -> dict[str, list[str]]:
     return {name: places for name, places in names.items() if len(places) > 1}
 
 
+@pytest.mark.slow
 def test_no_public_class_stands_for_two_things_in_a_room() -> None:
     rooms = {name: [place.partition("/")[0] for place in places] for name, places in classes().items()}
     assert not {name: places for name, places in shared(rooms).items() if len(set(places)) < len(places)}
@@ -114,6 +115,7 @@ def test_what_shares_its_name_for_a_reason_stands_where_the_reason_says() -> Non
         assert len(set(folders) - faces) <= 1 and ("config" in folders) == (name in settings), (name, folders)
 
 
+@pytest.mark.slow
 def test_imports_point_down(graph: Mapping[str, set[str]]) -> None:
     """A room imports what is below it, the modules beside the rooms no room, and none of them the package whole."""
     height = {name: at for at, name in enumerate(["__main__", "", *order()])}

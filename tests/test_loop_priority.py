@@ -109,6 +109,7 @@ class Observed:
 
 @pytest.mark.skipif(not may_come_first(), reason="needs the right to real-time scheduling")
 @pytest.mark.parametrize(("wanted", "has"), [(True, (os.SCHED_FIFO, BESIDE)), (False, ORDINARY)])
+@pytest.mark.slow
 def test_whoever_sees_to_the_pictures_comes_behind_the_loop_and_before_the_rest(
     unlocked: list[str], monkeypatch: pytest.MonkeyPatch, wanted: bool, has: tuple[int, int]
 ) -> None:
@@ -124,6 +125,7 @@ def test_whoever_sees_to_the_pictures_comes_behind_the_loop_and_before_the_rest(
 
 
 @pytest.mark.skipif(not may_come_first(), reason="needs the right to real-time scheduling")
+@pytest.mark.slow
 def test_who_draws_the_emulated_cameras_pictures_is_as_any_program(unlocked: list[str], tmp_path: Path) -> None:
     small = BenchSettings(camera=RenderedCamera(scene=SceneSettings(width=160, height=120)))
     with prioritised(True):

@@ -23,6 +23,7 @@ def ppo() -> ModuleType:
     return module
 
 
+@pytest.mark.slow
 def test_an_episodes_end_shows_its_last_sight_and_the_next_has_begun(ppo: ModuleType) -> None:
     study = ppo.study_of()
     wrists = ppo.Wrists(WristVectorEnv(4, study, ppo.RIG))

@@ -36,6 +36,7 @@ def links(page: Path) -> set[Path]:
     return {(page.parent / unquote(target)).resolve() for target in targets}
 
 
+@pytest.mark.slow
 def test_every_page_is_within_three_clicks_of_the_front(site: Path) -> None:
     front = (site / "docs" / "index.html").resolve()
     clicks, waiting = {front: 0}, deque([front])

@@ -93,6 +93,7 @@ def test_the_sdist_holds_the_tests_and_what_they_read(built: Path) -> None:
     assert len(wanted) > 800 and not set(wanted) - held
 
 
+@pytest.mark.slow
 def test_the_documented_commands_find_their_studies_in_an_empty_folder(installed: Path, tmp_path: Path) -> None:
     page = (ROOT / "docs" / "commands.md").read_text(encoding="utf-8")
     named = re.findall(r"`(wristctl [^`]*experiments/[^`]*)`", page.replace("wristctl paper audit", "wristctl audit"))
@@ -107,6 +108,7 @@ def test_the_documented_commands_find_their_studies_in_an_empty_folder(installed
     assert ended[-2][0] == 0 and not list(tmp_path.iterdir())
 
 
+@pytest.mark.slow
 def test_an_installed_wristctl_makes_sealed_runs_of_the_same_code_as_the_clone(installed: Path, tmp_path: Path) -> None:
     _, ended = _said(installed, tmp_path, ["gen-data", "quick", "--set", "samples=50", "-q"], ["init", "study"])
     assert [code for code, _ in ended] == [0, 0], ended

@@ -83,6 +83,7 @@ def sections(kind: type[Section]) -> Iterator[type[Section]]:
             yield from sections(field.annotation)
 
 
+@pytest.mark.slow
 def test_settings_and_errors_have_the_words_of_the_field() -> None:
     texts = [said_there for file in sorted((ROOT / "wristctl").rglob("*.py")) for said_there in said(file)]
     wrong = {place: (found(text), text) for place, text in texts if found(text)}

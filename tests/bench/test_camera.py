@@ -181,6 +181,7 @@ def test_the_whole_bench_gives_the_same_bytes_in_every_run() -> None:
     assert runs[0] == runs[1]
 
 
+@pytest.mark.slow
 def test_frames_that_jitter_come_in_order_each_by_its_own_delay() -> None:
     jitter = 0.9 / 60.0
     stage = Stage(RenderedCamera(dropped=0.1, jitter=jitter))

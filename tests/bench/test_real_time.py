@@ -83,6 +83,7 @@ def ready(bench: RealTimeBench) -> Board:
     return board
 
 
+@pytest.mark.slow
 def test_steps_move_the_wrist_and_frames_come_late_with_their_time_of_capture(serving: Serving) -> None:
     _, bench, _ = serving()
     began = time.monotonic()
@@ -104,6 +105,7 @@ def test_steps_move_the_wrist_and_frames_come_late_with_their_time_of_capture(se
     assert motion.steps == (-40, -40, 40, 40)
 
 
+@pytest.mark.slow
 def test_a_lost_port_is_lost_to_the_client_and_the_board_stops_by_itself(serving: Serving) -> None:
     faults = (InjectedFault(kind="port-lost", at=0.2), InjectedFault(kind="marker-covered", at=0.1))
     _, bench, record = serving(*faults)
@@ -116,6 +118,7 @@ def test_a_lost_port_is_lost_to_the_client_and_the_board_stops_by_itself(serving
     assert 0.0 < last_step(told) - told["last_heard"] < STOPPED_WITHIN
 
 
+@pytest.mark.slow
 def test_a_board_that_restarts_is_found_out_and_its_drives_are_off(serving: Serving) -> None:
     server, bench, record = serving(InjectedFault(kind="board-reset", at=0.2))
     board = ready(bench)

@@ -79,6 +79,7 @@ def values_of(wrist: WristParameters, settings: BenchSettings) -> np.ndarray:
         WristParameters(stiffness_axis_deg=30.0, flexion_ratio=2.0),
     ],
 )
+@pytest.mark.slow
 def test_at_rest_it_stands_where_statics_put_it_under_the_same_pulls(wrist: WristParameters) -> None:
     settings = BenchSettings(motors=TAUT, actuator=SLIDING, plant=WeakenedPlant(payload=0.05))
     host = hosted(wrist, actuator=SLIDING, plant=settings.plant)
@@ -210,6 +211,7 @@ def test_a_step_of_a_millisecond_is_fine_enough() -> None:
 
 
 @pytest.mark.parametrize(("damping", "share"), [(0.105, 1e-3), (1e-4, 0.02)])
+@pytest.mark.slow
 def test_energy_goes_to_damping_alone(damping: float, share: float) -> None:
     """Of the wrist and its stretched tendons on held spools, without friction; of one that hardly damps at last too."""
     wrist, settings = WristParameters(damping=damping), BenchSettings(motors=TAUT, actuator=SLIDING)
@@ -284,6 +286,7 @@ def looked(host: Host, seconds: float) -> list[list[Any]]:
     return frames
 
 
+@pytest.mark.slow
 def test_each_camera_tells_the_true_bend_of_its_plane() -> None:
     host = hosted()
     rig = host.bench._rig

@@ -240,6 +240,7 @@ def test_a_softer_plant_bends_further(host_on: HostOn) -> None:
     assert angles[0] > angles[1] > 0.02
 
 
+@pytest.mark.slow
 def test_the_last_minute_is_remembered_with_its_times() -> None:
     bench = VirtualBench(BenchSettings(), WRIST, 0)
     bench.transport.wait(130.0)

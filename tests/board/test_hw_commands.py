@@ -71,6 +71,7 @@ def test_a_wrist_in_two_planes_is_not_emulated_in_real_time(hw: Typed) -> None:
 
 
 @pytest.mark.parametrize("how", [[], ["--tcp", "0"], ["--wrist"]], ids=["pty", "tcp", "wrist"])
+@pytest.mark.slow
 def test_check_tells_who_and_how_the_emulated_board_is(emulate: Served, hw: Typed, how: list[str]) -> None:
     port = emulate(*how)
     check = ("check", "--port", port, "--rounds", "20", "--json", "-q")
@@ -86,6 +87,7 @@ def test_check_tells_who_and_how_the_emulated_board_is(emulate: Served, hw: Type
     assert told["counters"]["uart_errors"] <= 1  # a byte in transit when the receiver starts
 
 
+@pytest.mark.slow
 def test_stop_latches_a_fault_beside_a_running_program(emulate: Served) -> None:
     port = emulate()
     holder = f"""
@@ -146,6 +148,7 @@ def test_flash_refuses_an_image_that_is_not_there(hw: Typed) -> None:
 
 
 @pytest.mark.skipif(not (BOOT_LOADER.exists() and shutil.which("avrdude")), reason="needs avrdude and arduino-core-avr")
+@pytest.mark.slow
 def test_flash_writes_the_firmware_through_the_stock_boot_loader(emulate: Served, tmp_path: Path) -> None:
     empty = tmp_path / "empty.hex"
     empty.write_text(":00000001FF\n")

@@ -48,6 +48,7 @@ def test_ledger_orders_the_rows_of_t2_as_it_prints_them_and_judges_no_law_that_i
 
 
 @pytest.mark.painted
+@pytest.mark.slow
 def test_audit_judges_every_claim_on_each_loop_and_draws_one_figure(call: Call, tmp_path: Path) -> None:
     """On the ledger without the rivals, whose rollouts on the exact loop take long."""
     data = yaml.safe_load(LEDGER.read_text())
@@ -81,6 +82,7 @@ def test_audit_judges_every_claim_on_each_loop_and_draws_one_figure(call: Call, 
     assert pictures == ["figures/ledger.png"], "one; others are drawn when somebody asks for them"
 
 
+@pytest.mark.slow
 def test_trainings_decide_the_claims_on_networks_and_are_cited(call: Call, tmp_path: Path) -> None:
     """On trainings far too short, whose numbers the verdicts must follow."""
     data = yaml.safe_load(LEDGER.read_text())

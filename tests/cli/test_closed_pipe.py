@@ -46,6 +46,7 @@ def test_a_reader_of_results_may_leave(tmp_path: Path) -> None:
         assert done.stdout.splitlines()[-1] in ("0", "141") and done.stderr == ""
 
 
+@pytest.mark.slow
 def test_an_interrupted_search_names_how_to_go_on(tmp_path: Path) -> None:
     """As typed, for a search that is long enough to be stopped."""
     searched = ("tune", "--candidates", "4", "--iterations", "100000", "--set", "loops={fast: {plant_segments: 1}}",

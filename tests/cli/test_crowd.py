@@ -8,6 +8,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 from wristctl.records import list_runs
 from wristctl.records.tags import read_tags
 
@@ -38,6 +40,7 @@ def together(folder: Path, *commands: tuple[str, ...]) -> list[tuple[int, str]]:
     return [(child.returncode, said) for child, said in zip(children, told, strict=True)]
 
 
+@pytest.mark.slow
 def test_a_crowd_of_processes_leaves_everything_whole(tmp_path: Path) -> None:
     results = tmp_path / "results"
     done = together(tmp_path, *[("gen-data", "--samples", "50", "-q")] * MANY)

@@ -70,6 +70,7 @@ def _everywhere() -> Iterator[tuple[str, str]]:
 
 
 @pytest.mark.parametrize("command", COMMANDS if THOROUGH else ["simulate"])
+@pytest.mark.slow
 def test_the_same_result_whatever_the_surroundings(tmp_path: Path, command: str) -> None:
     here = result(tmp_path, command)
     known = PLACES | PROCESSORS

@@ -84,6 +84,7 @@ def _pages(typed: list[list[str]]) -> dict[str, str]:
     return {" ".join(arguments): page.partition("\n")[2] for arguments, page in zip(typed, pages, strict=True)}
 
 
+@pytest.mark.slow
 def test_each_page_of_help_is_one_screen_and_with_all_names_every_option() -> None:
     named = [
         [],
@@ -127,6 +128,7 @@ TAKEN_FOR_GRANTED = (
 )
 
 
+@pytest.mark.slow
 def test_every_example_runs_as_written_but_for_what_it_takes_for_granted(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:

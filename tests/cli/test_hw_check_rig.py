@@ -40,6 +40,7 @@ def test_a_rig_with_two_cameras_is_checked_by_each_of_them(call: Call) -> None:
     assert code == 2 and "a check looks at one camera, and this rig has two" in err and "planes=1" in err
 
 
+@pytest.mark.slow
 def test_a_rig_is_measured_and_each_trouble_named_answer_first(call: Call, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(rig_strokes, "COUNT", 8)
     monkeypatch.setattr(rig_strokes, "MOST", 8)
@@ -57,6 +58,7 @@ def test_a_rig_is_measured_and_each_trouble_named_answer_first(call: Call, monke
     assert abs(hidden) < 2.0
 
 
+@pytest.mark.slow
 def test_nothing_moves_without_a_yes_and_the_rest_is_measured(call: Call, monkeypatch: pytest.MonkeyPatch) -> None:
     moved: list[Any] = []
     monkeypatch.setattr(rig_facts, "RigStrokes", lambda *given: moved.append(given))
@@ -86,6 +88,7 @@ def test_a_camera_too_slow_for_the_limits_is_refused_before_anything_moves(
     assert benches[0].motion().steps == (0, 0, 0, 0) and not any(benches[0].motion().energised)
 
 
+@pytest.mark.slow
 def test_a_link_that_fills_the_ticks_is_a_stop_that_names_it(call: Call) -> None:
     code, _, err = call(*TRIAL, "--set", "bench.line.adapter=ftdi")
     assert code == 5 and "the board's answers take" in err and "latency timer" in err

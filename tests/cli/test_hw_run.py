@@ -44,6 +44,7 @@ SLOW = ("--set", "sensor={level: camera, frame_rate: 20}")
 
 
 @pytest.mark.painted
+@pytest.mark.slow
 def test_the_emulated_experiment_ends_in_a_sealed_run_with_tables_and_pictures(call: Call) -> None:
     code, out, err = call(*QUICK, "--video")
     run = open_run("latest:hw-run")
@@ -150,6 +151,7 @@ def _look(page: Path) -> None:
         browser.close()
 
 
+@pytest.mark.slow
 def test_a_covered_marker_ends_in_a_sealed_run_with_its_reason_and_the_last_second(call: Call) -> None:
     code, _, err = call(*QUICK, "--set", "bench.faults=[{kind: marker-covered, at: 0.1}]")
     (run,) = list_runs(Path("results"))
@@ -281,6 +283,7 @@ def test_calibrating_the_wrist_leaves_what_a_later_run_reuses(call: Call) -> Non
     assert code == 4 and "the calibration left the motors at" in err
 
 
+@pytest.mark.slow
 def test_the_first_motion_of_a_new_rig_is_small_slow_and_stops_early(call: Call) -> None:
     file = str(ROOT / "experiments" / "first-motion.yaml")
     study = load_study([Path(file)])

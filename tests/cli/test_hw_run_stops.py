@@ -153,6 +153,7 @@ def test_every_fault_has_a_stated_time() -> None:
 
 
 @pytest.mark.parametrize("kind", OF_THE_CHAIN)
+@pytest.mark.slow
 def test_each_fault_ends_within_its_time_in_a_sealed_run(hw_run: HwRun, kind: str) -> None:
     judge(hw_run(*injected({kind: AT})), {kind: AT})
 
@@ -165,6 +166,7 @@ DAILY = ({"port-lost": AT, "disk-full": AT}, {"marker-covered": AT, "host-silent
 
 
 @pytest.mark.parametrize("faults", PAIRS if THOROUGH else DAILY, ids=lambda faults: "+".join(faults))
+@pytest.mark.slow
 def test_two_faults_together_end_within_the_sooner_ones_time(hw_run: HwRun, faults: dict[str, float]) -> None:
     judge(hw_run(*injected(faults)), faults)
 
@@ -186,6 +188,7 @@ def interrupted_at(moment: str, monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.mark.parametrize("moment", ["homing", "between trials", *["drawing"] * THOROUGH])
+@pytest.mark.slow
 def test_ctrl_c_stops_the_motors_and_seals_the_run(hw_run: HwRun, monkeypatch: pytest.MonkeyPatch, moment: str) -> None:
     interrupted_at(moment, monkeypatch)
     ended = hw_run(*(("--set", "positions=find") if moment == "homing" else ()))
@@ -196,6 +199,7 @@ def test_ctrl_c_stops_the_motors_and_seals_the_run(hw_run: HwRun, monkeypatch: p
         assert ended.stop["motors_stand"] and ended.stop["reason"] == STATED["Ctrl-C"].says
 
 
+@pytest.mark.slow
 def test_on_a_disk_that_is_really_full_the_motors_stop_and_the_run_is_sealed(
     hw_run: HwRun, small_disk: Callable[[int], Path], monkeypatch: pytest.MonkeyPatch
 ) -> None:

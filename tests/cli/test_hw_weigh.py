@@ -61,6 +61,7 @@ def hanging(monkeypatch: pytest.MonkeyPatch, masses: Sequence[Sequence[float]]) 
 NONE = (0.0,) * 4
 
 
+@pytest.mark.slow
 def test_four_cells_are_tared_and_scaled_and_the_study_file_has_what_was_found(
     call: Call, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
@@ -81,6 +82,7 @@ def test_four_cells_are_tared_and_scaled_and_the_study_file_has_what_was_found(
     assert again["offset"][2] - TRUE.offset[2] == pytest.approx(0.1 * GRAVITY * 91.0, abs=1.0)
 
 
+@pytest.mark.slow
 def test_a_weight_on_another_cell_or_one_that_shows_nothing_is_refused_by_name(
     call: Call, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -92,6 +94,7 @@ def test_a_weight_on_another_cell_or_one_that_shows_nothing_is_refused_by_name(
     assert code == 2 and "counts on axis 0" in err
 
 
+@pytest.mark.slow
 def test_silent_cells_are_told_left_out_and_keep_what_was_known(call: Call, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(Emulated, "wired", (1,))
     hanging(monkeypatch, [NONE, (0.0, 2.0, 0.0, 0.0)])

@@ -16,6 +16,7 @@ QUICK = ("--set", "ranges_deg=[[0, 10]]", "--set", "frequencies=[1, 5]", "--set"
 
 
 @pytest.mark.painted
+@pytest.mark.slow
 def test_a_run_with_a_measured_loop_is_repeated_to_the_byte(call: Call, tmp_path: Path) -> None:
     weights = SHORT._replace(what="tensions")
     written(made_loop(FrictionCase(0.15, 0.5, 3e-5), 0, weights).loop, tmp_path / "loop.csv")

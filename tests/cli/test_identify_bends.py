@@ -23,6 +23,7 @@ from wristctl.study_files.load import load_study
 from wristctl.wrist.tendon_layout import TendonLayout
 
 
+@pytest.mark.slow
 def test_what_would_tell_more_is_what_the_logs_have_not() -> None:
     rng = np.random.default_rng(1)
     rig = drawn_rig(rng)
@@ -44,6 +45,7 @@ def test_what_would_tell_more_is_what_the_logs_have_not() -> None:
 
 
 @pytest.mark.painted
+@pytest.mark.slow
 def test_logs_in_two_planes_tell_springs_and_tendons_in_a_run_of_their_own(call: Call, tmp_path: Path) -> None:
     rng = np.random.default_rng(0)
     rig = drawn_rig(rng)

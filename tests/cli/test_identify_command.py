@@ -21,6 +21,7 @@ SIDES: tuple[DirectionName, ...] = ("ulnar", "extension")
 
 
 @pytest.mark.painted
+@pytest.mark.slow
 def test_two_poses_give_a_run_that_simulate_starts_from(call: Call, tmp_path: Path) -> None:
     poses = [write_run(tmp_path / "results", 0, pose, sides=SIDES) for pose in (UPRIGHT, LEVEL)]
     code, out, err = call("identify", *(run.id for run in poses), "--set", "fix.friction=0.1")
@@ -61,6 +62,7 @@ def test_two_poses_give_a_run_that_simulate_starts_from(call: Call, tmp_path: Pa
         assert f"the wrist identified in {found.id}" in words and "the paper's wrist" not in words
 
 
+@pytest.mark.slow
 def test_commands_say_whose_wrist_they_took_and_hand_it_on_in_what_they_advise(call: Call, tmp_path: Path) -> None:
     wrist = {"stiffness": 0.4, "flexion_ratio": 1.1, "damping": 0.09, "tendon_radius": 0.021}
     values = wrist | {"tendon_stiffness": 9e3, "friction": 0.2, "presliding": 3e-5, "sheath_friction": 0.3}
@@ -138,6 +140,7 @@ def _log_of(file: Path, noise: float, backward: bool = False) -> None:
 
 
 @pytest.mark.painted
+@pytest.mark.slow
 def test_an_open_log_tells_what_it_can_in_a_run_of_its_own(call: Call, tmp_path: Path) -> None:
     _log_of(tmp_path / "my.csv", 0.05)
     code, out, err = call("identify", str(tmp_path / "my.csv"))
@@ -155,6 +158,7 @@ def test_an_open_log_tells_what_it_can_in_a_run_of_its_own(call: Call, tmp_path:
     assert call("runs", "replay", found.id)[0] == 0
 
 
+@pytest.mark.slow
 def test_a_log_that_no_model_predicts_is_refused_with_its_answer(call: Call, tmp_path: Path) -> None:
     _log_of(tmp_path / "back.csv", 0.05, backward=True)
     code, out, err = call("identify", str(tmp_path / "back.csv"))

@@ -10,6 +10,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 from wristctl.cli.app import typer_of
 from wristctl.cli.commands import COMMANDS
 from wristctl.records import list_runs
@@ -91,6 +93,7 @@ def test_every_command_that_makes_a_run_is_known() -> None:
     assert set(QUICKLY) | {"identify", "hw", "hw-run", "track", "validate"} == set(_that_write())
 
 
+@pytest.mark.slow
 def test_killed_before_any_change_of_a_file_no_run_looks_complete_that_is_not(tmp_path: Path) -> None:
     everything = [(name, *options) for name, ways in QUICKLY.items() for options in ways]
     drawn = random.Random(8)

@@ -141,6 +141,7 @@ def test_without_a_data_run_train_draws_what_gen_data_would(call: Call) -> None:
     assert "samples: 100" in own.file("config.yaml").read_text()
 
 
+@pytest.mark.slow
 def test_a_search_killed_outright_resumes_to_the_same_bytes(call: Call, tmp_path: Path) -> None:
     grid = "grid={depths: [1, 2], activations: [tanh, relu], widths: [8], folds: 5}"
     search = ("train", "--search", *QUICK, "--epochs", "40", "--set", grid, "--set", "gen-data.samples=80")

@@ -61,6 +61,7 @@ def test_the_tuning_that_is_advised_is_of_the_users_own_wrist(call: Call, tmp_pa
 
 
 @pytest.mark.painted
+@pytest.mark.slow
 def test_analyse_takes_the_loop_of_simulate_and_begins_with_its_margins(call: Call) -> None:
     typed = ("--controller", "pid", "--set", "gains={Kp: 10.0, Ki: 20.0, Kd: 0.5}", "--over", "Kp")
     code, out, _ = call("analyse", *typed, "--set", "loop.control_period=2e-3", "--set", "angles_deg=[20.0]")
@@ -95,6 +96,7 @@ def tuned_before(call: Call, tuning: Path, tmp_path: Path) -> None:
 
 @pytest.mark.painted
 @pytest.mark.usefixtures("tuned_before")
+@pytest.mark.slow
 def test_tuned_gains_reach_compare_and_simulate(call: Call) -> None:
     tuned = open_run("latest:tune")
     gains = json.loads(tuned.file("data/gains.json").read_text())
@@ -225,6 +227,7 @@ def begun_tuning(folder: Path) -> subprocess.Popen[bytes]:
     raise AssertionError(f"no progress: {child.poll()}")
 
 
+@pytest.mark.slow
 def test_a_killed_tuning_reads_as_crashed(tmp_path: Path) -> None:
     child = begun_tuning(tmp_path)
     child.kill()
@@ -233,6 +236,7 @@ def test_a_killed_tuning_reads_as_crashed(tmp_path: Path) -> None:
     assert run.state == "crashed"
 
 
+@pytest.mark.slow
 def test_an_interrupted_tuning_keeps_what_it_found(tmp_path: Path) -> None:
     child = begun_tuning(tmp_path)
     child.send_signal(signal.SIGINT)
@@ -280,6 +284,7 @@ SEARCH = ("tune", *SOFT, "--candidates", "4", "--iterations", "3", "--set", "con
 
 
 @pytest.mark.painted
+@pytest.mark.slow
 def test_gains_are_searched_on_worlds_and_rows_ranked_on_others_with_the_answer_first(call: Call) -> None:
     code, out, err = call(*SEARCH)
     assert code == 0, err

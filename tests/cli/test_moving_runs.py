@@ -62,6 +62,7 @@ def again(call: Call, run: Path, *out: str) -> Run:
     return Run(Path(said.splitlines()[-1]))
 
 
+@pytest.mark.slow
 def test_a_packed_run_is_done_again_at_a_colleagues_with_the_same_result(call: Call, made: Run) -> None:
     code, said, err = call("runs", "pack", made.id, "--out", "author/results", "--file", "mail.zip")
     assert code == 0 and said.splitlines()[-1] == "mail.zip", err

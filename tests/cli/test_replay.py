@@ -59,6 +59,7 @@ def _verdict(wristctl: Command, *arguments: str, before: Path | None = None) -> 
     return status, json.loads(out)
 
 
+@pytest.mark.slow
 def test_a_repetition_is_identical_to_the_byte(wristctl: Command, data: str) -> None:
     status, found = _verdict(wristctl, data)
     assert status == 0 and found["same"] and found["causes"] == [] and found["scratch"] is None
@@ -100,6 +101,7 @@ def test_a_run_of_every_kind_is_repeated_to_the_byte(wristctl: Command) -> None:
         assert status == 0 and not differing, (typed, found["causes"], differing)
 
 
+@pytest.mark.slow
 def test_a_changed_setting_is_named(wristctl: Command, data: str) -> None:
     status, found = _verdict(wristctl, data, "--set", "samples=11")
     assert status == 3 and found["causes"] == ["config: gen-data.samples: 10 -> 11"]
@@ -108,6 +110,7 @@ def test_a_changed_setting_is_named(wristctl: Command, data: str) -> None:
     assert Path(found["scratch"]).is_dir()
 
 
+@pytest.mark.slow
 def test_a_changed_line_of_code_is_named_by_its_file(wristctl: Command, code: Path, data: str) -> None:
     file = code / "wristctl" / "commands" / "gen_data" / "command.py"
     text = file.read_text()
@@ -120,6 +123,7 @@ def test_a_changed_line_of_code_is_named_by_its_file(wristctl: Command, code: Pa
     assert differing["metrics.json"].endswith("10 before, 11 now") and "data/samples.csv" not in differing
 
 
+@pytest.mark.slow
 def test_a_changed_package_is_named_with_its_version(wristctl: Command, data: str, tmp_path: Path) -> None:
     (tmp_path / "numpy-9.9.9.dist-info").mkdir()
     (tmp_path / "numpy-9.9.9.dist-info" / "METADATA").write_text("Name: numpy\nVersion: 9.9.9\n")

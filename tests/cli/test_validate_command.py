@@ -52,6 +52,7 @@ def days(tmp_path: Path) -> Path:
 
 
 @pytest.mark.painted
+@pytest.mark.slow
 def test_a_robot_is_validated_in_a_run_that_stands_without_its_folder(tmp_path: Path, days: Path, call: Call) -> None:
     code, out, err = call("validate", "deepc-arm", "--data", str(days), "--set", "terms=[slack]")
     assert code == 0, err

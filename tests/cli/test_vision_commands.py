@@ -45,6 +45,7 @@ def recording(tmp_path: Path) -> Path:
 
 
 @pytest.mark.painted
+@pytest.mark.slow
 def test_a_recording_is_tracked_with_a_calibration(call: Call, recording: Path) -> None:
     pose = [part for name, value in POSE.items() for part in ("--set", f"scene.{name}={value}")]
     code, out, err = call("hw", "calibrate", "camera", "--views", "8", *pose)

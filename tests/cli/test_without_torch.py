@@ -61,6 +61,7 @@ def ended(folder: Path, *commands: tuple[str, ...]) -> tuple[list[str], str]:
     return [line.rpartition(" ")[2] for line in done.stderr.splitlines() if " ended with " in line], done.stderr
 
 
+@pytest.mark.slow
 def test_every_command_but_train_runs_without_torch(earlier: Path, tmp_path: Path) -> None:
     runs = {kind: str(open_run(f"latest:{kind}", earlier).path) for kind in ("train", "tune", "hw-run", "identify")}
     network, short = ("--network", runs["train"]), ("--set", "horizon=0.05")

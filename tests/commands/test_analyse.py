@@ -53,6 +53,7 @@ def test_the_answer_is_the_least_margin_of_all_angles() -> None:
     assert known_of(done.findings, "gain_most", "delay_margin") == [("", "higher", 3), ("s", "higher", 3)]
 
 
+@pytest.mark.slow
 def test_a_sealed_run_begins_with_the_answer_and_one_figure(tmp_path: Path) -> None:
     done = analyse("simulate={controller: smc-tracking, gains: default, horizon: 0.5}", "analyse.over=k", out=tmp_path)
     assert done.run is not None
@@ -71,6 +72,7 @@ def test_a_sealed_run_begins_with_the_answer_and_one_figure(tmp_path: Path) -> N
     assert [table.title.split(",")[0] for table in done.tables][2] == "Root locus"
 
 
+@pytest.mark.slow
 def test_every_table_holds_what_was_found_in_the_units_of_its_heads(tmp_path: Path) -> None:
     """A loop that is stable above a gain too, so that no column is empty; frequencies in Hz, angles in deg."""
     lagged = "simulate.loop={actuator: {level: lagged}, sensor: {level: camera}}"
@@ -144,6 +146,7 @@ def test_a_wrist_that_buckles_needs_some_gain_to_stay(caplog: pytest.LogCaptureF
     assert "and it is UNSTABLE" in alone.sentence and alone.fault is not None
 
 
+@pytest.mark.slow
 def test_behind_camera_and_tendons_it_is_said_for_which_swings_it_holds() -> None:
     done = analyse(CAMERA, "simulate={controller: smc-tracking, gains: hardware, horizon: 0.2}", STRAIGHT)
     assert done.sentence.endswith(
@@ -165,6 +168,7 @@ def test_no_swing_is_linear_where_the_limits_cross() -> None:
     )
 
 
+@pytest.mark.slow
 def test_angles_count_toward_the_direction_and_a_sine_ends_at_its_farthest() -> None:
     one, other = (
         analyse(GVSC, f"simulate.direction={each}", "wrist.gravity=[-9.81, 2.0]") for each in ("ulnar", "radial")
@@ -219,6 +223,7 @@ def test_a_loop_that_rests_nowhere_is_said() -> None:
                 "wrist.hand_mass=3.0")  # fmt: skip
 
 
+@pytest.mark.slow
 def test_noise_and_drawn_courses_come_from_the_seed() -> None:
     first, again, other = (
         analyse(

@@ -113,6 +113,7 @@ def test_the_printed_error_comes_out_where_it_does_and_beyond_the_tendons_streng
     assert "RMSE on no loop" in sentence(said(dict.fromkeys(LOOPS, loop({}, off))), PID)
 
 
+@pytest.mark.slow
 def test_the_ranking_is_that_of_the_numbers() -> None:
     printed = dict.fromkeys(LOOPS, loop({}, {}))
     last = list(LOOPS)[-1]
@@ -231,6 +232,7 @@ def test_over_the_box_the_shares_are_told(share: float, told: str) -> None:
     assert "did not converge" not in found
 
 
+@pytest.mark.slow
 def test_what_the_box_says_comes_with_what_must_be_known_of_it() -> None:
     """How many settings are not counted, and that some wrists rest at 30 deg whatever is asked of them."""
     loops = dict.fromkeys(LOOPS, loop(NOTHING, {}))

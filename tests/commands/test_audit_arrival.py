@@ -15,6 +15,7 @@ CLAIMS = ", ".join(
 )
 
 
+@pytest.mark.slow
 def test_what_arrives_in_an_audit_arrives_in_a_comparison(monkeypatch: pytest.MonkeyPatch) -> None:
     """On the loops at 1 kHz, each judged by its own command; some rows arrive there and some do not."""
     monkeypatch.setattr(claims, "LOOPS", {name: loop for name, loop in LOOPS.items() if name != "exact"})

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 import wristctl
 from wristctl.records import list_runs
@@ -24,6 +25,7 @@ audit:
 """
 
 
+@pytest.mark.slow
 def test_each_claim_can_be_drawn_setting_by_setting_with_the_unit_of_what_decides_it(tmp_path: Path) -> None:
     (tmp_path / "own.yaml").write_text(STUDY)
     found = wristctl.audit(wristctl.load_study(tmp_path / "own.yaml"), out=tmp_path / "results")

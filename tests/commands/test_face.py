@@ -74,6 +74,7 @@ def _values(metrics: Mapping[str, Any]) -> dict[str, Any]:
 
 
 @pytest.mark.parametrize("name", CHAIN)
+@pytest.mark.slow
 def test_numbers_are_the_same_in_memory_and_in_a_sealed_run(name: str, in_memory: Results, recorded: Results) -> None:
     memory, kept = in_memory[name], recorded[name]
     assert memory.run is None and isinstance(kept.run, Run) and kept.run.state == "ok" and kept.run.problems() == []

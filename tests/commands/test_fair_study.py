@@ -77,6 +77,7 @@ def run_of(found: Studied) -> Run:
     return found.run
 
 
+@pytest.mark.slow
 def test_its_answer_names_the_controller_what_each_term_buys_and_heads_the_run(done: Studied) -> None:
     text = (run_of(done).path / "README.md").read_text()
     result = text[text.index("## Result") :]
@@ -162,6 +163,7 @@ def test_how_often_a_controller_is_first_is_data_that_the_page_reads(
     assert script.first_of(Run(tmp_path / run.id), rankings) == {"rig": told}
 
 
+@pytest.mark.slow
 def test_a_comparison_of_what_a_study_ships_has_its_figures_to_the_last_bit(
     study: Study, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -213,6 +215,7 @@ def test_a_variant_is_held_against_the_one_that_it_names(done: Studied) -> None:
     assert table.loc["random", "ratio"] != 1.0, "another search finds other gains"
 
 
+@pytest.mark.slow
 def test_a_study_killed_and_resumed_by_other_processes_has_the_same_hash(
     done: Studied, study: Study, file: Path, tmp_path: Path
 ) -> None:
@@ -238,6 +241,7 @@ def test_a_study_killed_and_resumed_by_other_processes_has_the_same_hash(
     assert [each.role for each in run_of(again).manifest.inputs] == ["resume"]
 
 
+@pytest.mark.slow
 def test_what_a_resumed_study_keeps_says_nothing_of_the_time_that_is_left(
     done: Studied, study: Study, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -257,6 +261,7 @@ def test_what_a_resumed_study_keeps_says_nothing_of_the_time_that_is_left(
     assert 0 < total["tuning"] < sizes["tuning"] / 2
 
 
+@pytest.mark.slow
 def test_whoever_resumes_with_other_code_is_told_once_that_all_is_computed_anew(
     done: Studied, study: Study, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
@@ -266,10 +271,12 @@ def test_whoever_resumes_with_other_code_is_told_once_that_all_is_computed_anew(
     assert run_of(again).result_hash == run_of(done).result_hash
 
 
+@pytest.mark.slow
 def test_in_memory_it_finds_the_same(done: Studied, study: Study) -> None:
     assert wristctl.study(study).frame().equals(done.frame())
 
 
+@pytest.mark.slow
 def test_a_unit_that_fails_is_named_and_its_row_left_out(
     done: Studied, study: Study, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -53,6 +53,7 @@ def whole(tmp_path_factory: pytest.TempPathFactory) -> Whole:
     return Whole(result, Run(live.path))
 
 
+@pytest.mark.slow
 def test_a_row_has_errors_by_plane_estimated_and_true(whole: Whole) -> None:
     table, columns = whole.run.data("trials"), columns_of(whole.run, "data/trials.csv")
     assert sorted(table["push"]) == [0.0, 1.0] and set(table["direction"]) == {"dart-thrower"}

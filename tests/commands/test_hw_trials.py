@@ -131,6 +131,7 @@ def perform(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Perform:
     return performed
 
 
+@pytest.mark.slow
 def test_a_row_is_a_trial_that_began_judged_by_its_own_log(perform: Perform) -> None:
     table, run, watched, _ = perform()
     assert list(table["trial"]) == [0, 1] and list(table["outcome"]) == ["ok", "ok"] and watched.trials == 3

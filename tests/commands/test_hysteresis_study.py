@@ -169,6 +169,7 @@ def test_what_does_not_converge_is_marked_where_its_numbers_are(monkeypatch: pyt
 
 
 @pytest.mark.parametrize(("step", "told"), [(1e-3, False), (5e-3, True)])
+@pytest.mark.slow
 def test_a_fit_by_too_long_a_step_is_warned_of(
     step: float, told: bool, tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
@@ -183,6 +184,7 @@ def test_a_fit_by_too_long_a_step_is_warned_of(
     assert any("hysteresis.step: 0.0025" in said for said in caplog.messages) == told
 
 
+@pytest.mark.slow
 def test_a_loop_that_no_model_fits_is_refused_where_everybody_looks(
     tmp_path: Path,
 ) -> None:

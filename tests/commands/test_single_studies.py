@@ -16,6 +16,7 @@ from wristctl.commands.identify.command import Identified
 from wristctl.comparison.combinations import count_rollouts
 
 
+@pytest.mark.slow
 def test_identified_parameters_reach_a_loop_from_memory(tmp_path: Path) -> None:
     run = write_run(tmp_path, 0, UPRIGHT, sides=("ulnar",))
     settings = (

@@ -234,6 +234,7 @@ def test_how_the_rate_is_measured_decides_at_60_newton() -> None:
     assert found["ideal"] == pytest.approx(0.155, rel=0.03) and found["observer"] == pytest.approx(0.0014, abs=1e-4)
 
 
+@pytest.mark.slow
 def test_the_limit_that_decides_is_found_and_the_held_tick_explains_it() -> None:
     """Draws of the limit alone around the 60 N that four segments at 1 kHz stand."""
     own = box(64, wrist__tension_limit={"draw": "40..70"}).model_copy(update={"horizon": 4.0})

@@ -71,6 +71,7 @@ def test_references_are_named_by_kind_duration_and_target() -> None:
     assert reference_name(Reference(tip=(0.07, 0.02), inverse="closed-form")) == "minimum jerk 1 s tip 70, 20 mm"
 
 
+@pytest.mark.slow
 def test_step_time_is_measured_for_every_controller() -> None:
     study = load_study([])
     for name in CONTROLLERS:

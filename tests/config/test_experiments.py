@@ -75,6 +75,7 @@ def test_experiments_are_read_without_a_warning(file: Path, caplog: pytest.LogCa
 
 
 @pytest.mark.filterwarnings("ignore:Pydantic serializer warnings")
+@pytest.mark.slow
 def test_every_leaf_changes_the_fingerprint_of_the_command_that_reads_it() -> None:
     code, environment = code_state()[0], environment_state()[0]
     seen = set()
@@ -170,6 +171,7 @@ OPEN = ("loops", "families", "budgets", "variants", "unknowns", "one_of")
 """Mappings that take any name, but no number under it."""
 
 
+@pytest.mark.slow
 def test_a_key_that_nothing_reads_is_refused_with_its_line_and_the_key_that_was_meant(tmp_path: Path) -> None:
     for place, (data, path, mapping) in MAPPINGS.items():
         meant = next(reversed(mapping))

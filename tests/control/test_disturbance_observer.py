@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
 from tests.control.conftest import ClosedLoop, Sine
 from wristctl.config.wrist import WristParameters
@@ -11,6 +12,7 @@ from wristctl.control.table import controller, gains_of
 WRIST = WristParameters(gravity=(-8.0, 3.0), hand_mass=0.4)
 
 
+@pytest.mark.slow
 def test_on_the_model_itself_there_is_no_load_however_fast_the_wrist_moves(closed_loop: ClosedLoop, sine: Sine) -> None:
     """A period of 0.1 ms, so that what a period leaves out is little beside every term of the momentum's equation."""
     law = controller("ct-dob")

@@ -95,6 +95,7 @@ def optimal(given: Problem) -> np.ndarray:
     return found
 
 
+@pytest.mark.slow
 def test_a_plan_is_the_optimum_and_nearly_so_after_its_fixed_turns() -> None:
     rng, constrained = np.random.default_rng(0), 0
     for _ in range(1000):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
 from tests.control.conftest import ClosedLoop, Sine
 from wristctl.config.wrist import WristParameters
@@ -31,6 +32,7 @@ def test_lyapunov_function_does_not_grow_under_excitation(closed_loop: ClosedLoo
     assert lyapunov[-1] < 0.98 * lyapunov[0]
 
 
+@pytest.mark.slow
 def test_parameters_stay_in_bounds_on_a_wrist_of_another_form(closed_loop: ClosedLoop, sine: Sine) -> None:
     plant = MODEL.model_copy(update={"hand_mass": 0.6, "stiffness": 0.4})
     wild = (80.0, 80.0, 0.5, 1e4, 1e-6)

@@ -34,6 +34,7 @@ def site(tmp_path: Path) -> Path:
     return tmp_path / "site"
 
 
+@pytest.mark.slow
 def test_an_entry_point_is_a_controller_and_is_sealed_and_replayed_without_its_package(
     tmp_path: Path, site: Path
 ) -> None:
@@ -46,6 +47,7 @@ def test_an_entry_point_is_a_controller_and_is_sealed_and_replayed_without_its_p
     assert again.returncode == 0 and f"{run.name}: identical" in again.stdout, again.stderr
 
 
+@pytest.mark.slow
 def test_it_is_loaded_only_when_it_is_named(tmp_path: Path, site: Path) -> None:
     marker = tmp_path / "imported"
     for arguments in (

@@ -336,6 +336,7 @@ SPRINGY = LawDesign("springy", {"spring": Parameter(2.0, "N m/rad", "how stiff")
 """
 
 
+@pytest.mark.slow
 def test_a_laws_own_section_has_units_decides_what_it_is_and_is_sealed_in_full(tmp_path: Path) -> None:
     (tmp_path / "springy.py").write_text(DESIGN)
     study = tmp_path / "study.yaml"
@@ -399,6 +400,7 @@ def test_what_an_optimiser_from_elsewhere_raises_is_said_of_it(tmp_path: Path, w
     assert states == ([] if where == "__init__" else [("failed", 2)]), "one that cannot be made is known before"
 
 
+@pytest.mark.slow
 def test_a_law_that_ends_the_program_ends_its_run_as_failed_with_its_name(stranger: Path) -> None:
     law = "def law(now, wrist, gains, memory):\n    exit() if abs(now.theta) < 1e-9 else None\n    return 0.0\n"
     more = "ENDS = Controller('ends', law, 'a stranger', GAINS, PRESETS, plain=True)\n"

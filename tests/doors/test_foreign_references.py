@@ -41,6 +41,7 @@ def test_a_course_that_is_none_is_refused_before_anything_runs(tmp_path: Path, c
     assert "simulate.reference.kind" in done.stderr and "bug in wristctl" not in done.stderr
 
 
+@pytest.mark.slow
 def test_what_shows_only_later_ends_the_run_and_is_named(tmp_path: Path) -> None:
     (tmp_path / "own.py").write_text(OWN.replace("COURSE", SOUND.replace("0.0 * time]", "np.sqrt(1.5 - time)]")))
     given = ("--set", "simulate.reference.kind=own.py:OWN", "--set", "simulate.horizon=2")

@@ -56,6 +56,7 @@ def run_of(folder: Path) -> Run:
 
 
 @pytest.mark.painted
+@pytest.mark.slow
 def test_weights_are_sealed_and_a_run_replays_when_they_are_gone(learned: Path) -> None:
     run = run_of(learned)
     assert {each for each in run.manifest.code.foreign if each.endswith(".npy")} == {"code/strange/nets/weights.npy"}

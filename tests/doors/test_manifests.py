@@ -209,6 +209,7 @@ def _heard(descriptor: int) -> bool:
 
 
 @pytest.mark.parametrize("kind", ["hw-run", "calibrate-camera"])
+@pytest.mark.slow
 def test_the_repetition_itself_opens_no_device(
     tmp_path: Path, terminal: tuple[str, int], kind: str, capfd: pytest.CaptureFixture[str]
 ) -> None:

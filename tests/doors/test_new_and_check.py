@@ -21,6 +21,7 @@ def asked(name: str, board: bool = False) -> dict[str, LawCheck]:
     return {each.asked: each for each in certificate(name, {}, board)}
 
 
+@pytest.mark.slow
 def test_new_files_run_as_they_stand_in_one_study(tmp_path: Path) -> None:
     for kind, name in (("controller", "my-law"), ("reference", "my-move"), ("optimiser", "my-search")):
         done = wristctl(tmp_path, "new", kind, name)
@@ -47,6 +48,7 @@ tune:
     assert not [each for each in found.values() if each.passed is False] and found["compiles"].passed
 
 
+@pytest.mark.slow
 def test_new_writes_over_nothing_and_takes_no_name_that_is_taken(tmp_path: Path) -> None:
     (tmp_path / "mine.py").write_text("mine")
     for name, told in (
@@ -62,6 +64,7 @@ def test_new_writes_over_nothing_and_takes_no_name_that_is_taken(tmp_path: Path)
     assert [each.name for each in tmp_path.iterdir()] == ["mine.py"] and (tmp_path / "mine.py").read_text() == "mine"
 
 
+@pytest.mark.slow
 def test_a_law_that_pushes_the_wrong_way_gets_no_certificate(stranger: Path) -> None:
     place = f"{stranger}/strange.py:STRANGE"
     assert asked(place)["bends the wrist back"].passed

@@ -50,6 +50,7 @@ def seal_anew(run: Path) -> None:
 
 
 @pytest.mark.parametrize("by", ["its law", "its reference"])
+@pytest.mark.slow
 def test_nothing_of_a_hostile_run_executes(stranger: Path, by: str) -> None:
     run, marker = sealed(stranger), stranger / "was here"
     for file in (run.path / "code/strange/helper.py", run.path / "code/strange/strange.py"):
@@ -77,6 +78,7 @@ def test_nothing_of_a_hostile_run_executes(stranger: Path, by: str) -> None:
 
 
 @pytest.mark.painted
+@pytest.mark.slow
 def test_a_run_replays_identically_from_its_copy_once_it_is_trusted(stranger: Path) -> None:
     run = sealed(stranger)
     assert set(run.manifest.code.foreign) == {"code/strange/helper.py", "code/strange/strange.py"}
@@ -90,6 +92,7 @@ def test_a_run_replays_identically_from_its_copy_once_it_is_trusted(stranger: Pa
     assert list((stranger / "results").glob("figures-*/*.svg"))
 
 
+@pytest.mark.slow
 def test_on_a_terminal_a_person_is_shown_files_and_hashes_and_asked(stranger: Path) -> None:
     run = sealed(stranger)
     for answer, lets in (("no", False), ("yes", True)):

@@ -93,6 +93,7 @@ CASES += [("simulate", left) for left in ("no manifest", "no manifest, no seal",
 
 
 @pytest.mark.parametrize(("kind", "left"), CASES)
+@pytest.mark.slow
 def test_no_command_imports_the_law_of_a_run_unasked(
     tmp_path: Path, call: Call, monkeypatch: pytest.MonkeyPatch, kind: str, left: str  # noqa: F811
 ) -> None:  # fmt: skip

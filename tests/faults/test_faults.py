@@ -30,6 +30,7 @@ def _without_a_fault(*words: str) -> None:
 
 @pytest.mark.skipif(shutil.which("gcc") is None or sys.platform != "linux", reason="needs gcc on Linux")
 @pytest.mark.parametrize("sample", [()] if THOROUGH else FAULTS, ids=lambda sample: sample[1] if sample else "all")
+@pytest.mark.slow
 def test_wherever_a_command_is_killed_or_refused_what_is_left_is_right(sample: tuple[str, ...]) -> None:
     _without_a_fault("tests.faults.run", *sample)
 
@@ -40,5 +41,6 @@ def test_wherever_a_command_is_killed_or_refused_what_is_left_is_right(sample: t
     [(), ("--kill", "--only", KILLED, "--moments", "10")] if THOROUGH else INTERRUPTS,
     ids=lambda sample: "-".join(sample) if sample else "all",
 )
+@pytest.mark.slow
 def test_whenever_a_command_is_interrupted_it_ends_soon_and_alone(sample: tuple[str, ...]) -> None:
     _without_a_fault("tests.faults.interrupts", *sample)

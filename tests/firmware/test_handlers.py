@@ -89,6 +89,7 @@ def unhandled(said: str) -> set[str]:
 
 
 @needs_gcc
+@pytest.mark.slow
 def test_a_handler_or_answer_that_is_missing_is_named_by_the_linker(sources: Sources) -> None:
     assert unhandled(sources.host_build()) == set()
     whole = sources.commands

@@ -61,6 +61,7 @@ def driven(env: WristEnv, actions: Array, seed: int | None = None) -> dict[str, 
     return {name: np.array(values) for name, values in found.items()}
 
 
+@pytest.mark.slow
 def test_gymnasiums_own_check_has_nothing_to_say(study: Study) -> None:
     with warnings.catch_warnings():
         warnings.simplefilter("error")
@@ -116,6 +117,7 @@ def test_behind_a_camera_the_observation_is_not_the_truth() -> None:
     assert np.array_equal(found["observed"][:, 0], found["theta"])
 
 
+@pytest.mark.slow
 def test_environments_of_a_vector_are_the_episodes_of_one(tmp_path: Path) -> None:
     file = tmp_path / "worlds.yaml"
     file.write_text(FAMILY)

@@ -7,6 +7,7 @@ import os
 from collections import Counter
 
 import numpy as np
+import pytest
 
 from tests.identification.bend_rigs import SETTINGS, drawn_rig, identified, logs_of
 
@@ -22,6 +23,7 @@ def _error(name: str, found: float, true: float) -> float:
     return abs(found / true - 1.0) if name in SPRINGS else abs(found - true)
 
 
+@pytest.mark.slow
 def test_springs_and_tendons_of_a_bench_are_found_and_intervals_hold_the_truth() -> None:
     """Stiffnesses to 1 %, their axis to 2 deg, each tendon's direction to 1 deg; of 100 intervals 90 to 99 hold."""
     holds, worst, refused = Counter[str](), dict[str, float](), 0

@@ -43,6 +43,7 @@ def test_springs_are_the_same_by_their_axis_and_by_the_numbers_of_the_search(
     assert other == pytest.approx(one, rel=1e-9, abs=1e-12)
 
 
+@pytest.mark.slow
 def test_a_wrist_on_held_spools_comes_to_rest_where_its_tendons_hold_springs_and_weight() -> None:
     wrist = KNOWN.model_copy(update={"flexion_ratio": 1.3, "stiffness_axis_deg": 25.0, "gravity_flexion": 3.0})
     sliding = TENDONS.model_copy(update={"friction": 0.0})

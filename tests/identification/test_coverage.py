@@ -77,6 +77,7 @@ def judged(name: str, bench: Bench) -> tuple[list[Outcome], dict[str, int]]:
 
 
 @pytest.mark.parametrize("name", SOUND if THOROUGH else ["sheaths"])
+@pytest.mark.slow
 def test_a_bench_that_the_model_can_be_is_answered_and_its_intervals_hold(name: str) -> None:
     """At most 5 of 100 are refused, and of each parameter 90 to 99 intervals hold."""
     found, holds = judged(name, SOUND[name])
@@ -91,6 +92,7 @@ def test_a_bench_that_the_model_can_be_is_answered_and_its_intervals_hold(name: 
 
 
 @pytest.mark.parametrize("name", UNSOUND if THOROUGH else ["tendons that creep"])
+@pytest.mark.slow
 def test_a_bench_that_the_model_cannot_be_is_refused_by_name_or_its_intervals_hold(name: str) -> None:
     """Of each parameter in 90 of 100: intervals of 95 % do not all hold at once more often than so."""
     found, _ = judged(name, UNSOUND[name])

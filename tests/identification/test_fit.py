@@ -62,6 +62,7 @@ def test_slopes_are_the_differences_of_expected_angles() -> None:
         assert apart < 0.05, each  # friction that turns round at another moment makes a kink
 
 
+@pytest.mark.slow
 def test_softened_springs_and_a_late_camera_are_found() -> None:
     """Stiffness and damping to 5 %, delay to 5 ms."""
     trials, truth = logged(0, directions=("ulnar", "extension"))

@@ -39,6 +39,7 @@ def held(fit: FrictionFit, truth: FrictionCase) -> list[bool]:
 
 
 @pytest.mark.parametrize("what", ["spools and tensions", "spools", "tensions"])
+@pytest.mark.slow
 def test_intervals_hold_the_truth(what: Measured, capsys: pytest.CaptureFixture[str]) -> None:
     """Of few loops here, most; of a hundred by `make test-identify` 90 to 99 of each parameter."""
     count, recording = (100, Recording(what=what)) if THOROUGH else (3, SHORT._replace(what=what))
@@ -65,6 +66,7 @@ def wide() -> FrictionFit:
     return fit_friction(made_loop(CABLE, 1, Recording(cycles=1.5)))
 
 
+@pytest.mark.slow
 def test_a_loop_over_a_wide_range_of_bend_tells_the_coefficient_from_the_sheath(wide: FrictionFit) -> None:
     assert wide.friction.value == pytest.approx(0.1, rel=0.1) and wide.sheath.value == pytest.approx(1.0, rel=0.15)
     assert wide.friction.high - wide.friction.low < 0.02 and wide.sheath.high - wide.sheath.low < 0.4
@@ -106,6 +108,7 @@ def test_without_friction_nothing_else_is_told() -> None:
     assert fit.exponent.high < 0.02 and fit.sheath.high > 1.0
 
 
+@pytest.mark.slow
 def test_where_a_recording_begins_does_not_matter() -> None:
     quiet = SHORT._replace(noise_deg=0.0, noise=0.0)
     one, other = (fit_friction(made_loop(CABLE, 4, quiet._replace(lead=lead))) for lead in (0.6, 0.9))
@@ -193,6 +196,7 @@ def probe(torque: float, slack: float, seed: int = 3) -> LoopProblem:
     return LoopProblem(loop, wrist, HysteresisSettings())
 
 
+@pytest.mark.slow
 def test_a_loop_of_slack_tendons_wants_friction_inside_the_wrist() -> None:
     """The plateau at the turns, where both tendons are slack and it stays bent, is no tendon's friction."""
     problem = probe(0.04, 1.5e-3)

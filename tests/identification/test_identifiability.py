@@ -25,6 +25,7 @@ def slow() -> Slow:
     return fitted, known, not_identified(fitted, known)
 
 
+@pytest.mark.slow
 def test_slow_upright_moves_tell_neither_scale_nor_damping_and_the_refusal_says_what_would(slow: Slow) -> None:
     fitted, known, lacking = slow
     assert {"stiffness", "damping"} <= set(lacking)
@@ -36,6 +37,7 @@ def test_slow_upright_moves_tell_neither_scale_nor_damping_and_the_refusal_says_
     assert next(each.what for each in offered if each.enough) in refused.value.fix
 
 
+@pytest.mark.slow
 def test_what_is_predicted_of_a_faster_move_comes_true(slow: Slow) -> None:
     """Half widths with trials three times as fast added: predicted without them, then found with them.
 

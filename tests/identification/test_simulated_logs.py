@@ -62,6 +62,7 @@ def test_spools_of_a_simulated_run_stand_where_tendons_pull_as_recorded(tmp_path
     assert not simulated(tmp_path, "simulate.controller=feedforward").tendons("spool")
 
 
+@pytest.mark.slow
 def test_a_simulated_plane_is_found_again_from_its_log(tmp_path: Path) -> None:
     motion = "simulate.reference={kind: two-sided-sine, frequency: 0.3, angle_deg: 15.0}"
     settings = (MOTORS, motion, "simulate.loop.actuator.friction=0", "simulate.loop.plant_segments=1",
@@ -82,6 +83,7 @@ def test_a_simulated_plane_is_found_again_from_its_log(tmp_path: Path) -> None:
     assert told["gain"].value == pytest.approx(1.0, abs=0.005) and told["delay"].low <= 0.0 < told["delay"].high < 2e-3
 
 
+@pytest.mark.slow
 def test_a_simulated_wrist_in_two_planes_is_found_again_from_its_log(tmp_path: Path) -> None:
     whole = simulated(tmp_path, MOTORS, "simulate.reference.kind=circumduction", "simulate.controller=pd-ff")
     assert set(whole.tendons("spool")) == {1, 2, 4, 5} and not whole.tendons("tension")
@@ -102,6 +104,7 @@ def test_a_simulated_wrist_in_two_planes_is_found_again_from_its_log(tmp_path: P
 
 
 @pytest.mark.parametrize("ratio", [1.3, 0.75])
+@pytest.mark.slow
 def test_springs_that_differ_between_planes_are_found_where_equal_ones_are_believed(
     tmp_path: Path, ratio: float
 ) -> None:

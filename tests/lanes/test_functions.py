@@ -125,6 +125,7 @@ SIZES = st.floats(5e-324, 1e300)
     [(SINE, mpmath.sin, 2.0), (COSINE, mpmath.cos, 2.0), (TANGENT, mpmath.tan, 3.0)],
     ids=["sin", "cos", "tan"],
 )
+@pytest.mark.slow
 def test_circular_functions_are_within_their_ulp_up_to_a_billion(
     column: int, exact: Callable[..., Any], bound: float
 ) -> None:

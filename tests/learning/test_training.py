@@ -104,6 +104,7 @@ def test_the_best_of_several_seeds_is_kept(samples: Samples, split: Split, quick
     assert best_of(trials).validation_loss == min(trial.epochs[-1].validation_loss for trial in trials)
 
 
+@pytest.mark.slow
 def test_the_number_of_processes_changes_no_byte(samples: Samples, split: Split, quick: NetworkSettings) -> None:
     settings = quick.model_copy(update={"epochs": 2})
     jobs = [Job(f"job-{k}", settings, split, seed, k) for k, seed in enumerate(np.random.SeedSequence(3).spawn(3))]

@@ -87,6 +87,7 @@ def run(copy: Path, *arguments: str) -> tuple[Run, str]:
     return Run(copy / done.stdout.splitlines()[-1]), done.stdout
 
 
+@pytest.mark.slow
 def test_the_newcomers_shown_are_tuned_compared_and_told_of(copy: Path) -> None:
     compared, said = run(copy, "compare", "study.yaml", "--all")
     table = compared.data("comparison").set_index(["loop", "gains"])

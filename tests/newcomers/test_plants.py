@@ -100,6 +100,7 @@ def test_tendons_shorten_on_the_side_to_which_the_wrist_bends_and_are_the_wrists
     assert plus < WRIST.length < minus
 
 
+@pytest.mark.slow
 def test_a_wrist_is_the_mirror_image_of_itself(model: PlantModel) -> None:
     right, left = (run(model, loaded(side * 0.2), angle=side * 20.0) for side in (1.0, -1.0))
     np.testing.assert_allclose(left.column("theta", 0), -right.column("theta", 0), atol=1e-12)
@@ -115,6 +116,7 @@ def test_a_load_bends_the_wrist_toward_it_and_a_stiffer_one_less(model: PlantMod
     assert bends[0] > 0.02 and 0.0 < bends[1] < 0.5 * bends[0]
 
 
+@pytest.mark.slow
 def test_elastic_tendons_begin_at_pretension_and_a_held_wrist_stays(model: PlantModel) -> None:
     done = run(model, {"actuator": Actuator(level="tendon")}, angle=0.0, horizon=0.5)
     assert np.abs(done.column("theta", 0)).max() < 1e-6
@@ -174,6 +176,7 @@ def test_every_plant_is_registered_and_its_kernels_go_by_all_that_they_call(mode
     assert called <= files and len(called) > 1
 
 
+@pytest.mark.slow
 def test_on_the_bench_it_comes_to_rest_and_the_other_side_is_its_mirror_image(
     host_on: HostOn, model: PlantModel
 ) -> None:

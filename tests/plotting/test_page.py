@@ -165,6 +165,7 @@ def test_the_wrist_bends_as_it_was_logged_and_the_animation_runs(browser: Any, c
     assert browser.console() == []
 
 
+@pytest.mark.slow
 def test_two_runs_on_one_page_show_only_what_differs(browser: Any, tmp_path: Path) -> None:
     runs = []
     for epochs in (5, 6):

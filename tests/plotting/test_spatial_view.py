@@ -64,6 +64,7 @@ def test_the_drawn_wrist_ends_where_the_tip_was_recorded(tmp_path: Path) -> None
     assert found["duration"] == pytest.approx(1.5) and not found["left"]
 
 
+@pytest.mark.slow
 def test_pictures_are_those_of_their_times_and_a_long_run_has_no_more_of_them(tmp_path: Path) -> None:
     made = course()
     at = np.linspace(0.0, 1.5, len(viewed(tmp_path, made)["tip"]))
@@ -227,6 +228,7 @@ def test_it_is_turned_by_keys_and_by_dragging_and_moves_on_its_own_only_when_pla
 
 
 @pytest.mark.parametrize("width", [390, 1280], ids=["phone", "desktop"])
+@pytest.mark.slow
 def test_the_view_fits_the_page(browser: Browser, tmp_path: Path, width: int) -> None:
     browser.open(run_of(tmp_path, course()).file("report.html"), width, True)
     assert browser.run("return document.documentElement.scrollWidth") <= width

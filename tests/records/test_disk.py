@@ -64,6 +64,7 @@ def test_whenever_the_disk_fills_the_run_fails_in_words_and_earlier_runs_stand(d
     assert states == ({"failed"} if large else {"ok", "failed"})
 
 
+@pytest.mark.slow
 def test_a_full_disk_is_one_line_on_the_command_line(disk: Path) -> None:
     _leave(disk, 1_000_000)
     command = [sys.executable, "-P", "-m", "wristctl", "gen-data", "--samples", "100000", "--out", str(disk)]

@@ -154,6 +154,7 @@ def test_an_earlier_calibration_is_read(earlier: Path) -> None:
     assert np.all(np.isfinite(view.rectify(corners[["x", "y"]].to_numpy())))
 
 
+@pytest.mark.slow
 def test_a_repetition_that_differs_from_an_earlier_run_names_the_code(call: Call, earlier: Path) -> None:
     run = open_run("latest:gen-data", earlier)
     found = json.loads(call("runs", "replay", str(run.path), "--set", "samples=61", "--json", code=3))

@@ -65,6 +65,7 @@ def test_a_key_more_is_passed_over_and_a_later_schema_is_named_and_still_verifie
     assert found.state == "broken" and [name for name, _ in found.problems()] == ["run.json"]
 
 
+@pytest.mark.slow
 def test_a_killed_replay_takes_its_repetition_with_it(tmp_path: Path) -> None:
     results, scratch = tmp_path / "results", tmp_path / "tmp"
     scratch.mkdir()

@@ -171,6 +171,7 @@ def test_a_full_disk_is_an_error_of_the_user(results: Path) -> None:
     assert not (run.path / "data" / "x.npz").exists()
 
 
+@pytest.mark.slow
 def test_uncommitted_changes_are_kept_as_a_patch(tmp_path: Path) -> None:
     package = Path(__file__).parents[2] / "wristctl"
     clone = tmp_path / "clone"

@@ -146,6 +146,7 @@ def by(user: int, folder: Path, *arguments: str, umask: int = 0o022) -> tuple[in
     return done.returncode, done.stdout, done.stderr
 
 
+@pytest.mark.slow
 def test_in_a_folder_of_several_people_nobody_deletes_or_locks_out_another(shared: Path) -> None:
     assert by(ONE, shared, "gen-data", "--samples", "50")[0] == 0
     (run,) = list_runs(shared / "results")
@@ -167,6 +168,7 @@ def test_in_a_folder_of_several_people_nobody_deletes_or_locks_out_another(share
     assert by(ONE, shared, "runs", "gc", "--yes")[0] == 0 and not left.exists()
 
 
+@pytest.mark.slow
 def test_a_run_that_is_nobody_elses_to_read_is_said_to_be_so(shared: Path) -> None:
     assert by(ONE, shared, "gen-data", "--samples", "50", umask=0o077)[0] == 0
     (run,) = list_runs(shared / "results")

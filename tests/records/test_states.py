@@ -102,6 +102,7 @@ def test_runs_of_the_same_second_have_directories_of_their_own(results: Path, mo
     assert len(set(ids)) == 3 and {name[:16] for name in ids} == {"20260101T000000Z"}
 
 
+@pytest.mark.slow
 def test_processes_at_the_same_time_do_not_share_a_directory(process: Start, results: Path) -> None:
     code = 'with start_run("tune", Study(), "", out) as run: begun(run)'
     children = [process(code, results) for _ in range(4)]

@@ -58,6 +58,7 @@ def lone_manifest(request: pytest.FixtureRequest, earlier: Path, results: Path) 
     return _little(Run(results / old.name))
 
 
+@pytest.mark.slow
 def test_every_flipped_bit_of_a_manifest_is_refused_in_the_same_words(lone_manifest: Run) -> None:
     run, kind, manifest = lone_manifest, lone_manifest.kind, lone_manifest.path / "run.json"
     ways: tuple[Callable[[], object], ...] = (run.check, lambda: require(run.path, kind))

@@ -54,6 +54,7 @@ def leg(reeled: Array, begin: Array, force: float) -> Array:
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 @pytest.mark.parametrize("n", [1, 4])
+@pytest.mark.slow
 def test_a_wrist_that_is_thrown_and_pulled_from_one_stop_into_the_other_moves_as_scipy_has_it(
     n: int, sign: float
 ) -> None:

@@ -31,6 +31,7 @@ def driven() -> dict[tuple[float, float], HysteresisLoop]:
 @pytest.mark.parametrize(
     ("sheath", "works", "close"), [(0.0, (6.438, 6.437, 6.427), 2e-4), (3.0, (67.07, 66.93, 65.54), 3e-3)]
 )
+@pytest.mark.slow
 def test_works_are_those_of_an_independent_prototype(
     driven: dict[tuple[float, float], HysteresisLoop], sheath: float, works: tuple[float, ...], close: float
 ) -> None:

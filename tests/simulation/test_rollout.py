@@ -44,6 +44,7 @@ def test_printed_gains_move_less_than_a_tenth_of_a_milliradian_in_five_seconds()
         assert 1e-6 < np.abs(moved).max() < 1e-4
 
 
+@pytest.mark.slow
 def test_exchanged_gains_give_the_papers_rmse_on_an_exact_model_in_nearly_continuous_time_only() -> None:
     exact = run("smc", [EXCHANGED], LOOPS["exact"], *MOVES).metrics["rmse"]
     assert exact == pytest.approx([4.8e-4, 2.1e-4], rel=0.02)
@@ -60,6 +61,7 @@ def bits(outcome: Outcome, index: int) -> bytes:
 
 
 @pytest.mark.parametrize("segments_", [1, 4])
+@pytest.mark.slow
 def test_a_lane_has_the_same_bytes_alone_in_a_batch_and_on_two_threads(segments_: int) -> None:
     rng = np.random.default_rng(0)
     gains = [tuple(row) for row in 10.0 ** rng.uniform([0, -1, 0], [2, 0, 2], (256, 3))]
@@ -72,6 +74,7 @@ def test_a_lane_has_the_same_bytes_alone_in_a_batch_and_on_two_threads(segments_
     assert len({bits(batch, index) for index in range(256)}) == 256
 
 
+@pytest.mark.slow
 def test_rollout_agrees_with_an_independent_implicit_solver() -> None:
     """Four segments under the feedforward torque held over each millisecond, by SciPy's Radau."""
     loop, horizon = LOOPS["four-segments"], 0.3 if os.environ.get("WRISTCTL_THOROUGH") else 0.08

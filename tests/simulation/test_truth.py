@@ -160,6 +160,7 @@ def commands_from(recorded: Batch, loop: Loop, speeds: TrueActuator) -> np.ndarr
 
 @pytest.mark.parametrize("leaf", LEAVES)
 @pytest.mark.parametrize("level", LOOPS)
+@pytest.mark.slow
 def test_a_leaf_moves_the_wrist_and_the_controller_knows_only_its_frames_and_steps(level: str, leaf: str) -> None:
     loop, beside = LOOPS[level], BESIDE.get(leaf, {})
     without, plant = (

@@ -42,6 +42,7 @@ def test_saturation_is_felt_where_a_swing_uses_up_the_tension_that_is_left() -> 
     assert f"{own.wrist.tension_limit - bent.tensions[0]:.3g} N below" in _limits(own, 30.0)["saturation"].read_as
 
 
+@pytest.mark.slow
 def test_the_boundary_layer_ends_where_sigma_has_its_width() -> None:
     gains = {"lambda": 20.0, "kappa": 250.0, "k": 100.0, "phi": 10.0}
     narrow, wide = (_limits(row("smc-tracking", gains | {"phi": phi}, BEHIND)) for phi in (1.0, 10.0))
@@ -100,6 +101,7 @@ def test_a_tendon_goes_slack_where_a_turn_takes_up_its_stretch() -> None:
     assert _limits(own)["a slack tendon"].swing == pytest.approx(stretch / own.wrist.tendon_offset, rel=1e-6)
 
 
+@pytest.mark.slow
 def test_friction_is_read_one_way_and_felt_the_other() -> None:
     turned = TENDON.presliding / row("pid", PID, BEHIND).wrist.tendon_offset
     sliding, stuck = (_limits(row("smc-tracking", "hardware", BEHIND, each)) for each in ("slipping", "stuck"))

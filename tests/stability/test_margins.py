@@ -140,6 +140,7 @@ def test_a_pair_that_leaves_the_unit_circle_just_before_it_is_real_is_found() ->
 
 @settings(max_examples=40, deadline=None)
 @given(loops())
+@pytest.mark.slow
 def test_limits_of_any_loop_are_where_eigenvalues_leave_the_unit_circle(own: tuple[Array, Array, Array]) -> None:
     loop = closed(*own, 1.0)
     found = margins(loop)

@@ -17,6 +17,7 @@ def measured() -> ModuleType:
 
 
 @pytest.mark.parametrize("number", [0, 3])
+@pytest.mark.slow
 def test_a_loop_rests_within_its_margins_and_swings_beyond(measured: ModuleType, number: int) -> None:
     """An ideal loop, and one with lagged motors behind a camera, 15 % on either side; delays by whole periods."""
     judged = measured.ROWS[number]

@@ -50,6 +50,7 @@ def test_over_the_loops_gain_the_limits_are_the_margins() -> None:
     assert found.swings[1] == pytest.approx(limits.most.omega / (2.0 * math.pi), rel=1e-6)
 
 
+@pytest.mark.slow
 def test_over_one_gain_the_others_stay() -> None:
     """A derivative gain that is too large is unstable where the whole loop's is: it decides at high frequencies."""
     own = row("pid", PID, Loop())

@@ -42,6 +42,7 @@ def test_the_resolved_study_gives_the_same_study(command: str, tmp_path: Path) -
 
 @settings(max_examples=500 if os.environ.get("WRISTCTL_THOROUGH") else 25)
 @given(st.text(max_size=30), st.dictionaries(st.text(max_size=8), st.floats(allow_nan=False, allow_infinity=False)))
+@pytest.mark.slow
 def test_any_text_survives_the_round_trip(text: str, gains: dict[str, float]) -> None:
     simulated = SimulateSettings(gains=gains, tuned=text, network=text)
     compared = CompareSettings(rows=(Row(gains=text.replace("=", "")), Row(gains=gains)), loops={text: Loop()})

@@ -22,6 +22,7 @@ from wristctl.trial.zero_checks import check_zero
 NAMES = "log", "between", "frames", "residuals", "truth", "wire"
 
 
+@pytest.mark.slow
 def test_a_trial_follows_its_reference_and_comes_back(experiment: Run) -> None:
     done = experiment()
     log, truth = done.table("log"), done.table("truth")
@@ -34,6 +35,7 @@ def test_a_trial_follows_its_reference_and_comes_back(experiment: Run) -> None:
     assert (log["late"].abs() < 1e-5).all() and done.experiment.timing.overruns == 0
 
 
+@pytest.mark.slow
 def test_tensions_and_spools_in_the_log_are_what_the_emulated_tendons_do(experiment: Run) -> None:
     """Once the reference rests, each tendon pulls as commanded, within friction and what the springs lack."""
     done = experiment()
@@ -44,6 +46,7 @@ def test_tensions_and_spools_in_the_log_are_what_the_emulated_tendons_do(experim
         assert pull == pytest.approx(late[f"tension_{tendon}"].to_numpy(), abs=2.5)
 
 
+@pytest.mark.slow
 def test_frames_are_fused_at_their_capture_time(experiment: Run) -> None:
     """A frame's marker angle is the true angle when it was taken, not when it was used two frames later."""
     done = experiment()
@@ -56,6 +59,7 @@ def test_frames_are_fused_at_their_capture_time(experiment: Run) -> None:
 
 
 @pytest.mark.parametrize(("period", "most"), [(10.1e-3, 1e-4), (10e-3, 0.6e-3)])
+@pytest.mark.slow
 def test_positions_in_the_log_are_of_the_time_that_it_says(experiment: Run, period: float, most: float) -> None:
     """By the true spools, to a tenth of a millisecond, though a status comes six after its command.
 
@@ -76,6 +80,7 @@ def test_positions_in_the_log_are_of_the_time_that_it_says(experiment: Run, peri
 
 
 @pytest.mark.parametrize("moment", [0.0, 0.11, 0.31])
+@pytest.mark.slow
 def test_ctrl_c_stops_the_motors_before_it_goes_on_up(experiment: Run, moment: float) -> None:
     def interrupt(row: dict[str, Any]) -> None:
         if row["trial"] == 0 and row["time"] >= moment:
@@ -89,6 +94,7 @@ def test_ctrl_c_stops_the_motors_before_it_goes_on_up(experiment: Run, moment: f
     assert not any(done.bench.motion().energised)
 
 
+@pytest.mark.slow
 def test_an_error_of_the_disk_is_told_as_such(experiment: Run) -> None:
     def fail(row: dict[str, Any]) -> None:
         raise OSError(errno.EDQUOT, "Disk quota exceeded")
@@ -99,6 +105,7 @@ def test_an_error_of_the_disk_is_told_as_such(experiment: Run) -> None:
     assert stop is not None and stop.halt.verified and stop.reason == done.error.what
 
 
+@pytest.mark.slow
 def test_the_same_seed_gives_the_same_bytes(experiment: Run) -> None:
     files = []
     for _ in range(2):
@@ -107,6 +114,7 @@ def test_the_same_seed_gives_the_same_bytes(experiment: Run) -> None:
     assert set(files[0]) == {f"{name}.csv" for name in NAMES} and files[0] == files[1]
 
 
+@pytest.mark.slow
 def test_a_stored_zero_is_checked_on_a_wrist_that_has_had_time_to_straighten(
     experiment: Run, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -128,6 +136,7 @@ def test_a_stored_zero_is_checked_on_a_wrist_that_has_had_time_to_straighten(
     assert times[1] - times[0] >= settings_of().homing.let_go > 0.0
 
 
+@pytest.mark.slow
 def test_the_zero_of_a_further_plane_is_what_its_checks_find(experiment: Run, monkeypatch: pytest.MonkeyPatch) -> None:
     seen: list[tuple[float, ...]] = []
     at_rest = Experiment._at_rest
@@ -158,6 +167,7 @@ def test_stored_positions_of_another_start_of_the_board_are_refused(experiment: 
     assert not (done.folder / "log.csv").read_text().splitlines()[1:]
 
 
+@pytest.mark.slow
 def test_co_contraction_in_a_trial_is_found_behind_it_and_never_beyond_the_motors_pull(experiment: Run) -> None:
     faults = tuple({"kind": "tendon-creeps", "at": 0.1, "axis": axis, "size": -3.0, "duration": 0.6} for axis in (1, 2))
     bench = {"motors": {"slack": (0.0, 0.0, 0.0, 0.0)}, "person": {"takes": 0.5}, "faults": faults}
@@ -167,6 +177,7 @@ def test_co_contraction_in_a_trial_is_found_behind_it_and_never_beyond_the_motor
     assert 30.0 < done.bench.truth().pull.max() < 43.5
 
 
+@pytest.mark.slow
 def test_no_law_asks_for_more_than_the_motors_hold_and_no_tension_is_let_pass_beyond_the_wrists(
     experiment: Run,
 ) -> None:

@@ -39,6 +39,7 @@ def test_there_are_enough_kinds_and_few_exceptions() -> None:
     }
 
 
+@pytest.mark.slow
 def test_some_faults_in_motion_end_as_they_are_to() -> None:
     judged = fan_out("moving", [[case] for case in CASES if case.name in SAMPLE])
     assert len(judged) == len(SAMPLE)

@@ -41,6 +41,7 @@ def homed(signs: tuple[int, ...] | None = None, **motors: Any) -> tuple[Zero, Vi
     return find_zero(board, tracking, settings, WRIST, "ulnar", signs), bench
 
 
+@pytest.mark.slow
 def test_slack_senses_and_steps_per_radian_are_found() -> None:
     zero, bench = homed(reversed=(False, True, False, False))
     assert zero.signs == (1, -1, 1, 1)
@@ -52,6 +53,7 @@ def test_slack_senses_and_steps_per_radian_are_found() -> None:
 
 
 @pytest.mark.parametrize("friction", [2e-3, 5e-3])
+@pytest.mark.slow
 def test_friction_inside_the_wrist_turns_no_bend_aside(friction: float) -> None:
     """Let go it stays bent by 0.6 and 1.6 deg, in its plane and across it."""
     settings = settings_with({"inner_friction": friction})

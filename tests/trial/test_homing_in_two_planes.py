@@ -42,6 +42,7 @@ def homed(seed: int = 0, **motors: Any) -> SpatialZero:
     return zero
 
 
+@pytest.mark.slow
 def test_every_tendon_is_found_where_it_is_within_a_degree() -> None:
     zero = homed(reversed=(False, True, False, False))
     off = np.angle(np.exp(1j * (np.array(zero.directions) - pull_directions())))
@@ -52,6 +53,7 @@ def test_every_tendon_is_found_where_it_is_within_a_degree() -> None:
     assert len(zero.markers) == 2 and max(map(abs, zero.markers)) < math.radians(1.0)
 
 
+@pytest.mark.slow
 def test_exchanged_motors_are_named_by_direction_alone() -> None:
     with pytest.raises(SafetyStop) as stopped:
         homed(order=(1, 0, 2, 3))

@@ -28,6 +28,7 @@ def bench_of(**motors: object) -> tuple[VirtualBench, EmulatedTestbed, Calibrate
 
 
 @pytest.mark.parametrize(("axis", "reversed_axis"), [(2, None), (0, 0)])
+@pytest.mark.slow
 def test_sense_and_slack_of_a_motor_are_found_within_two_degrees(axis: int, reversed_axis: int | None) -> None:
     slack = (3e-4, 2e-4, 4e-4, 2.5e-4)
     bench, testbed, settings = bench_of(slack=slack, reversed=tuple(k == reversed_axis for k in range(4)))
@@ -43,6 +44,7 @@ def test_sense_and_slack_of_a_motor_are_found_within_two_degrees(axis: int, reve
     assert others == [None, None, None]
 
 
+@pytest.mark.slow
 def test_a_tendon_that_is_off_bends_nothing_and_that_is_said() -> None:
     bench, testbed, settings = bench_of(slack=(0.02,) * 4)
     short = settings.model_copy(update={"homing": settings.homing.model_copy(update={"slack": 5e-4})})

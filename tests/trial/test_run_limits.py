@@ -39,6 +39,7 @@ def near(runs: list[Logged]) -> list[Nearness]:
 @pytest.mark.parametrize(
     ("kind", "size", "residual"), [("marker-turned", 5.0, "jump"), ("tendon-detached", 1.0, "across")]
 )
+@pytest.mark.slow
 def test_the_files_of_a_stopped_trial_stop_at_the_very_tick(
     experiment: Run, tmp_path: Any, kind: str, size: float, residual: str
 ) -> None:

@@ -160,6 +160,7 @@ def faulty(faults: Sequence[dict[str, Any]], cells: bool = True) -> dict[str, An
 AGAINST = [{"kind": "tendon-slipped", "axis": axis, "size": -1.0, "at": 0.1} for axis in range(4)]
 
 
+@pytest.mark.slow
 def test_a_sound_rig_goes_through_and_its_log_has_the_true_pulls(experiment: Run) -> None:
     done = experiment(**faulty(()))
     assert done.error is None and done.experiment.outcomes == {0: "ok"} and done.experiment.odd == {0: ""}
@@ -171,6 +172,7 @@ def test_a_sound_rig_goes_through_and_its_log_has_the_true_pulls(experiment: Run
     assert residuals["cell_age"].max() < 0.03 and residuals["excess_pull"].max() < 5.0
 
 
+@pytest.mark.slow
 def test_tendons_that_all_pull_20_newtons_more_end_a_trial_that_goes_through_without_load_cells(
     experiment: Run,
 ) -> None:
@@ -183,6 +185,7 @@ def test_tendons_that_all_pull_20_newtons_more_end_a_trial_that_goes_through_wit
     assert done.bench.truth().pull.max() < 36.0
 
 
+@pytest.mark.slow
 def test_an_amplifier_that_dies_ends_the_trial_and_is_named(experiment: Run) -> None:
     done = experiment(**faulty([{"kind": "cell-unplugged", "axis": 1, "at": 0.1}]))
     assert isinstance(done.error, SafetyStop)

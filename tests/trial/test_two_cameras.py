@@ -56,6 +56,7 @@ def watched(board: Board, tracking: Tracking, seconds: float) -> list[Sighting]:
     return sightings
 
 
+@pytest.mark.slow
 def test_uncalibrated_cameras_that_were_set_square_tell_both_true_bends() -> None:
     testbed = opened(two_planes())
     board, tracking = driven(testbed), testbed.tracking()

@@ -73,6 +73,7 @@ def two_planes(experiment: Run, seed: int = 0, takes: float = 1.0, **person: flo
 
 @pytest.mark.parametrize("force", [0.0, BENDS])
 @pytest.mark.parametrize("seed", range(SEEDS))
+@pytest.mark.slow
 def test_in_ten_seconds_no_step_is_made_and_tendons_keep_their_pull(
     experiment: Run, monkeypatch: pytest.MonkeyPatch, seed: int, force: float
 ) -> None:
@@ -92,6 +93,7 @@ def test_in_ten_seconds_no_step_is_made_and_tendons_keep_their_pull(
         assert changed.max() < 1.0
 
 
+@pytest.mark.slow
 def test_a_wrist_bent_beyond_what_its_tendons_may_pull_ends_the_wait(
     experiment: Run, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -102,6 +104,7 @@ def test_a_wrist_bent_beyond_what_its_tendons_may_pull_ends_the_wait(
     assert not any(done.bench.motion().energised)
 
 
+@pytest.mark.slow
 def test_a_marker_that_a_hand_has_covered_is_no_evidence(experiment: Run, monkeypatch: pytest.MonkeyPatch) -> None:
     """What it shows while flags are moved about does not end the wait."""
     angles = {"shown": math.nan}
@@ -132,6 +135,7 @@ FAULTS: dict[str, tuple[Happens, type[UserError], str]] = {
 
 
 @pytest.mark.parametrize("fault", FAULTS)
+@pytest.mark.slow
 def test_a_fault_ends_the_wait_within_a_tenth_of_a_second(
     experiment: Run, monkeypatch: pytest.MonkeyPatch, fault: str
 ) -> None:

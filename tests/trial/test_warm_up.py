@@ -48,6 +48,7 @@ COMMANDS = {
 
 
 @pytest.mark.parametrize("name", COMMANDS)
+@pytest.mark.slow
 def test_nothing_is_compiled_or_imported_once_the_motors_are_on(name: str, tmp_path: Path) -> None:
     command, *sets = COMMANDS[name]
     given = [sys.executable, "-c", WATCHED, *command.split(), *(part for each in sets for part in ("--set", each))]

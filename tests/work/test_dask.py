@@ -132,6 +132,7 @@ def test_a_cluster_that_vanishes_is_named_and_what_was_done_is_kept(tmp_path: Pa
     assert _whole(done)
 
 
+@pytest.mark.slow
 def test_a_dask_worker_of_other_numbers_computes_nothing(tmp_path: Path) -> None:
     with cluster(tmp_path) as made:
         made.add(1)
@@ -141,6 +142,7 @@ def test_a_dask_worker_of_other_numbers_computes_nothing(tmp_path: Path) -> None
     assert raised.value.exit_code == 3
 
 
+@pytest.mark.slow
 def test_where_no_scheduler_answers_that_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("wristctl.work.executors._ANSWERS", 1.0)
     with socket.socket() as free:

@@ -149,6 +149,7 @@ def test_a_unit_that_fails_once_is_as_if_it_had_not(tmp_path: Path) -> None:
     assert not done.poisoned and same(done, walked)
 
 
+@pytest.mark.slow
 def test_a_unit_that_kills_its_worker_is_named_and_takes_no_other_with_it(tmp_path: Path) -> None:
     units = walks(6, takes=0.05)
     units.insert(1, at(tmp_path, "die"))

@@ -120,6 +120,7 @@ def some(n: int, seed: int) -> tuple[Array, Array, Array]:
 
 @settings(max_examples=30, deadline=None)
 @given(st.sampled_from([1, 2, 5]), st.integers(0, 10_000))
+@pytest.mark.slow
 def test_tendons_are_as_long_as_their_holes_are_apart(n: int, seed: int) -> None:
     q, rate, pulls = some(n, seed)
     apart = holes_apart(WRIST, q)
@@ -161,6 +162,7 @@ def test_energy_stays_without_damping_and_what_dampers_take_is_missing() -> None
 
 
 @pytest.mark.parametrize("n", [2, 5])
+@pytest.mark.slow
 def test_it_comes_to_rest_where_no_energy_is_lower(n: int) -> None:
     tensions = (9.0, 3.0)
     rest = HINGES.rest(WRIST, n, tensions)

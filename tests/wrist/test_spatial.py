@@ -57,6 +57,7 @@ def turned(values: np.ndarray, by: float) -> np.ndarray:
 
 
 @given(q=bends)
+@pytest.mark.slow
 def test_cross_sections_end_at_the_compiled_models_tip_and_hold_its_tendons(q: np.ndarray) -> None:
     terms = spatial_terms(VALUES, q, 0.0 * q)
     centres, frames = spatial_frames(q, WRIST.length, np.linspace(0.0, 1.0, WRIST.discs))
@@ -90,6 +91,7 @@ def test_fast_form_equals_the_augmented_form(q: np.ndarray, rate: np.ndarray) ->
 
 @settings(max_examples=25)
 @given(q=bends, rate=rates, acceleration=rates, pulls=tensions, passive=st.booleans())
+@pytest.mark.slow
 def test_jacobians_are_the_analytic_derivatives_of_the_augmented_residual(
     q: np.ndarray, rate: np.ndarray, acceleration: np.ndarray, pulls: np.ndarray, passive: bool
 ) -> None:
@@ -168,6 +170,7 @@ def of_plane(plane: str) -> tuple[np.ndarray, np.ndarray, slice]:
 
 
 @pytest.mark.parametrize("plane", ["ulnar", "flexion"])
+@pytest.mark.slow
 def test_in_one_plane_it_is_the_planar_wrist(plane: str) -> None:
     """Tendons 1 and 2 pull toward radial, 4 and 5 toward ulnar; turned about x the other plane is the same."""
     planar, spatial, own = of_plane(plane)

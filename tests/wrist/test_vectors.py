@@ -19,6 +19,7 @@ def run(path: Path) -> subprocess.CompletedProcess[str]:
 
 
 @pytest.mark.parametrize(("vectors", "quantities"), [(VECTORS, 6), (SPATIAL, 7)], ids=["planar", "spatial"])
+@pytest.mark.slow
 def test_model_agrees_with_reference_vectors(vectors: Path, quantities: int) -> None:
     done = run(vectors)
     assert done.returncode == 0, done.stdout + done.stderr

@@ -87,6 +87,7 @@ def answered_ping(bench: Bench, seq: int) -> bool:
     return False
 
 
+@pytest.mark.slow
 def test_each_bad_input_is_followed_by_an_answered_ping_no_step_and_no_enabling(bench: Bench, rounds: int) -> None:
     rng = random.Random(5)
     for i in range(4_000 * rounds):

@@ -147,6 +147,7 @@ def test_a_turn_is_a_rate_whose_answer_holds_the_status_and_the_pulls(bench: Ben
     assert all(abs(now - before) < 8 for now, before in zip(weighed.position, status.position, strict=True))
 
 
+@pytest.mark.slow
 def test_amplifiers_are_read_amid_40000_steps_a_second_without_a_late_step_or_a_long_pulse(bench: Bench) -> None:
     """The clock stays high for 1 us, whatever interrupts wait."""
     bench.get_ready()

@@ -41,6 +41,7 @@ def keep_rate(bench: Bench, rate: Rate, seconds: float) -> None:
         bench.run_ms(20)
 
 
+@pytest.mark.slow
 def test_random_moves_end_exactly_on_their_targets(bench: Bench, rounds: int) -> None:
     rng = np.random.default_rng(1)
     bench.get_ready()

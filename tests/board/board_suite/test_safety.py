@@ -123,6 +123,7 @@ def test_emergency_stop_overtakes_the_commands_that_wait_before_it(bench: Bench)
     assert_latched(bench, Fault.ESTOP_COMMAND)
 
 
+@pytest.mark.slow
 def test_a_status_is_of_one_instant_also_where_a_stop_falls_into_its_making(bench: Bench) -> None:
     """The millisecond that latches the button comes at every moment of the answer's making, every 16 cycles of it."""
     bench.run(-bench.chip.cycles % MS)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import random
 from typing import Any
 
+import pytest
 from hypothesis import HealthCheck, settings
 from hypothesis.stateful import (
     RuleBasedStateMachine,
@@ -196,6 +197,7 @@ class BoardStates(RuleBasedStateMachine):
             assert self.bench.drives_energised() == [True] * 4
 
 
+@pytest.mark.slow
 def test_no_order_of_commands_leads_to_an_illegal_transition(emulator: str, rounds: int) -> None:
     machine = type("Machine", (BoardStates,), {"emulator": emulator})
     run_state_machine_as_test(
