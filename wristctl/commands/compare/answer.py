@@ -166,7 +166,7 @@ def _outcomes(rankings: Sequence[Ranking], label: str) -> str:
             works.append(f"{error(ranking, row)} deg in {condition(ranking)}{place}")
     verbs = joined(list(bad), "or")
     if not works:
-        return f"{verbs} in every condition"
+        return f"{verbs} in every condition" if len(rankings) > 1 else verbs
     return f"{joined(works)}{f', else {verbs}' if bad else ''}"
 
 
@@ -184,8 +184,10 @@ def papers_order(rankings: Sequence[Ranking]) -> str:
             holds.append(condition(ranking))
     if not complete:
         return ""
-    where = f"{joined(holds)} alone" if holds else f"none of {complete}"
-    return f"The paper's ranking {' < '.join(printed)} holds in {where}."
+    where = f"holds in {joined(holds)} alone" if holds else f"holds in none of {complete}"
+    if complete == 1:
+        where = "holds" if holds else "does not hold"
+    return f"The paper's ranking {' < '.join(printed)} {where}."
 
 
 def head_with_the_best(findings: Findings, rankings: Sequence[Ranking]) -> None:
