@@ -91,8 +91,8 @@ def terms_by_rig(values: Sequence[TermValue]) -> Figure:
         logarithmic(panel.xaxis)
         panel.xaxis.set_minor_formatter(NullFormatter())
         low, high = panel.get_xlim()
-        if high < 100.0 * low:
-            panel.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+        if high < 30.0 * low:
+            panel.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0) if high < 8.0 * low else (1.0, 3.0)))
             panel.xaxis.set_major_formatter("{x:g}")
         else:
             panel.xaxis.set_major_locator(LogLocator(numticks=3))
