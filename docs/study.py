@@ -34,10 +34,10 @@ PAPER = ("smc/tuned", "smc/printed", "smc/exchanged", "pid/printed")
 _ABOUT = """All of it is simulated: {worlds} worlds of each family, wrists and rigs drawn anew and held out from tuning.
 Each controller was tuned {tunings} times, each time with {evaluations} evaluations on {draws} other worlds. RMSE is the
 geometric mean over worlds and tunings; intervals and ties are of 95 %, by paired differences. The first sentence names
-what is in the first group on all rigs of its kind. A world is lost where a controller fails, swings or chatters. Do not
-use what is shown, at 95 %, to lose more than 1 % of the worlds; a few of so many do not show it. Names without a suffix
-are tuned; [what they mean](choices.md#controllers). The gains: `wristctl simulate --gains tuned:camera`, [of all
-families](gains.md). For a wrist of your own: [recommend](recommend.md)."""
+one that is in the first group on all rigs of its kind, and the table all that are as good. A world is lost where a
+controller fails, swings or chatters. Do not use what is shown, at 95 %, to lose more than 1 % of the worlds; a few of
+so many do not show it. Names without a suffix are tuned; [what they mean](choices.md#controllers). The gains: `wristctl
+simulate --gains tuned:camera`, [of all families](gains.md). For a wrist of your own: [recommend](recommend.md)."""
 _FIRST = re.compile(r"([\w-]+(?: \(steps\))?) [\w-]+ (\d+) and (\d+ of \d+)(?=[;.])")
 
 
