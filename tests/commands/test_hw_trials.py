@@ -181,6 +181,13 @@ def test_lateness_is_shown_where_time_is_real_and_ticks_there_were(
     assert len(watched.told) == told and findings.metrics["ticks"]["value"] == len(late)
 
 
+def test_a_stop_before_any_tick_has_no_table(perform: Perform, caplog: pytest.LogCaptureFixture) -> None:
+    with caplog.at_level(logging.WARNING):
+        _, run, _, _ = perform(stops=SafetyStop("it smokes", "bench", "water"), ticks=0, truth=False)
+    assert caplog.records[-1].getMessage() == "it smokes" and "it smokes" in run.file("README.md").read_text()
+    assert "The last second" not in run.file("README.md").read_text()
+
+
 @pytest.mark.parametrize(("verified", "said"), [(True, "the motors stand"), (False, "could NOT be seen to stand")])
 def test_a_stop_is_told_with_the_last_second_by_tenths(
     perform: Perform, caplog: pytest.LogCaptureFixture, verified: bool, said: str

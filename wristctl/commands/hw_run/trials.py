@@ -216,6 +216,10 @@ def _summarise(session: Session, experiment: Experiment, trial_log: TrialLog) ->
     findings.plain("data/stop.json", stop.plain())
     sure = "the motors stand" if stop.halt.verified else "the motors could NOT be seen to stand"
     log.warning("%s after %.0f ms (%s)", sure, 1e3 * stop.halt.seconds, stop.halt.how)
+    if not trial_log.last:
+        findings.summary(stop.reason)
+        log.warning("%s", stop.reason)
+        return
     text = _last_second(trial_log).text()
     findings.summary(f"{stop.reason}\n\n```\n{text}\n```")
     log.warning("%s\n%s", stop.reason, text)
