@@ -16,14 +16,13 @@ run: .venv/run
 	answer() { kept=$$1; shift; echo "== wristctl $$*" >&2; \
 	  $(BIN)/wristctl "$$@" | awk -v RS= -v kept=",$$kept," \
 	    'index(kept, "," NR ",") { print } { made = $$0 } END { print made "/README.md" }'; }; \
-	page() { echo "$${1##*$$'\n'}"; }; \
 	step gen-data $(STUDY); data=$$made; \
 	step train $(STUDY) --data "$$data"; network=$$made; \
 	step tune $(STUDY) --network "$$network"; tuned=$$made; \
 	compared=$$(answer 1,2,3,4,5,6 compare $(STUDY) --network "$$network" --tuned "$$tuned"); \
 	judged=$$(answer 1,2,3,4 paper audit $(CLAIMS)); \
 	printf '\n%s\nWhat of the paper holds in simulation\n%s\n' "$${compared%$$'\n'*}" "$${judged%$$'\n'*}"; \
-	echo "More: $$(page "$$compared") and $$(page "$$judged")"
+	echo "More: $${compared##*$$'\n'} and $${judged##*$$'\n'}"
 
 test: lint
 	$(BIN)/pytest -n auto --maxprocesses 4 -m "not slow"

@@ -190,6 +190,20 @@ def test_the_paper_is_answered_by_its_gains_and_the_conditions_in_which_they_wor
     assert "smc < mrac < pid < gvsc < nc holds in none of 4" in paper
 
 
+def test_each_condition_is_said_once_and_a_rig_by_what_is_simulated_of_it() -> None:
+    rig = stands("camera and tendons")
+    said = told(stands(), rig, replace(rig, name="camera and tendons, steps"), stands("off-nominal"))
+    assert said.count("spools follow the motion") == said.count("Sampled: ") == 1
+    assert "motors + camera: spools" in said and "wrong model: another wrist" in said and "push: " not in said
+    seen = told(replace(rig, traits=Traits(True, True, False)))
+    assert "Camera: angles come from pictures" in seen and "spools" not in seen
+
+
+def test_more_that_are_as_good_than_a_sentence_holds_are_counted() -> None:
+    many = {f"c{number}/default": 1e-3 for number in range(6)}
+    assert re.search(r"use c\d/default: RMSE .*; 5 others are as good\.", told(stands(rmse=many)))
+
+
 def test_a_place_counts_what_is_better_and_not_what_is_tied() -> None:
     rig = stands(
         "camera and tendons", rmse={"a/default": 1e-3, "b/default": 1e-3, "smc/printed": 0.01, "c/default": 0.1}

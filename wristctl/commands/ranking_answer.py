@@ -94,8 +94,9 @@ def _use(where: str, alike: Sequence[Ranking], others: Sequence[Ranking]) -> str
         text += "; no controller is better than feedforward, which is open loop"
     elif gains:
         text += f", {_times(gains[0], means[0])} less than feedforward"
-    if alternatives:
-        text += f"; {joined([*map(called, alternatives)])} {'is' if len(alternatives) == 1 else 'are'} as good"
+    if equal:
+        as_good = joined([*map(called, alternatives)]) or f"{len(equal)} others"
+        text += f"; {as_good} {'is' if len(equal) == 1 else 'are'} as good"
     text += _seldom([chosen, *alternatives], [ranking for ranking, _ in places])
     if few := [condition(ranking) for ranking in alike if ranking.standing.untold]:
         text += f" (no ranking in {joined(few)}: too few cases)"
@@ -128,7 +129,7 @@ def _together(verb: str, places: Sequence[tuple[str, Ranking, int]]) -> str:
         return f"{label} {fact(ranking, row)}"
     largest = sized(verb, [max(fault_size(verb, *place[1:]) for place in places)])
     often = max(facts(*place[1:])[verb][1] for place in places)
-    words = f"{joined([label for label, *_ in places])} {_THEY[verb].removeprefix('these ')}"
+    words = f"{joined([label for label, *_ in places])} {_THEY[verb]}"
     return f"{words} {f'{largest} at most, ' if largest else ''}in {often} of {counted_in(ranking, verb)} at most"
 
 
@@ -247,10 +248,9 @@ def _smooth_on_rigs(rankings: Sequence[Ranking]) -> list[Ranking]:
 def not_elsewhere(rankings: Sequence[Ranking], names: Mapping[str, str]) -> str:
     """Those that must not be used in conditions that `do_not_use` does not tell of, and why; alike ones together."""
     rigs = _smooth_on_rigs(rankings)
+    others = [ranking for ranking in rankings if ranking not in rigs] if rigs else []
     faults: dict[str, dict[str, list[Ranking]]] = {}
-    for ranking in rankings if rigs else []:
-        if ranking in rigs:
-            continue
+    for ranking in others:
         for row in ranking.standing.unusable:
             verb = next(iter(facts(ranking, row)))
             faults.setdefault(ranking.labels[row], {}).setdefault(verb, []).append(ranking)
@@ -263,7 +263,7 @@ def not_elsewhere(rankings: Sequence[Ranking], names: Mapping[str, str]) -> str:
         clauses = []
         for verb, places_named in where:
             lost = [fault_size(verb, one, one.labels.index(label)) for label in labels for one in faults[label][verb]]
-            they = _THEY[verb].removeprefix("these ") if len(labels) > 1 else verb
+            they = _THEY[verb] if len(labels) > 1 else verb
             clauses.append(" ".join(filter(None, [they, sized(verb, lost), f"in {places_named}"])))
         listed.append(f"{joined([names[label] for label in labels])} {joined(clauses)}")
     return f"Elsewhere {'; '.join(listed)}." if listed else ""
@@ -275,15 +275,15 @@ def _lost(ranking: Ranking, row: int) -> float:
 
 # Ratio of two errors from which it is told as a factor, and of two resolutions up to which they are told as a range.
 _FACTOR, _ALIKE = 2.0, 5.0
-# Faults of several.
+# Faults as verbs of several.
 _THEY = {
-    "leaves its range": "these leave their range",
-    "swings": "these swing",
-    "chatters": "these chatter",
-    "swings or chatters": "these swing or chatter",
-    "does not arrive": "these do not arrive",
-    "pulls harder than a tendon bears": "these pull harder than a tendon bears",
-    "changes with the integration step": "these change with the integration step",
+    "leaves its range": "leave their range",
+    "swings": "swing",
+    "chatters": "chatter",
+    "swings or chatters": "swing or chatter",
+    "does not arrive": "do not arrive",
+    "pulls harder than a tendon bears": "pull harder than a tendon bears",
+    "changes with the integration step": "change with the integration step",
 }
 
 

@@ -109,11 +109,9 @@ def _controllers(claims: Sequence[Judgement]) -> list[str]:
         arrival = _one(j for j in labelled if j.claim.evidence == "arrival")
         number = _one(j for j in labelled if _is_number(j.claim, "rmse"))
         who = f"{who[0].upper()}{who[1:]}"
-        if arrival and number and not any(_ever(found) for found in (arrival.found, number.found)):
-            sentences.append(f"{who} {_arrives(SHORT, not sentences)} on no loop.")
-            continue
         facts = [f"{_arrives(SHORT, not sentences)} {_places(arrival.found)}"] if arrival else []
-        facts += [f"has the paper's RMSE {_places(number.found)}{_beyond(number.found)}"] if number else []
+        if number and (not arrival or _ever(arrival.found) or _ever(number.found)):
+            facts.append(f"has the paper's RMSE {_places(number.found)}{_beyond(number.found)}")
         sentences += [f"{who} {' and '.join(facts)}."] if facts else []
     return sentences
 

@@ -24,7 +24,7 @@ from wristctl.commands.results import Findings
 
 if TYPE_CHECKING:
     from wristctl.comparison.combinations import ComparedRow
-    from wristctl.comparison.controller_ranking import Ranking
+    from wristctl.comparison.controller_ranking import Ranking, Traits
     from wristctl.comparison.step_cost import StepTime
 
 
@@ -113,11 +113,10 @@ def compared(rankings: Sequence[Ranking]) -> str:
     return f"{len(labels)} compared: {'; '.join(groups)}."
 
 
-# What each condition is.
+# What each condition is, but a rig's.
 _CONDITIONS = {
     "ideal": "the believed wrist",
-    "sampled": "with ticks and a tension limit",
-    "camera and tendons": "spools follow the motion itself, so weak gains come near too",
+    "sampled": "with ticks, limits or more segments",
     "pushed": "an unknown force",
     "off-nominal": "another wrist",
 }
@@ -126,11 +125,17 @@ _CONDITIONS = {
 def conditions(rankings: Sequence[Ranking]) -> str:
     """What the names of the conditions mean; empty for families of worlds, which a study describes."""
     meanings = {
-        condition(one).removesuffix(" (steps)"): _CONDITIONS[name]
+        condition(one).removesuffix(" (steps)"): _CONDITIONS.get(one.name.removesuffix(", steps"), _rig(one.traits))
         for one in rankings
-        if one.unit != "world" and (name := one.name.removesuffix(", steps")) in _CONDITIONS
+        if one.unit != "world"
     }
     return f"{capital('; '.join(f'{name}: {meaning}' for name, meaning in meanings.items()))}." if meanings else ""
+
+
+def _rig(traits: Traits) -> str:
+    if traits.tendons:
+        return "spools follow the motion, so weak gains come near"
+    return "angles come from pictures" if traits.camera else "of some loops"
 
 
 def papers(rankings: Sequence[Ranking]) -> str:
