@@ -12,14 +12,18 @@ import math
 import re
 import shutil
 import sys
-from collections.abc import Mapping, Sequence
+import textwrap
+from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 from ranking_rows import Rankings, Row, deg, first_group, group, interval, short, three
 from second_study import again, asked_twice
 
+from wristctl.commands.printed_table import joined
 from wristctl.commands.study.units import families_of
 from wristctl.comparison.repeated_tunings import HALVES
 from wristctl.comparison.world_ranking import kinds_of
@@ -28,16 +32,33 @@ from wristctl.records import Run
 from wristctl.records.manifest import asked_again
 
 HERE = Path(__file__).parent
+# Times the lowest RMSE up to which a controller that is not told from it is about the same; upper over lower end of a
+# ratio's interval that tells nothing; share of the worlds that a controller loses whose RMSE tells nothing.
+ALIKE, WIDE, USELESS = 1.1, 1.5, 0.5
+_EXACT = "with exact angles and torques"
 FIGURES = {"laws": "RMSE of every controller on every rig", "terms": "What each term of a controller buys"}
-PAPER = ("smc/tuned", "smc/printed", "smc/exchanged", "pid/printed")
+PAPER = ("smc/tuned", "smc/printed", "smc/exchanged", "pid/tuned", "pid/printed")
 
-_ABOUT = """All of it is simulated: {worlds} worlds of each family, wrists and rigs drawn anew and held out from tuning.
-Each controller was tuned {tunings} times, each time with {evaluations} evaluations on {draws} other worlds. RMSE is the
-geometric mean over worlds and tunings; intervals and ties are of 95 %, by paired differences. The first sentence names
-one that is in the first group on all rigs of its kind, and the table all that are as good. A world is lost where a
-controller fails, swings or chatters. Do not use what is shown, at 95 %, to lose more than 1 % of the worlds; a few of
-so many do not show it. Names without a suffix are tuned; [what they mean](choices.md#controllers). The gains: `wristctl
-simulate --gains tuned:camera`, [of all families](gains.md). For a wrist of your own: [recommend](recommend.md)."""
+_SIMULATED = """**All of it is simulated: nothing here was measured on a real rig.** [How the model meets recordings of
+real robots](real-robots.md)."""
+_ABOUT = """Each row of the table is a family of {worlds} simulated worlds: wrists and rigs drawn anew, none of them
+seen in tuning. Each controller was tuned {tunings} times, each time with {evaluations} evaluations on {draws} other
+worlds; the RMSE is the geometric mean over worlds and tunings. Intervals are of 95 %, by a bootstrap over tunings and
+worlds. Controllers are told apart by their paired differences in the same worlds, so that one may be told worse though
+its RMSE lies in the other's interval. Not told apart does not mean equal: where the own RMSE is more than a tenth above
+the lowest, it stands beside the name. Halves of the worlds are drawn at random, {halves} times.
+
+A world is lost where the controller [fails, swings or chatters](glossary.md). What is shown, at 95 %, to lose more
+than 1 % of the worlds is not to be used, and is in no other column; two or three of {worlds} are too few to show it.
+Names without a suffix have tuned gains; [what controllers are](choices.md#controllers). The gains, of the median
+tuning: `wristctl simulate --gains tuned:camera`, [of all families](gains.md). For a wrist of your own:
+[recommend](recommend.md)."""
+_PAPER = """How many times the lowest RMSE on the rig; of what may not be used, the share of worlds that are lost.
+The gains of [the paper](paper.md)'s sliding mode are P1, P2 and P3, those of its PID Kp, Ki and Kd: `printed` as the
+paper prints them, `exchanged` with P1 and P2 swapped, our hypothesis of a misprint."""
+_BOUGHT = """How many times less RMSE the second controller has, which has the term, than the first; `more`: it has
+more. `none shown`: the 95 % interval holds 1; `any`: it holds 1 and is so wide that nothing is told. With * the second
+is among what not to use on that rig; `lost`: it loses more than half of the worlds."""
 _FIRST = re.compile(r"([\w-]+(?: \(steps\))?) [\w-]+ (\d+) and (\d+ of \d+)(?=[;.])")
 
 
@@ -45,12 +66,12 @@ _FIRST = re.compile(r"([\w-]+(?: \(steps\))?) [\w-]+ (\d+) and (\d+ of \d+)(?=[;
 class Study:
     """What the page shows of a run.
 
-    Its answer in words, rankings by family, best first, what the families are, values of terms, orders tuned otherwise,
+    What to use, rankings by family, best first, what the families are, values of terms, orders tuned otherwise,
     how often the best of a family is first, how it was tuned and tested, and what of it a second study finds again: a
     sentence and a section, empty without one.
     """
 
-    answer: str
+    answer: Sequence[str]
     rankings: Mapping[str, Sequence[Row]]
     about: Mapping[str, str]
     terms: Sequence[Row]
@@ -64,8 +85,8 @@ class Study:
 def decision(rankings: Mapping[str, Sequence[Row]], first: Mapping[str, str]) -> list[str]:
     """A line for each rig: what to run, how often it is first, what is as good, what comes next, and the gain."""
     lines = [
-        "| rig | lowest RMSE | RMSE [deg], 95 % | first in halves of the worlds, in tunings | not told from it "
-        "| the next that is: RMSE [deg] | feedforward's RMSE over the lowest | [do not use](#what-not-to-use) |",
+        "| rig | lowest RMSE | RMSE [deg], 95 % | lowest in halves of the worlds, in tunings | not told from it "
+        "| lowest that is told worse | feedforward's RMSE over the lowest | [do not use](#what-not-to-use) |",
         "| --- | --- | --- | --- | --- | --- | --- | --- |",
     ]
     for name, rows in rankings.items():
@@ -76,7 +97,7 @@ def decision(rankings: Mapping[str, Sequence[Row]], first: Mapping[str, str]) ->
         best, *ties = first_group(rows)
         following = [row for row in rows if group(row) == 2]
         after = min(following, key=lambda row: float(row["rmse"])) if following else None
-        same = ", ".join(short(row["row"]) for row in ties)
+        same = ", ".join(short(row["row"]) + _beside(row, best) for row in ties)
         then = f"{short(after['row'])} {deg(after['rmse'])}" if after else "-"
         lines.append(
             f"| {name} | **{best['row']}** | {interval(best)} | {first.get(name, '-')} | {same or '-'} | {then} "
@@ -85,46 +106,113 @@ def decision(rankings: Mapping[str, Sequence[Row]], first: Mapping[str, str]) ->
     return lines
 
 
+def _beside(row: Row, best: Row) -> str:
+    """The RMSE of a row that is not told from the best though it is larger; nothing where it is about the same."""
+    return f" ({interval(row)})" if row["rmse"] > ALIKE * best["rmse"] else ""
+
+
+def use(rankings: Mapping[str, Sequence[Row]], where: str) -> str:
+    """What to use on rigs of a kind: what is in most of their first groups, of several the one that errs least."""
+    firsts = {name: {row["row"]: row for row in rows if group(row) == 1} for name, rows in rankings.items()}
+    often = Counter(label for rows in firsts.values() for label in rows)
+    if not often:
+        return f"- **{where}**: none may be used."
+    errors_of = partial(_mean, rankings.values())
+    label = min(often, key=lambda label: (-often[label], errors_of(label)))
+    chosen = {name: rows[label] for name, rows in firsts.items() if label in rows}
+    errors = joined([f"{interval(row)} deg in {name}" for name, row in chosen.items()])
+    better = [row["times_better"] for row in chosen.values()]
+    least = f"{'at least ' * (len(better) > 1)}{three(min(better))} times less than feedforward alone"
+    words = f"use {label}: RMSE {errors}, {least}."
+    same = sorted((other for other in often if often[other] == often[label] == len(rankings)), key=errors_of)
+    if others := [short(other) for other in same if other != label]:
+        words += f" Not told from it{' on any of these' if len(rankings) > 1 else ''}: {joined(others)}."
+    lost = [f"{100.0 * _lost(row):.2g} % of the worlds of {name}" for name, row in chosen.items() if _lost(row)]
+    if lost:
+        words += f" It loses {joined(lost)}."
+    return "\n".join(textwrap.wrap(f"- **{where}**: {words}", 120, subsequent_indent="  "))
+
+
+def _mean(rankings: Iterable[Sequence[Row]], label: str) -> float:
+    """Sum of the logarithms of a controller's errors."""
+    return sum(math.log(row["rmse"]) for rows in rankings for row in rows if row["row"] == label)
+
+
+def _lost(row: Row) -> float:
+    """Share of the worlds in which a controller fails, swings or chatters."""
+    return float(row["failures"] + row["swings"])
+
+
+def lead(run: Run, rankings: Rankings) -> list[str]:
+    """What to use, a line for each kind of rig and of motion."""
+    lines = []
+    for rig, steps in itertools.product((True, False), (False, True)):
+        alike = {name: rows for name, rows in rankings.items() if _kind(run, name) == (rig, steps)}
+        where = f"{'Steps' if steps else 'Smooth motions'} {'by motors, tendons and a camera' if rig else _EXACT}"
+        lines += [use(alike, where)] if alike else []
+    return lines
+
+
 def unusable(rankings: Mapping[str, Sequence[Row]]) -> list[str]:
     """What must not be used on each rig, with the share of the worlds in which it fails or swings."""
     lines = []
     for name, rows in rankings.items():
-        lost = {row["row"]: 100.0 * (row["failures"] + row["swings"]) for row in rows if group(row) is None}
+        lost = {row["row"]: 100.0 * _lost(row) for row in rows if group(row) is None}
         worst = sorted(lost, key=lambda label: -lost[label])
         lines.append(f"- {name}: {', '.join(f'{short(label)} {lost[label]:.3g} %' for label in worst) or 'none'}")
     return lines
 
 
 def of_the_paper(rankings: Mapping[str, Sequence[Row]]) -> list[str]:
-    """How many times the best's error the paper's controllers have on each rig; a dash where they must not be used."""
+    """How many times the best's error the paper's controllers have on each rig; or what they lose."""
     lines = [f"| the paper's | {' | '.join(rankings)} |", "| --- |" + " --- |" * len(rankings)]
     for label in PAPER:
         cells = []
         for rows in rankings.values():
             row = next(row for row in rows if row["row"] == label)
-            lost = f"{100.0 * (row['failures'] + row['swings']):.3g} % lost"
+            why = "fails" if row["failures"] > row["swings"] else "swings or chatters"
+            lost = f"{100.0 * _lost(row):.3g} % lost ({why})"
             cells.append(f"{row['rmse'] / first_group(rows)[0]['rmse']:.3g}" if group(row) else lost)
         lines.append(f"| {label} | {' | '.join(cells)} |")
     return lines
 
 
-def bought(terms: Sequence[Row], families: Sequence[str]) -> list[str]:
+def bought(terms: Sequence[Row], rankings: Mapping[str, Sequence[Row]]) -> list[str]:
     """How many times less the RMSE is with each term, by rig, and which two controllers tell it."""
-    lines = [f"| term | {' | '.join(families)} |", "| --- |" + " --- |" * len(families)]
+    lost = {(name, row["row"]): _lost(row) for name, rows in rankings.items() for row in rows if group(row) is None}
+    lines = [f"| term | {' | '.join(rankings)} |", "| --- |" + " --- |" * len(rankings)]
     for term in dict.fromkeys(row["term"] for row in terms):
         values = {row["family"]: row for row in terms if row["term"] == term}
         pair = next(iter(values.values()))
         named = f"{term}: {short(pair['without'])} to {short(pair['with'])}"
-        lines.append(f"| {named} | {' | '.join(_times(values[name]) for name in families)} |")
+        shares = {name: lost.get((name, pair["with"]), 0.0) for name in rankings}
+        cells = [
+            "lost" if share > USELESS else f"{_times(values[name])}{' *' if share else ''}"
+            for name, share in shares.items()
+        ]
+        lines.append(f"| {named} | {' | '.join(cells)} |")
     return lines
 
 
 def _times(row: Row) -> str:
-    """A ratio with its interval, in brackets where the interval holds 1; undecided where its tunings tell none."""
+    """A ratio with its interval in words: how many times less, or more; whether the interval holds 1, and is wide."""
     if not row["high"] < math.inf:
-        return f"({three(row['times'])})"
-    text = f"{three(row['times'])} [{three(row['low'])}, {three(row['high'])}]"
-    return f"({text})" if row["low"] <= 1.0 <= row["high"] else text
+        return f"any: {three(row['times'])}"
+    times, low, high = (row[name] for name in ("times", "low", "high"))
+    word = ""
+    if low <= 1.0 <= high:
+        word = "any: " if high / low > WIDE else "none shown: "
+    elif high < 1.0:
+        times, low, high, word = 1.0 / times, 1.0 / high, 1.0 / low, "more: "
+    return f"{word}{_finely(times)} [{_finely(low)}, {_finely(high)}]"
+
+
+def _finely(ratio: float) -> str:
+    """Three digits of a ratio, and as many as tell it from 1."""
+    digits = 3
+    while digits < 6 and ratio != 1.0 and float(f"{ratio:.{digits}g}") == 1.0:
+        digits += 1
+    return f"{ratio:.{digits}g}" if digits > 3 else three(ratio)
 
 
 def ranking(rows: Sequence[Row]) -> list[str]:
@@ -164,19 +252,18 @@ def page(study: Study, made: str) -> str:
     """The page: answer and tables; `made` is the paragraph on the run."""
     rankings = study.rankings
     lines = [
-        "# Which controller for which rig, tuned at equal budget", "", study.answer, "",
+        "# Which controller for which rig, tuned at equal budget", "", _SIMULATED, "",
+        *study.answer, "",
         *study.again,
         *decision(rankings, study.first), "",
         *(f"- **{name}**: {about}" for name, about in study.about.items()), "",
         study.settings, "",
         "## The paper's controllers", "",
-        "RMSE over the lowest on the rig, or the share of worlds that are lost. `printed`: with the paper's gains;",
-        "`exchanged`: with P1 and P2 of these exchanged.", "",
+        _PAPER, "",
         *of_the_paper(rankings), "",
         "## What a term buys", "",
-        "RMSE of the first controller over that of the second, which has the term: above 1 it helps, below it harms.",
-        "In parentheses the 95 % interval holds 1: no effect is shown.", "",
-        *bought(study.terms, list(rankings)), "",
+        _BOUGHT, "",
+        *bought(study.terms, rankings), "",
         "## What not to use", "", "With the share of worlds that are lost:", "",
         *unusable(rankings), "",
         *(part for name, told in FIGURES.items() for part in (f"![{told}](images/study-{name}.png)", "")),
@@ -237,6 +324,12 @@ def studied(run: Run) -> dict[str, Family]:
     return {name: run.config.families[name] for name in families_of(run.config)}
 
 
+def _kind(run: Run, name: str) -> tuple[bool, bool]:
+    """Whether a ranking is of rigs with a camera, and whether it is of steps."""
+    family = studied(run)[name.removesuffix(", steps")]
+    return family.loop.sensor.level == "camera", name.endswith(", steps") or set(kinds_of(family)) == {True}
+
+
 def second_of(run: Run, second: Run) -> tuple[list[str], list[str]]:
     """What a second study finds again of the families that both have: a sentence, and a section.
 
@@ -255,6 +348,13 @@ def second_of(run: Run, second: Run) -> tuple[list[str], list[str]]:
         "None of its worlds, searches and noise are those of the first study.",
     ]
     return again(*rankings, smooth), asked_twice(*rankings, "\n".join(made))
+
+
+def resumed(run: Run) -> list[Run]:
+    """The run, the one that it resumed, and so on, as far as they lie beside it."""
+    units = run.manifest.units
+    earlier = run.path.parent / units.run if units and units.run else None
+    return [run, *(resumed(Run(earlier)) if earlier and earlier.exists() else [])]
 
 
 def asked_of(run: Run, families: Sequence[str]) -> dict[str, Any]:
@@ -281,14 +381,15 @@ def main() -> None:
         tunings=budget.tunings,
         evaluations=budget.candidates * budget.iterations,
         draws=budget.draws,
+        halves=HALVES,
     )
-    answer = "\n".join(itertools.takewhile(bool, _overview(run)))
     repeated = second_of(run, Run(Path(sys.argv[2]))) if len(sys.argv) > 2 else ([], [])
     about = {name: words for name, words in named(studied(run)).items() if name in rankings}
     terms, otherwise = (run.data(name).to_dict("records") for name in ("terms", "sensitivity"))
-    study = Study(answer, rankings, about, terms, otherwise, first_of(run, rankings), how, *repeated)
-    minutes = (run.manifest.timing.wall_s or 0.0) / 60.0
-    part = " for the last part of a run that was resumed" if "--resume" in run.manifest.argv else ""
+    study = Study(lead(run, rankings), rankings, about, terms, otherwise, first_of(run, rankings), how, *repeated)
+    runs = resumed(run)
+    minutes = sum(one.manifest.timing.wall_s or 0.0 for one in runs) / 60.0
+    part = f" in {len(runs)} parts" if len(runs) > 1 else ""
     made = "\n".join(
         [
             f"`{asked_again(run.manifest.argv)}`, {minutes:.0f} minutes on two cores{part}, {run.id}.",

@@ -77,13 +77,12 @@ def _use(where: str, alike: Sequence[Ranking], others: Sequence[Ranking]) -> str
     chosen, often = _chosen(ranked)
     places = [(ranking, ranking.labels.index(chosen)) for ranking in ranked if chosen in ranking.labels]
     places = [place for place in places if place[0].standing.group(place[1]) == 1]
-    means = sorted(ranking.means[row].value for ranking, row in places)
+    errors = sorted(((ranking.means[row].value, condition(ranking)) for ranking, row in places))
     equal = [label for label, times in often.items() if times == often[chosen] == len(ranked) and label != chosen]
     alternatives = equal if len(equal) <= 3 else []
     everywhere = len(places) == len(alike) > 1
     names = f" ({', '.join(map(condition, alike))})" if everywhere else ""
-    errors = between([degrees(mean, DIGITS) for mean in means])
-    text = f"{where}{names} use {called(chosen)}: RMSE {errors} deg"
+    text = f"{where}{names} use {called(chosen)}: RMSE {_errors(errors)}"
     if len(places) == 1:
         text += interval(*places[0])
     if len(alike) > 1 and not everywhere:
@@ -93,7 +92,8 @@ def _use(where: str, alike: Sequence[Ranking], others: Sequence[Ranking]) -> str
     if any(map(open_loop, (chosen, *equal))):
         text += "; no controller is better than feedforward, which is open loop"
     elif gains:
-        text += f", {_times(gains[0], means[0])} less than feedforward"
+        least = f"{'at least ' * (len(gains) > 1)}{_times(gains[0], errors[0][0])}"
+        text += f", {least} less than feedforward"
     if equal:
         as_good = joined([*map(called, alternatives)]) or f"{len(equal)} others"
         text += f"; {as_good} {'is' if len(equal) == 1 else 'are'} as good"
@@ -143,6 +143,14 @@ def _no_ranking(alike: Sequence[Ranking]) -> str:
     least = min(fewest.standing.untold, key=lambda row: fewest.means[row].value)
     lowest = f"{called(fewest.labels[least])} has the least RMSE, {error(fewest, least)} deg"
     return f"there is no ranking: too few cases ({fewest.cases}, {LEAST_PAIRS} are needed). {lowest}"
+
+
+def _errors(errors: Sequence[tuple[float, str]]) -> str:
+    """Sorted errors [rad] of conditions: one, or the least and the largest with where they are."""
+    shown = [degrees(rmse, DIGITS) for rmse, _ in errors]
+    if shown[0] == shown[-1]:
+        return f"{shown[0]} deg"
+    return f"{shown[0]} ({errors[0][1]}) to {shown[-1]} deg ({errors[-1][1]})"
 
 
 def _times(least: float, rmse: float) -> str:
