@@ -27,7 +27,7 @@ run: .venv/run
 test: lint
 	$(BIN)/pytest -n auto --maxprocesses 4 -m "not slow"
 
-# Tests of some 2 s of processor time or more: whole commands, killed processes, the emulated rig.
+# Tests of a second of processor time or more: whole commands, killed processes, the emulated rig.
 test-slow: .venv/dev
 	$(BIN)/pytest -n auto --maxprocesses 4 -m slow
 

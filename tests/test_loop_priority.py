@@ -137,6 +137,7 @@ def test_who_draws_the_emulated_cameras_pictures_is_as_any_program(unlocked: lis
     assert process.exitcode == 0
 
 
+@pytest.mark.slow
 def test_what_is_not_allowed_is_said_with_where_to_read_on(monkeypatch: pytest.MonkeyPatch) -> None:
     def refused(*_: Any) -> None:
         raise PermissionError(1, "Operation not permitted")
@@ -149,6 +150,7 @@ def test_what_is_not_allowed_is_said_with_where_to_read_on(monkeypatch: pytest.M
     assert "not allowed: SCHED_FIFO 20, locked memory" in said and "docs/hardware/real-time.md" in said
 
 
+@pytest.mark.slow
 def test_without_the_wish_nothing_changes() -> None:
     before = scheduled()
     with prioritised(False) as said:

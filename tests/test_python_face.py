@@ -89,6 +89,7 @@ def test_import_is_light() -> None:
         subprocess.run([sys.executable, "-c", code], check=True, cwd=PACKAGE.parent)
 
 
+@pytest.mark.slow
 def test_every_public_name_has_a_docstring() -> None:
     missing = []
     for file in PACKAGE.rglob("*.py"):

@@ -158,6 +158,7 @@ def pages() -> list[str]:
 
 
 @pytest.mark.parametrize("page", pages())
+@pytest.mark.slow
 def test_a_page_says_of_each_limit_what_the_model_gives(page: str) -> None:
     assert not wrong((ROOT / page).read_text(encoding="utf-8"), page == CORRECTED)
 
@@ -189,6 +190,7 @@ def test_pages_on_the_limit_are_read(page: str) -> None:
         "> Exchanged gains do not move the wrist at 60 N.",
     ],
 )
+@pytest.mark.slow
 def test_what_we_once_said_is_refused_and_so_is_its_like(text: str) -> None:
     assert wrong(text)
 
@@ -232,6 +234,7 @@ def test_the_table_of_limits_has_the_model_s_limit_of_the_default_loop() -> None
     assert f"{rule:g} N" in (ROOT / CORRECTED).read_text(encoding="utf-8")
 
 
+@pytest.mark.slow
 def test_pages_give_the_models_error_at_60_newtons() -> None:
     """RMSE over 5 s and what is left at the end; within the 5 % by which such an RMSE changes with the step."""
     done = ran([DEFAULT], horizon=5.0)

@@ -62,6 +62,7 @@ def _said(installed: Path, folder: Path, *calls: list[str]) -> tuple[str, list[t
     return done.stdout, list(zip(codes, ended[::2], strict=True))
 
 
+@pytest.mark.slow
 def test_the_wheel_holds_experiments_firmware_templates_and_types_as_they_are_here(installed: Path) -> None:
     package = installed / "wristctl"
     for name in PACKAGED:

@@ -64,6 +64,7 @@ def test_frames_come_at_the_frame_rate_each_late_by_the_delay(delay_frames: floa
     assert delay - 1e-9 <= late.min() and late.max() <= delay + 0.0021
 
 
+@pytest.mark.slow
 def test_the_wanted_share_of_frames_is_dropped() -> None:
     numbers = [frame.number for _, frame in Stage(RenderedCamera(dropped=0.3)).look(20.0, every=0.016)]
     assert len(numbers) == pytest.approx(0.7 * 1200, abs=4 * np.sqrt(1200 * 0.3 * 0.7))

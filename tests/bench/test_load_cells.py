@@ -73,6 +73,7 @@ def test_a_reading_is_the_mean_of_the_last_four_conversions(host_on: HostOn) -> 
             assert pulls.age[axis] < period + 8e-3
 
 
+@pytest.mark.slow
 def test_readings_scatter_by_the_noise_and_are_the_same_however_often_somebody_looks_at_the_wrist(
     host_on: HostOn,
 ) -> None:

@@ -205,6 +205,7 @@ def client(tmp_path: Path) -> Iterator[tuple[subprocess.Popen[str], Path]]:
     process.stdout.close()
 
 
+@pytest.mark.slow
 def test_a_stopped_client_and_a_killed_one_leave_the_board_to_stop_the_motors(
     client: tuple[subprocess.Popen[str], Path],
 ) -> None:

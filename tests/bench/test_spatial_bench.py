@@ -261,6 +261,7 @@ def test_what_it_does_not_have_is_refused(settings: dict[str, Any], key: str) ->
     assert refused.value.where == key and refused.value.exit_code == 2
 
 
+@pytest.mark.slow
 def test_a_bench_in_one_plane_loads_no_kernel_of_two() -> None:
     code = (
         "import sys\n"
@@ -307,6 +308,7 @@ def test_each_camera_tells_the_true_bend_of_its_plane() -> None:
     assert min(map(len, off)) > 40 and np.degrees(np.abs(np.concatenate(off)).max()) < 0.3
 
 
+@pytest.mark.slow
 def test_cameras_run_by_clocks_of_their_own() -> None:
     second = RenderedCamera(frame_rate=50.0, phase=0.4, delay_frames=1.0, dropped=0.0)
     host = hosted(camera=RenderedCamera(dropped=0.3), camera_2=second)

@@ -53,6 +53,7 @@ def simulated(steps: Truth, start: float) -> np.ndarray:
     return np.array(angles)
 
 
+@pytest.mark.slow
 def test_a_bench_moves_as_the_simulation_does_under_the_same_reeled_lengths_and_push(host_on: HostOn) -> None:
     host = host_on()
     host.bench.begin(host.start, Disturbances(push=PUSH))

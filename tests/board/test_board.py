@@ -290,6 +290,7 @@ def test_a_stopping_host_needs_no_session_nor_the_same_message_table(wire: BadWi
         board.turn((5000.0, 0.0, 0.0, 0.0))
 
 
+@pytest.mark.slow
 def test_a_command_status_loop_at_200_hz_misses_no_deadline(board: Board, wire: BadWire) -> None:
     ready(board)
     late = 0

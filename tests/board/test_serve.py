@@ -196,6 +196,7 @@ def test_many_clients_together_are_taken_from_by_no_more_than_one() -> None:
         line.close()
 
 
+@pytest.mark.slow
 def test_a_foreign_program_on_the_same_port_moves_nothing_and_ends_nothing() -> None:
     """It takes answers away and mixes bytes in: our session may lose its link, the board stops and serves on."""
     line, running = WatchedLine(PtyLine()), [True]

@@ -19,6 +19,7 @@ STREAMS = ["2>&1 |", "2>/dev/null |", "2> >(exec true) |"]
 
 
 @pytest.mark.parametrize("streams", STREAMS if os.environ.get("WRISTCTL_THOROUGH") else STREAMS[:1])
+@pytest.mark.slow
 def test_a_closed_pipe_costs_no_run(tmp_path: Path, streams: str) -> None:
     """Closed before a word is said: the first that is, is lost."""
     environment = {**os.environ, "PYTHONPATH": str(ROOT)}
@@ -33,6 +34,7 @@ def test_a_closed_pipe_costs_no_run(tmp_path: Path, streams: str) -> None:
     run.check()
 
 
+@pytest.mark.slow
 def test_a_reader_of_results_may_leave(tmp_path: Path) -> None:
     """Before anything is written, or amid output of more than a pipe holds."""
     with start_run("tune", Study(), "", tmp_path / "results") as live:

@@ -39,6 +39,7 @@ for arguments in json.loads(sys.argv[1]):
 """
 
 
+@pytest.mark.slow
 def test_help_and_listing_load_no_heavy_package() -> None:
     named = [*([name] for name in COMMANDS), ["hw", "calibrate", "camera"], ["paper", "audit"]]
     typed = [[], ["--help"], ["--version"], ["runs", "ls"], *([*name, "--help"] for name in named)]
@@ -105,6 +106,7 @@ def test_each_page_of_help_is_one_screen_and_with_all_names_every_option() -> No
     assert "--version" in whole["--help --all"]
 
 
+@pytest.mark.slow
 def test_an_advanced_option_works_without_being_shown(tmp_path: Path) -> None:
     asked = ("-m", "wristctl", "simulate", "--dry-run", "--json", "--seed", "5")
     done = subprocess.run([sys.executable, *asked], capture_output=True, text=True, cwd=tmp_path)

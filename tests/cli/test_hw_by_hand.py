@@ -80,6 +80,7 @@ def test_a_tendon_is_reeled_in_by_what_is_typed_and_let_go_at_the_end(
     assert board.energised == [False] * 4 and Board(board).read().position == (0, 0, sum(steps), 0)
 
 
+@pytest.mark.slow
 def test_jogs_together_lead_no_further_than_a_taut_tendon_may_be_pulled_until_the_drives_let_go(
     call: Call, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -60,6 +60,7 @@ def test_parts_have_the_size_of_the_settings_and_a_bar_to_check_the_print(call: 
     assert size(flag["marker"]) == pytest.approx([20.0, 20.0], abs=1e-3)
 
 
+@pytest.mark.slow
 def test_another_rig_has_other_drawings_and_the_same_rig_the_same_bytes(call: Call, tmp_path: Path) -> None:
     other = (
         "--set",

@@ -85,6 +85,7 @@ def test_commands_say_whose_wrist_they_took_and_hand_it_on_in_what_they_advise(c
     assert "the paper's wrist" in " ".join(call("simulate")[1].split())
 
 
+@pytest.mark.slow
 def test_what_cannot_be_told_apart_is_refused_with_what_to_add(call: Call, tmp_path: Path) -> None:
     run = write_run(tmp_path / "results", 1, UPRIGHT, SLOW, sides=("ulnar",))
     code, out, err = call("identify", run.id)

@@ -78,6 +78,7 @@ def test_train_leaves_a_network_its_errors_and_the_exact_inverse_beside_them(tra
     assert record["seed"] == 0 and record["settings"]["epochs"] == 12
 
 
+@pytest.mark.slow
 def test_the_same_seed_gives_the_same_results(call: Call, data: str, trained: Path) -> None:
     def hashes(seed: str) -> tuple[str, ...]:
         sampled = call("gen-data", "--samples", "400", "--seed", seed, "--json")
@@ -164,6 +165,7 @@ def test_a_search_killed_outright_resumes_to_the_same_bytes(call: Call, tmp_path
 
 
 @pytest.mark.painted
+@pytest.mark.slow
 def test_rows_are_ranked_with_intervals_beside_the_paper(call: Call, tmp_path: Path) -> None:
     study = tmp_path / "rows.yaml"
     rows = "".join(
@@ -184,6 +186,7 @@ def test_rows_are_ranked_with_intervals_beside_the_paper(call: Call, tmp_path: P
 
 
 @pytest.mark.painted
+@pytest.mark.slow
 def test_a_search_chooses_by_cross_validation_and_says_why(call: Call) -> None:
     grid = "grid={depths: [1, 3], activations: [tanh], widths: [8], folds: 2}"
     call("train", "--search", *QUICK, "--epochs", "3", "--set", grid, "--set", "gen-data.samples=80")

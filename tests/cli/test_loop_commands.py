@@ -311,6 +311,7 @@ def test_gains_are_searched_on_worlds_and_rows_ranked_on_others_with_the_answer_
     assert code == 0 and open_run("latest:compare").result_hash == run.result_hash
 
 
+@pytest.mark.slow
 def test_a_search_that_was_cut_short_goes_on_in_a_new_run_to_the_same_result(call: Call) -> None:
     assert call(*SEARCH)[0] == 0
     whole = open_run("latest:tune")

@@ -86,6 +86,7 @@ def test_a_configuration_finds_its_inputs_beside_it_whatever_the_results_folder(
     assert code == 2 and "no such run" in err
 
 
+@pytest.mark.slow
 def test_a_configuration_of_a_run_whose_inputs_were_elsewhere_finds_them_once_unpacked(call: Call, made: Run) -> None:
     """Its config.yaml names the network by the author's path, which nobody else has."""
     done = again(call, made.path, "--out", "second")

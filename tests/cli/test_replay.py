@@ -134,6 +134,7 @@ def test_a_changed_package_is_named_with_its_version(wristctl: Command, data: st
     assert status == 3 and found["causes"] == [f"environment: numpy: {np.__version__} -> 9.9.9"]
 
 
+@pytest.mark.slow
 def test_a_changed_input_is_named_by_its_file_and_nothing_is_run(wristctl: Command, data: str) -> None:
     results = Path(wristctl("runs", "show", data)[1].splitlines()[-1]).parent
     with start_run("train", Study(), "", results, inputs=[InputRun("data", Run(results / data))]) as live:

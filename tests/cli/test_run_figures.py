@@ -41,6 +41,7 @@ def files() -> dict[str, str]:
     return {str(each): hashlib.sha256(each.read_bytes()).hexdigest() for each in run.path.rglob("*") if each.is_file()}
 
 
+@pytest.mark.slow
 def test_figures_are_as_wide_as_asked_and_stand_beside_the_sealed_run(call: Call) -> None:
     sealed, run = files(), open_run("latest:compare")
     assert {each.stem for each in (run.path / "figures").iterdir()} == {"answer", "overlay-sampled"}

@@ -61,6 +61,7 @@ def make(tmp_path: Path) -> Make:
 
 
 @pytest.mark.parametrize("per_run", [-0.012, 0.012])
+@pytest.mark.slow
 def test_springs_that_change_are_found_with_their_size_and_the_pulley_is_not_blamed(
     call: Call, make: Make, per_run: float
 ) -> None:
@@ -108,6 +109,7 @@ def readings_of(values: np.ndarray, days: np.ndarray) -> list[Reading]:
     ]
 
 
+@pytest.mark.slow
 def test_a_set_of_runs_without_a_drift_is_blamed_in_one_of_twenty_and_intervals_hold_the_slope() -> None:
     rng, sets, runs = np.random.default_rng(1), 150, 8
     blamed, inside = 0, list[bool]()

@@ -97,6 +97,7 @@ def test_a_plan_says_what_is_fitted_and_what_is_predicted(days: Path, call: Call
 
 
 @pytest.mark.parametrize(("robot", "most", "unit"), [("uc3m-soft-neck", 1.5, "deg")])
+@pytest.mark.slow
 def test_published_recordings_are_predicted_better_than_by_their_authors(
     call: Call, robot: str, most: float, unit: str
 ) -> None:

@@ -122,6 +122,7 @@ def test_the_board_is_written_where_asked(call: Call, tmp_path: Path) -> None:
     assert (tmp_path / "sheet.pdf").read_bytes().startswith(b"%PDF")
 
 
+@pytest.mark.slow
 def test_views_from_a_device_are_taken_kept_and_ended_with_the_plane(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -82,6 +82,7 @@ def test_every_command_but_train_runs_without_torch(earlier: Path, tmp_path: Pat
     assert codes == ["0"] * len(commands), said
 
 
+@pytest.mark.slow
 def test_train_says_how_to_have_torch(tmp_path: Path) -> None:
     codes, said = ended(tmp_path, ("train", "--epochs", "1"))
     assert codes == ["2"] and "pip install torch" in said and not list(tmp_path.iterdir())

@@ -153,6 +153,7 @@ def test_an_error_inside_the_work_keeps_its_exit_code(probe: Command, tmp_path: 
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.slow
 def test_interruption_ends_with_130_and_keeps_what_was_found(
     begin: Begin, tmp_path: Path, number: signal.Signals
 ) -> None:
@@ -169,6 +170,7 @@ def test_interruption_ends_with_130_and_keeps_what_was_found(
     run.check()
 
 
+@pytest.mark.slow
 def test_a_killed_command_leaves_a_run_that_is_listed_as_crashed(
     begin: Begin, wristctl: Command, tmp_path: Path
 ) -> None:
@@ -181,6 +183,7 @@ def test_a_killed_command_leaves_a_run_that_is_listed_as_crashed(
     assert [entry["state"] for entry in listed] == ["crashed"]
 
 
+@pytest.mark.slow
 def test_an_interrupted_terminal_is_left_with_its_cursor(begin: Begin) -> None:
     ours, theirs = pty.openpty()
     child = begin("gen-data", stdin=theirs, stdout=theirs, stderr=theirs)

@@ -111,6 +111,7 @@ def test_every_table_holds_what_was_found_in_the_units_of_its_heads(tmp_path: Pa
         assert third[name][at] == pytest.approx(getattr(own_course, name)[at]), name
 
 
+@pytest.mark.slow
 def test_over_a_gain_the_table_tells_its_values() -> None:
     done = analyse(PID, "analyse={over: Kd, span: 20.0, angles_deg: [10.0]}")
     (row,) = done.tables[2].rows
@@ -126,6 +127,7 @@ def test_a_loop_that_feeds_nothing_back_says_so_and_shows_the_plant() -> None:
     assert "angle per torque" in done.figures["bode"].axes[0].get_title("left")
 
 
+@pytest.mark.slow
 def test_an_unstable_loop_is_told_with_what_would_mend_it_and_ends_with_a_fault() -> None:
     done = analyse("simulate={gains: exchanged, horizon: 1.1}")
     assert "smc/exchanged is UNSTABLE at 0, 15 and 30 deg" in done.sentence and "stable up to" in done.sentence
@@ -187,6 +189,7 @@ def test_a_law_that_bends_at_once_is_warned_of(caplog: pytest.LogCaptureFixture)
     assert "at 0 deg the control law is not linear" in caplog.text
 
 
+@pytest.mark.slow
 def test_frames_that_never_repeat_are_warned_of(caplog: pytest.LogCaptureFixture) -> None:
     with caplog.at_level(logging.WARNING):
         analyse(

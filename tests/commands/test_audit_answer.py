@@ -89,6 +89,7 @@ def test_each_loop_is_named_by_what_it_is() -> None:
     assert all(head in first for head in heads) and "any tension" in first and "60 N" in first
 
 
+@pytest.mark.slow
 def test_whatever_arrives_is_said_to_and_nothing_else() -> None:
     names = list(LOOPS)
     there, away = loop({}, {}), loop(NOTHING, dict.fromkeys(NOTHING, 0.5))
@@ -101,6 +102,7 @@ def test_whatever_arrives_is_said_to_and_nothing_else() -> None:
     assert "arrives on the ideal and sampled loops" in sentence(some, SWAPPED + " (")
 
 
+@pytest.mark.slow
 def test_the_printed_error_comes_out_where_it_does_and_beyond_the_tendons_strength_it_says_so() -> None:
     off = dict.fromkeys(NOTHING, 0.5)
     ideal, sampled, segments = LOOPS
@@ -140,6 +142,7 @@ def test_an_error_below_the_papers_is_told_apart_from_one_above() -> None:
     assert "less" not in sentence(said(above), PID)
 
 
+@pytest.mark.slow
 def test_soft_springs_are_told_by_what_they_add() -> None:
     stiff = dict.fromkeys(LOOPS, loop({}, {}))
     told = sentence(said(stiff), "Soft springs")
@@ -156,6 +159,7 @@ def test_soft_springs_are_told_by_what_they_add() -> None:
     assert "9 deg on the ideal loop only: less on sampled, more on 4-segment." in told
 
 
+@pytest.mark.slow
 def test_the_networks_are_told_by_the_ways_to_train_them() -> None:
     loops = dict.fromkeys(LOOPS, loop({}, {}))
     assert "--table1 RUN" in said(loops)

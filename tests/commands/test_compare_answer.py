@@ -285,6 +285,7 @@ def test_each_condition_is_called_by_another_name(name: str) -> None:
     st.integers(0, 1000),
     st.booleans(),
 )
+@pytest.mark.slow
 def test_an_answer_fits_a_terminal_whatever_is_compared(classes: int, laws: list[str], seed: int, steps: bool) -> None:
     rng = np.random.default_rng(seed)
     rmse = {f"{law}/g{k}": float(10.0 ** rng.uniform(-6, 0)) for k, law in enumerate(laws)}

@@ -169,6 +169,7 @@ def test_a_run_and_its_source_belong_together() -> None:
 
 
 @pytest.mark.painted
+@pytest.mark.slow
 def test_of_more_samples_than_anybody_reads_the_arrays_alone_are_kept(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

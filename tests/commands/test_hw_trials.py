@@ -148,6 +148,7 @@ def test_a_row_is_a_trial_that_began_judged_by_its_own_log(perform: Perform) -> 
     assert not (run.path / "data/stop.json").exists() and cv2.getNumThreads() == 1
 
 
+@pytest.mark.slow
 def test_what_the_bench_knows_is_logged_of_a_bench_alone(perform: Perform) -> None:
     _, run, _, _ = perform("hw-run.bench.segments=3")
     assert {"theta_1", "theta_3"} < set(run.data("truth").columns) and "theta_4" not in run.data("truth").columns
@@ -217,6 +218,7 @@ def test_a_few_ticks_are_all_told(perform: Perform, caplog: pytest.LogCaptureFix
     assert len(caplog.messages[-1].splitlines()) == 5 + 14, "seven of each trial"
 
 
+@pytest.mark.slow
 def test_a_log_that_cannot_be_closed_is_a_safety_stop_unless_something_stopped_it_before(
     perform: Perform, monkeypatch: pytest.MonkeyPatch
 ) -> None:

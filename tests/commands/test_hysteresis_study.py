@@ -73,6 +73,7 @@ def recorded(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return written(made_loop(CABLE, 1, SHORT).loop, tmp_path_factory.mktemp("measured") / "rig.csv")
 
 
+@pytest.mark.slow
 def test_a_measured_loop_is_fitted_and_told_before_all_else(recorded: Path, tmp_path: Path) -> None:
     done = wristctl.hysteresis(study(f"hysteresis.measured={recorded}"), out=tmp_path)
     assert done.fit is not None and done.run is not None
@@ -113,6 +114,7 @@ def test_the_answer_without_a_loop_gives_the_dead_band_and_the_width_of_each_she
     assert f"{done.metrics['dead_band']:.3g} deg" in " ".join(done.summary)
 
 
+@pytest.mark.slow
 def test_what_a_narrow_loop_does_not_tell_is_said(tmp_path: Path) -> None:
     narrow = made_loop(CABLE, 2, SHORT._replace(low=13.0, high=17.0, what="spools")).loop
     named = f"hysteresis.measured={written(narrow, tmp_path / 'narrow.csv')}"
@@ -124,6 +126,7 @@ def test_what_a_narrow_loop_does_not_tell_is_said(tmp_path: Path) -> None:
     assert [row[1] for row in _rows_of_a_screen(done)[:2]] == ["-", "-"]
 
 
+@pytest.mark.slow
 def test_a_loop_sampled_too_coarsely_at_its_turns_is_warned_of(
     tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
@@ -132,6 +135,7 @@ def test_a_loop_sampled_too_coarsely_at_its_turns_is_warned_of(
     assert any("leaps" in said and "sample more often" in said for said in caplog.messages)
 
 
+@pytest.mark.slow
 def test_pulls_that_tremble_are_warned_of(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
     loop = made_loop(CABLE, 4, SHORT._replace(what="tensions")).loop
     assert loop.tensions is not None

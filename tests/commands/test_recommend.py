@@ -142,6 +142,7 @@ def test_its_answer_fits_a_screen_and_names_gains_error_and_limits(found: Recomm
     assert all(candidate.label in text for candidate in found.candidates)
 
 
+@pytest.mark.slow
 def test_the_same_seed_recommends_the_same_and_another_draws_other_rigs(found: Recommended) -> None:
     again = wristctl.recommend(study_of())
     assert again.metrics == found.metrics and again.best == found.best
@@ -225,6 +226,7 @@ MINE = Controller("mine", law, "", GAINS, {"soft": {"k": 2.0, "d": 0.05}})
 """
 
 
+@pytest.mark.slow
 def test_a_controller_of_ones_own_is_recommended_by_the_runs_copy_of_it(tmp_path: Path) -> None:
     (tmp_path / "own.py").write_text(OWN)
     place = f"{tmp_path / 'own.py'}:MINE"

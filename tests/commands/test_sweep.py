@@ -106,6 +106,7 @@ def test_gains_are_swept_from_the_preset_they_stand_in_for() -> None:
 
 
 @pytest.mark.painted
+@pytest.mark.slow
 def test_a_sweep_is_one_run_with_a_table_with_units_and_a_figure_for_each_key(tmp_path: Path) -> None:
     study = swept(wristctl.load_study(None, *FAST), "wrist.stiffness=0.4..0.9:4", "simulate.controller=pid-ff,pd-ff")
     done = wristctl.simulate(study, out=tmp_path)
@@ -174,6 +175,7 @@ def test_angles_that_nobody_could_measure_are_not_shown() -> None:
     assert headline(frame, names, dict.fromkeys(names, "rad")) == ["rmse", "steady_state"]
 
 
+@pytest.mark.slow
 def test_processes_find_what_one_finds(tmp_path: Path) -> None:
     study = swept(wristctl.load_study(None, *FAST), "wrist.stiffness=0.4..0.9:5")
     hashes = {
@@ -192,6 +194,7 @@ def test_a_point_where_the_wrist_fails_is_told_and_stays_in_the_table() -> None:
     assert "2 of 4 rollouts: failed" in str(done) and done.marks == ["failed: 2 of 4"]
 
 
+@pytest.mark.slow
 def test_a_sweep_says_of_each_point_what_simulate_says_of_it() -> None:
     """Loops that are sound, chatter, do not arrive, swing and do not converge, to either side."""
     keys = {

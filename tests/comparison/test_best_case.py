@@ -89,6 +89,7 @@ def test_a_search_that_finds_only_stopped_clocks_finds_nothing(monkeypatch: pyte
     assert found.stopped_clocks > 0
 
 
+@pytest.mark.slow
 def test_a_search_comes_closer_and_is_its_seed() -> None:
     own = Box(
         unknowns={

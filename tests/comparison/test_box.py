@@ -225,6 +225,7 @@ def test_a_thresholds_interval_holds_the_true_one_19_times_of_20() -> None:
     assert 185 <= held <= 197
 
 
+@pytest.mark.slow
 def test_how_the_rate_is_measured_decides_at_60_newton() -> None:
     """Four segments at 1 kHz: with the rate as it is the wrist comes late, and behind the observer it follows."""
     own = box(24, measured={"one_of": {name: {"measured": name} for name in ("ideal", "differenced", "observer")}})
@@ -352,6 +353,7 @@ def test_what_did_not_converge_is_counted_apart_and_read_as_no_verdict() -> None
     assert none.uncounted == 4 and math.isnan(none.share("reproduced").value) and not none.told
 
 
+@pytest.mark.slow
 def test_settings_near_the_limit_that_decides_do_not_converge_and_a_gentle_law_does() -> None:
     settings = drawn_settings(box(8, wrist__tension_limit={"draw": "50..60"}), WRIST, 0)
     gentle = Row(controller="pid", gains={"Kp": 5.0, "Ki": 1.0, "Kd": 0.3})

@@ -53,6 +53,7 @@ def swing(done: Outcome) -> float:
 
 
 @pytest.mark.parametrize("name", ["pid-dob", "ct-dob"])
+@pytest.mark.slow
 def test_a_stroke_faster_than_the_motors_ends_at_rest_and_not_in_a_swing(name: str) -> None:
     law = controller(name)
     for side in (1.0, -1.0):

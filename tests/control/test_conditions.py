@@ -37,6 +37,7 @@ def margins() -> ModuleType:
 
 
 @pytest.mark.parametrize(("name", "preset"), STATED)
+@pytest.mark.slow
 def test_a_preset_does_not_swing_at_the_ends_of_its_conditions(margins: ModuleType, name: str, preset: str) -> None:
     (fast, slow), (soft, _) = controller(name).conditions[preset]
     for period in {fast, 5e-3, slow}:

@@ -33,6 +33,7 @@ def _tick(given: Any, memory: Any, out: Any) -> None:
     result[5] = biquad(x, INTEGRATOR, kept, 14)
 
 
+@pytest.mark.slow
 def test_each_filter_states_the_memory_that_it_takes() -> None:
     sizes = filters.LOW_PASS, filters.DERIVATIVE, filters.NOTCH, filters.BIQUAD, filters.RATE_LIMIT
     assert sizes == (3, 3, 3, 3, 2), "the places that _tick gives them"
@@ -69,6 +70,7 @@ PERIODS = st.floats(2e-4, 2e-2)
 
 @given(FREQUENCIES, PERIODS, st.integers(0, 1000))
 @settings(max_examples=40, deadline=None)
+@pytest.mark.slow
 def test_low_pass_and_derivative_are_scipys_first_order_hold_at_any_frequency(
     w: float, period: float, seed: int
 ) -> None:

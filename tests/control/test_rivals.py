@@ -141,6 +141,7 @@ def test_the_network_learns_to_follow_its_reference_model() -> None:
 
 @pytest.mark.parametrize("order", [0.5, -0.3, 0.0, 0.9])
 @pytest.mark.parametrize("frequency", [1.0, 10.0, 60.0])
+@pytest.mark.slow
 def test_the_fractional_derivative_has_the_gain_and_phase_of_its_order(order: float, frequency: float) -> None:
     """Of a sine within the band: |jw|^order, and order times a right angle ahead."""
     period = 1e-4

@@ -64,6 +64,7 @@ def test_it_is_loaded_only_when_it_is_named(tmp_path: Path, site: Path) -> None:
 
 
 @pytest.mark.parametrize("other", ["another package", "a controller of wristctl", "a file"])
+@pytest.mark.slow
 def test_the_same_name_twice_is_refused(tmp_path: Path, site: Path, other: str) -> None:
     named, told = "strange", "2 installed packages have a 'strange'"
     if other == "another package":

@@ -58,6 +58,7 @@ def test_a_worker_elsewhere_knows_the_same_law_and_refuses_another_text_of_it(st
         adopt(told)
 
 
+@pytest.mark.slow
 def test_a_law_by_its_place_is_simulated_tuned_and_compared_under_its_own_name(stranger: Path) -> None:
     (stranger / "inner").mkdir()
     (stranger / "inner" / "study.yaml").write_text(
@@ -94,6 +95,7 @@ compare:
         assert done.run.problems() == []
 
 
+@pytest.mark.slow
 def test_an_edited_law_is_another_run_by_its_fingerprint_and_in_the_difference(stranger: Path) -> None:
     (stranger / "study.yaml").write_text(f"simulate: {{controller: strange.py:STRANGE, gains: default, {QUICK}}}")
     runs = []

@@ -34,6 +34,7 @@ SOUND = "np.array([time > 0.5, 0.0 * time, 0.0 * time])"
         ("np.array([time, 0.0 * time, np.where(time > 0.35, np.nan, 0.0)])", "is no number at 0.4 s"),
     ],
 )
+@pytest.mark.slow
 def test_a_course_that_is_none_is_refused_before_anything_runs(tmp_path: Path, course: str, told: str) -> None:
     (tmp_path / "own.py").write_text(OWN.replace("COURSE", course))
     done = wristctl(tmp_path, "simulate", "--dry-run", "--set", "simulate.reference.kind=own.py:OWN")
@@ -50,6 +51,7 @@ def test_what_shows_only_later_ends_the_run_and_is_named(tmp_path: Path) -> None
     assert done.returncode == 2 and "own.py:OWN is no number at 1.501 s" in done.stderr, done.stderr
 
 
+@pytest.mark.slow
 def test_a_sound_one_runs(tmp_path: Path) -> None:
     (tmp_path / "own.py").write_text(OWN.replace("COURSE", SOUND))
     given = ("--set", "simulate.reference.kind=own.py:OWN", "--set", "simulate.horizon=1")

@@ -78,6 +78,7 @@ def test_a_law_that_pushes_the_wrong_way_gets_no_certificate(stranger: Path) -> 
     ("place", "told"),
     [("strange.py", "strange.py should name its controller: strange.py:NAME"), ("pidd", "did you mean 'pid'?")],
 )
+@pytest.mark.slow
 def test_a_law_that_is_not_named_is_asked_for_by_name(stranger: Path, place: str, told: str) -> None:
     done = wristctl(stranger, "check-controller", place, "--no-board")
     assert done.returncode == 2 and told in done.stderr and not done.stdout
@@ -131,6 +132,7 @@ def test_a_stranger_who_types_the_page_gets_a_row_in_compare_and_a_trial_in_hw_r
         assert done.returncode == 0 and "identical" in done.stdout.splitlines()[-1], done.stderr
 
 
+@pytest.mark.slow
 def test_the_law_with_filters_in_the_page_is_fit_and_rests_where_it_should(tmp_path: Path) -> None:
     (text,) = (block for block in re.findall(r"```python\n(.*?)```", PAGE, re.DOTALL) if "PD_NOTCH" in block)
     (tmp_path / "notched.py").write_text(text)

@@ -236,6 +236,7 @@ BANG = np.where(np.arange(999) % 2 == 0, 1.0, -0.9)
 DEFAULT = ("simulate.horizon=1.0",)
 
 
+@pytest.mark.slow
 def test_an_episode_in_doubt_says_so_at_its_end_and_the_steps_that_it_names_are_enough(
     caplog: pytest.LogCaptureFixture,
 ) -> None:
@@ -259,6 +260,7 @@ def test_an_episode_in_doubt_says_so_at_its_end_and_the_steps_that_it_names_are_
     assert left < 0.1 * off and off > np.deg2rad(0.01)
 
 
+@pytest.mark.slow
 def test_of_a_vector_only_the_episodes_with_rough_actions_are_in_doubt(caplog: pytest.LogCaptureFixture) -> None:
     env = WristVectorEnv(9, load_study([], DEFAULT))
     for episode in range(2):
@@ -273,6 +275,7 @@ def test_of_a_vector_only_the_episodes_with_rough_actions_are_in_doubt(caplog: p
     assert len(caplog.messages) == 1 and "1 of 9 episodes" in caplog.messages[0], "said once"
 
 
+@pytest.mark.slow
 def test_the_pages_example_runs_and_feedback_pays_in_it() -> None:
     (code,) = re.findall(r"^```python\n(.*?)^```", (ROOT / "docs" / "gym.md").read_text(), re.DOTALL | re.MULTILINE)
     known: dict[str, Any] = {}

@@ -81,6 +81,7 @@ def test_the_search_arrives_from_far_off(factor: float) -> None:
     assert values["delay"] == pytest.approx(truth["delay"], abs=5e-3)
 
 
+@pytest.mark.slow
 def test_a_search_that_believes_in_no_friction_leaves_that_edge() -> None:
     trials, truth = logged(0, poses=(UPRIGHT,), directions=("ulnar",))
     known = {name: truth[name] for name in ("damping", "friction", "tendon_radius")}
@@ -88,6 +89,7 @@ def test_a_search_that_believes_in_no_friction_leaves_that_edge() -> None:
     assert fit(problem(trials, fix=known)).values["stiffness"] == pytest.approx(truth["stiffness"], rel=0.05)
 
 
+@pytest.mark.slow
 def test_a_parameter_that_is_held_is_not_found_and_helps_the_others() -> None:
     trials, truth = logged(2, poses=(LEVEL,), directions=("ulnar",))
     free, held = fit(problem(trials)), fit(problem(trials, fix={"tendon_radius": truth["tendon_radius"]}))
@@ -135,6 +137,7 @@ def test_a_picture_shows_the_mean_of_its_exposure() -> None:
     np.testing.assert_allclose(seen, weaker * np.sin(rate * (within - 0.03)), rtol=0.0, atol=4e-3)
 
 
+@pytest.mark.slow
 def test_what_the_clocks_may_be_off_by_widens_the_delay_and_nothing_else() -> None:
     trials, _ = logged(0, poses=(UPRIGHT,), directions=("flexion",))
     fitted = fit(problem(trials, clock_error=0.0))

@@ -76,6 +76,7 @@ def test_a_loop_over_a_wide_range_of_bend_tells_the_coefficient_from_the_sheath(
     assert abs(wide.autocorrelation) < 0.1
 
 
+@pytest.mark.slow
 def test_one_over_a_narrow_range_tells_their_product_and_says_that_it_does_not_tell_them_apart() -> None:
     fit = fit_friction(made_loop(CABLE, 2, SHORT._replace(low=13.0, high=17.0, what="spools")))
     assert fit.sheath.high == math.inf and fit.friction.low == 0.0
@@ -102,6 +103,7 @@ def test_the_exponent_is_told_best_where_its_error_is_least(wide: FrictionFit) -
     assert best.value == pytest.approx(wide.friction.value * (bend + wide.sheath.value), rel=1e-9)
 
 
+@pytest.mark.slow
 def test_without_friction_nothing_else_is_told() -> None:
     fit = fit_friction(made_loop(FrictionCase(0.0, 0.0, 2e-5), 3, SHORT))
     assert fit.friction.low == 0.0 and fit.friction.high < 0.02

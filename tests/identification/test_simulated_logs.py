@@ -47,6 +47,7 @@ def seen(log: OpenLog, noise_deg: float, every: int) -> OpenLog:
     return replace(log, columns={**log.columns, **noisy})
 
 
+@pytest.mark.slow
 def test_spools_of_a_simulated_run_stand_where_tendons_pull_as_recorded(tmp_path: Path) -> None:
     free = simulated(tmp_path, MOTORS, "simulate.loop.actuator.friction=0", "simulate.controller=feedforward")
     bend = free.columns["bend_y"]

@@ -106,6 +106,7 @@ def test_where_nothing_can_be_written_nothing_is_kept(tmp_path: Path, monkeypatc
     assert [found(doubling(tmp_path / "law")) for _ in range(2)] == [0, 0]
 
 
+@pytest.mark.slow
 def test_compiled_functions_take_nothing_from_configuration_and_at_most_eight_arguments() -> None:
     """A comment in the configuration compiles nothing anew, so no number there may decide what is compiled."""
     seen = 0
@@ -135,6 +136,7 @@ def _is_kernel(argument: ast.expr, call: ast.Call) -> TypeGuard[ast.Name]:
     return isinstance(call.func, ast.Name) and call.func.id == "kernel_of" and isinstance(argument, ast.Name)
 
 
+@pytest.mark.slow
 def test_a_numba_that_nobody_has_tried_is_named() -> None:
     code = "import numba; numba.__version__ = '9.1.0'; import wristctl.lanes.compiled"
     done = subprocess.run([sys.executable, "-c", code], cwd=PACKAGE.parent, capture_output=True, text=True, check=True)

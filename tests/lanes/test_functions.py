@@ -207,6 +207,7 @@ def test_whole_powers_are_products_and_powers_of_zero_are_numpys() -> None:
     np.testing.assert_array_equal(of_pairs([0.0, 0.0], np.array([0.0, -1.0]))[:, POWER], [1.0, np.inf])
 
 
+@pytest.mark.slow
 def test_bessel_functions_are_exact_at_zero_and_to_two_ulp_of_one_up_to_a_full_turn() -> None:
     x = np.linspace(-np.pi, np.pi, 801)
     found = values(x)[:, 1:5]

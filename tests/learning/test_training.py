@@ -43,11 +43,13 @@ def same_bytes(a: TrainingResult, b: TrainingResult) -> bool:
     return a.epochs == b.epochs and all(x.tobytes() == y.tobytes() for x, y in pairs)
 
 
+@pytest.mark.slow
 def test_standardised_adamw_learns_the_papers_network() -> None:
     learned = paper()
     assert learned.r2 > 0.998 and learned.rmse_deg < 1.2
 
 
+@pytest.mark.slow
 def test_t1s_sigmoid_as_printed_collapses_to_the_mean() -> None:
     collapsed = paper(preset="t1-sigmoid")
     assert abs(collapsed.r2) < 0.1, "C11: coupled weight decay of 0.01 leaves nothing but the mean"

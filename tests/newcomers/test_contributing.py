@@ -97,6 +97,7 @@ def test_the_newcomers_shown_are_tuned_compared_and_told_of(copy: Path) -> None:
     assert default["jerk"]["shaken"] > 1.5 * default["jerk"]["still"] > 0.0
 
 
+@pytest.mark.slow
 def test_the_command_shown_leaves_a_run(copy: Path) -> None:
     reached, said = run(copy, "reach", "--step-deg", "1")
     tips = reached.data("tips")

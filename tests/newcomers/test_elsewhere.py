@@ -136,6 +136,7 @@ print(json.dumps(ended))
 """
 
 
+@pytest.mark.slow
 def test_errors_know_the_newcomers(elsewhere: Elsewhere) -> None:
     typed = json.dumps([arguments for arguments, _ in ERRORS])
     done = elsewhere.python("-c", ONE_BY_ONE, typed)
@@ -155,6 +156,7 @@ def test_a_dry_run_prints_their_names_units_and_defaults(elsewhere: Elsewhere) -
     assert f"optimiser: pso  # ask/tell optimiser (or file.py:NAME): {listed}" in tuned
 
 
+@pytest.mark.slow
 def test_the_shell_completes_them(elsewhere: Elsewhere) -> None:
     typed = {"COMP_WORDS": "wristctl simulate --controller lqr", "COMP_CWORD": "3"}
     done = elsewhere(_WRISTCTL_COMPLETE="complete_bash", **typed)

@@ -96,6 +96,7 @@ VERBS = [
 
 
 @pytest.mark.parametrize("verb", VERBS, ids=lambda verb: verb[0])
+@pytest.mark.slow
 def test_no_verb_prints_a_control_character(
     foreign: Run, verb: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

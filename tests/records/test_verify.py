@@ -181,6 +181,7 @@ def test_sha256sum_says_the_same(make: Make, flip: bool) -> None:
     assert (done.returncode != 0) == flip == ("metrics.json" in done.stdout)
 
 
+@pytest.mark.slow
 def test_no_flipped_bit_of_the_sums_goes_unnoticed(make: Make) -> None:
     run = _little(make())
     for at, bit in _flips(run.path / "SHA256SUMS"):

@@ -89,6 +89,7 @@ def settings(count: int) -> list[PaperSetting]:
 
 
 @pytest.mark.parametrize("row", [("smc", "exchanged"), ("pid", "printed"), ("smc-tracking", "default")])
+@pytest.mark.slow
 def test_an_rmse_is_that_of_twenty_times_the_steps_or_marked(row: tuple[str, str]) -> None:
     law, groups = controller(row[0]), dict[tuple[object, ...], list[PaperSetting]]()
     for each in settings(24):

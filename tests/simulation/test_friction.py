@@ -84,6 +84,7 @@ def element(
     return out[:, 0], out[:, 1]
 
 
+@pytest.mark.slow
 def test_the_bristle_never_leaves_its_bounds() -> None:
     """In 1e7 moves of 1 nm to 1 mm, either way."""
     rng = np.random.default_rng(0)

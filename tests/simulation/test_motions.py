@@ -205,6 +205,7 @@ def test_a_file_that_has_changed_is_another_motion(tmp_path: Path) -> None:
 
 
 @given(st.floats(0.2, 2.0), st.floats(1.0, 25.0), st.floats(-20.0, 20.0))
+@pytest.mark.slow
 def test_any_smooth_motion_comes_through_a_file_as_it_was(frequency: float, angle: float, offset: float) -> None:
     reference = Reference(
         kind="two-sided-sine",

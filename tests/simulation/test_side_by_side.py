@@ -66,6 +66,7 @@ CAMERAS = st.tuples(st.floats(20.0, 200.0), st.floats(0.0, 6.0), st.floats(0.0, 
 @settings(max_examples=15, deadline=None)
 @given(st.lists(CAMERAS, min_size=2, max_size=11))
 @example([(20.0, 0.0, 0.0), (23.0, 0.0, 2.0)])  # the first frame comes late, and is believed to be fresh
+@pytest.mark.slow
 def test_cameras_of_any_rates_and_delays_do_not_disturb_each_other(cameras: list[tuple[float, float, float]]) -> None:
     loops = [
         LOOP.model_copy(

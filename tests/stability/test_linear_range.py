@@ -26,6 +26,7 @@ def _with(loop: Loop, **plant: object) -> Loop:
     return loop.model_copy(update={"plant": Plant.model_validate(plant)})
 
 
+@pytest.mark.slow
 def test_saturation_is_felt_where_a_swing_uses_up_the_tension_that_is_left() -> None:
     """At its margin, half the control rate, a PD loop's torque is its derivative's: Kd |rate|."""
     own = row("pid", PID, Loop())
@@ -57,6 +58,7 @@ def test_the_boundary_layer_ends_where_sigma_has_its_width() -> None:
     assert name not in _limits(row("computed-torque", "default", BEHIND))
 
 
+@pytest.mark.slow
 def test_limits_of_motors_scale_with_what_the_motors_are() -> None:
     gains = "hardware"
     plain = _limits(row("smc-tracking", gains, BEHIND))
@@ -84,6 +86,7 @@ def test_a_microstep_swallows_what_makes_a_motor_swing_by_half_of_it() -> None:
     assert found.swing == pytest.approx(0.5 * pull * lag * own.wrist.tendon_offset / torque, rel=0.03)
 
 
+@pytest.mark.slow
 def test_a_controller_sees_as_much_of_a_swing_whatever_stands_behind_its_motors() -> None:
     """With pulleys of twice the size a loop begins to swing at half the gain, and its motors turn for it as before."""
     limits = []
@@ -111,6 +114,7 @@ def test_friction_is_read_one_way_and_felt_the_other() -> None:
     assert not any("friction" in each for each in _limits(row("smc-tracking", "hardware", smooth)))
 
 
+@pytest.mark.slow
 def test_what_happens_at_times_is_listed_as_left_out() -> None:
     loop = _with(BEHIND, end_stop_deg=40.0, actuator={"backlash": 1e-4, "torque": 0.4, "broken_at": 1.0})
     loop = loop.model_copy(

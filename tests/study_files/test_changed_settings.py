@@ -14,6 +14,7 @@ from wristctl.study_files.shipped import shipped, shipped_names
 
 
 @pytest.mark.parametrize("name", [name for name in shipped_names() if name != "claims"])
+@pytest.mark.slow
 def test_what_is_shown_gives_the_same_study(tmp_path: Path, name: str) -> None:
     study = load_study([shipped() / f"{name}.yaml"])
     for kind in KINDS[:10]:

@@ -65,6 +65,7 @@ def test_keys_know_their_lines() -> None:
         ("a: \x00", "not valid YAML"),
     ],
 )
+@pytest.mark.slow
 def test_doubtful_yaml_is_refused_with_its_line(text: str, said: str) -> None:
     with pytest.raises(UserError) as caught:
         parse_yaml(text, "f.yaml")

@@ -84,10 +84,12 @@ def test_repeated_pictures_are_no_angle(rate: float, repeated: Callable[[list[Im
 
 
 @pytest.mark.parametrize("noise", [0.7, 4.0], ids=["a quiet sensor", "a webcam's"])
+@pytest.mark.slow
 def test_a_wrist_at_rest_is_not_frozen(noise: float) -> None:
     assert {each.verdict for each in seen(in_time(pictures(90, 0.0, noise)))} == {OK}
 
 
+@pytest.mark.slow
 def test_a_picture_of_more_than_a_second_ago_is_news() -> None:
     first, second = pictures(2)
     frames = [Frame(first, 0.0, 0), Frame(second, 1.0 / RATE, 1), *in_time(pictures(70))[2:70]]
@@ -119,6 +121,7 @@ def test_a_count_of_frames_that_goes_back_is_refused() -> None:
     assert [each.verdict for each in seen(frames)] == [OK, OK, OK, STAMP, OK]
 
 
+@pytest.mark.slow
 def test_another_marker_of_the_same_id_is_named_as_long_as_it_is_there_and_the_first_one_followed() -> None:
     """The whole picture is searched every 150 ms, and again at once where something was found."""
     images = pictures(80, 0.1)

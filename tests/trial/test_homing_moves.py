@@ -281,6 +281,7 @@ class StaysBent(Wrist):
     stays=st.floats(0.0, 2.0), first=st.floats(-1.0, 1.0), plane=st.sampled_from(["ulnar", "flexion"]),
     signs=st.sampled_from([(1, 1, 1, 1), (-1, 1, 1, -1)]),
 )  # fmt: skip
+@pytest.mark.slow
 def test_a_wrist_that_stays_bent_by_its_own_friction_is_homed(
     stays: float, first: float, plane: str, signs: tuple[int, ...]
 ) -> None:

@@ -74,6 +74,7 @@ def test_the_delay_is_found_to_two_milliseconds_whatever_the_wrist_does(
 
 
 @pytest.mark.parametrize(("across", "seed"), [(0.5, 0), (0.5, 1), (1.0, 0), (1.7, 0), (1.7, 1)])
+@pytest.mark.slow
 def test_what_the_other_plane_gives_back_slowly_is_not_taken_for_age(across: float, seed: int) -> None:
     found = find_latency(strokes(0.06, in_two_planes(across), 15.0, states=4, seed=seed))
     assert found.delay == pytest.approx(0.06, abs=2e-3)

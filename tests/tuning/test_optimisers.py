@@ -154,6 +154,7 @@ def test_sphere_is_solved(name: str) -> None:
 
 
 @learning
+@pytest.mark.slow
 def test_optimum_in_a_corner_is_met(name: str) -> None:
     assert median_best(name, corner, 40) < 1e-6
 

@@ -75,12 +75,14 @@ def test_the_first_search_starts_from_a_preset_and_the_others_from_the_middle_of
 
 
 @pytest.mark.parametrize("optimiser", ["pso", "differential-evolution", "random"])
+@pytest.mark.slow
 def test_the_same_seed_finds_the_same_gains_and_another_seed_others(optimiser: str) -> None:
     one, again, other = (found(f"optimiser={optimiser}", seed=seed) for seed in (3, 3, 4))
     assert one.gains == again.gains
     assert one.tried.values.tobytes() == again.tried.values.tobytes() != other.tried.values.tobytes()
 
 
+@pytest.mark.slow
 def test_a_search_that_was_cut_short_goes_on_to_the_same_bytes() -> None:
     """From its table, as it is written and read again; nothing that it had tried is run again."""
     whole = found("restarts=2")

@@ -82,6 +82,7 @@ def two(tmp_path_factory: pytest.TempPathFactory, importable: None) -> Iterator[
         yield made
 
 
+@pytest.mark.slow
 def test_a_worker_killed_and_a_unit_poisoned_leave_the_bytes_of_all_others_as_they_are(
     two: Cluster, tmp_path: Path
 ) -> None:
@@ -105,6 +106,7 @@ def test_a_worker_killed_and_a_unit_poisoned_leave_the_bytes_of_all_others_as_th
     )
 
 
+@pytest.mark.slow
 def test_what_one_executor_began_another_ends(two: Cluster, tmp_path: Path) -> None:
     begun, whole = tmp_path / "begun", tmp_path / "whole"
     begun.mkdir()
@@ -115,6 +117,7 @@ def test_what_one_executor_began_another_ends(two: Cluster, tmp_path: Path) -> N
     assert done.found == 4 and contents(begun) == contents(whole)
 
 
+@pytest.mark.slow
 def test_a_cluster_that_vanishes_is_named_and_what_was_done_is_kept(tmp_path: Path) -> None:
     kept = tmp_path / "kept"
     kept.mkdir()

@@ -29,6 +29,7 @@ def test_a_worker_furnishes_itself_once_before_its_units() -> None:
     assert [each["left"].tolist() for each in done.arrays if each] == [[7]] * 5
 
 
+@pytest.mark.slow
 def test_serial_processes_and_an_executor_of_ones_own_give_the_same_bytes(tmp_path: Path) -> None:
     folders = {}
     for named in ("serial", "processes:2", "piecework:threads"):
@@ -61,6 +62,7 @@ def test_what_is_there_is_copied_and_not_computed_again_but_for_one_to_check(tmp
 
 
 @pytest.mark.parametrize("named", ["serial", "processes:2"])
+@pytest.mark.slow
 def test_a_forged_unit_is_found_where_it_is_drawn_and_nothing_of_its_run_is_kept(
     tmp_path: Path, named: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -133,6 +135,7 @@ def test_the_key_goes_by_what_is_computed_from_what_and_by_which_code(monkeypatc
 
 
 @pytest.mark.parametrize("named", ["serial", "processes:2"])
+@pytest.mark.slow
 def test_a_unit_that_fails_is_tried_three_times_and_named_and_the_others_go_on(tmp_path: Path, named: str) -> None:
     units = walks()
     units.insert(2, at(tmp_path, "fail"))

@@ -142,6 +142,7 @@ def test_motion_is_lagranges_by_differences_of_the_energies(n: int) -> None:
         np.testing.assert_allclose(r, whirling + slope + WRIST.damping * n * rate, rtol=1e-6, atol=1e-7)
 
 
+@pytest.mark.slow
 def test_energy_stays_without_damping_and_what_dampers_take_is_missing() -> None:
     """Of a wrist that is let go; the light parts beat at 1e3 1/s, whence the steps."""
     free, pulls, bent, still = (

@@ -27,6 +27,7 @@ def test_model_agrees_with_reference_vectors(vectors: Path, quantities: int) -> 
 
 
 @pytest.mark.parametrize("quantity", ["mass matrix", "trajectory"])
+@pytest.mark.slow
 def test_a_wrong_vector_is_found_and_named(tmp_path: Path, quantity: str) -> None:
     vectors = json.loads(VECTORS.read_text())
     if quantity == "trajectory":

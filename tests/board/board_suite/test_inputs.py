@@ -26,6 +26,7 @@ def test_an_emergency_stop_input_open_for_less_than_two_milliseconds_is_noise(be
     assert bench.status().state is State.ENABLED
 
 
+@pytest.mark.slow
 def test_open_for_three_it_stops_within_3_1_milliseconds(bench: Bench) -> None:
     rng, found = np.random.default_rng(4), []
     for hold in (0, 1, 0, 0, 1):
@@ -44,6 +45,7 @@ def test_open_for_three_it_stops_within_3_1_milliseconds(bench: Bench) -> None:
 
 
 @pytest.mark.parametrize("hold", [0, 1])
+@pytest.mark.slow
 def test_an_alarm_of_any_drive_stops_all_within_a_millisecond(bench: Bench, hold: int) -> None:
     rng, found = np.random.default_rng(5), []
     for alarm in ALARMS:

@@ -89,6 +89,7 @@ def test_without_amplifiers_nothing_is_clocked_and_all_are_silent(bench: Bench) 
     "counts",
     [(0x123456, -0x123456, 0, -2), (2**23 - 1, -(2**23), 0x7F, -0x80), (0x555555, -0x555556, 255, -256)],
 )
+@pytest.mark.slow
 def test_each_amplifier_is_read_with_its_sign_by_25_short_pulses(bench: Bench, counts: Sequence[int]) -> None:
     amplifiers = [Hx711(bench, axis) for axis in range(4)]
     for amplifier, value in zip(amplifiers, counts, strict=True):

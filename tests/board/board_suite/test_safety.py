@@ -102,6 +102,7 @@ def test_hold_on_fault_keeps_the_drives_on_until_disabled(bench: Bench) -> None:
 
 
 @pytest.mark.parametrize("hold", [0, 1])
+@pytest.mark.slow
 def test_emergency_stop_command_ends_stepping_within_a_millisecond(bench: Bench, hold: int) -> None:
     rng = np.random.default_rng(3)
     for seq in (ESTOP_SEQ, 77, 1, ESTOP_SEQ, 255):
@@ -146,6 +147,7 @@ def test_a_status_is_of_one_instant_also_where_a_stop_falls_into_its_making(benc
     assert {State.ENABLED, State.FAULT} == set(states), "both sides of it were met"
 
 
+@pytest.mark.slow
 def test_no_axis_starts_again_when_a_stop_falls_into_the_working_out_of_its_rate(bench: Bench, rounds: int) -> None:
     rng = np.random.default_rng(7)
     for _ in range(20 + 10 * rounds):
