@@ -20,6 +20,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+from choices import about
 from ranking_rows import Rankings, Row, deg, first_group, group, interval, short, three
 from second_study import again, asked_twice
 
@@ -28,6 +29,7 @@ from wristctl.commands.study.units import families_of
 from wristctl.comparison.repeated_tunings import HALVES
 from wristctl.comparison.world_ranking import kinds_of
 from wristctl.config.families import Family
+from wristctl.control.table import controller
 from wristctl.records import Run
 from wristctl.records.manifest import asked_again
 
@@ -44,21 +46,23 @@ real robots](real-robots.md)."""
 _ABOUT = """Each row of the table is a family of {worlds} simulated worlds: wrists and rigs drawn anew, none of them
 seen in tuning. Each controller was tuned {tunings} times, each time with {evaluations} evaluations on {draws} other
 worlds; the RMSE is the geometric mean over worlds and tunings. Intervals are of 95 %, by a bootstrap over tunings and
-worlds. Controllers are told apart by their paired differences in the same worlds, so that one may be told worse though
-its RMSE lies in the other's interval. Not told apart does not mean equal: where the own RMSE is more than a tenth above
-the lowest, it stands beside the name. Halves of the worlds are drawn at random, {halves} times.
+worlds. Controllers are distinguished by their paired differences in the same worlds, so that one may be worse though
+its RMSE lies in the other's interval. Not distinguished does not mean equal: an RMSE more than a tenth above the lowest
+stands beside the name. Intervals are of the mean, not of single wrists. Halves of the worlds are drawn at random,
+{halves} times; the tunings are the same in each.
 
-A world is lost where the controller [fails, swings or chatters](glossary.md). What is shown, at 95 %, to lose more
-than 1 % of the worlds is not to be used, and is in no other column; two or three of {worlds} are too few to show it.
+A world is lost where the controller [fails, swings or chatters](glossary.md); a failure counts as 90 deg in the RMSE.
+What is shown, at 95 %, to lose more than 1 % of the worlds is not to be used, and is in no other column; up to {few} of
+{worlds} do not show it here.
 Names without a suffix have tuned gains; [what controllers are](choices.md#controllers). The gains, of the median
 tuning: `wristctl simulate --gains tuned:camera`, [of all families](gains.md). For a wrist of your own:
 [recommend](recommend.md)."""
 _PAPER = """How many times the lowest RMSE on the rig; of what may not be used, the share of worlds that are lost.
 The gains of [the paper](paper.md)'s sliding mode are P1, P2 and P3, those of its PID Kp, Ki and Kd: `printed` as the
 paper prints them, `exchanged` with P1 and P2 swapped, our hypothesis of a misprint."""
-_BOUGHT = """How many times less RMSE the second controller has, which has the term, than the first; `more`: it has
-more. `none shown`: the 95 % interval holds 1; `any`: it holds 1 and is so wide that nothing is told. With * the second
-is among what not to use on that rig; `lost`: it loses more than half of the worlds."""
+_BOUGHT = """How many times less RMSE the second controller has, which has the term, than the first, or how many times
+more. `none shown`: the 95 % interval holds 1; `unknown`: and its ends are more than {wide} times apart. With * the
+second is among what not to use on that rig, for the worlds that it loses; `lost`: these are more than half."""
 _FIRST = re.compile(r"([\w-]+(?: \(steps\))?) [\w-]+ (\d+) and (\d+ of \d+)(?=[;.])")
 
 
@@ -85,8 +89,9 @@ class Study:
 def decision(rankings: Mapping[str, Sequence[Row]], first: Mapping[str, str]) -> list[str]:
     """A line for each rig: what to run, how often it is first, what is as good, what comes next, and the gain."""
     lines = [
-        "| rig | lowest RMSE | RMSE [deg], 95 % | lowest in halves of the worlds, in tunings | not told from it "
-        "| lowest that is told worse | feedforward's RMSE over the lowest | [do not use](#what-not-to-use) |",
+        "| rig | lowest RMSE | RMSE [deg], 95 % | lowest in so many halves of the worlds, tunings "
+        "| not distinguished from it | first that is worse | feedforward's RMSE over the lowest "
+        "| [do not use](#what-not-to-use) |",
         "| --- | --- | --- | --- | --- | --- | --- | --- |",
     ]
     for name, rows in rankings.items():
@@ -120,13 +125,27 @@ def use(rankings: Mapping[str, Sequence[Row]], where: str) -> str:
     errors_of = partial(_mean, rankings.values())
     label = min(often, key=lambda label: (-often[label], errors_of(label)))
     chosen = {name: rows[label] for name, rows in firsts.items() if label in rows}
-    errors = joined([f"{interval(row)} deg in {name}" for name, row in chosen.items()])
+    lowest = {name: min(rows.values(), key=lambda row: float(row["rmse"])) for name, rows in firsts.items() if rows}
+    errors = joined(
+        [
+            f"{interval(row)} deg in {name}"
+            + ("" if lowest[name]["row"] == label else f" ({short(lowest[name]['row'])}: {deg(lowest[name]['rmse'])})")
+            for name, row in chosen.items()
+        ]
+    )
     better = [row["times_better"] for row in chosen.values()]
-    least = f"{'at least ' * (len(better) > 1)}{three(min(better))} times less than feedforward alone"
+    hardly = "hardly less than feedforward alone: " if min(better) < ALIKE else ""
+    least = f"{hardly}{'at least ' * (len(better) > 1)}{three(min(better))} times less"
+    least += "" if hardly else " than feedforward alone"
     words = f"use {label}: RMSE {errors}, {least}."
     same = sorted((other for other in often if often[other] == often[label] == len(rankings)), key=errors_of)
-    if others := [short(other) for other in same if other != label]:
-        words += f" Not told from it{' on any of these' if len(rankings) > 1 else ''}: {joined(others)}."
+    beside = {
+        other: _beside(firsts[name][other], firsts[name][label]) if len(rankings) == 1 else ""
+        for other in same
+        for name in rankings
+    }
+    if others := [f"{short(other)}{beside[other]}" for other in same if other != label]:
+        words += f" Not distinguished from it{' on any of these' if len(rankings) > 1 else ''}: {joined(others)}."
     lost = [f"{100.0 * _lost(row):.2g} % of the worlds of {name}" for name, row in chosen.items() if _lost(row)]
     if lost:
         words += f" It loses {joined(lost)}."
@@ -150,7 +169,9 @@ def lead(run: Run, rankings: Rankings) -> list[str]:
         alike = {name: rows for name, rows in rankings.items() if _kind(run, name) == (rig, steps)}
         where = f"{'Steps' if steps else 'Smooth motions'} {'by motors, tendons and a camera' if rig else _EXACT}"
         lines += [use(alike, where)] if alike else []
-    return lines
+    named = dict.fromkeys(label for line in lines for label in re.findall(r"use ([\w-]+)/", line))
+    what = [f"| {name} | {about(controller(name).law.__module__)} |" for name in named]
+    return [*lines, "", "| controller | what it is |", "| --- | --- |", *what]
 
 
 def unusable(rankings: Mapping[str, Sequence[Row]]) -> list[str]:
@@ -197,14 +218,14 @@ def bought(terms: Sequence[Row], rankings: Mapping[str, Sequence[Row]]) -> list[
 def _times(row: Row) -> str:
     """A ratio with its interval in words: how many times less, or more; whether the interval holds 1, and is wide."""
     if not row["high"] < math.inf:
-        return f"any: {three(row['times'])}"
+        return f"unknown: {three(row['times'])}"
     times, low, high = (row[name] for name in ("times", "low", "high"))
-    word = ""
+    word, more = "", ""
     if low <= 1.0 <= high:
-        word = "any: " if high / low > WIDE else "none shown: "
+        word = "unknown: " if high / low > WIDE else "none shown: "
     elif high < 1.0:
-        times, low, high, word = 1.0 / times, 1.0 / high, 1.0 / low, "more: "
-    return f"{word}{_finely(times)} [{_finely(low)}, {_finely(high)}]"
+        times, low, high, more = 1.0 / times, 1.0 / high, 1.0 / low, " times more"
+    return f"{word}{_finely(times)}{more} [{_finely(low)}, {_finely(high)}]"
 
 
 def _finely(ratio: float) -> str:
@@ -262,7 +283,7 @@ def page(study: Study, made: str) -> str:
         _PAPER, "",
         *of_the_paper(rankings), "",
         "## What a term buys", "",
-        _BOUGHT, "",
+        _BOUGHT.format(wide=WIDE), "",
         *bought(study.terms, rankings), "",
         "## What not to use", "", "With the share of worlds that are lost:", "",
         *unusable(rankings), "",
@@ -382,6 +403,7 @@ def main() -> None:
         evaluations=budget.candidates * budget.iterations,
         draws=budget.draws,
         halves=HALVES,
+        few=max(round(budget.worlds * _lost(row)) for rows in rankings.values() for row in rows if group(row)),
     )
     repeated = second_of(run, Run(Path(sys.argv[2]))) if len(sys.argv) > 2 else ([], [])
     about = {name: words for name, words in named(studied(run)).items() if name in rankings}

@@ -53,30 +53,42 @@ def test_what_has_no_group_must_not_be_used_however_small_its_error(script: Modu
     assert script.ranking(ROWS)[-1].startswith("| - | smc/exchanged | 0.05")
 
 
-def test_an_effect_whose_interval_holds_one_stands_in_parentheses(script: ModuleType) -> None:
-    terms = [
-        {
-            "term": "an integral",
-            "family": "camera",
-            "without": "pd-ff/tuned",
-            "with": "pid/printed",
-            "times": 1.284,
-            "low": 1.21,
-            "high": 1.35,
-        },
-        {
-            "term": "an integral",
-            "family": "steps",
-            "without": "pd-ff/tuned",
-            "with": "pid/printed",
-            "times": 0.998,
-            "low": 0.99,
-            "high": 1.01,
-        },
-    ]
-    assert script.bought(terms, ["camera", "steps"])[-1] == (
-        "| an integral: pd-ff to pid/printed | 1.28 [1.21, 1.35] | (0.998 [0.99, 1.01]) |"
-    )
+def term(times: float, low: float, high: float, with_term: str = "mpc/tuned") -> dict[str, Any]:
+    """A line of the values of terms, on one rig."""
+    return {
+        "term": "prediction", "family": "camera", "without": "lqi/tuned", "with": with_term, "times": times, "low": low,
+        "high": high,
+    }  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("value", "cell"),
+    [
+        (term(1.284, 1.21, 1.35), "1.28 [1.21, 1.35]"),
+        (term(0.8, 0.5, 0.96), "1.25 times more [1.04, 2]"),
+        (term(0.998, 0.99, 1.01), "none shown: 0.998 [0.99, 1.01]"),
+        (term(1.2, 0.5, 4.0), "unknown: 1.2 [0.5, 4]"),
+        (term(1.2, 0.0, math.inf), "unknown: 1.2"),
+        (term(1.004, 1.0004, 1.008), "1.004 [1.0004, 1.01]"),
+        (term(1.3, 1.2, 1.4, "pid/tuned"), "1.3 [1.2, 1.4] *"),
+        (term(1.3, 1.2, 1.4, "smc/exchanged"), "lost"),
+    ],
+)
+def test_the_value_of_a_term_says_whether_it_is_shown_and_whether_its_controller_may_be_used(
+    script: ModuleType, value: dict[str, Any], cell: str
+) -> None:
+    rows = [*ROWS[:-1], row("smc/exchanged", math.nan, 0.05, 1.0, 0.7), row("pid/tuned", math.nan, 0.3, 1.0, 0.05)]
+    assert script.bought([value], {"camera": rows})[-1].split(" | ")[-1] == f"{cell} |"
+
+
+def test_what_to_use_says_what_is_lower_somewhere_and_what_is_as_little_distinguished(script: ModuleType) -> None:
+    other = [row("ct-dob/tuned", 1, 0.3, 1.0, 0.01), row("mpc/tuned", 1, 0.4, 1.0)]
+    text = " ".join(script.use({"camera": ROWS, "uneven": other}, "Rigs").split())
+    assert "use ct-dob/tuned: RMSE 0.11 [0.099, 0.121] deg in camera (mpc: 0.1) and 0.3 [0.27, 0.33] deg in" in text
+    assert "on any of these: mpc" in text and "lqi" not in text and "1 % of the worlds of uneven" in text
+    unlike = [row("mpc/tuned", 1, 1.0, 1.0), row("nc/tuned", 1, 2.0, 1.0)]
+    assert "nc (2 [1.8, 2.2])" in script.use({"steps": unlike}, "Steps")
+    assert "none may be used" in script.use({"camera": ROWS[-1:]}, "Rigs")
 
 
 @pytest.mark.parametrize("rig", ["camera", "handling", "uneven", "ideal", "ideal, steps", "steps"])
