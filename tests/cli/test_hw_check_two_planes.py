@@ -100,6 +100,17 @@ def test_nothing_moves_where_one_camera_is_oblique_and_the_other_sees_no_marker(
 
 
 @pytest.mark.slow
+def test_an_oblique_camera_that_is_calibrated_passes(call: Call, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("wristctl.cli.hw_check.typed_line", lambda meanwhile: "no")
+    code, _, err = call("hw", "calibrate", "camera", "--set", "scene.pan_deg=20")
+    assert code == 0, err
+    given = ("--optics-2", "latest:calibrate-camera", "--set", "bench.camera_2.scene.pan_deg=20")
+    code, out, err = call(*CHECK, "--port", "emulated", *given)
+    assert code == 0 and "in two planes.\n" in out, out + err
+    assert re.search(r"off square, by its markers +0\.\d deg \(.*\) +calibrated", out)
+
+
+@pytest.mark.slow
 def test_exchanged_cameras_are_named_and_nothing_moves(
     call: Call, benches: list[VirtualBench], monkeypatch: pytest.MonkeyPatch
 ) -> None:

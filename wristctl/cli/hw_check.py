@@ -33,6 +33,12 @@ def check(
         bool, typer.Option("--rig", help="Camera and computer too: can the loop of hw-run run here?")
     ] = False,
     camera: Annotated[str | None, typer.Option("--camera", help="With --rig: number, path or address.")] = None,
+    optics: Annotated[
+        str | None, typer.Option("--optics", metavar="RUN", help="With --rig: calibrate-camera run of the camera.")
+    ] = None,
+    optics_2: Annotated[
+        str | None, typer.Option("--optics-2", metavar="RUN", help="With --rig: that of the second camera.")
+    ] = None,
     axis: Annotated[int, typer.Option("--axis", min=0, max=3, help="With --rig: axis that is to be moved.")] = 2,
     override: Annotated[
         list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help="With --rig: a setting of hw-run.")
@@ -44,7 +50,9 @@ def check(
 ) -> None:
     """Ask the board who it is and how it is, time its answers, and try one drive's wiring; --rig: the whole rig."""
     if rig:
-        return check_rig(port, baud, camera, override or [], axis, yes, as_json, quiet)
+        named = {"camera": camera, "optics": optics, "optics_2": optics_2}
+        chosen = {name: value for name, value in named.items() if value is not None}
+        return check_rig(port, baud, chosen, override or [], axis, yes, as_json, quiet)
     from wristctl.board.check import adapter_of, move_a_little, round_trips
     from wristctl.board.driver import Board
     from wristctl.board.messages import Command
@@ -104,13 +112,14 @@ UNFIT = 3
 
 
 def check_rig(
-    port: str | None, baud: int, camera: str | None, override: list[str], axis: int, yes: bool, as_json: bool,
+    port: str | None, baud: int, chosen: dict[str, str], override: list[str], axis: int, yes: bool, as_json: bool,
     quiet: bool,
 ) -> None:  # fmt: skip
-    """Measure, and print the answer first. Exits with 3 where the loop cannot run."""
+    """Measure, and print the answer first. Exits with 3 where the loop cannot run. `chosen` are settings by name."""
     from wristctl.board.driver import Board
     from wristctl.board.transport import EMULATED, only_board
     from wristctl.loop_priority import prioritised
+    from wristctl.records import require
     from wristctl.trial.rig_facts import Pictures, measure, troubles
     from wristctl.trial.spatial_belief import layout_of_axes
     from wristctl.trial.supervised_wait import Patience
@@ -119,15 +128,17 @@ def check_rig(
 
     study = load_study((), override, "hw-run")
     overrides: dict[str, Any] = {"baud": baud, "port": None if port == EMULATED else port or only_board()}
-    settings = study.hw_run.model_copy(update=overrides | ({"camera": camera} if camera is not None else {}))
+    settings = study.hw_run.model_copy(update=overrides | chosen)
     if settings.planes == 2:
         layout_of_axes(study.wrist)
+    runs = (require(run, "calibrate-camera") if run else None for run in (settings.optics, settings.optics_2))
+    view, view_2 = map(View.of, runs)
     pictures = Pictures()
     with listening(quiet, False) as console, prioritised(settings.priority) as priority:
         if priority:
             typer.echo(priority, err=True)
         with progress(console, no_event, f"opening board and camera{'s' * (settings.planes == 2)}", None, "", quiet):
-            testbed = open_testbed(settings, study.wrist, study.seed, View(), lambda what, meanwhile: None, pictures)
+            testbed = open_testbed(settings, study.wrist, study.seed, view, lambda *_: None, pictures, view_2)
         try:
             with Board(testbed.transport) as board:
                 moved = yes or _agreed(axis, Patience(board).pulse)
@@ -161,7 +172,8 @@ def _print(facts: RigFacts, faults: list[Trouble], settings: HwRunSettings) -> N
     for trouble in faults:
         print(f"- {trouble.what}\n  {trouble.fix}")
     print()
-    first, *others = (_camera_rows(camera) for camera in facts.cameras)
+    runs = settings.optics, settings.optics_2
+    first, *others = (_camera_rows(camera, run) for camera, run in zip(facts.cameras, runs, strict=False))
     if not others:
         print(Table("Measured", ("what", "value"), [*_rows(facts), *first]).text())
         return
@@ -195,11 +207,12 @@ def _direction_row(facts: RigFacts) -> tuple[str, str]:
 _UNKNOWN = "not measured"
 
 
-def _camera_rows(camera: CameraFacts) -> list[tuple[str, str]]:
+def _camera_rows(camera: CameraFacts, optics: str | None) -> list[tuple[str, str]]:
     pace, quality, latency, pose = camera.pace, camera.quality, camera.latency, camera.pose
     rate = f"{pace.rate:.1f} per second, uneven by {1e3 * pace.jitter:.1f} ms" if pace.verdicts else "none"
     hidden = _UNKNOWN if latency is None else f"{1e3 * latency.delay:.1f} ms (+- {2e3 * latency.sd:.1f} ms)"
-    marker = grey = noise = off = "not seen"
+    marker = grey = noise = "not seen"
+    off = "calibrated" if optics else "not seen"
     if quality is not None:
         marker = f"{quality.side:.0f} px, blurred by {quality.blur:.1f} px"
         grey = f"{quality.black:.0f} to {quality.white:.0f} of 255"
