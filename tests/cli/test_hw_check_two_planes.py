@@ -50,15 +50,21 @@ def troubles_of(out: str) -> str:
     return "\n".join(lines[1 : lines.index("")])
 
 
-@pytest.mark.slow
-def test_a_sound_rig_passes_with_the_age_of_both_cameras_and_the_direction_of_its_axis(
-    call: Call, monkeypatch: pytest.MonkeyPatch
-) -> None:
+SLOWER = [part for key in ("bench.camera", "bench.camera_2", "sensor") for part in ("--set", f"{key}.frame_rate=30")]
+
+
+@pytest.fixture
+def few_strokes(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Four strokes are enough."""
     monkeypatch.setattr(rig_strokes, "COUNT", 4)
     monkeypatch.setattr(rig_strokes, "MOST", 4)
-    slower = [f"{name}.frame_rate=30" for name in ("bench.camera", "bench.camera_2", "sensor")]
-    options = [part for setting in slower for part in ("--set", setting)]
-    code, out, err = call(*EMULATED, *options, "--set", "bench.camera_2.delay_frames=1.2", "--axis", "1", "--json")
+
+
+@pytest.mark.slow
+def test_a_sound_rig_passes_with_the_age_of_both_cameras_and_the_direction_of_its_axis(
+    call: Call, few_strokes: None
+) -> None:
+    code, out, err = call(*EMULATED, *SLOWER, "--set", "bench.camera_2.delay_frames=1.2", "--axis", "1", "--json")
     assert code == 0, err
     checked = json.loads(out)
     assert checked["fit"] and checked["troubles"] == []
@@ -71,6 +77,18 @@ def test_a_sound_rig_passes_with_the_age_of_both_cameras_and_the_direction_of_it
     direction = checked["direction"]
     assert direction["axis"] == 1 and np.degrees(direction["place"]) == pytest.approx(135.0)
     assert np.degrees(direction["bend"]) == pytest.approx(135.0, abs=5.0)
+
+
+@pytest.mark.slow
+def test_pictures_of_one_camera_that_are_older_than_their_stamps_are_told_from_the_other_ones(
+    call: Call, few_strokes: None
+) -> None:
+    late = "bench.faults=[{kind: pictures-late, size: 0.03, camera: 2, since: power-on, at: 0}]"
+    code, out, err = call(*EMULATED, *SLOWER, "--set", late, "--set", "bench.camera_2.delay_frames=1")
+    assert code == 0 and "and could be better." in out, err
+    ages = re.search(r"camera 1 are (-?\d+) ms and pictures of camera 2 are (\d+) ms older", troubles_of(out))
+    assert ages and abs(int(ages[1])) <= 4 and abs(int(ages[2]) - 30) <= 4, out
+    assert "device.delay=" in troubles_of(out)
 
 
 @pytest.mark.slow

@@ -219,7 +219,7 @@ def _of_the_views(facts: RigFacts, settings: HwRunSettings) -> list[Trouble]:
             True,
             f"camera {plane + 1} shows markers {ids}, which are those of camera {2 - plane}",
             f"it must see markers {' and '.join(map(str, _ids(settings)[plane]))}: put it before their plane, or give "
-            f"the right one, {('--camera', '--set camera_2=')[plane]}",
+            f"the right one, {('--camera NUMBER', '--set camera_2=NUMBER')[plane]}",
         )
         for plane, ids in enumerate(shown)
         if ids
