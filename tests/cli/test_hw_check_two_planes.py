@@ -118,6 +118,17 @@ def test_nothing_moves_where_one_camera_is_oblique_and_the_other_sees_no_marker(
 
 
 @pytest.mark.slow
+def test_nothing_moves_before_a_camera_that_is_too_oblique_though_it_sees_its_markers(
+    call: Call, benches: list[VirtualBench]
+) -> None:
+    given = ("--set", "homing.oblique_deg=5", "--set", "bench.camera.scene.tilt_deg=9")
+    code, out, err = call(*EMULATED, *given)
+    assert code == 3, err
+    assert re.search(r"^- camera 1 looks \d deg off square", troubles_of(out)) and "camera 2 looks" not in out
+    assert nothing_moved(benches[0])
+
+
+@pytest.mark.slow
 def test_an_oblique_camera_that_is_calibrated_passes(call: Call, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("wristctl.cli.hw_check.typed_line", lambda meanwhile: "no")
     code, _, err = call("hw", "calibrate", "camera", "--set", "scene.pan_deg=20")

@@ -117,8 +117,8 @@ def measure(
 ) -> RigFacts:  # fmt: skip
     """Measure a connected board and the testbed's pictures. With an `axis` its motor makes strokes.
 
-    Nothing moves unless every camera sees the wrist. In two planes the axis must then bend the believed wrist toward
-    its tendon, before it makes any stroke. Raises SafetyStop, BoardError and CameraError.
+    Nothing moves unless every camera sees the wrist, and none too obliquely. In two planes the axis must then bend the
+    believed wrist toward its tendon, before it makes any stroke. Raises SafetyStop, BoardError and CameraError.
     """
     trips, adapter = round_trips(board, Command.STATUS, _TRIPS), adapter_of(testbed.transport.name)
     tracking = testbed.tracking()
@@ -128,7 +128,8 @@ def measure(
     woken = _woken(testbed, settings.control_period)
     latencies = list[Latency]()
     direction = None
-    if axis is not None and all(pace.verdicts[SightingVerdict.OK] for pace in paces):
+    sees = all(pace.verdicts[SightingVerdict.OK] for pace in paces)
+    if axis is not None and sees and not any(_is_too_oblique(pose, settings) for pose in poses):
         strokes = RigStrokes(board, tracking, settings, axis)
         taut, bend = strokes.taken_up()
         if settings.planes == 2:
@@ -248,7 +249,7 @@ def _of_the_link(facts: RigFacts, settings: HwRunSettings, port: str) -> list[Tr
 
 def _of_a_camera(camera: CameraFacts, settings: HwRunSettings) -> list[Trouble]:
     pace, met = camera.pace, []
-    usual = {SightingVerdict.OK, *(_OF_OBLIQUE if _is_too_oblique(camera, settings) else ())}
+    usual = {SightingVerdict.OK, *(_OF_OBLIQUE if _is_too_oblique(camera.pose, settings) else ())}
     for verdict in [verdict for verdict in pace.verdicts if verdict not in usual]:
         count, of = pace.verdicts[verdict], sum(pace.verdicts.values())
         problem, fix = f"{count} of {of} pictures{pace.whose}: {verdict}", FIX[verdict].removesuffix(BY_CHECK)
@@ -298,8 +299,8 @@ def _of_the_pictures(camera: CameraFacts) -> list[Trouble]:
     return [Trouble(False, problem, fix) for is_bad, problem, fix in checks if is_bad]
 
 
-def _is_too_oblique(camera: CameraFacts, settings: HwRunSettings) -> bool:
-    return camera.pose is not None and camera.pose.oblique > math.radians(settings.homing.oblique_deg)
+def _is_too_oblique(pose: CameraPose | None, settings: HwRunSettings) -> bool:
+    return pose is not None and pose.oblique > math.radians(settings.homing.oblique_deg)
 
 
 def _of_the_pose(camera: CameraFacts, settings: HwRunSettings, plane: int) -> list[Trouble]:
@@ -309,7 +310,7 @@ def _of_the_pose(camera: CameraFacts, settings: HwRunSettings, plane: int) -> li
     oblique = math.degrees(pose.oblique)
     problem = f"{camera.pace.name} looks {oblique:.0f} deg off square at the bending plane"
     checks = [
-        (oblique > _OBLIQUE_DEG, _is_too_oblique(camera, settings), problem, OBLIQUE_FIX[plane]),
+        (oblique > _OBLIQUE_DEG, _is_too_oblique(pose, settings), problem, OBLIQUE_FIX[plane]),
         (pose.misfit > _MISFIT, False,
          f"the markers{camera.pace.whose} are no squares of one plane (by {100.0 * pose.misfit:.1f} %)",
          "glue both flat on stiff flags in one plane, as far from the camera, of one print"),
