@@ -93,7 +93,7 @@ def test_a_camera_that_is_lost_ends_the_look() -> None:
     testbed = opened(two_planes(faults=(InjectedFault(kind="camera-lost", at=0.1, since="power-on", camera=2),)))
     tracking = testbed.tracking()
     testbed.transport.wait(0.2)
-    with pytest.raises(CameraError, match="no more pictures"):
+    with pytest.raises(CameraError, match="camera 2: the camera gives no more pictures"):
         tracking.look()
 
 
@@ -152,9 +152,24 @@ def test_a_real_rig_opens_a_camera_for_each_plane_and_gives_them_back(
 
 def test_a_second_camera_that_cannot_be_opened_gives_the_first_one_back(port: Port) -> None:
     settings = RigSettings(planes=2, port="x", camera="4", camera_2="broken")
-    with pytest.raises(CameraError):
+    with pytest.raises(CameraError, match="camera 2: no such camera"):
         open_testbed(settings, WRIST, 0, View(), lambda what, meanwhile: None)
     assert port.closed and [device.closed for device in Device.opened] == [True]
+
+
+def test_the_same_camera_for_both_planes_is_refused_before_anything_is_opened(port: Port) -> None:
+    settings = RigSettings(planes=2, port="x", camera="4", camera_2="4")
+    with pytest.raises(CameraError, match="camera 1 and camera 2 are the same, 4"):
+        open_testbed(settings, WRIST, 0, View(), lambda what, meanwhile: None)
+    assert not Device.opened
+
+
+def test_a_camera_may_be_given_by_its_number() -> None:
+    """As `--set camera_2=4` gives it."""
+    settings = RigSettings.model_validate({"camera": 4, "camera_2": 6})
+    assert (settings.camera, settings.camera_2) == ("4", "6")
+    with pytest.raises(ValidationError):
+        RigSettings.model_validate({"camera": True})
 
 
 @pytest.mark.parametrize(

@@ -19,7 +19,7 @@ from wristctl.study_files.load import load_study
 
 if TYPE_CHECKING:
     from wristctl.config.hw_run import HwRunSettings
-    from wristctl.trial.rig_facts import RigFacts, Trouble
+    from wristctl.trial.rig_facts import CameraFacts, RigFacts, Trouble
 
 
 def check(
@@ -33,6 +33,12 @@ def check(
         bool, typer.Option("--rig", help="Camera and computer too: can the loop of hw-run run here?")
     ] = False,
     camera: Annotated[str | None, typer.Option("--camera", help="With --rig: number, path or address.")] = None,
+    optics: Annotated[
+        str | None, typer.Option("--optics", metavar="RUN", help="With --rig: calibrate-camera run of the camera.")
+    ] = None,
+    optics_2: Annotated[
+        str | None, typer.Option("--optics-2", metavar="RUN", help="With --rig: that of the second camera.")
+    ] = None,
     axis: Annotated[int, typer.Option("--axis", min=0, max=3, help="With --rig: axis that is to be moved.")] = 2,
     override: Annotated[
         list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help="With --rig: a setting of hw-run.")
@@ -44,7 +50,9 @@ def check(
 ) -> None:
     """Ask the board who it is and how it is, time its answers, and try one drive's wiring; --rig: the whole rig."""
     if rig:
-        return check_rig(port, baud, camera, override or [], axis, yes, as_json, quiet)
+        named = {"camera": camera, "optics": optics, "optics_2": optics_2}
+        chosen = {name: value for name, value in named.items() if value is not None}
+        return check_rig(port, baud, chosen, override or [], axis, yes, as_json, quiet)
     from wristctl.board.check import adapter_of, move_a_little, round_trips
     from wristctl.board.driver import Board
     from wristctl.board.messages import Command
@@ -104,35 +112,38 @@ UNFIT = 3
 
 
 def check_rig(
-    port: str | None, baud: int, camera: str | None, override: list[str], axis: int, yes: bool, as_json: bool,
+    port: str | None, baud: int, chosen: dict[str, str], override: list[str], axis: int, yes: bool, as_json: bool,
     quiet: bool,
 ) -> None:  # fmt: skip
-    """Measure, and print the answer first. Exits with 3 where the loop cannot run."""
+    """Measure, and print the answer first. Exits with 3 where the loop cannot run. `chosen` are settings by name."""
     from wristctl.board.driver import Board
     from wristctl.board.transport import EMULATED, only_board
     from wristctl.loop_priority import prioritised
+    from wristctl.records import require
     from wristctl.trial.rig_facts import Pictures, measure, troubles
+    from wristctl.trial.spatial_belief import layout_of_axes
     from wristctl.trial.supervised_wait import Patience
     from wristctl.trial.testbeds import open_testbed
     from wristctl.vision.view import View
 
     study = load_study((), override, "hw-run")
     overrides: dict[str, Any] = {"baud": baud, "port": None if port == EMULATED else port or only_board()}
-    settings = study.hw_run.model_copy(update=overrides | ({"camera": camera} if camera is not None else {}))
+    settings = study.hw_run.model_copy(update=overrides | chosen)
     if settings.planes == 2:
-        problem = "a check looks at one camera, and this rig has two"
-        raise UserError(problem, "planes", "--set hw-run.planes=1 with --camera of either")
+        layout_of_axes(study.wrist)
+    runs = (require(run, "calibrate-camera") if run else None for run in (settings.optics, settings.optics_2))
+    view, view_2 = map(View.of, runs)
     pictures = Pictures()
     with listening(quiet, False) as console, prioritised(settings.priority) as priority:
         if priority:
             typer.echo(priority, err=True)
-        with progress(console, no_event, "opening board and camera", None, "", quiet):
-            testbed = open_testbed(settings, study.wrist, study.seed, View(), lambda what, meanwhile: None, pictures)
+        with progress(console, no_event, f"opening board and camera{'s' * (settings.planes == 2)}", None, "", quiet):
+            testbed = open_testbed(settings, study.wrist, study.seed, view, lambda *_: None, pictures, view_2)
         try:
             with Board(testbed.transport) as board:
                 moved = yes or _agreed(axis, Patience(board).pulse)
                 with progress(console, no_event, "measuring", None, "strokes", quiet) as advance:
-                    facts = measure(testbed, board, pictures, settings, axis if moved else None, advance)
+                    facts = measure(testbed, board, pictures, settings, study.wrist, axis if moved else None, advance)
         finally:
             testbed.close()
     faults = troubles(facts, settings, testbed.transport.name)
@@ -155,40 +166,71 @@ def _agreed(axis: int, meanwhile: Any) -> bool:
 
 
 def _print(facts: RigFacts, faults: list[Trouble], settings: HwRunSettings) -> None:
-    loop = f"the loop of {1e3 * settings.control_period:g} ms"
+    loop = f"the loop of {1e3 * settings.control_period:g} ms{' in two planes' * (settings.planes == 2)}"
     grave = any(trouble.grave for trouble in faults)
     print(f"This rig can{'not' if grave else ''} run {loop}{'.' if grave or not faults else ', and could be better.'}")
     for trouble in faults:
         print(f"- {trouble.what}\n  {trouble.fix}")
     print()
-    print(Table("Measured", ("what", "value"), _rows(facts)).text())
+    runs = settings.optics, settings.optics_2
+    first, *others = (_camera_rows(camera, run) for camera, run in zip(facts.cameras, runs, strict=False))
+    if not others:
+        print(Table("Measured", ("what", "value"), [*_rows(facts), *first]).text())
+        return
+    names = [camera.pace.name for camera in facts.cameras]
+    by_camera = [(what, value, *(rows[k][1] for rows in others)) for k, (what, value) in enumerate(first)]
+    print(Table("Measured", ("what", "value"), [*_rows(facts), _direction_row(facts)]).text(), end="\n\n")
+    print(Table("Cameras", ("what", *names), by_camera).text())
 
 
 def _rows(facts: RigFacts) -> list[tuple[str, str]]:
-    trips, pace, quality, latency = facts.trips, facts.pace, facts.quality, facts.latency
     import numpy as np
 
+    trips = facts.trips
     median, most = (1e3 * float(np.quantile(facts.woken, share)) for share in (0.5, 0.99))
-    rows = [
+    return [
         ("round trip of STATUS", f"{1e3 * trips.median:.2f} ms, p99 {1e3 * trips.p99:.2f} ms"),
         ("USB adapter", str(facts.adapter)),
         ("computer wakes late by", f"{median:.2f} ms, p99 {most:.2f} ms"),
-        ("camera", f"{pace.rate:.1f} pictures/s, uneven by {1e3 * pace.jitter:.1f} ms"),
-        ("age of pictures when they come, by their stamps", f"{1e3 * pace.latency:.1f} ms"),
     ]
-    age = "not measured" if latency is None else f"{1e3 * latency.delay:.1f} ms (+- {2e3 * latency.sd:.1f} ms)"
-    rows.append(("age that stamps do not tell, by strokes", age))
-    if latency is not None:
-        rows.append(("age of pictures when they come", f"{1e3 * (pace.latency + latency.delay):.1f} ms"))
+
+
+def _direction_row(facts: RigFacts) -> tuple[str, str]:
+    direction = facts.direction
+    if direction is None:
+        return ("direction in which an axis bends the wrist", _UNKNOWN)
+    bend, place = (f"{math.degrees(angle) % 360.0:.0f} deg" for angle in (direction.bend, direction.place))
+    return (f"axis {direction.axis} bends the wrist toward", f"{bend}, its tendon toward {place}")
+
+
+# What is printed where nothing was measured.
+_UNKNOWN = "not measured"
+
+
+def _camera_rows(camera: CameraFacts, optics: str | None) -> list[tuple[str, str]]:
+    pace, quality, latency, pose = camera.pace, camera.quality, camera.latency, camera.pose
+    rate = f"{pace.rate:.1f} per second, uneven by {1e3 * pace.jitter:.1f} ms" if pace.verdicts else "none"
+    hidden = _UNKNOWN if latency is None else f"{1e3 * latency.delay:.1f} ms (+- {2e3 * latency.sd:.1f} ms)"
+    marker = grey = noise = "not seen"
+    off = "calibrated" if optics else "not seen"
     if quality is not None:
+        marker = f"{quality.side:.0f} px, blurred by {quality.blur:.1f} px"
         grey = f"{quality.black:.0f} to {quality.white:.0f} of 255"
-        rows += [("tip's marker", f"{quality.side:.0f} px, blurred by {quality.blur:.1f} px, grey {grey}"),
-                 ("scatter of the resting angle", f"{math.degrees(facts.noise):.3f} deg")]  # fmt: skip
-    if facts.pose is not None:
-        tilt, pan = (f"{math.degrees(angle):+.1f}" for angle in (facts.pose.tilt, facts.pose.pan))
-        off = f"{math.degrees(facts.pose.oblique):.1f} deg (tilt {tilt}, pan {pan})"
-        rows.append(("camera off square, by its markers", off))
-    return rows
+    if math.isfinite(camera.noise):
+        noise = f"{math.degrees(camera.noise):.3f} deg"
+    if pose is not None:
+        tilt, pan = (f"{math.degrees(angle):+.1f}" for angle in (pose.tilt, pose.pan))
+        off = f"{math.degrees(pose.oblique):.1f} deg (tilt {tilt}, pan {pan})"
+    return [
+        ("pictures", rate),
+        ("their age, by their stamps", f"{1e3 * pace.latency:.1f} ms" if pace.verdicts else _UNKNOWN),
+        ("their age beyond that, by strokes", hidden),
+        ("their age in all", _UNKNOWN if latency is None else f"{1e3 * (pace.latency + latency.delay):.1f} ms"),
+        ("tip's marker", marker),
+        ("grey of its print and rim", grey),
+        ("scatter of the resting angle", noise),
+        ("camera off square, by its markers", off),
+    ]
 
 
 def _plain(facts: RigFacts, faults: list[Trouble]) -> dict[str, Any]:
@@ -197,21 +239,29 @@ def _plain(facts: RigFacts, faults: list[Trouble]) -> dict[str, Any]:
 
     from wristctl.records.journal import jsonable
 
-    pace = facts.pace
+    direction = facts.direction
     median, most = (float(np.quantile(facts.woken, share)) for share in (0.5, 0.99))
     plain: dict[str, Any] = jsonable(
         {
-            "schema": "wristctl.rig/1",
+            "schema": "wristctl.rig/2",
             "fit": not any(trouble.grave for trouble in faults),
             "troubles": [trouble._asdict() for trouble in faults],
             "round_trip": facts.trips._asdict(),
             "adapter": facts.adapter._asdict(),
             "woken_late": {"median": median, "p99": most},
-            "camera": {"rate": pace.rate, "jitter": pace.jitter, "stamped_age": pace.latency},
-            "latency": None if facts.latency is None else facts.latency._asdict(),
-            "marker": None if facts.quality is None else facts.quality._asdict(),
-            "noise": facts.noise,
-            "pose": None if facts.pose is None else facts.pose.plain(),
+            "cameras": [_plain_camera(camera) for camera in facts.cameras],
+            "direction": direction and {name: getattr(direction, name) for name in ("axis", "bend", "place")},
         }
     )
     return plain
+
+
+def _plain_camera(camera: CameraFacts) -> dict[str, Any]:
+    pace = camera.pace
+    return {
+        "pictures": {"rate": pace.rate, "jitter": pace.jitter, "stamped_age": pace.latency},
+        "latency": camera.latency and camera.latency._asdict(),
+        "marker": camera.quality and camera.quality._asdict(),
+        "noise": camera.noise,
+        "pose": camera.pose and camera.pose.plain(),
+    }

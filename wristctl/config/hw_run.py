@@ -162,6 +162,12 @@ class RigSettings(Section):
         tension = min(self.safety.tension, wrist.tension_limit)
         return self.model_copy(update={"safety": self.safety.model_copy(update={"tension": tension})})
 
+    @field_validator("camera", "camera_2", mode="before")
+    @classmethod
+    def _number_of_a_camera(cls, given: Any) -> Any:
+        """The number of a camera as text, where a study has it as a number."""
+        return str(given) if type(given) is int else given
+
     @field_validator("actuator", "sensor", mode="before")
     @classmethod
     def _level_of_a_rig(cls, given: Any, field: ValidationInfo) -> Any:

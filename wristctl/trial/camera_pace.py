@@ -15,7 +15,9 @@ _PAUSE = 2.0
 # Relative scatter of the time between two pictures that is worth a word.
 _UNEVEN = 0.3
 
-_LIGHT = "and the camera's light and focus: wristctl hw check --rig"
+# Advice to look at pictures by the check of a rig, after what is to be looked at.
+BY_CHECK = ": wristctl hw check --rig"
+_LIGHT = f"and the camera's light and focus{BY_CHECK}"
 # Advice about pictures that cannot be used, by their verdict.
 FIX = {
     SightingVerdict.NO_TIP: f"see that nothing covers the tip's marker, {_LIGHT}",
@@ -34,7 +36,7 @@ class CameraPace:
     """The pictures of the last seconds; times are of the loop's clock [s]. `name` is what the camera is called."""
 
     def __init__(self, name: str = _ONLY) -> None:
-        self._name, self.used = name, -math.inf
+        self.name, self.used = name, -math.inf
         """When its newest usable picture came."""
         self._seen: deque[Sighting] = deque(maxlen=_REMEMBERED)
         self.verdicts: Counter[SightingVerdict] = Counter()
@@ -48,8 +50,9 @@ class CameraPace:
         self.verdicts[sighting.verdict] += 1
 
     @property
-    def _whose(self) -> str:
-        return "" if self._name == _ONLY else f" of {self._name}"
+    def whose(self) -> str:
+        """The camera after what is its, in words; nothing where it is the only one."""
+        return "" if self.name == _ONLY else f" of {self.name}"
 
     @property
     def rate(self) -> float:
@@ -81,10 +84,10 @@ class CameraPace:
     def said(self) -> str:
         """In words."""
         if len(self._seen) < 2:
-            return f"{self._name} gives no pictures"
+            return f"{self.name} gives no pictures"
         old = f", {1e3 * self.latency:.0f} ms old when they come" if self.latency > 1e-3 else ""
         uneven = f", unevenly (+-{1e3 * self.jitter:.0f} ms)" if self.jitter * self.rate > _UNEVEN else ""
-        return f"{self._name} gives {self.rate:.3g} pictures/s{old}{uneven}"
+        return f"{self.name} gives {self.rate:.3g} pictures/s{old}{uneven}"
 
     def summary(self) -> str:
         """In words, with what could not be used of all pictures."""
@@ -99,13 +102,13 @@ class CameraPace:
         if not self._seen or now - self._seen[-1].came > stale:
             until_then = f"; until then {self.said().removeprefix('the ')}" if len(self._seen) > 1 else ""
             return (
-                f"no picture{self._whose} has come{until_then}",
+                f"no picture{self.whose} has come{until_then}",
                 "see the camera's cable, and that no other program uses it",
             )
         newest = self._seen[-1].verdict
         if newest is not SightingVerdict.OK:
-            return f"newest frame{self._whose}: {newest}", FIX[newest]
-        return f"newest frame{self._whose}: {newest}; {self.said()}", self._faster()
+            return f"newest frame{self.whose}: {newest}", FIX[newest]
+        return f"newest frame{self.whose}: {newest}; {self.said()}", self._faster()
 
     def fits(self, stale: float, hidden: float = 0.0) -> None:
         """Raises CameraError for a camera whose pictures are too few, or too old when they come, for this limit [s].
@@ -137,6 +140,11 @@ class CameraPaces:
         """Know how many cameras there are, before the first picture of two."""
         if cameras > len(self._each):
             self._each = [CameraPace(f"camera {number + 1}") for number in range(cameras)]
+
+    @property
+    def by_camera(self) -> tuple[CameraPace, ...]:
+        """The pace of each camera."""
+        return tuple(self._each)
 
     def add(self, sighting: Sighting) -> None:
         """The next picture, of the camera that looks at its plane."""

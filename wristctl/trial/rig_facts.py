@@ -1,6 +1,7 @@
 """Can this rig run the configured loop? What its link, camera and computer do, measured, and what is wrong with it."""
 
 import math
+from collections import defaultdict
 from collections.abc import Callable
 from typing import NamedTuple
 
@@ -11,16 +12,20 @@ from wristctl.board.check import Adapter, RoundTrips, adapter_of, round_trips, s
 from wristctl.board.driver import Board
 from wristctl.board.messages import LAYOUTS, Command, Pulls, Rate, Status
 from wristctl.config.hw_run import HwRunSettings
-from wristctl.trial.camera_pace import FIX, CameraPace
+from wristctl.config.wrist import WristParameters
+from wristctl.trial.camera_pace import BY_CHECK, FIX, CameraPace, CameraPaces
+from wristctl.trial.expected_moves import Bend
 from wristctl.trial.rig_strokes import Latency, RigStrokes, find_latency
+from wristctl.trial.safety import SafetyStop
+from wristctl.trial.spatial_moves import SpatialMoves
 from wristctl.trial.supervised_wait import OBLIQUE_FIX
 from wristctl.trial.testbeds import Testbed
 from wristctl.trial.tick_timing import FIX as TIMING_FIX
 from wristctl.trial.tick_timing import SCHEDULING
 from wristctl.trial.tracking import Tracking
-from wristctl.vision.camera import CameraError, Frame
+from wristctl.vision.camera import CameraError, Frame, Image
 from wristctl.vision.camera_pose import CameraPose
-from wristctl.vision.detector import PictureQuality, quality_of
+from wristctl.vision.detector import Detector, PictureQuality, quality_of
 from wristctl.vision.marker import Sighting, SightingVerdict
 
 # Commands timed; seconds for which the camera is watched, and for which the computer is woken every period.
@@ -34,6 +39,36 @@ _SURE = 0.7e-3
 _SMALL, _BLURRED, _BRIGHT, _FAINT = 40.0, 1.8, 250.0, 60.0
 # Limits of its pose: degrees off square, and corners off two squares of one plane, in sides.
 _OBLIQUE_DEG, _MISFIT = 5.0, 0.006
+# Verdicts on sound markers before a camera that is too oblique.
+_OF_OBLIQUE = SightingVerdict.NO_BASE, SightingVerdict.SHAPE
+
+
+class CameraFacts(NamedTuple):
+    """What one camera gives, times in s."""
+
+    pace: CameraPace
+    quality: PictureQuality | None
+    """Medians over the pictures; None where the tip's marker is not seen."""
+    noise: float
+    """Scatter of a resting wrist's angle [rad]."""
+    latency: Latency | None
+    """None where nothing was to move."""
+    pose: CameraPose | None = None
+    """None for a calibrated camera, or one that sees no markers."""
+    foreign: tuple[int, ...] = ()
+    """Ids of the other camera's markers that it shows, where it shows none of its own."""
+
+
+class AxisDirection(NamedTuple):
+    """Where the wrist went, in two planes, as its axis took up the tendon."""
+
+    axis: int
+    bend: float
+    """Direction of the bend, from ulnar toward flexion [rad]."""
+    place: float
+    """Direction in which this axis should bend it [rad]."""
+    astray: SafetyStop | None
+    """What this means, where it is not that direction."""
 
 
 class RigFacts(NamedTuple):
@@ -41,17 +76,12 @@ class RigFacts(NamedTuple):
 
     trips: RoundTrips
     adapter: Adapter
-    pace: CameraPace
-    quality: PictureQuality | None
-    """Medians over the pictures; None where the tip's marker is not seen."""
-    noise: float
-    """Scatter of a resting wrist's angle [rad]."""
     woken: Array
     """Delays with which the computer woke."""
-    latency: Latency | None
-    """None where nothing was to move."""
-    pose: CameraPose | None = None
-    """None for a calibrated camera, or one that sees no markers."""
+    cameras: tuple[CameraFacts, ...]
+    """Of each camera, in the order of their planes."""
+    direction: AxisDirection | None = None
+    """None in one plane, or where nothing was to move."""
 
 
 class Trouble(NamedTuple):
@@ -64,55 +94,92 @@ class Trouble(NamedTuple):
 
 
 class Pictures:
-    """Keeps what was seen in the newest pictures with a usable angle."""
+    """Keeps what was seen in the newest pictures, by the plane that their camera looks at."""
 
     def __init__(self) -> None:
-        self.qualities: list[PictureQuality] = []
+        self.qualities: defaultdict[int, list[PictureQuality]] = defaultdict(list)
+        self._newest: dict[int, Image] = {}
 
     def __call__(self, frame: Frame, sighting: Sighting) -> None:
         """Take one."""
-        if np.isfinite(sighting.corners[1]).all() and len(self.qualities) < _TRIPS:
-            self.qualities.append(quality_of(frame.image, sighting.corners[1]))
+        qualities, self._newest[sighting.plane] = self.qualities[sighting.plane], frame.image
+        if np.isfinite(sighting.corners[1]).all() and len(qualities) < _TRIPS:
+            qualities.append(quality_of(frame.image, sighting.corners[1]))
+
+    def shown(self, plane: int) -> set[int]:
+        """Ids of all markers in the newest picture."""
+        return set(Detector().everywhere(self._newest[plane], fine=True)) if plane in self._newest else set()
 
 
 def measure(
-    testbed: Testbed, board: Board, pictures: Pictures, settings: HwRunSettings, axis: int | None,
-    progress: Callable[[int], None] = lambda done: None,
+    testbed: Testbed, board: Board, pictures: Pictures, settings: HwRunSettings, wrist: WristParameters,
+    axis: int | None, progress: Callable[[int], None] = lambda done: None,
 ) -> RigFacts:  # fmt: skip
     """Measure a connected board and the testbed's pictures. With an `axis` its motor makes strokes.
 
-    Raises SafetyStop, BoardError and CameraError.
+    Nothing moves unless every camera sees the wrist, and none too obliquely. In two planes the axis must then bend the
+    believed wrist toward its tendon, before it makes any stroke. Raises SafetyStop, BoardError and CameraError.
     """
     trips, adapter = round_trips(board, Command.STATUS, _TRIPS), adapter_of(testbed.transport.name)
     tracking = testbed.tracking()
-    pace, sightings = _watched(tracking, testbed)
-    angles = [sighting.theta for sighting in sightings if math.isfinite(sighting.theta)]
-    pose = tracking.stand_square(sightings)
+    paces, sightings = _watched(tracking, testbed)
+    seen = [[sighting for sighting in sightings if sighting.plane == plane] for plane in range(len(paces))]
+    poses = [tracking.stand_square(of_camera) for of_camera in seen]
     woken = _woken(testbed, settings.control_period)
-    usable = pace.verdicts[SightingVerdict.OK] > 0
-    latency = None
-    if axis is not None and usable:
+    latencies = list[Latency]()
+    direction = None
+    sees = all(pace.verdicts[SightingVerdict.OK] for pace in paces)
+    if axis is not None and sees and not any(_is_too_oblique(pose, settings) for pose in poses):
         strokes = RigStrokes(board, tracking, settings, axis)
-        for motor_strokes in strokes.strokes(progress):
-            latency = find_latency(motor_strokes)
-            if latency.sd < _SURE:
-                break
+        taut, bend = strokes.taken_up()
+        if settings.planes == 2:
+            direction = _direction_of(axis, bend, SpatialMoves(settings, wrist))
+        if direction is None or direction.astray is None:
+            for cameras in strokes.strokes(taut, progress):
+                latencies = [find_latency(motor_strokes) for motor_strokes in cameras]
+                if max(latency.sd for latency in latencies) < _SURE:
+                    break
         strokes.let_go()
-    quality = PictureQuality(*np.median(pictures.qualities, axis=0)) if pictures.qualities else None
-    noise = float(np.std(angles)) if len(angles) > 2 else math.nan
-    return RigFacts(trips, adapter, pace, quality, noise, woken, latency, pose)
+    facts = []
+    for plane, (pace, pose) in enumerate(zip(paces, poses, strict=True)):
+        angles = [sighting.theta for sighting in seen[plane] if math.isfinite(sighting.theta)]
+        qualities = pictures.qualities[plane]
+        quality = PictureQuality(*np.median(qualities, axis=0)) if qualities else None
+        noise = float(np.std(angles)) if len(angles) > 2 else math.nan
+        foreign: set[int] = set()
+        if settings.planes == 2 and quality is None:
+            shown, ids = pictures.shown(plane), _ids(settings)
+            foreign = set() if shown & set(ids[plane]) else shown & set(ids[1 - plane])
+        latency = latencies[plane] if latencies else None
+        facts.append(CameraFacts(pace, quality, noise, latency, pose, tuple(sorted(foreign))))
+    return RigFacts(trips, adapter, woken, tuple(facts), direction)
 
 
-def _watched(tracking: Tracking, testbed: Testbed) -> tuple[CameraPace, list[Sighting]]:
-    clock, pace, sightings = testbed.transport, CameraPace(), []
+def _ids(settings: HwRunSettings) -> list[tuple[int, int]]:
+    """Ids of the markers that each of two cameras should see."""
+    return [(markers.base, markers.tip) for markers in (settings.markers, settings.markers_2)]
+
+
+def _direction_of(axis: int, bend: Bend, expected: SpatialMoves) -> AxisDirection:
+    try:
+        expected.judge_side(axis, bend)
+        astray = None
+    except SafetyStop as stop:
+        astray = stop
+    return AxisDirection(axis, math.atan2(bend.away, bend.theta), expected.place(axis), astray)
+
+
+def _watched(tracking: Tracking, testbed: Testbed) -> tuple[tuple[CameraPace, ...], list[Sighting]]:
+    clock, paces, sightings = testbed.transport, CameraPaces(), []
+    paces.expect(len(tracking.zero))
     tracking.look()
     end = clock.now() + _WATCHED
     while clock.now() < end:
         for sighting in tracking.look():
-            pace.add(sighting)
+            paces.add(sighting)
             sightings.append(sighting)
         clock.wait(2e-3)
-    return pace, sightings
+    return paces.by_camera, sightings
 
 
 def _woken(testbed: Testbed, period: float) -> Array:
@@ -127,13 +194,37 @@ def _woken(testbed: Testbed, period: float) -> Array:
 
 def troubles(facts: RigFacts, settings: HwRunSettings, port: str) -> list[Trouble]:
     """Troubles of a rig for these settings, the grave first."""
-    met = [*_of_the_link(facts, settings, port), *_of_the_camera(facts, settings), *_of_the_pictures(facts)]
-    met += _of_the_pose(facts, settings)
+    met = [*_of_the_link(facts, settings, port), *_of_the_views(facts, settings)]
+    for plane, camera in enumerate(facts.cameras):
+        if not camera.foreign:
+            met += _of_a_camera(camera, settings)
+        met += [*_of_the_pictures(camera), *_of_the_pose(camera, settings, plane)]
+    met += _of_the_age(facts, settings)
+    if facts.direction is not None and (astray := facts.direction.astray) is not None:
+        met.append(Trouble(True, astray.what.removeprefix("stopped: "), astray.fix))
     late = float(np.quantile(facts.woken, 0.99))
     if late > _WOKEN * settings.control_period:
         problem = f"one time in a hundred this computer wakes a tick {1e3 * late:.1f} ms late"
         met.append(Trouble(late > settings.safety.late, problem, TIMING_FIX[SCHEDULING]))
     return sorted(met, key=lambda trouble: not trouble.grave)
+
+
+def _of_the_views(facts: RigFacts, settings: HwRunSettings) -> list[Trouble]:
+    """Cameras that show the other one's markers."""
+    shown = [" and ".join(map(str, camera.foreign)) for camera in facts.cameras]
+    if all(shown):
+        problem = f"the cameras are exchanged: camera 1 shows markers {shown[0]}, camera 2 markers {shown[1]}"
+        return [Trouble(True, problem, f"--camera {settings.camera_2} --set camera_2={settings.camera}")]
+    return [
+        Trouble(
+            True,
+            f"camera {plane + 1} shows markers {ids}, which are those of camera {2 - plane}",
+            f"it must see markers {' and '.join(map(str, _ids(settings)[plane]))}: put it before their plane, or give "
+            f"the right one, {('--camera NUMBER', '--set camera_2=NUMBER')[plane]}",
+        )
+        for plane, ids in enumerate(shown)
+        if ids
+    ]
 
 
 def _of_the_link(facts: RigFacts, settings: HwRunSettings, port: str) -> list[Trouble]:
@@ -156,55 +247,72 @@ def _of_the_link(facts: RigFacts, settings: HwRunSettings, port: str) -> list[Tr
     return [Trouble(True, problem, fix)]
 
 
-def _of_the_camera(facts: RigFacts, settings: HwRunSettings) -> list[Trouble]:
-    pace, met = facts.pace, []
-    odd = [verdict for verdict in pace.verdicts if verdict is not SightingVerdict.OK]
-    for verdict in odd:
+def _of_a_camera(camera: CameraFacts, settings: HwRunSettings) -> list[Trouble]:
+    pace, met = camera.pace, []
+    usual = {SightingVerdict.OK, *(_OF_OBLIQUE if _is_too_oblique(camera.pose, settings) else ())}
+    for verdict in [verdict for verdict in pace.verdicts if verdict not in usual]:
         count, of = pace.verdicts[verdict], sum(pace.verdicts.values())
-        met.append(Trouble(count == of, f"{count} of {of} pictures: {verdict}", FIX[verdict]))
+        problem, fix = f"{count} of {of} pictures{pace.whose}: {verdict}", FIX[verdict].removesuffix(BY_CHECK)
+        met.append(Trouble(count == of, problem, fix))
     if not pace.verdicts:
-        return [Trouble(True, "the camera gives no pictures", "see its cable, and that no other program uses it")]
-    expected, hidden = settings.sensor.frame_rate, 0.0 if facts.latency is None else facts.latency.delay
+        return [Trouble(True, f"{pace.name} gives no pictures", "see its cable, and that no other program uses it")]
+    expected, hidden = settings.sensor.frame_rate, 0.0 if camera.latency is None else camera.latency.delay
     if pace.rate < _SLOW_CAMERA * expected:
-        problem = f"the camera gives {pace.rate:.3g} pictures/s; the loop's observer counts on {expected:g}"
+        problem = f"{pace.name} gives {pace.rate:.3g} pictures/s; the loop's observer counts on {expected:g}"
         fix = f"device.fourcc: MJPG, device.frame_rate, a shorter device.exposure; or sensor.frame_rate={pace.rate:.0f}"
         met.append(Trouble(False, problem, fix))
     try:
         pace.fits(settings.safety.stale, hidden)
     except CameraError as error:
         met.append(Trouble(True, error.what, error.fix))
-    if abs(hidden) > _UNSTAMPED:
-        delay = max(0.0, settings.device.delay + hidden)
-        problem = f"pictures are {1e3 * hidden:.0f} ms older than their time stamps say"
-        met.append(Trouble(False, problem, f"--set device.delay={delay:.4f}"))
     if pace.jitter * pace.rate > _UNEVEN:
-        problem = f"pictures come unevenly, +-{1e3 * pace.jitter:.0f} ms"
+        problem = f"pictures{pace.whose} come unevenly, +-{1e3 * pace.jitter:.0f} ms"
         met.append(Trouble(False, problem, "another USB port or hub, or a computer that does less besides"))
     return met
 
 
-def _of_the_pictures(facts: RigFacts) -> list[Trouble]:
-    quality = facts.quality
+def _of_the_age(facts: RigFacts, settings: HwRunSettings) -> list[Trouble]:
+    """Ages that stamps do not tell. One `device.delay` is for both of two cameras."""
+    aged = [(camera.pace, camera.latency.delay) for camera in facts.cameras if camera.latency is not None]
+    if not any(abs(hidden) > _UNSTAMPED for _, hidden in aged):
+        return []
+    ages = [hidden for _, hidden in aged]
+    said = " and ".join(f"pictures{pace.whose} are {1e3 * hidden:.0f} ms" for pace, hidden in aged)
+    delay = f"--set device.delay={max(0.0, settings.device.delay + float(np.mean(ages))):.4f}"
+    if max(ages) - min(ages) > 2.0 * _UNSTAMPED:
+        delay = f"cameras of one kind on ports alike, since device.delay is for both; until then {delay}"
+    return [Trouble(False, f"{said} older than their time stamps say", delay)]
+
+
+def _of_the_pictures(camera: CameraFacts) -> list[Trouble]:
+    quality, marker = camera.quality, f"the tip's marker{camera.pace.whose}"
     if quality is None:
         return []
     checks = [
-        (quality.side < _SMALL, f"the tip's marker is {quality.side:.0f} px wide", "nearer, or larger pictures: 40 px"),
-        (quality.blur > _BLURRED, f"its outline is blurred by {quality.blur:.1f} px", "focus (device.focus)"),
-        (quality.white > _BRIGHT, f"its rim is white ({quality.white:.0f} of 255)", "a shorter device.exposure"),
-        (quality.white - quality.black < _FAINT, "its print is faint", "more light, or a longer device.exposure"),
-    ]
+        (quality.side < _SMALL, f"{marker} is {quality.side:.0f} px wide", "nearer, or larger pictures: 40 px"),
+        (quality.blur > _BLURRED, f"{marker} is blurred by {quality.blur:.1f} px", "focus (device.focus)"),
+        (quality.white > _BRIGHT, f"the rim of {marker} is white ({quality.white:.0f} of 255)",
+         "a shorter device.exposure"),
+        (quality.white - quality.black < _FAINT, f"the print of {marker} is faint",
+         "more light, or a longer device.exposure"),
+    ]  # fmt: skip
     return [Trouble(False, problem, fix) for is_bad, problem, fix in checks if is_bad]
 
 
-def _of_the_pose(facts: RigFacts, settings: HwRunSettings) -> list[Trouble]:
-    pose, most = facts.pose, settings.homing.oblique_deg
+def _is_too_oblique(pose: CameraPose | None, settings: HwRunSettings) -> bool:
+    return pose is not None and pose.oblique > math.radians(settings.homing.oblique_deg)
+
+
+def _of_the_pose(camera: CameraFacts, settings: HwRunSettings, plane: int) -> list[Trouble]:
+    pose = camera.pose
     if pose is None:
         return []
     oblique = math.degrees(pose.oblique)
-    problem = f"the camera looks {oblique:.0f} deg off square at the bending plane"
+    problem = f"{camera.pace.name} looks {oblique:.0f} deg off square at the bending plane"
     checks = [
-        (oblique > _OBLIQUE_DEG, oblique > most, problem, OBLIQUE_FIX),
-        (pose.misfit > _MISFIT, False, f"the markers are no squares of one plane (by {100.0 * pose.misfit:.1f} %)",
+        (oblique > _OBLIQUE_DEG, _is_too_oblique(pose, settings), problem, OBLIQUE_FIX[plane]),
+        (pose.misfit > _MISFIT, False,
+         f"the markers{camera.pace.whose} are no squares of one plane (by {100.0 * pose.misfit:.1f} %)",
          "glue both flat on stiff flags in one plane, as far from the camera, of one print"),
     ]  # fmt: skip
     return [Trouble(grave, what, fix) for is_bad, grave, what, fix in checks if is_bad]

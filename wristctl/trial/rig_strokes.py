@@ -13,6 +13,7 @@ from wristctl.board.driver import Board
 from wristctl.board.messages import AXES, JOG_RATE, Flag, State, Target
 from wristctl.board.transport import underway
 from wristctl.config.hw_run import CalibrateWristSettings, RigSettings
+from wristctl.trial.expected_moves import Bend
 from wristctl.trial.motors_ready import in_sight, prepare
 from wristctl.trial.safety import SafetyStop
 from wristctl.trial.spools import spools_of
@@ -148,9 +149,9 @@ def _courses(strokes: Sequence[MotorStroke], rate: float, damping: float) -> lis
 
 # Strokes after which one may know enough; that are made at most.
 COUNT, MOST = 24, 96
-# Bend [rad] between which strokes go, the tendon and those opposite taut at both ends, which keeps the wrist linear: at
-# 3.5 deg they pull some 30 N against each other, at 6 deg 56 N, more than motors at 1 A hold; how much tendon [m] they
-# reel in at most, and how fast [m/s].
+# Bend [rad], in the plane that bends most, between which strokes go, the tendon and those opposite taut at both ends,
+# which keeps the wrist linear: at 3.5 deg they pull some 30 N against each other, at 6 deg 56 N, more than motors at
+# 1 A hold; how much tendon [m] they reel in at most, and how fast [m/s].
 _BEGUN, _ENDED, _LONGEST, _SPEED = math.radians(1.5), math.radians(3.5), 6e-3, 40e-3
 # Seconds between two points of a stroke's course.
 _SAMPLED = 1e-3
@@ -169,7 +170,8 @@ _STATUS_BYTES, _READ = 7, 0.08e-3
 class RigStrokes:
     """Strokes of one axis, which bends the wrist by `furthest` [rad] at most.
 
-    The board is enabled, and where the motors stand is called zero: no homing outlives this.
+    The board is enabled, and where the motors stand is called zero: no homing outlives this. In two planes both
+    cameras watch, and readings of the straight wrist are taken off their angles.
     """
 
     def __init__(
@@ -183,73 +185,85 @@ class RigStrokes:
         patient = settings.safety.model_copy(update={"watchdog": max(_SILENCE, settings.safety.watchdog)})
         prepare(board, settings.model_copy(update={"safety": patient}))
         board.home()
-        self._straight = Patience(board).angle(tracking, 10)
+        if settings.planes == 2:  # what one camera sees of a bend depends on the other
+            tracking.zero = Patience(board).markers(tracking, 10)
+        self._straight = Patience(board).reading(tracking, 10)
 
-    def strokes(self, progress: Callable[[int], None] = lambda count: None) -> Iterator[Sequence[MotorStroke]]:
-        """All strokes so far, whenever COUNT more are done, up to MOST; the tendon stays taut.
+    def strokes(
+        self, taut: int, progress: Callable[[int], None] = lambda count: None
+    ) -> Iterator[Sequence[Sequence[MotorStroke]]]:
+        """All strokes so far as each camera saw them, whenever COUNT more are done, up to MOST; the tendon stays taut.
 
-        Raises SafetyStop, BoardError and CameraError.
+        They begin from the position [steps] of `taken_up`. Raises SafetyStop, BoardError and CameraError.
         """
-        taut, _ = self.taken_up()
         sense = 1 if taut > 0 else -1
         low, _ = self._crept(taut, sense, _BEGUN, _LONGEST)
         high, _ = self._crept(low, sense, _ENDED, _LONGEST)
-        strokes, rng = list[MotorStroke](), np.random.default_rng(0)
-        while len(strokes) < MOST:
+        cameras, rng = [list[MotorStroke]() for _ in self._tracking.zero], np.random.default_rng(0)
+        for count in range(1, MOST + 1):
             self._watch(0, JOG_RATE, _BACK)  # slack: friction is to hold back already when the stroke begins
             self._watch(low, JOG_RATE, _SETTLED)
             # at random, so that strokes begin anywhere between two pictures
-            strokes.append(self._stroke(low, high, _BEFORE * rng.uniform(0.6, 1.4)))
-            progress(len(strokes))
-            if len(strokes) % COUNT == 0:
-                yield strokes
+            for strokes, stroke in zip(cameras, self._stroke(low, high, _BEFORE * rng.uniform(0.6, 1.4)), strict=True):
+                strokes.append(stroke)
+            progress(count)
+            if count % COUNT == 0:
+                yield cameras
 
     def let_go(self) -> None:
         """Back to where the motor stood at first."""
         self._board.go_to((0,) * AXES, JOG_RATE)
 
-    def taken_up(self) -> tuple[int, float]:
-        """The position [steps] at which the tendon bends the wrist a little, and the bend [rad].
+    def taken_up(self) -> tuple[int, Bend]:
+        """The position [steps] at which the tendon bends the wrist a little, and the bend, in one plane by its angle.
 
         The position's sign is the motor's sense. Raises SafetyStop where the tendon bends nothing.
         """
         for sense in (1, -1):
             position, bend = self._crept(0, sense, self._taut, self._slack)
-            if abs(bend) > self._taut:
+            if _largest(bend) > self._taut:
                 return position, bend
             self._watch(0, JOG_RATE, _REST)
         problem = f"axis {self._axis} does not bend the wrist within {1e3 * self._slack:g} mm"
         raise SafetyStop(problem, "one axis alone", "see its tendon and power; --axis tries another; homing.slack")
 
-    def _crept(self, begin: int, sense: int, wanted: float, most: float) -> tuple[int, float]:
-        """Reel in slowly, by `most` [m] at most, to a bend of `wanted` [rad]; position [steps] and bend [rad]."""
-        move, bend = max(1, round(_MOVE / self._step)), 0.0
+    def _crept(self, begin: int, sense: int, wanted: float, most: float) -> tuple[int, Bend]:
+        """Reel in slowly, by `most` [m] at most, to a bend of `wanted` [rad] in a plane; position [steps] and bend."""
+        move = max(1, round(_MOVE / self._step))
         for reeled in range(move, round(most / self._step) + move, move):
             self._watch(begin + sense * reeled, JOG_RATE, _REST)
-            if abs(bend := self._bend()) > wanted:
+            if _largest(bend := self._bend()) > wanted:
                 break
         return begin + sense * reeled, bend
 
-    def _bend(self) -> float:
-        bend = Patience(self._board).angle(self._tracking, 3) - self._straight
-        if abs(bend) > self._furthest:
-            problem = f"axis {self._axis} bent the wrist by {math.degrees(bend):.1f} deg"
+    def _bend(self) -> Bend:
+        reading = Patience(self._board).reading(self._tracking, 3)
+        bend = Bend(reading.theta - self._straight.theta, reading.beside - self._straight.beside)
+        if bend.askew > self._furthest:
+            problem = f"axis {self._axis} bent the wrist by {math.degrees(bend.askew):.1f} deg"
             raise SafetyStop(problem, fix="slacken all tendons")
         return bend
 
-    def _stroke(self, low: int, high: int, before: float) -> MotorStroke:
+    def _stroke(self, low: int, high: int, before: float) -> list[MotorStroke]:
+        """One stroke, as each camera saw it."""
         move = RampedMove(high - low, round(_SPEED / self._step), self._acceleration)
         still, moved = self._watch(low, JOG_RATE, before), self._watch(high, round(move.rate), _AFTER)
-        stamped, angle = np.concatenate([still[1], moved[1]]).T
+        seen = np.concatenate([still[1], moved[1]])
         time = np.arange(still[0][0, 0], moved[0][-1, 0], _SAMPLED)
         answered, steps = moved[0].T
         position = low + move.course(time - move.began(answered, steps - low))
-        if len(angle) and np.abs(angle - self._straight).max() > self._furthest:
+        straight, strokes, furthest = (self._straight.theta, self._straight.beside), list[MotorStroke](), list[float]()
+        for plane in range(len(self._tracking.zero)):
+            stamped, angle, _ = seen[seen[:, 2] == plane].T
+            furthest.append(float(np.abs(angle - straight[plane]).max(initial=0.0)))
+            strokes.append(MotorStroke(time, position, stamped, angle))
+        if math.hypot(*furthest) > self._furthest:
             raise SafetyStop(f"a stroke of axis {self._axis} bends the wrist too far", fix="slacken all tendons")
-        return MotorStroke(time, position, stamped, angle)
+        return strokes
 
     def _watch(self, goal: int, rate: int, seconds: float) -> tuple[np.ndarray, np.ndarray]:
-        """Go to `goal` and watch, so long and until it is there: positions and angles (n, 2), each after its time."""
+        """Go to `goal` and watch, so long and until it is there: positions (n, 2) after their times, and (m, 3) times,
+        angles and their planes."""
         board, clock = self._board, self._board.transport
         one, two, three, four = (goal * (k == self._axis) for k in range(AXES))
         board.send(Target((one, two, three, four), (rate,) * 4))
@@ -266,9 +280,14 @@ class RigStrokes:
                 board.ping()
                 fed = now
             usable = [sighting for sighting in self._tracking.look() if math.isfinite(sighting.theta)]
-            angles += [(sighting.time, sighting.theta) for sighting in usable]
+            angles += [(sighting.time, sighting.theta, sighting.plane) for sighting in usable]
             clock.wait(1e-3)
-        return np.array(positions, float).reshape(-1, 2), np.array(angles, float).reshape(-1, 2)
+        return np.array(positions, float).reshape(-1, 2), np.array(angles, float).reshape(-1, 3)
+
+
+def _largest(bend: Bend) -> float:
+    """Size [rad] of a bend in the plane that bends most."""
+    return max(abs(bend.theta), abs(bend.away) if math.isfinite(bend.away) else 0.0)
 
 
 class AxisTried(NamedTuple):
@@ -291,4 +310,4 @@ def axis_tried(testbed: Testbed, settings: CalibrateWristSettings, axis: int) ->
         strokes = RigStrokes(board, tracking, settings, axis, math.radians(settings.max_deg))
         steps, bend = strokes.taken_up()
         strokes.let_go()
-    return AxisTried(1 if steps > 0 else -1, abs(steps) * settings.actuator.step_length, bend)
+    return AxisTried(1 if steps > 0 else -1, abs(steps) * settings.actuator.step_length, bend.theta)

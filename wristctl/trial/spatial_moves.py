@@ -63,6 +63,10 @@ class SpatialMoves(ExpectedMoves):
         """Size of the bend [rad]."""
         return bend.askew
 
+    def place(self, axis: int) -> float:
+        """Direction [rad] in which an axis bends the wrist, from ulnar toward flexion."""
+        return math.atan2(self._toward[axis][1], self._toward[axis][0])
+
     def _off(self, bend: Bend) -> list[float]:
         """Angle between a bend and the direction of each axis [rad]."""
         unit = np.array(bend) / bend.askew
@@ -73,7 +77,7 @@ class SpatialMoves(ExpectedMoves):
         off = self._off(bend)
         if not off[axis] > self._astray:
             return
-        toward, meant = (math.degrees(math.atan2(y[1], y[0])) % 360.0 for y in (bend, self._toward[axis]))
+        toward, meant = (math.degrees(angle) % 360.0 for angle in (math.atan2(bend.away, bend.theta), self.place(axis)))
         nearest = int(np.argmin(off))
         tendon, other = ACTIVE[axis], ACTIVE[nearest]
         problem = f"axis {axis} bends the wrist toward {toward:.0f} deg, and tendon {tendon} is at {meant:.0f} deg"

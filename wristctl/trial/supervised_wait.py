@@ -18,7 +18,11 @@ from wristctl.trial.watch import Watch
 from wristctl.vision.camera_pose import CameraPose
 from wristctl.vision.marker import Sighting
 
-OBLIQUE_FIX = "set the camera square, or calibrate it: wristctl hw calibrate camera, then --optics"
+# What to do about an oblique camera, by the plane that it looks at.
+OBLIQUE_FIX = tuple(
+    f"set the camera square, or calibrate it: wristctl hw calibrate camera, then {option}"
+    for option in ("--optics", "--optics-2")
+)
 
 # A moment of waiting: comes back soon, to be called again, and raises what ends the wait.
 Meanwhile = Callable[[], None]
@@ -130,7 +134,7 @@ class Patience:
                     f"{which} looks {math.degrees(pose.oblique):.0f} deg off square at the bending plane, beyond "
                     f"{homing.oblique_deg:g} deg"
                 )
-                raise SafetyStop(problem, "homing", OBLIQUE_FIX)
+                raise SafetyStop(problem, "homing", OBLIQUE_FIX[plane])
         return tuple(poses)
 
     def _see(self, status: Status) -> None:

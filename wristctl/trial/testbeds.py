@@ -16,7 +16,7 @@ from wristctl.config.wrist import WristParameters
 from wristctl.seeds import Entropy
 from wristctl.trial.supervised_wait import Meanwhile
 from wristctl.trial.tracking import InlineTracking, Kept, PairedTracking, ThreadedTracking, Tracking
-from wristctl.vision.camera import Camera
+from wristctl.vision.camera import Camera, CameraError
 from wristctl.vision.device_camera import DeviceCamera
 from wristctl.vision.marker import Tracker
 from wristctl.vision.view import View
@@ -141,11 +141,20 @@ class RealTestbed:
 
     def __init__(self, settings: RigSettings, views: Sequence[View], keep: Kept | None, ask: Ask) -> None:
         self._settings, self._views, self._keep, self._ask = settings, views, keep, ask
+        sources = (settings.camera, settings.camera_2)[: settings.planes]
+        if len(set(sources)) < settings.planes:
+            problem = f"camera 1 and camera 2 are the same, {settings.camera}"
+            raise CameraError(problem, "camera_2", "--set camera_2=NUMBER of the camera at a right angle to the first")
         self.transport: Transport = open_transport(settings.port, settings.baud)
         self._cameras: list[DeviceCamera] = []
         try:
-            for source in (settings.camera, settings.camera_2)[: settings.planes]:
-                self._cameras.append(DeviceCamera(source, settings.device))
+            for number, source in enumerate(sources, 1):
+                try:
+                    self._cameras.append(DeviceCamera(source, settings.device))
+                except CameraError as error:
+                    if settings.planes == 1:
+                        raise
+                    raise error.of(number) from error
         except BaseException:
             self._close_devices()
             raise

@@ -12,7 +12,7 @@ import numpy as np
 
 from wristctl.arrays import Array
 from wristctl.loop_priority import beside_the_loop
-from wristctl.vision.camera import Camera, Frame
+from wristctl.vision.camera import Camera, CameraError, Frame
 from wristctl.vision.camera_pose import CameraPose
 from wristctl.vision.marker import Sighting, SightingVerdict, Tracker
 from wristctl.vision.two_views import bend_seen
@@ -204,7 +204,12 @@ class PairedTracking:
 
     def look(self) -> list[Sighting]:
         """Both cameras' sightings, by the time of capture. Raises the error that ended a camera's thread."""
-        sightings = [sighting for tracking in self._trackings for sighting in tracking.look()]
+        sightings = list[Sighting]()
+        for number, tracking in enumerate(self._trackings, 1):
+            try:
+                sightings += tracking.look()
+            except CameraError as error:
+                raise error.of(number) from error
         return sorted(sightings, key=lambda sighting: sighting.time)
 
     def bend(self, sighting: Sighting, other: float) -> float:

@@ -48,6 +48,10 @@ class CameraError(UserError):
     def __init__(self, what: str, where: str, fix: str) -> None:
         super().__init__(what, where, fix, exit_code=4)
 
+    def of(self, camera: int) -> "CameraError":
+        """The same, said of this camera of two."""
+        return CameraError(f"camera {camera}: {self.what}", self.where, self.fix)
+
 
 class VideoCamera:
     """The frames of a video file, one by one; `frame_rate` overrides the file's own. Raises CameraError."""
