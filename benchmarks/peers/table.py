@@ -61,3 +61,14 @@ SIDES = (
         f"{RIGID}; RK4 at n = 1, else implicit Euler, in Python", fine={1: 16, 4: 256}, most_steps=16, most_lanes=1,
     ),
 )  # fmt: skip
+
+ELASTIC = "elastic tendons"
+BEND_SIDES = (
+    Side(OURS, OURS, "wristctl_bends", None),
+    Side(
+        "wristctl, elastic tendons", ELASTIC, "wristctl_elastic_bends", None,
+        "the same wrist pulled by elastic tendons that motors reel in", fine={1: 16, 4: 16},
+    ),
+    Side("C, 8 lanes", "C", "c_bends", None, width=8),
+)  # fmt: skip
+"""Of the wrist that bends in two planes."""
