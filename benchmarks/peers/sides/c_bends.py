@@ -13,7 +13,7 @@ import numpy as np
 from compile_c import compiled
 from task import BendTask
 
-from wristctl.lanes.functions import E2, E3, SERIES_REACH, economised
+from wristctl.lanes.series import E2, E3, SERIES_REACH, economised
 
 SUMS = 13
 _DOUBLES = ctypes.POINTER(ctypes.c_double)
