@@ -15,8 +15,8 @@ from wristctl.wrist.segments import segments
 from wristctl.wrist.spatial.spatial_segments import spatial_values
 from wristctl.wrist.tendon_layout import TendonLayout
 
-WRIST = WristParameters(gravity=(-8.0, 4.0), gravity_flexion=4.0, flexion_ratio=1.5, stiffness_axis_deg=20.0)
-"""No symmetry: gravity across both planes, and springs whose soft axis lies in neither."""
+WRIST = WristParameters(gravity=(-8.0, 4.0), gravity_flexion=4.0, flexion_ratio=1.5)
+"""Its planes differ, in stiffness and in gravity."""
 PATH, SIZE_DEG, TURN = "circumduction", 25.0, 2.0
 
 
@@ -31,10 +31,10 @@ def loop_of(task: BendTask, steps: int, actuator: str = "ideal") -> Loop:
 
 def make_bend_task(n: int) -> BendTask:
     """The hand circles about the straight wrist by 25 degrees, a turn in 2 s, at 1 kHz."""
-    layout, axis = TendonLayout.of(WRIST), np.radians(WRIST.stiffness_axis_deg)
+    layout = TendonLayout.of(WRIST)
     return BendTask(
         n, PERIOD, WRIST.pretension, WRIST.tension_limit, bending_limit(WRIST),
-        spatial_values(WRIST, layout, n, axis=axis), spatial_values(WRIST, layout, 1, axis=axis),
+        spatial_values(WRIST, layout, n), spatial_values(WRIST, layout, 1),
         segments(in_plane(WRIST, "ulnar"), 1), segments(in_plane(WRIST, "flexion"), 1), np.array(GAINS),
         bend_path(PATH, SIZE_DEG, TURN, HORIZON - PERIOD),
     )  # fmt: skip

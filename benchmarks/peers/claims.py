@@ -25,6 +25,7 @@ _AT_EQUAL_ERROR = (
 _OF_C_IN_TWO_PLANES = {4: 0.75, 1: 0.65}
 """Share of the plain C loop's rate, by segments."""
 _OF_HELD_PULLS = 0.88
+_MUJOCO_IN_TWO_PLANES = 80.0
 _IN_TWO_PLANES = {(4, 64): 1200.0, (1, 64): 5800.0, (4, 1): 150.0, (1, 1): 1000.0}
 """Rates by segments and lanes on one core of a machine whose planar C loop of four segments does `_PLANAR`."""
 _PLANAR = 8500.0
@@ -77,7 +78,7 @@ def _ran(result: Result, peer: str, n: int) -> bool:
 
 
 def in_two_planes(result: Result, planar: Result) -> list[Claim]:
-    """Shares of the plain C loop and of held pulls on one core, and rates in proportion to the planar C loop's."""
+    """Shares of the plain C loop and of held pulls, times MuJoCo, and rates in proportion to planar C; on one core."""
     claims = []
     counts, lanes = result.axis("segments"), max(result.axis("lanes"))
     for n, least in _OF_C_IN_TWO_PLANES.items():
@@ -91,6 +92,11 @@ def in_two_planes(result: Result, planar: Result) -> list[Claim]:
         wanted = f"two planes, n = {n}, {lanes} lanes: elastic tendons at {100.0 * _OF_HELD_PULLS:.0f} % of held pulls"
         measured = f"{100.0 / held[0]:.0f} %" if held else "-"
         claims.append(Claim(wanted, measured, 1.0 / held[0] >= _OF_HELD_PULLS if held else None))
+    for n in counts:
+        found = result.ratio("MuJoCo", n, 1, lanes)
+        wanted = f"two planes, n = {n}, {lanes} lanes: {_MUJOCO_IN_TWO_PLANES:g} times MuJoCo at equal or smaller error"
+        measured = f"{found[0]:,.3g} times {found[1]}" if found else "-"
+        claims.append(Claim(wanted, measured, found[0] >= _MUJOCO_IN_TWO_PLANES if found else None))
     pace = _planar_pace(planar)
     for (n, lanes), least in _IN_TWO_PLANES.items():
         rate = result.own_rate(n, 1, lanes) if n in counts else None

@@ -115,7 +115,7 @@ def two_planes(result: Result) -> str:
         "mode control runs once for each plane at 1 kHz, with the gains above; what the planes do to each other is "
         "left to it. One allocation shares both torques among four tendons, and the bend is measured as it is. Gravity "
         f"is ({', '.join(f'{g:g}' for g in (*WRIST.gravity, WRIST.gravity_flexion))}) m/s^2, and springs are "
-        f"{WRIST.flexion_ratio:g} times as stiff across an axis at {WRIST.stiffness_axis_deg:g} degrees from ulnar. "
+        f"{WRIST.flexion_ratio:g} times as stiff toward flexion as toward ulnar. "
         "One core. wristctl keeps the whole motion of every lane, as it always does in two planes; C sums what metrics "
         f"are made of and keeps one lane's motion. Their coordinates differ by at most {apart or '-'} over the first "
         f"second; {SAME:g} rad would end the run. Error is the largest difference of a segment's bend over the first "
