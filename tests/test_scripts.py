@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import ast
+import subprocess
+import sys
 from importlib import import_module
 from pathlib import Path
 
@@ -29,3 +31,11 @@ def there(name: str) -> bool:
         return hasattr(import_module(module), attribute) or bool(import_module(name))
     except ModuleNotFoundError:
         return False
+
+
+def test_peers_read_the_wrists_equations_without_numba() -> None:
+    peers = ROOT / "benchmarks" / "peers"
+    program = (
+        f"import sys; sys.modules['numba'] = None; sys.path.insert(0, {str(peers)!r}); import equations, chain, task"
+    )
+    subprocess.run([sys.executable, "-c", program], check=True, cwd=ROOT)

@@ -7,7 +7,9 @@ easier problem) with the same stiffness in time.
 
 from __future__ import annotations
 
-from task import Task
+from collections.abc import Sequence
+
+from task import BendTask, Task
 
 
 def mjcf(task: Task, steps: int, tendons: bool, integrator: str) -> str:
@@ -37,8 +39,32 @@ def mjcf(task: Task, steps: int, tendons: bool, integrator: str) -> str:
         drive = f"<tendon>{routes}</tendon><actuator>{motors}</actuator>"
     else:
         drive = "<actuator>" + "".join(f'<motor joint="hinge{k}"/>' for k in range(1, n + 1)) + "</actuator>"
+    options = _options(task.period / steps, integrator, (gx, gy, 0.0))
+    return f"<mujoco>{options}<worldbody>{sites(0, 0.0)}{bodies}{ends}</worldbody>{drive}</mujoco>"
+
+
+def universal(task: BendTask, steps: int, integrator: str) -> str:
+    """MuJoCo's model in two planes: hinges toward +y and +z in the middle of each segment, a motor on each.
+
+    Of springs and dampers along both planes.
+    """
+    length, mass, hand, beyond, _, stiff_y, _, stiff_z, damp_y, _, damp_z, *gravity = task.plant[:14]
+    n, bodies, motors = task.segments, "", ""
+    for k in range(1, n + 1):
+        inertial = (hand, 0.5 * length + beyond) if k == n else (mass, length)
+        bodies += f'<body pos="{0.5 * length if k == 1 else length} 0 0">'
+        for name, axis, stiffness, damping in (("y", "0 0 1", stiff_y, damp_y), ("z", "0 -1 0", stiff_z, damp_z)):
+            bodies += (
+                f'<joint name="{name}{k}" type="hinge" axis="{axis}" stiffness="{stiffness}" damping="{damping}"/>'
+            )
+            motors += f'<motor joint="{name}{k}"/>'
+        bodies += f'<inertial mass="{inertial[0]}" pos="{inertial[1]} 0 0" diaginertia="1e-12 1e-12 1e-12"/>'
+    world = f"<worldbody>{bodies}{'</body>' * n}</worldbody><actuator>{motors}</actuator>"
+    return f"<mujoco>{_options(task.period / steps, integrator, gravity)}{world}</mujoco>"
+
+
+def _options(step: float, integrator: str, gravity: Sequence[float]) -> str:
     return (
-        f'<mujoco><compiler autolimits="true"/><option timestep="{task.period / steps:.17g}" integrator="{integrator}" '
-        f'gravity="{gx} {gy} 0"><flag contact="disable" constraint="disable"/></option>'
-        f"<worldbody>{sites(0, 0.0)}{bodies}{ends}</worldbody>{drive}</mujoco>"
+        f'<compiler autolimits="true"/><option timestep="{step:.17g}" integrator="{integrator}" '
+        f'gravity="{" ".join(map(str, gravity))}"><flag contact="disable" constraint="disable"/></option>'
     )

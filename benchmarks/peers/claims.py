@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from rates import Result
+from table import ELASTIC
 
 _AT_EQUAL_ERROR = (
     # peer, segments, lanes, all cores, least ratio
@@ -21,6 +22,13 @@ _AT_EQUAL_ERROR = (
     ("JAX", 1, 1, False, 5.0),
     ("JAX", 4, 1, False, 5.0),
 )
+_OF_C_IN_TWO_PLANES = {4: 0.75, 1: 0.65}
+"""Share of the plain C loop's rate, by segments."""
+_OF_HELD_PULLS = 0.88
+_MUJOCO_IN_TWO_PLANES = 80.0
+_IN_TWO_PLANES = {(4, 64): 1200.0, (1, 64): 5800.0, (4, 1): 150.0, (1, 1): 1000.0}
+"""Rates by segments and lanes on one core of a machine whose planar C loop of four segments does `_PLANAR`."""
+_PLANAR = 8500.0
 
 
 @dataclass(frozen=True)
@@ -67,6 +75,46 @@ def beside_peers(result: Result) -> list[Claim]:
 
 def _ran(result: Result, peer: str, n: int) -> bool:
     return any(variant.peer == peer for variant in result.variants(n))
+
+
+def in_two_planes(result: Result, planar: Result) -> list[Claim]:
+    """Shares of the plain C loop and of held pulls, times MuJoCo, and rates in proportion to planar C; on one core."""
+    claims = []
+    counts, lanes = result.axis("segments"), max(result.axis("lanes"))
+    for n, least in _OF_C_IN_TWO_PLANES.items():
+        share = result.ratio("C", n, 1, lanes) if n in counts else None
+        wanted = f"two planes, n = {n}, {lanes} lanes: {100.0 * least:.0f} % of the plain C loop's rate"
+        measured = f"{100.0 * share[0]:.0f} % of {share[1]}" if share else "-"
+        claims.append(Claim(wanted, measured, share[0] >= least if share else None))
+    for n in counts:
+        # wristctl over it: held pulls over elastic tendons
+        held = result.ratio(ELASTIC, n, 1, lanes, equal=False)
+        wanted = f"two planes, n = {n}, {lanes} lanes: elastic tendons at {100.0 * _OF_HELD_PULLS:.0f} % of held pulls"
+        measured = f"{100.0 / held[0]:.0f} %" if held else "-"
+        claims.append(Claim(wanted, measured, 1.0 / held[0] >= _OF_HELD_PULLS if held else None))
+    for n in counts:
+        found = result.ratio("MuJoCo", n, 1, lanes)
+        wanted = f"two planes, n = {n}, {lanes} lanes: {_MUJOCO_IN_TWO_PLANES:g} times MuJoCo at equal or smaller error"
+        measured = f"{found[0]:,.3g} times {found[1]}" if found else "-"
+        claims.append(Claim(wanted, measured, found[0] >= _MUJOCO_IN_TWO_PLANES if found else None))
+    pace = _planar_pace(planar)
+    for (n, lanes), least in _IN_TWO_PLANES.items():
+        rate = result.own_rate(n, 1, lanes) if n in counts else None
+        where = f"two planes, n = {n}, {lanes} lane{'s' if lanes > 1 else ''}"
+        wanted = f"{where}: {least:,.0f} simulated s/s where planar C, n = 4, does {_PLANAR:,.0f}"
+        if rate is None or pace is None:
+            claims.append(Claim(wanted, "-", None))
+            continue
+        measured = f"{rate:,.0f}, {rate / pace:,.0f} in proportion (planar C: {pace * _PLANAR:,.0f})"
+        claims.append(Claim(wanted, measured, rate >= least * pace))
+    return claims
+
+
+def _planar_pace(planar: Result) -> float | None:
+    """Rate of the fastest planar C loop of four segments on one core, over `_PLANAR`."""
+    lanes = max(planar.axis("lanes"), default=0)
+    rates = [planar.rate(variant, 4, 1, lanes) for variant in planar.variants(4) if variant.peer == "C"]
+    return max((rate for rate in rates if rate), default=0.0) / _PLANAR or None
 
 
 def of_costs(costs: dict[str, Any]) -> list[Claim]:

@@ -10,7 +10,9 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from claims import Claim, beside_peers, of_cold_start, of_costs
+from bend_truth import SIZE_DEG, TURN, WRIST
+from bends import FINE, SAME
+from claims import Claim, beside_peers, in_two_planes, of_cold_start, of_costs
 from picture import figure
 from rates import Result
 from report import claims_table, markdown
@@ -104,6 +106,27 @@ def roofline(result: Result) -> str:
     return "\n".join(lines)
 
 
+def two_planes(result: Result) -> str:
+    """The same comparison for the wrist that bends in two planes."""
+    apart = ", ".join(f"{apart:.1e} rad (n = {n})" for n, apart in result.raw["apart"].items())
+    lines = [
+        "## Two planes\n",
+        f"The hand circles about the straight wrist by {SIZE_DEG:g} degrees, a turn in {TURN:g} s. The paper's sliding "
+        "mode control runs once for each plane at 1 kHz, with the gains above; what the planes do to each other is "
+        "left to it. One allocation shares both torques among four tendons, and the bend is measured as it is. Gravity "
+        f"is ({', '.join(f'{g:g}' for g in (*WRIST.gravity, WRIST.gravity_flexion))}) m/s^2, and springs are "
+        f"{WRIST.flexion_ratio:g} times as stiff toward flexion as toward ulnar. "
+        "One core. wristctl keeps the whole motion of every lane, as it always does in two planes; C sums what metrics "
+        f"are made of and keeps one lane's motion. Their coordinates differ by at most {apart or '-'} over the first "
+        f"second; {SAME:g} rad would end the run. Error is the largest difference of a segment's bend over the first "
+        f"second from wristctl's motion with {FINE} steps a tick; for a side that solves other equations, from its own "
+        "motion with much smaller steps.\n",
+        *(f"- {side}: {of['problem']}" for side, of in result.raw["sides"].items()),
+    ]  # fmt: skip
+    lines += [f"- left out: {line}" for line in result.failures()]
+    return "\n".join(lines) + "\n\n" + markdown(result)
+
+
 def cold_start(rows: dict[str, Any]) -> str:
     """Seconds of each command."""
     lines = ["## Cold start\n"]
@@ -151,7 +174,12 @@ def main() -> None:
     found = {name: json.loads(file.read_text()) for name, file in read.items() if file.exists()}
     result = Result(found["peers"])
     claims: list[Claim] = beside_peers(result)
-    parts = [markdown(result), roofline(result)]
+    parts = [markdown(result)]
+    if "bends" in result.raw:
+        bends = Result(result.raw["bends"])
+        claims += in_two_planes(bends, result)
+        parts.append(two_planes(bends))
+    parts.append(roofline(result))
     for name, claimed, section in (
         ("cost_model", of_costs, cost_model), ("cold_start", of_cold_start, cold_start),
     ):  # fmt: skip

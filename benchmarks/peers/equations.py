@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
-from wristctl.lanes.functions import E2, E3
+from wristctl.lanes.series import E2, E3
 
 
 class Segment(NamedTuple):
@@ -92,11 +92,16 @@ def one_segment(s: Segment, theta: Any, rate: Any) -> Any:
     return inertia, curving * rate * rate - falling + s.damping * rate + s.stiffness * theta
 
 
-def pulls(xp: Any, model: Segment, gains: Any, low: Any, high: Any, theta: Any, rate: Any, theta_ref: Any) -> Any:
-    """The sliding mode law and its tension pair: pulls of the + and the - side [N]."""
+def sliding_mode(xp: Any, model: Segment, gains: Any, theta: Any, rate: Any, theta_ref: Any) -> Any:
+    """Torque that the sliding mode law wants [N m]."""
     inertia, load = one_segment(model, theta, rate)
     sigma = gains[0] * (theta - theta_ref) + gains[1] * rate
-    wanted = load - inertia / gains[1] * (gains[0] * rate + gains[2] * xp.tanh(sigma))
+    return load - inertia / gains[1] * (gains[0] * rate + gains[2] * xp.tanh(sigma))
+
+
+def pulls(xp: Any, model: Segment, gains: Any, low: Any, high: Any, theta: Any, rate: Any, theta_ref: Any) -> Any:
+    """The sliding mode law and its tension pair: pulls of the + and the - side [N]."""
+    wanted = sliding_mode(xp, model, gains, theta, rate, theta_ref)
     plus, minus = arms(theta, model)
     forward = wanted > (plus + minus) * low
     pull_plus = xp.where(forward, (wanted - minus * low) / plus, low)

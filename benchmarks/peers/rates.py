@@ -38,7 +38,7 @@ class Result:
     def variants(self, segments: int) -> list[Variant]:
         """All that have a rate, in the order of the table of sides."""
         found = []
-        for side, known in self.raw["errors"][str(segments)].items():
+        for side, known in self.raw["errors"].get(str(segments), {}).items():
             steps = {row["steps"] for row in self._rows(side, segments) if "rate" in row}
             for count in sorted(steps):
                 error = {int(key): value for key, value in known["errors"].items()}[count]

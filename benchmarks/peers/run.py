@@ -18,19 +18,17 @@ from typing import Any
 
 import numpy as np
 import truth
-from claims import beside_peers
-from errors import errors
+from bends import two_planes
+from claims import beside_peers, in_two_planes
+from errors import errors, variants
 from measure import speeds
 from picture import figure
 from rates import Result
 from report import claims_table, markdown
 from roofline import operations, peaks, scratch
 from say import say
-from table import OURS, SIDES, Side
+from table import BEND_SIDES, OURS, SIDES, Side
 from venvs import CACHE, HERE, python_of
-
-BLOWN_UP = 0.1
-"""Error [rad] beyond which a step is no solution."""
 
 
 def machine() -> dict[str, Any]:
@@ -62,17 +60,6 @@ def installed(sides: tuple[Side, ...]) -> tuple[tuple[Side, ...], dict[str, str]
     for name, why in missing.items():
         say(f"left out: {name}: {why}")
     return tuple(side for side in sides if side.name not in missing), missing
-
-
-def variants(sides: tuple[Side, ...], found: dict[str, Any]) -> list[tuple[Side, int]]:
-    """Each side with one step a tick, unless that blows up, and with the steps that reach wristctl's error."""
-    pairs = []
-    for side in sides:
-        if "errors" in found[side.name]:
-            errors_by_steps = found[side.name]["errors"]
-            steps = {1, found[side.name]["steps"]}
-            pairs += [(side, count) for count in sorted(steps) if errors_by_steps[count] < BLOWN_UP]
-    return pairs
 
 
 def main() -> None:
@@ -112,8 +99,13 @@ def main() -> None:
             pairs = variants(present, found)
             raw["speeds"] += speeds(pairs, file, n, threads, options.lanes, options.budget, options.rounds)
             (options.out / "peers.json").write_text(json.dumps(raw, indent=1) + "\n")
+    chosen = tuple(side for side in BEND_SIDES if not options.sides or side.name in (OURS, *options.sides))
+    raw["bends"] = two_planes(*installed(chosen), options.segments, options.budget, options.rounds)
+    (options.out / "peers.json").write_text(json.dumps(raw, indent=1) + "\n")
     result = Result(json.loads(json.dumps(raw)))
-    text = claims_table(beside_peers(result)) + "\n" + markdown(result)
+    bends = Result(result.raw["bends"])
+    claims = beside_peers(result) + in_two_planes(bends, result)
+    text = claims_table(claims) + "\n" + markdown(result) + "\n## Two planes\n\n" + markdown(bends)
     (options.out / "peers.md").write_text(text)
     figure(result, options.out / "peers")
     print(text)

@@ -47,7 +47,7 @@ class Running:
         )  # fmt: skip
 
     def ask(self, lanes: int, ticks: int, repeats: int = 1, theta: bool = False) -> dict[str, Any]:
-        """Seconds of `repeats` rollouts of `ticks` control periods, and the first lane's tip angles if asked for.
+        """Seconds of `repeats` rollouts of `ticks` control periods, and the first lane's motion if asked for.
 
         Failed where the process ended or the answer takes longer than PATIENCE.
         """

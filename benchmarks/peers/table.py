@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 
 SAME = "the same equations"
 RIGID = "easier: rigid links, one hinge a segment, no arcs"
+UNIVERSAL = "easier: rigid links, one universal joint a segment, no arcs, no tendons"
 OURS = "wristctl"
 
 
@@ -61,3 +62,22 @@ SIDES = (
         f"{RIGID}; RK4 at n = 1, else implicit Euler, in Python", fine={1: 16, 4: 256}, most_steps=16, most_lanes=1,
     ),
 )  # fmt: skip
+
+ELASTIC = "elastic tendons"
+BEND_SIDES = (
+    Side(OURS, OURS, "wristctl_bends", None),
+    Side(
+        "wristctl, elastic tendons", ELASTIC, "wristctl_elastic_bends", None,
+        "the same wrist pulled by elastic tendons that motors reel in", fine={1: 16, 4: 16},
+    ),
+    Side("C, 8 lanes", "C", "c_bends", None, width=8),
+    Side(
+        "MuJoCo, chain", "MuJoCo", "mujoco_bends", "mujoco", f"{UNIVERSAL}; first order, implicit in damping",
+        fine={1: 4096, 4: 4096}, most_steps=512,
+    ),
+    Side(
+        "MuJoCo, chain, RK4", "MuJoCo", "mujoco_bends_rk4", "mujoco", f"{UNIVERSAL}; explicit, fourth order",
+        fine={1: 64, 4: 2048}, most_steps=512,
+    ),
+)  # fmt: skip
+"""Of the wrist that bends in two planes."""

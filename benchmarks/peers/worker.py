@@ -2,7 +2,7 @@
 
 A side is a module in sides/ with `prepare(task, lanes, threads, steps) -> run`, where `run(ticks)` does that many
 control periods of all lanes from rest and returns the first lane's tip angle at each tick (wristctl: only where one
-lane runs). `steps` is the number of integration steps in one control period.
+lane runs), in two planes its coordinates. `steps` is the number of integration steps in one control period.
 """
 
 from __future__ import annotations

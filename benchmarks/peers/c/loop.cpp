@@ -2,6 +2,7 @@
  *
  * Same equations, law, allocation, step and running metrics as wristctl's kernel; built for SEGMENTS and LANES. */
 #include <pthread.h>
+#include "wrist.h"
 #include "rodas3.h"
 
 enum { SQUARED, MOVE, EXIT, ABSOLUTE, LATE, LATE_COUNT, EXIT2, EXIT5, OVER, PEAK, TENSION, VARIATION, SATURATED, SLACK,
@@ -20,29 +21,6 @@ struct work {
     int rollouts, ticks, substeps;
     int next;
 };
-
-INLINE segment wrist_of(const double *v)
-{
-    return segment{v[0], v[1], v[2], v[3], v[4], v[5], v[6], v[7], v[8], v[9], v[10], v[11]};
-}
-
-/* inertia and load of the one-segment model, as wristctl.control.model */
-INLINE lane sliding_mode(const segment *m, lane theta, lane rate, lane theta_ref, const lane *gain)
-{
-    lane x = 0.5 * theta;
-    bessels b = bessel(x);
-    lane c = m->length * b.e0, c1 = -0.5 * m->length * x * b.e1, c2 = 0.25 * m->length * (b.s * b.e2 - b.e1);
-    plane half_turn = planar(b.e0 - b.s * b.e1, x * b.e0), hand = mul(m->hand_offset, half_turn);
-    plane chord = planar(c1, 0.5 * c), bent = planar(c2 - 0.25 * c, c1);
-    plane along = add(chord, turn(hand)), hand_bent = sub(bent, hand), g = planar(m->gravity_x, m->gravity_y);
-    lane inertia = 0.25 * m->mass * dot(chord, chord) + m->hand_mass * dot(along, along);
-    lane curving = 0.25 * m->mass * dot(chord, bent) + m->hand_mass * dot(along, hand_bent);
-    plane weight = planar(dot(g, half_turn), dot(g, turn(half_turn)));
-    lane falling = dot(add(mul(0.5 * m->mass, chord), mul(m->hand_mass, along)), weight);
-    lane load = curving * rate * rate - falling + m->damping * rate + m->stiffness * theta;
-    lane sigma = gain[0] * (theta - theta_ref) + gain[1] * rate;
-    return load - inertia / gain[1] * (gain[0] * rate + gain[2] * hyperbolic_tangent(sigma));
-}
 
 INLINE void gather(lane *s, const work *job, double time, lane theta, double theta_ref, lane plus, lane minus, lane out)
 {
@@ -71,7 +49,7 @@ INLINE void gather(lane *s, const work *job, double time, lane theta, double the
 
 static void block(work *job, int first)
 {
-    const segment plant = wrist_of(job->plant), model = wrist_of(job->model);
+    const segment plant = segment_of(job->plant), model = segment_of(job->model);
     const lane low = job->low, high = job->high, one = 1.0;
     const lane half = 0.5 * model.length / model.spans, share = 0.5 / model.spans;
     lane theta[N], omega[N], old_theta[N], gain[3], sum[SUMS];
@@ -100,7 +78,7 @@ static void block(work *job, int first)
         if (job->record && first == 0) job->record[tick] = ((double *)&angle)[0];
         for (int i = 0; i < job->substeps; i++) {
             EACH(i) old_theta[i] = theta[i];
-            step(&plant, theta, omega, plus, minus, job->period / job->substeps);
+            step(&plant, theta, omega, tendons{plus, minus}, job->period / job->substeps);
             EACH(i) sum[ALIVE] = where(size(theta[i]) < 6.283185307179586, sum[ALIVE], 0.0);
             EACH(i) {
                 theta[i] = where(sum[ALIVE] > 0.0, theta[i], old_theta[i]);

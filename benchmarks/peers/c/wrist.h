@@ -1,26 +1,23 @@
-/* The wrist's equation of motion, its exact Jacobian and one step of RODAS3, formula by formula as in wristctl.wrist. */
-#include "lanes.h"
+/* The planar wrist's equation of motion and its exact Jacobian, formula by formula as in wristctl.wrist. */
+#include "segment.h"
 #define N SEGMENTS
 #define EACH(k) _Pragma("GCC unroll 8") for (int k = 0; k < N; k++)
 #define BACK(k) _Pragma("GCC unroll 8") for (int k = N - 1; k >= 0; k--)
 #define BELOW(i, j) _Pragma("GCC unroll 8") for (int i = 0; i < j; i++)
-#define ABOVE(i, k) _Pragma("GCC unroll 8") for (int i = k + 1; i < N; i++)
 
-struct segment {
-    lane length, mass, hand_mass, hand_offset, gravity_x, gravity_y, tendon_offset, spans, stiffness, damping,
-        force_x, force_y;
-};
-
+enum { COORDINATES = N };
+typedef segment wrist;
+struct tendons { lane plus, minus; }; /* pulls of both sides [N] */
 struct posture { /* a posture: chords with derivatives, last tangent, tendon torque and its slope */
     plane z[N], dz[N], d2z[N], d3z[N], tangent;
     lane pull[N], slope[N];
 };
 
-INLINE void bend(const segment *s, const lane *theta, lane plus, lane minus, posture *p)
+INLINE void bend(const segment *s, const lane *theta, tendons pulls, posture *p)
 {
     plane tangent = planar(1.0, 0.0);
     const lane share = 1.0 / s->spans, half = 0.5 * s->length * share;
-    const lane bending = s->tendon_offset * (plus - minus), squeeze = half * (plus + minus);
+    const lane bending = s->tendon_offset * (pulls.plus - pulls.minus), squeeze = half * (pulls.plus + pulls.minus);
     EACH(k) {
         lane x = 0.5 * theta[k];
         bessels b = bessel(x);
@@ -88,7 +85,7 @@ INLINE void bias(const segment *s, const lane *theta, const lane *omega, const p
     }
 }
 
-INLINE void jacobians(const segment *s, const lane *omega, const lane *acceleration, const posture *at,
+INLINE void jacobians(const segment *s, const lane *, const lane *omega, const lane *acceleration, const posture *at,
                       lane by_theta[N][N], lane by_rate[N][N])
 {
     const plane *z = at->z, *dz = at->dz, *d2z = at->d2z, *d3z = at->d3z;

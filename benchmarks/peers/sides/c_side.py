@@ -11,7 +11,7 @@ import numpy as np
 from compile_c import compiled
 from task import Task
 
-from wristctl.lanes.functions import E2, E3
+from wristctl.lanes.series import E2, E3
 
 SUMS = 19
 _DOUBLES = ctypes.POINTER(ctypes.c_double)

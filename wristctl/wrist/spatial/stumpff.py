@@ -9,8 +9,8 @@ from math import factorial
 from typing import Any, NamedTuple
 
 from wristctl.lanes.compiled import compiled
-from wristctl.lanes.functions import SERIES_REACH, economised
 from wristctl.lanes.lane import polynomial
+from wristctl.lanes.series import SERIES_REACH, economised
 
 _TERMS = 8
 
