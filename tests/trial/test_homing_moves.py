@@ -375,3 +375,27 @@ def test_a_tendon_that_sticks_is_refused() -> None:
     wrist.tracking = Marker(wrist.board, angle)
     with pytest.raises(SafetyStop, match=r"tendon 1 sticks: 0\.44 mm between reeling in and letting go"):
         wrist.homed()
+
+
+def test_a_wrist_that_stays_bent_may_take_more_and_fewer_steps_but_never_twice_or_half_as_many() -> None:
+    """Emulated rigs with inner friction to 0.02 N m take 0.84 to 1.65 times the steps of the model."""
+    expected, stays = ExpectedMoves(settings_of(), WRIST, "ulnar"), math.radians(0.5)
+    model = expected.steps()
+    for ratio, still, rubbing in ((1.0, True, True), (0.84, False, True), (1.65, False, True), (1.95, False, False),
+                                  (0.55, False, False)):  # fmt: skip
+        assert expected.has_steps(ratio * model) == expected.has_steps(ratio * model, 0.1 * stays) == still
+        assert expected.has_steps(ratio * model, stays) == rubbing
+        if not still:
+            with pytest.raises(SafetyStop, match="steps for one radian"):
+                expected.judge_steps(2, ratio * model)
+        if rubbing:
+            expected.judge_steps(2, ratio * model, stays)
+
+
+def test_a_wrist_that_stays_bent_may_begin_with_a_tendon_that_much_tighter() -> None:
+    expected, homing, stays = ExpectedMoves(settings_of(), WRIST, "ulnar"), Homing(), math.radians(2.0)
+    stretch = WRIST.stiffness * stays / (WRIST.tendon_offset * settings_of().safety.softest)
+    expected.judge_slack(1, -homing.taut - 0.5 * stretch, stays)
+    for slack, stood in ((-homing.taut - 0.5 * stretch, 0.0), (-homing.taut - 1.1 * stretch, stays)):
+        with pytest.raises(SafetyStop, match="was taut by"):
+            expected.judge_slack(1, slack, stood)

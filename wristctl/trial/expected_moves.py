@@ -14,10 +14,13 @@ from wristctl.trial.supervised_wait import Reading
 from wristctl.wrist.directions import ACTIVE, DIRECTIONS, away_of, in_plane
 from wristctl.wrist.out_of_plane import across_of
 
-# Springs that are stiffer than believed and friction may ask for so many times the pull that the model says.
-_HARDER = 1.5
+# Springs that are stiffer than believed and friction may ask for so many times the pull that the model says, and with
+# friction of the wrist's own; twice the steps stay wrong.
+_HARDER, _RUBBING = 1.5, 2.5
 # Shares of the believed bend that a small move may make: soft tendons and where zero was found.
 LEAST, MOST = 0.6, 1.35
+# Share of the least bend by which a wrist that nothing pulls may stand off without friction of its own.
+_RUBS = 0.5
 # Share of the least bend that a wrist without a taut tendon may move by: noise, and springs that creep.
 SLACK = 0.7
 _SCREWED = "check which tendon is on which motor, and markers.positive"
@@ -114,14 +117,23 @@ class ExpectedMoves:
         self.judge_side(axis, moved)
         return math.nan
 
-    def has_steps(self, steps: float) -> bool:
-        """Whether steps per radian are those of the model, within `homing.steps_tolerance`."""
-        share = self._homing.steps_tolerance
-        return (1.0 - share) * self.steps() <= steps <= (1.0 + share) * self.steps(self._softest, _HARDER)
+    def _stretch(self, stays: float) -> float:
+        """By how much friction that holds a wrist bent by `stays` [rad] stretches the softest tendon [m]."""
+        return self._stiffness * stays / (self._offset * self._softest)
 
-    def judge_steps(self, axis: int, steps: float) -> None:
+    def has_steps(self, steps: float, stays: float = 0.0) -> bool:
+        """Whether steps per radian are those of the model, within `homing.steps_tolerance`.
+
+        Within twice of it where the wrist stays bent by `stays` [rad] when nothing pulls: friction inside bears a part
+        of a small bend, and holds the wrist across its plane, so that a tendon bends it in the plane alone.
+        """
+        rubs = stays > _RUBS * math.radians(self._homing.bend_deg)
+        share, harder = (2.0 if rubs else 1.0) * self._homing.steps_tolerance, _RUBBING if rubs else _HARDER
+        return (1.0 - share) * self.steps() <= steps <= (1.0 + share) * self.steps(self._softest, harder)
+
+    def judge_steps(self, axis: int, steps: float, stays: float = 0.0) -> None:
         """Raises SafetyStop where steps per radian are not those of the model, as `has_steps`."""
-        if self.has_steps(steps):
+        if self.has_steps(steps, stays):
             return
         fix = (
             "see the DIP switches of the drive and actuator.microstep, and measure the pulley (actuator.pulley_radius)"
@@ -134,9 +146,13 @@ class ExpectedMoves:
         )
         raise SafetyStop(problem, "homing", fix)
 
-    def judge_slack(self, axis: int, slack: float) -> None:
-        """Raises SafetyStop where a tendon was taut before anything was reeled in."""
-        if slack >= -self._homing.taut:
+    def judge_slack(self, axis: int, slack: float, stays: float = 0.0) -> None:
+        """Raises SafetyStop where a tendon was taut before anything was reeled in.
+
+        A wrist that stays bent by `stays` [rad] when nothing pulls has friction of its own, which stretches the tendon
+        by which its taut point is found.
+        """
+        if slack >= -self._homing.taut - self._stretch(stays):
             return
         problem = f"tendon {ACTIVE[axis]} was taut by {-1e3 * slack:.2f} mm when homing began"
         raise SafetyStop(problem, "homing", "slacken all tendons first: wristctl hw slacken, or by hand")
@@ -147,7 +163,7 @@ class ExpectedMoves:
         A wrist that stays bent by up to `stays` [rad] when nothing pulls has friction of its own, which stretches a
         tendon by as much once more each way.
         """
-        if friction <= self._homing.sticks + 2.0 * self._stiffness * stays / (self._offset * self._softest):
+        if friction <= self._homing.sticks + 2.0 * self._stretch(stays):
             return
         problem = f"tendon {ACTIVE[axis]} sticks: {1e3 * friction:.2f} mm between reeling in and letting go"
         fix = "see whether it chafes or its sheath is bent sharply; or raise homing.sticks"

@@ -129,7 +129,7 @@ class _Finder:
         self._at, self._signs = np.zeros(AXES, int), np.ones(AXES, int)
         self._bend = math.radians(settings.bend_deg)
         self._straight = Patience(board).reading(tracking, 4 * settings.frames)
-        self._rest = expected.bend(self._straight, self._straight)
+        self._rest, self._stays = expected.bend(self._straight, self._straight), 0.0
         self.directions = [math.nan] * AXES
         """Direction of each axis that has been measured in two planes [rad]."""
 
@@ -171,9 +171,9 @@ class _Finder:
         Steps that are not the model's are measured once more, with more time for each reading, before they are judged.
         """
         measured = self._measured(axis, about, 1)
-        if not self._expected.has_steps(measured.per_radian):
+        if not self._expected.has_steps(measured.per_radian, self._stays):
             measured = self._measured(axis, about, _AGAIN)
-        self._expected.judge_steps(axis, measured.per_radian)
+        self._expected.judge_steps(axis, measured.per_radian, self._stays)
         return measured
 
     def _measured(self, axis: int, about: int, slowly: int) -> _Line:
@@ -200,7 +200,7 @@ class _Finder:
         friction = (along(axis, back) - offset) / slope - reeled[0] if held else 0.0
         line = _Line(float(slope), float(offset), float(friction), self._rest)
         if reeled[0] <= 0:  # it bends the wrist where it was at the start: the line alone may err by friction
-            self._expected.judge_slack(axis, line.taut(0.0) * self._spools.step)
+            self._expected.judge_slack(axis, line.taut(0.0) * self._spools.step, self._stays)
         return line
 
     def settle(self, taut: Sequence[float]) -> tuple[int, ...]:
@@ -223,8 +223,10 @@ class _Finder:
         return bend
 
     def _let_go(self, axis: int, reeled: int) -> None:
+        """Let an axis go, and read the wrist: how far it stays bent is by friction of its own."""
         self._reel(axis, reeled)
         self._rest = self._rests()
+        self._stays = max(self._stays, self._expected.size(self._rest))
 
     def _rests(self) -> Bend:
         rest = rest_of(self._board, self._tracking, self._expected, self._settings)
