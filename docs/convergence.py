@@ -198,12 +198,13 @@ def page(found: list[Drawn], rows: dict[str, tuple[int, int, list[Changed]]], li
             f"| {each.label} | {int(each.one_off.sum())} | {each.silent} | {int(each.marked.sum())} | {counts} |"
         )
     how = """A rollout is in doubt where the sum of its steps' estimated errors is large beside what is shown of its
-    RMSE, or, with friction or end stops, where its tensions go through their whole range more than twice a second. It
-    runs again with 2, 4, 8, ... 64 times the steps until RMSE (0.5 % or 0.001 deg) and the error at the end (ten times
-    as much) stay what they are twice in a row; the longest of these steps is taken. Where that never happens the loop
-    is chaotic: the row is marked `NOT CONVERGED`, with by how much it still changes, and is ranked no better than a
-    limit cycle. Steps given by hand stay, and are marked alike. `tune` verifies in this way only gains that would be
-    its best: it never ends with what the step makes good, and may pass over what the step makes bad."""
+    RMSE; they count eight times where its tensions chatter, or, with friction or end stops, go through their whole
+    range more than 0.8 times a second: kinks and jumps hide a part of the error from the estimate. It runs again with
+    2, 4, 8, ... 64 times the steps until RMSE (0.5 % or 0.001 deg) and the error at the end (ten times as much) stay
+    what they are twice in a row; the longest of these steps is taken. Where that never happens the loop is chaotic:
+    the row is marked `NOT CONVERGED`, with by how much it still changes, and is ranked no better than a limit cycle.
+    Steps given by hand stay, and are marked alike. `tune` verifies in this way only gains that would be its best: it
+    never ends with what the step makes good, and may pass over what the step makes bad."""
     limit = """A 30 deg minimum jerk in 1 s, ideal measurement; above the limit a held tick turns the tip too far and
     the wrist stays (`wristctl/comparison/best_case.py`). Within some newtons of it the RMSE is chaotic. One step a tick
     puts the limit elsewhere, and we believed it: [what we corrected](corrected.md)."""

@@ -119,12 +119,20 @@ def test_friction_and_slack_are_no_reason_to_doubt_a_quiet_loop_and_a_swing_is()
     rig = {"control_period": 5e-3, "actuator": {"level": "tendon", "friction": 0.1}, "sensor": {"level": "camera"}}
     quiet, swinging = (run(*row, Loop.model_validate(rig)) for row in (("ct-dob", "hardware"), ("pid", "printed")))
     assert quiet.steps == 5 and not in_doubt(quiet, np.array([True])).any()
-    quick = swinging.metrics["chattering"]
     assert in_doubt(swinging, np.array([True])).all()
-    swinging.step_error[:] = 0.0
-    assert in_doubt(swinging, np.array([True])).all() and not in_doubt(swinging, np.array([False])).any()
-    swinging.metrics["chattering"] = 0.1 * quick
+    swings = swinging.metrics["chattering"] / (2.0 * swinging.metrics["peak_tension"])
+    assert swings > 2.0
+    swinging.step_error[:] = 10.0 * tolerance(swinging.metrics["rmse"])  # too little to doubt a quiet loop
+    assert in_doubt(swinging, np.array([True])).all()
+    swinging.step_error[:] *= 0.1
     assert not in_doubt(swinging, np.array([True])).any()
+    swinging.step_error[:] *= 10.0
+    swinging.metrics["chattering"] = swinging.metrics["chattering"] / swings
+    assert in_doubt(swinging, np.array([True])).all()
+    swinging.metrics["chattering"] = 0.5 * swinging.metrics["chattering"]
+    assert not in_doubt(swinging, np.array([True])).any()
+    swinging.step_error[:] = np.nan
+    assert in_doubt(swinging, np.array([True])).all()
 
 
 def test_rollouts_that_differ_beyond_the_tolerance_do_not_agree() -> None:

@@ -1,10 +1,9 @@
 """Whether a rollout's integration step is short enough, and how short it has to be where it is not.
 
-A rollout is in doubt in two cases. RODAS3 carries an embedded solution of second order: the sum of the differences over
-all steps, without their share in modes that die out within a step, is above the error of the angle where forces change
-smoothly, so that a small sum clears a rollout. It cannot see what happens between: a torque that jumps from limit to
-limit at every tick, and the kinks of friction, backlash and end stops. There a loop whose tensions keep swinging is in
-doubt as well.
+RODAS3 carries an embedded solution of second order: the sum of the differences over all steps, without their share in
+modes that die out within a step, is above the error of the angle where forces change smoothly, so that a rollout is in
+doubt where that sum is large. It misses a part of what happens between: a torque that jumps from limit to limit at
+every tick, and the kinks of friction, backlash and end stops. So it counts several times where tensions keep swinging.
 
 A rollout in doubt runs again with 2, 4, 8, ... times as many steps, until its numbers stay what they are.
 """
@@ -31,11 +30,11 @@ AT_THE_END = 10.0
 # Sum of the steps' estimated errors, over the tolerance of the RMSE, from which a rollout is in doubt; and how many
 # times as much where forces have kinks, which the estimate takes for errors.
 DOUBT, KINKS = 4.0, 8.0
-# Frequency of tensions through their whole range and back, from which a loop with kinks is in doubt [1/s]; loops
-# without are where they chatter (FASTEST).
-SWINGS = 2.0
-# Factor by which the estimated errors of loops that swing count where a loop cannot run again.
-SWINGING = 4.0
+# Frequency of tensions through their whole range and back, from which a loop with kinks swings [1/s]; loops without do
+# where they chatter (FASTEST).
+SWINGS = 0.8
+# Factor by which the estimated errors of loops that swing count: they miss a part of what the step does to these.
+SWINGING = 8.0
 
 Rollouts = NDArray[np.int64]
 Mask = NDArray[np.bool_]
@@ -61,24 +60,29 @@ def _most(outcome: Outcome, kinked: Mask) -> Array:
     return most
 
 
+def _excess(outcome: Outcome, kinked: Mask) -> Array:
+    """Sum of the steps' estimated errors over what it may be, (count,)."""
+    counted: Array = np.where(_swinging(outcome, kinked), SWINGING, 1.0) * outcome.step_error
+    return counted / _most(outcome, kinked)
+
+
 def in_doubt(outcome: Outcome, kinked: Mask) -> Mask:
     """Rollouts whose integration step may be too long, (count,); `kinked` are those with friction or end stops."""
-    return (outcome.step_error > _most(outcome, kinked)) | _swinging(outcome, kinked)
+    doubtful: Mask = ~(_excess(outcome, kinked) <= 1.0)
+    return doubtful
 
 
 def in_one_go(outcome: Outcome, kinked: Mask) -> tuple[Mask, Rollouts]:
     """Judge rollouts that cannot run again: which are in doubt, (count,), and steps in a period that are likely to do.
 
-    Where tensions swing the estimate may be as small as a third of what else puts a loop in doubt and the loop be off;
-    a quarter is the limit there. The steps are twice as many times as the sum of errors is too large, and more where
-    tensions swing, since that falls more slowly than the step where the torque jumps; a power of two, as those that are
-    tried.
+    The steps are twice as many times as the sum of errors is too large, and more where tensions swing, since that falls
+    more slowly than the step where the torque jumps; a power of two, as those that are tried.
     """
-    swinging = np.where(_swinging(outcome, kinked), SWINGING, 1.0)
-    excess = swinging * outcome.step_error / _most(outcome, kinked)
+    swinging = np.where(_swinging(outcome, kinked), 0.25 * SWINGING, 1.0)
+    excess = _excess(outcome, kinked)
     times = np.clip(np.nan_to_num(2.0 * swinging * excess, nan=np.inf), FINER[0], FINER[-1])
     steps = np.minimum(outcome.steps * 2 ** np.ceil(np.log2(times)).astype(np.int64), MOST_SUBSTEPS)
-    doubtful: Mask = ~(excess <= 1.0)
+    doubtful = in_doubt(outcome, kinked)
     return doubtful, np.where(doubtful, steps, outcome.steps)
 
 
