@@ -62,7 +62,7 @@ def test_a_preset_without_conditions_swings_there(margins: ModuleType) -> None:
     ("row", "loop", "told"),
     [
         (("mrac", "hardware"), {"control_period": 5e-3}, None),
-        (("mrac", "hardware"), {"control_period": 1e-2}, "made for periods of 1 to 5 ms, not 10"),
+        (("mrac", "hardware"), {"control_period": 1e-3}, "made for periods of 5 to 10 ms, not 1"),
         (("nc", "default"), {"control_period": 5e-3, "stiffness": 1e4}, "tendons of 20 to 100 kN/m, not 10"),
         (("smc-tracking", "default"), {}, "not made for elastic tendons behind a camera"),
         (("smc-tracking", "default"), {"sensor": "ideal"}, None),

@@ -266,3 +266,17 @@ def test_a_pull_that_no_tendon_bears_is_told_and_one_that_it_bears_is_not() -> N
     free = simulate(load_study([], [*row, "simulate.loop.limits=false"]))
     assert "NOT PHYSICAL" in free.fate and f"{free.metrics['peak_tension'][0]:.3g} N" in free.fate
     assert simulate(load_study([], row)).fate == ""
+
+
+@pytest.mark.parametrize(("halving", "swings"), [(0.1, False), (0.25, False), (2.0, True), (math.inf, True)])
+def test_a_swing_that_dies_out_after_a_push_is_none(halving: float, swings: bool) -> None:
+    """0.6 deg at the begin of the last second, with its half-life [s]."""
+    reference = np.full(len(TIME), 0.5)
+    age = np.maximum(0.0, TIME - 4.0)
+    swing = np.deg2rad(0.6) * np.cos(2.0 * np.pi * 4.0 * age) * 0.5 ** (age / halving) * (TIME >= 4.0)
+    left = oscillation(course(reference + swing, reference))
+    assert (left > LIMIT_CYCLE) == swings
+    if math.isinf(halving):
+        assert left == pytest.approx(np.deg2rad(0.6), rel=0.05)
+    moving = 0.5 + 0.2 * np.sin(2.0 * np.pi * 0.5 * TIME)
+    assert oscillation(course(moving + swing, moving)) > oscillation(course(moving, moving)), "only at rest"

@@ -51,6 +51,7 @@ LEAST_PLAIN_PERIOD = 1e-5
 
 # Origin of presets for the rig.
 BY_TRIAL = "behind a 60 Hz camera, steppers and tendons of 8 to 100 kN/m: by trial at the corners of docs/margins.py"
+BY_STUDY = "behind a 60 Hz camera, steppers and tendons of 8 to 100 kN/m: docs/gains.md, camera, in few digits"
 
 
 def signals_of(preview: int) -> int:

@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from wristctl.control.law import BY_TRIAL, Conditions, Controller, Gain
+from wristctl.control.law import BY_STUDY, Conditions, Controller, Gain
 from wristctl.control.model import inverse_dynamics
 from wristctl.lanes.compiled import compiled
 
@@ -31,8 +31,8 @@ PD_FF = Controller(
     gains=GAINS,
     presets={
         "default": {"Kp": 1.0, "Kd": 0.1},
-        "hardware": {"Kp": 6.0, "Kd": 0.4},
+        "hardware": {"Kp": 7.0, "Kd": 1.3e-4},
     },
-    notes={"hardware": BY_TRIAL},
+    notes={"hardware": BY_STUDY},
     conditions={"default": Conditions((1e-3, 1e-2), (8e3, 1e5)), "hardware": Conditions((5e-3, 1e-2), (8e3, 1e5))},
 )

@@ -1,7 +1,8 @@
 """Does a loop come to rest, or does it swing, hunt or chatter: what is left at rest, and what its tensions do.
 
-Half the peak-to-peak of the angle over the last second, its trend removed. Of a reference that never rests it is the
-error's, over the last second or the last two of its periods, with all up to four times its frequency removed.
+Half the peak-to-peak of the angle over the last second, its trend removed; over the last half of that where a swing
+dies out, as after a push. Of a reference that never rests it is the error's, over the last second or the last two of
+its periods, with all up to four times its frequency removed.
 """
 
 import math
@@ -25,6 +26,9 @@ FASTEST = 25.0
 # Rest [s] that shows whether a loop hunts.
 LONG_HOLD = 20.0
 _HARMONICS = 4.0
+# Share of the swing of the half second before below which that of the last half second dies out, and periods in it from
+# which that can be told.
+_DIES_OUT, _PERIODS = 0.5, 1.5
 # Share of a reference's range within one sample that is a jump.
 _JUMP = 0.25
 # [rad] below which there is nothing but rounding.
@@ -47,6 +51,17 @@ def oscillations(theta: Array, references: Array, which: NDArray[np.int64], step
     amplitudes = np.full(len(theta), _UNKNOWN)
     for indices, left in _remaining(theta, references, which, step):
         amplitudes[indices] = np.ptp(left, axis=1) / 2.0
+        window = left.shape[1]
+        dying = np.ptp(references[:, -window:], axis=1)[which[indices]] == 0.0
+        if dying.any():
+            angle = theta[indices[dying], -window:]
+            about = angle - angle[:, window // 2 :].mean(axis=1, keepdims=True)
+            dying[dying] = _strongest(about, step) * window * step >= 2.0 * _PERIODS
+        if dying.any():
+            late = np.ptp(_without_trend(theta[indices[dying], -(window // 2) :]), axis=1)
+            before = np.ptp(left[dying, : window // 2], axis=1)
+            swings = indices[dying]
+            amplitudes[swings] = np.where(late < _DIES_OUT * before, late / 2.0, amplitudes[swings])
     return amplitudes
 
 
