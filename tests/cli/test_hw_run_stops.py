@@ -23,6 +23,7 @@ from wristctl.commands.hw_run import figures as trial_figures
 from wristctl.config.bench import FAULTS
 from wristctl.config.study import Study
 from wristctl.records import list_runs, start_run
+from wristctl.records.manifest import read_overview
 from wristctl.records.run import Run
 from wristctl.trial import homing, testbeds
 from wristctl.trial.calibration import FILE, WristCalibration
@@ -197,6 +198,9 @@ def test_ctrl_c_stops_the_motors_and_seals_the_run(hw_run: HwRun, monkeypatch: p
     assert not any(ended.bench.motion().energised)
     if moment != "drawing":  # where all trials are done
         assert ended.stop["motors_stand"] and ended.stop["reason"] == STATED["Ctrl-C"].says
+        first, *trials = filter(None, read_overview(ended.run.path).answer)
+        done = sum(ended.run.data("trials")["outcome"] == "ok")
+        assert STATED["Ctrl-C"].says in first and ("homed" in first) == (moment == "homing") and len(trials) == done
 
 
 @pytest.mark.slow

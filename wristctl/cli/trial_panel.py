@@ -66,7 +66,7 @@ def panel_shown(console: Terminal, trials: Sequence[Trial]) -> Iterator[Shown]:
 @contextmanager
 def trials_counted(session: Session, trials: Sequence[Trial]) -> Iterator[Shown]:
     """Count the trials by the ticks that are handed in."""
-    with session.progress("trials", len(trials), "trials") as advance:
+    with session.progress("homing, then trials", len(trials), "trials") as advance:
         begun = -1
 
         def take(row: dict[str, Any]) -> None:

@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 import pandas as pd
 
-from wristctl.commands.printed_table import Table
+from wristctl.commands.printed_table import Table, degrees
 from wristctl.commands.rig_description import coming_first
 from wristctl.commands.session import Session
 from wristctl.config.choices import PLANTS
@@ -22,7 +22,7 @@ from wristctl.simulation.metrics import METRICS
 from wristctl.trial.bend_motion import BendMotion
 from wristctl.trial.bend_results import FURTHER, LOGGED, TRULY, bends_evaluated
 from wristctl.trial.calibration import WristCalibration
-from wristctl.trial.experiment import Experiment
+from wristctl.trial.experiment import Experiment, Stop
 from wristctl.trial.log import TrialLog
 from wristctl.trial.residuals import FILE, RESIDUALS, limits_of, plain
 from wristctl.trial.safety import SafetyStop
@@ -113,7 +113,7 @@ def perform_trials(
     for name, stream in trial_log.streams.items():
         run.columns(f"data/{name}.csv", stream.columns)
     table = _evaluate(run, settings, study.wrist, experiment, trials)
-    _summarise(session, experiment, trial_log)
+    _summarise(session, experiment, trial_log, table, len(trials))
     if stopped is not None:
         raise stopped
     return table
@@ -191,7 +191,29 @@ def _evaluate(
     return table
 
 
-def _summarise(session: Session, experiment: Experiment, trial_log: TrialLog) -> None:
+def stopped_answer(stop: Stop, table: pd.DataFrame, count: int) -> list[str]:
+    """Lines on trials that were stopped: when, why, whether the motors stand, and what came of those that were done.
+
+    `table` has a row for each trial that began, of `count` in all.
+    """
+    when = "before the first trial, while the rig was opened or homed"
+    if stop.trial is not None:
+        when = f"in trial {stop.trial} of 0 to {count - 1}"
+        when += f", {stop.time:.1f} s after it began" if stop.time is not None else ""
+    elif len(table):
+        when = f"after trial {table['trial'].iloc[-1]} of 0 to {count - 1}"
+    sure = "the motors stand" if stop.halt.verified else "the motors could NOT be seen to stand"
+    lines = [f"Stopped {when}: {stop.reason.removeprefix('stopped: ')}; {sure}.", ""]
+    for _, trial in table[table["outcome"] == "ok"].iterrows():
+        push = f", push of {trial['push']:g} N" if trial["push"] else ""
+        error = f"error {degrees(trial['rmse'])} deg RMSE" if "rmse" in table else "done"
+        lines.append(
+            f"Trial {trial['trial']}, {trial['direction']}{push}, {trial['controller']}/{trial['gains']}: {error}"
+        )
+    return lines
+
+
+def _summarise(session: Session, experiment: Experiment, trial_log: TrialLog, table: pd.DataFrame, count: int) -> None:
     """Timing, zero, and where it was stopped why, whether the motors stand, and the last second."""
     findings, settings, timing = session.findings, session.study.hw_run, experiment.timing
     findings.metric("ticks", len(timing.late), meaning="control ticks")
@@ -214,6 +236,8 @@ def _summarise(session: Session, experiment: Experiment, trial_log: TrialLog) ->
         return
     stop = experiment.stop
     findings.plain("data/stop.json", stop.plain())
+    findings.overview.answer[:] = stopped_answer(stop, table, count)
+    findings.keep_overview()
     sure = "the motors stand" if stop.halt.verified else "the motors could NOT be seen to stand"
     log.warning("%s after %.0f ms (%s)", sure, 1e3 * stop.halt.seconds, stop.halt.how)
     if not trial_log.last:
@@ -235,7 +259,9 @@ def _tell_oddities(session: Session, experiment: Experiment) -> None:
             meaning = f"{line.meaning}; limit {limit:.4g} {unit}"
             findings.metric(f"greatest_{name}", most[name], unit, "lower", meaning=meaning)
             parts.append(f"{name} {line.shown(most[name])} of {line.shown(limit)}")
-    findings.summary(f"Greatest residuals, and their limits: {', '.join(parts)}. wristctl hw limits --from this run.")
+    if parts:
+        limits = f"Greatest residuals, and their limits: {', '.join(parts)}. wristctl hw limits --from this run."
+        findings.summary(limits)
     for number, words in experiment.odd.items():
         if words and experiment.outcomes.get(number) == "ok":
             text = f"Trial {number} went through, but was odd: {words}"
