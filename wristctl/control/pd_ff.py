@@ -31,7 +31,7 @@ PD_FF = Controller(
     gains=GAINS,
     presets={
         "default": {"Kp": 1.0, "Kd": 0.1},
-        "hardware": {"Kp": 7.0, "Kd": 1.3e-4},
+        "hardware": {"Kp": 7.0, "Kd": 4e-4},
     },
     notes={"hardware": BY_STUDY},
     conditions={"default": Conditions((1e-3, 1e-2), (8e3, 1e5)), "hardware": Conditions((5e-3, 1e-2), (8e3, 1e5))},

@@ -24,7 +24,7 @@ PID_FF = Controller(
     gains=GAINS,
     presets={
         "default": {"Kp": 1.0, "Ki": 5.0, "Kd": 0.1},
-        "hardware": {"Kp": 0.019, "Ki": 165.0, "Kd": 0.11},
+        "hardware": {"Kp": 0.04, "Ki": 165.0, "Kd": 0.11},
     },
     memory=1,
     notes={"hardware": BY_STUDY},
