@@ -14,8 +14,8 @@ from wristctl.config.loop import Loop, Reference
 from wristctl.config.study import Study
 from wristctl.config.wrist import WristParameters
 from wristctl.control.table import controller, gains_of
-from wristctl.simulation.bend_course import BendCourse
 from wristctl.simulation.bend_loops import bends_of
+from wristctl.simulation.bend_outcome import BendOutcome
 from wristctl.simulation.closed_loop import scenario_of
 from wristctl.simulation.spatial_batch import sample_step
 from wristctl.simulation.two_planes import rollout_bends
@@ -85,7 +85,7 @@ def courses(
     wrist: WristParameters,
     loop: Loop,
     seeds: int = SEEDS,
-) -> list[BendCourse]:
+) -> BendOutcome:
     """One motion by one controller under every seed."""
     chosen, reference = controller(law), Reference.model_validate(motion)
     bends = bends_of(reference, "ulnar", wrist, study.simulate.horizon, sample_step(loop.control_period))
@@ -95,15 +95,14 @@ def courses(
     return rollout_bends(chosen, rows, bends, [World(loop, wrist)] * seeds, None, None, streams)
 
 
-def cell(results: Sequence[BendCourse]) -> str:
+def cell(results: BendOutcome) -> str:
     """The worse axis' RMSE [deg]: median and largest of all seeds; bold where all are held, else how many fail."""
-    failed = sum(course.failed for course in results)
+    failed, count = int(results.failed.sum()), len(results.failed)
     if failed:
-        return f"fails in {failed} of {len(results)}"
-    metrics = [course.metrics() for course in results]
-    worse = np.rad2deg([max(each["rmse_ulnar"], each["rmse_flexion"]) for each in metrics])
+        return f"fails in {failed} of {count}"
+    worse = np.rad2deg(np.maximum(results.metrics["rmse_ulnar"], results.metrics["rmse_flexion"]))
     middle, most = float(np.median(worse)), float(worse.max())
-    text = f"{middle:.2g}" if len(results) == 1 else f"{middle:.2g} ({most:.2g})"
+    text = f"{middle:.2g}" if count == 1 else f"{middle:.2g} ({most:.2g})"
     return f"**{text}**" if most <= HOLDS else text
 
 
@@ -176,7 +175,8 @@ def arm(turn: float, slackest: float, law: str, gains: str | Mapping[str, float]
     bends = bends_of(motion, "ulnar", ARM, (laps + 0.5) * turn, sample_step(ARM_LOOP["control_period"]))
     rows = np.tile(gains_of(chosen, gains), (len(loops), 1))
     streams = [(1, k) for k in range(len(loops))]
-    results = rollout_bends(chosen, rows, bends, [World(loop, ARM) for loop in loops], None, None, streams)
+    worlds = [World(loop, ARM) for loop in loops]
+    results = rollout_bends(chosen, rows, bends, worlds, None, None, streams, record=True).courses
     off, late = [], []
     for course in results:
         on_circle = course.time > 0.5 * turn

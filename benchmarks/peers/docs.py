@@ -116,8 +116,8 @@ def two_planes(result: Result) -> str:
         "left to it. One allocation shares both torques among four tendons, and the bend is measured as it is. Gravity "
         f"is ({', '.join(f'{g:g}' for g in (*WRIST.gravity, WRIST.gravity_flexion))}) m/s^2, and springs are "
         f"{WRIST.flexion_ratio:g} times as stiff toward flexion as toward ulnar. "
-        "One core. wristctl keeps the whole motion of every lane, as it always does in two planes; C sums what metrics "
-        f"are made of and keeps one lane's motion. Their coordinates differ by at most {apart or '-'} over the first "
+        "One core. wristctl and C sum what metrics are made of; C keeps one lane's motion beside, wristctl that of a "
+        f"lane alone. Their coordinates differ by at most {apart or '-'} over the first "
         f"second; {SAME:g} rad would end the run. Error is the largest difference of a segment's bend over the first "
         f"second from wristctl's motion with {FINE} steps a tick; for a side that solves other equations, from its own "
         "motion with much smaller steps.\n",

@@ -79,7 +79,8 @@ def test_a_path_turned_by_a_right_angle_leaves_the_same_errors_behind_a_camera()
 def test_lanes_are_what_each_is_alone_and_noise_is_each_ones_own() -> None:
     path, loop = circumduction(TIME[:100], np.deg2rad(20.0), 1.0), real(sensor={"level": "camera"})
     streams = [(3, k) for k in range(3)]
-    together = rollout_bends(LAW, np.tile(GAINS, (3, 1)), path, [World(loop, WRIST)] * 3, None, None, streams)
+    worlds, rows = [World(loop, WRIST)] * 3, np.tile(GAINS, (3, 1))
+    together = rollout_bends(LAW, rows, path, worlds, None, None, streams, record=True).courses
     alone = followed(path, loop, stream=(3, 1))
     np.testing.assert_array_equal(together[1].bend, alone.bend)
     assert np.abs(together[0].bend - together[2].bend).max() > 1e-6

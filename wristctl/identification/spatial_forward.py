@@ -76,7 +76,7 @@ def _follow(values: Any, state: Any, reeled: Any, h: float, settle: int, out: An
             spools[t] = reeled[now, t] + taut[t]
         if k >= 0:
             row = rows_of(out[k])
-            row[0], row[1], _, _ = tip_bend(wrist.segment, q, rate)
+            row[0], row[1], _, _, _ = tip_bend(wrist.segment, q, rate)
             lengths_along(wrist, q, lengths)
             for t in range(tendons):
                 row[2 + t] = stiffness[t] * maximum(0.0, spools[t] - travel_of(wrist, t, lengths[t]))

@@ -158,7 +158,9 @@ def scratch_rows(result: RowsType, rows: RowsType) -> Any:
 
     def codegen(context: Any, builder: Any, sig: Any, args: list[Any]) -> Any:
         memory = ir.ArrayType(result.element.llvm, result.entries)
-        return _rows(builder, result, _opaque(builder, cgutils.alloca_once(builder, memory), memory))
+        with builder.goto_entry_block():  # cgutils.alloca_once would set it to 0 wherever the function is inlined
+            pointer = builder.alloca(memory)
+        return _rows(builder, result, _opaque(builder, pointer, memory))
 
     return signature(result, rows), codegen
 

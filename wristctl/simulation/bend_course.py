@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, NamedTuple
@@ -147,12 +147,23 @@ def column_meanings(names: list[str]) -> dict[str, tuple[str, str]]:
     return {name: of[name] for name in names}
 
 
+class BendTotals(NamedTuple):
+    """Sums over rollouts by the names of `wristctl.simulation.bend_sums.BEND_SUMS`, (count,) each."""
+
+    sums: Mapping[str, Array]
+    time: Array
+    """Of the samples (T,) [s]."""
+
+
 class BendMetric(NamedTuple):
-    """A metric of a motion in two planes."""
+    """A metric of a motion in two planes; it comes from a course, or from running sums (of many rollouts at once)."""
 
     unit: str
     formula: str
     value: Callable[[BendCourse], float]
+    of_totals: Callable[[BendTotals], Array] | None = None
+    of_error: bool = True
+    """Whether it is of the error, and so means nothing where the wrist has failed."""
 
 
 def _rms(values: Array) -> float:
@@ -164,7 +175,22 @@ def _norm(course: BendCourse) -> Array:
 
 
 def _late(course: BendCourse) -> float:
-    return float(_norm(course)[-max(1, len(course.time) // 10) :].mean())
+    return float(_norm(course)[-late_samples(len(course.time)) :].mean())
+
+
+def late_samples(samples: int) -> int:
+    """Number of samples in the last 10 % of the horizon."""
+    return max(1, samples // 10)
+
+
+def _share(of: BendTotals, name: str) -> Array:
+    """A sum over the number of samples."""
+    share: Array = of.sums[name] / len(of.time)
+    return share
+
+
+def _rms_of(of: BendTotals, *squares: str) -> Array:
+    return np.sqrt(sum((_share(of, name) for name in squares), np.zeros(())))
 
 
 def _tip_distance(course: BendCourse) -> Array:
@@ -184,24 +210,47 @@ def _oscillation(course: BendCourse) -> float:
 
 
 BEND_METRICS: dict[str, BendMetric] = {
-    "rmse_ulnar": BendMetric("rad", "sqrt(mean e^2) over the horizon, toward ulnar", lambda c: _rms(c.error[:, 0])),
-    "rmse_flexion": BendMetric("rad", "sqrt(mean e^2) over the horizon, toward flexion", lambda c: _rms(c.error[:, 1])),
-    "rmse": BendMetric("rad", "sqrt(mean |e|^2) over the horizon, |e| over both planes", lambda c: _rms(_norm(c))),
-    "largest_error": BendMetric("rad", "largest |e| over both planes", lambda c: float(_norm(c).max())),
-    "steady_state": BendMetric("rad", "mean |e| over the last 10 % of the horizon", _late),
+    "rmse_ulnar": BendMetric(
+        "rad", "sqrt(mean e^2) over the horizon, toward ulnar", lambda c: _rms(c.error[:, 0]),
+        lambda of: _rms_of(of, "squared_ulnar"),
+    ),
+    "rmse_flexion": BendMetric(
+        "rad", "sqrt(mean e^2) over the horizon, toward flexion", lambda c: _rms(c.error[:, 1]),
+        lambda of: _rms_of(of, "squared_flexion"),
+    ),
+    "rmse": BendMetric(
+        "rad", "sqrt(mean |e|^2) over the horizon, |e| over both planes", lambda c: _rms(_norm(c)),
+        lambda of: _rms_of(of, "squared_ulnar", "squared_flexion"),
+    ),
+    "largest_error": BendMetric(
+        "rad", "largest |e| over both planes", lambda c: float(_norm(c).max()),
+        lambda of: np.sqrt(of.sums["squared_most"]),
+    ),
+    "steady_state": BendMetric(
+        "rad", "mean |e| over the last 10 % of the horizon", _late,
+        lambda of: of.sums["late"] / late_samples(len(of.time)),
+    ),
     "tip_rmse": BendMetric(
-        "mm", "RMS distance of the tip from that of one arc bent as wanted", lambda c: _rms(_tip_distance(c))
+        "mm", "RMS distance of the tip from that of one arc bent as wanted", lambda c: _rms(_tip_distance(c)),
+        lambda of: 1e3 * _rms_of(of, "squared_tip"), of_error=False,
     ),
     "oscillation": BendMetric(
         "rad", "half the peak-to-peak that is left at the end of the faster plane, the motion removed", _oscillation
     ),
-    "peak_tension": BendMetric("N", "largest pull that acts at a place of tendons", lambda c: float(c.acting.max())),
-    "chattering": BendMetric("N/s", "total variation of all commanded pulls per second", _chattering),
+    "peak_tension": BendMetric(
+        "N", "largest pull that acts at a place of tendons", lambda c: float(c.acting.max()),
+        lambda of: of.sums["peak"], of_error=False,
+    ),
+    "chattering": BendMetric(
+        "N/s", "total variation of all commanded pulls per second", _chattering,
+        lambda of: of.sums["variation"] / (of.time[-1] - of.time[0]), of_error=False,
+    ),
     "saturation": BendMetric(
         "", "share of time in which the wanted torque was out of the tendons' reach",
-        lambda c: float(np.mean(c.share < _FULL)),
+        lambda c: float(np.mean(c.share < _FULL)), lambda of: _share(of, "saturated"), of_error=False,
     ),
     "slack": BendMetric(
-        "", "share of time in which a tendon was slack", lambda c: float(np.mean((c.acting <= 0.0).any(axis=1)))
+        "", "share of time in which a tendon was slack", lambda c: float(np.mean((c.acting <= 0.0).any(axis=1))),
+        lambda of: _share(of, "slack"), of_error=False,
     ),
 }  # fmt: skip

@@ -15,12 +15,14 @@ from wristctl.control.table import controller, gains_of
 from wristctl.errors import UserError
 from wristctl.simulation.arrival import SHORT
 from wristctl.simulation.bend_course import BendCourse
+from wristctl.simulation.bend_outcome import BendOutcome
 from wristctl.simulation.closed_loop import scenario_of
 from wristctl.simulation.convergence import FINER, HALF, more_finely, tolerance
 from wristctl.simulation.oscillation import LIMIT_CYCLE, chatter
 from wristctl.simulation.recording import recorded_bends
 from wristctl.simulation.reference import REFERENCES, course_of, motion, toward
 from wristctl.simulation.repetitions import STRAIN, Repetitions
+from wristctl.simulation.rollout import How
 from wristctl.simulation.spatial_batch import sample_step
 from wristctl.simulation.two_planes import check_bends, rollout_bends
 from wristctl.simulation.worlds import Draws, World, is_random, loops_of
@@ -151,27 +153,25 @@ def simulate_bends(
     scenario = scenario_of(chosen.reference, chosen.direction)
     streams = [draws.camera(scenario, repetition) for repetition in range(times)]
 
-    def courses(which: range, factor: int) -> list[BendCourse]:
+    def run(which: range, factor: int, record: How) -> BendOutcome:
         worlds = [World(more_finely(loops[k], factor) if factor > 1 else loops[k], wrist) for k in which]
-        return rollout_bends(
-            law, np.repeat(gains, len(which), axis=0), references, worlds, layout, None, [streams[k] for k in which]
-        )
+        rows, noise = np.repeat(gains, len(which), axis=0), [streams[k] for k in which]
+        return rollout_bends(law, rows, references, worlds, layout, None, noise, record=record)
 
-    first, factor, drift = _converged(lambda factor: courses(range(min(times, _TOGETHER)), factor), loop)
-    metrics, failed, until = list[dict[str, float]](), list[bool](), list[float]()
-    for begin in range(0, times, _TOGETHER):
-        for course in courses(range(begin, min(begin + _TOGETHER, times)), factor) if begin else first:
-            metrics.append(course.metrics())
-            failed.append(course.failed)
-            until.append(course.until)
+    first, factor, drift = _converged(lambda factor: run(range(min(times, _TOGETHER)), factor, True), loop)
+    outcomes = [first]
+    for begin in range(_TOGETHER, times, _TOGETHER):
         if progress is not None:
-            progress(len(metrics) / times)
-    gathered = {name: np.array([values[name] for values in metrics]) for name in metrics[0]}
+            progress(begin / times)
+        outcomes.append(run(range(begin, min(begin + _TOGETHER, times)), factor, "briefly"))
+    if progress is not None:
+        progress(1.0)
+    metrics = [outcome.all_metrics() for outcome in outcomes]
     return RepeatedBends(
-        first[0],
-        gathered,
-        np.array(failed),
-        np.array(until),
+        first.courses[0],
+        {name: np.concatenate([values[name] for values in metrics]) for name in metrics[0]},
+        np.concatenate([outcome.failed for outcome in outcomes]),
+        np.concatenate([outcome.until for outcome in outcomes]),
         wrist.tension_limit,
         wrist.tension_range,
         layout,
@@ -180,28 +180,29 @@ def simulate_bends(
     )
 
 
-def _converged(courses: Callable[[int], list[BendCourse]], loop: Loop) -> tuple[list[BendCourse], int, float]:
+def _converged(run: Callable[[int], BendOutcome], loop: Loop) -> tuple[BendOutcome, int, float]:
     """The first repetitions at a step that is short enough, the factor on its steps, and what still changes [rad].
 
     The step is halved until RMSE and error at the end of the first stay what they are; one given by hand stays.
     """
-    before, change = courses(1), math.inf
+    before, change = run(1), math.inf
     for last, factor in zip((1, *FINER), FINER, strict=False):
-        fine = courses(factor)
-        change = _difference(before[0], fine[0])
+        fine = run(factor)
+        change = _difference(before, fine)
         if change == 0.0 or loop.substeps is not None:
             return before, last, change
         before = fine
     return before, FINER[-1], change
 
 
-def _difference(one: BendCourse, finer: BendCourse) -> float:
-    """Greater difference of RMSE and of the error at the end [rad]; 0 where both are as good as the same."""
-    if one.failed or finer.failed:
-        return 0.0 if one.failed == finer.failed else math.inf
-    coarse, fine, largest = one.metrics(), finer.metrics(), 0.0
+def _difference(one: BendOutcome, finer: BendOutcome) -> float:
+    """Greater difference of the first's RMSE and error at the end [rad]; 0 where both are as good as the same."""
+    if one.failed[0] or finer.failed[0]:
+        return 0.0 if one.failed[0] == finer.failed[0] else math.inf
+    largest = 0.0
     for name in ("rmse", "steady_state"):
-        apart = abs(coarse[name] - fine[name])
-        if apart > HALF * float(tolerance(np.array(fine[name]))):
+        coarse, fine = float(one.metrics[name][0]), float(finer.metrics[name][0])
+        apart = abs(coarse - fine)
+        if apart > HALF * float(tolerance(np.array(fine))):
             largest = max(largest, apart)
     return largest

@@ -20,7 +20,7 @@ from wristctl.simulation.actuator import (
     reel_in,
     spool_target,
 )
-from wristctl.wrist.spatial.spatial_tendons import lengths_along, moment_arms_of
+from wristctl.wrist.spatial.spatial_tendons import arms_about_bend, lengths_along
 from wristctl.wrist.spatial.spooled_tendons import RubbingTendons, straight_length, travel_of
 from wristctl.wrist.tendon_mechanics import ElasticTendons, NoTendons
 
@@ -86,27 +86,27 @@ def _as_commanded(drive: Any, motors: Any, known: Any, aim: Any, pulls: Any, h: 
 
 @implements(drive_tendons, LaggedDrive)
 def _lagging(drive: Any, motors: Any, known: Any, aim: Any, pulls: Any, h: float, counts: Any) -> None:
-    arms, last = lanes_like(aim.angle), 2 * len(pulls)
+    arms_y, arms_z, last = lanes_like(pulls), lanes_like(pulls), 2 * len(pulls)
     withheld_y, withheld_z = zero_like(aim.angle[0]), zero_like(aim.angle[0])
+    arms_about_bend(known.wrist, aim.angle, arms_y, arms_z)
     for t in range(len(pulls)):
         counts[t], less = lag_pull(motor_at(drive.motor, known.alike[t]), motors, 2 * t, pulls[t], h)
-        moment_arms_of(known.wrist, aim.angle, t, arms)
-        withheld_y, withheld_z = withheld_y + less * arms[0], withheld_z + less * arms[1]
+        withheld_y, withheld_z = withheld_y + less * arms_y[t], withheld_z + less * arms_z[t]
     motors[last], motors[last + 1] = withheld_y, withheld_z
 
 
 @implements(drive_tendons, SpoolDrive)
 def _reeling(drive: Any, motors: Any, known: Any, aim: Any, pulls: Any, h: float, counts: Any) -> None:
-    arms, last = lanes_like(aim.angle), 2 * len(pulls)
+    arms_y, arms_z, last = lanes_like(pulls), lanes_like(pulls), 2 * len(pulls)
     withheld_y, withheld_z = zero_like(aim.angle[0]), zero_like(aim.angle[0])
     lengths_along(known.wrist, aim.angle, counts)
+    arms_about_bend(known.wrist, aim.angle, arms_y, arms_z)
     for t in range(len(pulls)):
         motor = motor_at(drive.motor, known.alike[t])
-        moment_arms_of(known.wrist, aim.angle, t, arms)
-        moving = rounded(arms[0] * aim.rate[0]) + rounded(arms[1] * aim.rate[1])
+        moving = rounded(arms_y[t] * aim.rate[0]) + rounded(arms_z[t] * aim.rate[1])
         target = spool_target(pulls[t], motor.stiffness, straight_length(known.wrist, t), counts[t])
         counts[t], less = reel_in(motor, motors, 2 * t, target, moving, h)
-        withheld_y, withheld_z = withheld_y + less * arms[0], withheld_z + less * arms[1]
+        withheld_y, withheld_z = withheld_y + less * arms_y[t], withheld_z + less * arms_z[t]
     motors[last], motors[last + 1] = withheld_y, withheld_z
 
 

@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from wristctl.arrays import Array
 from wristctl.config.loop import Loop
@@ -11,9 +12,11 @@ from wristctl.config.plant import TendonFacts, in_one_plane_only
 from wristctl.config.wrist import WristParameters
 from wristctl.control.law import REFERENCE, Controller, signals_of
 from wristctl.errors import UserError
-from wristctl.lanes.blocks import lanes_of, spread
+from wristctl.lanes.blocks import lanes_of, spread, width
 from wristctl.seeds import Entropy
 from wristctl.simulation.actuator import counted_motor, drive_with, motor_of, winding_of
+from wristctl.simulation.bend_course import late_samples
+from wristctl.simulation.bend_sums import BEND_SUMS
 from wristctl.simulation.frames import frame_counts, readings, remembered, schedule
 from wristctl.simulation.observer import NoCamera
 from wristctl.simulation.spatial_actuator import FrictionRows, NoFriction
@@ -48,6 +51,21 @@ class SpatialBatch(NamedTuple):
     state: SpatialState
     preview: int
 
+    @property
+    def blocks(self) -> int:
+        """Number of blocks."""
+        return len(self.state.alive)
+
+    @property
+    def samples(self) -> int:
+        """Number of samples."""
+        return int(self.course.references.shape[2])
+
+    @property
+    def places(self) -> int:
+        """Number of places of tendons."""
+        return len(self.setup.pulls)
+
     def scratch(self) -> SpatialScratch:
         """Rows to work on, for one thread."""
         wide = self.state.alive.shape[2:]
@@ -76,12 +94,13 @@ def spatial_batch(
     layout: TendonLayout,
     acting: Array,
     streams: Sequence[Entropy],
-    compensated: bool,
+    columns: int,
 ) -> SpatialBatch:
     """The batch of rollouts of gains (count, g), each in its world and with a stream of its own.
 
-    All worlds have the same structure, timing and camera.
+    All worlds have the same structure, timing and camera. Samples are recorded in so many columns.
     """
+    worlds, which = different_worlds(worlds)
     loop, count, places = worlds[0].loop, len(gains), len(layout.places)
     check_spatial(loop)
     n, period, alike = loop.plant_segments, loop.control_period, layout.multiplicity.astype(float)
@@ -91,8 +110,13 @@ def spatial_batch(
     samples = references.shape[2]
     ticks = max(1, round(sample_step(period) / period))
 
+    def by_lane(values: Sequence[Array]) -> Array:
+        """A row of each world's as blocks."""
+        return spread(np.array(values).reshape(len(worlds), -1)[which], count)
+
     def rows(values: Sequence[Array]) -> Array:
-        return spread(np.array([np.asarray(row, float) for row in values]).reshape(count, -1), count)
+        """A row of each world's as blocks; of one world as one block for all."""
+        return by_lane(values) if len(worlds) > 1 else spread(np.ravel(values[0]), width(count))[:1]
 
     def limits(world: World, wrist: WristParameters) -> Array:
         most = world.wrist.tension_limit if world.loop.limits else _NO_LIMIT
@@ -109,11 +133,11 @@ def spatial_batch(
     elastic = loop.actuator.level == "tendon"
     drive = drive_with(loop.actuator.level, rows([np.array(motor) for motor in counted]))
     offsets = [
-        [winding.scale, *(winding.offset - _slack(fact.actuator, places))]
+        np.array([winding.scale, *(winding.offset - _slack(fact.actuator, places))])
         for winding, fact in zip(windings, facts, strict=True)
     ]
     rubbing = elastic and any(actuator.friction for actuator in actuators)
-    friction = [[actuator.friction, actuator.sheath, 1.0 / actuator.presliding] for actuator in actuators]
+    friction = [np.array([actuator.friction, actuator.sheath, 1.0 / actuator.presliding]) for actuator in actuators]
     begin = [np.full(places, motor.stiffness) for motor in counted]
     at_rest = [
         world.wrist.pretension / stiffness if elastic else alike * world.wrist.pretension
@@ -121,7 +145,7 @@ def spatial_batch(
     ]
     motors = [np.append(np.stack([counts, 0.0 * counts], axis=1).ravel(), [0.0, 0.0]) for counts in at_rest]
     delivered = [
-        row[0] * counts + np.array(row[1:]) if loop.actuator.level != "ideal" else counts
+        row[0] * counts + row[1:] if loop.actuator.level != "ideal" else counts
         for row, counts in zip(offsets, at_rest, strict=True)
     ]
     memory = max(1, law.memory)
@@ -138,33 +162,46 @@ def spatial_batch(
         gains=spread(gains.reshape(count, -1), count),
         limits=rows([limits(world, wrist) for world, wrist in zip(worlds, actual, strict=True)]),
         drive=drive,
-        winding=rows([np.array(row) for row in offsets]),
-        alike=rows([alike] * count),
+        winding=rows(offsets),
+        alike=rows([alike] * len(worlds)),
         stiffness=rows([alike * motor_of(actuator).stiffness / TENDONS_PER_SIDE for actuator in actuators]),
         broken_at=rows([_broken_at(fact.actuator, places) for fact in facts]),
         backlash=rows([np.array([fact.actuator.backlash]) for fact in facts]),
         lead=rows([np.array([float(world.loop.spool_lead)]) for world in worlds]),
-        friction=FrictionRows(rows([np.array(row) for row in friction])) if rubbing else NoFriction(),
+        friction=FrictionRows(rows(friction)) if rubbing else NoFriction(),
     )  # fmt: skip
-    watch, frames = _watch(worlds, layout, streams, period, samples * ticks * period)
-    columns = len(SPATIAL_RECORDED) + 3 * places + 2 * n
+    watch, frames = _watch(worlds, which, layout, streams, period, samples * ticks * period)
     state = SpatialState(
         coordinates=spread(np.zeros(4 * n), count),
         memory_y=spread(np.zeros(memory), count),
         memory_z=spread(np.zeros(memory), count),
         alive=spread(np.ones(1), count),
-        motors=rows(motors),
-        delivered=rows(delivered),
+        motors=by_lane(motors),
+        delivered=by_lane(delivered),
         tendons=spread(np.zeros(OF_A_STATE * places), count),
-        record=np.empty((blocks, samples, columns, *wide)),
+        sums=spread(np.zeros(len(BEND_SUMS) + places), count),
+        record=np.empty((blocks, samples if columns else 0, columns, *wide)),
         watch=watch,
     )
     setup = SpatialSetup(
         law.compiled(count), (0,) * (2 * n), (0,) * (OF_A_TENDON * places), (0,) * places, (0, 0), period, loop.steps,
-        ticks, law.preview, Compensated() if compensated else Ignored(),
+        ticks, law.preview, Compensated() if loop.coupling == "compensated" else Ignored(),
     )  # fmt: skip
-    course = SpatialCourse(np.ascontiguousarray(references, float), acting, frames)
+    course = SpatialCourse(np.ascontiguousarray(references, float), acting, late_samples(samples), frames)
     return SpatialBatch(setup, course, values, state, law.preview)
+
+
+def different_worlds(worlds: Sequence[World]) -> tuple[list[World], NDArray[np.int64]]:
+    """The worlds that are not the same loop and wrist, and which of them each one is."""
+    parts = [(id(world.loop), id(world.wrist)) for world in worlds]
+    different = dict(zip(parts, worlds, strict=True))
+    numbers = {part: number for number, part in enumerate(different)}
+    return list(different.values()), np.array([numbers[part] for part in parts])
+
+
+def spatial_columns(layout: TendonLayout, loop: Loop) -> int:
+    """Number of columns of a sample of which all is recorded."""
+    return len(SPATIAL_RECORDED) + 3 * len(layout.places) + 2 * loop.plant_segments
 
 
 def sample_step(control_period: float) -> float:
@@ -197,19 +234,24 @@ def _broken_at(facts: TendonFacts, places: int) -> Array:
 
 
 def _watch(
-    worlds: Sequence[World], layout: TendonLayout, streams: Sequence[Entropy], period: float, horizon: float
+    worlds: Sequence[World],
+    which: NDArray[np.int64],
+    layout: TendonLayout,
+    streams: Sequence[Entropy],
+    period: float,
+    horizon: float,
 ) -> tuple[SpatialWatch, SpatialSchedule] | tuple[NoCamera, NoCamera]:
-    """One camera for all lanes, with an observer for each."""
+    """One camera for all lanes, with an observer for each; `which` (count,) of the worlds each has."""
     if worlds[0].loop.sensor.level == "ideal":
         return NoCamera(), NoCamera()
-    count, places = len(worlds), len(layout.places)
+    count, places = len(which), len(layout.places)
     sensors, believed = [world.sensor for world in worlds], [world.loop.sensor for world in worlds]
     first = schedule(sensors[0], period, horizon, believed[0])
-    bursts = [world.loop.plant.sensor.burst for world in worlds]
-    counts = frame_counts(sensors, horizon).tolist()
-    ulnar = readings(counts, sensors, streams, bursts)
-    flexion = readings(counts, sensors, [(*stream, 1) for stream in streams], bursts)
-    zero = np.radians([world.loop.plant.sensor.zero_deg for world in worlds])[:, None]
+    bursts = [worlds[world].loop.plant.sensor.burst for world in which]
+    counts, cameras = frame_counts(sensors, horizon)[which].tolist(), [sensors[world] for world in which]
+    ulnar = readings(counts, cameras, streams, bursts)
+    flexion = readings(counts, cameras, [(*stream, 1) for stream in streams], bursts)
+    zero = np.radians([world.loop.plant.sensor.zero_deg for world in worlds])[which, None]
     taken = np.stack([ulnar[:, :, 0] + zero, flexion[:, :, 0], ulnar[:, :, 1]], axis=2)
     order = lanes_of(count)
     blocks, wide = 1 if count == 1 else len(order), order.shape[1:]
@@ -227,7 +269,7 @@ def _watch(
         readings=np.ascontiguousarray(by_block.reshape(blocks, taken.shape[1], 3, *wide)),
         pictures=np.zeros((blocks, taken.shape[1], 2, *wide)),
         turn=np.zeros((blocks, 3), np.int64),
-        gain=spread(gains, count),
+        gain=spread(gains[which], count),
         delivered=np.zeros((blocks, remembered(sensors[:1], believed[:1], period), places, *wide)),
         fused=still,
         now=still.copy(),

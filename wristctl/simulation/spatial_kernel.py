@@ -14,14 +14,14 @@ from wristctl.lanes.lane import sqrt, where, zero_like
 from wristctl.lanes.named_tuples import block_of
 from wristctl.lanes.rows import lanes_like, part, planes_like, rows_of
 from wristctl.simulation.actuator import Aim, drive_in_lanes
+from wristctl.simulation.bend_sums import Errors, gather_bends, watch_bends
 from wristctl.simulation.spatial_actuator import deliver, drive_tendons, friction_in_lanes, lose, tendons_on
 from wristctl.simulation.spatial_observer import Knowledge, predict_bends, sense_bends
 from wristctl.simulation.spatial_response import Laws, Room, Seen, respond_in_planes
 from wristctl.wrist.segments import load_segments
-from wristctl.wrist.spatial.posture import tip_bend
+from wristctl.wrist.spatial.posture import spatial_tip, tip_bend
 from wristctl.wrist.spatial.spatial_segments import FIELDS, SpatialWrist, load_spatial_segments, load_tip
 from wristctl.wrist.spatial.spatial_step import spatial_step
-from wristctl.wrist.spatial.spatial_tendons import moment_arms_of
 from wristctl.wrist.spatial.spooled_tendons import pulls_of_tendons, remember_travel
 
 # Columns of a recorded sample, followed by the commanded pull at each place of tendons [N], those that act, what each
@@ -31,7 +31,9 @@ SPATIAL_RECORDED = (
     "bend_ulnar", "bend_flexion", "rate_ulnar", "rate_flexion", "torque_wanted_ulnar", "torque_wanted_flexion",
     "torque_ulnar", "torque_flexion", "share", "seen_ulnar", "seen_flexion", "load_ulnar", "load_flexion",
 )  # fmt: skip
-_COLUMNS = len(SPATIAL_RECORDED)
+# Columns that are recorded where no more are asked for: the bend.
+SPATIAL_BRIEFLY = SPATIAL_RECORDED[:2]
+_COLUMNS, _BRIEFLY = len(SPATIAL_RECORDED), len(SPATIAL_BRIEFLY)
 # Bend of a segment [rad] up to which the plant's series hold.
 _MOST = 3.1
 _NAN = float("nan")
@@ -57,11 +59,13 @@ class SpatialSetup(NamedTuple):
 
 
 class SpatialCourse(NamedTuple):
-    """References [plane, (bend, rate, acceleration), sample]; what acts, [(force x, y, z, stiffness scale), sample];
-    the ticks of frames, or NoCamera."""
+    """References [plane, (bend, rate, acceleration), sample], continued between samples by their own derivatives;
+    what acts, [(force x, y, z, stiffness scale), sample]; the number of samples in the last part of the horizon; the
+    ticks of frames, or NoCamera."""
 
     references: Any
     acting: Any
+    late: int
     schedule: Any
 
 
@@ -92,8 +96,9 @@ class SpatialValues(NamedTuple):
 
 
 class SpatialState(NamedTuple):
-    """State of the rollouts, [block, row, lane]; `record` is [block, sample, column, lane].
+    """State of the rollouts, [block, row, lane].
 
+    `record` [block, sample, column, lane] takes each sample's values, all or the SPATIAL_BRIEFLY, or has no samples.
     `motors` has two rows for each place and one for each plane, `delivered` what each motor delivers, `tendons` what
     rubbing tendons remember; `watch` is the camera with its observer, or NoCamera.
     """
@@ -105,6 +110,7 @@ class SpatialState(NamedTuple):
     motors: Any
     delivered: Any
     tendons: Any
+    sums: Any
     record: Any
     watch: Any
 
@@ -148,11 +154,11 @@ def run_spatial(setup: Any, course: Any, world: Any, states: Any, scratch: Any, 
         q, rate = part(coordinates, 0, setup.coordinates), part(coordinates, m, setup.coordinates)
         before, pulls, counts, spools = lanes_like(q), lanes_like(least), lanes_like(least), lanes_like(least)
         acts, left, stiffness = lanes_like(least), lanes_like(least), lanes_like(least)
-        bend, lever = lanes_like(part(q, 0, setup.bend)), lanes_like(part(q, 0, setup.bend))
+        bend, sums = lanes_like(part(q, 0, setup.bend)), rows_of(state.sums)
         speed, wish, extra = lanes_like(bend), lanes_like(bend), lanes_like(bend)
         at, seen = lanes_like(part(coordinates, 0, (0, 0, 0, 0))), lanes_like(part(coordinates, 0, (0, 0, 0, 0, 0, 0)))
-        arms, zero = planes_like(least), zero_like(still.length)
-        laws, room = Laws(control_y, control_z, least, greatest), Room(bend, speed, wish, extra, lever, arms)
+        arms_y, arms_z, arms, zero = lanes_like(least), lanes_like(least), planes_like(least), zero_like(still.length)
+        laws, room = Laws(control_y, control_z, least, greatest), Room(bend, speed, wish, extra, arms_y, arms_z, arms)
         for sample in range(span.first, span.last):
             acting = course.acting
             scale = acting[3, sample] + zero
@@ -167,7 +173,7 @@ def run_spatial(setup: Any, course: Any, world: Any, states: Any, scratch: Any, 
             plant = SpatialWrist(segment, part(rows, FIELDS, setup.tendons))
             for tick in range(ticks):
                 now_tick = sample * ticks + tick
-                at[0], at[1], at[2], at[3] = tip_bend(segment, q, rate)
+                at[0], at[1], at[2], at[3], tip = tip_bend(segment, q, rate)
                 bent = sqrt(at[0] * at[0] + at[1] * at[1])
                 alive[0] = where(bent < limits[2 * count], alive[0], zero)
                 sense_bends(state.watch, course.schedule, known, now_tick, at, (counts, bend), period, seen)
@@ -198,23 +204,29 @@ def run_spatial(setup: Any, course: Any, world: Any, states: Any, scratch: Any, 
                 lose(drive, left, delivered, spools)
                 tendons = tendons_on(drive, friction, stiffness, rows_of(state.tendons))
                 if tick == 0:
-                    row = rows_of(state.record[sample])
                     pulls_of_tendons(tendons, plant, q, spools, acts)
-                    torque_y, torque_z = zero, zero
-                    for t in range(count):
-                        moment_arms_of(believed, bend, t, lever)
-                        torque_y = torque_y + pulls[t] * lever[0]
-                        torque_z = torque_z + pulls[t] * lever[1]
-                        row[_COLUMNS + t] = pulls[t]
-                        row[_COLUMNS + count + t] = acts[t]
-                        row[_COLUMNS + 2 * count + t] = delivered[t]
-                    row[0] = where(alive[0] > 0.0, at[0], _NAN)
-                    row[1] = where(alive[0] > 0.0, at[1], _NAN)
-                    row[2], row[3], row[4], row[5] = at[2], at[3], wanted_y, wanted_z
-                    row[6], row[7], row[8] = torque_y, torque_z, share
-                    row[9], row[10], row[11], row[12] = seen[0], seen[3], seen[2], seen[5]
-                    for i in range(m):
-                        row[_COLUMNS + 3 * count + i] = q[i]
+                    wanted_tip, _, _, _ = spatial_tip(believed.segment, wish)
+                    errors = Errors(at[0] - wish[0], at[1] - wish[1], tip - wanted_tip)
+                    late = 1.0 if sample >= course.references.shape[2] - course.late else 0.0
+                    watch_bends(sums, time, alive[0])
+                    gather_bends(sums, sample, late, errors, pulls, acts, share)
+                    if sample < state.record.shape[0]:
+                        row = rows_of(state.record[sample])
+                        row[0] = where(alive[0] > 0.0, at[0], _NAN)
+                        row[1] = where(alive[0] > 0.0, at[1], _NAN)
+                        if state.record.shape[1] > _BRIEFLY:
+                            torque_y, torque_z = zero, zero
+                            for t in range(count):
+                                torque_y = torque_y + pulls[t] * arms_y[t]
+                                torque_z = torque_z + pulls[t] * arms_z[t]
+                                row[_COLUMNS + t] = pulls[t]
+                                row[_COLUMNS + count + t] = acts[t]
+                                row[_COLUMNS + 2 * count + t] = delivered[t]
+                            row[2], row[3], row[4], row[5] = at[2], at[3], wanted_y, wanted_z
+                            row[6], row[7], row[8] = torque_y, torque_z, share
+                            row[9], row[10], row[11], row[12] = seen[0], seen[3], seen[2], seen[5]
+                            for i in range(m):
+                                row[_COLUMNS + 3 * count + i] = q[i]
                 predict_bends(state.watch, known, now_tick, counts, bend, period)
                 for _ in range(setup.substeps):
                     for i in range(m):

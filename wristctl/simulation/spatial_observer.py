@@ -14,7 +14,7 @@ from wristctl.simulation.observer import NoCamera
 from wristctl.simulation.spatial_actuator import believed_pulls, held_stiffness
 from wristctl.wrist.spatial.posture import bend_segments, posture_like
 from wristctl.wrist.spatial.spatial_dynamics import momenta_like, spatial_bias, spatial_mass_matrix
-from wristctl.wrist.spatial.spatial_tendons import moment_arms_of
+from wristctl.wrist.spatial.spatial_tendons import arms_about_bend
 
 # Rows of the state of one plane.
 OF_A_PLANE = 3
@@ -104,22 +104,17 @@ def propagate_bends(known: Any, x: Any, counts: Any, bend: Any, h: float) -> Non
 
     Linearly implicit in each plane's damping and stiffness, as in one plane.
     """
-    pulls, arm, rate, still, extra = (
-        lanes_like(counts),
-        lanes_like(bend),
-        lanes_like(bend),
-        lanes_like(bend),
-        lanes_like(bend),
-    )
+    pulls, arms_y, arms_z = lanes_like(counts), lanes_like(counts), lanes_like(counts)
+    rate, still, extra = lanes_like(bend), lanes_like(bend), lanes_like(bend)
     zero = zero_like(x[0])
     bend[0], bend[1], rate[0], rate[1], still[0], still[1] = x[0], x[3], x[1], x[4], zero, zero
     believed_pulls(known.drive, known.wrist, known.alike, bend, counts, pulls)
     torque_y, torque_z, stiff_y, stiff_z = zero, zero, zero, zero
+    arms_about_bend(known.wrist, bend, arms_y, arms_z)
     for t in range(len(pulls)):
-        moment_arms_of(known.wrist, bend, t, arm)
         stiffness = held_stiffness(known.drive, known.alike[t])
-        torque_y, stiff_y = torque_y + pulls[t] * arm[0], stiff_y + stiffness * arm[0] * arm[0]
-        torque_z, stiff_z = torque_z + pulls[t] * arm[1], stiff_z + stiffness * arm[1] * arm[1]
+        torque_y, stiff_y = torque_y + pulls[t] * arms_y[t], stiff_y + stiffness * arms_y[t] * arms_y[t]
+        torque_z, stiff_z = torque_z + pulls[t] * arms_z[t], stiff_z + stiffness * arms_z[t] * arms_z[t]
     coupling(known.coupling, known, bend, rate, still, extra)
     x[0], x[1] = _advanced(known.model_y, x[0], x[1], torque_y + x[2] - extra[0], stiff_y, h)
     x[3], x[4] = _advanced(known.model_z, x[3], x[4], torque_z + x[5] - extra[1], stiff_z, h)

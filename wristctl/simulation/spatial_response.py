@@ -8,7 +8,7 @@ from wristctl.lanes.lane import planar, where
 from wristctl.lanes.rows import rows_of
 from wristctl.simulation.spatial_observer import coupling
 from wristctl.wrist.allocation import allocate
-from wristctl.wrist.spatial.spatial_tendons import moment_arms_of
+from wristctl.wrist.spatial.spatial_tendons import arms_about_bend
 
 
 class Laws(NamedTuple):
@@ -29,16 +29,17 @@ class Seen(NamedTuple):
 
 
 class Room(NamedTuple):
-    """Rows to work on: two each, and a planar vector for each place of tendons.
+    """Rows to work on: two each, and for each place of tendons its moment arms [m], and these as a planar vector.
 
-    Behind a tick `bend` is what the laws have seen.
+    Behind a tick `bend` is what the laws have seen, and the moment arms are those there.
     """
 
     bend: Any
     speed: Any
     wish: Any
     extra: Any
-    lever: Any
+    arms_y: Any
+    arms_z: Any
     arms: Any
 
 
@@ -50,19 +51,19 @@ def respond_in_planes(laws: Any, known: Any, seen: Any, room: Any, since: float,
     """
     ulnar, flexion, least, greatest = laws
     target_y, target_z = rows_of(ulnar.reference), rows_of(flexion.reference)
-    rows, bend, speed, wish, extra, lever = seen.rows, room.bend, room.speed, room.wish, room.extra, room.lever
+    rows, bend, speed, wish, extra = seen.rows, room.bend, room.speed, room.wish, room.extra
     wish[0], wish[1] = target_y[2], target_z[2]
     bend[0], bend[1], speed[0], speed[1] = rows[0], rows[3], rows[1], rows[4]
     coupling(known.coupling, known, bend, speed, wish, extra)
     low_y, high_y, low_z, high_z = -extra[0], -extra[0], -extra[1], -extra[1]
+    arms_about_bend(known.wrist, bend, room.arms_y, room.arms_z)
     for t in range(len(pulls)):
-        moment_arms_of(known.wrist, bend, t, lever)
-        room.arms[t] = planar(lever[0], lever[1])
-        forth, back = least[t], greatest[t]
-        low_y = low_y + lever[0] * where(lever[0] > 0.0, forth, back)
-        high_y = high_y + lever[0] * where(lever[0] > 0.0, back, forth)
-        low_z = low_z + lever[1] * where(lever[1] > 0.0, forth, back)
-        high_z = high_z + lever[1] * where(lever[1] > 0.0, back, forth)
+        arm_y, arm_z, forth, back = room.arms_y[t], room.arms_z[t], least[t], greatest[t]
+        room.arms[t] = planar(arm_y, arm_z)
+        low_y = low_y + arm_y * where(arm_y > 0.0, forth, back)
+        high_y = high_y + arm_y * where(arm_y > 0.0, back, forth)
+        low_z = low_z + arm_z * where(arm_z > 0.0, forth, back)
+        high_z = high_z + arm_z * where(arm_z > 0.0, back, forth)
     seen_y, seen_z = Estimate(rows[0], rows[1], rows[2]), Estimate(rows[3], rows[4], rows[5])
     perceive_within(ulnar, seen_y, seen.withheld_y, (low_y, high_y), since, period)
     perceive_within(flexion, seen_z, seen.withheld_z, (low_z, high_z), since, period)

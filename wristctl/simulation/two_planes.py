@@ -11,15 +11,16 @@ from wristctl.config.loop import Loop
 from wristctl.config.wrist import WristParameters
 from wristctl.control.law import Controller
 from wristctl.errors import UserError
-from wristctl.lanes.blocks import to_rows
 from wristctl.processes import cores, stoppable
 from wristctl.seeds import Entropy
 from wristctl.simulation.bend_course import BendCourse
+from wristctl.simulation.bend_outcome import BendOutcome, bend_outcome
 from wristctl.simulation.bend_paths import BEND_PATHS, turned
 from wristctl.simulation.disturbances import acting_in_space
 from wristctl.simulation.kernel import Span
-from wristctl.simulation.spatial_batch import SpatialBatch, check_spatial, sample_step, spatial_batch
-from wristctl.simulation.spatial_kernel import SPATIAL_RECORDED, run_spatial
+from wristctl.simulation.rollout import How
+from wristctl.simulation.spatial_batch import SpatialBatch, check_spatial, sample_step, spatial_batch, spatial_columns
+from wristctl.simulation.spatial_kernel import SPATIAL_BRIEFLY, run_spatial
 from wristctl.simulation.worlds import World
 from wristctl.wrist.allocation import allocated
 from wristctl.wrist.spatial.spatial_model import spatial_terms
@@ -124,8 +125,8 @@ def simulate_two_planes(
     Raises UserError for a path beyond the wrist's range, a law in plain Python, or what no loop in two planes has.
     """
     world = World(loop or Loop(), wrist or WristParameters())
-    (course,) = rollout_bends(law, np.atleast_2d(gains), references, [world], layout, force, [stream])
-    return course
+    outcome = rollout_bends(law, np.atleast_2d(gains), references, [world], layout, force, [stream], record=True)
+    return outcome.courses[0]
 
 
 def rollout_bends(
@@ -137,66 +138,46 @@ def rollout_bends(
     force: Array | None = None,
     streams: Sequence[Entropy] | None = None,
     threads: int | None = None,
-) -> list[BendCourse]:
+    record: How = False,
+) -> BendOutcome:
     """Follow one path by several loops at once, as lanes: gains (count, g), their worlds and streams (count,).
 
-    The loops have one structure, timing, camera and kind of disturbances; parameters as `simulate_two_planes`.
+    The loops have one structure, timing, camera and kind of disturbances; parameters as `simulate_two_planes`. Samples
+    are recorded as `record` says: none, all with their courses, or briefly, the bends alone, which tell oscillation.
     """
     loop, wrist, count = worlds[0].loop, worlds[0].wrist, len(gains)
     layout = layout or TendonLayout.of(wrist)
-    step = sample_step(loop.control_period)
     check_bends(law, references[:, 0], wrist, loop)
-    samples = references.shape[2]
-    time = step * np.arange(float(samples))
+    time = sample_step(loop.control_period) * np.arange(float(references.shape[2]))
+    columns = len(SPATIAL_BRIEFLY) if record == "briefly" else spatial_columns(layout, loop) if record else 0
     lanes = spatial_batch(
-        law, gains, references, worlds, layout, _acting(loop, time, force), streams or [(0,)] * count,
-        loop.coupling == "compensated",
-    )  # fmt: skip
-    _advance(lanes, samples, threads or cores())
-    record = lanes.state.record
-    columns = record.shape[2]
-    flat = record.reshape(len(record), samples * columns, *record.shape[3:])
-    kept = to_rows(flat, count).reshape(count, samples, columns)
-    wanted = references[:, 0].T
-    courses = []
-    for rows, world in zip(kept, worlds, strict=True):
-        places, first = len(layout.places), len(SPATIAL_RECORDED)
-        courses.append(
-            BendCourse(
-                time=time,
-                bend=rows[:, 0:2],
-                rate=rows[:, 2:4],
-                bend_ref=wanted,
-                bend_seen=rows[:, 9:11],
-                load_seen=rows[:, 11:13],
-                torque_wanted=rows[:, 4:6],
-                torque=rows[:, 6:8],
-                share=rows[:, 8],
-                pulls=rows[:, first : first + places],
-                acting=rows[:, first + places : first + 2 * places],
-                coordinates=rows[:, first + 3 * places :],
-                length=world.plant.length,
-                length_known=world.wrist.length,
-                spools=rows[:, first + 2 * places : first + 3 * places] if loop.actuator.level == "tendon" else None,
-            )
-        )
-    return courses
+        law, gains, references, worlds, layout, _acting(loop, time, force), streams or [(0,)] * count, columns
+    )
+    _advance(lanes, threads or cores())
+    return bend_outcome(lanes, time, worlds)
 
 
-def _advance(lanes: SpatialBatch, samples: int, workers: int) -> None:
+def _advance(lanes: SpatialBatch, workers: int) -> None:
     """Run all blocks to the end, on so many threads, in pieces between which an interrupt is heard."""
-    stop, blocks = Event(), len(lanes.state.alive)
-    piece = max(1, _PIECE // (lanes.setup.ticks * lanes.setup.substeps))
+    stop, blocks, samples = Event(), lanes.blocks, lanes.samples
+    steps = lanes.setup.ticks * lanes.setup.substeps
+    piece = max(1, _PIECE // steps)
+    together = max(1, min(_PIECE // (steps * samples), -(-blocks // workers)))
 
-    def run(block: int) -> None:
+    def run(begin: int) -> None:
         scratch = lanes.scratch()
         for first in range(0, samples, piece):
             if not stop.is_set():
-                span = Span(block, block + 1, first, min(first + piece, samples))
+                span = Span(begin, min(begin + together, blocks), first, min(first + piece, samples))
                 run_spatial(lanes.setup, lanes.course, lanes.values, lanes.state, scratch, span)
 
-    with stoppable(min(workers, blocks), stop) as pool:
-        for _ in pool.map(run, range(blocks)):
+    pieces = range(0, blocks, together)
+    if min(workers, len(pieces)) == 1:
+        for begin in pieces:
+            run(begin)
+        return
+    with stoppable(min(workers, len(pieces)), stop) as pool:
+        for _ in pool.map(run, pieces):
             pass
 
 

@@ -164,8 +164,8 @@ def bend_twin(
     law = controller(row.controller)
     disturbed = settings.loop.model_copy(update={"disturbances": trial.disturbances(settings, followed)})
     (loop,) = loops_of(disturbed, [draws.plant(0)])
-    (course,) = rollout_bends(
+    outcome = rollout_bends(
         law, np.array([gains_of(law, row.gains, tuned)]), followed.references, [World(loop, wrist)],
-        layout_of_axes(wrist), None, [draws.camera(trial.scenario, 0)],
+        layout_of_axes(wrist), None, [draws.camera(trial.scenario, 0)], record=True,
     )  # fmt: skip
-    return course
+    return outcome.courses[0]

@@ -23,7 +23,6 @@ from wristctl.simulation.stationary_filter import Belief, stationary_gains
 from wristctl.trial.spatial_belief import PLANES, belief_of, known_of, layout_of_axes
 from wristctl.trial.steering import REMEMBERED
 from wristctl.wrist.directions import in_plane
-from wristctl.wrist.spatial.spatial_tendons import moment_arms_of
 
 # Share of a wanted torque below which it was out of the tendons' reach.
 _FULL = 1.0 - 1e-9
@@ -157,16 +156,18 @@ def _respond(belief: Any, laws: Any, now: Any, withheld: Any, to_follow: Any, pe
     least, greatest = part(rows_of(laws.least), 0, belief.pulls), part(rows_of(laws.greatest), 0, belief.pulls)
     x, less = rows_of(now), rows_of(withheld)
     two = part(x, 0, (0, 0))
-    room = Room(lanes_like(two), lanes_like(two), lanes_like(two), lanes_like(two), lanes_like(two), planes_like(least))
+    room = Room(
+        lanes_like(two), lanes_like(two), lanes_like(two), lanes_like(two), lanes_like(least), lanes_like(least),
+        planes_like(least),
+    )  # fmt: skip
     pulls = part(row, 0, belief.pulls)
     wanted_y, wanted_z, share = respond_in_planes(
         Laws(ulnar, flexion, least, greatest), known, Seen(x, less[0], less[1]), room, 0.0, period, pulls
     )
     torque_y, torque_z = zero_like(x[0]), zero_like(x[0])
     for t in range(len(pulls)):
-        moment_arms_of(known.wrist, room.bend, t, room.lever)
-        torque_y = torque_y + pulls[t] * room.lever[0]
-        torque_z = torque_z + pulls[t] * room.lever[1]
+        torque_y = torque_y + pulls[t] * room.arms_y[t]
+        torque_z = torque_z + pulls[t] * room.arms_z[t]
     count = len(pulls)
     row[count], row[count + 1], row[count + 2], row[count + 3] = wanted_y, wanted_z, torque_y, torque_z
     row[count + 4] = share

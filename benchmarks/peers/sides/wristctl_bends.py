@@ -16,13 +16,14 @@ from wristctl.simulation.worlds import World
 def prepare(
     task: BendTask, lanes: int, threads: int, steps: int, actuator: str = "ideal"
 ) -> Callable[[int], np.ndarray]:
-    """The whole motion of every lane is kept, as it always is in two planes."""
+    """One lane is recorded, as `simulate` does it; many are not."""
+    record = lanes == 1
     law, worlds = controller("smc"), [World(loop_of(task, steps, actuator), WRIST)] * lanes
     gains = np.tile(task.gains, (lanes, 1))
 
     def run(ticks: int) -> np.ndarray:
-        courses = rollout_bends(law, gains, task.reference[:, :, :ticks], worlds, threads=threads)
-        return courses[0].coordinates.ravel()
+        done = rollout_bends(law, gains, task.reference[:, :, :ticks], worlds, threads=threads, record=record)
+        return done.courses[0].coordinates.ravel() if record else done.metrics["rmse"]
 
     run(10)
     return run

@@ -153,13 +153,13 @@ _STRAIGHT = 1e-14
 
 @compiled
 def tip_bend(segment: Any, q: Any, rate: Any) -> Any:
-    """Bend of the last disc's tangent from the base (y, z) [rad], and its rates (y, z) [rad/s].
+    """Bend of the last disc's tangent from the base (y, z) [rad], its rates (y, z) [rad/s], and the disc's centre [m].
 
-    It is the vector of the angle between the tangents, along the part of the last one across the base's. Of one segment
-    it is u; of several it is not their sum.
+    The bend is the vector of the angle between the tangents, along the part of the last one across the base's. Of one
+    segment it is u; of several it is not their sum.
     """
     zero = zero_like(segment.length)
-    tangent, spin = space(1.0 + zero, zero, zero), space(zero, zero, zero)
+    tangent, spin, end = space(1.0 + zero, zero, zero), space(zero, zero, zero), space(zero, zero, zero)
     across_y, across_z = space(zero, 1.0 + zero, zero), space(zero, zero, 1.0 + zero)
     for k in range(len(q) // 2):
         bend_y, bend_z, rate_y, rate_z = q[2 * k], q[2 * k + 1], rate[2 * k], rate[2 * k + 1]
@@ -171,6 +171,7 @@ def tip_bend(segment: Any, q: Any, rate: Any) -> Any:
         spin = spin + (c.c1 * rate_y + along * bend_y) * across_z
         spin = spin - (c.c1 * rate_z + along * bend_z) * across_y
         both = c.c1 * tangent + c.c2 * nu
+        end = end + segment.length * both
         tangent = c.c0 * tangent + c.c1 * nu
         across_y = across_y - bend_y * both
         across_z = across_z - bend_z * both
@@ -184,4 +185,4 @@ def tip_bend(segment: Any, q: Any, rate: Any) -> Any:
     growing = slope * moving.x
     rate_y = per_sine * moving.y + growing * tangent.y
     rate_z = per_sine * moving.z + growing * tangent.z
-    return per_sine * tangent.y, per_sine * tangent.z, rate_y, rate_z
+    return per_sine * tangent.y, per_sine * tangent.z, rate_y, rate_z, end

@@ -63,7 +63,7 @@ def _terms(parameters: Any, states: Any, out: Any, cut: Any, of_tendons: Any, of
             result[3 * i] = v.x
             result[3 * i + 1] = v.y
             result[3 * i + 2] = v.z
-        bend_y, bend_z, rate_y, rate_z = tip_bend(segment, q, rate)
+        bend_y, bend_z, rate_y, rate_z, _ = tip_bend(segment, q, rate)
         result[12] = bend_y
         result[13] = bend_z
         result[14] = rate_y

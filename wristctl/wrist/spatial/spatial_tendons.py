@@ -71,17 +71,29 @@ def lengths_along(wrist: Any, q: Any, lengths: Any) -> None:
 
 
 @compiled
+def _arm(wrist: Any, t: int, k: int, y: Any, z: Any, spans: Any) -> Any:
+    """Moment arms of a tendon about the segment k that is bent by (y, z) [m]."""
+    sinc, fall, _ = spans
+    c_y, c_z, share = place_y(wrist.tendons, t), place_z(wrist.tendons, t), share_of(wrist.tendons, t, k)
+    squeeze = fall * (wrist.segment.length - c_y * y - c_z * z)
+    return share * (c_y * sinc + squeeze * y), share * (c_z * sinc + squeeze * z)
+
+
+@compiled
 def moment_arms_of(wrist: Any, q: Any, t: int, arms: Any) -> None:
     """Moment arms of a tendon, minus the derivatives of its length by each coordinate [m]; 2n rows."""
-    segment, tendons = wrist.segment, wrist.tendons
-    c_y, c_z = place_y(tendons, t), place_z(tendons, t)
     for k in range(len(q) // 2):
         y, z = q[2 * k], q[2 * k + 1]
-        sinc, fall, _ = _spans(segment, y, z)
-        share = share_of(tendons, t, k)
-        squeeze = fall * (segment.length - c_y * y - c_z * z)
-        arms[2 * k] = share * (c_y * sinc + squeeze * y)
-        arms[2 * k + 1] = share * (c_z * sinc + squeeze * z)
+        arms[2 * k], arms[2 * k + 1] = _arm(wrist, t, k, y, z, _spans(wrist.segment, y, z))
+
+
+@compiled
+def arms_about_bend(wrist: Any, bend: Any, arms_y: Any, arms_z: Any) -> None:
+    """Moment arms of all tendons of a wrist of one segment bent like this (2 rows), into T rows each [m]."""
+    y, z = bend[0], bend[1]
+    spans = _spans(wrist.segment, y, z)
+    for t in range(len(arms_y)):
+        arms_y[t], arms_z[t] = _arm(wrist, t, 0, y, z, spans)
 
 
 @compiled

@@ -1,0 +1,69 @@
+"""Rollouts in two planes tell the same metrics whatever of them is recorded, and are what their courses are."""
+
+import numpy as np
+import pytest
+
+from wristctl.config.loop import Loop
+from wristctl.config.wrist import WristParameters
+from wristctl.control.table import controller, gains_of
+from wristctl.simulation.bend_course import BEND_METRICS
+from wristctl.simulation.bend_outcome import BendOutcome
+from wristctl.simulation.rollout import How
+from wristctl.simulation.two_planes import bend_path, rollout_bends
+from wristctl.simulation.worlds import World
+
+LAW = controller("pid-ff")
+PATH = bend_path("circumduction", 30.0, 1.0, 1.5)
+# Of the first the tendons are too weak, the third bends beyond its range, the others share a world.
+WRISTS = [WristParameters(tension_limit=6.0), WristParameters(), WristParameters(range_deg=20.0)]
+LANES = (0, 1, 2, 1, 1, 1, 1, 1, 1, 0)
+
+
+def ran(loop: Loop, record: How) -> BendOutcome:
+    every = loop.control_period / 1e-3
+    path = PATH[:, :, :: max(1, round(every))]
+    worlds = [World(loop, WRISTS[lane]) for lane in LANES]
+    gains = np.outer(np.linspace(1.0, 1.3, len(LANES)), gains_of(LAW, "default"))
+    force = np.array([0.0, 0.4, 0.0])
+    streams = [(2, lane) for lane in range(len(LANES))]
+    return rollout_bends(LAW, gains, path, worlds, None, force, streams, record=record)
+
+
+@pytest.mark.parametrize(
+    "loop",
+    [
+        Loop(coupling="ignored"),
+        pytest.param(
+            Loop.model_validate({
+                "control_period": 5e-3, "actuator": {"level": "tendon", "sheath": 1.0}, "sensor": {"level": "camera"},
+            }),
+            marks=pytest.mark.slow,
+        ),
+    ],
+    ids=["ideal", "real"],
+)  # fmt: skip
+def test_metrics_are_those_of_the_courses_whatever_is_recorded(loop: Loop) -> None:
+    nothing, briefly, everything = ran(loop, False), ran(loop, "briefly"), ran(loop, True)
+    assert not nothing.courses and not briefly.courses and nothing.bends is None
+    for outcome in (nothing, briefly):
+        np.testing.assert_array_equal(outcome.failed, everything.failed)
+        np.testing.assert_array_equal(outcome.until, everything.until)
+        for name, values in everything.metrics.items():
+            np.testing.assert_array_equal(outcome.metrics[name], values, err_msg=name)
+    metrics = everything.all_metrics()
+    np.testing.assert_equal(briefly.all_metrics(), metrics)
+    assert list(metrics) == list(BEND_METRICS)
+    assert set(BEND_METRICS) - set(nothing.metrics) == {"oscillation"}
+    for lane, course in enumerate(everything.courses):
+        assert (course.failed, course.until) == (everything.failed[lane], everything.until[lane])
+        for name, value in course.metrics().items():  # sums run one by one, numpy's by pairs
+            np.testing.assert_allclose(metrics[name][lane], value, rtol=1e-12, atol=1e-14, err_msg=name)
+    assert everything.failed.any() and not everything.failed.all()
+    assert np.ptp(everything.metrics["saturation"]) > 0.0
+
+
+def test_lanes_of_one_world_and_of_equal_worlds_are_the_same() -> None:
+    loop, gains = Loop(coupling="ignored"), np.tile(gains_of(LAW, "default"), (3, 1))
+    shared = rollout_bends(LAW, gains, PATH, [World(loop, WRISTS[1])] * 3)
+    apart = rollout_bends(LAW, gains, PATH, [World(loop.model_copy(), WRISTS[1]) for _ in range(3)])
+    np.testing.assert_equal(apart.metrics, shared.metrics)
