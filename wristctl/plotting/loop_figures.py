@@ -147,7 +147,9 @@ def overlay(trajectories: Sequence[Trajectory], heading: str = "") -> Figure:
     largest = max(float(np.degrees(np.abs(course.theta_ref)).max()) for course in trajectories)
     _at_most(below, 0.5 * _LEAST_DEG, 2.0 * largest + 1.0)
     above.set(ylabel="bending angle [deg]")
-    below.set(xlabel="time [s]", ylabel="|error| [deg]")
+    floored = any((np.degrees(np.abs(course.error)) < _LEAST_DEG).any() for course in trajectories)
+    least = f"\n(less than {_LEAST_DEG:g} as {_LEAST_DEG:g})" if floored else ""
+    below.set(xlabel="time [s]", ylabel=f"|error| [deg]{least}")
     title(above, heading)
     legend_below(picture)
     return picture

@@ -155,7 +155,7 @@ RESIDUALS: Mapping[str, Residual] = {
     ),
     "unseen": Residual(
         _SHARE, "share of the believed usable angles that did not come, over two seconds", _never, 0.12, _CAMERA,
-        notes="{value} of the usable angles that should come did not",
+        notes="{value} of the angles that the camera should give did not come: marker not seen, or pictures lost",
     ),
     "repeated": Residual(
         _COUNT, "pictures in the last second that were no news, or whose time cannot be", _never, 3.0,
