@@ -86,7 +86,13 @@ def main() -> None:
     head = ["| | " + " | ".join(COLUMNS) + " | stopped |", "| --- |" + " --- |" * (len(COLUMNS) + 1)]
     lines = [*_BEGIN, *head, row("/".join(DEFAULT), default), ""]
     for sheath in SHEATHS:
-        lines += [f"## Sheaths of {sheath:g} rad", "", "One seed." if FEW == 1 else f"Medians of {FEW} seeds.", "", *head]
+        lines += [
+            f"## Sheaths of {sheath:g} rad",
+            "",
+            "One seed." if FEW == 1 else f"Medians of {FEW} seeds.",
+            "",
+            *head,
+        ]
         lines += [row("/".join(law), [found[Rig(law, sheath, seed)] for seed in range(FEW)]) for law in laws]
         lines.append("")
     (HERE / "hardware" / "accuracy.md").write_text("\n".join(lines).rstrip() + "\n")
