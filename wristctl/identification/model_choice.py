@@ -98,7 +98,7 @@ def _held_again(
     if base.terms == ("slack",) and base.verdict != "wanted":
         bare = _tried(robot, cases, centred, best.terms[1:], None)
         yield bare
-        yield _tried(robot, cases, centred, (*bare.terms, "slack"), bare)
+        yield TriedModel((*bare.terms, "slack"), best.fits, bare)
     for model in rest:
         more = _tried(robot, cases, centred, (*best.terms, model.terms[-1]), best)
         yield more
