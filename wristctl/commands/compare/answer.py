@@ -67,8 +67,6 @@ def answer_of(
 def best_on_yours(rankings: Sequence[Ranking]) -> str:
     """Probability that a controller is the best on an identified robot in a motion: its share of the draws of both.
 
-    On most motions together the robot's best is surer than that, since what one motion decides does not count there.
-
     Empty where the worlds are no draws of an identification's posterior.
     """
     import numpy as np
@@ -86,7 +84,7 @@ def best_on_yours(rankings: Sequence[Ranking]) -> str:
         sentences.append(
             f"{ranking.labels[row]} is best{steps} on your robot with probability {shares[row].value:.2f} (95 % "
             f"{shares[row].low:.2f} to {shares[row].high:.2f}) in a motion drawn at random: it has the least error in "
-            f"{shares[row].times} of {shares[row].n} worlds, each a wrist that your trials leave possible with a motion."
+            f"{shares[row].times} of {shares[row].n} worlds, each a motion and a wrist that your trials leave possible."
         )
     return " ".join(sentences)
 
