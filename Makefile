@@ -8,7 +8,7 @@ CLAIMS ?= experiments/claims.yaml
 BIN := .venv/bin
 
 .PHONY: run test lint bench bench-sweeps bench-peers bench-all firmware test-firmware test-faults test-trust test-vision test-identify \
-	test-allocation test-slow test-rig fault-table sound-rigs test-statistics converge worlds docs clean venv mutants coverage installed matrix
+	test-allocation test-slow test-rig fault-table sound-rigs inner-rigs test-posterior test-statistics converge worlds docs clean venv mutants coverage installed matrix
 
 run: .venv/run
 	@set -eo pipefail; \
@@ -60,6 +60,15 @@ test-firmware: .venv/dev firmware
 # Do 95 % intervals of identified parameters hold the truth in 90 to 99 of 100 benches?
 test-identify: .venv/dev
 	WRISTCTL_THOROUGH=1 $(BIN)/pytest -n auto --maxschedchunk 1 -rP tests/identification
+
+# Friction inside the wrist and slack, from an open log (--way arcs) and from a loop: found where they are, intervals that
+# hold? WHICH="--way loop --count 40"
+inner-rigs: .venv/dev
+	$(BIN)/python -m tests.identification.inner_rigs $(WHICH)
+
+# Is a law that is said to be best with probability p on an identified wrist the best there? WHICH="--count 100"
+test-posterior: .venv/dev
+	$(BIN)/python -m tests.identification.posterior_rigs $(WHICH)
 
 # Do 95 % intervals of a comparison hold the truth as often, and groups of ties all that are alike?
 test-statistics: .venv/dev

@@ -209,6 +209,8 @@ def test_a_loop_of_slack_tendons_wants_friction_inside_the_wrist() -> None:
     assert fit.inner_friction is not None and fit.inner_presliding is not None
     ratio = fit.inner_friction.value / fit.stiffness.value
     assert ratio == pytest.approx(0.04 / stiffness, rel=0.1), "spools alone tell a ratio"
+    assert fit.inner_friction.holds(0.04) and fit.stiffness.holds(stiffness)
+    assert fit.inner_presliding.holds(math.radians(0.6))
     assert all(side.holds(1.5e-3) for side in fit.slack)
     assert fit.friction.low == 0.0
 

@@ -61,7 +61,7 @@ def test_a_late_planar_wrist_tells_its_delay_and_with_tensions_its_stiffness(sig
 
 def test_without_tensions_or_masses_nothing_in_newton_metres_is_looked_for() -> None:
     robot = robot_of_logs([planar()], WRIST, 0.01)
-    assert set(robot.unknowns(())) == {"gain", "tendon", "delay", "damping"}
+    assert set(robot.unknowns(())) == {"gain", "tendon", "delay", "damping", "inertia"}
     log = planar(mass=0.2, trials=2)
     log.columns["mass"][300:] = 0.6
     assert "softening" in robot_of_logs([log], WRIST, 0.01).unknowns(())

@@ -8,21 +8,26 @@ import numpy as np
 import pytest
 
 from wristctl.arrays import Array
-from wristctl.wrist.quasistatic_arcs import QuasistaticArcs
+from wristctl.config.wrist import WristParameters
+from wristctl.wrist.quasistatic_arcs import SMOOTH, QuasistaticArcs
+from wristctl.wrist.tendon_layout import TendonLayout
 
 RADIUS, STIFF = 0.05, 8.0
 TOWARD = np.array([[math.cos(angle), math.sin(angle)] for angle in np.radians([0.0, 120.0, 240.0])])
 ENDS = np.array([1, 1, 1])
 
 
-def _one(variants: int = 1, arms: Array = RADIUS * TOWARD, ends: Array = ENDS, **ways: float) -> QuasistaticArcs:
+def _one(
+    variants: int = 1, arms: Array = RADIUS * TOWARD, ends: Array = ENDS, lengths: tuple[float, ...] = (),
+    spans: int = 0, **ways: float,
+) -> QuasistaticArcs:  # fmt: skip
     values = {"friction": 0.0, "sheath": 0.0, "presliding": 1e-4, "inner": 0.0, "inner_presliding": 0.01} | ways
     values = {"creep": 0.0, "creep_time": 1.0, "damping": 0.0} | values
     rows = {name: np.full(variants, value) for name, value in values.items()}
     count, tendons = arms.shape[1], len(arms)
     return QuasistaticArcs(
         arms=np.broadcast_to(arms, (variants, tendons, count)), ends=ends, stiffness=np.ones((variants, count)),
-        tendon=np.full((variants, tendons), STIFF / RADIUS**2), **rows,
+        tendon=np.full((variants, tendons), STIFF / RADIUS**2), lengths=lengths, spans=spans, smooth=SMOOTH, **rows,
     )  # fmt: skip
 
 
@@ -132,3 +137,47 @@ def test_an_arc_that_shortens_bends_less() -> None:
     stiff = _one().rest(reeled, _pause(1))[0, 0]
     soft = _one(arms=RADIUS * np.column_stack([TOWARD, np.ones(3)])).rest(reeled, _pause(1))[0, 0]
     assert 0.0 < soft[0] < stiff[0] and soft[2] > 0.0
+
+
+@pytest.mark.parametrize("spans", [1, 4])
+def test_tendons_straight_between_discs_are_as_long_as_those_of_the_layout(spans: int) -> None:
+    wrist = WristParameters(discs=spans + 1)
+    layout = TendonLayout.of(wrist)
+    places = np.array(
+        [[place.radius * math.cos(place.angle), place.radius * math.sin(place.angle)] for place in layout.places]
+    )
+    arcs = _one(
+        arms=places, ends=np.ones(len(places), int), lengths=(wrist.length,), spans=spans,
+    )  # fmt: skip
+    bend = np.array([0.5, -0.3])
+    shorter = arcs.reeled_by(bend[None, None])[0, 0]
+    angle = math.hypot(*bend)
+    straight = math.sin(0.5 * angle / spans) / (0.5 * angle / spans)
+    assert shorter == pytest.approx(wrist.length - (wrist.length - places @ bend) * straight, rel=1e-12)
+    step = 1e-5
+    for k in range(2):
+        further = bend + step * np.eye(2)[k]
+        by_bend = (arcs.reeled_by(further[None, None])[0, 0] - shorter) / step
+        arms = layout.moment_arms(bend, wrist.length, wrist.discs)[:, k]
+        assert by_bend == pytest.approx(arms, rel=1e-3)
+    reeled = np.full((1, 1, len(places)), 1e-3) + (places @ bend)[None, None]
+    rest = arcs.rest(reeled, _pause(1))
+    pulls = arcs.pulls(reeled, rest)[0, 0]
+    torque = pulls @ layout.moment_arms(rest[0, 0], wrist.length, wrist.discs)
+    assert torque == pytest.approx(rest[0, 0], rel=1e-6), "springs and tendons balance"
+
+
+def test_inertia_lets_a_bend_swing_with_its_own_period_and_damping() -> None:
+    damping, inertia, step, samples = 0.4, 0.05, 0.002, 800
+    arcs = _one(arms=np.array([[RADIUS, 0.0]]), ends=np.array([1]), damping=damping, inertia=inertia)
+    reeled = np.r_[np.zeros(5), np.full(samples - 5, 0.02)] + 0.05  # its tendon stays taut
+    bend = arcs.rest(reeled[None, :, None], _pause(samples, step))[0, :, 0]
+    begin, end = (STIFF / (1.0 + STIFF) * length / RADIUS for length in (0.05, 0.07))
+    decay = 0.5 * damping / inertia
+    swing = math.sqrt((1.0 + STIFF) / inertia - decay**2)
+    time = step * (np.arange(samples - 5) + 0.5)
+    expected = end - (end - begin) * np.exp(-decay * time) * (
+        np.cos(swing * time) + decay / swing * np.sin(swing * time)
+    )
+    assert bend[5:] == pytest.approx(expected, abs=0.02 * (end - begin))
+    assert bend.max() - end > 0.1 * (end - begin)

@@ -11,6 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
+from scipy.stats import t as student
 
 from wristctl.arrays import Array
 from wristctl.identification.arc_robot import SLACK_ERROR, ArcRecording, ArcRobot, Term
@@ -19,10 +20,10 @@ _DRAWS, _SEED = 4000, 0
 _ZERO_SCALE = {"bend": 0.02, "tip": 2e-3}
 # Range in which zero and slack are looked for [rad or m, m], and change of a difference over the usual change.
 _ZERO_RANGE, _SLACK_RANGE, _STEP = 1.0, 1.5e-2, 1e-4
-# Error of a single sample that the priors are held against: 1 deg, or 2 mm.
-_ERROR = {"bend": math.radians(1.0), "tip": 2e-3}
-# The same of a tension [N].
-_TENSION_ERROR = 0.5
+# Error of a single sample that the priors are held against: 1 deg, or 2 mm; of a tension [N].
+_ERROR, _TENSION_ERROR = {"bend": math.radians(1.0), "tip": 2e-3}, 0.5
+# Where samples are weighed: searches, and the least of these errors over that.
+_SEARCHES, _LEAST_ERROR = 3, 1e-3
 
 
 class Score(NamedTuple):
@@ -62,6 +63,8 @@ class ArcFit:
     """Zero and slack of each session."""
     centred: bool
     """Whether the mean of the error over what is predicted does not count, as its authors have it."""
+    weights: tuple[float, float] = (1.0, 1.0)
+    """Error of a sample of the motion and of a tension, over the usual."""
 
     @property
     def numbers(self) -> int:
@@ -118,20 +121,24 @@ class ArcFit:
     @cached_property
     def told(self) -> dict[str, Told]:
         """The unknowns with intervals, by blocks of what was fitted: errors of neighbouring samples are alike."""
-        problem = _Problem(self.robot, self.terms, self.recordings)
+        problem = _Problem(self.robot, self.terms, self.recordings, self.weights)
         jacobian, residual = problem.jacobian(self.x) * problem.scale, problem.residuals(self.x[None])[0]
-        blocks = problem.blocks(len(residual))
+        blocks = problem.blocks()
+        measured, beforehand = jacobian[: len(blocks)], jacobian[len(blocks) :]
+        residual = residual[: len(blocks)]
         scores = np.zeros((blocks.max() + 1, len(self.x)))
-        np.add.at(scores, blocks, residual[:, None] * jacobian)
+        np.add.at(scores, blocks, residual[:, None] * measured)
         normal = jacobian.T @ jacobian
         inverse = np.linalg.inv(normal + 1e-12 * normal.diagonal().max() * np.eye(len(normal)))
         count = len(scores)
-        by_blocks = (inverse @ (scores.T @ scores) @ inverse).diagonal() * count / max(1, count - 1)
+        meat = scores.T @ scores * count / max(1, count - 1) + beforehand.T @ beforehand
+        by_blocks = (inverse @ meat @ inverse).diagonal()
         alone = inverse.diagonal() * float(np.mean(residual**2))  # wide where residuals depend on no such change
         variance = np.maximum(by_blocks, alone)
+        quantile = float(student.ppf(0.975, max(1, count - 1)))
         told = {}
         for k, (name, unknown) in enumerate(self.robot.unknowns(self.terms).items()):
-            value, half = float(self.x[k]), 1.96 * problem.scale[k] * math.sqrt(max(0.0, float(variance[k])))
+            value, half = float(self.x[k]), quantile * problem.scale[k] * math.sqrt(max(0.0, float(variance[k])))
             low, high = value - float(half), value + float(half)
             at_end = min(value - unknown.low, unknown.high - value) < 1e-2 * unknown.scale
             wide = half > max(abs(value), 3.0 * unknown.scale)
@@ -173,13 +180,16 @@ def fit_arcs(
     """
     problem = _Problem(robot, tuple(terms), tuple(recordings))
     x = problem.solved(begin or {})
+    for _ in range(_SEARCHES - 1 if robot.weighed else 0):
+        problem = replace(problem, weights=problem.weighed(x))
+        x = problem.searched(x)
     own = problem.own_of(x[None])
     whole = {session: part[0] for session, part in own.items()}
     unknowns = x[: len(problem.unknowns)]
     for recording in recordings:
         if recording.session not in whole:
             whole[recording.session] = problem.zeroed(unknowns, recording)
-    return ArcFit(robot, tuple(terms), tuple(recordings), x, whole, centred)
+    return ArcFit(robot, tuple(terms), tuple(recordings), x, whole, centred, problem.weights)
 
 
 def _drawn(blocks: int) -> NDArray[np.int64]:
@@ -196,6 +206,7 @@ class _Problem:
     robot: ArcRobot
     terms: tuple[Term, ...]
     recordings: tuple[ArcRecording, ...]
+    weights: tuple[float, float] = (1.0, 1.0)
 
     @cached_property
     def unknowns(self) -> list[str]:
@@ -252,16 +263,32 @@ class _Problem:
     def _of(self, values: Mapping[str, Array], own: Array, recording: ArcRecording, part: str) -> Array:
         expected, pulls = self.robot.expected(values, *_parted(own, self.robot), recording)
         chosen = getattr(recording, part)
-        error = _ERROR[self.robot.measured]
+        error, tension_error = _ERROR[self.robot.measured] * self.weights[0], _TENSION_ERROR * self.weights[1]
         wrong = np.nan_to_num((expected - recording.measured)[:, chosen].reshape(len(own), -1)) / error
         if recording.tensions is None:
             return np.asarray(wrong)
         tensions = recording.tensions[chosen]
         off = np.where(np.isfinite(tensions), pulls[:, chosen] - tensions, 0.0).reshape(len(own), -1)
-        return np.concatenate([wrong, off / _TENSION_ERROR], axis=1)
+        return np.concatenate([wrong, off / tension_error], axis=1)
 
-    def blocks(self, count: int) -> NDArray[np.int64]:
-        """Block of each residual; those of the slack have one for themselves."""
+    def weighed(self, x: Array) -> tuple[float, float]:
+        """Weights by the sizes of the residuals at x, of samples that were measured."""
+        values, own = dict(zip(self.unknowns, x[None].T, strict=False)), self.own_of(x[None])
+        sums = np.zeros((2, 2))
+        for one in self.fitted:
+            rows, chosen = self._of(values, own[one.session], one, "fitted")[0], one.fitted
+            parts = rows[: one.measured[chosen].size], rows[one.measured[chosen].size :]
+            there = one.measured, one.tensions if one.tensions is not None else one.measured[:0]
+            for k, (part, signals) in enumerate(zip(parts, there, strict=True)):
+                sums[k] += np.sum(part**2), np.isfinite(signals[chosen]).sum() if len(part) else 0
+        motion, tension = (
+            weight * max(_LEAST_ERROR, math.sqrt(square / count)) if count else weight
+            for weight, (square, count) in zip(self.weights, sums, strict=True)
+        )
+        return motion, tension
+
+    def blocks(self) -> NDArray[np.int64]:
+        """Block of each residual of a sample."""
         numbers, first = [], 0
         for recording in self.fitted:
             block = np.unique(recording.block[recording.fitted], return_inverse=True)[1] + first
@@ -269,8 +296,7 @@ class _Problem:
             numbers.append(np.repeat(block, recording.measured.shape[1]))
             if recording.tensions is not None:
                 numbers.append(np.repeat(block, recording.tensions.shape[1]))
-        of_samples = np.concatenate(numbers)
-        return np.concatenate([of_samples, np.full(count - len(of_samples), first)])
+        return np.concatenate(numbers)
 
     def jacobian(self, x: Array) -> Array:
         """Derivatives of the residuals by differences."""
@@ -285,7 +311,10 @@ class _Problem:
             if self.robot.measured == "tip":
                 straight = np.nan_to_num(first.measured[first.fitted][0]) - [sum(self.robot.lengths), 0.0, 0.0]
                 zeros[k * len(self.own_scale) :][:3] = straight
-        x = np.r_[unknowns, zeros]
+        return self.searched(np.r_[unknowns, zeros])
+
+    def searched(self, x: Array) -> Array:
+        """Values with the least squares of the residuals, sought from x on."""
         low, high = self.bounds()
         return _least(self.residuals, np.clip(x, low + 1e-9, high - 1e-9), self.scale, (low, high))
 

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wristctl.arrays import Array
-from wristctl.wrist.quasistatic_arcs import QuasistaticArcs
+from wristctl.wrist.quasistatic_arcs import SMOOTH, QuasistaticArcs
 from wristctl.wrist.spatial.spatial_kinematics import spatial_tips
 
 Term = Literal["tendon friction", "inner friction", "slack", "creep"]
@@ -48,6 +48,7 @@ UNKNOWNS: dict[str, ArcUnknown] = {
     "creep": ArcUnknown(0.1, 0.0, 0.9, 0.1, "", "share of the bending stiffness that relaxes"),
     "creep_time": ArcUnknown(5.0, 0.5, 100.0, 5.0, "s", "time constant of that"),
     "damping": ArcUnknown(0.05, 0.0, 5.0, 0.05, "s", "damping of bending over its stiffness"),
+    "inertia": ArcUnknown(5e-3, 0.0, 1.0, 2e-3, "s^2", "inertia of bending over its stiffness"),
     "force": ArcUnknown(0.6, 1e-4, 1e3, 0.2, "N m/rad", "bending stiffness of the first arc, by the tendons' tensions"),
 }  # fmt: skip
 """By name; of a number for each arc the name is followed by _ and the arc's number."""
@@ -83,6 +84,12 @@ class ArcRobot:
     """How well unknowns are known beforehand: standard deviations from where the search begins."""
     timed: bool = True
     """Whether its recordings have times, without which nothing is told of creep."""
+    spans: int = 0
+    """Straight spans of a tendon between discs along an arc; 0: it follows the arc."""
+    weighed: bool = False
+    """Whether samples count by the size of their residuals against what is known beforehand, not by 1 deg or 2 mm."""
+    smooth: float = SMOOTH
+    """Stretch below which a tendon passes smoothly from slack to taut [m]."""
 
     @property
     def unit(self) -> str:
@@ -167,13 +174,13 @@ class ArcRobot:
         return QuasistaticArcs(
             arms, ends, stiffness, tendon, others["friction"], others["sheath"], others["presliding"],
             others["inner_friction"], others["inner_presliding"], others["creep"], others["creep_time"],
-            others["damping"],
+            others["damping"], self.lengths, self.spans, others["inertia"], self.smooth,
         )  # fmt: skip
 
 
 _ABSENT = {
     "friction": 0.0, "sheath": 0.0, "presliding": 1.0, "inner_friction": 0.0, "inner_presliding": 1.0, "creep": 0.0,
-    "creep_time": 1.0, "damping": 0.0,
+    "creep_time": 1.0, "damping": 0.0, "inertia": 0.0,
 }  # fmt: skip
 
 

@@ -2,8 +2,11 @@
 
 Intervals come from the sandwich covariance of `wristctl.identification.intervals`, in the coordinates of
 `wristctl.identification.loop_problem`, in which the model is nearly linear; ends that pass what can be are cut off. One
-of the sheath's may be infinite.
+of the sheath's may be infinite. Friction inside a wrist and that of its tendons look alike in a loop: where one without
+the tendons' fits as well, intervals hold both.
 """
+
+from __future__ import annotations
 
 import math
 from collections.abc import Sequence
@@ -12,7 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 from scipy.optimize import least_squares
-from scipy.stats import norm, qmc
+from scipy.stats import chi2, norm, qmc
 
 from wristctl.arrays import Array
 from wristctl.identification.intervals import NORMAL_95, autocorrelation, bandwidth, inflation, inverse, long_run
@@ -44,6 +47,8 @@ _STARTS, _BEST, _EXPONENTS, _PRESLIDINGS, _INNERS = 32, 4, (0.02, 1.0), (3e-6, 2
 _ROUGH = 1e-3
 # Samples over which small errors are alike.
 _LASTING = 30
+# Chi-square beyond which a fit without the tendons' three parameters fits less well: 95 %.
+_AS_WELL = float(chi2.ppf(0.95, 3))
 
 
 class FrictionEstimate(NamedTuple):
@@ -71,6 +76,8 @@ class FrictionFit:
     covariance: Array
     autocorrelation: float
     """Correlation of neighbouring residuals over their noise."""
+    rival: FrictionFit | None = None
+    """The fit without friction of the tendons, where it fits as well."""
 
     @property
     def count(self) -> int:
@@ -114,8 +121,16 @@ class FrictionFit:
         """Torque of friction inside the wrist [N m]; None where there is none."""
         if self.x[INNER] == 0.0 and INNER in self.problem.fixed:
             return None
-        bend = self._straight(INNER, 0.0, math.inf)
-        return FrictionEstimate(*(end * self.problem.supposed_wrist(self.x).stiffness for end in bend))
+        stiffness, bend = self.problem.supposed_wrist(self.x).stiffness, float(self.x[INNER])
+        block = self.covariance[np.ix_([INNER, STIFFNESS], [INNER, STIFFNESS])]
+        by = np.array([1.0, bend])  # the stiffness is a logarithm
+        half = NORMAL_95 * stiffness * math.sqrt(max(0.0, by @ block @ by))
+        if self.problem.settings.fix.inner_friction is not None:
+            half = 0.0
+        ends = [FrictionEstimate(stiffness * bend, max(0.0, stiffness * bend - half), stiffness * bend + half)]
+        if self.rival is not None and self.rival.inner_friction is not None:
+            ends.append(self.rival.inner_friction)
+        return FrictionEstimate(ends[0].value, min(end.low for end in ends), max(end.high for end in ends))
 
     @property
     def inner_presliding(self) -> FrictionEstimate | None:
@@ -157,7 +172,8 @@ class FrictionFit:
         value = float(self.x[EXPONENT] * self.x[SHARE] / self.problem.bend)
         half = NORMAL_95 * math.sqrt(self._friction_by @ self.covariance[:2, :2] @ self._friction_by)
         most = self.exponent.high / self.problem.bend
-        return FrictionEstimate(value, max(0.0, value - half), max(value, min(value + half, most)))
+        low = 0.0 if self.rival else max(0.0, value - half)
+        return FrictionEstimate(value, low, max(value, min(value + half, most)))
 
     @property
     def _friction_by(self) -> Array:
@@ -173,7 +189,8 @@ class FrictionFit:
         further = min(max(-cross / spread, -self.problem.bend), furthest)
         value = float(self.x[EXPONENT]) + self.friction.value * further
         half = NORMAL_95 * math.sqrt(max(0.0, block[EXPONENT, EXPONENT] + further * (2.0 * cross + further * spread)))
-        return self.problem.bend + further, FrictionEstimate(value, max(0.0, value - half), value + half)
+        low = 0.0 if self.rival else max(0.0, value - half)
+        return self.problem.bend + further, FrictionEstimate(value, low, value + half)
 
     @property
     def sheath(self) -> FrictionEstimate:
@@ -200,7 +217,13 @@ class FrictionFit:
 
     def _straight(self, index: int, least: float, most: float) -> FrictionEstimate:
         half, value = NORMAL_95 * math.sqrt(self.covariance[index, index]), float(self.x[index])
-        return FrictionEstimate(value, max(least, value - half), min(most, value + half))
+        low, high = value - half, value + half
+        if self.rival is not None:
+            other = self.rival._straight(index, -math.inf, math.inf)
+            low, high = min(low, other.low), max(high, other.high)
+        if index in (SHARE, PRESLIDING) and not self.problem.supposed.tendons:
+            low, high = -math.inf, math.inf
+        return FrictionEstimate(value, max(least, low), min(most, high))
 
 
 def fit_in_turn(problem: LoopProblem) -> list[FrictionFit]:
@@ -230,6 +253,18 @@ def fit_friction(problem: LoopProblem) -> FrictionFit:
             noise,
             np.array([max(float(np.sqrt(np.mean(residual**2))), 1e-9) for residual in best.residuals]),
         )
+    fit = _estimated(problem, best, noise)
+    if not problem.supposed.inner:
+        return fit
+    without = replace(problem, supposed=problem.supposed._replace(tendons=False))
+    x = best.x.copy()
+    x[list(without.fixed)] = list(without.fixed.values())
+    rival = _search(without, x, noise)
+    return replace(fit, rival=_estimated(without, rival, noise)) if 2.0 * (rival.cost - best.cost) < _AS_WELL else fit
+
+
+def _estimated(problem: LoopProblem, best: _Found, noise: Array) -> FrictionFit:
+    """A fit with its covariance, of quantities with such noise."""
     parts = [residual / sd for residual, sd in zip(best.residuals, noise, strict=True)]
     slopes = [slope / sd for slope, sd in zip(best.slopes, noise, strict=True)]
     free = np.ix_(problem.free, problem.free)

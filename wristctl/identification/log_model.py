@@ -26,6 +26,8 @@ _NO_TIME = 1.0
 _WHOLE = 4
 # Correlation with the motion from which a spool goes with it.
 _GOES_WITH = 0.5
+# Stretch below which a tendon passes smoothly from slack to taut [m]: a fifth of what 0.4 N do to one of 20 kN/m.
+_SMOOTH = 4e-6
 GRAVITY = 9.81
 
 
@@ -48,15 +50,25 @@ def robot_of_logs(logs: Sequence[OpenLog], wrist: WristParameters, radius_error:
         base.append("turn")
     timed = all("time" in log.columns for log in logs)
     if timed:
-        base += ["delay", "damping"]
+        base += ["delay", "damping", "inertia"]
     if len(_masses(logs)) > 1:
         base.append("softening")
     if any(_has_tensions(log, numbers) for log in logs):
         base.append("force")
+    known_to = {"gain": radius_error}
+    if timed:
+        known_to["inertia"] = _inertia(wrist)
     return ArcRobot(
         (wrist.length,), tuple(angles), radius, (1,) * len(numbers), measured, tuple(base),
-        {"gain": 1.0, "turn": 0.0, "delay": 0.03}, {"gain": radius_error}, timed,
+        {"gain": 1.0, "turn": 0.0, "delay": 0.03, "inertia": _inertia(wrist)}, known_to, timed, wrist.discs - 1,
+        True, _SMOOTH,
     )  # fmt: skip
+
+
+def _inertia(wrist: WristParameters) -> float:
+    """Inertia of bending as one arc over the stiffness [s^2], of a wrist that may be another: it is known to itself."""
+    whole = wrist.mass * wrist.length**2 / 20.0 + wrist.hand_mass * (0.5 * wrist.length + wrist.hand_offset) ** 2
+    return whole / wrist.stiffness
 
 
 def _check_alike(logs: Sequence[OpenLog], numbers: Sequence[int]) -> None:

@@ -56,6 +56,8 @@ class Supposition(NamedTuple):
     """Whether stiffness, radius, slack and the angle's zero are hardly known beforehand."""
     inner: bool
     """Whether there is friction inside the wrist."""
+    tendons: bool = True
+    """Whether tendons rub."""
 
 
 AS_BELIEVED = Supposition("friction of the tendons", False, False)
@@ -147,6 +149,8 @@ class LoopProblem:
             held[INNER_PRESLIDING] = math.log(fix.inner_presliding_deg / BEGIN_INNER_PRESLIDING_DEG)
         elif held.get(INNER) == 0.0:
             held[INNER_PRESLIDING] = 0.0
+        if not self.supposed.tendons:
+            held |= {EXPONENT: 0.0, SHARE: 0.5, PRESLIDING: 0.0}
         return held
 
     @cached_property

@@ -16,6 +16,8 @@ from wristctl.identification.arc_robot import OF_TERM, ArcRecording, ArcRobot, T
 # Beginnings of the search for presliding [m] and [rad]: its errors have several minima. Else it begins where the model
 # without the term ends.
 _BEGINS = ({"presliding": 5e-5, "inner_presliding": 0.01}, {"presliding": 5e-4, "inner_presliding": 0.1})
+# Share of the error by which a term lessens it at least where it is wanted: less is of nobody's concern.
+_LEAST_GAIN = 5e-3
 
 
 @dataclass(frozen=True)
@@ -52,7 +54,7 @@ class TriedModel:
         """Whether the data want the last term."""
         if self.ratio is None:
             return ""
-        return "wanted" if self.ratio.high < 1.0 else "unwanted" if self.ratio.low > 1.0 else "not told"
+        return "wanted" if self.ratio.high < 1.0 - _LEAST_GAIN else "unwanted" if self.ratio.low > 1.0 else "not told"
 
 
 def tried_models(
@@ -80,9 +82,27 @@ def tried_models(
         others.append(_tried(robot, cases, centred, (*base.terms, term), base))
         yield others[-1]
     wanted = sorted((model for model in others if model.verdict == "wanted"), key=lambda model: model.score.error)
-    if len(wanted) > 1:
+    if robot.weighed and wanted:
+        yield from _held_again(robot, cases, centred, wanted, base)
+    elif len(wanted) > 1:
         best, *rest = wanted
         yield _tried(robot, cases, centred, (*best.terms, *(model.terms[-1] for model in rest)), best)
+
+
+def _held_again(
+    robot: ArcRobot, cases: Sequence[Sequence[ArcRecording]], centred: bool, wanted: Sequence[TriedModel],
+    base: TriedModel,
+) -> Iterator[TriedModel]:  # fmt: skip
+    """Slack that was not told and other wanted terms, each beside the best term: without it they may stand for it."""
+    best, *rest = wanted
+    if base.terms == ("slack",) and base.verdict != "wanted":
+        bare = _tried(robot, cases, centred, best.terms[1:], None)
+        yield bare
+        yield TriedModel((*bare.terms, "slack"), best.fits, bare)
+    for model in rest:
+        more = _tried(robot, cases, centred, (*best.terms, model.terms[-1]), best)
+        yield more
+        best = more if more.verdict == "wanted" else best
 
 
 def chosen_of(models: Sequence[TriedModel]) -> TriedModel:
@@ -103,6 +123,8 @@ def _tried(
     for number, recordings in enumerate(cases):
         before = without.fits[number].values if without else {}
         starts = [{**begin, **before} for begin in begins] + [{}] * (terms == ("slack",))
+        if robot.weighed and "inner friction" in terms:  # without it tendons and damping may stand for it
+            starts += [dict(begin) for begin in begins]
         tried = [fit_arcs(robot, terms, recordings, centred, start) for start in starts]
         fits.append(min(tried, key=lambda fit: fit.cost))
     return TriedModel(terms, tuple(fits), without)

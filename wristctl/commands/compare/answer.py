@@ -65,7 +65,7 @@ def answer_of(
 
 
 def best_on_yours(rankings: Sequence[Ranking]) -> str:
-    """Probability that a controller is the best on an identified robot: its share of the draws of what is open of it.
+    """Probability that a controller is the best on an identified robot in a motion: its share of the draws of both.
 
     Empty where the worlds are no draws of an identification's posterior.
     """
@@ -83,8 +83,8 @@ def best_on_yours(rankings: Sequence[Ranking]) -> str:
         steps = " of steps" if ranking.jumps else ""
         sentences.append(
             f"{ranking.labels[row]} is best{steps} on your robot with probability {shares[row].value:.2f} (95 % "
-            f"{shares[row].low:.2f} to {shares[row].high:.2f}): it has the least error on {shares[row].times} of "
-            f"{shares[row].n} wrists that your trials leave possible."
+            f"{shares[row].low:.2f} to {shares[row].high:.2f}) in a motion drawn at random: it has the least error in "
+            f"{shares[row].times} of {shares[row].n} worlds, each a motion and a wrist that your trials leave possible."
         )
     return " ".join(sentences)
 

@@ -40,9 +40,14 @@ def validated_answer(robot: RealRobot, models: Sequence[TriedModel], chosen: Tri
 
 
 def wanted_terms(models: Sequence[TriedModel]) -> str:
-    """Which terms the data want, in words."""
+    """Which terms the data want, in words: each by the last model that adds it alone."""
+    verdicts = {
+        model.terms[-1]: model.verdict
+        for model in models
+        if model.without is not None and len(model.terms) == len(model.without.terms) + 1
+    }
     by_verdict = {
-        verdict: [model.terms[-1] for model in models if model.verdict == verdict and len(model.terms) <= 2]
+        verdict: [term for term, judged in verdicts.items() if judged == verdict]
         for verdict in ("wanted", "unwanted", "not told")
     }
     wanted = joined(by_verdict["wanted"]) or "nothing beside elastic arcs and tendons"
