@@ -96,7 +96,9 @@ class Bench:
                 self.log.truth(number, true)
         if self.stops is not None:
             halted = SimpleNamespace(verified=self.verified, seconds=0.25, how="by a ramp")
-            self.stop = SimpleNamespace(reason="it smokes", halt=halted, plain=lambda: {"reason": "it smokes"})
+            self.stop = SimpleNamespace(
+                reason="it smokes", halt=halted, trial=1, time=0.25, plain=lambda: {"reason": "it smokes"}
+            )
             raise self.stops
 
 

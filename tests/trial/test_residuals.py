@@ -179,7 +179,7 @@ def test_usable_angles_count_as_missing_beside_those_that_are_believed_to_drop(d
             watch.saw(sighting(used), tick * PERIOD, tick * PERIOD)
         ticks(watch, timing, 1)
     assert watch.most["unseen"] == pytest.approx(share, abs=0.05)
-    assert ("usable angles" in watch.words()) is (share > 0.12)
+    assert ("angles that the camera" in watch.words()) is (share > 0.12)
 
 
 def test_the_first_place_of_the_bases_marker_is_where_it_was_first_seen_whole() -> None:
