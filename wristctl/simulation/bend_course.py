@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
 # Share of a wanted torque below which it was out of the tendons' reach.
-_FULL = 1.0 - 1e-9
+FULL = 1.0 - 1e-9
 _PLANES = ("ulnar", "flexion")
 # Columns of a plane, by the attribute that holds them, (T, 2): unit and meaning.
 _OF_A_PLANE = {
@@ -247,7 +247,7 @@ BEND_METRICS: dict[str, BendMetric] = {
     ),
     "saturation": BendMetric(
         "", "share of time in which the wanted torque was out of the tendons' reach",
-        lambda c: float(np.mean(c.share < _FULL)), lambda of: _share(of, "saturated"), of_error=False,
+        lambda c: float(np.mean(c.share < FULL)), lambda of: _share(of, "saturated"), of_error=False,
     ),
     "slack": BendMetric(
         "", "share of time in which a tendon was slack", lambda c: float(np.mean((c.acting <= 0.0).any(axis=1))),

@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 from wristctl.lanes.compiled import compiled
 from wristctl.lanes.functions import maximum
 from wristctl.lanes.lane import dot, sqrt, where, zero_like
+from wristctl.simulation.bend_course import FULL
 
 # Running sums of a lane; the commanded pulls of the last sample follow.
 BEND_SUMS = (
@@ -20,8 +21,6 @@ BEND_SUMS = (
     _SLACK, _ALIVE, _UNTIL,
 ) = range(len(BEND_SUMS))  # fmt: skip
 _COUNT = len(BEND_SUMS)
-# Share of a wanted torque below which it was out of the tendons' reach.
-_FULL = 1.0 - 1e-9
 
 
 class Errors(NamedTuple):
@@ -59,5 +58,5 @@ def gather_bends(sums: Any, sample: int, late: float, errors: Any, pulls: Any, a
     sums[_PEAK] = peak
     if sample > 0:
         sums[_VARIATION] = sums[_VARIATION] + change
-    sums[_SATURATED] = sums[_SATURATED] + where(share < _FULL, 1.0, zero)
+    sums[_SATURATED] = sums[_SATURATED] + where(share < FULL, 1.0, zero)
     sums[_SLACK] = sums[_SLACK] + where(least <= 0.0, 1.0, zero)

@@ -68,7 +68,12 @@ def _excess(outcome: Outcome, kinked: Mask) -> Array:
 
 def in_doubt(outcome: Outcome, kinked: Mask) -> Mask:
     """Rollouts whose integration step may be too long, (count,); `kinked` are those with friction or end stops."""
-    doubtful: Mask = ~(_excess(outcome, kinked) <= 1.0)
+    return _doubtful(_excess(outcome, kinked))
+
+
+def _doubtful(excess: Array) -> Mask:
+    """Where there is too much, or nobody knows how much, (count,)."""
+    doubtful: Mask = ~(excess <= 1.0)
     return doubtful
 
 
@@ -82,7 +87,7 @@ def in_one_go(outcome: Outcome, kinked: Mask) -> tuple[Mask, Rollouts]:
     excess = _excess(outcome, kinked)
     times = np.clip(np.nan_to_num(2.0 * swinging * excess, nan=np.inf), FINER[0], FINER[-1])
     steps = np.minimum(outcome.steps * 2 ** np.ceil(np.log2(times)).astype(np.int64), MOST_SUBSTEPS)
-    doubtful = in_doubt(outcome, kinked)
+    doubtful = _doubtful(excess)
     return doubtful, np.where(doubtful, steps, outcome.steps)
 
 

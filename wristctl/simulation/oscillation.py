@@ -1,8 +1,8 @@
 """Does a loop come to rest, or does it swing, hunt or chatter: what is left at rest, and what its tensions do.
 
 Half the peak-to-peak of the angle over the last second, its trend removed; over the last half of that where a swing
-dies out, as after a push. Of a reference that never rests it is the error's, over the last second or the last two of
-its periods, with all up to four times its frequency removed.
+beyond LIMIT_CYCLE dies out, as after a push. Of a reference that never rests it is the error's, over the last second or
+the last two of its periods, with all up to four times its frequency removed.
 """
 
 import math
@@ -51,17 +51,24 @@ def oscillations(theta: Array, references: Array, which: NDArray[np.int64], step
     amplitudes = np.full(len(theta), _UNKNOWN)
     for indices, left in _remaining(theta, references, which, step):
         amplitudes[indices] = np.ptp(left, axis=1) / 2.0
-        window = left.shape[1]
-        dying = np.ptp(references[:, -window:], axis=1)[which[indices]] == 0.0
-        if dying.any():
-            angle = theta[indices[dying], -window:]
-            about = angle - angle[:, window // 2 :].mean(axis=1, keepdims=True)
-            dying[dying] = _strongest(about, step) * window * step >= 2.0 * _PERIODS
-        if dying.any():
-            late = np.ptp(_without_trend(theta[indices[dying], -(window // 2) :]), axis=1)
-            before = np.ptp(left[dying, : window // 2], axis=1)
-            swings = indices[dying]
-            amplitudes[swings] = np.where(late < _DIES_OUT * before, late / 2.0, amplitudes[swings])
+        rests = np.ptp(references[:, -left.shape[1] :], axis=1)[which[indices]] == 0.0
+        swings = rests & (amplitudes[indices] > LIMIT_CYCLE)
+        if swings.any():
+            angle = theta[indices[swings], -left.shape[1] :]
+            amplitudes[indices[swings]] = _unless_it_dies_out(angle, left[swings], step)
+    return amplitudes
+
+
+def _unless_it_dies_out(angle: Array, left: Array, step: float) -> Array:
+    """Half the peak-to-peak (L,) of what a trend leaves of angles (L, W); of a swing that dies out, at the end."""
+    middle = angle.shape[1] // 2
+    amplitudes: Array = np.ptp(left, axis=1) / 2.0
+    about = angle - angle[:, middle:].mean(axis=1, keepdims=True)
+    quick = _strongest(about, step) * angle.shape[1] * step >= 2.0 * _PERIODS
+    if quick.any():
+        late = np.ptp(_without_trend(angle[quick, -middle:]), axis=1)
+        before = np.ptp(left[quick, :middle], axis=1)
+        amplitudes[quick] = np.where(late < _DIES_OUT * before, late / 2.0, amplitudes[quick])
     return amplitudes
 
 

@@ -16,6 +16,7 @@ from wristctl.errors import UserError
 from wristctl.lanes.compiled import kernel
 from wristctl.lanes.lane import zero_like
 from wristctl.lanes.rows import lanes_like, part, planes_like, rows_of
+from wristctl.simulation.bend_course import FULL
 from wristctl.simulation.spatial_batch import as_pairs
 from wristctl.simulation.spatial_observer import OF_A_PLANE, correct_bend, go_over, propagate_bends
 from wristctl.simulation.spatial_response import Laws, Room, Seen, respond_in_planes
@@ -24,8 +25,6 @@ from wristctl.trial.spatial_belief import PLANES, belief_of, known_of, layout_of
 from wristctl.trial.steering import REMEMBERED
 from wristctl.wrist.directions import in_plane
 
-# Share of a wanted torque below which it was out of the tendons' reach.
-_FULL = 1.0 - 1e-9
 # Seconds by which a frame may be older than the last one of the other camera: it is fused there.
 _UNEVEN = 0.05
 
@@ -41,7 +40,7 @@ class SpatialAnswer(NamedTuple):
     @property
     def saturated(self) -> bool:
         """Whether the wanted torque is out of the tendons' reach."""
-        return not self.share >= _FULL
+        return not self.share >= FULL
 
 
 class _Observer(NamedTuple):

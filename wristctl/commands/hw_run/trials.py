@@ -191,6 +191,10 @@ def _evaluate(
     return table
 
 
+def _stand(stop: Stop) -> str:
+    return "the motors stand" if stop.halt.verified else "the motors could NOT be seen to stand"
+
+
 def stopped_answer(stop: Stop, table: pd.DataFrame, count: int) -> list[str]:
     """Lines on trials that were stopped: when, why, whether the motors stand, and what came of those that were done.
 
@@ -202,8 +206,7 @@ def stopped_answer(stop: Stop, table: pd.DataFrame, count: int) -> list[str]:
         when += f", {stop.time:.1f} s after it began" if stop.time is not None else ""
     elif len(table):
         when = f"after trial {table['trial'].iloc[-1]} of 0 to {count - 1}"
-    sure = "the motors stand" if stop.halt.verified else "the motors could NOT be seen to stand"
-    lines = [f"Stopped {when}: {stop.reason.removeprefix('stopped: ')}; {sure}.", ""]
+    lines = [f"Stopped {when}: {stop.reason.removeprefix('stopped: ')}; {_stand(stop)}.", ""]
     for _, trial in table[table["outcome"] == "ok"].iterrows():
         push = f", push of {trial['push']:g} N" if trial["push"] else ""
         error = f"error {degrees(trial['rmse'])} deg RMSE" if "rmse" in table else "done"
@@ -238,8 +241,7 @@ def _summarise(session: Session, experiment: Experiment, trial_log: TrialLog, ta
     findings.plain("data/stop.json", stop.plain())
     findings.overview.answer[:] = stopped_answer(stop, table, count)
     findings.keep_overview()
-    sure = "the motors stand" if stop.halt.verified else "the motors could NOT be seen to stand"
-    log.warning("%s after %.0f ms (%s)", sure, 1e3 * stop.halt.seconds, stop.halt.how)
+    log.warning("%s after %.0f ms (%s)", _stand(stop), 1e3 * stop.halt.seconds, stop.halt.how)
     if not trial_log.last:
         findings.summary(stop.reason)
         log.warning("%s", stop.reason)
