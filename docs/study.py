@@ -116,44 +116,45 @@ def _beside(row: Row, best: Row) -> str:
     return f" ({interval(row)})" if row["rmse"] > ALIKE * best["rmse"] else ""
 
 
+def recommended(rankings: Mapping[str, Sequence[Row]]) -> list[str]:
+    """Labels that are in most first groups of these rigs, that of the least errors first."""
+    often = Counter(row["row"] for rows in rankings.values() for row in first_group(rows))
+    most = max(often.values(), default=0)
+    return sorted((label for label in often if often[label] == most), key=partial(_log_error, rankings.values()))
+
+
 def use(rankings: Mapping[str, Sequence[Row]], where: str) -> str:
-    """What to use on rigs of a kind: what is in most of their first groups, of several the one that errs least."""
-    firsts = {name: {row["row"]: row for row in rows if group(row) == 1} for name, rows in rankings.items()}
-    often = Counter(label for rows in firsts.values() for label in rows)
-    if not often:
+    """What to use on rigs of a kind: how large its error is on each, and what is not distinguished from it."""
+    if not recommended(rankings):
         return f"- **{where}**: none may be used."
-    errors_of = partial(_mean, rankings.values())
-    label = min(often, key=lambda label: (-often[label], errors_of(label)))
+    label, *others = recommended(rankings)
+    firsts = {name: {row["row"]: row for row in first_group(rows)} for name, rows in rankings.items()}
     chosen = {name: rows[label] for name, rows in firsts.items() if label in rows}
-    lowest = {name: min(rows.values(), key=lambda row: float(row["rmse"])) for name, rows in firsts.items() if rows}
-    errors = joined(
-        [
-            f"{interval(row)} deg in {name}"
-            + ("" if lowest[name]["row"] == label else f" ({short(lowest[name]['row'])}: {deg(lowest[name]['rmse'])})")
-            for name, row in chosen.items()
-        ]
-    )
+    errors, alike = [], []
+    for name, row in chosen.items():
+        lowest = first_group(rankings[name])[0]
+        lower = "" if lowest["row"] == label else f" ({short(lowest['row'])}: {deg(lowest['rmse'])})"
+        errors.append(f"{interval(row)} deg in {name}{lower}")
     better = [row["times_better"] for row in chosen.values()]
-    hardly = "hardly less than feedforward alone: " if min(better) < ALIKE else ""
-    least = f"{hardly}{'at least ' * (len(better) > 1)}{three(min(better))} times less"
-    least += "" if hardly else " than feedforward alone"
-    words = f"use {label}: RMSE {errors}, {least}."
-    same = sorted((other for other in often if often[other] == often[label] == len(rankings)), key=errors_of)
-    beside = {
-        other: _beside(firsts[name][other], firsts[name][label]) if len(rankings) == 1 else ""
-        for other in same
-        for name in rankings
-    }
-    if others := [f"{short(other)}{beside[other]}" for other in same if other != label]:
-        words += f" Not distinguished from it{' on any of these' if len(rankings) > 1 else ''}: {joined(others)}."
+    least = f"{'at least ' * (len(better) > 1)}{three(min(better))} times less"
+    hardly = min(better) < ALIKE
+    least = f"hardly less than feedforward alone: {least}" if hardly else f"{least} than feedforward alone"
+    words = f"use {label}: RMSE {joined(errors)}, {least}."
+    if len(rankings) == 1:
+        ((row, rows),) = zip(chosen.values(), firsts.values(), strict=True)
+        alike = [short(other) + _beside(rows[other], row) for other in others]
+    elif len(chosen) == len(rankings):
+        alike = [short(other) for other in others]
+    if alike:
+        words += f" Not distinguished from it{' on any of these' * (len(rankings) > 1)}: {joined(alike)}."
     lost = [f"{100.0 * _lost(row):.2g} % of the worlds of {name}" for name, row in chosen.items() if _lost(row)]
     if lost:
         words += f" It loses {joined(lost)}."
     return "\n".join(textwrap.wrap(f"- **{where}**: {words}", 120, subsequent_indent="  "))
 
 
-def _mean(rankings: Iterable[Sequence[Row]], label: str) -> float:
-    """Sum of the logarithms of a controller's errors."""
+def _log_error(rankings: Iterable[Sequence[Row]], label: str) -> float:
+    """Sum of the logarithms of a controller's errors in these rankings."""
     return sum(math.log(row["rmse"]) for rows in rankings for row in rows if row["row"] == label)
 
 
@@ -163,13 +164,13 @@ def _lost(row: Row) -> float:
 
 
 def lead(run: Run, rankings: Rankings) -> list[str]:
-    """What to use, a line for each kind of rig and of motion."""
-    lines = []
+    """What to use, a line for each kind of rig and of motion, and what these controllers are."""
+    lines, named = [], dict[str, None]()
     for rig, steps in itertools.product((True, False), (False, True)):
         alike = {name: rows for name, rows in rankings.items() if _kind(run, name) == (rig, steps)}
         where = f"{'Steps' if steps else 'Smooth motions'} {'by motors, tendons and a camera' if rig else _EXACT}"
         lines += [use(alike, where)] if alike else []
-    named = dict.fromkeys(label for line in lines for label in re.findall(r"use ([\w-]+)/", line))
+        named |= {label.split("/")[0]: None for label in recommended(alike)[:1]}
     what = [f"| {name} | {about(controller(name).law.__module__)} |" for name in named]
     return [*lines, "", "| controller | what it is |", "| --- | --- |", *what]
 
