@@ -6,8 +6,6 @@ is not. `python -m tests.identification.inner_rigs --count 100` keeps what has e
 
 from __future__ import annotations
 
-import argparse
-import json
 import math
 from collections import Counter
 from collections.abc import Callable
@@ -16,6 +14,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from tests.drawn_rigs import options, tried
 from wristctl.arrays import Array
 from wristctl.config.hysteresis import HysteresisSettings
 from wristctl.config.plant import Actuator, TrueWrist
@@ -152,21 +151,12 @@ def summary(results: list[Counted], present: bool) -> list[str]:
 
 def main() -> None:
     """Identify rigs, and say how many intervals hold."""
-    parser = argparse.ArgumentParser(description=__doc__)
+    parser = options(__doc__, 100, "inner-rigs")
     parser.add_argument("--way", choices=WAYS, default="arcs")
-    parser.add_argument("--first", type=int, default=0, help="number of the first rig")
-    parser.add_argument("--count", type=int, default=100)
-    parser.add_argument("--kept", type=Path, default=Path("build/inner-rigs"), help="what has ended is kept here")
     asked = parser.parse_args()
-    for present in (True, False):
-        kept, results = asked.kept / asked.way / ("with" if present else "without"), []
-        kept.mkdir(parents=True, exist_ok=True)
-        for number in range(asked.first, asked.first + asked.count):
-            file = kept / f"{number}.json"
-            if not file.is_file():
-                file.write_text(json.dumps(counted(asked.way, number, present)._asdict(), default=float))
-            results.append(Counted(**json.loads(file.read_text())))
-        print("\n".join(summary(results, present)), flush=True)
+    for present, folder in ((True, "with"), (False, "without")):
+        rigs = tried(asked, lambda number: counted(asked.way, number, present)._asdict(), f"{asked.way}/{folder}")  # noqa: B023
+        print("\n".join(summary([Counted(**rig) for _, rig in rigs], present)), flush=True)
 
 
 if __name__ == "__main__":

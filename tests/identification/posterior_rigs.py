@@ -9,7 +9,6 @@ on worlds of the posterior, which says p, and on the true wrist.
 
 from __future__ import annotations
 
-import argparse
 import json
 import re
 from itertools import pairwise
@@ -18,6 +17,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from tests.drawn_rigs import options, tried
 from tests.identification.benches import KNOWN, START, TENDONS, logged, problem
 from wristctl.arrays import Array
 from wristctl.commands.compare.answer import best_on_yours
@@ -128,18 +128,8 @@ def table(results: list[Judged]) -> list[str]:
 
 def main() -> None:
     """Judge rigs, and say how often what is said is true."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--first", type=int, default=0, help="number of the first rig")
-    parser.add_argument("--count", type=int, default=100)
-    parser.add_argument("--kept", type=Path, default=Path("build/posterior-rigs"), help="what has ended is kept here")
-    asked = parser.parse_args()
-    asked.kept.mkdir(parents=True, exist_ok=True)
-    results = []
-    for number in range(asked.first, asked.first + asked.count):
-        file = asked.kept / f"{number}.json"
-        if not file.is_file():
-            file.write_text(json.dumps(judged(number, asked.kept)._asdict()))
-        results.append(Judged(**json.loads(file.read_text())))
+    asked = options(__doc__, 100, "posterior-rigs").parse_args()
+    results = [Judged(**rig) for _, rig in tried(asked, lambda number: judged(number, asked.kept)._asdict())]
     print("\n".join(table(results)), flush=True)
 
 

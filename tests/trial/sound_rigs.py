@@ -6,14 +6,13 @@ drawn: `python -m tests.trial.sound_rigs --count 40` keeps what has ended, and g
 
 from __future__ import annotations
 
-import argparse
 import json
 import sys
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from tests.drawn_rigs import options, tried
 from tests.trial.fault_runs import perform, rig_settings
 
 SEED = 20261123
@@ -28,18 +27,9 @@ def ended_on(number: int) -> tuple[int, str, str, dict[str, Any]]:
 
 def main() -> int:
     """Try rigs, and name those that were stopped."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--first", type=int, default=0, help="number of the first rig")
-    parser.add_argument("--count", type=int, default=40)
-    parser.add_argument("--kept", type=Path, default=Path("build/sound-rigs"), help="what has ended is kept here")
-    asked = parser.parse_args()
-    asked.kept.mkdir(parents=True, exist_ok=True)
+    asked = options(__doc__, 40, "sound-rigs").parse_args()
     stopped = odd = 0
-    for number in range(asked.first, asked.first + asked.count):
-        file = asked.kept / f"{number}.json"
-        if not file.is_file():
-            file.write_text(json.dumps(ended_on(number), default=list))
-        _, reason, words, settings = json.loads(file.read_text())
+    for number, (_, reason, words, settings) in tried(asked, ended_on):
         stopped, odd = stopped + bool(reason), odd + bool(words)
         if reason:
             print(f"rig {number}: {reason}\n  {json.dumps(settings['bench'])}", flush=True)
