@@ -33,6 +33,20 @@ class Side:
     segments: tuple[int, ...] = field(default=(1, 4))
 
 
+def _mujoco_chains(problem: str, implicit: str, explicit: str) -> tuple[Side, Side]:
+    """MuJoCo's two integrators on a chain of rigid links, by their modules."""
+    return (
+        Side(
+            "MuJoCo, chain", "MuJoCo", implicit, "mujoco", f"{problem}; first order, implicit in damping",
+            fine={1: 4096, 4: 4096}, most_steps=512,
+        ),
+        Side(
+            "MuJoCo, chain, RK4", "MuJoCo", explicit, "mujoco", f"{problem}; explicit, fourth order",
+            fine={1: 64, 4: 2048}, most_steps=512,
+        ),
+    )  # fmt: skip
+
+
 SIDES = (
     Side(OURS, OURS, "wristctl_side", None),
     Side("C, 16 lanes", "C", "c_side", None, width=16),
@@ -45,14 +59,7 @@ SIDES = (
         "another rod: mass spread along it, hand a rigid rod with rotary inertia; RODAS3, Jacobian by differentiation",
         fine={1: 8, 4: 8}, most_steps=2,
     ),
-    Side(
-        "MuJoCo, chain", "MuJoCo", "mujoco_chain", "mujoco", f"{RIGID}; first order, implicit in damping",
-        fine={1: 4096, 4: 4096}, most_steps=512,
-    ),
-    Side(
-        "MuJoCo, chain, RK4", "MuJoCo", "mujoco_rk4", "mujoco", f"{RIGID}; explicit, fourth order",
-        fine={1: 64, 4: 2048}, most_steps=512,
-    ),
+    *_mujoco_chains(RIGID, "mujoco_chain", "mujoco_rk4"),
     Side(
         "MuJoCo, tendons", "MuJoCo", "mujoco_tendons", "mujoco", f"{RIGID}; spatial tendons; first order",
         fine={4: 2048}, segments=(4,),
@@ -71,13 +78,6 @@ BEND_SIDES = (
         "the same wrist pulled by elastic tendons that motors reel in", fine={1: 16, 4: 16},
     ),
     Side("C, 8 lanes", "C", "c_bends", None, width=8),
-    Side(
-        "MuJoCo, chain", "MuJoCo", "mujoco_bends", "mujoco", f"{UNIVERSAL}; first order, implicit in damping",
-        fine={1: 4096, 4: 4096}, most_steps=512,
-    ),
-    Side(
-        "MuJoCo, chain, RK4", "MuJoCo", "mujoco_bends_rk4", "mujoco", f"{UNIVERSAL}; explicit, fourth order",
-        fine={1: 64, 4: 2048}, most_steps=512,
-    ),
+    *_mujoco_chains(UNIVERSAL, "mujoco_bends", "mujoco_bends_rk4"),
 )  # fmt: skip
 """Of the wrist that bends in two planes."""

@@ -1,7 +1,6 @@
 /* Closed loops in two planes, LANES rollouts side by side: the sliding mode law once for each plane, four tendons.
  *
  * Same equations, law, allocation and step as wristctl's kernel; running sums of what metrics are made of. */
-#include <pthread.h>
 #include "segment.h"
 #include "spatial.h"
 #include "rodas3.h"
@@ -165,19 +164,4 @@ static void block(work *job, int first)
     }
 }
 
-static void *worker(void *given)
-{
-    work *job = (work *)given;
-    for (int first; (first = __atomic_fetch_add(&job->next, LANES, __ATOMIC_RELAXED)) < job->rollouts;)
-        block(job, first);
-    return 0;
-}
-
-extern "C" void run(work *job, int threads)
-{
-    pthread_t others[threads];
-    job->next = 0;
-    for (int i = 1; i < threads; i++) pthread_create(&others[i], 0, worker, job);
-    worker(job);
-    for (int i = 1; i < threads; i++) pthread_join(others[i], 0);
-}
+#include "threads.h" /* below what it runs */

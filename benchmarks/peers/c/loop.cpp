@@ -1,7 +1,6 @@
 /* Closed loops of the sliding mode law on the wrist, LANES rollouts side by side: the machine's limit.
  *
  * Same equations, law, allocation, step and running metrics as wristctl's kernel; built for SEGMENTS and LANES. */
-#include <pthread.h>
 #include "wrist.h"
 #include "rodas3.h"
 
@@ -95,18 +94,4 @@ static void block(work *job, int first)
     }
 }
 
-static void *worker(void *given)
-{
-    work *job = (work *)given;
-    for (int first; (first = __atomic_fetch_add(&job->next, LANES, __ATOMIC_RELAXED)) < job->rollouts;) block(job, first);
-    return 0;
-}
-
-extern "C" void run(work *job, int threads)
-{
-    pthread_t others[threads];
-    job->next = 0;
-    for (int i = 1; i < threads; i++) pthread_create(&others[i], 0, worker, job);
-    worker(job);
-    for (int i = 1; i < threads; i++) pthread_join(others[i], 0);
-}
+#include "threads.h" /* below what it runs */
