@@ -202,10 +202,10 @@ def stopped_answer(stop: Stop, table: pd.DataFrame, count: int) -> list[str]:
     """
     when = "before the first trial, while the rig was opened or homed"
     if stop.trial is not None:
-        when = f"in trial {stop.trial} of 0 to {count - 1}"
+        when = f"in trial {stop.trial} (of {count}, from 0)"
         when += f", {stop.time:.1f} s after it began" if stop.time is not None else ""
     elif len(table):
-        when = f"after trial {table['trial'].iloc[-1]} of 0 to {count - 1}"
+        when = f"after trial {table['trial'].iloc[-1]} (of {count}, from 0)"
     lines = [f"Stopped {when}: {stop.reason.removeprefix('stopped: ')}; {_stand(stop)}.", ""]
     for _, trial in table[table["outcome"] == "ok"].iterrows():
         push = f", push of {trial['push']:g} N" if trial["push"] else ""
