@@ -316,3 +316,11 @@ def test_an_interval_is_given_where_there_are_cases_enough() -> None:
     assert "(95 % interval: " in told(stands(motions=8)) and "(95 % interval: " not in told(stands(motions=7))
     scaled = replace(stands(), scores=stands().scores * 2.0)
     assert scaled.means[0].value == pytest.approx(2.0 * stands().means[0].value)
+
+
+def test_of_several_conditions_the_least_gain_is_told_as_the_least_and_errors_with_where_they_are() -> None:
+    one, other = stands(), stands("pushed", rmse={label: 3.0 * error for label, error in RMSE.items()})
+    assert "at least" not in told(one)
+    said = told(one, other)
+    least, most = (two(np.degrees(ranking.means[0].value), DIGITS) for ranking in (one, other))
+    assert f"RMSE {least} (sampled) to {most} deg (push), at least " in said

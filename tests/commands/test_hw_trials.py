@@ -252,3 +252,29 @@ def test_what_was_odd_and_how_near_it_came_to_the_limits_is_told(
     greatest = "jump 2.0 deg of 2.0 deg, across 0.0 deg of 1.0 deg, load 0.30 N m of 1.60 N m, apart 1.0 deg of 3.5 deg"
     assert greatest in readme
     assert findings.metrics["greatest_load"]["value"] == 0.3
+
+
+@pytest.mark.parametrize(
+    ("trial", "time", "began", "when"),
+    [
+        (None, None, 0, "before the first trial"),
+        (None, None, 2, "after trial 1 (of 4, from 0)"),
+        (2, 0.53, 3, "in trial 2 (of 4, from 0), 0.5 s"),
+    ],
+)
+def test_a_stop_says_when_it_was_and_what_was_done_before(
+    trial: int | None, time: float | None, began: int, when: str
+) -> None:
+    halted = SimpleNamespace(verified=False)
+    stop: Any = SimpleNamespace(reason="stopped: it smokes", trial=trial, time=time, halt=halted)
+    outcomes = ["ok", "ok", "it smokes"][:began]
+    table = pd.DataFrame(
+        {
+            "trial": range(began), "direction": "ulnar", "push": [0.0, 2.0, 0.0][:began], "controller": "mpc",
+            "gains": "own", "outcome": outcomes, "rmse": math.radians(0.25),
+        }
+    )  # fmt: skip
+    first, _, *done = hw_trials.stopped_answer(stop, table, 4)
+    assert when in first and "it smokes" in first and "could NOT be seen" in first
+    assert len(done) == outcomes.count("ok") and all("0.25 deg" in line for line in done)
+    assert not done or ("push of 2 N" in done[1] and "push" not in done[0])

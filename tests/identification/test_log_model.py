@@ -16,6 +16,8 @@ from wristctl.identification.arc_fit import fit_arcs
 from wristctl.identification.log_model import everything_fitted, recordings_of_logs, robot_of_logs
 from wristctl.identification.model_choice import tried_models
 from wristctl.records.open_log import OpenLog
+from wristctl.wrist.compiled_model import terms
+from wristctl.wrist.segments import segments
 
 WRIST = WristParameters()
 OFFSET = WRIST.tendon_offset
@@ -199,3 +201,13 @@ def test_logs_without_spools_or_motion_are_refused() -> None:
     still = {name: log.columns[name] for name in ("time", "spool_1", "spool_2")}
     with pytest.raises(UserError, match="neither a bend nor the tip"):
         robot_of_logs([OpenLog(log.file, "log", still)], WRIST, 0.01)
+
+
+@pytest.mark.parametrize(("changed", "within"), [({}, 0.01), ({"hand_mass": 0.0}, 0.25), ({"mass": 1e-6}, 1e-3)])
+def test_a_logs_arc_begins_with_the_inertia_that_the_wrist_has_straight(
+    changed: dict[str, float], within: float
+) -> None:
+    """Its mass is spread along the arc; the model's is at the chords' middles, a quarter more."""
+    wrist = WRIST.model_copy(update=changed)
+    begun = robot_of_logs([planar()], wrist, 0.01).begin["inertia"] * wrist.stiffness
+    assert begun == pytest.approx(terms(segments(wrist, 1), [0.0], [0.0]).mass[0, 0], rel=within)

@@ -67,3 +67,14 @@ def test_lanes_of_one_world_and_of_equal_worlds_are_the_same() -> None:
     shared = rollout_bends(LAW, gains, PATH, [World(loop, WRISTS[1])] * 3)
     apart = rollout_bends(LAW, gains, PATH, [World(loop.model_copy(), WRISTS[1]) for _ in range(3)])
     np.testing.assert_equal(apart.metrics, shared.metrics)
+
+
+def test_the_error_at_the_end_is_the_mean_over_the_last_tenth_of_both_planes() -> None:
+    loop, gains = Loop(coupling="ignored"), np.tile(gains_of(LAW, "default"), (1, 1))
+    outcome = rollout_bends(LAW, gains, PATH, [World(loop, WRISTS[1])], record=True)
+    (course,) = outcome.courses
+    sizes = np.hypot(*(course.bend - course.bend_ref).T)
+    late = course.time >= 0.9 * (course.time[-1] + 1e-3) - 1e-9
+    assert late.sum() == 150
+    assert outcome.metrics["steady_state"][0] == pytest.approx(sizes[late].mean(), rel=1e-12)
+    assert outcome.metrics["largest_error"][0] == pytest.approx(sizes.max(), rel=1e-12)
