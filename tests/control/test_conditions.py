@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import logging
+import math
 from types import ModuleType
 
 import pytest
@@ -23,7 +24,8 @@ from wristctl.config.loop import Loop
 from wristctl.control.law import Conditions
 from wristctl.control.table import controller
 from wristctl.errors import UserError
-from wristctl.simulation.oscillation import LIMIT_CYCLE
+from wristctl.simulation.closed_loop import simulate
+from wristctl.simulation.oscillation import LIMIT_CYCLE, chatter, oscillation
 from wristctl.study_files.load import load_study
 
 PAPERS = ("smc", "pid", "pid-angle")
@@ -96,3 +98,16 @@ def test_real_motors_do_not_move_by_gains_that_may_swing_unless_told_to(capsys: 
 def test_conditions_of_no_preset_are_refused() -> None:
     with pytest.raises(ValueError, match="no such preset"):
         dataclasses.replace(controller("nc"), conditions={"other": Conditions((1e-3, 1e-2), (1e3, 1e4))})
+
+
+@pytest.mark.parametrize("name", [name for name in CONTROLLERS if "hardware" in controller(name).presets])
+def test_hardware_gains_bring_an_ideal_wrist_to_its_angle_too(name: str) -> None:
+    """They are those of `simulate`, whose loop has no motors unless it is asked for them."""
+    study = load_study([], [f"simulate.controller={name}"])
+    assert study.simulate.gains == "hardware" and study.simulate.loop.actuator.level == "ideal"
+    done = simulate(study)
+    course = done.first.trajectory
+    assert not done.failed.any() and abs(course.error[-1]) < math.radians(0.05)
+    assert (
+        oscillation(course) < LIMIT_CYCLE and not chatter(done.metrics["chattering"], study.wrist.tension_range).any()
+    )

@@ -5,7 +5,7 @@ from typing import Any
 from wristctl.control import pid_ff
 from wristctl.control.clamped_integral import held, integrated
 from wristctl.control.disturbance_observer import VALUES, disturbance, remember
-from wristctl.control.law import BY_STUDY, Conditions, Controller, Gain
+from wristctl.control.law import BY_TRIAL, Conditions, Controller, Gain
 from wristctl.control.pd_ff import fed_forward_pd
 from wristctl.lanes.compiled import compiled
 from wristctl.lanes.lane import zero_like
@@ -36,9 +36,9 @@ PID_DOB = Controller(
     gains=GAINS,
     presets={
         "default": {"Kp": 5.0, "Ki": 1.0, "Kd": 0.2, "wo": 20.0},
-        "hardware": {"Kp": 2.6, "Ki": 0.028, "Kd": 4.3e-3, "wo": 12700.0},
+        "hardware": {"Kp": 2.6, "Ki": 0.03, "Kd": 0.02, "wo": 150.0},
     },
     memory=1 + VALUES,
-    notes={"hardware": BY_STUDY},
+    notes={"hardware": BY_TRIAL},
     conditions={"hardware": Conditions((5e-3, 1e-2), (8e3, 1e5))},
 )

@@ -4,7 +4,7 @@ from typing import Any
 
 from wristctl.control import pd_ff
 from wristctl.control.clamped_integral import held, integrated
-from wristctl.control.law import BY_STUDY, Conditions, Controller, Gain
+from wristctl.control.law import BY_TRIAL, Conditions, Controller, Gain
 
 GAINS = pd_ff.GAINS | {"Ki": Gain("N m/(rad s)", "integral gain", 1e-2, 1e4)}
 
@@ -24,9 +24,9 @@ PID_FF = Controller(
     gains=GAINS,
     presets={
         "default": {"Kp": 1.0, "Ki": 5.0, "Kd": 0.1},
-        "hardware": {"Kp": 0.04, "Ki": 165.0, "Kd": 0.11},
+        "hardware": {"Kp": 5.0, "Ki": 60.0, "Kd": 0.1},
     },
     memory=1,
-    notes={"hardware": BY_STUDY},
+    notes={"hardware": BY_TRIAL},
     conditions={"default": Conditions((1e-3, 1e-2), (8e3, 1e5)), "hardware": Conditions((5e-3, 1e-2), (8e3, 1e5))},
 )

@@ -3,7 +3,7 @@
 from typing import Any
 
 from wristctl.control.disturbance_observer import VALUES
-from wristctl.control.law import BY_STUDY, Conditions, Controller, Gain, Surface
+from wristctl.control.law import BY_TRIAL, Conditions, Controller, Gain, Surface
 from wristctl.control.pid_dob import GAINS, rung
 from wristctl.lanes.functions import tanh
 
@@ -28,10 +28,10 @@ SMC_DOB = Controller(
     },
     presets={
         "default": {"Kp": 5.0, "Ki": 1.0, "Kd": 0.2, "wo": 20.0, "Ks": 0.05, "phi": 1.0},
-        "hardware": {"Kp": 2.6, "Ki": 0.014, "Kd": 1.2e-3, "wo": 1730.0, "Ks": 0.34, "phi": 8800.0},
+        "hardware": {"Kp": 2.6, "Ki": 0.03, "Kd": 0.05, "wo": 200.0, "Ks": 0.02, "phi": 10.0},
     },
     memory=1 + VALUES,
-    notes={"hardware": BY_STUDY},
+    notes={"hardware": BY_TRIAL},
     conditions={"hardware": Conditions((5e-3, 1e-2), (8e3, 1e5))},
     surface=Surface(lambda gains: (gains["Kp"], gains["Kd"], 0.0), lambda gains: gains["Kd"] * gains["phi"]),
 )
