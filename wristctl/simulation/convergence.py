@@ -61,7 +61,7 @@ def _most(outcome: Outcome, kinked: Mask) -> Array:
 
 
 def _excess(outcome: Outcome, kinked: Mask) -> Array:
-    """Sum of the steps' estimated errors over what it may be, (count,)."""
+    """Sum of the steps' estimated errors, as counted, divided by its limit (count,): above 1 the step is in doubt."""
     counted: Array = np.where(_swinging(outcome, kinked), SWINGING, 1.0) * outcome.step_error
     return counted / _most(outcome, kinked)
 

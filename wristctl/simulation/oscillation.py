@@ -60,7 +60,7 @@ def oscillations(theta: Array, references: Array, which: NDArray[np.int64], step
 
 
 def _unless_it_dies_out(angle: Array, left: Array, step: float) -> Array:
-    """Half the peak-to-peak (L,) of what a trend leaves of angles (L, W); of a swing that dies out, at the end."""
+    """Half the peak-to-peak (L,) of angles (L, W) without trend, `left`; of a dying swing that of the last half."""
     middle = angle.shape[1] // 2
     amplitudes: Array = np.ptp(left, axis=1) / 2.0
     about = angle - angle[:, middle:].mean(axis=1, keepdims=True)

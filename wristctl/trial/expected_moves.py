@@ -124,8 +124,8 @@ class ExpectedMoves:
     def has_steps(self, steps: float, stays: float = 0.0) -> bool:
         """Whether steps per radian are those of the model, within `homing.steps_tolerance`.
 
-        Within twice of it where the wrist stays bent by `stays` [rad] when nothing pulls: friction inside bears a part
-        of a small bend, and holds the wrist across its plane, so that a tendon bends it in the plane alone.
+        The tolerance is doubled where the wrist stays bent by `stays` [rad] when nothing pulls. Its own friction then
+        carries a part of the torque of a small bend, and may keep it from bending across the plane.
         """
         rubs = stays > _RUBS * math.radians(self._homing.bend_deg)
         share, harder = (2.0 if rubs else 1.0) * self._homing.steps_tolerance, _RUBBING if rubs else _HARDER
