@@ -3,7 +3,7 @@
 from typing import Any, NamedTuple
 
 from wristctl.control.law import NOW, REFERENCE, now_of, wrist_of
-from wristctl.lanes.compiled import compiled
+from wristctl.lanes.compiled import compiled, spelled_out
 from wristctl.lanes.lane import zero_like
 from wristctl.lanes.rows import rows_of
 from wristctl.wrist.tendons import allocate, reach
@@ -71,7 +71,7 @@ def perceive_within(control: Any, estimate: Any, withheld: Any, within: Any, sin
     signals[_PERIOD] = period + zero_like(torque_low)
 
 
-@compiled
+@spelled_out
 def wanted_torque(control: Any) -> Any:
     """Torque [N m] that the law wants, by its signals."""
     gains, memory = rows_of(control.gains), rows_of(control.memory)
