@@ -166,7 +166,10 @@ def perform(
 
 def _summary(result: StudyResult, overview: Overview) -> str:
     """A result for README.md: the answer with its figure, then the tables, folded where there is an answer."""
-    tables = "\n\n".join(table.text() for table in result.tables)
+    from wristctl.plotting.page_tables import readable
+
+    in_degrees = (Table(**readable(table)) for table in plain_tables(result.tables))
+    tables = "\n\n".join(table.text() for table in in_degrees)
     if not overview.answer:
         return f"```\n{tables}\n```" if tables else ""
     picture = f"\n\n![{overview.captions[overview.figure]}](figures/{overview.figure}.png)" if overview.figure else ""

@@ -44,10 +44,10 @@ def shown_tables(run: Run) -> list[dict[str, Any]]:
     stored = tables(run)
     if run.kind == "compare" and (run.path / "data/comparison.csv").is_file():
         stored = _in_one(run, stored)
-    return [_readable(table) for table in stored]
+    return [readable(table) for table in stored]
 
 
-def _readable(table: dict[str, Any]) -> dict[str, Any]:
+def readable(table: dict[str, Any]) -> dict[str, Any]:
     """The table with angles in degrees, of columns that say `[rad]` and of rows that have their unit in a column."""
     heads, rows = [str(head) for head in table["columns"]], [list(row) for row in table["rows"]]
     unit_at = heads.index("unit") if "unit" in heads else None

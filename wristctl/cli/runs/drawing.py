@@ -147,12 +147,12 @@ def table(
     out: Out = RESULTS,
     debug: Debug = False,
 ) -> None:
-    """Print the tables of a run: all that the command printed or kept back."""
+    """Print the tables of a run, angles in degrees: all that the command printed or kept back."""
     from wristctl.commands.printed_table import Table, latex_table
-    from wristctl.plotting.page_tables import tables
+    from wristctl.plotting.page_tables import readable, tables
 
     run = open_run(ref, out)
-    run_tables = [Table(content["title"], content["columns"], content["rows"]) for content in tables(run)]
+    run_tables = [Table(**readable(content)) for content in tables(run)]
     if not run_tables:
         raise UserError(f"run {run.id} has no tables", str(run.path), "its data are in data/")
     for position in number or ():
