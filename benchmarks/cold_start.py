@@ -38,7 +38,7 @@ FIRST, AGAIN = 3, 5
 
 
 def seconds_of(command: str, folder: Path, cache: Path) -> dict[str, float]:
-    """Wall time of one command, and until it first reports progress beyond nothing, to the user or in its run."""
+    """Wall and processor time of one command, and the former until it reports progress, to the user or in its run."""
     arguments = [str(folder / "study.yaml") if word == "STUDY" else word for word in COMMANDS[command]]
     out = [] if command == "--help" else ["--out", str(folder / "results")]
     start = time.time()
@@ -54,11 +54,17 @@ def seconds_of(command: str, folder: Path, cache: Path) -> dict[str, float]:
         said.append(line)
         if first is None and re.search(r"\b[1-9]\d*\s*(/|of)\s*\d+|compil|simulat", line):
             first = time.time() - start
-    if process.wait() != 0:
+    _, status, used = os.wait4(process.pid, 0)
+    process.returncode = os.waitstatus_to_exitcode(status)
+    if process.returncode != 0:
         raise RuntimeError(f"wristctl {command}: {''.join(said)}")
     whole = time.perf_counter() - begun
     firsts = [each - start for each in counted(folder / "results", command)] + ([first] if first is not None else [])
-    return {"whole": whole, **({"first_progress": min(firsts)} if firsts else {})}
+    return {
+        "whole": whole,
+        "processor": used.ru_utime + used.ru_stime,
+        **({"first_progress": min(firsts)} if firsts else {}),
+    }
 
 
 def counted(results: Path, command: str) -> list[float]:
@@ -70,7 +76,7 @@ def counted(results: Path, command: str) -> list[float]:
 
 def import_seconds(command: str) -> float:
     """Time to import the module of one command."""
-    module = "wristctl.cli.app" if command == "--help" else f"wristctl.cli.{command.replace('-', '_')}"
+    module = "wristctl.cli.app" if command == "--help" else f"wristctl.commands.{command.replace('-', '_')}.command"
     code = f"import time; t = time.perf_counter(); import {module}; print(time.perf_counter() - t)"
     done = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True, env=ENVIRONMENT)
     return float(done.stdout)
@@ -87,7 +93,8 @@ def main() -> None:
     parser.add_argument("--out", type=Path, help="JSON file to write")
     options = parser.parse_args()
     rows = {}
-    print(f"{'command':10} {'import s':>9} {'first s':>9} {'again s':>9} {'progress, first s':>18} {'again s':>9}")
+    heads = "import s", "first s", "again s", "processor, first s", "again s", "progress, first s", "again s"
+    print(f"{'command':10} " + " ".join(head.rjust(max(9, len(head))) for head in heads))
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         (folder / "study.yaml").write_text(STUDY)
@@ -99,7 +106,8 @@ def main() -> None:
             progress = [f"{run['first_progress']:.2f}" if "first_progress" in run else "-" for run in (first, again)]
             print(
                 f"{command:10} {rows[command]['import']:9.2f} {first['whole']:9.2f} {again['whole']:9.2f} "
-                f"{progress[0]:>18} {progress[1]:>9}",
+                f"{first['processor']:18.2f} {again['processor']:9.2f} "
+                f"{progress[0]:>17} {progress[1]:>9}",
                 flush=True,
             )
     if options.out:

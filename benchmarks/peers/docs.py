@@ -132,16 +132,16 @@ def cold_start(rows: dict[str, Any]) -> str:
     lines = ["## Cold start\n"]
     lines.append(
         "Seconds of each command's smallest run (medians), its cache of compiled kernels empty, then filled; in "
-        "brackets until its first report of progress. What is missing between the two is compilation.\n"
+        "brackets until its first report of progress; processor time too. What lies between the two is compilation.\n"
     )
-    lines.append("| command | import | first | again | compilation |\n|---|---|---|---|---|")
+    lines.append("| command | import | first | again | processor: first | again |\n|---|---|---|---|---|---|")
     for command, row in rows.items():
         first, again = (
             f"{run['whole']:.1f}" + (f" ({run['first_progress']:.1f})" if "first_progress" in run else "")
             for run in (row["first"], row["again"])
         )
-        compiling = max(0.0, row["first"]["whole"] - row["again"]["whole"])
-        lines.append(f"| {command} | {row['import']:.2f} | {first} | {again} | {compiling:.1f} |")
+        spent = " | ".join(f"{row[turn]['processor']:.1f}" for turn in ("first", "again"))
+        lines.append(f"| {command} | {row['import']:.2f} | {first} | {again} | {spent} |")
     return "\n".join(lines) + "\n"
 
 
