@@ -10,7 +10,7 @@ order system the 2n equations of each stage reduce to n:
 
 from typing import Any, NamedTuple
 
-from wristctl.lanes.compiled import by_type, compiled, implements
+from wristctl.lanes.compiled import by_type, compiled, implements, spelled_out
 from wristctl.lanes.functions import clip
 from wristctl.lanes.lane import where, zero_like
 from wristctl.lanes.rows import lanes_like, planes_like, square_like
@@ -163,7 +163,7 @@ def accelerate(mass: Any, factors: Any, a: Any) -> None:
     solve(factors, a)
 
 
-@compiled
+@spelled_out
 def _linearised(held: Any, theta: Any, omega: Any, linear: Any) -> None:
     segment, spool_input, tendons = held.plant, held.spool_input, held.tendons
     arc = Chords(planes_like(theta), planes_like(theta), planes_like(theta), planes_like(theta))
@@ -181,7 +181,7 @@ def _linearised(held: Any, theta: Any, omega: Any, linear: Any) -> None:
     yield_jacobians(tendons, theta, omega, linear.by_q, linear.by_rate)
 
 
-@compiled
+@spelled_out
 def rodas3(
     linearised: Any, accelerations: Any, held: Any, q: Any, rate: Any, h: Any, last_q: Any, last_rate: Any
 ) -> None:
