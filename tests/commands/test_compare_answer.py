@@ -148,6 +148,13 @@ def test_every_controller_that_took_part_is_named_with_its_gains_and_counted() -
     assert "4 compared: smc (printed, tuned); pd (default); feedforward." in told(stands(rmse=rows))
 
 
+def test_presets_are_explained_that_take_part_and_no_others() -> None:
+    rows = {"smc/printed": 3e-3, "smc/tuned": 1e-3, "pd-ff/hardware": 2e-3, "feedforward/default": 1e-1}
+    (said,) = re.findall(r"Presets: ([^.]*)\.", told(stands(rmse=rows)))
+    assert said.startswith("hardware") and "tuned" in said and "default" not in said and "printed" not in said
+    assert "Presets" not in told(stands(rmse={"smc/printed": 3e-3, "feedforward/default": 1e-1}))
+
+
 def test_the_gains_of_what_is_recommended_are_printed_with_units_and_no_others() -> None:
     rig = stands("camera and tendons", swings=("mrac/default",))
     gains = {"pid-ff/default": {"Kp": 3.0, "Ki": 20.0, "Kd": 0.1}, "pd-ff/default": {"Kp": 7.0, "Kd": 0.1}}

@@ -51,7 +51,7 @@ def answer_of(
     more = f"Every rank and figure: `--all`, or {run}/report.html." if run else "Every rank and figure: `.tables`."
     unusable = do_not_use(rankings, names)
     notes = [
-        (conditions(rankings), ""),
+        (" ".join(filter(None, [conditions(rankings), gains_meant(rankings)])), conditions(rankings)),
         (best_on_yours(rankings), ""),
         (unusable, "Some must not be used; which, and why: `--all`." if unusable else ""),
         (papers(rankings), ""),
@@ -130,6 +130,21 @@ def conditions(rankings: Sequence[Ranking]) -> str:
         if one.unit != "world"
     }
     return f"{capital('; '.join(f'{name}: {meaning}' for name, meaning in meanings.items()))}." if meanings else ""
+
+
+# For what presets were made; those of the paper are told apart.
+_GAINS = {
+    "default": "for exact angles and torques",
+    "hardware": "for motors and a camera",
+    "tuned": "found by a search",
+}
+
+
+def gains_meant(rankings: Sequence[Ranking]) -> str:
+    """What the names of gains mean, of those that take part."""
+    present = {label.rpartition("/")[2] for ranking in rankings for label in ranking.labels if not open_loop(label)}
+    meanings = [f"{name} {meaning}" for name, meaning in _GAINS.items() if name in present]
+    return f"Presets: {', '.join(meanings)}." if meanings else ""
 
 
 def _rig(traits: Traits) -> str:
