@@ -76,13 +76,13 @@ def arc_path(theta: Array, length: Array) -> TipPath:
     rows = np.concatenate([theta, length])
     moved = np.append(True, (rows[:, 1:] != rows[:, :-1]).any(axis=0))  # where it rests all is as before
     q, dq, ddq, r, dr, ddr = rows[:, moved, None]
-    f, df, ddf = _unit_arc(q[:, 0])
+    f, df, ddf = unit_arc(q[:, 0])
     velocity, acceleration = dr * f + r * dq * df, ddr * f + 2.0 * dr * dq * df + r * (ddq * df + dq**2 * ddf)
     place = np.cumsum(moved) - 1
     return TipPath((r * f)[place], velocity[place], acceleration[place])
 
 
-def _unit_arc(theta: Array) -> tuple[Array, Array, Array]:
+def unit_arc(theta: Array) -> tuple[Array, Array, Array]:
     """Tip of the unit arc, the integral of exp(i theta s) over s in [0, 1], and two derivatives, each (T, 2).
 
     By Gauss-Legendre quadrature: to rounding for |theta| <= 2 pi, and nothing special at 0.

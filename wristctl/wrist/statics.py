@@ -11,6 +11,7 @@ from wristctl.arrays import Array
 from wristctl.config.wrist import WristParameters
 from wristctl.errors import UserError
 from wristctl.wrist.compiled_model import linearised, terms
+from wristctl.wrist.kinematics import unit_arc
 from wristctl.wrist.segments import Segments, segments
 from wristctl.wrist.tendons import TENDONS_PER_SIDE
 
@@ -39,8 +40,23 @@ def least_stiffness(wrist: WristParameters, n: int) -> float:
     An eigenvector of n segment angles with unit norm bends the tip by up to sqrt(n); the eigenvalue over n is the
     stiffness of the whole wrist. Negative: the wrist buckles.
     """
-    tangent = stiffness(wrist, n, np.zeros(n), (wrist.pretension, wrist.pretension))
-    return float(np.linalg.eigvalsh(0.5 * (tangent + tangent.T))[0] / n)
+    return float(np.linalg.eigvalsh(straight_stiffness(wrist, n))[0] / n)
+
+
+def straight_stiffness(wrist: WristParameters, n: int) -> Array:
+    """Stiffness matrix (n, n) [N m/rad] of the straight wrist at pretension, in closed form.
+
+    Chord j turns by a_j, the sum of the angles before it and half of its own, and is shortened by theta_j^2/24: so does
+    a weight along it fall; a side's tendon between neighbouring discs is shortened in the same way.
+    """
+    segment = Segments(*segments(wrist, n))
+    turned = np.tril(np.ones((n, n)), -1) + 0.5 * np.eye(n)
+    carried = segment.mass * (n - 0.5 - np.arange(n)) + segment.hand_mass
+    falling = segment.length * (np.einsum("j,jk,jl->kl", carried, turned, turned) + np.diag(carried) / 12.0)
+    falling += segment.hand_mass * segment.hand_offset
+    pulled = 2 * TENDONS_PER_SIDE * wrist.pretension * segment.length / (12.0 * segment.spans**2)
+    stiff: Array = (segment.stiffness - pulled) * np.eye(n) + segment.gravity_x * falling
+    return stiff
 
 
 def equilibrium(wrist: WristParameters, n: int, tensions: tuple[float, float]) -> Array:
@@ -138,11 +154,22 @@ class Shortfall(NamedTuple):
 
 def balance(wrist: WristParameters, theta: Array, force: float = 0.0) -> Balance:
     """Torques that hold the wrist at angles (T,) [rad] under a force at the tip, across the straight wrist [N]."""
-    at_theta = terms(segments(wrist, 1, (0.0, force)), theta[:, None], 0.0 * theta[:, None])
-    plus, minus = at_theta.moment_arms[:, 0].T
+    one = Segments(*segments(wrist, 1))
+    tip, turned = one.length * unit_arc(theta)[1], np.stack([-np.sin(theta), np.cos(theta)], axis=-1)
+    lifted = 0.5 * one.mass * tip + one.hand_mass * (tip + one.hand_offset * turned)
+    plus, minus = _moment_arms(one, theta)
     low, high = TENDONS_PER_SIDE * wrist.pretension, TENDONS_PER_SIDE * wrist.tension_limit
-    asked = at_theta.bias[:, 0] + wrist.stiffness * theta
+    asked = one.stiffness * theta - lifted @ np.array(wrist.gravity) - force * tip[:, 1]
     return Balance(asked, plus * low + minus * high, plus * high + minus * low, plus, minus)
+
+
+def _moment_arms(one: Segments, theta: Array) -> tuple[Array, Array]:
+    """Moment arms of the + and the - side of one arc at angles (T,) [m], as `wristctl.wrist.tendons` has them."""
+    y = theta / (2.0 * one.spans)
+    place, slope, _ = (row[:, 0] + 1j * row[:, 1] for row in unit_arc(2.0 * y))
+    shortening = -((2.0 * slope - 1j * place) * np.exp(-1j * y)).real  # of sin(y)/y
+    bending, compression = one.tendon_offset * np.cos(y), one.length / (2.0 * one.spans) * shortening
+    return bending + compression, compression - bending
 
 
 def shortfall(wrist: WristParameters, low: float, high: float, force: float = 0.0) -> Shortfall | None:
