@@ -63,9 +63,10 @@ def roofline(result: Result) -> str:
         return ""
     lines = [
         "## How close to the machine\n",
-        "Operations of one lane's tick, counted by running the equations on numbers that count (controller, allocation, a "
-        "step of RODAS3, metrics); the peak is that of independent fused multiply-adds in the widest registers, "
-        "measured in the same run; a division takes the time of as many operations as the ratio of the two peaks.\n",
+        "Operations of one lane's tick, counted by running the equations on numbers that count (controller, "
+        "allocation, a step of RODAS3, metrics); the peak is that of independent fused multiply-adds in the widest "
+        "registers, measured in the same run; a division takes the time of as many operations as the ratio "
+        "of the two peaks.\n",
         "| n | threads | + | x | / | peak [GF/s] | wristctl [GF/s] | share | C loop [GF/s] | share |\n"
         "|---|---|---|---|---|---|---|---|---|---|",
     ]  # fmt: skip
