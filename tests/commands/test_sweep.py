@@ -243,3 +243,11 @@ def test_a_sweep_of_what_is_not_there_says_so_before_anything_is_written(tmp_pat
     with pytest.raises(UserError, match=r"there is no setting simulate.loop.plant.stifness .*did you mean 'stiffness'"):
         wristctl.simulate(study, out=tmp_path)
     assert not list(tmp_path.iterdir())
+
+
+def test_a_controller_without_the_defaults_preset_is_swept_with_its_own(tmp_path: Path) -> None:
+    """Of two that are swept one has gains `hardware`; the other's are as when it is simulated alone."""
+    swept = wristctl.simulate(wristctl.load_study(None, "sweep=['simulate.controller=ct-dob,gvsc']"))
+    alone = wristctl.simulate(wristctl.load_study(None, "simulate.controller=gvsc", "simulate.gains=default"))
+    rows = swept.frame().set_index("simulate.controller")
+    assert rows.loc["gvsc", "rmse"] == pytest.approx(alone.metrics["rmse"], rel=1e-12)

@@ -252,8 +252,14 @@ def test_tables_are_in_degrees_by_their_heads_and_by_their_rows_units(tmp_path: 
     stored = [
         {"title": "A", "columns": ["who", "RMSE [rad]", "rate [rad/s]"], "rows": [["a", 0.5, 2.0], ["b", None, 1.0]]},
         {"title": "B", "columns": ["metric", "value", "unit"], "rows": [["rmse", 0.5, "rad"], ["peak", 9.5, "N"]]},
+        {
+            "title": "C",
+            "columns": ["name", "95 %", "unit"],
+            "rows": [["turn", "-0.5 to 1e-3", "rad"], ["x", "-", "m"]],
+        },
     ]
-    first, second = shown_tables(made(tmp_path, {}, tables=stored))
+    first, second, third = shown_tables(made(tmp_path, {}, tables=stored))
+    assert third["rows"] == [["turn", "-28.65 to 0.0573", "deg"], ["x", "-", "m"]], "a range is in its row's unit"
     assert first["columns"] == ["who", "RMSE [deg]", "rate [rad/s]"]
     assert first["rows"] == [["a", pytest.approx(90.0 / np.pi), 2.0], ["b", None, 1.0]]
     assert second["rows"] == [["rmse", pytest.approx(90.0 / np.pi), "deg"], ["peak", 9.5, "N"]]

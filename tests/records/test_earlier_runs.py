@@ -89,7 +89,7 @@ def test_the_configuration_of_an_earlier_run_is_read_back(run: Run) -> None:
 def test_the_configuration_of_an_earlier_run_is_fed_back(call: Call, earlier: Path, kind: str) -> None:
     config = open_run(f"latest:{kind}", earlier).file("config.yaml")
     said = call(*command_of(kind).split(), "--config", str(config), "--out", str(earlier), "--dry-run")
-    assert f"would write a {kind} run" in said
+    assert f"would write a run of {kind}" in said
 
 
 SHORT = ("--set", "horizon=0.05")

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -117,3 +119,11 @@ def test_what_a_kind_of_reference_adds_has_its_unit() -> None:
     assert units == {"end_frequency": "1/s", "offset_deg": "deg", "seed": "1"}
     daily = study.simulate.reference.model_copy(update={"kind": "adl:jar"})
     assert unit_at(daily, ("scale",)) == "1" and unit_at(daily, ("frequency",)) == "1/s"
+
+
+def test_code_of_ones_own_is_refused_as_a_value_wherever_it_stands(tmp_path: Path) -> None:
+    for sweep in ("controller=ct-dob,mine.py:MY_PD", f"simulate.controller={tmp_path}/mine.py:MY_PD"):
+        study = load_study([], [f"sweep=['{sweep}']"])
+        with pytest.raises(UserError, match="MY_PD") as told:
+            axes_of(study, "simulate")
+        assert told.value.exit_code == 2

@@ -26,7 +26,7 @@ def print_plan(kind: str, study: Study, plan: str, out: Path, as_json: bool, eve
         return
     print(resolved, end="")
     rest = [] if everything else ["every other setting is at its default: --dry-run --all shows them"]
-    for line in [*rest, *plan.splitlines(), f"would write a {kind} run under {out}; nothing is written now"]:
+    for line in [*rest, *plan.splitlines(), f"would write a run of {kind} under {out}; nothing is written now"]:
         print(f"# {printable(line)}")
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import re
 from collections.abc import Sequence
 from typing import Any
 
@@ -13,13 +14,17 @@ from wristctl.records.run import Run
 
 # Units of angles in files, and what people read.
 _DEGREES = {"rad": "deg", "rad s": "deg s"}
+_RANGE = re.compile(r"(-?[0-9.]+(?:e[-+]?[0-9]+)?) to (-?[0-9.]+(?:e[-+]?[0-9]+)?)")
 _WHO = ("loop", "reference", "controller", "gains", "inverse")
 
 
 def in_degrees(value: Any, unit: str) -> tuple[Any, str]:
-    """A number and its unit for people: angles, and their integrals, in degrees."""
+    """A number, or a range of two in words, and its unit for people: angles, and their integrals, in degrees."""
     if unit not in _DEGREES:
         return value, unit
+    if isinstance(value, str) and (ends := _RANGE.fullmatch(value)):
+        low, high = (format(math.degrees(float(end)), ".4g") for end in ends.groups())
+        return f"{low} to {high}", _DEGREES[unit]
     is_number = isinstance(value, int | float) and not isinstance(value, bool)
     return (math.degrees(value) if is_number else value), _DEGREES[unit]
 

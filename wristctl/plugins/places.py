@@ -28,8 +28,8 @@ def placed(value: Any, document: Path | None) -> Any:
 
     Raises UserError where the document is part of a run and names code that is not.
     """
-    if isinstance(value, dict):
-        return {key: placed(entry, document) for key, entry in value.items()}
+    if isinstance(value, dict):  # a sweep, KEY=VALUES, names no code
+        return {key: entry if key == "sweep" else placed(entry, document) for key, entry in value.items()}
     if isinstance(value, tuple):
         return tuple(placed(entry, document) for entry in value)
     if not isinstance(value, str) or not is_reference(value):

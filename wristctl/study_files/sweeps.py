@@ -11,6 +11,7 @@ from pydantic import ValidationError
 from pydantic_core import PydanticCustomError
 
 from wristctl.config.families import Range
+from wristctl.config.foreign import is_reference
 from wristctl.config.former_names import LOOPS, key_today
 from wristctl.config.section import OpenSection, Section
 from wristctl.config.study import Study
@@ -202,6 +203,9 @@ def _listed(text: str, values: str) -> tuple[Any, ...]:
         items = tuple(parse_yaml(item.strip(), "").data for item in values.split(","))
     except UserError as error:
         raise error.at(Argument("sweep", text)) from error
+    if own := next((item for item in items if isinstance(item, str) and is_reference(item)), None):
+        fix = "run the command once for it, and hold both results against each other with `wristctl runs diff`"
+        raise UserError(f"a sweep takes no code of one's own: {own}", Argument("sweep", text), fix)
     if any(item is None for item in items):
         raise UserError("a value is missing", Argument("sweep", text), _EXAMPLE)
     return items

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from functools import wraps
 from typing import TYPE_CHECKING, Any, TypeVar, cast
 
+from wristctl.commands.adoption import with_presets
 from wristctl.commands.answer import Answer
 from wristctl.commands.inputs import Inputs
 from wristctl.commands.inputs_of_loops import identified, tuned_gains
@@ -38,6 +39,8 @@ def sweep_units(study: Study, command: str, axes: Sequence[SweepAxis], points: S
     from wristctl.work.worker import Unit
 
     content = json.loads(study.model_dump_json(by_alias=True, include=_SECTIONS.get(command, _WHOLE | {command})))
+    if "gains" not in study.simulate.model_fields_set:  # each controller's own, where it has none of the default's name
+        content.get("simulate", {}).pop("gains", None)
     as_lanes = command == "simulate" and not _any_in_two_planes(study, axes)
     together, does = (_LANES, "simulated") if as_lanes else (1, "performed_at")
     keys = [(axis.key, axis.text) for axis in axes]
@@ -59,7 +62,12 @@ def _any_in_two_planes(study: Study, axes: Sequence[SweepAxis]) -> bool:
 def _studies(spec: Mapping[str, Any]) -> Iterator[Study]:
     study = Study.model_validate_json(json.dumps(spec["study"]))
     axes = [SweepAxis(key, (), False, text) for key, text in spec["keys"]]
-    return (study_at(study, axes, _plain(values)) for values in spec["points"])
+    return (_at(study, axes, _plain(values), spec["command"]) for values in spec["points"])
+
+
+def _at(study: Study, axes: Sequence[SweepAxis], values: Sequence[Any], command: str) -> Study:
+    """The study at a point, with a controller's own preset where nobody chose its gains."""
+    return with_presets(study_at(study, axes, values), command)
 
 
 def _plain(values: Sequence[Any]) -> list[Any]:
@@ -173,8 +181,9 @@ def sweepable(procedure: Procedure[Found]) -> Procedure[Found]:
         assert procedure.size is not None
         sizes = []
         for corner in _corners(axes):
-            plan_text = procedure.plan(study_at(base, axes, corner), Inputs())
-            sizes.append(procedure.size(study_at(base, axes, corner)))
+            there = _at(base, axes, corner, procedure.kind)
+            plan_text = procedure.plan(there, Inputs())
+            sizes.append(procedure.size(there))
         steps, rollouts = (
             sum(column) / len(sizes) for column in zip(*((a.steps, a.rollouts) for a in sizes), strict=True)
         )
