@@ -13,7 +13,7 @@ from tests.cli.conftest import Call
 @pytest.mark.parametrize("command", ["simulate", "analyse", "tune", "compare"])
 def test_a_dry_run_writes_nothing(call: Call, tmp_path: Path, command: str) -> None:
     code, out, _ = call(command, "--dry-run", *(("--set", "inverses=[none]") if command == "compare" else ()))
-    assert code == 0 and f"a {command} run under" in out and not list(tmp_path.iterdir())
+    assert code == 0 and f"a run of {command} under" in out and not list(tmp_path.iterdir())
 
 
 TIPS = "{kind: tip-path, inverse: closed-form, tips: [[0.12, 0.0], [0.078, 0.014]]}"
