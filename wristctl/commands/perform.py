@@ -12,7 +12,7 @@ from typing import Any, Generic
 from wristctl.commands.adoption import adopted, with_places, with_presets
 from wristctl.commands.inputs import Inputs, check_motions, check_tendons, named_for_good, opened
 from wristctl.commands.plain_python import warn_of_plain
-from wristctl.commands.printed_table import Table
+from wristctl.commands.printed_table import Table, table_for_people
 from wristctl.commands.procedure import Found, Procedure, procedure_of
 from wristctl.commands.progress import Watch, watched
 from wristctl.commands.results import Findings, StudyResult
@@ -166,10 +166,7 @@ def perform(
 
 def _summary(result: StudyResult, overview: Overview) -> str:
     """A result for README.md: the answer with its figure, then the tables, folded where there is an answer."""
-    from wristctl.plotting.page_tables import readable
-
-    in_degrees = (Table(**readable(table)) for table in plain_tables(result.tables))
-    tables = "\n\n".join(table.text() for table in in_degrees)
+    tables = "\n\n".join(table_for_people(content).text() for content in plain_tables(result.tables))
     if not overview.answer:
         return f"```\n{tables}\n```" if tables else ""
     picture = f"\n\n![{overview.captions[overview.figure]}](figures/{overview.figure}.png)" if overview.figure else ""

@@ -54,6 +54,14 @@ class Table:
         return heads, rows, cells, [max(map(len, column)) for column in zip(heads, *cells, strict=True)]
 
 
+def table_for_people(content: dict[str, Any]) -> Table:
+    """The table that a run keeps (title, columns, rows), angles in degrees."""
+    from wristctl.plotting.page_tables import readable
+
+    shown = readable(content)
+    return Table(shown["title"], shown["columns"], shown["rows"])
+
+
 def number(value: float) -> str:
     """Four significant digits; infinities and NaN as a dash."""
     return f"{value:.4g}" if math.isfinite(value) else "-"
