@@ -69,32 +69,34 @@ def adopted(study: Study, command: str) -> Adopted:
     return Adopted(study.model_copy(update=called | {"controller_settings": settings}), tuple(origins))
 
 
-def with_presets(study: Study, command: str) -> Study:
+def with_presets(study: Study, command: str, tell: bool = True) -> Study:
     """The study with a controller's own preset where nobody chose gains for it and it has none of the default's name.
 
-    That is its preset `default`, or else its first, for the commands of one loop and for `compare`.
+    That is its preset `default`, or else its first, for the commands of one loop and for `compare`. With `tell` the
+    log says which.
     """
     if command not in ("simulate", "analyse", "compare"):
         return study
     section = study.compare if command == "compare" else study.simulate
     if isinstance(section, SimulateSettings):
-        return study.model_copy(update={"simulate": _with_preset(section)})
+        return study.model_copy(update={"simulate": _with_preset(section, tell)})
     rows = {
-        name: tuple(map(_with_preset, value))
+        name: tuple(_with_preset(row, tell) for row in value)
         for name, value in section
         if isinstance(value, tuple) and value and isinstance(value[0], Row)
     }
     return study.model_copy(update={"compare": section.model_copy(update=rows)})
 
 
-def _with_preset(row: _Row) -> _Row:
+def _with_preset(row: _Row, tell: bool) -> _Row:
     if "gains" in row.model_fields_set or row.controller not in CONTROLLERS:
         return row
     presets = getattr(CONTROLLERS[row.controller], "presets", {})
     if not presets or row.gains in presets:
         return row
     preset = "default" if "default" in presets else next(iter(presets))
-    log.info("%s has no gains '%s': its own preset '%s' is taken", row.controller, row.gains, preset)
+    if tell:
+        log.info("%s has no gains '%s': its own preset '%s' is taken", row.controller, row.gains, preset)
     return row.model_copy(update={"gains": preset})
 
 

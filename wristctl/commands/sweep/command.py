@@ -62,12 +62,8 @@ def _any_in_two_planes(study: Study, axes: Sequence[SweepAxis]) -> bool:
 def _studies(spec: Mapping[str, Any]) -> Iterator[Study]:
     study = Study.model_validate_json(json.dumps(spec["study"]))
     axes = [SweepAxis(key, (), False, text) for key, text in spec["keys"]]
-    return (_at(study, axes, _plain(values), spec["command"]) for values in spec["points"])
-
-
-def _at(study: Study, axes: Sequence[SweepAxis], values: Sequence[Any], command: str) -> Study:
-    """The study at a point, with a controller's own preset where nobody chose its gains."""
-    return with_presets(study_at(study, axes, values), command)
+    points = (study_at(study, axes, _plain(values)) for values in spec["points"])
+    return (with_presets(at_point, spec["command"], tell=False) for at_point in points)
 
 
 def _plain(values: Sequence[Any]) -> list[Any]:
@@ -179,9 +175,12 @@ def sweepable(procedure: Procedure[Found]) -> Procedure[Found]:
         for point in points[:_CHECKED]:
             study_at(base, axes, point)
         assert procedure.size is not None
-        sizes = []
+        sizes, told = [], set[str]()
         for corner in _corners(axes):
-            there = _at(base, axes, corner, procedure.kind)
+            there = study_at(base, axes, corner)
+            name = there.simulate.controller
+            there = with_presets(there, procedure.kind, tell=name not in told)
+            told.add(name)
             plan_text = procedure.plan(there, Inputs())
             sizes.append(procedure.size(there))
         steps, rollouts = (
