@@ -133,7 +133,8 @@ def cold_start(rows: dict[str, Any]) -> str:
     lines = ["## Cold start\n"]
     lines.append(
         "Seconds of each command's smallest run (medians), its cache of compiled kernels empty, then filled; in "
-        "brackets until its first report of progress; processor time too. What lies between the two is compilation.\n"
+        "brackets until its first report of progress; beside it the processor time. The first run compiles, the "
+        "second does not.\n"
     )
     lines.append("| command | import | first | again | processor: first | again |\n|---|---|---|---|---|---|")
     for command, row in rows.items():

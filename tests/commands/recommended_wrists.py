@@ -16,6 +16,7 @@ import wristctl
 from tests.drawn_rigs import options, tried
 from wristctl.commands.recommend.answer import Recommended, spread
 from wristctl.commands.recommend.command import FAMILY
+from wristctl.comparison.world_ranking import world_scores
 from wristctl.config.study import Study
 from wristctl.control.table import controller
 from wristctl.errors import UserError
@@ -62,12 +63,11 @@ def _on_other_rigs(study: Study, result: Recommended) -> dict[str, Any]:
         for name, gains in ((best.controller, best.gains), (YARDSTICK, {}))
     )
     lost = (own.failed | own.swings_beside(open_loop)).reshape(RIGS, -1).any(axis=1)
-    rmse = np.exp(np.log(own.metrics["rmse"].reshape(RIGS, -1)).mean(axis=1))
     expected = [math.degrees(value) for value in spread(result.ranking.rows[row].rmse)]
     share = float(result.ranking.standing.lost[row].times) / result.ranking.count
     return {
         "use": best.label, "lost": int(lost.sum()), "said_lost": share, "swing_deg": own.largest_swing(open_loop),
-        "expected_deg": expected, "median_deg": math.degrees(float(np.median(rmse))),
+        "expected_deg": expected, "median_deg": math.degrees(float(np.median(world_scores(own, RIGS)))),
     }  # fmt: skip
 
 

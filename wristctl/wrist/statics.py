@@ -159,7 +159,7 @@ def balance(wrist: WristParameters, theta: Array, force: float = 0.0) -> Balance
     lifted = 0.5 * one.mass * tip + one.hand_mass * (tip + one.hand_offset * turned)
     plus, minus = _moment_arms(one, theta)
     low, high = TENDONS_PER_SIDE * wrist.pretension, TENDONS_PER_SIDE * wrist.tension_limit
-    asked = one.stiffness * theta - lifted @ np.array(wrist.gravity) - force * tip[:, 1]
+    asked = one.stiffness * theta - (lifted * wrist.gravity).sum(axis=1) - force * tip[:, 1]
     return Balance(asked, plus * low + minus * high, plus * high + minus * low, plus, minus)
 
 
