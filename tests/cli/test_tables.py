@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 import math
+import re
+from pathlib import Path
 
 import numpy as np
+import pytest
 
-from wristctl.commands.printed_table import Table, latex_table
+import wristctl
+from wristctl.commands.printed_table import Table, latex_table, table_for_people
 
 TABLE = Table("T", ("name", "rmse [rad]", "ok"), [("smc", 1 / 3, True), ("pid", None, False), ("x", math.nan, True)])
 
@@ -21,6 +25,22 @@ def test_columns_are_aligned_and_numbers_have_four_digits() -> None:
         "pid            -  no",
         "x              -  yes",
     ]
+
+
+def test_a_kept_table_is_shown_in_degrees_whatever_else_is_kept_with_it() -> None:
+    kept = {"title": "T", "columns": ["name", "rmse [rad]"], "rows": [["smc", math.pi], ["pid", None]], "note": "more"}
+    shown = table_for_people(kept)
+    assert list(shown.columns) == ["name", "rmse [deg]"] and list(shown.rows) == [["smc", 180.0], ["pid", None]]
+
+
+def test_the_readme_of_a_run_has_its_angles_in_degrees(tmp_path: Path) -> None:
+    study = wristctl.load_study(
+        None, "simulate.controller=pid-ff", "simulate.horizon=0.6", "simulate.loop.plant_segments=1"
+    )
+    done = wristctl.simulate(study, out=tmp_path)
+    assert done.run is not None
+    (row,) = re.findall(r"^rmse +(\S+) +(\S+)", done.run.file("README.md").read_text(), re.MULTILINE)
+    assert row[1] == "deg" and float(row[0]) == pytest.approx(math.degrees(done.metrics["rmse"]), rel=1e-3)
 
 
 def test_a_narrow_terminal_gets_the_columns_below_each_other() -> None:

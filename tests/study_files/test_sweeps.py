@@ -124,6 +124,7 @@ def test_what_a_kind_of_reference_adds_has_its_unit() -> None:
 def test_code_of_ones_own_is_refused_as_a_value_wherever_it_stands(tmp_path: Path) -> None:
     for sweep in ("controller=ct-dob,mine.py:MY_PD", f"simulate.controller={tmp_path}/mine.py:MY_PD"):
         study = load_study([], [f"sweep=['{sweep}']"])
+        assert study.sweep == (sweep,), "as it was typed"
         with pytest.raises(UserError, match="MY_PD") as told:
             axes_of(study, "simulate")
         assert told.value.exit_code == 2
