@@ -1,7 +1,7 @@
 """Wrists drawn at random, and what `recommend` says of each: does it hold on rigs that it has not seen?
 
-Length, stiffness and the hand's mass are drawn; what is recommended runs on 20 rigs of another seed. A recommendation
-is sound where it fails, swings or chatters on none of them; its expected error where the median of theirs lies in it.
+Length, stiffness and the hand's mass are drawn; the recommended gains run on 20 rigs of another seed. A recommendation
+is sound if it fails, swings or chatters on none of them. Its expected error holds if it contains their median error.
 `python -m tests.commands.recommended_wrists --count 20` keeps what has ended, and goes on from there.
 """
 

@@ -46,8 +46,9 @@ def least_stiffness(wrist: WristParameters, n: int) -> float:
 def straight_stiffness(wrist: WristParameters, n: int) -> Array:
     """Stiffness matrix (n, n) [N m/rad] of the straight wrist at pretension, in closed form.
 
-    Chord j turns by a_j, the sum of the angles before it and half of its own, and is shortened by theta_j^2/24: so does
-    a weight along it fall; a side's tendon between neighbouring discs is shortened in the same way.
+    Chord j turns by a_j, the sum of the angles before it and half of its own, and is shortened by the share
+    theta_j^2/24. A weight beyond it sinks by the chord's length times a_j^2/2 + theta_j^2/24. A tendon is shortened by
+    the same law, span by span.
     """
     segment = Segments(*segments(wrist, n))
     turned = np.tril(np.ones((n, n)), -1) + 0.5 * np.eye(n)

@@ -141,7 +141,7 @@ _GAINS = {
 
 
 def gains_meant(rankings: Sequence[Ranking]) -> str:
-    """What the names of gains mean, of those that take part."""
+    """What the presets that take part are made for."""
     present = {label.rpartition("/")[2] for ranking in rankings for label in ranking.labels if not open_loop(label)}
     meanings = [f"{name} {meaning}" for name, meaning in _GAINS.items() if name in present]
     return f"Presets: {', '.join(meanings)}." if meanings else ""
