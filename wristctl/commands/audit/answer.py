@@ -164,8 +164,8 @@ def _ranking(claims: Sequence[Judgement], loops: Sequence[str]) -> list[str]:
     ]
     return [
         *sentences,
-        f"Its ranking ({', '.join(name.upper() for name in order)}) cannot be tested, as it gives no equations of "
-        f"{_and(named)}; with designs of ours for these, and P1 and P2 exchanged, it holds {_on(holds, loops)}.",
+        f"Its ranking ({', '.join(name.upper() for name in order)}) cannot be tested: it gives no equations of "
+        f"{_and(named)}; with designs of ours, and P1 and P2 exchanged, it holds {_on(holds, loops)}.",
     ]
 
 
@@ -173,22 +173,10 @@ def _softened(claims: Sequence[Judgement]) -> list[str]:
     """Whether springs that lost stiffness add as much error as the experiment has, by the heaviest claim of that."""
     found = [j for j in claims if j.claim.stiffness_scale < 1.0 and j.claim.weight and j.claim.value]
     return [
-        f"Soft springs ({_percent(j.claim.stiffness_scale)} of the stiffness, our number) give the experiment's "
-        f"{degrees(float(j.claim.value or 0.0))} deg {_places(j.found)}{_missed(j)}."
+        f"Springs of {_percent(j.claim.stiffness_scale)} of the stiffness (our number) add the experiment's "
+        f"{degrees(float(j.claim.value or 0.0))} deg {_places(j.found)}."
         for j in found[:1]
     ]
-
-
-def _missed(judged: Judgement) -> str:
-    """On which loops a number is smaller, and on which it is larger, than the paper's, where it is not the paper's."""
-    value = float(judged.claim.value or 0.0)
-    off = {name: one for name, one in judged.found.items() if name and one.verdict != "reproduced"}
-    sides = {
-        "less": [name for name, one in off.items() if one.high < value],
-        "more": [name for name, one in off.items() if one.low > value],
-    }
-    parts = [f"{word} on {_and([_word(name) for name in loops])}" for word, loops in sides.items() if loops]
-    return f": {', '.join(parts)}" if parts else ""
 
 
 def _is_order(claim: Claim, less: str, more: str) -> bool:

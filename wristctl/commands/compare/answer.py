@@ -136,7 +136,7 @@ def conditions(rankings: Sequence[Ranking]) -> str:
 _GAINS = {
     "default": "for exact angles and torques",
     "hardware": "for motors and a camera",
-    "tuned": "found by a search",
+    "tuned": "by search",
 }
 
 
