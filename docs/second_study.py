@@ -20,20 +20,21 @@ _CHOOSE = """Choose among what both studies have in their first groups. What onl
 worlds or to the luck of its searches. An order comes out again where Kendall's tau of both is above 0 at 5 %."""
 
 
+def unsettled(first: Rankings, second: Rankings) -> dict[str, str]:
+    """What the second study has in its first group, of the rigs on which it shares no controller with the first."""
+    apart = [name for name, rows in first.items() if name in second and not _top(rows) & _top(second[name])]
+    return {name: _names(_top(second[name])) for name in apart}
+
+
 def again(first: Rankings, second: Rankings, rigs: Sequence[str]) -> list[str]:
-    """Which controllers are in the first group of all these rigs in both studies, and where the studies disagree."""
+    """Which controllers are in the first group of all these rigs in both studies, as a paragraph."""
     if not rigs:
         return []
-    apart = [name for name, rows in first.items() if name in second and not _top(rows) & _top(second[name])]
     one, other = (set.intersection(*(_top(rankings[name]) for name in rigs)) for rankings in (first, second))
-    where = f"all of {joined(rigs)}" if len(rigs) > 1 else rigs[0]
-    text = f"""[Asked twice](#asked-twice), with other worlds and searches: in the first group of {where} are both times
-        {_names(one & other)}; this time alone {_names(one - other)}; the other time alone {_names(other - one)}."""
-    text += "".join(
-        f" For {name} nothing is settled: this time {_names(_top(first[name]))}, the other time "
-        f"{_names(_top(second[name]))}."
-        for name in apart
-    )
+    where = f"each of {joined(rigs)}" if len(rigs) > 1 else rigs[0]
+    text = f"""[A second study](#asked-twice) has other worlds, tunings and noise. On {where} none is shown to be better
+        than, in both studies, {_names(one & other)}; in this one only, {_names(one - other)}; in the other only,
+        {_names(other - one)}."""
     return [*textwrap.wrap(" ".join(text.split()), 120), ""]
 
 

@@ -18,11 +18,12 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 from choices import about
 from ranking_rows import Rankings, Row, deg, first_group, group, interval, short, three
-from second_study import again, asked_twice
+from second_study import again, asked_twice, unsettled
 
 from wristctl.commands.printed_table import joined
 from wristctl.commands.study.units import families_of
@@ -37,26 +38,31 @@ HERE = Path(__file__).parent
 # Times the lowest RMSE up to which a controller that is not told from it is about the same; upper over lower end of a
 # ratio's interval that tells nothing; share of the worlds that a controller loses whose RMSE tells nothing.
 ALIKE, WIDE, USELESS = 1.1, 1.5, 0.5
-_EXACT = "with exact angles and torques"
+# Share of the worlds that a controller may lose.
+LOST = 0.01
+_EXACT, _RIG = "with exact angles and torques", "on rigs with motors, tendons and a camera"
 FIGURES = {"laws": "RMSE of every controller on every rig", "terms": "What each term of a controller buys"}
 PAPER = ("smc/tuned", "smc/printed", "smc/exchanged", "pid/tuned", "pid/printed")
 
 _SIMULATED = """**All of it is simulated: nothing here was measured on a real rig.** [How the model meets recordings of
 real robots](real-robots.md)."""
-_ABOUT = """Each row of the table is a family of {worlds} simulated worlds: wrists and rigs drawn anew, none of them
-seen in tuning. Each controller was tuned {tunings} times, each time with {evaluations} evaluations on {draws} other
-worlds; the RMSE is the geometric mean over worlds and tunings. Intervals are of 95 %, by a bootstrap over tunings and
-worlds. Controllers are distinguished by their paired differences in the same worlds, so that one may be worse though
-its RMSE lies in the other's interval. Not distinguished does not mean equal: an RMSE more than a tenth above the lowest
-stands beside the name. Intervals are of the mean, not of single wrists. Halves of the worlds are drawn at random,
-{halves} times; the tunings are the same in each.
+_ABOUT = """Each row of the table is a family of {worlds} simulated worlds, each another wrist on another rig, none of
+them seen in tuning. Each controller was tuned {tunings} times, each time with {evaluations} sets of gains on {draws}
+other worlds; the RMSE is the geometric mean over worlds and tunings. Intervals are of 95 %, by a bootstrap over tunings
+and worlds, and of the mean, not of single wrists. Controllers are distinguished by their paired differences in the same
+worlds: one may be worse though its RMSE lies in the other's interval, and one of a larger RMSE may not be distinguished
+where its tunings differ much. That does not mean equal: an RMSE more than a tenth above the lowest stands beside the
+name. Halves of the worlds are drawn at random, {halves} times, with the same tunings: what is lowest in all of them may
+owe it to its tunings. Where a line above is of several rigs, it names what is not distinguished from the lowest on the
+most of them, and of these the one of the least errors.
 
 A world is lost where the controller [fails, swings or chatters](glossary.md); a failure counts as 90 deg in the RMSE.
-What is shown, at 95 %, to lose more than 1 % of the worlds is not to be used, and is in no other column; up to {few} of
-{worlds} do not show it here.
-Names without a suffix have tuned gains; [what controllers are](choices.md#controllers). The gains, of the median
-tuning: `wristctl simulate --gains tuned:camera`, [of all families](gains.md). For a wrist of your own:
-[recommend](recommend.md)."""
+Not to be used is what is shown, at 95 %, to lose more than 1 % of the worlds; it is in no other column, and up to {few}
+of {worlds} do not show it. Feedforward alone comes near behind motors, whose spools follow the motion; with torques
+alone it has the whole error of its model.
+Gains are tuned where a name has no suffix; [what controllers are](choices.md#controllers). The gains of the tuning
+whose error is the median: `wristctl simulate --gains tuned:camera`, [of all families](gains.md). For a wrist of your
+own: [recommend](recommend.md)."""
 _PAPER = """How many times the lowest RMSE on the rig; of what may not be used, the share of worlds that are lost.
 The gains of [the paper](paper.md)'s sliding mode are P1, P2 and P3, those of its PID Kp, Ki and Kd: `printed` as the
 paper prints them, `exchanged` with P1 and P2 swapped, our hypothesis of a misprint."""
@@ -89,8 +95,8 @@ class Study:
 def decision(rankings: Mapping[str, Sequence[Row]], first: Mapping[str, str]) -> list[str]:
     """A line for each rig: what to run, how often it is first, what is as good, what comes next, and the gain."""
     lines = [
-        "| rig | lowest RMSE | RMSE [deg], 95 % | lowest in so many halves of the worlds, tunings "
-        "| not distinguished from it | first that is worse | feedforward's RMSE over the lowest "
+        "| rig | lowest RMSE | RMSE [deg], 95 % | lowest in: halves of the worlds, tunings "
+        "| not distinguished from it | first that is worse | feedforward's RMSE / the lowest "
         "| [do not use](#what-not-to-use) |",
         "| --- | --- | --- | --- | --- | --- | --- | --- |",
     ]
@@ -105,7 +111,7 @@ def decision(rankings: Mapping[str, Sequence[Row]], first: Mapping[str, str]) ->
         same = ", ".join(short(row["row"]) + _beside(row, best) for row in ties)
         then = f"{short(after['row'])} {deg(after['rmse'])}" if after else "-"
         lines.append(
-            f"| {name} | **{best['row']}** | {interval(best)} | {first.get(name, '-')} | {same or '-'} | {then} "
+            f"| {name} | **{short(best['row'])}** | {interval(best)} | {first.get(name, '-')} | {same or '-'} | {then} "
             f"| {three(best['times_better'])} | {lost} of {len(rows)} |"
         )
     return lines
@@ -123,33 +129,41 @@ def recommended(rankings: Mapping[str, Sequence[Row]]) -> list[str]:
     return sorted((label for label in often if often[label] == most), key=partial(_log_error, rankings.values()))
 
 
-def use(rankings: Mapping[str, Sequence[Row]], where: str) -> str:
-    """What to use on rigs of a kind: how large its error is on each, and what is not distinguished from it."""
+def use(rankings: Mapping[str, Sequence[Row]], where: str, otherwise: Mapping[str, str] = MappingProxyType({})) -> str:
+    """What to use on rigs of a kind: how large its error is on each, and what is not distinguished from it.
+
+    `otherwise` names what a second study recommends on the rigs where it shares no controller with this one.
+    """
     if not recommended(rankings):
         return f"- **{where}**: none may be used."
     label, *others = recommended(rankings)
     firsts = {name: {row["row"]: row for row in first_group(rows)} for name, rows in rankings.items()}
     chosen = {name: rows[label] for name, rows in firsts.items() if label in rows}
-    errors, alike = [], []
+    errors = []
     for name, row in chosen.items():
         lowest = first_group(rankings[name])[0]
-        lower = "" if lowest["row"] == label else f" ({short(lowest['row'])}: {deg(lowest['rmse'])})"
+        lower = "" if lowest["row"] == label else f" (there {short(lowest['row'])} has {deg(lowest['rmse'])})"
         errors.append(f"{interval(row)} deg in {name}{lower}")
     better = [row["times_better"] for row in chosen.values()]
-    least = f"{'at least ' * (len(better) > 1)}{three(min(better))} times less"
-    hardly = min(better) < ALIKE
-    least = f"hardly less than feedforward alone: {least}" if hardly else f"{least} than feedforward alone"
-    words = f"use {label}: RMSE {joined(errors)}, {least}."
+    least = f"feedforward alone has {'at least ' * (len(better) > 1)}{three(min(better))} times as much"
+    words = f"use {short(label)}: RMSE {joined(errors)}; {least}{', hardly more' * (min(better) < ALIKE)}."
+    unsettled = [f"{other} in {name}" for name, other in otherwise.items() if name in rankings]
+    if unsettled:
+        words += f" That is not settled: [a second study](#asked-twice) has {joined(unsettled)}."
     if len(rankings) == 1:
         ((row, rows),) = zip(chosen.values(), firsts.values(), strict=True)
-        alike = [short(other) + _beside(rows[other], row) for other in others]
-    elif len(chosen) == len(rankings):
-        alike = [short(other) for other in others]
-    if alike:
-        words += f" Not distinguished from it{' on any of these' * (len(rankings) > 1)}: {joined(alike)}."
+        near = [other for other in others if rows[other]["rmse"] <= WIDE * row["rmse"]]
+        far = [short(other) + _beside(rows[other], row) for other in others if other not in near]
+        alike = [short(other) + _beside(rows[other], row) for other in near]
+        words += f" Not distinguished from it: {joined(alike)}." if alike else ""
+        words += f" Too uncertain to be told from it: {joined(far)}." if far else ""
+    elif len(chosen) == len(rankings) and others:
+        words += f" On each of these none is shown to be better than {joined([short(o) for o in others], 'or')} either."
     lost = [f"{100.0 * _lost(row):.2g} % of the worlds of {name}" for name, row in chosen.items() if _lost(row)]
     if lost:
-        words += f" It loses {joined(lost)}."
+        words += f" It fails, swings or chatters in {joined(lost)}."
+    if any(_lost(row) > LOST for row in chosen.values()):
+        words += f" More than {100.0 * LOST:.0f} % would forbid its use, which so few worlds do not show at 95 %."
     return "\n".join(textwrap.wrap(f"- **{where}**: {words}", 120, subsequent_indent="  "))
 
 
@@ -163,14 +177,17 @@ def _lost(row: Row) -> float:
     return float(row["failures"] + row["swings"])
 
 
-def lead(run: Run, rankings: Rankings) -> list[str]:
-    """What to use, a line for each kind of rig and of motion, and what these controllers are."""
+def lead(run: Run, rankings: Rankings, otherwise: Mapping[str, str]) -> list[str]:
+    """What to use, a line for each kind of rig and of motion, and what the controllers are that it names.
+
+    `otherwise` names what a second study recommends on the rigs where it shares no controller with this one.
+    """
     lines, named = [], dict[str, None]()
     for rig, steps in itertools.product((True, False), (False, True)):
         alike = {name: rows for name, rows in rankings.items() if _kind(run, name) == (rig, steps)}
-        where = f"{'Steps' if steps else 'Smooth motions'} {'by motors, tendons and a camera' if rig else _EXACT}"
-        lines += [use(alike, where)] if alike else []
-        named |= {label.split("/")[0]: None for label in recommended(alike)[:1]}
+        where = f"{'Steps' if steps else 'Smooth motions'} {_RIG if rig else _EXACT}"
+        lines += [use(alike, where, otherwise)] if alike else []
+        named |= {label.split("/")[0]: None for label in recommended(alike)}
     what = [f"| {name} | {about(controller(name).law.__module__)} |" for name in named]
     return [*lines, "", "| controller | what it is |", "| --- | --- |", *what]
 
@@ -249,7 +266,7 @@ def ranking(rows: Sequence[Row]) -> list[str]:
         ratio = f"{times[0]} [{times[1]}, {times[2]}]" if row["times_better_high"] < math.inf else times[0]
         lost = [f"{100.0 * row[fate]:.3g}" for fate in ("failures", "swings")]
         cells = (
-            str(group(row) or "-"), row["row"], interval(row), ratio, *lost,
+            str(group(row) or "-"), short(row["row"]), interval(row), ratio, *lost,
             three(row["chattering"]),
         )  # fmt: skip
         lines.append(f"| {' | '.join(cells)} |")
@@ -294,15 +311,23 @@ def page(study: Study, made: str) -> str:
         *(part for name, rows in rankings.items() for part in (f"## {name}", "", *ranking(rows), "")),
         "## Tuned otherwise", "", *sensitivity(study.sensitivity), "", "Made by `python docs/study.py RUN [SECOND]`.",
     ]  # fmt: skip
-    return "\n".join(lines) + "\n"
+    text = "\n".join(lines) + "\n"
+    for name in rankings:
+        text = text.replace(name, name.replace(", steps", " (steps)"))
+    return text
 
 
 def named(families: Mapping[str, Family]) -> dict[str, str]:
     """What the rankings that families may have are of: the family's motions, and its jumps beside smooth ones."""
+    smooth = {
+        family: f"{content.about}{'; its smooth motions only' * (len(set(kinds_of(content))) > 1)}"
+        for family, content in families.items()
+    }
+    steps = {family: f"{content.about}; its steps only" for family, content in families.items()}
     return {
         name: about
-        for family, content in families.items()
-        for name, about in ((family, content.about), (f"{family}, steps", f"{content.about}; its steps alone"))
+        for family in families
+        for name, about in ((family, smooth[family]), (f"{family}, steps", steps[family]))
     }
 
 
@@ -352,8 +377,8 @@ def _kind(run: Run, name: str) -> tuple[bool, bool]:
     return family.loop.sensor.level == "camera", name.endswith(", steps") or set(kinds_of(family)) == {True}
 
 
-def second_of(run: Run, second: Run) -> tuple[list[str], list[str]]:
-    """What a second study finds again of the families that both have: a sentence, and a section.
+def second_of(run: Run, second: Run) -> tuple[dict[str, str], list[str], list[str]]:
+    """What a second study finds again of the families that both have: a sentence, and a section; where nothing, what.
 
     SystemExit where it asked something else of them, or had the same seed.
     """
@@ -369,7 +394,7 @@ def second_of(run: Run, second: Run) -> tuple[list[str], list[str]]:
         f"has the hash `{second.manifest.result_sha256}`.",
         "None of its worlds, searches and noise are those of the first study.",
     ]
-    return again(*rankings, smooth), asked_twice(*rankings, "\n".join(made))
+    return unsettled(*rankings), again(*rankings, smooth), asked_twice(*rankings, "\n".join(made))
 
 
 def resumed(run: Run) -> list[Run]:
@@ -406,10 +431,12 @@ def main() -> None:
         halves=HALVES,
         few=max(round(budget.worlds * _lost(row)) for rows in rankings.values() for row in rows if group(row)),
     )
-    repeated = second_of(run, Run(Path(sys.argv[2]))) if len(sys.argv) > 2 else ([], [])
+    differing, *repeated = second_of(run, Run(Path(sys.argv[2]))) if len(sys.argv) > 2 else ({}, [], [])
     about = {name: words for name, words in named(studied(run)).items() if name in rankings}
     terms, otherwise = (run.data(name).to_dict("records") for name in ("terms", "sensitivity"))
-    study = Study(lead(run, rankings), rankings, about, terms, otherwise, first_of(run, rankings), how, *repeated)
+    study = Study(
+        lead(run, rankings, differing), rankings, about, terms, otherwise, first_of(run, rankings), how, *repeated
+    )
     runs = resumed(run)
     minutes = sum(one.manifest.timing.wall_s or 0.0 for one in runs) / 60.0
     part = f" in {len(runs)} parts" if len(runs) > 1 else ""
