@@ -61,6 +61,7 @@ def unlocked(monkeypatch: pytest.MonkeyPatch) -> list[str]:
 
 
 @pytest.mark.skipif(not may_come_first(), reason="needs the right to real-time scheduling")
+@pytest.mark.slow
 def test_the_loop_and_its_threads_come_first_until_the_end(unlocked: list[str]) -> None:
     before, found = scheduled(), []
     with pytest.raises(ValueError, match="ends it"), prioritised(True) as said:

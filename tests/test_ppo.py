@@ -39,6 +39,7 @@ def test_an_episodes_end_shows_its_last_sight_and_the_next_has_begun(ppo: Module
     assert not np.array_equal(last, seen), "another episode"
 
 
+@pytest.mark.slow
 def test_a_policy_is_judged_as_a_law_that_does_the_same_is(ppo: ModuleType) -> None:
     """One that asks for no torque: spools still reel in what the reference shortens, so most of the way is made."""
     study = ppo.study_of()
@@ -63,6 +64,7 @@ def test_a_policy_is_judged_as_a_law_that_does_the_same_is(ppo: ModuleType) -> N
     assert row.scores == pytest.approx(ppo.row_of("still", known).scores, rel=0.02)
 
 
+@pytest.mark.slow
 def test_a_policy_that_learns_for_a_second_pulls(ppo: ModuleType) -> None:
     policy = ppo.learnt(ppo.study_of(), 1.0 / 60.0)
     assert policy.steps > 0

@@ -51,6 +51,7 @@ def test_a_notebook_can_simulate_from_overrides() -> None:
     assert frame["theta"].iloc[-1] == pytest.approx(frame["theta_desired"].iloc[-1], abs=1e-3)
 
 
+@pytest.mark.slow
 def test_the_documented_notebook_runs_as_it_stands(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     text = (PACKAGE.parent / "docs" / "commands.md").read_text(encoding="utf-8")
     (code,) = re.findall(r"^```python\n(.*?)^```", text, re.DOTALL | re.MULTILINE)
@@ -82,6 +83,7 @@ def test_dir_shows_the_face_and_every_function_of_it_is_explained() -> None:
         wristctl.__getattr__("simulat")
 
 
+@pytest.mark.slow
 def test_import_is_light() -> None:
     heavy = "{'torch', 'scipy', 'pandas', 'matplotlib', 'cv2', 'numba', 'numpy'}"
     for code in ("import wristctl; dir(wristctl)", "import wristctl.api, wristctl; wristctl.load_study()"):

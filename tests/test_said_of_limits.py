@@ -207,6 +207,7 @@ def test_what_we_once_said_is_refused_and_so_is_its_like(text: str) -> None:
         "The exchanged gains do not reach 15 deg at 60 N, and arrive at 59 N.",
     ],
 )
+@pytest.mark.slow
 def test_what_is_true_may_be_said(text: str) -> None:
     assert statements(text) and not wrong(text)
 

@@ -53,6 +53,7 @@ class Stage:
 
 
 @pytest.mark.parametrize("delay_frames", [0.0, 0.5, 2.0])
+@pytest.mark.slow
 def test_frames_come_at_the_frame_rate_each_late_by_the_delay(delay_frames: float) -> None:
     stage = Stage(RenderedCamera(dropped=0.0, delay_frames=delay_frames))
     seen = stage.look(1.0, every=0.001)
@@ -79,6 +80,7 @@ def test_the_newest_frame_wins_and_no_other_is_drawn() -> None:
     assert len(stage.sketch.drawn) == 1
 
 
+@pytest.mark.slow
 def test_a_frame_is_the_same_whoever_looked_before_and_another_under_another_seed() -> None:
     often = {f.number: f.image.tobytes() for _, f in Stage(RenderedCamera()).look(2.0)}
     seldom = {f.number: f.image.tobytes() for _, f in Stage(RenderedCamera()).look(2.0, every=0.1)}
@@ -148,6 +150,7 @@ def test_a_dropped_frame_and_a_covered_marker_may_come_together() -> None:
     assert covered and min(covered) >= 0.4 and max(covered) < 0.6
 
 
+@pytest.mark.slow
 def test_the_angle_found_in_rendered_pictures_is_the_one_the_wrist_had(host_on: HostOn) -> None:
     settings = BenchSettings(motors=TAUT, camera=RenderedCamera(dropped=0.0))
     host = host_on(settings)

@@ -46,6 +46,7 @@ def newtons(pulls: Pulls) -> np.ndarray:
     return np.asarray((np.array(pulls.counts) - OFFSET) / SCALE)
 
 
+@pytest.mark.slow
 def test_cells_of_tendons_at_rest_read_their_pulls_to_a_count(host_on: HostOn) -> None:
     host = host_on(settings())
     host.reel((40, 20, 60, 30))
@@ -56,6 +57,7 @@ def test_cells_of_tendons_at_rest_read_their_pulls_to_a_count(host_on: HostOn) -
     assert newtons(pulls) == pytest.approx(true, abs=2.0 / SCALE.min())
 
 
+@pytest.mark.slow
 def test_a_reading_is_the_mean_of_the_last_four_conversions(host_on: HostOn) -> None:
     """Tendons of one side that are reeled in steadily: readings come half that time late, by their age more."""
     host = host_on(settings())
@@ -90,6 +92,7 @@ def test_readings_scatter_by_the_noise_and_are_the_same_however_often_somebody_l
     assert np.array(read[0]).std(axis=0) == pytest.approx(20.0, rel=0.35)
 
 
+@pytest.mark.slow
 def test_an_unplugged_amplifier_is_silent_and_the_others_are_not_until_it_is_back(host_on: HostOn) -> None:
     fault = InjectedFault(kind="cell-unplugged", axis=2, since="power-on", at=1.0, duration=1.0)
     host = host_on(settings().model_copy(update={"faults": (fault,)}))

@@ -236,6 +236,7 @@ def test_the_same_seed_gives_the_same_bytes_however_often_one_looks() -> None:
     assert courses[0] == courses[1]
 
 
+@pytest.mark.slow
 def test_load_cells_show_the_pulls() -> None:
     host, cells = hosted(load_cells=CELLS), Kept()
     host.reel((-100, 60, 40, 200))
@@ -323,6 +324,7 @@ def test_cameras_run_by_clocks_of_their_own() -> None:
 
 
 @pytest.mark.parametrize("camera", [1, 2])
+@pytest.mark.slow
 def test_a_fault_of_one_camera_leaves_the_other_as_it_is(camera: Literal[1, 2]) -> None:
     faults = (InjectedFault(kind="frames-dropped", at=0.0, since="power-on", camera=camera),)
     dropped, seen = sorted(looked(hosted(faults=faults), 0.3), key=len)

@@ -135,6 +135,7 @@ def ran(chip: Atmega2560, routine: int, first: int, sreg: int, bytes_each: int) 
 
 
 @pytest.mark.parametrize("routine", range(len(NAMES)), ids=NAMES)
+@pytest.mark.slow
 def test_result_and_flags_are_those_of_whole_number_arithmetic(chip: Atmega2560, routine: int) -> None:
     second = np.arange(256)
     for sreg in (0, C, T | H | V | N | S | Z, 0x7F):

@@ -41,6 +41,7 @@ def test_the_python_side_is_what_the_table_says() -> None:
     assert Path(messages.__file__).read_text() == python_module(TABLE)
 
 
+@pytest.mark.slow
 def test_every_leaf_but_prose_changes_the_hash() -> None:
     for path in leaves(TABLE):
         same = dictionary_hash(changed(path)) == messages.DICTIONARY_HASH

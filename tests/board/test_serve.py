@@ -45,6 +45,7 @@ def line(request: pytest.FixtureRequest) -> Iterator[WatchedLine]:
     line.close()
 
 
+@pytest.mark.slow
 def test_a_board_answers_through_pyserial_and_starts_anew_for_the_next_client(line: WatchedLine) -> None:
     nonces = []
     for _ in range(2):
@@ -98,11 +99,13 @@ def paced(monkeypatch: pytest.MonkeyPatch, waits: list[float]) -> list[tuple[flo
     return seen
 
 
+@pytest.mark.slow
 def test_the_chip_keeps_real_time(monkeypatch: pytest.MonkeyPatch) -> None:
     for passed, ran in paced(monkeypatch, [0.0005, 0.0007, 0.02, 0.0, 0.09, 0.0001] * 5):
         assert ran == pytest.approx(passed, abs=1e-6)
 
 
+@pytest.mark.slow
 def test_time_in_which_the_computer_did_something_else_is_given_up(monkeypatch: pytest.MonkeyPatch) -> None:
     """All of it but a tenth of a second, so that the board does not race through what it has missed."""
     before, after, later = paced(monkeypatch, [0.05, 3.0, 0.01])
@@ -110,6 +113,7 @@ def test_time_in_which_the_computer_did_something_else_is_given_up(monkeypatch: 
     assert later[1] - after[1] == pytest.approx(0.01, abs=1e-6)
 
 
+@pytest.mark.slow
 def test_garbage_collection_does_not_hold_a_board_up() -> None:
     """All that was there before is left alone: to go through it takes a tenth of a second, which no board pauses."""
     clock, left_alone = Clock([0.001] * 3), list[int]()
@@ -171,6 +175,7 @@ class Flood:
         """Nothing is open."""
 
 
+@pytest.mark.slow
 def test_a_client_that_says_more_than_the_line_carries_has_to_wait(monkeypatch: pytest.MonkeyPatch) -> None:
     chip = Atmega2560()
     flood = Flood(chip, 4000)

@@ -30,6 +30,7 @@ def set_to(chip: Atmega2560, value: int) -> None:
 
 
 @pytest.mark.parametrize(("scale", "value"), [(0, 0), (1, 1), (2, 2), (4, 4), (7, 7), (8, WDP3), (9, WDP3 | 1)])
+@pytest.mark.slow
 def test_its_time_is_16_ms_doubled_by_each_count_of_its_prescaler(idle: Atmega2560, scale: int, value: int) -> None:
     set_to(idle, WDE | value)
     idle.run((PERIOD << scale) - 50)

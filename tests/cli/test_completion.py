@@ -53,6 +53,7 @@ def folder(tmp_path: Path) -> Path:
     return tmp_path
 
 
+@pytest.mark.slow
 def test_runs_are_completed_by_id_and_as_the_latest(folder: Path) -> None:
     (run,) = [path.name for path in (folder / "results").iterdir() if path.is_dir()]
     latest = [f"{typed} lat" for typed in ("train --data", "audit --table1", "hw-run --optics", "identify")]
@@ -61,6 +62,7 @@ def test_runs_are_completed_by_id_and_as_the_latest(folder: Path) -> None:
     assert offered == [["latest:gen-data"]] * len(latest)
 
 
+@pytest.mark.slow
 def test_study_files_controllers_and_commands_are_completed(folder: Path) -> None:
     typed = ("train ", "compare experiments/q", "simulate --controller sm", "runs rep")
     studies, one, laws, verbs = _completed(folder, *typed)

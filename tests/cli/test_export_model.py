@@ -63,6 +63,7 @@ def test_a_folders_name_stays_within_its_comment(
         ElementTree.fromstring(text)
 
 
+@pytest.mark.slow
 def test_a_run_that_took_over_an_identification_gives_that_wrist(call: Call, identified: Run) -> None:
     code, _, err = call("simulate", "--set", "horizon=0.1", "--from-identified", identified.id)
     assert code == 0, err

@@ -113,6 +113,7 @@ def test_an_advanced_option_works_without_being_shown(tmp_path: Path) -> None:
     assert done.returncode == 0 and "seed: 5" in json.loads(done.stdout)["config"]
 
 
+@pytest.mark.slow
 def test_former_names_are_the_same_commands() -> None:
     assert COMMANDS["audit"].place == PAPER["audit"].place
     typed = [["audit", "--help"], ["paper", "audit", "--help"], ["check-law", "--help"], ["check-controller", "--help"]]

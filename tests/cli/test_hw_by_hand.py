@@ -141,6 +141,7 @@ def test_slackened_tendons_are_paid_out_together_and_released(call: Call) -> Non
     assert Board(board).read().position == (paid,) * 4 and board.energised == [False] * 4
 
 
+@pytest.mark.slow
 def test_a_button_pressed_while_a_person_thinks_ends_the_command(call: Call, monkeypatch: pytest.MonkeyPatch) -> None:
     reading, writing = os.pipe()
     init = Emulated.__init__

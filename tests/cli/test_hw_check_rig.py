@@ -69,6 +69,7 @@ def test_nothing_moves_without_a_yes_and_the_rest_is_measured(call: Call, monkey
     assert "Type yes" in err
 
 
+@pytest.mark.slow
 def test_a_camera_too_slow_for_the_limits_is_refused_before_anything_moves(
     call: Call, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -106,6 +106,7 @@ def test_a_folder_that_cannot_be_is_named(call: Call, tmp_path: Path) -> None:
     assert code == 2 and "file/parts" in err
 
 
+@pytest.mark.slow
 def test_a_rig_in_two_planes_has_the_second_cameras_markers_too(call: Call, tmp_path: Path) -> None:
     code, out, _ = call("hw", "drawings", "parts", "--set", "planes=2")
     assert code == 0 and "parts/markers_2.svg" in out.split()

@@ -28,6 +28,7 @@ TRAIN = ("train", "--data", "latest:gen-data", *QUICK, "--seeds", "2")
 
 
 @pytest.mark.painted
+@pytest.mark.slow
 def test_gen_data_leaves_samples_that_read_back_exactly(call: Call) -> None:
     code, out, _ = call("gen-data", "--samples", "200")
     run = open_run("latest:gen-data")
@@ -59,6 +60,7 @@ def data(call: Call, sampled: Path, tmp_path: Path) -> str:
     return open_run("latest:gen-data").id
 
 
+@pytest.mark.slow
 def test_train_leaves_a_network_its_errors_and_the_exact_inverse_beside_them(trained: Path) -> None:
     run = open_run("latest:train", trained / "results")
     network, metrics = load_network(run.file("models/network.safetensors")), run.metrics
@@ -117,6 +119,7 @@ def test_interrupted_training_keeps_the_network_found_so_far(
     run.check()
 
 
+@pytest.mark.slow
 def test_a_training_that_was_stopped_resumes_to_the_same_result(
     call: Call, data: str, trained: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -134,6 +137,7 @@ def test_a_training_that_was_stopped_resumes_to_the_same_result(
     assert code == 2 and "other settings, data or seed" in err
 
 
+@pytest.mark.slow
 def test_without_a_data_run_train_draws_what_gen_data_would(call: Call) -> None:
     call("gen-data", "--samples", "100", "--seed", "3")
     call("train", *QUICK, "--seed", "3", "--set", "gen-data.samples=100")
@@ -198,6 +202,7 @@ def test_a_search_chooses_by_cross_validation_and_says_why(call: Call) -> None:
     assert len(run.data("grid")) == 2 and run.file("figures/accuracy-against-cost.svg").is_file()
 
 
+@pytest.mark.slow
 def test_a_network_of_the_plant_is_judged_on_what_was_held_out_and_knows_its_wrist(call: Call) -> None:
     plant = ("--source", "plant", "--set", "segments=2", "--set", "held_out_poses=[45]", "--samples", "120")
     call("gen-data", *plant)

@@ -34,6 +34,7 @@ COMPARE = (
 
 
 @pytest.mark.painted
+@pytest.mark.slow
 def test_simulate_leaves_a_trajectory_metrics_and_pictures(call: Call) -> None:
     code, out, _ = call("simulate", "--controller", "computed-torque", "--gains", "default")
     run = open_run("latest:simulate")
@@ -124,6 +125,7 @@ def test_compare_has_a_row_for_every_combination_and_the_papers_numbers_beside(c
     assert (table["inverse"].tolist() == ["none", "closed-form"] * 4) and not table["failed"].any()
 
 
+@pytest.mark.slow
 def test_the_same_command_and_seed_give_the_same_result(call: Call, tuning: Path, comparison: Path) -> None:
     for before, command in ((tuning, TUNE), (comparison, COMPARE)):
         (run,) = list_runs(before / "results")
@@ -158,6 +160,7 @@ def test_gains_tuned_on_what_they_would_be_judged_on_are_refused(call: Call) -> 
         (("compare", "--set", "inverses=[network]"), "--network RUN"),
     ],
 )
+@pytest.mark.slow
 def test_what_the_user_got_wrong_is_one_line_and_no_run_that_looks_complete(
     call: Call, arguments: tuple[str, ...], said: str
 ) -> None:
@@ -181,6 +184,7 @@ def test_tuned_gains_of_no_run_are_refused_before_anything_is_written(call: Call
 CAMERA = ("--set", "repetitions=8", "--set")
 
 
+@pytest.mark.slow
 def test_repetitions_give_medians_with_intervals_in_tables_metrics_and_data(call: Call) -> None:
     loop = "loop={plant_segments: 1, sensor: {level: camera}}"
     code, out, _ = call("simulate", "--set", "horizon=0.3", *CAMERA, loop, "--set", "reference.duration=0.2")
@@ -247,6 +251,7 @@ def test_an_interrupted_tuning_keeps_what_it_found(tmp_path: Path) -> None:
     assert len(run.data("history-smc")) >= 8 and (run.path / "SHA256SUMS").exists()
 
 
+@pytest.mark.slow
 def test_a_run_names_the_streams_that_it_drew_from(call: Call) -> None:
     seen = "{plant_segments: 1, sensor: {level: camera}}"
     call("simulate", "--seed", "3", "--set", "horizon=0.1", "--set", f"loop={seen}", "--set", "reference.kind=step")
@@ -261,6 +266,7 @@ def test_a_run_names_the_streams_that_it_drew_from(call: Call) -> None:
     assert "search smc" in drawn and any(each.startswith("tuning camera: ") for each in drawn)
 
 
+@pytest.mark.slow
 def test_simulate_exits_3_where_the_wrist_left_its_range_and_its_run_stands(call: Call) -> None:
     """Pushed by more than any tendon holds."""
     settings = ("simulate.loop={disturbances: {push: {force: 100.0, duration: 0.5}}}",)

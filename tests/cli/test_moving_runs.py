@@ -77,6 +77,7 @@ def test_a_packed_run_is_done_again_at_a_colleagues_with_the_same_result(call: C
     assert code == 0 and "identical" in said, err
 
 
+@pytest.mark.slow
 def test_a_configuration_finds_its_inputs_beside_it_whatever_the_results_folder(call: Call, made: Run) -> None:
     Path("author").rename("share")
     done = again(call, Path("share/results") / made.id, "--out", "mine")

@@ -138,6 +138,7 @@ def test_an_input_that_is_gone_is_told_and_nothing_is_run(call: Call, again: Any
 
 
 @pytest.mark.parametrize("kind", ["hw-run", "calibrate-wrist"])
+@pytest.mark.slow
 def test_a_repetition_never_moves_real_motors(call: Call, again: Any, kind: str) -> None:
     """Neither that of a run on hardware, nor that of an emulated one with a port put in."""
     section = kind.replace("-", "_")

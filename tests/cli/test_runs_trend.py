@@ -87,6 +87,7 @@ def test_springs_that_change_are_found_with_their_size_and_the_pulley_is_not_bla
     assert ways == pytest.approx((970.0 + scatter[1]).tolist()), "what both sides are reeled in by cancels"
 
 
+@pytest.mark.slow
 def test_a_rig_that_only_scatters_drifts_nowhere_and_one_run_or_two_rigs_are_refused(call: Call, make: Make) -> None:
     scatter = np.random.default_rng(5).normal(size=(2, 5))
     make((0.43 + 0.01 * scatter[0]).tolist(), (970.0 + scatter[1]).tolist())

@@ -77,6 +77,7 @@ def test_a_recording_is_tracked_with_a_calibration(call: Call, recording: Path) 
             assert code == 0 and Run(Path(out.splitlines()[-1])).result_hash == each.result_hash
 
 
+@pytest.mark.slow
 def test_without_a_calibration_a_tilted_camera_is_warned_of(call: Call, recording: Path) -> None:
     code, out, err = call("track", str(recording), "--zero", "first", "--json")
     assert code == 0
@@ -116,6 +117,7 @@ def test_a_recording_without_markers_fails_and_keeps_what_was_seen(call: Call, t
     assert run.state == "failed" and len(run.data("track")) == 1
 
 
+@pytest.mark.slow
 def test_the_board_is_written_where_asked(call: Call, tmp_path: Path) -> None:
     code, out, err = call("hw", "calibrate", "board-pdf", "sheet.pdf", "--paper", "letter")
     assert code == 0 and out == "sheet.pdf\n" and "100 %" in err

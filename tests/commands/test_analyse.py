@@ -29,6 +29,7 @@ def analyse(*settings: str, **given: Any) -> Any:
     return wristctl.analyse(load_study([], [*settings]), **given)
 
 
+@pytest.mark.slow
 def test_the_answer_is_the_least_margin_of_all_angles() -> None:
     done = analyse(PID)
     assert list(done.angles) == [0.0, 15.0, 30.0] and done.fault is None
@@ -120,6 +121,7 @@ def test_over_a_gain_the_table_tells_its_values() -> None:
     assert list(done.angles) == [10.0]
 
 
+@pytest.mark.slow
 def test_a_loop_that_feeds_nothing_back_says_so_and_shows_the_plant() -> None:
     done = analyse(ALONE)
     assert "feeds nothing back" in done.sentence and "UNSTABLE" not in done.sentence and done.locus is None
@@ -138,6 +140,7 @@ def test_an_unstable_loop_is_told_with_what_would_mend_it_and_ends_with_a_fault(
     assert "step" not in done.figures and done.figures["locus"].axes
 
 
+@pytest.mark.slow
 def test_a_wrist_that_buckles_needs_some_gain_to_stay(caplog: pytest.LogCaptureFixture) -> None:
     with caplog.at_level(logging.WARNING):
         done = analyse(PID, "wrist.hand_mass=0.9", STRAIGHT)
@@ -162,6 +165,7 @@ def test_behind_camera_and_tendons_it_is_said_for_which_swings_it_holds() -> Non
     assert abs(stuck.found[0].plant[0]) < 0.8 * abs(slips.found[0].plant[0])
 
 
+@pytest.mark.slow
 def test_no_swing_is_linear_where_the_limits_cross() -> None:
     slow = "simulate.loop.plant={actuator: {step_acceleration: x0.2}}"
     done = analyse(CAMERA, slow, "simulate={controller: super-twisting, gains: hardware, horizon: 0.1}", STRAIGHT)
@@ -213,6 +217,7 @@ def test_frames_that_never_repeat_are_warned_of(caplog: pytest.LogCaptureFixture
         ),
     ],
 )
+@pytest.mark.slow
 def test_what_cannot_be_analysed_is_said_with_where(settings: tuple[str, ...], said: str) -> None:
     with pytest.raises(UserError) as caught:
         analyse(*settings)

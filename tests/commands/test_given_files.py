@@ -36,6 +36,7 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Run]:
     return folder, done.run
 
 
+@pytest.mark.slow
 def test_a_course_that_was_simulated_is_followed_as_a_recording_of_it(tmp_path: Path) -> None:
     """Its table has units in run.json, not in its header; what is followed is that motion to 1e-9 rad."""
     first = simulated(tmp_path, "simulate.reference.duration=0.8", "simulate.horizon=1.5")

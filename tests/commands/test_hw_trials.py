@@ -158,6 +158,7 @@ def test_what_the_bench_knows_is_logged_of_a_bench_alone(perform: Perform) -> No
     assert not (run.path / "data/truth.csv").exists() and table["true_rmse"].isna().all()
 
 
+@pytest.mark.slow
 def test_lateness_is_told_in_quantiles(perform: Perform) -> None:
     _, run, watched, findings = perform("hw-run.real_time=true")
     names = ["ticks", "overruns", "late_p50", "late_p99", "late_max"]
@@ -177,6 +178,7 @@ def test_lateness_is_told_in_quantiles(perform: Perform) -> None:
         (("hw-run={port: /dev/null}",), [], 0),
     ],
 )
+@pytest.mark.slow
 def test_lateness_is_shown_where_time_is_real_and_ticks_there_were(
     perform: Perform, settings: tuple[str, ...], late: list[float], told: int
 ) -> None:
@@ -192,6 +194,7 @@ def test_a_stop_before_any_tick_has_no_table(perform: Perform, caplog: pytest.Lo
 
 
 @pytest.mark.parametrize(("verified", "said"), [(True, "the motors stand"), (False, "could NOT be seen to stand")])
+@pytest.mark.slow
 def test_a_stop_is_told_with_the_last_second_by_tenths(
     perform: Perform, caplog: pytest.LogCaptureFixture, verified: bool, said: str
 ) -> None:
@@ -214,6 +217,7 @@ def test_a_stop_is_told_with_the_last_second_by_tenths(
     assert cells[-1] == ["0.995", "4.31", "5.54", "-", "1.12", "2.12", "4.12", "5.12", "RUN"]
 
 
+@pytest.mark.slow
 def test_a_few_ticks_are_all_told(perform: Perform, caplog: pytest.LogCaptureFixture) -> None:
     with caplog.at_level(logging.WARNING):
         perform(ticks=7, stops=SafetyStop("it smokes", "bench", "water"))
@@ -239,6 +243,7 @@ def test_a_log_that_cannot_be_closed_is_a_safety_stop_unless_something_stopped_i
     assert "the log cannot be written: No space left on device" in run.file("run.json").read_text()
 
 
+@pytest.mark.slow
 def test_what_was_odd_and_how_near_it_came_to_the_limits_is_told(
     perform: Perform, caplog: pytest.LogCaptureFixture
 ) -> None:

@@ -153,6 +153,7 @@ def test_a_file_that_is_no_loop_leaves_nothing_behind(tmp_path: Path) -> None:
     assert not (tmp_path / "results").exists()
 
 
+@pytest.mark.slow
 def test_what_does_not_converge_is_marked_where_its_numbers_are(monkeypatch: pytest.MonkeyPatch) -> None:
     own = ("wrist.damping=1e-4", "hysteresis.tendon_stiffness=5e5", "hysteresis.shape=triangle")
     sound = wristctl.hysteresis(study(*own))

@@ -108,6 +108,7 @@ def found(tmp_path_factory: pytest.TempPathFactory) -> Recommended:
     return wristctl.recommend(study_of(), out=tmp_path_factory.mktemp("recommend"))
 
 
+@pytest.mark.slow
 def test_what_is_recommended_is_best_of_what_holds_on_every_rig(found: Recommended) -> None:
     ranked, best = found.ranking, found.best
     assert best is not None and best.controller in ("pid-ff", "ct-dob")
@@ -240,6 +241,7 @@ def test_a_controller_of_ones_own_is_recommended_by_the_runs_copy_of_it(tmp_path
     assert not wristctl.simulate(again).failed
 
 
+@pytest.mark.slow
 def test_where_no_feedback_is_better_than_none_that_is_the_reason_and_not_that_all_swing() -> None:
     """The same rows in three other orders: feedforward alone first, nothing ranked, and feedforward in a tie."""
     found = done = wristctl.recommend(study_of("recommend.controllers=[pid-ff]"))

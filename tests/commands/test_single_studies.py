@@ -51,6 +51,7 @@ def test_an_audit_compares_in_memory_too_and_says_where_it_is_shown(
     assert audited.tables[-1].rows == [(loop, "in memory") for loop in audited.comparisons]
 
 
+@pytest.mark.slow
 def test_a_comparison_runs_as_many_rollouts_as_it_planned() -> None:
     axes = {
         "directions": "[ulnar, radial, flexion]",
@@ -70,6 +71,7 @@ def test_a_comparison_runs_as_many_rollouts_as_it_planned() -> None:
         assert len(wristctl.compare(study).rows) == count_rollouts(study.compare), left_out
 
 
+@pytest.mark.slow
 def test_no_study_knows_a_terminal() -> None:
     """Whoever is told or asked comes in as the session's operator; what is printed, the command line prints."""
     for file in Path(commands.__file__).parent.rglob("*.py"):

@@ -224,6 +224,7 @@ def test_the_tail_of_a_move_is_no_limit_cycle_in_a_sweep_either() -> None:
     assert table["oscillation"][0] > LIMIT_CYCLE and table["fate"].tolist() == ["", ""]
 
 
+@pytest.mark.slow
 def test_a_search_and_a_comparison_are_done_at_every_point() -> None:
     base = wristctl.load_study(
         None, "tune.controllers=[pd-ff]", "tune.candidates=2", "tune.horizon=0.3",

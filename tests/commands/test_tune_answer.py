@@ -92,6 +92,7 @@ def test_the_loops_that_it_was_not_tuned_on_are_told_by_what_the_gains_do_there(
     assert "other loops" not in _text(_search("smc"), {})
 
 
+@pytest.mark.slow
 def test_a_search_tries_its_gains_on_the_loops_that_no_scenario_is_on() -> None:
     """A rate that is seen late makes swing what is calm where it is seen at once. By default a rig is searched on."""
     loops = "{fast: {plant_segments: 1, control_period: 1.0e-3}, slow: {plant_segments: 1, control_period: 0.1}}"

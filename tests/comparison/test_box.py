@@ -198,6 +198,7 @@ def least_variance(x: np.ndarray, yes: np.ndarray) -> float:
     return float(np.sqrt(x[at] * x[at + 1]))
 
 
+@pytest.mark.slow
 def test_a_thresholds_interval_is_as_wide_as_scipys_bootstrap_of_95_percent() -> None:
     """Of 90 % it would be narrower by 16 %."""
     widths = []

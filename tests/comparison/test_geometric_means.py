@@ -68,6 +68,7 @@ def worlds(kind: str, rng: np.random.Generator, shape: tuple[int, int]) -> Array
 
 @pytest.mark.parametrize("kind", ["normal", "skewed"])
 @pytest.mark.parametrize("n", [12, 24, 60] if THOROUGH else [24])
+@pytest.mark.slow
 def test_intervals_hold_the_truth_as_often_as_they_say(kind: str, n: int) -> None:
     """Within 2 % of 95 %, and what chance does to so many trials."""
     trials = 10_000 if THOROUGH else 600

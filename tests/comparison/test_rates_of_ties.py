@@ -82,6 +82,7 @@ def test_holms_step_down_against_the_samples_best_keeps_no_rate() -> None:
 
 
 @pytest.mark.parametrize("draw", [normal, skewed, skewed_differences, correlated])
+@pytest.mark.slow
 def test_an_equal_law_is_left_out_in_at_most_6_percent_of_comparisons(draw: Draw) -> None:
     for rows in ROWS:
         for worlds in WORLDS:
@@ -99,6 +100,7 @@ def test_an_equal_law_is_left_out_in_at_most_6_percent_of_comparisons(draw: Draw
             assert out <= binom.ppf(0.999, times, MOST), (draw.__name__, rows, worlds)
 
 
+@pytest.mark.slow
 def test_a_law_that_is_10_percent_worse_is_found() -> None:
     """By the side of equal ones; more of them cost power, more worlds buy it."""
     found = {}

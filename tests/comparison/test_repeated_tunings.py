@@ -95,6 +95,7 @@ def test_what_worlds_have_in_common_does_not_blur_a_ratio() -> None:
 
 
 @pytest.mark.parametrize("spread", [SPREADS["tunings differ"], SPREADS["both"]], ids=["tunings differ", "both"])
+@pytest.mark.slow
 def test_a_row_as_good_as_the_best_is_seldom_left_out_and_a_worse_one_is(
     spread: tuple[float, float, float, float],
 ) -> None:

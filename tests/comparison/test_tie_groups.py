@@ -54,6 +54,7 @@ def test_two_rows_are_told_apart_where_students_paired_test_does() -> None:
     assert min(told) >= 10
 
 
+@pytest.mark.slow
 def test_what_a_pair_must_differ_by_grows_with_the_rows_as_tukeys_range_does() -> None:
     """The smallest difference that is told as a rule, against the quantile of the studentised range."""
     for rows in (2, 5, 12):

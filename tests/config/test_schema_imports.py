@@ -25,6 +25,7 @@ print(*sys.modules)
 TABLES = [name for name, each in vars(choices).items() if isinstance(each, Choices)]
 
 
+@pytest.mark.slow
 def test_a_study_is_read_without_physics_or_arrays() -> None:
     done = subprocess.run([sys.executable, "-c", CODE], cwd=ROOT, capture_output=True, text=True, check=True)
     loaded = done.stdout.split()

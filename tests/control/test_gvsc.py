@@ -47,6 +47,7 @@ def equilibrium_at(wrist: WristParameters, theta: float, n: int) -> tuple[np.nda
 
 @pytest.mark.parametrize("gravity", POSES)
 @pytest.mark.parametrize("theta", [-0.87, 0.0, 0.2, 0.52])
+@pytest.mark.slow
 def test_statics_match_a_finely_segmented_wrist(gravity: tuple[float, float], theta: float) -> None:
     wrist = WristParameters(gravity=gravity)
     _, slope, torque, beta, _, _ = strain(wrist, theta)

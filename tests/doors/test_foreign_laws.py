@@ -46,6 +46,7 @@ def answer(name: str, count: int = 3) -> np.ndarray:
     return call_law(law, states, gains)
 
 
+@pytest.mark.slow
 def test_a_worker_elsewhere_knows_the_same_law_and_refuses_another_text_of_it(stranger: Path) -> None:
     study = adopted(Study.model_validate({"study": {"laws": (f"{stranger}/strange.py:STRANGE",)}}), "study").study
     assert study.study.laws == ("strange",) and set(sources_in(study)) == {"strange/strange.py", "strange/helper.py"}
@@ -131,6 +132,7 @@ def test_a_foreign_law_compiles_itself_and_no_kernel_anew(stranger: Path) -> Non
 
 
 @pytest.mark.parametrize("where", ["closure", "closure of a function", "global", "module", "file", "array"])
+@pytest.mark.slow
 def test_whatever_is_frozen_into_a_law_is_noticed_when_it_changes(tmp_path: Path, where: str) -> None:
     """numba alone would take the code that it kept: its key knows the function's own bytecode and closure only."""
     text = """
@@ -169,6 +171,7 @@ LAW = Controller("frozen", made({closed}), "a test", {{"k": Gain("", "", 0.1, 10
     assert found[0][1] != found[1][1]
 
 
+@pytest.mark.slow
 def test_an_edit_is_noticed_within_a_process(stranger: Path) -> None:
     place = f"{stranger}/strange.py:STRANGE"
     before = answer(place)
@@ -176,6 +179,7 @@ def test_an_edit_is_noticed_within_a_process(stranger: Path) -> None:
     assert np.abs(answer(place) - before).max() > 0.1
 
 
+@pytest.mark.slow
 def test_each_law_imports_the_modules_that_stand_beside_it(tmp_path: Path) -> None:
     found = []
     for factor in ("1.0", "3.0"):
@@ -215,6 +219,7 @@ BAD = {
 
 
 @pytest.mark.parametrize("fault", BAD)
+@pytest.mark.slow
 def test_what_is_no_law_is_refused_in_words_with_its_place(tmp_path: Path, fault: str) -> None:
     body, more, told = BAD[fault]
     (tmp_path / "bad.py").write_text(
@@ -237,6 +242,7 @@ FUNCTIONS: dict[str, Any] = {
 
 
 @pytest.mark.parametrize("call", FUNCTIONS)
+@pytest.mark.slow
 def test_the_import_that_an_error_names_makes_the_law_compile(tmp_path: Path, call: str) -> None:
     text = """import math
 from math import cos
@@ -304,6 +310,7 @@ def test_a_place_that_is_none_is_refused_with_its_line_in_the_study(tmp_path: Pa
         assert told in refused.value.what and f"{study}:2" in refused.value.where
 
 
+@pytest.mark.slow
 def test_two_laws_of_one_name_are_refused_with_both_places(stranger: Path) -> None:
     (stranger / "second.py").write_text(LAW)
     rows = tuple({"controller": f"{stranger}/{each}.py:STRANGE", "gains": "default"} for each in ("strange", "second"))
@@ -364,6 +371,7 @@ def test_a_laws_own_section_has_units_decides_what_it_is_and_is_sealed_in_full(t
         assert told in str(refused.value) and refused.value.where.startswith("controller-settings.")
 
 
+@pytest.mark.slow
 def test_a_runs_configuration_holds_every_setting_of_its_laws(tmp_path: Path) -> None:
     (tmp_path / "springy.py").write_text(DESIGN)
     (tmp_path / "study.yaml").write_text(f"simulate: {{controller: springy.py:SPRINGY, gains: default, {QUICK}}}")

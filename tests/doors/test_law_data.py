@@ -66,6 +66,7 @@ def test_weights_are_sealed_and_a_run_replays_when_they_are_gone(learned: Path) 
     assert "nets/weights.npy" in done.stderr, "shown before it is loaded"
 
 
+@pytest.mark.slow
 def test_other_weights_are_another_law(learned: Path) -> None:
     first, origin = rmse(learned / "study.yaml"), load(f"{learned}/strange.py:STRANGE")[1]
     weigh(learned, 2.0)
@@ -73,6 +74,7 @@ def test_other_weights_are_another_law(learned: Path) -> None:
     assert load(f"{learned}/strange.py:STRANGE")[1].files != origin.files
 
 
+@pytest.mark.slow
 def test_weights_that_are_not_as_they_were_sealed_are_refused_even_to_who_trusts_them(learned: Path) -> None:
     run = run_of(learned)
     np.save(run.path / "code/strange/nets/weights.npy", np.array([3.0]))
@@ -103,6 +105,7 @@ def test_data_that_is_asked_for_only_later_is_refused_and_not_left_behind(learne
         later("nets/more.npy")
 
 
+@pytest.mark.slow
 def test_a_worker_tells_files_of_one_name_apart(learned: Path) -> None:
     more = READS.format(name="first/weights.npy").replace("SPRING", "FIRST")
     (learned / "strange.py").write_text(more + (learned / "strange.py").read_text())
@@ -120,6 +123,7 @@ def test_a_worker_tells_files_of_one_name_apart(learned: Path) -> None:
         (learned / folder / "weights.npy").write_bytes(before)
 
 
+@pytest.mark.slow
 def test_in_python_too_a_runs_code_runs_only_once_it_is_trusted(learned: Path) -> None:
     expected, run = rmse(learned / "study.yaml"), run_of(learned)
     with pytest.raises(UserError, match="nobody has said that it may run") as refused:

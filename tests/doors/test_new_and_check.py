@@ -84,6 +84,7 @@ def test_a_law_that_is_not_named_is_asked_for_by_name(stranger: Path, place: str
     assert done.returncode == 2 and told in done.stderr and not done.stdout
 
 
+@pytest.mark.slow
 def test_a_certificate_names_sources_gains_and_cost(stranger: Path) -> None:
     found = list(certificate(f"{stranger}/strange.py:STRANGE", {}, False))
     sources = [each.found for each in found if each.asked == "source"]

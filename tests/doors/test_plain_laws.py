@@ -198,6 +198,7 @@ def test_every_table_flags_it(monkeypatch: pytest.MonkeyPatch) -> None:
         face.analyse(Study.model_validate({"simulate": {"controller": law.name, "gains": "default"}}))
 
 
+@pytest.mark.slow
 def test_the_mpc_of_the_worked_example_follows_and_pulls_as_hard_as_it_may_and_no_harder() -> None:
     pytest.importorskip("osqp")
     design: Any = CONTROLLERS[f"{ROOT}/experiments/own_controllers/mpc_osqp.py:MPC"]

@@ -120,6 +120,7 @@ def _read(terminal: int) -> bytes:
         return b""
 
 
+@pytest.mark.slow
 def test_bytecode_and_libraries_beside_a_law_are_never_looked_at(stranger: Path) -> None:
     """Bytecode that is not checked against its source would run in place of what was shown."""
     run, marker = sealed(stranger), stranger / "was here"
@@ -146,6 +147,7 @@ def test_code_that_is_not_as_it_was_sealed_is_refused_even_to_who_trusts_it(stra
     assert not (stranger / "was here").exists()
 
 
+@pytest.mark.slow
 def test_code_that_changes_after_it_was_shown_is_not_loaded(stranger: Path) -> None:
     run = sealed(stranger)
     helper = run.path / "code/strange/helper.py"
@@ -159,6 +161,7 @@ def test_code_that_changes_after_it_was_shown_is_not_loaded(stranger: Path) -> N
     assert not (stranger / "was here").exists()
 
 
+@pytest.mark.slow
 def test_a_runs_configuration_may_not_name_code_outside_the_run(stranger: Path) -> None:
     run = sealed(stranger)
     (stranger / "other.py").write_text(HOSTILE.format(marker=str(stranger / "was here")))
@@ -168,6 +171,7 @@ def test_a_runs_configuration_may_not_name_code_outside_the_run(stranger: Path) 
     assert done.returncode == 2 and "outside the run" in done.stderr and not (stranger / "was here").exists()
 
 
+@pytest.mark.slow
 def test_agreeing_to_one_code_is_not_agreeing_to_another(stranger: Path) -> None:
     run, asked = sealed(stranger), []
 

@@ -44,6 +44,7 @@ def made():
 """
 
 
+@pytest.mark.slow
 def test_workers_and_factories_run_no_module_of_the_working_directory(tmp_path: Path) -> None:
     folder, marks = tmp_path / "run", tmp_path / "marks"
     for place in (folder, marks, tmp_path / "elsewhere"):

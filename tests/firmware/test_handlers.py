@@ -120,6 +120,7 @@ def test_a_handler_of_the_wrong_type_does_not_compile(sources: Sources, wrong: s
 
 @needs_avr
 @pytest.mark.parametrize("handler", ["on_ping", "on_rate", "on_stop", "answer_counters"])
+@pytest.mark.slow
 def test_no_image_is_linked_without_a_handler(sources: Sources, handler: str) -> None:
     sources.commands = without(handler, sources.commands)
     image, said = sources.build()
@@ -141,6 +142,7 @@ def contributed() -> dict[str, str]:
 
 
 @needs_avr
+@pytest.mark.slow
 def test_the_message_that_contributing_adds_is_obeyed(sources: Sources) -> None:
     for path, added in contributed().items():
         with (sources.folder / path).open("a") as file:
@@ -163,6 +165,7 @@ def test_the_message_that_contributing_adds_is_obeyed(sources: Sources) -> None:
 
 
 @needs_avr
+@pytest.mark.slow
 def test_a_command_that_is_taken_out_of_the_table_is_unknown(sources: Sources) -> None:
     """Also one whose code lies among those of others."""
     sources.commands = without("on_stop", sources.commands)

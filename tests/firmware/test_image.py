@@ -21,6 +21,7 @@ def test_image_has_the_hash_written_beside_it() -> None:
 
 
 @needs_compiler
+@pytest.mark.slow
 def test_sources_alone_in_another_place_build_the_same_bytes(tmp_path: Path) -> None:
     elsewhere = tmp_path / "another" / "place"
     shutil.copytree(BOARD / "firmware", elsewhere / "firmware")

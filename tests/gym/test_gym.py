@@ -179,6 +179,7 @@ def test_a_wrist_that_leaves_its_range_stays_there_and_pays_for_the_whole_range(
     assert found["ended"][-1]
 
 
+@pytest.mark.slow
 def test_a_failed_neighbour_changes_nothing_and_is_told() -> None:
     study = load_study([], [*N, "wrist.range_deg=10", "simulate.reference.angle_deg=-5"])
     env = WristVectorEnv(9, study)
@@ -223,6 +224,7 @@ def test_what_cannot_be_stepped_says_how_to_mend_it(tmp_path: Path) -> None:
         env.step(np.zeros(2))
 
 
+@pytest.mark.slow
 def test_import_is_light_and_a_missing_gymnasium_is_told() -> None:
     heavy = "{'torch', 'scipy', 'pandas', 'matplotlib', 'cv2', 'numba'}"
     code = f"import sys, wristctl.gym; assert not {heavy} & set(sys.modules), {heavy} & set(sys.modules)"

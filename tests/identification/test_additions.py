@@ -154,6 +154,7 @@ def simulated(wrist: object, truth: dict[str, float]) -> MeasuredTrial:
     return replace(blank, angle=blank.shown(course, truth["delay"]) + noise)
 
 
+@pytest.mark.slow
 def test_a_fit_moves_as_the_budget_says_where_what_is_believed_is_wrong() -> None:
     """The trials fitted again with 1 % more, or on a base that leans by 1 deg."""
     truth = {"stiffness": 0.9 * START["stiffness"], "delay": 0.02}

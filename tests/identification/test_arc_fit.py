@@ -69,6 +69,7 @@ def test_what_a_made_robot_has_is_found_with_intervals_that_hold_it() -> None:
         ("inner friction", {"inner_friction": 0.06, "inner_presliding": 0.02}),
     ],
 )
+@pytest.mark.slow
 def test_friction_that_a_made_robot_has_is_what_its_data_want(term: str, added: dict[str, float]) -> None:
     recording = made(NECK, TRUE | added, SLACK, math.radians(0.1))
     models = list(tried_models(NECK, [[recording]], False))
@@ -81,6 +82,7 @@ def test_friction_that_a_made_robot_has_is_what_its_data_want(term: str, added: 
         assert held[0] == pytest.approx(held[1], rel=0.15)
 
 
+@pytest.mark.slow
 def test_a_probe_that_stays_bent_while_its_tendons_are_slack_wants_inner_friction() -> None:
     samples = 600
     phase = np.linspace(0.0, 4.0, samples)

@@ -46,6 +46,7 @@ def test_slack_tendons_leave_the_wrist_to_gravity() -> None:
     assert at_rest == pytest.approx(equilibrium(wrist, 4, (0.0, 0.0)).sum(), rel=1e-4)
 
 
+@pytest.mark.slow
 def test_slopes_are_the_differences_of_expected_angles() -> None:
     """By central differences of the whole model, delay, camera's zero and a spool's zero included."""
     trials, _ = logged(0, poses=(UPRIGHT,), directions=("flexion",))
@@ -73,6 +74,7 @@ def test_softened_springs_and_a_late_camera_are_found() -> None:
 
 
 @pytest.mark.parametrize("factor", [0.25, 2.5])
+@pytest.mark.slow
 def test_the_search_arrives_from_far_off(factor: float) -> None:
     """With tendons much softer or stiffer than believed."""
     trials, truth = logged(1, poses=(LEVEL,), directions=("ulnar",), tendon_stiffness=factor * 20e3, delay=0.05)

@@ -56,6 +56,7 @@ def test_what_is_predicted_of_a_faster_move_comes_true(slow: Slow) -> None:
         assert 1.0 / 3.0 < half / predicted.half_widths[name] < 3.0, name
 
 
+@pytest.mark.slow
 def test_a_hand_believed_heavier_makes_everything_stiffer_and_leaves_the_delay() -> None:
     """Angles at given spools depend on ratios, so that masses believed 1 % larger scale all the rest by 1 %."""
     trials, _ = logged(1, poses=(LEVEL,), directions=("ulnar",))

@@ -140,6 +140,7 @@ def test_circular_functions_are_within_their_ulp_up_to_a_billion(
 
 @given(ANGLES)
 @settings(max_examples=300, deadline=None)
+@pytest.mark.slow
 def test_circular_functions_are_numpys(x: float) -> None:
     found = of_pairs(x)[0]
     np.testing.assert_allclose(found[:3], [np.sin(x), np.cos(x), np.tan(x)], rtol=1e-15, atol=0.0)

@@ -66,6 +66,7 @@ def test_the_loss_never_rises_and_at_the_minimum_nothing_moves() -> None:
     torch.testing.assert_close(straight.weight.detach(), weights, rtol=1e-12, atol=1e-14)
 
 
+@pytest.mark.slow
 def test_recommended_is_within_a_twentieth_of_a_degree_over_the_whole_domain() -> None:
     samples = draw_samples(DataSettings(), WristParameters(), np.random.default_rng(0))
     split = split_samples(1000, 0.75, np.random.default_rng(0))

@@ -98,6 +98,7 @@ def test_tips_outside_the_trained_domain_are_flagged() -> None:
     assert path.outside.tolist() == [False, False, True, True, True, True]
 
 
+@pytest.mark.slow
 def test_a_network_needs_no_torch() -> None:
     code = "import sys, wristctl.learning.network_file; print({'torch', 'scipy', 'pandas'} & set(sys.modules))"
     answer = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)

@@ -70,6 +70,7 @@ def some(model: PlantModel, count: int = 9) -> np.ndarray:
     return drawn
 
 
+@pytest.mark.slow
 def test_the_jacobian_is_the_derivative_of_the_tip(model: PlantModel) -> None:
     q, small = some(model), 1e-6
     found = poses(model, WRIST, 2, q).jacobian
@@ -194,6 +195,7 @@ def test_on_the_bench_it_comes_to_rest_and_the_other_side_is_its_mirror_image(
     np.testing.assert_allclose(ends[1], -ends[0], atol=1e-6)
 
 
+@pytest.mark.slow
 def test_a_rehearsal_logs_it_as_it_moves(model: PlantModel) -> None:
     """A perfect camera sees the plant's angle; the same move to the other side is its mirror image."""
     own = TrueWrist(model=model.name)

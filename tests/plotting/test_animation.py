@@ -55,6 +55,7 @@ def test_a_loop_is_played_25_pictures_a_second_in_tenths_of_a_milliradian(tmp_pa
     assert own["diverged"] is False and own["group"] == ""
 
 
+@pytest.mark.slow
 def test_a_single_loop_is_named_by_its_controller_and_gains(tmp_path: Path, course: Course) -> None:
     for gains, name in (("printed", "pid/printed"), ("{P4: 1.0, P5: 1.0, P6: 0.1}", "pid/own gains")):
         study = wristctl.load_study(None, f"simulate={{controller: pid, gains: {gains}}}")

@@ -130,6 +130,7 @@ def test_every_cell_of_the_map_stands_at_its_row_and_column(results: list[Compar
     assert list(paper.get_xticks()) == [0]
 
 
+@pytest.mark.slow
 def test_numbers_of_the_map_lie_within_their_cells_on_a_page_of_180_mm(results: list[ComparedRow]) -> None:
     """Eight references and the paper's column; in a column of 88 mm colours have to do."""
     wide = [
@@ -179,6 +180,7 @@ def test_the_papers_column_stands_where_it_is_asked_for_alone(results: list[Comp
     assert len(rmse_map(others).axes) == 2, "no column without a number in it"
 
 
+@pytest.mark.slow
 def test_cells_of_many_rows_and_columns_are_large_enough_to_read_and_no_larger(
     results: list[ComparedRow],
 ) -> None:

@@ -42,6 +42,7 @@ def extent(text: Text) -> Bbox:
     return text.get_window_extent().padded(-1.0)
 
 
+@pytest.mark.slow
 def test_every_axis_of_numbers_has_a_label_with_its_unit_and_one_with_a_label_has_numbers(drawn: Figure) -> None:
     shared = {"x": drawn.get_supxlabel(), "y": drawn.get_supylabel()}
     for axes in drawn.axes:
@@ -58,6 +59,7 @@ def test_no_text_is_cut_or_lies_on_another_or_is_too_small_to_read(drawn: Figure
     assert not Gcf.get_all_fig_managers(), "drawing leaves no figure open"
 
 
+@pytest.mark.slow
 def test_in_a_column_of_88_mm_no_text_is_cut_or_lies_on_another(make: Callable[[], Figure]) -> None:
     with for_paper(88.0 / 25.4):
         made = make()

@@ -127,6 +127,7 @@ def test_a_run_in_one_plane_has_nothing_of_it_on_its_page(tmp_path: Path) -> Non
     assert 'id="courses"' in text and not re.search(r'id="(motion|stage|keys|said)"', text)
 
 
+@pytest.mark.slow
 def test_a_page_of_eight_seconds_stays_small(tmp_path: Path) -> None:
     run = run_of(tmp_path, course(horizon=8.0))
     assert run.file("report.html").stat().st_size < 150_000

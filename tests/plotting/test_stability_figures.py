@@ -36,6 +36,7 @@ def found() -> list[LoopAnalysis]:
     return [each for each in (row("pid", PID, Loop()).analysed(angle) for angle in (0.0, 0.3)) if each is not None]
 
 
+@pytest.mark.slow
 def test_the_bode_plot_has_each_angles_gain_and_phase_and_where_it_begins_to_oscillate(
     found: list[LoopAnalysis],
 ) -> None:

@@ -65,6 +65,7 @@ def test_titles_of_axes_side_by_side_do_not_reach_the_next_ones() -> None:
 
 
 @pytest.mark.parametrize(("low", "high"), [(1e-7, 3e-2), (0.9, 40.0), (0.02, 0.05)])
+@pytest.mark.slow
 def test_powers_of_ten_name_the_ticks_that_formulas_would(low: float, high: float) -> None:
     made, ((plain, formulas),) = figure(1, 2)
     logarithmic(plain.yaxis)

@@ -34,6 +34,7 @@ def test_a_loop_that_holds_30_degrees_pulls_as_much_as_is_drawn() -> None:
 
 
 @pytest.mark.parametrize(("factor", "told"), [(0.5, "from "), (0.02, "nowhere: it buckles within 60 N")])
+@pytest.mark.slow
 def test_a_wrist_that_buckles_is_drawn_as_far_as_it_stands(factor: float, told: str) -> None:
     soft = WRIST.model_copy(update={"stiffness": factor * WRIST.stiffness})
     assert np.isnan(rest_poses(soft, PULLS)).any()

@@ -190,6 +190,7 @@ def test_what_is_no_archive_of_runs_is_said(told: bytes | None, what: str, tmp_p
         unpack(file, tmp_path / "colleague")
 
 
+@pytest.mark.slow
 def test_no_zip_a_broken_one_and_one_that_swells_are_refused(packed: tuple[list[Run], Path], tmp_path: Path) -> None:
     _, file = packed
     with pytest.raises(UserError, match="cannot be read"):

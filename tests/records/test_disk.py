@@ -35,6 +35,7 @@ def _leave(disk: Path, free: int) -> None:
 
 
 @pytest.mark.parametrize("large", [False, True], ids=["metric", "table"])
+@pytest.mark.slow
 def test_whenever_the_disk_fills_the_run_fails_in_words_and_earlier_runs_stand(disk: Path, large: bool) -> None:
     said, states = set(), set()
     (earlier,) = list_runs(disk)

@@ -100,6 +100,7 @@ VALUES = st.floats(-1e300, 1e300) | st.just(math.nan)
 
 
 @given(names=st.lists(NAMES, min_size=1, max_size=5, unique=True), values=st.lists(VALUES, min_size=1, max_size=4))
+@pytest.mark.slow
 def test_what_is_written_reads_back_exactly(
     names: list[str], values: list[float], tmp_path_factory: pytest.TempPathFactory
 ) -> None:

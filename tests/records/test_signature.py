@@ -123,6 +123,7 @@ def lock_held(run: Path, text: str) -> Iterator[None]:
 
 
 @pytest.mark.parametrize("text", ["", "another-machine 0-boot 12 34\n"], ids=["held", "another machine's, no locks"])
+@pytest.mark.slow
 def test_a_lock_hides_nothing_of_a_sealed_run(
     make: Make, keys: dict[str, Path], call: Call, text: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -30,6 +30,7 @@ def _begun(child: subprocess.Popen[str], results: Path) -> Run:
     return Run(results / child.stdout.readline().strip())
 
 
+@pytest.mark.slow
 def test_a_killed_run_reads_as_crashed_and_a_living_one_as_running(process: Start, results: Path) -> None:
     child = process(_SLEEPS, results)
     run = _begun(child, results)
@@ -42,6 +43,7 @@ def test_a_killed_run_reads_as_crashed_and_a_living_one_as_running(process: Star
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.slow
 def test_an_interrupted_run_keeps_and_seals_what_it_wrote(
     process: Start, results: Path, number: signal.Signals
 ) -> None:
@@ -55,6 +57,7 @@ def test_an_interrupted_run_keeps_and_seals_what_it_wrote(
     run.check()
 
 
+@pytest.mark.slow
 def test_a_second_interrupt_does_not_disturb_the_sealing(process: Start, results: Path) -> None:
     code = """
 import os, signal

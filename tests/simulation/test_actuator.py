@@ -68,6 +68,7 @@ def run(
     return rollout(controller(name), row, [course], np.zeros(1, np.int64), loop, WRIST, record=True, threads=1)
 
 
+@pytest.mark.slow
 def test_lagged_pull_approaches_a_step_with_its_time_constant_in_whole_steps() -> None:
     drive = driven(Actuator(level="lagged", lag=0.05))
     pull = delivered(drive, np.tile([44.0, 4.0, 0.0], (500, 1)))
@@ -86,6 +87,7 @@ def test_lagged_pull_grows_no_faster_than_the_motor_turns() -> None:
     assert slope == pytest.approx(drive.motor.stiffness * drive.motor.speed, rel=0.05)
 
 
+@pytest.mark.slow
 def test_a_stepper_keeps_its_speed_and_acceleration_and_stops_within_a_step_of_its_target() -> None:
     drive = driven(Actuator(level="tendon"))
     length = delivered(drive, np.tile([4.0, 4.0, 0.8], (500, 1)))[:, 0]

@@ -40,6 +40,7 @@ def missing_deg(outcome: Outcome) -> float:
 
 
 @pytest.mark.parametrize("side", [1.0, -1.0])
+@pytest.mark.slow
 def test_exchanged_gains_move_the_front_pages_wrist_and_no_step_a_tick_says_so(side: float) -> None:
     """58 N, four segments, 1 kHz: one integration step a tick leaves the wrist where it was."""
     coarse = run("smc", "exchanged", Loop(substeps=1), 58.0, side)
@@ -50,6 +51,7 @@ def test_exchanged_gains_move_the_front_pages_wrist_and_no_step_a_tick_says_so(s
     assert found.metrics["rmse"] == pytest.approx(fine.metrics["rmse"], rel=0.02)
 
 
+@pytest.mark.slow
 def test_at_60_newtons_they_arrive_at_every_step_but_one_and_their_rmse_is_marked() -> None:
     found = [run("smc", "exchanged", Loop(substeps=steps)) for steps in (4, 8, 16)]
     own = run("smc", "exchanged", LOOPS["four-segments"])
@@ -58,6 +60,7 @@ def test_at_60_newtons_they_arrive_at_every_step_but_one_and_their_rmse_is_marke
     assert own.metrics["rmse"] == pytest.approx(found[0].metrics["rmse"], rel=0.05)
 
 
+@pytest.mark.slow
 def test_beyond_the_threshold_they_move_nothing_at_any_step() -> None:
     for limit in (61.0, 80.0):
         found = run("smc", "exchanged", LOOPS["four-segments"], limit)
@@ -148,6 +151,7 @@ def test_rollouts_that_differ_beyond_the_tolerance_do_not_agree() -> None:
         other.metrics[name] = one.metrics[name]
 
 
+@pytest.mark.slow
 def test_the_best_gains_of_a_search_are_what_they_are_at_a_step_that_is_short_enough() -> None:
     chosen = ["tune.controllers=[pid]", "tune.scenarios=[{loop: four-segments}]", "tune.horizon=3"]
     study, law = load_study([], chosen, "tune"), controller("pid")

@@ -50,6 +50,7 @@ def cycle(frequency: float, actuator: Actuator) -> tuple[float, float]:
 
 
 @pytest.mark.parametrize("sheath", [0.0, 3.0])
+@pytest.mark.slow
 def test_frictions_work_does_not_know_how_fast_it_goes(sheath: float) -> None:
     actuator = STIFF.model_copy(update={"sheath": sheath})
     (slow, raw_slow), (fast, raw_fast) = cycle(0.004, actuator), cycle(0.04, actuator)

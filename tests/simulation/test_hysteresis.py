@@ -68,6 +68,7 @@ def test_a_slow_loop_is_as_wide_as_the_roots_of_the_statics_are_apart(
 
 
 @pytest.mark.parametrize("ramp", [5.0, 9.0])
+@pytest.mark.slow
 def test_ramps_leave_held_spools_at_the_roots_of_the_statics(ramp: float) -> None:
     settings = {"preslidings": (5e-6, 2e-5, 1e-4), "frictions": (0.05, 0.2), "angles_deg": (4.0, 15.0, 27.0)}
     found = dead_bands(stroke(ramp=ramp, **settings))
@@ -94,6 +95,7 @@ def test_ramps_that_do_not_slide_far_enough_are_told_from_those_that_do() -> Non
     assert near.slid and not far.slid and far.width < 0.9 * far.exact_width
 
 
+@pytest.mark.slow
 def test_an_inner_loop_lies_in_the_outer_one() -> None:
     own = stroke(ranges_deg=((0.0, 30.0), (10.0, 20.0)), frequencies=(0.01,), sheaths=(1.0,))
     outer, inner = loops(own)
@@ -171,6 +173,7 @@ def lively(**own: Any) -> HysteresisLoop:
 
 
 @pytest.mark.parametrize("step", [2e-3, 1e-3])
+@pytest.mark.slow
 def test_a_loop_takes_as_many_steps_as_it_needs_and_says_how_many(step: float) -> None:
     found, fine = lively(step=step), lively(step=1e-5)
     assert found.step < 2e-4 and found.drift == fine.drift == 0.0
@@ -182,6 +185,7 @@ def test_a_loop_takes_as_many_steps_as_it_needs_and_says_how_many(step: float) -
     )
 
 
+@pytest.mark.slow
 def test_what_still_changes_at_the_shortest_step_is_marked(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("wristctl.simulation.hysteresis.FINER", (2,))
     open_ = lively(step=1e-3)

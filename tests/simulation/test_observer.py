@@ -204,6 +204,7 @@ def test_a_lane_behind_camera_and_tendons_has_the_same_bytes_alone_and_in_a_batc
 @pytest.mark.parametrize(
     ("level", "rmse", "steady_state"), [("ideal", 0.004, 0.002), ("tendon", 0.01, 0.005)], ids=["ideal", "tendon"]
 )
+@pytest.mark.slow
 def test_smc_tracking_meets_its_targets_behind_a_camera_on_a_softer_wrist(
     level: str, rmse: float, steady_state: float
 ) -> None:

@@ -209,6 +209,7 @@ def test_of_several_repetitions_the_middle_one_says_whether_a_loop_chatters(ofte
 
 @pytest.mark.parametrize("law", ["super-twisting", "smc-tracking"])
 @pytest.mark.parametrize("direction", ["ulnar", "radial"])
+@pytest.mark.slow
 def test_laws_that_slam_the_tendons_of_a_longer_wrist_are_marked(law: str, direction: str) -> None:
     row = [f"simulate.controller={law}", "simulate.gains=default", f"simulate.direction={direction}"]
     longer = simulate(load_study([], [*row, "wrist.length=0.12"]))

@@ -71,6 +71,7 @@ WORST = Loop(plant=UNKNOWN["softer"], sensor=Sensor(level="camera"), actuator=Ac
 
 @pytest.mark.parametrize("loop", [Loop(plant=UNKNOWN["loaded"]), WORST], ids=["loaded", "camera and tendons"])
 @pytest.mark.parametrize("name", sorted(CONTROLLERS))
+@pytest.mark.slow
 def test_commands_stay_finite_and_within_limits_for_any_gains_in_the_box(name: str, loop: Loop) -> None:
     chosen = controller(name)
     rng = np.random.default_rng(1)

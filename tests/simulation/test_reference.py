@@ -38,6 +38,7 @@ def test_minimum_jerk_starts_and_ends_at_rest_and_derivatives_agree() -> None:
 
 
 @given(st.floats(-0.8, 0.8), st.floats(0.0793, 0.0807), st.sampled_from(["step", "minimum-jerk", "sine"]))
+@pytest.mark.slow
 def test_the_wanted_angle_is_the_closed_form_inverse_of_the_wanted_tip(angle: float, length: float, kind: str) -> None:
     x, y = (float(v) for v in arc_tip(np.array(angle), length))
     m = evaluated(kind=kind, tip=(x, y), inverse="closed-form", duration=0.7, frequency=0.8)

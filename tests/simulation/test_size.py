@@ -74,6 +74,7 @@ def test_steps_of_all_loops_count_and_not_the_last_ones() -> None:
         ("audit", ["audit.horizon=1e7"], "audit.horizon"),
     ],
 )  # fmt: skip
+@pytest.mark.slow
 def test_a_command_that_would_not_end_is_refused_before_it_begins(
     command: str, settings: list[str], where: str
 ) -> None:
@@ -83,6 +84,7 @@ def test_a_command_that_would_not_end_is_refused_before_it_begins(
     assert where in str(caught.value)
 
 
+@pytest.mark.slow
 def test_a_box_of_too_many_settings_is_refused_and_the_shipped_one_is_not() -> None:
     shipped = [CLAIMS, CLAIMS.with_name("unknowns.yaml")]
     prepare(AUDIT, load_study(shipped, [], "audit"), NOWHERE).plan()
@@ -92,6 +94,7 @@ def test_a_box_of_too_many_settings_is_refused_and_the_shipped_one_is_not() -> N
             prepare(AUDIT, study, NOWHERE).plan()
 
 
+@pytest.mark.slow
 def test_the_shipped_study_of_all_laws_is_not_refused_and_one_a_thousand_times_as_large_is() -> None:
     file = CLAIMS.with_name("fair_study.yaml")
     prepare(FAIR_STUDY, load_study([file], ["study.budget=full"], "study"), NOWHERE).plan()

@@ -23,6 +23,7 @@ from wristctl.simulation.stationary_filter import (
 @given(
     st.floats(1e-3, 10e-3), st.floats(10.0, 200.0), st.floats(1e-3, 1.0), st.floats(1e-5, 1e-2), st.floats(1e-3, 0.3)
 )
+@pytest.mark.slow
 def test_it_solves_the_riccati_equation_of_a_frame(
     period: float, rate: float, noise_deg: float, torque_noise: float, load_drift: float
 ) -> None:

@@ -116,6 +116,7 @@ def test_a_pid_at_1_ms_bears_as_much_gain_as_two_other_programs_say() -> None:
 
 
 @pytest.mark.parametrize("level", ACTUATORS)
+@pytest.mark.slow
 def test_the_linear_loop_is_the_same_whatever_steps_it_is_simulated_with(level: str) -> None:
     loop = Loop(control_period=5e-3, actuator=ACTUATORS[level])
     found = [margins(linear("pid", SOFT, loop.model_copy(update={"substeps": each}), 15.0).closed) for each in (1, 50)]

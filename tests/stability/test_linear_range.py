@@ -73,6 +73,7 @@ def test_limits_of_motors_scale_with_what_the_motors_are() -> None:
     assert plain["a motor's microstep"].above is False and plain["the stepper's acceleration"].above
 
 
+@pytest.mark.slow
 def test_a_microstep_swallows_what_makes_a_motor_swing_by_half_of_it() -> None:
     """A lagged motor's pull is the torque over the arm, less by its lag."""
     own = row("pid", {"Kp": 0.05, "Ki": 1.0, "Kd": 1e-4}, Loop(plant_segments=1, actuator=LAGGED))
@@ -98,6 +99,7 @@ def test_a_controller_sees_as_much_of_a_swing_whatever_stands_behind_its_motors(
     assert limits[1] == pytest.approx(limits[0], rel=0.02)
 
 
+@pytest.mark.slow
 def test_a_tendon_goes_slack_where_a_turn_takes_up_its_stretch() -> None:
     own = row("smc-tracking", "hardware", BEHIND)
     stretch = own.wrist.pretension / TENDON.tendon_stiffness

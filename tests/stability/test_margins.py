@@ -184,6 +184,7 @@ def test_what_is_added_at_uneven_cuts_is_amplified_by_the_loop(seed: int) -> Non
 
 
 @pytest.mark.parametrize("name", ["integrator", "resonances, many crossings", "nearly marginal"])
+@pytest.mark.slow
 def test_a_loop_written_out_over_several_ticks_is_the_same_loop(name: str) -> None:
     """Its modes turn further in a cycle than one can see at its end, and its cuts are as many as its ticks."""
     _, loop = _open(name)
@@ -205,6 +206,7 @@ def test_a_sharp_resonance_between_the_decades_is_seen() -> None:
     assert len(margins(loop).gain_crossings) == 2 and np.diff(frequencies(loop)).min() > 0.0
 
 
+@pytest.mark.slow
 def test_margins_of_a_configured_loop_are_python_controls() -> None:
     found = linear("pid", {"Kp": 10.0, "Ki": 20.0, "Kd": 0.5}, Loop(plant_segments=1, control_period=5e-3), 15.0).closed
     (tick,) = found.ticks

@@ -31,6 +31,7 @@ def test_a_loop_rests_within_its_margins_and_swings_beyond(measured: ModuleType,
     assert rests <= still < swings
 
 
+@pytest.mark.slow
 def test_an_ideal_loop_begins_to_oscillate_within_a_few_percent_of_its_limit(measured: ModuleType) -> None:
     """Simulated finely: by the step of 1 ms that its period has, the limit would be 11 % lower."""
     judged = measured.ROWS[0]

@@ -79,6 +79,7 @@ def _changed(section: Section) -> Iterator[tuple[str, Section]]:
 
 @pytest.mark.parametrize("command", COMMANDS)
 @pytest.mark.filterwarnings("ignore:Pydantic serializer warnings")
+@pytest.mark.slow
 def test_every_leaf_that_a_command_reads_changes_its_hash(command: str) -> None:
     own = {
         "seed",

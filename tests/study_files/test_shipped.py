@@ -22,6 +22,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 @pytest.mark.parametrize("file", sorted((ROOT / "experiments").rglob("*.yaml")), ids=lambda file: file.stem)
+@pytest.mark.slow
 def test_every_experiment_is_found_by_name_and_path_in_an_empty_folder(file: Path) -> None:
     name = file.relative_to(ROOT / "experiments").with_suffix("").as_posix()
     assert name in shipped_names()

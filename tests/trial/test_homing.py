@@ -66,6 +66,7 @@ def test_friction_inside_the_wrist_turns_no_bend_aside(friction: float) -> None:
     check_zero(board, tracking, settings, WRIST, "flexion", zero)
 
 
+@pytest.mark.slow
 def test_a_tendon_that_is_off_its_pulley_stops_homing() -> None:
     with pytest.raises(SafetyStop, match=r"axis 0 \(tendon 1\) does not bend the wrist within 0.8 mm"):
         homed((1, 1, 1, 1), slack=(5e-3, 2e-4, 4e-4, 2.5e-4))

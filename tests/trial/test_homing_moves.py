@@ -297,6 +297,7 @@ def test_a_wrist_that_stays_bent_by_its_own_friction_is_homed(
 
 @settings(max_examples=20, deadline=None)
 @given(stays=st.floats(0.0, 1.0), first=st.floats(-1.0, 1.0), plane=st.sampled_from(["ulnar", "flexion"]))
+@pytest.mark.slow
 def test_a_wrist_that_stays_bent_passes_its_checks_and_a_dead_motor_does_not(
     stays: float, first: float, plane: str
 ) -> None:

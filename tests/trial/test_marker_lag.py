@@ -28,6 +28,7 @@ def lag_of(late: float, scale: float = 1.0, angle: float = 0.5, noise: float = N
 
 
 @given(st.floats(0.0, 0.03), st.floats(0.8, 1.25))
+@pytest.mark.slow
 def test_a_late_marker_is_told_from_stiff_or_soft_springs(late: float, scale: float) -> None:
     assert late - 0.003 < lag_of(late, scale) <= late + 0.001
 

@@ -98,6 +98,7 @@ def test_spools_are_behind_by_what_is_left_when_they_have_braked(way: float) -> 
 
 @settings(deadline=None)
 @given(st.floats(-2000.0, 2000.0), st.floats(-3000.0, 3000.0), st.floats(-4000.0, 4000.0))
+@pytest.mark.slow
 def test_a_trial_and_a_simulation_turn_a_spool_by_the_same_law(gap: float, moving: float, before: float) -> None:
     h = 1e-3
     out = np.array([0.0, before * SPOOLS.step])

@@ -64,6 +64,7 @@ def strokes(
     ("delay", "rate", "damping", "frame_rate"),
     [(0.0, 35.0, 0.4, 15.0), (0.06, 35.0, 0.4, 15.0), (0.13, 70.0, 0.2, 60.0), (0.06, 25.0, 1.5, 60.0)],
 )
+@pytest.mark.slow
 def test_the_delay_is_found_to_two_milliseconds_whatever_the_wrist_does(
     delay: float, rate: float, damping: float, frame_rate: float
 ) -> None:
@@ -80,6 +81,7 @@ def test_what_the_other_plane_gives_back_slowly_is_not_taken_for_age(across: flo
     assert found.delay == pytest.approx(0.06, abs=2e-3)
 
 
+@pytest.mark.slow
 def test_a_motor_that_reels_in_the_other_way_is_seen_as_late() -> None:
     turned = [each._replace(position=-each.position) for each in strokes(0.06, on_springs(35.0, 0.4), 30.0)]
     assert find_latency(turned).delay == pytest.approx(0.06, abs=2e-3)

@@ -149,6 +149,7 @@ def test_search_goes_on_where_every_candidate_fails(name: str) -> None:
 
 
 @learning
+@pytest.mark.slow
 def test_sphere_is_solved(name: str) -> None:
     assert median_best(name, sphere, 40) < 1e-5
 
@@ -160,6 +161,7 @@ def test_optimum_in_a_corner_is_met(name: str) -> None:
 
 
 @learning
+@pytest.mark.slow
 def test_rosenbrock_is_solved_better_than_by_random_search(name: str) -> None:
     assert median_best(name, rosenbrock, 30) < 0.5 * median_best("random", rosenbrock, 30)
 
@@ -181,6 +183,7 @@ def test_swarm_with_one_dimension_and_one_candidate_runs() -> None:
 
 
 @pytest.mark.parametrize("objective", [rosenbrock, rastrigin])
+@pytest.mark.slow
 def test_swarm_is_as_good_as_an_independent_one(objective: Objective) -> None:
     """At the same budget: of its bests, none of pymoo's swarms is better more often than chance has it."""
     pytest.importorskip("pymoo")
@@ -200,6 +203,7 @@ def test_swarm_is_as_good_as_an_independent_one(objective: Objective) -> None:
     assert mannwhitneyu(ours, theirs, alternative="greater").pvalue > 0.05
 
 
+@pytest.mark.slow
 def test_covariance_is_learnt_and_the_search_begins_anew_where_it_has_converged() -> None:
     """A narrow valley along the diagonal, far more narrow than an isotropic search could follow."""
 

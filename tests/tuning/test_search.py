@@ -203,6 +203,7 @@ def test_what_gains_do_on_the_cases_is_counted_by_mark() -> None:
         assert marks_of(law, gains, tuning_cases(study)[0], study.wrist) == marks
 
 
+@pytest.mark.slow
 def test_a_search_tells_of_which_controllers_the_best_gains_chatter_and_how_often(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:

@@ -48,6 +48,7 @@ def poses(seen: list[BoardView]) -> list[tuple[Array, Array]]:
     return found
 
 
+@pytest.mark.slow
 def test_there_are_as_many_pictures_as_asked_for_numbered_and_of_the_cameras_size(shots: list[Frame]) -> None:
     assert [frame.number for frame in shots] == list(range(VIEWS)) == [frame.time for frame in shots]
     assert {frame.image.shape for frame in shots} == {(PLAIN.height, PLAIN.width)}
@@ -108,6 +109,7 @@ def test_ink_and_paper_are_as_far_apart_as_the_contrast_says() -> None:
     assert common == {ink, paper, 122} and levels.min() == ink and levels.max() == paper
 
 
+@pytest.mark.slow
 def test_boards_in_hand_are_the_seeds_and_the_one_in_the_plane_is_not(shots: list[Frame]) -> None:
     again = list(board_shots(PLAIN, BOARD, 2, np.random.default_rng(5)))
     other = list(board_shots(PLAIN, BOARD, 2, np.random.default_rng(6)))

@@ -40,6 +40,7 @@ def found(album: Album) -> CameraCalibration:
     return calibrate(album.views, album.last, SIZE, SETTINGS)
 
 
+@pytest.mark.slow
 def test_lens_is_found_within_four_standard_deviations(found: CameraCalibration) -> None:
     true = Pinhole(SCENE, "right")
     values = [*found.view.camera_matrix[[0, 1, 0, 1], [0, 1, 2, 2]], *found.view.distortion]

@@ -98,6 +98,7 @@ def small(side: float, x: float, y: float) -> tuple[Image, NDArray[np.float64]]:
     return noisy, square + np.array([x - 0.5, y - 0.5])
 
 
+@pytest.mark.slow
 def test_markers_of_14_px_are_found_by_the_fine_search_alone_and_so_around_where_one_was() -> None:
     """Of 150 that begin anywhere between pixels; its widest window alone misses one in ten."""
     rng, detector = np.random.default_rng(0), Detector()

@@ -34,6 +34,7 @@ def errors(scene: Scene, view: View, degrees: Array) -> Array:
 
 
 @pytest.mark.parametrize("distance", [0.30, 0.21, 0.165], ids=["41 px", "61 px", "81 px"])
+@pytest.mark.slow
 def test_angle_scatters_by_less_than_a_tenth_of_a_degree_at_40_to_80_px(distance: float) -> None:
     settings = SceneSettings(distance=distance, height_above=0.019, noise=4.0)
     scene = Scene(settings, WristParameters(length=0.06))
@@ -56,6 +57,7 @@ def test_nearly_all_markers_of_20_px_are_found() -> None:
 
 
 @pytest.mark.parametrize("pose", [{"tilt_deg": 10.0}, {"pan_deg": 10.0}], ids=str)
+@pytest.mark.slow
 def test_homography_corrects_a_tilt_of_ten_degrees(pose: dict[str, float]) -> None:
     scene = Scene(SceneSettings.model_validate(pose), WristParameters())
     degrees = np.linspace(-45.0, 45.0, COUNT)
@@ -105,6 +107,7 @@ def test_zero_is_subtracted(scene: Scene) -> None:
     assert Tracker(Markers(), View(), Gates(), zero=0.1).see(frame).theta == pytest.approx(plain - 0.1)
 
 
+@pytest.mark.slow
 def test_a_base_once_averaged_makes_the_angle_quieter(scene: Scene) -> None:
     still = frames(scene, np.full(60, 10.0))
     with_memory, without = (

@@ -36,6 +36,7 @@ def sheets(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return file
 
 
+@pytest.mark.slow
 def test_the_pdf_has_two_pages_of_the_papers_size(sheets: Path, tmp_path: Path) -> None:
     write_sheets(tmp_path / "letter.pdf", "letter", CharucoBoard(), Markers())
     for file in (sheets, tmp_path / "letter.pdf"):

@@ -22,6 +22,7 @@ def same(one: UnitsDone, other: UnitsDone) -> bool:
     return all(a is not None and b is not None and np.array_equal(a["walk"], b["walk"]) for a, b in pairs)
 
 
+@pytest.mark.slow
 def test_a_worker_furnishes_itself_once_before_its_units() -> None:
     units = [Unit("tests.work.piecework:fetched", {"asked": k}) for k in range(5)]
     left = Furnish("tests.work.piecework:furnish", {"left": 7})
@@ -146,6 +147,7 @@ def test_a_unit_that_fails_is_tried_three_times_and_named_and_the_others_go_on(t
     assert [k for k, each in enumerate(done.arrays) if each is None] == [2]
 
 
+@pytest.mark.slow
 def test_a_unit_that_fails_once_is_as_if_it_had_not(tmp_path: Path) -> None:
     done = perform_units([at(tmp_path, "fail_once", 4)], Workers.of("processes:1"), golden())
     walked = perform_units([Unit("piecework:walk", {"seed": 4, "steps": 5})], Workers.of("serial"))
@@ -162,6 +164,7 @@ def test_a_unit_that_kills_its_worker_is_named_and_takes_no_other_with_it(tmp_pa
     assert 3 <= tries(tmp_path, "die") <= 4, "once beside others, then alone"
 
 
+@pytest.mark.slow
 def test_a_worker_whose_golden_numbers_differ_computes_nothing(tmp_path: Path) -> None:
     with pytest.raises(
         UserError, match=r"computes other numbers: its golden rollout is .* - fix: workers of"
@@ -171,6 +174,7 @@ def test_a_worker_whose_golden_numbers_differ_computes_nothing(tmp_path: Path) -
 
 
 @pytest.mark.parametrize("part, told", [("version", "runs wristctl"), ("code", "of the same number and other files")])
+@pytest.mark.slow
 def test_a_worker_of_another_version_or_other_files_computes_nothing(part: str, told: str) -> None:
     other = Golden(**{**golden()._asdict(), part: "another"})
     with pytest.raises(UserError, match=told) as raised:

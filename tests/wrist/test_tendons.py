@@ -44,6 +44,7 @@ def allocated(theta: float, torque: float, low: float, high: float) -> np.ndarra
     low=st.floats(0.0, 40.0),
     room=st.floats(1.0, 120.0),
 )
+@pytest.mark.slow
 def test_allocated_torque_is_the_wanted_one_wherever_it_can_be_reached(
     theta: float, torque: float, low: float, room: float
 ) -> None:

@@ -139,6 +139,7 @@ def test_every_value_out_of_range_is_refused_and_moves_nothing(bench: Bench, rea
     assert bench.status().state is (State.ENABLED if ready else State.DISABLED)
 
 
+@pytest.mark.slow
 def test_noise_between_commands_does_not_disturb_a_motion(bench: Bench) -> None:
     rng = random.Random(6)
     bench.get_ready()

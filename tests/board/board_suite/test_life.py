@@ -88,6 +88,7 @@ def test_a_rate_that_is_renewed_in_time_goes_on(bench: Bench) -> None:
     assert np.diff(rises).max() < 1.03 * 16e6 / RATE and bench.status().lapses == 0
 
 
+@pytest.mark.slow
 def test_nothing_lapses_at_rest_or_on_the_way_to_a_target(bench: Bench) -> None:
     bench.get_ready()
     bench.do(Rate((0.0, 0.0, 0.9, 0.0), 0.01))

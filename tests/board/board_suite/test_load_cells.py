@@ -124,6 +124,7 @@ def test_a_spike_on_an_open_pin_is_no_amplifier(bench: Bench) -> None:
         assert pulls(bench).age == (SILENT,) * 4
 
 
+@pytest.mark.slow
 def test_what_has_been_read_ages_and_is_silent_after_a_quarter_of_a_second(bench: Bench) -> None:
     amplifier = Hx711(bench, 2)
     amplifier.convert(-5000)

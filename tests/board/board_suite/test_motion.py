@@ -69,6 +69,7 @@ HEAVIEST = [(20_000.0, -20_000.0, 0.0, 0.0), (10_000.0, -10_000.0, 10_000.0, 10_
 
 
 @pytest.mark.parametrize("rates", [*map(tuple, SWEEP.tolist()), *HEAVIEST], ids=lambda r: f"to {r[3]:.0f}")
+@pytest.mark.slow
 def test_step_rates_are_within_100_ppm_and_no_step_is_late(bench: Bench, rates: tuple[float, ...]) -> None:
     bench.get_ready()
     rate = Rate(rates)  # type: ignore[arg-type]
@@ -115,6 +116,7 @@ def test_host_that_does_not_wait_loses_answers_but_gets_none_broken(bench: Bench
     assert len(answers) + counters.dropped_answers == 100
 
 
+@pytest.mark.slow
 def test_rates_that_cross_over_at_more_than_the_allowed_total_delay_no_step(bench: Bench) -> None:
     bench.get_ready()
     one_fast, three_fast = (20_000.0, -6_600.0, 6_600.0, -6_600.0), (0.0, 13_300.0, -13_300.0, 13_300.0)
@@ -198,6 +200,7 @@ def test_until_homed_only_slow_short_jogs_move(bench: Bench) -> None:
     assert bench.ask(Jog(ORIGIN))[0] is Result.STATE
 
 
+@pytest.mark.slow
 def test_jogs_together_lead_no_further_than_their_limit_until_the_drives_have_let_go(bench: Bench) -> None:
     bench.do(Limits(jog=300))
     bench.do(bench.enable)

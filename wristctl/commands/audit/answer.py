@@ -165,7 +165,7 @@ def _ranking(claims: Sequence[Judgement], loops: Sequence[str]) -> list[str]:
     return [
         *sentences,
         f"Its ranking ({', '.join(name.upper() for name in order)}) cannot be tested: it gives no equations of "
-        f"{_and(named)}; with designs of ours, and P1 and P2 exchanged, it holds {_on(holds, loops)}.",
+        f"{_and(named)}; with our designs, and P1 and P2 exchanged, it holds {_on(holds, loops)}.",
     ]
 
 
@@ -173,7 +173,7 @@ def _softened(claims: Sequence[Judgement]) -> list[str]:
     """Whether springs that lost stiffness add as much error as the experiment has, by the heaviest claim of that."""
     found = [j for j in claims if j.claim.stiffness_scale < 1.0 and j.claim.weight and j.claim.value]
     return [
-        f"Springs of {_percent(j.claim.stiffness_scale)} of the stiffness (our number) add the experiment's "
+        f"Springs of {_percent(j.claim.stiffness_scale)} stiffness (our number) add "
         f"{degrees(float(j.claim.value or 0.0))} deg {_places(j.found)}."
         for j in found[:1]
     ]
