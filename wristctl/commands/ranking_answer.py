@@ -192,7 +192,7 @@ def ranking_table(rankings: Sequence[Ranking], names: Mapping[str, str]) -> Tabl
             f"{len(ranking.standing.unusable)} of {len(ranking.labels)}",
         )
         rows.append((begin, best, others, following, open_loop, end))
-    title = "RMSE [deg]; as good: paired tests do not tell so many others from the best; times: over the best"
+    title = "RMSE [deg]; as good: number of others not told from the best by paired tests; times: over the best"
     return Table(title, heads, rows)
 
 

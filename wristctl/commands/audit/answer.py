@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 
 from wristctl.commands.answer import LINES, Answer
 from wristctl.commands.printed_table import Table, degrees
+from wristctl.commands.ranking_answer import capital
 from wristctl.config.loop import LOOPS
 
 if TYPE_CHECKING:
@@ -147,8 +148,8 @@ def _ranking(claims: Sequence[Judgement], loops: Sequence[str]) -> list[str]:
     pairs = []
     for gains, wording in (("printed", "with the paper's gains"), ("exchanged", "with P1 and P2 exchanged")):
         one = _one(j for j in claims if _is_order(j.claim, f"smc/{gains}", "pid/printed"))
-        pairs += [f"{wording} {_places(one.found)}"] if one else []
-    sentences = [f"SMC has a smaller RMSE than PID: {'; '.join(pairs)}."] if pairs else []
+        pairs += [f"{_places(one.found)} {wording}"] if one else []
+    sentences = [f"SMC has a smaller RMSE than PID {'; '.join(pairs)}."] if pairs else []
     order = sorted(T2, key=lambda name: T2[name].rmse)
     links = [_one(j for j in claims if _is_order(j.claim, f"{a}/", f"{b}/")) for a, b in pairwise(order)]
     tried = [link for link in links if link is not None]
@@ -164,7 +165,7 @@ def _ranking(claims: Sequence[Judgement], loops: Sequence[str]) -> list[str]:
     ]
     return [
         *sentences,
-        f"Its ranking ({', '.join(name.upper() for name in order)}) cannot be tested: it gives no equations of "
+        f"The paper's ranking ({', '.join(name.upper() for name in order)}) cannot be tested without equations of "
         f"{_and(named)}; with our designs, and P1 and P2 exchanged, it holds {_on(holds, loops)}.",
     ]
 
@@ -173,8 +174,8 @@ def _softened(claims: Sequence[Judgement]) -> list[str]:
     """Whether springs that lost stiffness add as much error as the experiment has, by the heaviest claim of that."""
     found = [j for j in claims if j.claim.stiffness_scale < 1.0 and j.claim.weight and j.claim.value]
     return [
-        f"Springs of {_percent(j.claim.stiffness_scale)} stiffness (our number) add "
-        f"{degrees(float(j.claim.value or 0.0))} deg {_places(j.found)}."
+        f"{capital(_places(j.found))} springs of {_percent(j.claim.stiffness_scale)} stiffness (ours) add the "
+        f"paper's {degrees(float(j.claim.value or 0.0))} deg."
         for j in found[:1]
     ]
 

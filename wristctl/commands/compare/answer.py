@@ -158,7 +158,7 @@ def papers(rankings: Sequence[Ranking]) -> str:
     labels = list(dict.fromkeys(label for ranking in rankings for label in ranking.labels))
     sentences = [
         f"{label}{explained} {_outcomes(rankings, label)}"
-        for gains, explained in ((PRINTED, ""), ("exchanged", " (P1 and P2)"))
+        for gains, explained in ((PRINTED, ""), ("exchanged", " (P1, P2)"))
         for label in labels
         if label.endswith(f"/{gains}")
     ]
@@ -182,12 +182,13 @@ def _outcomes(rankings: Sequence[Ranking], label: str) -> str:
         else:
             group, groups = ranking.standing.group(row), ranking.standing.groups
             better = sum(map(len, groups[: group - 1])) if group else 0
-            place = f" (place {better + 1} of {sum(map(len, groups))})" if group else ""
+            shared = ", shared" * (group is not None and len(groups[group - 1]) > 1)
+            place = f" (place {better + 1}/{sum(map(len, groups))}{shared})" if group else ""
             works.append(f"{error(ranking, row)} deg in {condition(ranking)}{place}")
     verbs = joined(list(bad), "or")
     if not works:
         return f"{verbs} in every condition" if len(rankings) > 1 else verbs
-    return f"{joined(works)}{f', else {verbs}' if bad else ''}"
+    return f"{joined(works)}{f', elsewhere {verbs}' if bad else ''}"
 
 
 def papers_order(rankings: Sequence[Ranking]) -> str:
