@@ -27,7 +27,8 @@ run: .venv/run
 test: lint
 	$(BIN)/pytest -n auto --maxprocesses 4 -m "not slow"
 
-# Tests of a second of processor time or more: whole commands, killed processes, the emulated rig.
+# Tests of half a second of processor time or more, or with a loop of their own to compile: whole commands, two planes,
+# killed processes, the emulated rig.
 test-slow: .venv/dev
 	$(BIN)/pytest -n auto --maxprocesses 4 -m slow
 

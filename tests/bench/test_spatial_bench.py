@@ -40,6 +40,8 @@ from wristctl.wrist.spatial.spatial_segments import spatial_values
 from wristctl.wrist.spatial.spatial_statics import spatial_energy, spatial_equilibrium
 from wristctl.wrist.tendon_layout import TendonLayout
 
+pytestmark = pytest.mark.slow
+
 WRIST, SECOND = WristParameters(), Markers(base=2, tip=3)
 SLIDING = StepperActuator(friction=0.0)
 BEND = (-110, -110, 130, 130)
@@ -79,7 +81,6 @@ def values_of(wrist: WristParameters, settings: BenchSettings) -> np.ndarray:
         WristParameters(stiffness_axis_deg=30.0, flexion_ratio=2.0),
     ],
 )
-@pytest.mark.slow
 def test_at_rest_it_stands_where_statics_put_it_under_the_same_pulls(wrist: WristParameters) -> None:
     settings = BenchSettings(motors=TAUT, actuator=SLIDING, plant=WeakenedPlant(payload=0.05))
     host = hosted(wrist, actuator=SLIDING, plant=settings.plant)
@@ -211,7 +212,6 @@ def test_a_step_of_a_millisecond_is_fine_enough() -> None:
 
 
 @pytest.mark.parametrize(("damping", "share"), [(0.105, 1e-3), (1e-4, 0.02)])
-@pytest.mark.slow
 def test_energy_goes_to_damping_alone(damping: float, share: float) -> None:
     """Of the wrist and its stretched tendons on held spools, without friction; of one that hardly damps at last too."""
     wrist, settings = WristParameters(damping=damping), BenchSettings(motors=TAUT, actuator=SLIDING)
@@ -236,7 +236,6 @@ def test_the_same_seed_gives_the_same_bytes_however_often_one_looks() -> None:
     assert courses[0] == courses[1]
 
 
-@pytest.mark.slow
 def test_load_cells_show_the_pulls() -> None:
     host, cells = hosted(load_cells=CELLS), Kept()
     host.reel((-100, 60, 40, 200))
@@ -262,7 +261,6 @@ def test_what_it_does_not_have_is_refused(settings: dict[str, Any], key: str) ->
     assert refused.value.where == key and refused.value.exit_code == 2
 
 
-@pytest.mark.slow
 def test_a_bench_in_one_plane_loads_no_kernel_of_two() -> None:
     code = (
         "import sys\n"
@@ -288,7 +286,6 @@ def looked(host: Host, seconds: float) -> list[list[Any]]:
     return frames
 
 
-@pytest.mark.slow
 def test_each_camera_tells_the_true_bend_of_its_plane() -> None:
     host = hosted()
     rig = host.bench._rig
@@ -309,7 +306,6 @@ def test_each_camera_tells_the_true_bend_of_its_plane() -> None:
     assert min(map(len, off)) > 40 and np.degrees(np.abs(np.concatenate(off)).max()) < 0.3
 
 
-@pytest.mark.slow
 def test_cameras_run_by_clocks_of_their_own() -> None:
     second = RenderedCamera(frame_rate=50.0, phase=0.4, delay_frames=1.0, dropped=0.0)
     host = hosted(camera=RenderedCamera(dropped=0.3), camera_2=second)
@@ -324,7 +320,6 @@ def test_cameras_run_by_clocks_of_their_own() -> None:
 
 
 @pytest.mark.parametrize("camera", [1, 2])
-@pytest.mark.slow
 def test_a_fault_of_one_camera_leaves_the_other_as_it_is(camera: Literal[1, 2]) -> None:
     faults = (InjectedFault(kind="frames-dropped", at=0.0, since="power-on", camera=camera),)
     dropped, seen = sorted(looked(hosted(faults=faults), 0.3), key=len)

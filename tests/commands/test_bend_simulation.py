@@ -21,6 +21,8 @@ from wristctl.simulation.bend_loops import bends_of, planes_of
 from wristctl.simulation.two_planes import bend_path
 from wristctl.wrist.spatial.spatial_kinematics import exact_bend, spatial_tips
 
+pytestmark = pytest.mark.slow
+
 # The kernel that tests of the loop in two planes compile.
 LOOP = ("simulate.controller=pid-ff", "simulate.gains=default", "simulate.loop.coupling=ignored", "simulate.horizon=1")
 

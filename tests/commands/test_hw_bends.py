@@ -26,6 +26,8 @@ from wristctl.records import Run, start_run
 from wristctl.simulation.bend_course import BEND_METRICS
 from wristctl.wrist.directions import ACTIVE
 
+pytestmark = pytest.mark.slow
+
 SETTINGS = (
     "hw-run={reference: {kind: dart-thrower, angle_deg: 8.0, turn: 1.0}, horizon: 1.2, back: 0.4, rest: 0.1, "
     "push: {force: 1.0, start: 0.6, duration: 0.2}, push_toward_deg: 130, "
@@ -53,7 +55,6 @@ def whole(tmp_path_factory: pytest.TempPathFactory) -> Whole:
     return Whole(result, Run(live.path))
 
 
-@pytest.mark.slow
 def test_a_row_has_errors_by_plane_estimated_and_true(whole: Whole) -> None:
     table, columns = whole.run.data("trials"), columns_of(whole.run, "data/trials.csv")
     assert sorted(table["push"]) == [0.0, 1.0] and set(table["direction"]) == {"dart-thrower"}

@@ -25,6 +25,8 @@ from wristctl.records.open_log import write_log
 from wristctl.wrist.spatial.spatial_model import spatial_terms
 from wristctl.wrist.spatial.spatial_segments import ellipse, spatial_values
 
+pytestmark = pytest.mark.slow
+
 
 @given(st.floats(0.1, 2.0), st.floats(0.3, 3.0), st.floats(-180.0, 180.0))
 def test_springs_are_the_same_by_their_axis_and_by_the_numbers_of_the_search(
@@ -43,7 +45,6 @@ def test_springs_are_the_same_by_their_axis_and_by_the_numbers_of_the_search(
     assert other == pytest.approx(one, rel=1e-9, abs=1e-12)
 
 
-@pytest.mark.slow
 def test_a_wrist_on_held_spools_comes_to_rest_where_its_tendons_hold_springs_and_weight() -> None:
     wrist = KNOWN.model_copy(update={"flexion_ratio": 1.3, "stiffness_axis_deg": 25.0, "gravity_flexion": 3.0})
     sliding = TENDONS.model_copy(update={"friction": 0.0})

@@ -24,6 +24,8 @@ from wristctl.identification.lack_of_fit import (
     widened,
 )
 
+pytestmark = pytest.mark.slow
+
 Found = tuple[Fit, Knowledge, list[Suspicion], dict[str, float]]
 
 
@@ -39,7 +41,6 @@ def sound() -> Found:
     return found(flexion_ratio=1.15, sheath_friction=0.1)
 
 
-@pytest.mark.slow
 def test_a_sound_fit_is_not_refused_and_planes_and_sheaths_are_found(sound: Found) -> None:
     fitted, known, suspected, truth = sound
     assert {each.cause for each in suspected} == set(CAUSES) and not any(each.evident for each in suspected)
@@ -58,7 +59,6 @@ def test_a_sound_fit_is_not_refused_and_planes_and_sheaths_are_found(sound: Foun
         ({"facts": TendonFacts(creep=0.1)}, "tendons that creep", 10.0),
     ],
 )
-@pytest.mark.slow
 def test_a_cause_is_named_first_and_its_size_estimated(more: dict[str, Any], cause: str, size: float) -> None:
     fitted, known, suspected, _ = found(more)
     first = suspected[0]
@@ -135,7 +135,6 @@ def test_noise_of_frames_does_not_count_moves_trends_and_what_lasts() -> None:
     assert frame_noise(quick) < 1.5e-3
 
 
-@pytest.mark.slow
 def test_residuals_that_are_alike_do_not_pass_for_evidence(sound: Found) -> None:
     """A slow error of the camera that no cause makes is not taken for one: its covariance is the sandwich's."""
     fitted, stays = sound[0], 0.97

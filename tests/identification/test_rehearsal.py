@@ -21,6 +21,8 @@ from wristctl.simulation.actuator import motor_of
 from wristctl.simulation.reference import toward
 from wristctl.wrist.directions import in_plane
 
+pytestmark = pytest.mark.slow
+
 SOFT = LEVEL.model_copy(update={"stiffness": 0.4, "gravity": (-3.0, 5.0), "gravity_flexion": -2.0})
 TRUE = RehearsedTruth(SOFT, TENDONS, delay=0.02, noise_deg=0.0, exposure=0.0, dropped=0.0)
 MOVES: tuple[tuple[DirectionName, Reference], ...] = (("radial", STEPS), ("flexion", STEPS))

@@ -67,7 +67,6 @@ def compared(elsewhere: Elsewhere) -> tuple[Run, str]:
     return elsewhere.run("compare", "study.yaml", "--tuned", "latest:tune", "--all")
 
 
-@pytest.mark.slow
 def test_newcomers_are_tuned_and_compared_like_those_of_the_house(compared: tuple[Run, str]) -> None:
     run, said = compared
     table = run.data("comparison")
@@ -79,7 +78,6 @@ def test_newcomers_are_tuned_and_compared_like_those_of_the_house(compared: tupl
     assert {each.name: each.unit for each in output.columns}["jerk"] == "rad/s^3"
 
 
-@pytest.mark.slow
 def test_a_metric_from_elsewhere_is_what_gains_were_tuned_for(elsewhere: Elsewhere, compared: tuple[Run, str]) -> None:
     """With a weight on jerk alone the objective is that weight times jerk's decades beside feedforward."""
     alone = "objective={rmse: 0, steady_state: 0, oscillation: 0, chattering: 0, worst: 0, swinging: 0, jerk: %s}"
@@ -124,6 +122,8 @@ from io import StringIO
 import elsewhere.tables
 from wristctl.cli.app import main
 
+pytestmark = pytest.mark.slow
+
 ended = []
 for arguments in json.loads(sys.argv[1]):
     sys.argv[1:] = arguments
@@ -136,7 +136,6 @@ print(json.dumps(ended))
 """
 
 
-@pytest.mark.slow
 def test_errors_know_the_newcomers(elsewhere: Elsewhere) -> None:
     typed = json.dumps([arguments for arguments, _ in ERRORS])
     done = elsewhere.python("-c", ONE_BY_ONE, typed)
@@ -144,7 +143,6 @@ def test_errors_know_the_newcomers(elsewhere: Elsewhere) -> None:
         assert code == 2 and told in err and not out, arguments
 
 
-@pytest.mark.slow
 def test_a_dry_run_prints_their_names_units_and_defaults(elsewhere: Elsewhere) -> None:
     said = elsewhere("simulate", "--dry-run", "--all", "--set", "reference={kind: sweep, end_frequency: 3}").stdout
     kind, model = (next(line for line in said.splitlines() if f" {key}:" in line) for key in ("kind", "model"))
@@ -156,7 +154,6 @@ def test_a_dry_run_prints_their_names_units_and_defaults(elsewhere: Elsewhere) -
     assert f"optimiser: pso  # ask/tell optimiser (or file.py:NAME): {listed}" in tuned
 
 
-@pytest.mark.slow
 def test_the_shell_completes_them(elsewhere: Elsewhere) -> None:
     typed = {"COMP_WORDS": "wristctl simulate --controller lqr", "COMP_CWORD": "3"}
     done = elsewhere(_WRISTCTL_COMPLETE="complete_bash", **typed)

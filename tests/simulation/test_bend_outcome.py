@@ -12,6 +12,8 @@ from wristctl.simulation.rollout import How
 from wristctl.simulation.two_planes import bend_path, rollout_bends
 from wristctl.simulation.worlds import World
 
+pytestmark = pytest.mark.slow
+
 LAW = controller("pid-ff")
 PATH = bend_path("circumduction", 30.0, 1.0, 1.5)
 # Of the first the tendons are too weak, the third bends beyond its range, the others share a world.

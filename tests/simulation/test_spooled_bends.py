@@ -16,6 +16,8 @@ from wristctl.simulation.two_planes import rollout_bends, simulate_two_planes
 from wristctl.simulation.worlds import World
 from wristctl.wrist.directions import in_plane
 
+pytestmark = pytest.mark.slow
+
 LAW = controller("pid-ff")
 GAINS = np.array(gains_of(LAW, "hardware"))
 WRIST = WristParameters()
@@ -47,7 +49,6 @@ def line() -> Array:
 
 
 @pytest.mark.parametrize("side", [0, 1])
-@pytest.mark.slow
 def test_camera_motors_and_rubbing_tendons_are_those_of_one_plane(side: int) -> None:
     path = np.zeros((2, 3, len(TIME)))
     path[side] = line()
@@ -75,7 +76,6 @@ def test_a_path_turned_by_a_right_angle_leaves_the_same_errors_behind_a_camera()
     assert aside.bend[:, 0] == pytest.approx(-plain.bend[:, 1], abs=1e-7)
 
 
-@pytest.mark.slow
 def test_lanes_are_what_each_is_alone_and_noise_is_each_ones_own() -> None:
     path, loop = circumduction(TIME[:100], np.deg2rad(20.0), 1.0), real(sensor={"level": "camera"})
     streams = [(3, k) for k in range(3)]

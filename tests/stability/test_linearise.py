@@ -24,6 +24,8 @@ from wristctl.stability.sampled_loop import SampledLoop
 from wristctl.stability.smooth_loop import cycle_of, smooth
 from wristctl.wrist.statics import least_stiffness
 
+pytestmark = pytest.mark.slow
+
 WRIST = WristParameters()
 FINE = Loop(plant_segments=1, control_period=1e-5)
 BEHIND = Loop(control_period=5e-3, actuator=LAGGED, sensor=CAMERA)

@@ -19,6 +19,8 @@ from wristctl.trial.spatial_steering import SpatialSteering
 from wristctl.trial.steering import REMEMBERED
 from wristctl.wrist.tendon_layout import TendonLayout
 
+pytestmark = pytest.mark.slow
+
 WRIST, PERIOD = WristParameters(stiffness_axis_deg=30.0, flexion_ratio=1.4), 1e-2
 ACTUATOR, SENSOR = Actuator(level="tendon"), Sensor(level="camera")
 PATHS = SpatialPaths(belief_of(WRIST, ACTUATOR))

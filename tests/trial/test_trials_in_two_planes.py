@@ -28,6 +28,8 @@ from wristctl.trial.testbeds import EmulatedTestbed
 from wristctl.trial.tracking import Tracking
 from wristctl.trial.trials import Trial, back, motion_of, motions_of, trials_of
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture(scope="module")
 def round_trip(tmp_path_factory: pytest.TempPathFactory) -> Done:
@@ -43,7 +45,6 @@ def cut(tmp_path_factory: pytest.TempPathFactory) -> Done:
     return performed(tmp_path_factory.mktemp("cut"), bench=bench)
 
 
-@pytest.mark.slow
 def test_the_true_wrist_goes_round_within_half_a_degree_in_both_planes(round_trip: Done) -> None:
     assert round_trip.error is None and round_trip.experiment.outcomes == {0: "ok"}
     assert round_trip.experiment.odd == {0: ""}
@@ -52,7 +53,6 @@ def test_the_true_wrist_goes_round_within_half_a_degree_in_both_planes(round_tri
     assert np.degrees(log[[f"bend_{p}" for p in PLANES]].abs().max()).min() > 10.0, "in both planes"
 
 
-@pytest.mark.slow
 def test_a_fast_trial_and_its_simulation_agree(tmp_path: Path) -> None:
     """Spools of both move with the reference, neither ahead of it: 120 deg/s at most, ticks of 10 ms."""
     thrown: dict[str, Any] = {
@@ -114,14 +114,12 @@ def test_a_rows_metrics_are_those_of_its_log_by_the_formulas_of_simulation(round
     assert all(map(math.isnan, short.values()))
 
 
-@pytest.mark.slow
 def test_the_same_seed_gives_the_same_bytes(round_trip: Done, tmp_path: Path) -> None:
     again = performed(tmp_path)
     for file in round_trip.folder.iterdir():
         assert (again.folder / file.name).read_bytes() == file.read_bytes(), file.name
 
 
-@pytest.mark.slow
 def test_a_lost_tendon_stops_the_motors_and_is_named_by_where_the_wrist_goes(cut: Done) -> None:
     assert isinstance(cut.error, SafetyStop)
     stop = cut.experiment.stop
@@ -152,7 +150,6 @@ def test_norms_of_both_planes_are_what_is_limited(round_trip: Done) -> None:
         np.testing.assert_allclose(of_trial[name].to_numpy(), norm, rtol=1e-9)
 
 
-@pytest.mark.slow
 def test_a_push_from_the_side_is_held_and_stops_nothing(tmp_path: Path) -> None:
     push = {"force": 2.0, "start": 0.5, "duration": 0.3}
     done = performed(tmp_path, push=push, push_toward_deg=130.0, without_push=False)
@@ -161,7 +158,6 @@ def test_a_push_from_the_side_is_held_and_stops_nothing(tmp_path: Path) -> None:
     assert (rmse(errors) < 0.5).all() and 0.3 < np.hypot(*errors.T).max() < 2.0
 
 
-@pytest.mark.slow
 def test_a_diagonal_direction_bends_alike_in_both_planes(tmp_path: Path) -> None:
     move = {"kind": "minimum-jerk", "angle_deg": 10.0, "duration": 0.5}
     done = performed(tmp_path, planes=2, reference=move, directions=("radial-flexion",), horizon=0.9)
@@ -201,7 +197,6 @@ def test_directions_are_shuffled_together_where_nobody_turns_the_wrist() -> None
     assert {trial.plane for trial in trials[:8]} >= {"", "ulnar", "flexion"}
 
 
-@pytest.mark.slow
 def test_one_set_up_serves_trials_in_all_directions(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     begun: list[object] = []
     tracking = EmulatedTestbed.tracking

@@ -138,6 +138,8 @@ def check_controller(
     from wristctl.commands.law_certificate import LawCheck, certificate
 
     checks: list[LawCheck] = []
+    if not as_json:
+        say("compiling the controller and trying it: half a minute the first time")
     with asking(partial(asked_to_trust, trust_code)):
         for check in certificate(placed(law, None), load_study(config or ()).controller_settings, not no_board):
             checks.append(check)

@@ -58,8 +58,8 @@ class DataSettings(Section):
 _PRINTED = {"optimiser": "adam", "standardise": False, "weight_decay": 0.01}
 
 # T1's columns (momentum read as beta1; coupled decay and raw inputs, of which T1 says nothing, C11), and a network
-# that is accurate: small, smooth, scaled, trained by second order; experiments/recommended_selection.yaml chose its
-# layers.
+# that is accurate: small, smooth, scaled, trained by second order; experiments/accurate_network_selection.yaml chose
+# its layers.
 PRESETS: dict[str, dict[str, Any]] = {
     "t1-sigmoid": {"activation": "sigmoid", "beta1": 0.90, "learning_rate": 0.003, **_PRINTED},
     "t1-relu": {"activation": "relu", "beta1": 0.95, "learning_rate": 0.001, **_PRINTED},
