@@ -66,7 +66,8 @@ def _on_other_rigs(study: Study, result: Recommended) -> dict[str, Any]:
     expected = [math.degrees(value) for value in spread(result.ranking.rows[row].rmse)]
     share = float(result.ranking.standing.lost[row].times) / result.ranking.count
     return {
-        "use": best.label, "lost": int(lost.sum()), "said_lost": share, "swing_deg": own.largest_swing(open_loop),
+        "use": best.label, "lost": int(lost.sum()), "said_lost": share,
+        "swing_deg": math.degrees(own.largest_swing(open_loop)),
         "expected_deg": expected, "median_deg": math.degrees(float(np.median(world_scores(own, RIGS)))),
     }  # fmt: skip
 

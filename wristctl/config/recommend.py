@@ -70,7 +70,7 @@ class RecommendSettings(Section):
     validation: int = choice(
         20, "other rigs to choose by, among the best gains and the scaled presets", ge=2, le=10_000
     )
-    tests: int = choice(40, "further rigs, which no search has seen, to test on", ge=8, le=10_000)
+    tests: int = choice(200, "further rigs, which no search has seen, to test on", ge=8, le=10_000)
     candidates: int = choice(12, "candidates per iteration of each search", ge=4, le=10_000)
     iterations: int = choice(6, "iterations of each search", ge=1, le=100_000)
     frequencies: tuple[Annotated[float, Field(gt=0)], ...] = quantity(

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import chain
 from typing import TYPE_CHECKING, NamedTuple
 
 from wristctl.commands.answer import Answer
@@ -21,6 +22,8 @@ if TYPE_CHECKING:
 
 # File with what is recommended, for `simulate` and `hw-run`.
 RECOMMENDED = "data/recommended.yaml"
+# Factor on the least error up to which a controller is taken that is lost on fewer rigs.
+NEAR = 1.25
 # Angle of the sines by which it is found how fast a motion may be, where the tendons reach it [deg].
 _SINE_DEG = 20.0
 
@@ -77,13 +80,20 @@ class Recommended(StudyResult):
 
     @property
     def best_row(self) -> int | None:
-        """Its number among the candidates and the ranking's rows.
+        """Its number among the candidates and the ranking's rows; None where feedforward alone errs least.
 
-        Of those that no test tells apart, the one that is lost on the fewest rigs, with the fewest gains.
+        Of those that err at most a quarter more than the least, and are not shown to err more than feedforward, the one
+        that is lost on the fewest rigs; of these the one that no test tells from the least, with the fewest gains.
         """
-        standing = self.ranking.standing
-        alike = [row for row in standing.groups[0] if self.candidates[row].gains] if standing.groups else []
-        return min(alike, key=lambda row: (standing.lost[row].times, len(self.candidates[row].gains)), default=None)
+        standing, errors = self.ranking.standing, [mean.value for mean in self.ranking.means]
+        if not any(self.candidates[row].gains for row in chain(*standing.groups[:1])):
+            return None
+        open_loop = standing.group(len(self.candidates) - 1) or len(standing.groups)
+        sound = [row for row in chain(*standing.groups[:open_loop]) if self.candidates[row].gains]
+        near = [row for row in sound if errors[row] <= NEAR * min(errors[other] for other in sound)]
+        return min(
+            near, key=lambda row: (standing.lost[row].times, standing.group(row), len(self.candidates[row].gains))
+        )
 
     @property
     def why_none(self) -> str:
@@ -132,9 +142,14 @@ def _sentence(result: Recommended) -> str:
     )
     if lost := _lost(ranked, row):
         sentence += f" It {lost} of {ranked.count} rigs."
-    alike = [result.candidates[other].label for other in ranked.standing.groups[0] if other != row]
+    first = ranked.standing.groups[0]
+    others = joined([result.candidates[other].label for other in first if other != row])
+    if row not in first:
+        least = ranked.means[row].value / ranked.means[first[0]].value
+        be = "are" if len(first) > 1 else "is"
+        return f"{sentence} {others} would err up to {two(least)} times less, and {be} lost on more rigs."
     why = "it is the one that is lost on the fewest rigs, with the fewest gains"
-    return f"{sentence} No test tells {joined(alike)} from it: {why}." if alike else sentence
+    return f"{sentence} No test tells {others} from it: {why}." if others else sentence
 
 
 def _gain(candidate: Candidate, name: str) -> str:
