@@ -110,7 +110,9 @@ _painted_tests = pytest.fixture(autouse=True)(_paint)
 def pytest_configure(config: pytest.Config) -> None:
     """Markers of this suite."""
     config.addinivalue_line("markers", "painted: pictures of runs are painted, not blank")
-    config.addinivalue_line("markers", "slow: half a second of processor time or more, or a loop of its own to compile (make test-slow)")
+    config.addinivalue_line(
+        "markers", "slow: half a second of processor time or more, or a loop of its own to compile (make test-slow)"
+    )
 
 
 @pytest.fixture

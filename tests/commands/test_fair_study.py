@@ -201,7 +201,7 @@ def test_only_another_seed_makes_a_second_study_of_the_same_question(
         (tmp_path / name / "config.yaml").write_text(text)
         return Run(tmp_path / name)
 
-    _, section = script.second_of(run, copied("again", ("seed: 3", "seed: 4"), ("RMSE alone:", "another:")))
+    _, _, section = script.second_of(run, copied("again", ("seed: 3", "seed: 4"), ("RMSE alone:", "another:")))
     assert "## Asked twice" in section and any(line.startswith("- **rig**: in both") for line in section)
     for other in (run, copied("longer", ("seed: 3", "seed: 4"), ("horizon: 1.0", "horizon: 2.0"))):
         with pytest.raises(SystemExit, match="differ in their seed"):

@@ -13,6 +13,8 @@ import pytest
 
 from wristctl.records import Run
 
+pytestmark = pytest.mark.slow
+
 ROOT, HERE = Path(__file__).parents[2], Path(__file__).parent
 STUDY = """\
 tune:
@@ -121,9 +123,6 @@ from contextlib import redirect_stderr, redirect_stdout
 from io import StringIO
 import elsewhere.tables
 from wristctl.cli.app import main
-
-pytestmark = pytest.mark.slow
-
 ended = []
 for arguments in json.loads(sys.argv[1]):
     sys.argv[1:] = arguments
