@@ -62,11 +62,16 @@ def _on_other_rigs(study: Study, result: Recommended) -> dict[str, Any]:
         measure(controller(name), np.array([list(controller(name).values(gains))]), cases, study.wrist, METRICS)
         for name, gains in ((best.controller, best.gains), (YARDSTICK, {}))
     )
-    lost = (own.failed | own.swings_beside(open_loop)).reshape(RIGS, -1).any(axis=1)
+    faults = {
+        "fails": own.failed, "swings": own.limit_cycles | own.swings_in_motion(open_loop),
+        "chatters": own.chatter > 0.0, "has not converged": own.unconverged,
+    }  # fmt: skip
+    on = {name: int(where.reshape(RIGS, -1).any(axis=1).sum()) for name, where in faults.items()}
+    lost = np.logical_or.reduce(list(faults.values())).reshape(RIGS, -1).any(axis=1)
     expected = [math.degrees(value) for value in spread(result.ranking.rows[row].rmse)]
     share = float(result.ranking.standing.lost[row].times) / result.ranking.count
     return {
-        "use": best.label, "lost": int(lost.sum()), "said_lost": share,
+        "use": best.label, "lost": int(lost.sum()), "faults": on, "said_lost": share,
         "swing_deg": math.degrees(own.largest_swing(open_loop)),
         "expected_deg": expected, "median_deg": math.degrees(float(np.median(world_scores(own, RIGS)))),
     }  # fmt: skip
@@ -82,9 +87,10 @@ def main() -> None:
             print(f"{wrist}: {found['refused']}", flush=True)
             continue
         low, _, high = found["expected_deg"]
+        why = "".join(f", {name} on {count}" for name, count in found["faults"].items() if count)
         counted.append((found["lost"] == 0, low <= found["median_deg"] <= high))
         print(
-            f"{wrist}, to {found['reach_deg']:.0f} deg: {found['use']}, lost {found['lost']} of {RIGS} "
+            f"{wrist}, to {found['reach_deg']:.0f} deg: {found['use']}, lost {found['lost']} of {RIGS}{why} "
             f"(said: {100.0 * found['said_lost']:.0f} %), {found['median_deg']:.2f} deg of {low:.2f} to {high:.2f}",
             flush=True,
         )
