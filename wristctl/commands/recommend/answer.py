@@ -80,20 +80,24 @@ class Recommended(StudyResult):
 
     @property
     def best_row(self) -> int | None:
-        """Its number among the candidates and the ranking's rows; None where feedforward alone errs least.
+        """Its number among the candidates and the ranking's rows; None where no feedback is in the first group.
 
-        Of those that err at most a quarter more than the least, and are not shown to err more than feedforward, the one
-        that is lost on the fewest rigs; of these the one that no test tells from the least, with the fewest gains.
+        Of `near`, the one that is lost on the fewest rigs; of these one of the first group, with the fewest gains.
         """
-        standing, errors = self.ranking.standing, [mean.value for mean in self.ranking.means]
+        standing = self.ranking.standing
         if not any(self.candidates[row].gains for row in chain(*standing.groups[:1])):
             return None
+        return min(
+            self.near, key=lambda row: (standing.lost[row].times, standing.group(row), len(self.candidates[row].gains))
+        )
+
+    @property
+    def near(self) -> list[int]:
+        """Rows with feedback that err at most a quarter more than the least of them, none more than feedforward."""
+        standing, errors = self.ranking.standing, [mean.value for mean in self.ranking.means]
         open_loop = standing.group(len(self.candidates) - 1) or len(standing.groups)
         sound = [row for row in chain(*standing.groups[:open_loop]) if self.candidates[row].gains]
-        near = [row for row in sound if errors[row] <= NEAR * min(errors[other] for other in sound)]
-        return min(
-            near, key=lambda row: (standing.lost[row].times, standing.group(row), len(self.candidates[row].gains))
-        )
+        return [row for row in sound if errors[row] <= NEAR * min(errors[other] for other in sound)]
 
     @property
     def why_none(self) -> str:
@@ -143,13 +147,14 @@ def _sentence(result: Recommended) -> str:
     if lost := _lost(ranked, row):
         sentence += f" It {lost} of {ranked.count} rigs."
     first = ranked.standing.groups[0]
-    others = joined([result.candidates[other].label for other in first if other != row])
-    if row not in first:
-        least = ranked.means[row].value / ranked.means[first[0]].value
-        be = "are" if len(first) > 1 else "is"
-        return f"{sentence} {others} would err up to {two(least)} times less, and {be} lost on more rigs."
-    why = "it is the one that is lost on the fewest rigs, with the fewest gains"
-    return f"{sentence} No test tells {others} from it: {why}." if others else sentence
+    if row in first:
+        others = joined([result.candidates[other].label for other in first if other != row])
+        why = "with feedback, and at most a quarter more error, it is lost on the fewest rigs, with the fewest gains"
+        return f"{sentence} No test tells {others} from it: {why}." if others else sentence
+    lesser = [other for other in first if other in result.near]
+    least = ranked.means[row].value / min(ranked.means[other].value for other in lesser)
+    others, be = joined([result.candidates[other].label for other in lesser]), "are" if lesser[1:] else "is"
+    return f"{sentence} {others} would err up to {two(least)} times less, and {be} lost on more rigs."
 
 
 def _gain(candidate: Candidate, name: str) -> str:
