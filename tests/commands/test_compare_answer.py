@@ -218,7 +218,7 @@ def test_a_place_counts_what_is_better_and_not_what_is_tied() -> None:
     said = told(rig)
     assert re.search(r"smc/printed [\d.]+ deg in motors \+ camera \(place 3/4\)\.", said)
     first = told(stands(rmse={"smc/printed": 1e-3, "b/default": 1e-3, "c/default": 0.1}))
-    assert "(place 1/3, shared)" in first
+    assert "(place 1/3, tied)" in first
 
 
 def test_the_papers_ranking_holds_where_it_does() -> None:

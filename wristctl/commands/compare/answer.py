@@ -182,8 +182,8 @@ def _outcomes(rankings: Sequence[Ranking], label: str) -> str:
         else:
             group, groups = ranking.standing.group(row), ranking.standing.groups
             better = sum(map(len, groups[: group - 1])) if group else 0
-            shared = ", shared" * (group is not None and len(groups[group - 1]) > 1)
-            place = f" (place {better + 1}/{sum(map(len, groups))}{shared})" if group else ""
+            tied = ", tied" * (group is not None and len(groups[group - 1]) > 1)
+            place = f" (place {better + 1}/{sum(map(len, groups))}{tied})" if group else ""
             works.append(f"{error(ranking, row)} deg in {condition(ranking)}{place}")
     verbs = joined(list(bad), "or")
     if not works:
