@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from wristctl.arrays import Array
-from wristctl.identification.arc_fit import ArcFit, fit_arcs, ratio_of, score_of
+from wristctl.identification.arc_fit import ArcFit, by_blocks, fit_arcs, ratio_of, score_of
 from wristctl.identification.arc_robot import ArcRecording, ArcRobot, window_means
 from wristctl.identification.model_choice import chosen_of, tried_models
 from wristctl.identification.real_robots import TEE_PROBE
@@ -44,6 +44,28 @@ def made(
 
 TRUE = {"gain": 1.05, "tendon": 6.0, "turn": 0.8}
 SLACK = (4e-4, -3e-4, 6e-4)
+
+
+def _rooted(slopes: Array) -> tuple[Array, Array]:
+    """Slopes by coordinates of unit variance, and the root that makes the unknowns of these."""
+    precise, axes = np.linalg.eigh(slopes.T @ slopes)
+    root: Array = axes / np.sqrt(precise)
+    return slopes @ root, root
+
+
+def test_scores_of_blocks_have_the_covariance_of_independent_errors_though_the_fit_makes_residuals_smaller() -> None:
+    """Residuals of independent errors of unit variance have the covariance 1 - H, which is its own root."""
+    slopes, root = _rooted(np.random.default_rng(0).normal(size=(60, 4)))
+    blocks = np.repeat(np.arange(6), (4, 16, 10, 10, 5, 15))
+    left = np.eye(60) - slopes @ slopes.T
+    each = np.array([by_blocks(slopes, column, blocks, root)[0] for column in left])
+    np.testing.assert_allclose(np.einsum("ibp,ibq->pq", each, each), np.eye(4), atol=1e-9)
+
+
+def test_a_mean_of_alike_blocks_has_one_degree_of_freedom_less_than_blocks() -> None:
+    slopes, root = _rooted(np.ones((60, 1)))
+    _, freedom = by_blocks(slopes, np.zeros(60), np.arange(60) // 5, root)
+    assert freedom == pytest.approx([11.0])
 
 
 def _lag(tendon: float) -> float:

@@ -18,10 +18,7 @@ RIGS = int(os.environ.get("WRISTCTL_INNER_RIGS", "100" if THOROUGH else "1"))
 @pytest.mark.parametrize("way", WAYS if THOROUGH else ["arcs"])
 @pytest.mark.slow
 def test_friction_inside_and_slack_are_found_where_they_are_and_intervals_hold(way: str, present: bool) -> None:
-    """Of 100 rigs at least 90 are judged rightly; of each parameter that is told 80 % of the intervals hold or more.
-
-    Those of an open log are narrower than 95 %: of 27 rigs damping was held in 23 and inner friction in 24.
-    """
+    """Of 100 rigs at least 90 are judged rightly; of each parameter that is told 90 % of the intervals hold or more."""
     results = [counted(way, number, present) for number in range(RIGS)]
     assert sum(one.inner == present for one in results) >= 0.9 * RIGS
     assert sum(one.slack == present for one in results) >= 0.9 * RIGS
@@ -32,4 +29,4 @@ def test_friction_inside_and_slack_are_found_where_they_are_and_intervals_hold(w
             held[name] += low <= true <= high and math.isfinite(low + high)
     assert held.total() >= 0.6 * every.total()
     if THOROUGH:
-        assert all(held[name] >= 0.8 * every[name] for name in every), held
+        assert all(held[name] >= 0.9 * every[name] for name in every), held

@@ -72,12 +72,21 @@ def test_without_tensions_or_masses_nothing_in_newton_metres_is_looked_for() -> 
 def test_of_many_trials_whole_ones_are_predicted_and_of_few_parts() -> None:
     robot = robot_of_logs([planar()], WRIST, 0.01)
     few, many = (recordings_of_logs([planar(trials=n)], robot) for n in (2, 4))
-    assert [bool(one.fitted.all()) for one in many] == [True, False, True, False]
-    assert [bool(one.asked.all()) for one in many] == [False, True, False, True]
+    assert [bool(one.fitted.all()) for one in many] == [True, False, False, True]
+    assert [bool(one.asked.all()) for one in many] == [False, True, True, False]
     for one in few:
         assert 0.4 < one.fitted.mean() < 0.6 and (one.fitted ^ one.asked).all()
     blocks = [set(one.block.tolist()) for one in few]
     assert not blocks[0] & blocks[1] and len(blocks[1]) >= 8
+
+
+@pytest.mark.parametrize("parts", [2, 4])
+def test_a_motion_that_comes_back_after_some_parts_is_fitted_and_predicted_at_every_phase(parts: int) -> None:
+    robot = robot_of_logs([planar()], WRIST, 0.01)
+    (one,) = recordings_of_logs([planar()], robot)
+    for phase in range(parts):
+        there = one.block % parts == phase
+        assert one.fitted[there].any() and one.asked[there].any()
 
 
 def test_tendons_are_those_of_the_square_wrist_of_the_study_or_evenly_around() -> None:

@@ -15,6 +15,7 @@ from scipy.stats import t as student
 
 from wristctl.arrays import Array
 from wristctl.identification.arc_robot import SLACK_ERROR, ArcRecording, ArcRobot, Term
+from wristctl.identification.intervals import NORMAL_95
 
 _DRAWS, _SEED = 4000, 0
 _ZERO_SCALE = {"bend": 0.02, "tip": 2e-3}
@@ -24,6 +25,8 @@ _ZERO_RANGE, _SLACK_RANGE, _STEP = 1.0, 1.5e-2, 1e-4
 _ERROR, _TENSION_ERROR = {"bend": math.radians(1.0), "tip": 2e-3}, 0.5
 # Where samples are weighed: searches, and the least of these errors over that.
 _SEARCHES, _LEAST_ERROR = 3, 1e-3
+# Share of a block's error in a direction that the fit leaves at least.
+_LEAST_LEFT = 1e-6
 
 
 class Score(NamedTuple):
@@ -120,26 +123,28 @@ class ArcFit:
 
     @cached_property
     def told(self) -> dict[str, Told]:
-        """The unknowns with intervals, by blocks of what was fitted: errors of neighbouring samples are alike."""
+        """The unknowns with intervals, by blocks of what was fitted: errors of neighbouring samples are alike.
+
+        The covariance and Student's degrees of freedom are those of Bell and McCaffrey (Survey Methodology 28 (2002)
+        169): of few blocks the fit itself makes the errors smaller.
+        """
         problem = _Problem(self.robot, self.terms, self.recordings, self.weights)
         jacobian, residual = problem.jacobian(self.x) * problem.scale, problem.residuals(self.x[None])[0]
         blocks = problem.blocks()
         measured, beforehand = jacobian[: len(blocks)], jacobian[len(blocks) :]
         residual = residual[: len(blocks)]
-        scores = np.zeros((blocks.max() + 1, len(self.x)))
-        np.add.at(scores, blocks, residual[:, None] * measured)
-        normal = jacobian.T @ jacobian
-        inverse = np.linalg.inv(normal + 1e-12 * normal.diagonal().max() * np.eye(len(normal)))
-        count = len(scores)
-        meat = scores.T @ scores * count / max(1, count - 1) + beforehand.T @ beforehand
-        by_blocks = (inverse @ meat @ inverse).diagonal()
-        alone = inverse.diagonal() * float(np.mean(residual**2))  # wide where residuals depend on no such change
-        variance = np.maximum(by_blocks, alone)
-        quantile = float(student.ppf(0.975, max(1, count - 1)))
+        precise, directions = np.linalg.eigh(jacobian.T @ jacobian)
+        root = directions / np.sqrt(np.maximum(precise, 1e-12 * precise[-1]))
+        scores, freedom = by_blocks(measured @ root, residual, blocks, root)
+        quantile = student.ppf(0.975, freedom)
+        blockwise = quantile * np.linalg.norm(root @ scores.T, axis=1)
+        assumed = NORMAL_95 * np.linalg.norm(root @ root.T @ beforehand.T, axis=1)
+        alone = quantile * np.linalg.norm(root, axis=1) * math.sqrt(float(np.mean(residual**2)))
+        halves = problem.scale * np.maximum(np.hypot(blockwise, assumed), alone)  # where residuals show no such change
         told = {}
         for k, (name, unknown) in enumerate(self.robot.unknowns(self.terms).items()):
-            value, half = float(self.x[k]), quantile * problem.scale[k] * math.sqrt(max(0.0, float(variance[k])))
-            low, high = value - float(half), value + float(half)
+            value, half = float(self.x[k]), float(halves[k])
+            low, high = value - half, value + half
             at_end = min(value - unknown.low, unknown.high - value) < 1e-2 * unknown.scale
             wide = half > max(abs(value), 3.0 * unknown.scale)
             ends = (max(low, unknown.low), high)
@@ -147,6 +152,29 @@ class ArcFit:
                 ends = (-math.inf, math.inf)
             told[name] = Told(value, ends[0], ends[1], unknown.unit, unknown.meaning)
         return told
+
+
+def by_blocks(slopes: Array, residual: Array, blocks: NDArray[np.int64], root: Array) -> tuple[Array, Array]:
+    """Scores of each block (blocks, P) as if it were not fitted, and Student's degrees of freedom of each unknown (P,).
+
+    Slopes (R, P) are by coordinates of unit variance, of which `root` (P, P) makes the unknowns. With X and r the
+    slopes and residuals of a block its scores are X' (1 - X X')^(-1/2) r, from the eigenvectors of X' X; the degrees of
+    freedom are Satterthwaite's of independent errors.
+    """
+    count, numbers = int(blocks.max()) + 1, slopes.shape[1]
+    scores, alone, shared = np.zeros((count, numbers)), np.zeros((count, numbers)), np.zeros((numbers, count, numbers))
+    for block in range(count):
+        some = slopes[blocks == block]
+        leverage, axes = np.linalg.eigh(some.T @ some)
+        left = np.clip(1.0 - leverage, _LEAST_LEFT, 1.0)
+        scores[block] = (axes / np.sqrt(left)) @ (axes.T @ (some.T @ residual[blocks == block]))
+        by_axes = root @ axes
+        alone[block] = by_axes**2 @ (leverage / left)
+        shared[:, block] = (by_axes * leverage / np.sqrt(left)) @ axes.T
+    covariance = np.einsum("ck,cd->kcd", alone, np.eye(count)) - shared @ shared.transpose(0, 2, 1)
+    squares = np.sum(covariance**2, axis=(1, 2)) + 1e-300
+    freedom: Array = np.trace(covariance, axis1=1, axis2=2) ** 2 / squares
+    return scores, np.maximum(freedom, 1.0)
 
 
 def score_of(fits: Sequence[ArcFit]) -> Score:

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
 from wristctl.arrays import Array
 from wristctl.config.wrist import WristParameters
@@ -22,7 +23,7 @@ from wristctl.wrist.tendon_layout import TendonLayout
 _MOST, _SHORTEST, _FEWEST, _BLOCKS = 800, 5e-3, 20, 8
 # Time between two samples of a log without times [s]; nothing that depends on time is found of it.
 _NO_TIME = 1.0
-# Trials from which whole ones are predicted; of fewer every second part of each.
+# Trials from which whole ones are predicted; of fewer parts of each.
 _WHOLE = 4
 # Correlation with the motion from which a spool goes with it.
 _GOES_WITH = 0.5
@@ -185,7 +186,10 @@ def _has_tensions(log: OpenLog, numbers: Sequence[int]) -> bool:
 
 
 def recordings_of_logs(logs: Sequence[OpenLog], robot: ArcRobot) -> list[ArcRecording]:
-    """Trials of logs at even steps. Of four or more every second one is predicted, of fewer every second part of each.
+    """Trials of logs at even steps. Of four or more half are predicted, of fewer half of the parts of each.
+
+    Which are follows Thue and Morse's sequence: where every second one was, a motion that comes back would be fitted at
+    some of its phases and predicted at others.
 
     Raises UserError for a trial with too few samples.
     """
@@ -199,10 +203,16 @@ def recordings_of_logs(logs: Sequence[OpenLog], robot: ArcRobot) -> list[ArcReco
     for k, recording in enumerate(recordings):
         count = len(recording.time)
         block = np.arange(count) * _BLOCKS * (1 if whole else 2) // count
-        fitted = np.full(count, k % 2 == 0) if whole else block % 2 == 0
+        fitted = _is_fitted(np.full(count, k) if whole else block)
         block, first = first + block, first + int(block.max()) + 1
         recordings[k] = replace(recording, fitted=fitted, asked=~fitted, block=block)
     return recordings
+
+
+def _is_fitted(numbers: NDArray[np.int64]) -> NDArray[np.bool_]:
+    """Whether the numbers' binary ones are even."""
+    even: NDArray[np.bool_] = np.bitwise_count(numbers) % 2 == 0
+    return even
 
 
 def everything_fitted(recordings: Sequence[ArcRecording]) -> list[ArcRecording]:
