@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass
 from typing import Any
 
@@ -25,7 +26,7 @@ _AT_EQUAL_ERROR = (
 _OF_C_IN_TWO_PLANES = {4: 0.75, 1: 0.65}
 """Share of the plain C loop's rate, by segments."""
 _OF_HELD_PULLS = 0.88
-_MUJOCO_IN_TWO_PLANES = 80.0
+_PEERS_IN_TWO_PLANES = {"MuJoCo": 80.0, "soromox": 400.0}
 _IN_TWO_PLANES = {(4, 64): 1200.0, (1, 64): 5800.0, (4, 1): 150.0, (1, 1): 1000.0}
 """Rates by segments and lanes on one core of a machine whose planar C loop of four segments does `_PLANAR`."""
 _PLANAR = 8500.0
@@ -78,7 +79,7 @@ def _ran(result: Result, peer: str, n: int) -> bool:
 
 
 def in_two_planes(result: Result, planar: Result) -> list[Claim]:
-    """Shares of the plain C loop and of held pulls, times MuJoCo, and rates in proportion to planar C; on one core."""
+    """Shares of the plain C loop and of held pulls, times peers, and rates in proportion to planar C; on one core."""
     claims = []
     counts, lanes = result.axis("segments"), max(result.axis("lanes"))
     for n, least in _OF_C_IN_TWO_PLANES.items():
@@ -92,11 +93,11 @@ def in_two_planes(result: Result, planar: Result) -> list[Claim]:
         wanted = f"two planes, n = {n}, {lanes} lanes: elastic tendons at {100.0 * _OF_HELD_PULLS:.0f} % of held pulls"
         measured = f"{100.0 / held[0]:.0f} %" if held else "-"
         claims.append(Claim(wanted, measured, 1.0 / held[0] >= _OF_HELD_PULLS if held else None))
-    for n in counts:
-        found = result.ratio("MuJoCo", n, 1, lanes)
-        wanted = f"two planes, n = {n}, {lanes} lanes: {_MUJOCO_IN_TWO_PLANES:g} times MuJoCo at equal or smaller error"
+    for (peer, least), n in itertools.product(_PEERS_IN_TWO_PLANES.items(), counts):
+        found = result.ratio(peer, n, 1, lanes)
+        wanted = f"two planes, n = {n}, {lanes} lanes: {least:g} times {peer} at equal or smaller error"
         measured = f"{found[0]:,.3g} times {found[1]}" if found else "-"
-        claims.append(Claim(wanted, measured, found[0] >= _MUJOCO_IN_TWO_PLANES if found else None))
+        claims.append(Claim(wanted, measured, found[0] >= least if found else None))
     pace = _planar_pace(planar)
     for (n, lanes), least in _IN_TWO_PLANES.items():
         rate = result.own_rate(n, 1, lanes) if n in counts else None

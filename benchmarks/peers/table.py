@@ -78,6 +78,11 @@ BEND_SIDES = (
         "the same wrist pulled by elastic tendons that motors reel in", fine={1: 16, 4: 16},
     ),
     Side("C, 8 lanes", "C", "c_bends", None, width=8),
+    Side(
+        "soromox", "soromox", "soromox_bends", "soromox",
+        "easier: no tendons; mass spread along the rod; RODAS3, Jacobian by differentiation", fine={1: 8, 4: 8},
+        most_steps=2,
+    ),
     *_mujoco_chains(UNIVERSAL, "mujoco_bends", "mujoco_bends_rk4"),
 )  # fmt: skip
 """Of the wrist that bends in two planes."""
