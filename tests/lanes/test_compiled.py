@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import ast
+import fcntl
 import importlib.util
+import os
 import subprocess
 import sys
 import warnings
@@ -98,6 +100,58 @@ def test_copies_of_the_package_share_their_kernels_and_other_sources_do_not(
 def test_files_outside_the_package_share_nothing(kernels: Path, tmp_path: Path) -> None:
     """What they read from files beside them is not in their text."""
     assert [found(doubling(tmp_path / name)) for name in ("first", "second", "first")] == [0, 0, 1]
+
+
+ONE_OF_SEVERAL = """
+import sys
+import doubling
+from wristctl.lanes.compiled import kernel
+made = kernel(doubling.doubled)
+print("ready", flush=True)
+sys.stdin.readline()
+made(1.0)
+print(sum(made.stats.cache_hits.values()), sum(made.stats.cache_misses.values()))
+"""
+# Long enough to compile that the other has begun before it ends.
+LONG = "def doubled(x):\n" + "".join(f"    for k{n} in range({n}):\n        x = x * 2.0 - k{n}\n" for n in range(60))
+
+
+def test_of_processes_that_need_the_same_at_once_one_compiles_and_the_others_take_it(tmp_path: Path) -> None:
+    (tmp_path / "doubling.py").write_text(LONG + "    return x\n")
+    own = {**os.environ, "WRISTCTL_KERNELS": str(tmp_path / "kernels"), "PYTHONPATH": str(PACKAGE.parent)}
+    command = [sys.executable, "-c", ONE_OF_SEVERAL]
+    several = [
+        subprocess.Popen(command, cwd=tmp_path, env=own, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+        for _ in range(3)
+    ]
+    for each in several:
+        assert each.stdout is not None and each.stdout.readline() == "ready\n"
+    for each in several:
+        assert each.stdin is not None
+        each.stdin.write("go\n")
+        each.stdin.flush()
+    assert sorted(each.communicate(timeout=100)[0].split() for each in several) == [["0", "1"], ["1", "0"], ["1", "0"]]
+
+
+def test_a_process_that_never_ends_compiling_is_not_waited_for(
+    kernels: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert found(doubling(tmp_path)) == 0
+    (lock,) = kernels.glob("*/doubled.*.lock")
+    monkeypatch.setattr(module, "_PATIENCE", 0.2)
+    with lock.open("a") as other:
+        fcntl.flock(other, fcntl.LOCK_EX)
+        assert found(doubling(tmp_path)) == 1
+
+
+def test_what_does_not_compile_leaves_no_lock_behind(kernels: Path, tmp_path: Path) -> None:
+    made = doubling(tmp_path)
+    for _ in range(2):
+        with pytest.raises(numba.TypingError):
+            made("word")
+    (lock,) = kernels.glob("*/doubled.*.lock")
+    with lock.open("a") as other:
+        fcntl.flock(other, fcntl.LOCK_EX | fcntl.LOCK_NB)
 
 
 def test_where_nothing_can_be_written_nothing_is_kept(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

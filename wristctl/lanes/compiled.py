@@ -5,6 +5,7 @@ folder's name holds a hash of the file and of all files that it imports, theirs 
 Where the package lies is no part of it: checkouts, copies and installed packages of the same sources share a cache.
 """
 
+import fcntl
 import hashlib
 import os
 import pickle
@@ -15,6 +16,7 @@ import tempfile
 import time
 import warnings
 from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from functools import cache, partial
 from pathlib import Path
 from types import CodeType, FunctionType, ModuleType
@@ -136,6 +138,8 @@ F = TypeVar("F", bound=Callable[..., Any])
 TRIED = "0.68"
 
 _KEPT_DAYS = 30.0
+# Longest wait [s] for another process that compiles the same, and pause between two looks at its lock.
+_PATIENCE, _PAUSE = 120.0, 0.05
 _OPTIONS: dict[str, Any] = {"error_model": "numpy", "nogil": True, "forceinline": True}
 # Options of functions that compiled code alone calls: a way in from Python would be compiled and never used.
 _INNER: dict[str, Any] = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
@@ -235,11 +239,47 @@ class _Locator(UserProvidedCacheLocator):
         self._py_file, self._lineno, self._cache_path = code.co_filename, code.co_firstlineno, str(folder)
 
 
-def keep(dispatcher: Any, function: Callable[..., Any], *extra_sources: Path, frozen: bytes = b"") -> None:
+def keep(dispatcher: Any, function: Callable[..., Any], *extra_sources: Path, frozen: bytes = b"") -> Path | None:
     """Have what numba makes of a function, a dispatcher or a C function, kept in the folder of its sources."""
     folder = cache_folder(Path(function.__code__.co_filename), *extra_sources, frozen=frozen)
     if folder is not None:
         dispatcher._cache = _Kept(function, folder)
+    return folder
+
+
+class _Kernel(CPUDispatcher):
+    """A function that Python calls: of processes that need it at once one compiles, the others take what it kept."""
+
+    kept: Path | None
+    """Folder of what is compiled, or None."""
+
+    def compile(self, sig: Any) -> Any:
+        signature = hashlib.sha256(str(sig).encode()).hexdigest()[:16]
+        with _alone(self.kept and self.kept / f"{self.py_func.__qualname__}.{signature}.lock"):
+            return super().compile(sig)
+
+
+@contextmanager
+def _alone(file: Path | None) -> Iterator[None]:
+    """Hold a lock file; without it where it cannot be written, or where another process holds it for too long."""
+    try:
+        lock = file.open("a") if file else None
+    except OSError:
+        lock = None
+    if lock is None:
+        yield
+        return
+    with lock:
+        last = time.monotonic() + _PATIENCE
+        while time.monotonic() < last:
+            try:
+                fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                break
+            except BlockingIOError:
+                time.sleep(_PAUSE)
+            except OSError:
+                break
+        yield
 
 
 class _Inner(CPUDispatcher):
@@ -303,5 +343,6 @@ def kernel(function: F, *extra_sources: Path) -> F:
     `extra_sources` are files beside the function's own that decide what it does, where it does not import them.
     """
     dispatcher = numba.njit(**_OPTIONS)(function)
-    keep(dispatcher, function, *extra_sources)
+    dispatcher.__class__ = _Kernel
+    dispatcher.kept = keep(dispatcher, function, *extra_sources)
     return cast(F, dispatcher)
