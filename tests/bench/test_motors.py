@@ -171,14 +171,40 @@ def test_tendons_4_and_5_bend_toward_ulnar_and_1_and_2_the_other_way() -> None:
     assert bent(Pins(), 2, 3).truth().angle[-1] > 0.03 and bent(Pins(), 0, 1).truth().angle[-1] < -0.03
 
 
-def test_turned_to_the_other_plane_it_is_straight_and_other_tendons_bend_it() -> None:
+def test_turned_to_the_other_plane_it_stays_bent_as_it_was_and_its_tendons_pull_as_they_did() -> None:
+    pins = Pins()
+    pins.steps(60, 2)
+    before = bent(pins, 2, 3).truth()
+    pins.wrist.face("flexion")
+    turned = pins.after(401).truth()
+    np.testing.assert_allclose(turned.pull[-1], before.pull[-1], atol=0.3)
+    assert abs(turned.across[-1]) == pytest.approx(before.angle[-1], rel=0.02)
+    assert abs(turned.angle[-1]) == pytest.approx(abs(before.across[-1]), rel=0.02)
+    pins.wrist.face("extension")
+    assert pins.after(402).truth().angle[-1] == pytest.approx(turned.angle[-1], rel=0.02), "the same plane"
+    pins.wrist.face("radial")
+    back = pins.after(403).truth()
+    assert back.angle[-1] == pytest.approx(before.angle[-1], rel=0.04)
+    assert back.across[-1] == pytest.approx(before.across[-1], rel=0.04)
+
+
+def test_what_friction_inside_holds_bent_it_holds_when_turned_to_the_other_plane() -> None:
+    pins = Pins(plant=WeakenedPlant(inner_friction=0.05), slack=(2e-3, 2e-3, 0.0, 2e-3))
+    pins.steps(200, 2)
+    pins.after(500)
+    pins.steps(200, 2, begin=500 * MS, back=True)
+    before = pins.after(1500).truth()
+    assert before.pull[-1].max() == 0.0 and np.degrees(np.abs(before.across[-1])) > 1.0
+    pins.wrist.face("flexion")
+    turned = pins.after(2500).truth()
+    for now, then in ((turned.across, before.angle), (turned.angle, before.across)):
+        assert abs(now[-1]) == pytest.approx(abs(then[-1]), rel=0.05)
+
+
+def test_turned_to_the_other_plane_other_tendons_bend_it() -> None:
     pins = Pins()
     pins.wrist.face("flexion")
     assert bent(pins, 1, 3).truth().angle[-1] > 0.03
-    pins.wrist.face("extension")
-    assert pins.after(401).truth().angle[-1] > 0.03, "the same plane"
-    pins.wrist.face("radial")
-    assert abs(pins.after(402).truth().angle[-1]) < 0.01
 
 
 def test_a_tendon_alone_swings_the_wrist_as_much_across_the_plane_as_in_it_at_every_moment() -> None:

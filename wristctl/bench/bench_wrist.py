@@ -96,7 +96,7 @@ class BenchWrist:
         return self._load.plane
 
     def face(self, direction: str) -> None:
-        """Bend in this direction's plane from here on; where that is another plane, straight and at rest at first.
+        """Bend in this direction's plane from here on; where that is another plane, at rest at first as it is bent.
 
         In two planes nothing changes.
         """

@@ -17,6 +17,7 @@ from wristctl.seeds import Entropy
 from wristctl.simulation.disturbances import acting, acting_in_space
 from wristctl.simulation.nonideal import inner_of, nonideal_of, of_tendons, unmoved
 from wristctl.simulation.worlds import drawn, facing, plant_of
+from wristctl.wrist.dahl import NoInnerFriction
 from wristctl.wrist.directions import ACTIVE, DIRECTIONS, away_of, tendons_of
 from wristctl.wrist.out_of_plane import across_of
 from wristctl.wrist.plant import kernel_of
@@ -34,7 +35,7 @@ class Load(Protocol):
     """Name of +y in the plane that it bends in; None: it bends in two."""
 
     def face(self, direction: str, spools: SpoolState) -> None:
-        """Bend in this direction's plane from here on; where that is another plane, straight and at rest at first."""
+        """Bend in this direction's plane from here on; where that is another plane, at rest at first as it is bent."""
 
     def follow(
         self, spools: SpoolState, stepper: Stepper, acting: tuple[Disturbances, Array], edges: Edges, first: int,
@@ -75,10 +76,14 @@ class PlanarLoad:
         self._face("ulnar", spools)
 
     def face(self, direction: str, spools: SpoolState) -> None:
-        """Bend in this direction's plane from here on; where that is another plane, straight and at rest at first."""
-        if DIRECTIONS[direction].plane != self.plane:
-            self._state[:] = 0.0
-            self._face(direction, spools)
+        """As `Load.face`: the bend in the plane is across the other, the bend across is in it; so are bristles."""
+        if DIRECTIONS[direction].plane == self.plane:
+            return
+        bent, _, bristle = self._away * spools.bent
+        beside = float(self.bend(self._state[: self.coordinates]))
+        inner = 0.0 if isinstance(self._inner, NoInnerFriction) else self._inner.state[: self.coordinates].mean()
+        self._face(direction, spools, bent, bristle)
+        spools.bent[:] = self._away * beside, 0.0, self._away * inner
 
     def follow(
         self, spools: SpoolState, stepper: Stepper, acting: tuple[Disturbances, Array], edges: Edges, first: int,
@@ -107,21 +112,25 @@ class PlanarLoad:
         """How far the last disc turns between two places (2, q) [rad]."""
         return abs(float(np.diff(self.bend(ends))[0]))
 
-    def _face(self, direction: str, spools: SpoolState) -> None:
+    def _face(self, direction: str, spools: SpoolState, bent: float = 0.0, bristle: float = 0.0) -> None:
+        """Rest in a plane at a bend [rad], with so much of inner friction's bristles."""
         n = self.coordinates
+        coordinates = np.full(n, bent) / self.bend(np.ones(n))
+        self._state[:] = np.append(coordinates, np.zeros(n))
         self.plane = DIRECTIONS[direction].plane
         plant = plant_of(*facing(self._wrist, self._drawn, direction))
         across = next(across for across in DIRECTIONS.values() if across.plane != self.plane)
         beside = plant_of(*facing(self._wrist, self._drawn, across.name))
-        self._across = across_of(beside, away_of(self.plane, self._positive))
-        spools.bent[:] = 0.0
+        away = away_of(self.plane, self._positive)
+        self._across, self._away = across_of(beside, away), away[-1]
         self._values = self._model.values(plant, self._settings.segments)
         self._sides = np.array([ACTIVE.index(tendon) for tendon in tendons_of(self.plane)])
         axes = self._sides[[0, 2, 1, 3]]  # as they are given: both sides' first, both sides' second
         tendon_states = of_tendons(self._tendons, AXES)[np.argsort(self._axes)][axes]
-        self._tendons = unmoved(spools.reeled[axes], np.zeros(3), np.zeros(AXES), self._state[:n])
+        path = np.append(plant.length - self._model.taut(plant, coordinates), np.abs(coordinates).sum())
+        self._tendons = unmoved(spools.reeled[axes], path, np.zeros(AXES), coordinates)
         of_tendons(self._tendons, AXES)[:] = tendon_states
-        self._inner = inner_of([self._drawn], self._state[None, :n], np.zeros(1), lambda rows: rows[0])
+        self._inner = inner_of([self._drawn], coordinates[None], np.array([bristle]), lambda rows: rows[0])
         self._axes = axes
 
 
