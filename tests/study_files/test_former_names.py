@@ -126,8 +126,8 @@ def test_a_preset_of_ones_own_may_have_the_former_name() -> None:
     gains = {"stepper": {"Kp": 1.0}, "hardware": {"Kp": 2.0}}
     own = Controller("own", lambda *now: 0.0, "", {"Kp": Gain("", "", 0.1, 10.0)}, gains)
     assert (gains_of(own, "stepper"), gains_of(own, "hardware")) == ((1.0,), (2.0,))
-    with pytest.raises(UserError, match="unknown gains 'stepper' of gvsc"):
-        gains_of(controller("gvsc"), "stepper")
+    with pytest.raises(UserError, match="unknown gains 'stepper' of computed-torque"):
+        gains_of(controller("computed-torque"), "stepper")
 
 
 def test_a_run_of_former_names_comes_out_as_it_was(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from wristctl.control.law import Conditions, Controller, Gain
+from wristctl.control.law import BY_TRIAL, Conditions, Controller, Gain
 from wristctl.lanes.compiled import compiled
 from wristctl.lanes.functions import bessel
 from wristctl.lanes.lane import dot, planar, turn, zero_like
@@ -105,7 +105,7 @@ GVSC = Controller(
         "Kp": Gain("N m/rad", "proportional gain", 1e-2, 1e4),
         "Kd": Gain("N m s/rad", "derivative gain", 1e-4, 1e2),
     },
-    presets={"default": {"Kp": 10.0, "Kd": 0.3}},
-    notes={"default": "our design; chosen by trial on the four-segment plant at 1 kHz"},
-    conditions={"default": Conditions((5e-3, 1e-2), (8e3, 1e5))},
+    presets={"default": {"Kp": 10.0, "Kd": 0.3}, "hardware": {"Kp": 6.0, "Kd": 0.1}},
+    notes={"default": "our design; chosen by trial on the four-segment plant at 1 kHz", "hardware": BY_TRIAL},
+    conditions={"hardware": Conditions((5e-3, 1e-2), (8e3, 1e5))},
 )

@@ -93,7 +93,7 @@ NN_MRAC = Controller(
     presets={
         "published": {"w": 2.236, "zeta": 0.67, "eta": 10.0, "Kd": 0.1},
         "default": {"w": 50.0, "zeta": 1.0, "eta": 100.0, "Kd": 0.3},
-        "hardware": {"w": 150.0, "zeta": 1.0, "eta": 20.0, "Kd": 0.6},
+        "hardware": {"w": 150.0, "zeta": 1.0, "eta": 20.0, "Kd": 0.3},
     },
     memory=_MODEL + 3,
     notes={
