@@ -197,7 +197,8 @@ class ExpectedMoves:
         problem = (
             f"tendons pull against each other: the slackened wrist bent by {math.degrees(bend.askew):.1f} deg when one "
             f"side was let out; likely tendon {ACTIVE[pulls]} (axis {pulls}) and one opposite are shorter than the "
-            "motors' positions say: steps that nobody counted, a knot, or zero positions that are wrong"
+            "motors' positions say: steps that nobody counted, a knot, or zero positions that are wrong; or a marker "
+            "has slipped"
         )
         fix = "see tendons, motor cables and their shields, then calibrate the wrist again"
         return SafetyStop(problem, "homing", fix)
