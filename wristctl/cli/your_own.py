@@ -138,10 +138,10 @@ def check_controller(
     from wristctl.commands.law_certificate import LawCheck, certificate
 
     checks: list[LawCheck] = []
-    if not as_json:
-        say("compiling the controller and trying it: half a minute the first time")
     with asking(partial(asked_to_trust, trust_code)):
         for check in certificate(placed(law, None), load_study(config or ()).controller_settings, not no_board):
+            if not checks and not as_json:  # it is there, and a controller
+                say("compiling the controller and trying it: half a minute the first time")
             checks.append(check)
             if not as_json:
                 say(f"{_VERDICTS[check.passed]:<6}{check.asked + ':':<23} {check.found}")
