@@ -51,6 +51,8 @@ def certificate(name: str, laws: Mapping[str, Mapping[str, float]], on_board: bo
     for origin in foreign:
         for file, digest in origin.files.items():
             yield LawCheck("source", None, f"{file.relative_to(origin.root)} sha256 {digest}")
+    if not foreign:
+        yield LawCheck("source", None, "wristctl's own")
     tried = vet(law, name)
     states = f"{len(tried.torques)} random states"
     yield LawCheck("finite", True, f"torques of {np.ptp(tried.torques):.3g} N m from least to largest, {states}")
