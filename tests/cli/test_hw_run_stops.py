@@ -188,7 +188,7 @@ def interrupted_at(moment: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(place, name, interrupting)
 
 
-@pytest.mark.parametrize("moment", ["homing", "between trials", *["drawing"] * THOROUGH])
+@pytest.mark.parametrize("moment", ["homing", "between trials", "drawing"])
 @pytest.mark.slow
 def test_ctrl_c_stops_the_motors_and_seals_the_run(hw_run: HwRun, monkeypatch: pytest.MonkeyPatch, moment: str) -> None:
     interrupted_at(moment, monkeypatch)

@@ -80,9 +80,8 @@ def check_cocontraction(
     expected, spools, homing = moves_of(settings, wrist, plane), spools_of(settings.actuator), settings.homing
     slack = round(homing.pull / spools.step)
     slacken(board, spools, homing, zero.signs)
-    patience = Patience(board)
-    patience.wait(_SETTLES)
-    held = patience.reading(tracking, 4 * homing.frames)
+    rest_of(board, tracking, expected, homing)
+    held = Patience(board).reading(tracking, 4 * homing.frames)
     patience = _reeled(board, zero, np.where(on_plus_side(plane or "ulnar"), -3 * slack, -slack))
     patience.wait(_SETTLES)
     bend = expected.bend(held, patience.reading(tracking, 4 * homing.frames))
