@@ -198,7 +198,7 @@ def test_what_friction_inside_holds_bent_it_holds_when_turned_to_the_other_plane
     pins.wrist.face("flexion")
     turned = pins.after(2500).truth()
     for now, then in ((turned.across, before.angle), (turned.angle, before.across)):
-        assert abs(now[-1]) == pytest.approx(abs(then[-1]), rel=0.05)
+        assert abs(now[-1]) == pytest.approx(abs(then[-1]), rel=5e-3)  # without its bristles it gives way by 4 %
 
 
 def test_turned_to_the_other_plane_other_tendons_bend_it() -> None:
