@@ -249,6 +249,7 @@ def test_a_sweep_of_what_is_not_there_says_so_before_anything_is_written(tmp_pat
 def test_a_controller_without_the_defaults_preset_is_swept_with_its_own(tmp_path: Path) -> None:
     """Of two that are swept one has gains `hardware`; the other's are as when it is simulated alone."""
     swept = wristctl.simulate(wristctl.load_study(None, "sweep=['simulate.controller=ct-dob,computed-torque']"))
-    alone = wristctl.simulate(wristctl.load_study(None, "simulate.controller=computed-torque", "simulate.gains=default"))
+    chosen = ("simulate.controller=computed-torque", "simulate.gains=default")
+    alone = wristctl.simulate(wristctl.load_study(None, *chosen))
     rows = swept.frame().set_index("simulate.controller")
     assert rows.loc["computed-torque", "rmse"] == pytest.approx(alone.metrics["rmse"], rel=1e-12)
