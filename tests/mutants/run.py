@@ -1,8 +1,10 @@
 """Are small wrong changes noticed? `make mutants`, or `python -m tests.mutants.run [--seed K] [--count N]`.
 
 One change at a time is made to a copy of the package, and the tests run that should notice it, the nearest first,
-until one fails. Without a seed the changes are those of known.yaml, with one they are drawn. The table says which test
-noticed each; exit code 1 if fewer than 90 % of the drawn ones, or not all of the known ones, were noticed.
+until one fails: of drawn ones those that run the line (reach.py), before whole rooms. A test that fails without the
+change too has noticed nothing. Without a seed the changes are those of known.yaml, with one they are drawn. The table
+says which test noticed each; exit code 1 if fewer than 90 % of the drawn ones, or not all of the known ones, were
+noticed.
 """
 
 from __future__ import annotations
@@ -17,18 +19,23 @@ import tempfile
 import time
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 import yaml
 
 from tests.mutants.draw import COUNT, drawn, entry
+from tests.mutants.reach import Reach, measured
 
 ROOT = Path(__file__).parents[2]
 KNOWN = Path(__file__).with_name("known.yaml")
 LEAST = 0.9
 """Share of drawn changes that must be noticed."""
-LIMIT = 100
+LIMIT = 300
 """Seconds after which one test is taken to hang: that is noticed too."""
+_HANGS = " hangs"
+_NONE_CHOSEN = 5
+"""pytest's exit code where a folder has no quick test, or no slow one."""
 
 NEIGHBOURS = {
     "arrays": ["tests/wrist"],
@@ -102,79 +109,90 @@ def from_seed(seed: int, count: int) -> list[Mutant]:
     return [Mutant(**each) for each in listed]
 
 
-def stages(mutant: Mutant) -> list[list[str]]:
-    """Tests to run one after the other: those named, those of the file's name, the package's, its neighbours'."""
+def stages(mutant: Mutant, reach: Reach | None = None) -> list[list[str]]:
+    """What pytest is given, one after the other: the tests that run the line, then the room's quick and slow ones.
+
+    Where tests are named, those alone. Quick tests that do not run a line of Python cannot notice that it is changed.
+    """
     if mutant.tests:
         return [list(mutant.tests)]
     parts = Path(mutant.file).with_suffix("").parts
     neighbours = NEIGHBOURS.get(parts[0], ["tests/test_python_face.py"])
-    own = sorted(str(each.relative_to(ROOT)) for each in (ROOT / "tests").rglob(f"test_{parts[-1]}*.py"))
-    found: list[list[str]] = [[each for each in own if each.split("/")[1] in (parts[0], *parts[1:-1])]]
-    found += [[each] for each in neighbours if (ROOT / each).exists()]
-    return [each for each in found if each]
+    named = sorted(str(each.relative_to(ROOT)) for each in (ROOT / "tests").rglob(f"test_{parts[-1]}*.py"))
+    rooms = [[each for each in named if each.split("/")[1] in (parts[0], *parts[1:-1])]]
+    rooms += [[each] for each in neighbours if (ROOT / each).exists()]
+    rooms = [each for each in rooms if each]
+    running = reach.tests(mutant.file, line(mutant)) if reach else []
+    quick = [running] if running else [["-m", "not slow", *each] for each in rooms]
+    return quick + [["-m", "slow", *each] for each in rooms]
+
+
+def line(mutant: Mutant) -> int:
+    """Number of the first line that it changes."""
+    source = _source(mutant)
+    return source.count("\n", 0, _place(mutant, source)) + 1
 
 
 def changed(mutant: Mutant) -> str:
     """Its file with the change. ValueError where the old text is not there."""
-    lines = (ROOT / "wristctl" / mutant.file).read_text(encoding="utf-8").splitlines(keepends=True)
-    before, after = "".join(lines[: mutant.near - 1]), "".join(lines[mutant.near - 1 :])
-    if mutant.old not in after:
+    source = _source(mutant)
+    place = _place(mutant, source)
+    return source[:place] + mutant.new + source[place + len(mutant.old) :]
+
+
+def _source(mutant: Mutant) -> str:
+    return (ROOT / "wristctl" / mutant.file).read_text(encoding="utf-8")
+
+
+def _place(mutant: Mutant, source: str) -> int:
+    before = sum(map(len, source.splitlines(keepends=True)[: mutant.near - 1]))
+    place = source.find(mutant.old, before)
+    if place < 0:
         raise ValueError(f"{mutant.name}: {mutant.file} has no {mutant.old!r} from line {mutant.near} on")
-    return before + after.replace(mutant.old, mutant.new, 1)
+    return place
 
 
-def mutate(mutant: Mutant, folder: Path) -> None:
-    """Copy the project and change one place."""
+def copied(folder: Path) -> Path:
+    """The project in another folder, which it makes."""
+    folder.mkdir(parents=True)
     for name in ("wristctl", "tests", "experiments", "docs", "benchmarks"):
         ignored = shutil.ignore_patterns("__pycache__", "results", "*.avi")
         shutil.copytree(ROOT / name, folder / name, ignore=ignored)
-    for name in (
-        "pyproject.toml",
-        "README.md",
-        "CHANGELOG.md",
-        "CITATION.cff",
-        "CODE_OF_CONDUCT.md",
-        "SECURITY.md",
-        "SUPPORT.md",
-        "CONTRIBUTING.md",
-        "Makefile",
-        "LICENSE",
-        "constraints.txt",
-        ".gitignore",
-    ):
-        shutil.copy(ROOT / name, folder / name)
+    for each in (each for each in ROOT.iterdir() if each.is_file()):
+        shutil.copy(each, folder)
     if (ROOT / "build").is_dir():
         os.symlink(ROOT / "build", folder / "build")
-    (folder / "wristctl" / mutant.file).write_text(changed(mutant), encoding="utf-8")
+    return folder
 
 
-def try_out(mutant: Mutant) -> Result:
-    """Run its tests until one fails."""
+def try_out(mutant: Mutant, sound: Path, reach: Reach | None = None) -> Result:
+    """Run its tests until one fails that passes on the `sound` copy of the project."""
     began = time.monotonic()
     with tempfile.TemporaryDirectory(prefix="wristctl-mutant-") as scratch:
-        folder = Path(scratch) / "project"
-        folder.mkdir()
-        mutate(mutant, folder)
-        noticed = None
-        for stage in stages(mutant):
-            noticed = _failing(folder, stage, Path(scratch) / "tmp")
-            if noticed:
-                break
-    return Result(mutant, noticed, time.monotonic() - began)
+        folder = copied(Path(scratch) / "project")
+        (folder / "wristctl" / mutant.file).write_text(changed(mutant), encoding="utf-8")
+        noticed, failing = None, list[str]()
+        for stage in stages(mutant, reach):
+            while noticed := _failing(folder, [*stage, *(f"--deselect={each}" for each in failing)], Path(scratch)):
+                if "::" not in noticed or not _failing(sound, [noticed.removesuffix(_HANGS)], Path(scratch)):
+                    return Result(mutant, noticed, time.monotonic() - began)
+                failing.append(noticed.removesuffix(_HANGS))
+    return Result(mutant, None, time.monotonic() - began)
 
 
 def _failing(folder: Path, tests: list[str], scratch: Path) -> str | None:
+    """Name of the first test that fails in a copy of the project; None if none does."""
     hangs = ("-o", f"faulthandler_timeout={LIMIT}", "-o", "faulthandler_exit_on_timeout=true")
-    own = ("-x", "-q", "-p", "no:cacheprovider", "--basetemp", str(scratch))
+    own = ("-x", "-q", "-p", "no:cacheprovider", "--basetemp", str(scratch / "tmp"))
     command = [sys.executable, "-m", "pytest", *own, *hangs, *tests]
-    environment = {**os.environ, "PYTHONPATH": str(folder), "PYTHONDONTWRITEBYTECODE": "1", "WRISTCTL_MUTANT": "1"}
+    environment = {**os.environ, "PYTHONPATH": str(folder), "PYTHONDONTWRITEBYTECODE": "1"}
     done = subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True)
-    if done.returncode == 0:
+    if done.returncode in (0, _NONE_CHOSEN):
         return None
-    found = re.findall(r"^(?:FAILED|ERROR) (\S+)", done.stdout, re.MULTILINE)
+    found = re.findall(r"^(?:FAILED|ERROR) (.+?)(?: - .*)?$", done.stdout, re.MULTILINE)
     stopped = re.findall(r"File \"[^\"]*/(tests/[^\"]+)\", line \d+ in (test_\w+)", done.stderr)
-    hanging = [f"{file}::{name} hangs" for file, name in stopped[:1]]
-    return (found or hanging or [f"{' '.join(tests)}: exit {done.returncode}"])[0]
+    hanging = [f"{file}::{name}{_HANGS}" for file, name in stopped[:1]]
+    return (found or hanging or [f"{' '.join(tests[:3])}: exit {done.returncode}"])[0]
 
 
 def main() -> None:
@@ -189,8 +207,9 @@ def main() -> None:
     mutants = [each for each in mutants if given.only in each.name or given.only in each.file]
     alive = [each for each in mutants if not each.equivalent]
     survivors, began = [], time.monotonic()
-    with ThreadPoolExecutor(given.jobs) as pool:
-        for result in pool.map(try_out, alive):
+    reach = measured() if given.seed is not None else None
+    with tempfile.TemporaryDirectory(prefix="wristctl-sound-") as folder, ThreadPoolExecutor(given.jobs) as pool:
+        for result in pool.map(partial(try_out, sound=copied(Path(folder) / "project"), reach=reach), alive):
             told = result.noticed or "NOTHING NOTICED"
             print(f"{result.mutant.name:28} {result.mutant.file:40} {result.seconds:4.0f} s  {told}", flush=True)
             if result.noticed is None:
