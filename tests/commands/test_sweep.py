@@ -246,10 +246,48 @@ def test_a_sweep_of_what_is_not_there_says_so_before_anything_is_written(tmp_pat
     assert not list(tmp_path.iterdir())
 
 
-def test_a_controller_without_the_defaults_preset_is_swept_with_its_own(tmp_path: Path) -> None:
-    """Of two that are swept one has gains `hardware`; the other's are as when it is simulated alone."""
-    swept = wristctl.simulate(wristctl.load_study(None, "sweep=['simulate.controller=ct-dob,computed-torque']"))
-    chosen = ("simulate.controller=computed-torque", "simulate.gains=default")
-    alone = wristctl.simulate(wristctl.load_study(None, *chosen))
-    rows = swept.frame().set_index("simulate.controller")
-    assert rows.loc["computed-torque", "rmse"] == pytest.approx(alone.metrics["rmse"], rel=1e-12)
+@pytest.mark.parametrize("typed", [(), ("simulate.gains=hardware",)])
+def test_a_controller_without_the_given_preset_is_swept_with_its_own(typed: tuple[str, ...]) -> None:
+    """Of two that are swept one has gains `hardware`, typed or not; the other's are as when it is simulated alone."""
+    both = "sweep=['simulate.controller=ct-dob,computed-torque']"  # none of which is the study's own
+    rows = wristctl.simulate(wristctl.load_study(None, *typed, both)).frame().set_index("simulate.controller")
+    for chosen in (("ct-dob", "hardware"), ("computed-torque", "default")):
+        keys = (f"simulate.{key}={value}" for key, value in zip(("controller", "gains"), chosen, strict=True))
+        alone = wristctl.simulate(wristctl.load_study(None, *keys))
+        assert rows.loc[chosen[0], "rmse"] == pytest.approx(alone.metrics["rmse"], rel=1e-12)
+
+
+def test_presets_that_are_swept_are_those_of_the_table_or_refused() -> None:
+    axes = "sweep=['simulate.controller=ct-dob,computed-torque', 'simulate.gains=hardware,default']"
+    with pytest.raises(UserError, match="unknown gains 'hardware' of computed-torque"):
+        wristctl.simulate(wristctl.load_study(None, *FAST, axes))
+
+
+@pytest.mark.parametrize("kind", ["minimum-jerk", pytest.param("dart-thrower", marks=pytest.mark.slow)])
+def test_what_speaks_against_a_preset_is_said_once_for_all_points(
+    caplog: pytest.LogCaptureFixture, kind: str
+) -> None:  # fmt: skip
+    axes = "sweep=['simulate.controller=pid,pid-angle', 'wrist.damping=0.05,0.06']"
+    loop = ("simulate.loop.actuator.level=tendon", "simulate.gains=printed", f"simulate.reference.kind={kind}")
+    study = wristctl.load_study(None, *FAST, *CAMERA, *loop, axes)
+    wristctl.simulate(study)
+    said = [record.getMessage() for record in caplog.records if "is not made for" in record.getMessage()]
+    assert sorted(message.partition(" ")[0] for message in said) == ["pid-angle/printed", "pid/printed"]
+
+
+@pytest.mark.slow
+def test_controllers_that_are_swept_take_their_own_gains_of_one_tuning(tmp_path: Path) -> None:
+    base = wristctl.load_study(
+        None, *FAST, "simulate.gains=tuned", "tune.controllers=[pid-ff,ct-dob]", "tune.candidates=2",
+        "tune.iterations=1", "tune.horizon=0.3", "tune.loops={fast: {plant_segments: 1}}",
+        "tune.scenarios=[{loop: fast, reference: {duration: 0.2}}]",
+    )  # fmt: skip
+    tuned = wristctl.tune(base, out=tmp_path)
+    study = swept(base, "simulate.controller=pid-ff,ct-dob")
+    rows = wristctl.simulate(study, tuned=tuned).frame().set_index("simulate.controller")["rmse"]
+    for name in ("pid-ff", "ct-dob"):
+        gains = ",".join(f"{gain}={value!r}" for gain, value in tuned.gains[name].items())
+        alone = at(f"simulate.controller={name}", f"simulate.gains={gains}").metrics["rmse"]
+        assert rows[name] == pytest.approx(alone, rel=1e-12)
+    with pytest.raises(UserError, match="no tuned gains of smc"):
+        wristctl.simulate(swept(base, "simulate.controller=pid-ff,smc"), tuned=tuned)

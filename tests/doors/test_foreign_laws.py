@@ -97,6 +97,36 @@ compare:
 
 
 @pytest.mark.slow
+def test_a_law_by_its_place_is_swept_beside_others_as_it_is_alone(stranger: Path) -> None:
+    (stranger / "inner").mkdir()
+    file = stranger / "inner" / "study.yaml"
+    file.write_text(
+        f"""
+simulate: {{{QUICK}}}
+sweep: ["simulate.controller=../strange.py:STRANGE,ct-dob", "simulate.reference.angle_deg=10,20"]
+"""
+    )
+    for executor in ("serial", "processes"):
+        swept = face.simulate(face.load_study(file), executor=executor, out=stranger / "results")
+        assert swept.run is not None and swept.run.problems() == []
+        assert (swept.run.path / "code" / "strange" / "helper.py").read_text() == (stranger / "helper.py").read_text()
+        assert "controller=code/strange/strange.py:STRANGE,ct-dob" in (swept.run.path / "config.yaml").read_text()
+        rows = swept.frame().set_index(["simulate.controller", "simulate.reference.angle_deg"])["rmse"]
+        assert len(rows) == 4
+        for name, place in (("strange", f"{stranger}/strange.py:STRANGE"), ("ct-dob", "ct-dob")):
+            alone = face.load_study(file, f"simulate.controller={place}", "sweep=[]", "simulate.reference.angle_deg=10")
+            assert rows[name, 10] == pytest.approx(face.simulate(alone).metrics["rmse"], rel=1e-12)
+
+
+def test_of_code_a_sweep_takes_controllers_only(stranger: Path) -> None:
+    """However its place is written: a name that is read as a place only later is refused."""
+    for text in ("simulate.reference.kind=strange.py:STRANGE,step", 'simulate.controller="strange.p\\x79:STRANGE",pid'):
+        study = face.load_study(None, f"sweep={json.dumps([text])}")
+        with pytest.raises(UserError, match=r"of one's own code a sweep takes controllers only: strange\.py:STRANGE"):
+            face.simulate(study)
+
+
+@pytest.mark.slow
 def test_an_edited_law_is_another_run_by_its_fingerprint_and_in_the_difference(stranger: Path) -> None:
     (stranger / "study.yaml").write_text(f"simulate: {{controller: strange.py:STRANGE, gains: default, {QUICK}}}")
     runs = []

@@ -23,11 +23,16 @@ from wristctl.records import Run
 HOSTILE = "open({marker!r}, 'a').close()\n"
 
 
-def sealed(stranger: Path) -> Run:
+ONE = "simulate: {controller: strange.py:STRANGE, gains: default, horizon: 0.3, loop: {plant_segments: 1}}\n"
+SWEPT = """
+sweep: ["simulate.controller= strange.py:STRANGE, 'pid'"]
+simulate: {horizon: 0.3, loop: {plant_segments: 1}}
+"""
+
+
+def sealed(stranger: Path, study: str = ONE) -> Run:
     """A run of the stranger's law, whose original is gone."""
-    (stranger / "study.yaml").write_text(
-        "simulate: {controller: strange.py:STRANGE, gains: default, horizon: 0.3, loop: {plant_segments: 1}}\n"
-    )
+    (stranger / "study.yaml").write_text(study)
     done = face.simulate(face.load_study(stranger / "study.yaml"), out=stranger / "results")
     for name in ("strange.py", "helper.py"):
         (stranger / name).unlink()
@@ -49,10 +54,10 @@ def seal_anew(run: Path) -> None:
     (run / "SHA256SUMS").write_text("".join(lines))
 
 
-@pytest.mark.parametrize("by", ["its law", "its reference"])
+@pytest.mark.parametrize("by", ["its law", "its reference", "its sweep"])
 @pytest.mark.slow
 def test_nothing_of_a_hostile_run_executes(stranger: Path, by: str) -> None:
-    run, marker = sealed(stranger), stranger / "was here"
+    run, marker = sealed(stranger, SWEPT if by == "its sweep" else ONE), stranger / "was here"
     for file in (run.path / "code/strange/helper.py", run.path / "code/strange/strange.py"):
         file.write_text(HOSTILE.format(marker=str(marker)) + file.read_text())
     name, results = run.id, str(run.path.parent)
@@ -75,6 +80,17 @@ def test_nothing_of_a_hostile_run_executes(stranger: Path, by: str) -> None:
             digest = hashlib.sha256(file.read_bytes()).hexdigest()
             assert digest in done.stderr and "--trust-code" in done.stderr and file.name in done.stderr
     assert [each.name for each in run.path.parent.iterdir() if each.is_dir()] == [name], "and no run looks complete"
+
+
+@pytest.mark.painted
+@pytest.mark.slow
+def test_a_sweep_over_a_law_replays_from_its_copy_once_it_is_trusted(stranger: Path) -> None:
+    run = sealed(stranger, SWEPT)
+    assert set(run.manifest.code.foreign) == {"code/strange/helper.py", "code/strange/strange.py"}
+    assert str(stranger) not in (run.path / "config.yaml").read_text() and run.problems() == []
+    assert "nobody has said that it may run" in wristctl(stranger, "runs", "replay", run.id).stderr
+    done = wristctl(stranger, "runs", "replay", run.id, "--trust-code")
+    assert done.returncode == 0 and f"{run.id}: identical" in done.stdout, done.stderr
 
 
 @pytest.mark.painted

@@ -9,6 +9,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from wristctl.config.choices import CONTROLLERS
+from wristctl.config.leaves import named_by
 from wristctl.config.study import Study
 from wristctl.errors import UserError
 from wristctl.study_files.load import load_study
@@ -121,10 +123,22 @@ def test_what_a_kind_of_reference_adds_has_its_unit() -> None:
     assert unit_at(daily, ("scale",)) == "1" and unit_at(daily, ("frequency",)) == "1/s"
 
 
-def test_code_of_ones_own_is_refused_as_a_value_wherever_it_stands(tmp_path: Path) -> None:
-    for sweep in ("controller=ct-dob,mine.py:MY_PD", f"simulate.controller={tmp_path}/mine.py:MY_PD"):
-        study = load_study([], [f"sweep=['{sweep}']"])
-        assert study.sweep == (sweep,), "as it was typed"
-        with pytest.raises(UserError, match="MY_PD") as told:
-            axes_of(study, "simulate")
-        assert told.value.exit_code == 2
+def test_the_place_of_ones_own_controller_counts_from_the_file_that_sweeps_it(tmp_path: Path) -> None:
+    """A study file's from its folder, an override's from here; what a sweep has beside it stays as it was typed."""
+    axis, other = "controller=ct-dob, 'mine.py:MY_PD',{}/b.py:B", "wrist.length=0.05, 0.1"
+    (tmp_path / "inner").mkdir()
+    (tmp_path / "inner" / "study.yaml").write_text(f'sweep: ["{axis.format("..")}", "{other}"]\n')
+    here, above = Path.cwd(), tmp_path / "inner"
+    study = load_study([above / "study.yaml"])
+    assert study.sweep == (f"controller=ct-dob,{above}/mine.py:MY_PD,{tmp_path}/b.py:B", other)
+    study = load_study([], [f'sweep=["{axis.format("/a")}"]'])
+    assert study.sweep == (f"controller=ct-dob,{here}/mine.py:MY_PD,/a/b.py:B",)
+    assert load_study([], ["sweep=['controller= pid , ct-dob']"]).sweep == ("controller= pid , ct-dob",)
+
+
+def test_the_names_that_a_sweep_takes_in_turn_are_among_those_of_the_study() -> None:
+    """What is no controller at all is left to the value's own error."""
+    study = swept("simulate.controller=/a/b.py:B,pid,no-such", "compare.controllers.0.controller=pid,/c.py:C")
+    named = [name for table, name in named_by(study) if table is CONTROLLERS]
+    assert named[-2:] == ["/a/b.py:B", "/c.py:C"] and named.count("pid") == 1 and "no-such" not in named
+    assert "/a/b.py:B" not in [name for _, name in named_by(study, {"simulate", "compare"})]

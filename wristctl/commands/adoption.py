@@ -8,7 +8,7 @@ from typing import Any, NamedTuple, TypeVar
 from wristctl.config.choices import CONTROLLERS, OPTIMISERS, REFERENCES, Choices
 from wristctl.config.controller_row import Row
 from wristctl.config.foreign import PLAIN, Foreign, is_reference
-from wristctl.config.leaves import named_in, renamed
+from wristctl.config.leaves import named_by, renamed_fields
 from wristctl.config.simulate import SimulateSettings
 from wristctl.config.study import Study
 from wristctl.errors import UserError, nearest
@@ -33,12 +33,11 @@ def adopted(study: Study, command: str) -> Adopted:
     Raises UserError for what cannot be loaded or does not keep to what a law is, and for two things of one name.
     """
     read = names_read(command)
-    sections = {name: getattr(study, name) for name in type(study).model_fields if name in read}
     names: dict[tuple[str, str], str] = {}
     settings = dict(study.controller_settings)
     owners: dict[tuple[str, str], str] = {}
     origins: list[Foreign] = []
-    for table, name in named_in(tuple(sections.values())):
+    for table, name in named_by(study, read):
         loaded = _loaded(table, name)
         if loaded is None:
             continue
@@ -65,21 +64,21 @@ def adopted(study: Study, command: str) -> Adopted:
 
     if not origins:
         return Adopted(study, ())
-    called = {name: renamed(content, own_name) for name, content in sections.items()}
+    called = renamed_fields(study, own_name, read)
     return Adopted(study.model_copy(update=called | {"controller_settings": settings}), tuple(origins))
 
 
-def with_presets(study: Study, command: str, tell: bool = True) -> Study:
+def with_presets(study: Study, command: str, tell: bool = True, for_several: bool = False) -> Study:
     """The study with a controller's own preset where nobody chose gains for it and it has none of the default's name.
 
     That is its preset `default`, or else its first, for the commands of one loop and for `compare`. With `tell` the
-    log says which.
+    log says which. A preset that was chosen `for_several` controllers in turn holds for those that have it.
     """
     if command not in ("simulate", "analyse", "compare"):
         return study
     section = study.compare if command == "compare" else study.simulate
     if isinstance(section, SimulateSettings):
-        return study.model_copy(update={"simulate": _with_preset(section, tell)})
+        return study.model_copy(update={"simulate": _with_preset(section, tell, for_several)})
     rows = {
         name: tuple(_with_preset(row, tell) for row in value)
         for name, value in section
@@ -88,8 +87,10 @@ def with_presets(study: Study, command: str, tell: bool = True) -> Study:
     return study.model_copy(update={"compare": section.model_copy(update=rows)})
 
 
-def _with_preset(row: _Row, tell: bool) -> _Row:
-    if "gains" in row.model_fields_set or row.controller not in CONTROLLERS:
+def _with_preset(row: _Row, tell: bool, for_several: bool = False) -> _Row:
+    is_preset = isinstance(row.gains, str) and not row.gains.startswith("tuned")
+    is_open = "gains" not in row.model_fields_set or (for_several and is_preset)
+    if not is_open or row.controller not in CONTROLLERS:
         return row
     presets = getattr(CONTROLLERS[row.controller], "presets", {})
     if not presets or row.gains in presets:
@@ -113,14 +114,13 @@ def with_places(study: Study, places: dict[str, str] | None = None) -> Study:
             table.lend(called, *table.loaded(reference))
         return called
 
-    sections = {name: getattr(study, name) for name in type(study).model_fields}
-    return study.model_copy(update={name: renamed(section, place) for name, section in sections.items()})
+    return study.model_copy(update=renamed_fields(study, place))
 
 
 def sources_in(study: Study) -> dict[str, str]:
     """Hashes of the sources from elsewhere in an adopted study, by name and place."""
     sources: dict[str, str] = {}
-    for table, name in named_in(tuple(getattr(study, field) for field in type(study).model_fields)):
+    for table, name in named_by(study):
         if origin := table.origin(name):
             places = {f"{name}/{file.relative_to(origin.root)}": digest for file, digest in origin.files.items()}
             sources |= places

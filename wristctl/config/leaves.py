@@ -1,11 +1,11 @@
 """The leaves of a study's sections, at whatever depth, and sections with other leaves."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from typing import Any, get_args
 
 from pydantic.fields import FieldInfo
 
-from wristctl.config.choices import Choices
+from wristctl.config.choices import CONTROLLERS, Choices
 from wristctl.config.section import OneOf, Section
 
 
@@ -60,3 +60,43 @@ def named_in(value: Any) -> list[tuple[Choices[Any], str]]:
 
     renamed(value, note)
     return list(named.values())
+
+
+def renamed_in_sweep(sweep: Sequence[str], rename: Rename) -> tuple[str, ...]:
+    """The axes of a sweep, KEY=VALUES, with `rename(table, name)` for every controller that one takes in turn."""
+
+    def axis(text: str) -> str:
+        key, _, values = text.partition("=")
+        if key.strip().split(".")[-1] != "controller":
+            return text
+        names = [item.strip().strip("\"'") for item in values.split(",")]
+        called = [rename(CONTROLLERS, name) for name in names]
+        return text if called == names else f"{key}={','.join(called)}"
+
+    return tuple(axis(text) for text in sweep)
+
+
+def swept_controllers(sweep: Sequence[str]) -> list[str]:
+    """The controllers that the axes of a sweep take in turn, each once, as they are named there."""
+    names = dict[str, None]()
+
+    def note(_: Choices[Any], name: str) -> str:
+        names[name] = None
+        return name
+
+    renamed_in_sweep(sweep, note)
+    return list(names)
+
+
+def renamed_fields(study: Section, rename: Rename, fields: Collection[str] | None = None) -> dict[str, Any]:
+    """Fields of a study with `rename(table, name)` for every name of a table in them, and in its sweep's values."""
+    called = {name: renamed(value, rename) for name, value in study if fields is None or name in fields}
+    return called | ({"sweep": renamed_in_sweep(called["sweep"], rename)} if "sweep" in called else {})
+
+
+def named_by(study: Section, fields: Collection[str] | None = None) -> list[tuple[Choices[Any], str]]:
+    """Every name of a table that fields of a study name, in order: those that its sweep takes in turn at the end."""
+    named = named_in(tuple(value for name, value in study if fields is None or name in fields))
+    known = {name for table, name in named if table is CONTROLLERS}
+    swept = swept_controllers(getattr(study, "sweep", ())) if fields is None or "sweep" in fields else []
+    return named + [(CONTROLLERS, name) for name in swept if name not in known and name in CONTROLLERS]

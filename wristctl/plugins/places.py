@@ -4,15 +4,17 @@ import logging
 import os
 import sys
 import traceback
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from functools import cache
+from itertools import chain
 from pathlib import Path
 from types import ModuleType
 from typing import Any
 
 from wristctl.config.foreign import Foreign, is_reference, split
 from wristctl.config.former_names import file_today
+from wristctl.config.leaves import renamed_in_sweep, swept_controllers
 from wristctl.errors import UserError, meant
 from wristctl.interrupt import from_outside
 from wristctl.plugins.import_hook import digest_now, imported, root_of
@@ -28,8 +30,11 @@ def placed(value: Any, document: Path | None) -> Any:
 
     Raises UserError where the document is part of a run and names code that is not.
     """
-    if isinstance(value, dict):  # a sweep, KEY=VALUES, names no code
-        return {key: entry if key == "sweep" else placed(entry, document) for key, entry in value.items()}
+    if isinstance(value, dict):
+        return {
+            key: _placed_sweep(entry, document) if key == "sweep" else placed(entry, document)
+            for key, entry in value.items()
+        }
     if isinstance(value, tuple):
         return tuple(placed(entry, document) for entry in value)
     if not isinstance(value, str) or not is_reference(value):
@@ -43,6 +48,13 @@ def placed(value: Any, document: Path | None) -> Any:
     return f"{moved}:{attribute}"
 
 
+def _placed_sweep(axes: Any, document: Path | None) -> Any:
+    """Axes of a sweep, KEY=VALUES; anything else that a study file has in their place is left to its validation."""
+    if not isinstance(axes, tuple) or not all(isinstance(text, str) for text in axes):
+        return axes
+    return renamed_in_sweep(axes, lambda _, name: str(placed(name, document)))
+
+
 def check_within(named: Path, document: Path) -> None:
     """Raises UserError where a document that is part of a run names code, or another document, outside the run."""
     home = run_around(document)
@@ -51,13 +63,22 @@ def check_within(named: Path, document: Path) -> None:
         raise UserError("the configuration of a run names code outside the run", str(named), fix)
 
 
-def check_trust(leaves: Iterable[Any], document: Path | None = None) -> None:
-    """Ask whether the code that the leaves of a document name may be loaded, and load none of it. Raises UserError."""
-    for leaf in placed(tuple(leaves), document):
-        for name in leaf if isinstance(leaf, tuple) else (leaf,):
-            if isinstance(name, str) and is_reference(name):
-                file, _ = split(name)
-                trusted(file, root_of(file))
+def check_trust(named: Any, document: Path | None = None) -> None:
+    """Ask whether the code that the data of a document names may be loaded, and load none of it. Raises UserError."""
+    for reference in _references(placed(named, document)):
+        file, _ = split(reference)
+        trusted(file, root_of(file))
+
+
+def _references(value: Any) -> Iterator[str]:
+    """Every reference in the data of a study, and every controller that its sweep takes in turn, as their places."""
+    if isinstance(value, str) and is_reference(value):
+        yield value
+    elif isinstance(value, tuple):
+        yield from chain.from_iterable(map(_references, value))
+    elif isinstance(value, dict):
+        for key, entry in value.items():
+            yield from filter(is_reference, swept_controllers(entry)) if key == "sweep" else _references(entry)
 
 
 _loaded: dict[Path, tuple[ModuleType, dict[Path, str]]] = {}

@@ -8,7 +8,7 @@ from pydantic import ValidationError
 
 from wristctl.config.former_names import key_today
 from wristctl.config.given_files import beside, names_a_file
-from wristctl.config.leaves import named_in
+from wristctl.config.leaves import named_by
 from wristctl.config.study import Study
 from wristctl.errors import Phrase, Setting, UserError, meant
 from wristctl.plugins.places import check_trust, check_within, placed
@@ -43,7 +43,7 @@ def load_study(
         return read_study(files, overrides, command)[0]
     with asking(lambda shown: True):
         study = read_study(files, overrides, command)[0]
-        check_trust(name for _, name in named_in(study))
+        check_trust(tuple(name for _, name in named_by(study)))
     return study
 
 

@@ -204,8 +204,8 @@ def _listed(text: str, values: str) -> tuple[Any, ...]:
     except UserError as error:
         raise error.at(Argument("sweep", text)) from error
     if own := next((item for item in items if isinstance(item, str) and is_reference(item)), None):
-        fix = "run the command once for it, and hold both results against each other with `wristctl runs diff`"
-        raise UserError(f"a sweep takes no code of one's own: {own}", Argument("sweep", text), fix)
+        fix = "run the command once for each, and hold the results against each other with `wristctl runs diff`"
+        raise UserError(f"of one's own code a sweep takes controllers only: {own}", Argument("sweep", text), fix)
     if any(item is None for item in items):
         raise UserError("a value is missing", Argument("sweep", text), _EXAMPLE)
     return items

@@ -187,7 +187,7 @@ def _replay(run: Run, overrides: list[str], as_json: bool) -> None:
     if run.state != "ok":
         raise UserError(f"run is {run.state}, not ok", str(run.path), "repeat a run that ended ok")
     inputs = inputs_of(run)
-    check_trust(leaves_of(run).values(), run.path / CONFIG)
+    check_trust(leaves_of(run), run.path / CONFIG)
     study, _ = read_study([run.path / CONFIG], overrides, run.kind, note=False)  # the repetition notes former names
     if getattr(getattr(study, run.kind.replace("-", "_")), "port", None) is not None:
         fix = "look at it: wristctl runs report; or do the experiment anew by its own command, with a person at the rig"

@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 import json
+import logging
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import wraps
 from typing import TYPE_CHECKING, Any, TypeVar, cast
 
+from wristctl.commands import loop_warnings
 from wristctl.commands.adoption import with_presets
 from wristctl.commands.answer import Answer
 from wristctl.commands.inputs import Inputs
-from wristctl.commands.inputs_of_loops import identified, tuned_gains
+from wristctl.commands.inputs_of_loops import check_row, identified, tuned_gains
 from wristctl.commands.procedure import Procedure
 from wristctl.commands.results import StudyResult
 from wristctl.commands.session import Session
@@ -34,20 +37,27 @@ _SECTIONS = {"simulate": {"seed", "wrist", "simulate"}}
 _WHOLE = {"seed", "wrist", "families"}
 
 
-def sweep_units(study: Study, command: str, axes: Sequence[SweepAxis], points: Sequence[Sequence[Any]]) -> list[Unit]:
-    """The points in order: many of `simulate` side by side, one of any other command."""
+def sweep_units(
+    study: Study,
+    command: str,
+    axes: Sequence[SweepAxis],
+    points: Sequence[Sequence[Any]],
+    tuned: Mapping[str, Mapping[str, float]] | None = None,
+) -> list[Unit]:
+    """The points in order: many of `simulate` side by side, one of any other command.
+
+    `tuned` has gains of a tune run by controller and name, for controllers that are taken in turn.
+    """
     from wristctl.work.worker import Unit
 
     content = json.loads(study.model_dump_json(by_alias=True, include=_SECTIONS.get(command, _WHOLE | {command})))
-    if "gains" not in study.simulate.model_fields_set:  # each controller's own, where it has none of the default's name
-        content.get("simulate", {}).pop("gains", None)
     as_lanes = command == "simulate" and not _any_in_two_planes(study, axes)
     together, does = (_LANES, "simulated") if as_lanes else (1, "performed_at")
     keys = [(axis.key, axis.text) for axis in axes]
     units = []
     for first in range(0, len(points), together):
         block = [list(point) for point in points[first : first + together]]
-        spec = {"study": content, "command": command, "keys": keys, "points": block}
+        spec = {"study": content, "command": command, "keys": keys, "points": block, "tuned": tuned or {}}
         name = f"{command} at {', '.join(f'{k}={v}' for (k, _), v in zip(keys, block[0], strict=True))}"
         units.append(Unit(f"wristctl.commands.sweep.command:{does}", spec, name, len(block)))
     return units
@@ -62,8 +72,32 @@ def _any_in_two_planes(study: Study, axes: Sequence[SweepAxis]) -> bool:
 def _studies(spec: Mapping[str, Any]) -> Iterator[Study]:
     study = Study.model_validate_json(json.dumps(spec["study"]))
     axes = [SweepAxis(key, (), False, text) for key, text in spec["keys"]]
-    points = (study_at(study, axes, _plain(values)) for values in spec["points"])
-    return (with_presets(at_point, spec["command"], tell=False) for at_point in points)
+    tuned = spec["tuned"]
+    return (_at(study, axes, _plain(values), spec["command"], tuned) for values in spec["points"])
+
+
+def _at(
+    study: Study,
+    axes: Sequence[SweepAxis],
+    values: Sequence[Any],
+    command: str,
+    tuned: Mapping[str, Mapping[str, float]] | None,
+    tell: bool = False,
+) -> Study:
+    """The study at a point, with gains that the controller there has. UserError where it has none that were tuned."""
+    there = with_presets(study_at(study, axes, values), command, tell, _of_several(axes))
+    row = there.simulate
+    if command != "simulate" or row.gains != "tuned" or not _of_several(axes):
+        return there
+    check_row(row, tuned)
+    gains = dict((tuned or {})[row.controller])
+    return there.model_copy(update={"simulate": row.model_copy(update={"gains": gains})})
+
+
+def _of_several(axes: Sequence[SweepAxis]) -> bool:
+    """Whether one preset is given for controllers that are taken in turn."""
+    keys = [axis.key for axis in axes]
+    return "simulate.controller" in keys and not any(key.startswith("simulate.gains") for key in keys)
 
 
 def _plain(values: Sequence[Any]) -> list[Any]:
@@ -177,9 +211,8 @@ def sweepable(procedure: Procedure[Found]) -> Procedure[Found]:
         assert procedure.size is not None
         sizes, told = [], set[str]()
         for corner in _corners(axes):
-            there = study_at(base, axes, corner)
-            name = there.simulate.controller
-            there = with_presets(there, procedure.kind, tell=name not in told)
+            name = study_at(base, axes, corner).simulate.controller
+            there = _at(base, axes, corner, procedure.kind, tuned_gains(inputs), name not in told)
             told.add(name)
             plan_text = procedure.plan(there, Inputs())
             sizes.append(procedure.size(there))
@@ -200,6 +233,23 @@ def sweepable(procedure: Procedure[Found]) -> Procedure[Found]:
     return cast(Procedure[Found], swept)
 
 
+@contextmanager
+def _said_once(log: logging.Logger) -> Iterator[None]:
+    """Within the block a log says nothing twice: what holds at several points is said of the sweep."""
+    said = set[str]()
+
+    def is_new(record: logging.LogRecord) -> bool:
+        known = record.getMessage() in said
+        said.add(record.getMessage())
+        return not known
+
+    log.addFilter(is_new)
+    try:
+        yield
+    finally:
+        log.removeFilter(is_new)
+
+
 def _base(study: Study, command: str, inputs: Inputs) -> Study:
     """The study without its sweep, and with what it takes from earlier runs written into it."""
     from wristctl.control.table import controller, gains_of
@@ -208,15 +258,14 @@ def _base(study: Study, command: str, inputs: Inputs) -> Study:
         fix = "leave it out: inverse: closed-form follows tips without one"
         raise UserError("a sweep runs without a network", Argument("network"), fix)
     by_gain = any(".gains." in f".{key}" for key in study.sweep)
-    study, tuned = study.model_copy(update={"sweep": ()}), tuned_gains(inputs)
+    swept, study, tuned = study, study.model_copy(update={"sweep": ()}), tuned_gains(inputs)
     if command in ("simulate", "tune"):
         study = identified(study, command, inputs)
     if command == "simulate":
-        law = controller(study.simulate.controller)
-        values = dict(zip(law.gains, gains_of(law, study.simulate.gains, tuned), strict=True))
         asked: dict[str, Any] = {"tuned": None, "from_identified": None}
-        if study.simulate.gains == "tuned" or by_gain:
-            asked |= {"gains": values}
+        if by_gain or (study.simulate.gains == "tuned" and not _of_several(axes_of(swept, command))):
+            law = controller(study.simulate.controller)
+            asked |= {"gains": dict(zip(law.gains, gains_of(law, study.simulate.gains, tuned), strict=True))}
         study = study.model_copy(update={"simulate": study.simulate.model_copy(update=asked)})
     if command == "compare" and tuned:
         rows = tuple(
@@ -248,9 +297,16 @@ def _swept(session: Session, command: str) -> Swept:
     study, findings = session.study, session.findings
     base, axes = _base(study, command, session.inputs), axes_of(study, command)
     points = points_of(axes)
-    units = sweep_units(base, command, axes, points)
+    tuned = tuned_gains(session.inputs)
+    units = sweep_units(base, command, axes, points, tuned)
     golden = None if session.executor == "serial" else _golden(base, command)
-    outcome = performed(session, command, f"{command} at {len(points)} points", units, golden, "points")
+    with _said_once(loop_warnings.log):
+        if command == "simulate":
+            for corner in _corners(axes):
+                at_corner = _at(base, axes, corner, command, tuned).simulate
+                loop_warnings.warn_if_coarse([at_corner.loop])
+                loop_warnings.warn_outside_conditions([at_corner], [at_corner.loop])
+        outcome = performed(session, command, f"{command} at {len(points)} points", units, golden, "points")
     parts, known_units, first = list[pd.DataFrame](), dict[str, str](), 0
     for unit, arrays in zip(units, outcome.arrays, strict=True):
         if arrays is not None:
