@@ -28,10 +28,13 @@ from wristctl.board.board_errors import NoAnswer, PortLost, Restarted
 from wristctl.board.driver import Board
 from wristctl.board.emulator.chip import FREQUENCY
 from wristctl.board.emulator.serve import PtyLine
-from wristctl.board.messages import Flag, Target
+from wristctl.board.messages import BAUD, Flag, Target
+from wristctl.board.transport import SerialTransport
 from wristctl.config.bench import BenchSettings, InjectedFault, RenderedCamera, SerialLine
 from wristctl.config.camera import SceneSettings
 from wristctl.config.wrist import WristParameters
+from wristctl.errors import UserError
+from wristctl.processes import NO_HARDWARE
 from wristctl.vision.camera import Frame
 
 SMALL = SceneSettings(width=160, height=120)
@@ -81,6 +84,18 @@ def ready(bench: RealTimeBench) -> Board:
     board.enable()
     board.home()
     return board
+
+
+@pytest.mark.slow
+def test_a_process_that_may_open_no_hardware_opens_the_emulated_bench(
+    serving: Serving, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """So a run on it is repeated: only a port that could be a real board's is refused."""
+    monkeypatch.setenv(NO_HARDWARE, "yes")
+    _, bench, _ = serving()
+    ready(bench)
+    with pytest.raises(UserError, match="opens no board"):
+        SerialTransport(bench.transport.name, BAUD)
 
 
 @pytest.mark.slow

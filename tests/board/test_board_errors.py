@@ -25,6 +25,8 @@ from wristctl.board.messages import FAULT_MEANING, Command, Fault, Result
         (BoardError("host", "something"), "host", 4),
         (PortLost("/dev/a", OSError("gone")), "cable", 4),
         (NoAnswer("/dev/a", Command.PING, 3, 0), "cable", 4),
+        (NoAnswer("/dev/a", Command.PING, 3, 0, 0.01), "cable", 4),  # a process is woken up so late now and then
+        (NoAnswer("/dev/a", Command.PING, 3, 0, 0.05), "host", 4),
         (NoAnswer("/dev/a", Command.PING, 3, 1), "firmware", 4),
         (WrongFirmware("/dev/a", 1, (1, 2, 3), 2), "firmware", 4),
         (Refused("/dev/a", Command.ENABLE, next(each for each in Result if each != Result.OK)), "host", 4),

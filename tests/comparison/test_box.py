@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import os
 import re
+from contextlib import nullcontext
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +14,8 @@ import pytest
 import scipy.stats
 
 from tests.values import one_move
+from wristctl.commands.audit.command import AUDIT
+from wristctl.commands.inputs import Inputs
 from wristctl.comparison.best_case import arrives_by_rule, overshoot_of_a_tick
 from wristctl.comparison.robust import Strip, deciding, draws_frame, rows_in_box, split, strips, strips_frame
 from wristctl.comparison.unknowns_sampling import (
@@ -38,7 +41,8 @@ from wristctl.study_files.load import load_study
 
 WRIST = WristParameters()
 EXCHANGED = Row(controller="smc", gains="exchanged")
-UNKNOWNS = Path(__file__).parents[2] / "experiments" / "unknowns.yaml"
+EXPERIMENTS = Path(__file__).parents[2] / "experiments"
+UNKNOWNS, CLAIMS = EXPERIMENTS / "unknowns.yaml", EXPERIMENTS / "claims.yaml"
 
 
 def box(draws: int = 16, **unknowns: Any) -> Box:
@@ -92,6 +96,16 @@ def test_a_box_that_cannot_be_is_refused(tmp_path: Path, text: str, said: str) -
     file.write_text(f"audit: {{box: {{unknowns: {{{text}}}}}}}")
     with pytest.raises(UserError, match=said):
         load_study([file])
+
+
+def test_more_settings_than_can_be_integrated_are_refused_before_any_is(tmp_path: Path) -> None:
+    """A hundred days of two cores, by the drawn settings alone; a thousandth of them may be tried."""
+    settings = "draws: {}, continuous: [0, 0], horizon: 1.0e+4, unknowns: {{wrist.mass: {{draw: 0.02..0.1}}}}"
+    file = tmp_path / "box.yaml"
+    for draws, is_refused in ((1_000_000, True), (1_000, False)):
+        file.write_text(f"include: [{CLAIMS}]\naudit: {{box: {{{settings.format(draws)}}}}}")
+        with pytest.raises(UserError, match="rollouts") if is_refused else nullcontext():
+            AUDIT.plan(load_study([file]), Inputs())
 
 
 def courses_of(theta: np.ndarray, rest: float = 0.0, horizon: float = 5.0, period: float = 1e-3) -> Courses:

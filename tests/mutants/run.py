@@ -110,21 +110,23 @@ def from_seed(seed: int, count: int) -> list[Mutant]:
 
 
 def stages(mutant: Mutant, reach: Reach | None = None) -> list[list[str]]:
-    """What pytest is given, one after the other: the tests that run the line, then the room's quick and slow ones.
+    """What pytest is given, one after the other: the tests that run the line, the file's own, the room's.
 
-    Where tests are named, those alone. Quick tests that do not run a line of Python cannot notice that it is changed.
+    Quick ones come before slow ones. Where tests are named, those alone. Quick tests that do not run a line of Python
+    cannot notice that it is changed.
     """
     if mutant.tests:
         return [list(mutant.tests)]
     parts = Path(mutant.file).with_suffix("").parts
-    neighbours = NEIGHBOURS.get(parts[0], ["tests/test_python_face.py"])
-    named = sorted(str(each.relative_to(ROOT)) for each in (ROOT / "tests").rglob(f"test_{parts[-1]}*.py"))
-    rooms = [[each for each in named if each.split("/")[1] in (parts[0], *parts[1:-1])]]
-    rooms += [[each] for each in neighbours if (ROOT / each).exists()]
-    rooms = [each for each in rooms if each]
+    rooms = [each for each in NEIGHBOURS.get(parts[0], ["tests/test_python_face.py"]) if (ROOT / each).exists()]
+    paths = (each.relative_to(ROOT) for each in (ROOT / "tests").rglob(f"test_{parts[-1]}*.py"))
+    named = sorted(str(each) for each in paths if each.parts[1] in (parts[0], *parts[1:-1]))
     running = reach.tests(mutant.file, line(mutant)) if reach else []
-    quick = [running] if running else [["-m", "not slow", *each] for each in rooms]
-    return quick + [["-m", "slow", *each] for each in rooms]
+    quick, slow = ("-m", "not slow"), ("-m", "slow")
+    stages = [running] if running else [[*quick, *named]] * bool(named)
+    stages += [[*slow, *named]] * bool(named)
+    stages += [] if running else [[*quick, room] for room in rooms]
+    return stages + [[*slow, room] for room in rooms]
 
 
 def line(mutant: Mutant) -> int:
