@@ -66,7 +66,7 @@ def serving(tmp_path: Path) -> Iterator[Serving]:
         camera, film = start_film(settings, wrist, None, tmp_path / "frame")
         ours, theirs = multiprocessing.Pipe()
         server = BenchServer(Rig(settings, wrist, 0), line, film, tmp_path / "record", theirs)
-        thread = threading.Thread(target=server.run)
+        thread = threading.Thread(target=server.run, daemon=True)
         thread.start()
         bench = RealTimeBench([camera], ours, line.address, tmp_path / "frame")
         running.append((Served(server, bench, tmp_path / "record"), thread))

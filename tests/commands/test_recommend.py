@@ -10,6 +10,7 @@ import pytest
 import yaml
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy.integrate import solve_ivp
 
 import wristctl
 from wristctl.commands.recommend.answer import NEAR, RECOMMENDED, Candidate, Recommended, spread
@@ -26,6 +27,8 @@ from wristctl.simulation.oscillation import FASTEST, oscillations, sustained
 from wristctl.simulation.reference import motion
 from wristctl.simulation.rollout import rollout
 from wristctl.tuning.scaled_presets import dynamic_stiffness, scaled_to
+from wristctl.wrist.compiled_model import terms
+from wristctl.wrist.segments import segments
 
 WRIST = WristParameters()
 QUICK = (
@@ -40,6 +43,22 @@ def heavier(times: float) -> WristParameters:
     """A wrist of which every torque is so many times the default one's."""
     loads = ("mass", "hand_mass", "stiffness", "damping", "pretension", "tension_limit")
     return WRIST.model_copy(update={name: times * getattr(WRIST, name) for name in loads})
+
+
+def test_the_dynamic_stiffness_is_the_torque_of_a_small_swing_to_its_angle() -> None:
+    """At 15 rad/s, by the wrist's own motion under a sine of torque, without gravity and once it goes on."""
+    wrist = WRIST.model_copy(update={"gravity": (0.0, 0.0)})
+    hinge, torque = segments(wrist, 1), 1e-3
+
+    def moves(t: float, state: np.ndarray) -> list[float]:
+        at = terms(hinge, state[:1], state[1:])
+        held = wrist.stiffness * state[0] + wrist.damping * state[1]
+        return [state[1], (torque * math.sin(15.0 * t) - held) / float(at.mass[0, 0])]
+
+    turn = 2.0 * math.pi / 15.0
+    kept = solve_ivp(moves, (0.0, 12.0 * turn), (0.0, 0.0), rtol=1e-6, atol=1e-9, max_step=turn / 20.0)
+    swing = np.abs(kept.y[0][kept.t > 11.0 * turn]).max()
+    assert torque / swing == pytest.approx(dynamic_stiffness(wrist), rel=5e-3)
 
 
 @settings(max_examples=20, deadline=None)

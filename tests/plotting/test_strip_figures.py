@@ -6,9 +6,11 @@ import dataclasses
 
 import numpy as np
 import pytest
+from matplotlib.patches import Rectangle
 
 from wristctl.commands.audit.figures import ours_over_the_papers, shares, strip
 from wristctl.comparison.claims import Judgement
+from wristctl.comparison.paper import FACTOR
 from wristctl.comparison.robust import Leaf, Strip, Threshold
 from wristctl.comparison.verdicts import Finding
 from wristctl.config.audit import Claim, VerdictName
@@ -50,6 +52,15 @@ def test_the_ledgers_ranges_are_ratios_to_the_papers_number() -> None:
     )
     (panel,) = ours_over_the_papers([judged]).axes
     assert [np.asarray(line.get_xdata(), float).tolist() for line in panel.lines] == [[0.5, 2.0], [1e5, 1e5]]
+
+
+def test_the_band_is_as_wide_below_the_papers_number_as_above() -> None:
+    judged = Judgement(CLAIM, {"exact": Finding("reproduced", 1.0, 4.0)})
+    (drawn,), (ledger,) = strip(STRIP, [20.0, 40.0, 60.0, np.inf], "N").axes, ours_over_the_papers([judged]).axes
+    (across,), (along,) = drawn.patches, ledger.patches
+    assert isinstance(across, Rectangle) and isinstance(along, Rectangle)
+    for begin, size in ((across.get_y(), across.get_height()), (along.get_x(), along.get_width())):
+        assert begin * (begin + size) == pytest.approx(1.0) and begin + size == pytest.approx(FACTOR)
 
 
 def test_what_stands_beside_the_bars_is_within_the_figure() -> None:

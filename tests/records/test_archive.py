@@ -356,3 +356,10 @@ def test_the_words_for_each_refusal_differ_and_none_of_a_missing_path_asks_an_ow
     assert len(set(fixes)) == len(NUMBERS) - 1, "no permission and read-only need the same"
     to_read = {number: UserError("", "", fix_to_read(OSError(number, ""))).fix for number in NUMBERS}
     assert [number for number, fix in to_read.items() if "owner" in fix] == [errno.EACCES]
+
+
+def test_whoever_unpacks_it_by_other_means_can_read_the_files_and_run_none(packed: tuple[list[Run], Path]) -> None:
+    with zipfile.ZipFile(packed[1]) as archive:
+        modes = {entry.external_attr >> 16 for entry in archive.infolist() if not entry.is_dir()}
+        assert modes == {stat.S_IFREG | 0o644}
+        assert {entry.compress_type for entry in archive.infolist()} == {zipfile.ZIP_DEFLATED}

@@ -66,6 +66,14 @@ def test_the_files_of_a_stopped_trial_stop_at_the_very_tick(
     assert stop.limit.limit / unit in {float(np.ravel(line.get_ydata())[0]) for line in marked[0].lines}
 
 
+def test_a_figure_of_the_last_seconds_has_those_alone() -> None:
+    run = logged(load=np.linspace(0.0, 0.1, 50))
+    for last, rows in ((None, 50), (9.5 * PERIOD, 10)):
+        for panel in residuals_over_time(run, None, last).axes:
+            clock = np.asarray(panel.lines[0].get_xdata(), float)
+            assert clock == pytest.approx(run.values["clock"].to_numpy()[-rows:])
+
+
 def test_of_several_runs_the_largest_is_named_with_its_run_trial_and_time() -> None:
     sizes = np.zeros(50)
     sizes[[10, 30]] = 0.4, -0.9
