@@ -16,11 +16,12 @@ from wristctl.stability.sampled_loop import LinearTick, SampledLoop
 S, PERIOD = control.tf("s"), 1e-3
 
 
-def _followed(of: control.TransferFunction) -> SampledLoop:
-    """A loop whose angle follows its reference like this."""
-    own = control.ss(control.c2d(control.ss(of), PERIOD))
+def _followed(of: control.TransferFunction, ticks: int = 1) -> SampledLoop:
+    """A loop whose angle follows its reference like this, in a cycle of so many ticks that are all alike."""
+    own = control.ss(control.c2d(control.ss(of), PERIOD / ticks))
     into, back = np.array(own.B)[:, 0], np.array(own.C)[0]
-    return SampledLoop(PERIOD, [LinearTick(np.array(own.A), 0.0 * into, 0.0 * back, into, True, {"theta": back})])
+    tick = LinearTick(np.array(own.A), 0.0 * into, 0.0 * back, into, True, {"theta": back})
+    return SampledLoop(PERIOD / ticks, [tick] * ticks)
 
 
 @pytest.mark.parametrize("damping", [0.2, 0.7, 1.5])
@@ -35,8 +36,9 @@ def test_rise_overshoot_and_settling_are_python_controls(damping: float) -> None
     assert found.final == pytest.approx(1.0, abs=1e-3)
 
 
-def test_a_long_response_is_sampled_every_so_many_ticks_and_is_the_same() -> None:
-    slow = step_response(_followed(1.0 / (10.0 * S + 1)))
+@pytest.mark.parametrize("ticks", [1, 2])
+def test_a_long_response_is_sampled_every_so_many_ticks_and_is_the_same(ticks: int) -> None:
+    slow = step_response(_followed(1.0 / (10.0 * S + 1), ticks))
     assert len(slow.time) < 40_000 and slow.time[-1] > 50.0
     np.testing.assert_allclose(slow.angle, -np.expm1(-slow.time / 10.0), atol=1e-6)
     assert slow.rise == pytest.approx(10.0 * math.log(9.0), rel=1e-2) and slow.overshoot == 0.0

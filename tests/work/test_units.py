@@ -11,6 +11,7 @@ import pytest
 
 from tests.work.walks import at, contents, golden, tries, walks
 from wristctl.errors import UserError
+from wristctl.work import executors
 from wristctl.work import worker as units_of_work
 from wristctl.work.executors import Workers
 from wristctl.work.fan_out import UnitsDone, perform_units
@@ -28,6 +29,13 @@ def test_a_worker_furnishes_itself_once_before_its_units() -> None:
     left = Furnish("tests.work.piecework:furnish", {"left": 7})
     done = perform_units(units, Workers.of("processes:1"), golden(), furnish=left)
     assert [each["left"].tolist() for each in done.arrays if each] == [[7]] * 5
+
+
+@pytest.mark.slow
+def test_workers_share_the_cores_among_them(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(executors, "cores", lambda: 7)
+    with Workers.of("processes:2").open() as pool:
+        assert pool.executor.submit(os.getenv, "OMP_NUM_THREADS").result() == "3"
 
 
 @pytest.mark.slow
