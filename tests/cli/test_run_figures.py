@@ -53,7 +53,7 @@ def test_figures_are_as_wide_as_asked_and_stand_beside_the_sealed_run(call: Call
     for name in names:
         box = re.search(rb"/MediaBox \[\s*0 0 ([\d.]+) ([\d.]+)", (folder / f"{name}.pdf").read_bytes())
         assert box is not None and float(box[1]) == pytest.approx(88.0 / 25.4 * 72.0, abs=0.1), name
-    call("runs", "figures", run.id, "answer", "--format", "png", "--width", "180mm", "--to", "own")
+    call("runs", "figures", run.id, "answer", "--format", "png", "--width", "18 cm", "--to", "own")
     head = Path("own/answer.png").read_bytes()[16:24]
     assert struct.unpack(">II", head)[0] == pytest.approx(180.0 / 25.4 * 300.0, abs=2)
     assert call("runs", "ls")[1].count("-compare-") == 1, "a folder of figures is no run"

@@ -18,7 +18,7 @@ import sys
 import tempfile
 import time
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 
@@ -104,9 +104,11 @@ def known() -> list[Mutant]:
 
 
 def from_seed(seed: int, count: int) -> list[Mutant]:
-    """Drawn ones."""
+    """Drawn ones; those that the committed list has as equivalent with its reason."""
     listed = (entry(each, f"{seed}-{number:02}") for number, each in enumerate(drawn(seed, count), start=1))
-    return [Mutant(**each) for each in listed]
+    reasons = {(each.file, changed(each)): each.equivalent for each in known() if each.equivalent}
+    mutants = (Mutant(**each) for each in listed)
+    return [replace(each, equivalent=reasons.get((each.file, changed(each)), "")) for each in mutants]
 
 
 def stages(mutant: Mutant, reach: Reach | None = None) -> list[list[str]]:

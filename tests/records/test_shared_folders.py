@@ -17,13 +17,16 @@ from typing import Any
 import pytest
 
 from wristctl.cli.app import main
+from wristctl.cli.runs.verification import Verified
 from wristctl.config.study import Study
 from wristctl.records import Run, list_runs, open_run, start_run
 from wristctl.records.find import entries
 from wristctl.records.index import INDEX
 from wristctl.records.lock import LOCK, is_locked
+from wristctl.records.manifest import SIGNATURE
 from wristctl.records.removal import leftovers, remove
 from wristctl.records.tags import change_tags, read_tags
+from wristctl.sha256sums import UNREADABLE
 
 Make = Callable[..., Run]
 ROOT = Path(__file__).parents[2]
@@ -182,3 +185,20 @@ def test_a_run_that_is_nobody_elses_to_read_is_said_to_be_so(shared: Path) -> No
         assert code == 2 and "cannot be read: Permission denied" in said and said.count("\n") == 1, verb
     assert by(ANOTHER, shared, "runs", "gc")[:2] == (0, "nothing is left over in results\n")
     assert by(ONE, shared, "runs", "verify")[0] == 0
+
+
+@pytest.mark.parametrize(
+    ("problems", "said"),
+    [
+        ([("a.csv", UNREADABLE + "Permission denied")], "could not be checked"),
+        ([("a.csv", UNREADABLE + "Permission denied"), (SIGNATURE, "not signed")], "could not be checked"),
+        ([("a.csv", UNREADABLE + "Permission denied"), ("b.csv", "is not as it was sealed")], "changed"),
+        ([("b.csv", "is not as it was sealed"), (SIGNATURE, "not signed")], "changed"),
+        ([(SIGNATURE, "not signed")], "as sealed, but nobody vouches for it"),
+        ([], "as sealed"),
+    ],
+)
+def test_a_run_of_which_one_file_is_changed_is_so_whatever_cannot_be_read(
+    problems: list[tuple[str, str]], said: str
+) -> None:
+    assert Verified(problems).said == said

@@ -56,9 +56,8 @@ class Verified(NamedTuple):
             return "is running"
         if all(file == SIGNATURE for file, _ in self.problems):
             return f"as sealed{', but nobody vouches for it' if self.problems else self.signed}"
-        return (
-            "could not be checked" if any(problem.startswith(UNREADABLE) for _, problem in self.problems) else "changed"
-        )
+        unread = [problem.startswith(UNREADABLE) for file, problem in self.problems if file != SIGNATURE]
+        return "could not be checked" if all(unread) else "changed"
 
     def fails(self, must_be_signed: bool) -> bool:
         """Whether it is not what was asked for."""
