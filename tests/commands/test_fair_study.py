@@ -307,6 +307,10 @@ def test_a_row_of_a_study_chatters_where_the_middle_of_its_noises_does_on_any_mo
     row = judge_unit.row_of("one", [pieces | still | slams], 58.0)
     assert row.swings.tolist() == [False, True, False] and (row.measured.chatter > 0.0).sum() == 3
     assert not judge_unit.row_of("one", [pieces | still | slams], 65.0).swings.any(), "a wider range is crossed less"
+    coarse = {"drift": still["drift"].copy()}
+    coarse["drift"][2, 0, 1] = 0.05
+    row = judge_unit.row_of("one", [pieces | still | coarse], 58.0)
+    assert row.swings.tolist() == [False, False, True], "a number that depends on the step with one noise is none"
 
 
 def test_a_row_swings_where_it_does_in_motion_by_more_than_feedforward_may(study: Study) -> None:

@@ -7,8 +7,9 @@ import math
 import numpy as np
 import pytest
 
+from wristctl.comparison import best_case
 from wristctl.comparison.best_case import GUARD_DEG, closest, follows, search
-from wristctl.comparison.paper import T2
+from wristctl.comparison.paper import FACTOR, T2
 from wristctl.comparison.unknowns_sampling import Courses, courses, readings
 from wristctl.config.controller_row import Row
 from wristctl.config.loop import Loop, Reference
@@ -47,6 +48,25 @@ def test_what_has_just_settled_when_time_is_up_has_not_settled() -> None:
         assert np.isfinite(closest(of, "gvsc", "usual")[0][0]) == counts
         theta[-1] = np.nan
         assert np.isinf(closest(of._replace(theta=theta[None]), "gvsc", "usual")[0][0])
+
+
+def test_neighbours_lie_to_both_sides_of_a_setting_by_up_to_5_percent(monkeypatch: pytest.MonkeyPatch) -> None:
+    moved: list[PaperSetting] = []
+
+    def closest_to(settings: list[PaperSetting], *_: object) -> tuple[np.ndarray, None, None]:
+        moved.extend(settings)
+        return np.array([1.0, 2.0, 1.5, np.inf]), None, None
+
+    monkeypatch.setattr(best_case, "_courses", lambda row, settings: settings)
+    monkeypatch.setattr(best_case, "closest", closest_to)
+    box, begin = Box(unknowns={"wrist.length": Unstated(draw=(0.05, 0.12))}), setting(WRIST)
+    share = best_case._near(box, WRIST, PRINTED, "strict", begin, np.random.default_rng(0))
+    assert share == np.mean(np.array([1.0, 2.0, 1.5, np.inf]) < FACTOR)
+    for name in ("length", "stiffness", "damping"):
+        ratios = np.array([getattr(near.wrist, name) / getattr(WRIST, name) for near in moved])
+        assert 0.95 <= ratios.min() < 0.96 and 1.04 < ratios.max() <= 1.05
+    durations = np.array([near.reference.duration for near in moved])
+    assert 0.95 <= durations.min() < 0.96 and 1.04 < durations.max() <= 1.05
 
 
 def sagging() -> PaperSetting:

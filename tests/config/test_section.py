@@ -5,6 +5,7 @@ from __future__ import annotations
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from pydantic import ValidationError
 
 from wristctl.config.hw_run import CalibrateWristSettings, HwRunSettings
 from wristctl.config.loop import Reference
@@ -32,3 +33,11 @@ def test_a_rig_keeps_motors_and_camera_where_a_study_gives_one_key_of_theirs(
     assert (rig.sensor.level, rig.sensor.frame_rate) == ("camera", 30.0)
     with pytest.raises(ValueError, match="tendon"):
         kind.model_validate({"actuator": {"level": "ideal"}})
+
+
+def test_an_unknown_key_is_told_with_all_that_there_are_in_one_order() -> None:
+    """Of the section and of what its kind adds, in an order that no process changes."""
+    with pytest.raises(ValidationError) as raised:
+        Reference.model_validate({"kind": "chirp", "frequencie": 1.0})
+    known = raised.value.errors()[0]["ctx"]["known"]
+    assert known == sorted(known) and {"kind", "duration", "end_frequency"} <= set(known)
