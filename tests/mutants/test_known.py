@@ -20,4 +20,4 @@ def test_each_change_is_another_program_that_python_reads_and_its_tests_are_ther
 
 def test_no_change_stands_there_twice_and_few_are_equivalent() -> None:
     assert len({each.name for each in MUTANTS}) == len(MUTANTS) >= 71
-    assert sum(bool(each.equivalent) for each in MUTANTS) <= 8
+    assert sum(bool(each.equivalent) for each in MUTANTS) <= 0.2 * len(MUTANTS)

@@ -59,7 +59,7 @@ def _soft_neck(file: Path) -> OpenLog:
     names = [entry for head, entry in known.items() if head in heads]
     if not any(name.startswith("inclination") for name in names):
         raise UserError("no inclination of a soft neck", str(file), "a file of HUMASoft/Data-and-Results")
-    log = read_table(file, ", ".join(names), "recording of the soft neck", others=True)
+    log = read_table(file, ", ".join(names), "recording of the soft neck")
     trial = file.stem.rpartition("__")[2]
     load = _NECK_LOAD.search(trial)
     mass = {"mass": np.full(len(log), 1e-3 * float(load[1]))} if load else {}
@@ -73,7 +73,7 @@ def _opencr(file: Path) -> OpenLog:
         raise UserError(f"{len(servos)} columns servo_<id>_mm", str(file), "nine, as in OpenCR's data/sysid")
     names = ["time=timestamp [s]", "trial=pattern_label", "tip_x=tip_z [mm]", "tip_y=tip_x [mm]", "tip_z=tip_y [mm]"]
     names += [f"spool_{k}={servo} [mm]" for k, servo in enumerate(servos, 1)]
-    return read_table(file, ", ".join(names), "recording of OpenCR", others=True)
+    return read_table(file, ", ".join(names), "recording of OpenCR")
 
 
 def _silicone_arm(file: Path) -> OpenLog:
