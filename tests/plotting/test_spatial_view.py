@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import dataclasses
 import re
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -14,12 +16,14 @@ from tests.plotting.browser import Browser
 from wristctl.arrays import Array
 from wristctl.config.study import Study
 from wristctl.config.wrist import WristParameters
+from wristctl.plotting import spatial_view as view_module
 from wristctl.plotting.page import page
 from wristctl.plotting.spatial_view import ANGLE, MOST, PLACE, PULL, cables, motion_in_space, rim, spatial_view
 from wristctl.plotting.style import TENDON_COLOURS
 from wristctl.records import Run, start_run
 from wristctl.simulation.bend_course import BendCourse
 from wristctl.simulation.two_planes import bend_path
+from wristctl.trial import bend_results
 from wristctl.wrist.spatial.spatial_kinematics import spatial_frames, spatial_tips
 
 PLANES = "simulate.loop.planes=2"
@@ -93,6 +97,20 @@ def test_tendons_run_at_their_places_through_the_discs_they_pass(tmp_path: Path,
     assert radii[-1] == study.wrist.tendon_radius and (radii[0] == 0.0) == (setting == "wrist.tendons=five")
     inner = [each["discs"] for each in found["tendons"]]
     assert inner == ([5, 5, 5, 3] if setting == INNER else [5] * tendons)
+
+
+def test_a_real_wrist_of_which_one_arc_is_seen_bends_by_its_share_in_every_segment(
+    monkeypatch: pytest.MonkeyPatch
+) -> None:  # fmt: skip
+    whole = course()
+    seen_as_one = dataclasses.replace(whole, coordinates=whole.bend)
+    monkeypatch.setattr(bend_results, "first_course", lambda run: seen_as_one)
+    run: Any = SimpleNamespace(config=SimpleNamespace(hw_run=SimpleNamespace(planes=2)))
+    bends = [f"bend_{k}_{plane}" for k in (1, 2, 3, 4) for plane in ("ulnar", "flexion")]
+    table = view_module._performed(run, ["time", *bends, "tip_x"])
+    assert table is not None
+    np.testing.assert_allclose(table[:, 1:9], np.tile(whole.bend / 4.0, 4))
+    assert np.array_equal(table[:, 0], whole.time) and np.array_equal(table[:, 9], seen_as_one.columns()["tip_x"])
 
 
 def test_the_wrist_is_drawn_as_it_is_and_not_as_it_is_believed(tmp_path: Path) -> None:
