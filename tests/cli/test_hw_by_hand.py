@@ -134,9 +134,12 @@ def test_limits_that_the_board_does_not_keep_are_told_of(call: Call, monkeypatch
     assert code == 4 and "axis 0 has no soft limit" in err and Emulated.made[0].energised == [False] * 4
 
 
-def test_slackened_tendons_are_paid_out_together_and_released(call: Call) -> None:
-    code, out, _ = call("hw", "slacken", "--mm", "1", "--port", "emulated", "--yes")
-    (board,), paid = Emulated.made, -round(1.0 / STEP_MM)
+@pytest.mark.parametrize(("words", "length"), [(("--mm", "1"), 1.0), ((), 0.6)])
+def test_slackened_tendons_are_paid_out_together_and_released(
+    call: Call, words: tuple[str, ...], length: float
+) -> None:
+    code, out, _ = call("hw", "slacken", *words, "--port", "emulated", "--yes")
+    (board,), paid = Emulated.made, -round(length / STEP_MM)
     assert code == 0 and out == f"paid out: {(paid,) * 4} steps\n"
     assert Board(board).read().position == (paid,) * 4 and board.energised == [False] * 4
 

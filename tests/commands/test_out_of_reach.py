@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 import logging
+import math
 from dataclasses import replace
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 import wristctl
 from tests.commands.conftest import repeated, session
+from wristctl.commands import loop_warnings
 from wristctl.commands.inputs import Inputs
 from wristctl.commands.loop_warnings import OutOfReach, asked_by, out_of_reach
 from wristctl.commands.simulate.command import SIMULATE
@@ -154,3 +158,10 @@ def test_a_motion_of_the_other_plane_has_no_direction_in_this_one() -> None:
     study = wristctl.load_study(None, "compare.references=[{kind: adl:mean-flexion}]", "compare.directions=[ulnar]")
     with pytest.raises(UserError, match="not in it"):
         asked_by(study, study.compare)
+
+
+@given(value=st.floats(1e-3, 1e3))
+def test_what_would_do_is_rounded_to_three_digits_to_the_side_that_does(value: float) -> None:
+    up, down = loop_warnings._rounded(value, math.ceil), loop_warnings._rounded(value, math.floor)
+    assert down <= value * (1.0 + 1e-12) and value * (1.0 - 1e-12) <= up <= 1.0101 * value and down >= 0.99 * value
+    assert float(f"{up:.3g}") == pytest.approx(up, rel=1e-12) and float(f"{down:.3g}") == pytest.approx(down, rel=1e-12)

@@ -169,6 +169,7 @@ def test_at_a_real_rig_a_person_is_asked_with_the_wait_that_a_fault_may_end(monk
     monkeypatch.setattr(testbeds, "DeviceCamera", Dark)
     monkeypatch.setattr(testbeds, "open_transport", Dark)
     real = RealTestbed(settings_of(port="x", safety={"motor_pull": 30.0}), [View()], None, ask)
+    assert not real.emulated and EmulatedTestbed.emulated, "faults of the bench are never injected into a real rig"
     for question in (real.confirm, lambda meanwhile: real.face("flexion", meanwhile)):
         with pytest.raises(TimeoutError):
             question(_fault)

@@ -71,6 +71,21 @@ def closed(camera: DeviceCamera, capture: Capture) -> None:
     assert capture.released
 
 
+def test_a_device_that_takes_half_a_second_to_its_first_picture_is_waited_for(
+    capture: Capture, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    at_once = capture.read
+
+    def late() -> tuple[bool, Any]:
+        time.sleep(0.5)
+        return at_once()
+
+    monkeypatch.setattr(capture, "read", late)
+    camera = DeviceCamera("0", Device())
+    assert camera.newest() is not None
+    closed(camera, capture)
+
+
 @pytest.mark.parametrize(("source", "place"), [("2", 2), ("/dev/video2", "/dev/video2")])
 def test_a_device_is_asked_for_what_is_set_and_for_one_frame_of_buffer(
     capture: Capture, source: str, place: Any
