@@ -70,7 +70,13 @@ def test_a_run_that_cannot_be_read_is_dated_by_its_name(results: Path) -> None:
     ]
 
 
-@pytest.mark.parametrize(("metrics", "note"), [('{"a": 1}', "no table of metrics"), ("{", "not valid JSON")])
+WRONG = ('"value": "1"', '"value": 1, "unit": 3', '"value": 1, "better": [1]', '"value": 1, "interval": [0, 1, 2]')
+DAMAGED = ['{"a": 1}', *(f'{{"b": {{"value": 1, "unit": "s"}}, "a": {{{entry}}}}}' for entry in WRONG)]
+
+
+@pytest.mark.parametrize(
+    ("metrics", "note"), [*((text, "no table of metrics") for text in DAMAGED), ("{", "not valid JSON")]
+)
 def test_a_run_with_damaged_metrics_is_broken_and_says_so(make: Make, results: Path, metrics: str, note: str) -> None:
     (make().path / "metrics.json").write_text(metrics)
     (entry,) = indexed(results)
