@@ -8,8 +8,10 @@ import pytest
 from tests.vision.conftest import bent
 from wristctl.config.camera import Markers, SceneSettings
 from wristctl.config.wrist import WristParameters
+from wristctl.vision import scene as scene_module
 from wristctl.vision.scene import Scene
 from wristctl.vision.scene_parts import FACE, THICK
+from wristctl.vision.view import Pinhole
 from wristctl.wrist.kinematics import arcs_backbone, discs
 
 WRIST = WristParameters()
@@ -83,3 +85,16 @@ def test_only_a_camera_above_sees_the_upper_face_of_a_disc(above: bool) -> None:
     upper = np.array([[0.5 * WRIST.length + 0.5 * THICK, 0.008, 0.005]])  # of the middle disc, beside the backbone
     x, y = np.rint(scene.camera.project(upper)[0]).astype(int)
     assert (picture[y, x] == FACE) == above
+
+
+def test_a_board_in_somebodys_hands_goes_over_the_whole_picture() -> None:
+    """Its middle is everywhere within the picture, across as much as up and down, and not along one line."""
+    camera, extent, rng = Pinhole(QUIET, "right"), np.array([0.1, 0.07]), seeded()
+    seen = []
+    for number in range(24):
+        _, place = scene_module._held(camera, number, 25, extent, rng)
+        pixel = camera.matrix @ place
+        seen.append(pixel[:2] / pixel[2] / np.array(camera.size))
+    middles = np.array(seen)
+    assert ((middles > 0.1) & (middles < 0.9)).all() and (np.ptp(middles, axis=0) > 0.55).all()
+    assert abs(np.corrcoef(middles.T)[0, 1]) < 0.2
