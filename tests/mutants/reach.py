@@ -11,6 +11,7 @@ import os
 import subprocess
 import sys
 from collections import Counter
+from collections.abc import Iterable
 from functools import cached_property
 from pathlib import Path
 
@@ -32,8 +33,14 @@ class Reach:
 
         `file` is relative to the package, `line` counts from 1. Empty where no test is known to.
         """
+        return self._ordered(file, statement((ROOT / "wristctl" / file).read_text(encoding="utf-8"), line))
+
+    def tests_of_file(self, file: str) -> list[str]:
+        """Names of the tests that run any line of a file, in the same order."""
+        return self._ordered(file, self._data.contexts_by_lineno(f"wristctl/{file}"))
+
+    def _ordered(self, file: str, lines: Iterable[int]) -> list[str]:
         contexts = self._data.contexts_by_lineno(f"wristctl/{file}")
-        lines = statement((ROOT / "wristctl" / file).read_text(encoding="utf-8"), line)
         names = {_name(each) for number in lines for each in contexts.get(number, ())} - {""}
         return sorted(names, key=lambda name: (self._sizes[name], name))
 

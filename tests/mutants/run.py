@@ -33,6 +33,8 @@ LEAST = 0.9
 """Share of drawn changes that must be noticed."""
 LIMIT = 300
 """Seconds after which one test is taken to hang: that is noticed too."""
+MOST_BESIDE = 100
+"""Tests of a file that are tried where none is known to run the line, as where it is compiled or a constant."""
 _HANGS = " hangs"
 _NONE_CHOSEN = 5
 """pytest's exit code where a folder has no quick test, or no slow one."""
@@ -112,7 +114,7 @@ def from_seed(seed: int, count: int) -> list[Mutant]:
 
 
 def stages(mutant: Mutant, reach: Reach | None = None) -> list[list[str]]:
-    """What pytest is given, one after the other: the tests that run the line, the file's own, the room's.
+    """What pytest is given, in turn: tests that run the line (or else its file), the file's own, the room's.
 
     Quick ones come before slow ones. Where tests are named, those alone. Quick tests that do not run a line of Python
     cannot notice that it is changed.
@@ -120,12 +122,14 @@ def stages(mutant: Mutant, reach: Reach | None = None) -> list[list[str]]:
     if mutant.tests:
         return [list(mutant.tests)]
     parts = Path(mutant.file).with_suffix("").parts
-    rooms = [each for each in NEIGHBOURS.get(parts[0], ["tests/test_python_face.py"]) if (ROOT / each).exists()]
+    neighbours = NEIGHBOURS.get(parts[0], [f"tests/{parts[0]}", "tests/test_python_face.py"])
+    rooms = [each for each in neighbours if (ROOT / each).exists()]
     paths = (each.relative_to(ROOT) for each in (ROOT / "tests").rglob(f"test_{parts[-1]}*.py"))
     named = sorted(str(each) for each in paths if each.parts[1] in (parts[0], *parts[1:-1]))
     running = reach.tests(mutant.file, line(mutant)) if reach else []
+    beside = reach.tests_of_file(mutant.file)[:MOST_BESIDE] if reach and not running else []
     quick, slow = ("-m", "not slow"), ("-m", "slow")
-    stages = [running] if running else [[*quick, *named]] * bool(named)
+    stages = [running] if running else [[*quick, *named]] * bool(named) + [beside] * bool(beside)
     stages += [[*slow, *named]] * bool(named)
     stages += [] if running else [[*quick, room] for room in rooms]
     return stages + [[*slow, room] for room in rooms]

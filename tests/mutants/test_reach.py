@@ -47,3 +47,4 @@ def test_the_tests_of_a_line_come_by_how_little_else_they_run(tmp_path: Path, mo
     assert reached.tests("clip.py", 9) == ["tests/a.py::test_narrow[x|y]", "tests/a.py::test_wide"]
     assert reached.tests("clip.py", 11) == ["tests/b.py::test_elsewhere", "tests/a.py::test_wide"]
     assert reached.tests("clip.py", 1) == []
+    assert reached.tests_of_file("clip.py") == ["tests/b.py::test_elsewhere", *reached.tests("clip.py", 9)]
