@@ -5,6 +5,8 @@ from __future__ import annotations
 import dataclasses
 import logging
 import math
+import re
+from pathlib import Path
 from types import ModuleType
 
 import pytest
@@ -30,6 +32,20 @@ from wristctl.study_files.load import load_study
 
 PAPERS = ("smc", "pid", "pid-angle")
 STATED = [(name, preset) for name in CONTROLLERS for preset in controller(name).conditions]
+
+
+def test_what_a_preset_states_is_what_was_tried_for_the_page_of_margins() -> None:
+    page = Path(__file__).parents[2] / "docs" / "margins.md"
+    rows = re.findall(r"^\| ([\w-]+/\w+) \| ([^|]+) \|", page.read_text(encoding="utf-8"), re.MULTILINE)
+    tried = {name: conditions for name, conditions in rows if conditions != "none"}
+    stated = {
+        f"{name}/{preset}": "{:g}-{:g} ms, {:g}-{:g} kN/m".format(
+            *(1e3 * bound for bound in conditions.period), *(1e-3 * bound for bound in conditions.tendon_stiffness)
+        )
+        for name in CONTROLLERS
+        for preset, conditions in controller(name).conditions.items()
+    }
+    assert tried == stated and len(rows) > len(tried)
 
 
 @pytest.fixture(scope="module")

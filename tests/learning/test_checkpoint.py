@@ -13,7 +13,7 @@ from wristctl.learning.training import read_checkpoint, write_checkpoint
 
 
 def test_a_checkpoint_reads_back_and_only_for_its_own_training(tmp_path: Path) -> None:
-    file = tmp_path / "checkpoints/0.pt"
+    file = tmp_path / "run/checkpoints/0.pt"
     write_checkpoint(file, "mark", {"weights": torch.arange(3.0), "epoch": 7})
     state = read_checkpoint(file, "mark")
     assert state["epoch"] == 7 and torch.equal(state["weights"], torch.arange(3.0))
