@@ -84,6 +84,13 @@ def test_a_frozen_camera_shows_the_last_frame_before_it_froze() -> None:
     assert frozen.expose(40).shown == 40 and frozen.expose(25).shown == 25
 
 
+def test_a_ring_shows_its_last_pictures_again_and_again_and_a_frozen_camera_one() -> None:
+    for kind, pictures in (("camera-repeats", {23, 24, 25}), ("camera-frozen", {25}), ("camera-frozen-clock", {25})):
+        fault = InjectedFault.model_validate({"kind": kind, "at": 0.51, "size": 3.0})
+        shown = [shutter(None, fault).expose(number).shown for number in range(26, 38)]
+        assert set(shown) == pictures and all(one == other for one, other in zip(shown, shown[3:], strict=False))
+
+
 @pytest.mark.parametrize(("kind", "which"), [("marker-covered", "covered"), ("markers-swapped", "swapped")])
 def test_only_its_own_fault_covers_or_swaps(kind: Any, which: str) -> None:
     taken = shutter(None, InjectedFault(kind=kind, at=0.5, duration=0.1))
