@@ -226,3 +226,11 @@ def test_what_is_undominated_is_beaten_by_nobody_in_all(costs: list[tuple[int, i
 def test_what_has_no_cost_is_not_on_the_front() -> None:
     costs: Array = np.array([[1.0, np.nan], [2.0, 2.0]])
     assert undominated(costs).tolist() == [False, True]
+
+
+def test_the_spread_of_a_rows_tunings_is_from_the_best_to_the_worst_of_them() -> None:
+    tunings = [row("pid-ff/tuned", factor, spread=0.0) for factor in (1.5, 1.0, 2.0)]
+    done = tuned_ranking("bench", FAMILIES["bench"], [[row("feedforward/default", 4.0, spread=0.0)], tunings], [0, 1])
+    hard = float(np.exp(np.log(HARD).mean()))
+    least, most = done.spreads[1]
+    assert (least, most) == pytest.approx((hard, 2.0 * hard)) and done.spreads[0] == pytest.approx((4 * hard, 4 * hard))
