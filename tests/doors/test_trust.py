@@ -82,6 +82,17 @@ def test_nothing_of_a_hostile_run_executes(stranger: Path, by: str) -> None:
     assert [each.name for each in run.path.parent.iterdir() if each.is_dir()] == [name], "and no run looks complete"
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("sweep", ["3", "[1, 2]", "controller=strange.py:STRANGE", "{a: b}"])
+def test_a_run_whose_sweep_is_none_is_refused_and_is_no_bug(stranger: Path, sweep: str) -> None:
+    run = sealed(stranger)
+    config = run.path / "config.yaml"
+    config.write_text(f"sweep: {sweep}\n{config.read_text()}")
+    seal_anew(run.path)
+    done = wristctl(stranger, "runs", "replay", run.id, "--trust-code")
+    assert done.returncode == 2 and "sweep" in done.stderr and "bug" not in done.stderr, done.stderr
+
+
 @pytest.mark.painted
 @pytest.mark.slow
 def test_a_sweep_over_a_law_replays_from_its_copy_once_it_is_trusted(stranger: Path) -> None:

@@ -166,7 +166,7 @@ def copied(folder: Path) -> Path:
     for name in ("wristctl", "tests", "experiments", "docs", "benchmarks"):
         ignored = shutil.ignore_patterns("__pycache__", "results", "*.avi")
         shutil.copytree(ROOT / name, folder / name, ignore=ignored)
-    for each in (each for each in ROOT.iterdir() if each.is_file()):
+    for each in (each for each in ROOT.iterdir() if each.is_file() and each.name != ".git"):  # a worktree's
         shutil.copy(each, folder)
     if (ROOT / "build").is_dir():
         os.symlink(ROOT / "build", folder / "build")

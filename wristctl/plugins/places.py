@@ -49,10 +49,12 @@ def placed(value: Any, document: Path | None) -> Any:
 
 
 def _placed_sweep(axes: Any, document: Path | None) -> Any:
-    """Axes of a sweep, KEY=VALUES; anything else that a study file has in their place is left to its validation."""
-    if not isinstance(axes, tuple) or not all(isinstance(text, str) for text in axes):
-        return axes
-    return renamed_in_sweep(axes, lambda _, name: str(placed(name, document)))
+    return renamed_in_sweep(axes, lambda _, name: str(placed(name, document))) if _are_axes(axes) else axes
+
+
+def _are_axes(entry: Any) -> bool:
+    """Whether these are texts, as a sweep's KEY=VALUES; anything else in their place is left to the validation."""
+    return isinstance(entry, tuple) and all(isinstance(text, str) for text in entry)
 
 
 def check_within(named: Path, document: Path) -> None:
@@ -78,7 +80,8 @@ def _references(value: Any) -> Iterator[str]:
         yield from chain.from_iterable(map(_references, value))
     elif isinstance(value, dict):
         for key, entry in value.items():
-            yield from filter(is_reference, swept_controllers(entry)) if key == "sweep" else _references(entry)
+            is_sweep = key == "sweep" and _are_axes(entry)
+            yield from filter(is_reference, swept_controllers(entry)) if is_sweep else _references(entry)
 
 
 _loaded: dict[Path, tuple[ModuleType, dict[Path, str]]] = {}

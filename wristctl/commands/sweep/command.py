@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 from functools import wraps
 from typing import TYPE_CHECKING, Any, TypeVar, cast
 
-from wristctl.commands import loop_warnings
+from wristctl.commands import adoption, loop_warnings
 from wristctl.commands.adoption import with_presets
 from wristctl.commands.answer import Answer
 from wristctl.commands.inputs import Inputs
@@ -209,13 +209,12 @@ def sweepable(procedure: Procedure[Found]) -> Procedure[Found]:
         for point in points[:_CHECKED]:
             study_at(base, axes, point)
         assert procedure.size is not None
-        sizes, told = [], set[str]()
-        for corner in _corners(axes):
-            name = study_at(base, axes, corner).simulate.controller
-            there = _at(base, axes, corner, procedure.kind, tuned_gains(inputs), name not in told)
-            told.add(name)
-            plan_text = procedure.plan(there, Inputs())
-            sizes.append(procedure.size(there))
+        sizes = []
+        with _said_once(adoption.log):
+            for corner in _corners(axes):
+                there = _at(base, axes, corner, procedure.kind, tuned_gains(inputs), tell=True)
+                plan_text = procedure.plan(there, Inputs())
+                sizes.append(procedure.size(there))
         steps, rollouts = (
             sum(column) / len(sizes) for column in zip(*((a.steps, a.rollouts) for a in sizes), strict=True)
         )
