@@ -134,6 +134,8 @@ class _Fan:
     """Arrays of the earlier run for the `drawn` unit."""
     alone: deque[int] = field(default_factory=deque)
     """Units that were under way when a worker died."""
+    suspected: set[int] = field(default_factory=set)
+    """Those of them that were handed out again, each of which has the pool for itself."""
     failures: Counter[int] = field(default_factory=Counter)
     running: dict[Future[Any], int] = field(default_factory=dict)
 
@@ -163,8 +165,10 @@ class _Fan:
 
     def _hand_out(self, pool: Pool) -> None:
         while source := self.alone or self.waiting:
-            if len(self.running) >= (1 if self.alone else pool.width()):
+            single = self.alone or not self.suspected.isdisjoint(self.running.values())
+            if len(self.running) >= (1 if single else pool.width()):
                 return
+            self.suspected |= {source[0]} if source is self.alone else set()
             unit = self.units[source[0]]
             first = (self.golden, self.furnish) if pool.apart else (None, None)
             future = pool.executor.submit(compute, unit.does, dict(unit.spec), *first)
