@@ -104,7 +104,11 @@ def test_a_search_that_finds_only_stopped_clocks_finds_nothing(monkeypatch: pyte
         },
         horizon=4.0,
     )
-    found = search(own, clock.wrist, PRINTED, "usual", (1, 1e-3), 0, generations=3, candidates=8)
+    shares: list[float] = []
+    found = search(
+        own, clock.wrist, PRINTED, "usual", (1, 1e-3), 0, generations=3, candidates=8, progress=shares.append
+    )
+    assert shares == pytest.approx([1 / 3, 2 / 3, 1.0])
     assert found.setting is None and math.isinf(found.factor) and found.rollouts == 24
     assert found.stopped_clocks > 0
 

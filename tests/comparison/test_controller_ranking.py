@@ -12,7 +12,15 @@ from tests.commands.conftest import repeated
 from wristctl.api import load_study
 from wristctl.comparison.bootstrap import MEASURABLE, paired_ratio
 from wristctl.comparison.combinations import CLASSES, ComparedRow, class_of
-from wristctl.comparison.controller_ranking import Ranking, class_rankings, probability_of_less, standings_frame
+from wristctl.comparison.controller_ranking import (
+    Ranking,
+    Traits,
+    class_rankings,
+    probability_of_less,
+    standings_frame,
+    traits_of,
+    undominated,
+)
 from wristctl.config.loop import LOOPS, Loop
 from wristctl.config.wrist import WristParameters
 from wristctl.simulation.repetitions import Repeated
@@ -236,6 +244,28 @@ def test_a_condition_has_the_traits_that_all_its_loops_share() -> None:
         "pushed": (False, False, False, True, False),
         "off-nominal": (False, False, False, False, True),
     }
+    assert not any(one.jumps or one.uneven for one in traits.values())
+
+
+def test_a_condition_of_which_nothing_is_said_asks_nothing_special() -> None:
+    """Each trait is a question to a reader, of which the answer is no until a loop or a study says yes."""
+    assert not any(Traits()) and not any(traits_of([LOOPS["exact"], LOOPS["sampled"]], WRIST))
+    assert traits_of([LOOPS["sampled"]], WRIST, jumps=True) == Traits(jumps=True)
+    tendons = Loop.model_validate({"actuator": {"level": "tendon"}})
+    assert traits_of([tendons], WRIST) == Traits(rig=True, tendons=True)
+    assert traits_of([tendons, Loop.model_validate({"sensor": {"level": "camera"}})], WRIST) == Traits(rig=True)
+    assert not any(traits_of([tendons, LOOPS["sampled"]], WRIST)), "what not all of them have"
+    hinges, soft = (Loop.model_validate({"plant": {name: of}}) for name, of in (("model", "hinges"), ("creep", 0.1)))
+    assert traits_of([hinges], WRIST) == Traits(unknown=True, uneven=True)
+    assert traits_of([hinges, soft], WRIST) == Traits(unknown=True)
+
+
+def test_on_the_front_is_what_no_other_beats_in_all_costs() -> None:
+    """A row that is as dear in one and cheaper in another beats; equal rows beat neither; inf is never on the front."""
+    costs = np.array([[1.0, 4.0], [2.0, 2.0], [2.0, 3.0], [4.0, 1.0], [1.0, 4.0], [0.5, np.inf], [3.0, 3.0]])
+    assert undominated(costs).tolist() == [True, True, False, True, True, False, False]
+    assert undominated(np.array([[np.inf, np.inf]])).tolist() == [False]
+    assert undominated(np.array([[3.0], [2.0], [2.0]])).tolist() == [False, True, True]
 
 
 def test_one_beats_another_in_the_share_of_cases_where_its_error_is_less() -> None:

@@ -18,6 +18,7 @@ from wristctl.comparison.bootstrap import (  # fmt: skip
     geometric_mean,
     paired_ratio,
     penalised,
+    plain,
 )
 
 THOROUGH = bool(os.environ.get("WRISTCTL_THOROUGH"))
@@ -112,6 +113,29 @@ def test_rows_that_differ_alike_everywhere_need_no_interval_and_rounding_is_no_d
     one = np.random.default_rng(0).uniform(1.0, 2.0, 20)
     assert paired_ratio(2.0 * one, one, 1) == pytest.approx((2.0, 2.0, 2.0, 0.95), rel=1e-9)
     assert paired_ratio(one * (1.0 + 1e-15), one, 1) == GeometricMean(1.0, 1.0, 1.0, 0.95)
+
+
+def test_a_row_that_differs_nowhere_leaves_the_others_their_intervals() -> None:
+    rows = np.random.default_rng(3).standard_normal((2, 12))
+    alone, beside = Resampled(rows, 7).intervals(), Resampled(np.insert(rows, 1, 0.25, axis=0), 7).intervals()
+    np.testing.assert_allclose(beside[:, [0, 2]], alone, rtol=0.0, atol=1e-14)
+    assert beside[:, 1].tolist() == [0.25, 0.25] and (alone[0] < rows.mean(axis=1)).all()
+    assert (alone[1] > rows.mean(axis=1)).all()
+    assert np.isfinite(Resampled(rows[:, :FEWEST_WORLDS], 7).intervals()).all()
+
+
+def test_an_error_too_small_to_measure_counts_as_the_least_and_a_failure_as_a_right_angle() -> None:
+    assert np.degrees(penalised([1e-9, 1.0, np.inf])) == pytest.approx([0.001, np.degrees(1.0), 90.0])
+
+
+@pytest.mark.parametrize(("ratio", "told"), [(0.34721, "0.347"), (8.512, "8.51"), (999.4, "999"), (8676.4, "8676")])
+def test_a_ratio_is_told_to_three_digits_and_never_as_a_power_of_ten(ratio: float, told: str) -> None:
+    assert plain(ratio) == told
+
+
+def test_a_ratio_may_be_one_where_its_interval_reaches_that() -> None:
+    ends = [(0.5, 0.99), (0.5, 1.0), (0.9, 1.1), (1.0, 2.0), (1.01, 2.0)]
+    assert [GeometricMean(1.0, low, high, 0.95).is_one for low, high in ends] == [False, True, True, True, False]
 
 
 def test_too_few_worlds_know_no_interval() -> None:

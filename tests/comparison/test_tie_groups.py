@@ -10,11 +10,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
-from scipy.stats import studentized_range, t, ttest_rel
+from scipy.stats import skew, studentized_range, t, ttest_rel
 
 from wristctl.arrays import Array
 from wristctl.comparison.bootstrap import FAILURE, MEASURABLE
-from wristctl.comparison.model_confidence_set import LEAST_PAIRS
+from wristctl.comparison.model_confidence_set import LEAST_PAIRS, PairedComparisons
 from wristctl.comparison.tie_groups import Standing, share, standing
 
 RANGE = 50.0
@@ -211,3 +211,27 @@ def test_a_failure_counts_as_a_right_angle_unless_another_is_said() -> None:
     found = standing(scores, np.zeros(scores.shape, bool), 0, tolerated=0.5)
     capped = np.where(np.isfinite(scores), scores, FAILURE)
     assert found.floor == standing(capped, np.zeros(scores.shape, bool), 0).floor
+
+
+@pytest.mark.parametrize("worlds", [8, 13, 40])
+def test_the_statistic_of_a_pair_is_halls_transform_of_its_mean_over_its_deviation(worlds: int) -> None:
+    """t + g t^2/3 + g^2 t^3/27 + g/(6 n), with the skewness g of a few differences made larger by 6/n, 2 at most."""
+    rng = np.random.default_rng(worlds)
+    logarithms = np.stack([np.zeros(worlds), rng.gamma(6.0, 0.1, worlds), rng.gamma(0.1, 1.0, worlds)])
+    found = PairedComparisons(logarithms, 5)._statistics
+    for pair, (one, other) in enumerate(((0, 1), (0, 2), (1, 2))):
+        differences = logarithms[one] - logarithms[other]
+        ratio = differences.mean() / differences.std(ddof=1)
+        g = float(np.clip((1.0 + 6.0 / worlds) * skew(differences), -2.0, 2.0))
+        wanted = abs(ratio + g * ratio**2 / 3.0 + g**2 * ratio**3 / 27.0 + g / (6.0 * worlds))
+        assert found[0, pair] == pytest.approx(wanted, rel=1e-6)
+
+
+@pytest.mark.parametrize("worlds", [6, 10, 13])
+def test_every_flip_of_a_few_worlds_is_tried_once_with_the_first_worlds_sign_as_it_is(worlds: int) -> None:
+    """A flip of all signs changes no size: of 2^W flips half are enough."""
+    differences = np.random.default_rng(1).standard_normal(worlds)
+    found = PairedComparisons(np.stack([differences, np.zeros(worlds)]), 5)._statistics
+    assert found.shape == (2 ** (worlds - 1), 1) and len(np.unique(found.round(12))) == len(found)
+    mirrored = PairedComparisons(np.stack([np.zeros(worlds), differences]), 5)._statistics
+    np.testing.assert_allclose(np.sort(mirrored, axis=0), np.sort(found, axis=0), atol=1e-12)

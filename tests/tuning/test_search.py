@@ -203,6 +203,20 @@ def test_what_gains_do_on_the_cases_is_counted_by_mark() -> None:
         assert marks_of(law, gains, tuning_cases(study)[0], study.wrist) == marks
 
 
+def test_what_swings_on_a_moving_reference_is_marked_where_feedforward_swings_less(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """At rest only what is left at the end counts."""
+    swings = [0.0, 1.5 * LIMIT_CYCLE, 1.5 * LIMIT_CYCLE]
+    _, found = made_up((0, 1, 2), oscillation=[0.0, 0.0, 2.0 * LIMIT_CYCLE], sustained=swings)
+    moving, law = replace(found, rests=np.array([True, False, True])), controller("pd-ff")
+    for measured, open_loop, marks in ((moving, 0.0, 2), (moving, 1.0, 1), (found, 0.0, 1)):
+        still = replace(measured, metrics={"sustained": np.full((1, 3), open_loop * LIMIT_CYCLE)})
+        given = {law.name: measured, "feedforward": still}
+        monkeypatch.setattr("wristctl.tuning.objective.measure", lambda law, *of, given=given: given[law.name])
+        assert marks_of(law, np.zeros(2), [], WristParameters()) == {"limit cycle": marks}
+
+
 @pytest.mark.slow
 def test_a_search_tells_of_which_controllers_the_best_gains_chatter_and_how_often(
     monkeypatch: pytest.MonkeyPatch,
@@ -247,6 +261,29 @@ def test_what_diverges_is_worse_than_what_does_not() -> None:
     study = load_study([], [*SETTINGS, "loops={one: {plant_segments: 1, limits: false}}"], "tune")
     values = judges(study)[0](controller("computed-torque"), np.array([[900.0, 9.0], [50.0, 1.0]]))
     assert values[0] > 2.0 > 0.0 > values[1]
+
+
+def test_only_what_would_be_the_best_is_measured_anew_and_the_most_promising_first(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """One of these is good by its step alone: the next best is the best, and the others need no such care."""
+    at_default, sound = np.array([0.5, -1.0, -2.0, -3.0, 0.1]), np.array([0.4, -1.1, -1.9, 1.0, 0.2])
+    anew = list[list[int]]()
+
+    def measured(law: Controller, gains: Array, *_: object, converge: bool = True) -> Array:
+        which = gains[:, 0].astype(int)
+        if converge:
+            anew.append(which.tolist())
+        return (sound if converge else at_default)[which]
+
+    judge, _ = made_up((0,), rmse=[0.1])
+    monkeypatch.setattr("wristctl.tuning.objective.measure", measured)
+    monkeypatch.setattr(judge, "value", np.array)
+    candidates = np.arange(5.0)[:, None]
+    assert judge.beside(controller("pid"), candidates, 0.0).tolist() == [0.5, -1.0, -1.9, 1.0, 0.1]
+    assert anew == [[3], [2]]
+    assert judge.beside(controller("pid"), candidates, -3.0).tolist() == at_default.tolist() and len(anew) == 2
+    assert judge.beside(controller("pid"), candidates[3:4], np.inf).tolist() == [1.0] and anew[2:] == [[3]]
 
 
 def test_feedforward_is_nothing_beside_itself() -> None:

@@ -205,7 +205,7 @@ def class_of(loop: Loop, wrist: WristParameters) -> str:
         return "pushed"
     if loop.actuator.level == "tendon" or loop.sensor.level == "camera":
         return "camera and tendons"
-    if acting or loop.actuator.level != "ideal" or mismatches(World(loop, wrist)):
+    if acting or loop.actuator.level != "ideal" or loop.plant.model != "pcc" or mismatches(World(loop, wrist)):
         return "off-nominal"
     nearly = loop.plant_segments == 1 and not loop.limits and loop.control_period <= _CONTINUOUS
     return "ideal" if nearly else "sampled"

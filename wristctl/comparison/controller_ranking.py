@@ -166,7 +166,8 @@ def traits_of(loops: Sequence[Loop], wrist: WristParameters, jumps: bool = False
     tendons = all(loop.actuator.level == "tendon" for loop in loops)
     either = all(loop.sensor.level == "camera" or loop.actuator.level == "tendon" for loop in loops)
     load, unknown = (all(name == kind for name in classes) for kind in ("pushed", "off-nominal"))
-    return Traits(either, camera, tendons, jumps, load, unknown)
+    uneven = all(loop.plant.model == "hinges" for loop in loops)
+    return Traits(either, camera, tendons, jumps, load, unknown, uneven)
 
 
 def class_rankings(results: Sequence[ComparedRow], settings: CompareSettings, wrist: WristParameters) -> list[Ranking]:

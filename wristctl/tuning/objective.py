@@ -68,13 +68,10 @@ class Judge:
         the most promising first, so that a search never ends with what the step alone makes good.
         """
         measured = measure(law, gains, self._cases, self._wrist, self._metrics, converge=False)
-        values, sure = self.value(measured), np.zeros(len(gains), bool)
-        while not sure.all():
-            next_ = int(np.argmin(np.where(sure, np.inf, values)))
-            if values[next_] >= best:
-                break
-            values[next_], sure[next_] = self(law, gains[next_ : next_ + 1])[0], True
-            best = min(best, float(values[next_]))
+        values = self.value(measured)
+        while values[first := int(np.argmin(values))] < best:
+            values[first] = self(law, gains[first : first + 1])[0]
+            best = min(best, float(values[first]))
         return values
 
     def value(self, measured: Measured) -> Array:
