@@ -69,6 +69,42 @@ def _runs_begin_and_end_soon() -> Iterator[None]:
         yield
 
 
+_scandir = os.scandir
+
+
+class _FromTheEnd:
+    """What `os.scandir` gives, the last name first."""
+
+    def __init__(self, path: Any = ".") -> None:
+        with _scandir(path) as listing:
+            self._entries = iter(sorted(listing, key=lambda entry: entry.name, reverse=True))
+
+    def __iter__(self) -> Iterator[os.DirEntry[str]]:
+        return self._entries
+
+    def __next__(self) -> os.DirEntry[str]:
+        return next(self._entries)
+
+    def __enter__(self) -> _FromTheEnd:
+        return self
+
+    def __exit__(self, *raised: object) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Nothing is open."""
+
+
+@pytest.fixture(autouse=True, scope="session")
+def _folders_are_listed_from_the_end() -> Iterator[None]:
+    """A file system lists a folder in whatever order it likes: here never in the one that most of them happen to."""
+    listdir = os.listdir
+    with pytest.MonkeyPatch.context() as session:
+        session.setattr(os, "scandir", _FromTheEnd)
+        session.setattr(os, "listdir", lambda path=None: sorted(listdir(path), reverse=True))
+        yield
+
+
 write_figure = formats.write_figure
 _PIXEL = bytes.fromhex(
     "89504e470d0a1a0a0000000d4948445200000001000000010806000000"
