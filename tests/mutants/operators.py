@@ -50,7 +50,7 @@ _LOOKS = {
     "dpi", "indent", "refresh_per_second", "padding", "aspect", "markevery", "thickness", "stacklevel", "timeout",
     "maxsize", "max_workers", "min_length", "bbox_to_anchor", "rasterized", "clip_on", "capsize", "s", "marker",
     "strict", "allow_nan", "missing_ok", "follow_imports", "sort_keys", "ensure_ascii", "validate", "frozen",
-    "align", "fused",
+    "align", "fused", "dont_inherit", "do_compression", "include_url", "inbounds", "wspace", "hspace", "bins",
 }  # fmt: skip
 """Keywords that say how something looks, how long somebody is waited for, how fast it is, or what is never so."""
 
@@ -58,7 +58,7 @@ _DRAWN = {
     "plot", "text", "annotate", "set", "set_xlim", "set_ylim", "set_xticks", "set_yticks", "legend", "colorbar",
     "figure", "add_patch", "tick_params", "Circle", "Polygon", "Rectangle", "axvspan", "axhspan", "axhline", "axvline",
     "Normalize", "subplots_adjust", "pcolormesh", "fill_between", "scatter", "step", "legend_below", "margins",
-    "set_box_aspect",
+    "set_box_aspect", "_panels",
 }  # fmt: skip
 """Calls in report/ whose numbers are places on a page."""
 
@@ -74,6 +74,8 @@ _PACES = (
     "_PATIENCE",
     "_RESERVE",
     "_POLL",
+    "_LOOK",
+    "_ANSWERS",
 )
 """Beginnings of names of constants that only decide how fast something goes or how long it is kept."""
 
@@ -97,11 +99,33 @@ _TWINS = {
 }  # fmt: skip
 
 
+_SYMMETRIC = {"min", "max", "minimum", "maximum", "dot", "fmul", "hypot", "suppress", "gcd", "isclose", "array_equal"}
+"""Functions of two that give the same for both orders."""
+
+_ROUNDING = 1e-6
+"""Numbers up to this that something is compared with, or that are added to it, stand for rounding."""
+
+
+def _rounds(node: ast.AST) -> bool:
+    """Whether a constant is one of rounding, where it is no factor."""
+    return isinstance(node, ast.Constant) and isinstance(node.value, float) and 0.0 < node.value <= _ROUNDING
+
+
 def _counts(node: ast.expr) -> bool:
     """Whether a side of a comparison is a whole number: among real ones < and <= differ nowhere to be noticed."""
     if isinstance(node, ast.Call):
         return getattr(node.func, "id", "") in ("len", "round", "int")
     return isinstance(node, ast.Constant) and isinstance(node.value, int)
+
+
+def _is_any_of(parent: ast.AST, node: ast.AST) -> bool:
+    """Whether it is a tuple that stands for any of its parts, in whatever order."""
+    if not isinstance(node, ast.Tuple):
+        return False
+    if isinstance(parent, ast.Compare):
+        return node in parent.comparators and isinstance(parent.ops[0], ast.In | ast.NotIn)
+    called = ast.unparse(parent.func).rpartition(".")[2] if isinstance(parent, ast.Call) else ""
+    return called in ("isinstance", "issubclass", "startswith", "endswith")
 
 
 def changes(package: Path, file: Path) -> list[Change]:
@@ -127,7 +151,8 @@ class _Finder:
     def _below(self, node: ast.AST) -> Iterator[Change]:
         for child in ast.iter_child_nodes(node):
             if not self._exempt(node, child):
-                yield from self._of(child)
+                if not _is_any_of(node, child):
+                    yield from self._of(child)
                 yield from self._below(child)
 
     def _exempt(self, parent: ast.AST, node: ast.AST) -> bool:
@@ -137,12 +162,16 @@ class _Finder:
             return isinstance(node.op, ast.Mult)  # 0.0 * x is a zero with x's lanes, whatever x is
         if isinstance(parent, ast.AnnAssign | ast.arg) and node is parent.annotation:
             return True
+        if isinstance(parent, ast.ExceptHandler) and node is parent.type:
+            return True  # in whatever order they stand
         if isinstance(parent, ast.FunctionDef) and (node is parent.returns or node in parent.decorator_list):
             return True
         if isinstance(node, ast.If) and isinstance(node.test, ast.Name) and node.test.id == "TYPE_CHECKING":
             return True
         if isinstance(node, ast.keyword) and node.arg in _LOOKS:
             return True
+        if _rounds(node) and isinstance(parent, ast.Compare | ast.BinOp):
+            return isinstance(parent, ast.Compare) or isinstance(parent.op, ast.Add | ast.Sub)
         if (
             isinstance(node, ast.Constant | ast.Tuple)
             and isinstance(parent, ast.Call | ast.keyword)
@@ -205,7 +234,7 @@ class _Finder:
             _, end = self._span(node.func)
             yield Change(self._name, node.lineno, "twin", end - len(name), end, name, _TWINS[name])
         plain = [each for each in node.args if isinstance(each, ast.Name | ast.Attribute)]
-        if len(node.args) >= 2 and len(plain) >= 2:
+        if len(node.args) >= 2 and len(plain) >= 2 and name not in _SYMMETRIC:
             yield from self._exchanged("order", plain[0], plain[1])
 
     def _exchanged(self, kind: str, one: ast.expr, other: ast.expr) -> Iterator[Change]:
