@@ -31,6 +31,18 @@ def test_light_scales_and_a_picture_saturates() -> None:
     assert (of("picture-bright", 3.0) == 255).mean() > 0.5
 
 
+@pytest.mark.parametrize(("kind", "size", "of_black", "of_grey"), [
+    ("picture-dark", 0.1, 0, 10), ("picture-bright", 1.5, 0, 150), ("picture-bright", 2.0, 0, 200),
+    ("picture-bright", 2.1, 60, 255), ("picture-dark", 2.1, 0, 210),
+])  # fmt: skip
+def test_black_stays_black_but_where_light_is_so_strong_that_it_hazes(
+    kind: str, size: float, of_black: int, of_grey: int
+) -> None:
+    halves = np.repeat(np.array([0, 100], np.uint8), 50).reshape(2, 50)
+    made = spoiled(halves, kind, size, 0, np.random.default_rng(1))  # type: ignore[arg-type]
+    assert (np.abs(made.astype(int) - [[of_black], [of_grey]]) <= 1).all()
+
+
 def test_a_moved_camera_moves_everything_and_a_mirror_shows_no_marker() -> None:
     assert (of("picture-shifted", 20.0)[:, 20:] == PICTURE[:, :-20]).all()
     assert (of("picture-mirrored")[:, ::-1] == PICTURE).all()

@@ -192,13 +192,14 @@ def moved(settings: BenchSettings, substeps: int, wrist: WristParameters = WRIST
     spools, periods = spool_state_of(settings), 1000
     hanging = SpatialLoad(settings, wrist, (0,), spools, substeps)
     spools.energised[:], spools.counted[:] = 1, (-100, 60, 40, 400)
-    rows = np.empty((periods, 2 * hanging.coordinates + 9))
+    rows = np.full((periods, 2 * hanging.coordinates + 9), np.nan)
     for first, last, force in ((0, 300, load), (300, periods, 0.0)):
         time = 1e-3 * np.arange(first, last, dtype=np.float64)
         acting = Disturbances(load=force, toward_deg=50.0), time
         hanging.follow(
             spools, stepper_of(settings), acting, np.empty((0, 3), np.int64), first, np.inf, rows[first:last]
         )  # fmt: skip
+    assert np.isfinite(rows).all() and not rows[:, -1].any(), "nothing bends out of both planes"
     return rows
 
 

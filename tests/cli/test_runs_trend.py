@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import json
 import math
+import re
 from collections.abc import Callable
+from importlib import import_module
 from pathlib import Path
-from types import MappingProxyType
+from types import MappingProxyType, SimpleNamespace
 
 import numpy as np
 import pandas as pd
@@ -141,3 +143,45 @@ def test_slopes_are_per_run_in_order_of_time_or_per_day() -> None:
 def test_what_never_changes_drifts_nowhere() -> None:
     lines = trends_of(readings_of(np.ones((5, 8)), np.arange(5)))
     assert not any(line.drifts for line in lines) and {line.slope for line in lines} == {0.0}
+
+
+NAMED = tuple(f"run-{k}" for k in range(4))
+
+
+@pytest.fixture
+def measured(monkeypatch: pytest.MonkeyPatch) -> list[Reading]:
+    """Readings of `NAMED`, a day apart, in place of runs: a stiffness falls steadily from 20 to 17, a slack rises from
+    1 mm by 0.5 mm a run, and all else stands."""
+    values = np.full((4, 8), 2.0) + 1e-6 * np.random.default_rng(4).normal(size=(4, 8))
+    values[:, 0] = [20.0, 19.001, 17.999, 17.0]
+    values[:, 4] = [1.0, 1.502, 1.998, 2.5]
+    found = readings_of(values, np.arange(4.0))
+    by_id = {reading.run: reading for reading in found}
+    module = import_module("wristctl.cli.runs.trend")  # its function has the same name
+    monkeypatch.setattr(module, "require", lambda name, kind, out: SimpleNamespace(id=name))
+    monkeypatch.setattr("wristctl.identification.rig_trend.check_one_rig", lambda runs: None)
+    monkeypatch.setattr("wristctl.identification.rig_trend.reading_of", lambda run: by_id[run.id])
+    return found
+
+
+@pytest.mark.parametrize("per", ["run", "day"])
+def test_a_fall_and_a_rise_are_told_by_their_size_with_the_lesser_end_first_the_larger_share_on_top(
+    call: Call, measured: list[Reading], per: str
+) -> None:
+    """Of runs named in any order; the changes in all are 3 of 18.5 and 1.5 of 1.75."""
+    code, out, _ = call("runs", "trend", *NAMED[::-1], "--per", per)
+    told = re.findall(
+        rf"^- (.+) (rises|falls) by ([\d.]+) \[([\d.]+), ([\d.]+)\] (.+) per {per}, ([\d.]+) % in all\n  likely: .",
+        out,
+        re.MULTILINE,
+    )
+    assert code == 3 and out.startswith("2 of 8 quantities drift over 4 runs")
+    assert [(name, way, unit) for name, way, *_, unit, _ in told] == [
+        ("slack of tendon 1", "rises", "mm"),
+        ("stiffness, ulnar", "falls", "N m/rad"),
+    ]
+    for (_, _, size, low, high, _, share), slope, whole in zip(told, (0.5, 1.0), (1.5 / 1.75, 3.0 / 18.5), strict=True):
+        assert float(low) < float(size) < float(high) and float(size) == pytest.approx(slope, abs=2e-3)
+        assert float(share) == pytest.approx(100.0 * whole, abs=0.2)
+    columns = [line for line in out.splitlines() if "run-0" in line]
+    assert len(columns) == 1 and re.findall(r"run-\d", columns[0]) == list(NAMED), "oldest first"

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 import wristctl
+from wristctl.commands.audit.command import AUDIT
+from wristctl.commands.inputs import Inputs
+from wristctl.errors import UserError
 from wristctl.records import list_runs
 
 STUDY = """
@@ -38,3 +42,34 @@ def test_each_claim_can_be_drawn_setting_by_setting_with_the_unit_of_what_decide
     assert panel.get_xlabel() == f"{one.leaves[0].name} [{unit}]"
     marks = sum(len(np.asarray(line.get_xdata())) for line in panel.lines if line.get_marker() == "o")
     assert marks == len(one.verdicts) > 20
+
+
+def plan_of(tmp_path: Path, **box: str) -> str:
+    settings = {"draws": "8", "continuous": "[2, 1]", "horizon": "2.0", **box}
+    text = STUDY
+    for name, value in settings.items():
+        text = re.sub(rf"{name}: .+", f"{name}: {value}", text)
+    (tmp_path / "own.yaml").write_text(text)
+    return AUDIT.plan(wristctl.load_study(tmp_path / "own.yaml"), Inputs())
+
+
+def test_a_plan_counts_the_settings_drawn_with_those_in_nearly_continuous_time(tmp_path: Path) -> None:
+    assert "11 settings drawn" in plan_of(tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("within", "beyond"),
+    [
+        ({"continuous": "[100000, 100000]", "horizon": "40.0"}, {"continuous": "[100000, 100000]", "horizon": "60.0"}),
+        ({"continuous": "[100000, 100000]", "horizon": "40.0"}, {"continuous": "[150000, 150000]", "horizon": "40.0"}),
+        ({"draws": "1000000", "horizon": "2.0"}, {"draws": "1000000", "horizon": "100000.0"}),
+    ],
+)
+def test_a_box_that_would_run_for_weeks_is_refused_at_once(
+    tmp_path: Path, within: dict[str, str], beyond: dict[str, str]
+) -> None:
+    """In nearly continuous time a second has a million steps; 1e13 steps are too many."""
+    plan_of(tmp_path, **within)
+    with pytest.raises(UserError, match=r"steps of .* rollouts") as caught:
+        plan_of(tmp_path, **beyond)
+    assert "audit.box" in caught.value.where and "shorter horizon" in str(caught.value)

@@ -226,3 +226,65 @@ def test_a_law_sees_the_load_that_the_observer_makes_out(level: str) -> None:
     done = followed(looking, "default", loop)
     seen, kept = done.column("torque_wanted", 0), done.column("load", 0)
     assert "load" in RECORDED and np.array_equal(seen, kept) and (np.ptp(seen) > 0.0) == (level == "camera")
+
+
+def by_each(name: str, gains: tuple[float, ...], memory: np.ndarray, count: int, **now: float) -> np.ndarray:
+    """Derivative of a law's torque by each of the first numbers that it remembers, by central differences."""
+    found = []
+    for place in range(count):
+        nudged = [
+            torque(name, gains, memory + side * 1e-6 * (np.arange(len(memory)) == place), **now) for side in (1, -1)
+        ]
+        found.append((nudged[0] - nudged[1]) / 2e-6)
+    return np.array(found)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_every_weight_of_the_network_learns_down_its_own_gradient(seed: int) -> None:
+    """By the MIT rule, at the rate eta: what the torque in reach changes by the weight, times e_m + de_m/dt / w."""
+    law, rng = controller("nn-mrac"), np.random.default_rng(seed)
+    weights = law.memory - 3
+    memory = np.concatenate([rng.uniform(-0.4, 0.4, weights), [1.0, 0.1, 0.3]])
+    gains = {"w": 20.0, "zeta": 0.7, "eta": 50.0, "Kd": 0.1}
+    now = {"theta": 0.17, "rate": 0.5, "theta_ref": 0.2, "torque_low": -2.0, "torque_high": 3.0, "period": 1e-3}
+    gradient = by_each("nn-mrac", law.values(gains), memory, weights, **now) / 2.5
+    assert (gradient != 0.0).all()
+    after = memory.copy()
+    torque("nn-mrac", law.values(gains), after, **now)
+    step = -1e-3 * 50.0 * (0.07 + 0.2 / 20.0)
+    np.testing.assert_allclose(after[:weights] - memory[:weights], step * gradient, rtol=1e-5, atol=1e-10)
+    assert after[weights] == 1.0
+    model = (after[-2] - 0.1) / 1e-3, after[-1]
+    assert model == pytest.approx((after[-1], 0.3 + 1e-3 * (400.0 * (0.2 - after[-2]) - 28.0 * after[-1])))
+
+
+def test_the_weights_of_the_network_stay_within_ten_of_where_they_began() -> None:
+    law = controller("nn-mrac")
+    gains = law.values({"w": 20.0, "zeta": 0.7, "eta": 1e9, "Kd": 0.1})
+    memory = np.concatenate([np.full(law.memory - 3, 0.3), [1.0, 0.5, 0.0]])
+    torque("nn-mrac", gains, memory, theta=0.1, rate=-0.5, theta_ref=0.2)
+    assert np.abs(memory[:-3]).max() == 10.0 and set(np.sign(memory[:-3])) == {-1.0, 1.0}
+
+
+def test_the_impedances_network_moves_toward_the_load_that_the_momentum_shows() -> None:
+    """Along its outputs, by h eta phi.phi/(1 + h eta phi.phi) of the way at the state where it stands."""
+    law, rng = controller("impedance"), np.random.default_rng(0)
+    begun = np.zeros(law.memory)
+    at: dict[str, float] = {"theta": 0.2, "rate": 0.4, "theta_ref": 0.25, "rate_ref": 0.1}
+    first = {"K": 3.0, "D": 0.2, "eta": 1e-9, "wo": 100.0}
+    torque("impedance", law.values(first), begun, **at)
+    weights = law.memory - 9
+    begun[weights:] = rng.uniform(-0.3, 0.3, 9)
+    later = at | {"rate": 0.5}
+    shown = []
+    for eta in (1e12, 10.0, 300.0):
+        gains = law.values(first | {"eta": eta})
+        outputs = -by_each("impedance", gains, begun, law.memory, **later)[weights:]
+        size, after = float(outputs @ outputs), begun.copy()
+        torque("impedance", gains, after, **later)
+        moved = after[weights:] - begun[weights:]
+        np.testing.assert_allclose(moved, moved[0] * outputs, rtol=1e-5, atol=1e-10)
+        assert outputs[0] == pytest.approx(1.0) and moved[0] != 0.0
+        share = 1e-3 * eta * size
+        shown.append(float(moved @ outputs) * (1.0 + share) / share)
+    assert shown == pytest.approx([shown[0]] * 3, rel=1e-4)

@@ -27,6 +27,7 @@ from wristctl.control.computed_torque import COMPUTED_TORQUE
 from wristctl.control.law import Controller, Gain
 from wristctl.control.plain_model import plain_one_segment
 from wristctl.control.table import CONTROLLERS
+from wristctl.control.vetting import vet
 from wristctl.errors import UserError
 from wristctl.interrupt import from_outside, interrupts
 from wristctl.simulation.outcome import Outcome
@@ -196,6 +197,22 @@ def test_every_table_flags_it(monkeypatch: pytest.MonkeyPatch) -> None:
             assert all("plainly(py)" in str(row[at]) for row in table.rows), table.title
     with pytest.raises(UserError, match="plain Python"):
         face.analyse(Study.model_validate({"simulate": {"controller": law.name, "gains": "default"}}))
+
+
+def test_each_preset_is_tried_on_random_states_before_a_controller_runs() -> None:
+    """One preset that gives no number is enough, and so are gains between their limits where there is no preset."""
+
+    def root(now: Any, wrist: Any, gains: Any, memory: Any) -> float:
+        return math.nan if gains.k < 0.3 else -gains.k * now.theta
+
+    gains = {"k": Gain("N m/rad", "", 0.1, 10.0)}
+    tried = vet(plain(root, gains=gains, presets={"soft": {"k": 0.5}, "stiff": {"k": 2.0}}), "here")
+    assert set(np.ravel(tried.gains)) == {0.5, 2.0}
+    np.testing.assert_allclose(vet(plain(root, gains=gains, presets={}), "here").gains, 1.0)
+    for number in (0, 1):
+        presets = {"odd" if k == number else f"sound-{k}": {"k": 0.2 if k == number else 1.0} for k in (0, 1)}
+        with pytest.raises(UserError, match=r"returned nan"):
+            vet(plain(root, gains=gains, presets=presets), "here")
 
 
 @pytest.mark.slow

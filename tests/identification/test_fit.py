@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -10,7 +13,7 @@ import pytest
 from tests.identification.benches import KNOWN, LEVEL, TENDONS, UPRIGHT, logged, problem, tendons
 from wristctl.config.loop import Loop, Reference
 from wristctl.control.table import controller
-from wristctl.identification.fit import SPOOL, Coordinate, fit, linearise
+from wristctl.identification.fit import SPOOL, Coordinate, Linearisation, fit, frame_noise, linearise
 from wristctl.identification.forward import SupposedWrist, angles
 from wristctl.identification.intervals import (
     autocorrelation,
@@ -162,3 +165,79 @@ def test_tendons_move_nothing_that_is_not_theirs() -> None:
     candidates = [SupposedWrist(KNOWN, tendons(20e3, 0.0), taut) for taut in ((0.0,) * 4, (1e-5, 0.0, 0.0, 0.0))]
     straight, bent = angles(candidates, np.full((50, 4), 2e-4), 1e-3, 1)[:, -1]
     assert bent - straight == pytest.approx(1e-5 / (4.0 * KNOWN.tendon_offset), rel=0.05)
+
+
+SIGMA, FRAMES = 0.01, 400
+
+
+def made_up(
+    monkeypatch: pytest.MonkeyPatch,
+    shape: Callable[[float], tuple[float, float]],
+    slopes: Callable[[float], tuple[float, float]],
+    begins: tuple[float, ...],
+    prior: float = 0.0,
+) -> Any:
+    """A problem of one coordinate x: `shape` of two columns, which are alike in no frame, with white noise on top."""
+    rng = np.random.default_rng(0)
+    columns, _ = np.linalg.qr(rng.standard_normal((FRAMES, 2)))
+    noise = SIGMA * rng.standard_normal(FRAMES)
+    noise -= columns @ (columns.T @ noise)
+
+    def at(_: Any, x: np.ndarray) -> Linearisation:
+        return Linearisation([columns @ shape(float(x[0]))], [(columns @ slopes(float(x[0])))[:, None]])
+
+    monkeypatch.setattr("wristctl.identification.fit.linearise", at)
+    return SimpleNamespace(
+        trials=[SimpleNamespace(angle=noise)], free=("x",), prior=lambda: np.array([prior]),
+        begins=lambda: [np.array([each]) for each in begins],
+        bounds=lambda: (np.array([-10.0]), np.array([10.0])),
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_of_two_minima_the_lower_is_the_fit_and_the_other_its_rival(
+    side: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Two wells at +-1, of which one lies higher by 3 standard deviations of the noise squared."""
+    tilt = 1.5 * SIGMA
+    asked = made_up(
+        monkeypatch, lambda x: (x * x - 1.0, tilt * (x - side)), lambda x: (2.0 * x, tilt), (-3.0, 3.0)
+    )  # fmt: skip
+    found = fit(asked)
+    assert found.x[0] == pytest.approx(side, abs=1e-3)
+    assert [rival.x[0] for rival in found.rivals] == [pytest.approx(-side, abs=0.01)]
+    assert found.rivals[0].excess == pytest.approx(9.0 * (SIGMA / found.noise) ** 2, rel=0.01)
+    assert found.noise == pytest.approx(SIGMA, rel=0.1)
+    assert found.evaluations > 10
+
+
+def test_searches_that_end_in_one_minimum_have_no_rival(monkeypatch: pytest.MonkeyPatch) -> None:
+    found = fit(made_up(monkeypatch, lambda x: (x - 2.0, 0.0), lambda x: (1.0, 0.0), (-3.0, 0.0, 5.0)))
+    assert found.x[0] == pytest.approx(2.0, abs=1e-6) and found.rivals == ()
+
+
+def test_a_beginning_that_leads_far_higher_goes_no_further_and_is_no_rival(monkeypatch: pytest.MonkeyPatch) -> None:
+    asked = made_up(monkeypatch, lambda x: (x * x - 1.0, 0.1 * (x - 1.0)), lambda x: (2.0 * x, 0.1), (-3.0, -2.0, 3.0))
+    found = fit(asked)
+    assert found.x[0] == pytest.approx(1.0, abs=1e-3)
+    assert found.rivals == () and found.evaluations < 60
+
+
+def test_what_is_known_beforehand_counts_by_its_deviation_beside_the_noise(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Readings say 1 +- sigma, it was known as 0 +- 2 sigma: between them as the inverse variances have it."""
+    asked = made_up(monkeypatch, lambda x: (x - 1.0, 0.0), lambda x: (1.0, 0.0), (0.5,), prior=1.0 / (2.0 * SIGMA))
+    found = fit(asked)
+    readings, known = 1.0 / found.noise**2, 1.0 / (2.0 * SIGMA) ** 2
+    assert found.x[0] == pytest.approx(readings / (readings + known), rel=0.09)
+    (left,) = found.residuals
+    assert found.noise == pytest.approx(np.sqrt(left @ left / (FRAMES - 1)), rel=1e-6)
+
+
+def test_the_noise_of_frames_is_told_from_any_slow_course() -> None:
+    """Of each, white noise of 2 mrad; a jump is one frame of many."""
+    rng = np.random.default_rng(1)
+    time = np.linspace(0.0, 5.0, 3000)
+    course = np.sin(time) + 3.0 * time + (time > 2.0)
+    white = [2e-3 * rng.standard_normal(3000) for _ in range(2)]
+    assert frame_noise(white) == pytest.approx(2e-3, rel=0.05)
+    assert frame_noise([course + each for each in white]) == pytest.approx(frame_noise(white), rel=0.01)

@@ -135,3 +135,77 @@ def test_a_file_that_cannot_be_read_is_named(tmp_path: Path) -> None:
     (tmp_path / "picture.png").write_bytes(bytes(range(256)))
     with pytest.raises(UserError, match=r"no text in UTF-8.*picture\.png"):
         read_loop(tmp_path / "picture.png", WRIST)
+
+
+def test_of_four_tendons_each_side_is_the_mean_of_its_pair(tmp_path: Path) -> None:
+    """4 and 5 pull toward ulnar, where the angle is positive, 1 and 2 away from there."""
+    two = read(text_of(COLUMNS), tmp_path)
+    apart = 0.3 * np.sin(3.0 * TIME)
+    four = without("spool", "tension")
+    for quantity, unit in (("spool", "mm"), ("tension", "N")):
+        plus, minus = (COLUMNS[f"{quantity}_{side} [{unit}]"] for side in ("plus", "minus"))
+        each = {1: minus - apart, 2: minus + apart, 4: plus + apart, 5: plus - apart}
+        four |= {f"{quantity}_{tendon} [{unit}]": values for tendon, values in each.items()}
+    pairs = read(text_of(four), tmp_path)
+    assert pairs.spools is not None and pairs.tensions is not None
+    np.testing.assert_allclose(pairs.spools, np.asarray(two.spools), atol=1e-12)
+    np.testing.assert_allclose(pairs.tensions, np.asarray(two.tensions), atol=1e-12)
+    other = {name.replace("_5", "_3"): values for name, values in four.items()}
+    with pytest.raises(UserError, match="spool of tendons 1, 2, 3, 4"):
+        read(text_of(other), tmp_path)
+
+
+def test_a_bend_is_read_in_the_plane_in_which_the_wrist_moves(tmp_path: Path) -> None:
+    """In either; what it shows beside that is noise up to 5 deg from end to end."""
+    across = 2.0 * np.cos(TIME) + 0.3
+    for along, beside in (("bend_y", "bend_z"), ("bend_z", "bend_y")):
+        columns = without("angle") | {f"{along} [deg]": ANGLE, f"{beside} [deg]": across}
+        np.testing.assert_allclose(read(text_of(columns), tmp_path).angle, np.radians(ANGLE))
+        np.testing.assert_allclose(
+            read(text_of(columns | {f"{beside} [deg]": 1.24 * across}), tmp_path).angle, np.radians(ANGLE)
+        )
+        with pytest.raises(UserError, match=r"leaves its plane by 5\.04 deg"):
+            read(text_of(columns | {f"{beside} [deg]": 1.26 * across}), tmp_path)
+
+
+def test_a_log_without_times_is_taken_as_slow(tmp_path: Path) -> None:
+    loop = read(text_of(without("time")), tmp_path)
+    np.testing.assert_allclose(np.diff(loop.time), 0.1)
+    assert len(loop.time) == len(TIME)
+
+
+STRETCHED = {"spool_plus [mm]", "spool_minus [mm]"}
+
+
+def scaled(names: set[str], factor: float) -> dict[str, np.ndarray]:
+    return {name: factor * each if name in names else each for name, each in COLUMNS.items()}
+
+
+def short(count: int) -> dict[str, np.ndarray]:
+    """So many samples of a whole cycle."""
+    return {name: np.interp(np.linspace(0.0, 5.0, count), TIME, each) for name, each in COLUMNS.items()}
+
+
+def pushed(share: float) -> dict[str, np.ndarray]:
+    """With a tension below nothing by a share of the largest, which is 8 N, in one sample."""
+    dip = np.where(np.arange(len(TIME)) == 7, -8.0 * share, COLUMNS["tension_minus [N]"])
+    return COLUMNS | {"tension_minus [N]": dip}
+
+
+@pytest.mark.parametrize(
+    ("fits", "beyond", "what"),
+    [
+        (short(100), short(99), "99 samples"),
+        (scaled({"angle [deg]", *STRETCHED}, 3.33), scaled({"angle [deg]", *STRETCHED}, 3.34), "it bends by 100 deg"),
+        (pushed(0.049), pushed(0.051), "a tendon pushes"),
+        (scaled(STRETCHED, 2.97), scaled(STRETCHED, 3.03), "3 times as far"),
+        (scaled(STRETCHED, 0.337), scaled(STRETCHED, 0.33), "0.33 times as far"),
+    ],
+)
+def test_a_log_is_refused_only_where_it_can_be_no_loop_of_this_wrist(
+    fits: dict[str, np.ndarray], beyond: dict[str, np.ndarray], what: str, tmp_path: Path
+) -> None:
+    """The wrist of the default settings, whose range is 50 deg."""
+    read(text_of(fits), tmp_path)
+    with pytest.raises(UserError, match=what):
+        read(text_of(beyond), tmp_path)

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import os
+import time
 from pathlib import Path
 
 import pytest
 
 from wristctl.lanes import compiled as kernel_folder
-from wristctl.lanes.compiled import is_shared, kernels_folder
+from wristctl.lanes.compiled import cache_folder, is_shared, kernels_folder
 
 
 @pytest.fixture
@@ -56,3 +58,30 @@ def test_a_folder_that_is_named_is_taken(home: Path, tmp_path: Path, monkeypatch
     mounted(monkeypatch, tmp_path, "nfs", home)
     monkeypatch.setenv("WRISTCTL_KERNELS", str(tmp_path / "named"))
     assert kernels_folder() == tmp_path / "named"
+
+
+def test_what_nothing_has_used_for_30_days_is_removed(
+    home: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("WRISTCTL_KERNELS", str(tmp_path / "named"))
+    for days in (0.0, 29.0, 31.0, 400.0):
+        folder = tmp_path / "named" / f"{days:g}"
+        folder.mkdir(parents=True)
+        (folder / "law.nbi").touch()
+        os.utime(folder, (time.time() - 86400.0 * days,) * 2)
+    assert kernel_folder._kernels.__wrapped__() == tmp_path / "named"
+    assert sorted(each.name for each in (tmp_path / "named").iterdir()) == ["0", "29"]
+
+
+def test_the_folder_is_made_when_it_is_first_used_and_each_use_counts(
+    home: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(kernel_folder, "_kernels", kernels_folder)
+    (tmp_path / "law.py").write_text("gain = 1.0\n")
+    folder = cache_folder.__wrapped__(tmp_path / "law.py")
+    assert folder is not None and folder.parent == home / "wristctl" / "kernels"
+    os.utime(folder, (0.0, 0.0))
+    assert cache_folder.__wrapped__(tmp_path / "law.py") == folder and list(folder.iterdir()) == []
+    assert time.time() - folder.stat().st_mtime < 3600.0
+    assert cache_folder.__wrapped__(tmp_path / "law.py", frozen=b"2") not in (folder, None)
+    assert cache_folder.__wrapped__(tmp_path / "typed.py") is None

@@ -40,6 +40,13 @@ def test_every_block_names_its_rows_and_shows_a_column_however_narrow_the_termin
     assert heads == ["name  ab", "name  cdef", "name  g"]
 
 
+@pytest.mark.parametrize(("width", "kept"), [(17, 4), (16, 3), (10, 2), (1, 2)])
+def test_where_there_is_no_room_the_last_columns_are_left_out(width: int, kept: int) -> None:
+    narrow = FOUR.within(width)
+    assert list(narrow.columns) == list(FOUR.columns[:kept])
+    assert [list(row) for row in narrow.rows] == [list(row[:kept]) for row in FOUR.rows]
+
+
 def test_words_stand_to_the_left_and_numbers_to_the_right() -> None:
     mixed = Table("", ("mixed", "words", "count"), [("a", "b", 1), (2, "c", None)]).text().splitlines()
     assert mixed[2:] == ["a      b          1", "2      c          -"]

@@ -18,7 +18,7 @@ from wristctl.config.study import Study
 from wristctl.config.wrist import WristParameters
 from wristctl.plotting import spatial_view as view_module
 from wristctl.plotting.page import page
-from wristctl.plotting.spatial_view import ANGLE, MOST, PLACE, PULL, cables, motion_in_space, rim, spatial_view
+from wristctl.plotting.spatial_view import ANGLE, MOST, PLACE, PULL, cables, motion_in_space, rim, seen, spatial_view
 from wristctl.plotting.style import TENDON_COLOURS
 from wristctl.records import Run, start_run
 from wristctl.simulation.bend_course import BendCourse
@@ -256,3 +256,13 @@ def test_the_view_fits_the_page(browser: Browser, tmp_path: Path, width: int) ->
         "return [document.getElementById('stage').clientWidth, t.height]"
     )
     assert stage > 0.4 * width and 10.0 < letters < 24.0
+
+
+def test_the_figures_view_turns_space_and_neither_stretches_nor_mirrors_it() -> None:
+    """From above and from the side: the straight wrist stands upright, and its far end is the nearer one."""
+    right, up, away = seen(np.eye(3)).T
+    np.testing.assert_allclose(np.array([right, up, away]) @ np.array([right, up, away]).T, np.eye(3), atol=1e-12)
+    np.testing.assert_allclose(np.cross(right, up), -away, atol=1e-12)
+    assert right[0] == 0.0 and up[0] > 0.5 and -1.0 < away[0] < 0.0
+    ulnar, flexion = seen(np.eye(3)[1:])
+    assert abs(ulnar[0]) > 0.5 and abs(flexion[0]) > 0.5, "neither plane is seen edge on"

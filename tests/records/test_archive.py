@@ -68,6 +68,13 @@ def test_a_run_arrives_with_all_that_it_was_made_from_as_it_was_sealed(
     assert not again.new and [each.id for each in again.known] == [each.id for each in chain]
 
 
+def test_files_may_stand_in_an_archive_in_any_order(packed: tuple[list[Run], Path], tmp_path: Path) -> None:
+    """Of one that others packed anew, those deepest in folders first."""
+    chain, file = packed
+    deepest = rewritten(file, lambda entries: dict(sorted(entries.items(), key=lambda entry: -entry[0].count("/"))))
+    assert [each.problems() for each in unpack(deepest, tmp_path / "colleague").new] == [[]] * len(chain)
+
+
 def test_the_same_runs_are_the_same_archive(packed: tuple[list[Run], Path], tmp_path: Path) -> None:
     chain, file = packed
     pack(chain[-1], tmp_path / "twice.zip")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import platform
 from pathlib import Path
 from typing import Any
 
@@ -10,7 +11,7 @@ import numpy as np
 import pytest
 
 from wristctl.config.study import Study
-from wristctl.records import Run, list_runs, start_run, stream
+from wristctl.records import Run, list_runs, provenance, start_run, stream
 from wristctl.records.files import sha256_of_list
 from wristctl.records.manifest import Code, Environment
 from wristctl.records.start import fingerprint
@@ -124,3 +125,56 @@ def test_streams_of_other_names_and_seeds_are_others() -> None:
     drawn = [np.random.default_rng(stream(*each)).random() for each in ((0, "a"), (0, "b"), (1, "a"))]
     assert len(set(drawn)) == 3
     assert drawn[0] == np.random.default_rng(stream(0, "a")).random()
+
+
+@pytest.mark.parametrize(
+    ("told", "cpu", "features"),
+    [
+        (
+            "processor\t: 0\nmodel name\t: Some CPU: 2 GHz\nflags\t\t: fpu sse2 sse4_2 fma avx2 avx512f\n\n"
+            "processor\t: 1\nmodel name\t: Another\nflags\t\t: fpu\n",
+            "Some CPU: 2 GHz",
+            ["avx2", "avx512f", "fma", "sse4_2"],
+        ),
+        ("processor\t: 0\nFeatures\t: fp asimd sve crc32\n", "as Python says", ["asimd", "sve"]),
+        ("processor\t: 0\n", "as Python says", []),
+        (None, "as Python says", []),
+    ],
+    ids=["of Intel's kind", "of ARM's kind", "silent", "on another system"],
+)
+def test_a_processor_is_known_by_its_name_and_its_vector_instructions(
+    told: str | None, cpu: str, features: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    file = tmp_path / "cpuinfo"
+    if told is not None:
+        file.write_text(told)
+    monkeypatch.setattr(provenance, "Path", lambda name: file if name == "/proc/cpuinfo" else Path(name))
+    monkeypatch.setattr("platform.processor", lambda: "as Python says")
+    found, _ = provenance.environment_state()
+    assert (found.cpu, found.features) == (cpu, features)
+
+
+THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
+CODE_PATHS = (
+    "OPENBLAS_CORETYPE", "MKL_CBWR", "NUMBA_CPU_NAME", "NUMBA_CPU_FEATURES", "NUMBA_OPT", "NPY_DISABLE_CPU_FEATURES",
+    "NPY_ENABLE_CPU_FEATURES", "ATEN_CPU_CAPABILITY", "ONEDNN_MAX_CPU_ISA",
+)  # fmt: skip
+
+
+def test_settings_by_which_libraries_compute_otherwise_are_noted_each_by_its_name(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    for name in (*THREADS, *CODE_PATHS, "WRISTCTL_OF_NO_MATTER"):
+        monkeypatch.delenv(name, raising=False)
+    bare, _ = provenance.environment_state()
+    assert bare.threads == bare.settings == {}
+    for number, name in enumerate((*THREADS, *CODE_PATHS, "WRISTCTL_OF_NO_MATTER"), start=1):
+        monkeypatch.setenv(name, str(number))
+    found, listing = provenance.environment_state()
+    assert found.threads == {name: str(number) for number, name in enumerate(THREADS, start=1)}
+    assert found.settings == {name: str(number) for number, name in enumerate(CODE_PATHS, start=5)}
+    assert found.packages["numpy"] == np.__version__ and {"scipy", "numba", "pandas"} <= set(found.packages)
+    names = [line.partition("==")[0] for line in listing.splitlines()]
+    assert f"numpy=={np.__version__}\n" in listing and names == sorted(set(names))
+    assert found.packages_sha256 == hashlib.sha256(listing.encode()).hexdigest()
+    assert (found.python, found.machine) == (platform.python_version(), platform.machine())

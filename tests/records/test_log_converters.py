@@ -14,6 +14,7 @@ from scipy.spatial.transform import Rotation
 
 from wristctl.errors import UserError
 from wristctl.records.log_converters import ARM_STEP, read_log, spirob_log
+from wristctl.records.xlsx import read_sheets
 
 NECK_OPEN = (
     "time,target_motor1,encoder1,target_motor2,encoder2,target_motor3,encoder3,inclination_target,inclination_sensor,"
@@ -161,6 +162,11 @@ def test_the_probes_bend_is_its_turn_in_the_base_whichever_way_that_stands(tmp_p
     (tmp_path / "text.xlsx").write_text("no zip")
     with pytest.raises(UserError, match="no Excel workbook"):
         read_log(tmp_path / "text.xlsx", "tee-probe")
+
+
+def test_rows_of_a_sheet_are_as_long_as_its_longest(tmp_path: Path) -> None:
+    file = workbook(tmp_path / "a.xlsx", {"One": [["a", "b", "c"], [1.0], [2.0, 3.0]], "None": []})
+    assert read_sheets(file) == {"One": [["a", "b", "c"], ["1.0", "", ""], ["2.0", "3.0", ""]], "None": []}
 
 
 def test_the_spirobs_lengths_become_spools_and_its_joints_one_bend() -> None:

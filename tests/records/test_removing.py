@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import errno
+import os
 import shutil
 import tempfile
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from threading import Thread
+from typing import Any
 
 import pytest
 
@@ -135,6 +138,27 @@ def test_of_two_who_delete_a_folder_the_second_leaves_it_to_the_first(tmp_path: 
     held.release()
     clear(next(leftovers(tmp_path)))
     assert not folder.exists()
+
+
+@pytest.mark.parametrize("room", [True, False], ids=["with room for its lock", "on a full disk"])
+def test_whoever_deletes_a_folder_keeps_nothing_of_it_open(
+    tmp_path: Path, room: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    folder, original = tmp_path / ".run.removed", os.open
+    (folder / "data").mkdir(parents=True)
+    (folder / "run.json").touch()
+
+    def opened(path: Any, flags: int, *given: Any, **named: Any) -> int:
+        if not room and flags & os.O_CREAT:
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(path))
+        return original(path, flags, *given, **named)
+
+    monkeypatch.setattr("wristctl.records.lock.os.open", opened)
+    before = len(os.listdir("/dev/fd"))
+    delete_folder(folder)
+    assert not folder.exists() and len(os.listdir("/dev/fd")) <= before
+    delete_folder(folder)
+    assert not folder.exists(), "one that is gone stays so"
 
 
 def test_a_run_begins_although_its_empty_folder_was_taken_away(results: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import math
 import os
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -11,11 +13,11 @@ import pytest
 
 from wristctl.api import simulate as simulated
 from wristctl.comparison.unknowns_sampling import drawn_settings
-from wristctl.config.loop import LOOPS, Loop, Reference
+from wristctl.config.loop import LOOPS, MOST_SUBSTEPS, Loop, Reference
 from wristctl.config.unknowns_box import PaperSetting
 from wristctl.config.wrist import WristParameters
 from wristctl.control.table import controller, gains_of
-from wristctl.simulation.convergence import agree, in_doubt, tolerance
+from wristctl.simulation.convergence import agree, in_doubt, in_one_go, tolerance
 from wristctl.simulation.outcome import Outcome
 from wristctl.simulation.reference import motion
 from wristctl.simulation.rollout import rollout, structure
@@ -172,3 +174,39 @@ def test_what_is_simulated_says_how_many_steps_it_took_and_whether_they_were_eno
     short = simulated(load_study([], [*chosen, "wrist.tension_limit=58", "simulate.loop.substeps=1"], "simulate"))
     assert enough.metrics["substeps"] > 1 and enough.metrics["drift"] == 0.0
     assert short.metrics["substeps"] == 1 and short.metrics["drift"] > 0.0
+
+
+def _summed(excess: list[float], steps: int, swings: float) -> Any:
+    """What `in_one_go` reads of rollouts of 1 deg RMSE, without kinks, whose errors are so many times the limit."""
+    count, rmse = len(excess), np.deg2rad(1.0)
+    metrics = {"rmse": rmse, "peak_tension": 20.0, "chattering": 2.0 * 20.0 * swings}
+    return SimpleNamespace(
+        metrics={name: np.full(count, value) for name, value in metrics.items()},
+        step_error=np.array(excess) * 4.0 * 0.01 * rmse,
+        steps=np.full(count, steps),
+    )
+
+
+@pytest.mark.parametrize("steps", [1, 5])
+def test_a_rollout_that_cannot_run_again_asks_for_a_power_of_two_of_steps_that_is_twice_its_excess(steps: int) -> None:
+    excess = [0.0, 0.99, 1.01, 1.5, 2.5, 7.0]
+    doubtful, wanted = in_one_go(_summed(excess, steps, 0.0), np.zeros(len(excess), bool))
+    assert doubtful.tolist() == [False, False, True, True, True, True]
+    assert (wanted[:2] == steps).all() and wanted[2:].tolist() == [4 * steps, 4 * steps, 8 * steps, 16 * steps]
+    ratio = wanted[2:] / steps
+    assert (ratio >= 2.0 * np.array(excess[2:])).all() and (ratio < 4.0 * np.array(excess[2:])).all()
+    kinked, _ = in_one_go(_summed(excess, steps, 0.0), np.ones(len(excess), bool))
+    assert not kinked.any(), "kinks are taken for errors: eight times as much is borne"
+
+
+def test_where_tensions_swing_errors_count_eightfold_and_twice_as_many_steps_again_are_asked_for() -> None:
+    calm, swinging = (in_one_go(_summed([0.11, 0.13, 0.3], 2, swings), np.zeros(3, bool)) for swings in (1.0, 300.0))
+    assert not calm[0].any() and swinging[0].tolist() == [False, True, True]
+    assert swinging[1].tolist() == [2, 2 * 8, 2 * 16]
+
+
+def test_of_errors_that_nobody_knows_or_that_are_beyond_all_the_most_steps_are_asked_for() -> None:
+    doubtful, wanted = in_one_go(_summed([math.nan, 1e9], 1, 0.0), np.zeros(2, bool))
+    assert doubtful.all() and wanted[0] == wanted[1] >= 64
+    _, most = in_one_go(_summed([math.nan], MOST_SUBSTEPS // 2 + 1, 0.0), np.zeros(1, bool))
+    assert most[0] == MOST_SUBSTEPS

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
@@ -11,9 +12,11 @@ from wristctl.config.hysteresis import HysteresisSettings
 from wristctl.config.wrist import WristParameters
 from wristctl.errors import UserError
 from wristctl.simulation.hysteresis import HysteresisLoop, dead_bands, friction_cases, loops, main_case
-from wristctl.simulation.spool_driven import Strokes, strokes
+from wristctl.simulation.spool_driven import FrictionCase, Strokes, strokes
+from wristctl.wrist.statics import least_stiffness
+from wristctl.wrist.tendons import TENDONS_PER_SIDE
 
-WRIST = WristParameters()
+WRIST, STROKES = WristParameters(), HysteresisSettings()
 
 
 def stroke(**own: Any) -> Strokes:
@@ -79,6 +82,24 @@ def test_ramps_leave_held_spools_at_the_roots_of_the_statics(ramp: float) -> Non
         assert each.exact_below < each.unhindered < each.exact_above
 
 
+@pytest.mark.parametrize("drive", ["spools", "tensions"])
+def test_friction_alone_holds_a_wrist_between_two_roots_about_its_angle_and_elastic_spools_narrow_them(
+    drive: str,
+) -> None:
+    """By the capstan on bare tendons: a torque of mu phi times the pulls' arms, over the stiffness that is felt."""
+    own, bend = stroke(drive=drive), math.radians(20.0)
+    found = own.exact([FrictionCase(0.0, 0.0, 2e-5), FrictionCase(0.02, 0.0, 2e-5)], np.full(2, bend))
+    assert found[0] == pytest.approx([bend, bend], abs=1e-9)
+    below, above = found[1]
+    assert below < bend < above and 0.5 * (below + above) == pytest.approx(bend, abs=0.1 * (above - below))
+    pulls = own.given(np.array(bend)) if drive == "tensions" else stroke(drive="tensions").given(np.array(bend))
+    lost = 0.02 * bend * float(pulls.sum()) * WRIST.tendon_offset
+    springs = least_stiffness(WRIST, STROKES.segments)
+    spools = 2.0 * TENDONS_PER_SIDE * STROKES.tendon_stiffness * WRIST.tendon_offset**2
+    felt = springs + spools if drive == "spools" else springs
+    assert spools > 10.0 * springs and above - below == pytest.approx(2.0 * lost / felt, rel=0.2)
+
+
 def test_held_pulls_leave_a_dead_band_many_times_as_wide() -> None:
     """By the springs alone: the spools' tendons had most of the stiffness."""
     wide, narrow = (
@@ -123,6 +144,9 @@ def test_a_loop_to_the_other_side_is_the_mirror_image() -> None:
 def test_a_triangle_goes_at_one_speed() -> None:
     (done,) = loops(stroke(shape="triangle", frequencies=(0.02,), sheaths=(1.0,)))
     steps = np.abs(np.diff(done.unhindered))
+    down, up = np.linspace(30.0, 0.0, 101), np.linspace(0.0, 30.0, 101)
+    np.testing.assert_allclose(np.degrees(done.unhindered), [*down, *up[1:]], atol=1e-9)
+    assert done.course.theta[0] == pytest.approx(done.course.theta[-1], abs=1e-6), "it closes"
     np.testing.assert_allclose(steps, np.radians(30.0) / 100.0, rtol=1e-9)
     assert done.unhindered[0] == pytest.approx(np.radians(30.0)) and done.unhindered[100] == pytest.approx(
         0.0, abs=1e-12

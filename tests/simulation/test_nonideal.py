@@ -10,6 +10,7 @@ from wristctl.config.loop import Loop, Reference
 from wristctl.config.plant import Actuator, Plant, Sensor, TrueActuator, TrueWrist
 from wristctl.control.table import controller, gains_of
 from wristctl.errors import UserError
+from wristctl.simulation.nonideal import is_ideal, nonideal_of, wears
 from wristctl.simulation.outcome import Outcome
 from wristctl.simulation.reference import motion
 from wristctl.simulation.rollout import rollout
@@ -126,6 +127,32 @@ def test_a_motor_falls_back_by_electrical_turns_where_it_is_pulled_harder_than_i
         assert done.spool_plus[: first - 1].max() <= hardest * 1.001
         speed = np.diff(ramp).max() / 1e-3 if top_speed else 0.0
         assert top_speed is None or done.spool_plus[first - 1] < hardest, speed
+
+
+@pytest.mark.parametrize(
+    ("facts", "worn"),
+    [
+        ({}, False), ({"creep": 0.2}, False), ({"slip": 1e-3}, False), ({"top_speed": 9.0}, False),
+        ({"backlash": 1e-4}, True), ({"broken_at": 0.5}, True), ({"slips_at": 0.5}, True), ({"torque": 0.3}, True),
+    ],
+    ids=str,
+)  # fmt: skip
+def test_one_fault_alone_is_enough_for_tendons_to_have_reeled_in_something_else_than_their_spools(
+    facts: dict[str, float], worn: bool
+) -> None:
+    frictionless = STIFF.model_copy(update={"friction": 0.0})
+    values = nonideal_of(TrueWrist(), frictionless, TrueActuator.model_validate(facts), 1e-3)
+    assert wears(values) == worn and is_ideal(values) == (not worn and "creep" not in facts)
+    assert not is_ideal(nonideal_of(TrueWrist(), STIFF, TrueActuator(), 1e-3)), "friction"
+    for plant in (TrueWrist(creep=0.1), TrueWrist(end_stop_deg=30.0)):
+        changed = nonideal_of(plant, frictionless, TrueActuator(), 1e-3)
+        assert not is_ideal(changed) and not wears(changed)
+
+
+def test_motors_that_are_no_steppers_and_stiff_tendons_have_none_of_it() -> None:
+    facts = TrueActuator(backlash=1e-4, slips_at=0.5, slip=1e-3, creep=0.2)
+    values = nonideal_of(TrueWrist(), Actuator(level="lagged", friction=0.2), facts, 1e-3)
+    assert is_ideal(values) and not wears(values)
 
 
 LEVELS = {

@@ -78,6 +78,19 @@ def test_what_the_planes_do_to_each_other_falls_with_the_bend_as_its_cube() -> N
     assert 4.0**2 < large / small < 4.0**4
 
 
+@pytest.mark.parametrize("toward", [0.0, 90.0])
+def test_a_law_that_knows_what_the_planes_do_to_each_other_follows_several_times_as_well(toward: float) -> None:
+    """A wrist of one segment, as the model has it: what is left in either plane is by the ticks alone."""
+    law, path = controller("computed-torque"), bend_path("circumduction", 25.0, 1.0, 2.0, toward_deg=toward)
+    gains = np.array(gains_of(law, "default"))
+    known, ignored = (
+        simulate_two_planes(law, gains, path, WRIST, loop=Loop(plant_segments=1, coupling=coupling)).metrics()
+        for coupling in ("compensated", "ignored")
+    )
+    for name in ("rmse_ulnar", "rmse_flexion"):
+        assert 0.0 < 3.0 * known[name] < ignored[name]
+
+
 def test_a_push_from_the_side_bends_toward_it_and_the_loop_answers() -> None:
     path = bend_path("dart-thrower", 0.0, 1.0, 1.0)
     pushed, other = (followed(path, force=np.array([0.0, 0.0, side])) for side in (2.0, -2.0))

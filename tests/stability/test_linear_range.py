@@ -10,9 +10,15 @@ import pytest
 from tests.stability.conftest import CAMERA, LAGGED, PID, TENDON, row
 from wristctl.config.loop import Loop
 from wristctl.config.plant import Disturbances, Plant, Push, Sensor, TrueActuator
-from wristctl.stability.linear_range import LinearityLimit
+from wristctl.config.wrist import WristParameters
+from wristctl.control.table import controller
+from wristctl.stability.linear_range import LinearityLimit, Swing, linearity_limits
+from wristctl.stability.linearise import LinearLoop
 from wristctl.stability.loop_analysis import AnalysedRow
+from wristctl.stability.sampled_loop import Complex, LinearTick, Mode, SampledLoop
+from wristctl.stability.smooth_loop import FrictionReading
 
+WRIST = WristParameters()
 BEHIND = Loop(control_period=5e-3, actuator=TENDON, sensor=CAMERA)
 
 
@@ -24,6 +30,81 @@ def _limits(own: AnalysedRow, degrees: float = 0.0) -> dict[str, LinearityLimit]
 
 def _with(loop: Loop, **plant: object) -> Loop:
     return loop.model_copy(update={"plant": Plant.model_validate(plant)})
+
+
+def _swing(hertz: float, motors: float = 0.0, pulls: float = 0.0, factor: float = 1.0, frames: bool = True) -> Swing:
+    """A swing of 1 rad at so many Hz, of a loop that is written out: its motors' counts and pulls (either side's)."""
+    rate = 2.0j * math.pi * hertz
+    outputs = {"theta": [1.0, 0.0, 0.0, 0.0], "rate": [0.0, 1.0, 0.0, 0.0]}
+    outputs |= {"tension_plus": [pulls, 0.0, 0.0, 0.0], "tension_minus": [-pulls, 0.0, 0.0, 0.0]}
+    nothing = np.zeros(4)
+    rows = {name: np.array(row) for name, row in outputs.items()}
+    loop = SampledLoop(5e-3, [LinearTick(np.eye(4), nothing, nothing, nothing, True, rows)])
+    names = ("angle", "rate", "motor", "motor")
+    linear = LinearLoop(loop, loop, math.radians(-25.0), 0.1, (9.0, 5.0), names, frames, 0.0)
+    states: Complex = 3.0 * np.array([[1.0, rate, motors, -motors]], np.complex128)
+    return Swing(linear, Mode(0.0, hertz, states) if hertz else None, factor)
+
+
+def _told(swing: Swing, loop: Loop, friction: FrictionReading = "slipping") -> dict[str, LinearityLimit]:
+    law = controller("smc-tracking")
+    gains = {"lambda": 20.0, "kappa": 0.0, "k": 100.0, "phi": 3.0}
+    return {each.what: each for each in linearity_limits(swing, loop, WRIST, friction, law.surface, gains)}
+
+
+EVERYTHING = Loop(
+    control_period=5e-3, actuator=TENDON, sensor=Sensor(level="camera"),
+    plant=Plant(
+        end_stop_deg=40.0, actuator=TrueActuator(backlash=1e-4, torque=0.4, broken_at=1.0, slips_at=2.0, slip=1e-3)
+    ),
+    disturbances=Disturbances(load=0.5, push=Push(force=-1.0)),
+)  # fmt: skip
+
+
+@pytest.mark.parametrize("reading", ["slipping", "stuck"])
+def test_each_effect_is_felt_below_its_swing_or_above_it_and_those_above_come_last(reading: FrictionReading) -> None:
+    found = _told(_swing(0.0), EVERYTHING, reading)
+    below = {"the camera's noise", "a motor's microstep", "backlash"}
+    above = {"a motor's speed", "the stepper's acceleration", "a slack tendon", "saturation", "the end stops"}
+    above |= {"the boundary layer's end", "a person's push", "a tendon that breaks", "a spool that slips"}
+    above |= {"a motor that stalls"}
+    (above if reading == "stuck" else below).add(
+        "friction that slips" if reading == "stuck" else "friction that sticks"
+    )
+    assert {name: each.above for name, each in found.items()} == dict.fromkeys(below, False) | dict.fromkeys(
+        above, True
+    )
+    order = [(each.above, math.isnan(each.swing)) for each in found.values()]
+    assert order == sorted(order), "and what has no swing after what has one"
+    for either in (False, True):
+        swings = [each.swing for each in found.values() if each.above is either and math.isfinite(each.swing)]
+        assert swings == sorted(swings) and len(swings) >= 2
+    assert found["the end stops"].swing == pytest.approx(math.radians(15.0))
+    assert found["a slack tendon"].swing == pytest.approx(5.0 / (TENDON.tendon_stiffness * WRIST.tendon_offset))
+    assert all(math.isnan(found[name].swing) for name in ("a motor's speed", "saturation", "the boundary layer's end"))
+
+
+@pytest.mark.parametrize("factor", [1.0, 4.0])
+def test_limits_of_motors_and_tensions_are_those_over_what_a_radian_makes_of_them(factor: float) -> None:
+    """Motors that are told a factor less, since what stands behind them is a factor stronger."""
+    hertz, length, per_radian = 3.0, TENDON.step_length, 2.0 * 1e-3
+    omega = 2.0 * math.pi * hertz
+    found = _told(_swing(hertz, 1e-3 * factor, 7.0 * factor, factor), EVERYTHING)
+    assert found["a motor's microstep"].swing == pytest.approx(0.5 * length / per_radian)
+    assert found["a motor's speed"].swing == pytest.approx(length * TENDON.step_rate / (omega * per_radian))
+    fastest = length * TENDON.step_acceleration
+    assert found["the stepper's acceleration"].swing == pytest.approx(0.3 * fastest / (omega**2 * per_radian))
+    assert found["saturation"].swing == pytest.approx((WRIST.tension_limit - 9.0) / 14.0)
+    assert found["the boundary layer's end"].swing == pytest.approx(3.0 / abs(20.0 + 1j * omega))
+    at_once = _told(_swing(hertz, 1e-3, 7.0, factor, frames=False), EVERYTHING)
+    assert at_once["saturation"].swing == pytest.approx((WRIST.tension_limit - 9.0) / 14.0)
+    still = _told(_swing(hertz), EVERYTHING)
+    assert math.isinf(still["a motor's speed"].swing) and math.isinf(still["saturation"].swing)
+    pulls = 2.0 * LAGGED.tendon_stiffness * 1e-3  # motors that pull are counted by their pulls
+    lagged = _told(_swing(hertz, pulls), EVERYTHING.model_copy(update={"actuator": LAGGED}))
+    assert lagged["a motor's microstep"].swing == pytest.approx(0.5 * length / per_radian)
+    assert lagged["a motor's speed"].swing == pytest.approx(length * LAGGED.step_rate / (omega * per_radian))
+    assert "a slack tendon" not in lagged and "the stepper's acceleration" not in lagged
 
 
 @pytest.mark.slow

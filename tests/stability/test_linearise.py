@@ -108,9 +108,14 @@ def test_a_small_step_of_the_simulated_loop_is_the_linear_one(name: str) -> None
     step, count = 1e-5, 60 if loop.sensor.level == "camera" else 250
     fine = smooth(loop, "slipping").model_copy(update={"substeps": 40})
     angles = _course(law, gains, fine, step, count * loop.control_period) / step
-    found = _linear_course(linear(law, gains, loop).closed, count)
+    own = linear(law, gains, loop)
+    found = _linear_course(own.closed, count)
     np.testing.assert_allclose(angles, found, atol=2e-3 * np.abs(found).max())
     assert np.abs(found).max() > 0.3
+    assert own.at_frames == (loop.sensor.level == "camera")
+    assert sum(tick.cut for tick in own.closed.ticks) == (cycle_of(loop)[1] or 1), (
+        "where each frame is taken, or always"
+    )
 
 
 @pytest.mark.parametrize("name", [name for name in CONTROLLERS if name != "feedforward"])

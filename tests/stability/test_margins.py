@@ -111,6 +111,20 @@ def test_a_narrow_range_of_stable_gains_is_found() -> None:
     assert not found.stable and (found.least.value, found.most.value) == pytest.approx((1.3, 1.5), rel=1e-9)
 
 
+@pytest.mark.parametrize(("seed", "least", "most"), [(939, 0.182, 0.533), (3356, 1.168, 1.323)])
+def test_of_two_ranges_of_stable_gains_the_nearer_to_one_is_told(seed: int, least: float, most: float) -> None:
+    """Random loops of four states whose poles lie within the unit circle over two ranges of the gain, 1 in neither."""
+    rng = np.random.default_rng(seed)
+    a = rng.normal(size=(4, 4))
+    a *= rng.uniform(0.5, 1.2) / np.abs(np.linalg.eigvals(a)).max()
+    b, c = rng.normal(size=4), rng.normal(size=4)
+    factors = np.geomspace(1e-3, 1e3, 2001)
+    inside = [bool(np.abs(np.linalg.eigvals(a - k * np.outer(b, c))).max() < 1.0) for k in (*factors, 1.0)]
+    assert np.diff([False, *inside]).sum() >= 3 and not inside[-1]
+    found = margins(closed(a, b, c, PERIOD))
+    assert not found.stable and (found.least.value, found.most.value) == pytest.approx((least, most), rel=5e-3)
+
+
 @st.composite
 def loops(draw: st.DrawFn) -> tuple[Array, Array, Array]:
     """A stable open loop of random poles and residues."""

@@ -36,12 +36,34 @@ def test_rise_overshoot_and_settling_are_python_controls(damping: float) -> None
     assert found.final == pytest.approx(1.0, abs=1e-3)
 
 
+@pytest.mark.parametrize("ticks", [1, 3])
+def test_a_short_response_has_every_tick_of_its_cycles(ticks: int) -> None:
+    quick = step_response(_followed(1.0 / (0.1 * S + 1), ticks))
+    np.testing.assert_allclose(np.diff(quick.time), PERIOD / ticks, rtol=1e-9)
+    np.testing.assert_allclose(quick.angle, -np.expm1(-quick.time / 0.1), atol=1e-9)
+    assert quick.time[-1] >= 0.1 * math.log(1e5) and quick.rise == pytest.approx(0.1 * math.log(9.0), abs=PERIOD)
+
+
 @pytest.mark.parametrize("ticks", [1, 2])
 def test_a_long_response_is_sampled_every_so_many_ticks_and_is_the_same(ticks: int) -> None:
     slow = step_response(_followed(1.0 / (10.0 * S + 1), ticks))
     assert len(slow.time) < 40_000 and slow.time[-1] > 50.0
     np.testing.assert_allclose(slow.angle, -np.expm1(-slow.time / 10.0), atol=1e-6)
     assert slow.rise == pytest.approx(10.0 * math.log(9.0), rel=1e-2) and slow.overshoot == 0.0
+
+
+@pytest.mark.parametrize("slow", [0.0, 1e-4, 0.02])
+def test_what_hardly_decays_is_not_waited_for(slow: float) -> None:
+    """A fast lag of 40 1/s beside a leak that nothing drives: it has settled to 1e-5 long before that has."""
+    transition, into = np.diag(np.exp(-PERIOD * np.array([40.0, slow]))), np.array([-math.expm1(-40.0 * PERIOD), 0.0])
+    tick = LinearTick(transition, into, np.zeros(2), into, True, {"theta": np.array([1.0, 1.0])})
+    found = step_response(SampledLoop(PERIOD, [tick]))
+    assert found.time[-1] == pytest.approx(math.log(1e5) / 40.0, abs=2.0 * PERIOD)
+    np.testing.assert_allclose(found.angle, -np.expm1(-40.0 * found.time), atol=1e-9)
+    assert found.rise == pytest.approx(math.log(9.0) / 40.0, abs=1.5 * PERIOD)
+    waited = SampledLoop(PERIOD, [tick._replace(transition=np.diag(np.exp(-PERIOD * np.array([40.0, 0.23]))))])
+    lasts = math.log(1e5) / 0.23
+    assert lasts <= step_response(waited).time[-1] < lasts + 0.01
 
 
 def test_of_an_unstable_loop_there_is_no_step() -> None:

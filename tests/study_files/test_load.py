@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from pathlib import Path
 
 import pytest
@@ -103,6 +104,20 @@ def test_errors_in_overrides_name_the_override(override: str, said: str) -> None
     with pytest.raises(UserError) as caught:
         load_study([], [override], "train")
     assert said in str(caught.value)
+
+
+def test_gains_of_a_file_are_for_the_controller_of_that_file(tmp_path: Path) -> None:
+    """An override that names another law has that one's own, unless it gives some too."""
+    file = _file(tmp_path, "simulate: {controller: pid, gains: hardware}")
+
+    def given(*overrides: str, files: Sequence[Path] = (file,)) -> bool:
+        return "gains" in load_study(files, overrides, "simulate").simulate.model_fields_set
+
+    assert given() and given("horizon=2.0") and not given("horizon=2.0", files=())
+    assert not given("controller=smc") and not given("seed=3", "simulate.controller=smc", "horizon=2.0")
+    assert given("controller=smc", "gains=printed") and given("gains=printed")
+    other = _file(tmp_path, "simulate: {controller: smc}", "other.yaml")
+    assert given(files=(file, other)), "a file says what it means"
 
 
 @pytest.mark.parametrize("text", ["Kp=10,Ki=2,Kd=0.1", "Kp=10 Ki=2.0 Kd=1e-1", "Kp=10, Ki=2, Kd=0.1"])

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from wristctl.errors import UserError
-from wristctl.study_files.error_messages import check_lengths
+from wristctl.study_files.error_messages import check_lengths, check_sizes
 from wristctl.study_files.load import read_study
 
 ASKED = {
@@ -34,3 +34,35 @@ def test_a_length_that_was_hardly_meant_in_metres_is_asked_about(given: str) -> 
 )
 def test_what_may_be_meant_is_not(given: str) -> None:
     check_lengths(*read_study([], [given]))
+
+
+SIZES = {
+    "wrist.stiffness": (1e-3, 1e3),
+    "wrist.tension_limit": (0.1, 1e4),
+    "simulate.loop.disturbances.load": (None, 1e3),
+    "simulate.loop.disturbances.push.force": (None, 1e3),
+    "hw-run.safety.load": (None, 1e3),
+}
+"""The least and the largest of each that goes on without a question; None: as little as one likes."""
+
+
+@pytest.mark.parametrize("key", SIZES)
+def test_a_size_by_far_out_of_the_usual_is_asked_about_and_the_last_one_within_is_not(key: str) -> None:
+    least, most = SIZES[key]
+    slack, unit = "wrist.pretension=0.01", "N m" if key.endswith("safety.load") else "N"
+    for within in (most, 1e-6 if least is None else least):
+        check_sizes(*read_study([], [slack, f"{key}={within}"]))
+    for beyond in (1.01 * most, *([] if least is None else [0.99 * least])):
+        with pytest.raises(UserError, match=f"{beyond:g} {unit}.* is not between") as refused:
+            check_sizes(*read_study([], [slack, f"{key}={beyond}"]))
+        assert f"{most:g}" in refused.value.what and key in str(refused.value) and "--force" in refused.value.fix
+
+
+def test_a_force_to_the_other_side_is_as_large_and_none_is_no_size() -> None:
+    key = "simulate.loop.disturbances.push.force"
+    check_sizes(*read_study([], [f"{key}=-1000"]))
+    check_sizes(*read_study([], [f"{key}=0"]))
+    with pytest.raises(UserError, match="-1010 N is not between"):
+        check_sizes(*read_study([], [f"{key}=-1010"]))
+    with pytest.raises(UserError, match="give it in metres"):
+        check_sizes(*read_study([], ["wrist.length=80"]))

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import hashlib
+import json
 import os
 from collections.abc import Iterator
 from pathlib import Path
@@ -17,8 +19,9 @@ from wristctl.config.loop import Loop
 from wristctl.config.section import Section
 from wristctl.config.simulate import SimulateSettings
 from wristctl.config.study import Study
+from wristctl.study_files.keys import keys_of
 from wristctl.study_files.load import load_study
-from wristctl.study_files.resolved import config_hash, resolved_yaml
+from wristctl.study_files.resolved import config_hash, names_read, resolved_yaml
 from wristctl.study_files.strict_yaml import parse_yaml
 
 COMMANDS = ("gen-data", "train", "tune", "compare", "simulate", "analyse", "identify", "calibrate-wrist", "hw-run")
@@ -49,6 +52,25 @@ def test_any_text_survives_the_round_trip(text: str, gains: dict[str, float]) ->
     study = Study(simulate=simulated, compare=compared)
     assert _read_back(resolved_yaml(study, "simulate")).simulate == study.simulate
     assert _read_back(resolved_yaml(study, "compare")).compare == study.compare
+
+
+def _plain(value: Any) -> Any:
+    """As JSON has it, by the keys of a study file."""
+    if isinstance(value, Section):
+        names = zip(keys_of(type(value)), type(value).model_fields, strict=True)
+        return {key: _plain(getattr(value, name)) for key, name in names}
+    if isinstance(value, dict):
+        return {str(key): _plain(item) for key, item in value.items()}
+    return list(map(_plain, value)) if isinstance(value, tuple) else value
+
+
+@pytest.mark.parametrize("command", ["gen-data", "train"])
+def test_the_hash_is_of_canonical_json_by_the_keys_of_a_file(command: str) -> None:
+    study = load_study([], ["wrist.length=0.09", "seed=7"])
+    read = {key: value for key, value in _plain(study).items() if key.replace("-", "_") in names_read(command)}
+    assert {"seed", "wrist", command} <= set(read)
+    text = json.dumps(read, sort_keys=True, separators=(",", ":"))
+    assert config_hash(study, command) == hashlib.sha256(text.encode()).hexdigest()
 
 
 def test_leaves_carry_unit_meaning_and_source() -> None:

@@ -32,6 +32,12 @@ def test_every_experiment_is_found_by_name_and_path_in_an_empty_folder(file: Pat
     assert load_study([Path(name)]) == load_study([file])
 
 
+def test_names_are_in_the_order_of_the_alphabet_and_have_no_ending() -> None:
+    names = shipped_names()
+    assert names == sorted(names) and {"quick", "paper", "scenarios/camera"} <= set(names)
+    assert not any(name.endswith(".yaml") for name in names)
+
+
 def test_python_knows_the_names_too() -> None:
     assert wristctl.load_study("quick", "seed=4") == load_study([shipped() / "quick.yaml"], ["seed=4"])
 

@@ -31,6 +31,7 @@ def test_lists_ranges_and_logarithmic_ranges_have_the_values_they_say() -> None:
     assert values("0.05..0.07:5") == pytest.approx([0.05, 0.055, 0.06, 0.065, 0.07])
     assert values("0.01..1 log:3") == pytest.approx([0.01, 0.1, 1.0])
     assert values("x0.5..1.5:3") == ["x0.5", "x1", "x1.5"]
+    assert values("0.05..0.07:1") == [0.05] and len(values("~1..3:1")) == 1, "one value is a sweep too"
 
 
 def test_distributions_are_drawn_from_a_stream_of_the_leafs_own() -> None:
@@ -113,6 +114,14 @@ def test_a_sweep_that_cannot_be_is_named(sweep: list[str], told: str) -> None:
         for point in points_of(axes):
             study_at(study, axes, point)
     assert raised.value.exit_code == 2
+
+
+def test_as_many_points_as_there_may_be_are_taken_and_drawn_ones_count_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("wristctl.study_files.sweeps.MOST_POINTS", 6)
+    six = ["wrist.length=0.1,0.2,0.3", "wrist.damping=~1..2:2", "wrist.mass=~1..2:2"]
+    assert len(points_of(axes_of(swept(*six), "simulate"))) == 6
+    with pytest.raises(UserError, match="a sweep of 12 points is more than 6"):
+        axes_of(swept(*six, "wrist.stiffness=1,2"), "simulate")
 
 
 def test_what_a_kind_of_reference_adds_has_its_unit() -> None:

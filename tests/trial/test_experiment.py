@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import errno
 import math
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -15,8 +16,9 @@ from wristctl.board.messages import State
 from wristctl.errors import UserError
 from wristctl.trial.experiment import Experiment, spared
 from wristctl.trial.homing import slacken
-from wristctl.trial.log import LOG
+from wristctl.trial.log import LOG, TrialLog
 from wristctl.trial.safety import SafetyStop
+from wristctl.trial.trials import trials_of
 from wristctl.trial.zero_checks import check_zero
 
 NAMES = "log", "between", "frames", "residuals", "truth", "wire"
@@ -156,6 +158,21 @@ def test_the_zero_of_a_further_plane_is_what_its_checks_find(experiment: Run, mo
     assert seen[-1][0] == pytest.approx(0.01, abs=2e-3), "the wrist is straight, and the checks say 0.01 rad more"
 
 
+@pytest.mark.parametrize("planes", [1, 2])
+def test_a_loop_in_one_plane_knows_the_springs_of_that_plane_and_one_in_two_the_whole_wrist(
+    planes: int, tmp_path: Path
+) -> None:
+    wrist = WRIST.model_copy(update={"flexion_ratio": 1.4, "gravity_flexion": -3.0})
+    settings = settings_of(planes=planes)
+    trials, log = trials_of(settings, np.random.default_rng(0)), TrialLog(tmp_path, None, settings.control_period)
+    own = Experiment(settings, wrist, trials, log)
+    log.close()
+    ulnar, flexion = own._facing("ulnar"), own._facing("flexion")
+    assert ulnar.stiffness == WRIST.stiffness and ulnar.gravity[1] == WRIST.gravity[1]
+    assert flexion.stiffness == pytest.approx((1.4 if planes == 1 else 1.0) * WRIST.stiffness)
+    assert flexion.gravity[1] == (-3.0 if planes == 1 else WRIST.gravity[1])
+
+
 def test_stored_positions_of_another_start_of_the_board_are_refused(experiment: Run, at_zero: Any) -> None:
     object.__setattr__(at_zero, "boot_nonce", at_zero.boot_nonce ^ 1)
     try:
@@ -185,5 +202,6 @@ def test_no_law_asks_for_more_than_the_motors_hold_and_no_tension_is_let_pass_be
     assert done.experiment._wrist.tension_limit == pytest.approx(24.0)
     assert done.experiment._settings.safety.tension == 45.0
     assert settings_of(safety={"tension": 150.0}).within(WRIST).safety.tension == WRIST.tension_limit == 60.0
+    assert settings_of(safety={"tension": 25.0}).within(WRIST).safety.tension == 25.0
     with pytest.raises(UserError, match="cannot hold a pretension of 2 N"):
         spared(WRIST, settings_of(safety={"motor_pull": 2.4}))

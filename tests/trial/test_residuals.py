@@ -16,7 +16,18 @@ from hypothesis import strategies as st
 from tests.trial.conftest import WRIST, settings_of
 from wristctl.board.messages import State
 from wristctl.control.response import Estimate
-from wristctl.trial.residuals import RESIDUALS, Judge, Limit, limits_of, load, notes, plain, stopped_by, worst
+from wristctl.trial.residuals import (
+    RESIDUALS,
+    Judge,
+    Limit,
+    columns,
+    limits_of,
+    load,
+    notes,
+    plain,
+    stopped_by,
+    worst,
+)
 from wristctl.trial.safety import SafetyStop
 from wristctl.trial.tick_timing import LINK, SCHEDULING, WORK, TickTiming
 from wristctl.trial.watch import Tick, Watch
@@ -93,6 +104,62 @@ def test_a_limit_that_is_kept_does_not_forgive_another_and_a_pause_between_motio
         assert judge.beyond(tick * apart, SOUND | over | {"load": 2.0 * (tick % 2)}) is None
     assert judge.beyond(12 * apart, SOUND | over) is BY_NAME["across"]
     assert judge.beyond(12 * apart + 0.6, SOUND | over) is None
+
+
+SHOWN = {
+    "late": (0.0123, "s", "12 ms"), "lapses": (3.0, "", "3"), "no_number": (1.0, "", "1"),
+    "angle": (math.radians(-51.3), "rad", "-51.3 deg"), "rate": (5.32, "rad/s", "5.3 rad/s"),
+    "age": (0.061, "s", "61 ms"), "pull": (62.4, "N", "62 N"), "cell_age": (0.2, "s", "200 ms"),
+    "measured_pull": (55.3, "N", "55 N"), "excess_pull": (21.0, "N", "21 N"), "missing_pull": (12.2, "N", "12 N"),
+    "travel": (0.0123, "m", "12.3 mm"), "disabled": (1.0, "", "1"), "jump": (math.radians(4.2), "rad", "4.2 deg"),
+    "across": (math.radians(9.1), "rad", "9.1 deg"), "load": (0.854, "N m", "0.85 N m"),
+    "apart": (math.radians(7.0), "rad", "7.0 deg"), "round_trip": (0.0116, "s", "11.6 ms"),
+    "skipped": (0.25, "", "25 %"), "unseen": (0.2, "", "20 %"), "repeated": (5.0, "", "5"), "resent": (4.0, "", "4"),
+    "moved": (0.1, "", "10 %"), "lag": (0.021, "s", "21 ms"),
+}  # fmt: skip
+"""Of each a value as it is logged, the log's unit, and what people read."""
+
+
+@pytest.mark.parametrize("name", RESIDUALS)
+def test_what_is_logged_in_si_units_is_read_in_those_that_people_use(name: str) -> None:
+    value, unit, said = SHOWN[name]
+    limit, line = BY_NAME[name], RESIDUALS[name]
+    assert line.shown(value) == said and columns(True)[name] == (unit, line.meaning) and limit.unit == unit
+    if "{value}" in line.stops:
+        signed = said if name in ("angle", "rate") else line.shown(abs(value))
+        assert signed in stopped_by(limit, value)
+    if "{value}" in line.notes:
+        (word,) = notes({name: 2.0 * abs(limit.odd)}, LIMITS)
+        assert line.shown(2.0 * limit.odd) in word
+
+
+def test_limits_are_the_settings_of_these_names_and_six_of_them_may_be_exceeded_for_a_while() -> None:
+    given = {
+        "late": 0.021, "rate": 3.0, "stale": 0.22, "tension": 41.0, "cell_age": 0.21, "motor_pull": 33.0,
+        "excess_pull": 17.0, "missing_pull": 13.0, "travel": 0.011, "load": 0.7, "skipped": 0.2, "odd_for": 0.4,
+    }  # fmt: skip
+    angles = {"angle": 44.0, "jump": 3.0, "across": 8.0, "follow": 6.0}
+    own = settings_of(load_cells={}, safety=given | {f"{name}_deg": value for name, value in angles.items()})
+    found = {limit.name: limit for limit in limits_of(own)}
+    most = {name: limit.limit for name, limit in found.items()}
+    same = ("late", "rate", "cell_age", "excess_pull", "missing_pull", "travel", "load", "skipped")
+    assert [most[name] for name in same] == [given[name] for name in same]
+    named = {"angle": "angle", "jump": "jump", "across": "across", "apart": "follow"}
+    assert [math.degrees(most[name]) for name in named] == pytest.approx([angles[name] for name in named.values()])
+    assert (most["age"], most["pull"], most["measured_pull"]) == (0.22, 41.0, 33.0)
+    assert most["round_trip"] == pytest.approx(own.safety.round_trip * own.control_period)
+    weaker = settings_of(load_cells={}, safety={"tension": 21.0, "motor_pull": 33.0})
+    assert {limit.name: limit.limit for limit in limits_of(weaker)}["measured_pull"] == 21.0
+    lasting = {"measured_pull", "excess_pull", "missing_pull", "across", "load", "apart"}
+    assert {name: limit.held for name, limit in found.items()} == {
+        name: 0.4 if name in lasting else 0.0 for name in RESIDUALS
+    }
+
+
+def test_a_rig_without_load_cells_has_no_line_of_them() -> None:
+    of_cells = {"cell_age", "measured_pull", "excess_pull", "missing_pull"}
+    assert set(columns(True)) - set(columns(False)) == of_cells and set(columns(True)) == set(RESIDUALS)
+    assert {limit.name for limit in limits_of(settings_of())} == set(RESIDUALS) - of_cells
 
 
 def test_limits_written_are_limits_read(tmp_path: Path) -> None:

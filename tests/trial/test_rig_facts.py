@@ -3,23 +3,28 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator, Sequence
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
 
+from tests.trial.conftest import WRIST
 from tests.trial.test_camera_pace import pace
 from wristctl.board.check import Adapter, RoundTrips, adapter_of, shorter
 from wristctl.board.transport import PortFound
 from wristctl.config.hw_run import HwRunSettings
+from wristctl.trial import rig_facts
 from wristctl.trial.camera_pace import CameraPace
-from wristctl.trial.rig_facts import AxisDirection, CameraFacts, RigFacts, Trouble, troubles
+from wristctl.trial.expected_moves import Bend
+from wristctl.trial.rig_facts import AxisDirection, CameraFacts, Pictures, RigFacts, Trouble, measure, troubles
 from wristctl.trial.rig_strokes import Latency
 from wristctl.trial.safety import SafetyStop
 from wristctl.vision.camera_pose import CameraPose
 from wristctl.vision.detector import PictureQuality
-from wristctl.vision.marker import SightingVerdict
+from wristctl.vision.marker import Sighting, SightingVerdict
 from wristctl.vision.view import View
 
 SETTINGS = HwRunSettings()
@@ -173,6 +178,78 @@ def test_an_axis_that_bends_the_wrist_elsewhere_is_grave() -> None:
     (trouble,) = told_of_two(named(1), named(2), direction=direction)
     assert trouble == Trouble(True, "axis 0 bends the wrist toward 137 deg", "see the motors")
     assert told_of_two(named(1), named(2), direction=direction._replace(astray=None)) == []
+
+
+class Stand:
+    """A testbed whose cameras see this, of which every axis bends the wrist so, and which keeps what has moved."""
+
+    def __init__(self, paces: Sequence[CameraPace], tilts: Sequence[float], bend: Bend) -> None:
+        self.transport, self.moved = SimpleNamespace(name="socket://a:1"), list[int]()
+        self.bend, self.struck = bend, 0
+        self._poses = iter([posed(tilt) for tilt in tilts])
+        self.watched = tuple(paces), list[Sighting]()
+
+    def tracking(self) -> Stand:
+        return self
+
+    def stand_square(self, seen: Sequence[Sighting]) -> CameraPose:
+        return next(self._poses)
+
+    def strokes_of(self, board: Any, tracking: Any, settings: Any, axis: int) -> Any:
+        self.moved.append(axis)
+        return SimpleNamespace(taken_up=lambda: (30, self.bend), strokes=self.strokes, let_go=lambda: None)
+
+    def strokes(self, taut: int, progress: Any) -> Iterator[Any]:
+        self.struck += 1
+        return iter(())
+
+
+def measured(stand: Any, axis: int | None, monkeypatch: pytest.MonkeyPatch) -> RigFacts:
+    monkeypatch.setattr(rig_facts, "round_trips", lambda *given: SOUND.trips)
+    monkeypatch.setattr(rig_facts, "_watched", lambda tracking, testbed: stand.watched)
+    monkeypatch.setattr(rig_facts, "_woken", lambda testbed, period: SOUND.woken)
+    monkeypatch.setattr(rig_facts, "RigStrokes", stand.strokes_of)
+    return measure(stand, stand, Pictures(), SETTINGS if len(stand.watched[0]) == 1 else TWO, WRIST, axis)
+
+
+UNSEEN = pace(60.0, 0.033, verdict=SightingVerdict.NO_BASE)
+
+
+@pytest.mark.parametrize(
+    ("axis", "first", "second", "tilts", "moves"),
+    [
+        (0, pace(60.0, 0.033), None, (0.0,), True),
+        (3, pace(60.0, 0.033), None, (0.0,), True),
+        (None, pace(60.0, 0.033), None, (0.0,), False),
+        (0, UNSEEN, None, (0.0,), False),
+        (None, UNSEEN, None, (0.0,), False),
+        (0, pace(60.0, 0.033), None, (40.0,), False),
+        (1, pace(60.0, 0.033), UNSEEN, (0.0, 0.0), False),
+        (1, UNSEEN, pace(60.0, 0.033), (0.0, 0.0), False),
+        (1, pace(60.0, 0.033), pace(60.0, 0.033), (0.0, 40.0), False),
+        (1, pace(60.0, 0.033), pace(60.0, 0.033), (0.0, 0.0), True),
+    ],
+)
+def test_nothing_moves_unless_it_is_asked_for_and_every_camera_sees_the_wrist_none_too_obliquely(
+    axis: int | None, first: CameraPace, second: CameraPace | None, tilts: tuple[float, ...], moves: bool,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:  # fmt: skip
+    stand = Stand([each for each in (first, second) if each is not None], tilts, Bend(-0.05, 0.05))
+    found = measured(stand, axis, monkeypatch)
+    assert stand.moved == ([axis] if moves else []) and stand.struck == moves
+    assert [camera.pace for camera in found.cameras] == list(stand.watched[0])
+    assert (found.direction is not None) == (moves and second is not None)
+
+
+def test_an_axis_that_bends_the_wrist_elsewhere_makes_no_stroke(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Tendon 2, of axis 1, is to bend it toward 135 deg from ulnar toward flexion."""
+    for bend, strokes in ((Bend(-0.05, 0.04), 1), (Bend(0.05, -0.05), 0), (Bend(0.05, 0.05), 0)):
+        stand = Stand([pace(60.0, 0.033)] * 2, (0.0, 0.0), bend)
+        direction = measured(stand, 1, monkeypatch).direction
+        assert stand.moved == [1] and stand.struck == strokes
+        assert direction is not None and (direction.astray is None) == bool(strokes) and direction.axis == 1
+        assert direction.bend == pytest.approx(math.atan2(bend.away, bend.theta))
+        assert math.degrees(direction.place) == pytest.approx(135.0)
 
 
 def test_the_adapter_is_that_of_the_real_port_behind_a_link_with_its_own_latency(

@@ -113,6 +113,18 @@ def test_the_bend_is_remembered_as_it_was_believed() -> None:
     between = past[REMEMBERED + 5] + 0.25 * (past[REMEMBERED + 6] - past[REMEMBERED + 5])
     assert steered.bend_at(at) == pytest.approx(between, abs=1e-12)
     assert steered.bend_at(99.0) == pytest.approx(steered.estimate.theta)
+    assert steered.bend_at(0.0) == pytest.approx(past[21], abs=1e-12), "the oldest that is remembered"
+
+
+def test_before_the_first_tick_the_bend_was_as_it_is_first_believed() -> None:
+    steered = steering()
+    assert steered.see(0, 0.05, 0.0)
+    first = steered.estimate.theta.copy()
+    assert first[0] > 0.001
+    for _ in range(3):
+        assert steered.bend_at(-0.4 * PERIOD) == pytest.approx(first, abs=1e-15)
+        assert steered.bend_at(-9.0) == pytest.approx(first, abs=1e-15)
+        steered.predict(*reeled(10.0))
 
 
 def test_what_motors_withhold_is_no_error_to_the_laws() -> None:

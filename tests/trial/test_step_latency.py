@@ -74,6 +74,17 @@ def test_the_delay_is_found_to_two_milliseconds_whatever_the_wrist_does(
     assert found.scatter == pytest.approx(NOISE, rel=0.3)
 
 
+@pytest.mark.parametrize(("delay", "rate", "damping"), [(0.06, 35.0, 0.3)])
+def test_a_few_strokes_of_a_wrist_on_springs_tell_its_own_frequency_too(
+    delay: float, rate: float, damping: float
+) -> None:
+    seen = strokes(delay, on_springs(rate, damping), 60.0, count=4)
+    found = find_latency(seen)
+    assert found.delay == pytest.approx(delay, abs=2e-3) and found.rate == pytest.approx(rate, rel=0.1)
+    assert found.scatter == pytest.approx(NOISE, rel=0.3) and 0.0 < found.sd < 2e-3
+    assert found.pictures == sum(len(each.angle) for each in seen)
+
+
 @pytest.mark.parametrize(("across", "seed"), [(0.5, 0), (0.5, 1), (1.0, 0), (1.7, 0), (1.7, 1)])
 @pytest.mark.slow
 def test_what_the_other_plane_gives_back_slowly_is_not_taken_for_age(across: float, seed: int) -> None:

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tests.trial.conftest import settings_of
-from wristctl.trial.trials import PushSeen, Trial, push_seen, recovery, trials_of
+from wristctl.trial.trials import PushSeen, Trial, motions_of, push_seen, recovery, trials_of
 
 TIME = np.arange(0.0, 5.0, 5e-3)
 
@@ -60,6 +60,17 @@ def test_trials_are_all_combinations_of_direction_repetition_push_and_row() -> N
     only = settings_of(directions=("ulnar", "ulnar"), push={"force": 2.0}, without_push=False)
     assert [trial[1:] for trial in trials_of(only, np.random.default_rng(0))] == [("ulnar", 0, 2.0, 0)]
     assert [trial.push for trial in trials_of(settings_of(), np.random.default_rng(0))] == [0.0]
+
+
+def test_a_rig_in_two_planes_goes_toward_its_directions_unless_its_reference_is_a_path() -> None:
+    toward = ("ulnar", "flexion", "radial-flexion")
+    moves = settings_of(planes=2, directions=(*toward, "ulnar"), repetitions=2)
+    trials = trials_of(moves, np.random.default_rng(0))
+    assert motions_of(moves) == list(toward)
+    assert {trial[1:] for trial in trials} == set(product(toward, (0, 1), (0.0,), (0,)))
+    path = settings_of(reference={"kind": "circumduction", "angle_deg": 8.0}, directions=("ulnar",), repetitions=2)
+    assert motions_of(path) == ["circumduction"] and motions_of(settings_of(directions=("radial",) * 2)) == ["radial"]
+    assert {trial[1:3] for trial in trials_of(path, np.random.default_rng(0))} == {("circumduction", k) for k in (0, 1)}
 
 
 def test_each_plane_may_come_first() -> None:

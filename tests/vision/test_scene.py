@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Literal
+
 import numpy as np
 import pytest
 
@@ -9,8 +11,9 @@ from tests.vision.conftest import bent
 from wristctl.config.camera import Markers, SceneSettings
 from wristctl.config.wrist import WristParameters
 from wristctl.vision import scene as scene_module
+from wristctl.vision.camera import Image
 from wristctl.vision.scene import Scene
-from wristctl.vision.scene_parts import FACE, THICK
+from wristctl.vision.scene_parts import FACE, THICK, Stroke
 from wristctl.vision.view import Pinhole
 from wristctl.wrist.kinematics import arcs_backbone, discs
 
@@ -98,3 +101,32 @@ def test_a_board_in_somebodys_hands_goes_over_the_whole_picture() -> None:
     middles = np.array(seen)
     assert ((middles > 0.1) & (middles < 0.9)).all() and (np.ptp(middles, axis=0) > 0.55).all()
     assert abs(np.corrcoef(middles.T)[0, 1]) < 0.2
+
+
+SQUARE = np.array([[20.0, 20.0], [40.0, 20.0], [40.0, 40.0], [20.0, 40.0]])
+
+
+def drawn(
+    how: Literal["line", "fill", "hull", "face"], pixels: np.ndarray, positive: Literal["left", "right"]
+) -> Image:
+    """A stroke of grey 200 on a wall of grey 122."""
+    image: Image = np.full((60, 60), 122, np.uint8)
+    scene = Scene(QUIET, WRIST, Markers(positive=positive))
+    scene._draw(image, [(Stroke(np.zeros((len(pixels), 3)), 200, how), pixels)])
+    return image
+
+
+def test_a_hull_is_filled_and_has_a_dark_edge_all_around_whatever_the_order_of_its_points() -> None:
+    for order in ([0, 1, 2, 3, 4], [2, 4, 0, 3, 1]):
+        image = drawn("hull", np.concatenate([SQUARE, [[27.0, 31.0]]])[order], "right")
+        assert image[30, 30] == 200 == image[25, 35] and image[30, 50] == 122 == image[10, 30]
+        sides = [image[20, 30], image[40, 30], image[30, 20], image[30, 40]]
+        assert max(sides) < 80, "darker than the wall and the hull"
+    line = drawn("line", SQUARE, "right")
+    assert line[30, 40] > 180 and line[30, 30] == 122 == line[30, 20], "open: from the last point none goes back"
+
+
+def test_a_face_is_seen_from_its_front_alone() -> None:
+    for positive, front in (("right", SQUARE), ("left", SQUARE[::-1])):
+        assert drawn("face", front, positive)[30, 30] == 200  # type: ignore[arg-type]
+        assert (drawn("face", front[::-1], positive) == 122).all()  # type: ignore[arg-type]
