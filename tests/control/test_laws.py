@@ -76,20 +76,26 @@ def test_sliding_variable_obeys_its_reaching_law(at: tuple[float, float, float],
     assert p1 * rate + p2 * (u - load) / inertia == pytest.approx(-p3 * np.tanh(sigma), rel=1e-9, abs=1e-8 * p3)
 
 
+@pytest.mark.parametrize("rate_ref", [0.0, 0.7])
 @pytest.mark.parametrize(("name", "switching"), [("smc", "P3"), ("smc-tracking", "k"), ("super-twisting", "k1")])
-def test_a_sliding_law_switches_on_the_surface_that_it_states(name: str, switching: str) -> None:
-    """On it the gain of the switching term does not matter; at the layer's end that term is well below its line."""
+def test_a_sliding_law_switches_on_the_surface_that_it_states(name: str, switching: str, rate_ref: float) -> None:
+    """On it the gain of the switching term does not matter; at the layer's end that term is well below its line.
+
+    The paper's law reads the angle's rate, the others that of the error (C9).
+    """
     law = controller(name)
-    assert law.surface is not None
+    surface = law.surface
+    assert surface is not None and surface.of_error == (name != "smc")
     gains = {each.removesuffix("_"): 3.0 for each in law.gains} | {"phi": 0.4, "tau": 0.3, "k1": 2.0, "k2": 1e-9}
     gains = {each: gains[each] for each in law.gains}
-    (a, b, c), layer = law.surface.weights(gains), law.surface.layer(gains)
+    (a, b, c), layer = surface.weights(gains), surface.layer(gains)
     error, period, memory = 0.2, 1e-3, np.full(max(law.memory, 1), 0.05 if c else 0.0)
 
     def wanted(sigma: float, factor: float) -> float:
-        rate = (sigma - a * error - c * (memory[0] + period * error)) / b
+        rate = (sigma - a * error - c * (memory[0] + period * error)) / b + rate_ref * surface.of_error
         values = law.values(gains | {switching: factor * gains[switching]})
         now = {"theta": 0.3 + error, "rate": rate, "theta_ref": 0.3, "torque_low": -1e3, "torque_high": 1e3}
+        now["rate_ref"] = rate_ref
         return torque(name, values, memory.copy(), period=period, **now)
 
     assert wanted(0.0, 1.0) == pytest.approx(wanted(0.0, 2.0), rel=1e-9)

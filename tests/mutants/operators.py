@@ -50,7 +50,8 @@ _LOOKS = {
     "dpi", "indent", "refresh_per_second", "padding", "aspect", "markevery", "thickness", "stacklevel", "timeout",
     "maxsize", "max_workers", "min_length", "bbox_to_anchor", "rasterized", "clip_on", "capsize", "s", "marker",
     "strict", "allow_nan", "missing_ok", "follow_imports", "sort_keys", "ensure_ascii", "validate", "frozen",
-    "align", "fused", "dont_inherit", "do_compression", "include_url", "inbounds", "wspace", "hspace", "bins",
+    "align", "fused", "dont_inherit", "do_compression", "include_url", "inbounds", "kw_only", "repr", "nogil", "wspace",
+    "hspace", "bins",
 }  # fmt: skip
 """Keywords that say how something looks, how long somebody is waited for, how fast it is, or what is never so."""
 

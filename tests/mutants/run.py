@@ -35,7 +35,7 @@ LIMIT = 300
 """Seconds after which one test is taken to hang: that is noticed too."""
 MOST_BESIDE = 100
 """Tests of a file that are tried where none is known to run the line, as where it is compiled or a constant."""
-_HANGS = " hangs"
+_HANGS, _BEGINS_NOTHING = " hangs", ": exit "
 _NONE_CHOSEN = 5
 """pytest's exit code where a folder has no quick test, or no slow one."""
 
@@ -188,9 +188,12 @@ def try_out(mutant: Mutant, sound: Path, reach: Reach | None = None) -> Result:
         noticed, failing = None, list[str]()
         for stage in stages(mutant, reach):
             while noticed := _failing(folder, [*stage, *(f"--deselect={each}" for each in failing)], Path(scratch)):
-                if "::" not in noticed or not _failing(sound, [noticed.removesuffix(_HANGS)], Path(scratch)):
+                test = noticed.removesuffix(_HANGS)
+                if not _failing(sound, stage if _BEGINS_NOTHING in noticed else [test], Path(scratch)):
                     return Result(mutant, noticed, time.monotonic() - began)
-                failing.append(noticed.removesuffix(_HANGS))
+                if _BEGINS_NOTHING in noticed:
+                    break  # without the change too
+                failing.append(test)
     return Result(mutant, None, time.monotonic() - began)
 
 
@@ -206,7 +209,7 @@ def _failing(folder: Path, tests: list[str], scratch: Path) -> str | None:
     found = re.findall(r"^(?:FAILED|ERROR) (.+?)(?: - .*)?$", done.stdout, re.MULTILINE)
     stopped = re.findall(r"File \"[^\"]*/(tests/[^\"]+)\", line \d+ in (test_\w+)", done.stderr)
     hanging = [f"{file}::{name}{_HANGS}" for file, name in stopped[:1]]
-    return (found or hanging or [f"{' '.join(tests[:3])}: exit {done.returncode}"])[0]
+    return (found or hanging or [f"{tests[-1]}{_BEGINS_NOTHING}{done.returncode}"])[0]
 
 
 def main() -> None:

@@ -27,6 +27,8 @@ def test_files_are_known_in_their_tree_and_with_folders_in_their_names(tmp_path:
     older.parent.mkdir(parents=True)
     older.write_text("another version, which sorts before it")
     assert MADE.found(tmp_path)["a/two.csv"] == file
+    older.write_text(file.read_text())
+    assert MADE.found(tmp_path)["a/two.csv"] == older, "of two that are as published the first by name"
     older.unlink()
     file.write_text("3")
     with pytest.raises(UserError, match="SHA-256 differs"):

@@ -180,6 +180,17 @@ def test_poles_of_a_loop_of_several_rates_are_counted(seed: int) -> None:
         assert count.unstable(factor) == np.sum(np.abs(loop.multipliers(factor)) > math.exp(NEUTRAL * loop.lasts))
 
 
+@pytest.mark.parametrize("seed", range(6))
+def test_the_limits_of_a_loop_of_several_rates_are_where_its_swings_no_longer_decay(seed: int) -> None:
+    """Its phase crossings tell them only nearly: what is fed back at other frequencies changes with the gain."""
+    loop = _uneven(np.random.default_rng(seed), 0.3)
+    found = margins(loop)
+    limits = [limit.value for limit in (found.least, found.most) if 0.0 < limit.value < math.inf]
+    assert limits or found.stable
+    for limit in limits:
+        assert loop.growth(limit) == pytest.approx(NEUTRAL, rel=1e-3)
+
+
 @pytest.mark.parametrize("seed", range(4))
 def test_what_is_added_at_uneven_cuts_is_amplified_by_the_loop(seed: int) -> None:
     """A tone goes on at the cuts for long; what it makes of itself at its own frequency is 1/(1 + L) of it."""
