@@ -59,8 +59,22 @@ def shown(value: Any) -> str:
 
 def range_of(field: Any) -> str:
     """What a leaf may be: its bounds, and how many entries it has."""
-    told = [(BOUNDS | COUNTS, name, getattr(each, name, None)) for each in field.metadata for name in BOUNDS | COUNTS]
-    return ", ".join(words[name].format(f"{at:g}") for words, name, at in told if at is not None)
+    told = [_bounds_of(field.metadata), *_bounds_within(field.annotation)]
+    return ", ".join(dict.fromkeys(part for part in told if part))
+
+
+def _bounds_of(metadata: Any) -> str:
+    told = [(name, getattr(each, name, None)) for each in metadata for name in BOUNDS | COUNTS]
+    return ", ".join((BOUNDS | COUNTS)[name].format(f"{at:.12g}") for name, at in told if at is not None)
+
+
+def _bounds_within(annotation: Any) -> Iterator[str]:
+    """Bounds of the numbers that an annotation is made of: those of one of several kinds, or of each in a list."""
+    for each in getattr(annotation, "__metadata__", ()):
+        yield _bounds_of(getattr(each, "metadata", ()))
+    of_each = "each " if get_origin(annotation) in (tuple, dict) else ""
+    for part in get_args(annotation):
+        yield from (f"{of_each}{within}" for within in _bounds_within(part) if within)
 
 
 def sections_in(annotation: Any) -> Iterator[Any]:
