@@ -8,14 +8,19 @@ import re
 import select
 import time
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any, cast
 
 import pytest
 
 from wristctl.cli import operator
+from wristctl.cli.hw_bench import _newest
 from wristctl.cli.operator import TerminalOperator
 from wristctl.cli.progress import Terminal
 from wristctl.commands.session import Session
+from wristctl.config.study import Study
+from wristctl.errors import UserError
+from wristctl.records import start_run
 from wristctl.trial.log import LOG
 from wristctl.trial.trials import Trial
 
@@ -103,3 +108,14 @@ def test_the_panel_gives_way_to_a_question_and_comes_back(screen: Screen, monkey
         take(row(0, 2.0))
         screen.panel("2.00 deg")
     assert beside == [""]
+
+
+def test_who_looks_on_sees_the_newest_trials_and_writes_nothing_beside_them(tmp_path: Path) -> None:
+    results, made = tmp_path / "results", []
+    for kind in ("hw-run", "hw-run", "gen-data"):
+        with start_run(kind, Study(), "", results, ["wristctl", kind]) as run:
+            made.append(run.path)
+    before = sorted(results.iterdir())
+    assert _newest(results).path == made[1] and sorted(results.iterdir()) == before
+    with pytest.raises(UserError, match="no run of hw-run"):
+        _newest(tmp_path)

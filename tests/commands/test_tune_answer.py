@@ -5,13 +5,17 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
 
 from wristctl import load_study, tune
-from wristctl.commands.tune.answer import Beside, answer_of, at_edge
+from wristctl.commands.tune.answer import Beside, answer_of, at_edge, beside_feedforward
 from wristctl.commands.tune.command import Tuned
+from wristctl.config.wrist import WristParameters
+from wristctl.control.law import Controller
 from wristctl.control.table import controller
 from wristctl.tuning.search import Finalist, Search, Tried
 
@@ -61,6 +65,23 @@ def test_the_error_stands_beside_that_of_feedforward_on_the_same_cases(tuned: Tu
         assert beside.cases == tuned.cases == 1 and 0.0 < beside.error < math.radians(20.0)
     assert len({beside.feedforward for beside in tuned.errors.values()}) == 1
     assert Beside(1e-3, 2e-2, 8).ratio == pytest.approx(20.0)
+
+
+@pytest.mark.parametrize("lost", [0, 1, 3])
+def test_where_some_cases_fail_the_error_is_the_geometric_mean_of_those_where_both_last(
+    lost: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    errors = {"feedforward": [0.4, 0.1, 0.2], "pid": [0.01, 0.02, 0.04]}
+
+    def measured(law: Controller, *given: Any) -> SimpleNamespace:
+        failed = np.arange(3) < (lost if law.name == "pid" else 0)
+        return SimpleNamespace(failed=failed[None], metrics={"rmse": np.array([errors[law.name]])})
+
+    monkeypatch.setattr("wristctl.simulation.cases.measure", measured)
+    (beside,) = beside_feedforward({"pid": {"Kp": 1.0}}, [], WristParameters()).values()
+    assert beside.cases == 3 - lost
+    known = [math.prod(errors[name][lost:]) ** (1.0 / (3 - lost)) if lost < 3 else math.nan for name in errors]
+    assert (beside.feedforward, beside.error) == pytest.approx(tuple(known), nan_ok=True)
 
 
 @pytest.mark.parametrize("end", ["low", "high"])

@@ -234,3 +234,12 @@ def test_the_spread_of_a_rows_tunings_is_from_the_best_to_the_worst_of_them() ->
     hard = float(np.exp(np.log(HARD).mean()))
     least, most = done.spreads[1]
     assert (least, most) == pytest.approx((hard, 2.0 * hard)) and done.spreads[0] == pytest.approx((4 * hard, 4 * hard))
+
+
+def test_the_table_of_tunings_counts_them_from_one_and_says_which_is_published() -> None:
+    tunings = [row("pid-ff/tuned", factor, spread=0.0) for factor in (1.5, 1.0, 2.0)]
+    done = tuned_ranking("bench", FAMILIES["bench"], [[row("feedforward/default", 4.0, spread=0.0)], tunings], [0, 1])
+    table, hard = done.tunings_frame(), float(np.exp(np.log(HARD).mean()))
+    assert table["row"].unique().tolist() == ["pid-ff/tuned"] and table["tuning"].tolist() == [1, 2, 3]
+    assert table["published"].tolist() == [False, True, False] and (table["lost"] == 0).all()
+    assert table["rmse"].tolist() == pytest.approx([1.5 * hard, hard, 2.0 * hard])

@@ -11,6 +11,7 @@ from types import ModuleType
 import pluggy
 import pytest
 
+from wristctl.errors import UserError
 from wristctl.plugins.import_hook import imported
 from wristctl.plugins.places import installed
 
@@ -102,3 +103,11 @@ def test_a_law_of_a_package_is_made_of_all_loaded_modules_of_it_alone(site: Path
 def test_a_law_of_a_single_module_is_made_of_its_file(site: Path) -> None:
     origin = installed(import_module("packed_alone"), "LAW")
     assert set(origin.files) == {site / "packed_alone.py"} and origin.root == site
+
+
+def test_an_error_is_told_at_the_innermost_line_of_ones_own_files(write: Write) -> None:
+    law = write("own/law.py", "import helper\n\n\nhelper.fails()\n")
+    helper = write("own/helper.py", "import json\n\n\ndef fails():\n    json.loads('no')\n")
+    with pytest.raises(UserError) as raised:
+        imported(law)
+    assert f"{helper}:5" in str(raised.value) and "JSONDecodeError" in str(raised.value)

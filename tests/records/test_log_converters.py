@@ -80,7 +80,12 @@ def test_the_silicone_arm_is_read_from_text_and_from_matlab_alike(tmp_path: Path
     with pytest.raises(UserError, match=r"'1 2 three' is no sample of the arm - .*log\.txt:2"):
         read_log(put(tmp_path, "log.txt", "1 2 3 4 5 6", "1, 2, three"), "deepc-arm")
     savemat(tmp_path / "loops.mat", {"yex21": rows[:, 3:].T, "yex22": 2.0 * rows[:, 3:].T})
-    assert list(read_log(tmp_path / "loops.mat", "deepc-arm").trials()) == ["yex21", "yex22"]
+    closed = read_log(tmp_path / "loops.mat", "deepc-arm")
+    assert list(closed.trials()) == ["yex21", "yex22"]
+    for name in ("tip_x", "tip_y", "tip_z"):
+        np.testing.assert_array_equal(
+            closed.columns[name], np.concatenate([matlab.columns[name], 2.0 * matlab.columns[name]])
+        )
 
 
 def workbook(file: Path, sheets: Mapping[str, Sequence[Sequence[str | float]]]) -> Path:

@@ -125,6 +125,12 @@ def test_tension_metrics_count_both_sides() -> None:
     assert metrics_of(PERIOD, TIME, TIME, 0 * tension, one_move(5.0, 0.0, HORIZON))["slack"] == 1.0
 
 
+def test_what_a_rollout_that_failed_still_tells_is_its_effort_and_how_it_was_computed() -> None:
+    told = {name for name, metric in METRICS.items() if not metric.of_error}
+    effort = {"peak_tension", "rms_tension", "chattering", "saturation", "slack", "energy"}
+    assert told == effort | {"substeps", "drift"}
+
+
 def test_every_metric_states_unit_and_formula() -> None:
     found = metrics_of(PERIOD, TIME, TIME, STILL, one_move(5.0, 0.0, HORIZON))
     assert set(found) == set(summed())

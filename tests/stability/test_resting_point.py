@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from wristctl.arrays import Array
-from wristctl.stability.linearise import resting_point
+from wristctl.stability.linearise import RestingPoint, change_in, resting_point
 from wristctl.stability.loop_ticks import TickSlopes
 
 SIZE = 4.0
@@ -52,6 +52,14 @@ def _found(loop: Any) -> float | None:
 def test_steps_of_newtons_method_are_short_enough_not_to_run_away(side: float, away: float) -> None:
     """Whole ones from more than 1.39 off the zero of an arc tangent go ever further."""
     assert _found(Mapped(1.0 + side * away, _atan(1.0))) == pytest.approx(1.0, abs=1e-9)
+
+
+@pytest.mark.parametrize("changes", [(0.0, -3.0), (3.0, 0.5), (0.0, 0.0), (0.0, math.inf), (math.nan, 1.0)])
+def test_what_changes_most_in_any_tick_counts(changes: tuple[float, float]) -> None:
+    loop: Any = Mapped(1.0, *((lambda x, by=by: by, lambda x: 0.0) for by in changes))
+    state = loop.guesses()[0]
+    most = max(map(abs, changes)) if all(map(math.isfinite, changes)) else math.inf
+    assert change_in(loop, RestingPoint(state, loop.slopes(state))) == most
 
 
 def test_all_ticks_of_a_cycle_leave_the_same_state() -> None:

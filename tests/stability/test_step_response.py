@@ -44,12 +44,13 @@ def test_a_short_response_has_every_tick_of_its_cycles(ticks: int) -> None:
     assert quick.time[-1] >= 0.1 * math.log(1e5) and quick.rise == pytest.approx(0.1 * math.log(9.0), abs=PERIOD)
 
 
-@pytest.mark.parametrize("ticks", [1, 2])
-def test_a_long_response_is_sampled_every_so_many_ticks_and_is_the_same(ticks: int) -> None:
-    slow = step_response(_followed(1.0 / (10.0 * S + 1), ticks))
-    assert len(slow.time) < 40_000 and slow.time[-1] > 50.0
-    np.testing.assert_allclose(slow.angle, -np.expm1(-slow.time / 10.0), atol=1e-6)
-    assert slow.rise == pytest.approx(10.0 * math.log(9.0), rel=1e-2) and slow.overshoot == 0.0
+@pytest.mark.parametrize(("ticks", "lag", "stride"), [(1, 10.0, 3), (2, 10.0, 3), (2, 4.0, 2), (1, 2.0, 1)])
+def test_a_long_response_is_sampled_every_so_many_ticks_and_is_the_same(ticks: int, lag: float, stride: int) -> None:
+    slow = step_response(_followed(1.0 / (lag * S + 1), ticks))
+    assert len(slow.time) < 40_000 and slow.time[-1] > min(50.0, lag * math.log(1e5))
+    np.testing.assert_allclose(np.diff(slow.time), stride * PERIOD, rtol=1e-6)
+    np.testing.assert_allclose(slow.angle, -np.expm1(-slow.time / lag), atol=1e-6)
+    assert slow.rise == pytest.approx(lag * math.log(9.0), rel=1e-2) and slow.overshoot == 0.0
 
 
 @pytest.mark.parametrize("slow", [0.0, 1e-4, 0.02])

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from wristctl.control.law import Gain
+from wristctl.control.law import Controller, Gain
 from wristctl.errors import UserError
-from wristctl.tuning.search import GainSpace
+from wristctl.tuning.search import GainSpace, _presets, _start
 
 SPACE = GainSpace.of({"P1": Gain("1/rad", "", 1e-1, 1e5), "P2": Gain("s/rad", "", 1e-3, 1e3)})
 
@@ -42,3 +42,15 @@ def test_of_many_gains_that_which_lies_outside_is_named() -> None:
         with pytest.raises(UserError, match=f"gain {name} outside"):
             three.unit(gains)
     assert three.unit(np.array([10.0, 1.0, 10.0])) == pytest.approx([1.0, 0.0, 1.0 / 3.0])
+
+
+def test_a_search_starts_at_the_last_preset_that_lies_in_the_box_with_every_gain() -> None:
+    presets = {"low": {"P1": 1.0, "P2": 1e-4}, "in": {"P1": 1e2, "P2": 1.0}, "high": {"P1": 1e6, "P2": 1.0}}
+    gains = {"P1": Gain("", "", 1e-1, 1e5), "P2": Gain("", "", 1e-3, 1e3)}
+    law = Controller("boxed", None, "a test", gains, presets)
+    assert list(_presets(law, SPACE)) == ["in"]
+    assert _start(law, SPACE) == pytest.approx([0.5, 0.5])
+    two = Controller("boxed", None, "a test", gains, presets | {"corner": {"P1": 1e5, "P2": 1e-3}})
+    assert _start(two, SPACE) == pytest.approx([1.0, 0.0])
+    far = Controller("boxed", None, "a test", gains, {"low": presets["low"]})
+    assert _start(far, SPACE) == pytest.approx([0.5, 0.5])
