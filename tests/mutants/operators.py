@@ -107,9 +107,11 @@ _ROUNDING = 1e-6
 """Numbers up to this that something is compared with, or that are added to it, stand for rounding."""
 
 
-def _rounds(node: ast.AST) -> bool:
-    """Whether a constant is one of rounding, where it is no factor."""
-    return isinstance(node, ast.Constant) and isinstance(node.value, float) and 0.0 < node.value <= _ROUNDING
+def _rounds(parent: ast.AST, node: ast.AST) -> bool:
+    """Whether it is a constant that allows for rounding, and no factor."""
+    small = isinstance(node, ast.Constant) and isinstance(node.value, float) and 0.0 < node.value <= _ROUNDING
+    added = isinstance(parent, ast.BinOp) and isinstance(parent.op, ast.Add | ast.Sub)
+    return small and (added or isinstance(parent, ast.Compare))
 
 
 def _counts(node: ast.expr) -> bool:
@@ -171,8 +173,8 @@ class _Finder:
             return True
         if isinstance(node, ast.keyword) and node.arg in _LOOKS:
             return True
-        if _rounds(node) and isinstance(parent, ast.Compare | ast.BinOp):
-            return isinstance(parent, ast.Compare) or isinstance(parent.op, ast.Add | ast.Sub)
+        if _rounds(parent, node):
+            return True
         if (
             isinstance(node, ast.Constant | ast.Tuple)
             and isinstance(parent, ast.Call | ast.keyword)

@@ -35,7 +35,7 @@ LIMIT = 300
 """Seconds after which one test is taken to hang: that is noticed too."""
 MOST_BESIDE = 100
 """Tests of a file that are tried where none is known to run the line, as where it is compiled or a constant."""
-_HANGS, _BEGINS_NOTHING = " hangs", ": exit "
+_HANGS, _BEGINS_NOTHING, _LEFT_OUT = " hangs", ": exit ", "--deselect={}"
 _NONE_CHOSEN = 5
 """pytest's exit code where a folder has no quick test, or no slow one."""
 
@@ -187,9 +187,9 @@ def try_out(mutant: Mutant, sound: Path, reach: Reach | None = None) -> Result:
         (folder / "wristctl" / mutant.file).write_text(changed(mutant), encoding="utf-8")
         noticed, failing = None, list[str]()
         for stage in stages(mutant, reach):
-            while noticed := _failing(folder, [*stage, *(f"--deselect={each}" for each in failing)], Path(scratch)):
+            while noticed := _failing(folder, chosen := [*stage, *map(_LEFT_OUT.format, failing)], Path(scratch)):
                 test = noticed.removesuffix(_HANGS)
-                if not _failing(sound, stage if _BEGINS_NOTHING in noticed else [test], Path(scratch)):
+                if not _failing(sound, chosen if _BEGINS_NOTHING in noticed else [test], Path(scratch)):
                     return Result(mutant, noticed, time.monotonic() - began)
                 if _BEGINS_NOTHING in noticed:
                     break  # without the change too

@@ -164,11 +164,13 @@ class _Fan:
         return bool(died) and self._blame(died)
 
     def _hand_out(self, pool: Pool) -> None:
+        """Fill the pool; a unit under suspicion has it for itself from its beginning to its end."""
         while source := self.alone or self.waiting:
-            single = self.alone or not self.suspected.isdisjoint(self.running.values())
+            single = source is self.alone or not self.suspected.isdisjoint(self.running.values())
             if len(self.running) >= (1 if single else pool.width()):
                 return
-            self.suspected |= {source[0]} if source is self.alone else set()
+            if source is self.alone:
+                self.suspected.add(source[0])
             unit = self.units[source[0]]
             first = (self.golden, self.furnish) if pool.apart else (None, None)
             future = pool.executor.submit(compute, unit.does, dict(unit.spec), *first)
