@@ -9,9 +9,10 @@ from wristctl.config.wrist import WristParameters
 from wristctl.control.table import controller, gains_of
 from wristctl.errors import UserError
 from wristctl.plotting.bend_figure import bend_figure
-from wristctl.simulation.bend_course import BendCourse
+from wristctl.simulation.bend_course import FULL, BendCourse
 from wristctl.simulation.bend_paths import BEND_PATHS
 from wristctl.simulation.motion import Angles, Motion
+from wristctl.simulation.references import minimum_jerk
 from wristctl.simulation.rollout import rollout
 from wristctl.simulation.two_planes import bend_path, reach_of_bends, simulate_two_planes
 from wristctl.wrist.tendon_layout import TendonLayout
@@ -116,6 +117,57 @@ def test_torque_out_of_reach_keeps_its_direction_and_counts_as_saturation() -> N
     assert course.metrics()["saturation"] == pytest.approx(np.mean(course.share < 1.0 - 1e-9)) and scaled.any()
     wanted = course.share[scaled, None] * course.torque_wanted[scaled]
     assert course.torque[scaled] == pytest.approx(wanted, abs=1e-9)
+
+
+def pushed_back(
+    toward: float, newton: float, limit: float, name: str = "pid-ff", places: str = "four", coupling: str = "ignored"
+) -> tuple[BendCourse, Array]:
+    """A bend of 30 deg, pushed back from 1.2 to 2.2 s; and how far it bends in that direction [deg]."""
+    law, time = controller(name), 1e-3 * np.arange(3001.0)
+    along, pushed = np.array([np.cos(np.radians(toward)), np.sin(np.radians(toward))]), (time > 1.2) & (time < 2.2)
+    path = along[:, None, None] * np.deg2rad(30.0) * minimum_jerk(time, 1.0)
+    force = np.array([0.0, *(-newton * along)])[:, None] * pushed
+    wrist = WristParameters(tension_limit=limit)
+    layout = TendonLayout.three(wrist.tendon_radius) if places == "three" else TendonLayout.four(wrist.tendon_radius)
+    gains, loop = np.array(gains_of(law, "default")), Loop.model_validate({"coupling": coupling})
+    course = simulate_two_planes(law, gains, path, wrist, layout, loop, force)
+    return course, np.rad2deg(course.bend @ along)
+
+
+@pytest.mark.parametrize(
+    ("name", "toward", "places", "coupling"),
+    [
+        ("pid-ff", 45.0, "four", "ignored"),
+        ("pid-ff", 225.0, "four", "compensated"),
+        ("pid-ff", 110.0, "three", "ignored"),
+        ("pid-ff", 315.0, "three", "compensated"),
+        ("ct-dob", 135.0, "four", "compensated"),
+        ("adrc", 315.0, "four", "ignored"),
+    ],
+)
+def test_a_wrist_pushed_out_of_reach_on_a_diagonal_comes_back_as_one_of_that_reach_in_one_plane(
+    name: str, toward: float, places: str, coupling: str
+) -> None:
+    """No integral winds up and no observer takes torque for load that the other plane's part left no room for."""
+    course, bend = pushed_back(toward, 11.0, 28.0, name, places, coupling)
+    begin, end = 1200, 2200
+    assert (course.share[begin:end] < FULL).mean() > 0.5, "out of reach while it is pushed"
+    reach = float(np.hypot(*course.torque[end - 10]))
+    limit = WRIST.pretension + reach / (np.sqrt(2.0) * WRIST.tendon_radius)  # two tendons, each at r/sqrt(2)
+    alone, lone_bend = pushed_back(0.0, 11.0, limit, name)
+    assert bend[end:].max() == pytest.approx(lone_bend[end:].max(), abs=0.25)
+    behind = [float((course.share[end:] < FULL).sum()) for course in (course, alone)]
+    assert behind[0] <= behind[1] + 4.0, "ticks out of reach after the push"
+    across = np.rad2deg(course.bend[end:] @ [-np.sin(np.radians(toward)), np.cos(np.radians(toward))])
+    assert abs(across).max() < 0.5
+
+
+@pytest.mark.parametrize("toward", [45.0, 225.0])
+def test_a_push_within_reach_on_a_diagonal_is_answered_as_in_one_plane(toward: float) -> None:
+    course, bend = pushed_back(toward, 8.0, 30.0)
+    alone, lone_bend = pushed_back(0.0, 8.0, 30.0)
+    assert (course.share >= FULL).all() and (alone.share >= FULL).all()
+    assert bend == pytest.approx(lone_bend, abs=0.1)
 
 
 def test_a_wrist_pushed_out_of_its_range_has_failed_for_good() -> None:

@@ -32,8 +32,9 @@ from wristctl.wrist.segments import Segments
 
 # Signals of a law: measured angle and rate, the reference with two derivatives, the torques that the tendons can
 # reach now [N m], the control period [s], the load torque [N m] that the observer behind a camera makes out (nothing
-# where sensors are ideal), and the torque [N m] of the last command that the motors were too slow to deliver (nothing
-# where they have no limits). The reference of the periods to come follows, as many as the controller's `preview`.
+# where sensors are ideal), and the torque [N m] of the last command that the motors were too slow to deliver, or the
+# tendons had no pull left for beside the other plane's (nothing where all of it came). The reference of the periods to
+# come follows, as many as the controller's `preview`.
 NOW = (
     "theta", "rate", "theta_ref", "rate_ref", "acceleration_ref", "torque_low", "torque_high", "period", "load",
     "withheld",

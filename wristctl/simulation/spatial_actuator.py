@@ -1,7 +1,7 @@
 """Motors of a wrist in two planes: one for each place of tendons, from commanded to delivered pulls or reeled lengths.
 
 The same motors as in one plane (`wristctl.simulation.actuator`), whose two sides are here as many places as there are.
-A row of `motors` and one of its speed belong to each; two rows for the torque that all withhold in both planes follow.
+A row of `motors` and one of its speed belong to each; a row for the torque that all withhold in each plane follows.
 """
 
 from typing import Any, NamedTuple
@@ -72,8 +72,8 @@ def motor_at(motor: Any, alike: Any) -> Any:
 def drive_tendons(drive: Any, motors: Any, known: Any, aim: Any, pulls: Any, h: float, counts: Any) -> None:
     """Host's counts over a period of commanded pulls [N], into `counts`: pulls, or lengths on spools in its middle [m].
 
-    `known` is Knowledge, `aim` of two rows each. The last two rows of `motors` become the torque that
-    the motors withhold in each plane [N m], as in one plane.
+    `known` is Knowledge, `aim` of two rows each. The two rows of `motors` behind those of the places become the torque
+    that the motors withhold in each plane [N m], as in one plane.
     """
     raise NotImplementedError("compiled code only")
 

@@ -143,7 +143,7 @@ def spatial_batch(
         world.wrist.pretension / stiffness if elastic else alike * world.wrist.pretension
         for world, stiffness in zip(worlds, begin, strict=True)
     ]
-    motors = [np.append(np.stack([counts, 0.0 * counts], axis=1).ravel(), [0.0, 0.0]) for counts in at_rest]
+    motors = [np.append(np.stack([counts, 0.0 * counts], axis=1).ravel(), np.zeros(4)) for counts in at_rest]
     delivered = [
         row[0] * counts + row[1:] if loop.actuator.level != "ideal" else counts
         for row, counts in zip(offsets, at_rest, strict=True)

@@ -99,8 +99,9 @@ class SpatialState(NamedTuple):
     """State of the rollouts, [block, row, lane].
 
     `record` [block, sample, column, lane] takes each sample's values, all or the SPATIAL_BRIEFLY, or has no samples.
-    `motors` has two rows for each place and one for each plane, `delivered` what each motor delivers, `tendons` what
-    rubbing tendons remember; `watch` is the camera with its observer, or NoCamera.
+    `motors` has two rows for each place, one for the torque that all withhold in each plane, and one for what a plane
+    missed of its last torque [N m]; `delivered` is what each motor delivers, `tendons` what rubbing tendons remember,
+    `watch` the camera with its observer, or NoCamera.
     """
 
     coordinates: Any
@@ -150,6 +151,7 @@ def run_spatial(setup: Any, course: Any, world: Any, states: Any, scratch: Any, 
         winding, broken_at = rows_of(values.winding), rows_of(values.broken_at)
         whole, backlash, lead = rows_of(values.stiffness), rows_of(values.backlash)[0], rows_of(values.lead)[0]
         motors, delivered = rows_of(state.motors), part(rows_of(state.delivered), 0, setup.pulls)
+        withheld, missed = part(motors, 2 * count, setup.bend), part(motors, 2 * count + 2, setup.bend)
         coordinates = rows_of(state.coordinates)
         q, rate = part(coordinates, 0, setup.coordinates), part(coordinates, m, setup.coordinates)
         before, pulls, counts, spools = lanes_like(q), lanes_like(least), lanes_like(least), lanes_like(least)
@@ -189,8 +191,8 @@ def run_spatial(setup: Any, course: Any, world: Any, states: Any, scratch: Any, 
                     target_y[i] = course.references[0, i, sample] + zero
                     target_z[i] = course.references[1, i, sample] + zero
                 since = tick * period
-                sees = Seen(seen, motors[2 * count], motors[2 * count + 1])
-                wanted_y, wanted_z, share = respond_in_planes(laws, known, sees, room, since, period, pulls)
+                sees = Seen(seen, withheld, missed)
+                wanted, torque, share = respond_in_planes(laws, known, sees, room, since, period, pulls)
                 time = now_tick * period + zero
                 wish[0] = target_y[0] + since * (target_y[1] + 0.5 * since * target_y[2])
                 wish[1] = target_z[0] + since * (target_z[1] + 0.5 * since * target_z[2])
@@ -215,15 +217,12 @@ def run_spatial(setup: Any, course: Any, world: Any, states: Any, scratch: Any, 
                         row[0] = where(alive[0] > 0.0, at[0], _NAN)
                         row[1] = where(alive[0] > 0.0, at[1], _NAN)
                         if state.record.shape[1] > _BRIEFLY:
-                            torque_y, torque_z = zero, zero
                             for t in range(count):
-                                torque_y = torque_y + pulls[t] * arms_y[t]
-                                torque_z = torque_z + pulls[t] * arms_z[t]
                                 row[_COLUMNS + t] = pulls[t]
                                 row[_COLUMNS + count + t] = acts[t]
                                 row[_COLUMNS + 2 * count + t] = delivered[t]
-                            row[2], row[3], row[4], row[5] = at[2], at[3], wanted_y, wanted_z
-                            row[6], row[7], row[8] = torque_y, torque_z, share
+                            row[2], row[3], row[4], row[5] = at[2], at[3], wanted[0], wanted[1]
+                            row[6], row[7], row[8] = torque[0], torque[1], share
                             row[9], row[10], row[11], row[12] = seen[0], seen[3], seen[2], seen[5]
                             for i in range(m):
                                 row[_COLUMNS + 3 * count + i] = q[i]

@@ -14,7 +14,6 @@ from wristctl.control.law import REFERENCE, Controller, signals_of
 from wristctl.control.response import Controlled, Estimate, look_ahead
 from wristctl.errors import UserError
 from wristctl.lanes.compiled import kernel
-from wristctl.lanes.lane import zero_like
 from wristctl.lanes.rows import lanes_like, part, planes_like, rows_of
 from wristctl.simulation.bend_course import FULL
 from wristctl.simulation.spatial_batch import as_pairs
@@ -68,6 +67,7 @@ class SpatialSteering:
         self._observer = _Observer(gain, np.zeros((REMEMBERED, AXES)), x, x.copy())
         self._bends = np.zeros((REMEMBERED, 2))
         self._fused_at, self._period, self._found = 0, period, np.zeros(AXES + 5)
+        self._missed = np.zeros(2)
         self._laws: Any = None
         self._preview = 0
         self.tick = 0
@@ -95,7 +95,7 @@ class SpatialSteering:
         if controller.plain:
             problem = f"{controller.name} is plain Python, which no loop in two planes runs"
             raise UserError(problem, "controllers", "one that compiles")
-        self.withheld, self._preview = np.zeros(2), controller.preview
+        self.withheld, self._missed, self._preview = np.zeros(2), np.zeros(2), controller.preview
         law = controller.compiled()
         ulnar, flexion = (
             Controlled(
@@ -128,8 +128,8 @@ class SpatialSteering:
 
         It goes by periods; beyond its end it stays as it is there, for a law that looks ahead.
         """
-        to_follow = course, tick, self._preview
-        _respond(self._belief, self._laws, self._observer.now, self.withheld, to_follow, self._period, self._found)
+        to_follow, sees = (course, tick, self._preview), Seen(self._observer.now, self.withheld, self._missed)
+        _respond(self._belief, self._laws, sees, to_follow, self._period, self._found)
         found = self._found.copy()
         return SpatialAnswer(found[AXES : AXES + 2], found[AXES + 2 : AXES + 4], float(found[AXES + 4]), found[:AXES])
 
@@ -141,7 +141,7 @@ class SpatialSteering:
 
 
 @kernel
-def _respond(belief: Any, laws: Any, now: Any, withheld: Any, to_follow: Any, period: float, found: Any) -> None:
+def _respond(belief: Any, laws: Any, sees: Any, to_follow: Any, period: float, found: Any) -> None:
     known, row = known_of(belief), rows_of(found)
     course, tick, preview = to_follow
     ulnar, flexion = laws.ulnar, laws.flexion
@@ -153,22 +153,16 @@ def _respond(belief: Any, laws: Any, now: Any, withheld: Any, to_follow: Any, pe
             look_ahead(ulnar, ahead, 0.0)
             look_ahead(flexion, ahead, 0.0)
     least, greatest = part(rows_of(laws.least), 0, belief.pulls), part(rows_of(laws.greatest), 0, belief.pulls)
-    x, less = rows_of(now), rows_of(withheld)
-    two = part(x, 0, (0, 0))
+    seen = Seen(rows_of(sees.rows), rows_of(sees.withheld), rows_of(sees.missed))
+    two = part(seen.rows, 0, (0, 0))
     room = Room(
         lanes_like(two), lanes_like(two), lanes_like(two), lanes_like(two), lanes_like(least), lanes_like(least),
         planes_like(least),
     )  # fmt: skip
     pulls = part(row, 0, belief.pulls)
-    wanted_y, wanted_z, share = respond_in_planes(
-        Laws(ulnar, flexion, least, greatest), known, Seen(x, less[0], less[1]), room, 0.0, period, pulls
-    )
-    torque_y, torque_z = zero_like(x[0]), zero_like(x[0])
-    for t in range(len(pulls)):
-        torque_y = torque_y + pulls[t] * room.arms_y[t]
-        torque_z = torque_z + pulls[t] * room.arms_z[t]
-    count = len(pulls)
-    row[count], row[count + 1], row[count + 2], row[count + 3] = wanted_y, wanted_z, torque_y, torque_z
+    laws_in_reach, count = Laws(ulnar, flexion, least, greatest), len(pulls)
+    wanted, torque, share = respond_in_planes(laws_in_reach, known, seen, room, 0.0, period, pulls)
+    row[count], row[count + 1], row[count + 2], row[count + 3] = wanted[0], wanted[1], torque[0], torque[1]
     row[count + 4] = share
 
 
