@@ -1,11 +1,16 @@
 # make run: the paper's study in small, from data to which controller to use and what of the paper holds. make test: the
-# quick tests; make test-slow: the others. CI runs both.
+# quick tests; make test-slow: the others. CI runs all three. Each installs what it needs into .venv first.
 
 SHELL := /bin/bash
-PYTHON ?= $(shell command -v python3.11 || command -v python3)
+# The first that runs and is new enough; constraints.txt was tried with 3.11.
+PYTHON ?= $(shell for each in python3.11 python3 python3.14 python3.13 python3.12; do \
+  $$each -c 'import sys; sys.exit(sys.version_info < (3, 11))' 2>/dev/null && echo $$each && break; done)
+# PyTorch without CUDA, which nothing here uses.
+TORCH_INDEX ?= https://download.pytorch.org/whl/cpu
 STUDY ?= experiments/quick.yaml
 CLAIMS ?= experiments/claims.yaml
 BIN := .venv/bin
+PIP := $(BIN)/python -m pip --disable-pip-version-check
 
 .PHONY: run test lint bench bench-sweeps bench-peers bench-all firmware test-firmware test-faults test-trust test-vision test-identify \
 	test-allocation test-slow test-rig fault-table sound-rigs inner-rigs test-posterior test-statistics converge worlds docs clean venv mutants coverage installed matrix
@@ -151,20 +156,34 @@ coverage: .venv/dev
 
 venv: .venv/dev
 
-.venv/run: pyproject.toml constraints.txt
-	test -x $(BIN)/pip || $(PYTHON) -m venv .venv
-	$(BIN)/pip install --quiet -c constraints.txt -e .
-	touch $@
+# PyTorch's own index is asked first, but not for long: what pip finds without it brings CUDA on Linux x86-64.
+.venv/torch: constraints.txt
+	$(if $(PYTHON),,$(error Python 3.11 or newer is needed, and none was found: make PYTHON=/path/to/python3 names one))
+	@test -x $(BIN)/pip || $(PYTHON) -m venv .venv
+	@echo "Downloads into .venv what is not there yet: PyTorch without CUDA (190 MB), then other packages (330 MB at most)"
+	@trap 'exit 130' INT; torch=$$(grep '^torch==' constraints.txt); \
+	$(PIP) install --no-deps --timeout 5 --retries 0 --index-url $(TORCH_INDEX) $$torch || { \
+	  echo "No $$torch from $(TORCH_INDEX): pip's own index is asked. On Linux x86-64 that may bring CUDA, 2.7 GB"; \
+	  $(PIP) install -c constraints.txt $$torch; }
+	@touch $@
 
-.venv/dev: pyproject.toml constraints.txt
-	test -x $(BIN)/pip || $(PYTHON) -m venv .venv
-	$(BIN)/pip install --quiet -c constraints.txt -e '.[dev]'
-	touch $@
+# What an extra of wristctl needs, and so many downloads.
+define install
+@echo "Downloads into .venv what is not there yet: packages that wristctl$(1) needs ($(2))"
+@$(PIP) install --quiet -c constraints.txt -e '.$(1)'
+endef
 
-.venv/docs: pyproject.toml constraints.txt
-	test -x $(BIN)/pip || $(PYTHON) -m venv .venv
-	$(BIN)/pip install --quiet -c constraints.txt -e '.[docs]'
-	touch $@
+.venv/run: pyproject.toml constraints.txt | .venv/torch
+	$(call install,,230 MB)
+	@touch $@
+
+.venv/docs: pyproject.toml constraints.txt | .venv/torch
+	$(call install,[docs],250 MB)
+	@touch $@ .venv/run
+
+.venv/dev: pyproject.toml constraints.txt | .venv/torch
+	$(call install,[dev],330 MB)
+	@touch $@ .venv/run .venv/docs
 
 clean:
 	rm -rf build .venv .mypy_cache .pytest_cache .ruff_cache .hypothesis dist
