@@ -63,6 +63,19 @@ def test_one_version_is_said_everywhere() -> None:
     assert 'dynamic = ["version"]' in (ROOT / "pyproject.toml").read_text(encoding="utf-8")
 
 
+def test_pages_install_the_pytorch_that_the_constraints_pin_from_the_index_that_make_asks() -> None:
+    (pinned,) = re.findall(r"^torch==.+$", (ROOT / "constraints.txt").read_text(encoding="utf-8"), re.MULTILINE)
+    (index,) = re.findall(r"^TORCH_INDEX \?= (.+)$", (ROOT / "Makefile").read_text(encoding="utf-8"), re.MULTILINE)
+    said = {
+        page.name: [
+            line.strip() for line in re.findall(r"pip install torch\b[^`#\n]*", page.read_text(encoding="utf-8"))
+        ]
+        for page in PAGES
+    }
+    assert said["index.md"] and said["five-minutes.md"]
+    assert {line for lines in said.values() for line in lines} == {f"pip install {pinned} --index-url {index}"}
+
+
 def test_the_draft_paper_has_what_a_journal_of_software_asks_and_cites_what_it_lists() -> None:
     text = (ROOT / "paper" / "paper.md").read_text(encoding="utf-8")
     heads = re.findall(r"^# (.*)", text, re.MULTILINE)
