@@ -14,7 +14,7 @@ from wristctl.config.choices import CONTROLLERS
 from wristctl.version import __version__
 
 ROOT = Path(__file__).parents[1]
-PAGES = sorted([*ROOT.glob("*.md"), *(ROOT / "docs").rglob("*.md")])
+PAGES = sorted([*ROOT.glob("*.md"), ROOT / "results" / "README.md", *(ROOT / "docs").rglob("*.md")])
 
 
 def anchors(page: Path) -> set[str]:
@@ -66,13 +66,9 @@ def test_one_version_is_said_everywhere() -> None:
 def test_pages_install_the_pytorch_that_the_constraints_pin_from_the_index_that_make_asks() -> None:
     (pinned,) = re.findall(r"^torch==.+$", (ROOT / "constraints.txt").read_text(encoding="utf-8"), re.MULTILINE)
     (index,) = re.findall(r"^TORCH_INDEX \?= (.+)$", (ROOT / "Makefile").read_text(encoding="utf-8"), re.MULTILINE)
-    said = {
-        page.name: [
-            line.strip() for line in re.findall(r"pip install torch\b[^`#\n]*", page.read_text(encoding="utf-8"))
-        ]
-        for page in PAGES
-    }
-    assert said["index.md"] and said["five-minutes.md"]
+    call = r"pip install torch\b[^`#\n]*"
+    said = {page: [line.strip() for line in re.findall(call, page.read_text(encoding="utf-8"))] for page in PAGES}
+    assert said[ROOT / "docs" / "index.md"] and said[ROOT / "docs" / "five-minutes.md"]
     assert {line for lines in said.values() for line in lines} == {f"pip install {pinned} --index-url {index}"}
 
 

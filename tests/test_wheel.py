@@ -84,6 +84,7 @@ def test_the_sdist_holds_the_tests_and_what_they_read(built: Path) -> None:
     with tarfile.open(sdist) as archive:
         held = {name.partition("/")[2] for name in archive.getnames()}
     wanted = ["README.md", "CONTRIBUTING.md", "Makefile", "pyproject.toml", "constraints.txt", "LICENSE", ".gitignore"]
+    wanted.append("results/README.md")
     for top in ("tests", "experiments", "docs", "benchmarks", "wristctl"):
         wanted += [
             each.relative_to(ROOT).as_posix()
