@@ -105,18 +105,17 @@ def _folders_are_listed_from_the_end() -> Iterator[None]:
         yield
 
 
-write_figure = formats.write_figure
+pictures = formats.pictures
 _PIXEL = bytes.fromhex(
     "89504e470d0a1a0a0000000d4948445200000001000000010806000000"
     "1f15c4890000000b49444154789c6360000200000500017a5eab3f0000000049454e44ae426082"
 )
 
 
-def _blank(stem: Path, figure: Figure, dpi: int = 150) -> None:
+def _blank(figure: Figure, name: str, dpi: int = 150) -> dict[str, bytes]:
     width, height = 72.0 * figure.get_size_inches()
     svg = f'<svg xmlns="http://www.w3.org/2000/svg" width="{width:g}pt" height="{height:g}pt"></svg>\n'
-    stem.with_name(f"{stem.name}.png").write_bytes(_PIXEL)
-    stem.with_name(f"{stem.name}.svg").write_text(svg, encoding="utf-8")
+    return {".png": _PIXEL, ".svg": svg.encode()}
 
 
 @pytest.fixture(autouse=True, scope="session")
@@ -127,7 +126,7 @@ def _blank_pictures() -> Iterator[None]:
     leaves, in tests that are marked `painted`.
     """
     with pytest.MonkeyPatch.context() as session:
-        session.setattr(formats, "write_figure", _blank)
+        session.setattr(formats, "pictures", _blank)
         yield
 
 
@@ -135,7 +134,7 @@ def _paint(request: pytest.FixtureRequest) -> Iterator[None]:
     """Pictures are painted where a test, or a whole file with the runs that its tests share, is marked so."""
     with pytest.MonkeyPatch.context() as during:
         if request.node.get_closest_marker("painted"):
-            during.setattr(formats, "write_figure", write_figure)
+            during.setattr(formats, "pictures", pictures)
         yield
 
 

@@ -181,6 +181,12 @@ def meant(word: str, choices: Iterable[str]) -> str:
     return f"did you mean {best!r}?" if best else f"one of {', '.join(known[:_TOLD])}{more}"
 
 
+def reason_of(error: BaseException) -> str:
+    """An error in one line: the user's as it is, any other after its type."""
+    text = str(error) if isinstance(error, UserError) else f"{type(error).__name__}: {error}".rstrip(": ")
+    return " ".join(text.split())
+
+
 _SPACE: Phrase = ("free space or choose another ", OUT)
 _ELSEWHERE: Phrase = ("choose a folder you can write to with ", OUT)
 _FIXES: dict[int, Phrase] = {

@@ -94,6 +94,11 @@ def deferred() -> Iterator[None]:
             signal.raise_signal(each)
 
 
+def asked() -> bool:
+    """Whether Ctrl-C or SIGTERM has come, also where a library has made another error of it."""
+    return bool(_around) and _around[-1].asked
+
+
 def from_outside(error: BaseException) -> bool:
     """Whether an exception is Ctrl-C or SIGTERM, and not a KeyboardInterrupt that some code has raised by itself."""
     heard = _around[-1].asked if _around else signal.getsignal(signal.SIGINT) is not signal.SIG_IGN

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 
 from tests.cli.conftest import Call
 from tests.trial.test_run_limits import LIMITS, PERIOD, logged
@@ -90,20 +91,28 @@ def test_the_picture_is_of_the_last_run_up_to_where_it_was_stopped(
 ) -> None:
     drawn: list[tuple[Logged, StopTick | None]] = []
 
-    class Picture:
-        def savefig(self, file: Path) -> None:
-            file.write_text("a picture")
-
-    def draw(run: Logged, stop: StopTick | None) -> Picture:
+    def draw(run: Logged, stop: StopTick | None) -> Figure:
         drawn.append((run, stop))
-        return Picture()
+        return Figure()
 
     monkeypatch.setattr("wristctl.plotting.residual_figure.residuals_over_time", draw)
     for names in (both, both[::-1], both[:1]):
         code, out, _ = call("hw", "limits", *(part for name in names for part in ("--from", name)), "--figure", "a.png")
-        assert code == 0 and "a.png" in out and Path("a.png").read_text() == "a picture"
+        assert code == 0 and "a.png" in out and Path("a.png").read_bytes().startswith(b"\x89PNG")
+        Path("a.png").unlink()
     trials = [int(run.values["trial"].iloc[0]) for run, _ in drawn]
     assert trials == [3, 0, 0] and [stop is not None for _, stop in drawn] == [True, False, False]
+
+
+@pytest.mark.parametrize(("file", "said"), [("a.png", "could not be drawn: ZeroDivisionError"), ("a.gif", ".pdf")])
+def test_a_picture_that_cannot_be_drawn_costs_nothing_that_is_printed(
+    call: Call, both: tuple[str, str], monkeypatch: pytest.MonkeyPatch, file: str, said: str
+) -> None:
+    draw = (lambda *_: 1 / 0) if file == "a.png" else lambda *_: Figure()
+    monkeypatch.setattr("wristctl.plotting.residual_figure.residuals_over_time", draw)
+    _, plain, _ = call("hw", "limits", "--from", both[0])
+    code, out, err = call("hw", "limits", "--from", both[0], "--figure", file)
+    assert code != 0 and out == plain and said in err and file in err and not Path(file).exists()
 
 
 def test_runs_of_other_limits_or_without_any_are_refused(call: Call, kept: Kept) -> None:

@@ -60,6 +60,20 @@ def test_figures_are_as_wide_as_asked_and_stand_beside_the_sealed_run(call: Call
     assert call("runs", "verify")[0] == 0
 
 
+@pytest.mark.slow
+def test_a_figure_that_cannot_be_drawn_is_named_and_the_others_are_drawn(
+    call: Call, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("wristctl.commands.compare.figures.variation_dots", lambda *_: 1 / 0)
+    code, out, error = call("runs", "figures", "latest:compare", "tension-variation-fast", "answer")
+    assert code == 1 and "bug" not in error, error
+    assert (Path(out.strip()) / "answer.pdf").is_file()
+    assert "1 of 2 figures could not be drawn: tension-variation-fast" in error and "ZeroDivisionError" in error
+    code, out, error = call("runs", "report", "latest:compare", "--all-figures")
+    assert code == 0 and "figure tension-variation-fast could not be drawn: ZeroDivisionError" in error
+    assert Path(out.strip()).read_text().count("<figure>") > 5
+
+
 def test_a_report_with_all_figures_shows_those_left_for_later(call: Call) -> None:
     sealed, run = files(), open_run("latest:compare")
     code, out, _ = call("runs", "report", run.id, "--all-figures")

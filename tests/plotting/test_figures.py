@@ -82,6 +82,7 @@ def assert_in_its_place(drawn: Figure, smallest: float) -> None:
 
 @pytest.mark.parametrize("make", ["errors, log", "rmse map", "directions", "stroboscope"], indirect=True)
 @pytest.mark.slow
+@pytest.mark.painted
 def test_figure_has_the_same_bytes_when_drawn_again(make: Callable[[], Figure], tmp_path: Path) -> None:
     for folder in ("first", "second"):
         (tmp_path / folder).mkdir()

@@ -37,11 +37,11 @@ def compared(tmp_path_factory: pytest.TempPathFactory, results: list[ComparedRow
         network.metric("rmse", 1e-3, "rad", "lower")
     inputs = [InputRun("network", Run(network.path))]
     argv = ["wristctl", "compare", "--label", MARKUP]
-    with start_run("compare", Study(), "quick", out, argv, inputs, lambda path, man: page(Run(path), man)) as run:
+    with start_run("compare", Study(), "quick", out, argv, inputs, lambda path, man, _: page(Run(path), man)) as run:
         run.table("data/comparison.csv", frame(found, ()))
         run.arrays("data/trajectories.npz", series(found, every=1))
-        run.figure("rmse-default", rmse_map(found, "loop default"))
-        run.figure("tension-variation-default", variation_dots(found, "loop default"))
+        run.figure("rmse-default", lambda: rmse_map(found, "loop default"))
+        run.figure("tension-variation-default", lambda: variation_dots(found, "loop default"))
         for each in found:
             value = each.simulation.metrics["rmse"]
             run.metric(f"rmse_{each.label}_{each.reference}", value, "rad", "lower", meaning=MARKUP)
@@ -85,7 +85,7 @@ def test_a_page_that_fails_costs_nothing_but_itself(tmp_path: Path) -> None:
         live.metric("rmse", 1.0)
     run = Run(live.path)
     assert run.state == "ok" and not (run.path / "report.html").exists()
-    assert "no report.html: ZeroDivisionError" in run.file("console.log").read_text()
+    assert "report.html could not be drawn: ZeroDivisionError" in run.file("console.log").read_text()
 
 
 @pytest.mark.parametrize("dark", [False, True], ids=["light", "dark"])
@@ -109,7 +109,7 @@ def test_a_browser_shows_the_page_without_an_error_or_a_request(
 
 @pytest.mark.parametrize("width", [390, 1280], ids=["phone", "desktop"])
 def test_a_long_line_of_an_answer_is_not_cut_off_at_the_edge(browser: Any, tmp_path: Path, width: int) -> None:
-    with start_run("train", Study(), "", tmp_path, [], page=lambda path, man: page(Run(path), man)) as live:
+    with start_run("train", Study(), "", tmp_path, [], page=lambda path, man, _: page(Run(path), man)) as live:
         live.file(OVERVIEW).write_text(Overview(["hardly moves, and why " * 20]).text())
     browser.open(Run(live.path).file("report.html"), width, False)
     wide = "const a = document.querySelector('#answer'); return a.scrollWidth - a.clientWidth"

@@ -289,7 +289,7 @@ def test_a_comparison_has_one_table_whose_rows_are_its_files(tmp_path: Path, res
     ]
     stored.append({"title": "Control step", "columns": ["controller"], "rows": [["smc"]]})
     plain = json.loads(json.dumps(stored, default=float).replace("NaN", "null"))
-    with start_run("compare", Study(), "", tmp_path, page=lambda path, man: page(Run(path), man)) as live:
+    with start_run("compare", Study(), "", tmp_path, page=lambda path, man, _: page(Run(path), man)) as live:
         live.table("data/comparison.csv", csv, units={"rmse": "rad", "settling": "s"})
         live.file("tables.json").write_text(json.dumps(plain))
     one, step = shown_tables(Run(live.path))

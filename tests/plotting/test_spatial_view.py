@@ -45,7 +45,7 @@ def course(tendons: int = 4, horizon: float = 1.5, length: float = 0.08, name: s
 
 def run_of(folder: Path, made: BendCourse, *settings: str) -> Run:
     study = wristctl.load_study(None, PLANES, *settings)
-    with start_run("simulate", study, "", folder, page=lambda path, manifest: page(Run(path), manifest)) as live:
+    with start_run("simulate", study, "", folder, page=lambda path, manifest, _: page(Run(path), manifest)) as live:
         live.table("data/bends.csv", made.columns())
     return Run(live.path)
 
@@ -138,7 +138,7 @@ def test_a_wrist_that_failed_at_once_has_no_pictures(tmp_path: Path) -> None:
 
 
 def test_a_run_in_one_plane_has_nothing_of_it_on_its_page(tmp_path: Path) -> None:
-    with start_run("simulate", Study(), "", tmp_path, page=lambda path, man: page(Run(path), man)) as live:
+    with start_run("simulate", Study(), "", tmp_path, page=lambda path, man, _: page(Run(path), man)) as live:
         live.table("data/trajectory.csv", dict.fromkeys(("time", "theta", "theta_desired"), np.array([0.0, 0.1])))
     text = Run(live.path).file("report.html").read_text()
     assert spatial_view(Run(live.path)) is None
@@ -266,3 +266,18 @@ def test_the_figures_view_turns_space_and_neither_stretches_nor_mirrors_it() -> 
     assert right[0] == 0.0 and up[0] > 0.5 and -1.0 < away[0] < 0.0
     ulnar, flexion = seen(np.eye(3)[1:])
     assert abs(ulnar[0]) > 0.5 and abs(flexion[0]) > 0.5, "neither plane is seen edge on"
+
+
+@pytest.mark.painted
+@pytest.mark.parametrize("planes", [(1.0, 0.0), (0.0, 1.0), (0.0, 0.0)], ids=["ulnar", "flexion", "at rest"])
+def test_a_straight_move_is_drawn_with_one_scale_for_both_planes(planes: tuple[float, float]) -> None:
+    from wristctl.records.formats import pictures
+
+    round_move = course()
+    flat = dataclasses.replace(round_move, coordinates=round_move.coordinates * np.tile(planes, 4))
+    flat = dataclasses.replace(flat, bend=flat.bend * planes, bend_ref=flat.bend_ref * planes)
+    drawn = motion_in_space(flat, WristParameters())
+    assert pictures(drawn, "space")[".png"].startswith(b"\x89PNG")
+    path = drawn.axes[1]
+    scale = np.diff(path.transData.transform([[0.0, 0.0], [1.0, 1.0]]), axis=0)[0]
+    assert scale[0] == pytest.approx(scale[1]), "a millimetre is as long in one plane as in the other"

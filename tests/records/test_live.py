@@ -74,7 +74,7 @@ def test_times_begin_with_the_run_and_memory_is_in_the_systems_own_unit(
 
 
 def test_a_page_is_made_of_the_ended_run_and_may_fail(results: Path) -> None:
-    def page(path: Path, manifest: Manifest) -> str:
+    def page(path: Path, manifest: Manifest, undrawn: object) -> str:
         return f"{path.name} {manifest.id} {manifest.state} {manifest.exit_code}"
 
     with start_run("tune", Study(), "", results, page=page) as live:
@@ -88,7 +88,7 @@ def test_a_page_is_made_of_the_ended_run_and_may_fail(results: Path) -> None:
         pass
     run = Run(live.path)
     assert run.state == "ok" and not (run.path / "report.html").exists() and run.problems() == []
-    said = "no report.html: KeyError: 'colour'"
+    said = "report.html could not be drawn: KeyError: 'colour'"
     assert f"warning: {said}\n" in run.file("console.log").read_text()
     events = [json.loads(line) for line in run.file("events.jsonl").read_text().splitlines()]
     assert [(each["event"], each.get("message")) for each in events[1:]] == [("end", None), ("warning", said)]

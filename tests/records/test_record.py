@@ -11,7 +11,9 @@ import subprocess
 import sys
 import zipfile
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pandas as pd
@@ -22,6 +24,9 @@ from wristctl.config.study import Study
 from wristctl.errors import UserError
 from wristctl.records import InputRun, Run, start_run, stream
 from wristctl.study_files.load import load_study
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 Make = Callable[..., Run]
 
@@ -87,18 +92,23 @@ def test_a_table_of_columns_or_of_a_frame_is_what_pandas_would_write(results: Pa
     assert written == 2 * [frame.to_csv(index=False, lineterminator="\n")]
 
 
-@pytest.mark.painted
-def test_figures_are_the_same_bytes_each_time(tmp_path: Path) -> None:
+def _line(values: list[float]) -> Figure:
+    """A line with a legend."""
     from matplotlib.figure import Figure
 
+    figure = Figure()
+    axes = figure.subplots()
+    axes.plot([0, 1], values, label="line")
+    axes.legend()
+    return figure
+
+
+@pytest.mark.painted
+def test_figures_are_the_same_bytes_each_time(tmp_path: Path) -> None:
     digests = []
     for folder in ("a", "b"):
         with start_run("tune", Study(), "", tmp_path / folder) as run:
-            figure = Figure()
-            axes = figure.subplots()
-            axes.plot([0, 1], [0, 1], label="line")
-            axes.legend()
-            run.figure("line", figure)
+            run.figure("line", partial(_line, [0, 1]))
         digests.append(
             [hashlib.sha256((run.path / f"figures/line.{end}").read_bytes()).hexdigest() for end in ("png", "svg")]
         )

@@ -65,6 +65,7 @@ def test_runs_of_one_second_are_numbered(results: Path) -> None:
     assert (second, third) == (f"{first}-2", f"{first}-3")
 
 
+@pytest.mark.painted
 def test_a_figure_has_150_dots_per_inch_in_both_formats(tmp_path: Path) -> None:
     from matplotlib.figure import Figure
 

@@ -61,7 +61,7 @@ def test_an_interrupted_run_keeps_and_seals_what_it_wrote(
 def test_a_second_interrupt_does_not_disturb_the_sealing(process: Start, results: Path) -> None:
     code = """
 import os, signal
-def page(path, manifest):
+def page(path, manifest, undrawn):
     for number in (signal.SIGTERM, signal.SIGINT):
         os.kill(os.getpid(), number)
     return "page"

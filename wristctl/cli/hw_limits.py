@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
+from wristctl.cli.output import write_picture
 from wristctl.commands.printed_table import Table
 from wristctl.errors import UserError
 
@@ -32,13 +33,21 @@ def tell_limits(names: Sequence[str], out: Path, figure: Path | None, as_json: b
             raise UserError(problem, name, "runs with the same safety and control_period")
     stops = [stop_of(run) for run in runs]
     lines = nearness(runs, stops)
+    if as_json:
+        print(json.dumps(_plain(names, stops, lines), indent=2))
+    else:
+        _tell(names, runs, stops, lines)
     if figure is not None:
         from wristctl.plotting.residual_figure import residuals_over_time
 
-        residuals_over_time(runs[-1], stops[-1]).savefig(figure)
-    if as_json:
-        print(json.dumps(_plain(names, stops, lines), indent=2))
-        return
+        write_picture(figure, lambda: residuals_over_time(runs[-1], stops[-1]))
+        if not as_json:
+            print(f"\nEvery residual with its limit: {figure}")
+
+
+def _tell(
+    names: Sequence[str], runs: Sequence[Logged], stops: Sequence[StopTick | None], lines: Sequence[Nearness]
+) -> None:
     for name, stop in zip(names, stops, strict=True):
         if stop is not None:
             print(_stopped(name, stop))
@@ -46,8 +55,6 @@ def tell_limits(names: Sequence[str], out: Path, figure: Path | None, as_json: b
         print(_went_through(runs, lines[0]))
     print("\n" + _table(lines).within(_WIDTH).text())
     _tell_proposals(lines, all(stop is not None for stop in stops))
-    if figure is not None:
-        print(f"\nEvery residual with its limit: {figure}")
 
 
 def _logged(run: Run) -> Logged:

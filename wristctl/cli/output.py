@@ -1,19 +1,26 @@
 """Output of a command on stdout: its plan, or its tables and the run directory."""
 
+from __future__ import annotations
+
 import json
 import shutil
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from wristctl.commands.adoption import with_places
 from wristctl.commands.perform import plain_tables
 from wristctl.commands.printed_table import Table
 from wristctl.config.study import Study
+from wristctl.errors import Argument, UserError, reason_of
 from wristctl.escape import printable
 from wristctl.records import Run
 from wristctl.records.journal import jsonable
 from wristctl.study_files.resolved import changed_yaml, resolved_yaml
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 
 def print_plan(kind: str, study: Study, plan: str, out: Path, as_json: bool, everything: bool = False) -> None:
@@ -46,6 +53,7 @@ def print_result(
             "run": str(path),
             "state": run.state,
             "result_sha256": run.result_hash,
+            "undrawn": run.manifest.undrawn,
             "answer": list(answer),
             "metrics": run.metrics,
             "tables": plain_tables(tables),
@@ -58,6 +66,19 @@ def print_result(
     for table in tables if everything or not answer else ():
         print(table.text(width), end="\n\n")
     print(path)
+
+
+def write_picture(file: Path, draw: Callable[[], Figure]) -> None:
+    """Write a picture that was asked for beside what is printed, once it is. UserError where it cannot be drawn."""
+    from wristctl.records.formats import own_look, write_figure_for_paper
+
+    try:
+        with own_look():
+            picture = draw()
+    except Exception as error:
+        reason = f"the picture could not be drawn: {reason_of(error)}"
+        raise UserError(reason, str(file), "--debug shows the traceback", exit_code=1) from error
+    write_figure_for_paper(file, picture, by=Argument("figure"))
 
 
 def say(text: object) -> None:

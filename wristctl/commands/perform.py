@@ -3,7 +3,7 @@
 import json
 import math
 import traceback
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Container, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -25,6 +25,7 @@ from wristctl.records import LiveRun, Run, start_run
 from wristctl.records.copied_inputs import sealed_references
 from wristctl.records.journal import jsonable
 from wristctl.records.manifest import MANIFEST, TABLES, Manifest, Overview
+from wristctl.records.run_writer import Undrawn
 from wristctl.study_files.load import load_study
 
 # Laws that a listing names.
@@ -154,7 +155,7 @@ def perform(
         with suppress(OSError, UserError):  # what went wrong is told by another error
             findings.keep_overview()
     run.console(str(result))
-    run.summary(_summary(result, findings.overview), first=bool(result.summary))
+    run.summary(_summary(result, findings.overview, run.lacking), first=bool(result.summary))
     answer = result.answer
     answered = [answer.table] if answer is not None and answer.table is not None else []
     content = json.dumps(plain_tables([*answered, *result.tables]), indent=2, allow_nan=False)
@@ -164,12 +165,13 @@ def perform(
     return result
 
 
-def _summary(result: StudyResult, overview: Overview) -> str:
+def _summary(result: StudyResult, overview: Overview, undrawn: Container[str]) -> str:
     """A result for README.md: the answer with its figure, then the tables, folded where there is an answer."""
     tables = "\n\n".join(table_for_people(content).text() for content in plain_tables(result.tables))
     if not overview.answer:
         return f"```\n{tables}\n```" if tables else ""
-    picture = f"\n\n![{overview.captions[overview.figure]}](figures/{overview.figure}.png)" if overview.figure else ""
+    drawn = overview.figure in overview.captions and f"figure {overview.figure}" not in undrawn
+    picture = f"\n\n![{overview.captions[overview.figure]}](figures/{overview.figure}.png)" if drawn else ""
     lines = "\n".join(overview.answer)
     return f"```\n{lines}\n```{picture}\n\n<details><summary>All tables</summary>\n\n```\n{tables}\n```\n\n</details>"
 
@@ -179,10 +181,10 @@ def plain_tables(tables: Sequence[Table]) -> Any:
     return jsonable([{"title": table.title, "columns": table.columns, "rows": table.rows} for table in tables])
 
 
-def _page(path: Path, manifest: Manifest) -> str:
+def _page(path: Path, manifest: Manifest, undrawn: Undrawn) -> str:
     from wristctl.plotting.page import page
 
-    return page(Run(path), manifest)
+    return page(Run(path), manifest, undrawn=undrawn)
 
 
 Ref = str | Path | Run

@@ -6,9 +6,11 @@ import base64
 import html
 import io
 import json
+import logging
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property, partial
 from pathlib import Path
@@ -17,8 +19,10 @@ from typing import TYPE_CHECKING, Any, ClassVar, Literal
 from wristctl.commands.answer import Answer
 from wristctl.commands.printed_table import Table
 from wristctl.config.study import Study
-from wristctl.errors import UserError, meant
+from wristctl.errors import UserError, meant, reason_of
+from wristctl.interrupt import asked
 from wristctl.records import LiveRun, Run, stream
+from wristctl.records.formats import own_look
 from wristctl.records.manifest import OVERVIEW, Overview
 
 if TYPE_CHECKING:
@@ -27,6 +31,11 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from wristctl.records.formats import Columns
+
+
+_log = logging.getLogger(__name__)
+# Figures of a block that failed between them.
+_FURTHER = "further figures"
 
 
 class Metrics(dict[str, float]):
@@ -52,8 +61,12 @@ class Figures(Mapping[str, "Figure"]):
         if name not in self._drawers:
             raise KeyError(f"no figure {name!r}: {meant(str(name), self._drawers)}")
         if name not in self._drawn:
-            self._drawn[name] = self._drawers[name]()
+            with own_look():
+                self._drawn[name] = self._drawers[name]()
         return self._drawn[name]
+
+    def __contains__(self, name: object) -> bool:  # a mapping's own would draw it
+        return name in self._drawers
 
     def __iter__(self) -> Iterator[str]:
         return iter(self._drawers)
@@ -148,7 +161,22 @@ class Findings:
         self.figures.add(name, drawer)
         self.overview.captions[name] = caption
         if self.run and self._draws and not later:
-            self.run.figure(name, drawer())
+            self.run.figure(name, drawer)
+
+    @contextmanager
+    def drawing(self) -> Iterator[None]:
+        """A block that draws: where it fails, what was computed stands without the figures that were to come."""
+        try:
+            yield
+        except UserError:  # the disk, above all
+            raise
+        except Exception as error:
+            if asked():
+                raise
+            if self.run:
+                self.run.undrawn(_FURTHER, error)
+            else:
+                _log.warning("%s could not be drawn: %s", _FURTHER, reason_of(error))
 
     def headline(self, *metrics: str) -> None:
         """The metrics that head the run's page."""
@@ -275,9 +303,7 @@ class StudyResult(ABC):
         """The answer, or the tables where there is none, with the figure of the answer, for a notebook."""
         text = "\n".join(self.summary) or "\n\n".join(table.text() for table in self.tables)
         name = self.findings.overview.figure or next(iter(self.figures), "")
-        source = f"data:image/png;base64,{_png(self.figures[name])}" if name else ""
-        picture = f'<img style="max-width: 100%" src="{source}">' * bool(name)
-        return f"<pre>{html.escape(text)}</pre>{picture}"
+        return f"<pre>{html.escape(text)}</pre>{_picture(self.figures, name) if name else ''}"
 
     def __str__(self) -> str:
         return "\n\n".join([*["\n".join(self.summary)] * bool(self.summary), *(table.text() for table in self.tables)])
@@ -286,8 +312,13 @@ class StudyResult(ABC):
         return f"<{type(self).__name__}: {self.place or 'in memory'}; {len(self.metrics)} metrics; {self.figures!r}>"
 
 
-def _png(figure: Figure) -> str:
-    """A figure as PNG in base64."""
+def _picture(figures: Figures, name: str) -> str:
+    """A figure for a notebook; the reason where it cannot be drawn."""
     content = io.BytesIO()
-    figure.savefig(content, format="png", dpi=100)
-    return base64.b64encode(content.getvalue()).decode("ascii")
+    try:
+        with own_look():
+            figures[name].savefig(content, format="png", dpi=100)
+    except Exception as error:
+        return f"<p>{html.escape(f'figure {name} could not be drawn: {reason_of(error)}')}</p>"
+    source = f"data:image/png;base64,{base64.b64encode(content.getvalue()).decode('ascii')}"
+    return f'<img style="max-width: 100%" src="{source}">'

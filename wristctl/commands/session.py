@@ -76,6 +76,12 @@ class Session:
         """Show the progress of `task`: a context manager that yields `done(count, **figures)`."""
         return self.show(self.findings.event, task, total, unit)
 
+    @contextmanager
+    def drawing(self) -> Iterator[None]:
+        """Show that a block draws; where it fails, what was computed stands without its further figures."""
+        with self.progress("drawing"), self.findings.drawing():
+            yield
+
 
 class Unattended:
     """Shows nothing, and agrees to nothing."""

@@ -7,11 +7,11 @@ import hashlib
 import math
 import re
 import shlex
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import cache
 from html import escape
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from wristctl.escape import printable, printable_lines
 from wristctl.plotting.animation import animation
@@ -20,6 +20,7 @@ from wristctl.records.difference import difference
 from wristctl.records.lineage import Ancestor, ancestry
 from wristctl.records.manifest import CONFIG, Manifest, command_of, read_overview
 from wristctl.records.run import Run
+from wristctl.records.run_writer import Undrawn
 from wristctl.version import __version__
 
 if TYPE_CHECKING:
@@ -138,15 +139,39 @@ _CARDS = 6
 
 # Figures of a page: name, caption and data URL.
 Figures = list[tuple[str, str, str]]
+Part = TypeVar("Part")
 
 
-def page(run: Run, manifest: Manifest, beside: Path | None = None) -> str:
+def page(run: Run, manifest: Manifest, beside: Path | None = None, undrawn: Undrawn | None = None) -> str:
     """The page of a run; the manifest may be newer than what the directory holds, while the run is being sealed.
 
-    `beside` is a folder of figures that were drawn later.
+    Parameters
+    ----------
+    run
+        Run directory.
+    manifest
+        Its manifest, in which `undrawn` may note more.
+    beside
+        Folder of figures that were drawn later.
+    undrawn
+        Called for a part that cannot be drawn, which is then left out. Without it the part's error is raised.
     """
+
+    def part(name: str, draw: Callable[[], Part], default: Part) -> Part:
+        try:
+            return draw()
+        except Exception as error:
+            if undrawn is None:
+                raise
+            undrawn(name, error)
+            return default
+
     overview, drawn = read_overview(run.path), figures(run, beside)
-    drawn_names = {name for name, *_ in drawn}
+    known = {*(name for name, *_ in drawn), *(name.removeprefix("figure ") for name in manifest.undrawn)}
+    moving = part("the animation", lambda: animation(run), None)
+    space = part("the view in space", lambda: _in_space(run), None)
+    lineage = part("the lineage", lambda: lineage_picture(ancestry(run, state=manifest.state)), "")
+    results = part("the tables", lambda: shown_tables(run), list[dict[str, Any]]())
     first = [picture for picture in drawn if picture[0] == overview.figure or _OVERLAY.match(picture[0])]
     return render(
         "run.html",
@@ -157,13 +182,13 @@ def page(run: Run, manifest: Manifest, beside: Path | None = None) -> str:
         answer=blocks(overview.answer),
         headline=_headline(run.metrics, overview.cards),
         metrics=_metrics(run),
-        tables=shown_tables(run),
+        tables=results,
         figures=[picture for picture in drawn if picture not in first],
         first=first,
-        undrawn=[caption or name for name, caption in overview.captions.items() if name not in drawn_names],
-        animation=animation(run),
-        space=_in_space(run),
-        lineage=lineage_picture(ancestry(run, state=manifest.state)),
+        later=[caption or name for name, caption in overview.captions.items() if name not in known],
+        animation=moving,
+        space=space,
+        lineage=lineage,
         provenance=_provenance(manifest),
         files=[(output.path, output.bytes, output.sha256, not output.volatile) for output in manifest.outputs],
         config=run.file(CONFIG).read_text(encoding="utf-8", errors="replace"),

@@ -169,7 +169,8 @@ def motion_in_space(course: BendCourse, wrist: WristParameters, heading: str = "
     right.plot(1e3 * course.tip[largest, 1], 1e3 * course.tip[largest, 2], **_HERE)
     undress(left)
     left.set(xticks=[], yticks=[], aspect="equal")
-    right.set(aspect="equal", xlabel="tip toward ulnar [mm]", ylabel="tip toward flexion [mm]")
+    right.set_aspect("equal", adjustable="datalim")  # a box as flat as a straight path would have no height
+    right.set(xlabel="tip toward ulnar [mm]", ylabel="tip toward flexion [mm]")
     title(left, heading)
     title(right, f"bent most at {course.time[largest]:.2f} s")
     legend_below(picture)

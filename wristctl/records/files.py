@@ -49,6 +49,12 @@ def write_text(path: Path, text: str, by: Phrase = OUT) -> None:
         temporary.write_text(text, encoding="utf-8", newline="\n")
 
 
+def write_bytes(path: Path, content: bytes) -> None:
+    """Write a file, whole or not at all."""
+    with replacing(path) as temporary:
+        temporary.write_bytes(content)
+
+
 def sync(path: Path) -> None:
     """Wait until a file or directory is on the disk, where its file system can tell."""
     descriptor = os.open(path, os.O_RDONLY)

@@ -103,7 +103,8 @@ def _entry(run: Run) -> IndexEntry:
         metrics = {name: metric.get("value") for name, metric in run.metrics.items()} if state != "broken" else {}
     except UserError as error:
         return IndexEntry(run.id, "-", "", "broken", dated(run.id), None, error.what)
-    note = manifest.error.what if manifest.error else ""
+    undrawn = f"not drawn: {', '.join(manifest.undrawn)}" if manifest.undrawn else ""
+    note = manifest.error.what if manifest.error else undrawn
     timing, inputs = manifest.timing, [record.run for record in manifest.inputs]
     return IndexEntry(
         run.id,

@@ -173,6 +173,8 @@ class Manifest(ManifestPart):
     outputs: list[Output] = []
     units: TakenOver | None = None
     """None: no run was resumed that keeps units of work"""
+    undrawn: dict[str, str] = {}
+    """Figures and parts of the page that could not be drawn, with the reason."""
     numerics: dict[str, Any] = {}
     timing: Timing
     result_sha256: str | None = None

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from pathlib import Path
+from pathlib import Path, PurePosixPath
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 from wristctl.config.former_names import label_today
@@ -146,7 +146,7 @@ class ReplayVerdict(NamedTuple):
     """Verdict on one file of a repetition. Volatile files (wall times) are not compared."""
 
     path: str
-    verdict: Literal["identical", "within tolerance", "differs", "missing", "added", "volatile"]
+    verdict: Literal["identical", "within tolerance", "differs", "missing", "added", "drawn now", "undrawn", "volatile"]
     detail: str = ""
 
 
@@ -159,12 +159,22 @@ def verdicts(original: Run, again: Run) -> list[ReplayVerdict]:
         if (before.get(path) or after[path]).volatile:
             compared.append(ReplayVerdict(path, "volatile", "not compared"))
         elif path not in after:
-            compared.append(ReplayVerdict(path, "missing", "not written this time"))
+            lost = _undrawn(again, path)
+            compared.append(ReplayVerdict(path, "missing", f"not {lost or 'written'} this time"))
         elif path not in before:
-            compared.append(ReplayVerdict(path, "added", "not written then"))
+            lost = _undrawn(original, path)
+            compared.append(ReplayVerdict(path, "drawn now" if lost else "added", f"not {lost or 'written'} then"))
         else:
             compared.append(ReplayVerdict(path, *compare_files(original.path / path, again.path / path)))
+    for name in original.manifest.undrawn.keys() & again.manifest.undrawn.keys():
+        compared.append(ReplayVerdict(name, "undrawn", f"neither then nor now: {again.manifest.undrawn[name]}"))
     return compared
+
+
+def _undrawn(run: Run, path: str) -> str:
+    """Why a run has no such picture: `drawn (LinAlgError: Singular matrix)`; empty where nothing failed."""
+    reason = run.manifest.undrawn.get(f"figure {PurePosixPath(path).stem}") if path.startswith("figures/") else None
+    return f"drawn ({reason})" if reason else ""
 
 
 def changed_inputs(run: Run) -> list[str]:

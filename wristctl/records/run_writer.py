@@ -4,17 +4,20 @@ from __future__ import annotations
 
 import hashlib
 import json
+import logging
 import resource
 import shlex
 import sys
 import time
+import traceback
 from collections.abc import Callable, Mapping
 from pathlib import Path, PurePosixPath
 from typing import TYPE_CHECKING, Any, Literal
 
-from wristctl.errors import UserError
+from wristctl.errors import UserError, reason_of
+from wristctl.interrupt import asked
 from wristctl.records import formats
-from wristctl.records.files import check_plain, files_below, replacing, sha256_of, sync, write_text
+from wristctl.records.files import check_plain, files_below, replacing, sha256_of, sync, write_bytes, write_text
 from wristctl.records.journal import Journal, jsonable, now
 from wristctl.records.manifest import (
     CONFIG,
@@ -42,6 +45,8 @@ if TYPE_CHECKING:
     import numpy as np
     from matplotlib.figure import Figure
 
+_log = logging.getLogger(__name__)
+
 
 def readme(manifest: Manifest, summary: str) -> str:
     """The run in a page: command, inputs, result, files with their columns, how to repeat and to check it."""
@@ -56,6 +61,7 @@ def readme(manifest: Manifest, summary: str) -> str:
         ),
         *([_taken_over(manifest.units)] if manifest.units else []),
         *([f"\nError: {manifest.error.what} {manifest.error.where}".rstrip()] if manifest.error else []),
+        *(f"\nNot drawn: {name}: {reason}" for name, reason in manifest.undrawn.items()),
         *(["", "## Result", "", summary.strip()] if summary else []),
         *(["", "## Files", ""] if manifest.outputs else []),
     ]
@@ -94,8 +100,10 @@ def _taken_over(units: TakenOver) -> str:
     return f"{text}; {units.computed_again} more of its units were computed again here, and gave the same."
 
 
-# Makes report.html of a run directory and its finished manifest.
-Page = Callable[[Path, Manifest], str]
+# Notes what could not be drawn, by its name.
+Undrawn = Callable[[str, Exception], None]
+# Makes report.html of a run directory and its finished manifest; parts that cannot be drawn are noted and left out.
+Page = Callable[[Path, Manifest, Undrawn], str]
 
 # Space kept from the start, so that a run on a full disk can still say that it failed.
 RESERVE, _RESERVED = ".reserve", 512 * 1024
@@ -135,6 +143,11 @@ class LiveRun:
         self.event, self.console = self._journal.event, self._journal.console
         self.event("start", kind=manifest.kind)
 
+    @property
+    def lacking(self) -> Mapping[str, str]:
+        """Pictures that could not be drawn by now, with the reason."""
+        return self._manifest.undrawn
+
     def stream(self, name: str) -> tuple[int, int]:
         """Entropy of the random stream `name` for `numpy.random.default_rng`, noted in the manifest."""
         self._manifest.streams[name] = stream(self._manifest.seed, name)
@@ -173,11 +186,24 @@ class LiveRun:
         self._handed.add(name)
         return self.path / relative
 
-    def figure(self, name: str, figure: Figure) -> None:
-        """Write figures/<name>.png and .svg."""
-        stem = self.file(f"figures/{name}")
-        self._handed = self._handed - {f"figures/{name}"} | {f"figures/{name}.png", f"figures/{name}.svg"}
-        formats.write_figure(stem, figure)
+    def figure(self, name: str, draw: Callable[[], Figure]) -> None:
+        """Write figures/<name>.png and .svg; one that cannot be drawn is noted instead."""
+        try:
+            with formats.own_look():
+                pictures = formats.pictures(draw(), name)
+        except Exception as error:
+            if asked():  # Ctrl-C, of which a library made this
+                raise
+            self.undrawn(f"figure {name}", error)
+            return
+        for suffix, content in pictures.items():
+            write_bytes(self.file(f"figures/{name}{suffix}"), content)
+
+    def undrawn(self, name: str, error: Exception) -> None:
+        """Note a picture that could not be drawn: what was computed stands without it."""
+        self._manifest.undrawn[name] = reason_of(error)
+        self.console("".join(traceback.format_exception(error)))
+        _log.warning("%s could not be drawn: %s", name, reason_of(error))
 
     def metric(
         self,
@@ -291,10 +317,9 @@ class LiveRun:
         if self._page is None:
             return
         try:
-            write_text(self.path / REPORT, self._page(self.path, manifest))
+            write_text(self.path / REPORT, self._page(self.path, manifest, self.undrawn))
         except Exception as error:
-            self.event("warning", message=f"no report.html: {type(error).__name__}: {error}")
-            self.console(f"warning: no report.html: {type(error).__name__}: {error}")
+            self.undrawn(REPORT, error)
 
     def _output(self, name: str) -> Output:
         path = self.path / name

@@ -3,7 +3,7 @@
 import hashlib
 import logging
 import re
-from collections.abc import Collection, Iterable
+from collections.abc import Callable, Collection, Iterable, Sequence
 from enum import StrEnum
 from functools import partial
 from pathlib import Path
@@ -14,9 +14,9 @@ import typer
 from wristctl.cli.command import asked_to_trust
 from wristctl.cli.options import RESULTS, Debug, Out, Quiet, Ref, Refs, TrustCode
 from wristctl.cli.output import say
-from wristctl.cli.progress import listening, progress
+from wristctl.cli.progress import Terminal, listening, progress
 from wristctl.commands.progress import no_event
-from wristctl.errors import TO, Argument, UserError, meant, writing
+from wristctl.errors import TO, Argument, UserError, meant, reason_of, writing
 from wristctl.plugins.trust import asking
 from wristctl.records import Run, open_run
 from wristctl.records.files import write_text
@@ -36,11 +36,24 @@ def draw_later(run: Run, quiet: bool) -> Path:
         drawn = redrawn(run, partial(progress, console, quiet=quiet)).figures
         left = [name for name in drawn if not (run.path / "figures" / f"{name}.svg").exists()]
         folder.mkdir(parents=True, exist_ok=True)
-        with progress(console, no_event, "drawing", len(left), "figures", quiet) as advance:
-            for count, name in enumerate(left, start=1):
-                write_figure(folder / name, drawn[name])
-                advance(count)
+        _draw(left, lambda name: write_figure(folder / name, drawn[name]), console, quiet)
     return folder
+
+
+def _draw(names: Sequence[str], write: Callable[[str], None], console: Terminal, quiet: bool) -> list[str]:
+    """Draw figures one after another; those that cannot be drawn, of which each has a warning."""
+    failed = []
+    with progress(console, no_event, "drawing", len(names), "figures", quiet) as advance:
+        for count, name in enumerate(names, start=1):
+            try:
+                write(name)
+            except UserError:  # the disk
+                raise
+            except Exception as error:
+                _log.warning("figure %s could not be drawn: %s", name, reason_of(error))
+                failed.append(name)
+            advance(count)
+    return failed
 
 
 def report(
@@ -114,13 +127,16 @@ def figures(
         chosen = list(names or drawn)
         with writing(folder, TO):
             folder.mkdir(parents=True, exist_ok=True)
-        with progress(console, no_event, "drawing", len(chosen), "figures", quiet) as advance:
-            for count, name in enumerate(chosen, start=1):
-                picture = drawn[name]
-                fit(picture)
-                write_figure_for_paper(folder / f"{name}.{format_.value}", picture)
-                advance(count)
+
+        def write(name: str) -> None:
+            fit(drawn[name])
+            write_figure_for_paper(folder / f"{name}.{format_.value}", drawn[name])
+
+        failed = _draw(chosen, write, console, quiet)
     say(folder)
+    if failed:
+        problem = f"{len(failed)} of {len(chosen)} figures could not be drawn: {', '.join(failed)}"
+        raise UserError(problem, str(run.path), "the warnings say why", exit_code=1)
 
 
 def _check_names(names: Iterable[str], available: Collection[str], run: Run) -> None:

@@ -142,6 +142,7 @@ def _run_tables(run: Run, tags: list[str], with_metrics: bool) -> list[Table]:
         ("result hash", manifest.result_sha256 or "-"),
         *((f"input {record.role}", f"{record.kind} run {record.run}") for record in manifest.inputs),
         *([("error", manifest.error.what)] if manifest.error else []),
+        *(("not drawn", f"{name}: {reason}") for name, reason in manifest.undrawn.items()),
     ]
     metrics = [
         (name, metric["value"], metric["unit"], metric["better"], metric["n"]) for name, metric in run.metrics.items()

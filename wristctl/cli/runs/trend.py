@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import typer
 
 from wristctl.cli.options import RESULTS, Debug, Json, Out, run_ids
-from wristctl.cli.output import say
+from wristctl.cli.output import say, write_picture
 from wristctl.commands.printed_table import Table, number
 from wristctl.errors import UserError
 from wristctl.records import require
@@ -49,10 +49,6 @@ def trend(
     check_one_rig(runs)
     readings = sorted(map(reading_of, runs), key=lambda reading: reading.time)
     trends = trends_of(readings, per == "day")
-    if figure is not None:
-        from wristctl.plotting.trend_figure import trends_over_runs
-
-        trends_over_runs(trends, "run, in order of time" if per == "run" else "time [days]").savefig(figure)
     drifting = [line for line in trends if line.drifts]
     if as_json:
         print(json.dumps(_plain(readings, trends, per), indent=2))
@@ -62,7 +58,12 @@ def trend(
         print(f"\n{_slopes(trends, per).text()}\n\n{_values(readings, trends).text()}")
         if len(readings) > _SHOWN:
             say(f"The last {_SHOWN} of {len(readings)} runs; all of them: --json")
-        if figure is not None:
+    if figure is not None:
+        from wristctl.plotting.trend_figure import trends_over_runs
+
+        axis = "run, in order of time" if per == "run" else "time [days]"
+        write_picture(figure, lambda: trends_over_runs(trends, axis))
+        if not as_json:
             say(f"Every quantity with its line: {figure}")
     if drifting:
         raise typer.Exit(DRIFT)

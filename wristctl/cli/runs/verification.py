@@ -161,7 +161,7 @@ def sign(
     say(f"{run.id}  signed with {run_signature.key}")
 
 
-_SAME = ("identical", "within tolerance", "volatile")
+_SAME = ("identical", "within tolerance", "drawn now", "undrawn", "volatile")
 
 
 def replay(
@@ -250,5 +250,5 @@ def _conclude(run: Run, scratch: Path | None, compared: list[ReplayVerdict], why
     if scratch:
         shutil.rmtree(scratch)
     if not as_json:
-        exact = all(verdict.verdict in ("identical", "volatile") for verdict in compared)
+        exact = all(verdict.verdict in ("identical", "undrawn", "volatile") for verdict in compared)
         say(f"{run.id}: {'identical' if exact else 'the same within tolerance'}")

@@ -153,7 +153,7 @@ def analyse(session: Session) -> Analysed:
     findings.overview.figure = "bode"
     results = LoopResults(angles, analyses, locus, portrait)
     write(findings, results)
-    with session.progress("drawing"):
+    with session.drawing():
         draw(findings, label, results)
     tables = [margin_table(sentence, analyses, angles), step_table(analyses, angles)]
     if locus is not None:

@@ -191,7 +191,7 @@ def calibrate_camera(session: Session) -> CameraCalibrated:
         findings.metric(
             "plane_error", 1e6 * calibration.plane_error, "um", "lower", len(lying.corners), meaning=meaning
         )
-    with session.progress("drawing"):
+    with session.drawing():
         findings.figure("reprojection", reprojection, calibration, album.views)
         findings.figure("lens", lens, calibration.view)
         if lying is not None and album.last_picture is not None:

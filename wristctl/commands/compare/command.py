@@ -294,7 +294,7 @@ def compare(session: Session) -> Compared:
     findings.table("data/standings.csv", standings_frame(rankings), units=STANDING_UNITS)
     head_with_the_best(findings, rankings)
     times = _step_times(session, study, tuned)
-    with session.progress("drawing"):
+    with session.drawing():
         draw(findings, study, results, rankings)
     by_loop = [loop_tables(loop, [r for r in results if r.loop == loop], cells) for loop in settings.loops]
     tables = [

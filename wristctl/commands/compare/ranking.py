@@ -37,7 +37,7 @@ def ranked(session: Session, study: Study, network: Inverse | None, tuned: Tuned
         for label, mean in zip(world_ranking.labels, world_ranking.means, strict=True):
             ends = (mean.low, mean.high) if math.isfinite(mean.high) else None
             findings.metric(f"rmse_{label}{end}", mean.value, "rad", "lower", world_ranking.count, ends)
-        with session.progress("drawing"):
+        with session.drawing():
             caption = f"RMSE of every controller on {world_ranking.name}, with 95 % intervals over worlds"
             findings.figure(f"ranking{end}", ranking_intervals, world_ranking, caption=caption)
     return rankings

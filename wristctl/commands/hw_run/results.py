@@ -41,7 +41,7 @@ def trial_tables(
     theirs = bool((trials["controller"] == "smc").any())
     rows = [*_means(session, trials, twins), *(_papers() if theirs else ())]
     by_trial = Table("Trials, in the order done", list(_BY_TRIAL.values()), trials[list(_BY_TRIAL)].to_numpy().tolist())
-    with session.progress("drawing"):
+    with session.drawing():
         _draw(session, trials, twins)
     title = "Means over the trials" + ", beside the paper's experiment with the same law" * theirs
     return [Table(title, _COLUMNS, rows), by_trial], twins

@@ -118,7 +118,7 @@ def bends_performed(session: Session, trials: pd.DataFrame, tuned: Gains | None)
                 simulated[key] = bend_twin(study, trial, followed, tuned)
             twins[row["trial"]] = simulated[key]
     rows = _means(findings, done, names, twins)
-    with session.progress("drawing"):
+    with session.drawing():
         _draw(session, done, twins)
     columns = ("", "trials", *(f"{name.replace('_', ' ')} [{unit}]" for name, unit in zip(_MEANS, _UNITS, strict=True)))
     simulated_columns = "simulated RMSE toward ulnar [rad]", "simulated RMSE toward flexion [rad]"

@@ -152,7 +152,7 @@ def hysteresis(session: Session) -> Hysteresis:
     tables = _tables(findings, driven, bands, main_case(settings))
     result = Hysteresis(session.study, findings, tables, driven, bands, [])
     _write(findings, result)
-    with session.progress("drawing"):
+    with session.drawing():
         if bands:
             findings.figure("dead-band", figures.dead_band, driven_strokes, bands)
         findings.figure("loops", figures.loops, driven_strokes, driven)

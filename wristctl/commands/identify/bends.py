@@ -107,7 +107,7 @@ def identify_bends(session: Session) -> BendsTold:
         ends = (one.low, one.high) if one.known else None
         findings.metric(name, one.value if one.known else None, one.unit, "", 1, ends, one.meaning)
     tables = [_told_table(told), fit_table(findings, fitted, known), residual_table(missed)]
-    with session.progress("drawing"):
+    with session.drawing():
         findings.figure("bends", bends, fitted, caption="measured bends, the model's, and the difference")
         findings.figure("residuals", residuals, fitted, known)
     _refuse(session, fitted, told, missed)

@@ -135,7 +135,7 @@ def identify(session: Session) -> Identified | LogTold | BendsTold:
     additions_table = offers(offered) if offered else None
     if additions_table is not None:
         tables.append(additions_table)
-    with session.progress("drawing"):
+    with session.drawing():
         findings.figure("angles", angles, fitted)
         findings.figure("residuals", residuals, fitted, estimated)
         findings.figure("correlations", correlations, fitted, estimated)

@@ -112,7 +112,7 @@ def identify_logs(session: Session) -> LogTold:
         ends = (told.low, told.high) if told.known else None
         findings.metric(name, told.value if told.known else None, told.unit, "", 1, ends, told.meaning)
     about = RealRobot("this robot", "", robot, lambda files: [], "", "predicted part")
-    with session.progress("drawing"):
+    with session.drawing():
         findings.figure("motion", motion, about, chosen.fits, caption="measured motion and prediction")
         findings.figure("left-over", left_over, about, chosen.fits, caption="what is left of the motion")
         findings.figure("models", errors_of_models, about, models, caption="error of each model")

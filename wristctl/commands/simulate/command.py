@@ -148,7 +148,7 @@ def simulate(session: Session) -> Simulated:
     findings.table("data/trajectory.csv", course.columns(), units=units, meaning=meaning)
     title = ", ".join(part for part in (course.label, repeated.fate) if part)
     tables = [metrics_table(findings, title, METRICS, repeated), *truth_tables(wrist, {"simulate": settings.loop})]
-    with session.progress("drawing"):
+    with session.drawing():
         world = truth_heading(wrist, settings.loop)
         caption = "Bending angle, error and tensions over time; what changes faster is a band about its mean"
         findings.figure("course", one_motion, course, heading=world, caption=caption)

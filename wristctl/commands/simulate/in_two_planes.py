@@ -115,7 +115,7 @@ def simulate_in_two_planes(session: Session) -> SimulatedBends:
     findings.headline("rmse", "rmse_ulnar", "rmse_flexion", "largest_error", "tip_rmse", "peak_tension")
     label = f"{settings.controller}/{settings.gains if isinstance(settings.gains, str) else 'given'} in two planes"
     tables = [metrics_table(findings, label, BEND_METRICS, repeated), *truth_tables(wrist, {"simulate": settings.loop})]
-    with session.progress("drawing"):
+    with session.drawing():
         reach = reach_of_bends(wrist, repeated.layout)
         caption = "The plane of bends with what the tendons reach; errors of both planes and pulls over time"
         findings.overview.figure = "bends"

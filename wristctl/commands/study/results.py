@@ -52,7 +52,7 @@ def written(session: Session, judged: Pieces, searches: dict[StudyPlace, Search]
     _note_streams(session)
     _tables(session, rankings, terms, shifts, searches)
     times = _step_times(session, searches)
-    with session.progress("drawing"):
+    with session.drawing():
         _draw(session, rankings, terms)
     shown = answer_tables(list(rankings.values()))
     shown += [every_row(ranking, times) for ranking in rankings.values()]

@@ -331,7 +331,7 @@ def _swept(session: Session, command: str) -> Swept:
     shown = headline(table, metrics, columns)
     _note(session, table, shown, known_units)
     told, units_told = for_people(table, columns)
-    with session.progress("drawing"):
+    with session.drawing():
         for axis in axes:
             others = [other_axis.key for other_axis in axes if other_axis is not axis]
             findings.figure(f"sweep-{axis.key}", over_key, told, axis.key, others, shown, units_told)

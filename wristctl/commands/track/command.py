@@ -90,7 +90,7 @@ def track(session: Session) -> Tracked:
     findings.table("data/track.csv", _frame(sightings), _UNITS, _MEANING)
     recording = {"name": session.study.track.video, "sha256": _digest(Path(source)), "frames": len(sightings)}
     findings.plain("data/recording.json", recording)
-    with session.progress("drawing"):
+    with session.drawing():
         findings.figure("angle", angle, sightings)
         findings.figure("frames", frames, pictures)
     counts = Counter(sighting.verdict for sighting in sightings)

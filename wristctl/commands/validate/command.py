@@ -150,7 +150,7 @@ def validate(session: Session) -> Validated:
         tables.append(steps_table(robot, steps))
     result = Validated(study, findings, tables, robot, models, chosen, steps)
     findings.table("data/models.csv", result.frame(), *_units(_MODELS))
-    with session.progress("drawing"):
+    with session.drawing():
         findings.figure("motion", figures.motion, robot, chosen.fits, caption="measured motion and prediction")
         findings.figure("left-over", figures.left_over, robot, chosen.fits, caption="what is left of the motion")
         findings.figure("models", figures.errors_of_models, robot, models, caption="error of each model")
