@@ -24,7 +24,8 @@ def test_a_figure_is_drawn_when_first_asked_for_and_anew_once_replaced() -> None
         return name
 
     figures.add("a", lambda: draw("first"))
-    assert "a" in figures and "b" not in figures and not drawn and figures["a"] == figures["a"] == "first" and drawn == ["first"]  # type: ignore[comparison-overlap]
+    assert "a" in figures and "b" not in figures
+    assert not drawn and figures["a"] == figures["a"] == "first" and drawn == ["first"]  # type: ignore[comparison-overlap]
     figures.add("a", lambda: draw("second"))
     assert figures["a"] == "second" and list(figures) == ["a"] and repr(figures) == "figures a"  # type: ignore[comparison-overlap]
 

@@ -14,6 +14,7 @@ from typer.core import TyperCommand, TyperGroup, TyperOption
 from typer.main import get_command
 
 from wristctl.cli.commands import COMMANDS, Entry
+from wristctl.cli.matplotlib_defaults import use_defaults
 from wristctl.cli.options import everything
 from wristctl.errors import UserError, error_of_the_system
 from wristctl.escape import printable
@@ -91,6 +92,7 @@ def main() -> NoReturn:
     """Run the command line; errors are one line on stderr and an exit code, no traceback unless --debug."""
     gc.set_threshold(100_000, 50, 100)  # imports make many objects and no cycles: looking for them costs 0.15 s
     sys.unraisablehook = again
+    use_defaults()
     with interrupts() as interrupt:
         try:
             code = get_command(app)(prog_name="wristctl", standalone_mode=False) or 0

@@ -5,7 +5,6 @@ from pathlib import Path
 from typing import Any, Literal
 
 import cv2
-import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_pdf import PdfPages
@@ -18,6 +17,7 @@ from numpy.typing import NDArray
 from wristctl.config.camera import CharucoBoard, Markers
 from wristctl.errors import UserError
 from wristctl.plotting.style import BLACK, GREY
+from wristctl.records.formats import own_look
 from wristctl.vision.charuco import DICTIONARY as BOARD_DICTIONARY
 from wristctl.vision.detector import print_of
 
@@ -46,10 +46,11 @@ Cells = NDArray[np.bool_]
 
 def write_sheets(file: Path, paper: Literal["a4", "letter"], board: CharucoBoard, markers: Markers) -> None:
     """Two pages: the board, the markers. Raises UserError where the board is larger than the paper, OSError."""
-    sheets = board_page(paper, board), marker_page(paper, markers)
-    with mpl.rc_context({"pdf.fonttype": 42}), PdfPages(file, metadata={"CreationDate": None}) as pages:
-        for page in sheets:
-            pages.savefig(page)
+    with own_look(pdf__fonttype=42):
+        sheets = board_page(paper, board), marker_page(paper, markers)
+        with PdfPages(file, metadata={"CreationDate": None}) as pages:
+            for page in sheets:
+                pages.savefig(page)
 
 
 def board_page(paper: Literal["a4", "letter"], board: CharucoBoard) -> Figure:
