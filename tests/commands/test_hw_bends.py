@@ -12,10 +12,12 @@ import pytest
 
 import wristctl
 from tests.commands.conftest import columns_of, session
+from wristctl.commands.adoption import with_planes
 from wristctl.commands.export.open_log_of_run import open_log_of
 from wristctl.commands.hw_run.command import hw_run, plan
 from wristctl.commands.hw_run.trial_bends import PerformedBends
 from wristctl.commands.inputs import Inputs
+from wristctl.config.study import Study
 from wristctl.config.wrist import WristParameters
 from wristctl.errors import UserError
 from wristctl.identification.bend_trials import bend_trials
@@ -37,6 +39,11 @@ SETTINGS = (
 )  # fmt: skip
 
 
+def study_of(*changes: str) -> Study:
+    """The short trials, changed, on a rig with the planes of their reference."""
+    return with_planes(wristctl.load_study(None, *SETTINGS, *changes))
+
+
 @dataclass
 class Whole:
     """A result with its run."""
@@ -48,7 +55,7 @@ class Whole:
 @pytest.fixture(scope="module")
 def whole(tmp_path_factory: pytest.TempPathFactory) -> Whole:
     """Two trials, of which one is pushed."""
-    study = wristctl.load_study(None, *SETTINGS)
+    study = study_of()
     with start_run("hw-run", study, "", tmp_path_factory.mktemp("whole")) as live:
         result = hw_run(session(study, live))
     assert isinstance(result, PerformedBends)
@@ -115,8 +122,8 @@ def test_its_open_log_is_one_that_identification_reads(whole: Whole) -> None:
 )
 def test_what_cannot_be_is_refused_before_a_rig_is_opened(change: str, problem: str) -> None:
     with pytest.raises(UserError, match=problem):
-        plan(wristctl.load_study(None, *SETTINGS, change), Inputs({}))
-    said = plan(wristctl.load_study(None, *SETTINGS), Inputs({}))
+        plan(study_of(change), Inputs({}))
+    said = plan(study_of(), Inputs({}))
     assert "2 trials" in said
 
 

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from tests.doors.conftest import wristctl
+from wristctl.records import Run
 
 OWN = """
 import numpy as np
@@ -56,3 +58,60 @@ def test_a_sound_one_runs(tmp_path: Path) -> None:
     (tmp_path / "own.py").write_text(OWN.replace("COURSE", SOUND))
     given = ("--set", "simulate.reference.kind=own.py:OWN", "--set", "simulate.horizon=1")
     assert wristctl(tmp_path, "simulate", "--dry-run", *given).returncode == 0
+
+
+ASLANT = """
+import numpy as np
+from wristctl.config.section import Parameter
+from wristctl.simulation.reference import ReferenceKind
+
+def course(reference, time):
+    phase = 2.0 * np.pi * np.maximum(time, 0.0)
+    size = np.deg2rad(reference.end_deg)
+    swing = size * np.stack([0.5 - 0.5 * np.cos(phase), np.pi * np.sin(phase), 2.0 * np.pi**2 * np.cos(phase)])
+    return np.stack([swing, -reference.value("lean") * swing])
+
+ASLANT = ReferenceKind(
+    "a line aslant", course=course, described=lambda reference: "aslant", targets="none", planes=2,
+    parameters={"lean": Parameter(0.5, "", "of flexion to ulnar")},
+)
+"""
+TRIAL = (
+    "--set", "hw-run.reference={kind: aslant.py:ASLANT, angle_deg: 8}", "--set", "hw-run.horizon=1.2",
+    "--set", "hw-run.push={force: 0}", "--set", "hw-run.back=0.4", "--set", "hw-run.push_toward_deg=90",
+    "--set", "hw-run.homing={frames: 1, rest: 0.1, move: 1.0e-4, slack: 4.0e-4, let_go: 0.6}",
+    "--set", "hw-run.bench={motors: {slack: [0, 0, 0, 0]}, person: {takes: 0}}",
+)  # fmt: skip
+
+
+@pytest.mark.slow
+def test_one_that_bends_in_two_planes_is_followed_in_two_planes(tmp_path: Path) -> None:
+    """By a simulated loop and by a rig, which nobody has told its planes."""
+    (tmp_path / "aslant.py").write_text(ASLANT)
+    simulated = ("--set", "simulate.reference={kind: aslant.py:ASLANT, lean: 0.4}", "--set", "simulate.horizon=1")
+    done = wristctl(tmp_path, "simulate", *simulated)
+    assert done.returncode == 0 and "in two planes" in done.stdout, done.stdout + done.stderr
+    planned = wristctl(tmp_path, "hw-run", *TRIAL, "--dry-run")
+    assert planned.returncode == 0 and "1 trials" in planned.stdout, planned.stdout + planned.stderr
+    done = wristctl(tmp_path, "hw-run", *TRIAL)
+    assert done.returncode == 0, done.stdout + done.stderr
+    shown = wristctl(tmp_path, "runs", "show", "latest:hw-run")
+    assert shown.returncode == 0 and "nobody has said that it may run" not in shown.stderr
+    (run,) = (tmp_path / "results").glob("*hw-run*")
+    assert "planes: 2 " in (run / "config.yaml").read_text()
+    log = Run(run).data("log")
+    bends = log[["bend_ref_ulnar", "bend_ref_flexion"]].to_numpy()
+    assert np.rad2deg(bends.max(axis=0)) == pytest.approx([8.0, 0.0], abs=0.01)
+    assert np.rad2deg(bends.min(axis=0)) == pytest.approx([0.0, -4.0], abs=0.01)
+
+
+@pytest.mark.slow
+def test_a_rig_that_is_said_to_bend_in_one_plane_refuses_one_that_bends_in_two(tmp_path: Path) -> None:
+    (tmp_path / "aslant.py").write_text(ASLANT)
+    (tmp_path / "mine.yaml").write_text("hw-run:\n  reference: {kind: aslant.py:ASLANT}\n  planes: 1\n")
+    done = wristctl(tmp_path, "hw-run", "mine.yaml", "--dry-run")
+    assert done.returncode == 2 and "aslant.py:ASLANT bends in two planes, and the rig in one" in done.stderr
+    assert "mine.yaml:3: hw-run.planes" in done.stderr and "planes: 2" in done.stderr
+    (tmp_path / "mine.yaml").write_text("hw-run:\n  reference: {kind: aslant.py:ASLANT}\n  real_time: true\n")
+    done = wristctl(tmp_path, "hw-run", "mine.yaml", "--dry-run")
+    assert done.returncode == 2 and "draws two cameras' pictures" in done.stderr, done.stderr

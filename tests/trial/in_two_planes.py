@@ -20,6 +20,7 @@ from wristctl.trial.trials import trials_of
 from wristctl.vision.view import View
 
 CIRCLING: dict[str, Any] = {
+    "planes": 2,
     "rows": ({"controller": "ct-dob", "gains": "hardware"},),
     "reference": {"kind": "circumduction", "angle_deg": 12.0, "turn": 1.2},
     "horizon": 1.4,

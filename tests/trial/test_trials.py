@@ -68,7 +68,8 @@ def test_a_rig_in_two_planes_goes_toward_its_directions_unless_its_reference_is_
     trials = trials_of(moves, np.random.default_rng(0))
     assert motions_of(moves) == list(toward)
     assert {trial[1:] for trial in trials} == set(product(toward, (0, 1), (0.0,), (0,)))
-    path = settings_of(reference={"kind": "circumduction", "angle_deg": 8.0}, directions=("ulnar",), repetitions=2)
+    circling = {"kind": "circumduction", "angle_deg": 8.0}
+    path = settings_of(planes=2, reference=circling, directions=("ulnar",), repetitions=2)
     assert motions_of(path) == ["circumduction"] and motions_of(settings_of(directions=("radial",) * 2)) == ["radial"]
     assert {trial[1:3] for trial in trials_of(path, np.random.default_rng(0))} == {("circumduction", k) for k in (0, 1)}
 

@@ -11,11 +11,12 @@ import pytest
 from pydantic import ValidationError
 
 from tests.trial.conftest import WRIST, Done
-from tests.trial.in_two_planes import PLANES, circling, performed, rmse, true_errors
-from wristctl.config.choices import IN_TWO_PLANES
+from tests.trial.in_two_planes import CIRCLING, PLANES, circling, performed, rmse, true_errors
+from wristctl.commands.adoption import with_planes
+from wristctl.config.hw_run import HwRunSettings
+from wristctl.config.study import Study
 from wristctl.errors import UserError
 from wristctl.simulation.bend_course import BEND_METRICS
-from wristctl.simulation.reference import REFERENCES
 from wristctl.study_files.load import load_study
 from wristctl.trial.bend_motion import BendMotion
 from wristctl.trial.bend_results import bend_twin, bends_evaluated, logged_course
@@ -174,20 +175,24 @@ def test_stored_positions_of_a_rig_with_one_camera_are_refused(tmp_path: Path) -
 
 
 def test_a_path_in_two_planes_makes_the_rig_one_in_two_planes() -> None:
-    assert circling().planes == 2 and motions_of(circling()) == ["circumduction"]
+    def rig(**changes: Any) -> HwRunSettings:
+        given = {key: value for key, value in CIRCLING.items() if key != "planes"} | changes
+        return with_planes(Study(hw_run=HwRunSettings.model_validate(given))).hw_run
+
+    assert rig().planes == 2 and motions_of(rig()) == ["circumduction"]
+    assert rig(push_toward_deg=30.0).push_toward_deg == 30.0
     straight = {"kind": "minimum-jerk"}
-    one = circling(reference=straight)
+    one = rig(reference=straight)
     assert one.planes == 1 and len(motions_of(one)) == 4
-    with pytest.raises(ValidationError, match="circumduction bends in two planes, and the rig in one"):
-        circling(planes=1)
-    with pytest.raises(ValidationError, match="ulnar-flexion lies between two planes"):
-        circling(reference=straight, directions=("ulnar-flexion",))
-    with pytest.raises(ValidationError, match="push_toward_deg is of a rig in two planes"):
-        circling(reference=straight, push_toward_deg=30.0)
-
-
-def test_the_paths_that_do_so_are_those_of_the_table() -> None:
-    assert {name for name, kind in REFERENCES.items() if kind.planes == 2} == set(IN_TWO_PLANES)
+    with pytest.raises(UserError, match="circumduction bends in two planes, and the rig in one"):
+        rig(planes=1)
+    for alike in ({}, {"planes": 1}):
+        with pytest.raises((UserError, ValidationError), match="ulnar-flexion lies between two planes"):
+            rig(reference=straight, directions=("ulnar-flexion",), **alike)
+        with pytest.raises((UserError, ValidationError), match="push_toward_deg is of a rig in two planes"):
+            rig(reference=straight, push_toward_deg=30.0, **alike)
+    with pytest.raises(UserError, match="draws two cameras' pictures"):
+        rig(real_time=True)
 
 
 def test_directions_are_shuffled_together_where_nobody_turns_the_wrist() -> None:

@@ -61,10 +61,11 @@ def _serve_with_wrist(chip: Any, line: Any, override: list[str], console: Any, q
     import sys
     from tempfile import TemporaryDirectory
 
+    from wristctl.commands.adoption import with_planes
     from wristctl.loop_priority import prioritised
     from wristctl.study_files.load import load_study
 
-    study = load_study((), override, "hw-run")
+    study = with_planes(load_study((), override, "hw-run"))
     if study.hw_run.planes == 2:
         problem = "an emulated rig in two planes runs in virtual time alone"
         raise UserError(problem, "hw-run.planes", "planes: 1, or wristctl hw-run without --port")

@@ -118,6 +118,7 @@ def check_rig(
     """Measure, and print the answer first. Exits with 3 where the loop cannot run. `chosen` are settings by name."""
     from wristctl.board.driver import Board
     from wristctl.board.transport import EMULATED, only_board
+    from wristctl.commands.adoption import with_planes
     from wristctl.loop_priority import prioritised
     from wristctl.records import require
     from wristctl.trial.rig_facts import Pictures, measure, troubles
@@ -126,7 +127,7 @@ def check_rig(
     from wristctl.trial.testbeds import open_testbed
     from wristctl.vision.view import View
 
-    study = load_study((), override, "hw-run")
+    study = with_planes(load_study((), override, "hw-run"))
     overrides: dict[str, Any] = {"baud": baud, "port": None if port == EMULATED else port or only_board()}
     settings = study.hw_run.model_copy(update=overrides | chosen)
     if settings.planes == 2:

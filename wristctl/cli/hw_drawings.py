@@ -31,6 +31,7 @@ def drawings(
 
     All of them follow from the settings of hw-run and the wrist. Each page has a ruler to check the print.
     """
+    from wristctl.commands.adoption import with_planes
     from wristctl.commands.calibrate.part_drawings import part_pages
     from wristctl.commands.calibrate.print_sheet import marker_page
     from wristctl.records.files import replacing
@@ -38,7 +39,7 @@ def drawings(
     from wristctl.study_files.load import load_study
     from wristctl.trial.spool_part import SpoolPart, write_stl
 
-    study = load_study(config or (), override or (), "hw-run")
+    study = with_planes(load_study(config or (), override or (), "hw-run"))
     settings = study.hw_run
     spool = SpoolPart.of(settings, tendon_mm, shaft_mm)
     pages = {**part_pages(settings, study.wrist, spool, paper), "markers": marker_page(paper, settings.markers)}

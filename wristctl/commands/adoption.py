@@ -5,6 +5,8 @@ import logging
 from collections.abc import Mapping
 from typing import Any, NamedTuple, TypeVar
 
+from pydantic import ValidationError
+
 from wristctl.config.choices import CONTROLLERS, OPTIMISERS, REFERENCES, Choices
 from wristctl.config.controller_row import Row
 from wristctl.config.foreign import PLAIN, Foreign, is_reference
@@ -13,6 +15,7 @@ from wristctl.config.simulate import SimulateSettings
 from wristctl.config.study import Study
 from wristctl.errors import UserError, nearest
 from wristctl.plugins.places import entry_point_names
+from wristctl.study_files.error_messages import explained
 from wristctl.study_files.resolved import names_read
 
 log = logging.getLogger(__name__)
@@ -62,10 +65,33 @@ def adopted(study: Study, command: str) -> Adopted:
     def own_name(table: Choices[Any], name: str) -> str:
         return names.get((table.what, name), name)
 
+    if "hw_run" in read:
+        study = with_planes(study)
     if not origins:
         return Adopted(study, ())
     called = renamed_fields(study, own_name, read)
     return Adopted(study.model_copy(update=called | {"controller_settings": settings}), tuple(origins))
+
+
+def with_planes(study: Study) -> Study:
+    """The study with as many planes of its rig as the reference of the trials has, where nobody gave the rig's.
+
+    The reference is loaded for it. Raises UserError where it bends in more planes than a rig was given, and where other
+    settings do not fit them.
+    """
+    settings, name = study.hw_run, study.hw_run.reference.kind
+    if loaded := _loaded(REFERENCES, name):
+        _entry(REFERENCES, name, *loaded, study)
+    planes = REFERENCES[name].planes
+    if not settings.planes_are_open:
+        if planes > settings.planes:
+            problem = f"{name} bends in two planes, and the rig in one"
+            raise UserError(problem, "hw-run.planes", "planes: 2")
+        return study
+    try:
+        return study.model_copy(update={"hw_run": settings.bending_in(planes)})
+    except ValidationError as error:
+        raise explained(error, {}).at("hw-run") from error
 
 
 def with_presets(study: Study, command: str, tell: bool = True, for_several: bool = False) -> Study:

@@ -156,8 +156,6 @@ REFERENCES: Choices[Any] = Choices(
     },
     "wristctl.references",
 )
-# Names of those that bend in two planes: a rig's settings ask for it, and load none of them.
-IN_TWO_PLANES = ("circle", "figure-of-8", "circumduction", "dart-thrower")
 
 # Table of `wristctl.simulation.disturbances.Disturbance`.
 DISTURBANCES: Choices[Any] = Choices(

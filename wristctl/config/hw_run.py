@@ -7,7 +7,6 @@ from pydantic import ValidationInfo, field_validator, model_validator
 
 from wristctl.config.bench import BenchSettings
 from wristctl.config.camera import Device, Gates, Markers
-from wristctl.config.choices import IN_TWO_PLANES
 from wristctl.config.controller_row import Row
 from wristctl.config.loop import TICK, DirectionName, Loop, Reference
 from wristctl.config.plant import Actuator, Plant, Push, Sensor, TrueActuator, TrueSensor, TrueWrist
@@ -241,22 +240,19 @@ class HwRunSettings(RigSettings):
     network: str | None = choice(None, "train run behind a reference with inverse: network")
     video: bool = choice(False, "keep the frames that were looked at as videos: raw, and with clock and marker angle")
 
-    @model_validator(mode="before")
-    @classmethod
-    def _planes_of_the_reference(cls, given: Any) -> Any:
-        """Two planes, where the reference has two and nothing is said of the rig's."""
-        if not isinstance(given, Mapping) or "planes" in given:
-            return given
-        reference = given.get("reference")
-        kind = reference.get("kind") if isinstance(reference, Mapping) else getattr(reference, "kind", None)
-        return {**given, "planes": 2} if kind in IN_TWO_PLANES else given
+    @property
+    def planes_are_open(self) -> bool:
+        """Whether the rig has as many planes as its reference, which is not known before that is loaded."""
+        return "reference" in self.model_fields_set and "planes" not in self.model_fields_set
+
+    def bending_in(self, planes: int) -> Self:
+        """Settings of a rig with so many planes. Raises ValidationError where others do not fit them."""
+        return self.model_validate({name: getattr(self, name) for name in self.model_fields_set} | {"planes": planes})
 
     @model_validator(mode="after")
     def _planes_for_the_motion(self) -> Self:
-        if self.planes == 2:
+        if self.planes == 2 or self.planes_are_open:
             return self
-        if self.reference.kind in IN_TWO_PLANES:
-            raise Unfitting(f"{self.reference.kind} bends in two planes, and the rig in one", "planes: 2")
         if between := [name for name in self.directions if name in get_args(Between)]:
             raise Unfitting(f"{between[0]} lies between two planes, and the rig bends in one", "planes: 2")
         if self.push_toward_deg is not None:
