@@ -130,9 +130,9 @@ def test_identified_values_replace_what_a_command_knows_and_leave_its_levels() -
     assert {name: loop.sensor.level for name, loop in tuned.loops.items()} == levels
 
 
-def _log_of(file: Path, noise: float, backward: bool = False) -> None:
+def _log_of(file: Path, noise: float, backward: bool = False, step: float = 0.02) -> None:
     """An open log of a wrist in one plane that follows its spools 40 ms late."""
-    time = np.arange(0.0, 8.0, 0.02)
+    time = np.arange(0.0, 8.0, step)
     bend = 20.0 * np.sin(1.5 * time) * np.minimum(1.0, time)
     late = np.interp(time - 0.04, time, bend) + noise * np.random.default_rng(0).normal(size=len(time))
     spool = 14.142 * np.radians(bend) * (-1.0 if backward else 1.0)
@@ -143,7 +143,7 @@ def _log_of(file: Path, noise: float, backward: bool = False) -> None:
 @pytest.mark.painted
 @pytest.mark.slow
 def test_an_open_log_tells_what_it_can_in_a_run_of_its_own(call: Call, tmp_path: Path) -> None:
-    _log_of(tmp_path / "my.csv", 0.05)
+    _log_of(tmp_path / "my.csv", 0.05, step=0.005)
     code, out, err = call("identify", str(tmp_path / "my.csv"))
     assert code == 0, err
     assert (
@@ -153,6 +153,7 @@ def test_an_open_log_tells_what_it_can_in_a_run_of_its_own(call: Call, tmp_path:
     delay = found.metrics["delay"]
     assert delay["interval"][0] - 2e-3 < 0.04 < delay["interval"][1] + 2e-3
     assert found.metrics["tendon"]["value"] is None and found.metrics["error"]["value"] < 0.1
+    assert "Of 1600 samples the models are fitted at 801 instants" in out
     assert "not told" in out and all(len(line) <= 100 for line in out.splitlines()[:-1])
     (tmp_path / "my.csv").unlink()
     assert call("runs", "verify", found.id)[0] == 0
@@ -166,5 +167,5 @@ def test_a_log_that_no_model_predicts_is_refused_with_its_answer(call: Call, tmp
     assert code == 3 and out == "" and "nothing of it is to be relied on" in err and "misfit=tell" in err
     failed = open_run(next((tmp_path / "results").glob("*-identify-*")))
     assert failed.state == "failed" and "not told" in (failed.path / "README.md").read_text()
-    code, _, err = call("identify", str(tmp_path / "back.csv"), "--dry-run")
-    assert code == 0
+    code, out, err = call("identify", str(tmp_path / "back.csv"), "--dry-run")
+    assert code == 0 and "400 samples" in out and "instants" not in out

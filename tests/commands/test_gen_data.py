@@ -16,6 +16,7 @@ from tests.commands.conftest import columns_of, known_of, repeated, session
 from wristctl.commands.gen_data.command import GEN_DATA, Generated, samples_of
 from wristctl.commands.inputs import Inputs
 from wristctl.commands.simulate.command import Simulated
+from wristctl.commands.train.command import TRAIN
 from wristctl.commands.train.tables import MEANING
 from wristctl.errors import UserError
 from wristctl.learning import dataset
@@ -24,7 +25,7 @@ from wristctl.learning.dataset import HELD_PAYLOAD, HELD_POSE, Samples
 from wristctl.learning.domain import Domain
 from wristctl.learning.evaluation import angle_errors
 from wristctl.records import Run, start_run
-from wristctl.wrist.kinematics import exact_angle
+from wristctl.wrist.kinematics import arc_tip, exact_angle
 
 TIP = np.array([[0.08, 0.01], [0.07, -0.02], [0.06, 0.03], [0.05, 0.04]])
 OTHERS = np.array([[-0.5, 0.1], [0.25, 0.4], [0.0, 0.2], [0.1, 0.3]])
@@ -166,6 +167,46 @@ def test_a_run_and_its_source_belong_together() -> None:
         plan("source: run")
     (need,) = GEN_DATA.needs
     assert need.optional and need.kind is None
+
+
+@pytest.fixture
+def logs(tmp_path: Path) -> list[Path]:
+    """Files with 1,200 rows in all, one of them without an angle."""
+    files = []
+    for number in range(4):
+        theta = np.random.default_rng(number).uniform(-0.6, 0.6, 300)
+        columns = np.column_stack([1e3 * arc_tip(theta, 0.08), np.degrees(theta)])
+        columns[7:8, 2] = math.nan if number == 2 else columns[7, 2]
+        files.append(tmp_path / f"log{number}.csv")
+        rows = [",".join(map(repr, row)) for row in columns.tolist()]
+        files[-1].write_text("\n".join(["tip_x [mm],tip_y [mm],angle [deg]", *rows]) + "\n")
+    return files
+
+
+@pytest.mark.parametrize(
+    ("samples", "planned", "said", "count"),
+    [
+        ("null", "all 1199 samples of 4 files", "all of 4 recordings", 1199),
+        ("1000", "at most 1000 of 1199 samples of 4 files", "drawn from the 1199 of 4 recordings", 1000),
+    ],
+)
+def test_of_recordings_every_sample_is_taken_unless_a_number_is_given(
+    tmp_path: Path, logs: list[Path], samples: str, planned: str, said: str, count: int
+) -> None:
+    named = ", ".join(map(str, logs))
+    study = wristctl.load_study(None, f"gen-data={{source: csv, files: [{named}], samples: {samples}}}")
+    left_out = "(left out: 1 row without a tip or an angle)"
+    assert GEN_DATA.plan(study, Inputs()) == f"{planned}, 4 recordings {left_out}"
+    done = wristctl.gen_data(study, out=tmp_path / "runs")
+    assert done.run is not None and len(done.run.array("samples")["theta"]) == count
+    for text in (" ".join(done.answer.lines()), done.run.file("README.md").read_text().replace("\n", " ")):
+        assert f"{count} samples of tip position" in text and f"{said} {left_out}" in text
+
+
+def test_the_numbers_of_samples_that_are_drawn_and_read_are_the_papers_and_all(logs: list[Path]) -> None:
+    assert GEN_DATA.plan(wristctl.load_study(None), Inputs()).startswith("1000 samples (sobol)")
+    measured = wristctl.load_study(None, "gen-data.source=csv", f"gen-data.files=[{', '.join(map(str, logs))}]")
+    assert "on samples of its own: 599 samples to train on, 300 to choose by, 300" in TRAIN.plan(measured, Inputs())
 
 
 @pytest.mark.painted

@@ -12,6 +12,10 @@ from wristctl.config.section import Section, choice, quantity
 Activation = Literal["sigmoid", "relu", "leaky-relu", "tanh", "silu"]
 
 
+# Samples that are drawn where no number is given: the paper's.
+_DRAWN = 1000
+
+
 class DataSettings(Section):
     """Samples of tip positions and bending angles."""
 
@@ -20,7 +24,9 @@ class DataSettings(Section):
         "constant curvature (E1), static equilibria of the loaded wrist, or measured: in an earlier run, in CSV files",
         "paper",
     )
-    samples: int = choice(1000, "number of samples", "paper", ge=10, le=10_000_000)
+    samples: int | None = choice(
+        None, "number of samples; null: 1000 that are drawn, or all that were measured", "paper", ge=10, le=10_000_000
+    )
     sampling: Literal["uniform", "latin-hypercube", "sobol"] = choice(
         "sobol", "how angle, stretch and payload are drawn"
     )
@@ -43,6 +49,16 @@ class DataSettings(Section):
     )
     files: tuple[str, ...] = given_file("csv: open logs with tips and angles (docs/open-log.md)", ())
     columns: str | None = columns_of_file()
+
+    @property
+    def measured(self) -> bool:
+        """Whether the samples are of recordings."""
+        return self.source in ("run", "csv")
+
+    @property
+    def drawn_samples(self) -> int:
+        """Number of samples to draw."""
+        return _DRAWN if self.samples is None else self.samples
 
     @model_validator(mode="after")
     def _ranges_in_order(self) -> Self:

@@ -101,7 +101,7 @@ def draw_samples(settings: DataSettings, wrist: WristParameters, rng: np.random.
     """Samples of `pcc`: each segment's angle within its part of +-range_deg, the length in stretch * length."""
     n, bend = settings.segments, math.radians(wrist.range_deg)
     low, high = (ratio * wrist.length for ratio in settings.stretch)
-    unit = unit_cube(settings.sampling, settings.samples, n + 1, rng)
+    unit = unit_cube(settings.sampling, settings.drawn_samples, n + 1, rng)
     angles = (-bend + 2.0 * bend * unit[:, :n]) / n
     length = low + (high - low) * unit[:, n]
     theta = angles.sum(axis=1)
@@ -195,7 +195,7 @@ def draw_equilibria(
     What the tendons cannot hold within their limit, or what buckles, is left out. Raises UserError where that is
     more than half.
     """
-    count, n = settings.samples, settings.segments
+    count, n = settings.drawn_samples, settings.segments
     unit = unit_cube(settings.sampling, count, 2, rng)
     theta = math.radians(wrist.range_deg) * (2.0 * unit[:, 0] - 1.0)
     low, high = settings.payload

@@ -32,12 +32,15 @@ class RecordedCourse:
     theta: Array
     others: Mapping[str, Array]
     """inputs after x and y, keys of `learning.domain.OTHERS`"""
+    left_out: int = 0
+    """Rows of the recording that miss a tip, an angle or an input."""
 
 
 def courses_in(columns: Mapping[str, Any], name: str) -> Iterator[RecordedCourse]:
     """The courses in columns of SI units, none without tips and angles; rows that miss any value are left out.
 
-    A column `trial` parts them; of arrays (rows, T) each row is one.
+    One may have no samples: all its rows were left out. A column `trial` parts them; of arrays (rows, T) each row is
+    one.
     """
     if not all(column in columns for column in NEEDED):
         return
@@ -52,10 +55,10 @@ def courses_in(columns: Mapping[str, Any], name: str) -> Iterator[RecordedCourse
     for label, rows in parts:
         values = {key: np.broadcast_to(array, shape)[rows].ravel() for key, array in arrays.items()}
         finite = np.isfinite(np.stack(list(values.values()))).all(axis=0)
-        if finite.any():
-            kept = {key: array[finite] for key, array in values.items()}
-            tip = np.column_stack([kept["tip_x"], kept["tip_y"]])
-            yield RecordedCourse(label, tip, kept["theta"], {key: kept[key] for key in OTHERS if key in kept})
+        kept = {key: array[finite] for key, array in values.items()}
+        tip = np.column_stack([kept["tip_x"], kept["tip_y"]])
+        others = {key: kept[key] for key in OTHERS if key in kept}
+        yield RecordedCourse(label, tip, kept["theta"], others, int(np.sum(~finite)))
 
 
 def _label(trial: str | float) -> str:
@@ -87,8 +90,8 @@ def read_courses(file: Path, names: str = "") -> list[RecordedCourse]:
     return list(courses_in(columns, file.name))
 
 
-def samples_of_courses(courses: Sequence[RecordedCourse], count: int, rng: np.random.Generator) -> Samples:
-    """At most `count` samples of recordings. Raises UserError where too few are known, or inputs differ."""
+def samples_of_courses(courses: Sequence[RecordedCourse], count: int | None, rng: np.random.Generator) -> Samples:
+    """Samples of recordings, all or at most `count`. Raises UserError where too few are known, or inputs differ."""
     names = [tuple(course.others) for course in courses]
     if len(set(names)) > 1:
         odd = next(course for course, inputs in zip(courses, names, strict=True) if inputs != names[0])
@@ -98,7 +101,7 @@ def samples_of_courses(courses: Sequence[RecordedCourse], count: int, rng: np.ra
     total = sum(len(course.theta) for course in courses)
     if total < _FEWEST:
         raise UserError(f"{total} samples are known", "gen-data", f"at least {_FEWEST}: name longer recordings")
-    rows = np.sort(rng.choice(total, min(count, total), replace=False))
+    rows = np.sort(rng.choice(total, total if count is None else min(count, total), replace=False))
     tip, theta = (np.concatenate([getattr(course, name) for course in courses])[rows] for name in ("tip", "theta"))
     columns = [np.concatenate([course.others[key] for course in courses])[rows] for key in names[0]]
     inputs = np.stack(columns or [theta], -1)

@@ -4,9 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, NamedTuple
 
 from wristctl.commands.answer import Answer
 from wristctl.commands.printed_table import Table, degrees, number
+
+if TYPE_CHECKING:
+    from wristctl.learning.measured_samples import RecordedCourse
 
 # Factor and unit in which a quantity is shown; of others 1e3 and mm.
 RANGES = {"theta": (180.0 / math.pi, "deg"), "pose": (180.0 / math.pi, "deg"), "hand_mass": (1.0, "kg")}
@@ -15,11 +19,48 @@ _WORDS = {"theta": "bending angle", "arc_length": "arc length", "x": "tip, along
           "pose": "tilt of the wrist", "hand_mass": "mass in the hand"}  # fmt: skip
 
 
-def answer_of(inputs: Sequence[str], metrics: Mapping[str, float], run: str) -> Answer:
-    """What was drawn; `inputs` are those beside the tip, `run` is the path of the run, empty in memory."""
+class Measured(NamedTuple):
+    """What was read of recordings."""
+
+    recordings: int
+    """Recordings with samples."""
+    samples: int
+    """Rows with all of tip, angle and further inputs."""
+    left_out: int
+    """Rows without some of these."""
+
+    @property
+    def left_out_words(self) -> str:
+        """How many rows were left out, in brackets; empty where none was."""
+        return f" (left out: {counted(self.left_out, 'row')} without a tip or an angle)" if self.left_out else ""
+
+
+def measured_of(courses: Sequence[RecordedCourse]) -> Measured:
+    """What recordings have."""
+    counts = [len(course.theta) for course in courses]
+    return Measured(sum(count > 0 for count in counts), sum(counts), sum(course.left_out for course in courses))
+
+
+def counted(count: int, name: str) -> str:
+    """A number of things: 1 file, 2 files."""
+    return f"{count} {name}{'s' * (count != 1)}"
+
+
+def answer_of(
+    inputs: Sequence[str], metrics: Mapping[str, float], run: str, measured: Measured | None = None
+) -> Answer:
+    """What was drawn, or read of recordings.
+
+    `inputs` are those beside the tip, `run` is the path of the run, empty in memory.
+    """
     count = int(metrics["samples"])
     low, high = (metrics[f"theta_{end}_deg"] for end in ("min", "max"))
-    sentence = f"{count} samples of tip position and bending angle, from {number(low)} to {number(high)} deg."
+    source = ""
+    if measured is not None:
+        named = counted(measured.recordings, "recording")
+        chosen = "all" if measured.samples == count else f"drawn from the {measured.samples}"
+        source = f", {chosen} of {named}{measured.left_out_words}"
+    sentence = f"{count} samples of tip position and bending angle, from {number(low)} to {number(high)} deg{source}."
     error, largest = (math.radians(metrics[f"exact_inverse_{name}"]) for name in ("rmse_deg", "max_error_deg"))
     notes = [
         f"The closed form 2 atan2(y, x) errs by {degrees(error)} deg RMSE on them, at most {degrees(largest)} deg."

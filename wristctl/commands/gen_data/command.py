@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from wristctl.commands.answer import Answer
-from wristctl.commands.gen_data.answer import RANGES, answer_of
+from wristctl.commands.gen_data.answer import RANGES, Measured, answer_of, counted, measured_of
 from wristctl.commands.inputs import EarlierRun, Given, Inputs
 from wristctl.commands.printed_table import Table
 from wristctl.commands.procedure import Procedure
@@ -36,11 +36,13 @@ class Generated(StudyResult):
     kind = "gen-data"
 
     samples: Samples
+    measured: Measured | None = None
+    """What was read of recordings; None where samples were drawn."""
 
     @property
     def answer(self) -> Answer:
-        """What was drawn, with its ranges in deg and mm."""
-        return answer_of(self.samples.names, self.metrics, self.place)
+        """What was drawn or read, with its ranges in deg and mm."""
+        return answer_of(self.samples.names, self.metrics, self.place, self.measured)
 
     def frame(self) -> pd.DataFrame:
         """One row per sample: x, y, the other inputs, theta, arc_length; SI units."""
@@ -56,14 +58,15 @@ def plan(study: Study, inputs: Inputs) -> str:
         if present and settings.source != name:
             fix, noun = Setting(f"source={name}", "gen-data", option=True), "a run is" if name == "run" else "files are"
             raise UserError(f"{noun} given, but source is {settings.source}", "gen-data.source", fix)
-    if settings.source in ("run", "csv"):
-        courses, run = _courses(study, inputs), inputs.runs().get("run")
-        whose = (
-            run.id if run else f"a {inputs['run'].kind} result" if "run" in inputs else _counted(settings.files, "file")
-        )
-        count = sum(len(course.theta) for course in courses)
-        return f"at most {settings.samples} of {count} samples of {whose}, {_counted(courses, 'recording')}"
-    begin = f"{settings.samples} samples ({settings.sampling}), bending within +-{wrist.range_deg:g} deg, "
+    if settings.measured:
+        courses, run = recorded(study, inputs), inputs.runs().get("run")
+        result = f"a {inputs['run'].kind} result" if "run" in inputs else counted(len(settings.files), "file")
+        whose = run.id if run else result
+        measured = measured_of(courses)
+        chosen = "all" if settings.samples is None else f"at most {settings.samples} of"
+        named = counted(measured.recordings, "recording")
+        return f"{chosen} {measured.samples} samples of {whose}, {named}{measured.left_out_words}"
+    begin = f"{settings.drawn_samples} samples ({settings.sampling}), bending within +-{wrist.range_deg:g} deg, "
     if settings.source == "plant":
         tilts = ", ".join(f"{tilt:g}" for tilt in (*settings.poses, *settings.held_out_poses))
         low, high = (100.0 * ratio for ratio in settings.payload)
@@ -85,8 +88,10 @@ def gen_data(session: Session) -> Generated:
 
     findings = session.findings
     entropy = findings.stream("samples")
-    with session.progress("drawing", session.study.gen_data.samples, "samples") as advance:
-        samples = drawn(session.study, entropy, session.inputs, advance)
+    courses = recorded(session.study, session.inputs)
+    total = None if courses else session.study.gen_data.drawn_samples
+    with session.progress("drawing", total, "samples") as advance:
+        samples = drawn(session.study, entropy, courses, advance)
         advance(len(samples.theta))
     table = samples_table(samples)
     exact = angle_errors(exact_angle(samples.tip), samples.theta)
@@ -118,20 +123,25 @@ def gen_data(session: Session) -> Generated:
         "samples", "theta_min_deg", "theta_max_deg", "exact_inverse_rmse_deg", "exact_inverse_max_error_deg"
     )
     tables = [Table(f"{count} samples", ("quantity", "least", "greatest"), rows)]
-    return Generated(session.study, findings, tables, samples)
+    return Generated(session.study, findings, tables, samples, measured_of(courses) if courses else None)
 
 
-def drawn(study: Study, entropy: tuple[int, int], inputs: Inputs, advance: Callable[[int], object] = int) -> Samples:
-    """The samples that the study's gen-data section asks for; `done` is told how many there are by now."""
+def drawn(
+    study: Study, entropy: tuple[int, int], courses: Sequence[RecordedCourse], advance: Callable[[int], object] = int
+) -> Samples:
+    """The samples that the study's gen-data section asks for, of these recordings where it asks for measured ones.
+
+    `advance` is told how many there are by now.
+    """
     import numpy as np
 
     from wristctl.learning.dataset import draw_samples
 
     settings, rng = study.gen_data, np.random.default_rng(entropy)
-    if settings.source in ("run", "csv"):
+    if settings.measured:
         from wristctl.learning.measured_samples import samples_of_courses
 
-        return samples_of_courses(_courses(study, inputs), settings.samples, rng)
+        return samples_of_courses(courses, settings.samples, rng)
     if settings.source == "plant":
         from wristctl.learning.dataset import draw_equilibria
 
@@ -146,11 +156,10 @@ def samples_of(source: Run | Generated) -> Samples:
     return Samples.from_arrays(source.array("samples")) if isinstance(source, Run) else source.samples
 
 
-def _counted(items: Sequence[object], name: str) -> str:
-    return f"{len(items)} {name}{'s' * (len(items) != 1)}"
-
-
-def _courses(study: Study, inputs: Inputs) -> list[RecordedCourse]:
+def recorded(study: Study, inputs: Inputs) -> list[RecordedCourse]:
+    """The recordings that the study's gen-data section names; none where its samples are drawn. Raises UserError."""
+    if not study.gen_data.measured:
+        return []
     if study.gen_data.source == "csv":
         from wristctl.learning.measured_samples import read_courses
 

@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 from wristctl.commands.answer import Answer
 from wristctl.commands.inputs import Inputs
@@ -37,13 +37,13 @@ class LogTold(StudyResult):
     """The chosen model, fitted to all trials."""
     models: list[TriedModel]
     chosen: TriedModel
-    sides: str = ""
-    """Which tendons were taken to pull to which side, where the motion says it."""
+    remarks: Sequence[str] = ()
+    """Which tendons were taken to pull to which side, where the motion says it, and how many samples were used."""
 
     @property
     def answer(self) -> Answer:
         """Parameters with intervals or not told, the terms that the data want, and what would tell more."""
-        return told_answer(self.fit, self.models, self.chosen, self.sides)
+        return told_answer(self.fit, self.models, self.chosen, self.remarks)
 
     def frame(self) -> pd.DataFrame:
         """One row per parameter: value and ends of its interval, nan where the data do not tell it, and unit."""
@@ -56,8 +56,17 @@ class LogTold(StudyResult):
         return pd.DataFrame(rows, columns=["parameter", "value", "low", "high", "unit", "meaning"])
 
 
-def _read(study: Study) -> tuple[ArcRobot, list[ArcRecording], str]:
-    """The robot, its recordings, and in words which tendons pull to which side where the motion says it."""
+class _Read(NamedTuple):
+    """The robot of open logs, its recordings, and the number of samples that the logs have."""
+
+    robot: ArcRobot
+    recordings: list[ArcRecording]
+    samples: int
+    remarks: list[str]
+    """Which tendons pull to which side, where the motion says it, and how many samples are used if not all are."""
+
+
+def _read(study: Study) -> _Read:
     from wristctl.identification.log_model import recordings_of_logs, robot_of_logs, spools_of_log
     from wristctl.records.log_converters import read_log
 
@@ -65,7 +74,10 @@ def _read(study: Study) -> tuple[ArcRobot, list[ArcRecording], str]:
     logs = [read_log(Path(file), settings.columns or "", "log") for file in settings.logs]
     robot = robot_of_logs(logs, study.wrist, settings.radius_error)
     sides = _sides(robot, spools_of_log(logs[0])) if len(robot.angles) > 2 and "turn" not in robot.base else ""
-    return robot, recordings_of_logs(logs, robot), sides
+    recordings = recordings_of_logs(logs, robot)
+    read, used = sum(map(len, logs)), sum(len(recording.time) for recording in recordings)
+    fewer = f"Of {read} samples the models are fitted at {used} instants, evenly over each trial."
+    return _Read(robot, recordings, read, [sides] * bool(sides) + [fewer] * (used < read))
 
 
 def _sides(robot: ArcRobot, numbers: Sequence[int]) -> str:
@@ -79,10 +91,10 @@ def log_plan(study: Study, inputs: Inputs) -> str:
     """Say what is looked for in which logs."""
     if inputs.runs():
         raise UserError("runs and logs at once", "identify.runs", "identify one or the other")
-    robot, recordings, _ = _read(study)
-    samples = sum(len(recording.time) for recording in recordings)
+    robot, recordings, samples, remarks = _read(study)
     names = ", ".join(robot.unknowns(()))
-    return f"{names}, then slack, friction and creep, from {len(recordings)} trials of open logs, {samples} samples"
+    plan = f"{names}, then slack, friction and creep, from {len(recordings)} trials of open logs, {samples} samples"
+    return "\n".join([plan, *remarks])
 
 
 def identify_logs(session: Session) -> LogTold:
@@ -95,7 +107,7 @@ def identify_logs(session: Session) -> LogTold:
     from wristctl.identification.real_robots import RealRobot
 
     findings, study = session.findings, session.study
-    robot, recordings, sides = _read(study)
+    robot, recordings, _, remarks = _read(study)
     models = list["TriedModel"]()
     with session.progress("fitting models") as report:
         for model in tried_models(robot, [recordings], False):
@@ -118,7 +130,7 @@ def identify_logs(session: Session) -> LogTold:
         findings.figure("models", errors_of_models, about, models, caption="error of each model")
     findings.overview.figure = "motion"
     result = LogTold(
-        study, findings, [_models_table(models, robot), parameters_table([fit], "")], fit, models, chosen, sides
+        study, findings, [_models_table(models, robot), parameters_table([fit], "")], fit, models, chosen, remarks
     )
     findings.table("data/parameters.csv", result.frame())
     _refuse(session, result, recordings)
@@ -149,7 +161,7 @@ def _refuse(session: Session, result: LogTold, recordings: Sequence[ArcRecording
     raise UserError(problem, recordings[0].name, accept, exit_code=3)
 
 
-def told_answer(fit: ArcFit, models: Sequence[TriedModel], chosen: TriedModel, sides: str = "") -> Answer:
+def told_answer(fit: ArcFit, models: Sequence[TriedModel], chosen: TriedModel, remarks: Sequence[str] = ()) -> Answer:
     """Parameters with intervals or not told, the terms that the data want, and what would tell more."""
     from wristctl.commands.validate.answer import parameters_table, wanted_terms
 
@@ -160,7 +172,7 @@ def told_answer(fit: ArcFit, models: Sequence[TriedModel], chosen: TriedModel, s
         f"These data tell {joined(told) or 'nothing of the parameters'}. Of the part that was not fitted the model "
         f"predicts the {fit.robot.measured} to {error} {unit} RMS (95 % {low} to {high})."
     )
-    notes: list[str | Table] = [wanted_terms(models), *([sides] if sides else [])]
+    notes: list[str | Table] = [wanted_terms(models), *remarks]
     if "force" not in fit.values:
         more = (
             "" if "softening" in fit.values else "; trials with several masses tell how much a load softens the wrist"

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from wristctl.commands.answer import Answer
-from wristctl.commands.gen_data.command import drawn, samples_of
+from wristctl.commands.gen_data.command import drawn, recorded, samples_of
 from wristctl.commands.inputs import EarlierRun, Inputs
 from wristctl.commands.printed_table import Table
 from wristctl.commands.procedure import Procedure
@@ -174,10 +174,13 @@ def plan(study: Study, inputs: Inputs) -> str:
         fix = "pip install torch --index-url https://download.pytorch.org/whl/cpu"
         raise UserError("training needs PyTorch, which is not installed", "train", fix)
     settings, samples, held_out, whose = study.train, inputs.read("data", samples_of), None, None
-    count, source = study.gen_data.samples, "samples of its own"
+    count, source = study.gen_data.drawn_samples, "samples of its own"
+    if samples is None and study.gen_data.measured:
+        samples = drawn(study, (0, 0), recorded(study, Inputs()))
     if samples is not None:
         run = inputs.runs().get("data")
-        count, source, held_out = len(samples.theta), run.id if run else "those given", samples.held_out
+        count, held_out = len(samples.theta), samples.held_out
+        source = run.id if run else "those given" if "data" in inputs else source
         whose = recordings(samples, settings)
     split = split_samples(count, settings.train_share, np.random.default_rng(0), held_out, whose)
     lines = [
@@ -233,7 +236,7 @@ def train(session: Session) -> Trained:
     settings, findings = session.study.train, session.findings
     samples = session.inputs.read("data", samples_of)
     if samples is None:
-        samples = drawn(session.study, findings.stream("samples"), Inputs())
+        samples = drawn(session.study, findings.stream("samples"), recorded(session.study, Inputs()))
         findings.arrays("data/samples.npz", samples.arrays())
     rng = np.random.default_rng(findings.stream("split"))
     whose = recordings(samples, settings)
