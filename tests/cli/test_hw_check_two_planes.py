@@ -178,7 +178,7 @@ def test_a_camera_without_pictures_is_named(
     [
         ("real_time=true", "too much beside a board in real time"),
         ("bench.plant.model=hinges", "no bench in two planes has bench.plant.model"),
-        ("wrist.tendons=three", "winds the four tendons 1, 2, 4 and 5"),
+        ("wrist.tendons=three", "hw check moves four tendons at 45 deg from both planes; tendon 1 of this wrist"),
     ],
 )
 def test_what_cannot_be_checked_in_two_planes_is_refused_before_anything_is_opened(

@@ -76,3 +76,30 @@ def test_logs_in_two_planes_tell_springs_and_tendons_in_a_run_of_their_own(call:
         (axis["interval"][1] - axis["interval"][0]) / 3.92, rel=0.3
     )
     assert call("runs", "verify", found.id)[0] == 0
+
+
+@pytest.mark.painted
+@pytest.mark.slow
+def test_three_tendons_are_simulated_and_identified_and_all_else_says_what_takes_them(
+    call: Call, tmp_path: Path
+) -> None:
+    """A move toward ulnar has two planes by the layout; its log tells springs that are weaker than believed."""
+    three = ("--set", "wrist.tendons=three")
+    loop = "loop={control_period: 5.0e-3, actuator: {level: tendon}, sensor: {level: camera}, plant: {stiffness: 0.5}}"
+    code, out, err = call("simulate", *three, "--controller", "ct-dob", "--set", loop, "--set", "horizon=3.0")
+    assert code == 0 and "in two planes (3 tendons" in " ".join(out.split()), err
+    moved = open_run(out.splitlines()[-1])
+    assert moved.metrics["rmse"]["value"] < np.radians(1.0)
+    log = tmp_path / "three.csv"
+    assert call("runs", "export", moved.id, "--file", str(log))[0] == 0
+    told = ("--set", "model=wrist", "--set", "segments=2", "--set", "misfit=tell")
+    code, out, err = call("identify", str(log), *three, *told)
+    assert code == 0, err
+    found = open_run(out.splitlines()[-1])
+    assert found.metrics["stiffness"]["value"] == pytest.approx(0.5, rel=0.05)
+    assert not (found.path / "data" / "posterior.yaml").exists() and "wristctl compare" not in out
+    code, out, _ = call("simulate", "--from-identified", found.id, "--dry-run")
+    assert code == 0 and "one rollout of 5 s in two planes" in out
+    for command in ("tune", "recommend", "hw-run"):
+        code, _, err = call(command, "--from-identified", found.id, "--dry-run")
+        assert code == 2 and found.id in err and "simulate bends this wrist in two planes" in err

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from itertools import pairwise
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -13,13 +14,18 @@ from hypothesis import strategies as st
 
 import wristctl
 from wristctl.arrays import Array
+from wristctl.commands.compare.command import COMPARE
+from wristctl.commands.perform import prepare
+from wristctl.commands.tune.command import TUNE
+from wristctl.config.loop import Loop, Reference
 from wristctl.config.wrist import WristParameters
 from wristctl.errors import UserError
+from wristctl.simulation.bend_loops import planes_of
 from wristctl.study_files.error_messages import located
 from wristctl.study_files.load import load_study, read_study
 from wristctl.study_files.resolved import changed_yaml, resolved_yaml
 from wristctl.wrist.directions import ACTIVE, DIRECTIONS
-from wristctl.wrist.tendon_layout import TendonLayout, TendonPlace, check_planar
+from wristctl.wrist.tendon_layout import TendonLayout, TendonPlace, off_both_sides
 
 WRIST = WristParameters()
 THREE = TendonLayout.three(0.02, first=0.3)
@@ -167,25 +173,55 @@ SQUARE = "[{angle_deg: 45}, {angle_deg: 135}, {angle_deg: 225}, {angle_deg: 315}
     "tendons", ["four", "five", SQUARE, SQUARE.replace("45", "405", 1)[:-1] + ", {angle_deg: 0, radius: 0}]"]
 )
 def test_one_plane_takes_two_sides_of_two_tendons(tendons: str) -> None:
-    check_planar(load_study([], [f"wrist.tendons={tendons}"]).wrist)
+    wrist = load_study([], [f"wrist.tendons={tendons}"]).wrist
+    assert off_both_sides(wrist) is None and planes_of(Loop(), Reference(), wrist) == 1
+
+
+@pytest.mark.parametrize(
+    ("tendons", "odd"),
+    [
+        ("three", 1),
+        (SQUARE.replace("315", "320"), 4),
+        (SQUARE.replace("135}", "135, radius: 0.019}"), 2),
+        (SQUARE.replace("135}", "135, ends_at: 4}"), 2),
+        (SQUARE.replace("135}", "135, multiplicity: 2}"), 2),
+        ("[{angle_deg: 45}, {angle_deg: 135}, {angle_deg: 225}, {angle_deg: 315}, {angle_deg: 0}]", 5),
+    ],
+)
+def test_other_layouts_bend_in_two_planes_and_commands_in_one_say_what_takes_them(tendons: str, odd: int) -> None:
+    study = load_study([], [f"wrist.tendons={tendons}"])
+    assert planes_of(Loop(), Reference(), study.wrist) == 2
+    for command in (wristctl.tune, wristctl.compare, wristctl.recommend, wristctl.analyse, wristctl.hysteresis):
+        with pytest.raises(UserError, match=rf"tendon {odd} of this wrist is elsewhere .* bends this wrist in two"):
+            command(study)
+    with pytest.raises(UserError, match=r"and the loop in one - simulate\.loop\.planes - fix: loop\.planes"):
+        wristctl.simulate(load_study([], [f"wrist.tendons={tendons}", "simulate.loop.planes=1"]))
+
+
+def test_commands_that_pull_no_tendons_in_one_plane_take_any(tmp_path: Path) -> None:
+    study = load_study([], ["wrist.tendons=three", "gen-data={samples: 20}"])
+    assert len(wristctl.gen_data(study).samples.theta) == 20
+    with pytest.raises(UserError, match="gen-data bends in one plane"):
+        wristctl.gen_data(load_study([], ["wrist.tendons=three", "gen-data={samples: 20, source: plant}"]))
+
+
+@pytest.mark.parametrize(("command", "procedure"), [("tune", TUNE), ("compare", COMPARE)])
+def test_a_sweep_over_layouts_is_refused_where_one_plane_is_all_there_is(command: str, procedure: Any) -> None:
+    study = load_study([], ["sweep=['wrist.tendons=four,three']"])
+    with pytest.raises(UserError, match=f"{command} bends in one plane"):
+        prepare(procedure, study, Path("results")).plan()
 
 
 @pytest.mark.parametrize(
     ("tendons", "problem"),
     [
-        ("three", "two sides of two tendons alike, and tendon 1 is of neither"),
-        (SQUARE.replace("315", "320"), "and tendon 4 is of neither"),
-        (SQUARE.replace("135}", "135, radius: 0.019}"), "and tendon 2 is of neither"),
-        (SQUARE.replace("135}", "135, ends_at: 4}"), "and tendon 2 is of neither"),
-        (SQUARE.replace("135}", "135, multiplicity: 2}"), "and tendon 2 is of neither"),
-        ("[{angle_deg: 45}, {angle_deg: 135}, {angle_deg: 225}, {angle_deg: 315}, {angle_deg: 0}]", "and tendon 5"),
-        ("[{angle_deg: 0, multiplicity: 2}, {angle_deg: 180, multiplicity: 2}]", "and tendon 1 is of neither"),
         ("[{angle_deg: 45}, {angle_deg: 135}, {angle_deg: 270, radius: 0}]", "2 tendons off the axis"),
         (SQUARE.replace("315}", "225, ends_at: 5}"), "tendons 3 and 4 are at one place"),
         (SQUARE.replace("]", ", {angle_deg: 45, ends_at: 5}]"), "tendons 1 and 5 are at one place"),
+        ("[{angle_deg: 0, multiplicity: 2}, {angle_deg: 180, multiplicity: 2}]", "tendon_radius: 0.02828"),
     ],
 )
-def test_commands_in_one_plane_refuse_other_layouts(tendons: str, problem: str) -> None:
+def test_what_no_command_bends_is_refused_with_what_would_do(tendons: str, problem: str) -> None:
     with pytest.raises(UserError, match=problem):
         wristctl.simulate(load_study([], [f"wrist.tendons={tendons}"]))
 

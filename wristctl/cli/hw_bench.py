@@ -62,10 +62,12 @@ def _serve_with_wrist(chip: Any, line: Any, override: list[str], console: Any, q
     from tempfile import TemporaryDirectory
 
     from wristctl.commands.adoption import with_planes
+    from wristctl.commands.inputs import check_sides
     from wristctl.loop_priority import prioritised
     from wristctl.study_files.load import load_study
 
     study = with_planes(load_study((), override, "hw-run"))
+    check_sides(study.wrist, "hw emulate")
     if study.hw_run.planes == 2:
         problem = "an emulated rig in two planes runs in virtual time alone"
         raise UserError(problem, "hw-run.planes", "planes: 1, or wristctl hw-run without --port")

@@ -12,6 +12,7 @@ import typer
 from wristctl.cli.operator import typed_line
 from wristctl.cli.options import BAUD, Baud, Debug, Json, Port, Quiet, facts_of
 from wristctl.cli.progress import listening, progress
+from wristctl.commands.inputs import check_sides
 from wristctl.commands.printed_table import Table
 from wristctl.commands.progress import no_event
 from wristctl.errors import UserError
@@ -130,6 +131,7 @@ def check_rig(
     study = with_planes(load_study((), override, "hw-run"))
     overrides: dict[str, Any] = {"baud": baud, "port": None if port == EMULATED else port or only_board()}
     settings = study.hw_run.model_copy(update=overrides | chosen)
+    check_sides(study.wrist, "hw check")
     if settings.planes == 2:
         layout_of_axes(study.wrist)
     runs = (require(run, "calibrate-camera") if run else None for run in (settings.optics, settings.optics_2))

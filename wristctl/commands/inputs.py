@@ -1,5 +1,6 @@
 """Inputs that a study takes from earlier ones: run directories, or results in memory."""
 
+import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -9,7 +10,8 @@ from wristctl.commands.results import StudyResult
 from wristctl.config.loop import Reference
 from wristctl.config.section import Section
 from wristctl.config.study import Study
-from wristctl.errors import Argument, Call, UserError
+from wristctl.config.wrist import WristParameters
+from wristctl.errors import Argument, Call, Phrase, UserError
 from wristctl.records import InputRun, Run, open_run, require
 from wristctl.records.manifest import MANIFEST, command_of
 from wristctl.study_files.resolved import sections_read
@@ -162,17 +164,23 @@ def _stopped(ref: str | Path, wanted: EarlierRun, out: Path) -> Run:
     return run
 
 
-def check_tendons(study: Study, command: str) -> None:
-    """UserError where the wrist's tendons are none that it can bend with in one plane, or in two where it does."""
-    if study.wrist.tendons != "four":
-        from wristctl.simulation.bend_loops import planes_of
-        from wristctl.wrist.tendon_layout import TendonLayout, check_planar
+def check_sides(wrist: WristParameters, command: str) -> None:
+    """UserError, naming what takes this wrist, unless its tendons are the four at 45 deg from both planes."""
+    from wristctl.wrist.tendon_layout import TendonLayout, key_of_tendon, off_both_sides
 
-        chosen = study.simulate
-        if command == "simulate" and planes_of(chosen.loop, chosen.reference) == 2:
-            TendonLayout.of(study.wrist)
-        else:
-            check_planar(study.wrist)
+    odd = off_both_sides(wrist)
+    if odd is None:
+        return
+    rig = command.startswith(("hw", "calibrate-wrist"))
+    does = "moves" if rig else "bends in one plane, by"
+    problem = f"{command} {does} four tendons at 45 deg from both planes; tendon {odd} of this wrist is elsewhere"
+    takes = " bends this wrist in two planes"
+    compares = "; --sweep controller=ct-dob,pid-ff compares controllers on it"
+    fix: Phrase = (Call("simulate"), takes, "" if rig else compares)
+    if TendonLayout.of(wrist).planes == 1:  # and in no other
+        square = math.sqrt(2.0) * wrist.tendon_radius
+        fix = f"two tendons at 0 and two at 180 deg bend as `tendons: four` with tendon_radius: {square:.4g}"
+    raise UserError(problem, key_of_tendon(wrist, odd), fix)
 
 
 def check_motions(study: Study, command: str) -> None:

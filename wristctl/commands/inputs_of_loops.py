@@ -7,7 +7,7 @@ import math
 from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING, Protocol
 
-from wristctl.commands.inputs import Inputs
+from wristctl.commands.inputs import Inputs, check_sides
 from wristctl.config.compare import CompareSettings
 from wristctl.config.controller_row import Row
 from wristctl.config.families import Family
@@ -180,11 +180,23 @@ def network_for(inputs: Inputs, wrist: WristParameters, loops: Iterable[Loop]) -
 
 
 def identified(study: Study, command: str, inputs: Inputs) -> Study:
-    """The study with the parameters of the identification among the inputs, as it is without one."""
+    """The study with the parameters of the identification among the inputs, as it is without one.
+
+    Raises UserError for a wrist with other tendons than the command bends.
+    """
     from wristctl.identification.unknowns import with_identified
 
     text = inputs.read("from_identified", _identified_yaml)
-    return study if text is None else with_identified(study, command, text)
+    if text is None:
+        return study
+    found = with_identified(study, command, text)
+    if command != "simulate":
+        try:
+            check_sides(found.wrist, command)
+        except UserError as error:
+            run = inputs.runs().get("from_identified")
+            raise error.at(str(run.path) if run else "from_identified") from error
+    return found
 
 
 def wrist_identified(inputs: Inputs) -> str:

@@ -10,10 +10,10 @@ from pathlib import Path
 from typing import Any, Generic
 
 from wristctl.commands.adoption import adopted, with_places, with_presets
-from wristctl.commands.inputs import Inputs, check_motions, check_tendons, named_for_good, opened
+from wristctl.commands.inputs import Inputs, check_motions, named_for_good, opened
 from wristctl.commands.plain_python import warn_of_plain
 from wristctl.commands.printed_table import Table, table_for_people
-from wristctl.commands.procedure import Found, Procedure, procedure_of
+from wristctl.commands.procedure import Found, Procedure, check_tendons, procedure_of
 from wristctl.commands.progress import Watch, watched
 from wristctl.commands.results import Findings, StudyResult
 from wristctl.commands.session import Operator, Session, ShowProgress, Unattended
@@ -77,7 +77,7 @@ def prepare(
     if inputs:
         named = {procedure.subject.replace("-", "_"): named_for_good(inputs, section, out)}
         study = study.model_copy(update=named)
-    check_tendons(study, procedure.kind)
+    check_tendons(study, procedure)
     check_motions(study, procedure.kind)
     study, foreign = adopted(study, procedure.kind)
     study = with_presets(study, procedure.kind)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from importlib import import_module
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
-from wristctl.commands.inputs import EarlierRun, Inputs
+from wristctl.commands.inputs import EarlierRun, Inputs, check_sides
 from wristctl.commands.results import StudyResult
 from wristctl.commands.session import Session
 from wristctl.config.study import Study
@@ -44,6 +44,8 @@ class Procedure(Generic[Found]):
 
     completed: Callable[[Study], Study] | None = None
     """Settings that follow from others, filled in before anything is written. Raises UserError."""
+    in_one_plane: Callable[[Study], bool] = lambda study: True
+    """Whether it pulls a wrist in one plane, by two tendons alike on either side."""
 
     @property
     def sweeps(self) -> bool:
@@ -58,6 +60,21 @@ class Procedure(Generic[Found]):
     def subject(self) -> str:
         """The command in whose section that is: its own, or that of the one it works on."""
         return SUBJECTS.get(self.kind, self.kind)
+
+
+def no_tendons(study: Study) -> bool:
+    """`in_one_plane` of a command that pulls no tendons, or those of any layout."""
+    return False
+
+
+def check_tendons(study: Study, procedure: Procedure[Any]) -> None:
+    """UserError where the wrist's tendons are none that a command can bend it by."""
+    if study.wrist.tendons != "four":
+        from wristctl.wrist.tendon_layout import TendonLayout
+
+        TendonLayout.of(study.wrist)
+        if procedure.in_one_plane(study):
+            check_sides(study.wrist, procedure.kind)
 
 
 _PLACES = {kind: f"{kind.replace('-', '_')}.command:{kind.replace('-', '_').upper()}" for kind in KINDS}

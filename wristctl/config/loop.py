@@ -59,7 +59,10 @@ class Loop(Section):
     )
     limits: bool = choice(True, "tensions stay within pretension and tension_limit; false: no upper limit")
     planes: Literal[1, 2] | None = seldom(
-        None, "", "planes that the wrist bends in; null: two for a reference in two planes, else one"
+        None,
+        "",
+        "planes that the wrist bends in; null: two for a reference in two planes, or tendons that are not two alike on "
+        "either side; else one",
     )
     coupling: Literal["compensated", "ignored"] = seldom(
         "compensated", "", "in two planes: whether their effect on each other is added to the controller's torques"

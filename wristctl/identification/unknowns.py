@@ -10,6 +10,7 @@ from wristctl.config.study import Study
 from wristctl.config.wrist import TendonPlace, WristParameters
 from wristctl.simulation.bend_loops import planes_of
 from wristctl.study_files.strict_yaml import parse_yaml
+from wristctl.wrist.directions import ACTIVE
 
 
 class Unknown(NamedTuple):
@@ -110,7 +111,7 @@ def identified_yaml(
 def with_identified(study: Study, command: str, text: str) -> Study:
     """The study with the values of an identified.yaml in its wrist and in every actuator and sensor of the command.
 
-    Their levels stay as they are. Places of tendons, which no loop in one plane has, are for a loop in two.
+    Their levels stay as they are. Places of four tendons are for a loop in two planes: in one they stand on a square.
     """
     mapping = parse_yaml(text, "identified.yaml").data
     loop = mapping["simulate"]["loop"]
@@ -128,9 +129,11 @@ def with_identified(study: Study, command: str, text: str) -> Study:
             changed[leaf] = value.model_copy(update=parts[leaf])
     found = dict(mapping["wrist"])
     places = tuple(TendonPlace.model_validate(place) for place in found.pop("tendons", ()))
-    if places and command == "simulate" and planes_of(study.simulate.loop, study.simulate.reference) == 2:
-        found["tendons"] = places
     wrist = study.wrist.model_copy(update=found)
+    chosen, with_places = study.simulate, wrist.model_copy(update={"tendons": places})
+    in_two = command == "simulate" and planes_of(chosen.loop, chosen.reference, study.wrist) == 2
+    if places and (in_two or len(places) != len(ACTIVE)):
+        wrist = with_places
     return study.model_copy(update={"wrist": wrist, name: settings.model_copy(update=changed)})
 
 

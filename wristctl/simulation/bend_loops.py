@@ -27,7 +27,7 @@ from wristctl.simulation.spatial_batch import sample_step
 from wristctl.simulation.two_planes import check_bends, rollout_bends
 from wristctl.simulation.worlds import Draws, World, is_random, loops_of
 from wristctl.wrist.directions import DIRECTIONS, in_plane
-from wristctl.wrist.tendon_layout import TendonLayout
+from wristctl.wrist.tendon_layout import TendonLayout, off_both_sides
 
 # Rollouts that are recorded at once.
 _TOGETHER = 32
@@ -37,13 +37,17 @@ _STILL = math.radians(0.5)
 SIDES = 2
 
 
-def planes_of(loop: Loop, reference: Reference) -> int:
-    """Planes that a loop bends in on a reference. Raises UserError where these are more than the loop has."""
-    kind = REFERENCES[reference.kind]
-    if loop.planes == 1 and kind.planes == 2:
-        fix = "loop.planes: null, or 2"
-        raise UserError(f"{reference.kind} bends in two planes, and the loop in one", "loop.planes", fix)
-    return loop.planes or int(kind.planes)
+def planes_of(loop: Loop, reference: Reference, wrist: WristParameters) -> int:
+    """Planes that a loop bends in: two where the reference does, or where no tendons of the wrist pull in one alone.
+
+    Raises UserError where these are more than the loop has, and for places of tendons that are no layout.
+    """
+    two = f"{reference.kind} bends" * (REFERENCES[reference.kind].planes == 2)
+    if off_both_sides(wrist) is not None and TendonLayout.of(wrist).planes == 2:
+        two = two or "these tendons bend the wrist"
+    if two and loop.planes == 1:
+        raise UserError(f"{two} in two planes, and the loop in one", "loop.planes", "loop.planes: null, or 2")
+    return loop.planes or (2 if two else 1)
 
 
 def bends_of(

@@ -3,7 +3,7 @@
 import math
 import re
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, Union, get_origin
 
 from pydantic import ValidationError
 
@@ -69,11 +69,13 @@ def _what(detail: Any) -> str:
 
 
 def _fix(detail: Any) -> str:
-    path = _location(detail)
+    # pydantic puts the alternatives of a union, `tuple[...]`, between the keys
+    path = tuple(key for key in _location(detail) if "[" not in str(key))
     if detail["type"] == "extra_forbidden":
         return meant(str(path[-1]), detail.get("ctx", {}).get("known") or keys_of(field_at(path[:-1])[0]))
     if detail["type"] == "literal_error":
-        return meant(str(detail["input"]), re.findall(r"'([^']*)'", detail["ctx"]["expected"]))
+        names = re.findall(r"'([^']*)'", detail["ctx"]["expected"])
+        return meant(str(detail["input"]), names) + _or_a_list(path) if names else ""
     if _as_keys(detail):
         allowed = keys_of(field_at((*path, 0))[0])
         items = "{" + ", ".join(f"{key}: ..." for key in allowed) + "}" if allowed else "..."
@@ -88,7 +90,18 @@ def _fix(detail: Any) -> str:
         return ""
     unit, default = unit_of(field), repr(field.default)
     expected = f"{field.description} [{unit}]" if unit else field.description
-    return f"{expected}, default {default}" if len(default) <= 40 and field.default is not None else expected
+    return (
+        f"{expected}, default {default}"
+        if len(default) <= 40 and not (field.is_required() or field.default is None)
+        else expected
+    )
+
+
+def _or_a_list(path: KeyPath) -> str:
+    """The list of groups that may stand in the place of a name; empty where none may."""
+    items = keys_of(field_at((*path, 0))[0]) if get_origin(field_at(path)[0]) is Union else {}
+    needed = [key for key, field in items.items() if field.is_required()]
+    return f"; or a list, [{{{', '.join(f'{key}: ...' for key in needed)}}}, ...]" if needed else ""
 
 
 def _as_keys(detail: Any) -> bool:

@@ -70,7 +70,7 @@ def layout_of_axes(wrist: WristParameters) -> TendonLayout:
     places = TendonLayout.of(wrist)
     around = [place for place in places.places if place.radius > 0.0]
     if len(around) != AXES or not np.allclose([place.angle % math.tau for place in around], _angles(layout)):
-        fix = "wrist.tendons: four"
+        fix = f"angle_deg {', '.join(f'{math.degrees(angle):.0f}' for angle in _angles(layout))}, in this order"
         raise UserError("a rig in two planes winds the four tendons 1, 2, 4 and 5", "wrist.tendons", fix)
     return layout
 

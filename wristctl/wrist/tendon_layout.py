@@ -20,7 +20,6 @@ from wristctl.wrist.directions import TENDONS
 # Distances, relative to the largest radius, below which two places are one, and angles [rad] that are no gap.
 _APART = 1e-6
 _KEY = "wrist.tendons"
-_FOUR = f"{_KEY}: four"
 
 
 def _key(number: int) -> str:
@@ -219,16 +218,23 @@ class TendonLayout:
         )
 
 
-def check_planar(wrist: WristParameters) -> None:
-    """UserError unless a wrist in one plane sees its tendons as two sides of two alike, as `four` and `five` are.
+def off_both_sides(wrist: WristParameters) -> int | None:
+    """Number of the first tendon that is on neither side of one plane; None of `four`, `five` and their like.
 
-    Either plane has to: motions toward ulnar and toward flexion are of the same wrist.
+    A side is two tendons alike, in either plane: motions toward ulnar and toward flexion are of the same wrist. Raises
+    UserError for places that are no layout.
     """
+    if wrist.tendons == "four":
+        return None
     layout, corner = TendonLayout.of(wrist), wrist.tendon_offset
     expected = TendonLayout.four(wrist.tendon_radius).cross_section
     for number, (c, place) in enumerate(zip(layout.cross_section, layout.places, strict=True), 1):
         at_corner = np.hypot(*(expected - c).T).min() <= _APART * corner
         if place.radius > 0.0 and not (at_corner and place.multiplicity == 1 and place.ends_at is None):
-            where = _KEY if isinstance(wrist.tendons, str) else _key(number)
-            what = f"a wrist in one plane has two sides of two tendons alike, and tendon {number} is of neither"
-            raise UserError(what, where, _FOUR)
+            return number
+    return None
+
+
+def key_of_tendon(wrist: WristParameters, number: int) -> str:
+    """Key of a tendon's place; that of all where they have a name."""
+    return _KEY if isinstance(wrist.tendons, str) else _key(number)

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 from wristctl.commands.inputs import Inputs
 from wristctl.commands.printed_table import Table
-from wristctl.commands.procedure import Procedure
+from wristctl.commands.procedure import Procedure, no_tendons
 from wristctl.commands.results import StudyResult
 from wristctl.commands.session import Session
 from wristctl.config.camera import CalibrateCameraSettings
@@ -234,4 +234,4 @@ def _true_lens(settings: CalibrateCameraSettings) -> list[float]:
     return [*camera.matrix[[0, 1, 0, 1], [0, 1, 2, 2]].tolist(), *camera.distortion.tolist()]
 
 
-CALIBRATE_CAMERA = Procedure("calibrate-camera", plan, calibrate_camera)
+CALIBRATE_CAMERA = Procedure("calibrate-camera", plan, calibrate_camera, in_one_plane=no_tendons)

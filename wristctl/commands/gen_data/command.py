@@ -204,4 +204,11 @@ def _kept(source: Given) -> list[tuple[str, Mapping[str, Any]]]:
     return list(source.courses().items())
 
 
-GEN_DATA = Procedure("gen-data", plan, gen_data, (EarlierRun("run", kind=None, optional=True),))
+def pulled_to_samples(study: Study) -> bool:
+    """Whether the samples that a study draws are equilibria of a wrist that its tendons hold."""
+    return study.gen_data.source == "plant"
+
+
+GEN_DATA = Procedure(
+    "gen-data", plan, gen_data, (EarlierRun("run", kind=None, optional=True),), in_one_plane=pulled_to_samples
+)

@@ -46,7 +46,7 @@ class BendsTold(StudyResult):
     @property
     def answer(self) -> Answer:
         """Springs in the sentence, then each parameter with its interval or not told."""
-        return _answer(self.fit, self.told, self.place if self.yaml else "")
+        return _answer(self.fit, self.told, self.place if self.yaml else "", _in_one_plane_too(self.study))
 
     @property
     def values(self) -> dict[str, float]:
@@ -62,6 +62,13 @@ class BendsTold(StudyResult):
             for name, one in self.told.items()
         ]
         return pd.DataFrame(rows, columns=["parameter", "value", "low", "high", "unit", "meaning"])
+
+
+def _in_one_plane_too(study: Study) -> bool:
+    """Whether commands in one plane take the study's wrist."""
+    from wristctl.wrist.tendon_layout import off_both_sides
+
+    return off_both_sides(study.wrist) is None
 
 
 def _problem(study: Study) -> BendProblem:
@@ -116,7 +123,8 @@ def identify_bends(session: Session) -> BendsTold:
         rng = np.random.default_rng(findings.stream("posterior"))
         yaml, family = bends_yaml(fitted, known, _DRAWS, rng)
         findings.text("data/identified.yaml", yaml)
-        findings.text("data/posterior.yaml", family)
+        if _in_one_plane_too(session.study):
+            findings.text("data/posterior.yaml", family)
     result = BendsTold(session.study, findings, tables, fitted, known, told, yaml)
     findings.table("data/parameters.csv", result.frame())
     return result
@@ -127,7 +135,7 @@ def _refuse(session: Session, fitted: Fit, told: Mapping[str, Told], missed: Seq
     settings, worst = session.study.identify, max(missed, key=lambda misfit: misfit.ratio)
     if settings.misfit == "tell" or worst.ratio <= settings.lack_of_fit:
         return
-    text = "\n".join(_answer(fitted, told, "").lines())
+    text = "\n".join(_answer(fitted, told, "", True).lines())
     session.findings.summary(f"```\n{text}\n```")
     session.operator.tell(text)
     problem = f"{worst.direction}: the model is off by {math.sqrt(worst.ratio):.2g} times the readings' own noise"
@@ -165,7 +173,8 @@ def what_tells(fit: Fit, lacking: Sequence[str]) -> str:
     return f"{listed[0].upper()}{listed[1:]} tell more (docs/identify.md)." if parts else ""
 
 
-def _answer(fit: Fit, told: Mapping[str, Told], run: str) -> Answer:
+def _answer(fit: Fit, told: Mapping[str, Told], run: str, square: bool) -> Answer:
+    """The answer; `run` is the path of a run with the wrist, `square` whether its tendons are those of one plane."""
     along, across, axis = (told[name] for name in ("stiffness", "stiffness_across", "stiffness_axis_deg"))
     if along.known and across.known:
         where = f"toward {axis.value:.3g} deg from ulnar" if axis.known else "along an axis that is not told"
@@ -178,10 +187,11 @@ def _answer(fit: Fit, told: Mapping[str, Told], run: str) -> Answer:
     if lacking := [name for name, one in told.items() if not one.known]:
         notes.append(f"Not told: {joined(lacking)}. {what_tells(fit, lacking)}".strip())
     if run:
+        compares = ", or compare controllers on those that the readings leave possible"
         notes += [
-            "Next, bend the wrist that was found, or compare controllers on those that the readings leave possible:",
+            f"Next, bend the wrist that was found{compares * square}:",
             f"$ wristctl simulate --from-identified {run} --reference circumduction",
-            f"$ wristctl compare {run}/data/posterior.yaml --set worlds.family=posterior",
+            *[f"$ wristctl compare {run}/data/posterior.yaml --set worlds.family=posterior"] * square,
         ]
     table = _told_table(told)
     return Answer(f"{springs} {left}", Table("", table.columns, table.rows).within(COLUMNS), notes, "Figures: --all.")

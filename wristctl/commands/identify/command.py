@@ -15,7 +15,7 @@ from wristctl.commands.identify.bends import BendsTold, bends_plan, identify_ben
 from wristctl.commands.identify.logs import LogTold, identify_logs, log_plan
 from wristctl.commands.inputs import EarlierRun, Inputs, missing_run
 from wristctl.commands.printed_table import Table
-from wristctl.commands.procedure import Procedure
+from wristctl.commands.procedure import Procedure, no_tendons
 from wristctl.commands.results import StudyResult
 from wristctl.commands.session import Session
 from wristctl.config.study import Study
@@ -222,5 +222,5 @@ def _camera(inputs: Inputs, fitted: Fit) -> dict[str, float]:
 
 _RUNS = EarlierRun("runs", kind="hw-run", optional=True)
 IDENTIFY: Procedure[Identified | LogTold | BendsTold] = Procedure(
-    "identify", plan, identify, (_RUNS,), completed=with_logs
+    "identify", plan, identify, (_RUNS,), completed=with_logs, in_one_plane=no_tendons
 )

@@ -78,21 +78,19 @@ class Simulated(SimulatedLoop):
 
 def plan(study: Study, inputs: Inputs) -> str:
     """Check the controller and its gains."""
-    settings = study.simulate
     from wristctl.simulation.closed_loop import check_size
 
+    settings, known = study.simulate, identified(study, "simulate", inputs)
+    two = in_two_planes(known)
     with under("simulate"):
-        if in_two_planes(study):
-            check_row(settings, tuned_gains(inputs), inputs.runs().get("tuned"))
-            check_two_planes(identified(study, "simulate", inputs))
-            check_size(size(study), planes=2)
-            return _in_words(study, " in two planes", identified(study, "simulate", inputs).wrist)
         check_row(settings, tuned_gains(inputs), inputs.runs().get("tuned"))
-        check_reach([settings.reference], identified(study, "simulate", inputs).wrist, "reference")
-        check_inverses(inverses_of([settings.reference]), inputs)
-        check_size(size(study))
-
-    return _in_words(study, "", identified(study, "simulate", inputs).wrist)
+        if two:
+            check_two_planes(known)
+        else:
+            check_reach([settings.reference], known.wrist, "reference")
+            check_inverses(inverses_of([settings.reference]), inputs)
+        check_size(size(study), planes=2 if two else 1)
+    return _in_words(study, " in two planes" * two, known.wrist)
 
 
 def _in_words(study: Study, where: str, wrist: WristParameters) -> str:
@@ -114,8 +112,8 @@ def size(study: Study) -> Size:
 
 
 def simulate(session: Session) -> Simulated:
-    """Simulate one closed loop and draw it, in one plane or, on a reference in two, in two."""
-    if in_two_planes(session.study):
+    """Simulate one closed loop and draw it, in one plane, or in two where reference or tendons bend in two."""
+    if in_two_planes(identified(session.study, "simulate", session.inputs)):
         return cast(Simulated, simulate_in_two_planes(session))  # which has no trajectory, but a course
     from wristctl.commands.simulate.figures import consistency, sliding
     from wristctl.commands.truth_table import truth_heading, truth_tables
@@ -212,5 +210,6 @@ SIMULATE = sweepable(
             EarlierRun("from_identified", kind="identify", optional=True),
         ),
         size=size,
+        in_one_plane=lambda study: not in_two_planes(study),
     )
 )

@@ -22,6 +22,7 @@ from wristctl.commands.simulate.answer import (
 )
 from wristctl.commands.simulate.results import SimulatedLoop, metrics_table
 from wristctl.config.study import Study
+from wristctl.errors import under
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -70,10 +71,11 @@ class SimulatedBends(SimulatedLoop):
 
 
 def in_two_planes(study: Study) -> bool:
-    """Whether the loop of the study's `simulate` section bends in two planes."""
+    """Whether the loop of the study's `simulate` section bends in two planes. Raises UserError."""
     from wristctl.simulation.bend_loops import planes_of
 
-    return planes_of(study.simulate.loop, study.simulate.reference) == 2
+    with under("simulate"):
+        return planes_of(study.simulate.loop, study.simulate.reference, study.wrist) == 2
 
 
 # Time between two samples of a reference by which it is checked before a run [s].

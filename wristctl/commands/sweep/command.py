@@ -15,7 +15,7 @@ from wristctl.commands.adoption import with_presets
 from wristctl.commands.answer import Answer
 from wristctl.commands.inputs import Inputs
 from wristctl.commands.inputs_of_loops import check_row, identified, tuned_gains
-from wristctl.commands.procedure import Procedure
+from wristctl.commands.procedure import Procedure, check_tendons
 from wristctl.commands.results import StudyResult
 from wristctl.commands.session import Session
 from wristctl.commands.sweep.answer import answer, fates, for_people, headline, rows_of
@@ -207,7 +207,7 @@ def sweepable(procedure: Procedure[Found]) -> Procedure[Found]:
         base, axes = _base(study, procedure.kind, inputs), axes_of(study, procedure.kind)
         points = points_of(axes)
         for point in points[:_CHECKED]:
-            study_at(base, axes, point)
+            check_tendons(study_at(base, axes, point), procedure)
         assert procedure.size is not None
         sizes = []
         with _said_once(adoption.log):

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 from wristctl.commands.inputs import EarlierRun, Inputs
 from wristctl.commands.printed_table import Table
-from wristctl.commands.procedure import Procedure
+from wristctl.commands.procedure import Procedure, no_tendons
 from wristctl.commands.results import StudyResult
 from wristctl.commands.session import Session
 from wristctl.config.study import Study
@@ -180,4 +180,10 @@ def _digest(source: Path) -> str:
     return sha256_of_list([(name, sha256_of(source / name)) for name in files_below(source)])
 
 
-TRACK = Procedure("track", plan, track, (EarlierRun("calibration", kind="calibrate-camera", optional=True),))
+TRACK = Procedure(
+    "track",
+    plan,
+    track,
+    (EarlierRun("calibration", kind="calibrate-camera", optional=True),),
+    in_one_plane=no_tendons,
+)

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from wristctl.commands.answer import Answer
-from wristctl.commands.gen_data.command import drawn, recorded, samples_of
+from wristctl.commands.gen_data.command import drawn, pulled_to_samples, recorded, samples_of
 from wristctl.commands.inputs import EarlierRun, Inputs
 from wristctl.commands.printed_table import Table
 from wristctl.commands.procedure import Procedure
@@ -280,4 +280,5 @@ TRAIN = Procedure(
         EarlierRun("data", kind="gen-data", optional=True),
         EarlierRun("resume", kind="train", optional=True, unfinished=True),
     ),
+    in_one_plane=pulled_to_samples,
 )

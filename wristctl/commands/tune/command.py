@@ -98,8 +98,8 @@ def plan(study: Study, inputs: Inputs) -> str:
     """Check the controllers' names and say what the search costs."""
     from wristctl.commands.truth_table import truth_told
 
+    identified_study = identified(study, "tune", inputs)
     with under("tune"):
-        identified_study = identified(study, "tune", inputs)
         truth_text = truth_told(identified_study.wrist, judged_loops(study, study.tune))
         planned = planned_search(study.tune, study.families, identified_study.wrist, inputs)
     check_family_reach(identified_study, study.tune.worlds.family)

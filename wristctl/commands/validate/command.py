@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 from wristctl.commands.answer import Answer
 from wristctl.commands.inputs import Inputs
 from wristctl.commands.printed_table import Table
-from wristctl.commands.procedure import Procedure
+from wristctl.commands.procedure import Procedure, no_tendons
 from wristctl.commands.results import Findings, StudyResult
 from wristctl.commands.session import Session
 from wristctl.config.choices import ROBOTS
@@ -217,4 +217,4 @@ def _write(
     )
 
 
-VALIDATE = Procedure("validate", plan, validate, completed=with_recordings)
+VALIDATE = Procedure("validate", plan, validate, completed=with_recordings, in_one_plane=no_tendons)
