@@ -77,7 +77,7 @@ def test_a_recording_of_two_planes_is_followed_in_both(tmp_path: Path) -> None:
     with pytest.raises(UserError, match="no bends in two planes"):
         SIMULATE.plan(alone, Inputs())
     one_plane = alone.simulate.model_copy(update={"loop": alone.simulate.loop.model_copy(update={"planes": None})})
-    assert planes_of(one_plane.loop, one_plane.reference) == 1
+    assert planes_of(one_plane.loop, one_plane.reference, study.wrist) == 1
 
 
 def tips_file(folder: Path, tips: np.ndarray, more: str = "") -> Study:
