@@ -137,7 +137,7 @@ def page(found: list[Row], steps: list[tuple[int, str, float, float, float]]) ->
         "small, tells their RMSE."
     )
     lines = [
-        "# How accurate a simulated loop is",
+        "# How accurate a simulated loop is: its numerical error",
         "",
         *textwrap.wrap(told, 120),
         "",

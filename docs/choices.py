@@ -21,10 +21,11 @@ from wristctl.study_files.keys import keys_of, source_of, unit_of
 PAGE = Path(__file__).with_suffix(".md")
 OPENING = """# What can be chosen
 
-First what has a name: [controllers](#controllers), [references](#references), [metrics](#metrics),
-[optimisers](#optimisers), [disturbances](#disturbances), [plants](#plants), [networks](#presets-of-networks); then
-[every key](#every-key-of-a-study) with its default. `wristctl COMMAND --dry-run --all` prints the keys of a study. A
-newcomer to a table is one file and one line: [CONTRIBUTING](../CONTRIBUTING.md).
+The configuration of a study. First what has a name: [controllers](#controllers), [references](#references),
+[metrics](#metrics), [optimisers](#optimisers), [disturbances](#disturbances), [plants](#plants),
+[networks](#presets-of-networks); then [every key](#every-key-of-a-study) with its default. `wristctl COMMAND
+--dry-run --all` prints the keys of a study. A newcomer to a table is one file and one line:
+[CONTRIBUTING](../CONTRIBUTING.md).
 
 Made by `python docs/choices.py` from the tables in `wristctl/config/choices.py` and the schema of studies."""
 HEAD = "key, default, unit, range, meaning, source"

@@ -63,7 +63,7 @@ def main() -> None:
     lines = [f"| experiment | {' | '.join(heads)} |", "|---" * (len(heads) + 1) + "|"]
     lines += [f"| {name} | {' | '.join(row(*experiment))} |" for name, experiment in EXPERIMENTS.items()]
     (HERE / "identifiability.md").write_text(
-        "# Identifiability: which trials tell which parameters\n\n"
+        "# Identifiability and experiment design: which trials tell which parameters\n\n"
         "Made by `python docs/identifiability.py`: half the 95 % interval that "
         "each experiment promises, all of its parameters found together, by the Jacobian at the true ones (springs 30 "
         "% softer than believed, 20 kN/m tendons, 60 frames a second with 0.05 deg of noise, four directions of 5 s "

@@ -104,7 +104,7 @@ def main() -> None:
 
 
 _BEGIN = [
-    "# The objective: what a search for gains minimises",
+    "# The objective: the cost function that a search for gains minimises",
     "",
     "A case's value is a weighted sum of decades beside `feedforward` on the same world, motion and noise:",
     "log10((metric + floor)/(feedforward's + floor)), of the RMSE (weight 1), the error at the end and the oscillation",

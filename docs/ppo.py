@@ -242,8 +242,8 @@ def main() -> None:
         "intervals over worlds. A world is lost where the wrist leaves its range, or swings by more than 0.1 deg",
         "at rest.",
         "",
-        f"PPO is Stable-Baselines3's, two layers of 64, observations and rewards normalised, one seed: "
-        f"{policy.steps / 1e6:.1f} million",
+        "PPO (deep reinforcement learning) is Stable-Baselines3's, two layers of 64, observations and rewards",
+        f"normalised, one seed: {policy.steps / 1e6:.1f} million",
         f"steps of 5 ms in {policy.minutes:.0f} minutes, {COUNT} wrists at a time, on worlds of the `learn` split. It",
         "sees what a controller sees: no integral, and no past but the observer's. Gains are tuned with",
         f"{evaluations} evaluations a controller on drawn worlds, and chosen on others.",

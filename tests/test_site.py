@@ -14,6 +14,7 @@ from pathlib import Path
 from urllib.parse import unquote
 
 import pytest
+import snowballstemmer
 
 from wristctl.cli.commands import COMMANDS
 
@@ -88,6 +89,9 @@ SEARCHED = {
     "MPC": "docs/your-own-controller", "reinforcement learning": "docs/gym", "Slurm": "docs/cluster",
     "MuJoCo": "docs/models", "neural network": "docs/networks", "CSV": "docs/measured-data",
     "minimum jerk": "docs/motions", "stiffness": "docs/identify", "exit codes": "docs/reference",
+    "prosthesis": "docs/overview", "EMG": "docs/overview", "ROS": "docs/overview", "ROS bag": "docs/open-log",
+    "DOF": "docs/two-planes", "three tendons": "docs/two-planes", "inverse kinematics": "docs/networks",
+    "Simulink": "docs/models", "sample rate": "docs/hardware/real-time",
 }  # fmt: skip
 
 
@@ -107,3 +111,29 @@ def test_a_word_of_the_index_names_one_page(site: Path) -> None:
     assert len(every) == len(set(every)) > 150
     written = {page.relative_to(ROOT / "docs").with_suffix("").as_posix() for page in (ROOT / "docs").rglob("*.md")}
     assert words.keys() <= written
+
+
+def stems(text: str) -> set[str]:
+    """Words of a text as the search compares them."""
+    return set(snowballstemmer.stemmer("english").stemWords(re.findall(r"[a-z0-9]+", text.casefold())))
+
+
+def lacking(words: dict[str, list[str]], texts: dict[str, str]) -> list[str]:
+    """Entries of the index that no paragraph, item or row of their page has whole."""
+    said = {page: [stems(part) for part in re.split(r"\n\s*\n|\n(?=[-#|])", texts[page])] for page in words}
+    wanted = [(page, entry) for page, entries in words.items() for entry in entries]
+    return [f"{page}: {entry}" for page, entry in wanted if not any(stems(entry) <= part for part in said[page])]
+
+
+def test_a_page_says_each_word_that_the_index_leads_to_it_from() -> None:
+    words = tomllib.loads((ROOT / "docs" / "index_words.toml").read_text(encoding="utf-8"))
+    texts = {page: (ROOT / "docs" / f"{page}.md").read_text(encoding="utf-8") for page in words}
+    assert lacking(words, texts) == []
+
+
+def test_a_word_within_another_or_in_two_places_is_not_said() -> None:
+    page = {"a": "Forces across the wrist.\n\n| minimum | jerks |\n| maximum | jerk |\n\nA gain margin of 3."}
+    assert lacking({"a": ["ROS", "minimum jerk", "gain margins", "maximum margin"]}, page) == [
+        "a: ROS",
+        "a: maximum margin",
+    ]
