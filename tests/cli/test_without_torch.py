@@ -49,7 +49,8 @@ def _earlier(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Runs of every kind that an earlier version sealed."""
     folder = tmp_path_factory.mktemp("earlier") / "results"
     with tarfile.open(RUNS) as archive:
-        archive.extractall(folder, filter="data")
+        archive.extraction_filter = getattr(tarfile, "data_filter", None)  # which Python 3.11.2 lacks
+        archive.extractall(folder)
     return folder
 
 
