@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shlex
 import signal
 import subprocess
 import sys
@@ -15,6 +16,7 @@ from tests.cli.conftest import PROBE, ROOT
 from wristctl.config.study import Study
 from wristctl.records import list_runs, start_run
 
+PYTHON = shlex.quote(sys.executable)
 STREAMS = ["2>&1 |", "2>/dev/null |", "2> >(exec true) |"]
 
 
@@ -23,7 +25,7 @@ STREAMS = ["2>&1 |", "2>/dev/null |", "2> >(exec true) |"]
 def test_a_closed_pipe_costs_no_run(tmp_path: Path, streams: str) -> None:
     """Closed before a word is said: the first that is, is lost."""
     environment = {**os.environ, "PYTHONPATH": str(ROOT)}
-    command = f"{sys.executable} {' '.join(PROBE)} gen-data -v {streams} true; sleep 0.1"
+    command = f"{PYTHON} {' '.join(PROBE)} gen-data -v {streams} true; sleep 0.1"
     subprocess.run(["bash", "-c", command], cwd=tmp_path, env=environment, timeout=120)
     deadline = time.monotonic() + 60.0
     while not (runs := list_runs(tmp_path / "results")) or runs[0].state == "running":
@@ -42,7 +44,7 @@ def test_a_reader_of_results_may_leave(tmp_path: Path) -> None:
             live.metric(f"a_metric_of_a_long_name_{number}", float(number))
     environment = {**os.environ, "PYTHONPATH": str(ROOT)}
     for reader in ("true", "head -1"):
-        command = f"{sys.executable} -m wristctl runs show {live.id} --metrics | {reader}; echo ${{PIPESTATUS[0]}}"
+        command = f"{PYTHON} -m wristctl runs show {live.id} --metrics | {reader}; echo ${{PIPESTATUS[0]}}"
         asked = ["bash", "-c", command]
         done = subprocess.run(asked, cwd=tmp_path, env=environment, capture_output=True, text=True, timeout=120)
         assert done.stdout.splitlines()[-1] in ("0", "141") and done.stderr == ""
