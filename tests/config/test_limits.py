@@ -93,6 +93,11 @@ EDGES = {
         RigSettings, {"planes": 2, "real_time": False}, {"bench": {"plant": {"creep": 0.1}}}
     ),
     "motors": Edge(RigSettings, {"actuator": {"level": "tendon"}}, {"actuator": {"level": "lagged"}}),
+    "board ahead": Edge(
+        RigSettings,
+        {"ramp": 80_000.0, "actuator": {"level": "tendon", "step_acceleration": 80_000.0}},
+        {"ramp": 79_999.0},
+    ),
     "eyes": Edge(RigSettings, {"sensor": {"level": "camera"}}, {"sensor": {"level": "ideal"}}),
     "pushes or none": Edge(
         HwRunSettings, {"without_push": True, "push": {"force": 0.0}}, {"without_push": False}

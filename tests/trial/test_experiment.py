@@ -37,6 +37,20 @@ def test_a_trial_follows_its_reference_and_comes_back(experiment: Run) -> None:
     assert (log["late"].abs() < 1e-5).all() and done.experiment.timing.overruns == 0
 
 
+@pytest.mark.parametrize(("ramp", "least", "most"), [(50_000.0, 0.1, 0.5), (None, 0.0, 0.06)])
+@pytest.mark.slow
+def test_a_wrist_swings_at_rest_where_its_board_ramps_no_faster_than_its_host_changes_rates(
+    experiment: Run, ramp: float | None, least: float, most: float
+) -> None:
+    """Each change of a rate then takes the whole tick, of which the host does not know."""
+    changes = {} if ramp is None else {"ramp": ramp}
+    done = experiment(horizon=2.0, reference={"duration": 0.5, "angle_deg": 30.0}, **changes)
+    truth = done.table("truth")
+    theta = np.degrees(truth["theta"][(truth["trial"] == 0) & truth["time"].between(1.2, 2.0)])
+    assert done.error is None and theta.mean() == pytest.approx(30.0, abs=0.05)
+    assert least < np.ptp(theta) < most, "peak to peak [deg]"
+
+
 @pytest.mark.slow
 def test_tensions_and_spools_in_the_log_are_what_the_emulated_tendons_do(experiment: Run) -> None:
     """Once the reference rests, each tendon pulls as commanded, within friction and what the springs lack."""

@@ -142,6 +142,10 @@ class RigSettings(Section):
     camera: str = choice("0", "camera beside a real board: its number, or device path")
     camera_2: str = choice("2", "second camera, of two planes: it looks at the flexion-extension plane")
     real_time: bool = choice(False, "emulated rig: against the wall clock, in a process of its own")
+    ramp: float = quantity(
+        200_000.0, "1/s^2", "change of an axis' step rate by the board; actuator.step_acceleration is the host's",
+        "0.012 N m for a rotor of 300 g cm^2", ge=1000, le=200_000,
+    )  # fmt: skip
     priority: bool = choice(False, "real-time scheduling and locked memory for the loop, as far as the system allows")
     actuator: Actuator = choice(Actuator(level="tendon"), "motors and tendons as the controller knows them")
     sensor: Sensor = choice(Sensor(level="camera"), "camera as the observer knows it")
@@ -186,6 +190,16 @@ class RigSettings(Section):
         numbers = [self.markers.base, self.markers.tip, self.markers_2.base, self.markers_2.tip]
         if len(set(numbers)) < len(numbers):
             raise Unfitting(f"four markers need different ids, they are {numbers}", "other ids in markers_2")
+        return self
+
+    @model_validator(mode="after")
+    def _board_ahead_of_host(self) -> Self:
+        if self.ramp < self.actuator.step_acceleration:
+            problem = (
+                f"the board's ramp ({self.ramp:g} steps/s^2) is slower than the host changes step rates "
+                f"(actuator.step_acceleration, {self.actuator.step_acceleration:g} steps/s^2)"
+            )
+            raise Unfitting(problem, f"ramp of at least {self.actuator.step_acceleration:g}, or four times as much")
         return self
 
     @model_validator(mode="after")

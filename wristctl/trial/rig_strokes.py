@@ -16,7 +16,6 @@ from wristctl.config.hw_run import CalibrateWristSettings, RigSettings
 from wristctl.trial.expected_moves import Bend
 from wristctl.trial.motors_ready import in_sight, prepare
 from wristctl.trial.safety import SafetyStop
-from wristctl.trial.spools import spools_of
 from wristctl.trial.supervised_wait import Patience
 from wristctl.trial.testbeds import Testbed
 from wristctl.trial.tracking import Tracking
@@ -180,8 +179,7 @@ class RigStrokes:
         self._furthest, self._taut = furthest, min(_TAKEN_UP, 0.5 * furthest)
         self._board, self._tracking, self._axis = board, tracking, axis
         self._underway = underway(_STATUS_BYTES, settings.baud) + _READ
-        spools = spools_of(settings.actuator)
-        self._step, self._acceleration, self._slack = spools.step, spools.acceleration, settings.homing.slack
+        self._step, self._ramp, self._slack = settings.actuator.step_length, settings.ramp, settings.homing.slack
         patient = settings.safety.model_copy(update={"watchdog": max(_SILENCE, settings.safety.watchdog)})
         prepare(board, settings.model_copy(update={"safety": patient}))
         board.home()
@@ -246,7 +244,7 @@ class RigStrokes:
 
     def _stroke(self, low: int, high: int, before: float) -> list[MotorStroke]:
         """One stroke, as each camera saw it."""
-        move = RampedMove(high - low, round(_SPEED / self._step), self._acceleration)
+        move = RampedMove(high - low, round(_SPEED / self._step), self._ramp)
         still, moved = self._watch(low, JOG_RATE, before), self._watch(high, round(move.rate), _AFTER)
         seen = np.concatenate([still[1], moved[1]])
         time = np.arange(still[0][0, 0], moved[0][-1, 0], _SAMPLED)

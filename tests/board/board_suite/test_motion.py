@@ -41,9 +41,11 @@ def keep_rate(bench: Bench, rate: Rate, seconds: float) -> None:
         bench.run_ms(20)
 
 
+@pytest.mark.parametrize("acceleration", [50_000, 200_000])
 @pytest.mark.slow
-def test_random_moves_end_exactly_on_their_targets(bench: Bench, rounds: int) -> None:
+def test_random_moves_end_exactly_on_their_targets(bench: Bench, rounds: int, acceleration: int) -> None:
     rng = np.random.default_rng(1)
+    bench.do(Configure(acceleration=acceleration))
     bench.get_ready()
     for _ in range(15 * rounds):
         target = random_target(rng)
@@ -127,15 +129,15 @@ def test_rates_that_cross_over_at_more_than_the_allowed_total_delay_no_step(benc
     assert bench.wait_for_rest().position == positions(bench)
 
 
-def test_ramps_keep_the_configured_acceleration(bench: Bench) -> None:
-    acceleration = 20_000
+@pytest.mark.parametrize("acceleration", [20_000, 200_000])
+def test_ramps_keep_the_configured_acceleration(bench: Bench, acceleration: int) -> None:
     bench.do(Configure(acceleration=acceleration))
     bench.get_ready()
     bench.look()
     keep_rate(bench, Rate((8_000.0, 0.0, 0.0, 0.0)), 0.6)
     keep_rate(bench, Rate((-8_000.0, 0.0, 0.0, 0.0)), 1.0)
     rises = bench.look()[0]
-    moving = rises[(rises - rises[0]) < 0.38 * CLOCK]  # the way up to 8,000 steps/s takes 0.4 s
+    moving = rises[(rises - rises[0]) < 0.95 * 8_000 / acceleration * CLOCK]  # on the way up to 8,000 steps/s
     rate = CLOCK / np.diff(moving).astype(float)
     fitted = np.polyfit(moving[1:] / CLOCK, rate, 1)[0]
     assert fitted == pytest.approx(acceleration, rel=0.03)
