@@ -8,8 +8,10 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
+from tests.trial.conftest import SHORT, Run
 from wristctl.config.camera import Gates, Markers, SceneSettings
 from wristctl.config.wrist import WristParameters
+from wristctl.trial.safety import SafetyStop
 from wristctl.trial.tracking import InlineTracking
 from wristctl.vision.camera import Frame, Image
 from wristctl.vision.marker import Sighting, SightingVerdict, Tracker
@@ -39,9 +41,9 @@ class Replayed:
         """Nothing is open."""
 
 
-def seen(frames: list[Frame]) -> list[Sighting]:
+def seen(frames: list[Frame], noisy: bool = True) -> list[Sighting]:
     camera = Replayed(frames)
-    tracking = InlineTracking(camera, Tracker(Markers(), View(), Gates()), now=camera.now)
+    tracking = InlineTracking(camera, Tracker(Markers(), View(), Gates()), now=camera.now, noisy=noisy)
     return [tracking.look()[0] for _ in frames]
 
 
@@ -87,6 +89,30 @@ def test_repeated_pictures_are_no_angle(rate: float, repeated: Callable[[list[Im
 @pytest.mark.slow
 def test_a_wrist_at_rest_is_not_frozen(noise: float) -> None:
     assert {each.verdict for each in seen(in_time(pictures(90, 0.0, noise)))} == {OK}
+
+
+def test_a_camera_without_noise_gives_the_same_picture_of_a_wrist_at_rest_again_and_its_stamps_are_judged() -> None:
+    images = pictures(12, 0.0, 0.0)
+    assert all((image == images[0]).all() for image in images)
+    assert {each.verdict for each in seen(in_time(images), noisy=False)} == {OK}
+    assert {each.verdict for each in seen(in_time(images))[1:]} == {FROZEN}
+    late = [frame._replace(time=frame.time + 0.05) for frame in in_time(images)]
+    assert {each.verdict for each in seen(late, noisy=False)} == {STAMP}
+
+
+@pytest.mark.parametrize("frozen", [False, True])
+@pytest.mark.slow
+def test_an_emulated_camera_without_noise_is_not_frozen_at_rest_and_is_found_by_its_wrist_if_it_is(
+    experiment: Run, frozen: bool
+) -> None:
+    faults = ({"kind": "camera-frozen", "at": 0.05},) if frozen else ()
+    bench = {**SHORT["bench"], "camera": {"scene": {"noise": 0.0}}, "faults": faults}
+    done = experiment(bench=bench, reference={"duration": 0.4, "angle_deg": 25.0}, horizon=0.6)
+    if not frozen:
+        assert done.error is None and set(done.table("frames")["verdict"]) == {"ok"}
+    else:
+        assert isinstance(done.error, SafetyStop) and "does not follow its motors" in done.error.what
+        assert "the camera shows old pictures" in done.error.what and done.table("log")["time"].max() < 0.4
 
 
 @pytest.mark.slow

@@ -96,7 +96,9 @@ class EmulatedTestbed:
         if self._tracking is not None:
             self._tracking.close()
         kind = ThreadedTracking if isinstance(self._bench, RealTimeBench) else InlineTracking
-        make = partial(kind, keep=self._keep, now=self.transport.now)
+        cameras = self._settings.bench.camera, self._settings.bench.camera_2
+        noisy = all(camera.scene.noise > 0.0 for camera in cameras[: self._settings.planes])
+        make = partial(kind, keep=self._keep, now=self.transport.now, noisy=noisy)
         self._tracking = _tracking(make, self._bench.cameras, self._settings, self._views)
         return self._tracking
 

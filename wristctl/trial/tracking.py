@@ -36,10 +36,12 @@ class CameraTruth:
     """Judges one picture after the other; what is no news is no angle.
 
     A picture is known again by all its bytes, or by the corners of its markers, which stay the same where only a pixel
-    or a clock in the picture changes.
+    or a clock in the picture changes. Of a camera that is not `noisy`, as none is but an emulated one, every picture is
+    news: a wrist at rest gives the same again, and one that does not move with its motors is found by that.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, noisy: bool = True) -> None:
+        self._noisy = noisy
         self._known: deque[_Known] = deque()
         self._time, self._number = -math.inf, -1
 
@@ -48,7 +50,7 @@ class CameraTruth:
         while self._known and sighting.came - self._known[0].came > _REMEMBERED:
             self._known.popleft()
         shown = _Known(sighting.came, zlib.crc32(frame.image.tobytes()), sighting.corners)
-        repeated = any(_alike(earlier, shown) for earlier in self._known)
+        repeated = self._noisy and any(_alike(earlier, shown) for earlier in self._known)
         self._known.append(shown)
         stamped = self._time < frame.time <= sighting.came + _CLOCKS and self._number < frame.number
         self._time, self._number = max(self._time, min(frame.time, sighting.came)), max(self._number, frame.number)
@@ -96,10 +98,11 @@ class InlineTracking:
     """Looks when asked: in virtual time, where looking takes none. `now` is the clock of the camera's times."""
 
     def __init__(
-        self, camera: Camera, tracker: Tracker, keep: Kept | None = None, now: Callable[[], float] = time.monotonic
-    ) -> None:
+        self, camera: Camera, tracker: Tracker, keep: Kept | None = None, now: Callable[[], float] = time.monotonic,
+        noisy: bool = True,
+    ) -> None:  # fmt: skip
         self._camera, self._tracker, self._keep, self._now = camera, tracker, keep, now
-        self._truth = CameraTruth()
+        self._truth = CameraTruth(noisy)
         self.frame: Frame | None = None
         """The newest."""
         self.zero: tuple[float, ...] = (0.0,)
@@ -139,9 +142,10 @@ class ThreadedTracking:
     """
 
     def __init__(
-        self, camera: Camera, tracker: Tracker, keep: Kept | None = None, now: Callable[[], float] = time.monotonic
-    ) -> None:
-        self._inner, self._keep = InlineTracking(camera, tracker, now=now), keep
+        self, camera: Camera, tracker: Tracker, keep: Kept | None = None, now: Callable[[], float] = time.monotonic,
+        noisy: bool = True,
+    ) -> None:  # fmt: skip
+        self._inner, self._keep = InlineTracking(camera, tracker, now=now, noisy=noisy), keep
         self.zero: tuple[float, ...] = (0.0,)
         self._seen: deque[Sighting] = deque(maxlen=64)
         self._error: BaseException | None = None
