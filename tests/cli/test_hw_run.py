@@ -284,6 +284,29 @@ def test_calibrating_the_wrist_leaves_what_a_later_run_reuses(call: Call) -> Non
 
 
 @pytest.mark.slow
+def test_a_calibration_that_was_refused_or_is_of_one_axis_is_none(call: Call) -> None:
+    calibrate = ("hw", "calibrate", "wrist")
+    quick = ("--set", HOMING, "--set", "bench.motors.slack=[0, 0, 0, 0]")
+    assert call(*calibrate, *quick, "--label", "good")[0] == 0
+    assert call(*calibrate, *quick, "--set", "bench.motors.slack=[0.01, 0, 0, 0]", "--label", "refused")[0] == 5
+    assert call(*calibrate, "--axis", "2", "--max-deg", "2", "--label", "axis")[0] == 0
+    code, out, err = call("hw-run", "--calibration", "latest:calibrate-wrist", "--dry-run")
+    assert code == 0 and f"calibration: {open_run('latest:calibrate-wrist:good').id} " in out
+    assert "holds no calibration of all axes" in err
+    axis = open_run("latest:calibrate-wrist:axis").id
+    (refused,) = (path.name for path in Path("results").glob("*calibrate-wrist-refused*"))
+    for ref, told in (
+        (axis, "the run holds no calibration of all axes"),
+        (refused, "run is failed, not ok: stopped: axis 0 (tendon 1) does not bend the wrist"),
+        ("latest:calibrate-wrist:refused", "(state: failed: stopped: axis 0"),
+    ):
+        code, _, err = call("hw-run", "--calibration", ref, "--dry-run")
+        assert code == 2 and told in err, err
+        code, _, err = call("hw", "jog", "--axis", "0", "--mm", "0.1", "--port", "emulated", "--calibration", ref)
+        assert code == 2 and told in err, err
+
+
+@pytest.mark.slow
 def test_the_first_motion_of_a_new_rig_is_small_slow_and_stops_early(call: Call) -> None:
     file = str(ROOT / "experiments" / "first-motion.yaml")
     study = load_study([Path(file)])

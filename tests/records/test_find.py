@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import logging
 import shutil
 from collections.abc import Callable
 from pathlib import Path
 
+import pandas as pd
 import pytest
 
 from wristctl.config.study import Study
 from wristctl.errors import UserError
 from wristctl.records import Run, list_runs, open_run, require, start_run
+from wristctl.records.find import Content
 from wristctl.records.index import INDEX, indexed
 
 Make = Callable[..., Run]
@@ -30,6 +33,41 @@ def test_latest_passes_over_runs_that_did_not_end_well(make: Make, results: Path
     with pytest.raises(RuntimeError), start_run("gen-data", Study(), "", results):
         raise RuntimeError
     assert open_run("latest:gen-data", results).path == good.path
+
+
+TIPS = Content("data/tips.csv", "table of tips")
+
+
+def test_latest_is_the_last_that_holds_what_is_wanted_and_says_why_not_the_very_last(
+    make: Make, results: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    def told() -> list[str]:
+        with caplog.at_level(logging.INFO, "wristctl.records.find"):
+            caplog.clear()
+            found.append(require("latest:gen-data", "gen-data", results, TIPS).id)
+        return caplog.messages
+
+    found: list[str] = []
+    make()
+    with pytest.raises(
+        UserError, match="no gen-data run that ended ok holds a table of tips .data/tips.csv."
+    ) as caught:
+        require("latest:gen-data", "gen-data", results, TIPS)
+    assert str(caught.value).endswith("fix: run `wristctl gen-data` again")
+    with start_run("gen-data", Study(), "tips", results) as full:
+        full.table("data/tips.csv", pd.DataFrame({"x": [1.0]}), units={"x": "m"}, meaning={"x": "tip"})
+    assert told() == []
+    without = make()
+    assert told() == [f"the last gen-data run, {without.id}, holds no table of tips: {full.id} is taken"]
+    with pytest.raises(RuntimeError), start_run("gen-data", Study(), "", results) as failed:
+        raise RuntimeError("no light")
+    assert told() == [f"the last gen-data run, {failed.id}, is failed (no light): {full.id} is taken"]
+    assert found == [full.id] * 3
+    with pytest.raises(UserError, match=f"the run holds no table of tips .data/tips.csv. - .*{without.id}"):
+        require(without.id, "gen-data", results, TIPS)
+    with pytest.raises(UserError, match=f"run is failed, not ok: no light - .*{failed.id}"):
+        require(failed.id, "gen-data", results, TIPS)
+    assert require(str(full.path), "gen-data", results, TIPS).id == full.id
 
 
 def test_where_none_ended_well_the_last_that_did_not_is_named(make: Make, results: Path) -> None:

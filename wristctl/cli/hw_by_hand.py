@@ -145,13 +145,16 @@ def _session(
         return
     from wristctl.board.driver import Board
     from wristctl.board.transport import open_transport
-    from wristctl.records import open_run
+    from wristctl.commands.calibrate.wrist import CALIBRATION
+    from wristctl.records import require
     from wristctl.trial.by_hand import ByHand
     from wristctl.trial.calibration import WristCalibration
     from wristctl.trial.supervised_wait import Patience
     from wristctl.trial.tendon_pulls import tendon_pulls_of
 
-    signs = WristCalibration.load(open_run(calibration, out)).zero.signs if calibration else (1, 1, 1, 1)
+    signs: tuple[int, ...] = (1, 1, 1, 1)
+    if calibration:
+        signs = WristCalibration.load(require(calibration, "calibrate-wrist", out, CALIBRATION)).zero.signs
     with Board(open_transport(port, baud)) as board:
         board.cells = tendon_pulls_of(settings)
         _agree(f"{plan}. {_TENDONS}", yes, Patience(board).pulse)

@@ -13,6 +13,7 @@ from wristctl.config.study import Study
 from wristctl.config.wrist import WristParameters
 from wristctl.errors import Argument, Call, Phrase, UserError
 from wristctl.records import InputRun, Run, open_run, require
+from wristctl.records.find import Content
 from wristctl.records.manifest import MANIFEST, command_of
 from wristctl.study_files.resolved import sections_read
 
@@ -27,14 +28,15 @@ Read = TypeVar("Read")
 class EarlierRun:
     """An earlier run that a command reads: the leaf of its section that names it, and the kind it must be.
 
-    `kind` None is any kind. With `unfinished` the run may have been stopped; its files are then not checked. A leaf
-    that is a tuple names any number of runs.
+    `kind` None is any kind. With `unfinished` the run may have been stopped; its files are then not checked. `content`
+    is a file that it must have and other runs of its kind may lack. A leaf that is a tuple names any number of runs.
     """
 
     leaf: str
     kind: str | None
     optional: bool = False
     unfinished: bool = False
+    content: Content | None = None
 
 
 class Inputs(Mapping[str, Given]):
@@ -152,7 +154,7 @@ def _one(chosen: RunChoice, need: EarlierRun, out: Path) -> Given:
             raise UserError(f"a {chosen.kind} result where a {need.kind} run is needed", need.leaf, fix)
         return chosen
     ref = chosen.path if isinstance(chosen, Run) else chosen
-    return _stopped(ref, need, out) if need.unfinished else require(ref, need.kind, out)
+    return _stopped(ref, need, out) if need.unfinished else require(ref, need.kind, out, need.content)
 
 
 def _stopped(ref: str | Path, wanted: EarlierRun, out: Path) -> Run:

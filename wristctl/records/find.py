@@ -8,7 +8,7 @@ from datetime import UTC, datetime, timedelta
 from fnmatch import fnmatchcase
 from operator import eq, ge, gt, le, lt, ne
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from wristctl.errors import OUT, Argument, Call, Phrase, UserError, meant, nearest
 from wristctl.records.index import RESULTS, IndexEntry, indexed, run_names
@@ -69,18 +69,35 @@ def open_run(ref: str | Path, results: Path = RESULTS) -> Run:
             )
 
 
-def require(ref: str | Path, kind: str | None, results: Path = RESULTS) -> Run:
-    """The run `ref` if it is of the kind (None: any), has ended ok, and holds the very files sealed; else UserError."""
-    run = open_run(ref, results)
+class Content(NamedTuple):
+    """File of a run that other runs of its kind may lack, and what it is: for sentences."""
+
+    file: str
+    what: str
+
+    def of(self, run: Path) -> bool:
+        """Whether the run in this folder has it."""
+        return (run / self.file).is_file()
+
+
+def require(ref: str | Path, kind: str | None, results: Path = RESULTS, content: Content | None = None) -> Run:
+    """The run `ref` if it is of the kind (None: any), has ended ok, and holds the very files sealed; else UserError.
+
+    It must have the content too; `latest:` passes over runs without.
+    """
+    run = _latest(str(ref), results, content) if str(ref).startswith("latest:") else open_run(ref, results)
     actual_kind = run.manifest.kind  # raises where the manifest was changed, and with it perhaps kind and state
     if kind not in (None, actual_kind):
         raise UserError(
             f"a {actual_kind} run where a {kind} run is needed", str(run.path), f"for example latest:{kind}"
         )
+    again = ("run `", Call(command_of(actual_kind)), "` again")
     if run.state != "ok":
-        again = ("run `", Call(command_of(actual_kind)), "` again")
-        raise UserError(f"run is {run.state}, not ok", str(run.path), again)
+        why = f": {run.manifest.error.what}" if run.manifest.error else ""
+        raise UserError(f"run is {run.state}, not ok{why}", str(run.path), again)
     run.check()
+    if content and not content.of(run.path):
+        raise UserError(f"the run holds no {content.what} ({content.file})", str(run.path), again)
     return run
 
 
@@ -91,12 +108,13 @@ def _readable(path: Path) -> Run:
     return run
 
 
-def _latest(ref: str, results: Path) -> Run:
+def _latest(ref: str, results: Path, content: Content | None = None) -> Run:
     kind, _, label = ref.removeprefix("latest:").partition(":")
     entries = indexed(results, renew=False)
     ended = [run for run in entries if run.state == "ok"]
     fitting = [run for run in ended if run.kind == kind and label in ("", run.label)]
-    latest = max(fitting, key=lambda run: run.started, default=None)
+    empty = [run for run in fitting if content and not content.of(results / run.id)]
+    latest = max((run for run in fitting if run not in empty), key=lambda run: run.started, default=None)
     for run in (Run(results / entry.id) for entry in entries if entry.state == "broken"):
         stamp, _, name = run.id.partition("-")
         if (
@@ -105,12 +123,16 @@ def _latest(ref: str, results: Path) -> Run:
             and (latest is None or stamp >= latest.id.partition("-")[0])
         ):
             return run  # whoever reads it is told what is wrong; an older one in its place would go unnoticed
+    if latest is None and content and empty:
+        problem = f"no {kind} run that ended ok holds a {content.what} ({content.file})"
+        raise UserError(problem, f"{ref} in {results}", ("run `", Call(command_of(kind)), "` again"))
     if latest is None:
         others = [run for run in entries if run.kind == kind and label in ("", run.label) and run.state != "broken"]
         if others:
             last = max(others, key=lambda run: run.started)
             problem = f"no {kind} run{f' with the label {label!r}' if label else ''} that ended ok"
-            raise UserError(problem, f"{ref} in {results}", f"{last.id} (state: {last.state})")
+            why = f": {last.note}" if last.note else ""
+            raise UserError(problem, f"{ref} in {results}", f"{last.id} (state: {last.state}{why})")
         kinds, labels = {run.kind for run in ended}, {run.label for run in ended if run.kind == kind}
         if labels:
             raise UserError(f"no {kind} run with the label {label!r}", f"{ref} in {results}", meant(label, labels))
@@ -120,6 +142,15 @@ def _latest(ref: str, results: Path) -> Run:
             raise UserError(f"no command makes {kind!r} runs", f"{ref} in {results}", f"did you mean {labelled}?")
         fix: Phrase = meant(kind, kinds) if kinds else ("run `", Call(command_of(kind)), "` first")
         raise UserError(f"no {kind} run that ended ok", f"{ref} in {results}", fix)
+    later = [
+        run
+        for run in entries
+        if run.kind == kind and label in ("", run.label) and run.state != "broken" and run.started > latest.started
+    ]
+    for last in later[-1:]:
+        why = f"holds no {content.what}" if content and last in empty else f"is {last.state}"
+        note = f" ({last.note})" if last.note else ""
+        _log.info("the last %s run, %s, %s%s: %s is taken", kind, last.id, why, note, latest.id)
     return Run(results / latest.id)
 
 

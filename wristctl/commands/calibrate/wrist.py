@@ -13,6 +13,7 @@ from wristctl.commands.rig_description import coming_first, describe_rig
 from wristctl.commands.session import Session
 from wristctl.config.study import Study
 from wristctl.errors import UserError
+from wristctl.records.find import Content
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -20,6 +21,8 @@ if TYPE_CHECKING:
     from wristctl.trial.calibration import WristCalibration
     from wristctl.trial.testbeds import Testbed
 
+# What a run of one axis alone lacks.
+CALIBRATION = Content("data/wrist.json", "calibration of all axes")
 _OF_AXIS = ("axis", "tendon", "sense", "taken up [mm]", "bend [deg]")
 _COLUMNS = ("axis", "tendon", "sense", "steps per rad", "by the model", "slack [mm]", "friction [mm]")
 
@@ -75,7 +78,7 @@ def calibrate_wrist(session: Session) -> WristCalibrated | AxisFound:
     session.operator.tell(describe_rig(session.study.calibrate_wrist))
     import numpy as np
 
-    from wristctl.trial.calibration import FILE, calibrated
+    from wristctl.trial.calibration import calibrated
     from wristctl.trial.homing import SpatialZero, moves_of
     from wristctl.trial.testbeds import open_testbed
     from wristctl.vision.view import View
@@ -93,7 +96,7 @@ def calibrate_wrist(session: Session) -> WristCalibrated | AxisFound:
             return _one_axis(session, testbed, settings.axis)
         with session.progress("homing"):
             calibration = calibrated(testbed, settings, study.wrist)
-    findings.plain(FILE, calibration.plain())
+    findings.plain(CALIBRATION.file, calibration.plain())
     zero = calibration.zero
     findings.metric("marker", zero.marker, "rad", meaning="angle between the markers on the straight wrist")
     by_model = moves_of(settings, study.wrist, settings.plane).steps()

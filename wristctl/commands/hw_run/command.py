@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from wristctl.commands.answer import Answer
+from wristctl.commands.calibrate.wrist import CALIBRATION
 from wristctl.commands.hw_run.answer import answer_of, in_one_plane, marks_of
 from wristctl.commands.inputs import EarlierRun, Inputs
 from wristctl.commands.inputs_of_loops import (
@@ -144,7 +145,7 @@ HW_RUN: Procedure[Performed | PerformedBends] = Procedure(
     plan,
     hw_run,
     (
-        EarlierRun("calibration", kind="calibrate-wrist", optional=True),
+        EarlierRun("calibration", kind="calibrate-wrist", optional=True, content=CALIBRATION),
         EarlierRun("optics", kind="calibrate-camera", optional=True),
         EarlierRun("optics_2", kind="calibrate-camera", optional=True),
         EarlierRun("from_identified", kind="identify", optional=True),
