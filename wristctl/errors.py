@@ -228,6 +228,9 @@ _TO_READ: dict[int, Phrase] = {
     errno.EPERM: "ask its owner to let you read it",
     errno.EIO: "check the disk that it is on, or bring a copy",
     errno.ESTALE: "check the disk that it is on, or bring a copy",
+    errno.EINVAL: "put a plain file in its place",
+    errno.ELOOP: "put a copy of what was meant in its place",
+    errno.EFBIG: "bring the file that was meant",
 }
 """Advice where a file cannot be read, where it differs from that on writing, by errno."""
 

@@ -3,10 +3,9 @@
 import re
 from pathlib import Path
 
-from wristctl.errors import UserError, fix_to_read
+from wristctl.plain_files import read_plain, unreadable
 
 SUMS = "SHA256SUMS"
-UNREADABLE = "cannot be read: "
 _LINE = re.compile(r"([0-9a-f]{64})  (.+)")
 
 
@@ -16,18 +15,13 @@ def read_seal(folder: Path) -> dict[str, str] | None:
     UserError where it is there, perhaps, and cannot be read.
     """
     try:
-        text = (folder / SUMS).read_bytes().decode("utf-8", errors="replace")
-    except (FileNotFoundError, NotADirectoryError, IsADirectoryError):
+        text = read_plain(folder / SUMS, links=False).decode("utf-8", errors="replace")
+    except (FileNotFoundError, NotADirectoryError):
         return None
     except OSError as error:
         raise unreadable(error, folder / SUMS) from error
     lines = (_LINE.fullmatch(line) for line in text.split("\n"))
     return {line[2]: line[1] for line in lines if line and _inside(line[2])}
-
-
-def unreadable(error: OSError, file: Path) -> UserError:
-    """The user's error of a file that may be as it was, if only it could be read."""
-    return UserError(f"{UNREADABLE}{error.strerror or error}", str(file), fix_to_read(error))
 
 
 def _inside(name: str) -> bool:

@@ -6,6 +6,7 @@ import json
 import math
 import re
 from collections.abc import Callable
+from contextlib import nullcontext
 from importlib import import_module
 from pathlib import Path
 from types import MappingProxyType, SimpleNamespace
@@ -158,7 +159,7 @@ def measured(monkeypatch: pytest.MonkeyPatch) -> list[Reading]:
     found = readings_of(values, np.arange(4.0))
     by_id = {reading.run: reading for reading in found}
     module = import_module("wristctl.cli.runs.trend")  # its function has the same name
-    monkeypatch.setattr(module, "require", lambda name, kind, out: SimpleNamespace(id=name))
+    monkeypatch.setattr(module, "require", lambda name, kind, out: SimpleNamespace(id=name, reading=nullcontext))
     monkeypatch.setattr("wristctl.identification.rig_trend.check_one_rig", lambda runs: None)
     monkeypatch.setattr("wristctl.identification.rig_trend.reading_of", lambda run: by_id[run.id])
     return found

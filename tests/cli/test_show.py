@@ -117,10 +117,10 @@ def test_copies_of_a_run_and_one_that_cannot_be_read_are_each_verified(
 
     honest = sha256_of
 
-    def refuse(path: Path) -> str:
+    def refuse(path: Path, largest: int) -> str:
         if path == data.path / "config.yaml":
             raise PermissionError(errno.EACCES, "Permission denied", str(path))
-        return honest(path)
+        return honest(path, largest)
 
     monkeypatch.setattr(seal, "sha256_of", refuse)
     code, out, _ = call("runs", "verify", data.id, network.id)

@@ -31,7 +31,17 @@ def test_a_study_is_read_without_physics_or_arrays() -> None:
     loaded = done.stdout.split()
     assert not {name.split(".")[0] for name in loaded} & {"numpy", "numba", "scipy", "pandas", "matplotlib", "torch"}
     own = {name.split(".")[1] for name in loaded if name.startswith("wristctl.")}
-    assert own == {"config", "errors", "escape", "interrupt", "plugins", "sha256sums", "study_files", "version"}
+    assert own == {
+        "config",
+        "errors",
+        "escape",
+        "interrupt",
+        "plain_files",
+        "plugins",
+        "sha256sums",
+        "study_files",
+        "version",
+    }
 
 
 @pytest.mark.parametrize("name", TABLES)

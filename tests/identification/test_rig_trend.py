@@ -46,7 +46,8 @@ def run(log: list[Any], path: Path, kind: str = "hw-run", **trials: Any) -> Any:
     frames = {"log": pd.concat(log), "trials": pd.DataFrame(table)}
     return SimpleNamespace(
         id="a run", kind=kind, path=path, data=frames.__getitem__, metrics={},
-        file=lambda name: path / name, config=SimpleNamespace(wrist=BELIEVED),
+        has=lambda name: (path / name).exists(), json=lambda name: json.loads((path / name).read_text()),
+        config=SimpleNamespace(wrist=BELIEVED),
         manifest=SimpleNamespace(inputs=[], timing=SimpleNamespace(started="2026-01-02T03:04:05+00:00")),
     )  # fmt: skip
 

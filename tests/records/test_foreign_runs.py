@@ -126,5 +126,6 @@ ODD_TABLES = [
 def test_odd_tables_are_named_and_no_bug(make: Make, content: bytes) -> None:
     run = make()
     (run.path / "tables.json").write_bytes(content)
-    with pytest.raises(UserError, match="no tables as wristctl writes them"):
+    with pytest.raises(UserError, match=r"no tables as wristctl writes them|not valid JSON") as caught:
         page(run, run.manifest)
+    assert caught.value.where == str(run.path / "tables.json")

@@ -19,6 +19,7 @@ import pytest
 from wristctl.cli.app import main
 from wristctl.cli.runs.verification import Verified
 from wristctl.config.study import Study
+from wristctl.plain_files import UNREADABLE
 from wristctl.records import Run, list_runs, open_run, start_run
 from wristctl.records.find import entries
 from wristctl.records.index import INDEX
@@ -26,7 +27,6 @@ from wristctl.records.lock import LOCK, is_locked
 from wristctl.records.manifest import SIGNATURE
 from wristctl.records.removal import leftovers, remove
 from wristctl.records.tags import change_tags, read_tags
-from wristctl.sha256sums import UNREADABLE
 
 Make = Callable[..., Run]
 ROOT = Path(__file__).parents[2]

@@ -95,7 +95,7 @@ def test_a_changed_manifest_is_named_by_whoever_reads_the_run(
                 require(ref, kind, results)
             assert (caught.value.what, caught.value.where) == (CHANGED, str(manifest)), (ref, kind)
     assert open_run(run.id, results).state == "broken"
-    assert [each.note for each in entries(results) if each.state == "broken"] == [CHANGED]
+    assert [each.note for each in entries(results) if each.state == "broken"] == [f"run.json: {CHANGED}"]
     assert changed_inputs(Run(live.path)) == [f"input: network: {CHANGED} ({manifest})"]
     assert [each.state for each in ancestry(Run(live.path)).inputs] == ["broken"]
     assert open_run("latest:train", results).path == other.path, "the latest of another kind is as good as ever"

@@ -150,8 +150,14 @@ def test_an_error_names_the_file_that_set_the_value_last(tmp_path: Path) -> None
 def test_a_file_that_cannot_be_read_is_named(tmp_path: Path) -> None:
     with pytest.raises(UserError, match="No such file"):
         load_study([tmp_path / "absent.yaml"])
-    with pytest.raises(UserError, match="Is a directory"):
+    with pytest.raises(UserError, match="a folder, and no plain file") as caught:
         load_study([tmp_path])
+    assert caught.value.fix == "it holds no study file"
+    for name in ("f", "b", "d", "c", "e", "a"):
+        _file(tmp_path, "seed: 1", f"{name}.yaml")
+    with pytest.raises(UserError) as caught:
+        load_study([tmp_path])
+    assert caught.value.fix == "name a study file in it: a.yaml, b.yaml, c.yaml, d.yaml, e.yaml and 1 more"
 
 
 @pytest.mark.parametrize("file", sorted((ROOT / "experiments").glob("*.yaml")), ids=lambda file: file.name)

@@ -95,6 +95,7 @@ def _serve_with_wrist(chip: Any, line: Any, override: list[str], console: Any, q
             camera.join()
 
 
+_LOG = "data/log.csv"
 Seconds = Annotated[float, typer.Option("--last", help="Seconds to show.", min=0.5)]
 Every = Annotated[float, typer.Option("--every", help="Seconds between two pictures.", min=0.1)]
 
@@ -114,14 +115,20 @@ def watch(
     run = open_run(ref, out) if ref else _newest(out)
     if run.kind != "hw-run":
         raise UserError("only runs of hw-run go on in time", str(run.path), "name a run of hw-run")
-    period, log = run.config.hw_run.control_period, run.path / "data" / "log.csv"
+    period = run.config.hw_run.control_period
     going_on, drawn = True, False
     while going_on:
         going_on = run.state == "running"
-        if log.is_file() and log.stat().st_size:  # empty until the first tick
+        picture = None
+        if run.has(_LOG):
+            with run.reading():
+                log = run.file(_LOG)
+                if log.stat().st_size:  # empty until the first tick
+                    picture = recent(newest_rows(log, last, period))
+        if picture is not None:
             drawn = True
             with replacing(file) as temporary:
-                recent(newest_rows(log, last, period)).savefig(temporary, format="png", dpi=100)
+                picture.savefig(temporary, format="png", dpi=100)
         if going_on:
             time.sleep(every)
     if not drawn:

@@ -58,15 +58,13 @@ def _tell(
 
 
 def _logged(run: Run) -> Logged:
-    import pandas as pd
-
     from wristctl.trial.residuals import FILE, load
     from wristctl.trial.run_limits import Logged
 
-    try:
-        values, limits = pd.read_csv(run.path / "data" / "residuals.csv"), load(run.path / FILE)
-    except (OSError, ValueError, KeyError) as error:
-        raise UserError("a run without residuals and limits", str(run.path), "an hw-run run") from error
+    if not run.has("data/residuals.csv") or not run.has(FILE):
+        raise UserError("a run without residuals and limits", str(run.path), "an hw-run run")
+    with run.reading():
+        values, limits = run.data("residuals"), load(run.file(FILE))
     return Logged(values, limits, run.config.hw_run, run.config.wrist)
 
 

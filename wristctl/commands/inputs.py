@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeVar
@@ -60,7 +61,9 @@ class Inputs(Mapping[str, Given]):
         if role not in self._by_role:
             return None
         if (role, reader) not in self._read:
-            self._read[role, reader] = reader(self._by_role[role])
+            source = self._by_role[role]
+            with source.reading() if isinstance(source, Run) else nullcontext():
+                self._read[role, reader] = reader(source)
         content: Read = self._read[role, reader]
         return content
 

@@ -231,7 +231,7 @@ def _network(earlier: Run | _Training) -> Network:
 def _identified_yaml(earlier: Run | _Identification) -> str:
     if isinstance(earlier, Run):
         text = ""
-        if (earlier.path / IDENTIFIED).is_file():
+        if earlier.has(IDENTIFIED):
             text = earlier.file(IDENTIFIED).read_text(encoding="utf-8")
     else:
         text = getattr(earlier, "yaml", "")

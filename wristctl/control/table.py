@@ -11,6 +11,7 @@ from wristctl.control.law import Controller
 from wristctl.control.shipped_gains import PREFIX, families, is_shipped, shipped_gains
 from wristctl.control.vetting import law_of
 from wristctl.errors import Call, UserError, meant
+from wristctl.plain_files import read_json
 from wristctl.records.files import write_text
 
 CONTROLLERS: Choices[Controller] = _TABLE
@@ -73,7 +74,7 @@ def write_gains(path: Path, gains: Gains) -> None:
 def read_gains(path: Path) -> Gains:
     """Read a file of tuned gains; UserError if it is none."""
     try:
-        gains = json.loads(path.read_bytes())
+        gains = read_json(path)
         return {str(name): {str(k): float(v) for k, v in values.items()} for name, values in gains.items()}
     except (OSError, ValueError, AttributeError, TypeError) as error:
         raise UserError("not a file of tuned gains", str(path), ("name a run of `", Call("tune"), "`")) from error

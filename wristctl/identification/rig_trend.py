@@ -4,7 +4,6 @@ Integral action makes up for a spring that softens or a pulley that wears, so th
 loop needs for it does: the load that the observer finds, the way of the spools, and what homing measures.
 """
 
-import json
 import math
 from collections.abc import Mapping, Sequence
 from datetime import datetime
@@ -132,14 +131,13 @@ def _moved(run: Run) -> float:
 
 def _homed(run: Run, name: str) -> dict[str, float]:
     """Slack, friction, steps per radian and marker's zero that homing has found; nothing where it found none."""
-    if not (run.path / name).is_file():
+    if not run.has(name):
         return {}
-    zero = json.loads(run.file(name).read_text(encoding="utf-8"))
+    zero = run.json(name)
     slack = {f"slack of tendon {tendon}": float(value) for tendon, value in zip(ACTIVE, zero["slack"], strict=True)}
-    means = {
-        "steps per radian at homing": float(np.mean(zero["steps_per_radian"])),
-        "friction at homing": float(np.mean(zero["friction"])),
-    }
+    means = {"steps per radian at homing": float(np.mean(zero["steps_per_radian"]))}
+    if "friction" in zero:  # which runs of version 0.1.0 have not
+        means["friction at homing"] = float(np.mean(zero["friction"]))
     return {**slack, **means, "marker's zero": float(zero["marker"])}
 
 

@@ -23,11 +23,11 @@ def animation(run: Run) -> dict[str, Any] | None:
     A course holds its group, its name, its colour, and per picture the angle of each segment [0.1 mrad] and the wanted
     angle; pictures end where it diverged. It draws arcs, so that loops of another plant are left out.
     """
-    if (run.path / "data/trajectories.npz").is_file():
+    if run.has("data/trajectories.npz"):
         courses, time = _compared(run)
-    elif (run.path / "data/trajectory.csv").is_file():
+    elif run.has("data/trajectory.csv"):
         courses, time = _single(run)
-    elif run.kind == "hw-run" and run.config.hw_run.planes == 1 and (run.path / "data/trials.csv").is_file():
+    elif run.kind == "hw-run" and run.config.hw_run.planes == 1 and run.has("data/trials.csv"):
         courses, time = _trials(run)
     else:
         return None
@@ -76,7 +76,7 @@ def _compared(run: Run) -> tuple[list[Named], np.ndarray]:
 def _single(run: Run) -> tuple[list[Named], np.ndarray]:
     import numpy as np
 
-    with (run.path / "data/trajectory.csv").open(encoding="utf-8", newline="") as file:  # sooner than pandas is loaded
+    with run.file("data/trajectory.csv").open(encoding="utf-8", newline="") as file:  # sooner than pandas is loaded
         names, *rows = csv.reader(file)
     numbers = np.array([[float(cell or "nan") for cell in row] for row in rows])
     table = dict(zip(names, numbers.T, strict=True))
@@ -97,7 +97,7 @@ def _trials(run: Run) -> tuple[list[Named], np.ndarray]:
 
     trials, log = run.data("trials"), run.data("log")
     arcs = run.config.hw_run.bench.plant.model == "pcc"
-    truth = run.data("truth") if arcs and (run.path / "data/truth.csv").is_file() else None
+    truth = run.data("truth") if arcs and run.has("data/truth.csv") else None
     time = np.arange(0.0, run.config.hw_run.horizon, run.config.hw_run.control_period)
     courses = []
     for row in trials[trials["outcome"] == "ok"].to_dict("records"):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 import hashlib
 import math
+import os
 import re
 import shlex
 from collections.abc import Callable, Sequence
@@ -14,6 +15,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from wristctl.escape import printable, printable_lines
+from wristctl.plain_files import read_plain, unreadable
 from wristctl.plotting.animation import animation
 from wristctl.plotting.page_tables import in_degrees, shown_tables
 from wristctl.records.difference import difference
@@ -35,12 +37,19 @@ LARGEST = 300_000
 
 def inline_figure(svg: Path) -> str:
     """The figure's address as a data URL, with no more digits than a screen shows; of a large one its PNG's."""
-    text = svg.read_text(encoding="utf-8", errors="replace")
+    text = _content(svg).decode("utf-8", errors="replace")
     text = _PATH.sub(lambda path: _DIGITS.sub(lambda digits: digits[0][:3], path[0]).replace("\n", " "), text)
     picture = svg.with_suffix(".png")
-    if len(text) > LARGEST and picture.is_file() and not picture.is_symlink():
-        return f"data:image/png;base64,{base64.b64encode(picture.read_bytes()).decode()}"
+    if len(text) > LARGEST and os.path.lexists(picture):
+        return f"data:image/png;base64,{base64.b64encode(_content(picture)).decode()}"
     return f"data:image/svg+xml;base64,{base64.b64encode(text.encode()).decode()}"
+
+
+def _content(picture: Path) -> bytes:
+    try:
+        return read_plain(picture, links=False)
+    except OSError as error:
+        raise unreadable(error, picture) from error
 
 
 _WIDTH, _HEIGHT, _GAP, _ROW = 192, 44, 44, 60
@@ -159,7 +168,8 @@ def page(run: Run, manifest: Manifest, beside: Path | None = None, undrawn: Undr
 
     def part(name: str, draw: Callable[[], Part], default: Part) -> Part:
         try:
-            return draw()
+            with run.reading():
+                return draw()
         except Exception as error:
             if undrawn is None:
                 raise
@@ -197,7 +207,7 @@ def page(run: Run, manifest: Manifest, beside: Path | None = None, undrawn: Undr
 
 def _in_space(run: Run) -> dict[str, Any] | None:
     """What the page plays of a run in two planes; None of any other run. Without its tables nothing is imported."""
-    if not any((run.path / "data" / table).is_file() for table in ("bends.csv", "trials.csv")):
+    if not any(run.has(f"data/{table}.csv") for table in ("bends", "trials")):
         return None
     from wristctl.plotting.spatial_view import spatial_view
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 import re
 from collections.abc import Sequence
@@ -31,23 +30,17 @@ def in_degrees(value: Any, unit: str) -> tuple[Any, str]:
 
 def tables(run: Run) -> list[dict[str, Any]]:
     """The tables that a command printed or kept: title, columns and rows each."""
-    if not (run.path / TABLES).exists():
-        return []
-    file = run.file(TABLES)
-    try:
-        stored = json.loads(file.read_bytes())
-    except (ValueError, RecursionError):
-        stored = None
+    stored = run.json(TABLES) if run.has(TABLES) else []
     if not isinstance(stored, list) or not all(map(_is_table, stored)):
         again = ("restore it, or run `", Call(command_of(run.kind)), "` again")
-        raise UserError("no tables as wristctl writes them", str(file), again)
+        raise UserError("no tables as wristctl writes them", str(run.path / TABLES), again)
     return stored
 
 
 def shown_tables(run: Run) -> list[dict[str, Any]]:
     """The tables for a page: angles in degrees, and those of a comparison's loops and motions in one."""
     stored = tables(run)
-    if run.kind == "compare" and (run.path / "data/comparison.csv").is_file():
+    if run.kind == "compare" and run.has("data/comparison.csv"):
         stored = _in_one(run, stored)
     return [readable(table) for table in stored]
 

@@ -31,7 +31,6 @@ from wristctl.plotting.style import (
     undress,
 )
 from wristctl.plotting.wrist_drawing import RIM
-from wristctl.records.manifest import CONFIG
 from wristctl.records.run import Run
 from wristctl.simulation.bend_course import BendCourse
 from wristctl.simulation.worlds import plant_of
@@ -79,10 +78,8 @@ def spatial_view(run: Run) -> dict[str, Any] | None:
     [0.1 N], and the tip where it is and where it is wanted [0.01 mm]. Pictures end where the wrist left its range.
     """
     table_of = {"simulate": "data/bends.csv", "hw-run": "data/trials.csv"}.get(run.kind)
-    if table_of is None or not (run.path / table_of).is_file():
+    if table_of is None or not run.has(table_of):
         return None
-    for name in (CONFIG, table_of):  # no link
-        run.file(name)
     loop = run.config.hw_run.loop if run.kind == "hw-run" else run.config.simulate.loop
     wrist, planes = plant_of(run.config.wrist, loop.plant), ("ulnar", "flexion")
     places = cables(wrist)
@@ -122,7 +119,7 @@ def spatial_view(run: Run) -> dict[str, Any] | None:
 
 def _simulated(run: Run, columns: list[str]) -> Array:
     """Columns of a loop in two planes, (T, columns)."""
-    with (run.path / "data/bends.csv").open(encoding="utf-8", newline="") as lines:  # sooner than pandas is loaded
+    with run.file("data/bends.csv").open(encoding="utf-8", newline="") as lines:  # sooner than pandas is loaded
         heads, *rows = csv.reader(lines)
     at = [heads.index(name) for name in columns]
     return np.array([[float(row[column] or "nan") for column in at] for row in rows])

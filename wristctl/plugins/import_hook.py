@@ -18,6 +18,7 @@ from typing import Any, NamedTuple
 
 from wristctl.errors import UserError
 from wristctl.interrupt import from_outside
+from wristctl.plain_files import read_plain
 from wristctl.plugins.trust import run_around, trusted
 
 _PREFIX = "wristctl_foreign_"
@@ -67,7 +68,7 @@ def data_file(source: str, name: str) -> Path:
 def digest_now(file: Path) -> str:
     """SHA-256 of a file as it is; empty where it cannot be read."""
     try:
-        return hashlib.sha256(file.read_bytes()).hexdigest()
+        return hashlib.sha256(read_plain(file)).hexdigest()
     except OSError:
         return ""
 
@@ -82,7 +83,7 @@ class _Source(SourceFileLoader):
     def get_code(self, fullname: str) -> CodeType:
         """Compiled from the source, never from bytecode."""
         file = Path(self.path)
-        content = file.read_bytes()
+        content = read_plain(file)
         self._importing.note(file, hashlib.sha256(content).hexdigest())
         code: CodeType = compile(content, self.path, "exec", dont_inherit=True)
         return code

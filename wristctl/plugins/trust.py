@@ -9,6 +9,7 @@ from pathlib import Path
 
 from wristctl.errors import Argument, UserError
 from wristctl.escape import printable
+from wristctl.plain_files import read_plain, unreadable
 from wristctl.sha256sums import SUMS, read_seal
 
 _MANIFEST = "run.json"
@@ -86,7 +87,14 @@ def _sources(root: Path) -> dict[Path, str]:
     """All below a folder but what Python would load in place of sources, and nothing here ever does."""
     compiled_suffixes = tuple(set(all_suffixes()) - {".py"})
     sources = (path for path in root.rglob("*") if path.is_file() and not path.name.endswith(compiled_suffixes))
-    return {source: hashlib.sha256(source.read_bytes()).hexdigest() for source in sources}
+    return {source: hashlib.sha256(_content(source)).hexdigest() for source in sources}
+
+
+def _content(source: Path) -> bytes:
+    try:
+        return read_plain(source)
+    except OSError as error:
+        raise unreadable(error, source) from error
 
 
 def _listing(root: Path, files: Mapping[Path, str]) -> list[str]:

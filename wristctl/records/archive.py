@@ -18,13 +18,14 @@ from pathlib import Path
 from typing import NamedTuple
 
 from wristctl.errors import FILE, UserError, writing
+from wristctl.plain_files import LARGEST_DATA, read_plain, unreadable
 from wristctl.records.files import PART, replacing, sync, sync_all
 from wristctl.records.index import dated
 from wristctl.records.lineage import input_run
 from wristctl.records.lock import LOCK, RunLock
 from wristctl.records.manifest import SIGNATURE, SUMS
 from wristctl.records.run import Run
-from wristctl.sha256sums import read_seal, unreadable
+from wristctl.sha256sums import read_seal
 
 PACK, SCHEMA = "pack.json", "wristctl.pack/1"
 # Most files of an archive: ten times the files of a full study of all laws.
@@ -75,14 +76,21 @@ def pack(run: Run, file: Path) -> list[Run]:
         _write(archive, PACK, json.dumps(contents, indent=2).encode() + b"\n")
         for member in runs:
             for name in _packed(member):
-                _write(archive, f"{member.id}/{name}", (member.path / name).read_bytes())
+                _write(archive, f"{member.id}/{name}", _content(member.path / name))
     return runs
 
 
 def _packed(run: Run) -> list[str]:
     """Names of the files of a run that travel."""
-    beside = [name for name in (SUMS, SIGNATURE) if (run.path / name).is_file()]
+    beside = [name for name in (SUMS, SIGNATURE) if run.has(name)]
     return [*sorted(read_seal(run.path) or ()), *beside]
+
+
+def _content(file: Path) -> bytes:
+    try:
+        return read_plain(file, LARGEST_DATA, links=False)
+    except OSError as error:
+        raise unreadable(error, file) from error
 
 
 def _write(archive: zipfile.ZipFile, name: str, content: bytes) -> None:
@@ -263,7 +271,7 @@ def _problems(folder: Path) -> Iterator[tuple[str, str]]:
 
 def _check_same(existing: Path, arrived: Path) -> None:
     """UserError where what is here under a run's id is another run, or that run and damaged."""
-    if not (existing / SUMS).is_file() or (existing / SUMS).read_bytes() != (arrived / SUMS).read_bytes():
+    if not lexists(existing / SUMS) or _content(existing / SUMS) != _content(arrived / SUMS):
         problem = "a run of this id is here already, and is another"
         raise UserError(problem, str(existing), "another results folder, with --out", exit_code=3)
     try:

@@ -9,6 +9,7 @@ from wristctl.config.foreign import Foreign
 from wristctl.config.given_files import files_of, with_files
 from wristctl.config.study import Study
 from wristctl.errors import UserError
+from wristctl.plain_files import LARGEST_DATA, read_plain
 from wristctl.plugins.trust import agree, digest_of
 from wristctl.records.files import replacing, sha256_of
 from wristctl.study_files.resolved import sections_read
@@ -55,7 +56,7 @@ def _content(file: Path) -> bytes:
     from wristctl.records.open_log import with_units
 
     try:
-        content = file.read_bytes()
+        content = read_plain(file, LARGEST_DATA)
         return with_units(content.decode("utf-8"), file).encode("utf-8")
     except UnicodeDecodeError:
         return content
@@ -88,7 +89,7 @@ def copy_code(path: Path, foreign: Sequence[Foreign]) -> Mapping[str, str]:
             name = f"{homes[source.file]}/{_below(source, file)}"
             (path / name).parent.mkdir(parents=True, exist_ok=True)
             with replacing(path / name) as temporary:
-                temporary.write_bytes(file.read_bytes())
+                temporary.write_bytes(read_plain(file))
             digests[name] = sha256_of(path / name)
             if digests[name] != digest:
                 raise UserError("a source was changed after it was loaded", str(file), "run again")

@@ -2,9 +2,9 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any, NamedTuple
 
+from wristctl.plain_files import read_plain
 from wristctl.records.manifest import CONFIG, PACKAGES, SOURCES
 from wristctl.records.run import Run
 from wristctl.study_files.renaming import NewNames, with_keys_of_today
@@ -53,7 +53,7 @@ def changes(before: Mapping[str, Any], after: Mapping[str, Any]) -> list[Change]
 def leaves_of(run: Run) -> dict[str, Any]:
     """The configuration as written, by dotted key path."""
     file = run.file(CONFIG)
-    document = with_keys_of_today(parse_yaml(file.read_bytes(), str(file)), str(file), NewNames())
+    document = with_keys_of_today(parse_yaml(read_plain(file), str(file)), str(file), NewNames())
     return dict(_leaves(document.data, ""))
 
 
@@ -75,7 +75,7 @@ def _code(a: Run, b: Run) -> list[Change]:
         code = run.manifest.code
         commit = f"{code.commit[:12]}{' with changes' if code.dirty else ''}" if code.commit else None
         facts.append({"version": code.version, "commit": commit, "tree": code.tree_sha256[:12]})
-    files = changes(*(_listing(run.path / SOURCES, "  ", 1) for run in (a, b)))
+    files = changes(*(_listing(run, SOURCES, "  ", 1) for run in (a, b)))
     return [
         *foreign_changes,
         *changes(*facts),
@@ -88,15 +88,16 @@ def _environment(a: Run, b: Run) -> list[Change]:
         {name: getattr(run.manifest.environment, name) for name in _FACTS} | run.manifest.environment.threads
         for run in (a, b)
     ]
-    packages = [run.manifest.environment.packages | _listing(run.path / PACKAGES, "==", 0) for run in (a, b)]
+    packages = [run.manifest.environment.packages | _listing(run, PACKAGES, "==", 0) for run in (a, b)]
     return changes(*facts) + changes(*packages)
 
 
-def _listing(file: Path, separator: str, key: int) -> dict[str, str]:
+def _listing(run: Run, name: str, separator: str, key: int) -> dict[str, str]:
     """Lines of two parts as a mapping; empty where an older run has no such file."""
-    if not file.is_file():
+    if not run.has(name):
         return {}
-    pairs = [line.split(separator, 1) for line in file.read_text(encoding="utf-8").splitlines() if separator in line]
+    lines = run.file(name).read_text(encoding="utf-8", errors="replace").splitlines()
+    pairs = [line.split(separator, 1) for line in lines if separator in line]
     return {pair[key]: pair[1 - key] for pair in pairs}
 
 

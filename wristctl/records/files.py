@@ -10,10 +10,10 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from wristctl.errors import OUT, Phrase, UserError, writing
+from wristctl.plain_files import LARGEST_DATA, LINK, NOT_PLAIN, open_plain
 
 # End of the hidden name of a file that is being written.
 PART = ".part"
-LINK, NOT_PLAIN = "is a link, and a run holds files only", "is no plain file"
 # Files whose way to the disk is waited for at the same time.
 _AT_ONCE = 16
 
@@ -81,9 +81,9 @@ def sync_all(paths: Iterable[Path]) -> None:
         list(pool.map(sync, paths))
 
 
-def sha256_of(path: Path) -> str:
-    """SHA-256 of a file."""
-    with path.open("rb") as file:
+def sha256_of(path: Path, largest: int = LARGEST_DATA) -> str:
+    """SHA-256 of a file of at most so many bytes."""
+    with open_plain(path, largest) as file:
         return hashlib.file_digest(file, "sha256").hexdigest()
 
 

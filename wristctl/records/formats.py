@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from wristctl.errors import OUT, Phrase, UserError
+from wristctl.plain_files import LARGEST_DATA, open_plain
 from wristctl.records.files import replacing, write_bytes
 
 if TYPE_CHECKING:
@@ -47,7 +48,8 @@ def read_table(path: Path) -> pd.DataFrame:
     """A CSV file with floats exactly as they were written."""
     import pandas as pd
 
-    return pd.read_csv(path)
+    with open_plain(path, LARGEST_DATA) as file:
+        return pd.read_csv(file)
 
 
 def write_arrays(path: Path, arrays: Mapping[str, np.ndarray]) -> None:
@@ -66,7 +68,7 @@ def read_arrays(path: Path) -> dict[str, np.ndarray]:
     import numpy as np
 
     try:
-        with path.open("rb") as file, zipfile.ZipFile(file) as archive:
+        with open_plain(path, LARGEST_DATA) as file, zipfile.ZipFile(file) as archive:
             if sum(entry.file_size for entry in archive.infolist()) > _LARGEST_SHARE * path.stat().st_size:
                 raise ValueError("what it holds is far larger than the file")
             for entry in archive.infolist():

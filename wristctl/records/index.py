@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from wristctl.errors import OUT, UserError
+from wristctl.plain_files import read_json
 from wristctl.records.lock import lock
 from wristctl.records.manifest import MANIFEST, SUMS, read_overview
 from wristctl.records.run import Run
@@ -49,13 +50,20 @@ def run_names(results: Path) -> list[str]:
     """Names of the run directories of a results folder, oldest first; UserError where it cannot be read."""
     try:
         with os.scandir(results) as listing:
-            return sorted(item.name for item in listing if item.is_dir() and not item.name.startswith((".", DRAWN)))
+            return sorted(item.name for item in listing if _is_folder(item) and not item.name.startswith((".", DRAWN)))
     except FileNotFoundError:
         return []
     except OSError as error:
         raise UserError(
             f"cannot read the results folder: {error.strerror}", str(results), ("name it with ", OUT)
         ) from error
+
+
+def _is_folder(item: os.DirEntry[str]) -> bool:
+    try:
+        return item.is_dir()
+    except OSError:  # a link to itself
+        return False
 
 
 def indexed(results: Path, renew: bool = True) -> list[IndexEntry]:
@@ -101,8 +109,11 @@ def _entry(run: Run) -> IndexEntry:
     try:
         manifest = run.manifest
         metrics = {name: metric.get("value") for name, metric in run.metrics.items()} if state != "broken" else {}
+        overview = read_overview(run.path)
     except UserError as error:
-        return IndexEntry(run.id, "-", "", "broken", dated(run.id), None, error.what)
+        place = Path(error.where.partition(": ")[0])
+        note = f"{place.name}: {error.what}" if place.parent == run.path else error.what
+        return IndexEntry(run.id, "-", "", "broken", dated(run.id), None, note)
     undrawn = f"not drawn: {', '.join(manifest.undrawn)}" if manifest.undrawn else ""
     note = manifest.error.what if manifest.error else undrawn
     timing, inputs = manifest.timing, [record.run for record in manifest.inputs]
@@ -117,7 +128,7 @@ def _entry(run: Run) -> IndexEntry:
         metrics,
         inputs,
         about=manifest.about,
-        chief=next(iter(read_overview(run.path).cards), ""),
+        chief=next(iter(overview.cards), ""),
     )
 
 
@@ -140,7 +151,7 @@ def _stamp(path: str) -> list[int] | None:
 
 def _read_index(results: Path) -> dict[str, Any]:
     try:
-        index = json.loads((results / INDEX).read_bytes())
+        index = read_json(results / INDEX)
         if index["schema"] == _SCHEMA and index["fields"] == list(IndexEntry.__dataclass_fields__):
             runs: dict[str, Any] = dict(index["runs"])
             return runs

@@ -13,6 +13,8 @@ from pathlib import Path
 from typing import Any
 
 LOCK = ".lock"
+# A lock that is a link would make, or hold, a file elsewhere; one that is a pipe would wait.
+_PLAIN = os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC
 _NO_LOCKS = (errno.ENOLCK, errno.EOPNOTSUPP, errno.ENOSYS, errno.EINVAL, errno.EBADF)
 
 
@@ -21,7 +23,7 @@ class RunLock:
 
     def __init__(self, directory: Path) -> None:
         self._path = directory / LOCK
-        self._descriptor = os.open(self._path, os.O_CREAT | os.O_RDWR, 0o666)
+        self._descriptor = os.open(self._path, os.O_CREAT | os.O_RDWR | _PLAIN, 0o666)
         try:
             lock(self._descriptor)
             self._path.stat()  # gone where `runs gc` had the lock before, and took the new folder away
@@ -41,9 +43,9 @@ class RunLock:
 def locked(file: Path) -> Iterator[None]:
     """Within the block no other process has the lock of this file, which is made where it is not there."""
     try:
-        descriptor = os.open(file, os.O_CREAT | os.O_RDWR, 0o666)
+        descriptor = os.open(file, os.O_CREAT | os.O_RDWR | _PLAIN, 0o666)
     except PermissionError:  # another user's: to hold its lock it need not be written
-        descriptor = os.open(file, os.O_RDONLY)
+        descriptor = os.open(file, os.O_RDONLY | _PLAIN)
     try:
         lock(descriptor)
         yield
@@ -63,7 +65,7 @@ def lock(descriptor: int) -> None:
 def is_locked(path: Path) -> bool:
     """Whether a living process holds the lock of a folder or of a file, as far as its file system can tell."""
     try:
-        descriptor = os.open(path / LOCK if path.is_dir() else path, os.O_RDONLY | os.O_NONBLOCK)
+        descriptor = os.open(path / LOCK if path.is_dir() else path, os.O_RDONLY | _PLAIN)
     except OSError:
         return False
     try:
@@ -83,7 +85,7 @@ def delete_folder(directory: Path) -> None:
     """
     descriptor = None
     try:
-        descriptor = os.open(directory / LOCK, os.O_CREAT | os.O_RDWR | os.O_NONBLOCK, 0o666)
+        descriptor = os.open(directory / LOCK, os.O_CREAT | os.O_RDWR | _PLAIN, 0o666)
     except FileNotFoundError:
         return
     except OSError:  # a full disk has no room for a lock, and may have some again after this

@@ -17,6 +17,7 @@ import numpy as np
 
 from wristctl.arrays import Array
 from wristctl.errors import UserError
+from wristctl.plain_files import LARGEST_DATA, open_plain
 from wristctl.records.open_log import OpenLog, Units, read_table, text_of
 from wristctl.records.xlsx import read_sheets
 
@@ -111,9 +112,11 @@ def _arm_of_matlab(file: Path) -> OpenLog:
     from scipy.io.matlab import MatReadError
 
     try:
-        content = loadmat(file)
+        with open_plain(file, LARGEST_DATA) as stream:
+            content = loadmat(stream)  # type: ignore[arg-type]  # its documentation has files too
     except (OSError, ValueError, NotImplementedError, MatReadError) as error:
-        raise UserError(f"cannot read the file of MATLAB: {error}", str(file), "check the path") from error
+        reason = getattr(error, "strerror", None) or error
+        raise UserError(f"cannot read the file of MATLAB: {reason}", str(file), "check the path") from error
     if "ud" in content and "yd" in content:
         rows = np.concatenate([content["ud"], content["yd"]]).T
         return _arm(file, rows.tolist(), range(1, 1 + len(rows)))
@@ -197,11 +200,13 @@ def _spirob(file: Path) -> OpenLog:
     import pandas as pd
 
     try:
-        frame = pd.read_csv(file) if file.suffix == ".csv" else pd.read_parquet(file)
+        with open_plain(file, LARGEST_DATA) as stream:
+            frame = pd.read_csv(stream) if file.suffix == ".csv" else pd.read_parquet(stream)
     except ImportError:
         raise UserError("pandas cannot read parquet files here", str(file), "pip install pyarrow") from None
     except (OSError, ValueError) as error:
-        raise UserError(f"cannot read the recording: {error}", str(file), "check the path") from error
+        reason = getattr(error, "strerror", None) or error
+        raise UserError(f"cannot read the recording: {reason}", str(file), "check the path") from error
     return spirob_log(file, {str(name): column.to_numpy() for name, column in frame.items()})
 
 

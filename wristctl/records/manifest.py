@@ -12,6 +12,8 @@ from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field
 
+from wristctl.plain_files import read_json, unreadable
+
 MANIFEST, SUMS, CONFIG, METRICS, REPORT = "run.json", "SHA256SUMS", "config.yaml", "metrics.json", "report.html"
 SIGNATURE = "SHA256SUMS.sig"
 README, EVENTS, CONSOLE = "README.md", "events.jsonl", "console.log"
@@ -202,12 +204,18 @@ class Overview:
 
 
 def read_overview(folder: Path) -> Overview:
-    """Overview of a run directory. It is empty where the file is missing or unreadable, for it holds no result."""
-    file = folder / OVERVIEW
+    """Overview of a run directory. It is empty where the file is missing or holds none, for it holds no result.
+
+    UserError where it cannot be read.
+    """
+    file, overview = folder / OVERVIEW, None
     try:
-        overview: Any = {} if file.is_symlink() else json.loads(file.read_bytes())
-    except (OSError, ValueError, RecursionError):
-        overview = {}
+        overview = read_json(file, links=False)
+    except OSError as error:
+        if not isinstance(error, FileNotFoundError):
+            raise unreadable(error, file) from error
+    except ValueError:
+        pass
     if not isinstance(overview, dict):
         return Overview()
     answer, cards, captions, marks = (overview.get(name) for name in ("answer", "cards", "captions", "marks"))

@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 
 from wristctl.arrays import Array
 from wristctl.errors import OUT, Phrase, UserError, meant
+from wristctl.plain_files import LARGEST_DATA, open_plain, read_text
 from wristctl.records.files import replacing, sha256_of
 from wristctl.records.manifest import MANIFEST
 from wristctl.records.run import Run
@@ -69,6 +70,8 @@ SYNONYMS: Mapping[str, str] = {
 
 EXAMPLE = "time [s],angle [deg],spool_1 [mm],spool_2 [mm]"
 
+# Most letters of a column's name.
+_LONGEST = 1000
 _HEAD = re.compile(r"\s*(.*?)\s*(?:\[\s*([^]]*?)\s*\])?\s*")
 _TENDON = re.compile(rf"({'|'.join(OF_TENDONS)})_([1-9]\d*)")
 _SCALED = re.compile(r"([-+]?[\d.]+(?:[eE][-+]?\d+)?)\s*(?:x\s*)?(\S*)")
@@ -232,11 +235,13 @@ class _Table:
         import pandas as pd
 
         try:
-            frame = pd.read_parquet(self.file)
+            with open_plain(self.file, LARGEST_DATA) as stream:
+                frame = pd.read_parquet(stream)
         except ImportError:
             raise UserError("pandas cannot read parquet files here", str(self.file), "pip install pyarrow") from None
         except (OSError, ValueError) as error:
-            raise UserError(f"cannot read the {self.what}: {error}", str(self.file), "check the path") from error
+            reason = getattr(error, "strerror", None) or error
+            raise UserError(f"cannot read the {self.what}: {reason}", str(self.file), "check the path") from error
         heads = [str(name) for name in frame.columns]
         columns, words = dict[str, Array](), dict[str, Words]()
         chosen = self._chosen(heads, str(self.file))
@@ -253,6 +258,8 @@ class _Table:
         """Name and factor to SI of the columns that are read, by their places in a line."""
         chosen, missing = dict[int, tuple[str, float]](), dict(self.names)
         for place, cell in enumerate(heads):
+            if len(cell) > _LONGEST:
+                raise UserError(f"a column's name has {len(cell)} letters", where, f"a header such as {EXAMPLE}")
             match = _HEAD.fullmatch(cell)
             written, unit = (match[1], match[2] or "") if match else (cell.strip(), "")
             name = SYNONYMS.get(written, written)
@@ -326,7 +333,7 @@ def _number(cell: str, head: str, where: str) -> float:
 def text_of(file: Path, what: str = "log") -> str:
     """Text of a file, with units in its header where it is a table of a run."""
     try:
-        text = file.read_text(encoding="utf-8-sig")
+        text = read_text(file, LARGEST_DATA, "utf-8-sig")
     except (OSError, UnicodeDecodeError) as error:
         reason = error.strerror if isinstance(error, OSError) else "it is no text in UTF-8"
         problem = f"cannot read the {what}: {reason}"

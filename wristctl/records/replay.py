@@ -38,9 +38,9 @@ class FileComparison(NamedTuple):
 
 def compare_files(before: Path, after: Path) -> FileComparison:
     """Compare two files of the same name by what they hold."""
-    if sha256_of(before) == sha256_of(after):
-        return FileComparison("identical")
     try:
+        if sha256_of(before) == sha256_of(after):
+            return FileComparison("identical")
         match before.suffix:
             case ".csv":
                 return _compare_tables(read_table(before), read_table(after))

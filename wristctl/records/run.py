@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import hashlib
-import json
 import os
+from collections.abc import Iterator
+from contextlib import contextmanager
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
@@ -12,8 +13,9 @@ from typing import TYPE_CHECKING, Any, Literal
 from pydantic import ValidationError
 
 from wristctl.config.study import Study
-from wristctl.errors import Call, UserError, meant
-from wristctl.records.files import LINK, files_below
+from wristctl.errors import Call, UserError, meant, reason_of
+from wristctl.plain_files import LINK, open_plain, read_json, read_plain, unreadable
+from wristctl.records.files import files_below, sha256_of
 from wristctl.records.formats import read_arrays, read_table
 from wristctl.records.lock import is_locked
 from wristctl.records.manifest import CONFIG, MANIFEST, METRICS, SUMS, Manifest, command_of
@@ -24,8 +26,9 @@ from wristctl.records.seal import (
     MISSING,
     faults_of_files,
     faults_of_manifest,
+    largest,
 )
-from wristctl.sha256sums import read_seal, unreadable
+from wristctl.sha256sums import read_seal
 from wristctl.study_files.load import read_study
 
 if TYPE_CHECKING:
@@ -45,6 +48,7 @@ class Run:
     def __init__(self, path: Path) -> None:
         full_path = Path(os.path.abspath(path))
         self.path = full_path.parent.resolve() / full_path.name  # a link stays one: what is deleted is the link
+        self._asked: list[str] = []  # files, in the order in which they were asked for
 
     @property
     def id(self) -> str:
@@ -58,9 +62,9 @@ class Run:
         # the sum first: a run that ends meanwhile writes run.json, and then its sums
         sealed = (read_seal(self.path) or {}).get(MANIFEST)
         try:
-            content = file.read_bytes()
+            content = read_plain(file, links=False)
         except OSError as error:
-            if not isinstance(error, FileNotFoundError | NotADirectoryError | IsADirectoryError):
+            if not isinstance(error, FileNotFoundError | NotADirectoryError):
                 raise unreadable(error, file) from error
             if sealed:
                 raise UserError(MISSING, str(file), _RESTORE) from error
@@ -100,19 +104,15 @@ class Run:
     @cached_property
     def config(self) -> Study:
         """The resolved study it ran."""
-        return read_study([self.path / CONFIG], note=False)[0]
+        return read_study([self.file(CONFIG)], note=False)[0]
 
     @property
     def metrics(self) -> dict[str, dict[str, Any]]:
         """metrics.json: value, unit, better, n, interval and meaning by name; empty without one."""
-        file = self.path / METRICS
-        again = ("run `", Call(command_of(self.kind)), "` again")
-        try:
-            content = json.loads(file.read_bytes()) if file.is_file() else {}
-        except (ValueError, RecursionError) as error:
-            raise UserError("not valid JSON", str(file), again) from error
+        content = self.json(METRICS) if self.has(METRICS) else {}
         if not isinstance(content, dict) or not all(map(_is_metric, content.values())):
-            raise UserError("no table of metrics", str(file), again)
+            again = ("run `", Call(command_of(self.kind)), "` again")
+            raise UserError("no table of metrics", str(self.path / METRICS), again)
         return content
 
     @property
@@ -128,14 +128,55 @@ class Run:
         """The arrays of data/<name>.npz."""
         return read_arrays(self.file(f"data/{name}.npz"))
 
+    def has(self, name: str) -> bool:
+        """Whether there is something of this name, be it a file that can be read or not."""
+        return os.path.lexists(self.path / name)
+
     def file(self, name: str) -> Path:
-        """The path of one of its files; UserError where there is none, or a link, which may lead anywhere."""
+        """Path of one of its files; UserError where there is none, or it is no plain one: a link leads anywhere."""
         path = self.path / name
         if any(part.is_symlink() for part in (path, *path.parents[: len(Path(name).parts) - 1])):
             raise UserError(LINK, str(path), _RESTORE)
-        if not path.is_file():
-            raise UserError(f"run {self.id} has no file {name}", str(self.path), meant(name, files_below(self.path)))
+        sealed = next((output.bytes for output in self.manifest.outputs if output.path == name), 0)
+        try:
+            open_plain(path, max(sealed, largest(name)), links=False).close()
+        except (FileNotFoundError, NotADirectoryError):
+            fix = meant(name, files_below(self.path))
+            raise UserError(f"run {self.id} has no file {name}", str(self.path), fix) from None
+        except OSError as error:
+            raise unreadable(error, path) from error
+        if name != CONFIG:  # which is checked when it is read
+            self._asked.append(name)
         return path
+
+    @contextmanager
+    def reading(self) -> Iterator[None]:
+        """A block that reads files of the run: what they lack is the user's error, which names them."""
+        before = len(self._asked)
+        try:
+            yield
+        except (UserError, MemoryError):
+            raise
+        except Exception as error:
+            names = list(dict.fromkeys(self._asked[before:]))
+            if not names:
+                raise
+            sums = read_seal(self.path) or {}
+            changed = [name for name in names if sums.get(name, "") not in ("", sha256_of(self.path / name))]
+            problem = CHANGED if changed else f"does not hold what wristctl reads there: {reason_of(error)}"
+            places = [str(self.path / name) for name in changed or names]
+            raise UserError(problem, ", ".join(places), _RESTORE, exit_code=3) from error
+
+    def json(self, name: str) -> Any:
+        """Content of one of its JSON files. Raises UserError."""
+        file = self.file(name)
+        try:
+            return read_json(file, links=False)
+        except OSError as error:
+            raise unreadable(error, file) from error
+        except ValueError as error:
+            again = ("restore it, or run `", Call(command_of(self.kind)), "` again")
+            raise UserError("not valid JSON", str(file), again) from error
 
     def check(self) -> None:
         """Hash every file again; UserError naming run.json, or else the first that is missing or not as sealed."""
@@ -153,14 +194,14 @@ class Run:
         sums = read_seal(self.path)
         if sums is None:
             raise UserError("run is not sealed", str(self.path), "use a run that has ended")
-        faults = faults_of_files(self.path, sums)
-        if any(name == MANIFEST for name, _ in faults):
-            return faults
         self.__dict__.pop("manifest", None)
         try:
-            return sorted(faults + faults_of_manifest(self.path, sums, self.manifest))
+            manifest = self.manifest
         except UserError as error:
-            return sorted([*faults, (MANIFEST, error.what)])
+            faults = faults_of_files(self.path, sums, None)
+            known = any(name == MANIFEST for name, _ in faults)
+            return faults if known else sorted([*faults, (MANIFEST, error.what)])
+        return sorted(faults_of_files(self.path, sums, manifest) + faults_of_manifest(self.path, sums, manifest))
 
 
 def _is_metric(value: object) -> bool:

@@ -6,10 +6,11 @@ can seal a directory anew, which is what `wristctl runs sign` and `verify --sign
 
 import os
 import stat
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 
-from wristctl.records.files import LINK, NOT_PLAIN, PART, files_below, sha256_of, sha256_of_list, sync, write_text
+from wristctl.plain_files import LARGEST, LARGEST_DATA, LINK, NOT_PLAIN
+from wristctl.records.files import PART, files_below, sha256_of, sha256_of_list, sync, write_text
 from wristctl.records.lock import LOCK
 from wristctl.records.manifest import CONFIG, MANIFEST, PACKAGES, SIGNATURE, SOURCES, SUMS, Manifest
 
@@ -22,6 +23,9 @@ ADDED, ADDED_FOLDER = "file was added after sealing", "folder was added after se
 SIGNING = f".{SIGNATURE}{PART}"
 # Files of a run outside its seal. A lock remains where a process was killed at the very end.
 _BESIDE = (SUMS, SIGNATURE, SIGNING, LOCK)
+
+# Folders of a run whose files may be large.
+_LARGE = ("data", "models", "inputs")
 
 # A path in the run directory, and what is wrong with it.
 Fault = tuple[str, str]
@@ -63,9 +67,13 @@ def added(folder: Path, sums: dict[str, str]) -> list[str]:
     return sorted(name for name, _ in entries(folder) if name not in sums and name not in _BESIDE)
 
 
-def faults_of_files(folder: Path, sums: dict[str, str]) -> list[Fault]:
-    """Files that differ from the seal, each with its fault."""
+def faults_of_files(folder: Path, sums: Mapping[str, str], manifest: Manifest | None) -> list[Fault]:
+    """Files that differ from the seal, each with its fault.
+
+    A file of another size than the manifest says, where there is one, is not hashed, nor one too large for its name.
+    """
     faults, present = [], set()
+    sizes = {output.path: output.bytes for output in manifest.outputs} if manifest else {}
     for name, kind in entries(folder):
         present.add(name)
         if kind in ("link", "odd"):
@@ -73,7 +81,7 @@ def faults_of_files(folder: Path, sums: dict[str, str]) -> list[Fault]:
         elif name in sums:
             if kind == "folder":
                 faults.append((name, NOT_PLAIN))
-            elif sha256_of(folder / name) != sums[name]:
+            elif not _is_sealed(folder, name, sums[name], sizes.get(name)):
                 faults.append((name, CHANGED))
         elif name not in _BESIDE:
             faults.append((name, ADDED_FOLDER if kind == "folder" else ADDED))
@@ -82,7 +90,20 @@ def faults_of_files(folder: Path, sums: dict[str, str]) -> list[Fault]:
     return sorted(faults)
 
 
-def faults_of_manifest(folder: Path, sums: dict[str, str], manifest: Manifest) -> list[Fault]:
+def largest(name: str) -> int:
+    """Most bytes of a file of a run by its name, unless its manifest says more."""
+    return LARGEST_DATA if name.split("/")[0] in _LARGE else LARGEST
+
+
+def _is_sealed(folder: Path, name: str, digest: str, size: int | None) -> bool:
+    """Whether a file is the one that was sealed, which had this size where that is known."""
+    now = (folder / name).stat().st_size
+    if now > largest(name) if size is None else now != size:
+        return False
+    return sha256_of(folder / name, now) == digest
+
+
+def faults_of_manifest(folder: Path, sums: Mapping[str, str], manifest: Manifest) -> list[Fault]:
     """Contradictions between the seal and the hashes of outputs and result in the manifest."""
     faults = []
     if manifest.id != folder.name:

@@ -11,13 +11,15 @@ import subprocess
 from pathlib import Path
 from typing import NamedTuple
 
-from wristctl.errors import Call, UserError, error_of_the_system
+from wristctl.errors import Call, UserError
+from wristctl.plain_files import open_plain, read_plain, unreadable
 from wristctl.records.files import write_text
 from wristctl.records.manifest import SIGNATURE, SUMS
 from wristctl.records.run import Run
 
 # A signature made for another purpose does not count.
 NAMESPACE = "wristctl-run"
+_KEY = "name a private SSH key: ssh-keygen -t ed25519 makes one"
 
 
 class RunSignature(NamedTuple):
@@ -34,11 +36,13 @@ def sign(run: Run, key: Path) -> RunSignature:
     UserError where that is not so, or ssh-keygen refuses.
     """
     run.check()
+    try:
+        open_plain(key).close()  # ssh-keygen would wait for a pipe
+    except OSError as error:
+        raise UserError(f"cannot sign: {error.strerror}", str(key), _KEY) from error
     process = _ssh_keygen("sign", "-q", "-f", str(key), "-n", NAMESPACE, content=_content(run.path / SUMS))
     if process.returncode != 0:
-        raise UserError(
-            f"cannot sign: {_error_text(process)}", str(key), "name a private SSH key: ssh-keygen -t ed25519 makes one"
-        )
+        raise UserError(f"cannot sign: {_error_text(process)}", str(key), _KEY)
     write_text(run.path / SIGNATURE, process.stdout.decode())
     return signature(run, None)
 
@@ -55,6 +59,7 @@ def signature(run: Run, signers: Path | None) -> RunSignature:
     if not is_signed(run):
         raise UserError("run is not signed", str(run.path), ("ask whoever made it to run `", Call("runs sign"), "`"))
     content = _content(run.path / SUMS)
+    _content(file)  # ssh-keygen would wait for a pipe
     valid = _ssh_keygen("check-novalidate", "-n", NAMESPACE, "-s", str(file), content=content)
     match = re.search(r"key (SHA256:\S+)", valid.stdout.decode(errors="replace"))
     if valid.returncode != 0 or not match:
@@ -81,9 +86,9 @@ def _ssh_keygen(action: str, *options: str, content: bytes = b"") -> subprocess.
 
 def _content(file: Path) -> bytes:
     try:
-        return file.read_bytes()
+        return read_plain(file)
     except OSError as error:
-        raise (error_of_the_system(error, file) or error) from error
+        raise unreadable(error, file) from error
 
 
 def _error_text(process: subprocess.CompletedProcess[bytes]) -> str:

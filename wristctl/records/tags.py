@@ -7,6 +7,7 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from wristctl.errors import UserError
+from wristctl.plain_files import read_json
 from wristctl.records.files import write_text
 from wristctl.records.lock import locked
 
@@ -18,11 +19,12 @@ _log = logging.getLogger(__name__)
 def read_tags(results: Path) -> dict[str, list[str]]:
     """Tags by run id; UserError where the file is damaged."""
     try:
-        content = json.loads((results / TAGS).read_bytes())
+        content = read_json(results / TAGS)
     except FileNotFoundError:
         return {}
-    except (OSError, ValueError, RecursionError) as error:
-        raise UserError(f"cannot read the tags: {error}", str(results / TAGS), "mend or delete it") from error
+    except (OSError, ValueError) as error:
+        reason = error.strerror if isinstance(error, OSError) else error
+        raise UserError(f"cannot read the tags: {reason}", str(results / TAGS), "mend or delete it") from error
     if isinstance(content, dict) and all(_is_list_of_tags(tags) for tags in content.values()):
         return content
     raise UserError("the tags are no lists by run id", str(results / TAGS), "mend or delete it")

@@ -6,6 +6,7 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 from wristctl.errors import UserError
+from wristctl.plain_files import LARGEST_DATA, open_plain
 
 _MAIN = "{http://schemas.openxmlformats.org/spreadsheetml/2006/main}"
 _LINK = "{http://schemas.openxmlformats.org/officeDocument/2006/relationships}id"
@@ -18,7 +19,7 @@ def read_sheets(file: Path) -> dict[str, list[list[str]]]:
     Raises UserError for a file that is no workbook.
     """
     try:
-        with zipfile.ZipFile(file) as archive:
+        with open_plain(file, LARGEST_DATA) as stream, zipfile.ZipFile(stream) as archive:
             shared = _shared(archive)
             links = ElementTree.fromstring(archive.read("xl/_rels/workbook.xml.rels"))
             targets = {link.get("Id"): str(link.get("Target")) for link in links}

@@ -10,7 +10,8 @@ from wristctl.config.former_names import key_today
 from wristctl.config.given_files import beside, names_a_file
 from wristctl.config.leaves import named_by
 from wristctl.config.study import Study
-from wristctl.errors import Phrase, Setting, UserError, meant
+from wristctl.errors import Phrase, Setting, UserError, fix_to_read, meant
+from wristctl.plain_files import read_plain
 from wristctl.plugins.places import check_trust, check_within, placed
 from wristctl.plugins.trust import asking
 from wristctl.study_files.error_messages import explained
@@ -27,6 +28,8 @@ from wristctl.study_files.strict_yaml import Document, KeyPath, parse_yaml
 
 # The key of a study file that names others, which are read before it.
 INCLUDE = "include"
+# Study files of a folder that are named.
+_NAMED = 5
 
 
 def load_study(
@@ -111,9 +114,10 @@ def _merge_file(
 
 def _read(file: Path) -> Document:
     try:
-        text = file.read_bytes()
+        text = read_plain(file)
     except OSError as error:
-        raise UserError(f"cannot read the configuration: {error.strerror}", str(file), "check the path") from error
+        problem = f"cannot read the configuration: {error.strerror}"
+        raise UserError(problem, str(file), _studies_in(file) or fix_to_read(error)) from error
     document = parse_yaml(text, str(file))
     if document.data is not None and not isinstance(document.data, dict):
         raise UserError(
@@ -122,6 +126,16 @@ def _read(file: Path) -> Document:
             f"one of {', '.join(keys_of(Study))} at the top",
         )
     return document
+
+
+def _studies_in(folder: Path) -> str:
+    """Advice on a folder that was named as a study file: the first of the study files in it."""
+    try:
+        names = sorted(file.name for file in folder.iterdir() if file.suffix in (".yaml", ".yml"))
+    except OSError:
+        return ""
+    more = f" and {len(names) - _NAMED} more" if len(names) > _NAMED else ""
+    return f"name a study file in it: {', '.join(names[:_NAMED])}{more}" if names else "it holds no study file"
 
 
 def _whole(document: Document, file: Path | None) -> Document:

@@ -94,7 +94,7 @@ def first_course(run: Run) -> BendCourse | None:
     number, name = done.iloc[0]["trial"], str(done.iloc[0]["direction"])
     followed = bend_motion_of(run.config.hw_run, run.config.wrist, name)
     course = logged_course(log[log["trial"] == number], followed, run.config.wrist)
-    if not (run.path / "data/truth.csv").is_file():
+    if not run.has("data/truth.csv"):
         return course
     truth = run.data("truth")
     return true_course(course, truth[truth["trial"] == number])

@@ -1,6 +1,5 @@
 """A rig's calibration as a run keeps it: what stays true of the rig, and where its motors stood."""
 
-import json
 from dataclasses import dataclass
 from typing import Any, Self
 
@@ -9,6 +8,7 @@ from wristctl.board.driver import Board
 from wristctl.config.hw_run import CalibrateWristSettings
 from wristctl.config.wrist import WristParameters
 from wristctl.errors import UserError
+from wristctl.plain_files import read_json
 from wristctl.records import Run
 from wristctl.trial.homing import SpatialZero, Zero, find_zero, slacken
 from wristctl.trial.motors_ready import in_sight, prepare
@@ -39,7 +39,7 @@ class WristCalibration:
         """Read a calibrate-wrist run. Raises UserError."""
         file = run.file(FILE)
         try:
-            table = json.loads(file.read_text(encoding="utf-8"))
+            table = read_json(file)
             if table["schema"] != SCHEMA:
                 raise ValueError(table["schema"])
             signs, slopes, slack = (tuple(table[name]) for name in ("signs", "steps_per_radian", "slack"))

@@ -4,13 +4,13 @@ Every tick has a value of each residual. One that is beyond its limit for long e
 near it is worth a word. Both are computed from values and limits alone, so that a run's files give them again.
 """
 
-import json
 import math
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
 from wristctl.config.hw_run import HwRunSettings
+from wristctl.plain_files import read_json
 
 
 class Shown(NamedTuple):
@@ -281,7 +281,7 @@ def plain(limits: Sequence[Limit]) -> dict[str, Any]:
 
 def load(file: Path) -> tuple[Limit, ...]:
     """Read what `plain` has given. Raises OSError, ValueError and KeyError."""
-    table = json.loads(file.read_text(encoding="utf-8"))
+    table = read_json(file)
     if table["schema"] != SCHEMA:
         raise ValueError(table["schema"])
     limits = []

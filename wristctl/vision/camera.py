@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wristctl.errors import UserError
+from wristctl.plain_files import read_plain, unreadable
 
 Image = NDArray[np.uint8]
 
@@ -111,7 +112,11 @@ class FolderCamera:
             return None
         file, number = self.files[self._number], self._number
         self._number += 1
-        picture = cv2.imdecode(np.fromfile(file, np.uint8), cv2.IMREAD_GRAYSCALE) if file.stat().st_size else None
+        try:
+            content = np.frombuffer(read_plain(file), np.uint8)
+        except OSError as error:
+            raise CameraError(unreadable(error, file).what, str(file), "put a picture in its place") from error
+        picture = cv2.imdecode(content, cv2.IMREAD_GRAYSCALE) if len(content) else None
         if picture is None:
             raise CameraError("this picture cannot be decoded", str(file), "remove it from the folder, or replace it")
         return Frame(grey_of(picture), number / self.frame_rate, number)

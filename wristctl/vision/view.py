@@ -14,6 +14,7 @@ import numpy as np
 from wristctl.arrays import Array
 from wristctl.config.camera import SceneSettings
 from wristctl.errors import UserError
+from wristctl.plain_files import read_json
 
 if TYPE_CHECKING:
     from wristctl.records import Run
@@ -78,7 +79,7 @@ class View:
     def load(cls, file: Path) -> Self:
         """Read what `save` wrote. Raises UserError."""
         try:
-            arrays = json.loads(file.read_text(encoding="utf-8"))
+            arrays = read_json(file)
             if arrays["schema"] != SCHEMA:
                 raise ValueError(arrays["schema"])
             matrix, distortion, plane = (np.array(arrays[name], float) for name in _ARRAYS)

@@ -9,6 +9,7 @@ from wristctl.board.emulator.chip import CONSTANTS, FLASH_WORDS, Chip
 from wristctl.board.emulator.instructions import PATTERNS, Op
 from wristctl.board.emulator.registers import RAMPZ, SPMCSR
 from wristctl.errors import UserError
+from wristctl.plain_files import read_text
 
 _POINTER = {"X": 26, "Y": 28, "Z": 30}
 # Order of an instruction's operands by their letters.
@@ -109,7 +110,7 @@ _DATA, _END, _SEGMENT, _START_SEGMENT, _LINEAR, _START_LINEAR = range(6)
 def read_hex(path: Path) -> dict[int, bytes]:
     """The records of a file: byte address -> bytes. UserError for a file that is not one, naming the line."""
     try:
-        lines = path.read_text(encoding="ascii").splitlines()
+        lines = read_text(path, encoding="ascii").splitlines()
     except (OSError, UnicodeDecodeError) as error:
         raise UserError(f"cannot read the program: {error}", str(path), "name an Intel hex file") from error
     records: dict[int, bytes] = {}

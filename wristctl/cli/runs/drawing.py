@@ -195,4 +195,6 @@ def export(
     """
     from wristctl.commands.export.run_data import export_run
 
-    say(export_run(open_run(ref, out), to, file))
+    run = open_run(ref, out)
+    with run.reading():
+        say(export_run(run, to, file))

@@ -18,6 +18,7 @@ from wristctl.records.find import entries
 
 if TYPE_CHECKING:
     from wristctl.identification.rig_trend import Reading, Trend
+    from wristctl.records import Run
 
 # Exit code where something drifts, and runs whose values are printed.
 DRIFT, _SHOWN = 3, 8
@@ -40,14 +41,14 @@ def trend(
     Reads what hw-run, calibrate-wrist and identify runs have measured, in order of time: stiffness, spool steps per
     radian, slack and friction at homing, the marker's zero. Control errors hide such drifts.
     """
-    from wristctl.identification.rig_trend import check_one_rig, reading_of, trends_of
+    from wristctl.identification.rig_trend import check_one_rig, trends_of
 
     names = refs or [entry.id for entry in entries(out) if entry.kind == "hw-run" and entry.state == "ok"]
     if not names:
         raise UserError("no hw-run run that ended ok", str(out), "run trials first: wristctl hw-run")
     runs = list({run.id: run for run in (require(name, None, out) for name in names)}.values())
     check_one_rig(runs)
-    readings = sorted(map(reading_of, runs), key=lambda reading: reading.time)
+    readings = sorted(map(_read, runs), key=lambda reading: reading.time)
     trends = trends_of(readings, per == "day")
     drifting = [line for line in trends if line.drifts]
     if as_json:
@@ -67,6 +68,13 @@ def trend(
             say(f"Every quantity with its line: {figure}")
     if drifting:
         raise typer.Exit(DRIFT)
+
+
+def _read(run: Run) -> Reading:
+    from wristctl.identification.rig_trend import reading_of
+
+    with run.reading():
+        return reading_of(run)
 
 
 def _answer(trends: Sequence[Trend], runs: int, per: str) -> list[str]:

@@ -21,6 +21,7 @@ from wristctl.commands.printed_table import Table
 from wristctl.commands.procedure import inputs_of, procedure_of
 from wristctl.commands.progress import no_event
 from wristctl.errors import UserError
+from wristctl.plain_files import UNREADABLE, unreadable
 from wristctl.plugins.places import check_trust
 from wristctl.plugins.trust import asking
 from wristctl.processes import NO_HARDWARE, end_with_parent
@@ -33,7 +34,6 @@ from wristctl.records.removal import SCRATCH
 from wristctl.records.replay import ReplayVerdict, causes, changed_inputs, verdicts
 from wristctl.records.signature import RunSignature, is_signed, signature
 from wristctl.records.signature import sign as sign_run
-from wristctl.sha256sums import UNREADABLE, unreadable
 from wristctl.study_files.load import read_study
 
 # Number of runs from which progress is shown.
@@ -183,14 +183,18 @@ def replay(
 
 
 def _replay(run: Run, overrides: list[str], as_json: bool) -> None:
-    if run.state != "ok":
-        raise UserError(f"run is {run.state}, not ok", str(run.path), "repeat a run that ended ok")
+    state = run.state
+    run.manifest  # noqa: B018 - raises where it cannot be read
+    if state != "ok":
+        raise UserError(f"run is {state}, not ok", str(run.path), "repeat a run that ended ok")
     inputs = inputs_of(run)
     check_trust(leaves_of(run), run.path / CONFIG)
     study, _ = read_study([run.path / CONFIG], overrides, run.kind, note=False)  # the repetition notes former names
     if getattr(getattr(study, run.kind.replace("-", "_")), "port", None) is not None:
         fix = "look at it: wristctl runs report; or do the experiment anew by its own command, with a person at the rig"
         raise UserError("a repetition never moves real motors", str(run.path), fix, exit_code=3)
+    for output in run.manifest.outputs:
+        run.file(output.path)
     changed = changed_inputs(run)
     if changed:
         return _conclude(run, None, [], changed, as_json)

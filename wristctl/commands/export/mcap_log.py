@@ -106,7 +106,7 @@ def _film(writer: Writer, run: Run, name: str, tables: Tables) -> int:
     """The pictures of a video, whose times stand in raw.csv; how many there are."""
     import cv2
 
-    if "raw" not in tables or not (run.path / f"data/{name}.avi").is_file():
+    if "raw" not in tables or not run.has(f"data/{name}.avi"):
         return 0
     seconds, capture = tables["raw"][0]["clock"].tolist(), cv2.VideoCapture(str(run.file(f"data/{name}.avi")))
     channel, count = _channel(writer, f"/{run.kind}/{name}_video", "foxglove.CompressedImage", _PICTURE), 0

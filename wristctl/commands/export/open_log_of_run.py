@@ -38,7 +38,7 @@ def open_log_of(run: Run) -> OpenLog:
     """Motions of a run, one after the other. Raises UserError for a run that holds none."""
     if (run.path / "data").is_dir():
         for name, convert in _CONVERTED.items():
-            if (run.path / "data" / name).is_file():
+            if run.has(f"data/{name}"):
                 columns, words = convert(run)
                 return OpenLog(run.path, "log", columns, words)
     problem = f"a {run.kind} run holds no motion over time"

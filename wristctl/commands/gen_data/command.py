@@ -192,15 +192,13 @@ def _courses_of(source: Given) -> list[RecordedCourse]:
 def _kept(source: Given) -> list[tuple[str, Mapping[str, Any]]]:
     """Every table and every set of arrays of a run by its name, or what a result would have written of that."""
     if isinstance(source, Run):
-        from wristctl.records.formats import read_arrays, read_table
-
         folder = source.path / "data"
-        frames = [(file.stem, read_table(file)) for file in sorted(folder.glob("*.csv"))]
+        frames = [(file.stem, source.data(file.stem)) for file in sorted(folder.glob("*.csv"))]
         tables = [
             (table_name, {str(name): column.to_numpy() for name, column in frame.items()})
             for table_name, frame in frames
         ]
-        return [*tables, *((file.stem, read_arrays(file)) for file in sorted(folder.glob("*.npz")))]
+        return [*tables, *((file.stem, source.array(file.stem)) for file in sorted(folder.glob("*.npz")))]
     return list(source.courses().items())
 
 

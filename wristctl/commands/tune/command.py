@@ -283,7 +283,7 @@ def _known(session: Session, name: str) -> Tried | None:
     from wristctl.tuning.search import tried_of
 
     stopped = session.inputs.runs().get("resume")
-    if stopped is None or not (stopped.path / f"data/history-{name}.csv").exists():
+    if stopped is None or not stopped.has(f"data/history-{name}.csv"):
         return None
     return tried_of(stopped.data(f"history-{name}"), list(controller(name).gains))
 
