@@ -79,7 +79,9 @@ def test_lineage_is_a_tree_and_its_users_as_lines_or_as_an_object(call: Call, da
     assert call("runs", "lineage", network.id)[1].splitlines() == tree
     assert call("runs", "lineage", data.id)[1].splitlines() == [f"{data.id} (ok)", f"used by {network.id}"]
     told = json.loads(call("runs", "lineage", network.id, "--json")[1])
-    assert told["lineage"]["inputs"][0]["id"] == data.id and told["dependents"] == []
+    first, second = told["lineage"]
+    assert first["id"] == network.id and first["inputs"] == [{"role": "data", "id": data.id}]
+    assert (second["id"], second["inputs"], told["dependents"]) == (data.id, [], [])
 
 
 def test_verify_tells_of_each_run_whether_it_is_as_sealed(call: Call, data: Run, network: Run) -> None:

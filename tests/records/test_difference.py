@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import shutil
 from pathlib import Path
 
@@ -10,11 +11,13 @@ import pytest
 
 from wristctl.config.study import Study
 from wristctl.errors import UserError
+from wristctl.plotting.page import lineage_picture
 from wristctl.records import InputRun, Run, start_run
+from wristctl.records.archive import with_ancestors
 from wristctl.records.difference import Change, changes, difference
 from wristctl.records.find import entries
 from wristctl.records.lineage import Ancestor, ancestry, dependents, input_run
-from wristctl.records.manifest import Code
+from wristctl.records.manifest import Code, Input
 from wristctl.records.removal import removable, remove
 from wristctl.records.replay import changed_inputs
 from wristctl.records.tags import change_tags, read_tags
@@ -163,3 +166,37 @@ def test_lineage_goes_back_to_the_data_and_forward_to_what_was_built_on_it(resul
 def test_a_running_run_cannot_be_removed(results: Path) -> None:
     with start_run("tune", Study(), "", results) as live, pytest.raises(UserError, match="still going on"):
         removable([Run(live.path)], force=True)
+
+
+@pytest.mark.slow
+def test_runs_that_share_their_inputs_are_each_visited_once(results: Path) -> None:
+    """24 layers of two runs, each made from both of the layer before it: 2^24 ways lead back."""
+    layers = [[_run(results, "gen-data", Study())]]
+    for _ in range(24):
+        inputs = {f"data[{k}]": run for k, run in enumerate(layers[-1])}
+        layers.append([_run(results, "train", Study(), inputs=inputs) for _ in range(2)])
+    last, visited = layers[-1][0], 2 * 24
+    tree = ancestry(last)
+    assert len(tree.runs()) == visited and tree.runs()[-1] is tree and len(tree.plain()) == visited
+    lines = list(tree.lines())
+    assert len(lines) == 2 * visited - 3 and sum(line.endswith(" - as above") for line in lines) == 2 * 22
+    assert lineage_picture(tree).count("<title>") == visited
+    assert {run.id for run in with_ancestors(last)} == {one.id for one in tree.runs()}
+
+
+@pytest.mark.slow
+def test_a_chain_of_runs_may_be_as_long_as_it_likes(results: Path) -> None:
+    """1,500 runs, by their manifests alone."""
+    first = _run(results, "train", Study())
+    manifest, before = first.manifest, first.id
+    for number in range(1500):
+        result = first.result_hash if number == 0 else ""
+        record = Input(role="data", kind="train", run=before, path=str(results / before), result_sha256=result)
+        before = f"20260101T000000Z-train-{number}"
+        (results / before).mkdir()
+        content = manifest.model_copy(update={"id": before, "inputs": [record], "result_sha256": None})
+        (results / before / "run.json").write_text(content.model_dump_json(by_alias=True))
+    tree = ancestry(Run(results / before))
+    assert len(tree.runs()) == 1501 and tree.runs()[0].id == first.id
+    assert list(tree.lines())[-1].endswith(f"└─ data: {first.id} (ok)")
+    assert len(json.loads(json.dumps(tree.plain()))) == 1501 and lineage_picture(tree).count("<title>") == 1501

@@ -60,10 +60,11 @@ def lineage_picture(tree: Ancestor) -> str:
     """SVG markup: each run once, as far left as what it was made from allows; empty where there is nothing behind."""
     if not tree.inputs:
         return ""
-    nodes: dict[str, Ancestor] = {}
-    edges: dict[tuple[str, str], str] = {}
-    _collect(tree, nodes, edges)
-    columns = {name: _depth(node) for name, node in nodes.items()}
+    nodes = {node.id: node for node in tree.runs()}
+    edges = dict.fromkeys((ancestor.id, node.id) for node in nodes.values() for ancestor in node.inputs)
+    columns = dict[str, int]()
+    for name, node in nodes.items():  # after its inputs
+        columns[name] = max((1 + columns.get(ancestor.id, 0) for ancestor in node.inputs), default=0)
     rows: dict[str, int] = {}
     for name in sorted(nodes, key=lambda name: (columns[name], name)):
         rows[name] = sum(columns[other_name] == columns[name] for other_name in rows)
@@ -76,17 +77,6 @@ def lineage_picture(tree: Ancestor) -> str:
         f'<svg class="lineage" viewBox="0 0 {width} {height}" width="{width}" height="{height}" role="img" '
         f'aria-label="lineage">{"".join(parts)}</svg>'
     )
-
-
-def _collect(node: Ancestor, nodes: dict[str, Ancestor], edges: dict[tuple[str, str], str]) -> None:
-    nodes[node.id] = node
-    for ancestor in node.inputs:
-        edges[ancestor.id, node.id] = ancestor.role
-        _collect(ancestor, nodes, edges)
-
-
-def _depth(node: Ancestor) -> int:
-    return 1 + max(map(_depth, node.inputs)) if node.inputs else 0
 
 
 def _arrow(start: tuple[int, int], end: tuple[int, int]) -> str:

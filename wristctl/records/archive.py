@@ -21,7 +21,7 @@ from wristctl.errors import FILE, UserError, writing
 from wristctl.plain_files import LARGEST_DATA, read_plain, unreadable
 from wristctl.records.files import PART, replacing, sync, sync_all
 from wristctl.records.index import dated
-from wristctl.records.lineage import input_run
+from wristctl.records.lineage import each_once, input_run
 from wristctl.records.lock import LOCK, RunLock
 from wristctl.records.manifest import SIGNATURE, SUMS
 from wristctl.records.run import Run
@@ -44,21 +44,17 @@ def with_ancestors(run: Run) -> list[Run]:
 
     Raises UserError where one is gone, has not ended, is not as it was sealed, or is not what was read then.
     """
-    collected: dict[Path, Run] = {}
 
-    def add(one: Run, users: tuple[Path, ...]) -> None:
+    def inputs(one: Run) -> Iterator[Run]:
         one.check()
         for record in one.manifest.inputs:
             behind = input_run(one, record)
             if behind.result_hash != record.result_sha256:
                 problem = f"the {record.role} run has another result than the one that was read"
                 raise UserError(problem, str(behind.path), "bring back the run that was read", exit_code=3)
-            if behind.path not in (one.path, *users):
-                add(behind, (one.path, *users))
-        collected.setdefault(one.path, one)
+            yield behind
 
-    add(run, ())
-    return list(collected.values())
+    return list(each_once(run, lambda one: one.path, inputs).values())
 
 
 def pack(run: Run, file: Path) -> list[Run]:

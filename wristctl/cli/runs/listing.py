@@ -235,7 +235,7 @@ def lineage(ref: Ref, out: Out = RESULTS, as_json: Json = False, debug: Debug = 
     run = open_run(ref, out)
     tree, users = ancestry(run), dependents(run, run.path.parent)
     if as_json:
-        shown = {"schema": "wristctl.lineage/1", "lineage": asdict(tree), "dependents": users}
+        shown = {"schema": "wristctl.lineage/2", "lineage": tree.plain(), "dependents": users}
         print(json.dumps(shown, indent=2))
         return
     for line in tree.lines():
