@@ -28,6 +28,8 @@ from numba.core.caching import CompileResultCacheImpl, FunctionCache, UserProvid
 from numba.core.registry import CPUDispatcher
 from numba.extending import overload
 
+from wristctl.lanes.kernel_folder import kernels_folder, own_folder
+
 _PACKAGE = Path(__file__).resolve().parents[1]
 
 
@@ -93,45 +95,6 @@ def _told(value: Any) -> bytes:
         return repr(value).encode()
 
 
-# Environment variable that names another folder.
-NAMED = "WRISTCTL_KERNELS"
-_SHARED = ("nfs", "nfs4", "lustre", "gpfs", "beegfs", "cifs", "smb3", "ceph", "afs", "panfs", "glusterfs", "fuse.sshfs")
-_MOUNTS = Path("/proc/self/mounts")
-
-
-def kernels_folder() -> Path:
-    """The folder, which may not be there yet. PermissionError where another user has taken its place."""
-    if named := os.environ.get(NAMED):
-        return Path(named)
-    usual = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "wristctl" / "kernels"
-    return _of_this_machine() if is_shared(usual) else usual
-
-
-def is_shared(folder: Path) -> bool:
-    """Whether a folder lies on a file system of a network."""
-    try:
-        mounts = [line.split()[1:3] for line in _MOUNTS.read_text(encoding="utf-8").splitlines()]
-    except OSError:
-        return False
-    place = folder.resolve()
-    below = [(len(point), kind) for point, kind in mounts if place.is_relative_to(_unescaped(point))]
-    return bool(below) and max(below)[1] in _SHARED
-
-
-def _unescaped(point: str) -> str:
-    return point.encode().decode("unicode_escape") if "\\" in point else point
-
-
-def _of_this_machine() -> Path:
-    """Folder of this machine's own file system, which the user alone may write: its files are run."""
-    folder = Path(tempfile.gettempdir()) / f"wristctl-kernels-{os.getuid()}"
-    folder.mkdir(mode=0o700, exist_ok=True)
-    status = folder.lstat()
-    if status.st_uid != os.getuid() or status.st_mode & 0o022 or folder.is_symlink():
-        raise PermissionError(f"{folder} is not this user's alone")
-    return folder
-
-
 F = TypeVar("F", bound=Callable[..., Any])
 
 # The numba that the tests ran with. What lanes are built on (docs/lanes.md) may be another thing in the next one.
@@ -194,8 +157,10 @@ def cache_folder(file: Path, *extra_sources: Path, frozen: bytes = b"") -> Path 
     for source in sorted({path for root in (file, *extra_sources) for path in sources(root)}, key=_named):
         digest.update(repr((_named(source), _read(source)[0])).encode())
     try:
-        folder = _kernels() / digest.hexdigest()[:16]
-        folder.mkdir(parents=True, exist_ok=True)
+        base = _kernels()
+        folder = base and base / digest.hexdigest()[:16]
+        if folder is None or not own_folder(folder):
+            return None
         with tempfile.TemporaryFile(dir=folder):
             os.utime(folder)
     except (OSError, RuntimeError):  # RuntimeError: the user has no home
@@ -204,12 +169,11 @@ def cache_folder(file: Path, *extra_sources: Path, frozen: bytes = b"") -> Path 
 
 
 @cache
-def _kernels() -> Path:
+def _kernels() -> Path | None:
     base = kernels_folder()
-    if base.is_dir():
-        for folder in base.iterdir():
-            if time.time() - folder.stat().st_mtime > _KEPT_DAYS * 86400.0:
-                shutil.rmtree(folder, ignore_errors=True)
+    for folder in base.iterdir() if base else ():
+        if time.time() - folder.stat().st_mtime > _KEPT_DAYS * 86400.0:
+            shutil.rmtree(folder, ignore_errors=True)
     return base
 
 
