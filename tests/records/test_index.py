@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 from collections.abc import Callable
 from pathlib import Path
 
@@ -58,6 +59,17 @@ def test_an_index_of_another_make_is_not_believed(make: Make, results: Path) -> 
     for other in ({"schema": "wristctl.index/0"}, {"fields": ["id"]}):
         (results / INDEX).write_text(json.dumps({**index, **other}))
         assert [each.label for each in indexed(results)] == ["a"]
+
+
+@pytest.mark.parametrize(
+    "put",
+    [lambda file: file.write_text("[" * 100_000), os.mkfifo, lambda file: file.symlink_to("/dev/zero"), Path.mkdir],
+    ids=["nested", "a pipe", "a device", "a folder"],
+)
+def test_an_index_that_cannot_be_read_costs_nothing(make: Make, results: Path, put: Callable[[Path], object]) -> None:
+    run = make()
+    put(results / INDEX)
+    assert [entry.id for entry in indexed(results)] == [run.id]
 
 
 def test_a_run_that_cannot_be_read_is_dated_by_its_name(results: Path) -> None:
