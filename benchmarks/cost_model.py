@@ -34,10 +34,9 @@ LEAST = 0.3
 
 def batch(segments: int, horizon: float, threads: int) -> Callable[[int], None]:
     """A closed loop with the sliding mode law, of as many lanes as asked for."""
-    from wristctl.config.loop import Loop, Reference
+    from wristctl.config.loop import Loop, Reference, sample_period
     from wristctl.config.wrist import WristParameters
     from wristctl.control.table import controller, gains_of
-    from wristctl.simulation.batch import sample_period
     from wristctl.simulation.reference import motion
     from wristctl.simulation.rollout import rollout
 
@@ -65,10 +64,9 @@ def point(lanes: int, segments: int, horizon: float, threads: int) -> dict[str, 
 
 def streamed(threads: int) -> dict[str, float]:
     """Seconds of a stream of rollouts of 5 s (n = 1), and how much the peak memory grows after its first batch."""
-    from wristctl.config.loop import Loop, Reference
+    from wristctl.config.loop import Loop, Reference, sample_period
     from wristctl.config.wrist import WristParameters
     from wristctl.control.table import controller
-    from wristctl.simulation.batch import sample_period
     from wristctl.simulation.reference import motion
     from wristctl.simulation.rollout import stream
 

@@ -9,11 +9,10 @@ import time
 
 import numpy as np
 
-from wristctl.config.loop import Loop, Reference
+from wristctl.config.loop import Loop, Reference, sample_period
 from wristctl.config.study import Study
 from wristctl.control.table import controller, gains_of
 from wristctl.seeds import stream
-from wristctl.simulation.batch import sample_period
 from wristctl.simulation.reference import motion
 from wristctl.simulation.rollout import rollout
 from wristctl.tuning.objective import Judge

@@ -15,9 +15,9 @@ from pathlib import Path
 import numpy as np
 
 from wristctl.commands.sweep.command import simulated, sweep_units
+from wristctl.config.loop import sample_period
 from wristctl.config.study import Study
 from wristctl.control.table import controller, gains_of
-from wristctl.simulation.batch import sample_period
 from wristctl.simulation.cases import Case, measure
 from wristctl.simulation.reference import motion
 from wristctl.simulation.swept_loops import swept_metrics

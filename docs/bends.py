@@ -10,14 +10,13 @@ from typing import Any
 import numpy as np
 
 import wristctl
-from wristctl.config.loop import Loop, Reference
+from wristctl.config.loop import Loop, Reference, sample_period
 from wristctl.config.study import Study
 from wristctl.config.wrist import WristParameters
 from wristctl.control.table import controller, gains_of
 from wristctl.simulation.bend_loops import bends_of
 from wristctl.simulation.bend_outcome import BendOutcome
 from wristctl.simulation.closed_loop import scenario_of
-from wristctl.simulation.spatial_batch import sample_step
 from wristctl.simulation.two_planes import rollout_bends
 from wristctl.simulation.worlds import Draws, World
 
@@ -88,7 +87,7 @@ def courses(
 ) -> BendOutcome:
     """One motion by one controller under every seed."""
     chosen, reference = controller(law), Reference.model_validate(motion)
-    bends = bends_of(reference, "ulnar", wrist, study.simulate.horizon, sample_step(loop.control_period))
+    bends = bends_of(reference, "ulnar", wrist, study.simulate.horizon, sample_period(loop.control_period))
     draws, scenario = Draws(study.seed), scenario_of(reference, "ulnar")
     streams = [draws.camera(scenario, seed) for seed in range(seeds)]
     rows = np.tile(gains_of(chosen, gains), (seeds, 1))
@@ -172,7 +171,7 @@ def arm(turn: float, slackest: float, law: str, gains: str | Mapping[str, float]
         Loop.model_validate({**ARM_LOOP, "plant": {"actuator": {"slack": tuple(map(float, each))}}}) for each in slack
     ]
     motion = Reference.model_validate({"kind": "circumduction", "angle_deg": ARM_BEND, "turn": turn})
-    bends = bends_of(motion, "ulnar", ARM, (laps + 0.5) * turn, sample_step(ARM_LOOP["control_period"]))
+    bends = bends_of(motion, "ulnar", ARM, (laps + 0.5) * turn, sample_period(ARM_LOOP["control_period"]))
     rows = np.tile(gains_of(chosen, gains), (len(loops), 1))
     streams = [(1, k) for k in range(len(loops))]
     worlds = [World(loop, ARM) for loop in loops]

@@ -20,13 +20,12 @@ from numpy.typing import NDArray
 from wristctl.comparison.best_case import overshoot_of_a_tick
 from wristctl.comparison.combinations import ComparedRow, compare
 from wristctl.comparison.unknowns_sampling import drawn_settings
-from wristctl.config.loop import Loop, Reference
+from wristctl.config.loop import Loop, Reference, sample_period
 from wristctl.config.study import Study
 from wristctl.config.unknowns_box import PaperSetting
 from wristctl.config.wrist import WristParameters
 from wristctl.control.differenced import differenced
 from wristctl.control.table import controller, gains_of
-from wristctl.simulation.batch import sample_period
 from wristctl.simulation.convergence import tolerance
 from wristctl.simulation.outcome import Outcome
 from wristctl.simulation.reference import motion

@@ -22,14 +22,13 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 from wristctl.arrays import Array
-from wristctl.config.loop import Loop, Reference
+from wristctl.config.loop import Loop, Reference, sample_period
 from wristctl.config.plant import Actuator, Plant, Sensor, TrueActuator, TrueSensor
 from wristctl.config.wrist import WristParameters
 from wristctl.control.law import Controller, Gain
 from wristctl.control.table import controller, gains_of
 from wristctl.lanes.compiled import compiled
 from wristctl.lanes.lane import where
-from wristctl.simulation.batch import sample_period
 from wristctl.simulation.reference import motion
 from wristctl.simulation.rollout import rollout
 from wristctl.stability.loop_analysis import AnalysedRow

@@ -16,12 +16,11 @@ import pytest
 
 from tests.documented import script_of_docs
 from wristctl.comparison.best_case import overshoot_of_a_tick
-from wristctl.config.loop import Loop, Reference
+from wristctl.config.loop import Loop, Reference, sample_period
 from wristctl.config.unknowns_box import PaperSetting
 from wristctl.config.wrist import WristParameters
 from wristctl.control.table import controller, gains_of
 from wristctl.simulation.arrival import SHORT
-from wristctl.simulation.batch import sample_period
 from wristctl.simulation.outcome import Outcome
 from wristctl.simulation.reference import motion
 from wristctl.simulation.rollout import rollout

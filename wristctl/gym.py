@@ -142,7 +142,7 @@ class _Episodes:
         return observed, sight.theta.copy(), sight.failed, -((error / SCALE) ** 2)
 
     def _cases(self, first: int) -> Sequence[Case]:
-        from wristctl.simulation.batch import sample_period
+        from wristctl.config.loop import sample_period
         from wristctl.simulation.cases import Case
         from wristctl.simulation.closed_loop import scenario_of
         from wristctl.simulation.drawn_worlds import drawn_cases

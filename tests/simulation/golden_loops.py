@@ -18,11 +18,11 @@ import numpy as np
 
 from wristctl.arrays import Array
 from wristctl.config.choices import PLANTS
-from wristctl.config.loop import Loop, Reference
+from wristctl.config.loop import Loop, Reference, sample_period
 from wristctl.config.wrist import WristParameters
 from wristctl.control.table import CONTROLLERS, controller, gains_of
 from wristctl.lanes.blocks import to_rows
-from wristctl.simulation.batch import Lanes, batch, sample_period
+from wristctl.simulation.batch import Lanes, batch
 from wristctl.simulation.bend_sums import BEND_SUMS
 from wristctl.simulation.kernel import Span, run_blocks
 from wristctl.simulation.reference import motion

@@ -5,10 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from wristctl.config.loop import Loop, Reference
+from wristctl.config.loop import Loop, Reference, sample_period
 from wristctl.config.wrist import WristParameters
 from wristctl.control.table import controller
-from wristctl.simulation.batch import sample_period
 from wristctl.simulation.cases import Case, measure
 from wristctl.simulation.closed_loop import trajectory
 from wristctl.simulation.metrics import METRICS, energy

@@ -5,11 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from wristctl.config.loop import Loop, Reference
+from wristctl.config.loop import Loop, Reference, sample_period
 from wristctl.config.plant import Actuator, Plant, Sensor
 from wristctl.config.wrist import WristParameters
 from wristctl.control.table import CONTROLLERS, controller, gains_of
-from wristctl.simulation.batch import sample_period
 from wristctl.simulation.outcome import Outcome
 from wristctl.simulation.reference import motion
 from wristctl.simulation.rollout import rollout

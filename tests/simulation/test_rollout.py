@@ -9,10 +9,9 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from wristctl.config.loop import LOOPS, Loop, Reference
+from wristctl.config.loop import LOOPS, Loop, Reference, sample_period
 from wristctl.config.wrist import WristParameters
 from wristctl.control.table import controller
-from wristctl.simulation.batch import sample_period
 from wristctl.simulation.outcome import Outcome
 from wristctl.simulation.reference import motion
 from wristctl.simulation.rollout import rollout, stream

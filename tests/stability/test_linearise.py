@@ -11,12 +11,11 @@ import pytest
 
 from tests.stability.conftest import CAMERA, LAGGED, PID, TENDON, linear, row
 from wristctl.arrays import Array
-from wristctl.config.loop import Loop, Reference
+from wristctl.config.loop import Loop, Reference, sample_period
 from wristctl.config.plant import Disturbances, Plant, Push, TrueActuator, TrueSensor
 from wristctl.config.wrist import WristParameters
 from wristctl.control.table import CONTROLLERS
 from wristctl.errors import UserError
-from wristctl.simulation.batch import sample_period
 from wristctl.simulation.reference import motion
 from wristctl.simulation.rollout import rollout
 from wristctl.stability.loop_ticks import looks_back

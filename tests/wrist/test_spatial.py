@@ -9,11 +9,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from tests.oracles.spatial_augmented import augmented_residual, augmented_tendons, spatial_augmented
 from wristctl.config.wrist import WristParameters
 from wristctl.errors import UserError
 from wristctl.wrist import compiled_model, statics
 from wristctl.wrist.segments import segments
-from wristctl.wrist.spatial.spatial_augmented import augmented_residual, augmented_tendons, spatial_augmented
 from wristctl.wrist.spatial.spatial_kinematics import exact_bend, spatial_frames, spatial_tips
 from wristctl.wrist.spatial.spatial_model import spatial_integrate, spatial_linearised, spatial_terms
 from wristctl.wrist.spatial.spatial_segments import FIELDS, SpatialSegments, ellipse, spatial_values

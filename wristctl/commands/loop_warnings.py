@@ -202,7 +202,7 @@ def refuse_out_of_reach(study: Study, inputs: Inputs) -> None:
 
 
 def _shortfall(wrist: WristParameters, asked: AskedMotion) -> Shortfall | None:
-    from wristctl.simulation.batch import sample_period
+    from wristctl.config.loop import sample_period
     from wristctl.simulation.reference import motion
     from wristctl.simulation.worlds import loop_facing, plant_of
     from wristctl.wrist.statics import shortfall

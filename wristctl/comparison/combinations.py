@@ -8,13 +8,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from wristctl.config.compare import CompareSettings
-from wristctl.config.loop import DirectionName, Loop, Reference
+from wristctl.config.loop import DirectionName, Loop, Reference, sample_period
 from wristctl.config.study import Study
 from wristctl.config.tune import TuneSettings
 from wristctl.config.wrist import WristParameters
 from wristctl.control.table import TunedGains, controller, gains_of
 from wristctl.errors import UserError
-from wristctl.simulation.batch import sample_period
 from wristctl.simulation.closed_loop import repeat, scenario_of
 from wristctl.simulation.disturbances import DISTURBANCES
 from wristctl.simulation.motion import Motion

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from wristctl.arrays import Array
 from wristctl.config.controller_row import Row
-from wristctl.config.loop import Reference
+from wristctl.config.loop import Reference, sample_period
 from wristctl.config.unknowns_box import STRATA, Box, PaperSetting
 from wristctl.config.wrist import WristParameters
 from wristctl.control.differenced import differenced
@@ -19,7 +19,6 @@ from wristctl.control.table import controller, gains_of
 from wristctl.lanes.types import LANES
 from wristctl.processes import cores, stoppable
 from wristctl.seeds import stream
-from wristctl.simulation.batch import sample_period
 from wristctl.simulation.reference import motion
 from wristctl.simulation.rollout import rollout, structure
 

@@ -39,6 +39,11 @@ def longest_step(actuator: Actuator) -> float:
     return LONGEST_STEP if actuator.tendon_stiffness <= STIFF else 0.5 * LONGEST_STEP
 
 
+def sample_period(control_period: float) -> float:
+    """Time between samples of references and records: 1 ms, or the control period where that is longer [s]."""
+    return max(control_period, round(1e-3 / control_period) * control_period)
+
+
 class Loop(Section):
     """The plant and the timing. Controllers always see one segment (E13: a scalar input)."""
 

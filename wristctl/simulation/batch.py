@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wristctl.arrays import Array
+from wristctl.config.loop import sample_period
 from wristctl.config.plant import Actuator
 from wristctl.config.wrist import WristParameters
 from wristctl.control.law import REFERENCE, Controller, signals_of
@@ -173,11 +174,6 @@ def _bodies(worlds: Sequence[World]) -> tuple[list[World], Indices]:
         parts = id(world.wrist), id(loop.plant), id(loop.actuator), id(loop.disturbances), loop.limits, loop.spool_lead
         which.append(bodies.setdefault(parts, (len(bodies), world))[0])
     return [world for _, world in bodies.values()], np.array(which)
-
-
-def sample_period(control_period: float) -> float:
-    """Time between samples of references and records: 1 ms, or the control period where that is longer [s]."""
-    return max(control_period, round(1e-3 / control_period) * control_period)
 
 
 def _disturbances(cases: Sequence[Array | None], samples: int) -> Disturbed | Undisturbed:

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wristctl.arrays import Array
-from wristctl.config.loop import DirectionName, Loop, Reference
+from wristctl.config.loop import DirectionName, Loop, Reference, sample_period
 from wristctl.config.study import Study
 from wristctl.config.wrist import WristParameters
 from wristctl.control.table import controller, gains_of
@@ -23,7 +23,6 @@ from wristctl.simulation.recording import recorded_bends
 from wristctl.simulation.reference import REFERENCES, course_of, motion, toward
 from wristctl.simulation.repetitions import STRAIN, Repetitions
 from wristctl.simulation.rollout import How
-from wristctl.simulation.spatial_batch import sample_step
 from wristctl.simulation.two_planes import check_bends, rollout_bends
 from wristctl.simulation.worlds import Draws, World, is_random, loops_of
 from wristctl.wrist.directions import DIRECTIONS, in_plane
@@ -151,7 +150,7 @@ def simulate_bends(
     chosen, draws, wrist = study.simulate, Draws(study.seed), study.wrist
     loop, layout, law = chosen.loop, TendonLayout.of(study.wrist), controller(chosen.controller)
     gains = np.array([gains_of(law, chosen.gains, tuned)])
-    references = wanted_bends(study, sample_step(loop.control_period))
+    references = wanted_bends(study, sample_period(loop.control_period))
     times = chosen.repetitions if is_random(loop) else 1
     loops = loops_of(loop, [draws.plant(repetition) for repetition in range(times)])
     scenario = scenario_of(chosen.reference, chosen.direction)

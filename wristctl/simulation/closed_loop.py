@@ -9,14 +9,14 @@ from numpy.typing import NDArray
 
 from wristctl.arrays import Array
 from wristctl.config.choices import PLANTS
-from wristctl.config.loop import DirectionName, Loop, Reference
+from wristctl.config.loop import DirectionName, Loop, Reference, sample_period
 from wristctl.config.study import Study
 from wristctl.config.wrist import WristParameters
 from wristctl.control.law import Controller
 from wristctl.control.table import CONTROLLERS, controller, gains_of
 from wristctl.errors import UserError
 from wristctl.processes import cores
-from wristctl.simulation.batch import Start, sample_period
+from wristctl.simulation.batch import Start
 from wristctl.simulation.metrics import of_trajectory
 from wristctl.simulation.motion import Motion
 from wristctl.simulation.outcome import Outcome

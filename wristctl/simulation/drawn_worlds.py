@@ -7,10 +7,9 @@ are draws of different names.
 import numpy as np
 
 from wristctl.config.families import TOGETHER, Family
-from wristctl.config.loop import Loop
+from wristctl.config.loop import Loop, sample_period
 from wristctl.config.wrist import WristParameters
 from wristctl.seeds import Entropy, stream
-from wristctl.simulation.batch import sample_period
 from wristctl.simulation.cases import Case
 from wristctl.simulation.motion import Motion
 from wristctl.simulation.reference import motion

@@ -11,11 +11,10 @@ from typing import Any
 import numpy as np
 
 from wristctl.config.families import Family
-from wristctl.config.loop import Loop, Reference
+from wristctl.config.loop import Loop, Reference, sample_period
 from wristctl.config.wrist import WristParameters
 from wristctl.control.law import Controller
 from wristctl.control.table import controller
-from wristctl.simulation.batch import sample_period
 from wristctl.simulation.drawn_worlds import world_of
 from wristctl.simulation.reference import motion
 from wristctl.simulation.rollout import rollout, structure

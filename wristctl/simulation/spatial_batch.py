@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wristctl.arrays import Array
-from wristctl.config.loop import Loop
+from wristctl.config.loop import Loop, sample_period
 from wristctl.config.plant import TendonFacts, in_one_plane_only
 from wristctl.config.wrist import WristParameters
 from wristctl.control.law import REFERENCE, Controller, signals_of
@@ -108,7 +108,7 @@ def spatial_batch(
     facts, wide = [world.loop.plant for world in worlds], lanes_of(count).shape[1:]
     blocks = 1 if count == 1 else len(lanes_of(count))
     samples = references.shape[2]
-    ticks = max(1, round(sample_step(period) / period))
+    ticks = max(1, round(sample_period(period) / period))
 
     def by_lane(values: Sequence[Array]) -> Array:
         """A row of each world's as blocks."""
@@ -202,11 +202,6 @@ def different_worlds(worlds: Sequence[World]) -> tuple[list[World], NDArray[np.i
 def spatial_columns(layout: TendonLayout, loop: Loop) -> int:
     """Number of columns of a sample of which all is recorded."""
     return len(SPATIAL_RECORDED) + 3 * len(layout.places) + 2 * loop.plant_segments
-
-
-def sample_step(control_period: float) -> float:
-    """Time between samples of references and records: 1 ms, or the control period where that is longer [s]."""
-    return max(control_period, round(1e-3 / control_period) * control_period)
 
 
 def layout_of(world: World, wrist: WristParameters, layout: TendonLayout) -> TendonLayout:

@@ -8,14 +8,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wristctl.arrays import Array
-from wristctl.config.loop import Loop
+from wristctl.config.loop import Loop, sample_period
 from wristctl.config.study import Study
 from wristctl.config.wrist import WristParameters
 from wristctl.control.law import Controller
 from wristctl.control.table import controller, gains_of
 from wristctl.seeds import Entropy
 from wristctl.simulation.arrival import SHORT
-from wristctl.simulation.batch import Start, sample_period
+from wristctl.simulation.batch import Start
 from wristctl.simulation.cases import AT_ONCE, at_most, at_once
 from wristctl.simulation.closed_loop import equilibrium, scenario_of
 from wristctl.simulation.metrics import METRICS

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wristctl.arrays import Array
-from wristctl.config.loop import Loop
+from wristctl.config.loop import Loop, sample_period
 from wristctl.config.wrist import WristParameters
 from wristctl.control.law import Controller
 from wristctl.errors import UserError
@@ -19,7 +19,7 @@ from wristctl.simulation.bend_paths import BEND_PATHS, turned
 from wristctl.simulation.disturbances import acting_in_space
 from wristctl.simulation.kernel import Span
 from wristctl.simulation.rollout import How
-from wristctl.simulation.spatial_batch import SpatialBatch, check_spatial, sample_step, spatial_batch, spatial_columns
+from wristctl.simulation.spatial_batch import SpatialBatch, check_spatial, spatial_batch, spatial_columns
 from wristctl.simulation.spatial_kernel import SPATIAL_BRIEFLY, run_spatial
 from wristctl.simulation.worlds import World
 from wristctl.wrist.allocation import allocated
@@ -148,7 +148,7 @@ def rollout_bends(
     loop, wrist, count = worlds[0].loop, worlds[0].wrist, len(gains)
     layout = layout or TendonLayout.of(wrist)
     check_bends(law, references[:, 0], wrist, loop)
-    time = sample_step(loop.control_period) * np.arange(float(references.shape[2]))
+    time = sample_period(loop.control_period) * np.arange(float(references.shape[2]))
     columns = len(SPATIAL_BRIEFLY) if record == "briefly" else spatial_columns(layout, loop) if record else 0
     lanes = spatial_batch(
         law, gains, references, worlds, layout, _acting(loop, time, force), streams or [(0,)] * count, columns

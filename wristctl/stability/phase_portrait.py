@@ -8,10 +8,10 @@ import numpy as np
 
 from wristctl.arrays import Array
 from wristctl.config.choices import PLANTS
-from wristctl.config.loop import Loop, Reference
+from wristctl.config.loop import Loop, Reference, sample_period
 from wristctl.config.wrist import WristParameters
 from wristctl.control.law import Controller, Surface
-from wristctl.simulation.batch import Start, sample_period
+from wristctl.simulation.batch import Start
 from wristctl.simulation.closed_loop import repeat
 from wristctl.simulation.reference import motion
 from wristctl.simulation.worlds import Draws

@@ -16,6 +16,7 @@ import numpy as np
 import pandas as pd
 
 from wristctl.arrays import Array
+from wristctl.config.loop import sample_period
 from wristctl.config.study import Study
 from wristctl.config.tune import TuneSettings
 from wristctl.control.law import Controller
@@ -23,7 +24,6 @@ from wristctl.control.table import controller
 from wristctl.errors import UserError, meant
 from wristctl.plugins.places import contained
 from wristctl.seeds import stream
-from wristctl.simulation.batch import sample_period
 from wristctl.simulation.cases import Case
 from wristctl.simulation.closed_loop import scenario_of
 from wristctl.simulation.drawn_worlds import drawn_cases

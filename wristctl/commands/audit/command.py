@@ -189,7 +189,7 @@ def _metrics(earlier: Given) -> Metrics:
 
 def _trials(earlier: Given) -> TrialsDone:
     from wristctl.comparison.claims import TrialsDone
-    from wristctl.simulation.batch import sample_period
+    from wristctl.config.loop import sample_period
     from wristctl.simulation.reference import motion
 
     study = earlier.config if isinstance(earlier, Run) else earlier.study
