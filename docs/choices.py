@@ -203,7 +203,7 @@ How large they are is in the group {link(Loop)}.
 
 ## Plants
 
-{table("name, what it is", ((f"`{k}`", about(v.tip_angle.py_func.__module__)) for k, v in PLANTS.items()))}
+{table("name, what it is", ((f"`{k}`", about(v.bend_of.py_func.__module__)) for k, v in PLANTS.items()))}
 
 ## Presets of networks
 

@@ -22,18 +22,18 @@ from wristctl.config.loop import Loop, Reference, sample_period
 from wristctl.config.wrist import WristParameters
 from wristctl.control.table import CONTROLLERS, controller, gains_of
 from wristctl.lanes.blocks import to_rows
-from wristctl.simulation.batch import Lanes, batch
+from wristctl.simulation.batch import Batch, Lanes, batch
 from wristctl.simulation.bend_sums import BEND_SUMS
-from wristctl.simulation.kernel import Span, run_blocks
+from wristctl.simulation.kernel import Span, columns_of_sample, run_blocks
+from wristctl.simulation.motion import Angles, Motion
+from wristctl.simulation.observer import Watch
 from wristctl.simulation.reference import motion
 from wristctl.simulation.references import minimum_jerk
-from wristctl.simulation.rollout import columns_of
-from wristctl.simulation.spatial_batch import spatial_batch, spatial_columns
-from wristctl.simulation.spatial_kernel import SPATIAL_RECORDED, run_spatial
-from wristctl.simulation.two_planes import _acting
+from wristctl.simulation.sums import SUMS
 from wristctl.simulation.worlds import World
 from wristctl.wrist.directions import in_plane
 from wristctl.wrist.plant import kernel_of
+from wristctl.wrist.spatial.pcc_in_space import PCC_IN_SPACE
 from wristctl.wrist.tendon_layout import TendonLayout
 
 RECORDS = Path(__file__).parents[1] / "data" / "golden_loops.json"
@@ -162,14 +162,16 @@ def _lanes(case: Case) -> tuple[list[Loop], list[tuple[int, ...]]]:
     return [Loop.model_validate(loop) for loop in case.loops], [(lane,) for lane in range(case.lanes)]
 
 
-def _run(kernel: Any, arguments: Any, samples: int, blocks: int) -> None:
-    kernel(*arguments, Span(0, blocks, 0, samples))
-
-
-def _as_rows(values: Array, count: int, lanes: bool) -> Array:
-    """(blocks, T, columns[, lanes]) -> (count, T, columns)."""
-    flat = values.reshape(len(values), -1, *values.shape[3:]) if lanes else values.reshape(1, -1)
-    return to_rows(np.ascontiguousarray(flat), count).reshape(count, *values.shape[1:3])
+def _recorded(made: Batch, count: int) -> Array:
+    """What a batch records, run to its end, (count, T, columns)."""
+    if isinstance(made.state.watch, Watch):
+        gain = made.state.watch.observer.gain
+        gain[:] = np.float32(gain)
+    span = Span(0, made.blocks, 0, made.samples)
+    kernel_of(run_blocks, made.setup.plant)(made.setup, made.course, made.world, made.state, made.scratch(), span)
+    record = made.state.record
+    flat = record.reshape(len(record), -1, *record.shape[3:])
+    return to_rows(np.ascontiguousarray(flat), count).reshape(count, *record.shape[1:3])
 
 
 def in_one_plane(case: Case, gains: list[float]) -> Numbers:
@@ -182,28 +184,18 @@ def in_one_plane(case: Case, gains: list[float]) -> Numbers:
     ]
     model, lanes = PLANTS[loops[0].plant.model], np.arange(case.lanes)
     worlds = [World(loop, wrist) for loop in loops]
-    count = columns_of(True, model.coordinates(loops[0].plant_segments))
-    made = batch(
-        law,
-        _gains(case, gains),
-        motions,
-        worlds,
-        Lanes(lanes // 2 % 2, lanes % len(loops), streams),
-        model,
-        None,
-        count,
-    )
-    if hasattr(made.state.watch, "observer"):
-        made.state.watch.observer.gain[:] = np.float32(made.state.watch.observer.gain)
-    arguments = made.setup, made.course, made.world, made.state, made.scratch()
-    _run(kernel_of(run_blocks, model), arguments, made.samples, made.blocks)
-    record = _as_rows(made.state.record, case.lanes, bool(made.wide))
+    count = len(columns_of_sample(1, 2)) + model.coordinates(loops[0].plant_segments)
+    order = Lanes(lanes // 2 % 2, lanes % len(loops), streams)
+    made = batch(law, _gains(case, gains), motions, worlds, order, model, None, count)
+    record = _recorded(made, case.lanes)
     sums = to_rows(made.state.sums, case.lanes)
+    last = SUMS.index("alive")  # tensions of the last tick, as recorded, stand before it
+    sums = np.concatenate([sums[:, :last], sums[:, len(SUMS) :], sums[:, last : len(SUMS)]], axis=1)
     return {
         "bend": record[:, :, :1],
         "record": record,
         "sums": sums,
-        "memory": to_rows(made.state.memory, case.lanes),
+        "memory": to_rows(made.state.memory[:, 0], case.lanes),
         "coordinates": to_rows(made.state.coordinates, case.lanes),
     }
 
@@ -217,31 +209,28 @@ def in_two_planes(case: Case, gains: list[float]) -> Numbers:
     time: Array = period * np.arange(float(round(case.horizon / period)))
     there, back = minimum_jerk(time, 1.0), minimum_jerk(time - 0.8, 1.0)
     references = np.deg2rad(25.0) * np.stack([there - 0.5 * back, 0.75 * back - 0.25 * there])
-    made = spatial_batch(
-        law, _gains(case, gains), references, [World(loop, wrist)] * case.lanes, layout, _acting(loop, time, None),
-        streams, spatial_columns(layout, loop),
+    followed = Motion(time, Angles.of(references.reshape(6, -1)), np.zeros((0, 3)), None, 0.0, 0.0, case.horizon)
+    one, names = np.zeros(case.lanes, np.int64), columns_of_sample(2, len(layout.places))
+    made = batch(
+        law, _gains(case, gains), [followed], [World(loop, wrist)], Lanes(one, one, streams), PCC_IN_SPACE, None,
+        len(names) + 2 * loop.plant_segments, layout,
     )  # fmt: skip
-    if hasattr(made.state.watch, "gain"):
-        made.state.watch.gain[:] = np.float32(made.state.watch.gain)
-    arguments = made.setup, made.course, made.values, made.state, made.scratch()
-    _run(run_spatial, arguments, made.samples, made.blocks)
-    record = _as_rows(made.state.record, case.lanes, case.lanes > 1)
-    first, places = len(SPATIAL_RECORDED), made.places
-    sums = to_rows(made.state.sums, case.lanes)
-    column = {name: record[:, :, number] for number, name in enumerate(SPATIAL_RECORDED)}
+    record = _recorded(made, case.lanes)
+    sums = to_rows(made.state.sums, case.lanes)[:, len(SUMS) + len(layout.places) :]
 
-    def planes(name: str) -> Array:
-        return np.stack([column[f"{name}_ulnar"], column[f"{name}_flexion"]], axis=-1)
+    def of(name: str) -> Array:
+        """Columns of a name, of all planes or places."""
+        return record[:, :, [number for number, column in enumerate(names) if column.rpartition("_")[0] == name]]
 
     return {
-        "bend": planes("bend"),
-        "rate": planes("rate"),
-        "seen": planes("seen"),
-        "pulls": record[:, :, first : first + places],
-        "acting": record[:, :, first + places : first + 2 * places],
-        "delivered": record[:, :, first + 2 * places : first + 3 * places],
-        "wanted": planes("torque_wanted"),
-        "coordinates": record[:, :, first + 3 * places :],
+        "bend": of("bend"),
+        "rate": of("rate"),
+        "seen": of("seen"),
+        "pulls": layout.multiplicity * of("tension"),
+        "acting": layout.multiplicity * of("acting"),
+        "delivered": of("delivered"),
+        "wanted": of("torque_wanted"),
+        "coordinates": record[:, :, len(names) :],
         "sums": sums[:, : len(BEND_SUMS)],
     }
 

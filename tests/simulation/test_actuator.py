@@ -11,37 +11,42 @@ import pytest
 from wristctl.config.loop import Loop, Reference
 from wristctl.config.plant import Actuator, Plant
 from wristctl.config.wrist import WristParameters
+from wristctl.control.belief import Sides, belief_in_lanes
 from wristctl.control.table import controller
 from wristctl.lanes.compiled import kernel
-from wristctl.lanes.rows import rows_of
+from wristctl.lanes.rows import lanes_like, part, rows_of
 from wristctl.simulation.actuator import (
-    WITHHELD,
+    SIDES,
     Aim,
     Drive,
     IdealDrive,
     LaggedDrive,
+    Motor,
     SpoolDrive,
     actuate,
     at_rest,
+    drive_in_lanes,
     drive_of,
 )
 from wristctl.simulation.outcome import Outcome
 from wristctl.simulation.reference import motion
 from wristctl.simulation.rollout import rollout
 from wristctl.wrist.pcc import PCC
-from wristctl.wrist.segments import load_segments, segments
+from wristctl.wrist.segments import segments
 
 WRIST = WristParameters()
 PERIOD, MOVE = 1e-3, Reference()
 
 
 @kernel
-def _drive(drive: Any, state: Any, model: Any, commands: Any, out: Any, h: float) -> None:
-    known, motors = load_segments(rows_of(model)), rows_of(state)
+def _drive(drive: Any, state: Any, belief: Any, commands: Any, out: Any, h: float) -> None:
+    known, motors, in_lanes = belief_in_lanes(belief), rows_of(state), drive_in_lanes(drive)
     for tick in range(commands.shape[0]):
         command, result = rows_of(commands[tick]), rows_of(out[tick])
-        result[0], result[1] = actuate(drive, motors, known, Aim(command[2], command[3]), command[0], command[1], h)
-        result[2] = motors[WITHHELD]
+        counts = part(result, 0, (0, 0))
+        aim = Aim(part(command, 2, (0,)), part(command, 3, (0,)), lanes_like(counts))
+        actuate(in_lanes, motors, known, aim, part(command, 0, (0, 0)), h, counts)
+        result[2] = motors[4]
 
 
 def delivered(drive: Drive, commands: np.ndarray, period: float = PERIOD) -> np.ndarray:
@@ -49,8 +54,15 @@ def delivered(drive: Drive, commands: np.ndarray, period: float = PERIOD) -> np.
     withheld torque; (T, 3)."""
     out, aimed = np.zeros((len(commands), 3)), np.zeros((len(commands), 4))
     aimed[:, : commands.shape[1]] = commands
-    _drive(drive, at_rest(drive, WRIST, PCC, np.zeros(1)), segments(WRIST, 1), aimed, out, period)
+    sides = np.array(SIDES)
+    state = at_rest(drive, sides * WRIST.pretension, WRIST.length, PCC.taut(WRIST, np.zeros(1)))
+    _drive(drive, state, Sides(segments(WRIST, 1)[None], sides), aimed, out, period)
     return out
+
+
+def motor_of_side(drive: LaggedDrive | SpoolDrive) -> Motor:
+    """A side's motor: its stiffness is that of both its tendons."""
+    return Motor(*drive.motor.tolist())._replace(stiffness=float(drive.stiffness[0]))
 
 
 def driven(actuator: Actuator) -> LaggedDrive | SpoolDrive:
@@ -73,7 +85,7 @@ def test_lagged_pull_approaches_a_step_with_its_time_constant_in_whole_steps() -
     drive = driven(Actuator(level="lagged", lag=0.05))
     pull = delivered(drive, np.tile([44.0, 4.0, 0.0], (500, 1)))
     time = (np.arange(500) + 1) * PERIOD
-    quantum = drive.motor.stiffness * drive.motor.step
+    quantum = motor_of_side(drive).stiffness * motor_of_side(drive).step
     assert np.abs(pull[:, 0] - (44.0 - 40.0 * np.exp(-time / 0.05))).max() < 0.5 * quantum + 0.4
     np.testing.assert_allclose(pull[:, :2] / quantum, np.rint(pull[:, :2] / quantum), atol=1e-9)
     assert (pull[:, 2] == 0.0).all(), "a lag is no limit"
@@ -84,22 +96,22 @@ def test_lagged_pull_grows_no_faster_than_the_motor_turns() -> None:
     drive = driven(Actuator(level="lagged", lag=1e-4, step_rate=500.0))
     pull = delivered(drive, np.tile([100.0, 4.0, 0.0], (100, 1)))[:, 0]
     slope = (pull[50] - pull[0]) / (50 * PERIOD)
-    assert slope == pytest.approx(drive.motor.stiffness * drive.motor.speed, rel=0.05)
+    assert slope == pytest.approx(motor_of_side(drive).stiffness * motor_of_side(drive).speed, rel=0.05)
 
 
 @pytest.mark.slow
 def test_a_stepper_keeps_its_speed_and_acceleration_and_stops_within_a_step_of_its_target() -> None:
     drive = driven(Actuator(level="tendon"))
     length = delivered(drive, np.tile([4.0, 4.0, 0.8], (500, 1)))[:, 0]
-    fine = length / drive.motor.step
+    fine = length / motor_of_side(drive).step
     np.testing.assert_allclose(fine, np.rint(fine), atol=1e-6)
     speed = np.diff(length) / PERIOD
-    assert speed.max() <= drive.motor.speed + drive.motor.step / PERIOD
+    assert speed.max() <= motor_of_side(drive).speed + motor_of_side(drive).step / PERIOD
     ramp = (length[20] - length[0]) / (0.5 * (20 * PERIOD) ** 2)
-    assert ramp == pytest.approx(drive.motor.acceleration, rel=0.15)
-    target = 4.0 / drive.motor.stiffness + WRIST.length - _plus_length(0.8)
-    assert length[-1] == pytest.approx(target, abs=drive.motor.step)
-    assert length.max() <= target + 2 * drive.motor.step
+    assert ramp == pytest.approx(motor_of_side(drive).acceleration, rel=0.15)
+    target = 4.0 / motor_of_side(drive).stiffness + WRIST.length - _plus_length(0.8)
+    assert length[-1] == pytest.approx(target, abs=motor_of_side(drive).step)
+    assert length.max() <= target + 2 * motor_of_side(drive).step
 
 
 @pytest.mark.parametrize("side", [0, 1])
@@ -109,7 +121,7 @@ def test_a_stepper_withholds_the_torque_of_what_it_cannot_reel_in_before_it_stop
     commands = np.tile([4.0, 4.0, 0.0], (1000, 1))
     commands[0:, side] = 44.0
     torque = delivered(drive, commands)[:, 2]
-    motor, sign = drive.motor, 1.0 - 2.0 * side
+    motor, sign = motor_of_side(drive), 1.0 - 2.0 * side
     short = 40.0 / motor.stiffness - 1.5 * motor.acceleration * PERIOD**2
     arm = WRIST.tendon_offset
     assert torque[0] == pytest.approx(sign * arm * motor.stiffness * short, rel=1e-9)
@@ -122,7 +134,7 @@ def test_a_stepper_that_keeps_up_withholds_nothing() -> None:
     time = PERIOD * np.arange(2000)
     commands = np.stack([4.0 + 0.0 * time, 4.0 + 0.0 * time, 0.2 * (1.0 - np.cos(2.0 * time))], axis=1)
     length, _, torque = delivered(drive, commands).T
-    assert np.ptp(length) > 50 * drive.motor.step and (torque == 0.0).all()
+    assert np.ptp(length) > 50 * motor_of_side(drive).step and (torque == 0.0).all()
 
 
 @pytest.mark.parametrize("way", [1.0, -1.0])
@@ -134,7 +146,7 @@ def test_spools_told_a_rate_move_with_the_reference_and_else_lag_by_braking(
     still = np.full_like(time, 4.0)
     told = delivered(drive, np.stack([still, still, rate * time, np.full_like(time, rate)], axis=1))
     late = delivered(drive, np.stack([still, still, rate * time], axis=1))
-    angle, motor = rate * time[400:], drive.motor
+    angle, motor = rate * time[400:], motor_of_side(drive)
     wanted = 4.0 / motor.stiffness + WRIST.length - np.array([_plus_length(theta) for theta in angle])
     speed = abs(np.diff(wanted) / PERIOD).max()
     lag = way * (wanted - late[400:, 0])
@@ -151,15 +163,15 @@ def test_what_acts_over_a_coarse_period_is_the_spool_in_its_middle() -> None:
     middle, end = (
         [_plus_length(0.2 * (1.0 - math.cos(3.0 * (begin + share * period)))) for begin in time] for share in (0.5, 1.0)
     )
-    reeled = length - 4.0 / drive.motor.stiffness
-    assert np.abs(reeled - (WRIST.length - np.array(middle)))[5:].max() < 2.0 * drive.motor.step
-    assert np.abs(reeled - (WRIST.length - np.array(end)))[5:].max() > 3.0 * drive.motor.step
+    reeled = length - 4.0 / motor_of_side(drive).stiffness
+    assert np.abs(reeled - (WRIST.length - np.array(middle)))[5:].max() < 2.0 * motor_of_side(drive).step
+    assert np.abs(reeled - (WRIST.length - np.array(end)))[5:].max() > 3.0 * motor_of_side(drive).step
 
 
 def test_a_lagged_motor_withholds_what_its_speed_does() -> None:
     drive = driven(Actuator(level="lagged", lag=1e-4, step_rate=500.0))
     torque = delivered(drive, np.tile([4.0, 100.0, 0.0], (100, 1)))[:, 2]
-    motor = drive.motor
+    motor = motor_of_side(drive)
     share = PERIOD / (motor.lag + PERIOD)
     most = motor.stiffness * motor.speed * PERIOD
     assert torque[0] == pytest.approx(-WRIST.tendon_offset * (96.0 * share - most), rel=1e-9)

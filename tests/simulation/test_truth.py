@@ -15,25 +15,25 @@ from wristctl.config.choices import PLANTS
 from wristctl.config.loop import Loop, Reference
 from wristctl.config.plant import Actuator, Plant, Sensor, TrueActuator, TrueSensor, actual
 from wristctl.config.wrist import WristParameters
+from wristctl.control.belief import Limits, belief_in_lanes
 from wristctl.control.law import now_of
-from wristctl.control.response import Controlled, respond
+from wristctl.control.response import Controlled, Seen, respond, room_like
 from wristctl.control.table import controller, gains_of
 from wristctl.errors import UserError
 from wristctl.lanes.compiled import kernel
 from wristctl.lanes.lane import zero_like
-from wristctl.lanes.rows import rows_of
-from wristctl.simulation.actuator import WITHHELD, Aim, actuate, drive_in_lanes, winding_of
+from wristctl.lanes.rows import lanes_like, part, rows_of
+from wristctl.simulation.actuator import Aim, actuate, drive_in_lanes, winding_of
 from wristctl.simulation.batch import Batch, Lanes, batch
 from wristctl.simulation.closed_loop import simulate
 from wristctl.simulation.kernel import run_blocks
-from wristctl.simulation.observer import go_on, sense
+from wristctl.simulation.observer import Knowing, go_on, sense
 from wristctl.simulation.reference import motion
-from wristctl.simulation.rollout import _advance, columns_of
+from wristctl.simulation.rollout import advance_blocks, columns_of
 from wristctl.simulation.worlds import World, facing, mismatches, plant_of
 from wristctl.study_files.load import load_study
 from wristctl.study_files.resolved import config_hash, resolved_yaml
 from wristctl.wrist.plant import kernel_of
-from wristctl.wrist.segments import load_segments
 from wristctl.wrist.statics import equilibrium
 from wristctl.wrist.tendons import TENDONS_PER_SIDE
 
@@ -107,7 +107,7 @@ def prepared(plant: Plant, loop: Loop, horizon: float = 0.6) -> Batch:
 def finished(plant: Plant, loop: Loop, horizon: float = 0.6) -> Batch:
     """The same, run to its end."""
     done = prepared(plant, loop, horizon)
-    _advance(done, kernel_of(run_blocks, PLANTS[plant.model]), 1, lambda share: None, Event())
+    advance_blocks(done, kernel_of(run_blocks, PLANTS[plant.model]), 1, lambda share: None, Event())
     return done
 
 
@@ -119,24 +119,28 @@ def column(done: Batch, name: str) -> np.ndarray:
 @kernel
 def _controller_side(setup: Any, course: Any, world: Any, state: Any, scratch: Any, out: Any) -> None:
     """What `run_blocks` does of one lane without a plant: frames and their dates are given."""
-    believed, drive = load_segments(rows_of(world.model)), drive_in_lanes(world.drive)
-    control = Controlled(setup.law, scratch.now, world.model, world.gains, state.memory, scratch.target)
-    bound, motor, target = rows_of(world.limits), rows_of(state.motors), rows_of(scratch.target)
-    low, high = TENDONS_PER_SIDE * bound[0], TENDONS_PER_SIDE * bound[1]
-    zero, view = zero_like(low), now_of(scratch.now)
+    known, drive = belief_in_lanes(world.belief), drive_in_lanes(world.drive)
+    control = Controlled(setup.law, scratch.now, world.belief.models, world.gains, state.memory, scratch.target)
+    bound, motor, target = rows_of(world.limits), rows_of(state.motors), rows_of(scratch.target[0])
+    limits = Limits(part(bound, 0, setup.pulls), part(bound, 2, setup.pulls))
+    bend, pulls, counts = lanes_like(part(bound, 0, setup.bend)), lanes_like(limits.least), lanes_like(limits.least)
+    still, wish, wish_rate = lanes_like(bend), lanes_like(bend), lanes_like(bend)
+    rows = lanes_like(part(motor, 0, setup.seen))
+    seen = Seen(rows, part(motor, 4, setup.bend), part(motor, 5, setup.bend))
+    room = room_like(bend, pulls)
+    aim, knowing = Aim(wish, wish_rate, lanes_like(pulls)), Knowing(known, drive, bend, pulls, pulls)
+    zero, view = zero_like(bound[0]), now_of(scratch.now[0])
+    still[0] = zero
     for tick in range(out.shape[0]):
         for value in range(3):
             target[value] = course.references[0, value, tick] + zero
-        estimate = sense(state.watch, world.schedule, drive, believed, tick, zero, zero, setup.period)
-        wanted, _, _, plus, minus = respond(
-            control, believed, estimate, motor[WITHHELD], (low, high), 0.0, setup.period
-        )
+        sense(state.watch, world.schedule, knowing, tick, still, still, setup.period, rows)
+        respond(control, known, seen, limits, room, 0.0, setup.period, pulls)
         row = rows_of(out[tick])
-        row[0], row[1], row[2] = wanted, plus, minus
-        counted_plus, counted_minus = actuate(
-            drive, motor, believed, Aim(view.theta_ref, view.rate_ref), plus, minus, setup.period
-        )
-        go_on(state.watch, drive, believed, tick, counted_plus, counted_minus, setup.period)
+        row[0], row[1], row[2] = room.wanted[0], pulls[0], pulls[1]
+        wish[0], wish_rate[0] = view.theta_ref, view.rate_ref
+        actuate(drive, motor, known, aim, pulls, setup.period, counts)
+        go_on(state.watch, knowing, tick, counts, setup.period)
 
 
 def only(values: Any) -> Any:
@@ -220,14 +224,14 @@ def test_steps_mean_what_the_worlds_pulley_makes_of_them() -> None:
     """At rest an ideal controller's spools stand where it counts them; a pulley 2 % larger has reeled in 2 % more."""
     believed, own = Actuator(level="tendon"), Actuator(level="tendon", pulley_radius=1.02 * Actuator().pulley_radius)
     winding = winding_of(believed, own, 4.0)
-    home = 4.0 / (TENDONS_PER_SIDE * believed.tendon_stiffness)
+    home = 4.0 / believed.tendon_stiffness
     assert winding.scale == pytest.approx(1.02)
     assert winding.scale * home + winding.offset == pytest.approx(home, rel=1e-12), "homed at the same pull"
     steps = 500 * believed.step_length
     reeled = winding.scale * (home + steps) + winding.offset
     assert reeled - home == pytest.approx(500 * own.step_length, rel=1e-9)
     softer = winding_of(believed, Actuator(level="tendon", tendon_stiffness=10e3), 4.0)
-    assert softer.scale == 1.0 and home + softer.offset == pytest.approx(4.0 / (TENDONS_PER_SIDE * 10e3))
+    assert softer.scale == 1.0 and home + softer.offset == pytest.approx(4.0 / 10e3)
 
 
 def test_a_zero_that_is_wrong_by_a_degree_costs_a_degree_and_is_not_seen() -> None:

@@ -14,7 +14,7 @@ from wristctl.control.table import controller, gains_of
 from wristctl.errors import UserError
 from wristctl.simulation.two_planes import bend_path, simulate_two_planes
 from wristctl.trial.blind_model import BlindModel
-from wristctl.trial.spatial_belief import SpatialPaths, belief_of, layout_of_axes
+from wristctl.trial.spatial_belief import SpatialPaths, known_of_axes, layout_of_axes
 from wristctl.trial.spatial_steering import SpatialSteering
 from wristctl.trial.steering import REMEMBERED
 from wristctl.wrist.tendon_layout import TendonLayout
@@ -23,7 +23,7 @@ pytestmark = pytest.mark.slow
 
 WRIST, PERIOD = WristParameters(stiffness_axis_deg=30.0, flexion_ratio=1.4), 1e-2
 ACTUATOR, SENSOR = Actuator(level="tendon"), Sensor(level="camera")
-PATHS = SpatialPaths(belief_of(WRIST, ACTUATOR))
+PATHS = SpatialPaths(known_of_axes(WRIST, ACTUATOR))
 
 
 def steering(law: str = "feedforward", gains: str = "") -> SpatialSteering:
@@ -152,7 +152,7 @@ def test_a_torque_out_of_reach_keeps_its_direction_and_is_said() -> None:
 
 def test_tendons_at_other_places_are_refused() -> None:
     with pytest.raises(UserError, match="winds the four tendons 1, 2, 4 and 5"):
-        belief_of(WristParameters(tendons="three"), ACTUATOR)
+        known_of_axes(WristParameters(tendons="three"), ACTUATOR)
 
 
 def test_soft_tendons_bend_the_blind_wrist_less_in_both_planes() -> None:

@@ -25,7 +25,7 @@ SPOOLS = spools_of(ACTUATOR)
 
 @kernel
 def _reel_in(motor: Any, state: Any, target: float, moving: float, h: float) -> None:
-    reel_in(motor, rows_of(state), 0, target, moving, h)
+    reel_in(motor, motor.stiffness, rows_of(state), 0, target, moving, h)
 
 
 @settings(deadline=None)

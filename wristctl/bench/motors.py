@@ -195,7 +195,7 @@ def follow(
         middle = (first + k) * CYCLES + CYCLES // 2
         edge = hear_edges(spools, motor, edges, edge, middle)
         turn_spools(spools, motor, hanging.stiffness)
-        plant = disturbed(undisturbed, acting[k, 0], acting[k, 1])
+        plant = disturbed(undisturbed, (0.0, acting[k, 0], 0.0), acting[k, 1])
         time, path = (first + k) * PERIOD - start + zero, travel(plant, q)
         on_spools = (
             tendon_after_slip(tendons, 0, reeled[ahead] - levers[ahead] * bent[0], zero, time, path[0], 0.0),

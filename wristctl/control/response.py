@@ -1,93 +1,146 @@
-"""One control tick, in simulation and on hardware: what the law sees, its torque, and the pulls that give it."""
+"""One control tick, in simulation and on hardware: a law once for each plane, and one allocation for all planes.
+
+Rows have P entries for planes, T for places of tendons (`wristctl.control.belief`).
+"""
 
 from typing import Any, NamedTuple
 
+from wristctl.control.belief import Reached, coupled, coupling, miss, moment_arms_at, reach, share_out, torque_of
 from wristctl.control.law import NOW, REFERENCE, now_of, wrist_of
 from wristctl.lanes.compiled import compiled, spelled_out
 from wristctl.lanes.lane import zero_like
-from wristctl.lanes.rows import rows_of
-from wristctl.wrist.tendons import allocate, reach
+from wristctl.lanes.rows import lanes_like, rows_of
 
 _THETA, _RATE, _THETA_REF, _RATE_REF, _ACCELERATION_REF, _LOW, _HIGH, _PERIOD, _LOAD, _WITHHELD = range(len(NOW))
 
+# Rows of what is seen of one plane: bend [rad], rate [rad/s] and load torque [N m].
+OF_A_PLANE = 3
+
+
+class Controlled(NamedTuple):
+    """A law with the arrays that it works on, those of P planes beside each other.
+
+    They are what it sees (NOW and the preview), each plane's one-segment wrist (Segments), its gains, its memory, and
+    each plane's reference (angle, rate, acceleration).
+    """
+
+    law: Any
+    signals: Any
+    models: Any
+    gains: Any
+    memory: Any
+    reference: Any
+
 
 class Estimate(NamedTuple):
-    """The wrist's angle [rad], rate [rad/s] and load torque [N m] as measured or as the observer makes them out."""
+    """Bend [rad], rate [rad/s] and load torque [N m] as measured or as the observer makes them out."""
 
     theta: Any
     rate: Any
     load: Any
 
 
-class Controlled(NamedTuple):
-    """A law with the arrays that it works on: what it sees (NOW and the preview), the controller's one-segment wrist
-    (Segments), its gains, its memory, and the reference (angle, rate, acceleration)."""
+class Seen(NamedTuple):
+    """What the law sees: bend, rate and load of each plane, as measured or as the observer makes them out (3 P rows),
+    and the torque [N m] withheld in each (P rows).
 
-    law: Any
-    signals: Any
-    model: Any
-    gains: Any
-    memory: Any
-    reference: Any
+    `withheld` is what motors are too slow for, `missed` what the tendons could not give beside the other plane's.
+    """
+
+    rows: Any
+    withheld: Any
+    missed: Any
+
+
+class Room(NamedTuple):
+    """Rows to work on, one for each plane, and the moment arms [m] at the bend that the law has seen.
+
+    Behind a tick `wanted` is what the law wants, `torque` what the pulls give by its belief [N m].
+    """
+
+    bend: Any
+    speed: Any
+    acceleration: Any
+    extra: Any
+    low: Any
+    high: Any
+    wanted: Any
+    torque: Any
+    arms: Any
+
+
+@spelled_out
+def room_like(bend: Any, arms: Any) -> Any:
+    """A Room as long as rows of bends and of moment arms; it lives as long as its caller."""
+    return Room(
+        lanes_like(bend), lanes_like(bend), lanes_like(bend), lanes_like(bend), lanes_like(bend), lanes_like(bend),
+        lanes_like(bend), lanes_like(bend), lanes_like(arms),
+    )  # fmt: skip
 
 
 @compiled
-def look_ahead(control: Any, periods: int, since: float) -> None:
-    """Put the reference that is `periods` from now into the preview, `since` seconds after what it was then."""
-    _continued(control, len(NOW) + len(REFERENCE) * (periods - 1), since)
+def look_ahead(control: Any, bend: Any, periods: int, since: float) -> None:
+    """Put the reference that is `periods` from now into the preview, `since` seconds after what it was then.
+
+    `bend` is a row for each plane.
+    """
+    for p in range(len(bend)):
+        _continued(control, p, len(NOW) + len(REFERENCE) * (periods - 1), since)
 
 
 @compiled
-def _continued(control: Any, first: int, since: float) -> None:
+def _continued(control: Any, p: int, first: int, since: float) -> None:
     """The reference as what a law sees from `first` on, continued by its own derivatives."""
-    signals, target = rows_of(control.signals), rows_of(control.reference)
+    signals, target = rows_of(control.signals[p]), rows_of(control.reference[p])
     signals[first] = target[0] + since * (target[1] + 0.5 * since * target[2])
     signals[first + 1] = target[1] + since * target[2]
     signals[first + 2] = target[2]
 
 
 @compiled
-def perceive(
-    control: Any, believed: Any, estimate: Any, withheld: Any, bounds: Any, since: float, period: float
-) -> Any:
-    """Put what a law sees into its signals; the least and the largest torque [N m] in reach. Arguments as `respond`."""
-    low, high = bounds
-    torque_low, torque_high = reach(estimate.theta, believed, low, high)
-    perceive_within(control, estimate, withheld, (torque_low, torque_high), since, period)
-    return torque_low, torque_high
-
-
-@compiled
-def perceive_within(control: Any, estimate: Any, withheld: Any, within: Any, since: float, period: float) -> None:
-    """Put what a law sees into its signals, where the torques `within` reach [N m] are known."""
-    signals, (torque_low, torque_high) = rows_of(control.signals), within
-    signals[_THETA] = estimate.theta
-    signals[_RATE] = estimate.rate
-    signals[_LOAD] = estimate.load
-    signals[_WITHHELD] = withheld
-    _continued(control, _THETA_REF, since)
-    signals[_LOW] = torque_low
-    signals[_HIGH] = torque_high
-    signals[_PERIOD] = period + zero_like(torque_low)
+def perceive(control: Any, known: Any, seen: Any, limits: Any, room: Any, since: float, period: float) -> None:
+    """Put what the law sees into its signals, and what each plane reaches into `room`. Arguments as `respond`."""
+    for p in range(len(room.bend)):
+        room.bend[p] = seen.rows[OF_A_PLANE * p]
+        room.speed[p] = seen.rows[OF_A_PLANE * p + 1]
+        room.acceleration[p] = rows_of(control.reference[p])[2]
+    coupling(known.coupling, known, room.bend, room.speed, room.acceleration, room.extra)
+    moment_arms_at(known.wrist, room.bend, room.arms)
+    reach(room.arms, limits, room.extra, room.low, room.high)
+    for p in range(len(room.bend)):
+        signals = rows_of(control.signals[p])
+        signals[_THETA] = room.bend[p]
+        signals[_RATE] = room.speed[p]
+        signals[_LOAD] = seen.rows[OF_A_PLANE * p + 2]
+        signals[_WITHHELD] = seen.withheld[p] + seen.missed[p]
+        _continued(control, p, _THETA_REF, since)
+        signals[_LOW] = room.low[p]
+        signals[_HIGH] = room.high[p]
+        signals[_PERIOD] = period + zero_like(room.low[p])
 
 
 @spelled_out
-def wanted_torque(control: Any) -> Any:
-    """Torque [N m] that the law wants, by its signals."""
-    gains, memory = rows_of(control.gains), rows_of(control.memory)
-    return control.law(now_of(control.signals), wrist_of(control.model), gains, memory)
+def wanted_torque(control: Any, p: int) -> Any:
+    """Torque [N m] that the law wants in a plane, by its signals."""
+    gains, memory = rows_of(control.gains), rows_of(control.memory[p])
+    return control.law(now_of(control.signals[p]), wrist_of(control.models[p]), gains, memory)
 
 
 @compiled
-def respond(control: Any, believed: Any, estimate: Any, withheld: Any, bounds: Any, since: float, period: float) -> Any:
-    """Torque that the law wants [N m], the least and largest in reach, and pulls of the + and the - side [N].
+def respond(
+    control: Any, known: Any, seen: Any, limits: Any, room: Any, since: float, period: float, pulls: Any
+) -> Any:
+    """Write the pulls (T rows) [N] of a tick, and return the share of the wanted torque that they give.
 
-    `believed` is the controller's wrist as Segments, `estimate` an Estimate, `withheld` the torque of the last command
-    that the motors were too slow for [N m]; `bounds` are the least and largest pull of a side [N]. The reference is
-    what it was `since` seconds ago, continued by its own derivatives.
+    `known` is the Belief of the controller's side. The reference is what it was `since` seconds ago, continued by its
+    own derivatives. A law is told what its plane alone reaches; what it misses within that since the other plane wants
+    its part, it is told at the next tick, by `seen.missed`.
     """
-    low, high = bounds
-    torque_low, torque_high = perceive(control, believed, estimate, withheld, bounds, since, period)
-    wanted = wanted_torque(control)
-    plus, minus = allocate(estimate.theta, believed, wanted, low, high)
-    return wanted, torque_low, torque_high, plus, minus
+    perceive(control, known, seen, limits, room, since, period)
+    for p in range(len(room.bend)):
+        room.wanted[p] = coupled(known.coupling, wanted_torque(control, p), room.extra[p])
+    reached = Reached(room.extra, room.low, room.high, limits)
+    share = share_out(known.wrist, room.arms, room.wanted, reached, pulls)
+    torque_of(room.arms, pulls, room.torque)
+    miss(known.wrist, room.wanted, room.torque, reached, seen.missed)
+    return share

@@ -14,11 +14,11 @@ from wristctl.config.wrist import WristParameters
 from wristctl.lanes.blocks import to_blocks, to_rows
 from wristctl.lanes.compiled import by_type, implements
 from wristctl.lanes.lane import zero_like
-from wristctl.lanes.rows import part, rows_of
+from wristctl.lanes.rows import lanes_like, part, rows_of
 from wristctl.simulation.nonideal import inner_of, nonideal_of, tendon_after_slip, unmoved, wears
 from wristctl.wrist.dahl import inner_in_lanes, one_block
 from wristctl.wrist.pcc import PCC
-from wristctl.wrist.plant import PlantModel, advance_or_stop, kernel_of, parameters_of, tip_angle, travel
+from wristctl.wrist.plant import PlantModel, advance_or_stop, bend_of, kernel_of, parameters_of, travel
 from wristctl.wrist.tendon_mechanics import Nonideal, RealTendons, read_nonideal
 
 _STIFFNESS = len(Nonideal._fields)
@@ -93,13 +93,14 @@ def _advance(
     tendons = RealTendons(tendon_rows[_STIFFNESS], read_nonideal(tendon_rows), rows_of(memory), inner_in_lanes(inner))
     n = len(cut)
     q, rate = part(rows_of(state), 0, cut), part(rows_of(state), n, cut)
+    bend, speed = lanes_like(part(q, 0, (0,))), lanes_like(part(q, 0, (0,)))
     alive = 1.0 + zero
     reeled, taut = spools.lengths, _STIFFNESS + 1
     for k in range(-spools.settle, reeled.shape[0]):
         now = max(k, 0)
         if k >= 0:
-            total, _ = tip_angle(plant, q, rate)
-            rows_of(angle)[k] = total
+            bend_of(plant, q, rate, bend, speed)
+            rows_of(angle)[k] = bend[0]
         on_spools = (
             reeled[now, 0] + tendon_rows[taut],
             reeled[now, 2] + tendon_rows[taut + 2],

@@ -16,18 +16,28 @@ from wristctl.config.choices import PLANTS
 from wristctl.config.loop import DirectionName, Loop, Reference
 from wristctl.config.plant import Actuator, TendonFacts, TrueWrist
 from wristctl.config.wrist import WristParameters
+from wristctl.control.belief import Sides, belief_in_lanes
 from wristctl.control.table import controller
 from wristctl.errors import UserError
 from wristctl.identification.forward import SupposedWrist, angles
 from wristctl.lanes.compiled import kernel
-from wristctl.lanes.rows import rows_of
-from wristctl.simulation.actuator import Aim, Motor, SpoolDrive, actuate, at_rest, counted_motor
+from wristctl.lanes.rows import lanes_like, part, rows_of
+from wristctl.simulation.actuator import (
+    SIDES,
+    Aim,
+    Motor,
+    SpoolDrive,
+    actuate,
+    at_rest,
+    counted_motor,
+    drive_in_lanes,
+)
 from wristctl.simulation.reference import motion, toward
 from wristctl.simulation.rollout import rollout
 from wristctl.simulation.worlds import facing, plant_of
 from wristctl.wrist.directions import ACTIVE, DIRECTIONS, in_plane, tendons_of
 from wristctl.wrist.pcc import PCC
-from wristctl.wrist.segments import load_segments, segments
+from wristctl.wrist.segments import segments
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -73,11 +83,12 @@ class RehearsedTruth:
 
 
 @kernel
-def _reel_in(drive: Any, motors: Any, model: Any, commands: Any, out: Any, h: float) -> None:
-    known, motor = load_segments(rows_of(model)), rows_of(motors)
+def _reel_in(drive: Any, motors: Any, belief: Any, commands: Any, out: Any, h: float) -> None:
+    known, motor, on_spools = belief_in_lanes(belief), rows_of(motors), drive_in_lanes(drive)
     for tick in range(commands.shape[0]):
-        command, reeled = rows_of(commands[tick]), rows_of(out[tick])
-        reeled[0], reeled[1] = actuate(drive, motor, known, Aim(command[2], command[3]), command[0], command[1], h)
+        command, reeled = rows_of(commands[tick]), part(rows_of(out[tick]), 0, (0, 0))
+        aim = Aim(part(command, 2, (0,)), part(command, 3, (0,)), lanes_like(reeled))
+        actuate(on_spools, motor, known, aim, part(command, 0, (0, 0)), h, reeled)
 
 
 def spools(wrist: WristParameters, reference: Reference, actuator: Actuator, horizon: float, motor: Motor) -> Array:
@@ -90,9 +101,10 @@ def spools(wrist: WristParameters, reference: Reference, actuator: Actuator, hor
     rolled = rollout(law, np.zeros((1, 0)), [followed], np.zeros(1, np.int64), loop, wrist, record=True, threads=1)
     sides = [2.0 * rolled.column(name, 0) for name in ("tension_plus", "tension_minus")]
     commands = np.stack([*sides, followed.theta_ref, followed.rate_ref], axis=1)
-    drive = SpoolDrive(motor)
-    out = np.empty((len(commands), 2))
-    _reel_in(drive, at_rest(drive, wrist, PCC, np.zeros(1)), segments(wrist, 1), commands, out, _PERIOD)
+    alike, out = np.array(SIDES), np.empty((len(commands), 2))
+    drive = SpoolDrive(np.array(motor), alike * motor.stiffness)
+    begin = at_rest(drive, alike * wrist.pretension, wrist.length, PCC.taut(wrist, np.zeros(1)))
+    _reel_in(drive, begin, Sides(segments(wrist, 1)[None], alike), commands, out, _PERIOD)
     return out
 
 

@@ -1,4 +1,4 @@
-"""Actuators: from commanded pulls to the pulls that act on the wrist. A side's pull is that of its two tendons.
+"""Actuators: from commanded pulls to the pulls that act on the wrist. A place's pull is that of its tendons alike.
 
 lagged: T' = (command - T)/lag, no faster than the motor can stretch the tendon, in whole microsteps of it.
 tendon: a stepper reels tendon in; what its elastic tendons then pull is `wristctl.wrist.tendon_mechanics`'s.
@@ -8,6 +8,10 @@ It turns evenly over a control period; what is held over the period is where it 
 
 A host sends steps and believes what they are: it counts in lengths and pulls of its own belief, and what the motors
 deliver for that count is the world's (`Winding`).
+
+There is a motor for each of T places of tendons; in one plane these are the + and the - side. The state of the motors
+has two rows for each, its count, a pull or a reeled length, and its speed; a row for the torque [N m] that all of them
+withhold in each of P planes follows, and one for what each plane missed of its last torque.
 """
 
 from typing import Any, NamedTuple
@@ -16,24 +20,22 @@ import numpy as np
 
 from wristctl.arrays import Array
 from wristctl.config.plant import Actuator
-from wristctl.config.wrist import WristParameters
+from wristctl.control.belief import lengths_at, moment_arms_at, straight_at
 from wristctl.lanes.compiled import by_type, compiled, implements
 from wristctl.lanes.functions import clip, maximum
 from wristctl.lanes.lane import floor, rounded, sqrt, where, zero_like
 from wristctl.lanes.named_tuples import tuple_of
 from wristctl.lanes.rows import rows_of
-from wristctl.wrist.plant import PlantModel
-from wristctl.wrist.tendon_mechanics import travel
-from wristctl.wrist.tendons import TENDONS_PER_SIDE, lengths, moment_arms, torque_of
+from wristctl.wrist.tendons import TENDONS_PER_SIDE
 
-# Place of the torque that both sides' motors withhold [N m] in their state, after each side's count and speed.
-WITHHELD = 4
 # Length of tendon [m] that is none, however fine the microsteps.
 _ROUNDING = 1e-9
+# Tendons at each place in one plane: the + and the - side's.
+SIDES = (float(TENDONS_PER_SIDE), float(TENDONS_PER_SIDE))
 
 
 class Motor(NamedTuple):
-    """One side's motor and tendons, SI units; `stiffness` is that of both tendons together."""
+    """A motor, SI units; `stiffness` is that of one tendon."""
 
     lag: Any
     stiffness: Any
@@ -47,15 +49,17 @@ class IdealDrive(NamedTuple):
 
 
 class LaggedDrive(NamedTuple):
-    """Motors whose pulls lag behind their commands."""
+    """Motors whose pulls lag behind their commands; `stiffness` (T,) is that of all tendons of each place [N/m]."""
 
     motor: Any
+    stiffness: Any
 
 
 class SpoolDrive(NamedTuple):
-    """Motors that reel elastic tendons onto spools."""
+    """Motors that reel elastic tendons onto spools; `stiffness` (T,) is that of all tendons of each place [N/m]."""
 
     motor: Any
+    stiffness: Any
 
 
 Drive = IdealDrive | LaggedDrive | SpoolDrive
@@ -67,12 +71,8 @@ read_motor = tuple_of(Motor)
 class Winding(NamedTuple):
     """Winding error: the motors deliver `scale` times the count of their host, and `offset` [m]."""
 
-    scale: Any
-    offset: Any
-
-
-# A Winding of lanes from rows of lanes, in compiled code.
-read_winding = tuple_of(Winding)
+    scale: float
+    offset: float
 
 
 def motor_of(actuator: Actuator) -> Motor:
@@ -80,23 +80,25 @@ def motor_of(actuator: Actuator) -> Motor:
     step = actuator.step_length
     return Motor(
         lag=actuator.lag,
-        stiffness=TENDONS_PER_SIDE * actuator.tendon_stiffness,
+        stiffness=actuator.tendon_stiffness,
         step=step,
         speed=step * actuator.step_rate,
         acceleration=step * actuator.step_acceleration,
     )
 
 
-def drive_with(level: str, motor: Any) -> Drive:
-    """The drive of a level with this Motor, or with its rows of a batch; an ideal drive has none."""
+def drive_with(level: str, motor: Any, stiffness: Any) -> Drive:
+    """The drive of a level with this Motor and places of this stiffness, or with the rows of a batch; an ideal drive
+    has none."""
     if level == "ideal":
         return IdealDrive()
-    return LaggedDrive(motor) if level == "lagged" else SpoolDrive(motor)
+    return LaggedDrive(motor, stiffness) if level == "lagged" else SpoolDrive(motor, stiffness)
 
 
-def drive_of(actuator: Actuator) -> Drive:
-    """The drive of an actuator section."""
-    return drive_with(actuator.level, motor_of(actuator))
+def drive_of(actuator: Actuator, alike: Array | tuple[float, ...] = SIDES) -> Drive:
+    """The drive of an actuator section, as arrays, with so many tendons at each place (T,)."""
+    motor = motor_of(actuator)
+    return drive_with(actuator.level, np.array(motor), motor.stiffness * np.asarray(alike))
 
 
 @by_type
@@ -112,12 +114,12 @@ def _ideal_in_lanes(drive: Any) -> Any:
 
 @implements(drive_in_lanes, LaggedDrive)
 def _lagged_in_lanes(drive: Any) -> Any:
-    return LaggedDrive(read_motor(rows_of(drive.motor)))
+    return LaggedDrive(read_motor(rows_of(drive.motor)), rows_of(drive.stiffness))
 
 
 @implements(drive_in_lanes, SpoolDrive)
 def _spools_in_lanes(drive: Any) -> Any:
-    return SpoolDrive(read_motor(rows_of(drive.motor)))
+    return SpoolDrive(read_motor(rows_of(drive.motor)), rows_of(drive.stiffness))
 
 
 def counted_motor(believed: Actuator, actual: Actuator) -> Motor:
@@ -128,7 +130,7 @@ def counted_motor(believed: Actuator, actual: Actuator) -> Motor:
 
 
 def winding_of(believed: Actuator, actual: Actuator, pull: float, creep: float = 0.0) -> Winding:
-    """Meaning of a count: both sides were homed at this pull [N] on the straight wrist, where the counts are right.
+    """Meaning of a count: each tendon was homed at this pull [N] on the straight wrist, where the counts are right.
 
     `creep` is the share of the tendons' stiffness that had relaxed by then.
     """
@@ -139,28 +141,32 @@ def winding_of(believed: Actuator, actual: Actuator, pull: float, creep: float =
     return Winding(scale, pull / (does.stiffness * (1.0 - creep)) - scale * (pull / counts.stiffness))
 
 
-def at_rest(drive: Drive, wrist: WristParameters, model: PlantModel, q: Array, scale: float = 1.0) -> Array:
-    """State of the motors at pretension with the plant at q: of each side its count, a pull or a reeled length, and its
-    speed, then the torque that both withhold, none; (5,).
+def at_rest(drive: Drive, pulls: Array, straight: float, taut: Array, scale: float = 1.0, planes: int = 1) -> Array:
+    """State of the motors at rest at these pulls (T,) [N], none of which withholds anything, (2 T + 2 P,).
 
-    `wrist` is the one that is wound, `drive` as its host counts, `scale` that of the winding.
+    Tendons that are just taut are `taut` (T,) long on the wrist as it stands, and `straight` on the straight one [m];
+    `drive` is as the host counts, `scale` that of the winding.
     """
-    pull = TENDONS_PER_SIDE * wrist.pretension
-    if not isinstance(drive, SpoolDrive):
-        return np.array([pull, 0.0, pull, 0.0, 0.0])
-    plus, minus = pull / drive.motor.stiffness + wrist.length / scale - model.taut(wrist, q) / scale
-    return np.array([plus, 0.0, minus, 0.0, 0.0])
+    state = np.zeros(2 * len(pulls) + 2 * planes)
+    counts = state[: 2 * len(pulls) : 2]
+    counts[:] = pulls
+    if isinstance(drive, SpoolDrive):
+        counts[:] = pulls / drive.stiffness + straight / scale - taut / scale
+    return state
 
 
 @compiled
-def lag_pull(motor: Any, state: Any, side: int, command: Any, h: float) -> Any:
-    """Let a pull follow its command; returns it in whole microsteps, and the pull that the motor's speed withholds."""
-    fastest = motor.stiffness * motor.speed * h
-    wanted = rounded((command - state[side]) * (h / (motor.lag + h)))
+def lag_pull(motor: Any, stiffness: Any, state: Any, t: int, command: Any, h: float) -> Any:
+    """Let the pull of a place of this stiffness [N/m] follow its command.
+
+    Returns it in whole microsteps, and the pull that the motor's speed withholds.
+    """
+    fastest = stiffness * motor.speed * h
+    wanted = rounded((command - state[2 * t]) * (h / (motor.lag + h)))
     change = clip(wanted, -fastest, fastest)
-    state[side] = state[side] + change
-    quantum = rounded(motor.stiffness * motor.step)
-    return quantum * floor(state[side] / quantum + 0.5), wanted - change
+    state[2 * t] = state[2 * t] + change
+    quantum = rounded(stiffness * motor.step)
+    return quantum * floor(state[2 * t] / quantum + 0.5), wanted - change
 
 
 @compiled
@@ -183,20 +189,20 @@ def left_behind(acceleration: Any, gap: Any, closing: Any, h: float) -> Any:
 
 
 @compiled
-def reel_in(motor: Any, state: Any, side: int, target: Any, moving: Any, h: float) -> Any:
-    """Move a stepper towards its moving target with bounded speed and acceleration, evenly over a period.
+def reel_in(motor: Any, stiffness: Any, state: Any, t: int, target: Any, moving: Any, h: float) -> Any:
+    """Move the stepper of a place towards its moving target with bounded speed and acceleration, evenly over a period.
 
     Returns the length on its spool in the middle of the period, in whole microsteps, and its withheld pull: of the
     length from where it can stop to its target, where that is more than a microstep.
     """
-    gap = target - state[side]
-    speed = spool_speed(motor.speed, motor.acceleration, gap, moving, state[side + 1], h)
+    gap = target - state[2 * t]
+    speed = spool_speed(motor.speed, motor.acceleration, gap, moving, state[2 * t + 1], h)
     closing = speed - moving
-    state[side + 1] = speed
-    state[side] = state[side] + h * speed
+    state[2 * t + 1] = speed
+    state[2 * t] = state[2 * t] + h * speed
     behind = left_behind(motor.acceleration, gap, closing, h)
-    withheld = where(abs(behind) > motor.step + _ROUNDING, motor.stiffness * behind, 0.0)
-    middle = state[side] - rounded(0.5 * rounded(h * speed))
+    withheld = where(abs(behind) > motor.step + _ROUNDING, stiffness * behind, 0.0)
+    middle = state[2 * t] - rounded(0.5 * rounded(h * speed))
     return motor.step * floor(middle / motor.step + 0.5), withheld
 
 
@@ -207,95 +213,124 @@ def spool_target(pull: Any, stiffness: Any, length: Any, path: Any) -> Any:
 
 
 class Aim(NamedTuple):
-    """The reference that spools are paid out by: angle [rad], and the rate [rad/s] that they move with; in two planes
-    both are rows."""
+    """The reference that spools are paid out by: bend [rad] and the rate [rad/s] that they move with, P rows each, and
+    rows for the moment arms there."""
 
-    angle: Any
+    bend: Any
     rate: Any
+    arms: Any
 
 
 @by_type
-def actuate(drive: Any, state: Any, believed: Any, aim: Any, plus: Any, minus: Any, h: float) -> Any:
-    """Host's counts of both sides over a period of commanded pulls [N]: pulls, or lengths on spools in its middle [m].
+def actuate(drive: Any, state: Any, known: Any, aim: Any, pulls: Any, h: float, counts: Any) -> None:
+    """Write the host's counts (T rows) over a period of commanded pulls [N]: pulls, or lengths on spools in its middle
+    [m].
 
-    `believed` is the controller's wrist as Segments; at a rate of 0 in `aim` spools only close their gap. The state's
-    last value becomes the torque [N m] that the motors withhold, by this belief: what of the command their speed and
-    acceleration keep from the wrist over this period.
+    `known` is the Belief; at a rate of 0 in `aim` spools only close their gap. The rows of the state that are for it
+    become the torque [N m] that the motors withhold, by this belief: what of the command their speed and acceleration
+    keep from the wrist over this period.
     """
     raise NotImplementedError("compiled code only")
 
 
 @implements(actuate, IdealDrive)
-def _as_commanded(drive: Any, state: Any, believed: Any, aim: Any, plus: Any, minus: Any, h: float) -> Any:
-    return plus, minus
+def _as_commanded(drive: Any, state: Any, known: Any, aim: Any, pulls: Any, h: float, counts: Any) -> None:
+    for t in range(len(pulls)):
+        counts[t] = pulls[t]
+
+
+@compiled
+def _begin_withholding(state: Any, pulls: Any, bend: Any) -> None:
+    for p in range(len(bend)):
+        state[2 * len(pulls) + p] = zero_like(bend[p])
+
+
+@compiled
+def _withhold(state: Any, pulls: Any, aim: Any, t: int, less: Any) -> None:
+    """Add a place's withheld pull [N] to the torque that all of them withhold."""
+    count = len(pulls)
+    for p in range(len(aim.bend)):
+        state[2 * count + p] = state[2 * count + p] + less * aim.arms[count * p + t]
 
 
 @implements(actuate, LaggedDrive)
-def _lagged(drive: Any, state: Any, believed: Any, aim: Any, plus: Any, minus: Any, h: float) -> Any:
-    pull_plus, less_plus = lag_pull(drive.motor, state, 0, plus, h)
-    pull_minus, less_minus = lag_pull(drive.motor, state, 2, minus, h)
-    state[WITHHELD] = torque_of(aim.angle, believed, less_plus, less_minus)
-    return pull_plus, pull_minus
+def _lagged(drive: Any, state: Any, known: Any, aim: Any, pulls: Any, h: float, counts: Any) -> None:
+    moment_arms_at(known.wrist, aim.bend, aim.arms)
+    _begin_withholding(state, pulls, aim.bend)
+    for back in range(len(pulls)):
+        t = len(pulls) - 1 - back
+        counts[t], less = lag_pull(drive.motor, drive.stiffness[t], state, t, pulls[t], h)
+        _withhold(state, pulls, aim, t, less)
 
 
 @implements(actuate, SpoolDrive)
-def _reeled(drive: Any, state: Any, believed: Any, aim: Any, plus: Any, minus: Any, h: float) -> Any:
-    motor, (path_plus, path_minus) = drive.motor, lengths(aim.angle, believed)
-    arm_plus, arm_minus = moment_arms(aim.angle, believed)
-    target_plus = spool_target(plus, motor.stiffness, believed.length, path_plus)
-    target_minus = spool_target(minus, motor.stiffness, believed.length, path_minus)
-    reeled_plus, less_plus = reel_in(motor, state, 0, target_plus, rounded(arm_plus * aim.rate), h)
-    reeled_minus, less_minus = reel_in(motor, state, 2, target_minus, rounded(arm_minus * aim.rate), h)
-    state[WITHHELD] = torque_of(aim.angle, believed, less_plus, less_minus)
-    return reeled_plus, reeled_minus
+def _reeled(drive: Any, state: Any, known: Any, aim: Any, pulls: Any, h: float, counts: Any) -> None:
+    count = len(pulls)
+    lengths_at(known.wrist, aim.bend, counts)
+    moment_arms_at(known.wrist, aim.bend, aim.arms)
+    _begin_withholding(state, pulls, aim.bend)
+    for back in range(count):
+        t = count - 1 - back
+        moving = rounded(aim.arms[t] * aim.rate[0])
+        for p in range(1, len(aim.bend)):
+            moving = moving + rounded(aim.arms[count * p + t] * aim.rate[p])
+        target = spool_target(pulls[t], drive.stiffness[t], straight_at(known.wrist, t), counts[t])
+        counts[t], less = reel_in(drive.motor, drive.stiffness[t], state, t, target, moving, h)
+        _withhold(state, pulls, aim, t, less)
 
 
 @by_type
-def wound(drive: Any, winding: Any, plus: Any, minus: Any) -> Any:
-    """Pulls [N] or lengths [m] that the motors of both sides deliver for what their host counts."""
+def deliver(drive: Any, winding: Any, counts: Any, delivered: Any) -> None:
+    """Write the pulls [N] or lengths [m] that the motors deliver for what their host counts (T rows each).
+
+    `winding` has the scale of the counts, then the offset of each place [m].
+    """
     raise NotImplementedError("compiled code only")
 
 
-@implements(wound, IdealDrive)
-def _as_counted(drive: Any, winding: Any, plus: Any, minus: Any) -> Any:
-    return plus, minus
+@implements(deliver, IdealDrive)
+def _as_counted(drive: Any, winding: Any, counts: Any, delivered: Any) -> None:
+    for t in range(len(counts)):
+        delivered[t] = counts[t]
 
 
-@implements(wound, LaggedDrive, SpoolDrive)
-def _scaled(drive: Any, winding: Any, plus: Any, minus: Any) -> Any:
-    return winding.scale * plus + winding.offset, winding.scale * minus + winding.offset
+@implements(deliver, LaggedDrive, SpoolDrive)
+def _scaled(drive: Any, winding: Any, counts: Any, delivered: Any) -> None:
+    for t in range(len(counts)):
+        delivered[t] = winding[0] * counts[t] + winding[1 + t]
 
 
 @by_type
-def frictionless_pulls(drive: Any, believed: Any, theta: Any, plus: Any, minus: Any) -> Any:
-    """Pulls [N] of both sides on segments at theta from what their motors deliver, of tendons that slide freely."""
+def frictionless_pulls(drive: Any, known: Any, bend: Any, counts: Any, pulls: Any) -> None:
+    """Write the pulls [N] on a wrist bent like this [rad] of what the host counts, of tendons that slide freely."""
     raise NotImplementedError("compiled code only")
 
 
 @implements(frictionless_pulls, IdealDrive, LaggedDrive)
-def _delivered_pulls(drive: Any, believed: Any, theta: Any, plus: Any, minus: Any) -> Any:
-    return plus, minus
+def _delivered_pulls(drive: Any, known: Any, bend: Any, counts: Any, pulls: Any) -> None:
+    for t in range(len(pulls)):
+        pulls[t] = counts[t]
 
 
 @implements(frictionless_pulls, SpoolDrive)
-def _stretched(drive: Any, believed: Any, theta: Any, plus: Any, minus: Any) -> Any:
-    path_plus, path_minus, _ = travel(believed, theta)
-    stiffness = drive.motor.stiffness
-    return stiffness * maximum(0.0, plus - path_plus), stiffness * maximum(0.0, minus - path_minus)
+def _stretched(drive: Any, known: Any, bend: Any, counts: Any, pulls: Any) -> None:
+    lengths_at(known.wrist, bend, pulls)
+    for t in range(len(pulls)):
+        stretch = counts[t] - (straight_at(known.wrist, t) - pulls[t])
+        pulls[t] = drive.stiffness[t] * maximum(0.0, stretch)
 
 
 @by_type
-def tendon_stiffness(drive: Any, segment: Any, theta: Any) -> Any:
-    """Stiffness [N m/rad] that elastic tendons on held spools add to one segment at theta; 0 without them."""
+def held_stiffness(drive: Any, zero: Any) -> Any:
+    """Stiffness [N/m] of one elastic tendon on a held spool; 0 without them."""
     raise NotImplementedError("compiled code only")
 
 
-@implements(tendon_stiffness, IdealDrive, LaggedDrive)
-def _none(drive: Any, segment: Any, theta: Any) -> Any:
-    return zero_like(theta)
+@implements(held_stiffness, IdealDrive, LaggedDrive)
+def _none(drive: Any, zero: Any) -> Any:
+    return zero
 
 
-@implements(tendon_stiffness, SpoolDrive)
-def _on_spools(drive: Any, segment: Any, theta: Any) -> Any:
-    arm_plus, arm_minus = moment_arms(theta, segment)
-    return drive.motor.stiffness * (arm_plus * arm_plus + arm_minus * arm_minus)
+@implements(held_stiffness, SpoolDrive)
+def _on_spools(drive: Any, zero: Any) -> Any:
+    return drive.motor.stiffness

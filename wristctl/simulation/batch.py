@@ -1,4 +1,7 @@
-"""A batch of rollouts as the kernel wants it: its parts as blocks of lanes."""
+"""A batch of rollouts as the kernel wants it: its parts as blocks of lanes.
+
+In one plane the places of tendons are the + and the - side; in two they are those of a layout.
+"""
 
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
@@ -8,27 +11,38 @@ from numpy.typing import NDArray
 
 from wristctl.arrays import Array
 from wristctl.config.loop import sample_period
-from wristctl.config.plant import Actuator
+from wristctl.config.plant import Disturbances, TendonFacts
 from wristctl.config.wrist import WristParameters
+from wristctl.control.belief import Compensated, Ignored, Places, Sides
 from wristctl.control.law import REFERENCE, Controller, signals_of
+from wristctl.control.response import OF_A_PLANE
+from wristctl.errors import UserError
 from wristctl.lanes.blocks import lanes_of, spread
 from wristctl.seeds import Entropy
-from wristctl.simulation.actuator import Winding, at_rest, counted_motor, drive_with, motor_of, winding_of
-from wristctl.simulation.disturbances import acting
-from wristctl.simulation.frames import frame_counts, readings, remembered, side_by_side
+from wristctl.simulation.actuator import SIDES, at_rest, counted_motor, drive_with, motor_of, winding_of
+from wristctl.simulation.bend_sums import BEND_SUMS, BendGoals
+from wristctl.simulation.cameras import cameras_of
+from wristctl.simulation.disturbances import acting_in_space
 from wristctl.simulation.kernel import Disturbed, LoopCourse, LoopState, LoopValues, Scratch, Setup, Undisturbed
 from wristctl.simulation.motion import Motion
 from wristctl.simulation.nonideal import inner_of, is_ideal, nonideal_of, unmoved
-from wristctl.simulation.observer import NoCamera, Observer, Schedule, Watch
-from wristctl.simulation.stationary_filter import Belief, stationary_gains
-from wristctl.simulation.sums import SUMS
+from wristctl.simulation.sums import SUMS, MoveGoals
 from wristctl.simulation.worlds import World, bending_limit, check_stops
 from wristctl.wrist.dahl import NoInnerFriction
+from wristctl.wrist.directions import in_plane
 from wristctl.wrist.plant import PlantModel
 from wristctl.wrist.segments import segments
-from wristctl.wrist.tendon_mechanics import ElasticTendons, NoTendons, PulledTendons, RealTendons, Tendons
+from wristctl.wrist.spatial.pcc_in_space import placed_values
+from wristctl.wrist.spatial.spatial_segments import OF_A_TENDON
+from wristctl.wrist.spatial.spooled_tendons import OF_A_STATE, ElasticPlaces, HeldPlaces, RubbingPlaces
+from wristctl.wrist.tendon_layout import TendonLayout
+from wristctl.wrist.tendon_mechanics import ElasticTendons, NoTendons, PulledTendons, RealTendons
 from wristctl.wrist.tendons import TENDONS_PER_SIDE
 
+# Pull [N] in two planes for tensions without a limit: no wrist's wants are as large.
+_NO_LIMIT = 1e6
+# Planes of the two bends, in their order.
+PLANES = ("ulnar", "flexion")
 Indices = NDArray[np.int64]
 # The coordinates (q,) at which a plant begins, at rest.
 Start = Callable[[WristParameters], Array]
@@ -48,10 +62,11 @@ class Batch(NamedTuple):
 
     def scratch(self) -> Scratch:
         """Rows to work on, for one thread."""
-        now, target, case = (
-            np.zeros((rows, *self.wide)) for rows in (signals_of(self.setup.preview), len(REFERENCE), 2)
+        planes = len(self.setup.bend)
+        now, target = (
+            np.zeros((planes, rows, *self.wide)) for rows in (signals_of(self.setup.preview), len(REFERENCE))
         )
-        return Scratch(now, target, case)
+        return Scratch(now, target, np.zeros((4, *self.wide)))
 
 
 class Lanes(NamedTuple):
@@ -60,6 +75,71 @@ class Lanes(NamedTuple):
     motion: Indices
     world: Indices
     streams: Sequence[Entropy]
+
+
+class _Worlds:
+    """Rows of the worlds that rollouts have, as blocks of lanes."""
+
+    def __init__(self, worlds: Sequence[World], which: Indices, layout: TendonLayout | None) -> None:
+        self.worlds, self.which, self.count, self.layout = list(worlds), which, len(which), layout
+        self.actual = [world.plant for world in worlds]
+        self.actuators = [world.actuator for world in worlds]
+        self.loop = worlds[0].loop
+        self.period, self.level = self.loop.control_period, self.loop.actuator.level
+        self.alike = np.array(SIDES) if layout is None else layout.multiplicity.astype(float)
+        self.counted = [
+            counted_motor(world.loop.actuator, actuator) for world, actuator in zip(worlds, self.actuators, strict=True)
+        ]
+        self.windings = [
+            winding_of(world.loop.actuator, actuator, world.wrist.pretension, world.loop.plant.actuator.creep)
+            for world, actuator in zip(worlds, self.actuators, strict=True)
+        ]
+
+    @property
+    def blocks(self) -> int:
+        """Number of blocks."""
+        return 1 if self.count == 1 else len(lanes_of(self.count))
+
+    @property
+    def wide(self) -> tuple[int, ...]:
+        """(LANES,), or () for a rollout alone."""
+        return lanes_of(self.count).shape[1:]
+
+    def rows(self, row: Callable[[int], Array]) -> Array:
+        """A row of each world's as blocks; of one world as one block for all."""
+        if len(self.worlds) == 1:
+            return spread(row(0), max(1, *self.wide, 1))[:1]
+        return self.of_each(row)
+
+    def of_each(self, row: Callable[[int], Array]) -> Array:
+        """A row of each world's as blocks, which rollouts may change."""
+        return spread(np.array([row(index) for index in range(len(self.worlds))])[self.which], self.count)
+
+    def limits(self, index: int) -> Array:
+        """Least and greatest pull at each place [N], then the bend [rad] beyond which a wrist has failed."""
+        loop, wrist = self.worlds[index]
+        free = np.inf if self.layout is None else _NO_LIMIT
+        pulls: Array = self.alike * np.array([[wrist.pretension], [wrist.tension_limit if loop.limits else free]])
+        return np.append(pulls, bending_limit(self.actual[index], loop.plant.end_stop_deg))
+
+    def stiffness(self, index: int) -> Array:
+        """Believed stiffness of all tendons of each place [N/m]."""
+        stiffness: Array = self.alike * self.counted[index].stiffness
+        return stiffness
+
+    def offsets(self, index: int) -> Array:
+        """Scale of the motors' counts, and the offset of each place [m]."""
+        winding, facts = self.windings[index], self.worlds[index].loop.plant.actuator
+        slack = np.zeros(len(self.alike)) if self.layout is None else _slack(facts, len(self.alike))
+        return np.array([winding.scale, *(winding.offset - slack)])
+
+    def motors(self, index: int, taut: Array) -> Array:
+        """State of the motors at rest where tendons that are just taut are so long [m] (T,)."""
+        wrist = self.actual[index]
+        drive = drive_with(self.level, self.counted[index], self.stiffness(index))
+        pulls = self.alike * wrist.pretension
+        planes = 1 if self.layout is None else 2
+        return at_rest(drive, pulls, wrist.length, taut, self.windings[index].scale, planes)
 
 
 def batch(
@@ -71,98 +151,78 @@ def batch(
     model: PlantModel,
     start: Start | None,
     columns: int,
+    layout: TendonLayout | None = None,
+    force: Array | None = None,
 ) -> Batch:
-    """The batch of `rollout`, which records so many columns; all worlds have the same structure and timing."""
+    """The batch of `rollout`, which records so many columns; all worlds have the same structure and timing.
+
+    In two planes `layout` has the places of the tendons, and `force` (3, T) [N] acts on the tip beside the loops' own
+    disturbances.
+    """
     filmed, (worlds, body) = worlds, _bodies(worlds)
-    world_index = body[lanes.world]
-    references = np.empty((len(motions), 3, len(motions[0].time)))
+    references = np.empty((len(motions), OF_A_PLANE * model.planes, len(motions[0].time)))
     for target, followed_motion in zip(references, motions, strict=True):
         followed_motion.angles.into(target)
-    check_stops(worlds, references[:, 0])
-    loop, count = worlds[0].loop, len(gains)
-    n, period = loop.plant_segments, loop.control_period
-    k, level = model.coordinates(n), loop.actuator.level
-    ticks, samples = max(1, round(sample_period(period) / period)), references.shape[2]
-    followed, blocks = lanes_of(count), 1 if count == 1 else len(lanes_of(count))
-    wide = followed.shape[1:]
-    actual = [world.plant for world in worlds]
-    coordinates = np.zeros((len(worlds), k)) if start is None else np.array([start(wrist) for wrist in actual])
-    actuators = [world.actuator for world in worlds]
-    counted = [counted_motor(world.loop.actuator, actuator) for world, actuator in zip(worlds, actuators, strict=True)]
-    windings = [_winding(world, actuator) for world, actuator in zip(worlds, actuators, strict=True)]
-    step = period / loop.steps
-    nonideals = [
-        nonideal_of(world.loop.plant, actuator, world.loop.plant.actuator, step)
-        for world, actuator in zip(worlds, actuators, strict=True)
-    ]
-    plants = [world.loop.plant for world in worlds]
-    inner = inner_of(
-        plants, coordinates, np.zeros(len(worlds)), lambda rows: spread(np.ascontiguousarray(rows[world_index]), count)
-    )
-    ideal = all(map(is_ideal, nonideals)) and isinstance(inner, NoInnerFriction)
-
-    def of_worlds(row: Callable[[int], Array]) -> Array:
-        """A row of each world's as blocks; of one world as one block for all."""
-        if len(worlds) == 1:
-            return spread(row(0), max(1, *wide, 1))[:1]
-        return spread(np.array([row(index) for index in range(len(worlds))])[world_index], count)
-
-    def limits(index: int) -> Array:
-        loop, wrist = worlds[index]
-        most = wrist.tension_limit if loop.limits else np.inf
-        return np.array([wrist.pretension, most, bending_limit(actual[index], loop.plant.end_stop_deg)])
-
-    def at_the_motors(index: int) -> Array:
-        return at_rest(
-            drive_with(level, counted[index]), actual[index], model, coordinates[index], windings[index].scale
-        )
-
-    def resting(index: int) -> Array:
-        """State of a world's tendons and springs at rest."""
-        counts, lengths = at_the_motors(index)[[0, 2]], model.taut(actual[index], coordinates[index])
-        reeled, short = windings[index].scale * counts + windings[index].offset, actual[index].length - lengths
-        path = np.append(short, np.abs(coordinates[index]).sum())
-        return unmoved(reeled, path, reeled - short, coordinates[index])
-
-    def tendons() -> Tendons:
-        stiffness = of_worlds(lambda index: np.array([motor_of(actuators[index]).stiffness]))
-        if ideal:
-            return ElasticTendons(stiffness) if level == "tendon" else NoTendons()
-        nonideal = of_worlds(lambda index: np.array(nonideals[index]))
-        state = spread(np.array([resting(index) for index in range(len(worlds))])[world_index], count)
-        real = RealTendons(stiffness, nonideal, state, inner)
-        return real if level == "tendon" else PulledTendons(nonideal, state, inner)
-
-    ends = zip(motions, references[:, 0, -1], strict=True)
-    goals = np.array([followed_motion.goals_at(end) for followed_motion, end in ends])[lanes.motion]
-    watch, frames = _watch(filmed, lanes, motions[0].horizon, model, coordinates[body])
+    if layout is None:
+        check_stops(worlds, references[:, 0])
+    of = _Worlds(worlds, body[lanes.world], layout)
+    loop, count, planes, places = of.loop, len(gains), model.planes, len(of.alike)
+    k = model.coordinates(loop.plant_segments)
+    ticks, samples = max(1, round(sample_period(of.period) / of.period)), references.shape[2]
+    followed, blocks, wide = lanes_of(count), of.blocks, of.wide
+    coordinates = np.zeros((len(worlds), k)) if start is None else np.array([start(wrist) for wrist in of.actual])
+    if layout is None:
+        taut = [model.taut(wrist, at) for wrist, at in zip(of.actual, coordinates, strict=True)]
+    else:
+        taut = [np.full(places, wrist.length) for wrist in of.actual]
+    motors = [of.motors(index, lengths) for index, lengths in enumerate(taut)]
+    counts = [state[: 2 * places : 2] for state in motors]
+    starts = np.zeros(len(filmed)) if layout is not None else model.angle(coordinates[body])
+    watch, frames = cameras_of(filmed, lanes.world, lanes.streams, motions[0].horizon, starts, layout)
+    belief: Sides | Places
+    if layout is None:
+        tendons: object = _sides(of, coordinates, taut, counts)
+        plants = of.rows(lambda index: model.values(of.actual[index], loop.plant_segments))
+        belief = Sides(of.rows(lambda index: segments(of.worlds[index].wrist, 1))[:, None], of.rows(lambda _: of.alike))
+        ends = zip(motions, references[:, 0, -1], strict=True)
+        goals = np.array([followed_motion.goals_at(end) for followed_motion, end in ends])[lanes.motion]
+        aims: MoveGoals | BendGoals = MoveGoals(spread(goals, count))
+    else:
+        tendons = _places(of, layout, counts)
+        plants = of.rows(lambda index: _placed(of.worlds[index], of.actual[index], layout, loop.plant_segments))
+        belief = _beliefs_in_space(of, layout)
+        aims = BendGoals(max(1, samples // 10), samples)
     values = LoopValues(
-        plant=of_worlds(lambda index: model.values(actual[index], n)),
-        model=of_worlds(lambda index: segments(worlds[index].wrist, 1)),
-        limits=of_worlds(limits),
-        drive=drive_with(level, of_worlds(lambda index: np.array(counted[index]))),
-        lead=of_worlds(lambda index: np.array([float(worlds[index].loop.spool_lead)])),
-        winding=of_worlds(lambda index: np.array(windings[index])),
+        plant=plants,
+        belief=belief,
+        limits=of.rows(of.limits),
+        drive=drive_with(of.level, of.rows(lambda index: np.array(of.counted[index])), of.rows(of.stiffness)),
+        lead=of.rows(lambda index: np.array([float(of.worlds[index].loop.spool_lead)])),
+        winding=of.rows(of.offsets),
         gains=spread(gains.reshape(count, -1), count),
-        goals=spread(goals, count),
+        goals=aims,
         schedule=frames,
     )
     kinds = list(dict.fromkeys(world.loop.disturbances for world in worlds))
-    cases = [acting(kind, motions[0].time) for kind in kinds]
-    case = np.array([kinds.index(world.loop.disturbances) for world in worlds])[world_index]
+    cases = [_acting(kind, motions[0].time, planes, force) for kind in kinds]
+    case = np.array([kinds.index(world.loop.disturbances) for world in worlds])[of.which]
+    memory, summed = max(1, controller.memory), len(SUMS) + places + (0 if layout is None else len(BEND_SUMS) + places)
     state = LoopState(
         which=lanes.motion[followed].reshape(blocks, -1),
         case=case[followed].reshape(blocks, -1),
-        memory=spread(np.zeros(max(1, controller.memory)), count),
-        coordinates=spread(np.concatenate([coordinates, np.zeros_like(coordinates)], axis=1)[world_index], count),
-        motors=spread(np.array([at_the_motors(index) for index in range(len(worlds))])[world_index], count),
-        tendons=tendons(),
-        sums=spread(np.array([float(name == "alive") for name in SUMS]), count),
+        memory=spread(np.zeros(planes * memory), count).reshape(blocks, planes, memory, *wide),
+        coordinates=spread(np.concatenate([coordinates, np.zeros_like(coordinates)], axis=1)[of.which], count),
+        motors=spread(np.array(motors)[of.which], count),
+        tendons=tendons,
+        sums=spread(np.eye(1, summed, SUMS.index("alive"))[0], count),
         record=np.empty((blocks, samples if columns else 0, columns, *wide)),
         watch=watch,
     )
     course = LoopCourse(references, _disturbances(cases, samples))
-    setup = Setup(controller.compiled(count), model, (0,) * k, period, loop.steps, ticks, controller.preview)
+    setup = Setup(
+        controller.compiled(count), model, (0,) * k, (0,) * planes, (0,) * places, (0,) * (planes * places),
+        (0,) * (OF_A_PLANE * planes), of.period, loop.steps, ticks, controller.preview,
+    )  # fmt: skip
     return Batch(setup, course, values, state, blocks, samples, wide)
 
 
@@ -176,54 +236,116 @@ def _bodies(worlds: Sequence[World]) -> tuple[list[World], Indices]:
     return [world for _, world in bodies.values()], np.array(which)
 
 
+def _sides(
+    of: _Worlds, coordinates: Array, taut: Sequence[Array], counts: Sequence[Array]
+) -> NoTendons | PulledTendons | ElasticTendons | RealTendons:
+    """Tendons of the + and the - side in one plane."""
+    plants = [world.loop.plant for world in of.worlds]
+    nonideals = [
+        nonideal_of(plant, actuator, plant.actuator, of.period / of.loop.steps)
+        for plant, actuator in zip(plants, of.actuators, strict=True)
+    ]
+    inner = inner_of(
+        plants,
+        coordinates,
+        np.zeros(len(plants)),
+        lambda rows: spread(np.ascontiguousarray(rows[of.which]), of.count),
+    )
+    stiffness = of.rows(lambda index: np.array([TENDONS_PER_SIDE * motor_of(of.actuators[index]).stiffness]))
+    if all(map(is_ideal, nonideals)) and isinstance(inner, NoInnerFriction):
+        return ElasticTendons(stiffness) if of.level == "tendon" else NoTendons()
+
+    def resting(index: int) -> Array:
+        winding, q = of.windings[index], coordinates[index]
+        reeled, short = winding.scale * counts[index] + winding.offset, of.actual[index].length - taut[index]
+        return unmoved(reeled, np.append(short, np.abs(q).sum()), reeled - short, q)
+
+    nonideal, state = of.rows(lambda index: np.array(nonideals[index])), of.of_each(resting)
+    return (
+        RealTendons(stiffness, nonideal, state, inner)
+        if of.level == "tendon"
+        else PulledTendons(nonideal, state, inner)
+    )
+
+
+def _places(of: _Worlds, layout: TendonLayout, counts: Sequence[Array]) -> HeldPlaces | ElasticPlaces | RubbingPlaces:
+    """Tendons at the places of a layout."""
+    places, facts = len(of.alike), [world.loop.plant.actuator for world in of.worlds]
+    pulls, broken_at = (0,) * places, of.rows(lambda index: _broken_at(facts[index], places))
+    if of.level != "tendon":
+        return HeldPlaces(broken_at, spread(np.zeros(places), of.count), pulls)
+    whole = of.rows(lambda index: of.alike * motor_of(of.actuators[index]).stiffness)
+    backlash = of.rows(lambda index: np.array([facts[index].backlash]))
+    reeled = of.of_each(lambda index: of.offsets(index)[0] * counts[index] + of.offsets(index)[1:])
+    stiffness = spread(np.zeros(places), of.count)
+    if not any(actuator.friction for actuator in of.actuators):
+        return ElasticPlaces(whole, broken_at, backlash, stiffness, reeled, pulls)
+    friction = of.rows(
+        lambda index: np.array([
+            of.actuators[index].friction, of.actuators[index].sheath, 1.0 / of.actuators[index].presliding,
+        ])
+    )  # fmt: skip
+    state, travel = spread(np.zeros(OF_A_STATE * places), of.count), spread(np.zeros(places), of.count)
+    return RubbingPlaces(whole, broken_at, backlash, stiffness, reeled, friction, 0, 0, state, travel, pulls)
+
+
+def _placed(world: World, wrist: WristParameters, layout: TendonLayout, n: int) -> Array:
+    """Values of the wrist in space as it is: with the places of the study on the true circle of tendons."""
+    own = layout if wrist.tendon_radius == world.wrist.tendon_radius else TendonLayout.of(wrist)
+    return placed_values(wrist, own, n)
+
+
+def _beliefs_in_space(of: _Worlds, layout: TendonLayout) -> Places:
+    def models(index: int) -> Array:
+        return np.concatenate([segments(in_plane(of.worlds[index].wrist, plane), 1) for plane in PLANES])
+
+    rows, places = of.rows(models), len(of.alike)
+    return Places(
+        rows.reshape(len(rows), len(PLANES), -1, *rows.shape[2:]),
+        of.rows(lambda _: of.alike),
+        of.rows(lambda index: placed_values(of.worlds[index].wrist, layout, 1)),
+        (0,) * (OF_A_TENDON * places),
+        (0,) * places,
+        Compensated() if of.loop.coupling == "compensated" else Ignored(),
+    )
+
+
+def _slack(facts: TendonFacts, places: int) -> Array:
+    slack = np.zeros(places)
+    if len(facts.slack) > places:
+        what = f"{len(facts.slack)} tendons with slack of {places}"
+        raise UserError(what, "loop.plant.actuator.slack", f"at most {places} values")
+    slack[: len(facts.slack)] = facts.slack
+    return slack
+
+
+def _broken_at(facts: TendonFacts, places: int) -> Array:
+    times = np.full(places, np.inf)
+    if facts.broken_at is not None:
+        if facts.broken_tendon > places:
+            what = f"tendon {facts.broken_tendon} of {places} cannot break"
+            raise UserError(what, "loop.plant.actuator.broken_tendon", f"1 to {places}")
+        times[facts.broken_tendon - 1] = facts.broken_at
+    return times
+
+
+def _acting(settings: Disturbances, time: Array, planes: int, force: Array | None) -> Array | None:
+    """Force on the tip (3) [N] and scale of the stiffness, (4, T); None where nothing acts.
+
+    In one plane all of a force acts toward that plane.
+    """
+    pushes = acting_in_space(settings if planes == 2 else settings.model_copy(update={"toward_deg": 0.0}), time)
+    if pushes is None and force is None:
+        return None
+    table = np.tile([[0.0], [0.0], [0.0], [1.0]], len(time)) if pushes is None else pushes.T.copy()
+    if force is not None:
+        table[:3] += force
+    return table
+
+
 def _disturbances(cases: Sequence[Array | None], samples: int) -> Disturbed | Undisturbed:
     """Disturbances of all cases, of which one where nothing acts is None."""
     if all(case is None for case in cases):
         return Undisturbed()
-    nothing = np.tile((0.0, 1.0), (samples, 1))
-    return Disturbed(np.array([(nothing if case is None else case).T for case in cases]))
-
-
-def _watch(
-    worlds: Sequence[World], lanes: Lanes, horizon: float, model: PlantModel, coordinates: Array
-) -> tuple[Watch, Schedule] | tuple[NoCamera, NoCamera]:
-    """Cameras with their observers by block."""
-    loop, count = worlds[0].loop, len(lanes.motion)
-    if loop.sensor.level == "ideal":
-        return NoCamera(), NoCamera()
-    sensors = [world.sensor for world in worlds]
-    believed, period = [world.loop.sensor for world in worlds], loop.control_period
-    tables, camera = side_by_side(sensors, believed, period, horizon)
-    bursts = [worlds[index].loop.plant.sensor.burst for index in lanes.world]
-    counts = frame_counts(sensors, horizon)[lanes.world].tolist()
-    taken = readings(counts, [sensors[index] for index in lanes.world], lanes.streams, bursts)
-    taken[:, :, 0] += np.deg2rad([worlds[index].loop.plant.sensor.zero_deg for index in lanes.world])[:, None]
-    order = lanes_of(count)
-    blocks, wide = 1 if count == 1 else len(order), order.shape[1:]
-    by_block = np.array(
-        [np.moveaxis(taken[block], 0, -1) for block in order.reshape(blocks, -1)]
-    )  # (blocks, F, 2, lanes)
-    cameras = camera[lanes.world][order].reshape(blocks, -1)
-    different = cameras if camera.any() else cameras[:1]
-    frames = Schedule(*(np.ascontiguousarray(np.moveaxis(table[..., different], -2, 0)) for table in tables))
-    gains = stationary_gains([_belief(world) for world in worlds])
-    start = np.zeros((len(worlds), 3))
-    start[:, 0] = model.angle(coordinates)
-    now = spread(start[lanes.world], count)
-    observer = Observer(
-        gain=spread(gains[lanes.world], count),
-        delivered=np.zeros((blocks, remembered(sensors, believed, period), 2, *wide)),
-        fused=now, now=now.copy(), at=np.zeros((blocks, 1, *wide)),
-    )  # fmt: skip
-    pictures = np.zeros((blocks, taken.shape[1], *wide))
-    turn, arriving = np.zeros((blocks, 2, cameras.shape[1]), np.int64), np.zeros((blocks, 3, *wide))
-    return Watch(by_block.reshape(*by_block.shape[:3], *wide), pictures, turn, arriving, observer), frames
-
-
-def _belief(world: World) -> Belief:
-    return Belief(world.loop.sensor, world.loop.actuator, world.wrist, world.loop.control_period)
-
-
-def _winding(world: World, actual: Actuator) -> Winding:
-    pull = TENDONS_PER_SIDE * world.wrist.pretension
-    return winding_of(world.loop.actuator, actual, pull, world.loop.plant.actuator.creep)
+    nothing = np.tile([[0.0], [0.0], [0.0], [1.0]], samples)
+    return Disturbed(np.array([nothing if case is None else case for case in cases]))

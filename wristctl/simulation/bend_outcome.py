@@ -7,13 +7,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wristctl.arrays import Array
+from wristctl.control.response import OF_A_PLANE
 from wristctl.lanes.blocks import to_rows
+from wristctl.simulation.batch import Batch
 from wristctl.simulation.bend_course import BEND_METRICS, BendCourse, BendTotals
 from wristctl.simulation.bend_sums import BEND_SUMS
+from wristctl.simulation.kernel import columns_of_brief, columns_of_sample
 from wristctl.simulation.oscillation import oscillations
-from wristctl.simulation.spatial_batch import SpatialBatch
-from wristctl.simulation.spatial_kernel import SPATIAL_BRIEFLY, SPATIAL_RECORDED
+from wristctl.simulation.sums import SUMS
 from wristctl.simulation.worlds import World
+from wristctl.wrist.tendon_layout import TendonLayout
 
 
 @dataclass(frozen=True)
@@ -52,10 +55,12 @@ class BendOutcome:
         return oscillation
 
 
-def bend_outcome(lanes: SpatialBatch, time: Array, worlds: Sequence[World]) -> BendOutcome:
+def bend_outcome(rollouts: Batch, time: Array, worlds: Sequence[World], layout: TendonLayout) -> BendOutcome:
     """Outcome of a batch's rollouts that ran to the end; `time` [s] is that of samples."""
-    count, wanted = len(worlds), lanes.course.references[:, 0].T
-    sums = dict(zip(BEND_SUMS, to_rows(lanes.state.sums, count).T, strict=False))
+    count, wanted = len(worlds), rollouts.course.references[0, [0, OF_A_PLANE]].T
+    names = columns_of_sample(2, len(layout.places))
+    own = to_rows(rollouts.state.sums, count)[:, len(SUMS) + len(layout.places) :]
+    sums = dict(zip(BEND_SUMS, own.T, strict=False))
     alive, totals = sums["alive"] > 0.0, BendTotals(sums, time)
     metrics = dict[str, Array]()
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -63,35 +68,39 @@ def bend_outcome(lanes: SpatialBatch, time: Array, worlds: Sequence[World]) -> B
             if metric.of_totals is not None:
                 value = metric.of_totals(totals)
                 metrics[name] = np.where(alive, value, np.nan) if metric.of_error else value
-    record, bends, courses = lanes.state.record, None, list[BendCourse]()
+    record, bends, courses = rollouts.state.record, None, list[BendCourse]()
     if record.shape[1]:
         flat = record.reshape(len(record), -1, *record.shape[3:])
         recorded = to_rows(flat, count).reshape(count, len(time), -1)
-        bends, spooled = recorded[:, :, :2], worlds[0].loop.actuator.level == "tendon"
-        if record.shape[2] > len(SPATIAL_BRIEFLY):
+        bends = recorded[:, :, :2]
+        if record.shape[2] > columns_of_brief(2):
             courses = [
-                _course(rows, time, wanted, world, lanes.places, spooled)
-                for rows, world in zip(recorded, worlds, strict=True)
+                _course(rows, names, time, wanted, world, layout) for rows, world in zip(recorded, worlds, strict=True)
             ]
     return BendOutcome(metrics, ~alive, sums["until"], time, wanted, bends, courses)
 
 
-def _course(rows: Array, time: Array, wanted: Array, world: World, places: int, spooled: bool) -> BendCourse:
-    first = len(SPATIAL_RECORDED)
+def _course(
+    rows: Array, names: Sequence[str], time: Array, wanted: Array, world: World, layout: TendonLayout
+) -> BendCourse:
+    def of(name: str) -> Array:
+        """Columns of a name, of all planes or places."""
+        return rows[:, [number for number, column in enumerate(names) if column.rpartition("_")[0] == name]]
+
     return BendCourse(
         time=time,
-        bend=rows[:, 0:2],
-        rate=rows[:, 2:4],
+        bend=of("bend"),
+        rate=of("rate"),
         bend_ref=wanted,
-        bend_seen=rows[:, 9:11],
-        load_seen=rows[:, 11:13],
-        torque_wanted=rows[:, 4:6],
-        torque=rows[:, 6:8],
-        share=rows[:, 8],
-        pulls=rows[:, first : first + places],
-        acting=rows[:, first + places : first + 2 * places],
-        coordinates=rows[:, first + 3 * places :],
+        bend_seen=of("seen"),
+        load_seen=of("load"),
+        torque_wanted=of("torque_wanted"),
+        torque=of("torque"),
+        share=rows[:, names.index("share")],
+        pulls=layout.multiplicity * of("tension"),
+        acting=layout.multiplicity * of("acting"),
+        coordinates=rows[:, len(names) :],
         length=world.plant.length,
         length_known=world.wrist.length,
-        spools=rows[:, first + 2 * places : first + 3 * places] if spooled else None,
+        spools=of("delivered") if world.loop.actuator.level == "tendon" else None,
     )

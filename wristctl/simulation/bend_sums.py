@@ -31,6 +31,13 @@ class Errors(NamedTuple):
     tip: Any
 
 
+class BendGoals(NamedTuple):
+    """Number of samples in the last part of the horizon, and in all."""
+
+    late: int
+    samples: int
+
+
 @compiled
 def watch_bends(sums: Any, time: Any, alive: Any) -> None:
     """Note at a sample whether the wrist is within its range, and until when it was."""

@@ -1,50 +1,75 @@
-"""The compiled closed loop of blocks of lanes.
+"""The compiled closed loop of blocks of lanes, of P planes and T places of tendons.
 
-reference -> law -> allocation -> actuator -> plant with its disturbances -> metrics, sensor and observer -> law.
+reference -> law of each plane -> allocation -> actuator -> plant with its disturbances -> metrics, sensor and
+observer -> law. P and T are lengths of tuples: what is compiled for one plane and two sides has no loops over them.
 """
 
 from typing import Any, NamedTuple
 
+from wristctl.control.belief import Limits, belief_in_lanes
 from wristctl.control.law import now_of
-from wristctl.control.response import Controlled, look_ahead, respond
+from wristctl.control.response import OF_A_PLANE, Controlled, Seen, look_ahead, respond, room_like
 from wristctl.lanes.compiled import by_type, compiled, implements, spelled_out
 from wristctl.lanes.lane import where, zero_like
 from wristctl.lanes.named_tuples import block_of
-from wristctl.lanes.rows import part, rows_of
-from wristctl.simulation.actuator import WITHHELD, Aim, actuate, drive_in_lanes, read_winding, wound
+from wristctl.lanes.rows import beyond, lanes_like, part, rows_of
+from wristctl.simulation.actuator import Aim, actuate, deliver, drive_in_lanes
+from wristctl.simulation.bend_course import FULL
+from wristctl.simulation.bend_sums import BendGoals, Errors, gather_bends, watch_bends
 from wristctl.simulation.nonideal import spools_after_slip
-from wristctl.simulation.observer import go_on, sense
-from wristctl.simulation.sums import SUMS, gather, goals_of, watch_range
-from wristctl.wrist.plant import advance_or_stop, disturbed, parameters_of, path_before, tip_angle
-from wristctl.wrist.segments import load_segments
-from wristctl.wrist.tendon_mechanics import pulls_at_start, tendons_in_lanes
-from wristctl.wrist.tendons import TENDONS_PER_SIDE, torque_of
+from wristctl.simulation.observer import Knowing, go_on, sense
+from wristctl.simulation.sums import SUMS, MoveGoals, gather, goals_of, watch_range
+from wristctl.wrist.plant import acting_pulls, advance_or_stop, bend_of, disturbed, parameters_of, path_before
+from wristctl.wrist.spatial.posture import spatial_tip
+from wristctl.wrist.tendon_mechanics import tendons_in_lanes
 
-# Columns of a recorded sample, followed by the plant's coordinates: tensions as commanded and as they act, the
-# angle that the law sees, the load that its observer estimates, and what each side's motors deliver: pulls [N], or
-# lengths on spools [m]. theta is nan where the lane has failed.
-RECORDED = (
-    "theta", "rate", "torque_wanted", "torque", "tension_plus", "tension_minus", "acting_plus", "acting_minus", "seen",
-    "load", "delivered_plus", "delivered_minus",
-)  # fmt: skip
-
-# Columns that are recorded where no more are asked for.
-BRIEFLY = RECORDED[:4]
 _ALIVE, _STEP_ERROR = SUMS.index("alive"), SUMS.index("step_error")
-_COLUMNS, _BRIEFLY = len(RECORDED), len(BRIEFLY)
-_SIDE = float(TENDONS_PER_SIDE)
 _NAN = float("nan")
 
 
-class Setup(NamedTuple):
-    """Values that all lanes share. `coordinates` has an entry for each of the plant's, whose values mean nothing.
+def columns_of_sample(planes: int, places: int) -> tuple[str, ...]:
+    """Columns of a recorded sample of P planes and T places, followed by the plant's coordinates.
 
-    The law looks `preview` periods ahead.
+    Tensions are those of one tendon of a place, as commanded and as they act. After them come the bends that the law
+    sees, the load that its observer estimates, and what motors deliver: pulls [N], or lengths on spools [m]. In two
+    planes the share of the wanted torque that the tendons could give is last. The bend is nan where the lane has
+    failed.
+    """
+    of_planes = [""] if planes == 1 else ["_ulnar", "_flexion"]
+    of_places = ["_plus", "_minus"] if planes == 1 else [f"_{t + 1}" for t in range(places)]
+    kinds = (
+        ("theta" if planes == 1 else "bend", of_planes), ("rate", of_planes), ("torque_wanted", of_planes),
+        ("torque", of_planes), ("tension", of_places), ("acting", of_places), ("seen", of_planes), ("load", of_planes),
+        ("delivered", of_places),
+    )  # fmt: skip
+    return (*(f"{kind}{end}" for kind, ends in kinds for end in ends), *(("share",) if planes > 1 else ()))
+
+
+def columns_of_brief(planes: int) -> int:
+    """Number of columns that are recorded where no more are asked for: bends, rates, torques wanted and given."""
+    return 4 * planes
+
+
+# Columns in one plane, and those that are recorded where no more are asked for.
+RECORDED = columns_of_sample(1, 2)
+BRIEFLY = RECORDED[: columns_of_brief(1)]
+
+
+class Setup(NamedTuple):
+    """Values that all lanes share.
+
+    `coordinates`, `bend`, `pulls`, `arms` and `seen` are tuples with an entry, whose value means nothing, for each of
+    the plant's coordinates, each plane, each place of tendons, each moment arm (P T) and each value seen (3 P). The law
+    looks `preview` periods ahead.
     """
 
     law: Any
     plant: Any
     coordinates: Any
+    bend: Any
+    pulls: Any
+    arms: Any
+    seen: Any
     period: float
     substeps: int
     ticks: int
@@ -56,7 +81,10 @@ class Undisturbed(NamedTuple):
 
 
 class Disturbed(NamedTuple):
-    """Disturbances [case, (tip force, stiffness scale), sample]."""
+    """Disturbances [case, (tip force along the base, toward ulnar and toward flexion, stiffness scale), sample].
+
+    In one plane the second is toward that plane, and the third is nothing.
+    """
 
     cases: Any
 
@@ -64,8 +92,8 @@ class Disturbed(NamedTuple):
 class LoopCourse(NamedTuple):
     """Course of references and disturbances over time, on the sample grid.
 
-    `references` [motion, (angle, rate, acceleration), sample], continued between samples by its own derivatives;
-    `acting` is Disturbed or Undisturbed.
+    `references` [motion, (bend, rate, acceleration) of each plane, sample], continued between samples by its own
+    derivatives; `acting` is Disturbed or Undisturbed.
     """
 
     references: Any
@@ -75,12 +103,13 @@ class LoopCourse(NamedTuple):
 class LoopValues(NamedTuple):
     """Values that stay, [block, row, lane]; with one block only they are every block's.
 
-    `plant` and `winding` are what is, `model`, `limits` and `drive` what the controller's side believes. `lead` is 1
-    where spools move with the reference, else 0. `schedule` has the ticks of frames, or is NoCamera.
+    `plant` and `winding` are what is, `belief`, `limits` and `drive` what the controller's side believes; limits are
+    the least and the greatest pull at each place, then the bend beyond which a wrist has failed. `lead` is 1 where
+    spools move with the reference, else 0. `schedule` has the ticks of frames, or is NoCamera.
     """
 
     plant: Any
-    model: Any
+    belief: Any
     limits: Any
     drive: Any
     lead: Any
@@ -93,10 +122,10 @@ class LoopValues(NamedTuple):
 class LoopState(NamedTuple):
     """State of the rollouts, by block first: a long run may be done in pieces.
 
-    `which` and `case` are each lane's motion and case of disturbances, `coordinates` the plant's with their rates,
-    `tendons` one of `wristctl.wrist.tendon_mechanics.Tendons` as they are, with their state.
-    `record` [block, sample, column, lane] takes each sample's values, all or BRIEFLY, or has no samples. `watch` is the
-    camera with its observer, or NoCamera.
+    `which` and `case` are each lane's motion and case of disturbances, `memory` is the law's in each plane,
+    `coordinates` the plant's with their rates, `tendons` as they are with their state, in one plane one of
+    `wristctl.wrist.tendon_mechanics.Tendons`. `record` [block, sample, column, lane] takes each sample's values, all or
+    briefly, or has no samples. `watch` is the camera with its observer, or NoCamera.
     """
 
     which: Any
@@ -111,7 +140,7 @@ class LoopState(NamedTuple):
 
 
 class Scratch(NamedTuple):
-    """Rows to work on: what the law sees, the reference (3,), and the disturbance (2,)."""
+    """Rows to work on: what the law sees and the reference (3,) of each plane, and the disturbance (4,)."""
 
     now: Any
     target: Any
@@ -140,68 +169,126 @@ def run_blocks(setup: Any, course: Any, world: Any, state: Any, scratch: Any, sp
 @spelled_out
 def _run_block(setup: Any, course: Any, world: Any, state: Any, scratch: Any, first: int, last: int) -> None:
     coordinates, period, ticks = setup.coordinates, setup.period, setup.ticks
-    undisturbed = parameters_of(setup.plant, rows_of(world.plant))
-    believed, drive = load_segments(rows_of(world.model)), drive_in_lanes(world.drive)
+    planes, count, n = len(setup.bend), len(setup.pulls), len(coordinates)
+    undisturbed = parameters_of(setup.plant, rows_of(world.plant), setup.pulls)
+    known, drive = belief_in_lanes(world.belief), drive_in_lanes(world.drive)
     tendons = tendons_in_lanes(state.tendons)
-    winding, lead = read_winding(rows_of(world.winding)), rows_of(world.lead)[0]
-    control = Controlled(setup.law, scratch.now, world.model, world.gains, state.memory, scratch.target)
-    view, bound, goal = now_of(scratch.now), rows_of(world.limits), goals_of(world.goals)
+    winding, lead = rows_of(world.winding), rows_of(world.lead)[0]
+    control = Controlled(setup.law, scratch.now, world.belief.models, world.gains, state.memory, scratch.target)
+    bound = rows_of(world.limits)
     motor, sum_ = rows_of(state.motors), rows_of(state.sums)
-    low, high = _SIDE * bound[0], _SIDE * bound[1]
-    n = len(coordinates)
-    q, rates = part(rows_of(state.coordinates), 0, coordinates), part(rows_of(state.coordinates), n, coordinates)
-    zero = zero_like(low)
+    every = rows_of(state.coordinates)
+    q, rates = part(every, 0, coordinates), part(every, n, coordinates)
+    limits = Limits(part(bound, 0, setup.pulls), part(bound, count, setup.pulls))
+    bend, speed = lanes_like(part(every, 0, setup.bend)), lanes_like(part(every, 0, setup.bend))
+    wish, wish_rate = lanes_like(bend), lanes_like(bend)
+    pulls, counts, acts = lanes_like(limits.least), lanes_like(limits.least), lanes_like(limits.least)
+    delivered, speeds = lanes_like(limits.least), lanes_like(limits.least)
+    room = room_like(bend, part(every, 0, setup.arms))
+    aim, knowing = Aim(wish, wish_rate, lanes_like(room.arms)), Knowing(known, drive, bend, pulls, room.arms)
+    rows = lanes_like(part(every, 0, setup.seen))
+    seen = Seen(rows, part(motor, 2 * count, setup.bend), part(motor, 2 * count + planes, setup.bend))
+    zero = zero_like(bound[0])
     h = period / setup.substeps + zero
-    targets, acts = scratch.target.reshape(3, len(state.which)), scratch.acting.reshape(2, len(state.case))
-    acting = rows_of(scratch.acting)
+    targets = scratch.target.reshape(3 * planes, len(state.which))
+    acting, acting_lanes = rows_of(scratch.acting), scratch.acting.reshape(4, len(state.case))
     for sample in range(first, last):
         gather_lanes(course.references, state.which, sample, targets)
-        plant = _under(course.acting, state.case, sample, acts, acting, undisturbed)
+        plant = _under(course.acting, state.case, sample, acting_lanes, acting, undisturbed)
         for tick in range(ticks):
             now_tick = sample * ticks + tick
-            angle, rate = tip_angle(plant, q, rates)
-            estimate = sense(state.watch, world.schedule, drive, believed, now_tick, angle, rate, period)
+            bend_of(plant, q, rates, bend, speed)
+            sense(state.watch, world.schedule, knowing, now_tick, bend, speed, period, rows)
             for ahead in range(1, setup.preview + 1):
                 to_come = min((now_tick + ahead) // ticks, course.references.shape[2] - 1)
                 gather_lanes(course.references, state.which, to_come, targets)
-                look_ahead(control, ahead, (now_tick + ahead - to_come * ticks) * period)
+                look_ahead(control, bend, ahead, (now_tick + ahead - to_come * ticks) * period)
             if setup.preview > 0:
                 gather_lanes(course.references, state.which, sample, targets)
-            wanted, torque_low, torque_high, plus, minus = respond(
-                control, believed, estimate, motor[WITHHELD], (low, high), tick * period, period
-            )
-            theta_ref = view.theta_ref
-            aim = Aim(theta_ref, lead * view.rate_ref)
-            counted_plus, counted_minus = actuate(drive, motor, believed, aim, plus, minus, period)
+            share = respond(control, known, seen, limits, room, tick * period, period, pulls)
+            for p in range(planes):
+                view = now_of(scratch.now[p])
+                wish[p] = view.theta_ref
+                wish_rate[p] = lead * view.rate_ref
+            actuate(drive, motor, known, aim, pulls, period, counts)
             time, path = now_tick * period + zero, path_before(tendons, plant, q)
-            delivered = wound(drive, winding, counted_plus, counted_minus)
-            speeds = winding.scale * motor[1], winding.scale * motor[3]
+            deliver(drive, winding, counts, delivered)
+            for t in range(count):
+                speeds[t] = winding[0] * motor[2 * t + 1]
             spool_input = spools_after_slip(tendons, delivered, speeds, time, path)
-            acting_plus, acting_minus = pulls_at_start(tendons, spool_input, path)
-            saturated = where((wanted > torque_high) | (wanted < torque_low), 1.0, zero)
-            watch_range(sum_, time, angle, bound[2])
-            gather(sum_, goal, time, angle, theta_ref, acting_plus / _SIDE, acting_minus / _SIDE, saturated)
+            acting_pulls(tendons, plant, q, spool_input, path, acts)
+            watch_range(sum_, time, bend, bound[2 * count])
+            for t in range(count):
+                acts[t] = acts[t] / known.alike[t]
+            _gather(world.goals, sum_, (sample, tick, time), (plant, q), known, (bend, wish), (acts, pulls), share)
             if tick == 0 and sample < state.record.shape[0]:
                 row = rows_of(state.record[sample])
-                row[0] = where(sum_[_ALIVE] > zero, angle, _NAN)
-                row[1] = rate
-                row[2] = wanted
-                row[3] = torque_of(estimate.theta, believed, plus, minus)
-                if state.record.shape[1] > _BRIEFLY:
-                    row[4] = plus / _SIDE
-                    row[5] = minus / _SIDE
-                    row[6] = acting_plus / _SIDE
-                    row[7] = acting_minus / _SIDE
-                    row[8] = estimate.theta
-                    row[9] = estimate.load
-                    row[10] = delivered[0]
-                    row[11] = delivered[1]
-                    for i in range(n):
-                        row[_COLUMNS + i] = q[i]
-            go_on(state.watch, drive, believed, now_tick, counted_plus, counted_minus, period)
+                for p in range(planes):
+                    row[p] = where(sum_[_ALIVE] > zero, bend[p], _NAN)
+                    row[planes + p] = speed[p]
+                    row[2 * planes + p] = room.wanted[p]
+                    row[3 * planes + p] = room.torque[p]
+                if state.record.shape[1] > 4 * planes:
+                    for t in range(count):
+                        pulls[t] = pulls[t] / known.alike[t]
+                    _record(row, (pulls, acts, delivered), rows, share, q)
+            go_on(state.watch, knowing, now_tick, counts, period)
             for _ in range(setup.substeps):
                 sum_[_ALIVE], error = advance_or_stop(plant, q, rates, spool_input, tendons, h, sum_[_ALIVE])
                 sum_[_STEP_ERROR] = sum_[_STEP_ERROR] + error
+
+
+@by_type
+def _gather(goals: Any, sums: Any, when: Any, pose: Any, known: Any, bends: Any, tensions: Any, share: Any) -> None:
+    """Add a tick to the sums of a motion."""
+    raise NotImplementedError("compiled code only")
+
+
+@implements(_gather, MoveGoals)
+def _gather_move(
+    goals: Any, sums: Any, when: Any, pose: Any, known: Any, bends: Any, tensions: Any, share: Any
+) -> None:
+    saturated = where(share < FULL, 1.0, zero_like(share))
+    gather(sums, goals_of(goals.rows), when[2], bends[0], bends[1], tensions[0], saturated)
+
+
+@implements(_gather, BendGoals)
+def _gather_bends(
+    goals: Any, sums: Any, when: Any, pose: Any, known: Any, bends: Any, tensions: Any, share: Any
+) -> None:
+    sample, tick, time = when
+    if tick == 0:
+        (plant, q), (bend, wish), (acts, pulls) = pose, bends, tensions
+        own, places = beyond(sums, len(SUMS) + len(pulls)), lanes_like(pulls)
+        for t in range(len(pulls)):
+            places[t] = acts[t] * known.alike[t]
+        tip, _, _, _ = spatial_tip(plant.segment, q)
+        wanted_tip, _, _, _ = spatial_tip(known.wrist.segment, wish)
+        errors = Errors(bend[0] - wish[0], bend[1] - wish[1], tip - wanted_tip)
+        late = 1.0 if sample >= goals.samples - goals.late else 0.0
+        watch_bends(own, time, sums[_ALIVE])
+        gather_bends(own, sample, late, errors, pulls, places, share)
+
+
+@compiled
+def _record(row: Any, tensions: Any, seen: Any, share: Any, q: Any) -> None:
+    """Record what is not recorded briefly: tensions commanded and acting, what is seen, delivered, shared, and q."""
+    commanded, acts, delivered = tensions
+    count, planes = len(acts), len(seen) // OF_A_PLANE
+    at = 4 * planes
+    for t in range(count):
+        row[at + t] = commanded[t]
+        row[at + count + t] = acts[t]
+        row[at + 2 * count + 2 * planes + t] = delivered[t]
+    for p in range(planes):
+        row[at + 2 * count + p] = seen[OF_A_PLANE * p]
+        row[at + 2 * count + planes + p] = seen[OF_A_PLANE * p + 2]
+    last = at + 3 * count + 2 * planes
+    if planes > 1:
+        row[last] = share
+        last += 1
+    for i in range(len(q)):
+        row[last + i] = q[i]
 
 
 @compiled
@@ -226,4 +313,4 @@ def _undisturbed(acting: Any, which: Any, sample: int, out: Any, rows: Any, plan
 @implements(_under, Disturbed)
 def _disturbed(acting: Any, which: Any, sample: int, out: Any, rows: Any, plant: Any) -> Any:
     gather_lanes(acting.cases, which, sample, out)
-    return disturbed(plant, rows[0], rows[1])
+    return disturbed(plant, rows, rows[3])

@@ -105,7 +105,7 @@ def metrics_of(
     flags = np.zeros(len(theta)) if saturated is None else np.asarray(saturated, float)
     sums = sums_of(period, np.column_stack([theta, theta_ref, tension, flags]), goals)
     each_goal = {name: np.array([value]) for name, value in goals._asdict().items()}
-    totals = Totals(dict(zip(SUMS, sums[:, None], strict=True)), each_goal, period)
+    totals = Totals(dict(zip(SUMS, sums[:, None], strict=False)), each_goal, period)
     return {name: float(value[0]) for name, value in summary(totals).items()}
 
 

@@ -12,6 +12,7 @@ from wristctl.lanes.compiled import by_type, compiled, implements
 from wristctl.lanes.functions import clip, maximum, minimum
 from wristctl.lanes.lane import where
 from wristctl.wrist.dahl import Inner, InnerFriction, NoInnerFriction, inner_state
+from wristctl.wrist.spatial.spooled_tendons import ElasticPlaces, HeldPlaces, RubbingPlaces
 from wristctl.wrist.tendon_mechanics import (
     LOST,
     OF_A_TENDON,
@@ -164,3 +165,20 @@ def _pulls_that_are_left(tendons: Any, delivered: Any, speeds: Any, time: Any, p
 def _after_slip(tendons: Any, delivered: Any, speeds: Any, time: Any, path: Any) -> Any:
     plus = tendon_after_slip(tendons, 0, delivered[0], speeds[0], time, path[0], _ONE_OF_A_SIDE_LESS)
     return plus, tendon_after_slip(tendons, 1, delivered[1], speeds[1], time, path[1], 1.0)
+
+
+@implements(spools_after_slip, HeldPlaces)
+def _pulls_at_places(tendons: Any, delivered: Any, speeds: Any, time: Any, path: Any) -> Any:
+    for t in range(len(delivered)):
+        tendons.left[t] = where(time >= tendons.broken_at[t], 0.0, 1.0) * delivered[t]
+    return tendons.left
+
+
+@implements(spools_after_slip, ElasticPlaces, RubbingPlaces)
+def _lengths_at_places(tendons: Any, delivered: Any, speeds: Any, time: Any, path: Any) -> Any:
+    reeled = tendons.reeled
+    for t in range(len(delivered)):
+        tendons.stiffness[t] = where(time >= tendons.broken_at[t], 0.0, 1.0) * tendons.whole[t]
+        reeled[t] = clip(reeled[t], delivered[t], delivered[t] + tendons.backlash)
+        delivered[t] = reeled[t]
+    return reeled

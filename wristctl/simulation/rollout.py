@@ -154,22 +154,22 @@ def _run(
     model = PLANTS[loop.plant.model]
     columns = columns_of(record, model.coordinates(loop.plant_segments))
     rollouts = batch(controller, gains, motions, worlds, lanes, model, start, columns)
-    _advance(rollouts, kernel_of(run_blocks, model), threads or cores(), progress, stop)
+    advance_blocks(rollouts, kernel_of(run_blocks, model), threads or cores(), progress, stop)
     rollouts.setup.law.check()
     return outcome_of(rollouts, count, loop, KeptSamples.of(rollouts.state.record, count) if record else None)
 
 
 def outcome_of(rollouts: Batch, count: int, loop: Loop, kept: KeptSamples | None = None) -> Outcome:
     """Outcome of a batch's rollouts, so far as they have come."""
-    sums, goals = to_rows(rollouts.state.sums, count), to_rows(rollouts.world.goals, count)
-    named = dict(zip(SUMS, sums.T, strict=True)), dict(zip(Goals._fields, goals.T, strict=True))
+    sums, goals = to_rows(rollouts.state.sums, count), to_rows(rollouts.world.goals.rows, count)
+    named = dict(zip(SUMS, sums.T, strict=False)), dict(zip(Goals._fields, goals.T, strict=True))
     totals = Totals(*named, loop.control_period)
     failed, until = totals.sums["alive"] <= 0.0, totals.sums["until"]
     steps, error, drift = np.full(count, loop.steps), totals.sums["step_error"], np.zeros(count)
     return Outcome(summary(totals), failed, until, rollouts.course.references, steps, error, drift, kept)
 
 
-def _advance(
+def advance_blocks(
     rollouts: Batch, kernel: Callable[..., None], workers: int, progress: Callable[[float], None], stop: Event
 ) -> None:
     """Run all blocks to the end, or until they are to stop, on so many threads."""

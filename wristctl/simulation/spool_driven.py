@@ -20,13 +20,13 @@ from wristctl.config.wrist import WristParameters
 from wristctl.errors import UserError
 from wristctl.lanes.blocks import lanes_of, to_blocks, to_rows
 from wristctl.lanes.lane import where, zero_like
-from wristctl.lanes.rows import part, rows_of
+from wristctl.lanes.rows import lanes_like, part, rows_of
 from wristctl.processes import cores, stoppable
 from wristctl.simulation.nonideal import inner_of, nonideal_of, of_tendons, unmoved
 from wristctl.wrist.compiled_model import terms
 from wristctl.wrist.dahl import inner_in_lanes, one_block
 from wristctl.wrist.pcc import PCC
-from wristctl.wrist.plant import advance_or_stop, kernel_of, parameters_of, tip_angle
+from wristctl.wrist.plant import advance_or_stop, bend_of, kernel_of, parameters_of
 from wristctl.wrist.segments import segments
 from wristctl.wrist.statics import FROM_ABOVE, FROM_BELOW, HeldTendons, at_rest_with, equilibria_at
 from wristctl.wrist.tendon_mechanics import Nonideal, RealTendons, Z, pulls_at_start, read_nonideal, row_of, spool_pull
@@ -106,6 +106,7 @@ def _move(model: Any, lanes: Any, driven: Any, timing: Any, out: Any, cut: Any) 
     tendons = RealTendons(values[_STIFFNESS], read_nonideal(values), rows_of(lanes.memory), inner_in_lanes(lanes.inner))
     winch, memory, ends, n = values[_STIFFNESS + 1], rows_of(lanes.memory), rows_of(lanes.ends), len(cut)
     q, rate = part(rows_of(lanes.state), 0, cut), part(rows_of(lanes.state), n, cut)
+    bend, speed = lanes_like(part(q, 0, (0,))), lanes_like(part(q, 0, (0,)))
     alive = 1.0 + zero
     for k in range(driven.shape[0]):
         tick, now = timing.first + k, rows_of(driven[k])
@@ -120,7 +121,8 @@ def _move(model: Any, lanes: Any, driven: Any, timing: Any, out: Any, cut: Any) 
             ends[3], ends[4], ends[5], ends[6], ends[7], ends[8] = *reeled, spool_plus, spool_minus, plus, minus
         if tick % timing.every == 0:  # between two steps what is held over them jumps: its mean is what it is there
             row = rows_of(out[tick // timing.every])
-            row[0], _ = tip_angle(segment, q, rate)
+            bend_of(segment, q, rate, bend, speed)
+            row[0] = bend[0]
             row[1], row[2] = 0.5 * (reeled[0] + ends[3]), 0.5 * (reeled[1] + ends[4])
             row[3], row[4] = 0.5 * (spool_plus + ends[5]), 0.5 * (spool_minus + ends[6])
             row[5], row[6] = 0.5 * (plus + ends[7]), 0.5 * (minus + ends[8])

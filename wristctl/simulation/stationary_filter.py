@@ -10,19 +10,20 @@ from wristctl.arrays import Array, distinct
 from wristctl.config.plant import Actuator, Sensor
 from wristctl.config.wrist import WristParameters
 from wristctl.lanes.compiled import kernel
-from wristctl.lanes.lane import zero_like
-from wristctl.lanes.rows import rows_of
-from wristctl.simulation.actuator import at_rest, drive_of
-from wristctl.simulation.observer import Observer, propagate
+from wristctl.lanes.rows import part, rows_of
+from wristctl.simulation.actuator import SIDES, at_rest
+from wristctl.simulation.observer import Observer, knowing_in_lanes, known_of_sides, propagate
+from wristctl.simulation.worlds import World
+from wristctl.wrist.directions import in_plane
 from wristctl.wrist.pcc import PCC
-from wristctl.wrist.segments import load_segments, segments
+from wristctl.wrist.tendon_layout import TendonLayout
+from wristctl.wrist.tendons import TENDONS_PER_SIDE
 
 
 @kernel
-def _propagate_row(drive: Any, model: Any, state: Any, plus: float, minus: float, h: float) -> None:
-    believed, x = load_segments(rows_of(model)), rows_of(state)
-    zero = zero_like(x[0])
-    propagate(drive, believed, x, plus + zero, minus + zero, h)
+def _propagate_row(known: Any, state: Any, counts: Any, h: float) -> None:
+    x = rows_of(state)
+    propagate(knowing_in_lanes(known), x, part(rows_of(counts), 0, known.pulls), h)
 
 
 # Doublings at most, and a change of a correlation that is none.
@@ -36,6 +37,21 @@ class Belief(NamedTuple):
     actuator: Actuator
     wrist: WristParameters
     period: float
+
+
+def beliefs_of(world: World, layout: TendonLayout | None) -> list[Belief]:
+    """Beliefs of each plane's observer in a world: of one plane, or of two with tendons at the places of a layout."""
+    sensor, actuator, period = world.loop.sensor, world.loop.actuator, world.loop.control_period
+    if layout is None:
+        return [Belief(sensor, actuator, world.wrist, period)]
+    facing = [in_plane(world.wrist, plane) for plane in ("ulnar", "flexion")]
+    return [Belief(sensor, actuator, as_pairs(wrist, layout, axis), period) for axis, wrist in enumerate(facing)]
+
+
+def as_pairs(wrist: WristParameters, layout: TendonLayout, axis: int) -> WristParameters:
+    """The wrist in one plane whose four tendons stiffen it as those of the layout do, on held spools."""
+    square = float(layout.multiplicity @ layout.cross_section[:, axis] ** 2) / TENDONS_PER_SIDE
+    return wrist.model_copy(update={"tendon_radius": float(np.sqrt(square))})
 
 
 class _GoesBy(NamedTuple):
@@ -84,12 +100,13 @@ def _stationary(filters: tuple[_GoesBy, ...]) -> _Stationary:
 @lru_cache(maxsize=256)
 def _linearised(actuator: Actuator, wrist: WristParameters, period: float) -> Array:
     """The transition (3, 3) of the prediction over a period [s], where the wrist is straight."""
-    drive = drive_of(actuator)
-    delivered = at_rest(drive, wrist, PCC, np.zeros(1))[[0, 2]]
+    known = known_of_sides(wrist, actuator)
+    pulls = np.array(SIDES) * wrist.pretension
+    delivered = at_rest(known.drive, pulls, wrist.length, PCC.taut(wrist, np.zeros(1)))[[0, 2]]
     small = 1e-6
     states = small * np.eye(4, 3)
     for state in states:
-        _propagate_row(drive, segments(wrist, 1), state, float(delivered[0]), float(delivered[1]), period)
+        _propagate_row(known, state, delivered, period)
     transition: Array = (states[:3] - states[3]).T / small
     transition.setflags(write=False)
     return transition

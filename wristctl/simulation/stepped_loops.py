@@ -13,23 +13,24 @@ from numpy.typing import NDArray
 from wristctl.arrays import Array
 from wristctl.config.choices import PLANTS
 from wristctl.config.wrist import WristParameters
+from wristctl.control.belief import Limits, belief_in_lanes
 from wristctl.control.law import NOW, Controller, Gain
-from wristctl.control.response import Controlled, perceive
+from wristctl.control.response import Controlled, Seen, perceive, room_like
 from wristctl.lanes.blocks import to_rows
 from wristctl.lanes.compiled import kernel, spelled_out
 from wristctl.lanes.lane import where, zero_like
 from wristctl.lanes.named_tuples import block_of
-from wristctl.lanes.rows import part, rows_of
-from wristctl.simulation.actuator import WITHHELD, drive_in_lanes
+from wristctl.lanes.rows import lanes_like, part, rows_of
+from wristctl.simulation.actuator import drive_in_lanes
 from wristctl.simulation.batch import Lanes, Start, batch
 from wristctl.simulation.cases import Case
 from wristctl.simulation.convergence import has_kinks, in_one_go
 from wristctl.simulation.kernel import Span, gather_lanes, run_blocks
-from wristctl.simulation.observer import sense
+from wristctl.simulation.observer import Knowing, sense
 from wristctl.simulation.rollout import outcome_of, worlds_of
 from wristctl.simulation.sums import SUMS
 from wristctl.simulation.worlds import bending_limit
-from wristctl.wrist.plant import kernel_of, parameters_of, tip_angle
+from wristctl.wrist.plant import bend_of, kernel_of, parameters_of
 from wristctl.wrist.segments import load_segments, segments
 from wristctl.wrist.tendons import TENDONS_PER_SIDE, reach
 
@@ -133,22 +134,28 @@ def _look_blocks(setup: Any, course: Any, world: Any, state: Any, scratch: Any, 
 @spelled_out
 def _look_block(setup: Any, course: Any, world: Any, state: Any, scratch: Any, sample: int, output: Any) -> None:
     coordinates, period = setup.coordinates, setup.period
-    n = len(coordinates)
-    plant = parameters_of(setup.plant, rows_of(world.plant))
-    believed, drive = load_segments(rows_of(world.model)), drive_in_lanes(world.drive)
-    control = Controlled(setup.law, scratch.now, world.model, world.gains, state.memory, scratch.target)
-    q, rates = part(rows_of(state.coordinates), 0, coordinates), part(rows_of(state.coordinates), n, coordinates)
-    bound, signals, out = rows_of(world.limits), rows_of(scratch.now), rows_of(output)
-    gather_lanes(course.references, state.which, sample, scratch.target.reshape(3, len(state.which)))
-    angle, rate = tip_angle(plant, q, rates)
-    estimate = sense(state.watch, world.schedule, drive, believed, sample * setup.ticks, angle, rate, period)
-    withheld = rows_of(state.motors)[WITHHELD]
-    perceive(control, believed, estimate, withheld, (_SIDE * bound[0], _SIDE * bound[1]), 0.0, period)
+    n, count, planes = len(coordinates), len(setup.pulls), len(setup.bend)
+    plant = parameters_of(setup.plant, rows_of(world.plant), setup.pulls)
+    known, drive = belief_in_lanes(world.belief), drive_in_lanes(world.drive)
+    control = Controlled(setup.law, scratch.now, world.belief.models, world.gains, state.memory, scratch.target)
+    every, motor = rows_of(state.coordinates), rows_of(state.motors)
+    q, rates = part(every, 0, coordinates), part(every, n, coordinates)
+    bound, signals, out = rows_of(world.limits), rows_of(scratch.now[0]), rows_of(output)
+    limits = Limits(part(bound, 0, setup.pulls), part(bound, count, setup.pulls))
+    bend, speed = lanes_like(part(every, 0, setup.bend)), lanes_like(part(every, 0, setup.bend))
+    room = room_like(bend, part(every, 0, setup.arms))
+    rows = lanes_like(part(every, 0, setup.seen))
+    seen = Seen(rows, part(motor, 2 * count, setup.bend), part(motor, 2 * count + planes, setup.bend))
+    gather_lanes(course.references, state.which, sample, scratch.target.reshape(3 * planes, len(state.which)))
+    bend_of(plant, q, rates, bend, speed)
+    knowing = Knowing(known, drive, bend, limits.least, room.arms)
+    sense(state.watch, world.schedule, knowing, sample * setup.ticks, bend, speed, period, rows)
+    perceive(control, known, seen, limits, room, 0.0, period)
     for i in range(_TRUE):
         out[i] = signals[i]
-    out[_TRUE] = angle
-    out[_WELL] = where(abs(angle) < bound[2], rows_of(state.sums)[_ALIVE], 0.0)
-    out[_LIMIT] = bound[2]
+    out[_TRUE] = bend[0]
+    out[_WELL] = where(abs(bend[0]) < bound[2 * count], rows_of(state.sums)[_ALIVE], 0.0)
+    out[_LIMIT] = bound[2 * count]
 
 
 @kernel

@@ -8,29 +8,29 @@ from numpy.typing import NDArray
 
 from wristctl.arrays import Array
 from wristctl.config.loop import Loop, sample_period
+from wristctl.config.plant import in_one_plane_only
 from wristctl.config.wrist import WristParameters
 from wristctl.control.law import Controller
 from wristctl.errors import UserError
-from wristctl.processes import cores, stoppable
+from wristctl.processes import cores
 from wristctl.seeds import Entropy
+from wristctl.simulation.batch import Lanes, batch
 from wristctl.simulation.bend_course import BendCourse
 from wristctl.simulation.bend_outcome import BendOutcome, bend_outcome
 from wristctl.simulation.bend_paths import BEND_PATHS, turned
-from wristctl.simulation.disturbances import acting_in_space
-from wristctl.simulation.kernel import Span
-from wristctl.simulation.rollout import How
-from wristctl.simulation.spatial_batch import SpatialBatch, check_spatial, spatial_batch, spatial_columns
-from wristctl.simulation.spatial_kernel import SPATIAL_BRIEFLY, run_spatial
+from wristctl.simulation.kernel import columns_of_brief, columns_of_sample, run_blocks
+from wristctl.simulation.motion import Angles, Motion
+from wristctl.simulation.rollout import How, advance_blocks, worlds_of
 from wristctl.simulation.worlds import World
 from wristctl.wrist.allocation import allocated
+from wristctl.wrist.plant import kernel_of
+from wristctl.wrist.spatial.pcc_in_space import PCC_IN_SPACE
 from wristctl.wrist.spatial.spatial_model import spatial_terms
 from wristctl.wrist.spatial.spatial_segments import ellipse, spatial_values
 from wristctl.wrist.tendon_layout import TendonLayout
 
 # Time between samples of a bend path [s].
 SAMPLE = 1e-3
-# Integration steps of a block between two looks at whether the user has asked to stop.
-_PIECE = 20_000
 
 
 def bend_path(name: str, size_deg: float, turn: float, horizon: float, toward_deg: float = 0.0) -> Array:
@@ -149,47 +149,27 @@ def rollout_bends(
     layout = layout or TendonLayout.of(wrist)
     check_bends(law, references[:, 0], wrist, loop)
     time = sample_period(loop.control_period) * np.arange(float(references.shape[2]))
-    columns = len(SPATIAL_BRIEFLY) if record == "briefly" else spatial_columns(layout, loop) if record else 0
-    lanes = spatial_batch(
-        law, gains, references, worlds, layout, _acting(loop, time, force), streams or [(0,)] * count, columns
-    )
-    _advance(lanes, threads or cores())
-    return bend_outcome(lanes, time, worlds)
+    rows = np.ascontiguousarray(references, float).reshape(-1, len(time))
+    followed = Motion(time, Angles.of(rows), np.empty((0, 3)), None, 0.0, len(time) * time[1], len(time) * time[1])
+    columns = columns_of_brief(2) if record == "briefly" else spatial_columns(layout, loop) if record else 0
+    different, which = worlds_of([world.loop for world in worlds], [world.wrist for world in worlds], count)
+    lanes = Lanes(np.zeros(count, np.int64), which, list(streams or [(0,)] * count))
+    pushed = None if force is None else np.broadcast_to(np.reshape(force, (3, -1)), (3, len(time)))
+    rollouts = batch(law, gains, [followed], different, lanes, PCC_IN_SPACE, None, columns, layout, pushed)
+    advance_blocks(rollouts, kernel_of(run_blocks, PCC_IN_SPACE), threads or cores(), lambda share: None, Event())
+    return bend_outcome(rollouts, time, worlds, layout)
 
 
-def _advance(lanes: SpatialBatch, workers: int) -> None:
-    """Run all blocks to the end, on so many threads, in pieces between which an interrupt is heard."""
-    stop, blocks, samples = Event(), lanes.blocks, lanes.samples
-    steps = lanes.setup.ticks * lanes.setup.substeps
-    piece = max(1, _PIECE // steps)
-    together = max(1, min(_PIECE // (steps * samples), -(-blocks // workers)))
-
-    def run(begin: int) -> None:
-        scratch = lanes.scratch()
-        for first in range(0, samples, piece):
-            if not stop.is_set():
-                span = Span(begin, min(begin + together, blocks), first, min(first + piece, samples))
-                run_spatial(lanes.setup, lanes.course, lanes.values, lanes.state, scratch, span)
-
-    pieces = range(0, blocks, together)
-    if min(workers, len(pieces)) == 1:
-        for begin in pieces:
-            run(begin)
-        return
-    with stoppable(min(workers, len(pieces)), stop) as pool:
-        for _ in pool.map(run, pieces):
-            pass
+def spatial_columns(layout: TendonLayout, loop: Loop) -> int:
+    """Number of columns of a sample of which all is recorded."""
+    return len(columns_of_sample(2, len(layout.places))) + PCC_IN_SPACE.coordinates(loop.plant_segments)
 
 
-def _acting(loop: Loop, time: Array, force: Array | None) -> Array:
-    """What acts: force on the tip [N] and scale of the stiffness, (4, T)."""
-    result = np.zeros((4, len(time)))
-    result[3] = 1.0
-    if (pushes := acting_in_space(loop.disturbances, time)) is not None:
-        result[:] = pushes.T
-    if force is not None:
-        result[:3] += np.reshape(force, (3, -1))
-    return result
+def check_spatial(loop: Loop) -> None:
+    """UserError for what a loop has in one plane and not in two."""
+    if beyond := in_one_plane_only(loop.plant, loop.plant.actuator):
+        key = f"plant.{beyond[0]}"
+        raise UserError(f"no loop in two planes has {key}", f"loop.{key}", "leave it at its default")
 
 
 def check_bends(law: Controller, bends: Array, wrist: WristParameters, loop: Loop) -> None:

@@ -94,7 +94,8 @@ def linearity_limits(
         limits.append(LinearityLimit("the camera's noise", False, noise, "none, and no frame lost"))
     if level != "ideal":
         motor = motor_of(loop.actuator)
-        step, scale = (motor.step, 1.0) if level == "tendon" else (motor.stiffness * motor.step, motor.stiffness)
+        stiffness = TENDONS_PER_SIDE * motor.stiffness
+        step, scale = (motor.step, 1.0) if level == "tendon" else (stiffness * motor.step, stiffness)
         finest = LinearityLimit("a motor's microstep", False, _over(0.5 * step, swing.motor()), "no steps: any length")
         speed = scale * loop.actuator.step_length * world.actuator.step_rate
         limits += [

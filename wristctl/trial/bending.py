@@ -15,7 +15,7 @@ from wristctl.config.wrist import WristParameters
 from wristctl.control.response import Estimate
 from wristctl.simulation.motion import Motion
 from wristctl.trial.bend_motion import BendMotion
-from wristctl.trial.spatial_belief import PLANES, SpatialPaths, belief_of
+from wristctl.trial.spatial_belief import PLANES, SpatialPaths, known_of_axes
 from wristctl.trial.spatial_steering import SpatialAnswer, SpatialSteering
 from wristctl.trial.spools import Paths
 from wristctl.trial.steering import Answer, Steering
@@ -143,7 +143,7 @@ class TwoPlanes:
 
     def __init__(self, settings: HwRunSettings, wrist: WristParameters, period: float) -> None:
         self.steering: Any = SpatialSteering(wrist, settings.actuator, settings.sensor, period)
-        self._paths = SpatialPaths(belief_of(wrist, settings.actuator))
+        self._paths = SpatialPaths(known_of_axes(wrist, settings.actuator))
 
     def course(self, motion: BendMotion) -> Array:
         """Bend, rate and acceleration of each plane (T, 2, 3)."""

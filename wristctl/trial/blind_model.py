@@ -9,15 +9,12 @@ from wristctl.arrays import Array
 from wristctl.board.messages import AXES
 from wristctl.config.plant import Actuator, Sensor
 from wristctl.config.wrist import WristParameters
+from wristctl.control.response import OF_A_PLANE
 from wristctl.lanes.compiled import kernel
-from wristctl.lanes.lane import zero_like
-from wristctl.lanes.rows import lanes_like, part, rows_of
-from wristctl.simulation.actuator import drive_of
-from wristctl.simulation.observer import predict
-from wristctl.simulation.spatial_observer import OF_A_PLANE, propagate_bends
+from wristctl.lanes.rows import part, rows_of
+from wristctl.simulation.observer import knowing_in_lanes, known_of_sides, propagate
 from wristctl.simulation.stationary_filter import Belief, observer_of
-from wristctl.trial.spatial_belief import belief_of, known_of
-from wristctl.wrist.segments import load_segments, segments
+from wristctl.trial.spatial_belief import known_of_axes
 
 # Ticks.
 _REMEMBERED = 256
@@ -33,13 +30,12 @@ class _OneSegment:
     def __init__(
         self, wrist: WristParameters, actuator: Actuator, believed: Actuator, sensor: Sensor, period: float
     ) -> None:
-        self._drive, self._model = drive_of(actuator), segments(wrist, 1)
+        self._known = known_of_sides(wrist, actuator)
         self._observer = observer_of(Belief(sensor, believed, wrist, period), 1, 0.0)
 
     def advanced(self, reeled: Array, h: float) -> Array:
         """The angle () [rad] after h [s] with spools that hold so much [m]."""
-        plus, minus = reeled
-        _predict(self._observer, self._drive, self._model, plus, minus, h)
+        _propagate(self._known, self._observer.now, np.array(reeled, np.float64), h)
         angle: Array = self._observer.now[0]
         return angle
 
@@ -52,11 +48,11 @@ class _InTwoPlanes:
     def __init__(
         self, wrist: WristParameters, actuator: Actuator, believed: Actuator, sensor: Sensor, period: float
     ) -> None:
-        self._belief, self._x = belief_of(wrist, actuator), np.zeros(2 * OF_A_PLANE)
+        self._known, self._x = known_of_axes(wrist, actuator), np.zeros(2 * OF_A_PLANE)
 
     def advanced(self, reeled: Array, h: float) -> Array:
         """The bend (2,) [rad] after h [s] with spools that hold so much [m]."""
-        _predict_bends(self._belief, self._x, np.array(reeled, np.float64), h)
+        _propagate(self._known, self._x, np.array(reeled, np.float64), h)
         bend: Array = self._x[::OF_A_PLANE]
         return bend
 
@@ -100,14 +96,5 @@ class BlindModel:
 
 
 @kernel
-def _predict(observer: Any, drive: Any, model: Any, plus: float, minus: float, h: float) -> None:
-    believed = load_segments(rows_of(model))
-    zero = zero_like(believed.length)
-    predict(observer, drive, believed, 0, plus + zero, minus + zero, h)
-
-
-@kernel
-def _predict_bends(belief: Any, x: Any, reeled: Any, h: float) -> None:
-    known, rows = known_of(belief), rows_of(x)
-    counts = part(rows_of(reeled), 0, belief.pulls)
-    propagate_bends(known, rows, counts, lanes_like(part(rows, 0, (0, 0))), h)
+def _propagate(known: Any, x: Any, reeled: Any, h: float) -> None:
+    propagate(knowing_in_lanes(known), rows_of(x), part(rows_of(reeled), 0, known.pulls), h)

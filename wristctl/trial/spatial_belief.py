@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -10,21 +10,17 @@ from wristctl.arrays import Array
 from wristctl.board.messages import AXES
 from wristctl.config.plant import Actuator
 from wristctl.config.wrist import WristParameters
+from wristctl.control.belief import Compensated, Places, belief_in_lanes
 from wristctl.errors import UserError
-from wristctl.lanes.compiled import compiled, kernel
+from wristctl.lanes.compiled import kernel
 from wristctl.lanes.lane import zero_like
 from wristctl.lanes.rows import lanes_like, part, rows_of
-from wristctl.simulation.actuator import SpoolDrive, drive_in_lanes, motor_of
-from wristctl.simulation.spatial_observer import Compensated, Knowledge
+from wristctl.simulation.actuator import drive_of
+from wristctl.simulation.observer import Known
 from wristctl.wrist.directions import ACTIVE, TENDONS, in_plane
-from wristctl.wrist.segments import load_segments, segments
-from wristctl.wrist.spatial.spatial_segments import (
-    FIELDS,
-    OF_A_TENDON,
-    SpatialWrist,
-    load_spatial_segments,
-    spatial_values,
-)
+from wristctl.wrist.segments import segments
+from wristctl.wrist.spatial.pcc_in_space import placed_values
+from wristctl.wrist.spatial.spatial_segments import OF_A_TENDON
 from wristctl.wrist.spatial.spatial_tendons import lengths_along, moment_arms_of
 from wristctl.wrist.spatial.spooled_tendons import straight_length
 from wristctl.wrist.tendon_layout import TendonLayout
@@ -38,30 +34,13 @@ TOWARD = {
 }  # fmt: skip
 
 
-class SpatialBelief(NamedTuple):
-    """Rows of the wrist as one segment with its four tendons, of each plane's Segments, and the drive of one tendon.
-
-    The last two are tuples with an entry, of no meaning, for each value of the tendons and for each tendon.
-    """
-
-    wrist: Any
-    model_y: Any
-    model_z: Any
-    alike: Any
-    drive: Any
-    coupling: Any
-    tendons: Any
-    pulls: Any
-
-
-def belief_of(wrist: WristParameters, actuator: Actuator) -> SpatialBelief:
-    """The belief in a wrist that this actuator winds. Raises UserError for tendons that no axis winds."""
-    motor = motor_of(actuator)._replace(stiffness=actuator.tendon_stiffness)
-    return SpatialBelief(
-        spatial_values(wrist, layout_of_axes(wrist), 1, axis=math.radians(wrist.stiffness_axis_deg)),
-        segments(in_plane(wrist, "ulnar"), 1), segments(in_plane(wrist, "flexion"), 1), np.ones(AXES),
-        SpoolDrive(np.array(motor)), Compensated(), (0,) * (OF_A_TENDON * AXES), (0,) * AXES,
-    )  # fmt: skip
+def known_of_axes(wrist: WristParameters, actuator: Actuator) -> Known:
+    """Knowledge of a wrist that this actuator winds. Raises UserError for tendons that no axis winds."""
+    values, alike = placed_values(wrist, layout_of_axes(wrist), 1), np.ones(AXES)
+    models = np.array([segments(in_plane(wrist, plane), 1) for plane in PLANES])
+    pulls = (0,) * AXES
+    belief = Places(models, alike, values, (0,) * (OF_A_TENDON * AXES), pulls, Compensated())
+    return Known(belief, drive_of(actuator, alike), (0, 0), pulls, (0,) * (2 * AXES))
 
 
 def layout_of_axes(wrist: WristParameters) -> TendonLayout:
@@ -93,38 +72,28 @@ def unit_toward(degrees: float) -> Array:
     return unit
 
 
-@compiled
-def known_of(belief: Any) -> Any:
-    """The belief as Knowledge of compiled code."""
-    rows = rows_of(belief.wrist)
-    wrist = SpatialWrist(load_spatial_segments(rows), part(rows, FIELDS, belief.tendons))
-    model_y, model_z = load_segments(rows_of(belief.model_y)), load_segments(rows_of(belief.model_z))
-    alike = part(rows_of(belief.alike), 0, belief.pulls)
-    return Knowledge(wrist, model_y, model_z, alike, drive_in_lanes(belief.drive), belief.coupling)
-
-
 class SpatialPaths:
     """The tendons' paths through the one-segment wrist in two planes, for each axis of the board."""
 
-    def __init__(self, belief: SpatialBelief) -> None:
-        self._belief, self._found = belief, np.zeros(3 * AXES)
+    def __init__(self, known: Known) -> None:
+        self._known, self._found = known, np.zeros(3 * AXES)
 
     def taut(self, bend: Sequence[float] | Array) -> tuple[Array, Array]:
         """Reeled-in lengths (4,) of tendons that are just taut at this bend (2,) [m], and their changes by the bend
         (4, 2) [m/rad]."""
-        _paths(self._belief, np.ascontiguousarray(bend, np.float64), self._found)
+        _paths(self._known, np.ascontiguousarray(bend, np.float64), self._found)
         return self._found[:AXES].copy(), self._found[AXES:].reshape(AXES, 2).copy()
 
 
 @kernel
-def _paths(belief: Any, bend: Any, found: Any) -> None:
-    known, row = known_of(belief), rows_of(found)
-    at = part(rows_of(bend), 0, (0, 0))
-    arms, lengths = lanes_like(at), lanes_like(known.alike)
-    lengths_along(known.wrist, at, lengths)
+def _paths(known: Any, bend: Any, found: Any) -> None:
+    wrist, row = belief_in_lanes(known.belief).wrist, rows_of(found)
+    at = part(rows_of(bend), 0, known.bend)
+    arms, lengths = lanes_like(at), lanes_like(part(row, 0, known.pulls))
+    lengths_along(wrist, at, lengths)
     zero = zero_like(at[0])
     for t in range(len(lengths)):
-        moment_arms_of(known.wrist, at, t, arms)
-        row[t] = straight_length(known.wrist, t) - lengths[t] + zero
+        moment_arms_of(wrist, at, t, arms)
+        row[t] = straight_length(wrist, t) - lengths[t] + zero
         row[len(lengths) + 2 * t] = arms[0]
         row[len(lengths) + 2 * t + 1] = arms[1]

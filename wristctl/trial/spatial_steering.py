@@ -10,17 +10,16 @@ from wristctl.arrays import Array
 from wristctl.board.messages import AXES
 from wristctl.config.plant import Actuator, Sensor
 from wristctl.config.wrist import WristParameters
+from wristctl.control.belief import Limits
 from wristctl.control.law import REFERENCE, Controller, signals_of
-from wristctl.control.response import Controlled, Estimate, look_ahead
+from wristctl.control.response import OF_A_PLANE, Controlled, Estimate, Seen, look_ahead, respond, room_like
 from wristctl.errors import UserError
-from wristctl.lanes.compiled import kernel
-from wristctl.lanes.rows import lanes_like, part, planes_like, rows_of
+from wristctl.lanes.compiled import compiled, kernel
+from wristctl.lanes.rows import lanes_like, part, rows_of
 from wristctl.simulation.bend_course import FULL
-from wristctl.simulation.spatial_batch import as_pairs
-from wristctl.simulation.spatial_observer import OF_A_PLANE, correct_bend, go_over, propagate_bends
-from wristctl.simulation.spatial_response import Laws, Room, Seen, respond_in_planes
-from wristctl.simulation.stationary_filter import Belief, stationary_gains
-from wristctl.trial.spatial_belief import PLANES, belief_of, known_of, layout_of_axes
+from wristctl.simulation.observer import knowing_in_lanes, propagate
+from wristctl.simulation.stationary_filter import Belief, as_pairs, stationary_gains
+from wristctl.trial.spatial_belief import PLANES, known_of_axes, layout_of_axes
 from wristctl.trial.steering import REMEMBERED
 from wristctl.wrist.directions import in_plane
 
@@ -56,8 +55,8 @@ class SpatialSteering:
 
     def __init__(self, wrist: WristParameters, actuator: Actuator, sensor: Sensor, period: float) -> None:
         layout = layout_of_axes(wrist)
-        self._belief = belief_of(wrist, actuator)
-        self._limits = np.full(AXES, wrist.pretension), np.full(AXES, wrist.tension_limit)
+        self._known = known_of_axes(wrist, actuator)
+        self._bounds = np.repeat([wrist.pretension, wrist.tension_limit], AXES)
         beliefs = [
             Belief(sensor, actuator, as_pairs(in_plane(wrist, plane), layout, axis), period)
             for axis, plane in enumerate(PLANES)
@@ -68,7 +67,7 @@ class SpatialSteering:
         self._bends = np.zeros((REMEMBERED, 2))
         self._fused_at, self._period, self._found = 0, period, np.zeros(AXES + 5)
         self._missed = np.zeros(2)
-        self._laws: Any = None
+        self._control: Any = None
         self._preview = 0
         self.tick = 0
         self.withheld: Array = np.zeros(2)
@@ -96,15 +95,10 @@ class SpatialSteering:
             problem = f"{controller.name} is plain Python, which no loop in two planes runs"
             raise UserError(problem, "controllers", "one that compiles")
         self.withheld, self._missed, self._preview = np.zeros(2), np.zeros(2), controller.preview
-        law = controller.compiled()
-        ulnar, flexion = (
-            Controlled(
-                law, np.zeros(signals_of(controller.preview)), model, np.array([*gains, 0.0]),
-                np.zeros(max(1, controller.memory)), np.zeros(len(REFERENCE)),
-            )
-            for model in (self._belief.model_y, self._belief.model_z)
+        self._control = Controlled(
+            controller.compiled(), np.zeros((2, signals_of(controller.preview))), self._known.belief.models,
+            np.array([*gains, 0.0]), np.zeros((2, max(1, controller.memory))), np.zeros((2, len(REFERENCE))),
         )  # fmt: skip
-        self._laws = Laws(ulnar, flexion, *self._limits)
 
     def see(self, plane: int, bend: float, captured: float) -> bool:
         """Fuse one plane's bend [rad] seen `captured` seconds after tick 0; False where that is too old or yet to come.
@@ -117,7 +111,7 @@ class SpatialSteering:
             return False
         at = max(tick, self._fused_at)
         ticks = self._fused_at, at, self.tick
-        _fuse(self._belief, self._observer, ticks, plane, captured - at * self._period, bend, self._period)
+        _fuse(self._known, self._observer, ticks, plane, captured - at * self._period, bend, self._period)
         self._fused_at = at
         self._bends[self.tick % REMEMBERED] = self._observer.now[::OF_A_PLANE]
         return True
@@ -129,62 +123,69 @@ class SpatialSteering:
         It goes by periods; beyond its end it stays as it is there, for a law that looks ahead.
         """
         to_follow, sees = (course, tick, self._preview), Seen(self._observer.now, self.withheld, self._missed)
-        _respond(self._belief, self._laws, sees, to_follow, self._period, self._found)
+        _respond(self._control, self._known, self._bounds, sees, to_follow, self._period, self._found)
         found = self._found.copy()
         return SpatialAnswer(found[AXES : AXES + 2], found[AXES + 2 : AXES + 4], float(found[AXES + 4]), found[:AXES])
 
     def predict(self, *reeled: float) -> None:
         """Go on to the next tick, with each axis reeled in by so much [m] until then."""
-        _predict(self._belief, self._observer, self.tick, np.array(reeled, np.float64), self._period)
+        _predict(self._known, self._observer, self.tick, np.array(reeled, np.float64), self._period)
         self.tick += 1
         self._bends[self.tick % REMEMBERED] = self._observer.now[::OF_A_PLANE]
 
 
 @kernel
-def _respond(belief: Any, laws: Any, sees: Any, to_follow: Any, period: float, found: Any) -> None:
-    known, row = known_of(belief), rows_of(found)
+def _respond(control: Any, known: Any, bounds: Any, sees: Any, to_follow: Any, period: float, found: Any) -> None:
+    knowing, row, bound = knowing_in_lanes(known), rows_of(found), rows_of(bounds)
+    bend, pulls = knowing.bend, part(row, 0, known.pulls)
     course, tick, preview = to_follow
-    ulnar, flexion = laws.ulnar, laws.flexion
     for ahead in range(preview, -1, -1):  # the present last: it is what the laws follow
-        sample = min(tick + ahead, course.shape[0] - 1)
-        ulnar.reference[:] = course[sample, 0]
-        flexion.reference[:] = course[sample, 1]
+        control.reference[:] = course[min(tick + ahead, course.shape[0] - 1)]
         if ahead > 0:
-            look_ahead(ulnar, ahead, 0.0)
-            look_ahead(flexion, ahead, 0.0)
-    least, greatest = part(rows_of(laws.least), 0, belief.pulls), part(rows_of(laws.greatest), 0, belief.pulls)
+            look_ahead(control, bend, ahead, 0.0)
+    count = len(pulls)
+    limits = Limits(part(bound, 0, known.pulls), part(bound, count, known.pulls))
     seen = Seen(rows_of(sees.rows), rows_of(sees.withheld), rows_of(sees.missed))
-    two = part(seen.rows, 0, (0, 0))
-    room = Room(
-        lanes_like(two), lanes_like(two), lanes_like(two), lanes_like(two), lanes_like(least), lanes_like(least),
-        planes_like(least),
-    )  # fmt: skip
-    pulls = part(row, 0, belief.pulls)
-    laws_in_reach, count = Laws(ulnar, flexion, least, greatest), len(pulls)
-    wanted, torque, share = respond_in_planes(laws_in_reach, known, seen, room, 0.0, period, pulls)
-    row[count], row[count + 1], row[count + 2], row[count + 3] = wanted[0], wanted[1], torque[0], torque[1]
-    row[count + 4] = share
+    room = room_like(bend, knowing.arms)
+    share = respond(control, knowing.belief, seen, limits, room, 0.0, period, pulls)
+    for p in range(len(bend)):
+        row[count + p] = room.wanted[p]
+        row[count + len(bend) + p] = room.torque[p]
+    row[count + 2 * len(bend)] = share
+
+
+@compiled
+def _go_over(observer: Any, knowing: Any, x: Any, ticks: Any, h: float) -> None:
+    """Advance x over the ticks from the first up to the last, by what is remembered as delivered."""
+    first, last = ticks
+    counts = lanes_like(knowing.pulls)
+    for past in range(first, last):
+        before = rows_of(observer.delivered[past % observer.delivered.shape[0]])
+        for t in range(len(counts)):
+            counts[t] = before[t]
+        propagate(knowing, x, counts, h)
 
 
 @kernel
-def _fuse(belief: Any, observer: Any, ticks: Any, plane: int, since: float, bend: float, h: float) -> None:
-    known = known_of(belief)
+def _fuse(known: Any, observer: Any, ticks: Any, plane: int, since: float, bend: float, h: float) -> None:
+    knowing = knowing_in_lanes(known)
     before, captured, tick = ticks
     gain, fused, now = rows_of(observer.gain), rows_of(observer.fused), rows_of(observer.now)
-    counts, two = lanes_like(known.alike), lanes_like(part(now, 0, (0, 0)))
-    go_over(observer.delivered, known, fused, (before, captured), counts, two, h)
+    _go_over(observer, knowing, fused, (before, captured), h)
     first = OF_A_PLANE * plane
-    correct_bend(fused, gain, plane, bend - fused[first] - since * fused[first + 1])
+    innovation = bend - fused[first] - since * fused[first + 1]
+    for i in range(first, first + OF_A_PLANE):
+        fused[i] = fused[i] + gain[i] * innovation
     for i in range(2 * OF_A_PLANE):
         now[i] = fused[i]
-    go_over(observer.delivered, known, now, (captured, tick), counts, two, h)
+    _go_over(observer, knowing, now, (captured, tick), h)
 
 
 @kernel
-def _predict(belief: Any, observer: Any, tick: int, reeled: Any, h: float) -> None:
-    known = known_of(belief)
-    counts, now = part(rows_of(reeled), 0, belief.pulls), rows_of(observer.now)
+def _predict(known: Any, observer: Any, tick: int, reeled: Any, h: float) -> None:
+    knowing = knowing_in_lanes(known)
+    counts, now = part(rows_of(reeled), 0, known.pulls), rows_of(observer.now)
     sent = rows_of(observer.delivered[tick % observer.delivered.shape[0]])
     for t in range(len(counts)):
         sent[t] = counts[t]
-    propagate_bends(known, now, counts, lanes_like(part(now, 0, (0, 0))), h)
+    propagate(knowing, now, counts, h)

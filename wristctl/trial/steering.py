@@ -11,16 +11,15 @@ from wristctl.bench.faults import Faults
 from wristctl.config.bench import InjectedFault
 from wristctl.config.plant import Actuator, Sensor
 from wristctl.config.wrist import WristParameters
+from wristctl.control.belief import Limits
 from wristctl.control.law import REFERENCE, Controller, signals_of
-from wristctl.control.response import Controlled, Estimate, look_ahead, respond
+from wristctl.control.response import Controlled, Estimate, Seen, look_ahead, respond, room_like
 from wristctl.lanes.compiled import kernel
 from wristctl.lanes.lane import zero_like
-from wristctl.lanes.rows import rows_of
-from wristctl.simulation.actuator import drive_of
-from wristctl.simulation.observer import ArrivingFrame, fuse, predict
+from wristctl.lanes.rows import lanes_like, part, rows_of
+from wristctl.simulation.observer import ArrivingFrame, fuse, knowing_in_lanes, known_of_sides, predict
 from wristctl.simulation.stationary_filter import Belief, observer_of
-from wristctl.wrist.segments import load_segments, segments
-from wristctl.wrist.tendons import TENDONS_PER_SIDE, torque_of
+from wristctl.wrist.tendons import TENDONS_PER_SIDE
 
 # Ticks that a frame may be late.
 REMEMBERED = 256
@@ -40,15 +39,14 @@ class Steering:
     """Observer and law of one bending plane. Ticks are numbered from 0, `period` [s] apart."""
 
     def __init__(self, wrist: WristParameters, actuator: Actuator, sensor: Sensor, period: float, theta: float) -> None:
-        self._drive = drive_of(actuator)
-        self._model = segments(wrist, 1)
-        self._bounds = TENDONS_PER_SIDE * np.array([wrist.pretension, wrist.tension_limit])
+        self._known = known_of_sides(wrist, actuator)
+        self._bounds = TENDONS_PER_SIDE * np.repeat([wrist.pretension, wrist.tension_limit], 2)
         self._observer = observer_of(Belief(sensor, actuator, wrist, period), REMEMBERED, theta)
-        self._signals, self._target, self._found = (np.zeros(rows) for rows in (0, len(REFERENCE), 6))
+        self._signals, self._target, self._found = np.zeros((1, 0)), np.zeros((1, len(REFERENCE))), np.zeros(6)
         self._period = period
         self._law: Any = None
         self._preview = 0
-        self._gains = self._memory = np.zeros(1)
+        self._gains, self._memory = np.zeros(1), np.zeros((1, 1))
         self.tick = 0
         self.withheld = 0.0
         """Torque of the last command that the motors are too slow to deliver [N m]."""
@@ -63,10 +61,10 @@ class Steering:
         """Take up a law, its memory empty, with motors that have caught up."""
         self.withheld = 0.0
         self._law = controller.compiled()
-        self._signals = np.zeros(signals_of(controller.preview))
+        self._signals = np.zeros((1, signals_of(controller.preview)))
         self._preview = controller.preview
         self._gains = np.array([*gains, 0.0])
-        self._memory = np.zeros(max(1, controller.memory))
+        self._memory = np.zeros((1, max(1, controller.memory)))
 
     def see(self, theta: float, captured: float) -> bool:
         """Fuse an angle [rad] seen `captured` seconds after tick 0; False where that is too old or yet to come."""
@@ -75,7 +73,7 @@ class Steering:
             return False
         since = captured - tick * self._period
         ticks = int(self._observer.at[0]), tick, tick, self.tick
-        _fuse(self._observer, self._drive, self._model, ticks, since, theta, self._period)
+        _fuse(self._observer, self._known, ticks, since, theta, self._period)
         return True
 
     def respond(self, course: Array, tick: int = 0) -> Answer:
@@ -84,50 +82,51 @@ class Steering:
         It goes by periods; beyond its end it stays as it is there, for a law that looks ahead. Raises what a plain law
         has raised.
         """
-        control = Controlled(self._law, self._signals, self._model, self._gains, self._memory, self._target)
-        to_follow = course, tick, self._preview
-        _respond(control, self._bounds, self._observer.now, self.withheld, to_follow, self._period, self._found)
+        models = self._known.belief.models
+        control = Controlled(self._law, self._signals, models, self._gains, self._memory, self._target)
+        seen, to_follow = np.array([*self._observer.now, self.withheld, 0.0]), (course, tick, self._preview)
+        _respond(control, self._known, self._bounds, seen, to_follow, self._period, self._found)
         self._law.check()
         wanted, torque, plus, minus, low, high = map(float, self._found)
         return Answer(wanted, torque, plus / TENDONS_PER_SIDE, minus / TENDONS_PER_SIDE, not low <= wanted <= high)
 
     def predict(self, reeled_plus: float, reeled_minus: float) -> None:
         """Go on to the next tick, with the sides reeled in by so much [m] until then."""
-        _predict(self._observer, self._drive, self._model, self.tick, reeled_plus, reeled_minus, self._period)
+        _predict(self._observer, self._known, self.tick, np.array([reeled_plus, reeled_minus], float), self._period)
         self.tick += 1
 
 
 @kernel
-def _respond(control: Any, bounds: Any, now: Any, withheld: float, to_follow: Any, period: float, result: Any) -> None:
-    believed, x, bound, row = load_segments(rows_of(control.model)), rows_of(now), rows_of(bounds), rows_of(result)
+def _respond(control: Any, known: Any, bounds: Any, sees: Any, to_follow: Any, period: float, result: Any) -> None:
+    knowing, row, x, bound = knowing_in_lanes(known), rows_of(result), rows_of(sees), rows_of(bounds)
+    bend, pulls = knowing.bend, lanes_like(knowing.pulls)
     course, tick, preview = to_follow
     for ahead in range(preview, -1, -1):  # the present last: it is what the law follows
-        control.reference[:] = course[min(tick + ahead, course.shape[0] - 1)]
+        control.reference[0, :] = course[min(tick + ahead, course.shape[0] - 1)]
         if ahead > 0:
-            look_ahead(control, ahead, 0.0)
-    estimate = Estimate(x[0], x[1], x[2])
-    less = withheld + zero_like(x[0])
-    wanted, low, high, plus, minus = respond(control, believed, estimate, less, (bound[0], bound[1]), 0.0, period)
-    row[0] = wanted
-    row[1] = torque_of(x[0], believed, plus, minus)
-    row[2] = plus
-    row[3] = minus
-    row[4] = low
-    row[5] = high
+            look_ahead(control, bend, ahead, 0.0)
+    seen = Seen(part(x, 0, (0, 0, 0)), part(x, 3, (0,)), part(x, 4, (0,)))
+    limits, room = Limits(part(bound, 0, known.pulls), part(bound, 2, known.pulls)), room_like(bend, knowing.arms)
+    respond(control, knowing.belief, seen, limits, room, 0.0, period, pulls)
+    row[0] = room.wanted[0]
+    row[1] = room.torque[0]
+    row[2] = pulls[0]
+    row[3] = pulls[1]
+    row[4] = room.low[0]
+    row[5] = room.high[0]
 
 
 @kernel
-def _fuse(observer: Any, drive: Any, model: Any, ticks: Any, since: float, theta: float, h: float) -> None:
-    believed = load_segments(rows_of(model))
-    zero = zero_like(believed.length)
-    fuse(observer, drive, believed, ticks, ArrivingFrame(ticks[1] + zero, since, theta + zero, 1.0 + zero), h)
+def _fuse(observer: Any, known: Any, ticks: Any, since: float, theta: float, h: float) -> None:
+    knowing = knowing_in_lanes(known)
+    bend, zero = lanes_like(knowing.bend), zero_like(knowing.bend[0])
+    bend[0] = theta + zero
+    fuse(observer, knowing, ticks, ArrivingFrame(ticks[1] + zero, since, bend, 1.0 + zero), h)
 
 
 @kernel
-def _predict(observer: Any, drive: Any, model: Any, tick: int, plus: float, minus: float, h: float) -> None:
-    believed = load_segments(rows_of(model))
-    zero = zero_like(believed.length)
-    predict(observer, drive, believed, tick, plus + zero, minus + zero, h)
+def _predict(observer: Any, known: Any, tick: int, reeled: Any, h: float) -> None:
+    predict(observer, knowing_in_lanes(known), tick, part(rows_of(reeled), 0, known.pulls), h)
 
 
 class HostFaults:

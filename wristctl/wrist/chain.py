@@ -70,14 +70,14 @@ def _spring(segment: Any, k: int) -> Any:
 
 
 @compiled
-def angle_along(segment: Any, q: Any, rate: Any) -> Any:
-    """Bending angle of the last disc [rad] and its rate [rad/s]: the sums of the parts'."""
+def bend_along(segment: Any, q: Any, rate: Any, bend: Any, speed: Any) -> None:
+    """Write the bend of the last disc [rad] and its rate [rad/s], one row each: the sums of the parts'."""
     zero = zero_like(segment.length)
     angle, turning = zero, zero
     for k in range(len(q)):
         angle = angle + q[k]
         turning = turning + rate[k]
-    return angle, turning
+    bend[0], speed[0] = angle, turning
 
 
 @compiled

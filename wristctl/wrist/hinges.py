@@ -21,7 +21,7 @@ from wristctl.lanes.named_tuples import replacing, tuple_of
 from wristctl.lanes.rows import beyond, lanes_like, part, planes_like, rows_of, square_like
 from wristctl.wrist.arcs import Chords
 from wristctl.wrist.chain import (
-    angle_along,
+    bend_along,
     chords,
     lengths,
     moment_arms,
@@ -149,7 +149,7 @@ def _within(plant: Any, q: Any) -> Any:
 
 @compiled
 def _disturbed(plant: Any, force: Any, scale: Any) -> Any:
-    return _load(plant, (scale * plant.stiffness, force + plant.force_y))
+    return _load(plant, (scale * plant.stiffness, force[1] + plant.force_y))
 
 
 def values(wrist: WristParameters, n: int) -> Array:
@@ -225,7 +225,7 @@ HINGES = PlantModel(
     coordinates=lambda n: n,
     values=values,
     advance=step,
-    tip_angle=angle_along,
+    bend_of=bend_along,
     travel=travel,
     within=_within,
     disturbed=_disturbed,

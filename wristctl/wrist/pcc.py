@@ -8,7 +8,7 @@ from wristctl.errors import UserError
 from wristctl.lanes.compiled import compiled
 from wristctl.lanes.named_tuples import replacing
 from wristctl.wrist.arcs import ARC_LIMIT, tip
-from wristctl.wrist.chain import angle_along, tip_derivatives
+from wristctl.wrist.chain import bend_along, tip_derivatives
 from wristctl.wrist.compiled_model import terms
 from wristctl.wrist.integrator import step
 from wristctl.wrist.kinematics import arcs_backbone, chain_tip
@@ -30,7 +30,7 @@ def _within(plant: Any, q: Any) -> Any:
 
 @compiled
 def _disturbed(plant: Any, force: Any, scale: Any) -> Any:
-    return _load(plant, (scale * plant.stiffness, force + plant.force_y))
+    return _load(plant, (scale * plant.stiffness, force[1] + plant.force_y))
 
 
 @compiled
@@ -56,7 +56,7 @@ PCC = PlantModel(
     coordinates=lambda n: n,
     values=_values,
     advance=step,
-    tip_angle=angle_along,
+    bend_of=bend_along,
     travel=travel,
     within=_within,
     disturbed=_disturbed,

@@ -29,7 +29,18 @@ from wristctl.lanes.lane import dot, planar, where, zero_like
 from wristctl.lanes.named_tuples import tuple_of
 from wristctl.lanes.rows import lanes_like, part, planes_like, rows_of
 from wristctl.wrist.kinematics import Backbone
-from wristctl.wrist.tendon_mechanics import ElasticTendons, NoTendons, PulledTendons, RealTendons, update_memory
+from wristctl.wrist.tendon_mechanics import (
+    ElasticTendons,
+    NoTendons,
+    PulledTendons,
+    RealTendons,
+    pulls_at_start,
+    update_memory,
+)
+
+
+def _unknown(*_: Any) -> Any:
+    raise NotImplementedError("a plant in two planes has no one angle, and no two sides")
 
 
 @dataclass(frozen=True)
@@ -44,26 +55,31 @@ class PlantModel:
     values: Callable[[WristParameters, int], Array]
     """The parameters' values of a wrist cut into so many segments, in their order."""
     advance: Any
-    tip_angle: Any
-    travel: Any
+    bend_of: Any
     within: Any
     disturbed: Any
-    tip_pose: Any
-    tip_jacobian: Any
-    angle: Callable[[Array], Array]
-    """Bending angles (...) [rad] of the last disc at coordinates (..., q)."""
     tips: Callable[[WristParameters, Array], Array]
-    """Tips (T, 2) [m] at coordinates (T, q)."""
-    taut: Callable[[WristParameters, Array], Array]
+    """Tips (T, P + 1) [m] at coordinates (T, q)."""
+    planes: int = 1
+    """Number P of planes that it bends in; what follows is of a plant in one plane."""
+    read: Any = None
+    """Function (model, rows, pulls) of compiled code that reads the parameters; None: each is a row."""
+    travel: Any = None
+    tip_pose: Any = None
+    tip_jacobian: Any = None
+    angle: Callable[[Array], Array] = _unknown
+    """Bending angles (...) [rad] of the last disc at coordinates (..., q)."""
+    taut: Callable[[WristParameters, Array], Array] = _unknown
     """Lengths (2,) [m] of the + and the - side's taut tendons at coordinates (q,)."""
-    backbone: Backbone
+    backbone: Backbone = _unknown
     """For pictures."""
     equilibrium: Callable[[WristParameters, int, tuple[float, float]], Array] | None = None
     """Coordinates (q,) at rest under tensions [N per tendon, + and - side]; None where the plant cannot tell."""
 
     def __post_init__(self) -> None:
-        for function in (advance, tip_angle, travel, within, disturbed, tip_pose, tip_jacobian):
-            implements(function, self.parameters)(getattr(self, function.__name__))
+        for function in (advance, bend_of, travel, within, disturbed, tip_pose, tip_jacobian):
+            if (body := getattr(self, function.__name__)) is not None:
+                implements(function, self.parameters)(body)
 
     @property
     def sources(self) -> tuple[Path, ...]:
@@ -85,8 +101,8 @@ PLANTS: Choices[PlantModel] = _TABLE
 class PlantType(numba.types.Type):
     """A plant model in compiled code: nothing but a type."""
 
-    def __init__(self, parameters: Any) -> None:
-        self.parameters = parameters
+    def __init__(self, parameters: Any, read: Any) -> None:
+        self.parameters, self.read = parameters, read
         super().__init__(name=f"plant({parameters.__module__}.{parameters.__qualname__})")
 
 
@@ -95,7 +111,7 @@ register_model(PlantType)(models.OpaqueModel)
 
 @typeof_impl.register(PlantModel)
 def _type_of(model: PlantModel, context: Any) -> PlantType:
-    return PlantType(model.parameters)
+    return PlantType(model.parameters, model.read)
 
 
 @unbox(PlantType)
@@ -103,18 +119,20 @@ def _nothing(kind: PlantType, model: Any, context: Any) -> NativeValue:
     return NativeValue(context.context.get_dummy_value())
 
 
-def parameters_of(model: Any, rows: Any) -> Any:
-    """The model's parameters, read from rows of lanes."""
+def parameters_of(model: Any, rows: Any, pulls: Any = ()) -> Any:
+    """The model's parameters, read from rows of lanes; `pulls` is a tuple with an entry for each place of tendons."""
     raise NotImplementedError("compiled code only")
 
 
 @overload(parameters_of)
-def _parameters_of(model: Any, rows: Any) -> Any:
+def _parameters_of(model: Any, rows: Any, pulls: Any = ()) -> Any:
     if not isinstance(model, PlantType):
         return None
+    if model.read is not None:
+        return model.read
     read = tuple_of(model.parameters)
 
-    def parameters(model: Any, rows: Any) -> Any:
+    def parameters(model: Any, rows: Any, pulls: Any = ()) -> Any:
         return read(rows)
 
     return parameters
@@ -133,8 +151,8 @@ def advance(plant: Any, q: Any, rate: Any, spool_input: Any, tendons: Any, h: An
 
 
 @by_type
-def tip_angle(plant: Any, q: Any, rate: Any) -> Any:
-    """Bending angle of the last disc [rad] and its rate [rad/s]."""
+def bend_of(plant: Any, q: Any, rate: Any, bend: Any, speed: Any) -> None:
+    """Write the bend of the last disc [rad] and its rate [rad/s], a row for each plane."""
     raise NotImplementedError("compiled code only")
 
 
@@ -153,7 +171,10 @@ def within(plant: Any, q: Any) -> Any:
 
 @by_type
 def disturbed(plant: Any, force: Any, scale: Any) -> Any:
-    """The plant with a force on the last disc [N, across the straight wrist] and its stiffness scaled."""
+    """The plant with a force (3) on the last disc [N] and its stiffness scaled.
+
+    The force is along the straight wrist, across it toward positive bends, and aside, which one plane does not feel.
+    """
     raise NotImplementedError("compiled code only")
 
 
@@ -199,6 +220,20 @@ def _remembered_path(tendons: Any, plant: Any, q: Any) -> Any:
     return tendons.state[0], tendons.state[1], tendons.state[2]
 
 
+@by_type
+def acting_pulls(tendons: Any, plant: Any, q: Any, spool_input: Any, path: Any, acts: Any) -> None:
+    """Write the pulls [N] at the wrist, at coordinates q at the start of a step, a row for each place of tendons.
+
+    `path` is that of `path_before`.
+    """
+    raise NotImplementedError("compiled code only")
+
+
+@implements(acting_pulls, NoTendons, PulledTendons, ElasticTendons, RealTendons)
+def _acting_on_sides(tendons: Any, plant: Any, q: Any, spool_input: Any, path: Any, acts: Any) -> None:
+    acts[0], acts[1] = pulls_at_start(tendons, spool_input, path)
+
+
 @cache
 def kernel_of(function: Any, model: PlantModel) -> Any:
     """A function of Python as a kernel that moves plants of this model; its cache goes by that one's sources too."""
@@ -222,7 +257,9 @@ def _poses(model: Any, values: Any, states: Any, out: Any, cut: Any) -> None:
         n = len(cut)
         q, rate = part(rows_of(states[block]), 0, cut), part(rows_of(states[block]), n, cut)
         place, turning = planes_like(q), lanes_like(q)
-        angle, zero = tip_angle(plant, q, rate)
+        bend, speed = lanes_like(part(q, 0, (0,))), lanes_like(part(q, 0, (0,)))
+        bend_of(plant, q, rate, bend, speed)
+        angle, zero = bend[0], speed[0]
         position, _ = tip_pose(plant, q)
         tip_jacobian(plant, q, place, turning)
         along, across = planar(1.0 + zero, zero), planar(zero, 1.0 + zero)

@@ -94,8 +94,8 @@ def _advance(rod: Any, q: Any, rate: Any, given: Any, tendons: Any, h: Any) -> A
 
 
 @compiled
-def _tip_angle(rod: Any, q: Any, rate: Any) -> Any:
-    return q[0], rate[0]
+def _bend_of(rod: Any, q: Any, rate: Any, bend: Any, speed: Any) -> None:
+    bend[0], speed[0] = q[0], rate[0]
 
 
 @compiled
@@ -105,7 +105,7 @@ def _within(rod: Any, q: Any) -> Any:
 
 @compiled
 def _disturbed(rod: Any, force: Any, scale: Any) -> Any:
-    return _loaded(rod, (scale * rod.stiffness, force + rod.force))
+    return _loaded(rod, (scale * rod.stiffness, force[1] + rod.force))
 
 
 @compiled
@@ -141,7 +141,7 @@ HINGE = PlantModel(
     coordinates=lambda n: 1,
     values=values,
     advance=_advance,
-    tip_angle=_tip_angle,
+    bend_of=_bend_of,
     travel=_travel,
     within=_within,
     disturbed=_disturbed,

@@ -88,12 +88,12 @@ def moment_arms_of(wrist: Any, q: Any, t: int, arms: Any) -> None:
 
 
 @compiled
-def arms_about_bend(wrist: Any, bend: Any, arms_y: Any, arms_z: Any) -> None:
-    """Moment arms of all tendons of a wrist of one segment bent like this (2 rows), into T rows each [m]."""
-    y, z = bend[0], bend[1]
+def arms_about_bend(wrist: Any, bend: Any, arms: Any) -> None:
+    """Moment arms [m] of all T tendons of a wrist of one segment bent like this (2 rows): T rows toward y, then z."""
+    y, z, count = bend[0], bend[1], len(arms) // 2
     spans = _spans(wrist.segment, y, z)
-    for t in range(len(arms_y)):
-        arms_y[t], arms_z[t] = _arm(wrist, t, 0, y, z, spans)
+    for t in range(count):
+        arms[t], arms[count + t] = _arm(wrist, t, 0, y, z, spans)
 
 
 @compiled

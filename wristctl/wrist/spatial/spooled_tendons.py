@@ -1,9 +1,11 @@
 """Tendons between spools and a wrist in two planes, as the integration step evaluates them; a row for each tendon.
 
-By the type of `tendons` the step's `spool_input` is a pull [N] that is held (NoTendons), or the length [m] that a spool
-has reeled in of an elastic tendon (ElasticTendons, RubbingTendons): that pulls stiffness times stretch, and never
-pushes. A rubbing tendon pulls less at the wrist than at its spool where it is reeled in, and more where it is paid
-out: the capstan's equation with a Dahl bristle, as `wristctl.wrist.tendon_mechanics` has it in one plane.
+By the type of `tendons` the step's `spool_input` is a pull [N] that is held (NoTendons, HeldPlaces), or the length [m]
+that a spool has reeled in of an elastic tendon: that pulls stiffness times stretch, and never pushes. A rubbing tendon
+pulls less at the wrist than at its spool where it is reeled in, and more where it is paid out: the capstan's equation
+with a Dahl bristle, as `wristctl.wrist.tendon_mechanics` has it in one plane.
+
+Those of a loop, at places, break at a time, and lag behind their spools within a backlash.
 """
 
 from typing import Any, NamedTuple
@@ -11,11 +13,12 @@ from typing import Any, NamedTuple
 from wristctl.lanes.compiled import by_type, compiled, implements
 from wristctl.lanes.functions import maximum
 from wristctl.lanes.lane import sqrt, where, zero_like
-from wristctl.lanes.rows import lanes_like
+from wristctl.lanes.rows import lanes_like, part, rows_of
 from wristctl.wrist.dahl import bristle, bristle_slope
+from wristctl.wrist.plant import acting_pulls, path_along, path_before
 from wristctl.wrist.spatial.spatial_segments import OF_A_TENDON
 from wristctl.wrist.spatial.spatial_tendons import lengths_along, moment_arms_of, share_of
-from wristctl.wrist.tendon_mechanics import ElasticTendons, NoTendons, capstan
+from wristctl.wrist.tendon_mechanics import ElasticTendons, NoTendons, capstan, tendons_in_lanes, update_memory
 
 # Rows of the state of one rubbing tendon: travel before the step [m], and its bristle.
 OF_A_STATE = 2
@@ -33,6 +36,111 @@ class RubbingTendons(NamedTuple):
     """One over the path in which friction turns round [1/m]."""
     state: Any
     """OF_A_STATE rows for each tendon."""
+
+
+class HeldPlaces(NamedTuple):
+    """Places whose pulls are held, until their tendons break at a time [s].
+
+    `left` are rows to work on. In one block's arrays `pulls` is a tuple with an entry for each place.
+    """
+
+    broken_at: Any
+    left: Any
+    pulls: Any
+
+
+class ElasticPlaces(NamedTuple):
+    """Places of elastic tendons: the stiffness of all of a place [N/m] before they break, as long as they are whole,
+    the time at which they break [s], the backlash of all [m], and the length [m] that each has reeled in.
+
+    In one block's arrays `pulls` is a tuple with an entry for each place.
+    """
+
+    whole: Any
+    broken_at: Any
+    backlash: Any
+    stiffness: Any
+    reeled: Any
+    pulls: Any
+
+
+class RubbingPlaces(NamedTuple):
+    """ElasticPlaces with friction, its values and state as those of RubbingTendons, and travels to work on [m].
+
+    In one block's arrays `friction` holds coefficient, sheath and slope.
+    """
+
+    whole: Any
+    broken_at: Any
+    backlash: Any
+    stiffness: Any
+    reeled: Any
+    friction: Any
+    sheath: Any
+    slope: Any
+    state: Any
+    travel: Any
+    pulls: Any
+
+
+@implements(tendons_in_lanes, HeldPlaces)
+def _held_in_lanes(tendons: Any) -> Any:
+    pulls = tendons.pulls
+    return HeldPlaces(part(rows_of(tendons.broken_at), 0, pulls), part(rows_of(tendons.left), 0, pulls), pulls)
+
+
+@implements(tendons_in_lanes, ElasticPlaces)
+def _elastic_in_lanes(tendons: Any) -> Any:
+    pulls = tendons.pulls
+    return ElasticPlaces(
+        part(rows_of(tendons.whole), 0, pulls), part(rows_of(tendons.broken_at), 0, pulls),
+        rows_of(tendons.backlash)[0], part(rows_of(tendons.stiffness), 0, pulls),
+        part(rows_of(tendons.reeled), 0, pulls), pulls,
+    )  # fmt: skip
+
+
+@implements(tendons_in_lanes, RubbingPlaces)
+def _rubbing_in_lanes(tendons: Any) -> Any:
+    pulls, values = tendons.pulls, rows_of(tendons.friction)
+    return RubbingPlaces(
+        part(rows_of(tendons.whole), 0, pulls), part(rows_of(tendons.broken_at), 0, pulls),
+        rows_of(tendons.backlash)[0], part(rows_of(tendons.stiffness), 0, pulls),
+        part(rows_of(tendons.reeled), 0, pulls), values[0], values[1], values[2], rows_of(tendons.state),
+        part(rows_of(tendons.travel), 0, pulls), pulls,
+    )  # fmt: skip
+
+
+@implements(path_before, HeldPlaces, ElasticPlaces, RubbingPlaces)
+@implements(path_along, HeldPlaces, ElasticPlaces)
+def _nothing_kept(tendons: Any, plant: Any, q: Any) -> Any:
+    return tendons.pulls
+
+
+@implements(path_along, RubbingPlaces)
+def _travels(tendons: Any, plant: Any, q: Any) -> Any:
+    travel = tendons.travel
+    lengths_along(plant, q, travel)
+    for t in range(len(travel)):
+        travel[t] = travel_of(plant, t, travel[t])
+    return tendons.pulls
+
+
+@implements(update_memory, HeldPlaces, ElasticPlaces)
+def _remember_nothing(tendons: Any, q: Any, spool_input: Any, path: Any) -> None:
+    pass
+
+
+@implements(update_memory, RubbingPlaces)
+def _remember_travels(tendons: Any, q: Any, spool_input: Any, path: Any) -> None:
+    state, travel = tendons.state, tendons.travel
+    for t in range(len(travel)):
+        state[OF_A_STATE * t + 1] = _slid(tendons, t, travel[t])
+        state[OF_A_STATE * t] = travel[t]
+
+
+@implements(acting_pulls, HeldPlaces, ElasticPlaces, RubbingPlaces)
+def _acting(tendons: Any, plant: Any, q: Any, spool_input: Any, path: Any, acts: Any) -> None:
+    pulls_of_tendons(tendons, plant, q, spool_input, acts)
 
 
 @compiled
@@ -81,13 +189,13 @@ def remember_travel(tendons: Any, wrist: Any, q: Any) -> None:
     raise NotImplementedError("compiled code only")
 
 
-@implements(pulls_of_tendons, NoTendons)
+@implements(pulls_of_tendons, NoTendons, HeldPlaces)
 def _held(tendons: Any, wrist: Any, q: Any, spool_input: Any, pulls: Any) -> None:
     for t in range(len(pulls)):
         pulls[t] = spool_input[t]
 
 
-@implements(stiffen_by_tendons, NoTendons)
+@implements(stiffen_by_tendons, NoTendons, HeldPlaces)
 def _soft(tendons: Any, wrist: Any, q: Any, rate: Any, pulls: Any, by_q: Any) -> None:
     pass
 
@@ -97,7 +205,7 @@ def _nothing(tendons: Any, wrist: Any, q: Any) -> None:
     pass
 
 
-@implements(pulls_of_tendons, ElasticTendons)
+@implements(pulls_of_tendons, ElasticTendons, ElasticPlaces)
 def _stretched(tendons: Any, wrist: Any, q: Any, spool_input: Any, pulls: Any) -> None:
     lengths_along(wrist, q, pulls)
     for t in range(len(pulls)):
@@ -105,7 +213,7 @@ def _stretched(tendons: Any, wrist: Any, q: Any, spool_input: Any, pulls: Any) -
         pulls[t] = tendons.stiffness[t] * maximum(0.0, stretch)
 
 
-@implements(pulls_of_tendons, RubbingTendons)
+@implements(pulls_of_tendons, RubbingTendons, RubbingPlaces)
 def _rubbed(tendons: Any, wrist: Any, q: Any, spool_input: Any, pulls: Any) -> None:
     lengths_along(wrist, q, pulls)
     for t in range(len(pulls)):
@@ -122,7 +230,7 @@ def _add_stiffness(stiffness: Any, arms: Any, by_q: Any) -> None:
             by_q[i, j] = by_q[i, j] + scaled * arms[j]
 
 
-@implements(stiffen_by_tendons, ElasticTendons)
+@implements(stiffen_by_tendons, ElasticTendons, ElasticPlaces)
 def _taut(tendons: Any, wrist: Any, q: Any, rate: Any, pulls: Any, by_q: Any) -> None:
     arms, zero = lanes_like(q), zero_like(wrist.segment.length)
     for t in range(len(pulls)):
@@ -130,7 +238,7 @@ def _taut(tendons: Any, wrist: Any, q: Any, rate: Any, pulls: Any, by_q: Any) ->
         _add_stiffness(where(pulls[t] > 0.0, tendons.stiffness[t], zero), arms, by_q)
 
 
-@implements(stiffen_by_tendons, RubbingTendons)
+@implements(stiffen_by_tendons, RubbingTendons, RubbingPlaces)
 def _taut_and_rubbing(tendons: Any, wrist: Any, q: Any, rate: Any, pulls: Any, by_q: Any) -> None:
     arms, zero = lanes_like(q), zero_like(wrist.segment.length)
     for t in range(len(pulls)):

@@ -1,0 +1,74 @@
+"""The wrist in two planes as a plant: piecewise constant curvature, n segments with two bends each as coordinates."""
+
+import math
+from typing import Any
+
+from wristctl.arrays import Array
+from wristctl.config.wrist import WristParameters
+from wristctl.lanes.compiled import compiled
+from wristctl.lanes.rows import part
+from wristctl.wrist.plant import PlantModel
+from wristctl.wrist.spatial.posture import tip_bend
+from wristctl.wrist.spatial.spatial_kinematics import spatial_tips
+from wristctl.wrist.spatial.spatial_segments import (
+    FIELDS,
+    SpatialWrist,
+    load_spatial_segments,
+    load_tip,
+    spatial_values,
+)
+from wristctl.wrist.spatial.spatial_step import spatial_step
+from wristctl.wrist.tendon_layout import TendonLayout
+
+# Bend of a segment [rad] up to which the plant's series hold.
+_MOST = 3.1
+
+
+def _read(model: Any, rows: Any, pulls: Any = ()) -> Any:
+    return SpatialWrist(load_spatial_segments(rows), part(rows, FIELDS, pulls + pulls + pulls))
+
+
+@compiled
+def _bend_of(plant: Any, q: Any, rate: Any, bend: Any, speed: Any) -> None:
+    bend[0], bend[1], speed[0], speed[1], _ = tip_bend(plant.segment, q, rate)
+
+
+@compiled
+def _within(plant: Any, q: Any) -> Any:
+    inside = q[0] * q[0] + q[1] * q[1] < _MOST * _MOST
+    for k in range(1, len(q) // 2):
+        inside = inside & (q[2 * k] * q[2 * k] + q[2 * k + 1] * q[2 * k + 1] < _MOST * _MOST)
+    return inside
+
+
+@compiled
+def _disturbed(plant: Any, force: Any, scale: Any) -> Any:
+    still = plant.segment
+    segment = load_tip(
+        still,
+        (
+            still.force_x + force[0], still.force_y + force[1], still.force_z + force[2],
+            scale * still.stiffness_yy, scale * still.stiffness_yz, scale * still.stiffness_zz,
+        ),
+    )  # fmt: skip
+    return SpatialWrist(segment, plant.tendons)
+
+
+def placed_values(wrist: WristParameters, layout: TendonLayout, n: int) -> Array:
+    """The parameters' values of a wrist with tendons like these, cut into n segments."""
+    return spatial_values(wrist, layout, n, axis=math.radians(wrist.stiffness_axis_deg))
+
+
+PCC_IN_SPACE = PlantModel(
+    name="pcc",
+    parameters=SpatialWrist,
+    planes=2,
+    coordinates=lambda n: 2 * n,
+    values=lambda wrist, n: placed_values(wrist, TendonLayout.of(wrist), n),
+    advance=spatial_step,
+    bend_of=_bend_of,
+    within=_within,
+    disturbed=_disturbed,
+    tips=lambda wrist, q: spatial_tips(q, wrist.length),
+    read=_read,
+)
