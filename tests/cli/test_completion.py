@@ -64,10 +64,10 @@ def test_runs_are_completed_by_id_and_as_the_latest(folder: Path) -> None:
 
 @pytest.mark.slow
 def test_study_files_controllers_and_commands_are_completed(folder: Path) -> None:
-    typed = ("train ", "compare experiments/q", "simulate --controller sm", "runs rep")
-    studies, one, laws, verbs = _completed(folder, *typed)
+    typed = ("train ", "compare experiments/q", "simulate --controller sm", "hw-run --controller sm", "runs rep")
+    studies, one, laws, on_a_rig, verbs = _completed(folder, *typed)
     assert studies == ["experiments/paper.yaml", "experiments/quick.yaml"] and one == ["experiments/quick.yaml"]
-    assert laws == ["smc", "smc-dob", "smc-tracking"] and verbs == ["replay", "report"]
+    assert laws == on_a_rig == ["smc", "smc-dob", "smc-tracking"] and verbs == ["replay", "report"]
 
 
 def test_runs_are_the_newest_first_and_kinds_in_order(folder: Path) -> None:

@@ -104,6 +104,28 @@ def test_a_sweep_over_a_law_replays_from_its_copy_once_it_is_trusted(stranger: P
     assert done.returncode == 0 and f"{run.id}: identical" in done.stdout, done.stderr
 
 
+TRIAL = (
+    "--set", "directions=[ulnar]", "--set", "push.force=0", "--set", "horizon=0.5", "--set", "back=0.3",
+    "--set", "reference={duration: 0.4, angle_deg: 10.0}",
+    "--set", "homing={move: 1.0e-4, rest: 0.15, frames: 2, slack: 5.0e-4, let_go: 1.0}",
+)  # fmt: skip
+
+
+@pytest.mark.slow
+def test_a_trial_of_a_law_by_its_place_replays_from_its_copy_once_it_is_trusted(stranger: Path) -> None:
+    planned = wristctl(stranger, "hw-run", "--controller", "strange.py:STRANGE", "--dry-run")
+    assert planned.returncode == 0 and "its own preset 'default' is taken" in planned.stderr
+    done = wristctl(stranger, "hw-run", "--controller", "strange.py:STRANGE/rig", *TRIAL)
+    assert done.returncode == 0, done.stdout + done.stderr
+    (run,) = (stranger / "results").glob("*hw-run*")
+    (row,) = face.load_study(run / "config.yaml").hw_run.rows
+    assert row.gains == "rig" and "code/strange/strange.py:STRANGE" in row.controller
+    assert Run(run).data("trials")["outcome"].tolist() == ["ok"]
+    (stranger / "strange.py").unlink()
+    done = wristctl(stranger, "runs", "replay", run.name, "--trust-code")
+    assert done.returncode == 0 and f"{run.name}: identical" in done.stdout, done.stdout + done.stderr
+
+
 @pytest.mark.painted
 @pytest.mark.slow
 def test_a_run_replays_identically_from_its_copy_once_it_is_trusted(stranger: Path) -> None:

@@ -97,20 +97,17 @@ def with_planes(study: Study) -> Study:
 def with_presets(study: Study, command: str, tell: bool = True, for_several: bool = False) -> Study:
     """The study with a controller's own preset where nobody chose gains for it and it has none of the default's name.
 
-    That is its preset `default`, or else its first, for the commands of one loop and for `compare`. With `tell` the
-    log says which. A preset that was chosen `for_several` controllers in turn holds for those that have it.
+    That is its preset `default`, or else its first, for the commands of one loop, for `compare` and for `hw-run`. With
+    `tell` the log says which. A preset that was chosen `for_several` controllers in turn holds for those that have it.
     """
-    if command not in ("simulate", "analyse", "compare"):
+    if command in ("simulate", "analyse"):
+        return study.model_copy(update={"simulate": _with_preset(study.simulate, tell, for_several)})
+    if command not in ("compare", "hw-run"):
         return study
-    section = study.compare if command == "compare" else study.simulate
-    if isinstance(section, SimulateSettings):
-        return study.model_copy(update={"simulate": _with_preset(section, tell, for_several)})
-    rows = {
-        name: tuple(_with_preset(row, tell) for row in value)
-        for name, value in section
-        if isinstance(value, tuple) and value and isinstance(value[0], Row)
-    }
-    return study.model_copy(update={"compare": section.model_copy(update=rows)})
+    name = command.replace("-", "_")
+    section = getattr(study, name)
+    rows = tuple(_with_preset(row, tell) for row in section.rows)
+    return study.model_copy(update={name: section.model_copy(update={"rows": rows})})
 
 
 def _with_preset(row: _Row, tell: bool, for_several: bool = False) -> _Row:

@@ -31,6 +31,7 @@ def _by_name(gains: Any) -> Any:
     return values
 
 
+CONTROLLER = "name in the table of controllers, NAME/GAINS, or file.py:NAME"
 GainsChoice = Annotated[str | dict[str, float], BeforeValidator(_by_name)]
 ControllerName = Annotated[str, OneOf(CONTROLLERS)]
 
@@ -40,7 +41,7 @@ REPETITIONS = "repetitions, each with noise and drawn plants of its own, the sam
 class Row(Section):
     """One controller with one set of gains."""
 
-    controller: ControllerName = choice("smc", "name in the table of controllers, or file.py:NAME")
+    controller: ControllerName = choice("smc", CONTROLLER)
     gains: GainsChoice = choice("default", GAINS)
 
     @property

@@ -7,7 +7,7 @@ from pydantic import ValidationInfo, field_validator, model_validator
 
 from wristctl.config.bench import BenchSettings
 from wristctl.config.camera import Device, Gates, Markers
-from wristctl.config.controller_row import Row
+from wristctl.config.controller_row import GAINS, GainsChoice, Row
 from wristctl.config.loop import TICK, DirectionName, Loop, Reference
 from wristctl.config.plant import Actuator, Plant, Push, Sensor, TrueActuator, TrueSensor, TrueWrist
 from wristctl.config.section import Section, choice, quantity, seldom
@@ -217,11 +217,17 @@ class CalibrateWristSettings(RigSettings):
     max_deg: float = quantity(2.0, "deg", "largest bend while one axis is tried", "assumed", gt=0.5, le=10)
 
 
+class RigRow(Row):
+    """One controller with one set of gains, on a rig."""
+
+    gains: GainsChoice = choice("hardware", GAINS)
+
+
 class HwRunSettings(RigSettings):
     """The paper's experiment: directions x repetitions, with and without a push, for each controller."""
 
-    rows: tuple[Row, ...] = choice(
-        (Row(controller="smc-tracking", gains="hardware"),),
+    rows: tuple[RigRow, ...] = choice(
+        (RigRow(controller="smc-tracking"),),
         "controllers with their gains",
         min_length=1,
         alias="controllers",

@@ -2,7 +2,7 @@
 
 from typing import Literal
 
-from wristctl.config.controller_row import GAINS, ControllerName, GainsChoice
+from wristctl.config.controller_row import CONTROLLER, GAINS, ControllerName, GainsChoice
 from wristctl.config.loop import DirectionName, Loop, Reference
 from wristctl.config.section import Section, choice, quantity
 
@@ -10,7 +10,7 @@ from wristctl.config.section import Section, choice, quantity
 class SimulateSettings(Section):
     """One closed loop."""
 
-    controller: ControllerName = choice("smc", "name in the table of controllers, or file.py:NAME")
+    controller: ControllerName = choice("smc", CONTROLLER)
     gains: GainsChoice = choice("hardware", GAINS)
     loop: Loop = Loop()
     reference: Reference = Reference()

@@ -7,6 +7,7 @@ from typing import Any, Literal, Union, get_args, get_origin
 from pydantic.fields import FieldInfo
 
 from wristctl.config import former_names
+from wristctl.config.controller_row import Row
 from wristctl.config.section import OneOf, Section
 from wristctl.config.study import Study
 from wristctl.study_files.strict_yaml import KeyPath
@@ -44,10 +45,15 @@ def _given(annotation: Any) -> Any:
 SUBJECTS = {"analyse": "simulate", "validate": "real-robot"}
 
 
+# Sections with a list of controllers, for which one controller or gains may be given in short.
+LISTS_OF_ROWS = {"hw-run": "controllers"}
+
+
 def section_keys(command: str | None) -> dict[str, FieldInfo]:
     """The keys of a command's own section and of the one that it works on; empty where it has none."""
     sections = [SUBJECTS[command], command] if command in SUBJECTS else [command] if command else []
-    return {key: field for section in sections for key, field in keys_of(field_at((section,))[0]).items()}
+    short = keys_of(Row) if command in LISTS_OF_ROWS else {}
+    return short | {key: field for section in sections for key, field in keys_of(field_at((section,))[0]).items()}
 
 
 def home_of(command: str, key: str) -> str:

@@ -24,6 +24,7 @@ from wristctl.study_files.renaming import (
     with_loops_of_today,
 )
 from wristctl.study_files.shipped import shipped_name, shipped_names, study_file
+from wristctl.study_files.short_rows import for_their_own_controller, in_lists, with_gains_apart
 from wristctl.study_files.strict_yaml import Document, KeyPath, parse_yaml
 
 # The key of a study file that names others, which are read before it.
@@ -69,23 +70,21 @@ def read_study(
     leave_out_removed(data, origins)
     for override in overrides:
         setting = Setting(override)
-        document = with_keys_of_today(_override(override, command), setting, former)
+        document = with_gains_apart(with_keys_of_today(_override(override, command), setting, former), setting)
         _merge(data, _whole(document, None), setting, origins)
     with_loops_of_today(data, origins, former)
     note_presets(data, origins, former)
     if note:
         former.note()
+    for_another = for_their_own_controller(data, origins)
+    in_lists(data, origins)
     try:
         study = Study.model_validate(data, by_alias=True, by_name=False)
     except ValidationError as error:
         raise explained(error, origins) from error
-    if _is_override(origins, "controller") and not _is_override(origins, "gains"):
-        study.simulate.model_fields_set.discard("gains")  # the file's are for its own controller
+    if for_another:
+        study.simulate.model_fields_set.discard("gains")
     return study, origins
-
-
-def _is_override(origins: Mapping[KeyPath, Phrase], leaf: str) -> bool:
-    return any(path[:2] == ("simulate", leaf) and isinstance(origin, Setting) for path, origin in origins.items())
 
 
 def _merge_file(
@@ -108,7 +107,7 @@ def _merge_file(
         check_within(inner, file)
         _merge_file(data, inner, origins, (*outer, file), former)
     lines = {path: line for path, line in document.lines.items() if path[0] != INCLUDE}
-    document = with_keys_of_today(Document(content, lines), str(file), former)
+    document = with_gains_apart(with_keys_of_today(Document(content, lines), str(file), former), str(file))
     _merge(data, _whole(document, file), str(file), origins)
 
 

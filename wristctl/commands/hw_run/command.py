@@ -112,10 +112,7 @@ def check_bends_of_trials(settings: HwRunSettings, wrist: WristParameters) -> No
 
 
 def hw_run(session: Session) -> Performed | PerformedBends:
-    """Perform the paper's experiment: four directions, with and without a push, on hardware or all emulated.
-
-    A reference in two planes, or `planes: 2`, bends the wrist in both at once, before two cameras.
-    """
+    """Perform trials, emulated or on hardware: in four directions or both planes at once, with and without a push."""
     session.operator.tell(describe_rig(session.study.hw_run))
     from wristctl.commands.hw_run.results import trial_tables
     from wristctl.commands.hw_run.trial_bends import bends_performed
