@@ -50,7 +50,7 @@ def test_latest_is_the_last_that_holds_what_is_wanted_and_says_why_not_the_very_
     found: list[str] = []
     make()
     with pytest.raises(
-        UserError, match="no gen-data run that ended ok holds a table of tips .data/tips.csv."
+        UserError, match=r"no gen-data run that ended ok holds a table of tips .data/tips\.csv."
     ) as caught:
         require("latest:gen-data", "gen-data", results, TIPS)
     assert str(caught.value).endswith("fix: run `wristctl gen-data` again")
