@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +15,8 @@ from scipy.integrate import solve_ivp
 
 import wristctl
 from wristctl.commands.recommend.answer import NEAR, RECOMMENDED, Candidate, Recommended, spread
-from wristctl.commands.recommend.command import FAMILY, TOLERATED, reach_deg
+from wristctl.commands.recommend.command import FAMILY, TOLERATED, _limit, reach_deg
+from wristctl.commands.recommend.figures import errors
 from wristctl.commands.recommend.study_file import hw_run_fits, next_command, study_file
 from wristctl.config.loop import Loop, Reference
 from wristctl.config.study import Study
@@ -26,6 +28,7 @@ from wristctl.simulation.drawn_worlds import drawn_cases
 from wristctl.simulation.oscillation import FASTEST, oscillations, sustained
 from wristctl.simulation.reference import motion
 from wristctl.simulation.rollout import rollout
+from wristctl.study_files.load import load_study
 from wristctl.tuning.scaled_presets import dynamic_stiffness, scaled_to
 from wristctl.wrist.compiled_model import terms
 from wristctl.wrist.segments import segments
@@ -150,6 +153,53 @@ def test_its_gains_are_a_study_file_for_simulate_and_hw_run(found: Recommended) 
     assert written["simulate"]["gains"] == pytest.approx(found.best.gains, rel=1e-5)
 
 
+def test_the_gains_of_every_row_are_a_file_that_the_readme_names(found: Recommended) -> None:
+    assert found.run is not None
+    readme = found.run.file("README.md").read_text()
+    for candidate in found.candidates:
+        assert candidate.file in readme
+        study = wristctl.load_study(found.run.file(candidate.file))
+        rows: list[Any] = [study.simulate, *study.hw_run.rows, *study.compare.rows]
+        for row in rows:
+            assert (row.controller, row.gains) == (candidate.controller, pytest.approx(candidate.gains, rel=1e-5))
+    ranked = wristctl.load_study(found.run.file(RECOMMENDED)).compare.rows
+    assert found.best is not None and ranked[0].controller == found.best.controller
+    assert sorted(row.controller for row in ranked) == sorted(one.controller for one in found.candidates)
+    assert all(f"{name} = {value:.3g}" in readme for one in found.candidates for name, value in one.gains.items())
+    assert "data/controllers/" in " ".join(found.answer.lines())
+
+
+def test_a_search_that_ends_where_it_began_is_no_row_of_its_own(found: Recommended) -> None:
+    for name in {one.controller for one in found.candidates}:
+        gains = [list(one.gains.values()) for one in found.candidates if one.controller == name]
+        assert not any(np.allclose(one, other, rtol=1e-6) for one, other in pairwise(gains))
+
+
+def test_limits_are_those_of_the_gains_by_their_names() -> None:
+    """Whatever their order, which a preset has of its own: with two exchanged every rig would swing."""
+    study = study_of()
+    law = scaled_to(WRIST, controller("pid-ff"))
+    assert list(law.presets["hardware"]) != list(law.gains)
+    one = Candidate("pid-ff", "scaled preset", dict(law.presets["hardware"]))
+    other = one._replace(gains=dict(zip(law.gains, law.values(one.gains), strict=True)))
+    family = study.recommend.family(20.0)
+    assert _limit(study, one, 0.5, family) == _limit(study, other, 0.5, family)
+
+
+def test_a_cross_of_the_figure_is_a_rig_that_a_controller_loses(found: Recommended) -> None:
+    """Of two rows one swings on three rigs and fails on a fourth, which has no error and stands at the right edge."""
+    rows = list(found.ranking.rows)
+    rmse, swings = rows[0].rmse.copy(), np.zeros(8, bool)
+    rmse[0], swings[1:4] = np.inf, True
+    rows = [rows[0]._replace(rmse=rmse, swings=swings), *(row._replace(swings=np.zeros(8, bool)) for row in rows[1:])]
+    (axes,) = errors(replace(found, ranking=replace(found.ranking, rows=rows))).axes
+    crosses = np.concatenate([line.get_xdata() for line in axes.get_lines() if line.get_marker() == "x"])
+    dots = np.concatenate([line.get_xdata() for line in axes.get_lines() if line.get_marker() == "."])
+    assert len(crosses) == 4 and len(dots) == 8 * len(rows) - 4
+    assert sorted(crosses)[:3] == pytest.approx(sorted(np.degrees(rmse[1:4]))) and crosses.max() > dots.max()
+    assert "cross: swings or chatters there; at the right edge: fails" in axes.get_xlabel()
+
+
 def test_its_answer_fits_a_screen_and_names_gains_error_and_limits(found: Recommended) -> None:
     lines = found.answer.lines()
     assert len(lines) <= 32 and all(len(line) <= 100 for line in lines if not line.startswith("wristctl "))
@@ -171,8 +221,9 @@ def test_where_every_controller_chatters_nothing_is_recommended() -> None:
     """The paper's PID at a period of 50 ms, which its preset and what so short a search finds do not stand."""
     done = wristctl.recommend(study_of("recommend.controllers=[pid]", "recommend.loop.control_period=5e-2"))
     assert done.best is None and done.fault is not None and done.fault.exit_code == 3
-    assert [share.times for share in done.ranking.standing.lost] == [8, 8, 0] and not done.motions
+    assert [share.times for share in done.ranking.standing.lost] == [8, 0] and not done.motions
     assert done.marks and len(done.answer.lines()) <= 32
+    assert {row[2] for row in done.tables[0].rows} == {one.file for one in done.candidates}
 
 
 def test_a_recommendation_is_for_the_ticks_of_a_trial_unless_a_study_says_otherwise() -> None:
@@ -250,10 +301,11 @@ def test_a_controller_of_ones_own_is_recommended_by_the_runs_copy_of_it(tmp_path
     done = wristctl.recommend(study_of(f"recommend.controllers=[{place}]"), out=tmp_path)
     assert done.run is not None and done.best is not None and done.best.controller == "mine"
     assert "own.py:MINE" in done.run.file("config.yaml").read_text()
-    again = wristctl.load_study(done.run.file(RECOMMENDED), trust_code=True)
     copy = done.run.path / "code" / "own" / "own.py"
-    assert again.hw_run.rows[0].controller == again.simulate.controller and copy.read_text() == OWN
-    assert Path(again.simulate.controller.rpartition(":")[0]).resolve() == copy.resolve()
+    for file in (done.best.file, RECOMMENDED):
+        again = wristctl.load_study(done.run.file(file), trust_code=True)
+        assert again.hw_run.rows[0].controller == again.simulate.controller and copy.read_text() == OWN
+        assert Path(again.simulate.controller.rpartition(":")[0]).resolve() == copy.resolve()
     assert not wristctl.simulate(again).failed
 
 
@@ -332,29 +384,49 @@ BEST = Candidate("pid-ff", "tuned", {"Kp": 3.0, "Ki": 1.23456789, "Kd": 0.2})
 
 
 def test_the_next_command_is_of_the_wrist_and_not_of_the_recommendation() -> None:
-    typed = ("my wrist.yaml", "--set", "recommend.draws=2", "--set", "wrist.length=0.1", "--set", "recommend.tests=8")
+    """Which the file has whole; what was set of the trial is not in it."""
+    typed = (
+        "my wrist.yaml",
+        "--set",
+        "recommend.draws=2",
+        "--set",
+        "wrist.length=0.1",
+        "--set",
+        "hw-run.repetitions=2",
+    )
     told = next_command(study_of(RIG), typed, RECOMMENDED)
-    assert told == f"wristctl hw-run 'my wrist.yaml' --set wrist.length=0.1 {RECOMMENDED}"
+    assert told == f"wristctl hw-run 'my wrist.yaml' --set hw-run.repetitions=2 {RECOMMENDED}"
     assert next_command(study_of(), (), "f.yaml") == "wristctl simulate f.yaml", "hw-run has no ideal motors"
 
 
-@pytest.mark.parametrize("reach, asked", [(45.0, 30.0), (12.0, 12.0)])
-def test_its_file_has_the_wrist_and_the_rig_for_simulate_and_hw_run(tmp_path: Path, reach: float, asked: float) -> None:
+OTHER = Candidate("ct-dob", "scaled preset", {"w": 30.0, "zeta": 0.6, "wo": 300.0})
+
+
+@pytest.mark.parametrize("reach, asked, largest", [(45.0, 30.0, 40.0), (12.0, 12.0, 12.0)])
+def test_its_file_has_the_wrist_and_the_rig_for_simulate_compare_and_hw_run(
+    tmp_path: Path, reach: float, asked: float, largest: float
+) -> None:
     made_for = study_of(RIG, "wrist.length=0.11")
-    (tmp_path / "best.yaml").write_text(study_file(made_for, BEST, BEST.controller, reach))
-    read = wristctl.load_study(tmp_path / "best.yaml")
+    (tmp_path / "best.yaml").write_text(study_file(made_for, [BEST, OTHER], ["pid-ff", "ct-dob"], reach))
+    (tmp_path / "before.yaml").write_text("wrist: {length: 0.2, stiffness: 9}\nsimulate: {controller: smc}\n")
+    read = load_study([tmp_path / "before.yaml", tmp_path / "best.yaml"])
     rig = made_for.recommend.loop
-    for loop in (read.simulate.loop, read.hw_run.loop):
+    for loop in (read.simulate.loop, read.hw_run.loop, *read.compare.loops.values()):
         assert (loop.actuator, loop.sensor, loop.control_period) == (rig.actuator, rig.sensor, 1e-2)
-    assert read.wrist == made_for.wrist and read.hw_run.reference.end_deg == asked
-    assert read.hw_run.rows[0].gains == read.simulate.gains == pytest.approx(BEST.gains, rel=1e-5)
+    assert read.wrist == made_for.wrist, "whole, so that no file before it shows through"
+    assert read.hw_run.reference.end_deg == read.simulate.reference.end_deg == asked
+    assert max(abs(move.end_deg) for move in read.compare.references) == largest
+    assert len(set(map(str, read.compare.references))) == len(Study().compare.references)
+    (row,) = read.hw_run.rows
+    assert [one.controller for one in read.compare.rows] == ["pid-ff", "ct-dob"]
+    assert row.gains == read.simulate.gains == read.compare.rows[0].gains == pytest.approx(BEST.gains, rel=1e-5)
 
 
 @pytest.mark.parametrize("loop", ["control_period=1.0e-3", "sensor.level=ideal", "actuator.level=lagged"])
 def test_a_rig_that_hw_run_cannot_have_is_left_out_of_its_section(tmp_path: Path, loop: str) -> None:
     other = study_of(RIG, f"recommend.loop.{loop}")
     assert hw_run_fits(study_of(RIG)) and not hw_run_fits(other)
-    (tmp_path / "best.yaml").write_text(study_file(other, BEST, BEST.controller, 45.0))
+    (tmp_path / "best.yaml").write_text(study_file(other, [BEST], [BEST.controller], 45.0))
     read = wristctl.load_study(tmp_path / "best.yaml")
     assert read.hw_run.actuator == Study().hw_run.actuator and read.hw_run.rows[0].controller == "pid-ff"
     assert read.simulate.loop.actuator == other.recommend.loop.actuator

@@ -78,7 +78,8 @@ def test_where_some_cases_fail_the_error_is_the_geometric_mean_of_those_where_bo
         return SimpleNamespace(failed=failed[None], metrics={"rmse": np.array([errors[law.name]])})
 
     monkeypatch.setattr("wristctl.simulation.cases.measure", measured)
-    (beside,) = beside_feedforward({"pid": {"Kp": 1.0}}, [], WristParameters()).values()
+    whole = dict.fromkeys(controller("pid").gains, 1.0)
+    (beside,) = beside_feedforward({"pid": whole}, [], WristParameters()).values()
     assert beside.cases == 3 - lost
     known = [math.prod(errors[name][lost:]) ** (1.0 / (3 - lost)) if lost < 3 else math.nan for name in errors]
     assert (beside.feedforward, beside.error) == pytest.approx(tuple(known), nan_ok=True)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import chain
@@ -20,8 +21,8 @@ if TYPE_CHECKING:
     from wristctl.comparison.world_ranking import WorldRanking
     from wristctl.tuning.search import Search
 
-# File with what is recommended, for `simulate` and `hw-run`.
-RECOMMENDED = "data/recommended.yaml"
+# File with what is recommended, and the folder with a file for every row, for `simulate`, `compare` and `hw-run`.
+RECOMMENDED, ROWS = "data/recommended.yaml", "data/controllers"
 # Factor on the least error up to which a controller is taken that is lost on fewer rigs.
 NEAR = 1.25
 # Angle of the sines by which it is found how fast a motion may be, where the tendons reach it [deg].
@@ -54,6 +55,11 @@ class Candidate(NamedTuple):
     def label(self) -> str:
         """Controller and origin."""
         return f"{self.controller} ({self.origin})" if self.gains else self.controller
+
+    @property
+    def file(self) -> str:
+        """Its study file in the run: data/controllers/ct-dob-tuned.yaml."""
+        return f"{ROWS}/{re.sub(r'[^A-Za-z0-9_]+', '-', self.label).strip('-')}.yaml"
 
 
 @dataclass(frozen=True, repr=False, eq=False)
@@ -129,8 +135,9 @@ class Recommended(StudyResult):
     @property
     def answer(self) -> Answer:
         """What to run, what error to expect, what not to use, and the limits."""
-        gains = "" if self.best is None else f"The gains are in {RECOMMENDED} of the run. "
-        return Answer(_sentence(self), _table(self), _notes(self), f"{gains}Every rig: data/rigs.csv.")
+        chosen = "" if self.best is None else f"{RECOMMENDED} of the run, "
+        rows = f"those of each row: {ROWS}/, each a file for simulate, compare and hw-run. Every rig: data/rigs.csv."
+        return Answer(_sentence(self), _table(self), _notes(self), f"The gains: {chosen}{rows}")
 
 
 def _sentence(result: Recommended) -> str:
@@ -180,6 +187,13 @@ def _table(result: Recommended) -> Table:
         rows.append((result.candidates[k].label, median, f"{low} to {high}", lost or "holds on all"))
     heads = ("controller (gains)", "error [deg]", "on 8 of 10 rigs [deg]", f"of {ranked.count} simulated rigs")
     return Table("", heads, rows)
+
+
+def files_table(candidates: Sequence[Candidate]) -> Table:
+    """Gains of every row, in the order of the candidates, with the file of each."""
+    rows = [(one.label, ", ".join(_gain(one, name) for name in one.gains) or "-", one.file) for one in candidates]
+    title = "Gains of every row, best first; each file is for simulate, compare and hw-run"
+    return Table(title, ("controller (gains)", "gains", "file"), rows)
 
 
 def _lost(ranked: WorldRanking, k: int) -> str:

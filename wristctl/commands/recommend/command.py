@@ -11,7 +11,15 @@ from wristctl.commands.inputs import EarlierRun, Inputs
 from wristctl.commands.inputs_of_loops import identified
 from wristctl.commands.loop_warnings import warn_if_coarse, warn_if_it_buckles
 from wristctl.commands.procedure import Procedure
-from wristctl.commands.recommend.answer import RECOMMENDED, Candidate, Limit, Recommended, sine_deg, spread
+from wristctl.commands.recommend.answer import (
+    RECOMMENDED,
+    Candidate,
+    Limit,
+    Recommended,
+    files_table,
+    sine_deg,
+    spread,
+)
 from wristctl.commands.recommend.study_file import next_command, study_file
 from wristctl.commands.results import Findings
 from wristctl.commands.session import Session
@@ -40,6 +48,8 @@ _SWINGS = ("rmse", "oscillation", "sustained")
 # Rigs on which the limits of motion and payload are looked for.
 _RIGS_AT_LIMITS = 12
 TUNED, SCALED = "tuned", "scaled preset"
+# Relative difference of two gains that is none: a search begins at the preset, to its last bit but one.
+_ALIKE = 1e-9
 
 
 def reach_deg(study: Study) -> float:
@@ -113,7 +123,8 @@ def recommend(session: Session) -> Recommended:
     searches = _searches(session, study, family, scaled)
     candidates = _candidates(scaled, searches)
     ranking = _tested(session, study, family, candidates)
-    result = Recommended(session.study, findings, [], reach, candidates, ranking, searches, [], [], "")
+    tables = [files_table([candidates[row] for row in ranking.standing.order])]
+    result = Recommended(session.study, findings, tables, reach, candidates, ranking, searches, [], [], "")
     if result.best is None:
         return _recorded(study, result)
     with session.progress("how fast and how heavy"):
@@ -155,9 +166,11 @@ def _candidates(scaled: Sequence[Controller], searches: Mapping[str, Search]) ->
 
     candidates = []
     for law, found in zip(scaled, searches.values(), strict=True):
-        preset = dict(list(law.presets.values())[-1]) if law.presets else {}
+        last = list(law.presets.values())[-1:]
+        preset = dict(zip(law.gains, law.values(last[0]), strict=True)) if last else {}
         candidates += [Candidate(law.name, SCALED, preset)] * bool(preset)
-        candidates += [Candidate(law.name, TUNED, dict(found.gains))] * (found.gains != preset)
+        same = bool(preset) and all(math.isclose(found.gains[name], preset[name], rel_tol=_ALIKE) for name in preset)
+        candidates += [Candidate(law.name, TUNED, dict(found.gains))] * (not same)
     return [*candidates, Candidate(YARDSTICK, "", {})]
 
 
@@ -216,8 +229,8 @@ def _limit(study: Study, best: Candidate, value: float, family: Family) -> Limit
 
     cases = drawn_cases(family, FAMILY, "test", study.seed, _RIGS_AT_LIMITS, study.wrist)
     own, open_loop = (
-        measure(controller(name), np.array([list(gains.values())]), cases, study.wrist, _SWINGS)
-        for name, gains in ((best.controller, best.gains), (YARDSTICK, {}))
+        measure(law, np.array([law.values(gains)]), cases, study.wrist, _SWINGS)
+        for law, gains in ((controller(best.controller), best.gains), (controller(YARDSTICK), {}))
     )
     lost = (own.failed | own.swings_beside(open_loop)).reshape(_RIGS_AT_LIMITS, -1).any(axis=1)
     error = float(np.nanmedian(own.metrics["rmse"]))
@@ -236,6 +249,7 @@ def _recorded(study: Study, result: Recommended) -> Recommended:
     caption = "Error of each controller over the simulated rigs: median, 8 of 10 rigs, and each rig"
     findings.figure("errors", errors, result, caption=caption)
     findings.overview.figure = "errors"
+    _write_files(study, findings, result)
     if best is None or result.best_row is None:
         return result
     low, median, high = spread(ranked.rows[result.best_row].rmse)
@@ -245,19 +259,31 @@ def _recorded(study: Study, result: Recommended) -> Recommended:
     findings.metric("rmse_high", high, "rad", "lower", ranked.count, meaning=f"{meaning}: 9 of 10 stay below")
     findings.headline("rmse", "rmse_low", "rmse_high", "reach_deg")
     findings.figure("limits", limits, result, caption="Error and lost rigs over frequency and over payload")
-    _write_file(study, findings, best, result)
     return result
 
 
-def _write_file(study: Study, findings: Findings, best: Candidate, result: Recommended) -> None:
-    """The study file; a controller of one's own is the run's copy."""
+def _write_files(study: Study, findings: Findings, result: Recommended) -> None:
+    """A study file for every row, and one with what is recommended that compares all; own controllers are copies."""
     from wristctl.control.table import CONTROLLERS
     from wristctl.records.copied_inputs import sealed_references
 
     origins = [CONTROLLERS.origin(name) for name in dict.fromkeys(one.controller for one in result.candidates)]
-    copies, origin = sealed_references([one for one in origins if one]), CONTROLLERS.origin(best.controller)
-    name = f"../{copies[origin.reference]}" if origin else best.controller
-    findings.text(RECOMMENDED, study_file(study, best, name, result.reach_deg))
+    copies = sealed_references([one for one in origins if one])
+
+    def written(file: str, rows: Sequence[Candidate]) -> None:
+        """A file of the run with the first of these rows, which compares them all."""
+        up = "../" * file.count("/")
+        places = [CONTROLLERS.origin(one.controller) for one in rows]
+        names = [
+            up + copies[place.reference] if place else one.controller for place, one in zip(places, rows, strict=True)
+        ]
+        findings.text(file, study_file(study, rows, names, result.reach_deg))
+
+    ordered = [result.candidates[row] for row in result.ranking.standing.order]
+    for one in ordered:
+        written(one.file, [one])
+    if (best := result.best) is not None:
+        written(RECOMMENDED, [best, *(one for one in ordered if one != best)])
 
 
 RECOMMEND = Procedure("recommend", plan, recommend, (EarlierRun("from_identified", kind="identify", optional=True),))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
@@ -18,28 +19,36 @@ if TYPE_CHECKING:
 
 
 def errors(result: Recommended) -> Figure:
-    """Every candidate's error on each rig, with median and 10 to 90 % of rigs; what cannot be relied on is grey."""
+    """Every candidate's error on each rig, with median and 10 to 90 % of rigs; crosses are rigs that it loses.
+
+    What cannot be relied on is grey, as is what has no feedback. A rig on which the wrist fails has no error: its cross
+    stands at the right edge.
+    """
     ranked = result.ranking
     order = ranked.standing.order[::-1]
-    picture, ((axes,),) = figure(height=1.1 + 0.3 * len(order))
+    picture, ((axes,),) = figure(height=1.3 + 0.3 * len(order))
     jitter = np.random.default_rng(0).uniform(-0.18, 0.18, ranked.count)
-    for place, k in enumerate(order):
-        sizes = np.degrees(ranked.rows[k].rmse)
-        sizes = np.where(np.isfinite(sizes), sizes, np.nan)
+    sizes = [np.degrees(ranked.rows[k].rmse) for k in order]
+    finite = np.concatenate([row[np.isfinite(row)] for row in sizes])
+    edge = 1.3 * float(finite.max()) if finite.size else 1.0
+    for place, (k, row) in enumerate(zip(order, sizes, strict=True)):
+        failed = ~np.isfinite(row)
+        lost, at = failed | ranked.rows[k].swings, np.where(failed, edge, row)
         unreliable = k in ranked.standing.unreliable
         shade = GREY if unreliable or not result.candidates[k].gains else BLUE
-        axes.plot(sizes, place + jitter, ".", color=shade, markersize=2.5, alpha=0.5)
-        low, median, high = np.degrees(spread(ranked.rows[k].rmse))
-        axes.plot([low, high], [place, place], color=shade, linewidth=2.0)
-        axes.plot(
-            [median], [place], "x" if unreliable else "o", color=VERMILLION if unreliable else shade, markersize=6
+        axes.plot(at[~lost], (place + jitter)[~lost], ".", color=shade, markersize=2.5, alpha=0.5)
+        axes.plot(at[lost], (place + jitter)[lost], "x", color=VERMILLION, markersize=4.5, zorder=3)
+        low, median, high = (
+            edge if not math.isfinite(error) else math.degrees(error) for error in spread(ranked.rows[k].rmse)
         )
+        axes.plot([low, high], [place, place], color=shade, linewidth=2.0, zorder=4)
+        axes.plot([median], [place], "o", color=shade, markersize=6, zorder=4)
     axes.set_yticks(range(len(order)), [result.candidates[k].label for k in order])
     axes.set_xscale("log")
     axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
     axes.xaxis.set_major_formatter(FormatStrFormatter("%g"))
     axes.xaxis.set_minor_formatter(NullFormatter())
-    axes.set_xlabel("RMSE on a simulated rig [deg] (cross: fails, swings or chatters on some)")
+    axes.set_xlabel("RMSE on a simulated rig [deg]\ncross: swings or chatters there; at the right edge: fails")
     return picture
 
 

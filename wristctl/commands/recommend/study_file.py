@@ -2,48 +2,53 @@
 
 from __future__ import annotations
 
+import json
+import math
 import shlex
 from collections.abc import Sequence
-from copy import deepcopy
 from typing import Any
 
 from pydantic import ValidationError
 
 from wristctl.commands.recommend.answer import Candidate
+from wristctl.config.compare import CompareSettings
 from wristctl.config.hw_run import HwRunSettings
+from wristctl.config.loop import Reference
 from wristctl.config.study import Study
 
 # What of a loop is the rig's.
 _RIG = ("actuator", "sensor", "control_period")
 
 
-def study_file(study: Study, best: Candidate, controller: str, reach_deg: float) -> str:
-    """Text of the file for `simulate` and, where `hw-run` can have such a rig, for `hw-run`.
+def study_file(study: Study, rows: Sequence[Candidate], names: Sequence[str], reach_deg: float) -> str:
+    """Text of the file for `simulate`, `compare` and, where `hw-run` can have such a rig, for `hw-run`.
 
     Parameters
     ----------
     study
         the study whose wrist and `recommend.loop` it is recommended for
-    best
-        what is recommended
-    controller
-        its name, or the reference of its code beside the file
+    rows
+        what `simulate` and `hw-run` take, and then what `compare` takes beside it
+    names
+        the controllers' names, or the references of their code beside the file
     reach_deg
-        angle that the tendons hold [deg]; the motion of `hw-run` asks for no more
+        angle that the tendons hold [deg]; no motion asks for more
     """
     import yaml
 
-    row = {"controller": controller, "gains": {name: float(f"{value:.6g}") for name, value in best.gains.items()}}
+    written = [_row(one, name) for one, name in zip(rows, names, strict=True)]
     content: dict[str, Any] = {
-        "wrist": study.wrist.model_dump(mode="json", exclude_defaults=True),
-        "simulate": row | {"loop": _rig(study)},
-        "hw-run": {"controllers": [deepcopy(row)]},  # a study file has no aliases
+        "wrist": study.wrist.model_dump(mode="json"),
+        "simulate": written[0] | {"loop": _rig(study)} | _within(study.simulate.reference, reach_deg),
+        "compare": {"controllers": written, "loops": {"rig": _rig(study)}} | _moves(reach_deg),
+        "hw-run": {"controllers": written[:1]},
     }
     if hw_run_fits(study):
-        content["hw-run"] |= _rig(study) | _reference(study, reach_deg)
-    head = f"# {best.label}, as `wristctl recommend` found it for this wrist on this rig: wristctl hw-run THIS"
-    written = yaml.safe_dump({key: value for key, value in content.items() if value}, sort_keys=False, width=100)
-    return f"{head}\n{written}"
+        content["hw-run"] |= _rig(study) | _within(study.hw_run.reference, reach_deg)
+    head = f"# {rows[0].label}, as `wristctl recommend` found it for this wrist on this rig: wristctl hw-run THIS"
+    plain = json.loads(json.dumps(content))  # nothing twice, for which YAML would write an alias
+    text = yaml.safe_dump(plain, sort_keys=False, width=100)
+    return f"{head}\n{text}"
 
 
 def hw_run_fits(study: Study) -> bool:
@@ -58,10 +63,10 @@ def hw_run_fits(study: Study) -> bool:
 def next_command(study: Study, typed: Sequence[str], file: str) -> str:
     """The trial of what is recommended, or its simulation, on the files that were typed.
 
-    Settings of the recommendation are none of it; what else was set is.
+    Settings of the recommendation are none of it, nor those of the wrist, which the file has; what else was set is.
     """
-    words = list(typed)
-    places = [k for k, word in enumerate(words) if word.startswith("recommend.") and words[k - 1] == "--set"]
+    words, own = list(typed), ("recommend.", "wrist.")
+    places = [k for k, word in enumerate(words) if word.startswith(own) and words[k - 1] == "--set"]
     kept = [word for k, word in enumerate(words) if k not in places and k + 1 not in places]
     return shlex.join(["wristctl", "hw-run" if hw_run_fits(study) else "simulate", *kept, file])
 
@@ -70,6 +75,21 @@ def _rig(study: Study) -> dict[str, Any]:
     return study.recommend.loop.model_dump(mode="json", include=set(_RIG))
 
 
-def _reference(study: Study, reach_deg: float) -> dict[str, Any]:
-    wanted = study.hw_run.reference.end_deg
-    return {"reference": {"angle_deg": reach_deg}} if wanted > reach_deg else {}
+def _row(candidate: Candidate, name: str) -> dict[str, Any]:
+    return {"controller": name, "gains": {gain: float(f"{value:.6g}") for gain, value in candidate.gains.items()}}
+
+
+def _within(reference: Reference, reach_deg: float) -> dict[str, Any]:
+    """The reference to an angle as far as the tendons hold it; empty where it asks for no more."""
+    beyond = reference.tip is None and abs(reference.end_deg) > reach_deg
+    return {"reference": {"angle_deg": math.copysign(reach_deg, reference.end_deg)}} if beyond else {}
+
+
+def _moves(reach_deg: float) -> dict[str, Any]:
+    """The usual moves of `compare`, smaller where the tendons do not hold the largest; empty where they do."""
+    moves = CompareSettings().references
+    largest = max(abs(move.end_deg) for move in moves)
+    if largest <= reach_deg:
+        return {}
+    scaled = [move.model_copy(update={"angle_deg": move.end_deg * reach_deg / largest}) for move in moves]
+    return {"references": [move.model_dump(mode="json", exclude_defaults=True) for move in scaled]}

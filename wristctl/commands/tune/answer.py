@@ -57,7 +57,8 @@ def beside_feedforward(
     from wristctl.tuning.objective import YARDSTICK
 
     def errors(name: str, values: Mapping[str, float]) -> Array:
-        measured = measure(controller(name), np.array([list(values.values())]), cases, wrist, ["rmse"])
+        law = controller(name)
+        measured = measure(law, np.array([law.values(values)]), cases, wrist, ["rmse"])
         return np.maximum(np.where(measured.failed[0], np.nan, measured.metrics["rmse"][0]), MEASURABLE)
 
     open_loop, results = errors(YARDSTICK, {}), {}

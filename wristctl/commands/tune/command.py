@@ -176,8 +176,8 @@ def tune(session: Session) -> Tuned:
     searched, chosen = tuning_cases(study, network)
     cases = chosen or searched
     lost = {
-        name: marks_of(controller(name), np.array(list(best.gains.values())), cases, study.wrist)
-        for name, best in searches.items()
+        name: marks_of(law, np.array(law.values(searches[name].gains)), cases, study.wrist)
+        for name, law in ((name, controller(name)) for name in searches)
     }
     fates = {
         name: ", ".join(f"{mark} in {count} of {len(cases)} cases" for mark, count in marks.items())
