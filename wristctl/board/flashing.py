@@ -7,7 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from wristctl.board.board_errors import BoardError
-from wristctl.plain_files import read_plain, unreadable
+from wristctl.plain_files import read_plain, read_text, unreadable
 from wristctl.processes import check_hardware_allowed
 
 IMAGE = Path(__file__).with_name("firmware") / "wrist.hex"
@@ -41,10 +41,10 @@ def _see_whole(image: Path) -> None:
     if not image.exists():
         raise BoardError("host", "there is no such firmware", str(image), "name an Intel hex file", exit_code=2)
     try:
-        content = read_plain(image)
+        content, stated = read_plain(image), read_text(beside) if beside.exists() else ""
     except OSError as error:
         raise BoardError(
             "host", unreadable(error, image).what, str(image), "name an Intel hex file", exit_code=2
         ) from None
-    if beside.exists() and beside.read_text().split()[0] != hashlib.sha256(content).hexdigest():
+    if stated and stated.split()[0] != hashlib.sha256(content).hexdigest():
         raise BoardError("host", "the firmware is not what its check sum says", str(image), "install wristctl anew")
