@@ -1,15 +1,26 @@
-"""The command line as a process: Ctrl-C ends it in silence from here on, before all that it needs is imported."""
+"""The command line as a process: Ctrl-C ends it without a word from here on, before all that it needs is imported."""
 
 import os
 import signal
 import sys
 from contextlib import suppress
 
+# The object on stdout of a command that was interrupted before it could begin, where --json was typed.
+_INTERRUPTED = b"""{
+  "schema": "wristctl.error/1",
+  "kind": "interrupted",
+  "exit_code": 130,
+  "what": "interrupted",
+  "where": "",
+  "fix": ""
+}
+"""
+
 
 def main() -> None:
     """Run the command line; once it has ended nothing is left that Ctrl-C could end."""
     if signal.getsignal(signal.SIGINT) is not signal.SIG_IGN:
-        signal.signal(signal.SIGINT, lambda *_: os._exit(130))
+        signal.signal(signal.SIGINT, _interrupted)
     from wristctl.cli.app import main as command_line
 
     try:
@@ -22,6 +33,13 @@ def main() -> None:
         raise
     finally:
         signal.signal(signal.SIGINT, signal.SIG_IGN)
+
+
+def _interrupted(*_: object) -> None:
+    """End at once."""
+    with suppress(OSError):
+        os.write(1, _INTERRUPTED * ("--json" in sys.argv))
+    os._exit(130)
 
 
 def _leave(code: int) -> None:

@@ -53,11 +53,15 @@ class Setting:
     """the command whose section the key is looked for in; load_study wants it in front"""
     option: bool = False
     """whether the command has an option of this name: `--source run`"""
+    quoted: bool = False
+    """whether a shell needs quotes about it"""
 
     @property
     def typed(self) -> str:
         """On the command line."""
-        return f"--{self.text.replace('=', ' ', 1)}" if self.option else f"--set {self.text}"
+        if self.option:
+            return f"--{self.text.replace('=', ' ', 1)}"
+        return f"--set '{self.text}'" if self.quoted else f"--set {self.text}"
 
     @property
     def in_python(self) -> str:

@@ -24,6 +24,12 @@ class Probed(StudyResult):
     """Nothing but the tables."""
 
     kind = "probe"
+    failed: UserError | None = None
+
+    @property
+    def fault(self) -> UserError | None:
+        """The one that is to be."""
+        return self.failed
 
     def frame(self) -> pd.DataFrame:
         """No table."""
@@ -46,8 +52,9 @@ def gen_data(session: Session) -> Probed:
         raise ZeroDivisionError("of this probe")
     if action == "check":
         raise UserError("the check failed", "here", "mend it", exit_code=3)
+    fault = UserError("the wrist buckled", "here", "less load", exit_code=3) if action == "fault" else None
     table = Table("Samples", ("set", "value [m]"), [("first", 0.123456), ("second", float("nan"))])
-    return Probed(session.study, findings, [table])
+    return Probed(session.study, findings, [table], fault)
 
 
 def train(session: Session) -> Probed:

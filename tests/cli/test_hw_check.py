@@ -128,7 +128,8 @@ def test_an_axis_moves_after_a_typed_yes_asked_for_on_stderr(
     assert (
         ended == code and "Axis 0 will creep" in err and err.split("tendons.\n")[1].startswith("Type yes to move it:")
     )
-    assert (("moved", 0) in asked) == (code == 0) == bool(out.strip())
+    assert (("moved", 0) in asked) == (code == 0)
+    assert json.loads(out)["schema"] == ("wristctl.error/1" if code else "wristctl.board/1")
     if out.strip():
         json.loads(out)
     else:

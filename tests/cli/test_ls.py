@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+import re
 from pathlib import Path
 
 import pytest
@@ -13,10 +15,12 @@ from wristctl.records import Run, start_run
 from wristctl.records.tags import change_tags
 
 
-def _made(kind: str, label: str, **metrics: float) -> Run:
+def _made(kind: str, label: str, chief: str = "", **metrics: float) -> Run:
     with start_run(kind, Study(), label) as live:
         for name, value in metrics.items():
             live.metric(name, value)
+        if chief:
+            live.file("overview.json").write_text(json.dumps({"cards": [chief]}))
     return Run(live.path)
 
 
@@ -46,6 +50,34 @@ def test_columns_are_those_that_hold_something_and_those_asked_for(call: Call, r
         raise UserError("buckled")
     assert _rows(call("runs", "ls")[1])[0] == [*plain, "tags", "note"]
     assert "buckled" in call("runs", "ls", "--state", "failed")[1]
+
+
+@pytest.mark.parametrize(
+    ("asked", "shown"),
+    [
+        ((), {"chief": ["rmse 0.5", "best 7"]}),
+        (("--where", "rmse<2"), {"rmse": ["0.5"]}),
+        (("--where", "rmse<2", "--where", "rmse>0"), {"rmse": ["0.5"]}),
+        (("--where", "rmse<2", "--sort", "rmse"), {"rmse": ["0.5"]}),
+        (("--sort", "rmse"), {"chief": ["best 7"], "rmse": ["0.5", "-"]}),
+        (("--where", "rmse_move<2"), {"chief": ["rmse 0.5"], "rmse_move": ["1.5"]}),
+        (("--sort", "kind"), {"chief": ["best 7", "rmse 0.5"]}),
+        (("--columns", "rmse,best,rmse"), {"rmse": ["0.5", "-"], "best": ["-", "7"]}),
+    ],
+)
+def test_a_metric_stands_once_in_each_row(call: Call, asked: tuple[str, ...], shown: dict[str, list[str]]) -> None:
+    """In the column that was asked for, else as the chief metric of its run."""
+    _made("simulate", "a", "rmse", rmse=0.5, rmse_move=1.5)
+    _made("compare", "b", "best", best=7.0)
+    head, rule, *rows = call("runs", "ls", *asked)[1].splitlines()
+    spans = [found.span() for found in re.finditer("-+", rule)]
+    table = {head[a:b].strip(): [text for row in rows if (text := row[a:b].strip())] for a, b in spans}
+    shown_there = {name.removesuffix(" metric"): column for name, column in table.items()}
+    assert {name: column for name, column in shown_there.items() if name not in PLAIN} == shown
+    assert len(table) == len(spans), "no head stands twice"
+
+
+PLAIN = ("id", "kind", "state", "wall [s]")
 
 
 @pytest.mark.parametrize(

@@ -78,6 +78,10 @@ def test_what_is_missing_or_not_as_published_is_said_before_anything_is_written(
 ) -> None:
     code, out, _ = call("validate", "--list")
     assert code == 0 and "uc3m-soft-neck" in out and "LGPL-2.1" in out
+    shown = json.loads(call("validate", "--list", "--json")[1])
+    assert shown["columns"][:3] == ["robot", "where", "licence"] and [row[0] for row in shown["rows"]] == list(
+        DATA_SETS
+    )
     assert "a robot is needed" in call("validate")[2]
     assert "its recordings are needed" in call("validate", "opencr-v4")[2]
     assert "no such folder" in call("validate", "opencr-v4", "--data", "away")[2]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shlex
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -58,9 +59,21 @@ def test_an_override_is_relative_to_the_command_first() -> None:
         ("wrist: {mass: '0.1'}\n", "'0.1' should be a valid number"),
         ("wrist: {mass: true}\n", "should be a valid number"),
         ("gen-data: {samples: 1e3}\n", "1000.0 should be a valid integer"),
-        ("wrist: 3\n", "3 should be a group of keys and values - {file}:1: wrist"),
+        (
+            "wrist: {mass: 50g}\n",
+            "'50g' is a number with a unit - {file}:1: wrist.mass - fix: give the number without its unit, in kg",
+        ),
+        (
+            "train: {epochs: 30 %}\n",
+            "is a number with a unit - {file}:1: train.epochs - fix: give the number without its unit",
+        ),
+        ("wrist: 3\n", "3 should have the form {{discs: ..., length: ..., mass: ..., ...}} - {file}:1: wrist"),
+        ("wrist: [1, 2]\n", "[1, 2] should have the form {{discs: "),
+        ("compare: {controllers: [pid]}\n", "'pid' should have the form {{controller: ..., gains: ...}} - {file}:1"),
+        ("compare: {loops: [3]}\n", "[3] should have the form {{NAME: ...}} - {file}:1"),
+        ("wrist: {gravity: [a, 2]}\n", "'a' should be a valid number - {file}:1: wrist.gravity.0"),
         ("wrist: {pretension: 70}\n", "must exceed pretension"),
-        ("train: {optimiser: adam_w}\n", "{file}:1: train.optimiser - fix: did you mean 'adamw'?"),
+        ("train: {optimiser: adam_w}\n", "{file}:1: train.optimiser - fix: did you mean 'adamw'? All: "),
         ("compare:\n  controllers:\n  - {}\n  - contoller: pid\n", "{file}:4: compare.controllers.1.contoller"),
         ("compare:\n  controllers:\n  - gains:\n      P1: a\n", "'a' should be a valid number - {file}:4"),
         ("tune:\n  scenarios:\n  - reference: {kind: ramp}\n", "{file}:3: tune.scenarios.0.reference.kind"),
@@ -106,6 +119,52 @@ def test_errors_in_overrides_name_the_override(override: str, said: str) -> None
     with pytest.raises(UserError) as caught:
         load_study([], [override], "train")
     assert said in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("override", "fix"),
+    [
+        ("simulate.controller=ct-dobb", "did you mean 'ct-dob'? All: adrc, computed-torque, ct-dob, "),
+        ("simulate.controller=zzz", "one of adrc, computed-torque, "),
+        ("wrist.tendons=6", "one of five, four, three"),
+        ("simulate.loop.planes=3", "one of 1, 2"),
+    ],
+)
+def test_of_names_the_one_that_was_meant_comes_first_and_each_once(override: str, fix: str) -> None:
+    with pytest.raises(UserError) as caught:
+        load_study([], [override])
+    said, given = str(caught.value), override.partition("=")[2]
+    assert caught.value.fix.startswith(fix) and said.startswith(
+        f"{given if given.isdigit() else repr(given)} is not one of the choices - --set {override}: "
+    )
+    assert "computed-torque" not in fix or said.count("computed-torque") == 1
+
+
+@pytest.mark.parametrize(
+    ("command", "fix"),
+    [
+        ("simulate", "--controller pid-ff"),
+        ("analyse", "--controller pid-ff"),
+        ("tune", "--set 'controllers=[pid-ff, adrc]'"),
+        ("recommend", "--set 'controllers=[pid-ff, adrc]'"),
+        ("compare", "--set 'controllers=[{controller: pid-ff, gains: default}, {controller: adrc, gains: default}]'"),
+        ("hw-run", "--set 'controllers=[{controller: pid-ff, gains: default}, {controller: adrc, gains: default}]'"),
+        ("gen-data", ""),
+    ],
+)
+def test_a_controller_in_place_of_a_study_file_is_told_how_it_is_given(
+    command: str, fix: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(UserError, match=r"there is no study file .*/pid-ff") as caught:
+        load_study([Path("pid-ff"), Path("adrc")], [], command)
+    if not fix:
+        assert caught.value.fix.startswith("one of accurate_network, ")
+        return
+    assert caught.value.fix == f"pid-ff is a controller: {fix}"
+    word, text = shlex.split(fix)
+    section = load_study([], [text if word == "--set" else f"controller={text}"], command)
+    assert "pid-ff" in str(getattr(section, command.replace("-", "_").replace("analyse", "simulate")))
 
 
 def test_gains_of_a_file_are_for_the_controller_of_that_file(tmp_path: Path) -> None:

@@ -14,6 +14,7 @@ from typer.core import TyperCommand, TyperGroup, TyperOption
 from typer.main import get_command
 
 from wristctl.cli.commands import COMMANDS, Entry
+from wristctl.cli.json_output import Interrupted, Shown, print_error
 from wristctl.cli.matplotlib_defaults import use_defaults
 from wristctl.cli.options import everything
 from wristctl.errors import UserError, error_of_the_system
@@ -89,23 +90,30 @@ def _wristctl(
 
 
 def main() -> NoReturn:
-    """Run the command line; errors are one line on stderr and an exit code, no traceback unless --debug."""
+    """Run the command line; errors are one line on stderr and an exit code, no traceback unless --debug.
+
+    With --json an error is an object on stdout too.
+    """
     gc.set_threshold(100_000, 50, 100)  # imports make many objects and no cycles: looking for them costs 0.15 s
     sys.unraisablehook = again
     use_defaults()
     with interrupts() as interrupt:
         try:
             code = get_command(app)(prog_name="wristctl", standalone_mode=False) or 0
+            code = _interrupted() if code == 130 else code  # as which typer gives Ctrl-C
             sys.stdout.flush()
         except BrokenPipeError:
             code = _unread()
+        except Interrupted as error:
+            code = _interrupted(error.where, error.fix)
         except UserError as error:
-            code = _failed(str(error), error, error.exit_code)
+            code = _failed(error, str(error), error.what, error.where, error.fix, error.exit_code)
         except typer.TyperException as error:
             command = getattr(getattr(error, "ctx", None), "command_path", "wristctl")
-            code = _failed(f"{error.format_message()} - fix: {command} --help", error, error.exit_code)
+            what, fix = error.format_message(), f"{command} --help"
+            code = _failed(error, f"{what} - fix: {fix}", what, command, fix, error.exit_code)
         except (KeyboardInterrupt, typer.Abort):
-            code = 130
+            code = _interrupted()
         except SystemExit as ended:  # completion ends so, and typer where it meets a closed pipe
             if not isinstance(ended.__context__, BrokenPipeError):
                 raise
@@ -113,11 +121,12 @@ def main() -> NoReturn:
         except BaseException as error:
             notes = getattr(error, "__notes__", ["run again with --debug for the traceback"])
             if interrupt.asked:
-                code = 130
+                code = _interrupted()
             elif refused := error_of_the_system(error):
-                code = _failed(str(refused), error, refused.exit_code)
+                code = _failed(error, str(refused), refused.what, refused.where, refused.fix, refused.exit_code)
             else:
-                code = _failed(f"bug in wristctl: {type(error).__name__}: {error} - {notes[-1]}", error, 1)
+                what = f"bug in wristctl: {type(error).__name__}: {error}"
+                code = _failed(error, f"{what} - {notes[-1]}", what, _raised_at(error), notes[-1], 1)
         signal.setitimer(signal.ITIMER_REAL, 0.0)  # what has ended need not be interrupted again
         gc.freeze()  # else the interpreter looks for cycles once more before it ends: 0.3 s
         sys.exit(code)
@@ -129,8 +138,21 @@ def _unread() -> int:
     return 128 + signal.SIGPIPE
 
 
-def _failed(message: str, error: BaseException, code: int) -> int:
+def _failed(error: BaseException, line: str, what: str, where: str, fix: str, code: int) -> int:
     if "--debug" in sys.argv:
         traceback.print_exception(error)
-    print(f"error: {printable(' '.join(message.split()))}", file=sys.stderr)
+    print(f"error: {printable(' '.join(line.split()))}", file=sys.stderr)
+    if not isinstance(error, Shown):
+        print_error(what, where, fix, code)
     return code
+
+
+def _interrupted(where: str = "", fix: str = "") -> int:
+    print_error("interrupted", where, fix, 130)
+    return 130
+
+
+def _raised_at(error: BaseException) -> str:
+    """FILE:LINE of the code that raised."""
+    frames = traceback.extract_tb(error.__traceback__)
+    return f"{frames[-1].filename}:{frames[-1].lineno}" if frames else ""

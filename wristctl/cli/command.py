@@ -14,6 +14,7 @@ import typer
 
 from wristctl.board.board_errors import HARDWARE, SAFETY_STOP
 from wristctl.cli.commands import Entry
+from wristctl.cli.json_output import Interrupted
 from wristctl.cli.options import Options, Own, StudyCommand, controllers, references, run_ids, signature
 from wristctl.commands.procedure import Procedure
 from wristctl.errors import UserError
@@ -49,7 +50,7 @@ def study_command(procedure: Procedure[Any], entry: Entry) -> typer.Typer:
 
     def call(**arguments: Any) -> None:
         if entry.listing is not None and arguments.pop("list"):
-            return _list(entry.listing[0])
+            return _list(entry.listing[0], arguments["as_json"])
         leaves = {leaf: arguments.pop(_option_of(leaf)) for leaf in (*first, *named, *shortcuts)}
         raised = frozenset(name for name in flags if arguments.pop(name))
         sweeps = arguments.pop("sweep") if procedure.sweeps else None
@@ -94,12 +95,11 @@ def study_command(procedure: Procedure[Any], entry: Entry) -> typer.Typer:
     return app
 
 
-def _list(place: str) -> None:
-    from wristctl.cli.output import say
+def _list(place: str, as_json: bool) -> None:
+    from wristctl.cli.output import print_table
 
     module, _, name = place.partition(":")
-    for line in getattr(import_module(module), name)():
-        say(line)
+    print_table(getattr(import_module(module), name)(), as_json)
 
 
 def _option_of(leaf: str) -> str:
@@ -148,18 +148,17 @@ def _perform(
         try:
             with recording(prepared, options.out, label, ["wristctl", *sys.argv[1:]]) as run:
                 outcome = perform(prepared, run, show, TerminalOperator(console, options.quiet, flags), executor, typed)
-        except KeyboardInterrupt:
-            remark = ""
-            if run:
-                place, resumes = shlex.quote(str(run.path)), any(need.leaf == "resume" for need in procedure.needs)
-                go_on = f"go on: wristctl {procedure.kind} {place}/config.yaml --resume {place}"
-                remark = f"; {go_on if resumes else f'what was found: wristctl runs show {place}'}"
-            console.print(f"interrupted{remark}", **PLAIN)
-            raise
+        except KeyboardInterrupt as interruption:
+            if not run:
+                console.print("interrupted", **PLAIN)
+                raise
+            place, resumes = shlex.quote(str(run.path)), any(need.leaf == "resume" for need in procedure.needs)
+            go_on = f"go on: wristctl {procedure.kind} {place}/config.yaml --resume {place}"
+            remark = go_on if resumes else f"what was found: wristctl runs show {place}"
+            console.print(f"interrupted; {remark}", **PLAIN)
+            raise Interrupted(str(run.path), remark) from interruption
         except UserError as error:
             if run and error.exit_code in (HARDWARE, SAFETY_STOP):
                 console.print(f"what was recorded: wristctl runs show {shlex.quote(str(run.path))}", **PLAIN)
             raise
-    print_result(run.path, outcome.tables, options.as_json, outcome.summary, options.all_)
-    if outcome.fault is not None:
-        raise outcome.fault
+    print_result(run.path, outcome.tables, options.as_json, outcome.summary, options.all_, outcome.fault)

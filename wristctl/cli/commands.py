@@ -30,7 +30,7 @@ class Entry(NamedTuple):
     hidden: bool = False
     """Whether the help leaves it out: a former name."""
     listing: tuple[str, str] | None = None
-    """Module and name of the lines that `--list` prints, and its help."""
+    """Module and name of the table that `--list` prints, and its help."""
 
 
 COMMANDS = {

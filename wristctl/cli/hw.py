@@ -1,8 +1,7 @@
 """`wristctl hw`: the motor board listed, flashed and stopped, and the commands beside."""
 
-import json
 import logging
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -12,6 +11,7 @@ from wristctl.cli.hw_calibrate import app as calibrations
 from wristctl.cli.hw_check import check
 from wristctl.cli.hw_drawings import drawings
 from wristctl.cli.hw_weigh import weigh
+from wristctl.cli.json_output import print_json
 from wristctl.cli.options import BAUD, Baud, Debug, Image, Json, Port, Quiet, facts_of
 from wristctl.cli.progress import listening, progress
 from wristctl.commands.printed_table import Table
@@ -38,7 +38,7 @@ def ports(
             problem = f"{len(listed)} ports went away" if listed else "no port went away"
             raise UserError(problem, fix="plug the board in, start again, and unplug only the board", exit_code=4)
     if as_json:
-        print(json.dumps({"schema": "wristctl.ports/1", "ports": [port._asdict() for port in listed]}, indent=2))
+        print_json({"schema": "wristctl.ports/1", "ports": [port._asdict() for port in listed]})
     elif find:
         print(listed[0].device)
     elif listed:
@@ -61,16 +61,16 @@ def flash(
         place = port or only_board()
         with progress(console, no_event, f"flashing the board at {place}", None, "", quiet):
             write(place, image or IMAGE, log.info)
-        if image is not None:
-            return
-        transport = SerialTransport(place, BAUD)
-        transport.boot_time = BOOT_TIME
-        with Board(transport) as board:
-            assert board.hello is not None
-            facts = facts_of(board.hello._asdict())
+        facts: dict[str, Any] = {}
+        if image is None:
+            transport = SerialTransport(place, BAUD)
+            transport.boot_time = BOOT_TIME
+            with Board(transport) as board:
+                assert board.hello is not None
+                facts = facts_of(board.hello._asdict())
     if as_json:
-        print(json.dumps({"schema": "wristctl.flashed/1", "port": place, **facts}, indent=2))
-    else:
+        print_json({"schema": "wristctl.flashed/1", "port": place, **facts})
+    elif image is None:
         print(f"firmware {facts['firmware']} written, verified and answering at {place}")
 
 

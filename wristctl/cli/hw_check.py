@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import json
 import math
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from wristctl.cli.json_output import print_json
 from wristctl.cli.operator import typed_line
 from wristctl.cli.options import BAUD, Baud, Debug, Json, Port, Quiet, facts_of
 from wristctl.cli.progress import listening, progress
@@ -86,8 +86,7 @@ def check(
             "round_trips_s": timed,
             "counters": counted,
         }
-        print(json.dumps(shown, indent=2))
-        return
+        return print_json(shown)
     columns = ("command", "times", "median [ms]", "p99 [ms]", "worst [ms]")
     rows = [(timing.command, timing.rounds, *(1e3 * value for value in timing[2:])) for timing in times]
     for table in (
@@ -151,7 +150,7 @@ def check_rig(
             testbed.close()
     faults = troubles(facts, settings, testbed.transport.name)
     if as_json:
-        print(json.dumps(_plain(facts, faults), indent=2))
+        print_json(_plain(facts, faults))
     else:
         _print(facts, faults, settings)
     if any(trouble.grave for trouble in faults):

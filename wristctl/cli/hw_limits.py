@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Sequence
 from pathlib import Path
@@ -10,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
+from wristctl.cli.json_output import print_json
 from wristctl.cli.output import write_picture
 from wristctl.commands.printed_table import Table
 from wristctl.errors import UserError
@@ -34,7 +34,7 @@ def tell_limits(names: Sequence[str], out: Path, figure: Path | None, as_json: b
     stops = [stop_of(run) for run in runs]
     lines = nearness(runs, stops)
     if as_json:
-        print(json.dumps(_plain(names, stops, lines), indent=2))
+        print_json(_plain(names, stops, lines))
     else:
         _tell(names, runs, stops, lines)
     if figure is not None:

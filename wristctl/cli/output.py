@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import json
 import shutil
 import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from wristctl.cli.json_output import print_json
 from wristctl.commands.adoption import with_places
 from wristctl.commands.perform import plain_tables
 from wristctl.commands.printed_table import Table
@@ -16,7 +16,6 @@ from wristctl.config.study import Study
 from wristctl.errors import Argument, UserError, reason_of
 from wristctl.escape import printable
 from wristctl.records import Run
-from wristctl.records.journal import jsonable
 from wristctl.study_files.resolved import changed_yaml, resolved_yaml
 
 if TYPE_CHECKING:
@@ -28,9 +27,7 @@ def print_plan(kind: str, study: Study, plan: str, out: Path, as_json: bool, eve
     placed = with_places(study)
     resolved = resolved_yaml(placed, kind) if everything or as_json else changed_yaml(placed, kind)
     if as_json:
-        shown = {"schema": "wristctl.plan/1", "kind": kind, "config": resolved, "plan": plan}
-        print(json.dumps(shown, indent=2))
-        return
+        return print_json({"schema": "wristctl.plan/1", "kind": kind, "config": resolved, "plan": plan})
     print(resolved, end="")
     rest = [] if everything else ["every other setting is at its default: --dry-run --all shows them"]
     for line in [*rest, *plan.splitlines(), f"would write a run of {kind} under {out}; nothing is written now"]:
@@ -38,11 +35,16 @@ def print_plan(kind: str, study: Study, plan: str, out: Path, as_json: bool, eve
 
 
 def print_result(
-    path: Path, tables: Sequence[Table], as_json: bool, answer: Sequence[str] = (), everything: bool = False
+    path: Path,
+    tables: Sequence[Table],
+    as_json: bool,
+    answer: Sequence[str] = (),
+    everything: bool = False,
+    fault: UserError | None = None,
 ) -> None:
     """The answer, or where there is none or `everything` is asked for the tables as wide as the terminal; then the run.
 
-    Or all of the result as one JSON object.
+    Or all of the result as one JSON object. A result with a fault is printed, and the fault raised.
     """
     if as_json:
         run = Run(path)
@@ -58,14 +60,26 @@ def print_result(
             "metrics": run.metrics,
             "tables": plain_tables(tables),
         }
-        print(json.dumps(jsonable(result), indent=2, allow_nan=False))
-        return
+        return print_json(result, fault)
     width = shutil.get_terminal_size().columns if sys.stdout.isatty() else None
     if answer:
         print("\n".join(map(printable, answer)), end="\n\n")
     for table in tables if everything or not answer else ():
         print(table.text(width), end="\n\n")
     print(path)
+    if fault is not None:
+        raise fault
+
+
+def print_table(table: Table, as_json: bool) -> None:
+    """A table by itself, or as one JSON object."""
+    if as_json:
+        return print_json({"schema": "wristctl.list/1", "columns": table.columns, "rows": table.rows})
+    print(table.text(_ALONE))
+
+
+_ALONE = 100
+"""Columns of a table that is printed by itself."""
 
 
 def write_picture(file: Path, draw: Callable[[], Figure]) -> None:

@@ -1,6 +1,5 @@
 """`wristctl new`, `init` and `check-controller`: files of your own to begin from, and a controller checked."""
 
-import json
 import keyword
 import os
 import re
@@ -15,6 +14,7 @@ from typing import Annotated, Literal
 import typer
 
 from wristctl.cli.command import asked_to_trust
+from wristctl.cli.json_output import print_json
 from wristctl.cli.options import Debug, Json, TrustCode, controllers
 from wristctl.cli.output import say
 from wristctl.config.choices import CONTROLLERS, OPTIMISERS, REFERENCES
@@ -146,10 +146,11 @@ def check_controller(
             if not as_json:
                 say(f"{_VERDICTS[check.passed]:<6}{check.asked + ':':<23} {check.found}")
     failed = [check.asked for check in checks if check.passed is False]
+    problem, fix = f"{law} fails: {', '.join(failed)}", "mend it; docs/your-own-controller.md"
+    error = UserError(problem, law, fix, exit_code=3) if failed else None
     if as_json:
         shown = {"schema": "wristctl.law/1", "law": law, "fit": not failed, "checks": [c._asdict() for c in checks]}
-        print(json.dumps(shown, indent=2))
-    if failed:
-        raise UserError(f"{law} fails: {', '.join(failed)}", law, "mend it; docs/your-own-controller.md", exit_code=3)
-    if not as_json:
-        say(f"{law} is fit for simulate, tune and compare" + f"{', and for hw-run' * (not no_board)}")
+        return print_json(shown, error)
+    if error:
+        raise error
+    say(f"{law} is fit for simulate, tune and compare" + f"{', and for hw-run' * (not no_board)}")

@@ -50,7 +50,9 @@ class OneOf:
         if self.table.group and is_reference(name):
             file, _ = split(name)
             if not file.is_file():
-                raise PydanticCustomError("added_value", "no file {file}", {"file": str(file)})
+                raise PydanticCustomError(
+                    "added_value", "no file {file}", {"file": str(file), "fix": "check the path of FILE.py:NAME"}
+                )
         elif self.table.group and name.endswith(".py"):
             context = {"file": name, "what": self.table.what}
             raise PydanticCustomError("added_value", "{file} should name its {what}: {file}:NAME", context)

@@ -185,7 +185,7 @@ def select(
         and (tag is None or tag in entry.tags)
     ]
     for text in where:
-        name, compare, bound = _condition(text)
+        name, compare, bound = condition(text)
         _check_metric(name, chosen, text)
         chosen = [entry for entry in chosen if _is_number(entry.value(name)) and compare(entry.value(name), bound)]
     if newer:
@@ -215,7 +215,7 @@ def _check_metric(name: str, listed: Sequence[IndexEntry], where: Phrase) -> Non
         raise UserError(f"no run has a metric {name!r}", where, meant(name, sorted(names)))
 
 
-def _condition(text: str) -> tuple[str, Any, float]:
+def condition(text: str) -> tuple[str, Any, float]:
     match = re.fullmatch(r"(.+?)\s*(<=|>=|!=|==|<|>|=)\s*([^<>=!]+)", text)
     try:
         if match:

@@ -10,7 +10,7 @@ from pydantic import ValidationError
 from wristctl.config.plant import Actuator
 from wristctl.config.study import Study
 from wristctl.config.wrist import WristParameters
-from wristctl.errors import Phrase, UserError, meant
+from wristctl.errors import Phrase, UserError, meant, nearest
 from wristctl.study_files.keys import field_at, keys_of, unit_of
 from wristctl.study_files.strict_yaml import KeyPath
 
@@ -42,6 +42,11 @@ def located(error: UserError, origins: Mapping[KeyPath, Phrase]) -> UserError:
     return error.at((origins[path], f": {error.where}")) if path else error
 
 
+def fault_of(detail: Any) -> tuple[str, str]:
+    """What is wrong, and the fix, of one of pydantic's errors, whose `loc` is the key path."""
+    return _what(detail), _fix(detail)
+
+
 def _location(detail: Any) -> KeyPath:
     """Key path of an error. For an unknown key of an open section, the path ends at the section."""
     return (*detail["loc"], *[key for key in [detail.get("ctx", {}).get("key")] if key is not None])
@@ -54,10 +59,14 @@ def _what(detail: Any) -> str:
         return str(detail["msg"])
     if detail["type"] == "value_error":
         return str(detail["ctx"]["error"])
-    value = repr(detail["input"])
+    value = repr(_as_lists(detail["input"]))
     value = value if len(value) <= 60 else f"{value[:57]}..."
     if detail["type"] in ("model_type", "dict_type"):
-        return f"{value} should be a group of keys and values"
+        return f"{value} should have the form {_form(_location(detail))}"
+    if detail["type"] == "literal_error":
+        return f"{value} is not one of the choices"
+    if _has_unit(detail):
+        return f"{value} is a number with a unit"
     if _as_keys(detail):
         key = next(iter(detail["input"]))
         return f"{detail['loc'][-1]!r} is a list, and given as a whole: {key!r} is no key of it"
@@ -74,8 +83,7 @@ def _fix(detail: Any) -> str:
     if detail["type"] == "extra_forbidden":
         return meant(str(path[-1]), detail.get("ctx", {}).get("known") or keys_of(field_at(path[:-1])[0]))
     if detail["type"] == "literal_error":
-        names = re.findall(r"'([^']*)'", detail["ctx"]["expected"])
-        return meant(str(detail["input"]), names) + _or_a_list(path) if names else ""
+        return _of_choices(str(detail["input"]), detail["ctx"]["expected"]) + _or_a_list(path)
     if _as_keys(detail):
         allowed = keys_of(field_at((*path, 0))[0])
         items = "{" + ", ".join(f"{key}: ..." for key in allowed) + "}" if allowed else "..."
@@ -85,7 +93,12 @@ def _fix(detail: Any) -> str:
         return f"{example}; for {unknown!r} {meant(unknown, allowed)}" if unknown else example
     if detail["type"] == "value_error":
         return str(getattr(detail["ctx"]["error"], "fix", ""))
+    if advice := detail.get("ctx", {}).get("fix"):
+        return str(advice)
     _, field = field_at(path)
+    if _has_unit(detail):
+        unit = unit_of(field) if field else ""
+        return "give the number without its unit" + f", in {unit}" * bool(unit)
     if field is None or not field.description:
         return ""
     unit, default = unit_of(field), repr(field.default)
@@ -104,10 +117,42 @@ def _or_a_list(path: KeyPath) -> str:
     return f"; or a list, [{{{', '.join(f'{key}: ...' for key in needed)}}}, ...]" if needed else ""
 
 
+def _of_choices(name: str, expected: str) -> str:
+    """What was meant, and then all there is; `expected` is pydantic's list, whose items may be numbers."""
+    choices = re.findall(r"'([^']*)'", expected) or re.split(r", | or ", expected)
+    best = nearest(name, choices)
+    return f"did you mean {best!r}? All: {', '.join(sorted(choices))}" if best else meant(name, choices)
+
+
+def _form(path: KeyPath) -> str:
+    """How the group of keys at this path is written: the first of its keys."""
+    kind, _ = field_at(path)
+    keys = list(keys_of(kind)) or ["NAME"]
+    more = ", ..." * (len(keys) > _KEYS)
+    return f"{{{', '.join(f'{key}: ...' for key in keys[:_KEYS])}{more}}}"
+
+
+def _as_lists(value: Any) -> Any:
+    """As a file has it, which has no tuples."""
+    if isinstance(value, dict):
+        return {key: _as_lists(entry) for key, entry in value.items()}
+    return list(map(_as_lists, value)) if isinstance(value, tuple) else value
+
+
+def _has_unit(detail: Any) -> bool:
+    """Whether a text was given where a number stands, and is one with its unit: 0.095m."""
+    number = detail["type"].startswith(("float_", "int_")) and isinstance(detail["input"], str)
+    return number and _NUMBER_WITH_UNIT.match(detail["input"]) is not None
+
+
 def _as_keys(detail: Any) -> bool:
     """Whether keys were given where a list stands: `rows.0.gains=...`."""
     return detail["type"] == "tuple_type" and isinstance(detail["input"], dict) and bool(detail["input"])
 
+
+# Keys of a group that the form shows.
+_KEYS = 3
+_NUMBER_WITH_UNIT = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)(e[-+]?\d+)? ?[^\W\d_]|[-+]?[\d.]+ ?[%°]", re.IGNORECASE)
 
 # Beyond so many times the default a length is asked about.
 _TIMES = 20.0

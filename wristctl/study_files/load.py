@@ -6,6 +6,7 @@ from typing import Any
 
 from pydantic import ValidationError
 
+from wristctl.config.choices import CONTROLLERS
 from wristctl.config.former_names import key_today
 from wristctl.config.given_files import beside, names_a_file
 from wristctl.config.leaves import named_by
@@ -65,7 +66,7 @@ def read_study(
         path = study_file(file)
         if path is None:
             problem = f"there is no study file {Path.cwd() / file}, nor such an experiment of wristctl"
-            raise UserError(problem, str(file), meant(shipped_name(file), shipped_names()))
+            raise UserError(problem, str(file), _in_place_of(str(file), files, command))
         _merge_file(data, path, origins, (), former)
     leave_out_removed(data, origins)
     for override in overrides:
@@ -85,6 +86,25 @@ def read_study(
     if for_another:
         study.simulate.model_fields_set.discard("gains")
     return study, origins
+
+
+def _in_place_of(file: str, files: Sequence[Path], command: str | None) -> Phrase:
+    """Advice where there is no such study file: how controllers are given, where it has the name of one."""
+    keys = section_keys(command)
+    if file not in CONTROLLERS or not keys.keys() & {"controller", "controllers"}:
+        return meant(shipped_name(Path(file)), shipped_names())
+    if "controller" in keys:
+        return (f"{file} is a controller: ", Setting(f"controller={file}", option=True))
+    names = [str(other) for other in files if str(other) in CONTROLLERS]
+    if keys_of(field_at((command or "", "controllers", 0))[0]):
+        names = [f"{{controller: {name}, gains: {_a_preset(name)}}}" for name in names]
+    given = Setting(f"controllers=[{', '.join(names)}]", command or "", quoted=True)
+    return (f"{file} is a controller: ", given)
+
+
+def _a_preset(name: str) -> str:
+    """A preset of a controller; of one from elsewhere, which nothing loads here, the usual name."""
+    return next(iter(CONTROLLERS[name].presets)) if CONTROLLERS.belongs(name) else "default"
 
 
 def _merge_file(

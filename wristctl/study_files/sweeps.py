@@ -16,6 +16,7 @@ from wristctl.config.former_names import LOOPS, key_today
 from wristctl.config.section import OpenSection, Section
 from wristctl.config.study import Study
 from wristctl.errors import Argument, UserError, meant
+from wristctl.study_files.error_messages import fault_of
 from wristctl.study_files.keys import keys_of, unit_of, whole_key
 from wristctl.study_files.strict_yaml import parse_yaml
 
@@ -85,8 +86,12 @@ def study_at(study: Study, axes: Sequence[SweepAxis], values: Sequence[Any]) -> 
         try:
             study = _changed(study, axis.path, value, axis)
         except (ValidationError, PydanticCustomError) as error:
-            why = error.errors()[0]["msg"] if isinstance(error, ValidationError) else str(error)
-            raise UserError(f"{axis.key} cannot be {value!r}: {why}", axis.where, "other values") from error
+            if isinstance(error, ValidationError):
+                detail: Any = error.errors(include_url=False)[0]
+            else:
+                detail = {"type": error.type, "msg": error.message(), "ctx": error.context or {}, "input": value}
+            why, fix = fault_of({**detail, "loc": axis.path})
+            raise UserError(f"{axis.key} cannot be {value!r}: {why}", axis.where, fix or "other values") from error
     return study
 
 

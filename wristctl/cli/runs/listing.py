@@ -3,20 +3,20 @@
 import json
 import shlex
 from collections.abc import Collection, Iterator
-from dataclasses import asdict, fields
+from dataclasses import asdict, fields, replace
 from typing import Annotated, Any, get_args
 
 import typer
 
+from wristctl.cli.json_output import print_json
 from wristctl.cli.options import RESULTS, Debug, Json, Out, Ref, run_ids
 from wristctl.cli.output import say
 from wristctl.commands.printed_table import Table, number
 from wristctl.errors import Argument, UserError, meant
 from wristctl.records import Run, open_run
 from wristctl.records.difference import Change, Difference, difference
-from wristctl.records.find import entries, in_order, select
+from wristctl.records.find import condition, entries, in_order, select
 from wristctl.records.index import IndexEntry
-from wristctl.records.journal import jsonable
 from wristctl.records.lineage import ancestry, dependents
 from wristctl.records.manifest import read_overview
 from wristctl.records.run import RunState
@@ -54,39 +54,42 @@ def ls(
     listed = in_order(select(indexed, kind, label, state, tagged, where, newer, older), sort)
     listed = listed[::-1] if reverse else listed
     if as_json:
-        print(json.dumps(jsonable({"schema": "wristctl.runs/1", "runs": list(map(asdict, listed))}), indent=2))
+        print_json({"schema": "wristctl.runs/1", "runs": list(map(asdict, listed))})
     elif listed:
-        print((_chosen(listed, columns) if columns else _table(listed, [sort, *where])).text())
+        print(
+            (
+                _chosen(listed, columns) if columns else _table(listed, [sort, *(condition(text)[0] for text in where)])
+            ).text()
+        )
     else:
         say(f"no runs in {out}" + " that meet this" * any((kind, label, state, tagged, where, newer, older)))
 
 
 def _table(listed: list[IndexEntry], asked: list[str]) -> Table:
     """The listing, with the metrics that were asked for and the columns that hold something."""
-    metrics = sorted(
-        {name for entry in listed for name in entry.metrics if any(text.startswith(name) for text in asked)}
-    )
-    held = [name for name in ("about", "chief") if any(getattr(entry, name) for entry in listed)]
+    metrics = sorted({name for entry in listed for name in entry.metrics} & set(asked))
+    rows = [replace(entry, chief="") if entry.chief in metrics else entry for entry in listed]  # it has its column
+    held = [name for name in ("about", "chief") if any(getattr(entry, name) for entry in rows)]
     columns = ["id", "kind", "state", "wall_s", *held, *metrics]
-    columns += [name for name in ("tags", "note") if any(getattr(entry, name) for entry in listed)]
-    heads = [_LISTED_HEADS.get(name, name) for name in columns]
-    return Table("", heads, [[_cell(entry, name) for name in columns] for entry in listed])
+    columns += [name for name in ("tags", "note") if any(getattr(entry, name) for entry in rows)]
+    return _of_columns(rows, columns)
 
 
 def _chosen(listed: list[IndexEntry], columns: str) -> Table:
-    """The columns that were named."""
-    names = [name.strip() for name in columns.split(",") if name.strip()]
+    """The columns that were named, each once."""
+    names = list(dict.fromkeys(name.strip() for name in columns.split(",") if name.strip()))
     available = {
         *(field.name for field in fields(IndexEntry)),
         *(metric for entry in listed for metric in entry.metrics),
     }
     for name in names:
         _check_choice("columns", name, available)
-    return Table(
-        "",
-        [_LISTED_HEADS.get(name, name) for name in names],
-        [[_cell(entry, name) for name in names] for entry in listed],
-    )
+    return _of_columns(listed, names)
+
+
+def _of_columns(listed: list[IndexEntry], names: list[str]) -> Table:
+    heads = [_LISTED_HEADS.get(name, name) for name in names]
+    return Table("", heads, [[_cell(entry, name) for name in names] for entry in listed])
 
 
 def _check_choice(option: str, value: str | None, allowed: Collection[str]) -> None:
@@ -115,8 +118,7 @@ def show(
     if as_json:
         manifest = json.loads(run.manifest.model_dump_json(by_alias=True))
         shown = {**manifest, "state": run.state, "tags": tags, "metrics": run.metrics, "run": str(run.path)}
-        print(json.dumps(jsonable(shown), indent=2))
-        return
+        return print_json(shown)
     answer = read_overview(run.path).answer
     for line in answer:
         say(line)
@@ -178,8 +180,7 @@ def diff(
             name: {change.name: {"before": change.before, "after": change.after} for change in changes}
             for name, changes in vars(differences).items()
         }
-        print(json.dumps(jsonable({"schema": "wristctl.diff/1", "before": a.id, "after": b.id, **changed}), indent=2))
-        return
+        return print_json({"schema": "wristctl.diff/1", "before": a.id, "after": b.id, **changed})
     say(f"before  {a.id}")
     say(f"after   {b.id}")
     print()
@@ -235,9 +236,7 @@ def lineage(ref: Ref, out: Out = RESULTS, as_json: Json = False, debug: Debug = 
     run = open_run(ref, out)
     tree, users = ancestry(run), dependents(run, run.path.parent)
     if as_json:
-        shown = {"schema": "wristctl.lineage/2", "lineage": tree.plain(), "dependents": users}
-        print(json.dumps(shown, indent=2))
-        return
+        return print_json({"schema": "wristctl.lineage/2", "lineage": tree.plain(), "dependents": users})
     for line in tree.lines():
         say(line)
     for user in users:

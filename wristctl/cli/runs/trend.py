@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
+from wristctl.cli.json_output import print_json
 from wristctl.cli.options import RESULTS, Debug, Json, Out, run_ids
 from wristctl.cli.output import say, write_picture
 from wristctl.commands.printed_table import Table, number
@@ -52,7 +52,7 @@ def trend(
     trends = trends_of(readings, per == "day")
     drifting = [line for line in trends if line.drifts]
     if as_json:
-        print(json.dumps(_plain(readings, trends, per), indent=2))
+        print_json(_plain(readings, trends, per))
     else:
         for line in _answer(trends, len(readings), per):
             say(line)

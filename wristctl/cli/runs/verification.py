@@ -9,11 +9,12 @@ import tempfile
 from collections.abc import Iterator, Mapping, Sequence
 from functools import partial
 from pathlib import Path
-from typing import Annotated, Any, NamedTuple
+from typing import Annotated, NamedTuple
 
 import typer
 
 from wristctl.cli.command import asked_to_trust
+from wristctl.cli.json_output import print_json
 from wristctl.cli.options import RESULTS, Debug, Json, Out, Ref, TrustCode, run_ids
 from wristctl.cli.output import say
 from wristctl.cli.progress import listening, progress
@@ -95,24 +96,22 @@ def verify(
             run = Run(path)  # and forgotten again: the manifests of 20,000 runs are 400 MB
             checked[str(path) if run.id in checked else run.id] = _verified(run, must, signers)
             advance(count, changed=sum(verdict.fails(must) for verdict in checked.values()))
+    error, changed = None, sum(verdict.fails(must) for verdict in checked.values())
+    if changed:
+        problem = f"{changed} of {len(checked)} runs are not as they were sealed{' and signed' * must}"
+        error = UserError(problem, str(out), "restore the files named, or run the command again", exit_code=3)
     if as_json:
         shown = {
             name: [{"file": file, "problem": problem} for file, problem in verdict.problems]
             for name, verdict in checked.items()
         }
-        print(json.dumps({"schema": "wristctl.verify/1", "runs": shown}, indent=2))
-    else:
-        for name, verdict in checked.items():
-            say(f"{name}  {verdict.said}")
-            for file, problem in () if verdict.running else verdict.problems:
-                say(f"  {file}: {problem}")
-    changed = sum(verdict.fails(must) for verdict in checked.values())
-    if changed:
-        fix = "restore the files named, or run the command again"
-        asked = " and signed" if must else ""
-        raise UserError(
-            f"{changed} of {len(checked)} runs are not as they were sealed{asked}", str(out), fix, exit_code=3
-        )
+        return print_json({"schema": "wristctl.verify/1", "runs": shown}, error)
+    for name, verdict in checked.items():
+        say(f"{name}  {verdict.said}")
+        for file, problem in () if verdict.running else verdict.problems:
+            say(f"  {file}: {problem}")
+    if error:
+        raise error
 
 
 def _verified(run: Run, signed: bool, signers: Path | None) -> Verified:
@@ -238,21 +237,22 @@ def _again(run: Run, scratch: Path, settings: Sequence[str]) -> int:
 
 def _conclude(run: Run, scratch: Path | None, compared: list[ReplayVerdict], why: list[str], as_json: bool) -> None:
     """Print the verdicts; where there is a cause to name, fail and keep the scratch folder."""
-    if as_json:
-        files = [verdict._asdict() for verdict in compared]
-        kept = str(scratch) if why and scratch else None
-        shown: dict[str, Any] = {"schema": "wristctl.replay/1", "run": run.id, "same": not why, "causes": why}
-        print(json.dumps({**shown, "files": files, "scratch": kept}, indent=2))
-    else:
-        if compared:
-            print(Table("", ("file", "verdict", "where"), compared).text(), end="\n\n")
-        for cause in why:
-            say(f"cause: {cause}")
+    error = None
     if why:
         kept = f"the repetition is in {scratch}" if scratch else "mend the input, or run its command again"
-        raise UserError("the repetition differs" if compared else "the run was not repeated", run.id, kept, exit_code=3)
-    if scratch:
+        problem = "the repetition differs" if compared else "the run was not repeated"
+        error = UserError(problem, run.id, kept, exit_code=3)
+    elif scratch:
         shutil.rmtree(scratch)
-    if not as_json:
-        exact = all(verdict.verdict in ("identical", "undrawn", "volatile") for verdict in compared)
-        say(f"{run.id}: {'identical' if exact else 'the same within tolerance'}")
+    if as_json:
+        files = [verdict._asdict() for verdict in compared]
+        shown = {"schema": "wristctl.replay/1", "run": run.id, "same": not why, "causes": why, "files": files}
+        return print_json({**shown, "scratch": str(scratch) if why and scratch else None}, error)
+    if compared:
+        print(Table("", ("file", "verdict", "where"), compared).text(), end="\n\n")
+    for cause in why:
+        say(f"cause: {cause}")
+    if error:
+        raise error
+    exact = all(verdict.verdict in ("identical", "undrawn", "volatile") for verdict in compared)
+    say(f"{run.id}: {'identical' if exact else 'the same within tolerance'}")

@@ -74,13 +74,13 @@ _MODELS = {
 }
 
 
-def listed() -> list[str]:
+def listed() -> Table:
     """Each data set, where it is, its licence, how many of its files have a hash here, and what reads it."""
     rows = [
         (name, one.place, one.licence, one.columns, len(one.hashes), "validate" if name in ROBOTS else "identify")
         for name, one in DATA_SETS.items()
     ]
-    return Table("", ("robot", "where", "licence", "--columns", "hashes", "read by"), rows).text(100).split("\n")
+    return Table("", ("robot", "where", "licence", "--columns", "hashes", "read by"), rows)
 
 
 def with_recordings(study: Study) -> Study:
