@@ -50,6 +50,14 @@ def _forgotten() -> Iterator[None]:
 
 
 @pytest.fixture(autouse=True, scope="session")
+def _a_home_of_their_own(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
+    """What commands note for the user is not noted for who runs the tests."""
+    with pytest.MonkeyPatch.context() as session:
+        session.setenv("XDG_STATE_HOME", str(tmp_path_factory.mktemp("state")))
+        yield
+
+
+@pytest.fixture(autouse=True, scope="session")
 def _runs_begin_and_end_soon() -> Iterator[None]:
     """Runs of this process read sources and installed packages once, and do not wait for the disk.
 

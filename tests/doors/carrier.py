@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import hashlib
 import json
-import os
+import shutil
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
-from tests.doors.conftest import HELPER, LAW
+from tests.doors.conftest import HELPER, LAW, elsewhere
+from wristctl.commands.adoption import with_places
 from wristctl.config.foreign import Foreign
 from wristctl.records import Run, start_run
 from wristctl.records.manifest import Manifest
@@ -22,25 +23,27 @@ MARKING = "open({mark!r}, 'a').close()\n"
 
 
 def carrier(folder: Path, kind: str, section: Mapping[str, Any]) -> Run:
-    """A sealed run of this kind in folder/results whose code says folder/MARK once it is imported."""
+    """Somebody else's sealed run of this kind in folder/results, whose code says folder/MARK once it is imported."""
+    with elsewhere(folder):
+        return made(folder, kind, section)
+
+
+def made(folder: Path, kind: str, section: Mapping[str, Any], found: str = "") -> Run:
+    """Such a run, made by this user here; `found` is a folder of it for a copy of the law that it never ran."""
     sources = folder / "sources"
     sources.mkdir(exist_ok=True)
     for name, text in (("strange.py", LAW), ("helper.py", HELPER)):
         (sources / name).write_text(MARKING.format(mark=str(folder / MARK)) + text)
     hashes = {file: hashlib.sha256(file.read_bytes()).hexdigest() for file in sorted(sources.iterdir())}
     foreign = Foreign(sources / "strange.py", "STRANGE", hashes, sources)
-    agreed = os.environ.get("WRISTCTL_TRUSTED_CODE")
     document = sources / "study.yaml"
     document.write_text(json.dumps({kind: section}).replace(CARRIED, foreign.reference))
-    study = load_study([document])
+    study = with_places(load_study([document]), {foreign.reference: CARRIED})
     with start_run(kind, study, "", folder / "results", ["wristctl", kind], foreign=[foreign]) as live:
         live.file("data/gains.json").write_text('{"strange": {"Kp": 4.0, "Kd": 0.2}}')
         live.metric("rmse", 0.1)
-    if agreed is None:
-        os.environ.pop("WRISTCTL_TRUSTED_CODE")
-    config = live.path / "config.yaml"
-    config.write_text(config.read_text().replace(foreign.reference, CARRIED))
-    write_seal(live.path, {})
+        if found:
+            shutil.copytree(sources, live.path / found)
     return Run(live.path)
 
 

@@ -6,6 +6,7 @@ import os
 import subprocess
 import sys
 from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
@@ -42,6 +43,15 @@ def _distrusted() -> Iterator[None]:
     os.environ.pop("WRISTCTL_TRUSTED_CODE", None)
     if before is not None:
         os.environ["WRISTCTL_TRUSTED_CODE"] = before
+
+
+@contextmanager
+def elsewhere(folder: Path) -> Iterator[None]:
+    """Within the block runs are made by somebody else: nothing is noted as this user's own, or agreed to."""
+    with pytest.MonkeyPatch.context() as their:
+        their.setenv("XDG_STATE_HOME", str(folder / "state of another"))
+        their.setenv("WRISTCTL_TRUSTED_CODE", "")
+        yield
 
 
 @pytest.fixture

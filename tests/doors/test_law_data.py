@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 import wristctl as face
-from tests.doors.conftest import LAW, wristctl
+from tests.doors.conftest import LAW, elsewhere, wristctl
 from wristctl.commands.adoption import adopt, adopted, adoption
 from wristctl.errors import UserError
 from wristctl.plugins.places import load
@@ -46,11 +45,11 @@ def rmse(study: Path, trust_code: bool = False) -> float:
 
 
 def run_of(folder: Path) -> Run:
-    """A run of the law, whose original is gone, and to whose code nobody has agreed."""
-    done = face.simulate(face.load_study(folder / "study.yaml"), out=folder / "results")
+    """A run of the law from elsewhere, whose original is gone, and to whose code nobody has agreed."""
+    with elsewhere(folder):
+        done = face.simulate(face.load_study(folder / "study.yaml"), out=folder / "results")
     for name in ("strange.py", "helper.py", "nets/weights.npy"):
         (folder / name).unlink()
-    os.environ.pop("WRISTCTL_TRUSTED_CODE")
     assert done.run is not None
     return Run(done.run.path)
 

@@ -14,7 +14,7 @@ from pathlib import Path
 import pytest
 
 import wristctl as face
-from tests.doors.conftest import ROOT, wristctl
+from tests.doors.conftest import ROOT, elsewhere, wristctl
 from wristctl.errors import UserError
 from wristctl.plugins.places import load
 from wristctl.plugins.trust import asking
@@ -31,12 +31,12 @@ simulate: {horizon: 0.3, loop: {plant_segments: 1}}
 
 
 def sealed(stranger: Path, study: str = ONE) -> Run:
-    """A run of the stranger's law, whose original is gone."""
+    """A run of the stranger's law, by the stranger, whose original is gone."""
     (stranger / "study.yaml").write_text(study)
-    done = face.simulate(face.load_study(stranger / "study.yaml"), out=stranger / "results")
+    with elsewhere(stranger):
+        done = face.simulate(face.load_study(stranger / "study.yaml"), out=stranger / "results")
     for name in ("strange.py", "helper.py"):
         (stranger / name).unlink()
-    os.environ.pop("WRISTCTL_TRUSTED_CODE")
     assert done.run is not None
     return Run(done.run.path)
 

@@ -1,4 +1,7 @@
-"""Trust in code that came with a run. It is loaded once a person has seen its files and hashes, and agreed."""
+"""Trust in code that came with a run. It is loaded once a person has seen its files and hashes, and agreed.
+
+Nobody is asked about a run that the same user sealed on this machine: its code has run already.
+"""
 
 import hashlib
 import os
@@ -10,9 +13,10 @@ from pathlib import Path
 from wristctl.errors import Argument, UserError
 from wristctl.escape import printable
 from wristctl.plain_files import read_plain, unreadable
+from wristctl.plugins.own_runs import is_noted
 from wristctl.sha256sums import SUMS, read_seal
 
-_MANIFEST = "run.json"
+_MANIFEST, _CONFIG, _CODE = "run.json", "config.yaml", "code"
 # Files that nothing but a run has, each of which is left where another was lost or taken away.
 _MARKS = (_MANIFEST, SUMS, "code.txt")
 # Environment variable with the hashes that were agreed to, for the processes that a command starts.
@@ -44,7 +48,7 @@ def run_around(file: Path) -> Path | None:
         for folder in path.parents:
             if any(os.path.lexists(folder / name) for name in _MARKS):
                 return folder
-            if os.path.lexists(folder / "config.yaml") and os.path.lexists(folder / "code"):
+            if os.path.lexists(folder / _CONFIG) and os.path.lexists(folder / _CODE):
                 return folder
     return None
 
@@ -52,15 +56,16 @@ def run_around(file: Path) -> Path | None:
 def trusted(file: Path, root: Path) -> Mapping[Path, str] | None:
     """The hashes of all below `root` that a file in a run may load, which were agreed to; None for one that is in none.
 
-    Raises UserError where nobody agrees, and for code that is not as the run was sealed.
+    Those of a run that this user sealed here count as agreed to. Raises UserError where nobody agrees, and for code
+    that is not as the run was sealed.
     """
     home = run_around(file)
     if home is None:
         return None
-    files = _sources(root)
-    _check_seal(home, files)
+    files, sealed = _sources(root), read_seal(home)
+    _check_seal(home, sealed, files)
     whole_digest = digest_of(root, files)
-    if whole_digest in os.environ.get(_AGREED, "").split(","):
+    if whole_digest in os.environ.get(_AGREED, "").split(",") or _sealed_here(home, sealed, root):
         return files
     lines = [printable(line) for line in _listing(root, files)]  # a name may hold what a terminal obeys
     shown = f"{printable(home)} carries code, which would run with all that you may do. In {printable(root)}:\n"
@@ -101,8 +106,20 @@ def _listing(root: Path, files: Mapping[Path, str]) -> list[str]:
     return [f"{digest}  {source.relative_to(root).as_posix()}" for source, digest in sorted(files.items())]
 
 
-def _check_seal(home: Path, files: Mapping[Path, str]) -> None:
-    sealed = read_seal(home)
+def _sealed_here(home: Path, sealed: Mapping[str, str] | None, root: Path) -> bool:
+    """Whether this user sealed the run on this machine, with this configuration beside the code.
+
+    The code itself is as it was sealed, or it is refused before.
+    """
+    if not sealed or not root.is_relative_to(home / _CODE) or not is_noted(sealed):
+        return False
+    try:
+        return hashlib.sha256(read_plain(home / _CONFIG)).hexdigest() == sealed.get(_CONFIG)
+    except OSError:
+        return False
+
+
+def _check_seal(home: Path, sealed: Mapping[str, str] | None, files: Mapping[Path, str]) -> None:
     if sealed is None:
         return
     complete = _MANIFEST in sealed  # else it was cut short, or is a list of other files

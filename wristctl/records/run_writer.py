@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from wristctl.errors import UserError, reason_of
 from wristctl.interrupt import asked
+from wristctl.plugins.own_runs import note
 from wristctl.records import formats
 from wristctl.records.files import check_plain, files_below, replacing, sha256_of, sync, write_bytes, write_text
 from wristctl.records.journal import Journal, jsonable, now
@@ -40,6 +41,7 @@ from wristctl.records.manifest import (
     command_of,
 )
 from wristctl.records.seal import entries, result_hash, write_seal
+from wristctl.sha256sums import read_seal
 
 if TYPE_CHECKING:
     import numpy as np
@@ -274,6 +276,8 @@ class LiveRun:
             if not any(folder.iterdir()):
                 folder.rmdir()
         write_seal(self.path, {output.path: output.sha256 for output in manifest.outputs})
+        if manifest.code.foreign:
+            note(read_seal(self.path) or {})
         return manifest
 
     def close(self) -> None:
