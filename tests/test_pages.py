@@ -49,6 +49,16 @@ def test_the_readme_is_one_screen_and_names_every_controller() -> None:
     assert {name for row in rows for name in re.findall(r"`([^`]+)`", row)} == set(CONTROLLERS)
 
 
+NUMBERS = {"eighteen": 18, "nineteen": 19, "twenty": 20, "twenty-one": 21, "twenty-two": 22, "twenty-three": 23}
+
+
+@pytest.mark.parametrize("page", ["README.md", "CHANGELOG.md", "paper/paper.md", "CITATION.cff", "docs/overview.md"])
+def test_a_page_that_counts_controllers_counts_those_there_are(page: str) -> None:
+    words = re.findall(r"([\w-]+)\s+controllers\b", (ROOT / page).read_text(encoding="utf-8"))
+    counts = [int(word) if word.isdigit() else NUMBERS[word] for word in words if word.isdigit() or word in NUMBERS]
+    assert set(counts) <= {len(CONTROLLERS)} and (counts or page not in ("CHANGELOG.md", "paper/paper.md"))
+
+
 def test_the_wrist_in_motion_is_a_small_animation() -> None:
     file = ROOT / "docs" / "images" / "motion.gif"
     assert file.stat().st_size < 600e3

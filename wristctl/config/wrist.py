@@ -18,7 +18,7 @@ class TendonPlace(Section):
 
 
 class WristParameters(Section):
-    """A tendon-driven wrist of rigid discs and springs, bending in one plane; SI units."""
+    """A tendon-driven wrist of rigid discs and springs; SI units."""
 
     discs: int = choice(5, "rigid discs, the first clamped, the last carrying the hand", "paper", ge=2, le=33)
     length: float = quantity(0.080, "m", "arc length from the first to the last disc", "assumed", gt=0)

@@ -1,0 +1,56 @@
+"""Which commands bend in two planes, and with which tendons, is as the pages and the errors say."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+
+from tests.cli.conftest import Call
+from wristctl.cli.commands import COMMANDS
+
+ROOT = Path(__file__).parents[2]
+TWO_PLANES = {
+    "simulate": ("--reference", "circumduction"),
+    "hw-run": ("--reference", "circumduction"),
+    "compare": ("--set", "references=[{kind: circumduction}]"),
+    "tune": ("--set", "scenarios=[{reference: {kind: circumduction}}]"),
+    "analyse": ("--set", "reference.kind=circumduction"),
+}
+"""How a motion in two planes is asked for, of commands whose motions can be chosen."""
+WRIST = {"simulate", "gen-data", "train", "tune", "compare", "recommend", "hw-run", "study", "analyse", "hysteresis"}
+"""Commands that compute with a wrist of the user's."""
+MUST = {"study": ("fair_study",)}
+"""Study files without which a command has nothing to do."""
+
+
+def _takes(call: Call, command: str, *typed: str) -> bool:
+    code, _, err = call(command, *MUST.get(command, ()), *typed, "--dry-run", "--quiet")
+    assert code == 0 or (code == 2 and "plane" in err and " - fix: " in err), (command, err)
+    return code == 0
+
+
+def test_commands_that_bend_in_two_planes_are_those_that_the_pages_name(call: Call) -> None:
+    bend = {command: _takes(call, command, *motion) for command, motion in TWO_PLANES.items()}
+    three = ("--set", "wrist.tendons=three")
+    any_tendons = {command for command in WRIST if _takes(call, command, *TWO_PLANES.get(command, ()), *three)}
+    taking = {command: "any" if command in any_tendons else "four" for command in bend if bend[command]}
+    for page in ("overview.md", "two-planes.md"):
+        text = " ".join((ROOT / "docs" / page).read_text(encoding="utf-8").split())
+        (said,) = re.findall(r"Commands that bend in two planes: (.*?\))\.", text)
+        assert dict(re.findall(r"`([\w-]+)` \((?:with )?(\w+)", said)) == taking, page
+    assert any_tendons == {"simulate"} and set(COMMANDS) > WRIST
+
+
+def test_in_one_plane_all_take_a_fifth_tendon_in_the_centre_and_none_takes_three(call: Call) -> None:
+    for command in sorted(WRIST):
+        assert _takes(call, command, "--set", "wrist.tendons=five") and not _takes(
+            call, command, "--set", "wrist.tendons=three"
+        )
+
+
+@pytest.mark.parametrize("motion", [(), ("--reference", "circumduction")])
+def test_a_rig_says_of_the_planes_it_was_asked_for_what_tendons_it_winds(call: Call, motion: tuple[str, ...]) -> None:
+    _, _, err = call("hw-run", *motion, "--set", "wrist.tendons=three", "--dry-run")
+    assert ("a rig in two planes winds the four tendons" if motion else "bending in one plane needs two") in err
