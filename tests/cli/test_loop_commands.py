@@ -356,6 +356,6 @@ def test_where_every_law_fails_or_swings_the_answer_says_so_and_the_table_stays(
     code, out, _ = call("compare", *hard)
     assert (
         "use none of these" in out
-        and "what leaves its range: pd-ff and feedforward (each in 8 of 8 worlds)" in " ".join(out.split())
+        and "that leave their range: pd-ff and feedforward (each in 8 of 8 worlds)" in " ".join(out.split())
     )
     assert code == 3

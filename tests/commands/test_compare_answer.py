@@ -77,9 +77,9 @@ def told(*rankings: Ranking) -> str:
 
 def avoided_in(said: str) -> str:
     """What an answer says of controllers that must not be used."""
-    rest = re.split(r" (?:Gains:|\d+ compared:)", said[said.index("o not use what") :])[0]
+    rest = re.split(r" (?:Gains:|\d+ compared:)", said[said.index("o not use controllers that") :])[0]
     rig, _, later = rest.partition(" The paper's gains:")
-    return f"{rig} {later[later.index('Elsewhere') :] if 'Elsewhere' in later else ''}"
+    return f"{rig} {later[later.index('In other conditions') :] if 'In other conditions' in later else ''}"
 
 
 def test_a_condition_is_a_line_with_the_best_the_next_and_the_gain_over_feedforward() -> None:
@@ -91,7 +91,7 @@ def test_a_condition_is_a_line_with_the_best_the_next_and_the_gain_over_feedforw
     assert line[3].startswith("pid-ff ") and line[5] == "0 of 9"
     ratio = one.means[one.labels.index("feedforward/default")].value / one.means[0].value
     assert line[4].endswith(f"({two(ratio, DIGITS)})")
-    assert "use mrac/default: RMSE" in told(one) and f"{two(ratio, DIGITS)} times less than feedforward" in told(one)
+    assert "use mrac/default: RMSE" in told(one) and f"{two(ratio, DIGITS)} times lower than feedforward" in told(one)
 
 
 def test_the_rig_is_answered_first_and_what_is_best_elsewhere_is_warned_of_where_it_swings() -> None:
@@ -99,7 +99,7 @@ def test_the_rig_is_answered_first_and_what_is_best_elsewhere_is_warned_of_where
     said = told(stands(), rig, stands("pushed"))
     assert said.index("use pid-ff/default") < said.index("use mrac/default")
     warned = said[said.index("use mrac/default") :]
-    assert "(sampled, push) use mrac/default" in said
+    assert "(sampled, push), use mrac/default" in said
     assert re.search(r"a camera: it swings by 2\.9 deg in 12 of 12 cases", warned)
     avoided = avoided_in(said)
     assert all(f"{name} by 2.9 deg" in avoided for name in ("mrac", "pid/printed"))
@@ -114,12 +114,12 @@ def test_every_fault_is_named_with_its_size_and_its_number_of_cases() -> None:
     )  # fmt: skip
     avoided = avoided_in(said).lower()
     for fact in (
-        "swings: smc/exchanged by 2.9 deg (in 12 of 12 cases)",
-        "does not arrive: smc/printed (in 12 of 12 motions)",
-        "pulls harder than a tendon bears: gvsc with 70 n",
-        "chatters: pid/printed 300 times a second (in 12 of 12 cases)",
-        "changes with the integration step: nc (in 12 of 12 cases)",
-        "leaves its range: pd-ff (in 5 of 12 cases)",
+        "swing: smc/exchanged by 2.9 deg (in 12 of 12 cases)",
+        "do not arrive: smc/printed (in 12 of 12 motions)",
+        "pull harder than a tendon bears: gvsc with 70 n",
+        "chatter: pid/printed 300 times a second (in 12 of 12 cases)",
+        "change with the integration step: nc (in 12 of 12 cases)",
+        "leave their range: pd-ff (in 5 of 12 cases)",
     ):
         assert fact in avoided
     assert "6 of 9" in said, "as many in the table"
@@ -130,7 +130,7 @@ def test_what_must_not_be_used_without_a_rig_is_named_after_the_rigs_with_its_co
         stands(away=("smc/printed",), swings=("nc/default",)), stands("pushed", swings=("nc/default",)),
         stands("camera and tendons", swings=("mrac/default",)),
     )  # fmt: skip
-    rig, elsewhere = avoided_in(said).split("Elsewhere")
+    rig, elsewhere = avoided_in(said).split("In other conditions")
     assert "mrac by 2.9 deg" in rig and "nc" not in rig.split() and "mrac" not in elsewhere.split(".")[0]
     assert "smc/printed does not arrive in sampled;" in elsewhere
     assert "nc swings by 2.9 deg in sampled and push." in elsewhere
@@ -178,7 +178,7 @@ def test_every_rank_of_every_controller_stands_in_a_table() -> None:
 def test_a_row_that_fails_and_swings_is_named_once_by_the_graver_fault() -> None:
     said = told(stands(swings=("pd-ff/default",), failed={"pd-ff/default": 5}))
     avoided = avoided_in(said)
-    assert avoided.count("pd-ff") == 1 and "eaves its range: pd-ff (in 5 of 12 cases)" in avoided
+    assert avoided.count("pd-ff") == 1 and "eave their range: pd-ff (in 5 of 12 cases)" in avoided
 
 
 def test_the_paper_is_answered_by_its_gains_and_the_conditions_in_which_they_work() -> None:
@@ -200,7 +200,7 @@ def test_the_paper_is_answered_by_its_gains_and_the_conditions_in_which_they_wor
 def test_each_condition_is_said_once_and_a_rig_by_what_is_simulated_of_it() -> None:
     rig = stands("camera and tendons")
     said = told(stands(), rig, replace(rig, name="camera and tendons, steps"), stands("off-nominal"))
-    assert said.count("spools follow the motion") == said.count("Sampled: ") == 1
+    assert said.count("spools follow the reference") == said.count("Sampled: ") == 1
     assert "motors + camera: spools" in said and "wrong model: another wrist" in said and "push: " not in said
     seen = told(replace(rig, traits=Traits(True, True, False)))
     assert "Camera: angles come from pictures" in seen and "spools" not in seen
@@ -208,7 +208,7 @@ def test_each_condition_is_said_once_and_a_rig_by_what_is_simulated_of_it() -> N
 
 def test_more_that_are_as_good_than_a_sentence_holds_are_counted() -> None:
     many = {f"c{number}/default": 1e-3 for number in range(6)}
-    assert re.search(r"use c\d/default: RMSE .*; 5 others are as good\.", told(stands(rmse=many)))
+    assert re.search(r"use c\d/default: RMSE .*; 5 others tie with it\.", told(stands(rmse=many)))
 
 
 def test_a_place_counts_what_is_better_and_not_what_is_tied() -> None:
@@ -235,7 +235,7 @@ def test_what_cannot_be_told_apart_is_named_and_counted() -> None:
     one = stands(rmse=alike)
     assert ranking_table([one], names_of([one])).rows[0][2] == "1"
     said = told(one)
-    assert re.search(r"use (a/default: .*; b|b/default: .*; a)/default is as good", said)
+    assert re.search(r"use (a/default: .*; b|b/default: .*; a)/default ties with it", said)
     assert re.search(r"tell them apart. Sampled: [ab]\.", said)
     many = stands(rmse={f"c{number}/default": 1e-3 for number in range(6)})
     assert all(f"c{number}" in told(many) for number in range(6))
@@ -331,3 +331,45 @@ def test_of_several_conditions_the_least_gain_is_told_as_the_least_and_errors_wi
     said = told(one, other)
     least, most = (two(np.degrees(ranking.means[0].value), DIGITS) for ranking in (one, other))
     assert f"RMSE {least} (sampled) to {most} deg (push), at least " in said
+
+
+_RIG = r"(?:simulated motors, tendons (?:and|or) a camera|simulated motors and tendons|a simulated camera)"
+_BEGINS = re.compile(
+    rf"(?:With|For steps with) (?:exact angles and torques|{_RIG})(?: \([^)]*\))?, (?:use |there is no ranking)"
+)
+SETS = [Traits(), *(Traits(True, camera, tendons) for camera in (True, False) for tendons in (True, False))]
+
+
+@pytest.mark.parametrize("jumps", [False, True])
+@pytest.mark.parametrize("second", SETS)
+@pytest.mark.parametrize("first", SETS)
+def test_sentences_put_together_from_conditions_are_sentences(first: Traits, second: Traits, jumps: bool) -> None:
+    """Of every pair of actuators and sensors, for smooth motions and for steps."""
+    steps = ", steps" * jumps
+    chosen = {f"camera and tendons{steps}": first, f"pushed{steps}": second}
+    several, few = (
+        [
+            replace(
+                stands(name, swings=bad, away=("nc/default",), motions=motions), traits=traits._replace(jumps=jumps)
+            )
+            for (name, traits), bad in zip(chosen.items(), (("mrac/default",), ("pid/printed",)), strict=True)
+        ]
+        for motions in (12, 3)
+    )
+    for rankings in (several, several[:1], few):
+        said = told(*rankings)
+        assert len(re.findall(_BEGINS, said)) == len({one.traits.rig for one in rankings}), said
+        for wrong in (
+            r"\b(simulated|with|in|the|a) an?d?\b (?!simulated camera|camera)",
+            r"simulated a\b",
+            r" [,;.:]",
+            r"[,;:]{2}",
+        ):
+            assert not re.search(wrong, said), (wrong, said)
+        avoided = re.findall(r"(?:^|[.] )([A-Z][^.]*?)[dD]o not use controllers that", said)
+        assert all(re.fullmatch(r"(With|In) [^.]*, ", begin) for begin in avoided if begin), avoided
+    one, other = first.camera, first.tendons
+    rig = told(several[0])
+    assert ("a simulated camera, use" in rig) == (first.rig and one and not other)
+    assert ("simulated motors and tendons, use" in rig) == (first.rig and other and not one)
+    assert ("simulated motors, tendons and a camera, use" in rig) == (one and other)

@@ -43,8 +43,8 @@ def advice(rankings: Sequence[Ranking]) -> str:
     sides = _sides(rankings)
     sentences = []
     for rig, alike in sides.items():
-        where = f"with {f'simulated {rig_whole(alike)}' if rig else 'exact angles and torques'}"
-        where = f"For steps {where}" if alike[0].jumps else where.capitalize()
+        where = f"with {rig_whole(alike, simulated=True) if rig else 'exact angles and torques'}"
+        where = f"For steps {where}" if alike[0].jumps else capital(where)
         sentences.append(_use(where, alike, sides.get(True, []) if not rig else []))
     return " ".join(sentences)
 
@@ -73,7 +73,7 @@ def _use(where: str, alike: Sequence[Ranking], others: Sequence[Ranking]) -> str
     """What to use in conditions of one kind, how large its error is there, and in which others it must not be used."""
     ranked = [ranking for ranking in alike if ranking.standing.groups]
     if not ranked:
-        return f"{where} {_no_ranking(alike)}."
+        return f"{where}, {_no_ranking(alike)}."
     chosen, often = _chosen(ranked)
     places = [(ranking, ranking.labels.index(chosen)) for ranking in ranked if chosen in ranking.labels]
     places = [place for place in places if place[0].standing.group(place[1]) == 1]
@@ -82,7 +82,7 @@ def _use(where: str, alike: Sequence[Ranking], others: Sequence[Ranking]) -> str
     alternatives = equal if len(equal) <= 3 else []
     everywhere = len(places) == len(alike) > 1
     names = f" ({', '.join(map(condition, alike))})" if everywhere else ""
-    text = f"{where}{names} use {called(chosen)}: RMSE {_errors(errors)}"
+    text = f"{where}{names}, use {called(chosen)}: RMSE {_errors(errors)}"
     if len(places) == 1:
         text += interval(*places[0])
     if len(alike) > 1 and not everywhere:
@@ -93,10 +93,10 @@ def _use(where: str, alike: Sequence[Ranking], others: Sequence[Ranking]) -> str
         text += "; no controller is better than feedforward, which is open loop"
     elif gains:
         least = f"{'at least ' * (len(gains) > 1)}{_times(gains[0], errors[0][0])}"
-        text += f", {least} less than feedforward"
+        text += f", {least} lower than feedforward"
     if equal:
         as_good = joined([*map(called, alternatives)]) or f"{len(equal)} others"
-        text += f"; {as_good} {'is' if len(equal) == 1 else 'are'} as good"
+        text += f"; {as_good} {'ties' if len(equal) == 1 else 'tie'} with it"
     text += _seldom([chosen, *alternatives], [ranking for ranking, _ in places])
     if few := [condition(ranking) for ranking in alike if ranking.standing.untold]:
         text += f" (no ranking in {joined(few)}: too few cases)"
@@ -166,14 +166,14 @@ def _mean(rankings: Sequence[Ranking], label: str) -> float:
 
 
 def ranking_table(rankings: Sequence[Ranking], names: Mapping[str, str]) -> Table:
-    """A condition a line: the best, how many are as good, the next, feedforward, and how many must not be used."""
+    """A condition a line: the best, how many tie, the next, feedforward, and how many must not be used."""
     unit = "worlds" if rankings[0].unit == "world" else "cases"
     heads = (
         f"condition ({unit})",
         "best",
-        "as good",
-        "first worse",
-        "feedforward (times)",
+        "ties",
+        "next",
+        "feedforward (ratio)",
         "unusable",
     )
     rows = []
@@ -192,12 +192,12 @@ def ranking_table(rankings: Sequence[Ranking], names: Mapping[str, str]) -> Tabl
             f"{len(ranking.standing.unusable)} of {len(ranking.labels)}",
         )
         rows.append((begin, best, others, following, open_loop, end))
-    title = "RMSE [deg]; as good: number of others not told from the best by paired tests; times: over the best"
+    title = "RMSE [deg]; ties: not significantly different from the best; next: first that is; ratio: to the best"
     return Table(title, heads, rows)
 
 
 def ties(rankings: Sequence[Ranking], names: Mapping[str, str]) -> str:
-    """Every controller that is as good as the best of a condition; conditions with the same ones together."""
+    """Every controller that ties with the best of a condition; conditions with the same ones together."""
     same: dict[tuple[str, ...], list[str]] = {}
     for ranking in rankings:
         row = winner(ranking, rankings)
@@ -245,8 +245,8 @@ def do_not_use(rankings: Sequence[Ranking], names: Mapping[str, str]) -> str:
             text = f"{joined([name for name, _ in rows])} ({'each ' * (len(rows) > 1)}{counts[0]})"
         else:
             text = joined([f"{name} ({count})" for name, count in rows])
-        sentences.append(f"what {verb}: {text}")
-    return f"{capital(f'{where} do not use'.strip())} {'; '.join(sentences)}."
+        sentences.append(f"that {_THEY[verb]}: {text}")
+    return f"{capital(f'{where}, do not use'.strip(' ,'))} controllers {'; '.join(sentences)}."
 
 
 def _smooth_on_rigs(rankings: Sequence[Ranking]) -> list[Ranking]:
@@ -274,7 +274,7 @@ def not_elsewhere(rankings: Sequence[Ranking], names: Mapping[str, str]) -> str:
             they = _THEY[verb] if len(labels) > 1 else verb
             clauses.append(" ".join(filter(None, [they, sized(verb, lost), f"in {places_named}"])))
         listed.append(f"{joined([names[label] for label in labels])} {joined(clauses)}")
-    return f"Elsewhere {'; '.join(listed)}." if listed else ""
+    return f"In other conditions {'; '.join(listed)}." if listed else ""
 
 
 def _lost(ranking: Ranking, row: int) -> float:

@@ -40,12 +40,16 @@ def _rig(traits: Traits) -> str:
     return "camera" if traits.camera else "motors" if traits.tendons else "motors or camera"
 
 
-def rig_whole(rankings: Sequence[Ranking]) -> str:
-    """What is simulated of a rig in these conditions."""
+def rig_whole(rankings: Sequence[Ranking], simulated: bool = False) -> str:
+    """What there is of a rig in these conditions: "a camera", where it is to be said "a simulated camera"."""
     traits = [ranking.traits for ranking in rankings]
-    if all(one.camera and one.tendons for one in traits):
-        return "motors, tendons and a camera"
-    return "a camera" if all(one.camera for one in traits) else "motors, tendons or a camera"
+    if all(one.camera for one in traits) and not any(one.tendons for one in traits):
+        return "a simulated camera" if simulated else "a camera"
+    if all(one.tendons for one in traits) and not any(one.camera for one in traits):
+        words = "motors and tendons"
+    else:
+        words = f"motors, tendons {'and' if all(one.camera and one.tendons for one in traits) else 'or'} a camera"
+    return f"simulated {words}" if simulated else words
 
 
 def names_of(rankings: Sequence[Ranking], short: bool = False) -> dict[str, str]:

@@ -53,7 +53,7 @@ def answer_of(
     notes = [
         (" ".join(filter(None, [conditions(rankings), gains_meant(rankings)])), conditions(rankings)),
         (best_on_yours(rankings), ""),
-        (unusable, "Some must not be used; which, and why: `--all`." if unusable else ""),
+        (unusable, "Some controllers must not be used: `--all` says which and why." if unusable else ""),
         (papers(rankings), ""),
         (" ".join(filter(None, [not_elsewhere(rankings, names), papers_order(rankings)])), ""),
         (" ".join(filter(None, [gains_of_best(rankings, gains or {}), compared(rankings), more])), more),
@@ -115,7 +115,7 @@ def compared(rankings: Sequence[Ranking]) -> str:
 
 # What each condition is, but a rig's.
 _CONDITIONS = {
-    "ideal": "the believed wrist",
+    "ideal": "the nominal model",
     "sampled": "with ticks, limits or more segments",
     "pushed": "an unknown force",
     "off-nominal": "another wrist",
@@ -149,7 +149,7 @@ def gains_meant(rankings: Sequence[Ranking]) -> str:
 
 def _rig(traits: Traits) -> str:
     if traits.tendons:
-        return "spools follow the motion, so weak gains come near"
+        return "spools follow the reference, so even low gains track it"
     return "angles come from pictures" if traits.camera else "of some loops"
 
 
