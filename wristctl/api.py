@@ -26,7 +26,8 @@ from wristctl.commands.perform import RESULTS, Folder, Ref, StudyOrFile, carry_o
 from wristctl.commands.progress import Watch
 from wristctl.commands.recommend.answer import Recommended
 from wristctl.commands.recommend.command import RECOMMEND
-from wristctl.commands.simulate.command import SIMULATE, Simulated
+from wristctl.commands.simulate.command import SIMULATE
+from wristctl.commands.simulate.results import SimulatedLoop
 from wristctl.commands.study.command import FAIR_STUDY
 from wristctl.commands.study.units import Studied
 from wristctl.commands.train.command import TRAIN, Trained
@@ -54,8 +55,8 @@ def load_study(file: str | Path | None = None, *overrides: str, trust_code: bool
 
 @in_python()
 def gen_data(
-    study: StudyOrFile, *, run: Ref | Simulated | Compared | None = None, out: Folder | None = None, label: str = "",
-    progress: Watch | None = None,
+    study: StudyOrFile, *, run: Ref | SimulatedLoop | Compared | None = None, out: Folder | None = None,
+    label: str = "", progress: Watch | None = None,
 ) -> Generated:  # fmt: skip
     """Samples of tip positions [m] and bending angles [rad], by the study's `gen-data` section.
 
@@ -162,13 +163,14 @@ def simulate(
     study: StudyOrFile, *, network: Ref | Trained | None = None, tuned: Ref | Tuned | None = None,
     from_identified: Ref | Identified | None = None, executor: str = "serial",
     out: Folder | None = None, label: str = "", progress: Watch | None = None,
-) -> Simulated:  # fmt: skip
+) -> SimulatedLoop:  # fmt: skip
     """One closed loop, by the study's `simulate` section.
 
     `network` (train) stands behind a reference with `inverse: network`, `tuned` (tune) behind `gains: tuned`; the
-    parameters of `from_identified` (identify) replace the study's. The result has `.trajectory` (`.frame()` is its
-    table, SI units) and `.failed`, whether the wrist left its range. Raises UserError for unknown controllers
-    or gains, a reference out of reach, inputs that are missing, or a start in equilibrium of a wrist that buckles.
+    parameters of `from_identified` (identify) replace the study's. The result has `.trajectory` (in two planes
+    `.course`), whose table in SI units is `.frame()`, and `.failed`, whether the wrist left its range. Raises UserError
+    for unknown controllers or gains, a reference out of reach, inputs that are missing, or a start in equilibrium of a
+    wrist that buckles.
 
     Where the study has a `sweep` the result is a table of its points, which `executor` computes. `out`, `label` and
     `progress` are as in `gen_data`.

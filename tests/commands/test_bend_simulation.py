@@ -59,6 +59,17 @@ def test_a_dart_throw_is_answered_by_plane_and_as_one_norm_in_a_sealed_run(tmp_p
     assert "figures/bends.png" in (run.path / "README.md").read_text()
 
 
+def test_the_result_says_where_its_motion_is_whether_in_one_plane_or_in_two() -> None:
+    bends = wristctl.simulate(study_of("simulate.reference.kind=dart-thrower"))
+    assert bends.course.bend.shape[1] == 2 and len(bends.frame()) == len(bends.course.bend)
+    with pytest.raises(UserError, match=r"two planes has no trajectory - fix: take \.course"):
+        _ = bends.trajectory
+    planar = wristctl.simulate(study_of())
+    assert planar.trajectory.theta.ndim == 1 and len(planar.frame()) == len(planar.trajectory.theta)
+    with pytest.raises(UserError, match=r"one plane has no course - fix: take \.trajectory"):
+        _ = planar.course
+
+
 def test_a_recording_of_two_planes_is_followed_in_both(tmp_path: Path) -> None:
     time = np.arange(0.0, 1.0, 0.02)
     bends = np.array([12.0 * np.sin(np.pi * time) ** 2, -7.0 * time**2])
@@ -146,7 +157,7 @@ def test_a_motion_in_one_plane_is_the_same_with_gravity_from_the_side(direction:
 
 
 def test_three_tendons_bend_in_two_planes_and_not_in_one() -> None:
-    with pytest.raises(UserError, match="two sides of two tendons"):
+    with pytest.raises(UserError, match="two tendons on either side"):
         wristctl.simulate(study_of("wrist.tendons=three"))
     assert simulated("wrist.tendons=three", "simulate.reference.kind=circle").course.pulls.shape[1] == 3
 

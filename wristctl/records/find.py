@@ -216,6 +216,7 @@ def _check_metric(name: str, listed: Sequence[IndexEntry], where: Phrase) -> Non
 
 
 def condition(text: str) -> tuple[str, Any, float]:
+    """The metric, comparison and bound of "rmse<1e-3". Raises UserError for a text that is no condition."""
     match = re.fullmatch(r"(.+?)\s*(<=|>=|!=|==|<|>|=)\s*([^<>=!]+)", text)
     try:
         if match:

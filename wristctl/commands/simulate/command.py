@@ -7,7 +7,7 @@ import shlex
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, Any
 
 from wristctl.commands.answer import Answer
 from wristctl.commands.inputs import EarlierRun, Inputs
@@ -111,10 +111,10 @@ def size(study: Study) -> Size:
     return Size([chosen.loop], chosen.horizon, chosen.repetitions if is_random(chosen.loop) else 1)
 
 
-def simulate(session: Session) -> Simulated:
+def simulate(session: Session) -> SimulatedLoop:
     """Simulate one closed loop and draw it, in one plane, or in two where reference or tendons bend in two."""
     if in_two_planes(identified(session.study, "simulate", session.inputs)):
-        return cast(Simulated, simulate_in_two_planes(session))  # which has no trajectory, but a course
+        return simulate_in_two_planes(session)
     from wristctl.commands.simulate.figures import consistency, sliding
     from wristctl.commands.truth_table import truth_heading, truth_tables
     from wristctl.control.table import controller, gains_of

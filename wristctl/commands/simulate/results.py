@@ -12,7 +12,9 @@ from wristctl.errors import UserError
 
 if TYPE_CHECKING:
     from wristctl.config.study import Study
+    from wristctl.simulation.bend_course import BendCourse
     from wristctl.simulation.repetitions import Repetitions
+    from wristctl.simulation.trajectory import Trajectory
 
 
 @dataclass(frozen=True, repr=False, eq=False)
@@ -31,6 +33,16 @@ class SimulatedLoop(StudyResult):
     """Study with the identified wrist, motors and sensor in it; None: `study`."""
     wrist: str = ""
     """The wrist in words, where it was identified."""
+
+    @property
+    def trajectory(self) -> Trajectory:
+        """Trajectory of the first repetition. UserError of a loop in two planes, which has a `.course`."""
+        raise UserError("a loop in two planes has no trajectory", fix="take .course, or .frame() for its table")
+
+    @property
+    def course(self) -> BendCourse:
+        """What the wrist did in two planes, in the first repetition. UserError of a loop in one plane."""
+        raise UserError("a loop in one plane has no course", fix="take .trajectory, or .frame() for its table")
 
     @property
     def failed(self) -> bool:
