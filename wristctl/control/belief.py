@@ -11,7 +11,7 @@ from wristctl.control.model import one_segment
 from wristctl.lanes.compiled import by_type, compiled, implements
 from wristctl.lanes.functions import clip
 from wristctl.lanes.lane import planar, where, zero_like
-from wristctl.lanes.rows import lanes_like, part, planes_like, rows_of, square_like
+from wristctl.lanes.rows import lanes_like, part, planes_like, rows_at, rows_of, square_like
 from wristctl.wrist.allocation import allocate
 from wristctl.wrist.segments import Segments, load_segments
 from wristctl.wrist.spatial.posture import bend_segments, posture_like
@@ -75,7 +75,7 @@ def belief_in_lanes(belief: Any) -> Any:
 
 @implements(belief_in_lanes, Sides)
 def _sides_in_lanes(belief: Any) -> Any:
-    return Belief(load_segments(rows_of(belief.models[0])), belief.models, rows_of(belief.alike), Ignored())
+    return Belief(load_segments(rows_at(belief.models, 0)), belief.models, rows_of(belief.alike), Ignored())
 
 
 @implements(belief_in_lanes, Places)
@@ -156,8 +156,8 @@ def _compensated(kind: Any, known: Any, bend: Any, rate: Any, acceleration: Any,
     tangent = bend_segments(segment, bend, posture)
     spatial_mass_matrix(segment, posture, tangent, mass, momenta)
     spatial_bias(segment, bend, rate, posture, tangent, free, extra)
-    inertia_y, load_y = one_segment(load_segments(rows_of(known.models[0])), bend[0], rate[0])
-    inertia_z, load_z = one_segment(load_segments(rows_of(known.models[1])), bend[1], rate[1])
+    inertia_y, load_y = one_segment(load_segments(rows_at(known.models, 0)), bend[0], rate[0])
+    inertia_z, load_z = one_segment(load_segments(rows_at(known.models, 1)), bend[1], rate[1])
     a_y, a_z = acceleration[0], acceleration[1]
     extra[0] = extra[0] - load_y + (mass[0, 0] - inertia_y) * a_y + mass[0, 1] * a_z
     extra[1] = extra[1] - load_z + (mass[1, 1] - inertia_z) * a_z + mass[1, 0] * a_y

@@ -26,7 +26,7 @@ from wristctl.errors import UserError
 from wristctl.lanes import functions, lane
 from wristctl.lanes.blocks import width
 from wristctl.lanes.compiled import compiled, frozen_values, keep
-from wristctl.lanes.rows import rows_named
+from wristctl.lanes.rows import rows_named, stack_named
 from wristctl.lanes.types import LaneType, RowsType
 from wristctl.wrist.segments import Segments
 
@@ -42,8 +42,8 @@ NOW = (
 
 REFERENCE = ("theta_ref", "rate_ref", "acceleration_ref")
 
-now_of = rows_named(NOW)
-wrist_of = rows_named(Segments._fields)
+now_of, wrist_of = rows_named(NOW), rows_named(Segments._fields)
+now_at, wrist_at = stack_named(NOW), stack_named(Segments._fields)
 
 Law = Callable[[Any, Any, Any, Any], Any]
 

@@ -6,10 +6,10 @@ Rows have P entries for planes, T for places of tendons (`wristctl.control.belie
 from typing import Any, NamedTuple
 
 from wristctl.control.belief import Reached, coupled, coupling, miss, moment_arms_at, reach, share_out, torque_of
-from wristctl.control.law import NOW, REFERENCE, now_of, wrist_of
+from wristctl.control.law import NOW, REFERENCE, now_at, wrist_at
 from wristctl.lanes.compiled import compiled, spelled_out
 from wristctl.lanes.lane import zero_like
-from wristctl.lanes.rows import lanes_like, rows_of
+from wristctl.lanes.rows import lanes_like, rows_at, rows_of
 
 _THETA, _RATE, _THETA_REF, _RATE_REF, _ACCELERATION_REF, _LOW, _HIGH, _PERIOD, _LOAD, _WITHHELD = range(len(NOW))
 
@@ -91,7 +91,7 @@ def look_ahead(control: Any, bend: Any, periods: int, since: float) -> None:
 @compiled
 def _continued(control: Any, p: int, first: int, since: float) -> None:
     """The reference as what a law sees from `first` on, continued by its own derivatives."""
-    signals, target = rows_of(control.signals[p]), rows_of(control.reference[p])
+    signals, target = rows_at(control.signals, p), rows_at(control.reference, p)
     signals[first] = target[0] + since * (target[1] + 0.5 * since * target[2])
     signals[first + 1] = target[1] + since * target[2]
     signals[first + 2] = target[2]
@@ -103,12 +103,12 @@ def perceive(control: Any, known: Any, seen: Any, limits: Any, room: Any, since:
     for p in range(len(room.bend)):
         room.bend[p] = seen.rows[OF_A_PLANE * p]
         room.speed[p] = seen.rows[OF_A_PLANE * p + 1]
-        room.acceleration[p] = rows_of(control.reference[p])[2]
+        room.acceleration[p] = rows_at(control.reference, p)[2]
     coupling(known.coupling, known, room.bend, room.speed, room.acceleration, room.extra)
     moment_arms_at(known.wrist, room.bend, room.arms)
     reach(room.arms, limits, room.extra, room.low, room.high)
     for p in range(len(room.bend)):
-        signals = rows_of(control.signals[p])
+        signals = rows_at(control.signals, p)
         signals[_THETA] = room.bend[p]
         signals[_RATE] = room.speed[p]
         signals[_LOAD] = seen.rows[OF_A_PLANE * p + 2]
@@ -122,8 +122,8 @@ def perceive(control: Any, known: Any, seen: Any, limits: Any, room: Any, since:
 @spelled_out
 def wanted_torque(control: Any, p: int) -> Any:
     """Torque [N m] that the law wants in a plane, by its signals."""
-    gains, memory = rows_of(control.gains), rows_of(control.memory[p])
-    return control.law(now_of(control.signals[p]), wrist_of(control.models[p]), gains, memory)
+    gains, memory = rows_of(control.gains), rows_at(control.memory, p)
+    return control.law(now_at(control.signals, p), wrist_at(control.models, p), gains, memory)
 
 
 @compiled

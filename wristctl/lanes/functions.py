@@ -10,9 +10,9 @@ from numba.core import types
 from numba.extending import overload
 
 from wristctl.lanes.compiled import compiled
-from wristctl.lanes.lane import exp2i, exponent, floor, polynomial, where, zero_like
+from wristctl.lanes.lane import exp2i, exponent, floor, polynomial, sqrt, where, zero_like
 from wristctl.lanes.series import E2, E3, economised
-from wristctl.lanes.types import LaneType
+from wristctl.lanes.types import LaneType, RowsType
 
 _LOG2_E = 1.0 / math.log(2.0)
 _LN2_HIGH = 6.93147180369123816490e-01
@@ -31,6 +31,27 @@ def minimum(a: Any, b: Any) -> Any:
 def maximum(a: Any, b: Any) -> Any:
     """The larger of two lanes."""
     return where(a > b, a, b)
+
+
+def norm(rows: Any) -> Any:
+    """Root of the sum of squares of rows; of one row its size."""
+    raise NotImplementedError("compiled code only")
+
+
+@overload(norm, strict=False)
+def _norm(rows: Any) -> Any:
+    if not isinstance(rows, RowsType):
+        return None
+    if rows.size == 1:
+        return lambda rows: abs(rows[0])
+
+    def of_all(rows: Any) -> Any:
+        squared = zero_like(rows[0])
+        for k in range(len(rows)):
+            squared = squared + rows[k] * rows[k]
+        return sqrt(squared)
+
+    return of_all
 
 
 @compiled

@@ -106,6 +106,16 @@ def rows_named(fields: tuple[str, ...]) -> Any:
     return view
 
 
+def stack_named(fields: tuple[str, ...]) -> Any:
+    """An intrinsic that views one array of a stack as `rows_at` does, its first rows by these names."""
+
+    @intrinsic
+    def view(typingctx: Any, stack: types.Array, index: types.Integer) -> Any:
+        return _slab(stack, index, fields)
+
+    return view
+
+
 def _rows(builder: Any, rows: RowsType, pointer: Any) -> Any:
     return builder.insert_value(ir.Constant(rows.llvm, ir.Undefined), pointer, 0)
 
@@ -133,6 +143,29 @@ def _view(array: types.Array, fields: tuple[str, ...] = ()) -> Any:
 def rows_of(typingctx: Any, array: types.Array) -> Any:
     """View a contiguous float64 array, [row, lane] of a block or [row] of a rollout alone, as rows of lanes."""
     return _view(array)
+
+
+def _slab(stack: types.Array, index: types.Integer, fields: tuple[str, ...] = ()) -> Any:
+    if stack.dtype != types.float64 or stack.layout != "C" or stack.ndim not in (2, 3):
+        return None
+    result = RowsType(LaneType(WIDTHS[stack.ndim - 2]), None, fields=fields)
+
+    def codegen(context: Any, builder: Any, sig: Any, args: list[Any]) -> Any:
+        struct = cgutils.create_struct_proxy(sig.args[0])(context, builder, args[0])
+        size = builder.extract_value(struct.shape, 1)
+        if sig.args[0].ndim == 3:
+            size = builder.mul(size, builder.extract_value(struct.shape, 2))
+        first = _opaque(builder, struct.data, ir.DoubleType())
+        pointer = builder.gep(first, [builder.mul(args[1], size)], inbounds=True, source_etype=ir.DoubleType())
+        return _rows(builder, sig.return_type, pointer)
+
+    return signature(result, stack, types.intp), codegen
+
+
+@intrinsic
+def rows_at(typingctx: Any, stack: types.Array, index: types.Integer) -> Any:
+    """View one array of a stack, [index, row, lane] or [index, row] of a rollout alone, as `rows_of` does."""
+    return _slab(stack, index)
 
 
 def _beyond(context: Any, builder: Any, sig: Any, args: list[Any]) -> Any:

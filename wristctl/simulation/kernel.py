@@ -7,7 +7,7 @@ observer -> law. P and T are lengths of tuples: what is compiled for one plane a
 from typing import Any, NamedTuple
 
 from wristctl.control.belief import Limits, belief_in_lanes
-from wristctl.control.law import now_of
+from wristctl.control.law import now_at
 from wristctl.control.response import OF_A_PLANE, Controlled, Seen, look_ahead, respond, room_like
 from wristctl.lanes.compiled import by_type, compiled, implements, spelled_out
 from wristctl.lanes.lane import where, zero_like
@@ -188,7 +188,9 @@ def _run_block(setup: Any, course: Any, world: Any, state: Any, scratch: Any, fi
     aim, knowing = Aim(wish, wish_rate, lanes_like(room.arms)), Knowing(known, drive, bend, pulls, room.arms)
     rows = lanes_like(part(every, 0, setup.seen))
     seen = Seen(rows, part(motor, 2 * count, setup.bend), part(motor, 2 * count + planes, setup.bend))
-    zero = zero_like(bound[0])
+    zero, of_one = zero_like(bound[0]), lanes_like(pulls)
+    for t in range(count):
+        of_one[t] = 1.0 / known.alike[t]
     h = period / setup.substeps + zero
     targets = scratch.target.reshape(3 * planes, len(state.which))
     acting, acting_lanes = rows_of(scratch.acting), scratch.acting.reshape(4, len(state.case))
@@ -207,7 +209,7 @@ def _run_block(setup: Any, course: Any, world: Any, state: Any, scratch: Any, fi
                 gather_lanes(course.references, state.which, sample, targets)
             share = respond(control, known, seen, limits, room, tick * period, period, pulls)
             for p in range(planes):
-                view = now_of(scratch.now[p])
+                view = now_at(scratch.now, p)
                 wish[p] = view.theta_ref
                 wish_rate[p] = lead * view.rate_ref
             actuate(drive, motor, known, aim, pulls, period, counts)
@@ -219,7 +221,7 @@ def _run_block(setup: Any, course: Any, world: Any, state: Any, scratch: Any, fi
             acting_pulls(tendons, plant, q, spool_input, path, acts)
             watch_range(sum_, time, bend, bound[2 * count])
             for t in range(count):
-                acts[t] = acts[t] / known.alike[t]
+                acts[t] = acts[t] * of_one[t]
             _gather(world.goals, sum_, (sample, tick, time), (plant, q), known, (bend, wish), (acts, pulls), share)
             if tick == 0 and sample < state.record.shape[0]:
                 row = rows_of(state.record[sample])
@@ -230,7 +232,7 @@ def _run_block(setup: Any, course: Any, world: Any, state: Any, scratch: Any, fi
                     row[3 * planes + p] = room.torque[p]
                 if state.record.shape[1] > 4 * planes:
                     for t in range(count):
-                        pulls[t] = pulls[t] / known.alike[t]
+                        pulls[t] = pulls[t] * of_one[t]
                     _record(row, (pulls, acts, delivered), rows, share, q)
             go_on(state.watch, knowing, now_tick, counts, period)
             for _ in range(setup.substeps):

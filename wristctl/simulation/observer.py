@@ -17,7 +17,7 @@ from wristctl.control.model import one_segment
 from wristctl.control.response import OF_A_PLANE
 from wristctl.lanes.compiled import by_type, compiled, implements, spelled_out
 from wristctl.lanes.lane import rounded, where, zero_like
-from wristctl.lanes.rows import lanes_like, part, rows_of
+from wristctl.lanes.rows import lanes_like, part, rows_at, rows_of
 from wristctl.simulation.actuator import SIDES, drive_in_lanes, drive_of, frictionless_pulls, held_stiffness
 from wristctl.wrist.segments import load_segments, segments
 
@@ -108,7 +108,7 @@ def known_of_sides(wrist: WristParameters, actuator: Actuator) -> Known:
 @spelled_out
 def knowing_in_lanes(known: Any) -> Any:
     """Knowing from one loop's arrays; it lives as long as its caller."""
-    rows = rows_of(known.belief.models[0])
+    rows = rows_at(known.belief.models, 0)
     bend, pulls, arms = part(rows, 0, known.bend), part(rows, 0, known.pulls), part(rows, 0, known.arms)
     return Knowing(belief_in_lanes(known.belief), drive_in_lanes(known.drive), bend, pulls, arms)
 
@@ -135,7 +135,7 @@ def propagate(knowing: Any, x: Any, counts: Any, h: Any) -> None:
             torque = torque + arm * pulls[t]
             square = square + (known.alike[t] * arm) * arm
         angle, speed, load = bend[p], rate[p], x[OF_A_PLANE * p + 2]
-        model = load_segments(rows_of(known.models[p]))
+        model = load_segments(rows_at(known.models, p))
         inertia, resisting = one_segment(model, angle, speed)
         stiffness = model.stiffness + rounded(held_stiffness(drive, zero) * square)
         push = torque + load - extra[p] - resisting - h * stiffness * speed

@@ -10,9 +10,9 @@ import numpy as np
 
 from wristctl.arrays import Array
 from wristctl.lanes.compiled import compiled, kernel
-from wristctl.lanes.functions import maximum
-from wristctl.lanes.lane import sqrt, where, zero_like
-from wristctl.lanes.rows import part, rows_named, rows_of
+from wristctl.lanes.functions import maximum, norm
+from wristctl.lanes.lane import where, zero_like
+from wristctl.lanes.rows import lanes_like, part, rows_named, rows_of
 from wristctl.simulation.motion import Goals
 
 # Running sums of a lane: those that metrics are made of, and the integration steps' estimated errors [rad]; tensions of
@@ -50,15 +50,14 @@ def gather(sums: Any, goals: Any, time: Any, bend: Any, wish: Any, tensions: Any
     moving = where(time <= goals.rest, 1.0, 0.0)
     late = where(time >= 0.9 * goals.horizon, 1.0, 0.0)
     move = abs(goals.move)
-    squared, apart, passed = zero, zero, zero
+    squared, passed, errors, apart = zero, zero, lanes_like(bend), lanes_like(bend)
     toward = where(goals.move < 0.0, -1.0, 1.0)
     for p in range(planes):
-        error, off = bend[p] - wish[p], bend[p] - goals.final
-        sums[_SQUARED] = sums[_SQUARED] + error * error
-        squared = squared + error * error
-        apart = apart + off * off
-        passed = passed + toward * off
-    error, size = sqrt(squared), sqrt(apart)
+        errors[p], apart[p] = bend[p] - wish[p], bend[p] - goals.final
+        sums[_SQUARED] = sums[_SQUARED] + errors[p] * errors[p]
+        squared = squared + errors[p] * errors[p]
+        passed = passed + toward * apart[p]
+    error, size = norm(errors), norm(apart)
     sums[_SQUARED_MOVE] = sums[_SQUARED_MOVE] + moving * squared
     sums[_ABSOLUTE] = sums[_ABSOLUTE] + error
     sums[_LATE] = sums[_LATE] + late * error
@@ -89,12 +88,9 @@ def gather(sums: Any, goals: Any, time: Any, bend: Any, wish: Any, tensions: Any
 @compiled
 def watch_range(sums: Any, time: Any, bend: Any, reach: Any) -> None:
     """A lane that bends (P rows) beyond `reach` [rad], or to no number, has failed; until when it had not."""
-    squared = zero_like(time)
-    for p in range(len(bend)):
-        squared = squared + bend[p] * bend[p]
     alive = sums[_ALIVE]
     sums[_UNTIL] = where(alive > 0.0, time, sums[_UNTIL])
-    sums[_ALIVE] = where(sqrt(squared) < reach, alive, 0.0)
+    sums[_ALIVE] = where(norm(bend) < reach, alive, 0.0)
 
 
 @kernel
