@@ -23,7 +23,6 @@ from wristctl.config.wrist import WristParameters
 from wristctl.control.table import CONTROLLERS, controller, gains_of
 from wristctl.lanes.blocks import to_rows
 from wristctl.simulation.batch import Batch, Lanes, batch
-from wristctl.simulation.bend_sums import BEND_SUMS
 from wristctl.simulation.kernel import Span, columns_of_sample, run_blocks
 from wristctl.simulation.motion import Angles, Motion
 from wristctl.simulation.observer import Watch
@@ -216,7 +215,6 @@ def in_two_planes(case: Case, gains: list[float]) -> Numbers:
         len(names) + 2 * loop.plant_segments, layout,
     )  # fmt: skip
     record = _recorded(made, case.lanes)
-    sums = to_rows(made.state.sums, case.lanes)[:, len(SUMS) + len(layout.places) :]
 
     def of(name: str) -> Array:
         """Columns of a name, of all planes or places."""
@@ -231,7 +229,6 @@ def in_two_planes(case: Case, gains: list[float]) -> Numbers:
         "delivered": of("delivered"),
         "wanted": of("torque_wanted"),
         "coordinates": record[:, :, len(names) :],
-        "sums": sums[:, : len(BEND_SUMS)],
     }
 
 

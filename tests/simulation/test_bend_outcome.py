@@ -3,14 +3,16 @@
 import numpy as np
 import pytest
 
-from wristctl.config.loop import Loop
+from wristctl.config.loop import Loop, Reference
 from wristctl.config.wrist import WristParameters
 from wristctl.control.table import controller, gains_of
 from wristctl.simulation.bend_course import BEND_METRICS
 from wristctl.simulation.bend_outcome import BendOutcome
-from wristctl.simulation.rollout import How
+from wristctl.simulation.reference import motion
+from wristctl.simulation.rollout import How, rollout
 from wristctl.simulation.two_planes import bend_path, rollout_bends
 from wristctl.simulation.worlds import World
+from wristctl.wrist.directions import in_plane
 
 pytestmark = pytest.mark.slow
 
@@ -80,3 +82,33 @@ def test_the_error_at_the_end_is_the_mean_over_the_last_tenth_of_both_planes() -
     assert late.sum() == 150
     assert outcome.metrics["steady_state"][0] == pytest.approx(sizes[late].mean(), rel=1e-12)
     assert outcome.metrics["largest_error"][0] == pytest.approx(sizes.max(), rel=1e-12)
+
+
+@pytest.mark.parametrize("kind", ["step", "minimum-jerk"])
+def test_a_motion_in_one_plane_has_the_metrics_of_the_loop_in_that_plane(kind: str) -> None:
+    """Of the four tendons two pull as the two of a side do; each is a place of its own, and chatters as one."""
+    loop, ulnar = Loop(coupling="ignored"), in_plane(WRISTS[1], "ulnar")
+    gains = np.array([gains_of(LAW, "default")])
+    followed = motion(Reference(kind=kind, angle_deg=20.0), ulnar, 1.5, 1e-3)
+    path = np.zeros((2, 3, len(followed.time)))
+    path[0] = followed.angles.rows
+    two = rollout_bends(LAW, gains, path, [World(loop, WRISTS[1])]).metrics
+    one = rollout(LAW, gains, [followed], np.zeros(1, np.int64), loop, ulnar, converge=False).metrics
+    assert one.keys() < two.keys() and one["settling"][0] > 0.5 and one["overshoot"][0] > 0.0
+    for name, values in one.items():
+        times = 2.0 if name == "chattering" else 1.0
+        assert two[name][0] == pytest.approx(times * values[0], rel=1e-6, abs=1e-12), name
+
+
+def test_overshoot_is_along_the_move_and_settling_within_a_circle() -> None:
+    time = 1e-3 * np.arange(1500.0)
+    move = np.deg2rad([12.0, -16.0])
+    path = np.zeros((2, 3, len(time)))
+    path[:, 0] = move[:, None] * (time > 0.1)
+    gains = np.array([gains_of(LAW, "default")])
+    outcome = rollout_bends(LAW, gains, path, [World(Loop(coupling="ignored"), WRISTS[1])], record=True)
+    off = outcome.courses[0].bend - move
+    passed = (off @ move).max() / (move @ move)
+    assert outcome.metrics["overshoot"][0] == pytest.approx(100.0 * passed) and passed > 0.1
+    outside = np.flatnonzero(np.hypot(*off.T) > 0.05 * np.hypot(*move))
+    assert outcome.metrics["settling_5"][0] == pytest.approx(time[outside[-1]])

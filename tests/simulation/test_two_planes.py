@@ -6,10 +6,11 @@ import pytest
 from wristctl.arrays import Array
 from wristctl.config.loop import Loop
 from wristctl.config.wrist import WristParameters
+from wristctl.control.response import FULL
 from wristctl.control.table import controller, gains_of
 from wristctl.errors import UserError
 from wristctl.plotting.bend_figure import bend_figure
-from wristctl.simulation.bend_course import FULL, BendCourse
+from wristctl.simulation.bend_course import BendCourse
 from wristctl.simulation.bend_paths import BEND_PATHS
 from wristctl.simulation.motion import Angles, Motion
 from wristctl.simulation.references import minimum_jerk

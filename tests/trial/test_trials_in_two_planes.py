@@ -16,7 +16,6 @@ from wristctl.commands.adoption import with_planes
 from wristctl.config.hw_run import HwRunSettings
 from wristctl.config.study import Study
 from wristctl.errors import UserError
-from wristctl.simulation.bend_course import BEND_METRICS
 from wristctl.study_files.load import load_study
 from wristctl.trial.bend_motion import BendMotion
 from wristctl.trial.bend_results import bend_twin, bends_evaluated, logged_course
@@ -107,7 +106,7 @@ def test_a_rows_metrics_are_those_of_its_log_by_the_formulas_of_simulation(round
     trial = Trial(0, "circumduction", 0, 0.0, 0)
     values = bends_evaluated(trial, log, followed, circling().push, WRIST, truth)
     course = logged_course(log, followed, WRIST)
-    assert values["rmse"] == BEND_METRICS["rmse"].value(course)
+    assert values["rmse"] == course.metrics()["rmse"]
     assert values["true_rmse_ulnar"] == pytest.approx(np.radians(rmse(true_errors(round_trip))[0]), rel=1e-3)
     assert math.hypot(values["true_rmse_ulnar"], values["true_rmse_flexion"]) == pytest.approx(values["true_rmse"])
     assert math.isnan(values["recovery"]) and math.isnan(values["push_torque"])

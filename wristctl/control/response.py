@@ -15,6 +15,8 @@ _THETA, _RATE, _THETA_REF, _RATE_REF, _ACCELERATION_REF, _LOW, _HIGH, _PERIOD, _
 
 # Rows of what is seen of one plane: bend [rad], rate [rad/s] and load torque [N m].
 OF_A_PLANE = 3
+# Share of a wanted torque below which it was out of the tendons' reach.
+FULL = 1.0 - 1e-9
 
 
 class Controlled(NamedTuple):

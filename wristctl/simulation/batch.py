@@ -20,13 +20,12 @@ from wristctl.errors import UserError
 from wristctl.lanes.blocks import lanes_of, spread
 from wristctl.seeds import Entropy
 from wristctl.simulation.actuator import SIDES, at_rest, counted_motor, drive_with, motor_of, winding_of
-from wristctl.simulation.bend_sums import BEND_SUMS, BendGoals
 from wristctl.simulation.cameras import cameras_of
 from wristctl.simulation.disturbances import acting_in_space
 from wristctl.simulation.kernel import Disturbed, LoopCourse, LoopState, LoopValues, Scratch, Setup, Undisturbed
-from wristctl.simulation.motion import Motion
+from wristctl.simulation.motion import Motion, goals_of_bends
 from wristctl.simulation.nonideal import inner_of, is_ideal, nonideal_of, unmoved
-from wristctl.simulation.sums import SUMS, MoveGoals
+from wristctl.simulation.sums import no_sums
 from wristctl.simulation.worlds import World, bending_limit, check_stops
 from wristctl.wrist.dahl import NoInnerFriction
 from wristctl.wrist.directions import in_plane
@@ -185,13 +184,12 @@ def batch(
         plants = of.rows(lambda index: model.values(of.actual[index], loop.plant_segments))
         belief = Sides(of.rows(lambda index: segments(of.worlds[index].wrist, 1))[:, None], of.rows(lambda _: of.alike))
         ends = zip(motions, references[:, 0, -1], strict=True)
-        goals = np.array([followed_motion.goals_at(end) for followed_motion, end in ends])[lanes.motion]
-        aims: MoveGoals | BendGoals = MoveGoals(spread(goals, count))
+        goals = [followed_motion.goals_at(end) for followed_motion, end in ends]
     else:
         tendons = _places(of, layout, counts)
         plants = of.rows(lambda index: _placed(of.worlds[index], of.actual[index], layout, loop.plant_segments))
         belief = _beliefs_in_space(of, layout)
-        aims = BendGoals(max(1, samples // 10), samples)
+        goals = [goals_of_bends(rows[::OF_A_PLANE], motions[0].time) for rows in references]
     values = LoopValues(
         plant=plants,
         belief=belief,
@@ -200,13 +198,13 @@ def batch(
         lead=of.rows(lambda index: np.array([float(of.worlds[index].loop.spool_lead)])),
         winding=of.rows(of.offsets),
         gains=spread(gains.reshape(count, -1), count),
-        goals=aims,
+        goals=spread(np.array([each.rows for each in goals])[lanes.motion], count),
         schedule=frames,
     )
     kinds = list(dict.fromkeys(world.loop.disturbances for world in worlds))
     cases = [_acting(kind, motions[0].time, planes, force) for kind in kinds]
     case = np.array([kinds.index(world.loop.disturbances) for world in worlds])[of.which]
-    memory, summed = max(1, controller.memory), len(SUMS) + places + (0 if layout is None else len(BEND_SUMS) + places)
+    memory = max(1, controller.memory)
     state = LoopState(
         which=lanes.motion[followed].reshape(blocks, -1),
         case=case[followed].reshape(blocks, -1),
@@ -214,7 +212,7 @@ def batch(
         coordinates=spread(np.concatenate([coordinates, np.zeros_like(coordinates)], axis=1)[of.which], count),
         motors=spread(np.array(motors)[of.which], count),
         tendons=tendons,
-        sums=spread(np.eye(1, summed, SUMS.index("alive"))[0], count),
+        sums=spread(no_sums(planes, places), count),
         record=np.empty((blocks, samples if columns else 0, columns, *wide)),
         watch=watch,
     )

@@ -3,22 +3,22 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from wristctl.arrays import Array
+from wristctl.control.response import FULL
+from wristctl.simulation.metrics import Metric, Totals, summary, summed, totals_of_series
+from wristctl.simulation.motion import goals_of_bends
 from wristctl.simulation.oscillation import REST, oscillations
 from wristctl.wrist.spatial.spatial_kinematics import spatial_tips
 
 if TYPE_CHECKING:
     import pandas as pd
 
-# Share of a wanted torque below which it was out of the tendons' reach.
-FULL = 1.0 - 1e-9
 _PLANES = ("ulnar", "flexion")
 # Columns of a plane, by the attribute that holds them, (T, 2): unit and meaning.
 _OF_A_PLANE = {
@@ -34,8 +34,8 @@ _OF_A_PLANE = {
 _TIP = {"tip": "last disc's centre", "tip_desired": "tip of one arc that is bent as wanted"}
 _AXES = {"x": "along the base tangent", "y": "toward ulnar", "z": "toward flexion"}
 _OF_A_TENDON = {
-    "pull": ("N", "commanded pull at this place of tendons"),
-    "acting": ("N", "pull as it acts on the wrist: late and in steps behind real motors"),
+    "pull": ("N", "commanded pull of one tendon at this place"),
+    "acting": ("N", "pull of one tendon at this place as it acts on the wrist: late and in steps behind real motors"),
     "spool": ("m", "length that each spool of this place has reeled in until the next control period"),
 }
 
@@ -63,9 +63,9 @@ class BendCourse:
     share: Array
     """Share of the wanted torque that the tendons could give (T,)."""
     pulls: Array
-    """Commanded (T, places of tendons) [N]."""
+    """Commanded, of one tendon of each place (T, places) [N]."""
     acting: Array
-    """As they act on the wrist (T, places of tendons) [N]."""
+    """As they act on the wrist, of one tendon of each place (T, places) [N]."""
     coordinates: Array
     """Bends of the plant's segments (T, 2n) [rad]."""
     length: float
@@ -98,9 +98,9 @@ class BendCourse:
 
     @property
     def until(self) -> float:
-        """Time when the wrist was last within its range [s]."""
+        """Time until which the wrist was within its range [s]."""
         lost = np.isnan(self.bend[:, 0])
-        return float(self.time[max(0, int(np.argmax(lost)) - 1)] if lost.any() else self.time[-1])
+        return float(self.time[int(np.argmax(lost)) if lost.any() else -1])
 
     @property
     def error(self) -> Array:
@@ -108,8 +108,21 @@ class BendCourse:
         return self.bend - self.bend_ref
 
     def metrics(self) -> dict[str, float]:
-        """Errors by plane and as one norm [rad], of the tip [mm], and of the pulls; by name."""
-        return {name: metric.value(self) for name, metric in BEND_METRICS.items()}
+        """BEND_METRICS by name, of the samples."""
+        step, saturated = float(self.time[1] - self.time[0]), (self.share < FULL).astype(float)
+        goals = goals_of_bends(self.bend_ref.T, self.time)
+        totals = totals_of_series(step, self.bend, self.bend_ref, self.acting, saturated, goals)
+        off = np.linalg.norm(self.tip - self.tip_desired, axis=1)
+        totals.sums["squared_tip"][:] = np.sum(off**2)
+        totals.sums["alive"][:] = float(not self.failed)
+        values = {name: float(value[0]) for name, value in summary(totals, BEND_METRICS).items()}
+        values["oscillation"] = self._oscillation(step)
+        return {name: values[name] for name in BEND_METRICS}
+
+    def _oscillation(self, step: float) -> float:
+        if self.failed:
+            return math.nan
+        return float(np.max(oscillations(self.bend.T, self.bend_ref.T, np.arange(2), step)))
 
     def columns(self) -> dict[str, Array]:
         """Everything under the names of `column_meanings`, (T,) each."""
@@ -147,110 +160,31 @@ def column_meanings(names: list[str]) -> dict[str, tuple[str, str]]:
     return {name: of[name] for name in names}
 
 
-class BendTotals(NamedTuple):
-    """Sums over rollouts by the names of `wristctl.simulation.bend_sums.BEND_SUMS`, (count,) each."""
-
-    sums: Mapping[str, Array]
-    time: Array
-    """Of the samples (T,) [s]."""
+def _per_tick(name: str, of: Totals) -> Array:
+    """A sum over the number of ticks."""
+    mean: Array = of.sums[name] / of.sums["ticks"]
+    return mean
 
 
-class BendMetric(NamedTuple):
-    """A metric of a motion in two planes; it comes from a course, or from running sums (of many rollouts at once)."""
-
-    unit: str
-    formula: str
-    value: Callable[[BendCourse], float]
-    of_totals: Callable[[BendTotals], Array] | None = None
-    of_error: bool = True
-    """Whether it is of the error, and so means nothing where the wrist has failed."""
-
-
-def _rms(values: Array) -> float:
-    return float(np.sqrt(np.mean(values**2)))
-
-
-def _norm(course: BendCourse) -> Array:
-    return np.hypot(course.error[:, 0], course.error[:, 1])
-
-
-def _late(course: BendCourse) -> float:
-    return float(_norm(course)[-late_samples(len(course.time)) :].mean())
-
-
-def late_samples(samples: int) -> int:
-    """Number of samples in the last 10 % of the horizon."""
-    return max(1, samples // 10)
-
-
-def _share(of: BendTotals, name: str) -> Array:
-    """A sum over the number of samples."""
-    share: Array = of.sums[name] / len(of.time)
-    return share
-
-
-def _rms_of(of: BendTotals, *squares: str) -> Array:
-    return np.sqrt(sum((_share(of, name) for name in squares), np.zeros(())))
-
-
-def _tip_distance(course: BendCourse) -> Array:
-    distance: Array = 1e3 * np.linalg.norm(course.tip - course.tip_desired, axis=1)
-    return distance
-
-
-def _chattering(course: BendCourse) -> float:
-    return float(np.abs(np.diff(course.pulls, axis=0)).sum() / (course.time[-1] - course.time[0]))
-
-
-def _oscillation(course: BendCourse) -> float:
-    step, which = float(course.time[1] - course.time[0]), np.arange(2)
-    if course.failed:
-        return math.nan
-    return float(np.max(oscillations(course.bend.T, course.bend_ref.T, which, step)))
-
-
-BEND_METRICS: dict[str, BendMetric] = {
-    "rmse_ulnar": BendMetric(
-        "rad", "sqrt(mean e^2) over the horizon, toward ulnar", lambda c: _rms(c.error[:, 0]),
-        lambda of: _rms_of(of, "squared_ulnar"),
+# Metrics of a motion in two planes: those of one plane that come from sums, of the norm of the error over both planes;
+# and of each plane by itself.
+BEND_METRICS: dict[str, Metric] = {
+    **{
+        f"rmse_{plane}": Metric(
+            "rad", f"sqrt(mean e^2) over the horizon, toward {plane}",
+            lambda of, name=f"squared_{plane}": np.sqrt(_per_tick(name, of)),  # type: ignore[misc]
+        )
+        for plane in _PLANES
+    },
+    "largest_error": Metric(
+        "rad", "largest |e| over both planes", lambda of: np.sqrt(of.sums["squared_most"]),
     ),
-    "rmse_flexion": BendMetric(
-        "rad", "sqrt(mean e^2) over the horizon, toward flexion", lambda c: _rms(c.error[:, 1]),
-        lambda of: _rms_of(of, "squared_flexion"),
+    **summed(),
+    "tip_rmse": Metric(
+        "mm", "RMS distance of the tip from that of one arc bent as wanted",
+        lambda of: 1e3 * np.sqrt(_per_tick("squared_tip", of)), of_error=False,
     ),
-    "rmse": BendMetric(
-        "rad", "sqrt(mean |e|^2) over the horizon, |e| over both planes", lambda c: _rms(_norm(c)),
-        lambda of: _rms_of(of, "squared_ulnar", "squared_flexion"),
-    ),
-    "largest_error": BendMetric(
-        "rad", "largest |e| over both planes", lambda c: float(_norm(c).max()),
-        lambda of: np.sqrt(of.sums["squared_most"]),
-    ),
-    "steady_state": BendMetric(
-        "rad", "mean |e| over the last 10 % of the horizon", _late,
-        lambda of: of.sums["late"] / late_samples(len(of.time)),
-    ),
-    "tip_rmse": BendMetric(
-        "mm", "RMS distance of the tip from that of one arc bent as wanted", lambda c: _rms(_tip_distance(c)),
-        lambda of: 1e3 * _rms_of(of, "squared_tip"), of_error=False,
-    ),
-    "oscillation": BendMetric(
-        "rad", "half the peak-to-peak that is left at the end of the faster plane, the motion removed", _oscillation
-    ),
-    "peak_tension": BendMetric(
-        "N", "largest pull that acts at a place of tendons", lambda c: float(c.acting.max()),
-        lambda of: of.sums["peak"], of_error=False,
-    ),
-    "chattering": BendMetric(
-        "N/s", "total variation of all commanded pulls per second", _chattering,
-        lambda of: of.sums["variation"] / (of.time[-1] - of.time[0]), of_error=False,
-    ),
-    "saturation": BendMetric(
-        "", "share of time in which the wanted torque was out of the tendons' reach",
-        lambda c: float(np.mean(c.share < FULL)), lambda of: _share(of, "saturated"), of_error=False,
-    ),
-    "slack": BendMetric(
-        "", "share of time in which a tendon was slack", lambda c: float(np.mean((c.acting <= 0.0).any(axis=1))),
-        lambda of: _share(of, "slack"), of_error=False,
+    "oscillation": Metric(
+        "rad", "half the peak-to-peak that is left at the end of the faster plane, the motion removed",
     ),
 }  # fmt: skip

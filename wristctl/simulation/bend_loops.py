@@ -32,8 +32,6 @@ from wristctl.wrist.tendon_layout import TendonLayout, off_both_sides
 _TOGETHER = 32
 # Error [rad] that is none where nothing is asked for.
 _STILL = math.radians(0.5)
-# Two sides, of which the frequency of chattering is told in one plane.
-SIDES = 2
 
 
 def planes_of(loop: Loop, reference: Reference, wrist: WristParameters) -> int:
@@ -118,13 +116,12 @@ class RepeatedBends(Repetitions):
     @property
     def chatter(self) -> float:
         """Frequency at which pulls go from limit to limit and back, where it chatters, else 0 [1/s]."""
-        places = len(self.layout.places)
-        return float(chatter(self.median("chattering") * SIDES / places, self.tension_range))
+        return float(chatter(self.median("chattering"), self.tension_range, len(self.layout.places)))
 
     @property
     def beyond(self) -> float:
         """Largest pull, where it is above what a tendon bears, else 0 [N]."""
-        peak = float(np.nanmax((self.first.acting / self.layout.multiplicity).max(initial=0.0)))
+        peak = float(np.nanmax(self.first.acting.max(initial=0.0)))
         return peak if peak > STRAIN * self.bears else 0.0
 
 

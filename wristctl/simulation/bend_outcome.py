@@ -10,11 +10,11 @@ from wristctl.arrays import Array
 from wristctl.control.response import OF_A_PLANE
 from wristctl.lanes.blocks import to_rows
 from wristctl.simulation.batch import Batch
-from wristctl.simulation.bend_course import BEND_METRICS, BendCourse, BendTotals
-from wristctl.simulation.bend_sums import BEND_SUMS
+from wristctl.simulation.bend_course import BEND_METRICS, BendCourse
 from wristctl.simulation.kernel import columns_of_brief, columns_of_sample
+from wristctl.simulation.metrics import summary
 from wristctl.simulation.oscillation import oscillations
-from wristctl.simulation.sums import SUMS
+from wristctl.simulation.rollout import totals_of
 from wristctl.simulation.worlds import World
 from wristctl.wrist.tendon_layout import TendonLayout
 
@@ -58,31 +58,19 @@ class BendOutcome:
 def bend_outcome(rollouts: Batch, time: Array, worlds: Sequence[World], layout: TendonLayout) -> BendOutcome:
     """Outcome of a batch's rollouts that ran to the end; `time` [s] is that of samples."""
     count, wanted = len(worlds), rollouts.course.references[0, [0, OF_A_PLANE]].T
-    names = columns_of_sample(2, len(layout.places))
-    own = to_rows(rollouts.state.sums, count)[:, len(SUMS) + len(layout.places) :]
-    sums = dict(zip(BEND_SUMS, own.T, strict=False))
-    alive, totals = sums["alive"] > 0.0, BendTotals(sums, time)
-    metrics = dict[str, Array]()
-    with np.errstate(divide="ignore", invalid="ignore"):
-        for name, metric in BEND_METRICS.items():
-            if metric.of_totals is not None:
-                value = metric.of_totals(totals)
-                metrics[name] = np.where(alive, value, np.nan) if metric.of_error else value
+    names, totals = columns_of_sample(2, len(layout.places)), totals_of(rollouts, count)
+    alive, metrics = totals.sums["alive"] > 0.0, summary(totals, BEND_METRICS)
     record, bends, courses = rollouts.state.record, None, list[BendCourse]()
     if record.shape[1]:
         flat = record.reshape(len(record), -1, *record.shape[3:])
         recorded = to_rows(flat, count).reshape(count, len(time), -1)
         bends = recorded[:, :, :2]
         if record.shape[2] > columns_of_brief(2):
-            courses = [
-                _course(rows, names, time, wanted, world, layout) for rows, world in zip(recorded, worlds, strict=True)
-            ]
-    return BendOutcome(metrics, ~alive, sums["until"], time, wanted, bends, courses)
+            courses = [_course(rows, names, time, wanted, world) for rows, world in zip(recorded, worlds, strict=True)]
+    return BendOutcome(metrics, ~alive, totals.sums["until"], time, wanted, bends, courses)
 
 
-def _course(
-    rows: Array, names: Sequence[str], time: Array, wanted: Array, world: World, layout: TendonLayout
-) -> BendCourse:
+def _course(rows: Array, names: Sequence[str], time: Array, wanted: Array, world: World) -> BendCourse:
     def of(name: str) -> Array:
         """Columns of a name, of all planes or places."""
         return rows[:, [number for number, column in enumerate(names) if column.rpartition("_")[0] == name]]
@@ -97,8 +85,8 @@ def _course(
         torque_wanted=of("torque_wanted"),
         torque=of("torque"),
         share=rows[:, names.index("share")],
-        pulls=layout.multiplicity * of("tension"),
-        acting=layout.multiplicity * of("acting"),
+        pulls=of("tension"),
+        acting=of("acting"),
         coordinates=rows[:, len(names) :],
         length=world.plant.length,
         length_known=world.wrist.length,

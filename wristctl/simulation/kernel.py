@@ -8,19 +8,16 @@ from typing import Any, NamedTuple
 
 from wristctl.control.belief import Limits, belief_in_lanes
 from wristctl.control.law import now_at
-from wristctl.control.response import OF_A_PLANE, Controlled, Seen, look_ahead, respond, room_like
+from wristctl.control.response import FULL, OF_A_PLANE, Controlled, Seen, look_ahead, respond, room_like
 from wristctl.lanes.compiled import by_type, compiled, implements, spelled_out
 from wristctl.lanes.lane import where, zero_like
 from wristctl.lanes.named_tuples import block_of
-from wristctl.lanes.rows import beyond, lanes_like, part, rows_of
+from wristctl.lanes.rows import lanes_like, part, rows_of
 from wristctl.simulation.actuator import Aim, actuate, deliver, drive_in_lanes
-from wristctl.simulation.bend_course import FULL
-from wristctl.simulation.bend_sums import BendGoals, Errors, gather_bends, watch_bends
 from wristctl.simulation.nonideal import spools_after_slip
 from wristctl.simulation.observer import Knowing, go_on, sense
-from wristctl.simulation.sums import SUMS, MoveGoals, gather, goals_of, watch_range
+from wristctl.simulation.sums import SUMS, gather, gather_tip, watch_range
 from wristctl.wrist.plant import acting_pulls, advance_or_stop, bend_of, disturbed, parameters_of, path_before
-from wristctl.wrist.spatial.posture import spatial_tip
 from wristctl.wrist.tendon_mechanics import tendons_in_lanes
 
 _ALIVE, _STEP_ERROR = SUMS.index("alive"), SUMS.index("step_error")
@@ -175,7 +172,7 @@ def _run_block(setup: Any, course: Any, world: Any, state: Any, scratch: Any, fi
     tendons = tendons_in_lanes(state.tendons)
     winding, lead = rows_of(world.winding), rows_of(world.lead)[0]
     control = Controlled(setup.law, scratch.now, world.belief.models, world.gains, state.memory, scratch.target)
-    bound = rows_of(world.limits)
+    bound, goals = rows_of(world.limits), rows_of(world.goals)
     motor, sum_ = rows_of(state.motors), rows_of(state.sums)
     every = rows_of(state.coordinates)
     q, rates = part(every, 0, coordinates), part(every, n, coordinates)
@@ -222,7 +219,8 @@ def _run_block(setup: Any, course: Any, world: Any, state: Any, scratch: Any, fi
             watch_range(sum_, time, bend, bound[2 * count])
             for t in range(count):
                 acts[t] = acts[t] * of_one[t]
-            _gather(world.goals, sum_, (sample, tick, time), (plant, q), known, (bend, wish), (acts, pulls), share)
+            gather(sum_, goals, time, bend, wish, acts, where(share < FULL, 1.0, zero))
+            gather_tip(known.wrist, sum_, plant, q, wish, acts)
             if tick == 0 and sample < state.record.shape[0]:
                 row = rows_of(state.record[sample])
                 for p in range(planes):
@@ -238,38 +236,6 @@ def _run_block(setup: Any, course: Any, world: Any, state: Any, scratch: Any, fi
             for _ in range(setup.substeps):
                 sum_[_ALIVE], error = advance_or_stop(plant, q, rates, spool_input, tendons, h, sum_[_ALIVE])
                 sum_[_STEP_ERROR] = sum_[_STEP_ERROR] + error
-
-
-@by_type
-def _gather(goals: Any, sums: Any, when: Any, pose: Any, known: Any, bends: Any, tensions: Any, share: Any) -> None:
-    """Add a tick to the sums of a motion."""
-    raise NotImplementedError("compiled code only")
-
-
-@implements(_gather, MoveGoals)
-def _gather_move(
-    goals: Any, sums: Any, when: Any, pose: Any, known: Any, bends: Any, tensions: Any, share: Any
-) -> None:
-    saturated = where(share < FULL, 1.0, zero_like(share))
-    gather(sums, goals_of(goals.rows), when[2], bends[0], bends[1], tensions[0], saturated)
-
-
-@implements(_gather, BendGoals)
-def _gather_bends(
-    goals: Any, sums: Any, when: Any, pose: Any, known: Any, bends: Any, tensions: Any, share: Any
-) -> None:
-    sample, tick, time = when
-    if tick == 0:
-        (plant, q), (bend, wish), (acts, pulls) = pose, bends, tensions
-        own, places = beyond(sums, len(SUMS) + len(pulls)), lanes_like(pulls)
-        for t in range(len(pulls)):
-            places[t] = acts[t] * known.alike[t]
-        tip, _, _, _ = spatial_tip(plant.segment, q)
-        wanted_tip, _, _, _ = spatial_tip(known.wrist.segment, wish)
-        errors = Errors(bend[0] - wish[0], bend[1] - wish[1], tip - wanted_tip)
-        late = 1.0 if sample >= goals.samples - goals.late else 0.0
-        watch_bends(own, time, sums[_ALIVE])
-        gather_bends(own, sample, late, errors, pulls, places, share)
 
 
 @compiled

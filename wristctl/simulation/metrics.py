@@ -15,7 +15,7 @@ from wristctl.arrays import Array
 from wristctl.config.choices import METRICS as _TABLE
 from wristctl.config.choices import Choices
 from wristctl.simulation.arrival import missing
-from wristctl.simulation.motion import Goals
+from wristctl.simulation.motion import GOALS, Goals
 from wristctl.simulation.oscillation import hunting, oscillation
 from wristctl.simulation.trajectory import Trajectory
 
@@ -36,7 +36,8 @@ _LEAST_MOVE = 1e-9
 
 
 class Totals(NamedTuple):
-    """Sums over rollouts: `sums` by the names of SUMS, `goals` by those of Goals, each (count,)."""
+    """Sums over rollouts and goals of their motions, (count,) each, by the names of `wristctl.simulation.sums` (SUMS,
+    in two planes OF_BENDS too) and of GOALS."""
 
     sums: Mapping[str, Array]
     goals: Mapping[str, Array]
@@ -65,15 +66,15 @@ class Metric:
 METRICS: Choices[Metric] = _TABLE
 
 
-def summary(totals: Totals) -> dict[str, Array]:
+def summary(totals: Totals, metrics: Mapping[str, Metric] = METRICS) -> dict[str, Array]:
     """The metrics that come from sums, each (count,); of the error nan where the wrist has diverged."""
     alive = totals.sums["alive"] > 0.0
     values = {}
     with np.errstate(divide="ignore", invalid="ignore"):
-        for name, metric in summed().items():
-            assert metric.of_totals is not None
-            value = metric.of_totals(totals)
-            values[name] = np.where(alive, value, np.nan) if metric.of_error else value
+        for name, metric in metrics.items():
+            if metric.of_totals is not None:
+                value = metric.of_totals(totals)
+                values[name] = np.where(alive, value, np.nan) if metric.of_error else value
     return values
 
 
@@ -100,13 +101,17 @@ def metrics_of(
 
     `goals` are those of the reference (`Motion.goals`), `saturated` (T,) where the torque was out of reach.
     """
-    from wristctl.simulation.sums import SUMS, sums_of  # compiled code, which the table does not need
-
     flags = np.zeros(len(theta)) if saturated is None else np.asarray(saturated, float)
-    sums = sums_of(period, np.column_stack([theta, theta_ref, tension, flags]), goals)
-    each_goal = {name: np.array([value]) for name, value in goals._asdict().items()}
-    totals = Totals(dict(zip(SUMS, sums[:, None], strict=False)), each_goal, period)
+    totals = totals_of_series(period, theta[:, None], theta_ref[:, None], tension, flags, goals)
     return {name: float(value[0]) for name, value in summary(totals).items()}
+
+
+def totals_of_series(period: float, bend: Array, wish: Array, tension: Array, saturated: Array, goals: Goals) -> Totals:
+    """Sums of one recorded series, as `wristctl.simulation.sums.sums_of` takes it."""
+    from wristctl.simulation.sums import sums_of  # compiled code, which the table does not need
+
+    sums, rows = sums_of(period, bend, wish, tension, saturated, goals), goals.rows
+    return Totals(sums, dict(zip(GOALS, rows[-len(GOALS) :, None], strict=True)), period)
 
 
 def _rests(of: Totals) -> Any:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -41,18 +41,42 @@ class Angles:
 
 
 class Goals(NamedTuple):
-    """Facts of a reference that metrics need: simulated loops, recorded trials and tests are all judged by it."""
+    """Facts of a reference that metrics need: simulated loops, recorded trials and tests are all judged by it.
 
-    final: float
-    """Last reference angle [rad]."""
-    move: float
-    """Last move, signed [rad]: bands and overshoot are shares of it."""
+    In two planes `final` and `move` are vectors (2,).
+    """
+
+    final: Any
+    """Last reference bend [rad]."""
+    move: Any
+    """Last move, signed [rad]: bands and overshoot are shares of its size, and overshoot is along it."""
     begin: float
     """When the last move begins [s]."""
     rest: float
     """When the reference rests [s]; the horizon if it never does."""
     horizon: float
     """[s]"""
+
+    @property
+    def rows(self) -> Array:
+        """As running sums take them: last bend and direction of the last move of each plane, then GOALS."""
+        final, move = np.atleast_1d(self.final), np.atleast_1d(self.move)
+        size = float(np.hypot(*move)) if len(move) > 1 else abs(float(move[0]))
+        toward = move / size if len(move) > 1 and size > 0.0 else np.where(move < 0.0, -1.0, 1.0)
+        return np.array([*final, *toward, size, self.begin, self.rest, self.horizon])
+
+
+# Rows of goals behind those of each plane.
+GOALS = ("move", "begin", "rest", "horizon")
+
+
+def goals_of_bends(bends: Array, time: Array) -> Goals:
+    """Goals of a path of bends (P, T) [rad] at times (T,) [s]: one move, from straight to where it ends."""
+    step = float(time[1] - time[0])
+    moving = np.flatnonzero(np.diff(bends, axis=1).any(axis=0))
+    horizon = len(time) * step
+    rest = 0.0 if not len(moving) else float(time[moving[-1] + 1])
+    return Goals(bends[:, -1], bends[:, -1], 0.0, rest if rest < time[-1] - 0.5 * step else horizon, horizon)
 
 
 @dataclass(frozen=True)

@@ -93,13 +93,14 @@ def at_rest(course: Trajectory) -> bool:
     return len(course.theta_ref) >= samples and bool(np.ptp(course.theta_ref[-samples:]) == 0.0)
 
 
-def chatter(variation: ArrayLike, tension_range: ArrayLike) -> Array:
+def chatter(variation: ArrayLike, tension_range: ArrayLike, places: int = 2) -> Array:
     """Frequency of tensions between their limits [1/s], where that is faster than any wrist follows; else 0.
 
-    `variation` [N/s] is that of both sides, the metric `chattering`. `tension_range` [N] is the wrist's, from
-    pretension to limit, also where a loop's tensions have no limit. What lies near: docs/chattering.md.
+    `variation` [N/s] is that of one tendon of each of so many places together, the metric `chattering`; in one plane
+    the places are two sides. `tension_range` [N] is the wrist's, from pretension to limit, also where a loop's tensions
+    have no limit. What lies near: docs/chattering.md.
     """
-    rate = np.asarray(variation, float) / (4.0 * np.asarray(tension_range, float))  # two sides, to and fro
+    rate = np.asarray(variation, float) / (2.0 * places * np.asarray(tension_range, float))  # to and fro
     return np.where(rate > FASTEST, rate, 0.0)
 
 

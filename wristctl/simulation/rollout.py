@@ -19,9 +19,9 @@ from wristctl.simulation.batch import Batch, Lanes, Start, batch
 from wristctl.simulation.convergence import has_kinks, more_finely, settled
 from wristctl.simulation.kernel import BRIEFLY, RECORDED, Span, run_blocks
 from wristctl.simulation.metrics import Totals, summary
-from wristctl.simulation.motion import Goals, Motion
+from wristctl.simulation.motion import GOALS, Motion
 from wristctl.simulation.outcome import KeptSamples, Outcome
-from wristctl.simulation.sums import SUMS
+from wristctl.simulation.sums import sums_by_name
 from wristctl.simulation.worlds import World
 from wristctl.wrist.plant import kernel_of
 
@@ -161,12 +161,18 @@ def _run(
 
 def outcome_of(rollouts: Batch, count: int, loop: Loop, kept: KeptSamples | None = None) -> Outcome:
     """Outcome of a batch's rollouts, so far as they have come."""
-    sums, goals = to_rows(rollouts.state.sums, count), to_rows(rollouts.world.goals.rows, count)
-    named = dict(zip(SUMS, sums.T, strict=False)), dict(zip(Goals._fields, goals.T, strict=True))
-    totals = Totals(*named, loop.control_period)
+    totals = totals_of(rollouts, count)
     failed, until = totals.sums["alive"] <= 0.0, totals.sums["until"]
     steps, error, drift = np.full(count, loop.steps), totals.sums["step_error"], np.zeros(count)
     return Outcome(summary(totals), failed, until, rollouts.course.references, steps, error, drift, kept)
+
+
+def totals_of(rollouts: Batch, count: int) -> Totals:
+    """Sums of a batch's rollouts by name, so far as they have come."""
+    planes, places = len(rollouts.setup.bend), len(rollouts.setup.pulls)
+    sums, goals = to_rows(rollouts.state.sums, count), to_rows(rollouts.world.goals, count)
+    of_motion = dict(zip(GOALS, goals[:, 2 * planes :].T, strict=True))
+    return Totals(sums_by_name(sums, places), of_motion, rollouts.setup.period)
 
 
 def advance_blocks(

@@ -4,59 +4,66 @@ e is the bend less its reference (E12) in each of P planes, |e| its norm over th
 move is the time until the reference rests. Tensions are those that act, of one tendon of each of T places.
 """
 
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
 from wristctl.arrays import Array
-from wristctl.lanes.compiled import compiled, kernel
+from wristctl.lanes.compiled import by_type, compiled, implements, kernel
 from wristctl.lanes.functions import maximum, norm
-from wristctl.lanes.lane import where, zero_like
-from wristctl.lanes.rows import lanes_like, part, rows_named, rows_of
-from wristctl.simulation.motion import Goals
+from wristctl.lanes.lane import dot, where, zero_like
+from wristctl.lanes.rows import beyond, lanes_like, part, rows_of
+from wristctl.simulation.motion import GOALS, Goals
+from wristctl.wrist.segments import Segments
+from wristctl.wrist.spatial.posture import spatial_tip
+from wristctl.wrist.spatial.spatial_segments import SpatialWrist
 
-# Running sums of a lane: those that metrics are made of, and the integration steps' estimated errors [rad]; tensions of
-# the last tick, of as many places as there are, are behind them.
+# Running sums of a lane: those that metrics are made of, and the integration steps' estimated errors [rad]. Behind them
+# are the tensions of the last tick, of as many places as there are, and in two planes OF_BENDS.
 SUMS = (
     "squared", "squared_move", "squared_exit", "absolute", "late", "late_count", "exit_2", "exit_5", "overshoot",
     "peak", "squared_tension", "variation", "saturated", "slack", "ticks", "ticks_move", "alive", "until",
     "step_error",
 )  # fmt: skip
-
-
-class MoveGoals(NamedTuple):
-    """Goals of each lane's motion: rows by the names of Goals."""
-
-    rows: Any
-
-
-goals_of = rows_named(Goals._fields)
+OF_BENDS = ("squared_ulnar", "squared_flexion", "squared_most", "squared_tip")
 (
     _SQUARED, _SQUARED_MOVE, _SQUARED_EXIT, _ABSOLUTE, _LATE, _LATE_COUNT, _EXIT_2, _EXIT_5, _OVERSHOOT,
     _PEAK, _SQUARED_TENSION, _VARIATION, _SATURATED, _SLACK, _TICKS, _TICKS_MOVE, _ALIVE, _UNTIL,
     _STEP_ERROR,
 ) = range(len(SUMS))  # fmt: skip
-
-
 _LAST = len(SUMS)
+_MOVE, _BEGIN, _REST, _HORIZON = range(len(GOALS))
+
+
+def no_sums(planes: int, places: int) -> Array:
+    """Sums of a lane that is alive, before its first tick."""
+    sums = np.zeros(_LAST + places + (len(OF_BENDS) if planes > 1 else 0))
+    sums[_ALIVE] = 1.0
+    return sums
+
+
+def sums_by_name(rows: Array, places: int) -> dict[str, Array]:
+    """Sums by name (count,) of rows (count, sums) as the kernel has them."""
+    own = rows[:, _LAST + places :]
+    return dict(zip(SUMS, rows.T, strict=False)) | dict(zip(OF_BENDS, own.T, strict=False))
 
 
 @compiled
 def gather(sums: Any, goals: Any, time: Any, bend: Any, wish: Any, tensions: Any, saturated: Any) -> None:
     """Add one tick: bends and their reference at `time` (P rows each), the tensions [N] that act then (T rows), and 1
-    where the torque was out of reach."""
+    where the torque was out of reach. `goals` are rows of Goals."""
     zero = zero_like(time)
     planes, count = len(bend), len(tensions)
-    moving = where(time <= goals.rest, 1.0, 0.0)
-    late = where(time >= 0.9 * goals.horizon, 1.0, 0.0)
-    move = abs(goals.move)
+    of_motion = beyond(goals, 2 * planes)
+    moving = where(time <= of_motion[_REST], 1.0, 0.0)
+    late = where(time >= 0.9 * of_motion[_HORIZON], 1.0, 0.0)
+    move = of_motion[_MOVE]
     squared, passed, errors, apart = zero, zero, lanes_like(bend), lanes_like(bend)
-    toward = where(goals.move < 0.0, -1.0, 1.0)
     for p in range(planes):
-        errors[p], apart[p] = bend[p] - wish[p], bend[p] - goals.final
+        errors[p], apart[p] = bend[p] - wish[p], bend[p] - goals[p]
         sums[_SQUARED] = sums[_SQUARED] + errors[p] * errors[p]
         squared = squared + errors[p] * errors[p]
-        passed = passed + toward * apart[p]
+        passed = passed + goals[planes + p] * apart[p]
     error, size = norm(errors), norm(apart)
     sums[_SQUARED_MOVE] = sums[_SQUARED_MOVE] + moving * squared
     sums[_ABSOLUTE] = sums[_ABSOLUTE] + error
@@ -66,7 +73,7 @@ def gather(sums: Any, goals: Any, time: Any, bend: Any, wish: Any, tensions: Any
     sums[_EXIT_2] = where(outside, time, sums[_EXIT_2])
     sums[_SQUARED_EXIT] = where(outside, sums[_SQUARED], sums[_SQUARED_EXIT])
     sums[_EXIT_5] = where(size > 0.05 * move, time, sums[_EXIT_5])
-    sums[_OVERSHOOT] = maximum(sums[_OVERSHOOT], where(time >= goals.begin, passed, 0.0))
+    sums[_OVERSHOOT] = maximum(sums[_OVERSHOOT], where(time >= of_motion[_BEGIN], passed, 0.0))
     peak, square, change, least = sums[_PEAK], zero, zero, tensions[0]
     for back in range(count):
         t = count - 1 - back
@@ -83,6 +90,34 @@ def gather(sums: Any, goals: Any, time: Any, bend: Any, wish: Any, tensions: Any
     sums[_SLACK] = sums[_SLACK] + where(least <= 0.0, 1.0, 0.0)
     sums[_TICKS] = sums[_TICKS] + 1.0
     sums[_TICKS_MOVE] = sums[_TICKS_MOVE] + moving
+    if planes > 1:
+        own = beyond(sums, _LAST + count)
+        for p in range(planes):
+            own[p] = own[p] + errors[p] * errors[p]
+        own[planes] = maximum(own[planes], squared)
+
+
+@by_type
+def gather_tip(wrist: Any, sums: Any, plant: Any, q: Any, wish: Any, tensions: Any) -> None:
+    """Add the distance of the tip from that of one arc of the controller's wrist that is bent as wanted (P rows).
+
+    In one plane it is that of a recorded course, whose wanted tips may be others.
+    """
+    raise NotImplementedError("compiled code only")
+
+
+@implements(gather_tip, Segments)
+def _no_tip(wrist: Any, sums: Any, plant: Any, q: Any, wish: Any, tensions: Any) -> None:
+    pass
+
+
+@implements(gather_tip, SpatialWrist)
+def _tip_in_space(wrist: Any, sums: Any, plant: Any, q: Any, wish: Any, tensions: Any) -> None:
+    last = _LAST + len(tensions) + len(wish) + 1
+    tip, _, _, _ = spatial_tip(plant.segment, q)
+    wanted, _, _, _ = spatial_tip(wrist.segment, wish)
+    off = tip - wanted
+    sums[last] = sums[last] + dot(off, off)
 
 
 @compiled
@@ -94,21 +129,25 @@ def watch_range(sums: Any, time: Any, bend: Any, reach: Any) -> None:
 
 
 @kernel
-def _replay(series: Any, goals: Any, sums: Any, period: float) -> None:
-    goal = goals_of(goals)
-    total = rows_of(sums)
+def _replay(series: Any, goals: Any, sums: Any, period: float, planes: Any, places: Any) -> None:
+    goal, total, count = rows_of(goals), rows_of(sums), len(planes)
     for tick in range(series.shape[0]):
         row = rows_of(series[tick])
-        bend, wish, tensions = part(row, 0, (0,)), part(row, 1, (0,)), part(row, 2, (0, 0))
-        gather(total, goal, tick * period + zero_like(row[0]), bend, wish, tensions, row[4])
+        bend, wish, tensions = part(row, 0, planes), part(row, count, planes), part(row, 2 * count, places)
+        saturated = row[2 * count + len(places)]
+        gather(total, goal, tick * period + zero_like(row[0]), bend, wish, tensions, saturated)
 
 
-def sums_of(period: float, series: Array, goals: Goals) -> Array:
-    """The sums of a recorded series (T, 5) sampled every `period` [s].
+def sums_of(
+    period: float, bend: Array, wish: Array, tension: Array, saturated: Array, goals: Goals
+) -> dict[str, Array]:
+    """The sums by name, (1,) each, of a recorded series sampled every `period` [s].
 
-    Its columns are angle and reference [rad], tension of both sides [N], and 1 where the torque was out of reach.
+    It has bends and their reference (K, P) [rad], the tension of one tendon of each place (K, T) [N], and 1 where the
+    torque was out of reach (K,).
     """
-    sums = np.zeros(len(SUMS) + 2)
-    sums[_ALIVE] = 1.0
-    _replay(np.ascontiguousarray(series), np.array(goals), sums, period)
-    return sums
+    planes, places = bend.shape[1], tension.shape[1]
+    sums = no_sums(planes, places)
+    series = np.column_stack([bend, wish, tension, saturated]).astype(np.float64)
+    _replay(np.ascontiguousarray(series), goals.rows, sums, period, (0,) * planes, (0,) * places)
+    return sums_by_name(sums[None], places)

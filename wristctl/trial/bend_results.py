@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 import pandas as pd
@@ -12,7 +13,7 @@ from wristctl.config.study import Study
 from wristctl.config.wrist import WristParameters
 from wristctl.control.table import controller, gains_of
 from wristctl.records import Run
-from wristctl.simulation.bend_course import BEND_METRICS, BendCourse
+from wristctl.simulation.bend_course import BendCourse
 from wristctl.simulation.two_planes import rollout_bends
 from wristctl.simulation.worlds import Draws, World, loops_of
 from wristctl.trial.bend_motion import BendMotion, bend_motion_of
@@ -69,15 +70,12 @@ def true_course(logged: BendCourse, truth: pd.DataFrame) -> BendCourse:
     time = logged.time
     segments = sum(name.startswith("bend_") and name[5].isdigit() for name in truth.columns) // len(PLANES)
     names = [f"bend_{k + 1}_{plane}" for k in range(segments) for plane in PLANES]
-    course: BendCourse = logged.__class__(
-        **{
-            **logged.__dict__,
-            "bend": _on(time, truth, [f"bend_{plane}" for plane in PLANES]),
-            "acting": _on(time, truth, [f"pull_{tendon}" for tendon in ACTIVE]),
-            "coordinates": _on(time, truth, names),
-        }
+    return replace(
+        logged,
+        bend=_on(time, truth, [f"bend_{plane}" for plane in PLANES]),
+        acting=_on(time, truth, [f"pull_{tendon}" for tendon in ACTIVE]),
+        coordinates=_on(time, truth, names),
     )
-    return course
 
 
 def _on(time: Array, table: pd.DataFrame, names: list[str]) -> Array:
@@ -118,7 +116,8 @@ def bends_evaluated(
     if not whole(course, followed):
         return metrics
     logged = logged_course(course, followed, wrist)
-    metrics |= {name: BEND_METRICS[name].value(logged) for name in LOGGED}
+    by_log = logged.metrics()
+    metrics |= {name: by_log[name] for name in LOGGED}
     metrics["settling"] = _settling(logged)
     if trial.push and followed.rest < push.start - EARLY:
         load = logged.load_seen - np.median(logged.load_seen[logged.time < push.start - EARLY][-50:], axis=0)
@@ -128,7 +127,8 @@ def bends_evaluated(
             metrics["recovery"] = _recovery(logged, seen.end)
     if truth is not None and len(truth):
         true = true_course(logged, truth)
-        metrics |= {f"true_{name}": BEND_METRICS[name].value(true) for name in TRULY}
+        truly = true.metrics()
+        metrics |= {f"true_{name}": truly[name] for name in TRULY}
         metrics["true_settling"] = _settling(true)
         if trial.push:
             metrics["true_recovery"] = _recovery(true, push.start + push.duration)

@@ -12,11 +12,10 @@ from wristctl.config.plant import Actuator, Sensor
 from wristctl.config.wrist import WristParameters
 from wristctl.control.belief import Limits
 from wristctl.control.law import REFERENCE, Controller, signals_of
-from wristctl.control.response import OF_A_PLANE, Controlled, Estimate, Seen, look_ahead, respond, room_like
+from wristctl.control.response import FULL, OF_A_PLANE, Controlled, Estimate, Seen, look_ahead, respond, room_like
 from wristctl.errors import UserError
 from wristctl.lanes.compiled import compiled, kernel
 from wristctl.lanes.rows import lanes_like, part, rows_of
-from wristctl.simulation.bend_course import FULL
 from wristctl.simulation.observer import knowing_in_lanes, propagate
 from wristctl.simulation.stationary_filter import Belief, as_pairs, stationary_gains
 from wristctl.trial.spatial_belief import PLANES, known_of_axes, layout_of_axes

@@ -55,13 +55,12 @@ class PerformedBends(StudyResult):
         import numpy as np
 
         from wristctl.board.messages import AXES
-        from wristctl.simulation.bend_loops import SIDES
         from wristctl.simulation.oscillation import chatter
 
         done = self.trials[self.trials["outcome"] == "ok"]
         courses = [self.twins[number] for number in done["trial"]]
         goals = np.array([np.hypot(*course.bend_ref.T).max() if course.rests else np.inf for course in courses])
-        slams = chatter(done["chattering"].to_numpy(float) * SIDES / AXES, self.study.wrist.tension_range)
+        slams = chatter(done["chattering"].to_numpy(float), self.study.wrist.tension_range, AXES)
         return marks_of(done, goals, np.array([course.rests for course in courses], bool), slams > 0.0)
 
     def frame(self) -> pd.DataFrame:

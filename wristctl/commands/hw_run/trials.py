@@ -64,7 +64,7 @@ _OF_BENDS: dict[str, tuple[str, str]] = {
     **_OF_ANY,
     "direction": ("", "of bending, or the path in two planes"),
     "push": ("N", "largest force"),
-    **{name: BEND_METRICS[name][:2] for name in LOGGED},
+    **{name: (BEND_METRICS[name].unit, BEND_METRICS[name].formula) for name in LOGGED},
     **{f"true_{name}": (BEND_METRICS[name].unit, f"{BEND_METRICS[name].formula}; of the true bend") for name in TRULY},
     **FURTHER,
 }
