@@ -148,7 +148,7 @@ def test_what_is_not_allowed_is_said_with_where_to_read_on(monkeypatch: pytest.M
     monkeypatch.setattr(resource, "getrlimit", lambda _: (65536, 65536))
     with prioritised(True) as said:
         assert not gc.isenabled()
-    assert "not allowed: SCHED_FIFO 20, locked memory" in said and "docs/hardware/real-time.md" in said
+    assert "not allowed: SCHED_FIFO 20, locked memory" in said and "documentation: Real time" in said
 
 
 @pytest.mark.slow

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import ast
 import re
 import tomllib
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -57,6 +59,26 @@ def test_a_page_that_counts_controllers_counts_those_there_are(page: str) -> Non
     words = re.findall(r"([\w-]+)\s+controllers\b", (ROOT / page).read_text(encoding="utf-8"))
     counts = [int(word) if word.isdigit() else NUMBERS[word] for word in words if word.isdigit() or word in NUMBERS]
     assert set(counts) <= {len(CONTROLLERS)} and (counts or page not in ("CHANGELOG.md", "paper/paper.md"))
+
+
+def _said(source: str) -> Iterator[str]:
+    """Texts in a module that a user may be shown: no docstrings."""
+    tree = ast.parse(source)
+    docstrings = {id(node.value) for node in ast.walk(tree) if isinstance(node, ast.Expr)}
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Constant) and isinstance(node.value, str) and id(node) not in docstrings:
+            yield node.value
+
+
+def test_a_hint_names_a_page_by_its_title_which_an_installed_package_can_be_read_by_too() -> None:
+    """A wheel has no docs folder."""
+    heads = [page.read_text(encoding="utf-8").partition("\n")[0].removeprefix("# ") for page in PAGES]
+    titles = {re.split("[:,]", head)[0] for head in heads}
+    texts = [text for file in (ROOT / "wristctl").rglob("*.py") for text in _said(file.read_text(encoding="utf-8"))]
+    texts += [file.read_text(encoding="utf-8") for file in (ROOT / "wristctl" / "cli" / "templates").iterdir()]
+    assert not [text for text in texts if re.search(r"(?<!README)\.md\b", text)]
+    named = [title for text in texts for title in re.findall(r"documentation: ([A-Z][\w ]*\w)", " ".join(text.split()))]
+    assert len(named) > 20 and set(named) <= titles
 
 
 def test_the_wrist_in_motion_is_a_small_animation() -> None:

@@ -16,7 +16,7 @@ _CURRENT_AND_FUTURE = 3
 """MCL_CURRENT | MCL_FUTURE of sys/mman.h."""
 _SWITCH = 5e-4
 """Seconds after which a thread of ours lets another of them go on."""
-_HOW = "docs/hardware/real-time.md says how to allow it"
+_HOW = "how to allow it: documentation: Real time"
 
 
 @contextmanager

@@ -147,14 +147,16 @@ def test_an_open_log_tells_what_it_can_in_a_run_of_its_own(call: Call, tmp_path:
     code, out, err = call("identify", str(tmp_path / "my.csv"))
     assert code == 0, err
     assert (
-        out.startswith("These data tell") and "delay" in out.split(".")[0] and "Stiffness in N m/rad is not told" in out
+        out.startswith("Identified: ")
+        and "delay" in out.split(".")[0]
+        and "Stiffness in N m/rad is not identifiable" in out
     )
     found = open_run(out.splitlines()[-1])
     delay = found.metrics["delay"]
     assert delay["interval"][0] - 2e-3 < 0.04 < delay["interval"][1] + 2e-3
     assert found.metrics["tendon"]["value"] is None and found.metrics["error"]["value"] < 0.1
     assert "Of 1600 samples the models are fitted at 801 instants" in out
-    assert "not told" in out and all(len(line) <= 100 for line in out.splitlines()[:-1])
+    assert "not identifiable" in out and all(len(line) <= 100 for line in out.splitlines()[:-1])
     (tmp_path / "my.csv").unlink()
     assert call("runs", "verify", found.id)[0] == 0
     assert call("runs", "replay", found.id)[0] == 0
@@ -166,6 +168,6 @@ def test_a_log_that_no_model_predicts_is_refused_with_its_answer(call: Call, tmp
     code, out, err = call("identify", str(tmp_path / "back.csv"))
     assert code == 3 and out == "" and "nothing of it is to be relied on" in err and "misfit=tell" in err
     failed = open_run(next((tmp_path / "results").glob("*-identify-*")))
-    assert failed.state == "failed" and "not told" in (failed.path / "README.md").read_text()
+    assert failed.state == "failed" and "not identifiable" in (failed.path / "README.md").read_text()
     code, out, err = call("identify", str(tmp_path / "back.csv"), "--dry-run")
     assert code == 0 and "400 samples" in out and "instants" not in out

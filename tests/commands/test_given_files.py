@@ -90,14 +90,14 @@ def test_a_table_of_a_run_that_was_changed_has_no_units(tmp_path: Path) -> None:
     table = first.run.path / "data/trajectory.csv"
     table.write_text(table.read_text().replace("0.001,", "0.0011,", 1))
     named = f"simulate.reference.file={table}"
-    with pytest.raises(UserError, match="column 'time' is no name with a unit"):
+    with pytest.raises(UserError, match="column 'time' has no unit"):
         simulated(tmp_path, "simulate.reference.kind=recording", named)
 
 
 @pytest.mark.parametrize(
     ("text", "what"),
     [
-        (FILE.replace("angle [deg]", "angle"), "no name with a unit"),
+        (FILE.replace("angle [deg]", "angle"), "has no unit"),
         (FILE.replace(",10.0\n", ",10.0\n0.9,10.0\n"), "time goes back"),
         (FILE.replace("[deg]", "[rad]"), "the angle jumps by"),
         ("time [s],angle [deg]\n" + "".join(f"{t / 20},{6 * t}\n" for t in range(11)), "bends by 60 deg, beyond"),

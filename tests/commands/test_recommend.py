@@ -358,7 +358,7 @@ def test_of_what_errs_hardly_more_the_one_is_taken_that_is_lost_on_fewer_rigs(
     assert told(0, [least], [more], [open_loop]).best_row == least
     safer = told(1, [least], [more], [open_loop])
     assert safer.best_row == (least if kept else more)
-    assert ("lost on more rigs" in " ".join(safer.answer.lines())) != kept
+    assert ("unstable on more rigs" in " ".join(safer.answer.lines())) != kept
     behind = told(1, [least], [open_loop], [more])
     assert behind.best_row == least, "what errs more than feedforward alone is no choice"
 

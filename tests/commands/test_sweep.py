@@ -117,8 +117,8 @@ def test_a_sweep_is_one_run_with_a_table_with_units_and_a_figure_for_each_key(tm
     for key in ("wrist.stiffness", "simulate.controller"):
         assert (done.run.path / "figures" / f"sweep-{key}.png").is_file()
     best = done.frame().sort_values("rmse").iloc[0]
-    said = (done.run.path / "README.md").read_text()
-    assert f"simulate.controller = {best['simulate.controller']}" in said and "rmse is least" in said
+    said = " ".join((done.run.path / "README.md").read_text().split())
+    assert f"simulate.controller = {best['simulate.controller']}" in said and "lowest rmse " in said
     listed = wristctl.runs("points=8", kind="simulate", out=tmp_path)
     assert listed["rmse_least"].iloc[0] == best["rmse"]
 
@@ -127,7 +127,7 @@ def test_the_answer_of_a_sweep_is_in_degrees_in_the_order_of_its_values_and_fits
     done = wristctl.simulate(swept(wristctl.load_study(None, *FAST), "wrist.stiffness=~0.4..0.9:30"))
     table, lines = done.frame(), done.summary
     best = table.iloc[int(table["rmse"].argmin())]
-    assert f"rmse is least, {np.rad2deg(best['rmse']):.3g} deg at wrist.stiffness = " in " ".join(lines)
+    assert f"lowest rmse {np.rad2deg(best['rmse']):.3g} deg at wrist.stiffness = " in " ".join(lines)
     shown = [float(line.split()[0]) for line in lines if re.match(r" *0\.\d+  ", line)]
     assert shown == sorted(shown) and 6 < len(shown) < 30
     assert shown[0] == pytest.approx(table["wrist.stiffness"].min(), rel=5e-3)
@@ -138,12 +138,12 @@ def test_the_answer_of_a_sweep_is_in_degrees_in_the_order_of_its_values_and_fits
 def test_of_errors_that_nobody_could_measure_none_is_least() -> None:
     frame = pd.DataFrame({"k": ["a", "b", "c"], "point": [0, 1, 2], "rmse": [2e-4, 1e-4, 0.5]})
     units = {"k": "1", "rmse": "deg"}
-    assert "below 0.001 deg at 2 of 3 rollouts, such as k = b, and most, 0.5 deg at k = c" in sentence(
+    assert "below 0.001 deg at 2 of 3 rollouts, such as k = b; highest 0.5 deg at k = c" in sentence(
         "simulate", frame, ["k"], ["rmse"], units
     )
     tiny = sentence("simulate", frame[:2], ["k"], ["rmse"], units)
     assert "below 0.001 deg at every point" in tiny and "most" not in tiny
-    assert "least, 0.5 deg at k = c" in sentence("simulate", frame[2:], ["k"], ["rmse"], units)
+    assert "lowest rmse 0.5 deg at k = c" in sentence("simulate", frame[2:], ["k"], ["rmse"], units)
 
 
 def test_a_figure_of_a_sweep_has_a_line_for_each_value_of_a_second_setting_and_marks_what_is_no_good() -> None:

@@ -101,7 +101,10 @@ def test_an_unknown_that_the_data_do_not_tell_has_no_value() -> None:
     }
     fits: list[Any] = [SimpleNamespace(told=told, recordings=[SimpleNamespace(name=name)]) for name in ("a", "b")]
     one, both = parameters_table(fits[:1]), parameters_table(fits)
-    assert [tuple(row)[:3] for row in one.rows] == [("stiffness", "0.5", "0.4 to 0.6"), ("slack", "not told", "")]
+    assert [tuple(row)[:3] for row in one.rows] == [
+        ("stiffness", "0.5", "0.4 to 0.6"),
+        ("slack", "not identifiable", ""),
+    ]
     assert [row[0] for row in both.rows] == ["a", "a", "b", "b"] and len(both.columns) == len(one.columns) + 1
 
 

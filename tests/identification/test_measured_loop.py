@@ -98,7 +98,7 @@ ONE_WAY = {name: each if name == "time [s]" else each[:51].repeat(4)[:201] for n
     [
         ("", "empty", "", "a header such as time [s],angle [deg]"),
         ("# nothing\n", "empty", "", "a header"),
-        (put("angle [deg]", "angle", 1), "column 'angle' is no name with a unit", ":1", "angle [deg] or [rad]"),
+        (put("angle [deg]", "angle", 1), "column 'angle' has no unit", ":1", "angle [deg] or [rad]"),
         (put("angle [deg]", "angle [grad]", 1), "angle is in 'grad'", ":1", "angle [deg] or [rad]"),
         (put("[mm]", "[N]", 1), "spool_plus is in 'N'", ":1", "spool_plus [m] or [mm] or [um]"),
         (put("[deg]", "[DEG]", 1), "angle is in 'DEG'", ":1", "[deg] or [rad]"),

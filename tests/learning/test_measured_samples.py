@@ -91,8 +91,8 @@ def test_other_inputs_and_trials_come_along(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("head", "what", "fix"),
     [
-        ("x,y [mm],angle [deg]", "column 'x' is no name with a unit", "x [m] or [mm]"),
-        ("x [mm],y [mm],angle", "column 'angle' is no name with a unit", "angle [deg] or [rad]"),
+        ("x,y [mm],angle [deg]", "column 'x' has no unit", "x [m] or [mm]"),
+        ("x [mm],y [mm],angle", "column 'angle' has no unit", "angle [deg] or [rad]"),
         ("x [inch],y [mm],angle [deg]", "x is in 'inch'", "x [m] or [mm]"),
         ("x [mm],w [mm],angle [deg]", "unknown column 'w'", "leave it out"),
         ("x [mm],tip_x [mm],angle [deg]", "column tip_x stands there twice", "leave one out"),

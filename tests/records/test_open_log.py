@@ -58,7 +58,11 @@ def test_names_of_another_author_are_mapped_with_their_units(tmp_path: Path) -> 
         ("bent=imu [deg]", "bent is no column of an open log", "did you mean"),
         ("bend_y", "'bend_y' maps no column", "bend_y=imu [deg]"),
         ("bend_y=imu [N]", "imu is in 'N'", "imu [deg] or [rad]"),
-        ("bend_y=imu", "column 'imu' is no name with a unit", "imu [deg] or [rad]"),
+        (
+            "bend_y=imu",
+            "column 'imu' has no unit",
+            "imu [deg] or [rad]; or leave the file as it is: --columns 'bend_y=imu [deg]'",
+        ),
         ("bend_y=imu [2 N]", "imu is in '2 N'", "a multiple such as [0.5 deg]"),
     ],
 )
@@ -66,6 +70,24 @@ def test_a_mapping_that_cannot_be_meant_is_refused(names: str, what: str, fix: s
     with pytest.raises(UserError) as caught:
         log_of(tmp_path, "t [s],imu", "0,1", names=names)
     assert what in caught.value.what and fix in caught.value.fix
+
+
+@pytest.mark.parametrize(
+    ("head", "fix"),
+    [
+        ("t_ms;Winkel_grad;Seil1_mm", "--columns 'NAME=t_ms [UNIT]'"),
+        ("t [ms];Winkel [deg];Seil1 [mm]", "Else leave it out, or --columns 'NAME=t'"),
+    ],
+)
+def test_a_header_of_ones_own_is_told_of_the_option_that_maps_it(tmp_path: Path, head: str, fix: str) -> None:
+    with pytest.raises(UserError) as caught:
+        log_of(tmp_path, head, "0;1;2")
+    assert fix in caught.value.fix
+    units = ("ms", "deg", "mm")
+    theirs = [name.partition(" ")[0] for name in head.split(";")]
+    mapped = zip(("time", "bend_y", "spool_1"), theirs, units, strict=True)
+    names = ", ".join(f"{name}={their} [{unit}]" for name, their, unit in mapped)
+    assert list(log_of(tmp_path, head, "0;1;2", names=names).columns) == ["time", "bend_y", "spool_1"]
 
 
 @pytest.mark.parametrize(

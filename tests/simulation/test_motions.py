@@ -232,8 +232,8 @@ def put(line: int, text: str) -> str:
     ("text", "what", "where", "fix"),
     [
         ("", "the recording is empty", "", "a header such as time [s],angle [deg]"),
-        (put(1, "time,angle [deg]"), "column 'time' is no name with a unit", ":1", "time [s] or [ms]"),
-        (put(1, "time [s],angle"), "column 'angle' is no name with a unit", ":1", "angle [deg] or [rad]"),
+        (put(1, "time,angle [deg]"), "column 'time' has no unit", ":1", "time [s] or [ms]"),
+        (put(1, "time [s],angle"), "column 'angle' has no unit", ":1", "angle [deg] or [rad]"),
         (put(1, "time [min],angle [deg]"), "time is in 'min'", ":1", "time [s] or [ms]"),
         (put(1, "time [s],angle [mm]"), "angle is in 'mm'", ":1", "angle [deg] or [rad]"),
         (put(1, "time [s],angel [deg]"), "neither an angle nor tips", "", "a header such as"),

@@ -88,4 +88,4 @@ def latency_timer(port: str, system: Path = SYSTEM) -> float | None:
 def shorter(port: str, system: Path = SYSTEM) -> str:
     """Advice that makes a USB adapter hand over at once."""
     file = system / Path(port).resolve().name / "latency_timer"
-    return f"echo 1 | sudo tee {file}; for good: the udev rule of docs/hardware/rig.md"
+    return f"echo 1 | sudo tee {file}; for good: the udev rule (documentation: The rig)"

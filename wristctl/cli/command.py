@@ -33,7 +33,7 @@ def asked_to_trust(trust: bool, shown: str) -> bool:
     return typed_line(idle) == "yes"
 
 
-_SWEEP = "A leaf at many values: KEY=1,2,3, KEY=0..3:20, KEY=8e3..4e4 log:20, KEY=~0..3:100; repeat for more."
+_SWEEP = "One setting at many values: KEY=1,2,3, KEY=0..3:20, KEY=8e3..4e4 log:20, KEY=~0..3:100; repeat for more."
 _MORE_OPTIONS = "More options: --help --all"
 _EXECUTOR = "Who does the work: serial, processes[:N], dask://host:port or module:factory."
 

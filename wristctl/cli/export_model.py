@@ -35,7 +35,7 @@ def export_model(
     """Write the wrist of a run, identified or as its controller knew it, as a chain of rigid links.
 
     For MuJoCo a model with tendons, whose two actuators take tensions; for MATLAB (or Octave) a function with the
-    equations of motion. docs/models.md says how far they are from the wrist here.
+    equations of motion. How far they are from the wrist here: documentation: The wrist in other programs.
     """
     from wristctl.commands.export.model import export_wrist
     from wristctl.records import require

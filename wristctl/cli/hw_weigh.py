@@ -54,7 +54,7 @@ def weigh(
         _tell(cells, empty)
         if len(silent) == 4:
             problem = "no load cell answers"
-            fix = "see DOUT, PD_SCK and supply of the amplifiers: docs/hardware/load-cells.md"
+            fix = "see DOUT, PD_SCK and supply of the amplifiers (documentation: Load cells)"
             raise UserError(problem, fix=fix, exit_code=4)
         for one in [] if mass is None else range(4) if axis is None else [axis]:
             if axis is None and one in silent:

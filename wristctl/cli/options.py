@@ -100,7 +100,9 @@ class Options:
 
     files: Annotated[
         list[Path] | None,
-        typer.Argument(metavar="FILE", help="Study files (YAML); later ones win.", autocompletion=study_files),
+        typer.Argument(
+            metavar="FILE", help="Study files (YAML); later ones override earlier ones.", autocompletion=study_files
+        ),
     ] = None
     config: Annotated[
         list[Path] | None,

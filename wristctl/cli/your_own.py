@@ -146,7 +146,7 @@ def check_controller(
             if not as_json:
                 say(f"{_VERDICTS[check.passed]:<6}{check.asked + ':':<23} {check.found}")
     failed = [check.asked for check in checks if check.passed is False]
-    problem, fix = f"{law} fails: {', '.join(failed)}", "mend it; docs/your-own-controller.md"
+    problem, fix = f"{law} fails: {', '.join(failed)}", "mend it (documentation: Your own controller)"
     error = UserError(problem, law, fix, exit_code=3) if failed else None
     if as_json:
         shown = {"schema": "wristctl.law/1", "law": law, "fit": not failed, "checks": [c._asdict() for c in checks]}

@@ -237,7 +237,7 @@ def _identified_yaml(earlier: Run | _Identification) -> str:
         text = getattr(earlier, "yaml", "")
     if not text:
         run = earlier.id if isinstance(earlier, Run) else "identify"
-        fix = "identify runs of hw-run, or logs in two planes with model: wrist (docs/identify.md)"
+        fix = "identify runs of hw-run, or logs in two planes with model: wrist (documentation: Identification)"
         raise UserError("no wrist was identified there: its log told ratios alone, or too little", run, fix)
     return text
 

@@ -65,7 +65,7 @@ def outside_conditions(rows: Iterable[Row | SimulateSettings], loops: Iterable[L
             warnings.append(f"{name}/{preset} is not made for elastic tendons behind a camera: it may swing{instead}")
         for loop in real:
             if stated and (mismatch := _outside(stated, loop)):
-                warnings.append(f"{name}/{preset} was made for {mismatch}: it may swing (docs/margins.md)")
+                warnings.append(f"{name}/{preset} was made for {mismatch}: it may swing (documentation: Limit cycles)")
     return warnings
 
 

@@ -24,7 +24,9 @@ def of_file(meaning: str) -> Any:
 
 def columns_of_file() -> Any:
     """A leaf that maps another author's columns to those of an open log."""
-    return of_file("another's columns, as `time=t [ms], bend_y=imu [deg]`, or a converter's name (docs/open-log.md)")
+    return of_file(
+        "another's columns, as `time=t [ms], bend_y=imu [deg]`, or a converter's name (documentation: The open log)"
+    )
 
 
 def names_a_file(field: FieldInfo | None) -> bool:

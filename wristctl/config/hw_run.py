@@ -51,7 +51,7 @@ class Safety(Section):
     angle_deg: float = quantity(55.0, "deg", "largest bending angle, as estimated", "range and a tenth", gt=0)
     rate: float = quantity(10.0, "rad/s", "largest bending rate, as estimated", "assumed", gt=0)
     motor_pull: float = quantity(
-        42.0, "N", "largest pull of a motor at its drive's current, beyond which it slips", "1.0 A: rig.md", gt=0
+        42.0, "N", "largest pull of a motor at its drive's current, beyond which it slips", "1.0 A", gt=0
     )
     tension: float = quantity(
         60.0, "N", "largest tension by spool position and estimated angle; wrist.tension_limit if less",

@@ -64,7 +64,9 @@ class HysteresisSettings(Section):
     segments: int = choice(4, "constant-curvature segments of the wrist", "as simulated", ge=1, le=8)
     step: float = quantity(1e-3, "s", "longest integration step", "as simulated", gt=0, le=5e-3)
     samples: int = choice(200, "samples kept of each cycle, a multiple of 4", ge=40, le=10_000, multiple_of=4)
-    measured: str | None = given_file("a measured loop to overlay and to fit: an open log (docs/open-log.md)")
+    measured: str | None = given_file(
+        "a measured loop to overlay and to fit: an open log (documentation: The open log)"
+    )
     columns: str | None = columns_of_file()
     trial: str | None = of_file("trial of the measured log that is the loop, where it has several")
     known: KnownBeforehand = KnownBeforehand()

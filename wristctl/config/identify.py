@@ -23,8 +23,10 @@ class Fixed(Section):
 class IdentifySettings(Section):
     """Parameters of a real wrist from its spools' logged positions and its marker's angles."""
 
-    runs: tuple[str, ...] = choice((), "hw-run runs: paths, ids or latest:hw-run; or open logs (docs/open-log.md)")
-    logs: tuple[str, ...] = given_file("open logs (docs/open-log.md)", ())
+    runs: tuple[str, ...] = choice(
+        (), "hw-run runs: paths, ids or latest:hw-run; or open logs (documentation: The open log)"
+    )
+    logs: tuple[str, ...] = given_file("open logs (documentation: The open log)", ())
     columns: str | None = columns_of_file()
     model: Literal["arcs", "wrist"] = choice(
         "arcs",

@@ -47,7 +47,7 @@ class DataSettings(Section):
     run: str | None = choice(
         None, "run: one with tips and angles (hw-run, track, simulate, compare): path, id or latest:hw-run"
     )
-    files: tuple[str, ...] = given_file("csv: open logs with tips and angles (docs/open-log.md)", ())
+    files: tuple[str, ...] = given_file("csv: open logs with tips and angles (documentation: The open log)", ())
     columns: str | None = columns_of_file()
 
     @property

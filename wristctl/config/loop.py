@@ -116,7 +116,7 @@ class Reference(OpenSection):
     )
     duration: float = quantity(1.0, "s", "duration of each minimum-jerk move or step", "assumed", gt=0)
     frequency: float = quantity(0.5, "1/s", "frequency of a sine, a chirp's at first", "assumed", gt=0)
-    file: str | None = given_file("recording: an open log (docs/open-log.md)")
+    file: str | None = given_file("recording: an open log (documentation: The open log)")
     column: str | None = of_file("recording: name of the angle's column, or tip; by default angle, bend, theta, tip")
     columns: str | None = columns_of_file()
     inverse: InverseName = choice(

@@ -52,7 +52,10 @@ LEAST_PLAIN_PERIOD = 1e-5
 
 # Origin of presets for the rig.
 BY_TRIAL = "behind a 60 Hz camera, steppers and tendons of 8 to 100 kN/m: by trial at the corners of docs/margins.py"
-BY_STUDY = "behind a 60 Hz camera, steppers and tendons of 8 to 100 kN/m: docs/gains.md, camera, in few digits"
+BY_STUDY = (
+    "behind a 60 Hz camera, steppers and tendons of 8 to 100 kN/m: tuned for camera (documentation: Gains that are "
+    "shipped), in few digits"
+)
 
 
 def signals_of(preview: int) -> int:
@@ -208,7 +211,7 @@ def _refused(law: Law, error: NumbaError) -> UserError:
     reasons = [message for message in lines if not message.startswith(("Failed in", "During", "File", ">>>", "-", "^"))]
     why = reasons[0] if reasons else type(error).__name__
     explanations = [(match, words) for pattern, words in _TOLD if (match := re.search(pattern, text))]
-    fix = "docs/lanes.md says what a law may call; or state plain=True, and it runs as plain Python"
+    fix = "call what a controller may (documentation: Compiled code), or state plain=True: it then runs as plain Python"
     if explanations:
         match, words = explanations[0]
         why = words.format(*match.groups())

@@ -110,7 +110,7 @@ def vet(controller: Controller, where: str) -> TriedStates:
         torques.append(first)
     if not controller.plain and (allocations := _allocated(law, (signals[0], wrist, gains[0]), controller.memory)):
         problem = f"{controller.name} allocates memory, {allocations} times a call"
-        raise UserError(problem, where, "lanes, tuples and memory[k] in place of arrays: docs/lanes.md")
+        raise UserError(problem, where, "lanes, tuples and memory[k] in place of arrays (documentation: Compiled code)")
     return TriedStates(signals, gains, np.array(torques))
 
 

@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wristctl.arrays import Array
-from wristctl.errors import OUT, Phrase, UserError, meant
+from wristctl.errors import OUT, Argument, Phrase, UserError, meant
 from wristctl.plain_files import LARGEST_DATA, open_plain, read_text
 from wristctl.records.files import replacing, sha256_of
 from wristctl.records.manifest import MANIFEST
@@ -275,7 +275,7 @@ class _Table:
                 self._refuse_unknown(written, match is None or match[2] is None, where)
             if name in (other for other, _ in chosen.values()):
                 raise UserError(f"column {written} stands there twice", where, f"leave one out that is {name}")
-            chosen[place] = name, _factor(written, unit, units, where)
+            chosen[place] = name, _factor(written, name, unit, units, where)
         for theirs, (name, _) in missing.items():
             fix = meant(theirs, [_name_of(head) for head in heads])
             raise UserError(f"no column {theirs!r}, which is to be {name}", where, fix)
@@ -284,9 +284,14 @@ class _Table:
     def _refuse_unknown(self, written: str, bare: bool, where: str) -> NoReturn:
         choices = [*self.units, *WORDS, *SYNONYMS, "spool_3", "tension_3"]
         if bare:
-            raise UserError(f"column {written!r} is no name with a unit", where, f"name [unit], as in {EXAMPLE}")
-        fix = f"{meant(written, choices)} Else leave it out, or map it with columns"
+            raise _without_unit(written, f"a header as {EXAMPLE}", f"NAME={written} [UNIT]", where)
+        fix = (f"{meant(written, choices)} Else leave it out, or ", Argument("columns", f"NAME={written}", quoted=True))
         raise UserError(f"unknown column {written!r}", where, fix)
+
+
+def _without_unit(written: str, head: str, mapped: str, where: str) -> UserError:
+    fix = (f"{head}; or leave the file as it is: ", Argument("columns", mapped, quoted=True))
+    return UserError(f"column {written!r} has no unit", where, fix)
 
 
 def _name_of(head: str) -> str:
@@ -294,16 +299,18 @@ def _name_of(head: str) -> str:
     return match[1] if match else head.strip()
 
 
-def _factor(name: str, unit: str, units: Units, where: str) -> float:
-    """Factor to SI of a unit, which may be a multiple of one: 0.175 mm."""
+def _factor(written: str, name: str, unit: str, units: Units, where: str) -> float:
+    """Factor to SI of a unit, which may be a multiple of one: 0.175 mm; `name` is what the column is here."""
     if unit in units:
         return units[unit]
-    choices = f"{name} [{'] or ['.join(units)}]"
+    choices = f"{written} [{'] or ['.join(units)}]"
     if not unit:
-        raise UserError(f"column {name!r} is no name with a unit", where, f"{choices}, as in {EXAMPLE}")
+        raise _without_unit(written, choices, f"{name}={written} [{next(iter(units))}]", where)
     scaled = _SCALED.fullmatch(unit)
     if scaled is None or scaled[2] not in units:
-        raise UserError(f"{name} is in {unit!r}", where, f"{choices}, or a multiple such as [0.5 {next(iter(units))}]")
+        raise UserError(
+            f"{written} is in {unit!r}", where, f"{choices}, or a multiple such as [0.5 {next(iter(units))}]"
+        )
     return float(scaled[1]) * units[scaled[2]]
 
 

@@ -210,7 +210,7 @@ def _described(reference: Reference) -> str:
 
 
 RECORDING = ReferenceKind(
-    "a recorded motion: `file`, a CSV with units in its header (docs/motions.md)",
+    "a recorded motion: `file`, a CSV with units in its header (documentation: Motions)",
     course=_course,
     rest=_rest,
     described=_described,

@@ -273,7 +273,7 @@ def spared(wrist: WristParameters, settings: HwRunSettings) -> WristParameters:
     limit = min(wrist.tension_limit, _ASKED * settings.safety.motor_pull)
     if limit <= wrist.pretension:
         problem = f"motors of {settings.safety.motor_pull:g} N cannot hold a pretension of {wrist.pretension:g} N"
-        raise UserError(problem, "safety.motor_pull", "more current (docs/hardware/rig.md), or less wrist.pretension")
+        raise UserError(problem, "safety.motor_pull", "more current (documentation: The rig), or less wrist.pretension")
     return wrist.model_copy(update={"tension_limit": limit})
 
 

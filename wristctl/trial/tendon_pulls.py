@@ -27,8 +27,10 @@ _AGAINST = (
     "tendons pull against each other: they are shorter than at homing, or motors make steps that nobody counts "
     "(wires beside motor wires)"
 )
-_FIX = "cut the motors' supply, slacken the tendons by hand, and look; docs/hardware/load-cells.md"
-_CELL_FIX = "see its plugs, and that DOUT and PD_SCK are not exchanged: docs/hardware/load-cells.md, wristctl hw weigh"
+_FIX = "cut the motors' supply, slacken the tendons by hand, and look (documentation: Load cells)"
+_CELL_FIX = (
+    "see its plugs, and that DOUT and PD_SCK are not exchanged, by wristctl hw weigh (documentation: Load cells)"
+)
 
 
 class _Past(NamedTuple):

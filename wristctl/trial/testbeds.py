@@ -30,7 +30,7 @@ Ask = Callable[[str, Meanwhile], None]
 BEFORE_MOTION = (
     "The motors will now move. Emergency stop within reach, nobody's hands in the tendons, wrist straight, tendons "
     "slack, both markers in the camera's picture; and do the drives' switches let a motor pull {:g} N at most "
-    "(safety.motor_pull; docs/hardware/rig.md)?"
+    "(safety.motor_pull; documentation: The rig)?"
 )
 
 

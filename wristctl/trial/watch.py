@@ -31,7 +31,8 @@ _HISTORY, _SWINGING = 0.2, 1.0
 # Seconds that are summed up: of ticks, of lapsed rates, of commands sent again.
 _TICKS, _EVENTS, _SEEN = 0.5, 1.0, 2.0
 _FIX = (
-    "cut the motors' supply, slacken the tendons by hand, look (docs/hardware/faults.md), then wristctl hw check --rig"
+    "cut the motors' supply, slacken the tendons by hand, look (documentation: Faults and refusals), then wristctl hw "
+    "check --rig"
 )
 _FOLLOWING = "jump", "across", "load", "apart"
 

@@ -78,7 +78,7 @@ def scaled(cells: LoadCells, axis: int, mass: float, empty: Weighing, loaded: We
     more = loaded.counts - empty.counts
     if np.isnan(more[axis]):
         problem = f"the load cell of axis {axis} (tendon {ACTIVE[axis]}) is silent"
-        raise UserError(problem, fix="see its wires: docs/hardware/load-cells.md")
+        raise UserError(problem, fix="see its wires (documentation: Load cells)")
     most = int(np.nanargmax(np.abs(more)))
     if most != axis:
         problem = f"the weight hangs on the load cell of axis {most} (tendon {ACTIVE[most]}), not of axis {axis}"

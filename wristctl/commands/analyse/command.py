@@ -111,7 +111,8 @@ def plan(study: Study, inputs: Inputs) -> str:
     if law.plain:
         reason = f"{law.name} is plain Python, and only compiled controllers can be linearised"
         fix = (
-            "leave out plain=True and write it so that it compiles (docs/lanes.md); simulate shows its answer to a step"
+            "leave out plain=True and write it so that it compiles (documentation: Compiled code); simulate shows its "
+            "answer to a step"
         )
         raise UserError(reason, "simulate.controller", fix)
     if settings.over not in ("loop", *law.gains):

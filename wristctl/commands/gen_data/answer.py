@@ -63,7 +63,7 @@ def answer_of(
     sentence = f"{count} samples of tip position and bending angle, from {number(low)} to {number(high)} deg{source}."
     error, largest = (math.radians(metrics[f"exact_inverse_{name}"]) for name in ("rmse_deg", "max_error_deg"))
     notes = [
-        f"The closed form 2 atan2(y, x) errs by {degrees(error)} deg RMSE on them, at most {degrees(largest)} deg."
+        f"The closed form 2 atan2(y, x) has an RMSE of {degrees(error)} deg there, at most {degrees(largest)} deg off."
     ]
     held = [
         f"{100.0 * metrics[f'held_out_{name}_share']:.3g} % by their {name}"

@@ -156,7 +156,7 @@ def _table(done: pd.DataFrame, labels: Sequence[str], twins: Mapping[int, Simula
     directions = list(dict.fromkeys(done["direction"]))
     by_direction = len(directions) * len(labels) <= ROWS
     heads = (
-        "controller", "direction", "error [deg]", "simulated [deg]", "at the end [deg]", "settling [s]",
+        "controller", "direction", "error [deg]", "simulated [deg]", "final error [deg]", "settling [s]",
         "pushed: [deg]", "recovery [s]",
     )  # fmt: skip
     rows = []

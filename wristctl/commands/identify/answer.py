@@ -60,7 +60,7 @@ def parameter_table(fit: Fit, knowledge: Knowledge, lacking: Mapping[str, float]
         else:
             value_text = number(value)
             interval_text = "fixed" if verdict == "fixed" else f"{number(low)} to {number(high)}"
-        remark = "not told beyond what was assumed" if verdict == "as assumed" else ""
+        remark = "no better known than assumed" if verdict == "as assumed" else ""
         rows.append((name, value_text, interval_text, unit, number(believed), remark))
     return Table("", ("parameter", "value", "95 % interval", "unit", "in the first run's study", ""), rows)
 

@@ -33,7 +33,7 @@ _NEEDED = ("stiffness", "stiffness_across", "damping", "tendon_stiffness")
 
 @dataclass(frozen=True, repr=False, eq=False)
 class BendsTold(StudyResult):
-    """A wrist's springs in two planes, its tendons' places, damping and delay, each with its interval or not told."""
+    """A wrist's springs in two planes, its tendons' places, damping and delay, with intervals or not identifiable."""
 
     kind = "identify"
 
@@ -45,7 +45,7 @@ class BendsTold(StudyResult):
 
     @property
     def answer(self) -> Answer:
-        """Springs in the sentence, then each parameter with its interval or not told."""
+        """Springs in the sentence, then each parameter with its interval or not identifiable."""
         return _answer(self.fit, self.told, self.place if self.yaml else "", _in_one_plane_too(self.study))
 
     @property
@@ -147,7 +147,7 @@ def _told_table(told: Mapping[str, Told]) -> Table:
     rows = []
     for name, one in told.items():
         value, interval = number(one.value), f"{number(one.low)} to {number(one.high)}"
-        rows.append((name, *((value, interval) if one.known else ("not told", "")), one.unit, one.meaning))
+        rows.append((name, *((value, interval) if one.known else ("not identifiable", "")), one.unit, one.meaning))
     return Table("What the readings tell", ("parameter", "value", "95 %", "unit", "meaning"), rows)
 
 
@@ -170,17 +170,17 @@ def what_tells(fit: Fit, lacking: Sequence[str]) -> str:
     if any(name in ("delay", "damping") for name in lacking):
         parts.append("quicker moves")
     listed = joined(parts)
-    return f"{listed[0].upper()}{listed[1:]} tell more (docs/identify.md)." if parts else ""
+    return f"{listed[0].upper()}{listed[1:]} tell more (documentation: Identification)." if parts else ""
 
 
 def _answer(fit: Fit, told: Mapping[str, Told], run: str, square: bool) -> Answer:
     """The answer; `run` is the path of a run with the wrist, `square` whether its tendons are those of one plane."""
     along, across, axis = (told[name] for name in ("stiffness", "stiffness_across", "stiffness_axis_deg"))
     if along.known and across.known:
-        where = f"toward {axis.value:.3g} deg from ulnar" if axis.known else "along an axis that is not told"
+        where = f"toward {axis.value:.3g} deg from ulnar" if axis.known else "along an axis that is not identifiable"
         springs = f"The springs have {along.value:.3g} N m/rad {where}, and {across.value:.3g} across."
     else:
-        springs = "These readings do not tell the springs."
+        springs = "The springs are not identifiable from these readings."
     readings = sum(map(len, fit.residuals))
     left = f"{degrees(float(fit.noise))} deg are left over of {readings} readings (standard deviation)."
     notes = list[str | Table]()

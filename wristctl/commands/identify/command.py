@@ -100,10 +100,11 @@ def plan(study: Study, inputs: Inputs) -> str:
 def identify(session: Session) -> Identified | LogTold | BendsTold:
     """Find stiffness, damping, tendons and delay of a real wrist from logged trials, with 95 % intervals.
 
-    Trials are those of hw-run runs, or of open logs (FILE.csv, docs/open-log.md) of wrists with two or more tendons in
-    one plane or two: of these each parameter comes with its interval or is not told, and which of slack, friction and
-    creep the data want is found by predicting a part of them. With `model: wrist` logs in two planes are of the study's
-    wrist: both stiffnesses, the axis of the springs, and the direction and gain of each tendon.
+    Trials are those of hw-run runs, or of open logs (FILE.csv, documentation: The open log) of wrists with two or more
+    tendons in one plane or two: of these each parameter comes with its interval or is not identifiable, and which of
+    slack, friction and creep the data want is found by predicting a part of them. With `model: wrist` logs in two
+    planes are of the study's wrist: both stiffnesses, the axis of the springs, and the direction and gain of each
+    tendon.
     """
     if session.study.identify.logs:
         return identify_bends(session) if session.study.identify.model == "wrist" else identify_logs(session)

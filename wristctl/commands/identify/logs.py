@@ -42,7 +42,7 @@ class LogTold(StudyResult):
 
     @property
     def answer(self) -> Answer:
-        """Parameters with intervals or not told, the terms that the data want, and what would tell more."""
+        """Parameters with intervals or not identifiable, the terms that the data want, and what would tell more."""
         return told_answer(self.fit, self.models, self.chosen, self.remarks)
 
     def frame(self) -> pd.DataFrame:
@@ -162,14 +162,14 @@ def _refuse(session: Session, result: LogTold, recordings: Sequence[ArcRecording
 
 
 def told_answer(fit: ArcFit, models: Sequence[TriedModel], chosen: TriedModel, remarks: Sequence[str] = ()) -> Answer:
-    """Parameters with intervals or not told, the terms that the data want, and what would tell more."""
+    """Parameters with intervals or not identifiable, the terms that the data want, and what would tell more."""
     from wristctl.commands.validate.answer import parameters_table, wanted_terms
 
     unit, scale = fit.robot.unit, fit.robot.scale
     error, low, high = (f"{scale * value:.3g}" for value in chosen.score[:3])
     told = [name for name, one in fit.told.items() if one.known and one.low > 0.0]
     sentence = (
-        f"These data tell {joined(told) or 'nothing of the parameters'}. Of the part that was not fitted the model "
+        f"Identified: {joined(told) or 'none of the parameters'}. Of the part that was not fitted the model "
         f"predicts the {fit.robot.measured} to {error} {unit} RMS (95 % {low} to {high})."
     )
     notes: list[str | Table] = [wanted_terms(models), *remarks]
@@ -177,7 +177,7 @@ def told_answer(fit: ArcFit, models: Sequence[TriedModel], chosen: TriedModel, r
         more = (
             "" if "softening" in fit.values else "; trials with several masses tell how much a load softens the wrist"
         )
-        notes.append(f"Stiffness in N m/rad is not told: it needs tension_1 [N], ... of all tendons{more}.")
+        notes.append(f"Stiffness in N m/rad is not identifiable: it needs tension_1 [N], ... of all tendons{more}.")
     return Answer(
         sentence,
         parameters_table([fit], "").within(COLUMNS),

@@ -148,20 +148,22 @@ def _sentence(result: Recommended) -> str:
     values = ", ".join(_gain(best, name) for name in best.gains)
     sentence = (
         f"Use {best.controller} with {values}. Expect an error of {degrees(median)} deg RMSE ({degrees(low)} to "
-        f"{degrees(high)} deg on 8 of 10 simulated rigs), {two(ranked.gains[row].value)} times less than "
-        "without feedback."
+        f"{degrees(high)} deg on 8 of 10 simulated rigs), {two(ranked.gains[row].value)} times lower than "
+        "feedforward alone."
     )
     if lost := _lost(ranked, row):
         sentence += f" It {lost} of {ranked.count} rigs."
     first = ranked.standing.groups[0]
     if row in first:
         others = joined([result.candidates[other].label for other in first if other != row])
-        why = "with feedback, and at most a quarter more error, it is lost on the fewest rigs, with the fewest gains"
+        why = (
+            "with feedback, and at most a quarter more error, it is unstable on the fewest rigs, with the fewest gains"
+        )
         return f"{sentence} No test tells {others} from it: {why}." if others else sentence
     lesser = [other for other in first if other in result.near]
     least = ranked.means[row].value / min(ranked.means[other].value for other in lesser)
     others, be = joined([result.candidates[other].label for other in lesser]), "are" if lesser[1:] else "is"
-    return f"{sentence} {others} would err up to {two(least)} times less, and {be} lost on more rigs."
+    return f"{sentence} {others} would err up to {two(least)} times less, and {be} unstable on more rigs."
 
 
 def _gain(candidate: Candidate, name: str) -> str:
@@ -184,7 +186,7 @@ def _table(result: Recommended) -> Table:
     for k in ranked.standing.order:
         low, median, high = (degrees(error) if math.isfinite(error) else "-" for error in spread(ranked.rows[k].rmse))
         lost = _lost(ranked, k)
-        rows.append((result.candidates[k].label, median, f"{low} to {high}", lost or "holds on all"))
+        rows.append((result.candidates[k].label, median, f"{low} to {high}", lost or "stable on all"))
     heads = ("controller (gains)", "error [deg]", "on 8 of 10 rigs [deg]", f"of {ranked.count} simulated rigs")
     return Table("", heads, rows)
 
@@ -197,7 +199,7 @@ def files_table(candidates: Sequence[Candidate]) -> Table:
 
 
 def _lost(ranked: WorldRanking, k: int) -> str:
-    """On how many rigs a candidate fails, and on how many it swings and by how much; empty where it holds on all."""
+    """On how many rigs a candidate fails, and on how many it swings and by how much; empty where stable on all."""
     failures, swings = ranked.standing.failures[k].times, ranked.standing.swings[k].times
     swing = ranked.rows[k].measured.largest_swing(ranked.rows[-1].measured)
     size = f"swings by up to {degrees(swing)} deg" if swing > 0.0 else "chatters"

@@ -96,7 +96,7 @@ def sentence(
     if metrics:
         text += f": {least(table, keys, metrics[0], units)}"
         if not unmeasurable(table[metrics[0]], units[metrics[0]]).all():
-            text += f", and most, {' at '.join(_extreme(table, keys, metrics[0], units, 'idxmax'))}"
+            text += f"; highest {' at '.join(_extreme(table, keys, metrics[0], units, 'idxmax'))}"
     for fate, count in fates(table).items():
         text += f"; {count} of {len(table)} rollouts: {fate}"
     return f"{text}."
@@ -109,7 +109,7 @@ def least(table: pd.DataFrame, keys: Sequence[str], metric: str, units: Mapping[
         bound = in_unit(metric, float(measurable(0.0, units[metric])), units)
         where = f"{tiny} of {count} rollouts, such as {_extreme(table, keys, metric, units, 'idxmin')[1]}"
         return f"{metric} is below {bound} at {'every point' if tiny == count else where}"
-    return f"{metric} is least, {' at '.join(_extreme(table, keys, metric, units, 'idxmin'))}"
+    return f"lowest {metric} {' at '.join(_extreme(table, keys, metric, units, 'idxmin'))}"
 
 
 def _extreme(

@@ -23,11 +23,11 @@ def answer_of(errors: Table, held_out: int, kept: tuple[str, int], run: str) -> 
     rows = [(row[0], row[1], _deg(row[3]), _deg(row[4])) for row in errors.rows]
     rmse, largest = next(row[2:] for row in rows if row[0] == "network")
     sentence = (
-        f"On {held_out} samples that it was not trained on the network{f' {name}' * (networks > 1)} errs by {rmse} deg "
-        f"RMSE, at most {largest} deg."
+        f"On {held_out} samples that it was not trained on the network{f' {name}' * (networks > 1)} has an RMSE of "
+        f"{rmse} deg, at most {largest} deg off."
     )
     closed, most = next(row[2:] for row in rows if row[0] == _CLOSED_FORM)
-    sentence += f" The closed form 2 atan2(y, x) errs by {closed} deg there, at most {most} deg."
+    sentence += f" The closed form 2 atan2(y, x) has one of {closed} deg, at most {most} deg off."
     named = [("closed form" if row[0] == _CLOSED_FORM else row[0], *row[1:]) for row in rows]
     notes = [f"It is the one of {networks} networks with the least validation loss."] * (networks > 1)
     if run:

@@ -96,7 +96,7 @@ def parameters_table(fits: Sequence[ArcFit], title: str = "What the data tell of
     several, rows = len(fits) > 1, []
     for fit in fits:
         for name, told in fit.told.items():
-            value = number(told.value) if told.known else "not told"
+            value = number(told.value) if told.known else "not identifiable"
             interval = f"{number(told.low)} to {number(told.high)}" if told.known else ""
             rows.append((*([fit.recordings[0].name] * several), name, value, interval, told.unit, told.meaning))
     heads = (*["recording"] * several, "parameter", "value", "95 %", "unit", "meaning")
