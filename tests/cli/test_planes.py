@@ -40,7 +40,7 @@ def test_commands_that_bend_in_two_planes_are_those_that_the_pages_name(call: Ca
         text = " ".join((ROOT / "docs" / page).read_text(encoding="utf-8").split())
         (said,) = re.findall(r"Commands that bend in two planes: (.*?\))\.", text)
         assert dict(re.findall(r"`([\w-]+)` \((?:with )?(\w+)", said)) == taking, page
-    assert any_tendons == {"simulate"} and set(COMMANDS) > WRIST
+    assert any_tendons == {"simulate", "gen-data", "train"} and set(COMMANDS) > WRIST
 
 
 def test_in_one_plane_all_take_a_fifth_tendon_in_the_centre_and_three_bend_in_two(call: Call) -> None:
@@ -54,3 +54,15 @@ def test_in_one_plane_all_take_a_fifth_tendon_in_the_centre_and_three_bend_in_tw
 def test_a_rig_says_what_takes_a_wrist_that_its_motors_do_not_wind(call: Call, motion: tuple[str, ...]) -> None:
     _, _, err = call("hw-run", *motion, "--set", "wrist.tendons=three", "--dry-run")
     assert "hw-run moves four tendons" in err and "wristctl simulate bends this wrist in two planes" in err
+
+
+def test_the_table_of_the_readme_says_which_command_bends_in_two_planes_and_takes_three_tendons(call: Call) -> None:
+    text = (ROOT / "README.md").read_text(encoding="utf-8")
+    table = text.partition("| command | one plane | two planes | tendons |")[2].partition("\n\n")[0]
+    rows = [[cell.strip() for cell in line.strip("|").split("|")] for line in table.splitlines()[2:]]
+    said = {name: row for row in rows for name in re.findall(r"`([\w-]+)`", row[0])}
+    for command, motion in TWO_PLANES.items():
+        assert (said[command][2] == "yes") == _takes(call, command, *motion), command
+    for command in WRIST:
+        takes = _takes(call, command, *TWO_PLANES.get(command, ()), "--set", "wrist.tendons=three")
+        assert said[command][3].startswith(("three", "any")) == takes, command

@@ -111,7 +111,7 @@ def commands() -> Iterator[list[str]]:
 
 def test_the_page_names_commands_that_there_are() -> None:
     typed = list(commands())
-    assert [each[0] for each in typed] == ["new", "check-controller", "simulate", "tune", "compare", "hw-run"]
+    assert [each[0] for each in typed] == ["new", "check-controller", "simulate", "hw-run", "tune", "compare", "hw-run"]
 
 
 @pytest.mark.skipif(not THOROUGH, reason="takes minutes: WRISTCTL_THOROUGH=1")
@@ -122,7 +122,7 @@ def test_a_stranger_who_types_the_page_gets_a_row_in_compare_and_a_trial_in_hw_r
         done = wristctl(tmp_path, *typed)
         assert done.returncode == 0, (typed, done.stderr)
     runs = face.runs(out=tmp_path / "results")
-    assert runs["kind"].tolist() == ["simulate", "tune", "compare", "hw-run"] and set(runs["state"]) == {"ok"}
+    assert runs["kind"].tolist() == ["simulate", "hw-run", "tune", "compare", "hw-run"] and set(runs["state"]) == {"ok"}
     compared = face.open_run("latest:compare", tmp_path / "results").data("comparison")
     assert {"my-law"} < set(compared["controller"])
     trials = face.open_run("latest:hw-run", tmp_path / "results").data("trials")

@@ -237,7 +237,7 @@ def _identified_yaml(earlier: Run | _Identification) -> str:
         text = getattr(earlier, "yaml", "")
     if not text:
         run = earlier.id if isinstance(earlier, Run) else "identify"
-        fix = "identify runs of hw-run, or logs in two planes with model: wrist (documentation: Identification)"
+        fix = "identify runs of hw-run, or logs in two planes with model: wrist (documentation: System identification)"
         raise UserError("no wrist was identified there: its log told ratios alone, or too little", run, fix)
     return text
 

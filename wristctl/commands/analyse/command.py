@@ -44,7 +44,7 @@ if TYPE_CHECKING:
 
     import pandas as pd
 
-    from wristctl.config.loop import Loop, sample_period
+    from wristctl.config.loop import Loop
     from wristctl.stability.loop_analysis import AnalysedRow, LoopAnalysis, RootLocus
     from wristctl.stability.phase_portrait import PhasePortrait
     from wristctl.wrist.kinematics import Inverse
@@ -184,6 +184,7 @@ def _angles(study: Study, network: Inverse | None) -> list[float]:
 
     A reference that never rests ends at its farthest.
     """
+    from wristctl.config.loop import sample_period
     from wristctl.simulation.reference import motion, toward
     from wristctl.wrist.directions import in_plane
 

@@ -170,7 +170,7 @@ def what_tells(fit: Fit, lacking: Sequence[str]) -> str:
     if any(name in ("delay", "damping") for name in lacking):
         parts.append("quicker moves")
     listed = joined(parts)
-    return f"{listed[0].upper()}{listed[1:]} tell more (documentation: Identification)." if parts else ""
+    return f"{listed[0].upper()}{listed[1:]} tell more (documentation: System identification)." if parts else ""
 
 
 def _answer(fit: Fit, told: Mapping[str, Told], run: str, square: bool) -> Answer:
