@@ -148,7 +148,7 @@ def test_of_names_the_one_that_was_meant_comes_first_and_each_once(override: str
         ("tune", "--set 'controllers=[pid-ff, adrc]'"),
         ("recommend", "--set 'controllers=[pid-ff, adrc]'"),
         ("compare", "--set 'controllers=[{controller: pid-ff, gains: default}, {controller: adrc, gains: default}]'"),
-        ("hw-run", "--set 'controllers=[{controller: pid-ff, gains: default}, {controller: adrc, gains: default}]'"),
+        ("hw-run", "--controller pid-ff"),
         ("gen-data", ""),
     ],
 )
