@@ -38,4 +38,4 @@ def test_of_several_networks_the_kept_one_is_named(networks: int) -> None:
     rows = [("network", "test samples", 0.9, 0.5, 2.0), ("exact inverse", "test samples", 0.9, 3.0, float("inf"))]
     words = " ".join(answer_of(Table("", "abcde", rows), 8, ("tan-8", networks), "").lines())
     assert ("tan-8" in words) == ("of 3 networks" in words) == (networks == 3)
-    assert "RMSE of 0.5 deg, at most 2 deg" in words and "3 deg there, at most - deg" in words
+    assert "RMSE of 0.5 deg, at most 2 deg" in words and "one of 3 deg, at most - deg" in words
