@@ -156,10 +156,12 @@ def test_a_motion_in_one_plane_is_the_same_with_gravity_from_the_side(direction:
     assert not done.course.bend_ref[:, 1 - plane].any()
 
 
-def test_three_tendons_bend_in_two_planes_and_not_in_one() -> None:
-    with pytest.raises(UserError, match="two tendons on either side"):
-        wristctl.simulate(study_of("wrist.tendons=three"))
-    assert simulated("wrist.tendons=three", "simulate.reference.kind=circle").course.pulls.shape[1] == 3
+@pytest.mark.parametrize("kind", ["minimum-jerk", "circle"])
+def test_three_tendons_bend_in_two_planes_on_any_reference(kind: str) -> None:
+    course = simulated("wrist.tendons=three", f"simulate.reference.kind={kind}").course
+    assert course.pulls.shape[1] == 3 and not course.failed
+    with pytest.raises(UserError, match="in two planes, and the loop in one"):
+        wristctl.simulate(study_of("wrist.tendons=three", f"simulate.reference.kind={kind}", "simulate.loop.planes=1"))
 
 
 @pytest.mark.parametrize("setting", ["slack=[1e-3]", "broken_tendon=2"])
