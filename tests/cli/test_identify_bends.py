@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -98,6 +99,9 @@ def test_three_tendons_are_simulated_and_identified_and_all_else_says_what_takes
     found = open_run(out.splitlines()[-1])
     assert found.metrics["stiffness"]["value"] == pytest.approx(0.5, rel=0.05)
     assert not (found.path / "data" / "posterior.yaml").exists() and "wristctl compare" not in out
+    (advised,) = (shlex.split(line)[1:] for line in out.splitlines() if line.startswith("wristctl "))
+    code, out, err = call(*advised)
+    assert code == 0 and "circumduction" in out and "3 tendons" in " ".join(out.split()), err
     code, out, _ = call("simulate", "--from-identified", found.id, "--dry-run")
     assert code == 0 and "one rollout of 5 s in two planes" in out
     for command in ("tune", "recommend", "hw-run"):

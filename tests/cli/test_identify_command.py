@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from pathlib import Path
 
 import numpy as np
@@ -77,11 +78,14 @@ def test_commands_say_whose_wrist_they_took_and_hand_it_on_in_what_they_advise(c
     short = ("--set", "simulate.horizon=0.06", "--set", "simulate.reference.duration=0.05")  # where nothing arrives
     code, out, err = call("simulate", *takes, "--controller", "pd-ff", *short)
     advised = next(line for line in out.splitlines() if line.startswith("wristctl tune "))
-    assert code == 0 and " ".join(takes) in advised
+    search_here = load_study([Path(shlex.split(advised)[-1])])
+    assert code == 0 and search_here.wrist.stiffness == 0.4 and search_here.tune.controllers == ("pd-ff",)
+    assert [loop.actuator.tendon_stiffness for loop in search_here.tune.loops.values()] == [9e3]
     search = ("tune.controllers=[pd-ff]", "tune.iterations=1", "tune.candidates=2")
     code, out, err = call("tune", *takes, *(word for key in search for word in ("--set", key)))
     advised = next(line for line in out.splitlines() if line.startswith("wristctl simulate "))
-    assert code == 0 and " ".join(takes) in advised
+    once = load_study([Path(shlex.split(advised)[-1])])
+    assert code == 0 and once.wrist.stiffness == 0.4 and once.simulate.loop.actuator.tendon_stiffness == 9e3
     assert "the paper's wrist" in " ".join(call("simulate")[1].split())
 
 

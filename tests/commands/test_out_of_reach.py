@@ -135,13 +135,11 @@ def test_a_loop_beyond_its_tendons_is_warned_of_before_and_no_gains_are_advised(
     for beyond in (True, False):
         caplog.clear()
         study = study_of("simulate.controller=ct-dob", *(() if beyond else ("wrist.tension_limit=106",)))
-        given = replace(session(study), typed=("my wrist.yaml", "--set", "wrist.length=0.12"))
         with caplog.at_level(logging.WARNING):
-            said = " ".join(SIMULATE.perform(given).summary)
+            said = " ".join(SIMULATE.perform(session(study)).summary)
         assert ("cannot hold" in caplog.text) is beyond
         assert ("106 N" in said and "16.7 deg" in said and "0.0361 m" in said) is beyond
-        advised = "wristctl tune 'my wrist.yaml' --set wrist.length=0.12 --set 'tune.controllers=[ct-dob]'"
-        assert ("wristctl tune" in said) is not beyond and (advised in said) is not beyond
+        assert ("`tune` may find gains that do" in said) is not beyond
 
 
 @pytest.mark.parametrize("family", ["ideal", "camera", "uneven", "handling", "steps"])

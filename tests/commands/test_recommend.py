@@ -14,10 +14,11 @@ from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
 import wristctl
+from wristctl.commands.kept_studies import gains_content, hw_run_fits, row_of, study_text
 from wristctl.commands.recommend.answer import NEAR, RECOMMENDED, Candidate, Recommended, spread
 from wristctl.commands.recommend.command import FAMILY, TOLERATED, _limit, reach_deg
 from wristctl.commands.recommend.figures import errors
-from wristctl.commands.recommend.study_file import hw_run_fits, next_command, study_file
+from wristctl.commands.recommend.study_file import next_command, sections_of
 from wristctl.config.loop import Loop, Reference
 from wristctl.config.study import Study
 from wristctl.config.wrist import WristParameters
@@ -407,7 +408,9 @@ def test_its_file_has_the_wrist_and_the_rig_for_simulate_compare_and_hw_run(
     tmp_path: Path, reach: float, asked: float, largest: float
 ) -> None:
     made_for = study_of(RIG, "wrist.length=0.11")
-    (tmp_path / "best.yaml").write_text(study_file(made_for, [BEST, OTHER], ["pid-ff", "ct-dob"], reach))
+    rows = [row_of(one.controller, one.gains, 6) for one in (BEST, OTHER)]
+    written = study_text("best", gains_content(made_for, rows, **sections_of(made_for, reach)))
+    (tmp_path / "best.yaml").write_text(written)
     (tmp_path / "before.yaml").write_text("wrist: {length: 0.2, stiffness: 9}\nsimulate: {controller: smc}\n")
     read = load_study([tmp_path / "before.yaml", tmp_path / "best.yaml"])
     rig = made_for.recommend.loop
@@ -425,8 +428,9 @@ def test_its_file_has_the_wrist_and_the_rig_for_simulate_compare_and_hw_run(
 @pytest.mark.parametrize("loop", ["control_period=1.0e-3", "sensor.level=ideal", "actuator.level=lagged"])
 def test_a_rig_that_hw_run_cannot_have_is_left_out_of_its_section(tmp_path: Path, loop: str) -> None:
     other = study_of(RIG, f"recommend.loop.{loop}")
-    assert hw_run_fits(study_of(RIG)) and not hw_run_fits(other)
-    (tmp_path / "best.yaml").write_text(study_file(other, [BEST], [BEST.controller], 45.0))
+    assert [hw_run_fits(study, study.recommend.loop) for study in (study_of(RIG), other)] == [True, False]
+    content = gains_content(other, [row_of(BEST.controller, BEST.gains)], **sections_of(other, 45.0))
+    (tmp_path / "best.yaml").write_text(study_text("best", content))
     read = wristctl.load_study(tmp_path / "best.yaml")
     assert read.hw_run.actuator == Study().hw_run.actuator and read.hw_run.rows[0].controller == "pid-ff"
     assert read.simulate.loop.actuator == other.recommend.loop.actuator

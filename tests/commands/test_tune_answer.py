@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
+import shlex
 from collections.abc import Sequence
-from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
@@ -56,8 +56,12 @@ def test_figures_are_those_of_the_search_and_fit_a_screen(tuned: Tuned) -> None:
     assert {row[0]: row[1] for row in tuned.answer.table.rows} == {
         name: tuned.metrics[f"{name}_objective"] for name in tuned.searches
     }
-    assert tuned.run is not None and Path(tuned.run.path / "config.yaml").is_file()
-    assert any(str(tuned.run.path / "config.yaml") in line for line in lines if line.startswith("wristctl simulate"))
+    assert tuned.run is not None
+    (simulate,) = (line for line in lines if line.startswith("wristctl "))
+    assert shlex.split(simulate) == ["wristctl", "simulate", f"{tuned.run.path}/data/controllers/{best}.yaml"]
+    for name, gains in tuned.gains.items():
+        once = load_study(tuned.run.file(f"data/controllers/{name}.yaml")).simulate
+        assert (once.controller, once.gains) == (name, gains), "to the last bit"
 
 
 def test_the_error_stands_beside_that_of_feedforward_on_the_same_cases(tuned: Tuned) -> None:

@@ -1,6 +1,7 @@
 """`wristctl hw emulate` and `watch`."""
 
 import logging
+import shlex
 import time
 from pathlib import Path
 from typing import Annotated, Any
@@ -132,7 +133,8 @@ def watch(
         if going_on:
             time.sleep(every)
     if not drawn:
-        raise UserError("the run ended before its first trial", str(run.path), f"wristctl runs show {run.id}")
+        shows = f"wristctl runs show {shlex.quote(str(run.path))}"
+        raise UserError("the run ended before its first trial", str(run.path), shows)
     print(file)
 
 

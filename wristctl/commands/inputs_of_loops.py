@@ -207,11 +207,6 @@ def wrist_identified(inputs: Inputs) -> str:
     return f"the wrist identified in {run.id}" if run else "the identified wrist"
 
 
-def with_option(run: str | None) -> list[str]:
-    """Words of a command that takes its wrist from an identification, by the name of its run; none without one."""
-    return ["--from-identified", run] if run else []
-
-
 def _gains(earlier: Run | _Tuning) -> Gains:
     from wristctl.control.table import read_gains
 

@@ -2,6 +2,7 @@
 
 import json
 import math
+import shlex
 import traceback
 from collections.abc import Container, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
@@ -276,7 +277,7 @@ def redrawn(run: Run, show: ShowProgress) -> StudyResult:
         raise UserError(
             f"again it finds something else: {different[0]}{f' and {len(different) - 1} more' * (len(different) > 1)}",
             str(run.path),
-            f"wristctl runs replay {run.id} says why",
+            f"wristctl runs replay {shlex.quote(str(run.path))} says why",
             exit_code=3,
         )
     return result

@@ -261,11 +261,13 @@ def _rms(residuals: Sequence[Array]) -> float:
     return float(np.sqrt(np.mean(np.concatenate(residuals) ** 2)))
 
 
-def bends_yaml(fit: Fit, knowledge: Knowledge, count: int, rng: np.random.Generator) -> tuple[str, str]:
-    """A study file of the wrist that was found, and one with a family of so many draws of what is left open.
+def bends_yaml(
+    fit: Fit, knowledge: Knowledge, wrist: WristParameters, count: int, rng: np.random.Generator
+) -> tuple[str, str]:
+    """A study file of what was found, and one of the whole wrist with a family of so many draws of what is left open.
 
     The first has each tendon's place. The second is for commands in one plane, whose wrist has its tendons on a square:
-    there their radius is the mean.
+    there their radius is the mean. `wrist` has what was not to be found.
     """
     problem = fit.problem
     assert isinstance(problem, BendProblem)
@@ -282,5 +284,5 @@ def bends_yaml(fit: Fit, knowledge: Knowledge, count: int, rng: np.random.Genera
         for number, place in problem.places.items()
     ]
     draws = [problem.planar(draw) for draw in posterior_draws(fit, knowledge, count, rng)]
-    family = identified_yaml(values, camera) + posterior_yaml(draws, values, camera, 1.0 / rate)
+    family = identified_yaml(values, camera, known=wrist) + posterior_yaml(draws, values, camera, 1.0 / rate)
     return identified_yaml(values, camera, places), family

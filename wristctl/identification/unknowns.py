@@ -1,5 +1,6 @@
 """Identifiable parameters and their coordinates: logarithms of what is positive, friction and delay as they are."""
 
+import json
 import math
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
@@ -88,13 +89,19 @@ _WRIST = ("stiffness", "flexion_ratio", "stiffness_axis_deg", "damping", "tendon
 
 
 def identified_yaml(
-    values: Mapping[str, float], camera: Mapping[str, float], places: Sequence[tuple[float, float]] = ()
+    values: Mapping[str, float],
+    camera: Mapping[str, float],
+    places: Sequence[tuple[float, float]] = (),
+    known: WristParameters | None = None,
 ) -> str:
     """A study file: the wrist, and the actuator and sensor of `simulate`, with these parameters.
 
-    `places` are directions [rad] and radii [m] of the tendons, where they are not those of `wrist.tendons`.
+    `places` are directions [rad] and radii [m] of the tendons, where they are not those of `wrist.tendons`. With a
+    `known` wrist the file has what of it was not to be found, too: geometry, masses and pose.
     """
-    lines = ["wrist:", *(f"  {name}: {values[name]!r}" for name in _WRIST if name in values)]
+    found = {name: values[name] for name in _WRIST if name in values}
+    whole = known.model_dump(mode="json") if known else {}
+    lines = ["wrist:", *(f"  {name}: {json.dumps(value)}" for name, value in (whole | found).items())]
     if places:
         lines.append("  tendons:")
         lines += [f"    - {{angle_deg: {math.degrees(angle)!r}, radius: {radius!r}}}" for angle, radius in places]

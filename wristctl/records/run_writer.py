@@ -123,9 +123,12 @@ class LiveRun:
     """The writing side of a run directory, handed out by `start_run`."""
 
     def __init__(
-        self, path: Path, manifest: Manifest, page: Page | None = None, files: Mapping[str, str] | None = None
-    ) -> None:
+        self, path: Path, manifest: Manifest, page: Page | None = None, files: Mapping[str, str] | None = None,
+        code: Mapping[str, str] | None = None,
+    ) -> None:  # fmt: skip
         self.path, self.id, self._page, self.files = path, manifest.id, page, dict(files or {})
+        self.code = dict(code or {})
+        """References to the copied code, by those of the originals."""
         self._home = path.stat()
         kept = (*_PROVENANCE, *self.files.values(), *manifest.code.foreign)
         self._provenance = {name: sha256_of(path / name) for name in kept if (path / name).is_file()}

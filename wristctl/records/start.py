@@ -15,7 +15,7 @@ from wristctl.config.foreign import Foreign
 from wristctl.config.study import Study
 from wristctl.errors import OUT, Argument, UserError, error_of_the_system
 from wristctl.interrupt import deferred, interrupts, undisturbed
-from wristctl.records.copied_inputs import SealedFiles, copy_code, sealed_files, write_files
+from wristctl.records.copied_inputs import SealedFiles, copy_code, sealed_files, sealed_references, write_files
 from wristctl.records.files import replacing, sha256_of, sync, write_text
 from wristctl.records.journal import now
 from wristctl.records.lock import RunLock
@@ -193,6 +193,7 @@ def _begin(
         ),
         page,
         files.names,
+        sealed_references(foreign),
     )
 
 

@@ -126,7 +126,7 @@ def show(
     shown_tables = _run_tables(run, tags, metrics or not answer)
     print("\n\n".join(table.text() for table in shown_tables), end="\n\n")
     if answer and not metrics and run.metrics:
-        say(f"{len(run.metrics)} metrics: wristctl runs show {run.id} --metrics")
+        say(f"{len(run.metrics)} metrics: wristctl runs show {shlex.quote(str(run.path))} --metrics")
     say(run.path)
 
 

@@ -59,7 +59,7 @@ def answer_of(
         (" ".join(filter(None, [gains_of_best(rankings, gains or {}), compared(rankings), more])), more),
         (ties(rankings, names), ""),
         (certainty(rankings), ""),
-        ("Your own wrist: `wristctl compare controllers mywrist.yaml` (documentation: Your own wrist).", ""),
+        ("Your own wrist: `wristctl init DIR` begins a folder for it (documentation: Your own wrist).", ""),
     ]
     return fitted(Answer(advice(rankings), ranking_table(rankings, names)), notes)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import shlex
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -47,11 +48,12 @@ def counted(count: int, name: str) -> str:
 
 
 def answer_of(
-    inputs: Sequence[str], metrics: Mapping[str, float], run: str, measured: Measured | None = None
+    inputs: Sequence[str], metrics: Mapping[str, float], run: str, split: str | None, measured: Measured | None = None
 ) -> Answer:
     """What was drawn, or read of recordings.
 
-    `inputs` are those beside the tip, `run` is the path of the run, empty in memory.
+    `inputs` are those beside the tip, `run` is the path of the run, empty in memory; `split` is how `train` can part
+    the samples, None where it cannot.
     """
     count = int(metrics["samples"])
     low, high = (metrics[f"theta_{end}_deg"] for end in ("min", "max"))
@@ -71,8 +73,11 @@ def answer_of(
         if metrics[f"held_out_{name}_share"] > 0.0
     ]
     notes += [f"Held out of training: {', '.join(held)}."] * bool(held)
-    if run:
-        notes += ["Next, train a network on them:", f"$ wristctl train --data {run}"]
+    if run and split is not None:
+        parted = ["--set", f"split={split}"] * (split != "recording")
+        words = ["wristctl", "train", f"{run}/config.yaml", *parted, "--data", run]
+        neighbours = ", which is tested by neighbours of what it was trained on" * bool(parted)
+        notes += [f"Next, train a network on them{neighbours}:", f"$ {shlex.join(words)}"]
     more = f"The samples: {run}/data/samples.npz" if run else ""
     return Answer(sentence, Table("", ("quantity", "least", "greatest", "unit"), _rows(inputs, metrics)), notes, more)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -14,6 +15,7 @@ from wristctl.commands.printed_table import Table
 from wristctl.commands.procedure import Procedure
 from wristctl.commands.results import StudyResult
 from wristctl.commands.session import Session
+from wristctl.config.learning import TrainSettings
 from wristctl.config.study import Study
 from wristctl.errors import Argument, Call, Setting, UserError
 from wristctl.records import Run
@@ -42,7 +44,7 @@ class Generated(StudyResult):
     @property
     def answer(self) -> Answer:
         """What was drawn or read, with its ranges in deg and mm."""
-        return answer_of(self.samples.names, self.metrics, self.place, self.measured)
+        return answer_of(self.samples.names, self.metrics, self.place, split_of(self.samples), self.measured)
 
     def frame(self) -> pd.DataFrame:
         """One row per sample: x, y, the other inputs, theta, arc_length; SI units."""
@@ -147,6 +149,22 @@ def drawn(
 
         return draw_equilibria(settings, study.wrist, rng, advance)
     return draw_samples(settings, study.wrist, rng)
+
+
+def split_of(samples: Samples) -> str | None:
+    """How `train` can part samples: by recordings, else by samples; None where there are too few for either."""
+    import numpy as np
+
+    from wristctl.learning.dataset import split_samples
+
+    settings = TrainSettings()
+    for split, recording in (("recording", samples.recording), ("sample", None)):
+        with suppress(UserError):
+            split_samples(
+                len(samples.theta), settings.train_share, np.random.default_rng(0), samples.held_out, recording
+            )
+            return split
+    return None
 
 
 def samples_of(source: Run | Generated) -> Samples:

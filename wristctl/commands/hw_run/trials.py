@@ -262,8 +262,8 @@ def _tell_oddities(session: Session, experiment: Experiment) -> None:
             findings.metric(f"greatest_{name}", most[name], unit, "lower", meaning=meaning)
             parts.append(f"{name} {line.shown(most[name])} of {line.shown(limit)}")
     if parts:
-        limits = f"Greatest residuals, and their limits: {', '.join(parts)}. wristctl hw limits --from this run."
-        findings.summary(limits)
+        again = f" Tick by tick: `wristctl hw limits --from {findings.run.path.name}`." if findings.run else ""
+        findings.summary(f"Greatest residuals, and their limits: {', '.join(parts)}.{again}")
     for number, words in experiment.odd.items():
         if words and experiment.outcomes.get(number) == "ok":
             text = f"Trial {number} went through, but was odd: {words}"

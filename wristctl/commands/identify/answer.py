@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
@@ -14,8 +15,18 @@ if TYPE_CHECKING:
     from wristctl.identification.lack_of_fit import Suspicion
 
 
-def found_answer(fit: Fit, knowledge: Knowledge, suspected: Sequence[Suspicion], run: str) -> Answer:
-    """What was found; `run` is the path of its run, empty in memory."""
+def simulation_of(run: str, known: str) -> str:
+    """Command that simulates the wrist that a run found, of a study file with what was known of it."""
+    return shlex.join(["wristctl", "simulate", known, "--from-identified", run])
+
+
+def comparison_on(run: str) -> str:
+    """Command that compares controllers on the wrists that a run leaves possible."""
+    return shlex.join(["wristctl", "compare", f"{run}/data/posterior.yaml", "--set", "worlds.family=posterior"])
+
+
+def found_answer(fit: Fit, knowledge: Knowledge, suspected: Sequence[Suspicion], run: str, known: str) -> Answer:
+    """What was found; `run` is the path of its run, empty in memory, `known` a study file with the wrist's geometry."""
     trials, frames = len(fit.problem.trials), sum(map(len, fit.residuals))
     names = ", ".join(fit.problem.free)
     sentence = (
@@ -26,8 +37,8 @@ def found_answer(fit: Fit, knowledge: Knowledge, suspected: Sequence[Suspicion],
     if run:
         notes += [
             "Next, simulate the wrist that was found, or compare controllers on those that the trials leave possible:",
-            f"$ wristctl simulate --from-identified {run}",
-            f"$ wristctl compare {run}/data/posterior.yaml --set worlds.family=posterior",
+            f"$ {simulation_of(run, known)}",
+            f"$ {comparison_on(run)}",
         ]
     more = f"Correlations, residuals and assumptions: --all. The study file: {run}/data/identified.yaml" if run else ""
     return Answer(sentence, parameter_table(fit, knowledge, {}), notes, more)

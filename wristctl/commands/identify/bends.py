@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from wristctl.commands.answer import Answer
+from wristctl.commands.identify.answer import comparison_on, simulation_of
 from wristctl.commands.inputs import Inputs
 from wristctl.commands.printed_table import COLUMNS, Table, degrees, joined, number
 from wristctl.commands.results import StudyResult
@@ -121,7 +122,7 @@ def identify_bends(session: Session) -> BendsTold:
     yaml = ""
     if all(told[name].known for name in _NEEDED):
         rng = np.random.default_rng(findings.stream("posterior"))
-        yaml, family = bends_yaml(fitted, known, _DRAWS, rng)
+        yaml, family = bends_yaml(fitted, known, session.study.wrist, _DRAWS, rng)
         findings.text("data/identified.yaml", yaml)
         if _in_one_plane_too(session.study):
             findings.text("data/posterior.yaml", family)
@@ -190,8 +191,8 @@ def _answer(fit: Fit, told: Mapping[str, Told], run: str, square: bool) -> Answe
         compares = ", or compare controllers on those that the readings leave possible"
         notes += [
             f"Next, bend the wrist that was found{compares * square}:",
-            f"$ wristctl simulate --from-identified {run} --reference circumduction",
-            *[f"$ wristctl compare {run}/data/posterior.yaml --set worlds.family=posterior"] * square,
+            f"$ {simulation_of(run, f'{run}/config.yaml')} --reference circumduction",
+            *[f"$ {comparison_on(run)}"] * square,
         ]
     table = _told_table(told)
     return Answer(f"{springs} {left}", Table("", table.columns, table.rows).within(COLUMNS), notes, "Figures: --all.")

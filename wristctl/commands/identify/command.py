@@ -49,11 +49,13 @@ class Identified(StudyResult):
     """A study file with what was found: the wrist, and the actuator and sensor of a loop."""
     suspected: list[Suspicion]
     """What the residuals say that the model may lack."""
+    known: str = ""
+    """Study file of the first run, with the wrist's geometry, masses and pose."""
 
     @property
     def answer(self) -> Answer:
         """Parameters with intervals and units, and what the model misses."""
-        return found_answer(self.fit, self.knowledge, self.suspected, self.place)
+        return found_answer(self.fit, self.knowledge, self.suspected, self.place, self.known)
 
     @property
     def values(self) -> dict[str, float]:
@@ -155,8 +157,11 @@ def identify(session: Session) -> Identified | LogTold | BendsTold:
     findings.text("data/identified.yaml", yaml)
     rng = np.random.default_rng(findings.stream("posterior"))
     draws = posterior_draws(fitted, estimated, _DRAWS, rng)
-    findings.text("data/posterior.yaml", yaml + posterior_yaml(draws, fitted.values, camera, _period(session.inputs)))
-    return Identified(session.study, findings, tables, fitted, estimated, yaml, suspected)
+    first = next(iter(session.inputs.runs().values()))
+    whole = identified_yaml(fitted.values, camera, known=first.config.wrist)
+    findings.text("data/posterior.yaml", whole + posterior_yaml(draws, fitted.values, camera, _period(session.inputs)))
+    known = str(first.path / "config.yaml")
+    return Identified(session.study, findings, tables, fitted, estimated, yaml, suspected, known)
 
 
 @contextmanager

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import chain
 from typing import TYPE_CHECKING, NamedTuple
 
 from wristctl.commands.answer import Answer
+from wristctl.commands.kept_studies import FOLDER, file_of
 from wristctl.commands.printed_table import Table, degrees, joined, two
 from wristctl.commands.results import StudyResult
 from wristctl.errors import UserError
@@ -21,8 +21,8 @@ if TYPE_CHECKING:
     from wristctl.comparison.world_ranking import WorldRanking
     from wristctl.tuning.search import Search
 
-# File with what is recommended, and the folder with a file for every row, for `simulate`, `compare` and `hw-run`.
-RECOMMENDED, ROWS = "data/recommended.yaml", "data/controllers"
+# File with what is recommended, for `simulate`, `compare` and `hw-run`.
+RECOMMENDED = "data/recommended.yaml"
 # Factor on the least error up to which a controller is taken that is lost on fewer rigs.
 NEAR = 1.25
 # Angle of the sines by which it is found how fast a motion may be, where the tendons reach it [deg].
@@ -59,7 +59,7 @@ class Candidate(NamedTuple):
     @property
     def file(self) -> str:
         """Its study file in the run: data/controllers/ct-dob-tuned.yaml."""
-        return f"{ROWS}/{re.sub(r'[^A-Za-z0-9_]+', '-', self.label).strip('-')}.yaml"
+        return file_of(self.label)
 
 
 @dataclass(frozen=True, repr=False, eq=False)
@@ -136,7 +136,7 @@ class Recommended(StudyResult):
     def answer(self) -> Answer:
         """What to run, what error to expect, what not to use, and the limits."""
         chosen = "" if self.best is None else f"{RECOMMENDED} of the run, "
-        rows = f"those of each row: {ROWS}/, each a file for simulate, compare and hw-run. Every rig: data/rigs.csv."
+        rows = f"those of each row: {FOLDER}/, each a file for simulate, compare and hw-run. Every rig: data/rigs.csv."
         return Answer(_sentence(self), _table(self), _notes(self), f"The gains: {chosen}{rows}")
 
 

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 from wristctl.commands.inputs import EarlierRun, Inputs
 from wristctl.commands.inputs_of_loops import identified
+from wristctl.commands.kept_studies import keep_gains, row_of
 from wristctl.commands.loop_warnings import warn_if_coarse, warn_if_it_buckles
 from wristctl.commands.procedure import Procedure
 from wristctl.commands.recommend.answer import (
@@ -20,7 +21,7 @@ from wristctl.commands.recommend.answer import (
     sine_deg,
     spread,
 )
-from wristctl.commands.recommend.study_file import next_command, study_file
+from wristctl.commands.recommend.study_file import next_command, sections_of
 from wristctl.commands.results import Findings
 from wristctl.commands.session import Session
 from wristctl.config.families import Family, TuningWorlds
@@ -263,27 +264,15 @@ def _recorded(study: Study, result: Recommended) -> Recommended:
 
 
 def _write_files(study: Study, findings: Findings, result: Recommended) -> None:
-    """A study file for every row, and one with what is recommended that compares all; own controllers are copies."""
-    from wristctl.control.table import CONTROLLERS
-    from wristctl.records.copied_inputs import sealed_references
-
-    origins = [CONTROLLERS.origin(name) for name in dict.fromkeys(one.controller for one in result.candidates)]
-    copies = sealed_references([one for one in origins if one])
-
-    def written(file: str, rows: Sequence[Candidate]) -> None:
-        """A file of the run with the first of these rows, which compares them all."""
-        up = "../" * file.count("/")
-        places = [CONTROLLERS.origin(one.controller) for one in rows]
-        names = [
-            up + copies[place.reference] if place else one.controller for place, one in zip(places, rows, strict=True)
-        ]
-        findings.text(file, study_file(study, rows, names, result.reach_deg))
-
+    """A study file for every row, and one with what is recommended that compares all."""
+    sections = sections_of(study, result.reach_deg)
     ordered = [result.candidates[row] for row in result.ranking.standing.order]
-    for one in ordered:
-        written(one.file, [one])
+    files = {one.file: [one] for one in ordered}
     if (best := result.best) is not None:
-        written(RECOMMENDED, [best, *(one for one in ordered if one != best)])
+        files[RECOMMENDED] = [best, *(one for one in ordered if one != best)]
+    for file, rows in files.items():
+        found = f"{rows[0].label}, as `wristctl recommend` found it for this wrist on this rig: wristctl hw-run THIS"
+        keep_gains(findings, file, found, study, [row_of(one.controller, one.gains, 6) for one in rows], **sections)
 
 
 RECOMMEND = Procedure("recommend", plan, recommend, (EarlierRun("from_identified", kind="identify", optional=True),))

@@ -2,62 +2,30 @@
 
 from __future__ import annotations
 
-import json
 import math
 import shlex
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
-from pydantic import ValidationError
-
-from wristctl.commands.recommend.answer import Candidate
+from wristctl.commands.kept_studies import asked_for, hw_run_fits, rig_of
 from wristctl.config.compare import CompareSettings
-from wristctl.config.hw_run import HwRunSettings
 from wristctl.config.loop import Reference
 from wristctl.config.study import Study
 
-# What of a loop is the rig's.
-_RIG = ("actuator", "sensor", "control_period")
 
+def sections_of(study: Study, reach_deg: float) -> Mapping[str, Mapping[str, Any]]:
+    """Settings of `simulate`, `compare` and, where it can have the rig, `hw_run`, on the rig of `recommend.loop`.
 
-def study_file(study: Study, rows: Sequence[Candidate], names: Sequence[str], reach_deg: float) -> str:
-    """Text of the file for `simulate`, `compare` and, where `hw-run` can have such a rig, for `hw-run`.
-
-    Parameters
-    ----------
-    study
-        the study whose wrist and `recommend.loop` it is recommended for
-    rows
-        what `simulate` and `hw-run` take, and then what `compare` takes beside it
-    names
-        the controllers' names, or the references of their code beside the file
-    reach_deg
-        angle that the tendons hold [deg]; no motion asks for more
+    No motion asks for more than the angle that the tendons hold [deg].
     """
-    import yaml
-
-    written = [_row(one, name) for one, name in zip(rows, names, strict=True)]
-    content: dict[str, Any] = {
-        "wrist": study.wrist.model_dump(mode="json"),
-        "simulate": written[0] | {"loop": _rig(study)} | _within(study.simulate.reference, reach_deg),
-        "compare": {"controllers": written, "loops": {"rig": _rig(study)}} | _moves(reach_deg),
-        "hw-run": {"controllers": written[:1]},
+    rig = rig_of(study.recommend.loop)
+    sections: dict[str, Mapping[str, Any]] = {
+        "simulate": {"loop": rig} | _within(study.simulate.reference, reach_deg),
+        "compare": {"loops": {"rig": rig}} | _moves(reach_deg),
     }
-    if hw_run_fits(study):
-        content["hw-run"] |= _rig(study) | _within(study.hw_run.reference, reach_deg)
-    head = f"# {rows[0].label}, as `wristctl recommend` found it for this wrist on this rig: wristctl hw-run THIS"
-    plain = json.loads(json.dumps(content))  # nothing twice, for which YAML would write an alias
-    text = yaml.safe_dump(plain, sort_keys=False, width=100)
-    return f"{head}\n{text}"
-
-
-def hw_run_fits(study: Study) -> bool:
-    """Whether `hw-run` can have the rig: motors, tendons, a camera, and ticks that its board can follow."""
-    try:
-        HwRunSettings.model_validate(study.hw_run.model_dump(by_alias=True) | _rig(study))
-    except ValidationError:
-        return False
-    return True
+    if hw_run_fits(study, study.recommend.loop):
+        sections["hw_run"] = rig | _within(study.hw_run.reference, reach_deg)
+    return sections
 
 
 def next_command(study: Study, typed: Sequence[str], file: str) -> str:
@@ -68,15 +36,7 @@ def next_command(study: Study, typed: Sequence[str], file: str) -> str:
     words, own = list(typed), ("recommend.", "wrist.")
     places = [k for k, word in enumerate(words) if word.startswith(own) and words[k - 1] == "--set"]
     kept = [word for k, word in enumerate(words) if k not in places and k + 1 not in places]
-    return shlex.join(["wristctl", "hw-run" if hw_run_fits(study) else "simulate", *kept, file])
-
-
-def _rig(study: Study) -> dict[str, Any]:
-    return study.recommend.loop.model_dump(mode="json", include=set(_RIG))
-
-
-def _row(candidate: Candidate, name: str) -> dict[str, Any]:
-    return {"controller": name, "gains": {gain: float(f"{value:.6g}") for gain, value in candidate.gains.items()}}
+    return shlex.join(["wristctl", "hw-run" if hw_run_fits(study, study.recommend.loop) else "simulate", *kept, file])
 
 
 def _within(reference: Reference, reach_deg: float) -> dict[str, Any]:
@@ -92,4 +52,4 @@ def _moves(reach_deg: float) -> dict[str, Any]:
     if largest <= reach_deg:
         return {}
     scaled = [move.model_copy(update={"angle_deg": move.end_deg * reach_deg / largest}) for move in moves]
-    return {"references": [move.model_dump(mode="json", exclude_defaults=True) for move in scaled]}
+    return {"references": [*map(asked_for, scaled)]}

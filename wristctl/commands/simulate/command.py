@@ -19,9 +19,9 @@ from wristctl.commands.inputs_of_loops import (
     inverses_of,
     network_for,
     tuned_gains,
-    with_option,
     wrist_identified,
 )
+from wristctl.commands.kept_studies import asked_for, keep_study
 from wristctl.commands.loop_warnings import (
     OutOfReach,
     asked_by,
@@ -194,9 +194,39 @@ def _short_of(
                 arriving.append(preset)
     if arriving:
         return short, [f"On the same loop these gains arrive: --gains {' or --gains '.join(arriving)}."]
-    words = [*session.typed, *with_option(session.study.simulate.from_identified)]
-    tune = shlex.join(["wristctl", "tune", *words, "--set", f"tune.controllers=[{chosen.controller}]"])
-    return short, [f"No preset of {chosen.controller} arrives here. Search its gains:", f"$ {tune}"]
+    if not controller(chosen.controller).gains:
+        return short, [f"{chosen.controller} has no gains to search: a controller with feedback may arrive."]
+    none = f"No preset of {chosen.controller} arrives here"
+    search = _search(session, study)
+    return short, [f"{none}. Search its gains:", search] if search else [f"{none}: `tune` may find gains that do."]
+
+
+# Study file of a run with a search for the gains of its controller, on its loop and motion.
+_SEARCH = "data/tune.yaml"
+
+
+def _search(session: Session, study: Study) -> str:
+    """The command that searches gains on the loop and the motion that were simulated, with its file in the run.
+
+    Empty without a run, and in the other plane than `tune` has.
+    """
+    from wristctl.simulation.reference import toward
+    from wristctl.wrist.directions import DIRECTIONS
+
+    chosen, findings, name = study.simulate, session.findings, "here"
+    if findings.run is None or DIRECTIONS[chosen.direction].plane != "ulnar":
+        return ""
+    settings = {
+        "controllers": [chosen.controller],
+        "loops": {name: chosen.loop.model_dump(mode="json")},
+        "scenarios": [{"loop": name, "reference": asked_for(toward(chosen.reference, chosen.direction))}],
+        "horizon": chosen.horizon,
+    }
+    content = {"seed": study.seed, "wrist": study.wrist.model_dump(mode="json"), "tune": settings}
+    keep_study(findings, _SEARCH, f"Search for gains of {chosen.controller}: wristctl tune THIS", content)
+    network = session.inputs.runs().get("network")
+    through = ["--network", str(network.path)] if network and chosen.reference.inverse == "network" else []
+    return f"$ {shlex.join(['wristctl', 'tune', f'{findings.run.path}/{_SEARCH}', *through])}"
 
 
 SIMULATE = sweepable(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import shlex
 
 from wristctl.commands.answer import Answer
 from wristctl.commands.printed_table import Table, degrees
@@ -11,11 +12,14 @@ from wristctl.commands.printed_table import Table, degrees
 _CLOSED_FORM = "exact inverse"
 
 
-def answer_of(errors: Table, held_out: int, kept: tuple[str, int], run: str) -> Answer:
+def answer_of(
+    errors: Table, held_out: int, kept: tuple[str, int], run: str, data: str = "", segments: int = 1
+) -> Answer:
     """What the network is worth on `held_out` test samples.
 
     `errors` has a row for each inverse and place: name, place, R^2, RMSE [deg], largest error [deg]. `kept` is
-    the name of the one of so many networks; `run` is the path of the run, empty in memory.
+    the name of the one of so many networks; `run` is the path of the run, empty in memory; `data` that of the run with
+    the samples, empty where the training drew its own, of a wrist of so many segments.
     """
     from wristctl.learning.network_file import NETWORK
 
@@ -31,8 +35,9 @@ def answer_of(errors: Table, held_out: int, kept: tuple[str, int], run: str) -> 
     named = [("closed form" if row[0] == _CLOSED_FORM else row[0], *row[1:]) for row in rows]
     notes = [f"It is the one of {networks} networks with the least validation loss."] * (networks > 1)
     if run:
-        notes += ["Next, one motion through this network:"]
-        notes += [f"$ wristctl simulate --set reference.inverse=network --network {run}"]
+        cut = ["--set", f"loop.plant_segments={segments}"] * (segments > 1)
+        words = ["wristctl", "simulate", f"{data or run}/config.yaml", "--set", "reference.inverse=network", *cut]
+        notes += ["Next, one motion of this wrist through this network:", f"$ {shlex.join([*words, '--network', run])}"]
     more = f"All tables: --all. The network: {run}/{NETWORK}" if run else "All tables: `.tables`."
     return Answer(sentence, Table("", ("inverse", "inputs", "RMSE [deg]", "largest error [deg]"), named), notes, more)
 

@@ -152,11 +152,14 @@ class Trained(StudyResult):
     """Name of the network that is kept."""
     errors: Table
     """Errors of the network, a polynomial and the closed form in every place."""
+    data: str = ""
+    """Path of the run with the samples; empty where there is none."""
 
     @property
     def answer(self) -> Answer:
         """Error on samples that no training has seen, beside the closed form's."""
-        return answer_of(self.errors, len(self.split.test), (self.kept, len(self.trials)), self.place)
+        kept, segments = (self.kept, len(self.trials)), self.network.segments
+        return answer_of(self.errors, len(self.split.test), kept, self.place, self.data, segments)
 
     def frame(self) -> pd.DataFrame:
         """One row per network and seed: its errors on the test samples and elsewhere, losses and epochs."""
@@ -267,9 +270,11 @@ def train(session: Session) -> Trained:
     tables.append(timing_table(findings, kept, samples, split, seconds))
     if checkpoints:
         shutil.rmtree(checkpoints, ignore_errors=True)
+    data = session.inputs.runs().get("data")
     return Trained(
-        session.study, findings, tables, kept.network, trials, samples, split, choice, measures, name, errors
-    )
+        session.study, findings, tables, kept.network, trials, samples, split, choice, measures, name, errors,
+        str(data.path) if data else "",
+    )  # fmt: skip
 
 
 TRAIN = Procedure(

@@ -8,11 +8,13 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
 from wristctl.commands.answer import LINES, Answer
+from wristctl.commands.kept_studies import FOLDER, file_of
 from wristctl.commands.printed_table import Table, degrees, joined, two
 from wristctl.commands.ranking_words import gains_words
 
 if TYPE_CHECKING:
     from wristctl.arrays import Array
+    from wristctl.config.loop import Loop, Reference
     from wristctl.config.wrist import WristParameters
     from wristctl.simulation.cases import Case
     from wristctl.tuning.search import Search
@@ -29,6 +31,23 @@ _VERBS = {
 
 # Difference of two errors' ratio from 1 that counts as none.
 _SAME = 0.01
+
+
+class Motion(NamedTuple):
+    """What gains were searched on, as far as one motion shows it: the first of its loops and references."""
+
+    name: str
+    """Name of the loop, or of the family of worlds."""
+    loops: Mapping[str, Loop]
+    reference: Reference
+    horizon: float
+    """[s]"""
+    where: str
+    """The loop in words."""
+    on_a_rig: bool
+    """Whether `hw-run` can have the loop's rig."""
+    network: str
+    """Path of the run behind a reference through a network; empty without one."""
 
 
 class Beside(NamedTuple):
@@ -77,12 +96,11 @@ def answer_of(
     cases: int,
     run: str,
     elsewhere: Mapping[str, Mapping[str, Mapping[str, int]]],
-    wrist: Sequence[str] = (),
+    motion: Motion | None = None,
 ) -> Answer | None:
     """The answer of a search on so many `cases`; None where nothing was searched. `run` is its path, if it has one.
 
-    `elsewhere` has the marks of the gains on other loops, by controller and loop; `wrist` the words of a command that
-    takes the wrist on which they were found.
+    `elsewhere` has the marks of the gains on other loops, by controller and loop; `motion` is the one to try them on.
     """
     if not searches:
         return None
@@ -90,11 +108,10 @@ def answer_of(
     best = ordered[0]
     notes = [*_edges(ordered, searches), *_presets(ordered, searches), *_lost(ordered, lost, cases)]
     notes += _elsewhere(ordered, elsewhere)
-    if run:
-        words = ["wristctl", "simulate", f"{run}/config.yaml", "--controller", best, "--gains", "tuned", "--tuned", run]
-        words += wrist
-        notes += ["Next, one motion with these gains:", f"$ {shlex.join(words)}"]
-    more = f"All tables: --all. The gains: {run}/data/gains.json" if run else "All tables: `.tables`."
+    more = "All tables: `.tables`."
+    if run and motion is not None:
+        notes += _next(f"{run}/{file_of(best)}", motion)
+        more = f"All tables: --all. The gains, each a file for simulate, compare and hw-run: {run}/{FOLDER}/"
     whole = Answer(_sentence(best, searches[best], errors[best], cases), _table(ordered, searches, errors), notes, more)
     if len(whole.lines()) <= LINES or len(ordered) == 1:
         return whole
@@ -112,6 +129,17 @@ def _sentence(name: str, search: Search, beside: Beside, cases: int) -> str:
     times = f"{_times(beside)} feedforward's {degrees(beside.feedforward)} deg"
     where = f"{cases} cases" if beside.cases == cases else f"{beside.cases} of {cases} cases (in the others it fails)"
     return f"{begin} Its error is {degrees(beside.error)} deg RMSE over {where}: {times}."
+
+
+def _next(file: str, motion: Motion) -> list[str]:
+    """Commands that try the gains of a file on what they were searched on."""
+    network = ["--network", motion.network] if motion.network else []
+    words = f"Next, one motion on {motion.where}, for which they were tuned"
+    commands = [["wristctl", "simulate", file, *network]]
+    if motion.on_a_rig:
+        words += ", and trials of them on the emulated rig"
+        commands += [["wristctl", "hw-run", file, *network]]
+    return [f"{words}:", *(f"$ {shlex.join(command)}" for command in commands)]
 
 
 def _times(beside: Beside) -> str:

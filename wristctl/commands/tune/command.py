@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from wristctl.commands.answer import Answer
@@ -17,8 +18,8 @@ from wristctl.commands.inputs_of_loops import (
     inverses_of,
     judged_loops,
     network_for,
-    with_option,
 )
+from wristctl.commands.kept_studies import asked_for, file_of, hw_run_fits, keep_gains, rig_of, row_of
 from wristctl.commands.loop_warnings import (
     asked_by,
     refuse_out_of_reach,
@@ -31,7 +32,7 @@ from wristctl.commands.procedure import Procedure
 from wristctl.commands.results import Findings, StudyResult
 from wristctl.commands.session import Done, Session
 from wristctl.commands.sweep.command import sweepable
-from wristctl.commands.tune.answer import Beside, answer_of, beside_feedforward
+from wristctl.commands.tune.answer import Beside, Motion, answer_of, beside_feedforward
 from wristctl.config.families import Family
 from wristctl.config.loop import Reference
 from wristctl.config.study import Study
@@ -47,6 +48,9 @@ if TYPE_CHECKING:
     from wristctl.tuning.objective import Judge
     from wristctl.tuning.search import Search, Tried
     from wristctl.wrist.kinematics import Inverse
+
+# Share of what a family draws at which one of its motions is tried.
+_WITHIN = 0.75
 
 
 @dataclass(frozen=True, repr=False, eq=False)
@@ -71,8 +75,8 @@ class Tuned(StudyResult):
     @property
     def answer(self) -> Answer | None:
         """Best gains, their error beside feedforward, and what they do wrong."""
-        wrist = with_option(self.study.tune.from_identified)
-        return answer_of(self.searches, self.errors, self.lost, self.cases, self.place, self.elsewhere, wrist)
+        motion = motion_of(self.study, self.place)
+        return answer_of(self.searches, self.errors, self.lost, self.cases, self.place, self.elsewhere, motion)
 
     @property
     def marks(self) -> list[str]:
@@ -193,7 +197,36 @@ def tune(session: Session) -> Tuned:
     gains = {name: best.gains for name, best in searches.items()}
     errors = beside_feedforward(gains, cases, study.wrist)
     elsewhere = _elsewhere(session, study, network, gains)
+    _write_files(session.findings, study, gains)
     return Tuned(session.study, session.findings, tables, searches, lost, errors, len(cases), elsewhere)
+
+
+def motion_of(study: Study, run: str) -> Motion:
+    """One motion of those that gains were searched on: of a family its loop, and a motion within what is drawn."""
+    settings, family = study.tune, study.families.get(study.tune.worlds.family)
+    loops, horizon = judged_loops(study, settings), settings.horizon
+    if family is not None:
+        name, horizon = settings.worlds.family, family.horizon
+        reference = family.motion(0, dict.fromkeys(family.draw, _WITHIN))
+    else:
+        name, reference = settings.scenarios[0].loop, settings.scenarios[0].reference
+        loops = {scenario.loop: loops[scenario.loop] for scenario in settings.scenarios}
+    where = f"the loop {name}" if family is None else f"the loop of the worlds {name}"
+    through = settings.network if settings.network and reference.inverse == "network" else ""
+    network = str(Path(run).parent / through) if through else ""
+    return Motion(name, loops, reference, horizon, where, hw_run_fits(study, loops[name]), network)
+
+
+def _write_files(findings: Findings, study: Study, gains: Mapping[str, Mapping[str, float]]) -> None:
+    """A study file for each controller: its gains, and what they were searched on."""
+    tried = motion_of(study, "")
+    loops = {name: loop.model_dump(mode="json") for name, loop in tried.loops.items()}
+    asked = {"loop": loops[tried.name], "reference": asked_for(tried.reference), "horizon": tried.horizon}
+    trial = rig_of(tried.loops[tried.name]) if tried.on_a_rig else {}
+    for name, values in gains.items():
+        title = f"{name}, as `wristctl tune` found it on {tried.where}: wristctl simulate THIS"
+        rows = [row_of(name, values)]
+        keep_gains(findings, file_of(name), title, study, rows, simulate=asked, compare={"loops": loops}, hw_run=trial)
 
 
 def _elsewhere(
