@@ -128,7 +128,8 @@ def test_a_changed_package_is_named_with_its_version(wristctl: Command, data: st
     (tmp_path / "numpy-9.9.9.dist-info").mkdir()
     (tmp_path / "numpy-9.9.9.dist-info" / "METADATA").write_text("Name: numpy\nVersion: 9.9.9\n")
     (tmp_path / "sitecustomize.py").write_text(
-        "import numpy.random as r; first = r.default_rng; r.default_rng = lambda seed: first([*seed, 9])"
+        "import numpy as np; r = np.random; first = r.default_rng; "
+        "r.default_rng = lambda seed: first([*np.atleast_1d(seed), 9])"
     )
     status, found = _verdict(wristctl, data, before=tmp_path)
     assert status == 3 and found["causes"] == [f"environment: numpy: {np.__version__} -> 9.9.9"]

@@ -220,3 +220,15 @@ def test_what_has_no_latest_run_is_made_or_named_rightly(make: Make, results: Pa
 def test_any_kind_will_do_where_none_is_asked_for(make: Make, results: Path) -> None:
     run = make()
     assert require(run.id, None, results).id == run.id
+
+
+def test_the_last_run_that_is_passed_over_is_the_last_in_time_though_ids_are_of_a_second(
+    make: Make, results: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    good = make()
+    for label in ("z", "m", "a", "k"):
+        with pytest.raises(RuntimeError), start_run("gen-data", Study(), label, results):
+            raise RuntimeError(label)
+    with caplog.at_level(logging.INFO, "wristctl.records.find"):
+        assert open_run("latest:gen-data", results).path == good.path
+    assert "-k-" in caplog.messages[0]

@@ -147,7 +147,8 @@ def _latest(ref: str, results: Path, content: Content | None = None) -> Run:
         for run in entries
         if run.kind == kind and label in ("", run.label) and run.state != "broken" and run.started > latest.started
     ]
-    for last in later[-1:]:
+    if later:
+        last = max(later, key=lambda run: run.started)  # not by id, which has no more than the second
         why = f"holds no {content.what}" if content and last in empty else f"is {last.state}"
         note = f" ({last.note})" if last.note else ""
         _log.info("the last %s run, %s, %s%s: %s is taken", kind, last.id, why, note, latest.id)
