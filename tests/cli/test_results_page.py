@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 import shutil
 import subprocess
+import tempfile
 from pathlib import Path
 
 import pytest
@@ -40,7 +41,10 @@ def results(tmp_path: Path) -> Path:
     return folder
 
 
-def test_no_command_takes_the_page_for_a_run_or_touches_it(call: Call, results: Path) -> None:
+def test_no_command_takes_the_page_for_a_run_or_touches_it(
+    call: Call, results: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))  # replays of others that were killed leave folders
     assert call("runs", "ls") == (0, "no runs in results\n", "")
     with start_run("tune", Study(), "a", results) as live:
         live.metric("rmse", 2.0, "rad", "lower")
