@@ -52,8 +52,12 @@ from wristctl.config.wrist import WristParameters
 from wristctl.control.table import controller, gains_of
 from wristctl.simulation.reference import motion
 from wristctl.simulation.rollout import rollout
-from wristctl.simulation.two_planes import bend_path, rollout_bends
 from wristctl.simulation.worlds import World
+try:
+    from wristctl.simulation.bend_paths import bend_path
+    from wristctl.simulation.motion import Motion
+except ImportError:  # a checkout in which two planes have a loop of their own
+    from wristctl.simulation.two_planes import bend_path, rollout_bends
 
 def in_one_plane(case, loop):
     law, wrist = controller("smc-tracking"), WristParameters()
@@ -68,9 +72,13 @@ def in_two_planes(case, loop):
     law, wrist = controller("pid-ff"), WristParameters(tendons=case["tendons"])
     path = bend_path("circumduction", 20.0, 1.0, case["horizon"])
     path = np.ascontiguousarray(path[:, :, :: max(1, round(loop.control_period / 1e-3))])
-    gains, worlds = np.tile(gains_of(law, "default"), (case["lanes"], 1)), [World(loop, wrist)] * case["lanes"]
+    gains, lanes = np.tile(gains_of(law, "default"), (case["lanes"], 1)), case["lanes"]
     began = time.process_time()
-    done = rollout_bends(law, gains, path, worlds, threads=1)
+    if "Motion" in globals():
+        followed, which = Motion.of_bends(path, loop.control_period, wrist.length), np.zeros(lanes, np.int64)
+        done = rollout(law, gains, [followed], which, loop, wrist, threads=1, converge=False)
+    else:
+        done = rollout_bends(law, gains, path, [World(loop, wrist)] * lanes, threads=1)
     return time.process_time() - began, float(done.metrics["rmse"][0])
 
 for line in sys.stdin:

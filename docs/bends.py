@@ -14,11 +14,11 @@ from wristctl.config.loop import Loop, Reference, sample_period
 from wristctl.config.study import Study
 from wristctl.config.wrist import WristParameters
 from wristctl.control.table import controller, gains_of
-from wristctl.simulation.bend_loops import bends_of
-from wristctl.simulation.bend_outcome import BendOutcome
-from wristctl.simulation.closed_loop import scenario_of
-from wristctl.simulation.two_planes import rollout_bends
-from wristctl.simulation.worlds import Draws, World
+from wristctl.simulation.closed_loop import scenario_of, trajectory
+from wristctl.simulation.outcome import Outcome
+from wristctl.simulation.planes import motion_in
+from wristctl.simulation.rollout import rollout
+from wristctl.simulation.worlds import Draws
 
 PAGE = Path(__file__).with_name("two-planes.md")
 STUDY = Path(__file__).parents[1] / "experiments" / "two_planes.yaml"
@@ -84,17 +84,18 @@ def courses(
     wrist: WristParameters,
     loop: Loop,
     seeds: int = SEEDS,
-) -> BendOutcome:
+) -> Outcome:
     """One motion by one controller under every seed."""
     chosen, reference = controller(law), Reference.model_validate(motion)
-    bends = bends_of(reference, "ulnar", wrist, study.simulate.horizon, sample_period(loop.control_period))
+    period, horizon = sample_period(loop.control_period), study.simulate.horizon
+    followed = motion_in(2, reference, "ulnar", wrist, horizon, period)
     draws, scenario = Draws(study.seed), scenario_of(reference, "ulnar")
     streams = [draws.camera(scenario, seed) for seed in range(seeds)]
     rows = np.tile(gains_of(chosen, gains), (seeds, 1))
-    return rollout_bends(chosen, rows, bends, [World(loop, wrist)] * seeds, None, None, streams)
+    return rollout(chosen, rows, [followed], np.zeros(seeds, np.int64), loop, wrist, None, streams)
 
 
-def cell(results: BendOutcome) -> str:
+def cell(results: Outcome) -> str:
     """The worse axis' RMSE [deg]: median and largest of all seeds; bold where all are held, else how many fail."""
     failed, count = int(results.failed.sum()), len(results.failed)
     if failed:
@@ -171,13 +172,15 @@ def arm(turn: float, slackest: float, law: str, gains: str | Mapping[str, float]
         Loop.model_validate({**ARM_LOOP, "plant": {"actuator": {"slack": tuple(map(float, each))}}}) for each in slack
     ]
     motion = Reference.model_validate({"kind": "circumduction", "angle_deg": ARM_BEND, "turn": turn})
-    bends = bends_of(motion, "ulnar", ARM, (laps + 0.5) * turn, sample_period(ARM_LOOP["control_period"]))
+    period = sample_period(ARM_LOOP["control_period"])
+    followed = motion_in(2, motion, "ulnar", ARM, (laps + 0.5) * turn, period)
     rows = np.tile(gains_of(chosen, gains), (len(loops), 1))
     streams = [(1, k) for k in range(len(loops))]
-    worlds = [World(loop, ARM) for loop in loops]
-    results = rollout_bends(chosen, rows, bends, worlds, None, None, streams, record=True).courses
+    which = np.zeros(len(loops), np.int64)
+    results = rollout(chosen, rows, [followed], which, loops, ARM, None, streams, record=True)
     off, late = [], []
-    for course in results:
+    for lane, loop in enumerate(loops):
+        course = trajectory(results, lane, followed, ARM, loop)
         on_circle = course.time > 0.5 * turn
         tip, wanted = course.tip[on_circle], course.tip_desired[on_circle]
         aside = np.hypot(*tip.T[1:]) - np.hypot(*wanted.T[1:])

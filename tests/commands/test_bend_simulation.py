@@ -16,9 +16,9 @@ from wristctl.commands.simulate.in_two_planes import SimulatedBends
 from wristctl.config.study import Study
 from wristctl.errors import UserError
 from wristctl.records import Run
-from wristctl.simulation.bend_course import BEND_METRICS
-from wristctl.simulation.bend_loops import bends_of, planes_of
-from wristctl.simulation.two_planes import bend_path
+from wristctl.simulation.bend_paths import bend_path
+from wristctl.simulation.metrics import metrics_in
+from wristctl.simulation.planes import bends_of, planes_of
 from wristctl.wrist.spatial.spatial_kinematics import exact_bend, spatial_tips
 
 pytestmark = pytest.mark.slow
@@ -39,7 +39,7 @@ def simulated(*settings: str, out: Path | None = None) -> SimulatedBends:
 
 def test_a_dart_throw_is_answered_by_plane_and_as_one_norm_in_a_sealed_run(tmp_path: Path) -> None:
     done = simulated("simulate.reference.kind=dart-thrower", out=tmp_path)
-    assert list(done.metrics) == list(BEND_METRICS)
+    assert list(done.metrics) == list(metrics_in(2))
     error = done.course.error
     assert done.metrics["rmse_ulnar"] == pytest.approx(np.sqrt(np.mean(error[:, 0] ** 2)))
     assert done.metrics["rmse"] == pytest.approx(np.hypot(done.metrics["rmse_ulnar"], done.metrics["rmse_flexion"]))
@@ -61,13 +61,19 @@ def test_a_dart_throw_is_answered_by_plane_and_as_one_norm_in_a_sealed_run(tmp_p
 
 def test_the_result_says_where_its_motion_is_whether_in_one_plane_or_in_two() -> None:
     bends = wristctl.simulate(study_of("simulate.reference.kind=dart-thrower"))
-    assert bends.course.bend.shape[1] == 2 and len(bends.frame()) == len(bends.course.bend)
-    with pytest.raises(UserError, match=r"two planes has no trajectory - fix: take \.course"):
-        _ = bends.trajectory
+    assert bends.trajectory is bends.course and len(bends.frame()) == len(bends.course.bend)
     planar = wristctl.simulate(study_of())
     assert planar.trajectory.theta.ndim == 1 and len(planar.frame()) == len(planar.trajectory.theta)
-    with pytest.raises(UserError, match=r"one plane has no course - fix: take \.trajectory"):
-        _ = planar.course
+    assert (bends.trajectory.planes, planar.trajectory.planes) == (2, 1)
+    np.testing.assert_array_equal(planar.trajectory.bend[:, 0], planar.trajectory.theta)
+    assert list(bends.courses()) == ["bends"] and list(planar.courses()) == ["trajectory"]
+
+
+def test_what_a_motion_in_two_planes_had_under_other_names_is_found_under_them() -> None:
+    course = simulated("simulate.reference.kind=circle").course
+    assert course.pulls is course.tension and course.coordinates is course.segment_theta  # type: ignore[attr-defined]
+    with pytest.raises(AttributeError, match="no metrics"):
+        _ = course.metrics  # type: ignore[attr-defined]
 
 
 def test_a_recording_of_two_planes_is_followed_in_both(tmp_path: Path) -> None:
@@ -159,7 +165,7 @@ def test_a_motion_in_one_plane_is_the_same_with_gravity_from_the_side(direction:
 @pytest.mark.parametrize("kind", ["minimum-jerk", "circle"])
 def test_three_tendons_bend_in_two_planes_on_any_reference(kind: str) -> None:
     course = simulated("wrist.tendons=three", f"simulate.reference.kind={kind}").course
-    assert course.pulls.shape[1] == 3 and not course.failed
+    assert course.tension.shape[1] == 3 and not course.failed
     with pytest.raises(UserError, match="in two planes, and the loop in one"):
         wristctl.simulate(study_of("wrist.tendons=three", f"simulate.reference.kind={kind}", "simulate.loop.planes=1"))
 
@@ -186,7 +192,7 @@ def test_a_sweep_runs_at_every_point_in_two_planes() -> None:
         update={"sweep": ("reference.angle_deg=5,15",)}
     )
     table = wristctl.simulate(study).frame()
-    small, large = table["tip_rmse"]
+    small, large = table["tip_rmse_mm"]
     assert table["simulate.reference.angle_deg"].tolist() == [5, 15] and 0.0 < small < large
 
 

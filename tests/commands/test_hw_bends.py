@@ -25,7 +25,7 @@ from wristctl.plotting.animation import animation
 from wristctl.plotting.page import page
 from wristctl.plotting.spatial_view import spatial_view
 from wristctl.records import Run, start_run
-from wristctl.simulation.bend_course import BEND_METRICS
+from wristctl.simulation.metrics import metrics_in
 from wristctl.wrist.directions import ACTIVE
 
 pytestmark = pytest.mark.slow
@@ -67,7 +67,7 @@ def test_a_row_has_errors_by_plane_estimated_and_true(whole: Whole) -> None:
     assert sorted(table["push"]) == [0.0, 1.0] and set(table["direction"]) == {"dart-thrower"}
     assert set(table["outcome"]) == {"ok"} and table["odd"].isna().all()
     for name in ("rmse_ulnar", "rmse_flexion", "rmse"):
-        assert columns[name] == (BEND_METRICS[name].unit, BEND_METRICS[name].formula)
+        assert columns[name] == (metrics_in(2)[name].unit, metrics_in(2)[name].formula)
         assert columns[f"true_{name}"][1].endswith("of the true bend")
         assert (np.degrees(table[f"true_{name}"]) < 0.5).all()
     pushed = table[table["push"] > 0.0].iloc[0]
@@ -81,7 +81,7 @@ def test_the_answer_has_both_planes_beside_simulation(whole: Whole) -> None:
     assert "toward ulnar" in answer.sentence and "toward flexion" in answer.sentence
     assert "with a push of 1 N" in answer.sentence and "No trial ended early." in answer.sentence
     assert answer.table is not None and len(answer.table.rows) == 2
-    simulated = [course.metrics()["rmse"] for course in whole.result.twins.values()]
+    simulated = [twin.metrics["rmse"] for twin in whole.result.twins.values()]
     assert np.degrees(simulated) == pytest.approx([0.1, 0.1], abs=0.15)
 
 
@@ -132,12 +132,14 @@ def test_a_wrist_that_swings_at_rest_is_told_and_one_that_still_moves_is_not(who
     table = whole.result.trials.assign(oscillation=np.radians(0.7), steady_state=0.0, chattering=0.0)
     moving = replace(whole.result, trials=table)
     still = {}
-    for number, course in whole.result.twins.items():
-        arrays = {name: value for name, value in vars(course).items() if isinstance(value, np.ndarray)}
+    for number, twin in whole.result.twins.items():
+        course, samples = twin.trajectory, len(twin.trajectory.time)
+        arrays = {name: value for name, value in vars(course).items() if np.shape(value)[:1] == (samples,)}
         longer: dict[str, Any] = {name: np.resize(value, (300, *value.shape[1:])) for name, value in arrays.items()}
-        longer |= {"time": np.arange(300) * 0.01, "bend_ref": np.full((300, 2), 0.1)}
+        longer |= {"time": np.arange(300) * 0.01, "theta_ref": np.full((300, 2), 0.1)}
         given = {field.name for field in fields(course)}
-        still[number] = replace(course, **{name: value for name, value in longer.items() if name in given})
+        longer = {name: value for name, value in longer.items() if name in given}
+        still[number] = replace(twin, trajectory=replace(course, **longer))
     assert moving.marks == []
     resting = replace(moving, twins=still)
     assert resting.marks == ["swings by up to 0.7 deg at rest: 2 of 2 trials"]

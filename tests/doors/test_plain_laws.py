@@ -30,6 +30,8 @@ from wristctl.control.table import CONTROLLERS
 from wristctl.control.vetting import vet
 from wristctl.errors import UserError
 from wristctl.interrupt import from_outside, interrupts
+from wristctl.simulation.bend_paths import bend_path
+from wristctl.simulation.motion import Motion
 from wristctl.simulation.outcome import Outcome
 from wristctl.simulation.reference import motion
 from wristctl.simulation.rollout import rollout
@@ -90,6 +92,31 @@ def test_each_of_a_batch_is_what_it_is_alone_and_begins_afresh() -> None:
     for k in range(3):
         np.testing.assert_array_equal(together.column("theta", k), run(law, gains[k : k + 1]).column("theta", 0))
     assert heard[-1] == pytest.approx(1.0) and np.all(np.diff(heard) > 0.0)
+
+
+@pytest.mark.slow
+def test_in_two_planes_it_is_the_compiled_law_in_both_and_a_class_has_an_object_for_each() -> None:
+    path = Motion.of_bends(bend_path("circumduction", 20.0, 0.5, 0.4), 1e-3, WRIST.length)
+    loop, gains = Loop(coupling="ignored"), np.array([[15.0, 1.0]])
+    laws = plain(ct, gains=COMPUTED_TORQUE.gains, presets={}), COMPUTED_TORQUE
+    ours, theirs = (rollout(law, gains, [path], np.zeros(1, np.int64), loop, WRIST, record=True) for law in laws)
+    for column in ("bend_ulnar", "bend_flexion"):
+        np.testing.assert_allclose(ours.column(column, 0), theirs.column(column, 0), atol=1e-9)
+    assert np.ptp(ours.column("bend_flexion", 0)) > 0.1
+
+    class Sums:
+        def __init__(self) -> None:
+            self.seen: list[float] = []
+
+        def __call__(self, now: Any, wrist: Any, gains: Any, memory: Any) -> float:
+            self.seen.append(now.theta_ref)
+            memory[0] += now.theta_ref
+            assert memory[0] == pytest.approx(sum(self.seen), abs=1e-12), "this plane's references alone"
+            return wrist.stiffness * float(now.theta_ref)
+
+    law = plain(Sums, memory=1)
+    done = rollout(law, np.empty((2, 0)), [path], np.zeros(2, np.int64), loop, WRIST, record=True)
+    np.testing.assert_array_equal(done.column("bend_flexion", 0), done.column("bend_flexion", 1))
 
 
 def test_it_sees_what_compiled_laws_see() -> None:

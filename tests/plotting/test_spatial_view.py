@@ -21,8 +21,8 @@ from wristctl.plotting.page import page
 from wristctl.plotting.spatial_view import ANGLE, MOST, PLACE, PULL, cables, motion_in_space, rim, seen, spatial_view
 from wristctl.plotting.style import TENDON_COLOURS
 from wristctl.records import Run, start_run
-from wristctl.simulation.bend_course import BendCourse
-from wristctl.simulation.two_planes import bend_path
+from wristctl.simulation.bend_paths import bend_path
+from wristctl.simulation.trajectory import Trajectory
 from wristctl.trial import bend_results
 from wristctl.wrist.spatial.spatial_kinematics import spatial_frames, spatial_tips
 
@@ -30,7 +30,7 @@ PLANES = "simulate.loop.planes=2"
 INNER = "wrist.tendons=[{angle_deg: 0}, {angle_deg: 120}, {angle_deg: 240}, {angle_deg: 60, radius: 0.012, ends_at: 3}]"
 
 
-def course(tendons: int = 4, horizon: float = 1.5, length: float = 0.08, name: str = "circumduction") -> BendCourse:
+def course(tendons: int = 4, horizon: float = 1.5, length: float = 0.08, name: str = "circumduction") -> Trajectory:
     """Four segments that bend by 4, 3, 2 and 1 tenths of what is wanted, a little late."""
     path = bend_path(name, 25.0, 1.0, horizon)[:, 0].T
     time = 1e-3 * np.arange(float(len(path)))
@@ -38,19 +38,20 @@ def course(tendons: int = 4, horizon: float = 1.5, length: float = 0.08, name: s
     bends = (late[:, None] * np.array([0.4, 0.3, 0.2, 0.1])[:, None]).reshape(len(path), 8)
     pulls = np.abs(20.0 * np.sin(time[:, None] + np.arange(tendons)))
     still = 0.0 * path
-    return BendCourse(
-        time, late, still, path, late, still, still, still, 1.0 + 0.0 * time, pulls, pulls, bends, length, 0.08
+    tips = spatial_tips(bends, length), spatial_tips(path, 0.08)
+    return Trajectory(
+        "", time, late, bends, still, path, path, *tips, still, still, pulls, pulls, late, still, 1.0 + 0.0 * time
     )
 
 
-def run_of(folder: Path, made: BendCourse, *settings: str) -> Run:
+def run_of(folder: Path, made: Trajectory, *settings: str) -> Run:
     study = wristctl.load_study(None, PLANES, *settings)
     with start_run("simulate", study, "", folder, page=lambda path, manifest, _: page(Run(path), manifest)) as live:
         live.table("data/bends.csv", made.columns())
     return Run(live.path)
 
 
-def viewed(folder: Path, made: BendCourse, *settings: str) -> dict[str, Any]:
+def viewed(folder: Path, made: Trajectory, *settings: str) -> dict[str, Any]:
     found = spatial_view(run_of(folder, made, *settings))
     assert found is not None
     return found
@@ -64,7 +65,7 @@ def test_the_drawn_wrist_ends_where_the_tip_was_recorded(tmp_path: Path) -> None
     np.testing.assert_allclose(PLACE * np.array(found["tip"][-1]), made.tip[-1], atol=PLACE)
     np.testing.assert_allclose(PLACE * np.array(found["tip_desired"][-1]), made.tip_desired[-1], atol=PLACE)
     np.testing.assert_allclose(ANGLE * np.array(found["wanted"][-1]), made.bend_ref[-1], atol=ANGLE)
-    np.testing.assert_allclose(PULL * np.array(found["pulls"][-1]), made.acting[-1], atol=PULL)
+    np.testing.assert_allclose(PULL * np.array(found["pulls"][-1]), made.tension[-1], atol=PULL)
     assert found["duration"] == pytest.approx(1.5) and not found["left"]
 
 
@@ -85,7 +86,7 @@ def test_tendons_run_at_their_places_through_the_discs_they_pass(tmp_path: Path,
     study = wristctl.load_study(None, setting)
     assert [len(row) for row in found["pulls"][:1]] == [tendons] == [len(found["tendons"])]
     assert [each["colour"] for each in found["tendons"]] == list(TENDON_COLOURS[:tendons])
-    centres, frames = spatial_frames(made.coordinates[-1], 0.08, np.linspace(0.0, 1.0, 5))
+    centres, frames = spatial_frames(made.segment_theta[-1], 0.08, np.linspace(0.0, 1.0, 5))
     for each, cable in zip(found["tendons"], cables(study.wrist), strict=True):
         assert (each["y"], each["z"], each["discs"]) == cable
         line = centres + frames @ np.array([0.0, each["y"], each["z"]])
@@ -103,7 +104,7 @@ def test_a_real_wrist_of_which_one_arc_is_seen_bends_by_its_share_in_every_segme
     monkeypatch: pytest.MonkeyPatch
 ) -> None:  # fmt: skip
     whole = course()
-    seen_as_one = dataclasses.replace(whole, coordinates=whole.bend)
+    seen_as_one = dataclasses.replace(whole, segment_theta=whole.bend)
     monkeypatch.setattr(bend_results, "first_course", lambda run: seen_as_one)
     run: Any = SimpleNamespace(config=SimpleNamespace(hw_run=SimpleNamespace(planes=2)))
     bends = [f"bend_{k}_{plane}" for k in (1, 2, 3, 4) for plane in ("ulnar", "flexion")]
@@ -124,7 +125,7 @@ def test_the_wrist_is_drawn_as_it_is_and_not_as_it_is_believed(tmp_path: Path) -
 
 def test_pictures_end_where_the_wrist_left_its_range(tmp_path: Path) -> None:
     made = course()
-    for each in (made.bend, made.coordinates):
+    for each in (made.theta, made.segment_theta, made.tip):
         each[800:] = np.nan
     found = viewed(tmp_path, made)
     assert found["left"] and found["duration"] == pytest.approx(0.799)
@@ -133,7 +134,8 @@ def test_pictures_end_where_the_wrist_left_its_range(tmp_path: Path) -> None:
 
 def test_a_wrist_that_failed_at_once_has_no_pictures(tmp_path: Path) -> None:
     made = course()
-    made.coordinates[1:] = np.nan
+    for each in (made.segment_theta, made.tip):
+        each[1:] = np.nan
     assert spatial_view(run_of(tmp_path, made)) is None
 
 
@@ -188,7 +190,7 @@ def test_the_browser_bends_the_wrist_as_the_model_does(browser: Browser, tmp_pat
     made = course(4)
     browser.open(run_of(tmp_path, made, INNER).file("report.html"), 1280, False)
     browser.run(SEEK.format(1000))
-    _, frames = spatial_frames(made.coordinates[-1], 0.08, [1.0])
+    _, frames = spatial_frames(made.segment_theta[-1], 0.08, [1.0])
     x, y, z = frames[0, :, 0]
     bends = np.rad2deg(np.arctan2(np.hypot(y, z), x) * np.array([y, z]) / np.hypot(y, z))
     told = {name: float(number) for number, name in re.findall(r"([\d.]+)° toward (\w+)", browser.run(SAID))}
@@ -208,7 +210,7 @@ def test_the_browser_bends_the_wrist_as_the_model_does(browser: Browser, tmp_pat
         pieces = [sum(stroke == colour for stroke, *_ in paths) for colour in TENDON_COLOURS[:4]]
         assert pieces == [4, 4, 4, 2], "one piece between two discs, and the last tendon ends at the third"
     keys = browser.run("return [...document.querySelectorAll('#keys li')].map(each => each.textContent)")
-    assert f"tendon 4, to disc 3: {made.acting[-1, 3]:.1f} N" in keys
+    assert f"tendon 4, to disc 3: {made.tension[-1, 3]:.1f} N" in keys
     assert browser.console() == []
     assert set(browser.requests()) == {next(tmp_path.glob("*/report.html")).as_uri()}
 
@@ -274,8 +276,11 @@ def test_a_straight_move_is_drawn_with_one_scale_for_both_planes(planes: tuple[f
     from wristctl.records.formats import pictures
 
     round_move = course()
-    flat = dataclasses.replace(round_move, coordinates=round_move.coordinates * np.tile(planes, 4))
-    flat = dataclasses.replace(flat, bend=flat.bend * planes, bend_ref=flat.bend_ref * planes)
+    bends, wanted = round_move.segment_theta * np.tile(planes, 4), round_move.bend_ref * planes
+    flat = dataclasses.replace(
+        round_move, theta=round_move.bend * planes, theta_ref=wanted, segment_theta=bends,
+        tip=spatial_tips(bends, 0.08), tip_desired=spatial_tips(wanted, 0.08),
+    )  # fmt: skip
     drawn = motion_in_space(flat, WristParameters())
     assert pictures(drawn, "space")[".png"].startswith(b"\x89PNG")
     path = drawn.axes[1]

@@ -24,7 +24,7 @@ from wristctl.control.table import CONTROLLERS, controller, gains_of
 from wristctl.lanes.blocks import to_rows
 from wristctl.simulation.batch import Batch, Lanes, batch
 from wristctl.simulation.kernel import Span, columns_of_sample, run_blocks
-from wristctl.simulation.motion import Angles, Motion
+from wristctl.simulation.motion import Motion
 from wristctl.simulation.observer import Watch
 from wristctl.simulation.reference import motion
 from wristctl.simulation.references import minimum_jerk
@@ -208,11 +208,11 @@ def in_two_planes(case: Case, gains: list[float]) -> Numbers:
     time: Array = period * np.arange(float(round(case.horizon / period)))
     there, back = minimum_jerk(time, 1.0), minimum_jerk(time - 0.8, 1.0)
     references = np.deg2rad(25.0) * np.stack([there - 0.5 * back, 0.75 * back - 0.25 * there])
-    followed = Motion(time, Angles.of(references.reshape(6, -1)), np.zeros((0, 3)), None, 0.0, 0.0, case.horizon)
+    followed = Motion.of_bends(references, period, wrist.length)
     one, names = np.zeros(case.lanes, np.int64), columns_of_sample(2, len(layout.places))
     made = batch(
         law, _gains(case, gains), [followed], [World(loop, wrist)], Lanes(one, one, streams), PCC_IN_SPACE, None,
-        len(names) + 2 * loop.plant_segments, layout,
+        len(names) + 2 * loop.plant_segments,
     )  # fmt: skip
     record = _recorded(made, case.lanes)
 

@@ -176,14 +176,15 @@ def test_what_is_simulated_says_how_many_steps_it_took_and_whether_they_were_eno
     assert short.metrics["substeps"] == 1 and short.metrics["drift"] > 0.0
 
 
-def _summed(excess: list[float], steps: int, swings: float) -> Any:
+def _summed(excess: list[float], steps: int, swings: float, places: int = 2) -> Any:
     """What `in_one_go` reads of rollouts of 1 deg RMSE, without kinks, whose errors are so many times the limit."""
     count, rmse = len(excess), np.deg2rad(1.0)
-    metrics = {"rmse": rmse, "peak_tension": 20.0, "chattering": 2.0 * 20.0 * swings}
+    metrics = {"rmse": rmse, "peak_tension": 20.0, "chattering": places * 20.0 * swings}
     return SimpleNamespace(
         metrics={name: np.full(count, value) for name, value in metrics.items()},
         step_error=np.array(excess) * 4.0 * 0.01 * rmse,
         steps=np.full(count, steps),
+        places=places,
     )
 
 
@@ -199,8 +200,11 @@ def test_a_rollout_that_cannot_run_again_asks_for_a_power_of_two_of_steps_that_i
     assert not kinked.any(), "kinks are taken for errors: eight times as much is borne"
 
 
-def test_where_tensions_swing_errors_count_eightfold_and_twice_as_many_steps_again_are_asked_for() -> None:
-    calm, swinging = (in_one_go(_summed([0.11, 0.13, 0.3], 2, swings), np.zeros(3, bool)) for swings in (1.0, 300.0))
+@pytest.mark.parametrize("places", [2, 3, 4, 6])
+def test_where_tensions_swing_errors_count_eightfold_and_twice_as_many_steps_again_are_asked_for(places: int) -> None:
+    calm, swinging = (
+        in_one_go(_summed([0.11, 0.13, 0.3], 2, swings, places), np.zeros(3, bool)) for swings in (24.0, 26.0)
+    )
     assert not calm[0].any() and swinging[0].tolist() == [False, True, True]
     assert swinging[1].tolist() == [2, 2 * 8, 2 * 16]
 

@@ -4,18 +4,21 @@ import numpy as np
 import pytest
 
 from wristctl.arrays import Array
-from wristctl.config.loop import Loop
+from wristctl.config.loop import Loop, Reference
 from wristctl.config.wrist import WristParameters
 from wristctl.control.response import FULL
 from wristctl.control.table import controller, gains_of
 from wristctl.errors import UserError
 from wristctl.plotting.bend_figure import bend_figure
-from wristctl.simulation.bend_course import BendCourse
-from wristctl.simulation.bend_paths import BEND_PATHS
+from wristctl.simulation.bend_paths import BEND_PATHS, bend_path
+from wristctl.simulation.closed_loop import follow
 from wristctl.simulation.motion import Angles, Motion
+from wristctl.simulation.planes import bends_of
 from wristctl.simulation.references import minimum_jerk
+from wristctl.simulation.repetitions import Simulation
 from wristctl.simulation.rollout import rollout
-from wristctl.simulation.two_planes import bend_path, reach_of_bends, simulate_two_planes
+from wristctl.simulation.trajectory import Trajectory
+from wristctl.wrist.spatial.held_bends import reach_of_bends
 from wristctl.wrist.tendon_layout import TendonLayout
 
 LAW = controller("pid-ff")
@@ -24,8 +27,16 @@ WRIST = WristParameters()
 IGNORED = Loop(coupling="ignored")
 
 
-def followed(path: Array, wrist: WristParameters = WRIST, loop: Loop = IGNORED, **how: object) -> BendCourse:
-    return simulate_two_planes(LAW, GAINS, path, wrist, loop=loop, **how)  # type: ignore[arg-type]
+def simulated(
+    path: Array, wrist: WristParameters = WRIST, loop: Loop = IGNORED, force: Array | None = None
+) -> Simulation:
+    return follow(LAW, GAINS, Motion.of_bends(path, 1e-3, wrist.length), wrist, loop, force)
+
+
+def followed(
+    path: Array, wrist: WristParameters = WRIST, loop: Loop = IGNORED, force: Array | None = None
+) -> Trajectory:
+    return simulated(path, wrist, loop, force).trajectory
 
 
 @pytest.mark.parametrize("name", BEND_PATHS)
@@ -61,12 +72,12 @@ def test_a_bend_in_one_plane_is_the_loop_in_that_plane(side: int) -> None:
 
 @pytest.mark.parametrize("name", BEND_PATHS)
 def test_a_path_turned_by_a_right_angle_leaves_the_same_errors(name: str) -> None:
-    plain = followed(bend_path(name, 25.0, 1.0, 1.0))
-    turned = followed(bend_path(name, 25.0, 1.0, 1.0, toward_deg=90.0))
+    first, second = (simulated(bend_path(name, 25.0, 1.0, 1.0, toward_deg=toward)) for toward in (0.0, 90.0))
+    plain, turned = first.trajectory, second.trajectory
     assert turned.bend[:, 1] == pytest.approx(plain.bend[:, 0], abs=1e-10)
     assert turned.bend[:, 0] == pytest.approx(-plain.bend[:, 1], abs=1e-10)
-    assert turned.metrics()["rmse_flexion"] == pytest.approx(plain.metrics()["rmse_ulnar"], rel=1e-6)
-    assert turned.metrics()["rmse"] == pytest.approx(plain.metrics()["rmse"], rel=1e-6)
+    assert second.metrics["rmse_flexion"] == pytest.approx(first.metrics["rmse_ulnar"], rel=1e-6)
+    assert second.metrics["rmse"] == pytest.approx(first.metrics["rmse"], rel=1e-6)
 
 
 def test_what_the_planes_do_to_each_other_falls_with_the_bend_as_its_cube() -> None:
@@ -86,7 +97,9 @@ def test_a_law_that_knows_what_the_planes_do_to_each_other_follows_several_times
     law, path = controller("computed-torque"), bend_path("circumduction", 25.0, 1.0, 2.0, toward_deg=toward)
     gains = np.array(gains_of(law, "default"))
     known, ignored = (
-        simulate_two_planes(law, gains, path, WRIST, loop=Loop(plant_segments=1, coupling=coupling)).metrics()
+        follow(
+            law, gains, Motion.of_bends(path, 1e-3, WRIST.length), WRIST, Loop(plant_segments=1, coupling=coupling)
+        ).metrics
         for coupling in ("compensated", "ignored")
     )
     for name in ("rmse_ulnar", "rmse_flexion"):
@@ -103,35 +116,36 @@ def test_a_push_from_the_side_bends_toward_it_and_the_loop_answers() -> None:
 
 
 def test_three_tendons_follow_and_pulls_keep_their_limits() -> None:
-    course = followed(bend_path("circumduction", 25.0, 1.0, 2.0), layout=TendonLayout.three(WRIST.tendon_radius))
-    assert course.pulls.shape[1] == 3 and not course.failed
-    assert course.pulls.min() >= WRIST.pretension - 1e-12 and course.pulls.max() <= WRIST.tension_limit + 1e-12
-    reached = course.share > 1.0 - 1e-12
+    done = simulated(bend_path("circumduction", 25.0, 1.0, 2.0), WristParameters(tendons="three"))
+    course, share = done.trajectory, np.asarray(done.trajectory.share)
+    assert course.tension.shape[1] == 3 and not course.failed
+    assert course.tension.min() >= WRIST.pretension - 1e-12 and course.tension.max() <= WRIST.tension_limit + 1e-12
+    reached = share > 1.0 - 1e-12
     assert course.torque[reached] == pytest.approx(course.torque_wanted[reached], abs=1e-10)
-    assert course.metrics()["rmse"] < np.deg2rad(0.5)
+    assert done.metrics["rmse"] < np.deg2rad(0.5)
 
 
 def test_torque_out_of_reach_keeps_its_direction_and_counts_as_saturation() -> None:
     weak = WRIST.model_copy(update={"tension_limit": 6.0})
-    course = followed(bend_path("circumduction", 30.0, 1.0, 1.5), weak)
-    scaled = (course.share > 0.0) & (course.share < 0.99)
-    assert course.metrics()["saturation"] == pytest.approx(np.mean(course.share < 1.0 - 1e-9)) and scaled.any()
-    wanted = course.share[scaled, None] * course.torque_wanted[scaled]
+    done = simulated(bend_path("circumduction", 30.0, 1.0, 1.5), weak)
+    course, share = done.trajectory, np.asarray(done.trajectory.share)
+    scaled = (share > 0.0) & (share < 0.99)
+    assert done.metrics["saturation"] == pytest.approx(np.mean(share < 1.0 - 1e-9)) and scaled.any()
+    wanted = share[scaled, None] * course.torque_wanted[scaled]
     assert course.torque[scaled] == pytest.approx(wanted, abs=1e-9)
 
 
 def pushed_back(
     toward: float, newton: float, limit: float, name: str = "pid-ff", places: str = "four", coupling: str = "ignored"
-) -> tuple[BendCourse, Array]:
+) -> tuple[Trajectory, Array]:
     """A bend of 30 deg, pushed back from 1.2 to 2.2 s; and how far it bends in that direction [deg]."""
     law, time = controller(name), 1e-3 * np.arange(3001.0)
     along, pushed = np.array([np.cos(np.radians(toward)), np.sin(np.radians(toward))]), (time > 1.2) & (time < 2.2)
     path = along[:, None, None] * np.deg2rad(30.0) * minimum_jerk(time, 1.0)
     force = np.array([0.0, *(-newton * along)])[:, None] * pushed
-    wrist = WristParameters(tension_limit=limit)
-    layout = TendonLayout.three(wrist.tendon_radius) if places == "three" else TendonLayout.four(wrist.tendon_radius)
+    wrist = WristParameters.model_validate({"tension_limit": limit, "tendons": places})
     gains, loop = np.array(gains_of(law, "default")), Loop.model_validate({"coupling": coupling})
-    course = simulate_two_planes(law, gains, path, wrist, layout, loop, force)
+    course = follow(law, gains, Motion.of_bends(path, 1e-3, wrist.length), wrist, loop, force).trajectory
     return course, np.rad2deg(course.bend @ along)
 
 
@@ -152,12 +166,12 @@ def test_a_wrist_pushed_out_of_reach_on_a_diagonal_comes_back_as_one_of_that_rea
     """No integral winds up and no observer takes torque for load that the other plane's part left no room for."""
     course, bend = pushed_back(toward, 11.0, 28.0, name, places, coupling)
     begin, end = 1200, 2200
-    assert (course.share[begin:end] < FULL).mean() > 0.5, "out of reach while it is pushed"
+    assert (np.asarray(course.share)[begin:end] < FULL).mean() > 0.5, "out of reach while it is pushed"
     reach = float(np.hypot(*course.torque[end - 10]))
     limit = WRIST.pretension + reach / (np.sqrt(2.0) * WRIST.tendon_radius)  # two tendons, each at r/sqrt(2)
     alone, lone_bend = pushed_back(0.0, 11.0, limit, name)
     assert bend[end:].max() == pytest.approx(lone_bend[end:].max(), abs=0.25)
-    behind = [float((course.share[end:] < FULL).sum()) for course in (course, alone)]
+    behind = [float((np.asarray(each.share)[end:] < FULL).sum()) for each in (course, alone)]
     assert behind[0] <= behind[1] + 4.0, "ticks out of reach after the push"
     across = np.rad2deg(course.bend[end:] @ [-np.sin(np.radians(toward)), np.cos(np.radians(toward))])
     assert abs(across).max() < 0.5
@@ -167,14 +181,15 @@ def test_a_wrist_pushed_out_of_reach_on_a_diagonal_comes_back_as_one_of_that_rea
 def test_a_push_within_reach_on_a_diagonal_is_answered_as_in_one_plane(toward: float) -> None:
     course, bend = pushed_back(toward, 8.0, 30.0)
     alone, lone_bend = pushed_back(0.0, 8.0, 30.0)
-    assert (course.share >= FULL).all() and (alone.share >= FULL).all()
+    assert all((np.asarray(each.share) >= FULL).all() for each in (course, alone))
     assert bend == pytest.approx(lone_bend, abs=0.1)
 
 
 def test_a_wrist_pushed_out_of_its_range_has_failed_for_good() -> None:
     weak = WRIST.model_copy(update={"tension_limit": 4.0})
-    course = followed(bend_path("circle", 10.0, 1.0, 1.0), weak, force=np.array([0.0, 60.0, 0.0]))
-    assert course.failed and np.isnan(course.metrics()["rmse"])
+    done = simulated(bend_path("circle", 10.0, 1.0, 1.0), weak, force=np.array([0.0, 60.0, 0.0]))
+    course = done.trajectory
+    assert course.failed and done.failed and np.isnan(done.metrics["rmse"])
     lost = np.isnan(course.bend[:, 0])
     assert lost[np.argmax(lost) :].all()
 
@@ -188,7 +203,7 @@ def test_the_reach_of_weak_tendons_is_where_a_held_bend_saturates() -> None:
     still = np.zeros((2, 3, 3001))
     for degrees, saturates in ((-2.0, False), (2.0, True)):
         still[0, 0] = np.minimum(np.arange(3001) / 1500, 1.0) * (reach[0] + np.deg2rad(degrees))
-        assert (followed(still, weak).share[-1] < 0.999) == saturates
+        assert (np.asarray(followed(still, weak).share)[-1] < 0.999) == saturates
 
 
 def test_the_picture_draws_what_is_wanted_followed_and_in_reach() -> None:
@@ -204,6 +219,6 @@ def test_what_cannot_run_is_said() -> None:
     with pytest.raises(UserError, match="no bend path 'square'"):
         bend_path("square", 10.0, 1.0, 1.0)
     with pytest.raises(UserError, match="beyond the wrist's range"):
-        followed(bend_path("circumduction", WRIST.range_deg + 1.0, 1.0, 2.0))
+        bends_of(Reference(kind="circumduction", angle_deg=WRIST.range_deg + 1.0), "ulnar", WRIST, 2.0, 1e-3)
     with pytest.raises(UserError, match=r"no loop in two planes has plant\.creep"):
         followed(bend_path("circle", 10.0, 1.0, 1.0), loop=Loop.model_validate({"plant": {"creep": 0.1}}))

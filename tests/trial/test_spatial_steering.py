@@ -12,9 +12,11 @@ from wristctl.config.plant import Actuator, Sensor
 from wristctl.config.wrist import WristParameters
 from wristctl.control.table import controller, gains_of
 from wristctl.errors import UserError
-from wristctl.simulation.two_planes import bend_path, simulate_two_planes
+from wristctl.simulation.bend_paths import bend_path
+from wristctl.simulation.closed_loop import follow
+from wristctl.simulation.motion import Motion
 from wristctl.trial.blind_model import BlindModel
-from wristctl.trial.spatial_belief import SpatialPaths, known_of_axes, layout_of_axes
+from wristctl.trial.spatial_belief import SpatialPaths, known_of_axes
 from wristctl.trial.spatial_steering import SpatialSteering
 from wristctl.trial.steering import REMEMBERED
 from wristctl.wrist.tendon_layout import TendonLayout
@@ -46,18 +48,20 @@ def test_torques_and_pulls_are_those_of_the_simulated_loop_at_every_tick(law: st
     gains = gains_of(chosen, "hardware")
     path = bend_path("figure-of-8", 20.0, 1.5, 1.2, 25.0)[:, :, ::10].copy()
     loop = Loop(control_period=PERIOD, plant_segments=1)
-    course = simulate_two_planes(chosen, np.array(gains), path, wrist, layout_of_axes(wrist), loop)
-    assert (course.share < 1.0).any() == (limit < 60.0)
+    motion = Motion.of_bends(path, PERIOD, wrist.length)
+    course = follow(chosen, np.array(gains), motion, wrist.model_copy(update={"tendons": "four"}), loop).trajectory
+    share = np.asarray(course.share)
+    assert (share < 1.0).any() == (limit < 60.0)
     steered = SpatialSteering(wrist, ACTUATOR, SENSOR, PERIOD)
     steered.use(chosen, gains)
     references = np.ascontiguousarray(path.transpose(2, 0, 1))
     for tick, (bend, rate) in enumerate(zip(course.bend, course.rate, strict=True)):
         steered._observer.now[:] = [bend[0], rate[0], 0.0, bend[1], rate[1], 0.0]
         answer = steered.respond(references, tick)
-        assert answer.tension == pytest.approx(course.pulls[tick], rel=1e-12, abs=1e-12)
+        assert answer.tension == pytest.approx(course.tension[tick], rel=1e-12, abs=1e-12)
         assert answer.torque_wanted == pytest.approx(course.torque_wanted[tick], rel=1e-12, abs=1e-12)
         assert answer.torque == pytest.approx(course.torque[tick], rel=1e-12, abs=1e-12)
-        assert answer.share == course.share[tick]
+        assert answer.share == share[tick]
 
 
 def test_paths_are_those_of_the_exact_arc() -> None:

@@ -16,6 +16,7 @@ from wristctl.commands.adoption import with_planes
 from wristctl.config.hw_run import HwRunSettings
 from wristctl.config.study import Study
 from wristctl.errors import UserError
+from wristctl.simulation.metrics import of_course
 from wristctl.study_files.load import load_study
 from wristctl.trial.bend_motion import BendMotion
 from wristctl.trial.bend_results import bend_twin, bends_evaluated, logged_course
@@ -64,7 +65,7 @@ def test_a_fast_trial_and_its_simulation_agree(tmp_path: Path) -> None:
     study, followed = load_study([]).model_copy(update={"hw_run": settings}), motion_of(settings, WRIST, "dart-thrower")
     assert isinstance(followed, BendMotion)
     twin = bend_twin(study, Trial(0, "dart-thrower", 0, 0.0, 0), followed, None)
-    simulated, true = np.degrees(twin.error), true_errors(done)
+    simulated, true = np.degrees(twin.trajectory.error), true_errors(done)
     assert rmse(simulated) == pytest.approx(rmse(true), rel=0.15)
     ahead = [lead(errors, followed) for errors in (simulated, true)]
     assert np.abs(ahead[0] - ahead[1]).max() < 1.5e-3
@@ -106,7 +107,7 @@ def test_a_rows_metrics_are_those_of_its_log_by_the_formulas_of_simulation(round
     trial = Trial(0, "circumduction", 0, 0.0, 0)
     values = bends_evaluated(trial, log, followed, circling().push, WRIST, truth)
     course = logged_course(log, followed, WRIST)
-    assert values["rmse"] == course.metrics()["rmse"]
+    assert values["rmse"] == of_course(course)["rmse"]
     assert values["true_rmse_ulnar"] == pytest.approx(np.radians(rmse(true_errors(round_trip))[0]), rel=1e-3)
     assert math.hypot(values["true_rmse_ulnar"], values["true_rmse_flexion"]) == pytest.approx(values["true_rmse"])
     assert math.isnan(values["recovery"]) and math.isnan(values["push_torque"])

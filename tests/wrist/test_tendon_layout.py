@@ -20,7 +20,7 @@ from wristctl.commands.tune.command import TUNE
 from wristctl.config.loop import Loop, Reference
 from wristctl.config.wrist import WristParameters
 from wristctl.errors import UserError
-from wristctl.simulation.bend_loops import planes_of
+from wristctl.simulation.planes import planes_of
 from wristctl.study_files.error_messages import located
 from wristctl.study_files.load import load_study, read_study
 from wristctl.study_files.resolved import changed_yaml, resolved_yaml

@@ -37,7 +37,7 @@ class PlainLaw(types.WrapperAddressProtocol):
         self._error: BaseException | None = None
         self._preview, self._memory = sizes
         self._now, self._wrist, self._gains = _seen(tuple(now)), wrist, _named(gains)
-        self._law: Callable[..., Any] = law() if isinstance(law, type) else law
+        self._law, self._of_plane = law, dict[int, Callable[..., Any]]()
         self._signals = len(now) + _REFERENCE * self._preview
         code = getattr(law.__call__ if isinstance(law, type) else law, "__code__", None)
         self._where = f"{code.co_filename}:{code.co_firstlineno}" if code else name
@@ -66,11 +66,17 @@ class PlainLaw(types.WrapperAddressProtocol):
             current = self._now(signals)
             believed, gains_type = self._wrist(*_doubles(wrist, len(self._wrist._fields))), self._gains
             kept = np.ctypeslib.as_array((ctypes.c_double * max(1, self._memory)).from_address(memory))[: self._memory]
-            torque = self._law(current, believed, gains_type(*_doubles(gains, len(gains_type._fields))), kept)
+            torque = self._in(memory)(current, believed, gains_type(*_doubles(gains, len(gains_type._fields))), kept)
             return self._finite(torque, current)
         except BaseException as error:  # nothing may be raised through compiled code
             self._error = error
             return math.nan
+
+    def _in(self, memory: int) -> Callable[..., Any]:
+        """The law of the plane whose memory is at this address: of a class an object of its own."""
+        if memory not in self._of_plane:
+            self._of_plane[memory] = self._law() if isinstance(self._law, type) else self._law
+        return self._of_plane[memory]
 
     def _finite(self, torque: Any, now: Any) -> float:
         value = float(torque)

@@ -9,7 +9,7 @@ from wristctl.config.loop import Loop
 from wristctl.config.plant import Actuator
 from wristctl.config.study import Study
 from wristctl.config.wrist import TendonPlace, WristParameters
-from wristctl.simulation.bend_loops import planes_of
+from wristctl.simulation.planes import planes_of
 from wristctl.study_files.strict_yaml import parse_yaml
 from wristctl.wrist.directions import ACTIVE
 

@@ -18,20 +18,20 @@ from wristctl.plotting.style import (
     legend_below,
     title,
 )
-from wristctl.simulation.bend_course import BendCourse
+from wristctl.simulation.trajectory import Trajectory
 
 # In colours that no tendon has: they share a legend.
 _OF_PLANES = (("toward ulnar", INDIGO), ("toward flexion", SKY))
 
 
-def bend_figure(course: BendCourse, reach: Array, heading: str = "") -> Figure:
+def bend_figure(course: Trajectory, reach: Array, heading: str = "") -> Figure:
     """The plane of bends; `reach` is a closed line (K, 2) [rad], as `reach_of_bends` gives it."""
     picture = Figure(figsize=(5.0, 5.0), layout="constrained")
     _plane_of_bends(picture.add_subplot(), course, reach, heading).legend(loc="upper right")
     return picture
 
 
-def bend_motion(course: BendCourse, reach: Array, heading: str = "") -> Figure:
+def bend_motion(course: Trajectory, reach: Array, heading: str = "") -> Figure:
     """Left the plane of bends; right the errors of both planes [deg] and the pulls at all places [N] over time [s]."""
     picture, axes = figure(2, 2, height=4.6, width_ratios=(1.0, 1.25))
     for panel in axes[:, 0]:
@@ -42,7 +42,7 @@ def bend_motion(course: BendCourse, reach: Array, heading: str = "") -> Figure:
         draw_course(errors, course.time, np.degrees(error), shade, f"error {name}")
     errors.axhline(0.0, color=BLACK, linewidth=0.8, zorder=1.0)
     errors.set_ylabel("error [deg]")
-    for number, pull in enumerate(course.acting.T):
+    for number, pull in enumerate((course.tension if course.acting is None else course.acting).T):
         shade = TENDON_COLOURS[number % len(TENDON_COLOURS)]
         draw_course(pulls, course.time, pull, shade, f"tendon {number + 1}")
     pulls.set(xlabel="time [s]", ylabel="pull [N]")
@@ -50,7 +50,7 @@ def bend_motion(course: BendCourse, reach: Array, heading: str = "") -> Figure:
     return picture
 
 
-def _plane_of_bends(axes: Axes, course: BendCourse, reach: Array, heading: str) -> Axes:
+def _plane_of_bends(axes: Axes, course: Trajectory, reach: Array, heading: str) -> Axes:
     axes.plot(*np.rad2deg(reach).T, **DOTTED, label="in reach")
     axes.plot(*np.rad2deg(course.bend_ref).T, **WANTED | {"label": "wanted"})
     axes.plot(*np.rad2deg(course.bend).T, color=GREEN, label="followed")

@@ -32,7 +32,7 @@ from wristctl.plotting.style import (
 )
 from wristctl.plotting.wrist_drawing import RIM
 from wristctl.records.run import Run
-from wristctl.simulation.bend_course import BendCourse
+from wristctl.simulation.trajectory import Trajectory
 from wristctl.simulation.worlds import plant_of
 from wristctl.wrist.spatial.spatial_kinematics import spatial_frames
 from wristctl.wrist.tendon_layout import TendonLayout
@@ -136,7 +136,7 @@ def _performed(run: Run, columns: list[str]) -> Array | None:
         return None
     of_course = course.columns()
     segments = sum(name.startswith("bend_") and name[5].isdigit() for name in columns)
-    known = course.coordinates.shape[1]
+    known = course.segment_theta.shape[1]
     if known < segments:  # of a real wrist one arc is all that is seen
         of_course |= {name: of_course[f"bend_1_{name[7:]}"] * known / segments for name in columns[1 : 1 + segments]}
     return np.stack([of_course[name] for name in columns], axis=1)
@@ -150,7 +150,7 @@ def seen(points: Array) -> Array:
     return np.stack([right, up, behind * math.cos(ELEVATION) - x * math.sin(ELEVATION)], axis=-1)
 
 
-def motion_in_space(course: BendCourse, wrist: WristParameters, heading: str = "") -> Figure:
+def motion_in_space(course: Trajectory, wrist: WristParameters, heading: str = "") -> Figure:
     """Left the wrist in space where it is bent most, right the path of its tip as seen from above it [mm].
 
     `wrist` is the wrist as it is.
@@ -158,7 +158,7 @@ def motion_in_space(course: BendCourse, wrist: WristParameters, heading: str = "
     picture, ((left, right),) = figure(1, 2, height=3.8)
     largest = int(np.nanargmax(np.hypot(*course.bend.T)))
     _draw_floor(left, 2.0 * rim(wrist))
-    _draw_body(left, course.coordinates[largest], wrist)
+    _draw_body(left, course.segment_theta[largest], wrist)
     for path, style in ((course.tip_desired, _WANTED), (course.tip, _REACHED)):
         _line(left, path, zorder=4.0, **style)
         right.plot(1e3 * path[:, 1], 1e3 * path[:, 2], **style)

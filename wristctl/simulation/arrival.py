@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from wristctl.simulation.trajectory import Trajectory, rests
+from wristctl.simulation.trajectory import Trajectory, rests, size_of
 
 # Share of the move that may be missing at the end of what arrives.
 SHORT = 0.2
@@ -15,16 +15,16 @@ _BOTH_WAYS = 0.2
 
 
 def missing(course: Trajectory) -> float:
-    """Missing share at the end: mean |theta - theta_ref| over the last 10 % as a share of the largest reference.
+    """Missing share at the end: mean |e| over the last 10 % as a share of the largest reference.
 
     Of a reference that never rests over the last half, since it may pass where a wrist stands that does not move. 0
     where the reference stays at zero; inf where the wrist has failed.
     """
     late = max(1, len(course.time) // (_LATE if rests(course) else 2))
-    asked = float(np.max(np.abs(course.theta_ref)))
+    asked = float(np.max(size_of(course.bend_ref)))
     if not np.isfinite(course.theta[-late:]).all():
         return np.inf
-    return float(np.mean(np.abs(course.error[-late:])) / asked) if asked > 0.0 else 0.0
+    return float(np.mean(course.distance[-late:]) / asked) if asked > 0.0 else 0.0
 
 
 def arrives(course: Trajectory) -> bool:

@@ -23,7 +23,7 @@ from wristctl.simulation.actuator import SIDES, at_rest, counted_motor, drive_wi
 from wristctl.simulation.cameras import cameras_of
 from wristctl.simulation.disturbances import acting_in_space
 from wristctl.simulation.kernel import Disturbed, LoopCourse, LoopState, LoopValues, Scratch, Setup, Undisturbed
-from wristctl.simulation.motion import Motion, goals_of_bends
+from wristctl.simulation.motion import DERIVATIVES, Motion
 from wristctl.simulation.nonideal import inner_of, is_ideal, nonideal_of, unmoved
 from wristctl.simulation.sums import no_sums
 from wristctl.simulation.worlds import World, bending_limit, check_stops
@@ -31,7 +31,7 @@ from wristctl.wrist.dahl import NoInnerFriction
 from wristctl.wrist.directions import in_plane
 from wristctl.wrist.plant import PlantModel
 from wristctl.wrist.segments import segments
-from wristctl.wrist.spatial.pcc_in_space import placed_values
+from wristctl.wrist.spatial.pcc_in_space import PCC_IN_SPACE
 from wristctl.wrist.spatial.spatial_segments import OF_A_TENDON
 from wristctl.wrist.spatial.spooled_tendons import OF_A_STATE, ElasticPlaces, HeldPlaces, RubbingPlaces
 from wristctl.wrist.tendon_layout import TendonLayout
@@ -150,16 +150,15 @@ def batch(
     model: PlantModel,
     start: Start | None,
     columns: int,
-    layout: TendonLayout | None = None,
     force: Array | None = None,
 ) -> Batch:
     """The batch of `rollout`, which records so many columns; all worlds have the same structure and timing.
 
-    In two planes `layout` has the places of the tendons, and `force` (3, T) [N] acts on the tip beside the loops' own
-    disturbances.
+    A force (3, T) [N] on the tip acts beside the loops' own disturbances.
     """
+    layout = None if model.planes == 1 else TendonLayout.of(worlds[0].wrist)
     filmed, (worlds, body) = worlds, _bodies(worlds)
-    references = np.empty((len(motions), OF_A_PLANE * model.planes, len(motions[0].time)))
+    references = np.empty((len(motions), DERIVATIVES * model.planes, len(motions[0].time)))
     for target, followed_motion in zip(references, motions, strict=True):
         followed_motion.angles.into(target)
     if layout is None:
@@ -181,17 +180,14 @@ def batch(
     belief: Sides | Places
     if layout is None:
         tendons: object = _sides(of, coordinates, taut, counts)
-        plants = of.rows(lambda index: model.values(of.actual[index], loop.plant_segments))
         belief = Sides(of.rows(lambda index: segments(of.worlds[index].wrist, 1))[:, None], of.rows(lambda _: of.alike))
-        ends = zip(motions, references[:, 0, -1], strict=True)
-        goals = [followed_motion.goals_at(end) for followed_motion, end in ends]
     else:
         tendons = _places(of, layout, counts)
-        plants = of.rows(lambda index: _placed(of.worlds[index], of.actual[index], layout, loop.plant_segments))
-        belief = _beliefs_in_space(of, layout)
-        goals = [goals_of_bends(rows[::OF_A_PLANE], motions[0].time) for rows in references]
+        belief = _beliefs_in_space(of)
+    ends = references[:, ::DERIVATIVES, -1]
+    goals = [followed_motion.goals_at(end) for followed_motion, end in zip(motions, ends, strict=True)]
     values = LoopValues(
-        plant=plants,
+        plant=of.rows(lambda index: model.values(of.actual[index], loop.plant_segments)),
         belief=belief,
         limits=of.rows(of.limits),
         drive=drive_with(of.level, of.rows(lambda index: np.array(of.counted[index])), of.rows(of.stiffness)),
@@ -287,13 +283,7 @@ def _places(of: _Worlds, layout: TendonLayout, counts: Sequence[Array]) -> HeldP
     return RubbingPlaces(whole, broken_at, backlash, stiffness, reeled, friction, 0, 0, state, travel, pulls)
 
 
-def _placed(world: World, wrist: WristParameters, layout: TendonLayout, n: int) -> Array:
-    """Values of the wrist in space as it is: with the places of the study on the true circle of tendons."""
-    own = layout if wrist.tendon_radius == world.wrist.tendon_radius else TendonLayout.of(wrist)
-    return placed_values(wrist, own, n)
-
-
-def _beliefs_in_space(of: _Worlds, layout: TendonLayout) -> Places:
+def _beliefs_in_space(of: _Worlds) -> Places:
     def models(index: int) -> Array:
         return np.concatenate([segments(in_plane(of.worlds[index].wrist, plane), 1) for plane in PLANES])
 
@@ -301,7 +291,7 @@ def _beliefs_in_space(of: _Worlds, layout: TendonLayout) -> Places:
     return Places(
         rows.reshape(len(rows), len(PLANES), -1, *rows.shape[2:]),
         of.rows(lambda _: of.alike),
-        of.rows(lambda index: placed_values(of.worlds[index].wrist, layout, 1)),
+        of.rows(lambda index: PCC_IN_SPACE.values(of.worlds[index].wrist, 1)),
         (0,) * (OF_A_TENDON * places),
         (0,) * places,
         Compensated() if of.loop.coupling == "compensated" else Ignored(),

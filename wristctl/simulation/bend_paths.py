@@ -10,11 +10,14 @@ import numpy as np
 from wristctl.arrays import Array
 from wristctl.config.loop import Reference
 from wristctl.config.section import Parameter
+from wristctl.errors import UserError
 from wristctl.simulation.reference import ReferenceKind
 from wristctl.simulation.references import minimum_jerk
 
 # Share of a turn in which a motion gets up to its speed.
 _SPEEDING = 0.25
+# Time between samples of `bend_path` [s].
+SAMPLE = 1e-3
 # Direction of the dart-thrower's line, from ulnar toward flexion [deg].
 _DIAGONAL_DEG = 40.0
 
@@ -97,6 +100,32 @@ def turned(path: Array, toward_deg: float) -> Array:
     c, s = np.cos(np.deg2rad(toward_deg)), np.sin(np.deg2rad(toward_deg))
     result: Array = np.einsum("ij,jkt->ikt", np.array([[c, -s], [s, c]]), path)
     return result
+
+
+def bend_path(name: str, size_deg: float, turn: float, horizon: float, toward_deg: float = 0.0) -> Array:
+    """Bends of a named path with two derivatives, (2, 3, T), sampled every millisecond.
+
+    Parameters
+    ----------
+    name
+        One of BEND_PATHS.
+    size_deg
+        Largest bend [deg].
+    turn
+        Time of a turn [s].
+    horizon
+        Time of the last sample [s].
+    toward_deg
+        Angle by which the path is turned, from ulnar toward flexion [deg].
+
+    Raises UserError for another name, or times that are not positive.
+    """
+    if name not in BEND_PATHS:
+        raise UserError(f"no bend path '{name}'", "reference", f"one of {', '.join(BEND_PATHS)}")
+    if not (turn > 0.0 and horizon >= SAMPLE):
+        raise UserError(f"a turn of {turn:g} s over {horizon:g} s is no motion", "horizon", "positive times")
+    time: Array = SAMPLE * np.arange(round(horizon / SAMPLE) + 1.0)
+    return turned(BEND_PATHS[name](time, np.deg2rad(size_deg), turn), toward_deg)
 
 
 def _kind(name: str, meaning: str, turn: float) -> ReferenceKind:

@@ -21,7 +21,7 @@ from wristctl.control.law import Controller
 from wristctl.seeds import Entropy
 from wristctl.simulation.closed_loop import trajectory
 from wristctl.simulation.metrics import METRICS, energy
-from wristctl.simulation.motion import Motion
+from wristctl.simulation.motion import DERIVATIVES, Motion
 from wristctl.simulation.oscillation import LIMIT_CYCLE, REST, chatter, oscillations, sustained
 from wristctl.simulation.outcome import Outcome
 from wristctl.simulation.rollout import How, columns_of, rollout, structure
@@ -198,7 +198,8 @@ def at_once(metrics: Sequence[str], outcome: Outcome, which: NDArray[np.int64], 
     if "drift" in metrics:
         values["drift"] = outcome.drift
     if "energy" in metrics:
-        values["energy"] = energy(outcome.columns("torque"), outcome.columns("rate"), step)
+        planes = zip(outcome.each("torque"), outcome.each("rate"), strict=True)
+        values["energy"] = energy(np.sum([torque * rate for torque, rate in planes], axis=0), step)
     return values
 
 
@@ -224,7 +225,7 @@ def _measured(
     if slow:
         plants = [plant_of(wrist, case.loop.plant) for case in cases]
         courses = [
-            trajectory(outcome, lane, motions[which[lane]], plants[lane % count], cases[0].loop.plant.model)
+            trajectory(outcome, lane, motions[which[lane]], plants[lane % count], cases[0].loop)
             for lane in range(rows * count)
         ]
         for name in slow:
@@ -235,12 +236,14 @@ def _measured(
 
 
 def _amplitudes(amplitudes: Callable[..., Array], outcome: Outcome, which: NDArray[np.int64], step: float) -> Array:
-    """`oscillations` or `sustained` of every rollout, without a trajectory for each."""
-    theta = outcome.columns("theta")
-    swings = np.empty(len(theta))
+    """`oscillations` or `sustained` of every rollout, of its plane with most, without a trajectory for each."""
+    swings = np.empty((outcome.planes, len(which)))
     with threadpool_limits(limits=1, user_api="blas"):
-        for first in range(0, len(theta), _SPECTRA):
-            chunk = slice(first, first + _SPECTRA)
-            motions, followed = np.unique(which[chunk], return_inverse=True)
-            swings[chunk] = amplitudes(theta[chunk], outcome.references[motions, 0], followed, step)
-    return swings
+        for plane, theta in enumerate(outcome.each("bend")):
+            for first in range(0, len(theta), _SPECTRA):
+                chunk = slice(first, first + _SPECTRA)
+                motions, followed = np.unique(which[chunk], return_inverse=True)
+                wanted = outcome.references[motions, DERIVATIVES * plane]
+                swings[plane, chunk] = amplitudes(theta[chunk], wanted, followed, step)
+    most: Array = swings.max(axis=0)
+    return most

@@ -16,17 +16,20 @@ from wristctl.control.law import Controller
 from wristctl.control.table import CONTROLLERS, controller, gains_of
 from wristctl.errors import UserError
 from wristctl.processes import cores
+from wristctl.seeds import Entropy
 from wristctl.simulation.batch import Start
 from wristctl.simulation.metrics import of_trajectory
 from wristctl.simulation.motion import Motion
 from wristctl.simulation.outcome import Outcome
-from wristctl.simulation.reference import motion, reference_name, toward
+from wristctl.simulation.planes import motion_in, planes_of
+from wristctl.simulation.reference import reference_name
 from wristctl.simulation.repetitions import Gathered, Repeated, Simulation
-from wristctl.simulation.rollout import rollout
-from wristctl.simulation.stationary_filter import Belief, expected_error
+from wristctl.simulation.rollout import check_two_planes, plant_in, rollout
+from wristctl.simulation.stationary_filter import beliefs_of, expected_error
 from wristctl.simulation.trajectory import Trajectory
-from wristctl.simulation.worlds import Draws, is_random, loop_facing, loops_of, plant_of
+from wristctl.simulation.worlds import Draws, World, is_random, loop_facing, loops_of, plant_of
 from wristctl.wrist.kinematics import Inverse
+from wristctl.wrist.tendon_layout import TendonLayout
 
 # Rollouts that are recorded at once.
 _TOGETHER = 64
@@ -54,8 +57,9 @@ def repeat(
     rows, times = len(gains), repetitions if is_random(loop) else 1
     loops = loops_of(loop, [draws.plant(repetition) for repetition in range(times)])
     repetitions_at_once = max(1, _TOGETHER // rows)
-    belief = Belief(loop.sensor, loop.actuator, wrist, loop.control_period)
-    expected = expected_error(belief) if loop.sensor.level == "camera" else None
+    layout = TendonLayout.of(wrist) if motions[0].planes == 2 else None
+    beliefs = beliefs_of(World(loop, wrist), layout) if loop.sensor.level == "camera" else []
+    expected = np.array([expected_error(belief) for belief in beliefs])
     gathered: list[Gathered] = [Gathered() for _ in range(rows)]
     for first in range(0, times, repetitions_at_once):
         now = range(first, min(first + repetitions_at_once, times))
@@ -72,10 +76,8 @@ def repeat(
         )  # fmt: skip
         _refuse_nan(law, outcome, motions[0].time)
         for lane, k in enumerate(k for k in now for _ in range(rows)):
-            plant = plant_of(wrist, loops[k].plant)
-            row = lane % rows
-            followed, wound = motions[which[row]], loop.actuator.level == "tendon"
-            course = trajectory(outcome, lane, followed, plant, loop.plant.model, expected, wound)
+            plant, row = plant_of(wrist, loops[k].plant), lane % rows
+            course = trajectory(outcome, lane, motions[which[row]], plant, loop, expected)
             gathered[row].add(simulation(outcome, lane, course))
     return [row_results.repeated(wrist) for row_results in gathered]
 
@@ -86,11 +88,11 @@ def _refuse_nan(law: Controller, outcome: Outcome, time: Array) -> None:
     if origin is None:
         return
     for lane in range(len(outcome.failed)):
-        theta, wanted = outcome.column("theta", lane), outcome.column("torque_wanted", lane)
-        bad = np.flatnonzero(np.isfinite(theta) & np.isnan(wanted))
-        if len(bad):
-            problem = f"{law.name} returned nan at {time[bad[0]]:.4g} s, theta = {theta[bad[0]]:.3g} rad"
-            raise UserError(problem, origin.reference, "return a finite torque [N m] whatever it sees")
+        for theta, wanted in zip(outcome.part("bend", lane).T, outcome.part("torque_wanted", lane).T, strict=True):
+            bad = np.flatnonzero(np.isfinite(theta) & np.isnan(wanted))
+            if len(bad):
+                problem = f"{law.name} returned nan at {time[bad[0]]:.4g} s, theta = {theta[bad[0]]:.3g} rad"
+                raise UserError(problem, origin.reference, "return a finite torque [N m] whatever it sees")
 
 
 def simulation(outcome: Outcome, index: int, course: Trajectory) -> Simulation:
@@ -105,43 +107,43 @@ def trajectory(
     index: int,
     followed: Motion,
     plant: WristParameters,
-    model: str,
-    expected: float | None = None,
-    wound: bool = False,
+    loop: Loop,
+    expected: Array | Sequence[float] = (),
 ) -> Trajectory:
-    """The recorded rollout `index` as a Trajectory; `plant` is the wrist as it is, of this plant model.
+    """The recorded rollout `index` of a loop as a Trajectory; `plant` is the wrist as it is.
 
-    `expected` is the standard deviation of its observer's error by what that believes [rad], None without an observer;
-    `wound` whether its tendons are on spools.
+    `expected` is the standard deviation of its observer's error in each plane by what that believes [rad].
     """
-    coordinates = outcome.coordinates(index)
+    planes = followed.planes
+
+    def of(kind: str) -> Array:
+        values = outcome.part(kind, index)
+        return values[:, 0] if planes == 1 else values
+
+    coordinates, observed, wound = outcome.coordinates(index), loop.sensor.level == "camera", loop.actuator.level
     return Trajectory(
         label="",
         time=followed.time,
-        theta=outcome.column("theta", index),
+        theta=of("bend"),
         segment_theta=coordinates,
-        rate=outcome.column("rate", index),
+        rate=of("rate"),
         theta_ref=followed.theta_ref,
         theta_desired=followed.theta_desired,
-        tip=PLANTS[model].tips(plant, coordinates),
+        tip=plant_in(planes, loop).tips(plant, coordinates),
         tip_desired=followed.tip_desired,
-        torque_wanted=outcome.column("torque_wanted", index),
-        torque=outcome.column("torque", index),
-        tension=_sides(outcome, "tension", index),
-        acting=_sides(outcome, "acting", index),
-        seen=outcome.column("seen", index),
-        load=None if expected is None else outcome.column("load", index),
-        expected=math.nan if expected is None else expected,
+        torque_wanted=of("torque_wanted"),
+        torque=of("torque"),
+        tension=outcome.part("tension", index),
+        acting=outcome.part("acting", index),
+        seen=of("seen"),
+        load=of("load") if observed else None,
+        share=outcome.part("share", index)[:, 0] if planes == 2 else None,
+        expected=np.asarray(expected) if len(expected) else math.nan,
         substeps=int(outcome.steps[index]),
         drift=float(outcome.drift[index]),
         outside=followed.outside,
-        spools=_sides(outcome, "delivered", index) if wound else None,
+        spools=outcome.part("delivered", index) if wound == "tendon" else None,
     )
-
-
-def _sides(outcome: Outcome, name: str, index: int) -> Array:
-    """A recorded pair of columns of the + and the - side, (T, 2)."""
-    return np.stack([outcome.column(f"{name}_{side}", index) for side in ("plus", "minus")], axis=-1)
 
 
 def scenario_of(reference: Reference, direction: DirectionName) -> str:
@@ -153,6 +155,59 @@ def equilibrium(loop: Loop) -> Start:
     """Equilibrium at which a plant of this loop rests at pretension."""
     model, n = PLANTS[loop.plant.model], loop.plant_segments
     return lambda plant: model.rest(plant, n, (plant.pretension, plant.pretension))
+
+
+def asked_of(study: Study, period: float, network: Inverse | None = None) -> tuple[WristParameters, Loop, Motion]:
+    """Wrist, loop and motion, on the grid of `period` [s], of the study's `simulate` section.
+
+    In one plane they are as its direction's plane sees them. Raises UserError for what no such loop has.
+    """
+    chosen, wrist, loop = study.simulate, study.wrist, study.simulate.loop
+    planes = planes_of(loop, chosen.reference, wrist)
+    if planes == 1:
+        wrist, loop = loop_facing(wrist, loop, chosen.direction)
+    else:
+        check_two_planes([World(loop, wrist)])
+        if chosen.start != "straight":
+            raise UserError("a loop in two planes begins straight", "start", "start: straight")
+    motion = motion_in(planes, chosen.reference, chosen.direction, wrist, chosen.horizon, period, network)
+    return wrist, loop, motion
+
+
+def follow(
+    law: Controller,
+    gains: Array,
+    followed: Motion,
+    wrist: WristParameters | None = None,
+    loop: Loop | None = None,
+    force: Array | None = None,
+    stream: Entropy = (0,),
+) -> Simulation:
+    """Follow one motion from the straight wrist at rest, in the planes that it bends in.
+
+    Parameters
+    ----------
+    law, gains
+        A controller and its gains (g,), the same for each plane.
+    followed
+        The motion, of `wristctl.simulation.reference.motion` or `Motion.of_bends`.
+    wrist
+        The wrist as its controller knows it; None: the paper's.
+    loop
+        Plant, motors, tendons, camera and timing; None: four segments, ideal motors and sensors.
+    force
+        Force on the tip (3,) or (3, T) [N], along the base, toward ulnar, toward flexion, beside the loop's own
+        disturbances; the laws do not know it.
+    stream
+        Entropy of the camera's noise.
+
+    Raises UserError for what no loop in these planes has.
+    """
+    loop, wrist = loop or Loop(), wrist or WristParameters()
+    rows, which = np.reshape(np.asarray(gains, float), (1, -1)), np.zeros(1, np.int64)
+    outcome = rollout(law, rows, [followed], which, loop, wrist, None, [stream], record=True, force=force)
+    course = trajectory(outcome, 0, followed, plant_of(wrist, loop.plant), loop)
+    return simulation(outcome, 0, course)
 
 
 def simulate(
@@ -168,11 +223,9 @@ def simulate(
     equilibrium of a wrist that buckles.
     """
     chosen, draws = study.simulate, Draws(study.seed)
-    wrist, loop = loop_facing(study.wrist, chosen.loop, chosen.direction)
     law = controller(chosen.controller)
     gains = np.array([gains_of(law, chosen.gains, tuned)])
-    reference = toward(chosen.reference, chosen.direction)
-    followed = motion(reference, wrist, chosen.horizon, sample_period(loop.control_period), network)
+    wrist, loop, followed = asked_of(study, sample_period(chosen.loop.control_period), network)
     start = equilibrium(loop) if chosen.start == "equilibrium" else None
     scenario = scenario_of(chosen.reference, chosen.direction)
     which = np.zeros(1, np.int64)

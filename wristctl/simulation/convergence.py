@@ -49,7 +49,7 @@ def tolerance(angles: Array) -> Array:
 def _swinging(outcome: Outcome, kinked: Mask) -> Mask:
     """Rollouts whose tensions swing so often that the steps' estimated errors miss what matters, (count,)."""
     with np.errstate(invalid="ignore", divide="ignore"):
-        swings = outcome.metrics["chattering"] / (2.0 * outcome.metrics["peak_tension"])
+        swings = outcome.metrics["chattering"] / (float(outcome.places) * outcome.metrics["peak_tension"])
     often: Mask = swings > np.where(kinked, SWINGS, FASTEST)
     return often
 

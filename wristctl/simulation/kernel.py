@@ -16,7 +16,7 @@ from wristctl.lanes.rows import lanes_like, part, rows_of
 from wristctl.simulation.actuator import Aim, actuate, deliver, drive_in_lanes
 from wristctl.simulation.nonideal import spools_after_slip
 from wristctl.simulation.observer import Knowing, go_on, sense
-from wristctl.simulation.sums import SUMS, gather, gather_tip, watch_range
+from wristctl.simulation.sums import SUMS, gather, watch_range
 from wristctl.wrist.plant import acting_pulls, advance_or_stop, bend_of, disturbed, parameters_of, path_before
 from wristctl.wrist.tendon_mechanics import tendons_in_lanes
 
@@ -24,22 +24,33 @@ _ALIVE, _STEP_ERROR = SUMS.index("alive"), SUMS.index("step_error")
 _NAN = float("nan")
 
 
-def columns_of_sample(planes: int, places: int) -> tuple[str, ...]:
-    """Columns of a recorded sample of P planes and T places, followed by the plant's coordinates.
+# What is recorded of each plane, and of each place.
+_OF_PLANES = ("bend", "rate", "torque_wanted", "torque", "seen", "load")
+_KINDS = (*_OF_PLANES[:4], "tension", "acting", *_OF_PLANES[4:], "delivered")
+
+
+def parts_of_sample(planes: int, places: int) -> dict[str, slice]:
+    """Where a recorded sample of P planes and T places has each kind of value; the plant's coordinates come last.
 
     Tensions are those of one tendon of a place, as commanded and as they act. After them come the bends that the law
     sees, the load that its observer estimates, and what motors deliver: pulls [N], or lengths on spools [m]. In two
     planes the share of the wanted torque that the tendons could give is last. The bend is nan where the lane has
     failed.
     """
-    of_planes = [""] if planes == 1 else ["_ulnar", "_flexion"]
-    of_places = ["_plus", "_minus"] if planes == 1 else [f"_{t + 1}" for t in range(places)]
-    kinds = (
-        ("theta" if planes == 1 else "bend", of_planes), ("rate", of_planes), ("torque_wanted", of_planes),
-        ("torque", of_planes), ("tension", of_places), ("acting", of_places), ("seen", of_planes), ("load", of_planes),
-        ("delivered", of_places),
-    )  # fmt: skip
-    return (*(f"{kind}{end}" for kind, ends in kinds for end in ends), *(("share",) if planes > 1 else ()))
+    parts, begin = dict[str, slice](), 0
+    for kind in _KINDS:
+        parts[kind] = slice(begin, begin := begin + (planes if kind in _OF_PLANES else places))
+    if planes > 1:
+        parts["share"] = slice(begin, begin := begin + 1)
+    return parts | {"coordinates": slice(begin, None)}
+
+
+def columns_of_sample(planes: int, places: int) -> tuple[str, ...]:
+    """Columns of `parts_of_sample` by their names, but for the coordinates."""
+    of_planes = ("_ulnar", "_flexion") if planes > 1 else ("",)
+    of_places = tuple(f"_{t + 1}" for t in range(places)) if planes > 1 else ("_plus", "_minus")
+    names = [f"{kind}{end}" for kind in _KINDS for end in (of_planes if kind in _OF_PLANES else of_places)]
+    return (*names, "share") if planes > 1 else ("theta", *names[1:])
 
 
 def columns_of_brief(planes: int) -> int:
@@ -220,7 +231,6 @@ def _run_block(setup: Any, course: Any, world: Any, state: Any, scratch: Any, fi
             for t in range(count):
                 acts[t] = acts[t] * of_one[t]
             gather(sum_, goals, time, bend, wish, acts, where(share < FULL, 1.0, zero))
-            gather_tip(known.wrist, sum_, plant, q, wish, acts)
             if tick == 0 and sample < state.record.shape[0]:
                 row = rows_of(state.record[sample])
                 for p in range(planes):

@@ -1,12 +1,13 @@
 """Metrics of one closed loop, each with formula, unit and heading: the entries of `wristctl.config.choices.METRICS`.
 
-e = theta - theta_ref (E12), sampled at the control ticks; T is the horizon. The move is the time until the reference
-rests; a reference that does not rest before the horizon has neither settling time nor overshoot. Tensions are those
-that act, of one tendon of each side. Of all metrics less is better.
+e = theta - theta_ref (E12), in two planes a vector and |e| its norm, sampled at the control ticks; T is the horizon.
+The move is the time until the reference rests; a reference that does not rest before the horizon has neither settling
+time nor overshoot, which is along the move. Tensions are those that act, of one tendon of each place: a side in one
+plane. Of all metrics less is better.
 """
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -15,19 +16,20 @@ from wristctl.arrays import Array
 from wristctl.config.choices import METRICS as _TABLE
 from wristctl.config.choices import Choices
 from wristctl.simulation.arrival import missing
-from wristctl.simulation.motion import GOALS, Goals
+from wristctl.simulation.motion import GOALS, Goals, goals_of_bends
 from wristctl.simulation.oscillation import hunting, oscillation
-from wristctl.simulation.trajectory import Trajectory
+from wristctl.simulation.trajectory import PLANES, Trajectory, size_of
 
 
-def energy(torque: Array, rate: Array, step: float) -> Any:
-    """Integral of |torque * rate| [J] over torques [N m] and rates [rad/s] (..., T) sampled every `step` [s]."""
-    return np.abs(torque * rate).sum(axis=-1) * step
+def energy(power: Array, step: float) -> Any:
+    """Integral of |power| [J] over powers [W] (..., T), torque times rate of all planes, sampled every `step` [s]."""
+    return np.abs(power).sum(axis=-1) * step
 
 
 def course_energy(course: Trajectory) -> float:
     """Energy of one course, as `energy` takes it of many."""
-    return float(energy(course.torque, course.rate, float(course.time[1] - course.time[0])))
+    power = (course.torque * course.rate).reshape(len(course.time), -1).sum(axis=1)
+    return float(energy(power, float(course.time[1] - course.time[0])))
 
 
 _ANGLE = float(np.deg2rad(0.01))
@@ -83,10 +85,32 @@ def summed() -> dict[str, Metric]:
     return {name: metric for name, metric in METRICS.items() if metric.of_totals is not None}
 
 
+def metrics_in(planes: int) -> Mapping[str, Metric]:
+    """The metrics of loops in so many planes: in two those of each plane come first."""
+    if planes == 1:
+        return METRICS
+    told = {name: replace(METRICS[name], formula=formula) for name, formula in _IN_TWO_PLANES.items()}
+    return {**OF_TWO_PLANES, **METRICS, **told}
+
+
 def of_trajectory(trajectory: Trajectory) -> dict[str, float]:
     """The metrics that come from a trajectory."""
     chosen = {name: metric.of_trajectory for name, metric in METRICS.items() if metric.of_trajectory is not None}
     return {name: float(value(trajectory)) for name, value in chosen.items()}
+
+
+def of_course(course: Trajectory) -> dict[str, float]:
+    """All metrics of a trajectory that was recorded sample by sample, from straight to where its reference ends."""
+    from wristctl.control.response import FULL  # compiled code, which the table does not need
+
+    step, planes = float(course.time[1] - course.time[0]), course.planes
+    acting = course.tension if course.acting is None else course.acting
+    saturated = np.zeros(len(course.time)) if course.share is None else (course.share < FULL).astype(float)
+    goals = goals_of_bends(course.bend_ref.T, course.time)
+    totals = totals_of_series(step, course.bend, course.bend_ref, acting, saturated, goals)
+    totals.sums["alive"][:] = float(not course.failed)
+    values = {name: float(value[0]) for name, value in summary(totals, metrics_in(planes)).items()}
+    return values | of_trajectory(course)
 
 
 def metrics_of(
@@ -229,7 +253,7 @@ ENERGY = Metric("J", "integral of |torque * rate|: work on the wrist", of_trajec
 RMSE_DESIRED = Metric(
     "rad",
     "RMSE against the true wanted angle",
-    of_trajectory=lambda course: np.sqrt(np.mean((course.theta - course.theta_desired) ** 2)),
+    of_trajectory=lambda course: np.sqrt(course.planes * np.mean((course.theta - course.theta_desired) ** 2)),
     floor=_ANGLE,
 )
 TIP_RMSE = Metric(
@@ -285,15 +309,16 @@ BIN = np.deg2rad(1.0)
 
 
 def range_untracked(course: Trajectory) -> float:
-    """Share of the wanted range in which the angle was ever off by more than 2 deg, by bins of 1 deg.
+    """Share of the wanted range in which the bend was ever off by more than 2 deg, by bins of 1 deg in each plane.
 
     Bins that a motion jumps over are no part of its range.
     """
-    wanted = course.theta_desired
-    bins = np.floor((wanted - wanted.min()) / BIN + 1e-9).astype(np.int64)
-    worst = np.zeros(bins.max() + 1)
-    np.maximum.at(worst, bins, np.nan_to_num(np.abs(course.theta - wanted), nan=np.inf))
-    return float(np.mean(worst[np.unique(bins)] > WITHIN))
+    wanted = course.theta_desired.reshape(len(course.time), -1)
+    bins = np.floor((wanted - wanted.min(axis=0)) / BIN + 1e-9).astype(np.int64)
+    passed, which = np.unique(bins, axis=0, return_inverse=True)
+    worst = np.zeros(len(passed))
+    np.maximum.at(worst, which.reshape(-1), np.nan_to_num(size_of(course.bend - wanted), nan=np.inf))
+    return float(np.mean(worst > WITHIN))
 
 
 RANGE_UNTRACKED = Metric(
@@ -316,3 +341,25 @@ SETTLING_AFTER = Metric(
     never=lambda horizon: horizon,
     floor=0.01,
 )
+
+# What is said of METRICS in two planes where sides are places, and angles vectors.
+_IN_TWO_PLANES = {
+    "rms_tension": "sqrt(mean of the squared tensions of all places)",
+    "chattering": "total variation of the tensions of all places per second",
+    "range_untracked": "share of the wanted cells of 1 deg by 1 deg in which |e| was ever more than 2 deg",
+    "oscillation": "half the peak-to-peak over the last second at rest of the plane with most, its trend removed",
+    "hunting": "half the peak-to-peak over the last half of a hold of at least 20 s of the plane with most",
+}
+# What loops in two planes have beside METRICS, whose e is the vector over both planes.
+OF_TWO_PLANES: Mapping[str, Metric] = {
+    **{
+        f"rmse_{plane}": Metric(
+            "rad", f"sqrt(mean e^2) over the horizon, toward {plane}",
+            lambda of, name=f"squared_{plane}": np.sqrt(of.sums[name] / of.sums["ticks"]),  # type: ignore[misc]
+        )
+        for plane in PLANES
+    },
+    "largest_error": Metric(
+        "rad", "largest |e| over both planes", lambda of: np.sqrt(of.sums["squared_most"]),
+    ),
+}  # fmt: skip

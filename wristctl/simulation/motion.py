@@ -1,39 +1,46 @@
-"""Motions that a wrist follows: angles with two derivatives over time, worked out where they are asked for."""
+"""Motions that a wrist follows: bends with two derivatives over time, worked out where they are asked for."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from wristctl.arrays import Array
+from wristctl.wrist.spatial.spatial_kinematics import spatial_tips
+
+# Rows of a reference in one plane: bend, rate and acceleration.
+DERIVATIVES = 3
 
 
 class Angles:
-    """Angle [rad], rate and acceleration over T samples: rows (3, T), which `work` writes into what it is given."""
+    """Bend [rad], rate and acceleration over T samples in each of P planes: rows (3 P, T), plane by plane.
 
-    def __init__(self, samples: int, work: Callable[[Array], None]) -> None:
-        self._samples, self._work = samples, work
+    `work` writes them into what it is given.
+    """
+
+    def __init__(self, samples: int, work: Callable[[Array], None], planes: int = 1) -> None:
+        self._samples, self._work, self.planes = samples, work, planes
 
     @classmethod
     def of(cls, rows: Array) -> Angles:
-        """Angles of known rows, (3, T), which nobody may change from now on."""
-        angles = cls(rows.shape[1], lambda out: None)
+        """Angles of known rows, (3 P, T), which nobody may change from now on."""
+        angles = cls(rows.shape[1], lambda out: None, len(rows) // DERIVATIVES)
         angles.rows = _fixed(rows)
         return angles
 
     @cached_property
     def rows(self) -> Array:
-        """The three rows, which are kept, read-only."""
-        rows = np.empty((3, self._samples))
+        """The rows, which are kept, read-only."""
+        rows = np.empty((DERIVATIVES * self.planes, self._samples))
         self._work(rows)
         return _fixed(rows)
 
     def into(self, out: Array) -> None:
-        """Write the rows into `out` (3, T); unless they are known already, they are not kept."""
+        """Write the rows into `out` (3 P, T); unless they are known already, they are not kept."""
         if "rows" in self.__dict__:
             out[:] = self.rows
         else:
@@ -81,15 +88,18 @@ def goals_of_bends(bends: Array, time: Array) -> Goals:
 
 @dataclass(frozen=True)
 class Motion:
-    """A reference on the sample grid, T samples from t = 0; SI units."""
+    """A reference on the sample grid, T samples from t = 0; SI units.
+
+    What is of each plane is (T,) in one plane, and (T, 2) in two, toward ulnar and toward flexion.
+    """
 
     time: Array
     angles: Angles
     """The reference with two derivatives."""
     tips: Array | Callable[[], Array]
-    """The wanted tip positions, (T, 2) [m], or what works them out once they are asked for."""
-    turn: float | None
-    """Last move of the reference, signed [rad]; None: from straight to where it ends."""
+    """The wanted tip positions, (T, P + 1) [m], or what works them out once they are asked for."""
+    turn: Any
+    """Last move of the reference, signed, of each plane [rad]; None: from straight to where it ends."""
     begin: float
     """Time at which the last move begins."""
     rest: float
@@ -100,47 +110,72 @@ class Motion:
     wanted: Angles | None = None
     """Angles that are truly wanted, where a network only approximates them."""
 
+    @classmethod
+    def of_bends(cls, bends: Array, period: float, length: float) -> Motion:
+        """A motion in P planes: bends with two derivatives (P, 3, T), sampled every `period` [s].
+
+        It is one move, from straight to where it ends; tips are those of one arc of this length [m].
+        """
+        planes, _, samples = bends.shape
+        time, wanted = period * np.arange(samples, dtype=np.float64), np.array(bends[:, 0].T)
+        goals = goals_of_bends(wanted.T, time)
+        angles = Angles.of(np.ascontiguousarray(bends, np.float64).reshape(DERIVATIVES * planes, samples))
+        tips = partial(spatial_tips, wanted, length)
+        return cls(time, angles, tips, None, goals.begin, goals.rest, goals.horizon)
+
+    @property
+    def planes(self) -> int:
+        """Planes that it bends in."""
+        return self.angles.planes
+
+    @property
+    def bend_ref(self) -> Array:
+        """The reference bend, (T, P) [rad]."""
+        bends: Array = self.angles.rows[::DERIVATIVES].T
+        return bends
+
     @property
     def theta_ref(self) -> Array:
-        """The reference angle, (T,) [rad]."""
-        theta: Array = self.angles.rows[0]
-        return theta
+        """The reference bend, (T,) or (T, 2) [rad]."""
+        return self._of(self.angles, 0)
 
     @property
     def rate_ref(self) -> Array:
-        """Rate of the reference, (T,) [rad/s]."""
-        rate: Array = self.angles.rows[1]
-        return rate
+        """Rate of the reference, (T,) or (T, 2) [rad/s]."""
+        return self._of(self.angles, 1)
 
     @property
     def acceleration_ref(self) -> Array:
-        """Acceleration of the reference, (T,) [rad/s^2]."""
-        acceleration: Array = self.angles.rows[2]
-        return acceleration
+        """Acceleration of the reference, (T,) or (T, 2) [rad/s^2]."""
+        return self._of(self.angles, 2)
 
     @property
     def theta_desired(self) -> Array:
-        """The true wanted angle, (T,) [rad], which a network only approximates."""
-        theta: Array = (self.wanted or self.angles).rows[0]
-        return theta
+        """The bend that is truly wanted, (T,) or (T, 2) [rad], which a network only approximates."""
+        return self._of(self.wanted or self.angles, 0)
+
+    @staticmethod
+    def _of(angles: Angles, derivative: int) -> Array:
+        rows: Array = angles.rows[derivative::DERIVATIVES]
+        return rows[0] if len(rows) == 1 else rows.T
 
     @cached_property
     def tip_desired(self) -> Array:
-        """The wanted tip position, (T, 2)."""
+        """The wanted tip position, (T, P + 1) [m]."""
         return self.tips() if callable(self.tips) else self.tips
 
     @property
-    def final(self) -> float:
-        """Last reference angle [rad]."""
-        return float(self.theta_ref[-1])
+    def final(self) -> Any:
+        """Last reference bend, of two planes (2,) [rad]."""
+        return self.theta_ref[-1]
 
     @property
     def goals(self) -> Goals:
         """Facts of the motion that metrics need."""
         return self.goals_at(self.final)
 
-    def goals_at(self, final: float) -> Goals:
-        """Facts of the motion that metrics need, by its last angle [rad], where that is known already."""
+    def goals_at(self, final: Any) -> Goals:
+        """Facts of the motion that metrics need, by its last bend [rad], where that is known already."""
         return Goals(final, final if self.turn is None else self.turn, self.begin, self.rest, self.horizon)
 
 

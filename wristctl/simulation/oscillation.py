@@ -34,14 +34,17 @@ _JUMP = 0.25
 # [rad] below which there is nothing but rounding.
 _STILL = 1e-9
 _UNKNOWN = math.nan
-_FIRST = np.zeros(1, np.int64)
 # Between samples that show how fast a reference goes [s].
 _ENOUGH = 0.5 / FASTEST
 
 
 def oscillation(course: Trajectory) -> float:
-    """Half the peak-to-peak [rad] that is left at rest; nan where the wrist has failed or there is no time to rest."""
-    amplitude = float(oscillations(course.theta[None], course.theta_ref[None], _FIRST, _step(course))[0])
+    """Half the peak-to-peak [rad] that is left at rest, of the plane that swings most.
+
+    nan where the wrist has failed or there is no time to rest.
+    """
+    planes = np.arange(course.planes)
+    amplitude = float(np.max(oscillations(course.bend.T, course.bend_ref.T, planes, _step(course))))
     return _UNKNOWN if math.isnan(amplitude) else amplitude
 
 
@@ -90,7 +93,7 @@ def sustained(theta: Array, references: Array, which: NDArray[np.int64], step: f
 def at_rest(course: Trajectory) -> bool:
     """Whether the reference rests for the last 2 s, so that what is left at the end is a swing of the loop's own."""
     samples = round(REST / _step(course))
-    return len(course.theta_ref) >= samples and bool(np.ptp(course.theta_ref[-samples:]) == 0.0)
+    return len(course.time) >= samples and not np.ptp(course.bend_ref[-samples:], axis=0).any()
 
 
 def chatter(variation: ArrayLike, tension_range: ArrayLike, places: int = 2) -> Array:
@@ -109,22 +112,29 @@ def hunting(course: Trajectory) -> float:
 
     Friction and slow integrals creep with periods of 5 to 20 s, which one second cannot show.
     """
-    moved = np.flatnonzero(np.diff(course.theta_ref))
+    moved = np.flatnonzero(np.diff(course.bend_ref, axis=0).any(axis=1))
     begun = int(moved[-1]) + 1 if len(moved) else 0
-    held = course.theta[(begun + len(course.theta)) // 2 :]
-    if (len(course.theta) - begun) * _step(course) < LONG_HOLD or not np.isfinite(held).all():
+    held = course.bend[(begun + len(course.time)) // 2 :]
+    if (len(course.time) - begun) * _step(course) < LONG_HOLD or not np.isfinite(held).all():
         return _UNKNOWN
+    return max(_creeping(plane) for plane in held.T)
+
+
+def _creeping(held: Array) -> float:
+    """Half the peak-to-peak of angles (W,), their trend removed [rad]."""
     place = np.linspace(-1.0, 1.0, len(held))
     trend = np.polynomial.polynomial.polyfit(place, held, 1)
     return float(np.ptp(held - np.polynomial.polynomial.polyval(place, trend)) / 2.0)
 
 
 def oscillation_frequency(course: Trajectory) -> float:
-    """Strongest frequency of the remaining swing [1/s]; nan where there is none."""
-    for _, left in _remaining(course.theta[None], course.theta_ref[None], _FIRST, _step(course)):
-        if np.ptp(left) >= _STILL:
-            return float(_strongest(left, _step(course))[0])
-    return _UNKNOWN
+    """Strongest frequency of the remaining swing [1/s], of the plane that swings most; nan where there is none."""
+    most, frequency = _STILL, _UNKNOWN
+    for _, left in _remaining(course.bend.T, course.bend_ref.T, np.arange(course.planes), _step(course)):
+        swings = np.ptp(left, axis=1)
+        if swings.max() >= most:
+            most, frequency = float(swings.max()), float(_strongest(left[[np.argmax(swings)]], _step(course))[0])
+    return frequency
 
 
 def _remaining(

@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wristctl.arrays import Array
-from wristctl.simulation.kernel import RECORDED
+from wristctl.simulation.kernel import columns_of_sample, parts_of_sample
+from wristctl.simulation.motion import DERIVATIVES
 
 
 class KeptSamples(NamedTuple):
@@ -69,7 +70,7 @@ class Outcome:
     until: Array
     """When they were last within it [s]: where they have failed."""
     references: Array
-    """References, angle with rate and acceleration, (motions, 3, T)."""
+    """References, bend with rate and acceleration in each plane, (motions, 3 P, T)."""
     steps: NDArray[np.int64]
     """Integration steps in a control period, (count,)."""
     step_error: Array
@@ -77,12 +78,19 @@ class Outcome:
     drift: Array
     """Change of RMSE or error at the end at the shortest steps tried, (count,) [rad]; 0: converged."""
     kept: KeptSamples | None = None
+    places: int = 2
+    """Places of tendons."""
 
     @property
     def unconverged(self) -> NDArray[np.bool_]:
         """Rollouts whose numbers depend on the integration step, (count,)."""
         changing: NDArray[np.bool_] = self.drift > 0.0
         return changing
+
+    @property
+    def planes(self) -> int:
+        """Planes that the wrists bend in."""
+        return int(self.references.shape[1]) // DERIVATIVES
 
     @property
     def samples(self) -> Array | None:
@@ -92,17 +100,31 @@ class Outcome:
     def column(self, name: str, rollout: int) -> Array:
         """One recorded column of one rollout, (T,)."""
         assert self.kept is not None
-        return self.kept.rollout(rollout)[:, RECORDED.index(name)].copy()
+        return self.kept.rollout(rollout)[:, self._names.index(name)].copy()
 
     def columns(self, name: str) -> Array:
         """One recorded column of all, (count, T)."""
         assert self.kept is not None
-        return self.kept.column(RECORDED.index(name))
+        return self.kept.column(self._names.index(name))
+
+    def each(self, kind: str) -> list[Array]:
+        """Recorded columns of a kind of `parts_of_sample`, (count, T) of each plane or place."""
+        assert self.kept is not None
+        part = parts_of_sample(self.planes, self.places)[kind]
+        return [self.kept.column(number) for number in range(part.start, part.stop)]
+
+    def part(self, kind: str, rollout: int) -> Array:
+        """What one rollout's samples have of a kind of `parts_of_sample`, (T, planes, places or coordinates)."""
+        assert self.kept is not None
+        return self.kept.rollout(rollout)[:, parts_of_sample(self.planes, self.places)[kind]].copy()
 
     def coordinates(self, rollout: int) -> Array:
         """The plant's coordinates, the angles of its segments, (T, q) [rad]."""
-        assert self.kept is not None
-        return self.kept.rollout(rollout)[:, len(RECORDED) :].copy()
+        return self.part("coordinates", rollout)
+
+    @property
+    def _names(self) -> tuple[str, ...]:
+        return columns_of_sample(self.planes, self.places)
 
     def rows(self, rollouts: NDArray[np.int64]) -> Outcome:
         """Some of the rollouts, in this order."""
@@ -134,6 +156,7 @@ class Outcome:
             together([part.step_error for part in parts]),
             together([part.drift for part in parts]),
             KeptSamples.joined(kept, order) if kept else None,
+            parts[0].places,
         )
 
     def replaced(self, rollouts: NDArray[np.int64], replacements: Outcome) -> Outcome:

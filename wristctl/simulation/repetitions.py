@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from abc import ABC, abstractmethod
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -33,13 +32,35 @@ class Simulation:
     until: float
 
 
-class Repetitions(ABC):
-    """Results of a loop that ran once or several times, in one plane or two: whether it failed, and what is wrong."""
+@dataclass(frozen=True)
+class Repeated:
+    """Repetitions of one loop, each with noise and a drawn plant of its own: whether it failed, and what is wrong."""
 
+    first: Simulation
     metrics: dict[str, Array]
+    """Metrics of each repetition, (R,)."""
     failed: NDArray[np.bool_]
+    """(R,)"""
     until: Array
-    bears: float
+    """(R,) when each was last within its range [s]."""
+    errors: Array
+    """Errors over time of the first repetitions, as many as are worth drawing, (<= R, T) or (<= R, T, 2) [rad]."""
+    bears: float = math.inf
+    """Largest tension that a tendon bears [N]."""
+    tension_range: float = math.inf
+    """Largest tension less the least one [N]."""
+
+    @classmethod
+    def once(cls, simulation: Simulation) -> Repeated:
+        """One simulation."""
+        metrics = {name: np.array([value]) for name, value in simulation.metrics.items()}
+        return cls(
+            simulation,
+            metrics,
+            np.array([simulation.failed]),
+            np.array([simulation.until]),
+            simulation.trajectory.error[None],
+        )
 
     @property
     def failure(self) -> str:
@@ -57,72 +78,11 @@ class Repetitions(ABC):
         holds = not self.arrives, self.swing > 0.0, self.chatter > 0.0, self.beyond > 0.0, self.drift > 0.0
         return [mark for mark, one in zip(MARKS[1:], holds, strict=True) if one]
 
-    @property
-    @abstractmethod
-    def arrives(self) -> bool:
-        """Whether the first repetition ends where it was asked to."""
-
-    @property
-    @abstractmethod
-    def swing(self) -> float:
-        """Half of the swing at rest, the repetitions' median, where it is a limit cycle, else 0 [rad]."""
-
-    @property
-    @abstractmethod
-    def frequency(self) -> float:
-        """Strongest frequency of the first repetition's swing [1/s]; nan where none is known."""
-
-    @property
-    @abstractmethod
-    def chatter(self) -> float:
-        """Frequency at which tensions go from limit to limit and back, the median, where it chatters, else 0 [1/s]."""
-
-    @property
-    @abstractmethod
-    def beyond(self) -> float:
-        """Largest tension, where it is above what a tendon bears, else 0 [N]."""
-
-    @property
-    @abstractmethod
-    def drift(self) -> float:
-        """Largest change of a repetition's numbers with the integration step [rad]; 0 where all have converged."""
-
     def median(self, name: str) -> float:
         """Median of a metric over the repetitions in which it is a number; nan where there is none."""
         values = self.metrics.get(name, np.empty(0))
         finite = values[np.isfinite(values)]
         return float(np.median(finite)) if len(finite) else math.nan
-
-
-@dataclass(frozen=True)
-class Repeated(Repetitions):
-    """Repetitions of one loop, each with noise and a drawn plant of its own."""
-
-    first: Simulation
-    metrics: dict[str, Array]
-    """Metrics of each repetition, (R,)."""
-    failed: NDArray[np.bool_]
-    """(R,)"""
-    until: Array
-    """(R,) when each was last within its range [s]."""
-    errors: Array
-    """theta - theta_ref over time of the first repetitions, as many as are worth drawing, (<= R, T) [rad]."""
-    bears: float = math.inf
-    """Largest tension that a tendon bears [N]."""
-    tension_range: float = math.inf
-    """Largest tension less the least one [N]."""
-
-    @classmethod
-    def once(cls, simulation: Simulation) -> Repeated:
-        """One simulation."""
-        metrics = {name: np.array([value]) for name, value in simulation.metrics.items()}
-        return cls(
-            simulation,
-            metrics,
-            np.array([simulation.failed]),
-            np.array([simulation.until]),
-            simulation.trajectory.error[None],
-        )
 
     @property
     def fate(self) -> str:
@@ -155,7 +115,8 @@ class Repeated(Repetitions):
     @property
     def chatter(self) -> float:
         """Frequency at which tensions go from limit to limit and back, the median, where it chatters, else 0 [1/s]."""
-        return float(chatter(self.median("chattering"), self.tension_range))
+        places = self.first.trajectory.tension.shape[1]
+        return float(chatter(self.median("chattering"), self.tension_range, places))
 
     @property
     def drift(self) -> float:

@@ -10,20 +10,25 @@ from numpy.typing import NDArray
 from wristctl.arrays import Array
 from wristctl.config.choices import PLANTS
 from wristctl.config.loop import Loop
+from wristctl.config.plant import in_one_plane_only
 from wristctl.config.wrist import WristParameters
 from wristctl.control.law import Controller
+from wristctl.errors import UserError
 from wristctl.lanes.blocks import to_rows
 from wristctl.processes import cores, stoppable
 from wristctl.seeds import Entropy
+from wristctl.simulation.actuator import SIDES
 from wristctl.simulation.batch import Batch, Lanes, Start, batch
 from wristctl.simulation.convergence import has_kinks, more_finely, settled
-from wristctl.simulation.kernel import BRIEFLY, RECORDED, Span, run_blocks
-from wristctl.simulation.metrics import Totals, summary
+from wristctl.simulation.kernel import Span, columns_of_brief, columns_of_sample, run_blocks
+from wristctl.simulation.metrics import Totals, metrics_in, summary
 from wristctl.simulation.motion import GOALS, Motion
 from wristctl.simulation.outcome import KeptSamples, Outcome
 from wristctl.simulation.sums import sums_by_name
 from wristctl.simulation.worlds import World
-from wristctl.wrist.plant import kernel_of
+from wristctl.wrist.plant import PlantModel, kernel_of
+from wristctl.wrist.spatial.pcc_in_space import PCC_IN_SPACE
+from wristctl.wrist.tendon_layout import TendonLayout
 
 # Control ticks of a block between two looks at whether the user has asked to stop.
 _SLICE_TICKS = 200_000
@@ -35,11 +40,11 @@ _SHARES = 8
 How = bool | Literal["briefly"]
 
 
-def columns_of(record: How, coordinates: int) -> int:
+def columns_of(record: How, coordinates: int, planes: int = 1, places: int = 2) -> int:
     """Number of recorded columns of a plant with so many coordinates."""
     if record == "briefly":
-        return len(BRIEFLY)
-    return len(RECORDED) + coordinates if record else 0
+        return columns_of_brief(planes)
+    return len(columns_of_sample(planes, places)) + coordinates if record else 0
 
 
 def rollout(
@@ -56,20 +61,28 @@ def rollout(
     progress: Callable[[float], None] | None = None,
     stop: Event | None = None,
     converge: bool = True,
+    force: Array | None = None,
 ) -> Outcome:
     """Run `count` closed loops: gains (count, g) and for each the index (count,) of the motion that it follows.
 
-    They begin at rest with the coordinates (q,) that `start` gives for the plant, straight where none is given. The
-    controller's one-segment model comes from `wrist`; the loop says how finely the plant is cut, how it differs, and
-    what stands between command and measurement. Loop and wrist are one for all or one for each (of one structure:
-    ValueError for loops that differ in their segments, plant, timing, or levels of actuator and sensor). `streams`
-    (count,) are the entropies of the cameras' noise; all meet the same where none is given. Where another thread sets
-    `stop`, the outcome comes soon and is of no use. Where a loop's `substeps` are null and its integration step turns
-    out to be too long, the rollout runs again with a shorter one (`wristctl.simulation.convergence`), unless `converge`
-    is false. Raises what a plain law has raised; such rollouts run one by one.
+    They bend in the planes of the motions, and begin at rest with the coordinates (q,) that `start` gives for the
+    plant, straight where none is given. The controller's one-segment model comes from `wrist`; the loop says how finely
+    the plant is cut, how it differs, and what stands between command and measurement. Loop and wrist are one for all or
+    one for each (of one structure: ValueError for loops that differ in their segments, plant, timing, or levels of
+    actuator and sensor, and for wrists with other numbers of tendons). `streams` (count,) are the entropies of the
+    cameras' noise; all meet the same where none is given. Where another thread sets `stop`, the outcome comes soon and
+    is of no use. Where a loop's `substeps` are null and its integration step turns out to be too long, the rollout runs
+    again with a shorter one (`wristctl.simulation.convergence`), unless `converge` is false. A `force` on the tip, (3,)
+    or (3, T) [N], along the base, toward ulnar and toward flexion, acts beside the loops' own disturbances. Raises what
+    a plain law has raised; such rollouts run one by one. UserError for facts that no loop in two planes has.
     """
     count = len(gains)
     worlds, world = worlds_of(loop, wrist, count)
+    model = plant_in(motions[0].planes, worlds[0].loop)
+    if model.planes == 2:
+        check_two_planes(worlds)
+    if force is not None:
+        force = np.broadcast_to(np.reshape(force, (3, -1)), (3, len(motions[0].time)))
     lanes = Lanes(which, world, [(0,)] * count if streams is None else list(streams))
     stop = stop or Event()
     everyone = np.arange(count)
@@ -90,9 +103,10 @@ def rollout(
                 followed, group_lanes = [motions[number] for number in numbers], group_lanes._replace(motion=motion)
             parts.append(
                 _run(
-                    controller, gains[group], followed, group_worlds, group_lanes, start, record, threads, so_far, stop
+                    controller, gains[group], followed, group_worlds, group_lanes, model, start, record, threads,
+                    so_far, stop, force,
                 )
-            )
+            )  # fmt: skip
         return parts[0] if len(parts) == 1 else Outcome.joined(parts, np.arange(len(rollouts)))
 
     outcome = run(everyone, 1, progress)
@@ -101,6 +115,21 @@ def rollout(
     by_hand = np.array([setting.loop.substeps is not None for setting in worlds])[world]
     kinked = np.array([has_kinks(setting.loop) for setting in worlds])[world]
     return settled(outcome, run, by_hand, kinked, stop)
+
+
+def plant_in(planes: int, loop: Loop) -> PlantModel:
+    """Plant of a loop in so many planes."""
+    return PLANTS[loop.plant.model] if planes == 1 else PCC_IN_SPACE
+
+
+def check_two_planes(worlds: Sequence[World]) -> None:
+    """UserError for facts that no loop in two planes has; ValueError for wrists with other numbers of tendons."""
+    for world in worlds:
+        if beyond := in_one_plane_only(world.loop.plant, world.loop.plant.actuator):
+            key = f"loop.plant.{beyond[0]}"
+            raise UserError(f"no loop in two planes has plant.{beyond[0]}", key, "leave it at its default")
+    if len({len(TendonLayout.of(world.wrist).places) for world in worlds}) != 1:
+        raise ValueError("wrists of one batch have other numbers of tendons")
 
 
 def worlds_of(
@@ -144,16 +173,18 @@ def _run(
     motions: Sequence[Motion],
     worlds: Sequence[World],
     lanes: Lanes,
+    model: PlantModel,
     start: Start | None,
     record: How,
     threads: int | None,
     progress: Callable[[float], None],
     stop: Event,
+    force: Array | None,
 ) -> Outcome:
     loop, count = worlds[0].loop, len(gains)
-    model = PLANTS[loop.plant.model]
-    columns = columns_of(record, model.coordinates(loop.plant_segments))
-    rollouts = batch(controller, gains, motions, worlds, lanes, model, start, columns)
+    places = len(SIDES) if model.planes == 1 else len(TendonLayout.of(worlds[0].wrist).places)
+    columns = columns_of(record, model.coordinates(loop.plant_segments), model.planes, places)
+    rollouts = batch(controller, gains, motions, worlds, lanes, model, start, columns, force)
     advance_blocks(rollouts, kernel_of(run_blocks, model), threads or cores(), progress, stop)
     rollouts.setup.law.check()
     return outcome_of(rollouts, count, loop, KeptSamples.of(rollouts.state.record, count) if record else None)
@@ -161,10 +192,11 @@ def _run(
 
 def outcome_of(rollouts: Batch, count: int, loop: Loop, kept: KeptSamples | None = None) -> Outcome:
     """Outcome of a batch's rollouts, so far as they have come."""
-    totals = totals_of(rollouts, count)
+    totals, planes = totals_of(rollouts, count), len(rollouts.setup.bend)
     failed, until = totals.sums["alive"] <= 0.0, totals.sums["until"]
     steps, error, drift = np.full(count, loop.steps), totals.sums["step_error"], np.zeros(count)
-    return Outcome(summary(totals), failed, until, rollouts.course.references, steps, error, drift, kept)
+    metrics, places = summary(totals, metrics_in(planes)), len(rollouts.setup.pulls)
+    return Outcome(metrics, failed, until, rollouts.course.references, steps, error, drift, kept, places)
 
 
 def totals_of(rollouts: Batch, count: int) -> Totals:

@@ -9,14 +9,11 @@ from typing import Any
 import numpy as np
 
 from wristctl.arrays import Array
-from wristctl.lanes.compiled import by_type, compiled, implements, kernel
+from wristctl.lanes.compiled import compiled, kernel
 from wristctl.lanes.functions import maximum, norm
-from wristctl.lanes.lane import dot, where, zero_like
+from wristctl.lanes.lane import where, zero_like
 from wristctl.lanes.rows import beyond, lanes_like, part, rows_of
 from wristctl.simulation.motion import GOALS, Goals
-from wristctl.wrist.segments import Segments
-from wristctl.wrist.spatial.posture import spatial_tip
-from wristctl.wrist.spatial.spatial_segments import SpatialWrist
 
 # Running sums of a lane: those that metrics are made of, and the integration steps' estimated errors [rad]. Behind them
 # are the tensions of the last tick, of as many places as there are, and in two planes OF_BENDS.
@@ -25,7 +22,7 @@ SUMS = (
     "peak", "squared_tension", "variation", "saturated", "slack", "ticks", "ticks_move", "alive", "until",
     "step_error",
 )  # fmt: skip
-OF_BENDS = ("squared_ulnar", "squared_flexion", "squared_most", "squared_tip")
+OF_BENDS = ("squared_ulnar", "squared_flexion", "squared_most")
 (
     _SQUARED, _SQUARED_MOVE, _SQUARED_EXIT, _ABSOLUTE, _LATE, _LATE_COUNT, _EXIT_2, _EXIT_5, _OVERSHOOT,
     _PEAK, _SQUARED_TENSION, _VARIATION, _SATURATED, _SLACK, _TICKS, _TICKS_MOVE, _ALIVE, _UNTIL,
@@ -95,29 +92,6 @@ def gather(sums: Any, goals: Any, time: Any, bend: Any, wish: Any, tensions: Any
         for p in range(planes):
             own[p] = own[p] + errors[p] * errors[p]
         own[planes] = maximum(own[planes], squared)
-
-
-@by_type
-def gather_tip(wrist: Any, sums: Any, plant: Any, q: Any, wish: Any, tensions: Any) -> None:
-    """Add the distance of the tip from that of one arc of the controller's wrist that is bent as wanted (P rows).
-
-    In one plane it is that of a recorded course, whose wanted tips may be others.
-    """
-    raise NotImplementedError("compiled code only")
-
-
-@implements(gather_tip, Segments)
-def _no_tip(wrist: Any, sums: Any, plant: Any, q: Any, wish: Any, tensions: Any) -> None:
-    pass
-
-
-@implements(gather_tip, SpatialWrist)
-def _tip_in_space(wrist: Any, sums: Any, plant: Any, q: Any, wish: Any, tensions: Any) -> None:
-    last = _LAST + len(tensions) + len(wish) + 1
-    tip, _, _, _ = spatial_tip(plant.segment, q)
-    wanted, _, _, _ = spatial_tip(wrist.segment, wish)
-    off = tip - wanted
-    sums[last] = sums[last] + dot(off, off)
 
 
 @compiled

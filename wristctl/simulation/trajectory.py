@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING
@@ -15,7 +16,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
 
-# Columns of a trajectory's table with unit and meaning; the segments' angles theta_1 ... theta_n [rad] follow.
+# Columns of a trajectory's table in one plane with unit and meaning; the segments' angles theta_1 ... theta_n follow.
 COLUMNS: dict[str, tuple[str, str]] = {
     "time": ("s", "time from the start of the move"),
     "theta": ("rad", "bending angle of the last disc"),
@@ -40,38 +41,68 @@ COLUMNS: dict[str, tuple[str, str]] = {
 }
 
 
+# The same in two planes: of each plane, of the tip, and of each tendon. Bends of segments, bend_1_ulnar ..., follow.
+PLANES = ("ulnar", "flexion")
+_OF_A_PLANE = {
+    "bend": ("rad", "bend of the last disc"),
+    "rate": ("rad/s", "rate of that bend"),
+    "bend_seen": ("rad", "bend that the controller sees: behind a camera the observer's"),
+    "load_seen": ("N m", "load torque as the observer estimates it; 0 where there is none"),
+    "bend_ref": ("rad", "reference that the controller follows"),
+    "error": ("rad", "bend less its reference"),
+    "torque_wanted": ("N m", "torque that the controller wants"),
+    "torque": ("N m", "torque of the commanded pulls on the one-segment model"),
+}
+_TIP = {"tip": "last disc's centre", "tip_desired": "tip of one arc that is bent as wanted"}
+_AXES = {"x": "along the base tangent", "y": "toward ulnar", "z": "toward flexion"}
+_OF_A_TENDON = {
+    "pull": ("N", "commanded pull of one tendon at this place"),
+    "acting": ("N", "pull of one tendon at this place as it acts on the wrist: late and in steps behind real motors"),
+    "spool": ("m", "length that each spool of this place has reeled in until the next control period"),
+}
+
+
+_FORMERLY = {"pulls": "tension", "coordinates": "segment_theta", "bend_seen": "seen", "load_seen": "load"}
+
+
 @dataclass(frozen=True)
 class Trajectory:
-    """One closed loop over time: T samples, n plant segments; SI units."""
+    """One closed loop over time: T samples, P planes, n plant segments; SI units. nan after a wrist has failed.
+
+    What is of each plane is (T,) in one plane, and (T, 2) in two, toward ulnar and toward flexion. Places of tendons
+    are the + and the - side in one plane, and those of the wrist's layout in two.
+    """
 
     label: str
     """controller/gains, for example smc/exchanged"""
     time: Array
     theta: Array
-    """Bending angle of the last disc, the sum of the segments' angles, (T,)."""
+    """Bend of the last disc, in one plane the sum of the segments' angles, (T,) or (T, 2)."""
     segment_theta: Array
-    """(T, n)"""
+    """The plant's coordinates, (T, n) or (T, 2n)."""
     rate: Array
     theta_ref: Array
     theta_desired: Array
-    """True wanted angle, (T,); differs from theta_ref by the network's own error."""
+    """True wanted bend, (T,) or (T, 2); differs from theta_ref by the network's own error."""
     tip: Array
-    """(T, 2)"""
+    """(T, P + 1)"""
     tip_desired: Array
-    """(T, 2)"""
+    """(T, P + 1)"""
     torque_wanted: Array
     torque: Array
-    """Torque of the commanded tensions on the controller's one-segment model, (T,)."""
+    """Torque of the commanded tensions on the controller's one-segment model, (T,) or (T, 2)."""
     tension: Array
-    """Commanded, per tendon of the + and the - side, (T, 2)."""
+    """Commanded, of one tendon of each place, (T, places)."""
     acting: Array | None = None
-    """Tension as it acts on the wrist, (T, 2); None where it is as commanded or cannot be known."""
+    """Tension as it acts on the wrist, (T, places); None where it is as commanded or cannot be known."""
     seen: Array | None = None
-    """Angle that the controller sees, (T,); None where that is theta."""
+    """Bend that the controller sees, (T,) or (T, 2); None where that is theta."""
     load: Array | None = None
-    """Load torque as the observer estimates it, (T,); None where there is no observer."""
-    expected: float = math.nan
-    """Standard deviation of the observer's error of the angle by what it believes [rad]."""
+    """Load torque as the observer estimates it, (T,) or (T, 2); None where there is no observer."""
+    share: Array | None = None
+    """Share of the wanted torque that the tendons could give, (T,), in two planes."""
+    expected: float | Array = math.nan
+    """Standard deviation of the observer's error of the bend by what it believes, in each plane [rad]."""
     substeps: int = 1
     """Integration steps in a control period that it took."""
     drift: float = 0.0
@@ -79,19 +110,52 @@ class Trajectory:
     outside: float = 0.0
     """Share of the wanted tips outside the domain of the network behind the reference."""
     spools: Array | None = None
-    """Length that each spool of the + and the - side has reeled in [m], (T, 2); None without spools."""
+    """Length that each spool of a place has reeled in [m], (T, places); None without spools."""
+
+    if not TYPE_CHECKING:
+
+        def __getattr__(self, name: str) -> object:
+            """What loops in two planes had under names of their own."""
+            if name not in _FORMERLY:
+                raise AttributeError(f"a trajectory has no {name}")
+            return getattr(self, _FORMERLY[name])
+
+    @property
+    def planes(self) -> int:
+        """Planes that the wrist bends in."""
+        return 1 if self.theta.ndim == 1 else self.theta.shape[1]
+
+    @property
+    def bend(self) -> Array:
+        """theta as (T, P) [rad]."""
+        return self.theta.reshape(len(self.time), -1)
+
+    @property
+    def bend_ref(self) -> Array:
+        """theta_ref as (T, P) [rad]."""
+        return self.theta_ref.reshape(len(self.time), -1)
 
     @property
     def error(self) -> Array:
-        """e = theta - theta_ref (E12), (T,)."""
+        """e = theta - theta_ref (E12), (T,) or (T, 2)."""
         return self.theta - self.theta_ref
+
+    @property
+    def distance(self) -> Array:
+        """|e|, over both planes its norm, (T,) [rad]."""
+        return size_of(self.bend - self.bend_ref)
+
+    @property
+    def failed(self) -> bool:
+        """Whether the wrist left its range."""
+        return bool(np.isnan(self.theta).any())
 
     @property
     def consistency(self) -> float:
         """RMS of the observer's error over what it expects of itself; nan where there is no observer."""
-        if self.seen is None or not self.expected > 0.0:
+        if self.seen is None or not np.all(np.asarray(self.expected) > 0.0):
             return math.nan
-        return float(np.sqrt(np.mean((self.seen - self.theta) ** 2)) / self.expected)
+        return float(np.sqrt(np.mean((self.seen - self.theta) ** 2)) / np.sqrt(np.mean(np.square(self.expected))))
 
     @cached_property
     def tip_distance(self) -> Array:
@@ -100,7 +164,30 @@ class Trajectory:
         return distance
 
     def columns(self) -> dict[str, Array]:
-        """Everything under the names of COLUMNS, (T,) each; spools where there are any."""
+        """Everything under the names of `meanings`, (T,) each; spools where there are any."""
+        return self._in_one_plane() if self.planes == 1 else self._in_two_planes()
+
+    def _in_two_planes(self) -> dict[str, Array]:
+        seen, load = self.theta if self.seen is None else self.seen, self.load
+        of_a_plane = {
+            "bend": self.theta, "rate": self.rate, "bend_seen": seen,
+            "load_seen": np.zeros_like(self.theta) if load is None else load, "bend_ref": self.theta_ref,
+            "error": self.error, "torque_wanted": self.torque_wanted, "torque": self.torque,
+        }  # fmt: skip
+        columns = {"time": self.time}
+        for name, values in of_a_plane.items():
+            columns |= {f"{name}_{plane}": column for plane, column in zip(PLANES, values.T, strict=True)}
+        for name, path in (("tip", self.tip), ("tip_desired", self.tip_desired)):
+            columns |= {f"{name}_{axis}": column for axis, column in zip(_AXES, path.T, strict=True)}
+        acting = self.tension if self.acting is None else self.acting
+        for name, tendons in (("pull", self.tension), ("acting", acting), ("spool", self.spools)):
+            if tendons is not None:
+                columns |= {f"{name}_{t}": column for t, column in enumerate(tendons.T, 1)}
+        for k, bends in enumerate(self.segment_theta.reshape(len(self.time), -1, 2).transpose(1, 2, 0), 1):
+            columns |= {f"bend_{k}_{plane}": column for plane, column in zip(PLANES, bends, strict=True)}
+        return columns if self.share is None else columns | {"share": self.share}
+
+    def _in_one_plane(self) -> dict[str, Array]:
         acting = self.tension if self.acting is None else self.acting
         columns = {
             "time": self.time,
@@ -133,7 +220,29 @@ class Trajectory:
         return pd.DataFrame(self.columns())
 
 
+def size_of(values: Array) -> Array:
+    """Norms (T,) of vectors (T, P): of one plane the absolute values themselves."""
+    sizes: Array = np.hypot.reduce(np.abs(values), axis=1)
+    return sizes
+
+
+def meanings(columns: Sequence[str]) -> dict[str, tuple[str, str]]:
+    """Unit and meaning of a trajectory's columns, by their names."""
+    if "theta" in columns:
+        segments = {name: ("rad", "bending angle of one segment") for name in columns if name not in COLUMNS}
+        return {name: (COLUMNS | segments)[name] for name in columns}
+    of = {"time": COLUMNS["time"]}
+    of |= {f"{n}_{p}": (unit, f"{meaning}, {p}") for n, (unit, meaning) in _OF_A_PLANE.items() for p in PLANES}
+    of |= {f"{n}_{axis}": ("m", f"{text}, {where}") for n, text in _TIP.items() for axis, where in _AXES.items()}
+    of["share"] = ("1", "share of the wanted torque that the tendons could give")
+    for name in columns:
+        first, _, rest = name.partition("_")
+        if name not in of:
+            of[name] = _OF_A_TENDON[first] if rest.isdigit() else ("rad", "bend of one segment")
+    return {name: of[name] for name in columns}
+
+
 def rests(trajectory: Trajectory) -> bool:
     """Whether the reference comes to rest before the horizon: a periodic one never settles, and need not."""
     late = max(2, len(trajectory.time) // 20)
-    return bool(np.ptp(trajectory.theta_ref[-late:]) == 0.0)
+    return not np.ptp(trajectory.bend_ref[-late:], axis=0).any()

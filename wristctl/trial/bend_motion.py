@@ -8,7 +8,7 @@ from wristctl.arrays import Array
 from wristctl.config.hw_run import HwRunSettings
 from wristctl.config.wrist import WristParameters
 from wristctl.errors import UserError
-from wristctl.simulation.bend_loops import bends_of
+from wristctl.simulation.planes import bends_of
 from wristctl.simulation.reference import REFERENCES, motion
 from wristctl.simulation.references import minimum_jerk
 from wristctl.trial.spatial_belief import TOWARD, unit_toward

@@ -13,13 +13,17 @@ from wristctl.config.study import Study
 from wristctl.config.wrist import WristParameters
 from wristctl.control.table import controller, gains_of
 from wristctl.records import Run
-from wristctl.simulation.bend_course import BendCourse
-from wristctl.simulation.two_planes import rollout_bends
-from wristctl.simulation.worlds import Draws, World, loops_of
+from wristctl.simulation.closed_loop import follow
+from wristctl.simulation.metrics import of_course
+from wristctl.simulation.motion import Motion
+from wristctl.simulation.repetitions import Simulation
+from wristctl.simulation.trajectory import Trajectory, size_of
+from wristctl.simulation.worlds import Draws, loops_of
 from wristctl.trial.bend_motion import BendMotion, bend_motion_of
 from wristctl.trial.spatial_belief import PLANES, layout_of_axes
 from wristctl.trial.trials import EARLY, LEAST_PUSH, Trial, push_seen, recovery
 from wristctl.wrist.directions import ACTIVE
+from wristctl.wrist.spatial.spatial_kinematics import spatial_tips
 
 # Metrics of a motion that the log alone gives, and of those the ones that the true bend gives too.
 LOGGED = (
@@ -39,7 +43,7 @@ FURTHER: Mapping[str, tuple[str, str]] = {
 _BAND = 0.02
 
 
-def logged_course(course: pd.DataFrame, followed: BendMotion, wrist: WristParameters) -> BendCourse:
+def logged_course(course: pd.DataFrame, followed: BendMotion, wrist: WristParameters) -> Trajectory:
     """A trial as logged, on the grid of its motion: the bend as estimated, and pulls as commanded."""
 
     def planes(name: str) -> Array:
@@ -47,34 +51,37 @@ def logged_course(course: pd.DataFrame, followed: BendMotion, wrist: WristParame
 
     bend = planes("bend")
     pulls = _on(followed.time, course, [f"tension_{tendon}" for tendon in ACTIVE])
-    return BendCourse(
+    return Trajectory(
+        label="",
         time=followed.time,
-        bend=bend,
+        theta=bend,
+        segment_theta=bend,
         rate=planes("rate"),
-        bend_ref=followed.bend_ref,
-        bend_seen=bend,
-        load_seen=planes("load"),
+        theta_ref=followed.bend_ref,
+        theta_desired=followed.bend_ref,
+        tip=spatial_tips(bend, wrist.length),
+        tip_desired=spatial_tips(followed.bend_ref, wrist.length),
         torque_wanted=planes("torque_wanted"),
         torque=planes("torque"),
+        tension=pulls,
+        seen=bend,
+        load=planes("load"),
         share=_on(followed.time, course, ["share"])[:, 0],
-        pulls=pulls,
-        acting=pulls,
-        coordinates=bend,
-        length=wrist.length,
-        length_known=wrist.length,
     )
 
 
-def true_course(logged: BendCourse, truth: pd.DataFrame) -> BendCourse:
-    """The same as it truly was on an emulated bench; its rate is still the estimated one."""
+def true_course(logged: Trajectory, truth: pd.DataFrame, length: float) -> Trajectory:
+    """The same as it truly was on an emulated bench, of a wrist so long [m]; its rate is still the estimated one."""
     time = logged.time
     segments = sum(name.startswith("bend_") and name[5].isdigit() for name in truth.columns) // len(PLANES)
     names = [f"bend_{k + 1}_{plane}" for k in range(segments) for plane in PLANES]
+    bends = _on(time, truth, names)
     return replace(
         logged,
-        bend=_on(time, truth, [f"bend_{plane}" for plane in PLANES]),
+        theta=_on(time, truth, [f"bend_{plane}" for plane in PLANES]),
         acting=_on(time, truth, [f"pull_{tendon}" for tendon in ACTIVE]),
-        coordinates=_on(time, truth, names),
+        segment_theta=bends,
+        tip=spatial_tips(bends, length),
     )
 
 
@@ -83,7 +90,7 @@ def _on(time: Array, table: pd.DataFrame, names: list[str]) -> Array:
     return np.stack([np.interp(time, at, table[name].to_numpy(float)) for name in names], axis=1)
 
 
-def first_course(run: Run) -> BendCourse | None:
+def first_course(run: Run) -> Trajectory | None:
     """The first trial of a run in two planes that went to its end: as it truly was, where that is known."""
     trials, log = run.data("trials"), run.data("log")
     done = trials[trials["outcome"] == "ok"]
@@ -95,7 +102,7 @@ def first_course(run: Run) -> BendCourse | None:
     if not run.has("data/truth.csv"):
         return course
     truth = run.data("truth")
-    return true_course(course, truth[truth["trial"] == number])
+    return true_course(course, truth[truth["trial"] == number], run.config.wrist.length)
 
 
 def whole(course: pd.DataFrame, followed: BendMotion) -> bool:
@@ -116,18 +123,19 @@ def bends_evaluated(
     if not whole(course, followed):
         return metrics
     logged = logged_course(course, followed, wrist)
-    by_log = logged.metrics()
+    by_log = of_course(logged)
     metrics |= {name: by_log[name] for name in LOGGED}
     metrics["settling"] = _settling(logged)
     if trial.push and followed.rest < push.start - EARLY:
-        load = logged.load_seen - np.median(logged.load_seen[logged.time < push.start - EARLY][-50:], axis=0)
+        seen_load = np.asarray(logged.load)
+        load = seen_load - np.median(seen_load[logged.time < push.start - EARLY][-50:], axis=0)
         seen = push_seen(logged.time, np.hypot(*load.T), push.start - EARLY, LEAST_PUSH)
         if seen is not None:
             metrics["push_torque"] = seen.torque
             metrics["recovery"] = _recovery(logged, seen.end)
     if truth is not None and len(truth):
-        true = true_course(logged, truth)
-        truly = true.metrics()
+        true = true_course(logged, truth, wrist.length)
+        truly = of_course(true)
         metrics |= {f"true_{name}": truly[name] for name in TRULY}
         metrics["true_settling"] = _settling(true)
         if trial.push:
@@ -135,37 +143,32 @@ def bends_evaluated(
     return metrics
 
 
-def _norm(course: BendCourse) -> Array:
-    size: Array = np.hypot(*course.error.T)
-    return size
+def _size(course: Trajectory) -> float:
+    return float(size_of(course.bend_ref).max())
 
 
-def _size(course: BendCourse) -> float:
-    return float(np.hypot(*course.bend_ref.T).max())
-
-
-def _settling(course: BendCourse) -> float:
-    outside = np.flatnonzero(_norm(course) > _BAND * _size(course))
+def _settling(course: Trajectory) -> float:
+    outside = np.flatnonzero(course.distance > _BAND * _size(course))
     if not len(outside):
         return 0.0
     return float(course.time[outside[-1] + 1]) if outside[-1] + 1 < len(course.time) else math.nan
 
 
-def _recovery(course: BendCourse, end: float) -> float:
-    return recovery(course.time, _norm(course), _size(course), end)
+def _recovery(course: Trajectory, end: float) -> float:
+    return recovery(course.time, course.distance, _size(course), end)
 
 
 def bend_twin(
     study: Study, trial: Trial, followed: BendMotion, tuned: Mapping[str, Mapping[str, float]] | None
-) -> BendCourse:
+) -> Simulation:
     """Simulate a trial in two planes of the study's hw-run section."""
     settings, draws, wrist = study.hw_run, Draws(study.seed), study.wrist
     row = settings.rows[trial.row]
     law = controller(row.controller)
     disturbed = settings.loop.model_copy(update={"disturbances": trial.disturbances(settings, followed)})
     (loop,) = loops_of(disturbed, [draws.plant(0)])
-    outcome = rollout_bends(
-        law, np.array([gains_of(law, row.gains, tuned)]), followed.references, [World(loop, wrist)],
-        layout_of_axes(wrist), None, [draws.camera(trial.scenario, 0)], record=True,
-    )  # fmt: skip
-    return outcome.courses[0]
+    layout_of_axes(wrist)
+    wound = wrist.model_copy(update={"tendons": "four"})  # the fifth in the centre is not
+    motion = Motion.of_bends(followed.references, settings.control_period, wrist.length)
+    gains, stream = np.array(gains_of(law, row.gains, tuned)), draws.camera(trial.scenario, 0)
+    return follow(law, gains, motion, wound, loop, stream=stream)

@@ -13,7 +13,6 @@ from wristctl.config.wrist import WristParameters
 from wristctl.control.belief import Limits
 from wristctl.control.law import REFERENCE, Controller, signals_of
 from wristctl.control.response import FULL, OF_A_PLANE, Controlled, Estimate, Seen, look_ahead, respond, room_like
-from wristctl.errors import UserError
 from wristctl.lanes.compiled import compiled, kernel
 from wristctl.lanes.rows import lanes_like, part, rows_of
 from wristctl.simulation.observer import knowing_in_lanes, propagate
@@ -66,6 +65,7 @@ class SpatialSteering:
         self._bends = np.zeros((REMEMBERED, 2))
         self._fused_at, self._period, self._found = 0, period, np.zeros(AXES + 5)
         self._missed = np.zeros(2)
+        self._law: Any = None
         self._control: Any = None
         self._preview = 0
         self.tick = 0
@@ -86,16 +86,11 @@ class SpatialSteering:
         return believed
 
     def use(self, controller: Controller, gains: Sequence[float]) -> None:
-        """Take up a law in both planes, its memory empty, with motors that have caught up.
-
-        Raises UserError for one in plain Python.
-        """
-        if controller.plain:
-            problem = f"{controller.name} is plain Python, which no loop in two planes runs"
-            raise UserError(problem, "controllers", "one that compiles")
+        """Take up a law in both planes, its memory empty, with motors that have caught up."""
+        self._law = controller.compiled()
         self.withheld, self._missed, self._preview = np.zeros(2), np.zeros(2), controller.preview
         self._control = Controlled(
-            controller.compiled(), np.zeros((2, signals_of(controller.preview))), self._known.belief.models,
+            self._law, np.zeros((2, signals_of(controller.preview))), self._known.belief.models,
             np.array([*gains, 0.0]), np.zeros((2, max(1, controller.memory))), np.zeros((2, len(REFERENCE))),
         )  # fmt: skip
 
@@ -119,10 +114,12 @@ class SpatialSteering:
         """The laws' answer, at the present estimate, to a reference (T, 2, 3) of bend, rate and acceleration at its
         tick.
 
-        It goes by periods; beyond its end it stays as it is there, for a law that looks ahead.
+        It goes by periods; beyond its end it stays as it is there, for a law that looks ahead. Raises what a plain law
+        has raised.
         """
         to_follow, sees = (course, tick, self._preview), Seen(self._observer.now, self.withheld, self._missed)
         _respond(self._control, self._known, self._bounds, sees, to_follow, self._period, self._found)
+        self._law.check()
         found = self._found.copy()
         return SpatialAnswer(found[AXES : AXES + 2], found[AXES + 2 : AXES + 4], float(found[AXES + 4]), found[:AXES])
 

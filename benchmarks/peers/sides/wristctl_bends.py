@@ -9,8 +9,8 @@ from bend_truth import WRIST, loop_of
 from task import BendTask
 
 from wristctl.control.table import controller
-from wristctl.simulation.two_planes import rollout_bends
-from wristctl.simulation.worlds import World
+from wristctl.simulation.motion import Motion
+from wristctl.simulation.rollout import rollout
 
 
 def prepare(
@@ -18,12 +18,15 @@ def prepare(
 ) -> Callable[[int], np.ndarray]:
     """One lane is recorded, as `simulate` does it; many are not."""
     record = lanes == 1
-    law, worlds = controller("smc"), [World(loop_of(task, steps, actuator), WRIST)] * lanes
+    law, loop, which = controller("smc"), loop_of(task, steps, actuator), np.zeros(lanes, np.int64)
     gains = np.tile(task.gains, (lanes, 1))
 
     def run(ticks: int) -> np.ndarray:
-        done = rollout_bends(law, gains, task.reference[:, :, :ticks], worlds, threads=threads, record=record)
-        return done.courses[0].coordinates.ravel() if record else done.metrics["rmse"]
+        followed = Motion.of_bends(task.reference[:, :, :ticks], task.period, WRIST.length)
+        done = rollout(
+            law, gains, [followed], which, loop, WRIST, record=record, threads=threads, converge=False
+        )  # fmt: skip
+        return done.coordinates(0).ravel() if record else done.metrics["rmse"]
 
     run(10)
     return run

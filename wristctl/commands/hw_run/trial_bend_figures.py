@@ -20,7 +20,7 @@ from wristctl.plotting.style import (
     legend_below,
     title,
 )
-from wristctl.simulation.bend_course import BendCourse
+from wristctl.simulation.trajectory import Trajectory
 
 _PLANES = ("ulnar", "flexion")
 
@@ -29,9 +29,9 @@ class TrialBends(NamedTuple):
     """One trial: as logged, as it truly was on a bench, and in simulation."""
 
     motion: str
-    logged: BendCourse
-    true: BendCourse | None
-    simulated: BendCourse
+    logged: Trajectory
+    true: Trajectory | None
+    simulated: Trajectory
     push: tuple[float, float] | None
     """When the push began and ended [s]."""
 

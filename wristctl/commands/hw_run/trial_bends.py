@@ -18,7 +18,7 @@ from wristctl.control.table import Gains
 if TYPE_CHECKING:
     import pandas as pd
 
-    from wristctl.simulation.bend_course import BendCourse
+    from wristctl.simulation.repetitions import Simulation
 
 _MEANS = (
     "rmse_ulnar", "rmse_flexion", "rmse", "steady_state", "settling", "recovery", "true_rmse_ulnar",
@@ -41,7 +41,7 @@ class PerformedBends(StudyResult):
     kind = "hw-run"
 
     trials: pd.DataFrame
-    twins: dict[int, BendCourse]
+    twins: dict[int, Simulation]
     """by the trial's number"""
 
     @property
@@ -55,13 +55,15 @@ class PerformedBends(StudyResult):
         import numpy as np
 
         from wristctl.board.messages import AXES
-        from wristctl.simulation.oscillation import chatter
+        from wristctl.simulation.oscillation import at_rest, chatter
+        from wristctl.simulation.trajectory import size_of
 
         done = self.trials[self.trials["outcome"] == "ok"]
-        courses = [self.twins[number] for number in done["trial"]]
-        goals = np.array([np.hypot(*course.bend_ref.T).max() if course.rests else np.inf for course in courses])
+        courses = [self.twins[number].trajectory for number in done["trial"]]
+        resting = np.array([at_rest(course) for course in courses], bool)
+        goals = np.where(resting, [size_of(course.bend_ref).max() for course in courses], np.inf)
         slams = chatter(done["chattering"].to_numpy(float), self.study.wrist.tension_range, AXES)
-        return marks_of(done, goals, np.array([course.rests for course in courses], bool), slams > 0.0)
+        return marks_of(done, goals, resting, slams > 0.0)
 
     def frame(self) -> pd.DataFrame:
         """One row per trial that began."""
@@ -83,11 +85,11 @@ class _Errors(NamedTuple):
     recovery: float
 
 
-def _errors(trials: pd.DataFrame, twins: Mapping[int, BendCourse]) -> _Errors:
+def _errors(trials: pd.DataFrame, twins: Mapping[int, Simulation]) -> _Errors:
     def mean(name: str) -> float:
         return float(trials[name].mean(skipna=False)) if len(trials) else math.nan
 
-    courses = [twins[number].metrics() for number in trials["trial"]]
+    courses = [twins[number].metrics for number in trials["trial"]]
     worse = [max(metrics["rmse_ulnar"], metrics["rmse_flexion"]) for metrics in courses]
     true = trials[["true_rmse_ulnar", "true_rmse_flexion"]].max(axis=1, skipna=False)
     recovery = "true_recovery" if trials["true_recovery"].notna().any() else "recovery"
@@ -106,8 +108,8 @@ def bends_performed(session: Session, trials: pd.DataFrame, tuned: Gains | None)
 
     study, findings, settings = session.study, session.findings, session.study.hw_run
     done = trials[trials["outcome"] == "ok"].assign(label=trials["controller"] + "/" + trials["gains"])
-    names, twins = [row.label for row in settings.rows], dict[int, "BendCourse"]()
-    simulated = dict[tuple[str, float, str], "BendCourse"]()
+    names, twins = [row.label for row in settings.rows], dict[int, "Simulation"]()
+    simulated = dict[tuple[str, float, str], "Simulation"]()
     with session.progress("compiling and simulating the same trials"):
         for row in done.to_dict("records"):
             key = row["direction"], row["push"], row["label"]
@@ -128,7 +130,7 @@ def bends_performed(session: Session, trials: pd.DataFrame, tuned: Gains | None)
 
 
 def _means(
-    findings: Findings, done: pd.DataFrame, labels: Sequence[str], twins: Mapping[int, BendCourse]
+    findings: Findings, done: pd.DataFrame, labels: Sequence[str], twins: Mapping[int, Simulation]
 ) -> list[tuple[object, ...]]:
     """A row for each controller with and without a push; a metric for each number."""
     rows: list[tuple[object, ...]] = []
@@ -143,20 +145,20 @@ def _means(
                 full = "_".join([*["pushed"] * pushed, name, *whose])
                 meaning = f"mean over trials{' with a push' * pushed}, {label}"
                 findings.metric(full, means[name], unit, "lower", n=len(group), meaning=meaning)
-        courses = [twins[number].metrics() for number in group["trial"]]
+        courses = [twins[number].metrics for number in group["trial"]]
         simulated = [sum(course[name] for course in courses) / len(courses) for name in ("rmse_ulnar", "rmse_flexion")]
         rows.append((f"{label}{', pushed' * pushed}", len(group), *means.values(), *simulated))
     return rows
 
 
-def _draw(session: Session, done: pd.DataFrame, twins: Mapping[int, BendCourse]) -> None:
+def _draw(session: Session, done: pd.DataFrame, twins: Mapping[int, Simulation]) -> None:
     import pandas as pd
 
     from wristctl.commands.hw_run.trial_bend_figures import TrialBends, errors_of_bends, paths_of_bends
-    from wristctl.simulation.two_planes import reach_of_bends
     from wristctl.trial.bend_motion import bend_motion_of
     from wristctl.trial.bend_results import logged_course, true_course
     from wristctl.trial.spatial_belief import layout_of_axes
+    from wristctl.wrist.spatial.held_bends import reach_of_bends
 
     findings, study, settings = session.findings, session.study, session.study.hw_run
     assert findings.run is not None
@@ -169,9 +171,11 @@ def _draw(session: Session, done: pd.DataFrame, twins: Mapping[int, BendCourse])
             continue
         followed = bend_motion_of(settings, study.wrist, record["direction"])
         logged = logged_course(log[log["trial"] == record["trial"]], followed, study.wrist)
-        true = None if truth is None else true_course(logged, truth[truth["trial"] == record["trial"]])
+        true = (
+            None if truth is None else true_course(logged, truth[truth["trial"] == record["trial"]], study.wrist.length)
+        )
         push = (settings.push.start, settings.push.start + settings.push.duration) if record["push"] else None
-        courses.append(TrialBends(record["direction"], logged, true, twins[record["trial"]], push))
+        courses.append(TrialBends(record["direction"], logged, true, twins[record["trial"]].trajectory, push))
     reach = reach_of_bends(study.wrist, layout_of_axes(study.wrist))
     for prefix, pushed in (("", False), ("pushed-", True)):
         some = [course for course in courses if (course.push is not None) == pushed]
@@ -185,12 +189,12 @@ def _draw(session: Session, done: pd.DataFrame, twins: Mapping[int, BendCourse])
         findings.overview.figure = "bends" if courses[0].push is None or len(courses) > 1 else "pushed-bends"
 
 
-def in_two_planes(twins: Mapping[int, BendCourse]) -> TrialWords:
+def in_two_planes(twins: Mapping[int, Simulation]) -> TrialWords:
     """Words for trials in two planes beside their simulation, by the trial's number."""
     return TrialWords(partial(_sentence, twins=twins), partial(_table, twins=twins), partial(_apart, twins=twins))
 
 
-def _sentence(trials: pd.DataFrame, label: str, twins: Mapping[int, BendCourse]) -> str:
+def _sentence(trials: pd.DataFrame, label: str, twins: Mapping[int, Simulation]) -> str:
     parts = []
     for pushed in (False, True):
         group = trials[(trials["push"] != 0.0) == pushed]
@@ -208,7 +212,7 @@ def _sentence(trials: pd.DataFrame, label: str, twins: Mapping[int, BendCourse])
     return f"{label} in two planes: {'; '.join(parts)}."
 
 
-def _table(done: pd.DataFrame, labels: Sequence[str], twins: Mapping[int, BendCourse]) -> Table:
+def _table(done: pd.DataFrame, labels: Sequence[str], twins: Mapping[int, Simulation]) -> Table:
     """A row for each motion and controller, with and without a push; for very many a row for each controller."""
     motions = list(dict.fromkeys(done["direction"]))
     heads = (
@@ -231,7 +235,7 @@ def _table(done: pd.DataFrame, labels: Sequence[str], twins: Mapping[int, BendCo
     return Table("", heads[not several :], [row[not several :] for row in rows])
 
 
-def _apart(done: pd.DataFrame, labels: Sequence[str], twins: Mapping[int, BendCourse]) -> list[str]:
+def _apart(done: pd.DataFrame, labels: Sequence[str], twins: Mapping[int, Simulation]) -> list[str]:
     """Where measured and simulated errors differ much."""
     facts = []
     for label in labels:

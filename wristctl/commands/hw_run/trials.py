@@ -17,8 +17,7 @@ from wristctl.config.wrist import WristParameters
 from wristctl.control.table import Gains
 from wristctl.errors import fix_of
 from wristctl.records import LiveRun
-from wristctl.simulation.bend_course import BEND_METRICS
-from wristctl.simulation.metrics import METRICS
+from wristctl.simulation.metrics import METRICS, metrics_in
 from wristctl.trial.bend_motion import BendMotion
 from wristctl.trial.bend_results import FURTHER, LOGGED, TRULY, bends_evaluated
 from wristctl.trial.calibration import WristCalibration
@@ -42,6 +41,7 @@ log = logging.getLogger(__name__)
 # Films of each camera.
 Films = list[list[AnnotatedVideo | RawVideo]]
 
+_IN_TWO_PLANES = metrics_in(2)
 _OF_ANY: dict[str, tuple[str, str]] = {
     "trial": ("", "number, from 0, in the order done"),
     "direction": ("", "of bending"),
@@ -64,8 +64,11 @@ _OF_BENDS: dict[str, tuple[str, str]] = {
     **_OF_ANY,
     "direction": ("", "of bending, or the path in two planes"),
     "push": ("N", "largest force"),
-    **{name: (BEND_METRICS[name].unit, BEND_METRICS[name].formula) for name in LOGGED},
-    **{f"true_{name}": (BEND_METRICS[name].unit, f"{BEND_METRICS[name].formula}; of the true bend") for name in TRULY},
+    **{name: (_IN_TWO_PLANES[name].unit, _IN_TWO_PLANES[name].formula) for name in LOGGED},
+    **{
+        f"true_{name}": (_IN_TWO_PLANES[name].unit, f"{_IN_TWO_PLANES[name].formula}; of the true bend")
+        for name in TRULY
+    },
     **FURTHER,
 }
 

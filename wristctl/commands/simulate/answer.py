@@ -13,7 +13,7 @@ from wristctl.config.wrist import WristParameters
 if TYPE_CHECKING:
     from wristctl.config.loop import DirectionName, Loop, Reference
     from wristctl.config.study import Study
-    from wristctl.simulation.repetitions import Repeated, Repetitions
+    from wristctl.simulation.repetitions import Repeated
 
 # Actuators in words, by level.
 _ACTUATORS = {"ideal": "", "lagged": "motors with a lag", "tendon": "stepper motors and elastic tendons"}
@@ -56,7 +56,7 @@ def answer(study: Study, repeated: Repeated, reason: str = "", advice: Sequence[
     return Answer(sentence, figures_table(repeated, _FIGURES) if count > 1 else None, advice, more)
 
 
-def outcome(study: Study, scenario: str, repeated: Repetitions, figures: str, reason: str) -> str:
+def outcome(study: Study, scenario: str, repeated: Repeated, figures: str, reason: str) -> str:
     """What a controller does in a loop of one plane or two: why it is no good, or that it follows; with its figures."""
     chosen, count = study.simulate, len(repeated.failed)
     verdicts = [*_faults(repeated), *([reason] if reason else [])]
@@ -72,7 +72,7 @@ def _rests(repeated: Repeated) -> bool:
     return at_rest(repeated.first.trajectory)
 
 
-def _faults(repeated: Repetitions) -> list[str]:
+def _faults(repeated: Repeated) -> list[str]:
     """Why the loop is no good, as what the controller does; where it does not arrive, that has a reason of its own."""
     if repeated.failure:
         return [f"fails: the wrist {repeated.failure}"]
@@ -104,14 +104,14 @@ def _told(repeated: Repeated) -> list[str]:
     return [*parts, f"at most {two(values['peak_tension'])} N in a tendon"]
 
 
-def figure_of(repeated: Repetitions, name: str) -> float:
+def figure_of(repeated: Repeated, name: str) -> float:
     """A metric of a loop, of several repetitions the median; nan where there is none."""
     from wristctl.comparison.repetition_spread import spread
 
     return spread(repeated.metrics[name]).median if name in repeated.metrics else math.nan
 
 
-def figures_table(repeated: Repetitions, figures: Sequence[tuple[str, str, bool]]) -> Table:
+def figures_table(repeated: Repeated, figures: Sequence[tuple[str, str, bool]]) -> Table:
     """Figures of a loop, of several repetitions medians with 95 % intervals; `-` where there is none.
 
     Each is a metric, its heading, and whether it is an angle.

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import math
 import shlex
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from wristctl.commands.answer import Answer
 from wristctl.commands.inputs import EarlierRun, Inputs
@@ -34,18 +34,15 @@ from wristctl.commands.loop_warnings import (
 from wristctl.commands.procedure import Procedure
 from wristctl.commands.session import Session
 from wristctl.commands.simulate.in_two_planes import check_two_planes, in_two_planes, simulate_in_two_planes
-from wristctl.commands.simulate.results import SimulatedLoop, metrics_table
+from wristctl.commands.simulate.results import SimulatedLoop, metrics_table, trajectory_table
 from wristctl.commands.sweep.command import sweepable
 from wristctl.config.study import Study
 from wristctl.errors import under
 
 if TYPE_CHECKING:
-    import pandas as pd
-
     from wristctl.config.wrist import WristParameters
     from wristctl.simulation.closed_loop import Size
     from wristctl.simulation.repetitions import Repeated
-    from wristctl.simulation.trajectory import Trajectory
     from wristctl.wrist.kinematics import Inverse
 
 
@@ -53,27 +50,12 @@ if TYPE_CHECKING:
 class Simulated(SimulatedLoop):
     """One closed loop in one plane, as often as the study says, and whether the wrist ever left its range."""
 
-    repeated: Repeated
-
     @property
     def answer(self) -> Answer:
         """The scenario and how it ends, in a few lines; why a loop does not arrive, and what may help."""
         from wristctl.commands.simulate.answer import answer
 
         return answer(self.simulated or self.study, self.repeated, self.short_of, self.advice, self.wrist)
-
-    @property
-    def trajectory(self) -> Trajectory:
-        """Trajectory of the first repetition."""
-        return self.repeated.first.trajectory
-
-    def courses(self) -> Mapping[str, Mapping[str, Any]]:
-        """The columns of the trajectory."""
-        return {"trajectory": self.trajectory.columns()}
-
-    def frame(self) -> pd.DataFrame:
-        """The trajectory: time, angles, tip, tensions, ...; SI units."""
-        return self.trajectory.frame()
 
 
 def plan(study: Study, inputs: Inputs) -> str:
@@ -123,7 +105,6 @@ def simulate(session: Session) -> SimulatedLoop:
     from wristctl.simulation.closed_loop import scenario_of
     from wristctl.simulation.closed_loop import simulate as run_simulation
     from wristctl.simulation.metrics import METRICS
-    from wristctl.simulation.trajectory import COLUMNS
     from wristctl.simulation.worlds import Draws
 
     study, findings = identified(session.study, "simulate", session.inputs), session.findings
@@ -140,10 +121,7 @@ def simulate(session: Session) -> SimulatedLoop:
     findings.note_streams(Draws(study.seed).names([settings.loop], [scenario]))
     course, failed = repeated.first.trajectory, bool(repeated.failed.any())
     warn_if_outside(course.outside)
-    segments = {f"theta_{k + 1}": ("rad", "bending angle of one segment") for k in range(course.segment_theta.shape[1])}
-    columns = COLUMNS | segments
-    units, meaning = ({name: column[i] for name, column in columns.items()} for i in range(2))
-    findings.table("data/trajectory.csv", course.columns(), units=units, meaning=meaning)
+    trajectory_table(findings, "trajectory", course)
     title = ", ".join(part for part in (course.label, repeated.fate) if part)
     tables = [metrics_table(findings, title, METRICS, repeated), *truth_tables(wrist, {"simulate": settings.loop})]
     with session.drawing():
@@ -156,7 +134,7 @@ def simulate(session: Session) -> SimulatedLoop:
         later("angle", angles, [course], heading=world)
         later("error", errors, [course], heading=world)
         findings.figure("tensions", tensions, course, later=not repeated.marks)
-        if course.load is not None and course.expected > 0.0:
+        if course.load is not None:
             later("observer", consistency, course, heading=world)
         law = controller(settings.controller)
         if law.surface is not None and not failed:

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from wristctl.commands.answer import Answer
 from wristctl.commands.inputs_of_loops import identified, tuned_gains, wrist_identified
@@ -20,15 +20,12 @@ from wristctl.commands.simulate.answer import (
     outcome,
     wrist_words,
 )
-from wristctl.commands.simulate.results import SimulatedLoop, metrics_table
+from wristctl.commands.simulate.results import SimulatedLoop, metrics_table, trajectory_table
 from wristctl.config.study import Study
 from wristctl.errors import under
 
 if TYPE_CHECKING:
-    import pandas as pd
-
-    from wristctl.simulation.bend_course import BendCourse
-    from wristctl.simulation.bend_loops import RepeatedBends
+    from wristctl.simulation.repetitions import Repeated
 
 
 # Figures of the table: metric, heading, and whether it is an angle.
@@ -39,7 +36,7 @@ _FIGURES = (
     ("largest_error", "largest error [deg]", True),
     ("steady_state", "error at the end [deg]", True),
     ("oscillation", "half the swing at the end [deg]", True),
-    ("tip_rmse", "RMS distance of the tip [mm]", False),
+    ("tip_rmse_mm", "RMS distance of the tip [mm]", False),
     ("peak_tension", "largest tension [N]", False),
     ("saturation", "share of time out of reach", False),
 )
@@ -49,30 +46,15 @@ _FIGURES = (
 class SimulatedBends(SimulatedLoop):
     """One closed loop in two planes, as often as the study says, and whether the wrist ever left its range."""
 
-    repeated: RepeatedBends
-
     @property
     def answer(self) -> Answer:
         """The scenario and how it ends, errors by plane and as one norm."""
         return _answer(self.simulated or self.study, self.repeated, self.short_of, self.advice, self.wrist)
 
-    @property
-    def course(self) -> BendCourse:
-        """What the wrist did in the first repetition."""
-        return self.repeated.first
-
-    def courses(self) -> Mapping[str, Mapping[str, Any]]:
-        """The columns of the first repetition."""
-        return {"bends": self.course.columns()}
-
-    def frame(self) -> pd.DataFrame:
-        """The first repetition: time, bends by plane, tip, pulls by tendon, ...; SI units."""
-        return self.course.frame()
-
 
 def in_two_planes(study: Study) -> bool:
     """Whether the loop of the study's `simulate` section bends in two planes. Raises UserError."""
-    from wristctl.simulation.bend_loops import planes_of
+    from wristctl.simulation.planes import planes_of
 
     with under("simulate"):
         return planes_of(study.simulate.loop, study.simulate.reference, study.wrist) == 2
@@ -84,9 +66,9 @@ _CHECKED = 0.01
 
 def check_two_planes(study: Study) -> None:
     """UserError for what can be known of a loop in two planes before it runs."""
-    from wristctl.simulation.bend_loops import wanted_bends
+    from wristctl.simulation.closed_loop import asked_of
 
-    wanted_bends(study, _CHECKED)
+    asked_of(study, _CHECKED)
 
 
 def simulate_in_two_planes(session: Session) -> SimulatedBends:
@@ -94,31 +76,32 @@ def simulate_in_two_planes(session: Session) -> SimulatedBends:
     from wristctl.commands.truth_table import truth_heading, truth_tables
     from wristctl.plotting.bend_figure import bend_motion
     from wristctl.plotting.spatial_view import motion_in_space
-    from wristctl.simulation.bend_course import BEND_METRICS, column_meanings
-    from wristctl.simulation.bend_loops import simulate_bends
     from wristctl.simulation.closed_loop import scenario_of
-    from wristctl.simulation.two_planes import reach_of_bends
+    from wristctl.simulation.closed_loop import simulate as run_simulation
+    from wristctl.simulation.metrics import metrics_in
     from wristctl.simulation.worlds import Draws, plant_of
+    from wristctl.wrist.spatial.held_bends import reach_of_bends
+    from wristctl.wrist.tendon_layout import TendonLayout
 
     study, findings = identified(session.study, "simulate", session.inputs), session.findings
     settings, wrist = study.simulate, study.wrist
     warn_if_coarse([settings.loop])
     warn_outside_conditions([settings], [settings.loop])
     with session.progress("compiling and simulating the loop"):
-        repeated = simulate_bends(study, tuned_gains(session.inputs))
+        repeated = run_simulation(study, None, tuned_gains(session.inputs))
     scenario = scenario_of(settings.reference, settings.direction)
     findings.note_streams(Draws(study.seed).names([settings.loop], [scenario]))
-    findings.numerics(planes=2, substeps=repeated.substeps, drift=repeated.drift)
-    course = repeated.first
-    columns = course.columns()
-    meanings = column_meanings(list(columns))
-    units, meaning = ({name: column[i] for name, column in meanings.items()} for i in range(2))
-    findings.table("data/bends.csv", columns, units=units, meaning=meaning)
-    findings.headline("rmse", "rmse_ulnar", "rmse_flexion", "largest_error", "tip_rmse", "peak_tension")
+    course = repeated.first.trajectory
+    findings.numerics(planes=2, substeps=int(repeated.metrics["substeps"].max()), drift=repeated.drift)
+    trajectory_table(findings, "bends", course)
+    findings.headline("rmse", "rmse_ulnar", "rmse_flexion", "largest_error", "tip_rmse_mm", "peak_tension")
     label = f"{settings.controller}/{settings.gains if isinstance(settings.gains, str) else 'given'} in two planes"
-    tables = [metrics_table(findings, label, BEND_METRICS, repeated), *truth_tables(wrist, {"simulate": settings.loop})]
+    tables = [
+        metrics_table(findings, label, metrics_in(2), repeated),
+        *truth_tables(wrist, {"simulate": settings.loop}),
+    ]
     with session.drawing():
-        reach = reach_of_bends(wrist, repeated.layout)
+        reach = reach_of_bends(wrist, TendonLayout.of(wrist))
         caption = "The plane of bends with what the tendons reach; errors of both planes and pulls over time"
         findings.overview.figure = "bends"
         world = truth_heading(wrist, settings.loop)
@@ -130,13 +113,15 @@ def simulate_in_two_planes(session: Session) -> SimulatedBends:
     return SimulatedBends(session.study, findings, tables, repeated, short_of, advice, study, words)
 
 
-def _short_of(study: Study, repeated: RepeatedBends) -> tuple[str, list[str]]:
+def _short_of(study: Study, repeated: Repeated) -> tuple[str, list[str]]:
     """Why the loop does not arrive, and what may help."""
-    from wristctl.simulation.two_planes import first_beyond
+    from wristctl.simulation.oscillation import at_rest
+    from wristctl.wrist.spatial.held_bends import first_beyond
+    from wristctl.wrist.tendon_layout import TendonLayout
 
-    course, wrist = repeated.first, study.wrist
-    off = math.degrees(course.metrics()["steady_state"])
-    beyond = first_beyond(wrist, repeated.layout, course.bend_ref) if study.simulate.loop.limits else None
+    course, wrist = repeated.first.trajectory, study.wrist
+    off = math.degrees(repeated.first.metrics["steady_state"])
+    beyond = first_beyond(wrist, TendonLayout.of(wrist), course.bend_ref) if study.simulate.loop.limits else None
     if beyond is not None:
         ulnar, flexion = (math.degrees(bend) for bend in course.bend_ref[beyond])
         reason = (
@@ -145,12 +130,12 @@ def _short_of(study: Study, repeated: RepeatedBends) -> tuple[str, list[str]]:
         )
         fix = "No gains can help: a larger tension_limit or tendon_radius, or a smaller angle_deg."
         return reason, [fix]
-    what = "arrive" if repeated.first.rests else "follow"
+    what = "arrive" if at_rest(course) else "follow"
     return f"does not {what}: {off:.2g} deg off at the end", ["Other gains or another controller may hold it."]
 
 
-def _answer(study: Study, repeated: RepeatedBends, reason: str, advice: Sequence[str], wrist: str) -> Answer:
-    chosen, places = study.simulate, len(repeated.layout.places)
+def _answer(study: Study, repeated: Repeated, reason: str, advice: Sequence[str], wrist: str) -> Answer:
+    chosen, places = study.simulate, repeated.first.trajectory.tension.shape[1]
     scenario = (
         f"{motion_words(chosen.reference, chosen.direction)} on {wrist or wrist_words(study.wrist)} in two planes "
         f"({places} tendons, {loop_words(chosen.loop, study.wrist)})"

@@ -4,16 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 from wristctl.commands.printed_table import Table
 from wristctl.commands.results import Findings, StudyResult
 from wristctl.errors import UserError
 
 if TYPE_CHECKING:
+    import pandas as pd
+
     from wristctl.config.study import Study
-    from wristctl.simulation.bend_course import BendCourse
-    from wristctl.simulation.repetitions import Repetitions
+    from wristctl.simulation.repetitions import Repeated
     from wristctl.simulation.trajectory import Trajectory
 
 
@@ -23,7 +24,7 @@ class SimulatedLoop(StudyResult):
 
     kind = "simulate"
 
-    repeated: Repetitions
+    repeated: Repeated
     """Metrics of every repetition."""
     short_of: str = ""
     """Reason why the loop does not arrive at its reference; empty where it does."""
@@ -36,13 +37,26 @@ class SimulatedLoop(StudyResult):
 
     @property
     def trajectory(self) -> Trajectory:
-        """Trajectory of the first repetition. UserError of a loop in two planes, which has a `.course`."""
-        raise UserError("a loop in two planes has no trajectory", fix="take .course, or .frame() for its table")
+        """Trajectory of the first repetition."""
+        return self.repeated.first.trajectory
 
     @property
-    def course(self) -> BendCourse:
-        """What the wrist did in two planes, in the first repetition. UserError of a loop in one plane."""
-        raise UserError("a loop in one plane has no course", fix="take .trajectory, or .frame() for its table")
+    def course(self) -> Trajectory:
+        """The trajectory, under the name that a loop in two planes had for it."""
+        return self.trajectory
+
+    def courses(self) -> Mapping[str, Mapping[str, Any]]:
+        """The columns of the trajectory, by the name of its table."""
+        return {self.table: self.trajectory.columns()}
+
+    @property
+    def table(self) -> str:
+        """Name of the table of the trajectory."""
+        return "trajectory" if self.trajectory.planes == 1 else "bends"
+
+    def frame(self) -> pd.DataFrame:
+        """The trajectory: time, bend, tip, tensions, ...; SI units."""
+        return self.trajectory.frame()
 
     @property
     def failed(self) -> bool:
@@ -75,7 +89,17 @@ class Explained(Protocol):
         """How it is computed."""
 
 
-def metrics_table(findings: Findings, title: str, metrics: Mapping[str, Explained], repeated: Repetitions) -> Table:
+def trajectory_table(findings: Findings, name: str, course: Trajectory) -> None:
+    """Keep a trajectory in the run, with unit and meaning of each column."""
+    from wristctl.simulation.trajectory import meanings
+
+    columns = course.columns()
+    told = meanings(list(columns))
+    units, meaning = ({name: column[i] for name, column in told.items()} for i in range(2))
+    findings.table(f"data/{name}.csv", columns, units=units, meaning=meaning)
+
+
+def metrics_table(findings: Findings, title: str, metrics: Mapping[str, Explained], repeated: Repeated) -> Table:
     """Every metric, kept in the run: its value, or of several repetitions the median with its 95 % interval."""
     import numpy as np
 

@@ -1,0 +1,44 @@
+"""Which bends in two planes tendons within their limits hold at rest, of the wrist as one segment."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wristctl.arrays import Array
+from wristctl.config.wrist import WristParameters
+from wristctl.wrist.allocation import allocated
+from wristctl.wrist.spatial.spatial_model import spatial_terms
+from wristctl.wrist.spatial.spatial_segments import ellipse, spatial_values
+from wristctl.wrist.tendon_layout import TendonLayout
+
+
+def reach_of_bends(wrist: WristParameters, layout: TendonLayout, directions: int = 72) -> Array:
+    """The largest bend (directions + 1, 2) [rad] that tendons within their limits hold at rest, all around.
+
+    Of the wrist as one segment, to half a degree, up to its range; the last direction is the first again.
+    """
+    around = np.linspace(0.0, 2.0 * np.pi, directions + 1)
+    sizes = np.deg2rad(np.arange(0.0, wrist.range_deg + 0.25, 0.5))
+    bends = sizes[:, None, None] * np.stack([np.cos(around), np.sin(around)], axis=-1)
+    held = _holds(wrist, layout, bends.reshape(-1, 2)).reshape(len(sizes), -1)
+    last = np.cumprod(held, axis=0).sum(axis=0) - 1
+    reach: Array = bends[last.clip(0), np.arange(directions + 1)]
+    return reach
+
+
+def _holds(wrist: WristParameters, layout: TendonLayout, bends: Array) -> NDArray[np.bool_]:
+    """Whether tendons within their limits hold bends (P, 2) [rad] at rest, (P,)."""
+    values = spatial_values(wrist, layout, 1, axis=np.radians(wrist.stiffness_axis_deg))
+    at_rest = spatial_terms(values, bends, 0.0 * bends)
+    yy, yz, zz = ellipse(wrist.stiffness, wrist.stiffness * wrist.flexion_ratio, np.radians(wrist.stiffness_axis_deg))
+    torque = at_rest.bias + bends @ np.array([[yy, yz], [yz, zz]])
+    limits = wrist.pretension * layout.multiplicity, wrist.tension_limit * layout.multiplicity
+    arms = at_rest.moment_arms.reshape(-1, len(layout.places), 2)
+    saturated: NDArray[np.bool_] = allocated(arms, torque, *limits).saturated
+    return ~saturated
+
+
+def first_beyond(wrist: WristParameters, layout: TendonLayout, bends: Array) -> int | None:
+    """The first of bends (T, 2) [rad] that tendons within their limits do not hold at rest; None without one."""
+    few = np.linspace(0, len(bends) - 1, min(len(bends), 400)).astype(np.int64)
+    beyond = np.flatnonzero(~_holds(wrist, layout, bends[few]))
+    return int(few[beyond[0]]) if len(beyond) else None
