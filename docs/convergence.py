@@ -38,7 +38,7 @@ PAGE, EXPERIMENTS = HERE / "convergence.md", HERE.parent / "experiments"
 ROWS = (("smc", "exchanged"), ("pid", "printed"), ("ct-dob", "default"), ("smc-tracking", "default"))
 SETTINGS, SEED, FINER = 200, 7, 20
 IN_SPACE = ("smc", "exchanged"), ("ct-dob", "default"), ("pid-ff", "default"), ("smc-tracking", "default")
-PLANES = 96
+PLANES = 144
 """Settings in two planes."""
 MOST = 0.01
 """Share of a controller's loops that may be off without a mark: chaos may agree twice by chance."""
@@ -252,8 +252,9 @@ def page(
     lagging motors, spools that wind elastic tendons, with friction and a camera too, periods of 1, 2, 5 and 10 ms, and
     paths of 5 to 30 deg. Loops with spools begin with a step of at most 1 ms."""
     how = """A rollout is in doubt where the sum of its steps' estimated errors is large beside what is shown of its
-    RMSE; they count eight times where its tensions chatter, or, with friction or end stops, go through their whole
-    range more than 0.8 times a second: kinks and jumps hide a part of the error from the estimate. It runs again with
+    RMSE; they count eight times where its tensions chatter, or, with friction or end stops, rise from nothing to their
+    largest more than 0.8 times a second, and forty times where, with these, they go so often through all that the
+    tendons bear: kinks and jumps hide a part of the error from the estimate. It runs again with
     2, 4, 8, ... 64 times the steps until RMSE (0.5 % or 0.001 deg) and the error at the end (ten times as much) stay
     what they are twice in a row; the longest of these steps is taken. Where that never happens the loop is chaotic:
     the row is marked `NOT CONVERGED`, with by how much it still changes, and is ranked no better than a limit cycle.

@@ -28,6 +28,8 @@ from wristctl.tuning.search import tuning_cases
 UNKNOWNS = Path(__file__).parents[2] / "experiments" / "unknowns.yaml"
 THOROUGH = bool(os.environ.get("WRISTCTL_THOROUGH"))
 NONE = np.zeros(1, np.int64)
+BEARS = np.array([58.0])
+"""Range of tension of the wrist's tendons [N]."""
 
 
 def run(law: str, gains: str, loop: Loop, limit: float = 60.0, side: float = 1.0, **how: Any) -> Outcome:
@@ -123,21 +125,21 @@ def test_an_rmse_is_that_of_twenty_times_the_steps_or_marked(row: tuple[str, str
 def test_friction_and_slack_are_no_reason_to_doubt_a_quiet_loop_and_a_swing_is() -> None:
     rig = {"control_period": 5e-3, "actuator": {"level": "tendon", "friction": 0.1}, "sensor": {"level": "camera"}}
     quiet, swinging = (run(*row, Loop.model_validate(rig)) for row in (("ct-dob", "hardware"), ("pid", "printed")))
-    assert quiet.steps == 5 and not in_doubt(quiet, np.array([True])).any()
-    assert in_doubt(swinging, np.array([True])).all()
+    assert quiet.steps == 5 and not in_doubt(quiet, np.array([True]), BEARS).any()
+    assert in_doubt(swinging, np.array([True]), BEARS).all()
     swings = swinging.metrics["chattering"] / (2.0 * swinging.metrics["peak_tension"])
     assert swings > 2.0
     swinging.step_error[:] = 5.0 * tolerance(swinging.metrics["rmse"])  # a sixth of what puts a quiet loop in doubt
-    assert in_doubt(swinging, np.array([True])).all()
+    assert in_doubt(swinging, np.array([True]), BEARS).all()
     swinging.step_error[:] *= 0.1
-    assert not in_doubt(swinging, np.array([True])).any()
+    assert not in_doubt(swinging, np.array([True]), BEARS).any()
     swinging.step_error[:] *= 10.0
     swinging.metrics["chattering"] = swinging.metrics["chattering"] / swings
-    assert in_doubt(swinging, np.array([True])).all()
+    assert in_doubt(swinging, np.array([True]), BEARS).all()
     swinging.metrics["chattering"] = 0.5 * swinging.metrics["chattering"]
-    assert not in_doubt(swinging, np.array([True])).any()
+    assert not in_doubt(swinging, np.array([True]), BEARS).any()
     swinging.step_error[:] = np.nan
-    assert in_doubt(swinging, np.array([True])).all()
+    assert in_doubt(swinging, np.array([True]), BEARS).all()
 
 
 def test_rollouts_that_differ_beyond_the_tolerance_do_not_agree() -> None:
@@ -191,26 +193,37 @@ def _summed(excess: list[float], steps: int, swings: float, places: int = 2) -> 
 @pytest.mark.parametrize("steps", [1, 5])
 def test_a_rollout_that_cannot_run_again_asks_for_a_power_of_two_of_steps_that_is_twice_its_excess(steps: int) -> None:
     excess = [0.0, 0.99, 1.01, 1.5, 2.5, 7.0]
-    doubtful, wanted = in_one_go(_summed(excess, steps, 0.0), np.zeros(len(excess), bool))
+    doubtful, wanted = in_one_go(_summed(excess, steps, 0.0), np.zeros(len(excess), bool), BEARS)
     assert doubtful.tolist() == [False, False, True, True, True, True]
     assert (wanted[:2] == steps).all() and wanted[2:].tolist() == [4 * steps, 4 * steps, 8 * steps, 16 * steps]
     ratio = wanted[2:] / steps
     assert (ratio >= 2.0 * np.array(excess[2:])).all() and (ratio < 4.0 * np.array(excess[2:])).all()
-    kinked, _ = in_one_go(_summed(excess, steps, 0.0), np.ones(len(excess), bool))
+    kinked, _ = in_one_go(_summed(excess, steps, 0.0), np.ones(len(excess), bool), BEARS)
     assert not kinked.any(), "kinks are taken for errors: eight times as much is borne"
 
 
 @pytest.mark.parametrize("places", [2, 3, 4, 6])
 def test_where_tensions_swing_errors_count_eightfold_and_twice_as_many_steps_again_are_asked_for(places: int) -> None:
     calm, swinging = (
-        in_one_go(_summed([0.11, 0.13, 0.3], 2, swings, places), np.zeros(3, bool)) for swings in (24.0, 26.0)
+        in_one_go(_summed([0.11, 0.13, 0.3], 2, swings, places), np.zeros(3, bool), BEARS) for swings in (24.0, 26.0)
     )
     assert not calm[0].any() and swinging[0].tolist() == [False, True, True]
     assert swinging[1].tolist() == [2, 2 * 8, 2 * 16]
 
 
+@pytest.mark.parametrize("places", [2, 3, 4])
+def test_with_kinks_errors_count_fortyfold_where_tensions_go_through_all_that_tendons_bear(places: int) -> None:
+    found = _summed([0.5, 1.0], 1, 4.0, places)  # 4 times a second to 20 N and back
+    bears = 4.0 / 2.0 * 20.0 / 0.8
+    one_fold, kinked = 0.5 * 8.0 / 8.0, np.ones(2, bool)
+    assert one_fold < 1.0
+    for range_, doubtful in ((1.02 * bears, [False, False]), (0.98 * bears, [True, True])):
+        assert in_doubt(found, kinked, np.full(2, range_)).tolist() == doubtful, range_
+        assert not in_doubt(found, ~kinked, np.full(2, range_))[0], "without kinks nothing of it counts"
+
+
 def test_of_errors_that_nobody_knows_or_that_are_beyond_all_the_most_steps_are_asked_for() -> None:
-    doubtful, wanted = in_one_go(_summed([math.nan, 1e9], 1, 0.0), np.zeros(2, bool))
+    doubtful, wanted = in_one_go(_summed([math.nan, 1e9], 1, 0.0), np.zeros(2, bool), BEARS)
     assert doubtful.all() and wanted[0] == wanted[1] >= 64
-    _, most = in_one_go(_summed([math.nan], MOST_SUBSTEPS // 2 + 1, 0.0), np.zeros(1, bool))
+    _, most = in_one_go(_summed([math.nan], MOST_SUBSTEPS // 2 + 1, 0.0), np.zeros(1, bool), BEARS)
     assert most[0] == MOST_SUBSTEPS

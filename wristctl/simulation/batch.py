@@ -169,11 +169,14 @@ def batch(
     ticks, samples = max(1, round(sample_period(of.period) / of.period)), references.shape[2]
     followed, blocks, wide = lanes_of(count), of.blocks, of.wide
     coordinates = np.zeros((len(worlds), k)) if start is None else np.array([start(wrist) for wrist in of.actual])
-    if layout is None:
-        taut = [model.taut(wrist, at) for wrist, at in zip(of.actual, coordinates, strict=True)]
-    else:
-        taut = [np.full(places, wrist.length) for wrist in of.actual]
-    motors = [of.motors(index, lengths) for index, lengths in enumerate(taut)]
+
+    def taut(index: int) -> Array:
+        """Lengths (T,) of taut tendons at first [m], which compiles code: of those that are wound alone."""
+        wrist = of.actual[index]
+        return model.taut(wrist, coordinates[index]) if layout is None else np.full(places, wrist.length)
+
+    wound, nothing = of.level == "tendon", np.zeros(places)
+    motors = [of.motors(index, taut(index) if wound else nothing) for index in range(len(worlds))]
     counts = [state[: 2 * places : 2] for state in motors]
     starts = np.zeros(len(filmed)) if layout is not None else model.angle(coordinates[body])
     watch, frames = cameras_of(filmed, lanes.world, lanes.streams, motions[0].horizon, starts, layout)
@@ -231,7 +234,7 @@ def _bodies(worlds: Sequence[World]) -> tuple[list[World], Indices]:
 
 
 def _sides(
-    of: _Worlds, coordinates: Array, taut: Sequence[Array], counts: Sequence[Array]
+    of: _Worlds, coordinates: Array, taut: Callable[[int], Array], counts: Sequence[Array]
 ) -> NoTendons | PulledTendons | ElasticTendons | RealTendons:
     """Tendons of the + and the - side in one plane."""
     plants = [world.loop.plant for world in of.worlds]
@@ -251,7 +254,7 @@ def _sides(
 
     def resting(index: int) -> Array:
         winding, q = of.windings[index], coordinates[index]
-        reeled, short = winding.scale * counts[index] + winding.offset, of.actual[index].length - taut[index]
+        reeled, short = winding.scale * counts[index] + winding.offset, of.actual[index].length - taut(index)
         return unmoved(reeled, np.append(short, np.abs(q).sum()), reeled - short, q)
 
     nonideal, state = of.rows(lambda index: np.array(nonideals[index])), of.of_each(resting)

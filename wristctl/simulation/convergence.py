@@ -30,11 +30,12 @@ AT_THE_END = 10.0
 # Sum of the steps' estimated errors, over the tolerance of the RMSE, from which a rollout is in doubt; and how many
 # times as much where forces have kinks, which the estimate takes for errors.
 DOUBT, KINKS = 4.0, 8.0
-# Frequency of tensions through their whole range and back, from which a loop with kinks swings [1/s]; loops without do
-# where they chatter (FASTEST).
+# Frequency of tensions from nothing to their largest and back, from which a loop with kinks swings [1/s]; loops without
+# do where they chatter (FASTEST).
 SWINGS = 0.8
-# Factor by which the estimated errors of loops that swing count: they miss a part of what the step does to these.
-SWINGING = 8.0
+# Factor by which the estimated errors of loops that swing count: they miss a part of what the step does to these; and
+# of loops with kinks whose tensions go so often through all that the wrist's tendons bear: such a swing is chaotic.
+SWINGING, CHAOTIC = 8.0, 40.0
 
 Rollouts = NDArray[np.int64]
 Mask = NDArray[np.bool_]
@@ -60,15 +61,20 @@ def _most(outcome: Outcome, kinked: Mask) -> Array:
     return most
 
 
-def _excess(outcome: Outcome, kinked: Mask) -> Array:
+def _excess(outcome: Outcome, kinked: Mask, bears: Array) -> Array:
     """Sum of the steps' estimated errors, as counted, divided by its limit (count,): above 1 the step is in doubt."""
-    counted: Array = np.where(_swinging(outcome, kinked), SWINGING, 1.0) * outcome.step_error
-    return counted / _most(outcome, kinked)
+    slams = outcome.metrics["chattering"] / (2.0 * outcome.places * bears) > SWINGS
+    factor = np.where(kinked & slams, CHAOTIC, np.where(_swinging(outcome, kinked), SWINGING, 1.0))
+    excess: Array = factor * outcome.step_error / _most(outcome, kinked)
+    return excess
 
 
-def in_doubt(outcome: Outcome, kinked: Mask) -> Mask:
-    """Rollouts whose integration step may be too long, (count,); `kinked` are those with friction or end stops."""
-    return _doubtful(_excess(outcome, kinked))
+def in_doubt(outcome: Outcome, kinked: Mask, bears: Array) -> Mask:
+    """Rollouts whose integration step may be too long, (count,).
+
+    `kinked` are those with friction or end stops, `bears` is the range of tension of each wrist's tendons [N].
+    """
+    return _doubtful(_excess(outcome, kinked, bears))
 
 
 def _doubtful(excess: Array) -> Mask:
@@ -77,14 +83,14 @@ def _doubtful(excess: Array) -> Mask:
     return doubtful
 
 
-def in_one_go(outcome: Outcome, kinked: Mask) -> tuple[Mask, Rollouts]:
+def in_one_go(outcome: Outcome, kinked: Mask, bears: Array) -> tuple[Mask, Rollouts]:
     """Judge rollouts that cannot run again: which are in doubt, (count,), and steps in a period that are likely to do.
 
     The steps are twice as many times as the sum of errors is too large, and more where tensions swing, since that falls
     more slowly than the step where the torque jumps; a power of two, as those that are tried.
     """
     swinging = np.where(_swinging(outcome, kinked), 0.25 * SWINGING, 1.0)
-    excess = _excess(outcome, kinked)
+    excess = _excess(outcome, kinked, bears)
     times = np.clip(np.nan_to_num(2.0 * swinging * excess, nan=np.inf), FINER[0], FINER[-1])
     steps = np.minimum(outcome.steps * 2 ** np.ceil(np.log2(times)).astype(np.int64), MOST_SUBSTEPS)
     doubtful = _doubtful(excess)
@@ -119,17 +125,22 @@ def more_finely(loop: Loop, times: int) -> Loop:
 
 
 def settled(
-    outcome: Outcome, run: Callable[[Rollouts, int], Outcome], by_hand: Mask, kinked: Mask, stop: Event
+    outcome: Outcome,
+    run: Callable[[Rollouts, int], Outcome],
+    by_hand: Mask,
+    kinked: Mask,
+    bears: Array,
+    stop: Event,
 ) -> Outcome:
     """The outcome with the rollouts that are in doubt taken at steps that are short enough.
 
     `run` takes some of the rollouts at so many times the steps. A rollout has converged where its numbers stay the same
     twice in a row; the longest of these steps is taken. Where that never happens the shortest is, and the rollout is
-    marked; so is, without trying all of them, a loop with kinks (`kinked`, (count,)) that swings at three steps and at
-    each differently: it is chaotic. Steps given `by_hand` (count,) stay; such a rollout is marked where half of the
-    step tells something else.
+    marked; so is, without trying all of them, a loop with kinks that swings at three steps and at each differently: it
+    is chaotic (`kinked` and `bears` as in `in_doubt`). Steps given `by_hand` (count,) stay; such a rollout is marked
+    where half of the step tells something else.
     """
-    doubtful = in_doubt(outcome, kinked)
+    doubtful = in_doubt(outcome, kinked, bears)
     fixed, left = np.flatnonzero(doubtful & by_hand), np.flatnonzero(doubtful & ~by_hand)
     if len(fixed):
         before, fine = outcome.rows(fixed), run(fixed, 2)

@@ -114,7 +114,8 @@ def rollout(
         return outcome
     by_hand = np.array([setting.loop.substeps is not None for setting in worlds])[world]
     kinked = np.array([has_kinks(setting.loop) for setting in worlds])[world]
-    return settled(outcome, run, by_hand, kinked, stop)
+    bears = np.array([setting.wrist.tension_range for setting in worlds])[world]
+    return settled(outcome, run, by_hand, kinked, bears, stop)
 
 
 def plant_in(planes: int, loop: Loop) -> PlantModel:

@@ -87,6 +87,7 @@ class SteppedLoops:
         model = PLANTS[loops[0].plant.model]
         self.count, self.sample, self.samples = count, 0, len(motions[0].time)
         self._loop, self._kinked = loops[0], np.array([has_kinks(loop) for loop in loops])
+        self._bears = np.full(count, wrist.tension_range)
         self._run: Callable[..., None] = kernel_of(run_blocks, model)
         self._look: Callable[..., None] = kernel_of(_look_blocks, model)
         self._batch = batch(GIVEN, np.zeros((count, 1)), motions, worlds, lanes, model, start, 0)
@@ -112,7 +113,7 @@ class SteppedLoops:
         """Loops whose integration step may be too long for the torques so far, and the steps in a control period that
         are likely to be enough, (count,) each."""
         outcome = outcome_of(self._batch, self.count, self._loop)
-        return in_one_go(outcome, self._kinked)
+        return in_one_go(outcome, self._kinked, self._bears)
 
     def look(self) -> Sight:
         """Signals that laws see now, before they answer, and the true angles."""
