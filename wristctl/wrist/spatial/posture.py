@@ -1,9 +1,9 @@
 """Shape of a wrist whose segments bend by vectors u = (u_y, u_z), in the ground's axes.
 
-A segment bends by the angle |u| about the axis e_x x u, without twist: with Stumpff's c_k(|u|^2) its chord is
-l (c_1 t + c_2 nu), where t is the tangent before it and nu = u_y n_y + u_z n_z in the frame (t, n_y, n_z) before it,
-and its frame turns by R = 1 + c_1 W + c_2 W^2, W = hat(0, -u_z, u_y). Bends of segments do not add as vectors; the
-frames' product does.
+A segment bends by the angle |u| about the axis e_x x u, without twist: its chord lies in the plane of the tangent t
+before it and of nu = u_y n_y + u_z n_z in the frame (t, n_y, n_z) before it (`spatial_chain`; an arc's is
+l (c_1 t + c_2 nu) with Stumpff's c_k(|u|^2)), and its frame turns by R = 1 + c_1 W + c_2 W^2, W = hat(0, -u_z, u_y).
+Bends of segments do not add as vectors; the frames' product does.
 
 Turning one coordinate moves all that lies beyond its segment by one screw: a point x moves by v + w x x. The angular
 part w is the column of the rotation vector's left Jacobian c_1 + c_2 hat(rho) + c_3 rho rho^T, rho = u_y n_z - u_z n_y.
@@ -16,7 +16,8 @@ from wristctl.lanes.functions import atan2
 from wristctl.lanes.lane import sqrt, where, zero_like
 from wristctl.lanes.rows import lanes_like
 from wristctl.lanes.space import cross, first_half, space, spaces_like
-from wristctl.wrist.spatial.stumpff import Stumpff, slopes, stumpff
+from wristctl.wrist.spatial.spatial_chain import chord_of, chord_unit
+from wristctl.wrist.spatial.stumpff import Stumpff, stumpff
 
 
 class Posture(NamedTuple):
@@ -95,15 +96,15 @@ def bend_segments(segment: Any, q: Any, posture: Any) -> Any:
     zero = zero_like(segment.length)
     tangent, end = space(1.0 + zero, zero, zero), space(zero, zero, zero)
     across_y, across_z = space(zero, 1.0 + zero, zero), space(zero, zero, 1.0 + zero)
-    length = segment.length
+    length = chord_unit(segment)
     for k in range(len(posture.chord)):
         y, z = 2 * k, 2 * k + 1
         bend_y, bend_z = q[y], q[z]
         c = stumpff(bend_y * bend_y + bend_z * bend_z)
         _keep(posture.series, k, c)
-        d = slopes(c)
+        part = chord_of(segment, c)
         nu = bend_y * across_y + bend_z * across_z
-        chord = (length * c.c1) * tangent + (length * c.c2) * nu
+        chord = (length * part.along) * tangent + (length * part.lean) * nu
         end = end + chord
         posture.tangent[k] = tangent
         posture.bend[k] = nu
@@ -113,11 +114,11 @@ def bend_segments(segment: Any, q: Any, posture: Any) -> Any:
         posture.normal[z] = across_z
         posture.axis[y] = across_z
         posture.axis[z] = -1.0 * across_y
-        stretched = (length * d.d1) * tangent + (length * d.d2) * nu
+        stretched = (length * part.along_1) * tangent + (length * part.lean_1) * nu
         rotation = bend_y * across_z - bend_z * across_y
         turn_pairs(q, k, posture.turned)
         for i in range(2 * k, 2 * k + 2):
-            chord_by = q[i] * stretched + (length * c.c2) * posture.normal[i]
+            chord_by = q[i] * stretched + (length * part.lean) * posture.normal[i]
             spin = (c.c2 * posture.turned[i]) * tangent + c.c1 * posture.axis[i] + (c.c3 * q[i]) * rotation
             posture.chord_by[i] = chord_by
             posture.spin[i] = spin
@@ -139,8 +140,9 @@ def spatial_tip(segment: Any, q: Any) -> Any:
         bend_y, bend_z = q[2 * k], q[2 * k + 1]
         c = stumpff(bend_y * bend_y + bend_z * bend_z)
         nu = bend_y * across_y + bend_z * across_z
+        part = chord_of(segment, c)
         both = c.c1 * tangent + c.c2 * nu
-        end = end + segment.length * both
+        end = end + chord_unit(segment) * (part.along * tangent + part.lean * nu)
         tangent = c.c0 * tangent + c.c1 * nu
         across_y = across_y - bend_y * both
         across_z = across_z - bend_z * both
@@ -170,8 +172,9 @@ def tip_bend(segment: Any, q: Any, rate: Any) -> Any:
         spin = spin + twist * tangent
         spin = spin + (c.c1 * rate_y + along * bend_y) * across_z
         spin = spin - (c.c1 * rate_z + along * bend_z) * across_y
+        part = chord_of(segment, c)
         both = c.c1 * tangent + c.c2 * nu
-        end = end + segment.length * both
+        end = end + chord_unit(segment) * (part.along * tangent + part.lean * nu)
         tangent = c.c0 * tangent + c.c1 * nu
         across_y = across_y - bend_y * both
         across_z = across_z - bend_z * both

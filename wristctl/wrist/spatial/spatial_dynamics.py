@@ -12,6 +12,7 @@ from wristctl.lanes.compiled import compiled, spelled_out
 from wristctl.lanes.lane import dot, zero_like
 from wristctl.lanes.space import cross, space, spaces_like
 from wristctl.wrist.spatial.posture import bend_segments, posture_like, series_of
+from wristctl.wrist.spatial.spatial_chain import chord_of, chord_unit, springs_of
 from wristctl.wrist.spatial.spatial_tendons import tendons_torques, torques_like
 from wristctl.wrist.spatial.stumpff import slopes
 
@@ -131,7 +132,7 @@ def spatial_bias(segment: Any, q: Any, rate: Any, posture: Any, tangent: Any, to
 
     `torque` holds the tendons' torque on each coordinate.
     """
-    n, length = len(posture.chord), segment.length
+    n, length = len(posture.chord), chord_unit(segment)
     force = spaces_like(posture.chord)
     zero, weight = zero_like(length), gravity_of(segment)
     a, spin, spin_rate = space(zero, zero, zero), space(zero, zero, zero), space(zero, zero, zero)
@@ -139,13 +140,13 @@ def spatial_bias(segment: Any, q: Any, rate: Any, posture: Any, tangent: Any, to
         y, z = 2 * k, 2 * k + 1
         c = series_of(posture, k)
         d = slopes(c)
-        curved_1, curved_2 = d.d3 - d.d2, 2.0 * d.d4 - d.d3  # the slopes of d1 and d2
+        part = chord_of(segment, c)
         along = q[y] * rate[y] + q[z] * rate[z]
         speed, along_2 = rate[y] * rate[y] + rate[z] * rate[z], along * along
         turning = rate[y] * posture.normal[y] + rate[z] * posture.normal[z]
-        bent = (length * (curved_1 * along_2 + d.d1 * speed)) * posture.tangent[k]
-        bent = bent + (length * (d.d2 * speed + curved_2 * along_2)) * posture.bend[k]
-        bent = bent + (2.0 * length * d.d2 * along) * turning
+        bent = (length * (part.along_2 * along_2 + part.along_1 * speed)) * posture.tangent[k]
+        bent = bent + (length * (part.lean_1 * speed + part.lean_2 * along_2)) * posture.bend[k]
+        bent = bent + (2.0 * length * part.lean_1 * along) * turning
         by_rate, by_bend = (d.d1 + c.c3) * along, d.d3 * along_2 + c.c3 * speed
         twist = d.d2 * along * (q[y] * rate[z] - q[z] * rate[y])
         turned = twist * posture.tangent[k]
@@ -167,7 +168,8 @@ def spatial_bias(segment: Any, q: Any, rate: Any, posture: Any, tangent: Any, to
     beyond = beyond - force_of(segment)
     for k in range(n - 1, -1, -1):
         on_chord = beyond + 0.5 * force[k]
-        spring_y, spring_z = by_plane(segment.stiffness_yy, segment.stiffness_yz, segment.stiffness_zz, q, k)
+        yy, yz, zz = springs_of(segment, k)
+        spring_y, spring_z = by_plane(yy, yz, zz, q, k)
         damper_y, damper_z = by_plane(segment.damping_yy, segment.damping_yz, segment.damping_zz, rate, k)
         r[2 * k] = spring_y + damper_y
         r[2 * k + 1] = spring_z + damper_z

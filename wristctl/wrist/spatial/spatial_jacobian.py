@@ -15,6 +15,7 @@ from wristctl.lanes.lane import dot, zero_like
 from wristctl.lanes.rows import lanes_like
 from wristctl.lanes.space import cross, space, spaces_like
 from wristctl.wrist.spatial.posture import series_of, turn_pairs
+from wristctl.wrist.spatial.spatial_chain import chord_of, chord_unit, springs_of
 from wristctl.wrist.spatial.spatial_dynamics import (
     bulk_of,
     circling,
@@ -73,12 +74,12 @@ def _along_motion(segment: Any, q: Any, rate: Any, acceleration: Any, posture: A
 
     Along the motion is by x twice and by y once, x the rate and y the acceleration of the segment's bend u.
     """
-    y, z, length = 2 * k, 2 * k + 1, segment.length
+    y, z, length = 2 * k, 2 * k + 1, chord_unit(segment)
     c = series_of(posture, k)
     d = slopes(c)
-    # slopes of the slopes, and theirs: d_k's is k d_{k+2} - d_{k+1}
-    e1, e2, e3, e4 = d.d3 - d.d2, 2.0 * d.d4 - d.d3, 3.0 * d.d5 - d.d4, 4.0 * d.d6 - d.d5
-    f1, f2 = e3 - e2, 2.0 * e4 - e3
+    part = chord_of(segment, c)
+    # slopes of the slopes: d_k's is k d_{k+2} - d_{k+1}
+    e1, e2, e3 = d.d3 - d.d2, 2.0 * d.d4 - d.d3, 3.0 * d.d5 - d.d4
     ux = q[y] * rate[y] + q[z] * rate[z]
     uy_xx = q[y] * acceleration[y] + q[z] * acceleration[z] + rate[y] * rate[y] + rate[z] * rate[z]
     twice = ux * ux
@@ -89,24 +90,26 @@ def _along_motion(segment: Any, q: Any, rate: Any, acceleration: Any, posture: A
     about_x = rate[y] * posture.axis[y] + rate[z] * posture.axis[z]
     about_y = acceleration[y] * posture.axis[y] + acceleration[z] * posture.axis[z]
 
-    stretched = (length * d.d1) * tangent + (length * d.d2) * nu
-    curved = (length * e1) * tangent + (length * e2) * nu
-    lean = length * d.d2
+    stretched = (length * part.along_1) * tangent + (length * part.lean_1) * nu
+    curved = (length * part.along_2) * tangent + (length * part.lean_2) * nu
+    lean = length * part.lean_1
     motion.chord_yy[k] = (q[y] * q[y]) * curved + (2.0 * lean * q[y]) * posture.normal[y] + stretched
     motion.chord_zz[k] = (q[z] * q[z]) * curved + (2.0 * lean * q[z]) * posture.normal[z] + stretched
     across = (lean * q[z]) * posture.normal[y] + (lean * q[y]) * posture.normal[z]
     motion.chord_yz[k] = (q[y] * q[z]) * curved + across
 
     # second derivatives of the chord along the motion, over u_a, x_a, y_a and along n_a
-    e1_twice, e2_twice = e1 * uy_xx + f1 * twice, e2 * uy_xx + f2 * twice
-    by_u = (length * e1_twice) * tangent + (length * e2_twice) * nu
-    by_u = by_u + (2.0 * length * e2 * ux) * nx + lean * ny
-    by_x = (2.0 * length * e1 * ux) * tangent + (2.0 * length * e2 * ux) * nu + (2.0 * lean) * nx
+    along_twice = part.along_2 * uy_xx + part.along_3 * twice
+    lean_twice = part.lean_2 * uy_xx + part.lean_3 * twice
+    by_u = (length * along_twice) * tangent + (length * lean_twice) * nu
+    by_u = by_u + (2.0 * length * part.lean_2 * ux) * nx + lean * ny
+    by_x = (2.0 * length * part.along_2 * ux) * tangent + (2.0 * length * part.lean_2 * ux) * nu + (2.0 * lean) * nx
     d1_twice, d2_twice, d3_twice = (
         d.d1 * uy_xx + e1 * twice,
         d.d2 * uy_xx + e2 * twice,
         d.d3 * uy_xx + e3 * twice,
     )
+    leaning = part.lean_1 * uy_xx + part.lean_2 * twice
     # and of w
     spun_u = d3_twice * about_u + (2.0 * d.d3 * ux) * about_x + c.c3 * about_y
     spun_x = (2.0 * d.d3 * ux) * about_u + (2.0 * c.c3) * about_x
@@ -124,7 +127,7 @@ def _along_motion(segment: Any, q: Any, rate: Any, acceleration: Any, posture: A
             (d.d2 * q[z] * turned_u[i]) * tangent + (d.d1 * q[z]) * axis + (d.d3 * u_i * q[z]) * about_u
         )
         motion.spin_by_z[i] = motion.spin_by_z[i] + (c.c3 * u_i) * posture.axis[z]
-        motion.chord_2[i] = u_i * by_u + x_i * by_x + y_i * stretched + (length * d2_twice) * normal
+        motion.chord_2[i] = u_i * by_u + x_i * by_x + y_i * stretched + (length * leaning) * normal
         twisted = d2_twice * turned_u[i] + 2.0 * d.d2 * ux * turned_x[i] + c.c2 * turned_y[i]
         motion.spin_2[i] = twisted * tangent + d1_twice * axis + u_i * spun_u + x_i * spun_x + y_i * spun_y
     # of w itself by the coordinate that it belongs to, and of -u_z and u_y by the other
@@ -225,11 +228,12 @@ def spatial_jacobians(segment: Any, q: Any, rate: Any, acceleration: Any, bent: 
                 by_rate[i, b] = dot(w, angular_rate[b]) + dot(move, linear_rate[b]) + damped
             by_q[i, y] = by_q[i, y] + dot(motion.spin_by_y[i], about_end)
             by_q[i, z] = by_q[i, z] + dot(motion.spin_by_z[i], about_end)
-        across = segment.stiffness_yz - torques.slope_across[j] + dot(motion.chord_yz[j], on_chord)
-        by_q[y, y] = by_q[y, y] + segment.stiffness_yy - torques.slope[y] + dot(motion.chord_yy[j], on_chord)
+        yy, yz, zz = springs_of(segment, j)
+        across = yz - torques.slope_across[j] + dot(motion.chord_yz[j], on_chord)
+        by_q[y, y] = by_q[y, y] + yy - torques.slope[y] + dot(motion.chord_yy[j], on_chord)
         by_q[y, z] = by_q[y, z] + across
         by_q[z, y] = by_q[z, y] + across
-        by_q[z, z] = by_q[z, z] + segment.stiffness_zz - torques.slope[z] + dot(motion.chord_zz[j], on_chord)
+        by_q[z, z] = by_q[z, z] + zz - torques.slope[z] + dot(motion.chord_zz[j], on_chord)
         by_rate[y, y] = by_rate[y, y] + segment.damping_yy
         by_rate[y, z] = by_rate[y, z] + segment.damping_yz
         by_rate[z, y] = by_rate[z, y] + segment.damping_yz

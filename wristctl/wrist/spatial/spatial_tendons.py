@@ -2,17 +2,17 @@
 
 A segment's g spans each bend by u/g over l/g: along it a tendon is (l - c.u) S(|u|/2g) long, S(x) = sin(x)/x, and its
 moment arm is minus the derivative of that by u. A tendon that ends at an inner disc runs along a part of the segments,
-of the last one perhaps along some of its spans only.
+of the last one perhaps along some of its spans only. So it is of arcs; other parts have functions of their own.
 """
 
 from typing import Any, NamedTuple
 
-from wristctl.lanes.compiled import compiled, spelled_out
+from wristctl.lanes.compiled import by_type, compiled, implements, spelled_out
 from wristctl.lanes.functions import clip
 from wristctl.lanes.lane import zero_like
 from wristctl.lanes.rows import lanes_like
 from wristctl.lanes.space import first_half
-from wristctl.wrist.spatial.spatial_segments import OF_A_TENDON
+from wristctl.wrist.spatial.spatial_segments import OF_A_TENDON, SpatialWrist
 from wristctl.wrist.spatial.stumpff import stumpff
 
 
@@ -48,6 +48,24 @@ def share_of(tendons: Any, t: int, k: int) -> Any:
     return clip(tendons[OF_A_TENDON * t + 2] - k, 0.0, 1.0)
 
 
+@by_type
+def lengths_along(wrist: Any, q: Any, lengths: Any) -> None:
+    """Length of each tendon from the base to where it ends [m]; T rows."""
+    raise NotImplementedError("compiled code only")
+
+
+@by_type
+def moment_arms_of(wrist: Any, q: Any, t: int, arms: Any) -> None:
+    """Moment arms of a tendon, minus the derivatives of its length by each coordinate [m]; 2n rows."""
+    raise NotImplementedError("compiled code only")
+
+
+@by_type
+def tendons_torques(wrist: Any, q: Any, pulls: Any, torques: Any) -> None:
+    """Torque of the tendons' pulls [N] (T rows) on each coordinate with its derivatives, into TendonTorques."""
+    raise NotImplementedError("compiled code only")
+
+
 @compiled
 def _spans(segment: Any, y: Any, z: Any) -> Any:
     """S at half a span's bend; minus its derivative by u_a over u_a, and minus that one's again."""
@@ -56,9 +74,8 @@ def _spans(segment: Any, y: Any, z: Any) -> Any:
     return c.c1, per_span * (c.c2 - c.c3), per_span * per_span * (c.c3 - 3.0 * c.c4 + 3.0 * c.c5)
 
 
-@compiled
-def lengths_along(wrist: Any, q: Any, lengths: Any) -> None:
-    """Length of each tendon from the base to where it ends [m]; T rows."""
+@implements(lengths_along, SpatialWrist)
+def _lengths_along_arcs(wrist: Any, q: Any, lengths: Any) -> None:
     segment, tendons = wrist.segment, wrist.tendons
     for t in range(len(lengths)):
         lengths[t] = zero_like(segment.length)
@@ -79,9 +96,8 @@ def _arm(wrist: Any, t: int, k: int, y: Any, z: Any, spans: Any) -> Any:
     return share * (c_y * sinc + squeeze * y), share * (c_z * sinc + squeeze * z)
 
 
-@compiled
-def moment_arms_of(wrist: Any, q: Any, t: int, arms: Any) -> None:
-    """Moment arms of a tendon, minus the derivatives of its length by each coordinate [m]; 2n rows."""
+@implements(moment_arms_of, SpatialWrist)
+def _moment_arms_about_arcs(wrist: Any, q: Any, t: int, arms: Any) -> None:
     for k in range(len(q) // 2):
         y, z = q[2 * k], q[2 * k + 1]
         arms[2 * k], arms[2 * k + 1] = _arm(wrist, t, k, y, z, _spans(wrist.segment, y, z))
@@ -96,9 +112,8 @@ def arms_about_bend(wrist: Any, bend: Any, arms: Any) -> None:
         arms[t], arms[count + t] = _arm(wrist, t, 0, y, z, spans)
 
 
-@compiled
-def tendons_torques(wrist: Any, q: Any, pulls: Any, torques: Any) -> None:
-    """Torque of the tendons' pulls [N] (T rows) on each coordinate with its derivatives, into TendonTorques."""
+@implements(tendons_torques, SpatialWrist)
+def _torques_on_arcs(wrist: Any, q: Any, pulls: Any, torques: Any) -> None:
     segment, tendons = wrist.segment, wrist.tendons
     zero = zero_like(segment.length)
     for k in range(len(q) // 2):
