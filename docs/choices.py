@@ -11,7 +11,15 @@ from typing import Any, Literal, get_args, get_origin
 
 from pydantic_core import PydanticUndefined
 
-from wristctl.config.choices import CONTROLLERS, DISTURBANCES, METRICS, OPTIMISERS, PLANTS, REFERENCES
+from wristctl.config.choices import (
+    CONTROLLERS,
+    DISTURBANCES,
+    METRICS,
+    OPTIMISERS,
+    PLANTS,
+    PLANTS_IN_SPACE,
+    REFERENCES,
+)
 from wristctl.config.learning import PRESETS
 from wristctl.config.loop import Loop, Reference
 from wristctl.config.section import OneOf, Section
@@ -42,6 +50,13 @@ def table(head: str, rows: Any) -> str:
 def about(module: str) -> str:
     """The first paragraph of a module's docstring, without its full stop."""
     return " ".join((sys.modules[module].__doc__ or "").split("\n\n")[0].split()).removesuffix(".")
+
+
+def plants() -> Iterator[tuple[str, ...]]:
+    """Every plant, and what it is in one plane and in two."""
+    for name in {**PLANTS, **PLANTS_IN_SPACE}:
+        both = (table.get(name) for table in (PLANTS, PLANTS_IN_SPACE))
+        yield f"`{name}`", *(about(plant.values.__module__) if plant else "" for plant in both)
 
 
 def shown(value: Any) -> str:
@@ -203,7 +218,7 @@ How large they are is in the group {link(Loop)}.
 
 ## Plants
 
-{table("name, what it is", ((f"`{k}`", about(v.bend_of.py_func.__module__)) for k, v in PLANTS.items()))}
+{table("name, in one plane, in two planes", plants())}
 
 ## Presets of networks
 

@@ -206,5 +206,6 @@ class BenchSettings(Section):
     @property
     def in_one_plane_only(self) -> list[str]:
         """Keys that are set, of what a bench in two planes has not."""
-        keys = in_one_plane_only(self.plant, self.actuator)
+        of_arcs = [name for name in ("model", "taper") if getattr(self.plant, name) != getattr(TrueWrist(), name)]
+        keys = of_arcs + in_one_plane_only(self.plant, self.actuator)
         return [f"bench.{key}" if key.startswith("actuator.") else f"bench.plant.{key}" for key in keys]

@@ -213,7 +213,7 @@ OPTIMISERS: Choices[Any] = Choices(
     "wristctl.optimisers",
 )
 
-# Table of `wristctl.wrist.plant.PlantModel`.
+# Table of `wristctl.identification.real_robots.RealRobot`.
 ROBOTS: Choices[Any] = Choices(
     "real robot",
     {
@@ -224,10 +224,21 @@ ROBOTS: Choices[Any] = Choices(
         "tee-probe": "wristctl.identification.real_robots:TEE_PROBE",
     },
 )
+
+# Table of `wristctl.wrist.plant.PlantModel`.
 PLANTS: Choices[Any] = Choices(
     "plant",
     {
         "pcc": "wristctl.wrist.pcc:PCC",
         "hinges": "wristctl.wrist.hinges:HINGES",
+    },
+)
+
+# Plants of the same names that bend in two planes.
+PLANTS_IN_SPACE: Choices[Any] = Choices(
+    "plant in two planes",
+    {
+        "pcc": "wristctl.wrist.spatial.pcc_in_space:PCC_IN_SPACE",
+        "hinges": "wristctl.wrist.spatial.hinges_in_space:HINGES_IN_SPACE",
     },
 )

@@ -181,7 +181,7 @@ class TrueWrist(Overrides):
 
 
 # Facts of a wrist and of its tendons that there are in one plane only.
-WRIST_IN_ONE_PLANE = ("model", "creep", "inner_friction", "end_stop_deg", "taper")
+WRIST_IN_ONE_PLANE = ("creep", "inner_friction", "end_stop_deg")
 TENDONS_IN_ONE_PLANE = ("creep", "slips_at", "torque", "top_speed")
 
 

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import csv
 import math
+from functools import partial
 from itertools import cycle
 from typing import Any, NamedTuple
 
@@ -34,7 +35,7 @@ from wristctl.plotting.wrist_drawing import RIM
 from wristctl.records.run import Run
 from wristctl.simulation.trajectory import Trajectory
 from wristctl.simulation.worlds import plant_of
-from wristctl.wrist.spatial.spatial_kinematics import spatial_frames
+from wristctl.wrist.plant import PLANTS_IN_SPACE
 from wristctl.wrist.tendon_layout import TendonLayout
 
 # Pictures a second, between which the page interpolates, and how many at most.
@@ -70,7 +71,7 @@ def rim(wrist: WristParameters) -> float:
 
 
 def spatial_view(run: Run) -> dict[str, Any] | None:
-    """Wrist, tendons and motion of a run in two planes, as the page plays them; None of any other run.
+    """Wrist, tendons and motion of a run in two planes, as the page plays them; None of any other run, or plant.
 
     Of trials on a rig it is the first one.
 
@@ -81,6 +82,8 @@ def spatial_view(run: Run) -> dict[str, Any] | None:
     if table_of is None or not run.has(table_of):
         return None
     loop = run.config.hw_run.loop if run.kind == "hw-run" else run.config.simulate.loop
+    if run.kind == "simulate" and loop.plant.model != "pcc":
+        return None
     wrist, planes = plant_of(run.config.wrist, loop.plant), ("ulnar", "flexion")
     places = cables(wrist)
     groups = {
@@ -150,7 +153,7 @@ def seen(points: Array) -> Array:
     return np.stack([right, up, behind * math.cos(ELEVATION) - x * math.sin(ELEVATION)], axis=-1)
 
 
-def motion_in_space(course: Trajectory, wrist: WristParameters, heading: str = "") -> Figure:
+def motion_in_space(course: Trajectory, wrist: WristParameters, heading: str = "", plant: str = "pcc") -> Figure:
     """Left the wrist in space where it is bent most, right the path of its tip as seen from above it [mm].
 
     `wrist` is the wrist as it is.
@@ -158,7 +161,7 @@ def motion_in_space(course: Trajectory, wrist: WristParameters, heading: str = "
     picture, ((left, right),) = figure(1, 2, height=3.8)
     largest = int(np.nanargmax(np.hypot(*course.bend.T)))
     _draw_floor(left, 2.0 * rim(wrist))
-    _draw_body(left, course.segment_theta[largest], wrist)
+    _draw_body(left, course.segment_theta[largest], wrist, plant)
     for path, style in ((course.tip_desired, _WANTED), (course.tip, _REACHED)):
         _line(left, path, zorder=4.0, **style)
         right.plot(1e3 * path[:, 1], 1e3 * path[:, 2], **style)
@@ -194,9 +197,10 @@ def _draw_floor(axes: Axes, radius: float) -> None:
             axes.annotate(name, (right, up), ha="center", va="center", fontsize=9.0, color=GREY)
 
 
-def _draw_body(axes: Axes, q: Array, wrist: WristParameters) -> None:
+def _draw_body(axes: Axes, q: Array, wrist: WristParameters, plant: str) -> None:
     """Discs, backbone and tendons at coordinates q (2n,): each disc over what is behind its plane."""
-    centres, frames = spatial_frames(q, wrist.length, np.linspace(0.0, 1.0, wrist.discs))
+    frames_at = partial(PLANTS_IN_SPACE[plant].frames, wrist, q)
+    centres, frames = frames_at(np.linspace(0.0, 1.0, wrist.discs))
     order = 2.0
     for k in _from_afar(seen(frames[:, :, 0])[:, 2] < 0.0):
         order += 0.01
@@ -206,7 +210,7 @@ def _draw_body(axes: Axes, q: Array, wrist: WristParameters) -> None:
             continue
         ends = slice(k // 2, k // 2 + 2)
         shares = np.linspace(k // 2, k // 2 + 1, 9) / (wrist.discs - 1)
-        lines = [(spatial_frames(q, wrist.length, shares)[0], {"color": BLACK, "linewidth": 2.0})]
+        lines = [(frames_at(shares)[0], {"color": BLACK, "linewidth": 2.0})]
         for cable, colour in zip(cables(wrist), cycle(TENDON_COLOURS), strict=False):
             if k // 2 + 1 < cable.discs:
                 at = centres[ends] + frames[ends] @ np.array([0.0, cable.y, cable.z])

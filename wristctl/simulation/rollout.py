@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wristctl.arrays import Array
-from wristctl.config.choices import PLANTS
 from wristctl.config.loop import Loop
 from wristctl.config.plant import in_one_plane_only
 from wristctl.config.wrist import WristParameters
@@ -26,8 +25,7 @@ from wristctl.simulation.motion import GOALS, Motion
 from wristctl.simulation.outcome import KeptSamples, Outcome
 from wristctl.simulation.sums import sums_by_name
 from wristctl.simulation.worlds import World
-from wristctl.wrist.plant import PlantModel, kernel_of
-from wristctl.wrist.spatial.pcc_in_space import PCC_IN_SPACE
+from wristctl.wrist.plant import PLANTS, PLANTS_IN_SPACE, PlantModel, kernel_of
 from wristctl.wrist.tendon_layout import TendonLayout
 
 # Control ticks of a block between two looks at whether the user has asked to stop.
@@ -120,15 +118,19 @@ def rollout(
 
 def plant_in(planes: int, loop: Loop) -> PlantModel:
     """Plant of a loop in so many planes."""
-    return PLANTS[loop.plant.model] if planes == 1 else PCC_IN_SPACE
+    return PLANTS[loop.plant.model] if planes == 1 else PLANTS_IN_SPACE.named(loop.plant.model)
 
 
 def check_two_planes(worlds: Sequence[World]) -> None:
-    """UserError for facts that no loop in two planes has; ValueError for wrists with other numbers of tendons."""
+    """UserError for facts that no loop in two planes has, or wrists that no plant there can be.
+
+    ValueError for wrists with other numbers of tendons.
+    """
     for world in worlds:
         if beyond := in_one_plane_only(world.loop.plant, world.loop.plant.actuator):
             key = f"loop.plant.{beyond[0]}"
             raise UserError(f"no loop in two planes has plant.{beyond[0]}", key, "leave it at its default")
+        plant_in(2, world.loop).values(world.plant, world.loop.plant_segments)
     if len({len(TendonLayout.of(world.wrist).places) for world in worlds}) != 1:
         raise ValueError("wrists of one batch have other numbers of tendons")
 

@@ -152,15 +152,22 @@ def _disturbed(plant: Any, force: Any, scale: Any) -> Any:
     return _load(plant, (scale * plant.stiffness, force[1] + plant.force_y))
 
 
-def values(wrist: WristParameters, n: int) -> Array:
-    """The wrist cut into n equal parts: springs in series, of which the taper leaves the whole as soft as it is.
+def tapered(wrist: WristParameters, n: int) -> tuple[float, float]:
+    """Stiffness of each of n hinges over that of the one before it, and of the first over that of n equal ones.
 
-    From the base to the tip the stiffness falls (taper > 1) by the same factor from hinge to hinge.
+    Of springs in series the taper leaves the whole as soft as it is; from the base to the tip the stiffness falls
+    (taper > 1) by the same factor from hinge to hinge.
     """
+    softening = wrist.taper ** (-1.0 / max(n - 1, 1))
+    return softening, float(np.mean(softening ** -np.arange(n, dtype=float)))
+
+
+def values(wrist: WristParameters, n: int) -> Array:
+    """The wrist cut into n equal parts, with springs in series."""
     named = dict(zip(Segments._fields, segments(wrist, n).tolist(), strict=True))
     del named["spans"]
-    softening = wrist.taper ** (-1.0 / max(n - 1, 1))
-    named["stiffness"] *= float(np.mean(softening ** -np.arange(n, dtype=float)))
+    softening, first = tapered(wrist, n)
+    named["stiffness"] *= first
     return np.array(Hinges(**named, softening=softening))
 
 

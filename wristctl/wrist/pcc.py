@@ -38,9 +38,14 @@ def _tip_pose(plant: Any, q: Any) -> Any:
     return tip(q, plant.length)
 
 
-def _values(wrist: WristParameters, n: int) -> Array:
+def check_even(wrist: WristParameters, n: int) -> None:
+    """UserError for a taper, which segments of constant curvature do not have."""
     if n > 1 and wrist.taper != 1.0:
         raise UserError("segments of plant pcc are equally stiff", "wrist.taper", "plant.model: hinges, or no taper")
+
+
+def _values(wrist: WristParameters, n: int) -> Array:
+    check_even(wrist, n)
     return segments(wrist, n)
 
 

@@ -3,7 +3,7 @@
 A plant is one file: the NamedTuple of its parameters, and functions of lanes on them and on its coordinates q with
 their rates. Compiled code is handed a PlantModel, reads its parameters by `parameters_of`, and calls the functions
 below; which plant's they are follows from the parameters' type, so that each kernel is compiled for its plant alone.
-`wristctl.wrist.pcc` is the first plant; a newcomer is a line in `wristctl.config.choices.PLANTS`.
+`wristctl.wrist.pcc` is the first plant; a newcomer is a line in `wristctl.config.choices.PLANTS`, or `PLANTS_IN_SPACE`.
 """
 
 import sys
@@ -20,6 +20,7 @@ from numba.extending import NativeValue, models, overload, register_model, typeo
 
 from wristctl.arrays import Array
 from wristctl.config.choices import PLANTS as _TABLE
+from wristctl.config.choices import PLANTS_IN_SPACE as _IN_SPACE
 from wristctl.config.choices import Choices
 from wristctl.config.wrist import WristParameters
 from wristctl.errors import UserError
@@ -43,6 +44,10 @@ def _unknown(*_: Any) -> Any:
     raise NotImplementedError("a plant in two planes has no one angle, and no two sides")
 
 
+def _unseen(*_: Any) -> Any:
+    raise NotImplementedError("a plant in one plane has no frames in space")
+
+
 @dataclass(frozen=True)
 class PlantModel:
     """A kind of plant; the compiled functions have the arguments of this module's of the same name."""
@@ -61,7 +66,10 @@ class PlantModel:
     tips: Callable[[WristParameters, Array], Array]
     """Tips (T, P + 1) [m] at coordinates (T, q)."""
     planes: int = 1
-    """Number P of planes that it bends in; what follows is of a plant in one plane."""
+    """Number P of planes that it bends in."""
+    frames: Callable[[WristParameters, Array, Array], tuple[Array, Array]] = _unseen
+    """For pictures, of a plant in two planes: centres (m, 3) [m] and axes (m, 3, 3), as columns, of cross-sections at
+    coordinates (q,) and at shares (m,) of the way from the base to the tip. What follows is of a plant in one plane."""
     read: Any = None
     """Function (model, rows, pulls) of compiled code that reads the parameters; None: each is a row."""
     travel: Any = None
@@ -96,6 +104,7 @@ class PlantModel:
 
 
 PLANTS: Choices[PlantModel] = _TABLE
+PLANTS_IN_SPACE: Choices[PlantModel] = _IN_SPACE
 
 
 class PlantType(numba.types.Type):

@@ -107,7 +107,8 @@ def simulate_in_two_planes(session: Session) -> SimulatedBends:
         world = truth_heading(wrist, settings.loop)
         findings.figure("bends", bend_motion, course, reach, world, caption=caption)
         caption = "The wrist in space where it is bent most, and the path of its tip, wanted and reached"
-        findings.figure("space", motion_in_space, course, plant_of(wrist, settings.loop.plant), world, caption=caption)
+        own = settings.loop.plant
+        findings.figure("space", motion_in_space, course, plant_of(wrist, own), world, own.model, caption=caption)
     short_of, advice = ("", []) if repeated.failure or repeated.arrives else _short_of(study, repeated)
     words = wrist_identified(session.inputs)
     return SimulatedBends(session.study, findings, tables, repeated, short_of, advice, study, words)

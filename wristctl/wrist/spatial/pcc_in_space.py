@@ -6,10 +6,12 @@ from typing import Any
 from wristctl.arrays import Array
 from wristctl.config.wrist import WristParameters
 from wristctl.lanes.compiled import compiled
+from wristctl.lanes.named_tuples import replacing
 from wristctl.lanes.rows import part
+from wristctl.wrist.pcc import check_even
 from wristctl.wrist.plant import PlantModel
 from wristctl.wrist.spatial.posture import tip_bend
-from wristctl.wrist.spatial.spatial_kinematics import spatial_tips
+from wristctl.wrist.spatial.spatial_kinematics import spatial_frames, spatial_tips
 from wristctl.wrist.spatial.spatial_segments import (
     FIELDS,
     SpatialWrist,
@@ -20,6 +22,8 @@ from wristctl.wrist.spatial.spatial_segments import (
 from wristctl.wrist.spatial.spatial_step import spatial_step
 from wristctl.wrist.tendon_layout import TendonLayout
 
+_with_segment = replacing("segment")
+
 # Bend of a segment [rad] up to which the plant's series hold.
 _MOST = 3.1
 
@@ -29,12 +33,14 @@ def _read(model: Any, rows: Any, pulls: Any = ()) -> Any:
 
 
 @compiled
-def _bend_of(plant: Any, q: Any, rate: Any, bend: Any, speed: Any) -> None:
+def bend_in_space(plant: Any, q: Any, rate: Any, bend: Any, speed: Any) -> None:
+    """Write the bend of the last disc's tangent [rad] and its rate [rad/s], two rows each."""
     bend[0], bend[1], speed[0], speed[1], _ = tip_bend(plant.segment, q, rate)
 
 
 @compiled
-def _within(plant: Any, q: Any) -> Any:
+def within_bends(plant: Any, q: Any) -> Any:
+    """Lanes in which every segment is bent by less than half a turn."""
     inside = q[0] * q[0] + q[1] * q[1] < _MOST * _MOST
     for k in range(1, len(q) // 2):
         inside = inside & (q[2 * k] * q[2 * k] + q[2 * k + 1] * q[2 * k + 1] < _MOST * _MOST)
@@ -42,7 +48,8 @@ def _within(plant: Any, q: Any) -> Any:
 
 
 @compiled
-def _disturbed(plant: Any, force: Any, scale: Any) -> Any:
+def load_in_space(plant: Any, force: Any, scale: Any) -> Any:
+    """The plant with a force (3) more on the last disc [N] and its springs' stiffness scaled."""
     still = plant.segment
     segment = load_tip(
         still,
@@ -51,7 +58,7 @@ def _disturbed(plant: Any, force: Any, scale: Any) -> Any:
             scale * still.stiffness_yy, scale * still.stiffness_yz, scale * still.stiffness_zz,
         ),
     )  # fmt: skip
-    return SpatialWrist(segment, plant.tendons)
+    return _with_segment(plant, (segment,))
 
 
 def placed_values(wrist: WristParameters, layout: TendonLayout, n: int) -> Array:
@@ -59,16 +66,22 @@ def placed_values(wrist: WristParameters, layout: TendonLayout, n: int) -> Array
     return spatial_values(wrist, layout, n, axis=math.radians(wrist.stiffness_axis_deg))
 
 
+def _values(wrist: WristParameters, n: int) -> Array:
+    check_even(wrist, n)
+    return placed_values(wrist, TendonLayout.of(wrist), n)
+
+
 PCC_IN_SPACE = PlantModel(
     name="pcc",
     parameters=SpatialWrist,
     planes=2,
     coordinates=lambda n: 2 * n,
-    values=lambda wrist, n: placed_values(wrist, TendonLayout.of(wrist), n),
+    values=_values,
     advance=spatial_step,
-    bend_of=_bend_of,
-    within=_within,
-    disturbed=_disturbed,
+    bend_of=bend_in_space,
+    within=within_bends,
+    disturbed=load_in_space,
     tips=lambda wrist, q: spatial_tips(q, wrist.length),
+    frames=lambda wrist, q, shares: spatial_frames(q, wrist.length, shares),
     read=_read,
 )
