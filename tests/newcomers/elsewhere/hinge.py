@@ -1,7 +1,7 @@
 """A plain hinge as a plant: a rigid rod that turns about the base, with the wrist's spring, damper, masses and tendons.
 
 (m L^2/3 + m_h (L + h)^2) q'' + D q' + K q = c (pull_plus - pull_minus) + gravity + F L cos q; tendons run beside the
-rod at +-c and are L -+ c q long. Explicit Runge-Kutta of fourth order: nothing here is stiff.
+rod at +-c and are L -+ c q long. Explicit Runge-Kutta of fourth order, pulls at each stage: nothing here is stiff.
 """
 
 from __future__ import annotations
@@ -66,28 +66,34 @@ def _direction(q: Any) -> Any:
 
 
 @compiled
-def _acceleration(rod: Any, q: Any, rate: Any, torque: Any) -> Any:
+def _path(rod: Any, q: Any) -> Any:
+    return rod.offset * q, -rod.offset * q, abs(q)
+
+
+@compiled
+def _travel(rod: Any, q: Any) -> Any:
+    return _path(rod, q[0])
+
+
+@compiled
+def _acceleration(rod: Any, q: Any, rate: Any, given: Any, tendons: Any) -> Any:
+    plus, minus = pulls_along(tendons, given, _path(rod, q))
+    torque = rod.offset * (plus - minus)
     cosine, sine = _direction(q)
     weight = rod.falling * (rod.gravity_y * cosine - rod.gravity_x * sine) + rod.force * rod.length * cosine
     return (torque + weight - rod.stiffness * q - rod.damping * rate) / rod.inertia
 
 
 @compiled
-def _travel(rod: Any, q: Any) -> Any:
-    return rod.offset * q[0], -rod.offset * q[0], abs(q[0])
-
-
-@compiled
 def _advance(rod: Any, q: Any, rate: Any, given: Any, tendons: Any, h: Any) -> Any:
-    plus, minus = pulls_along(tendons, given, _travel(rod, q))
-    torque, x, v = rod.offset * (plus - minus), q[0], rate[0]
-    a1 = _acceleration(rod, x, v, torque)
+    x, v = q[0], rate[0]
+    a1 = _acceleration(rod, x, v, given, tendons)
     v2 = v + 0.5 * h * a1
-    a2 = _acceleration(rod, x + 0.5 * h * v, v2, torque)
+    a2 = _acceleration(rod, x + 0.5 * h * v, v2, given, tendons)
     v3 = v + 0.5 * h * a2
-    a3 = _acceleration(rod, x + 0.5 * h * v2, v3, torque)
+    a3 = _acceleration(rod, x + 0.5 * h * v2, v3, given, tendons)
     v4 = v + h * a3
-    a4 = _acceleration(rod, x + h * v3, v4, torque)
+    a4 = _acceleration(rod, x + h * v3, v4, given, tendons)
     q[0] = x + h / 6.0 * (v + 2.0 * v2 + 2.0 * v3 + v4)
     rate[0] = v + h / 6.0 * (a1 + 2.0 * a2 + 2.0 * a3 + a4)
     return q[0] - (x + h * v2), rate[0] - (v + h * a2)  # the midpoint rule's, of second order
