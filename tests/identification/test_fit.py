@@ -13,7 +13,7 @@ import pytest
 from tests.identification.benches import KNOWN, LEVEL, TENDONS, UPRIGHT, logged, problem, tendons
 from wristctl.config.loop import Loop, Reference
 from wristctl.control.table import controller
-from wristctl.identification.fit import SPOOL, Coordinate, Linearisation, fit, frame_noise, linearise
+from wristctl.identification.fit import SPOOL, Coordinate, Linearisation, fit, linearise
 from wristctl.identification.forward import SupposedWrist, angles
 from wristctl.identification.intervals import (
     autocorrelation,
@@ -23,6 +23,7 @@ from wristctl.identification.intervals import (
     knowledge,
     long_run,
 )
+from wristctl.identification.measured_trials import frame_noise
 from wristctl.identification.rehearsal import spools
 from wristctl.simulation.actuator import motor_of
 from wristctl.simulation.reference import motion

@@ -12,7 +12,7 @@ import pytest
 from tests.identification.benches import logged, problem
 from wristctl.config.plant import TendonFacts, TrueWrist
 from wristctl.errors import UserError
-from wristctl.identification.fit import Fit, fit, frame_noise
+from wristctl.identification.fit import Fit, fit
 from wristctl.identification.intervals import Knowledge, interval, knowledge
 from wristctl.identification.lack_of_fit import (
     CAUSES,
@@ -23,6 +23,7 @@ from wristctl.identification.lack_of_fit import (
     suspicions,
     widened,
 )
+from wristctl.identification.measured_trials import frame_noise
 
 pytestmark = pytest.mark.slow
 

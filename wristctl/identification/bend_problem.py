@@ -21,10 +21,10 @@ from wristctl.config.wrist import WristParameters
 from wristctl.errors import UserError
 from wristctl.identification.arc_fit import Told
 from wristctl.identification.bend_trials import PLANES, BendTrial
-from wristctl.identification.fit import SPOOL, ZERO, Coordinate, Fit, Problem, frame_noise, spool_zero
+from wristctl.identification.fit import SPOOL, ZERO, Coordinate, Fit, Problem, spool_zero
 from wristctl.identification.intervals import NORMAL_95, Knowledge, interval
 from wristctl.identification.lack_of_fit import Misfit
-from wristctl.identification.measured_trials import MOST_DELAYED, MeasuredTrial
+from wristctl.identification.measured_trials import MOST_DELAYED, MeasuredTrial, frame_noise
 from wristctl.identification.posterior import posterior_draws, posterior_yaml
 from wristctl.identification.spatial_forward import SupposedBends, courses_of_bends
 from wristctl.identification.unknowns import UNKNOWNS, Unknown, believed_of, identified_yaml, tendons_of_values

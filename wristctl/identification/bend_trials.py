@@ -13,9 +13,8 @@ from numpy.typing import NDArray
 from wristctl.arrays import Array
 from wristctl.config.wrist import WristParameters
 from wristctl.errors import UserError
-from wristctl.identification.fit import frame_noise
 from wristctl.identification.log_model import mass_of_log, spools_of_log
-from wristctl.identification.measured_trials import MeasuredTrial
+from wristctl.identification.measured_trials import MeasuredTrial, frame_noise
 from wristctl.records.open_log import OpenLog
 from wristctl.wrist.directions import TENDONS
 from wristctl.wrist.tendon_layout import TendonLayout, TendonPlace

@@ -14,7 +14,7 @@ from wristctl.arrays import Array
 from wristctl.config.identify import IdentifySettings
 from wristctl.config.plant import Actuator
 from wristctl.identification.forward import SupposedWrist, angles
-from wristctl.identification.measured_trials import MeasuredTrial
+from wristctl.identification.measured_trials import MeasuredTrial, frame_noise
 from wristctl.identification.unknowns import NOT_NEGATIVE, SIMULATED, UNKNOWNS, Unknown, tendons_of_values
 from wristctl.processes import cores
 
@@ -225,15 +225,6 @@ class Fit:
     def values(self) -> dict[str, float]:
         """Every parameter, found or fixed."""
         return self.problem.values(self.x)
-
-
-def frame_noise(courses: Sequence[Array]) -> float:
-    """Standard deviation of what differs from frame to frame in courses (F,), by their second differences.
-
-    Neither a trend nor what lasts longer than a few frames counts. Medians: quick moves do not either.
-    """
-    second = np.concatenate([np.diff(course, 2) for course in courses])
-    return float(np.median(np.abs(second)) / (0.6745 * np.sqrt(6.0)))
 
 
 def fit(problem: Problem) -> Fit:

@@ -17,10 +17,10 @@ import numpy as np
 from wristctl.arrays import Array
 from wristctl.config.plant import TendonFacts, TrueWrist
 from wristctl.errors import Setting, UserError
-from wristctl.identification.fit import Fit, frame_noise
+from wristctl.identification.fit import Fit
 from wristctl.identification.forward import SupposedWrist
 from wristctl.identification.intervals import Knowledge, sandwich
-from wristctl.identification.measured_trials import MeasuredTrial
+from wristctl.identification.measured_trials import MeasuredTrial, frame_noise
 from wristctl.processes import cores
 
 # Standard deviations beyond which a cause is told: one in 430 sound fits has one of them there by chance.

@@ -21,8 +21,8 @@ from wristctl.config.hysteresis import HysteresisSettings
 from wristctl.config.plant import Actuator, TrueWrist
 from wristctl.config.wrist import WristParameters
 from wristctl.errors import UserError
-from wristctl.identification.fit import frame_noise
 from wristctl.identification.measured_loop import MeasuredLoop
+from wristctl.identification.measured_trials import frame_noise
 from wristctl.simulation.spool_driven import SpooledWrist, spooled
 from wristctl.wrist.statics import FROM_ABOVE, FROM_BELOW
 from wristctl.wrist.tendons import TENDONS_PER_SIDE

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
@@ -106,6 +107,15 @@ def measured_trials(
             f"no trial without a push has {_FEWEST} usable frames", label, "name an hw-run run with trials that ended"
         )
     return trials
+
+
+def frame_noise(courses: Sequence[Array]) -> float:
+    """Standard deviation of what differs from frame to frame in courses (F,), by their second differences.
+
+    Neither a trend nor what lasts longer than a few frames counts. Medians: quick moves do not either.
+    """
+    second = np.concatenate([np.diff(course, 2) for course in courses])
+    return float(np.median(np.abs(second)) / (0.6745 * np.sqrt(6.0)))
 
 
 # Frames of delay that a simulated camera may have.
