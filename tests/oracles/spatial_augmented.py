@@ -7,7 +7,8 @@ u/2), six numbers, and J_mu = d(mu)/du reduces them to two. A turn's axes are th
 Jacobian, so that nothing is singular at the straight wrist.
 
 All is written without absolute values and branches: at complex coordinates it gives the analytic functions, whose
-imaginary part over a small step is a derivative to rounding. One state at a time; SI units.
+imaginary part over a small step is a derivative to rounding. One state at a time; SI units. `spatial_motion` moves a
+wrist by these equations with an integrator of SciPy's.
 """
 
 from math import factorial
@@ -15,7 +16,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.integrate import solve_ivp
 
+from wristctl.config.wrist import WristParameters
 from wristctl.wrist.spatial.spatial_segments import FIELDS, OF_A_TENDON, SpatialSegments
 
 # Real or complex.
@@ -32,6 +35,12 @@ def stumpff_of(s: Any, k: int) -> Any:
 def hat(v: Numbers) -> Numbers:
     """The matrix of v x."""
     return np.array([[0.0 * v[0], -v[2], v[1]], [v[2], 0.0 * v[0], -v[0]], [-v[1], v[0], 0.0 * v[0]]])
+
+
+def cross(a: Numbers, b: Numbers) -> Numbers:
+    """a x b, sooner than NumPy's for one vector."""
+    (ax, ay, az), (bx, by, bz) = a, b
+    return np.array([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx])
 
 
 class Turn(NamedTuple):
@@ -120,8 +129,8 @@ def _chain(mu: Numbers, mu_rate: Numbers, hand_offset: float) -> tuple[list[Move
         jacobian, rate = np.zeros((3, size), kind), np.zeros((3, size), kind)
         for number, (is_turn, axis, axis_rate, about, about_rate) in enumerate(columns):
             if is_turn:
-                jacobian[:, number] = np.cross(axis, place - about)
-                rate[:, number] = np.cross(axis_rate, place - about) + np.cross(axis, place_rate - about_rate)
+                jacobian[:, number] = cross(axis, place - about)
+                rate[:, number] = cross(axis_rate, place - about) + cross(axis, place_rate - about_rate)
             else:
                 jacobian[:, number], rate[:, number] = axis, axis_rate
         return Moved(place, jacobian, rate)
@@ -178,17 +187,88 @@ def augmented_tendons(parameters: Numbers, q: Numbers) -> tuple[Numbers, Numbers
     return np.asarray(length), np.concatenate(arms, axis=1)
 
 
-def augmented_residual(
-    parameters: Numbers, q: Numbers, rate: Numbers, acceleration: Numbers, pulls: Numbers
-) -> Numbers:
-    """M q'' + r (2n,) under the tendons' pulls (T,) [N]."""
+def _forces(parameters: Numbers, at: Augmented, q: Numbers, rate: Numbers, pull_on: Numbers) -> Numbers:
+    """What accelerates at q'' = 0, (2n,), with `pull_on` what the tendons' pulls give."""
     segment = SpatialSegments(*parameters[:FIELDS])
-    at = spatial_augmented(parameters, q, rate)
     force = np.array([segment.force_x, segment.force_y, segment.force_z])
     stiffness = np.array([[segment.stiffness_yy, segment.stiffness_yz], [segment.stiffness_yz, segment.stiffness_zz]])
     damping = np.array([[segment.damping_yy, segment.damping_yz], [segment.damping_yz, segment.damping_zz]])
     passive = (q.reshape(-1, 2) @ stiffness + rate.reshape(-1, 2) @ damping).ravel()
-    arms = augmented_tendons(parameters, q)[1]
-    inertial = at.mass @ acceleration + at.coriolis @ rate + at.gravity
-    residual: Numbers = inertial - at.tip_jacobian.T @ force + passive - pulls @ arms
+    forces: Numbers = at.tip_jacobian.T @ force + pull_on - at.coriolis @ rate - at.gravity - passive
+    return forces
+
+
+def augmented_residual(
+    parameters: Numbers, q: Numbers, rate: Numbers, acceleration: Numbers, pulls: Numbers
+) -> Numbers:
+    """M q'' + r (2n,) under the tendons' pulls (T,) [N]."""
+    at = spatial_augmented(parameters, q, rate)
+    pull_on = pulls @ augmented_tendons(parameters, q)[1]
+    residual: Numbers = at.mass @ acceleration - _forces(parameters, at, q, rate, pull_on)
     return residual
+
+
+def parameters_of(wrist: WristParameters, places: Numbers, n: int, force: Numbers) -> Numbers:
+    """Parameters of a wrist with tendons at places (T, 2) [m] to the last disc and a force on the tip [N].
+
+    They are those of `spatial_values`, by hand: n segments in series, with the stiffness along and across its axis.
+    """
+    axis = np.deg2rad(wrist.stiffness_axis_deg)
+    along, across = np.array([np.cos(axis), np.sin(axis)]), np.array([-np.sin(axis), np.cos(axis)])
+    stiffness = wrist.stiffness * (np.outer(along, along) + wrist.flexion_ratio * np.outer(across, across))
+    segment = SpatialSegments(
+        length=wrist.length / n, mass=wrist.mass / n, hand_mass=wrist.hand_mass, hand_offset=wrist.hand_offset,
+        spans=(wrist.discs - 1) / n,
+        stiffness_yy=n * stiffness[0, 0], stiffness_yz=n * stiffness[0, 1], stiffness_zz=n * stiffness[1, 1],
+        damping_yy=n * wrist.damping, damping_yz=0.0, damping_zz=n * wrist.damping,
+        gravity_x=wrist.gravity[0], gravity_y=wrist.gravity[1], gravity_z=wrist.gravity_flexion,
+        force_x=force[0], force_y=force[1], force_z=force[2],
+    )  # fmt: skip
+    return np.concatenate([segment, np.column_stack([places, np.full(len(places), float(n))]).ravel()])
+
+
+class Rubbing(NamedTuple):
+    """Elastic tendons that rub: stiffness of each [N/m], friction, sheath [rad], the path of a bristle [m]."""
+
+    stiffness: float
+    friction: float
+    sheath: float
+    presliding: float
+
+
+def spatial_motion(
+    parameters: Numbers, n: int, held: Numbers, every: float, tendons: Rubbing | None = None
+) -> NDArray[np.float64]:
+    """Coordinates (K + 1, 2n) [rad] of n segments, straight and at rest first, every so many seconds, by SciPy's Radau.
+
+    Parameters
+    ----------
+    held
+        What is held over each interval (K, T): pulls [N], or of elastic tendons lengths reeled in [m].
+    tendons
+        Tendons between spools and wrist: one whose path is shorter by x pulls k max(l - x, 0) at its spool, and that
+        times exp(-mu phi z) at the wrist, phi the angle that sheath and segments wrap it by. The bristle z follows x:
+        dz/dt = (dx/dt - z |dx/dt|)/s.
+    """
+    runs = np.reshape(parameters[FIELDS:], (-1, OF_A_TENDON))[:, 2]
+    count = len(runs)
+    straight = runs * SpatialSegments(*parameters[:FIELDS]).length
+    shares = np.clip(runs[:, None] - np.arange(n), 0.0, 1.0)
+
+    def slope(_: float, state: Numbers, holds: Numbers) -> Numbers:
+        q, rate, z = np.split(state, [2 * n, 4 * n])
+        at, (lengths, arms) = spatial_augmented(parameters, q, rate), augmented_tendons(parameters, q)
+        pulls, z_rate = holds, 0.0 * z
+        if tendons is not None:
+            wrapped = tendons.sheath + shares @ np.hypot(*q.reshape(-1, 2).T)
+            stretch, speed = holds - (straight - lengths), arms @ rate
+            pulls = tendons.stiffness * np.maximum(stretch, 0.0) * np.exp(-tendons.friction * wrapped * z)
+            z_rate = (speed - z * np.abs(speed)) / tendons.presliding
+        acceleration = np.linalg.solve(at.mass, _forces(parameters, at, q, rate, pulls @ arms))
+        return np.concatenate([rate, acceleration, z_rate])
+
+    states = [np.zeros(4 * n + count)]
+    for holds in held:
+        done = solve_ivp(slope, (0.0, every), states[-1], "Radau", args=(holds,), rtol=1e-6, atol=1e-8)
+        states.append(done.y[:, -1])
+    return np.array(states)[:, : 2 * n]
