@@ -85,10 +85,19 @@ def test_a_loop_in_two_planes_has_every_metric_of_one_and_those_of_its_planes() 
         assert done.metrics[name] == pytest.approx(np.sqrt(np.mean(off**2)))
     apart = np.linalg.norm(course.tip - course.tip_desired, axis=1)
     assert done.metrics["tip_rmse_mm"] == pytest.approx(1e3 * np.sqrt(np.mean(apart**2)))
-    power = (course.torque * course.rate).sum(axis=1)
-    assert done.metrics["energy"] == pytest.approx(np.abs(power).sum() * 1e-3)
     late = off[-(len(off) // 2) :].mean() / np.hypot(*course.bend_ref.T).max()  # it never rests
     assert done.metrics["missing"] == pytest.approx(late, rel=1e-9) and done.metrics["drift"] == 0.0
+
+
+@pytest.mark.parametrize("name", ["circle", "dart-thrower"])
+def test_the_energy_is_of_both_planes_power_together_there_and_back(name: str) -> None:
+    hanging = WristParameters(gravity=(9.81, 0.0), damping=0.01)  # what its springs hold is given back
+    motion = Motion.of_bends(bend_path(name, 20.0, 1.0, 2.0), 1e-3, hanging.length)
+    done = follow(LAW, np.array(gains_of(LAW, "default")), motion, hanging, IGNORED)
+    course = done.trajectory
+    power = course.torque[:, 0] * course.rate[:, 0] + course.torque[:, 1] * course.rate[:, 1]
+    assert done.metrics["energy"] == pytest.approx(np.abs(power).sum() * 1e-3, rel=1e-9)
+    assert min(power) < -0.1 * max(power) < 0.0
 
 
 def test_lanes_of_one_world_and_of_equal_worlds_are_the_same() -> None:
