@@ -18,7 +18,7 @@ from wristctl.errors import UserError
 from wristctl.records import Run
 from wristctl.simulation.bend_paths import bend_path
 from wristctl.simulation.metrics import metrics_in
-from wristctl.simulation.planes import bends_of, planes_of
+from wristctl.simulation.planes import Asked, bends_of, planes_of
 from wristctl.wrist.spatial.spatial_kinematics import exact_bend, spatial_tips
 
 pytestmark = pytest.mark.slow
@@ -94,7 +94,7 @@ def test_a_recording_of_two_planes_is_followed_in_both(tmp_path: Path) -> None:
     with pytest.raises(UserError, match="no bends in two planes"):
         SIMULATE.plan(alone, Inputs())
     one_plane = alone.simulate.model_copy(update={"loop": alone.simulate.loop.model_copy(update={"planes": None})})
-    assert planes_of(one_plane.loop, one_plane.reference, study.wrist) == 1
+    assert planes_of(study.wrist, [Asked(one_plane.loop, one_plane.reference)]) == 1
 
 
 def tips_file(folder: Path, tips: np.ndarray, more: str = "") -> Study:

@@ -20,7 +20,7 @@ from wristctl.commands.tune.command import TUNE
 from wristctl.config.loop import Loop, Reference
 from wristctl.config.wrist import WristParameters
 from wristctl.errors import UserError
-from wristctl.simulation.planes import planes_of
+from wristctl.simulation.planes import Asked, planes_of
 from wristctl.study_files.error_messages import located
 from wristctl.study_files.load import load_study, read_study
 from wristctl.study_files.resolved import changed_yaml, resolved_yaml
@@ -174,7 +174,7 @@ SQUARE = "[{angle_deg: 45}, {angle_deg: 135}, {angle_deg: 225}, {angle_deg: 315}
 )
 def test_one_plane_takes_two_sides_of_two_tendons(tendons: str) -> None:
     wrist = load_study([], [f"wrist.tendons={tendons}"]).wrist
-    assert off_both_sides(wrist) is None and planes_of(Loop(), Reference(), wrist) == 1
+    assert off_both_sides(wrist) is None and planes_of(wrist, [Asked(Loop(), Reference())]) == 1
 
 
 @pytest.mark.parametrize(
@@ -190,7 +190,7 @@ def test_one_plane_takes_two_sides_of_two_tendons(tendons: str) -> None:
 )
 def test_other_layouts_bend_in_two_planes_and_commands_in_one_say_what_takes_them(tendons: str, odd: int) -> None:
     study = load_study([], [f"wrist.tendons={tendons}"])
-    assert planes_of(Loop(), Reference(), study.wrist) == 2
+    assert planes_of(study.wrist, [Asked(Loop(), Reference())]) == 2
     for command in (wristctl.tune, wristctl.compare, wristctl.recommend, wristctl.analyse, wristctl.hysteresis):
         with pytest.raises(UserError, match=rf"tendon {odd} of this wrist is elsewhere .* bends this wrist in two"):
             command(study)

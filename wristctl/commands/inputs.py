@@ -180,8 +180,8 @@ def check_sides(wrist: WristParameters, command: str) -> None:
     does = "moves" if rig else "bends in one plane, by"
     problem = f"{command} {does} four tendons at 45 deg from both planes; tendon {odd} of this wrist is elsewhere"
     takes = " bends this wrist in two planes"
-    compares = "; --sweep controller=ct-dob,pid-ff compares controllers on it"
-    fix: Phrase = (Call("simulate"), takes, "" if rig else compares)
+    compares = ("; ", Call("compare"), " and ", Call("tune"), " take it too")
+    fix: Phrase = (Call("simulate"), takes, *(() if rig else compares))
     if TendonLayout.of(wrist).planes == 1:  # and in no other
         square = math.sqrt(2.0) * wrist.tendon_radius
         fix = f"two tendons at 0 and two at 180 deg bend as `tendons: four` with tendon_radius: {square:.4g}"

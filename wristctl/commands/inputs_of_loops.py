@@ -97,15 +97,16 @@ def with_what_there_is(study: Study, inputs: Inputs) -> tuple[Study, list[str]]:
     return study if settings is study.compare else study.model_copy(update={"compare": settings}), left_out
 
 
-def check_reach(references: Iterable[Reference], wrist: WristParameters, where: str) -> None:
+def check_reach(references: Iterable[Reference], wrist: WristParameters, where: str, planes: int = 1) -> None:
     """UserError for the first reference that asks for more than the wrist's range, or whose course fails."""
     import numpy as np
 
-    from wristctl.simulation.reference import motion
+    from wristctl.simulation.planes import motion_in
 
     for number, reference in enumerate(references):
         try:
-            motion(by_angles(reference), wrist, 1.0, 0.1).angles.into(np.empty((3, 10)))
+            asked = motion_in(planes, by_angles(reference), None, wrist, 1.0, 0.1)
+            asked.angles.into(np.empty((3 * planes, 10)))
         except UserError as error:
             if not error.where.startswith("reference"):  # in a file
                 raise
@@ -128,8 +129,27 @@ def check_family_reach(study: Study, name: str) -> None:
     """As `check_reach` for the motions of a family, at both ends of what is drawn; an unknown family has none."""
     motions = ends_of_family(study.families.get(name, Family()))
     half = len(motions) // 2
+    planes = planes_of_family(study, name)
     for part in (motions[:half], motions[half:]):
-        check_reach(part, study.wrist, f"families.{name}.references.{{}}")
+        check_reach(part, study.wrist, f"families.{name}.references.{{}}", planes)
+
+
+def planes_of_family(study: Study, name: str) -> int:
+    """Planes that all worlds of a family bend in; an unknown family bends in one. Raises UserError."""
+    from wristctl.simulation.drawn_worlds import asked_of
+    from wristctl.simulation.planes import planes_of
+
+    return planes_of(study.wrist, asked_of(study.families[name])) if name in study.families else 1
+
+
+def planes_of_search(study: Study) -> int:
+    """Planes that all loops of the study's `tune` section bend in. Raises UserError."""
+    from wristctl.simulation.planes import planes_of
+    from wristctl.tuning.search import asked_by
+
+    if name := study.tune.worlds.family:
+        return planes_of_family(study, name)
+    return planes_of(study.wrist, asked_by(study.tune))
 
 
 def check_inverses(inverses: Iterable[str], inputs: Inputs) -> None:

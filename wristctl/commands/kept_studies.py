@@ -41,7 +41,12 @@ def rig_of(loop: Loop) -> dict[str, Any]:
 
 
 def hw_run_fits(study: Study, loop: Loop) -> bool:
-    """Whether `hw-run` can have the loop's rig: motors, tendons, a camera, and ticks that its board can follow."""
+    """Whether `hw-run` can have the loop's rig: motors, tendons that its board winds, a camera, and ticks that it can
+    follow."""
+    from wristctl.wrist.tendon_layout import off_both_sides
+
+    if off_both_sides(study.wrist) is not None:
+        return False
     try:
         HwRunSettings.model_validate(study.hw_run.model_dump(by_alias=True) | rig_of(loop))
     except ValidationError:

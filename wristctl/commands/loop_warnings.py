@@ -23,6 +23,7 @@ from wristctl.errors import UserError
 if TYPE_CHECKING:
     from wristctl.control.law import Conditions
     from wristctl.control.shipped_gains import ShippedGains
+    from wristctl.simulation.planes import Asked
     from wristctl.wrist.statics import Shortfall
 
 
@@ -109,6 +110,14 @@ def warn_if_coarse(loops: Iterable[Loop]) -> None:
             log.warning(message, 1e3 * step, loop.fewest_steps)
 
 
+def warn_of_one_plane(wrist: WristParameters, asked: Iterable[Asked]) -> None:
+    """Warn where loops that are to bend in one plane have what bends the wrist out of it."""
+    from wristctl.simulation.planes import left_out
+
+    if what := left_out(wrist, asked):
+        log.warning("%s, which `planes: 1` leaves out", what)
+
+
 class AskedMotion(NamedTuple):
     """A motion that a loop is asked for."""
 
@@ -164,11 +173,12 @@ def out_of_reach(wrist: WristParameters, asked: Iterable[AskedMotion]) -> list[O
 
     shortfalls: dict[tuple[str, str], dict[str, dict[str, None]]] = {}
     for request in asked:
-        if (short := _shortfall(wrist, request)) is not None:
+        short = _shortfall(wrist, request)
+        if (told := _not_held(wrist, request) if short is None else _told(wrist, short)) is not None:
             motion = reference_name(request.reference) + (
                 f", {request.direction}" if request.direction != "ulnar" else ""
             )
-            shortfalls.setdefault(_told(wrist, short), {}).setdefault(motion, {})[request.name] = None
+            shortfalls.setdefault(told, {}).setdefault(motion, {})[request.name] = None
     unreachable = []
     for (reason, fix), motions in shortfalls.items():
         for loops in dict.fromkeys(map(tuple, motions.values())):
@@ -207,12 +217,40 @@ def _shortfall(wrist: WristParameters, asked: AskedMotion) -> Shortfall | None:
     from wristctl.simulation.worlds import loop_facing, plant_of
     from wristctl.wrist.statics import shortfall
 
-    if not asked.loop.limits:
+    if not asked.loop.limits or _in_space(wrist, asked):
         return None
     facing, loop = loop_facing(wrist, asked.loop, asked.direction)
     theta = motion(by_angles(asked.reference), facing, asked.horizon, sample_period(loop.control_period)).theta_ref
     low, high = min(0.0, float(theta.min())), max(0.0, float(theta.max()))
     return shortfall(plant_of(facing, loop.plant), low, high, loop.disturbances.load)
+
+
+def _in_space(wrist: WristParameters, asked: AskedMotion) -> bool:
+    from wristctl.simulation.planes import Asked, planes_of
+
+    return planes_of(wrist, [Asked(asked.loop, asked.reference, asked.direction)]) == 2
+
+
+def _not_held(wrist: WristParameters, asked: AskedMotion) -> tuple[str, str] | None:
+    """A bend in two planes that the tendons do not hold, by the statics of one segment, and what helps."""
+    from wristctl.config.loop import sample_period
+    from wristctl.simulation.planes import motion_in
+    from wristctl.simulation.worlds import plant_of
+    from wristctl.wrist.spatial.held_bends import first_beyond
+    from wristctl.wrist.tendon_layout import TendonLayout
+
+    if not asked.loop.limits or not _in_space(wrist, asked):
+        return None
+    period = sample_period(asked.loop.control_period)
+    bends = motion_in(2, by_angles(asked.reference), asked.direction, wrist, asked.horizon, period).bend_ref
+    beyond = first_beyond(plant_of(wrist, asked.loop.plant), TendonLayout.of(wrist), bends)
+    if beyond is None:
+        return None
+    ulnar, flexion = (math.degrees(bend) for bend in bends[beyond])
+    return (
+        f"tensions of {wrist.tension_limit:g} N do not hold {ulnar:.3g} deg toward ulnar with {flexion:.3g} deg toward "
+        "flexion"
+    ), "a larger tension_limit or tendon_radius, or a smaller angle_deg would do"
 
 
 def _told(wrist: WristParameters, short: Shortfall) -> tuple[str, str]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from itertools import product
 
 import numpy as np
 
@@ -17,7 +18,8 @@ from wristctl.errors import UserError
 from wristctl.simulation.closed_loop import repeat, scenario_of
 from wristctl.simulation.disturbances import DISTURBANCES
 from wristctl.simulation.motion import Motion
-from wristctl.simulation.reference import jumps, motion, reference_name, toward
+from wristctl.simulation.planes import Asked, motion_in, planes_of
+from wristctl.simulation.reference import jumps, reference_name
 from wristctl.simulation.repetitions import Repeated, Simulation
 from wristctl.simulation.worlds import Draws, World, is_random, loop_facing, mismatches
 from wristctl.wrist.kinematics import Inverse
@@ -89,16 +91,24 @@ class ReferenceCourse:
 
 
 def planned(study: Study, network: Inverse | None = None) -> list[Condition]:
-    """Conditions of the study's `compare` section: every row follows every course of every condition."""
-    chosen = study.compare
-    return [
-        Condition(
-            name, facing_loop, wrist, _courses(study, wrist, direction, sample_period(loop.control_period), network)
-        )
-        for name, loop in chosen.loops.items()
-        for direction in chosen.directions
-        for wrist, facing_loop in [loop_facing(study.wrist, loop, direction)]
-    ]
+    """Conditions of the study's `compare` section: every row follows every course of every condition.
+
+    In two planes they are of the wrist itself, in one as each direction's plane sees it.
+    """
+    chosen, planes = study.compare, planes_of(study.wrist, asked_by(study.compare))
+    conditions = []
+    for name, loop in chosen.loops.items():
+        for direction in chosen.directions:
+            wrist, own = (study.wrist, loop) if planes == 2 else loop_facing(study.wrist, loop, direction)
+            courses = _courses(study, planes, wrist, direction, sample_period(loop.control_period), network)
+            conditions.append(Condition(name, own, wrist, courses))
+    return conditions
+
+
+def asked_by(chosen: CompareSettings) -> list[Asked]:
+    """The motions that loops of a `compare` section are asked for."""
+    pairs = product(chosen.loops.values(), chosen.references, chosen.directions)
+    return [Asked(loop, reference, direction) for loop, reference, direction in pairs]
 
 
 def count_rollouts(chosen: CompareSettings) -> int:
@@ -152,15 +162,15 @@ def compare(
 
 
 def _courses(
-    study: Study, wrist: WristParameters, direction: DirectionName, period: float, network: Inverse | None
+    study: Study, planes: int, wrist: WristParameters, direction: DirectionName, period: float, network: Inverse | None
 ) -> list[ReferenceCourse]:
     chosen = study.compare
     reference_courses: list[ReferenceCourse] = []
     for reference in chosen.references:
         for inverse in chosen.inverses:
-            directed = toward(reference, direction).model_copy(update={"inverse": inverse})
+            inverted = reference.model_copy(update={"inverse": inverse})
             name, scenario = course_name(reference, direction, chosen), scenario_of(reference, direction)
-            course = motion(directed, wrist, chosen.horizon, period, network)
+            course = motion_in(planes, inverted, direction, wrist, chosen.horizon, period, network)
             reference_courses.append(ReferenceCourse(name, inverse, scenario, course, jumps(reference)))
     return reference_courses
 

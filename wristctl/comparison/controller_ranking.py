@@ -237,7 +237,8 @@ def _ripple(repeated: Repeated) -> Array:
 
 def _chatter(repeated: Repeated) -> Array:
     """Rate at which a chattering repetition's tensions go from limit to limit and back [1/s]; else 0."""
-    return chatter(repeated.metrics.get("chattering", np.zeros(len(repeated.failed))), repeated.tension_range)
+    variation = repeated.metrics.get("chattering", np.zeros(len(repeated.failed)))
+    return chatter(variation, repeated.tension_range, repeated.first.trajectory.tension.shape[1])
 
 
 def counted(flags: dict[str, NDArray[np.bool_]], scores: Array) -> dict[str, NDArray[np.int_]]:

@@ -309,13 +309,14 @@ def row_of(
     motions: Sequence[int] | None = None,
     noises: int | None = None,
     open_loop: Sequence[Mapping[str, np.ndarray]] | None = None,
+    places: int = 2,
 ) -> RankedRow:
     """A row of a ranking from its ranges of worlds in order; of these motions and so many of the noises, or of all.
 
     It swings in a world where it does in the middle one of its noises: at rest, or, by more than twice what feedforward
     shows there (`open_loop`, its ranges of worlds), while its reference moves. It also counts as swinging where it
     chatters on any motion in the middle one, or where a motion depends on the integration step however short.
-    `tension_range` is the wrist's, from pretension to limit [N].
+    `tension_range` is the wrist's, from pretension to limit [N], `places` the number of places of tendons.
     """
     chosen = slice(None) if motions is None else list(motions)
     metrics_of_worlds = {
@@ -335,9 +336,9 @@ def row_of(
     left = np.median(
         np.where(np.isnan(metrics_of_worlds["oscillation"]), 0.0, metrics_of_worlds["oscillation"]), axis=2
     )
-    chatters = chatter(np.median(metrics_of_worlds["chattering"], axis=2), tension_range) > 0.0
+    chatters = chatter(np.median(metrics_of_worlds["chattering"], axis=2), tension_range, places) > 0.0
     unsound = ((left > LIMIT_CYCLE) & rests_at_end) | moving | chatters | (metrics_of_worlds["drift"] > 0.0).any(axis=2)
     metrics = {name: metrics_of_worlds[name].reshape(1, -1) for name in RANKED}
     lasted, rests = metrics_of_worlds["lasted"].reshape(1, -1), metrics_of_worlds["rests"].ravel()
-    measured = Measured(metrics, failed.reshape(1, -1), lasted, rests, tension_range)
+    measured = Measured(metrics, failed.reshape(1, -1), lasted, rests, tension_range, places)
     return RankedRow(label, scores, unsound.any(axis=1), measured, failed.shape[1])

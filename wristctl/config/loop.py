@@ -66,8 +66,8 @@ class Loop(Section):
     planes: Literal[1, 2] | None = seldom(
         None,
         "",
-        "planes that the wrist bends in; null: two for a reference in two planes, or tendons that are not two alike on "
-        "either side; else one",
+        "planes that it bends in; null: two for a reference in two planes, for tendons that are not two alike on "
+        "either side, and where gravity, springs, a force or a tendon takes it out of its plane; else one",
     )
     coupling: Literal["compensated", "ignored"] = seldom(
         "compensated", "", "in two planes: whether their effect on each other is added to the controller's torques"

@@ -9,7 +9,7 @@ from wristctl.config.loop import Loop
 from wristctl.config.plant import Actuator
 from wristctl.config.study import Study
 from wristctl.config.wrist import TendonPlace, WristParameters
-from wristctl.simulation.planes import planes_of
+from wristctl.simulation.planes import Asked, planes_of
 from wristctl.study_files.strict_yaml import parse_yaml
 from wristctl.wrist.directions import ACTIVE
 
@@ -138,7 +138,9 @@ def with_identified(study: Study, command: str, text: str) -> Study:
     places = tuple(TendonPlace.model_validate(place) for place in found.pop("tendons", ()))
     wrist = study.wrist.model_copy(update=found)
     chosen, with_places = study.simulate, wrist.model_copy(update={"tendons": places})
-    in_two = command == "simulate" and planes_of(chosen.loop, chosen.reference, study.wrist) == 2
+    in_two = (
+        command == "simulate" and planes_of(study.wrist, [Asked(chosen.loop, chosen.reference, chosen.direction)]) == 2
+    )
     if places and (in_two or len(places) != len(ACTIVE)):
         wrist = with_places
     return study.model_copy(update={"wrist": wrist, name: settings.model_copy(update=changed)})

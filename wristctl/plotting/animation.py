@@ -58,6 +58,8 @@ Named = tuple[str, str, str, Any, Any]
 
 def _compared(run: Run) -> tuple[list[Named], np.ndarray]:
     table, series = run.data("comparison"), run.array("trajectories")
+    if "theta" not in series:  # in two planes
+        return [], series["time"][0]
     bent = series.get("segment_theta", series["theta"][..., None])
     many = table["inverse"].nunique() > 1
     names = [

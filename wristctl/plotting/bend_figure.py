@@ -1,11 +1,13 @@
 """Figures of a motion in two planes: the plane of bends with the tendons' reach, and errors and pulls over time."""
 
+from collections.abc import Sequence
+
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from wristctl.arrays import Array
-from wristctl.plotting.loop_figures import draw_course
+from wristctl.plotting.loop_figures import LEAST_DEG, draw_course, label
 from wristctl.plotting.style import (
     BLACK,
     DOTTED,
@@ -16,6 +18,8 @@ from wristctl.plotting.style import (
     WANTED,
     figure,
     legend_below,
+    line,
+    logarithmic,
     title,
 )
 from wristctl.simulation.trajectory import Trajectory
@@ -46,6 +50,25 @@ def bend_motion(course: Trajectory, reach: Array, heading: str = "") -> Figure:
         shade = TENDON_COLOURS[number % len(TENDON_COLOURS)]
         draw_course(pulls, course.time, pull, shade, f"tendon {number + 1}")
     pulls.set(xlabel="time [s]", ylabel="pull [N]")
+    legend_below(picture)
+    return picture
+
+
+def bend_overlay(courses: Sequence[Trajectory], heading: str = "") -> Figure:
+    """Left the paths in the plane of bends; right the size of the error [deg] over time [s]; a line for each course.
+
+    What nobody can measure is drawn as 0.001 deg.
+    """
+    picture, ((left, right),) = figure(1, 2, height=3.8, width_ratios=(1.0, 1.25))
+    left.plot(*np.rad2deg(courses[0].bend_ref).T, **WANTED | {"label": "wanted"})
+    for course in courses:
+        left.plot(*np.rad2deg(course.bend).T, label=label(course), **line(course.label))
+        right.plot(course.time, np.maximum(np.degrees(course.distance), LEAST_DEG), **line(course.label))
+    left.set_aspect("equal", adjustable="datalim")
+    left.set(xlabel="bend toward ulnar [deg]", ylabel="bend toward flexion [deg]")
+    logarithmic(right.yaxis)
+    right.set(xlabel="time [s]", ylabel="|error| [deg]")
+    title(left, heading)
     legend_below(picture)
     return picture
 

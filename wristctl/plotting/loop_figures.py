@@ -29,7 +29,7 @@ from wristctl.simulation.trajectory import Trajectory
 # Errors below this [rad] are not shown on a logarithmic axis.
 _SMALLEST = 1e-8
 # Error that nobody can measure [deg].
-_LEAST_DEG = 1e-3
+LEAST_DEG = 1e-3
 # Samples in the close-up of tensions.
 _LAST = 20
 # Parts of a long course of which each is drawn by its least and its largest value, and samples in a part from there on.
@@ -115,7 +115,7 @@ def errors(trajectories: Sequence[Trajectory], heading: str = "", log: bool = Fa
     """
     picture, ((axes,),) = figure(height=3.4)
     for course in trajectories:
-        error = np.where(np.abs(course.error) < _SMALLEST, np.nan, np.abs(course.error)) if log else course.error
+        error = np.where(course.distance < _SMALLEST, np.nan, course.distance) if log else course.error
         axes.plot(course.time, np.degrees(error), label=label(course), **line(course.label))
         if not log and (measured := _apart(course.seen, course.theta)) is not None:
             seen = np.degrees(measured - course.theta_ref)
@@ -139,16 +139,16 @@ def overlay(trajectories: Sequence[Trajectory], heading: str = "") -> Figure:
     picture, ((above,), (below,)) = figure(2, 1, height=4.4, sharex=True)
     for course in trajectories:
         above.plot(course.time, np.degrees(course.theta), label=label(course), **line(course.label))
-        error = np.maximum(np.degrees(np.abs(course.error)), _LEAST_DEG)
+        error = np.maximum(np.degrees(np.abs(course.error)), LEAST_DEG)
         below.plot(course.time, error, **line(course.label))
     draw_desired(above, trajectories)
     within_half_a_move(above, trajectories)
     logarithmic(below.yaxis)
     largest = max(float(np.degrees(np.abs(course.theta_ref)).max()) for course in trajectories)
-    _at_most(below, 0.5 * _LEAST_DEG, 2.0 * largest + 1.0)
+    _at_most(below, 0.5 * LEAST_DEG, 2.0 * largest + 1.0)
     above.set(ylabel="bending angle [deg]")
-    floored = any((np.degrees(np.abs(course.error)) < _LEAST_DEG).any() for course in trajectories)
-    least = f"\n(less than {_LEAST_DEG:g} as {_LEAST_DEG:g})" if floored else ""
+    floored = any((np.degrees(np.abs(course.error)) < LEAST_DEG).any() for course in trajectories)
+    least = f"\n(less than {LEAST_DEG:g} as {LEAST_DEG:g})" if floored else ""
     below.set(xlabel="time [s]", ylabel=f"|error| [deg]{least}")
     title(above, heading)
     legend_below(picture)
@@ -248,6 +248,12 @@ def _at_most(axes: Axes, low: float, high: float) -> None:
     axes.set_ylim(max(bottom, low), min(top, high))
 
 
+def _sizes(errors: Array) -> Array:
+    """Sizes (R, T) of errors (R, T), or (R, T, P) of planes."""
+    sizes: Array = np.abs(errors) if errors.ndim == 2 else np.linalg.norm(errors, axis=2)
+    return sizes
+
+
 def error_sizes(repeated: Sequence[Repeated], heading: str = "") -> Figure:
     """Size of the error |theta - theta_ref| [deg] over time [s]: the repetitions' median with its 95 % interval.
 
@@ -255,7 +261,7 @@ def error_sizes(repeated: Sequence[Repeated], heading: str = "") -> Figure:
     """
     picture, ((axes,),) = figure(height=3.4)
     for loop in repeated:
-        course, errors = loop.first.trajectory, np.degrees(np.abs(loop.errors))
+        course, errors = loop.first.trajectory, np.degrees(_sizes(loop.errors))
         median, low, high = spread_over_time(errors)
         style = line(course.label)
         label = course.label + (f", {loop.failed.sum()} failed" if loop.failed.any() else "")

@@ -65,6 +65,8 @@ class Measured:
     """Whether the reference of each case comes to rest, (C,)."""
     tension_range: float = math.inf
     """The wrist's, from pretension to limit [N]; inf: whether it chatters is not known."""
+    places: int = 2
+    """Places of tendons."""
 
     @property
     def limit_cycles(self) -> NDArray[np.bool_]:
@@ -77,7 +79,7 @@ class Measured:
         """Frequency at which tensions go from limit to limit and back, where it chatters, else 0, (P, C) [1/s]."""
         if math.isinf(self.tension_range):
             return np.zeros(self.failed.shape)
-        return chatter(self.metrics["chattering"], self.tension_range)
+        return chatter(self.metrics["chattering"], self.tension_range, self.places)
 
     @property
     def unconverged(self) -> NDArray[np.bool_]:
@@ -114,8 +116,9 @@ class Measured:
         indices = np.flatnonzero(np.isin(np.arange(len(self.rests)) % motions, chosen))
         metrics = {name: values[:, indices] for name, values in self.metrics.items()}
         return Measured(
-            metrics, self.failed[:, indices], self.lasted[:, indices], self.rests[indices], self.tension_range
-        )
+            metrics, self.failed[:, indices], self.lasted[:, indices], self.rests[indices], self.tension_range,
+            self.places,
+        )  # fmt: skip
 
 
 def measure(
@@ -134,12 +137,12 @@ def measure(
     shape, metrics = (len(gains), len(cases)), list(dict.fromkeys([*metrics, "chattering", "drift"]))
     measured = {name: np.empty(shape) for name in metrics}
     failed, lasted = np.empty(shape, bool), np.empty(shape)
-    finished = 0
+    finished, places = 0, 2
     for numbers in _alike(cases):
         for rows, columns in _pieces(len(gains), numbers, cases[numbers[0]], _recorded(metrics)):
             chosen = [cases[number] for number in columns]
             outcome, values = _measured(law, gains[rows], chosen, wrist, metrics, converge)
-            cells = np.ix_(rows, columns)
+            cells, places = np.ix_(rows, columns), outcome.places
             for name in metrics:
                 measured[name][cells] = values[name].reshape(len(rows), -1)
             failed[cells] = outcome.failed.reshape(len(rows), -1)
@@ -149,7 +152,7 @@ def measure(
             if progress is not None:
                 progress(finished / failed.size)
     rests, lasted = np.array([case.rests for case in cases]), np.clip(lasted, 0.0, 1.0)
-    return Measured(measured, failed, lasted, rests, wrist.tension_range)
+    return Measured(measured, failed, lasted, rests, wrist.tension_range, places)
 
 
 def _recorded(metrics: Sequence[str]) -> How:
@@ -183,7 +186,8 @@ def _pieces(rows: int, columns: Sequence[int], like: Case, recorded: How) -> lis
 
 def at_most(loop: Loop, followed: Motion, recorded: How) -> int:
     """Rollouts of such a loop whose samples can be kept in memory."""
-    return max(1, _RECORDED_AT_ONCE // (columns_of(recorded, loop.plant_segments) * len(followed.time)))
+    columns = columns_of(recorded, followed.planes * loop.plant_segments, followed.planes)
+    return max(1, _RECORDED_AT_ONCE // (columns * len(followed.time)))
 
 
 def at_once(metrics: Sequence[str], outcome: Outcome, which: NDArray[np.int64], step: float) -> dict[str, Array]:

@@ -21,7 +21,7 @@ from wristctl.simulation.batch import Start
 from wristctl.simulation.metrics import of_trajectory
 from wristctl.simulation.motion import Motion
 from wristctl.simulation.outcome import Outcome
-from wristctl.simulation.planes import motion_in, planes_of
+from wristctl.simulation.planes import Asked, motion_in, planes_of
 from wristctl.simulation.reference import reference_name
 from wristctl.simulation.repetitions import Gathered, Repeated, Simulation
 from wristctl.simulation.rollout import check_two_planes, plant_in, rollout
@@ -163,7 +163,7 @@ def asked_of(study: Study, period: float, network: Inverse | None = None) -> tup
     In one plane they are as its direction's plane sees them. Raises UserError for what no such loop has.
     """
     chosen, wrist, loop = study.simulate, study.wrist, study.simulate.loop
-    planes = planes_of(loop, chosen.reference, wrist)
+    planes = planes_of(wrist, [Asked(loop, chosen.reference, chosen.direction)])
     if planes == 1:
         wrist, loop = loop_facing(wrist, loop, chosen.direction)
     else:

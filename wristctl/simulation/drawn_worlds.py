@@ -12,7 +12,7 @@ from wristctl.config.wrist import WristParameters
 from wristctl.seeds import Entropy, stream
 from wristctl.simulation.cases import Case
 from wristctl.simulation.motion import Motion
-from wristctl.simulation.reference import motion
+from wristctl.simulation.planes import Asked, motion_in, planes_of
 from wristctl.wrist.kinematics import Inverse
 
 
@@ -37,6 +37,13 @@ def streams_of(family: Family, name: str, split: str) -> list[str]:
     ]
 
 
+def asked_of(family: Family) -> list[Asked]:
+    """Loops and motions of a family, with all that is drawn of them at its lower end, then at its upper end."""
+    ends = [dict.fromkeys([*family.draw, TOGETHER], share) for share in (0.0, 1.0 - 1e-12)]
+    numbers = range(len(family.references))
+    return [Asked(family.world(shares), family.motion(number, shares)) for shares in ends for number in numbers]
+
+
 def drawn_cases(
     family: Family, name: str, split: str, seed: int, draws: int, wrist: WristParameters,
     network: Inverse | None = None, first: int = 0, noises: int = 1,
@@ -44,7 +51,9 @@ def drawn_cases(
     """Every reference in each of so many worlds from the `first` on, each as often as there are `noises`.
 
     The cases of a world follow one another, and those of a reference in it, which are a cell, differ in noise alone.
+    All bend in two planes where any of the family leaves its plane.
     """
+    planes = planes_of(wrist, asked_of(family))
     cases, motions, cell = list[Case](), dict[tuple[str, float], Motion](), 0
     for world in range(first, first + draws):
         loop = world_of(family, name, split, seed, world)
@@ -58,7 +67,7 @@ def drawn_cases(
             reference = family.motion(number, {**dict.fromkeys(family.draw, 0.0), **shares})
             key = reference.model_dump_json(), period
             if key not in motions:
-                motions[key] = motion(reference, wrist, family.horizon, period, network)
+                motions[key] = motion_in(planes, reference, None, wrist, family.horizon, period, network)
             noise = *stream(seed, _camera(split, name, number)), world
             cases += [Case(loop, motions[key], (*noise, k) if k else noise, cell) for k in range(noises)]
             cell += 1

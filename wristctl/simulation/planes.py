@@ -1,36 +1,92 @@
 """Planes that a loop bends in, and its motion in them."""
 
+import math
+from collections.abc import Iterable
+from typing import NamedTuple
+
 import numpy as np
 
 from wristctl.arrays import Array
 from wristctl.config.loop import DirectionName, Loop, Reference
+from wristctl.config.plant import in_one_plane_only
 from wristctl.config.wrist import WristParameters
 from wristctl.errors import UserError
 from wristctl.simulation.motion import Motion
 from wristctl.simulation.recording import recorded_bends
 from wristctl.simulation.reference import REFERENCES, course_of, motion, toward
+from wristctl.simulation.worlds import plant_of
 from wristctl.wrist.directions import DIRECTIONS, in_plane
 from wristctl.wrist.kinematics import Inverse
 from wristctl.wrist.tendon_layout import TendonLayout, off_both_sides
 
 
-def planes_of(loop: Loop, reference: Reference, wrist: WristParameters) -> int:
-    """Planes that a loop bends in: two where the reference does, or where no tendons of the wrist pull in one alone.
+class Asked(NamedTuple):
+    """A motion that a loop is asked for."""
 
-    Raises UserError where these are more than the loop has, and for places of tendons that are no layout.
+    loop: Loop
+    reference: Reference
+    direction: DirectionName | None = None
+    """None: as it is, toward ulnar where it has no plane of its own."""
+
+
+def planes_of(wrist: WristParameters, asked: Iterable[Asked]) -> int:
+    """Planes that loops bend in, one number for all that are compared: two where any of them leaves its plane.
+
+    Raises UserError where a loop is to have one plane, and its reference or the tendons bend in two; and for places of
+    tendons that are no layout.
     """
-    two = f"{reference.kind} bends" * (REFERENCES[reference.kind].planes == 2)
+    return 2 if why_two(wrist, asked) else 1
+
+
+def why_two(wrist: WristParameters, asked: Iterable[Asked]) -> str:
+    """Why loops bend in two planes, in words; empty where all stay in one. Raises UserError as `planes_of`."""
+    found = ""
+    for each in dict.fromkeys(asked):
+        must, may = _must(wrist, each), _leaves(wrist, each)
+        if must and each.loop.planes == 1:
+            raise UserError(f"{must} in two planes, and the loop in one", "loop.planes", "loop.planes: null, or 2")
+        wanted = "loop.planes is 2" if each.loop.planes == 2 else ""
+        found = found or must or wanted or (may if each.loop.planes is None else "")
+    return found
+
+
+def left_out(wrist: WristParameters, asked: Iterable[Asked]) -> str:
+    """What leaves the plane of loops that are to bend in one all the same, in words; empty where nothing does."""
+    return next((may for each in asked if each.loop.planes == 1 and (may := _leaves(wrist, each))), "")
+
+
+def _must(wrist: WristParameters, asked: Asked) -> str:
+    """What bends in two planes and can be simulated in no one."""
+    if REFERENCES[asked.reference.kind].planes == 2:
+        return f"{asked.reference.kind} bends"
     if off_both_sides(wrist) is not None and TendonLayout.of(wrist).planes == 2:
-        two = two or "these tendons bend the wrist"
-    if two and loop.planes == 1:
-        raise UserError(f"{two} in two planes, and the loop in one", "loop.planes", "loop.planes: null, or 2")
-    return loop.planes or (2 if two else 1)
+        return "these tendons bend the wrist"
+    return ""
+
+
+def _leaves(wrist: WristParameters, asked: Asked) -> str:
+    """What takes the wrist, as it is believed or as it is, out of the plane of its motion, and one plane leaves out."""
+    plant, tendons, acting = asked.loop.plant, asked.loop.plant.actuator, asked.loop.disturbances
+    if in_one_plane_only(plant, tendons):
+        return ""
+    flexes = DIRECTIONS[_direction(asked.reference, asked.direction)].plane == "flexion"
+    for one in (wrist, plant_of(wrist, plant)):
+        if one.gravity[1] if flexes else one.gravity_flexion:
+            return "gravity bends the wrist out of the motion's plane"
+        if one.stiffness_axis_deg % 90.0 and one.flexion_ratio != 1.0:
+            return "springs that are softer along an oblique axis bend the wrist out of the motion's plane"
+    across = math.radians(acting.toward_deg - (90.0 if flexes else 0.0)) if acting.toward_deg else 0.0
+    if abs(math.sin(across)) > 1e-9 and any((acting.push.force, acting.load, acting.grasp.mass)):
+        return "a force from aside bends the wrist out of the motion's plane"
+    if any(tendons.slack) or tendons.broken_at is not None:
+        return "a tendon that is lost or slack bends the wrist out of the motion's plane"
+    return ""
 
 
 def motion_in(
     planes: int,
     reference: Reference,
-    direction: DirectionName,
+    direction: DirectionName | None,
     wrist: WristParameters,
     horizon: float,
     period: float,
@@ -38,11 +94,18 @@ def motion_in(
 ) -> Motion:
     """The motion of a reference in so many planes, on the grid of `period` [s] over the horizon [s].
 
-    In one plane the wrist is as this direction's plane sees it. Raises UserError for one out of reach.
+    In one plane the wrist is as this direction's plane sees it. Without a direction the reference is taken as it is, in
+    two planes toward ulnar where it has no plane of its own. Raises UserError for one out of reach.
     """
     if planes == 1:
-        return motion(toward(reference, direction), wrist, horizon, period, network)
-    return Motion.of_bends(bends_of(reference, direction, wrist, horizon, period), period, wrist.length)
+        directed = reference if direction is None else toward(reference, direction)
+        return motion(directed, wrist, horizon, period, network)
+    way = _direction(reference, direction)
+    return Motion.of_bends(bends_of(reference, way, wrist, horizon, period), period, wrist.length)
+
+
+def _direction(reference: Reference, direction: DirectionName | None) -> DirectionName:
+    return direction or REFERENCES[reference.kind].plane or "ulnar"
 
 
 def bends_of(

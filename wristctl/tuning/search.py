@@ -27,7 +27,7 @@ from wristctl.seeds import stream
 from wristctl.simulation.cases import Case
 from wristctl.simulation.closed_loop import scenario_of
 from wristctl.simulation.drawn_worlds import drawn_cases
-from wristctl.simulation.reference import motion
+from wristctl.simulation.planes import Asked, motion_in, planes_of
 from wristctl.simulation.worlds import Draws, is_random, loops_of
 from wristctl.tuning.objective import Judge
 from wristctl.tuning.optimisers import OPTIMISERS, Optimiser
@@ -161,14 +161,20 @@ def tuning_cases(study: Study, network: Inverse | None = None, tuning: int = 0) 
     ) if drawn else []
 
 
+def asked_by(settings: TuneSettings) -> list[Asked]:
+    """Loops and motions of the scenarios."""
+    return [Asked(settings.loops[scenario.loop], scenario.reference) for scenario in settings.scenarios]
+
+
 def _scenarios(study: Study, draws: Draws, repetitions: int, network: Inverse | None) -> list[Case]:
     """Cases of every scenario, repeated where the loop is random."""
     settings, cases = study.tune, list[Case]()
+    planes = planes_of(study.wrist, asked_by(settings))
     for cell, scenario in enumerate(settings.scenarios):
         loop = settings.loops[scenario.loop]
         times = repetitions if is_random(loop) else 1
         period, name = sample_period(loop.control_period), scenario_of(scenario.reference, "ulnar")
-        followed = motion(scenario.reference, study.wrist, settings.horizon, period, network)
+        followed = motion_in(planes, scenario.reference, None, study.wrist, settings.horizon, period, network)
         for k, plant_loop in enumerate(loops_of(loop, [draws.plant(draw) for draw in range(times)])):
             cases.append(Case(plant_loop, followed, draws.camera(name, k), cell))
     return cases

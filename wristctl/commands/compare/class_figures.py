@@ -15,6 +15,7 @@ from wristctl.plotting.style import (
     GREY,
     ORANGE,
     PURPLE,
+    TENDON_COLOURS,
     colour,
     columns_within,
     figure,
@@ -39,13 +40,13 @@ def shown_rows(standing: Ranking) -> list[str]:
 
 
 def tension_rows(courses: Sequence[Trajectory], heading: str = "") -> Figure:
-    """Tension per tendon [N] of both sides over time [s]: a panel for each controller, on one scale.
+    """Tension per tendon [N] of all places over time [s]: a panel for each controller, on one scale.
 
     A course that jumps at every tick is drawn from its least to its largest value, so that it fills an area.
     """
     fig, axes = figure(len(courses), 1, height=0.9 + 1.05 * len(courses), sharex=True, sharey=True)
     for panel, course in zip(axes[:, 0], courses, strict=True):
-        for shade, name, tension in zip((ORANGE, PURPLE), ("+ side", "- side"), course.tension.T, strict=True):
+        for shade, name, tension in zip(*_places(course), course.tension.T, strict=True):
             panel.plot(*envelope(course.time, tension), color=shade, linewidth=0.9, label=name)
         title(panel, label(course))
     largest = max(float(np.nanpercentile(course.tension, 99.5)) for course in courses)
@@ -55,6 +56,14 @@ def tension_rows(courses: Sequence[Trajectory], heading: str = "") -> Figure:
     fig.suptitle(heading, fontsize=10.0, x=0.02, ha="left")
     legend_below(fig)
     return fig
+
+
+def _places(course: Trajectory) -> tuple[Sequence[str], Sequence[str]]:
+    """Colour and name of each place of tendons."""
+    if course.planes == 1:
+        return (ORANGE, PURPLE), ("+ side", "- side")
+    count = course.tension.shape[1]
+    return [TENDON_COLOURS[t % len(TENDON_COLOURS)] for t in range(count)], [f"tendon {t + 1}" for t in range(count)]
 
 
 def error_against_variation(results: Sequence[ComparedRow], classes: Sequence[Ranking], heading: str = "") -> Figure:

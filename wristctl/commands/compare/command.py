@@ -30,6 +30,7 @@ from wristctl.commands.inputs_of_loops import (
     family_of,
     judged_loops,
     network_for,
+    planes_of_family,
     tuned_gains,
     tuned_on,
     with_what_there_is,
@@ -87,6 +88,7 @@ def draw(findings: Findings, study: Study, results: list[ComparedRow], rankings:
 def _of_class(findings: Findings, ranking: Ranking, results: Sequence[ComparedRow]) -> None:
     """Errors and tensions over time of the best rows and of the paper's, on the motion that stands for the class."""
     from wristctl.commands.compare.class_figures import shown_rows, tension_rows
+    from wristctl.plotting.bend_figure import bend_overlay
     from wristctl.plotting.loop_figures import error_sizes, errors, overlay
 
     later = partial(findings.figure, later=True)
@@ -96,12 +98,12 @@ def _of_class(findings: Findings, ranking: Ranking, results: Sequence[ComparedRo
     courses = [result.simulation.trajectory for result in shown]
     slug, where = _slug(ranking.name), f"{condition(ranking)}: loop {cell[0]}, {cell[1]}"
     caption = f"Angle and error of the best controllers and of the paper's, {where}"
-    findings.figure(f"overlay-{slug}", overlay, courses, where, later=ranking.jumps, caption=caption)
+    side_by_side = overlay if courses[0].planes == 1 else bend_overlay
+    findings.figure(f"overlay-{slug}", side_by_side, courses, where, later=ranking.jumps, caption=caption)
     caption = f"|theta - reference| of the best rows and of the paper's laws, {where}"
     later(f"error-over-time-{slug}", errors, courses, where, log=True, caption=caption)
-    later(
-        f"tension-over-time-{slug}", tension_rows, courses, where, caption=f"Commanded tension of both sides, {where}"
-    )
+    tendons = "both sides" if courses[0].planes == 1 else "each tendon"
+    later(f"tension-over-time-{slug}", tension_rows, courses, where, caption=f"Commanded tension of {tendons}, {where}")
     repeated = [result.repeated for result in shown if len(result.repeated.failed) > 1]
     if repeated:
         caption = f"|error| over repetitions: median and 95 % interval, {where}"
@@ -218,19 +220,30 @@ def plan(study: Study, inputs: Inputs) -> str:
     if settings.tuning is not None:
         check_family_reach(study, settings.tuning.worlds.family)
         with under("compare.tuning"):
-            searched = f"a search first: {planned_search(settings.tuning, study.families, study.wrist, inputs)}\n"
+            first = study.model_copy(update={"tune": settings.tuning})
+            searched = f"a search first: {planned_search(first, inputs)}\n"
         refuse_tuned_scenarios(settings, settings.tuning)
     if earlier is not None:
         refuse_tuned_scenarios(settings, earlier)
     check_family_reach(study, settings.worlds.family)
-    if not settings.worlds.family:
-        check_reach(settings.references, study.wrist, "compare.references.{}")
     with under("compare"):
-        asked = size(study)
+        asked, planes = size(study), planes_of_comparison(study)
         check_inverses(compared_inverses(study), inputs)
-        check_size(asked)
+        check_size(asked, planes)
+    if not settings.worlds.family:
+        check_reach(settings.references, study.wrist, "compare.references.{}", planes)
     truth = truth_told(study.wrist, judged_loops(study, study.compare))
     return f"{searched}{asked.rollouts} rollouts of {asked.horizon:g} s{truth}"
+
+
+def planes_of_comparison(study: Study) -> int:
+    """Planes that all rows bend in. Raises UserError."""
+    from wristctl.comparison.combinations import asked_by
+    from wristctl.simulation.planes import planes_of
+
+    if name := study.compare.worlds.family:
+        return planes_of_family(study, name)
+    return planes_of(study.wrist, asked_by(study.compare))
 
 
 def size(study: Study) -> Size:
@@ -338,5 +351,6 @@ COMPARE = sweepable(
         compare,
         (EarlierRun("network", kind="train", optional=True), EarlierRun("tuned", kind="tune", optional=True)),
         size=size,
+        in_one_plane=lambda study: planes_of_comparison(study) == 1,
     )
 )

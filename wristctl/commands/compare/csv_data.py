@@ -16,6 +16,11 @@ if TYPE_CHECKING:
     import pandas as pd
 
 
+# Columns of trajectories that are kept, in one plane and in two.
+_DRAWN = ("theta", "tip_x", "tip_y", "theta_ref", "theta_desired", "tension_plus", "tension_minus", "time")
+_IN_SPACE = ("bend_ulnar", "bend_flexion", "tip_x", "tip_y", "tip_z", "bend_ref_ulnar", "bend_ref_flexion", "time")
+
+
 def series(results: Sequence[ComparedRow], every: int = 5) -> dict[str, NDArray[np.float64]]:
     """Courses over time, one row per result in their order, every fifth sample: arrays (results, T), SI units.
 
@@ -25,16 +30,11 @@ def series(results: Sequence[ComparedRow], every: int = 5) -> dict[str, NDArray[
     courses = [result.simulation.trajectory for result in results]
     kept = _kept([c.time for c in courses], every)
     most = max(c.segment_theta.shape[1] for c in courses)
-    columns = {
-        "theta": [c.theta for c in courses],
-        "tip_x": [c.tip[:, 0] for c in courses],
-        "tip_y": [c.tip[:, 1] for c in courses],
-        "theta_ref": [c.theta_ref for c in courses],
-        "theta_desired": [c.theta_desired for c in courses],
-        "tension_plus": [c.tension[:, 0] for c in courses],
-        "tension_minus": [c.tension[:, 1] for c in courses],
-        "time": [c.time for c in courses],
-    }
+    drawn = [c.columns() for c in courses]
+    columns = {name: [each[name] for each in drawn] for name in (_DRAWN if courses[0].planes == 1 else _IN_SPACE)}
+    if courses[0].planes == 2:
+        places = courses[0].tension.shape[1]
+        columns |= {f"pull_{t + 1}": [c.tension[:, t] for c in courses] for t in range(places)}
     columns["segment_theta"] = [
         np.pad(c.segment_theta, ((0, 0), (0, most - c.segment_theta.shape[1])), constant_values=np.nan) for c in courses
     ]

@@ -28,12 +28,18 @@ from wristctl.commands.loop_warnings import (
     warn_if_coarse,
     warn_if_it_buckles,
     warn_if_outside,
+    warn_of_one_plane,
     warn_out_of_reach,
     warn_outside_conditions,
 )
 from wristctl.commands.procedure import Procedure
 from wristctl.commands.session import Session
-from wristctl.commands.simulate.in_two_planes import check_two_planes, in_two_planes, simulate_in_two_planes
+from wristctl.commands.simulate.in_two_planes import (
+    asked_for_by,
+    check_two_planes,
+    in_two_planes,
+    simulate_in_two_planes,
+)
 from wristctl.commands.simulate.results import SimulatedLoop, metrics_table, trajectory_table
 from wristctl.commands.sweep.command import sweepable
 from wristctl.config.study import Study
@@ -111,6 +117,7 @@ def simulate(session: Session) -> SimulatedLoop:
     settings, wrist = study.simulate, study.wrist
     warn_if_it_buckles(findings, wrist, [settings.loop])
     warn_if_coarse([settings.loop])
+    warn_of_one_plane(wrist, asked_for_by(study))
     warn_outside_conditions([settings], [settings.loop])
     beyond = warn_out_of_reach(findings, wrist, asked_by(study, settings))
     network = network_for(session.inputs, wrist, [settings.loop])

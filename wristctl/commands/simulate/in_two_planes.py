@@ -25,6 +25,7 @@ from wristctl.config.study import Study
 from wristctl.errors import under
 
 if TYPE_CHECKING:
+    from wristctl.simulation.planes import Asked
     from wristctl.simulation.repetitions import Repeated
 
 
@@ -57,7 +58,14 @@ def in_two_planes(study: Study) -> bool:
     from wristctl.simulation.planes import planes_of
 
     with under("simulate"):
-        return planes_of(study.simulate.loop, study.simulate.reference, study.wrist) == 2
+        return planes_of(study.wrist, asked_for_by(study)) == 2
+
+
+def asked_for_by(study: Study) -> list[Asked]:
+    """The motion of the study's `simulate` section."""
+    from wristctl.simulation.planes import Asked
+
+    return [Asked(study.simulate.loop, study.simulate.reference, study.simulate.direction)]
 
 
 # Time between two samples of a reference by which it is checked before a run [s].
@@ -136,10 +144,14 @@ def _short_of(study: Study, repeated: Repeated) -> tuple[str, list[str]]:
 
 
 def _answer(study: Study, repeated: Repeated, reason: str, advice: Sequence[str], wrist: str) -> Answer:
+    from wristctl.simulation.planes import why_two
+
     chosen, places = study.simulate, repeated.first.trajectory.tension.shape[1]
+    reason_for_two = why_two(study.wrist, asked_for_by(study))
+    why = f"{reason_for_two}; " if " out of " in reason_for_two else ""
     scenario = (
         f"{motion_words(chosen.reference, chosen.direction)} on {wrist or wrist_words(study.wrist)} in two planes "
-        f"({places} tendons, {loop_words(chosen.loop, study.wrist)})"
+        f"({why}{places} tendons, {loop_words(chosen.loop, study.wrist)})"
     )
     values = {name: figure_of(repeated, name) for name, *_ in _FIGURES}
     figures = [

@@ -111,7 +111,8 @@ def answer_of(
     more = "All tables: `.tables`."
     if run and motion is not None:
         notes += _next(f"{run}/{file_of(best)}", motion)
-        more = f"All tables: --all. The gains, each a file for simulate, compare and hw-run: {run}/{FOLDER}/"
+        takers = "simulate, compare and hw-run" if motion.on_a_rig else "simulate and compare"
+        more = f"All tables: --all. The gains, each a file for {takers}: {run}/{FOLDER}/"
     whole = Answer(_sentence(best, searches[best], errors[best], cases), _table(ordered, searches, errors), notes, more)
     if len(whole.lines()) <= LINES or len(ordered) == 1:
         return whole

@@ -18,6 +18,7 @@ from wristctl.commands.inputs_of_loops import (
     inverses_of,
     judged_loops,
     network_for,
+    planes_of_search,
 )
 from wristctl.commands.kept_studies import asked_for, file_of, hw_run_fits, keep_gains, rig_of, row_of
 from wristctl.commands.loop_warnings import (
@@ -37,7 +38,6 @@ from wristctl.config.families import Family
 from wristctl.config.loop import Reference
 from wristctl.config.study import Study
 from wristctl.config.tune import TuneSettings
-from wristctl.config.wrist import WristParameters
 from wristctl.errors import UserError, under
 
 if TYPE_CHECKING:
@@ -105,15 +105,13 @@ def plan(study: Study, inputs: Inputs) -> str:
     identified_study = identified(study, "tune", inputs)
     with under("tune"):
         truth_text = truth_told(identified_study.wrist, judged_loops(study, study.tune))
-        planned = planned_search(study.tune, study.families, identified_study.wrist, inputs)
+        planned = planned_search(identified_study, inputs)
     check_family_reach(identified_study, study.tune.worlds.family)
     return planned + truth_text
 
 
-def planned_search(
-    settings: TuneSettings, families: Mapping[str, Family], wrist: WristParameters, inputs: Inputs
-) -> str:
-    """Cost of a search. Raises UserError, naming the key, for a controller or a scenario that it cannot have.
+def planned_search(study: Study, inputs: Inputs) -> str:
+    """Cost of a study's search. Raises UserError, naming the key, for a controller or a scenario that it cannot have.
 
     That is an unknown controller, one without gains, a scenario on an unknown loop, an unknown family, or a network
     that none of the inputs is.
@@ -122,6 +120,7 @@ def planned_search(
     from wristctl.simulation.closed_loop import check_size
     from wristctl.tuning.search import check_loops, check_optimiser, check_tunable
 
+    settings, families = study.tune, study.families
     for number, name in enumerate(settings.controllers):
         try:
             check_tunable(controller(name))
@@ -135,9 +134,12 @@ def planned_search(
         family_of(families, settings.worlds.family, "worlds.family")
     else:
         check_loops(settings)
-        check_reach([scenario.reference for scenario in settings.scenarios], wrist, "scenarios.{}.reference")
+    planes = planes_of_search(study)
+    if not settings.worlds.family:
+        references = [scenario.reference for scenario in settings.scenarios]
+        check_reach(references, study.wrist, "scenarios.{}.reference", planes)
     asked = _size(settings, families)
-    check_size(asked)
+    check_size(asked, planes)
     check_inverses(inverses_of(_references(settings, families)), inputs)
     one = asked.rollouts // len(settings.controllers)
     return f"{one} rollouts of {asked.horizon:g} s for each of {', '.join(settings.controllers)}"
@@ -385,5 +387,6 @@ TUNE = sweepable(
         ),
         doubts=refuse_out_of_reach,
         size=size,
+        in_one_plane=lambda study: planes_of_search(study) == 1,
     )
 )
