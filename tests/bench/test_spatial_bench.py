@@ -251,8 +251,7 @@ def test_load_cells_show_the_pulls() -> None:
     ("settings", "key"),
     [
         ({"plant": {"model": "hinges"}}, "bench.plant.model"),
-        ({"plant": {"inner_friction": 0.1}}, "bench.plant.inner_friction"),
-        ({"actuator": {"slips_at": 1.0}}, "bench.actuator.slips_at"),
+        ({"actuator": {"slips_at": 1.0, "slipping_tendon": 6}}, "bench.actuator.slipping_tendon"),
         ({"actuator": {"broken_at": 1.0, "broken_tendon": 5}}, "bench.actuator.broken_tendon"),
     ],
 )

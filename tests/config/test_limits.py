@@ -90,7 +90,7 @@ EDGES = {
         {"markers_2": {"base": 2, "tip": 1}},
     ),
     "bench of two planes": Edge(
-        RigSettings, {"planes": 2, "real_time": False}, {"bench": {"plant": {"creep": 0.1}}}
+        RigSettings, {"planes": 2, "real_time": False}, {"bench": {"plant": {"model": "hinges"}}}
     ),
     "motors": Edge(RigSettings, {"actuator": {"level": "tendon"}}, {"actuator": {"level": "lagged"}}),
     "board ahead": Edge(

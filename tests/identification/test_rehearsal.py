@@ -130,9 +130,10 @@ OTHERS: dict[str, Any] = {
 }  # fmt: skip
 NOT_OF_TENDONS = {"lag", "torque", "top_speed", *TendonFacts.model_fields}
 """Of motors with a lag, of a motor that falls back, and what `facts` say."""
+OF_TWO_PLANES = "slack", "broken_tendon", "slipping_tendon"
 LEAVES = [
     *(f"plant.{name}" for name in TrueWrist.model_fields if not name.endswith("_spread")),
-    *(f"facts.{name}" for name in TendonFacts.model_fields if name not in ("slack", "broken_tendon")),  # of two planes
+    *(f"facts.{name}" for name in TendonFacts.model_fields if name not in OF_TWO_PLANES),
     *(f"actuator.{name}" for name in TrueActuator.model_fields.keys() - NOT_OF_TENDONS),
     *(each for each in ("delay", "noise_deg", "zero_deg", "taut", "frame_rate", "exposure", "dropped", "segments")),
 ]

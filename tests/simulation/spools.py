@@ -11,14 +11,14 @@ from wristctl.arrays import Array
 from wristctl.config.plant import Actuator, TendonFacts, TrueActuator, TrueWrist
 from wristctl.config.wrist import WristParameters
 from wristctl.lanes.lane import zero_like
-from wristctl.lanes.rows import part, rows_of
+from wristctl.lanes.rows import lanes_like, part, rows_of
 from wristctl.simulation.nonideal import inner_of, nonideal_of, spools_after_slip, unmoved
 from wristctl.wrist.compiled_model import terms
 from wristctl.wrist.dahl import inner_in_lanes
 from wristctl.wrist.pcc import PCC
 from wristctl.wrist.plant import advance_or_stop, kernel_of, parameters_of, travel
 from wristctl.wrist.segments import segments
-from wristctl.wrist.tendon_mechanics import RealTendons, pulls_along, read_nonideal, spool_pull
+from wristctl.wrist.tendon_mechanics import RealTendons, Z, pulls_along, read_nonideal, row_of, spool_pull
 from wristctl.wrist.tendons import TENDONS_PER_SIDE
 
 WRIST = WristParameters()
@@ -71,10 +71,11 @@ def _spooled(
     tendons = RealTendons(stiffness + zero, read_nonideal(rows_of(values)), rows_of(memory), inner_in_lanes(inner))
     q, rate = part(rows_of(state), 0, cut), part(rows_of(state), n, cut)
     alive, before = 1.0 + zero, (reeled[0, 0] + zero, reeled[0, 1] + zero)
+    given = lanes_like(part(rows_of(values), 0, (0, 0)))
     for k in range(reeled.shape[0]):
         path, turned = travel(segment, q), (reeled[k, 0] + zero, reeled[k, 1] + zero)
         speeds = (turned[0] - before[0]) / h, (turned[1] - before[1]) / h
-        given = spools_after_slip(tendons, turned, speeds, k * h + zero, path)
+        spools_after_slip(tendons, turned, speeds, k * h + zero, path, given)
         before = turned
         row = rows_of(out[k])
         row[4] = spool_pull(tendons, given[0], 0, path[0])
@@ -84,7 +85,7 @@ def _spooled(
         for i in range(n):
             row[0] = row[0] + q[i]
             row[1] = row[1] + rate[i]
-        row[2], row[3], row[8], row[9] = path[0], path[1], given[0], rows_of(memory)[3]
+        row[2], row[3], row[8], row[9] = path[0], path[1], given[0], rows_of(memory)[row_of(0, Z)]
         alive, _ = advance_or_stop(segment, q, rate, given, tendons, h + zero, alive)
 
 

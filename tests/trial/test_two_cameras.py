@@ -177,7 +177,6 @@ def test_a_camera_may_be_given_by_its_number() -> None:
     [
         ({"real_time": True}, "real time"),
         ({"bench": {"plant": {"model": "hinges"}}}, "no bench in two planes has bench.plant.model"),
-        ({"bench": {"actuator": {"creep": 0.1}}}, "no bench in two planes has bench.actuator.creep"),
         ({"markers_2": {"base": 1, "tip": 2}}, "different ids"),
     ],
 )

@@ -15,16 +15,16 @@ from wristctl.config.wrist import WristParameters
 from wristctl.errors import UserError
 from wristctl.seeds import Entropy
 from wristctl.simulation.disturbances import acting, acting_in_space
-from wristctl.simulation.nonideal import inner_of, nonideal_of, of_tendons, unmoved
+from wristctl.simulation.nonideal import faults_of, inner_of, nonideal_of, of_tendons, unmoved
 from wristctl.simulation.worlds import drawn, facing, plant_of
 from wristctl.wrist.dahl import NoInnerFriction
 from wristctl.wrist.directions import ACTIVE, DIRECTIONS, away_of, tendons_of
 from wristctl.wrist.out_of_plane import across_of
 from wristctl.wrist.plant import kernel_of
+from wristctl.wrist.spatial.pcc_in_space import PCC_IN_SPACE, placed_values
 from wristctl.wrist.spatial.spatial_kinematics import tip_bends
-from wristctl.wrist.spatial.spatial_segments import OF_A_TENDON, spatial_values
-from wristctl.wrist.spatial.spooled_tendons import OF_A_STATE
 from wristctl.wrist.tendon_layout import TendonLayout
+from wristctl.wrist.tendon_mechanics import X
 
 
 class Load(Protocol):
@@ -129,7 +129,7 @@ class PlanarLoad:
         tendon_states = of_tendons(self._tendons, AXES)[np.argsort(self._axes)][axes]
         path = np.append(plant.length - self._model.taut(plant, coordinates), np.abs(coordinates).sum())
         self._tendons = unmoved(spools.reeled[axes], path, np.zeros(AXES), coordinates)
-        of_tendons(self._tendons, AXES)[:] = tendon_states
+        of_tendons(self._tendons, AXES)[:, :X] = tendon_states[:, :X]
         self._inner = inner_of([self._drawn], coordinates[None], np.array([bristle]), lambda rows: rows[0])
         self._axes = axes
 
@@ -149,30 +149,25 @@ class SpatialLoad:
         self, settings: BenchSettings, wrist: WristParameters, stream: Entropy, spools: SpoolState, substeps: int = 1
     ) -> None:
         check_in_space(settings)
-        plant, actuator = plant_of(wrist, drawn(settings.plant, stream)), settings.actuator
-        n = settings.segments
+        own, motors = drawn(settings.plant, stream), settings.actuator
+        plant, n, alike = plant_of(wrist, own), settings.segments, np.ones(AXES)
         self.coordinates = 2 * n
-        layout = TendonLayout.four(plant.tendon_radius)
-        broken_at = np.full(AXES, np.inf)
-        if actuator.broken_at is not None:
-            broken_at[actuator.broken_tendon - 1] = actuator.broken_at
-        from wristctl.bench.spatial_motors import SpatialHanging
+        at_rest = np.zeros(self.coordinates)
+        from wristctl.bench.spatial_motors import SpatialHanging, follow_in_space
 
+        self._follow = kernel_of(follow_in_space, PCC_IN_SPACE)
         self._hanging = SpatialHanging(
-            values=spatial_values(plant, layout, n, axis=np.radians(plant.stiffness_axis_deg)),
-            stiffness=actuator.tendon_stiffness,
-            friction=actuator.friction,
-            sheath=actuator.sheath,
-            slope=1.0 / actuator.presliding,
-            backlash=actuator.backlash,
-            broken_at=broken_at,
-            rubbed=np.zeros(OF_A_STATE * AXES),
-            play=spools.reeled.copy(),
-            left=np.ones(AXES),
+            model=PCC_IN_SPACE,
+            values=placed_values(plant, TendonLayout.four(plant.tendon_radius), n),
+            stiffness=motors.tendon_stiffness,
+            stiffnesses=motors.tendon_stiffness * alike,
+            nonideal=np.array(nonideal_of(own, motors, motors, PERIOD / substeps)),
+            faults=faults_of(motors, motors, alike).ravel(),
+            tendons=unmoved(spools.reeled, np.zeros(2 * AXES), np.zeros(AXES), at_rest),
+            inner=inner_of([own], at_rest[None], np.zeros(1), lambda rows: rows[0], 2),
             motor=None,
             substeps=substeps,
             coordinates=(0,) * self.coordinates,
-            of_tendons=(0,) * (OF_A_TENDON * AXES),
             pulls=(0,) * AXES,
         )
         self._state = np.zeros(2 * self.coordinates)
@@ -185,13 +180,11 @@ class SpatialLoad:
         begun: float, out: Array,
     ) -> int:  # fmt: skip
         """As `Load.follow`."""
-        from wristctl.bench.spatial_motors import follow_in_space
-
         disturbed = acting_in_space(*acting)
         if disturbed is None:
             disturbed = np.tile((0.0, 0.0, 0.0, 1.0), (len(out), 1))
         hanging = self._hanging._replace(motor=stepper)
-        heard: int = follow_in_space(hanging, spools, self._state, disturbed, edges, first, begun, out)
+        heard: int = self._follow(hanging, spools, self._state, disturbed, edges, first, begun, out)
         return heard
 
     def bend(self, coordinates: Array) -> Array:
@@ -207,6 +200,10 @@ def check_in_space(settings: BenchSettings) -> None:
     """UserError for what a bench has in one plane and not in two."""
     if beyond := settings.in_one_plane_only:
         raise UserError(f"no bench in two planes has {beyond[0]}", beyond[0], "leave it at its default")
-    if settings.actuator.broken_tendon > AXES:
-        problem = f"tendon {settings.actuator.broken_tendon} of {AXES} cannot break"
-        raise UserError(problem, "bench.actuator.broken_tendon", f"1 to {AXES}")
+    motors = settings.actuator
+    for key, tendon, verb in (
+        ("broken_tendon", motors.broken_tendon, "break"),
+        ("slipping_tendon", motors.slipping_tendon, "slip"),
+    ):
+        if tendon > AXES:
+            raise UserError(f"tendon {tendon} of {AXES} cannot {verb}", f"bench.actuator.{key}", f"1 to {AXES}")

@@ -5,7 +5,7 @@ from typing import Literal, Self
 from pydantic import model_validator
 
 from wristctl.config.camera import SceneSettings
-from wristctl.config.plant import Actuator, TendonFacts, TrueWrist, in_one_plane_only
+from wristctl.config.plant import Actuator, TendonFacts, TrueWrist
 from wristctl.config.section import Section, choice, quantity
 
 # Every kind of fault that can be injected: controller-exception, model-nan and disk-full are the control loop's, the
@@ -207,5 +207,4 @@ class BenchSettings(Section):
     def in_one_plane_only(self) -> list[str]:
         """Keys that are set, of what a bench in two planes has not."""
         of_arcs = [name for name in ("model", "taper") if getattr(self.plant, name) != getattr(TrueWrist(), name)]
-        keys = of_arcs + in_one_plane_only(self.plant, self.actuator)
-        return [f"bench.{key}" if key.startswith("actuator.") else f"bench.plant.{key}" for key in keys]
+        return [f"bench.plant.{key}" for key in of_arcs]

@@ -318,11 +318,10 @@ class HwRunSettings(RigSettings):
         wrist = {name: getattr(self.bench.plant, name) for name in TrueWrist.model_fields}
         camera = self.sensor.model_copy(update={n: getattr(self.bench.camera, n) for n in ("delay_frames", "dropped")})
         motors = TrueActuator.between(self.actuator, self.bench.actuator)
-        # a loop in two planes has motors that do not slip
         holding = {"torque": self.bench.motors.holding_torque, "top_speed": self.bench.motors.top_speed}
         return Plant(
             **wrist,
-            actuator=motors if self.planes == 2 else motors.model_copy(update=holding),
+            actuator=motors.model_copy(update=holding),
             sensor=TrueSensor.between(self.sensor, camera),
         )
 

@@ -110,12 +110,17 @@ class TendonFacts(Section):
     backlash: float = fact(0.0, "m", "dead band between motor and tendon; homing leaves it where it reels in", ge=0)
     creep: float = fact(0.0, "", "share of a tendon's stiffness that relaxes (one Maxwell branch)", ge=0, lt=1)
     creep_time: float = fact(10.0, "s", "time constant of that", gt=0)
-    broken_at: float | None = fact(None, "s", "when one of the + side's two tendons breaks; null: never", ge=0)
-    broken_tendon: int = fact(1, "", "which of the tendons' places breaks, of a wrist in two planes", ge=1)
+    broken_at: float | None = fact(
+        None, "s", "when one of the + side's two tendons breaks, in two planes one of a place's; null: never", ge=0
+    )
+    broken_tendon: int = fact(1, "", "at which place a tendon breaks, of a wrist in two planes", ge=1)
     slack: tuple[float, ...] = fact(
         (), "m", "slack that homing left in each place's tendons, in two planes", strict=False
     )
-    slips_at: float | None = fact(None, "s", "when the + side's tendons slip on their spool; null: never", ge=0)
+    slips_at: float | None = fact(
+        None, "s", "when the + side's tendons slip on their spool, in two planes a place's; null: never", ge=0
+    )
+    slipping_tendon: int = fact(1, "", "at which place tendons slip, of a wrist in two planes", ge=1)
     slip: float = fact(1e-3, "m", "by how much", gt=0)
 
 
@@ -175,25 +180,11 @@ class TrueWrist(Overrides):
     creep_time: float = fact(10.0, "s", "time constant of that", gt=0)
     inner_friction: float = fact(0.0, "N m", "torque of friction on the bend itself, inside the wrist", ge=0)
     inner_presliding_deg: float = fact(0.5, "deg", "bend in which that turns round", gt=0)
-    end_stop_deg: float | None = fact(None, "deg", "bending angle at which the wrist meets its end stops", gt=0, le=180)
+    end_stop_deg: float | None = fact(
+        None, "deg", "bend at which the wrist meets its end stops, in two planes in any direction", gt=0, le=180
+    )
     end_stop_stiffness: float = fact(20.0, "N m/rad", "of the whole wrist's end stops", gt=0)
     end_stop_dissipation: float = fact(1.0, "s/rad", "Hunt and Crossley's: share of that per rate of impact", ge=0)
-
-
-# Facts of a wrist and of its tendons that there are in one plane only.
-WRIST_IN_ONE_PLANE = ("creep", "inner_friction", "end_stop_deg")
-TENDONS_IN_ONE_PLANE = ("creep", "slips_at", "torque", "top_speed")
-
-
-def in_one_plane_only(wrist: TrueWrist, tendons: TendonFacts) -> list[str]:
-    """Keys of such facts that are not at their defaults."""
-    facts = wrist, TrueWrist(), tendons, TendonFacts()
-    of_wrist = [name for name in WRIST_IN_ONE_PLANE if getattr(facts[0], name) != getattr(facts[1], name)]
-    return of_wrist + [
-        f"actuator.{name}"
-        for name in TENDONS_IN_ONE_PLANE
-        if getattr(facts[2], name, None) != getattr(facts[3], name, None)
-    ]
 
 
 class Plant(TrueWrist):

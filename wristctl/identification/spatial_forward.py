@@ -9,31 +9,24 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from wristctl.arrays import Array
-from wristctl.config.plant import Actuator
+from wristctl.config.plant import Actuator, TendonFacts, TrueWrist
 from wristctl.config.wrist import WristParameters
 from wristctl.lanes.blocks import to_blocks, to_rows
-from wristctl.lanes.compiled import kernel
-from wristctl.lanes.functions import maximum
-from wristctl.lanes.lane import where, zero_like
-from wristctl.lanes.rows import lanes_like, part, rows_of
+from wristctl.lanes.lane import zero_like
+from wristctl.lanes.rows import beyond, lanes_like, part, rows_of
+from wristctl.simulation.nonideal import faults_of, nonideal_of, unmoved
+from wristctl.wrist.dahl import NoInnerFriction
+from wristctl.wrist.plant import advance_or_stop, kernel_of, parameters_of, path_before
+from wristctl.wrist.spatial.pcc_in_space import PCC_IN_SPACE
 from wristctl.wrist.spatial.posture import tip_bend
-from wristctl.wrist.spatial.spatial_segments import (
-    FIELDS,
-    OF_A_TENDON,
-    SpatialWrist,
-    load_spatial_segments,
-    rows_of_tendons,
-    spatial_values,
-)
-from wristctl.wrist.spatial.spatial_step import spatial_step
-from wristctl.wrist.spatial.spatial_tendons import lengths_along
-from wristctl.wrist.spatial.spooled_tendons import OF_A_STATE, RubbingTendons, remember_travel, travel_of
+from wristctl.wrist.spatial.spatial_segments import FIELDS, OF_A_TENDON, rows_of_tendons, spatial_values
+from wristctl.wrist.spatial.spooled_tendons import RealPlaces, read_faults
 from wristctl.wrist.tendon_layout import TendonLayout
+from wristctl.wrist.tendon_mechanics import Nonideal, read_nonideal, shortening, spool_pull
 
 SETTLE = 0.5
 """Time [s] that a wrist is given to come to rest on its first spool positions."""
-# Bend of a segment [rad] beyond which a candidate stays where it was.
-_MOST = 3.1
+_NONIDEAL = len(Nonideal._fields)
 
 
 class SupposedBends(NamedTuple):
@@ -48,48 +41,35 @@ class SupposedBends(NamedTuple):
 
 
 class _Shapes(NamedTuple):
-    """Tuples with an entry, of no meaning, for each coordinate, each value and each state of tendons, each tendon."""
+    """Tuples with an entry, of no meaning, for each coordinate and each tendon."""
 
     cut: Any
-    of_tendons: Any
-    of_states: Any
     of_pulls: Any
 
 
-@kernel
-def _follow(values: Any, state: Any, reeled: Any, h: float, settle: int, out: Any, shapes: Any) -> None:
+def _follow(model: Any, values: Any, state: Any, reeled: Any, h: float, settle: int, out: Any, shapes: Any) -> None:
     rows, states = rows_of(values), rows_of(state)
-    m, tendons = len(shapes.cut), len(shapes.of_pulls)
-    wrist = SpatialWrist(load_spatial_segments(rows), part(rows, FIELDS, shapes.of_tendons))
-    first = FIELDS + len(shapes.of_tendons)
-    taut, stiffness = part(rows, first, shapes.of_pulls), part(rows, first + tendons, shapes.of_pulls)
-    last = first + 2 * tendons
-    memory = part(states, 2 * m, shapes.of_states)
-    rubbing = RubbingTendons(stiffness, rows[last], rows[last + 1], rows[last + 2], memory)
-    q, rate = part(states, 0, shapes.cut), part(states, m, shapes.cut)
-    spools, lengths, before = lanes_like(taut), lanes_like(taut), lanes_like(q)
-    zero = zero_like(wrist.segment.length)
+    m, count = len(shapes.cut), len(shapes.of_pulls)
+    wrist, first = parameters_of(model, rows, shapes.of_pulls), FIELDS + OF_A_TENDON * count
+    taut, stiffness = part(rows, first, shapes.of_pulls), part(rows, first + count, shapes.of_pulls)
+    nonideal = beyond(rows, first + 2 * count)
+    tendons = RealPlaces(
+        stiffness, read_nonideal(nonideal), read_faults(beyond(nonideal, _NONIDEAL), shapes.of_pulls),
+        beyond(states, 2 * m), NoInnerFriction(), shapes.of_pulls,
+    )  # fmt: skip
+    q, rate, spools = part(states, 0, shapes.cut), part(states, m, shapes.cut), lanes_like(taut)
+    zero = zero_like(taut[0])
     alive = 1.0 + zero
     for k in range(-settle, reeled.shape[0]):
         now = max(k, 0)
-        for t in range(tendons):
+        for t in range(count):
             spools[t] = reeled[now, t] + taut[t]
         if k >= 0:
-            row = rows_of(out[k])
+            row, path = rows_of(out[k]), path_before(tendons, wrist, q)
             row[0], row[1], _, _, _ = tip_bend(wrist.segment, q, rate)
-            lengths_along(wrist, q, lengths)
-            for t in range(tendons):
-                row[2 + t] = stiffness[t] * maximum(0.0, spools[t] - travel_of(wrist, t, lengths[t]))
-        for i in range(m):
-            before[i] = q[i]
-        spatial_step(wrist, q, rate, spools, rubbing, h + zero)
-        for i in range(m // 2):
-            size = q[2 * i] * q[2 * i] + q[2 * i + 1] * q[2 * i + 1]
-            alive = where(size < _MOST * _MOST, alive, zero)
-        for i in range(m):
-            q[i] = where(alive > 0.0, q[i], before[i])
-            rate[i] = where(alive > 0.0, rate[i], zero)
-        remember_travel(rubbing, wrist, q)
+            for t in range(count):
+                row[2 + t] = spool_pull(tendons, spools[t], t, shortening(path, t))
+        alive, _ = advance_or_stop(wrist, q, rate, spools, tendons, h + zero, alive)
 
 
 def courses_of_bends(candidates: Sequence[SupposedBends], reeled: Array, h: float, n: int) -> Array:
@@ -102,22 +82,26 @@ def courses_of_bends(candidates: Sequence[SupposedBends], reeled: Array, h: floa
         (T, M) [m], held over each step; at first the wrist is at rest
     """
     tendons, coordinates, count = reeled.shape[1], 2 * n, len(candidates)
-    of_tendons, of_states = (0,) * (OF_A_TENDON * tendons), (0,) * (OF_A_STATE * tendons)
-    shapes = _Shapes((0,) * coordinates, of_tendons, of_states, (0,) * tendons)
-    rows = np.array([_values(candidate, n) for candidate in candidates])
+    shapes, follow = _Shapes((0,) * coordinates, (0,) * tendons), kernel_of(_follow, PCC_IN_SPACE)
+    rows = np.array([_values(candidate, n, h) for candidate in candidates])
     blocks = to_blocks(np.repeat(rows, 2, axis=0) if count == 1 else rows)  # one width is compiled
     spools = np.ascontiguousarray(reeled, float)
     out = np.empty((len(blocks), len(spools), 2 + tendons, blocks.shape[2]))
+    at_rest = unmoved(np.zeros(tendons), np.zeros(2 * tendons), np.zeros(tendons), np.zeros(coordinates))
+    begin = np.append(np.zeros(2 * coordinates), at_rest)
     for values, course in zip(blocks, out, strict=True):
-        state = np.zeros((2 * coordinates + len(of_states), blocks.shape[2]))
-        _follow(values, state, spools, h, round(SETTLE / h), course, shapes)
+        state = np.repeat(begin[:, None], blocks.shape[2], axis=1)
+        follow(PCC_IN_SPACE, values, state, spools, h, round(SETTLE / h), course, shapes)
     flat = to_rows(out.reshape(len(out), -1, blocks.shape[2]), count)
     return flat.reshape(count, len(spools), 2 + tendons)
 
 
-def _values(supposed: SupposedBends, n: int) -> Array:
-    wrist, tendons, count = supposed.wrist, supposed.tendons, len(supposed.places)
+def _values(supposed: SupposedBends, n: int, h: float) -> Array:
+    wrist, count = supposed.wrist, len(supposed.places)
     own = spatial_values(wrist, TendonLayout.four(wrist.tendon_radius), n, axis=np.radians(wrist.stiffness_axis_deg))
-    friction = [tendons.friction, tendons.sheath, 1.0 / tendons.presliding]
-    stiffness = np.full(count, tendons.tendon_stiffness)
-    return np.concatenate([own[:FIELDS], rows_of_tendons(supposed.places, n), supposed.taut, stiffness, friction])
+    tendons, facts = supposed.tendons.model_copy(update={"level": "tendon"}), TendonFacts()
+    stiffness, faults = np.full(count, tendons.tendon_stiffness), faults_of(tendons, facts, np.ones(count))
+    nonideal = nonideal_of(TrueWrist(), tendons, facts, h)
+    return np.concatenate(
+        [own[:FIELDS], rows_of_tendons(supposed.places, n), supposed.taut, stiffness, nonideal, faults.ravel()]
+    )

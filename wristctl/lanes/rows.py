@@ -214,3 +214,17 @@ def planes_like(typingctx: Any, rows: RowsType) -> Any:
 def square_like(typingctx: Any, rows: RowsType) -> Any:
     """A scratch matrix of lanes, uninitialised, with a row and a column for each of `rows`."""
     return scratch_rows(RowsType(LaneType(rows.element.width), rows.size, columns=rows.size or 1), rows)
+
+
+@intrinsic
+def entries(typingctx: Any, rows: RowsType) -> Any:
+    """The rows' lanes as a tuple; how many they are is part of their type."""
+
+    assert rows.size is not None
+    size = rows.size
+
+    def codegen(context: Any, builder: Any, sig: Any, args: list[Any]) -> Any:
+        numbers = [context.get_constant(types.intp, number) for number in range(size)]
+        return context.make_tuple(builder, sig.return_type, [load_row(builder, rows, args[0], n) for n in numbers])
+
+    return signature(types.UniTuple(rows.element, size), rows), codegen

@@ -122,12 +122,23 @@ def spaces_like(typingctx: Any, rows: RowsType) -> Any:
     return scratch_rows(RowsType(SpaceType(rows.element.width), rows.size), rows)
 
 
-@intrinsic
-def first_half(typingctx: Any, rows: RowsType) -> Any:
-    """The first half of the rows: one for each segment, of rows of two coordinates a segment."""
+def _first(rows: RowsType, parts: int) -> Any:
+    """Signature and lowering of a view of the first rows of so many equal parts."""
 
     def codegen(context: Any, builder: Any, sig: Any, args: list[Any]) -> Any:
         return args[0]
 
-    assert rows.size is not None and rows.size % 2 == 0
-    return signature(RowsType(rows.element, rows.size // 2), rows), codegen
+    assert rows.size is not None and rows.size % parts == 0
+    return signature(RowsType(rows.element, rows.size // parts), rows), codegen
+
+
+@intrinsic
+def first_half(typingctx: Any, rows: RowsType) -> Any:
+    """The first half of the rows: one for each segment, of rows of two coordinates a segment."""
+    return _first(rows, 2)
+
+
+@intrinsic
+def first_third(typingctx: Any, rows: RowsType) -> Any:
+    """The first third of the rows: one for each tendon, of rows of three values a tendon."""
+    return _first(rows, 3)

@@ -24,19 +24,19 @@ from wristctl.simulation.cameras import cameras_of
 from wristctl.simulation.disturbances import acting_in_space
 from wristctl.simulation.kernel import Disturbed, LoopCourse, LoopState, LoopValues, Scratch, Setup, Undisturbed
 from wristctl.simulation.motion import DERIVATIVES, Motion
-from wristctl.simulation.nonideal import inner_of, is_ideal, nonideal_of, unmoved
+from wristctl.simulation.nonideal import faults_of, inner_of, is_ideal, nonideal_of, unmoved
 from wristctl.simulation.sums import no_sums
 from wristctl.simulation.worlds import World, bending_limit, check_stops
 from wristctl.wrist.dahl import NoInnerFriction
 from wristctl.wrist.directions import in_plane
-from wristctl.wrist.plant import PlantModel
+from wristctl.wrist.plant import PlantModel, path_at
 from wristctl.wrist.segments import segments
 from wristctl.wrist.spatial.pcc_in_space import PCC_IN_SPACE
+from wristctl.wrist.spatial.spatial_kinematics import tip_bends
 from wristctl.wrist.spatial.spatial_segments import OF_A_TENDON
-from wristctl.wrist.spatial.spooled_tendons import OF_A_STATE, ElasticPlaces, HeldPlaces, RubbingPlaces
+from wristctl.wrist.spatial.spooled_tendons import ElasticPlaces, PulledPlaces, RealPlaces
 from wristctl.wrist.tendon_layout import TendonLayout
 from wristctl.wrist.tendon_mechanics import ElasticTendons, NoTendons, PulledTendons, RealTendons
-from wristctl.wrist.tendons import TENDONS_PER_SIDE
 
 # Pull [N] in two planes for tensions without a limit: no wrist's wants are as large.
 _NO_LIMIT = 1e6
@@ -132,13 +132,25 @@ class _Worlds:
         slack = np.zeros(len(self.alike)) if self.layout is None else _slack(facts, len(self.alike))
         return np.array([winding.scale, *(winding.offset - slack)])
 
-    def motors(self, index: int, taut: Array) -> Array:
-        """State of the motors at rest where tendons that are just taut are so long [m] (T,)."""
+    def path(self, model: PlantModel, index: int, at: Array) -> Array:
+        """Path of the tendons of a wrist at rest at coordinates (q,), as `travel` of the plant has it.
+
+        That compiles code; of tendons that are not wound it is of no use, and 0.
+        """
+        wrist, places = self.actual[index], len(self.alike)
+        if self.level != "tendon":
+            return np.zeros(3 if self.layout is None else 2 * places)
+        if self.layout is None:
+            return np.append(wrist.length - model.taut(wrist, at), np.abs(at).sum())
+        return path_at(model, model.values(wrist, self.loop.plant_segments), at, places)
+
+    def motors(self, index: int, travel: Array) -> Array:
+        """State of the motors at rest where the tendons' paths are so much shorter than on the straight wrist (T,)."""
         wrist = self.actual[index]
         drive = drive_with(self.level, self.counted[index], self.stiffness(index))
         pulls = self.alike * wrist.pretension
         planes = 1 if self.layout is None else 2
-        return at_rest(drive, pulls, wrist.length, taut, self.windings[index].scale, planes)
+        return at_rest(drive, pulls, wrist.length, wrist.length - travel, self.windings[index].scale, planes)
 
 
 def batch(
@@ -161,31 +173,22 @@ def batch(
     references = np.empty((len(motions), DERIVATIVES * model.planes, len(motions[0].time)))
     for target, followed_motion in zip(references, motions, strict=True):
         followed_motion.angles.into(target)
-    if layout is None:
-        check_stops(worlds, references[:, 0])
+    check_stops(worlds, np.linalg.norm(references[:, ::DERIVATIVES], axis=1))
     of = _Worlds(worlds, body[lanes.world], layout)
     loop, count, planes, places = of.loop, len(gains), model.planes, len(of.alike)
     k = model.coordinates(loop.plant_segments)
     ticks, samples = max(1, round(sample_period(of.period) / of.period)), references.shape[2]
     followed, blocks, wide = lanes_of(count), of.blocks, of.wide
     coordinates = np.zeros((len(worlds), k)) if start is None else np.array([start(wrist) for wrist in of.actual])
-
-    def taut(index: int) -> Array:
-        """Lengths (T,) of taut tendons at first [m], which compiles code: of those that are wound alone."""
-        wrist = of.actual[index]
-        return model.taut(wrist, coordinates[index]) if layout is None else np.full(places, wrist.length)
-
-    wound, nothing = of.level == "tendon", np.zeros(places)
-    motors = [of.motors(index, taut(index) if wound else nothing) for index in range(len(worlds))]
-    counts = [state[: 2 * places : 2] for state in motors]
-    starts = np.zeros(len(filmed)) if layout is not None else model.angle(coordinates[body])
-    watch, frames = cameras_of(filmed, lanes.world, lanes.streams, motions[0].horizon, starts, layout)
+    paths = [of.path(model, index, at) for index, at in enumerate(coordinates)]
+    motors = [of.motors(index, path[:places]) for index, path in enumerate(paths)]
+    tendons = _tendons(of, coordinates, paths, [state[: 2 * places : 2] for state in motors])
+    starts = model.angle(coordinates)[:, None] if layout is None else tip_bends(coordinates)
+    watch, frames = cameras_of(filmed, lanes.world, lanes.streams, motions[0].horizon, starts[body], layout)
     belief: Sides | Places
     if layout is None:
-        tendons: object = _sides(of, coordinates, taut, counts)
         belief = Sides(of.rows(lambda index: segments(of.worlds[index].wrist, 1))[:, None], of.rows(lambda _: of.alike))
     else:
-        tendons = _places(of, layout, counts)
         belief = _beliefs_in_space(of)
     ends = references[:, ::DERIVATIVES, -1]
     goals = [followed_motion.goals_at(end) for followed_motion, end in zip(motions, ends, strict=True)]
@@ -233,57 +236,45 @@ def _bodies(worlds: Sequence[World]) -> tuple[list[World], Indices]:
     return [world for _, world in bodies.values()], np.array(which)
 
 
-def _sides(
-    of: _Worlds, coordinates: Array, taut: Callable[[int], Array], counts: Sequence[Array]
-) -> NoTendons | PulledTendons | ElasticTendons | RealTendons:
-    """Tendons of the + and the - side in one plane."""
-    plants = [world.loop.plant for world in of.worlds]
+def _tendons(of: _Worlds, coordinates: Array, paths: Sequence[Array], counts: Sequence[Array]) -> object:
+    """Tendons between the motors, which have counted so much, and wrists at rest at coordinates with these `paths`."""
+    plants, planes = [world.loop.plant for world in of.worlds], 1 if of.layout is None else 2
+    facts = [plant.actuator for plant in plants]
     nonideals = [
-        nonideal_of(plant, actuator, plant.actuator, of.period / of.loop.steps)
-        for plant, actuator in zip(plants, of.actuators, strict=True)
+        nonideal_of(*known, of.period / of.loop.steps) for known in zip(plants, of.actuators, facts, strict=True)
     ]
     inner = inner_of(
         plants,
         coordinates,
         np.zeros(len(plants)),
         lambda rows: spread(np.ascontiguousarray(rows[of.which]), of.count),
+        planes,
     )
-    stiffness = of.rows(lambda index: np.array([TENDONS_PER_SIDE * motor_of(of.actuators[index]).stiffness]))
+    elastic, pulls = of.level == "tendon", (0,) * len(of.alike)
+
+    def stiffness_of(index: int) -> Array:
+        alike = of.alike[:1] if of.layout is None else of.alike
+        stiffness: Array = alike * motor_of(of.actuators[index]).stiffness
+        return stiffness
+
+    stiffness = of.rows(stiffness_of)
     if all(map(is_ideal, nonideals)) and isinstance(inner, NoInnerFriction):
-        return ElasticTendons(stiffness) if of.level == "tendon" else NoTendons()
+        if not elastic:
+            return NoTendons()
+        return ElasticTendons(stiffness) if of.layout is None else ElasticPlaces(stiffness, pulls)
 
     def resting(index: int) -> Array:
-        winding, q = of.windings[index], coordinates[index]
-        reeled, short = winding.scale * counts[index] + winding.offset, of.actual[index].length - taut(index)
-        return unmoved(reeled, np.append(short, np.abs(q).sum()), reeled - short, q)
+        winding, path = of.offsets(index), paths[index]
+        reeled = winding[0] * counts[index] + winding[1:]
+        return unmoved(reeled, path, np.maximum(reeled - path[: len(reeled)], 0.0), coordinates[index])
 
     nonideal, state = of.rows(lambda index: np.array(nonideals[index])), of.of_each(resting)
-    return (
-        RealTendons(stiffness, nonideal, state, inner)
-        if of.level == "tendon"
-        else PulledTendons(nonideal, state, inner)
-    )
-
-
-def _places(of: _Worlds, layout: TendonLayout, counts: Sequence[Array]) -> HeldPlaces | ElasticPlaces | RubbingPlaces:
-    """Tendons at the places of a layout."""
-    places, facts = len(of.alike), [world.loop.plant.actuator for world in of.worlds]
-    pulls, broken_at = (0,) * places, of.rows(lambda index: _broken_at(facts[index], places))
-    if of.level != "tendon":
-        return HeldPlaces(broken_at, spread(np.zeros(places), of.count), pulls)
-    whole = of.rows(lambda index: of.alike * motor_of(of.actuators[index]).stiffness)
-    backlash = of.rows(lambda index: np.array([facts[index].backlash]))
-    reeled = of.of_each(lambda index: of.offsets(index)[0] * counts[index] + of.offsets(index)[1:])
-    stiffness = spread(np.zeros(places), of.count)
-    if not any(actuator.friction for actuator in of.actuators):
-        return ElasticPlaces(whole, broken_at, backlash, stiffness, reeled, pulls)
-    friction = of.rows(
-        lambda index: np.array([
-            of.actuators[index].friction, of.actuators[index].sheath, 1.0 / of.actuators[index].presliding,
-        ])
-    )  # fmt: skip
-    state, travel = spread(np.zeros(OF_A_STATE * places), of.count), spread(np.zeros(places), of.count)
-    return RubbingPlaces(whole, broken_at, backlash, stiffness, reeled, friction, 0, 0, state, travel, pulls)
+    if of.layout is None:
+        return RealTendons(stiffness, nonideal, state, inner) if elastic else PulledTendons(nonideal, state, inner)
+    faults = of.rows(lambda index: faults_of(of.actuators[index], facts[index], of.alike).ravel())
+    if elastic:
+        return RealPlaces(stiffness, nonideal, faults, state, inner, pulls)
+    return PulledPlaces(nonideal, faults, state, inner, pulls)
 
 
 def _beliefs_in_space(of: _Worlds) -> Places:
@@ -308,16 +299,6 @@ def _slack(facts: TendonFacts, places: int) -> Array:
         raise UserError(what, "loop.plant.actuator.slack", f"at most {places} values")
     slack[: len(facts.slack)] = facts.slack
     return slack
-
-
-def _broken_at(facts: TendonFacts, places: int) -> Array:
-    times = np.full(places, np.inf)
-    if facts.broken_at is not None:
-        if facts.broken_tendon > places:
-            what = f"tendon {facts.broken_tendon} of {places} cannot break"
-            raise UserError(what, "loop.plant.actuator.broken_tendon", f"1 to {places}")
-        times[facts.broken_tendon - 1] = facts.broken_at
-    return times
 
 
 def _acting(settings: Disturbances, time: Array, planes: int, force: Array | None) -> Array | None:

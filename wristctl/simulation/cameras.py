@@ -27,8 +27,8 @@ def cameras_of(
 ) -> tuple[Watch, Schedule] | tuple[NoCamera, NoCamera]:
     """Cameras with their observers by block, of rollouts in these worlds (count,), each with its stream of noise.
 
-    `begin` is the bend at which each world's wrist rests at first (worlds,) [rad], in two planes straight; `layout` has
-    the places of tendons in two planes.
+    `begin` is the bend at which each world's wrist rests at first (worlds, P) [rad]; `layout` has the places of tendons
+    in two planes.
     """
     loop, count, planes = worlds[0].loop, len(which), 1 if layout is None else 2
     if loop.sensor.level == "ideal":
@@ -56,7 +56,7 @@ def cameras_of(
         axis=1,
     )
     start = np.zeros((len(worlds), OF_A_PLANE * planes))
-    start[:, 0] = begin
+    start[:, ::OF_A_PLANE] = begin
     now, places = spread(start[which], count), len(SIDES) if layout is None else len(layout.places)
     observer = Observer(
         gain=spread(gains[which], count),

@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wristctl.arrays import Array
-from wristctl.config.choices import PLANTS
 from wristctl.config.loop import DirectionName, Loop, Reference, sample_period
 from wristctl.config.study import Study
 from wristctl.config.wrist import WristParameters
@@ -151,9 +150,9 @@ def scenario_of(reference: Reference, direction: DirectionName) -> str:
     return f"{reference_name(reference.in_metres(_LENGTH))}, {direction}"
 
 
-def equilibrium(loop: Loop) -> Start:
-    """Equilibrium at which a plant of this loop rests at pretension."""
-    model, n = PLANTS[loop.plant.model], loop.plant_segments
+def equilibrium(loop: Loop, planes: int = 1) -> Start:
+    """Equilibrium at which a plant of this loop in so many planes rests at pretension."""
+    model, n = plant_in(planes, loop), loop.plant_segments
     return lambda plant: model.rest(plant, n, (plant.pretension, plant.pretension))
 
 
@@ -168,8 +167,6 @@ def asked_of(study: Study, period: float, network: Inverse | None = None) -> tup
         wrist, loop = loop_facing(wrist, loop, chosen.direction)
     else:
         check_two_planes([World(loop, wrist)])
-        if chosen.start != "straight":
-            raise UserError("a loop in two planes begins straight", "start", "start: straight")
     motion = motion_in(planes, chosen.reference, chosen.direction, wrist, chosen.horizon, period, network)
     return wrist, loop, motion
 
@@ -226,7 +223,7 @@ def simulate(
     law = controller(chosen.controller)
     gains = np.array([gains_of(law, chosen.gains, tuned)])
     wrist, loop, followed = asked_of(study, sample_period(chosen.loop.control_period), network)
-    start = equilibrium(loop) if chosen.start == "equilibrium" else None
+    start = equilibrium(loop, followed.planes) if chosen.start == "equilibrium" else None
     scenario = scenario_of(chosen.reference, chosen.direction)
     which = np.zeros(1, np.int64)
     (repeated,) = repeat(
@@ -273,6 +270,7 @@ def check_one_plane(loop: Loop) -> None:
     asked = {
         "planes": loop.planes == 2, "disturbances.toward_deg": loop.disturbances.toward_deg,
         "plant.actuator.slack": any(tendons.slack), "plant.actuator.broken_tendon": tendons.broken_tendon > 1,
+        "plant.actuator.slipping_tendon": tendons.slipping_tendon > 1,
     }  # fmt: skip
     for key in (key for key, is_asked in asked.items() if is_asked):
         fix = "leave it out, or `wristctl simulate`, which bends in two planes too"

@@ -17,8 +17,8 @@ from wristctl.simulation.actuator import Aim, actuate, deliver, drive_in_lanes
 from wristctl.simulation.nonideal import spools_after_slip
 from wristctl.simulation.observer import Knowing, go_on, sense
 from wristctl.simulation.sums import SUMS, gather, watch_range
-from wristctl.wrist.plant import acting_pulls, advance_or_stop, bend_of, disturbed, parameters_of, path_before
-from wristctl.wrist.tendon_mechanics import tendons_in_lanes
+from wristctl.wrist.plant import advance_or_stop, bend_of, disturbed, parameters_of, path_before
+from wristctl.wrist.tendon_mechanics import acting_pulls, tendons_in_lanes
 
 _ALIVE, _STEP_ERROR = SUMS.index("alive"), SUMS.index("step_error")
 _NAN = float("nan")
@@ -131,9 +131,10 @@ class LoopState(NamedTuple):
     """State of the rollouts, by block first: a long run may be done in pieces.
 
     `which` and `case` are each lane's motion and case of disturbances, `memory` is the law's in each plane,
-    `coordinates` the plant's with their rates, `tendons` as they are with their state, in one plane one of
-    `wristctl.wrist.tendon_mechanics.Tendons`. `record` [block, sample, column, lane] takes each sample's values, all or
-    briefly, or has no samples. `watch` is the camera with its observer, or NoCamera.
+    `coordinates` the plant's with their rates, `tendons` as they are with their state: Tendons of
+    `wristctl.wrist.tendon_mechanics` in one plane, Places of `wristctl.wrist.spatial.spooled_tendons` in two. `record`
+    [block, sample, column, lane] takes each sample's values, all or briefly, or has no samples. `watch` is the camera
+    with its observer, or NoCamera.
     """
 
     which: Any
@@ -191,7 +192,7 @@ def _run_block(setup: Any, course: Any, world: Any, state: Any, scratch: Any, fi
     bend, speed = lanes_like(part(every, 0, setup.bend)), lanes_like(part(every, 0, setup.bend))
     wish, wish_rate = lanes_like(bend), lanes_like(bend)
     pulls, counts, acts = lanes_like(limits.least), lanes_like(limits.least), lanes_like(limits.least)
-    delivered, speeds = lanes_like(limits.least), lanes_like(limits.least)
+    delivered, speeds, held = lanes_like(limits.least), lanes_like(limits.least), lanes_like(limits.least)
     room = room_like(bend, part(every, 0, setup.arms))
     aim, knowing = Aim(wish, wish_rate, lanes_like(room.arms)), Knowing(known, drive, bend, pulls, room.arms)
     rows = lanes_like(part(every, 0, setup.seen))
@@ -225,8 +226,8 @@ def _run_block(setup: Any, course: Any, world: Any, state: Any, scratch: Any, fi
             deliver(drive, winding, counts, delivered)
             for t in range(count):
                 speeds[t] = winding[0] * motor[2 * t + 1]
-            spool_input = spools_after_slip(tendons, delivered, speeds, time, path)
-            acting_pulls(tendons, plant, q, spool_input, path, acts)
+            spools_after_slip(tendons, delivered, speeds, time, path, held)
+            acting_pulls(tendons, held, path, acts)
             watch_range(sum_, time, bend, bound[2 * count])
             for t in range(count):
                 acts[t] = acts[t] * of_one[t]
@@ -244,7 +245,7 @@ def _run_block(setup: Any, course: Any, world: Any, state: Any, scratch: Any, fi
                     _record(row, (pulls, acts, delivered), rows, share, q)
             go_on(state.watch, knowing, now_tick, counts, period)
             for _ in range(setup.substeps):
-                sum_[_ALIVE], error = advance_or_stop(plant, q, rates, spool_input, tendons, h, sum_[_ALIVE])
+                sum_[_ALIVE], error = advance_or_stop(plant, q, rates, held, tendons, h, sum_[_ALIVE])
                 sum_[_STEP_ERROR] = sum_[_STEP_ERROR] + error
 
 

@@ -8,24 +8,29 @@ import numpy as np
 
 from wristctl.arrays import Array
 from wristctl.config.plant import Actuator, TendonFacts, TrueActuator, TrueWrist
+from wristctl.errors import UserError
 from wristctl.lanes.compiled import by_type, compiled, implements
 from wristctl.lanes.functions import clip, maximum, minimum
-from wristctl.lanes.lane import where
-from wristctl.wrist.dahl import Inner, InnerFriction, NoInnerFriction, inner_state
-from wristctl.wrist.spatial.spooled_tendons import ElasticPlaces, HeldPlaces, RubbingPlaces
+from wristctl.lanes.lane import where, zero_like
+from wristctl.wrist.dahl import Inner, InnerFriction, InnerFrictionInSpace, NoInnerFriction, inner_state
+from wristctl.wrist.spatial.spooled_tendons import ElasticPlaces, PulledPlaces, RealPlaces
 from wristctl.wrist.tendon_mechanics import (
+    CREPT,
     LOST,
     OF_A_TENDON,
-    PATH,
     PLAY,
     SHARE,
     SLIPPED,
+    WRAPPED,
     ElasticTendons,
+    Fault,
     Nonideal,
     NoTendons,
     PulledTendons,
     RealTendons,
+    X,
     row_of,
+    shortening,
     spool_pull,
     state_rows,
 )
@@ -67,6 +72,29 @@ def nonideal_of(plant: TrueWrist, actuator: Actuator, facts: TendonFacts, step: 
     )
 
 
+def faults_of(actuator: Actuator, facts: TendonFacts, alike: Array) -> Array:
+    """Rows of Fault of each place of a layout with so many tendons alike (T,), (4, T).
+
+    Raises UserError for a place that there is not.
+    """
+    places, never = len(alike), math.inf
+    elastic = actuator.level == "tendon"
+    torque = facts.torque if isinstance(facts, TrueActuator) else None
+    faults = np.array([np.full(places, never), 1.0 - 1.0 / alike, np.full(places, never), np.full(places, never)])
+    for row, time, place, key in (
+        (0, facts.broken_at, facts.broken_tendon, "broken_tendon"),
+        (2, facts.slips_at if elastic else None, facts.slipping_tendon, "slipping_tendon"),
+    ):
+        if time is not None:
+            if place > places:
+                what = f"tendon {place} of {places} cannot {'break' if row == 0 else 'slip'}"
+                raise UserError(what, f"loop.plant.actuator.{key}", f"1 to {places}")
+            faults[row, place - 1] = time
+    if torque is not None:
+        faults[3] = alike * torque / actuator.pulley_radius
+    return faults
+
+
 def is_ideal(nonideal: Nonideal) -> bool:
     """Whether these values change nothing."""
     shares = nonideal.friction, nonideal.tendon_creep, nonideal.spring_creep, nonideal.backlash
@@ -79,17 +107,20 @@ def wears(nonideal: Nonideal) -> bool:
     return nonideal.backlash > 0.0 or any(map(math.isfinite, (nonideal.broken_at, nonideal.slips_at, nonideal.torque)))
 
 
-def inner_of(plants: Sequence[TrueWrist], q: Array, z: Array, blocks: Callable[[Array], Array]) -> Inner:
+def inner_of(
+    plants: Sequence[TrueWrist], q: Array, z: Array, blocks: Callable[[Array], Array], planes: int = 1
+) -> Inner:
     """Friction inside wrists (B,) at rest at coordinates q (B, n), their bristles bent by z (B,).
 
     `blocks` makes blocks of lanes of rows (B, values). Where no wrist has any there is none.
     """
     if not any(plant.inner_friction for plant in plants):
         return NoInnerFriction()
-    torque = np.array([[plant.inner_friction] for plant in plants])
-    slope = np.array([[q.shape[1] / math.radians(plant.inner_presliding_deg)] for plant in plants])
+    torque, segments = np.array([[plant.inner_friction] for plant in plants]), q.shape[1] // planes
+    slope = np.array([[segments / math.radians(plant.inner_presliding_deg)] for plant in plants])
     state = np.array([inner_state(angles, bent) for angles, bent in zip(q, z, strict=True)])
-    return InnerFriction(blocks(torque), blocks(slope), blocks(state))
+    kind = InnerFriction if planes == 1 else InnerFrictionInSpace
+    return kind(blocks(torque), blocks(slope), blocks(state))
 
 
 def _time(time: float | None) -> float:
@@ -99,86 +130,113 @@ def _time(time: float | None) -> float:
 def unmoved(reeled: Array, path: Array, crept: Array, q: Array) -> Array:
     """The state of tendons that have reeled in `reeled` (t,) [m] and crept so far (t,) [m], at rest at q (k,).
 
-    `path` (3,) is both sides' travel there [m] and the bend [rad].
+    `path` there is both sides' travel [m] and the bend [rad], (3,), or each tendon's travel, then what each is wrapped
+    by, (2 t,).
     """
-    state = np.zeros(state_rows(len(reeled), len(q)))
-    state[:PATH] = path
-    tendon = of_tendons(state, len(reeled))
-    tendon[:, 1], tendon[:, SHARE - PATH], tendon[:, PLAY - PATH] = crept, 1.0, reeled
+    count, paths = len(reeled), (len(path) + 1) // 2
+    state = np.zeros(state_rows(count, len(q)))
+    tendon, number = of_tendons(state, count), np.arange(count)
+    tendon[:, CREPT], tendon[:, SHARE], tendon[:, PLAY] = crept, 1.0, reeled
+    tendon[:, X], tendon[:, WRAPPED] = path[number % paths], path[paths + number % (len(path) - paths)]
     state[len(state) - len(q) :] = q
     return state
 
 
 def of_tendons(state: Array, count: int) -> Array:
     """A view of a state's rows of so many tendons, (count, rows of each)."""
-    values: Array = state[PATH : PATH + len(OF_A_TENDON) * count].reshape(count, -1)
+    values: Array = state[: len(OF_A_TENDON) * count].reshape(count, -1)
     return values
 
 
 @compiled
-def _broken(tendons: Any, t: int, time: Any, left: float) -> None:
-    """Leave the share `left` of a tendon from the time on at which it breaks, for good; with 1 it does not break."""
+def _break(tendons: Any, t: int, time: Any, fault: Any) -> None:
+    """Leave a share of a place's tendons from the time on at which one of them breaks, for good."""
     state, share = tendons.state, row_of(t, SHARE)
-    state[share] = minimum(state[share], where(time >= tendons.nonideal.broken_at, left, 1.0))
+    state[share] = minimum(state[share], where(time >= fault.broken_at, fault.left, 1.0))
 
 
 @compiled
-def tendon_after_slip(tendons: Any, t: int, delivered: Any, speed: Any, time: Any, x: Any, left: float) -> Any:
-    """Length [m] that one of the RealTendons has reeled in, of the length that its motor delivers at a speed [m/s].
+def _fall_back(tendons: Any, t: int, delivered: Any, speed: Any, time: Any, x: Any, fault: Any) -> Any:
+    """Length [m] that one of the tendons has reeled in, of the length that its motor delivers at a speed [m/s].
 
-    It falls back where its motor is pulled harder than it holds, lags within the backlash, slips, and breaks, so that
-    the share `left` of it is left; both of the last for good.
+    It falls back where its motor is pulled harder than it holds, lags within the backlash, slips, and breaks; both of
+    the last for good.
     """
     nonideal, state = tendons.nonideal, tendons.state
     play, lost, slip = row_of(t, PLAY), row_of(t, LOST), row_of(t, SLIPPED)
-    _broken(tendons, t, time, left)
-    if t % 2 == 0:
-        state[slip] = maximum(state[slip], where(time >= nonideal.slips_at, nonideal.slip, 0.0))
-    holds = nonideal.torque * maximum(0.0, 1.0 - abs(speed) / nonideal.top_speed)
+    _break(tendons, t, time, fault)
+    state[slip] = maximum(state[slip], where(time >= fault.slips_at, nonideal.slip, 0.0))
+    holds = fault.holds * maximum(0.0, 1.0 - abs(speed) / nonideal.top_speed)
     state[lost] = state[lost] + where(spool_pull(tendons, state[play], t, x) > holds, nonideal.turn, 0.0)
     on_spool = delivered - state[lost] - state[slip]
     state[play] = clip(state[play], on_spool, on_spool + nonideal.backlash)
     return state[play]
 
 
+@compiled
+def _fault_of_a_side(nonideal: Any, t: int, breaks: bool, left: Any) -> Any:
+    """Fault of one of a plane's tendons; those of the + side slip."""
+    never = zero_like(nonideal.slip) + math.inf
+    broken_at, slips_at = nonideal.broken_at if breaks else never, nonideal.slips_at if t % 2 == 0 else never
+    return Fault(broken_at, left + zero_like(never), slips_at, nonideal.torque)
+
+
+@compiled
+def tendon_after_slip(tendons: Any, t: int, delivered: Any, speed: Any, time: Any, x: Any, left: float) -> Any:
+    """Length [m] that one of the RealTendons has reeled in, of the length that its motor delivers at a speed [m/s].
+
+    Where it breaks the share `left` of it is left; with 1 it does not.
+    """
+    fault = _fault_of_a_side(tendons.nonideal, t, True, left)
+    return _fall_back(tendons, t, delivered, speed, time, x, fault)
+
+
 @by_type
-def spools_after_slip(tendons: Any, delivered: Any, speeds: Any, time: Any, path: Any) -> Any:
-    """Pulls [N] or reeled lengths [m] of both sides, of those that their motors deliver (plus, minus).
+def fault_at(tendons: Any, t: int) -> Any:
+    """Fault of a place of tendons; of a plane's one of the + side's two breaks."""
+    raise NotImplementedError("compiled code only")
+
+
+@implements(fault_at, PulledTendons, RealTendons)
+def _fault_of_sides(tendons: Any, t: int) -> Any:
+    return _fault_of_a_side(tendons.nonideal, t, t == 0, _ONE_OF_A_SIDE_LESS)
+
+
+@implements(fault_at, PulledPlaces, RealPlaces)
+def _fault_of_places(tendons: Any, t: int) -> Any:
+    faults = tendons.faults
+    return Fault(faults.broken_at[t], faults.left[t], faults.slips_at[t], faults.holds[t])
+
+
+@compiled
+def place_after_slip(tendons: Any, t: int, delivered: Any, speed: Any, time: Any, x: Any) -> Any:
+    """As `tendon_after_slip`, with the fault of its place."""
+    return _fall_back(tendons, t, delivered, speed, time, x, fault_at(tendons, t))
+
+
+@by_type
+def spools_after_slip(tendons: Any, delivered: Any, speeds: Any, time: Any, path: Any, held: Any) -> None:
+    """Write the pulls [N] or reeled lengths [m] of each place, of those that their motors deliver (T rows each).
 
     `speeds` are the spools' [m/s].
     """
     raise NotImplementedError("compiled code only")
 
 
-@implements(spools_after_slip, NoTendons, ElasticTendons)
-def _as_delivered(tendons: Any, delivered: Any, speeds: Any, time: Any, path: Any) -> Any:
-    return delivered
+@implements(spools_after_slip, NoTendons, ElasticTendons, ElasticPlaces)
+def _as_delivered(tendons: Any, delivered: Any, speeds: Any, time: Any, path: Any, held: Any) -> None:
+    for t in range(len(held)):
+        held[t] = delivered[t]
 
 
-@implements(spools_after_slip, PulledTendons)
-def _pulls_that_are_left(tendons: Any, delivered: Any, speeds: Any, time: Any, path: Any) -> Any:
-    _broken(tendons, 0, time, _ONE_OF_A_SIDE_LESS)
-    return tendons.state[row_of(0, SHARE)] * delivered[0], delivered[1]
+@implements(spools_after_slip, PulledTendons, PulledPlaces)
+def _pulls_that_are_left(tendons: Any, delivered: Any, speeds: Any, time: Any, path: Any, held: Any) -> None:
+    for t in range(len(held)):
+        _break(tendons, t, time, fault_at(tendons, t))
+        held[t] = tendons.state[row_of(t, SHARE)] * delivered[t]
 
 
-@implements(spools_after_slip, RealTendons)
-def _after_slip(tendons: Any, delivered: Any, speeds: Any, time: Any, path: Any) -> Any:
-    plus = tendon_after_slip(tendons, 0, delivered[0], speeds[0], time, path[0], _ONE_OF_A_SIDE_LESS)
-    return plus, tendon_after_slip(tendons, 1, delivered[1], speeds[1], time, path[1], 1.0)
-
-
-@implements(spools_after_slip, HeldPlaces)
-def _pulls_at_places(tendons: Any, delivered: Any, speeds: Any, time: Any, path: Any) -> Any:
-    for t in range(len(delivered)):
-        tendons.left[t] = where(time >= tendons.broken_at[t], 0.0, 1.0) * delivered[t]
-    return tendons.left
-
-
-@implements(spools_after_slip, ElasticPlaces, RubbingPlaces)
-def _lengths_at_places(tendons: Any, delivered: Any, speeds: Any, time: Any, path: Any) -> Any:
-    reeled = tendons.reeled
-    for t in range(len(delivered)):
-        tendons.stiffness[t] = where(time >= tendons.broken_at[t], 0.0, 1.0) * tendons.whole[t]
-        reeled[t] = clip(reeled[t], delivered[t], delivered[t] + tendons.backlash)
-        delivered[t] = reeled[t]
-    return reeled
+@implements(spools_after_slip, RealTendons, RealPlaces)
+def _after_slip(tendons: Any, delivered: Any, speeds: Any, time: Any, path: Any, held: Any) -> None:
+    for t in range(len(held)):
+        held[t] = place_after_slip(tendons, t, delivered[t], speeds[t], time, shortening(path, t))

@@ -8,7 +8,6 @@ import numpy as np
 
 from wristctl.arrays import Array
 from wristctl.config.loop import DirectionName, Loop, Reference
-from wristctl.config.plant import in_one_plane_only
 from wristctl.config.wrist import WristParameters
 from wristctl.errors import UserError
 from wristctl.simulation.motion import Motion
@@ -67,8 +66,6 @@ def _must(wrist: WristParameters, asked: Asked) -> str:
 def _leaves(wrist: WristParameters, asked: Asked) -> str:
     """What takes the wrist, as it is believed or as it is, out of the plane of its motion, and one plane leaves out."""
     plant, tendons, acting = asked.loop.plant, asked.loop.plant.actuator, asked.loop.disturbances
-    if in_one_plane_only(plant, tendons):
-        return ""
     flexes = DIRECTIONS[_direction(asked.reference, asked.direction)].plane == "flexion"
     for one in (wrist, plant_of(wrist, plant)):
         if one.gravity[1] if flexes else one.gravity_flexion:

@@ -9,10 +9,8 @@ from numpy.typing import NDArray
 
 from wristctl.arrays import Array
 from wristctl.config.loop import Loop
-from wristctl.config.plant import in_one_plane_only
 from wristctl.config.wrist import WristParameters
 from wristctl.control.law import Controller
-from wristctl.errors import UserError
 from wristctl.lanes.blocks import to_rows
 from wristctl.processes import cores, stoppable
 from wristctl.seeds import Entropy
@@ -127,9 +125,6 @@ def check_two_planes(worlds: Sequence[World]) -> None:
     ValueError for wrists with other numbers of tendons.
     """
     for world in worlds:
-        if beyond := in_one_plane_only(world.loop.plant, world.loop.plant.actuator):
-            key = f"loop.plant.{beyond[0]}"
-            raise UserError(f"no loop in two planes has plant.{beyond[0]}", key, "leave it at its default")
         plant_in(2, world.loop).values(world.plant, world.loop.plant_segments)
     if len({len(TendonLayout.of(world.wrist).places) for world in worlds}) != 1:
         raise ValueError("wrists of one batch have other numbers of tendons")

@@ -26,7 +26,7 @@ from wristctl.simulation.nonideal import inner_of, nonideal_of, of_tendons, unmo
 from wristctl.wrist.compiled_model import terms
 from wristctl.wrist.dahl import inner_in_lanes, one_block
 from wristctl.wrist.pcc import PCC
-from wristctl.wrist.plant import advance_or_stop, bend_of, kernel_of, parameters_of
+from wristctl.wrist.plant import advance_or_stop, bend_of, kernel_of, parameters_of, path_before
 from wristctl.wrist.segments import segments
 from wristctl.wrist.statics import FROM_ABOVE, FROM_BELOW, HeldTendons, at_rest_with, equilibria_at
 from wristctl.wrist.tendon_mechanics import Nonideal, RealTendons, Z, pulls_at_start, read_nonideal, row_of, spool_pull
@@ -110,7 +110,7 @@ def _move(model: Any, lanes: Any, driven: Any, timing: Any, out: Any, cut: Any) 
     alive = 1.0 + zero
     for k in range(driven.shape[0]):
         tick, now = timing.first + k, rows_of(driven[k])
-        path = memory[0], memory[1], memory[2]
+        path = path_before(tendons, segment, q)
         reeled = (
             where(winch > 0.0, now[0] / tendons.stiffness + path[0], now[0]),
             where(winch > 0.0, now[1] / tendons.stiffness + path[1], now[1]),
@@ -134,7 +134,7 @@ def _move(model: Any, lanes: Any, driven: Any, timing: Any, out: Any, cut: Any) 
         alive, _ = advance_or_stop(segment, q, rate, reeled, tendons, timing.h + zero, alive)
         for i in range(n):
             rates = rates + rate[i] * rate[i]
-        end = memory[0], memory[1], memory[2]
+        end = path_before(tendons, segment, q)
         ends[3], ends[4] = reeled
         ends[5], ends[6] = spool_pull(tendons, reeled[0], 0, end[0]), spool_pull(tendons, reeled[1], 1, end[1])
         ends[7], ends[8] = pulls_at_start(tendons, reeled, end)
@@ -184,7 +184,7 @@ def _lanes(wrists: Sequence[SpooledWrist], h: float) -> _Lanes:
         stiffness = _WINCH if driven.winch else TENDONS_PER_SIDE * driven.actuator.tendon_stiffness
         path = np.array([*(driven.wrist.length - PCC.taut(driven.wrist, driven.begin)), np.abs(driven.begin).sum()])
         memory = unmoved(np.zeros(2), path, np.zeros(2), driven.begin)
-        of_tendons(memory, 2)[:, 0] = driven.z
+        of_tendons(memory, 2)[:, Z] = driven.z
         rows.append(
             (
                 PCC.values(driven.wrist, len(driven.begin)),

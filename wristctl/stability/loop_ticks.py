@@ -25,7 +25,7 @@ from wristctl.simulation.worlds import World
 from wristctl.stability.smooth_loop import cycle_of
 from wristctl.wrist.dahl import InnerFriction
 from wristctl.wrist.plant import kernel_of
-from wristctl.wrist.tendon_mechanics import OF_A_TENDON, PATH, PulledTendons, RealTendons
+from wristctl.wrist.tendon_mechanics import CREPT, OF_A_TENDON, WRAPPED, PulledTendons, RealTendons, X, Z
 
 # Typical sizes [rad, rad/s, N, m], by which small changes are measured.
 _ANGLE, _RATE, _PULL, _LENGTH = 1.0, 10.0, 10.0, 1e-3
@@ -61,11 +61,12 @@ def state_parts(batch: Batch, memory: int, tick: int, back: Remembered) -> Itera
         yield StatePart("motor", state.motors, np.array([0, 2]), np.full(2, size))
     if isinstance(state.tendons, RealTendons):
         rows, per_tendon = state.tendons.state, len(OF_A_TENDON)
-        count = (rows.shape[1] - PATH - k) // per_tendon
-        yield StatePart("path", rows, np.arange(PATH), np.array([_LENGTH, _LENGTH, _ANGLE]))
-        bristles = PATH + per_tendon * np.arange(count)
-        yield StatePart("bristle", rows, bristles, np.ones(count))
-        yield StatePart("tendon creep", rows, bristles + 1, np.full(count, _LENGTH))
+        count = (rows.shape[1] - k) // per_tendon
+        first = per_tendon * np.arange(count)
+        path = np.array([first[0] + X, first[1] + X, first[0] + WRAPPED])
+        yield StatePart("path", rows, path, np.array([_LENGTH, _LENGTH, _ANGLE]))
+        yield StatePart("bristle", rows, first + Z, np.ones(count))
+        yield StatePart("tendon creep", rows, first + CREPT, np.full(count, _LENGTH))
     if isinstance(state.tendons, (PulledTendons, RealTendons)):
         rows = state.tendons.state
         yield StatePart("spring creep", rows, np.arange(rows.shape[1] - k, rows.shape[1]), np.full(k, _ANGLE))

@@ -21,7 +21,6 @@ from wristctl.wrist.dynamics import bias, equation_of_motion, mass_matrix
 from wristctl.wrist.jacobian import residual_jacobians
 from wristctl.wrist.plant import path_along, path_before
 from wristctl.wrist.tendon_mechanics import (
-    PATH,
     ElasticTendons,
     NoTendons,
     PulledTendons,
@@ -59,14 +58,24 @@ def solve(lu: Any, b: Any) -> None:
 
 
 @compiled
-def _contact(nonideal: Any, n: int, theta: Any, omega: Any) -> Any:
-    """Torque of a segment's end stop [N m], against its bend, and its derivatives by angle and by rate."""
-    limit, stiffness = nonideal.stop / n, nonideal.stop_stiffness * n
-    depth = theta - clip(theta, -limit, limit)
-    damped = 1.0 + nonideal.stop_dissipation * where(depth < 0.0, -omega, omega)
+def stop_contact(nonideal: Any, n: int, depth: Any, closing: Any) -> Any:
+    """Hunt and Crossley's torque of an end stop of one of n segments that is bent so far into it [N m].
+
+    `closing` is the rate at which the depth grows [rad/s]. Also the torque's derivatives by depth and by that rate.
+    """
+    stiffness = nonideal.stop_stiffness * n
+    damped = 1.0 + nonideal.stop_dissipation * closing
     touching = where((abs(depth) > 0.0) & (damped > 0.0), 1.0, 0.0)
     torque = stiffness * depth * damped * touching
     return torque, stiffness * damped * touching, stiffness * nonideal.stop_dissipation * abs(depth) * touching
+
+
+@compiled
+def _contact(nonideal: Any, n: int, theta: Any, omega: Any) -> Any:
+    """Torque of a segment's end stop [N m], against its bend, and its derivatives by angle and by rate."""
+    limit = nonideal.stop / n
+    depth = theta - clip(theta, -limit, limit)
+    return stop_contact(nonideal, n, depth, where(depth < 0.0, -omega, omega))
 
 
 @by_type
@@ -82,18 +91,18 @@ def yield_jacobians(tendons: Any, theta: Any, omega: Any, by_theta: Any, by_rate
 
 
 @implements(yield_, NoTendons, ElasticTendons)
-def _stay(tendons: Any, segment: Any, theta: Any, omega: Any, spool_input: Any, r: Any) -> None:
-    pass
+def stay(tendons: Any, segment: Any, theta: Any, omega: Any, spool_input: Any, r: Any) -> None:
+    """There is none of it."""
 
 
 @implements(yield_jacobians, NoTendons, ElasticTendons)
-def _stay_jacobians(tendons: Any, theta: Any, omega: Any, by_theta: Any, by_rate: Any) -> None:
-    pass
+def stay_jacobians(tendons: Any, theta: Any, omega: Any, by_theta: Any, by_rate: Any) -> None:
+    """There is none of it."""
 
 
 @implements(yield_, PulledTendons, RealTendons)
 def _yield(tendons: Any, segment: Any, theta: Any, omega: Any, spool_input: Any, r: Any) -> None:
-    nonideal, state, springs = tendons.nonideal, tendons.state, row_of(len(spool_input), PATH)
+    nonideal, state, springs = tendons.nonideal, tendons.state, row_of(len(spool_input), 0)
     for k in range(len(theta)):
         torque, _, _ = _contact(nonideal, len(theta), theta[k], omega[k])
         r[k] = r[k] + torque - nonideal.spring_creep * spring(segment, k) * state[springs + k]

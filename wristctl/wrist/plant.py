@@ -31,11 +31,13 @@ from wristctl.lanes.named_tuples import tuple_of
 from wristctl.lanes.rows import lanes_like, part, planes_like, rows_of
 from wristctl.wrist.kinematics import Backbone
 from wristctl.wrist.tendon_mechanics import (
+    WRAPPED,
     ElasticTendons,
     NoTendons,
     PulledTendons,
     RealTendons,
-    pulls_at_start,
+    X,
+    row_of,
     update_memory,
 )
 
@@ -65,14 +67,14 @@ class PlantModel:
     disturbed: Any
     tips: Callable[[WristParameters, Array], Array]
     """Tips (T, P + 1) [m] at coordinates (T, q)."""
+    travel: Any
     planes: int = 1
     """Number P of planes that it bends in."""
     frames: Callable[[WristParameters, Array, Array], tuple[Array, Array]] = _unseen
     """For pictures, of a plant in two planes: centres (m, 3) [m] and axes (m, 3, 3), as columns, of cross-sections at
-    coordinates (q,) and at shares (m,) of the way from the base to the tip. What follows is of a plant in one plane."""
+    coordinates (q,) and at shares (m,) of the way from the base to the tip."""
     read: Any = None
     """Function (model, rows, pulls) of compiled code that reads the parameters; None: each is a row."""
-    travel: Any = None
     tip_pose: Any = None
     tip_jacobian: Any = None
     angle: Callable[[Array], Array] = _unknown
@@ -82,7 +84,8 @@ class PlantModel:
     backbone: Backbone = _unknown
     """For pictures."""
     equilibrium: Callable[[WristParameters, int, tuple[float, float]], Array] | None = None
-    """Coordinates (q,) at rest under tensions [N per tendon, + and - side]; None where the plant cannot tell."""
+    """Coordinates (q,) at rest under tensions [N per tendon, + and - side, which in two planes are one of all]; None
+    where the plant cannot tell."""
 
     def __post_init__(self) -> None:
         for function in (advance, bend_of, travel, within, disturbed, tip_pose, tip_jacobian):
@@ -167,8 +170,8 @@ def bend_of(plant: Any, q: Any, rate: Any, bend: Any, speed: Any) -> None:
 
 @by_type
 def travel(plant: Any, q: Any) -> Any:
-    """Shortening of the + and the - side's tendon paths from the straight wrist [m], and the bend
-    that they are wrapped by [rad]."""
+    """Shortening of the + and the - side's tendon paths from the straight wrist [m], and the bend that they are wrapped
+    by [rad]; in two planes the shortening of each place's, then the bend that each is wrapped by."""
     raise NotImplementedError("compiled code only")
 
 
@@ -213,34 +216,23 @@ def path_before(tendons: Any, plant: Any, q: Any) -> Any:
 
 @implements(path_before, NoTendons, PulledTendons)
 @implements(path_along, NoTendons, PulledTendons)
-def _no_path(tendons: Any, plant: Any, q: Any) -> Any:
+def no_path(tendons: Any, plant: Any, q: Any) -> Any:
+    """Zeros."""
     zero = zero_like(q[0])
     return zero, zero, zero
 
 
 @implements(path_before, ElasticTendons)
 @implements(path_along, ElasticTendons, RealTendons)
-def _path(tendons: Any, plant: Any, q: Any) -> Any:
+def travelled(tendons: Any, plant: Any, q: Any) -> Any:
+    """The plant's `travel`."""
     return travel(plant, q)
 
 
 @implements(path_before, RealTendons)
 def _remembered_path(tendons: Any, plant: Any, q: Any) -> Any:
-    return tendons.state[0], tendons.state[1], tendons.state[2]
-
-
-@by_type
-def acting_pulls(tendons: Any, plant: Any, q: Any, spool_input: Any, path: Any, acts: Any) -> None:
-    """Write the pulls [N] at the wrist, at coordinates q at the start of a step, a row for each place of tendons.
-
-    `path` is that of `path_before`.
-    """
-    raise NotImplementedError("compiled code only")
-
-
-@implements(acting_pulls, NoTendons, PulledTendons, ElasticTendons, RealTendons)
-def _acting_on_sides(tendons: Any, plant: Any, q: Any, spool_input: Any, path: Any, acts: Any) -> None:
-    acts[0], acts[1] = pulls_at_start(tendons, spool_input, path)
+    state = tendons.state
+    return state[row_of(0, X)], state[row_of(1, X)], state[row_of(0, WRAPPED)]
 
 
 @cache
@@ -290,6 +282,19 @@ def poses(model: PlantModel, wrist: WristParameters, n: int, q: Array) -> Pose:
     kernel_of(_poses, model)(model, values, states, out, (0,) * k)
     rows = to_rows(out, count)
     return Pose(rows[:, :2], rows[:, 2], rows[:, 3:].reshape(count, 3, k))
+
+
+def _path_at(model: Any, values: Any, state: Any, out: Any, cut: Any, pulls: Any) -> None:
+    path, row = travel(parameters_of(model, rows_of(values), pulls), part(rows_of(state), 0, cut)), rows_of(out)
+    for i in range(len(path)):
+        row[i] = path[i]
+
+
+def path_at(model: PlantModel, values: Array, q: Array, places: int) -> Array:
+    """The plant's `travel` at coordinates (q,) of a wrist with these values and so many places of tendons."""
+    out = np.empty(3 if model.planes == 1 else 2 * places)
+    kernel_of(_path_at, model)(model, values, np.ascontiguousarray(q, float), out, (0,) * len(q), (0,) * places)
+    return out
 
 
 @spelled_out

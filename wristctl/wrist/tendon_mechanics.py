@@ -57,15 +57,25 @@ class Nonideal(NamedTuple):
     """Length of an electrical turn, four full steps [m]."""
 
 
+class Fault(NamedTuple):
+    """When a place's tendons break and slip [s], what share of them a break leaves, and the pull [N] at which their
+    standing motor falls out of step; lanes, or in two planes a row for each place."""
+
+    broken_at: Any
+    left: Any
+    slips_at: Any
+    holds: Any
+
+
 # A Nonideal of lanes from rows of lanes, in compiled code.
 read_nonideal = tuple_of(Nonideal)
 
-# Rows of a tendon's state: the bristle's state, psi [m], the share of it that is not broken, where its spool is in
-# the backlash [m], what its motor has lost and it has slipped [m]. Before all tendons' rows comes the path, x of both
-# sides [m] and the bend [rad], after them the springs' psi [rad].
-OF_A_TENDON = ("z", "crept", "share", "play", "lost", "slipped")
-_OWN, PATH = len(OF_A_TENDON), 3
-Z, _CREPT, SHARE, PLAY, LOST, SLIPPED = range(PATH, PATH + _OWN)
+# Rows of a tendon's state: the bristle's state, psi [m], the share of it that is not broken, where its spool is in the
+# backlash [m], what its motor has lost and it has slipped [m], and before the step the shortening of its path [m] and
+# the bend that it is wrapped by [rad]. After all tendons' rows comes the springs' psi [rad] of each coordinate.
+OF_A_TENDON = ("z", "crept", "share", "play", "lost", "slipped", "x", "wrapped")
+_OWN = len(OF_A_TENDON)
+Z, CREPT, SHARE, PLAY, LOST, SLIPPED, X, WRAPPED = range(_OWN)
 
 
 class NoTendons(NamedTuple):
@@ -73,8 +83,8 @@ class NoTendons(NamedTuple):
 
 
 class PulledTendons(NamedTuple):
-    """Held pulls on a wrist with end stops, creeping springs and tendons that break; of the state path, friction and
-    creep of tendons stay as they are."""
+    """Held pulls on a wrist with end stops, creeping springs and tendons that break; of the state all that friction and
+    creep of tendons need stays as it is."""
 
     nonideal: Any
     state: Any
@@ -132,13 +142,31 @@ def _real(tendons: Any) -> Any:
 
 def state_rows(tendons: int, coordinates: int) -> int:
     """Rows of the state of so many tendons and of a wrist with so many coordinates."""
-    return PATH + _OWN * tendons + coordinates
+    return _OWN * tendons + coordinates
 
 
 @compiled
 def row_of(t: int, which: int) -> int:
-    """Row of one of a tendon's values: SHARE, PLAY, LOST or SLIPPED."""
+    """Row of one of a tendon's values, as X or SHARE; of as many as there are tendons the springs' first."""
     return _OWN * t + which
+
+
+@compiled
+def _paths(path: Any) -> int:
+    """How many tendons have a path of their own: of (plus, minus, bend) 2, of T paths and T bends T."""
+    return (len(path) + 1) // 2
+
+
+@compiled
+def shortening(path: Any, t: int) -> Any:
+    """Shortening of a tendon's path from the straight wrist [m]; tendons of one side have one path."""
+    return path[t % _paths(path)]
+
+
+@compiled
+def wrapped_by(path: Any, t: int) -> Any:
+    """Bend that a tendon is wrapped by [rad]: its own, or that of all."""
+    return path[_paths(path) + t % (len(path) - _paths(path))]
 
 
 @compiled
@@ -154,93 +182,121 @@ def travel(segment: Any, theta: Any) -> Any:
     return plus, minus, bend
 
 
+@by_type
+def stiffness_at(tendons: Any, t: int) -> Any:
+    """Stiffness of one tendon, or of all of its place [N/m], as long as they are whole."""
+    raise NotImplementedError("compiled code only")
+
+
+@implements(stiffness_at, ElasticTendons, RealTendons)
+def _stiffness_of_all(tendons: Any, t: int) -> Any:
+    return tendons.stiffness
+
+
 @compiled
-def _slid(nonideal: Any, state: Any, t: int, x: Any) -> Any:
-    return bristle(state[row_of(t, Z)], x - state[t % 2], nonideal.bristle)
+def _slid(tendons: Any, t: int, x: Any) -> Any:
+    return bristle(tendons.state[row_of(t, Z)], x - tendons.state[row_of(t, X)], tendons.nonideal.bristle)
 
 
 @compiled
 def spool_pull(tendons: Any, length: Any, t: int, x: Any) -> Any:
     """Pull [N] at its spool of one real tendon that has reeled in a length [m]."""
     state = tendons.state
-    elongation = (length - x) - tendons.nonideal.tendon_creep * state[row_of(t, _CREPT)]
-    return rounded(state[row_of(t, SHARE)] * tendons.stiffness * maximum(0.0, elongation))
-
-
-@compiled
-def _stretch_pull(tendons: Any, length: Any, x: Any) -> Any:
-    return rounded(tendons.stiffness * maximum(0.0, length - x))
+    elongation = (length - x) - tendons.nonideal.tendon_creep * state[row_of(t, CREPT)]
+    return rounded(state[row_of(t, SHARE)] * stiffness_at(tendons, t) * maximum(0.0, elongation))
 
 
 @compiled
 def _at_wrist(tendons: Any, length: Any, t: int, path: Any, z: Any) -> Any:
     """Pull [N] of one tendon whose bristle is in this state."""
-    left = capstan(tendons.nonideal.friction, tendons.nonideal.sheath + path[2], z)
-    return rounded(spool_pull(tendons, length, t, path[t % 2]) * left)
+    left = capstan(tendons.nonideal.friction, tendons.nonideal.sheath + wrapped_by(path, t), z)
+    return rounded(spool_pull(tendons, length, t, shortening(path, t)) * left)
 
 
 @by_type
+def pull_along(tendons: Any, spool_input: Any, t: int, path: Any) -> Any:
+    """Pull [N] of one tendon at the wrist, at a path within a step."""
+    raise NotImplementedError("compiled code only")
+
+
+@by_type
+def pull_at_start(tendons: Any, spool_input: Any, t: int, path: Any) -> Any:
+    """Pull [N] of one tendon at the wrist at the start of a step, where it has not slid yet."""
+    raise NotImplementedError("compiled code only")
+
+
+@implements(pull_at_start, NoTendons, PulledTendons)
+@implements(pull_along, NoTendons, PulledTendons)
+def held_pull(tendons: Any, pulls: Any, t: int, path: Any) -> Any:
+    """A pull that is held."""
+    return pulls[t]
+
+
+@implements(pull_at_start, ElasticTendons)
+@implements(pull_along, ElasticTendons)
+def stretch_pull(tendons: Any, reeled: Any, t: int, path: Any) -> Any:
+    """Pull of a tendon that only stretches."""
+    return rounded(stiffness_at(tendons, t) * maximum(0.0, reeled[t] - shortening(path, t)))
+
+
+@implements(pull_along, RealTendons)
+def slid_pull(tendons: Any, reeled: Any, t: int, path: Any) -> Any:
+    """Pull of a real tendon that has slid."""
+    return _at_wrist(tendons, reeled[t], t, path, _slid(tendons, t, shortening(path, t)))
+
+
+@implements(pull_at_start, RealTendons)
+def stuck_pull(tendons: Any, reeled: Any, t: int, path: Any) -> Any:
+    """Pull of a real tendon that has not slid."""
+    return _at_wrist(tendons, reeled[t], t, path, tendons.state[row_of(t, Z)])
+
+
+@compiled
+def acting_pulls(tendons: Any, spool_input: Any, path: Any, acts: Any) -> None:
+    """Write the pulls [N] at the wrist at the start of a step, a row for each place of tendons."""
+    for t in range(len(acts)):
+        acts[t] = pull_at_start(tendons, spool_input, t, path)
+
+
+@compiled
 def pulls_along(tendons: Any, spool_input: Any, path: Any) -> Any:
     """Pulls [N] of both sides at the wrist, at a path (plus, minus, bend) within a step."""
-    raise NotImplementedError("compiled code only")
+    plus, minus = zero_like(path[0]), zero_like(path[0])
+    for t in range(0, len(spool_input), 2):
+        plus = plus + pull_along(tendons, spool_input, t, path)
+        minus = minus + pull_along(tendons, spool_input, t + 1, path)
+    return plus, minus
 
 
-@by_type
+@compiled
 def pulls_at_start(tendons: Any, spool_input: Any, path: Any) -> Any:
     """Pulls [N] of both sides at the wrist at the start of a step, where no tendon has slid yet."""
-    raise NotImplementedError("compiled code only")
-
-
-@implements(pulls_at_start, NoTendons, PulledTendons)
-@implements(pulls_along, NoTendons, PulledTendons)
-def _held_pulls(tendons: Any, pulls: Any, path: Any) -> Any:
-    return pulls[0], pulls[1]
-
-
-@implements(pulls_at_start, ElasticTendons)
-@implements(pulls_along, ElasticTendons)
-def _elastic_pulls(tendons: Any, reeled: Any, path: Any) -> Any:
-    return _stretch_pull(tendons, reeled[0], path[0]), _stretch_pull(tendons, reeled[1], path[1])
-
-
-@implements(pulls_along, RealTendons)
-def _slid_pulls(tendons: Any, reeled: Any, path: Any) -> Any:
     plus, minus = zero_like(path[0]), zero_like(path[0])
-    for t in range(0, len(reeled), 2):
-        slid_plus = _slid(tendons.nonideal, tendons.state, t, path[0])
-        slid_minus = _slid(tendons.nonideal, tendons.state, t + 1, path[1])
-        plus = plus + _at_wrist(tendons, reeled[t], t, path, slid_plus)
-        minus = minus + _at_wrist(tendons, reeled[t + 1], t + 1, path, slid_minus)
-    return plus, minus
-
-
-@implements(pulls_at_start, RealTendons)
-def _stuck_pulls(tendons: Any, reeled: Any, path: Any) -> Any:
-    plus, minus = zero_like(path[0]), zero_like(path[0])
-    for t in range(0, len(reeled), 2):
-        plus = plus + _at_wrist(tendons, reeled[t], t, path, tendons.state[row_of(t, Z)])
-        minus = minus + _at_wrist(tendons, reeled[t + 1], t + 1, path, tendons.state[row_of(t + 1, Z)])
+    for t in range(0, len(spool_input), 2):
+        plus = plus + pull_at_start(tendons, spool_input, t, path)
+        minus = minus + pull_at_start(tendons, spool_input, t + 1, path)
     return plus, minus
 
 
 @by_type
-def _slope(tendons: Any, length: Any, t: int, path: Any, speed: Any) -> Any:
+def pull_slope(tendons: Any, length: Any, t: int, path: Any, speed: Any) -> Any:
     """Fall of one tendon's pull with its path's shortening at the start of a step [N/m]."""
     raise NotImplementedError("compiled code only")
 
 
-@implements(_slope, ElasticTendons)
-def _elastic_slope(tendons: Any, length: Any, t: int, path: Any, speed: Any) -> Any:
-    x = path[t % 2]
-    return where(length - x > 0.0, tendons.stiffness, 0.0)
+@implements(pull_slope, ElasticTendons)
+def stretch_slope(tendons: Any, length: Any, t: int, path: Any, speed: Any) -> Any:
+    """Of a tendon that only stretches its stiffness, while it is taut."""
+    return where(length - shortening(path, t) > 0.0, stiffness_at(tendons, t), 0.0)
 
 
-@implements(_slope, RealTendons)
-def _real_slope(tendons: Any, length: Any, t: int, path: Any, speed: Any) -> Any:
-    x, nonideal, state = path[t % 2], tendons.nonideal, tendons.state
-    z, wrapped = state[row_of(t, Z)], nonideal.friction * (nonideal.sheath + path[2])
-    pull = spool_pull(tendons, length, t, x)
-    taut = where(pull > 0.0, state[row_of(t, SHARE)] * tendons.stiffness, 0.0)
+@implements(pull_slope, RealTendons)
+def slid_slope(tendons: Any, length: Any, t: int, path: Any, speed: Any) -> Any:
+    """Of a real tendon also the slope of its friction."""
+    nonideal, state = tendons.nonideal, tendons.state
+    z, wrapped = state[row_of(t, Z)], nonideal.friction * (nonideal.sheath + wrapped_by(path, t))
+    pull = spool_pull(tendons, length, t, shortening(path, t))
+    taut = where(pull > 0.0, state[row_of(t, SHARE)] * stiffness_at(tendons, t), 0.0)
     sliding = pull * wrapped * bristle_slope(z, speed, nonideal.bristle)
     return (taut + sliding) * capstan(wrapped, 1.0, z)
 
@@ -269,8 +325,8 @@ def _stiffen(tendons: Any, segment: Any, theta: Any, omega: Any, reeled: Any, pa
         speed_minus = speed_minus + arm_minus * omega[k]
     plus, minus = zero, zero
     for t in range(0, len(reeled), 2):
-        plus = plus + _slope(tendons, reeled[t], t, path, speed_plus)
-        minus = minus + _slope(tendons, reeled[t + 1], t + 1, path, speed_minus)
+        plus = plus + pull_slope(tendons, reeled[t], t, path, speed_plus)
+        minus = minus + pull_slope(tendons, reeled[t + 1], t + 1, path, speed_minus)
     for i in range(n):
         for j in range(n):
             by_theta[i, j] = by_theta[i, j] + plus * ahead[i] * ahead[j] + minus * behind[i] * behind[j]
@@ -283,27 +339,31 @@ def update_memory(tendons: Any, theta: Any, spool_input: Any, path: Any) -> None
 
 
 @implements(update_memory, NoTendons, ElasticTendons)
-def _update_nothing(tendons: Any, theta: Any, spool_input: Any, path: Any) -> None:
-    pass
+def update_nothing(tendons: Any, theta: Any, spool_input: Any, path: Any) -> None:
+    """There is no state."""
 
 
 @implements(update_memory, PulledTendons)
 @compiled
-def _update_wrist(tendons: Any, theta: Any, spool_input: Any, path: Any) -> None:
+def update_wrist(tendons: Any, theta: Any, spool_input: Any, path: Any) -> None:
+    """Springs creep, and the bristles of inner friction turn."""
     state = tendons.state
     for k in range(len(theta)):
-        row = row_of(len(spool_input), PATH) + k
+        row = row_of(len(spool_input), 0) + k
         state[row] = theta[k] + tendons.nonideal.spring_keep * (state[row] - theta[k])
     remember_bend(tendons.inner, theta)
 
 
 @implements(update_memory, RealTendons)
-def _update_tendons(tendons: Any, theta: Any, reeled: Any, path: Any) -> None:
+@compiled
+def update_tendons(tendons: Any, theta: Any, reeled: Any, path: Any) -> None:
+    """Tendons have slid and creep, beside the wrist's own."""
     nonideal, state = tendons.nonideal, tendons.state
     for t in range(len(reeled)):
-        state[row_of(t, Z)] = _slid(nonideal, state, t, path[t % 2])
-        stretch, crept = maximum(0.0, reeled[t] - path[t % 2]), row_of(t, _CREPT)
+        x = shortening(path, t)
+        state[row_of(t, Z)] = _slid(tendons, t, x)
+        stretch, crept = maximum(0.0, reeled[t] - x), row_of(t, CREPT)
         state[crept] = stretch + nonideal.tendon_keep * (state[crept] - stretch)
-    for i in range(PATH):
-        state[i] = path[i]
-    _update_wrist(tendons, theta, reeled, path)
+        state[row_of(t, X)] = x
+        state[row_of(t, WRAPPED)] = wrapped_by(path, t)
+    update_wrist(tendons, theta, reeled, path)

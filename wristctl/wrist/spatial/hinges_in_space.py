@@ -31,6 +31,7 @@ from wristctl.wrist.spatial.spatial_tendons import (
     share_of,
     tendons_torques,
 )
+from wristctl.wrist.spatial.spooled_tendons import travel_in_space
 from wristctl.wrist.spatial.stumpff import slopes, stumpff
 from wristctl.wrist.tendon_layout import TendonLayout
 
@@ -207,6 +208,7 @@ HINGES_IN_SPACE = PlantModel(
     values=values,
     advance=spatial_step,
     bend_of=bend_in_space,
+    travel=travel_in_space,
     within=within_bends,
     disturbed=load_in_space,
     tips=_tips,

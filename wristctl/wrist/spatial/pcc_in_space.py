@@ -19,7 +19,9 @@ from wristctl.wrist.spatial.spatial_segments import (
     load_tip,
     spatial_values,
 )
+from wristctl.wrist.spatial.spatial_statics import spatial_equilibrium
 from wristctl.wrist.spatial.spatial_step import spatial_step
+from wristctl.wrist.spatial.spooled_tendons import travel_in_space
 from wristctl.wrist.tendon_layout import TendonLayout
 
 _with_segment = replacing("segment")
@@ -62,13 +64,17 @@ def load_in_space(plant: Any, force: Any, scale: Any) -> Any:
 
 
 def placed_values(wrist: WristParameters, layout: TendonLayout, n: int) -> Array:
-    """The parameters' values of a wrist with tendons like these, cut into n segments."""
+    """The parameters' values of a wrist with tendons like these, cut into n segments.
+
+    UserError for a taper of several.
+    """
+    check_even(wrist, n)
     return spatial_values(wrist, layout, n, axis=math.radians(wrist.stiffness_axis_deg))
 
 
-def _values(wrist: WristParameters, n: int) -> Array:
-    check_even(wrist, n)
-    return placed_values(wrist, TendonLayout.of(wrist), n)
+def _equilibrium(wrist: WristParameters, n: int, tensions: tuple[float, float]) -> Array:
+    layout = TendonLayout.of(wrist)
+    return spatial_equilibrium(placed_values(wrist, layout, n), n, layout.multiplicity * tensions[0])
 
 
 PCC_IN_SPACE = PlantModel(
@@ -76,12 +82,14 @@ PCC_IN_SPACE = PlantModel(
     parameters=SpatialWrist,
     planes=2,
     coordinates=lambda n: 2 * n,
-    values=_values,
+    values=lambda wrist, n: placed_values(wrist, TendonLayout.of(wrist), n),
     advance=spatial_step,
     bend_of=bend_in_space,
+    travel=travel_in_space,
     within=within_bends,
     disturbed=load_in_space,
     tips=lambda wrist, q: spatial_tips(q, wrist.length),
     frames=lambda wrist, q, shares: spatial_frames(q, wrist.length, shares),
     read=_read,
+    equilibrium=_equilibrium,
 )

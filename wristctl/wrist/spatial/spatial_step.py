@@ -6,33 +6,42 @@ The step's `spool_input` holds a row for each tendon: pulls or reeled lengths, b
 
 from typing import Any
 
+import wristctl.wrist.spatial.spatial_resistance  # noqa: F401 what stops and friction of places give to the residual
 from wristctl.lanes.compiled import compiled
 from wristctl.lanes.lane import sqrt
 from wristctl.lanes.rows import lanes_like
-from wristctl.wrist.integrator import Held, accelerate, factorise, rodas3, solve
+from wristctl.wrist.integrator import Held, accelerate, factorise, rodas3, solve, yield_, yield_jacobians
+from wristctl.wrist.plant import path_along, path_before
 from wristctl.wrist.spatial.spatial_dynamics import bent_wrist, spatial_bias, spatial_equation
 from wristctl.wrist.spatial.spatial_jacobian import spatial_jacobians
-from wristctl.wrist.spatial.spooled_tendons import pulls_of_tendons, stiffen_by_tendons
+from wristctl.wrist.spatial.spooled_tendons import stiffen_by_tendons
+from wristctl.wrist.tendon_mechanics import acting_pulls, pull_along
 
 
 @compiled
 def _accelerations(held: Any, q: Any, rate: Any, mass: Any, a: Any) -> None:
-    pulls = lanes_like(held.spool_input)
-    pulls_of_tendons(held.tendons, held.plant, q, held.spool_input, pulls)
+    tendons, pulls = held.tendons, lanes_like(held.spool_input)
+    path = path_along(tendons, held.plant, q)
+    for t in range(len(pulls)):
+        pulls[t] = pull_along(tendons, held.spool_input, t, path)
     spatial_equation(held.plant, q, rate, pulls, mass, a)
+    yield_(tendons, held.plant, q, rate, held.spool_input, a)
     factorise(mass)
     solve(mass, a)
 
 
 @compiled
 def _linearised(held: Any, q: Any, rate: Any, linear: Any) -> None:
-    wrist, pulls = held.plant, lanes_like(held.spool_input)
-    pulls_of_tendons(held.tendons, wrist, q, held.spool_input, pulls)
+    wrist, tendons, pulls = held.plant, held.tendons, lanes_like(held.spool_input)
+    path = path_before(tendons, wrist, q)
+    acting_pulls(tendons, held.spool_input, path, pulls)
     bent = bent_wrist(wrist, q, pulls, linear.mass)
     spatial_bias(wrist.segment, q, rate, bent.posture, bent.tangent, bent.torques.torque, linear.acceleration)
+    yield_(tendons, wrist, q, rate, held.spool_input, linear.acceleration)
     accelerate(linear.mass, linear.factors, linear.acceleration)
     spatial_jacobians(wrist.segment, q, rate, linear.acceleration, bent, linear.by_q, linear.by_rate)
-    stiffen_by_tendons(held.tendons, wrist, q, rate, pulls, linear.by_q)
+    stiffen_by_tendons(tendons, wrist, q, rate, held.spool_input, path, linear.by_q)
+    yield_jacobians(tendons, q, rate, linear.by_q, linear.by_rate)
 
 
 @compiled

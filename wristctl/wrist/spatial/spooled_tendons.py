@@ -1,146 +1,142 @@
-"""Tendons between spools and a wrist in two planes, as the integration step evaluates them; a row for each tendon.
+"""Tendons between spools and a wrist in two planes, as the integration step evaluates them; a row for each place.
 
-By the type of `tendons` the step's `spool_input` is a pull [N] that is held (NoTendons, HeldPlaces), or the length [m]
-that a spool has reeled in of an elastic tendon: that pulls stiffness times stretch, and never pushes. A rubbing tendon
-pulls less at the wrist than at its spool where it is reeled in, and more where it is paid out: the capstan's equation
-with a Dahl bristle, as `wristctl.wrist.tendon_mechanics` has it in one plane.
-
-Those of a loop, at places, break at a time, and lag behind their spools within a backlash.
+What a tendon does is `wristctl.wrist.tendon_mechanics`'s, as in one plane. Each place has a path, stiffness, friction
+and faults of its own: its travel along the bent wrist, and the bends of the segments that it runs along, which wrap it.
 """
 
 from typing import Any, NamedTuple
 
 from wristctl.lanes.compiled import by_type, compiled, implements
-from wristctl.lanes.functions import maximum
-from wristctl.lanes.lane import sqrt, where, zero_like
-from wristctl.lanes.rows import lanes_like, part, rows_of
-from wristctl.wrist.dahl import bristle, bristle_slope
-from wristctl.wrist.plant import acting_pulls, path_along, path_before
+from wristctl.lanes.lane import sqrt, zero_like
+from wristctl.lanes.rows import entries, lanes_like, part, rows_of
+from wristctl.lanes.space import first_third
+from wristctl.wrist.dahl import inner_in_lanes
+from wristctl.wrist.plant import no_path, path_along, path_before, travelled
 from wristctl.wrist.spatial.spatial_segments import OF_A_TENDON
 from wristctl.wrist.spatial.spatial_tendons import lengths_along, moment_arms_of, share_of
-from wristctl.wrist.tendon_mechanics import ElasticTendons, NoTendons, capstan, tendons_in_lanes, update_memory
+from wristctl.wrist.tendon_mechanics import (
+    WRAPPED,
+    Fault,
+    NoTendons,
+    X,
+    held_pull,
+    pull_along,
+    pull_at_start,
+    pull_slope,
+    read_nonideal,
+    row_of,
+    slid_pull,
+    slid_slope,
+    stiffness_at,
+    stretch_pull,
+    stretch_slope,
+    stuck_pull,
+    tendons_in_lanes,
+    update_memory,
+    update_nothing,
+    update_tendons,
+    update_wrist,
+)
 
-# Rows of the state of one rubbing tendon: travel before the step [m], and its bristle.
-OF_A_STATE = 2
 
+class PulledPlaces(NamedTuple):
+    """Places whose pulls are held, as PulledTendons in one plane, with the Fault of each.
 
-class RubbingTendons(NamedTuple):
-    """Elastic tendons with friction; lanes, SI units."""
-
-    stiffness: Any
-    """Of each tendon [N/m], T rows."""
-    friction: Any
-    sheath: Any
-    """Angle by which each tendon is wrapped before it reaches the wrist [rad]."""
-    slope: Any
-    """One over the path in which friction turns round [1/m]."""
-    state: Any
-    """OF_A_STATE rows for each tendon."""
-
-
-class HeldPlaces(NamedTuple):
-    """Places whose pulls are held, until their tendons break at a time [s].
-
-    `left` are rows to work on. In one block's arrays `pulls` is a tuple with an entry for each place.
+    In one block's arrays `pulls` is a tuple with an entry for each place, and `faults` are rows.
     """
 
-    broken_at: Any
-    left: Any
+    nonideal: Any
+    faults: Any
+    state: Any
+    inner: Any
     pulls: Any
 
 
 class ElasticPlaces(NamedTuple):
-    """Places of elastic tendons: the stiffness of all of a place [N/m] before they break, as long as they are whole,
-    the time at which they break [s], the backlash of all [m], and the length [m] that each has reeled in.
+    """Places of tendons that only stretch: the stiffness of all of each [N/m], T rows.
 
     In one block's arrays `pulls` is a tuple with an entry for each place.
     """
 
-    whole: Any
-    broken_at: Any
-    backlash: Any
     stiffness: Any
-    reeled: Any
     pulls: Any
 
 
-class RubbingPlaces(NamedTuple):
-    """ElasticPlaces with friction, its values and state as those of RubbingTendons, and travels to work on [m].
+class RealPlaces(NamedTuple):
+    """Places of tendons with friction, creep and faults, as RealTendons in one plane: the stiffness of all of each
+    [N/m], T rows, as long as they are whole, Nonideal, the Fault of each, their state, inner friction.
 
-    In one block's arrays `friction` holds coefficient, sheath and slope.
+    In one block's arrays `pulls` is a tuple with an entry for each place, and `faults` are rows.
     """
 
-    whole: Any
-    broken_at: Any
-    backlash: Any
     stiffness: Any
-    reeled: Any
-    friction: Any
-    sheath: Any
-    slope: Any
+    nonideal: Any
+    faults: Any
     state: Any
-    travel: Any
+    inner: Any
     pulls: Any
 
 
-@implements(tendons_in_lanes, HeldPlaces)
-def _held_in_lanes(tendons: Any) -> Any:
-    pulls = tendons.pulls
-    return HeldPlaces(part(rows_of(tendons.broken_at), 0, pulls), part(rows_of(tendons.left), 0, pulls), pulls)
+@compiled
+def read_faults(rows: Any, pulls: Any) -> Any:
+    """Fault with rows for each place, of rows one after the other."""
+    count = len(pulls)
+    return Fault(
+        part(rows, 0, pulls), part(rows, count, pulls), part(rows, 2 * count, pulls), part(rows, 3 * count, pulls)
+    )
+
+
+@implements(tendons_in_lanes, PulledPlaces)
+def _pulled_in_lanes(tendons: Any) -> Any:
+    return PulledPlaces(
+        read_nonideal(rows_of(tendons.nonideal)), read_faults(rows_of(tendons.faults), tendons.pulls),
+        rows_of(tendons.state), inner_in_lanes(tendons.inner), tendons.pulls,
+    )  # fmt: skip
 
 
 @implements(tendons_in_lanes, ElasticPlaces)
 def _elastic_in_lanes(tendons: Any) -> Any:
-    pulls = tendons.pulls
-    return ElasticPlaces(
-        part(rows_of(tendons.whole), 0, pulls), part(rows_of(tendons.broken_at), 0, pulls),
-        rows_of(tendons.backlash)[0], part(rows_of(tendons.stiffness), 0, pulls),
-        part(rows_of(tendons.reeled), 0, pulls), pulls,
+    return ElasticPlaces(part(rows_of(tendons.stiffness), 0, tendons.pulls), tendons.pulls)
+
+
+@implements(tendons_in_lanes, RealPlaces)
+def _real_in_lanes(tendons: Any) -> Any:
+    return RealPlaces(
+        part(rows_of(tendons.stiffness), 0, tendons.pulls), read_nonideal(rows_of(tendons.nonideal)),
+        read_faults(rows_of(tendons.faults), tendons.pulls), rows_of(tendons.state), inner_in_lanes(tendons.inner),
+        tendons.pulls,
     )  # fmt: skip
 
 
-@implements(tendons_in_lanes, RubbingPlaces)
-def _rubbing_in_lanes(tendons: Any) -> Any:
-    pulls, values = tendons.pulls, rows_of(tendons.friction)
-    return RubbingPlaces(
-        part(rows_of(tendons.whole), 0, pulls), part(rows_of(tendons.broken_at), 0, pulls),
-        rows_of(tendons.backlash)[0], part(rows_of(tendons.stiffness), 0, pulls),
-        part(rows_of(tendons.reeled), 0, pulls), values[0], values[1], values[2], rows_of(tendons.state),
-        part(rows_of(tendons.travel), 0, pulls), pulls,
-    )  # fmt: skip
+implements(pull_along, PulledPlaces)(held_pull)
+implements(pull_at_start, PulledPlaces)(held_pull)
+implements(pull_along, ElasticPlaces)(stretch_pull)
+implements(pull_at_start, ElasticPlaces)(stretch_pull)
+implements(pull_along, RealPlaces)(slid_pull)
+implements(pull_at_start, RealPlaces)(stuck_pull)
+implements(pull_slope, ElasticPlaces)(stretch_slope)
+implements(pull_slope, RealPlaces)(slid_slope)
+implements(update_memory, PulledPlaces)(update_wrist)
+implements(update_memory, ElasticPlaces)(update_nothing)
+implements(update_memory, RealPlaces)(update_tendons)
+implements(path_before, PulledPlaces)(no_path)
+implements(path_along, PulledPlaces)(no_path)
+implements(path_before, ElasticPlaces)(travelled)
+implements(path_along, ElasticPlaces, RealPlaces)(travelled)
 
 
-@implements(path_before, HeldPlaces, ElasticPlaces, RubbingPlaces)
-@implements(path_along, HeldPlaces, ElasticPlaces)
-def _nothing_kept(tendons: Any, plant: Any, q: Any) -> Any:
-    return tendons.pulls
+@implements(stiffness_at, ElasticPlaces, RealPlaces)
+def _stiffness_of_each(tendons: Any, t: int) -> Any:
+    return tendons.stiffness[t]
 
 
-@implements(path_along, RubbingPlaces)
-def _travels(tendons: Any, plant: Any, q: Any) -> Any:
-    travel = tendons.travel
-    lengths_along(plant, q, travel)
+@implements(path_before, RealPlaces)
+def _remembered_paths(tendons: Any, plant: Any, q: Any) -> Any:
+    travel, wrapped = lanes_like(tendons.stiffness), lanes_like(tendons.stiffness)
     for t in range(len(travel)):
-        travel[t] = travel_of(plant, t, travel[t])
-    return tendons.pulls
-
-
-@implements(update_memory, HeldPlaces, ElasticPlaces)
-def _remember_nothing(tendons: Any, q: Any, spool_input: Any, path: Any) -> None:
-    pass
-
-
-@implements(update_memory, RubbingPlaces)
-def _remember_travels(tendons: Any, q: Any, spool_input: Any, path: Any) -> None:
-    state, travel = tendons.state, tendons.travel
-    for t in range(len(travel)):
-        state[OF_A_STATE * t + 1] = _slid(tendons, t, travel[t])
-        state[OF_A_STATE * t] = travel[t]
-
-
-@implements(acting_pulls, HeldPlaces, ElasticPlaces, RubbingPlaces)
-def _acting(tendons: Any, plant: Any, q: Any, spool_input: Any, path: Any, acts: Any) -> None:
-    pulls_of_tendons(tendons, plant, q, spool_input, acts)
+        travel[t] = tendons.state[row_of(t, X)]
+        wrapped[t] = tendons.state[row_of(t, WRAPPED)]
+    return entries(travel) + entries(wrapped)
 
 
 @compiled
@@ -150,114 +146,47 @@ def straight_length(wrist: Any, t: int) -> Any:
 
 
 @compiled
-def travel_of(wrist: Any, t: int, length: Any) -> Any:
-    """By how much a tendon's path is shorter than on the straight wrist [m], of its length [m]."""
-    return straight_length(wrist, t) - length
-
-
-@compiled
-def _wrapped(tendons: Any, wrist: Any, q: Any, t: int) -> Any:
-    """Coefficient of friction times the angle by which a tendon is wrapped."""
-    angle = tendons.sheath
+def _wrapping(wrist: Any, q: Any, t: int) -> Any:
+    """Bend of the segments that a tendon runs along [rad], summed."""
+    angle = zero_like(wrist.segment.length)
     for k in range(len(q) // 2):
         y, z = q[2 * k], q[2 * k + 1]
         angle = angle + share_of(wrist.tendons, t, k) * sqrt(y * y + z * z)
-    return tendons.friction * angle
+    return angle
 
 
 @compiled
-def _slid(tendons: Any, t: int, travel: Any) -> Any:
-    state = tendons.state
-    return bristle(state[OF_A_STATE * t + 1], travel - state[OF_A_STATE * t], tendons.slope)
+def travel_in_space(wrist: Any, q: Any) -> Any:
+    """`wristctl.wrist.plant.travel` of a SpatialWrist."""
+    travel, wrapped = lanes_like(first_third(wrist.tendons)), lanes_like(first_third(wrist.tendons))
+    lengths_along(wrist, q, travel)
+    for t in range(len(travel)):
+        travel[t] = straight_length(wrist, t) - travel[t]
+        wrapped[t] = _wrapping(wrist, q, t)
+    return entries(travel) + entries(wrapped)
 
 
 @by_type
-def pulls_of_tendons(tendons: Any, wrist: Any, q: Any, spool_input: Any, pulls: Any) -> None:
-    """Pulls [N] of all tendons on the wrist at coordinates q, into T rows."""
-    raise NotImplementedError("compiled code only")
-
-
-@by_type
-def stiffen_by_tendons(tendons: Any, wrist: Any, q: Any, rate: Any, pulls: Any, by_q: Any) -> None:
+def stiffen_by_tendons(tendons: Any, wrist: Any, q: Any, rate: Any, spool_input: Any, path: Any, by_q: Any) -> None:
     """Add to dr/dq what tendons on held spools add: arm_i (-dT/dx) arm_j of each, x its travel."""
     raise NotImplementedError("compiled code only")
 
 
-@by_type
-def remember_travel(tendons: Any, wrist: Any, q: Any) -> None:
-    """Take the tendons' state over to the end of a step, at coordinates q."""
-    raise NotImplementedError("compiled code only")
-
-
-@implements(pulls_of_tendons, NoTendons, HeldPlaces)
-def _held(tendons: Any, wrist: Any, q: Any, spool_input: Any, pulls: Any) -> None:
-    for t in range(len(pulls)):
-        pulls[t] = spool_input[t]
-
-
-@implements(stiffen_by_tendons, NoTendons, HeldPlaces)
-def _soft(tendons: Any, wrist: Any, q: Any, rate: Any, pulls: Any, by_q: Any) -> None:
+@implements(stiffen_by_tendons, NoTendons, PulledPlaces)
+def _soft(tendons: Any, wrist: Any, q: Any, rate: Any, pulls: Any, path: Any, by_q: Any) -> None:
     pass
 
 
-@implements(remember_travel, NoTendons, ElasticTendons)
-def _nothing(tendons: Any, wrist: Any, q: Any) -> None:
-    pass
-
-
-@implements(pulls_of_tendons, ElasticTendons, ElasticPlaces)
-def _stretched(tendons: Any, wrist: Any, q: Any, spool_input: Any, pulls: Any) -> None:
-    lengths_along(wrist, q, pulls)
-    for t in range(len(pulls)):
-        stretch = spool_input[t] - travel_of(wrist, t, pulls[t])
-        pulls[t] = tendons.stiffness[t] * maximum(0.0, stretch)
-
-
-@implements(pulls_of_tendons, RubbingTendons, RubbingPlaces)
-def _rubbed(tendons: Any, wrist: Any, q: Any, spool_input: Any, pulls: Any) -> None:
-    lengths_along(wrist, q, pulls)
-    for t in range(len(pulls)):
-        travel = travel_of(wrist, t, pulls[t])
-        left = capstan(_wrapped(tendons, wrist, q, t), 1.0, _slid(tendons, t, travel))
-        pulls[t] = tendons.stiffness[t] * maximum(0.0, spool_input[t] - travel) * left
-
-
-@compiled
-def _add_stiffness(stiffness: Any, arms: Any, by_q: Any) -> None:
-    for i in range(len(arms)):
-        scaled = stiffness * arms[i]
-        for j in range(len(arms)):
-            by_q[i, j] = by_q[i, j] + scaled * arms[j]
-
-
-@implements(stiffen_by_tendons, ElasticTendons, ElasticPlaces)
-def _taut(tendons: Any, wrist: Any, q: Any, rate: Any, pulls: Any, by_q: Any) -> None:
+@implements(stiffen_by_tendons, ElasticPlaces, RealPlaces)
+def _stiffen(tendons: Any, wrist: Any, q: Any, rate: Any, reeled: Any, path: Any, by_q: Any) -> None:
     arms, zero = lanes_like(q), zero_like(wrist.segment.length)
-    for t in range(len(pulls)):
-        moment_arms_of(wrist, q, t, arms)
-        _add_stiffness(where(pulls[t] > 0.0, tendons.stiffness[t], zero), arms, by_q)
-
-
-@implements(stiffen_by_tendons, RubbingTendons, RubbingPlaces)
-def _taut_and_rubbing(tendons: Any, wrist: Any, q: Any, rate: Any, pulls: Any, by_q: Any) -> None:
-    arms, zero = lanes_like(q), zero_like(wrist.segment.length)
-    for t in range(len(pulls)):
+    for t in range(len(reeled)):
         moment_arms_of(wrist, q, t, arms)
         speed = zero
         for i in range(len(q)):
             speed = speed + arms[i] * rate[i]
-        z, wrapped = tendons.state[OF_A_STATE * t + 1], _wrapped(tendons, wrist, q, t)
-        taut = where(pulls[t] > 0.0, tendons.stiffness[t], zero) * capstan(wrapped, 1.0, z)
-        _add_stiffness(taut + pulls[t] * wrapped * bristle_slope(z, speed, tendons.slope), arms, by_q)
-
-
-@implements(remember_travel, RubbingTendons)
-def _remember(tendons: Any, wrist: Any, q: Any) -> None:
-    state = tendons.state
-    count = len(wrist.tendons) // OF_A_TENDON
-    lengths = lanes_like(tendons.stiffness)
-    lengths_along(wrist, q, lengths)
-    for t in range(count):
-        travel = travel_of(wrist, t, lengths[t])
-        state[OF_A_STATE * t + 1] = _slid(tendons, t, travel)
-        state[OF_A_STATE * t] = travel
+        stiffness = pull_slope(tendons, reeled[t], t, path, speed)
+        for i in range(len(q)):
+            scaled = stiffness * arms[i]
+            for j in range(len(q)):
+                by_q[i, j] = by_q[i, j] + scaled * arms[j]
