@@ -158,6 +158,29 @@ def test_a_tendon_breaks_in_a_trial_and_stays_broken() -> None:
     assert truth.angle[-1, 0] < -0.01 and truth.angle[-1, 1] > 0.01
 
 
+def test_a_tendon_slips_in_a_trial_by_itself() -> None:
+    host = hosted(actuator=StepperActuator(slips_at=0.3, slip=1e-3, slipping_tendon=3, friction=0.0))
+    host.reel(ALL)
+    host.bench.begin(host.bench.transport.now())
+    host.rest(0.5)
+    truth = host.bench.truth()
+    lost = (
+        0.5 * 1e-3 * SLIDING.tendon_stiffness
+    )  # the wrist bends, and shares it out to the tendon and the opposite one
+    assert truth.pull[-1] == pytest.approx(truth.pull[-400] - lost * np.array([0.0, 1.0, 1.0, 0.0]), abs=0.1)
+    assert truth.angle[-1, 0] < -1e-2 and truth.angle[-1, 1] > 1e-2
+
+
+@pytest.mark.parametrize(
+    "plant", [{"inner_friction": 0.05}, {"creep": 0.3, "creep_time": 0.2}, {"end_stop_deg": 4.0}], ids=str
+)
+def test_a_bend_in_one_plane_is_the_planar_bench_with_all_that_the_wrist_has(plant: dict[str, Any]) -> None:
+    flat, spatial = (course((300, 300, -300, -300), planes=planes, plant=plant) for planes in (1, 2))
+    plain = course((300, 300, -300, -300))
+    assert np.abs(spatial.angle[-1, 0] - flat.angle[-1]).max() < 1e-4
+    assert abs(plain.angle[-1, 0] - spatial.angle[-1, 0]) > 1e-3
+
+
 def test_backlash_holds_back_a_tendon_that_is_paid_out() -> None:
     pulls = []
     for backlash in (0.0, 2e-4):

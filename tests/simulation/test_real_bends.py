@@ -77,7 +77,7 @@ def test_a_motion_in_a_plane_is_the_planar_one_with_all_that_a_real_wrist_has(le
     assert np.abs(bend[:, side] - without).max() > 1e-4, "it does something"
 
 
-WRIST = WristParameters(damping=0.04)
+WRIST = WristParameters(damping=0.04, flexion_ratio=1.3, stiffness_axis_deg=25.0)
 SOFT = Actuator(level="tendon", tendon_stiffness=4e3, friction=0.2, sheath=0.5, presliding=2e-4)
 SMOOTH = SOFT.model_copy(update={"friction": 0.0})
 END, STEP = 0.3, 5e-5
@@ -111,8 +111,9 @@ def real(fact: str, n: int, turn: float = 0.0) -> Wrist:
     actuator, facts, plant = FACTS[fact]
     c, s = np.cos(turn), np.sin(turn)
     force = (0.2, 0.5 * c, 0.5 * s)
+    wrist = WRIST.model_copy(update={"stiffness_axis_deg": WRIST.stiffness_axis_deg + np.degrees(turn)})
     return Wrist(
-        WRIST, layout(turn), actuator, TrueActuator.model_validate(facts), TrueWrist.model_validate(plant), n, force
+        wrist, layout(turn), actuator, TrueActuator.model_validate(facts), TrueWrist.model_validate(plant), n, force
     )
 
 

@@ -15,6 +15,7 @@ from wristctl.simulation.repetitions import Simulation
 from wristctl.simulation.rollout import rollout
 from wristctl.simulation.trajectory import Trajectory
 from wristctl.wrist.directions import in_plane
+from wristctl.wrist.tendon_layout import TendonLayout
 
 pytestmark = pytest.mark.slow
 
@@ -101,6 +102,31 @@ def test_a_tendon_that_is_lost_pulls_no_more_and_the_others_hold_what_they_can(t
     assert np.asarray(course.acting)[late].sum(axis=1).min() > 0.0
     with pytest.raises(UserError, match="tendon 5 of 4"):
         followed(circumduction(TIME, 0.1, 1.0), real(plant={"actuator": {"broken_at": 0.7, "broken_tendon": 5}}))
+
+
+@pytest.mark.parametrize("level", ["ideal", "tendon"])
+def test_of_tendons_alike_at_a_place_one_breaks_and_the_rest_of_them_goes_on(level: str) -> None:
+    places = tuple({"angle_deg": angle, "multiplicity": 1 + (angle == 90.0)} for angle in (90.0, 210.0, 330.0))
+    wrist = WristParameters.model_validate({"tendons": places})
+    still, faults = np.zeros((2, 3, 100)), {"actuator": {"broken_at": 0.2, "broken_tendon": 1}}
+    loop = real(plant=faults, actuator={"level": level, "friction": 0.0}, sensor={"level": "ideal"})
+    pulls = np.asarray(followed(still, loop, wrist).acting) / wrist.pretension
+    assert pulls[39] == pytest.approx([1.0, 2.0, 2.0], abs=0.1), "two balance two others"
+    assert pulls[40] == pytest.approx([0.5, 2.0, 2.0], abs=0.1), "of one tendon on average"
+
+
+@pytest.mark.parametrize("tendon", [1, 4])
+def test_a_place_that_slips_pays_out_once_and_bends_the_wrist_away_from_it(tendon: int) -> None:
+    still, facts = np.zeros((2, 3, 100)), {"slips_at": 0.2, "slip": 2e-4, "slipping_tendon": tendon}
+    loop = real(plant={"actuator": facts}, actuator={"level": "tendon", "friction": 0.0}, sensor={"level": "ideal"})
+    course = followed(still, loop)
+    before, after = np.asarray(course.acting)[39], np.asarray(course.acting)[40]
+    slack = np.maximum(before[tendon - 1] - 2e-4 * loop.actuator.tendon_stiffness, 0.0)
+    assert after[tendon - 1] == pytest.approx(slack) and np.delete(after, tendon - 1) == pytest.approx(before[1])
+    place = TendonLayout.of(WRIST).cross_section[tendon - 1]
+    assert course.bend[60] @ place < -1e-6
+    with pytest.raises(UserError, match="tendon 5 of 4 cannot slip"):
+        followed(still, real(plant={"actuator": facts | {"slipping_tendon": 5}}))
 
 
 def test_slack_in_one_tendon_bends_the_wrist_away_until_it_is_reeled_in() -> None:
