@@ -173,7 +173,7 @@ def test_three_tendons_bend_in_two_planes_on_any_reference(kind: str) -> None:
 @pytest.mark.parametrize("setting", ["slack=[1e-3]", "broken_tendon=2", "slipping_tendon=2"])
 def test_what_only_two_planes_have_is_refused_in_one(setting: str) -> None:
     rig = ("simulate.loop.actuator.level=tendon", f"simulate.loop.plant.actuator.{setting}")
-    study = wristctl.load_study(None, "simulate.horizon=0.1", *rig)
+    study = wristctl.load_study(None, "simulate.horizon=0.1", "simulate.loop.planes=1", *rig)
     with pytest.raises(UserError, match="bends in one plane") as refused:
         wristctl.simulate(study)
     assert setting.split("=")[0] in str(refused.value)
@@ -213,9 +213,9 @@ def test_what_cannot_run_in_two_planes_is_refused_before_it_runs(settings: tuple
 
 
 def test_other_commands_refuse_a_reference_in_two_planes() -> None:
-    study = wristctl.load_study(None, "compare.references=[{kind: circumduction}]", "compare.inverses=[none]")
+    study = wristctl.load_study(None, "simulate.reference.kind=circumduction")  # whose loop it analyses
     with pytest.raises(UserError, match="bends in two planes"):
-        wristctl.compare(study)
+        wristctl.analyse(study)
 
 
 def test_a_bend_out_of_reach_is_said_with_what_holds_it_not() -> None:

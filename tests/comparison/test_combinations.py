@@ -72,11 +72,15 @@ def test_the_number_of_rollouts_counts_repetitions_only_where_something_is_drawn
 
 def test_a_direction_is_named_only_where_there_are_several_and_wrists_lie_in_its_plane() -> None:
     tilted = "wrist.gravity_flexion=4.0"
-    (one,) = planned(study("loops={one: {}}", "references=[{kind: step}]", "inverses=[none]", tilted))
+    (one,) = planned(study("loops={one: {planes: 1}}", "references=[{kind: step}]", "inverses=[none]", tilted))
     assert [course.reference for course in one.courses] == ["step 30 deg"]
     ulnar, extension = planned(
         study(
-            "loops={one: {}}", "references=[{kind: step}]", "inverses=[none]", "directions=[ulnar, extension]", tilted
+            "loops={one: {planes: 1}}",
+            "references=[{kind: step}]",
+            "inverses=[none]",
+            "directions=[ulnar, extension]",
+            tilted,
         )
     )
     assert [each.courses[0].reference for each in (ulnar, extension)] == [

@@ -25,8 +25,7 @@ from wristctl.lanes.compiled import _BODIES, sources
 from wristctl.simulation.outcome import Outcome
 from wristctl.simulation.reference import motion
 from wristctl.simulation.rollout import rollout
-from wristctl.wrist.plant import PLANTS, PlantModel, poses
-from wristctl.wrist.spatial.spatial_segments import SpatialWrist
+from wristctl.wrist.plant import PLANTS, PLANTS_IN_SPACE, PlantModel, poses
 from wristctl.wrist.spatial.spooled_tendons import ElasticPlaces, PulledPlaces, RealPlaces
 
 __all__ = ["host_on"]  # a fixture of the bench's tests
@@ -153,7 +152,7 @@ def test_a_wrist_bent_beyond_what_its_plant_can_be_has_failed_and_stays_where_it
 
 
 # Tendons that no plant in one plane has.
-IN_SPACE = {SpatialWrist, PulledPlaces, ElasticPlaces, RealPlaces}
+IN_SPACE = {*(plant.parameters for plant in PLANTS_IN_SPACE.values()), PulledPlaces, ElasticPlaces, RealPlaces}
 
 
 def _reached(functions: Iterable[CPUDispatcher], others: Collection[type]) -> set[Path]:

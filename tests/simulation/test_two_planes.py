@@ -220,8 +220,6 @@ def test_what_cannot_run_is_said() -> None:
         bend_path("square", 10.0, 1.0, 1.0)
     with pytest.raises(UserError, match="beyond the wrist's range"):
         bends_of(Reference(kind="circumduction", angle_deg=WRIST.range_deg + 1.0), "ulnar", WRIST, 2.0, 1e-3)
-    with pytest.raises(UserError, match=r"no loop in two planes has plant\.model: hinges"):
-        followed(bend_path("circle", 10.0, 1.0, 1.0), loop=Loop.model_validate({"plant": {"model": "hinges"}}))
     with pytest.raises(UserError, match="end stop at 14 deg lies inside the reference's range, 15 deg"):
         path = bend_path("circle", 15.0, 1.0, 1.0, 45.0)
         followed(path, loop=Loop.model_validate({"plant": {"end_stop_deg": 14.0}}))

@@ -12,7 +12,8 @@ from wristctl.wrist.directions import ACTIVE, DIRECTIONS, TENDONS, Direction, in
 
 SETTINGS = (
     "controllers=[{controller: computed-torque, gains: default}]", "inverses=[none]", "horizon=0.8",
-    "loops={four-segments: {}}", "references=[{duration: 0.5}]", "directions=[ulnar, radial, flexion, extension]",
+    "loops={four-segments: {planes: 1}}", "references=[{duration: 0.5}]",
+    "directions=[ulnar, radial, flexion, extension]",
 )  # fmt: skip
 
 

@@ -98,8 +98,10 @@ def _of_class(findings: Findings, ranking: Ranking, results: Sequence[ComparedRo
     courses = [result.simulation.trajectory for result in shown]
     slug, where = _slug(ranking.name), f"{condition(ranking)}: loop {cell[0]}, {cell[1]}"
     caption = f"Angle and error of the best controllers and of the paper's, {where}"
-    side_by_side = overlay if courses[0].planes == 1 else bend_overlay
-    findings.figure(f"overlay-{slug}", side_by_side, courses, where, later=ranking.jumps, caption=caption)
+    if courses[0].planes == 1:
+        findings.figure(f"overlay-{slug}", overlay, courses, where, later=ranking.jumps, caption=caption)
+    else:
+        findings.figure(f"overlay-{slug}", bend_overlay, courses, where, later=ranking.jumps, caption=caption)
     caption = f"|theta - reference| of the best rows and of the paper's laws, {where}"
     later(f"error-over-time-{slug}", errors, courses, where, log=True, caption=caption)
     tendons = "both sides" if courses[0].planes == 1 else "each tendon"
