@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -176,3 +177,16 @@ def test_metrics_of_a_trajectory_are_those_of_its_tip_and_of_the_true_wanted_ang
         "drift": 0.0,
         "range_untracked": 0.0,
     }
+
+
+def test_the_observer_is_judged_by_what_it_expects_of_itself_in_both_planes() -> None:
+    """Off by 0.02 rad toward ulnar and 0.06 toward flexion: where it expects that it is as good as it thinks."""
+    off, path, tips = np.tile((0.02, -0.06), (50, 1)), np.zeros((50, 2)), np.zeros((50, 3))
+    course = Trajectory(
+        "", np.arange(50.0), path, path, path, path, path, tips, tips, path, path, np.zeros((50, 4)), seen=path + off
+    )
+    for expected, judged in (((0.02, 0.06), 1.0), ((0.06, 0.02), 1.0), ((0.01, 0.03), 2.0)):
+        assert replace(course, expected=np.array(expected)).consistency == pytest.approx(judged)
+    for unknown in ((0.02, 0.0), (math.nan, 0.06)):
+        assert math.isnan(replace(course, expected=np.array(unknown)).consistency)
+    assert math.isnan(course.consistency) and math.isnan(replace(course, seen=None, expected=0.1).consistency)
