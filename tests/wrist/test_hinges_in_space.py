@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
 
+from tests.wrist.turned_in_space import turned
 from wristctl.arrays import Array
 from wristctl.config.wrist import TendonPlace, WristParameters
 from wristctl.lanes.compiled import kernel
@@ -197,22 +198,6 @@ def test_tendons_run_from_hole_to_hole_and_jacobians_are_the_derivatives(
         np.testing.assert_allclose(by_rate[:, column], (ahead[2] - behind[2]) / (2.0 * h), rtol=1e-6, atol=1e-7)
 
 
-def turned(values: Array, by: float) -> Array:
-    """Parameters of the wrist turned about its base's tangent."""
-    c, s = np.cos(by), np.sin(by)
-    turn = np.array([[c, -s], [s, c]])
-    out = dict(zip(SpatialHinges._fields, values[:COUNT].tolist(), strict=True))
-    for name in ("gravity", "force"):
-        out[f"{name}_y"], out[f"{name}_z"] = turn @ [out[f"{name}_y"], out[f"{name}_z"]]
-    for name in ("stiffness", "damping"):
-        yz = out[f"{name}_yz"]
-        matrix = turn @ np.array([[out[f"{name}_yy"], yz], [yz, out[f"{name}_zz"]]]) @ turn.T
-        out[f"{name}_yy"], out[f"{name}_yz"], out[f"{name}_zz"] = matrix[0, 0], matrix[0, 1], matrix[1, 1]
-    tendons = values[COUNT:].reshape(-1, 3).copy()
-    tendons[:, :2] = tendons[:, :2] @ turn.T
-    return np.concatenate([np.array(list(out.values())), tendons.ravel()])
-
-
 @settings(max_examples=15)
 @given(q=bends, rate=rates, pulls=tensions, by=st.sampled_from([0.5 * np.pi, np.pi, -1.1, 0.3]))
 def test_turning_everything_about_the_tangent_turns_the_motion(q: Array, rate: Array, pulls: Array, by: float) -> None:
@@ -224,7 +209,7 @@ def test_turning_everything_about_the_tangent_turns_the_motion(q: Array, rate: A
         return (pairs.reshape(-1, 2) @ turn.T).reshape(pairs.shape)
 
     end, speed = moved(VALUES, q, rate, held)
-    end_aside, speed_aside = moved(turned(VALUES, by), aside(q), aside(rate), held)
+    end_aside, speed_aside = moved(turned(SpatialHinges._fields, VALUES, by), aside(q), aside(rate), held)
     np.testing.assert_allclose(end_aside, aside(end), atol=1e-12)
     np.testing.assert_allclose(speed_aside, aside(speed), atol=1e-10)
 
@@ -236,7 +221,9 @@ def test_in_one_plane_it_is_the_planar_hinges(plane: str, milliseconds: int) -> 
     wrist = WristParameters(gravity=(-8.0, 3.0), taper=3.0)
     planar, spatial = HINGES.values(wrist, N), values_of(wrist)
     spatial, own = (
-        (spatial, slice(0, None, 2)) if plane == "ulnar" else (turned(spatial, np.pi / 2.0), slice(1, None, 2))
+        (spatial, slice(0, None, 2))
+        if plane == "ulnar"
+        else (turned(SpatialHinges._fields, spatial, np.pi / 2.0), slice(1, None, 2))
     )
     pulls, start, rate = np.array([5.0, 31.0]), np.array([0.3, -0.5]), np.array([2.0, -4.0])
     state = np.concatenate([start, rate, pulls])

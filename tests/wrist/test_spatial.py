@@ -10,6 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tests.oracles.spatial_augmented import augmented_residual, augmented_tendons, spatial_augmented
+from tests.wrist.turned_in_space import turned
 from wristctl.config.wrist import WristParameters
 from wristctl.errors import UserError
 from wristctl.wrist import compiled_model, statics
@@ -38,22 +39,6 @@ VALUES = spatial_values(WRIST, UNEVEN, N, (0.4, -1.1, 0.7), **OBLIQUE)
 bends = st.lists(st.floats(-1.4, 1.4), min_size=2 * N, max_size=2 * N).map(np.array)
 rates = st.lists(st.floats(-8.0, 8.0), min_size=2 * N, max_size=2 * N).map(np.array)
 tensions = st.lists(st.floats(0.0, 60.0), min_size=4, max_size=4).map(np.array)
-
-
-def turned(values: np.ndarray, by: float) -> np.ndarray:
-    """Parameters of the wrist turned about its base's tangent."""
-    c, s = np.cos(by), np.sin(by)
-    turn = np.array([[c, -s], [s, c]])
-    out = dict(zip(SpatialSegments._fields, values[:FIELDS].tolist(), strict=True))
-    for name in ("gravity", "force"):
-        out[f"{name}_y"], out[f"{name}_z"] = turn @ [out[f"{name}_y"], out[f"{name}_z"]]
-    for name in ("stiffness", "damping"):
-        yz = out[f"{name}_yz"]
-        matrix = turn @ np.array([[out[f"{name}_yy"], yz], [yz, out[f"{name}_zz"]]]) @ turn.T
-        out[f"{name}_yy"], out[f"{name}_yz"], out[f"{name}_zz"] = matrix[0, 0], matrix[0, 1], matrix[1, 1]
-    tendons = values[FIELDS:].reshape(-1, 3).copy()
-    tendons[:, :2] = tendons[:, :2] @ turn.T
-    return np.concatenate([np.array(list(out.values())), tendons.ravel()])
 
 
 @given(q=bends)
@@ -164,7 +149,7 @@ def of_plane(plane: str) -> tuple[np.ndarray, np.ndarray, slice]:
     spatial = spatial_values(wrist, FOUR, N, (0.3, 0.8, 0.0))
     return (
         planar,
-        spatial if plane == "ulnar" else turned(spatial, np.pi / 2.0),
+        spatial if plane == "ulnar" else turned(SpatialSegments._fields, spatial, np.pi / 2.0),
         slice(int(plane == "flexion"), None, 2),
     )
 
@@ -200,7 +185,9 @@ def test_turning_everything_about_the_tangent_turns_the_motion(
     def aside(pairs: np.ndarray) -> np.ndarray:
         return (pairs.reshape(-1, 2) @ turn.T).reshape(pairs.shape)
 
-    end_aside, speed_aside = spatial_integrate(turned(VALUES, by), aside(q), aside(rate), pulls, times)
+    end_aside, speed_aside = spatial_integrate(
+        turned(SpatialSegments._fields, VALUES, by), aside(q), aside(rate), pulls, times
+    )
     np.testing.assert_allclose(end_aside, aside(end), atol=1e-12)
     np.testing.assert_allclose(speed_aside, aside(speed), atol=1e-10)
 
