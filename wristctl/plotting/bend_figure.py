@@ -7,7 +7,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from wristctl.arrays import Array
-from wristctl.plotting.loop_figures import LEAST_DEG, draw_course, label
+from wristctl.plotting.loop_figures import draw_course, draw_sizes_of_errors, label
 from wristctl.plotting.style import (
     BLACK,
     DOTTED,
@@ -19,7 +19,6 @@ from wristctl.plotting.style import (
     figure,
     legend_below,
     line,
-    logarithmic,
     title,
 )
 from wristctl.simulation.trajectory import Trajectory
@@ -63,11 +62,9 @@ def bend_overlay(courses: Sequence[Trajectory], heading: str = "") -> Figure:
     left.plot(*np.rad2deg(courses[0].bend_ref).T, **WANTED | {"label": "wanted"})
     for course in courses:
         left.plot(*np.rad2deg(course.bend).T, label=label(course), **line(course.label))
-        right.plot(course.time, np.maximum(np.degrees(course.distance), LEAST_DEG), **line(course.label))
     left.set_aspect("equal", adjustable="datalim")
     left.set(xlabel="bend toward ulnar [deg]", ylabel="bend toward flexion [deg]")
-    logarithmic(right.yaxis)
-    right.set(xlabel="time [s]", ylabel="|error| [deg]")
+    draw_sizes_of_errors(right, courses)
     title(left, heading)
     legend_below(picture)
     return picture

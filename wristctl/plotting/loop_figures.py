@@ -24,12 +24,12 @@ from wristctl.plotting.style import (
     title,
 )
 from wristctl.simulation.repetitions import Repeated
-from wristctl.simulation.trajectory import Trajectory
+from wristctl.simulation.trajectory import Trajectory, size_of
 
 # Errors below this [rad] are not shown on a logarithmic axis.
 _SMALLEST = 1e-8
 # Error that nobody can measure [deg].
-LEAST_DEG = 1e-3
+_LEAST_DEG = 1e-3
 # Samples in the close-up of tensions.
 _LAST = 20
 # Parts of a long course of which each is drawn by its least and its largest value, and samples in a part from there on.
@@ -139,20 +139,29 @@ def overlay(trajectories: Sequence[Trajectory], heading: str = "") -> Figure:
     picture, ((above,), (below,)) = figure(2, 1, height=4.4, sharex=True)
     for course in trajectories:
         above.plot(course.time, np.degrees(course.theta), label=label(course), **line(course.label))
-        error = np.maximum(np.degrees(np.abs(course.error)), LEAST_DEG)
-        below.plot(course.time, error, **line(course.label))
     draw_desired(above, trajectories)
     within_half_a_move(above, trajectories)
-    logarithmic(below.yaxis)
+    draw_sizes_of_errors(below, trajectories)
     largest = max(float(np.degrees(np.abs(course.theta_ref)).max()) for course in trajectories)
-    _at_most(below, 0.5 * LEAST_DEG, 2.0 * largest + 1.0)
+    _at_most(below, 0.5 * _LEAST_DEG, 2.0 * largest + 1.0)
     above.set(ylabel="bending angle [deg]")
-    floored = any((np.degrees(np.abs(course.error)) < LEAST_DEG).any() for course in trajectories)
-    least = f"\n(less than {LEAST_DEG:g} as {LEAST_DEG:g})" if floored else ""
-    below.set(xlabel="time [s]", ylabel=f"|error| [deg]{least}")
     title(above, heading)
     legend_below(picture)
     return picture
+
+
+def draw_sizes_of_errors(axes: Axes, trajectories: Sequence[Trajectory]) -> None:
+    """Draw the size of each error [deg] over time [s] on a logarithmic axis.
+
+    What nobody can measure is drawn as 0.001 deg, and the axis says so.
+    """
+    sizes = [np.degrees(course.distance) for course in trajectories]
+    for course, size in zip(trajectories, sizes, strict=True):
+        axes.plot(course.time, np.maximum(size, _LEAST_DEG), **line(course.label))
+    logarithmic(axes.yaxis)
+    floored = any((size < _LEAST_DEG).any() for size in sizes)
+    least = f"\n(less than {_LEAST_DEG:g} as {_LEAST_DEG:g})" if floored else ""
+    axes.set(xlabel="time [s]", ylabel=f"|error| [deg]{least}")
 
 
 def tensions(trajectory: Trajectory) -> Figure:
@@ -248,12 +257,6 @@ def _at_most(axes: Axes, low: float, high: float) -> None:
     axes.set_ylim(max(bottom, low), min(top, high))
 
 
-def _sizes(errors: Array) -> Array:
-    """Sizes (R, T) of errors (R, T), or (R, T, P) of planes."""
-    sizes: Array = np.abs(errors) if errors.ndim == 2 else np.linalg.norm(errors, axis=2)
-    return sizes
-
-
 def error_sizes(repeated: Sequence[Repeated], heading: str = "") -> Figure:
     """Size of the error |theta - theta_ref| [deg] over time [s]: the repetitions' median with its 95 % interval.
 
@@ -261,7 +264,8 @@ def error_sizes(repeated: Sequence[Repeated], heading: str = "") -> Figure:
     """
     picture, ((axes,),) = figure(height=3.4)
     for loop in repeated:
-        course, errors = loop.first.trajectory, np.degrees(_sizes(loop.errors))
+        course = loop.first.trajectory
+        errors = np.degrees(size_of(loop.errors.reshape(*loop.errors.shape[:2], -1)))
         median, low, high = spread_over_time(errors)
         style = line(course.label)
         label = course.label + (f", {loop.failed.sum()} failed" if loop.failed.any() else "")

@@ -221,8 +221,8 @@ class Trajectory:
 
 
 def size_of(values: Array) -> Array:
-    """Norms (T,) of vectors (T, P): of one plane the absolute values themselves."""
-    sizes: Array = np.hypot.reduce(np.abs(values), axis=1)
+    """Norms (..., T) of vectors (..., T, P): of one plane the absolute values themselves."""
+    sizes: Array = np.hypot.reduce(np.abs(values), axis=-1)
     return sizes
 
 
