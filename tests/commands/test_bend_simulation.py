@@ -225,6 +225,17 @@ def test_a_bend_out_of_reach_is_said_with_what_holds_it_not() -> None:
     assert any("tension_limit" in note for note in done.advice)
 
 
+@pytest.mark.parametrize(("stiffer", "held"), [(1.0, True), (2.0, False)])
+def test_whether_a_bend_is_in_reach_is_judged_on_the_wrist_as_it_is(stiffer: float, held: bool) -> None:
+    """The controller's wrist is held with 12 N; one of twice its stiffness is not, and no gains help."""
+    done = simulated(
+        "simulate.reference.kind=circumduction", "simulate.reference.angle_deg=25", "simulate.reference.turn=1",
+        "wrist.tension_limit=12", f"simulate.loop.plant.stiffness_scale={stiffer}",
+    )  # fmt: skip
+    assert ("tensions of 12 N do not hold" not in done.short_of) is held
+    assert held or any("No gains can help" in note for note in done.advice)
+
+
 def test_a_push_from_the_side_bends_toward_its_direction_and_is_told_with_it() -> None:
     settings = (
         "simulate.loop.planes=2", "simulate.reference.angle_deg=0", "simulate.loop.disturbances.toward_deg=130",

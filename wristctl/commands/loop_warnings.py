@@ -21,6 +21,7 @@ from wristctl.config.wrist import WristParameters
 from wristctl.errors import UserError
 
 if TYPE_CHECKING:
+    from wristctl.arrays import Array
     from wristctl.control.law import Conditions
     from wristctl.control.shipped_gains import ShippedGains
     from wristctl.simulation.planes import Asked
@@ -232,25 +233,33 @@ def _in_space(wrist: WristParameters, asked: AskedMotion) -> bool:
 
 
 def _not_held(wrist: WristParameters, asked: AskedMotion) -> tuple[str, str] | None:
-    """A bend in two planes that the tendons do not hold, by the statics of one segment, and what helps."""
+    """A bend in two planes that the tendons do not hold, and what helps."""
     from wristctl.config.loop import sample_period
     from wristctl.simulation.planes import motion_in
-    from wristctl.simulation.worlds import plant_of
-    from wristctl.wrist.spatial.held_bends import first_beyond
-    from wristctl.wrist.tendon_layout import TendonLayout
 
     if not asked.loop.limits or not _in_space(wrist, asked):
         return None
     period = sample_period(asked.loop.control_period)
     bends = motion_in(2, by_angles(asked.reference), asked.direction, wrist, asked.horizon, period).bend_ref
-    beyond = first_beyond(plant_of(wrist, asked.loop.plant), TendonLayout.of(wrist), bends)
+    reason = bend_not_held(wrist, asked.loop, bends)
+    return (reason, "a larger tension_limit or tendon_radius, or a smaller angle_deg would do") if reason else None
+
+
+def bend_not_held(wrist: WristParameters, loop: Loop, bends: Array) -> str:
+    """The first of bends (T, 2) [rad] that the tendons of a loop's plant do not hold, in words; empty without one.
+
+    By the statics of one segment; tensions without limits hold every bend.
+    """
+    from wristctl.simulation.worlds import plant_of
+    from wristctl.wrist.spatial.held_bends import first_beyond
+    from wristctl.wrist.tendon_layout import TendonLayout
+
+    beyond = first_beyond(plant_of(wrist, loop.plant), TendonLayout.of(wrist), bends) if loop.limits else None
     if beyond is None:
-        return None
+        return ""
     ulnar, flexion = (math.degrees(bend) for bend in bends[beyond])
-    return (
-        f"tensions of {wrist.tension_limit:g} N do not hold {ulnar:.3g} deg toward ulnar with {flexion:.3g} deg toward "
-        "flexion"
-    ), "a larger tension_limit or tendon_radius, or a smaller angle_deg would do"
+    limit = f"tensions of {wrist.tension_limit:g} N"
+    return f"{limit} do not hold {ulnar:.3g} deg toward ulnar with {flexion:.3g} deg toward flexion"
 
 
 def _told(wrist: WristParameters, short: Shortfall) -> tuple[str, str]:

@@ -118,9 +118,9 @@ def bends_of(
     kind = REFERENCES[reference.kind]
     time = np.arange(round(horizon / period), dtype=np.float64) * period
     if kind.planes == 2:
-        return _within(course_of(reference, kind, time), wrist)
+        return within(course_of(reference, kind, time), wrist)
     if reference.file:
-        return _within(recorded_bends(reference, wrist, time), wrist)
+        return within(recorded_bends(reference, wrist, time), wrist)
     aim = DIRECTIONS[direction]
     references = np.zeros((2, 3, len(time)))
     facing = in_plane(wrist, direction)
@@ -128,9 +128,10 @@ def bends_of(
     return references
 
 
-def _within(bends: Array, wrist: WristParameters) -> Array:
+def within(bends: Array, wrist: WristParameters, where: str = "reference.angle_deg") -> Array:
+    """Bends (2, 3, T) [rad] as they are. Raises UserError where one is beyond the wrist's range."""
     most = float(np.rad2deg(np.hypot(*bends[:, 0]).max()))
     if most > wrist.range_deg * (1.0 + 1e-12):
         problem = f"a bend of {most:.3g} deg is beyond the wrist's range of {wrist.range_deg:g} deg"
-        raise UserError(problem, "reference.angle_deg", "ask for less, or widen wrist.range_deg")
+        raise UserError(problem, where, "ask for less, or widen wrist.range_deg")
     return bends

@@ -8,7 +8,7 @@ from wristctl.arrays import Array
 from wristctl.config.hw_run import HwRunSettings
 from wristctl.config.wrist import WristParameters
 from wristctl.errors import UserError
-from wristctl.simulation.planes import bends_of
+from wristctl.simulation.planes import bends_of, within
 from wristctl.simulation.reference import REFERENCES, motion
 from wristctl.simulation.references import minimum_jerk
 from wristctl.trial.spatial_belief import TOWARD, unit_toward
@@ -76,11 +76,7 @@ def bend_motion_of(
         raise UserError(
             "the reference has samples that are no number", "reference", "a course that is finite everywhere"
         )
-    most = float(np.rad2deg(np.hypot(*references[:, 0]).max()))
-    if most > wrist.range_deg * (1.0 + 1e-12):
-        problem = f"a bend of {most:.3g} deg is beyond the wrist's range of {wrist.range_deg:g} deg"
-        raise UserError(problem, "reference", "ask for less, or widen wrist.range_deg")
-    return BendMotion(time, references, rest, horizon)
+    return BendMotion(time, within(references, wrist, "reference"), rest, horizon)
 
 
 def bend_back(bend: Array, duration: float, rest: float, period: float) -> BendMotion:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from wristctl.commands.answer import Answer
 from wristctl.commands.inputs_of_loops import identified, tuned_gains, wrist_identified
-from wristctl.commands.loop_warnings import warn_if_coarse, warn_outside_conditions
+from wristctl.commands.loop_warnings import bend_not_held, warn_if_coarse, warn_outside_conditions
 from wristctl.commands.printed_table import degrees, joined, two
 from wristctl.commands.session import Session
 from wristctl.commands.simulate.answer import (
@@ -125,20 +125,12 @@ def simulate_in_two_planes(session: Session) -> SimulatedBends:
 def _short_of(study: Study, repeated: Repeated) -> tuple[str, list[str]]:
     """Why the loop does not arrive, and what may help."""
     from wristctl.simulation.oscillation import at_rest
-    from wristctl.wrist.spatial.held_bends import first_beyond
-    from wristctl.wrist.tendon_layout import TendonLayout
 
-    course, wrist = repeated.first.trajectory, study.wrist
+    course = repeated.first.trajectory
     off = math.degrees(repeated.first.metrics["steady_state"])
-    beyond = first_beyond(wrist, TendonLayout.of(wrist), course.bend_ref) if study.simulate.loop.limits else None
-    if beyond is not None:
-        ulnar, flexion = (math.degrees(bend) for bend in course.bend_ref[beyond])
-        reason = (
-            f"does not arrive, {off:.2g} deg off at the end: tensions of {wrist.tension_limit:g} N do not hold "
-            f"{ulnar:.3g} deg toward ulnar with {flexion:.3g} deg toward flexion"
-        )
+    if reason := bend_not_held(study.wrist, study.simulate.loop, course.bend_ref):
         fix = "No gains can help: a larger tension_limit or tendon_radius, or a smaller angle_deg."
-        return reason, [fix]
+        return f"does not arrive, {off:.2g} deg off at the end: {reason}", [fix]
     what = "arrive" if at_rest(course) else "follow"
     return f"does not {what}: {off:.2g} deg off at the end", ["Other gains or another controller may hold it."]
 
