@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+import sys
 from typing import Any, NamedTuple
 
 import numba
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 from numba.core.errors import TypingError
 
+from wristctl.lanes.blocks import to_blocks, to_rows
 from wristctl.lanes.compiled import by_type, implements, kernel
 from wristctl.lanes.lane import zero_like
-from wristctl.lanes.named_tuples import block_of, replacing, tuple_of
+from wristctl.lanes.named_tuples import block_of, borrowed, replacing, tuple_of
 from wristctl.lanes.rows import beyond, lanes_like, part, planes_like, rows_named, rows_of, square_like
 from wristctl.lanes.types import LANES
 
@@ -76,6 +80,13 @@ def _add(parts: Any, block: int) -> None:
     rows_of(own.motor.speed)[0] = rows_of(own.state)[0]
 
 
+@kernel
+def _sum(parts: Any, out: Any) -> None:
+    of_all, result = borrowed(parts), rows_of(out)
+    for row in range(of_all.state.shape[0]):
+        result[0] = result[0] + rows_of(of_all.state)[row] * rows_of(of_all.motor.speed)[0]
+
+
 @by_type
 def _heard(part: Any, x: Any) -> Any:
     """What a part makes of a number."""
@@ -125,6 +136,27 @@ def test_a_block_takes_its_own_part_and_one_block_is_every_blocks(wide: tuple[in
         _add(parts, block)
     assert [float(each.flat[0]) for each in parts.state] == [3.0, 1.0, 3.0]
     assert [float(each.flat[0]) for each in motor.speed] == [3.0, 0.0, 3.0]
+
+
+@WIDE
+def test_arrays_of_kernels_are_as_often_owned_behind_them_as_before(wide: tuple[int, ...]) -> None:
+    arrays = [np.ones((3, 1, *wide)), np.ones((1, 1, *wide)), np.ones((3, 1, *wide))]
+    flat, out = [np.full((3, *wide), 2.0), np.ones((1, *wide)), np.full((1, *wide), 5.0)], np.zeros((1, *wide))
+    owned = list(map(sys.getrefcount, arrays + flat))
+    for block in (0, 1, 2):
+        _add(Parts(arrays[0], arrays[1], 0.5, NoCamera(), Motor(arrays[2], 7)), block)
+    _sum(Parts(flat[0], flat[1], 0.5, NoCamera(), Motor(flat[2], 7)), out)
+    np.testing.assert_array_equal(out, np.full((1, *wide), 30.0))
+    assert list(map(sys.getrefcount, arrays + flat)) == owned
+
+
+@settings(max_examples=30)
+@given(st.integers(2, 40), st.integers(1, 5))
+def test_every_lane_of_blocks_lies_in_one_cache_line(count: int, variables: int) -> None:
+    rows = np.arange(float(count * variables)).reshape(count, variables)
+    blocks = to_blocks(rows)
+    assert blocks.ctypes.data % 64 == 0 and blocks.flags.c_contiguous and blocks.dtype == np.float64
+    np.testing.assert_array_equal(to_rows(blocks, count), rows)
 
 
 @WIDE

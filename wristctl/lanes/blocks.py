@@ -24,11 +24,22 @@ def lanes_of(count: int) -> NDArray[np.int64]:
     return np.minimum(np.arange(blocks * LANES), count - 1).reshape(blocks, LANES)
 
 
+def aligned(shape: tuple[int, ...]) -> Array:
+    """Zeros whose lanes each lie in one cache line: a block's lanes fill one, and what crosses two costs twice."""
+    size = int(np.prod(shape))
+    room = np.zeros(size + LANES)
+    first = -(room.ctypes.data // 8) % LANES
+    return room[first : first + size].reshape(shape)
+
+
 def to_blocks(rows: Array) -> Array:
     """(count, variables) -> (blocks, variables, LANES), or (1, variables) where there is only one."""
     if len(rows) == 1:
         return np.array(rows)
-    return np.ascontiguousarray(rows[lanes_of(len(rows))].transpose(0, 2, 1))
+    lanes = lanes_of(len(rows))
+    blocks = aligned((len(lanes), rows.shape[1], LANES))
+    blocks[...] = rows[lanes].transpose(0, 2, 1)
+    return blocks
 
 
 def spread(row: Array, count: int) -> Array:

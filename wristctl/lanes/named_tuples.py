@@ -7,6 +7,7 @@ from typing import Any
 
 import numba
 from llvmlite import ir
+from numba.core import cgutils
 from numba.core.typing.templates import signature
 from numba.extending import intrinsic
 
@@ -57,7 +58,7 @@ def _own(array: Any, block: Any) -> Any:
 
 @intrinsic
 def block_of(typingctx: Any, parts: Any, block: numba.types.Integer) -> Any:
-    """One block's part of a NamedTuple of arrays [block, ...]: an array of one block is every block's.
+    """One block's part of a NamedTuple of arrays [block, ...], `borrowed`: an array of one block is every block's.
 
     Numbers and functions stay as they are, NamedTuples within are taken apart likewise.
     """
@@ -68,9 +69,40 @@ def block_of(typingctx: Any, parts: Any, block: numba.types.Integer) -> Any:
 
     def codegen(context: Any, builder: Any, sig: Any, args: list[Any]) -> Any:
         record, index = args
-        return _taken(context, builder, sig.args, record, index)
+        taken = _taken(context, builder, sig.args, record, index)
+        context.nrt.decref(builder, result, taken)
+        return _without_owners(context, builder, result, taken)
 
     return signature(result, parts, block), codegen
+
+
+@intrinsic
+def borrowed(typingctx: Any, parts: Any) -> Any:
+    """A NamedTuple of arrays without their owners, who outlive the kernel: what is not owned is not counted.
+
+    Counting costs as much as a control law, wherever compiled code reads an array of a tuple within a tick.
+    """
+    if not isinstance(parts, numba.types.BaseNamedTuple):
+        return None
+
+    def codegen(context: Any, builder: Any, sig: Any, args: list[Any]) -> Any:
+        return _without_owners(context, builder, parts, args[0])
+
+    return signature(parts, parts), codegen
+
+
+def _without_owners(context: Any, builder: Any, kind: Any, value: Any) -> Any:
+    if isinstance(kind, numba.types.BaseNamedTuple):
+        parts = [
+            _without_owners(context, builder, part, builder.extract_value(value, number))
+            for number, part in enumerate(kind.types)
+        ]
+        return context.make_tuple(builder, kind, parts)
+    if not isinstance(kind, numba.types.Array):
+        return value
+    array = cgutils.create_struct_proxy(kind)(context, builder, value)
+    array.meminfo, array.parent = (cgutils.get_null_value(part.type) for part in (array.meminfo, array.parent))
+    return array._getvalue()
 
 
 def _block_type(kind: Any) -> Any:

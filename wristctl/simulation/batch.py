@@ -17,7 +17,7 @@ from wristctl.control.belief import Compensated, Ignored, Places, Sides
 from wristctl.control.law import REFERENCE, Controller, signals_of
 from wristctl.control.response import OF_A_PLANE
 from wristctl.errors import UserError
-from wristctl.lanes.blocks import lanes_of, spread
+from wristctl.lanes.blocks import aligned, lanes_of, spread
 from wristctl.seeds import Entropy
 from wristctl.simulation.actuator import SIDES, at_rest, counted_motor, drive_with, motor_of, winding_of
 from wristctl.simulation.cameras import cameras_of
@@ -62,10 +62,8 @@ class Batch(NamedTuple):
     def scratch(self) -> Scratch:
         """Rows to work on, for one thread."""
         planes = len(self.setup.bend)
-        now, target = (
-            np.zeros((planes, rows, *self.wide)) for rows in (signals_of(self.setup.preview), len(REFERENCE))
-        )
-        return Scratch(now, target, np.zeros((4, *self.wide)))
+        now, target = (aligned((planes, rows, *self.wide)) for rows in (signals_of(self.setup.preview), len(REFERENCE)))
+        return Scratch(now, target, aligned((4, *self.wide)))
 
 
 class Lanes(NamedTuple):

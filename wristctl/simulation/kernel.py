@@ -11,7 +11,7 @@ from wristctl.control.law import now_at
 from wristctl.control.response import FULL, OF_A_PLANE, Controlled, Seen, look_ahead, respond, room_like
 from wristctl.lanes.compiled import by_type, compiled, implements, spelled_out
 from wristctl.lanes.lane import where, zero_like
-from wristctl.lanes.named_tuples import block_of
+from wristctl.lanes.named_tuples import block_of, borrowed
 from wristctl.lanes.rows import lanes_like, part, rows_of
 from wristctl.simulation.actuator import Aim, actuate, deliver, drive_in_lanes
 from wristctl.simulation.nonideal import spools_after_slip
@@ -171,8 +171,9 @@ def run_blocks(setup: Any, course: Any, world: Any, state: Any, scratch: Any, sp
     A lane leaves the game when its wrist leaves its range (or a segment bends beyond a full turn). What a loop does
     not have, NoCamera or NoTendons, is not compiled in.
     """
+    of_all, room = borrowed(course), borrowed(scratch)
     for block in range(span.begin, span.end):
-        _run_block(setup, course, block_of(world, block), block_of(state, block), scratch, span.first, span.last)
+        _run_block(setup, of_all, block_of(world, block), block_of(state, block), room, span.first, span.last)
 
 
 @spelled_out
