@@ -99,3 +99,50 @@ def test_a_family_bends_in_two_planes_in_all_its_worlds_where_one_end_of_a_draw_
         alone = follow(law, gains[0], case.motion, wrist, case.loop).metrics
         assert found.metrics["rmse"][0, k] == pytest.approx(alone["rmse"], rel=1e-9)
         assert found.metrics["energy"][0, k] == pytest.approx(alone["energy"], rel=1e-9)
+
+
+def test_what_is_drawn_within_a_range_or_a_list_takes_a_family_out_of_its_plane_too() -> None:
+    drawn = {"loop": {"plant_segments": 1, "disturbances": {"load": 1.0}}, "references": ({"duration": 0.4},)}
+    wrist = load_study([], []).wrist
+    within = Family.model_validate(drawn | {"draw": {"disturbances.toward_deg": "-180..180"}})
+    among = Family.model_validate(drawn | {"draw": {"disturbances.toward_deg": (0.0, 40.0, 180.0)}})
+    row = Family.model_validate(drawn | {"together": ({}, {"disturbances.toward_deg": 30.0}, {})})
+    along = Family.model_validate(drawn | {"draw": {"disturbances.toward_deg": (0.0, 180.0)}})
+    assert [planes_of(wrist, asked_of(one)) for one in (within, among, row, along)] == [2, 2, 2, 1]
+
+
+LEVEL = ("wrist.gravity=[0,0]", "wrist.gravity_flexion=9.81")
+SAYS = "All loops bend in two planes: gravity bends the wrist out of the motion's plane."
+SMALL = {
+    "compare": ("compare.horizon=0.5", "compare.loops={here: {plant_segments: 1}}", "compare.inverses=[none]",
+        "compare.controllers=[{controller: pid-ff, gains: default}]", "compare.references=[{duration: 0.3}]"),
+    "tune": ("tune.controllers=[pid-ff]", "tune.iterations=1", "tune.candidates=2", "tune.horizon=0.5",
+        "tune.loops={here: {plant_segments: 1}}", "tune.scenarios=[{loop: here, reference: {duration: 0.3}}]"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("command", SMALL)
+def test_the_answer_says_why_all_bend_in_two_planes_and_one_plane_warns_of_what_it_leaves_out(
+    command: str, caplog: pytest.LogCaptureFixture
+) -> None:
+    perform = getattr(wristctl, command)
+    answer = perform(load_study([], [*SMALL[command], *LEVEL])).answer
+    assert SAYS in answer.notes
+    assert not any("planes" in note for note in perform(load_study([], list(SMALL[command]))).answer.notes)
+    assert not caplog.records
+    one = f"{command}.loops={{here: {{plant_segments: 1, planes: 1}}}}"
+    answer = perform(load_study([], [*SMALL[command], *LEVEL, one])).answer
+    assert not any("planes" in note for note in answer.notes)
+    (warning,) = [record.getMessage() for record in caplog.records]
+    assert warning == "gravity bends the wrist out of the motion's plane, which `planes: 1` leaves out"
+
+
+def test_families_say_and_warn_too(caplog: pytest.LogCaptureFixture) -> None:
+    family = "families={f: {loop: {plant_segments: 1}, horizon: 0.5, references: [{duration: 0.3}]}}"
+    row = "compare.controllers=[{controller: pid-ff, gains: default}]"
+    settings = [family, row, "compare.worlds={family: f, draws: 4}", *LEVEL]
+    answer = wristctl.compare(load_study([], settings)).answer
+    assert answer is not None and SAYS in answer.notes
+    assert not caplog.records
+    wristctl.compare(load_study([], [*settings, "families.f.loop.planes=1"]))
+    assert any("which `planes: 1` leaves out" in record.getMessage() for record in caplog.records)

@@ -22,6 +22,7 @@ from wristctl.records import Run
 if TYPE_CHECKING:
     from wristctl.control.table import Gains
     from wristctl.learning.network import Network
+    from wristctl.simulation.planes import Asked
     from wristctl.wrist.kinematics import Inverse
 
 log = logging.getLogger(__name__)
@@ -127,29 +128,44 @@ def ends_of_family(family: Family) -> list[Reference]:
 
 def check_family_reach(study: Study, name: str) -> None:
     """As `check_reach` for the motions of a family, at both ends of what is drawn; an unknown family has none."""
+    from wristctl.simulation.planes import planes_of
+
     motions = ends_of_family(study.families.get(name, Family()))
     half = len(motions) // 2
-    planes = planes_of_family(study, name)
+    planes = planes_of(study.wrist, asked_of_family(study, name))
     for part in (motions[:half], motions[half:]):
         check_reach(part, study.wrist, f"families.{name}.references.{{}}", planes)
 
 
-def planes_of_family(study: Study, name: str) -> int:
-    """Planes that all worlds of a family bend in; an unknown family bends in one. Raises UserError."""
+def asked_of_family(study: Study, name: str) -> list[Asked]:
+    """The loops of a family with what they are asked for; none of an unknown one."""
     from wristctl.simulation.drawn_worlds import asked_of
-    from wristctl.simulation.planes import planes_of
 
-    return planes_of(study.wrist, asked_of(study.families[name])) if name in study.families else 1
+    return asked_of(study.families[name]) if name in study.families else []
 
 
-def planes_of_search(study: Study) -> int:
-    """Planes that all loops of the study's `tune` section bend in. Raises UserError."""
-    from wristctl.simulation.planes import planes_of
+def asked_of_search(study: Study) -> list[Asked]:
+    """The loops of the study's `tune` section with what they are asked for."""
     from wristctl.tuning.search import asked_by
 
-    if name := study.tune.worlds.family:
-        return planes_of_family(study, name)
-    return planes_of(study.wrist, asked_by(study.tune))
+    family = study.tune.worlds.family
+    return asked_of_family(study, family) if family else asked_by(study.tune)
+
+
+def asked_of_comparison(study: Study) -> list[Asked]:
+    """The loops of the study's `compare` section with what they are asked for."""
+    from wristctl.comparison.combinations import asked_by
+
+    family = study.compare.worlds.family
+    return asked_of_family(study, family) if family else asked_by(study.compare)
+
+
+def why_two_planes(wrist: WristParameters, asked: Iterable[Asked]) -> str:
+    """In which planes all loops bend, and why, a sentence; empty where they stay in one. Raises UserError."""
+    from wristctl.simulation.planes import why_two
+
+    reason = why_two(wrist, asked)
+    return f"All loops bend in two planes: {reason}." if reason else ""
 
 
 def check_inverses(inverses: Iterable[str], inputs: Inputs) -> None:
@@ -210,7 +226,7 @@ def identified(study: Study, command: str, inputs: Inputs) -> Study:
     if text is None:
         return study
     found = with_identified(study, command, text)
-    if command != "simulate":
+    if command not in ("simulate", "tune"):
         try:
             check_sides(found.wrist, command)
         except UserError as error:

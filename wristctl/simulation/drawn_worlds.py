@@ -15,6 +15,9 @@ from wristctl.simulation.motion import Motion
 from wristctl.simulation.planes import Asked, motion_in, planes_of
 from wristctl.wrist.kinematics import Inverse
 
+# A share at which no interval that is given in round numbers has its middle, an end, or a right angle.
+_WITHIN = 0.382
+
 
 def world_of(family: Family, name: str, split: str, seed: int, number: int) -> Loop:
     """The world of this number in a split."""
@@ -38,10 +41,12 @@ def streams_of(family: Family, name: str, split: str) -> list[str]:
 
 
 def asked_of(family: Family) -> list[Asked]:
-    """Loops and motions of a family, with all that is drawn of them at its lower end, then at its upper end."""
-    ends = [dict.fromkeys([*family.draw, TOGETHER], share) for share in (0.0, 1.0 - 1e-12)]
+    """Loops and motions of a family: all that is drawn at its lower end, at its upper, within, and at every value."""
+    longest = max([len(family.together), *(len(some) for some in family.draw.values() if not isinstance(some, str))])
+    places = [0.0, 1.0 - 1e-12, _WITHIN, *((k + 0.5) / longest for k in range(longest))]
+    drawn = [dict.fromkeys([*family.draw, TOGETHER], share) for share in places]
     numbers = range(len(family.references))
-    return [Asked(family.world(shares), family.motion(number, shares)) for shares in ends for number in numbers]
+    return [Asked(family.world(shares), family.motion(number, shares)) for shares in drawn for number in numbers]
 
 
 def drawn_cases(

@@ -38,14 +38,14 @@ def planes_of(wrist: WristParameters, asked: Iterable[Asked]) -> int:
 
 
 def why_two(wrist: WristParameters, asked: Iterable[Asked]) -> str:
-    """Why loops bend in two planes, in words; empty where all stay in one. Raises UserError as `planes_of`."""
+    """Why loops bend in two planes, a clause; empty where all stay in one. Raises UserError as `planes_of`."""
     found = ""
     for each in dict.fromkeys(asked):
         must, may = _must(wrist, each), _leaves(wrist, each)
         if must and each.loop.planes == 1:
             raise UserError(f"{must} in two planes, and the loop in one", "loop.planes", "loop.planes: null, or 2")
         wanted = "loop.planes is 2" if each.loop.planes == 2 else ""
-        found = found or must or wanted or (may if each.loop.planes is None else "")
+        found = found or (must and f"{must} in both") or wanted or (may if each.loop.planes is None else "")
     return found
 
 

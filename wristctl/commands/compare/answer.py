@@ -29,7 +29,10 @@ if TYPE_CHECKING:
 
 
 def answer_of(
-    rankings: Sequence[Ranking], run: str = "", gains: Mapping[str, Mapping[str, float]] | None = None
+    rankings: Sequence[Ranking],
+    run: str = "",
+    gains: Mapping[str, Mapping[str, float]] | None = None,
+    bending: str = "",
 ) -> Answer | None:
     """The answer of a comparison for one screen; None where nothing was compared.
 
@@ -41,6 +44,8 @@ def answer_of(
         Path of the run; empty for a result in memory.
     gains
         Gains by name, in SI units, of every row by its label.
+    bending
+        Planes that all loops bend in, a sentence; empty where they stay in one.
     """
     if not rankings:
         return None
@@ -51,6 +56,7 @@ def answer_of(
     more = f"Every rank and figure: `--all`, or {run}/report.html." if run else "Every rank and figure: `.tables`."
     unusable = do_not_use(rankings, names)
     notes = [
+        (bending, bending),
         (" ".join(filter(None, [conditions(rankings), gains_meant(rankings)])), conditions(rankings)),
         (best_on_yours(rankings), ""),
         (unusable, "Some controllers must not be used: `--all` says which and why." if unusable else ""),

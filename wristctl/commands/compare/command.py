@@ -22,6 +22,7 @@ from wristctl.commands.compare.answer import (
 from wristctl.commands.compare.ranking import ranked
 from wristctl.commands.inputs import EarlierRun, Inputs
 from wristctl.commands.inputs_of_loops import (
+    asked_of_comparison,
     check_family_reach,
     check_inverses,
     check_reach,
@@ -30,15 +31,16 @@ from wristctl.commands.inputs_of_loops import (
     family_of,
     judged_loops,
     network_for,
-    planes_of_family,
     tuned_gains,
     tuned_on,
+    why_two_planes,
     with_what_there_is,
 )
 from wristctl.commands.loop_warnings import (
     asked_by,
     warn_if_coarse,
     warn_if_it_buckles,
+    warn_of_one_plane,
     warn_out_of_reach,
     warn_outside_conditions,
 )
@@ -171,7 +173,8 @@ class Compared(StudyResult):
     @property
     def answer(self) -> Answer | None:
         """Which controller to use under which condition, and which must not be used."""
-        return answer_of(self.rankings, self.place, self.gains)
+        bending = why_two_planes(self.study.wrist, asked_of_comparison(self.study))
+        return answer_of(self.rankings, self.place, self.gains, bending)
 
     @property
     def marks(self) -> list[str]:
@@ -211,6 +214,7 @@ def plan(study: Study, inputs: Inputs) -> str:
     from wristctl.commands.truth_table import truth_told
     from wristctl.comparison.combinations import refuse_tuned_scenarios
     from wristctl.simulation.closed_loop import check_size
+    from wristctl.simulation.planes import planes_of
 
     study, _ = with_what_there_is(study, inputs)
     settings, earlier, searched = study.compare, tuned_on(inputs), ""
@@ -229,23 +233,13 @@ def plan(study: Study, inputs: Inputs) -> str:
         refuse_tuned_scenarios(settings, earlier)
     check_family_reach(study, settings.worlds.family)
     with under("compare"):
-        asked, planes = size(study), planes_of_comparison(study)
+        asked, planes = size(study), planes_of(study.wrist, asked_of_comparison(study))
         check_inverses(compared_inverses(study), inputs)
         check_size(asked, planes)
     if not settings.worlds.family:
         check_reach(settings.references, study.wrist, "compare.references.{}", planes)
     truth = truth_told(study.wrist, judged_loops(study, study.compare))
     return f"{searched}{asked.rollouts} rollouts of {asked.horizon:g} s{truth}"
-
-
-def planes_of_comparison(study: Study) -> int:
-    """Planes that all rows bend in. Raises UserError."""
-    from wristctl.comparison.combinations import asked_by
-    from wristctl.simulation.planes import planes_of
-
-    if name := study.compare.worlds.family:
-        return planes_of_family(study, name)
-    return planes_of(study.wrist, asked_by(study.compare))
 
 
 def size(study: Study) -> Size:
@@ -280,6 +274,7 @@ def compare(session: Session) -> Compared:
     warn_if_it_buckles(findings, study.wrist, loops)
     warn_if_coarse(loops)
     warn_outside_conditions(settings.rows, loops)
+    warn_of_one_plane(study.wrist, asked_of_comparison(study))
     warn_out_of_reach(findings, study.wrist, asked_by(study, settings))
     network = network_for(session.inputs, study.wrist, loops)
     if settings.tuning is not None:
@@ -353,6 +348,6 @@ COMPARE = sweepable(
         compare,
         (EarlierRun("network", kind="train", optional=True), EarlierRun("tuned", kind="tune", optional=True)),
         size=size,
-        in_one_plane=lambda study: planes_of_comparison(study) == 1,
+        in_one_plane=lambda study: not why_two_planes(study.wrist, asked_of_comparison(study)),
     )
 )

@@ -97,16 +97,23 @@ def answer_of(
     run: str,
     elsewhere: Mapping[str, Mapping[str, Mapping[str, int]]],
     motion: Motion | None = None,
+    bending: str = "",
 ) -> Answer | None:
     """The answer of a search on so many `cases`; None where nothing was searched. `run` is its path, if it has one.
 
     `elsewhere` has the marks of the gains on other loops, by controller and loop; `motion` is the one to try them on.
+    `bending` says in which planes all loops bend, where these are two.
     """
     if not searches:
         return None
     ordered = sorted(searches, key=lambda name: searches[name].objective)
     best = ordered[0]
-    notes = [*_edges(ordered, searches), *_presets(ordered, searches), *_lost(ordered, lost, cases)]
+    notes = [
+        *[bending] * bool(bending),
+        *_edges(ordered, searches),
+        *_presets(ordered, searches),
+        *_lost(ordered, lost, cases),
+    ]
     notes += _elsewhere(ordered, elsewhere)
     more = "All tables: `.tables`."
     if run and motion is not None:

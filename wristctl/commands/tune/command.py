@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 from wristctl.commands.answer import Answer
 from wristctl.commands.inputs import EarlierRun, Inputs
 from wristctl.commands.inputs_of_loops import (
+    asked_of_search,
     check_family_reach,
     check_inverses,
     check_reach,
@@ -18,7 +19,7 @@ from wristctl.commands.inputs_of_loops import (
     inverses_of,
     judged_loops,
     network_for,
-    planes_of_search,
+    why_two_planes,
 )
 from wristctl.commands.kept_studies import asked_for, file_of, hw_run_fits, keep_gains, rig_of, row_of
 from wristctl.commands.loop_warnings import (
@@ -26,6 +27,7 @@ from wristctl.commands.loop_warnings import (
     refuse_out_of_reach,
     warn_if_coarse,
     warn_if_it_buckles,
+    warn_of_one_plane,
     warn_out_of_reach,
 )
 from wristctl.commands.printed_table import Table
@@ -71,12 +73,15 @@ class Tuned(StudyResult):
     elsewhere: dict[str, dict[str, dict[str, int]]]
     """by controller and loop, on how many of the same motions its best gains are lost on loops that no scenario is
     on; none for a family of worlds"""
+    bending: str
+    """Planes that all loops bend in, a sentence; empty where they stay in one."""
 
     @property
     def answer(self) -> Answer | None:
         """Best gains, their error beside feedforward, and what they do wrong."""
         motion = motion_of(self.study, self.place)
-        return answer_of(self.searches, self.errors, self.lost, self.cases, self.place, self.elsewhere, motion)
+        found = self.searches, self.errors, self.lost, self.cases, self.place, self.elsewhere
+        return answer_of(*found, motion, self.bending)
 
     @property
     def marks(self) -> list[str]:
@@ -118,6 +123,7 @@ def planned_search(study: Study, inputs: Inputs) -> str:
     """
     from wristctl.control.table import controller
     from wristctl.simulation.closed_loop import check_size
+    from wristctl.simulation.planes import planes_of
     from wristctl.tuning.search import check_loops, check_optimiser, check_tunable
 
     settings, families = study.tune, study.families
@@ -134,7 +140,7 @@ def planned_search(study: Study, inputs: Inputs) -> str:
         family_of(families, settings.worlds.family, "worlds.family")
     else:
         check_loops(settings)
-    planes = planes_of_search(study)
+    planes = planes_of(study.wrist, asked_of_search(study))
     if not settings.worlds.family:
         references = [scenario.reference for scenario in settings.scenarios]
         check_reach(references, study.wrist, "scenarios.{}.reference", planes)
@@ -176,6 +182,7 @@ def tune(session: Session) -> Tuned:
     loops = judged_loops(study, study.tune).values()
     warn_if_it_buckles(session.findings, study.wrist, loops)
     warn_if_coarse(loops)
+    warn_of_one_plane(study.wrist, asked_of_search(study))
     warn_out_of_reach(session.findings, study.wrist, asked_by(study, study.tune))
     network = network_for(session.inputs, study.wrist, loops)
     searches = search_all(session, study, network)
@@ -200,7 +207,8 @@ def tune(session: Session) -> Tuned:
     errors = beside_feedforward(gains, cases, study.wrist)
     elsewhere = _elsewhere(session, study, network, gains)
     _write_files(session.findings, study, gains)
-    return Tuned(session.study, session.findings, tables, searches, lost, errors, len(cases), elsewhere)
+    bending = why_two_planes(study.wrist, asked_of_search(study))
+    return Tuned(session.study, session.findings, tables, searches, lost, errors, len(cases), elsewhere, bending)
 
 
 def motion_of(study: Study, run: str) -> Motion:
@@ -387,6 +395,6 @@ TUNE = sweepable(
         ),
         doubts=refuse_out_of_reach,
         size=size,
-        in_one_plane=lambda study: planes_of_search(study) == 1,
+        in_one_plane=lambda study: not why_two_planes(study.wrist, asked_of_search(study)),
     )
 )
