@@ -41,6 +41,7 @@ def asked(direction: Any = "ulnar", kind: str = "minimum-jerk", **loop: Any) -> 
         ({}, asked(planes=1), asked(planes=2)),
         ({"tendons": "five"}, asked(), asked(kind="dart-thrower")),
         ({"tendons": "three"}, None, asked()),
+        ({"tendons": "six"}, None, asked()),
     ],
 )
 def test_two_planes_are_where_something_leaves_the_plane_of_the_motion(

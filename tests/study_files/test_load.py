@@ -77,7 +77,7 @@ def test_an_override_is_relative_to_the_command_first() -> None:
         ("compare:\n  controllers:\n  - {}\n  - contoller: pid\n", "{file}:4: compare.controllers.1.contoller"),
         ("compare:\n  controllers:\n  - gains:\n      P1: a\n", "'a' should be a valid number - {file}:4"),
         ("tune:\n  scenarios:\n  - reference: {kind: ramp}\n", "{file}:3: tune.scenarios.0.reference.kind"),
-        ("wrist: {tendons: 6}\n", "one of five, four, three; or a list, [{{angle_deg: ...}}, ...]"),
+        ("wrist: {tendons: 6}\n", "one of five, four, six, three; or a list, [{{angle_deg: ...}}, ...]"),
         ("wrist:\n  tendons:\n  - angle: 3\n", "{file}:3: wrist.tendons.0.angle - fix: did you mean 'angle_deg'?"),
         ("- 1\n", "a study file holds keys and values - {file}:1"),
         ("train: {epochs: 1}\ntrain: {}\n", "key 'train' is repeated - {file}:2"),
@@ -126,7 +126,7 @@ def test_errors_in_overrides_name_the_override(override: str, said: str) -> None
     [
         ("simulate.controller=ct-dobb", "did you mean 'ct-dob'? All: adrc, computed-torque, ct-dob, "),
         ("simulate.controller=zzz", "one of adrc, computed-torque, "),
-        ("wrist.tendons=6", "one of five, four, three"),
+        ("wrist.tendons=6", "one of five, four, six, three"),
         ("simulate.loop.planes=3", "one of 1, 2"),
     ],
 )

@@ -150,7 +150,7 @@ def test_a_study_names_its_layout_or_lists_the_places() -> None:
     expected = [[0.0, 0.03], [-0.01 * math.sqrt(0.75), -0.005], [0.03 * math.sqrt(0.75), -0.015]]
     assert layout.cross_section == pytest.approx(np.array(expected), abs=1e-15)
     assert layout.multiplicity.tolist() == [1, 1, 2] and layout.shares(5).tolist() == [1.0, 0.5, 1.0]
-    for name, count in (("three", 3), ("four", 4), ("five", 5)):
+    for name, count in (("three", 3), ("four", 4), ("five", 5), ("six", 6)):
         named = TendonLayout.of(load_study([], [f"wrist.tendons={name}"]).wrist)
         assert len(named.places) == count and named.cross_section.max() <= WRIST.tendon_radius
     assert TendonLayout.of(WRIST) == TendonLayout.four(WRIST.tendon_radius)
@@ -164,6 +164,19 @@ def test_a_list_of_places_is_written_out_as_it_was_read(tmp_path: Path) -> None:
         file = tmp_path / "config.yaml"
         file.write_text(written(study, "simulate"), encoding="utf-8")
         assert load_study([file]).wrist == study.wrist
+
+
+def test_six_tendons_are_at_60_deg_from_each_other_the_first_toward_ulnar() -> None:
+    angles = np.degrees([place.angle for place in TendonLayout.of(load_study([], ["wrist.tendons=six"]).wrist).places])
+    assert angles == pytest.approx([0.0, 60.0, 120.0, 180.0, 240.0, 300.0], abs=1e-9)
+
+
+@pytest.mark.parametrize("wrist", ["wrist=[{length: 0.04}, {length: 0.04}]", "wrist.sections=[{length: 0.04}]"])
+def test_several_sections_in_series_are_refused_plainly(wrist: str) -> None:
+    with pytest.raises(UserError) as refused:
+        load_study([], [wrist])
+    assert str(refused.value).startswith("several sections in series are not simulated - --set wrist")
+    assert "one section from base to hand" in str(refused.value)
 
 
 SQUARE = "[{angle_deg: 45}, {angle_deg: 135}, {angle_deg: 225}, {angle_deg: 315}]"
@@ -181,6 +194,7 @@ def test_one_plane_takes_two_sides_of_two_tendons(tendons: str) -> None:
     ("tendons", "odd"),
     [
         ("three", 1),
+        ("six", 1),
         (SQUARE.replace("315", "320"), 4),
         (SQUARE.replace("135}", "135, radius: 0.019}"), 2),
         (SQUARE.replace("135}", "135, ends_at: 4}"), 2),

@@ -1,9 +1,11 @@
 """The wrist's parameters; every default carries its source: the paper gives few of them (C10)."""
 
 import math
-from typing import Literal, Self
+from collections.abc import Mapping
+from typing import Any, Literal, Self
 
 from pydantic import model_validator
+from pydantic_core import PydanticCustomError
 
 from wristctl.config.section import Section, choice, quantity, seldom
 
@@ -35,10 +37,10 @@ class WristParameters(Section):
     )
     damping: float = quantity(0.105, "N m s/rad", "bending damping of the whole wrist", "paper, C1", ge=0)
     tendon_radius: float = quantity(0.020, "m", "radius of the circle of tendons", "assumed", gt=0)
-    tendons: Literal["three", "four", "five"] | tuple[TendonPlace, ...] = choice(
+    tendons: Literal["three", "four", "five", "six"] | tuple[TendonPlace, ...] = choice(
         "four",
-        "places: three at 120 deg, four at 45 deg from both planes, five with one more in the centre, or a list of "
-        "places; a wrist in one plane has four or five",
+        "places: three at 120 deg, four at 45 deg from both planes, five with one more in the centre, six at 60 deg, "
+        "or a list of places; a wrist in one plane has four or five",
         "paper",
     )
     pretension: float = quantity(2.0, "N", "least tension of each tendon", "assumed", ge=0)
@@ -48,6 +50,15 @@ class WristParameters(Section):
         (-9.81, 0.0), "m/s^2", "gravity along the base tangent and toward ulnar", "assumed: upright, as in the test"
     )
     gravity_flexion: float = quantity(0.0, "m/s^2", "gravity toward flexion", "assumed: upright")
+
+    @model_validator(mode="before")
+    @classmethod
+    def _one_section(cls, given: Any) -> Any:
+        several = isinstance(given, list | tuple) and all(isinstance(each, Mapping) for each in given)
+        if several or (isinstance(given, Mapping) and "sections" in given):
+            fix = {"fix": "one section from base to hand; tendons that end inside it have ends_at"}
+            raise PydanticCustomError("sections", "several sections in series are not simulated", fix)
+        return given
 
     @model_validator(mode="after")
     def _tensions_in_order(self) -> Self:

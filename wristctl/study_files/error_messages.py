@@ -55,7 +55,7 @@ def _location(detail: Any) -> KeyPath:
 def _what(detail: Any) -> str:
     if detail["type"] == "extra_forbidden":
         return f"unknown key {_location(detail)[-1]!r}"
-    if detail["type"] == "added_value":
+    if detail["type"] in ("added_value", "sections"):
         return str(detail["msg"])
     if detail["type"] == "value_error":
         return str(detail["ctx"]["error"])

@@ -177,7 +177,8 @@ class TendonLayout:
         """Layout of a wrist's parameters. Raises UserError, with the key of the place, as the class does."""
         radius = wrist.tendon_radius
         if isinstance(wrist.tendons, str):
-            return {"three": cls.three, "four": cls.four, "five": cls.five}[wrist.tendons](radius)
+            named = {"three": cls.three, "four": cls.four, "five": cls.five, "six": cls.six}
+            return named[wrist.tendons](radius)
         layout = cls(
             tuple(
                 TendonPlace(
@@ -198,9 +199,19 @@ class TendonLayout:
         return cls((TendonPlace(0.0, offset, multiplicity=2), TendonPlace(math.pi, offset, multiplicity=2)))
 
     @classmethod
+    def around(cls, count: int, radius: float, first: float = 0.0) -> Self:
+        """Tendons at equal angles from each other on a circle [m], the first at an angle [rad]."""
+        return cls(tuple(TendonPlace(first + k * math.tau / count, radius) for k in range(count)))
+
+    @classmethod
     def three(cls, radius: float, first: float = 0.0) -> Self:
         """Three tendons at 120 deg from each other on a circle [m], the first at an angle [rad]."""
-        return cls(tuple(TendonPlace(first + k * math.tau / 3.0, radius) for k in range(3)))
+        return cls.around(3, radius, first)
+
+    @classmethod
+    def six(cls, radius: float) -> Self:
+        """Six tendons at 60 deg from each other on a circle [m], the first toward ulnar."""
+        return cls.around(6, radius)
 
     @classmethod
     def four(cls, radius: float) -> Self:
