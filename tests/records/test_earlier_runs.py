@@ -15,7 +15,7 @@ import pytest
 from wristctl.cli.app import main
 from wristctl.config.study import Study
 from wristctl.records import Run, list_runs, open_run
-from wristctl.records.manifest import command_of
+from wristctl.study_files.keys import command_of
 from wristctl.trial.calibration import WristCalibration
 from wristctl.vision.view import View
 

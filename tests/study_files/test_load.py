@@ -116,8 +116,9 @@ def test_errors_name_place_key_and_cure(tmp_path: Path, text: str, said: str) ->
     ],
 )
 def test_errors_in_overrides_name_the_override(override: str, said: str) -> None:
+    section = override.partition(".")[0]
     with pytest.raises(UserError) as caught:
-        load_study([], [override], "train")
+        load_study([], [override], section if section in ("hw-run", "compare") else "train")
     assert said in str(caught.value)
 
 

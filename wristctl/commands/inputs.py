@@ -15,7 +15,8 @@ from wristctl.config.wrist import WristParameters
 from wristctl.errors import Argument, Call, Phrase, UserError
 from wristctl.records import InputRun, Run, open_run, require
 from wristctl.records.find import Content
-from wristctl.records.manifest import MANIFEST, command_of
+from wristctl.records.manifest import MANIFEST
+from wristctl.study_files.keys import command_of
 from wristctl.study_files.resolved import sections_read
 
 Given = Run | StudyResult

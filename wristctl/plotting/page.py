@@ -20,9 +20,10 @@ from wristctl.plotting.animation import animation
 from wristctl.plotting.page_tables import in_degrees, shown_tables
 from wristctl.records.difference import difference
 from wristctl.records.lineage import Ancestor, ancestry
-from wristctl.records.manifest import CONFIG, Manifest, command_of, read_overview
+from wristctl.records.manifest import CONFIG, Manifest, read_overview
 from wristctl.records.run import Run
 from wristctl.records.run_writer import Undrawn
+from wristctl.study_files.keys import command_of
 from wristctl.version import __version__
 
 if TYPE_CHECKING:

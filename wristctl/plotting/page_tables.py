@@ -8,8 +8,9 @@ from collections.abc import Sequence
 from typing import Any
 
 from wristctl.errors import Call, UserError
-from wristctl.records.manifest import TABLES, command_of
+from wristctl.records.manifest import TABLES
 from wristctl.records.run import Run
+from wristctl.study_files.keys import command_of
 
 # Units of angles in files, and what people read.
 _DEGREES = {"rad": "deg", "rad s": "deg s"}

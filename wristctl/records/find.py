@@ -12,9 +12,10 @@ from typing import Any, NamedTuple
 
 from wristctl.errors import OUT, Argument, Call, Phrase, UserError, meant, nearest
 from wristctl.records.index import RESULTS, IndexEntry, indexed, run_names
-from wristctl.records.manifest import MANIFEST, command_of
+from wristctl.records.manifest import MANIFEST
 from wristctl.records.run import NAME_A_RUN, Run
 from wristctl.records.tags import known_tags
+from wristctl.study_files.keys import command_of
 
 _log = logging.getLogger(__name__)
 

@@ -32,13 +32,6 @@ _ONE_MACHINES = {"--out", "--resume"}
 EndState = Literal["running", "ok", "failed", "interrupted"]
 
 
-def command_of(kind: str) -> str:
-    """The words that make a run of this kind: `hw calibrate camera`, `paper audit`, else the kind itself."""
-    if kind == "audit":
-        return "paper audit"
-    return f"hw {kind.replace('-', ' ')}" if kind.startswith("calibrate-") else kind
-
-
 def _inside(name: str) -> str:
     """A name of a file in the run."""
     if PurePosixPath(name).is_absolute() or ".." in PurePosixPath(name).parts or "\0" in name:

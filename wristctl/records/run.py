@@ -18,7 +18,7 @@ from wristctl.plain_files import LINK, open_plain, read_json, read_plain, unread
 from wristctl.records.files import files_below, sha256_of
 from wristctl.records.formats import read_arrays, read_table
 from wristctl.records.lock import is_locked
-from wristctl.records.manifest import CONFIG, MANIFEST, METRICS, SUMS, Manifest, command_of
+from wristctl.records.manifest import CONFIG, MANIFEST, METRICS, SUMS, Manifest
 from wristctl.records.seal import (
     ADDED,
     ADDED_FOLDER,
@@ -29,6 +29,7 @@ from wristctl.records.seal import (
     largest,
 )
 from wristctl.sha256sums import read_seal
+from wristctl.study_files.keys import command_of
 from wristctl.study_files.load import read_study
 
 if TYPE_CHECKING:

@@ -38,10 +38,10 @@ from wristctl.records.manifest import (
     Manifest,
     Output,
     TakenOver,
-    command_of,
 )
 from wristctl.records.seal import entries, result_hash, write_seal
 from wristctl.sha256sums import read_seal
+from wristctl.study_files.keys import command_of
 
 if TYPE_CHECKING:
     import numpy as np

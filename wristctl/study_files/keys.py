@@ -45,6 +45,13 @@ def _given(annotation: Any) -> Any:
 SUBJECTS = {"analyse": "simulate", "validate": "real-robot"}
 
 
+def command_of(kind: str) -> str:
+    """The words that make a run of this kind: `hw calibrate camera`, `paper audit`, else the kind itself."""
+    if kind == "audit":
+        return "paper audit"
+    return f"hw {kind.replace('-', ' ')}" if kind.startswith("calibrate-") else kind
+
+
 # Sections with a list of controllers, for which one controller or gains may be given in short.
 LISTS_OF_ROWS = {"hw-run": "controllers"}
 

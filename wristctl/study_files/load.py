@@ -24,6 +24,7 @@ from wristctl.study_files.renaming import (
     with_keys_of_today,
     with_loops_of_today,
 )
+from wristctl.study_files.resolved import check_read
 from wristctl.study_files.shipped import shipped_name, shipped_names, study_file
 from wristctl.study_files.short_rows import for_their_own_controller, in_lists, with_gains_apart
 from wristctl.study_files.strict_yaml import Document, KeyPath, parse_yaml
@@ -40,7 +41,8 @@ def load_study(
     """The study of `files`, then of the overrides `a.b=value`; later ones win, leaf by leaf.
 
     A file may be an experiment by its name, `quick`. A sequence is one leaf. An override's key is first looked for in
-    the section of `command`: for train, `epochs=5` is `train.epochs=5`. With `trust_code` the code of runs that the
+    the section of `command`: for train, `epochs=5` is `train.epochs=5`. It may be of no section that `command` does not
+    read; files may hold any. With `trust_code` the code of runs that the
     study names may be loaded, now and later. Raises UserError with file and line (or override), key path, and nearest
     key or what is expected.
     """
@@ -172,6 +174,8 @@ def _override(text: str, command: str | None) -> Document:
     command_keys, top = section_keys(command), keys_of(Study)
     if key_today(tuple(keys))[0] not in top:
         raise UserError(f"unknown key {keys[0]!r}", where, meant(keys[0], dict.fromkeys([*command_keys, *top])))
+    if command is not None:
+        check_read(".".join(map(str, key_today(tuple(keys)))), command, where)
     try:
         data = parse_yaml(value, "").data
     except UserError as error:

@@ -14,7 +14,8 @@ from wristctl.config.loop import LOOPS
 from wristctl.config.plant import is_unsaid
 from wristctl.config.section import OpenSection, Parameter, Section
 from wristctl.config.study import Study
-from wristctl.study_files.keys import SUBJECTS, choices_of, keys_of, source_of, unit_of
+from wristctl.errors import Phrase, UserError
+from wristctl.study_files.keys import SUBJECTS, choices_of, command_of, keys_of, source_of, unit_of
 from wristctl.study_files.strict_yaml import parse_yaml
 
 _WORD = re.compile(r"[A-Za-z0-9_./][A-Za-z0-9_./ -]*[A-Za-z0-9_./]|[A-Za-z_/]")
@@ -28,16 +29,34 @@ class _Part(list[Entry]):
 
 _SHARED = ("seed", "wrist")
 _OWN = "controller-settings"
+_NO_COMMANDS = (*_SHARED, "families", "sweep", _OWN, "real-robot")
 _READ: dict[str, tuple[str, ...]] = {"train": ("gen-data",), "simulate": (_OWN, "sweep")}
 _READ |= dict.fromkeys(("hw-run", "recommend"), (_OWN,))
 _READ |= dict.fromkeys(("tune", "compare"), ("families", _OWN, "sweep")) | {"study": ("families", _OWN)}
 _READ |= {command: (subject, _OWN) for command, subject in SUBJECTS.items()}
+_PASSED_ON: dict[str, tuple[str, ...]] = {"recommend": ("simulate", "hw-run"), "calibrate-camera": ("track",)}
+"""Sections whose settings go into the files that a command writes: the study of a recommendation, printed markers."""
 """Sections that a command reads beside its own: without a data run, train draws what gen-data would."""
 
 
 def sections_read(command: str) -> tuple[str, ...]:
     """The sections of a study that a command reads, by their names as attributes."""
     return tuple(name.replace("-", "_") for name in _keys(command) if name in keys_of(Study) and name not in _SHARED)
+
+
+def check_read(key: str, command: str, where: Phrase) -> None:
+    """UserError, naming the commands that read it, for a dotted key of a section that `command` does not read.
+
+    Keys that no study has pass: another error tells those.
+    """
+    section = key.partition(".")[0]
+    if section not in keys_of(Study) or section in (*_keys(command), *_PASSED_ON.get(command, ())):
+        return
+    commands = [name for name in dict.fromkeys([*keys_of(Study), *SUBJECTS]) if name not in _NO_COMMANDS]
+    readers = [command_of(name) for name in commands if section in _keys(name)]
+    read = f"`{'`, `'.join(f'wristctl {reader}' for reader in readers)}` read{'s' * (len(readers) == 1)} it"
+    fix = f"{read}; a study file may hold it beside what {command_of(command)} reads"
+    raise UserError(f"{command_of(command)} does not read {key}", where, fix)
 
 
 def resolved_yaml(study: Study, command: str) -> str:

@@ -18,6 +18,7 @@ from wristctl.config.study import Study
 from wristctl.errors import Argument, UserError, meant
 from wristctl.study_files.error_messages import fault_of
 from wristctl.study_files.keys import keys_of, unit_of, whole_key
+from wristctl.study_files.resolved import check_read
 from wristctl.study_files.strict_yaml import parse_yaml
 
 MOST_POINTS = 1_000_000
@@ -56,6 +57,7 @@ def axes_of(study: Study, command: str) -> list[SweepAxis]:
         if not equals or not key.strip() or not values.strip():
             raise UserError("a sweep is KEY=VALUES", Argument("sweep", text), _EXAMPLE)
         name = ".".join(map(str, key_today(tuple(whole_key(key.strip(), command).split(".")))))
+        check_read(name, command, Argument("sweep", text))
         if name in [axis.key for axis in axes]:
             raise UserError(f"{name} is swept twice", Argument("sweep", text), "give all its values at once")
         counted.append((text, *_count(text, values)))

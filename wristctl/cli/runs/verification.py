@@ -30,11 +30,12 @@ from wristctl.records import Run, list_runs, open_run
 from wristctl.records.difference import leaves_of
 from wristctl.records.lineage import input_run
 from wristctl.records.lock import RunLock
-from wristctl.records.manifest import CONFIG, SIGNATURE, SUMS, Input, command_of
+from wristctl.records.manifest import CONFIG, SIGNATURE, SUMS, Input
 from wristctl.records.removal import SCRATCH
 from wristctl.records.replay import ReplayVerdict, causes, changed_inputs, verdicts
 from wristctl.records.signature import RunSignature, is_signed, signature
 from wristctl.records.signature import sign as sign_run
+from wristctl.study_files.keys import command_of
 from wristctl.study_files.load import read_study
 
 # Number of runs from which progress is shown.

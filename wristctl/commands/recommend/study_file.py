@@ -11,6 +11,7 @@ from wristctl.commands.kept_studies import asked_for, hw_run_fits, rig_of
 from wristctl.config.compare import CompareSettings
 from wristctl.config.loop import Reference
 from wristctl.config.study import Study
+from wristctl.study_files.resolved import sections_read
 
 
 def sections_of(study: Study, reach_deg: float) -> Mapping[str, Mapping[str, Any]]:
@@ -31,12 +32,17 @@ def sections_of(study: Study, reach_deg: float) -> Mapping[str, Mapping[str, Any
 def next_command(study: Study, typed: Sequence[str], file: str) -> str:
     """The trial of what is recommended, or its simulation, on the files that were typed.
 
-    Settings of the recommendation are none of it, nor those of the wrist, which the file has; what else was set is.
+    Of what was set it has what that command reads beside the wrist, which the file has.
     """
-    words, own = list(typed), ("recommend.", "wrist.")
-    places = [k for k, word in enumerate(words) if word.startswith(own) and words[k - 1] == "--set"]
+    command = "hw-run" if hw_run_fits(study, study.recommend.loop) else "simulate"
+    words, taken = list(typed), {"seed", *sections_read(command)}
+    places = [k for k, word in enumerate(words) if words[k - 1] == "--set" and _section(word) not in taken]
     kept = [word for k, word in enumerate(words) if k not in places and k + 1 not in places]
-    return shlex.join(["wristctl", "hw-run" if hw_run_fits(study, study.recommend.loop) else "simulate", *kept, file])
+    return shlex.join(["wristctl", command, *kept, file])
+
+
+def _section(override: str) -> str:
+    return override.partition("=")[0].partition(".")[0].replace("-", "_")
 
 
 def _within(reference: Reference, reach_deg: float) -> dict[str, Any]:
