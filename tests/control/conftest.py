@@ -10,8 +10,9 @@ import numpy as np
 import pytest
 
 from wristctl.config.wrist import WristParameters
-from wristctl.control.law import NOW, now_of, signals_of, wrist_of
+from wristctl.control.law import NOW, signals_of
 from wristctl.control.table import controller
+from wristctl.control.vetting import call_in_one_plane
 from wristctl.lanes.compiled import kernel
 from wristctl.lanes.lane import zero_like
 from wristctl.lanes.rows import part, rows_of
@@ -40,7 +41,7 @@ Sine = Callable[..., np.ndarray]
 @kernel
 def _run(
     law: Any, plant: Any, model: Any, limits: Any, gains: Any, reference: Any, now: Any, memory: Any, state: Any,
-    out: Any, period: float, segments: tuple[int, ...],
+    out: Any, period: float, segments: tuple[int, ...], wanted: Any,
 ) -> None:  # fmt: skip
     wrist, known, bound = load_segments(rows_of(plant)), load_segments(rows_of(model)), rows_of(limits)
     signals, kept = rows_of(now), rows_of(memory)
@@ -63,7 +64,8 @@ def _run(
                 signals[_FIRST_AHEAD + 3 * (ahead - 1) + i] = to_come[i]
         for i in range(memory.shape[0]):
             row[3 + i] = kept[i]
-        torque = law(now_of(now), wrist_of(model), rows_of(gains), kept)
+        call_in_one_plane(law, now, model, gains, memory, wanted, 1)
+        torque = rows_of(wanted)[0]
         row[0], row[1], row[2] = angle, rate, torque
         plus, minus = allocate(angle, known, torque, bound[0], bound[1])
         step(wrist, theta, omega, (plus, minus), NoTendons(), period + zero_like(angle))
@@ -81,7 +83,7 @@ def _closed_loop(
     now, followed = np.zeros(signals_of(law.preview)), np.ascontiguousarray(reference)
     _run(
         law.compiled(), wrist, known, np.array([4.0, limit]), values, followed, now, memory, state, out, period,
-        (0,) * segments_,
+        (0,) * segments_, np.zeros(1),
     )  # fmt: skip
     return Course(out[:, 0], out[:, 1], out[:, 2], out[:, 3:])
 

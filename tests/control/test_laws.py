@@ -14,6 +14,7 @@ from wristctl.config.wrist import WristParameters
 from wristctl.control.law import NOW, Controller, now_of, signals_of, wrist_of
 from wristctl.control.model import one_segment
 from wristctl.control.table import CONTROLLERS, controller, gains_of
+from wristctl.control.vetting import call_in_one_plane
 from wristctl.errors import UserError
 from wristctl.lanes.compiled import kernel
 from wristctl.lanes.rows import rows_of
@@ -21,12 +22,6 @@ from wristctl.wrist.compiled_model import terms
 from wristctl.wrist.segments import segments
 
 WRIST = WristParameters(gravity=(-8.0, 3.0))
-
-
-@kernel
-def _call(law: Any, now: Any, wrist: Any, gains: Any, memory: Any, torque: Any) -> None:
-    result = rows_of(torque)
-    result[0] = law(now_of(now), wrist_of(wrist), rows_of(gains), rows_of(memory))
 
 
 @kernel
@@ -42,7 +37,7 @@ def torque(name: str | Controller, gains: tuple[float, ...], memory: np.ndarray 
     row[: len(NOW)] = [given_now.get(field, 0.0) for field in NOW]
     kept = np.zeros(max(1, chosen.memory)) if memory is None else memory
     out = np.zeros(1)
-    _call(chosen.compiled(), row, segments(WRIST, 1), np.array([*gains, 0.0]), kept, out)
+    call_in_one_plane(chosen.compiled(), row, segments(WRIST, 1), np.array([*gains, 0.0]), kept, out, 1)
     return float(out[0])
 
 

@@ -4,6 +4,11 @@ A law is a function of lanes, written once: `law(now, wrist, gains, memory) -> t
 batches for tuning and on hardware. `now` has the fields of NOW, and `ahead` reads the reference to come where the
 controller asks for a preview; `wrist` is the Segments of the controller's one-segment model, `gains` the controller's
 own by name; `memory` is indexed, and the law may write it. What a law may call is in docs/lanes.md.
+
+Such a law runs once for each plane that the wrist bends in. One of a controller with `planes=2` runs once for all of
+them: `law(now, wrist, gains, memory, tendons, torque)`. `now`, `wrist` and `memory` are then tuples with an entry for
+each plane, `tendons` is what the tendons can do together (Tendons), and the law writes `torque[p]`. In a loop of one
+plane it has one entry of each.
 """
 
 import keyword
@@ -21,12 +26,12 @@ from numba.core.sigutils import normalize_signature
 
 from wristctl.config.foreign import PLAIN
 from wristctl.config.section import Parameter
-from wristctl.control.plain_law import PlainLaw
+from wristctl.control.plain_law import PlainLaw, Shape
 from wristctl.errors import UserError
 from wristctl.lanes import functions, lane
 from wristctl.lanes.blocks import width
 from wristctl.lanes.compiled import compiled, frozen_values, keep
-from wristctl.lanes.rows import rows_named, stack_named
+from wristctl.lanes.rows import part, rows_named, stack_named, stacked
 from wristctl.lanes.types import LaneType, RowsType
 from wristctl.wrist.segments import Segments
 
@@ -42,10 +47,26 @@ NOW = (
 
 REFERENCE = ("theta_ref", "rate_ref", "acceleration_ref")
 
+
+class Tendons(NamedTuple):
+    """Places of tendons as a law of both planes sees them: the torque in plane p is the sum of arm times pull.
+
+    In compiled code `arms` are rows: a plane's T arms after the other's; in plain Python an array (P, T).
+    """
+
+    arms: Any
+    """Moment arms at the present bend [m]."""
+    least: Any
+    """Least pull of all tendons at a place (T,) [N]."""
+    greatest: Any
+    """Greatest pull at a place (T,) [N]."""
+
+
 now_of, wrist_of = rows_named(NOW), rows_named(Segments._fields)
 now_at, wrist_at = stack_named(NOW), stack_named(Segments._fields)
 
-Law = Callable[[Any, Any, Any, Any], Any]
+Law = Callable[..., Any]
+_OF_A_WRIST = len(Segments._fields)
 
 # Control period [s] below which no comparison runs plain Python: a second of such a loop takes a second or more.
 LEAST_PLAIN_PERIOD = 1e-5
@@ -130,6 +151,8 @@ class Controller:
     surface: Surface | None = None
     """Surface of the sliding laws, for where their rate is that of the error."""
     plain: bool = False
+    planes: int = 1
+    """1 for a law that runs once for each plane, 2 for one that sees all planes at once."""
     settings: Mapping[str, Parameter] = field(default_factory=dict)
     """Settings that it was made from (`wristctl.control.design`): its own section of a study."""
 
@@ -138,6 +161,8 @@ class Controller:
         that cannot be a file's."""
         if not re.fullmatch(r"[A-Za-z0-9][\w.+-]*", self.name.removesuffix(PLAIN)):
             raise ValueError(f"{self.name!r} is no name for a controller: letters, digits, dots and dashes")
+        if self.planes not in (1, 2):
+            raise ValueError(f"{self.name} states planes={self.planes}: 1 sees one plane, 2 sees both")
         if self.plain and not self.name.endswith(PLAIN):
             object.__setattr__(self, "name", f"{self.name}{PLAIN}")
         if unknown := set(self.conditions) - set(self.presets):
@@ -154,25 +179,27 @@ class Controller:
         """Whether a comparison runs it in a loop with this control period [s]: plain Python not in the fastest."""
         return not self.plain or period >= LEAST_PLAIN_PERIOD
 
-    def compiled(self, count: int = 1) -> Any:
+    def compiled(self, count: int = 1, planes: int = 1, places: int = 2) -> Any:
         """The law as what every kernel of as many rollouts can call: native code, or a way out to plain Python.
 
-        Raises UserError where it does not compile.
+        It answers for all of so many planes and places of tendons at once. Raises UserError where it does not compile.
         """
         names = tuple(f"{name}_" if keyword.iskeyword(name) else name for name in self.gains)
+        shape = Shape(planes, places if self.planes > 1 else 0, self.preview, max(1, self.memory))
         if self.plain:
-            return PlainLaw(self.name, self.law, (NOW, Segments, names), (self.preview, self.memory), _signature(1))
-        return _native(self.law, width(count), names)
+            return PlainLaw(self.name, self.law, (NOW, Segments, names, Tendons), shape, self.memory, _signature(1))
+        return _native(self.law, width(count), names, shape)
 
 
 class _NativeLaw(types.WrapperAddressProtocol):
     """A compiled law as kernels know laws, all of one type: that its rows of gains have names is its own affair."""
 
-    def __init__(self, law: Law, lanes: int, names: tuple[str, ...]) -> None:
+    def __init__(self, law: Law, lanes: int, names: tuple[str, ...], shape: Shape) -> None:
         self._lanes = lanes
         frozen, imported = frozen_values(law)
-        self._code: Any = CFunc(law, normalize_signature(_signature(lanes, names)), locals={}, options={})
-        keep(self._code, law, *imported, frozen=frozen)
+        of_planes = _of_both_planes(law, shape) if shape.places else _of_each_plane(law, shape)
+        self._code: Any = CFunc(of_planes, normalize_signature(_signature(lanes, names)), locals={}, options={})
+        keep(self._code, law, Path(__file__), *imported, frozen=frozen + repr(shape).encode())
         try:
             self._code.compile()
         except NumbaError as error:
@@ -190,6 +217,32 @@ class _NativeLaw(types.WrapperAddressProtocol):
         """Nothing can have gone wrong in native code."""
 
 
+def _of_each_plane(law: Law, shape: Shape) -> Law:
+    """All planes' torques by a law of one plane."""
+    inner, planes, seen, kept = compiled(law), (0,) * shape.planes, signals_of(shape.preview), shape.memory
+
+    def run(now: Any, wrist: Any, gains: Any, memory: Any, arms: Any, least: Any, greatest: Any, torque: Any) -> None:
+        each_now, each_wrist = stacked(now, seen, planes), stacked(wrist, _OF_A_WRIST, planes)
+        each_memory = stacked(memory, kept, planes)
+        for p in range(len(planes)):
+            torque[p] = inner(each_now[p], each_wrist[p], gains, each_memory[p])
+
+    return run
+
+
+def _of_both_planes(law: Law, shape: Shape) -> Law:
+    """All planes' torques by a law of both planes."""
+    inner, planes, seen, kept = compiled(law), (0,) * shape.planes, signals_of(shape.preview), shape.memory
+    places, lever_arms = (0,) * shape.places, (0,) * (shape.planes * shape.places)
+
+    def run(now: Any, wrist: Any, gains: Any, memory: Any, arms: Any, least: Any, greatest: Any, torque: Any) -> None:
+        tendons = Tendons(part(arms, 0, lever_arms), part(least, 0, places), part(greatest, 0, places))
+        each_now, each_wrist = stacked(now, seen, planes), stacked(wrist, _OF_A_WRIST, planes)
+        inner(each_now, each_wrist, gains, stacked(memory, kept, planes), tendons, part(torque, 0, planes))
+
+    return run
+
+
 # Functions of Python and NumPy that have another name for lanes.
 _OTHER_NAMES = {"arctan2": "atan2", "pow": "power", "min": "minimum", "max": "maximum"}
 
@@ -200,7 +253,7 @@ _TOLD = (
     (r"Unknown attribute '(\w+)' of type rows\(.*?, \d+, ([\w,]*)\)", "there is no '{0}' among {1}"),
     (r"No implementation of function Function\((?:<(?:built-in function |function |ufunc '))?(\w+).*?\) found",
      "it calls {0}, which does not compile"),
-    (r"No conversion from none to LaneType", "it returns no torque"),
+    (r"Cannot cast none to LaneType", "it returns no torque"),
 )  # fmt: skip
 
 
@@ -232,9 +285,9 @@ def _import_of(name: str) -> str:
 def _signature(lanes: int, gains: tuple[str, ...] = ()) -> Any:
     number = LaneType(lanes)
     now, wrist, named = (RowsType(number, None, fields=fields) for fields in (NOW, Segments._fields, gains))
-    return number(now, wrist, named, RowsType(number, None))
+    return types.void(now, wrist, named, *[RowsType(number, None)] * 5)
 
 
 @cache
-def _native(law: Law, lanes: int, names: tuple[str, ...]) -> _NativeLaw:
-    return _NativeLaw(law, lanes, names)
+def _native(law: Law, lanes: int, names: tuple[str, ...], shape: Shape) -> _NativeLaw:
+    return _NativeLaw(law, lanes, names, shape)

@@ -5,7 +5,7 @@ import math
 from collections import namedtuple
 from collections.abc import Callable, Sequence
 from functools import cache
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numba.core import types
@@ -17,28 +17,40 @@ from wristctl.plugins.places import contained
 __all__ = ["PlainLaw"]
 # Imported for what it does: numba learns there what an object with an address is.
 _TEACHES_NUMBA = function_type
-# Function that kernels call of a rollout alone: four pointers to doubles, and a lane of width one, which is a double.
-_CALLBACK = ctypes.CFUNCTYPE(ctypes.c_double, *[ctypes.c_void_p] * 4)
-_REFERENCE = 3
+# Function that kernels call of a rollout alone: eight pointers to doubles.
+_CALLBACK = ctypes.CFUNCTYPE(None, *[ctypes.c_void_p] * 8)
+_REFERENCE, _DOUBLE = 3, ctypes.sizeof(ctypes.c_double)
+
+
+class Shape(NamedTuple):
+    """Numbers that a law is called with: planes, places of tendons (0 for a law of each plane), periods of preview, and
+    rows of memory of each plane."""
+
+    planes: int
+    places: int
+    preview: int
+    memory: int
 
 
 class PlainLaw(types.WrapperAddressProtocol):
     """A plain law as kernels know laws. `check` raises what went wrong in it, after which it has answered nan.
 
     The law is called with a named tuple of what it sees, on which `ahead(k)` is the reference k periods from now, named
-    tuples of the wrist and of the gains, and an array of its memory; all but that are copies.
+    tuples of the wrist and of the gains, and an array of its memory; all but that are copies. A law of both planes gets
+    a tuple of them, with the tendons and an array of torques that it writes.
     """
 
     def __init__(
-        self, name: str, law: Any, fields: tuple[Sequence[str], Any, tuple[str, ...]], sizes: tuple[int, int], kind: Any
-    ) -> None:
-        now, wrist, gains = fields
+        self, name: str, law: Any, fields: tuple[Sequence[str], Any, tuple[str, ...], Any], shape: Shape, memory: int,
+        kind: Any,
+    ) -> None:  # fmt: skip
+        now, self._wrist, gains, self._tendons = fields
         self._name, self._kind = name, kind
         self._error: BaseException | None = None
-        self._preview, self._memory = sizes
-        self._now, self._wrist, self._gains = _seen(tuple(now)), wrist, _named(gains)
+        self._shape, self._memory = shape, memory
+        self._now, self._gains = _seen(tuple(now)), _named(gains)
         self._law, self._of_plane = law, dict[int, Callable[..., Any]]()
-        self._signals = len(now) + _REFERENCE * self._preview
+        self._signals = len(now) + _REFERENCE * shape.preview
         code = getattr(law.__call__ if isinstance(law, type) else law, "__code__", None)
         self._where = f"{code.co_filename}:{code.co_firstlineno}" if code else name
         self._callback = _CALLBACK(self._call)
@@ -58,32 +70,50 @@ class PlainLaw(types.WrapperAddressProtocol):
             with contained(self._name, self._where):
                 raise error
 
-    def _call(self, now: int, wrist: int, gains: int, memory: int) -> float:
+    def _call(
+        self, now: int, wrist: int, gains: int, memory: int, arms: int, least: int, greatest: int, torque: int
+    ) -> None:
+        wanted = _array(torque, self._shape.planes)
+        wanted[:] = math.nan
         if self._error is not None:
-            return math.nan
+            return
         try:
-            signals = _doubles(now, self._signals)
-            current = self._now(signals)
-            believed, gains_type = self._wrist(*_doubles(wrist, len(self._wrist._fields))), self._gains
-            kept = np.ctypeslib.as_array((ctypes.c_double * max(1, self._memory)).from_address(memory))[: self._memory]
-            torque = self._in(memory)(current, believed, gains_type(*_doubles(gains, len(gains_type._fields))), kept)
-            return self._finite(torque, current)
+            planes = range(self._shape.planes)
+            seen = [self._now(_doubles(now + _DOUBLE * self._signals * p, self._signals)) for p in planes]
+            size = len(self._wrist._fields)
+            believed = [self._wrist(*_doubles(wrist + _DOUBLE * size * p, size)) for p in planes]
+            values = self._gains(*_doubles(gains, len(self._gains._fields)))
+            addresses = [memory + _DOUBLE * self._shape.memory * p for p in planes]
+            kept = [_array(address, self._memory) for address in addresses]
+            if places := self._shape.places:
+                levers = np.array(_doubles(arms, places * len(planes))).reshape(len(planes), places)
+                tendons = self._tendons(levers, *(np.array(_doubles(limit, places)) for limit in (least, greatest)))
+                self._in(memory)(tuple(seen), tuple(believed), values, tuple(kept), tendons, wanted)
+            else:
+                for p in planes:
+                    wanted[p] = float(self._in(addresses[p])(seen[p], believed[p], values, kept[p]))
+            self._check_finite(wanted, seen)
         except BaseException as error:  # nothing may be raised through compiled code
             self._error = error
-            return math.nan
+            wanted[:] = math.nan
 
     def _in(self, memory: int) -> Callable[..., Any]:
-        """The law of the plane whose memory is at this address: of a class an object of its own."""
+        """The law whose memory is at this address, of a plane or of both: of a class an object of its own."""
         if memory not in self._of_plane:
             self._of_plane[memory] = self._law() if isinstance(self._law, type) else self._law
         return self._of_plane[memory]
 
-    def _finite(self, torque: Any, now: Any) -> float:
-        value = float(torque)
-        if not math.isfinite(value):
-            problem = f"{self._name} returned {value} at theta = {now.theta:.4g} rad, rate = {now.rate:.4g} rad/s"
-            raise UserError(problem, self._where, "return a finite torque [N m] whatever it sees")
-        return value
+    def _check_finite(self, torques: Any, seen: Sequence[Any]) -> None:
+        for value, now in zip(map(float, torques), seen, strict=True):
+            if not math.isfinite(value):
+                verb = "wrote" if self._shape.places else "returned"
+                problem = f"{self._name} {verb} {value} at theta = {now.theta:.4g} rad, rate = {now.rate:.4g} rad/s"
+                raise UserError(problem, self._where, "return a finite torque [N m] whatever it sees")
+
+
+def _array(address: int, count: int) -> Any:
+    """View of so many doubles at an address."""
+    return np.ctypeslib.as_array((ctypes.c_double * max(1, count)).from_address(address))[:count]
 
 
 def _doubles(address: int, count: int) -> list[float]:

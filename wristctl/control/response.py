@@ -9,7 +9,7 @@ from wristctl.control.belief import Reached, coupled, coupling, miss, moment_arm
 from wristctl.control.law import NOW, REFERENCE, now_at, wrist_at
 from wristctl.lanes.compiled import compiled, spelled_out
 from wristctl.lanes.lane import zero_like
-from wristctl.lanes.rows import lanes_like, rows_at, rows_of
+from wristctl.lanes.rows import beyond, lanes_like, rows_at, rows_of
 
 _THETA, _RATE, _THETA_REF, _RATE_REF, _ACCELERATION_REF, _LOW, _HIGH, _PERIOD, _LOAD, _WITHHELD = range(len(NOW))
 
@@ -122,10 +122,12 @@ def perceive(control: Any, known: Any, seen: Any, limits: Any, room: Any, since:
 
 
 @spelled_out
-def wanted_torque(control: Any, p: int) -> Any:
-    """Torque [N m] that the law wants in a plane, by its signals."""
-    gains, memory = rows_of(control.gains), rows_at(control.memory, p)
-    return control.law(now_at(control.signals, p), wrist_at(control.models, p), gains, memory)
+def wanted_torques(control: Any, arms: Any, limits: Any, wanted: Any) -> None:
+    """Write the torques [N m] that the law wants in all planes, by its signals."""
+    control.law(
+        now_at(control.signals, 0), wrist_at(control.models, 0), rows_of(control.gains), rows_at(control.memory, 0),
+        beyond(arms, 0), beyond(limits.least, 0), beyond(limits.greatest, 0), beyond(wanted, 0),
+    )  # fmt: skip
 
 
 @compiled
@@ -139,8 +141,9 @@ def respond(
     its part, it is told at the next tick, by `seen.missed`.
     """
     perceive(control, known, seen, limits, room, since, period)
+    wanted_torques(control, room.arms, limits, room.wanted)
     for p in range(len(room.bend)):
-        room.wanted[p] = coupled(known.coupling, wanted_torque(control, p), room.extra[p])
+        room.wanted[p] = coupled(known.coupling, room.wanted[p], room.extra[p])
     reached = Reached(room.extra, room.low, room.high, limits)
     share = share_out(known.wrist, room.arms, room.wanted, reached, pulls)
     torque_of(room.arms, pulls, room.torque)

@@ -14,7 +14,8 @@ from wristctl.control.law import NOW, Controller, now_of, signals_of, wrist_of
 from wristctl.errors import UserError
 from wristctl.lanes.blocks import to_blocks, to_rows
 from wristctl.lanes.compiled import kernel
-from wristctl.lanes.rows import rows_of
+from wristctl.lanes.lane import zero_like
+from wristctl.lanes.rows import beyond, lanes_like, part, rows_of
 from wristctl.wrist.segments import segments
 
 _STATES = 32
@@ -54,10 +55,27 @@ def law_of(entry: Any, where: str, settings: Mapping[str, Mapping[str, float]]) 
     return entry
 
 
+# Moment arms [m] of both sides where a law is tried in one plane.
+_ARMS = (1.0, -1.0)
+
+
 @kernel
-def _call(law: Any, now: Any, wrist: Any, gains: Any, memory: Any, out: Any, times: int) -> None:
+def call_in_one_plane(law: Any, now: Any, wrist: Any, gains: Any, memory: Any, out: Any, times: int) -> None:
+    """Write the torque of a law after so many calls; two tendons reach what its signals say.
+
+    `now`, `wrist`, `gains`, `memory` and `out` are arrays, [row, lane] of a block or [row] of a rollout alone.
+    """
+    signals = now_of(now)
+    pair = part(rows_of(now), 0, (0, 0))
+    arms, least, greatest = lanes_like(pair), lanes_like(pair), lanes_like(pair)
+    for t in range(2):
+        arms[t], least[t] = _ARMS[t] + zero_like(signals.period), zero_like(signals.period)
+    greatest[0], greatest[1] = signals.torque_high, -signals.torque_low
     for _ in range(times):
-        rows_of(out)[0] = law(now_of(now), wrist_of(wrist), rows_of(gains), rows_of(memory))
+        law(
+            signals, wrist_of(wrist), rows_of(gains), rows_of(memory), beyond(arms, 0), beyond(least, 0),
+            beyond(greatest, 0), rows_of(out),
+        )  # fmt: skip
 
 
 def call_law(controller: Controller, signals: Array, gains: Array, wide: bool = False, times: int = 1) -> Array:
@@ -74,7 +92,7 @@ def call_law(controller: Controller, signals: Array, gains: Array, wide: bool = 
         rows = (signals[group], wrists, np.pad(gains[group], ((0, 0), (0, 1))), kept, out)
         signal_blocks, wrist_blocks, gain_blocks, memory, answers = (to_blocks(row) for row in rows)
         for block in range(len(signal_blocks)):
-            _call(
+            call_in_one_plane(
                 law, signal_blocks[block], wrist_blocks[block], gain_blocks[block], memory[block], answers[block], times
             )
         torques[group] = to_rows(answers, len(group))[:, 0]
@@ -138,7 +156,7 @@ def _guarded(
     before = [block.copy() for block in blocks]
     now, wrist, gains, memory = (b[_GUARD : _GUARD + size] for b, size in zip(blocks, sizes, strict=True))
     out = np.zeros(1)
-    _call(law, now, wrist, gains, memory, out, 1)
+    call_in_one_plane(law, now, wrist, gains, memory, out, 1)
     law.check()
     for name, block, old in zip(_PARTS[:3], blocks, before, strict=False):
         if not _same(block, old):
@@ -160,7 +178,7 @@ def _allocated(law: Any, arguments: tuple[Array, Array, Array], memory: int) -> 
     try:
         counts = [rtsys.get_allocation_stats().alloc]
         for times in (1, 2):  # handing arrays over takes memory too, and as much each time
-            _call(law, *arguments, kept, out, times)
+            call_in_one_plane(law, *arguments, kept, out, times)
             counts.append(rtsys.get_allocation_stats().alloc)
         return int(counts[2] - 2 * counts[1] + counts[0])
     finally:

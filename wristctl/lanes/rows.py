@@ -186,6 +186,18 @@ def beyond(typingctx: Any, rows: RowsType, start: types.Integer) -> Any:
     return signature(RowsType(rows.element, None), rows, types.intp), _beyond
 
 
+@intrinsic
+def stacked(typingctx: Any, rows: RowsType, size: types.Integer, count: Any) -> Any:
+    """Views, as many as the tuple `count` has entries, each of `size` rows after the other and with their names."""
+
+    def codegen(context: Any, builder: Any, sig: Any, args: list[Any]) -> Any:
+        starts = [builder.mul(args[1], context.get_constant(types.intp, number)) for number in range(len(count))]
+        views = [_rows(builder, rows, _address(builder, rows, args[0], start)) for start in starts]
+        return context.make_tuple(builder, sig.return_type, views)
+
+    return signature(types.UniTuple(rows, len(count)), rows, types.intp, count), codegen
+
+
 def scratch_rows(result: RowsType, rows: RowsType) -> Any:
     """Signature and lowering of a function of `rows` that gives memory for rows of the type `result`."""
 

@@ -218,8 +218,8 @@ def batch(
     )
     course = LoopCourse(references, _disturbances(cases, samples))
     setup = Setup(
-        controller.compiled(count), model, (0,) * k, (0,) * planes, (0,) * places, (0,) * (planes * places),
-        (0,) * (OF_A_PLANE * planes), of.period, loop.steps, ticks, controller.preview,
+        controller.compiled(count, planes, places), model, (0,) * k, (0,) * planes, (0,) * places,
+        (0,) * (planes * places), (0,) * (OF_A_PLANE * planes), of.period, loop.steps, ticks, controller.preview,
     )  # fmt: skip
     return Batch(setup, course, values, state, blocks, samples, wide)
 

@@ -87,7 +87,7 @@ class SpatialSteering:
 
     def use(self, controller: Controller, gains: Sequence[float]) -> None:
         """Take up a law in both planes, its memory empty, with motors that have caught up."""
-        self._law = controller.compiled()
+        self._law = controller.compiled(1, 2, AXES)
         self.withheld, self._missed, self._preview = np.zeros(2), np.zeros(2), controller.preview
         self._control = Controlled(
             self._law, np.zeros((2, signals_of(controller.preview))), self._known.belief.models,
