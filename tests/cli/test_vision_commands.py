@@ -21,7 +21,7 @@ from wristctl.commands.calibrate.camera import look
 from wristctl.config.camera import CalibrateCameraSettings, SceneSettings
 from wristctl.config.wrist import WristParameters
 from wristctl.records import Run, open_run
-from wristctl.records.manifest import command_of
+from wristctl.study_files.keys import command_of
 from wristctl.vision.camera import FolderCamera, Frame
 from wristctl.vision.scene import Scene, board_shots
 

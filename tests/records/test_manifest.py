@@ -16,9 +16,10 @@ from wristctl.config.study import Study
 from wristctl.errors import UserError
 from wristctl.records import InputRun, Run, start_run
 from wristctl.records.files import files_below, sha256_of_list
-from wristctl.records.manifest import Code, command_of
+from wristctl.records.manifest import Code
 from wristctl.records.run_writer import readme
 from wristctl.records.tags import change_tags
+from wristctl.study_files.keys import command_of
 from wristctl.study_files.resolved import config_hash
 
 Make = Callable[..., Run]
