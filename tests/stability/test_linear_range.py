@@ -35,10 +35,8 @@ def _with(loop: Loop, **plant: object) -> Loop:
 def _swing(hertz: float, motors: float = 0.0, pulls: float = 0.0, factor: float = 1.0, frames: bool = True) -> Swing:
     """A swing of 1 rad at so many Hz, of a loop that is written out: its motors' counts and pulls (either side's)."""
     rate = 2.0j * math.pi * hertz
-    outputs = {"theta": [1.0, 0.0, 0.0, 0.0], "rate": [0.0, 1.0, 0.0, 0.0]}
-    outputs |= {"tension_plus": [pulls, 0.0, 0.0, 0.0], "tension_minus": [-pulls, 0.0, 0.0, 0.0]}
-    nothing = np.zeros(4)
-    rows = {name: np.array(row) for name, row in outputs.items()}
+    nothing, tension = np.zeros(4), np.array([[pulls, 0.0, 0.0, 0.0], [-pulls, 0.0, 0.0, 0.0]])
+    rows = {"theta": np.eye(4)[0], "rate": np.eye(4)[1], "tension": tension}
     loop = SampledLoop(5e-3, [LinearTick(np.eye(4), nothing, nothing, nothing, True, rows)])
     names = ("angle", "rate", "motor", "motor")
     linear = LinearLoop(loop, loop, math.radians(-25.0), 0.1, (9.0, 5.0), names, frames, 0.0)

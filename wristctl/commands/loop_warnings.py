@@ -37,12 +37,14 @@ def warn_if_outside(share: float) -> None:
         log.warning("%.3g %% of the wanted tips lie outside what the network learned: guesses", 100.0 * share)
 
 
-def warn_if_it_buckles(findings: Findings, wrist: WristParameters, loops: Iterable[Loop]) -> None:
+def warn_if_it_buckles(findings: Findings, wrist: WristParameters, loops: Iterable[Loop], planes: int = 1) -> None:
     """Warn where the straight wrist of a loop has no stable equilibrium, and note it in the manifest."""
     from wristctl.simulation.worlds import plant_of
+    from wristctl.wrist.spatial.spatial_statics import least_stiffness_at_pretension
     from wristctl.wrist.statics import least_stiffness
 
-    least = min(least_stiffness(plant_of(wrist, loop.plant), loop.plant_segments) for loop in loops)
+    of_wrist = least_stiffness if planes == 1 else least_stiffness_at_pretension
+    least = min(of_wrist(plant_of(wrist, loop.plant), loop.plant_segments) for loop in loops)
     findings.numerics(least_stiffness=least, buckles=least <= 0.0)
     if least <= 0.0:
         log.warning("the straight wrist buckles: its least stiffness is %.3g N m/rad; only feedback can hold it", least)

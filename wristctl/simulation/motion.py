@@ -179,6 +179,19 @@ class Motion:
         return Goals(final, final if self.turn is None else self.turn, self.begin, self.rest, self.horizon)
 
 
+def resting(theta: Array, samples: int, period: float, acceleration: Array | None = None) -> Motion:
+    """A motion that rests at bends (P,) [rad] from the start, over so many samples, every `period` [s].
+
+    Laws are told an `acceleration` (P,) [rad/s^2] all the same, where one is given.
+    """
+    rows = np.zeros((DERIVATIVES * len(theta), samples))
+    rows[::DERIVATIVES] = theta[:, None]
+    if acceleration is not None:
+        rows[2::DERIVATIVES] = acceleration[:, None]
+    time, tips = period * np.arange(samples, dtype=np.float64), np.zeros((samples, len(theta) + 1))
+    return Motion(time, Angles.of(rows), tips, None, 0.0, 0.0, samples * period)
+
+
 def _fixed(rows: Array) -> Array:
     rows.setflags(write=False)
     return rows

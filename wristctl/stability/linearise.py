@@ -11,20 +11,19 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from wristctl.arrays import Array
 from wristctl.config.loop import Loop
 from wristctl.config.plant import Sensor
 from wristctl.config.wrist import WristParameters
-from wristctl.control.law import Controller, Gain
-from wristctl.simulation.kernel import RECORDED
+from wristctl.control.law import Controller
 from wristctl.stability.loop_ticks import LoopTicks, TickSlopes
 from wristctl.stability.sampled_loop import Complex, LinearTick, SampledLoop
 from wristctl.stability.smooth_loop import FrictionReading, smooth
 
-# Change in one tick, in typical sizes, that is none.
-_STILL = 1e-8
+# Change in one tick, in typical sizes, that is none, and with which Newton's method ends.
+_STILL, _ENDED = 1e-7, 1e-11
 _TRIES = 60
 # Longest step of Newton's method, in typical sizes.
 _FURTHEST = 0.3
@@ -32,7 +31,8 @@ _FURTHEST = 0.3
 _FREE = 1e-10
 # Iterations that find the tendons' path at a position of the wrist.
 _TURNS = 5
-_THETA = RECORDED.index("theta")
+# Column of the first bend, which is nan where the wrist has failed.
+_BEND = 0
 
 
 class RestingPoint(NamedTuple):
@@ -41,9 +41,10 @@ class RestingPoint(NamedTuple):
     state: Array
     ticks: list[TickSlopes]
 
-    def recorded(self, name: str) -> float:
-        """Value that the kernel records at the resting point, by its name in RECORDED."""
-        return float(self.ticks[0].recorded[RECORDED.index(name)])
+    def recorded(self, columns: slice) -> Array:
+        """Values that the kernel records at the resting point."""
+        values: Array = self.ticks[0].recorded[columns]
+        return values
 
 
 def resting_point(loop: LoopTicks) -> RestingPoint | None:
@@ -76,7 +77,7 @@ def with_relaxed_bristles(loop: LoopTicks, sliding: LoopTicks, point: RestingPoi
 
 def change_in(loop: LoopTicks, point: RestingPoint) -> float:
     """The largest change of any variable in any tick, in typical sizes; inf where the wrist is not where it can be."""
-    if not all(math.isfinite(tick.recorded[_THETA]) for tick in point.ticks):
+    if not all(math.isfinite(tick.recorded[_BEND]) for tick in point.ticks):
         return math.inf
     change = max(float(np.abs((tick.after - point.state) / loop.sizes).max()) for tick in point.ticks)
     return change if math.isfinite(change) else math.inf
@@ -89,7 +90,7 @@ def _newton(loop: LoopTicks, point: RestingPoint) -> RestingPoint:
         now = change_in(loop, point)
         if now < change_in(loop, best):
             best = point
-        if not math.isfinite(now) or now < 1e-3 * _STILL:
+        if not math.isfinite(now) or now < _ENDED:
             break
         ticks = list({id(tick): tick for tick in point.ticks}.values())
         change = np.concatenate([(tick.after - point.state) / sizes for tick in ticks])
@@ -103,39 +104,35 @@ def _newton(loop: LoopTicks, point: RestingPoint) -> RestingPoint:
 
 
 def law(now: Any, wrist: Any, gains: Any, memory: Any) -> Any:
-    """The torque that it is given."""
-    return gains.torque
+    """The acceleration of its reference as the torque, for each plane its own."""
+    return now.acceleration_ref
 
 
-HOLD = Controller(
-    name="hold",
-    law=law,
-    source="the plant alone",
-    gains={"torque": Gain("N m", "held", 1e-3, 1e1)},
-    presets={},
-)
+HOLD = Controller(name="hold", law=law, source="the plant alone", gains={}, presets={})
 
 
 # Change of the plant's answer, as a share of it, that is none; the shortest integration step that is tried [s]; and at
 # how many frequencies the plant is asked.
 _EXACT, _SHORTEST, _FREQUENCIES = 1e-6, 2e-5, 24
-_OUTPUTS = {name: RECORDED.index(name) for name in ("theta", "rate", "torque_wanted", "tension_plus", "tension_minus")}
+# Outputs of a linear loop by the kinds of values that the kernel records.
+_OUTPUTS = {"theta": "bend", "rate": "rate", "torque_wanted": "torque_wanted", "tension": "tension"}
 
 
 @dataclass(frozen=True)
 class LinearLoop:
-    """A loop about where it rests: the closed one, which can be cut, and the plant alone from torque to angle.
+    """A loop about where it rests: the closed one, which can be cut, and the plant alone from torque to bend.
 
     It is cut where a camera takes its frames, or, where sensors are ideal, where the law commands its torque: the same
-    loop, through the wrist and its motors on one side and all that its controller is on the other.
+    loop, through the wrist and its motors on one side and all that its controller is on the other. What is of each
+    plane is a number in one plane, and (2,) in two; tensions are of one tendon of each place.
     """
 
     closed: SampledLoop
     plant: SampledLoop
-    theta: float
-    """Angle at rest [rad]; `torque` [N m] and `tensions` [N] hold the wrist there."""
-    torque: float
-    tensions: tuple[float, float]
+    theta: Any
+    """Bend at rest [rad]; `torque` [N m] and `tensions` [N] hold the wrist there."""
+    torque: Any
+    tensions: tuple[float, ...]
     names: Sequence[str]
     """Names of the closed loop's variables."""
     at_frames: bool
@@ -143,14 +140,25 @@ class LinearLoop:
     bend: float
     """Relative difference of the law's slope between a small change and a hundred times it."""
 
+    @property
+    def planes(self) -> int:
+        """Planes that it bends in."""
+        return np.size(self.theta)
+
 
 def linearise(
-    law: Controller, gains: Sequence[float], loop: Loop, wrist: WristParameters, theta: float, friction: FrictionReading
+    law: Controller,
+    gains: Sequence[float],
+    loop: Loop,
+    wrist: WristParameters,
+    theta: ArrayLike,
+    friction: FrictionReading,
 ) -> LinearLoop | None:
     """The loop about where it rests with its reference at theta [rad]; None where it rests nowhere near.
 
-    Tendons with friction are taken as `slipping` or `stuck`; what is held between ticks is held exactly, however many
-    integration steps the loop has. Raises UserError for frames that are too many control periods apart.
+    It bends in as many planes as theta has entries, a number or (2,). Tendons with friction are taken as `slipping` or
+    `stuck`; what is held between ticks is held exactly, however many integration steps the loop has. Raises UserError
+    for frames that are too many control periods apart.
     """
     sliding = LoopTicks(law, gains, smooth(loop, "slipping"), wrist, theta)
     ticks, point = sliding, resting_point(sliding)
@@ -161,89 +169,108 @@ def linearise(
         point = with_relaxed_bristles(ticks, sliding, point)
     memory = np.array(ticks.names) == "memory"
     controller_rows = np.isin(ticks.names, ("memory", "estimate", "estimate at the frame", "delivered", "frame"))
-    torque = point.recorded("torque_wanted")
-    alone = smooth(loop.model_copy(update={"sensor": Sensor()}), friction)
+    columns = ticks.columns
+    torque = point.recorded(columns["torque_wanted"])
+    alone = smooth(loop.model_copy(update={"sensor": Sensor(), "coupling": "ignored"}), friction)
     held, steps = _held(torque, alone, wrist, theta, point.state[~controller_rows])
     camera = loop.sensor.level == "camera"
     exact = LoopTicks(law, gains, _stepped(smooth(loop, friction), steps), wrist, theta).slopes(point.state)
-    closed = [_seen(tick) if camera else _commanded(tick, memory, held) for tick in exact]
+    closed = [_seen(tick, columns) if camera else _commanded(tick, columns, memory, held) for tick in exact]
     return LinearLoop(
         closed=SampledLoop(ticks.period, closed),
-        plant=SampledLoop(ticks.period, [_alone(held)]),
-        theta=point.recorded("theta"),
-        torque=torque,
-        tensions=(point.recorded("tension_plus"), point.recorded("tension_minus")),
+        plant=SampledLoop(ticks.period, [_alone(held, columns)]),
+        theta=_of_planes(point.recorded(columns["bend"])),
+        torque=_of_planes(torque),
+        tensions=tuple(point.recorded(columns["tension"]).tolist()),
         names=ticks.names,
         at_frames=camera,
         bend=_bend(ticks, point),
     )
 
 
-def _held(torque: float, alone: Loop, wrist: WristParameters, theta: float, state: Array) -> tuple[TickSlopes, int]:
+def _of_planes(values: Array) -> Any:
+    return float(values[0]) if len(values) == 1 else values
+
+
+def _held(torque: Array, alone: Loop, wrist: WristParameters, theta: ArrayLike, state: Array) -> tuple[TickSlopes, int]:
     """The plant's tick from a state with its torque held exactly, and how many integration steps a period has for that.
 
     Steps of third order, as the wrist's are, converge long before the shortest; of first order 1e-4 may be left.
     """
     steps, answer = alone.steps, None
     while True:
-        (tick,) = LoopTicks(HOLD, (torque,), _stepped(alone, steps), wrist, theta).slopes(state)
-        before, answer = answer, _answer(tick)
-        converged = before is not None and np.abs(answer / before - 1.0).max() <= _EXACT
+        plant = LoopTicks(HOLD, (), _stepped(alone, steps), wrist, theta, torque)
+        (tick,) = plant.slopes(state)
+        before, answer = answer, _answer(tick, plant.columns)
+        converged = before is not None and (np.abs(answer - before) <= _EXACT * _sizes(before)).all()
         if converged or alone.control_period < 2 * steps * _SHORTEST:
             return tick, steps
         steps *= 2
 
 
-def _answer(held: TickSlopes) -> Complex:
-    """The plant's angle and rate per torque at frequencies up to half the sampling rate, (n, 2).
+def _answer(held: TickSlopes, columns: dict[str, slice]) -> Complex:
+    """The plant's bends and rates per torque at frequencies up to half the sampling rate, (2, n, P, P).
 
     Far below it the answer is the static one, which no step changes, and difference quotients are less exact.
     """
-    z = np.exp(1j * np.geomspace(0.03, math.pi, _FREQUENCIES))
-    state = np.linalg.solve(z[:, None, None] * np.eye(len(held.by_gain)) - held.transition, held.by_gain[:, None])
-    return np.asarray((held.outputs[[_OUTPUTS["theta"], _OUTPUTS["rate"]]] @ state)[..., 0], complex)
+    z, count = np.exp(1j * np.geomspace(0.03, math.pi, _FREQUENCIES)), len(held.after)
+    state = np.linalg.solve(z[:, None, None] * np.eye(count) - held.transition, held.by_acceleration.reshape(count, -1))
+    return np.array([held.outputs[columns[kind]] @ state for kind in ("bend", "rate")], complex)
+
+
+def _sizes(answer: Complex) -> Array:
+    """The largest of each kind at each frequency, over all planes."""
+    sizes: Array = np.abs(answer).max(axis=(-2, -1), keepdims=True)
+    return sizes
 
 
 def _stepped(loop: Loop, steps: int) -> Loop:
     return loop.model_copy(update={"substeps": steps})
 
 
-def _outputs(tick: TickSlopes) -> dict[str, Array]:
-    return {name: tick.outputs[column] for name, column in _OUTPUTS.items()}
+def _outputs(tick: TickSlopes, columns: dict[str, slice]) -> dict[str, Array]:
+    return {name: _row(tick.outputs[columns[kind]]) for name, kind in _OUTPUTS.items()}
 
 
-def _seen(tick: TickSlopes) -> LinearTick:
+def _row(rows: Array) -> Array:
+    """Rows of P planes, or of T places; the row of one plane alone."""
+    return rows[0] if len(rows) == 1 else rows
+
+
+def _seen(tick: TickSlopes, columns: dict[str, slice]) -> LinearTick:
     """A tick behind a camera, cut where its frame is taken."""
-    outputs = _outputs(tick)
+    outputs = _outputs(tick, columns)
     return LinearTick(tick.transition, tick.by_frame, outputs["theta"], tick.by_reference, tick.seen, outputs)
 
 
-def _commanded(tick: TickSlopes, memory: NDArray[np.bool_], held: TickSlopes) -> LinearTick:
+def _commanded(tick: TickSlopes, columns: dict[str, slice], memory: NDArray[np.bool_], held: TickSlopes) -> LinearTick:
     """A tick of an ideal sensor, cut at the law's torque, which its memory does not feel.
 
     What a large gain does is not to be told from the wrist's own motion in one difference: the wrist's part is that of
     the torque held, and what the law makes of it.
     """
-    outputs, into, transition = _outputs(tick), np.zeros(len(memory)), tick.transition.copy()
-    into[~memory] = held.by_gain
+    outputs, into, transition = _outputs(tick, columns), np.zeros_like(tick.by_reference), tick.transition.copy()
+    into[~memory] = held.by_acceleration
     transition[~memory] = 0.0
     transition[np.ix_(~memory, ~memory)] = held.transition
-    transition[~memory] += np.outer(held.by_gain, outputs["torque_wanted"])
+    by_torque = held.by_acceleration.reshape(len(held.after), -1)
+    transition[~memory] += by_torque @ tick.outputs[columns["torque_wanted"]]
     return LinearTick(transition, into, outputs["torque_wanted"], tick.by_reference, True, outputs)
 
 
-def _alone(held: TickSlopes) -> LinearTick:
-    """The plant: cut at its torque, of which -angle comes back, so that its response is the angle's."""
-    angle = held.outputs[_OUTPUTS["theta"]]
-    closed = held.transition - np.outer(held.by_gain, angle)
-    return LinearTick(closed, held.by_gain, -angle, held.by_reference, True, {"theta": angle})
+def _alone(held: TickSlopes, columns: dict[str, slice]) -> LinearTick:
+    """The plant: cut at its torque, of which -bend comes back, so that its response is the bend's."""
+    bends = held.outputs[columns["bend"]]
+    closed = held.transition - held.by_acceleration.reshape(len(held.after), -1) @ bends
+    into, outputs = held.by_acceleration, {"theta": _row(bends)}
+    return LinearTick(closed, into, -outputs["theta"], held.by_reference, True, outputs)
 
 
 def _bend(ticks: LoopTicks, point: RestingPoint) -> float:
     """Relative difference of the torque's slope between a small change and a hundred times it."""
-    column, worst = _OUTPUTS["torque_wanted"], 0.0
+    columns, worst = ticks.columns["torque_wanted"], 0.0
     for near, far in zip(point.ticks, ticks.slopes(point.state, 100.0), strict=True):
-        size = float(np.abs(near.outputs[column] * ticks.sizes).max())
+        size = float(np.abs(near.outputs[columns] * ticks.sizes).max())
         if size > 0.0:
-            worst = max(worst, float(np.abs((far.outputs[column] - near.outputs[column]) * ticks.sizes).max()) / size)
+            worst = max(worst, float(np.abs((far.outputs[columns] - near.outputs[columns]) * ticks.sizes).max()) / size)
     return worst if math.isfinite(worst) else math.inf

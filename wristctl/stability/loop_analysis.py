@@ -3,8 +3,10 @@
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
+from numpy.typing import ArrayLike
 from threadpoolctl import threadpool_limits
 
 from wristctl.arrays import Array
@@ -13,7 +15,7 @@ from wristctl.config.wrist import WristParameters
 from wristctl.control.law import Controller
 from wristctl.stability.linear_range import LinearityLimit, Swing, linearity_limits
 from wristctl.stability.linearise import LinearLoop, linearise
-from wristctl.stability.margins import NEUTRAL, Margins, frequencies, margins
+from wristctl.stability.margins import NEUTRAL, Margins, frequencies, loci_of, margins
 from wristctl.stability.sampled_loop import Complex, Mode, SampledLoop
 from wristctl.stability.smooth_loop import FrictionReading
 
@@ -38,14 +40,17 @@ class StepResponse:
     final: float
 
 
-def step_response(loop: SampledLoop) -> StepResponse:
-    """The step response of a loop until it has settled, sampled at its ticks (every so many in a long one)."""
+def step_response(loop: SampledLoop, toward: Array | None = None) -> StepResponse:
+    """The step response of a loop until it has settled, sampled at its ticks (every so many in a long one).
+
+    In two planes the reference steps `toward` a direction (2,), and the answer is the bend along it.
+    """
     rates = [mode.growth for mode in loop.modes()]
     if max(rates) > NEUTRAL:
         return StepResponse(np.zeros(0), np.zeros(0), *(4 * [math.nan]))
     slowest = min((-rate for rate in rates if rate < -_SLOW), default=1.0)
     lasts = min(-math.log(_DECAYED) / slowest, _LONGEST)
-    time, angle = _course(loop, lasts)
+    time, angle = _course(loop, lasts, np.ones(loop.planes) if toward is None else toward)
     return StepResponse(time, angle, *step_info(time, angle))
 
 
@@ -59,15 +64,17 @@ def step_info(time: Array, angle: Array) -> tuple[float, float, float, float]:
     return rise, max(float(share.max()) - 1.0, 0.0), settling, final
 
 
-def _course(loop: SampledLoop, lasts: float) -> tuple[Array, Array]:
+def _course(loop: SampledLoop, lasts: float, toward: Array) -> tuple[Array, Array]:
     """Every tick, or, where that were too many, every so many cycles; from one to the next they are one map."""
     count, cycle = math.ceil(lasts / loop.period), len(loop.ticks)
     cycle_map, forced = np.eye(len(loop.ticks[0].into)), np.zeros(len(loop.ticks[0].into))
     rows, pushes = [], []
     for tick in loop.ticks:
-        rows.append(tick.outputs["theta"] @ cycle_map)
-        pushes.append(tick.outputs["theta"] @ forced)
-        cycle_map, forced = tick.transition @ cycle_map, tick.transition @ forced + tick.reference
+        bend = toward @ tick.outputs["theta"].reshape(len(toward), -1)
+        rows.append(bend @ cycle_map)
+        pushes.append(bend @ forced)
+        stepped = tick.reference.reshape(len(forced), -1) @ toward
+        cycle_map, forced = tick.transition @ cycle_map, tick.transition @ forced + stepped
     stride = max(1, count // (_SAMPLES * cycle))
     if stride > 1:
         rows, pushes = rows[:1], pushes[:1]
@@ -139,8 +146,8 @@ def _limit(closed: At, good: float, bad: float) -> tuple[float, float]:
 
 @dataclass(frozen=True)
 class LoopAnalysis:
-    """A loop about one resting angle; `response` is its transfer at frequencies `omega` [rad/s], `plant` the angle's
-    per torque [rad/(N m)]."""
+    """A loop about one resting bend; `response` is its transfer at frequencies `omega` [rad/s], `plant` the bend's
+    per torque [rad/(N m)]: (n,) in one plane, (n, 2, 2) in two."""
 
     linear: LinearLoop
     margins: Margins
@@ -149,6 +156,21 @@ class LoopAnalysis:
     omega: Array
     response: Complex
     plant: Complex
+
+    @property
+    def transfer(self) -> Complex:
+        """`response` as (n, P, P)."""
+        return self.response.reshape(len(self.omega), self.linear.planes, -1)
+
+    @cached_property
+    def loci(self) -> Complex:
+        """Characteristic loci of the loop's transfer, (P, n): in one plane the transfer itself."""
+        return loci_of(self.transfer)
+
+    @cached_property
+    def plant_loci(self) -> Complex:
+        """Characteristic loci of the plant, (P, n)."""
+        return loci_of(self.plant.reshape(self.transfer.shape))
 
     @property
     def is_open(self) -> bool:
@@ -169,13 +191,19 @@ class AnalysedRow:
     wrist: WristParameters
     friction: FrictionReading
 
-    def linear(self, theta: float, **gains: float) -> LinearLoop | None:
-        """The loop about where it rests near theta [rad], some of its gains as given; None where it does not."""
+    def linear(self, theta: ArrayLike, **gains: float) -> LinearLoop | None:
+        """The loop about where it rests near theta [rad], some of its gains as given; None where it does not.
+
+        In two planes theta is (2,).
+        """
         values = self.law.values(self.gains | gains)
         return linearise(self.law, values, self.loop, self.wrist, theta, self.friction)
 
-    def analysed(self, theta: float) -> LoopAnalysis | None:
-        """Margins, step response and limits about theta [rad]; None where it rests nowhere near."""
+    def analysed(self, theta: ArrayLike, toward: Array | None = None) -> LoopAnalysis | None:
+        """Margins, step response and limits about theta [rad]; None where it rests nowhere near.
+
+        In two planes theta is (2,), and the step goes `toward` a direction (2,).
+        """
         with threadpool_limits(limits=1):
             linear = self.linear(theta)
             if linear is None:
@@ -186,9 +214,10 @@ class AnalysedRow:
             swing = Swing(linear, swings[0] if swings else None, factor)
             limits = linearity_limits(swing, self.loop, self.wrist, self.friction, self.law.surface, self.gains)
             response, plant = linear.closed.response(omega), linear.plant.response(omega)
-            return LoopAnalysis(linear, loop_margins, step_response(linear.closed), limits, omega, response, plant)
+            step = step_response(linear.closed, toward)
+            return LoopAnalysis(linear, loop_margins, step, limits, omega, response, plant)
 
-    def locus(self, theta: float, over: str, span: float) -> RootLocus:
+    def locus(self, theta: ArrayLike, over: str, span: float) -> RootLocus:
         """The root locus about theta [rad] over a gain of the law, or, where that is `loop`, over the loop's own."""
         with threadpool_limits(limits=1):
             here = self.linear(theta)

@@ -5,26 +5,28 @@ from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from wristctl.arrays import Array
-from wristctl.config.choices import PLANTS
 from wristctl.config.loop import Loop
 from wristctl.config.wrist import WristParameters
 from wristctl.control.law import Controller
 from wristctl.errors import UserError
 from wristctl.lanes.blocks import to_blocks, to_rows
-from wristctl.simulation.actuator import IdealDrive, SpoolDrive
+from wristctl.simulation.actuator import SIDES, IdealDrive, SpoolDrive
 from wristctl.simulation.batch import Batch, Lanes, batch
 from wristctl.simulation.frames import schedule
-from wristctl.simulation.kernel import RECORDED, Span, run_blocks
-from wristctl.simulation.motion import Angles, Motion
+from wristctl.simulation.kernel import Span, parts_of_sample, run_blocks
+from wristctl.simulation.motion import resting
 from wristctl.simulation.observer import Schedule, Watch
+from wristctl.simulation.rollout import plant_in
 from wristctl.simulation.sums import SUMS
 from wristctl.simulation.worlds import World
 from wristctl.stability.smooth_loop import cycle_of
-from wristctl.wrist.dahl import InnerFriction
+from wristctl.wrist.dahl import InnerFriction, InnerFrictionInSpace
 from wristctl.wrist.plant import kernel_of
+from wristctl.wrist.spatial.spooled_tendons import PulledPlaces, RealPlaces
+from wristctl.wrist.tendon_layout import TendonLayout
 from wristctl.wrist.tendon_mechanics import CREPT, OF_A_TENDON, WRAPPED, PulledTendons, RealTendons, X, Z
 
 # Typical sizes [rad, rad/s, N, m], by which small changes are measured.
@@ -53,36 +55,42 @@ def state_parts(batch: Batch, memory: int, tick: int, back: Remembered) -> Itera
     What was delivered and the frames under way come as they are counted back from the tick.
     """
     state, drive, k = batch.state, batch.world.drive, len(batch.setup.coordinates)
-    yield StatePart("memory", state.memory, np.arange(memory), np.ones(memory))
+    planes, places = len(batch.setup.bend), len(batch.setup.pulls)
+    kept = state.memory.shape[2] * np.arange(planes)
+    yield StatePart("memory", state.memory, _beside(kept, memory), np.ones(planes * memory))
     yield StatePart("angle", state.coordinates, np.arange(k), np.full(k, _ANGLE))
     yield StatePart("rate", state.coordinates, np.arange(k, 2 * k), np.full(k, _RATE))
     size = _LENGTH if isinstance(drive, SpoolDrive) else _PULL
     if not isinstance(drive, IdealDrive):
-        yield StatePart("motor", state.motors, np.array([0, 2]), np.full(2, size))
-    if isinstance(state.tendons, RealTendons):
+        yield StatePart("motor", state.motors, np.arange(0, 2 * places, 2), np.full(places, size))
+    if isinstance(state.tendons, (RealTendons, RealPlaces)):
         rows, per_tendon = state.tendons.state, len(OF_A_TENDON)
-        count = (rows.shape[1] - k) // per_tendon
-        first = per_tendon * np.arange(count)
-        path = np.array([first[0] + X, first[1] + X, first[0] + WRAPPED])
-        yield StatePart("path", rows, path, np.array([_LENGTH, _LENGTH, _ANGLE]))
-        yield StatePart("bristle", rows, first + Z, np.ones(count))
-        yield StatePart("tendon creep", rows, first + CREPT, np.full(count, _LENGTH))
-    if isinstance(state.tendons, (PulledTendons, RealTendons)):
+        first = per_tendon * np.arange(places)
+        wrapped = first[:1] if isinstance(state.tendons, RealTendons) else first
+        path = np.concatenate([first + X, wrapped + WRAPPED])
+        yield StatePart("path", rows, path, np.array([_LENGTH] * places + [_ANGLE] * len(wrapped)))
+        yield StatePart("bristle", rows, first + Z, np.ones(places))
+        yield StatePart("tendon creep", rows, first + CREPT, np.full(places, _LENGTH))
+    if isinstance(state.tendons, (PulledTendons, RealTendons, PulledPlaces, RealPlaces)):
         rows = state.tendons.state
         yield StatePart("spring creep", rows, np.arange(rows.shape[1] - k, rows.shape[1]), np.full(k, _ANGLE))
-        if isinstance(state.tendons.inner, InnerFriction):
+        if isinstance(state.tendons.inner, (InnerFriction, InnerFrictionInSpace)):
             sizes = np.concatenate([np.ones(k), np.full(k, _ANGLE)])
             yield StatePart("inner friction", state.tendons.inner.state, np.arange(2 * k), sizes)
     if isinstance(state.watch, Watch):
         observer, taken = state.watch.observer, int(state.watch.turn[0, 0, 0])
-        sizes = np.array([_ANGLE, _RATE, _ANGLE])
-        yield StatePart("estimate", observer.now, np.arange(3), sizes)
-        yield StatePart("estimate at the frame", observer.fused, np.arange(3), sizes)
-        ring = np.arange(tick - back.ticks, tick) % observer.delivered.shape[1]
-        sent = np.stack([2 * ring, 2 * ring + 1], axis=1).ravel()
+        sizes = np.tile([_ANGLE, _RATE, _ANGLE], planes)
+        yield StatePart("estimate", observer.now, np.arange(len(sizes)), sizes)
+        yield StatePart("estimate at the frame", observer.fused, np.arange(len(sizes)), sizes)
+        sent = _beside(places * (np.arange(tick - back.ticks, tick) % observer.delivered.shape[1]), places)
         yield StatePart("delivered", observer.delivered, sent, np.full(len(sent), size))
-        frames = np.arange(taken - back.frames, taken)
+        frames = _beside(planes * np.arange(taken - back.frames, taken), planes)
         yield StatePart("frame", state.watch.pictures, frames, np.full(len(frames), _ANGLE))
+
+
+def _beside(first: NDArray[np.int64], count: int) -> NDArray[np.int64]:
+    """So many rows from each of some first ones on."""
+    return np.asarray(first[:, None] + np.arange(count)).ravel()
 
 
 def read_state(parts: Iterator[StatePart], count: int) -> Array:
@@ -115,14 +123,15 @@ _LONGEST_MEMORY = 200
 
 
 _ALIVE = SUMS.index("alive")
-# Inputs by which a tick is differentiated beside its state, in the order of their lanes.
-_OTHERS = ("by_frame", "by_gain", "by_reference")
+# Inputs of each plane by which a tick is differentiated beside its state, in the order of their lanes.
+_OTHERS = ("by_frame", "by_acceleration", "by_reference")
 
 
 class TickSlopes(NamedTuple):
     """One tick from a state: the next one, what is recorded, and their derivatives by the state x.
 
-    Columns of `recorded` are the kernel's RECORDED. `by_frame` is 0 but where a frame is taken (`seen`).
+    Columns of `recorded` are those of the kernel's `parts_of_sample`. `by_frame` is 0 but where a frame is taken
+    (`seen`). Inputs have an entry for each plane: derivatives by them are (x,) in one plane, and (x, 2) in two.
     """
 
     after: Array
@@ -134,11 +143,11 @@ class TickSlopes(NamedTuple):
     """Derivative of the recorded values by the state, (columns, x)."""
     seen: bool
     by_frame: Array
-    """Derivative of the next state by an angle added to the frame, (x,)."""
-    by_gain: Array
-    """Derivative of the next state by the law's first gain, (x,)."""
+    """Derivative of the next state by a bend added to the frame."""
+    by_acceleration: Array
+    """Derivative of the next state by the reference's acceleration."""
     by_reference: Array
-    """Derivative of the next state by the reference angle, (x,)."""
+    """Derivative of the next state by the reference bend."""
 
 
 def looks_back(loop: Loop) -> tuple[int, Remembered]:
@@ -165,17 +174,27 @@ def looks_back(loop: Loop) -> tuple[int, Remembered]:
 class LoopTicks:
     """The ticks of one cycle of a smooth loop (`smooth`) about a reference that rests at theta [rad].
 
-    `sizes` (x,) are the typical sizes of the state's variables and `names` what they are. Raises UserError where the
-    observer would have to look back too far.
+    It bends in as many planes as theta has entries, a number or (2,), and so has `acceleration`, the reference's
+    [rad/s^2]. `sizes` (x,) are the typical sizes of the state's variables and `names` what they are; `columns` says
+    where recorded values have which kind. Raises UserError where the observer would have to look back too far.
     """
 
     def __init__(
-        self, law: Controller, gains: Sequence[float], loop: Loop, wrist: WristParameters, theta: float
+        self,
+        law: Controller,
+        gains: Sequence[float],
+        loop: Loop,
+        wrist: WristParameters,
+        theta: ArrayLike,
+        acceleration: ArrayLike = 0.0,
     ) -> None:
         self.period = loop.control_period
         self.cycle, _ = cycle_of(loop)
-        self._law, self._gains, self._world, self._theta = law, np.array([gains], float), World(loop, wrist), theta
-        self._model = PLANTS[loop.plant.model]
+        self._law, self._gains, self._world = law, np.array([gains], float), World(loop, wrist)
+        self._theta = np.atleast_1d(np.asarray(theta, float))
+        self._planes = len(self._theta)
+        self._acceleration = np.broadcast_to(np.asarray(acceleration, float), self._planes)
+        self._model = plant_in(self._planes, loop)
         self._kernel = kernel_of(run_blocks, self._model)
         self._early, self._back = looks_back(loop)
         self._first = self._early + self.cycle * math.ceil(_WARM_UP / self.cycle)
@@ -183,7 +202,8 @@ class LoopTicks:
         parts = list(self._parts(0))
         self.sizes = np.concatenate([part.sizes for part in parts])
         self.names = [part.name for part in parts for _ in part.rows]
-        self._make(2 * (len(self.sizes) + len(_OTHERS)) + 1)
+        self.columns = parts_of_sample(self._planes, self._places)
+        self._make(2 * (len(self.sizes) + len(_OTHERS) * self._planes) + 1)
 
     def guesses(self) -> list[Array]:
         """States (x,) from which a resting point may be looked for: the loop let go from rest, and a while later."""
@@ -212,7 +232,7 @@ class LoopTicks:
         return cycle
 
     def _tick(self, tick: int, state: Array, small: float) -> TickSlopes:
-        n, changes = len(state), small * self.sizes
+        n, planes, changes = len(state), self._planes, small * self.sizes
         states = np.tile(state, (self._count, 1))
         states[np.arange(0, 2 * n, 2), np.arange(n)] += changes
         states[np.arange(1, 2 * n, 2), np.arange(n)] -= changes
@@ -223,43 +243,57 @@ class LoopTicks:
         self._run(tick, tick + 1)
         after, recorded = self._states(tick + 1), to_rows(self._batch.state.record[:, tick], self._count)
         after[to_rows(self._batch.state.sums, self._count)[:, _ALIVE] <= 0.0] = math.nan
-        steps = np.append(changes, [SMALL, self._gain_step(), SMALL])[:, None]
+        of_inputs = np.full(planes, SMALL), self._acceleration_step(), np.full(planes, SMALL)
+        steps = np.concatenate([changes, *of_inputs])[:, None]
         by, outputs = ((values[:-1:2] - values[1:-1:2]) / (2.0 * steps) for values in (after, recorded))
-        input_slopes = dict(zip(_OTHERS, by[n:], strict=True))
+        of_plane = by[n:].reshape(len(_OTHERS), planes, n)
+        input_slopes = {name: rows[0] if planes == 1 else rows.T for name, rows in zip(_OTHERS, of_plane, strict=True)}
         return TickSlopes(after[-1], recorded[-1], by[:n].T, outputs[:n].T, seen=frame_taken, **input_slopes)
 
     def _shift_frame(self, tick: int, lane: int) -> bool:
-        """Add a little to the frame that is taken at this tick, in its two lanes; whether one is."""
-        watch = self._batch.state.watch
+        """Add a little to the frame that is taken at this tick, in two lanes for each plane; whether one is."""
+        watch, planes = self._batch.state.watch, self._planes
         if not isinstance(watch, Watch):
             return False
         taken = int(watch.turn[0, 0, 0])
         if self._frames().captures[taken] != tick:
             return False
-        added = np.zeros((self._count, 1))
-        added[lane : lane + 2, 0] = SMALL, -SMALL
-        watch.readings[:, taken, :1] = to_blocks(added)
+        added = np.zeros((self._count, planes))
+        for plane in range(planes):
+            added[lane + 2 * plane : lane + 2 * plane + 2, plane] = SMALL, -SMALL
+        watch.readings[:, taken, :planes] = to_blocks(added)
         return True
 
-    def _gain_step(self) -> float:
-        return SMALL * max(1.0, abs(float(self._gains[0, 0]))) if self._gains.size else SMALL
+    def _acceleration_step(self) -> Array:
+        step: Array = SMALL * np.maximum(1.0, np.abs(self._acceleration))
+        return step
 
     def _make(self, count: int) -> None:
-        """A batch of so many lanes; the last is as it is, before it those of the reference and the first gain."""
-        samples = self._first + 2 * self.cycle + 1
-        motions = [_at_rest(self._theta + shift, samples, self.period) for shift in (0.0, SMALL, -SMALL)]
+        """A batch of so many lanes; the last is as it is, before it are those of the reference and its acceleration."""
+        planes, samples = self._planes, self._first + 2 * self.cycle + 1
+        sides, still, steps = np.array([1.0, -1.0]), np.zeros(planes), self._acceleration_step()
+        faster = [(still, side * axis) for axis in np.diag(steps) for side in sides]
+        further = [(side * SMALL * axis, still) for axis in np.eye(planes) for side in sides]
+        motions = [
+            resting(self._theta + shift, samples, self.period, self._acceleration + more)
+            for shift, more in ((still, still), *faster, *further)
+        ]
         which, gains = np.zeros(count, np.int64), np.tile(self._gains, (count, 1))
         if count > 2:
-            which[-3:-1] = 1, 2
-            gains[-5:-3, :1] += self._gain_step() * np.array([[1.0], [-1.0]])
+            which[-len(motions) : -1] = np.arange(1, len(motions))
         k = self._model.coordinates(self._world.loop.plant_segments)
         lanes = Lanes(which, np.zeros(count, np.int64), [(0,)] * count)
+        recorded = parts_of_sample(planes, self._places)["coordinates"].start + k
         lanes_batch = batch(
             self._law, gains, motions, [self._world], lanes, self._model,
-            lambda plant: np.full(k, self._theta / k), len(RECORDED) + k,
+            lambda plant: np.tile(self._theta / (k // planes), k // planes), recorded,
         )  # fmt: skip
         self._count, self._batch = count, lanes_batch._replace(setup=lanes_batch.setup._replace(ticks=1))
         self._scratch = lanes_batch.scratch()
+
+    @property
+    def _places(self) -> int:
+        return len(SIDES) if self._planes == 1 else len(TendonLayout.of(self._world.wrist).places)
 
     def _frames(self) -> Schedule:
         """Ticks of the frames, the same in all lanes, (F,); none where sensors are ideal."""
@@ -285,10 +319,3 @@ class LoopTicks:
     def _run(self, begin: int, end: int) -> None:
         lot = self._batch
         self._kernel(lot.setup, lot.course, lot.world, lot.state, self._scratch, Span(0, lot.blocks, begin, end))
-
-
-def _at_rest(theta: float, samples: int, period: float) -> Motion:
-    time = period * np.arange(samples, dtype=np.float64)
-    rows = np.zeros((3, samples))
-    rows[0] = theta
-    return Motion(time, Angles.of(rows), np.zeros((samples, 2)), 0.0, 0.0, 0.0, samples * period)

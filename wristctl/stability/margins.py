@@ -8,11 +8,12 @@ and a loop whose frames fall unevenly on its ticks has more to its stability tha
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
-from scipy.optimize import brentq
+from scipy.optimize import brentq, linear_sum_assignment
 
 from wristctl.arrays import Array
 from wristctl.stability.sampled_loop import Complex, SampledLoop
@@ -31,6 +32,8 @@ class PoleCount:
         self._poles_beyond = int(np.sum(np.abs(closed) > self._radius))
         self._z = self._radius * np.exp(1j * self._angles(np.concatenate([closed, loop.multipliers(0.0)])))
         self._back = loop.returned(self._z)
+        self._open = self._back[:, loop.rows_at(loop.cuts)]
+        self._loci = loci_of(self._open).T if loop.planes > 1 else None
         self._turns = self._winding(1.0, 0.0)
 
     def unstable(self, factor: float, delay: float = 0.0) -> int:
@@ -38,20 +41,27 @@ class PoleCount:
         return self._poles_beyond + self._turns - self._winding(factor, delay)
 
     def _winding(self, factor: float, delay: float) -> int:
-        """Winding number of the determinant about 0, from half the circle: the other half is its mirror image."""
-        back = self._back[:, self._loop.cuts] if delay == 0.0 else self._late(delay)
-        determinants = np.linalg.det(np.eye(back.shape[-1]) - factor * back)
-        return round(float(np.sum(np.angle(determinants[1:] / determinants[:-1]))) / math.pi)
+        """Winding number of the determinant about 0, from half the circle: the other half is its mirror image.
+
+        Two planes alike cross the circle together: in these the loci are followed one by one.
+        """
+        if delay == 0.0 and self._loci is not None:
+            factors = 1.0 - factor * self._loci
+        else:
+            back = self._open if delay == 0.0 else self._late(delay)
+            factors = np.linalg.det(np.eye(back.shape[-1]) - factor * back)[:, None]
+        return round(float(np.sum(np.angle(factors[1:] / factors[:-1]))) / math.pi)
 
     def _late(self, delay: float) -> Complex:
         """Delay the signals that return at the cuts by a time [s], linearly between two ticks."""
         count, ticks = len(self._loop.ticks), delay / self._loop.period
         whole_ticks = math.floor(ticks)
-        delayed = np.zeros((len(self._z), len(self._loop.cuts), len(self._loop.cuts)), complex)
-        for row, cut in enumerate(self._loop.cuts):
+        delayed = np.zeros_like(self._back[:, self._loop.rows_at(self._loop.cuts)])
+        for number, cut in enumerate(self._loop.cuts):
+            rows = self._loop.rows_at([number])
             for back, share in ((whole_ticks, 1.0 + whole_ticks - ticks), (whole_ticks + 1, ticks - whole_ticks)):
                 cycles, tick = divmod(cut - back, count)
-                delayed[:, row] += share * (self._z**cycles)[:, None] * self._back[:, tick]
+                delayed[:, rows] += share * (self._z**cycles)[:, None, None] * self._back[:, self._loop.rows_at([tick])]
         return delayed
 
     def _angles(self, poles: Complex) -> Array:
@@ -87,6 +97,17 @@ class Crossing(NamedTuple):
         return (self.value % (2.0 * math.pi)) / self.omega
 
 
+class EachPlane(NamedTuple):
+    """Factors of a plane's gain, or its phase [rad] to either side, that leave a stable loop stable (disk margin).
+
+    Of the disk of radius 1/Ms about -1 (Lehtomaki, Sandell and Athans, IEEE Trans. Automatic Control 26 (1981) 75).
+    """
+
+    least: float
+    most: float
+    phase: float
+
+
 @dataclass(frozen=True)
 class Margins:
     """Margins of a loop: about its own gain where it is `stable`, else the gains that make it so, and no delay."""
@@ -110,6 +131,13 @@ class Margins:
     """Ms, the largest |1/(1 + L)|."""
     complementary: Crossing
     """Mt, the largest |L/(1 + L)|."""
+
+    @property
+    def of_each(self) -> EachPlane:
+        """Gains and phases that each plane bears by itself, whatever the others bear at the same time."""
+        disk = 1.0 / self.sensitivity.value
+        most = 1.0 / (1.0 - disk) if disk < 1.0 else math.inf
+        return EachPlane(1.0 / (1.0 + disk), most, 2.0 * math.asin(min(1.0, 0.5 * disk)))
 
 
 def frequencies(loop: SampledLoop) -> Array:
@@ -142,42 +170,51 @@ def half_rate(loop: SampledLoop) -> float:
 
 
 def margins(loop: SampledLoop) -> Margins:
-    """The margins of a loop. A loop that nothing comes back in has none: all are infinite."""
+    """The margins of a loop. A loop that nothing comes back in has none: all are infinite.
+
+    In two planes they are of both planes' gains times one factor, and of one delay in both: of the eigenvalues of the
+    loop's transfer (its characteristic loci). Sensitivities are largest singular values.
+    """
     omega = frequencies(loop)
-    response = loop.response(omega)
-    gains, phases = crossings(loop, omega, response)
+    transfer = loop.transfer(omega)
+    gains, phases = crossings(loop, omega, loci_of(transfer))
     poles = PoleCount(loop, NEUTRAL)
     stable = poles.unstable(1.0) == 0
     least, most = _stable_gains(loop, poles, [crossing for crossing in phases if crossing.value > 0.0], stable)
     delay, delay_omega = (math.nan, math.nan) if not stable else _delay(loop, poles, gains)
-    amplified = np.abs(1.0 / (1.0 + response))
-    carried = np.abs(response) * amplified
     smallest = min(gains, key=lambda crossing: abs(crossing.value), default=Crossing(math.nan, math.inf))
     return Margins(
         stable, loop.growth(), least, most, delay, delay_omega, smallest, gains, phases,
-        *(_peak(loop, omega, values, of) for values, of in ((amplified, _amplified), (carried, _carried))),
+        *(_peak(loop, omega, of(transfer), of) for of in (amplified, carried)),
     )  # fmt: skip
 
 
-def crossings(loop: SampledLoop, omega: Array, response: Complex) -> tuple[list[Crossing], list[Crossing]]:
-    """Crossings of a transfer L: of gain 1, with phase margins in (-pi, pi], and of phase -180 deg, with gain factors.
+def loci_of(transfer: Complex) -> Complex:
+    """Eigenvalues of a transfer (n, P, P) over its frequencies, each followed from one to the next, (P, n)."""
+    loci = np.linalg.eigvals(transfer)
+    for before, now in pairwise(loci):
+        now[:] = now[linear_sum_assignment(np.abs(before[:, None] - now))[1]]
+    return np.asarray(loci.T)
+
+
+def crossings(loop: SampledLoop, omega: Array, loci: Complex) -> tuple[list[Crossing], list[Crossing]]:
+    """Crossings of loci L (P, n): of gain 1, with phase margins in (-pi, pi], and of phase -180 deg, with gain factors.
 
     At frequency 0, and at half the sampling rate of a loop of one rate, L is real: there the loop runs away, or turns
     with every sample. Where an integrator holds it at frequency 0, it cannot run away.
     """
-    gains = [
-        Crossing(frequency, float(np.angle(-_transfer(loop, frequency))))
-        for frequency in _zeros(
-            omega, np.log(np.abs(response) + 1e-300), lambda omega: math.log(abs(_transfer(loop, omega)) + 1e-300)
-        )
-    ]
+    gains, values = list[Crossing](), list[tuple[float, float]]()
     end = len(omega) - 1  # at half the rate rounding decides the sign of what is 0
-    turns = _zeros(omega[:end], response.imag[:end], lambda frequency: _transfer(loop, frequency).imag)
-    turns += omega[end:].tolist()
-    values = [(frequency, _transfer(loop, frequency).real) for frequency in turns]
-    still = _transfer(loop, _STILL * float(omega[0]))
-    if abs(still.imag) < _STILL * abs(still.real) < 1.0:
-        values.append((0.0, still.real))
+    for locus in loci:
+        at = partial(_locus_at, loop, omega, locus)
+        sizes = np.log(np.abs(locus) + 1e-300)
+        crossed = _zeros(omega, sizes, partial(_log_size, at))
+        gains += [Crossing(frequency, float(np.angle(-at(frequency)))) for frequency in crossed]
+        turns = _zeros(omega[:end], locus.imag[:end], partial(_imaginary, at))
+        values += [(frequency, at(frequency).real) for frequency in (*turns, *omega[end:].tolist())]
+    for still in _loci_at(loop, _STILL * float(omega[0])):
+        if abs(still.imag) < _STILL * abs(still.real) < 1.0:
+            values.append((0.0, still.real))
     return gains, [Crossing(frequency, -1.0 / value) for frequency, value in values if value < -_NOTHING]
 
 
@@ -186,16 +223,37 @@ _STILL = 1e-3
 _NOTHING = 1e-9
 
 
-def _transfer(loop: SampledLoop, omega: float) -> complex:
-    return complex(loop.response(np.array([omega]))[0])
+def _locus_at(loop: SampledLoop, omega: Array, locus: Complex, frequency: float) -> complex:
+    """The one of a transfer's eigenvalues at a frequency that a locus (n,) leads to, known at frequencies omega."""
+    near = complex(np.interp(frequency, omega, locus.real), np.interp(frequency, omega, locus.imag))
+    return min(_loci_at(loop, frequency), key=lambda value: abs(value - near))
 
 
-def _amplified(response: complex) -> float:
-    return abs(1.0 / (1.0 + response))
+def _log_size(at: Callable[[float], complex], frequency: float) -> float:
+    return math.log(abs(at(frequency)) + 1e-300)
 
 
-def _carried(response: complex) -> float:
-    return abs(response / (1.0 + response))
+def _imaginary(at: Callable[[float], complex], frequency: float) -> float:
+    return at(frequency).imag
+
+
+def _loci_at(loop: SampledLoop, omega: float) -> list[complex]:
+    values: list[complex] = np.linalg.eigvals(loop.transfer(np.array([omega]))[0]).tolist()
+    return values
+
+
+def amplified(transfer: Complex) -> Array:
+    """|1/(1 + L)| of a transfer (n, P, P): largest singular values, (n,)."""
+    return np.asarray(np.linalg.norm(_sensitivity(transfer), 2, axis=(-2, -1)))
+
+
+def carried(transfer: Complex) -> Array:
+    """|L/(1 + L)| of a transfer (n, P, P): largest singular values, (n,)."""
+    return np.asarray(np.linalg.norm(transfer @ _sensitivity(transfer), 2, axis=(-2, -1)))
+
+
+def _sensitivity(transfer: Complex) -> Complex:
+    return np.asarray(np.linalg.inv(np.eye(transfer.shape[-1]) + transfer))
 
 
 def _zeros(omega: Array, values: Array, function: Callable[[float], float]) -> list[float]:
@@ -206,18 +264,19 @@ def _zeros(omega: Array, values: Array, function: Callable[[float], float]) -> l
     return roots
 
 
-def _peak(loop: SampledLoop, omega: Array, values: Array, of: Callable[[complex], float]) -> Crossing:
+def _peak(loop: SampledLoop, omega: Array, values: Array, of: Callable[[Complex], Array]) -> Crossing:
     """The largest value, refined by golden sections between its neighbours."""
     k = int(np.argmax(values))
     low, high = omega[max(k - 1, 0)], omega[min(k + 1, len(omega) - 1)]
     for _ in range(_SECTIONS):
         inner = low + _GOLDEN * (high - low), high - _GOLDEN * (high - low)
-        if of(_transfer(loop, inner[0])) > of(_transfer(loop, inner[1])):
+        first, second = of(loop.transfer(np.array(inner)))
+        if first > second:
             high = inner[1]
         else:
             low = inner[0]
     middle = 0.5 * (low + high)
-    return Crossing(float(middle), max(float(values[k]), of(_transfer(loop, middle))))
+    return Crossing(float(middle), max(float(values[k]), float(of(loop.transfer(np.array([middle])))[0])))
 
 
 _GOLDEN, _SECTIONS = 0.381966, 40

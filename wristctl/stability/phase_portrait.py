@@ -7,13 +7,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from wristctl.arrays import Array
-from wristctl.config.choices import PLANTS
-from wristctl.config.loop import Loop, Reference, sample_period
+from wristctl.config.loop import Loop, sample_period
 from wristctl.config.wrist import WristParameters
 from wristctl.control.law import Controller, Surface
 from wristctl.simulation.batch import Start
 from wristctl.simulation.closed_loop import repeat
-from wristctl.simulation.reference import motion
+from wristctl.simulation.motion import resting
+from wristctl.simulation.rollout import plant_in
 from wristctl.simulation.worlds import Draws
 
 # The name that the camera's noise goes by.
@@ -48,26 +48,29 @@ class PhasePortrait:
 
 def phase_portrait(
     law: Controller, gains: Mapping[str, float], loop: Loop, wrist: WristParameters, theta: float, horizon: float,
-    draws: Draws,
+    draws: Draws, toward: Array | None = None,
 ) -> PhasePortrait | None:  # fmt: skip
     """Courses of the loop as it is (with limits, steps, noise) toward theta [rad], from rest to both sides of it.
 
     They begin within the wrist's range. None for a law that has no sliding surface. The integral of the error counts
-    from the start.
+    from the start. In two planes the wrist bends along a direction `toward` (2,), and error and rate are those along
+    it: planes have surfaces alike.
     """
     if law.surface is None:
         return None
-    count = PLANTS[loop.plant.model].coordinates(loop.plant_segments)
-    goal = Reference(kind="step", angle_deg=math.degrees(theta))
-    followed = motion(goal, wrist, horizon, sample_period(loop.control_period))
+    toward = np.ones(1) if toward is None else toward
+    planes, period = len(toward), sample_period(loop.control_period)
+    segments = plant_in(planes, loop).coordinates(loop.plant_segments) // planes
+    followed = resting(theta * toward, round(horizon / period), period)
     courses = []
     for begin in _begins(theta, math.radians(wrist.range_deg)):
         (rollout,) = repeat(
             law, np.array([law.values(gains)]), [followed], np.zeros(1, np.int64), loop, wrist, [SCENARIO], draws,
-            start=_from(np.full(count, begin / count)),
+            start=_from(np.tile(begin * toward / segments, segments)),
         )  # fmt: skip
         course = rollout.first.trajectory
-        courses.append(_approach(law.surface, gains, course.time, course.error, course.rate))
+        off, speed = (values.reshape(len(course.time), -1) @ toward for values in (course.error, course.rate))
+        courses.append(_approach(law.surface, gains, course.time, off, speed))
     error, rate, _ = law.surface.weights(gains)
     return PhasePortrait(error / rate, law.surface.layer(gains) / abs(rate), courses)
 

@@ -43,7 +43,7 @@ def smooth(loop: Loop, friction: FrictionReading) -> Loop:
         "actuator": actuator,
         "sensor": _clean(loop.sensor, loop.control_period),
         "plant": loop.plant.model_copy(update=world),
-        "disturbances": Disturbances(load=loop.disturbances.load),
+        "disturbances": Disturbances(load=loop.disturbances.load, toward_deg=loop.disturbances.toward_deg),
         "limits": False,
     }
     return loop.model_copy(update=changes)

@@ -51,7 +51,7 @@ def answer(label: str, analyses: Sequence[LoopAnalysis], angles: Sequence[float]
         swing = worst.linear.closed.modes()[0].frequency
         sentence = f"{label} is UNSTABLE at {listed(angles[k] for k in bad)}: a swing of {_three(swing)} Hz"
         return f"{sentence} grows by e in {_time(1.0 / worst.margins.growth)}; {_mended(worst)}"
-    parts = [_gain_margin(analyses), _delay_margin(analyses)]
+    parts = [_gain_margin(analyses), *_of_each_plane(analyses), _delay_margin(analyses)]
     sensitivity = max(analysis.margins.sensitivity.value for analysis in analyses)
     step = max(analyses, key=lambda analysis: analysis.step.settling).step
     parts += [
@@ -80,6 +80,7 @@ def on_a_screen(label: str, sentence: str, analyses: Sequence[LoopAnalysis], ang
     margin = f"delay margin {_time(delay)}" if math.isfinite(delay) else "any delay is stable"
     first = f"{label} is stable at {listed(angles)}: {gain}, {margin}."
     notes = [f"Below {_three(least)} times the loop gain it is unstable."] * (least > 0.0)
+    notes += [f"Margins are of both planes together; {each}." for each in _of_each_plane(analyses)]
     for swings in _linear_range(analyses[-1]):
         holds = f"these margins hold {swings}" if swings.startswith("for ") else swings.removeprefix("and yet ")
         notes.append(f"At {listed(angles[-1:])} {holds}.")
@@ -113,6 +114,15 @@ def _gain_margin(analyses: Sequence[LoopAnalysis]) -> str:
 
 def _times(limit: Crossing) -> str:
     return f"{_three(limit.value)} times the loop gain, with {_three(_HZ * limit.omega)} Hz"
+
+
+def _of_each_plane(analyses: Sequence[LoopAnalysis]) -> list[str]:
+    """What each of two planes bears by itself, in words."""
+    if analyses[0].linear.planes == 1:
+        return []
+    each = max((analysis.margins for analysis in analyses), key=lambda margins: margins.sensitivity.value).of_each
+    factors = f"{_three(each.least)} to {_three(each.most)} times its gain"
+    return [f"each plane by itself bears {factors}, or a phase of {_three(math.degrees(each.phase))} deg"]
 
 
 def _delay_margin(analyses: Sequence[LoopAnalysis]) -> str:
@@ -161,7 +171,7 @@ def margin_table(title: str, analyses: Sequence[LoopAnalysis], angles: Sequence[
     )  # fmt: skip
     rows = [
         (
-            angle, round(analysis.linear.torque, 12), analysis.margins.stable, decibels(analysis.margins.most.value),
+            angle, round(_torque(analysis), 12), analysis.margins.stable, decibels(analysis.margins.most.value),
             _HZ * analysis.margins.most.omega, analysis.margins.least.value, math.degrees(analysis.margins.phase.value),
             1e3 * analysis.margins.delay, _HZ * analysis.margins.delay_omega, analysis.margins.sensitivity.value,
             analysis.margins.complementary.value,
@@ -169,6 +179,23 @@ def margin_table(title: str, analyses: Sequence[LoopAnalysis], angles: Sequence[
         for angle, analysis in zip(angles, analyses, strict=True)
     ]  # fmt: skip
     return Table(title, columns, rows)
+
+
+def _torque(analysis: LoopAnalysis) -> float:
+    """Torque at rest [N m]; over two planes its size."""
+    torque = analysis.linear.torque
+    return torque if analysis.linear.planes == 1 else math.hypot(*torque)
+
+
+def each_plane_table(analyses: Sequence[LoopAnalysis], angles: Sequence[float]) -> Table:
+    """Table of what each of two planes bears by itself, whatever the other bears, a row for each resting angle."""
+    columns = ("rests at [deg]", "least factor", "largest factor", "phase [deg]")
+    rows = []
+    for angle, analysis in zip(angles, analyses, strict=True):
+        each, stable = analysis.margins.of_each, analysis.margins.stable
+        values = each.least, each.most, math.degrees(each.phase)
+        rows.append((angle, *(value if stable else None for value in values)))
+    return Table("What each plane bears by itself, by the largest sensitivity", columns, rows)
 
 
 def step_table(analyses: Sequence[LoopAnalysis], angles: Sequence[float]) -> Table:
@@ -244,15 +271,25 @@ _MARGINS: dict[str, tuple[str, str]] = {
 }
 
 
-def margins_of(angle: float, analysis: LoopAnalysis) -> dict[str, float]:
-    """A row of the main table; inf where there is no limit."""
+# Columns that are added in two planes.
+_OF_TWO: dict[str, tuple[str, str]] = {
+    "toward_deg": ("deg", "direction of the resting bend, from ulnar toward flexion"),
+    "each_least": ("", "factor of one plane's gain down to which it is stable, whatever the other's up to its own"),
+    "each_most": ("", "factor of one plane's gain up to which it is stable, whatever the other's up to its own"),
+    "each_phase": ("rad", "phase that each plane bears by itself"),
+}
+
+
+def margins_of(angle: float, analysis: LoopAnalysis, toward_deg: float | None = None) -> dict[str, float]:
+    """A row of the main table; inf where there is no limit. In two planes the wrist rests toward a direction [deg]."""
     margins, step = analysis.margins, analysis.step
     values = (
-        angle, analysis.linear.torque, margins.stable, margins.growth, margins.most.value, _HZ * margins.most.omega,
+        angle, _torque(analysis), margins.stable, margins.growth, margins.most.value, _HZ * margins.most.omega,
         margins.least.value, _HZ * margins.least.omega, margins.phase.value, margins.delay, _HZ * margins.delay_omega,
         margins.sensitivity.value, margins.complementary.value, step.rise, step.overshoot, step.settling, step.final,
     )  # fmt: skip
-    return dict(zip(_MARGINS, values, strict=True))
+    row = dict(zip(_MARGINS, values, strict=True))
+    return row if toward_deg is None else row | dict(zip(_OF_TWO, (toward_deg, *margins.of_each), strict=True))
 
 
 class LoopResults(NamedTuple):
@@ -266,6 +303,8 @@ class LoopResults(NamedTuple):
     """Root locus at the last angle; None where nothing is fed back."""
     portrait: PhasePortrait | None
     """Phase portrait of a sliding law; None of another law."""
+    toward_deg: float | None
+    """Direction of the resting bends [deg]; None in one plane."""
 
 
 def write(findings: Findings, results: LoopResults) -> None:
@@ -273,8 +312,8 @@ def write(findings: Findings, results: LoopResults) -> None:
     import numpy as np
     import pandas as pd
 
-    angles, analyses, locus, portrait = results
-    rows = pd.DataFrame([margins_of(*row) for row in zip(angles, analyses, strict=True)])
+    angles, analyses, locus, portrait, toward_deg = results
+    rows = pd.DataFrame([margins_of(*row, toward_deg) for row in zip(angles, analyses, strict=True)])
     worst: dict[str, tuple[Literal["lower", "higher"], float]] = {
         "gain_most": ("higher", rows["gain_most"].min()), "gain_least": ("lower", rows["gain_least"].max()),
         "delay_margin": ("higher", rows["delay_margin"].min()), "sensitivity": ("lower", rows["sensitivity"].max()),
@@ -286,17 +325,19 @@ def write(findings: Findings, results: LoopResults) -> None:
         shown = float(value) if all(analysis.margins.stable for analysis in analyses) or name == "growth" else math.nan
         description = f"{meaning}; the worst of all resting angles"
         findings.metric(name, shown if math.isfinite(shown) else None, unit, better, len(analyses), meaning=description)
-    units, meanings = ({name: column[k] for name, column in _MARGINS.items()} for k in range(2))
+    columns = _MARGINS if toward_deg is None else _MARGINS | _OF_TWO
+    units, meanings = ({name: column[k] for name, column in columns.items()} for k in range(2))
     findings.table("data/margins.csv", rows, units, meanings)
     curves = [
         pd.DataFrame(
             {
-                "angle_deg": angle, "frequency": _HZ * analysis.omega, "gain": np.abs(analysis.response),
-                "phase": np.unwrap(np.angle(analysis.response)), "plant_gain": np.abs(analysis.plant),
-                "plant_phase": np.unwrap(np.angle(analysis.plant)),
+                "angle_deg": angle, **({} if toward_deg is None else {"locus": number}),
+                "frequency": _HZ * analysis.omega, "gain": np.abs(curve), "phase": np.unwrap(np.angle(curve)),
+                "plant_gain": np.abs(plant), "plant_phase": np.unwrap(np.angle(plant)),
             }
         )
         for angle, analysis in zip(angles, analyses, strict=True)
+        for number, (curve, plant) in enumerate(zip(analysis.loci, analysis.plant_loci, strict=True), 1)
     ]  # fmt: skip
     response_units = {
         "angle_deg": "deg",
@@ -305,7 +346,10 @@ def write(findings: Findings, results: LoopResults) -> None:
         "plant_gain": "rad/(N m)",
         "plant_phase": "rad",
     }
-    findings.table("data/response.csv", pd.concat(curves), response_units, {"gain": "of the loop's transfer"})
+    of_response = {"gain": "of the loop's transfer"}
+    if toward_deg is not None:
+        of_response = {"gain": "of an eigenvalue of the loop's transfer", "locus": "number of the eigenvalue"}
+    findings.table("data/response.csv", pd.concat(curves), response_units, of_response)
     steps = [
         pd.DataFrame({"angle_deg": angle, "time": analysis.step.time, "response": analysis.step.angle})
         for angle, analysis in zip(angles, analyses, strict=True)
@@ -332,7 +376,7 @@ def draw(findings: Findings, label: str, results: LoopResults) -> None:
     """Draw the Bode plot first; of a loop that feeds nothing back, the plant's. `label` names the law and its gains."""
     from wristctl.commands.analyse import figures
 
-    angles, analyses, locus, portrait = results
+    angles, analyses, locus, portrait, _ = results
     heading = f"{label}: the plant, angle per torque" if locus is None else f"{label}: loop transfer"
     findings.figure("bode", figures.bode, analyses, angles, heading)
     if any(analysis.margins.stable for analysis in analyses):

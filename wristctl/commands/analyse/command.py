@@ -5,13 +5,14 @@ from __future__ import annotations
 import logging
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from wristctl.commands.analyse.answer import (
     CUTS,
     LoopResults,
     answer,
     draw,
+    each_plane_table,
     limit_table,
     listed,
     locus_table,
@@ -32,10 +33,16 @@ from wristctl.commands.inputs_of_loops import (
     network_for,
     tuned_gains,
 )
-from wristctl.commands.loop_warnings import warn_if_coarse, warn_if_it_buckles, warn_outside_conditions
-from wristctl.commands.procedure import Procedure
+from wristctl.commands.loop_warnings import (
+    warn_if_coarse,
+    warn_if_it_buckles,
+    warn_of_one_plane,
+    warn_outside_conditions,
+)
+from wristctl.commands.procedure import Procedure, no_tendons
 from wristctl.commands.results import StudyResult
 from wristctl.commands.session import Session
+from wristctl.commands.simulate.in_two_planes import asked_for_by, check_two_planes, in_two_planes
 from wristctl.config.study import Study
 from wristctl.errors import UserError, meant, under
 
@@ -44,6 +51,7 @@ if TYPE_CHECKING:
 
     import pandas as pd
 
+    from wristctl.arrays import Array
     from wristctl.config.loop import Loop
     from wristctl.stability.loop_analysis import AnalysedRow, LoopAnalysis, RootLocus
     from wristctl.stability.phase_portrait import PhasePortrait
@@ -71,6 +79,8 @@ class Analysed(StudyResult):
     """Root locus at the last angle; None where nothing is fed back."""
     portrait: PhasePortrait | None
     """Phase portrait of a sliding law, toward the last angle; None of another law."""
+    toward_deg: float | None = None
+    """Direction of the resting bends from ulnar toward flexion [deg]; None in one plane."""
 
     @property
     def answer(self) -> Answer:
@@ -92,7 +102,8 @@ class Analysed(StudyResult):
 
         from wristctl.commands.analyse.answer import margins_of
 
-        return pd.DataFrame([margins_of(*row) for row in zip(self.angles, self.found, strict=True)])
+        rows = zip(self.angles, self.found, strict=True)
+        return pd.DataFrame([margins_of(angle, analysis, self.toward_deg) for angle, analysis in rows])
 
 
 def plan(study: Study, inputs: Inputs) -> str:
@@ -102,10 +113,15 @@ def plan(study: Study, inputs: Inputs) -> str:
     from wristctl.stability.smooth_loop import smooth
 
     settings, chosen = study.analyse, study.simulate
+    known = identified(study, "simulate", inputs)
+    two = in_two_planes(known)
     with under("simulate"):
         check_row(chosen, tuned_gains(inputs), inputs.runs().get("tuned"))
-        check_reach([chosen.reference], identified(study, "analyse", inputs).wrist, "reference")
-        check_inverses(inverses_of([chosen.reference]), inputs)
+        if two:
+            check_two_planes(known)
+        else:
+            check_reach([chosen.reference], known.wrist, "reference")
+            check_inverses(inverses_of([chosen.reference]), inputs)
         looks_back(smooth(chosen.loop, settings.friction))
     law = controller(chosen.controller)
     if law.plain:
@@ -123,40 +139,46 @@ def plan(study: Study, inputs: Inputs) -> str:
         reason = f"{far[0]:g} deg lies outside the wrist's range of +-{study.wrist.range_deg:g} deg"
         raise UserError(reason, "analyse.angles_deg", "smaller angles, or widen wrist.range_deg")
     angles = listed(settings.angles_deg) if settings.angles_deg else "where its reference begins, is half way, and ends"
-    return f"linearise {chosen.controller} at rest at {angles}, friction {settings.friction}"
+    where = " in two planes" * two
+    return f"linearise {chosen.controller}{where} at rest at {angles}, friction {settings.friction}"
 
 
 def analyse(session: Session) -> Analysed:
     """Linearise one closed loop at rest: gain, phase and delay margins, sensitivity, step, root locus, phase portrait.
 
-    The loop is that of the `simulate` section. Exit code 3 where it is unstable.
+    The loop is that of the `simulate` section, in one plane or in two, as `simulate` finds them. Exit code 3 where it
+    is unstable.
     """
     study, findings = identified(session.study, "simulate", session.inputs), session.findings
-    chosen, settings = study.simulate, study.analyse
-    warn_if_it_buckles(findings, study.wrist, [chosen.loop])
+    chosen, settings, planes = study.simulate, study.analyse, 2 if in_two_planes(study) else 1
+    warn_if_it_buckles(findings, study.wrist, [chosen.loop], planes)
     warn_if_coarse([chosen.loop])
+    warn_of_one_plane(study.wrist, asked_for_by(study))
     warn_outside_conditions([chosen], [chosen.loop])
     _warn_of_frames(chosen.loop)
     network = network_for(session.inputs, study.wrist, [chosen.loop])
-    row, angles = _row(study, session.inputs), _angles(study, network)
-    analyses = []
+    row, rests = _row(study, session.inputs, planes), _rests(study, planes, network)
+    angles, analyses = rests.angles, []
     with session.progress("linearising the loop", len(angles), "angles") as report:
         for angle in angles:
-            analyses.append(_at_rest(row, study, angle))
+            analyses.append(_at_rest(row, study, rests, angle))
             report(len(analyses))
-    locus, last = None, _theta(study, angles[-1])
+    locus, last = None, angles[-1]
     if not all(analysis.is_open for analysis in analyses):
         with session.progress("following the poles"):
-            locus = row.locus(last, settings.over, settings.span)
-    portrait = _portrait(session, row, study, last)
-    label = f"{row.law.name}/{chosen.gains if isinstance(chosen.gains, str) else 'given'}"
+            locus = row.locus(rests.bend(last), settings.over, settings.span)
+    portrait = _portrait(session, row, study, rests, last)
+    label = f"{row.law.name}/{chosen.gains if isinstance(chosen.gains, str) else 'given'}{rests.words(study)}"
     sentence = answer(label, analyses, angles)
     findings.overview.figure = "bode"
-    results = LoopResults(angles, analyses, locus, portrait)
+    findings.numerics(planes=planes)
+    results = LoopResults(angles, analyses, locus, portrait, rests.toward_deg)
     write(findings, results)
     with session.drawing():
         draw(findings, label, results)
     tables = [margin_table(sentence, analyses, angles), step_table(analyses, angles)]
+    if planes == 2:
+        tables.insert(1, each_plane_table(analyses, angles))
     if locus is not None:
         value = None if settings.over == "loop" else row.gains[settings.over]
         tables.append(
@@ -164,39 +186,85 @@ def analyse(session: Session) -> Analysed:
         )
     tables.append(limit_table(analyses[-1], CUTS[chosen.loop.sensor.level]))
     tables += [] if portrait is None else [portrait_table(portrait)]
-    return Analysed(session.study, findings, tables, label, sentence, angles, analyses, locus, portrait)
+    return Analysed(
+        session.study, findings, tables, label, sentence, angles, analyses, locus, portrait, rests.toward_deg
+    )  # fmt: skip
 
 
-def _row(study: Study, inputs: Inputs) -> AnalysedRow:
+def _row(study: Study, inputs: Inputs, planes: int) -> AnalysedRow:
     from wristctl.control.table import controller, gains_of
+    from wristctl.simulation.worlds import loop_facing
     from wristctl.stability.loop_analysis import AnalysedRow
-    from wristctl.wrist.directions import in_plane
 
     chosen = study.simulate
     law = controller(chosen.controller)
     gains = dict(zip(law.gains, gains_of(law, chosen.gains, tuned_gains(inputs)), strict=True))
-    wrist = in_plane(study.wrist, chosen.direction)
-    return AnalysedRow(law, gains, chosen.loop, wrist, study.analyse.friction)
+    one_plane = planes == 1
+    wrist, loop = loop_facing(study.wrist, chosen.loop, chosen.direction) if one_plane else (study.wrist, chosen.loop)
+    return AnalysedRow(law, gains, loop, wrist, study.analyse.friction)
 
 
-def _angles(study: Study, network: Inverse | None) -> list[float]:
-    """Resting angles [deg] toward the direction: those given, else straight, half way, and where the reference ends.
+class Rests(NamedTuple):
+    """Resting angles [deg] along a direction of bends `toward` (P,), times `sign` in one plane."""
 
-    A reference that never rests ends at its farthest.
+    angles: list[float]
+    sign: float
+    toward: Array
+
+    def bend(self, angle: float) -> Any:
+        """The bend at a resting angle [deg]: a number in one plane, (2,) in two [rad]."""
+        return self.theta(angle) if len(self.toward) == 1 else self.theta(angle) * self.toward
+
+    def theta(self, angle: float) -> float:
+        """A resting angle along `toward` [rad]."""
+        return self.sign * math.radians(angle)
+
+    @property
+    def toward_deg(self) -> float | None:
+        """Direction of the bends from ulnar toward flexion [deg]; None in one plane."""
+        if len(self.toward) == 1:
+            return None
+        return round(math.degrees(math.atan2(self.toward[1], self.toward[0])), 6) % 360.0
+
+    def words(self, study: Study) -> str:
+        """Planes and direction, in words; none of one plane."""
+        from wristctl.simulation.planes import why_two
+
+        if self.toward_deg is None:
+            return ""
+        why = why_two(study.wrist, asked_for_by(study))
+        reason = f" ({why})" if " out of " in why else ""
+        return f" in two planes{reason}, bent toward {self.toward_deg:.3g} deg from ulnar,"
+
+
+def _rests(study: Study, planes: int, network: Inverse | None) -> Rests:
+    """Resting angles toward the direction: those given, else straight, half way, and where the reference ends.
+
+    A reference that never rests ends at its farthest. In two planes the direction is that of this end.
     """
-    from wristctl.config.loop import sample_period
-    from wristctl.simulation.reference import motion, toward
-    from wristctl.wrist.directions import in_plane
+    import numpy as np
 
-    chosen = study.simulate
-    if study.analyse.angles_deg:
-        return list(study.analyse.angles_deg)
-    wrist, period = in_plane(study.wrist, chosen.direction), sample_period(chosen.loop.control_period)
-    followed = motion(toward(chosen.reference, chosen.direction), wrist, chosen.horizon, period, network)
-    rests = followed.rest < followed.horizon
-    end = followed.final if rests else float(max(followed.theta_ref, key=abs))
-    degrees = round(math.degrees(end) * _sign(study), 6)
-    return [0.0, 0.5 * degrees, degrees] if degrees else [0.0]
+    from wristctl.config.loop import sample_period
+    from wristctl.simulation.planes import motion_in
+    from wristctl.simulation.trajectory import size_of
+    from wristctl.wrist.directions import DIRECTIONS, in_plane
+
+    chosen, given = study.simulate, list(study.analyse.angles_deg)
+    way, period = DIRECTIONS[chosen.direction], sample_period(chosen.loop.control_period)
+    if given and planes == 1:
+        return Rests(given, way.sign, np.ones(1))
+    wrist = in_plane(study.wrist, chosen.direction) if planes == 1 else study.wrist
+    followed = motion_in(planes, chosen.reference, chosen.direction, wrist, chosen.horizon, period, network)
+    farthest = int(np.argmax(size_of(followed.bend_ref)))
+    end = followed.bend_ref[-1 if followed.rest < followed.horizon else farthest]
+    if planes == 1:
+        sign, toward, size = float(way.sign), np.ones(1), float(end[0]) * way.sign
+    else:
+        size, sign = float(np.hypot(*end)), 1.0
+        of_plane = way.sign * np.eye(2)[int(way.plane == "flexion")]
+        toward = end / size if size > 0.0 else of_plane
+    degrees = round(math.degrees(size), 6)
+    return Rests(given or ([0.0, 0.5 * degrees, degrees] if degrees else [0.0]), sign, toward)
 
 
 def _warn_of_frames(loop: Loop) -> None:
@@ -207,19 +275,9 @@ def _warn_of_frames(loop: Loop) -> None:
         log.warning("frames at %g Hz repeat on no few control periods: linearised with %.5g Hz", configured, rate)
 
 
-def _sign(study: Study) -> float:
-    from wristctl.wrist.directions import DIRECTIONS
-
-    return DIRECTIONS[study.simulate.direction].sign
-
-
-def _theta(study: Study, angle: float) -> float:
-    return _sign(study) * math.radians(angle)
-
-
-def _at_rest(row: AnalysedRow, study: Study, angle: float) -> LoopAnalysis:
+def _at_rest(row: AnalysedRow, study: Study, rests: Rests, angle: float) -> LoopAnalysis:
     """The loop about one resting angle [deg]; UserError where it rests nowhere near, or beyond what tendons bear."""
-    analysis = row.analysed(_theta(study, angle))
+    analysis = row.analysed(rests.bend(angle), rests.toward)
     if analysis is None:
         fix = "other gains, or another angle in analyse.angles_deg"
         raise UserError(f"the loop rests nowhere near {angle:g} deg", "simulate.gains", fix)
@@ -232,7 +290,9 @@ def _at_rest(row: AnalysedRow, study: Study, angle: float) -> LoopAnalysis:
     return analysis
 
 
-def _portrait(session: Session, row: AnalysedRow, study: Study, theta: float) -> PhasePortrait | None:
+def _portrait(
+    session: Session, row: AnalysedRow, study: Study, rests: Rests, angle: float
+) -> PhasePortrait | None:  # fmt: skip
     from wristctl.simulation.worlds import Draws
     from wristctl.stability.phase_portrait import SCENARIO, phase_portrait
 
@@ -241,7 +301,8 @@ def _portrait(session: Session, row: AnalysedRow, study: Study, theta: float) ->
     draws = Draws(study.seed)
     session.findings.note_streams(draws.names([row.loop], [SCENARIO]))
     with session.progress("simulating courses to the sliding surface"):
-        return phase_portrait(row.law, row.gains, row.loop, row.wrist, theta, study.simulate.horizon, draws)
+        theta, horizon = rests.theta(angle), study.simulate.horizon
+        return phase_portrait(row.law, row.gains, row.loop, row.wrist, theta, horizon, draws, rests.toward)
 
 
 ANALYSE = Procedure(
@@ -253,4 +314,5 @@ ANALYSE = Procedure(
         EarlierRun("tuned", kind="tune", optional=True),
         EarlierRun("from_identified", kind="identify", optional=True),
     ),
+    in_one_plane=no_tendons,
 )

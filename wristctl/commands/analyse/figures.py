@@ -25,11 +25,14 @@ from wristctl.plotting.style import (
     title,
 )
 from wristctl.stability.loop_analysis import LoopAnalysis, RootLocus
+from wristctl.stability.margins import amplified, carried
 from wristctl.stability.phase_portrait import PhasePortrait
 from wristctl.stability.sampled_loop import Complex
 
 _COLOURS = (SKY, ORANGE, VERMILLION, BLUE, GREY)
 _TURN = 2.0 * np.pi
+# Lines of the eigenvalues of a transfer in two planes, which often lie on each other.
+_DASHES = ("-", (0, (2, 2)))
 # Loop gain, and frequency [Hz], below which nothing is drawn.
 _LEAST, _SLOWEST = 1e-4, 0.02
 
@@ -38,17 +41,18 @@ def bode(analyses: Sequence[LoopAnalysis], angles: Sequence[float], heading: str
     """Magnitude and phase of the loop's transfer over frequency [Hz], a line for each resting angle [deg].
 
     Dots are where the gain is 1 and where the phase is -180 deg. A loop that feeds nothing back is shown as its plant:
-    angle per torque.
+    angle per torque. In two planes lines are the two eigenvalues of the transfer, the second one dashed.
     """
     fig, axes = figure(2, 1, height=5.2, sharex=True)
     gain, phase = axes[:, 0]
     alone = all(loop.is_open for loop in analyses)
     for analysis, angle, style in zip(analyses, angles, _styles(len(analyses)), strict=True):
-        response = analysis.plant if alone else analysis.response
         frequency = analysis.omega / _TURN
         shown = frequency >= min(_SLOWEST, 0.1 * frequency[-1])
-        gain.plot(frequency[shown], np.abs(response)[shown], label=f"at {angle:g} deg", **style)
-        phase.plot(frequency[shown], _phase(response)[shown], **style)
+        loci = analysis.plant_loci if alone else analysis.loci
+        for response, dashes, label in zip(loci, _DASHES, (f"at {angle:g} deg", None), strict=False):
+            gain.plot(frequency[shown], np.abs(response)[shown], label=label, linestyle=dashes, **style)
+            phase.plot(frequency[shown], _phase(response)[shown], linestyle=dashes, **style)
         if not alone:
             _mark(gain, analysis, style["color"])
     logarithmic(gain.xaxis)
@@ -86,20 +90,14 @@ def _styles(count: int) -> list[dict[str, Any]]:
 
 
 def sensitivity(analyses: Sequence[LoopAnalysis], angles: Sequence[float]) -> Figure:
-    """|S| = |1/(1 + L)| and |T| = |L/(1 + L)| over frequency [Hz]."""
+    """|S| = |1/(1 + L)| and |T| = |L/(1 + L)| over frequency [Hz]; in two planes largest singular values."""
     fig, ((axes,),) = figure(height=3.2)
     for analysis, angle, style in zip(analyses, angles, _styles(len(analyses)), strict=True):
-        amplified = 1.0 / (1.0 + analysis.response)
         frequency = analysis.omega / _TURN
         shown = frequency >= min(_SLOWEST, 0.1 * frequency[-1])
-        axes.plot(frequency[shown], np.abs(amplified)[shown], label=f"S at {angle:g} deg", **style)
-        axes.plot(
-            frequency[shown],
-            np.abs(analysis.response * amplified)[shown],
-            linestyle="--",
-            label=f"T at {angle:g} deg",
-            **style,
-        )
+        axes.plot(frequency[shown], amplified(analysis.transfer)[shown], label=f"S at {angle:g} deg", **style)
+        reached = carried(analysis.transfer)[shown]
+        axes.plot(frequency[shown], reached, linestyle="--", label=f"T at {angle:g} deg", **style)
     axes.axhline(1.0, **DOTTED)
     logarithmic(axes.xaxis)
     logarithmic(axes.yaxis)

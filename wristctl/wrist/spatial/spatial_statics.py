@@ -4,9 +4,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from wristctl.arrays import Array
+from wristctl.config.wrist import WristParameters
 from wristctl.errors import UserError
 from wristctl.wrist.spatial.spatial_model import spatial_linearised, spatial_terms
-from wristctl.wrist.spatial.spatial_segments import FIELDS, SpatialSegments
+from wristctl.wrist.spatial.spatial_segments import FIELDS, SpatialSegments, spatial_values
+from wristctl.wrist.tendon_layout import TendonLayout
 
 _STEPS = 100
 # Largest change of a coordinate in one step of Newton's method [rad].
@@ -26,6 +28,13 @@ def least_spatial_stiffness(parameters: ArrayLike, n: int, pulls: ArrayLike) -> 
     """
     tangent = spatial_stiffness(parameters, np.zeros(2 * n), pulls)
     return float(np.linalg.eigvalsh(0.5 * (tangent + tangent.T))[0] / n)
+
+
+def least_stiffness_at_pretension(wrist: WristParameters, n: int) -> float:
+    """`least_spatial_stiffness` of a wrist of n segments whose tendons all pull at pretension [N m/rad]."""
+    layout = TendonLayout.of(wrist)
+    values = spatial_values(wrist, layout, n, axis=np.radians(wrist.stiffness_axis_deg))
+    return least_spatial_stiffness(values, n, layout.multiplicity * wrist.pretension)
 
 
 def spatial_equilibrium(parameters: ArrayLike, n: int, pulls: ArrayLike, guess: ArrayLike | None = None) -> Array:
