@@ -27,7 +27,7 @@ from wristctl.plotting.ranking_figures import answer_figure
 from wristctl.plotting.wrist_drawing import directions
 from wristctl.records.formats import write_figure
 from wristctl.simulation.hysteresis import loops
-from wristctl.simulation.spool_driven import strokes
+from wristctl.simulation.strokes import strokes
 from wristctl.study_files.load import load_study
 from wristctl.vision.camera import Frame
 from wristctl.vision.marker import Tracker

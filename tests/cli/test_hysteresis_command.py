@@ -10,7 +10,7 @@ import pytest
 from tests.cli.conftest import Call
 from tests.identification.made_loops import SHORT, made_loop, written
 from wristctl.records import open_run
-from wristctl.simulation.spool_driven import FrictionCase
+from wristctl.simulation.strokes import FrictionCase
 
 QUICK = ("--set", "ranges_deg=[[0, 10]]", "--set", "frequencies=[1, 5]", "--set", "angles_deg=[]")
 

@@ -18,7 +18,7 @@ from wristctl.commands.hysteresis.command import Hysteresis
 from wristctl.config.study import Study
 from wristctl.errors import UserError
 from wristctl.records.files import sha256_of
-from wristctl.simulation.spool_driven import FrictionCase
+from wristctl.simulation.strokes import FrictionCase
 
 CABLE = FrictionCase(0.1, 1.0, 2e-5)
 QUICK = ("hysteresis.ranges_deg=[[0, 20], [5, 15]]", "hysteresis.frequencies=[0.5, 2]", "hysteresis.sheaths=[0, 1, 3]",

@@ -13,7 +13,8 @@ from wristctl.config.plant import Actuator
 from wristctl.config.wrist import WristParameters
 from wristctl.identification.loop_problem import LoopProblem
 from wristctl.identification.measured_loop import MeasuredLoop
-from wristctl.simulation.spool_driven import FrictionCase, SpooledWrist, spooled, strokes
+from wristctl.simulation.spool_driven import SpooledWrist, spooled
+from wristctl.simulation.strokes import FrictionCase, strokes
 
 BELIEVED, KNOWN = WristParameters(), KnownBeforehand()
 Measured = Literal["spools and tensions", "spools", "tensions"]
@@ -71,7 +72,7 @@ def made_loop(truth: FrictionCase, seed: int, recording: Recording | None = None
     time = np.arange(0.0, recording.cycles / recording.frequency, 1.0 / recording.rate)
     at = time + recording.lead / recording.frequency
     grid = _STEP * np.arange(done.theta.shape[1])
-    angle, *pulls = (np.interp(at, grid, each[0]) for each in (done.theta, done.spool_plus, done.spool_minus))
+    angle, *pulls = (np.interp(at, grid, each[0]) for each in (done.theta, done.spool[..., 0], done.spool[..., 1]))
     angle += math.radians(KNOWN.zero_error_deg * drawn[3]) + np.radians(recording.noise_deg) * rng.standard_normal(
         len(at)
     )

@@ -19,7 +19,8 @@ from wristctl.errors import UserError
 from wristctl.identification.friction_fit import FrictionFit, fit_friction, fit_in_turn
 from wristctl.identification.loop_problem import INNER, LEAST_SHARE, PRESLIDING, STIFFNESS, LoopProblem
 from wristctl.identification.measured_loop import MeasuredLoop
-from wristctl.simulation.spool_driven import FrictionCase, SpooledWrist, spooled
+from wristctl.simulation.spool_driven import SpooledWrist, spooled
+from wristctl.simulation.strokes import FrictionCase
 
 NAMES = ("friction", "sheath", "presliding")
 CABLE = FrictionCase(0.1, 1.0, 2e-5)

@@ -14,7 +14,7 @@ from wristctl.config.hysteresis import HysteresisSettings
 from wristctl.config.wrist import WristParameters
 from wristctl.identification.friction_fit import FrictionFit
 from wristctl.simulation.hysteresis import DeadBand, HysteresisLoop, dead_bands, loops
-from wristctl.simulation.spool_driven import FrictionCase, Strokes, strokes
+from wristctl.simulation.strokes import FrictionCase, Strokes, strokes
 
 Driven = tuple[Strokes, list[HysteresisLoop], list[DeadBand]]
 
@@ -49,9 +49,9 @@ def test_outer_loops_stand_by_sheath_with_the_roots_of_the_statics(driven: Drive
     slow = next(each for each in every if each.case == (FrictionCase(0.1, 3.0, 2e-5), 0.5, 0.0, np.radians(20.0)))
     (line,) = labelled(above[2], "0.5 Hz")
     np.testing.assert_allclose(x_of(line), np.degrees(slow.course.theta))
-    np.testing.assert_allclose(y_of(line), slow.course.spool_plus / 2.0)
+    np.testing.assert_allclose(y_of(line), slow.course.spool[..., 0] / 2.0)
     (wrist,) = labelled(above[2], "slowest, at the wrist")
-    np.testing.assert_allclose(y_of(wrist), slow.course.wrist_plus / 2.0)
+    np.testing.assert_allclose(y_of(wrist), slow.course.wrist[..., 0] / 2.0)
     (lag,) = labelled(below[2], "0.5 Hz")
     np.testing.assert_allclose(y_of(lag), np.degrees(slow.course.theta - slow.unhindered))
     low, high = labelled(below[2], "roots of the statics")
@@ -91,7 +91,7 @@ def test_inner_loops_stand_beside_each_other_by_sheath_or_presliding(driven: Dri
     assert [axes.get_title("left") for axes in made.axes] == [f"mu 0.1, {phi} rad, 20 um" for phi in (0, 1, 3)]
     inner = next(e for e in every if e.case == (FrictionCase(0.1, 0.0, 2e-5), 0.5, np.radians(5.0), np.radians(15.0)))
     (line,) = labelled(made.axes[0], "5 to 15 deg")
-    np.testing.assert_allclose(y_of(line), inner.course.spool_plus / 2.0)
+    np.testing.assert_allclose(y_of(line), inner.course.spool[..., 0] / 2.0)
     more = own.settings.model_copy(update={"preslidings": (1e-4, 5e-6), "frequencies": (2.0,)})
     wider = strokes(own.wrist, more)
     titles = [axes.get_title("left") for axes in figures.minor_loops(wider, loops(wider)).axes]

@@ -12,7 +12,7 @@ from wristctl.config.hysteresis import HysteresisSettings
 from wristctl.config.wrist import WristParameters
 from wristctl.errors import UserError
 from wristctl.simulation.hysteresis import HysteresisLoop, dead_bands, friction_cases, loops, main_case
-from wristctl.simulation.spool_driven import FrictionCase, Strokes, strokes
+from wristctl.simulation.strokes import FrictionCase, Strokes, strokes
 from wristctl.wrist.statics import least_stiffness
 from wristctl.wrist.tendons import TENDONS_PER_SIDE
 
@@ -123,11 +123,11 @@ def test_an_inner_loop_lies_in_the_outer_one() -> None:
     assert inner.friction_work < outer.friction_work / 2.5
     half = len(outer.time) // 2
     down, up = (
-        np.interp(inner.course.theta, outer.course.theta[part][::order], outer.course.spool_plus[part][::order])
+        np.interp(inner.course.theta, outer.course.theta[part][::order], outer.course.spool[..., 0][part][::order])
         for part, order in ((slice(0, half + 1), -1), (slice(half, None), 1))
     )
-    assert (inner.course.spool_plus > down - 0.02).all() and (inner.course.spool_plus < up + 0.02).all()
-    assert np.ptp(inner.course.spool_plus) > 0.9 * np.abs(up - down).max()
+    assert (inner.course.spool[..., 0] > down - 0.02).all() and (inner.course.spool[..., 0] < up + 0.02).all()
+    assert np.ptp(inner.course.spool[..., 0]) > 0.9 * np.abs(up - down).max()
 
 
 def test_a_loop_to_the_other_side_is_the_mirror_image() -> None:

@@ -52,10 +52,10 @@ def test_it_moves_as_the_integration_step_moves_it() -> None:
     known = spools.spooled(course, STIFF)
     found = follow([SpooledWrist(WRIST, STIFF, STRAIGHT)], course)
     np.testing.assert_array_equal(found.theta[0], known.theta)
-    np.testing.assert_array_equal(found.z_plus[0], known.z_plus)
+    np.testing.assert_array_equal(found.z[0, :, 0], known.z_plus)
     middle = 0.5 * (course[1:, 0] + course[:-1, 0])
-    np.testing.assert_allclose(found.given_plus[0, 1:], middle, rtol=1e-15)
-    steps = np.abs(known.spool_plus[1:] - found.spool_plus[0, 1:])
+    np.testing.assert_allclose(found.given[0, 1:, 0], middle, rtol=1e-15)
+    steps = np.abs(known.spool_plus[1:] - found.spool[0, 1:, 0])
     assert steps.max() < 40e3 * np.abs(np.diff(course[:, 0])).max(), (
         "at a sample, between what is held before and after"
     )
@@ -98,16 +98,18 @@ def test_a_winch_keeps_its_pull() -> None:
     wrists = [SpooledWrist(WRIST, STIFF, STRAIGHT, winch=True), SpooledWrist(WRIST, STIFF, STRAIGHT)]
     done = follow(wrists[:1], pulls)
     middle = 0.5 * (pulls[1:] + pulls[:-1])
-    np.testing.assert_allclose(done.spool_plus[0, 1:], middle[:, 0], atol=1e-3)
-    np.testing.assert_allclose(done.spool_minus[0, 1:], 4.0, atol=1e-3)
+    np.testing.assert_allclose(done.spool[0, 1:, 0], middle[:, 0], atol=1e-3)
+    np.testing.assert_allclose(done.spool[0, 1:, 1], 4.0, atol=1e-3)
     slipping = slice(300, 400)
     phi = STIFF.sheath + np.abs(done.theta[0])
-    np.testing.assert_allclose((done.spool_plus / done.wrist_plus)[0, slipping], np.exp(0.1 * phi)[slipping], rtol=2e-4)
+    np.testing.assert_allclose(
+        (done.spool[..., 0] / done.wrist[..., 0])[0, slipping], np.exp(0.1 * phi)[slipping], rtol=2e-4
+    )
     assert done.theta[0, -1] > np.radians(15.0)
 
 
 def test_bristles_begin_as_they_are_told() -> None:
     rest = np.full((3, 2), HOME)
     done = follow([SpooledWrist(WRIST, STIFF, STRAIGHT, z=(0.5, -0.25))], rest)
-    assert (done.z_plus[0, 0], done.z_minus[0, 0]) == (0.5, -0.25)
-    assert done.wrist_plus[0, 0] == pytest.approx(done.spool_plus[0, 0] * np.exp(-0.1 * 0.5))
+    assert (done.z[0, 0, 0], done.z[0, 0, 1]) == (0.5, -0.25)
+    assert done.wrist[0, 0, 0] == pytest.approx(done.spool[0, 0, 0] * np.exp(-0.1 * 0.5))

@@ -108,7 +108,7 @@ def _swings(measured: ModuleType, own: AnalysedRow, bend: Array, factors: Array)
     """What is left [deg] of the swing about straight of the plane that swings more, let go at a bend (2,) [rad], where
     the law's torques are times these factors; inf where the wrist leaves its range."""
     loop = own.loop.model_copy(update={"substeps": round(own.loop.control_period / measured.STEP) or 1})
-    samples = round(8.0 / sample_period(loop.control_period))
+    samples = round(measured.HORIZON / sample_period(loop.control_period))
     still = resting(np.zeros(2), samples, sample_period(loop.control_period))
     nothing = np.zeros(len(factors))
     gains = np.column_stack([np.tile(own.law.values(own.gains), (len(factors), 1)), factors, nothing, nothing])
@@ -135,7 +135,9 @@ def test_three_tendons_begin_to_swing_where_both_planes_gains_reach_their_margin
     across = np.abs(found.transfer[:, 0, 1] / found.transfer[:, 0, 0]).max()
     assert across > 0.1, "one loop of two planes, not two loops"
     left = _swings(measured, own, np.radians([0.7, 0.7]), found.margins.most.value * np.array([0.9, 1.1]))
-    assert left[0] <= measured.STILL < left[1], left
+    limits = {limit.what: math.degrees(limit.swing) for limit in found.limits}
+    still = limits.get("a motor's microstep", measured.STILL)
+    assert left[0] <= still < left[1] and left[1] > 10.0 * left[0], (left, still)
 
 
 def test_loci_go_on_where_they_cross_each_other() -> None:

@@ -43,6 +43,9 @@ class HysteresisSettings(Section):
     drive: Literal["spools", "tensions"] = choice(
         "spools", "what moves the wrist, as it would without friction: positions of its spools, or pulls at them"
     )
+    toward_deg: float = quantity(
+        0.0, "deg", "direction of the bends from ulnar toward flexion; other than 0: in two planes", ge=-360, le=360
+    )
     shape: Literal["sine", "triangle"] = choice("sine", "of the way to and fro, from a range's low end")
     ranges_deg: tuple[tuple[float, float], ...] = quantity(
         ((0.0, 30.0), (10.0, 20.0), (14.0, 16.0)), "deg", "angles between which it goes: outer loop, then inner ones",

@@ -242,7 +242,9 @@ class LoopProblem:
         signals = []
         for lane, x in enumerate(candidates):
             pulls = (
-                () if len(self.measured) == 1 else (courses.spool_plus[lane] / sides, courses.spool_minus[lane] / sides)
+                ()
+                if len(self.measured) == 1
+                else (courses.spool[..., 0][lane] / sides, courses.spool[..., 1][lane] / sides)
             )
             signals.append(
                 [np.interp(instants, grid, signal) for signal in (courses.theta[lane] + x[ANGLE_ZERO], *pulls)]

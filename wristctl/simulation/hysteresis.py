@@ -17,8 +17,11 @@ from numpy.typing import NDArray
 from wristctl.arrays import Array
 from wristctl.config.hysteresis import HysteresisSettings
 from wristctl.simulation.convergence import ABSOLUTE, FINER, RELATIVE
-from wristctl.simulation.spool_driven import FrictionCase, Spooled, Strokes, spooled
+from wristctl.simulation.spool_driven import Spooled, spooled
+from wristctl.simulation.strokes import FrictionCase, Strokes
 
+# Share of the longest moment arm from which on a tendon slides as the wrist bends.
+_SLIDING = 0.1
 # Time for which a wrist is held at the end of a ramp [s].
 _HOLD = 1.5
 # Path, over presliding, after which a bristle is bent fully: to exp(-5).
@@ -55,12 +58,28 @@ class HysteresisLoop:
     """Integration step [s]."""
     drift: float = 0.0
     """Largest relative change of width and works with the integration step, at the shortest tried; 0: converged."""
+    toward: tuple[float, ...] = (1.0,)
+    """Direction of the bends in the planes that it bends in."""
+
+    @property
+    def bend(self) -> Array:
+        """Bend along the direction, (T,) [rad]."""
+        bends = self.course.bends
+        return bends[:, 0] if len(self.toward) == 1 else bends @ np.array(self.toward)
+
+    @property
+    def aside(self) -> float:
+        """The furthest that it leaves the line of its bends [rad]; 0 in one plane."""
+        if len(self.toward) == 1:
+            return 0.0
+        across = self.course.bends @ np.array([-self.toward[1], self.toward[0]])
+        return float(np.abs(across).max())
 
     @property
     def width(self) -> float:
         """Bend on the way back less that on the way out, in the middle of the range [rad]."""
         quarter = (len(self.time) - 1) // 4
-        return float(self.course.theta[quarter] - self.course.theta[3 * quarter])
+        return float(self.bend[quarter] - self.bend[3 * quarter])
 
     @property
     def friction_work(self) -> float:
@@ -225,7 +244,7 @@ def _driven(held: Strokes, frequency: float, cases: Sequence[LoopCase]) -> dict[
             HysteresisLoop(
                 cases[index], time, low[index] + (high - low)[index] * swing,
                 Spooled(*(column[lane, cycle] for column in courses)),
-                float(ends[index, 1] - ends[index, 0]), h,
+                float(ends[index, 1] - ends[index, 0]), h, toward=tuple(held.toward.tolist()),
             )
             for lane, index in enumerate(which.tolist())
         ]  # fmt: skip
@@ -260,9 +279,10 @@ def dead_bands(held: Strokes) -> list[DeadBand]:
 
         wrists = [held.lane(every[index][0], float(end)) for end in ends for index in which]
         courses = spooled(wrists, told, steps + 1, lasts / steps, steps)
-        path = held.wrist.tendon_offset * np.abs(courses.theta[:, -1] - begin).reshape(2, -1).min(axis=0)
+        bend = held.along(courses.bends[:, -1])
+        path = _least_arm(held) * np.abs(bend - begin).reshape(2, -1).min(axis=0)
         slid = path > _FULLY * np.array([every[index][0].presliding for index in which])
-        below, above = courses.theta[:, -1].reshape(2, -1).tolist()
+        below, above = bend.reshape(2, -1).tolist()
         return [
             DeadBand(
                 every[index][0], every[index][1], float(exact[index, 0]), float(exact[index, 1]),
@@ -272,3 +292,9 @@ def dead_bands(held: Strokes) -> list[DeadBand]:
         ]  # fmt: skip
 
     return _converged(run, len(every), max(2, round(lasts / settings.step)))
+
+
+def _least_arm(held: Strokes) -> float:
+    """The least moment arm [m] of the tendons that slide as the wrist bends along its line."""
+    arms = np.abs(held.arms)
+    return float(arms[arms > _SLIDING * arms.max()].min())

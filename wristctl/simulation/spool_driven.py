@@ -4,9 +4,7 @@ A winch that keeps a pull P is a spool behind a tendon so soft that nothing the 
 reeled in anew before each step: the element with its friction is the same for both.
 """
 
-import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from threading import Event
 from typing import Any, NamedTuple
 
@@ -14,25 +12,33 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wristctl.arrays import Array
-from wristctl.config.hysteresis import HysteresisSettings
 from wristctl.config.plant import Actuator, TendonFacts, TrueWrist
 from wristctl.config.wrist import WristParameters
-from wristctl.errors import UserError
 from wristctl.lanes.blocks import lanes_of, to_blocks, to_rows
+from wristctl.lanes.compiled import by_type, implements
 from wristctl.lanes.lane import where, zero_like
 from wristctl.lanes.rows import lanes_like, part, rows_of
 from wristctl.processes import cores, stoppable
-from wristctl.simulation.nonideal import inner_of, nonideal_of, of_tendons, unmoved
-from wristctl.wrist.compiled_model import terms
-from wristctl.wrist.dahl import inner_in_lanes, one_block
+from wristctl.simulation.actuator import SIDES
+from wristctl.simulation.nonideal import faults_of, inner_of, nonideal_of, of_tendons, unmoved
 from wristctl.wrist.pcc import PCC
-from wristctl.wrist.plant import advance_or_stop, bend_of, kernel_of, parameters_of, path_before
-from wristctl.wrist.segments import segments
-from wristctl.wrist.statics import FROM_ABOVE, FROM_BELOW, HeldTendons, at_rest_with, equilibria_at
-from wristctl.wrist.tendon_mechanics import Nonideal, RealTendons, Z, pulls_at_start, read_nonideal, row_of, spool_pull
-from wristctl.wrist.tendons import TENDONS_PER_SIDE
+from wristctl.wrist.plant import advance_or_stop, bend_of, kernel_of, parameters_of, path_at, path_before
+from wristctl.wrist.segments import Segments
+from wristctl.wrist.spatial.pcc_in_space import PCC_IN_SPACE
+from wristctl.wrist.spatial.spatial_segments import SpatialWrist
+from wristctl.wrist.spatial.spooled_tendons import RealPlaces
+from wristctl.wrist.tendon_layout import TendonLayout
+from wristctl.wrist.tendon_mechanics import (
+    RealTendons,
+    Z,
+    acting_pulls,
+    row_of,
+    shortening,
+    spool_pull,
+    stiffness_at,
+    tendons_in_lanes,
+)
 
-_STIFFNESS = len(Nonideal._fields)
 # Stiffness of a winch's tendons [N/m]: 1 m/s changes its pull by 1 mN in a millisecond.
 _WINCH = 1.0
 # Steps of a block of wrists between two looks at what the spools do next.
@@ -40,44 +46,60 @@ _CHUNK = 20_000
 
 
 class SpooledWrist(NamedTuple):
-    """A wrist and its tendons, driven at its spools by their positions or, with a `winch`, by their pulls."""
+    """A wrist and its tendons, driven at its spools by their positions or, with a `winch`, by their pulls.
+
+    Its places of tendons are both sides in one plane, and those of its layout in two.
+    """
 
     wrist: WristParameters
     actuator: Actuator
     begin: Array
-    """Segments' angles (n,) [rad] at first, when it does not move."""
+    """Coordinates (q,) [rad] at first, when it does not move: in one plane the segments' angles."""
     winch: bool = False
-    z: tuple[float, float] = (0.0, 0.0)
-    """State of both sides' bristles at first."""
+    z: tuple[float, ...] = ()
+    """State of the bristles of each place at first; none: all relaxed."""
     plant: TrueWrist = TrueWrist()
     """What else the wrist has: creep, end stops, friction inside it."""
     inner_z: float = 0.0
     """State of that friction's bristles at first."""
+    planes: int = 1
+    """Planes that it bends in."""
 
 
 class Spooled(NamedTuple):
-    """Courses of wrists, (count, T) each; of a side both tendons together."""
+    """Courses of wrists, (count, T) each, or (count, T, values); of a place all its tendons together."""
 
-    theta: Array
-    """Bending angle [rad]."""
-    given_plus: Array
-    """Length that the + side has reeled in since it was taut and free of tension on the straight wrist [m]."""
-    given_minus: Array
-    spool_plus: Array
-    """Pull at the spool [N]."""
-    spool_minus: Array
-    wrist_plus: Array
-    """Pull at the wrist [N]."""
-    wrist_minus: Array
-    z_plus: Array
-    """State of its bristle."""
-    z_minus: Array
+    bends: Array
+    """Bend of each plane [rad]."""
+    given: Array
+    """Length that each place has reeled in since it was taut and free of tension on the straight wrist [m]."""
+    spool: Array
+    """Pull of each place at the spool [N]."""
+    wrist: Array
+    """Pull of each place at the wrist [N]."""
+    z: Array
+    """State of the bristle of each place."""
     friction: Array
     """Work that tendons have lost to friction so far [J]: pull at the spool less pull at the wrist, along the path."""
     raw: Array
     """Work that the spools have given so far [J]: pull at the spool along the path."""
     damped: Array
     """Work that the wrist's damping has taken so far [J], by its rates at the ends of steps."""
+
+    @property
+    def theta(self) -> Array:
+        """Bending angle in one plane [rad]."""
+        return self.bends[..., 0]
+
+    @property
+    def spool_plus(self) -> Array:
+        """Pull at the spool of the + side, or of the first place [N]."""
+        return self.spool[..., 0]
+
+    @property
+    def spool_minus(self) -> Array:
+        """Pull at the spool of the - side, or of the second place [N]."""
+        return self.spool[..., 1]
 
 
 class _Timing(NamedTuple):
@@ -89,62 +111,108 @@ class _Timing(NamedTuple):
 class _Lanes(NamedTuple):
     wrist: Any
     tendons: Any
-    """Nonideal's values, stiffness, and 1 for a winch."""
+    """RealTendons, or RealPlaces in two planes."""
+    winch: Any
+    """1 for a winch."""
     state: Any
-    memory: Any
     ends: Any
-    """Works so far, and of the last step's end what both sides have reeled in, pull at the spool and at the wrist."""
-    inner: Any
+    """Works so far; at the last step's end what each place has reeled in, its pull at the spool and at the wrist."""
 
 
-_ENDS = 9
+_WORKS = 3
 
 
-def _move(model: Any, lanes: Any, driven: Any, timing: Any, out: Any, cut: Any) -> None:
-    segment, values = parameters_of(model, rows_of(lanes.wrist)), rows_of(lanes.tendons)
-    zero = zero_like(values[_STIFFNESS])
-    tendons = RealTendons(values[_STIFFNESS], read_nonideal(values), rows_of(lanes.memory), inner_in_lanes(lanes.inner))
-    winch, memory, ends, n = values[_STIFFNESS + 1], rows_of(lanes.memory), rows_of(lanes.ends), len(cut)
+@by_type
+def _squares(plant: Any, rate: Any, sums: Any) -> None:
+    """Add the products of rates that damping goes by, summed over the segments, to three rows."""
+    raise NotImplementedError("compiled code only")
+
+
+@implements(_squares, Segments)
+def _squares_in_one_plane(plant: Any, rate: Any, sums: Any) -> None:
+    for i in range(len(rate)):
+        sums[0] = sums[0] + rate[i] * rate[i]
+
+
+@implements(_squares, SpatialWrist)
+def _squares_in_space(plant: Any, rate: Any, sums: Any) -> None:
+    for k in range(len(rate) // 2):
+        y, z = rate[2 * k], rate[2 * k + 1]
+        sums[0], sums[1], sums[2] = sums[0] + y * y, sums[1] + y * z, sums[2] + z * z
+
+
+@by_type
+def _damped(plant: Any, h: float, sums: Any) -> Any:
+    """Work [J] that damping takes in a step of h [s] with these sums at its begin and its end together."""
+    raise NotImplementedError("compiled code only")
+
+
+@implements(_damped, Segments)
+def _damped_in_one_plane(plant: Any, h: float, sums: Any) -> Any:
+    return 0.5 * h * plant.damping * sums[0]
+
+
+@implements(_damped, SpatialWrist)
+def _damped_in_space(plant: Any, h: float, sums: Any) -> Any:
+    segment = plant.segment
+    power = segment.damping_yy * sums[0] + 2.0 * segment.damping_yz * sums[1] + segment.damping_zz * sums[2]
+    return 0.5 * h * power
+
+
+def _move(model: Any, lanes: Any, driven: Any, timing: Any, out: Any, cut: Any, bends: Any, pulls: Any) -> None:
+    segment, tendons = parameters_of(model, rows_of(lanes.wrist), pulls), tendons_in_lanes(lanes.tendons)
+    winch, ends, n, planes, count = rows_of(lanes.winch)[0], rows_of(lanes.ends), len(cut), len(bends), len(pulls)
     q, rate = part(rows_of(lanes.state), 0, cut), part(rows_of(lanes.state), n, cut)
-    bend, speed = lanes_like(part(q, 0, (0,))), lanes_like(part(q, 0, (0,)))
+    bend, speed = lanes_like(part(q, 0, bends)), lanes_like(part(q, 0, bends))
+    places = part(ends, _WORKS, pulls)
+    reeled, spool, wrist = lanes_like(places), lanes_like(places), lanes_like(places)
+    sums, zero = lanes_like(part(ends, 0, (0, 0, 0))), zero_like(winch)
     alive = 1.0 + zero
     for k in range(driven.shape[0]):
         tick, now = timing.first + k, rows_of(driven[k])
         path = path_before(tendons, segment, q)
-        reeled = (
-            where(winch > 0.0, now[0] / tendons.stiffness + path[0], now[0]),
-            where(winch > 0.0, now[1] / tendons.stiffness + path[1], now[1]),
-        )
-        spool_plus, spool_minus = spool_pull(tendons, reeled[0], 0, path[0]), spool_pull(tendons, reeled[1], 1, path[1])
-        plus, minus = pulls_at_start(tendons, reeled, path)
+        for t in range(count):
+            held = now[t] / stiffness_at(tendons, t) + shortening(path, t)
+            reeled[t] = where(winch > 0.0, held, now[t])
+            spool[t] = spool_pull(tendons, reeled[t], t, shortening(path, t))
+        acting_pulls(tendons, reeled, path, wrist)
         if tick == 0:
-            ends[3], ends[4], ends[5], ends[6], ends[7], ends[8] = *reeled, spool_plus, spool_minus, plus, minus
+            for t in range(count):
+                ends[_WORKS + t], ends[_WORKS + count + t], ends[_WORKS + 2 * count + t] = reeled[t], spool[t], wrist[t]
         if tick % timing.every == 0:  # between two steps what is held over them jumps: its mean is what it is there
             row = rows_of(out[tick // timing.every])
             bend_of(segment, q, rate, bend, speed)
-            row[0] = bend[0]
-            row[1], row[2] = 0.5 * (reeled[0] + ends[3]), 0.5 * (reeled[1] + ends[4])
-            row[3], row[4] = 0.5 * (spool_plus + ends[5]), 0.5 * (spool_minus + ends[6])
-            row[5], row[6] = 0.5 * (plus + ends[7]), 0.5 * (minus + ends[8])
-            row[7], row[8] = memory[row_of(0, Z)], memory[row_of(1, Z)]
-            row[9], row[10], row[11] = ends[0], ends[1], ends[2]
-        rates = zero
-        for i in range(n):
-            rates = rates + rate[i] * rate[i]
+            for p in range(planes):
+                row[p] = bend[p]
+            for t in range(count):
+                row[planes + t] = 0.5 * (reeled[t] + ends[_WORKS + t])
+                row[planes + count + t] = 0.5 * (spool[t] + ends[_WORKS + count + t])
+                row[planes + 2 * count + t] = 0.5 * (wrist[t] + ends[_WORKS + 2 * count + t])
+                row[planes + 3 * count + t] = tendons.state[row_of(t, Z)]
+            for i in range(_WORKS):
+                row[planes + 4 * count + i] = ends[i]
+        for i in range(_WORKS):
+            sums[i] = zero
+        _squares(segment, rate, sums)
         alive, _ = advance_or_stop(segment, q, rate, reeled, tendons, timing.h + zero, alive)
-        for i in range(n):
-            rates = rates + rate[i] * rate[i]
+        _squares(segment, rate, sums)
         end = path_before(tendons, segment, q)
-        ends[3], ends[4] = reeled
-        ends[5], ends[6] = spool_pull(tendons, reeled[0], 0, end[0]), spool_pull(tendons, reeled[1], 1, end[1])
-        ends[7], ends[8] = pulls_at_start(tendons, reeled, end)
-        raw = (spool_plus + ends[5]) * (end[0] - path[0]) + (spool_minus + ends[6]) * (end[1] - path[1])
-        left = (plus + ends[7]) * (end[0] - path[0]) + (minus + ends[8]) * (end[1] - path[1])
+        raw, left = zero, zero
+        acting_pulls(tendons, reeled, end, part(ends, _WORKS + 2 * count, pulls))
+        for back in range(count):
+            t = count - 1 - back
+            at_spool, moved = (
+                spool_pull(tendons, reeled[t], t, shortening(end, t)),
+                shortening(end, t) - shortening(path, t),
+            )
+            raw = raw + (spool[t] + at_spool) * moved
+            left = left + (wrist[t] + ends[_WORKS + 2 * count + t]) * moved
+            ends[_WORKS + t], ends[_WORKS + count + t] = reeled[t], at_spool
         ends[0], ends[1] = ends[0] + 0.5 * (raw - left), ends[1] + 0.5 * raw
-        ends[2] = ends[2] + 0.5 * timing.h * segment.damping * rates
+        ends[2] = ends[2] + _damped(segment, timing.h, sums)
 
 
-# From times (T,) [s] and which wrists (L,) to what drives both sides of each: spools [m], or pulls [N]; (T, 2, L).
+# From times (T,) [s] and which wrists (L,) to what drives all places of each: spools [m], or pulls [N]; (T, places, L).
 Told = Callable[[Array, NDArray[np.int64]], Array]
 
 
@@ -154,126 +222,72 @@ def spooled(wrists: Sequence[SpooledWrist], inputs: Told, steps: int, h: float, 
     `inputs` is asked for what is held over each step, at its middle. A wrist that bends a segment beyond a full turn
     stays where it was.
     """
-    count, cut = len(wrists), (0,) * len(wrists[0].begin)
+    count, planes = len(wrists), wrists[0].planes
+    cut, model = (0,) * len(wrists[0].begin), PCC if planes == 1 else PCC_IN_SPACE
     blocks, which = _lanes(wrists, h), np.atleast_2d(lanes_of(count))
-    wide, samples = blocks.wrist.shape[2:], -(-steps // every)
-    out, move = np.empty((len(which), samples, len(Spooled._fields), *wide)), kernel_of(_move, PCC)
-    stop = Event()
+    places, wide, samples = _places(wrists[0]), blocks.wrist.shape[2:], -(-steps // every)
+    columns = np.cumsum([planes, places, places, places, places, 1, 1])
+    out = np.empty((len(which), samples, columns[-1] + 1, *wide))
+    move, stop = kernel_of(_move, model), Event()
 
     def run(block: int) -> None:
-        parts = {name: rows[block] for name, rows in blocks._asdict().items() if name != "inner"}
-        block_lanes = _Lanes(**parts, inner=one_block(blocks.inner, block))
+        block_lanes = _one_block(blocks, block)
         for first in range(0, steps, _CHUNK):
             if stop.is_set():
                 return
             last = min(first + _CHUNK, steps)
             middle = h * np.arange(first + 0.5, last)
-            driven = inputs(middle, which[block]).reshape(last - first, 2, *wide)
-            move(PCC, block_lanes, np.ascontiguousarray(driven), _Timing(h, first, every), out[block], cut)
+            driven = np.ascontiguousarray(inputs(middle, which[block]).reshape(last - first, places, *wide))
+            timing = _Timing(h, first, every)
+            move(model, block_lanes, driven, timing, out[block], cut, (0,) * planes, (0,) * places)
 
     with stoppable(cores(), stop) as pool:
         list(pool.map(run, range(len(which))))
     rows: Array = to_rows(out.reshape(len(out), -1, *wide), count).reshape(count, samples, -1)
-    return Spooled(*np.moveaxis(rows, 2, 0))
+    bends, given, spool, wrist, z, *works = np.split(rows, columns, axis=2)
+    friction, raw, damped = (work[..., 0] for work in works)
+    return Spooled(bends, given, spool, wrist, z, friction, raw, damped)
+
+
+def _places(driven: SpooledWrist) -> int:
+    return len(SIDES) if driven.planes == 1 else len(TendonLayout.of(driven.wrist).places)
+
+
+def _one_block(lanes: Any, number: int) -> Any:
+    """One block of NamedTuples of arrays; tuples that are none stay as they are."""
+    if hasattr(lanes, "_fields"):
+        return type(lanes)(*(_one_block(value, number) for value in lanes))
+    return lanes if isinstance(lanes, tuple) else lanes[number]
 
 
 def _lanes(wrists: Sequence[SpooledWrist], h: float) -> _Lanes:
+    planes, places = wrists[0].planes, _places(wrists[0])
+    model = PCC if planes == 1 else PCC_IN_SPACE
     rows = []
     for driven in wrists:
+        layout = None if planes == 1 else TendonLayout.of(driven.wrist)
+        alike = np.array(SIDES) if layout is None else layout.multiplicity.astype(float)
         nonideal = nonideal_of(driven.plant, driven.actuator, TendonFacts(), h)
-        stiffness = _WINCH if driven.winch else TENDONS_PER_SIDE * driven.actuator.tendon_stiffness
-        path = np.array([*(driven.wrist.length - PCC.taut(driven.wrist, driven.begin)), np.abs(driven.begin).sum()])
-        memory = unmoved(np.zeros(2), path, np.zeros(2), driven.begin)
-        of_tendons(memory, 2)[:, Z] = driven.z
-        rows.append(
-            (
-                PCC.values(driven.wrist, len(driven.begin)),
-                np.array([*nonideal, stiffness, float(driven.winch)], float),
-                np.concatenate([driven.begin, 0.0 * driven.begin]),
-                memory,
-                np.zeros(_ENDS),
-            )
+        stiffness = np.full(places, _WINCH) if driven.winch else alike * driven.actuator.tendon_stiffness
+        values = model.values(driven.wrist, len(driven.begin) // planes)
+        if layout is None:
+            path = np.array([*(driven.wrist.length - PCC.taut(driven.wrist, driven.begin)), np.abs(driven.begin).sum()])
+        else:
+            path = path_at(model, values, driven.begin, places)
+        memory = unmoved(np.zeros(places), path, np.zeros(places), driven.begin)
+        of_tendons(memory, places)[:, Z] = driven.z or np.zeros(places)
+        begin, faults = (
+            np.concatenate([driven.begin, 0.0 * driven.begin]),
+            faults_of(driven.actuator, TendonFacts(), alike),
         )
+        ends = np.zeros(_WORKS + 3 * places)
+        own = stiffness[:1] if layout is None else stiffness
+        rows.append((values, own, np.array(nonideal, float), faults.ravel(), memory, [driven.winch], begin, ends))
     begin, bent = np.array([driven.begin for driven in wrists]), np.array([driven.inner_z for driven in wrists])
-    inner = inner_of([driven.plant for driven in wrists], begin, bent, to_blocks)
-    of_wrist, of_tendons_, state, memories, ends = (to_blocks(np.array(column)) for column in zip(*rows, strict=True))
-    return _Lanes(of_wrist, of_tendons_, state, memories, ends, inner)
-
-
-# Step between two angles at which the statics are solved [rad]; chords between them are 1e-10 m off.
-_FINE = math.radians(0.05)
-
-
-class FrictionCase(NamedTuple):
-    """Friction of a wrist's tendons: coefficient, the sheath's angle [rad], the path in which it turns round [m]."""
-
-    friction: float
-    sheath: float
-    presliding: float
-
-
-@dataclass(frozen=True)
-class Strokes:
-    """Spools and pulls that hold a wrist without friction at angles (G,) [rad]; of a side both tendons together."""
-
-    wrist: WristParameters
-    settings: HysteresisSettings
-    angle: Array
-    theta: Array
-    """Segments' angles (G, n) [rad]."""
-    reeled: Array
-    """(G, 2) [m]"""
-    pulls: Array
-    """(G, 2) [N]"""
-
-    @property
-    def winch(self) -> bool:
-        """Whether pulls are held instead of spools."""
-        return self.settings.drive == "tensions"
-
-    def given(self, angle: Array) -> Array:
-        """Input of both sides at angles (...): spools [m], or pulls of winches [N]; (2, ...)."""
-        course = self.pulls if self.winch else self.reeled
-        return np.stack([np.interp(angle, self.angle, side) for side in course.T])
-
-    def told(self, angle: Array) -> Array:
-        """Input of both sides at angles (T, L), as `spooled` takes it: (T, 2, L)."""
-        return np.moveaxis(self.given(angle), 0, 1)
-
-    def theta_at(self, angle: Array) -> Array:
-        """Segments' angles at angles (...), (..., n)."""
-        return np.stack([np.interp(angle, self.angle, column) for column in self.theta.T], axis=-1)
-
-    def lane(self, tendons: FrictionCase, begin: float) -> SpooledWrist:
-        """A wrist that rests at this angle [rad] at first."""
-        return SpooledWrist(self.wrist, self.settings.actuator(*tendons), self.theta_at(np.array(begin)), self.winch)
-
-    def exact(self, tendons: Sequence[FrictionCase], angle: Array) -> Array:
-        """Angles at rest from below and from above (B, 2) [rad] where without friction they are `angle` (B,)."""
-        values = np.tile(segments(self.wrist, self.settings.segments), (len(angle), 1))
-        stiffness = 0.0 if self.winch else TENDONS_PER_SIDE * self.settings.tendon_stiffness
-        friction, sheath, _ = np.array(tendons, float).T
-        held = HeldTendons(self.given(angle).T, np.full(len(angle), stiffness), friction, sheath)
-        guess = self.theta_at(angle)
-        ends = [at_rest_with(values, held, z, guess).sum(axis=1) for z in (FROM_BELOW, FROM_ABOVE)]
-        return np.stack(ends, axis=1)
-
-
-def strokes(wrist: WristParameters, settings: HysteresisSettings) -> Strokes:
-    """Strokes over all angles of all ranges. Raises UserError where the wrist cannot be held there."""
-    ends = np.radians(settings.ranges_deg)
-    angle = np.linspace(ends.min(), ends.max(), 1 + math.ceil(float(np.ptp(ends)) / _FINE))
-    if math.degrees(float(np.abs(angle).max())) > wrist.range_deg:
-        problem = f"a loop goes beyond the wrist's range, {wrist.range_deg:g} deg"
-        raise UserError(problem, "hysteresis.ranges_deg", "smaller ranges")
-    values = np.tile(segments(wrist, settings.segments), (len(angle), 1))
-    balance = equilibria_at(values, settings.segments, angle, TENDONS_PER_SIDE * wrist.pretension)
-    if settings.drive == "tensions" and not balance.stable.all():
-        raise UserError("the wrist buckles on held pulls", "hysteresis.drive", "drive: spools, or a lighter hand")
-    most = float(balance.pulls.max()) / TENDONS_PER_SIDE
-    if most > wrist.tension_limit:
-        problem = f"it takes {most:.3g} N a tendon, above wrist.tension_limit ({wrist.tension_limit:g} N)"
-        raise UserError(problem, "hysteresis.ranges_deg", "smaller ranges")
-    taut = terms(values, balance.theta, 0.0 * balance.theta).tendon_lengths.sum(axis=1)
-    reeled = balance.pulls / (TENDONS_PER_SIDE * settings.tendon_stiffness) + wrist.length - taut
-    return Strokes(wrist, settings, angle, balance.theta, reeled, balance.pulls)
+    inner = inner_of([driven.plant for driven in wrists], begin, bent, to_blocks, planes)
+    columns = (to_blocks(np.array(column, float)) for column in zip(*rows, strict=True))
+    values, stiffness, nonideals, of_faults, memories, winch, state, ends = columns
+    if planes == 1:
+        return _Lanes(values, RealTendons(stiffness, nonideals, memories, inner), winch, state, ends)
+    tendons = RealPlaces(stiffness, nonideals, of_faults, memories, inner, (0,) * places)
+    return _Lanes(values, tendons, winch, state, ends)

@@ -234,7 +234,7 @@ class Rests(NamedTuple):
             return ""
         why = why_two(study.wrist, asked_for_by(study))
         reason = f" ({why})" if " out of " in why else ""
-        return f" in two planes{reason}, bent toward {self.toward_deg:.3g} deg from ulnar,"
+        return f" in two planes{reason} toward {self.toward_deg:.3g} deg"
 
 
 def _rests(study: Study, planes: int, network: Inverse | None) -> Rests:

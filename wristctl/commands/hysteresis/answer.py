@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from wristctl.identification.friction_fit import FrictionEstimate, FrictionFit
     from wristctl.identification.loop_shape import LoopShape
     from wristctl.simulation.hysteresis import DeadBand, HysteresisLoop
-    from wristctl.simulation.spool_driven import FrictionCase
+    from wristctl.simulation.strokes import FrictionCase
 
 # Rows that a table may have; of more, those of the main coefficient of friction.
 _ROWS = 14
@@ -122,8 +122,13 @@ def _notes(fits: Sequence[FrictionFit]) -> list[str]:
     return notes
 
 
-def model_answer(driven: Sequence[HysteresisLoop], bands: Sequence[DeadBand], main: FrictionCase, more: str) -> Answer:
-    """Dead band, width and works of the wrist at its main friction, beside other coefficients and sheaths."""
+def model_answer(
+    driven: Sequence[HysteresisLoop], bands: Sequence[DeadBand], main: FrictionCase, more: str, why_two: str = ""
+) -> Answer:
+    """Dead band, width and works of the wrist at its main friction, beside other coefficients and sheaths.
+
+    `why_two` says why it bends in two planes; it is empty where it does not.
+    """
     first = driven[0].case
     outer = [loop for loop in driven if (loop.case.low, loop.case.high) == (first.low, first.high)]
     slowest = min(loop.case.frequency for loop in outer)
@@ -149,6 +154,10 @@ def model_answer(driven: Sequence[HysteresisLoop], bands: Sequence[DeadBand], ma
     if open_ := sum(drift > 0.0 for drift in [*(loop.drift for loop in driven), *(band.drift for band in bands)]):
         total = len(driven) + len(bands)
         notes.append(f"Do not rely on all of them: {open_} of {total} loops and dead bands have not converged (--all).")
+    if why_two:
+        toward = math.degrees(math.atan2(own.toward[1], own.toward[0])) % 360.0
+        aside = f"friction takes the wrist off that line by {degrees(own.aside, 3)} deg at most"
+        notes.append(f"In two planes ({why_two}), bent toward {toward:.3g} deg from ulnar; {aside}.")
     return Answer(_of_wrist(own, held.get(main)), Table("", heads, cells), notes, more)
 
 

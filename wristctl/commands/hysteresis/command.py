@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING
 from wristctl.commands.answer import Answer
 from wristctl.commands.hysteresis.answer import measured_answer, model_answer
 from wristctl.commands.hysteresis.measured import FITTED, fit_measured, problem_of, refuse_misfit
-from wristctl.commands.inputs import Inputs
+from wristctl.commands.inputs import Inputs, check_sides
 from wristctl.commands.printed_table import Table
-from wristctl.commands.procedure import Procedure
+from wristctl.commands.procedure import Procedure, no_tendons
 from wristctl.commands.results import Findings, StudyResult
 from wristctl.commands.session import Session
 from wristctl.config.study import Study
@@ -21,9 +21,10 @@ from wristctl.errors import UserError
 if TYPE_CHECKING:
     import pandas as pd
 
+    from wristctl.arrays import Array
     from wristctl.identification.friction_fit import FrictionFit
     from wristctl.simulation.hysteresis import DeadBand, HysteresisLoop
-    from wristctl.simulation.spool_driven import FrictionCase
+    from wristctl.simulation.strokes import FrictionCase
 
 
 _LOOPS = {
@@ -41,6 +42,12 @@ _LOOPS = {
     "step": ("s", "integration step that it took"),
     "drift": ("", "largest relative change of width and works with the step, at the shortest tried; 0: converged"),
 }
+_OF_A_PLACE = {
+    "given": ("m", "what this place has reeled in"),
+    "spool": ("N", "pull of all its tendons at the spool"),
+    "wrist": ("N", "pull of all its tendons at the wrist"),
+    "z": ("", "state of its bristle"),
+}
 _COURSES = {
     "loop": ("", "row of loops.csv, from 0"),
     "time": ("s", "since the range's high end"),
@@ -55,6 +62,35 @@ _COURSES = {
     "z_plus": ("", "state of the + side's bristle"),
     "z_minus": ("", "of the - side's"),
 }
+_OF_TWO_PLANES = {
+    "theta": ("rad", "bend along the direction of the loop"),
+    "bend_ulnar": ("rad", "bend toward ulnar"),
+    "bend_flexion": ("rad", "bend toward flexion"),
+}
+
+
+def _columns_of(number: int, loop: HysteresisLoop) -> dict[str, Array]:
+    """Courses of a loop by their names: of both sides in one plane, of each plane and each place in two."""
+    import numpy as np
+
+    course, two = loop.course, len(loop.toward) == 2
+    columns = {"loop": np.full(len(loop.time), number), "time": loop.time, "unhindered": loop.unhindered}
+    columns["theta"] = loop.bend
+    if two:
+        columns |= dict(zip(("bend_ulnar", "bend_flexion"), course.bends.T, strict=True))
+    names = [str(place) for place in range(1, course.spool.shape[1] + 1)] if two else ["plus", "minus"]
+    for kind in _OF_A_PLACE:
+        columns |= {f"{kind}_{name}": column for name, column in zip(names, getattr(course, kind).T, strict=True)}
+    return columns
+
+
+def _meaning_of(column: str, two: bool) -> tuple[str, str]:
+    kind, _, place = column.partition("_")
+    if place.isdigit():
+        return _OF_A_PLACE[kind]
+    return _OF_TWO_PLANES[column] if two and column in _OF_TWO_PLANES else _COURSES[column]
+
+
 _BANDS = {
     "friction": _LOOPS["friction"],
     "sheath": _LOOPS["sheath"],
@@ -90,11 +126,14 @@ class Hysteresis(StudyResult):
     def answer(self) -> Answer:
         """A measured loop's own shape and fit, else the dead band and loops of the wrist."""
         from wristctl.simulation.hysteresis import main_case
+        from wristctl.simulation.strokes import why_in_two_planes
 
         where = f", or {self.findings.run.path}/report.html" if self.findings.run else ""
         if self.fit is not None:
             return measured_answer(self.fits, self.study.wrist, f"All that was fitted: --all{where}.")
-        return model_answer(self.loops, self.dead_bands, main_case(self.study.hysteresis), f"Every loop: --all{where}.")
+        why = why_in_two_planes(self.study.wrist, self.study.hysteresis)
+        main, more = main_case(self.study.hysteresis), f"Every loop: --all{where}."
+        return model_answer(self.loops, self.dead_bands, main, more, why)
 
     @property
     def marks(self) -> list[str]:
@@ -116,21 +155,26 @@ class Hysteresis(StudyResult):
 def plan(study: Study, inputs: Inputs) -> str:
     """See that the wrist can be driven so, or that a measured loop can be read."""
     from wristctl.simulation.hysteresis import loop_cases
-    from wristctl.simulation.spool_driven import strokes
+    from wristctl.simulation.strokes import strokes, why_in_two_planes
 
     settings = study.hysteresis
     if settings.measured is not None:
+        check_sides(study.wrist, "hysteresis --measured")
+        if settings.toward_deg:
+            raise UserError("a measured loop is of one plane", "hysteresis.toward_deg", "leave it out")
         problem = problem_of(study)
         return f"{', '.join(FITTED)} from {len(problem.measured[0])} samples of {problem.loop.name}"
     strokes(study.wrist, settings)
     count, lasts = len(loop_cases(settings)), 1.5 * sum(1.0 / frequency for frequency in settings.frequencies)
-    return f"{count} loops, {lasts * count / len(settings.frequencies):.3g} simulated seconds"
+    where = " in two planes" if why_in_two_planes(study.wrist, settings) else ""
+    return f"{count} loops{where}, {lasts * count / len(settings.frequencies):.3g} simulated seconds"
 
 
 def hysteresis(session: Session) -> Hysteresis:
     """Drive the wrist through hysteresis loops, or fit friction to a measured one.
 
-    Its spools go to and fro at several speeds, over several ranges, for several frictions. Of a measured loop (an open
+    Its spools go to and fro at several speeds, over several ranges, for several frictions, in one plane or, toward any
+    direction and with any tendons, in two. Of a measured loop (an open
     log) friction of tendons and wrist, stiffness, radius and slack are found, with 95 % intervals; one that no model
     fits is refused.
     """
@@ -138,7 +182,7 @@ def hysteresis(session: Session) -> Hysteresis:
         return _of_measured(session)
     from wristctl.commands.hysteresis import figures
     from wristctl.simulation.hysteresis import dead_bands, loops, main_case
-    from wristctl.simulation.spool_driven import strokes
+    from wristctl.simulation.strokes import strokes
 
     findings, settings = session.findings, session.study.hysteresis
     driven_strokes = strokes(session.study.wrist, settings)
@@ -146,7 +190,7 @@ def hysteresis(session: Session) -> Hysteresis:
         driven = loops(driven_strokes, lambda share: advance(round(100.0 * share)))
         bands = dead_bands(driven_strokes)
     shortest = min([item.step for item in driven] + [each.step for each in bands])
-    findings.numerics(integrator="RODAS3", step=shortest, segments=settings.segments)
+    findings.numerics(integrator="RODAS3", step=shortest, segments=settings.segments, planes=driven_strokes.planes)
     open_ = _still_change(driven, bands)
     findings.metric("not_converged", open_, "", "lower", len(driven) + len(bands), meaning=_NOT_CONVERGED)
     tables = _tables(findings, driven, bands, main_case(settings))
@@ -190,13 +234,9 @@ def _write(findings: Findings, results: Hysteresis) -> None:
         }
 
     findings.table("data/loops.csv", results.frame(), *units(_LOOPS))
-    courses = [
-        {"loop": np.full(len(loop.time), number), "time": loop.time, "unhindered": loop.unhindered}
-        | loop.course._asdict()
-        for number, loop in enumerate(results.loops)
-    ]
-    columns = {name: np.concatenate([course[name] for course in courses]) for name in _COURSES}
-    findings.table("data/courses.csv", columns, *units(_COURSES))
+    courses, two = [_columns_of(*row) for row in enumerate(results.loops)], len(results.loops[0].toward) == 2
+    columns = {name: np.concatenate([course[name] for course in courses]) for name in courses[0]}
+    findings.table("data/courses.csv", columns, *units({name: _meaning_of(name, two) for name in columns}))
     if results.dead_bands:
         rows = [
             {name: getattr(band, name, None) for name in _BANDS} | band.tendons._asdict() for band in results.dead_bands
@@ -285,4 +325,4 @@ def _in_um(case: FrictionCase) -> tuple[float, float, float]:
     return case.friction, case.sheath, 1e6 * case.presliding
 
 
-HYSTERESIS = Procedure("hysteresis", plan, hysteresis)
+HYSTERESIS = Procedure("hysteresis", plan, hysteresis, in_one_plane=no_tendons)

@@ -24,8 +24,7 @@ from wristctl.plotting.style import (
     title,
 )
 from wristctl.simulation.hysteresis import DeadBand, HysteresisLoop, with_preslidings, with_sheaths
-from wristctl.simulation.spool_driven import FrictionCase, Strokes
-from wristctl.wrist.tendons import TENDONS_PER_SIDE
+from wristctl.simulation.strokes import FrictionCase, Strokes
 
 _COLOURS = (BLUE, VERMILLION, GREEN, PURPLE, ORANGE, SKY)
 _WORKS = {"friction_work": "-", "damped_work": ":", "raw_work": (0, (6, 2))}
@@ -60,27 +59,34 @@ def loops(all_strokes: Strokes, driven: Sequence[HysteresisLoop]) -> Figure:
     wrist; and by how much the angle differs from that without friction, between the roots of the statics."""
     outer, cases = _outer(driven), _some(with_sheaths(all_strokes.settings))
     picture, axes = figure(2, len(cases), height=6.2, sharey="row")
-    narrow = _narrow(cases)
+    narrow, (place, alike, name) = _narrow(cases), _pulling(all_strokes)
     for (above, below), case in zip(axes.T, cases, strict=True):
         mine = sorted((loop for loop in outer if loop.case.tendons == case), key=lambda each: each.case.frequency)
         for loop, colour in zip(mine[::-1], _COLOURS[: len(mine)][::-1], strict=False):
-            angle, label = np.degrees(loop.course.theta), f"{loop.case.frequency:g} Hz"
-            above.plot(angle, loop.course.spool_plus / TENDONS_PER_SIDE, color=colour, linewidth=1.0, label=label)
-            lag = np.degrees(loop.course.theta - loop.unhindered)
+            angle, label = np.degrees(loop.bend), f"{loop.case.frequency:g} Hz"
+            above.plot(angle, loop.course.spool[:, place] / alike, color=colour, linewidth=1.0, label=label)
+            lag = np.degrees(loop.bend - loop.unhindered)
             below.plot(np.degrees(loop.unhindered), lag, color=colour, linewidth=1.0, label=label)
         slow = mine[0]
-        at_wrist = slow.course.wrist_plus / TENDONS_PER_SIDE
-        above.plot(np.degrees(slow.course.theta), at_wrist, label="slowest, at the wrist", **DOTTED)
+        at_wrist = slow.course.wrist[:, place] / alike
+        above.plot(np.degrees(slow.bend), at_wrist, label="slowest, at the wrist", **DOTTED)
         angle = np.linspace(slow.case.low, slow.case.high, 61)
         for edge in all_strokes.exact([case] * len(angle), angle).T:
             below.plot(np.degrees(angle), np.degrees(edge - angle), label="roots of the statics", **_ROOTS)
         title(above, _heading(case, narrow))
         above.set_xlabel("angle [deg]")
         below.set_xlabel("without friction [deg]".replace(" ", "\n") if narrow else "without friction [deg]")
-    axes[0, 0].set_ylabel("tension of a + tendon [N]")
+    axes[0, 0].set_ylabel(f"tension of {name} [N]")
     axes[1, 0].set_ylabel("angle less that [deg]")
     legend_below(picture, 3)
     return picture
+
+
+def _pulling(all_strokes: Strokes) -> tuple[int, int, str]:
+    """Index of the place whose tendons bend the wrist most, number of these, and the name of one."""
+    place = int(np.argmax(all_strokes.arms))
+    name = "a + tendon" if all_strokes.planes == 1 else f"tendon {place + 1}"
+    return place, int(all_strokes.layout.multiplicity[place]), name
 
 
 _ROOTS = {"color": BLACK, "linewidth": 1.2, "linestyle": (0, (4, 2))}
@@ -141,14 +147,15 @@ def minor_loops(all_strokes: Strokes, driven: Sequence[HysteresisLoop]) -> Figur
     several = len(all_strokes.settings.preslidings) > 1 and all_strokes.settings.frictions[0] > 0.0
     cases = _some(with_preslidings(all_strokes.settings) if several else with_sheaths(all_strokes.settings))
     picture, axes = figure(1, len(cases), height=3.4, sharey=True)
+    place, alike, name = _pulling(all_strokes)
     for panel, case in zip(axes[0], cases, strict=True):
         for loop, colour in zip((one for one in slow if one.case.tendons == case), _COLOURS, strict=False):
             label = f"{np.degrees(loop.case.low):g} to {np.degrees(loop.case.high):g} deg"
-            tension = loop.course.spool_plus / TENDONS_PER_SIDE
-            panel.plot(np.degrees(loop.course.theta), tension, color=colour, linewidth=1.2, label=label)
+            tension = loop.course.spool[:, place] / alike
+            panel.plot(np.degrees(loop.bend), tension, color=colour, linewidth=1.2, label=label)
         title(panel, _heading(case, _narrow(cases)))
         panel.set_xlabel("angle [deg]")
-    axes[0, 0].set_ylabel(f"tension of a + tendon, {slowest:g} Hz [N]")
+    axes[0, 0].set_ylabel(f"tension of {name}, {slowest:g} Hz [N]")
     legend_below(picture, 4)
     return picture
 

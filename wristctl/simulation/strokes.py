@@ -1,0 +1,169 @@
+"""Strokes of spools that hold a wrist without friction along a line of bends, in one plane or in two."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from wristctl.arrays import Array
+from wristctl.config.hysteresis import HysteresisSettings
+from wristctl.config.loop import Loop, Reference
+from wristctl.config.wrist import WristParameters
+from wristctl.errors import UserError
+from wristctl.simulation.actuator import SIDES
+from wristctl.simulation.planes import Asked, why_two
+from wristctl.simulation.spool_driven import SpooledWrist
+from wristctl.wrist.compiled_model import terms
+from wristctl.wrist.segments import segments
+from wristctl.wrist.spatial.spatial_holding import FrictionOnHeld, at_rest_along, held_at, values_of
+from wristctl.wrist.spatial.spatial_kinematics import tip_bends
+from wristctl.wrist.spatial.spatial_model import spatial_terms
+from wristctl.wrist.statics import FROM_ABOVE, FROM_BELOW, HeldTendons, at_rest_with, equilibria_at
+from wristctl.wrist.tendon_layout import TendonLayout
+from wristctl.wrist.tendons import TENDONS_PER_SIDE
+
+# Step between two angles at which the statics are solved [rad]; chords between them are 1e-10 m off.
+_FINE = math.radians(0.05)
+
+
+class FrictionCase(NamedTuple):
+    """Friction of a wrist's tendons: coefficient, the sheath's angle [rad], the path in which it turns round [m]."""
+
+    friction: float
+    sheath: float
+    presliding: float
+
+
+@dataclass(frozen=True)
+class Strokes:
+    """Spools and pulls that hold a wrist without friction at angles (G,) [rad]; of a place all its tendons together.
+
+    In two planes angles are bends along a line toward a direction.
+    """
+
+    wrist: WristParameters
+    settings: HysteresisSettings
+    angle: Array
+    theta: Array
+    """Coordinates (G, q) [rad]: in one plane the segments' angles."""
+    reeled: Array
+    """(G, places) [m]"""
+    pulls: Array
+    """(G, places) [N]"""
+
+    @property
+    def winch(self) -> bool:
+        """Whether pulls are held instead of spools."""
+        return self.settings.drive == "tensions"
+
+    @property
+    def planes(self) -> int:
+        """Planes that it bends in."""
+        return len(self.theta[0]) // self.settings.segments
+
+    @property
+    def toward(self) -> Array:
+        """Direction of the bends (P,)."""
+        return np.ones(1) if self.planes == 1 else direction_of(self.settings)
+
+    @property
+    def layout(self) -> TendonLayout:
+        """Places of tendons: in one plane both sides."""
+        one_plane = self.planes == 1
+        return TendonLayout.pair_of_sides(self.wrist.tendon_offset) if one_plane else TendonLayout.of(self.wrist)
+
+    @property
+    def arms(self) -> Array:
+        """Moment arm of a tendon of each place along the line, on the straight wrist (places,) [m]."""
+        arms: Array = self.layout.cross_section[:, : self.planes] @ self.toward
+        return arms
+
+    def given(self, angle: Array) -> Array:
+        """Input of all places at angles (...): spools [m], or pulls of winches [N]; (places, ...)."""
+        course = self.pulls if self.winch else self.reeled
+        return np.stack([np.interp(angle, self.angle, place) for place in course.T])
+
+    def told(self, angle: Array) -> Array:
+        """Input of all places at angles (T, L), as `spooled` takes it: (T, places, L)."""
+        return np.moveaxis(self.given(angle), 0, 1)
+
+    def theta_at(self, angle: Array) -> Array:
+        """Coordinates at angles (...), (..., q)."""
+        return np.stack([np.interp(angle, self.angle, column) for column in self.theta.T], axis=-1)
+
+    def lane(self, tendons: FrictionCase, begin: float) -> SpooledWrist:
+        """A wrist that rests at this angle [rad] at first."""
+        at, actuator = self.theta_at(np.array(begin)), self.settings.actuator(*tendons)
+        return SpooledWrist(self.wrist, actuator, at, self.winch, planes=self.planes)
+
+    def along(self, bends: Array) -> Array:
+        """Bend along the line [rad], of bends of each plane (..., P)."""
+        return bends[..., 0] if self.planes == 1 else bends @ self.toward
+
+    def exact(self, tendons: Sequence[FrictionCase], angle: Array) -> Array:
+        """Angles at rest from below and from above (B, 2) [rad] where without friction they are `angle` (B,)."""
+        friction, sheath, _ = np.array(tendons, float).T
+        given, guess, n = self.given(angle).T, self.theta_at(angle), self.settings.segments
+        stiffness = 0.0 if self.winch else self.settings.tendon_stiffness
+        if self.planes == 1:
+            values = np.tile(segments(self.wrist, n), (len(angle), 1))
+            held = HeldTendons(given, np.full(len(angle), TENDONS_PER_SIDE * stiffness), friction, sheath)
+            ends = [at_rest_with(values, held, z, guess).sum(axis=1) for z in (FROM_BELOW, FROM_ABOVE)]
+        else:
+            alike = None if self.winch else stiffness * self.layout.multiplicity.astype(float)
+            on_held, way = FrictionOnHeld(given, alike, friction, sheath), np.tile(self.toward, n) * np.ones_like(guess)
+            rests = [at_rest_along(self.wrist, n, on_held, side * way, guess) for side in (1.0, -1.0)]
+            ends = [self.along(tip_bends(rest)) for rest in rests]
+        return np.stack(ends, axis=1)
+
+
+def direction_of(settings: HysteresisSettings) -> Array:
+    """Direction of bends in two planes (2,), toward ulnar and toward flexion."""
+    angle = math.radians(settings.toward_deg)
+    return np.array([math.cos(angle), math.sin(angle)])
+
+
+def why_in_two_planes(wrist: WristParameters, settings: HysteresisSettings) -> str:
+    """Why a wrist on its spools bends in two planes, in words; empty where it stays in one.
+
+    Raises UserError for places of tendons that are no layout.
+    """
+    if settings.toward_deg:
+        return f"its bends go toward {settings.toward_deg:g} deg from ulnar"
+    return why_two(wrist, [Asked(Loop(), Reference(kind="step"), "ulnar")])
+
+
+def strokes(wrist: WristParameters, settings: HysteresisSettings) -> Strokes:
+    """Strokes over all angles of all ranges. Raises UserError where the wrist cannot be held there."""
+    ends = np.radians(settings.ranges_deg)
+    angle = np.linspace(ends.min(), ends.max(), 1 + math.ceil(float(np.ptp(ends)) / _FINE))
+    if math.degrees(float(np.abs(angle).max())) > wrist.range_deg:
+        problem = f"a loop goes beyond the wrist's range, {wrist.range_deg:g} deg"
+        raise UserError(problem, "hysteresis.ranges_deg", "smaller ranges")
+    if why_in_two_planes(wrist, settings):
+        alike = TendonLayout.of(wrist).multiplicity.astype(float)
+        held = held_at(wrist, settings.segments, angle[:, None] * direction_of(settings))
+        theta, pulls, stable = held
+        values = values_of(wrist, settings.segments)
+        straight, lengths = _lengths(values, 0.0 * theta[:1]), _lengths(values, theta)
+    else:
+        alike = np.array(SIDES)
+        values = np.tile(segments(wrist, settings.segments), (len(angle), 1))
+        theta, pulls, stable = equilibria_at(values, settings.segments, angle, TENDONS_PER_SIDE * wrist.pretension)
+        straight = np.full(2, wrist.length)
+        lengths = terms(values, theta, 0.0 * theta).tendon_lengths.sum(axis=1)
+    if settings.drive == "tensions" and not stable.all():
+        raise UserError("the wrist buckles on held pulls", "hysteresis.drive", "drive: spools, or a lighter hand")
+    most = float((pulls / alike).max())
+    if most > wrist.tension_limit:
+        problem = f"it takes {most:.3g} N a tendon, above wrist.tension_limit ({wrist.tension_limit:g} N)"
+        raise UserError(problem, "hysteresis.ranges_deg", "smaller ranges")
+    reeled = pulls / (alike * settings.tendon_stiffness) + straight - lengths
+    return Strokes(wrist, settings, angle, theta, reeled, pulls)
+
+
+def _lengths(values: Array, q: Array) -> Array:
+    lengths: Array = spatial_terms(values, q, 0.0 * q).lengths
+    return lengths
