@@ -23,7 +23,7 @@ from wristctl.comparison.bootstrap import LEVEL, GeometricMean, paired_ratio, pe
 from wristctl.comparison.world_ranking import world_scores
 from wristctl.config.study import Study
 from wristctl.control.table import controller
-from wristctl.gym import OBSERVED, WristVectorEnv
+from wristctl.gym import WristVectorEnv
 from wristctl.seeds import stream
 from wristctl.simulation.cases import Measured, measure
 from wristctl.simulation.drawn_worlds import drawn_cases
@@ -38,7 +38,6 @@ EXPERIMENTS = HERE.parent / "experiments"
 RIG, WORLDS, MINUTES, COUNT = "camera", 240, 15.0, 256
 ALIKE = ("plant_segments", "plant.model")
 """What environments that step together cannot draw: every wrist here bends in four segments."""
-REFERENCE = [each.name for each in OBSERVED].index("theta_ref")
 RIVALS = ("pid", "smc", "pid-ff")
 """The controllers that are tuned beside it: the paper's two, and the ladder's that integrates."""
 
@@ -47,7 +46,7 @@ class Wrists(VecEnv):
     """wristctl's environments as Stable-Baselines3 has them: an episode's end shows its last sight, and begins anew."""
 
     def __init__(self, env: WristVectorEnv) -> None:
-        self.env, self.actions = env, np.zeros((env.num_envs, 1))
+        self.env, self.actions = env, np.zeros_like(env.action_space.sample())
         super().__init__(env.num_envs, env.single_observation_space, env.single_action_space)
 
     def reset(self) -> Any:
@@ -149,17 +148,22 @@ def judged(study: Study, policy: Learnt) -> Measured:
     cases = drawn_cases(family, RIG, "test", study.seed, WORLDS, study.wrist)
     env = WristVectorEnv(len(cases), study, RIG, split="test")
     seen, told = env.reset(seed=study.seed)
-    courses, references, failed = [told["theta"]], [seen[:, REFERENCE]], told["failed"]
+    wanted_at = [number for number, each in enumerate(env.observed) if each.name.startswith("theta_ref")]
+    courses, references, failed = [told["theta"]], [seen[:, wanted_at]], told["failed"]
     ended = np.zeros(env.num_envs, bool)
     while not ended.any():
         actions, _ = policy.model.predict(policy.sight.normalize_obs(seen), deterministic=True)
         seen, _, _, ended, told = env.step(np.asarray(actions, np.float64))
         courses.append(told["theta"])
-        references.append(seen[:, REFERENCE])
+        references.append(seen[:, wanted_at])
         failed = failed | told["failed"]
-    theta, wanted, step = np.array(courses).T, np.array(references).T, family.loop.control_period
-    rmse = np.sqrt(np.mean((theta - wanted) ** 2, axis=1))
-    left = oscillations(theta, wanted, np.arange(len(theta)), step)
+    count, step = len(courses), family.loop.control_period
+    bends, wished = (
+        np.array(rows).reshape(count, env.num_envs, -1).transpose(2, 1, 0) for rows in (courses, references)
+    )
+    rmse = np.sqrt(np.square(bends - wished).sum(axis=0).mean(axis=1))
+    swings = [oscillations(*plane, np.arange(env.num_envs), step) for plane in zip(bends, wished, strict=True)]
+    left = np.max(swings, axis=0)
     nothing, rests = np.zeros((1, len(cases))), np.array([case.rests for case in cases])
     found = {"rmse": rmse[None], "oscillation": np.where(failed, np.nan, left)[None], "drift": nothing}
     return Measured(found, failed[None], nothing + 1.0, rests)

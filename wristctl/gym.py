@@ -1,7 +1,8 @@
 """gymnasium's environments over the closed loops of a study (extra `gym`): one wrist, or many at once.
 
-An episode is one motion of the horizon's length. The action is the torque that a law would want; the observation is
-what a law sees, behind a camera the observer's estimate and never the plant's truth. docs/gym.md has it all.
+An episode is one motion of the horizon's length, in the planes that it bends in. The action is the torque that a law
+would want in each plane, or the tension of each tendon; the observation is what a law sees, behind a camera the
+observer's estimate and never the plant's truth. docs/gym.md has it all.
 
     import wristctl, wristctl.gym
 
@@ -24,7 +25,7 @@ from wristctl.errors import UserError, meant
 
 if TYPE_CHECKING:
     from wristctl.simulation.cases import Case
-    from wristctl.simulation.stepped_loops import SteppedLoops
+    from wristctl.simulation.stepped_loops import Given, SteppedLoops
     from wristctl.wrist.kinematics import Inverse
 
 try:
@@ -50,7 +51,7 @@ class Observed(NamedTuple):
 
 
 OBSERVED = (
-    Observed("theta", "rad", "bending angle as measured, behind a camera as the observer estimates it", 2.0 * math.pi),
+    Observed("theta", "rad", "bend as measured, behind a camera as the observer estimates it", 2.0 * math.pi),
     Observed("rate", "rad/s", "its rate, likewise", 100.0),
     Observed("theta_ref", "rad", "the reference", 2.0 * math.pi),
     Observed("rate_ref", "rad/s", "its rate", 100.0),
@@ -59,42 +60,74 @@ OBSERVED = (
     Observed("torque_high", "N m", "largest torque that the tendons can give here", 100.0),
     Observed("load", "N m", "load torque as the observer estimates it; 0 where sensors are ideal", 100.0),
 )
-"""Signals of an observation, in their order."""
+"""Signals of an observation in one plane, in their order."""
 
 SCALE = math.radians(10.0)
 """Error [rad] at which a step costs 1."""
 
-_BOUND = np.array([each.bound for each in OBSERVED])
+
+def observed_in(planes: int) -> tuple[Observed, ...]:
+    """Signals of an observation in so many planes: in two those toward ulnar, then those toward flexion."""
+    from wristctl.simulation.trajectory import PLANES
+
+    if planes == 1:
+        return OBSERVED
+    return tuple(
+        Observed(f"{each.name}_{plane}", each.unit, f"{each.meaning}, {plane}", each.bound)
+        for plane in PLANES
+        for each in OBSERVED
+    )
 
 
 class _Episodes:
     """The episodes of a study's loop or family, so many at a time: each number is a world, a motion and its noise."""
 
-    def __init__(self, study: Study | None, family: str, split: str, count: int, network: Inverse | None) -> None:
+    def __init__(
+        self, study: Study | None, family: str, split: str, count: int, network: Inverse | None, actions: Given
+    ) -> None:
         from wristctl.control.law import NOW
-        from wristctl.simulation.stepped_loops import largest_torque
+        from wristctl.simulation.drawn_worlds import asked_of
+        from wristctl.simulation.planes import Asked, planes_of
+        from wristctl.simulation.stepped_loops import largest_torque, places_of
         from wristctl.simulation.worlds import loop_facing
 
         self.study, self.family, self.split = study or Study(), family, split
         if family and family not in self.study.families:
             fix = meant(family, self.study.families) if self.study.families else "families: in the study"
             raise UserError(f"no family {family!r}", "family", fix)
+        if actions not in ("torques", "tensions"):
+            raise UserError(f"no actions are {actions!r}", "actions", meant(actions, ("torques", "tensions")))
         simulated = self.study.simulate
         self.wrist, self.loop = self.study.wrist, self.study.families[family].loop if family else simulated.loop
-        if not family:
+        drawn = asked_of(self.study.families[family]) if family else []
+        asked = drawn or [Asked(simulated.loop, simulated.reference, simulated.direction)]
+        self.planes = planes_of(self.wrist, asked)
+        if not family and self.planes == 1:
             self.wrist, self.loop = loop_facing(self.wrist, self.loop, simulated.direction)
         if not self.loop.limits:
-            raise UserError("without limits no torque is the largest", "loop.limits", "loop.limits: true")
+            raise UserError(f"without limits no {actions[:-1]} is the largest", "loop.limits", "loop.limits: true")
         self.count, self.network, self.seed, self.next = count, network, self.study.seed, 0
+        self.actions, self.observed = actions, observed_in(self.planes)
         self.picked = [NOW.index(each.name) for each in OBSERVED]
-        self.torque = 2.0 ** math.ceil(math.log2(largest_torque(self.wrist)))
-        self.action_space = Box(-1.0, 1.0, (1,), np.float64)
-        self.observation_space = Box(-_BOUND, _BOUND, dtype=np.float64)
+        torques = actions == "torques"
+        most = largest_torque(self.wrist, self.planes) if torques else self.wrist.tension_limit
+        self.largest = 2.0 ** math.ceil(math.log2(most))
+        entries = self.planes if torques else places_of(self.wrist, self.planes)
+        self.action_space = Box(-1.0 if torques else 0.0, 1.0, (entries,), np.float64)
+        self.bound = np.array([each.bound for each in self.observed])
+        self.observation_space = Box(-self.bound, self.bound, dtype=np.float64)
         self.loops: SteppedLoops | None = None
         self.warned = False
 
+    @property
+    def torque(self) -> float:
+        """Torque of an action of 1 [N m]. Raises UserError where actions are tensions."""
+        if self.actions != "torques":
+            raise UserError("these actions are tensions", "torque", "largest, the tension of an action of 1")
+        return self.largest
+
     def begin(self, seed: int | None) -> tuple[Array, Array, Any]:
-        """The next episodes, or with a seed the first under it: observations, true angles, and who has failed."""
+        """The next episodes, or with a seed the first under it: observations, true bends, and who has failed."""
         from wristctl.simulation.closed_loop import equilibrium
         from wristctl.simulation.stepped_loops import SteppedLoops
 
@@ -102,9 +135,10 @@ class _Episodes:
             self.seed, self.next = seed, 0
         cases = self._cases(self.next)
         self.next += self.count
-        start = equilibrium(self.loop) if not self.family and self.study.simulate.start == "equilibrium" else None
+        rests = not self.family and self.study.simulate.start == "equilibrium"
+        start = equilibrium(self.loop, self.planes) if rests else None
         try:
-            self.loops = SteppedLoops(cases, self.wrist, start)
+            self.loops = SteppedLoops(cases, self.wrist, start, self.actions)
         except ValueError as error:
             what = f"the worlds of {self.family} cannot be stepped together: {error}"
             raise UserError(
@@ -113,16 +147,16 @@ class _Episodes:
         return self._seen()[:3]
 
     def step(self, actions: Array) -> tuple[Array, Array, Any, Array]:
-        """After a sample with these actions (count,): observations, true angles, who has failed, and rewards."""
+        """After a sample with these actions (count, A): observations, true bends, who has failed, and rewards."""
         if self.loops is None or self.loops.done:
             raise gymnasium.error.ResetNeeded("reset before the first step, and after an episode's end")
         if not np.isfinite(actions).all():
             raise UserError("an action that is no number", "step(action)", "a finite one")
-        self.loops.step(self.torque * actions)
+        self.loops.step(self.largest * actions)
         return self._seen()
 
     def truth(self, theta: Array, failed: Any) -> dict[str, Any]:
-        """Entries of `info`, (count,) each; at an episode's end also whether its integration step is in doubt."""
+        """Entries of `info`, of each episode; at its end also whether its integration step is in doubt."""
         told = {"theta": theta, "failed": failed}
         if self.loops is None or not self.loops.done:
             return told
@@ -135,18 +169,22 @@ class _Episodes:
         return {**told, "in_doubt": doubtful, "substeps": steps}
 
     def _seen(self) -> tuple[Array, Array, Any, Array]:
+        from wristctl.simulation.trajectory import size_of
+
         assert self.loops is not None
         sight = self.loops.look()
-        error = np.where(sight.failed, 2.0 * sight.limit, sight.theta - sight.reference)
-        observed = np.clip(np.nan_to_num(sight.signals[:, self.picked]), -_BOUND, _BOUND)
-        return observed, sight.theta.copy(), sight.failed, -((error / SCALE) ** 2)
+        error = np.where(sight.failed, 2.0 * sight.limit, size_of(sight.bend - sight.reference))
+        signals = sight.signals[..., self.picked].reshape(self.count, -1)
+        observed = np.clip(np.nan_to_num(signals), -self.bound, self.bound)
+        theta = sight.bend[:, 0] if self.planes == 1 else sight.bend
+        return observed, theta.copy(), sight.failed, -((error / SCALE) ** 2)
 
     def _cases(self, first: int) -> Sequence[Case]:
         from wristctl.config.loop import sample_period
         from wristctl.simulation.cases import Case
         from wristctl.simulation.closed_loop import scenario_of
         from wristctl.simulation.drawn_worlds import drawn_cases
-        from wristctl.simulation.reference import motion, toward
+        from wristctl.simulation.planes import motion_in
         from wristctl.simulation.worlds import Draws, loops_of
 
         if self.family:
@@ -159,9 +197,10 @@ class _Episodes:
             )  # fmt: skip
             return drawn[skipped : skipped + self.count]
         chosen, draws = self.study.simulate, Draws(self.seed, self.split)
-        reference, numbers = toward(chosen.reference, chosen.direction), range(first, first + self.count)
-        period = sample_period(self.loop.control_period)
-        followed = motion(reference, self.wrist, chosen.horizon, period, self.network)
+        numbers, period = range(first, first + self.count), sample_period(self.loop.control_period)
+        followed = motion_in(
+            self.planes, chosen.reference, chosen.direction, self.wrist, chosen.horizon, period, self.network
+        )
         scenario = scenario_of(chosen.reference, chosen.direction)
         loops = loops_of(self.loop, [draws.plant(number) for number in numbers])
         return [Case(loop, followed, draws.camera(scenario, k), 0) for loop, k in zip(loops, numbers, strict=True)]
@@ -170,27 +209,46 @@ class _Episodes:
 class WristEnv(gymnasium.Env[Array, Array]):
     """One closed loop of a study: its `simulate` section's, or with `family` the worlds of a family one after another.
 
-    Observation (8,): OBSERVED. Action (1,): the torque that is wanted until the next step, a control period (1 ms where
-    that is shorter) later, as a share of `torque` [N m]; what tendons cannot give is cut off. Reward: -(e / 10 deg)^2,
-    e being the true angle's error; once the wrist has left its range, with e both ends of the range apart. An episode
-    lasts the horizon (truncated); a wrist that has failed stays where it was till then.
+    It bends in P planes: the planes of the section's loop, or two where any world of the family leaves its plane.
+    Observation (8 P,): `observed`. Action (P,): the torque that is wanted in each plane until the next step, a control
+    period (1 ms where that is shorter) later, as a share of `largest` [N m]. With `actions="tensions"` it is (T,): the
+    tension of a tendon at each place, in one plane of each side, as a share of `largest` [N]. What tendons cannot give
+    is cut off. Reward: -(e / 10 deg)^2, e being the size of the true bend's error; once the wrist has left its range,
+    with e both ends of the range apart. An episode lasts the horizon (truncated); a wrist that has failed stays where
+    it was till then.
 
     Episode k under a seed (the study's where reset is given none) is repetition or case k of `split`: `learn`'s are its
     own; `judged` (`test` of a family) are those that `simulate` (`compare`) judges by. `info` has the truth: theta
-    [rad], failed; at an episode's end also `in_doubt`, whether its integration step may have been too long for these
-    actions, and `substeps`, how many in a control period are likely to do. Raises UserError for an unknown family, a
-    loop without limits, and what the study cannot be.
+    [rad], in two planes (2,), and failed; at an episode's end also `in_doubt`, whether its integration step may have
+    been too long for these actions, and `substeps`, how many in a control period are likely to do. Raises UserError for
+    an unknown family, other actions, a loop without limits, and what the study cannot be.
     """
 
     def __init__(
-        self, study: Study | None = None, family: str = "", split: str = "learn", network: Inverse | None = None
+        self,
+        study: Study | None = None,
+        family: str = "",
+        split: str = "learn",
+        network: Inverse | None = None,
+        actions: Given = "torques",
     ) -> None:
-        self._episodes = _Episodes(study, family, split, 1, network)
+        self._episodes = _Episodes(study, family, split, 1, network, actions)
         self.observation_space, self.action_space = self._episodes.observation_space, self._episodes.action_space
 
     @property
+    def observed(self) -> tuple[Observed, ...]:
+        """Signals of an observation, in their order."""
+        return self._episodes.observed
+
+    @property
+    def largest(self) -> float:
+        """Torque [N m] or tension [N] of an action of 1: the power of two above all that tendons give or bear, so that
+        it divides exactly."""
+        return self._episodes.largest
+
+    @property
     def torque(self) -> float:
-        """Torque of an action of 1 [N m]: the power of two above all that tendons give, so that it divides exactly."""
+        """Torque of an action of 1 [N m]. Raises UserError where actions are tensions."""
         return self._episodes.torque
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Array, dict[str, Any]]:
@@ -200,13 +258,15 @@ class WristEnv(gymnasium.Env[Array, Array]):
         return observed[0], self._told(theta, failed)
 
     def step(self, action: Array) -> tuple[Array, float, bool, bool, dict[str, Any]]:
-        """Hold an action (1,) until the next sample; UserError for one that is no number."""
-        observed, theta, failed, reward = self._episodes.step(np.asarray(action, np.float64).reshape(1))
+        """Hold an action until the next sample; UserError for one that is no number."""
+        shares = np.asarray(action, np.float64).reshape(1, *self._episodes.action_space.shape)
+        observed, theta, failed, reward = self._episodes.step(shares)
         assert self._episodes.loops is not None
         return observed[0], float(reward[0]), False, self._episodes.loops.done, self._told(theta, failed)
 
     def _told(self, theta: Array, failed: Any) -> dict[str, Any]:
-        return {name: values[0].item() for name, values in self._episodes.truth(theta, failed).items()}
+        told = {name: values[0] for name, values in self._episodes.truth(theta, failed).items()}
+        return {name: value if isinstance(value, np.ndarray) else value.item() for name, value in told.items()}
 
 
 class WristVectorEnv(VectorEnv[Array, Array, Array]):
@@ -223,14 +283,25 @@ class WristVectorEnv(VectorEnv[Array, Array, Array]):
         family: str = "",
         split: str = "learn",
         network: Inverse | None = None,
+        actions: Given = "torques",
     ) -> None:
         self.metadata = {"autoreset_mode": AutoresetMode.NEXT_STEP}
-        self._episodes = _Episodes(study, family, split, num_envs, network)
+        self._episodes = _Episodes(study, family, split, num_envs, network, actions)
         self.num_envs = num_envs
         self.single_observation_space = self._episodes.observation_space
         self.single_action_space = self._episodes.action_space
         self.observation_space = batch_space(self.single_observation_space, num_envs)
         self.action_space = batch_space(self.single_action_space, num_envs)
+
+    @property
+    def observed(self) -> tuple[Observed, ...]:
+        """Signals of an observation, as WristEnv's."""
+        return self._episodes.observed
+
+    @property
+    def largest(self) -> float:
+        """Torque [N m] or tension [N] of an action of 1, as WristEnv's."""
+        return self._episodes.largest
 
     @property
     def torque(self) -> float:
@@ -244,12 +315,12 @@ class WristVectorEnv(VectorEnv[Array, Array, Array]):
         return observed, self._told(theta, failed)
 
     def step(self, actions: Array) -> tuple[Array, Array, Any, Any, dict[str, Any]]:
-        """Hold actions (num_envs, 1) until the next sample; UserError for one that is no number."""
+        """Hold actions (num_envs, A) until the next sample; UserError for one that is no number."""
         never = np.zeros(self.num_envs, bool)
         if self._episodes.loops is not None and self._episodes.loops.done:
             observed, info = self.reset()
             return observed, np.zeros(self.num_envs), never, never.copy(), info
-        shares = np.asarray(actions, np.float64).reshape(self.num_envs)
+        shares = np.asarray(actions, np.float64).reshape(self.num_envs, *self._episodes.action_space.shape)
         observed, theta, failed, reward = self._episodes.step(shares)
         assert self._episodes.loops is not None
         ended = np.full(self.num_envs, self._episodes.loops.done)

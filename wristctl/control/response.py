@@ -7,8 +7,9 @@ from typing import Any, NamedTuple
 
 from wristctl.control.belief import Reached, coupled, coupling, miss, moment_arms_at, reach, share_out, torque_of
 from wristctl.control.law import NOW, REFERENCE, now_at, wrist_at
-from wristctl.lanes.compiled import compiled, spelled_out
-from wristctl.lanes.lane import zero_like
+from wristctl.lanes.compiled import by_type, compiled, implements, spelled_out
+from wristctl.lanes.functions import clip
+from wristctl.lanes.lane import where, zero_like
 from wristctl.lanes.rows import beyond, lanes_like, rows_at, rows_of
 
 _THETA, _RATE, _THETA_REF, _RATE_REF, _ACCELERATION_REF, _LOW, _HIGH, _PERIOD, _LOAD, _WITHHELD = range(len(NOW))
@@ -141,11 +142,57 @@ def respond(
     its part, it is told at the next tick, by `seen.missed`.
     """
     perceive(control, known, seen, limits, room, since, period)
+    return answer(control.law, control, known, limits, room, pulls, seen.missed)
+
+
+class GivenTorques(NamedTuple):
+    """In the place of a law: the torque that is wanted in each plane [N m] stands in the place of its gains."""
+
+
+class GivenTensions(NamedTuple):
+    """In the place of a law: the tension of one tendon at each place [N] stands in the place of its gains."""
+
+
+@by_type
+def answer(law: Any, control: Any, known: Any, limits: Any, room: Any, pulls: Any, missed: Any) -> Any:
+    """Write the pulls (T rows) [N] that answer what has been perceived, and return the share that `respond` does."""
+    raise NotImplementedError("compiled code only")
+
+
+@implements(answer, None)
+def _by_law(law: Any, control: Any, known: Any, limits: Any, room: Any, pulls: Any, missed: Any) -> Any:
     wanted_torques(control, room.arms, limits, room.wanted)
     for p in range(len(room.bend)):
         room.wanted[p] = coupled(known.coupling, room.wanted[p], room.extra[p])
+    return _allocated(known, limits, room, pulls, missed)
+
+
+@implements(answer, GivenTorques)
+def _by_torques(law: Any, control: Any, known: Any, limits: Any, room: Any, pulls: Any, missed: Any) -> Any:
+    torques = rows_of(control.gains)
+    for p in range(len(room.bend)):
+        room.wanted[p] = coupled(known.coupling, torques[p], room.extra[p])
+    return _allocated(known, limits, room, pulls, missed)
+
+
+@implements(answer, GivenTensions)
+def _by_tensions(law: Any, control: Any, known: Any, limits: Any, room: Any, pulls: Any, missed: Any) -> Any:
+    tensions, share = rows_of(control.gains), 1.0 + zero_like(limits.least[0])
+    for t in range(len(pulls)):
+        pull, least, greatest = known.alike[t] * tensions[t], limits.least[t], limits.greatest[t]
+        pulls[t] = clip(pull, least, greatest)
+        share = where((pull < least) | (pull > greatest), 0.0, share)
+    torque_of(room.arms, pulls, room.torque)
+    for p in range(len(room.bend)):
+        room.wanted[p] = room.torque[p]
+    return share
+
+
+@compiled
+def _allocated(known: Any, limits: Any, room: Any, pulls: Any, missed: Any) -> Any:
+    """Write the pulls that give the wanted torques, and what is missed of these; return the share that they give."""
     reached = Reached(room.extra, room.low, room.high, limits)
     share = share_out(known.wrist, room.arms, room.wanted, reached, pulls)
     torque_of(room.arms, pulls, room.torque)
-    miss(known.wrist, room.wanted, room.torque, reached, seen.missed)
+    miss(known.wrist, room.wanted, room.torque, reached, missed)
     return share
