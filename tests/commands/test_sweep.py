@@ -291,3 +291,49 @@ def test_controllers_that_are_swept_take_their_own_gains_of_one_tuning(tmp_path:
         assert rows[name] == pytest.approx(alone, rel=1e-12)
     with pytest.raises(UserError, match="no tuned gains of smc"):
         wristctl.simulate(swept(base, "simulate.controller=pid-ff,smc"), tuned=tuned)
+
+
+CIRCLE = (
+    "simulate.reference={kind: circumduction, angle_deg: 20, duration: 0.4}", "simulate.horizon=0.8",
+    "simulate.loop.plant_segments=1", "simulate.controller=pid-ff", "simulate.gains=hardware",
+)  # fmt: skip
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("key", "values", "others"),
+    [
+        ("wrist.stiffness", ("0.8", "1.4"), ("wrist.tendons=three",)),
+        ("wrist.tendons", ("three", "four"), ()),
+        ("wrist.tendon_radius", ("0.015", "0.02"), ("wrist.tendons=three", "simulate.loop.sensor.level=camera")),
+        ("simulate.loop.plant.stiffness_spread", ("0.1", "0.3"), ("simulate.repetitions=2",)),
+        ("simulate.loop.plant.actuator.broken_tendon", ("1", "3"), ("simulate.loop.plant.actuator.broken_at=0.3",)),
+    ],
+)
+def test_a_point_in_two_planes_is_the_rollout_that_simulate_makes_there(
+    key: str, values: tuple[str, str], others: tuple[str, ...]
+) -> None:
+    study = wristctl.load_study(None, *CIRCLE, *others)
+    table = wristctl.simulate(swept(study, f"{key}={','.join(values)}")).frame()
+    for number, value in enumerate(values):
+        alone = wristctl.simulate(wristctl.load_study(None, *CIRCLE, *others, f"{key}={value}"))
+        rows = table[table["point"] == number]
+        for name in ("rmse", "rmse_ulnar", "rmse_flexion", "largest_error", "chattering", "oscillation", "energy"):
+            found = alone.repeated.metrics[name].tolist()
+            assert rows[name].to_list() == pytest.approx(found, rel=1e-12, nan_ok=True), name
+        assert rows["failed"].to_list() == alone.repeated.failed.tolist()
+        marks = [mark for mark in alone.marks if mark != "does not arrive"]  # of a motion that rests, in a sweep
+        assert set(rows["fate"]) == {", ".join(marks)}
+
+
+@pytest.mark.slow
+def test_points_of_one_plane_and_of_two_stand_in_one_table() -> None:
+    """What lies aside of the motion's plane takes only its own points out of it."""
+    study = wristctl.load_study(None, *FAST)
+    table = wristctl.simulate(swept(study, "wrist.gravity_flexion=0,9.81", "wrist.tendons=four,five")).frame()
+    aside = table["wrist.gravity_flexion"] > 0.0
+    assert table["rmse_flexion"].isna().to_list() == (~aside).to_list() and table["rmse"].notna().all()
+    for gravity in ("0", "9.81"):
+        alone = at(f"wrist.gravity_flexion={gravity}").repeated.metrics["rmse"]
+        here = table[(table["wrist.gravity_flexion"] == float(gravity)) & (table["wrist.tendons"] == "four")]
+        assert here["rmse"].to_list() == pytest.approx(alone.tolist(), rel=1e-12)

@@ -156,10 +156,13 @@ def equilibrium(loop: Loop, planes: int = 1) -> Start:
     return lambda plant: model.rest(plant, n, (plant.pretension, plant.pretension))
 
 
-def asked_of(study: Study, period: float, network: Inverse | None = None) -> tuple[WristParameters, Loop, Motion]:
+def asked_of(
+    study: Study, period: float, network: Inverse | None = None, later: bool = False
+) -> tuple[WristParameters, Loop, Motion]:
     """Wrist, loop and motion, on the grid of `period` [s], of the study's `simulate` section.
 
-    In one plane they are as its direction's plane sees them. Raises UserError for what no such loop has.
+    In one plane they are as its direction's plane sees them; `later` is as `motion_in` has it. Raises UserError for
+    what no such loop has.
     """
     chosen, wrist, loop = study.simulate, study.wrist, study.simulate.loop
     planes = planes_of(wrist, [Asked(loop, chosen.reference, chosen.direction)])
@@ -167,7 +170,7 @@ def asked_of(study: Study, period: float, network: Inverse | None = None) -> tup
         wrist, loop = loop_facing(wrist, loop, chosen.direction)
     else:
         check_two_planes([World(loop, wrist)])
-    motion = motion_in(planes, chosen.reference, chosen.direction, wrist, chosen.horizon, period, network)
+    motion = motion_in(planes, chosen.reference, chosen.direction, wrist, chosen.horizon, period, network, later)
     return wrist, loop, motion
 
 

@@ -96,14 +96,15 @@ def at_rest(course: Trajectory) -> bool:
     return len(course.time) >= samples and not np.ptp(course.bend_ref[-samples:], axis=0).any()
 
 
-def chatter(variation: ArrayLike, tension_range: ArrayLike, places: int = 2) -> Array:
+def chatter(variation: ArrayLike, tension_range: ArrayLike, places: ArrayLike = 2) -> Array:
     """Frequency of tensions between their limits [1/s], where that is faster than any wrist follows; else 0.
 
     `variation` [N/s] is that of one tendon of each of so many places together, the metric `chattering`; in one plane
     the places are two sides. `tension_range` [N] is the wrist's, from pretension to limit, also where a loop's tensions
     have no limit. What lies near: docs/chattering.md.
     """
-    rate = np.asarray(variation, float) / (2.0 * places * np.asarray(tension_range, float))  # to and fro
+    to_and_fro = 2.0 * np.asarray(places, float) * np.asarray(tension_range, float)
+    rate = np.asarray(variation, float) / to_and_fro
     return np.where(rate > FASTEST, rate, 0.0)
 
 

@@ -88,15 +88,17 @@ def motion_in(
     horizon: float,
     period: float,
     network: Inverse | None = None,
+    later: bool = False,
 ) -> Motion:
     """The motion of a reference in so many planes, on the grid of `period` [s] over the horizon [s].
 
-    In one plane the wrist is as this direction's plane sees it. Without a direction the reference is taken as it is, in
-    two planes toward ulnar where it has no plane of its own. Raises UserError for one out of reach.
+    In one plane the wrist is as this direction's plane sees it, and `later` works the course out when it is asked for.
+    Without a direction the reference is taken as it is, in two planes toward ulnar where it has no plane of its own.
+    Raises UserError for one out of reach.
     """
     if planes == 1:
         directed = reference if direction is None else toward(reference, direction)
-        return motion(directed, wrist, horizon, period, network)
+        return motion(directed, wrist, horizon, period, network, later)
     way = _direction(reference, direction)
     return Motion.of_bends(bends_of(reference, way, wrist, horizon, period), period, wrist.length)
 

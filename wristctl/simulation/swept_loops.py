@@ -17,15 +17,16 @@ from wristctl.seeds import Entropy
 from wristctl.simulation.arrival import SHORT
 from wristctl.simulation.batch import Start
 from wristctl.simulation.cases import AT_ONCE, at_most, at_once
-from wristctl.simulation.closed_loop import equilibrium, scenario_of
-from wristctl.simulation.metrics import METRICS
+from wristctl.simulation.closed_loop import asked_of, equilibrium, scenario_of
+from wristctl.simulation.metrics import metrics_in
 from wristctl.simulation.motion import Motion
 from wristctl.simulation.oscillation import LIMIT_CYCLE, REST, chatter
 from wristctl.simulation.outcome import Outcome
-from wristctl.simulation.reference import motion, toward
 from wristctl.simulation.repetitions import MARKS, STRAIN
 from wristctl.simulation.rollout import rollout, structure
-from wristctl.simulation.worlds import Draws, is_random, loop_facing, loops_of
+from wristctl.simulation.trajectory import size_of
+from wristctl.simulation.worlds import Draws, is_random, loops_of
+from wristctl.wrist.tendon_layout import TendonLayout
 
 
 class SweptLoop(NamedTuple):
@@ -44,16 +45,20 @@ class SweptLoop(NamedTuple):
     @property
     def kind(self) -> tuple[object, ...]:
         """Properties that loops in the lanes of one batch have in common."""
-        return self.law.name, *structure(self.loop), len(self.motion.time), self.at_rest
+        layout = None if self.motion.planes == 1 else TendonLayout.of(self.wrist)
+        return self.law.name, *structure(self.loop), len(self.motion.time), self.at_rest, layout
 
 
 class SweptMetrics(NamedTuple):
     """Metrics of rollouts, (count,) each."""
 
     metrics: dict[str, Array]
+    """Those of each plane are nan of loops in one."""
     failed: NDArray[np.bool_]
     until: Array
     """When each was last within its range [s]."""
+    places: NDArray[np.int64]
+    """Places of tendons of each loop: in one plane its two sides."""
 
 
 def swept_loops(study: Study) -> list[SweptLoop]:
@@ -62,10 +67,8 @@ def swept_loops(study: Study) -> list[SweptLoop]:
     Each is the very rollout of `simulate`, with its noise and its plant.
     """
     chosen, draws = study.simulate, Draws(study.seed)
-    wrist, loop = loop_facing(study.wrist, chosen.loop, chosen.direction)
     law = controller(chosen.controller)
-    asked, period = toward(chosen.reference, chosen.direction), sample_period(loop.control_period)
-    followed = motion(asked, wrist, chosen.horizon, period, later=True)
+    wrist, loop, followed = asked_of(study, sample_period(chosen.loop.control_period), later=True)
     times = chosen.repetitions if is_random(loop) else 1
     scenario = scenario_of(chosen.reference, chosen.direction)
     loops = loops_of(loop, [draws.plant(repetition) for repetition in range(times)])
@@ -76,25 +79,32 @@ def swept_loops(study: Study) -> list[SweptLoop]:
     ]
 
 
-def swept_metrics() -> list[str]:
-    """The metrics that are taken of many loops at once."""
-    return [name for name, metric in METRICS.items() if metric.of_totals is not None or name in AT_ONCE]
+def swept_metrics(planes: int = 1) -> list[str]:
+    """The metrics that are taken of many loops in so many planes at once."""
+    return [name for name, metric in metrics_in(planes).items() if metric.of_totals is not None or name in AT_ONCE]
 
 
 def run_swept(loops: Iterable[SweptLoop]) -> SweptMetrics:
     """Run all loops, those that differ in numbers alone side by side."""
-    names, order, judged = swept_metrics(), list[int](), list[Future[SweptMetrics]]()
+    order, judged = list[int](), list[Future[SweptMetrics]]()
     with ThreadPoolExecutor(1) as beside:  # judges while the next ones are laid out, which takes one processor
         for numbers, piece in _pieces(loops):
             order += numbers
             results = _run(piece)
             wait(judged[-1:])  # of what is kept of samples there is never more than two batches'
-            judged.append(beside.submit(_judged, names, *results))
+            judged.append(beside.submit(_judged, swept_metrics(piece[0].motion.planes), *results))
     parts = [future.result() for future in judged]
     back = np.argsort(order, kind="stable")
-    metrics = {name: np.concatenate([part.metrics[name] for part in parts])[back] for name in names}
-    failed, until = (np.concatenate(columns)[back] for columns in zip(*(columns[1:] for columns in parts), strict=True))
-    return SweptMetrics(metrics, failed, until)
+    names = max((list(part.metrics) for part in parts), key=len)
+    unknown = [np.full(len(part.failed), np.nan) for part in parts]
+    metrics = {
+        name: np.concatenate([part.metrics.get(name, nan) for part, nan in zip(parts, unknown, strict=True)])[back]
+        for name in names
+    }
+    failed, until, places = (
+        np.concatenate(columns)[back] for columns in zip(*(columns[1:] for columns in parts), strict=True)
+    )
+    return SweptMetrics(metrics, failed, until, places)
 
 
 def _pieces(loops: Iterable[SweptLoop]) -> Iterator[tuple[list[int], list[SweptLoop]]]:
@@ -119,7 +129,7 @@ def _run(chosen: Sequence[SweptLoop]) -> tuple[Outcome, NDArray[np.int64], float
     motions = list({id(loop.motion.angles): loop.motion for loop in chosen}.values())  # which may differ in tips
     numbers = {id(followed.angles): number for number, followed in enumerate(motions)}
     which = np.array([numbers[id(loop.motion.angles)] for loop in chosen])
-    start: Start | None = equilibrium(first.loop) if first.at_rest else None
+    start: Start | None = equilibrium(first.loop, first.motion.planes) if first.at_rest else None
     outcome = rollout(
         first.law, np.array([loop.gains for loop in chosen]).reshape(len(chosen), -1), motions, which,
         [loop.loop for loop in chosen], [loop.wrist for loop in chosen], start, [loop.stream for loop in chosen],
@@ -134,13 +144,13 @@ def fates(loops: Sequence[SweptLoop], swept: SweptMetrics) -> list[str]:
     goals = [loop.motion.goals for loop in loops]
     rests = np.array([goal.rest <= 0.9 * goal.horizon for goal in goals])
     long = np.array([goal.rest <= goal.horizon - REST for goal in goals])
-    moves = np.array([np.abs(loop.motion.theta_ref).max() for loop in loops])
+    moves = np.array([size_of(loop.motion.bend_ref).max() for loop in loops])
     limits = np.array([wrist.tension_limit for wrist in wrists])
     holds = (
         swept.failed,
         rests & (metrics["steady_state"] > SHORT * moves),
         long & (metrics["oscillation"] > LIMIT_CYCLE),
-        chatter(metrics["chattering"], [wrist.tension_range for wrist in wrists]) > 0.0,
+        chatter(metrics["chattering"], [wrist.tension_range for wrist in wrists], swept.places) > 0.0,
         metrics["peak_tension"] > STRAIN * limits,
         metrics["drift"] > 0.0,
     )
@@ -152,4 +162,5 @@ def fates(loops: Sequence[SweptLoop], swept: SweptMetrics) -> list[str]:
 
 def _judged(names: Sequence[str], outcome: Outcome, which: NDArray[np.int64], step: float) -> SweptMetrics:
     values = outcome.metrics | at_once(names, outcome, which, step)
-    return SweptMetrics({name: values[name] for name in names}, outcome.failed, outcome.until)
+    places = np.full(len(outcome.failed), outcome.places)
+    return SweptMetrics({name: values[name] for name in names}, outcome.failed, outcome.until, places)

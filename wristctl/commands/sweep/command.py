@@ -51,8 +51,7 @@ def sweep_units(
     from wristctl.work.worker import Unit
 
     content = json.loads(study.model_dump_json(by_alias=True, include=_SECTIONS.get(command, _WHOLE | {command})))
-    as_lanes = command == "simulate" and not _any_in_two_planes(study, axes)
-    together, does = (_LANES, "simulated") if as_lanes else (1, "performed_at")
+    together, does = (_LANES, "simulated") if command == "simulate" else (1, "performed_at")
     keys = [(axis.key, axis.text) for axis in axes]
     units = []
     for first in range(0, len(points), together):
@@ -61,12 +60,6 @@ def sweep_units(
         name = f"{command} at {', '.join(f'{k}={v}' for (k, _), v in zip(keys, block[0], strict=True))}"
         units.append(Unit(f"wristctl.commands.sweep.command:{does}", spec, name, len(block)))
     return units
-
-
-def _any_in_two_planes(study: Study, axes: Sequence[SweepAxis]) -> bool:
-    from wristctl.commands.simulate.in_two_planes import in_two_planes
-
-    return any(in_two_planes(study_at(study, axes, corner)) for corner in _corners(axes))
 
 
 def _studies(spec: Mapping[str, Any]) -> Iterator[Study]:
@@ -149,7 +142,6 @@ def performed_at(spec: Mapping[str, Any]) -> dict[str, np.ndarray]:
 
 
 _PROCEDURES: Mapping[str, str] = {
-    "simulate": "wristctl.commands.simulate.command:SIMULATE",
     "tune": "wristctl.commands.tune.command:TUNE",
     "compare": "wristctl.commands.compare.command:COMPARE",
 }
@@ -354,9 +346,10 @@ def _golden(study: Study, command: str) -> Golden:
 
 
 def _units(metrics: Sequence[str], units: dict[str, str]) -> dict[str, str]:
-    from wristctl.simulation.metrics import METRICS
+    from wristctl.simulation.metrics import metrics_in
 
-    of_table = {name: METRICS[name].unit or "1" for name in metrics if name in METRICS}
+    known = metrics_in(2)
+    of_table = {name: known[name].unit or "1" for name in metrics if name in known}
     return (
         {"point": "1", "repetition": "1", "failed": "1", "until": "s", "fate": "1"}
         | of_table
