@@ -146,3 +146,16 @@ def test_families_say_and_warn_too(caplog: pytest.LogCaptureFixture) -> None:
     assert not caplog.records
     wristctl.compare(load_study([], [*settings, "families.f.loop.planes=1"]))
     assert any("which `planes: 1` leaves out" in record.getMessage() for record in caplog.records)
+
+
+def test_a_ranking_in_two_planes_is_the_same_for_the_same_seed_to_the_hash(tmp_path: Path) -> None:
+    family = (
+        "families={f: {loop: {plant_segments: 1}, horizon: 0.6, draw: {plant.stiffness: x0.8..1.2, "
+        "reference.angle_deg: 10..20, reference.toward_deg: -180..180, reference.turn: 0.6..1}, "
+        "references: [{kind: ellipse}, {kind: diagonal, duration: 0.3}]}}"
+    )
+    rows = "compare.controllers=[{controller: pid-ff, gains: default}, {controller: ct-dob, gains: default}]"
+    settings = [family, rows, "compare.worlds={family: f, draws: 8}"]
+    runs = [wristctl.compare(load_study([], [*settings, f"seed={seed}"]), out=tmp_path).run for seed in (1, 1, 2)]
+    first, again, other = [run.result_hash for run in runs if run is not None]
+    assert first == again != other

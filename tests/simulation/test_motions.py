@@ -27,7 +27,7 @@ TIME = np.arange(0.0, 3.0, 0.01)
 ANGLE = 20.0 * np.sin(2.0 * TIME) ** 2
 IN_ONE_PLANE = {kind: each for kind, each in REFERENCES.items() if each.planes == 1}
 OWN_COURSE = [kind for kind, each in IN_ONE_PLANE.items() if each.targets == "none" and kind != "recording"]
-SMOOTH = [kind for kind in OWN_COURSE if kind not in ("square", "random-steps")]
+SMOOTH = [kind for kind in OWN_COURSE if kind not in ("square", "limited-square", "random-steps")]
 
 
 def evaluated(wrist: WristParameters = WRIST, horizon: float = 3.0, period: float = 1e-3, **given: object) -> Motion:

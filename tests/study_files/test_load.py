@@ -76,7 +76,7 @@ def test_an_override_is_relative_to_the_command_first() -> None:
         ("train: {optimiser: adam_w}\n", "{file}:1: train.optimiser - fix: did you mean 'adamw'? All: "),
         ("compare:\n  controllers:\n  - {}\n  - contoller: pid\n", "{file}:4: compare.controllers.1.contoller"),
         ("compare:\n  controllers:\n  - gains:\n      P1: a\n", "'a' should be a valid number - {file}:4"),
-        ("tune:\n  scenarios:\n  - reference: {kind: ramp}\n", "{file}:3: tune.scenarios.0.reference.kind"),
+        ("tune:\n  scenarios:\n  - reference: {kind: zigzag}\n", "{file}:3: tune.scenarios.0.reference.kind"),
         ("wrist: {tendons: 6}\n", "one of five, four, six, three; or a list, [{{angle_deg: ...}}, ...]"),
         ("wrist:\n  tendons:\n  - angle: 3\n", "{file}:3: wrist.tendons.0.angle - fix: did you mean 'angle_deg'?"),
         ("- 1\n", "a study file holds keys and values - {file}:1"),

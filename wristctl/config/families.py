@@ -65,7 +65,9 @@ class Family(Section):
 
     loop: Loop = Loop()
     draw: dict[str, Drawn] = choice(
-        {}, "settings of the loop, or of its references as reference.angle_deg, and what each is drawn from"
+        {},
+        "settings of the loop, or of its references as reference.angle_deg, of those that have it, and what each is "
+        "drawn from",
     )
     together: tuple[dict[str, float], ...] = choice(
         (), "rows of settings that are drawn together, one row a world, as an identification's posterior has them"
@@ -88,10 +90,15 @@ class Family(Section):
     def motion(self, number: int, shares: Mapping[str, float]) -> Reference:
         """The reference of this number at these shares."""
         data = self.references[number].model_dump(exclude_unset=True)
-        for key, source in self.draw.items():
-            if key.startswith(_OF_REFERENCE):
-                _put(data, key.removeprefix(_OF_REFERENCE), drawn_value(source, shares[key]))
+        for key in self.drawn_of(number):
+            _put(data, key.removeprefix(_OF_REFERENCE), drawn_value(self.draw[key], shares[key]))
         return Reference.model_validate(data)
+
+    def drawn_of(self, number: int) -> list[str]:
+        """The drawn settings that the reference of this number has."""
+        reference = self.references[number]
+        has = {*Reference.model_fields, *reference.added()}
+        return [key for key in self.draw if key.startswith(_OF_REFERENCE) and key.split(".")[1] in has]
 
     @model_validator(mode="after")
     def _all_worlds_can_be(self) -> Self:
@@ -100,9 +107,12 @@ class Family(Section):
             try:
                 self.world(dict.fromkeys(self.draw, 0.5) | {TOGETHER: (number + 0.5) / len(self.together)})
             except ValidationError as error:
-                context = {"number": number + 1, "why": error.errors()[0]["msg"]}
+                context = {"number": str(number + 1), "why": error.errors()[0]["msg"]}
                 raise PydanticCustomError("draw", "row {number} of together is no world: {why}", context) from error
         for key, source in self.draw.items():
+            if key.startswith(_OF_REFERENCE) and not any(key in self.drawn_of(n) for n in range(len(self.references))):
+                context = {"key": key, "why": "there is no such leaf"}
+                raise PydanticCustomError("draw", "cannot draw {key}: {why}", context)
             if not isinstance(source, str) and not source:
                 raise PydanticCustomError("empty_draw", "{key} is drawn from nothing", {"key": key})
             for share in (0.0, 1.0 - 1e-12):

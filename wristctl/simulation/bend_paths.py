@@ -4,6 +4,7 @@ All begin at rest and straight, and get up to speed within a quarter of a turn.
 """
 
 from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 
@@ -128,33 +129,65 @@ def bend_path(name: str, size_deg: float, turn: float, horizon: float, toward_de
     return turned(BEND_PATHS[name](time, np.deg2rad(size_deg), turn), toward_deg)
 
 
-def _kind(name: str, meaning: str, turn: float) -> ReferenceKind:
-    """A bend path as a reference: `angle_deg` is its largest bend."""
+_TOWARD = "angle by which the path is turned, from ulnar toward flexion"
+
+
+def _turning(name: str, meaning: str, turn: float) -> ReferenceKind:
+    """A bend path of so many seconds a turn as a reference: `angle_deg` is its largest bend."""
 
     def course(reference: Reference, time: Array) -> Array:
         size = np.deg2rad(reference.end_deg)
         path = BEND_PATHS[name](np.maximum(time, 0.0), size, reference.value("turn"))
         return turned(path, reference.value("toward_deg"))
 
-    def described(reference: Reference) -> str:
-        toward = reference.value("toward_deg")
-        aside = f", turned by {toward:g} deg" if toward else ""
-        return f"{name} of {reference.end_deg:g} deg in {reference.value('turn'):g} s{aside}"
-
+    parameters = {"turn": Parameter(turn, "s", "time of a turn"), "toward_deg": Parameter(0.0, "deg", _TOWARD)}
     return ReferenceKind(
-        meaning,
-        course=course,
-        described=described,
-        targets="none",
-        parameters={
-            "turn": Parameter(turn, "s", "time of a turn"),
-            "toward_deg": Parameter(0.0, "deg", "angle by which the path is turned, from ulnar toward flexion"),
-        },
-        planes=2,
+        meaning, course=course, described=partial(_described, name), targets="none", parameters=parameters, planes=2
     )
 
 
-CIRCLE = _kind("circle", "bends on a circle through straight and `angle_deg` toward ulnar", 4.0)
-FIGURE_OF_8 = _kind("figure-of-8", "a figure of 8 by `angle_deg` toward ulnar and radial", 4.0)
-CIRCUMDUCTION = _kind("circumduction", "the hand circles about the straight wrist, bent by `angle_deg`", 4.0)
-DART_THROWER = _kind("dart-thrower", "from radial extension to ulnar flexion and back, by `angle_deg` each", 1.5)
+def _described(name: str, reference: Reference) -> str:
+    toward = reference.value("toward_deg")
+    aside = f", turned by {toward:g} deg" if toward else ""
+    return f"{name} of {reference.end_deg:g} deg in {reference.value('turn'):g} s{aside}"
+
+
+CIRCLE = _turning("circle", "bends on a circle through straight and `angle_deg` toward ulnar", 4.0)
+FIGURE_OF_8 = _turning("figure-of-8", "a figure of 8 by `angle_deg` toward ulnar and radial", 4.0)
+CIRCUMDUCTION = _turning("circumduction", "the hand circles about the straight wrist, bent by `angle_deg`", 4.0)
+DART_THROWER = _turning("dart-thrower", "from radial extension to ulnar flexion and back, by `angle_deg` each", 1.5)
+
+
+def _ellipse(reference: Reference, time: Array) -> Array:
+    size, ratio = np.deg2rad(reference.end_deg), reference.value("ratio")
+    path = circumduction(np.maximum(time, 0.0), size, reference.value("turn"))
+    path[1] *= ratio
+    return turned(path, reference.value("toward_deg"))
+
+
+def _diagonal(reference: Reference, time: Array) -> Array:
+    move = np.deg2rad(reference.end_deg) * minimum_jerk(time, reference.duration)
+    return turned(np.stack([move, np.zeros_like(move)]), reference.value("toward_deg"))
+
+
+ELLIPSE = ReferenceKind(
+    "the hand goes around on an ellipse about the straight wrist, bent by `angle_deg` along it, `ratio` of that across",
+    course=_ellipse,
+    described=lambda reference: f"{_described('ellipse', reference)}, {reference.value('ratio'):g} as wide",
+    targets="none",
+    parameters={
+        **CIRCUMDUCTION.parameters,
+        "ratio": Parameter(0.5, "", "its width over its length"),
+    },
+    planes=2,
+)
+DIAGONAL = ReferenceKind(
+    "a smooth move of `duration` from straight to `angle_deg` toward `toward_deg`, and rest there",
+    course=_diagonal,
+    described=lambda reference: (
+        f"minimum jerk {reference.duration:g} s {reference.end_deg:g} deg toward {reference.value('toward_deg'):g} deg"
+    ),
+    targets="none",
+    parameters={"toward_deg": Parameter(45.0, "deg", "direction of the move, from ulnar toward flexion")},
+    planes=2,
+)

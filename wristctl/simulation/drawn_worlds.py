@@ -31,7 +31,7 @@ def streams_of(family: Family, name: str, split: str) -> list[str]:
     leaves = [_leaf(split, name, key) for key in family.draw if not key.startswith("reference.")]
     leaves += [_leaf(split, name, TOGETHER)] * bool(family.together)
     motions = [
-        _leaf(split, name, key, number) for key in family.draw if key.startswith("reference.") for number in numbers
+        _leaf(split, name, key, number) for key in family.draw for number in numbers if key in family.drawn_of(number)
     ]
     return [
         *leaves,
@@ -65,11 +65,9 @@ def drawn_cases(
         period = sample_period(loop.control_period)
         for number in range(len(family.references)):
             shares = {
-                key: _share(stream(seed, _leaf(split, name, key, number)), world)
-                for key in family.draw
-                if key.startswith("reference.")
+                key: _share(stream(seed, _leaf(split, name, key, number)), world) for key in family.drawn_of(number)
             }
-            reference = family.motion(number, {**dict.fromkeys(family.draw, 0.0), **shares})
+            reference = family.motion(number, shares)
             key = reference.model_dump_json(), period
             if key not in motions:
                 motions[key] = motion_in(planes, reference, None, wrist, family.horizon, period, network)

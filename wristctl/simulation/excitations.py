@@ -8,6 +8,7 @@ from wristctl.config.section import Parameter
 from wristctl.errors import UserError
 from wristctl.seeds import stream
 from wristctl.simulation.reference import ReferenceKind
+from wristctl.simulation.references import target_words
 
 _OFFSET = Parameter(0.0, "deg", "middle of the motion", mirrors=True)
 
@@ -63,6 +64,29 @@ def _square(reference: Reference, time: Array) -> Array:
     return _about(reference, _held(np.where(periods - np.floor(periods) < 0.5, 1.0, -1.0)))
 
 
+def _limited_square(reference: Reference, time: Array) -> Array:
+    speed, half = reference.value("speed"), 0.5 / reference.frequency
+    if not speed * half >= 2.0 * abs(reference.end_deg):
+        problem = f"{speed:g} deg/s do not go from side to side by {2.0 * abs(reference.end_deg):g} deg in {half:g} s"
+        raise UserError(problem, "reference.speed", "more, or a lower frequency")
+    rate = speed / abs(reference.end_deg) if reference.end_deg else 0.0
+    number = np.floor(np.maximum(time, 0.0) / half + 1e-9)
+    aim = np.where(number % 2.0, -1.0, 1.0)
+    begin = np.where(number, -aim, 0.0)
+    way, passed = np.abs(aim - begin), rate * (np.maximum(time, 0.0) - number * half)
+    course = np.zeros((3, len(time)))
+    course[0] = begin + aim * np.clip(passed, 0.0, way)
+    course[1] = np.where((time >= 0.0) & (passed < way), aim * rate, 0.0)
+    return _about(reference, course)
+
+
+def _ramp(reference: Reference, time: Array) -> Array:
+    course = np.zeros((3, len(time)))
+    course[0] = np.clip(time / reference.duration, 0.0, 1.0)
+    course[1] = np.where((time >= 0.0) & (time < reference.duration), 1.0 / reference.duration, 0.0)
+    return course
+
+
 def _random_steps(reference: Reference, time: Array) -> Array:
     seed = reference.value("seed")
     if seed < 0 or seed != int(seed):
@@ -106,6 +130,21 @@ SQUARE = ReferenceKind(
     targets="none",
     parameters={"offset_deg": _OFFSET},
     jumps=True,
+)
+LIMITED_SQUARE = ReferenceKind(
+    "to and fro between angle and -angle at `speed`, held there, `frequency` times a second there and back",
+    course=_limited_square,
+    described=lambda reference: (
+        f"square {reference.frequency:g} Hz {_swing(reference)} at {reference.value('speed'):g} deg/s"
+    ),
+    targets="none",
+    parameters={"speed": Parameter(90.0, "deg/s", "of its way from side to side"), "offset_deg": _OFFSET},
+)
+RAMP = ReferenceKind(
+    "a way to an angle or a tip position at an even speed in `duration`",
+    course=_ramp,
+    rest=lambda reference, begin, horizon: begin + reference.duration,
+    described=lambda reference: f"ramp {reference.duration:g} s {target_words(reference)}",
 )
 RANDOM_STEPS = ReferenceKind(
     "jumps to angles drawn evenly between offset - angle and offset + angle, one each `duration`",

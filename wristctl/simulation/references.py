@@ -51,7 +51,8 @@ def _millimetres(tip: tuple[float, float]) -> str:
     return f"{1e3 * tip[0]:.3g}, {1e3 * tip[1]:.3g}"
 
 
-def _target(reference: Reference) -> str:
+def target_words(reference: Reference) -> str:
+    """The angle or the tip position at the end, in words."""
     return f"{reference.end_deg:g} deg" if reference.tip is None else f"tip {_millimetres(reference.tip)} mm"
 
 
@@ -65,19 +66,19 @@ STEP = ReferenceKind(
     "a jump to an angle or a tip position",
     course=_step,
     rest=lambda reference, begin, horizon: begin,
-    described=lambda reference: f"step {_target(reference)}",
+    described=lambda reference: f"step {target_words(reference)}",
     jumps=True,
 )
 MINIMUM_JERK = ReferenceKind(
     "a smooth move of `duration` to an angle or a tip position (Flash and Hogan 1985)",
     course=_minimum_jerk,
     rest=lambda reference, begin, horizon: begin + reference.duration,
-    described=lambda reference: f"minimum jerk {reference.duration:g} s {_target(reference)}",
+    described=lambda reference: f"minimum jerk {reference.duration:g} s {target_words(reference)}",
 )
 SINE = ReferenceKind(
     "swinging between straight and the angle at `frequency`",
     course=_sine,
-    described=lambda reference: f"sine {reference.frequency:g} Hz {_target(reference)}",
+    described=lambda reference: f"sine {reference.frequency:g} Hz {target_words(reference)}",
 )
 MULTI_STEP = ReferenceKind(
     "jumps through `angles_deg`, one each `duration`",
