@@ -29,8 +29,7 @@ from wristctl.simulation.cases import Measured, measure
 from wristctl.simulation.drawn_worlds import drawn_cases
 from wristctl.simulation.oscillation import oscillations
 from wristctl.study_files.load import load_study
-from wristctl.tuning.objective import Judge
-from wristctl.tuning.search import search, tuning_cases
+from wristctl.tuning.search import judges_of, search
 
 Floats = NDArray[np.float64]
 HERE = Path(__file__).parent
@@ -187,8 +186,7 @@ def row_of(name: str, found: Measured) -> Row:
 
 def rivals(study: Study) -> list[Row]:
     """Feedforward, and each controller's gains, tuned with the budget of experiments/rivals.yaml."""
-    searched, chosen = tuning_cases(study)
-    judges = Judge(searched, study.wrist, study.tune.objective), Judge(chosen, study.wrist, study.tune.objective)
+    judges = judges_of(study)
     cases = drawn_cases(study.families[RIG], RIG, "test", study.seed, WORLDS, study.wrist)
     gains: dict[str, tuple[str, Floats]] = {"feedforward": ("feedforward", np.zeros(0))}
     for name in RIVALS:

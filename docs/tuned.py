@@ -25,7 +25,7 @@ from wristctl.simulation.cases import measure
 from wristctl.simulation.drawn_worlds import drawn_cases
 from wristctl.study_files.load import load_study
 from wristctl.tuning.objective import Judge
-from wristctl.tuning.search import search, tuning_cases
+from wristctl.tuning.search import judges_of, search
 
 HERE = Path(__file__).parent
 EXPERIMENTS = HERE.parent / "experiments"
@@ -55,7 +55,7 @@ def preset_of(law: Controller, family: str) -> str:
     return next((name for name in CONDITIONS[family] if name in law.presets), "")
 
 
-def tuned(study: Study, law: Controller, judges: tuple[Judge, Judge], family: str, chance: float) -> Tuning:
+def tuned(study: Study, law: Controller, judges: tuple[Judge, Judge | None], family: str, chance: float) -> Tuning:
     """Tune a controller, and compare on the test split; worse is what is so beyond this chance."""
     found = search(study, law, lambda name: stream(study.seed, name), judges)
     preset = preset_of(law, family)
@@ -85,15 +85,17 @@ def study_of(family: str) -> Study:
     budget = study.compare.tuning
     assert budget is not None
     laws = tuple(name for name in budget.controllers if preset_of(controller(name), family))
-    asked = {"worlds": budget.worlds.model_copy(update={"family": family}), "controllers": laws}
+    objective = budget.objective.model_copy(update={"margin": 0.0})
+    asked = {
+        "worlds": budget.worlds.model_copy(update={"family": family}), "controllers": laws, "objective": objective
+    }  # fmt: skip
     return study.model_copy(update={"tune": budget.model_copy(update=asked)})
 
 
 def lines_of(study: Study, family: str, chance: float) -> tuple[list[str], list[str]]:
     """The table of a family, and the controllers whose tuned gains are worse."""
     given = study.tune
-    searched, chosen = tuning_cases(study)
-    judges = Judge(searched, study.wrist, given.objective), Judge(chosen, study.wrist, given.objective)
+    judges = judges_of(study)
     rows = [tuned(study, controller(name), judges, family, chance) for name in given.controllers]
     rows.sort(key=lambda each: each.rmse)
     table = [
@@ -122,8 +124,8 @@ def main() -> None:
     begin = [
         "# Tuned gains beside presets",
         "",
-        f"{said} Each is tuned by the budget of experiments/rivals.yaml on drawn worlds of a family; among the",
-        "best candidates and its presets the gains are chosen on worlds of a second split, and tested here on",
+        f"{said} Each is tuned by the budget of experiments/rivals.yaml on drawn worlds of a family, without",
+        "a [margin](tuning-margins.md); among the best candidates and its presets the gains are chosen on worlds of a second split, and tested here on",
         f"{TEST_WORLDS} worlds of a third: how many times less the RMSE is than the preset's (geometric mean, 95 %",
         "interval over worlds), and in how many cases either swings by more than 0.1 deg at rest or fails. As in every",
         "ranking, what swings or fails in more of the worlds is worse, whatever its RMSE. Worse is what is so beyond",

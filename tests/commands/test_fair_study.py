@@ -43,9 +43,10 @@ families:
 study:
   controllers: [pd-ff, pid-ff]
   presets: [{controller: feedforward}]
+  objective: {margin: 0.0}  # in so short a search all that keeps one is the preset
   terms: {feedback: [feedforward/default, pd-ff/tuned], an integral: [pd-ff/tuned, pid-ff/tuned]}
   variants:
-    RMSE alone: {objective: {steady_state: 0.0, worst: 0.0}}
+    RMSE alone: {objective: {steady_state: 0.0, worst: 0.0, margin: 0.0}}
     random: {optimiser: random}
     random again: {optimiser: random, beside: random}
   budgets:

@@ -17,6 +17,7 @@ from wristctl.commands.tune.command import Tuned
 from wristctl.config.wrist import WristParameters
 from wristctl.control.law import Controller
 from wristctl.control.table import controller
+from wristctl.tuning.margin import Stood
 from wristctl.tuning.search import Finalist, Search, Tried
 
 STUDY = (
@@ -116,6 +117,23 @@ def test_the_loops_that_it_was_not_tuned_on_are_told_by_what_the_gains_do_there(
     text = " ".join(_text(_search("smc"), {}, {"camera": {"limit cycle": 2}, "exact": {}, "sampled": {}}).split())
     assert "on other loops: smc holds on exact and sampled, swings on camera." in text
     assert "other loops" not in _text(_search("smc"), {})
+
+
+def test_the_margin_is_told_with_its_loop_and_what_is_less_than_it_should_be_is_named(tuned: Tuned) -> None:
+    """Of every controller there is a row of how much it stands."""
+    answer = tuned.answer
+    assert answer is not None and tuned.run is not None
+    text = " ".join(" ".join(answer.lines()).split())
+    for name, stood in tuned.stood.items():
+        assert f"{name} {stood.words}" in text.partition("Margin on the loop fast")[2]
+    assert tuned.run.data("margins")["controller"].tolist() == list(tuned.stood)
+    wide, narrow = Stood(0.5, 2.0, 2.0, 0.4, 1.4), Stood(0.67, 1.0, 1.0, 0.6, 3.0)
+    assert wide.enough and wide.words == "torque x 0.5 to x 2, springs x 0.4 to x 1.4, 2 frames later"
+    searches = {name: _search(name) for name in ("smc", "pid")}
+    known = dict.fromkeys(searches, Beside(1e-3, 2e-2, 8)), {name: dict[str, int]() for name in searches}
+    for given, named in (({"smc": wide, "pid": narrow}, True), ({"smc": wide, "pid": wide}, False)):
+        told = answer_of(searches, *known, 8, "", {}, None, given)
+        assert told is not None and ("1 frame later: pid." in " ".join(told.lines())) == named
 
 
 @pytest.mark.slow

@@ -128,7 +128,11 @@ def made_up(loop_cells: tuple[int, ...], **metrics: list[float]) -> tuple[Judge,
     study = load_study([], list(SETTINGS), "tune")
     case = tuning_cases(study)[0][0]
     cases = [Case(case.loop, case.motion, case.stream, cell) for cell in loop_cells]
-    weights = {"steady_state": 0.0, "chattering": 0.0, "oscillation": 0.0} | {"worst": 0.0, "swinging": 0.0}
+    weights = {"steady_state": 0.0, "chattering": 0.0, "oscillation": 0.0} | {
+        "worst": 0.0,
+        "swinging": 0.0,
+        "margin": 0.0,
+    }
     judge = Judge(cases, study.wrist, Objective.model_validate(weights | {"rmse": 1.0}))
     known, rests = {name: np.ones((1, len(cases))) for name in (*METRICS, "sustained")}, np.array([True] * len(cases))
     judge._yardstick = Measured(known, np.zeros((1, len(cases)), bool), np.ones((1, len(cases))), rests)
@@ -287,7 +291,7 @@ def test_only_what_would_be_the_best_is_measured_anew_and_the_most_promising_fir
 
 
 def test_feedforward_is_nothing_beside_itself() -> None:
-    study = load_study([], [*NOISY, "objective.swinging=0"], "tune")
+    study = load_study([], [*NOISY, "objective.swinging=0", "objective.margin=0"], "tune")
     assert judges(study)[0](controller("feedforward"), np.zeros((2, 0))) == pytest.approx(np.zeros(2), abs=1e-12)
 
 

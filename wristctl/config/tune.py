@@ -28,6 +28,12 @@ class Objective(OpenSection):
     swinging: float = choice(
         0.5, "times the root of the share of cases that swing by more than 0.1 deg, or chatter [decades]", ge=0
     )
+    margin: float = choice(
+        1.0,
+        "times the root of the share that fails, swings or chatters of the loop tuned for with its torque x 0.67 or "
+        "x 1.5, a frame later, springs x 0.6 or x 1.4 [decades]; 0: no such changes are tried",
+        ge=0,
+    )
 
     def added(self) -> Mapping[str, Parameter]:
         """A weight for every other metric of the table."""

@@ -48,7 +48,7 @@ class PlainLaw(types.WrapperAddressProtocol):
         self._name, self._kind = name, kind
         self._error: BaseException | None = None
         self._shape, self._memory = shape, memory
-        self._now, self._gains = _seen(tuple(now)), _named(gains)
+        self._now, self._gains = _seen(tuple(now)), named_gains(gains)
         self._law, self._of_plane = law, dict[int, Callable[..., Any]]()
         self._signals = len(now) + _REFERENCE * shape.preview
         code = getattr(law.__call__ if isinstance(law, type) else law, "__code__", None)
@@ -121,7 +121,7 @@ def _doubles(address: int, count: int) -> list[float]:
 
 
 @cache
-def _named(fields: tuple[str, ...]) -> Any:
+def named_gains(fields: tuple[str, ...]) -> Any:
     return namedtuple("Gains", fields)
 
 

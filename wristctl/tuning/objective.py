@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from wristctl.arrays import Array
 from wristctl.config.tune import Objective
@@ -11,9 +12,12 @@ from wristctl.control.law import Controller
 from wristctl.control.table import controller
 from wristctl.simulation.cases import Case, Measured, measure
 from wristctl.simulation.metrics import METRICS
+from wristctl.tuning.margin import CHANGES, OwnLoop
 
 # A law without feedback, which cannot be unstable: what every gains are measured by.
 YARDSTICK = "feedforward"
+# Rollouts of changed loops that cost hardly more than one.
+_LANES_TOGETHER = 64
 # Decades that a case counts where the wrist left its range at its very end, and one more where it did at once.
 _FAILED = 3.0
 
@@ -46,10 +50,15 @@ class Judge:
     3 to 4 decades. The objective is the mean over all cases, plus a weight times the worst cell (a case with its
     repetitions), plus one times the square root of the share of cases that swing, chatter or do not converge:
     steep at the first of them, since no ranking relies on such gains, and never the same for two that do more and less.
+    So does the share that they lose on the loop that they are tuned for, `own`, under the changes of
+    `wristctl.tuning.margin`, which are the cases themselves where none are given.
     """
 
-    def __init__(self, cases: Sequence[Case], wrist: WristParameters, weights: Objective) -> None:
+    def __init__(
+        self, cases: Sequence[Case], wrist: WristParameters, weights: Objective, own: OwnLoop | None = None
+    ) -> None:
         self._cases, self._wrist, self._weights = cases, wrist, weights
+        self.own_loop = own or OwnLoop(cases, wrist, controller(YARDSTICK))
         self._cells = np.array([case.cell for case in cases])
         self._horizons = np.array([case.motion.horizon for case in cases])
         self._metrics = list(
@@ -59,20 +68,58 @@ class Judge:
 
     def __call__(self, law: Controller, gains: Array) -> Array:
         """Objective (P,) of gains (P, g)."""
-        return self.value(measure(law, gains, self._cases, self._wrist, self._metrics))
+        return self._on_the_cases(law, gains) + self._without_margin(law, gains)
 
     def beside(self, law: Controller, gains: Array, best: float) -> Array:
         """Objective (P,) of gains (P, g) in a search whose best so far is `best`.
 
-        At the default integration step; only gains that would be the best are measured at steps that are short enough,
-        the most promising first, so that a search never ends with what the step alone makes good.
+        At the default integration step and without changes of the loop; only gains that would be the best are measured
+        at steps that are short enough and under these changes, the most promising first, so that a search never ends
+        with what the step alone makes good, or with gains that stand no change.
         """
         measured = measure(law, gains, self._cases, self._wrist, self._metrics, converge=False)
-        values = self.value(measured)
+        values, costs = self.value(measured), dict[int, float]()
         while values[first := int(np.argmin(values))] < best:
-            values[first] = self(law, gains[first : first + 1])[0]
+            values[first] = self._on_the_cases(law, gains[first : first + 1])[0]
+            if values[first] < best:
+                values[first] += self._cost_of(first, law, gains, values < best, values, costs)
             best = min(best, float(values[first]))
         return values
+
+    def choice(self, law: Controller, gains: Array) -> Array:
+        """Objective (P,) of gains (P, g) to choose the least by: what costs more without changes is not changed."""
+        values, best, costs = self._on_the_cases(law, gains), np.inf, dict[int, float]()
+        while values[first := int(np.argmin(values))] < best:
+            values[first] += self._cost_of(first, law, gains, values < best, values, costs)
+            best = min(best, float(values[first]))
+        return values
+
+    def _cost_of(
+        self,
+        first: int,
+        law: Controller,
+        gains: Array,
+        asked: NDArray[np.bool_],
+        values: Array,
+        costs: dict[int, float],
+    ) -> float:
+        """What a lack of margin costs the `first` of the gains; it is kept for those that are likely to be next."""
+        if first not in costs:
+            together = max(1, _LANES_TOGETHER // (len(CHANGES) * self.own_loop.count))
+            likely = [int(each) for each in np.argsort(values) if asked[each] and each not in costs and each != first]
+            chosen = [first, *likely[: together - 1]]
+            costs |= dict(zip(chosen, map(float, self._without_margin(law, gains[chosen])), strict=True))
+        return costs[first]
+
+    def _on_the_cases(self, law: Controller, gains: Array) -> Array:
+        return self.value(measure(law, gains, self._cases, self._wrist, self._metrics))
+
+    def _without_margin(self, law: Controller, gains: Array) -> Array:
+        """What it costs gains (P, g) that they lose a share of the changed loops, (P,) [decades]."""
+        if not self._weights.margin:
+            return np.zeros(len(gains))
+        costs: Array = self._weights.margin * np.sqrt(self.own_loop.lost(law, gains).mean(axis=(1, 2)))
+        return costs
 
     def value(self, measured: Measured) -> Array:
         """Objective (P,) of what was measured on the cases."""

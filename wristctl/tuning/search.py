@@ -26,10 +26,11 @@ from wristctl.plugins.places import contained
 from wristctl.seeds import stream
 from wristctl.simulation.cases import Case
 from wristctl.simulation.closed_loop import scenario_of
-from wristctl.simulation.drawn_worlds import drawn_cases
+from wristctl.simulation.drawn_worlds import asked_of, drawn_cases
 from wristctl.simulation.planes import Asked, motion_in, planes_of
 from wristctl.simulation.worlds import Draws, is_random, loops_of
-from wristctl.tuning.objective import Judge
+from wristctl.tuning.margin import OwnLoop
+from wristctl.tuning.objective import YARDSTICK, Judge
 from wristctl.tuning.optimisers import OPTIMISERS, Optimiser
 from wristctl.work.worker import Unit
 from wristctl.wrist.kinematics import Inverse
@@ -161,6 +162,36 @@ def tuning_cases(study: Study, network: Inverse | None = None, tuning: int = 0) 
     ) if drawn else []
 
 
+def judges_of(study: Study, network: Inverse | None = None, tuning: int = 0) -> tuple[Judge, Judge | None]:
+    """Judges of the cases to search on, and of those to choose by, None where nothing is random.
+
+    Both judge margins on the loop that the search is for (`own_loop`).
+    """
+    searched, chosen = tuning_cases(study, network, tuning)
+    objective, own = study.tune.objective, own_loop(study, searched, network)
+    judge = Judge(searched, study.wrist, objective, own)
+    return judge, Judge(chosen, study.wrist, objective, own) if chosen else None
+
+
+def own_loop(study: Study, cases: Sequence[Case], network: Inverse | None = None) -> OwnLoop:
+    """The loop that a search is for: of scenarios these cases, of a family its loop as stated, with its motions."""
+    own = _on_its_own_loop(study, name, network) if (name := study.tune.worlds.family) else cases
+    return OwnLoop(own, study.wrist, controller(YARDSTICK))
+
+
+# Draws of a family's motions, each with noise of its own, on which margins are judged.
+_OWN_DRAWS = 4
+
+
+def _on_its_own_loop(study: Study, name: str, network: Inverse | None) -> list[Case]:
+    """The motions of a family on its loop as it is stated, in the planes of its worlds."""
+    family = study.families[name]
+    loop = family.loop.model_copy(update={"planes": planes_of(study.wrist, asked_of(family))})
+    motions = {key: source for key, source in family.draw.items() if key.startswith("reference.")}
+    alone = family.model_copy(update={"loop": loop, "draw": motions, "together": ()})
+    return drawn_cases(alone, name, "tune", study.seed, _OWN_DRAWS, study.wrist, network)
+
+
 def asked_by(settings: TuneSettings) -> list[Asked]:
     """Loops and motions of the scenarios."""
     return [Asked(settings.loops[scenario.loop], scenario.reference) for scenario in settings.scenarios]
@@ -272,10 +303,7 @@ def _chosen(controller: Controller, result: Search, judge: Judge, choose: Judge 
         judged = judge(controller, np.array(list(presets.values())))
         for (name, each), value in zip(presets.items(), judged, strict=True):
             candidates.append((tuple(map(float, each)), name, float(value)))
-    if choose is None:
-        validated = judge(controller, np.array([gains for gains, *_ in candidates]))
-    else:
-        validated = choose(controller, np.array([gains for gains, *_ in candidates]))
+    validated = (choose or judge).choice(controller, np.array([gains for gains, *_ in candidates]))
     every = [Finalist(*each, float(value)) for each, value in zip(candidates, validated, strict=True)]
     ordered = tuple(sorted(every, key=lambda finalist: finalist.validated))
     best = dict(zip(controller.gains, ordered[0].gains, strict=True))
@@ -314,8 +342,7 @@ def searched(spec: Mapping[str, Any]) -> dict[str, np.ndarray]:
     """Result of one unit of `search_unit`: all gains that were tried, and the finalists, best first."""
     study, law = Study.model_validate_json(json.dumps(spec["study"])), controller(spec["law"])
     tuning = spec["tuning"]
-    cases, validation_cases = tuning_cases(study, tuning=tuning)
-    judges = Judge(cases, study.wrist, study.tune.objective), Judge(validation_cases, study.wrist, study.tune.objective)
+    judges = judges_of(study, tuning=tuning)
     result = search(study, law, lambda name: stream(study.seed, search_stream(name, tuning)), judges)
     return {
         "values": result.tried.values,

@@ -137,8 +137,7 @@ def recommend(session: Session) -> Recommended:
 
 
 def _searches(session: Session, study: Study, family: Family, scaled: Sequence[Controller]) -> dict[str, Search]:
-    from wristctl.tuning.objective import Judge
-    from wristctl.tuning.search import search, tuning_cases
+    from wristctl.tuning.search import judges_of, search
 
     settings = study.recommend
     tuning = study.model_copy(
@@ -152,11 +151,10 @@ def _searches(session: Session, study: Study, family: Family, scaled: Sequence[C
             ),
         }
     )  # fmt: skip
-    judges = [Judge(cases, study.wrist, tuning.tune.objective) for cases in tuning_cases(tuning)]
-    searches = {}
+    judges, searches = judges_of(tuning), dict[str, "Search"]()
     with session.progress("tuning", total=len(scaled), unit="controllers") as advance:
         for number, law in enumerate(scaled, start=1):
-            searches[law.name] = search(tuning, law, session.findings.stream, (judges[0], judges[1]))
+            searches[law.name] = search(tuning, law, session.findings.stream, judges)
             advance(number)
     return searches
 

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from wristctl.config.loop import Loop, Reference
     from wristctl.config.wrist import WristParameters
     from wristctl.simulation.cases import Case
+    from wristctl.tuning.margin import Stood
     from wristctl.tuning.search import Search
 
 # Share of a gain's search range, on its logarithmic scale, within which a gain lies at the edge.
@@ -97,12 +98,14 @@ def answer_of(
     run: str,
     elsewhere: Mapping[str, Mapping[str, Mapping[str, int]]],
     motion: Motion | None = None,
+    stood: Mapping[str, Stood] | None = None,
     bending: str = "",
 ) -> Answer | None:
     """The answer of a search on so many `cases`; None where nothing was searched. `run` is its path, if it has one.
 
-    `elsewhere` has the marks of the gains on other loops, by controller and loop; `motion` is the one to try them on.
-    `bending` says in which planes all loops bend, where these are two.
+    `elsewhere` has the marks of the gains on other loops, by controller and loop; `motion` is the one to try them on,
+    and `stood` how much they stand on its loop, by controller. `bending` says in which planes all loops bend, where
+    these are two.
     """
     if not searches:
         return None
@@ -114,6 +117,7 @@ def answer_of(
         *_presets(ordered, searches),
         *_lost(ordered, lost, cases),
     ]
+    notes += _margins(ordered, stood or {}, motion.where if motion else "the loop")
     notes += _elsewhere(ordered, elsewhere)
     more = "All tables: `.tables`."
     if run and motion is not None:
@@ -214,6 +218,21 @@ def _lost(ordered: Sequence[str], lost: Mapping[str, Mapping[str, int]], cases: 
     if facts:
         return [f"Do not rely on these: {'; '.join(facts)}."]
     return [f"In none of the {cases} cases does any of them fail, swing or chatter."]
+
+
+# Controllers whose margins are told one by one.
+_FIRST = 3
+
+
+def _margins(ordered: Sequence[str], stood: Mapping[str, Stood], where: str) -> list[str]:
+    """How much the best gains stand on the loop they were tuned for, and which stand less than they should."""
+    told = [f"{name} {stood[name].words}" for name in ordered[:_FIRST] if name in stood]
+    if not told:
+        return []
+    little = [name for name in ordered if name in stood and not stood[name].enough]
+    words = f"Margin on {where}, one change at a time without a swing or failure: {'; '.join(told)}."
+    least = "torque x 0.67 to x 1.5, springs x 0.6 to x 1.4, 1 frame later"
+    return [words + f" Less than {least}: {joined(little)}." * bool(little)]
 
 
 def _elsewhere(ordered: Sequence[str], elsewhere: Mapping[str, Mapping[str, Mapping[str, int]]]) -> list[str]:

@@ -44,9 +44,9 @@ from wristctl.errors import UserError, under
 
 if TYPE_CHECKING:
     import pandas as pd
-    from matplotlib.figure import Figure
 
     from wristctl.simulation.closed_loop import Size
+    from wristctl.tuning.margin import OwnLoop, Stood
     from wristctl.tuning.objective import Judge
     from wristctl.tuning.search import Search, Tried
     from wristctl.wrist.kinematics import Inverse
@@ -73,6 +73,8 @@ class Tuned(StudyResult):
     elsewhere: dict[str, dict[str, dict[str, int]]]
     """by controller and loop, on how many of the same motions its best gains are lost on loops that no scenario is
     on; none for a family of worlds"""
+    stood: dict[str, Stood]
+    """by controller, how much its best gains stand on the loop that they were tuned for"""
     bending: str
     """Planes that all loops bend in, a sentence; empty where they stay in one."""
 
@@ -81,7 +83,7 @@ class Tuned(StudyResult):
         """Best gains, their error beside feedforward, and what they do wrong."""
         motion = motion_of(self.study, self.place)
         found = self.searches, self.errors, self.lost, self.cases, self.place, self.elsewhere
-        return answer_of(*found, motion, self.bending)
+        return answer_of(*found, motion, self.stood, self.bending)
 
     @property
     def marks(self) -> list[str]:
@@ -176,7 +178,7 @@ def tune(session: Session) -> Tuned:
     from wristctl.commands.truth_table import truth_tables
     from wristctl.control.table import controller
     from wristctl.tuning.objective import marks_of
-    from wristctl.tuning.search import tuning_cases
+    from wristctl.tuning.search import own_loop, tuning_cases
 
     study = identified(session.study, "tune", session.inputs)
     loops = judged_loops(study, study.tune).values()
@@ -206,9 +208,10 @@ def tune(session: Session) -> Tuned:
     gains = {name: best.gains for name, best in searches.items()}
     errors = beside_feedforward(gains, cases, study.wrist)
     elsewhere = _elsewhere(session, study, network, gains)
+    stood = _stood(session, own_loop(study, searched, network), gains)
     _write_files(session.findings, study, gains)
     bending = why_two_planes(study.wrist, asked_of_search(study))
-    return Tuned(session.study, session.findings, tables, searches, lost, errors, len(cases), elsewhere, bending)
+    return Tuned(session.study, session.findings, tables, searches, lost, errors, len(cases), elsewhere, stood, bending)
 
 
 def motion_of(study: Study, run: str) -> Motion:
@@ -237,6 +240,25 @@ def _write_files(findings: Findings, study: Study, gains: Mapping[str, Mapping[s
         title = f"{name}, as `wristctl tune` found it on {tried.where}: wristctl simulate THIS"
         rows = [row_of(name, values)]
         keep_gains(findings, file_of(name), title, study, rows, simulate=asked, compare={"loops": loops}, hw_run=trial)
+
+
+def _stood(session: Session, own: OwnLoop, gains: Mapping[str, Mapping[str, float]]) -> dict[str, Stood]:
+    """How much the gains of each controller stand on the loop that they were tuned for, kept as a table."""
+    import numpy as np
+    import pandas as pd
+
+    from wristctl.control.table import controller
+
+    stood = dict[str, "Stood"]()
+    with session.progress("looking for margins", total=len(gains), unit="controllers") as advance:
+        for number, (name, values) in enumerate(gains.items(), start=1):
+            law = controller(name)
+            stood[name] = own.stood(law, np.array(law.values(values)))
+            advance(number)
+    if stood:
+        rows = [{"controller": name, **changes._asdict()} for name, changes in stood.items()]
+        session.findings.table("data/margins.csv", pd.DataFrame(rows), units=dict.fromkeys(rows[0], "1"))
+    return stood
 
 
 def _elsewhere(
@@ -272,14 +294,11 @@ def _elsewhere(
 def search_all(session: Session, study: Study, network: Inverse | None) -> dict[str, Search]:
     """Tune every controller of the study's tune section; what was found is kept also where it is cut short."""
     from wristctl.control.table import controller
-    from wristctl.tuning.objective import Judge
-    from wristctl.tuning.search import search, tuning_cases
+    from wristctl.tuning.search import judges_of, search
 
     settings = study.tune
     _note_streams(session, study)
-    searched, chosen = tuning_cases(study, network)
-    judge = Judge(searched, study.wrist, settings.objective)
-    choose = Judge(chosen, study.wrist, settings.objective) if chosen else None
+    judge, choose = judges_of(study, network)
     searches: dict[str, Search] = {}
     try:
         for name in settings.controllers:
@@ -337,7 +356,7 @@ def _told(gains: Mapping[str, float]) -> str:
 
 def _keep(findings: Findings, searches: dict[str, Search], judge: Judge) -> None:
     """Keep what was found, also of a search that was cut short."""
-    from wristctl.commands.tune.figures import convergence, gain_history
+    from wristctl.commands.tune.figures import convergence, gain_history, tornado
     from wristctl.control.table import controller, write_gains
     from wristctl.tuning.search import finalists, history
 
@@ -361,26 +380,6 @@ def _keep(findings: Findings, searches: dict[str, Search], judge: Judge) -> None
         findings.figure(f"gain-sensitivity-{name}", tornado, name, result.gains, judge, caption=caption, later=True)
     findings.headline(*(f"{name}_objective" for name in sorted(searches, key=lambda name: searches[name].objective)))
     findings.figure("convergence", convergence, list(searches.values()), caption="Best objective against the budget")
-
-
-# Factor by which gains are less or more.
-_APART = 1.5
-
-
-def tornado(name: str, gains: Mapping[str, float], judge: Judge) -> Figure:
-    """The tornado of the gains found, judged as they were chosen."""
-    import numpy as np
-
-    from wristctl.commands.tune.figures import gain_sensitivity
-    from wristctl.control.table import controller
-
-    law = controller(name)
-    base = np.array(law.values(gains))
-    tried = np.tile(base, (1 + 2 * len(base), 1))
-    for index in range(len(base)):
-        tried[1 + 2 * index, index] /= _APART
-        tried[2 + 2 * index, index] *= _APART
-    return gain_sensitivity(name, list(law.gains), _APART, judge(law, tried))
 
 
 TUNE = sweepable(

@@ -9,11 +9,15 @@ from numpy.typing import NDArray
 
 from wristctl.arrays import Array
 from wristctl.control.law import Gain
+from wristctl.control.table import controller
 from wristctl.plotting.style import BLACK, ORANGE, SKY, colour, figure, legend_below, logarithmic, title
+from wristctl.tuning.objective import Judge
 from wristctl.tuning.search import Search
 
 # Share of the candidates that the axis of a search reaches, and its least height [decades].
 _TYPICAL, _FLAT = 0.75, 0.05
+# Factor by which gains are less or more.
+_APART = 1.5
 # Candidates beyond which their axis is logarithmic.
 _LONG = 500
 
@@ -95,6 +99,17 @@ def _best_so_far(search: Search) -> Array:
     better = np.concatenate([[True], least[1:] < least[:-1]])
     best_gains: Array = gains_of_least[np.maximum.accumulate(np.where(better, np.arange(len(least)), 0))]
     return best_gains
+
+
+def tornado(name: str, gains: Mapping[str, float], judge: Judge) -> Figure:
+    """The tornado of the gains found, judged as they were chosen."""
+    law = controller(name)
+    base = np.array(law.values(gains))
+    tried = np.tile(base, (1 + 2 * len(base), 1))
+    for index in range(len(base)):
+        tried[1 + 2 * index, index] /= _APART
+        tried[2 + 2 * index, index] *= _APART
+    return gain_sensitivity(name, list(law.gains), _APART, judge(law, tried))
 
 
 def gain_sensitivity(name: str, gains: Sequence[str], factor: float, values: Array) -> Figure:
