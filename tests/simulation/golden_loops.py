@@ -189,7 +189,8 @@ def in_one_plane(case: Case, gains: list[float]) -> Numbers:
     record = _recorded(made, case.lanes)
     sums = to_rows(made.state.sums, case.lanes)
     last = SUMS.index("alive")  # tensions of the last tick, as recorded, stand before it
-    sums = np.concatenate([sums[:, :last], sums[:, len(SUMS) :], sums[:, last : len(SUMS)]], axis=1)
+    later = SUMS.index("limited")  # a newer sum, of which there is no record
+    sums = np.concatenate([sums[:, :last], sums[:, len(SUMS) :], sums[:, last:later]], axis=1)
     return {
         "bend": record[:, :, :1],
         "record": record,

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+import wristctl
 from tests.values import LAST_MOVES, multi_step, one_move
 from wristctl.simulation.closed_loop import simulate
 from wristctl.simulation.metrics import METRICS, metrics_of, of_trajectory, summed
@@ -79,7 +80,7 @@ def test_a_rollout_is_judged_as_its_recorded_course(angles: str) -> None:
     course = done.trajectory
     followed = motion(study.simulate.reference, study.wrist, 3.0, 1e-3)
     found = metrics_of(1e-3, course.theta, course.theta_ref, course.tension, followed.goals)
-    names = set(found) - {"saturation"}
+    names = set(found) - {"saturation", "motor_limited"}
     assert {name: found[name] for name in names} == {name: pytest.approx(done.metrics[name]) for name in names}
     assert 0.0 <= found["overshoot"] < 30.0 and 1.0 < found["settling"] < 3.0
 
@@ -128,7 +129,7 @@ def test_tension_metrics_count_both_sides() -> None:
 
 def test_what_a_rollout_that_failed_still_tells_is_its_effort_and_how_it_was_computed() -> None:
     told = {name for name, metric in METRICS.items() if not metric.of_error}
-    effort = {"peak_tension", "rms_tension", "chattering", "saturation", "slack", "energy"}
+    effort = {"peak_tension", "rms_tension", "chattering", "saturation", "slack", "energy", "motor_limited"}
     assert told == effort | {"substeps", "drift"}
 
 
@@ -136,6 +137,27 @@ def test_every_metric_states_unit_and_formula() -> None:
     found = metrics_of(PERIOD, TIME, TIME, STILL, one_move(5.0, 0.0, HORIZON))
     assert set(found) == set(summed())
     assert all(metric.formula for metric in METRICS.values())
+
+
+@pytest.mark.parametrize("planes", [1, 2])
+def test_motors_limit_where_they_are_slower_than_the_command_and_nowhere_else(planes: int) -> None:
+    """Spools with a hundredth of the acceleration are late for most of a quick move; torques as commanded never are."""
+    reference, horizon = "{kind: minimum-jerk, duration: 0.5, angle_deg: 30.0}", 1.0
+    shares = {}
+    for name, loop in {
+        "as commanded": "{}",
+        "quick": "{actuator: {level: tendon, step_acceleration: 5.0e+5}, control_period: 5.0e-3}",
+        "slow": "{actuator: {level: tendon, step_acceleration: 500.0}, control_period: 5.0e-3}",
+    }.items():
+        settings = [f"reference={reference}", f"horizon={horizon}", "controller=feedforward", f"loop={loop}"]
+        study = load_study([], [*settings, f"loop.planes={planes}"], "simulate")
+        shares[name] = wristctl.simulate(study).metrics["motor_limited"]
+    assert shares["as commanded"] == 0.0 and shares["quick"] < 0.05 and shares["slow"] > 0.5
+
+
+def test_what_the_motors_of_a_recording_withheld_is_not_known() -> None:
+    found = metrics_of(PERIOD, TIME, TIME, STILL, one_move(5.0, 0.0, HORIZON))
+    assert math.isnan(found["motor_limited"]) and found["saturation"] == 0.0
 
 
 def test_nothing_settles_or_overshoots_where_the_last_angle_is_where_it_began() -> None:
@@ -176,6 +198,8 @@ def test_metrics_of_a_trajectory_are_those_of_its_tip_and_of_the_true_wanted_ang
         "substeps": 1.0,
         "drift": 0.0,
         "range_untracked": 0.0,
+        "plateau": 0.0,
+        "jump": 0.0,
     }
 
 

@@ -204,6 +204,9 @@ METRICS: Choices[Any] = Choices(
         "observer_consistency": "wristctl.simulation.metrics:OBSERVER",
         "outside_domain": "wristctl.simulation.metrics:OUTSIDE_DOMAIN",
         "range_untracked": "wristctl.simulation.metrics:RANGE_UNTRACKED",
+        "plateau": "wristctl.simulation.metrics:PLATEAU",
+        "jump": "wristctl.simulation.metrics:JUMP",
+        "motor_limited": "wristctl.simulation.metrics:MOTOR_LIMITED",
     },
 )
 

@@ -10,6 +10,7 @@ from wristctl.control.belief import Limits, belief_in_lanes
 from wristctl.control.law import now_at
 from wristctl.control.response import FULL, OF_A_PLANE, Controlled, Seen, look_ahead, respond, room_like
 from wristctl.lanes.compiled import by_type, compiled, implements, spelled_out
+from wristctl.lanes.functions import norm
 from wristctl.lanes.lane import where, zero_like
 from wristctl.lanes.named_tuples import block_of, borrowed
 from wristctl.lanes.rows import lanes_like, part, rows_of
@@ -232,7 +233,8 @@ def _run_block(setup: Any, course: Any, world: Any, state: Any, scratch: Any, fi
             watch_range(sum_, time, bend, bound[2 * count])
             for t in range(count):
                 acts[t] = acts[t] * of_one[t]
-            gather(sum_, goals, time, bend, wish, acts, where(share < FULL, 1.0, zero))
+            limited = where(norm(seen.withheld) > 0.0, 1.0, zero)
+            gather(sum_, goals, time, bend, wish, acts, where(share < FULL, 1.0, zero), limited)
             if tick == 0 and sample < state.record.shape[0]:
                 row = rows_of(state.record[sample])
                 for p in range(planes):

@@ -18,6 +18,7 @@ from wristctl.config.choices import Choices
 from wristctl.simulation.arrival import missing
 from wristctl.simulation.motion import GOALS, Goals, goals_of_bends
 from wristctl.simulation.oscillation import hunting, oscillation
+from wristctl.simulation.stick_slip import jump, plateau
 from wristctl.simulation.trajectory import PLANES, Trajectory, size_of
 
 
@@ -242,6 +243,13 @@ SATURATION = Metric(
     of_error=False,
     floor=0.001,
 )
+MOTOR_LIMITED = Metric(
+    "",
+    "share of time in which motors' speed, acceleration or lag kept a part of the command from the wrist",
+    lambda of: of.sums["limited"] / of.sums["ticks"],
+    of_error=False,
+    floor=0.001,
+)
 SLACK = Metric(
     "",
     "share of time in which a tendon was slack",
@@ -279,6 +287,18 @@ HUNTING = Metric(
     "rad",
     "half the peak-to-peak of the angle over the last half of a hold of at least 20 s, its trend removed",
     of_trajectory=hunting,
+    floor=2.0 * _ANGLE,
+)
+PLATEAU = Metric(
+    "s",
+    "longest time in which the reference moves by more than 1 deg/s and the angle by less than a tenth of that",
+    of_trajectory=plateau,
+    floor=0.01,
+)
+JUMP = Metric(
+    "rad",
+    "largest motion beyond the reference's own within 0.1 s after such a rest of at least 0.05 s",
+    of_trajectory=jump,
     floor=2.0 * _ANGLE,
 )
 SUBSTEPS = Metric(

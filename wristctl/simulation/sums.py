@@ -20,13 +20,13 @@ from wristctl.simulation.motion import GOALS, Goals
 SUMS = (
     "squared", "squared_move", "squared_exit", "absolute", "late", "late_count", "exit_2", "exit_5", "overshoot",
     "peak", "squared_tension", "variation", "saturated", "slack", "ticks", "ticks_move", "alive", "until",
-    "step_error",
+    "step_error", "limited",
 )  # fmt: skip
 OF_BENDS = ("squared_ulnar", "squared_flexion", "squared_most")
 (
     _SQUARED, _SQUARED_MOVE, _SQUARED_EXIT, _ABSOLUTE, _LATE, _LATE_COUNT, _EXIT_2, _EXIT_5, _OVERSHOOT,
     _PEAK, _SQUARED_TENSION, _VARIATION, _SATURATED, _SLACK, _TICKS, _TICKS_MOVE, _ALIVE, _UNTIL,
-    _STEP_ERROR,
+    _STEP_ERROR, _LIMITED,
 ) = range(len(SUMS))  # fmt: skip
 _LAST = len(SUMS)
 _MOVE, _BEGIN, _REST, _HORIZON = range(len(GOALS))
@@ -46,9 +46,9 @@ def sums_by_name(rows: Array, places: int) -> dict[str, Array]:
 
 
 @compiled
-def gather(sums: Any, goals: Any, time: Any, bend: Any, wish: Any, tensions: Any, saturated: Any) -> None:
-    """Add one tick: bends and their reference at `time` (P rows each), the tensions [N] that act then (T rows), and 1
-    where the torque was out of reach. `goals` are rows of Goals."""
+def gather(sums: Any, goals: Any, time: Any, bend: Any, wish: Any, tensions: Any, saturated: Any, limited: Any) -> None:
+    """Add one tick: bends and their reference at `time` (P rows each), the tensions [N] that act then (T rows), 1 where
+    the torque was out of reach, and 1 where motors withheld a part of it. `goals` are rows of Goals."""
     zero = zero_like(time)
     planes, count = len(bend), len(tensions)
     of_motion = beyond(goals, 2 * planes)
@@ -84,6 +84,7 @@ def gather(sums: Any, goals: Any, time: Any, bend: Any, wish: Any, tensions: Any
     sums[_SQUARED_TENSION] = sums[_SQUARED_TENSION] + (1.0 / count) * square
     sums[_VARIATION] = sums[_VARIATION] + where(sums[_TICKS] > 0.0, change, 0.0)
     sums[_SATURATED] = sums[_SATURATED] + saturated
+    sums[_LIMITED] = sums[_LIMITED] + limited
     sums[_SLACK] = sums[_SLACK] + where(least <= 0.0, 1.0, 0.0)
     sums[_TICKS] = sums[_TICKS] + 1.0
     sums[_TICKS_MOVE] = sums[_TICKS_MOVE] + moving
@@ -109,7 +110,8 @@ def _replay(series: Any, goals: Any, sums: Any, period: float, planes: Any, plac
         row = rows_of(series[tick])
         bend, wish, tensions = part(row, 0, planes), part(row, count, planes), part(row, 2 * count, places)
         saturated = row[2 * count + len(places)]
-        gather(total, goal, tick * period + zero_like(row[0]), bend, wish, tensions, saturated)
+        zero = zero_like(saturated)
+        gather(total, goal, tick * period + zero, bend, wish, tensions, saturated, zero)
 
 
 def sums_of(
@@ -118,10 +120,11 @@ def sums_of(
     """The sums by name, (1,) each, of a recorded series sampled every `period` [s].
 
     It has bends and their reference (K, P) [rad], the tension of one tendon of each place (K, T) [N], and 1 where the
-    torque was out of reach (K,).
+    torque was out of reach (K,). What its motors withheld is not known.
     """
     planes, places = bend.shape[1], tension.shape[1]
     sums = no_sums(planes, places)
+    sums[_LIMITED] = np.nan
     series = np.column_stack([bend, wish, tension, saturated]).astype(np.float64)
     _replay(np.ascontiguousarray(series), goals.rows, sums, period, (0,) * planes, (0,) * places)
     return sums_by_name(sums[None], places)
