@@ -42,8 +42,12 @@ def stands(
     chatters: tuple[str, ...] = (),
     unconverged: tuple[str, ...] = (),
     failed: dict[str, int] | None = None,
+    waits: dict[str, float] | None = None,
 ) -> Ranking:
-    """Rows on so many motions, each its RMSE times what all share; `failed` rows in the first so many motions."""
+    """Rows on so many motions, each its RMSE times what all share; `failed` rows in the first so many motions.
+
+    `waits` is the share of time at the motors' limits, where it is known.
+    """
     errors = RMSE if rmse is None else rmse
     rng = np.random.default_rng(5)
     shared, own = rng.normal(0.0, 0.5, motions), 0.02 * rng.standard_normal((len(errors), motions))
@@ -65,7 +69,26 @@ def stands(
         swing=swing, chatter=slams, peak=peak, away=short, motions=motions, loops=["a"],
         unsound={kind: np.isfinite(scores).sum(axis=1) * flags for kind, flags in holds.items()},
         traits=TRAITS.get(name.removesuffix(", steps"), Traits())._replace(jumps=steps),
+        at_limit={} if waits is None else {"tensions": np.zeros(len(labels)),
+                                           "motors": np.array([waits.get(label, 0.0) for label in labels])},
     )  # fmt: skip
+
+
+def test_where_all_that_tie_wait_for_their_motors_it_is_said_that_motors_decide() -> None:
+    """Not where one of them does not, nor where the best is alone; the share at a limit is told in any case."""
+    alike = {"mrac/default": 1e-3, "pid-ff/default": 1e-3, "feedforward/default": 1e-2}
+    apart = alike | {"pid-ff/default": 3e-3}
+    slow, one = dict.fromkeys(alike, 0.4), {"mrac/default": 0.4, "pid-ff/default": 0.02}
+    for errors, waits, motors in ((alike, slow, True), (alike, one, False), (apart, slow, False)):
+        found = stands("camera and tendons", errors, waits=waits)
+        assert (len(found.standing.groups[0]) > 1) == (errors is alike)
+        assert found.motors_decide == motors and ("motors decide" in told(found)) == motors
+        assert "of the best: motors + camera tensions 0 %, motors" in told(found)
+    for waits, motors in ((dict.fromkeys(alike, 0.4), True), ({}, False)):
+        useless = stands("camera and tendons", alike, away=tuple(alike), waits=waits)
+        assert not useless.standing.groups and ("motors decide" in told(useless)) == motors
+    assert "at a limit" not in told(stands())
+    assert "of the best: none." in told(stands(waits={}))
 
 
 def told(*rankings: Ranking) -> str:

@@ -45,7 +45,10 @@ def standings_table(rankings: Sequence[Ranking]) -> Table:
 
 
 def every_row(ranking: WorldRanking, times: Mapping[str, StepTime] | None = None) -> Table:
-    """All rows of a ranking, from best to worst, with intervals, faults and costs; `times` of a tick by controller."""
+    """All rows of a ranking, from best to worst, with intervals, faults and costs.
+
+    `times` are those of a tick, by controller or by row.
+    """
     import numpy as np
 
     from wristctl.comparison.controller_ranking import undominated
@@ -58,17 +61,20 @@ def every_row(ranking: WorldRanking, times: Mapping[str, StepTime] | None = None
         mean, gain, group = ranking.means[row], ranking.gains[row], ranking.standing.group(row)
         failures, swings = ranking.standing.failures[row], ranking.standing.swings[row]
         lost = [f"{100 * share.value:.3g} % (< {100 * share.high:.2g})" for share in (failures, swings)]
-        tick = (times or {}).get(ranking.labels[row].split("/")[0])
+        name, known = ranking.labels[row], times or {}
+        tick = known.get(name, known.get(name.split("/")[0]))
         ends = [degrees(end, DIGITS) if mean.high < np.inf else "-" for end in (mean.low, mean.high)]
         ratio = f"{two(gain.low, DIGITS)} to {two(gain.high, DIGITS)}" if gain.high < np.inf else "-"
         rows.append((
             "-" if group is None else str(group), ranking.labels[row], degrees(mean.value, DIGITS), *ends,
             degrees(float(ranking.scores[row].max()), DIGITS), gain.value, ratio, *lost, chattering[row], energy[row],
-            tick.median if tick else None, "yes" if front[row] and group else "",
+            *(f"{100.0 * shares[row]:.3g} %" for shares in ranking.at_limit.values()),
+            tick.median if tick else None, tick.p99 if tick else None, "yes" if front[row] and group else "",
         ))  # fmt: skip
     heads = (
         "group", "controller", "RMSE [deg]", "95 % low", "high", "worst", "times less than feedforward", "95 %",
-        "fails", "swings or chatters", "tension [N/s]", "work [J]", "tick [us]", "undominated",
+        "fails", "swings or chatters", "tension [N/s]", "work [J]",
+        *(f"at limit of {limit}" for limit in ranking.at_limit), "tick [us]", "tick, P99 [us]", "undominated",
     )  # fmt: skip
     title = f"{condition(ranking)}: {ranking.count} held-out worlds, {ranking.motions} motions each"
     return Table(title, heads, rows)

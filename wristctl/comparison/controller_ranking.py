@@ -6,8 +6,8 @@ others.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING, Literal, NamedTuple
 
@@ -32,6 +32,11 @@ if TYPE_CHECKING:
 STREAM = 20_031
 # Inverses in order of preference for a ranking: control is ranked by itself, and a network's error by `train`.
 _INVERSES = ("none", "closed-form", "network")
+# What may limit a row, with the metric that is the share of time in which it does.
+LIMITS = {"tensions": "saturation", "motors": "motor_limited"}
+# Share of time at their motors' limits from which it is motors, and not laws, that make the best alike: errors have
+# grown by half an order of magnitude by then.
+MOTORS_DECIDE = 0.05
 # What a score is of.
 Unit = Literal["case", "repetition", "world"]
 
@@ -84,6 +89,18 @@ class Ranking:
     traits: Traits
     loops: Sequence[str] = ()
     """Names of the loops of a condition; none of worlds."""
+    at_limit: Mapping[str, Array] = field(default_factory=dict)
+    """Share of time that each row was at a limit, by LIMITS, (R,) each; none where that is not known."""
+
+    @property
+    def motors_decide(self) -> bool:
+        """Whether motors make several rows alike: those that tie for the best, or all where none can be used.
+
+        Each of them waits for its motors for at least MOTORS_DECIDE of the time.
+        """
+        alike = self.standing.groups[0] if self.standing.groups else self.standing.order
+        waits = self.at_limit.get("motors", np.zeros(len(self.labels)))
+        return len(alike) > 1 and bool((waits[alike] >= MOTORS_DECIDE).all())
 
     @property
     def jumps(self) -> bool:
@@ -220,6 +237,11 @@ def _ranked(name: str, results: Sequence[ComparedRow], loops: Sequence[str], tra
         motions=len(cells),
         traits=traits,
         loops=loops,
+        at_limit={
+            limit: np.array([np.mean([cell.metrics[metric].mean() for cell in row]) for row in table])
+            for limit, metric in LIMITS.items()
+            if all(metric in cell.metrics for row in table for cell in row)
+        },
     )
 
 
@@ -278,5 +300,6 @@ def standings_frame(rankings: Sequence[Ranking]) -> pd.DataFrame:
                     "chatter": ranking.chatter[row],
                     "peak": ranking.peak[row],
                 }
+                | {f"at_limit_of_{limit}": shares[row] for limit, shares in ranking.at_limit.items()}
             )
     return pd.DataFrame(lines)

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wristctl.arrays import Array
-from wristctl.comparison.controller_ranking import STREAM, Ranking, Traits, counted
+from wristctl.comparison.controller_ranking import LIMITS, STREAM, Ranking, Traits, counted
 from wristctl.comparison.tie_groups import Comparisons, standing
 from wristctl.config.controller_row import Row
 from wristctl.config.families import TOLERATED, Family, Worlds
@@ -44,6 +44,7 @@ RANKED = (
     "peak_tension",
     "rms_tension",
     "saturation",
+    "motor_limited",
     "energy",
     "drift",
 )
@@ -179,6 +180,11 @@ def ranking(
         traits=_traits(family, kind),
         family=family,
         rows=list(rows),
+        at_limit={
+            limit: np.array([one.metrics[metric].mean() for one in measured])
+            for limit, metric in LIMITS.items()
+            if all(metric in one.metrics for one in measured)
+        },
     )
 
 

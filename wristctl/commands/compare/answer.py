@@ -21,6 +21,7 @@ from wristctl.commands.ranking_answer import (
 )
 from wristctl.commands.ranking_words import PRINTED, condition, error, facts, gains_words, names_of, open_loop
 from wristctl.commands.results import Findings
+from wristctl.commands.who_decides import decided
 
 if TYPE_CHECKING:
     from wristctl.comparison.combinations import ComparedRow
@@ -64,6 +65,7 @@ def answer_of(
         (" ".join(filter(None, [not_elsewhere(rankings, names), papers_order(rankings)])), ""),
         (" ".join(filter(None, [gains_of_best(rankings, gains or {}), compared(rankings), more])), more),
         (ties(rankings, names), ""),
+        (decided(rankings), ""),
         (certainty(rankings), ""),
         ("Your own wrist: `wristctl init DIR` begins a folder for it (documentation: Your own wrist).", ""),
     ]

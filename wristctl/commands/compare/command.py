@@ -285,8 +285,9 @@ def compare(session: Session) -> Compared:
         of_worlds = ranked(session, study, network, tuned)
         head_with_the_best(findings, of_worlds)
         draw_rankings(findings, of_worlds)
-        shown = [*answer_tables(of_worlds), *map(every_row, of_worlds)]
-        return Compared(study, findings, shown, [], searches, {}, of_worlds, gains)
+        times = _step_times(session, study, tuned)
+        shown = [*answer_tables(of_worlds), *(every_row(ranking, times) for ranking in of_worlds)]
+        return Compared(study, findings, shown, [], searches, times, of_worlds, gains)
     with session.progress("comparing", total=100, unit="%") as report:
         results = run_comparison(study, network, tuned, lambda share: report(round(100 * share)))
     scenarios = [scenario_of(reference, way) for reference in settings.references for way in settings.directions]

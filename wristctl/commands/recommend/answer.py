@@ -12,6 +12,7 @@ from wristctl.commands.answer import Answer
 from wristctl.commands.kept_studies import FOLDER, file_of
 from wristctl.commands.printed_table import Table, degrees, joined, two
 from wristctl.commands.results import StudyResult
+from wristctl.commands.who_decides import decided
 from wristctl.errors import UserError
 
 if TYPE_CHECKING:
@@ -210,6 +211,8 @@ def _notes(result: Recommended) -> list[str]:
     wanted = result.study.recommend.largest_deg
     short = f" (asked: {wanted:g} deg)" if result.reach_deg < wanted else ""
     notes = [f"The tendons hold {result.reach_deg:g} deg to either side on every simulated rig{short}."]
+    if told := decided([result.ranking]):
+        notes.append(told)
     if result.best is None:
         return notes
     sine = f"sines of {sine_deg(result.reach_deg):g} deg to both sides"

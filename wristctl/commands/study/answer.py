@@ -10,6 +10,7 @@ from wristctl.commands.answer import Answer
 from wristctl.commands.printed_table import Table, joined
 from wristctl.commands.ranking_answer import advice, certainty, decision_table, do_not_use, fitted, not_elsewhere
 from wristctl.commands.ranking_words import condition, names_of, winner
+from wristctl.commands.who_decides import decided
 
 if TYPE_CHECKING:
     from wristctl.comparison.paired_worlds import OrderShift, TermValue
@@ -36,7 +37,9 @@ def answer_of(
         return None
     names = names_of(rankings)
     more = f"Every controller: `--all`, or {run}/report.html." if run else "Every controller: `.tables`."
-    sure = " ".join(filter(None, [certainty(rankings), few_tunings(rankings), first_again(rankings)]))
+    sure = " ".join(
+        filter(None, [certainty(rankings), decided(rankings), few_tunings(rankings), first_again(rankings)])
+    )
     notes: list[tuple[str | Table, str | Table]] = [
         (terms_table(terms) if terms else "", ""),
         (f"{do_not_use(rankings, names)} {not_elsewhere(rankings, names)}".strip(), _fewer(rankings)),
