@@ -5,7 +5,7 @@ from functools import cache
 from typing import Any
 
 from wristctl.control.law import NOW, Controller
-from wristctl.lanes.compiled import compiled
+from wristctl.lanes.compiled import compiled, kept_nowhere
 
 _RATE = NOW.index("rate")
 
@@ -33,7 +33,7 @@ def _law(base: Any, last: int) -> Any:
         _difference(now, memory, last)
         return inner(now, wrist, gains, memory)
 
-    return _kept_nowhere(law)
+    return kept_nowhere(law)
 
 
 @cache
@@ -45,10 +45,4 @@ def _law_of_both_planes(base: Any, last: int) -> Any:
             _difference(now[p], memory[p], last)
         inner(now, wrist, gains, memory, tendons, torque)
 
-    return _kept_nowhere(law)
-
-
-def _kept_nowhere(law: Any) -> Any:
-    # What it encloses is not part of its source: under a name that is no file, nothing compiled of it is kept.
-    law.__code__ = law.__code__.replace(co_filename="<differenced>")
-    return law
+    return kept_nowhere(law)

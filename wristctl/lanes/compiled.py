@@ -203,6 +203,12 @@ class _Locator(UserProvidedCacheLocator):
         self._py_file, self._lineno, self._cache_path = code.co_filename, code.co_firstlineno, str(folder)
 
 
+def kept_nowhere(function: F) -> F:
+    """A function that encloses others, which are no part of its source: nothing that is compiled of it is kept."""
+    function.__code__ = function.__code__.replace(co_filename="<made>")
+    return function
+
+
 def keep(dispatcher: Any, function: Callable[..., Any], *extra_sources: Path, frozen: bytes = b"") -> Path | None:
     """Have what numba makes of a function, a dispatcher or a C function, kept in the folder of its sources."""
     folder = cache_folder(Path(function.__code__.co_filename), *extra_sources, frozen=frozen)

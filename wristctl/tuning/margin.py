@@ -15,7 +15,7 @@ from wristctl.config.loop import Loop
 from wristctl.config.wrist import WristParameters
 from wristctl.control.law import Controller, Gain
 from wristctl.control.plain_law import named_gains
-from wristctl.lanes.compiled import compiled
+from wristctl.lanes.compiled import compiled, kept_nowhere
 from wristctl.lanes.lane import where
 from wristctl.simulation.cases import Case, Measured, measure
 
@@ -198,7 +198,7 @@ def _compiled(base: Any, last: int) -> Any:
     def law(now: Any, wrist: Any, gains: Any, memory: Any) -> Any:
         return _later(gains, memory, last, inner(now, wrist, gains, memory))
 
-    return _kept_nowhere(law)
+    return kept_nowhere(law)
 
 
 @cache
@@ -210,13 +210,7 @@ def _compiled_of_both_planes(base: Any, last: int) -> Any:
         for p in range(len(torque)):
             torque[p] = _later(gains, memory[p], last, torque[p])
 
-    return _kept_nowhere(law)
-
-
-def _kept_nowhere(law: Any) -> Any:
-    # What it encloses is not part of its source: under a name that is no file, nothing compiled of it is kept.
-    law.__code__ = law.__code__.replace(co_filename="<changed>")
-    return law
+    return kept_nowhere(law)
 
 
 @cache
