@@ -13,9 +13,9 @@ from wristctl.config.families import Family
 from wristctl.config.loop import Reference
 from wristctl.config.wrist import WristParameters
 from wristctl.errors import UserError
-from wristctl.simulation.drawn_worlds import drawn_cases
+from wristctl.simulation.drawn_worlds import asked_of, drawn_cases
 from wristctl.simulation.motion import Motion
-from wristctl.simulation.planes import motion_in
+from wristctl.simulation.planes import motion_in, planes_of
 from wristctl.study_files.load import load_study
 from wristctl.study_files.shipped import study_file
 
@@ -98,3 +98,10 @@ def test_a_shipped_family_bends_in_its_planes_with_no_motion_drawn_twice(name: s
     assert len(ends) == len(cases) - 5 * fixed
     again = drawn_cases(family, name, "test", 0, 6, WRIST)
     assert [case.motion.bend_ref.tobytes() for case in again] == [case.motion.bend_ref.tobytes() for case in cases]
+
+
+@pytest.mark.parametrize("name", ["ideal", "camera", "handling", "uneven", "steps"])
+def test_families_that_gains_were_shipped_for_stay_in_the_plane_that_they_were_found_in(name: str) -> None:
+    file = study_file(Path(f"scenarios/{name}"))
+    assert file is not None
+    assert planes_of(WRIST, asked_of(load_study([file]).families[name])) == 1

@@ -160,12 +160,12 @@ def asked_of_comparison(study: Study) -> list[Asked]:
     return asked_of_family(study, family) if family else asked_by(study.compare)
 
 
-def why_two_planes(wrist: WristParameters, asked: Iterable[Asked]) -> str:
+def why_two_planes(wrist: WristParameters, asked: Iterable[Asked], which: str = "") -> str:
     """In which planes all loops bend, and why, a sentence; empty where they stay in one. Raises UserError."""
     from wristctl.simulation.planes import why_two
 
     reason = why_two(wrist, asked)
-    return f"All loops bend in two planes: {reason}." if reason else ""
+    return f"All loops{which} bend in two planes: {reason}." if reason else ""
 
 
 def check_inverses(inverses: Iterable[str], inputs: Inputs) -> None:

@@ -1,11 +1,9 @@
 """The wrist's parameters; every default carries its source: the paper gives few of them (C10)."""
 
 import math
-from collections.abc import Mapping
-from typing import Any, Literal, Self
+from typing import Literal, Self
 
 from pydantic import model_validator
-from pydantic_core import PydanticCustomError
 
 from wristctl.config.section import Section, choice, quantity, seldom
 
@@ -50,15 +48,6 @@ class WristParameters(Section):
         (-9.81, 0.0), "m/s^2", "gravity along the base tangent and toward ulnar", "assumed: upright, as in the test"
     )
     gravity_flexion: float = quantity(0.0, "m/s^2", "gravity toward flexion", "assumed: upright")
-
-    @model_validator(mode="before")
-    @classmethod
-    def _one_section(cls, given: Any) -> Any:
-        several = isinstance(given, list | tuple) and all(isinstance(each, Mapping) for each in given)
-        if several or (isinstance(given, Mapping) and "sections" in given):
-            fix = {"fix": "one section from base to hand; tendons that end inside it have ends_at"}
-            raise PydanticCustomError("sections", "several sections in series are not simulated", fix)
-        return given
 
     @model_validator(mode="after")
     def _tensions_in_order(self) -> Self:

@@ -41,12 +41,17 @@ def streams_of(family: Family, name: str, split: str) -> list[str]:
 
 
 def asked_of(family: Family) -> list[Asked]:
-    """Loops and motions of a family: all that is drawn at its lower end, at its upper, within, and at every value."""
+    """Loops and motions of a family: all that is drawn at its lower end, at its upper, within, and at every value.
+
+    In one plane all angles count in the same, also those of tasks that people do in the other.
+    """
     longest = max([len(family.together), *(len(some) for some in family.draw.values() if not isinstance(some, str))])
     places = [0.0, 1.0 - 1e-12, _WITHIN, *((k + 0.5) / longest for k in range(longest))]
     drawn = [dict.fromkeys([*family.draw, TOGETHER], share) for share in places]
     numbers = range(len(family.references))
-    return [Asked(family.world(shares), family.motion(number, shares)) for shares in drawn for number in numbers]
+    return [
+        Asked(family.world(shares), family.motion(number, shares), "ulnar") for shares in drawn for number in numbers
+    ]
 
 
 def drawn_cases(

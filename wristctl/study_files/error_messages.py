@@ -52,10 +52,19 @@ def _location(detail: Any) -> KeyPath:
     return (*detail["loc"], *[key for key in [detail.get("ctx", {}).get("key")] if key is not None])
 
 
+def _of_sections(detail: Any) -> bool:
+    """Whether it is a wrist of several sections in series, as a list or by a key of that name."""
+    path, several = detail["loc"], detail["input"]
+    listed = isinstance(several, tuple) and all(isinstance(each, dict) for each in several)
+    return path == ("wrist", "sections") or (path == ("wrist",) and listed)
+
+
 def _what(detail: Any) -> str:
+    if _of_sections(detail):
+        return "several sections in series are not simulated"
     if detail["type"] == "extra_forbidden":
         return f"unknown key {_location(detail)[-1]!r}"
-    if detail["type"] in ("added_value", "sections"):
+    if detail["type"] == "added_value":
         return str(detail["msg"])
     if detail["type"] == "value_error":
         return str(detail["ctx"]["error"])
@@ -78,6 +87,8 @@ def _what(detail: Any) -> str:
 
 
 def _fix(detail: Any) -> str:
+    if _of_sections(detail):
+        return "one section from base to hand; tendons that end inside it have ends_at"
     # pydantic puts the alternatives of a union, `tuple[...]`, between the keys
     path = tuple(key for key in _location(detail) if "[" not in str(key))
     if detail["type"] == "extra_forbidden":

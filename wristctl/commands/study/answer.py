@@ -18,7 +18,11 @@ if TYPE_CHECKING:
 
 
 def answer_of(
-    rankings: Sequence[TunedRanking], terms: Sequence[TermValue], shifts: Sequence[OrderShift], run: str = ""
+    rankings: Sequence[TunedRanking],
+    terms: Sequence[TermValue],
+    shifts: Sequence[OrderShift],
+    run: str = "",
+    bending: str = "",
 ) -> Answer | None:
     """The answer of a study for one screen; None where nothing was ranked.
 
@@ -32,6 +36,8 @@ def answer_of(
         Changes of the order where controllers were tuned otherwise.
     run
         Path of the run; empty for a result in memory.
+    bending
+        Families whose loops bend in two planes, and why, in sentences; empty where all stay in one.
     """
     if not rankings:
         return None
@@ -41,6 +47,7 @@ def answer_of(
         filter(None, [certainty(rankings), decided(rankings), few_tunings(rankings), first_again(rankings)])
     )
     notes: list[tuple[str | Table, str | Table]] = [
+        (bending, bending),
         (terms_table(terms) if terms else "", ""),
         (f"{do_not_use(rankings, names)} {not_elsewhere(rankings, names)}".strip(), _fewer(rankings)),
         (f"{sure} {tuned_otherwise(shifts)} {more}".strip(), f"{sure} {more}".strip()),

@@ -6,6 +6,8 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from wristctl.commands.inputs import EarlierRun, Inputs
+from wristctl.commands.inputs_of_loops import asked_of_family
+from wristctl.commands.loop_warnings import warn_of_one_plane
 from wristctl.commands.procedure import Procedure
 from wristctl.commands.session import Session
 from wristctl.commands.study.results import written
@@ -15,6 +17,7 @@ from wristctl.commands.study.units import (
     families_of,
     golden_of,
     judge_all,
+    planes_of_family,
     search_units,
     ways_to_tune,
 )
@@ -66,8 +69,8 @@ def plan(study: Study, inputs: Inputs) -> str:
             except UserError as error:
                 raise error.at(places.get(str(error.where), "optimiser")) from error
         families = {name: study.families[name] for name in families_of(study)}
-        for family in families.values():
-            check_size(Size([family.loop], family.horizon))
+        for name, family in families.items():
+            check_size(Size([family.loop], family.horizon), planes_of_family(study, name))
             check_inverses(inverses_of(family.references), inputs)
     for name in families:
         check_family_reach(study, name)
@@ -100,6 +103,8 @@ def fair_study(session: Session) -> Studied:
     from wristctl.tuning.search import search_of
 
     study = session.study
+    for name in families_of(study):
+        warn_of_one_plane(study.wrist, asked_of_family(study, name))
     with session.progress("compiling, and computing the golden rollouts"):
         golden = golden_of(study)
     session.findings.numerics(golden=golden.expected, executor=session.executor)
@@ -130,5 +135,10 @@ def _whole(
 
 
 FAIR_STUDY = Procedure(
-    "study", plan, fair_study, (EarlierRun("resume", kind="study", optional=True, unfinished=True),), in_units=True
+    "study",
+    plan,
+    fair_study,
+    (EarlierRun("resume", kind="study", optional=True, unfinished=True),),
+    in_units=True,
+    in_one_plane=lambda study: any(planes_of_family(study, name) == 1 for name in families_of(study)),
 )

@@ -12,7 +12,7 @@ from wristctl.commands.ranking_drawing import draw_rankings
 from wristctl.commands.ranking_tables import answer_tables, every_row
 from wristctl.commands.session import Session
 from wristctl.commands.study.published import PUBLISHED, published, published_gains
-from wristctl.commands.study.units import BASE, Studied, StudyPlace, budget_of, families_of
+from wristctl.commands.study.units import BASE, Studied, StudyPlace, budget_of, families_of, places_in
 from wristctl.config.study import Study
 
 if TYPE_CHECKING:
@@ -88,11 +88,11 @@ def _rankings(study: Study, judged: Pieces) -> dict[str, TunedRanking]:
         of_family = _tunings(study, judged, BASE, family)
         if f"{YARDSTICK}/default" not in of_family:
             continue
-        family_of, published = study.families[family], list[int]()
+        family_of, published, places = study.families[family], list[int](), places_in(study, family)
         for steps, motions in kinds_of(family_of).items():
             (open_loop,), width = of_family[f"{YARDSTICK}/default"], study.wrist.tension_range
             rows = [
-                [row_of(label, pieces, width, motions, None, open_loop) for pieces in tunings]
+                [row_of(label, pieces, width, motions, None, open_loop, places) for pieces in tunings]
                 for label, tunings in of_family.items()
             ]
             published = published or [published_tuning(of_row) for of_row in rows]
@@ -108,12 +108,13 @@ def _shifts(study: Study, judged: Pieces) -> list[OrderShift]:
 
     shifts, width = [], study.wrist.tension_range
     varied = study.study.varied or families_of(study)[0]
+    places = places_in(study, varied)
     motions = next(iter(kinds_of(study.families[varied]).values()))
     for variant, way in study.study.variants.items():
         before, after = (_tunings(study, judged, name, varied) for name in (way.beside or BASE, variant))
         labels = [label for label in after if label in before]
         rows = [
-            [[row_of(label, pieces, width, motions, 1) for pieces in side[label]] for label in labels]
+            [[row_of(label, pieces, width, motions, 1, None, places) for pieces in side[label]] for label in labels]
             for side in (before, after)
         ]
         if labels:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
 from wristctl.commands.answer import Answer
+from wristctl.commands.inputs_of_loops import asked_of_family, why_two_planes
 from wristctl.commands.results import StudyResult
 from wristctl.config.fair_study import FairStudySettings, StudyBudget, StudyVariant
 from wristctl.config.families import TuningWorlds
@@ -103,7 +104,22 @@ def golden_of(study: Study) -> Golden:
     settings = study.study
     laws = dict.fromkeys([YARDSTICK, *settings.laws, *(row.controller for row in settings.presets)])
     loops = kinds_of_worlds(study.families, families_of(study), study.seed)
-    return Golden.here(GOLDEN, golden_spec(laws, loops, study.wrist))
+    planes = [planes_of_family(study, family) for family in families_of(study)]
+    return Golden.here(GOLDEN, golden_spec(laws, loops, study.wrist, planes))
+
+
+def planes_of_family(study: Study, family: str) -> int:
+    """Planes that all worlds of a family bend in. Raises UserError."""
+    from wristctl.simulation.planes import planes_of
+
+    return planes_of(study.wrist, asked_of_family(study, family))
+
+
+def places_in(study: Study, family: str) -> int:
+    """Places of tendons that a family's loops pull: both sides in one plane, in two all of the wrist."""
+    from wristctl.wrist.tendon_layout import TendonLayout
+
+    return 2 if planes_of_family(study, family) == 1 else len(TendonLayout.of(study.wrist).places)
 
 
 def _tune_settings(study: Study, family: str, variant: StudyVariant) -> TuneSettings:
@@ -138,7 +154,10 @@ class Studied(StudyResult):
         """Controller for each rig, gain of each term, and reliability of the order."""
         from wristctl.commands.study.answer import answer_of
 
-        return answer_of(list(self.rankings.values()), self.terms, self.shifts, self.place)
+        of_families = {name: asked_of_family(self.study, name) for name in families_of(self.study)}
+        bending = [why_two_planes(self.study.wrist, asked, f" of {name}") for name, asked in of_families.items()]
+        whole = " ".join(filter(None, bending))
+        return answer_of(list(self.rankings.values()), self.terms, self.shifts, self.place, whole)
 
     @property
     def fault(self) -> UserError | None:

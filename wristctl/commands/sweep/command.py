@@ -14,7 +14,13 @@ from wristctl.commands import adoption, loop_warnings
 from wristctl.commands.adoption import with_presets
 from wristctl.commands.answer import Answer
 from wristctl.commands.inputs import Inputs
-from wristctl.commands.inputs_of_loops import check_row, identified, tuned_gains
+from wristctl.commands.inputs_of_loops import (
+    asked_of_comparison,
+    asked_of_search,
+    check_row,
+    identified,
+    tuned_gains,
+)
 from wristctl.commands.procedure import Procedure, check_tendons
 from wristctl.commands.results import StudyResult
 from wristctl.commands.session import Session
@@ -335,14 +341,18 @@ def _swept(session: Session, command: str) -> Swept:
 
 def _golden(study: Study, command: str) -> Golden:
     """Golden rollout of the loop of simulate or the built-in loop, by which workers show that they compute the same."""
+    from wristctl.commands.simulate.in_two_planes import asked_for_by
     from wristctl.config.loop import LOOPS
     from wristctl.simulation.golden import GOLDEN, golden_spec
+    from wristctl.simulation.planes import planes_of
     from wristctl.work.worker import Golden
 
-    law, loop = ("feedforward", LOOPS["sampled"])
+    law, loop, asked = "feedforward", LOOPS["sampled"], asked_of_search
     if command == "simulate":
-        law, loop = study.simulate.controller, study.simulate.loop
-    return Golden.here(GOLDEN, golden_spec([law], [loop], study.wrist))
+        law, loop, asked = study.simulate.controller, study.simulate.loop, asked_for_by
+    elif command == "compare":
+        asked = asked_of_comparison
+    return Golden.here(GOLDEN, golden_spec([law], [loop], study.wrist, [planes_of(study.wrist, asked(study))]))
 
 
 def _units(metrics: Sequence[str], units: dict[str, str]) -> dict[str, str]:
