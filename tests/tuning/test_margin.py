@@ -50,11 +50,18 @@ def _follows(now: Any, wrist: Any, gains: Any, memory: Any) -> Any:
     return memory[0]
 
 
+def _follows_both(now: Any, wrist: Any, gains: Any, memory: Any, tendons: Any, torque: Any) -> None:
+    for p in range(len(torque)):
+        memory[p][0] = memory[p][0] + gains.K * now[p].theta_ref
+        torque[p] = memory[p][0]
+
+
+@pytest.mark.parametrize("planes", [1, 2])
 @pytest.mark.parametrize("plain", [False, True])
-def test_a_late_torque_is_the_same_some_periods_later_also_of_plain_python(plain: bool) -> None:
-    """Of a law that knows the reference alone, and remembers."""
-    gain = controller("pid").gains["Kp"]
-    own = Controller("follows", _follows, "", {"K": gain}, {}, memory=1, plain=plain)
+def test_a_late_torque_is_the_same_some_periods_later_whatever_law_gives_it(plain: bool, planes: int) -> None:
+    """Of a law that knows the reference alone, and remembers: compiled or plain Python, of a plane or of both."""
+    gain, law = controller("pid").gains["Kp"], _follows if planes == 1 else _follows_both
+    own = Controller("follows", law, "", {"K": gain}, {}, memory=1, plain=plain, planes=planes)
     before, late = _torques(own, [0.1]), _torques(changed_law(own), [0.1, 2.0, 3.0])
     assert np.array_equal(late[3:], 2.0 * before[:-3]) and not late[:3].any() and before[0] > 0.0
 
