@@ -8,7 +8,7 @@ import logging
 import math
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import cv2
 import numpy as np
@@ -16,12 +16,19 @@ import pytest
 
 import wristctl
 from tests.commands.conftest import columns_of, known_of, session
+from wristctl.arrays import Array
+from wristctl.commands.export.open_log_of_run import open_log_of
 from wristctl.commands.inputs import Inputs
 from wristctl.commands.track.command import TRACK, Tracked
+from wristctl.config.camera import Markers, SceneSettings
+from wristctl.config.wrist import WristParameters
 from wristctl.errors import UserError
 from wristctl.records import Run, start_run
 from wristctl.vision import marker
+from wristctl.vision.camera import Frame
 from wristctl.vision.marker import MEANING, Sighting, SightingVerdict
+from wristctl.vision.recordings import RawVideo
+from wristctl.vision.scene import Scene
 
 DEGREES = (10.0, 30.0, 20.0, 25.0, None, 40.0, None, None)
 """Seen in each frame; None where no tip is."""
@@ -52,8 +59,8 @@ def follow(folder: Path, monkeypatch: pytest.MonkeyPatch) -> Follow:
     """The folder tracked by a tracker that sees these angles, less its zero."""
 
     class Told:
-        def __init__(self, markers: Any, view: Any, gates: Any) -> None:
-            assert (markers.base, view.size, gates) == (0, None, study().track.gates)
+        def __init__(self, markers: Any, view: Any, gates: Any, plane: Any = None) -> None:
+            assert (markers.base, view.size, gates, plane) == (0, None, study().track.gates, None)
             self.zero = 0.0
 
         def see(self, frame: Any) -> Sighting:
@@ -165,5 +172,67 @@ def test_a_plan_names_the_recording_its_size_and_that_there_is_no_calibration(fo
     assert TRACK.plan(study, Inputs({"calibration": Run(live.path)})) == f"{folder}: 24 x 16"
     with pytest.raises(UserError, match="track needs a video"):
         TRACK.plan(wristctl.load_study(None), Inputs())
-    (need,) = TRACK.needs
-    assert need.optional and need.kind == "calibrate-camera"
+    assert all(need.optional and need.kind == "calibrate-camera" for need in TRACK.needs) and len(TRACK.needs) == 2
+
+
+def filmed(folder: Path, plane: Literal[0, 1], bends: Sequence[tuple[float, float]], at: Array) -> Path:
+    """A video of arcs with these bends [rad] as the camera of a plane sees them, and the table of its times beside."""
+    markers = Markers(base=2 * plane, tip=2 * plane + 1)
+    scene, rng = Scene(SceneSettings(), WristParameters(), markers, plane=plane), np.random.default_rng(plane)
+    video = RawVideo(folder / f"raw{'_2' if plane else ''}.avi", 30.0)
+    for number, (bend, time) in enumerate(zip(bends, at, strict=True)):
+        frame = Frame(scene.render(np.tile(np.array(bend) / 4.0, 4), rng), float(time), number)
+        video.add(frame, sighting(number, None))
+    video.close()
+    return folder / f"raw{'_2' if plane else ''}.avi"
+
+
+@pytest.mark.slow
+def test_two_recordings_tell_the_bends_of_both_planes(tmp_path: Path) -> None:
+    """The second camera starts 0.1 s late and looks half a frame later, which the tables beside the videos tell."""
+    times = np.arange(24) / 30.0
+
+    def bend(at: float) -> tuple[float, float]:
+        turn = 2.0 * math.pi * at
+        return 0.5 * math.cos(turn), 0.5 * math.sin(turn)
+
+    late = times[3:] + 0.5 / 30.0
+    videos = [
+        filmed(tmp_path, 0, [*map(bend, times)], 7.0 + times),
+        filmed(tmp_path, 1, [*map(bend, late)], 7.0 + late),
+    ]
+    views = []
+    for plane in (0, 1):
+        with start_run("calibrate-camera", wristctl.load_study(None), "", tmp_path) as live:
+            Scene(SceneSettings(), WristParameters(), plane=plane).view.save(live.file("data/camera.json"))
+        views.append(Run(live.path))
+    study = wristctl.load_study(None, f"track.video={videos[0]}", f"track.video_2={videos[1]}")
+    inputs = Inputs({"calibration": views[0], "calibration_2": views[1]})
+    assert TRACK.plan(study, inputs).startswith("two planes: ")
+    with start_run("track", study, "", tmp_path / "results") as live:
+        done = TRACK.perform(session(study, live, inputs=inputs))
+    table = done.frame()
+    assert (np.diff(table["time"]) >= 0.0).all() and set(table["verdict"]) == {"ok"}
+    for plane, name in enumerate(("ulnar", "flexion")):
+        seen = table[table["plane"] == name]
+        true = np.array([bend(at)[plane] for at in seen["time"]])
+        whole = np.isfinite(seen["bend"])
+        assert whole.sum() >= 20 and np.degrees(np.abs(seen["bend"] - true)[whole]).max() < 0.2
+        assert done.metrics[f"{name}_max"] == pytest.approx(np.degrees(seen["bend"].max()), rel=1e-12)
+    assert np.degrees(np.abs(table["bend"] - table["theta"])).max() > 1.0, "one camera alone is off"
+    one_alone = (table["time"] < late[0] - 1e-9) | (table["time"] > times[-1] + 1e-9)
+    assert table["bend"].isna().to_list() == one_alone.to_list()
+    log = open_log_of(Run(live.path)).columns
+    for column, name in (("bend_y", "ulnar"), ("bend_z", "flexion")):
+        seen = table[table["plane"] == name]
+        np.testing.assert_array_equal(log[column][np.isfinite(log[column])], seen["bend"].dropna())
+
+
+def test_a_second_camera_is_asked_for_with_its_recording(folder: Path) -> None:
+    def planned(*settings: str) -> None:
+        TRACK.plan(wristctl.load_study(None, f"track.video={folder}", *settings), Inputs())
+
+    with pytest.raises(UserError, match=r"no second camera - track\.markers_2"):
+        planned("track.markers_2={base: 4, tip: 5}")
+    with pytest.raises(UserError, match=r"both cameras look for a marker of one id - track\.markers_2"):
+        planned(f"track.video_2={folder}", "track.markers_2={base: 1, tip: 3}")

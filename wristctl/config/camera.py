@@ -117,9 +117,14 @@ class TrackSettings(Section):
     """Angles from a recording."""
 
     video: str | None = choice(None, "video file or folder of pictures")
+    video_2: str | None = choice(
+        None, "that of a second camera, of a wrist in two planes: it looks at the flexion-extension plane"
+    )
     frame_rate: float | None = quantity(None, "1/s", "frames per second; null reads it from the video", gt=0)
     calibration: str | None = choice(None, "calibrate-camera run; without one the camera is taken to stand square")
+    calibration_2: str | None = choice(None, "calibrate-camera run of the second camera")
     zero: Literal["none", "first"] = choice("none", "angle that counts as 0: markers aligned, or the first one seen")
     annotate: bool = choice(False, "write the video with corners and angle drawn in, data/annotated.avi")
     markers: Markers = Markers()
+    markers_2: Markers = choice(Markers(base=2, tip=3), "markers that the second camera sees")
     gates: Gates = Gates()

@@ -62,6 +62,20 @@ class RawVideo:
         self._table.close()
 
 
+def times_beside(video: Path, frames: int) -> Array | None:
+    """When the frames of a video were taken (frames,) [s], by the table that `RawVideo` writes beside it.
+
+    None without one, or where it is of another number of frames.
+    """
+    table = video.with_suffix(".csv")
+    if video.is_dir() or not table.is_file():
+        return None
+    head, *lines = table.read_text(encoding="utf-8").splitlines()
+    if head.split(",") != list(COLUMNS) or len(lines) != frames:
+        return None
+    return np.array([float(line.rpartition(",")[2]) for line in lines])
+
+
 _SPREAD, _REFUSED = 6, 3
 # Okabe and Ito's blue, green and vermillion, as OpenCV orders colours.
 _BASE, _TIP, _BAD, _PAPER = (178, 114, 0), (115, 158, 0), (0, 94, 213), (255, 255, 255)

@@ -6,8 +6,10 @@ is one equation for the bend in this one.
 """
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from wristctl.arrays import Array
 from wristctl.vision.detector import side_angle
@@ -16,6 +18,10 @@ from wristctl.vision.view import View
 
 # Rounds of Newton's method at most, the change [rad] after which there are no more, and the step of its slope [rad].
 _ROUNDS, _ENOUGH, _STEP = 20, 1e-12, 1e-6
+# Time [s] from a frame within which the other camera has to have seen the wrist.
+NEAR = 0.05
+# Times that each plane's bends are found by the other's: each turn leaves a tenth of the error.
+_TURNS = 5
 
 
 def bend_seen(sighting: Sighting, view: View, other: float, zero: float = 0.0, side: float = 1.0) -> float:
@@ -49,6 +55,39 @@ def bend_seen(sighting: Sighting, view: View, other: float, zero: float = 0.0, s
     away = side if sighting.plane == 0 else -side  # toward flexion is away from the first, toward ulnar to the second
     axes = np.array([[s, -c, 0.0], [side * c, side * s, 0.0], [0.0, 0.0, away]])  # on the plane's right, down, away
     return _root(axes @ _normal(corners, view), zero, other, theta)
+
+
+def paired_bends(
+    sightings: Sequence[Sequence[Sighting]], views: Sequence[View], zeros: Sequence[float], sides: Sequence[float]
+) -> list[Array]:
+    """Bends [rad] about the planes of two cameras at their frames, each by what the other sees around that time.
+
+    `views`, `zeros` and `sides` are those of each camera, as `bend_seen` takes them. nan where a frame has no angle,
+    or the other camera none before and after it, and one within NEAR.
+    """
+    times = [np.array([sighting.time for sighting in of_camera]) for of_camera in sightings]
+    thetas = [np.array([sighting.theta for sighting in of_camera]) for of_camera in sightings]
+    shown = [np.isfinite(theta) for theta in thetas]
+    if not all(own.any() for own in shown):
+        return [np.full(len(theta), math.nan) for theta in thetas]
+    bends = thetas
+    for _ in range(_TURNS):
+        guess = [np.where(np.isfinite(bend), bend, theta) for bend, theta in zip(bends, thetas, strict=True)]
+        others = [np.interp(times[p], times[1 - p][shown[1 - p]], guess[1 - p][shown[1 - p]]) for p in range(2)]
+        bends = [
+            np.array([bend_seen(each, views[p], other, zeros[p], sides[p]) for each, other in zip(*both, strict=True)])
+            for p, both in enumerate(zip(sightings, others, strict=True))
+        ]
+    return [np.where(_seen_beside(times[p], times[1 - p][shown[1 - p]]), bends[p], math.nan) for p in range(2)]
+
+
+def _seen_beside(times: Array, known: Array) -> NDArray[np.bool_]:
+    """Whether there are known times before and after each, and one of them within NEAR."""
+    after = np.searchsorted(known, times)
+    before, at_or_after = known[np.maximum(after - 1, 0)], known[np.minimum(after, len(known) - 1)]
+    near = np.minimum(np.abs(times - before), np.abs(times - at_or_after)) <= NEAR
+    within: NDArray[np.bool_] = near & (known[0] <= times) & (times <= known[-1])
+    return within
 
 
 def _normal(corners: Array, view: View) -> Array:

@@ -61,7 +61,9 @@ def _trials(run: Run) -> tuple[Columns, Mapping[str, np.ndarray]]:
         ticks, seen = log[log.trial == number], frames[(frames.trial == number) & (frames.verdict == "ok")]
         spools = {f"spool_{tendon}": step * ticks[f"position_{tendon}"].to_numpy(float) for tendon in ACTIVE}
         if "plane" in seen:
-            parts.append((_merged([(ticks.counted.to_numpy(float), spools), *_bends_seen(seen)]), f"{number}"))
+            parts.append(
+                (_merged([(ticks.counted.to_numpy(float), spools), *_bends_seen(seen, "captured")]), f"{number}")
+            )
             continue
         bend, tip = ("bend_z", "tip_z") if flexion else ("bend_y", "tip_y")
         sights = {bend: seen.theta.to_numpy(float)}
@@ -77,12 +79,12 @@ def _trials(run: Run) -> tuple[Columns, Mapping[str, np.ndarray]]:
     return columns, {"trial": np.concatenate([np.full(len(part["time"]), trial) for part, trial in parts])}
 
 
-def _bends_seen(frames: pd.DataFrame) -> list[tuple[Array, Columns]]:
-    """Bends at the times of the frames that show them, of a rig in two planes."""
+def _bends_seen(frames: pd.DataFrame, clock: str) -> list[tuple[Array, Columns]]:
+    """Bends at the times of the frames that show them, of two cameras; `clock` is the column of these times."""
     parts = []
     for plane, name in (("ulnar", "bend_y"), ("flexion", "bend_z")):
         of_plane = frames[frames.plane == plane]
-        parts.append((of_plane.captured.to_numpy(float), {name: of_plane.bend.to_numpy(float)}))
+        parts.append((of_plane[clock].to_numpy(float), {name: of_plane.bend.to_numpy(float)}))
     return parts
 
 
@@ -155,6 +157,14 @@ def _motion(file: str) -> Callable[[Run], tuple[Columns, Mapping[str, np.ndarray
     return columns
 
 
+def _tracked(run: Run) -> tuple[Columns, Mapping[str, np.ndarray]]:
+    """What one camera saw, or the bends that two cameras saw."""
+    table = read_table(run.file("data/track.csv"))
+    if "plane" not in table:
+        return _motion("track.csv")(run)
+    return _merged(_bends_seen(table[np.isfinite(table.bend)], "time")), {}
+
+
 def _bends(run: Run) -> tuple[Columns, Mapping[str, np.ndarray]]:
     """A motion in two planes with the spools of all tendons, and with their pulls where these are the spools' too.
 
@@ -205,7 +215,7 @@ _CONVERTED: Mapping[str, Callable[[Run], tuple[Columns, Mapping[str, np.ndarray]
     "log.csv": _trials,
     "trajectory.csv": _simulated,
     "bends.csv": _bends,
-    "track.csv": _motion("track.csv"),
+    "track.csv": _tracked,
     "trajectories.npz": _compared,
     "courses.csv": _loops,
 }

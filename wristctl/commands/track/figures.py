@@ -8,6 +8,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+from wristctl.arrays import Array
 from wristctl.plotting.style import (
     BLACK,
     BLUE,
@@ -20,6 +21,7 @@ from wristctl.plotting.style import (
     VERMILLION,
     WINE,
     figure,
+    legend,
     undress,
 )
 from wristctl.vision.marker import Sighting, SightingVerdict
@@ -30,18 +32,25 @@ _REFUSAL_COLOURS = VERMILLION, ORANGE, PURPLE, SKY, GREY, WINE, BLACK, OLIVE, RO
 _COLOURS = dict(zip(list(SightingVerdict)[1:], _REFUSAL_COLOURS, strict=True))
 
 
-def angle(sightings: Sequence[Sighting]) -> Figure:
-    """Bending angle [deg] over time [s]; below it the frames that could not be used, by why."""
+def angle(sightings: Sequence[Sighting], bends: Array | None = None) -> Figure:
+    """Bending angle [deg], or the bends of both planes [rad], over time [s]; below the frames without, by why."""
     refused = [verdict for verdict in _COLOURS if any(sighting.verdict is verdict for sighting in sightings)]
     below_it = 0.2 * len(refused)
     fig, axes = figure(2, 1, height=3.6 + below_it, sharex=True, height_ratios=(3.2, 0.2 + below_it))
     above, below = axes[:, 0]
-    time, theta = (
-        np.array([sighting.time for sighting in sightings]),
-        np.degrees([sighting.theta for sighting in sightings]),
-    )
-    above.plot(time, theta, color=BLUE, linewidth=1.0, marker=".", markersize=2.5)
-    above.set_ylabel("bending angle [deg]")
+    time = np.array([sighting.time for sighting in sightings])
+    style = {"linewidth": 1.0, "marker": ".", "markersize": 2.5}
+    if bends is None:
+        theta = np.degrees([sighting.theta for sighting in sightings])
+        above.plot(time, theta, color=BLUE, **style)
+        above.set_ylabel("bending angle [deg]")
+    else:
+        planes = np.array([sighting.plane for sighting in sightings])
+        for plane, (name, colour) in enumerate((("ulnar", BLUE), ("flexion", ORANGE))):
+            own = planes == plane
+            above.plot(time[own], np.degrees(bends[own]), color=colour, label=f"toward {name}", **style)
+        above.set_ylabel("bend [deg]")
+        legend(above)
     for row, verdict in enumerate(refused):
         times = [sighting.time for sighting in sightings if sighting.verdict is verdict]
         below.plot(times, np.full(len(times), row), linestyle="", marker="|", markersize=7.0, color=_COLOURS[verdict])
