@@ -245,3 +245,27 @@ def test_noise_and_drawn_courses_come_from_the_seed() -> None:
     np.testing.assert_array_equal(first.portrait.courses[0].error, again.portrait.courses[0].error)
     assert np.abs(first.portrait.courses[0].error - other.portrait.courses[0].error).max() > 0.0
     assert first.metrics == again.metrics
+
+
+@pytest.mark.slow
+def test_three_tendons_are_analysed_as_one_loop_of_two_planes(tmp_path: Path) -> None:
+    """Toward where the reference ends, with what each plane bears by itself beside the margins of both."""
+    done = analyse(
+        "wrist.tendons=three", "simulate={controller: ct-dob, gains: default, direction: flexion}",
+        "analyse.angles_deg=[0.0, 20.0]", out=tmp_path,
+    )  # fmt: skip
+    assert done.toward_deg == 90.0 and "in two planes toward 90 deg is stable at 0 and 20 deg" in done.sentence
+    table, margins = done.frame(), done.found[-1].margins
+    assert list(table["toward_deg"]) == [90.0, 90.0] and done.found[-1].linear.theta == pytest.approx(
+        [0.0, math.radians(20.0)], abs=1e-6
+    )
+    assert table["each_most"][1] == margins.of_each.most <= margins.most.value * (1.0 + 1e-6)
+    assert table["each_least"][1] < 1.0 < table["each_most"][1]
+    assert f"{margins.of_each.least:.3g} to " in " ".join(done.summary)
+    assert len(done.found[-1].linear.tensions) == 3
+    response = done.run.data("response")
+    assert set(response["locus"]) == {1, 2} and response.groupby(["angle_deg", "locus"]).ngroups == 4
+    bode = done.figures["bode"].axes[0]
+    drawn = [line for line in bode.lines if len(line.get_xdata()) > 100]
+    assert len(drawn) == 4, "two eigenvalues at each angle"
+    assert done.tables[1].title.startswith("What each plane bears by itself") and len(done.tables[1].rows) == 2

@@ -207,3 +207,27 @@ def test_a_loop_that_no_model_fits_is_refused_where_everybody_looks(
     assert json.loads((run / "metrics.json").read_text())["misfit"]["value"] > 2.0
     taken = wristctl.hysteresis(study(named, "hysteresis.misfit=tell"))
     assert taken.summary[0].startswith("Nothing to rely on") and taken.loops == [] and len(taken.fits) == 3
+
+
+@pytest.mark.slow
+def test_in_two_planes_its_files_hold_both_bends_and_every_place(tmp_path: Path) -> None:
+    done = wristctl.hysteresis(study("wrist.tendons=three", "hysteresis.toward_deg=30"), out=tmp_path)
+    assert done.run is not None
+    courses, loop = done.run.data("courses"), done.loops[0]
+    own = courses[courses.loop == 0]
+    way = math.radians(30.0)
+    along = math.cos(way) * own.bend_ulnar + math.sin(way) * own.bend_flexion
+    np.testing.assert_allclose(own.theta, along, atol=1e-12)
+    np.testing.assert_array_equal(own.spool_3, loop.course.spool[:, 2])
+    assert "spool_plus" not in courses and {"given_1", "wrist_2", "z_3"} < set(courses)
+    said = " ".join(done.summary)
+    assert "In two planes" in said and "toward 30 deg from ulnar" in said and loop.aside > 0.0
+    assert done.figures["loops"].axes[0].get_ylabel() == "tension of tendon 1 [N]"
+
+
+@pytest.mark.parametrize(
+    ("setting", "said"), [("wrist.tendons=three", "tendon 1 of this wrist"), ("hysteresis.toward_deg=30", "one plane")]
+)
+def test_a_measured_loop_is_fitted_in_one_plane(setting: str, said: str) -> None:
+    with pytest.raises(UserError, match=said):
+        wristctl.hysteresis(study(setting, "hysteresis.measured=loop.csv"))

@@ -73,6 +73,14 @@ class Loop(Section):
         "compensated", "", "in two planes: whether their effect on each other is added to the controller's torques"
     )
 
+    stiffness: float | None = seldom(
+        None,
+        "N m/rad",
+        "of the straight wrist on held spools, the least over a bend of stiffness_over_deg, to which tendons pull "
+        "against each other; null: they do not",
+        gt=0,
+    )
+    stiffness_over_deg: float = seldom(1.0, "deg", "bend over which `stiffness` counts", gt=0, le=10)
     spool_lead: bool = seldom(True, "", "whether spools move at the speed of the reference, and close their gap on top")
 
     @property

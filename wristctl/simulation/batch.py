@@ -31,6 +31,7 @@ from wristctl.wrist.dahl import NoInnerFriction
 from wristctl.wrist.directions import in_plane
 from wristctl.wrist.plant import PlantModel, path_at
 from wristctl.wrist.segments import segments
+from wristctl.wrist.spatial.co_contraction import least_pulls
 from wristctl.wrist.spatial.pcc_in_space import PCC_IN_SPACE
 from wristctl.wrist.spatial.spatial_kinematics import tip_bends
 from wristctl.wrist.spatial.spatial_segments import OF_A_TENDON
@@ -116,8 +117,14 @@ class _Worlds:
         """Least and greatest pull at each place [N], then the bend [rad] beyond which a wrist has failed."""
         loop, wrist = self.worlds[index]
         free = np.inf if self.layout is None else _NO_LIMIT
-        pulls: Array = self.alike * np.array([[wrist.pretension], [wrist.tension_limit if loop.limits else free]])
-        return np.append(pulls, bending_limit(self.actual[index], loop.plant.end_stop_deg))
+        greatest = self.alike * (wrist.tension_limit if loop.limits else free)
+        return np.append([self.least(index), greatest], bending_limit(self.actual[index], loop.plant.end_stop_deg))
+
+    def least(self, index: int) -> Array:
+        """Least pull at each place [N]: pretension, and what tendons pull against each other."""
+        world = self.worlds[index]
+        pulls: Array = self.alike * world.wrist.pretension
+        return pulls if world.loop.stiffness is None else least_pulls(world.wrist, world.loop, self.layout)
 
     def stiffness(self, index: int) -> Array:
         """Believed stiffness of all tendons of each place [N/m]."""
@@ -146,7 +153,7 @@ class _Worlds:
         """State of the motors at rest where the tendons' paths are so much shorter than on the straight wrist (T,)."""
         wrist = self.actual[index]
         drive = drive_with(self.level, self.counted[index], self.stiffness(index))
-        pulls = self.alike * wrist.pretension
+        pulls = self.least(index) if self.worlds[index].loop.stiffness else self.alike * wrist.pretension
         planes = 1 if self.layout is None else 2
         return at_rest(drive, pulls, wrist.length, wrist.length - travel, self.windings[index].scale, planes)
 
@@ -229,7 +236,10 @@ def _bodies(worlds: Sequence[World]) -> tuple[list[World], Indices]:
     bodies, which = dict[tuple[object, ...], tuple[int, World]](), []
     for world in worlds:
         loop = world.loop
-        parts = id(world.wrist), id(loop.plant), id(loop.actuator), id(loop.disturbances), loop.limits, loop.spool_lead
+        parts = (
+            id(world.wrist), id(loop.plant), id(loop.actuator), id(loop.disturbances), loop.limits, loop.spool_lead,
+            loop.stiffness, loop.stiffness_over_deg,
+        )  # fmt: skip
         which.append(bodies.setdefault(parts, (len(bodies), world))[0])
     return [world for _, world in bodies.values()], np.array(which)
 

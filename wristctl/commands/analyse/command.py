@@ -43,6 +43,7 @@ from wristctl.commands.procedure import Procedure, no_tendons
 from wristctl.commands.results import StudyResult
 from wristctl.commands.session import Session
 from wristctl.commands.simulate.in_two_planes import asked_for_by, check_two_planes, in_two_planes
+from wristctl.commands.stiffness_table import stiffness_table
 from wristctl.config.study import Study
 from wristctl.errors import UserError, meant, under
 
@@ -185,6 +186,7 @@ def analyse(session: Session) -> Analysed:
             locus_table(locus, value, "" if value is None else row.law.gains[settings.over].unit, settings.span)
         )
     tables.append(limit_table(analyses[-1], CUTS[chosen.loop.sensor.level]))
+    tables.append(stiffness_table(row.wrist, row.loop, planes))
     tables += [] if portrait is None else [portrait_table(portrait)]
     return Analysed(
         session.study, findings, tables, label, sentence, angles, analyses, locus, portrait, rests.toward_deg
