@@ -87,3 +87,14 @@ def test_a_bend_that_takes_more_than_a_tendon_bears_is_refused() -> None:
     wrist = WristParameters.model_validate({"tendons": "three", "tension_limit": 4.0})
     with pytest.raises(UserError, match=r"above wrist\.tension_limit"):
         strokes(wrist, HysteresisSettings(ranges_deg=((0.0, 30.0),), angles_deg=(5.0,)))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("tendons", ["four", "three"])
+def test_a_wrist_that_is_stiffened_by_its_tendons_has_more_friction(tendons: str) -> None:
+    """Pulls of no place fall below those that stiffen it, in one plane and in two; friction goes by pulls."""
+    plain, stiff = _strokes(tendons), _strokes(tendons, stiffness=16.0 if tendons == "four" else 12.0)
+    alike = stiff.layout.multiplicity
+    assert (stiff.pulls / alike).min() > 1.5 * plain.wrist.pretension
+    first, second = loops(plain)[0], loops(stiff)[0]
+    assert second.friction_work > 1.1 * first.friction_work and second.width > first.width

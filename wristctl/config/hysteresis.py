@@ -58,6 +58,13 @@ class HysteresisSettings(Section):
     )
     preslidings: tuple[Path, ...] = quantity((2e-5,), "m", "paths in which friction turns round", min_length=1)
     tendon_stiffness: float = quantity(20e3, "N/m", "stiffness of one tendon", "assumed; sweep 2-50 kN/m", gt=0)
+    stiffness: float | None = quantity(
+        None,
+        "N m/rad",
+        "of the wrist on held spools, to which tendons pull against each other; null: as it is",
+        gt=0,
+    )
+    stiffness_over_deg: float = quantity(1.0, "deg", "bend over which `stiffness` counts", "as a loop's", gt=0, le=10)
     angles_deg: tuple[float, ...] = quantity(
         (5.0, 15.0, 25.0),
         "deg",

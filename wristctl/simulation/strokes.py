@@ -17,6 +17,7 @@ from wristctl.simulation.planes import Asked, why_two
 from wristctl.simulation.spool_driven import SpooledWrist
 from wristctl.wrist.compiled_model import terms
 from wristctl.wrist.segments import segments
+from wristctl.wrist.spatial.co_contraction import least_pulls
 from wristctl.wrist.spatial.spatial_holding import FrictionOnHeld, at_rest_along, held_at, values_of
 from wristctl.wrist.spatial.spatial_kinematics import tip_bends
 from wristctl.wrist.spatial.spatial_model import spatial_terms
@@ -125,6 +126,13 @@ def direction_of(settings: HysteresisSettings) -> Array:
     return np.array([math.cos(angle), math.sin(angle)])
 
 
+def loop_of(settings: HysteresisSettings) -> Loop:
+    """A loop with the stiffness of wrist and tendons that the settings ask for."""
+    tendons = {"level": "tendon", "tendon_stiffness": settings.tendon_stiffness}
+    asked = {"stiffness": settings.stiffness, "stiffness_over_deg": settings.stiffness_over_deg}
+    return Loop.model_validate({"actuator": tendons, **asked})
+
+
 def why_in_two_planes(wrist: WristParameters, settings: HysteresisSettings) -> str:
     """Why a wrist on its spools bends in two planes, in words; empty where it stays in one.
 
@@ -144,14 +152,16 @@ def strokes(wrist: WristParameters, settings: HysteresisSettings) -> Strokes:
         raise UserError(problem, "hysteresis.ranges_deg", "smaller ranges")
     if why_in_two_planes(wrist, settings):
         alike = TendonLayout.of(wrist).multiplicity.astype(float)
-        held = held_at(wrist, settings.segments, angle[:, None] * direction_of(settings))
+        least = least_pulls(wrist, loop_of(settings), TendonLayout.of(wrist))
+        held = held_at(wrist, settings.segments, angle[:, None] * direction_of(settings), least)
         theta, pulls, stable = held
         values = values_of(wrist, settings.segments)
         straight, lengths = _lengths(values, 0.0 * theta[:1]), _lengths(values, theta)
     else:
         alike = np.array(SIDES)
         values = np.tile(segments(wrist, settings.segments), (len(angle), 1))
-        theta, pulls, stable = equilibria_at(values, settings.segments, angle, TENDONS_PER_SIDE * wrist.pretension)
+        least = least_pulls(wrist, loop_of(settings), None)
+        theta, pulls, stable = equilibria_at(values, settings.segments, angle, float(least[0]))
         straight = np.full(2, wrist.length)
         lengths = terms(values, theta, 0.0 * theta).tendon_lengths.sum(axis=1)
     if settings.drive == "tensions" and not stable.all():

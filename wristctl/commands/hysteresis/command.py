@@ -15,6 +15,7 @@ from wristctl.commands.printed_table import Table
 from wristctl.commands.procedure import Procedure, no_tendons
 from wristctl.commands.results import Findings, StudyResult
 from wristctl.commands.session import Session
+from wristctl.commands.stiffness_table import stiffness_table
 from wristctl.config.study import Study
 from wristctl.errors import UserError
 
@@ -182,7 +183,7 @@ def hysteresis(session: Session) -> Hysteresis:
         return _of_measured(session)
     from wristctl.commands.hysteresis import figures
     from wristctl.simulation.hysteresis import dead_bands, loops, main_case
-    from wristctl.simulation.strokes import strokes
+    from wristctl.simulation.strokes import loop_of, strokes
 
     findings, settings = session.findings, session.study.hysteresis
     driven_strokes = strokes(session.study.wrist, settings)
@@ -194,6 +195,7 @@ def hysteresis(session: Session) -> Hysteresis:
     open_ = _still_change(driven, bands)
     findings.metric("not_converged", open_, "", "lower", len(driven) + len(bands), meaning=_NOT_CONVERGED)
     tables = _tables(findings, driven, bands, main_case(settings))
+    tables.append(stiffness_table(session.study.wrist, loop_of(settings), driven_strokes.planes))
     result = Hysteresis(session.study, findings, tables, driven, bands, [])
     _write(findings, result)
     with session.drawing():

@@ -41,17 +41,17 @@ def values_of(wrist: WristParameters, n: int) -> Array:
     return spatial_values(wrist, TendonLayout.of(wrist), n, axis=np.radians(wrist.stiffness_axis_deg))
 
 
-def held_at(wrist: WristParameters, n: int, bends: Array) -> HeldBends:
-    """Wrists of n segments at rest with their tips bent like this (B, 2) [rad], no tendon below pretension.
+def held_at(wrist: WristParameters, n: int, bends: Array, least: Array) -> HeldBends:
+    """Wrists of n segments at rest with their tips bent like this (B, 2) [rad], no pull (T,) [N] below the least.
 
     Raises UserError where there is no such rest.
     """
-    values, alike = values_of(wrist, n), TendonLayout.of(wrist).multiplicity
+    values = values_of(wrist, n)
     one = values_of(wrist, 1)
-    arms = spatial_terms(one, bends, 0.0 * bends).moment_arms.reshape(len(bends), len(alike), 2)
+    arms = spatial_terms(one, bends, 0.0 * bends).moment_arms.reshape(len(bends), len(least), 2)
 
     def pulls_for(torque: Array) -> Array:
-        return allocated(arms, torque, wrist.pretension * alike, _NO_LIMIT).pulls
+        return allocated(arms, torque, least, _NO_LIMIT).pulls
 
     def residual(x: Array) -> Array:
         q, torque = x[:, : 2 * n], x[:, 2 * n :]
@@ -61,8 +61,8 @@ def held_at(wrist: WristParameters, n: int, bends: Array) -> HeldBends:
     x = _newton(residual, np.concatenate([np.tile(bends / n, n), wrist.stiffness * bends], axis=1))
     q, pulls = x[:, : 2 * n], pulls_for(x[:, 2 * n :])
     tangent = spatial_linearised(values, q, 0.0 * q, 0.0 * q, pulls)[1]
-    least = np.linalg.eigvalsh(0.5 * (tangent + tangent.transpose(0, 2, 1)))[:, 0]
-    return HeldBends(q, pulls, least > 0.0)
+    softest = np.linalg.eigvalsh(0.5 * (tangent + tangent.transpose(0, 2, 1)))[:, 0]
+    return HeldBends(q, pulls, softest > 0.0)
 
 
 class FrictionOnHeld(NamedTuple):
