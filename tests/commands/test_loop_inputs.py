@@ -67,7 +67,7 @@ class Network:
     """Learned a wrist of so many segments; of a pose and a hand, if that is said."""
 
     def __init__(self, segments: int, others: tuple[str, ...] = (), empty: bool = False) -> None:
-        self.segments, self.others, self.asked = segments, others, dict[str, float]()
+        self.segments, self.others, self.asked, self.planes = segments, others, dict[str, float](), 1
         self.domain, self.along = SimpleNamespace(is_empty=empty), f"{segments} segments"
 
     def at(self, others: dict[str, float]) -> Network:
@@ -94,7 +94,10 @@ def test_a_network_belongs_to_the_segments_that_it_learned() -> None:
 def test_a_network_is_asked_at_the_wrists_pose_and_hand(caplog: pytest.LogCaptureFixture) -> None:
     network = Network(1, ("pose", "hand_mass"))
     along(network, 1)
-    assert network.asked == {"pose": pytest.approx(math.atan2(4.0, 3.0)), "hand_mass": 0.25} and not caplog.messages
+    assert (
+        network.asked == {"pose": pytest.approx(math.atan2(4.0, 3.0)), "roll": 0.0, "hand_mass": 0.25}
+        and not caplog.messages
+    )
     alone = Network(1)
     along(alone, 1)
     assert not alone.asked

@@ -47,4 +47,4 @@ def test_at_values_of_its_other_inputs_it_is_the_region_of_tips_or_none() -> Non
 
 
 def test_inputs_after_the_tip_have_units() -> None:
-    assert OTHERS == {"pose": "rad", "hand_mass": "kg"}
+    assert OTHERS == {"pose": "rad", "roll": "rad", "hand_mass": "kg"}

@@ -75,7 +75,7 @@ def test_every_measure_stands_under_its_own_name(inputs: int) -> None:
     samples = loaded([HELD_PAYLOAD] * 5 + [HELD_POSE] * 7)
     own = network(inputs, bias=-0.2)
     found = measures(trial(own), places(samples, CUT))
-    assert set(found) == set(MEASURES)
+    assert set(found) == set(MEASURES) - {"rmse_ulnar_deg", "rmse_flexion_deg"}, "in one plane"
     assert [MEASURES[name][0] for name in ("r2", "rmse_deg", "close_share", "train_loss")] == ["", "deg", "1", "rad^2"]
     for name, rows in (("", TEST), ("held_out_payloads_", TEST[:5]), ("held_out_poses_", TEST[5:])):
         wanted = angle_errors(samples.inputs[rows, :inputs] @ [3.0, 2.0, 0.1, 0.2][:inputs] - 0.2, samples.theta[rows])

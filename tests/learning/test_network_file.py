@@ -95,7 +95,10 @@ def test_other_peoples_safetensors_are_the_users_error(file: Path) -> None:
         ({"hidden": [24, 17]}, r"1.weight is \(16, 24\).*header says \(17, 24\)"),
         ({"hidden": [24, 16, 4]}, "2.weight is"),
         ({"input": {"mean": [0, 0], "deviation": [0, 1]}}, "deviation"),
-        ({"input": {"mean": [0, 0, 0], "deviation": [1, 1, 1]}}, "input.mean"),
+        (
+            {"input": {"mean": [0, 0, 0], "deviation": [1, 1, 1]}},
+            "input is wrong: .*mean and deviation need 2 values each",
+        ),
         ({"input": {"unit": "mm", "mean": [0, 0], "deviation": [1, 1]}}, "input.unit"),
         ({"domain": {"theta": [-1.0, 1.0]}}, "domain.arc_length"),
         (

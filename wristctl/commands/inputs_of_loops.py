@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import logging
-import math
 from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING, Protocol
 
@@ -103,6 +102,7 @@ def check_reach(references: Iterable[Reference], wrist: WristParameters, where: 
     import numpy as np
 
     from wristctl.simulation.planes import motion_in
+    from wristctl.simulation.reference import by_angles
 
     for number, reference in enumerate(references):
         try:
@@ -112,12 +112,6 @@ def check_reach(references: Iterable[Reference], wrist: WristParameters, where: 
             if not error.where.startswith("reference"):  # in a file
                 raise
             raise error.at(where.format(number) + error.where.removeprefix("reference")) from error
-
-
-def by_angles(reference: Reference) -> Reference:
-    """The reference without a network: the angles that one arc has."""
-    tips = reference.tip is not None or reference.kind == "tip-path"
-    return reference.model_copy(update={"inverse": "closed-form" if tips else "none"})
 
 
 def ends_of_family(family: Family) -> list[Reference]:
@@ -190,26 +184,32 @@ def tuned_on(inputs: Inputs) -> TuneSettings | None:
     return inputs.read("tuned", _tune_settings)
 
 
-def network_for(inputs: Inputs, wrist: WristParameters, loops: Iterable[Loop]) -> Inverse | None:
+def network_for(inputs: Inputs, wrist: WristParameters, loops: Iterable[Loop], planes: int = 1) -> Inverse | None:
     """The network of the training among the inputs at the wrist's pose and hand, None without one.
 
-    UserError where it learned a wrist of another number of segments than the loops simulate.
+    UserError where it learned a wrist of another number of segments, or bends in other planes, than the loops simulate.
     """
+    from wristctl.learning.dataset import attitude
     from wristctl.learning.network_file import NETWORK
 
     network = inputs.read("network", _network)
     if network is None:
         return None
+    run = inputs.runs().get("network")
+    where = str(run.file(NETWORK)) if run else "network"
     other_segments = sorted({loop.plant_segments for loop in loops} - {network.segments})
     if network.segments > 1 and other_segments:
-        run = inputs.runs().get("network")
         raise UserError(
             f"the network learned a wrist of {network.segments} segments, the loop has {other_segments[0]}",
-            str(run.file(NETWORK)) if run else "network",
+            where,
             f"plant_segments: {network.segments} in every loop, or train on data with segments: {other_segments[0]}",
         )
-    pose = math.atan2(wrist.gravity[1], -wrist.gravity[0])
-    at_pose = network.at({"pose": pose, "hand_mass": wrist.hand_mass}) if network.others else network
+    if network.planes != planes:
+        learned, bends = ("one plane" if count == 1 else "two planes" for count in (network.planes, planes))
+        fix = f"train on data of this wrist with gen-data.planes: {planes}"
+        raise UserError(f"the network learned bends in {learned}, and the loop bends in {bends}", where, fix)
+    pose, roll = attitude(wrist)
+    at_pose = network.at({"pose": pose, "roll": roll, "hand_mass": wrist.hand_mass}) if network.others else network
     if at_pose.domain.is_empty:
         log.warning("the study's pose or hand mass lies outside what the network learned: every angle is a guess")
     return at_pose.along

@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterable
 from typing import TYPE_CHECKING, NamedTuple
 
 from wristctl.commands.inputs import Inputs
-from wristctl.commands.inputs_of_loops import by_angles, ends_of_family, identified
+from wristctl.commands.inputs_of_loops import ends_of_family, identified
 from wristctl.commands.results import Findings
 from wristctl.config.compare import CompareSettings
 from wristctl.config.controller_row import Row
@@ -216,7 +216,7 @@ def refuse_out_of_reach(study: Study, inputs: Inputs) -> None:
 
 def _shortfall(wrist: WristParameters, asked: AskedMotion) -> Shortfall | None:
     from wristctl.config.loop import sample_period
-    from wristctl.simulation.reference import motion
+    from wristctl.simulation.reference import by_angles, motion
     from wristctl.simulation.worlds import loop_facing, plant_of
     from wristctl.wrist.statics import shortfall
 
@@ -238,6 +238,7 @@ def _not_held(wrist: WristParameters, asked: AskedMotion) -> tuple[str, str] | N
     """A bend in two planes that the tendons do not hold, and what helps."""
     from wristctl.config.loop import sample_period
     from wristctl.simulation.planes import motion_in
+    from wristctl.simulation.reference import by_angles
 
     if not asked.loop.limits or not _in_space(wrist, asked):
         return None

@@ -33,9 +33,18 @@ class DataSettings(Section):
     stretch: tuple[float, float] = quantity(
         (0.9, 1.1), "", "pcc: range of arc length over the wrist's length", "assumed"
     )
+    planes: Literal[1, 2] | None = choice(
+        None, "planes that samples which are drawn bend in; null: two where the wrist leaves its plane, else one"
+    )
     segments: int = choice(1, "segments: each with an angle of its own (pcc), in equilibrium (plant)", ge=1, le=8)
     poses: tuple[float, ...] = quantity(
         (0.0, 90.0, 180.0), "deg", "plant: tilts of the base from upright, drawn in turn", "assumed", min_length=1
+    )
+    rolls: tuple[Annotated[float, Field(gt=-90, le=90)], ...] = quantity(
+        (),
+        "deg",
+        "plant, in two planes: directions of the tilts, from ulnar toward flexion, drawn in turn; empty: the "
+        "wrist's own",
     )
     held_out_poses: tuple[float, ...] = quantity((), "deg", "plant: tilts kept from training, to test by")
     payload: tuple[float, float] = quantity(

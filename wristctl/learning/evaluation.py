@@ -9,10 +9,11 @@ import numpy as np
 
 from wristctl.arrays import Array
 from wristctl.learning.dataset import HELD_PAYLOAD, HELD_POSE, Samples, Split
-from wristctl.learning.domain import Domain
+from wristctl.learning.domain import Domain, arc_to
 from wristctl.learning.inference import Polynomial, compiled_network
 from wristctl.learning.training_result import TrainingResult
-from wristctl.wrist.kinematics import arc_tip, exact_angle
+from wristctl.wrist.kinematics import arc_tip
+from wristctl.wrist.spatial.spatial_kinematics import spatial_tips
 
 # An error up to this counts as close.
 CLOSE_DEG = 0.5
@@ -20,7 +21,7 @@ CLOSE_DEG = 0.5
 
 @dataclass(frozen=True)
 class AngleErrors:
-    """Errors of predicted bending angles over a set of samples."""
+    """Errors of predicted bends over a set of samples; in two planes an error is the norm over both."""
 
     r2: float
     """1 - sum of squared errors / sum of squared deviations from the mean"""
@@ -30,6 +31,15 @@ class AngleErrors:
     """largest absolute error [deg]"""
     close_share: float
     """share of samples with an absolute error of at most 0.5 deg"""
+    rmse_ulnar_deg: float = math.nan
+    """in two planes the root of the mean squared error of the bend toward ulnar [deg]"""
+    rmse_flexion_deg: float = math.nan
+    """the same toward flexion"""
+
+    def known(self) -> dict[str, float]:
+        """The measures that these planes have, by name."""
+        of_a_plane = ("rmse_ulnar_deg", "rmse_flexion_deg")
+        return {name: value for name, value in vars(self).items() if name not in of_a_plane or not math.isnan(value)}
 
 
 # Unit, better direction and meaning of each of AngleErrors' fields.
@@ -38,38 +48,71 @@ ANGLE_MEASURES: dict[str, tuple[str, Literal["lower", "higher"], str]] = {
     "rmse_deg": ("deg", "lower", "root mean squared error of the angle"),
     "max_error_deg": ("deg", "lower", "largest absolute error of the angle"),
     "close_share": ("1", "higher", "share of samples with an error of at most 0.5 deg"),
+    "rmse_ulnar_deg": ("deg", "lower", "root mean squared error of the bend toward ulnar"),
+    "rmse_flexion_deg": ("deg", "lower", "root mean squared error of the bend toward flexion"),
 }
 
 
 @dataclass(frozen=True)
 class ErrorMap:
-    """Errors on a grid that fills a domain: A angles from end to end by L arc lengths."""
+    """Errors on a grid that fills a domain: A angles from end to end by L arc lengths.
+
+    In two planes A sizes of the bend by D directions by L arc lengths; bends have a last axis of both planes.
+    """
 
     tip: Array
-    """(A, L, 2) [m]"""
+    """(A, L, 2), in two planes (A, D, L, 3) [m]"""
     theta: Array
-    """(A, L) true angle [rad]"""
+    """(A, L) or (A, D, L, 2) true bend [rad]"""
     error: Array
-    """(A, L) predicted minus true angle [rad]"""
+    """(A, L) or (A, D, L, 2) predicted minus true bend [rad]"""
+
+    @property
+    def size(self) -> Array:
+        """Absolute errors (A, L), in two planes norms (A, D, L) [rad]."""
+        return size_of(self.error, self.tip.shape[-1] - 1)
 
 
-def angle_errors(predicted: Array, true: Array) -> AngleErrors:
-    """Measures of predicted against true angles of one shape [rad]; r2 is NaN where all true ones are equal."""
+def size_of(error: Array, planes: int) -> Array:
+    """Sizes of errors (...), in two planes of shape (..., 2)."""
+    return np.abs(error) if planes == 1 else np.hypot(error[..., 0], error[..., 1])
+
+
+def angle_errors(predicted: Array, true: Array, planes: int = 1) -> AngleErrors:
+    """Measures of predicted against true bends of one shape [rad]; r2 is NaN where all true ones are equal.
+
+    In two planes the last axis is that of the planes.
+    """
     error = predicted - true
-    deviation = true - true.mean()
+    deviation = true - (true.mean() if planes == 1 else true.reshape(-1, planes).mean(axis=0))
     with np.errstate(divide="ignore", invalid="ignore"):
         r2 = 1.0 - float(np.sum(error**2) / np.sum(deviation**2))
-    degrees = np.abs(np.degrees(error))
+    degrees = size_of(np.degrees(error), planes)
+    of_planes = np.sqrt(np.mean(np.degrees(error).reshape(-1, planes) ** 2, axis=0)).tolist() if planes == 2 else []
     return AngleErrors(
-        r2=r2,
-        rmse_deg=float(np.sqrt(np.mean(degrees**2))),
-        max_error_deg=float(degrees.max()),
-        close_share=float(np.mean(degrees <= CLOSE_DEG)),
+        r2,
+        float(np.sqrt(np.mean(degrees**2))),
+        float(degrees.max()),
+        float(np.mean(degrees <= CLOSE_DEG)),
+        *of_planes,
     )
 
 
+# Sizes of bends, directions and arc lengths of a map in two planes.
+_SIZES, _TOWARD, _LENGTHS = 41, 72, 21
+
+
 def error_map(inverse: Callable[[Array], Array], domain: Domain, angles: int = 201, lengths: int = 41) -> ErrorMap:
-    """Errors of `inverse`, tips (..., 2) [m] to angles (...) [rad], over the whole domain, edges included."""
+    """Errors of `inverse`, tips (..., P + 1) [m] to bends [rad], over the whole domain, edges included.
+
+    In two planes the map has its own numbers of sizes, directions and arc lengths.
+    """
+    if domain.planes == 2:
+        sizes, around = np.linspace(*domain.theta, _SIZES), np.linspace(0.0, 2.0 * np.pi, _TOWARD + 1)
+        of_sizes = sizes[:, None, None] * np.stack([np.cos(around), np.sin(around)], axis=-1)
+        bends = np.repeat(of_sizes[:, :, None], _LENGTHS, axis=2)
+        tip = np.linspace(*domain.arc_length, _LENGTHS)[:, None] * spatial_tips(bends, 1.0)
+        return ErrorMap(tip, bends, inverse(tip) - bends)
     theta, length = np.meshgrid(
         np.linspace(*domain.theta, angles), np.linspace(*domain.arc_length, lengths), indexing="ij"
     )
@@ -97,13 +140,27 @@ MEASURES: dict[str, tuple[str, str]] = {
 
 @dataclass(frozen=True)
 class Place:
-    """Inputs with known angles, on which inverses are judged."""
+    """Inputs with known bends, on which inverses are judged."""
 
     name: str
     inputs: Array
-    """(..., D), x and y first"""
+    """(..., D), the tip first"""
     theta: Array
-    """(...) [rad]"""
+    """(...), in two planes (..., 2) [rad]"""
+
+    @property
+    def planes(self) -> int:
+        """Planes that the wrist bends in."""
+        return 1 if self.theta.ndim < self.inputs.ndim else self.theta.shape[-1]
+
+    @property
+    def count(self) -> int:
+        """Number of bends."""
+        return self.theta.size // self.planes
+
+    def errors(self, predicted: Array) -> AngleErrors:
+        """Errors of bends that an inverse gives for the inputs."""
+        return angle_errors(predicted.reshape(self.theta.shape), self.theta, self.planes)
 
 
 def places(samples: Samples, split: Split) -> list[Place]:
@@ -115,7 +172,7 @@ def places(samples: Samples, split: Split) -> list[Place]:
         if 0 < len(rows) < len(split.test):
             regions.append(Place(name, samples.inputs[rows], samples.theta[rows]))
     if samples.curvature_is_constant:
-        grid = error_map(exact_angle, samples.domain)
+        grid = error_map(exact_bends, samples.domain)
         regions.append(Place("whole workspace", grid.tip, grid.theta))
     return regions
 
@@ -123,24 +180,27 @@ def places(samples: Samples, split: Split) -> list[Place]:
 def inverses(
     trial: TrainingResult, samples: Samples, split: Split
 ) -> dict[str, tuple[Callable[[Array], Array], int, int]]:
-    """The network, a polynomial of all inputs and the exact inverse: angles of inputs, parameters, multiply-adds."""
+    """The network, a polynomial of all inputs and the exact inverse: bends of inputs, parameters, multiply-adds."""
     network = trial.network
-    columns = network.sizes[0]
+    columns, tip = network.sizes[0], samples.planes + 1
     polynomial = Polynomial.fit(samples.inputs[split.train], samples.theta[split.train])
     return {
         "network": (lambda x: network.angle(x[..., :columns]), network.parameters, network.multiply_adds),
-        "polynomial": (polynomial.angle, len(polynomial.factors), polynomial.multiply_adds),
-        "exact inverse": (lambda x: exact_angle(x[..., :2]), 0, 0),
+        "polynomial": (polynomial.angle, polynomial.factors.size, polynomial.multiply_adds),
+        "exact inverse": (lambda x: exact_bends(x[..., :tip]), 0, 0),
     }
+
+
+def exact_bends(tip: Array) -> Array:
+    """Bends [rad] of the arc to each tip (..., P + 1) [m]: (...), in two planes (..., 2)."""
+    return arc_to(tip)[0]
 
 
 def measures(trial: TrainingResult, where: Sequence[Place]) -> dict[str, float]:
     """Every one of MEASURES, NaN for places that these data do not have."""
     columns, angle = trial.network.sizes[0], compiled_network(trial.network)
     errors = {
-        place.name: angle_errors(
-            angle(place.inputs.reshape(-1, place.inputs.shape[-1])[:, :columns]), place.theta.ravel()
-        )
+        place.name: place.errors(angle(place.inputs.reshape(-1, place.inputs.shape[-1])[:, :columns]))
         for place in where
     }
     test, workspace = errors["test samples"], errors.get("whole workspace")
@@ -149,7 +209,7 @@ def measures(trial: TrainingResult, where: Sequence[Place]) -> dict[str, float]:
         for name in HELD_OUT.values()
     }
     return {
-        **vars(test),
+        **test.known(),
         "workspace_rmse_deg": workspace.rmse_deg if workspace else math.nan,
         "workspace_max_error_deg": workspace.max_error_deg if workspace else math.nan,
         **held_out,

@@ -1,4 +1,4 @@
-"""The network, the polynomial and the exact inverse as compiled code: one angle at a time, as a control loop asks.
+"""The network, the polynomial and the exact inverse as compiled code: one bend at a time, as a control loop asks.
 
 Weights lie input by input, so that a layer is a sum of columns: many neurons at once and in a fixed order.
 """
@@ -32,16 +32,16 @@ class Polynomial:
     powers: NDArray[np.int64]
     """(terms, inputs)"""
     factors: Array
-    """(terms,) [rad]"""
+    """(terms,), in two planes (terms, 2) [rad]"""
     degree: int
 
     @property
     def multiply_adds(self) -> int:
-        """Multiply-adds of one angle."""
-        return int(self.powers.size + len(self.factors))
+        """Multiply-adds of one bend."""
+        return int(self.powers.size + self.factors.size)
 
     def angle(self, inputs: Array) -> Array:
-        """Bending angles (...) [rad] of inputs (..., D)."""
+        """Bends (...), in two planes (..., 2) [rad], of inputs (..., D)."""
         return self._terms(inputs) @ self.factors
 
     def _terms(self, inputs: Array) -> Array:
@@ -50,7 +50,7 @@ class Polynomial:
 
     @staticmethod
     def fit(inputs: Array, theta: Array, degree: int = DEGREE) -> Polynomial:
-        """The polynomial nearest to the angles (N,) [rad] of inputs (N, D)."""
+        """The polynomial nearest to the bends (N,) or (N, 2) [rad] of inputs (N, D)."""
         everything = product(range(degree + 1), repeat=inputs.shape[1])
         powers = np.array([power for power in everything if sum(power) <= degree])
         empty = Polynomial(Scaler.of(inputs), powers, np.zeros(len(powers)), degree)
@@ -63,7 +63,7 @@ _ACTIVATIONS = ("sigmoid", "tanh", "silu", "relu", "leaky-relu")
 # Inputs timed at once: enough to hide the call, few enough to be done within one slice of a busy machine's time.
 CHUNK = 50
 
-# From inputs (N, D) to angles (N,) [rad].
+# From inputs (N, D) to bends (N,), in two planes (N, 2) [rad].
 Timed = Callable[[Array], Array]
 
 
@@ -122,7 +122,8 @@ def _angles(sizes: Any, kind: int, packed: Any, inputs: Any, value: Any, result:
             if layer < len(sizes) - 1:
                 _activate(kind, total)
             value[:width] = total
-        out[sample] = value[0]
+        for plane in range(out.shape[1]):
+            out[sample, plane] = value[plane]
 
 
 @kernel
@@ -132,13 +133,14 @@ def _polynomials(powers: Any, factors: Any, inputs: Any, table: Any, out: Any) -
             table[j, 0] = 1.0
             for k in range(1, table.shape[1]):
                 table[j, k] = table[j, k - 1] * inputs[sample, j]
-        total = 0.0
+        for plane in range(out.shape[1]):
+            out[sample, plane] = 0.0
         for term in range(len(factors)):
-            product = factors[term]
+            product = 1.0
             for j in range(inputs.shape[1]):
                 product *= table[j, powers[term, j]]
-            total += product
-        out[sample] = total
+            for plane in range(out.shape[1]):
+                out[sample, plane] += factors[term, plane] * product
 
 
 @kernel
@@ -147,12 +149,22 @@ def _arcs(inputs: Any, out: Any) -> None:
         out[sample] = 2.0 * math.atan2(inputs[sample, 1], inputs[sample, 0])
 
 
+@kernel
+def _arcs_in_space(inputs: Any, out: Any) -> None:
+    for sample in range(len(out)):
+        y, z = inputs[sample, 1], inputs[sample, 2]
+        across = math.sqrt(y * y + z * z)
+        scale = 2.0 * math.atan2(across, inputs[sample, 0]) / max(across, 1e-300)
+        out[sample, 0] = scale * y
+        out[sample, 1] = scale * z
+
+
 def compiled_network(network: Network) -> Timed:
-    """The network's angles, one sample after another; scaling is folded into the first and the last layer."""
+    """The network's bends, one sample after another; scaling is folded into the first and the last layer."""
     weights, biases = [*network.weights], [*network.biases]
     weights[0] = weights[0] / network.input_scaler.deviation
     biases[0] = biases[0] - weights[0] @ network.input_scaler.mean
-    weights[-1] = weights[-1] * network.output_scaler.deviation
+    weights[-1] = weights[-1] * network.output_scaler.deviation[:, None]
     biases[-1] = biases[-1] * network.output_scaler.deviation + network.output_scaler.mean
     parts = zip(weights, biases, strict=True)
     packed = np.concatenate([np.concatenate([bias, weight.T.ravel()]) for weight, bias in parts])
@@ -160,30 +172,32 @@ def compiled_network(network: Network) -> Timed:
     value, result = np.empty(sizes.max()), np.empty(sizes.max())
 
     def angles(inputs: Array) -> Array:
-        out = np.empty(len(inputs))
+        out = np.empty((len(inputs), network.planes))
         _angles(sizes, kind, packed, np.ascontiguousarray(inputs), value, result, out)
-        return out
+        return out[:, 0] if network.planes == 1 else out
 
     return angles
 
 
 def compiled_polynomial(polynomial: Polynomial) -> Timed:
-    """The polynomial's angles, one sample after another."""
+    """The polynomial's bends, one sample after another."""
+    factors = polynomial.factors.reshape(len(polynomial.factors), -1)
     table = np.empty((polynomial.powers.shape[1], polynomial.degree + 1))
 
     def angles(inputs: Array) -> Array:
-        out = np.empty(len(inputs))
+        out = np.empty((len(inputs), factors.shape[1]))
         scaled = polynomial.scaler.scale(inputs)
-        _polynomials(polynomial.powers, polynomial.factors, scaled, table, out)
-        return out
+        _polynomials(polynomial.powers, factors, scaled, table, out)
+        return out.reshape(len(inputs), *polynomial.factors.shape[1:])
 
     return angles
 
 
-def compiled_exact(inputs: Array) -> Array:
-    """2 atan2(y, x), one sample after another."""
-    out = np.empty(len(inputs))
-    _arcs(np.ascontiguousarray(inputs), out)
+def compiled_exact(tip: Array) -> Array:
+    """Bend of the arc to each tip (N, P + 1) [m], one sample after another."""
+    planes = tip.shape[1] - 1
+    out = np.empty(len(tip) if planes == 1 else (len(tip), planes))
+    (_arcs if planes == 1 else _arcs_in_space)(np.ascontiguousarray(tip), out)
     return out
 
 

@@ -21,7 +21,7 @@ TRIES = 20
 
 
 class LevenbergMarquardt:
-    """Minimises mean((model(x) - y)^2) + decay / 2 |w|^2 over the weights w of a model with one output.
+    """Minimises mean(|model(x) - y|^2) + decay / 2 |w|^2 over the weights w of a model with P outputs.
 
     Marquardt, J. SIAM 11 (1963) 431, with Levenberg's damping by the identity. All samples at once, nothing random.
     """
@@ -30,7 +30,7 @@ class LevenbergMarquardt:
         self.model, self.weight_decay, self.damping = model, weight_decay, FIRST_DAMPING
 
     def step(self, x: Tensor, y: Tensor) -> float:
-        """One step on samples x (N, D) and y (N, 1); the mean squared error before it."""
+        """One step on samples x (N, D) and y (N, P); the mean squared error before it."""
         weights = nn.utils.parameters_to_vector(self.model.parameters()).detach()
         curvature, slope = self._normal_equations(weights, x, y)
         before = self._error(x, y)
@@ -61,19 +61,21 @@ class LevenbergMarquardt:
         """Gauss and Newton's second derivatives (W, W) of the objective and its gradient (W,)."""
         named = {name: value.detach() for name, value in self.model.named_parameters()}
 
-        def output(values: dict[str, Tensor], row: Tensor) -> Tensor:
+        def output(values: dict[str, Tensor], row: Tensor, plane: int) -> Tensor:
             output: Tensor = functional_call(self.model, values, (row,))
-            return output[0]
+            return output[plane]
 
-        gradients = vmap(grad(output), in_dims=(None, 0))
+        gradients = vmap(grad(output), in_dims=(None, 0, None))
         curvature = self.weight_decay * torch.eye(len(weights), dtype=x.dtype, device=x.device)
         slope = self.weight_decay * weights
         for some, wanted in blocks(x, y):
-            jacobian = torch.cat([gradient.flatten(1) for gradient in gradients(named, some).values()], dim=1)
             with torch.no_grad():
                 residual = self.model(some) - wanted
-            curvature += 2.0 / len(x) * (jacobian.T @ jacobian)
-            slope = slope + 2.0 / len(x) * (jacobian.T @ residual)[:, 0]
+            for plane in range(y.shape[1]):
+                of_weights = gradients(named, some, plane).values()
+                jacobian = torch.cat([gradient.flatten(1) for gradient in of_weights], dim=1)
+                curvature += 2.0 / len(x) * (jacobian.T @ jacobian)
+                slope = slope + 2.0 / len(x) * (jacobian.T @ residual[:, plane : plane + 1])[:, 0]
         return curvature, slope
 
     def _error(self, x: Tensor, y: Tensor) -> float:
@@ -82,6 +84,6 @@ class LevenbergMarquardt:
 
 
 def blocks(x: Tensor, y: Tensor) -> Iterator[tuple[Tensor, Tensor]]:
-    """Samples x (N, D) and y (N, 1) in parts of at most BLOCK."""
+    """Samples x (N, D) and y (N, P) in parts of at most BLOCK."""
     for start in range(0, len(x), BLOCK):
         yield x[start : start + BLOCK], y[start : start + BLOCK]

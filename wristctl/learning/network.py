@@ -66,9 +66,14 @@ class Scaler:
     """(D,)"""
 
     @staticmethod
-    def of(values: Array) -> Scaler:
-        """Zero mean and unit deviation for the rows of `values` (N, D); a constant column is only shifted."""
+    def of(values: Array, alike: bool = False) -> Scaler:
+        """Zero mean and unit deviation for the rows of `values` (N, D); a constant column is only shifted.
+
+        With `alike` all columns have one deviation, the root of their mean square: vectors keep their directions.
+        """
         deviation = values.std(axis=0)
+        if alike:
+            deviation = np.full(len(deviation), np.sqrt(np.mean(deviation**2)))
         return Scaler(values.mean(axis=0), np.where(deviation > 0.0, deviation, 1.0))
 
     @staticmethod
@@ -87,7 +92,7 @@ class Scaler:
 
 @dataclass(frozen=True)
 class Network:
-    """Inputs, of which x and y [m] of the tip are the first, to bending angle [rad]; scaled, one linear output."""
+    """Inputs, of which the tip (P + 1) [m] is the first, to the bend in P planes [rad]; scaled, linear outputs."""
 
     weights: tuple[Array, ...]
     """per layer (neurons, inputs)"""
@@ -100,9 +105,14 @@ class Network:
     domain: Domain
     """the region of inputs it was trained on"""
     others: tuple[str, ...] = ()
-    """inputs after x and y"""
+    """inputs after the tip"""
     segments: int = 1
     """segments of the wrist that it learned; 1: any"""
+
+    @property
+    def planes(self) -> int:
+        """Planes that the wrist bends in, one output each."""
+        return len(self.biases[-1])
 
     @property
     def parameters(self) -> int:
@@ -125,22 +135,35 @@ class Network:
         A value outside the trained domain leaves no tip inside. Raises KeyError where a value is missing.
         """
         values = np.array([others[name] for name in self.others])
-        scaler, weight = self.input_scaler, self.weights[0]
-        shift = weight[:, 2:] @ ((values - scaler.mean[2:]) / scaler.deviation[2:])
+        scaler, weight, tip = self.input_scaler, self.weights[0], self.planes + 1
+        shift = weight[:, tip:] @ ((values - scaler.mean[tip:]) / scaler.deviation[tip:])
         return replace(
             self,
-            weights=(weight[:, :2], *self.weights[1:]),
+            weights=(weight[:, :tip], *self.weights[1:]),
             biases=(self.biases[0] + shift, *self.biases[1:]),
-            input_scaler=Scaler(scaler.mean[:2], scaler.deviation[:2]),
+            input_scaler=Scaler(scaler.mean[:tip], scaler.deviation[:tip]),
             domain=self.domain.at(values),
             others=(),
         )
 
     def angle(self, inputs: Array) -> Array:
-        """Bending angles (...) [rad] of inputs (..., 2 + others); `domain.contains` says which can be trusted."""
+        """Bends (...) [rad] of inputs (..., P + 1 + others); `domain.contains` says which can be trusted.
+
+        In two planes they are of shape (..., 2).
+        """
         rows = inputs.reshape(-1, self.sizes[0])
         blocks = [self._forward(rows[i : i + BLOCK]) for i in range(0, len(rows), BLOCK)]
-        return np.concatenate(blocks or [np.empty(0)]).reshape(inputs.shape[:-1])
+        bends = np.concatenate(blocks or [np.empty((0, self.planes))])
+        return self._of_planes(bends).reshape((*inputs.shape[:-1], *self._shape))
+
+    @property
+    def _shape(self) -> tuple[int, ...]:
+        """Shape of one bend: a number in one plane."""
+        return () if self.planes == 1 else (self.planes,)
+
+    def _of_planes(self, bends: Array) -> Array:
+        """Bends (N, P) as (N,) in one plane."""
+        return bends[:, 0] if self.planes == 1 else bends
 
     def along(self, path: TipPath) -> AnglePath:
         """Angles along a path with their exact first and second time derivatives.
@@ -151,7 +174,7 @@ class Network:
         acceleration does not show.
         """
         count = len(path.position)
-        columns = np.empty((3, count))
+        columns = np.empty((3, count, *self._shape))
         for start in range(0, count, BLOCK):
             rows = slice(start, start + BLOCK)
             columns[:, rows] = self._expand(path.position[rows], path.velocity[rows], path.acceleration[rows])
@@ -162,7 +185,7 @@ class Network:
         value = self.input_scaler.scale(inputs)
         for weight, bias in zip(self.weights[:-1], self.biases[:-1], strict=True):
             value = activate(value @ weight.T + bias)[0]
-        return self.output_scaler.restore(value @ self.weights[-1].T + self.biases[-1])[:, 0]
+        return self.output_scaler.restore(value @ self.weights[-1].T + self.biases[-1])
 
     def _expand(self, tip: Array, velocity: Array, acceleration: Array) -> tuple[Array, Array, Array]:
         activate = ACTIVATIONS[self.activation]
@@ -175,4 +198,5 @@ class Network:
         last = self.weights[-1].T
         deviation = self.output_scaler.deviation
         theta = self.output_scaler.restore(value @ last + self.biases[-1])
-        return theta[:, 0], (rate @ last * deviation)[:, 0], (bend @ last * deviation)[:, 0]
+        rate, bend = rate @ last * deviation, bend @ last * deviation
+        return self._of_planes(theta), self._of_planes(rate), self._of_planes(bend)

@@ -2,10 +2,10 @@
 
 from itertools import pairwise
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Literal, Self
 
 import numpy as np
-from pydantic import Field, ValidationError
+from pydantic import Field, ValidationError, model_validator
 from safetensors import SafetensorError, safe_open
 from safetensors.numpy import save
 
@@ -13,7 +13,7 @@ from wristctl.arrays import Array
 from wristctl.config.learning import Activation
 from wristctl.config.section import Section
 from wristctl.errors import Call, UserError
-from wristctl.learning.domain import OTHERS, Domain
+from wristctl.learning.domain import AROUND, OTHERS, Domain
 from wristctl.learning.network import Network, Scaler
 from wristctl.records.files import replacing
 
@@ -25,11 +25,21 @@ ENTRY = "wristctl"
 Positive = Annotated[float, Field(gt=0)]
 
 
+TIP = ("x", "y", "z")
+BENDS = {1: ("theta",), 2: ("bend_ulnar", "bend_flexion")}
+"""Names of the outputs, by the number of planes."""
+
+
 class _Input(Section):
-    names: tuple[Literal["x"], Literal["y"]] = ("x", "y")
+    names: tuple[Literal["x"], Literal["y"]] | tuple[Literal["x"], Literal["y"], Literal["z"]] = ("x", "y")
     unit: Literal["m"] = "m"
-    mean: tuple[float, float]
-    deviation: tuple[Positive, Positive]
+    mean: tuple[float, ...]
+    deviation: tuple[Positive, ...]
+
+    @model_validator(mode="after")
+    def _a_value_each(self) -> Self:
+        _check_values(self, len(self.names))
+        return self
 
 
 class _Other(Section):
@@ -41,15 +51,26 @@ class _Other(Section):
 
 
 class _Output(Section):
-    names: tuple[Literal["theta"]] = ("theta",)
+    names: tuple[Literal["theta"]] | tuple[Literal["bend_ulnar"], Literal["bend_flexion"]] = ("theta",)
     unit: Literal["rad"] = "rad"
-    mean: tuple[float]
-    deviation: tuple[Positive]
+    mean: tuple[float, ...]
+    deviation: tuple[Positive, ...]
+
+    @model_validator(mode="after")
+    def _a_value_each(self) -> Self:
+        _check_values(self, len(self.names))
+        return self
+
+
+def _check_values(columns: _Input | _Output, count: int) -> None:
+    if len(columns.mean) != count or len(columns.deviation) != count:
+        raise ValueError(f"mean and deviation need {count} values each")
 
 
 class _Region(Section):
     theta: tuple[float, float]
     arc_length: tuple[float, float]
+    reach: tuple[float, ...] = ()
 
 
 class _Header(Section):
@@ -63,37 +84,58 @@ class _Header(Section):
     domain: _Region
     training: dict[str, object]
 
+    @property
+    def planes(self) -> int:
+        """Planes that the wrist bends in."""
+        return len(self.output.names)
+
+    @model_validator(mode="after")
+    def _planes_agree(self) -> Self:
+        if len(self.input.names) != self.planes + 1:
+            raise ValueError(f"a tip of {len(self.input.names)} coordinates has no bend in {self.planes} planes")
+        if len(self.domain.reach) != (AROUND if self.planes == 2 else 0):
+            raise ValueError(f"domain.reach needs {AROUND} values in two planes, and none in one")
+        return self
+
 
 def save_network(network: Network, path: Path, training: dict[str, object]) -> None:
     """Write a network and `training`, its record: settings, seed, the data's hash, whatever JSON can hold."""
-    scaler = _columns(network.input_scaler)
+    scaler, planes = _columns(network.input_scaler), network.planes
+    tip = {name: tuple(values[: planes + 1]) for name, values in scaler.items()}
     header = _Header(
         hidden=network.sizes[1:-1],
         activation=network.activation,
-        input=_Input.model_validate({name: tuple(values[:2]) for name, values in scaler.items()}),
+        input=_Input.model_validate(tip | {"names": TIP[: planes + 1]}),
         others=tuple(
             _Other(name=name, unit=OTHERS[name], mean=mean, deviation=deviation, range=ends)
             for name, mean, deviation, ends in zip(
-                network.others, scaler["mean"][2:], scaler["deviation"][2:], network.domain.others, strict=True
+                network.others,
+                scaler["mean"][planes + 1 :],
+                scaler["deviation"][planes + 1 :],
+                network.domain.others,
+                strict=True,
             )
         ),
         segments=network.segments,
-        output=_Output.model_validate(_columns(network.output_scaler)),
-        domain=_Region(theta=network.domain.theta, arc_length=network.domain.arc_length),
+        output=_Output.model_validate(_columns(network.output_scaler) | {"names": BENDS[planes]}),
+        domain=_Region(theta=network.domain.theta, arc_length=network.domain.arc_length, reach=network.domain.reach),
         training=training,
     )
     tensors = {}
     for layer, (weight, bias) in enumerate(zip(network.weights, network.biases, strict=True)):
         tensors[f"{layer}.weight"], tensors[f"{layer}.bias"] = np.ascontiguousarray(weight), bias
     with replacing(path) as temporary:
-        temporary.write_bytes(save(tensors, {ENTRY: header.model_dump_json()}))
+        text = header.model_dump_json(exclude={"domain": {"reach"}} if planes == 1 else None)
+        temporary.write_bytes(save(tensors, {ENTRY: text}))
 
 
 def load_network(path: Path) -> Network:
     """Read a network. Raises UserError for anything that `save_network` would not have written."""
     header, tensors = _read(path)
     weights, biases, entries = [], [], header.others
-    for layer, (inputs, neurons) in enumerate(pairwise((2 + len(header.others), *header.hidden, 1))):
+    for layer, (inputs, neurons) in enumerate(
+        pairwise((header.planes + 1 + len(entries), *header.hidden, header.planes))
+    ):
         weights.append(_tensor(path, tensors, f"{layer}.weight", (neurons, inputs)))
         biases.append(_tensor(path, tensors, f"{layer}.bias", (neurons,)))
     return Network(
@@ -105,7 +147,9 @@ def load_network(path: Path) -> Network:
             np.array([*header.input.deviation, *(entry.deviation for entry in entries)]),
         ),
         Scaler(np.array(header.output.mean), np.array(header.output.deviation)),
-        Domain(header.domain.theta, header.domain.arc_length, tuple(entry.range for entry in entries)),
+        Domain(
+            header.domain.theta, header.domain.arc_length, tuple(entry.range for entry in entries), header.domain.reach
+        ),
         tuple(entry.name for entry in entries),
         header.segments,
     )

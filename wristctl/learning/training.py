@@ -118,9 +118,11 @@ class _Problem:
 
     def __init__(self, samples: Samples, job: Job, device: str) -> None:
         self.settings, self.samples, self.job, self.device = job.settings, samples, job, device
-        inputs, theta = samples.inputs, samples.theta[:, None]
-        fit = Scaler.of if self.settings.standardise else lambda values: Scaler.none(values.shape[1])
-        self.input, self.output = fit(inputs[job.split.train]), fit(theta[job.split.train])
+        inputs, theta = samples.inputs, samples.theta.reshape(len(samples.theta), -1)
+        self.planes = theta.shape[1]
+        self.input, self.output = Scaler.none(inputs.shape[1]), Scaler.none(self.planes)
+        if self.settings.standardise:
+            self.input, self.output = Scaler.of(inputs[job.split.train]), Scaler.of(theta[job.split.train], alike=True)
 
         def tensors(rows: NDArray[np.int64]) -> tuple[Tensor, Tensor]:
             scaled = self.input.scale(inputs[rows]), self.output.scale(theta[rows])
@@ -137,7 +139,7 @@ class _Problem:
             torch.manual_seed(seed)
             for inputs, neurons in pairwise((self.train[0].shape[1], *self.settings.hidden)):
                 layers += [nn.Linear(inputs, neurons, dtype=DTYPE), LAYERS[self.settings.activation]()]
-            last = nn.Linear(self.settings.hidden[-1], 1, dtype=DTYPE)
+            last = nn.Linear(self.settings.hidden[-1], self.planes, dtype=DTYPE)
             return nn.Sequential(*layers, last).to(self.device)
 
     def optimiser(self, model: nn.Sequential) -> torch.optim.Optimizer | LevenbergMarquardt:
@@ -226,7 +228,7 @@ class _Course:
             loss = nn.functional.mse_loss(self.model(x[rows]), y[rows])
             loss.backward()  # type: ignore[no-untyped-call]
             optimiser.step()
-            total += loss.item() * len(rows)
+            total += loss.item() * y.shape[1] * len(rows)
         return total / len(x)
 
     def kept(self) -> tuple[nn.Sequential, float]:

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Iterable
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -10,12 +11,13 @@ from wristctl.arrays import Array
 from wristctl.config.loop import DirectionName, Loop, Reference
 from wristctl.config.wrist import WristParameters
 from wristctl.errors import UserError
-from wristctl.simulation.motion import Motion
+from wristctl.simulation.motion import Angles, Motion
 from wristctl.simulation.recording import recorded_bends
-from wristctl.simulation.reference import REFERENCES, course_of, motion, toward
+from wristctl.simulation.reference import REFERENCES, by_angles, course_of, estimated, motion, toward
 from wristctl.simulation.worlds import plant_of
 from wristctl.wrist.directions import DIRECTIONS, in_plane
 from wristctl.wrist.kinematics import Inverse
+from wristctl.wrist.spatial.spatial_kinematics import bend_path
 from wristctl.wrist.tendon_layout import TendonLayout, off_both_sides
 
 
@@ -100,7 +102,15 @@ def motion_in(
         directed = reference if direction is None else toward(reference, direction)
         return motion(directed, wrist, horizon, period, network, later)
     way = _direction(reference, direction)
-    return Motion.of_bends(bends_of(reference, way, wrist, horizon, period), period, wrist.length)
+    bends = bends_of(reference, way, wrist, horizon, period)
+    wanted = Motion.of_bends(bends, period, wrist.length)
+    if reference.inverse != "network":
+        return wanted
+    estimate = estimated(network, bend_path(bends, wrist.length))
+    rows = np.stack([estimate.theta, estimate.rate, estimate.acceleration]).transpose(2, 0, 1)
+    reached = Angles.of(np.ascontiguousarray(rows).reshape(-1, bends.shape[2]))
+    outside = float(np.mean(estimate.outside))
+    return replace(wanted, angles=reached, turn=bends[:, 0, -1], outside=outside, wanted=wanted.angles)
 
 
 def _direction(reference: Reference, direction: DirectionName | None) -> DirectionName:
@@ -112,11 +122,10 @@ def bends_of(
 ) -> Array:
     """Wanted bends with two derivatives, (2, 3, T), on the grid of `period` [s] over the horizon [s].
 
-    A reference in one plane bends toward the direction; of a recording both planes are taken.
+    A reference in one plane bends toward the direction; of a recording both planes are taken. A network behind it is
+    left out: these are the bends that are wanted.
     """
-    if reference.inverse == "network":
-        fix = "inverse: closed-form, or loop.planes: 1"
-        raise UserError("no network gives bends in two planes", "reference.inverse", fix)
+    reference = by_angles(reference)
     kind = REFERENCES[reference.kind]
     time = np.arange(round(horizon / period), dtype=np.float64) * period
     if kind.planes == 2:

@@ -20,7 +20,7 @@ from wristctl.interrupt import from_outside
 from wristctl.plugins.places import raised_at
 from wristctl.simulation.motion import Angles, Motion
 from wristctl.wrist.directions import DIRECTIONS
-from wristctl.wrist.kinematics import Inverse, arc_path, arc_tip, exact_arc
+from wristctl.wrist.kinematics import AnglePath, Inverse, TipPath, arc_path, arc_tip, exact_arc
 
 # Form of the targets in a study: one angle or tip at the end, or the leaf with several, one every `duration`.
 Targets = Literal["end", "angles_deg", "tips", "none"]
@@ -212,11 +212,22 @@ def _evaluated(
     rest_time, tips = kind.rest(reference, begin, horizon), partial(_tips, angles, length)
     if reference.inverse != "network":
         return Motion(time, angles, tips, move, begin, rest_time, horizon)
-    if network is None:
-        raise UserError("the reference goes through a network, and none is given", "reference.inverse", "--network RUN")
-    estimate = network(arc_path(angles.rows, length()))
+    estimate = estimated(network, arc_path(angles.rows, length()))
     reached = Angles.of(np.array([estimate.theta, estimate.rate, estimate.acceleration]))
     return Motion(time, reached, tips, move, begin, rest_time, horizon, float(np.mean(estimate.outside)), angles)
+
+
+def estimated(network: Inverse | None, path: TipPath) -> AnglePath:
+    """The network's bends of a path of the tip. Raises UserError without a network."""
+    if network is None:
+        raise UserError("the reference goes through a network, and none is given", "reference.inverse", "--network RUN")
+    return network(path)
+
+
+def by_angles(reference: Reference) -> Reference:
+    """The reference without a network: the bends that one arc has."""
+    tips = reference.tip is not None or reference.kind == "tip-path"
+    return reference.model_copy(update={"inverse": "closed-form" if tips else "none"})
 
 
 @lru_cache(maxsize=64)

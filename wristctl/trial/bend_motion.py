@@ -60,6 +60,9 @@ def bend_motion_of(
     """A trial's motion in this direction, or along the reference's own path. Raises UserError for one out of reach."""
     reference, horizon, period = settings.reference, settings.horizon, settings.control_period
     if has_path(settings):
+        if reference.inverse == "network":
+            problem, fix = "no network stands behind a path of trials", "inverse: closed-form"
+            raise UserError(problem, "reference.inverse", fix)
         references = bends_of(reference, "ulnar", wrist, horizon, period)
         time = period * np.arange(references.shape[2], dtype=np.float64)
         moving = np.flatnonzero(references[:, 1:].any(axis=(0, 1)))

@@ -13,14 +13,14 @@ from wristctl.config.wrist import WristParameters
 
 @dataclass(frozen=True)
 class TipPath:
-    """Wanted tip positions on a time grid of T samples."""
+    """Wanted tip positions in P planes on a time grid of T samples."""
 
     position: Array
-    """(T, 2) [m]"""
+    """(T, P + 1) [m]"""
     velocity: Array
-    """(T, 2) [m/s]"""
+    """(T, P + 1) [m/s]"""
     acceleration: Array
-    """(T, 2) [m/s^2]"""
+    """(T, P + 1) [m/s^2]"""
 
 
 @dataclass(frozen=True)
@@ -28,11 +28,11 @@ class AnglePath:
     """The bending angles that an inverse gives for a tip path."""
 
     theta: Array
-    """(T,) [rad]"""
+    """(T,), in two planes (T, 2) [rad]"""
     rate: Array
-    """(T,) [rad/s]"""
+    """(T,) or (T, 2) [rad/s]"""
     acceleration: Array
-    """(T,) [rad/s^2]"""
+    """(T,) or (T, 2) [rad/s^2]"""
     outside: NDArray[np.bool_]
     """(T,) true where the tip lies outside the inverse's domain, so that its angle means nothing"""
 

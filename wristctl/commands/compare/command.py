@@ -276,7 +276,7 @@ def compare(session: Session) -> Compared:
     warn_outside_conditions(settings.rows, loops)
     warn_of_one_plane(study.wrist, asked_of_comparison(study))
     warn_out_of_reach(findings, study.wrist, asked_by(study, settings))
-    network = network_for(session.inputs, study.wrist, loops)
+    network = network_for(session.inputs, study.wrist, loops, planes_of_comparison(study))
     if settings.tuning is not None:
         searches = search_all(session, study.model_copy(update={"tune": settings.tuning}), network)
     tuned = dict(tuned_gains(session.inputs) or {}) | {name: search.gains for name, search in searches.items()}

@@ -14,10 +14,21 @@ if TYPE_CHECKING:
     from wristctl.learning.measured_samples import RecordedCourse
 
 # Factor and unit in which a quantity is shown; of others 1e3 and mm.
-RANGES = {"theta": (180.0 / math.pi, "deg"), "pose": (180.0 / math.pi, "deg"), "hand_mass": (1.0, "kg")}
+RANGES = dict.fromkeys(("theta", "bend", "bend_ulnar", "bend_flexion", "pose", "roll"), (180.0 / math.pi, "deg")) | {
+    "hand_mass": (1.0, "kg")
+}
+# Quantities of samples beside further inputs, by the number of planes.
+QUANTITIES = {
+    1: ("theta", "arc_length", "x", "y"),
+    2: ("bend", "bend_ulnar", "bend_flexion", "arc_length", "x", "y", "z"),
+}
+CLOSED_FORM = {1: "2 atan2(y, x)", 2: "2 atan2(hypot(y, z), x) toward (y, z)"}
+"""The closed form of one arc, by the number of planes."""
 # Quantities in words.
 _WORDS = {"theta": "bending angle", "arc_length": "arc length", "x": "tip, along the straight wrist", "y": "tip, aside",
-          "pose": "tilt of the wrist", "hand_mass": "mass in the hand"}  # fmt: skip
+          "bend": "size of the bend", "bend_ulnar": "bend toward ulnar", "bend_flexion": "bend toward flexion",
+          "z": "tip, toward flexion", "pose": "tilt of the wrist", "roll": "direction of the tilt",
+          "hand_mass": "mass in the hand"}  # fmt: skip
 
 
 class Measured(NamedTuple):
@@ -48,24 +59,33 @@ def counted(count: int, name: str) -> str:
 
 
 def answer_of(
-    inputs: Sequence[str], metrics: Mapping[str, float], run: str, split: str | None, measured: Measured | None = None
+    inputs: Sequence[str],
+    metrics: Mapping[str, float],
+    run: str,
+    split: str | None,
+    measured: Measured | None = None,
+    why_two: str = "",
 ) -> Answer:
     """What was drawn, or read of recordings.
 
     `inputs` are those beside the tip, `run` is the path of the run, empty in memory; `split` is how `train` can part
-    the samples, None where it cannot.
+    the samples, None where it cannot; `why_two` says why the samples bend in two planes, where that is to be said.
     """
-    count = int(metrics["samples"])
-    low, high = (metrics[f"theta_{end}_deg"] for end in ("min", "max"))
+    count, planes = int(metrics["samples"]), 2 if "bend_max_deg" in metrics else 1
     source = ""
     if measured is not None:
         named = counted(measured.recordings, "recording")
         chosen = "all" if measured.samples == count else f"drawn from the {measured.samples}"
         source = f", {chosen} of {named}{measured.left_out_words}"
-    sentence = f"{count} samples of tip position and bending angle, from {number(low)} to {number(high)} deg{source}."
+    low, high = (metrics[f"{QUANTITIES[planes][0]}_{end}_deg"] for end in ("min", "max"))
+    ends = f"from {number(low)} to {number(high)} deg"
+    why = f" ({why_two})" if why_two else ""
+    what = "bending angle" if planes == 1 else f"bend in two planes{why}"
+    sentence = f"{count} samples of tip position and {what}, {ends}{source}."
     error, largest = (math.radians(metrics[f"exact_inverse_{name}"]) for name in ("rmse_deg", "max_error_deg"))
     notes = [
-        f"The closed form 2 atan2(y, x) has an RMSE of {degrees(error)} deg there, at most {degrees(largest)} deg off."
+        f"The closed form {CLOSED_FORM[planes]} has an RMSE of {degrees(error)} deg there, "
+        f"at most {degrees(largest)} deg off."
     ]
     held = [
         f"{100.0 * metrics[f'held_out_{name}_share']:.3g} % by their {name}"
@@ -79,12 +99,14 @@ def answer_of(
         neighbours = ", which is tested by neighbours of what it was trained on" * bool(parted)
         notes += [f"Next, train a network on them{neighbours}:", f"$ {shlex.join(words)}"]
     more = f"The samples: {run}/data/samples.npz" if run else ""
-    return Answer(sentence, Table("", ("quantity", "least", "greatest", "unit"), _rows(inputs, metrics)), notes, more)
+    return Answer(
+        sentence, Table("", ("quantity", "least", "greatest", "unit"), _rows(planes, inputs, metrics)), notes, more
+    )
 
 
-def _rows(inputs: Sequence[str], metrics: Mapping[str, float]) -> list[tuple[str, float, float, str]]:
+def _rows(planes: int, inputs: Sequence[str], metrics: Mapping[str, float]) -> list[tuple[str, float, float, str]]:
     rows = []
-    for name in ("theta", "arc_length", "x", "y", *inputs):
+    for name in (*QUANTITIES[planes], *inputs):
         unit = RANGES.get(name, (1e3, "mm"))[1]
         rows.append((_WORDS.get(name, name), metrics[f"{name}_min_{unit}"], metrics[f"{name}_max_{unit}"], unit))
     return rows

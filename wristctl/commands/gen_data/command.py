@@ -1,4 +1,4 @@
-"""Samples of tip positions and bending angles."""
+"""Samples of tip positions and bends."""
 
 from __future__ import annotations
 
@@ -9,8 +9,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from wristctl.commands.answer import Answer
-from wristctl.commands.gen_data.answer import RANGES, Measured, answer_of, counted, measured_of
+from wristctl.commands.gen_data.answer import CLOSED_FORM, QUANTITIES, RANGES, Measured, answer_of, counted, measured_of
 from wristctl.commands.inputs import EarlierRun, Given, Inputs
+from wristctl.commands.loop_warnings import warn_of_one_plane
 from wristctl.commands.printed_table import Table
 from wristctl.commands.procedure import Procedure
 from wristctl.commands.results import StudyResult
@@ -33,7 +34,7 @@ READABLE = 200_000
 
 @dataclass(frozen=True, repr=False, eq=False)
 class Generated(StudyResult):
-    """Samples of tip positions [m] and bending angles [rad]."""
+    """Samples of tip positions [m] and bends in P planes [rad]."""
 
     kind = "gen-data"
 
@@ -44,10 +45,11 @@ class Generated(StudyResult):
     @property
     def answer(self) -> Answer:
         """What was drawn or read, with its ranges in deg and mm."""
-        return answer_of(self.samples.names, self.metrics, self.place, split_of(self.samples), self.measured)
+        why = "" if self.measured else _why_two(self.study)
+        return answer_of(self.samples.names, self.metrics, self.place, split_of(self.samples), self.measured, why)
 
     def frame(self) -> pd.DataFrame:
-        """One row per sample: x, y, the other inputs, theta, arc_length; SI units."""
+        """One row per sample: the tip, the other inputs, the bend, arc_length; SI units."""
         from wristctl.commands.train.tables import samples_table
 
         return samples_table(self.samples)
@@ -68,7 +70,10 @@ def plan(study: Study, inputs: Inputs) -> str:
         chosen = "all" if settings.samples is None else f"at most {settings.samples} of"
         named = counted(measured.recordings, "recording")
         return f"{chosen} {measured.samples} samples of {whose}, {named}{measured.left_out_words}"
-    begin = f"{settings.drawn_samples} samples ({settings.sampling}), bending within +-{wrist.range_deg:g} deg, "
+    within = f"within +-{wrist.range_deg:g} deg"
+    if planes_of_study(study) == 2:
+        within = f"in two planes by up to {wrist.range_deg:g} deg"
+    begin = f"{settings.drawn_samples} samples ({settings.sampling}), bending {within}, "
     if settings.source == "plant":
         tilts = ", ".join(f"{tilt:g}" for tilt in (*settings.poses, *settings.held_out_poses))
         low, high = (100.0 * ratio for ratio in settings.payload)
@@ -78,15 +83,14 @@ def plan(study: Study, inputs: Inputs) -> str:
 
 
 def gen_data(session: Session) -> Generated:
-    """Sample tip positions and bending angles: constant curvature, equilibria under load, or earlier runs."""
+    """Sample tip positions and bends: constant curvature, equilibria under load, or earlier runs."""
     import numpy as np
 
     from wristctl.commands.gen_data.figures import workspace
     from wristctl.commands.train.figures import coverage
     from wristctl.commands.train.tables import MEANING, UNITS, samples_table
     from wristctl.learning.dataset import HELD_PAYLOAD, HELD_POSE
-    from wristctl.learning.evaluation import angle_errors
-    from wristctl.wrist.kinematics import exact_angle
+    from wristctl.learning.evaluation import angle_errors, exact_bends
 
     findings = session.findings
     entropy = findings.stream("samples")
@@ -96,7 +100,8 @@ def gen_data(session: Session) -> Generated:
         samples = drawn(session.study, entropy, courses, advance)
         advance(len(samples.theta))
     table = samples_table(samples)
-    exact = angle_errors(exact_angle(samples.tip), samples.theta)
+    planes = samples.planes
+    exact = angle_errors(exact_bends(samples.tip), samples.theta, planes)
 
     count = len(samples.theta)
     with session.progress("writing"):
@@ -104,25 +109,27 @@ def gen_data(session: Session) -> Generated:
             findings.table("data/samples.csv", table, UNITS, MEANING)
         findings.arrays("data/samples.npz", samples.arrays())
         findings.figure("coverage", coverage, table.iloc[:: -(-count // READABLE)], count)
-        findings.figure("workspace", workspace, session.study.wrist)
+        findings.figure("workspace", workspace, session.study.wrist, planes)
 
     findings.metric("samples", count, meaning="number of samples")
     for code, name in ((HELD_PAYLOAD, "payload"), (HELD_POSE, "pose")):
         share = float(np.mean(samples.held_out == code))
         findings.metric(f"held_out_{name}_share", share, n=count, meaning=f"share held out of training by its {name}")
     rows: list[tuple[str, float, float]] = []
-    for name in ("theta", "arc_length", "x", "y", *samples.names):
+    for name in (*QUANTITIES[planes], *samples.names):
         scale, unit = RANGES.get(name, (1e3, "mm"))
-        low, high = scale * float(table[name].min()), scale * float(table[name].max())
+        values = samples.size if name == "bend" else table[name]
+        low, high = scale * float(values.min()), scale * float(values.max())
         rows.append((f"{name} [{unit}]", low, high))
         findings.metric(f"{name}_min_{unit}", low, unit=unit, n=count, meaning=f"least: {MEANING[name]}")
         findings.metric(f"{name}_max_{unit}", high, unit=unit, n=count, meaning=f"greatest: {MEANING[name]}")
     for name in ("rmse_deg", "max_error_deg"):
-        meaning = "error of the exact inverse 2 atan2(y, x) on these samples"
+        meaning = f"error of the exact inverse {CLOSED_FORM[planes]} on these samples"
         findings.metric(f"exact_inverse_{name}", getattr(exact, name), "deg", "lower", count, meaning=meaning)
     rows.append(("error of the exact inverse [deg]", 0.0, exact.max_error_deg))
+    first = QUANTITIES[planes][0]
     findings.headline(
-        "samples", "theta_min_deg", "theta_max_deg", "exact_inverse_rmse_deg", "exact_inverse_max_error_deg"
+        "samples", f"{first}_min_deg", f"{first}_max_deg", "exact_inverse_rmse_deg", "exact_inverse_max_error_deg"
     )
     tables = [Table(f"{count} samples", ("quantity", "least", "greatest"), rows)]
     return Generated(session.study, findings, tables, samples, measured_of(courses) if courses else None)
@@ -137,13 +144,14 @@ def drawn(
     """
     import numpy as np
 
-    from wristctl.learning.dataset import draw_samples
+    from wristctl.learning.dataset import asked_of, draw_samples
 
     settings, rng = study.gen_data, np.random.default_rng(entropy)
     if settings.measured:
         from wristctl.learning.measured_samples import samples_of_courses
 
         return samples_of_courses(courses, settings.samples, rng)
+    warn_of_one_plane(study.wrist, [asked_of(settings)])
     if settings.source == "plant":
         from wristctl.learning.dataset import draw_equilibria
 
@@ -193,7 +201,7 @@ def recorded(study: Study, inputs: Inputs) -> list[RecordedCourse]:
 
 
 def _courses_of(source: Given) -> list[RecordedCourse]:
-    """Tips and angles of every course that a run keeps: tables and arrays with tip_x, tip_y and theta."""
+    """Tips and bends of every course that a run keeps: tables and arrays with tip_x, tip_y and theta, or in space."""
     from wristctl.learning.measured_samples import NEEDED, courses_in
 
     courses = [course for name, columns in _kept(source) for course in courses_in(columns, name)]
@@ -220,9 +228,24 @@ def _kept(source: Given) -> list[tuple[str, Mapping[str, Any]]]:
     return list(source.courses().items())
 
 
+def planes_of_study(study: Study) -> int:
+    """Planes of the samples that a study draws. Raises UserError."""
+    from wristctl.learning.dataset import planes_of_samples
+
+    return planes_of_samples(study.gen_data, study.wrist)
+
+
+def _why_two(study: Study) -> str:
+    from wristctl.learning.dataset import asked_of
+    from wristctl.simulation.planes import why_two
+
+    reason = why_two(study.wrist, [asked_of(study.gen_data)])
+    return reason if " out of " in reason else ""
+
+
 def pulled_to_samples(study: Study) -> bool:
-    """Whether the samples that a study draws are equilibria of a wrist that its tendons hold."""
-    return study.gen_data.source == "plant"
+    """Whether the samples that a study draws are equilibria of a wrist that two sides of tendons hold in one plane."""
+    return study.gen_data.source == "plant" and planes_of_study(study) == 1
 
 
 GEN_DATA = Procedure(

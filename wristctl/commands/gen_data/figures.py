@@ -13,7 +13,9 @@ from wristctl.config.wrist import WristParameters
 from wristctl.errors import UserError
 from wristctl.plotting.style import BLACK, BLUE, GREY, figure, legend, title
 from wristctl.wrist.kinematics import arcs_backbone
+from wristctl.wrist.spatial.held_bends import reach_of_bends
 from wristctl.wrist.statics import equilibrium
+from wristctl.wrist.tendon_layout import TendonLayout
 
 SEGMENTS = 4
 _SOFTER, _STIFFER = 0.7, 1.3
@@ -34,8 +36,13 @@ def rest_poses(wrist: WristParameters, tension: Array) -> Array:
     return poses
 
 
-def workspace(wrist: WristParameters) -> Figure:
-    """The wrist at rest under tensions up to its limit, its tip's path, and angle over tension; stiffer and softer."""
+def workspace(wrist: WristParameters, planes: int = 1) -> Figure:
+    """The wrist at rest under tensions up to its limit, its tip's path, and angle over tension; stiffer and softer.
+
+    In two planes the bends that tendons within their limits hold, stiffer and softer.
+    """
+    if planes == 2:
+        return _held_bends(wrist)
     up = np.linspace(wrist.pretension, wrist.tension_limit, _TENSIONS)
     tension = np.concatenate([-up[::-1], up])
     poses = rest_poses(wrist, tension)
@@ -61,4 +68,25 @@ def workspace(wrist: WristParameters) -> Figure:
         curve.plot(tension, angle, style, color=BLUE if factor == 1.0 else GREY, label=label)
     curve.set(xlabel="tension of the pulling side's tendons [N]", ylabel="bending angle at rest [deg]")
     legend(curve, loc="best")
+    return picture
+
+
+def _held_bends(wrist: WristParameters) -> Figure:
+    layout = TendonLayout.of(wrist)
+    picture, ((axes,),) = figure(height=4.6)
+    for factor, style in ((_SOFTER, "--"), (1.0, "-"), (_STIFFER, ":")):
+        stiffer = wrist.model_copy(update={"stiffness": factor * wrist.stiffness})
+        label = "as believed" if factor == 1.0 else f"springs x{factor:g}"
+        reach = np.degrees(reach_of_bends(stiffer, layout))
+        axes.plot(*reach.T, style, color=BLUE if factor == 1.0 else GREY, label=label)
+    for number, place in enumerate(layout.places, 1):
+        if place.radius > 0.0:
+            at = 1.08 * wrist.range_deg * np.array([np.cos(place.angle), np.sin(place.angle)])
+            axes.text(*at, f"{number}", ha="center", va="center")
+    axes.set(xlabel="bend toward ulnar [deg]", ylabel="bend toward flexion [deg]", aspect="equal")
+    title(
+        axes,
+        f"bends of up to {wrist.range_deg:g} deg held within {wrist.tension_limit:g} N, and where each tendon pulls",
+    )
+    legend(axes, loc="center")
     return picture

@@ -76,7 +76,7 @@ def plan(study: Study, inputs: Inputs) -> str:
             check_two_planes(known)
         else:
             check_reach([settings.reference], known.wrist, "reference")
-            check_inverses(inverses_of([settings.reference]), inputs)
+        check_inverses(inverses_of([settings.reference]), inputs)
         check_size(size(study), planes=2 if two else 1)
     return _in_words(study, " in two planes" * two, known.wrist)
 

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from wristctl.commands.answer import Answer
-from wristctl.commands.inputs_of_loops import identified, tuned_gains, wrist_identified
-from wristctl.commands.loop_warnings import bend_not_held, warn_if_coarse, warn_outside_conditions
+from wristctl.commands.inputs_of_loops import identified, network_for, tuned_gains, wrist_identified
+from wristctl.commands.loop_warnings import bend_not_held, warn_if_coarse, warn_if_outside, warn_outside_conditions
 from wristctl.commands.printed_table import degrees, joined, two
 from wristctl.commands.session import Session
 from wristctl.commands.simulate.answer import (
@@ -75,8 +75,12 @@ _CHECKED = 0.01
 def check_two_planes(study: Study) -> None:
     """UserError for what can be known of a loop in two planes before it runs."""
     from wristctl.simulation.closed_loop import asked_of
+    from wristctl.simulation.reference import by_angles
 
-    asked_of(study, _CHECKED)
+    reference = by_angles(study.simulate.reference)
+    asked_of(
+        study.model_copy(update={"simulate": study.simulate.model_copy(update={"reference": reference})}), _CHECKED
+    )
 
 
 def simulate_in_two_planes(session: Session) -> SimulatedBends:
@@ -95,11 +99,13 @@ def simulate_in_two_planes(session: Session) -> SimulatedBends:
     settings, wrist = study.simulate, study.wrist
     warn_if_coarse([settings.loop])
     warn_outside_conditions([settings], [settings.loop])
+    network = network_for(session.inputs, wrist, [settings.loop], planes=2)
     with session.progress("compiling and simulating the loop"):
-        repeated = run_simulation(study, None, tuned_gains(session.inputs))
+        repeated = run_simulation(study, network, tuned_gains(session.inputs))
     scenario = scenario_of(settings.reference, settings.direction)
     findings.note_streams(Draws(study.seed).names([settings.loop], [scenario]))
     course = repeated.first.trajectory
+    warn_if_outside(course.outside)
     findings.numerics(planes=2, substeps=int(repeated.metrics["substeps"].max()), drift=repeated.drift)
     trajectory_table(findings, "bends", course)
     findings.headline("rmse", "rmse_ulnar", "rmse_flexion", "largest_error", "tip_rmse_mm", "peak_tension")

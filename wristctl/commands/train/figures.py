@@ -10,12 +10,15 @@ from matplotlib.ticker import LogLocator, NullFormatter
 from numpy.typing import ArrayLike
 
 from wristctl.arrays import Array
+from wristctl.learning.evaluation import ErrorMap
 from wristctl.plotting.style import (
     BLACK,
     BLUE,
     GREEN,
+    INDIGO,
     ORANGE,
     PURPLE,
+    SKY,
     VERMILLION,
     darkened,
     figure,
@@ -30,13 +33,17 @@ ANGLES, ERRORS = "PuOr", "cividis"
 # More dots than this are drawn as pixels, or an SVG would hold a path for each.
 MOST_PATHS = 5000
 
+_OF_PLANES = {"ulnar": INDIGO, "flexion": SKY}
+
 
 def coverage(samples: pd.DataFrame, count: int | None = None) -> Figure:
     """Tip positions of a data set, coloured by bending angle; a table with x, y [m] and theta [rad].
 
-    It may be a part of the data set, which has `count` samples.
+    It may be a part of the data set, which has `count` samples. In two planes they are seen from both sides.
     """
     shown = f"{len(samples)} of {count}" if count not in (None, len(samples)) else f"{len(samples)}"
+    if "z" in samples:
+        return _both_sides(samples, f"{shown} samples of the tip")
     picture, axes = _workspace(1e3 * samples["y"], 1e3 * samples["x"], f"{shown} samples of the tip")
     bend = float(np.degrees(samples["theta"].abs().max()))
     dots = axes.scatter(
@@ -75,20 +82,30 @@ def learning_curves(curves: pd.DataFrame, kept: int = 0) -> Figure:
 
 
 def predicted_angles(predictions: pd.DataFrame) -> Figure:
-    """The network's angle over the true one, and its error; a table with theta and theta_network [rad]."""
-    true, network = (np.degrees(predictions[name]) for name in ("theta", "theta_network"))
+    """The network's angle over the true one, and its error; a table with theta and theta_network [rad].
+
+    In two planes the bends of both.
+    """
+    if "theta" in predictions:
+        shown, what = [("theta", "test samples", BLUE)], "angle"
+    else:
+        shown, what = [(f"bend_{plane}", f"toward {plane}", _OF_PLANES[plane]) for plane in _OF_PLANES], "bend"
     picture, axes = figure(1, 2, height=3.2)
     left, right = axes[0]
-    ends = [true.min(), true.max()]
+    ends = np.degrees([predictions[[name for name, _, _ in shown]].to_numpy().min(),
+                       predictions[[name for name, _, _ in shown]].to_numpy().max()])  # fmt: skip
     left.plot(ends, ends, color=BLACK, linewidth=0.8, label="equal")
-    dots: Any = {"color": BLUE, "marker": ".", "markersize": 4, "linestyle": "", "rasterized": len(true) > MOST_PATHS}
-    left.plot(true, network, label="test samples", **dots)
-    left.set(xlabel="true angle [deg]", ylabel="network's angle [deg]")
+    right.axhline(0.0, color=BLACK, linewidth=0.8)
+    for column, label, colour in shown:
+        true, network = (np.degrees(predictions[name]) for name in (column, f"{column}_network"))
+        dots: Any = {"color": colour, "marker": ".", "markersize": 4, "linestyle": ""}
+        dots |= {"rasterized": len(true) > MOST_PATHS}
+        left.plot(true, network, label=label, **dots)
+        right.plot(true, network - true, **dots)
+    left.set(xlabel=f"true {what} [deg]", ylabel=f"network's {what} [deg]")
     left.set_box_aspect(1)
     legend(left, loc="upper left")
-    right.axhline(0.0, color=BLACK, linewidth=0.8)
-    right.plot(true, network - true, **dots)
-    right.set(xlabel="true angle [deg]", ylabel="error of the network [deg]")
+    right.set(xlabel=f"true {what} [deg]", ylabel="error of the network [deg]")
     right.set_box_aspect(1)
     return picture
 
@@ -112,6 +129,45 @@ def errors_at_samples(tip: Array, error: Array) -> Figure:
     options: Any = {"s": 8.0, "cmap": ERRORS, "vmin": 0.0, "linewidths": 0.0, "rasterized": len(x) > MOST_PATHS}
     dots = axes.scatter(y[order], x[order], c=degrees[order], **options)
     picture.colorbar(dots, ax=axes, label="absolute error [deg]")
+    return picture
+
+
+def worst_over_lengths(grid: ErrorMap) -> tuple[Array, Array]:
+    """Bends (A, D, 2) [rad] of a map in two planes, and the largest error over the arc lengths (A, D) [rad]."""
+    return grid.theta[:, :, 0], grid.size.max(axis=2)
+
+
+def errors_over_bends(bends: Array, error: Array) -> Figure:
+    """Errors of a network [rad] in the plane of bends: on a grid (A, D, 2) [rad] filled, of samples (N, 2) as dots."""
+    degrees = np.degrees(error)
+    y, z = np.moveaxis(np.degrees(bends), -1, 0)
+    picture, ((axes,),) = figure(height=4.6)
+    if error.ndim == 2:
+        image: Any = axes.pcolormesh(y, z, degrees, shading="gouraud", cmap=ERRORS, vmin=0.0, rasterized=True)
+        worst = np.unravel_index(degrees.argmax(), degrees.shape)
+        axes.plot(y[worst], z[worst], "o", color=VERMILLION, fillstyle="none", markersize=10, markeredgewidth=1.5)
+        title(axes, f"greatest error {degrees.max():.3g} deg, at the circle; the worst of all arc lengths")
+    else:
+        order = np.argsort(degrees)
+        options: Any = {"s": 8.0, "cmap": ERRORS, "vmin": 0.0, "linewidths": 0.0, "rasterized": len(y) > MOST_PATHS}
+        image = axes.scatter(y[order], z[order], c=degrees[order], **options)
+        title(axes, f"greatest error {degrees.max():.3g} deg, on the test samples")
+    axes.set(xlabel="bend toward ulnar [deg]", ylabel="bend toward flexion [deg]", aspect="equal")
+    picture.colorbar(image, ax=axes, label="error over both planes [deg]")
+    return picture
+
+
+def _both_sides(samples: pd.DataFrame, heading: str) -> Figure:
+    size = np.degrees(np.hypot(samples["bend_ulnar"], samples["bend_flexion"]))
+    picture, (panels,) = figure(1, 2, height=2.2)
+    for axes, aside, toward in zip(panels, "yz", _OF_PLANES, strict=True):
+        dots = axes.scatter(
+            1e3 * samples[aside], 1e3 * samples["x"], c=size, s=float(np.clip(12_000 / len(samples), 0.5, 12.0)),
+            cmap=ERRORS, vmin=0.0, linewidths=0.0, rasterized=len(samples) > MOST_PATHS,
+        )  # fmt: skip
+        axes.set(xlabel=f"{aside}, toward {toward} [mm]", ylabel="x [mm]", aspect="equal")
+    title(panels[0], heading)
+    picture.colorbar(dots, ax=list(panels), label="size of the bend [deg]")
     return picture
 
 

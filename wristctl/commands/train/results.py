@@ -5,9 +5,11 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
+from wristctl.commands.gen_data.answer import CLOSED_FORM
 from wristctl.commands.printed_table import Table
 from wristctl.commands.results import Findings
 from wristctl.commands.session import Session
+from wristctl.commands.train.answer import OF_PLANES
 from wristctl.config.learning import TrainSettings
 
 if TYPE_CHECKING:
@@ -219,9 +221,15 @@ def trial_table(findings: Findings, trials: list[TrainingResult], kept: Training
 
 def error_table(findings: Findings, kept: TrainingResult, samples: Samples, split: Split, where: list[Place]) -> Table:
     """Errors of the kept network, a polynomial and the exact inverse in every place."""
-    from wristctl.commands.train.figures import error_over_workspace, errors_at_samples, predicted_angles
+    from wristctl.commands.train.figures import (
+        error_over_workspace,
+        errors_at_samples,
+        errors_over_bends,
+        predicted_angles,
+        worst_over_lengths,
+    )
     from wristctl.commands.train.tables import MEANING, UNITS, predictions_table
-    from wristctl.learning.evaluation import ANGLE_MEASURES, angle_errors, error_map, inverses
+    from wristctl.learning.evaluation import ANGLE_MEASURES, error_map, inverses, size_of
 
     network, test = kept.network, where[0]
     beside = inverses(kept, samples, split)
@@ -232,23 +240,29 @@ def error_table(findings: Findings, kept: TrainingResult, samples: Samples, spli
     if samples.curvature_is_constant:
         grid = error_map(network.angle, samples.domain)
         findings.arrays("data/error_map.npz", {"tip": grid.tip, "theta": grid.theta, "error": grid.error})
-        findings.figure("error-map", error_over_workspace, grid.tip, grid.error)
+        if samples.planes == 2:
+            findings.figure("error-map", errors_over_bends, *worst_over_lengths(grid))
+        else:
+            findings.figure("error-map", error_over_workspace, grid.tip, grid.error)
+    elif samples.planes == 2:
+        findings.figure("error-map", errors_over_bends, test.theta, size_of(angles[0] - test.theta, 2))
     else:
         findings.figure("error-map", errors_at_samples, test.inputs[:, :2], angles[0] - test.theta)
 
     rows, rmse = [], {}
     for name, (angle, parameters, multiply_adds) in beside.items():
         for place in where:
-            errors = angle_errors(angle(place.inputs), place.theta)
+            errors = place.errors(angle(place.inputs))
             rmse[name, place.name] = errors.rmse_deg
             shown = (errors.r2, errors.rmse_deg, errors.max_error_deg, errors.close_share)
-            rows.append((name, place.name, *shown, parameters, multiply_adds))
+            of_planes = (errors.rmse_ulnar_deg, errors.rmse_flexion_deg) if samples.planes == 2 else ()
+            rows.append((name, place.name, *shown, parameters, multiply_adds, *of_planes))
             begin = {"network": "", "polynomial": "polynomial_", "exact inverse": "exact_"}[name]
             begin += {"test samples": "", "whole workspace": "workspace_"}.get(place.name, f"{_key(place.name)}_")
-            for measure, (unit, better, meaning) in ANGLE_MEASURES.items():
-                value = getattr(errors, measure)
+            for measure, value in errors.known().items():
+                unit, better, meaning = ANGLE_MEASURES[measure]
                 text = f"{name}, {place.name}: {meaning}"
-                findings.metric(begin + measure, value, unit, better, place.theta.size, meaning=text)
+                findings.metric(begin + measure, value, unit, better, place.count, meaning=text)
         findings.metric(f"{_key(name)}_parameters", parameters, better="lower", meaning=f"{name}: fitted numbers")
         findings.metric(
             f"{_key(name)}_multiply_adds", multiply_adds, better="lower", meaning=f"{name}: of one angle (C13)"
@@ -258,14 +272,15 @@ def error_table(findings: Findings, kept: TrainingResult, samples: Samples, spli
         for place in where:
             ratio = rmse["network", place.name] / rmse["exact inverse", place.name]
             meaning = f"{place.name}: network's RMSE over the exact inverse's"
-            findings.metric(
-                f"rmse_over_exact_{_key(place.name)}", ratio, "1", "lower", place.theta.size, meaning=meaning
-            )
+            findings.metric(f"rmse_over_exact_{_key(place.name)}", ratio, "1", "lower", place.count, meaning=meaning)
             verdict = "at most a tenth of" if ratio <= 0.1 else "NOT down to a tenth of"
             findings.summary(
                 f"On {place.name} the network's RMSE is {verdict} the exact inverse's ({ratio:.3g} of it)."
             )
     columns = ("inverse", "inputs", "R^2", "RMSE [deg]", "max error [deg]", "within 0.5 deg [share]", "parameters")
+    if samples.planes == 2:
+        heads = (*columns, "multiply-adds", *OF_PLANES)
+        return Table("Errors of the bend, over both planes", heads, rows)
     return Table("Errors of the bending angle", (*columns, "multiply-adds"), rows)
 
 
@@ -285,7 +300,7 @@ def timing_table(findings: Findings, kept: TrainingResult, samples: Samples, spl
     timed = (
         ("network", compiled_network(kept.network), inputs[:, :columns]),
         ("polynomial", compiled_polynomial(polynomial), inputs),
-        ("exact inverse, 2 atan2(y, x)", compiled_exact, inputs),
+        (f"exact inverse, {CLOSED_FORM[samples.planes]}", compiled_exact, inputs[:, : samples.planes + 1]),
     )
     rows = [(name, microseconds(angles, points)) for name, angles, points in timed]
     findings.plain("timing.json", {"training_s": seconds, "compiled_us_per_angle": dict(rows)})

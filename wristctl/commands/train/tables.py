@@ -10,6 +10,8 @@ import pandas as pd
 
 from wristctl.arrays import Array
 from wristctl.learning.dataset import Samples
+from wristctl.learning.network_file import TIP
+from wristctl.simulation.trajectory import PLANES
 
 if TYPE_CHECKING:
     from wristctl.learning.selection import CrossValidated
@@ -19,12 +21,14 @@ if TYPE_CHECKING:
 UNITS = {
     "x": "m",
     "y": "m",
+    "z": "m",
     "theta": "rad",
     "arc_length": "m",
     "theta_network": "rad",
     "theta_exact": "rad",
     "theta_polynomial": "rad",
     "pose": "rad",
+    "roll": "rad",
     "hand_mass": "kg",
     "held_out": "1",
     "recording": "1",
@@ -38,12 +42,15 @@ UNITS = {
 MEANING = {
     "x": "tip position along the straight wrist",
     "y": "tip position across it, toward positive bending",
+    "z": "tip position toward flexion",
     "theta": "bending angle",
     "arc_length": "length of the arc from the first to the last disc",
     "theta_network": "the network's angle",
     "theta_exact": "the exact inverse's angle, 2 atan2(y, x)",
     "theta_polynomial": "the angle of a polynomial of the inputs",
     "pose": "tilt of the base from upright",
+    "roll": "direction of the tilt, from ulnar toward flexion",
+    "bend": "size of the bend",
     "hand_mass": "mass of hand and payload",
     "held_out": "0: not; held out of training by 1: its payload, 2: its pose",
     "recording": "which of the recordings it was measured in",
@@ -53,18 +60,30 @@ MEANING = {
     "validation_loss": "mean squared error of the angle on the validation samples, after the epoch",
 }
 
+# The bends in two planes, as the trajectories of loops name them.
+for _plane in PLANES:
+    for _end, _whose in (("", "bend"), ("_network", "the network's bend"), ("_exact", "the exact inverse's bend"),
+                         ("_polynomial", "the bend of a polynomial of the inputs")):  # fmt: skip
+        UNITS[f"bend_{_plane}{_end}"], MEANING[f"bend_{_plane}{_end}"] = "rad", f"{_whose}, toward {_plane}"
 
 # Units of grid_table's columns.
 GRID_UNITS = {"rmse_deg": "deg", "error_deg": "deg"}
 
 
+def bends_by_plane(theta: Array, end: str = "") -> dict[str, Array]:
+    """Bends (N,) as theta, (N, 2) as bend_ulnar and bend_flexion; `end` follows each name."""
+    if theta.ndim == 1:
+        return {f"theta{end}": theta}
+    return {f"bend_{plane}{end}": column for plane, column in zip(PLANES, theta.T, strict=True)}
+
+
 def samples_table(samples: Samples) -> pd.DataFrame:
-    """One row per sample: x, y, the other inputs, theta, arc_length; held_out where any is, recording if measured."""
-    x, y = samples.tip.T
+    """One row per sample: the tip, other inputs, bend, arc_length; held_out where any is, recording if measured."""
+    tip = dict(zip(TIP, samples.tip.T, strict=False))
     measured = dict(zip(samples.names, samples.others.T, strict=True))
     held = {"held_out": samples.held_out} if samples.held_out.any() else {}
     held |= {} if samples.recording is None else {"recording": samples.recording}
-    return pd.DataFrame({"x": x, "y": y} | measured | {"theta": samples.theta, "arc_length": samples.arc_length} | held)
+    return pd.DataFrame(tip | measured | bends_by_plane(samples.theta) | {"arc_length": samples.arc_length} | held)
 
 
 def curves_table(epochs: Sequence[Epoch]) -> pd.DataFrame:
@@ -75,10 +94,12 @@ def curves_table(epochs: Sequence[Epoch]) -> pd.DataFrame:
 def predictions_table(
     inputs: Array, names: Sequence[str], theta: Array, theta_network: Array, theta_polynomial: Array, theta_exact: Array
 ) -> pd.DataFrame:
-    """One row per sample: x, y, the inputs `names` after them, theta, theta_network, theta_polynomial, theta_exact."""
-    inputs_of = dict(zip(("x", "y", *names), inputs.T, strict=True))
-    angles = {"theta_network": theta_network, "theta_polynomial": theta_polynomial, "theta_exact": theta_exact}
-    return pd.DataFrame(inputs_of | {"theta": theta} | angles)
+    """One row per sample: the tip, the inputs `names` after it, the bend, and that of the three inverses."""
+    tip = TIP[: inputs.shape[1] - len(names)]
+    inputs_of = dict(zip((*tip, *names), inputs.T, strict=True))
+    ends = {"": theta, "_network": theta_network, "_polynomial": theta_polynomial, "_exact": theta_exact}
+    bends = {name: column for end, bend in ends.items() for name, column in bends_by_plane(bend, end).items()}
+    return pd.DataFrame(inputs_of | bends)
 
 
 def grid_table(results: Sequence[CrossValidated]) -> pd.DataFrame:

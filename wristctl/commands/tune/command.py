@@ -186,7 +186,7 @@ def tune(session: Session) -> Tuned:
     warn_if_coarse(loops)
     warn_of_one_plane(study.wrist, asked_of_search(study))
     warn_out_of_reach(session.findings, study.wrist, asked_by(study, study.tune))
-    network = network_for(session.inputs, study.wrist, loops)
+    network = network_for(session.inputs, study.wrist, loops, planes_of_search(study))
     searches = search_all(session, study, network)
     searched, chosen = tuning_cases(study, network)
     cases = chosen or searched

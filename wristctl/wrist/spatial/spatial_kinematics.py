@@ -1,10 +1,12 @@
 """Where a wrist that bends in two planes is, along its backbone, and which arc ends at a tip; NumPy."""
 
+import math
+
 import numpy as np
 from numpy.typing import ArrayLike
 
 from wristctl.arrays import Array
-from wristctl.wrist.kinematics import exact_arc
+from wristctl.wrist.kinematics import TipPath, exact_arc
 
 
 def spatial_tips(q: ArrayLike, length: ArrayLike) -> Array:
@@ -90,6 +92,42 @@ def tip_bends(q: ArrayLike) -> Array:
     size = np.arctan2(np.hypot(tangent[..., 1], tangent[..., 2]), tangent[..., 0])
     bend: Array = tangent[..., 1:] / np.sinc(size / np.pi)[..., None]
     return bend
+
+
+# Terms of Stumpff's functions: rounding for bends up to a full turn.
+_TERMS = 30
+
+
+def _stumpff(s: Array, k: int) -> Array:
+    """Stumpff's function c_k(s), the sum of (-s)^j/(2j + k)!, of s = |u|^2."""
+    total = np.zeros_like(s)
+    for j in reversed(range(_TERMS)):
+        total = 1.0 / math.factorial(2 * j + k) - s * total
+    return total
+
+
+def bend_path(bends: Array, length: float) -> TipPath:
+    """Tips of an arc of this length [m] whose bend moves: bend, rate and acceleration (2, 3, T) [rad].
+
+    The tip is l (c_1, c_2 u) of Stumpff's functions c_k of s = |u|^2, whose derivative is (k c_{k+2} - c_{k+1})/2.
+    """
+    u, du, ddu = bends.transpose(1, 2, 0)
+    s, ds = (u * u).sum(axis=1), 2.0 * (u * du).sum(axis=1)
+    dds = 2.0 * (du * du + u * ddu).sum(axis=1)
+    c = [_stumpff(s, k) for k in range(7)]
+
+    def moved(k: int) -> list[Array]:
+        """c_k with two derivatives by time, (T, 1) each."""
+        first, next_1, next_2 = (0.5 * (j * c[j + 2] - c[j + 1]) for j in (k, k + 1, k + 2))
+        second = 0.5 * (k * next_2 - next_1)
+        return [c[k][:, None], (first * ds)[:, None], (second * ds * ds + first * dds)[:, None]]
+
+    (along, rate, acceleration), (lean, lean_rate, lean_acceleration) = moved(1), moved(2)
+    return TipPath(
+        length * np.hstack([along, lean * u]),
+        length * np.hstack([rate, lean_rate * u + lean * du]),
+        length * np.hstack([acceleration, lean_acceleration * u + 2.0 * lean_rate * du + lean * ddu]),
+    )
 
 
 def exact_bend(tip: Array) -> tuple[Array, Array]:

@@ -1,11 +1,14 @@
 """Statics of the wrist in two planes: rest under tensions and loads, stiffness and buckling."""
 
+from typing import NamedTuple
+
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from wristctl.arrays import Array
 from wristctl.config.wrist import WristParameters
 from wristctl.errors import UserError
+from wristctl.wrist.allocation import allocated
 from wristctl.wrist.spatial.spatial_model import spatial_linearised, spatial_terms
 from wristctl.wrist.spatial.spatial_segments import FIELDS, SpatialSegments, spatial_values
 from wristctl.wrist.tendon_layout import TendonLayout
@@ -13,6 +16,19 @@ from wristctl.wrist.tendon_layout import TendonLayout
 _STEPS = 100
 # Largest change of a coordinate in one step of Newton's method [rad].
 _STRIDE = 0.3
+# Change of a torque by which pulls are differenced [N m]: they are piecewise linear in it.
+_SMALL = 1e-6
+
+
+class SpatialEquilibria(NamedTuple):
+    """Wrists at rest with wanted bends."""
+
+    q: Array
+    """(B, 2n) coordinates [rad]"""
+    pulls: Array
+    """(B, T) of all tendons alike at each place [N]"""
+    stable: NDArray[np.bool_]
+    """(B,) whether it was found and stays there under held pulls"""
 
 
 def spatial_stiffness(parameters: ArrayLike, q: ArrayLike, pulls: ArrayLike) -> Array:
@@ -58,6 +74,48 @@ def spatial_equilibrium(parameters: ArrayLike, n: int, pulls: ArrayLike, guess: 
             fix="lower wrist.hand_mass, hand_offset or the tensions, or raise wrist.stiffness",
         )
     return q
+
+
+def spatial_equilibria_at(parameters: Array, n: int, bends: Array, arms: Array, least: Array) -> SpatialEquilibria:
+    """Equilibria with the last disc at bends (B, 2) [rad], held by the pulls with the least sum.
+
+    Newton's method on the coordinates and the torque that the pulls have on the straight wrist, for all wrists at once;
+    the wanted bend as a side condition keeps it regular where a load buckles.
+
+    Parameters
+    ----------
+    parameters
+        Rows of `spatial_values` (B, V).
+    arms
+        Moment arms of the straight wrist (T, 2) [m].
+    least
+        Least pull of each place of tendons (T,) [N].
+    """
+    count, m = len(bends), 2 * n
+    q, torque, still = np.tile(bends / n, n), np.zeros((count, 2)), np.zeros((count, m))
+    bordered = np.zeros((count, m + 2, m + 2))
+    for _ in range(_STEPS):
+        pulls = allocated(arms, torque, least, np.inf).pulls
+        r, tangent, _ = spatial_linearised(parameters, q, still, still, pulls)
+        at = spatial_terms(parameters, q, still)
+        for plane in range(2):
+            more = allocated(arms, torque + _SMALL * np.eye(2)[plane], least, np.inf).pulls
+            bordered[:, :m, m + plane] = -np.einsum("bt,bti->bi", (more - pulls) / _SMALL, at.moment_arms)
+        for i in range(m):
+            bordered[:, m:, i] = spatial_terms(parameters, q, still + np.eye(m)[i]).bend[:, 2:]
+        bordered[:, :m, :m] = tangent
+        residual = np.concatenate([r, at.bend[:, :2] - bends], axis=1)
+        change = np.linalg.solve(bordered, -residual[..., None])[..., 0]
+        largest = np.abs(change[:, :m]).max(axis=1, keepdims=True)
+        change = change * np.minimum(1.0, _STRIDE / np.maximum(largest, 1e-300))
+        q, torque = q + change[:, :m], torque + change[:, m:]
+        if np.abs(change).max() < 1e-12:
+            break
+    pulls = allocated(arms, torque, least, np.inf).pulls
+    r, tangent, _ = spatial_linearised(parameters, q, still, still, pulls)
+    off = np.abs(spatial_terms(parameters, q, still).bend[:, :2] - bends).max(axis=1)
+    smallest = np.linalg.eigvalsh(0.5 * (tangent + tangent.transpose(0, 2, 1)))[:, 0]
+    return SpatialEquilibria(q, pulls, (np.abs(r).max(axis=1) < 1e-9) & (off < 1e-9) & (smallest > 0.0))
 
 
 def spatial_energy(parameters: ArrayLike, q: ArrayLike, rate: ArrayLike, pulls: ArrayLike) -> Array:
