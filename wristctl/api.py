@@ -58,7 +58,7 @@ def gen_data(
     study: StudyOrFile, *, run: Ref | SimulatedLoop | Compared | None = None, out: Folder | None = None,
     label: str = "", progress: Watch | None = None,
 ) -> Generated:  # fmt: skip
-    """Samples of tip positions [m] and bending angles [rad], by the study's `gen-data` section.
+    """Samples of tip positions [m] and bends [rad], by the study's `gen-data` section.
 
     `run` (hw-run, track, simulate or compare) holds the recordings to take them from where `source` is `run`; `csv`
     takes files. The result has `.samples`; `.frame()` is a row per sample. Raises UserError for a run without courses,
@@ -74,7 +74,7 @@ def train(
     study: StudyOrFile, *, data: Ref | Generated | None = None, resume: Ref | None = None, out: Folder | None = None,
     label: str = "", progress: Watch | None = None,
 ) -> Trained:  # fmt: skip
-    """Networks from tip position [m] to bending angle [rad], by the study's `train` section.
+    """Networks from tip position [m] to bend [rad], by the study's `train` section.
 
     `data` (gen-data) holds the samples; without it those of the study's `gen-data` section are drawn. `resume` is a
     train run that was stopped, taken up in a run directory. The result has `.network`, `.trials`, `.samples`, `.split`

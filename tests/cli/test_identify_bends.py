@@ -107,3 +107,24 @@ def test_three_tendons_are_simulated_and_identified_and_all_else_says_what_takes
     for command in ("tune", "recommend", "hw-run"):
         code, _, err = call(command, "--from-identified", found.id, "--dry-run")
         assert code == 2 and found.id in err and "simulate bends this wrist in two planes" in err
+
+
+@pytest.mark.slow
+def test_the_log_of_a_simulation_behind_elastic_tendons_tells_the_stiffness_of_three_tendons_wrist(
+    call: Call, tmp_path: Path
+) -> None:
+    own = tmp_path / "mywrist.yaml"
+    own.write_text("wrist: {tendons: three, length: 0.095, stiffness: 1.1}\n")
+    loop = ("--reference", "circumduction", "--set", "loop.actuator.level=tendon", "--controller", "pid-ff")
+    code, out, err = call("simulate", str(own), *loop)
+    assert code == 0, err
+    log = tmp_path / "circumduction.csv"
+    code, _, err = call("runs", "export", out.splitlines()[-1], "--file", str(log))
+    assert code == 0, err
+    believed = ("--config", str(own), "--set", "wrist.stiffness=0.8", "--set", "model=wrist", "--set", "segments=4")
+    code, out, err = call("identify", str(log), *believed)
+    assert code == 0, err
+    found = load_study([open_run(out.splitlines()[-1]).file("data/identified.yaml")]).wrist
+    assert found.stiffness == pytest.approx(1.1, rel=0.05)
+    assert found.stiffness * found.flexion_ratio == pytest.approx(1.1, rel=0.05)
+    assert len(TendonLayout.of(found).places) == 3

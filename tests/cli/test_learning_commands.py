@@ -253,3 +253,30 @@ def test_what_the_user_got_wrong_is_said_in_one_line_and_leaves_no_run(
     code, _, err = call(*arguments)
     assert code == 2 and len(err.splitlines()) == 1 and message in err
     assert len(list((tmp_path / "results").iterdir())) == 1
+
+
+@pytest.mark.slow
+def test_three_tendons_go_from_samples_to_a_network_behind_a_reference(call: Call, tmp_path: Path) -> None:
+    own = tmp_path / "mywrist.yaml"
+    own.write_text("wrist: {tendons: three, length: 0.095, stiffness: 1.1}\n")
+    code, out, err = call("gen-data", str(own), "--samples", "300")
+    assert code == 0 and "bend in two planes" in out, err
+    data = out.splitlines()[-1]
+    small = ("--preset", "recommended", "--set", "hidden=[8]", "--epochs", "40")
+    code, out, err = call("train", str(own), "--data", data, *small)
+    assert code == 0 and "over both planes" in out, err
+    network = out.splitlines()[-1]
+    over, ulnar = (open_run(network).metrics[name]["value"] for name in ("rmse_deg", "rmse_ulnar_deg"))
+    assert 0.0 < ulnar < over < 0.5
+    motion = ("--reference", "circumduction", "--controller", "ct-dob", "--set", "reference.inverse=network")
+    code, out, err = call("simulate", str(own), *motion, "--network", network)
+    assert code == 0, err
+    bends = open_run(out.splitlines()[-1]).data("bends")
+    wanted = np.deg2rad(30.0)
+    followed = np.hypot(bends["bend_ref_ulnar"], bends["bend_ref_flexion"])[-1000:]
+    assert 0.0 < np.abs(followed - wanted).max() < np.deg2rad(2.0), "by the network's own error, not the wanted bend"
+    code, _, err = call("simulate", str(own), *motion)
+    assert code == 2 and "none is given" in err
+    plain = ("--set", "wrist.tendons=four", "--set", "reference.inverse=network", "--network", network)
+    code, _, err = call("simulate", *plain)
+    assert code == 2 and "learned bends in two planes, and the loop bends in one plane" in err

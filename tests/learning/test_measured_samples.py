@@ -11,6 +11,7 @@ from wristctl.errors import UserError
 from wristctl.learning.dataset import Samples
 from wristctl.learning.measured_samples import RecordedCourse, courses_in, read_courses, samples_of_courses
 from wristctl.wrist.kinematics import arc_tip
+from wristctl.wrist.spatial.spatial_kinematics import spatial_tips
 
 THETA = np.linspace(-0.6, 0.6, 40)
 TIP = arc_tip(THETA, 0.08)
@@ -105,3 +106,22 @@ def test_what_is_wrong_with_a_file_is_said(head: str, what: str, fix: str, tmp_p
     with pytest.raises(UserError) as caught:
         read_courses(written(tmp_path, head, *columns))
     assert what in caught.value.what and fix in caught.value.fix and "data.csv" in caught.value.where
+
+
+def test_recordings_in_two_planes_are_samples_of_a_bend_of_both(tmp_path: Path) -> None:
+    bends = np.stack([THETA, 0.5 * THETA], axis=-1)
+    x, y, z = spatial_tips(bends, 0.08).T
+    log = written(tmp_path, "tip_x [m],tip_y [m],tip_z [m],bend_y [rad],bend_z [rad],trial", x, y, z, *bends.T, TRIAL)
+    of_log = read_courses(log)
+    columns = {"tip_x": x, "tip_y": y, "tip_z": z, "bend_ulnar": bends[:, 0], "bend_flexion": bends[:, 1]}
+    for courses in (of_log, list(courses_in({**columns, "trial": TRIAL}, "bends"))):
+        found = samples_of_courses(courses, None, np.random.default_rng(0))
+        np.testing.assert_allclose(found.theta, bends, atol=1e-15)
+        np.testing.assert_allclose(found.arc_length, 0.08)
+        assert found.planes == 2 and found.recording is not None and set(found.recording) == {0, 1}
+        assert found.domain.contains(found.inputs).all() and found.curvature_is_constant
+    with pytest.raises(UserError, match="some recordings bend in one plane, others in two"):
+        samples_of_courses([*of_log, course(20)], None, np.random.default_rng(0))
+    far = written(tmp_path, "tip_x [m],tip_y [m],tip_z [m],bend_y [deg],bend_z [deg]", x, y, z, THETA, 400.0 * THETA)
+    with pytest.raises(UserError, match="an angle of 240 deg"):
+        read_courses(far)

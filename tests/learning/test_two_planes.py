@@ -98,6 +98,15 @@ def test_a_tilt_toward_flexion_bends_the_wrist_toward_flexion() -> None:
     assert abs(sag[:, 2].mean()) > 10.0 * abs(sag[:, 1].mean()), "what gravity moves the tip of given bends by"
 
 
+def test_the_bare_hand_in_a_pose_that_was_drawn_is_no_guess() -> None:
+    found = drawn(source="plant", poses=(0.0, 60.0), rolls=(0.0, 90.0)).domain
+    bare = THREE.hand_mass
+    for pose, roll, mass in ((0.0, 0.0, bare), (math.radians(60.0), math.pi / 2, bare), (0.5, 0.3, 1.5 * bare)):
+        assert not found.at(np.array([pose, roll, mass])).is_empty
+    for pose, roll, mass in ((-0.1, 0.0, bare), (0.5, -0.1, bare), (0.5, 0.0, 1.6 * bare)):
+        assert found.at(np.array([pose, roll, mass])).is_empty
+
+
 def test_attitude_is_the_tilt_and_its_direction() -> None:
     for tilt, roll in ((0.4, 0.7), (-0.4, 0.7), (1.2, 0.0), (-1.2, 0.0), (0.9, math.pi / 2)):
         across = 9.81 * math.sin(tilt)

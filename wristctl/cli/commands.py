@@ -52,7 +52,7 @@ COMMANDS = {
     "gen-data": Entry(
         "wristctl.commands.gen_data.command:GEN_DATA",
         _MAIN,
-        "Sample tip positions and bending angles for a network.",
+        "Sample tip positions and bends for a network.",
         shortcuts=("samples", "source", "columns"),
         advanced=("columns",),
         examples=(
@@ -66,7 +66,7 @@ COMMANDS = {
     "train": Entry(
         "wristctl.commands.train.command:TRAIN",
         _MAIN,
-        "Train the network from tip position to bending angle.",
+        "Train the network from tip position to bend.",
         shortcuts=("search", "preset", "epochs", "seeds", "device"),
         examples=(
             "wristctl train experiments/paper.yaml --data latest:gen-data",

@@ -179,7 +179,7 @@ class Grid(Section):
 
 
 class TrainSettings(NetworkSettings):
-    """A network from tip position to bending angle."""
+    """A network from tip position to bend."""
 
     data: str | None = choice(None, "data run: path, id or latest:gen-data; without one, gen-data's samples are drawn")
     train_share: float = quantity(

@@ -282,6 +282,9 @@ def draw_equilibria(
     others = np.column_stack([columns[name] for name in names])[held]
     inside = code != HELD_POSE
     domain = Domain.around(tip[inside], others[inside])
+    if planes == 2:  # the whole range of payloads, whose ends no draw meets: the bare hand is inside
+        ends = (wrist.hand_mass * (1.0 + low), wrist.hand_mass * (1.0 + high))
+        domain = replace(domain, others=(*domain.others[:-1], ends))
     return Samples(tip, theta, arc_to(tip)[1], domain, others, names, code, n)
 
 

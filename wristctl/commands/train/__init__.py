@@ -1,1 +1,1 @@
-"""`train`: networks from tip position to bending angle."""
+"""`train`: networks from tip position to bend."""

@@ -1,4 +1,4 @@
-"""Networks from tip position to bending angle."""
+"""Networks from tip position to bend."""
 
 from __future__ import annotations
 
@@ -229,7 +229,7 @@ def _network(settings: NetworkSettings) -> NetworkSettings:
 
 
 def train(session: Session) -> Trained:
-    """Train networks from tip position to bending angle."""
+    """Train networks from tip position to bend."""
     import numpy as np
 
     from wristctl.learning.dataset import split_samples
