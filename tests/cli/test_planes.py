@@ -18,6 +18,8 @@ TWO_PLANES = {
     "tune": ("--set", "scenarios=[{reference: {kind: circumduction}}]"),
     "analyse": ("--set", "reference.kind=circumduction"),
     "hysteresis": ("--set", "toward_deg=45"),
+    "gen-data": ("--set", "planes=2"),
+    "train": ("--set", "gen-data.planes=2"),
 }
 """How a motion in two planes is asked for, of commands whose motions can be chosen."""
 WRIST = {"simulate", "gen-data", "train", "tune", "compare", "recommend", "hw-run", "study", "analyse", "hysteresis"}
