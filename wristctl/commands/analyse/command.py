@@ -122,7 +122,7 @@ def plan(study: Study, inputs: Inputs) -> str:
             check_two_planes(known)
         else:
             check_reach([chosen.reference], known.wrist, "reference")
-            check_inverses(inverses_of([chosen.reference]), inputs)
+        check_inverses(inverses_of([chosen.reference]), inputs)
         looks_back(smooth(chosen.loop, settings.friction))
     law = controller(chosen.controller)
     if law.plain:
@@ -157,7 +157,7 @@ def analyse(session: Session) -> Analysed:
     warn_of_one_plane(study.wrist, asked_for_by(study))
     warn_outside_conditions([chosen], [chosen.loop])
     _warn_of_frames(chosen.loop)
-    network = network_for(session.inputs, study.wrist, [chosen.loop])
+    network = network_for(session.inputs, study.wrist, [chosen.loop], planes)
     row, rests = _row(study, session.inputs, planes), _rests(study, planes, network)
     angles, analyses = rests.angles, []
     with session.progress("linearising the loop", len(angles), "angles") as report:

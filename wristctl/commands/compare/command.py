@@ -263,6 +263,7 @@ def compare(session: Session) -> Compared:
     from wristctl.comparison.controller_ranking import class_rankings, standings_frame
     from wristctl.comparison.repetition_spread import spread
     from wristctl.simulation.closed_loop import scenario_of
+    from wristctl.simulation.planes import planes_of
     from wristctl.simulation.worlds import Draws
 
     study, left_out = with_what_there_is(session.study, session.inputs)
@@ -276,7 +277,7 @@ def compare(session: Session) -> Compared:
     warn_outside_conditions(settings.rows, loops)
     warn_of_one_plane(study.wrist, asked_of_comparison(study))
     warn_out_of_reach(findings, study.wrist, asked_by(study, settings))
-    network = network_for(session.inputs, study.wrist, loops, planes_of_comparison(study))
+    network = network_for(session.inputs, study.wrist, loops, planes_of(study.wrist, asked_of_comparison(study)))
     if settings.tuning is not None:
         searches = search_all(session, study.model_copy(update={"tune": settings.tuning}), network)
     tuned = dict(tuned_gains(session.inputs) or {}) | {name: search.gains for name, search in searches.items()}
