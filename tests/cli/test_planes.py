@@ -9,6 +9,10 @@ import pytest
 
 from tests.cli.conftest import Call
 from wristctl.cli.commands import COMMANDS
+from wristctl.gym import WristEnv
+from wristctl.records import start_run
+from wristctl.study_files.load import load_study
+from wristctl.wrist.tendon_layout import TendonLayout
 
 ROOT = Path(__file__).parents[2]
 TWO_PLANES = {
@@ -66,9 +70,23 @@ def test_the_table_of_the_readme_says_which_command_bends_in_two_planes_and_take
     text = (ROOT / "README.md").read_text(encoding="utf-8")
     table = text.partition("| command | one plane | two planes | tendons |")[2].partition("\n\n")[0]
     rows = [[cell.strip() for cell in line.strip("|").split("|")] for line in table.splitlines()[2:]]
-    said = {name: row for row in rows for name in re.findall(r"`([\w-]+)`", row[0])}
+    said = {name: row for row in rows for name in re.findall(r"`([\w.-]+)`", row[0])}
     for command, motion in TWO_PLANES.items():
         assert (said[command][2] == "yes") == _takes(call, command, *motion), command
     for command in WRIST:
         takes = _takes(call, command, *TWO_PLANES.get(command, ()), "--set", "wrist.tendons=three")
         assert said[command][3].startswith(("three", "any")) == takes, command
+    assert said["export-model"][2] == said["wristctl.gym"][2] == "yes" and said["export-model"][3].startswith("any")
+
+
+@pytest.mark.parametrize(
+    "tendons", ["three", "six", "[{angle_deg: 10}, {angle_deg: 140, radius: 0.01}, {angle_deg: 250}]"]
+)
+def test_other_programs_and_environments_take_any_tendons(call: Call, tmp_path: Path, tendons: str) -> None:
+    study = load_study([], [f"wrist.tendons={tendons}"])
+    places = len(TendonLayout.of(study.wrist).places)
+    assert WristEnv(study, actions="tensions").action_space.shape == (places,)
+    with start_run("simulate", study, "", tmp_path / "results"):
+        pass
+    code, _, err = call("export-model", "latest:simulate", "--to", "mujoco")
+    assert code == 0 and Path("wrist.xml").read_text().count("<spatial ") == places, err
