@@ -231,6 +231,30 @@ def test_what_is_recommended_is_tried_on_its_rig_or_simulated_on_its_loop(did: D
         assert wrist_of(did("simulate", str(file))[1]) == small()
 
 
+IN_TWO_PLANES = {
+    "simulate": ("--set", "wrist.tendons=three"),
+    "hw-run": ("--set", "references=[{kind: dart-thrower, turn: 2}]"),
+}
+
+
+@pytest.mark.parametrize("command", IN_TWO_PLANES)
+def test_what_is_recommended_in_two_planes_is_simulated_or_tried_in_two(did: Did, command: str) -> None:
+    drawn = ("--set", "draw={plant.stiffness: x0.8..1.2, disturbances.load: -0.2..0.2, plant_segments: [1]}")
+    trial = TRIAL if command == "hw-run" else ()
+    out, _ = did(*RECOMMEND, *IN_TWO_PLANES[command], *trial, *drawn, "--set", "loop.plant_segments=1", *OUT)
+    assert "All loops bend in two planes: " in out and "to any side on every simulated rig" in " ".join(out.split())
+    (following,) = advised(out)
+    _, done = did(*following)
+    assert done.kind == command
+    if command == "hw-run":
+        assert done.config.hw_run.planes == 2 and done.has("data/log.csv")
+        assert {"bend_ulnar", "bend_flexion"} <= set(done.data("log"))
+    else:
+        assert {"bend_ulnar", "bend_flexion", "pull_3"} <= set(
+            done.data("bends")
+        ) and done.config.simulate.loop.planes == 2
+
+
 def test_an_identified_wrist_is_simulated_and_compared_on_with_its_geometry(did: Did, tmp_path: Path) -> None:
     poses = [
         write_run(tmp_path / "my runs", 0, pose.model_copy(update={"length": 0.085}), sides=("ulnar", "extension"))

@@ -16,7 +16,7 @@ from scipy.integrate import solve_ivp
 import wristctl
 from wristctl.commands.kept_studies import gains_content, hw_run_fits, row_of, study_text
 from wristctl.commands.recommend.answer import NEAR, RECOMMENDED, Candidate, Recommended, spread
-from wristctl.commands.recommend.command import FAMILY, TOLERATED, _limit, reach_deg
+from wristctl.commands.recommend.command import FAMILY, TOLERATED, _limit, family_of_rigs, reach_deg
 from wristctl.commands.recommend.figures import errors
 from wristctl.commands.recommend.study_file import next_command, sections_of
 from wristctl.config.loop import Loop, Reference
@@ -33,6 +33,8 @@ from wristctl.study_files.load import load_study
 from wristctl.tuning.scaled_presets import dynamic_stiffness, scaled_to
 from wristctl.wrist.compiled_model import terms
 from wristctl.wrist.segments import segments
+from wristctl.wrist.spatial.held_bends import first_beyond, held_all_around
+from wristctl.wrist.tendon_layout import TendonLayout
 
 WRIST = WristParameters()
 QUICK = (
@@ -434,3 +436,28 @@ def test_a_rig_that_hw_run_cannot_have_is_left_out_of_its_section(tmp_path: Path
     read = wristctl.load_study(tmp_path / "best.yaml")
     assert read.hw_run.actuator == Study().hw_run.actuator and read.hw_run.rows[0].controller == "pid-ff"
     assert read.simulate.loop.actuator == other.recommend.loop.actuator
+
+
+@pytest.mark.parametrize(("tendons", "force"), [("three", 0.0), ("three", 0.3), ("six", 0.0)])
+def test_in_two_planes_the_reach_is_the_angle_that_is_held_toward_every_side(tendons: Any, force: float) -> None:
+    weak = WristParameters(tendons=tendons, tension_limit=16.0 if tendons == "three" else 9.0)
+    layout = TendonLayout.of(weak)
+    held = held_all_around(weak, layout, force, 45.0)
+    around = np.linspace(0.0, 2.0 * np.pi, 72, endpoint=False)
+    sides = np.stack([np.cos(around), np.sin(around)], axis=-1)
+    beyond = [first_beyond(weak, layout, np.radians(angle) * sides) is not None for angle in (held - 0.5, held + 1.5)]
+    assert 5.0 < held < 44.0 and not beyond[0]
+    if not force:
+        assert beyond[1]
+    else:
+        assert held < held_all_around(weak, layout, 0.0, 45.0)
+
+
+def test_a_recommendation_for_three_tendons_is_planned_in_two_planes_toward_every_side() -> None:
+    study = load_study([], ["wrist.tendons=three", "wrist.tension_limit=16"])
+    family = family_of_rigs(study, reach_deg(study))
+    assert {reference.kind for reference in family.references} == {"diagonal", "ellipse"}
+    assert {"reference.toward_deg", "reference.ratio", "disturbances.toward_deg"} <= set(family.draw)
+    assert {case.motion.planes for case in drawn_cases(family, FAMILY, "test", 0, 2, study.wrist)} == {2}
+    one = load_study([])
+    assert family_of_rigs(one, 45.0) == one.recommend.family(45.0) and reach_deg(study) < reach_deg(one)

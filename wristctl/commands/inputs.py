@@ -179,9 +179,13 @@ def check_sides(wrist: WristParameters, command: str) -> None:
         return
     rig = command.startswith(("hw", "calibrate-wrist"))
     does = "moves" if rig else "bends in one plane, by"
-    problem = f"{command} {does} four tendons at 45 deg from both planes; tendon {odd} of this wrist is elsewhere"
+    if command == "audit":  # the claims of the paper alone
+        does = "judges the claims of the paper, whose wrist has"
+    elsewhere = f"tendon {odd} of this wrist is elsewhere"
+    problem = f"{command_of(command)} {does} four tendons at 45 deg from both planes; {elsewhere}"
     takes = " bends this wrist in two planes"
-    compares = ("; ", Call("compare"), " and ", Call("tune"), " take it too")
+    others = " and others take it too (documentation: A wrist in two planes)"
+    compares = ("; ", Call("compare"), ", ", Call("tune"), others)
     fix: Phrase = (Call("simulate"), takes, *(() if rig else compares))
     if TendonLayout.of(wrist).planes == 1:  # and in no other
         square = math.sqrt(2.0) * wrist.tendon_radius

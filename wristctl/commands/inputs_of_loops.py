@@ -226,7 +226,7 @@ def identified(study: Study, command: str, inputs: Inputs) -> Study:
     if text is None:
         return study
     found = with_identified(study, command, text)
-    if command not in ("simulate", "tune"):
+    if command == "hw-run":
         try:
             check_sides(found.wrist, command)
         except UserError as error:

@@ -1,6 +1,6 @@
 """Settings of `recommend`: which controllers are tuned for a wrist, on which rig, and for which motions."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Annotated, Any
 
 from pydantic import BeforeValidator, Field
@@ -31,6 +31,14 @@ _MOTIONS = (
     Reference(kind="two-sided-sine", frequency=0.2),
     Reference(kind="two-sided-sine", frequency=0.5),
 )
+# In two planes: moves toward any side, and ellipses from a line to a circle, as fast as those sines.
+_MOTIONS_IN_TWO_PLANES = (
+    Reference.model_validate({"kind": "diagonal", "duration": 1.0}),
+    Reference.model_validate({"kind": "diagonal", "duration": 0.7}),
+    Reference.model_validate({"kind": "ellipse", "turn": 5.0}),
+    Reference.model_validate({"kind": "ellipse", "turn": 2.0}),
+)
+_DRAWN_IN_TWO_PLANES = {"reference.toward_deg": "-180..180", "reference.ratio": "0..1"}
 _RIG: dict[str, Any] = {
     "control_period": TICK,
     "actuator": {"level": "tendon", "friction": 0.1, "sheath": 1.0},
@@ -62,7 +70,10 @@ class RecommendSettings(Section):
         _DRAWN, "settings of the loop in which simulated rigs differ, and what each is drawn from"
     )
     references: tuple[Reference, ...] = choice(
-        _MOTIONS, "motions that each simulated rig follows, to angles drawn within its reach", min_length=1
+        _MOTIONS,
+        "motions that each simulated rig follows, to angles drawn within its reach; by default in two planes moves "
+        "toward any side and ellipses",
+        min_length=1,
     )
     horizon: float = quantity(5.0, "s", "duration of one rollout", "assumed", gt=0)
     largest_deg: float = quantity(45.0, "deg", "largest angle asked for, where the tendons reach it", gt=0, le=180)
@@ -74,14 +85,27 @@ class RecommendSettings(Section):
     candidates: int = choice(12, "candidates per iteration of each search", ge=4, le=10_000)
     iterations: int = choice(6, "iterations of each search", ge=1, le=100_000)
     frequencies: tuple[Annotated[float, Field(gt=0)], ...] = quantity(
-        (0.2, 0.4, 0.6, 0.8, 1.0), "Hz", "sines to both sides by which it is found how fast a motion may be"
+        (0.2, 0.4, 0.6, 0.8, 1.0),
+        "Hz",
+        "sines to both sides, in two planes ellipses, by which it is found how fast a motion may be",
     )
     payloads: tuple[Annotated[float, Field(gt=0)], ...] = quantity(
         (0.1, 0.2, 0.3, 0.5), "kg", "masses in the hand, unknown to the controller, that are tried", "assumed"
     )
     from_identified: str | None = choice(None, "identify run whose parameters replace the study's")
 
-    def family(self, largest_deg: float) -> Family:
-        """The simulated rigs, asked for angles of up to `largest_deg` to both sides."""
+    def family(self, largest_deg: float, planes: int = 1) -> Family:
+        """The simulated rigs, asked for angles of up to `largest_deg` to both sides, in two planes to any side."""
         drawn = self.draw | {"reference.angle_deg": f"{-largest_deg:g}..{largest_deg:g}"}
-        return Family(loop=self.loop, draw=drawn, references=self.references, horizon=self.horizon)
+        references = self.references
+        if planes == 2:
+            references = _MOTIONS_IN_TWO_PLANES if references == _MOTIONS else references
+            drawn = in_any_direction(drawn, references)
+        return Family(loop=self.loop, draw=drawn, references=references, horizon=self.horizon)
+
+
+def in_any_direction(drawn: Mapping[str, Drawn], references: Iterable[Reference]) -> dict[str, Drawn]:
+    """What is drawn, and the direction of motions and of the load in two planes where it is not drawn otherwise."""
+    of_motions = {f"reference.{name}" for reference in references for name in reference.added()}
+    aside = {"disturbances.toward_deg": "-180..180"} if "disturbances.load" in drawn else {}
+    return aside | {key: some for key, some in _DRAWN_IN_TWO_PLANES.items() if key in of_motions} | dict(drawn)

@@ -79,6 +79,8 @@ class Recommended(StudyResult):
     payloads: list[Limit]
     next_command: str
     """Command that tries the recommendation on the rig."""
+    bending: str = ""
+    """Planes that all loops bend in, a sentence; empty where they stay in one."""
 
     @property
     def best(self) -> Candidate | None:
@@ -210,12 +212,15 @@ def _lost(ranked: WorldRanking, k: int) -> str:
 def _notes(result: Recommended) -> list[str]:
     wanted = result.study.recommend.largest_deg
     short = f" (asked: {wanted:g} deg)" if result.reach_deg < wanted else ""
-    notes = [f"The tendons hold {result.reach_deg:g} deg to either side on every simulated rig{short}."]
+    sides = "any side" if result.bending else "either side"
+    notes = [result.bending] * bool(result.bending)
+    notes += [f"The tendons hold {result.reach_deg:g} deg to {sides} on every simulated rig{short}."]
     if told := decided([result.ranking]):
         notes.append(told)
     if result.best is None:
         return notes
-    sine = f"sines of {sine_deg(result.reach_deg):g} deg to both sides"
+    motion, sides = ("ellipses", "any side") if result.bending else ("sines", "both sides")
+    sine = f"{motion} of {sine_deg(result.reach_deg):g} deg to {sides}"
     notes.append(
         f"{_up_to(result.motions, 'Hz', sine)} {_up_to(result.payloads, 'kg', 'an unknown payload in the hand')}"
     )

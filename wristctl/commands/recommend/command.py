@@ -8,9 +8,9 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from wristctl.commands.inputs import EarlierRun, Inputs
-from wristctl.commands.inputs_of_loops import identified
+from wristctl.commands.inputs_of_loops import identified, why_two_planes
 from wristctl.commands.kept_studies import keep_gains, row_of
-from wristctl.commands.loop_warnings import warn_if_coarse, warn_if_it_buckles
+from wristctl.commands.loop_warnings import warn_if_coarse, warn_if_it_buckles, warn_of_one_plane
 from wristctl.commands.procedure import Procedure
 from wristctl.commands.recommend.answer import (
     RECOMMENDED,
@@ -26,6 +26,7 @@ from wristctl.commands.results import Findings
 from wristctl.commands.session import Session
 from wristctl.config.families import Family, TuningWorlds
 from wristctl.config.loop import Reference
+from wristctl.config.recommend import in_any_direction
 from wristctl.config.study import Study
 from wristctl.config.tune import Objective, TuneSettings
 from wristctl.errors import UserError, under
@@ -34,6 +35,7 @@ if TYPE_CHECKING:
     from wristctl.comparison.world_ranking import WorldRanking
     from wristctl.control.law import Controller
     from wristctl.simulation.cases import Measured
+    from wristctl.simulation.planes import Asked
     from wristctl.tuning.search import Search
 
 # Name of the family of simulated rigs, of which the draws are named.
@@ -53,17 +55,35 @@ TUNED, SCALED = "tuned", "scaled preset"
 _ALIKE = 1e-9
 
 
+def asked_of_rigs(study: Study) -> list[Asked]:
+    """The simulated rigs with what they are asked for, before it is known whether that is in two planes."""
+    from wristctl.simulation.drawn_worlds import asked_of
+
+    return asked_of(study.recommend.family(LEAST_DEG))
+
+
+def family_of_rigs(study: Study, largest_deg: float) -> Family:
+    """The simulated rigs, in two planes where anything takes them out of one. Raises UserError."""
+    from wristctl.simulation.planes import planes_of
+
+    return study.recommend.family(largest_deg, planes_of(study.wrist, asked_of_rigs(study)))
+
+
 def reach_deg(study: Study) -> float:
     """Largest whole angle [deg] to both sides that the tendons hold on every rig that can be drawn, at most the wanted.
 
-    The worst rig has the stiffest springs, the largest payload and load, and the tendons nearest to the middle.
+    In two planes to any side. The worst rig has the stiffest springs, the largest payload and load, and the tendons
+    nearest to the middle.
     """
+    from wristctl.simulation.planes import planes_of
     from wristctl.simulation.worlds import plant_of
+    from wristctl.wrist.spatial.held_bends import held_all_around
     from wristctl.wrist.statics import shortfall
+    from wristctl.wrist.tendon_layout import TendonLayout
 
-    settings = study.recommend
+    settings, planes = study.recommend, planes_of(study.wrist, asked_of_rigs(study))
     wanted = min(settings.largest_deg, study.wrist.range_deg)
-    family, ends = settings.family(wanted), (0.0, 1.0 - 1e-12)
+    family, ends = settings.family(wanted, planes), (0.0, 1.0 - 1e-12)
     held = wanted
     for near in ends:  # of the radius; all else at the end that asks for more
         for side in ends:  # of the load
@@ -74,6 +94,10 @@ def reach_deg(study: Study) -> float:
             if not loop.limits:
                 continue
             actual = plant_of(study.wrist, loop.plant)
+            if planes == 2:
+                layout, load = TendonLayout.of(actual), abs(loop.disturbances.load)
+                held = min(held, held_all_around(actual, layout, load, wanted))
+                continue
             for toward in (-1.0, 1.0):
                 bound = math.radians(toward * wanted)
                 short = shortfall(actual, min(bound, 0.0), max(bound, 0.0), loop.disturbances.load)
@@ -86,6 +110,7 @@ def plan(study: Study, inputs: Inputs) -> str:
     """Check the controllers, and that the tendons reach what is asked for. Raises UserError."""
     from wristctl.control.table import controller
     from wristctl.simulation.closed_loop import Size, check_size
+    from wristctl.simulation.planes import planes_of
     from wristctl.tuning.search import check_tunable
 
     study = identified(study, "recommend", inputs)
@@ -98,12 +123,14 @@ def plan(study: Study, inputs: Inputs) -> str:
     if reach < LEAST_DEG:
         reason = f"the tendons hold the wrist to {reach:g} deg only: no controller can help"
         raise UserError(reason, "wrist", "a larger tension_limit or tendon_radius, a softer wrist, or a lighter hand")
+    family, asked = family_of_rigs(study, reach), asked_of_rigs(study)
     searched = settings.candidates * settings.iterations * settings.draws + settings.validation * settings.candidates
-    count = len(settings.controllers) * len(settings.references) * (searched + 2 * settings.tests)
-    check_size(Size([settings.loop], settings.horizon, count))
+    count = len(settings.controllers) * len(family.references) * (searched + 2 * settings.tests)
+    check_size(Size([settings.loop], settings.horizon, count), planes_of(study.wrist, asked))
+    bending = " in two planes" * bool(why_two_planes(study.wrist, asked))
     return (
         f"{', '.join(settings.controllers)} tuned on {settings.draws} simulated rigs and tested on {settings.tests} "
-        f"others, motions of up to {reach:g} deg: about {count} rollouts of {settings.horizon:g} s"
+        f"others, motions of up to {reach:g} deg{bending}: about {count} rollouts of {settings.horizon:g} s"
     )
 
 
@@ -117,7 +144,8 @@ def recommend(session: Session) -> Recommended:
     settings, reach = study.recommend, reach_deg(study)
     warn_if_it_buckles(findings, study.wrist, [settings.loop])
     warn_if_coarse([settings.loop])
-    family = settings.family(reach)
+    warn_of_one_plane(study.wrist, asked_of_rigs(study))
+    family = family_of_rigs(study, reach)
     for split in ("tune", "validation", "test"):
         findings.note_streams(streams_of(family, FAMILY, split))
     scaled = [scaled_to(study.wrist, controller(name)) for name in settings.controllers]
@@ -125,11 +153,15 @@ def recommend(session: Session) -> Recommended:
     candidates = _candidates(scaled, searches)
     ranking = _tested(session, study, family, candidates)
     tables = [files_table([candidates[row] for row in ranking.standing.order])]
-    result = Recommended(session.study, findings, tables, reach, candidates, ranking, searches, [], [], "")
+    bending = why_two_planes(study.wrist, asked_of_rigs(study))
+    planes = 2 if bending else 1
+    result = Recommended(session.study, findings, tables, reach, candidates, ranking, searches, [], [], "", bending)
     if result.best is None:
         return _recorded(study, result)
     with session.progress("how fast and how heavy"):
-        motions = [_limit(study, result.best, rate, _sines(family, reach, rate)) for rate in settings.frequencies]
+        motions = [
+            _limit(study, result.best, rate, _sines(family, reach, rate, planes)) for rate in settings.frequencies
+        ]
         payloads = [_limit(study, result.best, mass, _laden(family, mass)) for mass in settings.payloads]
     file = str(findings.run.path / RECOMMENDED) if findings.run else RECOMMENDED
     command = next_command(study, session.typed, file)
@@ -202,10 +234,14 @@ def _tested(session: Session, study: Study, family: Family, candidates: Sequence
     return ranking(FAMILY, family, rows, tolerated=TOLERATED)
 
 
-def _sines(family: Family, reach: float, frequency: float) -> Family:
-    """The rigs asked for a sine to both sides, for at least two of its periods."""
-    draw = {key: source for key, source in family.draw.items() if key != "reference.angle_deg"}
+def _sines(family: Family, reach: float, frequency: float, planes: int) -> Family:
+    """The rigs asked for a sine to both sides, in two planes an ellipse, for at least two of its periods."""
+    draw = {key: source for key, source in family.draw.items() if not key.startswith("reference.")}
     motion = Reference(kind="two-sided-sine", frequency=frequency, angle_deg=sine_deg(reach))
+    if planes == 2:
+        asked = {"kind": "ellipse", "turn": 1.0 / frequency, "angle_deg": sine_deg(reach)}
+        motion = Reference.model_validate(asked)
+        draw = in_any_direction(draw, [motion])
     horizon = max(family.horizon, math.ceil(2.0 / frequency))
     return family.model_copy(update={"draw": draw, "references": (motion,), "horizon": float(horizon)})
 
@@ -263,7 +299,7 @@ def _recorded(study: Study, result: Recommended) -> Recommended:
 
 def _write_files(study: Study, findings: Findings, result: Recommended) -> None:
     """A study file for every row, and one with what is recommended that compares all."""
-    sections = sections_of(study, result.reach_deg)
+    sections = sections_of(study, result.reach_deg, 2 if result.bending else 1)
     ordered = [result.candidates[row] for row in result.ranking.standing.order]
     files = {one.file: [one] for one in ordered}
     if (best := result.best) is not None:
@@ -273,4 +309,10 @@ def _write_files(study: Study, findings: Findings, result: Recommended) -> None:
         keep_gains(findings, file, found, study, [row_of(one.controller, one.gains, 6) for one in rows], **sections)
 
 
-RECOMMEND = Procedure("recommend", plan, recommend, (EarlierRun("from_identified", kind="identify", optional=True),))
+RECOMMEND = Procedure(
+    "recommend",
+    plan,
+    recommend,
+    (EarlierRun("from_identified", kind="identify", optional=True),),
+    in_one_plane=lambda study: not why_two_planes(study.wrist, asked_of_rigs(study)),
+)

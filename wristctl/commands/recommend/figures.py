@@ -55,7 +55,7 @@ def errors(result: Recommended) -> Figure:
 def limits(result: Recommended) -> Figure:
     """Median error of the recommended gains over the sines' frequency and over the payload; crosses lose rigs."""
     picture, ((left, right),) = figure(1, 2, height=2.6)
-    _limit(left, result.motions, "frequency of a sine to both sides [Hz]")
+    _limit(left, result.motions, f"frequency of {'an ellipse' if result.bending else 'a sine to both sides'} [Hz]")
     _limit(right, result.payloads, "unknown payload [kg]")
     left.set_ylabel("median RMSE [deg]")
     return picture

@@ -14,18 +14,18 @@ from wristctl.config.study import Study
 from wristctl.study_files.resolved import sections_read
 
 
-def sections_of(study: Study, reach_deg: float) -> Mapping[str, Mapping[str, Any]]:
+def sections_of(study: Study, reach_deg: float, planes: int = 1) -> Mapping[str, Mapping[str, Any]]:
     """Settings of `simulate`, `compare` and, where it can have the rig, `hw_run`, on the rig of `recommend.loop`.
 
-    No motion asks for more than the angle that the tendons hold [deg].
+    No motion asks for more than the angle that the tendons hold [deg]. All bend in so many planes.
     """
-    rig = rig_of(study.recommend.loop)
+    rig, bends = rig_of(study.recommend.loop), {"planes": 2} if planes == 2 else {}
     sections: dict[str, Mapping[str, Any]] = {
-        "simulate": {"loop": rig} | _within(study.simulate.reference, reach_deg),
-        "compare": {"loops": {"rig": rig}} | _moves(reach_deg),
+        "simulate": {"loop": rig | bends} | _within(study.simulate.reference, reach_deg),
+        "compare": {"loops": {"rig": rig | bends}} | _moves(reach_deg),
     }
     if hw_run_fits(study, study.recommend.loop):
-        sections["hw_run"] = rig | _within(study.hw_run.reference, reach_deg)
+        sections["hw_run"] = rig | bends | _within(study.hw_run.reference, reach_deg)
     return sections
 
 

@@ -1,5 +1,7 @@
 """Which bends in two planes tendons within their limits hold at rest, of the wrist as one segment."""
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -25,12 +27,27 @@ def reach_of_bends(wrist: WristParameters, layout: TendonLayout, directions: int
     return reach
 
 
-def _holds(wrist: WristParameters, layout: TendonLayout, bends: Array) -> NDArray[np.bool_]:
-    """Whether tendons within their limits hold bends (P, 2) [rad] at rest, (P,)."""
+def held_all_around(wrist: WristParameters, layout: TendonLayout, force: float, largest_deg: float) -> float:
+    """The whole angle [deg], at most `largest_deg`, to which tendons within their limits hold the wrist at rest.
+
+    Toward every side, and against a force [N] on the last disc of an unbent wrist from any side.
+    """
+    around = np.linspace(0.0, 2.0 * np.pi, 24, endpoint=False)
+    sides = np.stack([np.cos(around), np.sin(around)], axis=-1)
+    sizes = np.arange(0.0, math.floor(largest_deg) + 1.0)
+    bends = (np.deg2rad(sizes)[:, None, None] * sides).reshape(-1, 2)
+    forces = force * wrist.length * sides[::3] if force else np.zeros((1, 2))
+    held = np.logical_and.reduce([_holds(wrist, layout, bends, torque) for torque in forces])
+    whole = held.reshape(len(sizes), -1).all(axis=1)
+    return float(np.cumprod(whole).sum() - 1)
+
+
+def _holds(wrist: WristParameters, layout: TendonLayout, bends: Array, load: Array | float = 0.0) -> NDArray[np.bool_]:
+    """Whether tendons within their limits hold bends (P, 2) [rad] at rest, against a torque (2,) [N m], (P,)."""
     values = spatial_values(wrist, layout, 1, axis=np.radians(wrist.stiffness_axis_deg))
     at_rest = spatial_terms(values, bends, 0.0 * bends)
     yy, yz, zz = ellipse(wrist.stiffness, wrist.stiffness * wrist.flexion_ratio, np.radians(wrist.stiffness_axis_deg))
-    torque = at_rest.bias + bends @ np.array([[yy, yz], [yz, zz]])
+    torque = load + at_rest.bias + bends @ np.array([[yy, yz], [yz, zz]])
     limits = wrist.pretension * layout.multiplicity, wrist.tension_limit * layout.multiplicity
     arms = at_rest.moment_arms.reshape(-1, len(layout.places), 2)
     saturated: NDArray[np.bool_] = allocated(arms, torque, *limits).saturated
