@@ -113,6 +113,9 @@ def two_planes() -> dict[str, Case]:
     return {
         "three, ideal": Case("pid-ff", (_FINE | {"disturbances": aside},), 8, three),
         "three, camera": Case("pid-ff", (_SLOW | camera | alone,), 8, three),
+        "three, saturated, both planes at once": Case(
+            "clf-qp", (_FINE | {"disturbances": against},), 8, three | {"tension_limit": 20.0}
+        ),
         "four, ideal, 1": Case("pid-ff", (_FINE,), 1, four),
         "four, ideal, 8": Case("mpc", (_QUICK | alone,), 8, four, 0.6),
         "four, saturated": Case("pid-ff", (_FINE | alone | {"disturbances": against},), 8, stops),

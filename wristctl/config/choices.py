@@ -112,6 +112,7 @@ CONTROLLERS: Choices[Any] = Choices(
         "adrc": "wristctl.control.adrc:ADRC",
         "lqi": "wristctl.control.lqi:LQI",
         "mpc": "wristctl.control.mpc:MPC",
+        "clf-qp": "wristctl.control.clf_qp:CLF_QP",
         "nn-mrac": "wristctl.control.nn_mrac:NN_MRAC",
         "impedance": "wristctl.control.impedance:IMPEDANCE",
         "fopi": "wristctl.control.fopi:FOPI",
