@@ -112,6 +112,8 @@ _BEGIN = [
     "half the square root of the share of cases that swing by more than 0.1 deg at rest; a case that leaves its range",
     "counts 3 to 4 decades, by how early it does. 0 is feedforward, -1 ten times better. All weights are in",
     "`tune.objective`, and one for the worst case, which is 0: it makes the objective a matter of one unlucky world.",
+    "Gains that would be the best are tried under changes of their loop too ([margins](tuning-margins.md)), which is",
+    "left out here.",
     "",
     f"Does it tell good gains from bad ones? {GAINS} gains of three controllers, within a decade of a preset to",
     f"either side, on the first worlds of the tuning split, against their geometric-mean RMSE on {JUDGED_ON} worlds of",
