@@ -177,7 +177,6 @@ def tune(session: Session) -> Tuned:
 
     from wristctl.commands.truth_table import truth_tables
     from wristctl.control.table import controller
-    from wristctl.simulation.planes import planes_of
     from wristctl.tuning.objective import marks_of
     from wristctl.tuning.search import own_loop, tuning_cases
 
@@ -187,7 +186,7 @@ def tune(session: Session) -> Tuned:
     warn_if_coarse(loops)
     warn_of_one_plane(study.wrist, asked_of_search(study))
     warn_out_of_reach(session.findings, study.wrist, asked_by(study, study.tune))
-    planes = planes_of(study.wrist, asked_of_search(study))
+    planes = 2 if why_two_planes(study.wrist, asked_of_search(study)) else 1
     network = network_for(session.inputs, study.wrist, loops, planes)
     searches = search_all(session, study, network)
     searched, chosen = tuning_cases(study, network)
