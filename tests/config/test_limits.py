@@ -95,9 +95,10 @@ EDGES = {
     "motors": Edge(RigSettings, {"actuator": {"level": "tendon"}}, {"actuator": {"level": "lagged"}}),
     "board ahead": Edge(
         RigSettings,
-        {"ramp": 80_000.0, "actuator": {"level": "tendon", "step_acceleration": 80_000.0}},
-        {"ramp": 79_999.0},
+        {"actuator": {"level": "tendon", "step_acceleration": 80_000.0, "ramp": 80_000.0}},
+        {"actuator": {"level": "tendon", "step_acceleration": 80_000.0, "ramp": 79_999.0}},
     ),
+    "steepest ramp": Edge(RigSettings, {"actuator": {"ramp": 200_000.0}}, {"actuator": {"ramp": 200_001.0}}),
     "eyes": Edge(RigSettings, {"sensor": {"level": "camera"}}, {"sensor": {"level": "ideal"}}),
     "pushes or none": Edge(
         HwRunSettings, {"without_push": True, "push": {"force": 0.0}}, {"without_push": False}

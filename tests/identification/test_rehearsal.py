@@ -126,6 +126,7 @@ WITH: dict[str, dict[str, Any]] = {
 OTHERS: dict[str, Any] = {
     "plant.model": "hinges", "plant.end_stop_deg": 12.0, "facts.broken_at": 0.2, "facts.slips_at": 0.2,
     "facts.backlash": 3e-4, "plant.tilt_deg": 10.0, "plant.payload": 0.2, "actuator.step_rate": 2e3,
+    "actuator.ramp": 5e3,
     "plant.stiffness_axis_deg": 30.0,
 }  # fmt: skip
 NOT_OF_TENDONS = {"lag", "torque", "top_speed", *TendonFacts.model_fields}

@@ -14,6 +14,7 @@ from wristctl.config.wrist import WristParameters
 from wristctl.control.belief import Sides, belief_in_lanes
 from wristctl.control.table import controller
 from wristctl.lanes.compiled import kernel
+from wristctl.lanes.lane import zero_like
 from wristctl.lanes.rows import lanes_like, part, rows_of
 from wristctl.simulation.actuator import (
     SIDES,
@@ -25,6 +26,7 @@ from wristctl.simulation.actuator import (
     SpoolDrive,
     actuate,
     at_rest,
+    deliver,
     drive_in_lanes,
     drive_of,
 )
@@ -39,24 +41,36 @@ PERIOD, MOVE = 1e-3, Reference()
 
 
 @kernel
-def _drive(drive: Any, state: Any, belief: Any, commands: Any, out: Any, h: float) -> None:
+def _drive(drive: Any, state: Any, belief: Any, winding: Any, commands: Any, out: Any, h: float) -> None:
     known, motors, in_lanes = belief_in_lanes(belief), rows_of(state), drive_in_lanes(drive)
     for tick in range(commands.shape[0]):
         command, result = rows_of(commands[tick]), rows_of(out[tick])
         counts = part(result, 0, (0, 0))
-        aim = Aim(part(command, 2, (0,)), part(command, 3, (0,)), lanes_like(counts))
-        actuate(in_lanes, motors, known, aim, part(command, 0, (0, 0)), h, counts)
+        bend, told = part(command, 2, (0,)), lanes_like(counts)
+        actuate(
+            in_lanes,
+            motors,
+            known,
+            Aim(bend, part(command, 3, (0,)), lanes_like(counts)),
+            part(command, 0, (0, 0)),
+            h,
+            told,
+        )
+        middle = 0.5 * h + zero_like(motors[0])
+        deliver(in_lanes, (motors, rows_of(winding), told, bend, h), middle, (counts, lanes_like(counts)))
         result[2] = motors[4]
 
 
 def delivered(drive: Drive, commands: np.ndarray, period: float = PERIOD) -> np.ndarray:
-    """What both sides deliver to commands (T, 3 or 4), pulls [N], a reference angle and its rate, else 0; and the
-    withheld torque; (T, 3)."""
+    """What both sides deliver in the middle of ticks to commands (T, 3 or 4), and the withheld torque; (T, 3).
+
+    Commands are pulls [N], a reference angle and its rate, else 0.
+    """
     out, aimed = np.zeros((len(commands), 3)), np.zeros((len(commands), 4))
     aimed[:, : commands.shape[1]] = commands
     sides = np.array(SIDES)
     state = at_rest(drive, sides * WRIST.pretension, WRIST.length, PCC.taut(WRIST, np.zeros(1)))
-    _drive(drive, state, Sides(segments(WRIST, 1)[None], sides), aimed, out, period)
+    _drive(drive, state, Sides(segments(WRIST, 1)[None], sides), np.array([1.0, 0.0, 0.0]), aimed, out, period)
     return out
 
 
@@ -65,8 +79,8 @@ def motor_of_side(drive: LaggedDrive | SpoolDrive) -> Motor:
     return Motor(*drive.motor.tolist())._replace(stiffness=float(drive.stiffness[0]))
 
 
-def driven(actuator: Actuator) -> LaggedDrive | SpoolDrive:
-    drive = drive_of(actuator)
+def driven(actuator: Actuator, period: float = PERIOD) -> LaggedDrive | SpoolDrive:
+    drive = drive_of(actuator, SIDES, period)
     assert not isinstance(drive, IdealDrive)
     return drive
 
@@ -107,7 +121,8 @@ def test_a_stepper_keeps_its_speed_and_acceleration_and_stops_within_a_step_of_i
     np.testing.assert_allclose(fine, np.rint(fine), atol=1e-6)
     speed = np.diff(length) / PERIOD
     assert speed.max() <= motor_of_side(drive).speed + motor_of_side(drive).step / PERIOD
-    ramp = (length[20] - length[0]) / (0.5 * (20 * PERIOD) ** 2)
+    begun = 4  # ticks until the first rate has taken effect
+    ramp = 2.0 * np.polyfit(PERIOD * np.arange(20), length[begun : begun + 20], 2)[0]
     assert ramp == pytest.approx(motor_of_side(drive).acceleration, rel=0.15)
     target = 4.0 / motor_of_side(drive).stiffness + WRIST.length - _plus_length(0.8)
     assert length[-1] == pytest.approx(target, abs=motor_of_side(drive).step)
@@ -150,13 +165,15 @@ def test_spools_told_a_rate_move_with_the_reference_and_else_lag_by_braking(
     wanted = 4.0 / motor.stiffness + WRIST.length - np.array([_plus_length(theta) for theta in angle])
     speed = abs(np.diff(wanted) / PERIOD).max()
     lag = way * (wanted - late[400:, 0])
-    assert lag == pytest.approx(speed**2 / (2.0 * motor.acceleration), abs=2.0 * motor.step)
+    late = speed * (motor.delay + 0.5 * PERIOD)
+    assert lag == pytest.approx(speed**2 / (2.0 * motor.acceleration) + late, abs=2.0 * motor.step)
     assert told[400:, 0] == pytest.approx(wanted + 0.5 * way * speed * PERIOD, abs=1.1 * motor.step)
 
 
 def test_what_acts_over_a_coarse_period_is_the_spool_in_its_middle() -> None:
-    """It turns evenly, as at a step rate: it is not at the period's end from its beginning."""
-    drive, period = driven(Actuator(level="tendon")), 0.01
+    """It goes on within the period: it is not at the period's end from its beginning."""
+    period = 0.01
+    drive = driven(Actuator(level="tendon"), period)
     time, still = period * np.arange(60.0), np.full(60, 4.0)
     angle, rate = 0.2 * (1.0 - np.cos(3.0 * time)), 0.6 * np.sin(3.0 * time)
     length = delivered(drive, np.stack([still, still, angle, rate], axis=1), period)[:, 0]

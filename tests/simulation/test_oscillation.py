@@ -257,7 +257,7 @@ def test_a_wrist_fails_when_it_leaves_its_range_by_five_degrees_and_not_before()
 def test_soft_tendons_behind_a_camera_fail_or_swing_by_the_steppers_acceleration() -> None:
     slow = simulate(load_study([], [*SOFT]))
     assert slow.failed.any() or slow.metrics["oscillation"][0] > LIMIT_CYCLE
-    assert slow.fate.startswith(("FAILED: left its range at", "LIMIT CYCLE: +-"))
+    assert slow.fate.startswith("FAILED: left its range at") or "LIMIT CYCLE: +-" in slow.fate
     quick = simulate(load_study([], [*SOFT, "simulate.loop.actuator.step_acceleration=400000.0"]))
     assert not quick.failed.any() and quick.metrics["oscillation"][0] < 2.0 * LIMIT_CYCLE
 

@@ -55,6 +55,9 @@ LEAVES: dict[str, dict[str, Any]] = {
     "pulley_radius": {"actuator": {"pulley_radius": "x1.02"}},
     "step_rate": {"actuator": {"step_rate": "x0.02"}},
     "step_acceleration": {"actuator": {"step_acceleration": "x0.1"}},
+    "ramp": {"actuator": {"ramp": "x0.05"}},
+    "command_delay": {"actuator": {"command_delay": 4e-3}},
+    "update": {"actuator": {"update": "x2"}},
     "tilt_deg": {"tilt_deg": 3.0},
     "sheath": {"actuator": {"sheath": 2.0}},
     "presliding": {"actuator": {"presliding": "x4"}},
@@ -88,10 +91,13 @@ STILL = {
         for leaf in ("sheath", "presliding", "backlash", "tendon creep", "slips_at", "torque", "top_speed")
     },
     ("lagged", "step_acceleration"): "motors change their pull at once there, no faster than the steps come",
+    **{("lagged", leaf): "motors pull at once there" for leaf in ("ramp", "command_delay", "update")},
     ("tendon", "lag"): "a stepper has none",
     **{(level, "flexion_ratio"): "the motion is in the other plane" for level in ("tendon", "lagged")},
 }
 """Leaves that are of another level, with the reason."""
+OF_MOTORS = ("lag", "step_rate", "step_acceleration", "ramp", "command_delay", "update")
+"""Leaves that say which steps motors make, by which their host counts."""
 COLUMNS = {"theta": 0, "torque_wanted": 2, "tension_plus": 4, "tension_minus": 5, "seen": 8}
 
 
@@ -145,6 +151,8 @@ def _controller_side(setup: Any, course: Any, world: Any, state: Any, scratch: A
 
 def only(values: Any) -> Any:
     """The only block of named arrays of blocks."""
+    if type(values) is tuple:
+        return values
     return type(values)(*(map(only, values))) if hasattr(values, "_fields") else values[0]
 
 
@@ -178,7 +186,7 @@ def test_a_leaf_moves_the_wrist_and_the_controller_knows_only_its_frames_and_ste
     else:
         assert moved > 1e-6
     own = plant.actuator
-    speeds = TrueActuator(lag=own.lag, step_rate=own.step_rate, step_acceleration=own.step_acceleration)
+    speeds = TrueActuator(**{name: getattr(own, name) for name in OF_MOTORS})
     again = commands_from(actual, loop, speeds)
     for number, name in enumerate(("torque_wanted", "tension_plus", "tension_minus")):
         own_side = again[:, number] / (TENDONS_PER_SIDE if number else 1.0)

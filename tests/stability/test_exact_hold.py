@@ -58,22 +58,65 @@ def _open_loop(n: int, period: float, theta: float, gains: dict[str, float], lev
     actuator = ACTUATORS[level]
     stiffness = TENDONS_PER_SIDE * actuator.tendon_stiffness * (level == "tendon")
     a, b, torque = _continuous(n, theta, stiffness)
-    held = scipy.linalg.expm(period * np.block([[a, b], [np.zeros((2, 2 * n + 2))]]))
-    np.testing.assert_allclose(held[: 2 * n], np.hstack(_by_python_control(a, b, period)), rtol=1e-9, atol=1e-12)
-    phi, gamma = held[: 2 * n, : 2 * n], held[: 2 * n, 2 * n :]
-    angle, rate = np.repeat([1.0, 0.0], n), np.repeat([0.0, 1.0], n)
+    x, angle, rate = 2 * n, np.repeat([1.0, 0.0], n), np.repeat([0.0, 1.0], n)
     by_torque = _slope(lambda value: _pulls(value, theta), torque)
     by_angle = np.outer(_slope(lambda value: _pulls(torque, value), theta), angle)
-    share = period / (actuator.lag + period) if level == "lagged" else 1.0
-    acts = 0.5 if level == "tendon" else share  # a spool is held in the middle of its way
-    x = 2 * n
-    whole, into = np.zeros((x + 3, x + 3)), np.zeros(x + 3)
-    whole[:x, :x], into[:x] = phi + acts * gamma @ by_angle, acts * gamma @ by_torque  # pulls that act at once
-    whole[x : x + 2, :x], into[x : x + 2] = share * by_angle, share * by_torque
-    whole[:x, x : x + 2], whole[x : x + 2, x : x + 2] = (1.0 - acts) * gamma, (1.0 - share) * np.eye(2)
+    if level == "tendon":
+        motion, driven = _by_spools(a, b, period, by_angle, by_torque)
+    else:
+        motion, driven = _by_pulls(a, b, period, by_angle, by_torque, actuator.lag if level == "lagged" else 0.0)
+    size = len(motion)
+    whole, into = np.zeros((size + 1, size + 1)), np.append(driven, 0.0)
+    whole[:size, :size] = motion
     whole[-1, :x], whole[-1, -1] = period * angle, 1.0
-    back = np.concatenate([(gains["Kp"] + period * gains["Ki"]) * angle + gains["Kd"] * rate, [0.0, 0.0, gains["Ki"]]])
+    back = np.zeros(size + 1)
+    back[:x], back[-1] = (gains["Kp"] + period * gains["Ki"]) * angle + gains["Kd"] * rate, gains["Ki"]
     return whole, into, back
+
+
+def _by_pulls(a: Array, b: Array, period: float, by_angle: Array, by_torque: Array, lag: float) -> tuple[Array, Array]:
+    """A tick of wrist and pulls, which follow their commands with a lag [s], and what a torque does in it."""
+    x = len(a)
+    held = scipy.linalg.expm(period * np.block([[a, b], [np.zeros((2, x + 2))]]))
+    np.testing.assert_allclose(held[:x], np.hstack(_by_python_control(a, b, period)), rtol=1e-9, atol=1e-12)
+    phi, gamma, share = held[:x, :x], held[:x, x:], period / (lag + period)
+    whole, into = np.zeros((x + 2, x + 2)), np.zeros(x + 2)
+    whole[:x, :x], into[:x] = phi + share * gamma @ by_angle, share * gamma @ by_torque  # pulls that act at once
+    whole[x:, :x], into[x:] = share * by_angle, share * by_torque
+    whole[:x, x:], whole[x:, x:] = (1.0 - share) * gamma, (1.0 - share) * np.eye(2)
+    return whole, into
+
+
+def _by_spools(a: Array, b: Array, period: float, by_angle: Array, by_torque: Array) -> tuple[Array, Array]:
+    """A tick of wrist, spools (as the pulls that they stretch tendons by) and the rates sent before, newest first.
+
+    A rate takes effect after the board's delay. It is to bring the spool to its target a period after that.
+    """
+    x, late = len(a), TENDON.command_delay + 0.5 * TENDON.update
+    ticks = int(late // period)
+    since = late - ticks * period
+    flow, one = np.zeros((x + 4, x + 4)), np.eye(2)
+    flow[:x, :x], flow[:x, x : x + 2], flow[x : x + 2, x + 2 :] = a, b, one
+    sent = [slice(x + 2 + 2 * k, x + 4 + 2 * k) for k in range(ticks + 1)]
+    size = x + 4 + 2 * ticks
+    newest = np.zeros((2, size))
+    newest[:, :x], newest[:, x : x + 2], newest[:, sent[-1]] = by_angle, -one, -since * one
+    for rate in sent[:-1]:
+        newest[:, rate] = -period * one
+    newest /= period
+    before = np.zeros((x + 4, size))
+    before[: x + 2, : x + 2], before[x + 2 :, sent[-1]] = np.eye(x + 2), one
+    between, driven = scipy.linalg.expm(since * flow) @ before, np.zeros(x + 4)
+    between[x + 2 :] = np.eye(size)[sent[-2]] if ticks else newest
+    if not ticks:
+        driven[x + 2 :] = by_torque / period
+    rest = scipy.linalg.expm((period - since) * flow)
+    whole, into = np.zeros((size, size)), np.zeros(size)
+    whole[: x + 2], into[: x + 2] = (rest @ between)[: x + 2], (rest @ driven)[: x + 2]
+    whole[sent[0]], into[sent[0]] = newest, by_torque / period
+    for older, rate in zip(sent[1:], sent[:-1], strict=True):
+        whole[older, rate] = one
+    return whole, into
 
 
 def _by_python_control(a: Array, b: Array, period: float) -> tuple[Array, Array]:
@@ -95,18 +138,19 @@ def test_margins_are_those_of_the_exact_hold(
     loop = Loop(plant_segments=n, control_period=period, actuator=ACTUATORS[level])
     found = margins(linear("pid", gains, loop, degrees).closed)
     whole, into, back = _open_loop(n, period, math.radians(degrees), gains, level)
+    within = 1e-3 if level == "tendon" else 2e-6  # its spools turn on step by step
     inner, outer = (
         np.abs(np.linalg.eigvals(whole - found.most.value * share * np.outer(into, back))).max()
-        for share in (1.0 - 2e-6, 1.0 + 2e-6)
+        for share in (1.0 - within, 1.0 + within)
     )
     assert inner < 1.0 < outer
     own = control.ss(whole, into[:, None], back[None], 0.0, period)
     omega = np.linspace(1e-3, math.pi, 4000) / period
     amplified = np.abs(1.0 / (1.0 + own(np.exp(1j * np.append(omega, found.sensitivity.omega) * period))))
-    assert amplified[-1] == pytest.approx(found.sensitivity.value, rel=1e-6)
-    assert amplified.max() <= found.sensitivity.value * (1.0 + 1e-6)
+    assert amplified[-1] == pytest.approx(found.sensitivity.value, rel=within)
+    assert amplified.max() <= found.sensitivity.value * (1.0 + within)
     for crossed in found.gain_crossings:
-        assert abs(own(np.exp(1j * crossed.omega * period))) == pytest.approx(1.0, rel=1e-6)
+        assert abs(own(np.exp(1j * crossed.omega * period))) == pytest.approx(1.0, rel=within)
 
 
 def test_a_pid_at_1_ms_bears_as_much_gain_as_two_other_programs_say() -> None:
@@ -120,5 +164,6 @@ def test_a_pid_at_1_ms_bears_as_much_gain_as_two_other_programs_say() -> None:
 def test_the_linear_loop_is_the_same_whatever_steps_it_is_simulated_with(level: str) -> None:
     loop = Loop(control_period=5e-3, actuator=ACTUATORS[level])
     found = [margins(linear("pid", SOFT, loop.model_copy(update={"substeps": each}), 15.0).closed) for each in (1, 50)]
-    assert found[0].most.value == pytest.approx(found[1].most.value, rel=1e-6)
-    assert found[0].delay == pytest.approx(found[1].delay, rel=1e-6)
+    within = 3e-4 if level == "tendon" else 1e-6  # a spool that turns on in the period does so step by step
+    assert found[0].most.value == pytest.approx(found[1].most.value, rel=within)
+    assert found[0].delay == pytest.approx(found[1].delay, rel=within)

@@ -37,18 +37,20 @@ def test_a_trial_follows_its_reference_and_comes_back(experiment: Run) -> None:
     assert (log["late"].abs() < 1e-5).all() and done.experiment.timing.overruns == 0
 
 
-@pytest.mark.parametrize(("ramp", "least", "most"), [(50_000.0, 0.1, 0.5), (None, 0.0, 0.06)])
+@pytest.mark.parametrize("ramp", [50_000.0, 200_000.0])
 @pytest.mark.slow
-def test_a_wrist_swings_at_rest_where_its_board_ramps_no_faster_than_its_host_changes_rates(
-    experiment: Run, ramp: float | None, least: float, most: float
-) -> None:
-    """Each change of a rate then takes the whole tick, of which the host does not know."""
-    changes = {} if ramp is None else {"ramp": ramp}
-    done = experiment(horizon=2.0, reference={"duration": 0.5, "angle_deg": 30.0}, **changes)
+def test_a_wrist_under_a_quick_controller_rests_however_steeply_its_board_ramps(experiment: Run, ramp: float) -> None:
+    """Host and observer know how the board turns its motors; with rates taken to be there at once it swings."""
+    gains = {"w": 275.0, "lambda": 96.1, "Kd": 2.18e-4, "gamma": 4.16, "leak": 0.212}
+    done = experiment(
+        horizon=2.0, reference={"duration": 0.5, "angle_deg": 30.0}, actuator={"level": "tendon", "ramp": ramp},
+        rows=({"controller": "mrac", "gains": gains},),
+    )  # fmt: skip
     truth = done.table("truth")
-    theta = np.degrees(truth["theta"][(truth["trial"] == 0) & truth["time"].between(1.2, 2.0)])
-    assert done.error is None and theta.mean() == pytest.approx(30.0, abs=0.05)
-    assert least < np.ptp(theta) < most, "peak to peak [deg]"
+    late = truth[(truth["trial"] == 0) & truth["time"].between(1.2, 2.0)]
+    theta = np.degrees(late["theta"].to_numpy())
+    theta -= np.polyval(np.polyfit(late["time"], theta - 30.0, 1), late["time"])
+    assert done.error is None and np.ptp(theta) < 0.1, "peak to peak [deg]"
 
 
 @pytest.mark.slow

@@ -79,8 +79,8 @@ def test_one_that_does_not_answer_is_told_of_by_its_last_error() -> None:
 
 def test_before_anything_moves_ramps_watchdog_and_limits_are_set_and_drives_switched_on() -> None:
     board: Any = RigBoard()
-    actuator = Actuator(level="tendon", pulley_radius=6e-3)
-    settings = settings_of(actuator=actuator, ramp=150_000.0, safety={"watchdog": 0.2, "travel": 0.01, "hold": True})
+    actuator = Actuator(level="tendon", pulley_radius=6e-3, ramp=150_000.0)
+    settings = settings_of(actuator=actuator, safety={"watchdog": 0.2, "travel": 0.01, "hold": True})
     prepare(board, settings)
     prepare(board, settings, 1e-3)
     steps, homing, one = (round(length / spools_of(actuator).step) for length in (0.01, 2.78e-3, 1e-3))

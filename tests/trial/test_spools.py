@@ -14,8 +14,10 @@ from hypothesis import strategies as st
 from wristctl.config.plant import Actuator
 from wristctl.config.wrist import WristParameters
 from wristctl.lanes.compiled import kernel
-from wristctl.lanes.rows import rows_of
-from wristctl.simulation.actuator import motor_of, reel_in
+from wristctl.lanes.lane import zero_like
+from wristctl.lanes.rows import part, rows_of
+from wristctl.simulation.actuator import drive_in_lanes, drive_of, reel_in
+from wristctl.simulation.spool_timing import spool_at
 from wristctl.trial.spools import Paths, on_plus_side, spools_of
 from wristctl.wrist.directions import ACTIVE
 
@@ -24,8 +26,14 @@ SPOOLS = spools_of(ACTUATOR)
 
 
 @kernel
-def _reel_in(motor: Any, state: Any, target: float, moving: float, h: float) -> None:
-    reel_in(motor, motor.stiffness, rows_of(state), 0, target, moving, h)
+def _follow(drive: Any, state: Any, targets: Any, moving: float, h: float, out: Any) -> None:
+    spools, rows = drive_in_lanes(drive), rows_of(state)
+    rates = part(rows, 4, drive.rates)
+    for tick in range(len(targets)):
+        now = rows_of(out[tick])
+        now[2], _ = reel_in(spools, rows, rates, 0, targets[tick] + zero_like(rows[0]), moving + zero_like(rows[0]), h)
+        now[0], now[1] = rows[0], rates[0]
+        now[3], _ = spool_at(spools.motor, rows[0], rows[1], rates, 0.5 * h + zero_like(rows[0]), h)
 
 
 @settings(deadline=None)
@@ -96,12 +104,22 @@ def test_spools_are_behind_by_what_is_left_when_they_have_braked(way: float) -> 
     assert (SPOOLS.behind(to_stop - 0.9, moving, sent, period) == 0.0).all(), "less than a step"
 
 
-@settings(deadline=None)
-@given(st.floats(-2000.0, 2000.0), st.floats(-3000.0, 3000.0), st.floats(-4000.0, 4000.0))
-@pytest.mark.slow
-def test_a_trial_and_a_simulation_turn_a_spool_by_the_same_law(gap: float, moving: float, before: float) -> None:
-    h = 1e-3
-    out = np.array([0.0, before * SPOOLS.step])
-    _reel_in(motor_of(ACTUATOR), out, gap * SPOOLS.step, moving * SPOOLS.step, h)
-    wanted = SPOOLS.rate(np.array([gap]), np.array([moving]), np.array([before]), h)[0]
-    assert out[1] / SPOOLS.step == pytest.approx(wanted, abs=1e-6)
+@pytest.mark.parametrize("period", [2e-3, 5e-3, 1e-2])
+@pytest.mark.parametrize("seed", range(3))
+def test_a_trial_and_a_simulation_send_the_same_rates_and_see_the_same_spool(period: float, seed: int) -> None:
+    """Through 60 ticks of a target that jumps about on its way; the trial's spool is where the simulated one is."""
+    rng, moving = np.random.default_rng(seed), 400.0
+    targets = moving * period * np.arange(60.0) + rng.uniform(-30.0, 30.0, 60)
+    drive, out = drive_of(ACTUATOR, (1.0,), period), np.zeros((60, 4))
+    state = np.zeros(4 + len(drive.rates))  # type: ignore[union-attr]
+    _follow(drive, state, targets * SPOOLS.step, moving * SPOOLS.step, period, out)
+    out /= SPOOLS.step
+    rates = np.zeros((1, len(drive.rates)))  # type: ignore[union-attr]
+    for target, (place, rate, believed, true) in zip(targets, out, strict=True):
+        gap = target + moving * SPOOLS.timing.delay - SPOOLS.foreseen(np.array([place]), rates, period)
+        sent = SPOOLS.rate(gap, np.array([moving]), rates[:, 0], period)
+        assert sent[0] == pytest.approx(rate, abs=1e-6)
+        rates = np.column_stack([sent, rates[:, :-1]])
+        middle = SPOOLS.reckoned(np.array([place]), rates, 0.5 * period, period)
+        assert middle[0] == pytest.approx(believed, abs=1e-6) == pytest.approx(true, abs=1e-6)
+    assert np.ptp(out[:, 1]) > 300.0 and np.abs(out[20:, 0] - targets[20:]).max() < 60.0

@@ -18,8 +18,15 @@ from wristctl.errors import Unfitting
 Between = Literal["ulnar-flexion", "radial-flexion", "radial-extension", "ulnar-extension"]
 RigDirection = DirectionName | Between
 
+# Least and greatest ramp that the board takes [steps/s^2].
+RAMPS = 1000.0, 200_000.0
+
 # Lifetime of a step rate on the board: least time [s], and number of ticks.
 _LEAST_LIFE, _LIFE_PERIODS = 0.05, 2.5
+
+
+# What of an actuator host and board do by themselves, whatever hangs on them.
+_OF_THE_BOARD = ("step_rate", "step_acceleration", "ramp", "command_delay", "update")
 
 
 class Homing(Section):
@@ -142,10 +149,6 @@ class RigSettings(Section):
     camera: str = choice("0", "camera beside a real board: its number, or device path")
     camera_2: str = choice("2", "second camera, of two planes: it looks at the flexion-extension plane")
     real_time: bool = choice(False, "emulated rig: against the wall clock, in a process of its own")
-    ramp: float = quantity(
-        200_000.0, "1/s^2", "change of an axis' step rate by the board; actuator.step_acceleration is the host's",
-        "0.012 N m for a rotor of 300 g cm^2", ge=1000, le=200_000,
-    )  # fmt: skip
     priority: bool = choice(False, "real-time scheduling and locked memory for the loop, as far as the system allows")
     actuator: Actuator = choice(Actuator(level="tendon"), "motors and tendons as the controller knows them")
     sensor: Sensor = choice(Sensor(level="camera"), "camera as the observer knows it")
@@ -194,12 +197,16 @@ class RigSettings(Section):
 
     @model_validator(mode="after")
     def _board_ahead_of_host(self) -> Self:
-        if self.ramp < self.actuator.step_acceleration:
+        motors, (least, most) = self.actuator, RAMPS
+        if not least <= motors.ramp <= most:
+            fix = f"actuator.ramp of {least:g} to {most:g}"
+            raise Unfitting(f"no board ramps at {motors.ramp:g} steps/s^2", fix)
+        if motors.ramp < motors.step_acceleration:
             problem = (
-                f"the board's ramp ({self.ramp:g} steps/s^2) is slower than the host changes step rates "
-                f"(actuator.step_acceleration, {self.actuator.step_acceleration:g} steps/s^2)"
+                f"the board's ramp ({motors.ramp:g} steps/s^2) is slower than the host changes step rates "
+                f"(actuator.step_acceleration, {motors.step_acceleration:g} steps/s^2)"
             )
-            raise Unfitting(problem, f"ramp of at least {self.actuator.step_acceleration:g}, or four times as much")
+            raise Unfitting(problem, f"actuator.ramp of at least {motors.step_acceleration:g}, or four times as much")
         return self
 
     @model_validator(mode="after")
@@ -317,7 +324,8 @@ class HwRunSettings(RigSettings):
         """The bench as the plant of a loop: what of its motors and camera is not as believed stands there."""
         wrist = {name: getattr(self.bench.plant, name) for name in TrueWrist.model_fields}
         camera = self.sensor.model_copy(update={n: getattr(self.bench.camera, n) for n in ("delay_frames", "dropped")})
-        motors = TrueActuator.between(self.actuator, self.bench.actuator)
+        as_flashed = {name: getattr(self.actuator, name) for name in _OF_THE_BOARD}  # on both rigs the same firmware
+        motors = TrueActuator.between(self.actuator, self.bench.actuator.model_copy(update=as_flashed))
         holding = {"torque": self.bench.motors.holding_torque, "top_speed": self.bench.motors.top_speed}
         return Plant(
             **wrist,

@@ -134,7 +134,10 @@ class TrueActuator(Overrides, TendonFacts):
     presliding: Positive = truth("m", "path in which friction turns round (tendon)")
     pulley_radius: Positive = truth("m", "radius of the pulley: motors report steps, not metres")
     step_rate: Positive = truth("1/s", "largest rate of microsteps")
-    step_acceleration: Positive = truth("1/s^2", "largest change of that rate (tendon)")
+    step_acceleration: Positive = truth("1/s^2", "largest change of that rate by the host (tendon)")
+    ramp: Positive = truth("1/s^2", "change of that rate by the board, within a tick (tendon)")
+    command_delay: NotNegative = truth("s", "from a tick until the board has read its step rates (tendon)")
+    update: Positive = truth("s", "between two changes of an axis' rate by the board (tendon)")
     torque: float | None = fact(
         None, "N m", "of a standing motor: pulled harder it falls back by four full steps; null: never (tendon)", gt=0
     )
@@ -255,7 +258,21 @@ class Actuator(Section):
     microstep: int = choice(16, "microsteps per full step", "assumed", gt=0)
     pulley_radius: float = quantity(7.5e-3, "m", "radius of the pulley", "assumed", gt=0)
     step_rate: float = quantity(20_000.0, "1/s", "largest rate of microsteps", "assumed", gt=0)
-    step_acceleration: float = quantity(50_000.0, "1/s^2", "largest change of that rate (tendon)", "assumed", gt=0)
+    step_acceleration: float = quantity(
+        50_000.0, "1/s^2", "largest change of that rate by the host (tendon)", "assumed", gt=0
+    )
+    ramp: float = quantity(
+        200_000.0, "1/s^2", "change of that rate by the board, within a tick (tendon)",
+        "0.012 N m for a rotor of 300 g cm^2", gt=0,
+    )  # fmt: skip
+    command_delay: float = quantity(
+        1.98e-3, "s", "from a tick until the board has read its step rates (tendon)",
+        "half a frame of USB, 26 bytes at 250 kBd, 0.44 ms of the firmware", ge=0, le=0.1,
+    )  # fmt: skip
+    update: float = quantity(
+        3e-3, "s", "between two changes of an axis' rate by the board (tendon)",
+        "firmware: 2 ms, up to 4 where it looks after one axis a millisecond", gt=0, le=0.1,
+    )  # fmt: skip
 
     @property
     def step_length(self) -> float:

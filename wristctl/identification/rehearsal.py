@@ -21,16 +21,18 @@ from wristctl.control.table import controller
 from wristctl.errors import UserError
 from wristctl.identification.forward import SupposedWrist, angles
 from wristctl.lanes.compiled import kernel
+from wristctl.lanes.lane import zero_like
 from wristctl.lanes.rows import lanes_like, part, rows_of
 from wristctl.simulation.actuator import (
     SIDES,
     Aim,
     Motor,
-    SpoolDrive,
     actuate,
     at_rest,
     counted_motor,
+    deliver,
     drive_in_lanes,
+    drive_of,
 )
 from wristctl.simulation.reference import motion, toward
 from wristctl.simulation.rollout import rollout
@@ -83,16 +85,19 @@ class RehearsedTruth:
 
 
 @kernel
-def _reel_in(drive: Any, motors: Any, belief: Any, commands: Any, out: Any, h: float) -> None:
+def _reel_in(drive: Any, motors: Any, belief: Any, winding: Any, commands: Any, out: Any, h: float) -> None:
     known, motor, on_spools = belief_in_lanes(belief), rows_of(motors), drive_in_lanes(drive)
+    as_counted, zero = rows_of(winding), zero_like(motor[0])
     for tick in range(commands.shape[0]):
         command, reeled = rows_of(commands[tick]), part(rows_of(out[tick]), 0, (0, 0))
-        aim = Aim(part(command, 2, (0,)), part(command, 3, (0,)), lanes_like(reeled))
-        actuate(on_spools, motor, known, aim, part(command, 0, (0, 0)), h, reeled)
+        counts, bend = lanes_like(reeled), part(command, 2, (0,))
+        aim = Aim(bend, part(command, 3, (0,)), lanes_like(reeled))
+        actuate(on_spools, motor, known, aim, part(command, 0, (0, 0)), h, counts)
+        deliver(on_spools, (motor, as_counted, counts, bend, h), 0.5 * h + zero, (reeled, lanes_like(reeled)))
 
 
 def spools(wrist: WristParameters, reference: Reference, actuator: Actuator, horizon: float, motor: Motor) -> Array:
-    """Length reeled in by both sides' spools (T, 2) [m] every millisecond, as their host counts.
+    """Length reeled in by both sides' spools (T, 2) [m] in the middle of every millisecond, as their host counts.
 
     Feedforward follows a reference; it believes in `actuator`, and the motors turn as `motor` does.
     """
@@ -102,9 +107,10 @@ def spools(wrist: WristParameters, reference: Reference, actuator: Actuator, hor
     sides = [2.0 * rolled.column(name, 0) for name in ("tension_plus", "tension_minus")]
     commands = np.stack([*sides, followed.theta_ref, followed.rate_ref], axis=1)
     alike, out = np.array(SIDES), np.empty((len(commands), 2))
-    drive = SpoolDrive(np.array(motor), alike * motor.stiffness)
+    drive = drive_of(actuator, alike, _PERIOD, motor)
     begin = at_rest(drive, alike * wrist.pretension, wrist.length, PCC.taut(wrist, np.zeros(1)))
-    _reel_in(drive, begin, Sides(segments(wrist, 1)[None], alike), commands, out, _PERIOD)
+    belief, as_counted = Sides(segments(wrist, 1)[None], alike), np.array([1.0, 0.0, 0.0])
+    _reel_in(drive, begin, belief, as_counted, commands, out, _PERIOD)
     return out
 
 

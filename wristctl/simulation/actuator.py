@@ -4,16 +4,18 @@ lagged: T' = (command - T)/lag, no faster than the motor can stretch the tendon,
 tendon: a stepper reels tendon in; what its elastic tendons then pull is `wristctl.wrist.tendon_mechanics`'s.
 The spool's target is command/k + the shortening at theta_ref: at the measured angle, delayed, it would feed back
 positively with a gain near 1. A spool moves at the speed of the reference's shortening, and closes its gap on top.
-It turns evenly over a control period; what is held over the period is where it is in the middle.
+Its rates take effect when the board has them, and ramp (`wristctl.simulation.spool_timing`).
 
 A host sends steps and believes what they are: it counts in lengths and pulls of its own belief, and what the motors
 deliver for that count is the world's (`Winding`).
 
 There is a motor for each of T places of tendons; in one plane these are the + and the - side. The state of the motors
 has two rows for each, its count, a pull or a reeled length, and its speed; a row for the torque [N m] that all of them
-withhold in each of P planes follows, and one for what each plane missed of its last torque.
+withhold in each of P planes follows, and one for what each plane missed of its last torque. A spool's count and speed
+are those of when a rate took effect in the last tick; the rates that its host has sent, the newest first, come last.
 """
 
+import math
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -25,7 +27,17 @@ from wristctl.lanes.compiled import by_type, compiled, implements
 from wristctl.lanes.functions import clip, maximum
 from wristctl.lanes.lane import floor, rounded, sqrt, where, zero_like
 from wristctl.lanes.named_tuples import tuple_of
-from wristctl.lanes.rows import rows_of
+from wristctl.lanes.rows import part, rows_of
+from wristctl.simulation.spool_timing import (
+    Timing,
+    foreseen,
+    reached,
+    reckoned,
+    remember,
+    remembered_rates,
+    spool_at,
+    timing_of,
+)
 from wristctl.wrist.tendons import TENDONS_PER_SIDE
 
 # Length of tendon [m] that is none, however fine the microsteps.
@@ -35,13 +47,16 @@ SIDES = (float(TENDONS_PER_SIDE), float(TENDONS_PER_SIDE))
 
 
 class Motor(NamedTuple):
-    """A motor, SI units; `stiffness` is that of one tendon."""
+    """A motor, SI units; `stiffness` is that of one tendon, what comes last is the `Timing` of its board."""
 
     lag: Any
     stiffness: Any
     step: Any
     speed: Any
     acceleration: Any
+    ramp: Any
+    delay: Any
+    update: Any
 
 
 class IdealDrive(NamedTuple):
@@ -56,16 +71,22 @@ class LaggedDrive(NamedTuple):
 
 
 class SpoolDrive(NamedTuple):
-    """Motors that reel elastic tendons onto spools; `stiffness` (T,) is that of all tendons of each place [N/m]."""
+    """Motors that reel elastic tendons onto spools; `stiffness` (T,) is that of all tendons of each place [N/m].
+
+    `believed` is the Timing that their host reckons with; `rates` is a tuple with an entry, whose value means nothing,
+    for each rate of a spool that is remembered.
+    """
 
     motor: Any
     stiffness: Any
+    believed: Any
+    rates: Any
 
 
 Drive = IdealDrive | LaggedDrive | SpoolDrive
 
-# A Motor of lanes from rows of lanes, in compiled code.
-read_motor = tuple_of(Motor)
+# A Motor and a Timing of lanes from rows of lanes, in compiled code.
+read_motor, read_timing = tuple_of(Motor), tuple_of(Timing)
 
 
 class Winding(NamedTuple):
@@ -84,21 +105,33 @@ def motor_of(actuator: Actuator) -> Motor:
         step=step,
         speed=step * actuator.step_rate,
         acceleration=step * actuator.step_acceleration,
+        **timing_of(actuator, step)._asdict(),
     )
 
 
-def drive_with(level: str, motor: Any, stiffness: Any) -> Drive:
-    """The drive of a level with this Motor and places of this stiffness, or with the rows of a batch; an ideal drive
-    has none."""
+def drive_with(level: str, motor: Any, stiffness: Any, believed: Any, rates: int) -> Drive:
+    """The drive of a level with this Motor, places of this stiffness, believed Timing and so many rates that spools
+    remember, or with the rows of a batch; an ideal drive has none."""
     if level == "ideal":
         return IdealDrive()
-    return LaggedDrive(motor, stiffness) if level == "lagged" else SpoolDrive(motor, stiffness)
+    return LaggedDrive(motor, stiffness) if level == "lagged" else SpoolDrive(motor, stiffness, believed, (0,) * rates)
 
 
-def drive_of(actuator: Actuator, alike: Array | tuple[float, ...] = SIDES) -> Drive:
-    """The drive of an actuator section, as arrays, with so many tendons at each place (T,)."""
-    motor = motor_of(actuator)
-    return drive_with(actuator.level, np.array(motor), motor.stiffness * np.asarray(alike))
+def drive_of(
+    actuator: Actuator, alike: Array | tuple[float, ...] = SIDES, period: float = math.inf, motor: Motor | None = None
+) -> Drive:
+    """The drive of an actuator section, as arrays, with so many tendons at each place (T,).
+
+    Parameters
+    ----------
+    actuator : as its host believes
+    alike : tendons at each place (T,)
+    period : of control [s], where rates are sent
+    motor : as it is; None: as believed
+    """
+    motor, believed = motor or motor_of(actuator), timing_of(actuator, actuator.step_length)
+    rates = remembered_rates(max(motor.delay, believed.delay), period)
+    return drive_with(actuator.level, np.array(motor), motor.stiffness * np.asarray(alike), np.array(believed), rates)
 
 
 @by_type
@@ -119,14 +152,15 @@ def _lagged_in_lanes(drive: Any) -> Any:
 
 @implements(drive_in_lanes, SpoolDrive)
 def _spools_in_lanes(drive: Any) -> Any:
-    return SpoolDrive(read_motor(rows_of(drive.motor)), rows_of(drive.stiffness))
+    believed = read_timing(rows_of(drive.believed))
+    return SpoolDrive(read_motor(rows_of(drive.motor)), rows_of(drive.stiffness), believed, drive.rates)
 
 
 def counted_motor(believed: Actuator, actual: Actuator) -> Motor:
     """The motor as its host counts: lengths and pulls are what it believes, only how fast it is, it is in truth."""
     step = believed.step_length
     limits = {"lag": actual.lag, "speed": step * actual.step_rate, "acceleration": step * actual.step_acceleration}
-    return motor_of(believed)._replace(**limits)
+    return motor_of(believed)._replace(**limits, **timing_of(actual, step)._asdict())
 
 
 def winding_of(believed: Actuator, actual: Actuator, pull: float, creep: float = 0.0) -> Winding:
@@ -142,12 +176,13 @@ def winding_of(believed: Actuator, actual: Actuator, pull: float, creep: float =
 
 
 def at_rest(drive: Drive, pulls: Array, straight: float, taut: Array, scale: float = 1.0, planes: int = 1) -> Array:
-    """State of the motors at rest at these pulls (T,) [N], none of which withholds anything, (2 T + 2 P,).
+    """State of the motors at rest at these pulls (T,) [N], none of which withholds anything.
 
     Tendons that are just taut are `taut` (T,) long on the wrist as it stands, and `straight` on the straight one [m];
     `drive` is as the host counts, `scale` that of the winding.
     """
-    state = np.zeros(2 * len(pulls) + 2 * planes)
+    rates = len(drive.rates) if isinstance(drive, SpoolDrive) else 0
+    state = np.zeros((2 + rates) * len(pulls) + 2 * planes)
     counts = state[: 2 * len(pulls) : 2]
     counts[:] = pulls
     if isinstance(drive, SpoolDrive):
@@ -189,21 +224,26 @@ def left_behind(acceleration: Any, gap: Any, closing: Any, h: float) -> Any:
 
 
 @compiled
-def reel_in(motor: Any, stiffness: Any, state: Any, t: int, target: Any, moving: Any, h: float) -> Any:
-    """Move the stepper of a place towards its moving target with bounded speed and acceleration, evenly over a period.
+def _rates_of(drive: Any, state: Any, places: int, planes: int, t: int) -> Any:
+    """Rates that the host has sent to the spool of a place, the newest first."""
+    return part(state, 2 * (places + planes) + len(drive.rates) * t, drive.rates)
 
-    Returns the length on its spool in the middle of the period, in whole microsteps, and its withheld pull: of the
-    length from where it can stop to its target, where that is more than a microstep.
+
+@compiled
+def reel_in(drive: Any, state: Any, rates: Any, t: int, target: Any, moving: Any, h: float) -> Any:
+    """Send a rate, of bounded speed and acceleration, that leads the spool of a place to its moving target.
+
+    Returns the place where its host believes it to be in the middle of the period, and its withheld pull: of the length
+    from where it can stop to its target, where that is more than a microstep.
     """
-    gap = target - state[2 * t]
-    speed = spool_speed(motor.speed, motor.acceleration, gap, moving, state[2 * t + 1], h)
-    closing = speed - moving
-    state[2 * t + 1] = speed
-    state[2 * t] = state[2 * t] + h * speed
-    behind = left_behind(motor.acceleration, gap, closing, h)
-    withheld = where(abs(behind) > motor.step + _ROUNDING, stiffness * behind, 0.0)
-    middle = state[2 * t] - rounded(0.5 * rounded(h * speed))
-    return motor.step * floor(middle / motor.step + 0.5), withheld
+    motor, believed = drive.motor, drive.believed
+    state[2 * t], state[2 * t + 1] = reached(motor, state[2 * t], state[2 * t + 1], rates, h)
+    gap = target + rounded(moving * believed.delay) - foreseen(believed, state[2 * t], rates, h)
+    speed = spool_speed(motor.speed, motor.acceleration, gap, moving, rates[0], h)
+    remember(rates, speed)
+    behind = left_behind(motor.acceleration, gap, speed - moving, h)
+    withheld = where(abs(behind) > motor.step + _ROUNDING, drive.stiffness[t] * behind, 0.0)
+    return reckoned(believed, state[2 * t], rates, 0.5 * h + zero_like(gap), h), withheld
 
 
 @compiled
@@ -223,8 +263,8 @@ class Aim(NamedTuple):
 
 @by_type
 def actuate(drive: Any, state: Any, known: Any, aim: Any, pulls: Any, h: float, counts: Any) -> None:
-    """Write the host's counts (T rows) over a period of commanded pulls [N]: pulls, or lengths on spools in its middle
-    [m].
+    """Write the host's counts (T rows) over a period of commanded pulls [N]: pulls, or where it believes spools to be
+    in its middle [m].
 
     `known` is the Belief; at a rate of 0 in `aim` spools only close their gap. The rows of the state that are for it
     become the torque [N m] that the motors withhold, by this belief: what of the command their speed and acceleration
@@ -275,29 +315,47 @@ def _reeled(drive: Any, state: Any, known: Any, aim: Any, pulls: Any, h: float, 
         for p in range(1, len(aim.bend)):
             moving = moving + rounded(aim.arms[count * p + t] * aim.rate[p])
         target = spool_target(pulls[t], drive.stiffness[t], straight_at(known.wrist, t), counts[t])
-        counts[t], less = reel_in(drive.motor, drive.stiffness[t], state, t, target, moving, h)
+        rates = _rates_of(drive, state, count, len(aim.bend), t)
+        counts[t], less = reel_in(drive, state, rates, t, target, moving, h)
         _withhold(state, pulls, aim, t, less)
 
 
 @by_type
-def deliver(drive: Any, winding: Any, counts: Any, delivered: Any) -> None:
-    """Write the pulls [N] or lengths [m] that the motors deliver for what their host counts (T rows each).
+def deliver(drive: Any, told: Any, time: Any, motion: Any) -> None:
+    """Write the pulls [N], or the lengths on spools in whole microsteps [m], that the motors deliver at a time in the
+    tick [s], and the speeds of spools [m/s]: `motion`, T rows each.
 
-    `winding` has the scale of the counts, then the offset of each place [m].
+    `told` are the state of the motors, the winding (the scale of counts, then the offset of each place [m]), the host's
+    counts (T rows), rows as long as those of bends, and the tick [s].
     """
     raise NotImplementedError("compiled code only")
 
 
 @implements(deliver, IdealDrive)
-def _as_counted(drive: Any, winding: Any, counts: Any, delivered: Any) -> None:
+def _as_counted(drive: Any, told: Any, time: Any, motion: Any) -> None:
+    _, _, counts, _, _ = told
+    delivered, _ = motion
     for t in range(len(counts)):
         delivered[t] = counts[t]
 
 
-@implements(deliver, LaggedDrive, SpoolDrive)
-def _scaled(drive: Any, winding: Any, counts: Any, delivered: Any) -> None:
+@implements(deliver, LaggedDrive)
+def _scaled(drive: Any, told: Any, time: Any, motion: Any) -> None:
+    _, winding, counts, _, _ = told
+    delivered, _ = motion
     for t in range(len(counts)):
         delivered[t] = winding[0] * counts[t] + winding[1 + t]
+
+
+@implements(deliver, SpoolDrive)
+def _wound(drive: Any, told: Any, time: Any, motion: Any) -> None:
+    state, winding, counts, bend, h = told
+    delivered, speeds = motion
+    for t in range(len(counts)):
+        rates = _rates_of(drive, state, len(counts), len(bend), t)
+        place, rate = spool_at(drive.motor, state[2 * t], state[2 * t + 1], rates, time, h)
+        delivered[t] = winding[0] * (drive.motor.step * floor(place / drive.motor.step + 0.5)) + winding[1 + t]
+        speeds[t] = winding[0] * rate
 
 
 @by_type

@@ -25,6 +25,7 @@ from wristctl.simulation.disturbances import acting_in_space
 from wristctl.simulation.kernel import Disturbed, LoopCourse, LoopState, LoopValues, Scratch, Setup, Undisturbed
 from wristctl.simulation.motion import DERIVATIVES, Motion
 from wristctl.simulation.nonideal import faults_of, inner_of, is_ideal, nonideal_of, unmoved
+from wristctl.simulation.spool_timing import remembered_rates, timing_of
 from wristctl.simulation.sums import no_sums
 from wristctl.simulation.worlds import World, bending_limit, check_stops
 from wristctl.wrist.dahl import NoInnerFriction
@@ -149,10 +150,22 @@ class _Worlds:
             return np.append(wrist.length - model.taut(wrist, at), np.abs(at).sum())
         return path_at(model, model.values(wrist, self.loop.plant_segments), at, places)
 
+    def timing(self, index: int) -> Array:
+        """Timing of the motors' board as believed."""
+        believed = self.worlds[index].loop.actuator
+        return np.array(timing_of(believed, believed.step_length))
+
+    @property
+    def rates(self) -> int:
+        """Rates that each spool remembers."""
+        believed = [timing_of(world.loop.actuator).delay for world in self.worlds]
+        delays = [*believed, *(motor.delay for motor in self.counted)]
+        return remembered_rates(max(delays), self.period)
+
     def motors(self, index: int, travel: Array) -> Array:
         """State of the motors at rest where the tendons' paths are so much shorter than on the straight wrist (T,)."""
         wrist = self.actual[index]
-        drive = drive_with(self.level, self.counted[index], self.stiffness(index))
+        drive = drive_with(self.level, self.counted[index], self.stiffness(index), self.timing(index), self.rates)
         pulls = self.least(index) if self.worlds[index].loop.stiffness else self.alike * wrist.pretension
         planes = 1 if self.layout is None else 2
         return at_rest(drive, pulls, wrist.length, wrist.length - travel, self.windings[index].scale, planes)
@@ -201,7 +214,13 @@ def batch(
         plant=of.rows(lambda index: model.values(of.actual[index], loop.plant_segments)),
         belief=belief,
         limits=of.rows(of.limits),
-        drive=drive_with(of.level, of.rows(lambda index: np.array(of.counted[index])), of.rows(of.stiffness)),
+        drive=drive_with(
+            of.level,
+            of.rows(lambda index: np.array(of.counted[index])),
+            of.rows(of.stiffness),
+            of.rows(of.timing),
+            of.rates,
+        ),
         lead=of.rows(lambda index: np.array([float(of.worlds[index].loop.spool_lead)])),
         winding=of.rows(of.offsets),
         gains=spread(gains.reshape(count, -1), count),

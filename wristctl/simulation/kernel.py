@@ -14,7 +14,7 @@ from wristctl.lanes.functions import norm
 from wristctl.lanes.lane import where, zero_like
 from wristctl.lanes.named_tuples import block_of, borrowed
 from wristctl.lanes.rows import lanes_like, part, rows_of
-from wristctl.simulation.actuator import Aim, actuate, deliver, drive_in_lanes
+from wristctl.simulation.actuator import Aim, IdealDrive, LaggedDrive, SpoolDrive, actuate, deliver, drive_in_lanes
 from wristctl.simulation.nonideal import spools_after_slip
 from wristctl.simulation.observer import Knowing, go_on, sense
 from wristctl.simulation.sums import SUMS, gather, watch_range
@@ -225,9 +225,8 @@ def _run_block(setup: Any, course: Any, world: Any, state: Any, scratch: Any, fi
                 wish_rate[p] = lead * view.rate_ref
             actuate(drive, motor, known, aim, pulls, period, counts)
             time, path = now_tick * period + zero, path_before(tendons, plant, q)
-            deliver(drive, winding, counts, delivered)
-            for t in range(count):
-                speeds[t] = winding[0] * motor[2 * t + 1]
+            told = motor, winding, counts, bend, period
+            deliver(drive, told, zero, (delivered, speeds))
             spools_after_slip(tendons, delivered, speeds, time, path, held)
             acting_pulls(tendons, held, path, acts)
             watch_range(sum_, time, bend, bound[2 * count])
@@ -247,9 +246,31 @@ def _run_block(setup: Any, course: Any, world: Any, state: Any, scratch: Any, fi
                         pulls[t] = pulls[t] * of_one[t]
                     _record(row, (pulls, acts, delivered), rows, share, q)
             go_on(state.watch, knowing, now_tick, counts, period)
-            for _ in range(setup.substeps):
+            for step in range(setup.substeps):
+                _onward(drive, told, (time, step * h, h), (delivered, speeds, held), tendons, plant, q)
                 sum_[_ALIVE], error = advance_or_stop(plant, q, rates, held, tendons, h, sum_[_ALIVE])
                 sum_[_STEP_ERROR] = sum_[_STEP_ERROR] + error
+
+
+@by_type
+def _onward(drive: Any, told: Any, step: Any, spools: Any, tendons: Any, plant: Any, q: Any) -> None:
+    """Write what drives the tendons over a step into the last of `spools` (delivered, speeds, held).
+
+    `step` is the tick's time, by how much later the step begins, and how long it is [s].
+    """
+    raise NotImplementedError("compiled code only")
+
+
+@implements(_onward, IdealDrive, LaggedDrive)
+def _stays(drive: Any, told: Any, step: Any, spools: Any, tendons: Any, plant: Any, q: Any) -> None:
+    pass
+
+
+@implements(_onward, SpoolDrive)
+def _turns_on(drive: Any, told: Any, step: Any, spools: Any, tendons: Any, plant: Any, q: Any) -> None:
+    (tick, since, h), (delivered, speeds, held) = step, spools
+    deliver(drive, told, since + 0.5 * h, (delivered, speeds))
+    spools_after_slip(tendons, delivered, speeds, tick + since, path_before(tendons, plant, q), held)
 
 
 @compiled

@@ -36,8 +36,8 @@ COLUMNS: dict[str, tuple[str, str]] = {
     "tension_minus": ("N", "commanded tension of each tendon of the - side"),
     "acting_plus": ("N", "tension of the + side as it acts on the wrist: late and in steps behind real motors"),
     "acting_minus": ("N", "tension of the - side as it acts on the wrist"),
-    "spool_plus": ("m", "length that each spool of the + side has reeled in until the next control period"),
-    "spool_minus": ("m", "length that each spool of the - side has reeled in until the next control period"),
+    "spool_plus": ("m", "length that each spool of the + side has reeled in, in whole microsteps"),
+    "spool_minus": ("m", "length that each spool of the - side has reeled in, in whole microsteps"),
 }
 
 
@@ -58,7 +58,7 @@ _AXES = {"x": "along the base tangent", "y": "toward ulnar", "z": "toward flexio
 _OF_A_TENDON = {
     "pull": ("N", "commanded pull of one tendon at this place"),
     "acting": ("N", "pull of one tendon at this place as it acts on the wrist: late and in steps behind real motors"),
-    "spool": ("m", "length that each spool of this place has reeled in until the next control period"),
+    "spool": ("m", "length that each spool of this place has reeled in, in whole microsteps"),
 }
 
 

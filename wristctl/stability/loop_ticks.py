@@ -29,8 +29,8 @@ from wristctl.wrist.spatial.spooled_tendons import PulledPlaces, RealPlaces
 from wristctl.wrist.tendon_layout import TendonLayout
 from wristctl.wrist.tendon_mechanics import CREPT, OF_A_TENDON, WRAPPED, PulledTendons, RealTendons, X, Z
 
-# Typical sizes [rad, rad/s, N, m], by which small changes are measured.
-_ANGLE, _RATE, _PULL, _LENGTH = 1.0, 10.0, 10.0, 1e-3
+# Typical sizes [rad, rad/s, N, m, m/s], by which small changes are measured.
+_ANGLE, _RATE, _PULL, _LENGTH, _SPEED = 1.0, 10.0, 10.0, 1e-3, 1e-2
 
 
 class StatePart(NamedTuple):
@@ -63,6 +63,10 @@ def state_parts(batch: Batch, memory: int, tick: int, back: Remembered) -> Itera
     size = _LENGTH if isinstance(drive, SpoolDrive) else _PULL
     if not isinstance(drive, IdealDrive):
         yield StatePart("motor", state.motors, np.arange(0, 2 * places, 2), np.full(places, size))
+    if isinstance(drive, SpoolDrive):
+        sent = np.arange(2 * (places + planes), (2 + len(drive.rates)) * places + 2 * planes)
+        rates = np.concatenate([np.arange(1, 2 * places, 2), sent])
+        yield StatePart("motor rate", state.motors, rates, np.full(len(rates), _SPEED))
     if isinstance(state.tendons, (RealTendons, RealPlaces)):
         rows, per_tendon = state.tendons.state, len(OF_A_TENDON)
         first = per_tendon * np.arange(places)

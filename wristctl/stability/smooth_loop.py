@@ -20,12 +20,13 @@ _LONGEST_CYCLE = 40
 def smooth(loop: Loop, friction: FrictionReading) -> Loop:
     """The loop as it is to small signals about rest: no steps, limits, noise, play or passing disturbances.
 
-    Motors are as fast as they have to be; a load that stays, creep, and what the world is that the controller does not
-    believe, remain. `slipping` tendons have no friction (Coulomb's has no slope while it slides); `stuck` ones turn
-    their bristles. A frame rate that never repeats on the grid of ticks becomes the nearest one that does.
+    Motors are as fast as they have to be once a rate takes effect; a load that stays, creep, and what the world is that
+    the controller does not believe, remain. `slipping` tendons have no friction (Coulomb's has no slope while it
+    slides); `stuck` ones turn their bristles. A frame rate that never repeats on the grid of ticks becomes the nearest
+    one that does.
     """
     actuator = _steady(loop.actuator)
-    facts = {"step_rate": None, "step_acceleration": None, "backlash": 0.0}
+    facts = {"step_rate": None, "step_acceleration": None, "ramp": None, "backlash": 0.0}
     events = {"broken_at": None, "slips_at": None, "torque": None}
     if friction == "slipping":
         actuator, facts = actuator.model_copy(update={"friction": 0.0}), facts | {"friction": None}
@@ -63,6 +64,7 @@ def _steady(actuator: Actuator) -> Actuator:
         "microstep": actuator.microstep * _FINER,
         "step_rate": actuator.step_rate * _FINER * _FASTER,
         "step_acceleration": actuator.step_acceleration * _FINER * _FASTER,
+        "ramp": actuator.ramp * _FINER * _FASTER,
     }
     return actuator.model_copy(update=changes)
 

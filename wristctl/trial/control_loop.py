@@ -13,13 +13,13 @@ import numpy as np
 from wristctl.arrays import Array
 from wristctl.board.driver import Board
 from wristctl.board.messages import AXES, Fault, Flag
-from wristctl.board.transport import underway
 from wristctl.config.hw_run import HwRunSettings
 from wristctl.config.wrist import WristParameters
 from wristctl.control.law import Controller
 from wristctl.control.response import Estimate
 from wristctl.errors import UserError
 from wristctl.simulation.motion import Motion
+from wristctl.simulation.spool_timing import remembered_rates
 from wristctl.trial.bend_motion import BendMotion
 from wristctl.trial.bending import bending_of
 from wristctl.trial.log import TrialLog, of_axes
@@ -36,9 +36,9 @@ from wristctl.trial.watch import Tick, Watch
 # Takes each tick's row of the log, to show it.
 Shown = Callable[[dict[str, Any]], None]
 
-# Bytes of a RATE; seconds from the last of them until the board's positions are read, and by how much longer that
-# takes for each step/s of all axes together, whose interrupts come first: by the firmware's cycles.
-_RATE_BYTES, _OBEYED, _BUSY = 26, 0.44e-3, 6.6e-9
+# By how much longer it takes the board to read a RATE for each step/s of all axes together, whose interrupts come
+# first: by the firmware's cycles [s].
+_BUSY = 6.6e-9
 
 # Seconds within which motors at any speed have ramped down.
 _COMING_TO_REST = 0.5
@@ -78,7 +78,10 @@ class ControlLoop:
         timing.camera.expect(settings.planes)
         self._epoch = self._clock.now()
         self._last_usable = [self._epoch] * settings.planes
-        self._underway = min(underway(_RATE_BYTES, settings.baud) + _OBEYED, 0.5 * self._period)
+        self._underway = settings.actuator.command_delay
+        delay = self._spools.timing.delay
+        self._late, self._rates = int(delay // self._period), np.zeros((AXES, remembered_rates(delay, self._period)))
+        self._place = self._reeled()
         self._skipped = 0
         self._counted = self._epoch
 
@@ -202,8 +205,9 @@ class ControlLoop:
         """Send the step rates that lead to these tensions at a sample of the course; the targets [steps]."""
         taut, speed = self._bending.aim(sample)
         target, moving = self._spools.target(tension, taut), speed / self._spools.step
-        # the command acts once the board has read it; by then the one before has moved the spools for a whole period
-        gap = target + moving * self._underway - (position + self._sent * self._period)
+        # the command acts once an axis takes it up; by then the ones before have moved the spools
+        foreseen = self._spools.foreseen(self._place, self._rates, self._period)
+        gap = target + moving * self._spools.timing.delay - foreseen
         self._send(self._signs * self._spools.rate(gap, moving, self._sent, self._period))
         behind = self._spools.behind(gap, moving, self._sent, self._period)
         self._bending.withhold(sample, self._spools.tension(behind, np.zeros(AXES)))
@@ -214,16 +218,32 @@ class ControlLoop:
         began, busy = self._clock.now(), _BUSY * float(np.abs(self._sent).sum())
         sent, self._status = self._board.turn(rates.tolist(), self._life)
         self._sent = self._signs * np.array(sent)
+        self._remember()
         self._counted = began + self._underway + busy
 
     def _go_on(self) -> None:
         """To the next tick that is not over yet, with what the spools hold in the middle of this one."""
-        middle = self._reeled() + self._sent * (0.5 * self._period - self._underway)
-        reeled = self._bending.spools(self._spools.step * middle)
         self._skipped = max(0, int((self._clock.now() - self.next_tick - self._period) / self._period))
-        for _ in range(1 + self._skipped):
+        for skipped in range(1 + self._skipped):
+            if skipped > 0:
+                self._place = self._place + self._period * self._in_force
+                self._remember()
+            middle = self._spools.reckoned(self._place, self._rates, 0.5 * self._period, self._period)
+            reeled = self._bending.spools(self._spools.step * middle)
             self._steering.predict(*reeled)
             self.watch.predict(*reeled)
+        since_read = self._spools.timing.delay - self._late * self._period - self._underway
+        self._place = self._reeled() + self._in_force * since_read
+
+    @property
+    def _in_force(self) -> Array:
+        """Rates that those of this tick, or of one before, relieve in it."""
+        rates: Array = self._rates[:, self._late + 1]
+        return rates
+
+    def _remember(self) -> None:
+        """The rates that go on in this tick."""
+        self._rates = np.column_stack([self._sent, self._rates[:, :-1]])
 
     def _reeled(self) -> Array:
         """Steps that the spools have reeled in, by the last status."""

@@ -14,6 +14,7 @@ from wristctl.control.table import controller, gains_of
 from wristctl.errors import UserError, fix_of
 from wristctl.interrupt import undisturbed
 from wristctl.simulation.motion import Motion
+from wristctl.simulation.spool_timing import remembered_rates
 from wristctl.simulation.worlds import Draws
 from wristctl.trial.bend_motion import BendMotion
 from wristctl.trial.bending import bending_of
@@ -136,6 +137,9 @@ class Experiment:
         spools.target(still, taut)
         spools.rate(still, still, still, settings.control_period)
         spools.behind(still, still, still, settings.control_period)
+        rates = np.zeros((AXES, remembered_rates(spools.timing.delay, settings.control_period)))
+        spools.foreseen(still, rates, settings.control_period)
+        spools.reckoned(still, rates, 0.0, settings.control_period)
         bending.withhold(course[0], still)
         reeled = bending.spools(taut)
         Watch(settings, self._facing(plane), plane, self.timing).predict(*reeled)

@@ -100,7 +100,7 @@ def prepare(board: Board, settings: RigSettings, reach: float | None = None) -> 
     if board.read().state == State.FAULT:
         board.clear()
     furthest = round(limits.travel / spools.step)
-    ramps = Configure(limits.watchdog, int(limits.hold), round(settings.ramp))
+    ramps = Configure(limits.watchdog, int(limits.hold), round(settings.actuator.ramp))
     homing = settings.homing
     jog = round((homing.slack + homing.pull + 3.0 * homing.move if reach is None else reach) / spools.step)
     board.set_up(ramps, Limits((-furthest,) * 4, (furthest,) * 4, jog))

@@ -179,7 +179,11 @@ class RigStrokes:
         self._furthest, self._taut = furthest, min(_TAKEN_UP, 0.5 * furthest)
         self._board, self._tracking, self._axis = board, tracking, axis
         self._underway = underway(_STATUS_BYTES, settings.baud) + _READ
-        self._step, self._ramp, self._slack = settings.actuator.step_length, settings.ramp, settings.homing.slack
+        self._step, self._ramp, self._slack = (
+            settings.actuator.step_length,
+            settings.actuator.ramp,
+            settings.homing.slack,
+        )
         patient = settings.safety.model_copy(update={"watchdog": max(_SILENCE, settings.safety.watchdog)})
         prepare(board, settings.model_copy(update={"safety": patient}))
         board.home()

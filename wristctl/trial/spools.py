@@ -10,6 +10,7 @@ counted positive reeling in and zero where the tendon of the straight wrist is j
 delayed, `taut` would feed back positively with a gain near 1.
 """
 
+import math
 from dataclasses import dataclass
 from typing import Any
 
@@ -21,8 +22,9 @@ from wristctl.config.plant import Actuator
 from wristctl.config.wrist import WristParameters
 from wristctl.lanes.compiled import kernel
 from wristctl.lanes.lane import zero_like
-from wristctl.lanes.rows import rows_of
-from wristctl.simulation.actuator import left_behind, spool_speed, spool_target
+from wristctl.lanes.rows import part, rows_of
+from wristctl.simulation.actuator import left_behind, read_timing, spool_speed, spool_target
+from wristctl.simulation.spool_timing import Timing, foreseen, reckoned, timing_of
 from wristctl.wrist.directions import ACTIVE, tendons_of
 from wristctl.wrist.segments import load_segments, segments
 from wristctl.wrist.tendons import lengths, moment_arms
@@ -45,7 +47,9 @@ class Spools:
     speed: float
     """Largest step rate [1/s]."""
     acceleration: float
-    """Largest change of it [1/s^2]."""
+    """Largest change of it by the host [1/s^2]."""
+    timing: Timing
+    """Of the board, as believed; lengths in steps."""
 
     def torque(self, tension: Array) -> Array:
         """Torque at the pulley [N m] that these tensions [N] ask of the motors."""
@@ -79,6 +83,17 @@ class Spools:
         _behind(self.acceleration, gap, sent - moving, period, left)
         return np.where(np.abs(left) > 1.0, left, 0.0)
 
+    def foreseen(self, place: Array, rates: Array, period: float) -> Array:
+        """Positions (4,) [steps] when the rates that are to be sent in this tick take effect.
+
+        They were at `place` when rates took effect in the last tick, of which the newest of `rates` (4, n) [1/s] are.
+        """
+        return _where_spools_are(self.timing, place, rates, math.nan, period)
+
+    def reckoned(self, place: Array, rates: Array, time: float, period: float) -> Array:
+        """Positions (4,) [steps] at a time [s] in this tick, of which the newest of `rates` are."""
+        return _where_spools_are(self.timing, place, rates, time, period)
+
 
 def spools_of(actuator: Actuator) -> Spools:
     """The spools of an actuator section."""
@@ -88,6 +103,7 @@ def spools_of(actuator: Actuator) -> Spools:
         actuator.tendon_stiffness,
         actuator.step_rate,
         actuator.step_acceleration,
+        timing_of(actuator),
     )
 
 
@@ -135,6 +151,24 @@ def _behind(acceleration: float, gap: Any, closing: Any, period: float, left: An
     gaps, speeds, out = rows_of(gap), rows_of(closing), rows_of(left)
     for axis in range(len(gap)):
         out[axis] = left_behind(acceleration, gaps[axis], speeds[axis], period)
+
+
+def _where_spools_are(timing: Timing, place: Array, rates: Array, time: float, period: float) -> Array:
+    places: Array = np.empty(len(place))
+    _places(np.array(timing), place, np.ascontiguousarray(rates), (0,) * rates.shape[1], time, period, places)
+    return places
+
+
+@kernel
+def _places(timing: Any, place: Any, rates: Any, sent: Any, time: float, period: float, places: Any) -> None:
+    """Where spools are at a time in this tick [s]; nan: when what is sent in it takes effect."""
+    board, before, out = read_timing(rows_of(timing)), rows_of(place), rows_of(places)
+    for axis in range(len(place)):
+        own = part(rows_of(rates[axis]), 0, sent)
+        if math.isnan(time):
+            out[axis] = foreseen(board, before[axis], own, period)
+        else:
+            out[axis] = reckoned(board, before[axis], own, time + zero_like(before[axis]), period)
 
 
 @kernel

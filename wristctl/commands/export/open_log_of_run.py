@@ -110,30 +110,10 @@ def _simulated(run: Run) -> tuple[Columns, Mapping[str, np.ndarray]]:
     table, loop = read_table(run.file("data/trajectory.csv")), _study_of(run).simulate.loop
     for tendon, side in zip(tendons_of("ulnar"), ("plus", "plus", "minus", "minus"), strict=True):
         if f"spool_{side}" in table:
-            reeled = table[f"spool_{side}"].to_numpy(float)
-            columns[f"spool_{tendon}"] = _between(table.time, reeled, loop.control_period)
+            columns[f"spool_{tendon}"] = table[f"spool_{side}"].to_numpy(float)
             if _slides_freely(loop):
-                ahead = reeled - columns[f"spool_{tendon}"]
-                columns[f"tension_{tendon}"] = _slackened(table[f"acting_{side}"].to_numpy(float), ahead, loop)
+                columns[f"tension_{tendon}"] = table[f"acting_{side}"].to_numpy(float)
     return columns, {}
-
-
-def _between(time: pd.Series, reeled: Array, period: float) -> Array:
-    """Stand of a spool at each time, from lengths that it keeps for a control period from then on."""
-    clock = time.to_numpy(float)
-    stands: Array = np.interp(clock, clock + 0.5 * period, reeled)
-    return stands
-
-
-def _slackened(pull: Array, ahead: Array, loop: Loop) -> Array:
-    """Pulls of a tendon whose spool stands where `_between` has it, from those with its spool so far ahead [m].
-
-    A step begins with the jump of the spool, so that pulls at its begin lead the motion by half a period: a log of
-    them would tell more damping than there is.
-    """
-    stiffness = loop.plant.actuator.of(loop.actuator).tendon_stiffness
-    slackened: Array = np.where(pull > 0.0, np.maximum(0.0, pull - stiffness * ahead), 0.0)
-    return slackened
 
 
 def _study_of(run: Run) -> Study:
@@ -178,13 +158,10 @@ def _bends(run: Run) -> tuple[Columns, Mapping[str, np.ndarray]]:
     for column, (number, place) in enumerate(zip(square, places, strict=True), 1):
         if place.radius == 0.0:
             continue
-        pull, ahead = table[f"acting_{column}"].to_numpy(float) / place.multiplicity, np.zeros(len(table))
         if f"spool_{column}" in table:
-            reeled = table[f"spool_{column}"].to_numpy(float)
-            columns[f"spool_{number}"] = _between(table.time, reeled, loop.control_period)
-            ahead = reeled - columns[f"spool_{number}"]
+            columns[f"spool_{number}"] = table[f"spool_{column}"].to_numpy(float)
         if _slides_freely(loop):
-            columns[f"tension_{number}"] = _slackened(pull, ahead, loop)
+            columns[f"tension_{number}"] = table[f"acting_{column}"].to_numpy(float) / place.multiplicity
     return columns, {}
 
 
