@@ -147,5 +147,5 @@ CLF_QP = Controller(
         "hardware": "behind a 60 Hz camera, steppers and tendons of 8 to 100 kN/m: tuned on worlds of that rig, in few "
         "digits"
     },
-    conditions={"default": Conditions((5e-3, 1e-2), (8e3, 1e5)), "hardware": Conditions((5e-3, 1e-2), (8e3, 1e5))},
+    conditions={"default": Conditions((5e-3, 1e-2), (2e4, 1e5)), "hardware": Conditions((5e-3, 1e-2), (2e4, 1e5))},
 )

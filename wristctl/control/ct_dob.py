@@ -38,5 +38,5 @@ CT_DOB = Controller(
     },
     memory=VALUES,
     notes={"hardware": BY_TRIAL},
-    conditions={"default": Conditions((5e-3, 1e-2), (8e3, 1e5)), "hardware": Conditions((5e-3, 1e-2), (8e3, 1e5))},
+    conditions={"default": Conditions((5e-3, 1e-2), (2e4, 1e5)), "hardware": Conditions((5e-3, 1e-2), (8e3, 1e5))},
 )

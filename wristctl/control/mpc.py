@@ -117,5 +117,5 @@ MPC = Controller(
     memory=VALUES + 2 * HORIZON,
     preview=HORIZON,
     notes={"hardware": BY_TRIAL},
-    conditions={"default": Conditions((5e-3, 1e-2), (8e3, 1e5)), "hardware": Conditions((5e-3, 1e-2), (8e3, 1e5))},
+    conditions={"default": Conditions((5e-3, 1e-2), (8e3, 1e5)), "hardware": Conditions((5e-3, 1e-2), (2e4, 1e5))},
 )

@@ -77,5 +77,5 @@ NC = Controller(
         "default": "our design; chosen by trial on the four-segment plant at 1 kHz",
         "hardware": "behind a 60 Hz camera, steppers and tendons of 8 to 40 kN/m: by docs/preset_search.py",
     },
-    conditions={"default": Conditions((5e-3, 1e-2), (2e4, 1e5)), "hardware": Conditions((1e-3, 1e-2), (8e3, 1e5))},
+    conditions={"default": Conditions((5e-3, 1e-2), (4e4, 1e5)), "hardware": Conditions((1e-3, 1e-2), (2e4, 1e5))},
 )

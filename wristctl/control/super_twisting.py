@@ -51,6 +51,6 @@ SUPER_TWISTING = Controller(
         "default": "chosen by trial on the four-segment plant at 1 kHz",
         "hardware": "behind a 60 Hz camera, steppers and tendons of 8 to 40 kN/m: by docs/preset_search.py",
     },
-    conditions={"hardware": Conditions((5e-3, 1e-2), (8e3, 1e5))},
+    conditions={"hardware": Conditions((5e-3, 1e-2), (2e4, 1e5))},
     surface=Surface(lambda gains: (gains["lambda"], 1.0, 0.0), lambda gains: 0.25 * (gains["k1"] * gains["tau"]) ** 2),
 )
