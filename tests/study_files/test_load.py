@@ -125,8 +125,8 @@ def test_errors_in_overrides_name_the_override(override: str, said: str) -> None
 @pytest.mark.parametrize(
     ("override", "fix"),
     [
-        ("simulate.controller=ct-dobb", "did you mean 'ct-dob'? All: adrc, computed-torque, ct-dob, "),
-        ("simulate.controller=zzz", "one of adrc, computed-torque, "),
+        ("simulate.controller=ct-dobb", "did you mean 'ct-dob'? All: adrc, clf-qp, computed-torque, ct-dob, "),
+        ("simulate.controller=zzz", "one of adrc, clf-qp, computed-torque, "),
         ("wrist.tendons=6", "one of five, four, six, three"),
         ("simulate.loop.planes=3", "one of 1, 2"),
     ],
