@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
@@ -111,6 +112,14 @@ def test_residuals_far_above_the_frames_own_noise_are_refused_whatever_is_behind
         UserError, match=r"toward ulnar the model is off by 0\.082 deg, frames by 0\.057 deg.*none of the"
     ):
         refuse_misfit(fitted, known, suspected, [fits, fails])
+
+
+def test_a_model_that_is_off_by_less_than_any_reading_is_not_refused() -> None:
+    """Of a simulated log without noise the integration step is left over, smooth from sample to sample."""
+    step, camera = (math.radians(1e-3 * factor) for factor in (0.01, 2.0))
+    assert Misfit("ulnar", 9000, step, 0.4 * step).ratio < 0.001
+    assert Misfit("ulnar", 9000, 3.0 * camera, camera).ratio == pytest.approx(9.0)
+    assert Misfit("ulnar", 9000, 2.0 * camera, 0.0).ratio > 2.0
 
 
 def test_chi_square_is_of_each_direction_by_itself(sound: Found) -> None:

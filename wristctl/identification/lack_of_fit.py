@@ -6,6 +6,7 @@ Soc. 44 (1948) 50) with the covariance of `intervals`, so that residuals that ar
 matters to a user is by how much each parameter would move if the cause were so.
 """
 
+import math
 from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
@@ -30,6 +31,9 @@ EVIDENT = 3.5
 #
 # A bend without segments is at 4/3, and fits of wrists of 8 segments move by more than the first order tells.
 _UNSURE = 5.0 / 3.0
+
+# Noise [rad] that readings of a rig have at least; of simulated ones without noise, the integration step is left over.
+LEAST_NOISE = math.radians(1e-3)
 
 Supposed = tuple[MeasuredTrial, SupposedWrist]
 
@@ -160,8 +164,8 @@ class Misfit(NamedTuple):
 
     @property
     def ratio(self) -> float:
-        """Chi-square over its degrees of freedom."""
-        return (self.residual / self.noise) ** 2
+        """Chi-square over its degrees of freedom; no noise counts as less than `LEAST_NOISE`."""
+        return (self.residual / max(self.noise, LEAST_NOISE)) ** 2
 
 
 def misfits(fit: Fit) -> list[Misfit]:
