@@ -255,7 +255,7 @@ def test_three_tendons_are_analysed_as_one_loop_of_two_planes(tmp_path: Path) ->
         "wrist.tendons=three", "simulate={controller: ct-dob, gains: default, direction: flexion}",
         "analyse.angles_deg=[0.0, 20.0]", out=tmp_path,
     )  # fmt: skip
-    assert done.toward_deg == 90.0 and "in two planes toward 90 deg is stable at 0 and 20 deg" in done.sentence
+    assert done.toward_deg == 90.0 and "in two planes toward flexion is stable at 0 and 20 deg" in done.sentence
     table, margins = done.frame(), done.found[-1].margins
     assert list(table["toward_deg"]) == [90.0, 90.0] and done.found[-1].linear.theta == pytest.approx(
         [0.0, math.radians(20.0)], abs=1e-6

@@ -8,7 +8,7 @@ import pytest
 from wristctl.comparison.combinations import compare
 from wristctl.config.wrist import WristParameters
 from wristctl.study_files.load import load_study
-from wristctl.wrist.directions import ACTIVE, DIRECTIONS, TENDONS, Direction, in_plane, tendons_of
+from wristctl.wrist.directions import ACTIVE, DIRECTIONS, TENDONS, Direction, in_plane, tendons_of, toward_words
 
 SETTINGS = (
     "controllers=[{controller: computed-torque, gains: default}]", "inverses=[none]", "horizon=0.8",
@@ -66,3 +66,12 @@ def test_each_plane_has_the_four_tendons_off_the_centre_on_their_sides() -> None
     for plane, axis in (("ulnar", 0), ("flexion", 1)):
         assert sorted(tendons_of(plane)) == list(ACTIVE)
         assert [TENDONS[tendon][axis] for tendon in tendons_of(plane)] == [1, 1, -1, -1]
+
+
+@pytest.mark.parametrize(
+    ("angle_deg", "words"),
+    [(0.0, "ulnar"), (90.0, "flexion"), (180.0, "radial"), (-90.0, "extension"), (360.0, "ulnar"), (1e-9, "ulnar"),
+     (30.0, "30 deg from ulnar"), (-28.53, "-28.5 deg from ulnar")],
+)  # fmt: skip
+def test_a_direction_along_a_plane_has_its_anatomical_name(angle_deg: float, words: str) -> None:
+    assert toward_words(angle_deg) == f"toward {words}"

@@ -16,6 +16,7 @@ from wristctl.simulation.actuator import SIDES
 from wristctl.simulation.planes import Asked, why_two
 from wristctl.simulation.spool_driven import SpooledWrist
 from wristctl.wrist.compiled_model import terms
+from wristctl.wrist.directions import toward_words
 from wristctl.wrist.segments import segments
 from wristctl.wrist.spatial.co_contraction import least_pulls
 from wristctl.wrist.spatial.spatial_holding import FrictionOnHeld, at_rest_along, held_at, values_of
@@ -139,7 +140,7 @@ def why_in_two_planes(wrist: WristParameters, settings: HysteresisSettings) -> s
     Raises UserError for places of tendons that are no layout.
     """
     if settings.toward_deg:
-        return f"its bends go toward {settings.toward_deg:g} deg from ulnar"
+        return f"its bends go {toward_words(settings.toward_deg)}"
     return why_two(wrist, [Asked(Loop(), Reference(kind="step"), "ulnar")])
 
 

@@ -33,6 +33,14 @@ ACTIVE = tuple(number for number, place in TENDONS.items() if any(place))
 OPPOSITE_AXES = tuple((ACTIVE.index(one), ACTIVE.index(other)) for one, other in ((1, 5), (2, 4)))
 
 
+_NAMES = {0.0: "ulnar", 90.0: "flexion", 180.0: "radial", 270.0: "extension"}
+
+
+def toward_words(angle_deg: float) -> str:
+    """A direction [deg from ulnar toward flexion] in words: its anatomical name, or else its angle."""
+    return f"toward {_NAMES.get(round(angle_deg, 6) % 360.0, f'{angle_deg:.3g} deg from ulnar')}"
+
+
 def away_of(plane: str, positive: str) -> tuple[int, ...]:
     """1 for each tendon of `ACTIVE` that pulls the wrist away from a camera that looks at this bending plane, -1 for
     one that pulls it toward the camera, which sees theta > 0 on its `positive` side, right or left.

@@ -231,12 +231,13 @@ class Rests(NamedTuple):
     def words(self, study: Study) -> str:
         """Planes and direction, in words; none of one plane."""
         from wristctl.simulation.planes import why_two
+        from wristctl.wrist.directions import toward_words
 
         if self.toward_deg is None:
             return ""
         why = why_two(study.wrist, asked_for_by(study))
         reason = f" ({why})" if " out of " in why else ""
-        return f" in two planes{reason} toward {self.toward_deg:.3g} deg"
+        return f" in two planes{reason} {toward_words(self.toward_deg)}"
 
 
 def _rests(study: Study, planes: int, network: Inverse | None) -> Rests:

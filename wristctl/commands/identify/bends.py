@@ -16,6 +16,7 @@ from wristctl.commands.results import StudyResult
 from wristctl.commands.session import Session
 from wristctl.config.study import Study
 from wristctl.errors import Setting, UserError
+from wristctl.wrist.directions import toward_words
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -178,7 +179,7 @@ def _answer(fit: Fit, told: Mapping[str, Told], run: str, square: bool) -> Answe
     """The answer; `run` is the path of a run with the wrist, `square` whether its tendons are those of one plane."""
     along, across, axis = (told[name] for name in ("stiffness", "stiffness_across", "stiffness_axis_deg"))
     if along.known and across.known:
-        where = f"toward {axis.value:.3g} deg from ulnar" if axis.known else "along an axis that is not identifiable"
+        where = toward_words(axis.value) if axis.known else "along an axis that is not identifiable"
         springs = f"The springs have {along.value:.3g} N m/rad {where}, and {across.value:.3g} across."
     else:
         springs = "The springs are not identifiable from these readings."

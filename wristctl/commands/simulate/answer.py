@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 from wristctl.commands.answer import Answer
 from wristctl.commands.printed_table import Table, degrees, joined, two
 from wristctl.config.wrist import WristParameters
+from wristctl.wrist.directions import toward_words
 
 if TYPE_CHECKING:
     from wristctl.config.loop import DirectionName, Loop, Reference
@@ -192,7 +193,7 @@ def disturbance_words(loop: Loop) -> list[str]:
     if disturbances.grasp.mass:
         parts.append(f"an object of {abs(disturbances.grasp.mass):g} kg taken up at {disturbances.grasp.start:g} s")
     if parts and disturbances.toward_deg:
-        parts[-1] += f", toward {disturbances.toward_deg:g} deg from ulnar"
+        parts[-1] += f", {toward_words(disturbances.toward_deg)}"
     if disturbances.drift.scale != 1.0:
         parts.append(f"a stiffness that drifts to {disturbances.drift.scale:g} times")
     return parts
