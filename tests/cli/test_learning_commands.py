@@ -260,7 +260,7 @@ def test_three_tendons_go_from_samples_to_a_network_behind_a_reference(call: Cal
     own = tmp_path / "mywrist.yaml"
     own.write_text("wrist: {tendons: three, length: 0.095, stiffness: 1.1}\n")
     code, out, err = call("gen-data", str(own), "--samples", "300")
-    assert code == 0 and "bend in two planes" in out, err
+    assert code == 0 and "bend in two planes" in out and "tip, toward ulnar" in out, err
     data = out.splitlines()[-1]
     small = ("--preset", "recommended", "--set", "hidden=[8]", "--epochs", "40")
     code, out, err = call("train", str(own), "--data", data, *small)

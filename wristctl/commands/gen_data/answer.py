@@ -105,8 +105,8 @@ def answer_of(
 
 
 def _rows(planes: int, inputs: Sequence[str], metrics: Mapping[str, float]) -> list[tuple[str, float, float, str]]:
-    rows = []
+    rows, words = [], _WORDS | ({"y": "tip, toward ulnar"} if planes == 2 else {})
     for name in (*QUANTITIES[planes], *inputs):
         unit = RANGES.get(name, (1e3, "mm"))[1]
-        rows.append((_WORDS.get(name, name), metrics[f"{name}_min_{unit}"], metrics[f"{name}_max_{unit}"], unit))
+        rows.append((words.get(name, name), metrics[f"{name}_min_{unit}"], metrics[f"{name}_max_{unit}"], unit))
     return rows
