@@ -83,6 +83,11 @@ class Recommended(StudyResult):
     """Planes that all loops bend in, a sentence; empty where they stay in one."""
 
     @property
+    def on_a_rig(self) -> bool:
+        """Whether the next command drives a rig, as `hw-run` does; else none has these motors and tendons."""
+        return self.next_command.startswith("wristctl hw-run")
+
+    @property
     def best(self) -> Candidate | None:
         """Recommended controller and gains; None where none with feedback is among the best to rely on."""
         return None if self.best_row is None else self.candidates[self.best_row]
@@ -139,7 +144,8 @@ class Recommended(StudyResult):
     def answer(self) -> Answer:
         """What to run, what error to expect, what not to use, and the limits."""
         chosen = "" if self.best is None else f"{RECOMMENDED} of the run, "
-        rows = f"those of each row: {FOLDER}/, each a file for simulate, compare and hw-run. Every rig: data/rigs.csv."
+        takers = "simulate, compare and hw-run" if self.on_a_rig else "simulate and compare"
+        rows = f"those of each row: {FOLDER}/, each a file for {takers}. Every rig: data/rigs.csv."
         return Answer(_sentence(self), _table(self), _notes(self), f"The gains: {chosen}{rows}")
 
 
@@ -197,7 +203,7 @@ def _table(result: Recommended) -> Table:
 def files_table(candidates: Sequence[Candidate]) -> Table:
     """Gains of every row, in the order of the candidates, with the file of each."""
     rows = [(one.label, ", ".join(_gain(one, name) for name in one.gains) or "-", one.file) for one in candidates]
-    title = "Gains of every row, best first; each file is for simulate, compare and hw-run"
+    title = "Gains of every row, best first; each file is a study's"
     return Table(title, ("controller (gains)", "gains", "file"), rows)
 
 
@@ -224,10 +230,9 @@ def _notes(result: Recommended) -> list[str]:
     notes.append(
         f"{_up_to(result.motions, 'Hz', sine)} {_up_to(result.payloads, 'kg', 'an unknown payload in the hand')}"
     )
-    emulated = result.next_command.startswith("wristctl hw-run")
     how = (
         "emulated (on a real rig also --port /dev/ttyACM0 --camera 0 --optics latest:calibrate-camera)"
-        if emulated
+        if result.on_a_rig
         else "simulated (hw-run has no such rig)"
     )
     return [*notes, f"Next, {how}:", f"$ {result.next_command}"]
