@@ -81,6 +81,22 @@ def test_equilibria_in_a_plane_are_those_of_the_planar_wrist() -> None:
     assert stable.all() and held.all()
 
 
+def test_a_tendon_that_ends_within_a_segment_pulls_by_its_share() -> None:
+    from wristctl.learning.dataset import _equilibria_in_space
+
+    def pull(radius: float, **end: int) -> float:
+        places = ({"angle_deg": 0.0, "radius": radius, **end}, {"angle_deg": 120.0}, {"angle_deg": 240.0})
+        wrist = WristParameters.model_validate({"tendons": places, "pretension": 0.0})
+        some = np.zeros(1)
+        return float(_equilibria_in_space(wrist, 1, np.array([[0.05, 0.0]]), some, some, some + 0.3)[1][0])
+
+    assert pull(0.02, ends_at=3) == pytest.approx(pull(0.01), rel=0.02)
+    assert pull(0.02, ends_at=3) == pytest.approx(2.0 * pull(0.02), rel=0.02)
+    short = {"angle_deg": 12.0, "ends_at": 3}, {"angle_deg": 130.0}, {"angle_deg": 250.0}
+    found = drawn(WristParameters.model_validate({"tendons": short}), source="plant", poses=(0.0,))
+    np.testing.assert_allclose(found.tip, spatial_tips(found.theta, THREE.length), atol=1e-12)
+
+
 @pytest.mark.parametrize("tendons", ["three", "four", "five"])
 def test_an_upright_wrist_has_no_direction_of_tilt(tendons: str) -> None:
     upright = drawn(WristParameters.model_validate({"tendons": tendons}), source="plant", planes=2, poses=(0.0,))

@@ -305,7 +305,6 @@ def _equilibria_in_space(
 ) -> tuple[Array, Array, NDArray[np.bool_]]:
     """Tips (B, 3) [m], the largest tension of a tendon (B,) [N] and whether it is stable (B,), in two planes."""
     layout = TendonLayout.of(wrist)
-    layout.ends(wrist.discs, n)
     values = spatial_values(wrist, layout, n, axis=math.radians(wrist.stiffness_axis_deg))
     parameters = np.tile(values, (len(bends), 1))
     parameters[:, SpatialSegments._fields.index("hand_mass")] = hand

@@ -2,7 +2,7 @@
 
 import math
 import re
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from typing import Any, Union, get_origin
 
 from pydantic import ValidationError
@@ -168,6 +168,9 @@ _NUMBER_WITH_UNIT = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)(e[-+]?\d+)? ?[^\W\d_]|[-
 # Beyond so many times the default a length is asked about.
 _TIMES = 20.0
 _BELIEVED = WristParameters.model_fields | Actuator.model_fields
+# Usual sizes of lengths that are null by default; `radius` is a tendon's own.
+_USUAL = {name: field.default for name, field in _BELIEVED.items()}
+_USUAL["radius"] = _USUAL["tendon_radius"]
 
 
 # Sizes of leaves that are no lengths, beyond which they are asked about; in their units.
@@ -177,7 +180,7 @@ _SENSIBLE = {"stiffness": (1e-3, 1e3), "force": (0.0, 1e3), "load": (0.0, 1e3), 
 def check_sizes(study: Study, origins: Mapping[KeyPath, Phrase]) -> None:
     """UserError for a length, stiffness or force that was given and cannot well be meant."""
     check_lengths(study, origins)
-    for path, where in origins.items():
+    for path, where in _with_items(study, origins):
         _, field = field_at(path)
         low, high = _SENSIBLE.get(str(path[-1]), (0.0, math.inf))
         value = _at(study, path) if field is not None and unit_of(field) else None
@@ -187,16 +190,28 @@ def check_sizes(study: Study, origins: Mapping[KeyPath, Phrase]) -> None:
             raise UserError(problem, (where, f": {'.'.join(map(str, path))}"), "is that meant? go on with --force")
 
 
+def _with_items(study: Study, origins: Mapping[KeyPath, Phrase]) -> Iterator[tuple[KeyPath, Phrase]]:
+    """All that was given and where, also within the sections of lists that were given as one."""
+    for path, where in origins.items():
+        yield path, where
+        items = _at(study, path)
+        for number, item in enumerate(items if isinstance(items, tuple) else ()):
+            for key in keys_of(type(item)):
+                inner = (*path, number, key)
+                if inner not in origins:
+                    yield inner, where
+
+
 def check_lengths(study: Study, origins: Mapping[KeyPath, Phrase]) -> None:
     """UserError, with what may have been meant, for a length that was given and is far beyond the default's size."""
-    for path, where in origins.items():
+    for path, where in _with_items(study, origins):
         _, field = field_at(path)
         if field is None or unit_of(field) != "m":
             continue
-        value, usual = _at(study, path), field.default
-        override = usual is None and str(path[-1]) in _BELIEVED
-        if override:
-            usual = _BELIEVED[str(path[-1])].default
+        value, usual, name = _at(study, path), field.default, str(path[-1])
+        override = usual is None and name in _BELIEVED
+        if usual is None:
+            usual = _USUAL.get(name)
         if isinstance(value, float | int) and isinstance(usual, float) and 0.0 < _TIMES * usual < abs(value):
             meant = _meant(float(value), usual, override)
             key = ".".join(map(str, path))
