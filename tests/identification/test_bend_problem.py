@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from tests.identification.bend_rigs import KNOWN, LAYOUT, SETTINGS, TENDONS, drawn_rig, logs_of, spools
 from wristctl.config.identify import IdentifySettings
-from wristctl.config.wrist import TendonPlace
+from wristctl.config.wrist import WristParameters
 from wristctl.errors import UserError
 from wristctl.identification.bend_problem import bend_problem, oblique_of, springs_of, told_of_bends
 from wristctl.identification.bend_rehearsal import Hold, RehearsedBends, planned_spools, rehearse_bends
@@ -24,6 +24,7 @@ from wristctl.records.log_converters import read_log
 from wristctl.records.open_log import write_log
 from wristctl.wrist.spatial.spatial_model import spatial_terms
 from wristctl.wrist.spatial.spatial_segments import ellipse, spatial_values
+from wristctl.wrist.tendon_layout import TendonLayout
 
 pytestmark = pytest.mark.slow
 
@@ -49,7 +50,9 @@ def test_a_wrist_on_held_spools_comes_to_rest_where_its_tendons_hold_springs_and
     wrist = KNOWN.model_copy(update={"flexion_ratio": 1.3, "stiffness_axis_deg": 25.0, "gravity_flexion": 3.0})
     sliding = TENDONS.model_copy(update={"friction": 0.0})
     reeled = np.tile([-2e-3, 1e-3, -1.5e-3, 6e-3], (1500, 1))
-    supposed = SupposedBends(wrist, sliding, LAYOUT.cross_section, (1e-4, 0.0, 0.0, -1e-4))
+    supposed = SupposedBends(
+        wrist, sliding, LAYOUT.cross_section, (1e-4, 0.0, 0.0, -1e-4), np.ones(4), np.ones(4, np.int64)
+    )
     (course,) = courses_of_bends([supposed], reeled, 1e-3, 1)
     bend, pulls = course[-1, :2], course[-1, 2:]
     assert np.hypot(*bend) > 0.1 and pulls.min() == 0.0 and np.abs(course[-1] - course[-200]).max() < 1e-6
@@ -59,6 +62,22 @@ def test_a_wrist_on_held_spools_comes_to_rest_where_its_tendons_hold_springs_and
     assert pulls @ at_rest.moment_arms == pytest.approx(held, abs=1e-5)
     stretch = np.array(supposed.taut) + reeled[-1] - (wrist.length - at_rest.lengths)
     assert pulls == pytest.approx(2e4 * stretch.clip(0.0), abs=1e-3)
+
+
+def test_a_place_of_two_tendons_and_one_that_ends_early_pull_on_held_spools_as_they_do_in_the_wrist() -> None:
+    places = ({"angle_deg": 10.0, "multiplicity": 2}, {"angle_deg": 130.0, "ends_at": 3}, {"angle_deg": 250.0})
+    wrist = WristParameters.model_validate({"tendons": places})
+    layout, sliding = TendonLayout.of(wrist), TENDONS.model_copy(update={"friction": 0.0})
+    shares = layout.shares(wrist.discs)
+    supposed = SupposedBends(wrist, sliding, layout.cross_section, (1e-4,) * 3, shares, layout.multiplicity)
+    reeled = np.array([6e-3, -1e-3, -2e-3])
+    (course,) = courses_of_bends([supposed], np.tile(reeled, (1500, 1)), 1e-3, 1)
+    bend, pulls = course[-1, :2], course[-1, 2:]
+    at_rest = spatial_terms(spatial_values(wrist, layout, 1), bend, 0.0 * bend)
+    stretch = 1e-4 + reeled - (shares * wrist.length - at_rest.lengths)
+    assert pulls == pytest.approx(2e4 * stretch.clip(0.0), abs=1e-3) and pulls[0] > 2.0, "of one tendon of each place"
+    held = at_rest.bias + wrist.stiffness * bend
+    assert (pulls * layout.multiplicity) @ at_rest.moment_arms == pytest.approx(held, abs=1e-5)
 
 
 def test_planned_spools_keep_to_what_motors_can_do() -> None:
@@ -112,10 +131,6 @@ def test_a_log_of_another_wrist_or_of_one_plane_is_refused() -> None:
     three = KNOWN.model_copy(update={"tendons": "three"})
     with pytest.raises(UserError, match="3 places"):
         places_of_log(log, three)
-    twice = KNOWN.model_copy(update={"tendons": tuple(
-        TendonPlace(angle_deg=angle, multiplicity=2) for angle in (0.0, 90.0, 180.0, 270.0))})  # fmt: skip
-    with pytest.raises(UserError, match="several tendons"):
-        places_of_log(log, twice)
     columns = {name: column for name, column in log.columns.items() if name != "bend_z"}
     with pytest.raises(UserError, match="bend_z is not in the log"):
         bend_trials([type(log)(log.file, "log", columns)], KNOWN, 1e-3)

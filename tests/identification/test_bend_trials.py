@@ -63,14 +63,6 @@ def test_as_many_spools_as_the_wrist_has_no_places_are_refused(numbers: tuple[in
         places_of_log(log(numbers), wrist(0.0, 90.0, 180.0, 270.0))
 
 
-def test_a_place_of_several_tendons_or_one_that_ends_early_is_refused() -> None:
-    places_of_log(log((1, 2, 3)), wrist(0.0, 120.0, 240.0))
-    wrong: tuple[dict[str, Any], ...] = ({"multiplicity": 2}, {"ends_at": 3})
-    for more in wrong:
-        with pytest.raises(UserError, match="ends before the tip"):
-            places_of_log(log((1, 2, 3)), wrist(0.0, 120.0, 240.0, **more))
-
-
 def test_a_trial_holds_every_reading_at_its_own_time() -> None:
     """Both bends of their own frames, then each tendon's tension; spools at the middle of each step of the grid."""
     seen = np.arange(401) % 3 == 0

@@ -144,6 +144,10 @@ def test_a_spool_of_the_wrong_sense_is_refused_and_other_logs_keep_the_places_of
     uneven = (*places[:3], TendonPlace(angle_deg=270.0, radius=0.02))
     with pytest.raises(UserError, match="several circles"):
         robot_of_logs([both], WRIST.model_copy(update={"tendons": uneven}), 0.01)
+    for more in ({"multiplicity": 2}, {"ends_at": 3}):
+        unlike = (*places[:3], places[3].model_copy(update=more))
+        with pytest.raises(UserError, match=r"ends before the tip .* model: wrist"):
+            robot_of_logs([both], WRIST.model_copy(update={"tendons": unlike}), 0.01)
     pair = tuple(TendonPlace(angle_deg=angle, radius=0.03, multiplicity=2) for angle in (0.0, 180.0))
     assert robot_of_logs([four_in_a_plane((1, 2))], WRIST.model_copy(update={"tendons": pair}), 0.01).radius == 0.03
 

@@ -11,6 +11,7 @@ import pytest
 import wristctl.identification
 from tests.values import changeable
 from wristctl.config.identify import Fixed
+from wristctl.config.wrist import TendonPlace
 from wristctl.identification.unknowns import SIMULATED, UNKNOWNS, identified_yaml, tendons_of_values, with_identified
 from wristctl.study_files.load import load_study
 
@@ -81,6 +82,18 @@ def test_what_was_identified_is_a_study_that_simulates_it() -> None:
             assert {name: getattr(loop.sensor, name) for name in CAMERA} == CAMERA
             assert (loop.actuator.level, loop.sensor.level) == (was.actuator.level, was.sensor.level)
             assert loop.control_period == was.control_period and loop.plant_segments == was.plant_segments
+
+
+def test_each_place_keeps_where_its_tendons_end_and_how_many_they_are() -> None:
+    given = ({"angle_deg": 10.0, "multiplicity": 2}, {"angle_deg": 100.0, "ends_at": 3}, {"angle_deg": 190.0},
+             {"angle_deg": 280.0})  # fmt: skip
+    drawn = tuple(TendonPlace.model_validate({"radius": 0.02} | place) for place in given)
+    moved = tuple(place.model_copy(update={"angle_deg": place.angle_deg + 0.7}) for place in drawn)
+    text, study = identified_yaml(FOUND, CAMERA, moved), load_study()
+    unlike = study.model_copy(update={"wrist": study.wrist.model_copy(update={"tendons": drawn})})
+    for command in ("simulate", "compare", "tune"):
+        assert with_identified(unlike, command, text).wrist.tendons == moved
+    assert with_identified(study, "compare", text).wrist.tendons == "four", "the square of a loop in one plane"
 
 
 def test_the_identified_study_itself_has_tendons_and_a_camera(tmp_path: Path) -> None:

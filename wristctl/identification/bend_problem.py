@@ -17,6 +17,7 @@ import numpy as np
 from wristctl.arrays import Array
 from wristctl.config.identify import IdentifySettings
 from wristctl.config.plant import Actuator
+from wristctl.config.wrist import TendonPlace as Place
 from wristctl.config.wrist import WristParameters
 from wristctl.errors import UserError
 from wristctl.identification.arc_fit import Told
@@ -29,7 +30,7 @@ from wristctl.identification.posterior import posterior_draws, posterior_yaml
 from wristctl.identification.spatial_forward import SupposedBends, courses_of_bends
 from wristctl.identification.unknowns import UNKNOWNS, Unknown, believed_of, identified_yaml, tendons_of_values
 from wristctl.wrist.spatial.spatial_segments import ellipse
-from wristctl.wrist.tendon_layout import TendonPlace
+from wristctl.wrist.tendon_layout import TendonLayout, TendonPlace
 
 # Largest part of the springs' mean that an axis may have more or less, and error of a tendon's direction [rad].
 _OBLIQUE, _ASIDE = 0.6, 0.6
@@ -137,7 +138,9 @@ class BendProblem(Problem):
         wrist = trial.wrist.model_copy(update={**springs, "damping": values["damping"]})
         tendons = self.actuator.model_copy(update=tendons_of_values(values))
         taut = tuple(float(x[self.coordinates[spool_zero(trial, tendon)]]) for tendon in trial.tendons)
-        return SupposedBends(wrist, tendons, self._cross_section(values), taut)
+        layout = TendonLayout(tuple(self.places.values()))
+        shares = layout.shares(wrist.discs)
+        return SupposedBends(wrist, tendons, self._cross_section(values), taut, shares, layout.multiplicity)
 
     def planar(self, values: Mapping[str, float]) -> dict[str, float]:
         """The values with those of a wrist whose tendons are on a square."""
@@ -280,7 +283,12 @@ def bends_yaml(
     }
     values = problem.planar(fit.values)
     places = [
-        (fit.values[f"direction_{number}"], place.radius / fit.values[f"gain_{number}"])
+        Place(
+            angle_deg=math.degrees(fit.values[f"direction_{number}"]),
+            radius=place.radius / fit.values[f"gain_{number}"],
+            ends_at=place.ends_at,
+            multiplicity=place.multiplicity,
+        )
         for number, place in problem.places.items()
     ]
     draws = [problem.planar(draw) for draw in posterior_draws(fit, knowledge, count, rng)]

@@ -146,7 +146,8 @@ def rehearse_bends(
     """
     layout, tendons = truth.layout, counts.shape[1]
     numbers = (1, 2, 4, 5) if tendons == 4 else tuple(range(1, tendons + 1))
-    supposed = SupposedBends(truth.wrist, truth.actuator, layout.cross_section, truth.taut)
+    shares = layout.shares(truth.wrist.discs)
+    supposed = SupposedBends(truth.wrist, truth.actuator, layout.cross_section, truth.taut, shares, layout.multiplicity)
     course = courses_of_bends([supposed], truth.actuator.step_length * counts, _PERIOD, truth.segments)[0]
     time = _PERIOD * np.arange(len(course))
     ticks = slice(None, None, _LOGGED)

@@ -64,7 +64,7 @@ class BendTrial(MeasuredTrial):
 def places_of_log(log: OpenLog, wrist: WristParameters) -> dict[int, TendonPlace]:
     """Places of a log's tendons by their numbers: 1, 2, 4, 5 of the square wrist, else those of `wrist.tendons`.
 
-    Raises UserError where log and wrist have not as many, or where a place has several tendons or ends before the tip.
+    Raises UserError where log and wrist have not as many.
     """
     numbers, layout = spools_of_log(log), TendonLayout.of(wrist)
     places = [place for place in layout.places if place.radius > 0.0]
@@ -73,8 +73,6 @@ def places_of_log(log: OpenLog, wrist: WristParameters) -> dict[int, TendonPlace
     elif numbers != list(range(1, len(places) + 1)):
         problem = f"spools of tendons {', '.join(map(str, numbers))}, and the wrist has {len(places)} places"
         raise UserError(problem, log.header or str(log.file), "wrist.tendons as the log has them")
-    if any(place.multiplicity > 1 or place.ends_at is not None for place in places):
-        raise UserError("a place with several tendons, or one that ends before the tip", "wrist.tendons", "model: arcs")
     return dict(zip(numbers, places, strict=True))
 
 

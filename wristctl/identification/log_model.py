@@ -109,6 +109,11 @@ def _tendons(
         if max(place.radius for place in places) > 1.001 * min(place.radius for place in places):
             fix = "one radius, for arcs have their tendons on a circle; model: wrist takes each place as it is"
             raise UserError("tendons on several circles", "wrist.tendons", fix)
+        if len({place.multiplicity for place in places}) > 1 or any(place.ends_at for place in places):
+            fix = "model: wrist, which takes each place as it is"
+            raise UserError(
+                "more tendons at a place than at another, or one that ends before the tip", "wrist.tendons", fix
+            )
         return [place.angle for place in places], places[0].radius, layout.planes == 1
     if len(numbers) == 2:
         return [plane or 0.0, math.pi + (plane or 0.0)], pairs_radius, True

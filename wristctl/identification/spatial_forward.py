@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from wristctl.arrays import Array
 from wristctl.config.plant import Actuator, TendonFacts, TrueWrist
@@ -38,6 +39,10 @@ class SupposedBends(NamedTuple):
     """Places of the tendons in the cross-section (M, 2) [m], toward ulnar and toward flexion."""
     taut: tuple[float, ...]
     """Length that each tendon has reeled in beyond its spool's count [m]."""
+    shares: Array
+    """Share of the wrist's length that the tendons of each place span (M,)."""
+    alike: NDArray[np.int64]
+    """Number of tendons of each place (M,)."""
 
 
 class _Shapes(NamedTuple):
@@ -73,11 +78,13 @@ def _follow(model: Any, values: Any, state: Any, reeled: Any, h: float, settle: 
 
 
 def courses_of_bends(candidates: Sequence[SupposedBends], reeled: Array, h: float, n: int) -> Array:
-    """Bends [rad] and pulls at the spools [N] of candidates, (count, T, 2 + M), at steps of h [s].
+    """Bends [rad] and, of each place, the pull of one tendon at its spool [N] of candidates, at steps of h [s].
+
+    They are (count, T, 2 + M).
 
     Parameters
     ----------
-    candidates : wrists, cut into n segments, with M tendons each
+    candidates : wrists, cut into n segments, with M places of tendons each, the same number of tendons at a place
     reeled : length that each spool has reeled in since its tendon was taut and free of tension on the straight wrist
         (T, M) [m], held over each step; at first the wrist is at rest
     """
@@ -93,15 +100,17 @@ def courses_of_bends(candidates: Sequence[SupposedBends], reeled: Array, h: floa
         state = np.repeat(begin[:, None], blocks.shape[2], axis=1)
         follow(PCC_IN_SPACE, values, state, spools, h, round(SETTLE / h), course, shapes)
     flat = to_rows(out.reshape(len(out), -1, blocks.shape[2]), count)
-    return flat.reshape(count, len(spools), 2 + tendons)
+    courses = flat.reshape(count, len(spools), 2 + tendons)
+    return np.concatenate([courses[..., :2], courses[..., 2:] / candidates[0].alike], axis=2)
 
 
 def _values(supposed: SupposedBends, n: int, h: float) -> Array:
-    wrist, count = supposed.wrist, len(supposed.places)
+    wrist, along = supposed.wrist, n * supposed.shares
     own = spatial_values(wrist, TendonLayout.four(wrist.tendon_radius), n, axis=np.radians(wrist.stiffness_axis_deg))
     tendons, facts = supposed.tendons.model_copy(update={"level": "tendon"}), TendonFacts()
-    stiffness, faults = np.full(count, tendons.tendon_stiffness), faults_of(tendons, facts, np.ones(count))
+    alike = np.asarray(supposed.alike, float)
+    stiffness, faults = alike * tendons.tendon_stiffness, faults_of(tendons, facts, alike)
     nonideal = nonideal_of(TrueWrist(), tendons, facts, h)
     return np.concatenate(
-        [own[:FIELDS], rows_of_tendons(supposed.places, n), supposed.taut, stiffness, nonideal, faults.ravel()]
+        [own[:FIELDS], rows_of_tendons(supposed.places, along), supposed.taut, stiffness, nonideal, faults.ravel()]
     )

@@ -12,6 +12,7 @@ from wristctl.config.wrist import TendonPlace, WristParameters
 from wristctl.simulation.planes import Asked, planes_of
 from wristctl.study_files.strict_yaml import parse_yaml
 from wristctl.wrist.directions import ACTIVE
+from wristctl.wrist.tendon_layout import off_both_sides
 
 
 class Unknown(NamedTuple):
@@ -91,12 +92,12 @@ _WRIST = ("stiffness", "flexion_ratio", "stiffness_axis_deg", "damping", "tendon
 def identified_yaml(
     values: Mapping[str, float],
     camera: Mapping[str, float],
-    places: Sequence[tuple[float, float]] = (),
+    places: Sequence[TendonPlace] = (),
     known: WristParameters | None = None,
 ) -> str:
     """A study file: the wrist, and the actuator and sensor of `simulate`, with these parameters.
 
-    `places` are directions [rad] and radii [m] of the tendons, where they are not those of `wrist.tendons`. With a
+    `places` are those of the tendons, where they are not those of `wrist.tendons`. With a
     `known` wrist the file has what of it was not to be found, too: geometry, masses and pose.
     """
     found = {name: values[name] for name in _WRIST if name in values}
@@ -104,7 +105,8 @@ def identified_yaml(
     lines = ["wrist:", *(f"  {name}: {json.dumps(value)}" for name, value in (whole | found).items())]
     if places:
         lines.append("  tendons:")
-        lines += [f"    - {{angle_deg: {math.degrees(angle)!r}, radius: {radius!r}}}" for angle, radius in places]
+        shown = (place.model_dump(exclude_defaults=True) for place in places)
+        lines += [f"    - {{{', '.join(f'{key}: {value!r}' for key, value in place.items())}}}" for place in shown]
     lines += ["simulate:", "  loop:"]
     lines += [
         "    actuator:",
@@ -118,7 +120,7 @@ def identified_yaml(
 def with_identified(study: Study, command: str, text: str) -> Study:
     """The study with the values of an identified.yaml in its wrist and in every actuator and sensor of the command.
 
-    Their levels stay as they are. Places of four tendons are for a loop in two planes: in one they stand on a square.
+    Their levels stay as they are. Places of the four of a square are for a loop in two planes: in one they stand on it.
     """
     mapping = parse_yaml(text, "identified.yaml").data
     loop = mapping["simulate"]["loop"]
@@ -141,7 +143,7 @@ def with_identified(study: Study, command: str, text: str) -> Study:
     in_two = (
         command == "simulate" and planes_of(study.wrist, [Asked(chosen.loop, chosen.reference, chosen.direction)]) == 2
     )
-    if places and (in_two or len(places) != len(ACTIVE)):
+    if places and (in_two or len(places) != len(ACTIVE) or off_both_sides(study.wrist) is not None):
         wrist = with_places
     return study.model_copy(update={"wrist": wrist, name: settings.model_copy(update=changed)})
 
