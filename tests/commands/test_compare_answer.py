@@ -83,7 +83,8 @@ def test_where_all_that_tie_wait_for_their_motors_it_is_said_that_motors_decide(
         found = stands("camera and tendons", errors, waits=waits)
         assert (len(found.standing.groups[0]) > 1) == (errors is alike)
         assert found.motors_decide == motors and ("motors decide" in told(found)) == motors
-        assert "of the best: motors + camera tensions 0 %, motors" in told(found)
+        assert "of the best: tensions 0 %, motors" in told(found)
+        assert "of the best: motors + camera tensions 0 %, motors" in told(found, stands("ideal", errors, waits={}))
     for waits, motors in ((dict.fromkeys(alike, 0.4), True), ({}, False)):
         useless = stands("camera and tendons", alike, away=tuple(alike), waits=waits)
         assert not useless.standing.groups and ("motors decide" in told(useless)) == motors

@@ -18,7 +18,7 @@ from wristctl.commands.kept_studies import gains_content, hw_run_fits, row_of, s
 from wristctl.commands.recommend.answer import NEAR, RECOMMENDED, Candidate, Recommended, spread
 from wristctl.commands.recommend.command import FAMILY, TOLERATED, _limit, family_of_rigs, reach_deg
 from wristctl.commands.recommend.figures import errors
-from wristctl.commands.recommend.study_file import next_command, sections_of
+from wristctl.commands.recommend.study_file import next_command, sections_of, takers_of
 from wristctl.config.loop import Loop, Reference
 from wristctl.config.study import Study
 from wristctl.config.wrist import WristParameters
@@ -384,6 +384,13 @@ RIG = (
     "sensor: {level: camera, frame_rate: 50, delay_frames: 3}}"
 )
 BEST = Candidate("pid-ff", "tuned", {"Kp": 3.0, "Ki": 1.23456789, "Kd": 0.2})
+
+
+def test_only_commands_that_can_have_the_wrist_are_named_for_its_files() -> None:
+    assert takers_of(study_of(RIG)) == "simulate, compare and hw-run"
+    for other in ("wrist.tendons=six", "wrist.tendons=three"):
+        assert takers_of(study_of(RIG, other)) == "simulate and compare"
+        assert next_command(study_of(RIG, other), (), "f.yaml") == "wristctl simulate f.yaml"
 
 
 def test_the_next_command_is_of_the_wrist_and_not_of_the_recommendation() -> None:

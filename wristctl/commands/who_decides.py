@@ -24,16 +24,18 @@ def decided(rankings: Sequence[Ranking]) -> str:
     for ranking in known:
         row = winner(ranking, rankings)
         row = ranking.standing.order[0] if row is None else row
+        where = f"{condition(ranking)} " if len(rankings) > 1 else ""
         told = [f"{limit} {100.0 * of_rows[row]:.2g} %" for limit, of_rows in ranking.at_limit.items()]
         limited = any(of_rows[row] > 0.0 for of_rows in ranking.at_limit.values())
-        shares += [f"{condition(ranking)} {', '.join(told)}"] * limited
+        shares += [f"{where}{', '.join(told)}"] * limited
         motors += [condition(ranking)] * ranking.motors_decide
     if not known:
         return ""
     text = f"Share of time at a limit, of the best: {'; '.join(shares) or 'none'}."
     if not motors:
         return text
+    where = f"In {joined(motors)} motors" if len(rankings) > 1 else "There motors"
     return (
-        f"{text} In {joined(motors)} motors decide: all that tie for the best, or all where none can be used, wait for "
+        f"{text} {where} decide: all that tie for the best, or all where none can be used, wait for "
         f"theirs for {100.0 * MOTORS_DECIDE:g} % of the time or more. Quicker motors can tell controllers apart."
     )

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, NamedTuple
 from wristctl.commands.answer import Answer
 from wristctl.commands.kept_studies import FOLDER, file_of
 from wristctl.commands.printed_table import Table, degrees, joined, two
+from wristctl.commands.recommend.study_file import takers_of
 from wristctl.commands.results import StudyResult
 from wristctl.commands.who_decides import decided
 from wristctl.errors import UserError
@@ -144,8 +145,7 @@ class Recommended(StudyResult):
     def answer(self) -> Answer:
         """What to run, what error to expect, what not to use, and the limits."""
         chosen = "" if self.best is None else f"{RECOMMENDED} of the run, "
-        takers = "simulate, compare and hw-run" if self.on_a_rig else "simulate and compare"
-        rows = f"those of each row: {FOLDER}/, each a file for {takers}. Every rig: data/rigs.csv."
+        rows = f"those of each row: {FOLDER}/, each a file for {takers_of(self.study)}. Every rig: data/rigs.csv."
         return Answer(_sentence(self), _table(self), _notes(self), f"The gains: {chosen}{rows}")
 
 
@@ -200,10 +200,10 @@ def _table(result: Recommended) -> Table:
     return Table("", heads, rows)
 
 
-def files_table(candidates: Sequence[Candidate]) -> Table:
+def files_table(candidates: Sequence[Candidate], takers: str) -> Table:
     """Gains of every row, in the order of the candidates, with the file of each."""
     rows = [(one.label, ", ".join(_gain(one, name) for name in one.gains) or "-", one.file) for one in candidates]
-    title = "Gains of every row, best first; each file is a study's"
+    title = f"Gains of every row, best first; each file is for {takers}"
     return Table(title, ("controller (gains)", "gains", "file"), rows)
 
 

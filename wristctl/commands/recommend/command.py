@@ -21,7 +21,7 @@ from wristctl.commands.recommend.answer import (
     sine_deg,
     spread,
 )
-from wristctl.commands.recommend.study_file import next_command, sections_of
+from wristctl.commands.recommend.study_file import next_command, sections_of, takers_of, trial_of
 from wristctl.commands.results import Findings
 from wristctl.commands.session import Session
 from wristctl.config.families import Family, TuningWorlds
@@ -152,7 +152,7 @@ def recommend(session: Session) -> Recommended:
     searches = _searches(session, study, family, scaled)
     candidates = _candidates(scaled, searches)
     ranking = _tested(session, study, family, candidates)
-    tables = [files_table([candidates[row] for row in ranking.standing.order])]
+    tables = [files_table([candidates[row] for row in ranking.standing.order], takers_of(study))]
     bending = why_two_planes(study.wrist, asked_of_rigs(study))
     planes = 2 if bending else 1
     result = Recommended(session.study, findings, tables, reach, candidates, ranking, searches, [], [], "", bending)
@@ -305,7 +305,8 @@ def _write_files(study: Study, findings: Findings, result: Recommended) -> None:
     if (best := result.best) is not None:
         files[RECOMMENDED] = [best, *(one for one in ordered if one != best)]
     for file, rows in files.items():
-        found = f"{rows[0].label}, as `wristctl recommend` found it for this wrist on this rig: wristctl hw-run THIS"
+        run = f"wristctl {trial_of(study)} THIS"
+        found = f"{rows[0].label}, as `wristctl recommend` found it for this wrist on this rig: {run}"
         keep_gains(findings, file, found, study, [row_of(one.controller, one.gains, 6) for one in rows], **sections)
 
 

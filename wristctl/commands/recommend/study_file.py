@@ -29,12 +29,22 @@ def sections_of(study: Study, reach_deg: float, planes: int = 1) -> Mapping[str,
     return sections
 
 
+def trial_of(study: Study) -> str:
+    """The command that tries what is recommended: `hw-run` where it can have the rig."""
+    return "hw-run" if hw_run_fits(study, study.recommend.loop) else "simulate"
+
+
+def takers_of(study: Study) -> str:
+    """The commands that take a file of gains, in words."""
+    return "simulate, compare and hw-run" if trial_of(study) == "hw-run" else "simulate and compare"
+
+
 def next_command(study: Study, typed: Sequence[str], file: str) -> str:
     """The trial of what is recommended, or its simulation, on the files that were typed.
 
     Of what was set it has what that command reads beside the wrist, which the file has.
     """
-    command = "hw-run" if hw_run_fits(study, study.recommend.loop) else "simulate"
+    command = trial_of(study)
     words, taken = list(typed), {"seed", *sections_read(command)}
     places = [k for k, word in enumerate(words) if words[k - 1] == "--set" and _section(word) not in taken]
     kept = [word for k, word in enumerate(words) if k not in places and k + 1 not in places]
