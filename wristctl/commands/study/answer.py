@@ -50,7 +50,7 @@ def answer_of(
         (bending, bending),
         (terms_table(terms) if terms else "", ""),
         (f"{do_not_use(rankings, names)} {not_elsewhere(rankings, names)}".strip(), _fewer(rankings)),
-        (f"{sure} {tuned_otherwise(shifts)} {more}".strip(), f"{sure} {more}".strip()),
+        (" ".join(filter(None, [sure, tuned_otherwise(shifts), more])), f"{sure} {more}".strip()),
     ]
     return fitted(Answer(advice(rankings), decision_table(rankings, names)), notes)
 
