@@ -32,8 +32,10 @@ EVIDENT = 3.5
 # A bend without segments is at 4/3, and fits of wrists of 8 segments move by more than the first order tells.
 _UNSURE = 5.0 / 3.0
 
-# Noise [rad] that readings of a rig have at least; of simulated ones without noise, the integration step is left over.
-LEAST_NOISE = math.radians(1e-3)
+# Noise [rad] that readings of a rig have at least.
+#
+# Of simulated readings without noise, the integration step and the search's end are left over, up to 0.002 deg.
+LEAST_NOISE = math.radians(5e-3)
 
 Supposed = tuple[MeasuredTrial, SupposedWrist]
 
