@@ -23,6 +23,7 @@ pytestmark = [pytest.mark.slow, pytest.mark.painted]
 OUT = ("--out", "my runs")
 WRIST = ("--set", "wrist.length=0.09", "--set", "wrist.range_deg=45")
 Did = Callable[..., tuple[str, Run]]
+DOCS = Path(__file__).parents[2] / "docs"
 
 
 def advised(text: str) -> list[list[str]]:
@@ -326,3 +327,79 @@ def test_what_else_is_advised_in_answers_and_readmes_runs(
             if "--config" in following:
                 during.chdir(run.path.parent)
             did(*following)
+
+
+PRESETS = ", ".join(f"{{controller: {name}, gains: hardware}}" for name in ("ct-dob", "pid-ff", "mrac"))
+FEW = ("--set", "references=[{kind: circle, angle_deg: 15}]", "--set", "inverses=[none]")
+
+
+def test_a_file_of_three_tendons_goes_through_every_command_and_what_each_advises(did: Did, call: Call) -> None:
+    """One wrist from YAML to exports, with small budgets."""
+    Path("robot.yaml").write_text("wrist: {tendons: three, length: 0.095, stiffness: 1.1}\n")
+    robot = "robot.yaml"
+    wrist = WristParameters(tendons="three", length=0.095, stiffness=1.1)
+
+    def walked(*words: str) -> tuple[str, Run, list[list[str]]]:
+        """What a command said in one line, its run of this wrist, and the commands that it advises."""
+        out, run = did(*words)
+        assert wrist_of(run) == wrist
+        return " ".join(out.split()), run, advised(out)
+
+    said, moved, _ = walked("simulate", robot)
+    assert "in two planes (3 tendons" in said and moved.metrics["rmse_flexion"]["value"] < 1e-6
+    # At 30 deg one tendon alone pulls toward ulnar: the springs' torque over its radius, less what gravity takes.
+    springs = wrist.stiffness * np.radians(30.0) / wrist.tendon_radius
+    assert 0.6 * springs < moved.metrics["peak_tension"]["value"] < springs + wrist.pretension
+    said, _, _ = walked("compare", robot, *FEW, "--set", f"controllers=[{PRESETS}]")
+    assert "All loops bend in two planes: " in said and "3 compared: ct-dob, pid-ff and mrac (hardware)" in said
+    scenario = "scenarios=[{loop: rig, reference: {angle_deg: 15, duration: 1.2}}]"
+    rig = "loops={other: {}, rig: {control_period: 1.0e-2, actuator: {level: tendon}, sensor: {level: camera}}}"
+    tuning = ("--set", scenario, "--set", rig)
+    said, _, following = walked("tune", robot, *SEARCH, "--set", "controllers=[pid-ff]", *tuning)
+    assert "All loops bend in two planes" in said and [words[0] for words in following] == ["simulate"]
+    for words in following:
+        assert wrist_of(did(*words)[1]) == wrist
+    small_draws = ("--set", "draw={plant.stiffness: x0.8..1.2, plant_segments: [1]}", "--set", "loop.plant_segments=1")
+    said, _, following = walked("recommend", robot, *RECOMMEND[1 + len(WRIST) :], *small_draws)
+    assert "The tendons hold" in said and "to any side" in said
+    for words in following:
+        assert wrist_of(did(*words)[1]) == wrist
+    said, _, _ = walked("analyse", robot, "--controller", "ct-dob", "--set", "angles_deg=[0, 15]")
+    assert "ct-dob/hardware in two planes toward ulnar is stable at 0 and 15 deg" in said
+    said, drawn, (train,) = walked("gen-data", robot, "--samples", "300")
+    said, trained, (simulate,) = walked(*train, "--epochs", "40", "--set", "hidden=[8]", "--preset", "recommended")
+    assert [one.run for one in trained.manifest.inputs] == [drawn.id] and "over both planes" in said
+    _, behind, _ = walked(*simulate)
+    assert behind.config.simulate.reference.inverse == "network" and behind.metrics["rmse_flexion"]["value"] > 1e-6
+    loops = ("ranges_deg=[[0,10]]", "frequencies=[2.0]", "sheaths=[0.0]", "angles_deg=[5]")
+    said, _, _ = walked("hysteresis", robot, *(word for each in loops for word in ("--set", each)))
+    assert "In two planes (these tendons bend the wrist in both), bent toward ulnar" in said
+    motors = ("--set", "loop.actuator.level=tendon", "--set", "loop.plant_segments=1")
+    said, recorded, _ = walked("simulate", robot, "--reference", "circumduction", "--controller", "ct-dob", *motors)
+    assert call("runs", "export", recorded.id, "--file", "log.csv")[0] == 0
+    assert "spool_3 [m]" in Path("log.csv").read_text().partition("\n")[0]
+    belief = ("--config", robot, "--set", "wrist.stiffness=0.8", "--set", "model=wrist", "--set", "segments=1")
+    out, found = did("identify", "log.csv", *belief)
+    assert found.metrics["stiffness"]["value"] == pytest.approx(1.1, rel=0.01)
+    (simulate,) = advised(out)
+    told = f"on the wrist identified in {found.id} in two planes (3 tendons"
+    assert told in " ".join(did(*simulate)[0].split())
+    for program, file in (("mujoco", "wrist.xml"), ("matlab", "wrist_chain.m")):
+        assert call("export-model", recorded.id, "--to", program)[0] == 0
+        assert len(Path(file).read_text().splitlines()) > 20
+    assert Path("wrist.xml").read_text().count("<spatial ") == 3
+    said, _, _ = walked("simulate", robot, "--sweep", "wrist.tension_limit=6,60")
+    assert "highest 22.8 deg at wrist.tension_limit = 6 N; 1 of 2 rollouts: does not arrive" in said
+
+
+def test_the_page_of_a_robot_with_three_tendons_names_commands_that_run(did: Did, call: Call) -> None:
+    """Each as it stands on the page, as far as its plan; the budgets are a reader's."""
+    page = (DOCS / "your-own-wrist.md").read_text().partition("## A robot with three tendons")[2]
+    file, commands = re.findall(r"```(?:yaml)?\n(.*?)```", page, re.DOTALL)
+    Path("robot.yaml").write_text(file)
+    lines = [shlex.split(line, comments=True)[1:] for line in commands.splitlines()]
+    assert [words[0] for words in lines] == ["simulate", "compare", "recommend", "simulate", "compare"]
+    for words in lines:
+        if "RUN" not in words[1]:
+            code, out, err = call(*words, "--dry-run")
+            assert code == 0 and "would write a run of" in out, (words, out, err)
