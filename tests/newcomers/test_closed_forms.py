@@ -117,6 +117,8 @@ def test_it_rests_where_the_pulls_at_the_wrist_hold_its_spring_weight_and_load(
     found = run(wrist, 20.0, 8.0, law, actuator=motors, sensor=seeing, disturbances={"load": load})
     names = ("acting_plus", "acting_minus", "theta", "seen")
     plus, minus, angle, seen = (float(found.column(name, 0)[-1]) for name in names)
-    assert abs(np.rad2deg(angle) - 20.0) < near and abs(seen - angle) < 1e-5
+    assert (
+        abs(np.rad2deg(angle) - 20.0) < near and abs(seen - angle) < 1e-4
+    )  # a microstep of the spool turns it by 6e-4
     assert angle == pytest.approx(bent_by(plus, minus, load, wrist), abs=2e-5)
     assert abs(bent_by(plus, minus, 0.0, wrist) - angle) > 0.01

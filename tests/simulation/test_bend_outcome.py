@@ -70,7 +70,7 @@ def test_metrics_are_those_of_the_courses_whatever_is_recorded(loop: Loop) -> No
         assert course.failed == everything.failed[lane]
         found = of_course(course)
         for name, values in everything.metrics.items():  # sums run one by one, numpy's by pairs; failed ones end early
-            if not course.failed:
+            if not course.failed and name != "motor_limited":  # no course tells what motors withhold
                 np.testing.assert_allclose(values[lane], found[name], rtol=1e-9, atol=1e-12, err_msg=name)
     assert everything.failed.any() and not everything.failed.all()
     assert np.ptp(everything.metrics["saturation"]) > 0.0

@@ -31,19 +31,22 @@ _MOTIONS = (
     Reference(kind="two-sided-sine", frequency=0.2),
     Reference(kind="two-sided-sine", frequency=0.5),
 )
-# In two planes: moves toward any side, and ellipses from a line to a circle, as fast as those sines.
-_MOTIONS_IN_TWO_PLANES = (
-    Reference.model_validate({"kind": "diagonal", "duration": 1.0}),
-    Reference.model_validate({"kind": "diagonal", "duration": 0.7}),
-    Reference.model_validate({"kind": "ellipse", "turn": 5.0}),
-    Reference.model_validate({"kind": "ellipse", "turn": 2.0}),
-)
 _DRAWN_IN_TWO_PLANES = {"reference.toward_deg": "-180..180", "reference.ratio": "0..1"}
 _RIG: dict[str, Any] = {
     "control_period": TICK,
     "actuator": {"level": "tendon", "friction": 0.1, "sheath": 1.0},
     "sensor": {"level": "camera"},
 }
+
+
+def _motions_in_two_planes() -> tuple[Reference, ...]:
+    """Moves toward any side, and ellipses from a line to a circle, as fast as the sines of one plane.
+
+    Made where they are wanted: their parameters are read from the code that draws them.
+    """
+    kinds = ({"kind": "diagonal", "duration": 1.0}, {"kind": "diagonal", "duration": 0.7})
+    turns = ({"kind": "ellipse", "turn": 5.0}, {"kind": "ellipse", "turn": 2.0})
+    return tuple(Reference.model_validate(each) for each in (*kinds, *turns))
 
 
 def _from_the_rig(loop: Any) -> Any:
@@ -99,7 +102,7 @@ class RecommendSettings(Section):
         drawn = self.draw | {"reference.angle_deg": f"{-largest_deg:g}..{largest_deg:g}"}
         references = self.references
         if planes == 2:
-            references = _MOTIONS_IN_TWO_PLANES if references == _MOTIONS else references
+            references = _motions_in_two_planes() if references == _MOTIONS else references
             drawn = in_any_direction(drawn, references)
         return Family(loop=self.loop, draw=drawn, references=references, horizon=self.horizon)
 

@@ -149,4 +149,9 @@ def with_identified(study: Study, command: str, text: str) -> Study:
 
 
 def _known(loop: Loop, parts: Mapping[str, Mapping[str, Any]]) -> Loop:
-    return loop.model_copy(update={name: getattr(loop, name).model_copy(update=part) for name, part in parts.items()})
+    """The loop with these values; of a log with more readings than it has ticks it takes one a tick."""
+    known = {name: getattr(loop, name).model_copy(update=part) for name, part in parts.items()}
+    sensor = known["sensor"]
+    if sensor.level == "camera" and sensor.frame_rate * loop.control_period > 1.0:
+        known["sensor"] = sensor.model_copy(update={"frame_rate": 1.0 / loop.control_period})
+    return loop.model_copy(update=known)
