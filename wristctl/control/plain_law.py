@@ -122,6 +122,7 @@ def _doubles(address: int, count: int) -> list[float]:
 
 @cache
 def named_gains(fields: tuple[str, ...]) -> Any:
+    """Type of gains by their names, as a plain law sees them."""
     return namedtuple("Gains", fields)
 
 
