@@ -22,7 +22,7 @@ from wristctl.learning.training import train_one
 from wristctl.learning.training_result import Job, TrainingResult
 from wristctl.simulation.planes import motion_in
 from wristctl.wrist.kinematics import TipPath, arc_path
-from wristctl.wrist.spatial.spatial_kinematics import bend_path, spatial_tips
+from wristctl.wrist.spatial.spatial_kinematics import spatial_tips, tips_along
 
 THREE = WristParameters(tendons="three")
 
@@ -183,7 +183,7 @@ def test_a_network_of_two_planes_is_kept_in_its_file(trained: TrainingResult, tm
 
 def test_rates_along_a_path_are_derivatives_of_the_networks_bends(trained: TrainingResult) -> None:
     time = np.linspace(0.0, 1.0, 2001)
-    path = bend_path(_circle(time), 0.08)
+    path = tips_along(_circle(time), 0.08)
     found = trained.network.along(path)
     assert found.theta.shape == (2001, 2) and not found.outside.any()
     np.testing.assert_allclose(np.gradient(found.theta, time, axis=0)[1:-1], found.rate[1:-1], atol=1e-4)
@@ -200,7 +200,7 @@ def test_the_path_of_a_bend_in_a_plane_is_that_of_the_arc() -> None:
     theta = np.stack([np.linspace(-2.5, 2.5, 41), np.full(41, 0.7), np.linspace(-1.0, 2.0, 41)])
     length = np.repeat([[0.08], [0.0], [0.0]], 41, axis=1)
     toward = np.array([math.cos(0.6), math.sin(0.6)])
-    found, planar = bend_path(toward[:, None, None] * theta, 0.08), arc_path(theta, length)
+    found, planar = tips_along(toward[:, None, None] * theta, 0.08), arc_path(theta, length)
     for name in ("position", "velocity", "acceleration"):
         x, y = getattr(planar, name).T
         np.testing.assert_allclose(getattr(found, name), np.stack([x, *(toward[:, None] * y)], axis=1), atol=1e-14)

@@ -12,8 +12,8 @@ from wristctl.config.wrist import WristParameters
 from wristctl.errors import UserError
 from wristctl.simulation.hysteresis import HysteresisLoop, dead_bands, loops
 from wristctl.simulation.strokes import FrictionCase, Strokes, strokes, why_in_two_planes
-from wristctl.wrist.spatial.spatial_holding import values_of
 from wristctl.wrist.spatial.spatial_model import spatial_linearised
+from wristctl.wrist.spatial.spatial_segments import own_values
 
 DRAWN = ({"angle_deg": 10.0}, {"angle_deg": 100.0, "radius": 0.012}, {"angle_deg": 170.0}, {"angle_deg": 260.0})
 
@@ -66,7 +66,7 @@ def test_spools_hold_the_wrist_along_the_line_with_no_tendon_below_pretension(
     tendons: object, toward_deg: float
 ) -> None:
     held = _strokes(tendons, toward_deg)
-    values, still = values_of(held.wrist, held.settings.segments), 0.0 * held.theta
+    values, still = own_values(held.wrist, held.settings.segments), 0.0 * held.theta
     r = spatial_linearised(values, held.theta, still, still, held.pulls)[0]
     assert np.abs(r).max() < 1e-8 and held.pulls.min() >= held.wrist.pretension - 1e-9
     assert (held.pulls.min(axis=1) < held.wrist.pretension + 1e-6).all(), "with the least sum of pulls"

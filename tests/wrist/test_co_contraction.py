@@ -17,8 +17,8 @@ from wristctl.simulation.closed_loop import follow
 from wristctl.simulation.motion import Motion, resting
 from wristctl.simulation.spool_driven import SpooledWrist, spooled
 from wristctl.wrist.spatial.co_contraction import against_each_other, held_wrist, least_pulls, most_stiffness
-from wristctl.wrist.spatial.spatial_holding import values_of
 from wristctl.wrist.spatial.spatial_model import spatial_terms
+from wristctl.wrist.spatial.spatial_segments import own_values
 from wristctl.wrist.tendon_layout import TendonLayout
 
 DRAWN = ({"angle_deg": 0.0}, {"angle_deg": 100.0, "radius": 0.012}, {"angle_deg": 220.0})
@@ -54,7 +54,7 @@ def _rests(wrist: WristParameters, loop: Loop, ways: Array, torque: float) -> tu
 
     def weight(at: Array, gravity: Array) -> Array:
         loaded = wrist.model_copy(update={"gravity": (wrist.gravity[0], gravity[0]), "gravity_flexion": gravity[1]})
-        differ = [spatial_terms(values_of(one, 1), at, 0.0 * at).bias for one in (wrist, loaded)]
+        differ = [spatial_terms(own_values(one, 1), at, 0.0 * at).bias for one in (wrist, loaded)]
         return np.asarray(differ[0] - differ[1])[0]
 
     size = torque / np.hypot(*weight(straight, np.array([1.0, 0.0])))

@@ -23,7 +23,7 @@ from wristctl.records.open_log import OpenLog
 from wristctl.simulation.references import minimum_jerk
 from wristctl.wrist.allocation import allocated
 from wristctl.wrist.spatial.spatial_model import spatial_terms
-from wristctl.wrist.spatial.spatial_segments import ellipse, spatial_values
+from wristctl.wrist.spatial.spatial_segments import ellipse, own_values
 from wristctl.wrist.tendon_layout import TendonLayout
 
 # Tick of the simulation [s], and how many of them lie between two rows of spools.
@@ -114,7 +114,7 @@ def _reeled(wrist: WristParameters, actuator: Actuator, layout: TendonLayout, ai
     """Lengths on the spools (T, M) [m] that hold bends with least pulls, aims (T, 3), by one arc. Raises UserError."""
     bends, tightness = aims[:, :2], aims[:, 2:]
     axis = math.radians(wrist.stiffness_axis_deg)
-    values = spatial_values(wrist, layout, 1, axis=axis)
+    values = own_values(wrist, 1, layout)
     at_rest = spatial_terms(values, bends, 0.0 * bends)
     yy, yz, zz = ellipse(wrist.stiffness, wrist.stiffness * wrist.flexion_ratio, axis)
     torque = at_rest.bias + bends @ np.array([[yy, yz], [yz, zz]])

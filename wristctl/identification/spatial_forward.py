@@ -20,7 +20,7 @@ from wristctl.wrist.dahl import NoInnerFriction
 from wristctl.wrist.plant import advance_or_stop, kernel_of, parameters_of, path_before
 from wristctl.wrist.spatial.pcc_in_space import PCC_IN_SPACE
 from wristctl.wrist.spatial.posture import tip_bend
-from wristctl.wrist.spatial.spatial_segments import FIELDS, OF_A_TENDON, rows_of_tendons, spatial_values
+from wristctl.wrist.spatial.spatial_segments import FIELDS, OF_A_TENDON, own_values, rows_of_tendons
 from wristctl.wrist.spatial.spooled_tendons import RealPlaces, read_faults
 from wristctl.wrist.tendon_layout import TendonLayout
 from wristctl.wrist.tendon_mechanics import Nonideal, read_nonideal, shortening, spool_pull
@@ -106,7 +106,7 @@ def courses_of_bends(candidates: Sequence[SupposedBends], reeled: Array, h: floa
 
 def _values(supposed: SupposedBends, n: int, h: float) -> Array:
     wrist, along = supposed.wrist, n * supposed.shares
-    own = spatial_values(wrist, TendonLayout.four(wrist.tendon_radius), n, axis=np.radians(wrist.stiffness_axis_deg))
+    own = own_values(wrist, n, TendonLayout.four(wrist.tendon_radius))
     tendons, facts = supposed.tendons.model_copy(update={"level": "tendon"}), TendonFacts()
     alike = np.asarray(supposed.alike, float)
     stiffness, faults = alike * tendons.tendon_stiffness, faults_of(tendons, facts, alike)

@@ -19,7 +19,7 @@ from wristctl.simulation.planes import Asked, planes_of
 from wristctl.wrist.kinematics import arc_tip, chain_tip
 from wristctl.wrist.segments import Segments, segments
 from wristctl.wrist.spatial.spatial_kinematics import spatial_tips, tip_bends
-from wristctl.wrist.spatial.spatial_segments import SpatialSegments, spatial_values
+from wristctl.wrist.spatial.spatial_segments import SpatialSegments, own_values
 from wristctl.wrist.spatial.spatial_statics import spatial_equilibria_at
 from wristctl.wrist.statics import equilibria_at
 from wristctl.wrist.tendon_layout import TendonLayout
@@ -305,14 +305,13 @@ def _equilibria_in_space(
 ) -> tuple[Array, Array, NDArray[np.bool_]]:
     """Tips (B, 3) [m], the largest tension of a tendon (B,) [N] and whether it is stable (B,), in two planes."""
     layout = TendonLayout.of(wrist)
-    values = spatial_values(wrist, layout, n, axis=math.radians(wrist.stiffness_axis_deg))
-    parameters = np.tile(values, (len(bends), 1))
+    parameters = np.tile(own_values(wrist, n), (len(bends), 1))
     parameters[:, SpatialSegments._fields.index("hand_mass")] = hand
     for axis, gravity in zip("xyz", _gravity(pose, roll), strict=True):
         parameters[:, SpatialSegments._fields.index(f"gravity_{axis}")] = gravity
     arms: Array = layout.shares(wrist.discs)[:, None] * layout.cross_section
     least = wrist.pretension * layout.multiplicity.astype(np.float64)
-    q, pulls, stable = spatial_equilibria_at(parameters, n, bends, arms, least)
+    q, pulls, _, stable = spatial_equilibria_at(parameters, n, bends, arms, least)
     return spatial_tips(q, wrist.length), (pulls / layout.multiplicity).max(axis=1), stable
 
 

@@ -17,7 +17,7 @@ from wristctl.simulation.reference import REFERENCES, by_angles, course_of, esti
 from wristctl.simulation.worlds import plant_of
 from wristctl.wrist.directions import DIRECTIONS, in_plane
 from wristctl.wrist.kinematics import Inverse
-from wristctl.wrist.spatial.spatial_kinematics import bend_path
+from wristctl.wrist.spatial.spatial_kinematics import tips_along
 from wristctl.wrist.tendon_layout import TendonLayout, off_both_sides
 
 
@@ -106,7 +106,7 @@ def motion_in(
     wanted = Motion.of_bends(bends, period, wrist.length)
     if reference.inverse != "network":
         return wanted
-    estimate = estimated(network, bend_path(bends, wrist.length))
+    estimate = estimated(network, tips_along(bends, wrist.length))
     rows = np.stack([estimate.theta, estimate.rate, estimate.acceleration]).transpose(2, 0, 1)
     reached = Angles.of(np.ascontiguousarray(rows).reshape(-1, bends.shape[2]))
     outside = float(np.mean(estimate.outside))

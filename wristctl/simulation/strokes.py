@@ -19,9 +19,10 @@ from wristctl.wrist.compiled_model import terms
 from wristctl.wrist.directions import toward_words
 from wristctl.wrist.segments import segments
 from wristctl.wrist.spatial.co_contraction import least_pulls
-from wristctl.wrist.spatial.spatial_holding import FrictionOnHeld, at_rest_along, held_at, values_of
 from wristctl.wrist.spatial.spatial_kinematics import tip_bends
 from wristctl.wrist.spatial.spatial_model import spatial_terms
+from wristctl.wrist.spatial.spatial_segments import own_values
+from wristctl.wrist.spatial.spatial_statics import FrictionOnHeld, at_rest_along, spatial_equilibria_at
 from wristctl.wrist.statics import FROM_ABOVE, FROM_BELOW, HeldTendons, at_rest_with, equilibria_at
 from wristctl.wrist.tendon_layout import TendonLayout
 from wristctl.wrist.tendons import TENDONS_PER_SIDE
@@ -152,12 +153,14 @@ def strokes(wrist: WristParameters, settings: HysteresisSettings) -> Strokes:
         problem = f"a loop goes beyond the wrist's range, {wrist.range_deg:g} deg"
         raise UserError(problem, "hysteresis.ranges_deg", "smaller ranges")
     if why_in_two_planes(wrist, settings):
-        alike = TendonLayout.of(wrist).multiplicity.astype(float)
-        least = least_pulls(wrist, loop_of(settings), TendonLayout.of(wrist))
-        held = held_at(wrist, settings.segments, angle[:, None] * direction_of(settings), least)
-        theta, pulls, stable = held
-        values = values_of(wrist, settings.segments)
-        straight, lengths = _lengths(values, 0.0 * theta[:1]), _lengths(values, theta)
+        layout, bends = TendonLayout.of(wrist), angle[:, None] * direction_of(settings)
+        alike, least = layout.multiplicity.astype(float), least_pulls(wrist, loop_of(settings), layout)
+        arms = spatial_terms(own_values(wrist, 1), bends, 0.0 * bends).moment_arms.reshape(len(bends), -1, 2)
+        values = np.tile(own_values(wrist, settings.segments), (len(bends), 1))
+        theta, pulls, found, stable = spatial_equilibria_at(values, settings.segments, bends, arms, least)
+        if not found.all():
+            raise UserError("no rest was found on held tendons in two planes", "wrist", "a smaller bend, or more pull")
+        straight, lengths = _lengths(values[:1], 0.0 * theta[:1]), _lengths(values, theta)
     else:
         alike = np.array(SIDES)
         values = np.tile(segments(wrist, settings.segments), (len(angle), 1))

@@ -9,7 +9,7 @@ from wristctl.arrays import Array
 from wristctl.config.wrist import WristParameters
 from wristctl.wrist.allocation import allocated
 from wristctl.wrist.spatial.spatial_model import spatial_terms
-from wristctl.wrist.spatial.spatial_segments import ellipse, spatial_values
+from wristctl.wrist.spatial.spatial_segments import ellipse, own_values
 from wristctl.wrist.tendon_layout import TendonLayout
 
 
@@ -44,7 +44,7 @@ def held_all_around(wrist: WristParameters, layout: TendonLayout, force: float, 
 
 def _holds(wrist: WristParameters, layout: TendonLayout, bends: Array, load: Array | float = 0.0) -> NDArray[np.bool_]:
     """Whether tendons within their limits hold bends (P, 2) [rad] at rest, against a torque (2,) [N m], (P,)."""
-    values = spatial_values(wrist, layout, 1, axis=np.radians(wrist.stiffness_axis_deg))
+    values = own_values(wrist, 1, layout)
     at_rest = spatial_terms(values, bends, 0.0 * bends)
     yy, yz, zz = ellipse(wrist.stiffness, wrist.stiffness * wrist.flexion_ratio, np.radians(wrist.stiffness_axis_deg))
     torque = load + at_rest.bias + bends @ np.array([[yy, yz], [yz, zz]])

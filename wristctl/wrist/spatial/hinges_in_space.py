@@ -21,7 +21,7 @@ from wristctl.wrist.plant import PlantModel
 from wristctl.wrist.spatial.pcc_in_space import bend_in_space, load_in_space, within_bends
 from wristctl.wrist.spatial.spatial_chain import Chord, chord_of, chord_unit, springs_of
 from wristctl.wrist.spatial.spatial_kinematics import turned_by
-from wristctl.wrist.spatial.spatial_segments import FIELDS, SpatialSegments, rows_of_tendons, spatial_values
+from wristctl.wrist.spatial.spatial_segments import FIELDS, SpatialSegments, own_values, rows_of_tendons
 from wristctl.wrist.spatial.spatial_step import spatial_step
 from wristctl.wrist.spatial.spatial_tendons import (
     lengths_along,
@@ -167,7 +167,7 @@ def _torques(wrist: Any, q: Any, pulls: Any, torques: Any) -> None:
 def values(wrist: WristParameters, n: int) -> Array:
     """The wrist cut into n equal parts: SpatialHinges, then its tendons; UserError for one that ends within a part."""
     layout = TendonLayout.of(wrist)
-    of_arcs = spatial_values(wrist, layout, n, axis=np.radians(wrist.stiffness_axis_deg))
+    of_arcs = own_values(wrist, n, layout)
     named = dict(zip(SpatialSegments._fields, of_arcs[:FIELDS].tolist(), strict=True))
     del named["spans"]
     softening, first = tapered(wrist, n)

@@ -1,6 +1,5 @@
 """The wrist in two planes as a plant: piecewise constant curvature, n segments with two bends each as coordinates."""
 
-import math
 from typing import Any
 
 from wristctl.arrays import Array
@@ -17,7 +16,7 @@ from wristctl.wrist.spatial.spatial_segments import (
     SpatialWrist,
     load_spatial_segments,
     load_tip,
-    spatial_values,
+    own_values,
 )
 from wristctl.wrist.spatial.spatial_statics import spatial_equilibrium
 from wristctl.wrist.spatial.spatial_step import spatial_step
@@ -69,7 +68,7 @@ def placed_values(wrist: WristParameters, layout: TendonLayout, n: int) -> Array
     UserError for a taper of several.
     """
     check_even(wrist, n)
-    return spatial_values(wrist, layout, n, axis=math.radians(wrist.stiffness_axis_deg))
+    return own_values(wrist, n, layout)
 
 
 def _equilibrium(wrist: WristParameters, n: int, tensions: tuple[float, float]) -> Array:

@@ -106,7 +106,7 @@ def _stumpff(s: Array, k: int) -> Array:
     return total
 
 
-def bend_path(bends: Array, length: float) -> TipPath:
+def tips_along(bends: Array, length: float) -> TipPath:
     """Tips of an arc of this length [m] whose bend moves: bend, rate and acceleration (2, 3, T) [rad].
 
     The tip is l (c_1, c_2 u) of Stumpff's functions c_k of s = |u|^2, whose derivative is (k c_{k+2} - c_{k+1})/2.

@@ -103,3 +103,9 @@ def spatial_values(
     return np.concatenate(
         [SpatialSegments(*of_segments), rows_of_tendons(layout.cross_section, n * layout.shares(wrist.discs))]
     )
+
+
+def own_values(wrist: WristParameters, n: int, layout: TendonLayout | None = None) -> Array:
+    """`spatial_values` of a wrist with springs along its own axis, and its own tendons or those of a layout."""
+    tendons = TendonLayout.of(wrist) if layout is None else layout
+    return spatial_values(wrist, tendons, n, axis=math.radians(wrist.stiffness_axis_deg))

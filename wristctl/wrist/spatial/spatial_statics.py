@@ -1,5 +1,6 @@
-"""Statics of the wrist in two planes: rest under tensions and loads, stiffness and buckling."""
+"""Statics of the wrist in two planes: rest under tensions and loads or on held spools, stiffness and buckling."""
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -10,13 +11,17 @@ from wristctl.config.wrist import WristParameters
 from wristctl.errors import UserError
 from wristctl.wrist.allocation import allocated
 from wristctl.wrist.spatial.spatial_model import spatial_linearised, spatial_terms
-from wristctl.wrist.spatial.spatial_segments import FIELDS, SpatialSegments, spatial_values
+from wristctl.wrist.spatial.spatial_segments import FIELDS, SpatialSegments, own_values
 from wristctl.wrist.tendon_layout import TendonLayout
 
 _STEPS = 100
 # Largest change of a coordinate in one step of Newton's method [rad].
 _STRIDE = 0.3
-# Change of a torque by which pulls are differenced [N m]: they are piecewise linear in it.
+# Residual [N m, rad] of a rest.
+_AT_REST = 1e-9
+# Share of a tendon's largest moment arm below which it does not move along a motion.
+_STILL = 1e-6
+# Step of difference quotients [N m, rad]: pulls are piecewise linear in a torque.
 _SMALL = 1e-6
 
 
@@ -27,8 +32,10 @@ class SpatialEquilibria(NamedTuple):
     """(B, 2n) coordinates [rad]"""
     pulls: Array
     """(B, T) of all tendons alike at each place [N]"""
+    found: NDArray[np.bool_]
+    """(B,) whether there is such a rest"""
     stable: NDArray[np.bool_]
-    """(B,) whether it was found and stays there under held pulls"""
+    """(B,) whether the wrist stays there under held pulls"""
 
 
 def spatial_stiffness(parameters: ArrayLike, q: ArrayLike, pulls: ArrayLike) -> Array:
@@ -49,7 +56,7 @@ def least_spatial_stiffness(parameters: ArrayLike, n: int, pulls: ArrayLike) -> 
 def least_stiffness_at_pretension(wrist: WristParameters, n: int) -> float:
     """`least_spatial_stiffness` of a wrist of n segments whose tendons all pull at pretension [N m/rad]."""
     layout = TendonLayout.of(wrist)
-    values = spatial_values(wrist, layout, n, axis=np.radians(wrist.stiffness_axis_deg))
+    values = own_values(wrist, n)
     return least_spatial_stiffness(values, n, layout.multiplicity * wrist.pretension)
 
 
@@ -87,7 +94,7 @@ def spatial_equilibria_at(parameters: Array, n: int, bends: Array, arms: Array, 
     parameters
         Rows of `spatial_values` (B, V).
     arms
-        Moment arms of the straight wrist (T, 2) [m].
+        Moment arms (T, 2), or (B, T, 2) of each bend [m], by which pulls are shared out.
     least
         Least pull of each place of tendons (T,) [N].
     """
@@ -115,7 +122,60 @@ def spatial_equilibria_at(parameters: Array, n: int, bends: Array, arms: Array, 
     r, tangent, _ = spatial_linearised(parameters, q, still, still, pulls)
     off = np.abs(spatial_terms(parameters, q, still).bend[:, :2] - bends).max(axis=1)
     smallest = np.linalg.eigvalsh(0.5 * (tangent + tangent.transpose(0, 2, 1)))[:, 0]
-    return SpatialEquilibria(q, pulls, (np.abs(r).max(axis=1) < 1e-9) & (off < 1e-9) & (smallest > 0.0))
+    found = (np.abs(r).max(axis=1) < _AT_REST) & (off < _AT_REST)
+    return SpatialEquilibria(q, pulls, found, found & (smallest > 0.0))
+
+
+class FrictionOnHeld(NamedTuple):
+    """Tendons of B wrists on what holds them, as `wristctl.wrist.statics.HeldTendons` in one plane.
+
+    `given` (B, T) is what each place has reeled in [m], or its pull at the spool [N]; `stiffness` (T,) that of all
+    tendons of a place [N/m], or None where pulls are held; friction and sheath [rad] are (B,).
+    """
+
+    given: Array
+    stiffness: Array | None
+    friction: Array
+    sheath: Array
+
+
+def at_rest_along(wrist: WristParameters, n: int, held: FrictionOnHeld, motion: Array, guess: Array) -> Array:
+    """Coordinates (B, 2n) [rad] at rest on held tendons whose bristles a motion (B, 2n) there has bent fully.
+
+    By Newton's method from a guess (B, 2n). Raises UserError where there is no such rest.
+    """
+    values, layout = own_values(wrist, n), TendonLayout.of(wrist)
+    spanned = np.clip(n * layout.shares(wrist.discs)[:, None] - np.arange(n), 0.0, 1.0)
+    straight = layout.shares(wrist.discs) * wrist.length
+    travel = np.einsum("btq,bq->bt", spatial_terms(values, guess, 0.0 * guess).moment_arms, motion)
+    z = np.sign(np.where(np.abs(travel) > _STILL * np.abs(travel).max(axis=1, keepdims=True), travel, 0.0))
+
+    def residual(q: Array) -> Array:
+        stretch = held.given - (straight - spatial_terms(values, q, 0.0 * q).lengths)
+        at_spool = held.given if held.stiffness is None else held.stiffness * stretch.clip(0.0)
+        wrapped = np.hypot(q[:, ::2], q[:, 1::2]) @ spanned.T
+        left = np.exp(-held.friction[:, None] * (held.sheath[:, None] + wrapped) * z)
+        r: Array = spatial_linearised(values, q, 0.0 * q, 0.0 * q, at_spool * left)[0]
+        return r
+
+    return _newton(residual, guess)
+
+
+def _newton(residual: Callable[[Array], Array], guess: Array) -> Array:
+    """Zeros (B, m) of functions of B points at once, from a guess (B, m)."""
+    x, steps = np.array(guess, float), _SMALL * np.eye(guess.shape[1])
+    for _ in range(_STEPS):
+        r = residual(x)
+        columns = [(residual(x + step) - residual(x - step)) / (2.0 * _SMALL) for step in steps]
+        change = np.linalg.solve(np.stack(columns, axis=2), -r[..., None])[..., 0]
+        largest = np.abs(change).max(axis=1, initial=1e-300)
+        x = x + change * np.minimum(1.0, _STRIDE / largest)[:, None]
+        if largest.max() < 1e-12:
+            break
+    if not np.abs(residual(x)).max() < _AT_REST:
+        fix = "less friction, sheath or bend, or more pull"
+        raise UserError("no rest was found on held tendons in two planes", "wrist", fix)
+    return x
 
 
 def spatial_energy(parameters: ArrayLike, q: ArrayLike, rate: ArrayLike, pulls: ArrayLike) -> Array:
