@@ -28,10 +28,10 @@ from wristctl.config.wrist import WristParameters
 from wristctl.control.law import Controller, Gain
 from wristctl.control.table import controller, gains_of
 from wristctl.lanes.compiled import compiled
-from wristctl.lanes.lane import where
 from wristctl.simulation.reference import motion
 from wristctl.simulation.rollout import rollout
 from wristctl.stability.loop_analysis import AnalysedRow
+from wristctl.tuning.margin import late_torque
 
 HERE = Path(__file__).parent
 WRIST = WristParameters()
@@ -104,13 +104,7 @@ def altered(name: str) -> Controller:
 
     def law(now: Any, wrist: Any, gains: Any, kept: Any) -> Any:
         torque = gains.factor * (inner(now, wrist, gains, kept) - gains.rest)
-        late = torque
-        for k in range(LATEST):
-            late = where(abs(gains.late - (k + 1.0)) < 0.5, kept[memory + k], late)
-        for k in range(LATEST - 1, 0, -1):
-            kept[memory + k] = kept[memory + k - 1]
-        kept[memory] = torque
-        return gains.rest + late
+        return gains.rest + late_torque(torque, gains.late, kept, memory, LATEST)
 
     added = {each: Gain("", each, 1e-3, 1e3) for each in ("factor", "rest", "late")}
     return Controller(f"altered-{name}", law, own.source, {**own.gains, **added}, {}, memory + LATEST)

@@ -30,16 +30,28 @@ BENDS = {1: ("theta",), 2: ("bend_ulnar", "bend_flexion")}
 """Names of the outputs, by the number of planes."""
 
 
-class _Input(Section):
-    names: tuple[Literal["x"], Literal["y"]] | tuple[Literal["x"], Literal["y"], Literal["z"]] = ("x", "y")
-    unit: Literal["m"] = "m"
+class _Columns(Section):
+    names: tuple[str, ...]
+    unit: str
     mean: tuple[float, ...]
     deviation: tuple[Positive, ...]
 
     @model_validator(mode="after")
     def _a_value_each(self) -> Self:
-        _check_values(self, len(self.names))
+        count = len(self.names)
+        if len(self.mean) != count or len(self.deviation) != count:
+            raise ValueError(f"mean and deviation need {count} values each")
         return self
+
+
+class _Input(_Columns):
+    names: tuple[Literal["x"], Literal["y"]] | tuple[Literal["x"], Literal["y"], Literal["z"]] = ("x", "y")
+    unit: Literal["m"] = "m"
+
+
+class _Output(_Columns):
+    names: tuple[Literal["theta"]] | tuple[Literal["bend_ulnar"], Literal["bend_flexion"]] = ("theta",)
+    unit: Literal["rad"] = "rad"
 
 
 class _Other(Section):
@@ -48,23 +60,6 @@ class _Other(Section):
     mean: float
     deviation: Positive
     range: tuple[float, float]
-
-
-class _Output(Section):
-    names: tuple[Literal["theta"]] | tuple[Literal["bend_ulnar"], Literal["bend_flexion"]] = ("theta",)
-    unit: Literal["rad"] = "rad"
-    mean: tuple[float, ...]
-    deviation: tuple[Positive, ...]
-
-    @model_validator(mode="after")
-    def _a_value_each(self) -> Self:
-        _check_values(self, len(self.names))
-        return self
-
-
-def _check_values(columns: _Input | _Output, count: int) -> None:
-    if len(columns.mean) != count or len(columns.deviation) != count:
-        raise ValueError(f"mean and deviation need {count} values each")
 
 
 class _Region(Section):

@@ -6,7 +6,7 @@ extension -, ulnar deviation + and radial deviation - (Wu et al., ISB, J. Biomec
 its plane is named. A motion in one plane is the component that this plane has; those in two take both ends at once.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Literal
 
 import numpy as np
@@ -28,20 +28,10 @@ def _task(
 ) -> ReferenceKind:
     """A task that takes the wrist from `low_deg` to `high_deg` in a plane; an end at 0 is where it starts."""
     ends = [end for end in (high_deg, low_deg) if end != 0.0]
-
-    def course(reference: Reference, time: Array) -> Array:
-        return _strokes(reference, time, ends)
-
     signs = ("extension", "flexion") if plane == "flexion" else ("radial", "ulnar")
     stations = " to ".join(f"{abs(end):g} deg {signs[end > 0.0]}" for end in (low_deg, high_deg) if end != 0.0)
-    return ReferenceKind(
-        f"{activity}: {stations} ({source})",
-        course=course,
-        described=lambda reference: f"adl:{name} {reference.duration:g} s strokes" + _scaled(reference),
-        targets="none",
-        parameters={"scale": Parameter(1.0, "", "factor on the angles")},
-        plane=plane,
-    )
+    told = f"{activity}: {stations} ({source})"
+    return _repeated(name, told, lambda reference, time: _strokes(reference, time, ends), plane)
 
 
 def _task_in_two_planes(
@@ -56,13 +46,26 @@ def _task_in_two_planes(
     stations = (
         f"{-extension:g} deg extension with {-radial:g} deg radial to {flexion:g} deg flexion with {ulnar:g} deg ulnar"
     )
+    told = f"{activity}: {stations} ({source}; the dart-thrower's coupling of both planes is ours)"
+    return _repeated(name, told, course, planes=2)
+
+
+def _repeated(
+    name: str,
+    told: str,
+    course: Callable[[Reference, Array], Array],
+    plane: Literal["", "ulnar", "flexion"] = "",
+    planes: Literal[1, 2] = 1,
+) -> ReferenceKind:
+    """A task that is done over and over."""
     return ReferenceKind(
-        f"{activity}: {stations} ({source}; the dart-thrower's coupling of both planes is ours)",
+        told,
         course=course,
         described=lambda reference: f"adl:{name} {reference.duration:g} s strokes" + _scaled(reference),
         targets="none",
         parameters={"scale": Parameter(1.0, "", "factor on the angles")},
-        planes=2,
+        plane=plane,
+        planes=planes,
     )
 
 

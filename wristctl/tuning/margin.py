@@ -179,16 +179,20 @@ def changed_law(law: Controller) -> Controller:
 
 
 @compiled
-def _later(gains: Any, kept: Any, first: int, torque: Any) -> Any:
-    """The torque times its factor, as many periods late as is asked; those of before are kept from `first` on."""
-    now = gains.margin_factor * torque
-    late = now
-    for k in range(_LATEST):
-        late = where(abs(gains.margin_late - (k + 1.0)) < 0.5, kept[first + k], late)
-    for k in range(_LATEST - 1, 0, -1):
+def late_torque(torque: Any, late: Any, kept: Any, first: int, latest: int) -> Any:
+    """The torque of `late` periods ago, 0 to `latest`; those of before are kept from `first` on, the newest first."""
+    found = torque
+    for k in range(latest):
+        found = where(abs(late - (k + 1.0)) < 0.5, kept[first + k], found)
+    for k in range(latest - 1, 0, -1):
         kept[first + k] = kept[first + k - 1]
-    kept[first] = now
-    return late
+    kept[first] = torque
+    return found
+
+
+@compiled
+def _changed_torque(gains: Any, kept: Any, first: int, torque: Any) -> Any:
+    return late_torque(gains.margin_factor * torque, gains.margin_late, kept, first, _LATEST)
 
 
 @cache
@@ -196,7 +200,7 @@ def _compiled(base: Any, last: int) -> Any:
     inner = compiled(base)
 
     def law(now: Any, wrist: Any, gains: Any, memory: Any) -> Any:
-        return _later(gains, memory, last, inner(now, wrist, gains, memory))
+        return _changed_torque(gains, memory, last, inner(now, wrist, gains, memory))
 
     return kept_nowhere(law)
 
@@ -208,7 +212,7 @@ def _compiled_of_both_planes(base: Any, last: int) -> Any:
     def law(now: Any, wrist: Any, gains: Any, memory: Any, tendons: Any, torque: Any) -> None:
         inner(now, wrist, gains, memory, tendons, torque)
         for p in range(len(torque)):
-            torque[p] = _later(gains, memory[p], last, torque[p])
+            torque[p] = _changed_torque(gains, memory[p], last, torque[p])
 
     return kept_nowhere(law)
 
