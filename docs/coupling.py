@@ -20,7 +20,7 @@ from wristctl.control.clf_qp import least_acceleration
 from wristctl.control.disturbance_observer import VALUES, disturbance, remember
 from wristctl.control.law import Controller, ahead
 from wristctl.control.model import one_segment
-from wristctl.control.mpc import HORIZON, TURNS
+from wristctl.control.mpc import HORIZON, TURNS, riccati
 from wristctl.control.table import controller, gains_of
 from wristctl.lanes.compiled import compiled
 from wristctl.lanes.functions import maximum
@@ -77,25 +77,9 @@ def _plan_together(now: Any, weights: Any, base: Any, arms: Any, room: Any, memo
     """`wristctl.control.mpc.plan` of both planes, its box replaced by what the tendons reach together."""
     w, zeta = weights[0], maximum(_LEAST_DAMPING, weights[1])
     h = now[0].period
-    w2 = w * w
-    by_angle, by_rate = h * w2 * w2, h * (4.0 * zeta * zeta - 2.0) * w2
     first = part(memory[0], VALUES, _STEPS)
     by_start, by_speed, share, shift = lanes_like(first), lanes_like(first), lanes_like(first), lanes_like(first)
-    span = 1.0 + HORIZON * h * w * (2.0 * zeta + HORIZON * h * w)
-    price = 0.05 * span
-    effort = h * (1.0 + price)
-    p11, p12, p22 = 2.0 * zeta * w2 * w, w2, 2.0 * zeta * w
-    end11, end12, end22 = p11, p12, p22
-    for step in range(HORIZON):
-        k = HORIZON - 1 - step
-        b1, b2 = h * (0.5 * h * p11 + p12), h * (0.5 * h * p12 + p22)
-        inverse = 1.0 / (effort + h * (0.5 * h * b1 + b2))
-        c1, c2 = b1, h * b1 + b2
-        share[k] = inverse
-        by_start[k] = inverse * c1
-        by_speed[k] = inverse * c2
-        q11, q12, q22 = p11, p12 + h * p11, p22 + 2.0 * h * p12 + h * h * p11
-        p11, p12, p22 = by_angle + q11 - inverse * c1 * c1, q12 - inverse * c1 * c2, by_rate + q22 - inverse * c2 * c2
+    by_angle, by_rate, price, (end11, end12, end22) = riccati(h, (w, zeta), by_start, by_speed, share)
     wanted, off, none = lanes_like(out), lanes_like(out), lanes_like(out)
     zero = zero_like(h)
     none[0], none[1] = zero, zero

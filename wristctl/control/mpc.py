@@ -24,27 +24,18 @@ _RELAXED, _LEAST_DAMPING = 1.6, 2.0**-0.5
 
 
 @compiled
-def plan(now: Any, start: Any, weights: Any, box: Any, kept: Any, turns: int) -> Any:
-    """The first of the accelerations [rad/s^2] that bring the double integrator along the reference at least cost.
+def riccati(h: Any, weights: Any, by_start: Any, by_speed: Any, share: Any) -> Any:
+    """Sweep backward over the horizon at weights (w, zeta) of the error, in periods of h.
 
-    From `start` (angle, rate), at weights (w, zeta) the cost over the horizon is sum h ((v - theta_ref'')^2 + w^4 e^2 +
-    (4 zeta^2 - 2) w^2 e'^2), its end what a horizon without end would cost: unconstrained, the plan begins with
-    theta_ref'' - 2 zeta w e' - w^2 e. `box` is the least and the largest v; `kept` (2 HORIZON,) the plan of the period
-    before and its multipliers, of which this begins.
+    Writes the gains of each step on angle and rate and 1/(effort + B'PB), and returns the weights of a step on angle
+    and rate, the price of a change of the plan, and the end's cost to go (p11, p12, p22).
     """
-    w, zeta = weights[0], maximum(_LEAST_DAMPING, weights[1])
-    low, high = box
-    h = now.period
+    w, zeta = weights
     w2 = w * w
     by_angle, by_rate = h * w2 * w2, h * (4.0 * zeta * zeta - 2.0) * w2
-    plans, multipliers = part(kept, 0, _STEPS), part(kept, HORIZON, _STEPS)
-    by_start, by_speed, share = lanes_like(plans), lanes_like(plans), lanes_like(plans)
-    shift, wished = lanes_like(plans), lanes_like(plans)
     span = 1.0 + HORIZON * h * w * (2.0 * zeta + HORIZON * h * w)
     price = 0.05 * span  # by trial, over horizons of 0.4 to 10 of the error's time constants
     effort = h * (1.0 + price)
-
-    # the Riccati sweep: P of the cost to go (p11, p12, p22), the gains, and 1/(effort + B'PB)
     p11, p12, p22 = 2.0 * zeta * w2 * w, w2, 2.0 * zeta * w
     end11, end12, end22 = p11, p12, p22
     for step in range(HORIZON):
@@ -57,6 +48,25 @@ def plan(now: Any, start: Any, weights: Any, box: Any, kept: Any, turns: int) ->
         by_speed[k] = inverse * c2
         q11, q12, q22 = p11, p12 + h * p11, p22 + 2.0 * h * p12 + h * h * p11
         p11, p12, p22 = by_angle + q11 - inverse * c1 * c1, q12 - inverse * c1 * c2, by_rate + q22 - inverse * c2 * c2
+    return by_angle, by_rate, price, (end11, end12, end22)
+
+
+@compiled
+def plan(now: Any, start: Any, weights: Any, box: Any, kept: Any, turns: int) -> Any:
+    """The first of the accelerations [rad/s^2] that bring the double integrator along the reference at least cost.
+
+    From `start` (angle, rate), at weights (w, zeta) the cost over the horizon is sum h ((v - theta_ref'')^2 + w^4 e^2 +
+    (4 zeta^2 - 2) w^2 e'^2), its end what a horizon without end would cost: unconstrained, the plan begins with
+    theta_ref'' - 2 zeta w e' - w^2 e. `box` is the least and the largest v; `kept` (2 HORIZON,) the plan of the period
+    before and its multipliers, of which this begins.
+    """
+    w, zeta = weights[0], maximum(_LEAST_DAMPING, weights[1])
+    low, high = box
+    h = now.period
+    plans, multipliers = part(kept, 0, _STEPS), part(kept, HORIZON, _STEPS)
+    by_start, by_speed, share = lanes_like(plans), lanes_like(plans), lanes_like(plans)
+    shift, wished = lanes_like(plans), lanes_like(plans)
+    by_angle, by_rate, price, (end11, end12, end22) = riccati(h, (w, zeta), by_start, by_speed, share)
 
     wished[0] = now.acceleration_ref
     for k in range(1, HORIZON):
