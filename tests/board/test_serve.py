@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import gc
 import os
+import re
 import socket
 import threading
 from collections.abc import Iterator
@@ -111,6 +112,25 @@ def test_time_in_which_the_computer_did_something_else_is_given_up(monkeypatch: 
     before, after, later = paced(monkeypatch, [0.05, 3.0, 0.01])
     assert after[1] - before[1] == pytest.approx(0.1, abs=1e-6)
     assert later[1] - after[1] == pytest.approx(0.01, abs=1e-6)
+
+
+@pytest.mark.slow
+def test_how_late_the_board_spoke_is_told_and_a_warning_where_that_is_seen(
+    monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    """What the chip says is heard when its piece ends: half a piece late as a mean, longer pieces weighing more."""
+    told = r"ran ([\d.]+) ms late as a mean, (\d+) ms at worst"
+    for waits, late, worst, level in (
+        ([0.001] * 10, 0.5, 1, "INFO"),
+        ([0.001] * 30 + [0.04], 20.0 * 40.0 / 69.0, 40, "WARNING"),
+        ([0.0001] * 10 + [3.0], 50.0 * 100.0 / 100.9, 3000, "WARNING"),
+    ):
+        caplog.clear()
+        with caplog.at_level("INFO", logger="wristctl.board.emulator.serve"):
+            paced(monkeypatch, waits)
+        said = re.search(told, caplog.records[-1].getMessage())
+        assert said is not None and caplog.records[-1].levelname == level
+        assert float(said[1]) == pytest.approx(late, abs=0.3) and int(said[2]) == worst
 
 
 @pytest.mark.slow

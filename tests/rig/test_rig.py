@@ -29,52 +29,61 @@ from wristctl.loop_priority import prioritised
 ROOT = Path(__file__).parents[2]
 BOOT_LOADER = Path("/usr/share/arduino/hardware/arduino/avr/bootloaders/stk500v2/stk500boot_v2_mega2560.hex")
 TENDONS_OFF = ("--set", "bench.motors.slack=[0.02, 0.02, 0.02, 0.02]")
-PERIOD, MAY_BE_LATE = 10e-3, 5e-3
+PERIOD, MAY_BE_LATE, AT_WORST = 10e-3, 5e-3, 50e-3
+BOARD_MAY_BE_LATE = 1e-3
 
 pytestmark = pytest.mark.skipif(not os.environ.get("WRISTCTL_RIG"), reason="runs alone: make test-rig")
 
 
 class Lateness:
-    """How late this computer wakes somebody who sleeps for 5 ms at a time, with a loop's priority where it gives any,
-    for as long as the block lasts."""
+    """How late this computer wakes somebody who sleeps for 10 ms at a time on each of its processors, with a loop's
+    priority where it gives any, for as long as the block lasts: what another guest of the machine takes is of one."""
 
     def __enter__(self) -> Lateness:
         self._late: list[float] = []
         self._done = threading.Event()
-        self._thread = threading.Thread(target=self._sleep)
-        self._thread.start()
+        self._threads = [threading.Thread(target=self._sleep, args=(each,)) for each in os.sched_getaffinity(0)]
+        with prioritised(True):  # threads keep what the one has that starts them
+            for thread in self._threads:
+                thread.start()
         return self
 
     def __exit__(self, *_: object) -> None:
         self._done.set()
-        self._thread.join()
+        for thread in self._threads:
+            thread.join()
 
     @property
-    def p99(self) -> float:
-        return float(np.quantile(self._late, 0.99)) if self._late else 0.0
+    def excuse(self) -> str:
+        """What a test may have failed by that is not ours; empty where the period was kept."""
+        late, worst = np.quantile(self._late, [0.99, 1.0]) if self._late else (0.0, 0.0)
+        if late > MAY_BE_LATE or worst > AT_WORST:
+            return f"one time in a hundred this computer wakes {1e3 * late:.1f} ms late, at worst {1e3 * worst:.0f} ms"
+        return ""
 
-    def _sleep(self) -> None:
-        with prioritised(True):
-            while not self._done.is_set():
-                due = time.monotonic() + PERIOD
-                time.sleep(PERIOD)
-                self._late.append(time.monotonic() - due)
+    def _sleep(self, processor: int) -> None:
+        os.sched_setaffinity(threading.get_native_id(), {processor})
+        while not self._done.is_set():
+            due = time.monotonic() + PERIOD
+            time.sleep(PERIOD)
+            self._late.append(time.monotonic() - due)
 
 
 @contextmanager
-def in_time() -> Iterator[None]:
-    """What fails in the block is only held against us where the computer kept the period."""
+def in_time(served: Bridge) -> Iterator[None]:
+    """What fails in the block is only held against us where computer and emulated board kept their times."""
     with Lateness() as lateness:
         failed: BaseException | None = None
         try:
             yield
         except (AssertionError, subprocess.TimeoutExpired) as error:
             failed = error
-    if lateness.p99 > MAY_BE_LATE:
-        late = f"one time in a hundred this computer wakes {1e3 * lateness.p99:.1f} ms late"
-        pytest.skip(f"{late}, which is too much for ticks of {1e3 * PERIOD:g} ms: {failed or 'it passed all the same'}")
-    if failed is not None:
-        raise failed
+    if failed is None:
+        return
+    served.close()
+    if excuse := lateness.excuse or served.excuse:
+        pytest.skip(f"{excuse}, which is too much for ticks of {1e3 * PERIOD:g} ms: {failed}")
+    raise failed
 
 
 class Bridge:
@@ -96,8 +105,18 @@ class Bridge:
         return self._process.poll() is None
 
     def close(self) -> None:
-        self._process.send_signal(signal.SIGINT)
-        self._process.communicate(timeout=30.0)
+        """End it; again does nothing."""
+        if self._process.stdout is not None and not self._process.stdout.closed:
+            self._process.send_signal(signal.SIGINT)
+            _, self._said = self._process.communicate(timeout=30.0)
+
+    @property
+    def excuse(self) -> str:
+        """Of a closed one: how late its board was, where that is too late; empty else."""
+        told = re.search(r"the emulated board ran ([\d.]+) ms late as a mean, (\d+) ms at worst", self._said)
+        if told and (float(told[1]) > 1e3 * BOARD_MAY_BE_LATE or float(told[2]) > 1e3 * AT_WORST):
+            return told[0]
+        return ""
 
 
 def wristctl(*arguments: str) -> subprocess.Popen[str]:
@@ -137,7 +156,7 @@ def test_a_slow_link_and_camera_are_named_and_the_latency_is_found_to_two_millis
     slow = ("bench.line.adapter=ftdi", "bench.camera.frame_rate=15", "bench.camera.delay_frames=0.9",
             "bench.camera.dropped=0", "priority=true")  # fmt: skip
     served = bridge(*(part for each in slow for part in ("--set", each)))
-    with in_time():
+    with in_time(served):
         code, out, err = do(
             f"hw check --rig --yes --json --set priority=true --port {served.port} --camera {served.camera}"
         )
@@ -194,14 +213,14 @@ def test_first_power_up_is_walked_from_flashing_to_the_first_motion(bridge: Call
     def here() -> str:
         return next(walk).replace("/dev/ttyACM0", served.port).replace("--camera 0", f"--camera {served.camera}")
 
-    with in_time():
+    with in_time(served):
         flash, check = here(), here()
         code, out, err = do(flash)
         assert code == 0 and "written, verified and answering" in out, err
     # a pseudo-terminal has no modem lines: the host cannot know that opening it starts a boot loader
     served = bridge(*options, *TENDONS_OFF)
     check = check.replace(flash.split()[-1], served.port)
-    with in_time():
+    with in_time(served):
         for act, state, fault in (("press", "FAULT", "ESTOP_INPUT"), ("release", "DISABLED", "none")):
             served.type(act)
             code, out, err = do(check)
@@ -217,7 +236,7 @@ def test_first_power_up_is_walked_from_flashing_to_the_first_motion(bridge: Call
         code, out, err = do(here(), "yes\n")
         assert code == 0 and "is refused, on all axes" in out, err
     served = bridge(*options)  # tendons on
-    with in_time():
+    with in_time(served):
         code, out, err = do(here(), "yes\n\n")
         assert code == 0 and "axis 2: +20 steps" in out, out + err
         code, out, err = do(here(), "yes\n")
@@ -225,7 +244,7 @@ def test_first_power_up_is_walked_from_flashing_to_the_first_motion(bridge: Call
         code, out, err = do(here(), "yes\n2 0.2\n\n")
         assert code == 0 and "positions (0, 0, 14, 0)" in out, out + err
     served = bridge(*options)  # its tendons as they were before
-    with in_time():
+    with in_time(served):
         code, out, err = do(here(), "yes\n")
         assert code == 0 and out.startswith("This rig can run the loop of 10 ms"), out + err
         code, out, err = do(here(), "yes\nyes\n")

@@ -27,6 +27,8 @@ _QUANTUM, _IDLE_QUANTUM = 0.00025, 0.02
 _AT_ONCE, _ON_THE_WAY = 4096, 1024
 # Seconds that the chip may lag behind real time before that time is given up.
 _FURTHEST_BEHIND = 0.1
+# Seconds by which what the board says may be late as a mean, lest a rig's timing be another than it is set to.
+_NOT_SEEN = 1e-3
 
 
 class Line(Protocol):
@@ -153,13 +155,43 @@ def serve(
 
     `watch` is told what the chip's latches did, and when its clock was 0 (`time.monotonic`): later where it lagged.
     """
+    lateness = _Lateness()
     with no_long_pauses():
-        _serve(chip, line, running, watch)
+        try:
+            _serve(chip, line, running, watch, lateness)
+        finally:
+            lateness.tell()
+
+
+class _Lateness:
+    """By how much later than on a real board a client hears what the chip says: it runs in pieces, each when its time
+    has passed."""
+
+    def __init__(self) -> None:
+        self._served = self._late = self._worst = 0.0
+
+    def ran(self, piece: float, given_up: float, after: float) -> None:
+        """The chip ran a piece, time that has passed and is not given up, and was behind by `after` then, all in s."""
+        self._served += piece
+        self._late += piece * (0.5 * piece + after)
+        self._worst = max(self._worst, piece + given_up + after)
+
+    def tell(self) -> None:
+        """Log it, as a warning where it matters."""
+        if self._served == 0.0:
+            return
+        late, worst = 1e3 * self._late / self._served, 1e3 * self._worst
+        said = f"the emulated board ran {late:.1f} ms late as a mean, {worst:.0f} ms at worst"
+        if late > 1e3 * _NOT_SEEN or self._worst > _FURTHEST_BEHIND:
+            log.warning("%s: this computer is too slow or too busy for what was measured on it", said)
+        else:
+            log.info(said)
 
 
 def _serve(
-    chip: Atmega2560, line: Line, running: Callable[[], bool], watch: Callable[[NDArray[np.void], float], None]
-) -> None:
+    chip: Atmega2560, line: Line, running: Callable[[], bool], watch: Callable[[NDArray[np.void], float], None],
+    lateness: _Lateness,
+) -> None:  # fmt: skip
     start = time.monotonic() - chip.cycles / FREQUENCY
     connected = False
     while running():
@@ -168,8 +200,9 @@ def _serve(
             chip.reset()
         behind = time.monotonic() - start - chip.cycles / FREQUENCY
         start += max(0.0, behind - _FURTHEST_BEHIND)
+        piece = max(0.0, min(behind, _FURTHEST_BEHIND))
         try:
-            chip.run(max(0, round(min(behind, _FURTHEST_BEHIND) * FREQUENCY)))
+            chip.run(round(piece * FREQUENCY))
         except Halted as crash:
             log.warning("the program on the emulated board crashed: %s; the board is reset", crash)
             chip.reset()
@@ -179,4 +212,6 @@ def _serve(
             time.sleep(_QUANTUM)  # clients wait: bytes that are there end no poll
         if data := chip.read():
             line.send(data)
+        if connected and before:
+            lateness.ran(piece, behind - piece, time.monotonic() - start - chip.cycles / FREQUENCY)
         watch(chip.events(), start)
