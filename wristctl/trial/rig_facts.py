@@ -136,7 +136,7 @@ def measure(
             direction = _direction_of(axis, bend, SpatialMoves(settings, wrist))
         if direction is None or direction.astray is None:
             for cameras in strokes.strokes(taut, progress):
-                latencies = [find_latency(motor_strokes) for motor_strokes in cameras]
+                latencies = [find_latency(motor_strokes, strokes.hold) for motor_strokes in cameras]
                 if max(latency.sd for latency in latencies) < _SURE:
                     break
         strokes.let_go()

@@ -88,14 +88,18 @@ class Latency(NamedTuple):
     pictures: int
 
 
-def find_latency(strokes: Sequence[MotorStroke]) -> Latency:
-    """The delay by which strokes were seen. ValueError for fewer than twenty pictures."""
+def find_latency(strokes: Sequence[MotorStroke], meanwhile: Callable[[], None] = lambda: None) -> Latency:
+    """The delay by which strokes were seen. ValueError for fewer than twenty pictures.
+
+    It takes up to seconds, and calls `meanwhile` some hundred times a second.
+    """
     count = sum(len(stroke.angle) for stroke in strokes)
     if count < 20:
         raise ValueError(f"{count} pictures are too few")
 
     def fitted(begin: Array, parts: int) -> OptimizeResult:
         def errors(x: Array) -> Array:
+            meanwhile()
             return _errors(strokes, _courses(strokes, float(np.exp(x[1])), float(np.exp(x[2]))), float(x[0]), parts)
 
         bounds = [-0.05, np.log(3.0), np.log(0.02)], [_LATEST, np.log(1000.0), np.log(20.0)]
@@ -104,6 +108,7 @@ def find_latency(strokes: Sequence[MotorStroke]) -> Latency:
     tried = []
     for rate in _RATES:
         courses = _courses(strokes, rate, _DAMPING)
+        meanwhile()
         tried += [(float(np.sum(_errors(strokes, courses, delay, 1) ** 2)), delay, rate) for delay in _DELAYS]
     _, begin, rate = min(tried)
     swing = fitted(np.array([begin, np.log(rate), np.log(_DAMPING)]), 1)  # alone, lest it be taken for the slow part
@@ -187,6 +192,7 @@ class RigStrokes:
         patient = settings.safety.model_copy(update={"watchdog": max(_SILENCE, settings.safety.watchdog)})
         prepare(board, settings.model_copy(update={"safety": patient}))
         board.home()
+        self._fed = -math.inf
         if settings.planes == 2:  # what one camera sees of a bend depends on the other
             tracking.zero = Patience(board).markers(tracking, 10)
         self._straight = Patience(board).reading(tracking, 10)
@@ -196,7 +202,8 @@ class RigStrokes:
     ) -> Iterator[Sequence[Sequence[MotorStroke]]]:
         """All strokes so far as each camera saw them, whenever COUNT more are done, up to MOST; the tendon stays taut.
 
-        They begin from the position [steps] of `taken_up`. Raises SafetyStop, BoardError and CameraError.
+        They begin from the position [steps] of `taken_up`. Who looks at them calls `hold` all the while. Raises
+        SafetyStop, BoardError and CameraError.
         """
         sense = 1 if taut > 0 else -1
         low, _ = self._crept(taut, sense, _BEGUN, _LONGEST)
@@ -211,6 +218,12 @@ class RigStrokes:
             progress(count)
             if count % COUNT == 0:
                 yield cameras
+
+    def hold(self) -> None:
+        """Keep the motors where they are, when called five times or more in the board's time of silence."""
+        if (now := self._board.transport.now()) - self._fed > 0.2 * _SILENCE:
+            self._board.ping()
+            self._fed = now
 
     def let_go(self) -> None:
         """Back to where the motor stood at first."""
@@ -269,8 +282,8 @@ class RigStrokes:
         board, clock = self._board, self._board.transport
         one, two, three, four = (goal * (k == self._axis) for k in range(AXES))
         board.send(Target((one, two, three, four), (rate,) * 4))
-        fed = clock.now()
-        end, positions, angles = fed + seconds, [], []
+        self._fed = clock.now()
+        end, positions, angles = self._fed + seconds, [], []
         moving = True
         while (now := clock.now()) < end or moving:
             status = board.read()
@@ -278,9 +291,7 @@ class RigStrokes:
                 raise board.faulted(status)
             moving = Flag.MOVING in status.flags
             positions.append((now + self._underway, status.position[self._axis]))
-            if now - fed > 0.2 * _SILENCE:
-                board.ping()
-                fed = now
+            self.hold()
             usable = [sighting for sighting in self._tracking.look() if math.isfinite(sighting.theta)]
             angles += [(sighting.time, sighting.theta, sighting.plane) for sighting in usable]
             clock.wait(1e-3)
