@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 
 import pytest
@@ -142,3 +143,79 @@ def test_an_answer_that_the_computer_slept_through_is_not_the_cables_fault(sleep
     with pytest.raises(NoAnswer) as lost:
         Exchange(Sleepy(lambda frame, n: b"")).ask(Command.PING, b"", 0.025, 3)
     assert lost.value.origin == blamed and ("slept" in lost.value.what) == bool(sleeps)
+
+
+class Late(Wire):
+    """Answers, each so long after its command as a test says; inf: never."""
+
+    def __init__(self, delays: list[float]) -> None:
+        super().__init__(lambda frame, n: b"")
+        self.delays, self.due = delays, list[tuple[float, bytes]]()
+
+    def write(self, data: bytes) -> None:
+        for frame in Decoder().feed(data):
+            self.due.append((self.time + self.delays[len(self.frames)], answer(frame, bytes([0, len(self.frames)]))))
+            self.frames.append(frame)
+
+    def read(self, timeout: float) -> bytes:
+        first = min((time for time, _ in self.due), default=math.inf)
+        self.time = max(self.time, min(self.time + timeout, first))
+        came = [each for each in self.due if each[0] <= self.time]
+        self.due = [each for each in self.due if each not in came]
+        return b"".join(data for _, data in came)
+
+
+def posted(delays: list[float]) -> tuple[Exchange, Late]:
+    """Commands posted every 10 ms from 5.0 s on, the answers to which nobody has asked for."""
+    wire = Late(delays)
+    exchange = Exchange(wire)
+    for k in range(len(delays)):
+        wire.time = 5.0 + 0.01 * k
+        assert exchange.post(Command.PING, b"") == wire.time
+    return exchange, wire
+
+
+def heard(exchange: Exchange, until: float) -> tuple[int, float] | None:
+    """Number of the command whose answer comes by then, in milliseconds after 5 s when it was posted."""
+    arrived = exchange.arrived(until, 0.1)
+    if arrived is None:
+        return None
+    began, command, payload = arrived
+    assert command is Command.PING
+    return payload[1], round(1e3 * (began - 5.0), 9)
+
+
+def test_answers_to_what_was_posted_come_in_turn_those_of_one_reading_too() -> None:
+    exchange, wire = posted([0.025, 0.016, 0.012])
+    assert heard(exchange, 5.02) is None and wire.time == 5.02, "none is there, and time is up"
+    wire.time = 5.03
+    assert heard(exchange, 5.04) == (0, 0.0) and wire.time == 5.03
+    assert exchange.round_trip == pytest.approx(0.03)
+    assert heard(exchange, 5.0) == (1, 10.0), "it had come with the first"
+    assert heard(exchange, 6.0) == (2, 20.0) and wire.time == pytest.approx(5.032)
+    assert heard(exchange, 9.0) is None and wire.time == pytest.approx(5.032), "nothing is on its way"
+    traffic = exchange.traffic
+    assert (traffic.sent, traffic.resent, traffic.answers, traffic.stale) == (3, 0, 3, 0)
+
+
+def test_what_came_while_the_host_was_busy_is_read_though_time_is_up() -> None:
+    exchange, wire = posted([0.002])
+    wire.time = 5.3
+    assert heard(exchange, 5.01) == (0, 0.0) and wire.time == 5.3
+
+
+def test_a_command_that_the_answer_to_a_later_one_passes_over_counts_as_sent_again() -> None:
+    exchange, _ = posted([math.inf, math.inf, 0.005])
+    assert heard(exchange, 6.0) == (2, 20.0)
+    assert (exchange.traffic.resent, exchange.traffic.answers) == (2, 1)
+
+
+def test_posted_commands_without_any_answer_are_given_up_and_the_next_one_that_is_asked_begins_anew() -> None:
+    exchange, wire = posted([math.inf, math.inf, 0.5])
+    assert heard(exchange, 5.09) is None
+    with pytest.raises(NoAnswer, match="cable: no answer to PING after 3 attempts"):
+        heard(exchange, 5.11)
+    wire.delays.append(0.001)
+    wire.time = 5.6
+    assert exchange.ask(Command.STATUS, b"", 0.02, 1) == b"\0\3" and exchange.traffic.stale == 1
+    assert heard(exchange, 9.0) is None

@@ -39,12 +39,12 @@ def _milliseconds(out: str, name: str) -> float:
 def test_a_rig_is_measured_and_each_trouble_named_answer_first(call: Call, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(rig_strokes, "COUNT", 8)
     monkeypatch.setattr(rig_strokes, "MOST", 8)
-    odd = ("--set", "bench.line.adapter=ftdi")
+    odd = ("--set", "bench.line.adapter=ftdi", "--set", "control_period=0.008")
     command = ("hw", "check", "--rig", "--port", "emulated", "--yes", *SLOW_CAMERA, *odd)
     code, out, err = call(*command)
     assert code == 3, err
     lines = out.splitlines()
-    assert lines[0] == "This rig cannot run the loop of 10 ms."
+    assert lines[0] == "This rig cannot run the loop of 8 ms."
     told = " ".join(lines[1 : lines.index("")])
     assert "the board's answers take 16." in told and "15 pictures/s; the loop's observer counts on 60" in told
     assert "beyond safety.stale (150 ms)" in told and "older than their time stamps" not in told
@@ -87,8 +87,8 @@ def test_a_camera_too_slow_for_the_limits_is_refused_before_anything_moves(
 
 
 @pytest.mark.slow
-def test_a_link_that_fills_the_ticks_is_a_stop_that_names_it(call: Call) -> None:
-    code, _, err = call(*TRIAL, "--set", "bench.line.adapter=ftdi")
+def test_a_link_that_is_slower_than_its_limit_is_a_stop_that_names_it(call: Call) -> None:
+    code, _, err = call(*TRIAL, "--set", "bench.line.adapter=ftdi", "--set", "safety.round_trip=0.8")
     assert code == 5 and "the board's answers take" in err and "latency timer" in err
     (run,) = list_runs(Path("results"))
     assert run.state == "failed"

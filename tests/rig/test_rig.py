@@ -167,7 +167,7 @@ def test_a_slow_link_and_camera_are_named_and_the_latency_is_found_to_two_millis
         age = latency["delay"]  # till it came, which is when a stream's picture is stamped
         print(f"latency {1e3 * age:.2f} ms of 60, sd {1e3 * latency['sd']:.2f} ms")
         told = "; ".join(each["what"] for each in found["troubles"])
-        assert re.search(r"the board's answers take 1[67]\.\d ms", told), told
+        assert 16.0 < 1e3 * found["round_trip"]["median"] < 18.0
         rate = re.search(r"gives ([\d.]+) pictures/s; the loop's observer counts on 60", told)
         assert rate and float(rate[1]) == pytest.approx(15.0, abs=0.5), told
         assert "older than their time stamps say" in told

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Callable, Sequence
 from types import SimpleNamespace
 from typing import Any
@@ -41,6 +42,7 @@ class RigBoard:
         self.told: list[Any] = []
         self.state, self.faults, self.flags = State.ENABLED, Fault(0), Flag(0)
         self.round_trip = self.takes = 0.003
+        self.posted = deque[tuple[float, Status]]()
         self.pings: list[float] = []
         self.lapses = 0
         self.lives: list[float] = []
@@ -79,13 +81,21 @@ class RigBoard:
     def enable(self) -> None:
         self.told.append("enable")
 
-    def turn(self, rates: Sequence[float], life: float) -> tuple[tuple[float, ...], Status]:
-        """Take the rates over; a period later they have moved the axes."""
+    def post_turn(self, rates: Sequence[float], life: float) -> tuple[tuple[float, ...], float]:
+        """Take the rates over, and say later where the axes were by then."""
         self.lives.append(life)
         self.sent = np.rint(rates)
         self.told.append(("turn", tuple(rates)))
-        self.transport.wait(self.takes)
-        return tuple(float(each) for each in self.sent), self.read()
+        self.posted.append((self.transport.now(), self.read()))
+        return tuple(float(each) for each in self.sent), self.transport.now()
+
+    def answered(self, until: float) -> tuple[float, Status] | None:
+        """What came, or comes by then."""
+        if not self.posted:
+            return None
+        now, comes = self.transport.now(), self.posted[0][0] + self.takes
+        self.transport.wait(max(0.0, min(comes, until) - now))
+        return self.posted.popleft() if comes <= max(now, until) else None
 
 
 class Marker:

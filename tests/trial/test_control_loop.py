@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -85,7 +86,7 @@ def test_ticks_come_at_the_period_on_the_clock(rig_of: RigOf) -> None:
 
 def test_behind_a_motion_ticks_go_on_without_a_rate_until_the_board_says_that_nothing_moves(rig_of: RigOf) -> None:
     rig = rig_of()
-    turn, since = rig.board.turn, [math.inf]
+    turn, since = rig.board.post_turn, [math.inf]
 
     def ramps_down(rates: Any, life: float) -> Any:
         if any(rates):
@@ -96,13 +97,13 @@ def test_behind_a_motion_ticks_go_on_without_a_rate_until_the_board_says_that_no
                 rig.board.flags = Flag(0)
         return turn(rates, life)
 
-    rig.board.turn = ramps_down
+    rig.board.post_turn = ramps_down
     rig.follow(at_rest(0.1, PERIOD), trial=3)
-    assert [what[1] for what in rig.board.told[-8:]] == [(0.0,) * 4] * 8 != [what[1] for what in rig.board.told[-9:-1]]
-    assert [row["trial"] for row in rig.at_rest] == [-1] * 8, "they belong to no trial"
-    assert [row["clock"] for row in rig.at_rest] == pytest.approx(100.1 + PERIOD * np.arange(8))
+    assert [what[1] for what in rig.board.told[-9:]] == [(0.0,) * 4] * 9 != [what[1] for what in rig.board.told[-10:-1]]
+    assert [row["trial"] for row in rig.at_rest] == [-1] * 9, "they belong to no trial"
+    assert [row["clock"] for row in rig.at_rest] == pytest.approx(100.1 + PERIOD * np.arange(9))
     assert (
-        len(rig.table("log")) == 20 and len(rig.table("between")) == 8 == rig.table("between")["tension_1"].isna().sum()
+        len(rig.table("log")) == 20 and len(rig.table("between")) == 9 == rig.table("between")["tension_1"].isna().sum()
     )
 
 
@@ -132,14 +133,14 @@ def test_a_second_motion_counts_its_own_time(rig_of: RigOf) -> None:
 def test_ticks_that_are_over_before_they_begin_are_skipped_and_counted(rig_of: RigOf) -> None:
     rig = rig_of()
     motion, held = back(0.02, 0.1, 0.1, PERIOD), [0]
-    turn = rig.board.turn
+    turn = rig.board.post_turn
 
     def slow(rates: Any, life: float) -> Any:
         held[0] += 1
-        rig.board.transport.wait(0.013 if held[0] == 11 else 0.0)
+        rig.board.transport.wait(0.016 if held[0] == 11 else 0.0)
         return turn(rates, life)
 
-    rig.board.turn = slow
+    rig.board.post_turn = slow
     rig.follow(motion)
     assert rig.timing.overruns == 2 and len(rig.rows) == 40 - 2 == len(rig.timing.late) - len(rig.at_rest)
     assert rig.rows[11]["late"] == pytest.approx(0.001) == rig.timing.late[11]
@@ -149,13 +150,13 @@ def test_ticks_that_are_over_before_they_begin_are_skipped_and_counted(rig_of: R
 
 def test_a_tick_that_is_too_late_is_a_reason_to_stop(rig_of: RigOf) -> None:
     rig = rig_of(safety={"late": 0.02, "stale": 1.0})
-    turn = rig.board.turn
+    turn = rig.board.post_turn
 
     def hangs(rates: Any, life: float) -> Any:
-        rig.board.transport.wait(0.026 if len(rig.rows) == 5 else 0.0)
+        rig.board.transport.wait(0.029 if len(rig.rows) == 5 else 0.0)
         return turn(rates, life)
 
-    rig.board.turn = hangs
+    rig.board.post_turn = hangs
     with pytest.raises(SafetyStop, match="a tick came 24 ms late"):
         rig.follow(at_rest(0.2, PERIOD))
 
@@ -165,13 +166,13 @@ def test_step_rates_live_for_two_and_a_half_periods_and_lapsed_ones_are_counted(
         rig = rig_of(control_period=period, safety={"late": 0.01}, sensor={"level": "camera", "frame_rate": 20.0})
         rig.follow(at_rest(2 * PERIOD, PERIOD))
         assert set(rig.board.lives) == {life}
-    turn = rig.board.turn
+    turn = rig.board.post_turn
 
     def lapsing(*given: Any) -> Any:
         rig.board.lapses += len(rig.rows) in (8, 10, 12)
         return turn(*given)
 
-    rig.board.turn = lapsing
+    rig.board.post_turn = lapsing
     with pytest.raises(SafetyStop, match="step rates came too late"):
         rig.follow(at_rest(0.5, PERIOD))
     assert len(rig.rows) == 13
@@ -230,7 +231,7 @@ def test_no_usable_angle_for_too_long_is_a_reason_to_stop_with_the_newest_verdic
 def test_spools_go_to_their_targets_whichever_way_their_motors_turn(rig_of: RigOf, signs: tuple[int, ...]) -> None:
     """Each tendon holds its pretension: taut, and stretched by it."""
     rig = rig_of(signs=signs)
-    turn, since = rig.board.turn, [100.0, np.zeros(4)]
+    turn, since = rig.board.post_turn, [100.0, np.zeros(4)]
 
     def turned(rates: Any, life: float) -> Any:
         now = rig.board.transport.now()
@@ -238,7 +239,7 @@ def test_spools_go_to_their_targets_whichever_way_their_motors_turn(rig_of: RigO
         since[:] = now, np.rint(rates)
         return turn(rates, life)
 
-    rig.board.turn = turned
+    rig.board.post_turn = turned
     rig.follow(at_rest(0.5, PERIOD))
     actuator, last = SETTINGS.actuator, rig.rows[-1]
     steps = WRIST.pretension / actuator.tendon_stiffness / actuator.step_length
@@ -254,8 +255,8 @@ def test_spools_go_to_their_targets_whichever_way_their_motors_turn(rig_of: RigO
 def test_positions_are_of_when_the_board_read_the_command_behind_half_a_usb_frame(rig_of: RigOf) -> None:
     rig = rig_of()
     rig.follow(at_rest(0.1, PERIOD))
-    after = np.array([row["counted"] - row["time"] for row in rig.rows]) - UNDERWAY
-    sent = [sum(abs(row[f"sent_{tendon}"]) for tendon in (1, 2, 4, 5)) for row in rig.rows]
+    after = np.array([row["counted"] - before["time"] for before, row in pairwise(rig.rows)]) - UNDERWAY
+    sent = [sum(abs(row[f"sent_{tendon}"]) for tendon in (1, 2, 4, 5)) for row in rig.rows[:-1]]
     assert after[0] == pytest.approx(0.0, abs=1e-9) and np.abs(after).max() < 1e-4
     busiest = int(np.argmax(sent[:-1]))
     assert after[1:] == pytest.approx(after[busiest + 1] / sent[busiest] * np.array(sent[:-1]), abs=1e-9)
@@ -274,17 +275,26 @@ def test_the_observer_is_told_what_the_spools_hold_in_the_middle_of_a_tick(
 
     monkeypatch.setattr(Steering, "predict", heard)
     rig = rig_of()
+    turn, since = rig.board.post_turn, [100.0, np.zeros(4)]
+
+    def turned(rates: Any, life: float) -> Any:
+        now = rig.board.transport.now()
+        rig.board.position += since[1] * (now - since[0])
+        since[:] = now, np.rint(rates)
+        return turn(rates, life)
+
+    rig.board.post_turn = turned
     rig.follow(at_rest(0.1, PERIOD))
     wait = 0.5 * SETTINGS.actuator.update
     went_on = 1.5 * PERIOD - UNDERWAY - wait
     rows = rig.rows + rig.at_rest
-    for earlier, before, sides in zip(rows[:-2], rows[1:-1], told[2:], strict=True):
+    for earlier, before, after, sides in zip(rows[:-2], rows[1:-1], rows[2:], told[2:], strict=False):
         one, two, four, five = (
-            before[f"position_{k}"] + wait * earlier[f"sent_{k}"] + went_on * before[f"sent_{k}"] for k in (1, 2, 4, 5)
+            after[f"position_{k}"] + wait * earlier[f"sent_{k}"] + went_on * before[f"sent_{k}"] for k in (1, 2, 4, 5)
         )
         step = SETTINGS.actuator.step_length
         assert sides == pytest.approx((0.5 * step * (four + five), 0.5 * step * (one + two)), abs=1e-12)
-    assert told[2][0] > 0.0
+    assert told[2][0] > 0.0 and rows[-1]["position_1"] > 5.0
 
 
 def test_the_boards_state_and_all_its_faults_are_logged_by_name(rig_of: RigOf) -> None:

@@ -29,7 +29,7 @@ from wristctl.trial.residuals import (
     worst,
 )
 from wristctl.trial.safety import SafetyStop
-from wristctl.trial.tick_timing import LINK, SCHEDULING, WORK, TickTiming
+from wristctl.trial.tick_timing import SCHEDULING, WORK, TickTiming
 from wristctl.trial.watch import Tick, Watch
 from wristctl.vision.marker import Sighting, SightingVerdict
 
@@ -183,9 +183,9 @@ def ticks(watch: Watch, timing: TickTiming, count: int, woken: float = 0.0, trip
         tick = WELL._replace(clock=clock)
         watch.see(tick, clock)
         watch.judge(tick)
-        ended = late + woken + trip + work - PERIOD
+        ended = late + woken + work - PERIOD
         skipped = max(0, int(ended / PERIOD)) if skips is None else skips
-        culprit = timing.tick(late + woken, woken, trip, trip + work, skipped)
+        culprit = timing.tick(late + woken, woken, work, skipped)
         watch.ticked(clock, trip, skipped, culprit)
         late = max(0.0, ended - skipped * PERIOD)
         clock += (1 + skipped) * PERIOD
@@ -200,21 +200,21 @@ def watching(**changes: Any) -> tuple[Watch, TickTiming]:
 @pytest.mark.parametrize(
     ("how", "culprit", "said"),
     [
-        ({"trip": 0.016}, LINK, "the board's answers take 16.0 ms, beyond 9.5 ms"),
-        ({"trip": 0.011}, LINK, "the board's answers take 11.0 ms"),
-        ({"woken": 0.011}, SCHEDULING, "ticks were skipped: the computer woke the loop late"),
-        ({"work": 0.012}, WORK, "ticks were skipped: the loop's own work"),
+        ({"trip": 0.021}, None, "the board's answers take 21.0 ms, beyond 20 ms"),
+        ({"woken": 0.014}, SCHEDULING, "ticks were skipped: the computer woke the loop late"),
+        ({"work": 0.014}, WORK, "ticks were skipped: the loop's own work"),
     ],
 )
 def test_a_loop_that_cannot_keep_its_period_is_stopped_within_half_a_second_and_a_few_ticks(
-    how: dict[str, float], culprit: str, said: str
+    how: dict[str, float], culprit: str | None, said: str
 ) -> None:
     watch, timing = watching()
     with pytest.raises(SafetyStop, match=said) as stopped:
         ticks(watch, timing, 400, **how)  # type: ignore[arg-type]
     assert stopped.value.exit_code == 5 and stopped.value.fix
     assert len(timing.late) + timing.overruns <= 0.575 / PERIOD
-    assert timing.culprits.most_common(1)[0][0] == culprit and culprit in timing.said()
+    assert [who for who, _ in timing.culprits.most_common(1)] == ([] if culprit is None else [culprit])
+    assert culprit is None or culprit in timing.said()
 
 
 def test_a_few_skipped_ticks_are_borne_and_the_last_half_second_alone_counts() -> None:

@@ -66,7 +66,7 @@ def test_a_fast_trial_and_its_simulation_agree(tmp_path: Path) -> None:
     assert isinstance(followed, BendMotion)
     twin = bend_twin(study, Trial(0, "dart-thrower", 0, 0.0, 0), followed, None)
     simulated, true = np.degrees(twin.trajectory.error), true_errors(done)
-    assert rmse(simulated) == pytest.approx(rmse(true), rel=0.15)
+    assert rmse(simulated) == pytest.approx(rmse(true), rel=0.2)
     ahead = [lead(errors, followed) for errors in (simulated, true)]
     assert np.abs(ahead[0] - ahead[1]).max() < 1.5e-3
 

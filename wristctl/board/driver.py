@@ -1,14 +1,15 @@
 """The driver of the motor board: the same for a real one and an emulated one."""
 
 import struct
-from collections.abc import Callable, Sequence
+from collections import deque
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from types import TracebackType
-from typing import Any, Protocol, Self
+from typing import Any, NamedTuple, Protocol, Self
 
 from wristctl.board.board_errors import BoardError, Faulted, NoAnswer, Refused, Restarted, WrongFirmware
-from wristctl.board.framing import Decoder, crc, encode
+from wristctl.board.framing import Decoder, WireFrame, crc, encode
 from wristctl.board.messages import (
     ANSWER_TO,
     AXES,
@@ -62,20 +63,32 @@ class Traffic:
     bytes_read: int = 0
 
 
+class _Posted(NamedTuple):
+    """A command whose answer is not waited for."""
+
+    command: Command
+    sequence: int
+    began: float
+    """When it was sent [s]."""
+    bytes_before: int
+    """Bytes that had been read by then."""
+
+
 class Exchange:
-    """Commands and answers in turn over a transport."""
+    """Commands and answers over a transport: in turn, or a command posted while answers to others are on their way."""
 
     def __init__(self, transport: Transport, overheard: Overheard = nobody) -> None:
         self.transport, self._overheard = transport, overheard
         self.traffic = Traffic()
         self.round_trip = 0.0
-        """Seconds from the last command to its answer."""
+        """Seconds from the last command that was answered to its answer."""
         self.silence = 0.0
         """Seconds for which no command fed the board's watchdog: before the last that did, or since then, whichever is
         longer."""
-        self._decoder = Decoder()
+        self._decoder, self._frames = Decoder(), deque[WireFrame]()
         self._sequence = 0
         self._last_fed = 0.0
+        self._posted: deque[_Posted] = deque()
 
     @property
     def bad_frames(self) -> int:
@@ -86,46 +99,90 @@ class Exchange:
         """Result and payload of the answer, each attempt waited for `patience` seconds. Raises NoAnswer.
 
         Commands are numbered in turn; an emergency stop has the number by which the board obeys it on its last byte.
+        Answers to what was posted before count as stale.
         """
+        self._posted.clear()
+        frame, asked = self._numbered(command, payload)
+        for attempt in range(attempts):
+            self._write(frame)
+            self.traffic.resent += attempt > 0
+            if (answer := self._answer(asked, self.transport.now() + patience)) is not None:
+                return answer
+        overslept = self.transport.now() - asked.began - attempts * patience
+        bytes_seen = self.traffic.bytes_read - asked.bytes_before
+        raise NoAnswer(self.transport.name, command, attempts, bytes_seen, overslept)
+
+    def post(self, command: Command, payload: bytes) -> float:
+        """Send a command that the next of its kind repeats, and do not wait for the answer; when that was [s]."""
+        frame, posted = self._numbered(command, payload)
+        self._write(frame)
+        self._posted.append(posted)
+        return posted.began
+
+    def arrived(self, until: float, patience: float) -> tuple[float, Command, bytes] | None:
+        """The next answer to what was posted, if it comes by `until` [s]: when it was sent, which, result and payload.
+
+        None where nothing is on its way, or does not come by then. Raises NoAnswer where nothing has come for
+        `patience` seconds. A command that is passed over by the answer to a later one counts as sent again.
+        """
+        while self._posted:
+            for frame in self._came(until):
+                for number, posted in enumerate(self._posted):
+                    if (frame.code, frame.sequence) == (posted.command | _ANSWER, posted.sequence) and frame.payload:
+                        for _ in range(number + 1):
+                            self._posted.popleft()
+                        self.traffic.resent += number
+                        self._answered(posted)
+                        return posted.began, posted.command, frame.payload
+                self.traffic.stale += 1
+            oldest, now = self._posted[0], self.transport.now()
+            if now - oldest.began > patience:
+                bytes_seen = self.traffic.bytes_read - oldest.bytes_before
+                raise NoAnswer(self.transport.name, oldest.command, len(self._posted), bytes_seen)
+            if now >= until:
+                return None
+        return None
+
+    def _numbered(self, command: Command, payload: bytes) -> tuple[bytes, _Posted]:
         self._sequence = ESTOP_SEQ if command is Command.ESTOP else (self._sequence + 1) & 0xFF
-        frame, bytes_before, began = (
-            encode(command, self._sequence, payload),
-            self.traffic.bytes_read,
-            self.transport.now(),
-        )
+        began = self.transport.now()
         gap = began - self._last_fed if self._last_fed else 0.0
         self.silence = gap if command in FEEDS_WATCHDOG else max(gap, self.silence)
-        for attempt in range(attempts):
-            self._overheard(self.transport.now(), "sent", frame)
-            self.transport.write(frame)
-            self.traffic.sent += 1
-            self.traffic.resent += attempt > 0
-            if (answer := self._answer(command, self.transport.now() + patience)) is not None:
-                self.round_trip = self.transport.now() - began
-                if command in FEEDS_WATCHDOG:
-                    self._last_fed = began
-                return answer
-        overslept = self.transport.now() - began - attempts * patience
-        raise NoAnswer(self.transport.name, command, attempts, self.traffic.bytes_read - bytes_before, overslept)
+        asked = _Posted(command, self._sequence, began, self.traffic.bytes_read)
+        return encode(command, self._sequence, payload), asked
 
-    def _answer(self, command: Command, deadline: float) -> bytes | None:
-        answer = None
-        while answer is None and (left := deadline - self.transport.now()) > 0:
-            data = self.transport.read(left)
+    def _write(self, frame: bytes) -> None:
+        self._overheard(self.transport.now(), "sent", frame)
+        self.transport.write(frame)
+        self.traffic.sent += 1
+
+    def _answered(self, asked: _Posted) -> None:
+        self.traffic.answers += 1
+        self.round_trip = self.transport.now() - asked.began
+        if asked.command in FEEDS_WATCHDOG:
+            self._last_fed = asked.began
+
+    def _answer(self, asked: _Posted, deadline: float) -> bytes | None:
+        while self._frames or self.transport.now() < deadline:
+            for frame in self._came(deadline):
+                if (frame.code, frame.sequence) == (asked.command | _ANSWER, asked.sequence) and frame.payload:
+                    self._answered(asked)
+                    self.traffic.stale += len(self._frames)
+                    self._frames.clear()
+                    return frame.payload
+                self.traffic.stale += 1
+        return None
+
+    def _came(self, until: float) -> Iterator[WireFrame]:
+        """Frames that were here already, else those that come next, by `until` [s]."""
+        if not self._frames:
+            data = self.transport.read(max(0.0, until - self.transport.now()))
             self.traffic.bytes_read += len(data)
             if data:
                 self._overheard(self.transport.now(), "came", data)
-            for frame in self._decoder.feed(data):
-                if (
-                    answer is None
-                    and (frame.code, frame.sequence) == (command | _ANSWER, self._sequence)
-                    and frame.payload
-                ):
-                    answer = frame.payload
-                    self.traffic.answers += 1
-                else:
-                    self.traffic.stale += 1
-        return answer
+            self._frames.extend(self._decoder.feed(data))
+        while self._frames:
+            yield self._frames.popleft()
 
 
 # Seconds for which a step rate lives where nobody says otherwise.
@@ -210,7 +267,7 @@ class Board:
 
     @property
     def round_trip(self) -> float:
-        """Seconds from the last command to its answer."""
+        """Seconds from the last command that was answered to its answer."""
         return self._exchange.round_trip
 
     def connect(self) -> Hello:
@@ -258,7 +315,26 @@ class Board:
         The rates really sent, and the status.
         """
         sent = within_reach(rates)
-        return sent, self.send((Rate if self.cells is None else Turn)(sent, life))
+        return sent, self.send(self._turning(sent, life))
+
+    def post_turn(self, rates: Sequence[float], life: float = LEAST_LIFE) -> tuple[Axes, float]:
+        """As `turn`, but `answered` has the status later. The rates really sent, and when that was [s].
+
+        What is lost on the way is not sent again: the next rates take its place.
+        """
+        sent = within_reach(rates)
+        return sent, self._exchange.post(*self._packed(self._turning(sent, life)))
+
+    def answered(self, until: float) -> tuple[float, Status] | None:
+        """When the next of the posted rates that are answered by `until` [s] were sent, and the status in the answer.
+
+        None where no answer is on its way, or none comes by then.
+        """
+        arrived = self._exchange.arrived(until, self._patience * ATTEMPTS)
+        if arrived is None:
+            return None
+        began, command, answer = arrived
+        return began, self._seen(command, self._told(command, answer)[1])
 
     def jog(self, positions: Sequence[int]) -> Status:
         """Creep to `positions` (steps) before homing, and wait until the axes stand there."""
@@ -311,14 +387,10 @@ class Board:
 
     def send(self, message: Command | tuple[Any, ...]) -> Status:
         """Send a command that is answered by the status."""
-        if isinstance(message, Command):
-            command, payload = message, b""
-        else:
-            command, payload = COMMAND_OF[type(message)], LAYOUTS[type(message)].pack(message)
-        _result, content = self._ask(command, payload)
-        if self.cells is not None and ANSWER_TO[command] is Pulls:
-            self.cells.take(Pulls(*content))
-        return _status(content)
+        command, payload = self._packed(message)
+        return self._seen(
+            command, self._told(command, self._exchange.ask(command, payload, self._patience, ATTEMPTS))[1]
+        )
 
     def close(self, emergency: bool = False) -> None:
         """Stop the motors (at once in an `emergency`), as far as the board can be reached, and let it go."""
@@ -337,10 +409,37 @@ class Board:
             raise BoardError("firmware", problem, self.transport.name, "home again")
         return status
 
+    @property
+    def _patience(self) -> float:
+        """Seconds for which an answer is waited for before the command is sent again."""
+        return self._watchdog / (ATTEMPTS + 1)
+
+    def _turning(self, rates: Axes, life: float) -> Rate | Turn:
+        return (Rate if self.cells is None else Turn)(rates, life)
+
+    def _packed(self, message: Command | tuple[Any, ...]) -> tuple[Command, bytes]:
+        """A message as it is sent: command and payload."""
+        if isinstance(message, Command):
+            command, payload = message, b""
+        else:
+            command, payload = COMMAND_OF[type(message)], LAYOUTS[type(message)].pack(message)
+        return command, self._bound(command, payload)
+
+    def _bound(self, command: Command, payload: bytes) -> bytes:
+        return self._connection.to_bytes(2, "little") + payload if command in BOUND else payload
+
+    def _seen(self, command: Command, content: tuple[Any, ...]) -> Status:
+        """The status in an answer; load cells are shown theirs."""
+        if self.cells is not None and ANSWER_TO[command] is Pulls:
+            self.cells.take(Pulls(*content))
+        return _status(content)
+
     def _ask(self, command: Command, payload: bytes) -> tuple[Result, tuple[Any, ...]]:
-        if command in BOUND:
-            payload = self._connection.to_bytes(2, "little") + payload
-        answer = self._exchange.ask(command, payload, self._watchdog / (ATTEMPTS + 1), ATTEMPTS)
+        payload = self._bound(command, payload)
+        return self._told(command, self._exchange.ask(command, payload, self._patience, ATTEMPTS))
+
+    def _told(self, command: Command, answer: bytes) -> tuple[Result, tuple[Any, ...]]:
+        """Result and content of an answer. Raises Faulted, Restarted, Refused and BoardError."""
         result = Result(answer[0])
         kind = ANSWER_TO.get(command)
         if kind and len(answer) != 1 + LAYOUTS[kind].struct.size:

@@ -104,7 +104,7 @@ class Safety(Section):
         0.2, "", "largest share of half a second's ticks that are skipped", "assumed", gt=0, lt=0.5
     )
     round_trip: float = quantity(
-        0.95, "", "largest median of half a second's command round trips, over control_period", "assumed", gt=0, le=1
+        2.0, "", "largest median of half a second's command round trips, over control_period", "assumed", gt=0, le=3
     )
     watchdog: float = quantity(0.1, "s", "silence after which the board stops by itself", "assumed", ge=0.01, le=2.0)
     hold: bool = choice(False, "after a fault the drives hold the tendons, instead of letting them go")

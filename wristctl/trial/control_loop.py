@@ -1,10 +1,12 @@
 """The control loop at a fixed period: marker angle, observer, law, tensions, spool targets, step rates, board.
 
-One tick is one exchange with the board: step rates out, status back. What the spools reeled in is the observer's
-input, a frame is fused at its capture time. Everything runs on the transport's clock.
+A tick sends step rates; the board's answer, its status, is read while the next tick is waited for, so that a slow link
+makes no tick late. What the spools reeled in is the observer's input, a frame is fused at its capture time. Everything
+runs on the transport's clock.
 """
 
 import math
+from collections import deque
 from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
@@ -81,7 +83,7 @@ class ControlLoop:
         self._underway = settings.actuator.command_delay
         delay = self._spools.timing.delay
         self._late, self._rates = int(delay // self._period), np.zeros((AXES, remembered_rates(delay, self._period)))
-        self._place = self._reeled()
+        self._place, self._reckoned = self._reeled(), deque[tuple[float, Array]]()
         self._skipped = 0
         self._counted = self._epoch
 
@@ -119,12 +121,15 @@ class ControlLoop:
             if self._clock.now() > deadline:
                 raise SafetyStop(f"the motors do not stand {_COMING_TO_REST:g} s after a motion", fix="home again")
             self._tick(task, None)
+        self._listen(self.next_tick)
 
     def _tick(self, task: Task, k: int | None) -> None:
         """One exchange with the board at the motion's sample `k`; None: behind its last, where no law is asked."""
+        asleep = self._clock.now() < self.next_tick
+        self._listen(self.next_tick)
         if (ahead := self.next_tick - self._clock.now()) > 0.0:
             self._clock.wait(ahead)
-        woken = self._clock.now() - self.next_tick if ahead > 0.0 else 0.0
+        woken = self._clock.now() - self.next_tick if asleep else 0.0
         clock, due = self._clock.now(), self.next_tick
         marker = self._look(task)
         estimate, position = self._steering.estimate, self._reeled()
@@ -160,7 +165,7 @@ class ControlLoop:
             self._shown(row)
         took = self._clock.now() - clock
         self._go_on()
-        culprit = self._timing.tick(clock - due, woken, self._board.round_trip, took, self._skipped)
+        culprit = self._timing.tick(clock - due, woken, took, self._skipped)
         self.watch.ticked(clock, self._board.round_trip, self._skipped, culprit)
 
     def _look(self, task: Task) -> dict[str, Any]:
@@ -214,36 +219,35 @@ class ControlLoop:
         return target
 
     def _send(self, rates: Array) -> None:
-        """Step rates of the axes, one of which is 0 for none; and what the board then says."""
-        began, busy = self._clock.now(), _BUSY * float(np.abs(self._sent).sum())
-        sent, self._status = self._board.turn(rates.tolist(), self._life)
+        """Step rates of the axes, one of which is 0 for none."""
+        sent, self._posted = self._board.post_turn(rates.tolist(), self._life)
         self._sent = self._signs * np.array(sent)
-        self._remember()
-        self._counted = began + self._underway + busy
+
+    def _listen(self, until: float) -> None:
+        """Take in the board's answers to what was sent, those that come by `until` [s]."""
+        while (answered := self._board.answered(until)) is not None:
+            began, self._status = answered
+            busy = _BUSY * float(np.abs(self._rates[:, 1]).sum())
+            self._counted = began + self._underway + busy
+            while self._reckoned[0][0] < began:  # lost on the way
+                self._reckoned.popleft()
+            self._place = self._place + (self._reeled() - self._reckoned.popleft()[1])
 
     def _go_on(self) -> None:
         """To the next tick that is not over yet, with what the spools hold in the middle of this one."""
         self._skipped = max(0, int((self._clock.now() - self.next_tick - self._period) / self._period))
         for skipped in range(1 + self._skipped):
-            if skipped > 0:
-                self._place = self._place + self._period * self._in_force
-                self._remember()
+            ahead = self._spools.foreseen(self._place, self._rates, self._period)
+            self._rates = np.column_stack([self._sent, self._rates[:, :-1]])
             middle = self._spools.reckoned(self._place, self._rates, 0.5 * self._period, self._period)
             reeled = self._bending.spools(self._spools.step * middle)
             self._steering.predict(*reeled)
             self.watch.predict(*reeled)
-        since_read = self._spools.timing.delay - self._late * self._period - self._underway
-        self._place = self._reeled() + self._in_force * since_read
-
-    @property
-    def _in_force(self) -> Array:
-        """Rates that those of this tick, or of one before, relieve in it."""
-        rates: Array = self._rates[:, self._late + 1]
-        return rates
-
-    def _remember(self) -> None:
-        """The rates that go on in this tick."""
-        self._rates = np.column_stack([self._sent, self._rates[:, :-1]])
+            self._place = ahead
+            if skipped == 0:
+                in_force = self._rates[:, self._late + 1]
+                since_read = self._spools.timing.delay - self._late * self._period - self._underway
+                self._reckoned.append((self._posted, ahead - in_force * since_read))
 
     def _reeled(self) -> Array:
         """Steps that the spools have reeled in, by the last status."""

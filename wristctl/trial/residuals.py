@@ -145,7 +145,7 @@ RESIDUALS: Mapping[str, Residual] = {
     ),
     "round_trip": Residual(
         Shown("ms", 1e-3, ".1f"), "median time of half a second's commands until the board's answer",
-        lambda s: s.safety.round_trip * s.control_period, 0.85 / 0.95, _LINK,
+        lambda s: s.safety.round_trip * s.control_period, 0.9, _LINK,
         "the board's answers take {value}, beyond {limit}", "the board's answers took {value} (limit {limit})",
     ),
     "skipped": Residual(

@@ -235,7 +235,7 @@ def _of_the_link(facts: RigFacts, settings: HwRunSettings, port: str) -> list[Tr
     trip, period = facts.trips.median + longer, settings.control_period
     if trip <= settings.safety.round_trip * period:
         return []
-    problem = f"the board's answers take {1e3 * trip:.1f} ms of a tick's {1e3 * period:g} ms"
+    problem = f"the board's answers take {1e3 * trip:.1f} ms, too long for ticks of {1e3 * period:g} ms"
     adapter = facts.adapter
     if adapter.name == "FTDI" and adapter.every is not None and adapter.every > 1e-3:
         latency = f"the USB adapter's latency timer is {1e3 * adapter.every:g} ms"

@@ -8,14 +8,10 @@ import numpy as np
 
 from wristctl.trial.camera_pace import CameraPaces
 
-# Share of a period that the board's answer may take without being blamed.
-_SOUND = 0.6
-
-SCHEDULING, LINK, WORK = "the computer woke the loop late", "the board's answers took long", "the loop's own work did"
+SCHEDULING, WORK = "the computer woke the loop late", "the loop's own work took long"
 # Who makes ticks late, and what to do about it.
 FIX = {
     SCHEDULING: "close other programs, or give the loop priority: hw-run --priority",
-    LINK: "the USB adapter's latency timer or a hub: wristctl hw check --rig; or a longer control_period",
     WORK: "a longer control_period, or a faster computer",
 }
 
@@ -37,11 +33,10 @@ class TickTiming:
         """This quantile of lateness [s]."""
         return float(np.quantile(self.late, share)) if self.late else math.nan
 
-    def tick(self, late: float, woken: float, round_trip: float, took: float, skipped: int) -> str:
-        """A tick has ended: it began `late`, of which the computer slept on for `woken` seconds; it took so long, of
-        which the board's answer took `round_trip`; and so many after it are skipped. Who was slowest."""
-        shares = {SCHEDULING: woken, LINK: round_trip - _SOUND * self.period, WORK: took - round_trip}
-        culprit = max(shares, key=lambda who: shares[who])
+    def tick(self, late: float, woken: float, took: float, skipped: int) -> str:
+        """A tick has ended: it began `late`, of which the computer slept on for `woken` seconds; it took so long; and
+        so many after it are skipped. Who was slower."""
+        culprit = SCHEDULING if woken >= took else WORK
         if late + took > self.period:
             self.culprits[culprit] += 1
         self.late.append(late)
