@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from scipy import signal
 
 from wristctl.control import filters
-from wristctl.control.filters import biquad, derivative, low_pass, notch, rate_limited
+from wristctl.control.filters import biquad, derivative, low_pass, low_pass_both_ways, notch, rate_limited
 from wristctl.lanes.compiled import kernel
 from wristctl.lanes.rows import rows_of
 from wristctl.lanes.types import LANES
@@ -145,3 +145,28 @@ def test_the_rate_limiter_takes_as_long_as_its_limit_says_and_then_follows(sign:
     np.testing.assert_allclose(np.abs(np.diff(found)).max(), 0.02, rtol=1e-12)
     np.testing.assert_allclose(found[:51], sign * 0.02 * np.arange(51), atol=1e-12)
     np.testing.assert_array_equal(found[51:], x[51:])
+
+
+@kernel
+def _both_ways(values: Any, given: Any, memory: Any) -> None:
+    row = rows_of(given)
+    low_pass_both_ways(rows_of(values), len(values), row[0], row[1], rows_of(memory), 0)
+
+
+@pytest.mark.parametrize("hertz", [0.5, 8.0, 30.0])
+def test_a_low_pass_both_ways_is_scipys_butterworth_forward_and_back(hertz: float) -> None:
+    x, period = drawn(5), 0.01
+    section = signal.butter(2, hertz, fs=1.0 / period)
+    forward = from_rest(*section, x)
+    expected = from_rest(*section, forward[::-1])[::-1]
+    values = x.copy()
+    _both_ways(values, np.array([2.0 * np.pi * hertz, period]), np.full(3, 0.7))
+    np.testing.assert_allclose(values, expected, rtol=1e-9, atol=1e-9)
+
+
+def test_a_low_pass_both_ways_is_not_late() -> None:
+    time = np.arange(401) * 0.01
+    bump = np.exp(-(((time - 2.0) / 0.3) ** 2))
+    values = bump.copy()
+    _both_ways(values, np.array([20.0, 0.01]), np.zeros(3))
+    assert values.argmax() == bump.argmax() and np.abs(values - values[::-1]).max() == pytest.approx(0.0, abs=1e-9)

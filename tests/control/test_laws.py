@@ -210,7 +210,7 @@ def test_a_preset_that_leaves_a_gain_out_or_gives_values_without_names_is_refuse
 
 @pytest.mark.parametrize("name", CONTROLLERS)
 def test_a_law_remembers_as_many_numbers_as_it_says(name: str) -> None:
-    """A few ticks off the reference change every one of them, whatever it was."""
+    """A few ticks off the reference change every one of them, whatever it was, but for what a motion has to teach."""
     law = controller(name)
     if not law.memory:
         return
@@ -218,4 +218,4 @@ def test_a_law_remembers_as_many_numbers_as_it_says(name: str) -> None:
     memory = np.full(law.memory, 0.5)
     for tick in range(5):
         torque(name, gains, memory, theta=0.3 - 0.01 * tick, rate=-0.2, theta_ref=0.1, rate_ref=0.4)
-    assert (memory != 0.5).all()
+    assert (memory[law.learned :] != 0.5).all()

@@ -14,7 +14,19 @@ from numpy.typing import NDArray
 from wristctl.lanes.blocks import to_blocks, to_rows
 from wristctl.lanes.compiled import kernel
 from wristctl.lanes.functions import clip, maximum, minimum
-from wristctl.lanes.lane import dot, exp2i, floor, planar, polynomial, rounded, sqrt, turn, where, zero_like
+from wristctl.lanes.lane import (
+    common_integer,
+    dot,
+    exp2i,
+    floor,
+    planar,
+    polynomial,
+    rounded,
+    sqrt,
+    turn,
+    where,
+    zero_like,
+)
 from wristctl.lanes.rows import rows_of
 from wristctl.lanes.types import LANES
 
@@ -163,3 +175,20 @@ def test_planar_vectors_are_complex_numbers_and_i_turns_them(count: int) -> None
     wanted = [u + v, u - v, given[:, 0] * v, 2.0 * v, u * v, 1j * u, -0.5 * u + 1j * v]
     parts = [part for each in wanted for part in (each.real, each.imag)] + [(u.conj() * v).real]
     np.testing.assert_allclose(run(_vectors, given, 15), np.array(parts).T, rtol=0.0, atol=1e-15)
+
+
+@kernel
+def _indexed(given: Any, out: Any) -> None:
+    row, result = rows_of(given), rows_of(out)
+    number = common_integer(row[0])
+    for k in range(number):
+        result[k] = row[number] + k
+
+
+@pytest.mark.parametrize("shape", [(), (LANES,)], ids=["alone", "a block"])
+def test_a_number_that_all_lanes_have_is_an_index_and_a_number_of_turns(shape: tuple[int, ...]) -> None:
+    given, out = np.zeros((4, *shape)), np.full((4, *shape), -1.0)
+    given[0], given[3] = 3.0, 20.0
+    _indexed(given, out)
+    np.testing.assert_array_equal(out.reshape(4, -1)[:, 0], [20.0, 21.0, 22.0, -1.0])
+    assert (out.reshape(4, -1) == out.reshape(4, -1)[:, :1]).all()

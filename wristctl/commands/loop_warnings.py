@@ -50,6 +50,15 @@ def warn_if_it_buckles(findings: Findings, wrist: WristParameters, loops: Iterab
         log.warning("the straight wrist buckles: its least stiffness is %.3g N m/rad; only feedback can hold it", least)
 
 
+def warn_of_first_repetitions(rows: Iterable[Row]) -> None:
+    """Warn of controllers that learn over repetitions of a motion where each of their trials is a first one."""
+    from wristctl.control.table import controller
+
+    for name in dict.fromkeys(row.controller for row in rows):
+        if controller(name).learning > 1:
+            log.warning("%s learns over repetitions, and each trial is a first one: it has learned nothing there", name)
+
+
 def outside_conditions(rows: Iterable[Row | SimulateSettings], loops: Iterable[Loop]) -> list[str]:
     """Presets that are not made for a loop with motors, tendons and a camera, in words."""
     from wristctl.control.shipped_gains import is_shipped, shipped_gains

@@ -116,6 +116,7 @@ CONTROLLERS: Choices[Any] = Choices(
         "nn-mrac": "wristctl.control.nn_mrac:NN_MRAC",
         "impedance": "wristctl.control.impedance:IMPEDANCE",
         "fopi": "wristctl.control.fopi:FOPI",
+        "ilc": "wristctl.control.ilc:ILC",
         "feedforward": "wristctl.control.feedforward:FEEDFORWARD",
         "pd-ff": "wristctl.control.pd_ff:PD_FF",
         "pid-ff": "wristctl.control.pid_ff:PID_FF",

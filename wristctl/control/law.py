@@ -9,12 +9,15 @@ Such a law runs once for each plane that the wrist bends in. One of a controller
 them: `law(now, wrist, gains, memory, tendons, torque)`. `now`, `wrist` and `memory` are then tuples with an entry for
 each plane, `tendons` is what the tendons can do together (Tendons), and the law writes `torque[p]`. In a loop of one
 plane it has one entry of each.
+
+A law may learn over repetitions of a motion: of a controller with `learning=8` the eighth repetition is judged, and the
+first `learned` values of its memory are kept from one repetition to the next, but for `memory[0]`.
 """
 
 import keyword
 import re
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cache
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -153,6 +156,13 @@ class Controller:
     plain: bool = False
     planes: int = 1
     """1 for a law that runs once for each plane, 2 for one that sees all planes at once."""
+    learning: int = 1
+    """Repetitions of a motion from the first to the one that is judged; above 1 for a law that learns over them."""
+    learned: int = 0
+    """Values at the beginning of the memory of each plane that stay from one repetition to the next.
+
+    All others are 0 again at the first tick of a repetition, and so is the first, by which a law may tell that tick.
+    """
     settings: Mapping[str, Parameter] = field(default_factory=dict)
     """Settings that it was made from (`wristctl.control.design`): its own section of a study."""
 
@@ -163,6 +173,9 @@ class Controller:
             raise ValueError(f"{self.name!r} is no name for a controller: letters, digits, dots and dashes")
         if self.planes not in (1, 2):
             raise ValueError(f"{self.name} states planes={self.planes}: 1 sees one plane, 2 sees both")
+        if self.learning < 1 or not 0 <= self.learned <= self.memory or (self.learning > 1 and self.learned < 2):
+            problem = f"learning={self.learning} and learned={self.learned} of {self.memory} values of memory"
+            raise ValueError(f"{self.name} states {problem}: what it learns stands in memory[1] and after")
         if self.plain and not self.name.endswith(PLAIN):
             object.__setattr__(self, "name", f"{self.name}{PLAIN}")
         if unknown := set(self.conditions) - set(self.presets):
@@ -189,6 +202,11 @@ class Controller:
         if self.plain:
             return PlainLaw(self.name, self.law, (NOW, Segments, names, Tendons), shape, self.memory, _signature(1))
         return _native(self.law, width(count), names, shape)
+
+
+def in_a_first_repetition(controller: Controller) -> Controller:
+    """A controller as it is in the first repetition of a motion, in which it has learned nothing."""
+    return replace(controller, learning=1)
 
 
 class _NativeLaw(types.WrapperAddressProtocol):

@@ -123,6 +123,17 @@ define(exponent, (LaneType,), LaneType, _exponent)
 define(rounded, (LaneType,), LaneType, lambda b, x: b.fadd(x, ir.Constant(x.type, [-0.0] * x.type.count)))
 
 
+@intrinsic
+def common_integer(typingctx: Any, x: Any) -> Any:
+    """The whole number that all lanes of x hold, as an integer: an index, or a number of turns of a loop."""
+
+    def codegen(context: Any, builder: Any, sig: Any, args: list[Any]) -> Any:
+        first = builder.extract_element(args[0], ir.Constant(ir.IntType(32), 0))
+        return builder.fptosi(first, ir.IntType(64))
+
+    return (signature(types.intp, x), codegen) if isinstance(x, LaneType) else None
+
+
 @overload(rounded, strict=False)
 def _rounded_number(x: Any) -> Any:
     return (lambda x: x) if isinstance(x, types.Float) else None

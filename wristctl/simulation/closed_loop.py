@@ -11,7 +11,7 @@ from wristctl.arrays import Array
 from wristctl.config.loop import DirectionName, Loop, Reference, sample_period
 from wristctl.config.study import Study
 from wristctl.config.wrist import WristParameters
-from wristctl.control.law import Controller
+from wristctl.control.law import Controller, in_a_first_repetition
 from wristctl.control.table import CONTROLLERS, controller, gains_of
 from wristctl.errors import UserError
 from wristctl.processes import cores
@@ -215,15 +215,17 @@ def simulate(
     network: Inverse | None = None,
     tuned: Mapping[str, Mapping[str, float]] | None = None,
     progress: Callable[[float], None] | None = None,
+    learns: bool = True,
 ) -> Repeated:
     """Run the study's `simulate` section: one closed loop, as often as it says.
 
+    Of a law that learns over repetitions it is the one that is judged, or without `learns` the first of them.
     `network` is needed where the reference has `inverse: network`, `tuned` (gains by controller and name) where the
     gains are `tuned`. Raises UserError for an unknown controller or preset, a reference out of reach, or a start in
     equilibrium of a wrist that buckles.
     """
     chosen, draws = study.simulate, Draws(study.seed)
-    law = controller(chosen.controller)
+    law = controller(chosen.controller) if learns else in_a_first_repetition(controller(chosen.controller))
     gains = np.array([gains_of(law, chosen.gains, tuned)])
     wrist, loop, followed = asked_of(study, sample_period(chosen.loop.control_period), network)
     start = equilibrium(loop, followed.planes) if chosen.start == "equilibrium" else None

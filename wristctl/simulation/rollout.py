@@ -21,7 +21,7 @@ from wristctl.simulation.kernel import Span, columns_of_brief, columns_of_sample
 from wristctl.simulation.metrics import Totals, metrics_in, summary
 from wristctl.simulation.motion import GOALS, Motion
 from wristctl.simulation.outcome import KeptSamples, Outcome
-from wristctl.simulation.sums import sums_by_name
+from wristctl.simulation.sums import SUMS, sums_by_name
 from wristctl.simulation.worlds import World
 from wristctl.wrist.plant import PLANTS, PLANTS_IN_SPACE, PlantModel, kernel_of
 from wristctl.wrist.tendon_layout import TendonLayout
@@ -30,6 +30,7 @@ from wristctl.wrist.tendon_layout import TendonLayout
 _SLICE_TICKS = 200_000
 # Least number of pieces of work for each thread, where there are so many blocks, so that all end together.
 _SHARES = 8
+_ALIVE = SUMS.index("alive")
 
 
 # Whether samples are recorded: all columns, or BRIEFLY.
@@ -182,10 +183,31 @@ def _run(
     loop, count = worlds[0].loop, len(gains)
     places = len(SIDES) if model.planes == 1 else len(TendonLayout.of(worlds[0].wrist).places)
     columns = columns_of(record, model.coordinates(loop.plant_segments), model.planes, places)
-    rollouts = batch(controller, gains, motions, worlds, lanes, model, start, columns, force)
-    advance_blocks(rollouts, kernel_of(run_blocks, model), threads or cores(), progress, stop)
-    rollouts.setup.law.check()
+    kernel, learning = kernel_of(run_blocks, model), controller.learning
+    rollouts: Batch | None = None
+    for repetition in range(learning):
+        last = repetition == learning - 1
+        streams = lanes.streams if last else [(*entropy, repetition) for entropy in lanes.streams]
+        before, rollouts = rollouts, batch(
+            controller, gains, motions, worlds, lanes._replace(streams=streams), model, start, columns if last else 0,
+            force,
+        )  # fmt: skip
+        if before is not None:
+            _remember(before, rollouts, controller.learned)
+
+        def so_far(share: float, repetition: int = repetition) -> None:
+            progress((repetition + share) / learning)
+
+        advance_blocks(rollouts, kernel, threads or cores(), so_far, stop)
+        rollouts.setup.law.check()
+    assert rollouts is not None
     return outcome_of(rollouts, count, loop, KeptSamples.of(rollouts.state.record, count) if record else None)
+
+
+def _remember(before: Batch, rollouts: Batch, learned: int) -> None:
+    """Give rollouts what their law has learned in the repetition before, and the failures of its wrists."""
+    rollouts.state.memory[:, :, 1:learned] = before.state.memory[:, :, 1:learned]
+    rollouts.state.sums[:, _ALIVE] = before.state.sums[:, _ALIVE]
 
 
 def outcome_of(rollouts: Batch, count: int, loop: Loop, kept: KeptSamples | None = None) -> Outcome:

@@ -11,6 +11,7 @@ from wristctl.arrays import Array
 from wristctl.config.plant import Push
 from wristctl.config.study import Study
 from wristctl.config.wrist import WristParameters
+from wristctl.control.law import in_a_first_repetition
 from wristctl.control.table import controller, gains_of
 from wristctl.records import Run
 from wristctl.simulation.closed_loop import follow
@@ -164,7 +165,7 @@ def bend_twin(
     """Simulate a trial in two planes of the study's hw-run section."""
     settings, draws, wrist = study.hw_run, Draws(study.seed), study.wrist
     row = settings.rows[trial.row]
-    law = controller(row.controller)
+    law = in_a_first_repetition(controller(row.controller))
     disturbed = settings.loop.model_copy(update={"disturbances": trial.disturbances(settings, followed)})
     (loop,) = loops_of(disturbed, [draws.plant(0)])
     layout_of_axes(wrist)

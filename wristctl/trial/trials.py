@@ -253,7 +253,7 @@ def evaluated(
 def twin(
     study: Study, trial: Trial, network: Inverse | None, tuned: Mapping[str, Mapping[str, float]] | None
 ) -> Simulation:
-    """Simulate a trial of the study's hw-run section."""
+    """Simulate a trial of the study's hw-run section; of a controller that learns a first repetition, as there."""
     settings = study.hw_run
     row = settings.rows[trial.row]
     disturbances = Disturbances(push=trial.pushed(settings.push))
@@ -265,4 +265,4 @@ def twin(
         direction=cast(DirectionName, trial.direction),
         horizon=settings.horizon,
     )
-    return simulate(study.model_copy(update={"simulate": chosen}), network, tuned).first
+    return simulate(study.model_copy(update={"simulate": chosen}), network, tuned, learns=False).first

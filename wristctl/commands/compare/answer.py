@@ -108,7 +108,9 @@ def gains_of_best(rankings: Sequence[Ranking], gains: Mapping[str, Mapping[str, 
 
 
 def compared(rankings: Sequence[Ranking]) -> str:
-    """The names of all controllers that took part, each with its gains."""
+    """The names of all controllers that took part, each with its gains, and which have learnt over repetitions."""
+    from wristctl.control.table import CONTROLLERS
+
     gains: dict[str, list[str]] = {}
     labels = dict.fromkeys(label for ranking in rankings for label in ranking.labels)
     for label in labels:
@@ -118,7 +120,9 @@ def compared(rankings: Sequence[Ranking]) -> str:
     for name, several in gains.items():
         alike.setdefault(tuple(several), []).append(name)
     groups = [joined(names) + f" ({', '.join(several)})" * bool(several) for several, names in alike.items()]
-    return f"{len(labels)} compared: {'; '.join(groups)}."
+    times = {name: CONTROLLERS[name].learning for name in gains if name in CONTROLLERS}
+    learnt = [f" {name} is judged after {count} repetitions of a motion." for name, count in times.items() if count > 1]
+    return f"{len(labels)} compared: {'; '.join(groups)}.{''.join(learnt)}"
 
 
 # What each condition is, but a rig's.

@@ -18,7 +18,7 @@ from wristctl.commands.inputs_of_loops import (
     network_for,
     tuned_gains,
 )
-from wristctl.commands.loop_warnings import outside_conditions, warn_outside_conditions
+from wristctl.commands.loop_warnings import outside_conditions, warn_of_first_repetitions, warn_outside_conditions
 from wristctl.commands.procedure import Procedure
 from wristctl.commands.results import StudyResult
 from wristctl.commands.rig_description import describe_rig
@@ -116,6 +116,7 @@ def check_bends_of_trials(settings: HwRunSettings, wrist: WristParameters) -> No
 def hw_run(session: Session) -> Performed | PerformedBends:
     """Perform trials, emulated or on hardware: in four directions or both planes at once, with and without a push."""
     session.operator.tell(describe_rig(session.study.hw_run))
+    warn_of_first_repetitions(session.study.hw_run.rows)
     from wristctl.commands.hw_run.results import trial_tables
     from wristctl.commands.hw_run.trial_bends import bends_performed
     from wristctl.commands.hw_run.trials import perform_trials

@@ -139,11 +139,12 @@ def controller_words(name: str, gains: str | Mapping[str, float]) -> str:
     from wristctl.control.table import controller
 
     law = controller(name)
+    after = f", after {law.learning} repetitions of the motion," if law.learning > 1 else ""
     if not law.gains:
-        return law.name
+        return f"{law.name}{after}"
     if isinstance(gains, str):
-        return f"{law.name} with {'tuned' if gains == 'tuned' else f'its {gains}'} gains"
-    return f"{law.name} with {', '.join(f'{gain} = {value:.3g}' for gain, value in gains.items())}"
+        return f"{law.name} with {'tuned' if gains == 'tuned' else f'its {gains}'} gains{after}"
+    return f"{law.name} with {', '.join(f'{gain} = {value:.3g}' for gain, value in gains.items())}{after}"
 
 
 def motion_words(reference: Reference, direction: DirectionName = "ulnar") -> str:
