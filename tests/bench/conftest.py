@@ -13,6 +13,8 @@ from wristctl.config.bench import BenchSettings, Motors
 from wristctl.config.wrist import WristParameters
 
 TAUT = Motors(slack=(0.0, 0.0, 0.0, 0.0))
+# The same with spools that stand exactly where the drives count.
+EXACT = TAUT.model_copy(update={"rotor_inertia": 0.0})
 TICK = 0.01
 
 

@@ -1,4 +1,4 @@
-"""Motors and tendons by the board's pins alone: edges in, reeled lengths and pulls out."""
+"""Motors without inertia and tendons by the board's pins alone: edges in, reeled lengths and pulls out."""
 
 from __future__ import annotations
 
@@ -25,10 +25,13 @@ RADIUS = BenchSettings().actuator.pulley_radius
 
 
 class Pins:
-    """A wrist whose board is a test: drives switched on at once, steps wherever they are wanted."""
+    """A wrist whose board is a test: drives switched on at once, steps wherever they are wanted.
+
+    Its rotors have no inertia unless `motors` says so.
+    """
 
     def __init__(self, on: int = 0b1111, plant: WeakenedPlant | None = None, **motors: object) -> None:
-        turned = Motors.model_validate({"slack": TAUT, **motors})
+        turned = Motors.model_validate({"slack": TAUT, "rotor_inertia": 0.0, **motors})
         self.settings = BenchSettings(motors=turned, plant=plant or WeakenedPlant())
         self.wrist = BenchWrist(self.settings, WRIST)
         self.edge(0, "C", ~on & 0xF)

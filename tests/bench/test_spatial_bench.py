@@ -10,7 +10,7 @@ from typing import Any, Literal
 import numpy as np
 import pytest
 
-from tests.bench.conftest import TAUT, Host
+from tests.bench.conftest import EXACT, TAUT, Host
 from tests.bench.test_load_cells import CELLS, SCALE, Kept, newtons
 from wristctl.bench.bench_wrist import Truth
 from wristctl.bench.loads import SpatialLoad
@@ -159,7 +159,7 @@ def test_a_tendon_breaks_in_a_trial_and_stays_broken() -> None:
 
 
 def test_a_tendon_slips_in_a_trial_by_itself() -> None:
-    host = hosted(actuator=StepperActuator(slips_at=0.3, slip=1e-3, slipping_tendon=3, friction=0.0))
+    host = hosted(actuator=StepperActuator(slips_at=0.3, slip=1e-3, slipping_tendon=3, friction=0.0), motors=EXACT)
     host.reel(ALL)
     host.bench.begin(host.bench.transport.now())
     host.rest(0.5)
@@ -184,7 +184,7 @@ def test_a_bend_in_one_plane_is_the_planar_bench_with_all_that_the_wrist_has(pla
 def test_backlash_holds_back_a_tendon_that_is_paid_out() -> None:
     pulls = []
     for backlash in (0.0, 2e-4):
-        host = hosted(actuator=StepperActuator(backlash=backlash, friction=0.0))
+        host = hosted(actuator=StepperActuator(backlash=backlash, friction=0.0), motors=EXACT)
         host.reel((120, 120, 120, 120))
         host.reel((110, 110, 110, 110))  # 0.15 mm less
         host.rest(0.2)
@@ -238,7 +238,7 @@ def test_a_step_of_a_millisecond_is_fine_enough() -> None:
 @pytest.mark.parametrize(("damping", "share"), [(0.105, 1e-3), (1e-4, 0.02)])
 def test_energy_goes_to_damping_alone(damping: float, share: float) -> None:
     """Of the wrist and its stretched tendons on held spools, without friction; of one that hardly damps at last too."""
-    wrist, settings = WristParameters(damping=damping), BenchSettings(motors=TAUT, actuator=SLIDING)
+    wrist, settings = WristParameters(damping=damping), BenchSettings(motors=EXACT, actuator=SLIDING)
     rows, values = moved(settings, 1, wrist)[301:], values_of(wrist, settings)
     q, rate, reeled = rows[:, :8], rows[:, 8:16], rows[:, 20:24]
     stretch = np.maximum(0.0, reeled - WRIST.length + spatial_terms(values, q, rate).lengths)

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from tests.bench.conftest import TAUT, HostOn
+from tests.bench.conftest import EXACT, TAUT, HostOn
 from wristctl.bench.bench_wrist import Truth
 from wristctl.bench.virtual_bench import VirtualBench
 from wristctl.config.bench import BenchSettings, InjectedFault, Motors, StepperActuator, WeakenedPlant
@@ -144,7 +144,7 @@ def test_tendons_only_pull_and_a_slack_one_not_at_all(host_on: HostOn) -> None:
 
 
 def test_a_motor_reels_by_its_steps_its_sense_and_from_its_slack(host_on: HostOn) -> None:
-    motors = Motors(slack=(1e-4, 2e-4, 3e-4, 4e-4), reversed=(False, True, False, True))
+    motors = Motors(rotor_inertia=0.0, slack=(1e-4, 2e-4, 3e-4, 4e-4), reversed=(False, True, False, True))
     host = host_on(BenchSettings(motors=motors))
     host.reel((40, -50, -30, 20))
     host.rest(0.1)
@@ -172,7 +172,7 @@ def test_released_motors_let_go_down_to_their_detent_and_never_reel_in(host_on: 
 
 
 def test_a_motor_switched_on_again_falls_into_a_place_that_fits_its_count(host_on: HostOn) -> None:
-    host = host_on()
+    host = host_on(BenchSettings(motors=EXACT))
     host.reel((0, 0, 200, 200))
     host.board.emergency_stop()
     host.bench.transport.wait(0.5)

@@ -129,7 +129,7 @@ OTHERS: dict[str, Any] = {
     "actuator.ramp": 5e3,
     "plant.stiffness_axis_deg": 30.0,
 }  # fmt: skip
-NOT_OF_TENDONS = {"lag", "torque", "top_speed", *TendonFacts.model_fields}
+NOT_OF_TENDONS = {"lag", "torque", "corner_speed", "top_speed", *TendonFacts.model_fields}
 """Of motors with a lag, of a motor that falls back, and what `facts` say."""
 OF_TWO_PLANES = "slack", "broken_tendon", "slipping_tendon"
 LEAVES = [

@@ -112,13 +112,18 @@ def test_tendons_that_slip_stay_slipped() -> None:
 
 
 def test_a_motor_falls_back_by_electrical_turns_where_it_is_pulled_harder_than_it_holds() -> None:
-    """Standing: by its torque. Turning at half of the speed at which it has none left: by half of that."""
+    """Standing: by its torque. Turning at half of the speed at which it has none left: by half of that.
+
+    Where its torque begins to fall at a quarter of that speed: by two thirds.
+    """
     turn = 4 * STIFF.microstep * STIFF.step_length
     hardest = 2.0 * 0.3 / STIFF.pulley_radius
     ramp = minimum_jerk(0.0, 4e-3, 1.0)
     both = HOME + np.stack([ramp, ramp], axis=1)  # co-contracted: it stays straight
-    for top_speed, share in ((None, 1.0), (2.0 * np.diff(ramp).max() / 1e-3 / STIFF.step_length, 0.5)):
-        done = spooled(both, STIFF, TrueActuator(torque=0.3, top_speed=top_speed))
+    top = 2.0 * np.diff(ramp).max() / 1e-3 / STIFF.step_length
+    for corner_speed, top_speed, share in ((0.0, None, 1.0), (0.0, top, 0.5), (0.25 * top, top, 2.0 / 3.0)):
+        motor = TrueActuator(torque=0.3, corner_speed=corner_speed, top_speed=top_speed)
+        done = spooled(both, STIFF, motor)
         lost = (HOME + ramp) - done.given_plus
         assert lost[-1] > turn / 2
         np.testing.assert_allclose(lost / turn, np.rint(lost / turn), atol=1e-9)

@@ -67,6 +67,7 @@ LEAVES: dict[str, dict[str, Any]] = {
     "slips_at": {"actuator": {"slips_at": 0.2, "slip": 2e-4}},
     "torque": {"actuator": {"torque": 0.08}},
     "top_speed": {"actuator": {"torque": 0.2, "top_speed": 8e3}},
+    "corner_speed": {"actuator": {"torque": 0.2, "top_speed": 8e3, "corner_speed": 4e3}},
     "creep": {"creep": 0.1, "creep_time": 0.3},
     "end stop": {"end_stop_deg": 31.0},
     "end stop's stiffness": {"end_stop_deg": 31.0, "end_stop_stiffness": 5.0},
@@ -81,6 +82,7 @@ SKEWED: dict[str, Any] = {"sensor": {"zero_deg": -4.0}}
 BESIDE: dict[str, dict[str, Any]] = {
     "taper": {"model": "hinges"},
     "end stop": SKEWED,
+    "corner_speed": {"actuator": {"torque": 0.2, "top_speed": 8e3}},
     **{f"end stop's {leaf}": SKEWED | {"end_stop_deg": 31.0} for leaf in ("stiffness", "dissipation")},
 }
 """What both worlds have where a leaf is tried: a camera that lets the wrist go too far."""
@@ -88,7 +90,16 @@ STILL = {
     ("lagged", "friction"): "tendons pull without friction there",
     **{
         ("lagged", leaf): "tendons pull as commanded there"
-        for leaf in ("sheath", "presliding", "backlash", "tendon creep", "slips_at", "torque", "top_speed")
+        for leaf in (
+            "sheath",
+            "presliding",
+            "backlash",
+            "tendon creep",
+            "slips_at",
+            "torque",
+            "top_speed",
+            "corner_speed",
+        )
     },
     ("lagged", "step_acceleration"): "motors change their pull at once there, no faster than the steps come",
     **{("lagged", leaf): "motors pull at once there" for leaf in ("ramp", "command_delay", "update")},

@@ -1,9 +1,11 @@
 """Four steppers with their spools and tendons, and the wrist these pull, in steps of 1 ms.
 
-An energised motor stands where its drive counts, and turns back by whole electrical turns (four full steps) when its
-tendon pulls harder than it can hold. A released one is held by its detent torque alone: its tendon pays out until it
-pulls no harder, and nothing reels that in again. Energised anew, the rotor falls into the nearest place that
-fits the drive's count: up to two full steps away, so that positions are lost with the release.
+An energised rotor hangs on the magnetic spring of its field, which stands where the drive counts. It swings about the
+field and lags behind it by the angle at which it holds its tendon. Pulled harder than it can hold, or driven faster
+than it follows, it loses whole electrical turns (four full steps). Without inertia it stands where the drive counts. A
+released motor is held by its detent torque alone: its tendon pays out until it pulls no harder, and nothing reels that
+in again. Energised anew, the rotor falls into the nearest place that fits the drive's count: up to two full steps away,
+so that positions are lost with the release.
 """
 
 import math
@@ -17,7 +19,7 @@ from wristctl.config.bench import BenchSettings
 from wristctl.lanes.compiled import compiled
 from wristctl.lanes.lane import where, zero_like
 from wristctl.lanes.rows import part, rows_of
-from wristctl.simulation.nonideal import electrical_turn, tendon_after_slip
+from wristctl.simulation.nonideal import electrical_turn, tendon_after_slip, torque_share
 from wristctl.wrist.dahl import bristle, bristle_slope, inner_in_lanes
 from wristctl.wrist.plant import advance_or_stop, disturbed, parameters_of, travel
 from wristctl.wrist.tendon_mechanics import RealTendons, read_nonideal, spool_pull
@@ -26,6 +28,9 @@ PERIOD = 1e-3
 CYCLES = round(PERIOD * FREQUENCY)
 
 _PORT_A, _PORT_C = ord("A"), ord("C")
+_TURN = 2.0 * math.pi
+# Largest phase [rad] of a rotor's swing in one substep: leapfrog's frequency is off by its square over 24, 4e-4.
+_PHASE = 0.1
 
 
 class Stepper(NamedTuple):
@@ -33,7 +38,11 @@ class Stepper(NamedTuple):
 
     turn: float  # of the field: four full steps
     holding: float
+    corner_speed: float  # up to which it holds as much as standing
     top_speed: float  # at which it holds nothing; inf: it holds as much at any speed
+    mass: float  # [kg] inertia of rotor and spool over the radius squared; 0: no inertia
+    damping: float  # [N s/m]
+    substeps: int  # of a rotor in one period
     detent: float
     release: float  # share of its surplus stretch that a released tendon loses in one period
 
@@ -41,10 +50,18 @@ class Stepper(NamedTuple):
 def stepper_of(settings: BenchSettings) -> Stepper:
     """The motors of these settings."""
     actuator, motors = settings.actuator, settings.motors
+    turn, holding = electrical_turn(actuator), motors.holding_torque / actuator.pulley_radius
+    inertia = motors.rotor_inertia + motors.spool_inertia if motors.rotor_inertia > 0.0 else 0.0
+    mass = inertia / actuator.pulley_radius**2
+    frequency = math.sqrt(_TURN * holding / (turn * mass)) if mass else 0.0
     return Stepper(
-        turn=electrical_turn(actuator),
-        holding=motors.holding_torque / actuator.pulley_radius,
+        turn=turn,
+        holding=holding,
+        corner_speed=motors.corner_speed * actuator.step_length,
         top_speed=math.inf if motors.top_speed is None else motors.top_speed * actuator.step_length,
+        mass=mass,
+        damping=motors.damping / actuator.pulley_radius**2,
+        substeps=max(1, math.ceil(PERIOD * frequency / _PHASE)),
         detent=motors.detent_torque / actuator.pulley_radius,
         release=PERIOD / (motors.release_time + PERIOD),
     )
@@ -61,10 +78,12 @@ class SpoolState(NamedTuple):
     slipped: Any  # electrical turns that the rotor is ahead of the count
     energised: Any
     stepped: Any  # cycle of the last step, -1: never
+    spacing: Any  # cycles from the step before it, inf: never
     sense: Any  # 1, or -1 where the motor is wired the other way round
     slack: Any  # [m] at power-on
     latch: Any
     reeled: Any
+    speed: Any  # [m/s] of a rotor with inertia
     pull: Any
     bent: Any  # (3,) across the plane, away from the camera [rad], its rate [rad/s], and the bristle of friction there
 
@@ -79,10 +98,12 @@ def spool_state_of(settings: BenchSettings) -> SpoolState:
         slipped=none.copy(),
         energised=none.copy(),
         stepped=none - 1,
+        spacing=np.full(AXES, math.inf),
         sense=np.where(settings.motors.reversed, -1, 1),
         slack=slack,
         latch=np.zeros(1, np.int64),
         reeled=-slack,
+        speed=np.zeros(AXES),
         pull=np.zeros(AXES),
         bent=np.zeros(3),
     )
@@ -97,6 +118,7 @@ def hear_edge(spools: Any, motor: Any, cycle: int, port: int, value: int) -> Non
             if risen >> 2 * axis & 1:
                 turned = -1 if value >> (2 * axis + 1) & 1 else 1
                 spools.counted[axis] += turned * spools.sense[axis]
+                spools.spacing[axis] = cycle - spools.stepped[axis]
                 spools.stepped[axis] = cycle
         spools.latch[0] = value
     elif port == _PORT_C:
@@ -118,18 +140,68 @@ def hear_edges(spools: Any, motor: Any, edges: Any, heard: int, until: int) -> i
 
 
 @compiled
-def turn_spools(spools: Any, motor: Any, stiffness: float) -> None:
-    """Turn the spools for a period, by the pulls at its start."""
+def _follow_count(spools: Any, motor: Any, axis: int) -> None:
+    """Put a rotor without inertia where its drive counts, or an electrical turn behind that."""
+    stepped = spools.step[axis] * spools.counted[axis] - spools.slack[axis]
+    speed = (stepped + motor.turn * spools.slipped[axis] - spools.reeled[axis]) / PERIOD
+    if spools.pull[axis] > motor.holding * torque_share(speed, motor.corner_speed, motor.top_speed):
+        spools.slipped[axis] -= 1
+    spools.reeled[axis] = stepped + motor.turn * spools.slipped[axis]
+
+
+@compiled
+def _swing(spools: Any, motor: Any, axis: int, cycle: int, taut_at: float, stiffness: float) -> None:
+    """Advance a rotor by a substep of leapfrog about a cycle; its tendon is taut from `taut_at` [m] on.
+
+    mass dv/dt = holding sin(2 pi (field - rotor)/turn) - pull - damping v, with what it holds at the field's speed
+    (Acarnley, Stepping Motors, 4th ed., ch. 4).
+    """
+    step = PERIOD / motor.substeps
+    place = spools.reeled[axis] + 0.5 * step * spools.speed[axis]
+    speed = spools.speed[axis]
+    field = spools.step[axis] * spools.counted[axis] - spools.slack[axis]
+    field_speed = spools.step[axis] * FREQUENCY / max(spools.spacing[axis], cycle - spools.stepped[axis])
+    holds = motor.holding * torque_share(field_speed, motor.corner_speed, motor.top_speed)
+    push = holds * math.sin(_TURN / motor.turn * (field - place)) - stiffness * max(0.0, place - taut_at)
+    resisting = 0.5 * step * motor.damping
+    speed = ((motor.mass - resisting) * speed + step * push) / (motor.mass + resisting)
+    spools.speed[axis] = speed
+    spools.reeled[axis] = place + 0.5 * step * speed
+
+
+@compiled
+def turn_spools(spools: Any, motor: Any, stiffness: float, edges: Any, heard: int, until: int) -> int:
+    """Turn the spools for the period before a cycle, by the edges from `heard` on and the pulls at its start.
+
+    A tendon that pulls then pulls by its stiffness [N/m] harder or less as its spool turns; a slack one stays slack.
+    Returns the number of edges heard.
+    """
+    if motor.mass > 0.0:
+        taut_at = (
+            _taut_at(spools, 0, stiffness), _taut_at(spools, 1, stiffness),
+            _taut_at(spools, 2, stiffness), _taut_at(spools, 3, stiffness),
+        )  # fmt: skip
+        for part in range(motor.substeps):
+            middle = until - CYCLES + CYCLES * (2 * part + 1) // (2 * motor.substeps)
+            heard = hear_edges(spools, motor, edges, heard, middle)
+            for axis in range(AXES):
+                if spools.energised[axis]:
+                    _swing(spools, motor, axis, middle, taut_at[axis], stiffness)
+    heard = hear_edges(spools, motor, edges, heard, until)
     for axis in range(AXES):
-        pull = spools.pull[axis]
-        if spools.energised[axis]:
-            stepped = spools.step[axis] * spools.counted[axis] - spools.slack[axis]
-            speed = abs(stepped + motor.turn * spools.slipped[axis] - spools.reeled[axis]) / PERIOD
-            if pull > motor.holding * max(0.0, 1.0 - speed / motor.top_speed):
-                spools.slipped[axis] -= 1
-            spools.reeled[axis] = stepped + motor.turn * spools.slipped[axis]
-        else:
-            spools.reeled[axis] -= motor.release * max(0.0, pull - motor.detent) / stiffness
+        if not spools.energised[axis]:
+            spools.speed[axis] = 0.0
+            spools.reeled[axis] -= motor.release * max(0.0, spools.pull[axis] - motor.detent) / stiffness
+        elif motor.mass == 0.0:
+            _follow_count(spools, motor, axis)
+    return heard
+
+
+@compiled
+def _taut_at(spools: Any, axis: int, stiffness: float) -> float:
+    """Length on a spool [m] from which its tendon pulls; inf of a slack one."""
+    pull = spools.pull[axis]
+    return spools.reeled[axis] - pull / stiffness if pull > 0.0 else math.inf
 
 
 class Hanging(NamedTuple):
@@ -193,8 +265,7 @@ def follow(
     edge = 0
     for k in range(acting.shape[0]):
         middle = (first + k) * CYCLES + CYCLES // 2
-        edge = hear_edges(spools, motor, edges, edge, middle)
-        turn_spools(spools, motor, hanging.stiffness)
+        edge = turn_spools(spools, motor, hanging.stiffness, edges, edge, middle)
         plant = disturbed(undisturbed, (0.0, acting[k, 0], 0.0), acting[k, 1])
         time, path = (first + k) * PERIOD - start + zero, travel(plant, q)
         on_spools = (

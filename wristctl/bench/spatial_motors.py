@@ -5,7 +5,7 @@ Motors and spools are those of `wristctl.bench.motors`; each tendon has its plac
 
 from typing import Any, NamedTuple
 
-from wristctl.bench.motors import CYCLES, PERIOD, hear_edges, turn_spools
+from wristctl.bench.motors import CYCLES, PERIOD, turn_spools
 from wristctl.board.messages import AXES
 from wristctl.lanes.lane import zero_like
 from wristctl.lanes.rows import lanes_like, part, rows_of
@@ -58,8 +58,7 @@ def follow_in_space(
     edge = 0
     for k in range(acting.shape[0]):
         middle = (first + k) * CYCLES + CYCLES // 2
-        edge = hear_edges(spools, motor, edges, edge, middle)
-        turn_spools(spools, motor, hanging.stiffness)
+        edge = turn_spools(spools, motor, hanging.stiffness, edges, edge, middle)
         plant = disturbed(undisturbed, (acting[k, 0], acting[k, 1], acting[k, 2]), acting[k, 3])
         time, path = (first + k) * PERIOD - start + zero, path_before(tendons, undisturbed, q)
         for t in range(AXES):

@@ -326,7 +326,10 @@ class HwRunSettings(RigSettings):
         camera = self.sensor.model_copy(update={n: getattr(self.bench.camera, n) for n in ("delay_frames", "dropped")})
         as_flashed = {name: getattr(self.actuator, name) for name in _OF_THE_BOARD}  # on both rigs the same firmware
         motors = TrueActuator.between(self.actuator, self.bench.actuator.model_copy(update=as_flashed))
-        holding = {"torque": self.bench.motors.holding_torque, "top_speed": self.bench.motors.top_speed}
+        holds = self.bench.motors
+        holding = {
+            "torque": holds.holding_torque, "corner_speed": holds.corner_speed, "top_speed": holds.top_speed
+        }  # fmt: skip
         return Plant(
             **wrist,
             actuator=motors.model_copy(update=holding),

@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from functools import lru_cache
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import AfterValidator, Field, SerializerFunctionWrapHandler, model_serializer
+from pydantic import AfterValidator, Field, SerializerFunctionWrapHandler, model_serializer, model_validator
 from pydantic.config import JsonDict
 from pydantic.fields import FieldInfo
 from pydantic_core import PydanticCustomError
@@ -124,6 +124,12 @@ class TendonFacts(Section):
     slip: float = fact(1e-3, "m", "by how much", gt=0)
 
 
+def check_speeds(corner: float, top: float | None) -> None:
+    """ValueError where a motor's torque would be gone before it begins to fall."""
+    if top is not None and corner >= top:
+        raise ValueError(f"corner_speed ({corner:g} 1/s) must be below top_speed ({top:g} 1/s)")
+
+
 class TrueActuator(Overrides, TendonFacts):
     """Motors and tendons as they are, where that is not what the controller believes."""
 
@@ -141,9 +147,16 @@ class TrueActuator(Overrides, TendonFacts):
     torque: float | None = fact(
         None, "N m", "of a standing motor: pulled harder it falls back by four full steps; null: never (tendon)", gt=0
     )
+    corner_speed: float = fact(0.0, "1/s", "microsteps per second up to which it has all of that torque", ge=0)
     top_speed: float | None = fact(
-        None, "1/s", "microsteps per second at which its torque has fallen to none, in a straight line", gt=0
-    )
+        None, "1/s", "those at which it has none, in a straight line from the corner; null: its torque does not fall",
+        gt=0,
+    )  # fmt: skip
+
+    @model_validator(mode="after")
+    def _falls_after_its_corner(self) -> Self:
+        check_speeds(self.corner_speed, self.top_speed)
+        return self
 
 
 class TrueSensor(Overrides):

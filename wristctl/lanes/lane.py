@@ -139,6 +139,11 @@ def _rounded_number(x: Any) -> Any:
     return (lambda x: x) if isinstance(x, types.Float) else None
 
 
+@overload(where, strict=False)
+def _where_number(condition: Any, yes: Any, no: Any) -> Any:
+    return (lambda condition, yes, no: yes if condition else no) if isinstance(condition, types.Boolean) else None
+
+
 @overload(zero_like, strict=False)
 def _zero_like_number(x: Any) -> Any:
     return (lambda x: 0.0) if isinstance(x, types.Number) else None

@@ -50,7 +50,7 @@ def electrical_turn(actuator: Actuator) -> float:
 def nonideal_of(plant: TrueWrist, actuator: Actuator, facts: TendonFacts, step: float) -> Nonideal:
     """The values of a world at an integration step [s]."""
     elastic = actuator.level == "tendon"
-    torque, top_speed = (facts.torque, facts.top_speed) if isinstance(facts, TrueActuator) else (None, None)
+    motor = facts if isinstance(facts, TrueActuator) else TrueActuator()
     return Nonideal(
         friction=actuator.friction * elastic,
         sheath=actuator.sheath,
@@ -66,8 +66,9 @@ def nonideal_of(plant: TrueWrist, actuator: Actuator, facts: TendonFacts, step: 
         broken_at=_time(facts.broken_at),
         slips_at=_time(facts.slips_at) if elastic else math.inf,
         slip=facts.slip,
-        torque=math.inf if torque is None else TENDONS_PER_SIDE * torque / actuator.pulley_radius,
-        top_speed=math.inf if top_speed is None else top_speed * actuator.step_length,
+        torque=math.inf if motor.torque is None else TENDONS_PER_SIDE * motor.torque / actuator.pulley_radius,
+        corner_speed=motor.corner_speed * actuator.step_length,
+        top_speed=math.inf if motor.top_speed is None else motor.top_speed * actuator.step_length,
         turn=electrical_turn(actuator),
     )
 
@@ -149,6 +150,16 @@ def of_tendons(state: Array, count: int) -> Array:
 
 
 @compiled
+def torque_share(speed: Any, corner_speed: Any, top_speed: Any) -> Any:
+    """Share of its standing torque that a stepper has at a speed: all up to the corner, from there a line to none.
+
+    A chopper drive keeps its current up to the corner. There the supply's voltage is used up by the winding's
+    inductance and the voltage that the rotor induces (Acarnley, Stepping Motors, 4th ed., ch. 5 and 6).
+    """
+    return maximum(0.0, 1.0 - maximum(0.0, abs(speed) - corner_speed) / (top_speed - corner_speed))
+
+
+@compiled
 def _break(tendons: Any, t: int, time: Any, fault: Any) -> None:
     """Leave a share of a place's tendons from the time on at which one of them breaks, for good."""
     state, share = tendons.state, row_of(t, SHARE)
@@ -166,7 +177,7 @@ def _fall_back(tendons: Any, t: int, delivered: Any, speed: Any, time: Any, x: A
     play, lost, slip = row_of(t, PLAY), row_of(t, LOST), row_of(t, SLIPPED)
     _break(tendons, t, time, fault)
     state[slip] = maximum(state[slip], where(time >= fault.slips_at, nonideal.slip, 0.0))
-    holds = fault.holds * maximum(0.0, 1.0 - abs(speed) / nonideal.top_speed)
+    holds = fault.holds * torque_share(speed, nonideal.corner_speed, nonideal.top_speed)
     state[lost] = state[lost] + where(spool_pull(tendons, state[play], t, x) > holds, nonideal.turn, 0.0)
     on_spool = delivered - state[lost] - state[slip]
     state[play] = clip(state[play], on_spool, on_spool + nonideal.backlash)

@@ -51,6 +51,8 @@ class Nonideal(NamedTuple):
     slip: Any
     torque: Any
     """Pull [N] at which a standing motor falls out of step."""
+    corner_speed: Any
+    """Speed [m/s] up to which it pulls as hard as standing."""
     top_speed: Any
     """Speed [m/s] at which it cannot pull at all."""
     turn: Any
