@@ -272,11 +272,12 @@ class Actuator(Section):
     pulley_radius: float = quantity(7.5e-3, "m", "radius of the pulley", "assumed", gt=0)
     step_rate: float = quantity(20_000.0, "1/s", "largest rate of microsteps", "assumed", gt=0)
     step_acceleration: float = quantity(
-        50_000.0, "1/s^2", "largest change of that rate by the host (tendon)", "assumed", gt=0
-    )
+        50_000.0, "1/s^2", "largest change of that rate by the host (tendon)",
+        "a NEMA 23 at 34 N follows 390,000, with a drum of 0.44 kg 92,000", gt=0,
+    )  # fmt: skip
     ramp: float = quantity(
         200_000.0, "1/s^2", "change of that rate by the board, within a tick (tendon)",
-        "0.012 N m for a rotor of 300 g cm^2", gt=0,
+        "the board's most; a NEMA 23 at 34 N follows 810,000, with a drum of 0.44 kg 95,000", gt=0,
     )  # fmt: skip
     command_delay: float = quantity(
         1.98e-3, "s", "from a tick until the board has read its step rates (tendon)",
