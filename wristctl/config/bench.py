@@ -223,6 +223,15 @@ class BenchSettings(Section):
     faults: tuple[InjectedFault, ...] = choice((), "what goes wrong")
 
     @property
+    def stiffness_with_field(self) -> float:
+        """Stiffness of a tendon [N/m] on a lightly loaded rotor that has inertia, and so hangs on its field."""
+        tendon, motors = self.actuator.tendon_stiffness, self.motors
+        if motors.rotor_inertia == 0.0:
+            return tendon
+        teeth = self.actuator.motor_steps / 4.0
+        return 1.0 / (1.0 / tendon + self.actuator.pulley_radius**2 / (teeth * motors.holding_torque))
+
+    @property
     def in_one_plane_only(self) -> list[str]:
         """Keys that are set, of what a bench in two planes has not."""
         of_arcs = [name for name in ("model", "taper") if getattr(self.plant, name) != getattr(TrueWrist(), name)]

@@ -325,6 +325,7 @@ class HwRunSettings(RigSettings):
         wrist = {name: getattr(self.bench.plant, name) for name in TrueWrist.model_fields}
         camera = self.sensor.model_copy(update={n: getattr(self.bench.camera, n) for n in ("delay_frames", "dropped")})
         as_flashed = {name: getattr(self.actuator, name) for name in _OF_THE_BOARD}  # on both rigs the same firmware
+        as_flashed["tendon_stiffness"] = self.bench.stiffness_with_field
         motors = TrueActuator.between(self.actuator, self.bench.actuator.model_copy(update=as_flashed))
         holds = self.bench.motors
         holding = {
