@@ -85,6 +85,19 @@ def test_a_lightly_loaded_rotor_makes_its_tendon_softer_by_the_spring_of_its_fie
     assert exact.stiffness_with_field == exact.actuator.tendon_stiffness
 
 
+def test_a_taut_tendon_is_a_spring_beside_the_field_that_neither_feeds_nor_damps_a_swing() -> None:
+    """From 6 N at power-on; field and tendon together have the closed form's frequency and size of swing."""
+    wrist = pins(slack=(-3e-4,) * 4, damping=0.0)
+    swing = wrist.after(2002).truth().reeled[2:, 0]
+    tendon = wrist.settings.actuator.tendon_stiffness
+    stiffness = TEETH * HOLDING / RADIUS**2 + tendon
+    for part in (swing[:500], swing[-500:]):
+        assert np.ptp(part) == pytest.approx(2.0 * 3e-4 * tendon / stiffness, rel=0.03)
+    spectrum = np.abs(np.fft.rfft(swing - swing.mean()))
+    natural = math.sqrt(stiffness * RADIUS**2 / (ROTOR + SPOOL)) / (2.0 * math.pi)
+    assert 0.5 * np.argmax(spectrum) == pytest.approx(natural, abs=1.0)
+
+
 def followed(acceleration: float, seconds: float, motors: dict[str, Any]) -> bool:
     """Whether the bench's rotor follows a ramp from rest."""
     wrist = pins(slack=FREE, **motors)
