@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import importlib.util
+import re
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
+from wristctl.commands.simulate.answer import controller_words
 from wristctl.config.loop import CAMERA, Loop, Reference
 from wristctl.config.plant import Plant
 from wristctl.config.wrist import WristParameters
@@ -106,8 +110,8 @@ def test_behind_a_camera_an_unknown_wrist_is_followed_better() -> None:
 
 
 @pytest.mark.parametrize("plant", [Plant(), DRAWN.plant], ids=["nominal", "drawn"])
-def test_the_noise_of_a_camera_is_not_learnt_below_the_cutoff_alone(plant: Plant) -> None:
-    """Each repetition has noise of its own: tensions chatter more and more where all of the error is learnt."""
+def test_the_noise_of_a_camera_is_not_learned_below_the_cutoff_alone(plant: Plant) -> None:
+    """Each repetition has noise of its own: tensions chatter more and more where all of the error is learned."""
     loop = CAMERA.model_copy(update={"plant": plant})
     early, late = (_chattering(each, loop, ILC.presets["hardware"]["cutoff"]) for each in (8, 16))
     assert late < 1.03 * early
@@ -121,7 +125,7 @@ def test_a_lead_as_late_as_the_loop_learns_faster() -> None:
     assert in_time < 0.8 * late
 
 
-def test_beyond_what_it_has_room_for_the_learnt_torque_stays() -> None:
+def test_beyond_what_it_has_room_for_the_learned_torque_stays() -> None:
     law = replace(ILC, learning=2)
     values, loop = np.array([law.values(law.presets["default"])]), DRAWN.model_copy(update={"control_period": 0.01})
     motion = asked("adl:eating", loop, horizon=COUNT * SPACING + 2.0)
@@ -160,6 +164,33 @@ def test_a_loop_keeps_what_is_learned_and_empties_the_rest_at_each_repetition() 
         assert wanted[0] == pytest.approx(5e-3 + 0.1) and wanted[1:] == pytest.approx(5e-3)
 
 
+def _tells_the_last_bend(now: Any, wrist: Any, gains: Any, memory: Any) -> Any:
+    """At its first tick a trace of the bend that was seen last in the repetition before, else nothing."""
+    told = where(memory[0] <= 0.0, 1e-9 * memory[1], zero_like(now.theta))
+    memory[0], memory[1] = memory[0] + 1.0, now.theta
+    return told
+
+
+def test_each_repetition_has_noise_of_its_own_and_the_last_that_of_any_other_law() -> None:
+    motion = asked("minimum-jerk", CAMERA, horizon=0.6)
+    seen, told = dict[int, np.ndarray](), dict[int, float]()
+    for repetitions in (1, 2, 3):
+        law = _toy(_tells_the_last_bend, memory=2, learning=repetitions, learned=2)
+        which = np.zeros(1, np.int64)
+        done = rollout(
+            law, np.ones((1, 1)), [motion], which, CAMERA, WRIST, None, [(7, 1)], record=True, converge=False
+        )
+        seen[repetitions], told[repetitions] = done.part("seen", 0)[:, 0], done.column("torque_wanted", 0)[0]
+    ends = [1e9 * told[2], 1e9 * told[3], float(seen[1][-1])]
+    assert told[1] == 0.0 and np.diff(sorted(ends)).min() > 1e-5
+    np.testing.assert_allclose(seen[3], seen[1], rtol=0.0, atol=1e-7)
+
+
+def test_an_answer_tells_how_many_repetitions_there_were() -> None:
+    assert f"{ILC.learning} repetitions" in controller_words("ilc", "default")
+    assert "repetitions" not in controller_words("pid-ff", "default")
+
+
 def test_a_wrist_that_fails_while_its_law_learns_has_failed() -> None:
     loop = NOMINAL.model_copy(update={"limits": False})
     motion = asked("minimum-jerk", loop, horizon=0.5)
@@ -174,6 +205,31 @@ def test_a_wrist_that_fails_while_its_law_learns_has_failed() -> None:
 def _held(now: Any, wrist: Any, gains: Any, memory: Any) -> Any:
     memory[1] = 1.0 + zero_like(now.theta)
     return wrist.stiffness * now.theta_ref
+
+
+def test_the_controller_of_the_page_learns_a_constant_torque(tmp_path: Path) -> None:
+    page = (Path(__file__).parents[2] / "docs" / "your-own-controller.md").read_text(encoding="utf-8")
+    (block,) = [
+        each for each in re.findall(r"^```python\n(.*?)^```", page, re.DOTALL | re.MULTILINE) if "share" in each
+    ]
+    imports = "from wristctl.control.model import one_segment\nfrom wristctl.lanes.lane import where\n\n\n"
+    (tmp_path / "learner.py").write_text(imports + block, encoding="utf-8")
+    spec = importlib.util.spec_from_file_location("learner", tmp_path / "learner.py")
+    assert spec is not None and spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    gains = {name: Gain("", "of the page", 1e-3, 1e3) for name in ("Kp", "Kd", "share")}
+    law = replace(_toy(module.law, memory=3, learning=6, learned=3), gains=gains)
+    motion = asked("minimum-jerk", DRAWN)
+    errors = []
+    for repetitions in (1, 6):
+        repeated = replace(law, learning=repetitions)
+        done = rollout(
+            repeated, np.array([[2.0, 0.1, 1.0]]), [motion], np.zeros(1, np.int64), DRAWN, WRIST, record=True,
+            converge=False,
+        )  # fmt: skip
+        errors.append(abs(np.mean(done.column("theta", 0) - motion.theta_ref)))
+    assert errors[1] < 0.05 * errors[0]
 
 
 @pytest.mark.parametrize("stated", [{"learning": 0}, {"learning": 3}, {"learning": 3, "learned": 9, "memory": 4}])

@@ -1,10 +1,10 @@
-"""Iterative learning control: feedforward and PID, and a torque that is learnt from each repetition of a motion for the
+"""Iterative learning control: feedforward, PID, and a torque that is learned from each repetition of a motion for the
 next one.
 
 u <- Q(u + L e), e the error of the repetition before (Bristow, Tharayil and Alleyne, IEEE Control Systems Magazine 26
 (2006) 96): L is the inverse of the loop by the one-segment model, read as much later as the loop is late, and Q a
-low-pass without lag. The error then falls monotonically in each frequency at which |Q (1 - L P)| < 1, P from the learnt
-torque to the angle. Error and torque are held in averages over SPACING, so that the noise of a tick is not learnt.
+low-pass without lag. The error falls monotonically in each frequency at which |Q (1 - L P)| < 1, P from the learned
+torque to the angle. Error and torque are held in averages over SPACING, so that the noise of a tick is not learned.
 """
 
 from typing import Any
@@ -53,8 +53,8 @@ def _learn(wrist: Any, gains: Any, inertia: Any, spacing: Any, count: int, memor
 
 
 @compiled
-def _learnt(memory: Any, place: Any) -> Any:
-    """The learnt torque at a place among its averages, between two of them along a line."""
+def _learned(memory: Any, place: Any) -> Any:
+    """The learned torque at a place among its averages, between two of them along a line."""
     torques, below = beyond(memory, _TORQUES), floor(place)
     i = common_integer(below)
     before, after = torques[min(max(i, 0), COUNT - 1)], torques[min(max(i + 1, 0), COUNT - 1)]
@@ -62,10 +62,10 @@ def _learnt(memory: Any, place: Any) -> Any:
 
 
 def law(now: Any, wrist: Any, gains: Any, memory: Any) -> Any:
-    """pid-ff with the learnt torque: M theta_ref'' + load(theta_ref, rate_ref) + u - Kp e - Ki int(e) - Kd de/dt.
+    """pid-ff with the learned torque: M theta_ref'' + load(theta_ref, rate_ref) + u - Kp e - Ki int(e) - Kd de/dt.
 
     Between repetitions u changes by -share (M e'' + (D + Kd) e' + (K + Kp) e + Ki int(e)), e read `lead` later, and is
-    low-passed both ways. Errors that would drive a saturated tendon on are not learnt.
+    low-passed both ways. Errors that would drive a saturated tendon on are not learned.
     """
     spacing, tick, zero = maximum(SPACING, now.period), memory[_TICK], zero_like(now.period)
     if common_integer(tick) == 0:
@@ -74,7 +74,7 @@ def law(now: Any, wrist: Any, gains: Any, memory: Any) -> Any:
         memory[_AVERAGE] = zero - 1.0
     place = tick * now.period / spacing
     integral = integrated(now, memory[LEARNED])
-    torque = fed_forward_pd(now, wrist, gains) + _learnt(memory, place - 0.5) - gains.Ki * integral
+    torque = fed_forward_pd(now, wrist, gains) + _learned(memory, place - 0.5) - gains.Ki * integral
     memory[LEARNED] = held(now, torque, memory[LEARNED], integral)
     average, errors = floor(place + 1e-6), beyond(memory, _ERRORS)
     begins = average > memory[_AVERAGE]

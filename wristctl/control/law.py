@@ -10,7 +10,7 @@ them: `law(now, wrist, gains, memory, tendons, torque)`. `now`, `wrist` and `mem
 each plane, `tendons` is what the tendons can do together (Tendons), and the law writes `torque[p]`. In a loop of one
 plane it has one entry of each.
 
-A law may learn over repetitions of a motion: of a controller with `learning=8` the eighth repetition is judged, and the
+A law may learn over repetitions of a motion: of a controller with `learning=8` the eighth repetition is evaluated. The
 first `learned` values of its memory are kept from one repetition to the next, but for `memory[0]`.
 """
 
@@ -157,7 +157,7 @@ class Controller:
     planes: int = 1
     """1 for a law that runs once for each plane, 2 for one that sees all planes at once."""
     learning: int = 1
-    """Repetitions of a motion from the first to the one that is judged; above 1 for a law that learns over them."""
+    """Repetitions of a motion from the first to the one that is evaluated; above 1 for a law that learns over them."""
     learned: int = 0
     """Values at the beginning of the memory of each plane that stay from one repetition to the next.
 

@@ -219,7 +219,7 @@ def simulate(
 ) -> Repeated:
     """Run the study's `simulate` section: one closed loop, as often as it says.
 
-    Of a law that learns over repetitions it is the one that is judged, or without `learns` the first of them.
+    Of a law that learns over repetitions it is the one that is evaluated, or without `learns` the first of them.
     `network` is needed where the reference has `inverse: network`, `tuned` (gains by controller and name) where the
     gains are `tuned`. Raises UserError for an unknown controller or preset, a reference out of reach, or a start in
     equilibrium of a wrist that buckles.

@@ -187,7 +187,7 @@ def _run(
     rollouts: Batch | None = None
     for repetition in range(learning):
         last = repetition == learning - 1
-        streams = lanes.streams if last else [(*entropy, repetition) for entropy in lanes.streams]
+        streams = lanes.streams if last else [(*entropy, 0, repetition + 1) for entropy in lanes.streams]
         before, rollouts = rollouts, batch(
             controller, gains, motions, worlds, lanes._replace(streams=streams), model, start, columns if last else 0,
             force,

@@ -108,7 +108,7 @@ def gains_of_best(rankings: Sequence[Ranking], gains: Mapping[str, Mapping[str, 
 
 
 def compared(rankings: Sequence[Ranking]) -> str:
-    """The names of all controllers that took part, each with its gains, and which have learnt over repetitions."""
+    """The names of all controllers that took part, each with its gains, and which have learned over repetitions."""
     from wristctl.control.table import CONTROLLERS
 
     gains: dict[str, list[str]] = {}
@@ -121,8 +121,9 @@ def compared(rankings: Sequence[Ranking]) -> str:
         alike.setdefault(tuple(several), []).append(name)
     groups = [joined(names) + f" ({', '.join(several)})" * bool(several) for several, names in alike.items()]
     times = {name: CONTROLLERS[name].learning for name in gains if name in CONTROLLERS}
-    learnt = [f" {name} is judged after {count} repetitions of a motion." for name, count in times.items() if count > 1]
-    return f"{len(labels)} compared: {'; '.join(groups)}.{''.join(learnt)}"
+    several_times = [(name, count) for name, count in times.items() if count > 1]
+    repeated = [f" {name} repeats each motion {count} times, and the last counts." for name, count in several_times]
+    return f"{len(labels)} compared: {'; '.join(groups)}.{''.join(repeated)}"
 
 
 # What each condition is, but a rig's.
