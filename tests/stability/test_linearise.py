@@ -131,6 +131,14 @@ def test_every_law_rests_and_its_open_loop_closes_again(name: str) -> None:
             assert answer == pytest.approx(tick.back @ np.linalg.solve(each * own - opened, tick.into), rel=1e-6)
 
 
+def test_a_law_that_learns_over_repetitions_is_its_feedback_within_one() -> None:
+    gains = dict(CONTROLLERS["ilc"].presets["default"])
+    feedback = {name: gains[name] for name in CONTROLLERS["pid-ff"].gains}
+    learning, alone = linear("ilc", gains, Loop(), 20.0), linear("pid-ff", feedback, Loop(), 20.0)
+    assert learning.names == alone.names
+    np.testing.assert_allclose(learning.closed.transitions()[0], alone.closed.transitions()[0], atol=1e-6)
+
+
 def test_a_law_that_is_a_line_over_next_to_nothing_is_told_by_its_bend() -> None:
     assert linear("smc", "printed", Loop()).bend > 0.1 > 1e-3 > linear("pid", PID, Loop()).bend
 

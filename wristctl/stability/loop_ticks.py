@@ -49,14 +49,16 @@ class Remembered(NamedTuple):
     frames: int
 
 
-def state_parts(batch: Batch, memory: int, tick: int, back: Remembered) -> Iterator[StatePart]:
+def state_parts(batch: Batch, law: Controller, tick: int, back: Remembered) -> Iterator[StatePart]:
     """The parts of the state before a tick, in the same order at every tick; of each, what changes.
 
-    What was delivered and the frames under way come as they are counted back from the tick.
+    What was delivered and the frames under way come as they are counted back from the tick. What a law learns over
+    repetitions does not change within one.
     """
     state, drive, k = batch.state, batch.world.drive, len(batch.setup.coordinates)
     planes, places = len(batch.setup.bend), len(batch.setup.pulls)
-    kept = state.memory.shape[2] * np.arange(planes)
+    kept = state.memory.shape[2] * np.arange(planes) + law.learned
+    memory = law.memory - law.learned
     yield StatePart("memory", state.memory, _beside(kept, memory), np.ones(planes * memory))
     yield StatePart("angle", state.coordinates, np.arange(k), np.full(k, _ANGLE))
     yield StatePart("rate", state.coordinates, np.arange(k, 2 * k), np.full(k, _RATE))
@@ -307,7 +309,7 @@ class LoopTicks:
         return Schedule(*(ticks[0, ..., 0] for ticks in schedule))
 
     def _parts(self, tick: int) -> Iterator[StatePart]:
-        return state_parts(self._batch, self._law.memory, tick, self._back)
+        return state_parts(self._batch, self._law, tick, self._back)
 
     def _states(self, tick: int) -> Array:
         return read_state(self._parts(tick), self._count)
