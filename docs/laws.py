@@ -146,7 +146,7 @@ with one budget.
   predictive control that `mpc` is (Coulson, Lygeros and Dorfler, ECC 2019).
 - **A motion that is repeated** (ilc): a torque that is learned from each repetition of a motion for the next, about
   pid-ff. With torques as commanded it needs no model of a wrist that nobody knows. Behind a camera it learns what the
-  observer sees, and so the observer's errors too: it wins where the model is wrong, and loses where pid-ff's
+  observer sees, and so the observer's errors too: that helps where the model is wrong, and harms where pid-ff's
   feedforward is exact ([table](#what-repetitions-are-worth)). Equal budgets do not make it equal: it has seen each
   motion seven times. The rankings below and the study leave it out.
 - **Jumps**: behind motors (steps) none is told from feedforward for the better. Ask for motions instead. With torques
