@@ -236,6 +236,11 @@ def in_two_planes(case: Case, gains: list[float]) -> Numbers:
     }
 
 
+def avx512() -> bool:
+    """Whether NumPy has functions for this processor that take eight numbers at once."""
+    return "X86_V4" in np.show_config(mode="dicts")["SIMD Extensions"].get("found", ())
+
+
 def records() -> Iterator[tuple[str, dict[str, Any]]]:
     """All records, of all cases."""
     for planes, cases in ((1, one_plane()), (2, two_planes())):
@@ -243,7 +248,7 @@ def records() -> Iterator[tuple[str, dict[str, Any]]]:
             law = controller(case.law)
             gains = list(gains_of(law, list(law.presets)[-1]))
             record, _ = record_of(case, gains, planes)
-            yield name, {"gains": gains, **record}
+            yield name, {"avx512": avx512(), "gains": gains, **record}
 
 
 def main() -> None:

@@ -1,4 +1,8 @@
-"""Loops in one plane and in two give the numbers that are recorded, to the last bit (`golden_loops.py`)."""
+"""Loops in one plane and in two give the numbers that are recorded, to the last bit (`golden_loops.py`).
+
+Those bits are of processors with AVX-512, or of those without: NumPy has functions of its own for the former, by which
+references differ in their last bits. On the other kind the values have to be as near as that makes them.
+"""
 
 from __future__ import annotations
 
@@ -8,10 +12,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from tests.simulation.golden_loops import RECORDS, Case, one_plane, record_of, two_planes
+from tests.simulation.golden_loops import RECORDS, Case, avx512, one_plane, record_of, two_planes
 
 # A commanded pull [N] may differ by so much in two planes.
 _PULL = 1e-12
+# Values [rad, N] on a processor of the other kind differ by so much; those that swing or saturate in between by more.
+_ELSEWHERE, _WIDER = 1e-11, {"pid-angle, ideal, 8": 1e-4, "three, saturated, both planes at once": 5e-3}
 # Loops whose kernel other quick tests compile too.
 _QUICK = ("pid-ff, ideal, 8", "mpc, ideal, 1")
 
@@ -25,6 +31,8 @@ def differences(name: str, case: Case, planes: int) -> list[str]:
     wrong = [array for array, sha in expected["sha256"].items() if found["sha256"][array] != sha]
     values = "bend" if planes == 1 else "pulls"
     apart = float(np.abs(np.array(found[values]) - np.array(expected[values])).max())
+    if expected.get("avx512", True) is not avx512():
+        return [f"some {values} differ by {apart:.2g}"] if apart > _WIDER.get(name, _ELSEWHERE) else []
     if planes == 2:
         close = apart <= _PULL
         wrong = [array for array in wrong if array == "bend" or not close]
