@@ -8,7 +8,7 @@ from collections.abc import Callable
 import pytest
 
 from wristctl.board.board_errors import NoAnswer
-from wristctl.board.driver import Exchange
+from wristctl.board.exchange import Exchange
 from wristctl.board.framing import Decoder, WireFrame, encode
 from wristctl.board.messages import Command
 

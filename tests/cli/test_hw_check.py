@@ -15,7 +15,7 @@ from tests.cli.conftest import Call
 from wristctl.board import transport
 from wristctl.board.board_errors import PortUnusable
 from wristctl.board.check import RoundTrips
-from wristctl.board.driver import Traffic
+from wristctl.board.exchange import Traffic
 from wristctl.board.flashing import IMAGE
 from wristctl.board.messages import Command, Counters, Hello, Reset, Result, State, Status
 from wristctl.board.transport import BOOT_TIME, PortFound
