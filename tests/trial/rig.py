@@ -43,6 +43,8 @@ class RigBoard:
         self.state, self.faults, self.flags = State.ENABLED, Fault(0), Flag(0)
         self.round_trip = self.takes = 0.003
         self.posted = deque[tuple[float, Status]]()
+        self.lost: set[int] = set()
+        """Numbers of the rates, from 1 on, whose answers do not come."""
         self.pings: list[float] = []
         self.lapses = 0
         self.lives: list[float] = []
@@ -86,7 +88,8 @@ class RigBoard:
         self.lives.append(life)
         self.sent = np.rint(rates)
         self.told.append(("turn", tuple(rates)))
-        self.posted.append((self.transport.now(), self.read()))
+        if len(self.lives) not in self.lost:
+            self.posted.append((self.transport.now(), self.read()))
         return tuple(float(each) for each in self.sent), self.transport.now()
 
     def answered(self, until: float) -> tuple[float, Status] | None:

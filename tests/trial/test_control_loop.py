@@ -227,10 +227,8 @@ def test_no_usable_angle_for_too_long_is_a_reason_to_stop_with_the_newest_verdic
         blind.follow(at_rest(0.5, PERIOD))
 
 
-@pytest.mark.parametrize("signs", [(1, 1, 1, 1), (1, -1, -1, 1)], ids=str)
-def test_spools_go_to_their_targets_whichever_way_their_motors_turn(rig_of: RigOf, signs: tuple[int, ...]) -> None:
-    """Each tendon holds its pretension: taut, and stretched by it."""
-    rig = rig_of(signs=signs)
+def let_rates_move_axes(rig: Any) -> None:
+    """From 100 s on, each rate at once until the next."""
     turn, since = rig.board.post_turn, [100.0, np.zeros(4)]
 
     def turned(rates: Any, life: float) -> Any:
@@ -240,6 +238,13 @@ def test_spools_go_to_their_targets_whichever_way_their_motors_turn(rig_of: RigO
         return turn(rates, life)
 
     rig.board.post_turn = turned
+
+
+@pytest.mark.parametrize("signs", [(1, 1, 1, 1), (1, -1, -1, 1)], ids=str)
+def test_spools_go_to_their_targets_whichever_way_their_motors_turn(rig_of: RigOf, signs: tuple[int, ...]) -> None:
+    """Each tendon holds its pretension: taut, and stretched by it."""
+    rig = rig_of(signs=signs)
+    let_rates_move_axes(rig)
     rig.follow(at_rest(0.5, PERIOD))
     actuator, last = SETTINGS.actuator, rig.rows[-1]
     steps = WRIST.pretension / actuator.tendon_stiffness / actuator.step_length
@@ -263,10 +268,14 @@ def test_positions_are_of_when_the_board_read_the_command_behind_half_a_usb_fram
     assert 3e-9 < after[busiest + 1] / sent[busiest] < 1e-8, "and its interrupts come first"
 
 
+@pytest.mark.parametrize("lost", [set(), {5, 6, 11}], ids=["all answered", "some lost"])
 def test_the_observer_is_told_what_the_spools_hold_in_the_middle_of_a_tick(
-    rig_of: RigOf, monkeypatch: pytest.MonkeyPatch
+    rig_of: RigOf, monkeypatch: pytest.MonkeyPatch, lost: set[int]
 ) -> None:
-    """In periods of 5 ms that is before the tick's own rate takes effect: the one before goes on until then."""
+    """In periods of 5 ms that is before the tick's own rate takes effect: the one before goes on until then.
+
+    By an answer that came, whatever was lost before it.
+    """
     told, predict = [], Steering.predict
 
     def heard(steering: Steering, plus: float, minus: float) -> None:
@@ -275,20 +284,14 @@ def test_the_observer_is_told_what_the_spools_hold_in_the_middle_of_a_tick(
 
     monkeypatch.setattr(Steering, "predict", heard)
     rig = rig_of()
-    turn, since = rig.board.post_turn, [100.0, np.zeros(4)]
-
-    def turned(rates: Any, life: float) -> Any:
-        now = rig.board.transport.now()
-        rig.board.position += since[1] * (now - since[0])
-        since[:] = now, np.rint(rates)
-        return turn(rates, life)
-
-    rig.board.post_turn = turned
+    let_rates_move_axes(rig)
+    rig.board.lost = lost
     rig.follow(at_rest(0.1, PERIOD))
     wait = 0.5 * SETTINGS.actuator.update
     went_on = 1.5 * PERIOD - UNDERWAY - wait
     rows = rig.rows + rig.at_rest
-    for earlier, before, after, sides in zip(rows[:-2], rows[1:-1], rows[2:], told[2:], strict=False):
+    ticks = zip(rows[:-2], rows[1:-1], rows[2:], told[2:], strict=False)
+    for earlier, before, after, sides in (each for number, each in enumerate(ticks, start=2) if number not in lost):
         one, two, four, five = (
             after[f"position_{k}"] + wait * earlier[f"sent_{k}"] + went_on * before[f"sent_{k}"] for k in (1, 2, 4, 5)
         )

@@ -101,3 +101,10 @@ def test_a_motor_that_reels_in_the_other_way_is_seen_as_late() -> None:
 def test_too_few_pictures_are_no_measurement() -> None:
     with pytest.raises(ValueError, match="too few"):
         find_latency(strokes(0.0, on_springs(35.0, 0.4), 15.0, count=2))
+
+
+def test_somebody_else_may_do_something_all_the_while() -> None:
+    """As a board has to be fed, while a fit goes on that takes up to seconds."""
+    calls = list[None]()
+    find_latency(strokes(0.06, on_springs(35.0, 0.4), 15.0, count=8), lambda: calls.append(None))
+    assert len(calls) > 20

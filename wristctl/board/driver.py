@@ -177,7 +177,8 @@ class Board:
         What is lost on the way is not sent again: the next rates take its place.
         """
         sent = within_reach(rates)
-        return sent, self._exchange.post(*self._packed(self._turning(sent, life)))
+        command, payload = self._packed(self._turning(sent, life))
+        return sent, self._exchange.post(command, self._bound(command, payload))
 
     def answered(self, until: float) -> tuple[float, Status] | None:
         """When the next of the posted rates that are answered by `until` [s] were sent, and the status in the answer.
@@ -242,9 +243,7 @@ class Board:
     def send(self, message: Command | tuple[Any, ...]) -> Status:
         """Send a command that is answered by the status."""
         command, payload = self._packed(message)
-        return self._seen(
-            command, self._told(command, self._exchange.ask(command, payload, self._patience, ATTEMPTS))[1]
-        )
+        return self._seen(command, self._ask(command, payload)[1])
 
     def close(self, emergency: bool = False) -> None:
         """Stop the motors (at once in an `emergency`), as far as the board can be reached, and let it go."""
@@ -271,15 +270,15 @@ class Board:
     def _turning(self, rates: Axes, life: float) -> Rate | Turn:
         return (Rate if self.cells is None else Turn)(rates, life)
 
-    def _packed(self, message: Command | tuple[Any, ...]) -> tuple[Command, bytes]:
-        """A message as it is sent: command and payload."""
+    @staticmethod
+    def _packed(message: Command | tuple[Any, ...]) -> tuple[Command, bytes]:
+        """A message as command and payload."""
         if isinstance(message, Command):
-            command, payload = message, b""
-        else:
-            command, payload = COMMAND_OF[type(message)], LAYOUTS[type(message)].pack(message)
-        return command, self._bound(command, payload)
+            return message, b""
+        return COMMAND_OF[type(message)], LAYOUTS[type(message)].pack(message)
 
     def _bound(self, command: Command, payload: bytes) -> bytes:
+        """A payload with the number of the connection, where the board asks for it."""
         return self._connection.to_bytes(2, "little") + payload if command in BOUND else payload
 
     def _seen(self, command: Command, content: tuple[Any, ...]) -> Status:
@@ -289,8 +288,8 @@ class Board:
         return _status(content)
 
     def _ask(self, command: Command, payload: bytes) -> tuple[Result, tuple[Any, ...]]:
-        payload = self._bound(command, payload)
-        return self._told(command, self._exchange.ask(command, payload, self._patience, ATTEMPTS))
+        answer = self._exchange.ask(command, self._bound(command, payload), self._patience, ATTEMPTS)
+        return self._told(command, answer)
 
     def _told(self, command: Command, answer: bytes) -> tuple[Result, tuple[Any, ...]]:
         """Result and content of an answer. Raises Faulted, Restarted, Refused and BoardError."""

@@ -31,8 +31,8 @@ class Traffic:
     bytes_read: int = 0
 
 
-class _Posted(NamedTuple):
-    """A command whose answer is not waited for."""
+class _Sent(NamedTuple):
+    """A command that is on its way."""
 
     command: Command
     sequence: int
@@ -40,6 +40,10 @@ class _Posted(NamedTuple):
     """When it was sent [s]."""
     bytes_before: int
     """Bytes that had been read by then."""
+
+    def is_answered_by(self, frame: WireFrame) -> bool:
+        """Whether a frame is the answer."""
+        return (frame.code, frame.sequence) == (self.command | _ANSWER, self.sequence) and bool(frame.payload)
 
 
 class Exchange:
@@ -56,7 +60,7 @@ class Exchange:
         self._decoder, self._frames = Decoder(), deque[WireFrame]()
         self._sequence = 0
         self._last_fed = 0.0
-        self._posted: deque[_Posted] = deque()
+        self._posted: deque[_Sent] = deque()
 
     @property
     def bad_frames(self) -> int:
@@ -96,7 +100,7 @@ class Exchange:
         while self._posted:
             for frame in self._came(until):
                 for number, posted in enumerate(self._posted):
-                    if (frame.code, frame.sequence) == (posted.command | _ANSWER, posted.sequence) and frame.payload:
+                    if posted.is_answered_by(frame):
                         for _ in range(number + 1):
                             self._posted.popleft()
                         self.traffic.resent += number
@@ -111,12 +115,12 @@ class Exchange:
                 return None
         return None
 
-    def _numbered(self, command: Command, payload: bytes) -> tuple[bytes, _Posted]:
+    def _numbered(self, command: Command, payload: bytes) -> tuple[bytes, _Sent]:
         self._sequence = ESTOP_SEQ if command is Command.ESTOP else (self._sequence + 1) & 0xFF
         began = self.transport.now()
         gap = began - self._last_fed if self._last_fed else 0.0
         self.silence = gap if command in FEEDS_WATCHDOG else max(gap, self.silence)
-        asked = _Posted(command, self._sequence, began, self.traffic.bytes_read)
+        asked = _Sent(command, self._sequence, began, self.traffic.bytes_read)
         return encode(command, self._sequence, payload), asked
 
     def _write(self, frame: bytes) -> None:
@@ -124,16 +128,16 @@ class Exchange:
         self.transport.write(frame)
         self.traffic.sent += 1
 
-    def _answered(self, asked: _Posted) -> None:
+    def _answered(self, asked: _Sent) -> None:
         self.traffic.answers += 1
         self.round_trip = self.transport.now() - asked.began
         if asked.command in FEEDS_WATCHDOG:
             self._last_fed = asked.began
 
-    def _answer(self, asked: _Posted, deadline: float) -> bytes | None:
+    def _answer(self, asked: _Sent, deadline: float) -> bytes | None:
         while self._frames or self.transport.now() < deadline:
             for frame in self._came(deadline):
-                if (frame.code, frame.sequence) == (asked.command | _ANSWER, asked.sequence) and frame.payload:
+                if asked.is_answered_by(frame):
                     self._answered(asked)
                     self.traffic.stale += len(self._frames)
                     self._frames.clear()

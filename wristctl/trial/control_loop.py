@@ -83,6 +83,7 @@ class ControlLoop:
         self._underway = settings.actuator.command_delay
         delay = self._spools.timing.delay
         self._late, self._rates = int(delay // self._period), np.zeros((AXES, remembered_rates(delay, self._period)))
+        self._since_read = delay - self._late * self._period - self._underway
         self._place, self._reckoned = self._reeled(), deque[tuple[float, Array]]()
         self._skipped = 0
         self._counted = self._epoch
@@ -124,7 +125,7 @@ class ControlLoop:
         self._listen(self.next_tick)
 
     def _tick(self, task: Task, k: int | None) -> None:
-        """One exchange with the board at the motion's sample `k`; None: behind its last, where no law is asked."""
+        """One tick at the motion's sample `k`; None: behind its last, where no law is asked."""
         asleep = self._clock.now() < self.next_tick
         self._listen(self.next_tick)
         if (ahead := self.next_tick - self._clock.now()) > 0.0:
@@ -246,8 +247,7 @@ class ControlLoop:
             self._place = ahead
             if skipped == 0:
                 in_force = self._rates[:, self._late + 1]
-                since_read = self._spools.timing.delay - self._late * self._period - self._underway
-                self._reckoned.append((self._posted, ahead - in_force * since_read))
+                self._reckoned.append((self._posted, ahead - in_force * self._since_read))
 
     def _reeled(self) -> Array:
         """Steps that the spools have reeled in, by the last status."""
