@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import json
 import math
+import shutil
 from dataclasses import dataclass, fields, replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -75,6 +77,12 @@ def test_a_row_has_errors_by_plane_estimated_and_true(whole: Whole) -> None:
     assert columns["true_recovery"][0] == "s" and columns["push_torque"][0] == "N m"
 
 
+def test_nothing_is_asked_of_the_board_between_a_trial_and_its_first_tick(whole: Whole) -> None:
+    """In the emulated time an exchange of half a tick would make the first one late."""
+    log = whole.run.data("log")
+    assert set(log.trial) == {0, 1} and log.late.max() < 1e-6
+
+
 def test_the_answer_has_both_planes_beside_simulation(whole: Whole) -> None:
     answer = whole.result.answer
     assert answer.sentence.startswith("ct-dob/hardware in two planes: error 0.")
@@ -111,6 +119,20 @@ def test_its_open_log_is_one_that_identification_reads(whole: Whole) -> None:
     assert len(trials) == 2 and all(len(trial.angle) > 80 for trial in trials)
     assert {0, 1} == {int(channel) for trial in trials for channel in trial.channel}
     assert "theta" not in whole.run.data("frames"), "no sample of an angle in one plane"
+
+
+def test_a_tick_by_which_no_answer_had_come_is_no_row_of_an_open_log(whole: Whole, tmp_path: Path) -> None:
+    late = tmp_path / "late"
+    shutil.copytree(whole.run.path, late)
+    rows = (late / "data/log.csv").read_text().splitlines()
+    names = rows[0].split(",")
+    first, second = (rows[number].split(",") for number in (60, 61))
+    for name in ("counted", *(f"position_{tendon}" for tendon in ACTIVE)):
+        second[names.index(name)] = first[names.index(name)]
+    rows[61] = ",".join(second)
+    (late / "data/log.csv").write_text("\n".join(rows) + "\n")
+    spools = [np.isfinite(open_log_of(run).columns["spool_1"]).sum() for run in (whole.run, Run(late))]
+    assert spools[1] == spools[0] - 1
 
 
 @pytest.mark.parametrize(

@@ -52,6 +52,17 @@ def test_spools_are_held_at_what_the_middle_of_each_step_has() -> None:
     assert trial.time[0] == 2.0 and trial.time[-1] == pytest.approx(2.0 + 59 * 0.005 - GRID)
 
 
+def test_a_tick_by_which_no_answer_had_come_says_nothing_of_the_spools() -> None:
+    """Its row repeats the board's last positions and their time."""
+    log, frames, kinds = tables()
+    late = log.copy()
+    late.iloc[[20, 21]] = late.iloc[[19, 19]]
+    late["time"] = log.time
+    lost = log.drop(index=[20, 21])
+    for one, other in zip(trials(late, frames, kinds), trials(lost, frames, kinds), strict=True):
+        np.testing.assert_array_equal(one.reeled, other.reeled)
+
+
 def test_trials_keep_their_names_and_their_wrists_lie_in_their_planes() -> None:
     found = trials(*tables(directions=("radial", "flexion")), exposure=4e-3)
     assert [each.label for each in found] == ["run, trial 0: radial", "run, trial 1: flexion"]

@@ -71,6 +71,11 @@ class MeasuredTrial:
         return replace(self, reeled=reeled)
 
 
+def answered(log: pd.DataFrame) -> pd.DataFrame:
+    """The ticks of a log by which the board had answered anew: until then its last positions stand there again."""
+    return log.drop_duplicates("counted")
+
+
 def measured_trials(
     label: str, wrist: WristParameters, step_length: float, grid: float, log: pd.DataFrame, frames: pd.DataFrame,
     kinds: pd.DataFrame, exposure: float = 0.0,
@@ -85,7 +90,7 @@ def measured_trials(
     trials = []
     for row in kinds.itertuples():
         number, direction = int(row.trial), str(row.direction)  # type: ignore[arg-type]
-        own, sightings = log[log.trial == number], frames[frames.trial == number]
+        own, sightings = answered(log[log.trial == number]), frames[frames.trial == number]
         if float(row.push) != 0.0 or len(own) < _FEWEST:  # type: ignore[arg-type]
             continue
         clock, captured, angle = (column.to_numpy(float) for column in (own.time, sightings.captured, sightings.theta))

@@ -153,16 +153,16 @@ class Experiment:
 
     def _all(self, testbed: Testbed, board: Board, shown: Shown | None) -> None:
         plane: str | None = None
-        patience = Patience(board)
+        loop: ControlLoop | None = None
         for trial in self._trials:
             bends_in = trial.plane if self._settings.planes == 1 else ""  # one set-up sees both planes
-            if bends_in != plane:
+            if loop is None or bends_in != plane:
+                patience = Patience(board) if loop is None else loop.patience()
                 testbed.face(trial.direction, patience.pulse)
                 loop, tracking = self._loop(testbed, board, bends_in, shown)
                 plane = bends_in
             self._one(testbed, loop, trial)
             loop = self._relaxed(board, tracking, bends_in, shown)
-            patience = loop.patience()
 
     def _loop(
         self, testbed: Testbed, board: Board, plane: str, shown: Shown | None

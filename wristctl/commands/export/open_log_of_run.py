@@ -14,6 +14,7 @@ from wristctl.commands.inputs_of_loops import IDENTIFIED
 from wristctl.config.loop import Loop
 from wristctl.config.study import Study
 from wristctl.errors import FILE, UserError
+from wristctl.identification.measured_trials import answered
 from wristctl.identification.unknowns import with_identified
 from wristctl.records import Run
 from wristctl.records.formats import read_arrays, read_table
@@ -58,7 +59,7 @@ def _trials(run: Run) -> tuple[Columns, Mapping[str, np.ndarray]]:
     for row in kinds.itertuples():
         number, direction = row.trial, DIRECTIONS.get(str(row.direction))
         flexion = direction is not None and direction.plane == "flexion"
-        ticks, seen = log[log.trial == number], frames[(frames.trial == number) & (frames.verdict == "ok")]
+        ticks, seen = answered(log[log.trial == number]), frames[(frames.trial == number) & (frames.verdict == "ok")]
         spools = {f"spool_{tendon}": step * ticks[f"position_{tendon}"].to_numpy(float) for tendon in ACTIVE}
         if "plane" in seen:
             parts.append(
