@@ -106,7 +106,7 @@ sound-rigs: .venv/dev
 # The real path, serial port and camera device, against the emulated rig in real time: first-power-up.md walked, a slow
 # link and camera found out, hostile bytes. Alone: beside other work they end as skipped.
 test-rig: .venv/dev
-	WRISTCTL_RIG=1 $(BIN)/pytest -s -rs tests/rig
+	WRISTCTL_RIG=1 $(BIN)/pytest -s -rs $(AGAIN) tests/rig
 
 # The built wheel in an environment of its own and an empty folder: `make installed WITH=python3.13`, `OLDEST=--lowest`.
 installed: .venv/dev
