@@ -53,6 +53,15 @@ def test_a_slow_start_is_a_rest_without_a_jump_and_a_short_rest_has_none() -> No
     assert 0.0 < plateau(course(brief, RAMP)) < 0.05 and jump(course(brief, RAMP)) == 0.0
 
 
+@pytest.mark.parametrize(("rest", "jumps"), [(0.04, False), (0.06, True), (0.09, True)])
+def test_a_rest_of_a_twentieth_of_a_second_or_longer_can_end_in_a_jump(rest: float, jumps: bool) -> None:
+    """A ramp with one rest, then 4 deg ahead: the rest is made up for, from its last sample on, and 4 deg more."""
+    bend = np.where(TIME < 1.0, RAMP, RAMP + math.radians(4.0))
+    bend[1000 : 1000 + round(1000 * rest)] = math.radians(10.0)
+    ahead = 4.0 + 10.0 * (rest - 1e-3)
+    assert jump(course(bend, RAMP)) == pytest.approx(math.radians(ahead) if jumps else 0.0, abs=1e-9)
+
+
 def test_nothing_is_told_of_a_wrist_that_has_failed() -> None:
     gone = np.where(TIME < 1.0, STAIRS, np.nan)
     assert math.isnan(plateau(course(gone, RAMP))) and math.isnan(jump(course(gone, RAMP)))
