@@ -460,6 +460,18 @@ def test_in_two_planes_the_reach_is_the_angle_that_is_held_toward_every_side(ten
         assert held < held_all_around(weak, layout, 0.0, 45.0)
 
 
+@pytest.mark.parametrize("first", [0.0, 90.0])
+@pytest.mark.parametrize("tension_limit", [9.8, 13.0, 16.0])
+def test_three_tendons_reach_as_far_as_two_of_them_hold_across_the_third(tension_limit: float, first: float) -> None:
+    """Their torques fill a hexagon, whose sides are nearest to its middle at a right angle to each tendon."""
+    places = tuple({"angle_deg": first + angle} for angle in (0.0, 120.0, 240.0))
+    wrist = WristParameters.model_validate({"tendons": places, "tension_limit": tension_limit})
+    layout, angles, across = TendonLayout.of(wrist), np.arange(0.0, 46.0), math.radians(first + 90.0)
+    bends = np.radians(angles)[:, None] * np.array([math.cos(across), math.sin(across)])
+    beyond = first_beyond(wrist, layout, bends)
+    assert beyond is not None and held_all_around(wrist, layout, 0.0, 45.0) == angles[beyond - 1]
+
+
 def test_a_recommendation_for_three_tendons_is_planned_in_two_planes_toward_every_side() -> None:
     study = load_study([], ["wrist.tendons=three", "wrist.tension_limit=16"])
     family = family_of_rigs(study, reach_deg(study))

@@ -111,6 +111,26 @@ def test_both_sides_of_one_plane_have_a_null_space_too() -> None:
     assert held.over(OVER)[0] == pytest.approx(15.0, rel=1e-6)
 
 
+def test_both_sides_of_one_plane_are_looked_at_for_the_least_stiffness() -> None:
+    """Weight across the plane stiffens one side more than the other; mirrored, the sides are exchanged."""
+    leaning = WristParameters(gravity=(-4.0, 9.0))
+    mirrored = leaning.model_copy(update={"gravity": (-4.0, -9.0)})
+    one, other = (held_wrist(wrist, _loop(None), None) for wrist in (leaning, mirrored))
+    least, most = one.over(OVER)
+    assert most > least * (1.0 + 1e-4)
+    np.testing.assert_allclose(other.over(OVER), (least, most), rtol=1e-9)
+
+
+def test_the_stiffness_of_a_turned_wrist_is_the_same() -> None:
+    """Places turned by a quarter; the wrist hangs and is equally stiff all around, so nothing else turns."""
+    turned = tuple({**place, "angle_deg": place["angle_deg"] + 90.0} for place in DRAWN)
+    one, other = (
+        held_wrist(wrist, _loop(None), TendonLayout.of(wrist)).over(OVER) for wrist in (_wrist(DRAWN), _wrist(turned))
+    )
+    assert one[1] > 2.0 * one[0]
+    np.testing.assert_allclose(other, one, rtol=1e-9)
+
+
 def test_a_stiffness_beyond_what_tendons_give_is_refused_with_what_they_give() -> None:
     wrist = _wrist("three")
     with pytest.raises(UserError, match=r"no stiffer than 12\.3 N m/rad") as caught:
