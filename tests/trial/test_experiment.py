@@ -202,6 +202,20 @@ def test_stored_positions_of_another_start_of_the_board_are_refused(experiment: 
     assert not (done.folder / "log.csv").read_text().splitlines()[1:]
 
 
+def test_zero_is_found_anew_by_a_calibrations_senses_unless_its_positions_are_stored(
+    experiment: Run, at_zero: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    senses: list[Any] = []
+
+    def found(*given: Any) -> Any:
+        senses.append(given[-1])
+        raise SafetyStop("far enough", fix="none")
+
+    monkeypatch.setattr("wristctl.trial.experiment.find_zero", found)
+    done = experiment(positions="find")
+    assert isinstance(done.error, SafetyStop) and senses == [at_zero.zero.signs]
+
+
 @pytest.mark.slow
 def test_co_contraction_in_a_trial_is_found_behind_it_and_never_beyond_the_motors_pull(experiment: Run) -> None:
     faults = tuple({"kind": "tendon-creeps", "at": 0.1, "axis": axis, "size": -3.0, "duration": 0.6} for axis in (1, 2))
