@@ -10,7 +10,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from wristctl.simulation.references import minimum_jerk
+from wristctl.trial.camera_record import CameraRecord
 from wristctl.trial.marker_lag import MarkerLag
+from wristctl.vision.marker import Sighting, SightingVerdict
 
 RATE, NOISE = 60.0, 1e-3
 """Frames a second; standard deviation of an angle [rad]."""
@@ -41,3 +43,15 @@ def test_noise_makes_it_say_less_and_never_more() -> None:
 @pytest.mark.parametrize("given_", [{"angle": 0.0}, {"seconds": 0.2}])
 def test_a_wrist_that_did_not_move_and_too_few_frames_tell_nothing(given_: dict[str, float]) -> None:
     assert math.isnan(lag_of(0.03, **given_))
+
+
+def test_a_cameras_record_knows_how_late_its_frames_show_the_motion() -> None:
+    """Frames that are dated 40 ms after what they show; the second prediction, with softer tendons, has no say."""
+    record, late, nowhere = CameraRecord(math.nan), 0.04, np.zeros((2, 4, 2))
+    time = np.arange(0.0, 2.0, 1.0 / RATE)
+    for number, (captured, angle, rate) in enumerate(zip(time, *minimum_jerk(time, 1.0)[:2], strict=True)):
+        shown = float(minimum_jerk(np.array([captured - late]), 1.0)[0, 0])
+        sighting = Sighting(captured, number, 0.5 * shown, SightingVerdict.OK, nowhere)
+        frame = record.saw(sighting, captured, 0.5 * angle * np.array([1.0, 0.8]), 0.5 * rate, captured)
+        assert frame.seen == 0.5 * shown
+    assert late - 0.003 < record.lag.least() <= late + 0.001
