@@ -194,7 +194,12 @@ def test_the_log_has_reference_and_error_of_the_tick(rig_of: RigOf) -> None:
         for name in ("theta_ref", "rate_ref", "acceleration_ref", "theta_desired"):
             assert row[name] == getattr(motion, name)[k]
         assert row["error"] == pytest.approx(row["theta"] - row["theta_ref"])
-    assert len(rig.table("log")) == 40 and len(rig.table("between")) == len(rig.at_rest) == 1
+    (behind,) = rig.at_rest
+    for name in ("theta_ref", "theta_desired"):
+        assert behind[name] == getattr(motion, name)[-1], "it stays where the motion ends"
+    assert behind["rate_ref"] == behind["acceleration_ref"] == 0.0
+    assert behind["error"] == pytest.approx(behind["theta"] - behind["theta_ref"])
+    assert len(rig.table("log")) == 40 and len(rig.table("between")) == 1
 
 
 def test_a_frame_is_told_with_its_capture_in_the_row_that_used_it(rig_of: RigOf) -> None:
