@@ -7,7 +7,7 @@ import pickle
 import tempfile
 import traceback
 from collections.abc import Callable, Mapping, Sequence
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 from typing import Any
 
@@ -28,6 +28,9 @@ from wristctl.trial.log import TrialLog
 from wristctl.trial.testbeds import EmulatedTestbed
 from wristctl.trial.trials import trials_of
 from wristctl.vision.view import View
+
+# What prepares the bench of a run.
+Prepared = Callable[[VirtualBench], None]
 
 _AHEAD, _FIRST = 0.01, ("homing", "moving")
 _FULL = {
@@ -110,21 +113,36 @@ class _EndedByForks(BaseException):
 
 
 def fan_out(phase: Phase, groups: Sequence[Sequence[Case]], workers: int = 2) -> list[Judged]:
-    """Judge faults of one moment, alone or together: the experiment is done once up to there, and then once for each.
+    """Judge faults of one moment, alone or together: the experiment is done once up to there, then once for each."""
+    sound, since = sound_course(phase), "power-on" if phase == "homing" else "first trial"
+    injected = [
+        [InjectedFault.model_validate(each) for case in group for each in case.faults(phase)] for group in groups
+    ]
+    courses = forked(partial(_performed, _settings(phase)), injected, since, AT[phase], workers)
+    return [judge(groups[number], phase, course, sound) for number, course in courses.items()]
 
-    A process forks there; its children go on with one group of faults each.
+
+def _performed(changes: Mapping[str, Any], prepared: Prepared) -> Course:
+    return perform(changes, prepared=prepared)
+
+
+def forked(
+    run: Callable[[Prepared], Any], injected: Sequence[Sequence[InjectedFault]], since: str, at: float, workers: int = 2
+) -> dict[int, Any]:
+    """What a run comes to with each of these groups of faults, by number, so long [s] after power-on or a trial.
+
+    `run` is given what prepares its bench. A process forks at that moment; its children go on with one group each.
     """
-    sound, mine = sound_course(phase), []
+    mine: list[int] = []
     with tempfile.TemporaryDirectory() as folder:
 
         def fork(bench: VirtualBench) -> None:
             children: set[int] = set()
-            for number, group in enumerate(groups):
+            for number, group in enumerate(injected):
                 while len(children) >= workers:
                     children.discard(os.wait()[0])
                 if not (child := os.fork()):
-                    injected = [InjectedFault.model_validate(each) for case in group for each in case.faults(phase)]
-                    bench._rig.faults._faults = tuple(injected)
+                    bench._rig.faults._faults = tuple(group)
                     mine.append(number)
                     return
                 children.add(child)
@@ -133,25 +151,24 @@ def fan_out(phase: Phase, groups: Sequence[Sequence[Case]], workers: int = 2) ->
             raise _EndedByForks
 
         def prepared(bench: VirtualBench) -> None:
-            transport, forked, starts = bench.transport, [False], bench._rig.faults._starts
-            run, since = transport._run, "power-on" if phase == "homing" else "first trial"
+            transport, done, starts = bench.transport, [False], bench._rig.faults._starts
+            go_on = transport._run
 
             def watched(end: int) -> None:
-                if not forked[0] and transport.now() > starts[since] + AT[phase] - _AHEAD:
-                    forked[0] = True
+                if not done[0] and transport.now() > starts[since] + at - _AHEAD:
+                    done[0] = True
                     fork(bench)
-                run(end)
+                go_on(end)
 
             transport._run = watched  # type: ignore[method-assign]
 
         try:
-            course = perform(_settings(phase), prepared=prepared)
-            judged = judge(groups[mine[0]], phase, course, sound)
-            Path(folder, str(mine[0])).write_bytes(pickle.dumps(judged))
+            ended = run(prepared)
+            Path(folder, str(mine[0])).write_bytes(pickle.dumps(ended))
             os._exit(0)
         except _EndedByForks:
-            found = [Path(folder, str(number)) for number in range(len(groups))]
-            return [pickle.loads(file.read_bytes()) for file in found if file.exists()]
+            files = [(number, Path(folder, str(number))) for number in range(len(injected))]
+            return {number: pickle.loads(file.read_bytes()) for number, file in files if file.exists()}
         except BaseException:
             if mine:
                 traceback.print_exc()

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from wristctl.arrays import Array
 from wristctl.board.driver import Board
 from wristctl.board.messages import AXES
 from wristctl.config.hw_run import HwRunSettings
@@ -34,7 +35,7 @@ from wristctl.trial.tick_timing import TickTiming
 from wristctl.trial.tracking import Tracking
 from wristctl.trial.trials import Trial, back, motion_of, motions_of
 from wristctl.trial.watch import Watch
-from wristctl.trial.zero_checks import check_cocontraction, check_zero
+from wristctl.trial.zero_checks import check_cocontraction, check_tendons, check_zero
 from wristctl.vision.camera_pose import CameraPose
 from wristctl.vision.marker import Sighting, SightingVerdict
 from wristctl.wrist.directions import in_plane
@@ -100,6 +101,7 @@ class Experiment:
         self.most, self.odd = dict[str, float](), dict[int, str]()
         self.poses: dict[str, CameraPose | None] = {}
         self._under_way: tuple[int, float] | None = None  # number and start of the trial that goes on
+        self._in_doubt: int | None = None  # the trial that has ended, until its tendons have been looked at
 
     def run(self, testbed: Testbed, shown: Shown | None = None) -> None:
         """Do all trials, and close the stand. Whatever ends them early, the motors are stopped before it is raised.
@@ -161,8 +163,8 @@ class Experiment:
                 testbed.face(trial.direction, patience.pulse)
                 loop, tracking = self._loop(testbed, board, bends_in, shown)
                 plane = bends_in
-            self._one(testbed, loop, trial)
-            loop = self._relaxed(board, tracking, bends_in, shown)
+            pulled = self._one(testbed, loop, trial)
+            loop = self._relaxed(board, tracking, bends_in, pulled, shown)
 
     def _loop(
         self, testbed: Testbed, board: Board, plane: str, shown: Shown | None
@@ -204,10 +206,18 @@ class Experiment:
         """The wrist as a loop in this plane knows it, or in both."""
         return self._wrist if self._settings.planes == 2 else in_plane(self._wrist, plane)
 
-    def _relaxed(self, board: Board, tracking: Tracking, plane: str, shown: Shown | None) -> ControlLoop:
-        """After a trial see that no tendons pull against each other, and come to rest at zero again."""
+    def _relaxed(
+        self, board: Board, tracking: Tracking, plane: str, pulled: Array, shown: Shown | None
+    ) -> ControlLoop:  # fmt: skip
+        """After a trial see that no tendons pull against each other and that none is lost; rest at zero again.
+
+        `pulled` is the largest pull (4,) [N] that the trial asked of each.
+        """
         assert self.zero is not None
-        check_cocontraction(board, tracking, self._settings, self._wrist, plane, self.zero)
+        given = board, tracking, self._settings, self._wrist, plane, self.zero
+        check_cocontraction(*given)
+        check_tendons(*given, pulled)
+        self._in_doubt = None
         return self._at_rest(board, tracking, plane, shown)
 
     def _home(self, board: Board, tracking: Tracking, plane: str) -> Zero:
@@ -228,8 +238,8 @@ class Experiment:
         slacken(board, spools_of(self._settings.actuator), self._settings.homing, zero.signs)
         Patience(board).wait(self._settings.homing.let_go)
 
-    def _one(self, testbed: Testbed, loop: ControlLoop, trial: Trial) -> None:
-        """One trial, and the way back to zero."""
+    def _one(self, testbed: Testbed, loop: ControlLoop, trial: Trial) -> Array:
+        """One trial, and the way back to zero; the largest pull (4,) [N] that was asked of each tendon."""
         settings, followed, start = self._settings, self.motions[trial.direction], loop.next_tick
         law, gains = self._laws[trial.row]
         self._under_way, self.outcomes[trial.number] = (trial.number, start), "begun"
@@ -243,7 +253,9 @@ class Experiment:
             self.most = {name: max(value, self.most.get(name, 0.0)) for name, value in loop.watch.most.items()}
             self.odd[trial.number] = loop.watch.words()
         self._trial_ended(testbed, "ok")
+        self._in_doubt = trial.number
         loop.follow(back(followed.final, settings.back, 0.0, settings.control_period, settings.planes), self._back, ())
+        return loop.asked
 
     def _trial_ended(self, testbed: Testbed, outcome: str) -> None:
         if self._under_way is not None:
@@ -261,6 +273,8 @@ class Experiment:
             board.close(emergency=not halted.verified)
         trial, start = self._under_way or (None, None)
         self.stop = Stop(error, trial, None if start is None else decided - start, halted)
+        if self._in_doubt is not None and isinstance(error, SafetyStop):
+            self.outcomes[self._in_doubt] = f"after it: {self.stop.reason.removeprefix('stopped: ')}"
         self._log.disk.give_up_reserve()
         try:
             self._trial_ended(testbed, self.stop.reason)

@@ -1,13 +1,16 @@
 """Checks of a homed wrist: does each tendon do as it should, is each slack, do none pull against each other?"""
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 
+from wristctl.arrays import Array
 from wristctl.board.driver import Board
 from wristctl.board.messages import AXES, JOG_RATE
 from wristctl.config.hw_run import RigSettings
 from wristctl.config.wrist import WristParameters
-from wristctl.trial.expected_moves import LEAST, Bend, middle
+from wristctl.trial.expected_moves import LEAST, Bend, ExpectedMoves, middle
 from wristctl.trial.homing import Zero, moves_of, rest_of, slacken
 from wristctl.trial.spools import on_plus_side, spools_of
 from wristctl.trial.supervised_wait import Patience, Reading
@@ -16,6 +19,8 @@ from wristctl.wrist.directions import OPPOSITE_AXES
 
 # Share of `homing.pull` by which a tendon is reeled in to check it.
 _CHECKED = 1.2
+# How many times beyond `safety.follow_deg` a pull would bend the wrist of a tendon that counts as tried.
+_FAR = 3.0
 # Seconds in which a wrist that has been let go comes to rest, but for creep.
 _SETTLES = 0.5
 
@@ -25,19 +30,35 @@ def check_zero(
 ) -> tuple[float, ...]:
     """Let each tendon of a homed, slack wrist bend it a little, and leave it slack again; all must do as they should.
 
-    Friction inside a wrist leaves it bent where it was let go, and turns a bend by another tendon aside. So opposite
-    tendons bend it in turn, each from where the other has left it, and straight is the middle of where it rests.
     Returns each camera's marker angle of the straight wrist [rad].
 
     Raises SafetyStop where a tendon is not slack, or a motor turns the wrong way or winds another tendon than its own.
     """
     expected, spools, homing = moves_of(settings, wrist, plane), spools_of(settings.actuator), settings.homing
-    slack, reeled = -round(homing.pull / spools.step), round(_CHECKED * homing.pull / spools.step)
     held = Patience(board).reading(tracking, 4 * homing.frames)
     slacken(board, spools, homing, zero.signs, 2.0)
     Patience(board).wait(0.5 * homing.let_go)
     rest = Patience(board).reading(tracking, 4 * homing.frames)
     expected.judge_slackened(expected.bend(held, rest))
+    middles = []
+    for pair in OPPOSITE_AXES:
+        straight, rest = _tried(board, tracking, settings, expected, zero, pair, rest)
+        middles.append(straight)
+    slacken(board, spools, homing, zero.signs)
+    return tuple(angle + bent for angle, bent in zip(tracking.zero, middle(middles), strict=False))
+
+
+def _tried(
+    board: Board, tracking: Tracking, settings: RigSettings, expected: ExpectedMoves, zero: Zero,
+    pair: tuple[int, int], rest: Reading,
+) -> tuple[Bend, Reading]:  # fmt: skip
+    """Let two opposite tendons bend a slack wrist that is at rest so; where it is straight, and where it rests then.
+
+    Friction inside a wrist leaves it bent where it was let go, and turns a bend by another tendon aside. So opposite
+    tendons bend it in turn, each from where the other has left it, and straight is the middle of where it rests.
+    """
+    spools, homing = spools_of(settings.actuator), settings.homing
+    slack, reeled = -round(homing.pull / spools.step), round(_CHECKED * homing.pull / spools.step)
 
     def bent(axis: int, by: int) -> tuple[Bend, Reading]:
         """The bend that an axis makes of the wrist at rest, and where that rests after it."""
@@ -49,23 +70,41 @@ def check_zero(
         slacken(board, spools, homing, zero.signs, 2.0)
         return bend, rest_of(board, tracking, expected, homing)
 
-    middles = []
-    for pair in OPPOSITE_AXES:
-        bend, rest = bent(pair[1], 2 * reeled)
-        if expected.size(bend) < LEAST * reeled / expected.steps():
-            raise expected.bends_too_little(pair[1], bend.theta, reeled / expected.steps())
-        rests, bends = [_bend_of(rest)], []
-        for axis in pair:
-            bend, rest = bent(axis, reeled)
-            bends.append(bend)
-            rests.append(_bend_of(rest))
-        straight = middle(rests[1:])
-        for axis, before, bend in zip(pair, rests, bends, strict=False):
-            away = expected.toward(axis, straight.since(before)) * expected.steps()
-            expected.judge_small_move(axis, reeled + away, bend)
-        middles.append(straight)
+    bend, rest = bent(pair[1], 2 * reeled)
+    if expected.size(bend) < LEAST * reeled / expected.steps():
+        raise expected.bends_too_little(pair[1], bend.theta, reeled / expected.steps())
+    rests, bends = [_bend_of(rest)], []
+    for axis in pair:
+        bend, rest = bent(axis, reeled)
+        bends.append(bend)
+        rests.append(_bend_of(rest))
+    straight = middle(rests[1:])
+    for axis, before, bend in zip(pair, rests, bends, strict=False):
+        away = expected.toward(axis, straight.since(before)) * expected.steps()
+        expected.judge_small_move(axis, reeled + away, bend)
+    return straight, rest
+
+
+def check_tendons(
+    board: Board, tracking: Tracking, settings: RigSettings, wrist: WristParameters, plane: str, zero: Zero,
+    pulled: Array,
+) -> None:  # fmt: skip
+    """Let each tendon that was not tried bend a slack wrist a little, beside the one opposite; leaves it slack.
+
+    `pulled` is the largest pull (4,) [N] that was asked of each: one whose pull would have bent the wrist far beyond
+    `safety.follow_deg` was tried, for without it the trial had been stopped. Raises SafetyStop.
+    """
+    expected, spools, homing = moves_of(settings, wrist, plane), spools_of(settings.actuator), settings.homing
+    enough = _FAR * math.radians(settings.safety.follow_deg)
+    untried = [axis for axis in range(AXES) if not pulled[axis] * expected.compliance(axis) > enough]
+    pairs = [pair for pair in OPPOSITE_AXES if set(pair) & set(untried)]
+    if not pairs:
+        return
+    slacken(board, spools, homing, zero.signs, 2.0)
+    rest = rest_of(board, tracking, expected, homing)
+    for pair in pairs:
+        _, rest = _tried(board, tracking, settings, expected, zero, pair, rest)
     slacken(board, spools, homing, zero.signs)
-    return tuple(angle + bent for angle, bent in zip(tracking.zero, middle(middles), strict=False))
 
 
 def check_cocontraction(

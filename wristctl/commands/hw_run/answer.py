@@ -88,7 +88,7 @@ def answer_of(
         return Answer(f"None of {len(trials)} trials was completed.", None, notes, more)
     sentences = [words.sentence(done[done["label"] == label], label) for label in labels[:2]]
     stopped = len(trials) - len(done)
-    sentences.append(f"{stopped} of {len(trials)} trials ended early." if stopped else "No trial ended early.")
+    sentences.append(f"{stopped} of {len(trials)} trials left out." if stopped else "No trial ended early.")
     return Answer(" ".join(sentences), words.table(done, labels), notes, more)
 
 
@@ -192,8 +192,8 @@ def _apart(done: pd.DataFrame, labels: Sequence[str], twins: Mapping[int, Simula
 
 
 def unsound(trials: pd.DataFrame, marks: Sequence[str], metrics: Mapping[str, float]) -> list[str]:
-    """Trials that ended early or were odd, what the wrist does wrong, and ticks that were skipped."""
-    notes = [f"Trial {row['trial']} ended early: {row['outcome']}." for row in _records(trials, "outcome", "ok")[:3]]
+    """Trials that do not count or were odd, what the wrist does wrong, and ticks that were skipped."""
+    notes = [f"Trial {row['trial']} does not count: {row['outcome']}." for row in _records(trials, "outcome", "ok")[:3]]
     notes += [f"Trial {row['trial']} was odd: {row['odd']}." for row in _records(trials, "odd", "")[:3]]
     notes += [f"Of the completed trials: {'; '.join(marks)}."] if marks else []
     if metrics.get("overruns", 0.0) > 0.0:

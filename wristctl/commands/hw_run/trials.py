@@ -49,7 +49,7 @@ _OF_ANY: dict[str, tuple[str, str]] = {
     "push": ("N", "largest force against the bend"),
     "controller": ("", "name in the table of controllers"),
     "gains": ("", "preset, tuned or own"),
-    "outcome": ("", "ok, or why it ended early"),
+    "outcome": ("", "ok, or why it ended early or does not count"),
     "odd": ("", "what was odd all the same: beyond what a sound rig shows, within the limits"),
 }
 _OF_TRIALS: dict[str, tuple[str, str]] = {
