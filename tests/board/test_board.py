@@ -321,3 +321,10 @@ def test_a_board_beside_a_running_program_is_stopped_at_once(wire: BadWire, boar
     began = wire.now()
     assert Board(wire).stop_whatever_runs() is Result.OK
     assert wire.now() - began < 0.01
+
+
+def test_all_pins_of_the_load_cells_are_the_boards_own() -> None:
+    """JTAG, which has four of them where the fuses leave it on, is switched off (JTD in MCUCR)."""
+    chip = Atmega2560()
+    chip.run(FREQUENCY // 100)
+    assert chip.peek(0x55) & 0x80

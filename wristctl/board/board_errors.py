@@ -92,12 +92,12 @@ class Restarted(BoardError):
     """The board has started anew under a session."""
 
     def __init__(self, port: str) -> None:
-        problem = "the board has restarted; its drives are off and its positions lost"
+        problem = "the board has restarted; its positions are lost, and its drives may hold for 2 s more"
         super().__init__(
             "cable",
             problem,
             port,
-            "check its supply and that nobody pressed reset; enable and home",
+            "keep clear until they let go; check its supply and that nobody pressed reset; enable and home",
             SAFETY_STOP,
         )
 

@@ -44,6 +44,32 @@ def test_open_for_three_it_stops_within_3_1_milliseconds(bench: Bench) -> None:
     assert max(found) < ESTOP_MS + 0.1
 
 
+@pytest.mark.parametrize(("period", "share"), [(2.0, 0.5), (2.5, 0.5), (3.0, 0.7), (7.3, 0.6), (1.7, 0.5)])
+@pytest.mark.slow
+def test_a_contact_that_chatters_stops(bench: Bench, period: float, share: float) -> None:
+    """Open for half of the time, however quickly: each millisecond of it adds more than one closed takes away."""
+    set_moving(bench)
+    for _ in range(round(30.0 / period)):
+        bench.chip.drive(*ESTOP, True)
+        bench.run_ms(share * period)
+        bench.chip.drive(*ESTOP, False)
+        bench.run_ms((1.0 - share) * period)
+    assert_latched(bench, Fault.ESTOP_INPUT)
+
+
+@pytest.mark.slow
+def test_an_input_that_is_open_for_a_fifth_of_the_time_is_noise(bench: Bench) -> None:
+    set_moving(bench)
+    for _ in range(40):
+        bench.chip.drive(*ESTOP, True)
+        bench.run_ms(1.0)
+        bench.chip.drive(*ESTOP, False)
+        bench.run_ms(2.0)
+        bench.do(Command.PING)
+        bench.run_ms(2.0)
+    assert bench.status().state is State.ENABLED
+
+
 @pytest.mark.parametrize("hold", [0, 1])
 @pytest.mark.slow
 def test_an_alarm_of_any_drive_stops_all_within_a_millisecond(bench: Bench, hold: int) -> None:

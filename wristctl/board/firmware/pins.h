@@ -31,6 +31,9 @@ static inline void pins_init(void) {
   DDRA = 0xFF;
   PORTG |= _BV(PG0); /* pull-up */
   PORTL |= ALARM_BITS; /* pull-ups */
+  uint8_t no_jtag = MCUCR | _BV(JTD); /* PF4 to PF7 are JTAG's unless the fuses say otherwise, as on some clones */
+  MCUCR = no_jtag; /* twice within four cycles */
+  MCUCR = no_jtag;
   PORTF = 0x55;        /* pull-ups of DOUT: where there is no amplifier it reads high, nothing new */
   DDRF = 0xAA;
   DDRB |= _BV(PB7);

@@ -11,7 +11,7 @@
 static volatile uint32_t milliseconds;
 static volatile uint8_t state, faults, silent_ms;
 static volatile uint8_t settle_left;
-static uint8_t open_ms; /* for how long the emergency stop input has read open */
+static uint8_t open_half_ms; /* by how much the emergency stop input has read open more than half as long as closed */
 static volatile uint16_t watchdog_left, stop_left;
 static volatile bool homed;
 volatile bool safety_estop_heard;
@@ -97,14 +97,15 @@ static void show_state(uint16_t ms) { /* ENABLED lit, FAULT fast, else slow */
     PORTB &= ~_BV(PB7);
 }
 
-/* One stray reading among motor wires is no button; a drive's alarm output has a low impedance, and one is enough. Without
- * energised drives an alarm input only tells that the motors' supply is off. */
+/* One stray reading among motor wires is no button, and a contact that chatters is one: two up while it is open, one down
+ * while it is closed. A drive's alarm output has a low impedance, and one reading is enough. Without energised drives an
+ * alarm input only tells that the motors' supply is off. */
 static void look_at_inputs(void) {
-  if (!estop_open())
-    open_ms = 0;
-  else if (open_ms < ESTOP_MS)
-    open_ms++;
-  if (open_ms == ESTOP_MS && !(state == STATE_FAULT && (faults & FAULT_ESTOP_INPUT))) latch(FAULT_ESTOP_INPUT, true);
+  if (estop_open())
+    open_half_ms += open_half_ms < 2 * ESTOP_MS ? 2 : 0;
+  else if (open_half_ms)
+    open_half_ms--;
+  if (open_half_ms >= 2 * ESTOP_MS && !(state == STATE_FAULT && (faults & FAULT_ESTOP_INPUT))) latch(FAULT_ESTOP_INPUT, true);
   if (alarm_open() && (state == STATE_ENABLED || state == STATE_STOPPING)) latch(FAULT_DRIVE, !config.hold_on_fault);
 }
 
