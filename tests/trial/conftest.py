@@ -73,13 +73,16 @@ def at_zero() -> WristCalibration:
 def experiment(tmp_path: Path, at_zero: WristCalibration) -> Run:
     """Performs the short experiment, changed, and keeps what stopped it."""
 
-    def run(shown: Callable[[dict[str, Any]], None] | None = None, seed: int = 0, **changes: Any) -> Done:
+    def run(
+        shown: Callable[[dict[str, Any]], None] | None = None, seed: int = 0,
+        wrist: WristParameters = WRIST, **changes: Any,
+    ) -> Done:  # fmt: skip
         settings = settings_of(**changes)
-        bench = VirtualBench(settings.bench, WRIST, seed, settings.markers)
+        bench = VirtualBench(settings.bench, wrist, seed, settings.markers)
         weighed = settings.load_cells is not None
         log = TrialLog(tmp_path, settings.bench.segments, settings.control_period, weighed=weighed)
         trials = trials_of(settings, np.random.default_rng(0))
-        performed = Experiment(settings, WRIST, trials, log, calibration=at_zero, seed=seed)
+        performed = Experiment(settings, wrist, trials, log, calibration=at_zero, seed=seed)
         error = None
         try:
             performed.run(EmulatedTestbed(bench, settings, [View()], None), shown)

@@ -43,8 +43,11 @@ class Homing(Section):
         0.15, "", "steps per radian may differ from the model's by this share", "measured", gt=0
     )
     taut: float = quantity(0.15e-3, "m", "by how much a tendon may be taut when homing begins", "assumed", ge=0)
+    rest_deg: float = quantity(
+        7.0, "deg", "how far from where its weight lets it a slack wrist may rest", "emulated", gt=0, lt=30
+    )
     oblique_deg: float = quantity(
-        15.0, "deg", "how far off square the markers may show an uncalibrated camera", "emulated: +-10", gt=0, lt=45
+        12.0, "deg", "how far off square the markers may show an uncalibrated camera", "emulated: +-10", gt=0, lt=45
     )
     direction_deg: float = quantity(
         20.0, "deg", "in two planes: how far from its place a tendon may bend the wrist", "assumed", gt=0, lt=45

@@ -71,7 +71,7 @@ def calibrated(testbed: Testbed, settings: CalibrateWristSettings, wrist: WristP
 
     Raises SafetyStop, BoardError and CameraError; the motors are stopped before.
     """
-    with in_sight(testbed, settings) as (board, hello, tracking):
+    with in_sight(testbed, settings, wrist) as (board, hello, tracking):
         if settings.planes == 2:  # what one camera sees of a bend depends on the other
             tracking.zero = Patience(board).markers(tracking, 4 * settings.homing.frames)
         prepare(board, settings)

@@ -22,10 +22,11 @@ _LIGHT = f"and the camera's light and focus{BY_CHECK}"
 FIX = {
     SightingVerdict.NO_TIP: f"see that nothing covers the tip's marker, {_LIGHT}",
     SightingVerdict.NO_BASE: f"see that nothing covers the clamp's marker, {_LIGHT}",
+    SightingVerdict.DICTIONARY: "print the markers of wristctl hw drawings: ArUco, DICT_4X4_50",
     SightingVerdict.TWICE: "take away or cover whatever else shows a marker of the same id",
     SightingVerdict.SHAPE: "uncover the tip's marker whole and make it flat; a shorter exposure where it is smeared",
     SightingVerdict.BASE_MOVED: "fasten camera and clamp, and home again; wristctl hw calibrate camera",
-    SightingVerdict.SWAPPED: "markers.base belongs on the clamp, markers.tip on the last disc",
+    SightingVerdict.SWAPPED: "markers.base belongs on the clamp, markers.tip on the last disc; or both are upside down",
     SightingVerdict.JUMP: "see that the tip's marker sits fast on its disc, and that no other one is taken for it",
     SightingVerdict.FROZEN: "the camera or its driver repeats old pictures: plug it in again, another USB port",
     SightingVerdict.STAMP: "the camera's driver gives times that cannot be: plug it in again, another USB port",

@@ -24,11 +24,12 @@ from wristctl.trial.control_loop import ControlLoop, Shown
 from wristctl.trial.homing import Zero, find_zero, slacken
 from wristctl.trial.log import TrialLog
 from wristctl.trial.motors_ready import Halt, halt, prepare
+from wristctl.trial.resting import judge_rest
 from wristctl.trial.safety import SafetyStop
 from wristctl.trial.spatial_belief import PLANES
 from wristctl.trial.spools import spools_of
 from wristctl.trial.steering import HostFaults
-from wristctl.trial.supervised_wait import Patience
+from wristctl.trial.supervised_wait import Patience, medians
 from wristctl.trial.tendon_pulls import tendon_pulls_of
 from wristctl.trial.testbeds import Testbed
 from wristctl.trial.tick_timing import TickTiming
@@ -177,11 +178,13 @@ class Experiment:
         watching = Patience(board)
         names = (plane,) if settings.planes == 1 else PLANES
         self.poses |= dict(zip(names, watching.stand_square(tracking, settings.homing), strict=True))
-        markers = watching.markers(tracking, 4 * settings.homing.frames)
+        seen = watching.sightings(tracking, 4 * settings.homing.frames)
+        markers = medians(seen, settings.planes)
         watching.pace.fits(settings.safety.stale)
         if settings.planes == 2:  # what one camera sees of a bend depends on the other
             tracking.zero = markers
         if self.zero is None:  # the marker is seen, and nothing moves yet
+            judge_rest(seen, settings, self._wrist, names)
             testbed.confirm(Patience(board).pulse)
             prepare(board, settings)
             self.zero = self._home(board, tracking, plane)

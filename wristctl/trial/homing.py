@@ -12,8 +12,9 @@ rests after bends to all sides.
 
 import logging
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -23,7 +24,9 @@ from wristctl.board.messages import AXES, JOG_RATE
 from wristctl.config.hw_run import Homing, RigSettings
 from wristctl.config.wrist import WristParameters
 from wristctl.trial.expected_moves import Bend, ExpectedMoves, middle
+from wristctl.trial.resting import judge_slack
 from wristctl.trial.safety import SafetyStop
+from wristctl.trial.spatial_belief import PLANES
 from wristctl.trial.spatial_moves import SpatialMoves
 from wristctl.trial.spools import Spools, spools_of
 from wristctl.trial.supervised_wait import Patience, Reading
@@ -118,10 +121,11 @@ class _Finder:
     """Moves one axis at a time; positions are microsteps reeled in from where the finder began."""
 
     def __init__(
-        self, board: Board, tracking: Tracking, spools: Spools, settings: Homing, expected: ExpectedMoves
+        self, board: Board, tracking: Tracking, spools: Spools, settings: Homing, expected: ExpectedMoves,
+        judge_slack: Callable[[Bend], None],
     ) -> None:  # fmt: skip
         self._board, self._tracking, self._settings, self._expected = board, tracking, settings, expected
-        self._spools = spools
+        self._spools, self._judge_slack = spools, judge_slack
         self._slack, self._pull, self._move = (
             max(1, round(length / spools.step)) for length in (settings.slack, settings.pull, settings.move)
         )
@@ -154,10 +158,11 @@ class _Finder:
         raise SafetyStop(problem, "homing", f"{fix}: wristctl hw check --wiring {axis}; or raise homing.slack")
 
     def slacken(self) -> None:
-        """Let all tendons go, so far that none holds against another while it is measured."""
+        """Let all tendons go, so far that none holds against another while it is measured. SafetyStop where it sags."""
         self._at[:] = -2 * self._pull
         self._go()
         self._rest = self._rests()
+        self._judge_slack(self._rest)
 
     def bend_once(self, axis: int, about: int) -> None:
         """Let an axis that bends the wrist at `about` bend it, and go again: friction inside then holds it there."""
@@ -189,6 +194,7 @@ class _Finder:
                 break
         if len(reeled) < 3:
             self._let_go(axis, -2 * self._pull)
+            self._judge_slack(self._rest)  # one that sags slowly has gone on
             raise SafetyStop(f"tendon {ACTIVE[axis]} pulls differently each time", "homing", "see whether it slips")
         slope, offset = np.polyfit(reeled, [along(axis, bent) for bent in bends], 1)
         self._reel(axis, reeled[0])
@@ -267,7 +273,9 @@ def find_zero(
     taut before or sticks, or where the marker is lost. In two planes readings of the slack wrist have been taken off.
     """
     expected, spools = moves_of(settings, wrist, plane), spools_of(settings.actuator)
-    finder = _Finder(board, tracking, spools, settings.homing, expected)
+    planes = (plane,) if settings.planes == 1 else PLANES
+    sags = partial(judge_slack, settings=settings, wrist=wrist, planes=planes)
+    finder = _Finder(board, tracking, spools, settings.homing, expected, sags)
     about = [finder.sense(axis, (1, -1) if signs is None else (signs[axis],)) for axis in range(AXES)]
     finder.slacken()
     measured: dict[int, _Line] = {}

@@ -8,7 +8,10 @@ from wristctl.board.board_errors import BoardError
 from wristctl.board.driver import Board
 from wristctl.board.messages import Command, Configure, Flag, Hello, Limits, State, Status
 from wristctl.config.hw_run import CalibrateWristSettings, RigSettings
+from wristctl.config.wrist import WristParameters
 from wristctl.interrupt import undisturbed
+from wristctl.trial.resting import judge_rest
+from wristctl.trial.spatial_belief import PLANES
 from wristctl.trial.spools import spools_of
 from wristctl.trial.supervised_wait import Patience
 from wristctl.trial.tendon_pulls import tendon_pulls_of
@@ -64,7 +67,9 @@ def _standing(board: Board, deadline: float) -> Status | None:
 
 
 @contextmanager
-def in_sight(testbed: Testbed, settings: CalibrateWristSettings) -> Iterator[tuple[Board, Hello, Tracking]]:
+def in_sight(
+    testbed: Testbed, settings: CalibrateWristSettings, wrist: WristParameters
+) -> Iterator[tuple[Board, Hello, Tracking]]:
     """The connected board, how it greeted, and the camera; at the end the drives are released and the testbed closed.
 
     Where that comes by an error the motors are stopped before, and verified to stand. Raises SafetyStop, BoardError and
@@ -79,6 +84,8 @@ def in_sight(testbed: Testbed, settings: CalibrateWristSettings) -> Iterator[tup
             testbed.face(settings.plane, patience.pulse)
             tracking = testbed.tracking()
             patience.stand_square(tracking, settings.homing)  # the markers are seen, and nothing moves yet
+            planes = (settings.plane,) if settings.planes == 1 else PLANES
+            judge_rest(patience.sightings(tracking, 4 * settings.homing.frames), settings, wrist, planes)
             testbed.confirm(patience.pulse)
             yield board, hello, tracking
         except BaseException:

@@ -2,7 +2,7 @@
 
 import math
 from collections import defaultdict
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -15,8 +15,10 @@ from wristctl.config.hw_run import HwRunSettings
 from wristctl.config.wrist import WristParameters
 from wristctl.trial.camera_pace import BY_CHECK, FIX, CameraPace, CameraPaces
 from wristctl.trial.expected_moves import Bend
+from wristctl.trial.resting import judge_rest
 from wristctl.trial.rig_strokes import Latency, RigStrokes, find_latency
 from wristctl.trial.safety import SafetyStop
+from wristctl.trial.spatial_belief import PLANES
 from wristctl.trial.spatial_moves import SpatialMoves
 from wristctl.trial.supervised_wait import OBLIQUE_FIX
 from wristctl.trial.testbeds import Testbed
@@ -82,6 +84,8 @@ class RigFacts(NamedTuple):
     """Of each camera, in the order of their planes."""
     direction: AxisDirection | None = None
     """None in one plane, or where nothing was to move."""
+    rest: SafetyStop | None = None
+    """What is wrong with how the slack wrist rests and is seen."""
 
 
 class Trouble(NamedTuple):
@@ -129,7 +133,8 @@ def measure(
     latencies = list[Latency]()
     direction = None
     sees = all(pace.verdicts[SightingVerdict.OK] for pace in paces)
-    if axis is not None and sees and not any(_is_too_oblique(pose, settings) for pose in poses):
+    rest = _rest(seen, settings, wrist)
+    if axis is not None and sees and rest is None and not any(_is_too_oblique(pose, settings) for pose in poses):
         strokes = RigStrokes(board, tracking, settings, axis)
         taut, bend = strokes.taken_up()
         if settings.planes == 2:
@@ -152,7 +157,16 @@ def measure(
             foreign = set() if shown & set(ids[plane]) else shown & set(ids[1 - plane])
         latency = latencies[plane] if latencies else None
         facts.append(CameraFacts(pace, quality, noise, latency, pose, tuple(sorted(foreign))))
-    return RigFacts(trips, adapter, woken, tuple(facts), direction)
+    return RigFacts(trips, adapter, woken, tuple(facts), direction, rest)
+
+
+def _rest(seen: Sequence[Sequence[Sighting]], settings: HwRunSettings, wrist: WristParameters) -> SafetyStop | None:
+    usable = [sighting for of_camera in seen for sighting in of_camera if math.isfinite(sighting.theta)]
+    try:
+        judge_rest(usable, settings, wrist, ("ulnar",) if settings.planes == 1 else PLANES)
+    except SafetyStop as stop:
+        return stop
+    return None
 
 
 def _ids(settings: HwRunSettings) -> list[tuple[int, int]]:
@@ -200,8 +214,9 @@ def troubles(facts: RigFacts, settings: HwRunSettings, port: str) -> list[Troubl
             met += _of_a_camera(camera, settings)
         met += [*_of_the_pictures(camera), *_of_the_pose(camera, settings, plane)]
     met += _of_the_age(facts, settings)
-    if facts.direction is not None and (astray := facts.direction.astray) is not None:
-        met.append(Trouble(True, astray.what.removeprefix("stopped: "), astray.fix))
+    for stop in (facts.rest, None if facts.direction is None else facts.direction.astray):
+        if stop is not None:
+            met.append(Trouble(True, stop.what.removeprefix("stopped: "), stop.fix))
     late = float(np.quantile(facts.woken, 0.99))
     if late > _WOKEN * settings.control_period:
         problem = f"one time in a hundred this computer wakes a tick {1e3 * late:.1f} ms late"

@@ -13,6 +13,7 @@ from wristctl.board.driver import Board
 from wristctl.board.messages import AXES, JOG_RATE, Flag, State, Target
 from wristctl.board.transport import underway
 from wristctl.config.hw_run import CalibrateWristSettings, RigSettings
+from wristctl.config.wrist import WristParameters
 from wristctl.trial.expected_moves import Bend
 from wristctl.trial.motors_ready import in_sight, prepare
 from wristctl.trial.safety import SafetyStop
@@ -314,12 +315,12 @@ class AxisTried(NamedTuple):
     """Bend of the wrist then [rad], + as the markers count."""
 
 
-def axis_tried(testbed: Testbed, settings: CalibrateWristSettings, axis: int) -> AxisTried:
+def axis_tried(testbed: Testbed, settings: CalibrateWristSettings, wrist: WristParameters, axis: int) -> AxisTried:
     """Try an axis, let its tendon go again, and release the drives. Closes the testbed.
 
     Raises SafetyStop where it bends the wrist too far, or not at all; BoardError and CameraError.
     """
-    with in_sight(testbed, settings) as (board, _, tracking):
+    with in_sight(testbed, settings, wrist) as (board, _, tracking):
         strokes = RigStrokes(board, tracking, settings, axis, math.radians(settings.max_deg))
         steps, bend = strokes.taken_up()
         strokes.let_go()

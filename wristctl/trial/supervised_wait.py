@@ -1,7 +1,7 @@
 """Waiting beside a wrist at rest: nothing moves meanwhile, and what goes wrong ends the wait at once."""
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -12,6 +12,7 @@ from wristctl.board.messages import State, Status
 from wristctl.config.hw_run import Homing
 from wristctl.trial.bending import Bending
 from wristctl.trial.camera_pace import CameraPaces
+from wristctl.trial.resting import judge_turn
 from wristctl.trial.safety import SafetyStop
 from wristctl.trial.tracking import Tracking
 from wristctl.trial.watch import Watch
@@ -44,6 +45,11 @@ class Reading(NamedTuple):
     """Over the base's; nan where it is not measured."""
     beside: float = math.nan
     """Bend in the second plane [rad], of a rig with two cameras; `theta` is then that in the first."""
+
+
+def medians(sightings: Sequence[Sighting], cameras: int) -> tuple[float, ...]:
+    """Median marker angle [rad] of each camera's usable sightings."""
+    return tuple(float(np.median([s.theta for s in sightings if s.plane == plane])) for plane in range(cameras))
 
 
 class Patience:
@@ -97,9 +103,7 @@ class Patience:
 
     def markers(self, tracking: Tracking, frames: int) -> tuple[float, ...]:
         """Median marker angle [rad] of each camera's next usable frames, as it is seen. Raises SafetyStop."""
-        usable = self.sightings(tracking, frames)
-        cameras = range(len(tracking.zero))
-        return tuple(float(np.median([s.theta for s in usable if s.plane == plane])) for plane in cameras)
+        return medians(self.sightings(tracking, frames), len(tracking.zero))
 
     def sightings(self, tracking: Tracking, frames: int) -> list[Sighting]:
         """The next usable frames, so many of each camera at least. Raises SafetyStop where none come."""
@@ -123,11 +127,15 @@ class Patience:
     def stand_square(self, tracking: Tracking, homing: Homing) -> tuple[CameraPose | None, ...]:
         """Fit each camera's pose to a wrist at rest; None for a calibrated camera.
 
-        Raises SafetyStop where one is too oblique for that, or where no markers can be read.
+        Raises SafetyStop where one is too oblique for that, a marker is turned, or where no markers can be read.
         """
         usable, poses = self.sightings(tracking, 4 * homing.frames), list[CameraPose | None]()
         for plane in range(len(tracking.zero)):
-            poses.append(pose := tracking.stand_square([sighting for sighting in usable if sighting.plane == plane]))
+            own = [sighting for sighting in usable if sighting.plane == plane]
+            judge_turn(
+                [sighting.theta for sighting in own], f" of camera {plane + 1}" if len(tracking.zero) > 1 else ""
+            )
+            poses.append(pose := tracking.stand_square(own))
             if pose is not None and pose.oblique > math.radians(homing.oblique_deg):
                 which = "the camera" if len(tracking.zero) == 1 else f"camera {plane + 1}"
                 problem = (

@@ -62,6 +62,12 @@ def _meeting(point: NDArray[np.complex128], along: NDArray[np.complex128]) -> ND
 # Corners (4, 2) [px] of each marker seen, by id: top left, top right, bottom right, bottom left of its print.
 Found = dict[int, list[Array]]
 
+# Dictionaries that a print may be of by mistake, those in which least is taken for a marker first.
+_OTHERS = (
+    "DICT_APRILTAG_36h11", "DICT_7X7_1000", "DICT_6X6_1000", "DICT_ARUCO_MIP_36h12", "DICT_5X5_1000",
+    "DICT_ARUCO_ORIGINAL", "DICT_APRILTAG_25h9", "DICT_APRILTAG_16h5",
+)  # fmt: skip
+
 # Cells along a marker's side, with the black border; one more on either side stays white.
 CELLS = 6
 DICTIONARY = cv2.aruco.getPredefinedDictionary(cv2.aruco.DICT_4X4_50)
@@ -123,6 +129,15 @@ class Detector:
     def everywhere(self, image: Image, fine: bool = False) -> Found:
         """All markers of the picture."""
         return _detect(self._whole_fine if fine else self._whole, image, 0, 0, not fine)
+
+    def other_dictionary(self, image: Image) -> str | None:
+        """Name of another dictionary of which the picture shows a marker; None where it shows none."""
+        for name in _OTHERS:
+            dictionary = cv2.aruco.getPredefinedDictionary(getattr(cv2.aruco, name))
+            corners, _, _ = cv2.aruco.ArucoDetector(dictionary, _parameters(0.03, _WINDOWS[0])).detectMarkers(image)
+            if corners:
+                return name
+        return None
 
     def around(self, image: Image, corners: Array) -> Found:
         """The markers around where one had these corners (4, 2) [px]; by a fine search where there is none."""

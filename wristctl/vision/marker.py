@@ -18,8 +18,8 @@ _UNSEEN = np.full((4, 2), np.nan)
 _BEFORE = [3, 0, 1, 2]
 # Least length over width of a marker on a tilted disc: 66 deg.
 _TILTED = 0.4
-# Seconds between two searches of the whole picture for a second marker of the same id.
-_LOOK_ROUND = 0.15
+# Seconds between two searches of the whole picture for a second marker of the same id, and for another dictionary's.
+_LOOK_ROUND, _LOOK_ELSEWHERE = 0.15, 0.5
 
 
 class SightingVerdict(StrEnum):
@@ -28,6 +28,7 @@ class SightingVerdict(StrEnum):
     OK = "ok"
     NO_TIP = "no tip"
     NO_BASE = "no base"
+    DICTIONARY = "other dictionary"
     TWICE = "twice"
     SHAPE = "shape"
     BASE_MOVED = "base moved"
@@ -41,6 +42,7 @@ MEANING = {
     SightingVerdict.OK: "both markers seen, or the tip's with a base seen shortly before",
     SightingVerdict.NO_TIP: "the marker on the last disc is not seen",
     SightingVerdict.NO_BASE: "the marker on the clamp has not been seen whole for longer than base_memory",
+    SightingVerdict.DICTIONARY: "neither marker has been seen yet, and one of another ArUco dictionary is",
     SightingVerdict.TWICE: "a marker's id is seen in two places",
     SightingVerdict.SHAPE: "the tip's marker is no square: a corner is hidden, or it is bent or smeared",
     SightingVerdict.BASE_MOVED: "the marker on the clamp is not where it was: camera or clamp has moved",
@@ -104,7 +106,8 @@ class Tracker:
         self._last_seen: dict[int, Array] = {}
         self._base: _Base | None = None
         self._used: tuple[float, float] | None = None
-        self._look_round = -math.inf
+        self._look_round = self._look_elsewhere = -math.inf
+        self._elsewhere = False
         self._small = True
         self._picture = 0, 0
         self._pose: CameraPose | None = None
@@ -139,6 +142,8 @@ class Tracker:
         markers = self._find(frame)
         bases, tips = (markers.get(number, []) for number in (self._markers.base, self._markers.tip))
         verdict, theta = self._judge(frame.time, bases, tips)
+        if verdict is SightingVerdict.NO_TIP and self._sees_another_dictionary(frame):
+            verdict = SightingVerdict.DICTIONARY
         size, tip = math.nan, (math.nan, math.nan)
         if verdict is SightingVerdict.OK and self._base is not None:
             self._used = frame.time, theta
@@ -163,6 +168,15 @@ class Tracker:
                 self._look_round = frame.time
         self._last_seen = {number: places[0] for number, places in markers.items()}
         return markers
+
+    def _sees_another_dictionary(self, frame: Frame) -> bool:
+        """Whether the picture shows a marker of one, where none of ours has been seen yet."""
+        if self._base is not None or self._used is not None or self._last_seen:
+            return False
+        if frame.time >= self._look_elsewhere:
+            self._look_elsewhere = frame.time + _LOOK_ELSEWHERE
+            self._elsewhere = self._detector.other_dictionary(frame.image) is not None
+        return self._elsewhere
 
     def _everywhere(self, image: Image, wanted: tuple[int, int]) -> dict[int, list[Array]]:
         markers = self._detector.everywhere(image)

@@ -125,7 +125,7 @@ def _one_axis(session: Session, testbed: Testbed, axis: int) -> AxisFound:
 
     findings, study = session.findings, session.study
     with session.progress(f"trying axis {axis}"):
-        axis_result = axis_tried(testbed, study.calibrate_wrist, axis)
+        axis_result = axis_tried(testbed, study.calibrate_wrist, study.wrist, axis)
     findings.metric("taken_up", axis_result.taken_up, "m", meaning=f"tendon {ACTIVE[axis]}, until the wrist bent")
     findings.metric("bend", axis_result.bend, "rad", meaning="of the wrist then")
     row = axis, ACTIVE[axis], f"{axis_result.sense:+d}", 1e3 * axis_result.taken_up, float(np.degrees(axis_result.bend))
