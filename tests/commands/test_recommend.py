@@ -224,7 +224,8 @@ def test_where_every_controller_chatters_nothing_is_recommended() -> None:
     """The paper's PID at a period of 50 ms, which its preset and what so short a search finds do not stand."""
     done = wristctl.recommend(study_of("recommend.controllers=[pid]", "recommend.loop.control_period=5e-2"))
     assert done.best is None and done.fault is not None and done.fault.exit_code == 3
-    assert [share.times for share in done.ranking.standing.lost] == [8, 0] and not done.motions
+    *of_pid, feedforward = [share.times for share in done.ranking.standing.lost]
+    assert set(of_pid) == {8} and feedforward == 0 and not done.motions
     assert done.marks and len(done.answer.lines()) <= 32
     assert {row[2] for row in done.tables[0].rows} == {one.file for one in done.candidates}
 
@@ -475,8 +476,10 @@ def test_three_tendons_reach_as_far_as_two_of_them_hold_across_the_third(tension
 def test_a_recommendation_for_three_tendons_is_planned_in_two_planes_toward_every_side() -> None:
     study = load_study([], ["wrist.tendons=three", "wrist.tension_limit=16"])
     family = family_of_rigs(study, reach_deg(study))
-    assert {reference.kind for reference in family.references} == {"diagonal", "ellipse"}
-    assert {"reference.toward_deg", "reference.ratio", "disturbances.toward_deg"} <= set(family.draw)
+    kinds = {"diagonal", "diagonal-ramp", "diagonal-square", "ellipse"}
+    assert {reference.kind for reference in family.references} == kinds
+    drawn = {"reference.toward_deg", "reference.ratio", "reference.speed", "disturbances.toward_deg"}
+    assert drawn <= set(family.draw)
     assert {case.motion.planes for case in drawn_cases(family, FAMILY, "test", 0, 2, study.wrist)} == {2}
     one = load_study([])
     assert family_of_rigs(one, 45.0) == one.recommend.family(45.0) and reach_deg(study) < reach_deg(one)

@@ -73,6 +73,38 @@ def test_corners_go_at_an_even_speed_and_stand_in_between() -> None:
         moved(1, kind="limited-square", angle_deg=40, frequency=1, speed=80)
 
 
+def test_a_ramp_and_a_square_toward_a_side_are_those_of_one_plane_on_that_line() -> None:
+    toward = np.array([np.cos(np.deg2rad(-120)), np.sin(np.deg2rad(-120))])
+    moves: dict[str, dict[str, Any]] = {
+        "ramp": {"angle_deg": 30, "duration": 0.5},
+        "square": {"angle_deg": 20, "frequency": 0.5, "speed": 80},
+    }
+    for name, given in moves.items():
+        line = moved(1, kind="ramp" if name == "ramp" else "limited-square", **given).angles.rows
+        rows = moved(kind=f"diagonal-{name}", toward_deg=-120, **given).angles.rows.reshape(2, 3, -1)
+        np.testing.assert_allclose(rows, toward[:, None, None] * line, atol=1e-12)
+    assert moved(kind="diagonal-ramp", angle_deg=30, duration=0.5).rest == pytest.approx(0.5)
+
+
+@pytest.mark.parametrize("name", ["ideal", "camera", "handling", "uneven", "two-planes"])
+def test_a_shipped_family_asks_for_a_ramp_and_a_square_of_limited_speed_in_every_world(name: str) -> None:
+    """Their rate is constant or none: of a ramp until it rests, of a square time and again, at the drawn speed."""
+    file = study_file(Path(f"scenarios/{name}"))
+    assert file is not None
+    family = load_study([file]).families[name]
+    cases = drawn_cases(family, name, "test", 0, 4, WRIST)
+    count, speeds = len(family.references), set[float]()
+    for world in range(4):
+        rates = [np.rad2deg(np.hypot(*case.motion.angles.rows.reshape(-1, 3, len(case.motion.time))[:, 1]))
+            if case.motion.planes == 2 else np.abs(np.rad2deg(case.motion.rate_ref))
+            for case in cases[world * count : (world + 1) * count]]  # fmt: skip
+        even = [rate for rate in rates if rate.any() and len(np.unique(np.round(rate[rate > 0.0], 6))) == 1]
+        begins = sorted(int(np.sum((rate[1:] > 0.0) & (rate[:-1] == 0.0)) + (rate[0] > 0.0)) for rate in even)
+        assert len(even) == 2 and begins[0] == 1 and begins[1] > 1
+        speeds |= {float(rate.max()) for rate in even}
+    assert len(speeds) == 8
+
+
 def test_each_leaf_is_drawn_of_the_motions_that_have_it_and_one_that_none_has_is_an_error() -> None:
     draw = {"reference.turn": "2..5", "reference.scale": "0.5..1", "reference.angle_deg": "10..20"}
     drawn = {"draw": draw, "references": ({"kind": "circle"}, {"kind": "adl:mean"})}

@@ -148,6 +148,8 @@ REFERENCES: Choices[Any] = Choices(
         "dart-thrower": "wristctl.simulation.bend_paths:DART_THROWER",
         "ellipse": "wristctl.simulation.bend_paths:ELLIPSE",
         "diagonal": "wristctl.simulation.bend_paths:DIAGONAL",
+        "diagonal-ramp": "wristctl.simulation.bend_paths:DIAGONAL_RAMP",
+        "diagonal-square": "wristctl.simulation.bend_paths:DIAGONAL_SQUARE",
         "adl:personal-care": "wristctl.simulation.daily_living:PERSONAL_CARE",
         "adl:eating": "wristctl.simulation.daily_living:EATING",
         "adl:stirring": "wristctl.simulation.daily_living:STIRRING",

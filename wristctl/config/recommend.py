@@ -10,7 +10,7 @@ from wristctl.config.loop import TICK, Loop, Reference
 from wristctl.config.section import Section, choice, quantity
 from wristctl.config.tune import Controllers
 
-# Where a simulated rig differs from what its controller believes. The angle of each motion is drawn too.
+# Where a simulated rig differs from what its controller believes. Angle and speed of each motion are drawn too.
 _DRAWN: dict[str, Drawn] = {
     "plant.actuator.tendon_stiffness": "x0.7..1.4 log",
     "plant.actuator.friction": "0.03..0.2",
@@ -30,7 +30,12 @@ _MOTIONS = (
     Reference(kind="minimum-jerk", duration=0.7),
     Reference(kind="two-sided-sine", frequency=0.2),
     Reference(kind="two-sided-sine", frequency=0.5),
+    Reference(kind="ramp", duration=0.7),
+    Reference(kind="limited-square", frequency=0.3),
 )
+# Speed of a square from side to side, over the largest angle [1/s]: it gets there in 0.4 to 0.8 of half a period of
+# 0.3 Hz, and rests until it turns.
+_SPEEDS = (1.5, 3.0)
 _DRAWN_IN_TWO_PLANES = {"reference.toward_deg": "-180..180", "reference.ratio": "0..1"}
 _RIG: dict[str, Any] = {
     "control_period": TICK,
@@ -40,13 +45,14 @@ _RIG: dict[str, Any] = {
 
 
 def _motions_in_two_planes() -> tuple[Reference, ...]:
-    """Moves toward any side, and ellipses from a line to a circle, as fast as the sines of one plane.
+    """Smooth moves, ramps and squares toward any side, and ellipses from a line to a circle, as fast as in one plane.
 
     Made where they are wanted: their parameters are read from the code that draws them.
     """
     kinds = ({"kind": "diagonal", "duration": 1.0}, {"kind": "diagonal", "duration": 0.7})
     turns = ({"kind": "ellipse", "turn": 5.0}, {"kind": "ellipse", "turn": 2.0})
-    return tuple(Reference.model_validate(each) for each in (*kinds, *turns))
+    corners = ({"kind": "diagonal-ramp", "duration": 0.7}, {"kind": "diagonal-square", "frequency": 0.3})
+    return tuple(Reference.model_validate(each) for each in (*kinds, *turns, *corners))
 
 
 def _from_the_rig(loop: Any) -> Any:
@@ -74,8 +80,8 @@ class RecommendSettings(Section):
     )
     references: tuple[Reference, ...] = choice(
         _MOTIONS,
-        "motions that each simulated rig follows, to angles drawn within its reach; by default in two planes moves "
-        "toward any side and ellipses",
+        "motions that each simulated rig follows, to angles drawn within its reach; by default squares at a drawn "
+        "speed, and in two planes moves, ramps and squares toward any side and ellipses",
         min_length=1,
     )
     horizon: float = quantity(5.0, "s", "duration of one rollout", "assumed", gt=0)
@@ -99,10 +105,13 @@ class RecommendSettings(Section):
 
     def family(self, largest_deg: float, planes: int = 1) -> Family:
         """The simulated rigs, asked for angles of up to `largest_deg` to both sides, in two planes to any side."""
-        drawn = self.draw | {"reference.angle_deg": f"{-largest_deg:g}..{largest_deg:g}"}
+        drawn: dict[str, Drawn] = self.draw | {"reference.angle_deg": f"{-largest_deg:g}..{largest_deg:g}"}
         references = self.references
+        if references == _MOTIONS:
+            slow, fast = (share * largest_deg for share in _SPEEDS)
+            drawn.setdefault("reference.speed", f"{slow:g}..{fast:g}")
+            references = _motions_in_two_planes() if planes == 2 else references
         if planes == 2:
-            references = _motions_in_two_planes() if references == _MOTIONS else references
             drawn = in_any_direction(drawn, references)
         return Family(loop=self.loop, draw=drawn, references=references, horizon=self.horizon)
 

@@ -60,7 +60,7 @@ def posterior_yaml(
         "        level: camera", *(f"        {name}: {value!r}" for name, value in camera.items()),
         f"    draw: {{reference.angle_deg: -{_ANGLE}..{_ANGLE}}}", "    horizon: 4.0", "    references:",
         "      - {kind: minimum-jerk, duration: 1.0}", "      - {kind: two-sided-sine, frequency: 0.5}",
-        "    together:",
+        "      - {kind: ramp, duration: 0.5}", "      - {kind: limited-square, frequency: 0.3}", "    together:",
     ]  # fmt: skip
     for draw in draws:
         row = {f"plant.{name}": draw[name] for name in _OF_WRIST if name in draw}

@@ -12,6 +12,7 @@ from wristctl.arrays import Array
 from wristctl.config.loop import Reference
 from wristctl.config.section import Parameter
 from wristctl.errors import UserError
+from wristctl.simulation.excitations import SPEED, limited_square, ramp
 from wristctl.simulation.reference import ReferenceKind
 from wristctl.simulation.references import minimum_jerk
 
@@ -165,11 +166,29 @@ def _ellipse(reference: Reference, time: Array) -> Array:
     return turned(path, reference.value("toward_deg"))
 
 
-def _diagonal(reference: Reference, time: Array) -> Array:
-    move = np.deg2rad(reference.end_deg) * minimum_jerk(time, reference.duration)
+def _along(move: Array, reference: Reference) -> Array:
+    """A move (3, T) on the line toward `toward_deg`, (2, 3, T)."""
     return turned(np.stack([move, np.zeros_like(move)]), reference.value("toward_deg"))
 
 
+def _diagonal(reference: Reference, time: Array) -> Array:
+    return _along(np.deg2rad(reference.end_deg) * minimum_jerk(time, reference.duration), reference)
+
+
+def _diagonal_ramp(reference: Reference, time: Array) -> Array:
+    return _along(np.deg2rad(reference.end_deg) * ramp(time, reference.duration), reference)
+
+
+def _diagonal_square(reference: Reference, time: Array) -> Array:
+    speed = reference.value("speed")
+    return _along(limited_square(time, reference.end_deg, reference.frequency, speed), reference)
+
+
+def _toward_words(reference: Reference) -> str:
+    return f"{reference.end_deg:g} deg toward {reference.value('toward_deg'):g} deg"
+
+
+_DIRECTION = Parameter(45.0, "deg", "direction of the move, from ulnar toward flexion")
 ELLIPSE = ReferenceKind(
     "the hand goes around on an ellipse about the straight wrist, bent by `angle_deg` along it, `ratio` of that across",
     course=_ellipse,
@@ -184,10 +203,27 @@ ELLIPSE = ReferenceKind(
 DIAGONAL = ReferenceKind(
     "a smooth move of `duration` from straight to `angle_deg` toward `toward_deg`, and rest there",
     course=_diagonal,
+    described=lambda reference: f"minimum jerk {reference.duration:g} s {_toward_words(reference)}",
+    targets="none",
+    parameters={"toward_deg": _DIRECTION},
+    planes=2,
+)
+DIAGONAL_RAMP = ReferenceKind(
+    "a way from straight to `angle_deg` toward `toward_deg` at an even speed in `duration`, and rest there",
+    course=_diagonal_ramp,
+    described=lambda reference: f"ramp {reference.duration:g} s {_toward_words(reference)}",
+    targets="none",
+    parameters={"toward_deg": _DIRECTION},
+    planes=2,
+)
+DIAGONAL_SQUARE = ReferenceKind(
+    "to and fro between `angle_deg` toward `toward_deg` and as much to the other side at `speed`, held there, "
+    "`frequency` times a second there and back",
+    course=_diagonal_square,
     described=lambda reference: (
-        f"minimum jerk {reference.duration:g} s {reference.end_deg:g} deg toward {reference.value('toward_deg'):g} deg"
+        f"square {reference.frequency:g} Hz +-{_toward_words(reference)} at {reference.value('speed'):g} deg/s"
     ),
     targets="none",
-    parameters={"toward_deg": Parameter(45.0, "deg", "direction of the move, from ulnar toward flexion")},
+    parameters={"speed": SPEED, "toward_deg": _DIRECTION},
     planes=2,
 )

@@ -10,6 +10,8 @@ from wristctl.seeds import stream
 from wristctl.simulation.reference import ReferenceKind
 from wristctl.simulation.references import target_words
 
+SPEED = Parameter(90.0, "deg/s", "of its way from side to side")
+"""Speed of a limited square."""
 _OFFSET = Parameter(0.0, "deg", "middle of the motion", mirrors=True)
 
 
@@ -64,12 +66,27 @@ def _square(reference: Reference, time: Array) -> Array:
     return _about(reference, _held(np.where(periods - np.floor(periods) < 0.5, 1.0, -1.0)))
 
 
-def _limited_square(reference: Reference, time: Array) -> Array:
-    speed, half = reference.value("speed"), 0.5 / reference.frequency
-    if not speed * half >= 2.0 * abs(reference.end_deg):
-        problem = f"{speed:g} deg/s do not go from side to side by {2.0 * abs(reference.end_deg):g} deg in {half:g} s"
+def limited_square(time: Array, angle_deg: float, frequency: float, speed: float) -> Array:
+    """To and fro between an angle and its negative at an even speed, held at both, with two derivatives.
+
+    Parameters
+    ----------
+    time
+        Samples (T,) [s].
+    angle_deg
+        The angle that it goes to first [deg].
+    frequency
+        How often it goes there and back [1/s].
+    speed
+        Of its way from side to side [deg/s].
+
+    Returns (3, T) [rad]. Raises UserError for a speed at which it does not reach the other side in half a period.
+    """
+    half = 0.5 / frequency
+    if not speed * half >= 2.0 * abs(angle_deg):
+        problem = f"{speed:g} deg/s do not go from side to side by {2.0 * abs(angle_deg):g} deg in {half:g} s"
         raise UserError(problem, "reference.speed", "more, or a lower frequency")
-    rate = speed / abs(reference.end_deg) if reference.end_deg else 0.0
+    rate = speed / abs(angle_deg) if angle_deg else 0.0
     number = np.floor(np.maximum(time, 0.0) / half + 1e-9)
     aim = np.where(number % 2.0, -1.0, 1.0)
     begin = np.where(number, -aim, 0.0)
@@ -77,14 +94,26 @@ def _limited_square(reference: Reference, time: Array) -> Array:
     course = np.zeros((3, len(time)))
     course[0] = begin + aim * np.clip(passed, 0.0, way)
     course[1] = np.where((time >= 0.0) & (passed < way), aim * rate, 0.0)
-    return _about(reference, course)
+    course *= np.deg2rad(angle_deg)
+    return course
+
+
+def _limited_square(reference: Reference, time: Array) -> Array:
+    course = limited_square(time, reference.end_deg, reference.frequency, reference.value("speed"))
+    course[0] += np.deg2rad(reference.value("offset_deg"))
+    return course
+
+
+def ramp(time: Array, duration: float) -> Array:
+    """The way from 0 to 1 at an even speed in `duration` [s] with two derivatives, (3, T), by the time (T,) [s]."""
+    course = np.zeros((3, len(time)))
+    course[0] = np.clip(time / duration, 0.0, 1.0)
+    course[1] = np.where((time >= 0.0) & (time < duration), 1.0 / duration, 0.0)
+    return course
 
 
 def _ramp(reference: Reference, time: Array) -> Array:
-    course = np.zeros((3, len(time)))
-    course[0] = np.clip(time / reference.duration, 0.0, 1.0)
-    course[1] = np.where((time >= 0.0) & (time < reference.duration), 1.0 / reference.duration, 0.0)
-    return course
+    return ramp(time, reference.duration)
 
 
 def _random_steps(reference: Reference, time: Array) -> Array:
@@ -138,7 +167,7 @@ LIMITED_SQUARE = ReferenceKind(
         f"square {reference.frequency:g} Hz {_swing(reference)} at {reference.value('speed'):g} deg/s"
     ),
     targets="none",
-    parameters={"speed": Parameter(90.0, "deg/s", "of its way from side to side"), "offset_deg": _OFFSET},
+    parameters={"speed": SPEED, "offset_deg": _OFFSET},
 )
 RAMP = ReferenceKind(
     "a way to an angle or a tip position at an even speed in `duration`",
