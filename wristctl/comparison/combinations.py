@@ -112,11 +112,13 @@ def asked_by(chosen: CompareSettings) -> list[Asked]:
 
 
 def count_rollouts(chosen: CompareSettings) -> int:
-    """Number of rollouts in a `compare` section."""
+    """Number of rollouts in a `compare` section, every repetition that a controller learns from among them."""
     courses = len(chosen.directions) * len(chosen.references) * len(chosen.inverses)
     times = [(loop, chosen.repetitions if is_random(loop) else 1) for loop in chosen.loops.values()]
     laws = [controller(row.controller) for row in chosen.rows]
-    return courses * sum(count for loop, count in times for law in laws if law.keeps_up(loop.control_period))
+    return courses * sum(
+        count * law.learning for loop, count in times for law in laws if law.keeps_up(loop.control_period)
+    )
 
 
 def compare(
@@ -133,6 +135,8 @@ def compare(
     gains = [gains_of(controller(row.controller), row.gains, tuned) for row in chosen.rows]
     names = list(dict.fromkeys(row.controller for row in chosen.rows))
     conditions = planned(study, network)
+    repetitions_of = [controller(name).learning for name in names]
+    before = [sum(repetitions_of[:number]) / sum(repetitions_of) for number in range(len(names) + 1)]
     results: list[ComparedRow] = []
     for part, condition in enumerate(conditions):
         courses, motions = condition.courses, [each.motion for each in condition.courses]
@@ -143,11 +147,11 @@ def compare(
             rows = [i for i, row in enumerate(chosen.rows) if row.controller == name]
             batch = np.array([gains[i] for i in rows for _ in courses]).reshape(len(rows) * len(courses), -1)
             which = np.tile(np.arange(len(courses)), len(rows))
-            base = (part * len(names) + number) / (len(names) * len(conditions))
+            base = part + before[number]
 
-            def report(share: float, base: float = base) -> None:
+            def report(share: float, base: float = base, number: int = number) -> None:
                 if progress is not None:
-                    progress(base + share / (len(names) * len(conditions)))
+                    progress((base + share * (before[number + 1] - before[number])) / len(conditions))
 
             repetitions = repeat(
                 controller(name), batch, motions, which, condition.loop, condition.wrist, scenarios, draws,

@@ -109,12 +109,13 @@ def rank(
     if not any(row.controller == YARDSTICK for row in rows):
         rows.append(Row(controller=YARDSTICK, gains="default"))
     kinds, every = kinds_of(family), list[Measured]()
-    for number, row in enumerate(rows):
-        law = controller(row.controller)
+    laws = [controller(row.controller) for row in rows]
+    repetitions = [law.learning for law in laws]
+    for number, (law, row) in enumerate(zip(laws, rows, strict=True)):
 
         def report(share: float, number: int = number) -> None:
             if progress is not None:
-                progress((number + share) / len(rows))
+                progress((sum(repetitions[:number]) + share * repetitions[number]) / sum(repetitions))
 
         gains = np.array([gains_of(law, row.gains, tuned)])
         every.append(measure(law, gains, cases, study.wrist, RANKED, report))
@@ -272,7 +273,8 @@ def judge_units(
     content = json.loads(needed.model_dump_json(by_alias=True, include={"seed", "wrist", "families"}))
     times = noises_of(study.families[family], noises)
     rollouts = len(study.families[family].references) * times
-    together = max(1, _ROLLOUTS // rollouts)
+    repetitions = controller(law).learning
+    together = max(1, _ROLLOUTS // (rollouts * repetitions))
     units = []
     for first in range(0, worlds, together):
         many = min(together, worlds - first)
@@ -281,7 +283,7 @@ def judge_units(
             "noises": times,
         }  # fmt: skip
         name = f"{law} on worlds {first} to {first + many - 1} of {family}"
-        units.append(Unit("wristctl.comparison.world_ranking:judged", spec, name, many * rollouts))
+        units.append(Unit("wristctl.comparison.world_ranking:judged", spec, name, many * rollouts * repetitions))
     return units
 
 

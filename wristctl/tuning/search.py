@@ -327,7 +327,7 @@ def search_unit(study: Study, law: str, tuning: int = 0) -> Unit:
     content = json.loads(needed.model_dump_json(by_alias=True, include={"seed", "wrist", "families", "tune"}))
     rollouts = settings.candidates * settings.iterations * settings.restarts * settings.worlds.draws
     rollouts += settings.finalists * settings.worlds.validation
-    size = rollouts * len(study.families[family].references)
+    size = rollouts * len(study.families[family].references) * controller(law).learning
     spec = {"study": content, "law": law, "tuning": tuning}
     name = f"search {tuning + 1} for gains of {law} on {family}"
     return Unit("wristctl.tuning.search:searched", spec, name, size)

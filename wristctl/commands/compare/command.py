@@ -245,12 +245,14 @@ def plan(study: Study, inputs: Inputs) -> str:
 def size(study: Study) -> Size:
     """Every row on every loop and reference, or on the worlds of a family."""
     from wristctl.comparison.combinations import count_rollouts
+    from wristctl.control.table import controller
     from wristctl.simulation.closed_loop import Size
 
     settings, loops = study.compare, list(judged_loops(study, study.compare).values())
     if settings.worlds.family:
         family = family_of(study.families, settings.worlds.family, "worlds.family")
-        return Size(loops, family.horizon, len(settings.rows) * settings.worlds.draws * len(family.references))
+        rows = sum(controller(row.controller).learning for row in settings.rows)
+        return Size(loops, family.horizon, rows * settings.worlds.draws * len(family.references))
     return Size(loops, settings.horizon, count_rollouts(settings))
 
 

@@ -125,7 +125,8 @@ def plan(study: Study, inputs: Inputs) -> str:
         raise UserError(reason, "wrist", "a larger tension_limit or tendon_radius, a softer wrist, or a lighter hand")
     family, asked = family_of_rigs(study, reach), asked_of_rigs(study)
     searched = settings.candidates * settings.iterations * settings.draws + settings.validation * settings.candidates
-    count = len(settings.controllers) * len(family.references) * (searched + 2 * settings.tests)
+    rollouts = sum(controller(name).learning for name in settings.controllers)
+    count = rollouts * len(family.references) * (searched + 2 * settings.tests)
     check_size(Size([settings.loop], settings.horizon, count), planes_of(study.wrist, asked))
     bending = " in two planes" * bool(why_two_planes(study.wrist, asked))
     return (

@@ -91,12 +91,14 @@ def _in_words(study: Study, where: str, wrist: WristParameters) -> str:
 
 
 def size(study: Study) -> Size:
-    """One rollout, or as many as there are repetitions of what is drawn."""
+    """One rollout, or as many as there are repetitions of what is drawn, and as the controller learns from."""
+    from wristctl.control.table import controller
     from wristctl.simulation.closed_loop import Size
     from wristctl.simulation.worlds import is_random
 
     chosen = study.simulate
-    return Size([chosen.loop], chosen.horizon, chosen.repetitions if is_random(chosen.loop) else 1)
+    repetitions = chosen.repetitions if is_random(chosen.loop) else 1
+    return Size([chosen.loop], chosen.horizon, repetitions * controller(chosen.controller).learning)
 
 
 def simulate(session: Session) -> SimulatedLoop:

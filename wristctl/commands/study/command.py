@@ -38,6 +38,7 @@ def plan(study: Study, inputs: Inputs) -> str:
     from wristctl.comparison.world_ranking import noises_of
     from wristctl.control.table import controller
     from wristctl.simulation.closed_loop import Size, check_size, check_steps
+    from wristctl.tuning.objective import YARDSTICK
     from wristctl.tuning.search import check_optimiser, check_tunable
 
     settings = study.study
@@ -76,7 +77,9 @@ def plan(study: Study, inputs: Inputs) -> str:
         check_family_reach(study, name)
     searches = sum(unit.size for unit in search_units(study).values())
     per_world = sum(len(family.references) * noises_of(family, budget.noises) for family in families.values())
-    rows = len(settings.laws) * budget.tunings + len(labels) - len(settings.laws)
+    alone = {f"{YARDSTICK}/default": YARDSTICK} | {row.label: row.controller for row in settings.presets}
+    rows = budget.tunings * sum(controller(name).learning for name in settings.laws)
+    rows += sum(controller(name).learning for name in alone.values())
     judged = per_world * budget.worlds * rows
     longest = max(Size([studied.loop], studied.horizon).steps for studied in families.values())
     with under("study"):

@@ -146,23 +146,23 @@ def planned_search(study: Study, inputs: Inputs) -> str:
     if not settings.worlds.family:
         references = [scenario.reference for scenario in settings.scenarios]
         check_reach(references, study.wrist, "scenarios.{}.reference", planes)
-    asked = _size(settings, families)
+    asked = size(study)
     check_size(asked, planes)
     check_inverses(inverses_of(_references(settings, families)), inputs)
-    one = asked.rollouts // len(settings.controllers)
-    return f"{one} rollouts of {asked.horizon:g} s for each of {', '.join(settings.controllers)}"
+    times = {name: controller(name).learning for name in settings.controllers}
+    told = f"{asked.rollouts // sum(times.values())} rollouts of {asked.horizon:g} s for each of {', '.join(times)}"
+    return told + "".join(f", {n} times as many for {name}, which learns" for name, n in times.items() if n > 1)
 
 
 def size(study: Study) -> Size:
-    """Size of all searches of the study."""
-    return _size(study.tune, study.families)
-
-
-def _size(settings: TuneSettings, families: Mapping[str, Family]) -> Size:
+    """Size of all searches of the study, every repetition that a controller learns from among its rollouts."""
+    from wristctl.control.table import controller
     from wristctl.simulation.closed_loop import Size
     from wristctl.simulation.worlds import is_random
 
-    searched = settings.candidates * settings.iterations * settings.restarts * len(settings.controllers)
+    settings, families = study.tune, study.families
+    repetitions = sum(controller(name).learning for name in settings.controllers)
+    searched = settings.candidates * settings.iterations * settings.restarts * repetitions
     if settings.worlds.family:
         family = families[settings.worlds.family]
         return Size([family.loop], family.horizon, searched * settings.worlds.draws * len(family.references))
