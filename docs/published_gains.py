@@ -14,7 +14,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from wristctl.commands.study.published import PUBLISHED
+from wristctl.commands.study.published import PUBLISHED, what_changed
 from wristctl.control.shipped_gains import FILE, PREFIX
 from wristctl.records import Run
 from wristctl.records.manifest import asked_again
@@ -68,8 +68,9 @@ def page(content: dict[str, Any]) -> str:
         "",
         "The same worlds again, with these gains: `wristctl compare experiments/shipped.yaml`, for another family with",
         "`--set worlds.family=uneven`. The RMSE of every controller in every world (`data/worlds.csv`) is to the last",
-        "bit that in `data/worlds-FAMILY.csv` of the study's run, and as many worlds are lost. Intervals are over",
-        "worlds alone, since these gains are of one tuning.",
+        "bit that in `data/worlds-FAMILY.csv` of the study's run, and as many worlds are lost, as long as neither the",
+        "family nor the simulated drive has changed since. Where one has, this page and every command that uses the",
+        "gains say so. Intervals are over worlds alone, since these gains are of one tuning.",
     ]
     for name, of_family in content.items():
         lines += ["", f"## {name}", "", *_family(name, of_family)]
@@ -82,6 +83,8 @@ def _family(name: str, of_family: dict[str, Any]) -> list[str]:
     if limits:
         (fast, _), (soft, stiff) = limits["period"], limits["tendon_stiffness"]
         about += f" Made for a tick of {1e3 * fast:g} ms and tendons of {soft / 1e3:g} to {stiff / 1e3:g} kN/m."
+    if changed := what_changed(name, of_family["family_sha256"], of_family["drive"]):
+        about += f" **{changed[:1].upper()}{changed[1:]}.**"
     heads = ("controller", "gains", "RMSE [deg], 95 %", "tunings [deg]", f"lost of {worlds} worlds", "to rely on")
     rows = sorted(of_family["controllers"].items(), key=lambda item: (not item[1]["reliable"], item[1]["rmse"]))
     return [

@@ -136,6 +136,8 @@ def test_what_is_shipped_of_it_is_the_median_tuning_with_its_figures_and_run(don
     assert shipped["elsewhere"] == kept["elsewhere"] and shipped["rig"]["run"] == run.id
     published = json.loads((run.path / "data" / "gains-rig.json").read_text())
     assert {name: row["gains"] for name, row in shipped["rig"]["controllers"].items()} == published
+    assert shipped["rig"]["family_sha256"] == study.families["rig"].settings_hash()
+    assert shipped["rig"]["drive"] is None, "torques as commanded"
     for name, row in shipped["rig"]["controllers"].items():
         place = ranking.labels.index(f"{name}/tuned")
         assert row["rmse"] == pytest.approx(np.exp(np.log(ranking.scores[place]).mean()))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import re
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -14,17 +15,23 @@ import pytest
 
 import wristctl
 from tests.documented import DOCS, script_of_docs
-from wristctl.commands.loop_warnings import outside_conditions
+from wristctl.commands.loop_warnings import outside_conditions, warn_outside_conditions
+from wristctl.commands.study import published
 from wristctl.config.controller_row import Row
+from wristctl.config.families import Family
 from wristctl.config.loop import Loop
 from wristctl.control import shipped_gains
 from wristctl.control.shipped_gains import PREFIX, families
 from wristctl.control.table import CONTROLLERS, controller, gains_of
 from wristctl.errors import UserError
+from wristctl.simulation import actuator
+from wristctl.simulation.actuator import DRIVE
 
 CAMERA = {
     "about": "a rig",
     "conditions": {"period": [5e-3, 5e-3], "tendon_stiffness": [8e3, 3e4]},
+    "family_sha256": "",
+    "drive": 2,
     "worlds": 40,
     "run": "20260101T000000Z-study-x",
     "controllers": {
@@ -83,6 +90,70 @@ def test_they_warn_outside_the_family_and_where_the_study_lost_worlds() -> None:
     assert "without elastic tendons" in ideal and warned("pd-ff", "tuned:ideal", Loop()) == []
     (lost,) = warned("pid-ff", "tuned:camera", rig(tendon_stiffness=2e4))
     assert "9 of 40 worlds" in lost and str(CAMERA["run"]) in lost
+
+
+BRIEF = """
+families:
+  camera:
+    about: {about}
+    loop: {{plant_segments: 1, actuator: {{level: {level}}}}}
+    draw: {{reference.angle_deg: {angles}}}
+"""
+
+
+@pytest.fixture
+def experiments(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[..., Family]]:
+    """Makes the experiments that are shipped have another family `camera`, and gives it back."""
+
+    def of(about: str = "a rig", level: str = "tendon", angles: str = "10..20") -> Family:
+        file = tmp_path / "scenarios" / "camera.yaml"
+        file.parent.mkdir(exist_ok=True)
+        file.write_text(BRIEF.format(about=about, level=level, angles=angles))
+        monkeypatch.setattr("wristctl.study_files.shipped.shipped", lambda: tmp_path)
+        published._shipped_family.cache_clear()
+        return wristctl.load_study(file).families["camera"]
+
+    yield of
+    published._shipped_family.cache_clear()
+
+
+def test_gains_are_of_today_until_a_motion_a_world_or_the_drive_changes(
+    experiments: Callable[..., Family], monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    """Words about a family are none of these, nor is a drive where a family has none."""
+    found = experiments()
+    monkeypatch.setattr(
+        shipped_gains, "_shipped", lambda: {"camera": CAMERA | {"family_sha256": found.settings_hash(), "drive": DRIVE}}
+    )
+    rows = [Row(controller=name, gains="tuned:camera") for name in ("pd-ff", "pd-ff")]
+
+    def warned() -> list[str]:
+        caplog.clear()
+        warn_outside_conditions(rows, [rig(tendon_stiffness=2e4)])
+        return caplog.messages
+
+    assert warned() == []
+    experiments(about="in other words")
+    assert warned() == []
+    experiments(angles="10..30")
+    (family,) = warned()
+    assert family.startswith("tuned:camera: the family camera has changed since")
+    experiments()
+    monkeypatch.setattr(actuator, "DRIVE", DRIVE + 1)
+    (drive,) = warned()
+    assert "the simulated drive has changed since" in drive and "family" not in drive
+    experiments(angles="10..30")
+    assert "the family camera and the simulated drive have changed" in warned()[0]
+    ideal = experiments(level="ideal")
+    assert published.what_changed("camera", ideal.settings_hash(), None) == ""
+    assert "shipped no more" in published.what_changed("handling", "", None)
+
+
+def test_the_page_says_of_each_family_whether_it_is_that_of_today(experiments: Callable[..., Family]) -> None:
+    content = json.loads(json.dumps(shipped_gains._shipped()["camera"]))
+    page, same = script_of_docs("published_gains").page, {"family_sha256": experiments().settings_hash()}
+    assert "changed since these gains were found" not in page({"camera": content | same | {"drive": DRIVE}})
+    assert "The simulated drive has changed since" in page({"camera": content | same | {"drive": DRIVE - 1}})
 
 
 def test_what_is_shipped_can_be_run_and_lies_within_the_search_boxes() -> None:

@@ -17,6 +17,7 @@ from wristctl.lanes.compiled import kernel
 from wristctl.lanes.lane import zero_like
 from wristctl.lanes.rows import lanes_like, part, rows_of
 from wristctl.simulation.actuator import (
+    DRIVE,
     SIDES,
     Aim,
     Drive,
@@ -224,3 +225,19 @@ def test_ideal_actuators_and_sensors_act_and_see_what_is_commanded_and_there() -
     for side in ("plus", "minus"):
         assert (outcome.column(f"acting_{side}", 0) == outcome.column(f"tension_{side}", 0)).all()
     assert (outcome.column("seen", 0) == outcome.column("theta", 0)).all()
+
+
+# Lengths on the + side's spool, over those at the start [um], in the middle of 12 ticks of 10 ms, by version.
+MOVED = {2: (0.0, 0.0, 0.0, 14.7, 88.4, 235.6, 397.6, 618.5, 913.0, 1295.9, 1678.8, 2032.2)}
+
+
+def test_the_drive_of_this_version_delivers_what_is_recorded_of_it() -> None:
+    """Where motors deliver something else for the same settings, raise DRIVE and record it anew: what was tuned before
+    is of another drive."""
+    drive = drive_of(Actuator(level="tendon"), period=1e-2)
+    commands = np.zeros((12, 4))
+    commands[:, 0], commands[:, 1] = 2 * WRIST.pretension, 2 * WRIST.pretension
+    commands[3:, 0] += 20.0
+    commands[6:, 2:] = np.stack([0.02 * np.arange(6), np.full(6, 2.0)], axis=1)
+    spools = delivered(drive, commands, 1e-2)[:, 0]
+    assert 1e6 * (spools - spools[0]) == pytest.approx(MOVED[DRIVE], abs=0.1)

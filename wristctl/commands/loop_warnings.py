@@ -83,9 +83,27 @@ def outside_conditions(rows: Iterable[Row | SimulateSettings], loops: Iterable[L
 
 
 def warn_outside_conditions(rows: Iterable[Row | SimulateSettings], loops: Iterable[Loop]) -> None:
-    """Warn of each preset that is not made for its loop."""
+    """Warn of each preset that is not made for its loop, and of shipped gains of an earlier family or drive."""
+    rows = list(rows)
     for warning in outside_conditions(rows, loops):
         log.warning("%s", warning)
+    warn_of_earlier_families(rows)
+
+
+def warn_of_earlier_families(rows: Iterable[Row | SimulateSettings]) -> None:
+    """Warn of shipped gains whose family or simulated drive has changed since they were found, once of each family."""
+    from wristctl.commands.study.published import what_changed
+    from wristctl.control.shipped_gains import PREFIX, is_shipped, shipped_gains
+    from wristctl.control.table import controller
+
+    warnings = dict[str, str]()
+    for row in rows:
+        if isinstance(row.gains, str) and is_shipped(row.gains):
+            found = shipped_gains(controller(row.controller).name, row.gains)
+            warnings[row.gains] = what_changed(row.gains.removeprefix(PREFIX), found.family_sha256, found.drive)
+    for gains, changed in warnings.items():
+        if changed:
+            log.warning("%s: %s", gains, changed)
 
 
 def _of_shipped(name: str, shipped: ShippedGains, label: str, loops: Iterable[Loop]) -> list[str]:

@@ -1,5 +1,7 @@
 """Families of worlds: a loop whose leaves are drawn anew for each world, so that nothing is tuned or judged on one."""
 
+import hashlib
+import json
 import math
 import re
 from collections.abc import Mapping
@@ -93,6 +95,11 @@ class Family(Section):
         for key in self.drawn_of(number):
             _put(data, key.removeprefix(_OF_REFERENCE), drawn_value(self.draw[key], shares[key]))
         return Reference.model_validate(data)
+
+    def settings_hash(self) -> str:
+        """SHA-256 of all that is set in it but `about`, in any order: alike families have the same."""
+        content = self.model_dump(mode="json", by_alias=True, exclude_unset=True, exclude={"about"})
+        return hashlib.sha256(json.dumps(content, sort_keys=True, separators=(",", ":")).encode()).hexdigest()
 
     def drawn_of(self, number: int) -> list[str]:
         """The drawn settings that the reference of this number has."""

@@ -77,8 +77,8 @@ LEAST_PLAIN_PERIOD = 1e-5
 # Origin of presets for the rig.
 BY_TRIAL = "behind a 60 Hz camera, steppers and tendons of 8 to 100 kN/m: by trial at the corners of docs/margins.py"
 BY_STUDY = (
-    "behind a 60 Hz camera, steppers and tendons of 8 to 100 kN/m: tuned for camera (documentation: Gains that are "
-    "shipped), in few digits"
+    "behind a 60 Hz camera, steppers and tendons of 8 to 100 kN/m: tuned for camera, with the motions and the drive "
+    "that it had then (documentation: Gains that are shipped), in few digits"
 )
 
 

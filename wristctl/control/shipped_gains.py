@@ -34,6 +34,10 @@ class ShippedGains(NamedTuple):
     worlds: int
     reliable: bool
     """Whether they are not shown to be lost in more than the tolerated share of the worlds."""
+    family_sha256: str
+    """Hash of the family's settings as they were."""
+    drive: int | None
+    """Version of the simulated drive that they were found behind; None where the family has none."""
     run: str
     """Identifier of the run that counted them: the study's, or a comparison of controllers that changed since."""
 
@@ -62,7 +66,8 @@ def shipped_gains(controller: str, gains: str) -> ShippedGains:
     conditions = Conditions(tuple(limits["period"]), tuple(limits["tendon_stiffness"])) if limits else None
     return ShippedGains(
         dict(row["gains"]), of_family["about"], conditions, row["rmse"], row["lost"], of_family["worlds"],
-        row["reliable"], of_family.get("compared", of_family)["run"],
+        row["reliable"], of_family["family_sha256"], of_family["drive"],
+        of_family.get("compared", of_family)["run"],
     )  # fmt: skip
 
 

@@ -40,6 +40,9 @@ from wristctl.simulation.spool_timing import (
 )
 from wristctl.wrist.tendons import TENDONS_PER_SIDE
 
+# Version of the simulated drive: another one where motors deliver something else for the same settings and commands.
+# 1 moved spools at the start of a tick; 2 moves them as a board does, after its delay, by its updates and its ramp.
+DRIVE = 2
 # Length of tendon [m] that is none, however fine the microsteps.
 _ROUNDING = 1e-9
 # Tendons at each place in one plane: the + and the - side's.

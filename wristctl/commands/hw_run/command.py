@@ -18,7 +18,12 @@ from wristctl.commands.inputs_of_loops import (
     network_for,
     tuned_gains,
 )
-from wristctl.commands.loop_warnings import outside_conditions, warn_of_first_repetitions, warn_outside_conditions
+from wristctl.commands.loop_warnings import (
+    outside_conditions,
+    warn_of_earlier_families,
+    warn_of_first_repetitions,
+    warn_outside_conditions,
+)
 from wristctl.commands.procedure import Procedure
 from wristctl.commands.results import StudyResult
 from wristctl.commands.rig_description import describe_rig
@@ -130,8 +135,10 @@ def hw_run(session: Session) -> Performed | PerformedBends:
     )
     if believed.port is None:
         warn_outside_conditions(believed.rows, [believed.loop])
-    elif swinging := outside_conditions(believed.rows, [believed.loop]):
-        session.operator.dare("; ".join(swinging))
+    else:
+        warn_of_earlier_families(believed.rows)
+        if swinging := outside_conditions(believed.rows, [believed.loop]):
+            session.operator.dare("; ".join(swinging))
     trials = perform_trials(identified_session, bench, network, tuned)
     if believed.planes == 2:
         performed = bends_performed(identified_session, trials, tuned)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from functools import cache
 from typing import TYPE_CHECKING, Any
 
 from wristctl.commands.study.units import BASE, StudyPlace
@@ -47,8 +48,45 @@ def published(ranking: TunedRanking, searches: Mapping[StudyPlace, Search]) -> d
             "lost": ranking.standing.lost[row].times,
             "reliable": row not in ranking.standing.unusable,
         }
-    about, worlds = ranking.family.about, ranking.count
-    return {"about": about, "conditions": conditions(ranking.family), "worlds": worlds, "controllers": controllers}
+    family = ranking.family
+    return {
+        "about": family.about,
+        "conditions": conditions(family),
+        "family_sha256": family.settings_hash(),
+        "drive": drive_version(family),
+        "worlds": ranking.count,
+        "controllers": controllers,
+    }
+
+
+def drive_version(family: Family) -> int | None:
+    """Version of the simulated drive that a family's motors are; None where it has none."""
+    from wristctl.simulation.actuator import DRIVE
+
+    return None if family.loop.actuator.level == "ideal" else DRIVE
+
+
+def what_changed(name: str, family_sha256: str, drive: int | None) -> str:
+    """What has changed since gains were found on a family with this hash and drive, in words; empty where nothing has.
+
+    The present family is the shipped experiment of this name.
+    """
+    present = _shipped_family(name)
+    if present is None:
+        return f"the family {name} on which these gains were found is shipped no more"
+    changed = [f"the family {name}"] * (present.settings_hash() != family_sha256)
+    changed += ["the simulated drive"] * (drive_version(present) != drive)
+    have = "have" if len(changed) > 1 else "has"
+    return f"{' and '.join(changed)} {have} changed since these gains were found" if changed else ""
+
+
+@cache
+def _shipped_family(name: str) -> Family | None:
+    from wristctl.study_files.load import load_study
+    from wristctl.study_files.shipped import shipped
+
+    file = shipped() / "scenarios" / f"{name}.yaml"
+    return load_study([file]).families.get(name) if file.is_file() else None
 
 
 def conditions(family: Family) -> dict[str, list[float]] | None:
