@@ -130,6 +130,12 @@ with one budget.
   other worlds clf-qp, ct-dob and mpc all err by 0.19 deg, feedforward by 0.52. After a jump of 30 deg on the diagonal,
   with torques as commanded, it errs 1 % less with three tendons and no less with four
   ([both planes at once](two-planes.md#what-both-planes-at-once-are-worth)).
+- **Both planes at once** (computed-torque, ct-dob, mrac): all three run once a plane. With the inertia of the wrist
+  in space, which couples the planes, for all the acceleration that they want, they gain next to nothing. With
+  torques as commanded the RMSE is up to 0.6 % greater. Behind motors and a camera it is up to 3.6 % less for
+  computed-torque, 1.0 % for ct-dob and 2.1 % for mrac on a circle, and the same within 0.7 % on other motions
+  (`python docs/coupling.py`, [table](two-planes.md#what-both-planes-at-once-are-worth)). The loop adds the coupling
+  at the reference's acceleration to every controller's torque already.
 - **Feedforward and PID** (pid-ff): no model but the feedforward, and behind a camera not told from those with an
   observer. PD alone (pd-ff) leaves what an integral would take away.
 - **LQI**: like pid-ff, with weights instead of gains; it keeps the wrist's own spring in the loop.
