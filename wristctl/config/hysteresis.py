@@ -51,6 +51,9 @@ class HysteresisSettings(Section):
         ((0.0, 30.0), (10.0, 20.0), (14.0, 16.0)), "deg", "angles between which it goes: outer loop, then inner ones",
         min_length=1,
     )  # fmt: skip
+    circles_deg: tuple[Annotated[float, Field(gt=0, le=180)], ...] = quantity(
+        (), "deg", "bends by which the hand circles about the straight wrist, in two planes; none: no circles"
+    )
     frequencies: tuple[Speed, ...] = quantity((0.002, 0.02, 0.2, 1.0), "1/s", "cycles per second", min_length=1)
     frictions: tuple[NotNegative, ...] = quantity((0.1,), "", "coefficients of the tendons' friction", min_length=1)
     sheaths: tuple[NotNegative, ...] = quantity(

@@ -9,7 +9,7 @@ import itertools
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import NamedTuple, TypeVar
+from typing import Any, NamedTuple, Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -84,17 +84,17 @@ class HysteresisLoop:
     @property
     def friction_work(self) -> float:
         """Energy that friction took [J]."""
-        return _gained(self.course.friction)
+        return gained(self.course.friction)
 
     @property
     def raw_work(self) -> float:
         """Area of the loop of pulls at the spools over the tendons' path [J]."""
-        return _gained(self.course.raw)
+        return gained(self.course.raw)
 
     @property
     def damped_work(self) -> float:
         """Energy that the wrist's damping took [J]."""
-        return _gained(self.course.damped)
+        return gained(self.course.damped)
 
     def change(self, coarse: HysteresisLoop) -> float:
         """Largest relative change of width and works from a longer step to this one."""
@@ -102,15 +102,16 @@ class HysteresisLoop:
         least = max(_LEAST_WORK * abs(self.raw_work), 1e-12)
         names = "friction_work", "raw_work", "damped_work"
         pairs = [(getattr(self, name), getattr(coarse, name)) for name in names]
-        return _largest([of_width, *(abs(fine - before) / max(abs(fine), least) for fine, before in pairs)])
+        return largest_change([of_width, *(abs(fine - before) / max(abs(fine), least) for fine, before in pairs)])
 
 
-def _gained(work: Array) -> float:
+def gained(work: Array) -> float:
+    """Work [J] of a course of what was done so far (T,)."""
     return float(work[-1] - work[0])
 
 
-def _largest(changes: Sequence[float]) -> float:
-    """The largest; what is no number has changed beyond all."""
+def largest_change(changes: Sequence[float]) -> float:
+    """The largest of relative changes; what is no number has changed beyond all."""
     return max(change if math.isfinite(change) else math.inf for change in changes)
 
 
@@ -147,13 +148,22 @@ class DeadBand:
     def change(self, coarse: DeadBand) -> float:
         """Largest change of an end from a longer step to this one, over the width."""
         least = max(abs(self.width), _LEAST_WIDTH)
-        return _largest([abs(self.below - coarse.below) / least, abs(self.above - coarse.above) / least])
+        return largest_change([abs(self.below - coarse.below) / least, abs(self.above - coarse.above) / least])
 
 
-Found = TypeVar("Found", HysteresisLoop, DeadBand)
+class _Drifting(Protocol):
+    """What is driven with ever shorter integration steps."""
+
+    @property
+    def drift(self) -> float: ...
+
+    def change(self, coarse: Any, /) -> float: ...
 
 
-def _converged(run: Callable[[NDArray[np.int64], int], list[Found]], count: int, steps: int) -> list[Found]:
+Found = TypeVar("Found", bound=_Drifting)
+
+
+def converged(run: Callable[[NDArray[np.int64], int], list[Found]], count: int, steps: int) -> list[Found]:
     """Results of `run` for `count` wrists, each with as many integration steps as it takes.
 
     `run` drives some of them with so many steps in an interval of its own, `steps` or a multiple. The first number of
@@ -171,7 +181,8 @@ def _converged(run: Callable[[NDArray[np.int64], int], list[Found]], count: int,
         if not len(left):
             break
     for index in left.tolist():
-        results[index] = replace(results[index], drift=results[index].change(before[index]))
+        last: Any = results[index]
+        results[index] = replace(last, drift=last.change(before[index]))
     return results
 
 
@@ -250,7 +261,7 @@ def _driven(held: Strokes, frequency: float, cases: Sequence[LoopCase]) -> dict[
         ]  # fmt: skip
 
     every = math.ceil(1.0 / (frequency * settings.step * settings.samples) * (1.0 - 1e-9))
-    return {loop.case: loop for loop in _converged(run, len(cases), every)}
+    return {loop.case: loop for loop in converged(run, len(cases), every)}
 
 
 def _swing(phase: Array, shape: str) -> Array:
@@ -291,7 +302,7 @@ def dead_bands(held: Strokes) -> list[DeadBand]:
             for k, index in enumerate(which.tolist())
         ]  # fmt: skip
 
-    return _converged(run, len(every), max(2, round(lasts / settings.step)))
+    return converged(run, len(every), max(2, round(lasts / settings.step)))
 
 
 def _least_arm(held: Strokes) -> float:

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from wristctl.arrays import Array
 from wristctl.config.hysteresis import HysteresisSettings
@@ -153,29 +154,45 @@ def strokes(wrist: WristParameters, settings: HysteresisSettings) -> Strokes:
         problem = f"a loop goes beyond the wrist's range, {wrist.range_deg:g} deg"
         raise UserError(problem, "hysteresis.ranges_deg", "smaller ranges")
     if why_in_two_planes(wrist, settings):
-        layout, bends = TendonLayout.of(wrist), angle[:, None] * direction_of(settings)
-        alike, least = layout.multiplicity.astype(float), least_pulls(wrist, loop_of(settings), layout)
-        arms = spatial_terms(own_values(wrist, 1), bends, 0.0 * bends).moment_arms.reshape(len(bends), -1, 2)
-        values = np.tile(own_values(wrist, settings.segments), (len(bends), 1))
-        theta, pulls, found, stable = spatial_equilibria_at(values, settings.segments, bends, arms, least)
-        if not found.all():
-            raise UserError("no rest was found on held tendons in two planes", "wrist", "a smaller bend, or more pull")
-        straight, lengths = _lengths(values[:1], 0.0 * theta[:1]), _lengths(values, theta)
-    else:
-        alike = np.array(SIDES)
-        values = np.tile(segments(wrist, settings.segments), (len(angle), 1))
-        least = least_pulls(wrist, loop_of(settings), None)
-        theta, pulls, stable = equilibria_at(values, settings.segments, angle, float(least[0]))
-        straight = np.full(2, wrist.length)
-        lengths = terms(values, theta, 0.0 * theta).tendon_lengths.sum(axis=1)
+        theta, reeled, pulls = held_in_space(wrist, settings, angle[:, None] * direction_of(settings))
+        return Strokes(wrist, settings, angle, theta, reeled, pulls)
+    values = np.tile(segments(wrist, settings.segments), (len(angle), 1))
+    least = least_pulls(wrist, loop_of(settings), None)
+    theta, pulls, stable = equilibria_at(values, settings.segments, angle, float(least[0]))
+    lengths = terms(values, theta, 0.0 * theta).tendon_lengths.sum(axis=1)
+    _check_held(wrist, settings, stable, pulls / np.array(SIDES))
+    reeled = pulls / (np.array(SIDES) * settings.tendon_stiffness) + wrist.length - lengths
+    return Strokes(wrist, settings, angle, theta, reeled, pulls)
+
+
+def held_in_space(wrist: WristParameters, settings: HysteresisSettings, bends: Array) -> tuple[Array, Array, Array]:
+    """What holds a wrist without friction at bends (G, 2) [rad], with the least sum of pulls.
+
+    Returns its coordinates (G, q) [rad], and of each place of tendons what it has reeled in [m] and the pull of all its
+    tendons [N], (G, places). Raises UserError where the wrist cannot be held there.
+    """
+    layout = TendonLayout.of(wrist)
+    alike, least = layout.multiplicity.astype(float), least_pulls(wrist, loop_of(settings), layout)
+    arms = spatial_terms(own_values(wrist, 1), bends, 0.0 * bends).moment_arms.reshape(len(bends), -1, 2)
+    values = np.tile(own_values(wrist, settings.segments), (len(bends), 1))
+    theta, pulls, found, stable = spatial_equilibria_at(values, settings.segments, bends, arms, least)
+    if not found.all():
+        raise UserError("no rest was found on held tendons in two planes", "wrist", "a smaller bend, or more pull")
+    _check_held(wrist, settings, stable, pulls / alike)
+    straight, lengths = _lengths(values[:1], 0.0 * theta[:1]), _lengths(values, theta)
+    return theta, pulls / (alike * settings.tendon_stiffness) + straight - lengths, pulls
+
+
+def _check_held(
+    wrist: WristParameters, settings: HysteresisSettings, stable: NDArray[np.bool_], tensions: Array
+) -> None:
+    """UserError where the wrist buckles on held pulls, or a tendon's tension [N] is above the limit."""
     if settings.drive == "tensions" and not stable.all():
         raise UserError("the wrist buckles on held pulls", "hysteresis.drive", "drive: spools, or a lighter hand")
-    most = float((pulls / alike).max())
+    most = float(tensions.max())
     if most > wrist.tension_limit:
         problem = f"it takes {most:.3g} N a tendon, above wrist.tension_limit ({wrist.tension_limit:g} N)"
         raise UserError(problem, "hysteresis.ranges_deg", "smaller ranges")
-    reeled = pulls / (alike * settings.tendon_stiffness) + straight - lengths
-    return Strokes(wrist, settings, angle, theta, reeled, pulls)
 
 
 def _lengths(values: Array, q: Array) -> Array:

@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from wristctl.identification.friction_fit import FrictionEstimate, FrictionFit
     from wristctl.identification.loop_shape import LoopShape
     from wristctl.simulation.hysteresis import DeadBand, HysteresisLoop
+    from wristctl.simulation.hysteresis_circles import HysteresisCircle
     from wristctl.simulation.strokes import FrictionCase
 
 # Rows that a table may have; of more, those of the main coefficient of friction.
@@ -124,8 +125,9 @@ def _notes(fits: Sequence[FrictionFit]) -> list[str]:
 
 
 def model_answer(
-    driven: Sequence[HysteresisLoop], bands: Sequence[DeadBand], main: FrictionCase, more: str, why_two: str = ""
-) -> Answer:
+    driven: Sequence[HysteresisLoop], bands: Sequence[DeadBand], around: Sequence[HysteresisCircle],
+    main: FrictionCase, more: str, why_two: str = "",
+) -> Answer:  # fmt: skip
     """Dead band, width and works of the wrist at its main friction, beside other coefficients and sheaths.
 
     `why_two` says why it bends in two planes; it is empty where it does not.
@@ -152,9 +154,16 @@ def model_answer(
         for loop in rows
     ]
     notes = [f"Width and works are of a cycle at {slowest:g} Hz, with a presliding of {1e6 * main.presliding:g} um."]
-    if open_ := sum(drift > 0.0 for drift in [*(loop.drift for loop in driven), *(band.drift for band in bands)]):
-        total = len(driven) + len(bands)
-        notes.append(f"Do not rely on all of them: {open_} of {total} loops and dead bands have not converged (--all).")
+    every: list[HysteresisLoop | DeadBand | HysteresisCircle] = [*driven, *bands, *around]
+    if open_ := sum(item.drift > 0.0 for item in every):
+        parts = "loops, dead bands and circles" if around else "loops and dead bands"
+        notes.append(f"Do not rely on all of them: {open_} of {len(every)} {parts} have not converged (--all).")
+    if slow_circles := [circle for circle in around if circle.case.tendons == main]:
+        circle = min(slow_circles, key=lambda each: each.case.frequency)
+        notes.append(
+            f"On a circle of {math.degrees(circle.case.radius):g} deg at {circle.case.frequency:g} Hz it comes "
+            f"{degrees(circle.lag, 3)} deg behind, and friction takes {two(1e3 * circle.friction_work, 3)} mJ a turn."
+        )
     if why_two:
         toward = math.degrees(math.atan2(own.toward[1], own.toward[0])) % 360.0
         aside = f"friction takes the wrist off that line by {degrees(own.aside, 3)} deg at most"

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 from wristctl.commands.answer import Answer
 from wristctl.commands.hysteresis.answer import measured_answer, model_answer
+from wristctl.commands.hysteresis.circles import circle_tables, fate_of, in_um, write_circles
 from wristctl.commands.hysteresis.measured import FITTED, fit_measured, problem_of, refuse_misfit
 from wristctl.commands.inputs import Inputs, check_sides
 from wristctl.commands.printed_table import Table
@@ -25,6 +26,7 @@ if TYPE_CHECKING:
     from wristctl.arrays import Array
     from wristctl.identification.friction_fit import FrictionFit
     from wristctl.simulation.hysteresis import DeadBand, HysteresisLoop
+    from wristctl.simulation.hysteresis_circles import HysteresisCircle
     from wristctl.simulation.strokes import FrictionCase
 
 
@@ -115,6 +117,7 @@ class Hysteresis(StudyResult):
 
     loops: list[HysteresisLoop]
     dead_bands: list[DeadBand]
+    circles: list[HysteresisCircle]
     fits: list[FrictionFit]
     """Fits of a measured loop that were tried, the chosen one last."""
 
@@ -134,13 +137,14 @@ class Hysteresis(StudyResult):
             return measured_answer(self.fits, self.study.wrist, f"All that was fitted: --all{where}.")
         why = why_in_two_planes(self.study.wrist, self.study.hysteresis)
         main, more = main_case(self.study.hysteresis), f"Every loop: --all{where}."
-        return model_answer(self.loops, self.dead_bands, main, more, why)
+        return model_answer(self.loops, self.dead_bands, self.circles, main, more, why)
 
     @property
     def marks(self) -> list[str]:
-        """Number of loops and dead bands that still change with the integration step."""
-        open_ = _still_change(self.loops, self.dead_bands)
-        return [f"not converged: {open_} of {len(self.loops) + len(self.dead_bands)}"] * bool(open_)
+        """Number of loops, dead bands and circles that still change with the integration step."""
+        every: list[HysteresisLoop | DeadBand | HysteresisCircle] = [*self.loops, *self.dead_bands, *self.circles]
+        open_ = _still_change(every)
+        return [f"not converged: {open_} of {len(every)}"] * bool(open_)
 
     def frame(self) -> pd.DataFrame:
         """One row per loop: friction, speed, range, the dead band in its middle, and works; SI units."""
@@ -156,33 +160,39 @@ class Hysteresis(StudyResult):
 def plan(study: Study, inputs: Inputs) -> str:
     """See that the wrist can be driven so, or that a measured loop can be read."""
     from wristctl.simulation.hysteresis import loop_cases
+    from wristctl.simulation.hysteresis_circles import check_circles, circle_cases
     from wristctl.simulation.strokes import strokes, why_in_two_planes
 
     settings = study.hysteresis
     if settings.measured is not None:
         check_sides(study.wrist, "hysteresis --measured")
-        if settings.toward_deg:
-            raise UserError("a measured loop is of one plane", "hysteresis.toward_deg", "leave it out")
+        for key in ("toward_deg", "circles_deg"):
+            if getattr(settings, key):
+                raise UserError("a measured loop is of one plane", f"hysteresis.{key}", "leave it out")
         problem = problem_of(study)
         return f"{', '.join(FITTED)} from {len(problem.measured[0])} samples of {problem.loop.name}"
     strokes(study.wrist, settings)
+    check_circles(study.wrist, settings)
     count, lasts = len(loop_cases(settings)), 1.5 * sum(1.0 / frequency for frequency in settings.frequencies)
     where = " in two planes" if why_in_two_planes(study.wrist, settings) else ""
-    return f"{count} loops{where}, {lasts * count / len(settings.frequencies):.3g} simulated seconds"
+    circles = f", and {circled} circles" if (circled := len(circle_cases(settings))) else ""
+    seconds = lasts * (count + 1.75 / 1.5 * circled) / len(settings.frequencies)
+    return f"{count} loops{where}{circles}, {seconds:.3g} simulated seconds"
 
 
 def hysteresis(session: Session) -> Hysteresis:
     """Drive the wrist through hysteresis loops, or fit friction to a measured one.
 
     Its spools go to and fro at several speeds, over several ranges, for several frictions, in one plane or, toward any
-    direction and with any tendons, in two. Of a measured loop (an open
-    log) friction of tendons and wrist, stiffness, radius and slack are found, with 95 % intervals; one that no model
-    fits is refused.
+    direction and with any tendons, in two; there it goes around circles too (`circles_deg`). Of a measured loop (an
+    open log) friction of tendons and wrist, stiffness, radius and slack are found, with 95 % intervals; one that no
+    model fits is refused.
     """
     if session.study.hysteresis.measured is not None:
         return _of_measured(session)
     from wristctl.commands.hysteresis import figures
     from wristctl.simulation.hysteresis import dead_bands, loops, main_case
+    from wristctl.simulation.hysteresis_circles import circles
     from wristctl.simulation.strokes import loop_of, strokes
 
     findings, settings = session.findings, session.study.hysteresis
@@ -190,13 +200,20 @@ def hysteresis(session: Session) -> Hysteresis:
     with session.progress("compiling and driving loops", 100, "%") as advance:
         driven = loops(driven_strokes, lambda share: advance(round(100.0 * share)))
         bands = dead_bands(driven_strokes)
-    shortest = min([item.step for item in driven] + [each.step for each in bands])
-    findings.numerics(integrator="RODAS3", step=shortest, segments=settings.segments, planes=driven_strokes.planes)
-    open_ = _still_change(driven, bands)
-    findings.metric("not_converged", open_, "", "lower", len(driven) + len(bands), meaning=_NOT_CONVERGED)
-    tables = _tables(findings, driven, bands, main_case(settings))
+    around: list[HysteresisCircle] = []
+    if settings.circles_deg:
+        with session.progress("going around circles", 100, "%") as advance:
+            around = circles(session.study.wrist, settings, lambda share: advance(round(100.0 * share)))
+    every: list[HysteresisLoop | DeadBand | HysteresisCircle] = [*driven, *bands, *around]
+    findings.numerics(
+        integrator="RODAS3", step=min(item.step for item in every), segments=settings.segments,
+        planes=driven_strokes.planes,
+    )  # fmt: skip
+    open_ = _still_change(every)
+    findings.metric("not_converged", open_, "", "lower", len(every), meaning=_NOT_CONVERGED)
+    tables = _tables(findings, driven, bands, main_case(settings)) + circle_tables(around)
     tables.append(stiffness_table(session.study.wrist, loop_of(settings), driven_strokes.planes))
-    result = Hysteresis(session.study, findings, tables, driven, bands, [])
+    result = Hysteresis(session.study, findings, tables, driven, bands, around, [])
     _write(findings, result)
     with session.drawing():
         if bands:
@@ -205,6 +222,8 @@ def hysteresis(session: Session) -> Hysteresis:
         if len(settings.ranges_deg) > 1:
             findings.figure("minor-loops", figures.minor_loops, driven_strokes, driven)
         findings.figure("work", figures.work, driven_strokes, driven)
+        if around:
+            findings.figure("circles", figures.circles, around)
     return result
 
 
@@ -213,7 +232,7 @@ def _of_measured(session: Session) -> Hysteresis:
     fits, tables = fit_measured(session)
     chosen, settings = fits[-1], session.study.hysteresis
     session.findings.numerics(integrator="RODAS3", step=chosen.problem.step, segments=settings.segments)
-    result = Hysteresis(session.study, session.findings, tables, [], [], fits)
+    result = Hysteresis(session.study, session.findings, tables, [], [], [], fits)
     try:
         refuse_misfit(fits)
     except UserError:
@@ -244,9 +263,10 @@ def _write(findings: Findings, results: Hysteresis) -> None:
             {name: getattr(band, name, None) for name in _BANDS} | band.tendons._asdict() for band in results.dead_bands
         ]
         findings.table("data/dead_bands.csv", pd.DataFrame(rows)[list(_BANDS)], *units(_BANDS))
+    write_circles(findings, results.circles)
 
 
-_NOT_CONVERGED = "loops and dead bands that still change with the integration step"
+_NOT_CONVERGED = "loops, dead bands and circles that still change with the integration step"
 # Loops and dead bands that are all printed; of more, those with the main path of presliding, all being in data.
 _MOST = 60
 
@@ -257,14 +277,14 @@ def _tables(
     """The outer loops, under what they say in words, and the dead bands."""
     first, many = driven[0].case, len(driven) + len(bands) > _MOST
     outer = [loop for loop in driven if (loop.case.low, loop.case.high) == (first.low, first.high)]
-    fate = ("fate",) * (_still_change(driven, bands) > 0)
+    fate = ("fate",) * (_still_change([*driven, *bands]) > 0)
     heads = ("friction", "sheath [rad]", "presliding [um]")
     loop_heads = ("frequency [Hz]", "width [deg]", "statics [deg]", "friction [mJ]", "damping [mJ]", "raw loop [mJ]",
                   "step [ms]", *fate)  # fmt: skip
     rows = [
-        (*_in_um(loop.case.tendons), loop.case.frequency, math.degrees(loop.width), math.degrees(loop.exact_width),
+        (*in_um(loop.case.tendons), loop.case.frequency, math.degrees(loop.width), math.degrees(loop.exact_width),
          *(1e3 * part for part in (loop.friction_work, loop.damped_work, loop.raw_work, loop.step)),
-         *(_fate(loop),) * len(fate))
+         *(fate_of(loop),) * len(fate))
         for loop in outer
         if not many or loop.case.tendons.presliding == main.presliding
     ]  # fmt: skip
@@ -272,8 +292,8 @@ def _tables(
     if bands:
         held = ("angle [deg]", "dead band [deg]", "statics [deg]", "slid fully", "step [ms]", *fate)
         rests = [
-            (*_in_um(band.tendons), *map(math.degrees, (band.unhindered, band.width, band.exact_width)), band.slid,
-             1e3 * band.step, *(_fate(band),) * len(fate))
+            (*in_um(band.tendons), *map(math.degrees, (band.unhindered, band.width, band.exact_width)), band.slid,
+             1e3 * band.step, *(fate_of(band),) * len(fate))
             for band in bands
             if not many or band.tendons.presliding == main.presliding
         ]  # fmt: skip
@@ -305,26 +325,14 @@ def _told(findings: Findings, outer: Sequence[HysteresisLoop], bands: Sequence[D
         worst = max(abs(item.width / item.exact_width - 1.0) for item in slid)
         meaning = "largest relative error of a simulated dead band against the roots of the statics"
         findings.metric("root_error", worst, "", "lower", len(slid), meaning=meaning)
-    if open_ := _still_change(outer, bands):
+    if open_ := _still_change([*outer, *bands]):
         lines.append(f"NOT CONVERGED: {open_} of {len(outer) + len(bands)} change with the integration step")
     return f"{case}: " + ";\n".join(lines)
 
 
-def _still_change(driven: Sequence[HysteresisLoop], bands: Sequence[DeadBand]) -> int:
-    """Number of loops and dead bands that change with the integration step."""
-    return sum(item.drift > 0.0 for item in driven) + sum(each.drift > 0.0 for each in bands)
-
-
-def _fate(item: HysteresisLoop | DeadBand) -> str:
-    """Remaining change of a loop with the integration step, as text. Empty where there is none."""
-    if item.drift == 0.0:
-        return ""
-    by = f"by {100.0 * item.drift:.2g} % " if math.isfinite(item.drift) else ""
-    return f"NOT CONVERGED: changes {by}with the integration step"
-
-
-def _in_um(case: FrictionCase) -> tuple[float, float, float]:
-    return case.friction, case.sheath, 1e6 * case.presliding
+def _still_change(every: Sequence[HysteresisLoop | DeadBand | HysteresisCircle]) -> int:
+    """Number of loops, dead bands and circles that change with the integration step."""
+    return sum(item.drift > 0.0 for item in every)
 
 
 HYSTERESIS = Procedure("hysteresis", plan, hysteresis, in_one_plane=no_tendons)

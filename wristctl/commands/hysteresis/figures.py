@@ -24,6 +24,7 @@ from wristctl.plotting.style import (
     title,
 )
 from wristctl.simulation.hysteresis import DeadBand, HysteresisLoop, with_preslidings, with_sheaths
+from wristctl.simulation.hysteresis_circles import HysteresisCircle
 from wristctl.simulation.strokes import FrictionCase, Strokes
 
 _COLOURS = (BLUE, VERMILLION, GREEN, PURPLE, ORANGE, SKY)
@@ -157,6 +158,28 @@ def minor_loops(all_strokes: Strokes, driven: Sequence[HysteresisLoop]) -> Figur
         panel.set_xlabel("angle [deg]")
     axes[0, 0].set_ylabel(f"tension of {name}, {slowest:g} Hz [N]")
     legend_below(picture, 4)
+    return picture
+
+
+def circles(around: Sequence[HysteresisCircle]) -> Figure:
+    """The slowest largest circle of up to three sheaths: both bends, and by how much they differ from those without
+    friction, over the turn."""
+    first = max(around, key=lambda each: (each.case.radius, -each.case.frequency)).case
+    mine = [each for each in around if (each.case.radius, each.case.frequency) == (first.radius, first.frequency)]
+    picture, ((left, right),) = figure(1, 2, height=3.8)
+    left.plot(*np.degrees(mine[0].unhindered.T), label="without friction", **_ROOTS)
+    cases = _some([each.case.tendons for each in mine])
+    for each, colour in zip((one for one in mine if one.case.tendons in cases), _COLOURS, strict=False):
+        left.plot(*np.degrees(each.course.bends.T), color=colour, linewidth=1.2, label=case_text(each.case.tendons))
+        for plane, dashes in ((0, "-"), (1, ":")):
+            apart = np.degrees(each.course.bends[:, plane] - each.unhindered[:, plane])
+            right.plot(each.case.frequency * each.time, apart, color=colour, linewidth=1.2, linestyle=dashes)
+    for name, dashes in (("toward ulnar", "-"), ("toward flexion", ":")):
+        right.plot([], [], color=GREY, linestyle=dashes, label=name)
+    left.set_aspect("equal")
+    left.set(xlabel="bend toward ulnar [deg]", ylabel="bend toward flexion [deg]")
+    right.set(xlabel="turn", ylabel="bend less that without friction [deg]")
+    legend_below(picture, 3)
     return picture
 
 
