@@ -7,6 +7,7 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import Field, model_validator
 
 from wristctl.config.given_files import columns_of_file, given_file
+from wristctl.config.loop import Loop
 from wristctl.config.section import Section, choice, quantity
 
 Activation = Literal["sigmoid", "relu", "leaky-relu", "tanh", "silu"]
@@ -14,18 +15,24 @@ Activation = Literal["sigmoid", "relu", "leaky-relu", "tanh", "silu"]
 
 # Samples that are drawn where no number is given: the paper's.
 _DRAWN = 1000
+_OF_TRANSITIONS = 4000
 
 
 class DataSettings(Section):
     """Samples of tip positions and bending angles."""
 
-    source: Literal["pcc", "plant", "run", "csv"] = choice(
+    source: Literal["pcc", "plant", "run", "csv", "transitions"] = choice(
         "pcc",
-        "constant curvature (E1), static equilibria of the loaded wrist, or measured: in an earlier run, in CSV files",
+        "constant curvature (E1), static equilibria of the loaded wrist, measured (in an earlier run, in CSV files), or "
+        "transitions of the wrist in motion, for a network of its dynamics",
         "paper",
     )
     samples: int | None = choice(
-        None, "number of samples; null: 1000 that are drawn, or all that were measured", "paper", ge=10, le=10_000_000
+        None,
+        "number of samples; null: 1000 that are drawn, 4000 of transitions, or all that were measured",
+        "paper",
+        ge=10,
+        le=10_000_000,
     )
     sampling: Literal["uniform", "latin-hypercube", "sobol"] = choice(
         "sobol", "how angle, stretch and payload are drawn"
@@ -58,6 +65,9 @@ class DataSettings(Section):
     )
     files: tuple[str, ...] = given_file("csv: open logs with tips and angles (documentation: The open log)", ())
     columns: str | None = columns_of_file()
+    loop: Loop = Field(
+        Loop(), description="transitions: plant, motors and period", json_schema_extra={"unsaid": True}
+    )
 
     @property
     def measured(self) -> bool:
@@ -67,7 +77,8 @@ class DataSettings(Section):
     @property
     def drawn_samples(self) -> int:
         """Number of samples to draw."""
-        return _DRAWN if self.samples is None else self.samples
+        number = _OF_TRANSITIONS if self.source == "transitions" else _DRAWN
+        return number if self.samples is None else self.samples
 
     @model_validator(mode="after")
     def _ranges_in_order(self) -> Self:

@@ -70,6 +70,11 @@ class Samples:
         return np.hstack([self.tip, self.others])
 
     @property
+    def targets(self) -> Array:
+        """What a network learns of the inputs: the bends."""
+        return self.theta
+
+    @property
     def curvature_is_constant(self) -> bool:
         """Whether the single arc through each tip has the true angle, so that the whole domain is known."""
         return not self.names and bool(np.abs(arc_to(self.tip)[0] - self.theta).max() < 1e-9)
@@ -116,7 +121,8 @@ class Split:
 
 def asked_of(settings: DataSettings) -> Asked:
     """The motion by which planes of samples are found: a loop's toward ulnar, as a study file has it by default."""
-    return Asked(Loop(planes=settings.planes), Reference())
+    loop = settings.loop if settings.source == "transitions" else Loop()
+    return Asked(loop.model_copy(update={"planes": settings.planes or loop.planes}), Reference())
 
 
 def planes_of_samples(settings: DataSettings, wrist: WristParameters) -> int:

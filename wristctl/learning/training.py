@@ -23,14 +23,15 @@ from wristctl.learning.dataset import Samples
 from wristctl.learning.levenberg_marquardt import LevenbergMarquardt, blocks
 from wristctl.learning.network import LEAK, Network, Scaler
 from wristctl.learning.training_result import Epoch, Job, TrainingResult
+from wristctl.learning.transitions import Transitions
 from wristctl.records.files import replacing
 
 
-def fingerprint(samples: Samples, job: Job) -> str:
+def fingerprint(samples: Samples | Transitions, job: Job) -> str:
     """A hash of everything that a training depends on."""
     digest = hashlib.sha256(job.settings.model_dump_json().encode())
     split = job.split
-    for array in (samples.inputs, samples.theta, split.train, split.validation, job.seed.generate_state(4)):
+    for array in (samples.inputs, samples.targets, split.train, split.validation, job.seed.generate_state(4)):
         digest.update(np.ascontiguousarray(array).tobytes())
     return digest.hexdigest()
 
@@ -76,7 +77,7 @@ LAYERS: dict[Activation, Callable[[], nn.Module]] = {
 
 
 def train_one(
-    samples: Samples,
+    samples: Samples | Transitions,
     job: Job,
     device: str = "cpu",
     checkpoints: Path | None = None,
@@ -88,10 +89,12 @@ def train_one(
     KeyboardInterrupt only before the first epoch's end, UserError where the checkpoint belongs to another training.
     """
     with _one_thread():
-        problem = _Problem(samples if job.settings.inputs == "all" else samples.tips_alone(), job, device)
+        mark = fingerprint(samples, job)
+        if isinstance(samples, Samples) and job.settings.inputs == "tip":
+            samples = samples.tips_alone()
+        problem = _Problem(samples, job, device)
         course = _Course(problem)
         file = checkpoints / f"{job.name}.pt" if checkpoints else None
-        mark = fingerprint(samples, job)
         if file and file.is_file():
             course.restore(read_checkpoint(file, mark))
             if course.ended:
@@ -116,21 +119,21 @@ def train_one(
 class _Problem:
     """The data as scaled tensors, and what is asked of a model on them."""
 
-    def __init__(self, samples: Samples, job: Job, device: str) -> None:
+    def __init__(self, samples: Samples | Transitions, job: Job, device: str) -> None:
         self.settings, self.samples, self.job, self.device = job.settings, samples, job, device
-        inputs, theta = samples.inputs, samples.theta.reshape(len(samples.theta), -1)
-        self.planes = theta.shape[1]
+        inputs, targets = samples.inputs, samples.targets.reshape(len(samples.targets), -1)
+        self.planes = targets.shape[1]
         self.input, self.output = Scaler.none(inputs.shape[1]), Scaler.none(self.planes)
         if self.settings.standardise:
-            self.input, self.output = Scaler.of(inputs[job.split.train]), Scaler.of(theta[job.split.train], alike=True)
+            self.input, self.output = Scaler.of(inputs[job.split.train]), Scaler.of(targets[job.split.train], alike=True)
 
         def tensors(rows: NDArray[np.int64]) -> tuple[Tensor, Tensor]:
-            scaled = self.input.scale(inputs[rows]), self.output.scale(theta[rows])
+            scaled = self.input.scale(inputs[rows]), self.output.scale(targets[rows])
             x, y = (torch.tensor(values, dtype=DTYPE, device=device) for values in scaled)
             return x, y
 
         self.train, self.validation = tensors(job.split.train), tensors(job.split.validation)
-        self.square_radians = float(self.output.deviation[0] ** 2)
+        self.square_scale = float(self.output.deviation[0] ** 2)
 
     def model(self, seed: int) -> nn.Sequential:
         """A perceptron with torch's usual random weights."""
@@ -154,7 +157,7 @@ class _Problem:
     def validation_loss(self, model: nn.Sequential) -> float:
         with torch.no_grad():
             squares = sum(float(((model(x) - y) ** 2).sum()) for x, y in blocks(*self.validation))
-        return squares / len(self.validation[0]) * self.square_radians
+        return squares / len(self.validation[0]) * self.square_scale
 
     def gradient_norm(self, model: nn.Sequential) -> float:
         model.zero_grad()
@@ -206,7 +209,7 @@ class _Course:
         else:
             loss = self._over_batches(self.optimiser)
         validation, epoch = self.problem.validation_loss(self.model), len(self.epochs) + 1
-        self.epochs.append(Epoch(self.problem.job.trial, epoch, loss * self.problem.square_radians, validation))
+        self.epochs.append(Epoch(self.problem.job.trial, epoch, loss * self.problem.square_scale, validation))
         least = self.best_epoch == 0 or validation < self.epochs[self.best_epoch - 1].validation_loss
         if self.settings.patience and least:
             self.best = {name: value.clone() for name, value in self.model.state_dict().items()}

@@ -16,6 +16,7 @@ from wristctl.interrupt import deferred
 from wristctl.learning.dataset import Samples
 from wristctl.learning.training import train_one
 from wristctl.learning.training_result import Epoch, Job, TrainingResult
+from wristctl.learning.transitions import Transitions
 from wristctl.processes import safe_path, serve_parent
 
 # Told the job's number and its last epoch.
@@ -27,7 +28,7 @@ _TO_END = 0.35
 
 
 def train_all(
-    samples: Samples,
+    samples: Samples | Transitions,
     jobs: Sequence[Job],
     workers: int = 1,
     device: str = "cpu",
@@ -53,7 +54,7 @@ def train_all(
 
 
 def _over_processes(
-    samples: Samples, jobs: Sequence[Job], workers: int, device: str, checkpoints: Path | None, report: Report
+    samples: Samples | Transitions, jobs: Sequence[Job], workers: int, device: str, checkpoints: Path | None, report: Report
 ) -> list[TrainingResult]:
     context = multiprocessing.get_context("spawn")
     progress, stop, begun = context.SimpleQueue(), context.Event(), context.Event()
