@@ -83,7 +83,8 @@ def trained(files: Sequence[str], inputs: str) -> list[Trained]:
     settings = ("gen-data.source=csv", f"gen-data.files={named}", "gen-data.samples=2000")
     data = wristctl.gen_data(wristctl.load_study(None, *settings))
     own = ("train.preset=recommended", "train.workers=1", "train.train_share=0.6", f"train.inputs={inputs}")
-    return [wristctl.train(wristctl.load_study(None, f"seed={k}", *own), data=data) for k in range(SPLITS)]
+    results = [wristctl.train(wristctl.load_study(None, f"seed={k}", *own), data=data) for k in range(SPLITS)]
+    return [result for result in results if isinstance(result, Trained)]
 
 
 def interval(values: Sequence[float]) -> str:

@@ -18,6 +18,7 @@ from wristctl.commands.analyse.command import ANALYSE, Analysed
 from wristctl.commands.audit.command import AUDIT, Audited
 from wristctl.commands.compare.command import COMPARE, Compared
 from wristctl.commands.gen_data.command import GEN_DATA, Generated
+from wristctl.commands.gen_data.transitions import Moved
 from wristctl.commands.hysteresis.command import HYSTERESIS, Hysteresis
 from wristctl.commands.identify.bends import BendsTold
 from wristctl.commands.identify.command import IDENTIFY, Identified
@@ -31,6 +32,7 @@ from wristctl.commands.simulate.results import SimulatedLoop
 from wristctl.commands.study.command import FAIR_STUDY
 from wristctl.commands.study.units import Studied
 from wristctl.commands.train.command import TRAIN, Trained
+from wristctl.commands.train.dynamics import TrainedDynamics
 from wristctl.commands.tune.command import TUNE, Tuned
 from wristctl.config.study import Study
 from wristctl.records import Run
@@ -57,8 +59,8 @@ def load_study(file: str | Path | None = None, *overrides: str, trust_code: bool
 def gen_data(
     study: StudyOrFile, *, run: Ref | SimulatedLoop | Compared | None = None, out: Folder | None = None,
     label: str = "", progress: Watch | None = None,
-) -> Generated:  # fmt: skip
-    """Samples of tip positions [m] and bends [rad], by the study's `gen-data` section.
+) -> Generated | Moved:  # fmt: skip
+    """Samples of tip positions [m] and bends [rad], or of the wrist in motion, by the study's `gen-data` section.
 
     `run` (hw-run, track, simulate or compare) holds the recordings to take them from where `source` is `run`; `csv`
     takes files. The result has `.samples`; `.frame()` is a row per sample. Raises UserError for a run without courses,
@@ -71,15 +73,16 @@ def gen_data(
 
 @in_python()
 def train(
-    study: StudyOrFile, *, data: Ref | Generated | None = None, resume: Ref | None = None, out: Folder | None = None,
-    label: str = "", progress: Watch | None = None,
-) -> Trained:  # fmt: skip
-    """Networks from tip position [m] to bend [rad], by the study's `train` section.
+    study: StudyOrFile, *, data: Ref | Generated | Moved | None = None, resume: Ref | None = None,
+    out: Folder | None = None, label: str = "", progress: Watch | None = None,
+) -> Trained | TrainedDynamics:  # fmt: skip
+    """Networks from tip position [m] to bend [rad], or of the wrist's dynamics, by the study's `train` section.
 
     `data` (gen-data) holds the samples; without it those of the study's `gen-data` section are drawn. `resume` is a
     train run that was stopped, taken up in a run directory. The result has `.network`, `.trials`, `.samples`, `.split`
-    and, of a search, `.choice`; `.frame()` is a row per network and seed. Raises UserError where the split leaves too
-    few samples to judge by, or every training diverged.
+    and, of a search, `.choice`; `.frame()` is a row per network and seed. Where the samples are transitions it has
+    `.dynamics`, over which `wristctl.control.learned_mpc.learned_mpc` makes the controller. Raises UserError where the
+    split leaves too few samples to judge by, or every training diverged.
 
     With a folder `out` it is a sealed run directory too, named by `label`; `progress` is called as it goes on.
     """

@@ -103,6 +103,7 @@ def test_a_run_keeps_samples_that_are_read_back_whole(generate: Generate, tmp_pa
     assert columns["theta"] == ("rad", "bending angle") and columns["x"][0] == "m"
     pd.testing.assert_frame_equal(run.data("samples"), done.frame())
     for each in (samples_of(run), samples_of(done)):
+        assert isinstance(each, Samples)
         np.testing.assert_array_equal(each.inputs, samples().inputs)
         assert (each.segments, list(each.held_out)) == (3, [HELD_PAYLOAD, HELD_POSE, 0, HELD_POSE])
 

@@ -17,7 +17,9 @@ SMALL = ("seed=3", "gen-data.samples=40", "train={hidden: [4], activation: tanh,
 @pytest.fixture(scope="module")
 def trained(tmp_path_factory: pytest.TempPathFactory) -> Trained:
     """A network of a moment, in a run directory."""
-    return wristctl.train(wristctl.load_study(None, *SMALL), out=tmp_path_factory.mktemp("trained"))
+    result = wristctl.train(wristctl.load_study(None, *SMALL), out=tmp_path_factory.mktemp("trained"))
+    assert isinstance(result, Trained)
+    return result
 
 
 def test_errors_are_those_of_the_metrics_in_degrees_and_fit_a_screen(trained: Trained) -> None:

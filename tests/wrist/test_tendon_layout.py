@@ -216,7 +216,7 @@ def test_other_layouts_bend_in_two_planes_and_commands_in_one_say_what_takes_the
 
 def test_a_command_that_pulls_no_tendons_takes_any() -> None:
     study = load_study([], ["wrist.tendons=three", "gen-data={samples: 20}"])
-    assert len(wristctl.gen_data(study).samples.theta) == 20
+    assert len(wristctl.gen_data(study).samples.inputs) == 20
 
 
 @pytest.mark.parametrize("procedure", [TUNE, COMPARE])

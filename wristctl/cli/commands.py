@@ -60,6 +60,7 @@ COMMANDS = {
             "wristctl gen-data --samples 5000 --label large",
             "wristctl gen-data --source plant --set segments=4",
             "wristctl gen-data --source run --run latest:hw-run",
+            "wristctl gen-data --source transitions --set loop.plant.stiffness=x0.7",
             "wristctl gen-data --source csv --set 'files=[monday.csv,tuesday.csv]'",
         ),
     ),

@@ -27,9 +27,11 @@ class Choices(MutableMapping[str, T], Generic[T]):
     asked for, and never listed.
     """
 
-    def __init__(self, what: str, entries: Mapping[str, str], group: str = "") -> None:
-        self.what, self.group = what, group
-        """Noun for an entry, and the group of its entry points."""
+    def __init__(
+        self, what: str, entries: Mapping[str, str], group: str = "", made: Mapping[str, tuple[str, str]] | None = None
+    ) -> None:
+        self.what, self.group, self.made = what, group, made or {}
+        """Noun for an entry, the group of its entry points, and what a run makes first: what is missing, and how."""
         self._entries: dict[str, Any] = dict(entries)
         self._origins: dict[str, Foreign] = {}
 
@@ -63,6 +65,9 @@ class Choices(MutableMapping[str, T], Generic[T]):
 
     def named(self, name: str) -> T:
         """The entry of this name; UserError with the nearest name if there is none."""
+        if name in self.made and name not in self:
+            problem, fix = self.made[name]
+            raise UserError(problem, self.what, fix)
         if name not in self:
             raise UserError(f"unknown {self.what} '{name}'", self.what, meant(name, self.known()))
         return self[name]
@@ -95,6 +100,11 @@ class Choices(MutableMapping[str, T], Generic[T]):
         return name in self._entries and name not in self._origins
 
 
+_DYNAMICS = (
+    "`wristctl gen-data --source transitions`, then `wristctl train --preset recommended --data latest:gen-data`, "
+    "whose run has the controller as RUN/code/learned_mpc.py:LEARNED_MPC"
+)
+
 # Table of `wristctl.control.law.Controller`.
 CONTROLLERS: Choices[Any] = Choices(
     "controller",
@@ -124,6 +134,7 @@ CONTROLLERS: Choices[Any] = Choices(
         "smc-dob": "wristctl.control.smc_dob:SMC_DOB",
     },
     "wristctl.controllers",
+    {"learned-mpc": ("learned-mpc needs a network of the wrist's dynamics", _DYNAMICS)},
 )
 
 # Table of `wristctl.simulation.reference.ReferenceKind`.

@@ -23,8 +23,8 @@ class DataSettings(Section):
 
     source: Literal["pcc", "plant", "run", "csv", "transitions"] = choice(
         "pcc",
-        "constant curvature (E1), static equilibria of the loaded wrist, measured (in an earlier run, in CSV files), or "
-        "transitions of the wrist in motion, for a network of its dynamics",
+        "constant curvature (E1), static equilibria of the loaded wrist, or measured: in an earlier run, in CSV files; "
+        "or transitions of the wrist in motion, for a network of its dynamics",
         "paper",
     )
     samples: int | None = choice(
@@ -65,9 +65,7 @@ class DataSettings(Section):
     )
     files: tuple[str, ...] = given_file("csv: open logs with tips and angles (documentation: The open log)", ())
     columns: str | None = columns_of_file()
-    loop: Loop = Field(
-        Loop(), description="transitions: plant, motors and period", json_schema_extra={"unsaid": True}
-    )
+    loop: Loop = Field(Loop(), description="transitions: plant, motors and period", json_schema_extra={"unsaid": True})
 
     @property
     def measured(self) -> bool:
@@ -79,6 +77,12 @@ class DataSettings(Section):
         """Number of samples to draw."""
         number = _OF_TRANSITIONS if self.source == "transitions" else _DRAWN
         return number if self.samples is None else self.samples
+
+    @model_validator(mode="after")
+    def _loop_is_of_transitions(self) -> Self:
+        if self.source != "transitions" and self.loop != Loop():
+            raise ValueError("a loop is for source: transitions")
+        return self
 
     @model_validator(mode="after")
     def _ranges_in_order(self) -> Self:

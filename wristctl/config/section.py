@@ -56,6 +56,9 @@ class OneOf:
         elif self.table.group and name.endswith(".py"):
             context = {"file": name, "what": self.table.what}
             raise PydanticCustomError("added_value", "{file} should name its {what}: {file}:NAME", context)
+        elif name in self.table.made and name not in self.table:
+            problem, fix = self.table.made[name]
+            raise PydanticCustomError("added_value", "{problem}", {"problem": problem, "fix": fix})
         elif name not in self.table:
             *first_names, last = (f"'{name}'" for name in self.table.known())
             expected = f"{', '.join(first_names)} or {last}" if first_names else last

@@ -6,7 +6,6 @@ of the one-segment model in all that it does there: the box of the accelerations
 what the observer of the disturbance expects. So the wrist's parameters play no part.
 """
 
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -18,7 +17,7 @@ from wristctl.lanes.compiled import compiled
 from wristctl.lanes.functions import clip, expm1_of_negative, maximum, tanh
 from wristctl.lanes.lane import where, zero_like
 from wristctl.lanes.rows import beyond, lanes_like, part
-from wristctl.learning.dynamics import Dynamics, load_dynamics
+from wristctl.learning.dynamics import Dynamics
 from wristctl.learning.network import LEAK
 
 NAME = "learned-mpc"
@@ -162,13 +161,14 @@ def _compilable(dynamics: Dynamics) -> tuple[Any, Any]:
     biases[0] = biases[0] - weights[0] @ network.input_scaler.mean
     weights[-1] = weights[-1] * network.output_scaler.deviation[:, None]
     biases[-1] = biases[-1] * network.output_scaler.deviation + network.output_scaler.mean
-    packed = np.concatenate([np.column_stack([bias, weight]).ravel() for weight, bias in zip(weights, biases, strict=True)])
+    layers = zip(weights, biases, strict=True)
+    packed = np.concatenate([np.column_stack([bias, weight]).ravel() for weight, bias in layers])
     ends, kind = np.column_stack([dynamics.low, dynamics.high]).ravel(), _KINDS.index(network.activation)
     lengths = (planes, planes * planes, 3 * planes, max(network.sizes), planes * max(network.sizes))
     return (packed, np.array(network.sizes), ends, kind), tuple((0,) * length for length in lengths)
 
 
-def _mean_slope(dynamics: Dynamics, where: str) -> float:
+def _mean_slope(dynamics: Dynamics) -> float:
     """Mean slope of an acceleration with its torque in the learned region.
 
     Raises UserError where a torque moves the wrist the other way somewhere there: no plan could use that network.
@@ -180,19 +180,18 @@ def _mean_slope(dynamics: Dynamics, where: str) -> float:
     share = float(np.mean(least <= 0.0))
     if mean <= 0.0 or share > _LEAST:
         problem = f"by this network torques move the wrist the wrong way in {100.0 * share:.3g} % of what it learned"
-        raise UserError(problem, where, "train it on more samples, for longer, or with --preset recommended")
+        raise UserError(problem, NAME, "train it on more samples, for longer, or with --preset recommended")
     return mean
 
 
-def learned_mpc(file: Path, name: str = NAME) -> Controller:
-    """The controller over the network in a file. Raises UserError for a file that is none, and for a useless network.
+def learned_mpc(dynamics: Dynamics, name: str = NAME) -> Controller:
+    """The controller over a network. Raises UserError for one that is of no use.
 
     A network of one plane is used for each plane by itself, one of two planes for both together, or for one.
     """
-    dynamics = load_dynamics(file)
     net, shape = _compilable(dynamics)
     packed, sizes, ends, kind = net
-    least = _LEAST * _mean_slope(dynamics, str(file))
+    least = _LEAST * _mean_slope(dynamics)
 
     def law(now: Any, wrist: Any, gains: Any, memory: Any) -> Any:
         """u with N(theta, rate, u) + d = v: N the network, v the plan's first acceleration, d what N has left out."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Callable
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 from typing import Annotated, Literal, Self
 
@@ -19,7 +20,7 @@ from wristctl.config.section import Section
 from wristctl.errors import UserError
 from wristctl.learning.network import Network, Scaler
 from wristctl.learning.network_file import ENTRY
-from wristctl.learning.transitions import Transitions
+from wristctl.learning.transitions import Rows, Transitions
 from wristctl.records.files import replacing
 
 # Largest network that a controller evaluates: three times a period and plane.
@@ -72,7 +73,7 @@ class Dynamics:
         return np.stack(columns, axis=-1)
 
 
-def predicted(model: Model, transitions: Transitions, recordings: Array, periods: int) -> tuple[Array, Array]:
+def predicted(model: Model, transitions: Transitions, recordings: Rows, periods: int) -> tuple[Array, Array]:
     """Bends (S, P) that a model predicts so many periods ahead under the recorded torques, and those recorded [rad].
 
     Each prediction starts from a recorded bend and rate, and the next where it ends.
@@ -140,15 +141,16 @@ def load_dynamics(path: Path) -> Dynamics:
     fix = "use code/dynamics.safetensors of a sealed train run, or train again"
     try:
         with safe_open(path, "numpy") as file:
+            names = file.keys()
             header = _Header.model_validate_json((file.metadata() or {})[ENTRY])
-            tensors = {name: file.get_tensor(name) for name in file.keys()}
+            tensors = {name: file.get_tensor(name) for name in names}
         sizes = (3 * header.planes, *header.hidden, header.planes)
         weights = tuple(tensors[f"{layer}.weight"] for layer in range(len(sizes) - 1))
         biases = tuple(tensors[f"{layer}.bias"] for layer in range(len(sizes) - 1))
     except (SafetensorError, OSError, KeyError, ValidationError, json.JSONDecodeError) as error:
         raise UserError("not a network of a wrist's dynamics", str(path), fix) from error
     shapes = [(weight.shape, bias.shape) for weight, bias in zip(weights, biases, strict=True)]
-    if shapes != [((out, into), (out,)) for into, out in zip(sizes[:-1], sizes[1:], strict=True)]:
+    if shapes != [((out, into), (out,)) for into, out in pairwise(sizes)]:
         raise UserError("the arrays of this network are not of the sizes that its header says", str(path), fix)
     if not all(np.isfinite(values).all() for values in (*weights, *biases)):
         raise UserError("this network holds numbers that are not finite", str(path), fix)

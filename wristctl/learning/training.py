@@ -125,7 +125,8 @@ class _Problem:
         self.planes = targets.shape[1]
         self.input, self.output = Scaler.none(inputs.shape[1]), Scaler.none(self.planes)
         if self.settings.standardise:
-            self.input, self.output = Scaler.of(inputs[job.split.train]), Scaler.of(targets[job.split.train], alike=True)
+            train = job.split.train
+            self.input, self.output = Scaler.of(inputs[train]), Scaler.of(targets[train], alike=True)
 
         def tensors(rows: NDArray[np.int64]) -> tuple[Tensor, Tensor]:
             scaled = self.input.scale(inputs[rows]), self.output.scale(targets[rows])

@@ -54,11 +54,16 @@ def train_all(
 
 
 def _over_processes(
-    samples: Samples | Transitions, jobs: Sequence[Job], workers: int, device: str, checkpoints: Path | None, report: Report
+    samples: Samples | Transitions,
+    jobs: Sequence[Job],
+    workers: int,
+    device: str,
+    checkpoints: Path | None,
+    report: Report,
 ) -> list[TrainingResult]:
     context = multiprocessing.get_context("spawn")
     progress, stop, begun = context.SimpleQueue(), context.Event(), context.Event()
-    setup = {"samples": samples, "device": device, "checkpoints": checkpoints}
+    setup: dict[str, Any] = {"samples": samples, "device": device, "checkpoints": checkpoints}
     setup |= {"told": progress, "stop": stop, "begun": begun}
     interrupted = False
     try:

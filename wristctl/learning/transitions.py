@@ -16,15 +16,20 @@ from wristctl.errors import UserError
 from wristctl.learning.dataset import asked_of, planes_of_samples
 from wristctl.learning.domain import Domain
 
+# Numbers of recordings, ticks or samples.
+Rows = NDArray[np.int64]
+
 # Recordings that are drawn, and the time of each [s].
 RECORDINGS, SECONDS = 24, 2.0
+# Time in which a wrist that rests at first has come to its motion [s], which is left out.
+_BEGINS = 0.3
 # Sines of a motion, their lowest frequency [Hz] and the highest over it; share of the wrist's range that it fills.
-_SINES, _LOWEST, _SPREAD, _FILLS = 4, 0.2, 25.0, 0.8
+_SINES, _LOWEST, _SPREAD, _FILLS = 4, 0.2, 25.0, 0.7
 # Random accelerations: smooth between levels that are so far apart in time [s], of up to the wrist's range in the last
 # one [s]. Jumps of torque would show what one segment does not have: the bend of several begins to move at once.
 _SHORTEST, _LONGEST, _THROUGH = 0.03, 0.12, 0.1
-# Natural frequency [rad/s] and damping ratio at which computed torque follows: soft, so that the random part shows.
-_GAINS = (10.0, 0.7)
+# Gains of ct-dob, which follows whatever the wrist is: soft, so that the random part shows.
+_GAINS = {"w": 10.0, "zeta": 0.7, "wo": 20.0}
 
 
 @dataclass(frozen=True)
@@ -39,9 +44,9 @@ class Transitions:
     """(R, T, P) torque of the commanded tensions, from each tick to the next [N m]"""
     period: float
     """Time between two ticks [s]."""
-    recording: NDArray[np.int64]
+    recording: Rows
     """(N,) recording of each sample"""
-    tick: NDArray[np.int64]
+    tick: Rows
     """(N,) its tick, never the last of a recording"""
 
     names = ()
@@ -74,16 +79,17 @@ class Transitions:
     @staticmethod
     def from_arrays(arrays: Mapping[str, Array]) -> Transitions:
         """Transitions from what `arrays` gave. Raises KeyError where an array is missing."""
-        motion = (np.asarray(arrays[name], np.float64) for name in ("bend", "rate", "torque"))
-        which = (arrays[name].astype(np.int64) for name in ("recording", "tick"))
-        return Transitions(*motion, float(arrays["period"]), *which)
+        bend, rate, torque = (np.asarray(arrays[name], np.float64) for name in ("bend", "rate", "torque"))
+        recording, tick = (arrays[name].astype(np.int64) for name in ("recording", "tick"))
+        return Transitions(bend, rate, torque, float(arrays["period"]), recording, tick)
 
 
 def draw_transitions(settings: DataSettings, wrist: WristParameters, rng: np.random.Generator) -> Transitions:
     """Simulate the wrist in `settings.loop` along random motions under random torques, and draw samples of that.
 
-    A soft computed torque follows sums of sines; on top come random accelerations. A loop of one plane bends toward ulnar. Raises UserError for periods below a millisecond, and where the wrist leaves
-    its range in most recordings.
+    Computed torque with an observer follows sums of sines, softly; on top come random accelerations. A loop of one
+    plane bends toward ulnar. Raises UserError for periods below a millisecond, and where the wrist leaves its range in
+    most recordings.
     """
     from wristctl.control.table import controller
     from wristctl.simulation.motion import Motion
@@ -95,18 +101,18 @@ def draw_transitions(settings: DataSettings, wrist: WristParameters, rng: np.ran
         raise UserError("transitions are recorded every millisecond at most", "gen-data.loop.control_period", "1e-3")
     if planes == 1:
         wrist, loop = loop_facing(wrist, asked_of(settings).loop, "ulnar")
-    motions = [Motion.of_bends(_excitation(planes, period, wrist, rng), period, wrist.length) for _ in range(RECORDINGS)]
+    bends = [_excitation(planes, period, wrist, rng) for _ in range(RECORDINGS)]
+    motions = [Motion.of_bends(motion, period, wrist.length) for motion in bends]
     which, streams = np.arange(RECORDINGS), [tuple(rng.integers(2**32, size=2).tolist()) for _ in range(RECORDINGS)]
-    gains = np.tile(_GAINS, (RECORDINGS, 1))
-    outcome = rollout(
-        controller("computed-torque"), gains, motions, which, loop, wrist, None, streams, record=True
-    )  # fmt: skip
-    sound = np.flatnonzero(~outcome.failed)
+    law = controller("ct-dob")
+    gains = np.tile(law.values(_GAINS), (RECORDINGS, 1))
+    outcome = rollout(law, gains, motions, which, loop, wrist, None, streams, record=True)
+    sound, skipped = np.flatnonzero(~outcome.failed), round(_BEGINS / period)
     if 2 * len(sound) < RECORDINGS:
         problem = f"the wrist leaves its range in {RECORDINGS - len(sound)} of {RECORDINGS} random motions"
         raise UserError(problem, "gen-data.loop", "lower its loads, or the difference from the wrist as believed")
     bend, rate, torque = (
-        np.stack([outcome.part(name, lane) for lane in sound.tolist()]) for name in ("bend", "rate", "torque")
+        np.stack([outcome.part(name, lane)[skipped:] for lane in sound.tolist()]) for name in ("bend", "rate", "torque")
     )
     ticks = bend.shape[1] - 1
     chosen = np.sort(rng.permutation(len(sound) * ticks)[: settings.drawn_samples])
@@ -115,7 +121,7 @@ def draw_transitions(settings: DataSettings, wrist: WristParameters, rng: np.ran
 
 def _excitation(planes: int, period: float, wrist: WristParameters, rng: np.random.Generator) -> Array:
     """A random motion as a controller is told of it (P, 3, T): its acceleration has a random part of its own."""
-    time = period * np.arange(round(SECONDS / period))
+    time = period * np.arange(round((_BEGINS + SECONDS) / period))
     frequency = 2.0 * math.pi * _LOWEST * _SPREAD ** rng.random((planes, _SINES, 1))
     phase, size = rng.uniform(0.0, 2.0 * math.pi, frequency.shape), rng.random(frequency.shape)
     angle = frequency * time + phase
@@ -124,8 +130,8 @@ def _excitation(planes: int, period: float, wrist: WristParameters, rng: np.rand
     bend = math.radians(wrist.range_deg)
     motion *= _FILLS * bend * rng.uniform(0.2, 1.0) / np.hypot.reduce(motion[:, 0], axis=0).max()
     for plane in motion:
-        knots = np.cumsum(rng.uniform(_SHORTEST, _LONGEST, math.ceil(SECONDS / _SHORTEST)))
-        levels = rng.uniform(-1.0, 1.0, len(knots) + 1) * bend / _THROUGH**2
+        knots = np.cumsum(rng.uniform(_SHORTEST, _LONGEST, math.ceil(time[-1] / _SHORTEST) + 1))
+        levels = rng.uniform(-1.0, 1.0, len(knots) + 1) * bend / (planes * _THROUGH**2)
         last = np.searchsorted(knots, time)
         begun = np.concatenate([[0.0], knots])[last]
         share = (time - begun) / (knots[last] - begun)

@@ -279,7 +279,7 @@ class LiveRun:
             if not any(folder.iterdir()):
                 folder.rmdir()
         write_seal(self.path, {output.path: output.sha256 for output in manifest.outputs})
-        if manifest.code.foreign:
+        if manifest.code.foreign or any(output.path.startswith("code/") for output in manifest.outputs):
             note(read_seal(self.path) or {})
         return manifest
 

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from wristctl.commands.answer import Answer
 from wristctl.commands.gen_data.answer import CLOSED_FORM, QUANTITIES, RANGES, Measured, answer_of, counted, measured_of
+from wristctl.commands.gen_data.transitions import Moved, plan_transitions, record_transitions
 from wristctl.commands.inputs import EarlierRun, Given, Inputs
 from wristctl.commands.loop_warnings import warn_of_one_plane
 from wristctl.commands.printed_table import Table
@@ -26,6 +27,7 @@ if TYPE_CHECKING:
 
     from wristctl.learning.dataset import Samples
     from wristctl.learning.measured_samples import RecordedCourse
+    from wristctl.learning.transitions import Transitions
 
 
 # Samples beyond which there is no samples.csv, which nobody would read, and the figure shows some of them.
@@ -62,6 +64,8 @@ def plan(study: Study, inputs: Inputs) -> str:
         if present and settings.source != name:
             fix, noun = Setting(f"source={name}", "gen-data", option=True), "a run is" if name == "run" else "files are"
             raise UserError(f"{noun} given, but source is {settings.source}", "gen-data.source", fix)
+    if settings.source == "transitions":
+        return plan_transitions(study)
     if settings.measured:
         courses, run = recorded(study, inputs), inputs.runs().get("run")
         result = f"a {inputs['run'].kind} result" if "run" in inputs else counted(len(settings.files), "file")
@@ -82,8 +86,10 @@ def plan(study: Study, inputs: Inputs) -> str:
     return begin + f"arc length {low:g} to {high:g} mm"
 
 
-def gen_data(session: Session) -> Generated:
-    """Sample tip positions and bends: constant curvature, equilibria under load, or earlier runs."""
+def gen_data(session: Session) -> Generated | Moved:
+    """Sample tip positions and bends (constant curvature, equilibria under load, earlier runs), or motions."""
+    if session.study.gen_data.source == "transitions":
+        return record_transitions(session)
     import numpy as np
 
     from wristctl.commands.gen_data.figures import workspace
@@ -175,11 +181,15 @@ def split_of(samples: Samples) -> str | None:
     return None
 
 
-def samples_of(source: Run | Generated) -> Samples:
+def samples_of(source: Run | Generated | Moved) -> Samples | Transitions:
     """The samples of a gen-data run or result."""
     from wristctl.learning.dataset import Samples
+    from wristctl.learning.transitions import Transitions
 
-    return Samples.from_arrays(source.array("samples")) if isinstance(source, Run) else source.samples
+    if not isinstance(source, Run):
+        return source.samples
+    arrays = source.array("samples")
+    return Transitions.from_arrays(arrays) if "torque" in arrays else Samples.from_arrays(arrays)
 
 
 def recorded(study: Study, inputs: Inputs) -> list[RecordedCourse]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import shutil
 import time
 from dataclasses import dataclass
@@ -17,6 +18,7 @@ from wristctl.commands.procedure import Procedure
 from wristctl.commands.results import StudyResult
 from wristctl.commands.session import Session
 from wristctl.commands.train.answer import answer_of
+from wristctl.commands.train.dynamics import TrainedDynamics, check_dynamics, train_dynamics
 from wristctl.commands.train.results import (
     best_row,
     error_table,
@@ -31,6 +33,7 @@ from wristctl.commands.train.results import (
 from wristctl.config.learning import NetworkSettings, TrainSettings
 from wristctl.config.study import Study
 from wristctl.errors import Argument, UserError
+from wristctl.records import Run
 from wristctl.records.files import check_plain
 
 if TYPE_CHECKING:
@@ -42,6 +45,7 @@ if TYPE_CHECKING:
     from wristctl.learning.network import Network
     from wristctl.learning.selection import Choice
     from wristctl.learning.training_result import Job, TrainingResult
+    from wristctl.learning.transitions import Transitions
 
 
 CHECKPOINTS = "checkpoints"
@@ -66,7 +70,7 @@ def _copy_plain(source: str, target: str) -> None:
 
 def train_networks(
     session: Session,
-    samples: Samples,
+    samples: Samples | Transitions,
     split: Split,
     wanted: dict[str, NetworkSettings],
     checkpoints: Path | None,
@@ -107,12 +111,12 @@ def chosen_by_folds(session: Session, samples: Samples, split: Split, checkpoint
 
 
 def _train_all(
-    session: Session, activity: str, samples: Samples, jobs: list[Job], checkpoints: Path | None
+    session: Session, activity: str, samples: Samples | Transitions, jobs: list[Job], checkpoints: Path | None
 ) -> list[TrainingResult]:
     """The jobs' trials, with progress and checkpoints."""
-    import numpy as np
     import torch
 
+    from wristctl.learning.dataset import Samples
     from wristctl.learning.training_processes import train_all
     from wristctl.learning.training_result import Epoch
     from wristctl.processes import cores
@@ -128,7 +132,11 @@ def _train_all(
 
         def report(number: int, epoch: Epoch) -> None:
             epochs[number] = epoch.epoch
-            advance(sum(epochs), rmse_deg=np.degrees(np.sqrt(epoch.validation_loss)))
+            rmse = math.sqrt(epoch.validation_loss)
+            if isinstance(samples, Samples):
+                advance(sum(epochs), rmse_deg=math.degrees(rmse))
+            else:
+                advance(sum(epochs), rmse_rad_s2=rmse)
 
         return train_all(samples, jobs, workers, device, checkpoints, report)
 
@@ -172,17 +180,20 @@ def plan(study: Study, inputs: Inputs) -> str:
 
     from wristctl.learning.dataset import split_samples
     from wristctl.learning.selection import grid_points
+    from wristctl.learning.transitions import Transitions
 
     if find_spec("torch") is None:
         fix = "pip install torch --index-url https://download.pytorch.org/whl/cpu"
         raise UserError("training needs PyTorch, which is not installed", "train", fix)
     settings, samples, held_out, whose = study.train, inputs.read("data", samples_of), None, None
+    if study.gen_data.source == "transitions" if samples is None else isinstance(samples, Transitions):
+        check_dynamics(settings)
     count, source = study.gen_data.drawn_samples, "samples of its own"
     if samples is None and study.gen_data.measured:
         samples = drawn(study, (0, 0), recorded(study, Inputs()))
     if samples is not None:
         run = inputs.runs().get("data")
-        count, held_out = len(samples.theta), samples.held_out
+        count, held_out = len(samples.targets), samples.held_out
         source = run.id if run else "those given" if "data" in inputs else source
         whose = recordings(samples, settings)
     split = split_samples(count, settings.train_share, np.random.default_rng(0), held_out, whose)
@@ -204,7 +215,7 @@ def plan(study: Study, inputs: Inputs) -> str:
     )
 
 
-def recordings(samples: Samples, settings: TrainSettings) -> NDArray[np.int64] | None:
+def recordings(samples: Samples | Transitions, settings: TrainSettings) -> NDArray[np.int64] | None:
     """The recording of each sample where these are what is split, else None."""
     return samples.recording if settings.split == "recording" else None
 
@@ -228,16 +239,25 @@ def _network(settings: NetworkSettings) -> NetworkSettings:
     return NetworkSettings.model_construct(**fields)
 
 
-def train(session: Session) -> Trained:
-    """Train networks from tip position to bend."""
+def train(session: Session) -> Trained | TrainedDynamics:
+    """Train networks from tip position to bend, or one of the dynamics where the samples are transitions."""
     import numpy as np
 
     from wristctl.learning.dataset import split_samples
     from wristctl.learning.evaluation import places
     from wristctl.learning.training_result import best_of
+    from wristctl.learning.transitions import Transitions, draw_transitions
 
     settings, findings = session.study.train, session.findings
     samples = session.inputs.read("data", samples_of)
+    if samples is None and session.study.gen_data.source == "transitions":
+        entropy = findings.stream("samples")
+        samples = draw_transitions(session.study.gen_data, session.study.wrist, np.random.default_rng(entropy))
+        findings.arrays("data/samples.npz", samples.arrays())
+    if isinstance(samples, Transitions):
+        source = session.inputs.get("data")
+        known = source.config if isinstance(source, Run) else source.study if source else session.study
+        return train_dynamics(session, samples, known.wrist)
     if samples is None:
         samples = drawn(session.study, findings.stream("samples"), recorded(session.study, Inputs()))
         findings.arrays("data/samples.npz", samples.arrays())
