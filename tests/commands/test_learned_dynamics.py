@@ -11,8 +11,9 @@ import numpy as np
 import pytest
 
 import wristctl
-from wristctl.cli.app import main
 from wristctl.commands.gen_data.transitions import Moved
+from wristctl.commands.perform import redrawn
+from wristctl.commands.progress import watched
 from wristctl.commands.train.dynamics import TrainedDynamics
 from wristctl.errors import UserError
 from wristctl.records import Run
@@ -74,7 +75,8 @@ def test_a_loop_under_a_trained_controller_is_repeated_without_the_training(made
     assert set(copies) == {"learned_mpc.py", "dynamics.safetensors"}
     assert copies["dynamics.safetensors"].read_bytes() == weights
     shutil.rmtree(tmp_path / "elsewhere")
-    assert main(["runs", "replay", str(done.run.path)]) == 0
+    again = redrawn(done.run, watched(None))
+    assert again.metrics["rmse"] == done.metrics["rmse"]
     copies["dynamics.safetensors"].write_bytes(weights[:-1] + b"\0")
     assert Run(done.run.path).problems()
 
@@ -91,7 +93,7 @@ def test_a_training_draws_its_own_transitions_and_is_the_same_each_time(tmp_path
 def test_settings_of_networks_of_tips_are_refused_before_anything_is_drawn(change: str) -> None:
     key = change.partition("=")[0]
     with pytest.raises(UserError) as refused:
-        wristctl.train(load_study([], [*DATA, *SMALL, f"train.{change}"]))
+        wristctl.train(load_study([], [*DATA, "train={hidden: [8]}", f"train.{change}"]))
     assert refused.value.where == f"train.{key}"
 
 

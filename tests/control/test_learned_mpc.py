@@ -9,6 +9,8 @@ from typing import Any
 import numpy as np
 import pytest
 
+from tests.documented import script_of_docs
+from wristctl.config.choices import CONTROLLERS
 from wristctl.config.learning import DataSettings, NetworkSettings
 from wristctl.config.loop import Loop, Reference
 from wristctl.config.wrist import WristParameters
@@ -24,6 +26,7 @@ from wristctl.learning.training import train_one
 from wristctl.learning.training_result import Job
 from wristctl.learning.transitions import Transitions, draw_transitions
 from wristctl.simulation.closed_loop import follow
+from wristctl.simulation.oscillation import LIMIT_CYCLE
 from wristctl.simulation.planes import motion_in
 from wristctl.simulation.repetitions import Simulation
 from wristctl.study_files.load import load_study
@@ -222,6 +225,18 @@ def test_with_three_tendons_in_two_planes_it_comes_near_mpc_and_needs_no_model()
         found = followed(law, "default", THREE, *changes, kind="circle").metrics["rmse"]
         without = followed(controller("feedforward"), "default", THREE, *changes, kind="circle").metrics["rmse"]
         assert found < 0.01 * without
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("period", "stiffness", "sheath"), [(5e-3, 8e3, 0.0), (1e-2, 8e3, 0.0), (5e-3, 4e4, 3.0)])
+def test_behind_motors_and_a_camera_it_does_not_swing_at_the_ends_of_its_conditions(
+    monkeypatch: pytest.MonkeyPatch, period: float, stiffness: float, sheath: float
+) -> None:
+    law, margins = law_of(), script_of_docs("margins")
+    monkeypatch.setitem(CONTROLLERS, law.name, law)
+    (fast, slow), (soft, _) = law.conditions["hardware"]
+    assert fast <= period <= slow and soft <= stiffness
+    assert margins.swing(law.name, "hardware", margins.loop_of(period, stiffness, sheath)) <= LIMIT_CYCLE
 
 
 def test_transitions_below_a_millisecond_are_refused() -> None:

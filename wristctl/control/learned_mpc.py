@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from wristctl.control.law import BY_TRIAL, Controller, Gain
+from wristctl.control.law import BY_TRIAL, Conditions, Controller, Gain
 from wristctl.control.mpc import HORIZON, MPC, TURNS, plan
 from wristctl.errors import UserError
 from wristctl.lanes.compiled import compiled
@@ -214,10 +214,11 @@ def learned_mpc(dynamics: Dynamics, name: str = NAME) -> Controller:
         },
         presets={
             "default": {"w": 50.0, "zeta": 1.0, "wo": 50.0},
-            "hardware": {"w": 45.0, "zeta": 0.8, "wo": 200.0},
+            "hardware": {"w": 45.0, "zeta": 0.8, "wo": 20.0},
         },
         memory=_PLAN + 2 * HORIZON,
         preview=HORIZON,
         planes=dynamics.planes,
         notes={"hardware": BY_TRIAL},
+        conditions={"hardware": Conditions((5e-3, 1e-2), (8e3, 1e5))},
     )
