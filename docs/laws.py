@@ -147,8 +147,8 @@ with one budget.
 - **Networks** (nc, nn-mrac): no better than an integral here. nn-mrac is the group's law (arXiv 2510.19068) as far as
   it is specified; its published reference model is far slower.
 - **Learned dynamics** (learned-mpc): MPC over a network of the wrist's dynamics, which `gen-data` and `train` make. On
-  a wrist that is as believed it buys nothing; trained on one that is not, it errs a seventeenth of `mpc` with torques as
-  commanded, and behind motors and a camera, without an observer of its own, a quarter
+  a wrist that is as believed it buys nothing; trained on one that is not, it errs a seventeenth of `mpc` with torques
+  as commanded, and behind motors and a camera, without an observer of its own, a quarter
   ([table](learned-dynamics.md#what-it-buys)). The rankings below leave it out: there is no network of all their wrists.
 - **Rivals of other groups** (impedance, fopi): an impedance with a network for what the model lacks, and a fractional
   integral of the error; in smooth motions behind motors and a camera the former is not told from LQI. DeePC is not

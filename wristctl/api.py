@@ -32,7 +32,7 @@ from wristctl.commands.simulate.results import SimulatedLoop
 from wristctl.commands.study.command import FAIR_STUDY
 from wristctl.commands.study.units import Studied
 from wristctl.commands.train.command import TRAIN, Trained
-from wristctl.commands.train.dynamics import TrainedDynamics
+from wristctl.commands.train.learned_dynamics import TrainedDynamics
 from wristctl.commands.tune.command import TUNE, Tuned
 from wristctl.config.study import Study
 from wristctl.records import Run
@@ -81,7 +81,7 @@ def train(
     `data` (gen-data) holds the samples; without it those of the study's `gen-data` section are drawn. `resume` is a
     train run that was stopped, taken up in a run directory. The result has `.network`, `.trials`, `.samples`, `.split`
     and, of a search, `.choice`; `.frame()` is a row per network and seed. Where the samples are transitions it has
-    `.dynamics`, over which `wristctl.control.learned_mpc.learned_mpc` makes the controller. Raises UserError where the
+    `.dynamics`, over which `wristctl.learning.learned_mpc.learned_mpc` makes the controller. Raises UserError where the
     split leaves too few samples to judge by, or every training diverged.
 
     With a folder `out` it is a sealed run directory too, named by `label`; `progress` is called as it goes on.

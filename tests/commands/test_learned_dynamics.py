@@ -14,7 +14,7 @@ import wristctl
 from wristctl.commands.gen_data.transitions import Moved
 from wristctl.commands.perform import redrawn
 from wristctl.commands.progress import watched
-from wristctl.commands.train.dynamics import TrainedDynamics
+from wristctl.commands.train.learned_dynamics import TrainedDynamics
 from wristctl.errors import UserError
 from wristctl.records import Run
 from wristctl.study_files.load import load_study

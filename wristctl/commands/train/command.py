@@ -18,7 +18,7 @@ from wristctl.commands.procedure import Procedure
 from wristctl.commands.results import StudyResult
 from wristctl.commands.session import Session
 from wristctl.commands.train.answer import answer_of
-from wristctl.commands.train.dynamics import TrainedDynamics, check_dynamics, train_dynamics
+from wristctl.commands.train.learned_dynamics import TrainedDynamics, check_dynamics, keep_dynamics
 from wristctl.commands.train.results import (
     best_row,
     error_table,
@@ -116,9 +116,9 @@ def _train_all(
     """The jobs' trials, with progress and checkpoints."""
     import torch
 
-    from wristctl.learning.dataset import Samples
     from wristctl.learning.training_processes import train_all
     from wristctl.learning.training_result import Epoch
+    from wristctl.learning.transitions import Transitions
     from wristctl.processes import cores
 
     settings = session.study.train
@@ -133,10 +133,10 @@ def _train_all(
         def report(number: int, epoch: Epoch) -> None:
             epochs[number] = epoch.epoch
             rmse = math.sqrt(epoch.validation_loss)
-            if isinstance(samples, Samples):
-                advance(sum(epochs), rmse_deg=math.degrees(rmse))
-            else:
+            if isinstance(samples, Transitions):
                 advance(sum(epochs), rmse_rad_s2=rmse)
+            else:
+                advance(sum(epochs), rmse_deg=math.degrees(rmse))
 
         return train_all(samples, jobs, workers, device, checkpoints, report)
 
@@ -255,9 +255,7 @@ def train(session: Session) -> Trained | TrainedDynamics:
         samples = draw_transitions(session.study.gen_data, session.study.wrist, np.random.default_rng(entropy))
         findings.arrays("data/samples.npz", samples.arrays())
     if isinstance(samples, Transitions):
-        source = session.inputs.get("data")
-        known = source.config if isinstance(source, Run) else source.study if source else session.study
-        return train_dynamics(session, samples, known.wrist)
+        return _of_dynamics(session, samples)
     if samples is None:
         samples = drawn(session.study, findings.stream("samples"), recorded(session.study, Inputs()))
         findings.arrays("data/samples.npz", samples.arrays())
@@ -295,6 +293,25 @@ def train(session: Session) -> Trained | TrainedDynamics:
         session.study, findings, tables, kept.network, trials, samples, split, choice, measures, name, errors,
         str(data.path) if data else "",
     )  # fmt: skip
+
+
+def _of_dynamics(session: Session, samples: Transitions) -> TrainedDynamics:
+    """Train a network on transitions, and leave the controller over it."""
+    import numpy as np
+
+    from wristctl.learning.dataset import split_samples
+
+    settings, source = session.study.train, session.inputs.get("data")
+    check_dynamics(settings)
+    rng = np.random.default_rng(session.findings.stream("split"))
+    split = split_samples(len(samples.tick), settings.train_share, rng, None, recordings(samples, settings))
+    checkpoints = checkpoints_of(session)
+    (trials,) = train_networks(session, samples, split, networks(settings), checkpoints).values()
+    known = source.config if isinstance(source, Run) else source.study if source else session.study
+    result = keep_dynamics(session, samples, split, trials, known.wrist)
+    if checkpoints:
+        shutil.rmtree(checkpoints, ignore_errors=True)
+    return result
 
 
 TRAIN = Procedure(

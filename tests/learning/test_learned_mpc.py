@@ -15,12 +15,12 @@ from wristctl.config.learning import DataSettings, NetworkSettings
 from wristctl.config.loop import Loop, Reference
 from wristctl.config.wrist import WristParameters
 from wristctl.control.law import Controller
-from wristctl.control.learned_mpc import learned_mpc
 from wristctl.control.table import controller, gains_of
 from wristctl.control.vetting import call_law, vet
 from wristctl.errors import UserError
 from wristctl.learning.dataset import split_samples
-from wristctl.learning.dynamics import Dynamics, load_dynamics, predicted, save_dynamics
+from wristctl.learning.learned_dynamics import Dynamics, load_dynamics, predicted, save_dynamics
+from wristctl.learning.learned_mpc import learned_mpc
 from wristctl.learning.network import Network, Scaler
 from wristctl.learning.training import train_one
 from wristctl.learning.training_result import Job

@@ -17,7 +17,7 @@ from wristctl.lanes.compiled import compiled
 from wristctl.lanes.functions import clip, expm1_of_negative, maximum, tanh
 from wristctl.lanes.lane import where, zero_like
 from wristctl.lanes.rows import beyond, lanes_like, part
-from wristctl.learning.dynamics import Dynamics
+from wristctl.learning.learned_dynamics import Dynamics
 from wristctl.learning.network import LEAK
 
 NAME = "learned-mpc"

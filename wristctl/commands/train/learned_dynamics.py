@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import shlex
-import shutil
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import TYPE_CHECKING
@@ -22,7 +21,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from wristctl.arrays import Array
-    from wristctl.learning.dynamics import Dynamics, Model
+    from wristctl.learning.dataset import Split
+    from wristctl.learning.learned_dynamics import Dynamics, Model
     from wristctl.learning.training_result import TrainingResult
     from wristctl.learning.transitions import Rows, Transitions
 
@@ -33,8 +33,8 @@ AHEAD = (0.02, 0.2)
 _HEADS = ("model", "acceleration [rad/s^2]", "after 0.02 s [deg]", "after 0.2 s [deg]", "largest then [deg]")
 _TEXT = f'''"""The controller learned-mpc over the network that this run trained: FILE:{NAME} names it."""
 
-from wristctl.control.learned_mpc import learned_mpc
-from wristctl.learning.dynamics import load_dynamics
+from wristctl.learning.learned_mpc import learned_mpc
+from wristctl.learning.learned_dynamics import load_dynamics
 from wristctl.plugins.import_hook import data_file
 
 {NAME} = learned_mpc(load_dynamics(data_file(__file__, "{NETWORK}")))
@@ -83,7 +83,7 @@ class TrainedDynamics(StudyResult):
 
 def check_dynamics(settings: TrainSettings) -> None:
     """UserError for settings of networks from tip to bend, and for a network that no controller could evaluate."""
-    from wristctl.learning.dynamics import MOST_WEIGHTS
+    from wristctl.learning.learned_dynamics import MOST_WEIGHTS
 
     for name, asked in (("search", settings.search), ("rows", settings.rows), ("inputs", settings.inputs == "tip")):
         if asked:
@@ -99,22 +99,20 @@ def check_dynamics(settings: TrainSettings) -> None:
         raise UserError(problem, "train.hidden", f"--preset recommended, or layers with at most {MOST_WEIGHTS}")
 
 
-def train_dynamics(session: Session, samples: Transitions, believed: WristParameters) -> TrainedDynamics:
-    """Train a network on transitions, and leave the controller over it; `believed` is the wrist as its model has it."""
+def keep_dynamics(
+    session: Session, samples: Transitions, split: Split, trials: list[TrainingResult], believed: WristParameters
+) -> TrainedDynamics:
+    """Judge the best of the trainings on transitions, and leave the controller over it.
+
+    `believed` is the wrist as its model has it. Raises KeyboardInterrupt where a training was interrupted.
+    """
     import numpy as np
 
-    from wristctl.commands.train.command import checkpoints_of, networks, recordings, train_networks
-    from wristctl.learning.dataset import split_samples
-    from wristctl.learning.dynamics import Dynamics, predicted, save_dynamics
+    from wristctl.learning.learned_dynamics import Dynamics, predicted, save_dynamics
     from wristctl.learning.training_result import best_of
     from wristctl.records.files import sha256_of
 
     settings, findings = session.study.train, session.findings
-    check_dynamics(settings)
-    rng = np.random.default_rng(findings.stream("split"))
-    split = split_samples(len(samples.tick), settings.train_share, rng, None, recordings(samples, settings))
-    checkpoints = checkpoints_of(session)
-    (trials,) = train_networks(session, samples, split, networks(settings), checkpoints).values()
     kept = best_of(trials)
     dynamics = Dynamics.of(kept.network, samples)
     run, data = findings.run, session.inputs.runs().get("data")
@@ -128,8 +126,6 @@ def train_dynamics(session: Session, samples: Transitions, believed: WristParame
         findings.text(CONTROLLER, _TEXT)
     if any(trial.interrupted for trial in trials):
         raise KeyboardInterrupt
-    if checkpoints:
-        shutil.rmtree(checkpoints, ignore_errors=True)
     held_out = np.unique(samples.recording[split.test])
     rows = []
     for name, model in models(dynamics, samples, split.train, believed).items():
