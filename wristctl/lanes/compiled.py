@@ -36,8 +36,7 @@ _PACKAGE = Path(__file__).resolve().parents[1]
 def frozen_values(function: Callable[..., Any]) -> tuple[bytes, tuple[Path, ...]]:
     """A hash over all that a function reaches outside this package, and the files of this package that it reaches.
 
-    It reaches globals by the names in its code, attributes of modules too, and what its closure holds. Of a function of
-    this package these are the values that it was made with.
+    It reaches globals by the names in its code, attributes of modules too, and what its closure holds.
     """
     digest, files, visited = hashlib.sha256(), set[Path](), set[int]()
     waiting: list[Any] = [function]
@@ -51,8 +50,6 @@ def frozen_values(function: Callable[..., Any]) -> tuple[bytes, tuple[Path, ...]
             file = Path(unwrapped.__code__.co_filename)
             if file.is_relative_to(_PACKAGE):
                 files.add(file)
-                held = [cell.cell_contents for cell in unwrapped.__closure__ or ()]
-                waiting += [value for value in held if not callable(value)]
                 continue
             digest.update(unwrapped.__qualname__.encode())
             for code in _codes(unwrapped.__code__):
