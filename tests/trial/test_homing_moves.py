@@ -21,7 +21,6 @@ from wristctl.config.plant import Actuator
 from wristctl.trial.expected_moves import Bend, ExpectedMoves
 from wristctl.trial.homing import Zero, find_zero, slacken
 from wristctl.trial.safety import SafetyStop
-from wristctl.trial.spatial_moves import SpatialMoves
 from wristctl.trial.spools import on_plus_side, spools_of
 from wristctl.trial.zero_checks import check_cocontraction, check_tendons, check_zero
 from wristctl.wrist.directions import ACTIVE, away_of
@@ -418,7 +417,7 @@ def test_a_dead_tendon_is_found_where_a_trial_asked_little_of_it(plane: str, dea
 
     rig, zero = settings_of(homing={"frames": 1, "rest": 0.0}), Zero((1,) * 4, tuple(PER_RADIAN), GLUED, (0.0,) * 4)
     check: Any = partial(check_tendons, board, Marker(board, angle), rig, WRIST, plane, zero)  # type: ignore[arg-type]
-    enough = 1.01 * 3.0 * math.radians(rig.safety.follow_deg) / ExpectedMoves(rig, WRIST, plane).compliance(0)
+    enough = 1.01 * 3.0 * math.radians(rig.safety.follow_deg) / ExpectedMoves(rig, WRIST, plane).compliance
     little, much = np.full(4, 0.98 * enough), np.full(4, enough)
     check(much)
     assert not board.told, "all have been tried: nothing moves"
@@ -433,10 +432,29 @@ def test_a_dead_tendon_is_found_where_a_trial_asked_little_of_it(plane: str, dea
     check(np.where(np.isin(np.arange(4), (dead, opposite)), much, little))
 
 
+@pytest.mark.parametrize(("planes", "tried"), [(1, 0), (2, 2)])
+def test_no_pull_shows_a_tendon_to_be_there_where_nothing_bends_across(
+    planes: int, tried: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """In two planes a law makes up for half a tendon by the others."""
+    pairs = list[tuple[int, int]]()
+    rest: Any = None
+
+    def once(*given: Any) -> tuple[Any, Any]:
+        pairs.append(given[-2])
+        return rest, rest
+
+    monkeypatch.setattr("wristctl.trial.zero_checks._tried", once)
+    monkeypatch.setattr("wristctl.trial.zero_checks.rest_of", lambda *given: rest)
+    board: Any = Slackened()
+    zero = Zero((1,) * 4, tuple(PER_RADIAN), GLUED, (0.0,) * 4)
+    check_tendons(board, rest, settings_of(planes=planes), WRIST, "ulnar", zero, np.full(4, 100.0))
+    assert len(pairs) == tried and sorted(sum(pairs, ())) == list(range(2 * tried))
+
+
 def test_a_wrist_that_its_springs_do_not_hold_bends_by_any_pull() -> None:
     rig = settings_of()
-    assert ExpectedMoves(rig, WRIST.model_copy(update={"hand_mass": 5.0}), "ulnar").compliance(0) == math.inf
+    assert ExpectedMoves(rig, WRIST.model_copy(update={"hand_mass": 5.0}), "ulnar").compliance == math.inf
     firm = WRIST.model_copy(update={"stiffness": 100.0})
-    one = ExpectedMoves(rig, firm, "ulnar").compliance(0)
+    one = ExpectedMoves(rig, firm, "ulnar").compliance
     assert one == pytest.approx(WRIST.tendon_offset / 100.0, rel=0.02), "an arm over a stiffness"
-    assert SpatialMoves(rig, firm).compliance(2) == pytest.approx(math.hypot(one, one), rel=0.03), "of the same two"

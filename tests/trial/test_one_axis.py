@@ -32,7 +32,7 @@ def bench_of(**motors: object) -> tuple[VirtualBench, EmulatedTestbed, Calibrate
 def test_sense_and_slack_of_a_motor_are_found_within_two_degrees(axis: int, reversed_axis: int | None) -> None:
     slack = (3e-4, 2e-4, 4e-4, 2.5e-4)
     bench, testbed, settings = bench_of(slack=slack, reversed=tuple(k == reversed_axis for k in range(4)))
-    found = axis_tried(testbed, settings, axis)
+    found = axis_tried(testbed, settings, WristParameters(), axis)
     assert found.sense == (-1 if axis == reversed_axis else 1)
     bent = 2.0 * abs(found.bend) * WristParameters().tendon_offset  # a tendon alone bends across the plane as much
     assert slack[axis] + bent - 5e-5 < found.taken_up < slack[axis] + 1.5 * bent + 1.2e-4
@@ -49,7 +49,7 @@ def test_a_tendon_that_is_off_bends_nothing_and_that_is_said() -> None:
     bench, testbed, settings = bench_of(slack=(0.02,) * 4)
     short = settings.model_copy(update={"homing": settings.homing.model_copy(update={"slack": 5e-4})})
     with pytest.raises(SafetyStop, match=r"axis 1 does not bend the wrist within 0\.5 mm"):
-        axis_tried(testbed, short, 1)
+        axis_tried(testbed, short, WristParameters(), 1)
     assert not any(bench.motion().energised)
 
 

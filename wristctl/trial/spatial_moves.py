@@ -47,10 +47,6 @@ class SpatialMoves(ExpectedMoves):
         k = self._spools.stiffness if stiffness is None else stiffness
         return float(np.mean(self._path + harder * np.maximum(0.0, self._pull) / k)) / self._spools.step
 
-    def compliance(self, axis: int) -> float:
-        """Bend by a pull of an axis' tendon alone, toward its own direction [rad/N]."""
-        return 1.0 / float(self._pull[axis])
-
     def bend(self, straight: Reading, reading: Reading) -> Bend:
         """Bend of the wrist toward ulnar and flexion against a reading of the straight wrist."""
         return Bend(reading.theta - straight.theta, reading.beside - straight.beside)

@@ -92,12 +92,14 @@ def check_tendons(
     """Let each tendon that was not tried bend a slack wrist a little, beside the one opposite; leaves it slack.
 
     `pulled` is the largest pull (4,) [N] that was asked of each: one whose pull would have bent the wrist far beyond
-    `safety.follow_deg` was tried, for without it the trial had been stopped. Raises SafetyStop.
+    `safety.follow_deg` was tried, for without it the wrist had bent across its plane. In two planes there is no across,
+    and a law makes up for half a tendon: none of them counts as tried. Raises SafetyStop.
     """
     expected, spools, homing = moves_of(settings, wrist, plane), spools_of(settings.actuator), settings.homing
     enough = _FAR * math.radians(settings.safety.follow_deg)
-    untried = [axis for axis in range(AXES) if not pulled[axis] * expected.compliance(axis) > enough]
-    pairs = [pair for pair in OPPOSITE_AXES if set(pair) & set(untried)]
+    bends = pulled * expected.compliance if settings.planes == 1 else np.zeros(AXES)
+    untried = np.flatnonzero(~(bends > enough))
+    pairs = [pair for pair in OPPOSITE_AXES if np.isin(pair, untried).any()]
     if not pairs:
         return
     slacken(board, spools, homing, zero.signs, 2.0)
