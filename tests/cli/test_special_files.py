@@ -21,7 +21,7 @@ from wristctl.records import list_runs, start_run
 
 ROOT = Path(__file__).parents[2]
 # Seconds after which a verb that has not ended is interrupted, and waits for what will never come.
-PATIENCE = 2.0
+PATIENCE = 30.0
 SPARSE = 100_000_000_000
 
 
