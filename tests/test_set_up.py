@@ -176,9 +176,7 @@ def silent() -> Iterator[Silent]:
 
 
 @pytest.mark.slow
-def test_an_index_that_never_answers_is_given_up(
-    clone: Path, index: Callable[[str], Index], silent: Silent
-) -> None:
+def test_an_index_that_never_answers_is_given_up(clone: Path, index: Callable[[str], Index], silent: Silent) -> None:
     usual = index(PINNED)
     set_up(clone, silent.url, PIP_INDEX_URL=usual.url)
     assert installed(clone) == PINNED

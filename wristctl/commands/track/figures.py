@@ -13,6 +13,7 @@ from wristctl.plotting.style import (
     BLACK,
     BLUE,
     GREY,
+    INDIGO,
     OLIVE,
     ORANGE,
     PURPLE,
@@ -28,7 +29,7 @@ from wristctl.vision.marker import Sighting, SightingVerdict
 
 # Pixels across a frame in a figure.
 _WIDE = 480
-_REFUSAL_COLOURS = VERMILLION, ORANGE, PURPLE, SKY, GREY, WINE, BLACK, OLIVE, ROSE
+_REFUSAL_COLOURS = VERMILLION, ORANGE, INDIGO, PURPLE, SKY, GREY, WINE, BLACK, OLIVE, ROSE
 _COLOURS = dict(zip(list(SightingVerdict)[1:], _REFUSAL_COLOURS, strict=True))
 
 
