@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from tests.trial.conftest import SHORT, WRIST, Run, settings_of
+from tests.trial.conftest import WRIST, Run, settings_of
 from wristctl.board.driver import Board
 from wristctl.board.messages import State
 from wristctl.errors import UserError
@@ -35,19 +35,6 @@ def test_a_trial_follows_its_reference_and_comes_back(experiment: Run) -> None:
     between = done.table("between")
     assert between["theta_ref"].iloc[-1] == 0.0 and abs(between["theta"].iloc[-1]) < 0.02
     assert (log["late"].abs() < 1e-5).all() and done.experiment.timing.overruns == 0
-
-
-@pytest.mark.slow
-def test_a_trial_does_not_count_whose_resting_tendon_is_lost(experiment: Run) -> None:
-    """It follows its reference as if nothing were: the tendon has its pretension to hold alone."""
-    lost = {"faults": ({"kind": "tendon-detached", "axis": 0, "at": 0.1},)}
-    small = {"duration": 0.3, "angle_deg": 3.0}
-    done = experiment(back=1.0, reference=small, bench={**SHORT["bench"], **lost})
-    truth, log = done.table("truth"), done.table("log")
-    error = np.interp(log["time"], truth["time"], truth["theta"]) - log["theta_ref"]
-    assert math.degrees(np.abs(error).max()) < 1.0 and log["time"].iloc[-1] == pytest.approx(0.39)
-    assert isinstance(done.error, SafetyStop) and "axis 0 (tendon 1) bends the wrist by" in done.error.what
-    assert done.experiment.outcomes[0].startswith("after it: axis 0 (tendon 1) bends the wrist by")
 
 
 @pytest.mark.parametrize("ramp", [50_000.0, 200_000.0])

@@ -22,7 +22,7 @@ from wristctl.trial.expected_moves import Bend, ExpectedMoves
 from wristctl.trial.homing import Zero, find_zero, slacken
 from wristctl.trial.safety import SafetyStop
 from wristctl.trial.spools import on_plus_side, spools_of
-from wristctl.trial.zero_checks import check_cocontraction, check_tendons, check_zero
+from wristctl.trial.zero_checks import check_cocontraction, check_zero
 from wristctl.wrist.directions import ACTIVE, away_of
 
 SPOOLS = spools_of(Actuator(level="tendon"))
@@ -400,61 +400,3 @@ def test_a_wrist_that_stays_bent_may_begin_with_a_tendon_that_much_tighter() -> 
     for slack, stood in ((-homing.taut - 0.5 * stretch, 0.0), (-homing.taut - 1.1 * stretch, stays)):
         with pytest.raises(SafetyStop, match="was taut by"):
             expected.judge_slack(1, slack, stood)
-
-
-@pytest.mark.parametrize("plane", ["ulnar", "flexion"])
-@pytest.mark.parametrize("dead", [None, 0, 1, 2, 3])
-def test_a_dead_tendon_is_found_where_a_trial_asked_little_of_it(plane: str, dead: int | None) -> None:
-    """One that had to pull was tried: the trial had ended without it."""
-    board: Any = Slackened()
-    sides = np.where(on_plus_side(plane), 1.0, -1.0)
-
-    def angle() -> float:
-        moved = np.maximum(0.0, np.array(board.position, float))
-        if dead is not None:
-            moved[dead] = 0.0
-        return GLUED + float((sides * moved / PER_RADIAN).sum())
-
-    rig, zero = settings_of(homing={"frames": 1, "rest": 0.0}), Zero((1,) * 4, tuple(PER_RADIAN), GLUED, (0.0,) * 4)
-    check: Any = partial(check_tendons, board, Marker(board, angle), rig, WRIST, plane, zero)  # type: ignore[arg-type]
-    enough = 1.01 * 3.0 * math.radians(rig.safety.follow_deg) / ExpectedMoves(rig, WRIST, plane).compliance
-    little, much = np.full(4, 0.98 * enough), np.full(4, enough)
-    check(much)
-    assert not board.told, "all have been tried: nothing moves"
-    if dead is None:
-        check(little)
-        assert board.position.tolist() == [-round(rig.homing.pull / SPOOLS.step)] * 4, "slack again"
-        return
-    for asked in (little, np.where(np.arange(4) == dead, little, much)):
-        with pytest.raises(SafetyStop, match=rf"axis {dead} .* bends the wrist by"):
-            check(asked)
-    opposite = {0: 3, 3: 0, 1: 2, 2: 1}[dead]
-    check(np.where(np.isin(np.arange(4), (dead, opposite)), much, little))
-
-
-@pytest.mark.parametrize(("planes", "tried"), [(1, 0), (2, 2)])
-def test_no_pull_shows_a_tendon_to_be_there_where_nothing_bends_across(
-    planes: int, tried: int, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """In two planes a law makes up for half a tendon by the others."""
-    pairs = list[tuple[int, int]]()
-    rest: Any = None
-
-    def once(*given: Any) -> tuple[Any, Any]:
-        pairs.append(given[-2])
-        return rest, rest
-
-    monkeypatch.setattr("wristctl.trial.zero_checks._tried", once)
-    monkeypatch.setattr("wristctl.trial.zero_checks.rest_of", lambda *given: rest)
-    board: Any = Slackened()
-    zero = Zero((1,) * 4, tuple(PER_RADIAN), GLUED, (0.0,) * 4)
-    check_tendons(board, rest, settings_of(planes=planes), WRIST, "ulnar", zero, np.full(4, 100.0))
-    assert len(pairs) == tried and sorted(sum(pairs, ())) == list(range(2 * tried))
-
-
-def test_a_wrist_that_its_springs_do_not_hold_bends_by_any_pull() -> None:
-    rig = settings_of()
-    assert ExpectedMoves(rig, WRIST.model_copy(update={"hand_mass": 5.0}), "ulnar").compliance == math.inf
-    firm = WRIST.model_copy(update={"stiffness": 100.0})
-    one = ExpectedMoves(rig, firm, "ulnar").compliance
-    assert one == pytest.approx(WRIST.tendon_offset / 100.0, rel=0.02), "an arm over a stiffness"

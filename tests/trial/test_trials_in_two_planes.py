@@ -54,6 +54,18 @@ def test_the_true_wrist_goes_round_within_half_a_degree_in_both_planes(round_tri
     assert np.degrees(log[[f"bend_{p}" for p in PLANES]].abs().max()).min() > 10.0, "in both planes"
 
 
+def test_a_trial_does_not_count_whose_resting_tendon_is_lost(tmp_path: Path) -> None:
+    """It follows its reference as if nothing were, and so does the way back; small moves after it find the tendon."""
+    lost = {"kind": "tendon-detached", "at": 0.1, "axis": 1}
+    bench = {"motors": {"slack": (0.0,) * 4}, "person": {"takes": 0.1}, "faults": (lost,)}
+    done = performed(
+        tmp_path, bench=bench, reference={"duration": 0.5, "angle_deg": 10.0}, directions=("ulnar-flexion",), back=1.0
+    )
+    assert (rmse(true_errors(done)) < 1.0).all()
+    assert isinstance(done.error, SafetyStop) and "axis 1 (tendon 2) bends the wrist by" in done.error.what
+    assert done.experiment.outcomes[0].startswith("after it: axis 1 (tendon 2) bends the wrist by")
+
+
 def test_a_fast_trial_and_its_simulation_agree(tmp_path: Path) -> None:
     """Spools of both move with the reference, neither ahead of it: 120 deg/s at most, ticks of 10 ms."""
     thrown: dict[str, Any] = {

@@ -86,8 +86,6 @@ class ControlLoop:
         self._since_read = delay - self._late * self._period - self._underway
         self._place, self._reckoned = self._reeled(), deque[tuple[float, Array]]()
         self._skipped = 0
-        self.asked: Array = np.zeros(AXES)
-        """Largest pull that a law has asked of each tendon (4,) [N]."""
         self._counted = self._epoch
 
     @property
@@ -144,7 +142,6 @@ class ControlLoop:
         else:
             answer = self._answer(task, k, clock - task.begin)
             tension = self._bending.tension(answer)
-            self.asked = np.maximum(self.asked, tension)
             target = self._turn(tension, position, task.course[k])
         values = {
             "trial": task.trial,

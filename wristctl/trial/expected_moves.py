@@ -74,11 +74,6 @@ class ExpectedMoves:
         path = self._offset * (1.0 + self._ratio) + harder * self._stiffness / (self._offset * k)
         return path / self._spools.step
 
-    @property
-    def compliance(self) -> float:
-        """Bend by a pull of one tendon alone [rad/N]; infinite for a wrist that does not stand by its springs."""
-        return self._offset / self._stiffness if self._stiffness > 0.0 else math.inf
-
     def bend(self, straight: Reading, reading: Reading) -> Bend:
         """Bend of the wrist against a reading of the straight wrist."""
         return Bend(reading.theta - straight.theta, -self._scale * math.log(reading.size / straight.size))

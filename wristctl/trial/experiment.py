@@ -6,7 +6,6 @@ from typing import Any
 
 import numpy as np
 
-from wristctl.arrays import Array
 from wristctl.board.driver import Board
 from wristctl.board.messages import AXES
 from wristctl.config.hw_run import HwRunSettings
@@ -164,8 +163,8 @@ class Experiment:
                 testbed.face(trial.direction, patience.pulse)
                 loop, tracking = self._loop(testbed, board, bends_in, shown)
                 plane = bends_in
-            pulled = self._one(testbed, loop, trial)
-            loop = self._relaxed(board, tracking, bends_in, pulled, shown)
+            self._one(testbed, loop, trial)
+            loop = self._relaxed(board, tracking, bends_in, shown)
 
     def _loop(
         self, testbed: Testbed, board: Board, plane: str, shown: Shown | None
@@ -209,17 +208,12 @@ class Experiment:
         """The wrist as a loop in this plane knows it, or in both."""
         return self._wrist if self._settings.planes == 2 else in_plane(self._wrist, plane)
 
-    def _relaxed(
-        self, board: Board, tracking: Tracking, plane: str, pulled: Array, shown: Shown | None
-    ) -> ControlLoop:  # fmt: skip
-        """After a trial see that no tendons pull against each other and that none is lost; rest at zero again.
-
-        `pulled` is the largest pull (4,) [N] that the trial asked of each.
-        """
+    def _relaxed(self, board: Board, tracking: Tracking, plane: str, shown: Shown | None) -> ControlLoop:
+        """After a trial see that no tendons pull against each other and that none is lost; rest at zero again."""
         assert self.zero is not None
-        given = board, tracking, self._settings, self._wrist, plane, self.zero
-        check_cocontraction(*given)
-        check_tendons(*given, pulled)
+        check_cocontraction(board, tracking, self._settings, self._wrist, plane, self.zero)
+        if self._settings.planes == 2:
+            check_tendons(board, tracking, self._settings, self._wrist, self.zero)
         self._in_doubt = None
         return self._at_rest(board, tracking, plane, shown)
 
@@ -241,8 +235,8 @@ class Experiment:
         slacken(board, spools_of(self._settings.actuator), self._settings.homing, zero.signs)
         Patience(board).wait(self._settings.homing.let_go)
 
-    def _one(self, testbed: Testbed, loop: ControlLoop, trial: Trial) -> Array:
-        """One trial, and the way back to zero; the largest pull (4,) [N] that was asked of each tendon."""
+    def _one(self, testbed: Testbed, loop: ControlLoop, trial: Trial) -> None:
+        """One trial, and the way back to zero."""
         settings, followed, start = self._settings, self.motions[trial.direction], loop.next_tick
         law, gains = self._laws[trial.row]
         self._under_way, self.outcomes[trial.number] = (trial.number, start), "begun"
@@ -258,7 +252,6 @@ class Experiment:
         self._trial_ended(testbed, "ok")
         self._in_doubt = trial.number
         loop.follow(back(followed.final, settings.back, 0.0, settings.control_period, settings.planes), self._back, ())
-        return loop.asked
 
     def _trial_ended(self, testbed: Testbed, outcome: str) -> None:
         if self._under_way is not None:

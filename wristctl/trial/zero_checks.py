@@ -1,11 +1,8 @@
 """Checks of a homed wrist: does each tendon do as it should, is each slack, do none pull against each other?"""
 
-import math
-
 import numpy as np
 from numpy.typing import NDArray
 
-from wristctl.arrays import Array
 from wristctl.board.driver import Board
 from wristctl.board.messages import AXES, JOG_RATE
 from wristctl.config.hw_run import RigSettings
@@ -19,8 +16,6 @@ from wristctl.wrist.directions import OPPOSITE_AXES
 
 # Share of `homing.pull` by which a tendon is reeled in to check it.
 _CHECKED = 1.2
-# How many times beyond `safety.follow_deg` a pull would bend the wrist of a tendon that counts as tried.
-_FAR = 3.0
 # Seconds in which a wrist that has been let go comes to rest, but for creep.
 _SETTLES = 0.5
 
@@ -86,25 +81,17 @@ def _tried(
 
 
 def check_tendons(
-    board: Board, tracking: Tracking, settings: RigSettings, wrist: WristParameters, plane: str, zero: Zero,
-    pulled: Array,
+    board: Board, tracking: Tracking, settings: RigSettings, wrist: WristParameters, zero: Zero
 ) -> None:  # fmt: skip
-    """Let each tendon that was not tried bend a slack wrist a little, beside the one opposite; leaves it slack.
+    """Let each tendon of a wrist in two planes bend it a little, beside the one opposite; leaves it slack.
 
-    `pulled` is the largest pull (4,) [N] that was asked of each: one whose pull would have bent the wrist far beyond
-    `safety.follow_deg` was tried, for without it the wrist had bent across its plane. In two planes there is no across,
-    and a law makes up for half a tendon: none of them counts as tried. Raises SafetyStop.
+    A law makes up for half a tendon by the others, and a motion may ask nothing of one: no residual shows that it is
+    lost. In one plane it is shown by a bend across. Raises SafetyStop.
     """
-    expected, spools, homing = moves_of(settings, wrist, plane), spools_of(settings.actuator), settings.homing
-    enough = _FAR * math.radians(settings.safety.follow_deg)
-    bends = pulled * expected.compliance if settings.planes == 1 else np.zeros(AXES)
-    untried = np.flatnonzero(~(bends > enough))
-    pairs = [pair for pair in OPPOSITE_AXES if np.isin(pair, untried).any()]
-    if not pairs:
-        return
+    expected, spools, homing = moves_of(settings, wrist, ""), spools_of(settings.actuator), settings.homing
     slacken(board, spools, homing, zero.signs, 2.0)
     rest = rest_of(board, tracking, expected, homing)
-    for pair in pairs:
+    for pair in OPPOSITE_AXES:
         _, rest = _tried(board, tracking, settings, expected, zero, pair, rest)
     slacken(board, spools, homing, zero.signs)
 
