@@ -37,7 +37,7 @@ STEPS = 60
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("segments", "motors", "horizon"), [(1, {}, 0.4), (2, {}, 0.4), (1, MOTORS, 0.4)])
+@pytest.mark.parametrize(("segments", "motors", "horizon"), [(1, {}, 0.4), (2, {}, 0.4), (1, MOTORS, 0.8)])
 def test_what_a_loop_pulls_bends_the_same_wrist_by_another_integrator(
     segments: int, motors: dict[str, Any], horizon: float
 ) -> None:

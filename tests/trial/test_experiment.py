@@ -222,7 +222,8 @@ def test_co_contraction_in_a_trial_is_found_behind_it_and_never_beyond_the_motor
     bench = {"motors": {"slack": (0.0, 0.0, 0.0, 0.0)}, "person": {"takes": 0.5}, "faults": faults}
     done = experiment(bench=bench)
     assert isinstance(done.error, SafetyStop) and "tendons pull against each other" in done.error.what
-    assert done.experiment.outcomes == {0: "ok"} and done.experiment.odd == {0: ""}, "no residual shows it"
+    assert done.experiment.odd == {0: ""}, "no residual shows it"
+    assert done.experiment.outcomes[0].startswith("after it: tendons pull against each other")
     assert 30.0 < done.bench.truth().pull.max() < 43.5
 
 

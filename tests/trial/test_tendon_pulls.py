@@ -177,7 +177,8 @@ def test_tendons_that_all_pull_20_newtons_more_end_a_trial_that_goes_through_wit
     experiment: Run,
 ) -> None:
     blind = experiment(**faulty(AGAINST, cells=False))
-    assert blind.experiment.outcomes == {0: "ok"} and blind.experiment.odd == {0: ""}
+    assert blind.experiment.odd == {0: ""}
+    assert blind.experiment.outcomes[0].startswith("after it: tendons pull against each other")
     done = experiment(**faulty(AGAINST))
     assert isinstance(done.error, SafetyStop) and "tendons pull against each other" in done.error.what
     assert done.experiment.stop is not None and done.experiment.stop.time is not None
