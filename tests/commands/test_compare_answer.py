@@ -124,9 +124,9 @@ def test_the_rig_is_answered_first_and_what_is_best_elsewhere_is_warned_of_where
     assert said.index("use pid-ff/default") < said.index("use mrac/default")
     warned = said[said.index("use mrac/default") :]
     assert "(sampled, push), use mrac/default" in said
-    assert re.search(r"a camera: it swings by 2\.9 deg in 12 of 12 cases", warned)
+    assert re.search(r"a camera: it swings by 5\.7 deg peak to peak in 12 of 12 cases", warned)
     avoided = avoided_in(said)
-    assert all(f"{name} by 2.9 deg" in avoided for name in ("mrac", "pid/printed"))
+    assert all(f"{name} by 5.7 deg peak to peak" in avoided for name in ("mrac", "pid/printed"))
 
 
 def test_every_fault_is_named_with_its_size_and_its_number_of_cases() -> None:
@@ -138,7 +138,7 @@ def test_every_fault_is_named_with_its_size_and_its_number_of_cases() -> None:
     )  # fmt: skip
     avoided = avoided_in(said).lower()
     for fact in (
-        "swing: smc/exchanged by 2.9 deg (in 12 of 12 cases)",
+        "swing: smc/exchanged by 5.7 deg peak to peak (in 12 of 12 cases)",
         "do not arrive: smc/printed (in 12 of 12 motions)",
         "pull harder than a tendon bears: gvsc with 70 n",
         "chatter: pid/printed 300 times a second (in 12 of 12 cases)",
@@ -155,16 +155,16 @@ def test_what_must_not_be_used_without_a_rig_is_named_after_the_rigs_with_its_co
         stands("camera and tendons", swings=("mrac/default",)),
     )  # fmt: skip
     rig, elsewhere = avoided_in(said).split("In other conditions")
-    assert "mrac by 2.9 deg" in rig and "nc" not in rig.split() and "mrac" not in elsewhere.split(".")[0]
+    assert "mrac by 5.7 deg peak to peak" in rig and "nc" not in rig.split() and "mrac" not in elsewhere.split(".")[0]
     assert "smc/printed does not arrive in sampled;" in elsewhere
-    assert "nc swings by 2.9 deg in sampled and push." in elsewhere
+    assert "nc swings by 5.7 deg peak to peak in sampled and push." in elsewhere
 
 
 def test_faults_of_several_under_other_conditions_are_said_with_their_least_and_largest_size() -> None:
     one, other = (stands(name, swings=("nc/default", "gvsc/default")) for name in ("sampled", "pushed"))
     small = replace(other, swing=np.where(other.swing > 0.0, np.deg2rad(0.4), 0.0))
     said = told(one, small, stands("camera and tendons"))
-    assert re.search("(gvsc and nc|nc and gvsc) swing by 0.4 to 2.9 deg in sampled and push.", said)
+    assert re.search("(gvsc and nc|nc and gvsc) swing by 0.8 to 5.7 deg peak to peak in sampled and push.", said)
 
 
 def test_every_controller_that_took_part_is_named_with_its_gains_and_counted() -> None:

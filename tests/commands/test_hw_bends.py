@@ -152,6 +152,7 @@ def test_what_cannot_be_is_refused_before_a_rig_is_opened(change: str, problem: 
 def test_a_wrist_that_swings_at_rest_is_told_and_one_that_still_moves_is_not(whole: Whole) -> None:
     """The whole run's motion goes on to its end: whatever swings there may be the motion."""
     table = whole.result.trials.assign(oscillation=np.radians(0.7), steady_state=0.0, chattering=0.0)
+    table = table.assign(true_oscillation=np.radians([0.5, 0.6]))
     moving = replace(whole.result, trials=table)
     still = {}
     for number, twin in whole.result.twins.items():
@@ -164,10 +165,12 @@ def test_a_wrist_that_swings_at_rest_is_told_and_one_that_still_moves_is_not(who
         still[number] = replace(twin, trajectory=replace(course, **longer))
     assert moving.marks == []
     resting = replace(moving, twins=still)
-    assert resting.marks == ["swings by up to 0.7 deg at rest: 2 of 2 trials"]
-    assert any("swings by up to 0.7 deg" in str(note) for note in resting.answer.notes)
-    away = replace(resting, trials=table.assign(oscillation=0.0, steady_state=[0.1, 0.0]))
+    assert resting.marks == ["swings by up to 1.4 deg peak to peak at rest (truly 1.2 deg): 2 of 2 trials"]
+    assert any("swings by up to 1.4 deg peak to peak" in str(note) for note in resting.answer.notes)
+    away = replace(resting, trials=table.assign(oscillation=0.0, true_oscillation=0.0, steady_state=[0.1, 0.0]))
     assert away.marks == ["does not arrive: 1 of 2 trials"]
     crossing = 4.0 * 30.0 * WristParameters().tension_range  # of two sides 30 times a second, and of four tendons 15
-    slams = replace(resting, trials=table.assign(oscillation=0.0, chattering=[crossing, 2.0 * crossing]))
+    slams = replace(
+        resting, trials=table.assign(oscillation=0.0, true_oscillation=0.0, chattering=[crossing, 2.0 * crossing])
+    )
     assert slams.marks == ["chatters: 1 of 2 trials"]

@@ -13,7 +13,7 @@ import pytest
 import wristctl
 from tests.commands.conftest import repeated
 from wristctl.commands.hw_run import results as hw_tables
-from wristctl.commands.hw_run.answer import answer_of, in_one_plane
+from wristctl.commands.hw_run.answer import answer_of, in_one_plane, swings_apart
 from wristctl.commands.hw_run.command import Performed
 from wristctl.commands.inputs import Inputs
 from wristctl.commands.printed_table import Table
@@ -22,6 +22,7 @@ from wristctl.commands.results import Findings
 from wristctl.commands.session import Session, Unattended
 from wristctl.records import start_run
 from wristctl.simulation.repetitions import Simulation
+from wristctl.simulation.trajectory import Trajectory
 from wristctl.trial.trials import Trial
 
 ROWS = "controllers: [{controller: smc, gains: printed}, {controller: pid, gains: printed}]"
@@ -37,7 +38,14 @@ def trials() -> pd.DataFrame:
     numbers = np.arange(1.0, len(FACTS) + 1.0)
     names = "rmse steady_state settling recovery true_rmse true_steady_state overshoot peak_tension"
     own = {name: 10.0**k * numbers for k, name in enumerate(names.split())}
-    return table.assign(trial=range(len(FACTS)), repetition=[0, 0, 0, 0, 0, 1], gains="printed", **own)
+    return table.assign(
+        trial=range(len(FACTS)),
+        repetition=[0, 0, 0, 0, 0, 1],
+        gains="printed",
+        oscillation=0.0,
+        true_oscillation=0.0,
+        **own,
+    )
 
 
 @pytest.fixture
@@ -171,7 +179,9 @@ def test_trials_that_do_not_arrive_swing_or_chatter_are_the_verdict(short: int, 
     expected = {"does not arrive": short, "chatters": fast}
     assert done.marks == [f"{mark}: {count} of 5 trials" for mark, count in expected.items() if count]
     table.loc[last[:3], "oscillation"] = np.radians([0.09, 0.3, 0.7])
-    assert replace(done, trials=table).marks[bool(short)] == "swings by up to 0.7 deg at rest: 2 of 5 trials"
+    table.loc[last[:3], "true_oscillation"] = np.radians([0.0, 0.25, 0.6])
+    swinging = replace(done, trials=table)
+    assert swinging.marks[bool(short)] == "swings by up to 1.4 deg peak to peak at rest (truly 1.2 deg): 2 of 5 trials"
 
 
 def _twins(rmse: float) -> dict[int, Simulation]:
@@ -205,6 +215,37 @@ def test_a_measured_error_far_from_the_simulated_one_is_told(simulated: float, t
     lines = " ".join(answer_of(table, in_one_plane(_twins(simulated)), {}, [], "").lines())
     assert ("simulated." in lines) == told
     assert not told or ("smaller" if simulated > 0.0345 else "larger") in lines
+
+
+def _swinging(twin: Simulation, deg: float) -> Simulation:
+    """A simulation that rests for 3 s and swings there by so much, peak to peak, at 3 Hz."""
+    time = 0.01 * np.arange(400.0)
+    theta = 0.5 + np.radians(deg) / 2.0 * np.sin(6.0 * np.pi * time)
+    tip = np.zeros((400, 2))
+    own = theta, theta[:, None], theta, np.full(400, 0.5), np.full(400, 0.5), tip, tip
+    course = Trajectory("", time, *own, theta, theta, np.ones((400, 2)))
+    return replace(twin, trajectory=course)
+
+
+@pytest.mark.parametrize("sides", [1, -1])
+@pytest.mark.parametrize("known", [True, False])
+def test_where_one_of_rig_and_simulation_swings_at_rest_the_kinder_one_is_named(sides: int, known: bool) -> None:
+    """By the true angle where it is known, whatever the camera saw; where both swing, or rest, nothing is said."""
+    table = _small().query("outcome == 'ok'")
+    rig = np.array([0.0, 0.6, 0.0, 0.6, 0.05])[::sides]
+    model = [0.02, 0.9, 0.7, 0.05, 0.02][::sides]
+    seen = np.radians(rig if not known else np.full(5, 0.3)) / 2.0
+    table = table.assign(oscillation=seen, true_oscillation=np.radians(rig) / 2.0 if known else np.nan)
+    twin = repeated("twin").first
+    twins = {number: _swinging(twin, deg) for number, deg in zip(table["trial"], model, strict=True)}
+    notes = swings_apart(table, twins)
+    assert len(notes) == 2 and all("1 of 5 trials" in note for note in notes)
+    assert "the rig swings" in notes[0] and "0.6 deg" in notes[0] and "simulation is kinder" in notes[0]
+    assert "the simulation swings" in notes[1] and "by up to 0.7" in notes[1] and "rig is kinder" in notes[1]
+    assert all(note in " ".join(answer_of(table, in_one_plane(twins), {}, [], "").lines()) for note in notes)
+    alike = table.assign(true_oscillation=table["true_oscillation"] if known else np.nan)
+    alike = alike[[(one > 0.2) == (two > 0.2) for one, two in zip(rig, model, strict=True)]]
+    assert not swings_apart(alike, twins)
 
 
 def test_timing_is_told_only_where_ticks_were_skipped() -> None:

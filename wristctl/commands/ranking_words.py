@@ -150,15 +150,19 @@ def facts(ranking: Ranking, row: int) -> dict[str, tuple[str, int]]:
 
 
 def fault_size(verb: str, ranking: Ranking, row: int) -> float:
-    """Size of a fault of a row: a swing [rad], a rate of chatter [1/s] or a tension [N]; 0 for what has none."""
-    sizes = {"swings": ranking.swing, "chatters": ranking.chatter, "pulls harder than a tendon bears": ranking.peak}
+    """Size of a fault of a row: a swing peak to peak [rad], a rate of chatter [1/s] or a tension [N]; 0 for none."""
+    sizes = {
+        "swings": 2.0 * ranking.swing,
+        "chatters": ranking.chatter,
+        "pulls harder than a tendon bears": ranking.peak,
+    }
     return float(sizes[verb][row]) if verb in sizes else 0.0
 
 
 def sized(verb: str, sizes: Sequence[float]) -> str:
-    """Sizes of a fault in words, the least and the largest: by 0.4 to 2.7 deg; empty for what has no size."""
+    """Sizes of a fault in words, the least and the largest: by 0.4 to 2.7 deg peak to peak; empty where it has none."""
     if verb == "swings":
-        return f"by {between([two(math.degrees(swing)) for swing in sorted(sizes)])} deg"
+        return f"by {between([two(math.degrees(swing)) for swing in sorted(sizes)])} deg peak to peak"
     shown = between([two(value) for value in sorted(sizes)])
     return {"chatters": f"{shown} times a second", "pulls harder than a tendon bears": f"with {shown} N"}.get(verb, "")
 
@@ -169,7 +173,7 @@ def between(shown: Sequence[str]) -> str:
 
 
 def fact(ranking: Ranking, row: int) -> str:
-    """The gravest fault of a row with its size and number of cases: swings by 2.7 deg in 7 of 8 cases."""
+    """The gravest fault of a row with its size and number of cases: swings by 2.7 deg peak to peak in 7 of 8 cases."""
     verb, (size, count) = next(iter(facts(ranking, row).items()))
     return " ".join(filter(None, [verb, size, f"in {count} of {counted_in(ranking, verb)}"]))
 

@@ -296,7 +296,7 @@ def standings_frame(rankings: Sequence[Ranking]) -> pd.DataFrame:
                     "lost_high": lost.high,
                     "motions": ranking.motions,
                     "does_not_arrive": int(ranking.away[row]),
-                    "swing": ranking.swing[row],
+                    "swing": 2.0 * ranking.swing[row],
                     "chatter": ranking.chatter[row],
                     "peak": ranking.peak[row],
                 }

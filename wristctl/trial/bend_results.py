@@ -31,7 +31,7 @@ LOGGED = (
     "rmse_ulnar", "rmse_flexion", "rmse", "largest_error", "steady_state", "oscillation", "peak_tension", "chattering",
     "saturation",
 )  # fmt: skip
-TRULY = ("rmse_ulnar", "rmse_flexion", "rmse", "largest_error", "steady_state")
+TRULY = ("rmse_ulnar", "rmse_flexion", "rmse", "largest_error", "steady_state", "oscillation")
 # Columns of trials.csv beside the metrics: unit and meaning.
 FURTHER: Mapping[str, tuple[str, str]] = {
     "settling": ("s", "time from which |e| stays within 2 % of the largest bend; empty where it never does"),

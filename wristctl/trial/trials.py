@@ -200,7 +200,7 @@ def at_rest(duration: float, period: float) -> Motion:
 
 
 # The metrics of the paper's tables; also told of the true angle, where it is known.
-JUDGED = ("rmse", "settling", "steady_state")
+JUDGED = ("rmse", "settling", "steady_state", "oscillation")
 
 # Seconds by which a person may push too early.
 EARLY = 0.5
@@ -229,13 +229,11 @@ def evaluated(
     saturated = np.abs(course["torque_wanted"].to_numpy(float) - course["torque"].to_numpy(float)) > 1e-9
 
     def judged(angle: Array) -> dict[str, float]:
-        flags = np.interp(grid, time, saturated.astype(float)) > 0.5
-        return metrics_of(period, angle, followed.theta_ref, tension, goals, flags)
+        flags, which = np.interp(grid, time, saturated.astype(float)) > 0.5, np.zeros(1, np.int64)
+        swing = float(oscillations(angle[None], followed.theta_ref[None], which, period)[0])
+        return metrics_of(period, angle, followed.theta_ref, tension, goals, flags) | {"oscillation": swing}
 
-    estimated = np.interp(grid, time, theta)
-    metrics |= judged(estimated)
-    which = np.zeros(1, np.int64)
-    metrics["oscillation"] = float(oscillations(estimated[None], followed.theta_ref[None], which, period)[0])
+    metrics |= judged(np.interp(grid, time, theta))
     if trial.push:
         pushed = push_seen(time, course["load"].to_numpy(float), max(followed.rest, push.start - EARLY), LEAST_PUSH)
         if pushed is not None:

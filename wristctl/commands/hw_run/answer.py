@@ -69,11 +69,15 @@ class TrialWords(NamedTuple):
     table: Callable[[pd.DataFrame, Sequence[str]], Table]
     apart: Callable[[pd.DataFrame, Sequence[str]], list[str]]
     """where they and their simulation do not agree"""
+    twins: Mapping[int, Simulation]
+    """their simulation, by the trial's number"""
 
 
 def in_one_plane(twins: Mapping[int, Simulation]) -> TrialWords:
     """Words for trials in one plane beside their simulation, by the trial's number."""
-    return TrialWords(partial(_sentence, twins=twins), partial(_table, twins=twins), partial(_apart, twins=twins))
+    return TrialWords(
+        partial(_sentence, twins=twins), partial(_table, twins=twins), partial(_apart, twins=twins), twins
+    )
 
 
 def answer_of(
@@ -83,7 +87,7 @@ def answer_of(
     done = trials[trials["outcome"] == "ok"].assign(label=lambda table: table["controller"] + "/" + table["gains"])
     labels = list(dict.fromkeys(done["label"]))
     more = f"All tables: --all. Every trial: {run}/report.html" if run else "All tables: `.tables`."
-    notes = [*words.apart(done, labels), *unsound(trials, marks, metrics)]
+    notes = [*words.apart(done, labels), *swings_apart(done, words.twins), *unsound(trials, marks, metrics)]
     if not labels:
         return Answer(f"None of {len(trials)} trials was completed.", None, notes, more)
     sentences = [words.sentence(done[done["label"] == label], label) for label in labels[:2]]
@@ -124,31 +128,99 @@ def in_s(seconds: float) -> str:
     return two(seconds) if math.isfinite(seconds) else "-"
 
 
-def marks_of(done: pd.DataFrame, goals: Array, still: Mask, chatters: Mask) -> list[str]:
+class Swings(NamedTuple):
+    """Peak to peak at rest [rad] of trials that ended well, (N,) each; 0 where the reference does not rest for 2 s."""
+
+    seen: Array
+    """By the estimated angle."""
+    true: Array
+    """By the true angle of an emulated wrist; nan where it is not known."""
+    simulated: Array
+    """Of the same trials in simulation."""
+
+    @property
+    def rig(self) -> Mask:
+        """In which trials the rig swings, (N,): by its true angle where that is known."""
+        import numpy as np
+
+        from wristctl.simulation.oscillation import LIMIT_CYCLE
+
+        swings: Mask = np.where(np.isnan(self.true), self.seen, self.true) > 2.0 * LIMIT_CYCLE
+        return swings
+
+    @property
+    def simulation(self) -> Mask:
+        """In which trials their simulation swings, (N,)."""
+        from wristctl.simulation.oscillation import LIMIT_CYCLE
+
+        swings: Mask = self.simulated > 2.0 * LIMIT_CYCLE
+        return swings
+
+
+def swings_of(done: pd.DataFrame, twins: Mapping[int, Simulation]) -> Swings:
+    """How trials that ended well swing at rest, and their simulation."""
+    import numpy as np
+
+    from wristctl.simulation.oscillation import at_rest, oscillation
+
+    courses = [twins[number].trajectory for number in done["trial"]]
+    still = np.array([at_rest(course) for course in courses], bool)
+    seen, true = (
+        np.where(still, 2.0 * done[name].to_numpy(float), 0.0) if name in done else np.full(len(done), np.nan)
+        for name in ("oscillation", "true_oscillation")
+    )
+    simulated = [2.0 * oscillation(course) if rests else 0.0 for course, rests in zip(courses, still, strict=True)]
+    return Swings(np.nan_to_num(seen), true, np.array(simulated))
+
+
+def marks_of(done: pd.DataFrame, twins: Mapping[int, Simulation], chatters: Mask) -> list[str]:
     """In how many of the trials that ended well the wrist does not arrive, swings at rest, or tensions chatter.
 
-    Parameters
-    ----------
-    done
-        Those trials, (N,).
-    goals
-        Largest angle [rad] of each one's reference, inf where it does not rest at the end, (N,).
-    still
-        Whether it rests for as long as shows a swing, (N,).
-    chatters
-        Whether tensions cross their range faster than any wrist follows, (N,).
+    `chatters` (N,) is where tensions cross their range faster than any wrist follows.
     """
     import numpy as np
 
     from wristctl.simulation.arrival import SHORT
     from wristctl.simulation.oscillation import LIMIT_CYCLE
+    from wristctl.simulation.trajectory import rests, size_of
 
+    courses = [twins[number].trajectory for number in done["trial"]]
+    goals = np.array([size_of(course.bend_ref).max() if rests(course) else np.inf for course in courses])
     short = done["steady_state"].to_numpy(float) > SHORT * goals
-    swing = np.where(still, done["oscillation"].to_numpy(float), 0.0)
-    swings = swing > LIMIT_CYCLE
-    size = degrees(float(swing[swings].max())) if swings.any() else ""
-    found = {"does not arrive": short, f"swings by up to {size} deg at rest": swings, "chatters": chatters}
+    swings = swings_of(done, twins)
+    swinging = swings.rig | (swings.seen > 2.0 * LIMIT_CYCLE)
+    size = ""
+    if swinging.any():
+        size = f"{degrees(float(swings.seen[swinging].max()))} deg peak to peak at rest"
+        if np.isfinite(swings.true[swinging]).any():
+            size += f" (truly {degrees(float(np.nanmax(swings.true[swinging])))} deg)"
+    found = {"does not arrive": short, f"swings by up to {size}": swinging, "chatters": chatters}
     return [f"{mark}: {int(where.sum())} of {len(done)} trials" for mark, where in found.items() if where.any()]
+
+
+def swings_apart(done: pd.DataFrame, twins: Mapping[int, Simulation]) -> list[str]:
+    """Where the rig swings at rest and its simulation does not, or the other way round: which is kinder, by how much.
+
+    A sentence for each, of no trial none.
+    """
+    import numpy as np
+
+    swings, notes = swings_of(done, twins), []
+    rig = np.where(np.isnan(swings.true), swings.seen, swings.true)
+    for where, one, other, kinder in (
+        (swings.rig & ~swings.simulation, rig, swings.simulated, "the simulation is kinder than the rig"),
+        (swings.simulation & ~swings.rig, swings.simulated, rig, "the rig is kinder than the simulation"),
+    ):
+        if not where.any():
+            continue
+        worst = int(np.argmax(np.where(where, one - other, -np.inf)))
+        swinging, resting = ("rig", "simulation") if one is rig else ("simulation", "rig")
+        notes.append(
+            f"In {int(where.sum())} of {len(done)} trials the {swinging} swings at rest, by up to "
+            f"{degrees(float(one[worst]))} deg peak to peak, where the {resting} has {degrees(float(other[worst]))} "
+            f"deg: {kinder}, by {degrees(float(one[worst] - other[worst]))} deg. Do not rely on that simulation here."
+        )
+    return notes
 
 
 def _table(done: pd.DataFrame, labels: Sequence[str], twins: Mapping[int, Simulation]) -> Table:

@@ -61,16 +61,11 @@ class Performed(StudyResult):
     @property
     def marks(self) -> list[str]:
         """What the wrist does wrong in trials that ended well: `marks_of`."""
-        import numpy as np
-
-        from wristctl.simulation.oscillation import at_rest, chatter
-        from wristctl.simulation.trajectory import rests
+        from wristctl.simulation.oscillation import chatter
 
         done = self.trials[self.trials["outcome"] == "ok"]
-        courses = [self.twins[number].trajectory for number in done["trial"]]
-        goals = np.array([np.abs(course.theta_ref).max() if rests(course) else np.inf for course in courses])
         slams = chatter(done["chattering"].to_numpy(float), self.study.wrist.tension_range)
-        return marks_of(done, goals, np.array([at_rest(course) for course in courses], bool), slams > 0.0)
+        return marks_of(done, self.twins, slams > 0.0)
 
     def frame(self) -> pd.DataFrame:
         """One row per trial that began."""

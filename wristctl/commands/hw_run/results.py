@@ -28,7 +28,8 @@ _COLUMNS = (
 _BY_TRIAL = {
     "trial": "trial", "direction": "direction", "push": "push [N]", "label": "controller", "rmse": "RMSE [rad]",
     "steady_state": "steady state [rad]", "settling": "settling [s]", "recovery": "recovery [s]",
-    "overshoot": "overshoot [%]", "peak_tension": "peak tension [N]", "outcome": "outcome",
+    "overshoot": "overshoot [%]", "swing": "swing at rest, peak to peak [rad]",
+    "true_swing": "true swing [rad]", "peak_tension": "peak tension [N]", "outcome": "outcome",
 }  # fmt: skip
 
 
@@ -36,7 +37,10 @@ def trial_tables(
     session: Session, trials: pd.DataFrame, network: Inverse | None, tuned: Gains | None
 ) -> tuple[list[Table], Twins]:
     """Tables of all trials that ended well, with metrics and figures, and the simulation of each."""
-    trials = trials[trials["outcome"] == "ok"].assign(label=trials["controller"] + "/" + trials["gains"])
+    trials = trials[trials["outcome"] == "ok"].assign(
+        label=trials["controller"] + "/" + trials["gains"],
+        **{f"{true}swing": 2.0 * trials[f"{true}oscillation"] for true in ("", "true_")},
+    )
     twins = _twins(session, trials, network, tuned)
     theirs = bool((trials["controller"] == "smc").any())
     rows = [*_means(session, trials, twins), *(_papers() if theirs else ())]

@@ -29,7 +29,8 @@ _OF_PUSH = ("recovery", "true_recovery")
 _BY_TRIAL = {
     "trial": "trial", "direction": "motion", "push": "push [N]", "label": "controller",
     "rmse_ulnar": "RMSE toward ulnar [rad]", "rmse_flexion": "RMSE toward flexion [rad]", "rmse": "RMSE [rad]",
-    "true_rmse": "true RMSE [rad]", "largest_error": "largest error [rad]", "settling": "settling [s]",
+    "true_rmse": "true RMSE [rad]", "largest_error": "largest error [rad]",
+    "swing": "swing at the end, peak to peak [rad]", "true_swing": "true swing [rad]", "settling": "settling [s]",
     "true_recovery": "true recovery [s]", "peak_tension": "peak tension [N]", "outcome": "outcome",
 }  # fmt: skip
 
@@ -52,18 +53,12 @@ class PerformedBends(StudyResult):
     @property
     def marks(self) -> list[str]:
         """What the wrist does wrong in trials that ended well: `marks_of`."""
-        import numpy as np
-
         from wristctl.board.messages import AXES
-        from wristctl.simulation.oscillation import at_rest, chatter
-        from wristctl.simulation.trajectory import size_of
+        from wristctl.simulation.oscillation import chatter
 
         done = self.trials[self.trials["outcome"] == "ok"]
-        courses = [self.twins[number].trajectory for number in done["trial"]]
-        resting = np.array([at_rest(course) for course in courses], bool)
-        goals = np.where(resting, [size_of(course.bend_ref).max() for course in courses], np.inf)
         slams = chatter(done["chattering"].to_numpy(float), self.study.wrist.tension_range, AXES)
-        return marks_of(done, goals, resting, slams > 0.0)
+        return marks_of(done, self.twins, slams > 0.0)
 
     def frame(self) -> pd.DataFrame:
         """One row per trial that began."""
@@ -107,7 +102,10 @@ def bends_performed(session: Session, trials: pd.DataFrame, tuned: Gains | None)
     from wristctl.trial.trials import Trial
 
     study, findings, settings = session.study, session.findings, session.study.hw_run
-    done = trials[trials["outcome"] == "ok"].assign(label=trials["controller"] + "/" + trials["gains"])
+    done = trials[trials["outcome"] == "ok"].assign(
+        label=trials["controller"] + "/" + trials["gains"],
+        **{f"{true}swing": 2.0 * trials[f"{true}oscillation"] for true in ("", "true_")},
+    )
     names, twins = [row.label for row in settings.rows], dict[int, "Simulation"]()
     simulated = dict[tuple[str, float, str], "Simulation"]()
     with session.progress("compiling and simulating the same trials"):
@@ -191,7 +189,9 @@ def _draw(session: Session, done: pd.DataFrame, twins: Mapping[int, Simulation])
 
 def in_two_planes(twins: Mapping[int, Simulation]) -> TrialWords:
     """Words for trials in two planes beside their simulation, by the trial's number."""
-    return TrialWords(partial(_sentence, twins=twins), partial(_table, twins=twins), partial(_apart, twins=twins))
+    return TrialWords(
+        partial(_sentence, twins=twins), partial(_table, twins=twins), partial(_apart, twins=twins), twins
+    )
 
 
 def _sentence(trials: pd.DataFrame, label: str, twins: Mapping[int, Simulation]) -> str:

@@ -18,14 +18,14 @@ if TYPE_CHECKING:
 
 # Actuators in words, by level.
 _ACTUATORS = {"ideal": "", "lagged": "motors with a lag", "tendon": "stepper motors and elastic tendons"}
-# Figures of the table of repetitions: metric, heading, and whether it is an angle.
+# Figures of the table of repetitions: metric, heading, and for an angle how many times it is shown.
 _FIGURES = (
-    ("rmse", "RMSE [deg]", True),
-    ("settling", "settling [s]", False),
-    ("steady_state", "error at the end [deg]", True),
-    ("overshoot", "overshoot [%]", False),
-    ("peak_tension", "largest tension [N]", False),
-    ("oscillation", "half the swing at the end [deg]", True),
+    ("rmse", "RMSE [deg]", 1.0),
+    ("settling", "settling [s]", None),
+    ("steady_state", "error at the end [deg]", 1.0),
+    ("overshoot", "overshoot [%]", None),
+    ("peak_tension", "largest tension [N]", None),
+    ("oscillation", "swing at the end, peak to peak [deg]", 2.0),
 )
 # Overshoot [%] from which it is told.
 _OVERSHOOT = 0.5
@@ -80,7 +80,7 @@ def _faults(repeated: Repeated) -> list[str]:
     faults = []
     if repeated.swing > 0.0:
         at = f" at {two(repeated.frequency)} Hz" if math.isfinite(repeated.frequency) else ""
-        faults.append(f"swings by {degrees(repeated.swing)} deg to either side{at} and does not rest")
+        faults.append(f"swings by {degrees(2.0 * repeated.swing)} deg peak to peak{at} and does not rest")
     if repeated.chatter > 0.0:
         faults.append(f"chatters: tensions go from limit to limit and back {repeated.chatter:.0f} times a second")
     if repeated.beyond > 0.0:
@@ -112,21 +112,21 @@ def figure_of(repeated: Repeated, name: str) -> float:
     return spread(repeated.metrics[name]).median if name in repeated.metrics else math.nan
 
 
-def figures_table(repeated: Repeated, figures: Sequence[tuple[str, str, bool]]) -> Table:
+def figures_table(repeated: Repeated, figures: Sequence[tuple[str, str, float | None]]) -> Table:
     """Figures of a loop, of several repetitions medians with 95 % intervals; `-` where there is none.
 
-    Each is a metric, its heading, and whether it is an angle.
+    Each is a metric, its heading, and for an angle [rad] how many times it is shown, in degrees.
     """
     from wristctl.comparison.repetition_spread import spread
 
     rows: list[tuple[str, ...]] = []
     several = len(repeated.failed) > 1
-    for name, heading, angle in figures:
+    for name, heading, times in figures:
         if name not in repeated.metrics:
             continue
         estimate = spread(repeated.metrics[name])
         shown = [
-            "-" if not math.isfinite(value) else degrees(value) if angle else two(value, 3)
+            "-" if not math.isfinite(value) else two(value, 3) if times is None else degrees(times * value)
             for value in (estimate.median, estimate.low, estimate.high)
         ]
         rows.append((heading, shown[0], f"{shown[1]} to {shown[2]}") if several else (heading, shown[0]))

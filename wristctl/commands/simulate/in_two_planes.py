@@ -29,17 +29,17 @@ if TYPE_CHECKING:
     from wristctl.simulation.repetitions import Repeated
 
 
-# Figures of the table: metric, heading, and whether it is an angle.
+# Figures of the table: metric, heading, and for an angle how many times it is shown.
 _FIGURES = (
-    ("rmse_ulnar", "RMSE toward ulnar [deg]", True),
-    ("rmse_flexion", "RMSE toward flexion [deg]", True),
-    ("rmse", "RMSE over both planes [deg]", True),
-    ("largest_error", "largest error [deg]", True),
-    ("steady_state", "error at the end [deg]", True),
-    ("oscillation", "half the swing at the end [deg]", True),
-    ("tip_rmse_mm", "RMS distance of the tip [mm]", False),
-    ("peak_tension", "largest tension [N]", False),
-    ("saturation", "share of time out of reach", False),
+    ("rmse_ulnar", "RMSE toward ulnar [deg]", 1.0),
+    ("rmse_flexion", "RMSE toward flexion [deg]", 1.0),
+    ("rmse", "RMSE over both planes [deg]", 1.0),
+    ("largest_error", "largest error [deg]", 1.0),
+    ("steady_state", "error at the end [deg]", 1.0),
+    ("oscillation", "swing at the end, peak to peak [deg]", 2.0),
+    ("tip_rmse_mm", "RMS distance of the tip [mm]", None),
+    ("peak_tension", "largest tension [N]", None),
+    ("saturation", "share of time out of reach", None),
 )
 
 
