@@ -7,10 +7,11 @@ import math
 import numpy as np
 import pytest
 
-from tests.bench.conftest import EXACT, TAUT, HostOn
+from tests.bench.conftest import EXACT, TAUT, Host, HostOn
 from wristctl.bench.bench_wrist import Truth
 from wristctl.bench.virtual_bench import VirtualBench
 from wristctl.config.bench import BenchSettings, InjectedFault, Motors, StepperActuator, WeakenedPlant
+from wristctl.config.camera import Markers
 from wristctl.config.plant import Disturbances, Push
 from wristctl.config.wrist import WristParameters
 from wristctl.simulation.worlds import plant_of
@@ -92,6 +93,26 @@ def test_a_pushed_wrist_on_held_spools_yields_and_comes_back_to_where_it_was(hos
     moved = host.bench.truth(start).theta.sum(axis=1) - before
     assert moved.max() > 1e-3 and moved.min() > -0.1 * moved.max()  # damped: hardly beyond where it came from
     assert moved[-1] == pytest.approx(0.0, abs=1e-5)
+
+
+@pytest.mark.parametrize("planes", [1, 2])
+def test_a_payload_bends_a_wrist_as_if_its_hand_weighed_so_much_more_and_no_longer_than_it_is_held(planes: int) -> None:
+    """A bent upright wrist on held spools goes further; before it takes the payload and after it stands as without."""
+    taken = InjectedFault(kind="payload-taken", size=0.2, at=1.5, since="power-on", duration=1.5)
+    ends = []
+    for plant, faults in ((WeakenedPlant(), (taken,)), (WeakenedPlant(payload=0.2), ()), (WeakenedPlant(), ())):
+        second = None if planes == 1 else Markers(base=2, tip=3)
+        motors = TAUT.model_copy(update={"rotor_inertia": 0.0})
+        settings = FREE.model_copy(update={"plant": plant, "faults": faults, "motors": motors})
+        host = Host(VirtualBench(settings, WristParameters(), 0, None, second))
+        host.reel(BEND)
+        host.rest(5.0)
+        truth = host.bench.truth()
+        angle = truth.angle.reshape(len(truth.time), -1)[:, 0]
+        ends.append([float(np.interp(at, truth.time, angle)) for at in (1.4, 2.9, 4.9)])
+    moved, heavy, light = ends
+    assert heavy[1] > light[1] + 1e-3
+    assert moved == pytest.approx([light[0], heavy[1], light[2]], abs=2e-5)
 
 
 def test_the_other_side_and_the_other_plane_bend_alike(host_on: HostOn) -> None:

@@ -110,6 +110,14 @@ def test_no_pull_is_proposed_beyond_what_the_wrist_bears() -> None:
     assert less.setting == "safety.tension=33"
 
 
+def test_where_the_motion_set_the_limit_of_tension_its_factor_is_proposed() -> None:
+    """A limit of 18 N, twice what the trials need: 13 N are too near to it, and the same with 2.2 times."""
+    run = logged(pull=13.0)
+    limits = tuple(limit._replace(limit=18.0) if limit.name == "pull" else limit for limit in run.limits)
+    (line,) = (line for line in near([run._replace(limits=limits)]) if line.limit.name == "pull")
+    assert line.setting == "tension_factor=2.2" and line.proposed == pytest.approx(19.8)
+
+
 def test_what_a_stopped_run_shows_proposes_nothing() -> None:
     stopped, sound = logged(load=1.7), logged(load=0.7)
     assert stop_of(stopped) is not None and stop_of(sound) is None

@@ -75,8 +75,8 @@ def page(rows: list[dict[str, Any]], stopped: int) -> str:
     lines = [
         "# Does the simulation beside a trial swing where the rig does?", "",
         f"{len(rows)} trials on drawn rigs with drawn gains, half of which swing at rest by more than 0.2 deg peak to",
-        f"peak: in {agreed} the simulation of the trial says the same as the emulated wrist's true angle. {stopped} more",
-        "were stopped before their end by a limit or in homing. Made by `make twins`.", "",
+        f"peak: in {agreed} the simulation of the trial says the same as the emulated wrist's true angle. {stopped}",
+        "more were stopped before their end by a limit or in homing. Made by `make twins`.", "",
         "| controller | gains | move [deg] | true swing [deg] | by camera [deg] | simulated [deg] | agree |",
         "|---|---|---|---|---|---|---|",
     ]  # fmt: skip

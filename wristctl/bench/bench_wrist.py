@@ -127,6 +127,7 @@ class BenchWrist:
                 self._spools.slack[axis] += slack
                 self._spools.reeled[axis] -= slack
             self._rescale(self._faults.rescaled(self.time))
+            self._load.carry(self._faults.carried(self.time))
             if (due := self._faults.next(self.time)) < math.inf:
                 count = min(count, max(1, math.ceil((due - self.time) / PERIOD - 1e-9)))
             for axis, rate in self._faults.creeping(self.time):

@@ -125,9 +125,14 @@ class MotorFaults:
         return detached
 
     def next(self, after: float) -> float:
-        """When the next tendon gives way, or drive changes, after a time [s]; infinite where none does."""
+        """When a tendon gives way, a drive or the load of the hand changes next, after a time [s]; inf: never."""
         creep = after + _CREEPS_BY if self.creeping(after) else self._faults.next("tendon-creeps", after)
-        return min(creep, *(self._faults.next(kind, after) for kind in (*_TENDONS, *_DRIVES)))
+        laid = [
+            end for fault in self._faults.of(("payload-taken",))
+            if (end := self._faults.begun(fault) + (fault.duration or math.inf)) > after
+        ]  # fmt: skip
+        kinds: tuple[FaultKind, ...] = *_TENDONS, *_DRIVES, "payload-taken"
+        return min(creep, *laid, *(self._faults.next(kind, after) for kind in kinds))
 
     def rescaled(self, time: float) -> list[float]:
         """Times of the way that each drive makes with a step at a time [s], (4,)."""
@@ -139,6 +144,10 @@ class MotorFaults:
     def holding(self, time: float) -> float:
         """Largest pull [N] of any motor at a time [s], as far as faults bound it."""
         return min((fault.size for fault in self._faults.active(("torque-lost",), time)), default=math.inf)
+
+    def carried(self, time: float) -> float:
+        """What the hand has taken up at a time [s], in kg."""
+        return sum(fault.size for fault in self._faults.active(("payload-taken",), time))
 
     def creeping(self, time: float) -> list[tuple[int, float]]:
         """Axes whose tendons slip on at a time [s], and how fast they pay out [m/s]."""

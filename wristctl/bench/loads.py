@@ -37,6 +37,9 @@ class Load(Protocol):
     def face(self, direction: str, spools: SpoolState) -> None:
         """Bend in this direction's plane from here on; where that is another plane, at rest at first as it is bent."""
 
+    def carry(self, payload: float) -> None:
+        """Hold so much [kg] in the hand from here on, beyond what the wrist was given with."""
+
     def follow(
         self, spools: SpoolState, stepper: Stepper, acting: tuple[Disturbances, Array], edges: Edges, first: int,
         begun: float, out: Array,
@@ -64,7 +67,7 @@ class PlanarLoad:
         spools: SpoolState,
     ) -> None:  # fmt: skip
         self._settings, self._wrist, self._positive = settings, wrist, positive
-        self._drawn = drawn(settings.plant, stream)
+        self._drawn, self._carried = drawn(settings.plant, stream), 0.0
         self._model = PLANTS[settings.plant.model]
         self.coordinates = self._model.coordinates(settings.segments)
         self._follow = kernel_of(follow, self._model)
@@ -84,6 +87,12 @@ class PlanarLoad:
         inner = 0.0 if isinstance(self._inner, NoInnerFriction) else self._inner.state[: self.coordinates].mean()
         self._face(direction, spools, bent, bristle)
         spools.bent[:] = self._away * beside, 0.0, self._away * inner
+
+    def carry(self, payload: float) -> None:
+        """As `Load.carry`."""
+        if payload != self._carried:
+            self._carried = payload
+            self._weigh()
 
     def follow(
         self, spools: SpoolState, stepper: Stepper, acting: tuple[Disturbances, Array], edges: Edges, first: int,
@@ -118,12 +127,7 @@ class PlanarLoad:
         coordinates = np.full(n, bent) / self.bend(np.ones(n))
         self._state[:] = np.append(coordinates, np.zeros(n))
         self.plane = DIRECTIONS[direction].plane
-        plant = plant_of(*facing(self._wrist, self._drawn, direction))
-        across = next(across for across in DIRECTIONS.values() if across.plane != self.plane)
-        beside = plant_of(*facing(self._wrist, self._drawn, across.name))
-        away = away_of(self.plane, self._positive)
-        self._across, self._away = across_of(beside, away), away[-1]
-        self._values = self._model.values(plant, self._settings.segments)
+        plant = self._weigh()
         self._sides = np.array([ACTIVE.index(tendon) for tendon in tendons_of(self.plane)])
         axes = self._sides[[0, 2, 1, 3]]  # as they are given: both sides' first, both sides' second
         tendon_states = of_tendons(self._tendons, AXES)[np.argsort(self._axes)][axes]
@@ -132,6 +136,19 @@ class PlanarLoad:
         of_tendons(self._tendons, AXES)[:, :X] = tendon_states[:, :X]
         self._inner = inner_of([self._drawn], coordinates[None], np.array([bristle]), lambda rows: rows[0])
         self._axes = axes
+
+    def _weigh(self) -> WristParameters:
+        """The wrist with what it carries now, in the plane that it faces and across it."""
+        own = self._drawn.model_copy(update={"payload": self._drawn.payload + self._carried})
+        direction, across = (
+            next(each.name for each in DIRECTIONS.values() if (each.plane == self.plane) == within)
+            for within in (True, False)
+        )
+        plant = plant_of(*facing(self._wrist, own, direction))
+        away = away_of(DIRECTIONS[direction].plane, self._positive)
+        self._across, self._away = across_of(plant_of(*facing(self._wrist, own, across)), away), away[-1]
+        self._values = self._model.values(plant, self._settings.segments)
+        return plant
 
 
 _acting = acting
@@ -150,7 +167,8 @@ class SpatialLoad:
     ) -> None:
         check_in_space(settings)
         own, motors = drawn(settings.plant, stream), settings.actuator
-        plant, n, alike = plant_of(wrist, own), settings.segments, np.ones(AXES)
+        self._wrist, self._own, self._segments, self._carried = wrist, own, settings.segments, 0.0
+        n, alike = settings.segments, np.ones(AXES)
         self.coordinates = 2 * n
         at_rest = np.zeros(self.coordinates)
         from wristctl.bench.spatial_motors import SpatialHanging, follow_in_space
@@ -158,7 +176,7 @@ class SpatialLoad:
         self._follow = kernel_of(follow_in_space, PCC_IN_SPACE)
         self._hanging = SpatialHanging(
             model=PCC_IN_SPACE,
-            values=placed_values(plant, TendonLayout.four(plant.tendon_radius), n),
+            values=self._weighed(),
             stiffness=motors.tendon_stiffness,
             stiffnesses=motors.tendon_stiffness * alike,
             nonideal=np.array(nonideal_of(own, motors, motors, PERIOD / substeps)),
@@ -174,6 +192,17 @@ class SpatialLoad:
 
     def face(self, direction: str, spools: SpoolState) -> None:
         """Nothing: it bends in both planes."""
+
+    def carry(self, payload: float) -> None:
+        """As `Load.carry`."""
+        if payload != self._carried:
+            self._carried = payload
+            self._hanging = self._hanging._replace(values=self._weighed())
+
+    def _weighed(self) -> Array:
+        own = self._own.model_copy(update={"payload": self._own.payload + self._carried})
+        plant = plant_of(self._wrist, own)
+        return placed_values(plant, TendonLayout.four(plant.tendon_radius), self._segments)
 
     def follow(
         self, spools: SpoolState, stepper: Stepper, acting: tuple[Disturbances, Array], edges: Edges, first: int,

@@ -57,6 +57,7 @@ FAULTS = {
     "host-pause": "the whole host stands still once, for `size` ms",
     "bytes-garbled": "each byte loses a bit with probability `size`",
     "estop-pressed": "somebody presses the emergency stop button",
+    "payload-taken": "the hand takes up `size` kg",
 }
 
 FaultKind = Literal[
@@ -67,7 +68,7 @@ FaultKind = Literal[
     "camera-frozen-clock", "frames-thinned", "pictures-late", "stamps-shifted", "stamps-stuck", "camera-lost",
     "picture-dark", "picture-bright", "picture-blurred", "picture-smeared", "picture-mirrored", "picture-turned",
     "picture-shifted", "picture-other", "marker-twice", "cell-unplugged", "usb-latency", "answers-late", "answers-held",
-    "host-pause", "bytes-garbled", "estop-pressed",
+    "host-pause", "bytes-garbled", "estop-pressed", "payload-taken",
 ]  # fmt: skip
 
 

@@ -258,6 +258,13 @@ class HwRunSettings(RigSettings):
     without_push: bool = choice(True, "trials without the push too")
     reference: Reference = choice(Reference(), "motion of each trial; its angle counts toward the direction")
     horizon: float = quantity(5.0, "s", "duration of a trial", "assumed", gt=0)
+    payload: float = quantity(
+        0.0, "kg", "load that the hand takes up in a trial, declared: motors may pull as much more", ge=0
+    )
+    tension_factor: float = quantity(
+        2.0, "", "trials stop beyond so many times the largest tension of all in simulation, with that payload",
+        "assumed", gt=1,
+    )  # fmt: skip
     back: float = quantity(1.0, "s", "duration of the return to zero", "assumed", gt=0)
     rest: float = quantity(0.5, "s", "rest at zero before each trial", "assumed", ge=0.1)
     control_period: float = quantity(
@@ -343,11 +350,17 @@ class HwRunSettings(RigSettings):
     @property
     def loop(self) -> Loop:
         """Loop of the trials in simulation: the emulated plant, or the known plant of a real or an identified wrist."""
-        emulated = self.port is None and self.from_identified is None
+        if self.port is None and self.from_identified is None:
+            return self.known_loop.model_copy(update={"plant": self._emulated_world()})
+        return self.known_loop
+
+    @property
+    def known_loop(self) -> Loop:
+        """Loop of the trials with the plant that is believed, and the payload that is declared."""
         return Loop(
             plant_segments=self.bench.segments,
             planes=self.planes if self.planes == 2 else None,
-            plant=self._emulated_world() if emulated else Plant(),
+            plant=Plant(payload=self.payload),
             actuator=self.actuator,
             sensor=self.sensor,
             control_period=self.control_period,

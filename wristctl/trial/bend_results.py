@@ -8,6 +8,7 @@ import numpy as np
 import pandas as pd
 
 from wristctl.arrays import Array
+from wristctl.config.loop import Loop
 from wristctl.config.plant import Push
 from wristctl.config.study import Study
 from wristctl.config.wrist import WristParameters
@@ -160,13 +161,14 @@ def _recovery(course: Trajectory, end: float) -> float:
 
 
 def bend_twin(
-    study: Study, trial: Trial, followed: BendMotion, tuned: Mapping[str, Mapping[str, float]] | None
-) -> Simulation:
-    """Simulate a trial in two planes of the study's hw-run section."""
+    study: Study, trial: Trial, followed: BendMotion, tuned: Mapping[str, Mapping[str, float]] | None,
+    loop: Loop | None = None,
+) -> Simulation:  # fmt: skip
+    """Simulate a trial in two planes of the study's hw-run section, or of a loop in the place of that section's."""
     settings, draws, wrist = study.hw_run, Draws(study.seed), study.wrist
     row = settings.rows[trial.row]
     law = in_a_first_repetition(controller(row.controller))
-    disturbed = settings.loop.model_copy(update={"disturbances": trial.disturbances(settings, followed)})
+    disturbed = (loop or settings.loop).model_copy(update={"disturbances": trial.disturbances(settings, followed)})
     (loop,) = loops_of(disturbed, [draws.plant(0)])
     layout_of_axes(wrist)
     wound = wrist.model_copy(update={"tendons": "four"})  # the fifth in the centre is not

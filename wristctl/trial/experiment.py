@@ -211,8 +211,8 @@ class Experiment:
     def _relaxed(self, board: Board, tracking: Tracking, plane: str, shown: Shown | None) -> ControlLoop:
         """After a trial see that no tendons pull against each other and that none is lost; rest at zero again."""
         assert self.zero is not None
-        check_cocontraction(board, tracking, self._settings, self._wrist, plane, self.zero)
-        if self._settings.planes == 2:
+        told = check_cocontraction(board, tracking, self._settings, self._wrist, plane, self.zero)
+        if told and self._settings.planes == 2:
             check_tendons(board, tracking, self._settings, self._wrist, self.zero)
         self._in_doubt = None
         return self._at_rest(board, tracking, plane, shown)

@@ -89,7 +89,8 @@ RESIDUALS: Mapping[str, Residual] = {
     ),
     "pull": Residual(
         _N, "largest tension by spool position and estimated angle",
-        lambda s: s.safety.tension, math.inf, "something holds the wrist, or the zero positions are wrong: home again",
+        lambda s: s.safety.tension, math.inf,
+        "more load than declared (hw-run.payload), something holds the wrist, or wrong zero positions: home again",
         "tension of about {value} beyond {limit}",
     ),
     "cell_age": Residual(

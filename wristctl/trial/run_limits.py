@@ -56,7 +56,7 @@ class Nearness(NamedTuple):
     proposed: float | None
     """Limit to be set; None where there is no setting, or no evidence for one."""
     setting: str
-    """The same as `safety.NAME=VALUE`; empty without one."""
+    """The same as a key of hw-run with its value; empty without one."""
 
     @property
     def share(self) -> float:
@@ -107,11 +107,13 @@ def _proposed(run: Logged, limit: Limit, seen: float) -> tuple[float | None, str
     if name is None or seen <= 0.0:
         return None, ""
     wanted, present = max(MARGIN * seen, LEAST * limit.limit), getattr(run.settings.safety, name)
+    setting, factor = f"safety.{name}", present / limit.limit
     if limit.name == "pull":  # whatever a rig has shown: the wrist bears no more
-        wanted = min(wanted, run.wrist.tension_limit)
-    factor = 1.0 if limit.name == "pull" else present / limit.limit
+        wanted, factor = min(wanted, run.wrist.tension_limit), 1.0
+        if limit.limit < run.settings.within(run.wrist).safety.tension:  # the trials needed less
+            setting, factor = "tension_factor", run.settings.tension_factor / limit.limit
     value = float(f"{wanted * factor:.2g}")
-    return value / factor, f"safety.{name}={value:g}"
+    return value / factor, f"{setting}={value:g}"
 
 
 def shown(name: str, value: float) -> str:

@@ -10,7 +10,7 @@ import numpy as np
 
 from wristctl.arrays import Array
 from wristctl.config.hw_run import HwRunSettings
-from wristctl.config.loop import DirectionName
+from wristctl.config.loop import DirectionName, Loop
 from wristctl.config.plant import Disturbances, Push
 from wristctl.config.simulate import SimulateSettings
 from wristctl.config.study import Study
@@ -249,16 +249,20 @@ def evaluated(
 
 
 def twin(
-    study: Study, trial: Trial, network: Inverse | None, tuned: Mapping[str, Mapping[str, float]] | None
-) -> Simulation:
-    """Simulate a trial of the study's hw-run section; of a controller that learns a first repetition, as there."""
+    study: Study, trial: Trial, network: Inverse | None, tuned: Mapping[str, Mapping[str, float]] | None,
+    loop: Loop | None = None,
+) -> Simulation:  # fmt: skip
+    """Simulate a trial of the study's hw-run section; of a controller that learns a first repetition, as there.
+
+    `loop` takes the place of the section's own, which on an emulated rig has the emulated wrist.
+    """
     settings = study.hw_run
     row = settings.rows[trial.row]
     disturbances = Disturbances(push=trial.pushed(settings.push))
     chosen = SimulateSettings(
         controller=row.controller,
         gains=row.gains,
-        loop=settings.loop.model_copy(update={"disturbances": disturbances}),
+        loop=(loop or settings.loop).model_copy(update={"disturbances": disturbances}),
         reference=settings.reference,
         direction=cast(DirectionName, trial.direction),
         horizon=settings.horizon,

@@ -1,14 +1,17 @@
 """Checks of a homed wrist: does each tendon do as it should, is each slack, do none pull against each other?"""
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 
 from wristctl.board.driver import Board
 from wristctl.board.messages import AXES, JOG_RATE
-from wristctl.config.hw_run import RigSettings
+from wristctl.config.hw_run import HwRunSettings, RigSettings
 from wristctl.config.wrist import WristParameters
 from wristctl.trial.expected_moves import LEAST, Bend, ExpectedMoves, middle
 from wristctl.trial.homing import Zero, moves_of, rest_of, slacken
+from wristctl.trial.safety import SafetyStop
 from wristctl.trial.spools import on_plus_side, spools_of
 from wristctl.trial.supervised_wait import Patience, Reading
 from wristctl.trial.tracking import Tracking
@@ -18,6 +21,9 @@ from wristctl.wrist.directions import OPPOSITE_AXES
 _CHECKED = 1.2
 # Seconds in which a wrist that has been let go comes to rest, but for creep.
 _SETTLES = 0.5
+# Shares of the bend at which tendons let out by `homing.pull` hold a wrist that sags: from which on they may, and by
+# which it sags on where they are let out twice as far.
+_HELD, _FURTHER = 0.6, 0.5
 
 
 def check_zero(
@@ -97,13 +103,14 @@ def check_tendons(
 
 
 def check_cocontraction(
-    board: Board, tracking: Tracking, settings: RigSettings, wrist: WristParameters, plane: str, zero: Zero
-) -> None:
+    board: Board, tracking: Tracking, settings: HwRunSettings, wrist: WristParameters, plane: str, zero: Zero
+) -> bool:
     """See that no tendons of a wrist at rest at zero pull against each other; leaves it slack.
 
     Pulls that balance bend nothing, so they show in no residual. All tendons are let out by `homing.pull`, then those
     of one side twice as far again: where the other side pulls, the wrist bends to it. In two planes one tendon of both
-    opposite pairs is let out so. Raises SafetyStop.
+    opposite pairs is let out so. Returns False where nobody can tell, since the wrist sags under a declared payload.
+    Raises SafetyStop.
     """
     expected, spools, homing = moves_of(settings, wrist, plane), spools_of(settings.actuator), settings.homing
     slack = round(homing.pull / spools.step)
@@ -114,7 +121,40 @@ def check_cocontraction(
     patience.wait(_SETTLES)
     bend = expected.bend(held, patience.reading(tracking, 4 * homing.frames))
     slacken(board, spools, homing, zero.signs)
-    expected.judge_cocontraction(bend)
+    loaded = _is_loaded(board, tracking, settings, wrist, plane, zero, held)
+    if not loaded:
+        expected.judge_cocontraction(bend)
+    return not loaded
+
+
+def _is_loaded(
+    board: Board, tracking: Tracking, settings: HwRunSettings, wrist: WristParameters, plane: str, zero: Zero,
+    held: Reading,
+) -> bool:  # fmt: skip
+    """Whether a wrist that was `held` by tendons let out by `homing.pull` sags on when they are let out further.
+
+    A payload does that; nobody can then tell whether tendons pull against each other. One that does, or friction inside
+    that keeps a wrist bent, bends it no further. Raises SafetyStop where no payload was declared.
+    """
+    expected, spools, homing = moves_of(settings, wrist, plane), spools_of(settings.actuator), settings.homing
+    before, held_at = _sag(held), homing.pull / wrist.tendon_offset
+    if before < _HELD * held_at:
+        return False
+    slacken(board, spools, homing, zero.signs, 2.0)
+    sag = _sag(rest_of(board, tracking, expected, homing))
+    slacken(board, spools, homing, zero.signs)
+    if sag - before < _FURTHER * held_at:
+        return False
+    if settings.payload > 0.0:
+        return True
+    problem = f"the slack wrist sags by {math.degrees(sag):.1f} deg, as it did not when it was homed"
+    likely = "more load than declared (hw-run.payload), or something that pushes at the hand"
+    raise SafetyStop(f"{problem}; likely {likely}", "homing", "lay the load down, or declare it")
+
+
+def _sag(rest: Reading) -> float:
+    """How far off straight a wrist rests [rad]."""
+    return float(np.hypot.reduce(np.nan_to_num(_bend_of(rest))))
 
 
 def _reeled(board: Board, zero: Zero, positions: NDArray[np.int64]) -> Patience:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
@@ -37,7 +38,9 @@ if TYPE_CHECKING:
     from wristctl.commands.hw_run.trial_bends import PerformedBends
     from wristctl.config.hw_run import HwRunSettings
     from wristctl.config.wrist import WristParameters
+    from wristctl.control.table import Gains
     from wristctl.simulation.repetitions import Simulation
+    from wristctl.wrist.kinematics import Inverse
 
 # Time between two samples of a motion by which it is checked before a run [s].
 _CHECKED = 0.01
@@ -134,12 +137,35 @@ def hw_run(session: Session) -> Performed | PerformedBends:
         warn_of_earlier_families(believed.rows)
         if swinging := outside_conditions(believed.rows, [believed.loop]):
             session.operator.dare("; ".join(swinging))
-    trials = perform_trials(identified_session, bench, network, tuned)
+    limited_session = _limited(identified_session, network, tuned)
+    trials = perform_trials(limited_session, bench, network, tuned)
     if believed.planes == 2:
         performed = bends_performed(identified_session, trials, tuned)
         return replace(performed, study=study)
     tables, twins = trial_tables(identified_session, trials, network, tuned)
     return Performed(study, session.findings, tables, trials, twins)
+
+
+def _limited(session: Session, network: Inverse | None, tuned: Gains | None) -> Session:
+    """The session with tension limited to what the trials need, as the person is told."""
+    import numpy as np
+
+    from wristctl.trial.motion_limit import limited, peak_tension
+    from wristctl.trial.trials import trials_of
+
+    study = session.study
+    trials = trials_of(study.hw_run, np.random.default_rng(0))
+    with session.progress("simulating what the trials need"):
+        peak = peak_tension(study, trials, network, tuned)
+    changed = limited(study, peak)
+    most, factor = changed.hw_run.safety.tension, study.hw_run.tension_factor
+    if math.isfinite(peak):
+        carried = f" with {study.hw_run.payload:g} kg in the hand" if study.hw_run.payload else ""
+        session.operator.tell(
+            f"a tension beyond {most:.3g} N stops the motors: in simulation the trials need {peak:.2g} N{carried} "
+            f"(hw-run.tension_factor: {factor:g}, hw-run.payload)"
+        )
+    return replace(session, study=changed)
 
 
 HW_RUN: Procedure[Performed | PerformedBends] = Procedure(

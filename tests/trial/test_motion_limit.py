@@ -1,0 +1,82 @@
+"""The largest tension of trials by their simulation, and what undeclared loads come to."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+
+import wristctl
+from tests.trial.conftest import Run
+from wristctl.config.study import Study
+from wristctl.trial.motion_limit import LEAST, limited, peak_tension
+from wristctl.trial.trials import Trial, trials_of, twin
+
+pytestmark = pytest.mark.slow
+
+SHORT = (
+    "hw-run={horizon: 2.5, reference: {duration: 1.0, angle_deg: 25}, push: {force: 0}, directions: [ulnar, radial]}"
+)
+HANGING = "wrist.gravity=[9.81, 0.0]"
+
+
+def peak(*changes: str) -> tuple[Study, float]:
+    """The study of short trials, and what they need."""
+    study = wristctl.load_study(None, SHORT, *changes)
+    return study, peak_tension(study, trials_of(study.hw_run, np.random.default_rng(0)), None, None)
+
+
+def test_what_trials_need_is_the_peak_of_their_simulation_on_the_believed_wrist_and_not_on_the_emulated_one() -> None:
+    study, needed = peak()
+    (real,) = (study.model_copy(update={"hw_run": study.hw_run.model_copy(update={"port": "/dev/ttyACM0"})}),)
+    each = [twin(real, Trial(0, name, 0, 0.0, 0), None, None).metrics["peak_tension"] for name in ("ulnar", "radial")]
+    assert needed == pytest.approx(max(each), rel=1e-12)
+    weaker = peak("hw-run.bench.plant.stiffness_scale=0.3")[1]
+    assert weaker == needed, "nobody knows the emulated springs"
+
+
+@pytest.mark.parametrize(("payload", "gravity"), [(0.5, HANGING), (0.5, "wrist.gravity=[-9.81, 0.0]")])
+def test_a_declared_payload_lets_motors_pull_for_it_and_never_less(payload: float, gravity: str) -> None:
+    """A hanging wrist carries it up. An upright one is pulled along by it, and yet lifts nothing at first."""
+    without, declared = (peak(gravity, f"hw-run.payload={kg}")[1] for kg in (0.0, payload))
+    assert declared >= without and (declared > 1.2 * without) == (gravity == HANGING)
+
+
+def test_a_push_counts_and_so_do_the_swings_of_unsound_gains() -> None:
+    sound = peak()[1]
+    assert peak("hw-run.push={force: 4, start: 1.5}")[1] > 1.2 * sound
+    assert peak("hw-run.controllers=[{controller: pd-ff, gains: {Kp: 900, Kd: 0.0}}]")[1] > 2.0 * sound
+
+
+@pytest.mark.parametrize(
+    ("needed", "changes", "limit"),
+    [
+        (9.0, (), 18.0), (9.0, ("hw-run.tension_factor=3",), 27.0), (2.0, (), LEAST), (40.0, (), 60.0),
+        (math.inf, (), 60.0), (9.0, ("hw-run.safety.tension=15",), 15.0), (40.0, ("wrist.tension_limit=50",), 50.0),
+    ],
+)  # fmt: skip
+def test_a_limit_is_so_many_times_what_trials_need_and_never_above_what_tendons_and_wrist_bear(
+    needed: float, changes: tuple[str, ...], limit: float
+) -> None:
+    study = wristctl.load_study(None, SHORT, *changes)
+    changed = limited(study, needed)
+    assert changed.hw_run.safety.tension == limit
+    assert changed.hw_run.safety.model_copy(update={"tension": 60.0}) == study.hw_run.safety.model_copy(
+        update={"tension": 60.0}
+    )
+
+
+@pytest.mark.parametrize(("declared", "outcome"), [(0.0, "more load than declared"), (0.5, "ok")])
+def test_a_load_that_nobody_declared_ends_as_such_and_a_declared_one_is_carried(
+    experiment: Run, declared: float, outcome: str
+) -> None:
+    """An upright wrist that holds 0.5 kg sags once its tendons let it, which they do not for 0.6 mm."""
+    taken: dict[str, Any] = {"kind": "payload-taken", "size": 0.5, "at": 0.1}
+    motors = {"slack": (0.0, 0.0, 0.0, 0.0)}
+    done = experiment(
+        payload=declared, bench={"motors": motors, "person": {"takes": 0.0}, "faults": (taken,)}, horizon=0.6,
+    )  # fmt: skip
+    assert outcome in done.experiment.outcomes[0]
+    assert (done.error is None) == (declared > 0.0)
