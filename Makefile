@@ -13,7 +13,7 @@ BIN := .venv/bin
 PIP := $(BIN)/python -m pip --disable-pip-version-check
 
 .PHONY: run test lint bench bench-sweeps bench-peers bench-all firmware test-firmware test-faults test-trust test-vision test-identify \
-	test-allocation test-slow test-rig fault-table lost-tendons sound-rigs inner-rigs test-posterior test-statistics converge worlds docs clean venv mutants coverage installed matrix
+	test-allocation test-slow test-rig fault-table lost-tendons twins sound-rigs inner-rigs test-posterior test-statistics converge worlds docs clean venv mutants coverage installed matrix
 
 run: .venv/run
 	@set -eo pipefail; \
@@ -102,6 +102,11 @@ fault-table: .venv/dev
 # Tendons, motors and drives that fail in a trial in two planes: docs/hardware/lost-tendons.md. Goes on where it stopped.
 lost-tendons: .venv/dev
 	$(BIN)/python -m tests.trial.lost_tendons $(WHICH)
+
+# Rigs and gains drawn at random: does the simulation beside a trial swing where the rig does? docs/hardware/twins.md,
+# an hour; goes on where it stopped.
+twins: .venv/dev
+	$(BIN)/python -m tests.trial.twins $(WHICH)
 
 # Sound rigs drawn with pose, light, link and friction: which are stopped all the same? WHICH="--first 40 --count 20"
 sound-rigs: .venv/dev

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+import math
 import multiprocessing
 import os
 import signal
@@ -20,8 +22,8 @@ from tests.bench.conftest import TAUT
 from tests.bench.record import is_released, last_step, read
 from tests.board.patience import WATCHDOG, patient, wait_for
 from wristctl.bench.faults import Faults
-from wristctl.bench.frame_process import FrameMemory, start_film
-from wristctl.bench.real_time_bench import RealTimeBench
+from wristctl.bench.frame_process import FrameMemory
+from wristctl.bench.real_time_bench import RealTimeBench, films_of
 from wristctl.bench.rig import Rig
 from wristctl.bench.server import BenchServer, FaultyLine
 from wristctl.board.board_errors import NoAnswer, PortLost, Restarted
@@ -31,11 +33,12 @@ from wristctl.board.emulator.serve import PtyLine
 from wristctl.board.messages import BAUD, Flag, Target
 from wristctl.board.transport import SerialTransport
 from wristctl.config.bench import BenchSettings, InjectedFault, RenderedCamera, SerialLine
-from wristctl.config.camera import SceneSettings
+from wristctl.config.camera import Markers, SceneSettings
 from wristctl.config.wrist import WristParameters
 from wristctl.errors import UserError
 from wristctl.processes import NO_HARDWARE
 from wristctl.vision.camera import Frame
+from wristctl.vision.detector import Detector
 
 SMALL = SceneSettings(width=160, height=120)
 STOPPED_WITHIN = WATCHDOG + 0.03
@@ -60,15 +63,17 @@ def serving(tmp_path: Path) -> Iterator[Serving]:
     """Starts a bench's server in a thread."""
     running: list[tuple[Served, threading.Thread]] = []
 
-    def start(*faults: InjectedFault) -> Served:
-        settings = BenchSettings(motors=TAUT, camera=RenderedCamera(scene=SMALL, dropped=0.0), faults=faults)
+    def start(*faults: InjectedFault, markers_2: Markers | None = None) -> Served:
+        camera = RenderedCamera(scene=SMALL if markers_2 is None else SceneSettings(), dropped=0.0)
+        settings = BenchSettings(motors=TAUT, camera=camera, camera_2=camera, faults=faults)
         line, wrist = PtyLine(), WristParameters()
-        camera, film = start_film(settings, wrist, None, tmp_path / "frame")
+        cameras, films, pictures = films_of(settings, wrist, (None, markers_2), tmp_path)
         ours, theirs = multiprocessing.Pipe()
-        server = BenchServer(Rig(settings, wrist, 0), line, film, tmp_path / "record", theirs)
+        rig = Rig(settings, wrist, 0, markers_2=markers_2)
+        server = BenchServer(rig, line, films, tmp_path / "record", theirs)
         thread = threading.Thread(target=server.run, daemon=True)
         thread.start()
-        bench = RealTimeBench([camera], ours, line.address, tmp_path / "frame")
+        bench = RealTimeBench(cameras, ours, line.address, pictures)
         running.append((Served(server, bench, tmp_path / "record"), thread))
         return running[-1][0]
 
@@ -99,6 +104,30 @@ def test_a_process_that_may_open_no_hardware_opens_the_emulated_bench(
 
 
 @pytest.mark.slow
+def test_two_cameras_see_both_planes_of_a_wrist_in_real_time(serving: Serving) -> None:
+    """Tendons 1 and 2 are let out and 4 and 5 reeled in: it bends toward ulnar, and the second camera sees no bend."""
+    _, bench, record = serving(markers_2=Markers(base=2, tip=3))
+    board = ready(bench)
+    board.send(Target((-130, -130, 150, 150), (400,) * 4))
+    board.wait_while(Flag.MOVING, timeout=60.0)
+    board.ping()
+    time.sleep(0.5)
+    shown = [camera.newest() for camera in bench.cameras]
+    angle = bench.truth().angle[-1]
+    board.close()
+    assert angle.shape == (2,) and angle[0] > 0.1 and abs(angle[1]) < 0.01
+    seen = []
+    for plane, (frame, markers) in enumerate(zip(shown, (Markers(), Markers(base=2, tip=3)), strict=True)):
+        assert frame is not None
+        found = Detector().everywhere(frame.image, fine=True)
+        assert set(found) == {markers.base, markers.tip}, plane
+        tip, base = (found[each][0][1] - found[each][0][0] for each in (markers.tip, markers.base))
+        seen.append(math.atan2(base[0] * tip[1] - base[1] * tip[0], base @ tip))
+    assert abs(seen[0]) == pytest.approx(angle[0], abs=0.02) and abs(seen[1]) < 0.02
+    assert len(json.loads(record.read_text())["theta"]) == 2
+
+
+@pytest.mark.slow
 def test_steps_move_the_wrist_and_frames_come_late_with_their_time_of_capture(serving: Serving) -> None:
     _, bench, _ = serving()
     began = time.monotonic()
@@ -106,7 +135,7 @@ def test_steps_move_the_wrist_and_frames_come_late_with_their_time_of_capture(se
     frames: list[tuple[float, Frame]] = []
     while len(frames) < 10:
         board.turn((-100.0, -100.0, 100.0, 100.0))
-        if (frame := bench.camera.newest()) is not None:
+        if (frame := bench.cameras[0].newest()) is not None:
             frames.append((time.monotonic(), frame))
     board.send(Target((-40, -40, 40, 40), (400,) * 4))
     board.wait_while(Flag.MOVING, timeout=60.0)

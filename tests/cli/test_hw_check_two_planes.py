@@ -176,7 +176,6 @@ def test_a_camera_without_pictures_is_named(
 @pytest.mark.parametrize(
     ("setting", "said"),
     [
-        ("real_time=true", "too much beside a board in real time"),
         ("bench.plant.model=hinges", "no bench in two planes has bench.plant.model"),
         ("wrist.tendons=three", "hw check moves four tendons at 45 deg from both planes; tendon 1 of this wrist"),
     ],

@@ -112,6 +112,3 @@ def test_a_rig_that_is_said_to_bend_in_one_plane_refuses_one_that_bends_in_two(t
     done = wristctl(tmp_path, "hw-run", "mine.yaml", "--dry-run")
     assert done.returncode == 2 and "aslant.py:ASLANT bends in two planes, and the rig in one" in done.stderr
     assert "mine.yaml:3: hw-run.planes" in done.stderr and "planes: 2" in done.stderr
-    (tmp_path / "mine.yaml").write_text("hw-run:\n  reference: {kind: aslant.py:ASLANT}\n  real_time: true\n")
-    done = wristctl(tmp_path, "hw-run", "mine.yaml", "--dry-run")
-    assert done.returncode == 2 and "draws two cameras' pictures" in done.stderr, done.stderr

@@ -33,17 +33,18 @@ EVENLY = {
     "step_acceleration": 5e7,
 }
 MOTORS = {"level": "tendon", "friction": RUBBING.friction, "sheath": RUBBING.sheath, **EVENLY}
-STEPS = 60
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("segments", "motors", "horizon"), [(1, {}, 0.4), (2, {}, 0.4), (1, MOTORS, 0.8)])
+@pytest.mark.parametrize(
+    ("segments", "motors", "horizon", "steps"), [(1, {}, 0.4, 20), (2, {}, 0.4, 20), (1, MOTORS, 0.6, 40)]
+)
 def test_what_a_loop_pulls_bends_the_same_wrist_by_another_integrator(
-    segments: int, motors: dict[str, Any], horizon: float
+    segments: int, motors: dict[str, Any], horizon: float, steps: int
 ) -> None:
     """To a thousandth of a degree: under the loop's pulls, or of tendons that stretch and rub its spools' lengths."""
     loop = Loop.model_validate(
-        {"control_period": TICK, "substeps": STEPS, "plant_segments": segments, "actuator": motors}
+        {"control_period": TICK, "substeps": steps, "plant_segments": segments, "actuator": motors}
     )  # fmt: skip
     path = bend_path("circumduction", 25.0, horizon, horizon)[:, :, :: round(TICK / 1e-3)]
     followed = Motion.of_bends(path, TICK, WRIST.length)
@@ -52,11 +53,11 @@ def test_what_a_loop_pulls_bends_the_same_wrist_by_another_integrator(
     assert acting is not None
     if motors:
         assert course.spools is not None
-        middles = (np.arange(STEPS * (len(course.time) - 1)) + 0.5) / STEPS
+        middles = (np.arange(steps * (len(course.time) - 1)) + 0.5) / steps
         held = np.array([np.interp(middles, np.arange(len(course.time)), spool) for spool in course.spools.T]).T
     else:
-        held = np.repeat(course.tension[:-1], STEPS, axis=0)
+        held = np.repeat(course.tension[:-1], steps, axis=0)
     parameters = parameters_of(WRIST, PLACES, segments, FORCE)
-    found = spatial_motion(parameters, segments, held, TICK / STEPS, RUBBING if motors else None)[::STEPS]
+    found = spatial_motion(parameters, segments, held, TICK / steps, RUBBING if motors else None)[::steps]
     assert np.ptp(course.bend, axis=0).min() > 0.5 and np.ptp(acting, axis=0).min() > 5.0
     np.testing.assert_allclose(course.segment_theta, found, atol=np.deg2rad(1e-3))

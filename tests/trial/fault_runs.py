@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+import wristctl
 from tests.trial.conftest import WRIST
 from tests.trial.fault_cases import AT, Case, Phase
 from tests.trial.fault_judging import Course, Judged, judge
@@ -20,11 +21,14 @@ from wristctl.bench.virtual_bench import VirtualBench
 from wristctl.board.driver import Board
 from wristctl.config.bench import InjectedFault
 from wristctl.config.hw_run import HwRunSettings
+from wristctl.config.study import Study
+from wristctl.config.wrist import WristParameters
 from wristctl.errors import UserError
 from wristctl.trial.calibration import WristCalibration
 from wristctl.trial.experiment import Experiment
 from wristctl.trial.homing import Zero
 from wristctl.trial.log import TrialLog
+from wristctl.trial.motion_limit import limited, peak_tension
 from wristctl.trial.testbeds import EmulatedTestbed
 from wristctl.trial.trials import trials_of
 from wristctl.vision.view import View
@@ -60,6 +64,24 @@ def _at_zero() -> WristCalibration:
     return WristCalibration(Zero((1, 1, 1, 1), (1930.0,) * 4, 0.0, (0.0,) * 4), "ulnar", nonce, (0, 0, 0, 0))
 
 
+def as_limited(settings: HwRunSettings, wrist: WristParameters = WRIST) -> HwRunSettings:
+    """The settings with tension limited to what their trials need, as `hw-run` limits it."""
+    study = wristctl.load_study(None).model_copy(update={"hw_run": settings, "wrist": wrist})
+    alike = settings.model_copy(update={"bench": HwRunSettings().bench, "port": None}).model_dump_json()
+    return limited(study, _needed(alike, wrist.model_dump_json(), study)).hw_run
+
+
+_NEEDED: dict[tuple[str, str], float] = {}
+
+
+def _needed(settings: str, wrist: str, study: Study) -> float:
+    """What trials need by the belief, which the emulated bench does not change."""
+    if (settings, wrist) not in _NEEDED:
+        trials = trials_of(study.hw_run, np.random.default_rng(0))
+        _NEEDED[settings, wrist] = peak_tension(study, trials, None, None)
+    return _NEEDED[settings, wrist]
+
+
 class _Watched(Experiment):
     decided = np.inf
 
@@ -72,7 +94,7 @@ def perform(
     changes: Mapping[str, Any], seed: int = 0, prepared: Callable[[VirtualBench], None] | None = None
 ) -> Course:
     """Do the experiment of these settings; its bench can be prepared."""
-    settings = HwRunSettings.model_validate(changes)
+    settings = as_limited(HwRunSettings.model_validate(changes))
     bench = VirtualBench(settings.bench, WRIST, seed, settings.markers)
     if prepared is not None:
         prepared(bench)

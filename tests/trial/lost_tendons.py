@@ -18,7 +18,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from tests.trial.conftest import WRIST
-from tests.trial.fault_runs import Prepared, forked
+from tests.trial.fault_runs import Prepared, as_limited, forked
 from wristctl.bench.virtual_bench import VirtualBench
 from wristctl.board.messages import AXES
 from wristctl.config.bench import InjectedFault
@@ -63,12 +63,11 @@ class Ended(NamedTuple):
 
 def performed(motion: str, prepared: Prepared) -> Ended:
     """One trial of this motion on an emulated rig whose bench is prepared."""
-    settings = HwRunSettings.model_validate(
-        {
-            "planes": 2, "push": {"force": 0.0}, "bench": {"person": {"takes": 0.0}},
-            **MOTIONS[motion],
-        }
-    )  # fmt: skip
+    settings = as_limited(
+        HwRunSettings.model_validate(
+            {"planes": 2, "push": {"force": 0.0}, "bench": {"person": {"takes": 0.0}}, **MOTIONS[motion]}
+        )
+    )
     bench = VirtualBench(settings.bench, WRIST, 0, settings.markers, settings.markers_2)
     prepared(bench)
     coordinates = 2 * PLANTS[settings.bench.plant.model].coordinates(settings.bench.segments)

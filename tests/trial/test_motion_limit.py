@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 
 import wristctl
-from tests.trial.conftest import Run
+from tests.trial.conftest import WRIST, Run, settings_of
 from wristctl.config.study import Study
+from wristctl.trial.homing import moves_of
 from wristctl.trial.motion_limit import LEAST, limited, peak_tension
 from wristctl.trial.trials import Trial, trials_of, twin
 
@@ -80,3 +81,20 @@ def test_a_load_that_nobody_declared_ends_as_such_and_a_declared_one_is_carried(
     )  # fmt: skip
     assert outcome in done.experiment.outcomes[0]
     assert (done.error is None) == (declared > 0.0)
+
+
+@pytest.mark.parametrize("planes", [1, 2])
+@pytest.mark.parametrize("believed", [20e3, 40e3])
+def test_steps_per_radian_tell_tendons_that_are_softer_than_believed_and_never_softer_than_they_are(
+    planes: int, believed: float
+) -> None:
+    """But for 1.5 % of a rigid tendon's path; tendons that are stiffer stay as believed."""
+    settings = settings_of(planes=planes, actuator={"level": "tendon", "tendon_stiffness": believed})
+    moves = moves_of(settings, WRIST, "ulnar" if planes == 1 else "")
+    for true in (5e3, 6e3, 9e3, 15e3, believed, 80e3):
+        told = moves.tendon_stiffness([moves.steps(true)] * 4)
+        assert min(true, believed) <= told <= believed
+        if true <= 6e3:
+            assert told < 1.7 * true, "the limit of tension is then at most twice as near"
+        longer = moves.tendon_stiffness([moves.steps(true) + 0.015 * moves.steps(math.inf)] * 4)
+        assert longer == pytest.approx(max(5e3, min(true, believed)), rel=1e-6)

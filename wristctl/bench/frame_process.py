@@ -5,21 +5,25 @@ import multiprocessing
 import signal
 import threading
 import time
+from collections.abc import Callable
+from functools import partial
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from multiprocessing.connection import Connection
 from multiprocessing.process import BaseProcess
 from pathlib import Path
+from typing import Literal
 
 import cv2
 import numpy as np
 
 from wristctl.bench.shutter import Exposure, picture
-from wristctl.config.bench import BenchSettings
+from wristctl.config.bench import BenchSettings, RenderedCamera
 from wristctl.config.camera import Markers
 from wristctl.config.wrist import WristParameters
 from wristctl.loop_priority import as_any_program
 from wristctl.processes import safe_path
 from wristctl.vision.camera import Frame, Image
+from wristctl.vision.scene import Scene
 
 _HEAD = np.dtype([*((name, np.int64) for name in ("writes", "number", "height", "width")), ("time", np.float64)])
 
@@ -138,18 +142,22 @@ _DECODED = 3e-3
 
 
 def start_film(
-    settings: BenchSettings, wrist: WristParameters, markers: Markers | None, pictures: Path, broadcast: bool = False
-) -> tuple[BaseProcess, Connection]:
+    settings: BenchSettings, wrist: WristParameters, markers: Markers | None, pictures: Path, broadcast: bool = False,
+    plane: Literal[0, 1] | None = None,
+) -> tuple[BaseProcess, Connection]:  # fmt: skip
     """A process that puts pictures into the file `pictures`, and the way to it; `broadcast` also serves them by HTTP.
+
+    Of a wrist that bends in two planes, `plane` 0 is the first camera's and 1 the second's.
 
     It says when it is ready, by the address that it serves or None, takes exposures with the time at which
     their clock was 0 (`time.monotonic`), and ends when the other side is closed.
     """
-    scene = settings.camera.scene
-    FrameMemory(pictures, (scene.height, scene.width))
+    camera = settings.camera_2 if plane == 1 else settings.camera
+    FrameMemory(pictures, (camera.scene.height, camera.scene.width))
     context = multiprocessing.get_context("spawn")
     ours, theirs = context.Pipe()
-    arguments = theirs, settings, wrist, markers, pictures, broadcast
+    paint = partial(Scene, camera.scene, wrist, markers, settings.plant.model, plane=plane)
+    arguments = theirs, camera, paint, pictures, broadcast
     process = context.Process(target=_develop, args=arguments, daemon=True)
     with safe_path():
         process.start()
@@ -158,17 +166,13 @@ def start_film(
 
 
 def _develop(
-    exposed: Connection, settings: BenchSettings, wrist: WristParameters, markers: Markers | None, pictures: Path,
-    broadcast: bool,
-) -> None:  # fmt: skip
+    exposed: Connection, camera: RenderedCamera, paint: Callable[[], Scene], pictures: Path, broadcast: bool
+) -> None:
     """Draw each exposure and show it when it arrives; late, leave pictures out. Ctrl-C is others' affair."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    from wristctl.vision.scene import Scene
-
     as_any_program()  # a camera takes nothing of this computer
     cv2.setNumThreads(1)
-    camera, memory = settings.camera, FrameMemory(pictures)
-    painter = Scene(camera.scene, wrist, markers, settings.plant.model)
+    memory, painter = FrameMemory(pictures), paint()
     delay = camera.delay_frames / camera.frame_rate
     stream = MjpegStream() if broadcast else None
     try:

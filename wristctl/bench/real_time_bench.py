@@ -9,7 +9,7 @@ from multiprocessing.connection import Connection
 from multiprocessing.process import BaseProcess
 from pathlib import Path
 from types import TracebackType
-from typing import Any, Self
+from typing import Any, Literal, Self
 
 from wristctl.bench.bench_wrist import MotorMotion, Truth
 from wristctl.bench.frame_process import SharedCamera, start_film
@@ -34,11 +34,12 @@ class RealTimeBench:
     BoardError where the process has died.
     """
 
-    def __init__(self, processes: Sequence[BaseProcess], control: Connection, address: str, pictures: Path) -> None:
+    def __init__(
+        self, processes: Sequence[BaseProcess], control: Connection, address: str, pictures: Sequence[Path]
+    ) -> None:
         self._processes, self._control = processes, control
         self.transport = SerialTransport(address, BAUD, emulated=True)
-        self.camera = SharedCamera(pictures)
-        self.cameras = (self.camera,)
+        self.cameras = tuple(map(SharedCamera, pictures))
 
     def __enter__(self) -> Self:
         return self
@@ -91,23 +92,26 @@ def connect(
     wrist: WristParameters,
     seed: int,
     markers: Markers | None = None,
+    markers_2: Markers | None = None,
     record: Path | None = None,
 ) -> RealTimeBench:
-    """Start a bench in processes of its own, wrist and camera. What its board did is left in the file `record`.
+    """Start a bench in processes of its own, wrist and cameras. What its board did is left in the file `record`.
+
+    With the markers of a second camera, `markers_2`, the wrist bends in two planes.
 
     It takes as long to start as its parts take to be compiled, if this is the first time.
     """
     folder = Path(tempfile.mkdtemp(prefix="wristctl-bench-"))
-    camera, film = start_film(settings, wrist, markers, folder / "frame")
+    cameras, films, pictures = films_of(settings, wrist, (markers, markers_2), folder)
     context = multiprocessing.get_context("spawn")
     ours, theirs = context.Pipe()
     bench = context.Process(
-        target=_serve, args=(theirs, film, folder, settings, wrist, seed, markers, record), daemon=True
+        target=_serve, args=(theirs, films, folder, settings, wrist, seed, markers, markers_2, record), daemon=True
     )
     with safe_path():
         bench.start()
-    theirs.close()
-    film.close()
+    for end in (theirs, *films):
+        end.close()
     try:
         address = ours.recv()
     except EOFError as error:
@@ -115,20 +119,38 @@ def connect(
         raise BoardError("host", "the emulated bench did not start", fix=fix) from error
     if isinstance(address, UserError):
         raise address
-    return RealTimeBench((bench, camera), ours, address, folder / "frame")
+    return RealTimeBench((bench, *cameras), ours, address, pictures)
+
+
+def films_of(
+    settings: BenchSettings, wrist: WristParameters, markers: tuple[Markers | None, Markers | None], folder: Path,
+    broadcast: bool = False,
+) -> tuple[list[BaseProcess], list[Connection], list[Path]]:  # fmt: skip
+    """The processes of a bench's cameras, the ways to them, and the files of their pictures.
+
+    One camera, or two where the second's markers are given: the wrist then bends in two planes.
+    """
+    planes: tuple[Literal[0, 1] | None, ...] = (None,) if markers[1] is None else (0, 1)
+    pictures = [folder / f"frame{'' if not plane else plane + 1}" for plane in planes]
+    started = [
+        start_film(settings, wrist, markers[plane or 0], file, broadcast, plane)
+        for plane, file in zip(planes, pictures, strict=True)
+    ]
+    return [process for process, _ in started], [film for _, film in started], pictures
 
 
 def _serve(
     control: Connection,
-    film: Connection,
+    films: Sequence[Connection],
     folder: Path,
     settings: BenchSettings,
     wrist: WristParameters,
     seed: int,
     markers: Markers | None,
+    markers_2: Markers | None,
     record: Path | None,
 ) -> None:
-    """The bench's process: Ctrl-C is the client's affair. It takes the camera's folder with it."""
+    """The bench's process: Ctrl-C is the client's affair. It takes the cameras' folder with it."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     from wristctl.bench.rig import Rig
     from wristctl.bench.server import BenchServer
@@ -136,7 +158,8 @@ def _serve(
 
     try:
         line = PtyLine()
-        server = BenchServer(Rig(settings, wrist, seed, markers), line, film, record, control)
+        rig = Rig(settings, wrist, seed, markers, markers_2=markers_2)
+        server = BenchServer(rig, line, films, record, control)
         signal.signal(signal.SIGTERM, lambda *_: server.stop())
         control.send(line.address)
         server.run()

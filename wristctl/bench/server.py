@@ -5,7 +5,7 @@ import logging
 import math
 import os
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from multiprocessing.connection import Connection
 from pathlib import Path
@@ -92,7 +92,7 @@ _LEAST_INTERVAL = 0.05
 class BenchRecord:
     """A JSON file, written anew when motors have moved or been switched, at most 20 times a second.
 
-    Times are of `time.monotonic`; lists are by axis.
+    Times are of `time.monotonic`; lists are by axis, in two planes `theta` by plane.
     """
 
     def __init__(self, path: Path, wrist: BenchWrist, line: FaultyLine) -> None:
@@ -116,7 +116,7 @@ class BenchRecord:
             "last_step": [_moved(step_time, start) for step_time in self._last.last_step],
             "steps": self._last.steps,
             "energised": self._last.energised,
-            "theta": float(newest.angle[-1]),
+            "theta": newest.angle[-1].tolist(),
             "pull": newest.pull.sum(axis=0).tolist(),
         }
         part = self._path.with_name(f".{self._path.name}.part")
@@ -135,29 +135,28 @@ _TOGETHER = FREQUENCY // 500
 
 
 class BenchServer:
-    """Runs a rig against the wall clock. Exposures go to `film`, what the board did to the file `record`.
+    """Runs a rig against the wall clock. Exposures go to each camera's `films`, what the board did to `record`.
 
     Requests of a client come through `control` as a method's name and its arguments, and are answered; their times
     are of `time.monotonic`. When that client has gone the bench ends after a while; without `control` at `stop`.
     """
 
     def __init__(
-        self, rig: Rig, line: Line, film: Connection, record: Path | None = None, control: Connection | None = None,
-        bystander: Bystander | None = None,
+        self, rig: Rig, line: Line, films: Sequence[Connection], record: Path | None = None,
+        control: Connection | None = None, bystander: Bystander | None = None,
     ) -> None:  # fmt: skip
-        self._rig, self._film, self._control, self._bystander = rig, film, control, bystander
+        self._rig, self._films, self._control, self._bystander = rig, films, control, bystander
         self._line = FaultyLine(line, rig.faults, lambda: rig.chip.cycles, rig.settings.line)
         self._record = None if record is None else BenchRecord(record, rig.wrist, self._line)
         self._start, self._until = time.monotonic(), math.inf
-        self._taken, self._reset = -1, -math.inf
+        self._taken, self._reset = [-1] * len(films), -math.inf
         self._energised = False
         self._edges: list[NDArray[np.void]] = []
         rig.chip.run(FREQUENCY // 100)
         rig.catch_up()  # so that what is to be compiled is, before real time begins
-        self.camera: str | None = None
-        """Address of the camera's stream."""
         try:
-            self.camera = film.recv()
+            self.cameras: list[str | None] = [film.recv() for film in films]
+            """Address of each camera's stream."""
         except EOFError as error:
             fix = "give it more memory, or see with --debug"
             raise UserError("the rendered camera's process has died", fix=fix, exit_code=4) from error
@@ -168,7 +167,8 @@ class BenchServer:
             serve(self._rig.chip, self._line, lambda: time.monotonic() < self._until, self._round)
         finally:
             self._line.close()
-            self._film.close()
+            for film in self._films:
+                film.close()
             if self._record is not None:
                 self._record.write(self._start, ended=True)
 
@@ -214,7 +214,7 @@ class BenchServer:
         self._edges.clear()
         self._rig.weigh()
         self._reset_board()
-        self._take_frame()
+        self._take_frames()
         if self._control is not None:
             self._answer(self._control)
         if self._bystander is not None:
@@ -229,14 +229,14 @@ class BenchServer:
             self._rig.chip.reset()
             self._reset = due
 
-    def _take_frame(self) -> None:
-        shutter = self._rig.eyes[0].shutter
-        number = shutter.newest(0.0)
-        if number > self._taken:
-            self._taken = number
-            if self._line.there and shutter.arrives(number):
-                with suppress(BrokenPipeError):  # a camera that has died gives no frames
-                    self._film.send((shutter.expose(number), self._start))
+    def _take_frames(self) -> None:
+        for camera, (eye, film) in enumerate(zip(self._rig.eyes, self._films, strict=True)):
+            number = eye.shutter.newest(0.0)
+            if number > self._taken[camera]:
+                self._taken[camera] = number
+                if self._line.there and eye.shutter.arrives(number):
+                    with suppress(BrokenPipeError):  # a camera that has died gives no frames
+                        film.send((eye.shutter.expose(number), self._start))
 
     def _answer(self, control: Connection) -> None:
         try:
@@ -251,5 +251,5 @@ class BenchServer:
         energised = any(self._rig.wrist.motion.energised)
         if energised != self._energised:
             self._energised = energised
-            theta = self._rig.wrist.truth(self._rig.wrist.time - PERIOD).angle[-1]
-            log.info("drives %s, wrist at %.1f deg", "on" if energised else "off", np.rad2deg(theta))
+            theta = np.rad2deg(np.atleast_1d(self._rig.wrist.truth(self._rig.wrist.time - PERIOD).angle[-1]))
+            log.info("drives %s, wrist at %s deg", "on" if energised else "off", ", ".join(f"{a:.1f}" for a in theta))

@@ -37,8 +37,8 @@ def emulate(
 ) -> None:
     """Serve the emulated board for any serial client, in real time; its port is the only line on stdout.
 
-    With --wrist a second line says where the camera's pictures are, which --camera takes; press, release (the
-    emergency stop) and directions that the wrist is turned to can be typed.
+    With --wrist a second line says where the camera's pictures are, which --camera takes, with planes=2 a third where
+    the second's are; press, release (the emergency stop) and directions that the wrist is turned to can be typed.
     """
     with listening(quiet, False) as console:
         with progress(console, no_event, "preparing the emulated board (compiled once per version)", None, "", quiet):
@@ -69,31 +69,30 @@ def _serve_with_wrist(chip: Any, line: Any, override: list[str], console: Any, q
 
     study = with_planes(load_study((), override, "hw-run"))
     check_sides(study.wrist, "hw emulate")
-    if study.hw_run.planes == 2:
-        problem = "an emulated rig in two planes runs in virtual time alone"
-        raise UserError(problem, "hw-run.planes", "planes: 1, or wristctl hw-run without --port")
     priority = prioritised(study.hw_run.priority)
     with TemporaryDirectory(prefix="wristctl-bench-") as folder, priority as allowed:
         if allowed:
             log.info(allowed)
-        pictures = Path(folder) / "frame"
         with progress(console, no_event, "preparing the wrist (compiled once per version)", None, "", quiet):
-            from wristctl.bench.frame_process import start_film
+            from wristctl.bench.real_time_bench import films_of
             from wristctl.bench.rig import Bystander, Rig
             from wristctl.bench.server import BenchServer
 
-            settings, markers = study.hw_run.bench, study.hw_run.markers
-            camera, film = start_film(settings, study.wrist, markers, pictures, broadcast=True)
-            rig = Rig(settings, study.wrist, study.seed, markers, chip)
+            asked = study.hw_run
+            markers = asked.markers, asked.markers_2 if asked.planes == 2 else None
+            cameras, films, pictures = films_of(asked.bench, study.wrist, markers, Path(folder), broadcast=True)
+            rig = Rig(asked.bench, study.wrist, study.seed, markers[0], chip, markers[1])
             bystander = Bystander(rig, sys.stdin.fileno()) if sys.stdin and not sys.stdin.closed else None
-            server = BenchServer(rig, line, film, bystander=bystander)
-        log.info("serving, with a wrist on axes 0 to 3; its camera's frames: %s", pictures)
-        log.info("try: wristctl hw check --rig --port %s --camera %s", line.address, server.camera)
-        print(line.address, server.camera, sep="\n", flush=True)
+            server = BenchServer(rig, line, films, bystander=bystander)
+        log.info("serving, with a wrist on axes 0 to 3; its cameras' frames: %s", ", ".join(map(str, pictures)))
+        more = f" --set planes=2 --set camera_2={server.cameras[1]}" if asked.planes == 2 else ""
+        log.info("try: wristctl hw check --rig --port %s --camera %s%s", line.address, server.cameras[0], more)
+        print(line.address, *server.cameras, sep="\n", flush=True)
         try:
             server.run()
         finally:
-            camera.join()
+            for camera in cameras:
+                camera.join()
 
 
 _LOG = "data/log.csv"

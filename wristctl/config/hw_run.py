@@ -188,9 +188,6 @@ class RigSettings(Section):
     def _two_planes(self) -> Self:
         if self.planes == 1:
             return self
-        if self.port is None and self.real_time:
-            problem = "an emulated rig in two planes draws two cameras' pictures, too much beside a board in real time"
-            raise Unfitting(problem, "real_time: false, or planes: 1")
         if self.port is None and (beyond := self.bench.in_one_plane_only):
             raise Unfitting(f"no bench in two planes has {beyond[0]}", "leave it at its default, or planes: 1")
         numbers = [self.markers.base, self.markers.tip, self.markers_2.base, self.markers_2.tip]

@@ -62,19 +62,20 @@ class Task(NamedTuple):
 
 class ControlLoop:
     """Drives a homed, enabled board in a bending plane, or in both; `signs` say which way each motor's positive steps
-    turn.
+    turn, `stiffness` is that of the tendons [N/m] where homing has measured less than is believed.
     """
 
     def __init__(
         self, board: Board, tracking: Tracking, settings: HwRunSettings, wrist: WristParameters, plane: str,
         signs: Sequence[int], timing: TickTiming, log: TrialLog, shown: Shown | None = None, oblique: float = 0.0,
-        pulls: TendonPulls | None = None,
+        pulls: TendonPulls | None = None, stiffness: float | None = None,
     ) -> None:  # fmt: skip
         self._board, self._tracking, self._log, self._timing, self._shown = board, tracking, log, timing, shown
         self._clock, self._period, self._signs = board.transport, timing.period, np.array(signs)
         self._life, self._stale = settings.rate_life, settings.safety.stale
         self._spools, self._bending = spools_of(settings.actuator), bending_of(settings, wrist, plane, timing.period)
-        self._pulls, self.watch = pulls, Watch(settings, wrist, plane, timing, oblique, pulls)
+        self._pulls = pulls
+        self.watch = Watch(settings, wrist, plane, timing, oblique, pulls, stiffness)
         self._steering = self._bending.steering
         self._status, self._sent = board.read(), np.zeros(AXES)
         timing.camera.expect(settings.planes)

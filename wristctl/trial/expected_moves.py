@@ -17,6 +17,8 @@ from wristctl.wrist.out_of_plane import across_of
 # Springs that are stiffer than believed and friction may ask for so many times the pull that the model says, and with
 # friction of the wrist's own; twice the steps stay wrong.
 _HARDER, _RUBBING = 1.5, 2.5
+# By how much longer than believed the path of a rigid tendon is taken to be: half of what a pulley may be off.
+_LONGER = 1.015
 # Shares of the believed bend that a small move may make: soft tendons and where zero was found.
 LEAST, MOST = 0.6, 1.35
 # Share of the least bend by which a wrist that nothing pulls may stand off without friction of its own.
@@ -73,6 +75,17 @@ class ExpectedMoves:
         k = self._spools.stiffness if stiffness is None else stiffness
         path = self._offset * (1.0 + self._ratio) + harder * self._stiffness / (self._offset * k)
         return path / self._spools.step
+
+    def tendon_stiffness(self, steps: Sequence[float]) -> float:
+        """Stiffness of the tendons [N/m] by steps per radian (4,) that homing took: as believed, or less.
+
+        What they take beyond the path of rigid tendons is stretch, but for what a pulley may be off.
+        """
+        rigid, believed = self.steps(math.inf), self._spools.stiffness
+        stretch = float(np.mean(steps)) - _LONGER * rigid
+        if stretch <= self.steps() - rigid:
+            return believed
+        return max(self._softest, believed * (self.steps() - rigid) / stretch)
 
     def bend(self, straight: Reading, reading: Reading) -> Bend:
         """Bend of the wrist against a reading of the straight wrist."""

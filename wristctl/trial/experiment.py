@@ -20,7 +20,7 @@ from wristctl.trial.bend_motion import BendMotion
 from wristctl.trial.bending import bending_of
 from wristctl.trial.calibration import WristCalibration
 from wristctl.trial.control_loop import ControlLoop, Shown
-from wristctl.trial.homing import Zero, find_zero, slacken
+from wristctl.trial.homing import Zero, find_zero, moves_of, slacken
 from wristctl.trial.log import TrialLog
 from wristctl.trial.motors_ready import Halt, halt, prepare
 from wristctl.trial.resting import judge_rest
@@ -197,9 +197,10 @@ class Experiment:
         """A loop that has brought the homed, slack wrist to rest at zero."""
         settings, pose, zero = self._settings, self.poses.get(plane), self.zero
         assert zero is not None
+        stiffness = moves_of(settings, self._wrist, plane).tendon_stiffness(zero.steps_per_radian)
         loop = ControlLoop(
             board, tracking, settings, self._facing(plane), plane, zero.signs, self.timing, self._log,
-            shown, 0.0 if pose is None else pose.oblique, self._pulls,
+            shown, 0.0 if pose is None else pose.oblique, self._pulls, stiffness,
         )  # fmt: skip
         loop.follow(back(0.0, settings.rest, 0.0, settings.control_period, settings.planes), self._back, ())
         return loop

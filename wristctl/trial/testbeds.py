@@ -211,8 +211,6 @@ def open_testbed(
     views = view, view_2 or View()
     if settings.port is not None:
         return RealTestbed(settings, views, keep, ask)
-    if settings.planes == 2:
-        bench = VirtualBench(settings.bench, wrist, seed, settings.markers, settings.markers_2)
-        return EmulatedTestbed(bench, settings, views, keep)
     build = connect if settings.real_time else VirtualBench
-    return EmulatedTestbed(build(settings.bench, wrist, seed, settings.markers), settings, views, keep)
+    markers_2 = settings.markers_2 if settings.planes == 2 else None
+    return EmulatedTestbed(build(settings.bench, wrist, seed, settings.markers, markers_2), settings, views, keep)

@@ -3,6 +3,7 @@
 import math
 from collections import Counter, deque
 from collections.abc import Sequence
+from dataclasses import replace
 from itertools import pairwise
 from typing import Any, NamedTuple
 
@@ -64,18 +65,21 @@ class _Past(NamedTuple):
 class Watch:
     """Residuals of one loop, which begins with the wrist at rest at zero: the marker's size is that of no bend across.
 
-    `oblique` is how far off square an uncalibrated camera looks [rad]. `pulls` are those of a rig with load cells. A
-    rig in two planes has a camera for each; `plane` then says nothing, and residuals are norms over both.
+    `oblique` is how far off square an uncalibrated camera looks [rad]. `pulls` are those of a rig with load cells.
+    `stiffness` is what homing has measured of the tendons [N/m]; without it they are as believed. A rig in two planes
+    has a camera for each; `plane` then says nothing, and residuals are norms over both.
     """
 
     def __init__(
         self, settings: HwRunSettings, wrist: WristParameters, plane: str, timing: TickTiming, oblique: float = 0.0,
-        pulls: TendonPulls | None = None,
+        pulls: TendonPulls | None = None, stiffness: float | None = None,
     ) -> None:  # fmt: skip
         self._settings, self._timing, self._oblique, self._pulls = settings, timing, oblique, pulls
         self._plus = () if settings.planes == 2 else tuple(on_plus_side(plane).tolist())
         self._away = () if settings.planes == 2 else away_of(plane, settings.markers.positive)
         self._spools, self._period, self._radius = spools_of(settings.actuator), timing.period, wrist.tendon_radius
+        if stiffness is not None:
+            self._spools = replace(self._spools, stiffness=stiffness)
         self._blind = BlindModel(
             wrist, settings.actuator, settings.safety.softest, settings.sensor, self._period, settings.planes
         )
