@@ -81,9 +81,6 @@ EDGES = {
         HwRunSettings, {"safety": {"late": 0.13, "watchdog": 0.15}}, {"safety": {"late": 0.145, "watchdog": 0.15}}
     ),
     "mute cell": Edge(LoadCells, {"counts_per_newton": (1, -2, 3, 4)}, {"counts_per_newton": (1, 2, 0, 4)}),
-    "plane and a picture": Edge(
-        RigSettings, {"planes": 2, "real_time": False}, {"real_time": True}
-    ),
     "markers of two planes": Edge(
         RigSettings,
         {**TWO_PLANES, "markers": {"base": 0, "tip": 1}, "markers_2": {"base": 2, "tip": 3}},

@@ -15,7 +15,7 @@ _DRAWN: dict[str, Drawn] = {
     "plant.actuator.tendon_stiffness": "x0.7..1.4 log",
     "plant.actuator.friction": "0.03..0.2",
     "plant.actuator.sheath": "0..3",
-    "plant.stiffness": "x0.7..1.3",
+    "plant.stiffness": "x0.6..1.4",
     "plant.damping": "x0.5..2",
     "plant.payload": "0..0.15",
     "plant.tendon_radius": "x0.97..1.03",
@@ -101,6 +101,10 @@ class RecommendSettings(Section):
     payloads: tuple[Annotated[float, Field(gt=0)], ...] = quantity(
         (0.1, 0.2, 0.3, 0.5), "kg", "masses in the hand, unknown to the controller, that are tried", "assumed"
     )
+    rehearsed: int = choice(
+        3, "of the best, how many are rehearsed on the emulated rig at a time, where hw-run has the rig; 0: none",
+        ge=0, le=10,
+    )  # fmt: skip
     from_identified: str | None = choice(None, "identify run whose parameters replace the study's")
 
     def family(self, largest_deg: float, planes: int = 1) -> Family:

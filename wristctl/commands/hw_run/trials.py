@@ -18,8 +18,7 @@ from wristctl.control.table import Gains
 from wristctl.errors import fix_of
 from wristctl.records import LiveRun
 from wristctl.simulation.metrics import METRICS, metrics_in
-from wristctl.trial.bend_motion import BendMotion
-from wristctl.trial.bend_results import FURTHER, LOGGED, TRULY, bends_evaluated
+from wristctl.trial.bend_results import FURTHER, LOGGED, TRULY
 from wristctl.trial.calibration import WristCalibration
 from wristctl.trial.experiment import Experiment, Stop
 from wristctl.trial.log import TrialLog
@@ -27,7 +26,8 @@ from wristctl.trial.residuals import FILE, RESIDUALS, limits_of, plain
 from wristctl.trial.safety import SafetyStop
 from wristctl.trial.spatial_belief import PLANES
 from wristctl.trial.testbeds import open_testbed
-from wristctl.trial.trials import JUDGED, Trial, evaluated, trials_of
+from wristctl.trial.trial_metrics import metrics_of_trials
+from wristctl.trial.trials import JUDGED, Trial, trials_of
 from wristctl.vision.camera import Frame
 from wristctl.vision.marker import Sighting
 from wristctl.vision.recordings import COLUMNS as RAW
@@ -159,34 +159,22 @@ def _evaluate(
     run: LiveRun, settings: HwRunSettings, wrist: WristParameters, experiment: Experiment, trials: list[Trial]
 ) -> pd.DataFrame:
     """trials.csv: a row for each trial that began, by the log alone."""
-    courses = pd.read_csv(run.file("data/log.csv"))
-    file = run.path / "data/truth.csv"
-    truths = pd.read_csv(file) if file.is_file() else None
-    rows = []
-    for trial in trials:
-        if trial.number not in experiment.outcomes:
-            continue
-        row = settings.rows[trial.row]
-        course = courses[courses["trial"] == trial.number]
-        truth = None if truths is None else truths[truths["trial"] == trial.number]
-        followed = experiment.motions[trial.direction]
-        if isinstance(followed, BendMotion):
-            values = bends_evaluated(trial, course, followed, settings.push, wrist, truth)
-        else:
-            values = evaluated(trial, course, followed, settings.push, settings.control_period, truth)
-        rows.append(
-            {
-                "trial": trial.number,
-                "direction": trial.direction,
-                "repetition": trial.repetition,
-                "push": trial.push,
-                "controller": row.controller,
-                "gains": row.gains_name,
-                "outcome": experiment.outcomes[trial.number],
-                "odd": experiment.odd.get(trial.number, ""),
-                **values,
-            }
-        )
+    begun = [trial for trial in trials if trial.number in experiment.outcomes]
+    metrics = metrics_of_trials(run.path / "data", begun, experiment.motions, settings, wrist)
+    rows = [
+        {
+            "trial": trial.number,
+            "direction": trial.direction,
+            "repetition": trial.repetition,
+            "push": trial.push,
+            "controller": settings.rows[trial.row].controller,
+            "gains": settings.rows[trial.row].gains_name,
+            "outcome": experiment.outcomes[trial.number],
+            "odd": experiment.odd.get(trial.number, ""),
+            **values,
+        }
+        for trial, values in zip(begun, metrics, strict=True)
+    ]
     columns = _OF_BENDS if settings.planes == 2 else _OF_TRIALS
     table = pd.DataFrame(rows, columns=list(columns))
     units, meaning = ({name: column[i] for name, column in columns.items()} for i in range(2))

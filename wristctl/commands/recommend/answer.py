@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from itertools import chain
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
     from wristctl.arrays import Array
+    from wristctl.commands.recommend.rehearsals import Rehearsal
     from wristctl.comparison.world_ranking import WorldRanking
     from wristctl.tuning.search import Search
 
@@ -80,6 +81,10 @@ class Recommended(StudyResult):
     payloads: list[Limit]
     next_command: str
     """Command that tries the recommendation on the rig."""
+    rehearsals: Mapping[int, Rehearsal] = field(default_factory=dict)
+    """Of the candidates that were rehearsed on the emulated rig, by their numbers."""
+    on_the_trial: tuple[float, float, float] | None = None
+    """Spread of the error over the simulated rigs on the motion of the rehearsal [rad]."""
     bending: str = ""
     """Planes that all loops bend in, a sentence; empty where they stay in one."""
 
@@ -97,26 +102,41 @@ class Recommended(StudyResult):
     def best_row(self) -> int | None:
         """Its number among the candidates and the ranking's rows; None where no feedback is in the first group.
 
-        Of `near`, the one that is lost on the fewest rigs; of these one of the first group, with the fewest gains.
+        The first of `near`; where some were rehearsed, the first of these that is sound on the emulated rig and errs
+        there at most a quarter more than the least of them.
         """
-        standing = self.ranking.standing
-        if not any(self.candidates[row].gains for row in chain(*standing.groups[:1])):
+        if not any(self.candidates[row].gains for row in chain(*self.ranking.standing.groups[:1])):
             return None
-        return min(
-            self.near, key=lambda row: (standing.lost[row].times, standing.group(row), len(self.candidates[row].gains))
-        )
+        if not self.rehearsals:
+            return self.near[0]
+        sound = [row for row in self.near if row in self.rehearsals and not self.rehearsals[row].fault]
+        least = min((self.rehearsals[row].rmse for row in sound), default=math.nan)
+        return next((row for row in sound if self.rehearsals[row].rmse <= NEAR * least), None)
+
+    @property
+    def untried(self) -> list[int]:
+        """Of `near`, what has not been rehearsed."""
+        return [row for row in self.near if row not in self.rehearsals]
 
     @property
     def near(self) -> list[int]:
-        """Rows with feedback that err at most a quarter more than the least of them, none more than feedforward."""
+        """Rows with feedback that err at most a quarter more than the least of them, none more than feedforward.
+
+        First what is lost on the fewest rigs; of these those of the first group, then those with the fewest gains.
+        """
         standing, errors = self.ranking.standing, [mean.value for mean in self.ranking.means]
         open_loop = standing.group(len(self.candidates) - 1) or len(standing.groups)
         sound = [row for row in chain(*standing.groups[:open_loop]) if self.candidates[row].gains]
-        return [row for row in sound if errors[row] <= NEAR * min(errors[other] for other in sound)]
+        near = [row for row in sound if errors[row] <= NEAR * min(errors[other] for other in sound)]
+        return sorted(
+            near, key=lambda row: (standing.lost[row].times, standing.group(row), len(self.candidates[row].gains))
+        )
 
     @property
     def why_none(self) -> str:
         """Reason for which nothing is recommended."""
+        if self.rehearsals:
+            return "everything near the best swings or is stopped in its rehearsal on the emulated rig"
         sound = [row for group in self.ranking.standing.groups for row in group if self.candidates[row].gains]
         if sound:
             return "no controller with feedback that can be relied on errs less than feedforward"
@@ -157,7 +177,7 @@ def _sentence(result: Recommended) -> str:
     values = ", ".join(_gain(best, name) for name in best.gains)
     sentence = (
         f"Use {best.controller} with {values}. Expect an error of {degrees(median)} deg RMSE ({degrees(low)} to "
-        f"{degrees(high)} deg on 8 of 10 simulated rigs), {two(ranked.gains[row].value)} times lower than "
+        f"{degrees(high)} deg on 95 of 100 simulated rigs), {two(ranked.gains[row].value)} times lower than "
         "feedforward alone."
     )
     if lost := _lost(ranked, row):
@@ -182,10 +202,10 @@ def _gain(candidate: Candidate, name: str) -> str:
 
 
 def spread(errors: Array) -> tuple[float, float, float]:
-    """Error [rad] that 1, 5 and 9 of 10 rigs stay below."""
+    """Error [rad] that 2.5, 50 and 97.5 of 100 rigs stay below."""
     import numpy as np
 
-    low, median, high = np.percentile(errors, (10.0, 50.0, 90.0), method="nearest")
+    low, median, high = np.percentile(errors, (2.5, 50.0, 97.5), method="nearest")
     return float(low), float(median), float(high)
 
 
@@ -196,7 +216,7 @@ def _table(result: Recommended) -> Table:
         low, median, high = (degrees(error) if math.isfinite(error) else "-" for error in spread(ranked.rows[k].rmse))
         lost = _lost(ranked, k)
         rows.append((result.candidates[k].label, median, f"{low} to {high}", lost or "stable on all"))
-    heads = ("controller (gains)", "error [deg]", "on 8 of 10 rigs [deg]", f"of {ranked.count} simulated rigs")
+    heads = ("controller (gains)", "error [deg]", "on 95 of 100 rigs [deg]", f"of {ranked.count} simulated rigs")
     return Table("", heads, rows)
 
 
@@ -211,7 +231,7 @@ def _lost(ranked: WorldRanking, k: int) -> str:
     """On how many rigs a candidate fails, and on how many it swings and by how much; empty where stable on all."""
     failures, swings = ranked.standing.failures[k].times, ranked.standing.swings[k].times
     swing = ranked.rows[k].measured.largest_swing(ranked.rows[-1].measured)
-    size = f"swings by up to {degrees(swing)} deg" if swing > 0.0 else "chatters"
+    size = f"swings by up to {degrees(2.0 * swing)} deg peak to peak" if swing > 0.0 else "chatters"
     return ", ".join([f"fails on {failures}"] * bool(failures) + [f"{size} on {swings}"] * bool(swings))
 
 
@@ -223,6 +243,8 @@ def _notes(result: Recommended) -> list[str]:
     notes += [f"The tendons hold {result.reach_deg:g} deg to {sides} on every simulated rig{short}."]
     if told := decided([result.ranking]):
         notes.append(told)
+    if result.rehearsals:
+        notes.append(_rehearsed(result))
     if result.best is None:
         return notes
     motion, sides = ("ellipses", "any side") if result.bending else ("sines", "both sides")
@@ -238,6 +260,22 @@ def _notes(result: Recommended) -> list[str]:
     return [*notes, f"Next, {how}:", f"$ {result.next_command}"]
 
 
+def _rehearsed(result: Recommended) -> str:
+    """What the emulated rig says of the finalists: the true errors of the recommended one, and who is out and why."""
+    words = []
+    if result.best_row is not None:
+        runs = result.rehearsals[result.best_row].runs
+        each = joined([f"{degrees(run.rmse)} deg with springs x{scale:g}" for scale, run in runs.items()])
+        swing = degrees(result.rehearsals[result.best_row].swing)
+        words.append(f"Rehearsed on the emulated rig it truly errs by {each}, and swings by {swing} deg peak to peak.")
+        if result.on_the_trial is not None:
+            low, _, high = result.on_the_trial
+            words.append(f"With that motion 95 of 100 simulated rigs err by {degrees(low)} to {degrees(high)} deg.")
+    others = [(result.candidates[row].label, run.fault) for row, run in result.rehearsals.items() if run.fault]
+    words += [f"{label} {fault} there, and is not recommended." for label, fault in others]
+    return " ".join(words)
+
+
 def _up_to(limits: Sequence[Limit], unit: str, subject: str) -> str:
     """Up to which value nothing was lost, and what was at the next."""
     from wristctl.simulation.oscillation import LIMIT_CYCLE
@@ -249,7 +287,11 @@ def _up_to(limits: Sequence[Limit], unit: str, subject: str) -> str:
     if sound == len(limits):
         return f"{begin}, the largest tried."
     beyond = limits[sound]
-    how = f"swings by up to {degrees(beyond.swing)} deg" if beyond.swing > LIMIT_CYCLE else "chatters or fails"
+    how = (
+        f"swings by up to {degrees(2.0 * beyond.swing)} deg peak to peak"
+        if beyond.swing > LIMIT_CYCLE
+        else "chatters or fails"
+    )
     return f"{begin}: at {beyond.value:g} {unit} it {how} on {beyond.lost} of {beyond.rigs} rigs."
 
 

@@ -1,0 +1,98 @@
+"""Finalists of a recommendation on the emulated rig: who is taken, who is out, and which wrist no rig can home."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+import wristctl
+from wristctl.commands.inputs import Inputs
+from wristctl.commands.recommend.answer import Candidate, Recommended
+from wristctl.commands.recommend.command import plan
+from wristctl.commands.recommend.rehearsals import Rehearsal, check_homing
+from wristctl.commands.results import Findings
+from wristctl.errors import UserError
+from wristctl.trial.rehearsed import Rehearsed, rehearse
+
+
+def rehearsal(weak: float, strong: float, swing_deg: float = 0.05, outcome: str = "ok") -> Rehearsal:
+    """One with these errors with weak springs and strong ones [deg]."""
+    of = {0.7: (weak, outcome), 1.0: (strong, "ok")}
+    return Rehearsal(
+        {scale: Rehearsed(end, math.radians(error), math.radians(swing_deg)) for scale, (error, end) in of.items()}
+    )
+
+
+def test_what_swings_or_is_stopped_in_its_rehearsal_is_out_and_says_with_which_springs() -> None:
+    assert rehearsal(0.1, 0.1).fault == "" and rehearsal(0.1, 0.4).rmse == pytest.approx(math.radians(0.2))
+    assert rehearsal(0.1, 0.1, swing_deg=0.19).fault == ""
+    assert "swings by 0.21 deg peak to peak with springs x0.7" in rehearsal(0.1, 0.1, swing_deg=0.21).fault
+    stopped = rehearsal(math.nan, 0.1, outcome="rate 11.0 rad/s beyond +-10 rad/s; likely gains")
+    assert stopped.fault == "is stopped with springs x0.7 (rate 11.0 rad/s beyond +-10 rad/s)"
+
+
+@pytest.mark.parametrize(
+    ("runs", "best"),
+    [
+        ({}, 0),
+        ({0: rehearsal(0.1, 0.1), 1: rehearsal(0.09, 0.09)}, 0),  # the first, if it errs hardly more
+        ({0: rehearsal(0.2, 0.1), 1: rehearsal(0.1, 0.1)}, 1),
+        ({0: rehearsal(0.1, 0.1, swing_deg=0.5), 1: rehearsal(0.3, 0.3)}, 1),
+        ({0: rehearsal(0.1, 0.1, swing_deg=0.5), 1: rehearsal(0.3, 0.3, swing_deg=3.0)}, None),
+    ],
+)
+def test_of_those_near_the_best_the_first_is_taken_that_is_sound_and_near_the_least_on_the_emulated_rig(
+    runs: dict[int, Rehearsal], best: int | None
+) -> None:
+    share = SimpleNamespace(times=0)
+    standing = SimpleNamespace(groups=[[0, 1, 2], [3]], lost=[share] * 4, group=lambda row: 1 if row < 3 else 2)
+    ranking: Any = SimpleNamespace(standing=standing, means=[SimpleNamespace(value=v) for v in (1.0, 1.1, 1.2, 9.0)])
+    candidates = [Candidate(name, "tuned", dict.fromkeys("ab"[: k + 1], 1.0)) for k, name in enumerate(("a", "b"))]
+    candidates += [Candidate("c", "tuned", dict.fromkeys("abc", 1.0)), Candidate("feedforward", "", {})]
+    result = Recommended(
+        wristctl.load_study(None), Findings(0), [], 30.0, candidates, ranking, {}, [], [], "", rehearsals=runs
+    )
+    assert result.near == [0, 1, 2] and result.best_row == best
+    assert result.untried == [row for row in (0, 1, 2) if row not in runs]
+    assert best is not None or result.fault is not None
+    assert replace(result, rehearsals={**runs, 2: rehearsal(0.01, 0.01)}).best_row == 2
+
+
+@pytest.mark.parametrize(
+    ("hand", "gravity", "name"),
+    [
+        (0.4, "[-9.81, 0.0]", ""), (0.45, "[-9.81, 0.0]", "buckles"), (0.6, "[-9.81, 0.0]", "buckles"),
+        (0.6, "[9.81, 0.0]", ""), (0.3, "[0.0, 9.81]", "sags"),
+    ],
+)  # fmt: skip
+def test_a_wrist_that_no_rig_can_home_is_refused_by_that_name_before_any_search(
+    hand: float, gravity: str, name: str
+) -> None:
+    """An upright one whose springs, weakened to 0.7, hold the hand by less than a fifth; and one that sags."""
+    study = wristctl.load_study(None, f"wrist.hand_mass={hand}", f"wrist.gravity={gravity}")
+    if not name:
+        check_homing(study, 1)
+        return
+    with pytest.raises(UserError, match=name):
+        check_homing(study, 1)
+    with pytest.raises(UserError):
+        plan(study, Inputs({}))
+    check_homing(wristctl.load_study(None, f"wrist.hand_mass={hand}", "recommend.loop.sensor.level=ideal"), 1)
+
+
+@pytest.mark.slow
+def test_a_controller_that_swings_is_found_and_ends_nobody_elses_rehearsal() -> None:
+    rows = "[{controller: ct-dob, gains: {w: 190, zeta: 0.6, wo: 1600}}, {controller: pid-ff, gains: hardware}]"
+    study = wristctl.load_study(
+        None,
+        f"hw-run={{controllers: {rows}, directions: [ulnar], push: {{force: 0}}, horizon: 3.0, back: 0.3, rest: 0.1, "
+        "reference: {angle_deg: 10, duration: 0.6}, bench: {person: {takes: 0}}, "
+        "homing: {frames: 2, rest: 0.1, let_go: 0.6}}",
+    )
+    swinging, sound = rehearse(study)
+    assert swinging.outcome != "ok" or swinging.swing > math.radians(1.0)
+    assert sound.outcome == "ok" and sound.swing < math.radians(0.2) and 0.0 < sound.rmse < math.radians(0.3)
