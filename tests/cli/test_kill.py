@@ -40,7 +40,8 @@ QUICKLY: dict[str, tuple[tuple[str, ...], ...]] = {
     "recommend": ((
         "--set", "controllers=[pid-ff]", "--set", "loop={plant_segments: 1, control_period: 5.0e-3}",
         "--set", "draw={plant.stiffness: x0.7..1.3}", "--set", "draws=2", "--set", "validation=2", "--set", "tests=8",
-        "--set", "candidates=4", "--set", "iterations=1", "--set", "frequencies=[1.0]", "--set", "payloads=[0.2]",
+        "--set", "candidates=4", "--set", "iterations=1", "--set", "frequencies=[1.0]",
+        "--set", "payloads=[0.2]", "--set", "rehearsed=0",
     ),),
     "audit": (("--set", f"claims=[{CLAIM}]", "--set", "horizon=0.1"),),
 }  # fmt: skip

@@ -209,7 +209,7 @@ def test_where_no_preset_arrives_the_search_is_on_the_loop_and_the_motion_that_w
 RECOMMEND = (
     "recommend", *WRIST, "--set", "controllers=[pid-ff]", "--set", "horizon=2.5", "--set", "draws=2",
     "--set", "validation=2", "--set", "tests=8", "--set", "candidates=4", "--set", "iterations=1",
-    "--set", "frequencies=[0.5]", "--set", "payloads=[0.2]",
+    "--set", "rehearsed=0", "--set", "frequencies=[0.5]", "--set", "payloads=[0.2]",
 )  # fmt: skip
 TRIAL = ("--set", "hw-run.directions=[ulnar]", "--set", "hw-run.push.force=0", "--set", "hw-run.horizon=1.5")
 
