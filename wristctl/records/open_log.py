@@ -21,10 +21,11 @@ from numpy.typing import NDArray
 
 from wristctl.arrays import Array
 from wristctl.errors import OUT, Argument, Phrase, UserError, meant
-from wristctl.plain_files import LARGEST_DATA, open_plain, read_text
+from wristctl.plain_files import LARGEST_DATA, open_plain, read_plain
 from wristctl.records.files import replacing, sha256_of
 from wristctl.records.manifest import MANIFEST
 from wristctl.records.run import Run
+from wristctl.records.table_text import decoded, table_of
 
 Units = Mapping[str, float]
 """Units that a column may have, with their factors to SI."""
@@ -99,6 +100,8 @@ class OpenLog:
     """Line of the file of each sample."""
     header: str = ""
     """File and line of the header."""
+    remarks: Sequence[str] = ()
+    """What was passed over or read in another way, a sentence each."""
 
     def __len__(self) -> int:
         return next((len(column) for column in (*self.columns.values(), *self.words.values())), 0)
@@ -167,7 +170,7 @@ def read_table(
     Parameters
     ----------
     file
-        CSV, or parquet where pandas can read it.
+        CSV, parquet where pandas can read it, or MATLAB's vectors of equal length (before version 7.3).
     names
         Names of another author's columns, as `--columns` has them.
     what
@@ -178,7 +181,7 @@ def read_table(
         Further columns of numbers, with their units.
     """
     table = _Table(file, what, {**COLUMNS, **(more or {})}, others or bool(names.strip()), mapped_names(names))
-    return table.read_parquet() if file.suffix == ".parquet" else table.read_csv()
+    return {".parquet": table.read_parquet, ".mat": table.read_matlab}.get(file.suffix, table.read_csv)()
 
 
 def mapped_names(text: str) -> dict[str, tuple[str, str]]:
@@ -206,21 +209,14 @@ class _Table:
     names: Mapping[str, tuple[str, str]]
 
     def read_csv(self) -> OpenLog:
-        numbered = [(k, line) for k, line in enumerate(text_of(self.file, self.what).splitlines(), 1)]
-        lines = [(k, line) for k, line in numbered if line.strip() and line[0] != "#"]
-        if not lines:
+        known = {unit for units in (*self.units.values(), *OF_TENDONS.values()) for unit in units}
+        table = table_of(text_of(self.file, self.what), self.file, known, EXAMPLE)
+        if table is None:
             problem = f"the {self.what} is empty"
             raise UserError(problem, str(self.file), f"a header such as {EXAMPLE}, samples below")
-        separator = next((mark for mark in (",", ";", "\t") if mark in lines[0][1]), ",")
-        rows = csv.reader((line for _, line in lines), delimiter=separator)
-        cells, numbers = list(rows), [k for k, _ in lines]
-        heads, where = cells[0], f"{self.file}:{numbers[0]}"
-        for row, number in zip(cells, numbers, strict=True):
-            if len(row) != len(heads):
-                problem = f"{len(row)} cells under {len(heads)} columns"
-                raise UserError(problem, f"{self.file}:{number}", "one number for each column")
+        heads, where = table.heads, f"{self.file}:{table.header_line}"
+        body, lines_of = table.rows, table.lines
         chosen = self._chosen(heads, where)
-        body, lines_of = cells[1:], numbers[1:]
         columns, words = dict[str, Array](), dict[str, Words]()
         for place, (name, scale) in chosen.items():
             column = [row[place] for row in body]
@@ -229,7 +225,7 @@ class _Table:
             else:
                 columns[name] = scale * _numbers(column, heads[place], self.file, lines_of)
         written = {name: _name_of(heads[place]) for place, (name, _) in chosen.items()}
-        return OpenLog(self.file, self.what, columns, words, written, lines_of, where)
+        return OpenLog(self.file, self.what, columns, words, written, lines_of, where, table.remarks)
 
     def read_parquet(self) -> OpenLog:
         import pandas as pd
@@ -253,6 +249,34 @@ class _Table:
                 columns[name] = scale * values.to_numpy(float)
         written = {name: _name_of(heads[place]) for place, (name, _) in chosen.items()}
         return OpenLog(self.file, self.what, columns, words, written)
+
+    def read_matlab(self) -> OpenLog:
+        from scipy.io import loadmat
+
+        try:
+            with open_plain(self.file, LARGEST_DATA) as stream:
+                variables = loadmat(stream)
+        except NotImplementedError:
+            raise UserError("a .mat file of version 7.3", str(self.file), "save it with MATLAB's option -v7") from None
+        except (OSError, ValueError) as error:
+            reason = getattr(error, "strerror", None) or error
+            raise UserError(f"cannot read the {self.what}: {reason}", str(self.file), "check the path") from error
+        arrays = {name: np.asarray(value) for name, value in variables.items() if not name.startswith("__")}
+        vectors = {
+            name: value.ravel()
+            for name, value in arrays.items()
+            if value.dtype.kind in "iuf" and value.ndim and value.size == max(value.shape)
+        }
+        heads, columns = list(vectors), dict[str, Array]()
+        chosen = self._chosen(heads, str(self.file))
+        lengths = {heads[place]: len(vectors[heads[place]]) for place in chosen}
+        if len(set(lengths.values())) > 1:
+            problem = "vectors of different lengths: " + ", ".join(f"{name} {size}" for name, size in lengths.items())
+            raise UserError(problem, str(self.file), "one number of each for each sample")
+        for place, (name, scale) in chosen.items():
+            columns[name] = scale * vectors[heads[place]].astype(np.float64)
+        written = {name: heads[place] for place, (name, _) in chosen.items()}
+        return OpenLog(self.file, self.what, columns, {}, written)
 
     def _chosen(self, heads: Iterable[str], where: str) -> dict[int, tuple[str, float]]:
         """Name and factor to SI of the columns that are read, by their places in a line."""
@@ -340,9 +364,9 @@ def _number(cell: str, head: str, where: str) -> float:
 def text_of(file: Path, what: str = "log") -> str:
     """Text of a file, with units in its header where it is a table of a run."""
     try:
-        text = read_text(file, LARGEST_DATA, "utf-8-sig")
+        text = decoded(read_plain(file, LARGEST_DATA)).replace("\r\n", "\n")
     except (OSError, UnicodeDecodeError) as error:
-        reason = error.strerror if isinstance(error, OSError) else "it is no text in UTF-8"
+        reason = error.strerror if isinstance(error, OSError) else "it is no text in UTF-8 or UTF-16"
         problem = f"cannot read the {what}: {reason}"
         raise UserError(problem, str(file), f"a CSV file with a header such as {EXAMPLE}") from error
     return with_units(text, file)

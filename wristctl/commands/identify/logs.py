@@ -63,7 +63,7 @@ class _Read(NamedTuple):
     recordings: list[ArcRecording]
     samples: int
     remarks: list[str]
-    """Which tendons pull to which side, where the motion says it, and how many samples are used if not all are."""
+    """Which tendons pull to which side, where the motion says it, and how many samples are used if not all are; what reading passed over."""
 
 
 def _read(study: Study) -> _Read:
@@ -77,7 +77,8 @@ def _read(study: Study) -> _Read:
     recordings = recordings_of_logs(logs, robot)
     read, used = sum(map(len, logs)), sum(len(recording.time) for recording in recordings)
     fewer = f"Of {read} samples the models are fitted at {used} instants, evenly over each trial."
-    return _Read(robot, recordings, read, [sides] * bool(sides) + [fewer] * (used < read))
+    remarks = [remark for log in logs for remark in log.remarks]
+    return _Read(robot, recordings, read, [*remarks, *[sides] * bool(sides), *[fewer] * (used < read)])
 
 
 def _sides(robot: ArcRobot, numbers: Sequence[int]) -> str:
