@@ -255,7 +255,7 @@ class _Table:
 
         try:
             with open_plain(self.file, LARGEST_DATA) as stream:
-                variables = loadmat(stream)
+                variables = loadmat(stream)  # type: ignore[arg-type] # its stubs know paths alone
         except NotImplementedError:
             raise UserError("a .mat file of version 7.3", str(self.file), "save it with MATLAB's option -v7") from None
         except (OSError, ValueError) as error:

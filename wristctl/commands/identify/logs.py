@@ -63,15 +63,17 @@ class _Read(NamedTuple):
     recordings: list[ArcRecording]
     samples: int
     remarks: list[str]
-    """Which tendons pull to which side, where the motion says it, and how many samples are used if not all are; what reading passed over."""
+    """Which tendons pull to which side, where the motion says it, what reading and looking mended, and how many
+    samples are used if not all are."""
 
 
 def _read(study: Study) -> _Read:
     from wristctl.identification.log_model import recordings_of_logs, robot_of_logs, spools_of_log
     from wristctl.records.log_converters import read_log
+    from wristctl.records.log_looks import looked_at
 
     settings = study.identify
-    logs = [read_log(Path(file), settings.columns or "", "log") for file in settings.logs]
+    logs = [looked_at(read_log(Path(file), settings.columns or "", "log")) for file in settings.logs]
     robot = robot_of_logs(logs, study.wrist, settings.radius_error)
     sides = _sides(robot, spools_of_log(logs[0])) if len(robot.angles) > 2 and "turn" not in robot.base else ""
     recordings = recordings_of_logs(logs, robot)
