@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
@@ -49,7 +50,7 @@ def _without_repeats(log: OpenLog) -> OpenLog:
         # Of two rows that are apart, the one that is out of order goes.
         early = earlier + 1 < later and time[earlier + 1] < time[earlier]
         kept[earlier if early else later] = False
-    first = log.at(int(np.flatnonzero(~kept)[0]))
+    first = Path(log.at(int(np.flatnonzero(~kept)[0]))).name
     remark = f"{np.sum(~kept)} rows that stand twice, with their time, are used once; the first is at {first}."
     return replace(log.only(kept), remarks=[*log.remarks, remark])
 
@@ -65,7 +66,7 @@ def _parted(log: OpenLog) -> OpenLog:
     if not starts:
         return log
     trials = 1 + np.searchsorted(np.array(starts), np.arange(len(log)), side="right")
-    places = ", ".join(log.at(int(k)) for k in starts[:3])
+    places = ", ".join(Path(log.at(int(k))).name for k in starts[:3])
     remark = f"The clock starts again at {places}: each start is a trial of its own, {len(starts) + 1} in all."
     return replace(log, words={**log.words, "trial": trials.astype(str)}, remarks=[*log.remarks, remark])
 
