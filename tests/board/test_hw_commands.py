@@ -65,12 +65,7 @@ def emulate(tmp_path: Path) -> Iterator[Served]:
             assert child.wait(60) == 130
 
 
-def test_a_wrist_in_two_planes_is_not_emulated_in_real_time(hw: Typed) -> None:
-    refused = hw("emulate", "--wrist", "--set", "planes=2")
-    assert refused.returncode == 2 and "virtual time" in refused.stderr and not refused.stdout
-
-
-@pytest.mark.parametrize("how", [[], ["--tcp", "0"], ["--wrist"]], ids=["pty", "tcp", "wrist"])
+@pytest.mark.parametrize("how", [[], ["--tcp", "0"], ["--wrist"], ["--wrist", "--set", "planes=2"]])
 @pytest.mark.slow
 def test_check_tells_who_and_how_the_emulated_board_is(emulate: Served, hw: Typed, how: list[str]) -> None:
     port = emulate(*how)

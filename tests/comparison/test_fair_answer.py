@@ -69,7 +69,7 @@ def said(*rows: RankedRow, tolerated: float = 0.0) -> str:
 
 def lost(text: str, name: str, worlds: int) -> bool:
     """Whether a controller is named among those that must not be used, with its number of worlds."""
-    return bool(re.search(rf"[Dd]o not use.* {name}( by \S+ deg)? \(in {worlds} of 40 worlds\)", text))
+    return bool(re.search(rf"[Dd]o not use.* {name}( by \S+ deg peak to peak)? \(in {worlds} of 40 worlds\)", text))
 
 
 def test_the_better_controller_is_named_whichever_it_is() -> None:
@@ -149,7 +149,9 @@ def test_of_several_rigs_the_one_counts_in_which_a_controller_is_lost_most() -> 
     rows = {"rig": 2, "chain": 5}
     rigs = [ranked(row("a/x", 1.0, swings=count), row("bb/x", 2.0), family=name) for name, count in rows.items()]
     for order in (rigs, rigs[::-1]):
-        assert re.search(r"do not use controllers that .*: a( by \S+ deg)? \(in 5 of 40 worlds, chain\)", told(*order))
+        assert re.search(
+            r"do not use controllers that .*: a( by \S+ deg peak to peak)? \(in 5 of 40 worlds, chain\)", told(*order)
+        )
 
 
 def test_where_all_fail_none_is_recommended() -> None:

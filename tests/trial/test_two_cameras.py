@@ -175,7 +175,6 @@ def test_a_camera_may_be_given_by_its_number() -> None:
 @pytest.mark.parametrize(
     ("settings", "said"),
     [
-        ({"real_time": True}, "real time"),
         ({"bench": {"plant": {"model": "hinges"}}}, "no bench in two planes has bench.plant.model"),
         ({"markers_2": {"base": 1, "tip": 2}}, "different ids"),
     ],

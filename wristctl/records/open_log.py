@@ -24,6 +24,7 @@ from wristctl.errors import OUT, Argument, Phrase, UserError, meant
 from wristctl.plain_files import LARGEST_DATA, open_plain, read_plain
 from wristctl.records.files import replacing, sha256_of
 from wristctl.records.manifest import MANIFEST
+from wristctl.records.matlab_vectors import vectors_of
 from wristctl.records.run import Run
 from wristctl.records.table_text import decoded, table_of
 
@@ -251,30 +252,14 @@ class _Table:
         return OpenLog(self.file, self.what, columns, words, written)
 
     def read_matlab(self) -> OpenLog:
-        from scipy.io import loadmat
-
-        try:
-            with open_plain(self.file, LARGEST_DATA) as stream:
-                variables = loadmat(stream)  # type: ignore[arg-type] # its stubs know paths alone
-        except NotImplementedError:
-            raise UserError("a .mat file of version 7.3", str(self.file), "save it with MATLAB's option -v7") from None
-        except (OSError, ValueError) as error:
-            reason = getattr(error, "strerror", None) or error
-            raise UserError(f"cannot read the {self.what}: {reason}", str(self.file), "check the path") from error
-        arrays = {name: np.asarray(value) for name, value in variables.items() if not name.startswith("__")}
-        vectors = {
-            name: value.ravel()
-            for name, value in arrays.items()
-            if value.dtype.kind in "iuf" and value.ndim and value.size == max(value.shape)
-        }
-        heads, columns = list(vectors), dict[str, Array]()
+        vectors = vectors_of(self.file, self.what)
+        heads = list(vectors)
         chosen = self._chosen(heads, str(self.file))
         lengths = {heads[place]: len(vectors[heads[place]]) for place in chosen}
         if len(set(lengths.values())) > 1:
             problem = "vectors of different lengths: " + ", ".join(f"{name} {size}" for name, size in lengths.items())
             raise UserError(problem, str(self.file), "one number of each for each sample")
-        for place, (name, scale) in chosen.items():
-            columns[name] = scale * vectors[heads[place]].astype(np.float64)
+        columns = {name: scale * vectors[heads[place]] for place, (name, scale) in chosen.items()}
         written = {name: heads[place] for place, (name, _) in chosen.items()}
         return OpenLog(self.file, self.what, columns, {}, written)
 
