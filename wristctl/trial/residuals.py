@@ -90,7 +90,7 @@ RESIDUALS: Mapping[str, Residual] = {
     "pull": Residual(
         _N, "largest tension by spool position and estimated angle",
         lambda s: s.safety.tension, math.inf,
-        "more load than declared (hw-run.payload), something holds the wrist, or wrong zero positions: home again",
+        "more load than declared (hw-run.payload), a held wrist, motors that do not turn, or wrong zero positions",
         "tension of about {value} beyond {limit}",
     ),
     "cell_age": Residual(
