@@ -39,12 +39,19 @@ class Means(NamedTuple):
     recovery: float
     """[s]"""
     simulated: float
-    """RMSE of the same trials in simulation [rad]."""
+    """RMSE of the same trials in simulation, of the true angle [rad]."""
+    true: float
+    """RMSE of the true angle, where an emulated rig knows it [rad]."""
+
+    @property
+    def compared(self) -> float:
+        """What the simulation is held against: the true error where it is known, else the measured one [rad]."""
+        return self.true if math.isfinite(self.true) else self.rmse
 
     @property
     def apart(self) -> bool:
-        """Whether measured and simulated error differ by more than APART."""
-        ratio = self.rmse / self.simulated if self.simulated > 0.0 else math.nan
+        """Whether that and the simulated error differ by more than APART."""
+        ratio = self.compared / self.simulated if self.simulated > 0.0 else math.nan
         return math.isfinite(ratio) and not 1.0 / APART <= ratio <= APART
 
 
@@ -58,7 +65,8 @@ def means_of(trials: pd.DataFrame, twins: Mapping[int, Simulation]) -> Means:
     )
     simulated = [twins[number].metrics["rmse"] for number in trials["trial"]]
     model = float(np.mean(simulated)) if simulated else math.nan
-    return Means(len(trials), rmse, rest, settling, recovery, model)
+    true = float(trials["true_rmse"].mean(skipna=False)) if len(trials) and "true_rmse" in trials else math.nan
+    return Means(len(trials), rmse, rest, settling, recovery, model, true)
 
 
 class TrialWords(NamedTuple):
@@ -102,15 +110,17 @@ def _sentence(trials: pd.DataFrame, label: str, twins: Mapping[int, Simulation])
     if len(free):
         means = means_of(free, twins)
         each = [means_of(group, twins).rmse for _, group in free.groupby("direction", sort=False)]
-        spread = f" ({degrees(min(each))} to {degrees(max(each))} deg by direction)" if len(each) > 1 else ""
-        parts.append(f"error {in_deg(means.rmse)} deg RMSE{spread}")
+        said = [f"truly {in_deg(means.true)} deg"] * math.isfinite(means.true)
+        said += [f"{degrees(min(each))} to {degrees(max(each))} deg by direction"] * (len(each) > 1)
+        parts.append(f"error {in_deg(means.rmse)} deg RMSE" + f" ({'; '.join(said)})" * bool(said))
         parts.append(_within("settles", means.settling))
     if len(pushed):
         means = means_of(pushed, twins)
         force = ", ".join(f"{newtons:g}" for newtons in sorted({abs(force) for force in pushed["push"]}))
         after = f"after a push of {force} N"
         recovers = "is back at once" if means.recovery == 0.0 else _within("recovers", means.recovery)
-        parts.append(f"{recovers} {after} (error {in_deg(means.rmse)} deg RMSE with it)")
+        truly = f", truly {in_deg(means.true)} deg" * math.isfinite(means.true)
+        parts.append(f"{recovers} {after} (error {in_deg(means.rmse)} deg RMSE with it{truly})")
     return f"{label}: {', '.join(parts)}."
 
 
@@ -254,10 +264,13 @@ def _apart(done: pd.DataFrame, labels: Sequence[str], twins: Mapping[int, Simula
         for pushed in (False, True):
             means = means_of(done[(done["label"] == label) & ((done["push"] != 0.0) == pushed)], twins)
             if means.apart:
-                ratio = means.rmse / means.simulated
+                ratio = means.compared / means.simulated
                 times = f"{two(max(ratio, 1.0 / ratio))} times {'larger' if ratio > 1.0 else 'smaller'}"
                 where = f"{f'{label} ' * (len(labels) > 1)}{'with' if pushed else 'without'} a push"
-                facts.append(f"{where} {in_deg(means.rmse)} deg, {times} than {in_deg(means.simulated)} deg simulated")
+                true = "truly " * math.isfinite(means.true)
+                facts.append(
+                    f"{where} {true}{in_deg(means.compared)} deg, {times} than {in_deg(means.simulated)} deg simulated"
+                )
     if not facts:
         return []
     return [f"Measured and simulated errors do not agree: {'; '.join(facts)}. Do not rely on that simulation here."]
