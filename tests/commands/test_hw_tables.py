@@ -13,7 +13,7 @@ import pytest
 import wristctl
 from tests.commands.conftest import repeated
 from wristctl.commands.hw_run import results as hw_tables
-from wristctl.commands.hw_run.answer import answer_of, in_one_plane, swings_apart
+from wristctl.commands.hw_run.answer import answer_of, completed, in_one_plane, swings_apart
 from wristctl.commands.hw_run.command import Performed
 from wristctl.commands.inputs import Inputs
 from wristctl.commands.printed_table import Table
@@ -243,14 +243,14 @@ def test_where_one_of_rig_and_simulation_swings_at_rest_the_kinder_one_is_named(
     table = table.assign(oscillation=seen, true_oscillation=np.radians(rig) / 2.0 if known else np.nan)
     twin = repeated("twin").first
     twins = {number: _swinging(twin, deg) for number, deg in zip(table["trial"], model, strict=True)}
-    notes = swings_apart(table, twins)
+    notes = swings_apart(completed(table), twins)
     assert len(notes) == 2 and all("1 of 5 trials" in note for note in notes)
     assert "the rig swings" in notes[0] and "0.6 deg" in notes[0] and "simulation is kinder" in notes[0]
     assert "the simulation swings" in notes[1] and "by up to 0.7" in notes[1] and "rig is kinder" in notes[1]
     assert all(note in " ".join(answer_of(table, in_one_plane(twins), {}, [], "").lines()) for note in notes)
     alike = table.assign(true_oscillation=table["true_oscillation"] if known else np.nan)
     alike = alike[[(one > 0.2) == (two > 0.2) for one, two in zip(rig, model, strict=True)]]
-    assert not swings_apart(alike, twins)
+    assert not swings_apart(completed(alike), twins)
 
 
 def test_timing_is_told_only_where_ticks_were_skipped() -> None:

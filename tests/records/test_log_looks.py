@@ -3,6 +3,7 @@
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from wristctl.errors import UserError
@@ -29,6 +30,18 @@ def test_refused_before_a_fit(name: str, columns: str, words: str) -> None:
     assert words in str(refused.value)
     if columns:
         assert f"{name}:27" in str(refused.value)
+
+
+@pytest.mark.parametrize("tendon", [1, 2])
+def test_millimetres_under_a_head_of_metres_are_refused_at_the_furthest_sample(tendon: int, tmp_path: Path) -> None:
+    table = pd.read_csv(FIELD / "clean.csv")
+    (head,) = (name for name in table if name.startswith(f"spool_{tendon} [mm]"))
+    changed = table.rename(columns={head: f"spool_{tendon} [m]"})
+    changed.to_csv(tmp_path / "metres.csv", index=False)
+    with pytest.raises(UserError, match="is it in mm") as refused:
+        looked_at(read_log(tmp_path / "metres.csv"))
+    furthest = int(table[head].abs().argmax()) + 2
+    assert f"spool_{tendon}" in str(refused.value) and f"metres.csv:{furthest}" in str(refused.value)
 
 
 def test_a_sound_log_stays_as_it_is() -> None:

@@ -19,7 +19,7 @@ import wristctl
 from tests.commands.conftest import session
 from tests.drawn_rigs import options, tried
 from tests.trial.fault_runs import rig_settings
-from wristctl.commands.hw_run.answer import swings_of
+from wristctl.commands.hw_run.answer import completed, swings_of
 from wristctl.commands.hw_run.command import hw_run
 from wristctl.control.table import controller
 from wristctl.errors import UserError
@@ -61,7 +61,7 @@ def ended_on(number: int) -> dict[str, Any]:
             done = hw_run(session(study, live))
     except UserError as stop:
         return drawn | {"stopped": stop.what}
-    swings = swings_of(done.trials[done.trials["outcome"] == "ok"], done.twins)
+    swings = swings_of(completed(done.trials), done.twins)
     seen, true, simulated = (float(np.degrees(each[0])) for each in swings)
     return drawn | {
         "seen": seen, "true": true, "simulated": simulated,

@@ -35,8 +35,8 @@ class Rehearsed(NamedTuple):
 def rehearse(study: Study, tuned: Gains | None = None) -> list[Rehearsed]:
     """The trials of the study's hw-run section, for each of its controllers.
 
-    A controller whose trial is stopped ends the run; another run goes on with those that were not tried. Raises
-    SafetyStop where the rig cannot be homed.
+    A controller whose trial is stopped ends the run; another run goes on with those that were not tried. Raises what
+    ended a run that has tried none, as SafetyStop where the rig cannot be homed.
     """
     left, found = list(range(len(study.hw_run.rows))), dict[int, Rehearsed]()
     while left:
@@ -59,11 +59,11 @@ def _run(study: Study, tuned: Gains | None) -> dict[int, Rehearsed]:
         try:
             done = Experiment(settings, wrist, trials, log, tuned=tuned, seed=study.seed)
             testbed = open_testbed(settings, wrist, study.seed, View(), lambda text, meanwhile: None)
+            stop: UserError | None = None
             try:
                 done.run(testbed)
-            except UserError:
-                if not done.outcomes:
-                    raise
+            except UserError as error:
+                stop = error
         finally:
             log.close()
         begun = [trial for trial in trials if trial.number in done.outcomes]
@@ -77,6 +77,8 @@ def _run(study: Study, tuned: Gains | None) -> dict[int, Rehearsed]:
         elif own and len(own) == sum(trial.row == row for trial in trials):
             errors, swings = (np.array([m[f"true_{name}"] for _, m in own]) for name in ("rmse", "oscillation"))
             found[row] = Rehearsed("ok", float(np.sqrt(np.mean(errors**2))), 2.0 * float(np.nan_to_num(swings).max()))
+    if stop is not None and not found:
+        raise stop
     return found
 
 

@@ -92,7 +92,7 @@ def answer_of(
     trials: pd.DataFrame, words: TrialWords, metrics: Mapping[str, float], marks: Sequence[str], run: str
 ) -> Answer:
     """What the trials came to; `trials` are all that began, `run` is the path of their run."""
-    done = trials[trials["outcome"] == "ok"].assign(label=lambda table: table["controller"] + "/" + table["gains"])
+    done = completed(trials)
     labels = list(dict.fromkeys(done["label"]))
     more = f"All tables: --all. Every trial: {run}/report.html" if run else "All tables: `.tables`."
     notes = [*words.apart(done, labels), *swings_apart(done, words.twins), *unsound(trials, marks, metrics)]
@@ -138,6 +138,13 @@ def in_s(seconds: float) -> str:
     return two(seconds) if math.isfinite(seconds) else "-"
 
 
+def completed(trials: pd.DataFrame) -> pd.DataFrame:
+    """Trials that ended well, with `label`, and their swings at rest from crest to crest [rad], by log and truly."""
+    done = trials[trials["outcome"] == "ok"]
+    swings = {f"{true}swing": 2.0 * done[f"{true}oscillation"] for true in ("", "true_")}
+    return done.assign(label=done["controller"] + "/" + done["gains"], **swings)
+
+
 class Swings(NamedTuple):
     """Peak to peak at rest [rad] of trials that ended well, (N,) each; 0 where the reference does not rest for 2 s."""
 
@@ -175,25 +182,24 @@ def swings_of(done: pd.DataFrame, twins: Mapping[int, Simulation]) -> Swings:
 
     courses = [twins[number].trajectory for number in done["trial"]]
     still = np.array([at_rest(course) for course in courses], bool)
-    seen, true = (
-        np.where(still, 2.0 * done[name].to_numpy(float), 0.0) if name in done else np.full(len(done), np.nan)
-        for name in ("oscillation", "true_oscillation")
-    )
+    seen, true = (np.where(still, done[name].to_numpy(float), 0.0) for name in ("swing", "true_swing"))
     simulated = [2.0 * oscillation(course) if rests else 0.0 for course, rests in zip(courses, still, strict=True)]
     return Swings(np.nan_to_num(seen), true, np.array(simulated))
 
 
-def marks_of(done: pd.DataFrame, twins: Mapping[int, Simulation], chatters: Mask) -> list[str]:
+def marks_of(trials: pd.DataFrame, twins: Mapping[int, Simulation], tension_range: float, places: int) -> list[str]:
     """In how many of the trials that ended well the wrist does not arrive, swings at rest, or tensions chatter.
 
-    `chatters` (N,) is where tensions cross their range faster than any wrist follows.
+    They chatter where tensions at so many places cross their range [N] faster than any wrist follows.
     """
     import numpy as np
 
     from wristctl.simulation.arrival import SHORT
-    from wristctl.simulation.oscillation import LIMIT_CYCLE
+    from wristctl.simulation.oscillation import LIMIT_CYCLE, chatter
     from wristctl.simulation.trajectory import rests, size_of
 
+    done = completed(trials)
+    chatters = chatter(done["chattering"].to_numpy(float), tension_range, places) > 0.0
     courses = [twins[number].trajectory for number in done["trial"]]
     goals = np.array([size_of(course.bend_ref).max() if rests(course) else np.inf for course in courses])
     short = done["steady_state"].to_numpy(float) > SHORT * goals

@@ -64,11 +64,7 @@ class Performed(StudyResult):
     @property
     def marks(self) -> list[str]:
         """What the wrist does wrong in trials that ended well: `marks_of`."""
-        from wristctl.simulation.oscillation import chatter
-
-        done = self.trials[self.trials["outcome"] == "ok"]
-        slams = chatter(done["chattering"].to_numpy(float), self.study.wrist.tension_range)
-        return marks_of(done, self.twins, slams > 0.0)
+        return marks_of(self.trials, self.twins, self.study.wrist.tension_range, 2)
 
     def frame(self) -> pd.DataFrame:
         """One row per trial that began."""

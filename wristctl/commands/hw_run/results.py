@@ -7,6 +7,7 @@ import numpy as np
 import pandas as pd
 
 from wristctl.commands.hw_run import figures as trial_figures
+from wristctl.commands.hw_run.answer import completed
 from wristctl.commands.printed_table import Table
 from wristctl.commands.results import Findings
 from wristctl.commands.session import Session
@@ -37,10 +38,7 @@ def trial_tables(
     session: Session, trials: pd.DataFrame, network: Inverse | None, tuned: Gains | None
 ) -> tuple[list[Table], Twins]:
     """Tables of all trials that ended well, with metrics and figures, and the simulation of each."""
-    trials = trials[trials["outcome"] == "ok"].assign(
-        label=trials["controller"] + "/" + trials["gains"],
-        **{f"{true}swing": 2.0 * trials[f"{true}oscillation"] for true in ("", "true_")},
-    )
+    trials = completed(trials)
     twins = _twins(session, trials, network, tuned)
     theirs = bool((trials["controller"] == "smc").any())
     rows = [*_means(session, trials, twins), *(_papers() if theirs else ())]

@@ -9,7 +9,7 @@ from functools import partial
 from typing import TYPE_CHECKING, NamedTuple
 
 from wristctl.commands.answer import Answer
-from wristctl.commands.hw_run.answer import APART, ROWS, TrialWords, answer_of, in_deg, in_s, marks_of
+from wristctl.commands.hw_run.answer import APART, ROWS, TrialWords, answer_of, completed, in_deg, in_s, marks_of
 from wristctl.commands.printed_table import Table, two
 from wristctl.commands.results import Findings, StudyResult
 from wristctl.commands.session import Session
@@ -54,11 +54,8 @@ class PerformedBends(StudyResult):
     def marks(self) -> list[str]:
         """What the wrist does wrong in trials that ended well: `marks_of`."""
         from wristctl.board.messages import AXES
-        from wristctl.simulation.oscillation import chatter
 
-        done = self.trials[self.trials["outcome"] == "ok"]
-        slams = chatter(done["chattering"].to_numpy(float), self.study.wrist.tension_range, AXES)
-        return marks_of(done, self.twins, slams > 0.0)
+        return marks_of(self.trials, self.twins, self.study.wrist.tension_range, AXES)
 
     def frame(self) -> pd.DataFrame:
         """One row per trial that began."""
@@ -102,10 +99,7 @@ def bends_performed(session: Session, trials: pd.DataFrame, tuned: Gains | None)
     from wristctl.trial.trials import Trial
 
     study, findings, settings = session.study, session.findings, session.study.hw_run
-    done = trials[trials["outcome"] == "ok"].assign(
-        label=trials["controller"] + "/" + trials["gains"],
-        **{f"{true}swing": 2.0 * trials[f"{true}oscillation"] for true in ("", "true_")},
-    )
+    done = completed(trials)
     names, twins = [row.label for row in settings.rows], dict[int, "Simulation"]()
     simulated = dict[tuple[str, float, str], "Simulation"]()
     with session.progress("compiling and simulating the same trials"):

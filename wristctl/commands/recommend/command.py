@@ -148,8 +148,9 @@ def recommend(session: Session) -> Recommended:
     warn_if_it_buckles(findings, study.wrist, [settings.loop])
     warn_if_coarse([settings.loop])
     warn_of_one_plane(study.wrist, asked_of_rigs(study))
-    family = family_of_rigs(study, reach)
-    check_homing(study, 2 if why_two_planes(study.wrist, asked_of_rigs(study)) else 1)
+    family, bending = family_of_rigs(study, reach), why_two_planes(study.wrist, asked_of_rigs(study))
+    planes = 2 if bending else 1
+    check_homing(study, planes)
     for split in ("tune", "validation", "test"):
         findings.note_streams(streams_of(family, FAMILY, split))
     scaled = [scaled_to(study.wrist, controller(name)) for name in settings.controllers]
@@ -157,8 +158,6 @@ def recommend(session: Session) -> Recommended:
     candidates = _candidates(scaled, searches)
     ranking = _tested(session, study, family, candidates)
     tables = [files_table([candidates[row] for row in ranking.standing.order], takers_of(study))]
-    bending = why_two_planes(study.wrist, asked_of_rigs(study))
-    planes = 2 if bending else 1
     result = Recommended(
         session.study, findings, tables, reach, candidates, ranking, searches, [], [], "", bending=bending
     )
@@ -265,14 +264,19 @@ def _rehearsed(session: Session, study: Study, result: Recommended, planes: int)
 
 def _sines(family: Family, reach: float, frequency: float, planes: int) -> Family:
     """The rigs asked for a sine to both sides, in two planes an ellipse, for at least two of its periods."""
+    horizon = float(max(family.horizon, math.ceil(2.0 / frequency)))
+    if planes == 1:
+        sine = Reference(kind="two-sided-sine", frequency=frequency, angle_deg=sine_deg(reach))
+        return _asked_for(family, sine, horizon)
+    ellipse = {"kind": "ellipse", "turn": 1.0 / frequency, "angle_deg": sine_deg(reach)}
+    asked = _asked_for(family, Reference.model_validate(ellipse), horizon)
+    return asked.model_copy(update={"draw": in_any_direction(asked.draw, asked.references)})
+
+
+def _asked_for(family: Family, motion: Reference, horizon: float) -> Family:
+    """The rigs asked for this motion alone, of which nothing is drawn, for so long [s]."""
     draw = {key: source for key, source in family.draw.items() if not key.startswith("reference.")}
-    motion = Reference(kind="two-sided-sine", frequency=frequency, angle_deg=sine_deg(reach))
-    if planes == 2:
-        asked = {"kind": "ellipse", "turn": 1.0 / frequency, "angle_deg": sine_deg(reach)}
-        motion = Reference.model_validate(asked)
-        draw = in_any_direction(draw, [motion])
-    horizon = max(family.horizon, math.ceil(2.0 / frequency))
-    return family.model_copy(update={"draw": draw, "references": (motion,), "horizon": float(horizon)})
+    return family.model_copy(update={"draw": draw, "references": (motion,), "horizon": horizon})
 
 
 def _laden(family: Family, mass: float) -> Family:
@@ -313,9 +317,7 @@ def _on_the_trials_motion(
     from wristctl.simulation.cases import measure
     from wristctl.simulation.drawn_worlds import drawn_cases
 
-    motion, horizon = motion_of_rehearsal(study, reach, planes)
-    draw = {key: source for key, source in family.draw.items() if not key.startswith("reference.")}
-    asked = family.model_copy(update={"draw": draw, "references": (motion,), "horizon": horizon})
+    asked = _asked_for(family, *motion_of_rehearsal(study, reach, planes))
     law, tests = controller(best.controller), study.recommend.tests
     cases = drawn_cases(asked, FAMILY, "test", study.seed, tests, study.wrist)
     measured = measure(law, np.array([law.values(best.gains)]), cases, study.wrist, ["rmse"])
