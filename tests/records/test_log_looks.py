@@ -35,7 +35,7 @@ def test_refused_before_a_fit(name: str, columns: str, words: str) -> None:
 @pytest.mark.parametrize("tendon", [1, 2])
 def test_millimetres_under_a_head_of_metres_are_refused_at_the_furthest_sample(tendon: int, tmp_path: Path) -> None:
     table = pd.read_csv(FIELD / "clean.csv")
-    (head,) = (name for name in table if name.startswith(f"spool_{tendon} [mm]"))
+    (head,) = (name for name in map(str, table) if name.startswith(f"spool_{tendon} [mm]"))
     changed = table.rename(columns={head: f"spool_{tendon} [m]"})
     changed.to_csv(tmp_path / "metres.csv", index=False)
     with pytest.raises(UserError, match="is it in mm") as refused:
