@@ -112,7 +112,7 @@ SHOWN = {
     "age": (0.061, "s", "61 ms"), "pull": (62.4, "N", "62 N"), "cell_age": (0.2, "s", "200 ms"),
     "measured_pull": (55.3, "N", "55 N"), "excess_pull": (21.0, "N", "21 N"), "missing_pull": (12.2, "N", "12 N"),
     "travel": (0.0123, "m", "12.3 mm"), "disabled": (1.0, "", "1"), "jump": (math.radians(4.2), "rad", "4.2 deg"),
-    "across": (math.radians(9.1), "rad", "9.1 deg"), "load": (0.854, "N m", "0.85 N m"),
+    "doubted": (0.33, "", "33 %"), "across": (math.radians(9.1), "rad", "9.1 deg"), "load": (0.854, "N m", "0.85 N m"),
     "apart": (math.radians(7.0), "rad", "7.0 deg"), "round_trip": (0.0116, "s", "11.6 ms"),
     "skipped": (0.25, "", "25 %"), "unseen": (0.2, "", "20 %"), "repeated": (5.0, "", "5"), "resent": (4.0, "", "4"),
     "moved": (0.1, "", "10 %"), "lag": (0.021, "s", "21 ms"),
@@ -233,7 +233,7 @@ def test_a_few_skipped_ticks_are_borne_and_the_last_half_second_alone_counts() -
 
 def sighting(number: int, verdict: SightingVerdict = SightingVerdict.OK, shift: float = 0.0) -> Sighting:
     corners = np.stack([SQUARE + np.array([0.0, down]) for down in (shift, -300.0)])
-    return Sighting(number / 60.0, number, 0.0, verdict, corners, 1.0)
+    return Sighting(number / 60.0, number, 0.0, verdict, corners, 1.0, stands=1.0, grey=100.0)
 
 
 @pytest.mark.parametrize(("dropped", "share"), [(0.0, 0.05), (0.0, 0.3), (0.4, 0.05), (0.4, 0.3)])

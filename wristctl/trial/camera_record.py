@@ -15,8 +15,16 @@ from wristctl.vision.marker import Sighting, SightingVerdict
 _REFERENCE_FRAMES = 5
 # Seconds between two frames from which the wrist may have gone anywhere.
 _SUCCESSIVE = 0.06
-# Seconds that are summed up: of repeated pictures, and of usable angles.
+# Seconds that are summed up: of repeated pictures and of doubtful ones, and of usable angles.
 _EVENTS, _SEEN = 1.0, 2.0
+# Rate at which a wrist may bend across [rad/s]: where a tendon of 30 deg of bend comes off its pulley it is 0.7.
+_FASTEST = 1.0
+# Share of a second's pictures that may be doubtful.
+_SOUND = 0.1
+# Seconds after such a change in which a picture is doubtful.
+_AFTER = 0.5
+# Share by which the grey level may change before the sizes of markers are that of the light.
+_LIGHT = 0.1
 
 
 class Frame(NamedTuple):
@@ -27,12 +35,20 @@ class Frame(NamedTuple):
     predicted: Array
     """Angles with tendons as believed and as soft as may be, (2,)."""
     away: float
-    """Bend away from the camera, by the size of the tip's marker; nan where it is not known."""
+    """Bend away from the camera, by the size of the tip's marker; nan where a picture does not tell."""
 
     @property
     def apart(self) -> float:
         """Angle off what lies between both predictions [rad]."""
         return self.seen - float(np.clip(self.seen, self.predicted.min(), self.predicted.max()))
+
+
+class _Look(NamedTuple):
+    """How a picture shows the markers."""
+
+    time: float
+    away: float
+    grey: float
 
 
 class Recent:
@@ -55,10 +71,17 @@ class Recent:
 class CameraRecord:
     """One camera's frames since the loop began, with the wrist at rest at zero: the marker's size then is that of no
     bend across. `nearer` is that bend [rad] for a relative change of the size; nan: the size tells nothing.
+
+    A picture is doubtful, and tells no bend across, where the base's marker, which stands, is not seen or changes its
+    size by as much as a bend of `doubtful` [rad] would, where the light changes, or for a while after the size has
+    changed as fast as no wrist bends. After more than a few of them the size counts from where it then is.
     """
 
-    def __init__(self, nearer: float) -> None:
-        self._nearer, self._straight = nearer, list[float]()
+    def __init__(self, nearer: float, doubtful: float = math.inf) -> None:
+        self._nearer, self._straight = nearer, list[_Look]()
+        self._doubtful, self._doubts = doubtful, Recent(_EVENTS)
+        self._before: _Look | None = None
+        self._jumped, self._off = -math.inf, 0.0
         self._base: Array | None = None
         self._repeated, self._usable = Recent(_EVENTS), Recent(_SEEN)
         self.lag = MarkerLag()
@@ -81,15 +104,42 @@ class CameraRecord:
 
     def saw(self, sighting: Sighting, captured: float, predicted: Array, rate: float, clock: float) -> Frame:
         """Take in a usable frame, taken `captured` seconds after tick 0, where the model has (2,) and this rate."""
-        away = -self._nearer * math.log(sighting.size)  # a marker at a bend b is b L/2 further off
-        if math.isfinite(away) and len(self._straight) < _REFERENCE_FRAMES:
-            self._straight.append(away)
-        known = len(self._straight) == _REFERENCE_FRAMES
-        across = away - float(np.median(self._straight)) if known else math.nan
-        self.frame = Frame(sighting.time, sighting.theta, predicted, across)
+        self.frame = Frame(sighting.time, sighting.theta, predicted, self._across(sighting, clock))
         self._usable.add(clock)
         self.lag.add(sighting.theta, float(predicted[0]), rate)
         return self.frame
+
+    def _across(self, sighting: Sighting, clock: float) -> float:
+        """The bend across [rad]; nan where it is not known or the picture is doubtful."""
+        # a marker at a bend b is b L/2 further off
+        look = _Look(sighting.time, -self._nearer * math.log(sighting.size), sighting.grey)
+        if math.isfinite(look.away) and len(self._straight) < _REFERENCE_FRAMES:
+            self._straight.append(look)
+        if len(self._straight) < _REFERENCE_FRAMES:
+            return math.nan
+        _, away, grey = np.median(self._straight, axis=0)
+        if self._jumps(look):
+            self._jumped = clock
+        doubted = (
+            clock - self._jumped < _AFTER
+            or not self._nearer * abs(math.log(sighting.stands)) <= self._doubtful
+            or not abs(look.grey - grey) <= _LIGHT * grey
+        )
+        self._doubts.add(clock, float(doubted))
+        if np.mean(self._doubts.values(clock)) > _SOUND:  # whatever the picture makes of it: from here on it counts
+            self._off = look.away - float(away)
+        return math.nan if doubted else look.away - float(away) - self._off
+
+    def _jumps(self, look: _Look) -> bool:
+        """Whether the size has changed since the picture before as no wrist's does."""
+        before, self._before = self._before or look, look
+        step, time = look.away - before.away, look.time - before.time
+        return time <= _SUCCESSIVE and abs(step) > self._doubtful + _FASTEST * time
+
+    def doubted(self, clock: float, since: float) -> float:
+        """Share of the last second's usable pictures that were doubtful, `since` seconds after the loop began."""
+        doubts = self._doubts.values(clock)
+        return float(np.mean(doubts)) if doubts and since > _EVENTS else math.nan
 
     def repeated(self, clock: float) -> int:
         """Number of pictures in the last second that were no news."""

@@ -129,6 +129,12 @@ RESIDUALS: Mapping[str, Residual] = {
         "the marker's angle jumps by {value} from one frame to the next, beyond {limit}",
         "{value} of jump between frames (limit {limit})",
     ),
+    "doubted": Residual(
+        _SHARE, "share of a second's pictures that tell no bend across", lambda s: 0.9, 0.3,
+        "light that changes (a fixed exposure, LEDs on DC), dirt or glare on a marker, focus or zoom",
+        "{value} of a second's pictures tell no bend across: markers change their size or grey level as no wrist does",
+        "{value} of a second's pictures told no bend across: light, dirt, focus or zoom",
+    ),
     "across": Residual(
         _DEG, "bend across the plane, by the size of the tip's marker", lambda s: math.radians(s.safety.across_deg),
         0.8, "one tendon of two is lost or pulls alone; motors exchanged; a camera that is not square",

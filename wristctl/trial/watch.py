@@ -35,6 +35,8 @@ _FIX = (
     "cut the motors' supply, slacken the tendons by hand, look (documentation: Faults and refusals), then wristctl hw "
     "check --rig"
 )
+# Share of the limit on a bend across by which what stands may seem to bend.
+_DOUBTFUL = 0.5
 _FOLLOWING = "jump", "across", "load", "apart"
 
 
@@ -84,7 +86,8 @@ class Watch:
             wrist, settings.actuator, settings.safety.softest, settings.sensor, self._period, settings.planes
         )
         nearer = 2.0 * settings.markers.distance / wrist.length if settings.planes == 1 else math.nan
-        self._cameras = tuple(CameraRecord(nearer) for _ in range(settings.planes))
+        doubtful = _DOUBTFUL * math.radians(settings.safety.across_deg)
+        self._cameras = tuple(CameraRecord(nearer, doubtful) for _ in range(settings.planes))
         self.limits = limits_of(settings)
         self._judge = Judge(self.limits)
         self._past: deque[_Past] = deque()
@@ -144,6 +147,7 @@ class Watch:
             "disabled": float(tick.state != State.ENABLED),
             **self._following(tick),
             **self._of_timing(tick.clock),
+            "doubted": self._doubted(tick.clock),
             "unseen": max(self._unseen(camera, tick.clock) for camera in self._cameras),
             "repeated": float(max(camera.repeated(tick.clock) for camera in self._cameras)),
             "resent": sum(self._resent.values(tick.clock)),
@@ -208,6 +212,10 @@ class Watch:
         if self._began is None or clock - self._began < _TICKS or not trips:
             return {"round_trip": math.nan, "skipped": math.nan}
         return {"round_trip": float(np.median(trips)), "skipped": skipped / (skipped + len(trips))}
+
+    def _doubted(self, clock: float) -> float:
+        since = clock - (clock if self._began is None else self._began)
+        return self._cameras[0].doubted(clock, since) if len(self._cameras) == 1 else math.nan
 
     def _unseen(self, camera: CameraRecord, clock: float) -> float:
         since = clock - (clock if self._began is None else self._began)

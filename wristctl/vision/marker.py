@@ -75,6 +75,10 @@ class Sighting(NamedTuple):
     """Distance of the tip's marker across the base's, toward theta > 0 [m]"""
     plane: int = 0
     """Bending plane that the camera looks at: 0 ulnar-radial, 1 flexion-extension"""
+    stands: float = math.nan
+    """Size of the base's marker over its own average, 1 of one that stands; nan where it is not seen"""
+    grey: float = math.nan
+    """Mean grey level around the base's marker, 0 to 255; nan where it is not seen"""
 
 
 class _Base(NamedTuple):
@@ -144,13 +148,16 @@ class Tracker:
         verdict, theta = self._judge(frame.time, bases, tips)
         if verdict is SightingVerdict.NO_TIP and self._sees_another_dictionary(frame):
             verdict = SightingVerdict.DICTIONARY
-        size, tip = math.nan, (math.nan, math.nan)
+        size, tip, looks = math.nan, (math.nan, math.nan), (math.nan, math.nan)
         if verdict is SightingVerdict.OK and self._base is not None:
             self._used = frame.time, theta
             rectified = self._view.rectify(tips[0])
             size, tip = _width(rectified) / _width(self._base.corners), self._place(self._base.corners, rectified)
+            if bases:
+                stands = _side(self._view.rectify(bases[0])) / _side(self._base.corners)
+                looks = stands, _grey(frame.image, bases[0])
         shown = np.stack([corners[0] if corners else _UNSEEN for corners in (bases, tips)])
-        return Sighting(frame.time, frame.number, theta, verdict, shown, size, math.nan, *tip, self._plane or 0)
+        return Sighting(frame.time, frame.number, theta, verdict, shown, size, math.nan, *tip, self._plane or 0, *looks)
 
     def _find(self, frame: Frame) -> dict[int, list[Array]]:
         wanted = (self._markers.base, self._markers.tip)
@@ -272,3 +279,14 @@ def _ahead(base: Array, tip: Array) -> bool:
 def _width(corners: Array) -> float:
     """Mean length of the top and the bottom edge."""
     return 0.5 * (math.dist(corners[0], corners[1]) + math.dist(corners[3], corners[2]))
+
+
+def _side(corners: Array) -> float:
+    """Mean length of all four edges."""
+    return float(np.hypot(*edges(corners).T).mean())
+
+
+def _grey(image: Image, corners: Array) -> float:
+    """Mean grey level of the upright rectangle around a marker."""
+    low, high = np.floor(corners.min(axis=0)).astype(int), np.ceil(corners.max(axis=0)).astype(int)
+    return float(image[max(0, low[1]) : high[1], max(0, low[0]) : high[0]].mean())
