@@ -11,8 +11,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from wristctl.errors import UserError
+from wristctl.records.log_columns import COLUMNS, mapped_names, units_of
 from wristctl.records.log_converters import read_log
-from wristctl.records.open_log import COLUMNS, OpenLog, mapped_names, units_of, write_log
+from wristctl.records.open_log import OpenLog, write_log
 
 HEAD = "time [s],trial,spool_1 [mm],spool_2 [mm],tension_1 [N],bend_y [deg],mass [g],marker"
 ROWS = ["0.0,a,1.0,-1.0,2.5,10.0,500,start", "0.1,a,2.0,-2.0,,20.0,500,", "0.0,b,3.0,-3.0,4.5,,500,end"]
@@ -61,7 +62,7 @@ def test_names_of_another_author_are_mapped_with_their_units(tmp_path: Path) -> 
         (
             "bend_y=imu",
             "column 'imu' has no unit",
-            "imu [deg] or [rad]; or leave the file as it is: --columns 'bend_y=imu [deg]'",
+            "imu [deg] or [rad]; or leave the file as it is: --columns 'time=t [s], bend_y=imu [deg]'",
         ),
         ("bend_y=imu [2 N]", "imu is in '2 N'", "a multiple such as [0.5 deg]"),
     ],
@@ -72,22 +73,42 @@ def test_a_mapping_that_cannot_be_meant_is_refused(names: str, what: str, fix: s
     assert what in caught.value.what and fix in caught.value.fix
 
 
-@pytest.mark.parametrize(
-    ("head", "fix"),
-    [
-        ("t_ms;Winkel_grad;Seil1_mm", "--columns 'NAME=t_ms [UNIT]'"),
-        ("t [ms];Winkel [deg];Seil1 [mm]", "Else leave it out, or --columns 'NAME=t'"),
-    ],
-)
-def test_a_header_of_ones_own_is_told_of_the_option_that_maps_it(tmp_path: Path, head: str, fix: str) -> None:
+PROPOSALS = {
+    "t_ms;Winkel_grad;Seil1_mm": "time=t_ms [ms], bend_y=Winkel_grad [deg], spool_1=Seil1_mm [mm]",
+    "t [ms];Winkel [deg];Seil1 [mm]": "time=t [ms], bend_y=Winkel [deg], spool_1=Seil1 [mm]",
+    "Zeit (s);Biegewinkel (Grad);Zugkraft 2 [N]": "time=Zeit (s) [s], bend_y=Biegewinkel (Grad) [deg], "
+    "tension_2=Zugkraft 2 [N]",
+    "temps_s;câble0_mm;câble1_mm": "time=temps_s [s], spool_1=câble0_mm [mm], spool_2=câble1_mm [mm]",
+    "timeMs;thetaRef [rad];seil_rechts_mm;seil_links_mm": "time=timeMs [ms], spool_2=seil_rechts_mm [mm], "
+    "spool_1=seil_links_mm [mm]",
+    "motor1_deg;tip_x_mm;masse_kg": "spool_1=motor1_deg [0.1745 mm], tip_x=tip_x_mm [mm], mass=masse_kg [kg]",
+    "ms;imu;enc1;enc2": "time=ms [ms], bend_y=imu [deg], spool_1=enc1 [mm], spool_2=enc2 [mm]",
+}
+
+
+@pytest.mark.parametrize("head", list(PROPOSALS))
+def test_columns_of_ones_own_are_answered_with_a_text_that_one_can_paste(tmp_path: Path, head: str) -> None:
+    row = ";".join("0123"[: head.count(";") + 1])
     with pytest.raises(UserError) as caught:
-        log_of(tmp_path, head, "0;1;2")
-    assert fix in caught.value.fix
-    units = ("ms", "deg", "mm")
-    theirs = [name.partition(" ")[0] for name in head.split(";")]
-    mapped = zip(("time", "bend_y", "spool_1"), theirs, units, strict=True)
-    names = ", ".join(f"{name}={their} [{unit}]" for name, their, unit in mapped)
-    assert list(log_of(tmp_path, head, "0;1;2", names=names).columns) == ["time", "bend_y", "spool_1"]
+        log_of(tmp_path, head, row)
+    assert f"--columns '{PROPOSALS[head]}'" in caught.value.fix
+    pasted = log_of(tmp_path, head, row, names=PROPOSALS[head])
+    assert list(pasted.columns) == [entry.partition("=")[0] for entry in PROPOSALS[head].split(", ")]
+
+
+def test_a_proposal_says_what_it_guesses_and_what_it_passes_over(tmp_path: Path) -> None:
+    with pytest.raises(UserError) as caught:
+        log_of(tmp_path, "t_s,Winkel,Temperatur", "0,1,2")
+    assert "(guessed: the unit of Winkel) (it passes over Temperatur)" in caught.value.fix
+    with pytest.raises(UserError, match=r"unknown column 'Temperatur'.* --columns 'NAME=Temperatur .UNIT.'"):
+        log_of(tmp_path, "Temperatur", "2")
+
+
+def test_units_in_a_line_may_be_spelt_in_any_way(tmp_path: Path) -> None:
+    with pytest.raises(UserError, match="Grad") as caught:
+        log_of(tmp_path, "time;bend_y", "sec;Grad", "0;90")
+    assert "--columns 'bend_y=bend_y [deg]'" in caught.value.fix
+    assert log_of(tmp_path, "time;bend_y", "sec;°", "0;90").columns["bend_y"] == pytest.approx(0.5 * np.pi)
 
 
 @pytest.mark.parametrize(
@@ -117,7 +138,7 @@ def test_bends_come_from_either_pair_of_columns(tmp_path: Path) -> None:
     assert log_of(tmp_path, "time [s]", "0.2").bends() is None
 
 
-NAMES = st.sampled_from([*COLUMNS, "spool_1", "spool_12", "tension_3"])
+NAMES = st.sampled_from([*(name for name in COLUMNS if name != "time"), "spool_1", "spool_12", "tension_3"])
 VALUES = st.floats(-1e300, 1e300) | st.just(math.nan)
 
 

@@ -76,7 +76,7 @@ def study_command(procedure: Procedure[Any], entry: Entry) -> typer.Typer:
     parameters = [
         Own(
             _option_of(leaf),
-            keys[leaf].description or "",
+            _shown(keys[leaf].description or ""),
             kinds.get(leaf, str),
             completed.get(leaf),
             leaf in entry.advanced,
@@ -89,10 +89,14 @@ def study_command(procedure: Procedure[Any], entry: Entry) -> typer.Typer:
     parameters += [Own("executor", _EXECUTOR, str, advanced=True)] * procedure.in_units
     call.__signature__ = signature(parameters, argument)  # type: ignore[attr-defined]
     app = typer.Typer(add_completion=False)
-    shown = [example.replace("[", r"\[") for example in entry.examples]  # a bracket begins rich's markup
-    epilog = "\n".join(["Examples:", *shown, _MORE_OPTIONS])
+    epilog = "\n".join(["Examples:", *map(_shown, entry.examples), _MORE_OPTIONS])
     app.command(procedure.kind, cls=StudyCommand, help=inspect.getdoc(procedure.perform), epilog=epilog)(call)
     return app
+
+
+def _shown(text: str) -> str:
+    """Text as help shows it: a bracket begins rich's markup."""
+    return text.replace("[", r"\[")
 
 
 def _list(place: str, as_json: bool) -> None:

@@ -54,7 +54,6 @@ COMMANDS = {
         _MAIN,
         "Sample tip positions and bends for a network.",
         shortcuts=("samples", "source", "columns"),
-        advanced=("columns",),
         examples=(
             "wristctl gen-data experiments/paper.yaml",
             "wristctl gen-data --samples 5000 --label large",
@@ -113,7 +112,6 @@ COMMANDS = {
         "Find a real wrist's parameters from measured motions.",
         shortcuts=("columns",),
         argument="runs",
-        advanced=("columns",),
         examples=(
             "wristctl identify latest:hw-run",
             "wristctl identify my.csv",
@@ -195,7 +193,6 @@ COMMANDS = {
         _MORE,
         "Drive the wrist through hysteresis loops; fit a measured one.",
         shortcuts=("drive", "shape", "measured", "columns"),
-        advanced=("columns",),
         examples=(
             "wristctl hysteresis experiments/hysteresis.yaml",
             "wristctl hysteresis --measured loop.csv",

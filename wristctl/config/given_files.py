@@ -25,7 +25,8 @@ def of_file(meaning: str) -> Any:
 def columns_of_file() -> Any:
     """A leaf that maps another author's columns to those of an open log."""
     return of_file(
-        "another's columns, as `time=t [ms], bend_y=imu [deg]`, or a converter's name (documentation: The open log)"
+        "columns of a log with names of its own: 'time=t [ms], bend_y=imu [deg], spool_1=enc [0.175 mm]' says name in "
+        "an open log = name in the file [unit]; or a format's name (documentation: The open log)"
     )
 
 

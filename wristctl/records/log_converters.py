@@ -18,7 +18,9 @@ import numpy as np
 from wristctl.arrays import Array
 from wristctl.errors import UserError
 from wristctl.plain_files import LARGEST_DATA, open_plain
-from wristctl.records.open_log import OpenLog, Units, read_table, text_of
+from wristctl.records.log_columns import Units
+from wristctl.records.open_log import OpenLog, read_table, text_of
+from wristctl.records.parquet_logs import parquet_frame
 from wristctl.records.xlsx import read_sheets
 
 NECK_WINCH = 0.010
@@ -199,14 +201,15 @@ def _spirob(file: Path) -> OpenLog:
     """Measured forces and lengths of two antagonists, and the sum of the joints' angles as the bend."""
     import pandas as pd
 
-    try:
-        with open_plain(file, LARGEST_DATA) as stream:
-            frame = pd.read_csv(stream) if file.suffix == ".csv" else pd.read_parquet(stream)
-    except ImportError:
-        raise UserError("pandas cannot read parquet files here", str(file), "pip install pyarrow") from None
-    except (OSError, ValueError) as error:
-        reason = getattr(error, "strerror", None) or error
-        raise UserError(f"cannot read the recording: {reason}", str(file), "check the path") from error
+    if file.suffix != ".csv":
+        frame = parquet_frame(file, "recording")
+    else:
+        try:
+            with open_plain(file, LARGEST_DATA) as stream:
+                frame = pd.read_csv(stream)
+        except (OSError, ValueError) as error:
+            reason = getattr(error, "strerror", None) or error
+            raise UserError(f"cannot read the recording: {reason}", str(file), "check the path") from error
     return spirob_log(file, {str(name): column.to_numpy() for name, column in frame.items()})
 
 

@@ -10,80 +10,40 @@ from __future__ import annotations
 
 import csv
 import math
-import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import NoReturn
 
 import numpy as np
 from numpy.typing import NDArray
 
 from wristctl.arrays import Array
-from wristctl.errors import OUT, Argument, Phrase, UserError, meant
-from wristctl.plain_files import LARGEST_DATA, open_plain, read_plain
+from wristctl.errors import OUT, Phrase, UserError
+from wristctl.plain_files import LARGEST_DATA, read_plain
 from wristctl.records.files import replacing, sha256_of
+from wristctl.records.log_columns import (
+    COLUMNS,
+    EXAMPLE,
+    SYNONYMS,
+    TENDON,
+    WORDS,
+    Names,
+    Units,
+    chosen_columns,
+    mapped_names,
+    name_of,
+    units_in_a_line,
+    units_of,
+)
+from wristctl.records.log_times import MISSING, is_dated, is_unix, seconds_of
 from wristctl.records.manifest import MANIFEST
 from wristctl.records.matlab_vectors import vectors_of
+from wristctl.records.parquet_logs import parquet_table
+from wristctl.records.recorded_table import Cells, RecordedTable
 from wristctl.records.run import Run
 from wristctl.records.table_text import decoded, table_of
 
-Units = Mapping[str, float]
-"""Units that a column may have, with their factors to SI."""
 Words = NDArray[np.str_]
-
-TIME: Units = {"s": 1.0, "ms": 1e-3}
-ANGLE: Units = {"deg": math.pi / 180.0, "rad": 1.0}
-LENGTH: Units = {"m": 1.0, "mm": 1e-3, "um": 1e-6}
-FORCE: Units = {"N": 1.0}
-MASS: Units = {"kg": 1.0, "g": 1e-3}
-
-COLUMNS: Mapping[str, Units] = {
-    "time": TIME,
-    "bend_y": ANGLE,
-    "bend_z": ANGLE,
-    "inclination": ANGLE,
-    "orientation": ANGLE,
-    "tip_x": LENGTH,
-    "tip_y": LENGTH,
-    "tip_z": LENGTH,
-    "mass": MASS,
-    "pose": ANGLE,
-}
-"""Columns of numbers, beside those of tendons."""
-OF_TENDONS: Mapping[str, Units] = {"spool": LENGTH, "tension": FORCE}
-WORDS = ("trial", "marker")
-"""Columns of words."""
-
-SYNONYMS: Mapping[str, str] = {
-    "angle": "bend_y",
-    "bend": "bend_y",
-    "theta": "bend_y",
-    "x": "tip_x",
-    "y": "tip_y",
-    "z": "tip_z",
-    "hand_mass": "mass",
-    "spool_plus": "spool_1",
-    "spool_minus": "spool_2",
-    "tension_plus": "tension_1",
-    "tension_minus": "tension_2",
-}
-"""Other names of columns. In a plane the + side's tendon is the first, that of the - side the second."""
-
-EXAMPLE = "time [s],angle [deg],spool_1 [mm],spool_2 [mm]"
-
-# Most letters of a column's name.
-_LONGEST = 1000
-_HEAD = re.compile(r"\s*(.*?)\s*(?:\[\s*([^]]*?)\s*\])?\s*")
-_TENDON = re.compile(rf"({'|'.join(OF_TENDONS)})_([1-9]\d*)")
-_SCALED = re.compile(r"([-+]?[\d.]+(?:[eE][-+]?\d+)?)\s*(?:x\s*)?(\S*)")
-_MISSING = ("", "-", "nan", "NaN", "NA", "null")
-
-
-def units_of(name: str) -> Units | None:
-    """Units of a column of numbers by its name in an open log, None of no such column."""
-    tendon = _TENDON.fullmatch(name)
-    return OF_TENDONS[tendon[1]] if tendon else COLUMNS.get(name)
 
 
 @dataclass(frozen=True)
@@ -103,6 +63,8 @@ class OpenLog:
     """File and line of the header."""
     remarks: Sequence[str] = ()
     """What was passed over or read in another way, a sentence each."""
+    scales: Mapping[str, float] = field(default_factory=dict)
+    """Factors to SI with which columns were read, by their names: what one count of a counter is."""
 
     def __len__(self) -> int:
         return next((len(column) for column in (*self.columns.values(), *self.words.values())), 0)
@@ -132,7 +94,7 @@ class OpenLog:
 
     def tendons(self, quantity: str) -> dict[int, Array]:
         """Columns of all tendons' spools [m] or tensions [N] by the tendons' numbers; empty where there are none."""
-        numbers = sorted(int(match[2]) for name in self.columns if (match := _TENDON.fullmatch(name)))
+        numbers = sorted(int(match[2]) for name in self.columns if (match := TENDON.fullmatch(name)))
         names = {number: f"{quantity}_{number}" for number in numbers}
         return {number: self.whole(name) for number, name in names.items() if name in self.columns}
 
@@ -181,168 +143,92 @@ def read_table(
     more
         Further columns of numbers, with their units.
     """
-    table = _Table(file, what, {**COLUMNS, **(more or {})}, others or bool(names.strip()), mapped_names(names))
-    return {".parquet": table.read_parquet, ".mat": table.read_matlab}.get(file.suffix, table.read_csv)()
+    table = _READERS.get(file.suffix, _text_table)(file, what)
+    return named(table, file, mapped_names(names), what, others or bool(names.strip()), more)
 
 
-def mapped_names(text: str) -> dict[str, tuple[str, str]]:
-    """Name in an open log and unit, by another author's name: `bend_y=imu [deg]` gives {"imu": ("bend_y", "deg")}."""
-    mapped: dict[str, tuple[str, str]] = {}
-    for entry in filter(str.strip, re.split(r",(?![^[]*\])", text)):
-        standard, equals, theirs = entry.partition("=")
-        head = _HEAD.fullmatch(theirs)
-        name = SYNONYMS.get(standard.strip(), standard.strip())
-        if not equals or head is None or not head[1]:
-            raise UserError(f"{entry.strip()!r} maps no column", "columns", "time=t [ms], bend_y=imu [deg]")
-        if units_of(name) is None and name not in WORDS:
-            fix = meant(name, [*COLUMNS, *WORDS, "spool_1", "tension_1"])
-            raise UserError(f"{name} is no column of an open log", "columns", fix)
-        mapped[head[1]] = name, head[2] or ""
-    return mapped
+def named(
+    table: RecordedTable,
+    file: Path,
+    names: Names,
+    what: str = "log",
+    others: bool = False,
+    more: Mapping[str, Units] | None = None,
+) -> OpenLog:
+    """The open log that a recorded table is by the names of its columns, in SI units.
+
+    Parameters and errors are those of `read_table`; `names` are read already.
+    """
+    where = f"{file}:{table.header_line}" if table.header_line else str(file)
+    dated = [place for place, cells in enumerate(table.cells) if is_dated(cells)]
+    chosen = chosen_columns(table.heads, names, {**COLUMNS, **(more or {})}, others, dated, where)
+    lengths = {table.heads[place]: len(table.cells[place]) for place in chosen}
+    if len(set(lengths.values())) > 1:
+        problem = "vectors of different lengths: " + ", ".join(f"{name} {size}" for name, size in lengths.items())
+        raise UserError(problem, str(file), "one number of each for each sample")
+    columns, words, remarks = dict[str, Array](), dict[str, Words](), list(table.remarks)
+    for place, (name, scale) in chosen.items():
+        cells, head = table.cells[place], name_of(table.heads[place])
+        if name in WORDS:
+            words[name] = np.array([str(cell).strip() for cell in cells], dtype=str)
+        elif name == "time" and place in dated and (math.isnan(scale) or _is_date(cells, scale)):
+            columns[name], told = seconds_of(cells, scale, head, file, table.lines)
+            remarks.append(told)
+        else:
+            columns[name] = scale * _numbers(cells, head, file, table.lines)
+    written = {name: name_of(table.heads[place]) for place, (name, _) in chosen.items()}
+    scales = {name: scale for name, scale in chosen.values() if name not in WORDS and not math.isnan(scale)}
+    return OpenLog(file, what, columns, words, written, table.lines, where, remarks, scales)
 
 
-@dataclass(frozen=True)
-class _Table:
-    file: Path
-    what: str
-    units: Mapping[str, Units]
-    others: bool
-    names: Mapping[str, tuple[str, str]]
-
-    def read_csv(self) -> OpenLog:
-        known = {unit for units in (*self.units.values(), *OF_TENDONS.values()) for unit in units}
-        table = table_of(text_of(self.file, self.what), self.file, known, EXAMPLE)
-        if table is None:
-            problem = f"the {self.what} is empty"
-            raise UserError(problem, str(self.file), f"a header such as {EXAMPLE}, samples below")
-        heads, where = table.heads, f"{self.file}:{table.header_line}"
-        body, lines_of = table.rows, table.lines
-        chosen = self._chosen(heads, where)
-        columns, words = dict[str, Array](), dict[str, Words]()
-        for place, (name, scale) in chosen.items():
-            column = [row[place] for row in body]
-            if name in WORDS:
-                words[name] = np.array([cell.strip() for cell in column])
-            else:
-                columns[name] = scale * _numbers(column, heads[place], self.file, lines_of)
-        written = {name: _name_of(heads[place]) for place, (name, _) in chosen.items()}
-        return OpenLog(self.file, self.what, columns, words, written, lines_of, where, table.remarks)
-
-    def read_parquet(self) -> OpenLog:
-        import pandas as pd
-
-        try:
-            with open_plain(self.file, LARGEST_DATA) as stream:
-                frame = pd.read_parquet(stream)
-        except ImportError:
-            raise UserError("pandas cannot read parquet files here", str(self.file), "pip install pyarrow") from None
-        except (OSError, ValueError) as error:
-            reason = getattr(error, "strerror", None) or error
-            raise UserError(f"cannot read the {self.what}: {reason}", str(self.file), "check the path") from error
-        heads = [str(name) for name in frame.columns]
-        columns, words = dict[str, Array](), dict[str, Words]()
-        chosen = self._chosen(heads, str(self.file))
-        for place, (name, scale) in chosen.items():
-            values = frame.iloc[:, place]
-            if name in WORDS:
-                words[name] = values.astype(str).to_numpy(str)
-            else:
-                columns[name] = scale * values.to_numpy(float)
-        written = {name: _name_of(heads[place]) for place, (name, _) in chosen.items()}
-        return OpenLog(self.file, self.what, columns, words, written)
-
-    def read_matlab(self) -> OpenLog:
-        vectors = vectors_of(self.file, self.what)
-        heads = list(vectors)
-        chosen = self._chosen(heads, str(self.file))
-        lengths = {heads[place]: len(vectors[heads[place]]) for place in chosen}
-        if len(set(lengths.values())) > 1:
-            problem = "vectors of different lengths: " + ", ".join(f"{name} {size}" for name, size in lengths.items())
-            raise UserError(problem, str(self.file), "one number of each for each sample")
-        columns = {name: scale * vectors[heads[place]] for place, (name, scale) in chosen.items()}
-        written = {name: heads[place] for place, (name, _) in chosen.items()}
-        return OpenLog(self.file, self.what, columns, {}, written)
-
-    def _chosen(self, heads: Iterable[str], where: str) -> dict[int, tuple[str, float]]:
-        """Name and factor to SI of the columns that are read, by their places in a line."""
-        chosen, missing = dict[int, tuple[str, float]](), dict(self.names)
-        for place, cell in enumerate(heads):
-            if len(cell) > _LONGEST:
-                raise UserError(f"a column's name has {len(cell)} letters", where, f"a header such as {EXAMPLE}")
-            match = _HEAD.fullmatch(cell)
-            written, unit = (match[1], match[2] or "") if match else (cell.strip(), "")
-            name = SYNONYMS.get(written, written)
-            if written in self.names:
-                name, mapped_unit = missing.pop(written, self.names[written])
-                unit = mapped_unit or unit
-            elif cell.strip() in self.names:
-                name, unit = missing.pop(cell.strip(), self.names[cell.strip()])
-            units = self.units.get(written) or units_of(name) or ({"": 1.0} if name in WORDS else None)
-            if units is None:
-                if self.others:
-                    continue
-                self._refuse_unknown(written, match is None or match[2] is None, where)
-            if name in (other for other, _ in chosen.values()):
-                raise UserError(f"column {written} stands there twice", where, f"leave one out that is {name}")
-            chosen[place] = name, _factor(written, name, unit, units, where)
-        for theirs, (name, _) in missing.items():
-            fix = meant(theirs, [_name_of(head) for head in heads])
-            raise UserError(f"no column {theirs!r}, which is to be {name}", where, fix)
-        return chosen
-
-    def _refuse_unknown(self, written: str, bare: bool, where: str) -> NoReturn:
-        choices = [*self.units, *WORDS, *SYNONYMS, "spool_3", "tension_3"]
-        if bare:
-            raise _without_unit(written, f"a header as {EXAMPLE}", f"NAME={written} [UNIT]", where)
-        fix = (f"{meant(written, choices)} Else leave it out, or ", Argument("columns", f"NAME={written}", quoted=True))
-        raise UserError(f"unknown column {written!r}", where, fix)
+def _is_date(cells: Cells, scale: float) -> bool:
+    """Whether a column with a unit holds dates, or numbers that are Unix times in it."""
+    try:
+        return is_unix(np.asarray(cells, dtype=np.float64), scale)
+    except ValueError:
+        return True
 
 
-def _without_unit(written: str, head: str, mapped: str, where: str) -> UserError:
-    fix = (f"{head}; or leave the file as it is: ", Argument("columns", mapped, quoted=True))
-    return UserError(f"column {written!r} has no unit", where, fix)
+def _text_table(file: Path, what: str) -> RecordedTable:
+    table = table_of(text_of(file, what), file, units_in_a_line(), EXAMPLE)
+    if table is None:
+        raise UserError(f"the {what} is empty", str(file), f"a header such as {EXAMPLE}, samples below")
+    cells = [[row[place] for row in table.rows] for place in range(len(table.heads))]
+    return RecordedTable(table.heads, cells, table.lines, table.header_line, table.remarks)
 
 
-def _name_of(head: str) -> str:
-    match = _HEAD.fullmatch(head)
-    return match[1] if match else head.strip()
+def _matlab_table(file: Path, what: str) -> RecordedTable:
+    vectors = vectors_of(file, what)
+    return RecordedTable(list(vectors), list(vectors.values()))
 
 
-def _factor(written: str, name: str, unit: str, units: Units, where: str) -> float:
-    """Factor to SI of a unit, which may be a multiple of one: 0.175 mm; `name` is what the column is here."""
-    if unit in units:
-        return units[unit]
-    choices = f"{written} [{'] or ['.join(units)}]"
-    if not unit:
-        raise _without_unit(written, choices, f"{name}={written} [{next(iter(units))}]", where)
-    scaled = _SCALED.fullmatch(unit)
-    if scaled is None or scaled[2] not in units:
-        raise UserError(
-            f"{written} is in {unit!r}", where, f"{choices}, or a multiple such as [0.5 {next(iter(units))}]"
-        )
-    return float(scaled[1]) * units[scaled[2]]
+_READERS: Mapping[str, Callable[[Path, str], RecordedTable]] = {".parquet": parquet_table, ".mat": _matlab_table}
 
 
-def _numbers(cells: Sequence[str], head: str, file: Path, lines: Sequence[int]) -> Array:
+def _numbers(cells: Cells, head: str, file: Path, lines: Sequence[int]) -> Array:
     """Numbers of a column, nan where a cell is empty."""
     try:
-        values: Array = np.array(cells, dtype=str).astype(np.float64) if cells else np.empty(0)
+        values: Array = np.array(cells, dtype=np.float64) if len(cells) else np.empty(0)
     except ValueError:
-        values = np.array([_number(cell, head, f"{file}:{line}") for cell, line in zip(cells, lines, strict=True)])
+        values = np.array([_number(str(cell), head, _at(file, lines, row)) for row, cell in enumerate(cells)])
     if (endless := np.flatnonzero(np.isinf(values))).size:
-        _number(cells[endless[0]], head, f"{file}:{lines[endless[0]]}")
+        _number(str(cells[endless[0]]), head, _at(file, lines, int(endless[0])))
     return values
 
 
+def _at(file: Path, lines: Sequence[int], row: int) -> str:
+    return f"{file}:{lines[row]}" if lines else str(file)
+
+
 def _number(cell: str, head: str, where: str) -> float:
-    if cell.strip() in _MISSING:
+    if cell.strip() in MISSING:
         return math.nan
     try:
         value = float(cell)
     except ValueError:
         value = math.nan
     if not math.isfinite(value):
-        raise UserError(f"{_name_of(head)} is {cell.strip()!r}", where, "a number with a decimal point")
+        raise UserError(f"{head} is {cell.strip()!r}", where, "a number with a decimal point")
     return value
 
 

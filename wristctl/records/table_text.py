@@ -96,7 +96,12 @@ def _mark_of(lines: Sequence[str]) -> str:
 def _are_units(row: Sequence[str], heads: Sequence[str], units: Collection[str]) -> bool:
     cells = [cell.strip(" []()") for cell in row]
     bare = not any("[" in head for head in heads)
-    return bare and len(row) == len(heads) and any(cells) and all(cell in units or not cell for cell in cells)
+    return (
+        bare
+        and len(row) == len(heads)
+        and any(cells)
+        and all(not cell or {cell, cell.lower()} & set(units) for cell in cells)
+    )
 
 
 def _is_number(cell: str) -> bool:

@@ -18,8 +18,9 @@ from wristctl.config.loop import Reference
 from wristctl.config.section import Parameter
 from wristctl.config.wrist import WristParameters
 from wristctl.errors import UserError, meant
+from wristctl.records.log_columns import ANGLE, SYNONYMS
 from wristctl.records.log_converters import read_log
-from wristctl.records.open_log import ANGLE, SYNONYMS, OpenLog
+from wristctl.records.open_log import OpenLog
 from wristctl.simulation.reference import TIP_TOLERANCE, ReferenceKind, beyond_reach
 from wristctl.wrist.kinematics import exact_arc
 from wristctl.wrist.spatial.spatial_kinematics import exact_bend

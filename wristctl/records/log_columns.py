@@ -1,0 +1,294 @@
+"""Columns of logs: their names and units, and the text by which another author's columns are named (`--columns`)."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Collection, Mapping, Sequence
+from typing import NamedTuple
+
+from wristctl.errors import Argument, UserError, meant, nearest
+from wristctl.records.column_guesses import UNIT_WORDS, Guess, guesses
+
+Units = Mapping[str, float]
+"""Units that a column may have, with their factors to SI."""
+
+TIME: Units = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
+ANGLE: Units = {"deg": math.pi / 180.0, "rad": 1.0}
+LENGTH: Units = {"m": 1.0, "mm": 1e-3, "um": 1e-6, "cm": 1e-2}
+FORCE: Units = {"N": 1.0}
+MASS: Units = {"kg": 1.0, "g": 1e-3}
+
+COLUMNS: Mapping[str, Units] = {
+    "time": TIME,
+    "bend_y": ANGLE,
+    "bend_z": ANGLE,
+    "inclination": ANGLE,
+    "orientation": ANGLE,
+    "tip_x": LENGTH,
+    "tip_y": LENGTH,
+    "tip_z": LENGTH,
+    "mass": MASS,
+    "pose": ANGLE,
+}
+"""Columns of numbers, beside those of tendons."""
+OF_TENDONS: Mapping[str, Units] = {"spool": LENGTH, "tension": FORCE}
+WORDS = ("trial", "marker")
+"""Columns of words."""
+
+SYNONYMS: Mapping[str, str] = {
+    "timestamp": "time",
+    "angle": "bend_y",
+    "bend": "bend_y",
+    "theta": "bend_y",
+    "x": "tip_x",
+    "y": "tip_y",
+    "z": "tip_z",
+    "hand_mass": "mass",
+    "spool_plus": "spool_1",
+    "spool_minus": "spool_2",
+    "tension_plus": "tension_1",
+    "tension_minus": "tension_2",
+}
+"""Other names of columns. In a plane the + side's tendon is the first, that of the - side the second."""
+
+EXAMPLE = "time [s],angle [deg],spool_1 [mm],spool_2 [mm]"
+
+# Other spellings of units that mean one thing in every language.
+_SPELT = {"°": "deg", "degrees": "deg", "degree": "deg", "sec": "s", "seconds": "s", "µs": "us", "μs": "us",
+          "µm": "um", "μm": "um"}  # fmt: skip
+# Most letters of a column's name.
+_LONGEST = 1000
+_HEAD = re.compile(r"\s*(.*?)\s*(?:\[\s*([^]]*?)\s*\])?\s*")
+TENDON = re.compile(rf"({'|'.join(OF_TENDONS)})_([1-9]\d*)")
+"""Name of a tendon's column: its quantity and its number."""
+_SCALED = re.compile(r"([-+]?[\d.]+(?:[eE][-+]?\d+)?)\s*(?:x\s*)?(\S*)")
+
+Names = Mapping[str, tuple[str, str]]
+"""Name in an open log and unit (empty: as the header says), by another author's name."""
+
+
+class Column(NamedTuple):
+    """A column that is read: its name in an open log, and its factor to SI."""
+
+    name: str
+    scale: float
+
+
+def units_of(name: str) -> Units | None:
+    """Units of a column of numbers by its name in an open log, None of no such column."""
+    tendon = TENDON.fullmatch(name)
+    return OF_TENDONS[tendon[1]] if tendon else COLUMNS.get(name)
+
+
+def units_in_a_line() -> frozenset[str]:
+    """Words that a line of units under a header may have."""
+    maps = (*COLUMNS.values(), *OF_TENDONS.values())
+    return frozenset({*_SPELT, *UNIT_WORDS, *(unit for units in maps for unit in units)})
+
+
+def mapped_names(text: str) -> dict[str, tuple[str, str]]:
+    """Name in an open log and unit, by another author's name: `bend_y=imu [deg]` gives {"imu": ("bend_y", "deg")}."""
+    mapped: dict[str, tuple[str, str]] = {}
+    for entry in filter(str.strip, re.split(r",(?![^[]*\])", text)):
+        standard, equals, theirs = entry.partition("=")
+        head = _HEAD.fullmatch(theirs)
+        name = SYNONYMS.get(standard.strip(), standard.strip())
+        if not equals or head is None or not head[1]:
+            raise UserError(f"{entry.strip()!r} maps no column", "columns", "time=t [ms], bend_y=imu [deg]")
+        if units_of(name) is None and name not in WORDS:
+            fix = meant(name, [*COLUMNS, *WORDS, "spool_1", "tension_1"])
+            raise UserError(f"{name} is no column of an open log", "columns", fix)
+        mapped[head[1]] = name, head[2] or ""
+    return mapped
+
+
+def name_of(head: str) -> str:
+    """Name of a column in a header, without its unit."""
+    match = _HEAD.fullmatch(head)
+    return match[1] if match else head.strip()
+
+
+def chosen_columns(
+    heads: Sequence[str], names: Names, units: Mapping[str, Units], others: bool, dated: Collection[int], where: str
+) -> dict[int, Column]:
+    """The columns that are read, by their places in a header.
+
+    Raises UserError, with the text for `--columns` that may be meant, for a column without a name or a unit that is
+    known, for one that stands there twice, and for a name of `names` that no column has.
+
+    Parameters
+    ----------
+    heads
+        Names with units in brackets, as they stand in the file.
+    names
+        Names of another author's columns.
+    units
+        Columns of numbers of other names, with their units.
+    others
+        Whether columns of other names are passed over.
+    dated
+        Places of columns that hold dates or Unix times, whose unit they say themselves.
+    where
+        File and line of the header, for errors.
+    """
+    chosen, missing, unknown = dict[int, Column](), dict(names), list[int]()
+    for place, cell in enumerate(heads):
+        if len(cell) > _LONGEST:
+            raise UserError(f"a column's name has {len(cell)} letters", where, f"a header such as {EXAMPLE}")
+        match = _HEAD.fullmatch(cell)
+        written, unit = (match[1], match[2] or "") if match else (cell.strip(), "")
+        name = SYNONYMS.get(written, written)
+        if written in names:
+            name, mapped_unit = missing.pop(written, names[written])
+            unit = mapped_unit or unit
+        elif cell.strip() in names:
+            name, unit = missing.pop(cell.strip(), names[cell.strip()])
+        known = units.get(written) or units_of(name) or ({"": 1.0} if name in WORDS else None)
+        if known is None:
+            unknown += [] if others else [place]
+            continue
+        if name in (column.name for column in chosen.values()):
+            raise UserError(f"column {written} stands there twice", where, f"leave one out that is {name}")
+        if name == "time" and place in dated and not unit:
+            chosen[place] = Column(name, math.nan)
+            continue
+        factor = _factor(unit, known)
+        if factor is None:
+            raise _without_factor(written, name, unit, known, heads, names, where)
+        chosen[place] = Column(name, factor)
+    if unknown:
+        raise _unknown(heads, unknown, units, names, where)
+    for theirs, (name, _) in missing.items():
+        fix = meant(theirs, [name_of(head) for head in heads])
+        raise UserError(f"no column {theirs!r}, which is to be {name}", where, fix)
+    return chosen
+
+
+def _factor(unit: str, units: Units) -> float | None:
+    """Factor to SI of a unit, which may be a multiple of one: 0.175 mm; None of one that is not known."""
+    unit = _SPELT.get(unit, unit)
+    if unit in units:
+        return units[unit]
+    scaled = _SCALED.fullmatch(unit)
+    return float(scaled[1]) * units[scaled[2]] if scaled and scaled[2] in units else None
+
+
+def _without_factor(
+    written: str, name: str, unit: str, units: Units, heads: Sequence[str], names: Names, where: str
+) -> UserError:
+    choices = f"{written} [{'] or ['.join(units)}]"
+    mapped = f"{name}={written} [{UNIT_WORDS.get(unit.lower(), next(iter(units)))}]"
+    proposed = proposal(heads, names)
+    if unit and unit.lower() not in UNIT_WORDS:
+        fix = f"{choices}, or a multiple such as [0.5 {next(iter(units))}]"
+        return UserError(f"{written} is in {unit!r}", where, fix)
+    whole = proposed.text if f"{name}={written} " in proposed.text else mapped
+    problem = f"{written} is in {unit!r}" if unit else f"column {written!r} has no unit"
+    told = (f"{choices}; or leave the file as it is: ", Argument("columns", whole, quoted=True), proposed.doubts)
+    return UserError(problem, where, told)
+
+
+def _unknown(
+    heads: Sequence[str], unknown: Sequence[int], units: Mapping[str, Units], names: Names, where: str
+) -> UserError:
+    written = [name_of(heads[place]) for place in unknown]
+    proposed = proposal(heads, names)
+    choices = [*units, *WORDS, *SYNONYMS, "spool_3", "tension_3"]
+    like = nearest(written[0], choices) if len(written[0]) > 3 else None
+    text = proposed.text or f"NAME={written[0]}{'' if '[' in heads[unknown[0]] else ' [UNIT]'}"
+    option = Argument("columns", text, quoted=True)
+    if proposed.text and like is None:
+        begin = "if this is what they are: " if len(written) > 1 else "if this is what it is: "
+    else:
+        begin = f"{meant(written[0], choices)} Else leave it out, or "
+    problem = f"unknown column{'s' if len(written) > 1 else ''} {', '.join(map(repr, written[:6]))}"
+    return UserError(f"{problem}{', ...' if len(written) > 6 else ''}", where, (begin, option, proposed.doubts))
+
+
+class Proposal(NamedTuple):
+    """A text for `--columns` that may be meant."""
+
+    text: str
+    """Empty where no column's name says what it is."""
+    doubts: str
+    """Which units are guesses, and which columns it passes over; empty where there are none."""
+
+
+def proposal(heads: Sequence[str], names: Names | None = None) -> Proposal:
+    """The text for `--columns` that columns may be meant by, from their names and units.
+
+    Parameters
+    ----------
+    heads
+        Names with units in brackets, as they stand in the file.
+    names
+        What is named already, and stays.
+    """
+    named = dict(names or {})
+    entries, guessed, passed = list[str](), list[str](), list[str]()
+    taken = {name for name, _ in named.values()}
+    fresh = [head for head in heads if name_of(head) not in named and head.strip() not in named]
+    guess_of = dict(zip(fresh, guesses(fresh, taken, _known_already), strict=True))
+    for head in heads:
+        theirs = name_of(head)
+        key = theirs if theirs in named else head.strip()
+        if key in named:
+            name, unit = named[key]
+            written = "" if unit or name in WORDS or _in_header(head, name) else _first_unit(name)
+            guessed += [theirs] if written else []
+            entries.append(_entry(name, key, unit or written))
+            continue
+        guess = guess_of[head]
+        if guess is None:
+            passed.append(theirs)
+        elif not guess.standing:
+            entries.append(_entry(guess.name, theirs, guess.unit))
+            guessed += [theirs] if guess.unsure else []
+    entries = [entry for entry in entries if _reads_back(entry)]
+    counts = any(entry == f"spool_{k}={theirs} [mm]" for entry in entries for theirs in guessed for k in range(1, 10))
+    count = "; of a counter [0.175 mm] is what one count reels in" if counts else ""
+    doubts = f" (guessed: the unit of {', '.join(guessed)}{count})" if guessed else ""
+    return Proposal(", ".join(entries), doubts + (f" (it passes over {', '.join(passed[:6])})" if passed else ""))
+
+
+def _known_already(head: str) -> Guess | None:
+    """What a column is that an open log has by its name and unit."""
+    match = _HEAD.fullmatch(head)
+    written, unit = (match[1], match[2] or "") if match else (head.strip(), "")
+    name = SYNONYMS.get(written, written)
+    units = units_of(name)
+    if name in WORDS:
+        return Guess(name, "", False, True)
+    if units is None:
+        return None
+    if _factor(unit, units) is not None:
+        return Guess(name, unit, False, True)
+    spelt = UNIT_WORDS.get(unit.lower(), "")
+    return Guess(name, spelt if spelt in units else next(iter(_first(name))), spelt not in units, False)
+
+
+def _first(name: str) -> Sequence[str]:
+    """Units of a column, the commonest first."""
+    return ("mm",) if units_of(name) is LENGTH else tuple(units_of(name) or ())
+
+
+def _first_unit(name: str) -> str:
+    return next(iter(_first(name)), "")
+
+
+def _in_header(head: str, name: str) -> bool:
+    match = _HEAD.fullmatch(head)
+    return match is not None and _factor(match[2] or "", units_of(name) or {}) is not None
+
+
+def _entry(name: str, theirs: str, unit: str) -> str:
+    return f"{name}={theirs} [{unit}]" if unit else f"{name}={theirs}"
+
+
+def _reads_back(entry: str) -> bool:
+    """Whether an entry means one column: names may hold commas, brackets or equals signs."""
+    try:
+        return len(mapped_names(entry)) == 1
+    except UserError:
+        return False
