@@ -26,7 +26,8 @@ def columns_of_file() -> Any:
     """A leaf that maps another author's columns to those of an open log."""
     return of_file(
         "columns of a log with names of its own: 'time=t [ms], bend_y=imu [deg], spool_1=enc [0.175 mm]' says name in "
-        "an open log = name in the file [unit]; or a format's name (documentation: The open log)"
+        "an open log = name in the file [unit], 'tip=Hand, base=Arm' rigid bodies; or a format's name (documentation: "
+        "The open log)"
     )
 
 

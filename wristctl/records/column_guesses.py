@@ -29,7 +29,25 @@ UNIT_WORDS = {
 _KINDS = {"s": "time", "ms": "time", "us": "time", "ns": "time", "deg": "angle", "rad": "angle", "m": "length",
           "mm": "length", "cm": "length", "um": "length", "N": "force", "kg": "mass", "g": "mass"}  # fmt: skip
 # Parts of names, of four letters or more wherever they stand in a word; shorter ones are whole words.
-_WANTED = ("ref", "soll", "cmd", "command", "target", "ziel", "consigne", "setpoint", "desired", "goal")
+_OTHERS = (
+    "velocity",
+    "speed",
+    "geschw",
+    "vitesse",
+    "accel",
+    "gyro",
+    "temperat",
+    "ref",
+    "soll",
+    "cmd",
+    "command",
+    "target",
+    "ziel",
+    "consigne",
+    "setpoint",
+    "desired",
+    "goal",
+)
 _WORDS = {
     "time": ("time", "zeit", "temps", "stamp", "horodat", "epoch", "datum", "clock", "t", "ms", "sec", "date"),
     "tension": ("tension", "force", "kraft", "zugkraft", "loadcell", "effort", "traction", "f", "load", "zug"),
@@ -123,7 +141,7 @@ def _read(head: str) -> _Read:
 
 def _kind(read: _Read) -> str | None:
     """Quantity by the words, of several the one that the unit is of; by the unit where no word says it."""
-    if any(_has(word, _WANTED) for word in read.words):
+    if any(_has(word, _OTHERS) for word in read.words):
         return None
     fitting = _OF_KIND[_KINDS[read.unit]] if read.unit else ()
     by_words = [kind for kind, parts in _WORDS.items() if any(_has(word, parts) for word in read.words)]

@@ -12,6 +12,7 @@ from wristctl.errors import UserError
 from wristctl.plain_files import LARGEST_DATA, read_plain
 from wristctl.plugins.trust import agree, digest_of
 from wristctl.records.files import replacing, sha256_of
+from wristctl.records.parquet_logs import info_of
 from wristctl.study_files.resolved import sections_read
 
 # Folder of a run that holds the copies.
@@ -39,6 +40,8 @@ def sealed_files(study: Study, kind: str) -> SealedFiles:
             digest = hashlib.sha256(content).hexdigest()
             names[name] = f"{INPUTS}/{digest[:12]}/{Path(name).name}"
             contents[names[name]] = content
+            if (info := info_of(Path(name))) is not None:  # which names the parts of its vectors
+                contents[f"{INPUTS}/{digest[:12]}/{info.name}"] = _content(info)
     if not names:
         return SealedFiles(study)
     sections_with_copies = {section: with_files(getattr(study, section), names.__getitem__) for section in sections}

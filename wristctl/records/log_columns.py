@@ -87,10 +87,15 @@ def units_in_a_line() -> frozenset[str]:
     return frozenset({*_SPELT, *UNIT_WORDS, *(unit for units in maps for unit in units)})
 
 
+def entries_of(text: str) -> list[str]:
+    """Entries of a text for `--columns`: commas part them, but for those within brackets."""
+    return [entry.strip() for entry in re.split(r",(?![^[]*\])", text) if entry.strip()]
+
+
 def mapped_names(text: str) -> dict[str, tuple[str, str]]:
     """Name in an open log and unit, by another author's name: `bend_y=imu [deg]` gives {"imu": ("bend_y", "deg")}."""
     mapped: dict[str, tuple[str, str]] = {}
-    for entry in filter(str.strip, re.split(r",(?![^[]*\])", text)):
+    for entry in entries_of(text):
         standard, equals, theirs = entry.partition("=")
         head = _HEAD.fullmatch(theirs)
         name = SYNONYMS.get(standard.strip(), standard.strip())

@@ -30,6 +30,7 @@ from wristctl.records.log_columns import (
     Names,
     Units,
     chosen_columns,
+    entries_of,
     mapped_names,
     name_of,
     units_in_a_line,
@@ -38,8 +39,11 @@ from wristctl.records.log_columns import (
 from wristctl.records.log_times import MISSING, is_dated, is_unix, seconds_of
 from wristctl.records.manifest import MANIFEST
 from wristctl.records.matlab_vectors import vectors_of
+from wristctl.records.motion_capture import motive_table, qualisys_table, reader_of, vicon_table
 from wristctl.records.parquet_logs import parquet_table
 from wristctl.records.recorded_table import Cells, RecordedTable
+from wristctl.records.rigid_bodies import KEYS, BodyNames, bends_of_bodies
+from wristctl.records.ros_bags import SUFFIXES, bag_table
 from wristctl.records.run import Run
 from wristctl.records.table_text import decoded, table_of
 
@@ -133,9 +137,9 @@ def read_table(
     Parameters
     ----------
     file
-        CSV, parquet where pandas can read it, or MATLAB's vectors of equal length (before version 7.3).
+        CSV, parquet, MATLAB's vectors of equal length (before version 7.3), an export of motion capture, a bag of ROS.
     names
-        Names of another author's columns, as `--columns` has them.
+        Names of another author's columns and rigid bodies, as `--columns` has them.
     what
         Description of the log for its author.
     others
@@ -143,22 +147,31 @@ def read_table(
     more
         Further columns of numbers, with their units.
     """
-    table = _READERS.get(file.suffix, _text_table)(file, what)
-    return named(table, file, mapped_names(names), what, others or bool(names.strip()), more)
+    entries = entries_of(names)
+    kinds = [entry for entry in entries if entry in FORMATS]
+    keys = {key: entry for entry in entries if (key := entry.partition("=")[0].strip()) in KEYS and "=" in entry}
+    bodies = BodyNames(**{key: entry.partition("=")[2].strip() for key, entry in keys.items()})
+    rest = ", ".join(entry for entry in entries if entry not in (*kinds, *keys.values()))
+    table = _read(file, what, kinds[0] if kinds else "")
+    log = _named(table, file, mapped_names(rest), what, others or bool(entries), more)
+    if not table.bodies or ({"bend_y", "bend_z", "inclination"} & log.columns.keys() and not bodies.said):
+        return log
+    columns, told = bends_of_bodies(table, bodies, file)
+    return replace(log, columns={**log.columns, **columns}, remarks=[*log.remarks, *told])
 
 
-def named(
-    table: RecordedTable,
-    file: Path,
-    names: Names,
-    what: str = "log",
-    others: bool = False,
-    more: Mapping[str, Units] | None = None,
+def _read(file: Path, what: str, kind: str) -> RecordedTable:
+    """Columns of a file by its ending, or by how its text begins; of a kind of text that is named, as that."""
+    if file.suffix in _READERS:
+        return _READERS[file.suffix](file, what)
+    text = text_of(file, what)
+    reader = FORMATS[kind] if kind else reader_of(text)
+    return reader(text, file) if reader else _text_table(text, file, what)
+
+
+def _named(
+    table: RecordedTable, file: Path, names: Names, what: str, others: bool, more: Mapping[str, Units] | None
 ) -> OpenLog:
-    """The open log that a recorded table is by the names of its columns, in SI units.
-
-    Parameters and errors are those of `read_table`; `names` are read already.
-    """
     where = f"{file}:{table.header_line}" if table.header_line else str(file)
     dated = [place for place, cells in enumerate(table.cells) if is_dated(cells)]
     chosen = chosen_columns(table.heads, names, {**COLUMNS, **(more or {})}, others, dated, where)
@@ -189,8 +202,8 @@ def _is_date(cells: Cells, scale: float) -> bool:
         return True
 
 
-def _text_table(file: Path, what: str) -> RecordedTable:
-    table = table_of(text_of(file, what), file, units_in_a_line(), EXAMPLE)
+def _text_table(text: str, file: Path, what: str) -> RecordedTable:
+    table = table_of(text, file, units_in_a_line(), EXAMPLE)
     if table is None:
         raise UserError(f"the {what} is empty", str(file), f"a header such as {EXAMPLE}, samples below")
     cells = [[row[place] for row in table.rows] for place in range(len(table.heads))]
@@ -202,7 +215,18 @@ def _matlab_table(file: Path, what: str) -> RecordedTable:
     return RecordedTable(list(vectors), list(vectors.values()))
 
 
-_READERS: Mapping[str, Callable[[Path, str], RecordedTable]] = {".parquet": parquet_table, ".mat": _matlab_table}
+FORMATS: Mapping[str, Callable[[str, Path], RecordedTable]] = {
+    "motive": motive_table,
+    "vicon": vicon_table,
+    "qualisys": qualisys_table,
+}
+"""Exports of motion capture by the names that `--columns` has for them; how they begin says it too."""
+
+_READERS: Mapping[str, Callable[[Path, str], RecordedTable]] = {
+    ".parquet": parquet_table,
+    ".mat": _matlab_table,
+    **dict.fromkeys(SUFFIXES, bag_table),
+}
 
 
 def _numbers(cells: Cells, head: str, file: Path, lines: Sequence[int]) -> Array:

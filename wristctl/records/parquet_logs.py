@@ -64,6 +64,16 @@ def info_of(file: Path) -> Path | None:
     return next((place for place in places if file.suffix == ".parquet" and place.is_file()), None)
 
 
+def files_of_recording(path: Path) -> list[Path]:
+    """The files that a recording has which is a folder: a bag of ROS 2, or a data set; of any other path itself."""
+    files = list[Path]()
+    if (path / "meta" / INFO).is_file():
+        files = sorted(path.glob("data/*/*.parquet"))
+    elif (path / "metadata.yaml").is_file():
+        files = sorted(file for file in path.iterdir() if file.suffix in (".mcap", ".db3"))
+    return files or [path]
+
+
 def _plain(series: Any) -> np.ndarray[Any, Any]:
     """Numbers, dates or texts (T,), or numbers (T, N) of vectors."""
     import pandas as pd

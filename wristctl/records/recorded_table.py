@@ -2,16 +2,35 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
+
+from wristctl.arrays import Array
 
 Cells = Sequence[str] | np.ndarray[Any, Any]
 """A column: texts as they stand in the file, or numbers, dates or texts of numpy (T,)."""
 INSTALL = "pip install 'wristctl[logs]'"
 """What installs the libraries that read logs in binary formats."""
+
+
+@dataclass(frozen=True)
+class RigidBody:
+    """Poses of a rigid body, a marker cluster or an inertial unit at T times, in the axes of the laboratory."""
+
+    time: Array
+    """(T,) [s]"""
+    turn: Array
+    """Orientation as unit quaternions x, y, z, w (T, 4); nan where it was lost."""
+    place: Array | None
+    """Position (T, 3) [m]; None of what has an orientation alone."""
+    rows: NDArray[np.intp]
+    """Row of the table of each time (T,)."""
+    since: int | None = None
+    """Row of the table from whose pose the orientation counts; None: from axes of its own."""
 
 
 @dataclass(frozen=True)
@@ -27,3 +46,5 @@ class RecordedTable:
     """Line of the header; 0 of a binary file."""
     remarks: Sequence[str] = ()
     """What was passed over or read in another way, a sentence each."""
+    bodies: Mapping[str, RigidBody] = field(default_factory=dict)
+    """Rigid bodies by their names."""

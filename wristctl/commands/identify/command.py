@@ -21,6 +21,7 @@ from wristctl.commands.session import Session
 from wristctl.config.study import Study
 from wristctl.errors import UserError
 from wristctl.records import Run
+from wristctl.records.parquet_logs import files_of_recording
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -32,7 +33,7 @@ if TYPE_CHECKING:
 log = logging.getLogger(__name__)
 
 # Endings of names that are of tables and never of runs.
-_TABLES = (".csv", ".txt", ".parquet")
+_TABLES = (".csv", ".txt", ".tsv", ".parquet", ".mat", ".mcap", ".db3", ".bag")
 # Draws of the posterior that a run keeps as a family of worlds.
 _DRAWS = 200
 
@@ -80,13 +81,19 @@ class _Logged(NamedTuple):
 
 
 def with_logs(study: Study) -> Study:
-    """The study with files among its runs named as open logs."""
+    """The study with files among its runs named as open logs, and recordings that are folders by their files."""
     runs = study.identify.runs
-    logs = tuple(run for run in runs if Path(run).is_file() or Path(run).suffix in _TABLES)
+    files = {run: files_of_recording(Path(run)) for run in runs}
+    logs = {run: found for run, found in files.items() if found != [Path(run)] or _is_log(Path(run))}
     if not logs:
         return study
-    changed = {"runs": tuple(run for run in runs if run not in logs), "logs": (*study.identify.logs, *logs)}
+    named = tuple(str(file) for found in logs.values() for file in found)
+    changed = {"runs": tuple(run for run in runs if run not in logs), "logs": (*study.identify.logs, *named)}
     return study.model_copy(update={"identify": study.identify.model_copy(update=changed)})
+
+
+def _is_log(path: Path) -> bool:
+    return path.is_file() or path.suffix in _TABLES
 
 
 def plan(study: Study, inputs: Inputs) -> str:

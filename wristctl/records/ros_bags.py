@@ -1,0 +1,122 @@
+"""Recordings of ROS: MCAP and SQLite files of ROS 2, bags of ROS 1, read by rosbags without a ROS installation.
+
+A message is a row at the time of its header's stamp, or of its recording where it has none. Columns are
+`/topic.joint.position` of JointState, `/topic` of numbers; rigid bodies are poses, transforms and inertial units by
+their topics.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from wristctl.errors import UserError
+from wristctl.plain_files import LARGEST_DATA, open_plain
+from wristctl.records.recorded_table import INSTALL, RecordedTable, RigidBody
+
+SUFFIXES = (".mcap", ".db3", ".bag")
+"""Endings of files that are bags."""
+
+_NUMBERS = ("Float64", "Float32", "Int32", "Int64", "UInt32", "UInt16", "Int16")
+_VECTORS = ("Float64MultiArray", "Float32MultiArray", "Int32MultiArray")
+_POSES = ("PoseStamped", "PoseWithCovarianceStamped", "TransformStamped", "Odometry", "Imu")
+_NANOSECONDS = 10**9
+
+
+def bag_table(file: Path, what: str) -> RecordedTable:
+    """Columns and rigid bodies of a bag; `what` is what an error calls it.
+
+    Raises UserError for a file that cannot be read, or without messages of the types that are read.
+    """
+    try:
+        from rosbags.highlevel import AnyReader
+        from rosbags.typesys import Stores, get_typestore
+    except ImportError:
+        raise UserError("bags are read by rosbags, which is not installed", str(file), INSTALL) from None
+    columns = dict[str, dict[int, float]]()
+    poses = dict[str, dict[int, list[float]]]()
+    types = set[str]()
+    try:
+        open_plain(file, LARGEST_DATA).close()
+        with AnyReader([file], default_typestore=get_typestore(Stores.LATEST)) as reader:
+            types = {connection.msgtype for connection in reader.connections}
+            wanted = [connection for connection in reader.connections if _is_read(connection.msgtype)]
+            for connection, recorded, raw in reader.messages(wanted) if wanted else ():
+                message: Any = reader.deserialize(raw, connection.msgtype)
+                _note(connection.topic, connection.msgtype.rpartition("/")[2], message, recorded, columns, poses)
+    except Exception as error:  # of a torn file the library's reader fails in any way
+        reason = getattr(error, "strerror", None) or error
+        fix = "a bag of ROS, closed properly (`ros2 bag reindex`)"
+        raise UserError(f"cannot read the {what}: {reason}", str(file), fix) from error
+    if not columns and not poses:
+        problem = f"no topic of a type that is read, but {', '.join(sorted(types)) or 'none at all'}"
+        raise UserError(
+            problem, str(file), "JointState, PoseStamped, TransformStamped, Odometry, Imu or Float64 in the bag"
+        )
+    return _table(columns, poses)
+
+
+def _is_read(kind: str) -> bool:
+    return kind.rpartition("/")[2] in ("JointState", *_NUMBERS, *_VECTORS, *_POSES)
+
+
+def _note(
+    topic: str,
+    kind: str,
+    message: Any,
+    recorded: int,
+    columns: dict[str, dict[int, float]],
+    poses: dict[str, dict[int, list[float]]],
+) -> None:
+    """Put a message's numbers into the columns, its pose (place, then x, y, z, w) into the poses, at its time [ns]."""
+    header = getattr(message, "header", None)
+    stamp = _NANOSECONDS * header.stamp.sec + header.stamp.nanosec if header else 0
+    time = stamp or recorded
+    if kind == "JointState":
+        for quantity in ("position", "velocity", "effort"):
+            for joint, value in zip(message.name, getattr(message, quantity), strict=False):
+                columns.setdefault(f"{topic}.{joint}.{quantity}", {})[time] = float(value)
+    elif kind in _NUMBERS:
+        columns.setdefault(topic, {})[time] = float(message.data)
+    elif kind in _VECTORS:
+        for k, value in enumerate(message.data):
+            columns.setdefault(f"{topic}.{k}", {})[time] = float(value)
+    elif kind != "Imu" or message.orientation_covariance[0] != -1.0:  # -1: it has no orientation
+        place, turn = _pose(kind, message)
+        lost = [np.nan] * 3
+        position = [place.x, place.y, place.z] if place is not None else lost
+        poses.setdefault(topic, {})[time] = [*position, turn.x, turn.y, turn.z, turn.w]
+
+
+def _pose(kind: str, message: Any) -> tuple[Any, Any]:
+    """Position, None of an inertial unit, and orientation."""
+    if kind == "Imu":
+        return None, message.orientation
+    if kind == "TransformStamped":
+        return message.transform.translation, message.transform.rotation
+    pose = message.pose if kind == "PoseStamped" else message.pose.pose
+    return pose.position, pose.orientation
+
+
+def _table(columns: Mapping[str, Mapping[int, float]], poses: Mapping[str, Mapping[int, list[float]]]) -> RecordedTable:
+    """One row for each time that a message has, with empty cells where the others have none."""
+    times = np.unique(np.array([time for stream in (*columns.values(), *poses.values()) for time in stream], np.int64))
+    seconds = (times - times[0]) / _NANOSECONDS
+    cells = [seconds]
+    for stream in columns.values():
+        column = np.full(len(times), np.nan)
+        column[np.searchsorted(times, np.array(list(stream), np.int64))] = list(stream.values())
+        cells.append(column)
+    bodies = dict[str, RigidBody]()
+    for topic, stream_of_poses in poses.items():
+        rows = np.searchsorted(times, np.array(list(stream_of_poses), np.int64))
+        values = np.array(list(stream_of_poses.values()))[np.argsort(rows)]
+        rows = np.sort(rows)
+        size = np.linalg.norm(values[:, 3:], axis=1, keepdims=True)
+        turn = np.where(size > 0.5, values[:, 3:] / np.where(size > 0.5, size, 1.0), np.nan)
+        place = None if np.isnan(values[:, :3]).all() else values[:, :3]
+        bodies[topic] = RigidBody(seconds[rows], turn, place, rows)
+    return RecordedTable(["time [s]", *columns], cells, bodies=bodies)
