@@ -134,12 +134,12 @@ def test_identified_values_replace_what_a_command_knows_and_leave_its_levels() -
     assert {name: loop.sensor.level for name, loop in tuned.loops.items()} == levels
 
 
-def _log_of(file: Path, noise: float, backward: bool = False, step: float = 0.02) -> None:
-    """An open log of a wrist in one plane that follows its spools 40 ms late."""
+def _log_of(file: Path, noise: float, unlike: bool = False, step: float = 0.02) -> None:
+    """An open log of a wrist in one plane that follows its spools 40 ms late, or that has a motion of its own."""
     time = np.arange(0.0, 8.0, step)
     bend = 20.0 * np.sin(1.5 * time) * np.minimum(1.0, time)
     late = np.interp(time - 0.04, time, bend) + noise * np.random.default_rng(0).normal(size=len(time))
-    spool = 14.142 * np.radians(bend) * (-1.0 if backward else 1.0)
+    spool = 14.142 * np.radians(20.0 * np.sin(2.3 * time) if unlike else bend)
     rows = [f"{t:.3f},{s:.5f},{-s:.5f},{b:.4f}" for t, s, b in zip(time, spool, late, strict=True)]
     file.write_text("\n".join(["time [s],spool_1 [mm],spool_2 [mm],bend_y [deg]", *rows]) + "\n")
 
@@ -168,7 +168,7 @@ def test_an_open_log_tells_what_it_can_in_a_run_of_its_own(call: Call, tmp_path:
 
 @pytest.mark.slow
 def test_a_log_that_no_model_predicts_is_refused_with_its_answer(call: Call, tmp_path: Path) -> None:
-    _log_of(tmp_path / "back.csv", 0.05, backward=True)
+    _log_of(tmp_path / "back.csv", 0.05, unlike=True)
     code, out, err = call("identify", str(tmp_path / "back.csv"))
     assert code == 3 and out == "" and "nothing of it is to be relied on" in err and "misfit=tell" in err
     failed = open_run(next((tmp_path / "results").glob("*-identify-*")))

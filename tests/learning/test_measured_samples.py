@@ -98,7 +98,7 @@ def test_other_inputs_and_trials_come_along(tmp_path: Path) -> None:
         ("x [mm],w [mm],angle [deg]", "unknown column 'w'", "leave it out"),
         ("x [mm],tip_x [mm],angle [deg]", "column tip_x stands there twice", "leave one out"),
         ("x [mm],time [s],angle [deg]", "no column tip_y", "a header such as tip_x [mm]"),
-        ("x [m],y [m],angle [rad]", "an angle of -1970 deg", "unit"),
+        ("x [m],y [m],angle [rad]", "angle reaches 1,970 deg by its header", "is it in degrees?"),
     ],
 )
 def test_what_is_wrong_with_a_file_is_said(head: str, what: str, fix: str, tmp_path: Path) -> None:

@@ -1,35 +1,66 @@
 """What no wrist does is refused at its line before anything is fitted; what is mended is told."""
 
+from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 import pytest
 
+from tests.identification.inner_rigs import drawn_rig, recorded
+from tests.identification.test_log_model import planar
+from wristctl.arrays import Array
 from wristctl.errors import UserError
 from wristctl.records.log_converters import read_log
 from wristctl.records.log_looks import looked_at
+from wristctl.records.open_log import OpenLog
 
 FIELD = Path(__file__).parents[1] / "data" / "field"
 COUNTS = "time=ms [ms], bend_y=imu [deg], spool_1=enc1 [0.000719 mm], spool_2=enc2 [0.000719 mm]"
 
 
 @pytest.mark.parametrize(
-    ("name", "columns", "words"),
+    ("name", "words"),
     [
-        ("swapped.csv", "", "exchanged"),
-        ("degrees_as_rad.csv", "", "in degrees"),
-        ("ms_as_s.csv", "", "in ms"),
-        ("still.csv", "", "without motion"),
-        ("wrapped_counts.csv", COUNTS, "enc1 jumps 47 mm"),
+        ("swapped.csv", "exchanged"),
+        ("degrees_as_rad.csv", "in degrees"),
+        ("ms_as_s.csv", "in ms"),
+        ("still.csv", "without motion"),
     ],
 )
-def test_refused_before_a_fit(name: str, columns: str, words: str) -> None:
+def test_refused_before_a_fit(name: str, words: str) -> None:
     with pytest.raises(UserError) as refused:
-        looked_at(read_log(FIELD / name, columns))
+        looked_at(read_log(FIELD / name))
     assert words in str(refused.value)
-    if columns:
-        assert f"{name}:27" in str(refused.value)
+
+
+@pytest.mark.parametrize(
+    ("name", "told"),
+    [
+        ("swapped.csv", "spool_1=spool_2 [mm], spool_2=spool_1 [mm]"),
+        ("degrees_as_rad.csv", "bend_y=bend_y [deg]"),
+        ("ms_as_s.csv", "time=time [ms]"),
+    ],
+)
+def test_the_fix_can_be_pasted_and_gives_the_clean_numbers(name: str, told: str) -> None:
+    with pytest.raises(UserError) as refused:
+        looked_at(read_log(FIELD / name))
+    assert f"--columns '{told}'" in refused.value.fix
+    clean, log = read_log(FIELD / "clean.csv"), looked_at(read_log(FIELD / name, told))
+    for column, values in clean.columns.items():
+        np.testing.assert_allclose(log.columns[column], values, rtol=1e-12, atol=1e-15)
+
+
+def test_the_fix_keeps_what_was_named(tmp_path: Path) -> None:
+    table = pd.read_csv(FIELD / "swapped.csv")
+    table.columns = pd.Index(["t", "imu", "m1", "m2"])
+    table.to_csv(tmp_path / "own.csv", index=False)
+    names = "time=t [s], bend_y=imu [deg], spool_1=m1 [0.5 mm], spool_2=m2 [0.5 mm]"
+    with pytest.raises(UserError) as refused:
+        looked_at(read_log(tmp_path / "own.csv", names))
+    fix = "time=t [s], bend_y=imu [deg], spool_1=m2 [0.5 mm], spool_2=m1 [0.5 mm]"
+    assert f"--columns '{fix}'" in refused.value.fix
 
 
 @pytest.mark.parametrize("tendon", [1, 2])
@@ -62,3 +93,138 @@ def test_a_clock_that_starts_again_parts_the_log() -> None:
     assert len(trials) == 2
     assert all(np.all(np.diff(trial.columns["time"]) > 0.0) for trial in trials.values())
     assert ":502:" in log.remarks[0]
+
+
+def test_counters_that_wrap_go_on_and_it_is_told() -> None:
+    clean, log = read_log(FIELD / "clean.csv"), looked_at(read_log(FIELD / "wrapped_counts.csv", COUNTS))
+    for name in ("spool_1", "spool_2"):
+        assert np.ptp(log.columns[name] - clean.columns[name]) < 3e-6  # a count is 0.7 um
+    assert log.remarks[0].startswith("enc1 begins again after 2^16 counts at wrapped_counts.csv:27, 8 times")
+    assert "enc1, enc2 are reeled in by 43.4 mm" in log.remarks[2]  # where these encoders began
+
+
+def test_other_jumps_of_a_counter_are_refused_at_their_line(tmp_path: Path) -> None:
+    clean = read_log(FIELD / "clean.csv").columns
+    counts = {f"enc{k}": np.round(clean[f"spool_{k}"] / 0.719e-6).astype(int) % 40000 for k in (1, 2)}
+    table = pd.DataFrame({"ms": 1e3 * clean["time"], "imu": np.degrees(clean["bend_y"]), **counts})
+    table.to_csv(tmp_path / "turn.csv", index=False)
+    with pytest.raises(UserError, match=r"enc1 jumps 28\.\d mm .* - .*turn\.csv:\d+ - fix: a counter that wraps"):
+        looked_at(read_log(tmp_path / "turn.csv", COUNTS))
+
+
+@pytest.mark.parametrize("signed", [True, False])
+def test_clocks_and_counters_of_32_bits_wrap_too(signed: bool, tmp_path: Path) -> None:
+    clean = read_log(FIELD / "clean.csv")
+    clock = (2**32 - 2_000_000 + np.round(1e6 * clean.columns["time"]).astype(np.int64)) % 2**32
+    counts = np.round(clean.columns["spool_1"] / 1e-7).astype(np.int64)
+    counts = (counts + 2**31 + 2**31) % 2**32 if not signed else (counts + 2**31 + 2**31) % 2**32 - 2**31
+    table = pd.DataFrame({"time [us]": clock, "spool_1 [0.1 um]": counts})
+    table.to_csv(tmp_path / "counts.csv", index=False)
+    log = looked_at(read_log(tmp_path / "counts.csv"))
+    np.testing.assert_allclose(np.diff(log.columns["time"]), np.diff(clean.columns["time"]), atol=1e-9)
+    assert np.ptp(log.columns["spool_1"] - clean.columns["spool_1"]) < 3e-7
+    assert any("time begins again after 2^32" in remark for remark in log.remarks) and "trial" not in log.words
+
+
+def changed(name: str, change: Callable[[Array], Array], rows: slice = slice(None)) -> OpenLog:
+    """The clean log with something done to some rows of a column."""
+    clean = read_log(FIELD / "clean.csv")
+    column = clean.columns[name].copy()
+    column[rows] = change(column[rows])
+    return replace(clean, columns={**clean.columns, name: column})
+
+
+def test_rows_that_come_late_are_put_in_their_place_and_recordings_in_one_are_refused() -> None:
+    clean = read_log(FIELD / "clean.csv")
+    order = np.arange(len(clean))
+    order[[200, 201, 202]] = [202, 200, 201]
+    late = replace(clean, columns={name: column[order] for name, column in clean.columns.items()})
+    log = looked_at(late)
+    np.testing.assert_array_equal(log.columns["bend_y"], clean.columns["bend_y"])
+    assert log.remarks == ["1 rows that come late are put in the order of their times; the first is at clean.csv:203."]
+    late = replace(clean, columns={name: np.roll(column, 300) for name, column in clean.columns.items()})
+    again = looked_at(late)
+    assert len(again.trials()) == 2  # from its first time on
+    middle = replace(
+        late,
+        columns={
+            **late.columns,
+            "time": np.concatenate([np.linspace(5.0, 9.0, 300), late.columns["time"][300:] + 6.5]),
+        },
+    )
+    with pytest.raises(UserError, match=r"time goes back by 2\.5 s - .*clean\.csv:302 - fix: two recordings in one"):
+        looked_at(middle)
+
+
+@pytest.mark.parametrize(
+    ("name", "change", "rows", "told"),
+    [
+        ("time", lambda time: time + 0.52, slice(400, None), "clean.csv:402: 0.53 s without a row"),
+        ("bend_y", lambda bend: 0.0 * bend + bend[0], slice(300, 420), "clean.csv:302 to 421: bend_y stands at"),
+        ("spool_2", lambda spool: 0.0 * spool + spool[0], slice(300, 420), "clean.csv:302 to 421: spool_2 stands at"),
+        ("bend_y", lambda bend: np.minimum(bend, 0.2), slice(None), "bend_y stops at 11.46 as a sensor at its end"),
+        ("bend_y", lambda bend: np.roll(bend, 60), slice(None), "s behind the spools all along; are both of one clock"),
+        ("bend_y", lambda bend: np.roll(bend, -60), slice(None), "clean.csv:1: bend_y is 0.59 s ahead of the spools"),
+    ],
+)  # fmt: skip
+def test_what_a_fit_would_take_as_motion_is_told_with_its_line(
+    name: str, change: Callable[[Array], Array], rows: slice, told: str
+) -> None:
+    faulty = changed(name, change, rows)
+    log = looked_at(faulty)
+    assert len(log.remarks) == 1 and told in log.remarks[0]
+    np.testing.assert_array_equal(log.columns[name], faulty.columns[name])
+
+
+def test_units_that_no_wrist_has_are_refused(tmp_path: Path) -> None:
+    clean = read_log(FIELD / "clean.csv")
+    newtons = {f"tension_{k}": 8000.0 + 1e6 * clean.columns[f"spool_{k}"] for k in (1, 2)}
+    with pytest.raises(UserError, match=r"tension_1 reaches .* N by its header .* in mN, or a current in mA"):
+        looked_at(replace(clean, columns={**clean.columns, **newtons}))
+    seconds = pd.read_csv(FIELD / "clean.csv").rename(columns={"time [s]": "time [ms]"})
+    seconds.to_csv(tmp_path / "s.csv", index=False)
+    with pytest.raises(
+        UserError, match=r"spool_1 moves at .* m/s - .*s\.csv:3 - fix: is time in s\? .* 'time=time \[s\]'"
+    ):
+        looked_at(read_log(tmp_path / "s.csv"))
+    glitch = changed("bend_y", lambda bend: bend + 20.0, slice(5, 6))
+    with pytest.raises(UserError, match=r"clean\.csv:7 - fix: the numbers, or their unit: \[0\.1 deg\] is a tenth"):
+        looked_at(glitch)
+
+
+def test_tendons_exchanged_in_one_trial_or_in_tensions_are_refused() -> None:
+    clean = read_log(FIELD / "clean.csv")
+    half = np.arange(len(clean)) >= 500
+    one, two = (clean.columns[f"spool_{k}"] for k in (1, 2))
+    columns = {**clean.columns, "spool_1": np.where(half, two, one), "spool_2": np.where(half, one, two)}
+    words = {"trial": np.where(half, "second", "first")}
+    with pytest.raises(UserError, match="reeled in in trial second"):
+        looked_at(replace(clean, columns=columns, words=words))
+    pulled = {"tension_1": 5.0 - 100.0 * one, "tension_2": 5.0 - 100.0 * two}
+    only = {name: column for name, column in clean.columns.items() if not name.startswith("spool")}
+    with pytest.raises(UserError, match=r"pulls more .* exchange tension_1 and tension_2"):
+        looked_at(replace(clean, columns=only | pulled))
+
+
+@pytest.mark.parametrize("quantum_deg", [0.0, 0.1, 0.5])
+@pytest.mark.parametrize("held", [1, 4])
+def test_drawn_sound_logs_stay_as_they_are(quantum_deg: float, held: int) -> None:
+    for seed, sign in ((0, 1.0), (1, -1.0)):
+        log = planar(seed, mass=0.2, tension=True, sign=sign, trials=2)
+        bend = log.columns["bend_y"][np.arange(len(log)) // held * held]
+        quantum = np.radians(quantum_deg)
+        seen = quantum * np.round(bend / quantum) if quantum else bend
+        sound = replace(log, columns={**log.columns, "bend_y": seen})
+        assert looked_at(sound) is sound
+        gaps = replace(log, columns={**log.columns, "bend_y": np.where(np.arange(len(log)) % 3, np.nan, bend)})
+        assert looked_at(gaps) is gaps
+
+
+@pytest.mark.slow
+def test_a_wrist_with_slack_and_friction_is_sound() -> None:
+    rng = np.random.default_rng(0)
+    time = 0.02 * np.arange(400.0)
+    bend, spools = recorded(drawn_rig(rng, True), lambda at: 6e-3 * np.sin(0.5 * np.pi * at), time, rng)
+    columns = {"time": time, "bend_y": bend, "spool_1": spools[:, 0], "spool_2": spools[:, 1]}
+    sound = OpenLog(Path("made.csv"), "log", columns)
+    assert looked_at(sound) is sound

@@ -12,6 +12,7 @@ from wristctl.arrays import Array
 from wristctl.config.wrist import WristParameters
 from wristctl.errors import UserError
 from wristctl.records.log_converters import read_log
+from wristctl.records.log_looks import looked_at, telling
 from wristctl.records.open_log import OpenLog
 from wristctl.wrist.directions import DIRECTIONS
 
@@ -90,7 +91,7 @@ def read_loop(file: Path, wrist: WristParameters, names: str = "", trial: str | 
     `names` are another author's columns as `wristctl.records.open_log` has them, `trial` is that of several to be used.
     A log without times is taken as slow: so much of its way in a second that damping plays no part.
     """
-    log = trial_of(read_log(file, names, "measured loop"), trial)
+    log = trial_of(telling(looked_at(read_log(file, names, "measured loop"))), trial)
     slow: Array = _SLOWLY * np.arange(len(log), dtype=np.float64)
     time = log.whole("time", _EXAMPLE) if "time" in log.columns else slow
     bend, spools, tensions = planar_bend(log), in_pairs(log, "spool"), in_pairs(log, "tension")

@@ -12,6 +12,7 @@ from wristctl.errors import UserError
 from wristctl.learning.dataset import Samples
 from wristctl.learning.domain import OTHERS, Domain, arc_to
 from wristctl.records.log_converters import read_log
+from wristctl.records.log_looks import looked_at, telling
 
 # Columns of a table of a run that hold a course: the tip and the bend, in one plane and in two.
 NEEDED = ("tip_x", "tip_y", "theta")
@@ -79,7 +80,7 @@ def read_courses(file: Path, names: str = "") -> list[RecordedCourse]:
     `names` are another author's columns as `wristctl.records.open_log` has them. Samples without a tip or an angle are
     left out.
     """
-    log = read_log(file, names, "measured data")
+    log = telling(looked_at(read_log(file, names, "measured data"), motion=False))
     bends = log.bends()
     if bends is not None:
         log = replace(log, columns={**log.columns, "bend_y": bends[:, 0], "bend_z": bends[:, 1]})

@@ -153,8 +153,8 @@ def _kind(read: _Read) -> str | None:
         return both[0]
     if "spool" in by_words and read.unit in ("deg", "rad"):
         return "spool"
-    if fitting:
-        return fitting[0] if len(fitting) == 1 else "spool"
+    if fitting and (len(fitting) == 1 or read.number is not None):  # of lengths, numbered ones alone are spools
+        return fitting[0]
     return by_words[0] if by_words else None
 
 

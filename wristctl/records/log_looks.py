@@ -2,55 +2,83 @@
 
 from __future__ import annotations
 
+import logging
 import math
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
+from numpy.typing import NDArray
 
-from wristctl.errors import UserError
+from wristctl.arrays import Array
+from wristctl.errors import Argument, Phrase, UserError
+from wristctl.records.log_columns import SYNONYMS, Units, units_of
+from wristctl.records.log_counters import without_wraps
+from wristctl.records.log_sensors import sensors_told
 from wristctl.records.open_log import OpenLog
 
-# Bend [rad] and spool [m] beyond any wrist's; steady steps [s] over a time [s] that no recording of a motion has.
-_BEND, _SPOOL, _STEP, _LONG = 4.0 * math.pi, 2.0, 5.0, 3600.0
-# Way [m] between two samples, and its speed [m/s], that no motor makes.
-_JUMP, _SPEED = 0.02, 2.0
+_log = logging.getLogger(__name__)
+
+# Bend [rad], spool [m] and tension [N] beyond any wrist's; steady steps [s] over a time [s] that no motion takes.
+_BEND, _SPOOL, _TENSION, _STEP, _LONG = 4.0 * math.pi, 2.0, 5000.0, 5.0, 3600.0
+# Way [m] between two samples, and its speed [m/s], that no motor makes; speed of most steps that no motor has [m/s].
+_JUMP, _SPEED, _MOSTLY = 0.02, 2.0, 10.0
 # Correlation of bend and pull from which the senses are opposite.
 _OPPOSITE = -0.9
-# Rows within which one that stands twice is a slip of the recorder, not the start of another trial.
+# Rows within which one that stands twice, or out of order, is a slip of the recorder, not the start of another trial.
 _NEAR = 50
+# Number of its usual steps, and time [s], that a recording may skip without a word.
+_GAP, _PAUSE = 10.0, 0.1
+# Length [m] by which all tendons together are reeled in on no wrist.
+_TOGETHER = 0.01
 
 
-def looked_at(log: OpenLog) -> OpenLog:
-    """The log without repeated rows, and in a trial for each start of its clock, which its remarks say.
-
-    Raises UserError, with line and column and what may mend it, for spools that stand still or jump as a counter that
-    wraps, for bends, spools and times beyond any wrist's, and for two antagonists whose pull goes against the bend.
-    """
-    log = _parted(_without_repeats(log))
-    _check_units(log)
-    _check_spools(log)
-    _check_senses(log)
+def telling(log: OpenLog) -> OpenLog:
+    """The log, with each of its remarks as a warning: for a reader whose answer has no place for them."""
+    for remark in log.remarks:
+        _log.warning("%s", remark)
     return log
+
+
+def looked_at(log: OpenLog, motion: bool = True) -> OpenLog:
+    """The log without repeated rows, in the order of its times, and in a trial for each start of its clock.
+
+    Counters that wrap at 2^16 or 2^32 go on. What is mended so, and what is to be looked at (gaps, sensors that stand
+    or are at their ends, streams that are apart in time), is said in the log's remarks. Raises UserError, with line and
+    column and what may mend it, for spools that stand still where a `motion` is wanted or that jump, for bends, spools,
+    tensions, speeds and times beyond any wrist's, and for two antagonists whose pull goes against the bend.
+    """
+    if "time" in log.columns:
+        log.without_gaps("time")
+    log = _in_order(_parted(_without_repeats(without_wraps(log))))
+    _check_units(log)
+    _check_spools(log, motion)
+    _check_senses(log)
+    told = [*_gaps(log), *_zeros(log), *sensors_told(log)]
+    return replace(log, remarks=[*log.remarks, *told]) if told else log
 
 
 def _without_repeats(log: OpenLog) -> OpenLog:
     if "time" not in log.columns or len(log) < 2:
         return log
     rows = pd.DataFrame({**log.columns, **log.words})
-    before = rows.groupby(list(rows.columns), sort=False, dropna=False)["time"].transform(lambda twins: twins.index[0])
-    behind = np.arange(len(log)) - before.to_numpy(dtype=int)
+    if not rows.duplicated().any():
+        return log
+    same_rows = pd.Series(np.arange(len(log))).groupby([rows[name] for name in rows], sort=False, dropna=False)
+    before = same_rows.transform("min").to_numpy(dtype=int)
+    behind = np.arange(len(log)) - before
     same = (behind > 0) & (behind < _NEAR)
     if not same.any():
         return log
     kept, time = np.ones(len(log), dtype=bool), log.columns["time"]
     for later in np.flatnonzero(same):
-        earlier = int(before.iloc[later])
+        earlier = int(before[later])
         # Of two rows that are apart, the one that is out of order goes.
         early = earlier + 1 < later and time[earlier + 1] < time[earlier]
         kept[earlier if early else later] = False
-    first = Path(log.at(int(np.flatnonzero(~kept)[0]))).name
+    first = _place(log, int(np.flatnonzero(~kept)[0]))
     remark = f"{np.sum(~kept)} rows that stand twice, with their time, are used once; the first is at {first}."
     return replace(log.only(kept), remarks=[*log.remarks, remark])
 
@@ -62,13 +90,50 @@ def _parted(log: OpenLog) -> OpenLog:
     time = log.columns["time"]
     back = np.flatnonzero(np.diff(time) < 0.0) + 1
     # A clock that restarts is back near its start; single samples out of order are not.
-    starts = [k for k in back if time[k] - time[0] < 0.1 * (time[k - 1] - time[0])]
+    starts = [k for k in back if time[k] - time[0] < 0.1 * (time[k - 1] - time[0]) and not _returns(time, int(k))]
     if not starts:
         return log
     trials = 1 + np.searchsorted(np.array(starts), np.arange(len(log)), side="right")
-    places = ", ".join(Path(log.at(int(k))).name for k in starts[:3])
+    places = ", ".join(_place(log, int(k)) for k in starts[:3])
     remark = f"The clock starts again at {places}: each start is a trial of its own, {len(starts) + 1} in all."
     return replace(log, words={**log.words, "trial": trials.astype(str)}, remarks=[*log.remarks, remark])
+
+
+def _returns(time: Array, row: int) -> bool:
+    """Whether a time that goes back at a row is where it was soon: single rows have come late."""
+    after = time[row : row + _NEAR]
+    return bool((after >= time[row - 1]).any())
+
+
+def _in_order(log: OpenLog) -> OpenLog:
+    """With each trial's rows in the order of their times. Raises UserError where many would move."""
+    if "time" not in log.columns:
+        return log
+    parts = [np.arange(len(log))]
+    if "trial" in log.words:
+        parts = [np.flatnonzero(log.words["trial"] == name) for name in dict.fromkeys(log.words["trial"])]
+    order, moved = np.arange(len(log)), list[int]()
+    for rows in parts:
+        time = log.columns["time"][rows]
+        if not (np.diff(time) < 0.0).any():
+            continue
+        sorted_rows = np.argsort(time, kind="stable")
+        far = np.abs(sorted_rows - np.arange(len(rows)))
+        if int(far.max()) > _NEAR:
+            late = int(rows[np.flatnonzero(np.diff(time) < 0.0)[0] + 1])
+            step = float(log.columns["time"][late - 1] - log.columns["time"][late])
+            problem = f"{log.head('time')} goes back by {step:.4g} s"
+            raise UserError(problem, log.at(late), "two recordings in one? Give each its own trial in a column trial")
+        moved += rows[np.flatnonzero(np.diff(time) < 0.0) + 1].tolist()
+        order[rows] = rows[sorted_rows]
+    if not moved:
+        return log
+    columns = {name: column[order] for name, column in log.columns.items()}
+    words = {name: column[order] for name, column in log.words.items()}
+    lines = np.asarray(log.lines)[order].tolist() if log.lines else ()
+    first = _place(log, moved[0])
+    remark = f"{len(moved)} rows that come late are put in the order of their times; the first is at {first}."
+    return replace(log, columns=columns, words=words, lines=lines, remarks=[*log.remarks, remark])
 
 
 def _check_units(log: OpenLog) -> None:
@@ -76,51 +141,160 @@ def _check_units(log: OpenLog) -> None:
         column = np.abs(log.columns.get(name, np.empty(0)))
         if np.any(column > _BEND):
             reached, where = math.degrees(float(np.nanmax(column))), log.at(int(np.nanargmax(column)))
-            raise UserError(f"{log.head(name)} reaches {reached:,.0f} deg by its header", where, "is it in degrees?")
-    for number, spool in log.tendons("spool").items():
-        if len(spool) and float(np.ptp(spool)) > _SPOOL:
-            head = log.head(f"spool_{number}")
-            problem = f"{head} moves {float(np.ptp(spool)):,.3g} m by its header"
-            raise UserError(problem, log.at(int(np.argmax(np.abs(spool)))), "is it in mm?")
+            fix = _fix(log, "is it in degrees?", {name: (log.head(name), "deg")})
+            raise UserError(f"{log.head(name)} reaches {reached:,.0f} deg by its header", where, fix)
+    for name, column in _tendons(log, "spool").items():
+        reach = float(np.nanmax(column) - np.nanmin(column))
+        if reach > _SPOOL:
+            where = log.at(int(np.nanargmax(np.abs(column))))
+            fix = _fix(log, "is it in mm?", {name: (log.head(name), "mm") for name in _tendons(log, "spool")})
+            raise UserError(f"{log.head(name)} moves {reach:,.3g} m by its header", where, fix)
+    for name, column in _tendons(log, "tension").items():
+        if float(np.nanmax(np.abs(column))) > _TENSION:
+            problem = f"{log.head(name)} reaches {float(np.nanmax(np.abs(column))):,.0f} N by its header"
+            fix = "is it in mN, or a current in mA with a factor for A? [0.001 N] is a thousandth"
+            raise UserError(problem, log.at(int(np.nanargmax(np.abs(column)))), fix)
     for trial in log.trials().values():
         steps = np.diff(trial.columns.get("time", np.empty(0)))
         slow = steps.size > 0 and float(np.min(steps)) > _STEP and float(np.sum(steps)) > _LONG
         if slow and float(np.ptp(steps)) < 0.01 * float(np.median(steps)):
             problem = f"{float(np.median(steps)):.3g} s between samples of {log.head('time')}"
-            raise UserError(problem, trial.at(1), "is it in ms?")
+            raise UserError(problem, trial.at(1), _fix(log, "is it in ms?", {"time": (log.head("time"), "ms")}))
 
 
-def _check_spools(log: OpenLog) -> None:
-    spools = log.tendons("spool")
-    if spools and len(log) > 1 and all(float(np.ptp(spool)) == 0.0 for spool in spools.values()):
+def _check_spools(log: OpenLog, motion: bool) -> None:
+    spools = _tendons(log, "spool")
+    still = all(float(np.nanmax(spool) - np.nanmin(spool)) == 0.0 for spool in spools.values())
+    if motion and spools and len(log) > 1 and still:
         problem = "no spool moves: nothing can be identified from a log without motion"
         raise UserError(problem, log.header or str(log.file), "a log in which the tendons bend the wrist to both sides")
     if "time" not in log.columns or not spools:
         return
     for trial in log.trials().values():
-        steps = np.diff(trial.columns["time"])
-        ways = {number: np.diff(spool) for number, spool in trial.tendons("spool").items()}
-        fast = {n: (np.abs(way) > _JUMP) & (np.abs(way) > _SPEED * steps) for n, way in ways.items()}
-        together = np.sum(list(fast.values()), axis=0)
-        for number, jumps in fast.items():
-            alone = np.flatnonzero(jumps & (together == 1))
-            if alone.size:
-                row = int(alone[0])
-                way = 1e3 * abs(float(ways[number][row]))
-                problem = f"{log.head(f'spool_{number}')} jumps {way:.3g} mm between two samples, which no motor does"
-                fix = "a counter that wraps (at 2^16 or an encoder's turn)? Unwrap it in the file"
-                raise UserError(problem, trial.at(row + 1), fix)
+        for name, jumps in _jumps(trial, list(spools)).items():
+            if jumps.size:
+                row, way = int(jumps[0, 0]), 1e3 * float(jumps[0, 1])
+                problem = f"{log.head(name)} jumps {way:.3g} mm between two samples, which no motor does"
+                fix = "a counter that wraps (at an encoder's turn)? Unwrap it in the file"
+                raise UserError(problem, trial.at(row), fix)
+
+
+def _jumps(trial: OpenLog, names: Sequence[str]) -> dict[str, Array]:
+    """Rows and ways [m] (J, 2) of jumps that one spool makes alone. Raises UserError where most steps are too fast."""
+    found, together = dict[str, Array](), np.zeros(len(trial))
+    for name in names:
+        there = np.flatnonzero(np.isfinite(trial.columns[name]))
+        ways, steps = np.abs(np.diff(trial.columns[name][there])), np.diff(trial.columns["time"][there])
+        moving = (ways > 0.0) & (steps > 0.0)
+        if moving.sum() >= 20 and float(np.median(ways[moving] / steps[moving])) > _MOSTLY:
+            problem = f"{trial.head(name)} moves at {float(np.median(ways[moving] / steps[moving])):.3g} m/s"
+            fix = _fix(trial, f"is {trial.head('time')} in s?", {"time": (trial.head("time"), "s")})
+            raise UserError(problem, trial.at(int(there[1])), fix)
+        fast = (ways > _JUMP) & (ways > _SPEED * steps)
+        found[name] = np.stack([there[1:][fast], ways[fast]], axis=1)
+        together[there[1:][fast]] += 1
+    return {name: jumps[together[jumps[:, 0].astype(int)] == 1] for name, jumps in found.items()}
 
 
 def _check_senses(log: OpenLog) -> None:
-    spools = log.tendons("spool")
-    if list(spools) != [1, 2] or "bend_y" not in log.columns or "bend_z" in log.columns:
+    pulls = next(
+        (pulls for kind in ("spool", "tension") if list(pulls := _tendons(log, kind)) == [f"{kind}_1", f"{kind}_2"]), {}
+    )
+    if not pulls or "bend_y" not in log.columns or "bend_z" in log.columns:
         return
-    bend, pull = log.columns["bend_y"], spools[1] - spools[2]
-    there = np.isfinite(bend)
-    bend, pull = bend[there], pull[there]
-    moves = len(bend) > 2 and np.ptp(bend) > 0.0 and np.ptp(pull) > 0.0
-    if moves and float(np.corrcoef(bend, pull)[0, 1]) < _OPPOSITE:
-        problem = f"{log.head('bend_y')} falls while tendon 1 is reeled in"
-        fix = "tendons 1 and 2 exchanged, or the bend counted the other way: exchange spool_1 and spool_2"
-        raise UserError(problem, log.header or str(log.file), fix)
+    first = next(iter(pulls))
+    for name, trial in {"": log, **log.trials()}.items():
+        time = trial.columns.get("time", np.arange(len(trial), dtype=np.float64))
+        bend = trial.columns["bend_y"]
+        reeled = [_at_all(time, trial.columns[pull]) for pull in pulls]
+        pull = reeled[0] - reeled[1]
+        there = np.isfinite(bend) & np.isfinite(pull)
+        bend, pull = bend[there], pull[there]
+        moves = len(bend) > 2 and np.ptp(bend) > 0.0 and np.ptp(pull) > 0.0
+        if moves and float(np.corrcoef(bend, pull)[0, 1]) < _OPPOSITE:
+            act = "is reeled in" if first.startswith("spool") else "pulls more"
+            problem = f"{log.head('bend_y')} falls while tendon 1 {act}{f' in trial {name}' if name else ''}"
+            kind = first.partition("_")[0]
+            one, two = f"{kind}_1", f"{kind}_2"
+            question = f"tendons 1 and 2 exchanged, or the bend counted the other way: exchange {one} and {two}."
+            fix = _fix(log, question, {one: (log.head(two), _unit(log, two)), two: (log.head(one), _unit(log, one))})
+            raise UserError(problem, log.header or str(log.file), fix)
+
+
+def _fix(log: OpenLog, question: str, meant: Mapping[str, tuple[str, str]]) -> Phrase:
+    """A question, and the text for `--columns` that answers it: names in the file and units by names in an open log."""
+    if not all(name in log.heads for name in meant):
+        return question
+    if all((log.head(name), _unit(log, name)) == column for name, column in meant.items()):
+        unit = next(iter(meant.values()))[1]
+        return f"the numbers, or their unit: [0.1 {unit}] is a tenth of one"
+    renamed = {name: head for name, head in log.heads.items() if name not in (head, SYNONYMS.get(head))}
+    mapped = {name: (head, _unit(log, name)) for name, head in renamed.items() if name in log.scales}
+    text = ", ".join(f"{name}={head} [{unit}]" for name, (head, unit) in {**mapped, **meant}.items())
+    return (f"{question} Then ", Argument("columns", text, quoted=True))
+
+
+def _unit(log: OpenLog, name: str) -> str:
+    """Unit with which a column was read, or the multiple of one."""
+    units, scale = units_of(name) or {"": 1.0}, log.scales.get(name, 1.0)
+    unit = next((unit for unit, factor in units.items() if math.isclose(factor, scale, rel_tol=1e-9)), None)
+    return unit or f"{scale / units[_common(units)]:.9g} {_common(units)}"
+
+
+def _common(units: Units) -> str:
+    return "mm" if "mm" in units else next(iter(units))
+
+
+def _gaps(log: OpenLog) -> list[str]:
+    """A sentence where rows are further apart than elsewhere: whatever is between is joined by a line."""
+    found = list[tuple[str, float, float]]()
+    if "time" in log.columns:
+        for trial in log.trials().values():
+            steps = np.diff(trial.columns["time"])
+            usual = float(np.median(steps)) if steps.size else 0.0
+            gaps = np.flatnonzero(steps > max(_GAP * usual, _PAUSE))
+            found += [(_place(trial, int(row) + 1), float(steps[row]), usual) for row in gaps]
+    if not found:
+        return []
+    where, gap, usual = found[0]
+    others = f" (the first of {len(found)} gaps)" if len(found) > 1 else ""
+    return [
+        f"{where}: {gap:.3g} s without a row, where rows are {usual:.3g} s apart{others}; the motion is taken as "
+        "even in between. If it is not, give what follows its own trial in a column trial."
+    ]
+
+
+def _zeros(log: OpenLog) -> list[str]:
+    """A sentence where all tendons are reeled in by more than any wrist takes: their encoders have another zero."""
+    spools = _tendons(log, "spool")
+    if len(spools) < 2:
+        return []
+    together = float(np.mean([np.nanmean(spool) for spool in spools.values()]))
+    if abs(together) < _TOGETHER:
+        return []
+    names = ", ".join(log.head(name) for name in spools)
+    return [
+        f"{_place(log, 0)}: {names} are reeled in by {1e3 * together:.3g} mm in the mean; a spool counts from where "
+        "its tendon is just taut: slack and tendon stiffness are wrong unless you take that off in the file."
+    ]
+
+
+def _tendons(log: OpenLog, quantity: str) -> dict[str, Array]:
+    """Columns of tendons that hold a number, by their names in the order of the tendons."""
+    names = sorted(
+        (name for name in log.columns if name.startswith(f"{quantity}_")), key=lambda name: (len(name), name)
+    )
+    return {name: log.columns[name] for name in names if np.isfinite(log.columns[name]).any()}
+
+
+def _at_all(time: Array, column: Array) -> Array:
+    """A column at all times, by lines between the cells that it has; nan of one without any."""
+    there: NDArray[np.bool_] = np.isfinite(column)
+    if there.all() or not there.any():
+        return column
+    return np.interp(time, time[there], column[there], np.nan, np.nan)
+
+
+def _place(log: OpenLog, row: int) -> str:
+    """File's name and line of a row, for sentences."""
+    return Path(log.at(row)).name

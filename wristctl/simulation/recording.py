@@ -20,6 +20,7 @@ from wristctl.config.wrist import WristParameters
 from wristctl.errors import UserError, meant
 from wristctl.records.log_columns import ANGLE, SYNONYMS
 from wristctl.records.log_converters import read_log
+from wristctl.records.log_looks import telling
 from wristctl.records.open_log import OpenLog
 from wristctl.simulation.reference import TIP_TOLERANCE, ReferenceKind, beyond_reach
 from wristctl.wrist.kinematics import exact_arc
@@ -51,7 +52,7 @@ def read_recording(file: Path, column: str | None = None, names: str = "") -> Re
     none, with line and column: gaps, times that repeat, jumps, units that are not there or not known.
     """
     more = {} if column is None or column in SYNONYMS or column == "tip" else {column: ANGLE}
-    log = read_log(file, names, "recording", others=True, more=more)
+    log = telling(read_log(file, names, "recording", others=True, more=more))
     log.whole("time", _EXAMPLE)
     chosen = _angle_in(log, column)
     if chosen is None and not all(name in log.columns for name in TIP):
@@ -157,7 +158,7 @@ def recorded_bends(reference: Reference, wrist: WristParameters, time: Array) ->
     tip where no arc of the wrist ends.
     """
     file = Path(reference.file or "")
-    log = read_log(file, reference.columns or "", "recording", others=True)
+    log = telling(read_log(file, reference.columns or "", "recording", others=True))
     log.whole("time", _EXAMPLE)
     bends = log.bends() if {"bend_y", "bend_z"} <= log.columns.keys() or "orientation" in log.columns else None
     if (bends is None or reference.column == "tip") and all(name in log.columns for name in SPATIAL_TIP):

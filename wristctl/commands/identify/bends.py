@@ -78,9 +78,10 @@ def _problem(study: Study) -> BendProblem:
     from wristctl.identification.bend_problem import bend_problem
     from wristctl.identification.bend_trials import bend_trials, places_of_log
     from wristctl.records.log_converters import read_log
+    from wristctl.records.log_looks import looked_at, telling
 
     settings = study.identify
-    logs = [read_log(Path(file), settings.columns or "", "log") for file in settings.logs]
+    logs = [telling(looked_at(read_log(Path(file), settings.columns or "", "log"))) for file in settings.logs]
     places = places_of_log(logs[0], study.wrist)
     trials = bend_trials(logs, study.wrist, settings.step, settings.exposure or 0.0)
     return bend_problem(trials, places, study.wrist, Actuator(level="tendon"), settings)

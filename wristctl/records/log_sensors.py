@@ -1,0 +1,182 @@
+"""Sensors of logs that stand, are at their ends, or are of another clock: sentences, for a fit takes it as motion."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from wristctl.arrays import Array
+from wristctl.records.open_log import OpenLog
+
+# Rows of a standstill, and share of its whole way that the rest moves meanwhile, from which a sensor stands alone.
+_ROWS, _MOVED = 20, 0.2
+# Rows at an end of a sensor's range, and share of its way that the pull moves meanwhile.
+_AT_END, _BEYOND = 5, 0.1
+# Step at the end of a standstill over the largest of 99 in 100 others, from which the sensor had stood alone.
+_CATCHES_UP = 3.0
+# Delay [s], likeness with it, and how many times as far from one the likeness is without it, from which it is told.
+_LATE, _ALIKE, _BETTER = 0.25, 0.98, 4.0
+# Most instants at which two streams are held against each other, and longest delay that is looked for [s].
+_INSTANTS, _LONGEST = 2000, 5.0
+# Delays to either side that are looked at first, and likeness that is as good as the best.
+_COARSE, _ALMOST = 50, 0.02
+
+
+class _Run(NamedTuple):
+    """Rows from the first to the last that a column stands at one value."""
+
+    first: int
+    last: int
+
+
+def sensors_told(log: OpenLog) -> list[str]:
+    """A sentence for each column that stands while the rest moves, that is cut off at an end, or comes late.
+
+    The motion is the bend or the tip's place across, held against what all spools together make of it by least squares.
+    """
+    name = next((name for name in ("bend_y", "bend_z", "inclination", "tip_y") if name in log.columns), None)
+    told = list[str]()
+    for trial in log.trials().values() if name else ():
+        spools = [column for column in trial.columns if column.startswith("spool_")]
+        time = trial.columns.get("time", np.arange(len(trial), dtype=np.float64))
+        assert name is not None
+        seen = np.flatnonzero(np.isfinite(trial.columns[name]))
+        if len(seen) < 2 * _ROWS or not spools or np.ptp(trial.columns[name][seen]) == 0.0:
+            continue
+        reeled = np.stack([_at(time, trial.columns[spool], seen) for spool in spools], axis=1)
+        whole = np.isfinite(reeled).all(axis=1)
+        seen, reeled = seen[whole], reeled[whole]
+        if len(seen) < 2 * _ROWS or not np.ptp(reeled, axis=0).any():
+            continue
+        motion = trial.columns[name][seen]
+        made = _made_of(reeled, motion)
+        ends = _at_ends(motion, made)
+        frozen = [run for run in _standing(motion, made) if run not in ends]
+        told += _sentence(trial, name, seen, ends, "stops at {value} as a sensor at its end does")
+        told += _sentence(trial, name, seen, frozen, "stands at {value} while the spools move")
+        for place, spool in enumerate(spools):
+            others = np.delete(reeled, place, axis=1)
+            counted = np.flatnonzero(np.isfinite(trial.columns[spool]))
+            if len(counted) == len(seen) and others.size:
+                alone = _standing(reeled[:, place], motion, others)
+                told += _sentence(trial, spool, seen, alone, "stands at {value} while the wrist moves")
+        if "time" in trial.columns:
+            told += _late(trial, name, time[seen], motion, made)
+    return list(dict.fromkeys(told))[:6]
+
+
+def _at(time: Array, column: Array, rows: np.ndarray[tuple[int], np.dtype[np.intp]]) -> Array:
+    """A column at the times of some rows, by lines between the cells that it has."""
+    there = np.isfinite(column)
+    if there.all():
+        values: Array = column[rows]
+        return values
+    if not there.any():
+        return np.full(len(rows), np.nan)
+    return np.interp(time[rows], time[there], column[there], np.nan, np.nan)
+
+
+def _made_of(reeled: Array, motion: Array) -> Array:
+    """What spools (T, N) make of a motion (T,), by least squares."""
+    moved = reeled - reeled.mean(axis=0)
+    made: Array = moved @ np.linalg.lstsq(moved, motion - motion.mean(), rcond=1e-9)[0]
+    return made
+
+
+def _runs(column: Array, fewest: int) -> list[_Run]:
+    """Rows between which a column stands, where it does so for many more than it mostly does."""
+    changes = np.flatnonzero(np.diff(column) != 0.0)
+    bounds = np.concatenate([[-1], changes, [len(column) - 1]])
+    lengths = np.diff(bounds)
+    enough = max(fewest, 5.0 * float(np.median(lengths)))
+    return [_Run(int(bounds[k]) + 1, int(bounds[k + 1])) for k in np.flatnonzero(lengths >= enough)]
+
+
+def _moved(column: Array, run: _Run) -> float:
+    """Share of its whole way that a column moves in a run."""
+    way = float(np.ptp(column))
+    return float(np.ptp(column[run.first : run.last + 1])) / way if way else 0.0
+
+
+def _standing(column: Array, rest: Array, others: Array | None = None) -> list[_Run]:
+    """Runs in which a column stands while the rest moves, until it catches up in one step, or to the end."""
+    if not np.ptp(column):
+        return []
+    steps = np.abs(np.diff(column))
+    usual = float(np.quantile(steps[steps > 0.0], 0.99))
+    found = list[_Run]()
+    for run in _runs(column, _ROWS):
+        moves = _moved(rest, run) > _MOVED and (others is None or max(_moved(o, run) for o in others.T) > _MOVED)
+        ends = run.last + 1 == len(column)
+        if moves and (ends or steps[run.last] > _CATCHES_UP * usual or steps[run.last] > _MOVED * np.ptp(column)):
+            found.append(run)
+    return found
+
+
+def _at_ends(motion: Array, made: Array) -> list[_Run]:
+    """Runs at the largest or the smallest value of a motion, of which the pull goes on."""
+    ends = (float(motion.max()), float(motion.min()))
+    return [run for run in _runs(motion, _AT_END) if motion[run.first] in ends and _turns_within(made, run)]
+
+
+def _turns_within(made: Array, run: _Run) -> bool:
+    """Whether the pull goes on and comes back within a run, by more than a share of its way."""
+    within = made[run.first : run.last + 1]
+    return _moved(made, run) > _BEYOND and abs(within[0] - within[-1]) < 0.5 * float(np.ptp(within))
+
+
+def _sentence(
+    log: OpenLog, name: str, rows: np.ndarray[tuple[int], np.dtype[np.intp]], runs: list[_Run], what: str
+) -> list[str]:
+    if not runs:
+        return []
+    first, last = (Path(log.at(int(rows[row]))).name for row in runs[0])
+    scale = log.scales.get(name, 1.0)
+    value = f"{log.columns[name][rows[runs[0].first]] / scale:.4g}"
+    more = f", and {len(runs) - 1} times more" if len(runs) > 1 else ""
+    until = last.rpartition(":")[2] if ":" in last else last
+    return [
+        f"{first} to {until}{more}: {log.head(name)} {what.format(value=value)}. If it did, leave these cells empty."
+    ]
+
+
+def _late(log: OpenLog, name: str, time: Array, motion: Array, made: Array) -> list[str]:
+    """A sentence where a motion is like what the spools make of it at another time, and not at its own."""
+    count = min(_INSTANTS, len(time))
+    even = np.linspace(time[0], time[-1], count)
+    step = float(even[1] - even[0])
+    if step <= 0.0 or np.ptp(made) == 0.0:
+        return []
+    most = min(count // 4, int(_LONGEST / step))
+    one, other = (np.interp(even, time, values) for values in (motion, made))
+    stride = max(1, most // _COARSE)
+    coarse = np.arange(-(most // stride), most // stride + 1) * stride
+    alike = np.array([_likeness(one, other, int(lag)) for lag in coarse])
+    # Of either sense, for half a swing apart a motion looks turned round; of several alike the nearest lag.
+    near = coarse[np.abs(alike) > float(np.abs(alike).max()) - _ALMOST]
+    middle = int(near[np.argmin(np.abs(near))])
+    fine = np.arange(max(-most, middle - 2 * stride), min(most, middle + 2 * stride) + 1)
+    likeness = np.abs([_likeness(one, other, int(lag)) for lag in fine])
+    best, now = float(likeness.max()), _likeness(one, other, 0)
+    late = float(fine[np.argmax(likeness)]) * step
+    if abs(late) < _LATE or best < _ALIKE or 1.0 - now < _BETTER * (1.0 - best):
+        return []
+    side = "behind" if late > 0.0 else "ahead of"
+    cause = (
+        "are both of one clock, or is it the wrist's damping?"
+        if late > 0.0
+        else "no wrist does so: are both of one clock?"
+    )
+    where = Path(log.header or str(log.file)).name
+    return [f"{where}: {log.head(name)} is {abs(late):.2g} s {side} the spools all along; {cause}"]
+
+
+def _likeness(motion: Array, made: Array, lag: int) -> float:
+    """Correlation of a motion with what was made of it `lag` instants before."""
+    one = motion[lag:] if lag >= 0 else motion[:lag]
+    other = made[: len(made) - lag] if lag >= 0 else made[-lag:]
+    if np.ptp(one) == 0.0 or np.ptp(other) == 0.0:
+        return 0.0
+    return float(np.corrcoef(one, other)[0, 1])
