@@ -56,6 +56,19 @@ def test_utf_16_and_a_repeated_header(tmp_path: Path) -> None:
     assert len(log.remarks) == 1
 
 
+def test_a_spreadsheet_of_windows_is_read_in_its_own_encoding(tmp_path: Path) -> None:
+    file = tmp_path / "log.csv"
+    file.write_text("Zeit [s];Biegung [°];Länge [mm]\n0,5;90;1\n", encoding="cp1252")
+    with pytest.raises(UserError) as refused:
+        read_log(file)
+    proposed = "time=Zeit [s], bend_y=Biegung [deg], spool_1=Länge [mm]"
+    assert f"--columns '{proposed}'" in refused.value.fix
+    assert read_log(file, proposed).columns["bend_y"] == pytest.approx(0.5 * np.pi)
+    file.write_bytes(b"time [s]\n\xb0\x00\n")
+    with pytest.raises(UserError, match="no text in UTF-8, UTF-16 or Windows-1252"):
+        read_log(file)
+
+
 def test_a_decimal_comma_and_a_point_in_one_file_are_refused(tmp_path: Path) -> None:
     file = tmp_path / "log.csv"
     file.write_text("time [s];bend_y [deg]\n0.5;1,234\n")

@@ -212,3 +212,30 @@ def test_an_export_without_rigid_bodies_says_what_to_export(tmp_path: Path) -> N
     file = qualisys(tmp_path, [["DATA_INCLUDED", "3D"], ["MARKER_NAMES", "a", "b"]], [["1", "2", "3", "4", "5", "6"]])
     with pytest.raises(UserError, match="no rigid body in this export"):
         read_log(file)
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "message"),
+    [
+        ("\n1,0,", "\n1,inf,", r"'inf' among the samples - .*vicon\.csv:6"),
+        ("\n1,0,", '\n1,"0,', r"'0,.*among the samples - .*vicon\.csv:6"),
+        ("TX,TY,TZ", "TX,TY", r"16 cells under 15 columns - .*vicon\.csv:6"),
+        ("mm,mm,mm", "ft,ft,ft", r"TX is in 'ft'"),
+        ("\n100\n", "\nsome\n", r"a frame rate of 'some' - .*vicon\.csv:2"),
+    ],
+)
+def test_a_torn_export_is_refused_with_its_line(tmp_path: Path, before: str, after: str, message: str) -> None:
+    base, tip, at_base, at_tip = poses(BENDS)
+    rows = cells(base.as_quat(), 1e3 * at_base, tip.as_quat(), 1e3 * at_tip)
+    head = ["RX", "RY", "RZ", "RW", "TX", "TY", "TZ"]
+    file = vicon(tmp_path, "Objects", ["Base:Base", "Hand:Hand"], head, [""] * 4 + ["mm"] * 3, rows)
+    text = file.read_text()
+    assert before in text
+    file.write_text(text.replace(before, after, 1))
+    with pytest.raises(UserError, match=message):
+        read_log(file)
+
+
+def test_an_export_without_samples_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(UserError, match="no rigid body"):
+        read_log(vicon(tmp_path, "Objects", ["a:a"], ["RX", "RY", "RZ", "RW"], [""] * 4, []))

@@ -30,7 +30,9 @@ def bag(folder: Path, mcap: bool, messages: Iterable[tuple[str, str, int, Any]])
                 connections[topic] = writer.add_connection(topic, kind, typestore=store)
             stamp = store.types["builtin_interfaces/msg/Time"](*divmod(BEGIN + time, 10**9))
             message = make(store.types, store.types["std_msgs/msg/Header"](stamp, ""))
-            writer.write(connections[topic], BEGIN + time + 4_000_000, store.serialize_cdr(message, kind))
+            writer.write(
+                connections[topic], BEGIN + time + 1_000_000 + time % 3_000_000, store.serialize_cdr(message, kind)
+            )
     return next(file for file in (folder / "bag").iterdir() if file.suffix in (".mcap", ".db3"))
 
 

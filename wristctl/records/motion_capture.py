@@ -6,7 +6,6 @@ objects, segments and trajectories; Qualisys Track Manager, TSV exports of 6DOF 
 
 from __future__ import annotations
 
-import csv
 import math
 import re
 from collections.abc import Callable, Mapping, Sequence
@@ -20,6 +19,7 @@ from wristctl.arrays import Array
 from wristctl.errors import UserError
 from wristctl.records.log_columns import ANGLE, LENGTH
 from wristctl.records.recorded_table import RecordedTable, RigidBody
+from wristctl.records.table_text import cells_of
 
 _LENGTHS = {"meters": 1.0, "centimeters": 1e-2, "millimeters": 1e-3, **LENGTH}
 _VICON = ("Trajectories", "Objects", "Segments", "Bones", "Joints", "Model Outputs", "Devices", "Events")
@@ -56,7 +56,7 @@ def motive_table(text: str, file: Path) -> RecordedTable:
     above = [row for _, row in rows[1:begin] if any(row)]
     what = next((row for row in reversed(above) if "Rotation" in row or "Position" in row), [])
     kinds = next((row for row in above if any("body" in cell.replace(" ", "").lower() for cell in row)), [])
-    names = above[above.index(kinds) + 1] if kinds else []
+    names = above[above.index(kinds) + 1] if kinds and kinds is not above[-1] else []
     grid = _numbers(rows[begin + 1 :], len(rows[begin][1]), file)
     head = rows[begin][1]
     time = _column(grid, head, "Time (Seconds)")
@@ -90,7 +90,7 @@ def vicon_table(text: str, file: Path) -> RecordedTable:
     sections = [k for k, (_, row) in enumerate(rows) if row[0] in _VICON]
     bodies, clock = dict[str, RigidBody](), None
     told, shown = list[str](), None
-    for begin, end in zip(sections, [*sections[1:], len(rows)], strict=True):
+    for begin, end in zip(sections, [*sections, len(rows)][1:], strict=True):
         section = [row for row in rows[begin:end] if any(row[1])]
         kind = rows[begin][1][0]
         if kind not in ("Objects", "Segments", "Bones", "Trajectories") or len(section) < 5:
@@ -99,6 +99,8 @@ def vicon_table(text: str, file: Path) -> RecordedTable:
         head_at = _header(section, "Frame", file, f"Vicon's {kind}")
         names, head, units = section[head_at - 1][1], section[head_at][1], section[head_at + 1][1]
         grid = _numbers(section[head_at + 2 :], len(head), file)
+        if not len(grid.numbers):
+            continue
         time = (grid.numbers[:, 0] - grid.numbers[0, 0]) / _rate(rate[0], file, line)
         clock = time if clock is None else clock
         if len(time) != len(clock):
@@ -118,9 +120,9 @@ def _vicon_bodies(
     """Bodies of a section, and whether their rotations are rotation vectors."""
     from scipy.spatial.transform import Rotation
 
-    starts = [place for place, name in enumerate(names) if name.strip() and place > 1]
+    starts = [place for place, name in enumerate(names[: len(head)]) if name.strip() and place > 1]
     parts = dict[str, dict[str, int]]()
-    for start, end in zip(starts, [*starts[1:], len(head)], strict=True):
+    for start, end in zip(starts, [*starts, len(head)][1:], strict=True):
         name = names[start].strip().removeprefix("Global Angle ").removeprefix("Global ")
         parts.setdefault(name, {}).update({head[place].strip(): place for place in range(start, min(end, len(head)))})
 
@@ -241,7 +243,7 @@ def _fitted(model: Array, places: Array, seen: NDArray[np.bool_]) -> tuple[Array
 def _rows(text: str, mark: str) -> list[tuple[int, list[str]]]:
     """Rows of cells with their lines, without empty ones."""
     lines = [(number, line) for number, line in enumerate(text.splitlines(), 1) if line.strip()]
-    cells = csv.reader((line for _, line in lines), delimiter=mark)
+    cells = cells_of([line for _, line in lines], mark)
     return [(number, row) for (number, _), row in zip(lines, cells, strict=True)]
 
 
@@ -255,12 +257,14 @@ def _header(rows: Sequence[tuple[int, Sequence[str]]], first: str, file: Path, w
 def _numbers(rows: Sequence[tuple[int, Sequence[str]]], width: int, file: Path) -> _Grid:
     numbers, lines = np.full((len(rows), width), np.nan), [line for line, _ in rows]
     for into, (line, row) in zip(numbers, rows, strict=True):
+        if any(cell.strip() for cell in row[width:]):
+            problem = f"{len(row)} cells under {width} columns"
+            raise UserError(problem, f"{file}:{line}", "the export as it was written")
         for place, cell in enumerate(row[:width]):
             if cell.strip():
-                try:
-                    into[place] = float(cell)
-                except ValueError:
-                    raise UserError(f"{cell.strip()!r} among the samples", f"{file}:{line}", "a number") from None
+                if not _is_number(cell):
+                    raise UserError(f"{cell.strip()!r} among the samples", f"{file}:{line}", "a number")
+                into[place] = float(cell)
     return _Grid(numbers, lines)
 
 

@@ -261,7 +261,7 @@ def text_of(file: Path, what: str = "log") -> str:
     try:
         text = decoded(read_plain(file, LARGEST_DATA)).replace("\r\n", "\n")
     except (OSError, UnicodeDecodeError) as error:
-        reason = error.strerror if isinstance(error, OSError) else "it is no text in UTF-8 or UTF-16"
+        reason = error.strerror if isinstance(error, OSError) else "it is no text in UTF-8, UTF-16 or Windows-1252"
         problem = f"cannot read the {what}: {reason}"
         raise UserError(problem, str(file), f"a CSV file with a header such as {EXAMPLE}") from error
     return with_units(text, file)

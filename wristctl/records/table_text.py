@@ -14,6 +14,7 @@ from wristctl.errors import UserError
 _MARKS = (";", "\t", ",")
 _COMMA = re.compile(r"\s*[-+]?\d*,\d+(?:[eE][-+]?\d+)?\s*")
 _POINT = re.compile(r"\s*[-+]?\d*\.\d*(?:[eE][-+]?\d+)?\s*")
+_OF_NO_TEXT = re.compile(rb"[\x00-\x08\x0e-\x1f\x7f]")
 _MOST_TEXT = 20
 """Rows for each line of text that may stand among them."""
 
@@ -32,8 +33,24 @@ class TextTable:
 
 
 def decoded(raw: bytes) -> str:
-    """Text of a file in UTF-8, or UTF-16 where its first bytes say so. Raises UnicodeDecodeError for what is none."""
-    return raw.decode("utf-16" if raw[:2] in (b"\xff\xfe", b"\xfe\xff") else "utf-8-sig")
+    """Text of a file in UTF-8, in UTF-16 where its first bytes say so, or in Windows' own encoding of western Europe.
+
+    Raises UnicodeDecodeError for what is none: bytes that no text has.
+    """
+    if raw[:2] in (b"\xff\xfe", b"\xfe\xff"):
+        return raw.decode("utf-16")
+    try:
+        return raw.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        if _OF_NO_TEXT.search(raw):
+            raise
+        return raw.decode("cp1252")
+
+
+def cells_of(lines: Sequence[str], mark: str) -> list[list[str]]:
+    """Cells of each line; a quote that nothing closes ends with its line."""
+    rows = list(csv.reader(lines, delimiter=mark))
+    return rows if len(rows) == len(lines) else [next(csv.reader([line], delimiter=mark)) for line in lines]
 
 
 def table_of(text: str, file: Path, units: Collection[str], header: str) -> TextTable | None:
@@ -47,7 +64,7 @@ def table_of(text: str, file: Path, units: Collection[str], header: str) -> Text
     if not lines:
         return None
     mark = _mark_of([line for _, line in lines])
-    parted = list(zip((k for k, _ in lines), csv.reader((line for _, line in lines), delimiter=mark), strict=True))
+    parted = list(zip((k for k, _ in lines), cells_of([line for _, line in lines], mark), strict=True))
     width = Counter(len(row) for _, row in parted).most_common(1)[0][0]
     first = next(k for k, (_, row) in enumerate(parted) if len(row) > 1 or width == 1)
     passed = [line for line, _ in parted[:first]]
