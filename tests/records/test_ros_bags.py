@@ -97,6 +97,7 @@ def test_columns_of_a_bag_are_proposed(tmp_path: Path) -> None:
 
 
 def test_what_is_no_bag_or_has_nothing_of_use_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    pytest.importorskip("rosbags")
     torn = tmp_path / "log.mcap"
     torn.write_bytes(b"\x89MCAP0\r\n")
     with pytest.raises(UserError, match="cannot read the log"):

@@ -42,7 +42,8 @@ def robot_of_logs(logs: Sequence[OpenLog], wrist: WristParameters, radius_error:
     """
     log, numbers = logs[0], spools_of_log(logs[0])
     if len(numbers) < 2:
-        raise UserError(f"{len(numbers)} spools", log.header or str(log.file), "columns spool_1 [mm], spool_2 [mm]")
+        problem = f"{len(numbers)} spools, and the motion is that of two or more tendons"
+        raise UserError(problem, log.header or str(log.file), "columns spool_1 [mm], spool_2 [mm] beside the motion")
     _check_alike(logs, numbers)
     measured = _measured(log)
     angles, radius, paired = _tendons(logs, numbers, wrist)
