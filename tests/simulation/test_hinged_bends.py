@@ -52,7 +52,7 @@ def test_a_bend_in_one_plane_is_the_loop_of_planar_hinges(side: int) -> None:
 
 @pytest.mark.slow
 def test_it_is_followed_behind_motors_tendons_and_a_camera_as_another_plant_than_arcs() -> None:
-    path = bend_path("circumduction", 20.0, 1.5, 3.0)
+    path = bend_path("circumduction", 20.0, 1.5, 1.5)
     rig: dict[str, Any] = {"actuator": {"level": "tendon"}, "sensor": {"level": "camera"}}
     arcs, links, stiffer = (
         followed(path, looped(model, 4, plant=plant, **rig), force=np.array([0.0, 0.3, -0.2]))
