@@ -69,7 +69,7 @@ def test_an_override_is_relative_to_the_command_first() -> None:
         ),
         ("wrist: 3\n", "3 should have the form {{discs: ..., length: ..., mass: ..., ...}} - {file}:1: wrist"),
         ("wrist: [1, 2]\n", "[1, 2] should have the form {{discs: "),
-        ("compare: {controllers: [pid]}\n", "'pid' should have the form {{controller: ..., gains: ...}} - {file}:1"),
+        ("compare: {controllers: [3]}\n", "3 should have the form {{controller: ..., gains: ...}} - {file}:1"),
         ("compare: {loops: [3]}\n", "[3] should have the form {{NAME: ...}} - {file}:1"),
         ("wrist: {gravity: [a, 2]}\n", "'a' should be a valid number - {file}:1: wrist.gravity.0"),
         ("wrist: {pretension: 70}\n", "must exceed pretension"),

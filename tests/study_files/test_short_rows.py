@@ -69,6 +69,24 @@ def test_one_controller_takes_the_place_of_a_trials_list_with_its_gains_for_hard
     assert rows_of(files=(file,)) == [("pid-ff", "default")]
 
 
+def test_gains_by_loop_are_one_preset_where_all_loops_have_the_same() -> None:
+    assert rows_of("hw-run.controllers=[pid-ff, pid, adrc/default]") == [
+        ("pid-ff", "hardware"), ("pid", "printed"), ("adrc", "default")
+    ]  # fmt: skip
+
+    def gains(*settings: str) -> list[Any]:
+        study = with_presets(load_study([], ["controllers=[pid-ff, pid]", *settings], "compare"), "compare")
+        return [row.gains for row in study.compare.rows]
+
+    assert gains() == ["by-loop", "printed"]
+    assert gains("loops={one: {}}") == ["default", "printed"]
+    assert gains("loops={one: {sensor: {level: camera}}, two: {actuator: {level: tendon}}}") == ["hardware", "printed"]
+    worlds = load_study([Path("scenarios/camera")], ["controllers=[pid-ff]", "worlds.family=camera"], "compare")
+    assert with_presets(worlds, "compare").compare.rows[0].gains == "hardware"
+    alone = load_study([], ["controller=pid-ff", "gains=by-loop"], "simulate")
+    assert with_presets(alone, "simulate").simulate.gains == "default"
+
+
 def test_what_is_wrong_in_short_names_what_was_typed_and_the_row() -> None:
     for typed, said in (("controller=ctdob", "did you mean 'ct-dob'?"), ("gains=Kp=x", "NAME=NUMBER")):
         with pytest.raises(UserError) as caught:

@@ -13,13 +13,14 @@ from typing import Any, get_origin
 import typer
 
 from wristctl.board.board_errors import HARDWARE, SAFETY_STOP
-from wristctl.cli.commands import Entry
+from wristctl.cli.commands import TUNE, Entry
 from wristctl.cli.json_output import Interrupted
 from wristctl.cli.options import Options, Own, StudyCommand, controllers, references, run_ids, signature
 from wristctl.commands.procedure import Procedure
 from wristctl.errors import UserError
 from wristctl.plugins.trust import asking
 from wristctl.study_files.keys import field_at, section_keys, whole_key
+from wristctl.study_files.typed_controllers import TAKE_CONTROLLERS, parted
 
 
 def asked_to_trust(trust: bool, shown: str) -> bool:
@@ -87,7 +88,7 @@ def study_command(procedure: Procedure[Any], entry: Entry) -> typer.Typer:
     parameters += [Own("list", entry.listing[1], bool)] if entry.listing else []
     parameters += [Own("sweep", _SWEEP, list[str])] * procedure.sweeps
     parameters += [Own("executor", _EXECUTOR, str, advanced=True)] * procedure.in_units
-    call.__signature__ = signature(parameters, argument)  # type: ignore[attr-defined]
+    call.__signature__ = signature(parameters, argument, procedure.kind in TAKE_CONTROLLERS)  # type: ignore[attr-defined]
     app = typer.Typer(add_completion=False)
     epilog = "\n".join(["Examples:", *map(_shown, entry.examples), _MORE_OPTIONS])
     app.command(procedure.kind, cls=StudyCommand, help=inspect.getdoc(procedure.perform), epilog=epilog)(call)
@@ -128,9 +129,11 @@ def _perform(
     from wristctl.study_files.error_messages import check_sizes, located
     from wristctl.study_files.load import read_study
 
-    files = [*(options.files or ()), *(options.config or ())]
+    typed_controllers, named_files = parted(options.files or (), procedure.kind)
+    files = [*named_files, *(options.config or ())]
     seed = [f"seed={options.seed}"] if options.seed is not None else []
-    study, origins = read_study(files, [*(options.override or ()), *shortcuts, *seed], procedure.kind)
+    overrides = [*(options.override or ()), *shortcuts, *seed]
+    study, origins = read_study(files, overrides, procedure.kind, controllers=typed_controllers, tune=TUNE in flags)
     if not options.force:
         check_sizes(study, origins)
     with listening(options.quiet, options.verbose) as console:
@@ -146,8 +149,8 @@ def _perform(
         if procedure.in_units:
             check_executor(executor)
         label = options.label or re.sub(r"[^A-Za-z0-9_.-]", "-", files[-1].stem if files else "")[:60]
-        overrides = [whole_key(override, procedure.kind) for override in (*(options.override or ()), *seed)]
-        typed = [*map(str, files), *(word for override in overrides for word in ("--set", override))]
+        settings = [whole_key(override, procedure.kind) for override in (*(options.override or ()), *seed)]
+        typed = [*map(str, files), *(word for setting in settings for word in ("--set", setting))]
         show, run = partial(progress, console, quiet=options.quiet), None
         try:
             with recording(prepared, options.out, label, ["wristctl", *sys.argv[1:]]) as run:

@@ -8,6 +8,8 @@ _MAIN, _OWN = "From a wrist to its controller", "A controller of your own"
 _HARDWARE, _MORE = "Motors and camera", "More"
 # The flag of commands that move motors, and its help.
 YES = {"yes": "Ask nobody before the motors of real hardware move."}
+# The flag of comparisons that search gains first.
+TUNE = "tune"
 
 
 class Entry(NamedTuple):
@@ -82,7 +84,7 @@ COMMANDS = {
         shortcuts=("candidates", "iterations"),
         examples=(
             "wristctl tune experiments/paper.yaml",
-            "wristctl tune --set 'controllers=[smc, pid]' --iterations 20",
+            "wristctl tune smc pid --iterations 20",
             "wristctl tune experiments/paper.yaml --from-identified latest:identify",
         ),
     ),
@@ -91,9 +93,11 @@ COMMANDS = {
         _MAIN,
         "Compare controllers on the same motions.",
         shortcuts=("horizon",),
+        flags={TUNE: "Search gains first, at equal budget, for the controllers that are typed by name."},
         examples=(
+            "wristctl compare pid-ff adrc/hardware my_law.py:MY_LAW mywrist.yaml",
+            "wristctl compare pid-ff adrc ct-dob --tune",
             "wristctl compare experiments/paper.yaml --network latest:train --tuned latest:tune",
-            "wristctl compare --set 'inverses=[none]' --set 'controllers=[{controller: lqi, gains: default}]'",
         ),
     ),
     "recommend": Entry(
@@ -103,7 +107,7 @@ COMMANDS = {
         examples=(
             "wristctl recommend --set wrist.length=0.12 --set wrist.stiffness=2.0",
             "wristctl recommend --from-identified latest:identify",
-            "wristctl recommend --set loop.actuator.tendon_stiffness=2e4 --set 'controllers=[ct-dob, pid-ff]'",
+            "wristctl recommend ct-dob pid-ff mywrist.yaml --set loop.actuator.tendon_stiffness=2e4",
         ),
     ),
     "identify": Entry(
@@ -139,7 +143,7 @@ COMMANDS = {
         advanced=("video", "priority", "from_identified", "network"),
         examples=(
             "wristctl hw-run",
-            "wristctl hw-run --controller ct-dob --set 'directions=[ulnar]' --set push.force=0",
+            "wristctl hw-run ct-dob pid-ff --set 'directions=[ulnar]' --set push.force=0",
             "wristctl hw-run --reference circumduction --set reference.angle_deg=25",
             "wristctl hw-run --dry-run --port /dev/ttyACM0",
             "wristctl hw-run --port /dev/ttyACM0 --camera 0 --calibration latest:calibrate-wrist",

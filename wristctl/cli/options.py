@@ -49,6 +49,11 @@ def controllers(incomplete: str) -> list[str]:
     return sorted(name for name in CONTROLLERS if name.startswith(incomplete))
 
 
+def controllers_and_studies(incomplete: str) -> list[str]:
+    """Names of controllers, and study files."""
+    return [*controllers(incomplete), *study_files(incomplete)]
+
+
 def references(incomplete: str) -> list[str]:
     """Names of the table of references."""
     return sorted(name for name in REFERENCES if name.startswith(incomplete))
@@ -99,7 +104,7 @@ class Options:
     """The shared options; each field's annotation is the option as typed."""
 
     files: Annotated[
-        list[Path] | None,
+        list[str] | None,
         typer.Argument(
             metavar="FILE", help="Study files (YAML); later ones override earlier ones.", autocompletion=study_files
         ),
@@ -160,13 +165,26 @@ class Own(NamedTuple):
     advanced: bool = False
 
 
-def signature(parameters: Iterable[Own], argument: str | None = None) -> inspect.Signature:
+_CONTROLLERS_TOO = Annotated[
+    list[str] | None,
+    typer.Argument(
+        metavar="CONTROLLER|FILE",
+        help="Controllers (NAME, NAME/PRESET or file.py:NAME) and study files (.yaml, or an experiment's name); later "
+        "files override earlier ones.",
+        autocompletion=controllers_and_studies,
+    ),
+]
+
+
+def signature(
+    parameters: Iterable[Own], argument: str | None = None, takes_controllers: bool = False
+) -> inspect.Signature:
     """The parameters of a command: its own, then the shared ones.
 
-    One of its own may be the `argument` that stands first, in place of study files.
+    One of its own may be the `argument` that stands first, in place of study files; controllers may be among these.
     """
     shared = [
-        parameter
+        parameter.replace(annotation=_CONTROLLERS_TOO) if takes_controllers and name == "files" else parameter
         for name, parameter in inspect.signature(Options, eval_str=True).parameters.items()
         if argument is None or name != "files"
     ]

@@ -2,18 +2,20 @@
 
 import json
 import logging
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from typing import Any, NamedTuple, TypeVar
 
 from pydantic import ValidationError
 
+from wristctl.commands.inputs_of_loops import judged_loops
 from wristctl.config.choices import CONTROLLERS, OPTIMISERS, REFERENCES, Choices
-from wristctl.config.controller_row import Row
+from wristctl.config.controller_row import BY_LOOP, Row
 from wristctl.config.foreign import PLAIN, Foreign, is_reference
 from wristctl.config.leaves import named_by, renamed_fields
+from wristctl.config.loop import Loop
 from wristctl.config.simulate import SimulateSettings
 from wristctl.config.study import Study
-from wristctl.errors import UserError, nearest
+from wristctl.errors import UserError, nearest, under
 from wristctl.plugins.places import entry_point_names
 from wristctl.study_files.error_messages import explained
 from wristctl.study_files.resolved import names_read
@@ -99,15 +101,41 @@ def with_presets(study: Study, command: str, tell: bool = True, for_several: boo
 
     That is its preset `default`, or else its first, for the commands of one loop, for `compare` and for `hw-run`. With
     `tell` the log says which. A preset that was chosen `for_several` controllers in turn holds for those that have it.
+    Gains by loop are the preset of all loops, where these have the same one.
     """
     if command in ("simulate", "analyse"):
-        return study.model_copy(update={"simulate": _with_preset(study.simulate, tell, for_several)})
+        row = _with_preset(_by_loop(study.simulate, [study.simulate.loop], tell), tell, for_several)
+        return study.model_copy(update={"simulate": row})
     if command not in ("compare", "hw-run"):
         return study
     name = command.replace("-", "_")
     section = getattr(study, name)
-    rows = tuple(_with_preset(row, tell) for row in section.rows)
+    rows = tuple(_with_preset(_by_loop(row, _loops(study, command), tell), tell) for row in section.rows)
     return study.model_copy(update={name: section.model_copy(update={"rows": rows})})
+
+
+def _loops(study: Study, command: str) -> Collection[Loop]:
+    """Loops that the rows of `compare` are judged on; none for the trials of a rig."""
+    if command == "hw-run":
+        return ()
+    with under(command):
+        return judged_loops(study, study.compare).values()
+
+
+def _by_loop(row: _Row, loops: Collection[Loop], tell: bool) -> _Row:
+    """The row with the preset that it has on all loops, or behind a rig where there are none, if gains are by loop."""
+    if row.gains != BY_LOOP:
+        return row
+    from wristctl.control.table import controller, preset_for
+
+    law = controller(row.controller)
+    presets = {preset_for(law, loop.is_exact) for loop in loops} or {preset_for(law, exact=False)}
+    if len(presets) > 1:
+        return row
+    (preset,) = presets
+    if tell and preset not in ("default", "hardware"):
+        log.info("%s has no preset 'default' or 'hardware': '%s' is taken", row.controller, preset)
+    return row.model_copy(update={"gains": preset})
 
 
 def _with_preset(row: _Row, tell: bool, for_several: bool = False) -> _Row:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Protocol
 
 from wristctl.commands.inputs import Inputs, check_sides
 from wristctl.config.compare import CompareSettings
-from wristctl.config.controller_row import Row
+from wristctl.config.controller_row import BY_LOOP, Row
 from wristctl.config.families import Family
 from wristctl.config.loop import Loop, Reference
 from wristctl.config.simulate import SimulateSettings
@@ -62,6 +62,8 @@ def check_row(row: Row | SimulateSettings, tuned: Gains | None, run: Run | None 
     from wristctl.control.table import controller, gains_of
 
     law = controller(row.controller)
+    if row.gains == BY_LOOP:
+        return
     if row.gains == "tuned" and law.name not in (tuned or {}):
         looked = f" in {run.id}, which tuned {', '.join(tuned or ()) or 'nothing'}" if run else ""
         fix = (Argument("tuned"), f", a tune run that tuned {law.name}: `", Call("runs ls"), "` shows the runs")

@@ -11,7 +11,7 @@ from wristctl.commands.inputs import Inputs
 from wristctl.commands.inputs_of_loops import ends_of_family, identified
 from wristctl.commands.results import Findings
 from wristctl.config.compare import CompareSettings
-from wristctl.config.controller_row import Row
+from wristctl.config.controller_row import BY_LOOP, Row
 from wristctl.config.former_names import preset_today
 from wristctl.config.loop import DirectionName, Loop, Reference, longest_step
 from wristctl.config.simulate import SimulateSettings
@@ -62,13 +62,14 @@ def warn_of_first_repetitions(rows: Iterable[Row]) -> None:
 def outside_conditions(rows: Iterable[Row | SimulateSettings], loops: Iterable[Loop]) -> list[str]:
     """Presets that are not made for a loop with motors, tendons and a camera, in words."""
     from wristctl.control.shipped_gains import is_shipped, shipped_gains
-    from wristctl.control.table import controller
+    from wristctl.control.table import controller, preset_for
 
     real = [rig for rig in loops if rig.actuator.level == "tendon" and rig.sensor.level == "camera"]
     warnings = []
     presets = {(row.controller, row.gains) for row in rows if isinstance(row.gains, str) and row.gains != "tuned"}
     for name, preset in sorted(presets):
         law = controller(name)
+        preset = preset_for(law, exact=False) if preset == BY_LOOP else preset
         if is_shipped(preset):
             warnings += _of_shipped(name, shipped_gains(law.name, preset), preset, real)
             continue

@@ -9,6 +9,7 @@ from itertools import product
 import numpy as np
 
 from wristctl.config.compare import CompareSettings
+from wristctl.config.controller_row import label_of
 from wristctl.config.loop import DirectionName, Loop, Reference, sample_period
 from wristctl.config.study import Study
 from wristctl.config.tune import TuneSettings
@@ -45,8 +46,8 @@ class ComparedRow:
 
     @property
     def label(self) -> str:
-        """controller/gains"""
-        return f"{self.controller}/{self.gains}"
+        """controller/gains; of gains by loop the controller alone"""
+        return label_of(self.controller, self.gains)
 
 
 def refuse_tuned_scenarios(compared: CompareSettings, tuned: TuneSettings) -> None:
@@ -132,7 +133,10 @@ def compare(
     UserError for an unknown controller or gains, a missing network or tuned gains, before anything is run.
     """
     chosen, draws = study.compare, Draws(study.seed)
-    gains = [gains_of(controller(row.controller), row.gains, tuned) for row in chosen.rows]
+    gains = {
+        name: [gains_of(controller(row.controller), row.gains, tuned, loop) for row in chosen.rows]
+        for name, loop in chosen.loops.items()
+    }
     names = list(dict.fromkeys(row.controller for row in chosen.rows))
     conditions = planned(study, network)
     repetitions_of = [controller(name).learning for name in names]
@@ -145,7 +149,9 @@ def compare(
             if not controller(name).keeps_up(condition.loop.control_period):
                 continue
             rows = [i for i, row in enumerate(chosen.rows) if row.controller == name]
-            batch = np.array([gains[i] for i in rows for _ in courses]).reshape(len(rows) * len(courses), -1)
+            batch = np.array([gains[condition.name][i] for i in rows for _ in courses]).reshape(
+                len(rows) * len(courses), -1
+            )
             which = np.tile(np.arange(len(courses)), len(rows))
             base = part + before[number]
 
@@ -159,7 +165,7 @@ def compare(
             )  # fmt: skip
             for index, repeated in enumerate(repetitions):
                 row, course = chosen.rows[rows[index // len(courses)]], courses[which[index]]
-                labelled = repeated.labelled(f"{name}/{row.gains_name}")
+                labelled = repeated.labelled(row.label)
                 combination = (condition.name, course.reference, course.inverse, name, row.gains_name)
                 results.append(ComparedRow(*combination, labelled, course.jumps))
     return _in_order(results, chosen)

@@ -117,7 +117,7 @@ def rank(
             if progress is not None:
                 progress((sum(repetitions[:number]) + share * repetitions[number]) / sum(repetitions))
 
-        gains = np.array([gains_of(law, row.gains, tuned)])
+        gains = np.array([gains_of(law, row.gains, tuned, family.loop)])
         every.append(measure(law, gains, cases, study.wrist, RANKED, report))
     rankings = []
     for kind, chosen in kinds.items():

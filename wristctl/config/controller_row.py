@@ -11,7 +11,12 @@ from wristctl.errors import Unfitting
 
 # How gains are given by name, for a description and an error.
 BY_NAME = "every gain by name (Kp=10,Ki=2,Kd=0.1)"
-GAINS = f"a preset's name, `tuned` (from a tune run), `tuned:camera` (of a family, shipped), or {BY_NAME}"
+# Gains of a controller that is typed by its name alone: a preset for each loop.
+BY_LOOP = "by-loop"
+GAINS = (
+    "a preset's name, `by-loop` (`default` with ideal actuators and exact angles, else `hardware`), `tuned` "
+    f"(from a tune run), `tuned:camera` (of a family, shipped), or {BY_NAME}"
+)
 
 
 def _by_name(gains: Any) -> Any:
@@ -38,6 +43,11 @@ ControllerName = Annotated[str, OneOf(CONTROLLERS)]
 REPETITIONS = "repetitions, each with noise and drawn plants of its own, the same for all rows"
 
 
+def label_of(controller: str, gains: str) -> str:
+    """Label of a row of tables: controller/gains; of gains by loop the controller alone."""
+    return controller if gains == BY_LOOP else f"{controller}/{gains}"
+
+
 class Row(Section):
     """One controller with one set of gains."""
 
@@ -51,5 +61,5 @@ class Row(Section):
 
     @property
     def label(self) -> str:
-        """controller/gains"""
-        return f"{self.controller}/{self.gains_name}"
+        """controller/gains; of gains by loop the controller alone"""
+        return label_of(self.controller, self.gains_name)

@@ -84,6 +84,11 @@ class Loop(Section):
     spool_lead: bool = seldom(True, "", "whether spools move at the speed of the reference, and close their gap on top")
 
     @property
+    def is_exact(self) -> bool:
+        """Whether actuators are ideal and angles exact: no motors, tendons or camera."""
+        return self.actuator.level == "ideal" and self.sensor.level == "ideal"
+
+    @property
     def steps(self) -> int:
         """Integration steps within one control period."""
         return self.substeps or (self.fewest_steps if self.actuator.level == "tendon" else 1)

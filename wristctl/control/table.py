@@ -6,7 +6,9 @@ from pathlib import Path
 
 from wristctl.config.choices import CONTROLLERS as _TABLE
 from wristctl.config.choices import Choices
+from wristctl.config.controller_row import BY_LOOP
 from wristctl.config.former_names import preset_today
+from wristctl.config.loop import Loop
 from wristctl.control.law import Controller
 from wristctl.control.shipped_gains import PREFIX, families, is_shipped, shipped_gains
 from wristctl.control.vetting import law_of
@@ -26,14 +28,25 @@ def controller(name: str) -> Controller:
     return entry if isinstance(entry, Controller) else law_of(entry, name, {})
 
 
+def preset_for(chosen: Controller, exact: bool) -> str:
+    """Preset that a controller typed by its name alone has: `default` where all is `exact`, else `hardware`.
+
+    A controller without that preset has `default`, or else its first one; one without presets `default`.
+    """
+    names = ("default",) if exact else ("hardware", "default")
+    return next((name for name in names if name in chosen.presets), next(iter(chosen.presets), "default"))
+
+
 def gains_of(
-    chosen: Controller, gains: str | Mapping[str, float], tuned: TunedGains | None = None
+    chosen: Controller, gains: str | Mapping[str, float], tuned: TunedGains | None = None, loop: Loop | None = None
 ) -> tuple[float, ...]:
     """Gains by name or by value, in the controller's order; UserError for what is unknown or missing.
 
-    A name is a preset's, `tuned`, or `tuned:FAMILY` for the gains that a study found on a family of worlds. `tuned`
-    holds a tune run's gains by controller and name.
+    A name is a preset's, `tuned`, or `tuned:FAMILY` for the gains that a study found on a family of worlds, or
+    `by-loop` for the preset that is for `loop`. `tuned` holds a tune run's gains by controller and name.
     """
+    if gains == BY_LOOP and loop is not None:
+        gains = preset_for(chosen, loop.is_exact)
     if gains == "tuned":
         if tuned is None or chosen.name not in tuned:
             fix = f"--tuned RUN, a tune run that tuned {chosen.name}"
@@ -45,7 +58,7 @@ def gains_of(
         preset = preset_today(gains, chosen.presets)
         if preset not in chosen.presets:
             example = ",".join(f"{name}=1" for name in chosen.gains)
-            by_name = f", or every gain by name, such as {example}" if example else ""
+            by_name = f" Or every gain by name, such as {example}" if example else ""
             shipped = [PREFIX + family for family in families()]
             fix = f"{meant(gains, [*chosen.presets, 'tuned', *shipped])}{by_name}"
             raise UserError(f"unknown gains '{gains}' of {chosen.name}", "gains", fix)

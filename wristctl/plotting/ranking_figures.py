@@ -76,7 +76,7 @@ def answer_figure(rankings: Sequence[Ranking], places: Mapping[str, str]) -> Fig
     names = dict.fromkeys(label.split("/")[0] for label in labels)
     handles = [Line2D([], [], marker="o", color=colour(name), label=called(name), **every) for name in names]
     handles += [
-        Line2D([], [], marker=mark, color=GREY, label=f"{gains} gains", **every)
+        Line2D([], [], marker=mark, color=GREY, label=f"{gains} gains" if gains else "preset by loop", **every)
         for gains, mark in marks.items()
         if len(marks) > 1
     ]

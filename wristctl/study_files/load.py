@@ -28,6 +28,7 @@ from wristctl.study_files.resolved import check_read
 from wristctl.study_files.shipped import shipped_name, shipped_names, study_file
 from wristctl.study_files.short_rows import for_their_own_controller, in_lists, with_gains_apart
 from wristctl.study_files.strict_yaml import Document, KeyPath, parse_yaml
+from wristctl.study_files.typed_controllers import put_in
 
 # The key of a study file that names others, which are read before it.
 INCLUDE = "include"
@@ -55,11 +56,17 @@ def load_study(
 
 
 def read_study(
-    files: Sequence[Path] = (), overrides: Sequence[str] = (), command: str | None = None, note: bool = True
+    files: Sequence[Path] = (),
+    overrides: Sequence[str] = (),
+    command: str | None = None,
+    note: bool = True,
+    controllers: Sequence[str] = (),
+    tune: bool = False,
 ) -> tuple[Study, Mapping[KeyPath, Phrase]]:
     """As load_study, with the file and line (or override) of each key that was given.
 
-    A note names the former names among them, unless none is wanted.
+    A note names the former names among them, unless none is wanted. `controllers` were typed among the files of
+    `command`, which tunes them first if it is to `tune`.
     """
     data: dict[str, Any] = {}
     origins: dict[KeyPath, Phrase] = {}
@@ -76,6 +83,7 @@ def read_study(
         document = with_gains_apart(with_keys_of_today(_override(override, command), setting, former), setting)
         _merge(data, _whole(document, None), setting, origins)
     with_loops_of_today(data, origins, former)
+    put_in(data, origins, controllers, command or "", tune)
     note_presets(data, origins, former)
     if note:
         former.note()

@@ -1,9 +1,9 @@
-"""A controller with its gains as it may be given in short: NAME/GAINS, and one in place of a list of them."""
+"""A controller with its gains as it may be given in short: NAME or NAME/GAINS, and one in place of a list of them."""
 
 import re
 from typing import Any
 
-from wristctl.config.controller_row import Row
+from wristctl.config.controller_row import BY_LOOP, Row
 from wristctl.errors import Phrase, Setting, UserError
 from wristctl.study_files.keys import LISTS_OF_ROWS, field_at, keys_of
 from wristctl.study_files.strict_yaml import Document, KeyPath
@@ -13,7 +13,7 @@ _WITH_GAINS = re.compile(r"(?P<controller>[^/.\n]+|[^\n]*\.py:[A-Za-z_]\w*)/(?P<
 
 
 def with_gains_apart(document: Document, place: Phrase) -> Document:
-    """The document with each `controller: NAME/GAINS` as a controller and its gains.
+    """The document with each `controller: NAME/GAINS`, and each NAME of a list of rows, as a controller and its gains.
 
     Raises UserError where other gains stand beside.
     """
@@ -24,6 +24,8 @@ def with_gains_apart(document: Document, place: Phrase) -> Document:
 def _apart(data: Any, path: KeyPath, lines: dict[KeyPath, int], place: Phrase) -> Any:
     if isinstance(data, tuple):
         return tuple(_apart(item, (*path, position), lines, place) for position, item in enumerate(data))
+    if isinstance(data, str) and path[-1:] and isinstance(path[-1], int) and keys_of(Row).keys() <= _keys_at(path):
+        return row_typed(data)
     if not isinstance(data, dict):
         return data
     data = {key: _apart(item, (*path, key), lines, place) for key, item in data.items()}
@@ -37,6 +39,16 @@ def _apart(data: Any, path: KeyPath, lines: dict[KeyPath, int], place: Phrase) -
     if key in lines:
         lines[*path, "gains"] = lines[key]
     return data | parts.groupdict()
+
+
+def _keys_at(path: KeyPath) -> set[str]:
+    return set(keys_of(field_at(path)[0]))
+
+
+def row_typed(name: str) -> dict[str, str]:
+    """The row of a controller that is named as NAME or NAME/GAINS: by its name alone it has the preset of each loop."""
+    parts = _WITH_GAINS.fullmatch(name)
+    return dict(parts.groupdict()) if parts else {"controller": name, "gains": BY_LOOP}
 
 
 def for_their_own_controller(data: dict[str, Any], origins: dict[KeyPath, Phrase]) -> bool:

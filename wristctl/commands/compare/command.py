@@ -52,6 +52,7 @@ from wristctl.commands.results import Findings, StudyResult
 from wristctl.commands.session import Session
 from wristctl.commands.sweep.command import sweepable
 from wristctl.commands.tune.command import planned_search, search_all
+from wristctl.config.controller_row import BY_LOOP, label_of
 from wristctl.config.study import Study
 from wristctl.errors import UserError, under
 
@@ -64,6 +65,7 @@ if TYPE_CHECKING:
     from wristctl.comparison.combinations import ComparedRow
     from wristctl.comparison.controller_ranking import Ranking
     from wristctl.comparison.step_cost import StepTime
+    from wristctl.control.law import Controller
     from wristctl.control.table import Gains
     from wristctl.simulation.closed_loop import Size
     from wristctl.tuning.search import Search
@@ -322,10 +324,18 @@ def compare(session: Session) -> Compared:
 
 
 def _gains_of_rows(study: Study, tuned: Gains) -> dict[str, dict[str, float]]:
-    """Gains by name of every row, by its label."""
-    from wristctl.control.table import controller, gains_of
+    """Gains by name of every row, by its label; of gains by loop those of each preset, by controller/preset."""
+    from wristctl.control.table import controller, gains_of, preset_for
 
-    laws = {row.label: (controller(row.controller), row.gains) for row in study.compare.rows}
+    laws: dict[str, tuple[Controller, str | Mapping[str, float]]] = {}
+    for row in study.compare.rows:
+        law = controller(row.controller)
+        if row.gains != BY_LOOP:
+            laws[row.label] = law, row.gains
+            continue
+        for loop in judged_loops(study, study.compare).values():
+            preset = preset_for(law, loop.is_exact)
+            laws[label_of(row.controller, preset)] = law, preset
     return {
         label: dict(zip(law.gains, gains_of(law, gains, tuned), strict=True)) for label, (law, gains) in laws.items()
     }
@@ -339,8 +349,8 @@ def _step_times(session: Session, study: Study, tuned: Gains) -> dict[str, StepT
     with session.progress("timing the control step"):
         for row in study.compare.rows:
             law = controller(row.controller)
-            gains = gains_of(law, row.gains, tuned)
-            times[f"{row.controller}/{row.gains_name}"] = step_time(law, gains, study.wrist)
+            gains = gains_of(law, row.gains, tuned, next(iter(judged_loops(study, study.compare).values())))
+            times[row.label] = step_time(law, gains, study.wrist)
     session.findings.plain("timing.json", {name: time._asdict() for name, time in times.items()})
     return times
 

@@ -86,7 +86,7 @@ def judge_all(study: Study, gains: Mapping[StudyPlace, Mapping[str, float]]) -> 
         for row in study.study.presets:
             law = controller(row.controller)
             chosen[StudyPlace(BASE, family, row.label, law.name)] = dict(
-                zip(law.gains, gains_of(law, row.gains), strict=True)
+                zip(law.gains, gains_of(law, row.gains, loop=study.families[family].loop), strict=True)
             )
         chosen.setdefault(StudyPlace(BASE, family, f"{YARDSTICK}/default", YARDSTICK), {})
     for place, values in chosen.items():
