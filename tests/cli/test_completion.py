@@ -16,8 +16,10 @@ from wristctl.cli.options import MOST, controllers, run_ids, study_files
 from wristctl.config.choices import CONTROLLERS
 from wristctl.config.study import Study
 from wristctl.records import start_run
+from wristctl.study_files.shipped import shipped_names
 
 ROOT = Path(__file__).parents[2]
+SHIPPED = [name for name in shipped_names() if name.startswith("s")]
 HEAVY = {"torch", "scipy", "pandas", "matplotlib", "cv2", "numba", "numpy", "jinja2"}
 CODE = """
 import contextlib, io, json, os, sys
@@ -65,7 +67,9 @@ def test_runs_are_completed_by_id_and_as_the_latest(folder: Path) -> None:
 @pytest.mark.slow
 def test_study_files_controllers_and_commands_are_completed(folder: Path) -> None:
     typed = ("train ", "compare experiments/q", "simulate --controller sm", "hw-run --controller sm", "runs rep")
-    studies, one, laws, on_a_rig, verbs = _completed(folder, *typed)
+    studies, one, laws, on_a_rig, verbs, both, lists = _completed(folder, *typed, "compare pid-ff s", "list con")
+    assert both == [name for name in sorted(CONTROLLERS) if name.startswith("s")] + SHIPPED
+    assert lists == ["controllers", "conditions"]
     assert studies == ["experiments/paper.yaml", "experiments/quick.yaml"] and one == ["experiments/quick.yaml"]
     assert laws == on_a_rig == ["smc", "smc-dob", "smc-tracking"] and verbs == ["replay", "report"]
 

@@ -95,8 +95,8 @@ COMMANDS = {
         shortcuts=("horizon",),
         flags={TUNE: "Search gains first, at equal budget, for the controllers that are typed by name."},
         examples=(
-            "wristctl compare pid-ff adrc/hardware my_law.py:MY_LAW mywrist.yaml",
-            "wristctl compare pid-ff adrc ct-dob --tune",
+            "wristctl compare pid-ff adrc/hardware experiments/own_controllers/lqr.py:LQR quick",
+            "wristctl compare pid-ff adrc --tune",
             "wristctl compare experiments/paper.yaml --network latest:train --tuned latest:tune",
         ),
     ),
@@ -107,7 +107,7 @@ COMMANDS = {
         examples=(
             "wristctl recommend --set wrist.length=0.12 --set wrist.stiffness=2.0",
             "wristctl recommend --from-identified latest:identify",
-            "wristctl recommend ct-dob pid-ff mywrist.yaml --set loop.actuator.tendon_stiffness=2e4",
+            "wristctl recommend ct-dob pid-ff --set loop.actuator.tendon_stiffness=2e4",
         ),
     ),
     "identify": Entry(
@@ -142,7 +142,6 @@ COMMANDS = {
         flags=YES,
         advanced=("video", "priority", "from_identified", "network"),
         examples=(
-            "wristctl hw-run",
             "wristctl hw-run ct-dob pid-ff --set 'directions=[ulnar]' --set push.force=0",
             "wristctl hw-run --reference circumduction --set reference.angle_deg=25",
             "wristctl hw-run --dry-run --port /dev/ttyACM0",
@@ -214,6 +213,9 @@ COMMANDS = {
         ),
         argument="robot",
         listing=("wristctl.commands.validate.command:listed", "Say where the recordings of each robot are."),
+    ),
+    "list": Entry(
+        "wristctl.cli.list_choices:app", _MORE, "List controllers, presets, references, conditions or metrics."
     ),
     "export-model": Entry("wristctl.cli.export_model:app", _MORE, "Write the wrist of a run for MuJoCo or MATLAB."),
     "paper": Entry("wristctl.cli.paper_commands:app", _MORE, "Check the paper's claims one by one."),

@@ -169,8 +169,7 @@ _CONTROLLERS_TOO = Annotated[
     list[str] | None,
     typer.Argument(
         metavar="CONTROLLER|FILE",
-        help="Controllers (NAME, NAME/PRESET or file.py:NAME) and study files (.yaml, or an experiment's name); later "
-        "files override earlier ones.",
+        help="NAME, NAME/PRESET or file.py:NAME; study files (YAML).",
         autocompletion=controllers_and_studies,
     ),
 ]

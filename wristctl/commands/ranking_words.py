@@ -25,13 +25,16 @@ def condition(ranking: Ranking) -> str:
     """A condition in a few words; of worlds the name of their family."""
     if ranking.unit == "world":
         return ranking.name.replace(", steps", " (steps)")
-    name, traits = ranking.name.removesuffix(", steps"), ranking.traits
-    if name == "camera and tendons":
-        words = _rig(traits)
-    else:
-        words = {"pushed": "push", "off-nominal": "wrong model"}.get(name, name)
-        words = f"{_rig(traits)} + {words}" if traits.rig else words
+    words = class_words(ranking.name.removesuffix(", steps"), ranking.traits)
     return f"{words} (steps)" if ranking.jumps else words
+
+
+def class_words(name: str, traits: Traits) -> str:
+    """A class of loops in a few words, as tables have it."""
+    if name == "camera and tendons":
+        return _rig(traits)
+    words = {"pushed": "push", "off-nominal": "wrong model"}.get(name, name)
+    return f"{_rig(traits)} + {words}" if traits.rig else words
 
 
 def _rig(traits: Traits) -> str:

@@ -206,8 +206,15 @@ def _in_order(results: Sequence[ComparedRow], chosen: CompareSettings) -> list[C
     )
 
 
-# From what a law is designed for to what it meets.
-CLASSES = ("ideal", "sampled", "camera and tendons", "pushed", "off-nominal")
+# Classes of loops with their meanings, from what a law is designed for to what it meets.
+CLASS_MEANINGS = {
+    "ideal": "the nominal model",
+    "sampled": "with ticks, limits or more segments",
+    "camera and tendons": "behind motors and tendons, or a camera",
+    "pushed": "an unknown force",
+    "off-nominal": "another wrist",
+}
+CLASSES = tuple(CLASS_MEANINGS)
 # Control period [s] up to which a torque is held so briefly that a law need not know of it.
 _CONTINUOUS = 1e-4
 

@@ -14,8 +14,8 @@ BY_NAME = "every gain by name (Kp=10,Ki=2,Kd=0.1)"
 # Gains of a controller that is typed by its name alone: a preset for each loop.
 BY_LOOP = "by-loop"
 GAINS = (
-    "a preset's name, `by-loop` (`default` with ideal actuators and exact angles, else `hardware`), `tuned` "
-    f"(from a tune run), `tuned:camera` (of a family, shipped), or {BY_NAME}"
+    "a preset's name, `by-loop` (`default` or `hardware`, by motors and camera), `tuned` (from a tune run), "
+    f"`tuned:camera` (of a family, shipped), or {BY_NAME}"
 )
 
 

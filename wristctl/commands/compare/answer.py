@@ -126,23 +126,22 @@ def compared(rankings: Sequence[Ranking]) -> str:
     return f"{len(labels)} compared: {'; '.join(groups)}.{''.join(repeated)}"
 
 
-# What each condition is, but a rig's.
-_CONDITIONS = {
-    "ideal": "the nominal model",
-    "sampled": "with ticks, limits or more segments",
-    "pushed": "an unknown force",
-    "off-nominal": "another wrist",
-}
-
-
 def conditions(rankings: Sequence[Ranking]) -> str:
     """What the names of the conditions mean; empty for families of worlds, which a study describes."""
-    meanings = {
-        condition(one).removesuffix(" (steps)"): _CONDITIONS.get(one.name.removesuffix(", steps"), _rig(one.traits))
-        for one in rankings
-        if one.unit != "world"
-    }
+    from wristctl.comparison.combinations import CLASS_MEANINGS
+
+    meanings = dict[str, str]()
+    for one in rankings:
+        if one.unit != "world":
+            name, words = one.name.removesuffix(", steps"), condition(one).removesuffix(" (steps)")
+            meanings[words] = _rig(one.traits) if name == "camera and tendons" else CLASS_MEANINGS[name]
     return f"{capital('; '.join(f'{name}: {meaning}' for name, meaning in meanings.items()))}." if meanings else ""
+
+
+def _rig(traits: Traits) -> str:
+    if traits.tendons:
+        return "spools follow the reference, so even low gains track it"
+    return "angles come from pictures" if traits.camera else "of some loops"
 
 
 # For what presets were made; those of the paper are told apart.
@@ -158,12 +157,6 @@ def gains_meant(rankings: Sequence[Ranking]) -> str:
     present = {label.rpartition("/")[2] for ranking in rankings for label in ranking.labels if not open_loop(label)}
     meanings = [f"{name} {meaning}" for name, meaning in _GAINS.items() if name in present]
     return f"Presets: {', '.join(meanings)}." if meanings else ""
-
-
-def _rig(traits: Traits) -> str:
-    if traits.tendons:
-        return "spools follow the reference, so even low gains track it"
-    return "angles come from pictures" if traits.camera else "of some loops"
 
 
 def papers(rankings: Sequence[Ranking]) -> str:
