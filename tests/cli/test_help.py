@@ -15,6 +15,9 @@ from typer.main import get_command
 
 from wristctl.cli.app import app, main, typer_of
 from wristctl.cli.commands import CALIBRATIONS, COMMANDS, PAPER
+from wristctl.errors import UserError
+from wristctl.study_files.keys import field_at, keys_of
+from wristctl.study_files.load import load_study
 from wristctl.study_files.strict_yaml import parse_yaml
 
 ROOT = Path(__file__).parents[2]
@@ -153,3 +156,31 @@ def test_every_example_runs_as_written_but_for_what_it_takes_for_granted(
         assert ended.value.code == 0 or any(re.search(other, said) for other in TAKEN_FOR_GRANTED), f"{example}: {said}"
         for file in (word for word in typed if word.endswith(".yaml")):
             assert typed[0] in parse_yaml(Path(file).read_bytes(), file).data, example
+
+
+@pytest.mark.slow
+def test_horizon_and_seed_mean_the_same_wherever_they_are() -> None:
+    """Each command whose section has a horizon has the option for it, in seconds; each that makes a run has --seed."""
+    told = dict[str, set[str]]()
+    for name, entry in (COMMANDS | PAPER).items():
+        if entry.place.startswith("wristctl.cli"):
+            continue
+        options = {option: each for each in get_command(typer_of(entry)).params for option in each.opts}
+        assert "--seed" in options, name
+        if "horizon" in keys_of(field_at((name,))[0]):
+            assert "--horizon" in options, name
+        for option in {"--horizon", "--seed"} & set(options):
+            told.setdefault(option, set()).add(
+                str(getattr(options[option], "help", "")).replace("\\[", "[").partition(" of ")[2]
+            )
+    assert len(told["--seed"]) == 1
+    assert told["--horizon"] == {"one rollout [s]", "a trial [s]"}
+
+
+def test_a_horizon_that_worlds_would_leave_unread_is_refused() -> None:
+    files, worlds = [Path("scenarios/camera")], "worlds.family=camera"
+    for command in ("compare", "tune"):
+        with pytest.raises(UserError, match=r"their? own .*horizon=4: .* --set families\.camera\.horizon=4"):
+            load_study(files, [worlds, "horizon=4"], command)
+        assert load_study(files, [worlds, "families.camera.horizon=4"], command).families["camera"].horizon == 4.0
+        assert getattr(load_study([], ["horizon=4"], command), command).horizon == 4.0

@@ -11,6 +11,7 @@ from importlib import import_module
 from typing import Any, get_origin
 
 import typer
+from pydantic.fields import FieldInfo
 
 from wristctl.board.board_errors import HARDWARE, SAFETY_STOP
 from wristctl.cli.commands import TUNE, Entry
@@ -19,7 +20,7 @@ from wristctl.cli.options import Options, Own, StudyCommand, controllers, refere
 from wristctl.commands.procedure import Procedure
 from wristctl.errors import UserError
 from wristctl.plugins.trust import asking
-from wristctl.study_files.keys import field_at, section_keys, whole_key
+from wristctl.study_files.keys import field_at, section_keys, unit_of, whole_key
 from wristctl.study_files.typed_controllers import TAKE_CONTROLLERS, parted
 
 
@@ -77,7 +78,7 @@ def study_command(procedure: Procedure[Any], entry: Entry) -> typer.Typer:
     parameters = [
         Own(
             _option_of(leaf),
-            _shown(keys[leaf].description or ""),
+            _help_of(keys[leaf]),
             kinds.get(leaf, str),
             completed.get(leaf),
             leaf in entry.advanced,
@@ -98,6 +99,12 @@ def study_command(procedure: Procedure[Any], entry: Entry) -> typer.Typer:
 def _shown(text: str) -> str:
     """Text as help shows it: a bracket begins rich's markup."""
     return text.replace("[", r"\[")
+
+
+def _help_of(field: FieldInfo) -> str:
+    """Meaning of a leaf with its unit, as help shows it."""
+    unit = unit_of(field)
+    return _shown(f"{field.description or ''}{f' [{unit}]' * bool(unit)}")
 
 
 def _list(place: str, as_json: bool) -> None:

@@ -43,7 +43,7 @@ COMMANDS = {
         "wristctl.commands.simulate.command:SIMULATE",
         _MAIN,
         "Simulate one controller on one wrist.",
-        shortcuts=("controller", "gains", "reference.kind"),
+        shortcuts=("controller", "gains", "reference.kind", "horizon"),
         examples=(
             "wristctl simulate --controller smc --gains exchanged",
             "wristctl simulate --reference dart-thrower --controller ct-dob",
@@ -81,7 +81,7 @@ COMMANDS = {
         "wristctl.commands.tune.command:TUNE",
         _MAIN,
         "Search the gains of controllers.",
-        shortcuts=("candidates", "iterations"),
+        shortcuts=("candidates", "iterations", "horizon"),
         examples=(
             "wristctl tune experiments/paper.yaml",
             "wristctl tune smc pid --iterations 20",
@@ -104,6 +104,7 @@ COMMANDS = {
         "wristctl.commands.recommend.command:RECOMMEND",
         _MAIN,
         "Say which controller with which gains to run on a wrist.",
+        shortcuts=("horizon",),
         examples=(
             "wristctl recommend --set wrist.length=0.12 --set wrist.stiffness=2.0",
             "wristctl recommend --from-identified latest:identify",
@@ -132,6 +133,7 @@ COMMANDS = {
             "controller",
             "gains",
             "reference.kind",
+            "horizon",
             "port",
             "camera",
             "repetitions",
@@ -140,7 +142,7 @@ COMMANDS = {
             "priority",
         ),
         flags=YES,
-        advanced=("video", "priority", "from_identified", "network"),
+        advanced=("horizon", "video", "priority", "from_identified", "network"),
         examples=(
             "wristctl hw-run ct-dob pid-ff --set 'directions=[ulnar]' --set push.force=0",
             "wristctl hw-run --reference circumduction --set reference.angle_deg=25",
@@ -227,6 +229,7 @@ PAPER = {
         "wristctl.commands.audit.command:AUDIT",
         None,
         "Judge the paper's claims one by one.",
+        shortcuts=("horizon",),
         examples=(
             "wristctl paper audit experiments/claims.yaml",
             "wristctl paper audit experiments/claims.yaml --table1 RUN --selection RUN",

@@ -18,7 +18,7 @@ class SimulateSettings(Section):
     start: Literal["straight", "equilibrium"] = choice(
         "straight", "state at rest before the move: straight, or the static equilibrium at pretension"
     )
-    horizon: float = quantity(5.0, "s", "duration of the rollout", "assumed", gt=0)
+    horizon: float = quantity(5.0, "s", "duration of one rollout", "assumed", gt=0)
     repetitions: int = choice(1, "rollouts, each with noise and a drawn plant of its own", ge=1, le=10_000)
     network: str | None = choice(None, "train run behind a reference with inverse: network")
     tuned: str | None = choice(None, "tune run behind gains: tuned")

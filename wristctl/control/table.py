@@ -58,9 +58,11 @@ def gains_of(
         preset = preset_today(gains, chosen.presets)
         if preset not in chosen.presets:
             example = ",".join(f"{name}=1" for name in chosen.gains)
-            by_name = f" Or every gain by name, such as {example}" if example else ""
+            by_name = f"every gain by name, such as {example}"
             shipped = [PREFIX + family for family in families()]
-            fix = f"{meant(gains, [*chosen.presets, 'tuned', *shipped])}{by_name}"
+            fix = meant(gains, [*chosen.presets, "tuned", *shipped])
+            if example:
+                fix += f" Or {by_name}" if fix.endswith("?") else f"; or {by_name}"
             raise UserError(f"unknown gains '{gains}' of {chosen.name}", "gains", fix)
         return chosen.values(chosen.presets[preset])
     for name in gains:

@@ -93,9 +93,21 @@ def read_study(
         study = Study.model_validate(data, by_alias=True, by_name=False)
     except ValidationError as error:
         raise explained(error, origins) from error
+    _refuse_horizon_of_worlds(study, origins, command)
     if for_another:
         study.simulate.model_fields_set.discard("gains")
     return study, origins
+
+
+def _refuse_horizon_of_worlds(study: Study, origins: Mapping[KeyPath, Phrase], command: str | None) -> None:
+    """UserError where an override gives a horizon to a command whose worlds have their own, which would go unread."""
+    if command not in ("compare", "tune") or not isinstance(where := origins.get((command, "horizon")), Setting):
+        return
+    family = getattr(study, command).worlds.family
+    if family:
+        key = f"families.{family}.horizon"
+        problem = f"the worlds of {family} have a horizon of their own"
+        raise UserError(problem, (where, f": {command}.horizon"), Setting(where.text.replace("horizon", key, 1)))
 
 
 def _in_place_of(file: str, files: Sequence[Path], command: str | None) -> Phrase:
