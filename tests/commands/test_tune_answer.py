@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import math
+import re
 import shlex
 from collections.abc import Sequence
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
@@ -65,6 +67,15 @@ def test_figures_are_those_of_the_search_and_fit_a_screen(tuned: Tuned) -> None:
         assert (once.controller, once.gains) == (name, gains), "to the last bit"
 
 
+@pytest.mark.slow
+def test_the_first_line_says_which_gains_are_searched_and_for_about_how_long(caplog: pytest.LogCaptureFixture) -> None:
+    caplog.set_level("INFO", "wristctl")
+    tune(load_study(None, *STUDY))
+    first, *others = [record.getMessage() for record in caplog.records]
+    assert re.fullmatch(r"searching gains of smc, pid: about \d+ (s|min)", first)
+    assert not any("about" in line for line in others)
+
+
 def test_the_error_stands_beside_that_of_feedforward_on_the_same_cases(tuned: Tuned) -> None:
     for beside in tuned.errors.values():
         assert beside.cases == tuned.cases == 1 and 0.0 < beside.error < math.radians(20.0)
@@ -100,6 +111,62 @@ def test_a_gain_at_either_end_of_its_box_is_named_and_one_well_within_is_not(end
     inside = {"low": 1.2, "high": 1.0 / 1.2}[end] * getattr(table[last], end)
     assert at_edge(_search("smc", [*middle[:-1], inside])) == []
     assert "edge" in _text(found, {}) and "edge" not in _text(_search("smc"), {})
+
+
+NARROW = Stood(0.67, 1.0, 1.0, 0.6, 3.0)
+
+
+@pytest.mark.parametrize(
+    ("begin", "errors", "lost", "origin", "stood"),
+    [
+        ("Use {0}.", (1e-3, 2e-2), 0, "search", None),
+        ("Keep the preset hardware of {0}: nothing better was found.", (1e-3, 2e-2), 0, "hardware", None),
+        ("The best that was found has little margin: {0}.", (1e-3, 2e-2), 0, "search", NARROW),
+        ("Nothing that holds was found: the best, {0}, swings in 3 of 8 cases.", (1e-3, 2e-2), 3, "hardware", None),
+        ("Feedforward alone is as good as what was found, {0}.", (1e-2, 1.005e-2), 0, "search", None),
+        ("Feedforward alone is better than what was found, {0}.", (2e-2, 1e-2), 0, "search", None),
+    ],
+)
+def test_use_is_said_only_of_what_holds(
+    begin: str, errors: tuple[float, float], lost: int, origin: str, stood: Stood | None
+) -> None:
+    middle = [math.sqrt(gain.low * gain.high) for gain in controller("smc").gains.values()]
+    found = _search("smc", middle, origin)
+    faults = {"limit cycle": lost} if lost else {}
+    told = answer_of(
+        {"smc": found},
+        {"smc": Beside(errors[0], errors[1], 8)},
+        {"smc": faults},
+        8,
+        "",
+        {},
+        None,
+        {"smc": stood} if stood else {},
+    )
+    gains = ", ".join(
+        f"{name} = {value:.4g} {controller('smc').gains[name].unit}" for name, value in found.gains.items()
+    )
+    assert told is not None and told.sentence.startswith(begin.format(f"smc with {gains}"))
+
+
+def test_gains_at_the_edge_of_the_box_are_no_optimum_however_good() -> None:
+    table = controller("smc").gains
+    found = _search("smc", [table["P1"].low, math.sqrt(table["P2"].low * table["P2"].high), table["P3"].high])
+    sentence = _text(found, {}).partition("Its error")[0]
+    assert sentence.startswith("No optimum was found: the best is smc") and "Use" not in sentence
+    assert "P1 and P3 lie at the edge of the box" in " ".join(sentence.split())
+
+
+def test_a_controller_that_swings_is_passed_over_and_ties_are_named() -> None:
+    searches = {name: _search(name) for name in ("smc", "pid", "lqi", "adrc")}
+    objectives = {"smc": -2.0, "pid": -1.001, "lqi": -1.0, "adrc": -0.9}
+    searches = {name: replace(search, objective=objectives[name]) for name, search in searches.items()}
+    lost = {name: {"limit cycle": 3} if name == "smc" else {} for name in searches}
+    told = answer_of(searches, dict.fromkeys(searches, Beside(1e-3, 2e-2, 8)), lost, 8, "", {})
+    assert told is not None and told.sentence.startswith("Use pid with ")
+    assert told.sentence.endswith(
+        "lqi ties with it: equal within 1 %. smc has the least objective, but swings in 3 of 8 cases."
+    )
 
 
 def test_a_preset_that_nothing_beats_is_named() -> None:

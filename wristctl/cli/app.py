@@ -69,7 +69,7 @@ def lazy_group(commands: Mapping[str, Entry]) -> type[TyperGroup]:
 _EXAMPLES = """Examples:
 wristctl init my-wrist
 wristctl simulate --controller smc --gains exchanged
-wristctl compare controllers
+wristctl compare pid-ff adrc ct-dob
 wristctl compare --help"""
 
 

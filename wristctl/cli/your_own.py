@@ -30,7 +30,7 @@ new_app = typer.Typer(add_completion=False)
 
 _TABLES = {"controller": CONTROLLERS, "reference": REFERENCES, "optimiser": OPTIMISERS}
 _AFTER_NEW = {
-    "controller": "wristctl check-controller {0}\nwristctl simulate --controller {0}",
+    "controller": "wristctl check-controller {0}\nwristctl compare pid-ff adrc {0}",
     "reference": "wristctl simulate --set reference.kind={0}",
     "optimiser": "wristctl tune --set optimiser={0}",
 }
@@ -73,8 +73,8 @@ init_app = typer.Typer(add_completion=False)
 _WRIST = "mywrist.yaml"
 _AFTER_INIT = (
     f"wristctl simulate {_WRIST}",
-    f"wristctl compare controllers {_WRIST}",
-    f"wristctl tune {_WRIST} --iterations 20",
+    f"wristctl compare ct-dob pid-ff mrac {_WRIST}",
+    f"wristctl tune ct-dob {_WRIST} --iterations 20",
 )
 
 

@@ -66,6 +66,11 @@ class Judge:
         )
         self._yardstick = measure(controller(YARDSTICK), np.zeros((1, 0)), cases, wrist, self._metrics)
 
+    @property
+    def count(self) -> int:
+        """Number of cases."""
+        return len(self._cases)
+
     def __call__(self, law: Controller, gains: Array) -> Array:
         """Objective (P,) of gains (P, g)."""
         return self._on_the_cases(law, gains) + self._without_margin(law, gains)

@@ -51,7 +51,8 @@ from wristctl.commands.ranking_words import condition
 from wristctl.commands.results import Findings, StudyResult
 from wristctl.commands.session import Session
 from wristctl.commands.sweep.command import sweepable
-from wristctl.commands.tune.command import planned_search, search_all
+from wristctl.commands.tune.command import planned_search
+from wristctl.commands.tune.searches import search_all
 from wristctl.config.controller_row import BY_LOOP, label_of
 from wristctl.config.study import Study
 from wristctl.errors import UserError, under

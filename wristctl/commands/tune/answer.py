@@ -30,8 +30,9 @@ _VERBS = {
     "not converged": "depends on the integration step",
 }
 
-# Difference of two errors' ratio from 1 that counts as none.
+# Difference of two errors' ratio from 1 that counts as none, and the same in decades, of two objectives.
 _SAME = 0.01
+_TIE = math.log10(1.0 + _SAME)
 
 
 class Motion(NamedTuple):
@@ -110,37 +111,95 @@ def answer_of(
     if not searches:
         return None
     ordered = sorted(searches, key=lambda name: searches[name].objective)
-    best = ordered[0]
+    sound = [name for name in ordered if _is_sound(errors[name], lost[name])]
+    best = (sound or ordered)[0]
+    little = [name for name in ordered if name in (stood or {}) and not (stood or {})[name].enough]
+    sentence = " ".join([
+        _verdict(searches[best], errors[best], lost[best], cases, best in little),
+        *_error(errors[best], cases),
+        *_ties(best, sound, searches),
+        *_passed_over(ordered[0], best, errors, lost, cases),
+    ])  # fmt: skip
     notes = [
         *[bending] * bool(bending),
         *_edges(ordered, searches),
-        *_presets(ordered, searches),
+        *_presets([name for name in ordered if name != best], searches),
         *_lost(ordered, lost, cases),
     ]
-    notes += _margins(ordered, stood or {}, motion.where if motion else "the loop")
+    notes += _margins(ordered, stood or {}, little, motion.where if motion else "the loop")
     notes += _elsewhere(ordered, elsewhere)
     more = "All tables: `.tables`."
     if run and motion is not None:
         notes += _next(f"{run}/{file_of(best)}", motion)
         takers = "simulate, compare and hw-run" if motion.on_a_rig else "simulate and compare"
         more = f"All tables: --all. The gains, each a file for {takers}: {run}/{FOLDER}/"
-    whole = Answer(_sentence(best, searches[best], errors[best], cases), _table(ordered, searches, errors), notes, more)
+    whole = Answer(sentence, _table(ordered, searches, errors), notes, more)
     if len(whole.lines()) <= LINES or len(ordered) == 1:
         return whole
     return Answer(whole.sentence, _table(ordered, searches, errors, with_gains=False), notes, more)
 
 
-def _sentence(name: str, search: Search, beside: Beside, cases: int) -> str:
-    gains = f"{name} with {gains_words(search.controller, search.gains)}."
+def _is_sound(beside: Beside, lost: Mapping[str, int]) -> bool:
+    """Whether gains do nothing wrong in any case, and are better than feedforward."""
+    return bool(beside.cases) and not lost and beside.ratio > 1.0 + _SAME
+
+
+def _verdict(search: Search, beside: Beside, lost: Mapping[str, int], cases: int, little_margin: bool) -> str:
+    """What to do with the best gains: to use them only where they hold and the search has come to an end of its own."""
+    gains = f"{search.controller} with {gains_words(search.controller, search.gains)}"
     if not beside.cases:
         return (
-            f"Nothing to use was found: {gains} It fails in each of {cases} cases (objective {search.objective:.3g})."
+            f"Nothing to use was found: {gains}. It fails in each of {cases} cases (objective {search.objective:.3g})."
         )
-    worse = beside.ratio < 1.0 - _SAME
-    begin = f"Feedforward alone is better than what was found, {gains}" if worse else f"Use {gains}"
+    if lost:
+        return f"Nothing that holds was found: the best, {gains}, {_faults(lost, cases)}."
+    if beside.ratio <= 1.0 + _SAME:
+        as_good = "better than" if beside.ratio < 1.0 - _SAME else "as good as"
+        return f"Feedforward alone is {as_good} what was found, {gains}."
+    if edges := [gain for gain, *_ in at_edge(search)]:
+        lie = f"{joined(edges)} {'lie' if len(edges) > 1 else 'lies'} at the edge of the box that was searched"
+        return f"No optimum was found: the best is {gains}, and {lie}."
+    if little_margin:
+        return f"The best that was found has little margin: {gains}."
+    if preset := _preset_of(search):
+        return f"Keep the preset {preset} of {gains}: nothing better was found."
+    return f"Use {gains}."
+
+
+def _faults(lost: Mapping[str, int], cases: int) -> str:
+    return " and ".join(f"{_VERBS[mark]} in {count} of {cases} cases" for mark, count in lost.items())
+
+
+def _error(beside: Beside, cases: int) -> list[str]:
+    """Error of the best gains beside feedforward's; nothing where they fail everywhere."""
+    if not beside.cases:
+        return []
     times = f"{_times(beside)} feedforward's {degrees(beside.feedforward)} deg"
     where = f"{cases} cases" if beside.cases == cases else f"{beside.cases} of {cases} cases (in the others it fails)"
-    return f"{begin} Its error is {degrees(beside.error)} deg RMSE over {where}: {times}."
+    return [f"Its error is {degrees(beside.error)} deg RMSE over {where}: {times}."]
+
+
+def _ties(best: str, sound: Sequence[str], searches: Mapping[str, Search]) -> list[str]:
+    """Other controllers whose gains are as good: their objective is the same within 1 %."""
+    least = searches[best].objective
+    alike = [name for name in sound if name != best and searches[name].objective - least < _TIE]
+    return [f"{joined(alike)} {'tie' if len(alike) > 1 else 'ties'} with it: equal within 1 %."] * bool(alike)
+
+
+def _passed_over(
+    first: str, best: str, errors: Mapping[str, Beside], lost: Mapping[str, Mapping[str, int]], cases: int
+) -> list[str]:
+    """Why the least objective is not the best controller's."""
+    if first == best:
+        return []
+    why = _faults(lost[first], cases) if lost[first] else "is no better than feedforward"
+    return [f"{first} has the least objective, but {why if errors[first].cases else 'fails in each case'}."]
+
+
+def _preset_of(search: Search) -> str:
+    """The preset that nothing better was found than; empty where something was."""
+    finalists = search.finalists
+    return finalists[0].origin if finalists and finalists[0].origin != "search" else ""
 
 
 def _next(file: str, motion: Motion) -> list[str]:
@@ -202,19 +261,14 @@ def _presets(ordered: Sequence[str], searches: Mapping[str, Search]) -> list[str
     """Controllers for which the search found nothing better than a preset."""
     lines = []
     for name in ordered:
-        finalists = searches[name].finalists
-        if finalists and finalists[0].origin != "search":
-            lines.append(f"For {name} nothing better than the preset {finalists[0].origin} was found.")
+        if preset := _preset_of(searches[name]):
+            lines.append(f"For {name} nothing better than the preset {preset} was found.")
     return [" ".join(lines)] * bool(lines)
 
 
 def _lost(ordered: Sequence[str], lost: Mapping[str, Mapping[str, int]], cases: int) -> list[str]:
     """What the gains do wrong, and in how many cases; a sentence also where they do nothing wrong."""
-    facts = [
-        f"{name} {' and '.join(f'{_VERBS[mark]} in {count} of {cases} cases' for mark, count in lost[name].items())}"
-        for name in ordered
-        if lost[name]
-    ]
+    facts = [f"{name} {_faults(lost[name], cases)}" for name in ordered if lost[name]]
     if facts:
         return [f"Do not rely on these: {'; '.join(facts)}."]
     return [f"In none of the {cases} cases does any of them fail, swing or chatter."]
@@ -224,12 +278,11 @@ def _lost(ordered: Sequence[str], lost: Mapping[str, Mapping[str, int]], cases: 
 _FIRST = 3
 
 
-def _margins(ordered: Sequence[str], stood: Mapping[str, Stood], where: str) -> list[str]:
+def _margins(ordered: Sequence[str], stood: Mapping[str, Stood], little: Sequence[str], where: str) -> list[str]:
     """How much the best gains stand on the loop they were tuned for, and which stand less than they should."""
     told = [f"{name} {stood[name].words}" for name in ordered[:_FIRST] if name in stood]
     if not told:
         return []
-    little = [name for name in ordered if name in stood and not stood[name].enough]
     words = f"Margin on {where}, one change at a time without a swing or failure: {'; '.join(told)}."
     least = "torque x 0.67 to x 1.5, springs x 0.6 to x 1.4, 1 frame later"
     return [words + f" Less than {least}: {joined(little)}." * bool(little)]

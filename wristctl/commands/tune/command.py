@@ -33,9 +33,10 @@ from wristctl.commands.loop_warnings import (
 from wristctl.commands.printed_table import Table
 from wristctl.commands.procedure import Procedure
 from wristctl.commands.results import Findings, StudyResult
-from wristctl.commands.session import Done, Session
+from wristctl.commands.session import Session
 from wristctl.commands.sweep.command import sweepable
 from wristctl.commands.tune.answer import Beside, Motion, answer_of, beside_feedforward
+from wristctl.commands.tune.searches import search_all
 from wristctl.config.families import Family
 from wristctl.config.loop import Reference
 from wristctl.config.study import Study
@@ -47,8 +48,7 @@ if TYPE_CHECKING:
 
     from wristctl.simulation.closed_loop import Size
     from wristctl.tuning.margin import OwnLoop, Stood
-    from wristctl.tuning.objective import Judge
-    from wristctl.tuning.search import Search, Tried
+    from wristctl.tuning.search import Search
     from wristctl.wrist.kinematics import Inverse
 
 # Share of what a family draws at which one of its motions is tried.
@@ -292,95 +292,13 @@ def _elsewhere(
     return tried
 
 
-def search_all(session: Session, study: Study, network: Inverse | None) -> dict[str, Search]:
-    """Tune every controller of the study's tune section; what was found is kept also where it is cut short."""
-    from wristctl.control.table import controller
-    from wristctl.tuning.search import judges_of, search
-
-    settings = study.tune
-    _note_streams(session, study)
-    judge, choose = judges_of(study, network)
-    searches: dict[str, Search] = {}
-    try:
-        for name in settings.controllers:
-            total = settings.iterations * settings.restarts
-            with session.progress(f"tuning {name}", total=total, unit="iterations") as advance:
-
-                def so_far(result: Search, name: str = name, report: Done = advance) -> None:
-                    searches[name] = result
-                    report(len(result.tried.values), best=result.objective)
-
-                law, tried = controller(name), _known(session, name)
-                searches[name] = search(study, law, session.findings.stream, (judge, choose), so_far, tried)
-    finally:
-        _keep(session.findings, searches, choose or judge)
-    return searches
-
-
 def _references(settings: TuneSettings, families: Mapping[str, Family]) -> list[Reference]:
     family = settings.worlds.family
     return list(families[family].references) if family else [scenario.reference for scenario in settings.scenarios]
 
 
-def _note_streams(session: Session, study: Study) -> None:
-    from wristctl.simulation.closed_loop import scenario_of
-    from wristctl.simulation.drawn_worlds import streams_of
-    from wristctl.simulation.worlds import Draws
-
-    settings = study.tune
-    if settings.worlds.family:
-        name = settings.worlds.family
-        for split in ("tune", "validation"):
-            session.findings.note_streams(streams_of(study.families[name], name, split))
-        return
-    for purpose in ("tuning", "validation"):
-        draws = Draws(study.seed, purpose)
-        for scenario in settings.scenarios:
-            name = scenario_of(scenario.reference, "ulnar")
-            session.findings.note_streams(draws.names([settings.loops[scenario.loop]], [name]))
-
-
-def _known(session: Session, name: str) -> Tried | None:
-    """Gains of a controller that the run to resume has tried."""
-    from wristctl.control.table import controller
-    from wristctl.tuning.search import tried_of
-
-    stopped = session.inputs.runs().get("resume")
-    if stopped is None or not stopped.has(f"data/history-{name}.csv"):
-        return None
-    return tried_of(stopped.data(f"history-{name}"), list(controller(name).gains))
-
-
 def _told(gains: Mapping[str, float]) -> str:
     return "  ".join(f"{name} = {value:.4g}" for name, value in gains.items())
-
-
-def _keep(findings: Findings, searches: dict[str, Search], judge: Judge) -> None:
-    """Keep what was found, also of a search that was cut short."""
-    from wristctl.commands.tune.figures import convergence, gain_history, tornado
-    from wristctl.control.table import controller, write_gains
-    from wristctl.tuning.search import finalists, history
-
-    if not searches:
-        return
-    if file := findings.file("data/gains.json"):
-        write_gains(file, {name: result.gains for name, result in searches.items()})
-    for name, result in searches.items():
-        gains = controller(name).gains
-        units = {k: g.unit or "1" for k, g in gains.items()}
-        counted = dict.fromkeys(("restart", "iteration", "candidate", "objective"), "1")
-        findings.table(f"data/history-{name}.csv", history(result), units=counted | units)
-        if result.finalists:
-            judged = dict.fromkeys(("origin", "objective", "validated"), "1")
-            findings.table(f"data/finalists-{name}.csv", finalists(result), units=judged | units)
-        findings.metric(f"{name}_objective", result.objective, unit="", better="lower", n=result.evaluations)
-        for gain, value in result.gains.items():
-            findings.metric(f"{name}_{gain}", value, unit=gains[gain].unit, better="", meaning=gains[gain].meaning)
-        findings.figure(f"gains-{name}", gain_history, result, gains, caption=f"Gains of {name} over the search")
-        caption = f"What one gain of {name} by itself does to the objective"
-        findings.figure(f"gain-sensitivity-{name}", tornado, name, result.gains, judge, caption=caption, later=True)
-    findings.headline(*(f"{name}_objective" for name in sorted(searches, key=lambda name: searches[name].objective)))
-    findings.figure("convergence", convergence, list(searches.values()), caption="Best objective against the budget")
 
 
 TUNE = sweepable(
