@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import replace
+from unittest.mock import patch
 
 import numpy as np
 import pytest
@@ -13,8 +14,8 @@ from hypothesis import strategies as st
 from wristctl.commands.answer import LINES
 from wristctl.commands.compare.answer import answer_of
 from wristctl.commands.printed_table import COLUMNS, two
-from wristctl.commands.ranking_answer import ranking_table
-from wristctl.commands.ranking_tables import answer_tables, standings_table
+from wristctl.commands.ranking_answer import advice
+from wristctl.commands.ranking_tables import answer_tables, controllers_table, ranking_table, standings_table
 from wristctl.commands.ranking_words import DIGITS, condition, names_of, winner
 from wristctl.comparison.combinations import CLASSES
 from wristctl.comparison.controller_ranking import Ranking, Traits
@@ -93,8 +94,9 @@ def test_where_all_that_tie_wait_for_their_motors_it_is_said_that_motors_decide(
 
 
 def told(*rankings: Ranking) -> str:
-    """The answer in one line."""
-    answer = answer_of(rankings)
+    """The answer in one line, with all its notes however long it is."""
+    with patch("wristctl.commands.ranking_answer.LINES", 99):
+        answer = answer_of(rankings)
     assert answer is not None
     return " ".join(" ".join(answer.lines()).split())
 
@@ -130,13 +132,11 @@ def test_the_rig_is_answered_first_and_what_is_best_elsewhere_is_warned_of_where
 
 
 def test_every_fault_is_named_with_its_size_and_its_number_of_cases() -> None:
-    said = told(
-        stands(
-            swings=("smc/exchanged",), away=("smc/printed",), strained=("gvsc/default",), chatters=("pid/printed",),
-            unconverged=("nc/default",), failed={"pd-ff/default": 5},
-        )
+    one = stands(
+        swings=("smc/exchanged",), away=("smc/printed",), strained=("gvsc/default",), chatters=("pid/printed",),
+        unconverged=("nc/default",), failed={"pd-ff/default": 5},
     )  # fmt: skip
-    avoided = avoided_in(said).lower()
+    avoided = avoided_in(told(one)).lower()
     for fact in (
         "swing: smc/exchanged by 5.7 deg peak to peak (in 12 of 12 cases)",
         "do not arrive: smc/printed (in 12 of 12 motions)",
@@ -146,7 +146,62 @@ def test_every_fault_is_named_with_its_size_and_its_number_of_cases() -> None:
         "leave their range: pd-ff (in 5 of 12 cases)",
     ):
         assert fact in avoided
-    assert "6 of 9" in said, "as many in the table"
+    rows = controllers_table([one], names_of([one])).rows
+    assert {name: cell for name, cell in rows if not cell[0].isdigit()} == {
+        "smc/exchanged": "swings 5.7 deg 12/12", "smc/printed": "no arrival 12/12", "gvsc": "pulls 70 N 12/12",
+        "pid/printed": "chatters 300/s 12/12", "nc": "not converged 12/12", "pd-ff": "fails 5/12",
+    }  # fmt: skip
+
+
+def test_a_controller_is_a_line_and_a_condition_a_column_in_the_order_that_was_typed() -> None:
+    """The error with its interval; the best and what ties with it marked."""
+    typed = {"pid-ff": 2e-3, "adrc/hardware": 1e-3, "mine": 1e-3, "pid/printed": 0.1}
+    one, other = stands(rmse=typed), stands("pushed", rmse=typed | {"pid-ff": 1e-4}, swings=("mine",))
+    table = controllers_table([one, other], names_of([one, other]))
+    assert table.columns == ("controller", "sampled (12)", "push (12)")
+    assert [row[0] for row in table.rows] == list(typed)
+    assert names_of([one, other], short=True)["adrc/hardware"] == "adrc/hardware", "adrc alone would be another row"
+    assert "name alone: default if exact, else hardware" in table.title
+    first = one.labels[winner(one, [one, other]) or 0]
+    for label, cells in zip(typed, [row[1:] for row in table.rows], strict=True):
+        for ranking, cell in zip((one, other), cells, strict=True):
+            mean, tied = ranking.means[one.labels.index(label)], ranking is one and label in ("adrc/hardware", "mine")
+            mark = " *" if label == (first if ranking is one else "pid-ff") else " =" * tied
+            ends = f" [{two(np.degrees(mean.low))}, {two(np.degrees(mean.high))}]"
+            swings = ranking is other and label == "mine"
+            assert cell == ("swings 5.7 deg 12/12" if swings else f"{two(np.degrees(mean.value), DIGITS)}{ends}{mark}")
+    given = controllers_table([stands()], names_of([stands()]))
+    assert "name alone" not in given.title and "more" not in given.title
+
+
+def test_beyond_a_dozen_the_table_has_the_best_the_asked_for_and_the_number_of_the_rest() -> None:
+    many = {f"c{number:02d}/default": 1e-3 * (1.0 + number) for number in range(30)}
+    one, other = stands(rmse=many), stands("pushed", rmse=many | {"c29/default": 1e-5})
+    names = names_of([one, other])
+    table = controllers_table([one, other], names, ["c20/default"])
+    shown = [row[0] for row in table.rows]
+    assert len(shown) == 12 and {"c00", "c20", "c29"} <= set(shown) and shown == sorted(shown)
+    assert table.title.endswith("; 18 more: --all")
+    asked = controllers_table([one, other], names, list(many)[:15])
+    assert [row[0] for row in asked.rows] == sorted([*(f"c{number:02d}" for number in range(15)), "c29"])
+    assert asked.title.endswith("; 14 more: --all")
+
+
+def test_the_sentence_says_by_how_much_and_where_not() -> None:
+    rows = {"a/default": 1e-4, "b/default": 4e-3, "c/default": 0.1}
+    one, other = stands(rmse=rows), stands("pushed", rmse=rows | {"a/default": 0.05})
+    alone = told(one)
+    ratio = one.means[1].value / one.means[0].value
+    assert f", {two(ratio, DIGITS)} times lower than b/default, the next." in alone
+    less = two(other.means[0].value / other.means[1].value, DIGITS)
+    assert f"; not in push, where b/default has {less} times less." in told(one, other)
+    swings = stands("pushed", rmse=rows, swings=("a/default",))
+    assert "; not in push, where it swings by 5.7 deg peak to peak in 12 of 12 cases, and b/default is best" in told(
+        one, stands("off-nominal", rmse=rows), swings
+    )
+    best = {"f1": "a", "f2": "a", "f3": "b", "f4": "c", "f5": "d"}
+    several = [stands(name, rmse=rows | {"d/default": 0.2, f"{law}/default": 1e-5}) for name, law in best.items()]
+    assert advice(several).endswith("; others are better in f3, f4 and f5.")
 
 
 def test_what_must_not_be_used_without_a_rig_is_named_after_the_rigs_with_its_conditions() -> None:
@@ -326,13 +381,14 @@ def test_an_answer_fits_a_terminal_whatever_is_compared(classes: int, laws: list
     assert answer is not None
     lines = answer.lines()
     assert len(lines) <= LINES and max(map(len, lines)) <= COLUMNS
-    assert sum(bool(re.match(r".* \(12\) ", line)) for line in lines) >= len(names)
+    assert "\n".join(lines).count("(12)") == len(names), "no condition is left out"
 
 
 def test_the_tables_of_a_run_begin_with_the_answers() -> None:
-    first, second = answer_tables([stands(), stands("pushed")])
-    assert [len(first.columns), len(first.rows)] == [6, 2] and second.columns[0] == "push?"
-    assert len(answer_tables([stands()])) == 1, "one condition asks nothing"
+    everyone, best, tree = answer_tables([stands(), stands("pushed")])
+    assert [row[0] for row in everyone.rows] == list(RMSE) and everyone.columns == ("controller", "sampled", "push")
+    assert [len(best.columns), len(best.rows)] == [6, 2] and tree.columns[0] == "push?"
+    assert len(answer_tables([stands()])) == 2, "one condition asks nothing"
 
 
 @pytest.mark.parametrize(

@@ -86,17 +86,20 @@ def _use(where: str, alike: Sequence[Ranking], others: Sequence[Ranking]) -> str
     if len(places) == 1:
         text += interval(*places[0])
     if len(alike) > 1 and not everywhere:
-        text += f", and nothing is better in {joined([condition(ranking) for ranking, _ in places])}"
+        text += f", the best in {joined([condition(ranking) for ranking, _ in places])}"
+    following = _than_the_next(places)
+    text += following
     compared = [place for place in places if place[0].yardstick not in place[0].standing.unusable]
     gains = sorted(ranking.gains[row].value for ranking, row in compared if math.isfinite(ranking.gains[row].value))
     if any(map(open_loop, (chosen, *equal))):
         text += "; no controller is better than feedforward, which is open loop"
     elif gains:
         least = f"{'at least ' * (len(gains) > 1)}{_times(gains[0], errors[0][0])}"
-        text += f", {least} lower than feedforward"
+        text += f"{' and' if following else ','} {least} lower than feedforward"
     if equal:
         as_good = joined([*map(called, alternatives)]) or f"{len(equal)} others"
         text += f"; {as_good} {'ties' if len(equal) == 1 else 'tie'} with it"
+    text += _elsewhere(chosen, [ranking for ranking in ranked if ranking not in [place[0] for place in places]])
     text += _seldom([chosen, *alternatives], [ranking for ranking, _ in places])
     if few := [condition(ranking) for ranking in alike if ranking.standing.untold]:
         text += f" (no ranking in {joined(few)}: too few cases)"
@@ -108,7 +111,41 @@ def _use(where: str, alike: Sequence[Ranking], others: Sequence[Ranking]) -> str
     if not bad:
         return f"{text}."
     worst = max(bad, key=lambda place: _lost(*place))
-    return f"{text}. Do not use {chosen} with {rig_whole([worst[0]])}: it {fact(*worst)}."
+    return f"{text}; do not use {chosen} with {rig_whole([worst[0]])}: it {fact(*worst)}."
+
+
+def _than_the_next(places: Sequence[tuple[Ranking, int]]) -> str:
+    """By how much the error is lower than that of the next that differs: the least of several conditions."""
+    ratios = []
+    for ranking, row in places:
+        if len(ranking.standing.groups) < 2:
+            return ""
+        after = ranking.standing.groups[1][0]
+        ratio = ranking.means[after].value / ranking.means[row].value
+        ratios.append((ratio, ranking.means[row].value, called(ranking.labels[after])))
+    ratio, rmse, following = min(ratios)
+    return f", {'at least ' * (len(places) > 1)}{_times(ratio, rmse)} lower than {following}, the next"
+
+
+# Conditions of which it is told by how much another controller is better there.
+_TOLD = 2
+
+
+def _elsewhere(chosen: str, others: Sequence[Ranking]) -> str:
+    """In which other conditions of the same kind not to use a controller: what it does there, and what is better."""
+    if len(others) > _TOLD:
+        return f"; others are better in {joined([condition(ranking) for ranking in others])}"
+    text = ""
+    for ranking in others:
+        first = ranking.standing.groups[0][0]
+        better = called(ranking.labels[first])
+        row = ranking.labels.index(chosen) if chosen in ranking.labels else first
+        if row in ranking.standing.unusable:
+            text += f"; not in {condition(ranking)}, where it {fact(ranking, row)}, and {better} is best"
+        elif row != first:
+            ratio = _times(ranking.means[row].value / ranking.means[first].value, ranking.means[first].value)
+            text += f"; not in {condition(ranking)}, where {better} has {ratio} less"
+    return text
 
 
 def _seldom(labels: Sequence[str], rankings: Sequence[Ranking]) -> str:
@@ -163,37 +200,6 @@ def _mean(rankings: Sequence[Ranking], label: str) -> float:
     """Mean of the logarithm of a row's RMSE over the rankings that it is in."""
     means = [ranking.means[ranking.labels.index(label)].value for ranking in rankings if label in ranking.labels]
     return sum(map(math.log, means)) / len(means)
-
-
-def ranking_table(rankings: Sequence[Ranking], names: Mapping[str, str]) -> Table:
-    """A condition a line: the best, how many tie, the next, feedforward, and how many must not be used."""
-    unit = "worlds" if rankings[0].unit == "world" else "cases"
-    heads = (
-        f"condition ({unit})",
-        "best",
-        "ties",
-        "next",
-        "feedforward (ratio)",
-        "unusable",
-    )
-    rows = []
-    for ranking in rankings:
-        row, groups, base = winner(ranking, rankings), ranking.standing.groups, ranking.yardstick
-        why = "no ranking: too few" if ranking.standing.untold else "none"
-        best = why if row is None else f"{names[ranking.labels[row]]} {error(ranking, row)}"
-        after = groups[1][0] if len(groups) > 1 else None
-        following = "-" if after is None else f"{names[ranking.labels[after]]} {error(ranking, after)}"
-        bound = ">" if best.endswith(degrees(0.0)) else ""
-        ratio = "" if row is None or base is None else f" ({bound}{two(ranking.gains[row].value, DIGITS)})"
-        open_loop = "-" if base is None else f"{error(ranking, base)}{ratio}"
-        others = f"{len(groups[0]) - 1}" if groups else "-"
-        begin, end = (
-            f"{condition(ranking)} ({ranking.count})",
-            f"{len(ranking.standing.unusable)} of {len(ranking.labels)}",
-        )
-        rows.append((begin, best, others, following, open_loop, end))
-    title = "RMSE [deg]; ties: not significantly different from the best; next: first that is; ratio: to the best"
-    return Table(title, heads, rows)
 
 
 def ties(rankings: Sequence[Ranking], names: Mapping[str, str]) -> str:

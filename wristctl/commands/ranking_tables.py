@@ -2,13 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from wristctl.commands.printed_table import Table, degrees, two
-from wristctl.commands.ranking_answer import decision_table, ranking_table
-from wristctl.commands.ranking_words import DIGITS, condition, error, fact, names_of
+from wristctl.commands.printed_table import COLUMNS, Table, degrees, two
+from wristctl.commands.ranking_answer import decision_table
+from wristctl.commands.ranking_words import (
+    DIGITS,
+    condition,
+    error,
+    fact,
+    first_group,
+    is_by_loop,
+    names_of,
+    short_fact,
+    winner,
+    with_interval,
+)
 
 if TYPE_CHECKING:
     from wristctl.comparison.controller_ranking import Ranking
@@ -17,14 +28,93 @@ if TYPE_CHECKING:
 
 
 def answer_tables(rankings: Sequence[Ranking]) -> list[Table]:
-    """The table of the answer with a title, a condition a line; and where there are several, as questions."""
+    """Every controller under each condition; the best of each condition; where there are several, as questions."""
     if not rankings:
         return []
     names = names_of(rankings)
     title = "Best controller under each condition; the ratio is that of feedforward's RMSE to the best one's"
-    shown = [replace(ranking_table(rankings, names), title=title)]
+    shown = [standings_table(rankings), replace(ranking_table(rankings, names), title=title)]
     tree = decision_table(rankings, names, "Which controller for which rig")
     return [*shown, tree] if len(tree.rows) > 1 else shown
+
+
+# Controllers that a table on the screen has, at most, unless more were asked for, and the lines that it may take.
+_DOZEN, _LINES = 12, 18
+
+
+def controllers_table(rankings: Sequence[Ranking], names: Mapping[str, str], asked: Collection[str] = ()) -> Table:
+    """A controller a line and a condition a column: RMSE, or what is wrong with it there; the best and ties marked.
+
+    Beyond a dozen controllers the best of each condition, the labels that were `asked` for, and, as far as there is
+    room, those that tie. Intervals are left out where they do not fit. Where no controller fits, each condition is a
+    line.
+    """
+    labels = list(dict.fromkeys(label for ranking in rankings for label in ranking.labels))
+    best = [ranking.labels[row] for ranking in rankings if (row := winner(ranking, rankings)) is not None]
+    tied = [label for ranking in rankings for label in first_group(ranking)]
+    order = [label for label in dict.fromkeys([*best, *asked, *tied, *labels]) if label in labels]
+    kept = max(_DOZEN, len({*best, *asked} & set(labels)))
+    for count in range(min(kept, len(labels)), min(2, len(labels)) - 1, -1):
+        shown = [label for label in labels if label in order[:count]]
+        for intervals in (True, False):
+            table = _of_controllers(rankings, names, shown, intervals, len(labels) - count)
+            if len(table.text(COLUMNS).split("\n")) <= max(_LINES, count + 4 if count > _DOZEN else 0):
+                return table
+    return ranking_table(rankings, names)
+
+
+def ranking_table(rankings: Sequence[Ranking], names: Mapping[str, str]) -> Table:
+    """A condition a line: the best, how many tie, the next, feedforward, and how many must not be used."""
+    unit = "worlds" if rankings[0].unit == "world" else "cases"
+    heads = (
+        f"condition ({unit})",
+        "best",
+        "ties",
+        "next",
+        "feedforward (ratio)",
+        "unusable",
+    )
+    rows = []
+    for ranking in rankings:
+        row, groups, base = winner(ranking, rankings), ranking.standing.groups, ranking.yardstick
+        why = "no ranking: too few" if ranking.standing.untold else "none"
+        best = why if row is None else f"{names[ranking.labels[row]]} {error(ranking, row)}"
+        after = groups[1][0] if len(groups) > 1 else None
+        following = "-" if after is None else f"{names[ranking.labels[after]]} {error(ranking, after)}"
+        bound = ">" if best.endswith(degrees(0.0)) else ""
+        ratio = "" if row is None or base is None else f" ({bound}{two(ranking.gains[row].value, DIGITS)})"
+        open_loop = "-" if base is None else f"{error(ranking, base)}{ratio}"
+        others = f"{len(groups[0]) - 1}" if groups else "-"
+        begin, end = (
+            f"{condition(ranking)} ({ranking.count})",
+            f"{len(ranking.standing.unusable)} of {len(ranking.labels)}",
+        )
+        rows.append((begin, best, others, following, open_loop, end))
+    title = "RMSE [deg]; ties: not significantly different from the best; next: first that is; ratio: to the best"
+    return Table(title, heads, rows)
+
+
+def _of_controllers(
+    rankings: Sequence[Ranking], names: Mapping[str, str], labels: Sequence[str], intervals: bool, more: int
+) -> Table:
+    def cell(ranking: Ranking, label: str) -> str:
+        if label not in ranking.labels:
+            return "-"
+        row = ranking.labels.index(label)
+        if row in ranking.standing.unusable:
+            return short_fact(ranking, row)
+        mark = " *" if row == winner(ranking, rankings) else " =" if label in first_group(ranking) else ""
+        return f"{with_interval(ranking, row) if intervals else error(ranking, row)}{mark}"
+
+    rows = [(names[label], *(cell(ranking, label) for ranking in rankings)) for label in labels]
+    given = any("[" in text for row in rows for text in row)
+    title = f"RMSE [deg]{', 95 % interval' * given}; * best, = tied with it"
+    if any(is_by_loop(label) for label in labels):
+        title += "; name alone: default if exact, else hardware"
+    if more:
+        title += f"; {more} more: --all"
+    heads = [f"{condition(ranking)} ({ranking.count})" for ranking in rankings]
+    return Table(title, ("controller", *heads), rows)
 
 
 def standings_table(rankings: Sequence[Ranking]) -> Table:
@@ -37,10 +127,10 @@ def standings_table(rankings: Sequence[Ranking]) -> Table:
         row = ranking.labels.index(label)
         if row in ranking.standing.unusable:
             return fact(ranking, row)
-        return f"{ranking.standing.group(row) or '-'}: {error(ranking, row)}"
+        return f"{ranking.standing.group(row) or '-'}: {with_interval(ranking, row)}"
 
     rows = [(label, *(cell(ranking, label) for ranking in rankings)) for label in labels]
-    title = "Every controller under each condition, rank: RMSE [deg]; those of one rank cannot be told apart"
+    title = "Every controller under each condition, rank: RMSE [deg, 95 %]; those of one rank cannot be told apart"
     return Table(title, ("controller", *map(condition, rankings)), rows)
 
 

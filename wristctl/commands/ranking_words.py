@@ -58,9 +58,12 @@ def rig_whole(rankings: Sequence[Ranking], simulated: bool = False) -> str:
 def names_of(rankings: Sequence[Ranking], short: bool = False) -> dict[str, str]:
     """Name of each row: its label, without gains where all that are not the paper's are the same, or none matter.
 
-    With `short` a controller that has one set of gains is its name alone.
+    With `short` a controller that has one set of gains is its name alone. Beside a row that is named alone, as its
+    preset is that of each loop, labels stay whole.
     """
     labels = list(dict.fromkeys(label for ranking in rankings for label in ranking.labels))
+    if any(map(is_by_loop, labels)):
+        return _shortened({label: called(label) for label in labels})
     ours = {label.partition("/")[2] for label in labels if not open_loop(label)} - PAPERS_GAINS
     controllers = Counter(label.partition("/")[0] for label in labels)
     names = {}
@@ -123,6 +126,14 @@ def interval(ranking: Ranking, row: int) -> str:
     return f" (95 % interval: {degrees(mean.low, DIGITS)} to {degrees(mean.high, DIGITS)})"
 
 
+def with_interval(ranking: Ranking, row: int) -> str:
+    """A row's RMSE [deg] with the ends of its 95 % interval in brackets, if it has one."""
+    mean = ranking.means[row]
+    if not (math.isfinite(mean.high) and mean.high > mean.low):
+        return error(ranking, row)
+    return f"{error(ranking, row)} [{degrees(mean.low)}, {degrees(mean.high)}]"
+
+
 def called(label: str) -> str:
     """A controller with its gains; feedforward has none."""
     return label.split("/")[0] if open_loop(label) else label
@@ -133,6 +144,11 @@ def open_loop(label: str) -> bool:
     from wristctl.tuning.objective import YARDSTICK
 
     return label.split("/")[0] == YARDSTICK
+
+
+def is_by_loop(label: str) -> bool:
+    """Whether a label is of a controller that is named alone, whose preset is that of each loop."""
+    return "/" not in label
 
 
 def facts(ranking: Ranking, row: int) -> dict[str, tuple[str, int]]:
@@ -179,6 +195,26 @@ def fact(ranking: Ranking, row: int) -> str:
     """The gravest fault of a row with its size and number of cases: swings by 2.7 deg peak to peak in 7 of 8 cases."""
     verb, (size, count) = next(iter(facts(ranking, row).items()))
     return " ".join(filter(None, [verb, size, f"in {count} of {counted_in(ranking, verb)}"]))
+
+
+# Faults in the cell of a table.
+_SHORT = {
+    "leaves its range": "fails",
+    "does not arrive": "no arrival",
+    "pulls harder than a tendon bears": "pulls",
+    "changes with the integration step": "not converged",
+    "swings or chatters": "swings",
+}
+
+
+def short_fact(ranking: Ranking, row: int) -> str:
+    """The gravest fault of a row in the cell of a table: swings 2.7 deg 7/8."""
+    verb, (_, count) = next(iter(facts(ranking, row).items()))
+    value = fault_size(verb, ranking, row)
+    sizes = {"swings": f"{two(math.degrees(value))} deg", "chatters": f"{two(value)}/s"}
+    size = sizes.get(verb, f"{two(value)} N" if value else "")
+    total = ranking.motions if verb == "does not arrive" else ranking.count
+    return " ".join(filter(None, [_SHORT.get(verb, verb), size, f"{count}/{total}"]))
 
 
 def counted_in(ranking: Ranking, verb: str) -> str:

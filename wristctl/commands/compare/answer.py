@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Container, Iterable, Mapping, Sequence
+from collections.abc import Collection, Container, Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from wristctl.commands.answer import Answer
@@ -15,10 +15,10 @@ from wristctl.commands.ranking_answer import (
     do_not_use,
     fitted,
     not_elsewhere,
-    ranking_table,
     recommended,
     ties,
 )
+from wristctl.commands.ranking_tables import controllers_table
 from wristctl.commands.ranking_words import PRINTED, condition, error, facts, gains_words, names_of, open_loop
 from wristctl.commands.results import Findings
 from wristctl.commands.who_decides import decided
@@ -34,6 +34,7 @@ def answer_of(
     run: str = "",
     gains: Mapping[str, Mapping[str, float]] | None = None,
     bending: str = "",
+    asked: Collection[str] = (),
 ) -> Answer | None:
     """The answer of a comparison for one screen; None where nothing was compared.
 
@@ -47,29 +48,32 @@ def answer_of(
         Gains by name, in SI units, of every row by its label.
     bending
         Planes that all loops bend in, a sentence; empty where they stay in one.
+    asked
+        Labels of controllers that the table has, however many others there are.
     """
     if not rankings:
         return None
     names = names_of(rankings)
-    whole = ranking_table(rankings, names)
-    if len(whole.within(COLUMNS).columns) < len(whole.columns):
+    table = controllers_table(rankings, names, asked)
+    if len(table.within(COLUMNS).columns) < len(table.columns):
         names = names_of(rankings, short=True)
+        table = controllers_table(rankings, names, asked)
     more = f"Every rank and figure: `--all`, or {run}/report.html." if run else "Every rank and figure: `.tables`."
     unusable = do_not_use(rankings, names)
     notes = [
         (bending, bending),
         (" ".join(filter(None, [conditions(rankings), gains_meant(rankings)])), conditions(rankings)),
         (best_on_yours(rankings), ""),
+        (" ".join(filter(None, [gains_of_best(rankings, gains or {}), compared(rankings), more])), more),
         (unusable, "Some controllers must not be used: `--all` says which and why." if unusable else ""),
         (papers(rankings), ""),
         (" ".join(filter(None, [not_elsewhere(rankings, names), papers_order(rankings)])), ""),
-        (" ".join(filter(None, [gains_of_best(rankings, gains or {}), compared(rankings), more])), more),
         (ties(rankings, names), ""),
         (decided(rankings), ""),
         (certainty(rankings), ""),
         ("Your own wrist: `wristctl init DIR` begins a folder for it (documentation: Your own wrist).", ""),
     ]
-    return fitted(Answer(advice(rankings), ranking_table(rankings, names)), notes)
+    return fitted(Answer(advice(rankings), table), notes)
 
 
 def best_on_yours(rankings: Sequence[Ranking]) -> str:
@@ -99,10 +103,12 @@ def best_on_yours(rankings: Sequence[Ranking]) -> str:
 
 def gains_of_best(rankings: Sequence[Ranking], gains: Mapping[str, Mapping[str, float]]) -> str:
     """Gains of the controllers that are recommended, with units; empty where they have none or are not known."""
+    everyone = {label for ranking in rankings for label in ranking.labels}
     listed = [
-        f"{label} has {gains_words(label.split('/')[0], gains[label])}"
+        f"{row} has {gains_words(row.split('/')[0], gains[row])}"
         for label in recommended(rankings)
-        if gains.get(label)
+        for row in gains
+        if gains[row] and (row == label or (row.split("/")[0] == label and row not in everyone))
     ]
     return f"Gains: {'; '.join(listed)}." if listed else ""
 
@@ -115,7 +121,7 @@ def compared(rankings: Sequence[Ranking]) -> str:
     labels = dict.fromkeys(label for ranking in rankings for label in ranking.labels)
     for label in labels:
         name, _, named = label.partition("/")
-        gains.setdefault(name, []).extend([named] * (not open_loop(label)))
+        gains.setdefault(name, []).extend([named or "preset by loop"] * (not open_loop(label)))
     alike: dict[tuple[str, ...], list[str]] = {}
     for name, several in gains.items():
         alike.setdefault(tuple(several), []).append(name)

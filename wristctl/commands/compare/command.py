@@ -46,13 +46,14 @@ from wristctl.commands.loop_warnings import (
 )
 from wristctl.commands.procedure import Procedure
 from wristctl.commands.ranking_drawing import draw_rankings
-from wristctl.commands.ranking_tables import answer_tables, every_row, standings_table
+from wristctl.commands.ranking_tables import answer_tables, every_row
 from wristctl.commands.ranking_words import condition
 from wristctl.commands.results import Findings, StudyResult
 from wristctl.commands.session import Session
 from wristctl.commands.sweep.command import sweepable
 from wristctl.commands.tune.command import planned_search
 from wristctl.commands.tune.searches import search_all
+from wristctl.config.choices import CONTROLLERS
 from wristctl.config.controller_row import BY_LOOP, label_of
 from wristctl.config.study import Study
 from wristctl.errors import UserError, under
@@ -177,7 +178,9 @@ class Compared(StudyResult):
     def answer(self) -> Answer | None:
         """Which controller to use under which condition, and which must not be used."""
         bending = why_two_planes(self.study.wrist, asked_of_comparison(self.study))
-        return answer_of(self.rankings, self.place, self.gains, bending)
+        own = [row.label for row in self.study.compare.rows if CONTROLLERS.origin(row.controller)]
+        typed = [row.label for row in self.study.compare.rows if row.gains == BY_LOOP]
+        return answer_of(self.rankings, self.place, self.gains, bending, [*own, *typed])
 
     @property
     def marks(self) -> list[str]:
@@ -316,7 +319,6 @@ def compare(session: Session) -> Compared:
     by_loop = [loop_tables(loop, [r for r in results if r.loop == loop], cells) for loop in settings.loops]
     tables = [
         *answer_tables(rankings),
-        *([standings_table(rankings)] if rankings else []),
         *chain.from_iterable(by_loop),
         step_table(times),
         *truth_tables(study.wrist, settings.loops),
