@@ -36,9 +36,7 @@ MOTORS = {"level": "tendon", "friction": RUBBING.friction, "sheath": RUBBING.she
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    ("segments", "motors", "horizon", "steps"), [(2, {}, 0.4, 20), (1, MOTORS, 0.6, 40)]
-)
+@pytest.mark.parametrize(("segments", "motors", "horizon", "steps"), [(2, {}, 0.4, 20), (1, MOTORS, 0.6, 40)])
 def test_what_a_loop_pulls_bends_the_same_wrist_by_another_integrator(
     segments: int, motors: dict[str, Any], horizon: float, steps: int
 ) -> None:

@@ -119,7 +119,6 @@ COMMANDS = {
         argument="runs",
         examples=(
             "wristctl identify latest:hw-run",
-            "wristctl identify my.csv",
             "wristctl identify my.csv --columns 'time=t [ms], spool_1=m1 [mm], spool_2=m2 [mm], bend_y=imu [deg]'",
             "wristctl identify UPRIGHT_RUN LEVEL_RUN --set fix.friction=0.1",
             "wristctl tune experiments/paper.yaml --from-identified latest:identify",

@@ -12,7 +12,7 @@ from wristctl.errors import UserError
 from wristctl.plain_files import LARGEST_DATA, read_plain
 from wristctl.plugins.trust import agree, digest_of
 from wristctl.records.files import replacing, sha256_of
-from wristctl.records.parquet_logs import info_of
+from wristctl.records.folders_of_logs import info_of
 from wristctl.study_files.resolved import sections_read
 
 # Folder of a run that holds the copies.

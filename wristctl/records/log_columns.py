@@ -68,7 +68,7 @@ Names = Mapping[str, tuple[str, str]]
 """Name in an open log and unit (empty: as the header says), by another author's name."""
 
 
-class Column(NamedTuple):
+class ReadColumn(NamedTuple):
     """A column that is read: its name in an open log, and its factor to SI."""
 
     name: str
@@ -116,7 +116,7 @@ def name_of(head: str) -> str:
 
 def chosen_columns(
     heads: Sequence[str], names: Names, units: Mapping[str, Units], others: bool, dated: Collection[int], where: str
-) -> dict[int, Column]:
+) -> dict[int, ReadColumn]:
     """The columns that are read, by their places in a header.
 
     Raises UserError, with the text for `--columns` that may be meant, for a column without a name or a unit that is
@@ -137,7 +137,7 @@ def chosen_columns(
     where
         File and line of the header, for errors.
     """
-    chosen, missing, unknown = dict[int, Column](), dict(names), list[int]()
+    chosen, missing, unknown = dict[int, ReadColumn](), dict(names), list[int]()
     for place, cell in enumerate(heads):
         if len(cell) > _LONGEST:
             raise UserError(f"a column's name has {len(cell)} letters", where, f"a header such as {EXAMPLE}")
@@ -156,12 +156,12 @@ def chosen_columns(
         if name in (column.name for column in chosen.values()):
             raise UserError(f"column {written} stands there twice", where, f"leave one out that is {name}")
         if name == "time" and place in dated and not unit:
-            chosen[place] = Column(name, math.nan)
+            chosen[place] = ReadColumn(name, math.nan)
             continue
         factor = _factor(unit, known)
         if factor is None:
             raise _without_factor(written, name, unit, known, heads, names, where)
-        chosen[place] = Column(name, factor)
+        chosen[place] = ReadColumn(name, factor)
     if unknown:
         raise _unknown(heads, unknown, units, names, where)
     for theirs, (name, _) in missing.items():

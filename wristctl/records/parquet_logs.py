@@ -13,10 +13,8 @@ import numpy as np
 
 from wristctl.errors import UserError
 from wristctl.plain_files import LARGEST_DATA, open_plain, read_json
+from wristctl.records.folders_of_logs import info_of
 from wristctl.records.recorded_table import INSTALL, Cells, RecordedTable
-
-INFO = "info.json"
-"""File of a data set that names its vectors' parts."""
 
 
 def parquet_table(file: Path, what: str) -> RecordedTable:
@@ -56,22 +54,6 @@ def parquet_frame(file: Path, what: str) -> Any:
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or error
         raise UserError(f"cannot read the {what}: {reason}", str(file), "check the path") from error
-
-
-def info_of(file: Path) -> Path | None:
-    """The description of the data set that a parquet file is a part of: beside it, or where the set has it."""
-    places = [file.parent / INFO, *(parent / "meta" / INFO for parent in file.absolute().parents[2:3])]
-    return next((place for place in places if file.suffix == ".parquet" and place.is_file()), None)
-
-
-def files_of_recording(path: Path) -> list[Path]:
-    """The files that a recording has which is a folder: a bag of ROS 2, or a data set; of any other path itself."""
-    files = list[Path]()
-    if (path / "meta" / INFO).is_file():
-        files = sorted(path.glob("data/*/*.parquet"))
-    elif (path / "metadata.yaml").is_file():
-        files = sorted(file for file in path.iterdir() if file.suffix in (".mcap", ".db3"))
-    return files or [path]
 
 
 def _plain(series: Any) -> np.ndarray[Any, Any]:

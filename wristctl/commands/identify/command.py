@@ -21,7 +21,7 @@ from wristctl.commands.session import Session
 from wristctl.config.study import Study
 from wristctl.errors import UserError
 from wristctl.records import Run
-from wristctl.records.parquet_logs import files_of_recording
+from wristctl.records.folders_of_logs import files_of_recording
 
 if TYPE_CHECKING:
     import pandas as pd
