@@ -160,7 +160,7 @@ def test_tendons_at_other_places_are_refused() -> None:
 
 
 def test_soft_tendons_bend_the_blind_wrist_less_in_both_planes() -> None:
-    model = BlindModel(WRIST, ACTUATOR, 5e3, SENSOR, PERIOD, 2)
+    model = BlindModel(WRIST, ACTUATOR, 5e3, PERIOD, 2)
     for _ in range(150):
         model.predict(*(np.array(reeled(10.0)) + 5e-4 * np.array([0, 0, 0, 1])))
     believed, soft = model.angles(150 * PERIOD)

@@ -16,7 +16,7 @@ from wristctl.lanes.compiled import kernel
 from wristctl.lanes.lane import zero_like
 from wristctl.lanes.rows import lanes_like, part, rows_of
 from wristctl.simulation.actuator import drive_of
-from wristctl.simulation.observer import Known
+from wristctl.simulation.observer import Known, known_of_sides
 from wristctl.wrist.directions import ACTIVE, TENDONS, in_plane
 from wristctl.wrist.segments import segments
 from wristctl.wrist.spatial.pcc_in_space import placed_values
@@ -32,6 +32,11 @@ TOWARD = {
     "ulnar": 0.0, "ulnar-flexion": 45.0, "flexion": 90.0, "radial-flexion": 135.0, "radial": 180.0,
     "radial-extension": 225.0, "extension": 270.0, "ulnar-extension": 315.0,
 }  # fmt: skip
+
+
+def known_of_rig(wrist: WristParameters, actuator: Actuator, planes: int) -> Known:
+    """Knowledge of a wrist as one plane sees it, its places the + and the - side, or in two planes of each axis."""
+    return known_of_sides(wrist, actuator) if planes == 1 else known_of_axes(wrist, actuator)
 
 
 def known_of_axes(wrist: WristParameters, actuator: Actuator) -> Known:

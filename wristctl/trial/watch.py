@@ -82,9 +82,7 @@ class Watch:
         self._spools, self._period, self._radius = spools_of(settings.actuator), timing.period, wrist.tendon_radius
         if stiffness is not None:
             self._spools = replace(self._spools, stiffness=stiffness)
-        self._blind = BlindModel(
-            wrist, settings.actuator, settings.safety.softest, settings.sensor, self._period, settings.planes
-        )
+        self._blind = BlindModel(wrist, settings.actuator, settings.safety.softest, self._period, settings.planes)
         nearer = 2.0 * settings.markers.distance / wrist.length if settings.planes == 1 else math.nan
         doubtful = _DOUBTFUL * math.radians(settings.safety.across_deg)
         self._cameras = tuple(CameraRecord(nearer, doubtful) for _ in range(settings.planes))
@@ -123,8 +121,7 @@ class Watch:
         """Take in a usable frame, taken `captured` seconds after tick 0; its angle is its plane's bend."""
         plane = sighting.plane
         predicted, before, after = (
-            self._blind.angles(captured + since).reshape(2, -1)[:, plane]
-            for since in (0.0, -self._period / 2.0, self._period / 2.0)
+            self._blind.angles(captured + since)[:, plane] for since in (0.0, -self._period / 2.0, self._period / 2.0)
         )
         rate = float(after[0] - before[0]) / self._period
         return self._cameras[plane].saw(sighting, captured, predicted, rate, clock)
