@@ -24,9 +24,9 @@ from wristctl.commands.session import Unattended
 from wristctl.records import LiveRun, Run, start_run
 from wristctl.simulation.metrics import METRICS
 from wristctl.trial.log import LOG, TrialLog
+from wristctl.trial.motions import motion_of
 from wristctl.trial.safety import SafetyStop
 from wristctl.trial.tick_timing import TickTiming
-from wristctl.trial.trials import motion_of
 from wristctl.wrist.directions import ACTIVE
 
 SETTINGS = (

@@ -25,7 +25,6 @@ from wristctl.config.bench import InjectedFault
 from wristctl.config.choices import PLANTS
 from wristctl.config.hw_run import HwRunSettings
 from wristctl.errors import UserError
-from wristctl.trial.bend_motion import BendMotion
 from wristctl.trial.experiment import Experiment
 from wristctl.trial.log import TrialLog
 from wristctl.trial.testbeds import EmulatedTestbed
@@ -81,10 +80,9 @@ def performed(motion: str, prepared: Prepared) -> Ended:
         log.close()
     stopped, begun = bench.transport.now(), bench._rig.faults._starts["first trial"]
     truth, followed = bench.truth(begun), next(iter(done.motions.values()))
-    assert isinstance(followed, BendMotion)
     at = truth.time - begun
     moving = at < followed.horizon if done.stop is None or done.stop.time is None else at < done.stop.time
-    wanted = np.stack([np.interp(at, followed.time, plane) for plane in followed.references[:, 0]], axis=1)
+    wanted = np.stack([np.interp(at, followed.time, plane) for plane in followed.bend_ref.T], axis=1)
     apart = np.hypot(*(truth.theta.reshape(len(at), -1, 2).sum(axis=1) - wanted).T)
     return Ended(
         done.outcomes[0], done.odd.get(0, ""), np.nan if done.stop is None else stopped - begun - AT,

@@ -18,10 +18,10 @@ from wristctl.board.messages import Fault, Flag, State
 from wristctl.control.table import controller
 from wristctl.trial.control_loop import ControlLoop
 from wristctl.trial.log import TrialLog
+from wristctl.trial.motions import at_rest, back
 from wristctl.trial.safety import SafetyStop
 from wristctl.trial.steering import Answer, Steering
 from wristctl.trial.tick_timing import TickTiming
-from wristctl.trial.trials import at_rest, back
 from wristctl.vision.marker import SightingVerdict
 
 PERIOD = 5e-3

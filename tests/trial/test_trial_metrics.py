@@ -16,7 +16,8 @@ from wristctl.config.loop import DirectionName
 from wristctl.config.plant import Push
 from wristctl.simulation.motion import Angles, Motion
 from wristctl.study_files.load import load_study
-from wristctl.trial.trials import JUDGED, Trial, evaluated, motion_of, twin
+from wristctl.trial.motions import motion_of
+from wristctl.trial.trials import JUDGED, Trial, evaluated, twin
 from wristctl.wrist.directions import DIRECTIONS
 
 PERIOD, HORIZON = 5e-3, 3.0

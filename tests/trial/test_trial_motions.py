@@ -11,7 +11,7 @@ from wristctl.config.choices import REFERENCES
 from wristctl.config.loop import Reference
 from wristctl.errors import UserError
 from wristctl.simulation.reference import ReferenceKind
-from wristctl.trial.trials import at_rest, back, motion_of
+from wristctl.trial.motions import at_rest, back, motion_of
 
 PERIOD = 5e-3
 

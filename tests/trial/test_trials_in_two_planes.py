@@ -17,17 +17,18 @@ from wristctl.config.hw_run import HwRunSettings
 from wristctl.config.study import Study
 from wristctl.errors import UserError
 from wristctl.simulation.metrics import of_course
+from wristctl.simulation.motion import Motion
 from wristctl.study_files.load import load_study
-from wristctl.trial.bend_motion import BendMotion
 from wristctl.trial.bend_results import bend_twin, bends_evaluated, logged_course
 from wristctl.trial.homing import Zero
+from wristctl.trial.motions import back, motion_of
 from wristctl.trial.residuals import Limit, limits_of
 from wristctl.trial.run_limits import Logged, stop_of
 from wristctl.trial.safety import SafetyStop
 from wristctl.trial.spatial_belief import TOWARD
 from wristctl.trial.testbeds import EmulatedTestbed
 from wristctl.trial.tracking import Tracking
-from wristctl.trial.trials import Trial, back, motion_of, motions_of, trials_of
+from wristctl.trial.trials import Trial, motions_of, trials_of
 
 pytestmark = pytest.mark.slow
 
@@ -75,7 +76,6 @@ def test_a_fast_trial_and_its_simulation_agree(tmp_path: Path) -> None:
     done, settings = performed(tmp_path, **thrown), circling(**thrown)
     assert done.error is None
     study, followed = load_study([]).model_copy(update={"hw_run": settings}), motion_of(settings, WRIST, "dart-thrower")
-    assert isinstance(followed, BendMotion)
     twin = bend_twin(study, Trial(0, "dart-thrower", 0, 0.0, 0), followed, None)
     simulated, true = np.degrees(twin.trajectory.error), true_errors(done)
     assert rmse(simulated) == pytest.approx(rmse(true), rel=0.2)
@@ -83,10 +83,10 @@ def test_a_fast_trial_and_its_simulation_agree(tmp_path: Path) -> None:
     assert np.abs(ahead[0] - ahead[1]).max() < 1.5e-3
 
 
-def lead(errors: np.ndarray, followed: BendMotion) -> np.ndarray:
+def lead(errors: np.ndarray, followed: Motion) -> np.ndarray:
     """Time (2,) [s] by which each plane's bend is ahead of its reference, of errors (T, 2) [deg]."""
     times = []
-    for plane, (bend, rate, _) in enumerate(np.degrees(followed.references)):
+    for plane, (bend, rate, _) in enumerate(np.degrees(followed.angles.rows.reshape(2, 3, -1))):
         terms = np.stack([rate, bend], axis=1)  # a wrong gain is no lead
         times.append(np.linalg.lstsq(terms, errors[:, plane])[0][0])
     return np.array(times)
@@ -115,7 +115,6 @@ def test_it_comes_back_to_zero_along_a_straight_line(round_trip: Done) -> None:
 def test_a_rows_metrics_are_those_of_its_log_by_the_formulas_of_simulation(round_trip: Done) -> None:
     log, truth = round_trip.table("log"), round_trip.table("truth")
     followed = round_trip.experiment.motions["circumduction"]
-    assert isinstance(followed, BendMotion)
     trial = Trial(0, "circumduction", 0, 0.0, 0)
     values = bends_evaluated(trial, log, followed, circling().push, WRIST, truth)
     course = logged_course(log, followed, WRIST)
@@ -233,7 +232,6 @@ def test_one_set_up_serves_trials_in_all_directions(tmp_path: Path, monkeypatch:
 def test_a_move_goes_where_its_direction_says(name: str, degrees: float) -> None:
     settings = circling(planes=2, reference={"kind": "minimum-jerk", "angle_deg": 20.0}, directions=(name,))
     motion = motion_of(settings, WRIST, name)
-    assert isinstance(motion, BendMotion)
     toward = np.array([math.cos(math.radians(degrees)), math.sin(math.radians(degrees))])
     assert motion.final == pytest.approx(math.radians(20.0) * toward, abs=1e-6)
     pushed = Trial(0, name, 0, 2.0, 0).disturbances(settings, motion)
@@ -249,7 +247,8 @@ def test_a_path_beyond_the_wrists_range_is_refused_before_anything_moves() -> No
 
 def test_the_way_back_is_straight_and_ends_at_rest() -> None:
     motion = back(np.array([0.3, -0.1]), 1.0, 0.2, 0.01, 2)
-    assert isinstance(motion, BendMotion)
     bends: Any = motion.bend_ref
     assert bends[0] == pytest.approx([0.3, -0.1]) and bends[-1] == pytest.approx([0.0, 0.0])
-    assert np.allclose(bends[:, 1], -bends[:, 0] / 3.0) and not motion.references[:, 1:, -1].any()
+    assert np.allclose(bends[:, 1], -bends[:, 0] / 3.0) and not np.any(
+        [motion.rate_ref[-1], motion.acceleration_ref[-1]]
+    )

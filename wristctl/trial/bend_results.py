@@ -21,7 +21,7 @@ from wristctl.simulation.motion import Motion
 from wristctl.simulation.repetitions import Simulation
 from wristctl.simulation.trajectory import Trajectory, size_of
 from wristctl.simulation.worlds import Draws, loops_of
-from wristctl.trial.bend_motion import BendMotion, bend_motion_of
+from wristctl.trial.motions import motion_of
 from wristctl.trial.spatial_belief import PLANES, layout_of_axes
 from wristctl.trial.trials import EARLY, LEAST_PUSH, Trial, push_seen, recovery
 from wristctl.wrist.directions import ACTIVE
@@ -45,7 +45,7 @@ FURTHER: Mapping[str, tuple[str, str]] = {
 _BAND = 0.02
 
 
-def logged_course(course: pd.DataFrame, followed: BendMotion, wrist: WristParameters) -> Trajectory:
+def logged_course(course: pd.DataFrame, followed: Motion, wrist: WristParameters) -> Trajectory:
     """A trial as logged, on the grid of its motion: the bend as estimated, and pulls as commanded."""
 
     def planes(name: str) -> Array:
@@ -99,7 +99,7 @@ def first_course(run: Run) -> Trajectory | None:
     if done.empty:
         return None
     number, name = done.iloc[0]["trial"], str(done.iloc[0]["direction"])
-    followed = bend_motion_of(run.config.hw_run, run.config.wrist, name)
+    followed = motion_of(run.config.hw_run, run.config.wrist, name)
     course = logged_course(log[log["trial"] == number], followed, run.config.wrist)
     if not run.has("data/truth.csv"):
         return course
@@ -107,13 +107,13 @@ def first_course(run: Run) -> Trajectory | None:
     return true_course(course, truth[truth["trial"] == number], run.config.wrist.length)
 
 
-def whole(course: pd.DataFrame, followed: BendMotion) -> bool:
+def whole(course: pd.DataFrame, followed: Motion) -> bool:
     """Whether a trial's log goes to the end of its motion."""
     return bool(len(course) and course["time"].iloc[-1] >= followed.horizon - 1.5 * followed.time[1])
 
 
 def bends_evaluated(
-    trial: Trial, course: pd.DataFrame, followed: BendMotion, push: Push, wrist: WristParameters,
+    trial: Trial, course: pd.DataFrame, followed: Motion, push: Push, wrist: WristParameters,
     truth: pd.DataFrame | None,
 ) -> dict[str, float]:  # fmt: skip
     """Metrics of one whole trial by the estimated bend, of the true one as `true_...`, and what became of a push.
@@ -161,7 +161,7 @@ def _recovery(course: Trajectory, end: float) -> float:
 
 
 def bend_twin(
-    study: Study, trial: Trial, followed: BendMotion, tuned: Mapping[str, Mapping[str, float]] | None,
+    study: Study, trial: Trial, followed: Motion, tuned: Mapping[str, Mapping[str, float]] | None,
     loop: Loop | None = None,
 ) -> Simulation:  # fmt: skip
     """Simulate a trial in two planes of the study's hw-run section, or of a loop in the place of that section's."""
@@ -172,6 +172,5 @@ def bend_twin(
     (loop,) = loops_of(disturbed, [draws.plant(0)])
     layout_of_axes(wrist)
     wound = wrist.model_copy(update={"tendons": "four"})  # the fifth in the centre is not
-    motion = Motion.of_bends(followed.references, settings.control_period, wrist.length)
     gains, stream = np.array(gains_of(law, row.gains, tuned)), draws.camera(trial.scenario, 0)
-    return follow(law, gains, motion, wound, loop, stream=stream)
+    return follow(law, gains, followed, wound, loop, stream=stream)

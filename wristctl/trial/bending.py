@@ -13,8 +13,7 @@ from wristctl.arrays import Array
 from wristctl.config.hw_run import HwRunSettings
 from wristctl.config.wrist import WristParameters
 from wristctl.control.response import Estimate
-from wristctl.simulation.motion import Motion
-from wristctl.trial.bend_motion import BendMotion
+from wristctl.simulation.motion import DERIVATIVES, Motion
 from wristctl.trial.spatial_belief import PLANES, SpatialPaths, known_of_axes
 from wristctl.trial.spatial_steering import SpatialAnswer, SpatialSteering
 from wristctl.trial.spools import Paths
@@ -145,9 +144,9 @@ class TwoPlanes:
         self.steering: Any = SpatialSteering(wrist, settings.actuator, settings.sensor, period)
         self._paths = SpatialPaths(known_of_axes(wrist, settings.actuator))
 
-    def course(self, motion: BendMotion) -> Array:
+    def course(self, motion: Motion) -> Array:
         """Bend, rate and acceleration of each plane (T, 2, 3)."""
-        return np.ascontiguousarray(motion.references.transpose(2, 0, 1))
+        return np.ascontiguousarray(motion.angles.rows.reshape(2, DERIVATIVES, -1).transpose(2, 0, 1))
 
     def bend(self, tracking: Tracking, sighting: Sighting, captured: float) -> Sighting:
         """With what the other plane's bend, as it was believed then, does to the picture taken out."""
@@ -199,7 +198,7 @@ class TwoPlanes:
         return {**verdict, f"bend_measured_{plane}": sighting.theta, f"captured_{plane}": captured}
 
     def values(
-        self, estimate: Estimate, motion: BendMotion, course: Array, k: int | None, answer: SpatialAnswer | None
+        self, estimate: Estimate, motion: Motion, course: Array, k: int | None, answer: SpatialAnswer | None
     ) -> Columns:
         """Columns by plane."""
         reference = course[-1] * np.array([1.0, 0.0, 0.0]) if k is None else course[k]

@@ -22,7 +22,6 @@ from wristctl.control.response import Estimate
 from wristctl.errors import UserError
 from wristctl.simulation.motion import Motion
 from wristctl.simulation.spool_timing import remembered_rates
-from wristctl.trial.bend_motion import BendMotion
 from wristctl.trial.bending import bending_of
 from wristctl.trial.log import TrialLog, of_axes
 from wristctl.trial.safety import SafetyStop
@@ -49,7 +48,7 @@ _COMING_TO_REST = 0.5
 class Task(NamedTuple):
     """Motion that the loop follows, with its trial."""
 
-    motion: Motion | BendMotion
+    motion: Motion
     """Sampled at the loop's period."""
     course: Array
     """The motion as `Bending.course` has it."""
@@ -95,7 +94,7 @@ class ControlLoop:
         return self._epoch + float(self._steering.tick) * self._period
 
     def follow(
-        self, motion: Motion | BendMotion, controller: Controller, gains: Sequence[float], trial: int = -1,
+        self, motion: Motion, controller: Controller, gains: Sequence[float], trial: int = -1,
         faults: HostFaults | None = None, pushed: bool = False,
     ) -> None:  # fmt: skip
         """Follow a motion sampled at the period; its ticks are logged under the number of the trial.

@@ -16,12 +16,12 @@ from wristctl.interrupt import undisturbed
 from wristctl.simulation.motion import Motion
 from wristctl.simulation.spool_timing import remembered_rates
 from wristctl.simulation.worlds import Draws
-from wristctl.trial.bend_motion import BendMotion
 from wristctl.trial.bending import bending_of
 from wristctl.trial.calibration import WristCalibration
 from wristctl.trial.control_loop import ControlLoop, Shown
 from wristctl.trial.homing import Zero, find_zero, moves_of, slacken
 from wristctl.trial.log import TrialLog
+from wristctl.trial.motions import back, motion_of
 from wristctl.trial.motors_ready import Halt, halt, prepare
 from wristctl.trial.resting import judge_rest
 from wristctl.trial.safety import SafetyStop
@@ -33,7 +33,7 @@ from wristctl.trial.tendon_pulls import tendon_pulls_of
 from wristctl.trial.testbeds import Testbed
 from wristctl.trial.tick_timing import TickTiming
 from wristctl.trial.tracking import Tracking
-from wristctl.trial.trials import Trial, back, motion_of, motions_of
+from wristctl.trial.trials import Trial, motions_of
 from wristctl.trial.watch import Watch
 from wristctl.trial.zero_checks import check_cocontraction, check_tendons, check_zero
 from wristctl.vision.camera_pose import CameraPose
@@ -91,7 +91,7 @@ class Experiment:
         chosen = [(controller(row.controller), row.gains) for row in settings.rows]
         self._laws = [(law, gains_of(law, gains, tuned)) for law, gains in chosen]
         self._back = controller("feedforward")
-        self.motions: dict[str, Motion | BendMotion] = {
+        self.motions: dict[str, Motion] = {
             name: motion_of(settings, wrist, name, network) for name in motions_of(settings)
         }
         self.timing = TickTiming(settings.control_period)

@@ -9,8 +9,8 @@ from collections.abc import Mapping, Sequence
 
 from wristctl.config.plant import Plant
 from wristctl.config.study import Study
-from wristctl.trial.bend_motion import bend_motion_of
 from wristctl.trial.bend_results import bend_twin
+from wristctl.trial.motions import motion_of
 from wristctl.trial.trials import Trial, twin
 from wristctl.wrist.kinematics import Inverse
 
@@ -34,7 +34,7 @@ def peak_tension(
             if settings.planes == 1:
                 done = twin(study, trial, network, tuned, loop)
             else:
-                followed = bend_motion_of(settings, study.wrist, trial.direction, network)
+                followed = motion_of(settings, study.wrist, trial.direction, network)
                 done = bend_twin(study, trial, followed, tuned, loop)
             peaks.append(math.inf if done.failed else done.metrics["peak_tension"])
     return max(peaks)

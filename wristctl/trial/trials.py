@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any, NamedTuple, cast, overload
+from typing import TYPE_CHECKING, NamedTuple, cast
 
 import numpy as np
 
@@ -14,18 +14,14 @@ from wristctl.config.loop import DirectionName, Loop
 from wristctl.config.plant import Disturbances, Push
 from wristctl.config.simulate import SimulateSettings
 from wristctl.config.study import Study
-from wristctl.config.wrist import WristParameters
-from wristctl.errors import UserError
 from wristctl.simulation.closed_loop import simulate
 from wristctl.simulation.metrics import metrics_of, summed
-from wristctl.simulation.motion import Angles, Motion
+from wristctl.simulation.motion import Motion
 from wristctl.simulation.oscillation import oscillations
-from wristctl.simulation.reference import motion
-from wristctl.simulation.references import minimum_jerk
 from wristctl.simulation.repetitions import Simulation
-from wristctl.trial.bend_motion import BendMotion, bend_back, bend_motion_of, has_path
+from wristctl.trial.motions import has_path
 from wristctl.trial.spools import on_plus_side
-from wristctl.wrist.directions import ACTIVE, DIRECTIONS, in_plane
+from wristctl.wrist.directions import ACTIVE, DIRECTIONS
 from wristctl.wrist.kinematics import Inverse
 
 if TYPE_CHECKING:
@@ -64,16 +60,16 @@ class Trial(NamedTuple):
         """The push of an experiment as it acts in this trial, on a bench and in simulation: against the bend."""
         return push.model_copy(update={"force": -DIRECTIONS[self.direction].sign * self.push})
 
-    def disturbances(self, settings: HwRunSettings, followed: Motion | BendMotion) -> Disturbances:
+    def disturbances(self, settings: HwRunSettings, followed: Motion) -> Disturbances:
         """What disturbs this trial: in one plane its push against the bend, in two toward `push_toward_deg`.
 
         Without that it is against the bend that is wanted where the push begins.
         """
-        if not isinstance(followed, BendMotion):
+        if followed.planes == 1:
             return Disturbances(push=self.pushed(settings.push))
         toward = settings.push_toward_deg
         if toward is None:
-            bend = followed.bend_at(settings.push.start)
+            bend = [np.interp(settings.push.start, followed.time, plane) for plane in followed.bend_ref.T]
             toward = math.degrees(math.atan2(-bend[1], -bend[0])) if np.hypot(*bend) > _STRAIGHT else 90.0
         push = settings.push.model_copy(update={"force": self.push})
         return Disturbances(push=push, toward_deg=toward)
@@ -140,63 +136,6 @@ def recovery(time: Array, error: Array, move: float, end: float) -> float:
     if not len(outside):
         return 0.0
     return float(time[outside[-1] + 1] - end) if outside[-1] + 1 < len(time) else float("nan")
-
-
-@overload
-def motion_of(
-    settings: HwRunSettings, wrist: WristParameters, direction: DirectionName, network: Inverse | None = None
-) -> Motion: ...
-
-
-@overload
-def motion_of(
-    settings: HwRunSettings, wrist: WristParameters, direction: str, network: Inverse | None = None
-) -> Motion | BendMotion: ...
-
-
-def motion_of(
-    settings: HwRunSettings, wrist: WristParameters, direction: str, network: Inverse | None = None
-) -> Motion | BendMotion:
-    """A trial's motion in this direction, sampled at the control period, and worked out before any motor turns.
-
-    Raises UserError for one out of reach.
-    """
-    if settings.planes == 2:
-        return bend_motion_of(settings, wrist, direction, network)
-    reference = settings.reference if DIRECTIONS[direction].sign > 0 else settings.reference.mirrored()
-    course = motion(reference, in_plane(wrist, direction), settings.horizon, settings.control_period, network)
-    if not np.isfinite(course.angles.rows).all():
-        raise UserError(
-            "the reference has samples that are no number", "reference", "a course that is finite everywhere"
-        )
-    return course
-
-
-@overload
-def back(theta: float, duration: float, rest: float, period: float) -> Motion: ...
-
-
-@overload
-def back(theta: Any, duration: float, rest: float, period: float, planes: int) -> Motion | BendMotion: ...
-
-
-def back(theta: Any, duration: float, rest: float, period: float, planes: int = 1) -> Motion | BendMotion:
-    """From theta [rad], in two planes a bend (2,), to straight in `duration` [s], and rest there."""
-    if planes == 2:
-        return bend_back(np.broadcast_to(theta, 2), duration, rest, period)
-    time: Array = np.arange(round((duration + rest) / period), dtype=np.float64) * period
-    course = -theta * minimum_jerk(time, duration)
-    course[0] += theta
-    angles = Angles.of(course)
-    return Motion(
-        time, angles, np.zeros((len(time), 2)),
-        turn=-theta, begin=0.0, rest=duration, horizon=duration + rest,
-    )  # fmt: skip
-
-
-def at_rest(duration: float, period: float) -> Motion:
-    """Straight for so long [s]."""
-    return back(0.0, duration, 0.0, period)
 
 
 # The metrics of the paper's tables; also told of the true angle, where it is known.

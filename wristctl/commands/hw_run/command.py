@@ -100,14 +100,14 @@ def check_bends_of_trials(settings: HwRunSettings, wrist: WristParameters) -> No
     from wristctl.control.table import controller
     from wristctl.simulation.rollout import check_two_planes
     from wristctl.simulation.worlds import World
-    from wristctl.trial.bend_motion import bend_motion_of
+    from wristctl.trial.motions import motion_of
     from wristctl.trial.spatial_belief import layout_of_axes
     from wristctl.trial.trials import motions_of
 
     layout_of_axes(wrist)
     check_two_planes([World(settings.loop, wrist)])
     for name in motions_of(settings):
-        bend_motion_of(settings.model_copy(update={"control_period": _CHECKED}), wrist, name)
+        motion_of(settings.model_copy(update={"control_period": _CHECKED}), wrist, name)
     for row in settings.rows:
         controller(row.controller)
 

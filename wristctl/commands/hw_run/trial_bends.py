@@ -94,8 +94,8 @@ def _errors(trials: pd.DataFrame, twins: Mapping[int, Simulation]) -> _Errors:
 
 def bends_performed(session: Session, trials: pd.DataFrame, tuned: Gains | None) -> PerformedBends:
     """Tables, metrics and figures of trials in two planes, with the simulation of each."""
-    from wristctl.trial.bend_motion import bend_motion_of
     from wristctl.trial.bend_results import bend_twin
+    from wristctl.trial.motions import motion_of
     from wristctl.trial.trials import Trial
 
     study, findings, settings = session.study, session.findings, session.study.hw_run
@@ -107,7 +107,7 @@ def bends_performed(session: Session, trials: pd.DataFrame, tuned: Gains | None)
             key = row["direction"], row["push"], row["label"]
             if key not in simulated:
                 trial = Trial(row["trial"], row["direction"], 0, row["push"], names.index(row["label"]))
-                followed = bend_motion_of(settings, study.wrist, row["direction"])
+                followed = motion_of(settings, study.wrist, row["direction"])
                 simulated[key] = bend_twin(study, trial, followed, tuned)
             twins[row["trial"]] = simulated[key]
     rows = _means(findings, done, names, twins)
@@ -147,8 +147,8 @@ def _draw(session: Session, done: pd.DataFrame, twins: Mapping[int, Simulation])
     import pandas as pd
 
     from wristctl.commands.hw_run.trial_bend_figures import TrialBends, errors_of_bends, paths_of_bends
-    from wristctl.trial.bend_motion import bend_motion_of
     from wristctl.trial.bend_results import logged_course, true_course
+    from wristctl.trial.motions import motion_of
     from wristctl.trial.spatial_belief import layout_of_axes
     from wristctl.wrist.spatial.held_bends import reach_of_bends
 
@@ -161,7 +161,7 @@ def _draw(session: Session, done: pd.DataFrame, twins: Mapping[int, Simulation])
     for record in done.to_dict("records"):
         if record["repetition"] or record["label"] != settings.rows[0].label:
             continue
-        followed = bend_motion_of(settings, study.wrist, record["direction"])
+        followed = motion_of(settings, study.wrist, record["direction"])
         logged = logged_course(log[log["trial"] == record["trial"]], followed, study.wrist)
         true = (
             None if truth is None else true_course(logged, truth[truth["trial"] == record["trial"]], study.wrist.length)

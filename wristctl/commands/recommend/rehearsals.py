@@ -115,7 +115,7 @@ def _quietly() -> Iterator[None]:
 def motion_of_rehearsal(study: Study, reach_deg: float, planes: int) -> tuple[Reference, float]:
     """The motion as simulated rigs are asked for it, and how long it is looked at [s]."""
     from wristctl.config.loop import Reference
-    from wristctl.trial.bend_motion import has_path
+    from wristctl.trial.motions import has_path
 
     settings = _asked(study, [], reach_deg, planes, 1.0)
     asked = settings.reference
