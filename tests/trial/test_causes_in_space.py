@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from wristctl.trial.causes_in_space import SpatialEvidence, causes_in_space
-from wristctl.trial.spatial_belief import pull_directions
+from wristctl.trial.rig_belief import pull_directions
 from wristctl.wrist.directions import ACTIVE
 
 

@@ -283,9 +283,9 @@ def test_the_observer_is_told_what_the_spools_hold_in_the_middle_of_a_tick(
     """
     told, predict = [], Steering.predict
 
-    def heard(steering: Steering, plus: float, minus: float) -> None:
-        told.append((plus, minus))
-        predict(steering, plus, minus)
+    def heard(steering: Steering, reeled: np.ndarray) -> None:
+        told.append(tuple(reeled))
+        predict(steering, reeled)
 
     monkeypatch.setattr(Steering, "predict", heard)
     rig = rig_of()
@@ -325,10 +325,11 @@ def test_a_law_that_raises_stops_as_such(rig_of: RigOf) -> None:
 
 
 @pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf])
-@pytest.mark.parametrize("name", ["torque_wanted", "torque", "plus", "minus"])
+@pytest.mark.parametrize("name", ["torque_wanted", "torque", "share", "tension"])
 def test_what_a_law_wants_is_never_sent_where_it_is_no_number(rig_of: RigOf, name: str, value: float) -> None:
     rig = rig_of()
-    answer = Answer(0.5, 0.5, 10.0, 2.0, False)._replace(**{name: value})  # type: ignore[arg-type]
+    sound = Answer(np.array([0.5]), np.array([0.5]), 1.0, np.array([10.0, 10.0, 2.0, 2.0]))
+    answer = sound._replace(**{name: value * np.ones_like(getattr(sound, name))})
     rig.loop._steering.respond = lambda *_: answer
     with pytest.raises(SafetyStop, match="torque is not a number"):
         rig.follow(at_rest(0.02, PERIOD))

@@ -55,7 +55,7 @@ def watched(
         now = Tick(time, 0.0, estimate, np.full(4, position(time)), taut, State.ENABLED, 0, 0)
         watch.see(now, time)
         watch.judge(now)
-        watch.predict(held, held)
+        watch.predict(np.array([held, held]))
     return watch, time
 
 
@@ -65,11 +65,11 @@ def test_a_fast_wrist_is_predicted_alike_at_any_period_of_its_ticks(side: float)
     arm, speed = WRIST.tendon_offset, side * 200.0
     angles = []
     for period in (1e-3, 5e-3, 10e-3):
-        blind = BlindModel(WRIST, SETTINGS.actuator, LIMITS.softest, period)
+        blind = BlindModel(WRIST, SETTINGS.actuator, LIMITS.softest, period, ("ulnar",))
         held = WRIST.pretension / SETTINGS.actuator.tendon_stiffness
         for tick in range(1, round(0.2 / period) + 1):
             reeled = arm * math.radians(speed) * tick * period
-            blind.predict(held + reeled, held - reeled)
+            blind.predict(np.array([held + reeled, held - reeled]))
         angles.append(math.degrees(blind.angles(0.2)[0, 0]))
     assert abs(angles[0]) > 20.0 and angles == pytest.approx([angles[0]] * 3, abs=0.5)
 
@@ -160,9 +160,9 @@ def test_a_marker_without_a_size_is_not_judged_across() -> None:
 
 
 def blind(softest: float, plus: float, minus: float) -> np.ndarray:
-    model = BlindModel(WRIST, SETTINGS.actuator, softest, PERIOD)
+    model = BlindModel(WRIST, SETTINGS.actuator, softest, PERIOD, ("ulnar",))
     for _ in range(400):
-        model.predict(plus, minus)
+        model.predict(np.array([plus, minus]))
     return model.angles(399 * PERIOD)[:, 0]
 
 
@@ -183,9 +183,9 @@ def test_softer_tendons_bend_the_wrist_less_and_the_two_models_say_how_much() ->
 
 
 def test_between_two_ticks_the_model_is_between_its_angles() -> None:
-    model = BlindModel(WRIST, SETTINGS.actuator, 5e3, PERIOD)
+    model = BlindModel(WRIST, SETTINGS.actuator, 5e3, PERIOD, ("ulnar",))
     for _ in range(20):
-        model.predict(2e-3, -2e-3)
+        model.predict(np.array([2e-3, -2e-3]))
     before, after_ = model.angles(10 * PERIOD), model.angles(11 * PERIOD)
     assert (before < after_).all()
     assert model.angles(10.25 * PERIOD) == pytest.approx(0.75 * before + 0.25 * after_)

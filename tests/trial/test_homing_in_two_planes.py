@@ -15,8 +15,8 @@ from wristctl.config.wrist import WristParameters
 from wristctl.trial.expected_moves import Bend
 from wristctl.trial.homing import SpatialZero, find_zero
 from wristctl.trial.motors_ready import prepare
+from wristctl.trial.rig_belief import pull_directions
 from wristctl.trial.safety import SafetyStop
-from wristctl.trial.spatial_belief import pull_directions
 from wristctl.trial.spatial_moves import SpatialMoves
 from wristctl.trial.supervised_wait import Patience
 from wristctl.trial.testbeds import EmulatedTestbed

@@ -91,11 +91,11 @@ def test_any_tendon_that_pulls_too_hard_stops_and_none_that_is_slack(axis: int) 
 @pytest.mark.parametrize("side", BOTH_SIDES)
 def test_a_standing_wrist_is_judged_by_its_angle_and_its_tendons(side: float) -> None:
     still = np.zeros(4)
-    WATCH.standing(side * math.radians(54.9), still, still, 0.0)
+    WATCH.standing(np.array([side * math.radians(54.9)]), still, still, 0.0)
     with pytest.raises(SafetyStop, match=f"angle {side * 55.1:.1f} deg"):
-        WATCH.standing(side * math.radians(55.1), still, still, 0.0)
+        WATCH.standing(np.array([side * math.radians(55.1)]), still, still, 0.0)
     with pytest.raises(SafetyStop, match="tension of about 59 N"):
-        WATCH.standing(0.5 * side, **pulled(59.0, 3), taut=still, clock=0.0)
+        WATCH.standing(np.array([0.5 * side]), **pulled(59.0, 3), taut=still, clock=0.0)
 
 
 @pytest.mark.parametrize(

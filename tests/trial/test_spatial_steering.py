@@ -16,27 +16,28 @@ from wristctl.simulation.bend_paths import bend_path
 from wristctl.simulation.closed_loop import follow
 from wristctl.simulation.motion import Motion
 from wristctl.trial.blind_model import BlindModel
-from wristctl.trial.spatial_belief import SpatialPaths, known_of_axes
-from wristctl.trial.spatial_steering import SpatialSteering
-from wristctl.trial.steering import REMEMBERED
+from wristctl.trial.control_loop import course_of
+from wristctl.trial.rig_belief import PLANES, RigBelief
+from wristctl.trial.steering import REMEMBERED, Steering
 from wristctl.wrist.tendon_layout import TendonLayout
 
 pytestmark = pytest.mark.slow
 
 WRIST, PERIOD = WristParameters(stiffness_axis_deg=30.0, flexion_ratio=1.4), 1e-2
 ACTUATOR, SENSOR = Actuator(level="tendon"), Sensor(level="camera")
-PATHS = SpatialPaths(known_of_axes(WRIST, ACTUATOR))
+BELIEF = RigBelief(WRIST, ACTUATOR, PLANES)
 
 
-def steering(law: str = "feedforward", gains: str = "") -> SpatialSteering:
-    made, chosen = SpatialSteering(WRIST, ACTUATOR, SENSOR, PERIOD), controller(law)
+def steering(law: str = "feedforward", gains: str = "") -> Steering:
+    made, chosen = Steering(BELIEF, SENSOR, PERIOD), controller(law)
     made.use(chosen, gains_of(chosen, gains, None) if gains else ())
     return made
 
 
-def reeled(tension: float, bend: tuple[float, float] = (0.0, 0.0)) -> tuple[float, ...]:
+def reeled(tension: float, bend: tuple[float, float] = (0.0, 0.0)) -> np.ndarray:
     """Length on the spools of tendons that all pull like that on a wrist held at this bend."""
-    return tuple((PATHS.taut(bend)[0] + tension / ACTUATOR.tendon_stiffness).tolist())
+    lengths: np.ndarray = BELIEF.taut(bend)[0] + tension / ACTUATOR.tendon_stiffness
+    return lengths
 
 
 @pytest.mark.parametrize("limit", [60.0, 12.0])
@@ -52,9 +53,9 @@ def test_torques_and_pulls_are_those_of_the_simulated_loop_at_every_tick(law: st
     course = follow(chosen, np.array(gains), motion, wrist.model_copy(update={"tendons": "four"}), loop).trajectory
     share = np.asarray(course.share)
     assert (share < 1.0).any() == (limit < 60.0)
-    steered = SpatialSteering(wrist, ACTUATOR, SENSOR, PERIOD)
+    steered = Steering(RigBelief(wrist, ACTUATOR, PLANES), SENSOR, PERIOD)
     steered.use(chosen, gains)
-    references = np.ascontiguousarray(path.transpose(2, 0, 1))
+    references = course_of(motion)
     for tick, (bend, rate) in enumerate(zip(course.bend, course.rate, strict=True)):
         steered._observer.now[:] = [bend[0], rate[0], 0.0, bend[1], rate[1], 0.0]
         answer = steered.respond(references, tick)
@@ -66,14 +67,14 @@ def test_torques_and_pulls_are_those_of_the_simulated_loop_at_every_tick(law: st
 
 def test_paths_are_those_of_the_exact_arc() -> None:
     bend, h = np.array([0.3, -0.2]), 1e-6
-    taut, arms = PATHS.taut(bend)
+    taut, arms = BELIEF.taut(bend)
     layout = TendonLayout.four(WRIST.tendon_radius)
     assert arms == pytest.approx(layout.moment_arms(bend, WRIST.length, WRIST.discs), rel=1e-12)
     for plane in range(2):
         step = h * np.eye(2)[plane]
-        slope = (PATHS.taut(bend + step)[0] - PATHS.taut(bend - step)[0]) / (2.0 * h)
+        slope = (BELIEF.taut(bend + step)[0] - BELIEF.taut(bend - step)[0]) / (2.0 * h)
         assert slope == pytest.approx(arms[:, plane], abs=1e-9)
-    assert PATHS.taut((0.0, 0.0))[0] == pytest.approx(np.zeros(4), abs=1e-15) and taut[0] < 0.0
+    assert BELIEF.taut((0.0, 0.0))[0] == pytest.approx(np.zeros(4), abs=1e-15) and taut[0] < 0.0
 
 
 def test_it_bends_toward_the_tendon_that_is_reeled_in() -> None:
@@ -81,7 +82,7 @@ def test_it_bends_toward_the_tendon_that_is_reeled_in() -> None:
         steered = steering()
         more = 5e-4 * np.eye(4)[axis]
         for _ in range(100):
-            steered.predict(*(np.array(reeled(10.0)) + more))
+            steered.predict(reeled(10.0) + more)
         bend = steered.estimate.theta
         assert ulnar * bend[0] > 0.005 and flexion * bend[1] > 0.005
 
@@ -89,7 +90,7 @@ def test_it_bends_toward_the_tendon_that_is_reeled_in() -> None:
 def test_each_camera_tells_of_its_plane_when_its_picture_was_taken() -> None:
     steered = steering()
     for _ in range(40):
-        steered.predict(*reeled(10.0))
+        steered.predict(reeled(10.0))
     assert steered.see(0, 0.05, 0.35)
     first = steered.estimate.theta.copy()
     assert first[0] > 0.005 and abs(first[1]) < 1e-3
@@ -104,7 +105,7 @@ def test_each_camera_tells_of_its_plane_when_its_picture_was_taken() -> None:
 def test_pictures_that_are_too_old_or_yet_to_come_are_refused(captured: float, taken: bool) -> None:
     steered = steering()
     for _ in range(40):
-        steered.predict(*reeled(10.0))
+        steered.predict(reeled(10.0))
     assert steered.see(1, 0.0, 0.35)
     before = steered.estimate.theta.copy()
     assert steered.see(0, 0.05, captured) == taken
@@ -115,7 +116,7 @@ def test_the_bend_is_remembered_as_it_was_believed() -> None:
     steered, past = steering(), []
     for tick in range(REMEMBERED + 20):
         past.append(steered.estimate.theta.copy())
-        steered.predict(*(np.array(reeled(10.0)) + 1e-6 * tick * np.array([0, 0, 1, 0])))
+        steered.predict(reeled(10.0) + 1e-6 * tick * np.array([0, 0, 1, 0]))
     at = (REMEMBERED + 5.25) * PERIOD
     between = past[REMEMBERED + 5] + 0.25 * (past[REMEMBERED + 6] - past[REMEMBERED + 5])
     assert steered.bend_at(at) == pytest.approx(between, abs=1e-12)
@@ -131,7 +132,7 @@ def test_before_the_first_tick_the_bend_was_as_it_is_first_believed() -> None:
     for _ in range(3):
         assert steered.bend_at(-0.4 * PERIOD) == pytest.approx(first, abs=1e-15)
         assert steered.bend_at(-9.0) == pytest.approx(first, abs=1e-15)
-        steered.predict(*reeled(10.0))
+        steered.predict(reeled(10.0))
 
 
 def test_what_motors_withhold_is_no_error_to_the_laws() -> None:
@@ -156,12 +157,12 @@ def test_a_torque_out_of_reach_keeps_its_direction_and_is_said() -> None:
 
 def test_tendons_at_other_places_are_refused() -> None:
     with pytest.raises(UserError, match="winds the four tendons 1, 2, 4 and 5"):
-        known_of_axes(WristParameters(tendons="three"), ACTUATOR)
+        RigBelief(WristParameters(tendons="three"), ACTUATOR, PLANES)
 
 
 def test_soft_tendons_bend_the_blind_wrist_less_in_both_planes() -> None:
-    model = BlindModel(WRIST, ACTUATOR, 5e3, PERIOD, 2)
+    model = BlindModel(WRIST, ACTUATOR, 5e3, PERIOD, PLANES)
     for _ in range(150):
-        model.predict(*(np.array(reeled(10.0)) + 5e-4 * np.array([0, 0, 0, 1])))
+        model.predict(reeled(10.0) + 5e-4 * np.array([0, 0, 0, 1]))
     believed, soft = model.angles(150 * PERIOD)
     assert (soft > 0.005).all() and (believed > 1.03 * soft).all()

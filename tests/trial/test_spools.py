@@ -18,11 +18,12 @@ from wristctl.lanes.lane import zero_like
 from wristctl.lanes.rows import part, rows_of
 from wristctl.simulation.actuator import drive_in_lanes, drive_of, reel_in
 from wristctl.simulation.spool_timing import spool_at
-from wristctl.trial.spools import Paths, on_plus_side, spools_of
+from wristctl.trial.rig_belief import RigBelief
+from wristctl.trial.spools import on_plus_side, spools_of
 from wristctl.wrist.directions import ACTIVE
 
 WRIST, ACTUATOR = WristParameters(), Actuator(level="tendon")
-SPOOLS = spools_of(ACTUATOR)
+SPOOLS, BELIEF = spools_of(ACTUATOR), RigBelief(WRIST, ACTUATOR, ("ulnar",))
 
 
 @kernel
@@ -39,7 +40,7 @@ def _follow(drive: Any, state: Any, targets: Any, moving: float, h: float, out: 
 @settings(deadline=None)
 @given(st.lists(st.floats(0.0, 60.0), min_size=4, max_size=4), st.floats(-0.9, 0.9))
 def test_tension_to_position_and_back_gives_the_tension(tension: list[float], theta: float) -> None:
-    taut, _ = Paths(WRIST, "ulnar").taut(theta)
+    taut, _ = BELIEF.taut((theta,))
     position = SPOOLS.target(np.array(tension), taut)
     assert SPOOLS.tension(position, taut) == pytest.approx(tension, abs=1e-9)
 
@@ -52,14 +53,14 @@ def test_taut_length_is_the_shortening_of_four_straight_spans(theta: float) -> N
     chord = 2.0 * length / bend * math.sin(bend / 2.0)
     across = 2.0 * WRIST.tendon_offset * math.sin(bend / 2.0)
     expected = {True: WRIST.length - 4.0 * (chord - across), False: WRIST.length - 4.0 * (chord + across)}
-    taut, _ = Paths(WRIST, "flexion").taut(theta)
+    taut, _ = RigBelief(WRIST, ACTUATOR, ("flexion",)).taut((theta,))
     assert taut == pytest.approx([expected[bool(plus)] for plus in on_plus_side("flexion")], abs=1e-12)
 
 
 def test_the_change_of_the_taut_length_is_its_derivative() -> None:
-    paths, h = Paths(WRIST, "ulnar"), 1e-5
-    _, arm = paths.taut(0.4)
-    assert (paths.taut(0.4 + h)[0] - paths.taut(0.4 - h)[0]) / (2.0 * h) == pytest.approx(arm, rel=1e-6)
+    h = 1e-5
+    _, arm = BELIEF.taut((0.4,))
+    assert (BELIEF.taut((0.4 + h,))[0] - BELIEF.taut((0.4 - h,))[0]) / (2.0 * h) == pytest.approx(arm[:, 0], rel=1e-6)
 
 
 def test_each_direction_is_pulled_by_the_papers_two_tendons() -> None:

@@ -144,9 +144,9 @@ def test_a_loop_is_stopped_by_pulls_that_last_and_says_which_tendons() -> None:
 
 def test_a_standing_wrist_is_judged_by_its_load_cells_too() -> None:
     still = np.zeros(4)
-    watching((9.0,) * 4).standing(0.0, still, still, 0.0)
+    watching((9.0,) * 4).standing(np.zeros(1), still, still, 0.0)
     with pytest.raises(SafetyStop, match=r"11 N more than its spool explains.*against each other"):
-        watching((11.0,) * 4).standing(0.0, still, still, 0.0)
+        watching((11.0,) * 4).standing(np.zeros(1), still, still, 0.0)
 
 
 WITH_CELLS: dict[str, Any] = {"load_cells": {}, "horizon": 0.6}

@@ -23,9 +23,9 @@ from wristctl.trial.bend_results import bend_twin, bends_evaluated, logged_cours
 from wristctl.trial.homing import Zero
 from wristctl.trial.motions import back, motion_of
 from wristctl.trial.residuals import Limit, limits_of
+from wristctl.trial.rig_belief import TOWARD
 from wristctl.trial.run_limits import Logged, stop_of
 from wristctl.trial.safety import SafetyStop
-from wristctl.trial.spatial_belief import TOWARD
 from wristctl.trial.testbeds import EmulatedTestbed
 from wristctl.trial.tracking import Tracking
 from wristctl.trial.trials import Trial, motions_of, trials_of

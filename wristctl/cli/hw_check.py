@@ -121,8 +121,8 @@ def check_rig(
     from wristctl.commands.adoption import with_planes
     from wristctl.loop_priority import prioritised
     from wristctl.records import require
+    from wristctl.trial.rig_belief import layout_of_axes
     from wristctl.trial.rig_facts import Pictures, measure, troubles
-    from wristctl.trial.spatial_belief import layout_of_axes
     from wristctl.trial.supervised_wait import Patience
     from wristctl.trial.testbeds import open_testbed
     from wristctl.vision.view import View

@@ -135,6 +135,12 @@ class Motion:
         return bends
 
     @property
+    def bend_desired(self) -> Array:
+        """The bend that is truly wanted, (T, P) [rad], which a network only approximates."""
+        bends: Array = (self.wanted or self.angles).rows[::DERIVATIVES].T
+        return bends
+
+    @property
     def theta_ref(self) -> Array:
         """The reference bend, (T,) or (T, 2) [rad]."""
         return self._of(self.angles, 0)

@@ -22,7 +22,7 @@ from wristctl.simulation.repetitions import Simulation
 from wristctl.simulation.trajectory import Trajectory, size_of
 from wristctl.simulation.worlds import Draws, loops_of
 from wristctl.trial.motions import motion_of
-from wristctl.trial.spatial_belief import PLANES, layout_of_axes
+from wristctl.trial.rig_belief import PLANES, layout_of_axes
 from wristctl.trial.trials import EARLY, LEAST_PUSH, Trial, push_seen, recovery
 from wristctl.wrist.directions import ACTIVE
 from wristctl.wrist.spatial.spatial_kinematics import spatial_tips

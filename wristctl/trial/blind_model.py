@@ -1,6 +1,7 @@
 """The wrist as its spools alone should have it: what the marker is compared with."""
 
 import math
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -12,7 +13,7 @@ from wristctl.control.response import OF_A_PLANE
 from wristctl.lanes.compiled import kernel
 from wristctl.lanes.rows import part, rows_of
 from wristctl.simulation.observer import knowing_in_lanes, propagate
-from wristctl.trial.spatial_belief import known_of_rig
+from wristctl.trial.rig_belief import RigBelief
 
 # Ticks.
 _REMEMBERED = 256
@@ -28,24 +29,22 @@ class BlindModel:
     """
 
     def __init__(
-        self, wrist: WristParameters, actuator: Actuator, softest: float, period: float, planes: int = 1
+        self, wrist: WristParameters, actuator: Actuator, softest: float, period: float, planes: Sequence[str]
     ) -> None:
         soft = actuator.model_copy(update={"tendon_stiffness": min(softest, actuator.tendon_stiffness)})
         self._wrists = [
-            (known_of_rig(wrist, tendons, planes), np.zeros(OF_A_PLANE * planes)) for tendons in (actuator, soft)
+            (RigBelief(wrist, tendons, planes).known, np.zeros(OF_A_PLANE * len(planes)))
+            for tendons in (actuator, soft)
         ]
         self._period, self._tick = period, 0
-        self._angles = np.zeros((_REMEMBERED, 2, planes))
+        self._angles = np.zeros((_REMEMBERED, 2, len(planes)))
         self._parts = max(1, math.ceil(period / _STILL - 1e-9))
         self._reeled: Array | float = 0.0
 
-    def predict(self, *reeled: float) -> None:
-        """Go on to the next tick, with spools reeled in by so much [m] until then, evenly since the last one.
-
-        They are those of the + and the - side, or in two planes of the four axes.
-        """
+    def predict(self, reeled: Array) -> None:
+        """Go on to the next tick, with so much (T,) [m] reeled in at each place until then, evenly since the last."""
         self._tick += 1
-        before, self._reeled = self._reeled, np.array(reeled)
+        before, self._reeled = self._reeled, reeled
         for k, (known, x) in enumerate(self._wrists):
             for share in range(self._parts):
                 held = before + (share + 0.5) / self._parts * (self._reeled - before)

@@ -11,7 +11,7 @@ import numpy as np
 
 from wristctl.arrays import Array
 from wristctl.trial.likely_causes import JUMP, LOOP_SWINGS, MEANT, SWINGS, TURNED
-from wristctl.trial.spatial_belief import PLANES, TOWARD, pull_directions, unit_toward
+from wristctl.trial.rig_belief import PLANES, TOWARD, pull_directions, unit_toward
 from wristctl.wrist.directions import ACTIVE
 
 # A load this far off a tendon's direction [rad] may still be that tendon's doing.

@@ -20,18 +20,17 @@ from wristctl.config.wrist import WristParameters
 from wristctl.control.law import Controller
 from wristctl.control.response import Estimate
 from wristctl.errors import UserError
-from wristctl.simulation.motion import Motion
+from wristctl.simulation.motion import DERIVATIVES, Motion
 from wristctl.simulation.spool_timing import remembered_rates
-from wristctl.trial.bending import bending_of
-from wristctl.trial.log import TrialLog, of_axes
+from wristctl.trial.log import TrialLog, column_of, of_axes, of_planes
+from wristctl.trial.rig_belief import RigBelief, names_of_planes
 from wristctl.trial.safety import SafetyStop
-from wristctl.trial.spatial_steering import SpatialAnswer
 from wristctl.trial.spools import spools_of
-from wristctl.trial.steering import Answer, HostFaults
+from wristctl.trial.steering import Answer, HostFaults, Steering
 from wristctl.trial.supervised_wait import InSight, Patience
 from wristctl.trial.tendon_pulls import TendonPulls
 from wristctl.trial.tick_timing import TickTiming
-from wristctl.trial.tracking import Tracking
+from wristctl.trial.tracking import Tracking, bend_of
 from wristctl.trial.watch import Tick, Watch
 
 # Takes each tick's row of the log, to show it.
@@ -51,12 +50,17 @@ class Task(NamedTuple):
     motion: Motion
     """Sampled at the loop's period."""
     course: Array
-    """The motion as `Bending.course` has it."""
+    """Bend, rate and acceleration of each plane, at each sample (T, P, 3)."""
     trial: int
     """Number of the trial; -1 between trials."""
     begin: float
     """When it begins, on the clock."""
     faults: HostFaults
+
+
+def course_of(motion: Motion) -> Array:
+    """A motion as laws follow it: bend, rate and acceleration of each plane at each sample (T, P, 3)."""
+    return np.ascontiguousarray(motion.angles.rows.reshape(motion.planes, DERIVATIVES, -1).transpose(2, 0, 1))
 
 
 class ControlLoop:
@@ -72,10 +76,11 @@ class ControlLoop:
         self._board, self._tracking, self._log, self._timing, self._shown = board, tracking, log, timing, shown
         self._clock, self._period, self._signs = board.transport, timing.period, np.array(signs)
         self._life, self._stale = settings.rate_life, settings.safety.stale
-        self._spools, self._bending = spools_of(settings.actuator), bending_of(settings, wrist, plane, timing.period)
+        self._spools = spools_of(settings.actuator)
+        self._belief = RigBelief(wrist, settings.actuator, names_of_planes(settings.planes, plane))
+        self._steering = Steering(self._belief, settings.sensor, timing.period)
         self._pulls = pulls
         self.watch = Watch(settings, wrist, plane, timing, oblique, pulls, stiffness)
-        self._steering = self._bending.steering
         self._status, self._sent = board.read(), np.zeros(AXES)
         timing.camera.expect(settings.planes)
         self._epoch = self._clock.now()
@@ -91,7 +96,7 @@ class ControlLoop:
     @property
     def next_tick(self) -> float:
         """When the next tick is due, on the clock [s]."""
-        return self._epoch + float(self._steering.tick) * self._period
+        return self._epoch + self._steering.tick * self._period
 
     def follow(
         self, motion: Motion, controller: Controller, gains: Sequence[float], trial: int = -1,
@@ -105,7 +110,7 @@ class ControlLoop:
         """
         self._steering.use(controller, gains)
         self.watch.begin(pushed)
-        task = Task(motion, self._bending.course(motion), trial, self.next_tick, faults or HostFaults(()))
+        task = Task(motion, course_of(motion), trial, self.next_tick, faults or HostFaults(()))
         first = self._steering.tick
         while (k := self._steering.tick - first) < len(motion.time):
             self._tick(task, k)
@@ -113,7 +118,7 @@ class ControlLoop:
 
     def patience(self) -> Patience:
         """For waiting between two motions, the wrist in sight."""
-        sight = InSight(self._tracking, self.watch, self._stale, self._bending, self._clock.now, self._signs)
+        sight = InSight(self._tracking, self.watch, self._stale, self._belief, self._clock.now, self._signs)
         return Patience(self._board, sight)
 
     def _come_to_rest(self, task: Task) -> None:
@@ -135,20 +140,20 @@ class ControlLoop:
         marker = self._look(task)
         estimate, position = self._steering.estimate, self._reeled()
         self._judge(task.trial, estimate, position, clock, clock - due)
-        answer: Answer | SpatialAnswer | None = None
+        answer: Answer | None = None
         tension, target = np.full(AXES, math.nan), position
         if k is None:
             self._send(np.zeros(AXES))
         else:
             answer = self._answer(task, k, clock - task.begin)
-            tension = self._bending.tension(answer)
+            tension = answer.tension
             target = self._turn(tension, position, task.course[k])
         values = {
             "trial": task.trial,
             "time": clock - task.begin,
             "clock": clock,
             **marker,
-            **self._bending.values(estimate, task.motion, task.course, k, answer),
+            **self._followed(task, k, estimate, answer),
             "state": self._status.state.name,
             "faults": "+".join(fault.name or "" for fault in Fault if fault in self._status.faults),
             "counted": self._counted - task.begin,
@@ -171,33 +176,62 @@ class ControlLoop:
 
     def _look(self, task: Task) -> dict[str, Any]:
         """Fuse what was seen since the last tick; for the log the newest verdict and the newest angle used."""
-        marker = self._bending.marker()
+        planes = self._belief.planes
+        unseen = (math.nan,) * len(planes)
+        marker = of_planes(planes, bend_measured=unseen, captured=unseen, verdict=("",) * len(planes))
         for sighting in self._tracking.look():
             captured = sighting.time - self._epoch
             now, frame = self._clock.now(), None
             self.watch.sighted(sighting, now)
             self._timing.camera.add(sighting)
             if math.isfinite(sighting.theta):
-                sighting = self._bending.bend(self._tracking, sighting, captured)
-            if math.isfinite(sighting.theta) and self._bending.see(sighting, captured):
+                bend = bend_of(self._tracking, sighting, self._steering.bend_at(captured))
+                sighting = sighting._replace(theta=bend)
+            if math.isfinite(sighting.theta) and self._steering.see(sighting.plane, sighting.theta, captured):
                 self._last_usable[sighting.plane] = sighting.time
                 frame = self.watch.saw(sighting, captured, now)
-            marker |= self._bending.marked(sighting, None if frame is None else sighting.time - task.begin)
+            shown: dict[str, Any] = {"verdict": str(sighting.verdict)}
+            if frame is not None:
+                shown |= {"bend_measured": sighting.theta, "captured": sighting.time - task.begin}
+            plane = planes[sighting.plane]
+            marker |= {column_of(name, plane, len(planes)): value for name, value in shown.items()}
             if task.trial >= 0:
                 self._log.frame(task.trial, now - task.begin, task.begin, sighting, frame)
         return marker
 
+    def _followed(self, task: Task, k: int | None, estimate: Estimate, answer: Answer | None) -> dict[str, Any]:
+        """Columns of estimate, reference at the sample `k` (None: behind the last) and answer (None: none)."""
+        last = -1 if k is None else k
+        reference = task.course[last].T
+        if k is None:
+            reference = np.stack([reference[0], np.zeros(len(reference[0])), np.zeros(len(reference[0]))])
+        unknown = np.full(len(reference[0]), math.nan)
+        values = {
+            "bend": estimate.theta,
+            "rate": estimate.rate,
+            "load": estimate.load,
+            "bend_ref": reference[0],
+            "rate_ref": reference[1],
+            "acceleration_ref": reference[2],
+            "bend_desired": task.motion.bend_desired[last],
+            "error": estimate.theta - reference[0],
+            "torque_wanted": unknown if answer is None else answer.torque_wanted,
+            "torque": unknown if answer is None else answer.torque,
+        }
+        columns = of_planes(self._belief.planes, **{name: every.tolist() for name, every in values.items()})
+        return columns | {"share": math.nan if answer is None else answer.share}
+
     def _judge(self, trial: int, estimate: Estimate, position: Array, clock: float, late: float) -> None:
         """Raises SafetyStop where a residual is beyond its limit; all are logged before."""
-        taut = self._bending.taut(estimate.theta)
+        taut, _ = self._belief.taut(estimate.theta)
         delay, resent = late + self._skipped * self._period, self._board.traffic.resent
         tick = Tick(clock, delay, estimate, position, taut, self._status.state, self._status.lapses, resent)
         self._log.residuals(trial, clock, self.watch.see(tick, min(self._last_usable)))
         self.watch.judge(tick)
 
-    def _answer(self, task: Task, k: int, time: float) -> Answer | SpatialAnswer:
+    def _answer(self, task: Task, k: int, time: float) -> Answer:
         try:
-            answer: Answer | SpatialAnswer = task.faults.answer(self._steering.respond(task.course, k), time)
+            answer: Answer = task.faults.answer(self._steering.respond(task.course, k), time)
         except UserError as error:
             raise SafetyStop(f"the controller failed: {error.what}", error.where, error.fix) from error
         except Exception as error:
@@ -209,14 +243,14 @@ class ControlLoop:
 
     def _turn(self, tension: Array, position: Array, sample: Array) -> Array:
         """Send the step rates that lead to these tensions at a sample of the course; the targets [steps]."""
-        taut, speed = self._bending.aim(sample)
-        target, moving = self._spools.target(tension, taut), speed / self._spools.step
+        taut, arms = self._belief.taut(sample[:, 0])
+        target, moving = self._spools.target(tension, taut), arms @ sample[:, 1] / self._spools.step
         # the command acts once an axis takes it up; by then the ones before have moved the spools
         foreseen = self._spools.foreseen(self._place, self._rates, self._period)
         gap = target + moving * self._spools.timing.delay - foreseen
         self._send(self._signs * self._spools.rate(gap, moving, self._sent, self._period))
         behind = self._spools.behind(gap, moving, self._sent, self._period)
-        self._bending.withhold(sample, self._spools.tension(behind, np.zeros(AXES)))
+        self._steering.withheld = self._spools.tension(behind, np.zeros(AXES)) @ arms
         return target
 
     def _send(self, rates: Array) -> None:
@@ -241,9 +275,9 @@ class ControlLoop:
             ahead = self._spools.foreseen(self._place, self._rates, self._period)
             self._rates = np.column_stack([self._sent, self._rates[:, :-1]])
             middle = self._spools.reckoned(self._place, self._rates, 0.5 * self._period, self._period)
-            reeled = self._bending.spools(self._spools.step * middle)
-            self._steering.predict(*reeled)
-            self.watch.predict(*reeled)
+            reeled = self._belief.at_places(self._spools.step * middle)
+            self._steering.predict(reeled)
+            self.watch.predict(reeled)
             self._place = ahead
             if skipped == 0:
                 in_force = self._rates[:, self._late + 1]

@@ -1,6 +1,5 @@
 """The experiment from the first command to the last: connect, home, trials and returns, and the stop that ends it."""
 
-import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -16,18 +15,17 @@ from wristctl.interrupt import undisturbed
 from wristctl.simulation.motion import Motion
 from wristctl.simulation.spool_timing import remembered_rates
 from wristctl.simulation.worlds import Draws
-from wristctl.trial.bending import bending_of
 from wristctl.trial.calibration import WristCalibration
-from wristctl.trial.control_loop import ControlLoop, Shown
+from wristctl.trial.control_loop import ControlLoop, Shown, course_of
 from wristctl.trial.homing import Zero, find_zero, moves_of, slacken
 from wristctl.trial.log import TrialLog
 from wristctl.trial.motions import back, motion_of
 from wristctl.trial.motors_ready import Halt, halt, prepare
 from wristctl.trial.resting import judge_rest
+from wristctl.trial.rig_belief import RigBelief, names_of_planes
 from wristctl.trial.safety import SafetyStop
-from wristctl.trial.spatial_belief import PLANES
 from wristctl.trial.spools import spools_of
-from wristctl.trial.steering import HostFaults
+from wristctl.trial.steering import HostFaults, Steering
 from wristctl.trial.supervised_wait import Patience, medians
 from wristctl.trial.tendon_pulls import tendon_pulls_of
 from wristctl.trial.testbeds import Testbed
@@ -37,7 +35,6 @@ from wristctl.trial.trials import Trial, motions_of
 from wristctl.trial.watch import Watch
 from wristctl.trial.zero_checks import check_cocontraction, check_tendons, check_zero
 from wristctl.vision.camera_pose import CameraPose
-from wristctl.vision.marker import Sighting, SightingVerdict
 from wristctl.wrist.directions import in_plane
 from wristctl.wrist.kinematics import Inverse
 
@@ -131,27 +128,25 @@ class Experiment:
     def _warm_up(self) -> None:
         """Have everything compiled or loaded before the first motor is on: from then on the board wants to be fed."""
         settings, plane = self._settings, self._trials[0].plane
-        bending = bending_of(settings, self._facing(plane), plane, settings.control_period)
+        belief = RigBelief(self._facing(plane), settings.actuator, names_of_planes(settings.planes, plane))
         spools, still = spools_of(settings.actuator), np.zeros(AXES)
         motion = back(0.0, settings.rest, 0.0, settings.control_period, settings.planes)
-        course = bending.course(motion)
-        taut, _ = bending.aim(course[0])
+        course = course_of(motion)
+        taut, _ = belief.taut(course[0, :, 0])
         spools.target(still, taut)
         spools.rate(still, still, still, settings.control_period)
         spools.behind(still, still, still, settings.control_period)
         rates = np.zeros((AXES, remembered_rates(spools.timing.delay, settings.control_period)))
         spools.foreseen(still, rates, settings.control_period)
         spools.reckoned(still, rates, 0.0, settings.control_period)
-        bending.withhold(course[0], still)
-        reeled = bending.spools(taut)
-        Watch(settings, self._facing(plane), plane, self.timing).predict(*reeled)
-        steering = bending.steering
+        reeled = belief.at_places(taut)
+        Watch(settings, self._facing(plane), plane, self.timing).predict(reeled)
+        steering = Steering(belief, settings.sensor, settings.control_period)
         for law, gains in [*self._laws, (self._back, ())]:
             steering.use(law, gains)
             steering.respond(course)
-            steering.predict(*reeled)
-        sighting = Sighting(0.0, 0, 0.0, SightingVerdict.OK, np.full((2, 4, 2), math.nan))
-        bending.see(sighting, 0.0)
+            steering.predict(reeled)
+        steering.see(0, 0.0, 0.0)
 
     def _all(self, testbed: Testbed, board: Board, shown: Shown | None) -> None:
         plane: str | None = None
@@ -175,7 +170,7 @@ class Experiment:
         if self.zero is not None:
             self._let_go(board, self.zero)
         watching = Patience(board)
-        names = (plane,) if settings.planes == 1 else PLANES
+        names = names_of_planes(settings.planes, plane)
         self.poses |= dict(zip(names, watching.stand_square(tracking, settings.homing), strict=True))
         seen = watching.sightings(tracking, 4 * settings.homing.frames)
         markers = medians(seen, settings.planes)

@@ -25,8 +25,8 @@ from wristctl.config.hw_run import Homing, RigSettings
 from wristctl.config.wrist import WristParameters
 from wristctl.trial.expected_moves import Bend, ExpectedMoves, middle
 from wristctl.trial.resting import judge_slack
+from wristctl.trial.rig_belief import names_of_planes
 from wristctl.trial.safety import SafetyStop
-from wristctl.trial.spatial_belief import PLANES
 from wristctl.trial.spatial_moves import SpatialMoves
 from wristctl.trial.spools import Spools, spools_of
 from wristctl.trial.supervised_wait import Patience, Reading
@@ -273,7 +273,7 @@ def find_zero(
     taut before or sticks, or where the marker is lost. In two planes readings of the slack wrist have been taken off.
     """
     expected, spools = moves_of(settings, wrist, plane), spools_of(settings.actuator)
-    planes = (plane,) if settings.planes == 1 else PLANES
+    planes = names_of_planes(settings.planes, plane)
     sags = partial(judge_slack, settings=settings, wrist=wrist, planes=planes)
     finder = _Finder(board, tracking, spools, settings.homing, expected, sags)
     about = [finder.sense(axis, (1, -1) if signs is None else (signs[axis],)) for axis in range(AXES)]

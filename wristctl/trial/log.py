@@ -5,8 +5,9 @@ import math
 import os
 import time
 from collections import deque
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +17,7 @@ from numpy.typing import NDArray
 from wristctl.records.run_writer import RESERVE
 from wristctl.trial.camera_record import Frame
 from wristctl.trial.residuals import columns
-from wristctl.trial.spatial_belief import PLANES
+from wristctl.trial.rig_belief import PLANES
 from wristctl.vision.marker import Sighting
 from wristctl.wrist.directions import ACTIVE
 
@@ -296,6 +297,21 @@ def of_axes(**values: NDArray[np.float64]) -> dict[str, float]:
         f"{name}_{tendon}": value
         for name, four in values.items()
         for tendon, value in zip(ACTIVE, four.tolist(), strict=True)
+    }
+
+
+@cache
+def column_of(name: str, plane: str, planes: int) -> str:
+    """Name of a plane's column of a rig with so many planes: in one plane a bend is called theta."""
+    return name.replace("bend", "theta") if planes == 1 else f"{name}_{plane}"
+
+
+def of_planes(planes: Sequence[str], **values: Sequence[Any]) -> dict[str, Any]:
+    """Columns of values (P,) of a rig's planes."""
+    return {
+        column_of(name, plane, len(planes)): value
+        for name, every in values.items()
+        for plane, value in zip(planes, every, strict=True)
     }
 
 

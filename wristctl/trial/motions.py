@@ -13,7 +13,7 @@ from wristctl.simulation.motion import DERIVATIVES, Angles, Motion
 from wristctl.simulation.planes import motion_in, within
 from wristctl.simulation.reference import REFERENCES, motion
 from wristctl.simulation.references import minimum_jerk
-from wristctl.trial.spatial_belief import TOWARD, unit_toward
+from wristctl.trial.rig_belief import TOWARD, unit_toward
 from wristctl.wrist.directions import in_plane
 from wristctl.wrist.kinematics import Inverse
 

@@ -11,7 +11,7 @@ from wristctl.config.hw_run import CalibrateWristSettings, RigSettings
 from wristctl.config.wrist import WristParameters
 from wristctl.interrupt import undisturbed
 from wristctl.trial.resting import judge_rest
-from wristctl.trial.spatial_belief import PLANES
+from wristctl.trial.rig_belief import PLANES
 from wristctl.trial.spools import spools_of
 from wristctl.trial.supervised_wait import Patience
 from wristctl.trial.tendon_pulls import tendon_pulls_of

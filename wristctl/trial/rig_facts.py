@@ -16,9 +16,9 @@ from wristctl.config.wrist import WristParameters
 from wristctl.trial.camera_pace import BY_CHECK, FIX, CameraPace, CameraPaces
 from wristctl.trial.expected_moves import Bend
 from wristctl.trial.resting import judge_rest
+from wristctl.trial.rig_belief import PLANES
 from wristctl.trial.rig_strokes import Latency, RigStrokes, find_latency
 from wristctl.trial.safety import SafetyStop
-from wristctl.trial.spatial_belief import PLANES
 from wristctl.trial.spatial_moves import SpatialMoves
 from wristctl.trial.supervised_wait import OBLIQUE_FIX
 from wristctl.trial.testbeds import Testbed

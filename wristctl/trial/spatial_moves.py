@@ -11,8 +11,8 @@ import numpy as np
 from wristctl.config.hw_run import RigSettings
 from wristctl.config.wrist import WristParameters
 from wristctl.trial.expected_moves import LEAST, MOST, SLACK, Bend, ExpectedMoves
+from wristctl.trial.rig_belief import PLANES, pull_directions
 from wristctl.trial.safety import SafetyStop
-from wristctl.trial.spatial_belief import PLANES, pull_directions
 from wristctl.trial.supervised_wait import Reading
 from wristctl.wrist.directions import ACTIVE, in_plane
 from wristctl.wrist.out_of_plane import across_of

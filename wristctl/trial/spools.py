@@ -19,15 +19,12 @@ from numpy.typing import NDArray
 
 from wristctl.arrays import Array
 from wristctl.config.plant import Actuator
-from wristctl.config.wrist import WristParameters
 from wristctl.lanes.compiled import kernel
 from wristctl.lanes.lane import zero_like
 from wristctl.lanes.rows import part, rows_of
 from wristctl.simulation.actuator import left_behind, read_timing, spool_speed, spool_target
 from wristctl.simulation.spool_timing import Timing, foreseen, reckoned, timing_of
 from wristctl.wrist.directions import ACTIVE, tendons_of
-from wristctl.wrist.segments import load_segments, segments
-from wristctl.wrist.tendons import lengths, moment_arms
 
 
 def on_plus_side(plane: str) -> NDArray[np.bool_]:
@@ -107,29 +104,6 @@ def spools_of(actuator: Actuator) -> Spools:
     )
 
 
-class Paths:
-    """The tendons' paths through the controller's one-segment wrist, for each axis of the board."""
-
-    def __init__(self, wrist: WristParameters, plane: str) -> None:
-        self._model = segments(wrist, 1)
-        self._plus = on_plus_side(plane)
-        self._found = np.zeros(4)
-
-    def taut(self, theta: float) -> tuple[Array, Array]:
-        """Reeled-in lengths of tendons that are just taut at theta [m], and their change by theta [m/rad]."""
-        _paths(self._model, theta, self._found)
-        reeled_plus, reeled_minus, arm_plus, arm_minus = self._found
-        return np.where(self._plus, reeled_plus, reeled_minus), np.where(self._plus, arm_plus, arm_minus)
-
-    def sides(self, values: Array) -> tuple[float, float]:
-        """Means over the + and the - side's two axes of values (4,)."""
-        return float(values[self._plus].mean()), float(values[~self._plus].mean())
-
-    def each(self, plus: float, minus: float) -> Array:
-        """The + side's value for its axes and the - side's for the others, (4,)."""
-        return np.where(self._plus, plus, minus)
-
-
 @kernel
 def _targets(tension: Any, stiffness: float, taut: Any, reeled: Any) -> None:
     pulls, shorter, out = rows_of(tension), rows_of(taut), rows_of(reeled)
@@ -169,13 +143,3 @@ def _places(timing: Any, place: Any, rates: Any, sent: Any, time: float, period:
             out[axis] = foreseen(board, before[axis], own, period)
         else:
             out[axis] = reckoned(board, before[axis], own, time + zero_like(before[axis]), period)
-
-
-@kernel
-def _paths(model: Any, theta: float, paths: Any) -> None:
-    believed, row = load_segments(rows_of(model)), rows_of(paths)
-    angle = theta + zero_like(believed.length)
-    plus, minus = lengths(angle, believed)
-    row[0] = believed.length - plus
-    row[1] = believed.length - minus
-    row[2], row[3] = moment_arms(angle, believed)

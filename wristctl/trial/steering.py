@@ -1,4 +1,4 @@
-"""The controller on hardware: the same compiled law, allocation and observer as in simulation, tick by tick."""
+"""The controller on hardware: the same compiled laws, allocation and observer as in simulation, tick by tick."""
 
 import math
 from collections.abc import Sequence
@@ -9,124 +9,185 @@ import numpy as np
 from wristctl.arrays import Array
 from wristctl.bench.faults import Faults
 from wristctl.config.bench import InjectedFault
-from wristctl.config.plant import Actuator, Sensor
-from wristctl.config.wrist import WristParameters
+from wristctl.config.plant import Sensor
 from wristctl.control.belief import Limits
 from wristctl.control.law import REFERENCE, Controller, signals_of
-from wristctl.control.response import Controlled, Estimate, Seen, look_ahead, respond, room_like
-from wristctl.lanes.compiled import kernel
-from wristctl.lanes.lane import zero_like
+from wristctl.control.response import FULL, OF_A_PLANE, Controlled, Estimate, Seen, look_ahead, respond, room_like
+from wristctl.lanes.compiled import compiled, kernel
 from wristctl.lanes.rows import lanes_like, part, rows_of
-from wristctl.simulation.observer import ArrivingFrame, fuse, knowing_in_lanes, known_of_sides, predict
-from wristctl.simulation.stationary_filter import Belief, observer_of
-from wristctl.wrist.tendons import TENDONS_PER_SIDE
+from wristctl.simulation.observer import knowing_in_lanes, propagate
+from wristctl.trial.rig_belief import RigBelief
 
 # Ticks that a frame may be late.
 REMEMBERED = 256
+# Seconds by which a frame may be older than the last one of another camera: it is fused there.
+_UNEVEN = 0.05
 
 
 class Answer(NamedTuple):
-    """Answer of the law: torques wanted and commanded [N m], tensions of one tendon of each side [N]."""
+    """Answer of the laws: torques wanted and commanded (P,) [N m], share reached, and tensions of the axes (4,) [N]."""
 
-    torque_wanted: float
-    torque: float
-    plus: float
-    minus: float
-    saturated: bool
+    torque_wanted: Array
+    torque: Array
+    share: float
+    tension: Array
+
+    @property
+    def saturated(self) -> bool:
+        """Whether the wanted torque is out of the tendons' reach."""
+        return not self.share >= FULL
+
+
+class _Observer(NamedTuple):
+    """Gain (3 P,), what was delivered (ring, T), and x (3 P,) at the last fused frame and at the present tick."""
+
+    gain: Any
+    delivered: Any
+    fused: Any
+    now: Any
 
 
 class Steering:
-    """Observer and law of one bending plane. Ticks are numbered from 0, `period` [s] apart."""
+    """Observers and laws of P planes. Ticks are numbered from 0, `period` [s] apart; the wrist rests straight at first.
 
-    def __init__(self, wrist: WristParameters, actuator: Actuator, sensor: Sensor, period: float, theta: float) -> None:
-        self._known = known_of_sides(wrist, actuator)
-        self._bounds = TENDONS_PER_SIDE * np.repeat([wrist.pretension, wrist.tension_limit], 2)
-        self._observer = observer_of(Belief(sensor, actuator, wrist, period), REMEMBERED, theta)
-        self._signals, self._target, self._found = np.zeros((1, 0)), np.zeros((1, len(REFERENCE))), np.zeros(6)
-        self._period = period
+    `belief` has P planes and T places of tendons.
+    """
+
+    def __init__(self, belief: RigBelief, sensor: Sensor, period: float) -> None:
+        self._belief, self._known, self._planes = belief, belief.known, len(belief.planes)
+        self._alike = belief.known.belief.alike
+        wrist, places = belief.wrist, len(self._alike)
+        self._bounds = np.concatenate([self._alike * wrist.pretension, self._alike * wrist.tension_limit])
+        x = np.zeros(OF_A_PLANE * self._planes)
+        self._observer = _Observer(belief.gains(sensor, period), np.zeros((REMEMBERED, places)), x, x.copy())
+        self._bends = np.zeros((REMEMBERED, self._planes))
+        self._fused_at, self._seen_at, self._period = 0, [0] * self._planes, period
+        self._found = np.zeros(places + 2 * self._planes + 1)
+        self._missed = np.zeros(self._planes)
         self._law: Any = None
+        self._control: Any = None
         self._preview = 0
-        self._gains, self._memory = np.zeros(1), np.zeros((1, 1))
         self.tick = 0
-        self.withheld = 0.0
-        """Torque of the last command that the motors are too slow to deliver [N m]."""
+        self.withheld: Array = np.zeros(self._planes)
+        """Torque of the last command that the motors are too slow to deliver, by plane [N m]."""
 
     @property
     def estimate(self) -> Estimate:
-        """As of the present tick."""
-        theta, rate, load = self._observer.now
-        return Estimate(float(theta), float(rate), float(load))
+        """As of the present tick; bend, rate and load are (P,) each."""
+        return Estimate(*self._observer.now.reshape(self._planes, OF_A_PLANE).T.copy())
+
+    def bend_at(self, captured: float) -> Array:
+        """Bend (P,) [rad] as it was believed `captured` seconds after tick 0, as far as it is remembered."""
+        since = min(max(captured / self._period, self.tick - REMEMBERED + 1, 0), self.tick)
+        tick = math.floor(since)
+        before, after = self._bends[tick % REMEMBERED], self._bends[min(tick + 1, self.tick) % REMEMBERED]
+        believed: Array = before + (since - tick) * (after - before)
+        return believed
 
     def use(self, controller: Controller, gains: Sequence[float]) -> None:
-        """Take up a law, its memory empty, with motors that have caught up."""
-        self.withheld = 0.0
-        self._law = controller.compiled()
-        self._signals = np.zeros((1, signals_of(controller.preview)))
-        self._preview = controller.preview
-        self._gains = np.array([*gains, 0.0])
-        self._memory = np.zeros((1, max(1, controller.memory)))
+        """Take up a law in each plane, its memory empty, with motors that have caught up."""
+        planes, places = self._planes, len(self._alike)
+        self._law = controller.compiled(1, planes, places)
+        self.withheld, self._missed, self._preview = np.zeros(planes), np.zeros(planes), controller.preview
+        self._control = Controlled(
+            self._law, np.zeros((planes, signals_of(controller.preview))), self._known.belief.models,
+            np.array([*gains, 0.0]), np.zeros((planes, max(1, controller.memory))), np.zeros((planes, len(REFERENCE))),
+        )  # fmt: skip
 
-    def see(self, theta: float, captured: float) -> bool:
-        """Fuse an angle [rad] seen `captured` seconds after tick 0; False where that is too old or yet to come."""
+    def see(self, plane: int, bend: float, captured: float) -> bool:
+        """Fuse one plane's bend [rad] seen `captured` seconds after tick 0; False where that is too old or yet to come.
+
+        One that was taken before the last frame of another camera is compared with what was believed then.
+        """
         tick = math.floor(captured / self._period)
-        if not max(int(self._observer.at[0]), self.tick - REMEMBERED + 1) <= tick <= self.tick:
+        late = self._fused_at * self._period - captured
+        oldest = max(self._seen_at[plane], self.tick - REMEMBERED + 1)
+        if late > _UNEVEN or not oldest <= tick <= self.tick:
             return False
-        since = captured - tick * self._period
-        ticks = int(self._observer.at[0]), tick, tick, self.tick
-        _fuse(self._observer, self._known, ticks, since, theta, self._period)
+        at = max(tick, self._fused_at)
+        ticks = self._fused_at, at, self.tick
+        _fuse(self._known, self._observer, ticks, plane, captured - at * self._period, bend, self._period)
+        self._fused_at, self._seen_at[plane] = at, tick
+        self._bends[self.tick % REMEMBERED] = self._observer.now[::OF_A_PLANE]
         return True
 
     def respond(self, course: Array, tick: int = 0) -> Answer:
-        """The law's answer, at the present estimate, to a reference (T, 3) of angle, rate and acceleration at its tick.
+        """The laws' answer, at the present estimate, to a reference (T, P, 3) of bend, rate and acceleration at its
+        tick.
 
         It goes by periods; beyond its end it stays as it is there, for a law that looks ahead. Raises what a plain law
         has raised.
         """
-        models = self._known.belief.models
-        control = Controlled(self._law, self._signals, models, self._gains, self._memory, self._target)
-        seen, to_follow = np.array([*self._observer.now, self.withheld, 0.0]), (course, tick, self._preview)
-        _respond(control, self._known, self._bounds, seen, to_follow, self._period, self._found)
+        to_follow, sees = (course, tick, self._preview), Seen(self._observer.now, self.withheld, self._missed)
+        _respond(self._control, self._known, self._bounds, sees, to_follow, self._period, self._found)
         self._law.check()
-        wanted, torque, plus, minus, low, high = map(float, self._found)
-        return Answer(wanted, torque, plus / TENDONS_PER_SIDE, minus / TENDONS_PER_SIDE, not low <= wanted <= high)
+        count, planes = len(self._alike), self._planes
+        pulls, torques = self._found[:count], self._found[count:-1].copy()
+        tension = self._belief.of_axes(pulls / self._alike)
+        return Answer(torques[:planes], torques[planes:], float(self._found[-1]), tension)
 
-    def predict(self, reeled_plus: float, reeled_minus: float) -> None:
-        """Go on to the next tick, with the sides reeled in by so much [m] until then."""
-        _predict(self._observer, self._known, self.tick, np.array([reeled_plus, reeled_minus], float), self._period)
+    def predict(self, reeled: Array) -> None:
+        """Go on to the next tick, with so much (T,) [m] reeled in at each place until then."""
+        _predict(self._known, self._observer, self.tick, reeled, self._period)
         self.tick += 1
+        self._bends[self.tick % REMEMBERED] = self._observer.now[::OF_A_PLANE]
 
 
 @kernel
-def _respond(control: Any, known: Any, bounds: Any, sees: Any, to_follow: Any, period: float, result: Any) -> None:
-    knowing, row, x, bound = knowing_in_lanes(known), rows_of(result), rows_of(sees), rows_of(bounds)
-    bend, pulls = knowing.bend, lanes_like(knowing.pulls)
+def _respond(control: Any, known: Any, bounds: Any, sees: Any, to_follow: Any, period: float, found: Any) -> None:
+    knowing, row, bound = knowing_in_lanes(known), rows_of(found), rows_of(bounds)
+    bend, pulls = knowing.bend, part(row, 0, known.pulls)
     course, tick, preview = to_follow
-    for ahead in range(preview, -1, -1):  # the present last: it is what the law follows
-        control.reference[0, :] = course[min(tick + ahead, course.shape[0] - 1)]
+    for ahead in range(preview, -1, -1):  # the present last: it is what the laws follow
+        control.reference[:] = course[min(tick + ahead, course.shape[0] - 1)]
         if ahead > 0:
             look_ahead(control, bend, ahead, 0.0)
-    seen = Seen(part(x, 0, (0, 0, 0)), part(x, 3, (0,)), part(x, 4, (0,)))
-    limits, room = Limits(part(bound, 0, known.pulls), part(bound, 2, known.pulls)), room_like(bend, knowing.arms)
-    respond(control, knowing.belief, seen, limits, room, 0.0, period, pulls)
-    row[0] = room.wanted[0]
-    row[1] = room.torque[0]
-    row[2] = pulls[0]
-    row[3] = pulls[1]
-    row[4] = room.low[0]
-    row[5] = room.high[0]
+    count = len(pulls)
+    limits = Limits(part(bound, 0, known.pulls), part(bound, count, known.pulls))
+    seen = Seen(rows_of(sees.rows), rows_of(sees.withheld), rows_of(sees.missed))
+    room = room_like(bend, knowing.arms)
+    share = respond(control, knowing.belief, seen, limits, room, 0.0, period, pulls)
+    for p in range(len(bend)):
+        row[count + p] = room.wanted[p]
+        row[count + len(bend) + p] = room.torque[p]
+    row[count + 2 * len(bend)] = share
+
+
+@compiled
+def _go_over(observer: Any, knowing: Any, x: Any, ticks: Any, h: float) -> None:
+    """Advance x over the ticks from the first up to the last, by what is remembered as delivered."""
+    first, last = ticks
+    counts = lanes_like(knowing.pulls)
+    for past in range(first, last):
+        before = rows_of(observer.delivered[past % observer.delivered.shape[0]])
+        for t in range(len(counts)):
+            counts[t] = before[t]
+        propagate(knowing, x, counts, h)
 
 
 @kernel
-def _fuse(observer: Any, known: Any, ticks: Any, since: float, theta: float, h: float) -> None:
+def _fuse(known: Any, observer: Any, ticks: Any, plane: int, since: float, bend: float, h: float) -> None:
     knowing = knowing_in_lanes(known)
-    bend, zero = lanes_like(knowing.bend), zero_like(knowing.bend[0])
-    bend[0] = theta + zero
-    fuse(observer, knowing, ticks, ArrivingFrame(ticks[1] + zero, since, bend, 1.0 + zero), h)
+    before, captured, tick = ticks
+    gain, fused, now = rows_of(observer.gain), rows_of(observer.fused), rows_of(observer.now)
+    _go_over(observer, knowing, fused, (before, captured), h)
+    first = OF_A_PLANE * plane
+    innovation = bend - fused[first] - since * fused[first + 1]
+    for i in range(first, first + OF_A_PLANE):
+        fused[i] = fused[i] + gain[i] * innovation
+    for i in range(OF_A_PLANE * len(knowing.bend)):
+        now[i] = fused[i]
+    _go_over(observer, knowing, now, (captured, tick), h)
 
 
 @kernel
-def _predict(observer: Any, known: Any, tick: int, reeled: Any, h: float) -> None:
-    predict(observer, knowing_in_lanes(known), tick, part(rows_of(reeled), 0, known.pulls), h)
+def _predict(known: Any, observer: Any, tick: int, reeled: Any, h: float) -> None:
+    knowing = knowing_in_lanes(known)
+    counts, now = part(rows_of(reeled), 0, known.pulls), rows_of(observer.now)
+    sent = rows_of(observer.delivered[tick % observer.delivered.shape[0]])
+    for t in range(len(counts)):
+        sent[t] = counts[t]
+    propagate(knowing, now, counts, h)
 
 
 class HostFaults:

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Callable, Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -10,11 +10,11 @@ from wristctl.arrays import Array
 from wristctl.board.driver import Board
 from wristctl.board.messages import State, Status
 from wristctl.config.hw_run import Homing
-from wristctl.trial.bending import Bending
 from wristctl.trial.camera_pace import CameraPaces
 from wristctl.trial.resting import judge_turn
+from wristctl.trial.rig_belief import RigBelief
 from wristctl.trial.safety import SafetyStop
-from wristctl.trial.tracking import Tracking
+from wristctl.trial.tracking import Tracking, bend_of
 from wristctl.trial.watch import Watch
 from wristctl.vision.camera_pose import CameraPose
 from wristctl.vision.marker import Sighting
@@ -165,12 +165,12 @@ class InSight:
     """
 
     def __init__(
-        self, tracking: Tracking, watch: Watch, stale: float, bending: Bending, now: Callable[[], float], signs: Array
+        self, tracking: Tracking, watch: Watch, stale: float, belief: RigBelief, now: Callable[[], float], signs: Array
     ) -> None:
         self._tracking, self._watch, self._stale = tracking, watch, stale
-        self._bending, self._now, self._signs = bending, now, signs
+        self._belief, self._now, self._signs = belief, now, signs
         self._seen = self._looked = now()
-        self._bend: Any = None
+        self._bend = np.zeros(len(belief.planes))
 
     def __call__(self, status: Status) -> None:
         """Raises SafetyStop where the wrist is bent, or its tendons are pulled, beyond the limits."""
@@ -184,5 +184,5 @@ class InSight:
         for sighting in looked:
             if math.isfinite(sighting.theta):
                 self._seen = sighting.time
-                self._bend = self._bending.stands(self._tracking, sighting, self._bend)
-                self._watch.standing(self._bend, reeled, self._bending.taut(self._bend), now)
+                self._bend[sighting.plane] = bend_of(self._tracking, sighting, self._bend)
+                self._watch.standing(self._bend, reeled, self._belief.taut(self._bend)[0], now)

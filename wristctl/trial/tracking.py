@@ -94,6 +94,18 @@ class Tracking(Protocol):
         """Look no more; the camera stays open."""
 
 
+def bend_of(tracking: Tracking, sighting: Sighting, bends: Array) -> float:
+    """Bend [rad] of a sighting in its camera's plane, by what is known of the bends (P,) of all.
+
+    A bend in the other plane turns the marker in the picture; of one camera the angle is as it is.
+    """
+    theta = sighting.theta
+    for plane, other in enumerate(bends.tolist()):
+        if plane != sighting.plane:
+            theta = tracking.bend(sighting, other)
+    return theta
+
+
 class InlineTracking:
     """Looks when asked: in virtual time, where looking takes none. `now` is the clock of the camera's times."""
 

@@ -20,6 +20,7 @@ from wristctl.trial.causes_in_space import SpatialEvidence, causes_in_space
 from wristctl.trial.likely_causes import Evidence, likely_causes, reversals
 from wristctl.trial.marker_lag import MarkerLag
 from wristctl.trial.residuals import RESIDUALS, Judge, Limit, limits_of, notes, stopped_by, worst
+from wristctl.trial.rig_belief import names_of_planes
 from wristctl.trial.safety import SafetyStop
 from wristctl.trial.spools import on_plus_side, spools_of
 from wristctl.trial.tendon_pulls import TendonPulls
@@ -41,7 +42,7 @@ _FOLLOWING = "jump", "across", "load", "apart"
 
 
 class Tick(NamedTuple):
-    """What is there to be looked at at a tick; SI units. In two planes the estimate's values are (2,) each."""
+    """What is there to be looked at at a tick; SI units. The estimate's values are (P,) each."""
 
     clock: float
     late: float
@@ -82,7 +83,9 @@ class Watch:
         self._spools, self._period, self._radius = spools_of(settings.actuator), timing.period, wrist.tendon_radius
         if stiffness is not None:
             self._spools = replace(self._spools, stiffness=stiffness)
-        self._blind = BlindModel(wrist, settings.actuator, settings.safety.softest, self._period, settings.planes)
+        self._blind = BlindModel(
+            wrist, settings.actuator, settings.safety.softest, self._period, names_of_planes(settings.planes, plane)
+        )
         nearer = 2.0 * settings.markers.distance / wrist.length if settings.planes == 1 else math.nan
         doubtful = _DOUBTFUL * math.radians(settings.safety.across_deg)
         self._cameras = tuple(CameraRecord(nearer, doubtful) for _ in range(settings.planes))
@@ -109,9 +112,9 @@ class Watch:
         """What was odd in the motion, in one line."""
         return "; ".join(notes(self.most, self.limits))
 
-    def predict(self, *reeled: float) -> None:
-        """Go on to the next tick, with the sides, or in two planes the axes, reeled in by so much [m] until then."""
-        self._blind.predict(*reeled)
+    def predict(self, reeled: Array) -> None:
+        """Go on to the next tick, with so much (T,) [m] reeled in at each place until then."""
+        self._blind.predict(reeled)
 
     def sighted(self, sighting: Sighting, clock: float) -> None:
         """Take in any picture."""
@@ -164,10 +167,10 @@ class Watch:
         stretch = self._spools.step * position - taut
         return {} if self._pulls is None else self._pulls.residuals(clock, stretch)
 
-    def standing(self, theta: Any, position: Array, taut: Array, clock: float) -> None:
+    def standing(self, theta: Array, position: Array, taut: Array, clock: float) -> None:
         """Raises SafetyStop where a wrist whose motors stand is bent, or its tendons are pulled, beyond the limits.
 
-        In two planes `theta` is its bend (2,).
+        `theta` is its bend (P,).
         """
         pull = max(0.0, float(self._spools.tension(position, taut).max()))
         values = {"angle": _size(theta), "pull": pull, **self._weighed(clock, position, taut)}

@@ -101,7 +101,7 @@ def check_bends_of_trials(settings: HwRunSettings, wrist: WristParameters) -> No
     from wristctl.simulation.rollout import check_two_planes
     from wristctl.simulation.worlds import World
     from wristctl.trial.motions import motion_of
-    from wristctl.trial.spatial_belief import layout_of_axes
+    from wristctl.trial.rig_belief import layout_of_axes
     from wristctl.trial.trials import motions_of
 
     layout_of_axes(wrist)

@@ -149,7 +149,7 @@ def _draw(session: Session, done: pd.DataFrame, twins: Mapping[int, Simulation])
     from wristctl.commands.hw_run.trial_bend_figures import TrialBends, errors_of_bends, paths_of_bends
     from wristctl.trial.bend_results import logged_course, true_course
     from wristctl.trial.motions import motion_of
-    from wristctl.trial.spatial_belief import layout_of_axes
+    from wristctl.trial.rig_belief import layout_of_axes
     from wristctl.wrist.spatial.held_bends import reach_of_bends
 
     findings, study, settings = session.findings, session.study, session.study.hw_run

@@ -23,8 +23,8 @@ from wristctl.trial.calibration import WristCalibration
 from wristctl.trial.experiment import Experiment, Stop
 from wristctl.trial.log import TrialLog
 from wristctl.trial.residuals import FILE, RESIDUALS, limits_of, plain
+from wristctl.trial.rig_belief import PLANES
 from wristctl.trial.safety import SafetyStop
-from wristctl.trial.spatial_belief import PLANES
 from wristctl.trial.testbeds import open_testbed
 from wristctl.trial.trial_metrics import metrics_of_trials
 from wristctl.trial.trials import JUDGED, Trial, trials_of

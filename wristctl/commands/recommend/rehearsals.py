@@ -63,7 +63,7 @@ def check_homing(study: Study, planes: int) -> None:
     Only where the recommendation is for `hw-run`. Springs may have weakened to 0.7 of what is believed.
     """
     from wristctl.trial.resting import judge_weight, sag_of
-    from wristctl.trial.spatial_belief import PLANES
+    from wristctl.trial.rig_belief import PLANES
 
     if trial_of(study) != "hw-run":
         return
