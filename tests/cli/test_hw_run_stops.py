@@ -89,7 +89,7 @@ HwRun = Callable[..., Ended]
 def at_zero(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A calibrate-wrist run that holds for the bench at power-on without slack."""
     nonce = Board(VirtualBench(Study().hw_run.bench, Study().wrist, 0).transport).connect().boot_nonce
-    known = WristCalibration(Zero((1, 1, 1, 1), (960.0,) * 4, 0.0, (0.0,) * 4), "ulnar", nonce, (0, 0, 0, 0))
+    known = WristCalibration(Zero((1, 1, 1, 1), (960.0,) * 4, (0.0,), (0.0,) * 4), "ulnar", nonce, (0, 0, 0, 0))
     with start_run("calibrate-wrist", Study(), out=tmp_path_factory.mktemp("calibrated")) as run:
         run.file(FILE).write_text(json.dumps(known.plain()))
     return run.path

@@ -146,7 +146,7 @@ def test_an_earlier_run_is_taken_into_a_plan(
 def test_an_earlier_calibration_is_read(earlier: Path) -> None:
     wrist, camera = (open_run(f"latest:calibrate-{what}", earlier) for what in ("wrist", "camera"))
     zero = WristCalibration.load(wrist).zero
-    assert zero.marker == wrist.metrics["marker"]["value"]
+    assert zero.markers[0] == wrist.metrics["marker"]["value"]
     assert zero.steps_per_radian[1] == wrist.metrics["steps_per_radian_2"]["value"]
     corners, view = camera.data("corners"), View.of(camera)
     assert view.size is not None

@@ -65,7 +65,7 @@ def at_zero() -> WristCalibration:
     """A calibration that holds for the bench at power-on without slack."""
     bench = VirtualBench(settings_of().bench, WRIST, 0)
     nonce = Board(bench.transport).connect().boot_nonce
-    zero = Zero((1, 1, 1, 1), (960.0,) * 4, 0.0, (0.0,) * 4)
+    zero = Zero((1, 1, 1, 1), (960.0,) * 4, (0.0,), (0.0,) * 4)
     return WristCalibration(zero, "ulnar", nonce, (0, 0, 0, 0))
 
 

@@ -61,7 +61,7 @@ def over(below: Mapping[str, Any], above: Mapping[str, Any]) -> dict[str, Any]:
 def _at_zero() -> WristCalibration:
     settings = HwRunSettings.model_validate(_FULL)
     nonce = Board(VirtualBench(settings.bench, WRIST, 0).transport).connect().boot_nonce
-    return WristCalibration(Zero((1, 1, 1, 1), (1930.0,) * 4, 0.0, (0.0,) * 4), "ulnar", nonce, (0, 0, 0, 0))
+    return WristCalibration(Zero((1, 1, 1, 1), (1930.0,) * 4, (0.0,), (0.0,) * 4), "ulnar", nonce, (0, 0, 0, 0))
 
 
 def as_limited(settings: HwRunSettings, wrist: WristParameters = WRIST) -> HwRunSettings:

@@ -13,7 +13,7 @@ from wristctl.board.driver import Board
 from wristctl.config.hw_run import HwRunSettings
 from wristctl.trial.calibration import WristCalibration
 from wristctl.trial.experiment import Experiment
-from wristctl.trial.homing import SpatialZero, Zero
+from wristctl.trial.homing import Zero
 from wristctl.trial.log import TrialLog
 from wristctl.trial.testbeds import EmulatedTestbed
 from wristctl.trial.trials import trials_of
@@ -44,7 +44,7 @@ def bench_of(settings: HwRunSettings, seed: int = 0) -> VirtualBench:
     return VirtualBench(settings.bench, WRIST, seed, settings.markers, settings.markers_2)
 
 
-AT_ZERO = SpatialZero((1, 1, 1, 1), (1380.0,) * 4, 0.0, (0.0,) * 4)
+AT_ZERO = Zero((1, 1, 1, 1), (1380.0,) * 4, (0.0, 0.0), (0.0,) * 4)
 
 
 def performed(folder: Path, seed: int = 0, zero: Zero = AT_ZERO, **changes: Any) -> Done:

@@ -14,10 +14,10 @@ from tests.trial.rig import RigBoard
 from wristctl.board.board_errors import BoardError
 from wristctl.errors import UserError
 from wristctl.trial.calibration import WristCalibration
-from wristctl.trial.homing import SpatialZero, Zero
+from wristctl.trial.homing import Zero
 
 KNOWN = WristCalibration(
-    Zero((1, -1, 1, 1), (900.0, 910.0, 920.0, 930.0), 0.07, (1e-4, 2e-4, 3e-4, 4e-4)), "flexion", 7, (1, 2, 3, 4)
+    Zero((1, -1, 1, 1), (900.0, 910.0, 920.0, 930.0), (0.07,), (1e-4, 2e-4, 3e-4, 4e-4)), "flexion", 7, (1, 2, 3, 4)
 )
 
 
@@ -32,7 +32,7 @@ def test_it_reads_back_as_it_was_kept(tmp_path: Path) -> None:
 
 
 def test_one_of_two_planes_keeps_both_cameras_and_every_direction(tmp_path: Path) -> None:
-    zero = SpatialZero((1, 1, 1, -1), (900.0,) * 4, 0.07, (1e-4,) * 4, (1e-5,) * 4, -0.02, (-2.3, 2.3, -0.8, 0.8))
+    zero = Zero((1, 1, 1, -1), (900.0,) * 4, (0.07, -0.02), (1e-4,) * 4, (1e-5,) * 4, (-2.3, 2.3, -0.8, 0.8))
     both = dataclasses.replace(KNOWN, zero=zero)
     read = WristCalibration.load(run_with(tmp_path, json.loads(json.dumps(both.plain()))))
     assert read == both and read.zero.markers == (0.07, -0.02)

@@ -13,7 +13,7 @@ from tests.trial.in_two_planes import bench_of, circling
 from wristctl.board.driver import Board
 from wristctl.config.wrist import WristParameters
 from wristctl.trial.expected_moves import Bend
-from wristctl.trial.homing import SpatialZero, find_zero
+from wristctl.trial.homing import Zero, find_zero
 from wristctl.trial.motors_ready import prepare
 from wristctl.trial.rig_belief import pull_directions
 from wristctl.trial.safety import SafetyStop
@@ -27,7 +27,7 @@ QUICK = {"move": 1e-4, "rest": 0.15, "frames": 5, "slack": 8e-4, "let_go": 1.0}
 SLACK = (3e-4, 2e-4, 4e-4, 2.5e-4)
 
 
-def homed(seed: int = 0, **motors: Any) -> SpatialZero:
+def homed(seed: int = 0, **motors: Any) -> Zero:
     settings = circling(homing=QUICK, bench={"motors": {"slack": SLACK, **motors}})
     bench = bench_of(settings, seed)
     tracking = EmulatedTestbed(bench, settings, [View(), View()], None).tracking()
@@ -37,9 +37,7 @@ def homed(seed: int = 0, **motors: Any) -> SpatialZero:
     patience.stand_square(tracking, settings.homing)
     tracking.zero = patience.markers(tracking, 10)
     prepare(board, settings)
-    zero = find_zero(board, tracking, settings, WRIST, "")
-    assert isinstance(zero, SpatialZero)
-    return zero
+    return find_zero(board, tracking, settings, WRIST, "")
 
 
 @pytest.mark.slow

@@ -65,14 +65,14 @@ def test_taut_points_steps_per_radian_senses_and_the_glued_on_angle_are_found(
     assert zero.signs == signs
     assert zero.slack == pytest.approx(SLACK * SPOOLS.step, abs=1e-9)
     assert zero.steps_per_radian == pytest.approx(PER_RADIAN, rel=1e-9)
-    assert zero.marker == pytest.approx(GLUED)
+    assert zero.markers[0] == pytest.approx(GLUED)
     assert zero.friction == pytest.approx([0.0] * 4, abs=1e-9)
     assert zero.plain() == {
-        "signs": zero.signs, "steps_per_radian": zero.steps_per_radian, "marker": zero.marker, "slack": zero.slack,
+        "signs": zero.signs, "steps_per_radian": zero.steps_per_radian, "marker": zero.markers[0], "slack": zero.slack,
         "friction": zero.friction,
     }  # fmt: skip
     with pytest.raises(FrozenInstanceError):
-        zero.marker = 0.0  # type: ignore[misc]
+        zero.markers = ()  # type: ignore[misc]
     assert wrist.board.told[-1] == ("home", (0, 0, 0, 0))
     assert wrist.board.position == pytest.approx(START + signs * SLACK), "every tendon just taut is zero"
 
@@ -204,7 +204,7 @@ def test_a_tendon_that_is_still_taut_where_all_are_slackened_is_found(short: int
 
     tracking: Any = Marker(board, angle)
     settings = settings_of(homing={"frames": 1, "rest": 0.0})
-    zero = Zero(signs, tuple(PER_RADIAN), GLUED, (0.0,) * 4)
+    zero = Zero(signs, tuple(PER_RADIAN), (GLUED,), (0.0,) * 4)
     slacken(board, SPOOLS, settings.homing, signs)
     if not refused:
         check_zero(board, tracking, settings, WRIST, "ulnar", zero)
@@ -234,7 +234,7 @@ def test_tendons_that_pull_against_each_other_bend_a_wrist_whose_one_side_is_let
 
     tracking: Any = Marker(board, angle)
     settings = settings_of(homing={"frames": 1, "rest": 0.0})
-    zero = Zero(signs, tuple(PER_RADIAN), GLUED, (0.0,) * 4)
+    zero = Zero(signs, tuple(PER_RADIAN), (GLUED,), (0.0,) * 4)
     assert angle() == pytest.approx(GLUED)
     if refused:
         with pytest.raises(SafetyStop, match="tendons pull against each other") as stopped:
@@ -289,7 +289,7 @@ def test_a_wrist_that_stays_bent_by_its_own_friction_is_homed(
     wrist = StaysBent(signs, plane, stays=math.radians(stays), bend=math.radians(first * stays))
     zero = wrist.homed(slack=5e-3)
     assert zero.signs == signs
-    askew = zero.marker - GLUED
+    askew = zero.markers[0] - GLUED
     assert abs(askew) <= math.radians(stays) + 1e-9
     assert zero.slack == pytest.approx((wrist.slack + wrist.sides * askew / wrist.gain) * SPOOLS.step, abs=SPOOLS.step)
     assert zero.steps_per_radian == pytest.approx(PER_RADIAN, rel=0.02)
@@ -318,7 +318,7 @@ def test_a_wrist_that_stays_bent_passes_its_checks_and_a_dead_motor_does_not(
 
     slack = round(Homing().pull / SPOOLS.step)
     board.position[:] = -slack
-    zero = Zero((1,) * 4, tuple(PER_RADIAN), GLUED, (0.0,) * 4)
+    zero = Zero((1,) * 4, tuple(PER_RADIAN), (GLUED,), (0.0,) * 4)
     straight = check_zero(board, Marker(board, angle), rig, WRIST, plane, zero)  # type: ignore[arg-type]
     assert straight == pytest.approx((GLUED,), abs=math.radians(0.05))
     furthest = min(min(where) for _, where, _ in board.told)

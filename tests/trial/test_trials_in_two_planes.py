@@ -180,7 +180,7 @@ def test_a_diagonal_direction_bends_alike_in_both_planes(tmp_path: Path) -> None
 
 
 def test_stored_positions_of_a_rig_with_one_camera_are_refused(tmp_path: Path) -> None:
-    done = performed(tmp_path, zero=Zero((1, 1, 1, 1), (1380.0,) * 4, 0.0, (0.0,) * 4))
+    done = performed(tmp_path, zero=Zero((1, 1, 1, 1), (1380.0,) * 4, (0.0,), (0.0,) * 4))
     assert isinstance(done.error, UserError) and done.error.what == "the calibration knows 1 cameras of 2"
     assert not any(done.bench.motion().steps)
 

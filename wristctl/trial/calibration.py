@@ -10,7 +10,7 @@ from wristctl.config.wrist import WristParameters
 from wristctl.errors import UserError
 from wristctl.plain_files import read_json
 from wristctl.records import Run
-from wristctl.trial.homing import SpatialZero, Zero, find_zero, slacken
+from wristctl.trial.homing import Zero, find_zero, slacken
 from wristctl.trial.motors_ready import in_sight, prepare
 from wristctl.trial.spools import spools_of
 from wristctl.trial.supervised_wait import Patience
@@ -42,12 +42,7 @@ class WristCalibration:
             table = read_json(file)
             if table["schema"] != SCHEMA:
                 raise ValueError(table["schema"])
-            signs, slopes, slack = (tuple(table[name]) for name in ("signs", "steps_per_radian", "slack"))
-            found = signs, slopes, float(table["marker"]), slack, tuple(table.get("friction", (0.0,) * len(signs)))
-            zero = Zero(*found)
-            if "marker_2" in table:
-                zero = SpatialZero(*found, float(table["marker_2"]), tuple(table["directions"]))
-            return cls(zero, table["plane"], table["boot_nonce"], tuple(table["position"]))
+            return cls(Zero.of_plain(table), table["plane"], table["boot_nonce"], tuple(table["position"]))
         except (OSError, ValueError, KeyError, TypeError) as error:
             raise UserError("not a wrist calibration", str(file), "wristctl hw calibrate wrist") from error
 

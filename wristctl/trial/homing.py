@@ -15,7 +15,7 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 
@@ -51,36 +51,35 @@ class Zero:
     """1 where positive steps reel in, -1 where they pay out."""
     steps_per_radian: tuple[float, ...]
     """Reeled in for one radian of bend, near the straight wrist."""
-    marker: float
-    """Angle between the markers on the straight wrist [rad]."""
+    markers: tuple[float, ...]
+    """Angle between the markers on the straight wrist, as each camera sees it [rad]."""
     slack: tuple[float, ...]
     """Reeled in until the tendon was taut on the straight wrist [m]."""
     friction: tuple[float, ...] = (0.0,) * AXES
     """Path between reeling in and letting go for the same bend [m]."""
-
-    @property
-    def markers(self) -> tuple[float, ...]:
-        """The marker's angle by camera [rad]."""
-        return (self.marker,)
+    directions: tuple[float, ...] = ()
+    """Direction in which each tendon bends the wrist, from ulnar toward flexion [rad]; of one camera none."""
 
     def plain(self) -> dict[str, Any]:
-        """For JSON."""
-        return {name: getattr(self, name) for name in self.__dataclass_fields__}
+        """For JSON; the angle before a second camera is `marker_2`."""
+        first, *others = self.markers
+        known = {
+            "signs": self.signs,
+            "steps_per_radian": self.steps_per_radian,
+            "marker": first,
+            "slack": self.slack,
+            "friction": self.friction,
+        }
+        further = {f"marker_{camera}": angle for camera, angle in enumerate(others, 2)}
+        return known | further | ({"directions": self.directions} if others else {})
 
-
-@dataclass(frozen=True)
-class SpatialZero(Zero):
-    """Result of homing in two planes; `marker` is that before the first camera."""
-
-    marker_2: float = 0.0
-    """Angle between the markers of the second camera on the straight wrist [rad]."""
-    directions: tuple[float, ...] = ()
-    """Direction in which each tendon bends the wrist, from ulnar toward flexion [rad]."""
-
-    @property
-    def markers(self) -> tuple[float, ...]:
-        """The markers' angles by camera [rad]."""
-        return self.marker, self.marker_2
+    @classmethod
+    def of_plain(cls, table: dict[str, Any]) -> Self:
+        """Read what `plain` has given. Raises KeyError, TypeError and ValueError."""
+        signs, slopes, slack = (tuple(table[name]) for name in ("signs", "steps_per_radian", "slack"))
+        markers = tuple(float(table[name]) for name in ("marker", "marker_2") if name == "marker" or name in table)
+        friction, directions = tuple(table.get("friction", (0.0,) * len(signs))), tuple(table.get("directions", ()))
+        return cls(signs, slopes, markers, slack, friction, directions)
 
 
 class _Line(NamedTuple):
@@ -293,8 +292,7 @@ def find_zero(
     senses = finder.settle(taut)
     for tendon, sense, length, slope in zip(ACTIVE, senses, slack, slopes, strict=True):
         log.info("tendon %d: sense %+d, slack %.2f mm, %.0f steps per rad", tendon, sense, 1e3 * length, slope)
-    first, second = finder.began[0] + straight.theta, finder.began[1] + straight.away
-    if settings.planes == 1:
-        return Zero(senses, slopes, first, slack, sticking)
-    seen = first + tracking.zero[0], second + tracking.zero[1]
-    return SpatialZero(senses, slopes, seen[0], slack, sticking, seen[1], tuple(finder.directions))
+    seen = zip(tracking.zero, finder.began, straight, strict=False)
+    markers = tuple(began + bent + taken_off for taken_off, began, bent in seen)
+    directions = tuple(direction for direction in finder.directions if math.isfinite(direction))
+    return Zero(senses, slopes, markers, slack, sticking, directions)

@@ -79,7 +79,7 @@ def calibrate_wrist(session: Session) -> WristCalibrated | AxisFound:
     import numpy as np
 
     from wristctl.trial.calibration import calibrated
-    from wristctl.trial.homing import SpatialZero, moves_of
+    from wristctl.trial.homing import moves_of
     from wristctl.trial.testbeds import open_testbed
     from wristctl.vision.view import View
     from wristctl.wrist.directions import ACTIVE
@@ -98,7 +98,9 @@ def calibrate_wrist(session: Session) -> WristCalibrated | AxisFound:
             calibration = calibrated(testbed, settings, study.wrist)
     findings.plain(CALIBRATION.file, calibration.plain())
     zero = calibration.zero
-    findings.metric("marker", zero.marker, "rad", meaning="angle between the markers on the straight wrist")
+    meanings = "angle between the markers on the straight wrist", "the same before the second camera"
+    for name, angle, meaning in zip(("marker", "marker_2"), zero.markers, meanings, strict=False):
+        findings.metric(name, angle, "rad", meaning=meaning)
     by_model = moves_of(settings, study.wrist, settings.plane).steps()
     rows = []
     for axis, tendon in enumerate(ACTIVE):
@@ -106,10 +108,9 @@ def calibrate_wrist(session: Session) -> WristCalibrated | AxisFound:
         findings.metric(f"steps_per_radian_{tendon}", slope, "1/rad", meaning=near)
         findings.metric(f"slack_{tendon}", slack, "m", meaning=f"tendon {tendon}, when homing began")
         rows.append((axis, tendon, f"{zero.signs[axis]:+d}", slope, by_model, 1e3 * slack, 1e3 * zero.friction[axis]))
-    findings.summary(f"Marker angle of the straight wrist: {np.degrees(zero.marker):.3f} deg")
+    findings.summary(f"Marker angle of the straight wrist: {np.degrees(zero.markers[0]):.3f} deg")
     tables = [Table("Zero", _COLUMNS, rows)]
-    if isinstance(zero, SpatialZero):
-        findings.metric("marker_2", zero.marker_2, "rad", meaning="the same before the second camera")
+    if zero.directions:
         for tendon, toward in zip(ACTIVE, zero.directions, strict=True):
             findings.metric(f"direction_{tendon}", toward, "rad", meaning=f"tendon {tendon}, from ulnar toward flexion")
         cells = [(tendon, float(np.degrees(y))) for tendon, y in zip(ACTIVE, zero.directions, strict=True)]
