@@ -12,12 +12,11 @@ from tests.trial.conftest import WRIST
 from tests.trial.in_two_planes import bench_of, circling
 from wristctl.board.driver import Board
 from wristctl.config.wrist import WristParameters
-from wristctl.trial.expected_moves import Bend
+from wristctl.trial.expected_moves import Bend, ExpectedMoves
 from wristctl.trial.homing import Zero, find_zero
 from wristctl.trial.motors_ready import prepare
 from wristctl.trial.rig_belief import pull_directions
 from wristctl.trial.safety import SafetyStop
-from wristctl.trial.spatial_moves import SpatialMoves
 from wristctl.trial.supervised_wait import Patience
 from wristctl.trial.testbeds import EmulatedTestbed
 from wristctl.vision.view import View
@@ -48,7 +47,7 @@ def test_every_tendon_is_found_where_it_is_within_a_degree_and_a_half() -> None:
     assert np.degrees(np.abs(off)).max() < 1.5
     assert zero.signs == (1, -1, 1, 1)
     assert zero.slack == pytest.approx(SLACK, abs=5e-5)
-    assert zero.steps_per_radian == pytest.approx([SpatialMoves(circling(), WRIST).steps()] * 4, rel=0.1)
+    assert zero.steps_per_radian == pytest.approx([ExpectedMoves(circling(), WRIST, "").steps()] * 4, rel=0.1)
     assert len(zero.markers) == 2 and max(map(abs, zero.markers)) < math.radians(1.0)
 
 
@@ -62,7 +61,7 @@ def test_exchanged_motors_are_named_by_direction_alone() -> None:
     assert "likely motors of axes 0 and 1 exchanged, or tendons 1 and 2" in said
 
 
-MOVES = SpatialMoves(circling(), WRIST)
+MOVES = ExpectedMoves(circling(), WRIST, "")
 
 
 def bend(degrees: float, size: float = 0.02) -> Bend:
@@ -90,8 +89,8 @@ def test_a_bend_is_an_axis_own_within_the_stated_angle_and_another_tendons_beyon
 
 def test_oblique_springs_turn_where_a_tendon_bends_the_wrist() -> None:
     """One that is twice as stiff across 30 deg pulls the wrist further toward 30 deg than it lies."""
-    oblique = SpatialMoves(circling(), WristParameters(stiffness_axis_deg=30.0, flexion_ratio=2.0))
-    toward = [math.degrees(math.atan2(y, x)) for x, y in oblique._toward]
+    oblique = ExpectedMoves(circling(), WristParameters(stiffness_axis_deg=30.0, flexion_ratio=2.0), "")
+    toward = [math.degrees(oblique.place(axis)) for axis in range(4)]
     assert 31.0 < toward[3] < 40.0 and toward[0] == pytest.approx(toward[3] - 180.0, abs=1e-6)
     assert toward[1] > 150.0 and toward[2] == pytest.approx(toward[1] - 180.0, abs=1e-6)
 

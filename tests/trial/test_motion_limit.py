@@ -11,7 +11,7 @@ import pytest
 import wristctl
 from tests.trial.conftest import WRIST, Run, settings_of
 from wristctl.config.study import Study
-from wristctl.trial.homing import moves_of
+from wristctl.trial.expected_moves import ExpectedMoves
 from wristctl.trial.motion_limit import LEAST, limited, peak_tension
 from wristctl.trial.trials import Trial, trials_of, twin
 
@@ -90,7 +90,7 @@ def test_steps_per_radian_tell_tendons_that_are_softer_than_believed_and_never_s
 ) -> None:
     """But for 1.5 % of a rigid tendon's path; tendons that are stiffer stay as believed."""
     settings = settings_of(planes=planes, actuator={"level": "tendon", "tendon_stiffness": believed})
-    moves = moves_of(settings, WRIST, "ulnar" if planes == 1 else "")
+    moves = ExpectedMoves(settings, WRIST, "ulnar" if planes == 1 else "")
     for true in (5e3, 6e3, 9e3, 15e3, believed, 80e3):
         told = moves.tendon_stiffness([moves.steps(true)] * 4)
         assert min(true, believed) <= told <= believed

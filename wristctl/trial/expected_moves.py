@@ -6,13 +6,17 @@ from typing import NamedTuple
 
 import numpy as np
 
+from wristctl.arrays import Array
+from wristctl.board.messages import AXES
 from wristctl.config.hw_run import RigSettings
 from wristctl.config.wrist import WristParameters
+from wristctl.trial.rig_belief import PLANES, pull_directions
 from wristctl.trial.safety import SafetyStop
 from wristctl.trial.spools import on_plus_side, spools_of
 from wristctl.trial.supervised_wait import Reading
-from wristctl.wrist.directions import ACTIVE, DIRECTIONS, away_of, in_plane
+from wristctl.wrist.directions import ACTIVE, OPPOSITE_AXES, away_of, in_plane
 from wristctl.wrist.out_of_plane import across_of
+from wristctl.wrist.spatial.spatial_segments import ellipse
 
 # Springs that are stiffer than believed and friction may ask for so many times the pull that the model says, and with
 # friction of the wrist's own; twice the steps stay wrong.
@@ -25,7 +29,11 @@ LEAST, MOST = 0.6, 1.35
 _RUBS = 0.5
 # Share of the least bend that a wrist without a taut tendon may move by: noise, and springs that creep.
 SLACK = 0.7
-_SCREWED = "check which tendon is on which motor, and markers.positive"
+_SCREWED = (
+    "check which tendon is on which motor, and markers.positive",
+    "check which tendon is on which motor, markers.positive of both cameras, and which camera sees which plane",
+)
+"""What to do about tendons that bend the wrist elsewhere, before one camera and before two."""
 
 
 class Bend(NamedTuple):
@@ -52,29 +60,71 @@ def middle(bends: Sequence[Bend]) -> Bend:
     return Bend(*np.mean(bends, axis=0).tolist())
 
 
-class ExpectedMoves:
-    """By the believed wrist: the side of each axis in the plane and across it, and steps for one radian.
+class _Alone(NamedTuple):
+    """One tendon alone, of each axis: where it bends the wrist, and what its spool reels in for a radian.
 
-    A tendon that is alone bends the wrist toward itself, which is askew: by theta in the plane and, with springs that
-    are alike, by as much across. So it shortens by c theta + c away, and stretches by K theta/(c k_t).
+    The spool reels in path + torque/(lever k_t), of a tendon of the stiffness k_t.
+    """
+
+    toward: Array
+    """(4, 2), as a Bend has it: a unit vector, or before one camera 1 and -1 for the sides in the plane and across."""
+    path: Array
+    """(4,) [m/rad]"""
+    torque: Array
+    """(4,)"""
+    lever: Array
+    """(4,)"""
+
+
+def _before_one_camera(wrist: WristParameters, plane: str, away: Sequence[int], torque: float, ratio: float) -> _Alone:
+    """It bends the wrist askew: by theta in the plane and, with springs that are alike, by as much across.
+
+    So it shortens by c theta + c away, and stretches by K theta/(c k_t), for one radian in the plane.
+    """
+    sides, c = np.where(on_plus_side(plane), 1.0, -1.0), wrist.tendon_offset
+    toward = np.stack([sides, np.array(away, float)], axis=1)
+    return _Alone(toward, np.full(AXES, c * (1.0 + ratio)), np.full(AXES, torque), np.full(AXES, c))
+
+
+def _before_two(wrist: WristParameters) -> _Alone:
+    """It bends the wrist by K^-1 c T for a pull T at its place c, which takes c.K^-1 c T off its path."""
+    along, across = wrist.stiffness, wrist.stiffness * wrist.flexion_ratio
+    yy, yz, zz = ellipse(along, across, math.radians(wrist.stiffness_axis_deg))
+    sinking = [across_of(in_plane(wrist, plane), (0,) * AXES).stiffness for plane in PLANES]
+    springs = np.array([[yy, yz], [yz, zz]])
+    springs[np.diag_indices(2)] += np.array(sinking) - [in_plane(wrist, plane).stiffness for plane in PLANES]
+    places = wrist.tendon_radius * np.stack([np.cos(pull_directions()), np.sin(pull_directions())], axis=1)
+    bends = np.linalg.solve(springs, places.T).T
+    sizes = np.hypot(*bends.T)
+    toward = bends / sizes[:, None]
+    return _Alone(toward, (places * toward).sum(axis=1), np.ones(AXES), sizes)
+
+
+class ExpectedMoves:
+    """By the believed wrist: where each axis bends it, alone, and the steps for one radian of what counts.
+
+    Before one camera a bend counts in its plane, and of the bend across the side alone is told; before two both count,
+    and its direction tells the tendon.
     """
 
     def __init__(self, settings: RigSettings, wrist: WristParameters, plane: str) -> None:
-        self._homing, self._spools = settings.homing, spools_of(settings.actuator)
+        self._homing, self._spools, self._planes = settings.homing, spools_of(settings.actuator), settings.planes
         self._softest = min(settings.safety.softest, self._spools.stiffness)
-        self._plus, self._away = on_plus_side(plane), away_of(plane, settings.markers.positive)
+        self._astray = math.radians(settings.homing.direction_deg)
         self._scale = 2.0 * settings.markers.distance / wrist.length
-        beside_plane = next(direction.name for direction in DIRECTIONS.values() if direction.plane != plane)
-        across = across_of(in_plane(wrist, plane), self._away).stiffness
-        beside = across_of(in_plane(wrist, beside_plane), self._away).stiffness
-        self._ratio = across / beside if across > 0.0 and beside > 0.0 else 1.0
+        facing = plane or PLANES[0]
+        away = away_of(facing, settings.markers.positive)
+        other = next(name for name in PLANES if name != facing)
+        across, beside = (across_of(in_plane(wrist, name), away).stiffness for name in (facing, other))
+        ratio = across / beside if across > 0.0 and beside > 0.0 else 1.0
         self._offset, self._stiffness = wrist.tendon_offset, max(0.0, across)
+        one = self._planes == 1
+        self._alone = _before_one_camera(wrist, plane, away, self._stiffness, ratio) if one else _before_two(wrist)
 
     def steps(self, stiffness: float | None = None, harder: float = 1.0) -> float:
-        """Reeled in for one radian in the plane, by tendons as believed or of this stiffness; of any axis the same."""
-        k = self._spools.stiffness if stiffness is None else stiffness
-        path = self._offset * (1.0 + self._ratio) + harder * self._stiffness / (self._offset * k)
-        return path / self._spools.step
+        """Reeled in for one radian of what counts, by tendons as believed or of this stiffness; mean of all axes."""
+        k, (_, path, torque, lever) = self._spools.stiffness if stiffness is None else stiffness, self._alone
+        return math.fsum(path + harder * torque / (lever * k)) / AXES / self._spools.step
 
     def tendon_stiffness(self, steps: Sequence[float]) -> float:
         """Stiffness of the tendons [N/m] by steps per radian (4,) that homing took: as believed, or less.
@@ -89,46 +139,72 @@ class ExpectedMoves:
 
     def bend(self, straight: Reading, reading: Reading) -> Bend:
         """Bend of the wrist against a reading of the straight wrist."""
-        return Bend(reading.theta - straight.theta, -self._scale * math.log(reading.size / straight.size))
+        theta = reading.theta - straight.theta
+        if self._planes == 1:
+            return Bend(theta, -self._scale * math.log(reading.size / straight.size))
+        return Bend(theta, reading.beside - straight.beside)
 
     def along(self, axis: int, bend: Bend) -> float:
-        """What of a bend counts as that by an axis [rad]."""
-        return bend.theta
-
-    def toward(self, axis: int, bend: Bend) -> float:
-        """How far a bend goes toward the tendon of an axis [rad]."""
-        return bend.theta if self._plus[axis] else -bend.theta
+        """How far what counts of a bend goes toward the tendon of an axis [rad]."""
+        return float(self._alone.toward[axis, : self._planes] @ bend[: self._planes])
 
     def size(self, bend: Bend) -> float:
         """Size of what counts of a bend, whichever axis has made it [rad]."""
-        return abs(bend.theta)
+        return math.hypot(*bend[: self._planes])
 
-    def _axis_of(self, plus: bool, away: int) -> int:
-        """The axis that pulls to this side of the plane, and away from the camera (1) or toward it (-1)."""
-        return next(k for k in range(4) if (bool(self._plus[k]), self._away[k]) == (plus, away))
+    def place(self, axis: int) -> float:
+        """Direction [rad] in which an axis bends the wrist, from the first part of a bend toward the second."""
+        toward, aside = self._alone.toward[axis]
+        return math.atan2(aside, toward)
+
+    def _nearest(self, bend: Bend) -> tuple[int, int]:
+        """The axis toward which a bend is, and the one away from which it is."""
+        shares = self._alone.toward @ np.nan_to_num(bend)
+        return int(np.argmax(shares)), int(np.argmin(shares))
+
+    def _told(self, axis: int, bend: Bend) -> tuple[int | None, str]:
+        """The axis as whose a bend by this one is seen, None for no axis; and in words where that bends the wrist.
+
+        One camera tells sides, of parts of a bend that are no noise; two tell a direction.
+        """
+        own, meant = self._alone.toward[axis], f"tendon {ACTIVE[axis]}"
+        if self._planes == 1:
+            noise = 0.5 * math.radians(self._homing.bend_deg)
+            sides = np.where(np.abs(np.nan_to_num(bend)) < noise, own, np.sign(bend))
+            where = "to the other side than" if sides[0] != own[0] else "across its plane otherwise than"
+            return self._nearest(Bend(*sides.tolist()))[0], f"{where} {meant} should"
+        off = np.arccos(np.clip(self._alone.toward @ bend / bend.askew, -1.0, 1.0))
+        toward, place = (math.degrees(angle) % 360.0 for angle in (math.atan2(bend.away, bend.theta), self.place(axis)))
+        nearest = axis if off[axis] <= self._astray else int(np.argmin(off))
+        told = nearest if off[nearest] <= self._astray else None
+        return told, f"toward {toward:.0f} deg, and {meant} is at {place:.0f} deg"
 
     def judge_side(self, axis: int, bend: Bend) -> None:
-        """Raises SafetyStop where a bend by reeling in is another tendon's. One of noise tells nothing."""
-        noise = 0.5 * math.radians(self._homing.bend_deg)
-        plus = bool(self._plus[axis]) if abs(bend.theta) < noise else bend.theta > 0.0
-        away = self._away[axis] if not abs(bend.away) > noise else (1 if bend.away > 0.0 else -1)
-        if (plus, away) == (bool(self._plus[axis]), self._away[axis]):
+        """Raises SafetyStop where a bend by reeling in is another tendon's, or before two cameras no tendon's."""
+        like, where = self._told(axis, bend)
+        if like == axis:
             return
-        like = self._axis_of(plus, away)
-        where = "to the other side than" if plus != self._plus[axis] else "across its plane otherwise than"
-        problem = f"axis {axis} bends the wrist {where} tendon {ACTIVE[axis]} should: as tendon {ACTIVE[like]} would"
-        likely = f"motors of axes {axis} and {like} exchanged, or tendons {ACTIVE[axis]} and {ACTIVE[like]}"
-        if plus != self._plus[axis] and away != self._away[axis]:
-            likely = f"it turns the wrong way while others are taut, or {likely}"
-        raise SafetyStop(f"{problem}; likely {likely}", "homing", _SCREWED)
+        problem = f"axis {axis} bends the wrist {where}"
+        likely = "tendons that run through other holes, or cameras that do not look square at their planes"
+        if like is not None:
+            problem = f"{problem}: as tendon {ACTIVE[like]} would"
+            likely = f"motors of axes {axis} and {like} exchanged, or tendons {ACTIVE[axis]} and {ACTIVE[like]}"
+            if {axis, like} in map(set, OPPOSITE_AXES):
+                likely = f"it turns the wrong way while others are taut, or {likely}"
+        raise SafetyStop(f"{problem}; likely {likely}", "homing", _SCREWED[self._planes - 1])
 
     def judge_line(self, axis: int, moved: Bend, reeled: Sequence[int], bends: Sequence[Bend]) -> float:
-        """Direction [rad] in which bends grow with what an axis has reeled in, nan in one plane.
+        """Direction [rad] in which bends grow with what an axis has reeled in, nan before one camera.
 
         Raises SafetyStop where it is another tendon's; `moved` is the last bend against where the wrist rested before.
         """
-        self.judge_side(axis, moved)
-        return math.nan
+        if self._planes == 1:
+            self.judge_side(axis, moved)
+            return math.nan
+        slope, offset = np.polyfit(reeled, [self.along(axis, bent) for bent in bends], 1)
+        grown = Bend(*((slope * np.array(reeled) + offset) @ np.array(bends)).tolist())
+        self.judge_side(axis, grown)
+        return math.atan2(grown.away, grown.theta)
 
     def _stretch(self, stays: float) -> float:
         """By how much friction that holds a wrist bent by `stays` [rad] stretches the softest tendon [m]."""
@@ -184,12 +260,10 @@ class ExpectedMoves:
 
     def judge_slackened(self, bend: Bend) -> None:
         """Raises SafetyStop where a wrist that nothing should hold moves when its tendons are let out further."""
-        if bend.askew <= SLACK * math.radians(self._homing.bend_deg):
-            return
-        away = 1 if bend.away > 0.0 else -1
-        raise self.still_moved(bend, self._axis_of(bend.theta > 0.0, away), self._axis_of(bend.theta < 0.0, -away))
+        if bend.askew > SLACK * math.radians(self._homing.bend_deg):
+            raise self._still_moved(bend, *self._nearest(bend))
 
-    def still_moved(self, bend: Bend, pulls: int, holds: int) -> SafetyStop:
+    def _still_moved(self, bend: Bend, pulls: int, holds: int) -> SafetyStop:
         """The stop of a wrist that moved toward the tendon of one axis, away from another's."""
         problem = f"a slackened wrist still moved by {math.degrees(bend.askew):.1f} deg when it was slackened further"
         likely = (
@@ -201,11 +275,10 @@ class ExpectedMoves:
 
     def judge_cocontraction(self, bend: Bend) -> None:
         """Raises SafetyStop where a slackened wrist bends when one side's tendons are let out further."""
-        if bend.askew <= SLACK * math.radians(self._homing.bend_deg):
-            return
-        raise self.against_each_other(bend, self._axis_of(bend.theta > 0.0, 1 if bend.away > 0.0 else -1))
+        if bend.askew > SLACK * math.radians(self._homing.bend_deg):
+            raise self._against_each_other(bend, self._nearest(bend)[0])
 
-    def against_each_other(self, bend: Bend, pulls: int) -> SafetyStop:
+    def _against_each_other(self, bend: Bend, pulls: int) -> SafetyStop:
         """The stop of a wrist that bent toward the tendon of an axis."""
         problem = (
             f"tendons pull against each other: the slackened wrist bent by {math.degrees(bend.askew):.1f} deg when one "
@@ -218,18 +291,18 @@ class ExpectedMoves:
 
     def judge_small_move(self, axis: int, reeled: float, bend: Bend) -> None:
         """Raises SafetyStop where reeling in by so many steps beyond the taut point did not bend as it should."""
-        meant = reeled / self.steps()
-        if max(abs(bend.theta), abs(bend.away) if math.isfinite(bend.away) else 0.0) < LEAST * meant:
-            raise self.bends_too_little(axis, bend.theta, meant)
+        meant, size = reeled / self.steps(), self.size(bend)
+        if max(size, abs(np.nan_to_num(bend.away))) < LEAST * meant:
+            raise self.bends_too_little(axis, bend, meant)
         self.judge_side(axis, bend)
-        if abs(bend.theta) > MOST * meant:
-            self.judge_steps(axis, reeled / abs(bend.theta))
+        if size > MOST * meant:
+            self.judge_steps(axis, reeled / size)
 
-    def bends_too_little(self, axis: int, bend: float, meant: float) -> SafetyStop:
+    def bends_too_little(self, axis: int, bend: Bend, meant: float) -> SafetyStop:
         """The stop of an axis that bends the wrist by less than was meant [rad]."""
         problem = (
-            f"axis {axis} (tendon {ACTIVE[axis]}) bends the wrist by {math.degrees(bend):.1f} deg instead of "
-            f"{math.degrees(meant):.1f} deg; likely it turns the wrong way, its tendon is off the pulley, or it "
-            "has no power"
+            f"axis {axis} (tendon {ACTIVE[axis]}) bends the wrist by {math.degrees(self.along(axis, bend)):.1f} deg "
+            f"instead of {math.degrees(meant):.1f} deg; likely it turns the wrong way, its tendon is off the pulley, "
+            "or it has no power"
         )
         return SafetyStop(problem, "homing", "calibrate the wrist again; see motor, drive and tendon")

@@ -17,7 +17,8 @@ from wristctl.simulation.spool_timing import remembered_rates
 from wristctl.simulation.worlds import Draws
 from wristctl.trial.calibration import WristCalibration
 from wristctl.trial.control_loop import ControlLoop, Shown, course_of
-from wristctl.trial.homing import Zero, find_zero, moves_of, slacken
+from wristctl.trial.expected_moves import ExpectedMoves
+from wristctl.trial.homing import Zero, find_zero, slacken
 from wristctl.trial.log import TrialLog
 from wristctl.trial.motions import back, motion_of
 from wristctl.trial.motors_ready import Halt, halt, prepare
@@ -192,7 +193,7 @@ class Experiment:
         """A loop that has brought the homed, slack wrist to rest at zero."""
         settings, pose, zero = self._settings, self.poses.get(plane), self.zero
         assert zero is not None
-        stiffness = moves_of(settings, self._wrist, plane).tendon_stiffness(zero.steps_per_radian)
+        stiffness = ExpectedMoves(settings, self._wrist, plane).tendon_stiffness(zero.steps_per_radian)
         loop = ControlLoop(
             board, tracking, settings, self._facing(plane), plane, zero.signs, self.timing, self._log,
             shown, 0.0 if pose is None else pose.oblique, self._pulls, stiffness,

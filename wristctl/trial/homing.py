@@ -27,7 +27,6 @@ from wristctl.trial.expected_moves import Bend, ExpectedMoves, middle
 from wristctl.trial.resting import judge_slack
 from wristctl.trial.rig_belief import names_of_planes
 from wristctl.trial.safety import SafetyStop
-from wristctl.trial.spatial_moves import SpatialMoves
 from wristctl.trial.spools import Spools, spools_of
 from wristctl.trial.supervised_wait import Patience, Reading
 from wristctl.trial.tracking import Tracking
@@ -86,7 +85,7 @@ class _Line(NamedTuple):
     """Bend by what an axis has reeled in, a line; where the wrist rested after it was let go."""
 
     slope: float
-    """Bend toward the axis, or away from it, by a microstep [rad]."""
+    """Bend toward the axis by a microstep [rad]."""
     offset: float
     friction: float
     """Path between reeling in and letting go for the same bend [steps]."""
@@ -257,11 +256,6 @@ def slacken(
     return board.go_to((one, two, four, five), JOG_RATE).position
 
 
-def moves_of(settings: RigSettings, wrist: WristParameters, plane: str) -> ExpectedMoves:
-    """Moves of this plane, or of both."""
-    return SpatialMoves(settings, wrist) if settings.planes == 2 else ExpectedMoves(settings, wrist, plane)
-
-
 def find_zero(
     board: Board, tracking: Tracking, settings: RigSettings, wrist: WristParameters, plane: str,
     signs: Sequence[int] | None = None,
@@ -271,7 +265,7 @@ def find_zero(
     Raises SafetyStop where a tendon does not bend the wrist, bends it too far, the wrong way or by another's steps, was
     taut before or sticks, or where the marker is lost. In two planes readings of the slack wrist have been taken off.
     """
-    expected, spools = moves_of(settings, wrist, plane), spools_of(settings.actuator)
+    expected, spools = ExpectedMoves(settings, wrist, plane), spools_of(settings.actuator)
     planes = names_of_planes(settings.planes, plane)
     sags = partial(judge_slack, settings=settings, wrist=wrist, planes=planes)
     finder = _Finder(board, tracking, spools, settings.homing, expected, sags)

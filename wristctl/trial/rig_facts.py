@@ -14,12 +14,11 @@ from wristctl.board.messages import LAYOUTS, Command, Pulls, Rate, Status
 from wristctl.config.hw_run import HwRunSettings
 from wristctl.config.wrist import WristParameters
 from wristctl.trial.camera_pace import BY_CHECK, FIX, CameraPace, CameraPaces
-from wristctl.trial.expected_moves import Bend
+from wristctl.trial.expected_moves import Bend, ExpectedMoves
 from wristctl.trial.resting import judge_rest
 from wristctl.trial.rig_belief import PLANES
 from wristctl.trial.rig_strokes import Latency, RigStrokes, find_latency
 from wristctl.trial.safety import SafetyStop
-from wristctl.trial.spatial_moves import SpatialMoves
 from wristctl.trial.supervised_wait import OBLIQUE_FIX
 from wristctl.trial.testbeds import Testbed
 from wristctl.trial.tick_timing import FIX as TIMING_FIX
@@ -138,7 +137,7 @@ def measure(
         strokes = RigStrokes(board, tracking, settings, axis)
         taut, bend = strokes.taken_up()
         if settings.planes == 2:
-            direction = _direction_of(axis, bend, SpatialMoves(settings, wrist))
+            direction = _direction_of(axis, bend, ExpectedMoves(settings, wrist, ""))
         if direction is None or direction.astray is None:
             for cameras in strokes.strokes(taut, progress):
                 latencies = [find_latency(motor_strokes, strokes.hold) for motor_strokes in cameras]
@@ -174,7 +173,7 @@ def _ids(settings: HwRunSettings) -> list[tuple[int, int]]:
     return [(markers.base, markers.tip) for markers in (settings.markers, settings.markers_2)]
 
 
-def _direction_of(axis: int, bend: Bend, expected: SpatialMoves) -> AxisDirection:
+def _direction_of(axis: int, bend: Bend, expected: ExpectedMoves) -> AxisDirection:
     try:
         expected.judge_side(axis, bend)
         astray = None

@@ -10,7 +10,7 @@ from wristctl.board.messages import AXES, JOG_RATE
 from wristctl.config.hw_run import HwRunSettings, RigSettings
 from wristctl.config.wrist import WristParameters
 from wristctl.trial.expected_moves import LEAST, Bend, ExpectedMoves, middle
-from wristctl.trial.homing import Zero, moves_of, rest_of, slacken
+from wristctl.trial.homing import Zero, rest_of, slacken
 from wristctl.trial.safety import SafetyStop
 from wristctl.trial.spools import on_plus_side, spools_of
 from wristctl.trial.supervised_wait import Patience, Reading
@@ -35,7 +35,7 @@ def check_zero(
 
     Raises SafetyStop where a tendon is not slack, or a motor turns the wrong way or winds another tendon than its own.
     """
-    expected, spools, homing = moves_of(settings, wrist, plane), spools_of(settings.actuator), settings.homing
+    expected, spools, homing = ExpectedMoves(settings, wrist, plane), spools_of(settings.actuator), settings.homing
     held = Patience(board).reading(tracking, 4 * homing.frames)
     slacken(board, spools, homing, zero.signs, 2.0)
     Patience(board).wait(0.5 * homing.let_go)
@@ -73,7 +73,7 @@ def _tried(
 
     bend, rest = bent(pair[1], 2 * reeled)
     if expected.size(bend) < LEAST * reeled / expected.steps():
-        raise expected.bends_too_little(pair[1], bend.theta, reeled / expected.steps())
+        raise expected.bends_too_little(pair[1], bend, reeled / expected.steps())
     rests, bends = [_bend_of(rest)], []
     for axis in pair:
         bend, rest = bent(axis, reeled)
@@ -81,7 +81,7 @@ def _tried(
         rests.append(_bend_of(rest))
     straight = middle(rests[1:])
     for axis, before, bend in zip(pair, rests, bends, strict=False):
-        away = expected.toward(axis, straight.since(before)) * expected.steps()
+        away = expected.along(axis, straight.since(before)) * expected.steps()
         expected.judge_small_move(axis, reeled + away, bend)
     return straight, rest
 
@@ -94,7 +94,7 @@ def check_tendons(
     A law makes up for half a tendon by the others, and a motion may ask nothing of one: no residual shows that it is
     lost. In one plane it is shown by a bend across. Raises SafetyStop.
     """
-    expected, spools, homing = moves_of(settings, wrist, ""), spools_of(settings.actuator), settings.homing
+    expected, spools, homing = ExpectedMoves(settings, wrist, ""), spools_of(settings.actuator), settings.homing
     slacken(board, spools, homing, zero.signs, 2.0)
     rest = rest_of(board, tracking, expected, homing)
     for pair in OPPOSITE_AXES:
@@ -112,7 +112,7 @@ def check_cocontraction(
     opposite pairs is let out so. Returns False where nobody can tell, since the wrist sags under a declared payload.
     Raises SafetyStop.
     """
-    expected, spools, homing = moves_of(settings, wrist, plane), spools_of(settings.actuator), settings.homing
+    expected, spools, homing = ExpectedMoves(settings, wrist, plane), spools_of(settings.actuator), settings.homing
     slack = round(homing.pull / spools.step)
     slacken(board, spools, homing, zero.signs)
     rest_of(board, tracking, expected, homing)
@@ -136,7 +136,7 @@ def _is_loaded(
     A payload does that; nobody can then tell whether tendons pull against each other. One that does, or friction inside
     that keeps a wrist bent, bends it no further. Raises SafetyStop where no payload was declared.
     """
-    expected, spools, homing = moves_of(settings, wrist, plane), spools_of(settings.actuator), settings.homing
+    expected, spools, homing = ExpectedMoves(settings, wrist, plane), spools_of(settings.actuator), settings.homing
     before, held_at = _sag(held), homing.pull / wrist.tendon_offset
     if before < _HELD * held_at:
         return False

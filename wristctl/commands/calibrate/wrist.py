@@ -79,7 +79,7 @@ def calibrate_wrist(session: Session) -> WristCalibrated | AxisFound:
     import numpy as np
 
     from wristctl.trial.calibration import calibrated
-    from wristctl.trial.homing import moves_of
+    from wristctl.trial.expected_moves import ExpectedMoves
     from wristctl.trial.testbeds import open_testbed
     from wristctl.vision.view import View
     from wristctl.wrist.directions import ACTIVE
@@ -101,7 +101,7 @@ def calibrate_wrist(session: Session) -> WristCalibrated | AxisFound:
     meanings = "angle between the markers on the straight wrist", "the same before the second camera"
     for name, angle, meaning in zip(("marker", "marker_2"), zero.markers, meanings, strict=False):
         findings.metric(name, angle, "rad", meaning=meaning)
-    by_model = moves_of(settings, study.wrist, settings.plane).steps()
+    by_model = ExpectedMoves(settings, study.wrist, settings.plane).steps()
     rows = []
     for axis, tendon in enumerate(ACTIVE):
         slope, slack, near = zero.steps_per_radian[axis], zero.slack[axis], f"tendon {tendon}, near the straight wrist"
