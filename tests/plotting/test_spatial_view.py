@@ -23,7 +23,7 @@ from wristctl.plotting.style import TENDON_COLOURS
 from wristctl.records import Run, start_run
 from wristctl.simulation.bend_paths import bend_path
 from wristctl.simulation.trajectory import Trajectory
-from wristctl.trial import bend_results
+from wristctl.trial import trial_results
 from wristctl.wrist.spatial.spatial_kinematics import spatial_frames, spatial_tips
 
 PLANES = "simulate.loop.planes=2"
@@ -105,7 +105,7 @@ def test_a_real_wrist_of_which_one_arc_is_seen_bends_by_its_share_in_every_segme
 ) -> None:  # fmt: skip
     whole = course()
     seen_as_one = dataclasses.replace(whole, segment_theta=whole.bend)
-    monkeypatch.setattr(bend_results, "first_course", lambda run: seen_as_one)
+    monkeypatch.setattr(trial_results, "first_course", lambda run: seen_as_one)
     run: Any = SimpleNamespace(config=SimpleNamespace(hw_run=SimpleNamespace(planes=2)))
     bends = [f"bend_{k}_{plane}" for k in (1, 2, 3, 4) for plane in ("ulnar", "flexion")]
     table = view_module._performed(run, ["time", *bends, "tip_x"])

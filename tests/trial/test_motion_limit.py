@@ -13,7 +13,8 @@ from tests.trial.conftest import WRIST, Run, settings_of
 from wristctl.config.study import Study
 from wristctl.trial.expected_moves import ExpectedMoves
 from wristctl.trial.motion_limit import LEAST, limited, peak_tension
-from wristctl.trial.trials import Trial, trials_of, twin
+from wristctl.trial.trial_results import twin
+from wristctl.trial.trials import Trial, trials_of
 
 pytestmark = pytest.mark.slow
 

@@ -12,12 +12,14 @@ import pytest
 from tests.trial.conftest import WRIST, settings_of
 from tests.values import LAST_MOVES, multi_step
 from wristctl.arrays import Array
+from wristctl.config.hw_run import HwRunSettings
 from wristctl.config.loop import DirectionName
 from wristctl.config.plant import Push
 from wristctl.simulation.motion import Angles, Motion
 from wristctl.study_files.load import load_study
 from wristctl.trial.motions import motion_of
-from wristctl.trial.trials import JUDGED, Trial, evaluated, twin
+from wristctl.trial.trial_results import JUDGED, evaluated, twin
+from wristctl.trial.trials import Trial
 from wristctl.wrist.directions import DIRECTIONS
 
 PERIOD, HORIZON = 5e-3, 3.0
@@ -34,11 +36,16 @@ def course(error: float | Array = 0.0, load: float | Array = 0.3, **columns: Any
     return pd.DataFrame(known | {"torque_wanted": 0.5, "torque": 0.5} | NAMES | columns)
 
 
+def pushed_by(push: Push, period: float = PERIOD) -> HwRunSettings:
+    """Settings with this push and control period."""
+    return SETTINGS.model_copy(update={"push": push, "control_period": period})
+
+
 def found(
     log: pd.DataFrame, truth: pd.DataFrame | None = None, pushed: bool = False, push: Push = PUSH
 ) -> dict[str, float]:
     trial = Trial(0, "ulnar", 0, push.force if pushed else 0.0, 0)
-    return evaluated(trial, log, MOTION, push, PERIOD, truth)
+    return evaluated(trial, log, MOTION, pushed_by(push), truth)
 
 
 def bump(start: float, end: float, size: float) -> Array:
@@ -67,7 +74,7 @@ def test_no_error_settles_with_the_reference() -> None:
 @pytest.mark.parametrize(("direction", "peak", "other"), [("ulnar", 12.0, 4.0), ("flexion", 10.0, 6.0)])
 def test_a_sides_tension_is_the_mean_of_its_two_tendons(direction: Any, peak: float, other: float) -> None:
     """4 and 5 pull toward ulnar, 2 and 5 toward flexion."""
-    values = evaluated(Trial(0, direction, 0, 0.0, 0), course(), MOTION, PUSH, PERIOD, None)
+    values = evaluated(Trial(0, direction, 0, 0.0, 0), course(), MOTION, pushed_by(PUSH), None)
     assert values["peak_tension"] == pytest.approx(peak) and values["chattering"] == 0.0
     assert values["rms_tension"] == pytest.approx(math.sqrt(0.5 * (peak**2 + other**2)))
 
@@ -166,7 +173,7 @@ def test_a_trial_of_several_moves_is_judged_by_its_last_one(before: float, final
         load = 0.3 + 0.1 * ((time >= 2.0) & (time < 2.4))
         log = pd.DataFrame({"time": time, "theta": reference + error, "error": error, "load": load} | NAMES)
         truth = pd.DataFrame({"time": time, "theta": reference + error})
-        return evaluated(trial, log.assign(torque=0.5, torque_wanted=0.5), followed, PUSH, 1e-3, truth)
+        return evaluated(trial, log.assign(torque=0.5, torque_wanted=0.5), followed, pushed_by(PUSH, 1e-3), truth)
 
     perfect = judged(0.0 * time)
     assert perfect["overshoot"] == 0.0 and perfect["settling"] == perfect["true_settling"]
@@ -185,7 +192,7 @@ def test_a_perfect_follower_of_five_degrees_back_passes_nothing() -> None:
     )
     followed = motion_of(settings, WRIST, "radial")
     log = course(theta=followed.theta_ref)
-    values = evaluated(Trial(0, "radial", 0, 0.0, 0), log, followed, PUSH, PERIOD, None)
+    values = evaluated(Trial(0, "radial", 0, 0.0, 0), log, followed, pushed_by(PUSH), None)
     assert values["overshoot"] == 0.0 and values["settling"] == pytest.approx(1.0, abs=2 * PERIOD)
 
 
@@ -201,3 +208,9 @@ def test_a_trials_push_in_simulation_is_the_benchs_and_against_the_bend(directio
     sign = DIRECTIONS[direction].sign
     given = sign * (pushed.theta - free.theta)[pushed.time > 0.75]
     assert sign * free.theta[-1] > 0.05 and (given < 0.0).all() and given.min() < -0.003
+
+
+@pytest.mark.slow
+def test_a_wrist_that_gravity_bends_out_of_its_rigs_plane_is_simulated_in_both() -> None:
+    study = load_study([], ["wrist.gravity_flexion=5", "hw-run={planes: 1, horizon: 0.3}"])
+    assert twin(study, Trial(0, "ulnar", 0, 0.0, 0), None, None).trajectory.planes == 2

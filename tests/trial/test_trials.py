@@ -10,7 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tests.trial.conftest import settings_of
-from wristctl.trial.trials import PushSeen, Trial, motions_of, push_seen, recovery, trials_of
+from wristctl.trial.trial_results import PushSeen, push_seen, recovery
+from wristctl.trial.trials import Trial, motions_of, trials_of
 
 TIME = np.arange(0.0, 5.0, 5e-3)
 

@@ -19,7 +19,6 @@ from wristctl.errors import UserError
 from wristctl.simulation.metrics import of_course
 from wristctl.simulation.motion import Motion
 from wristctl.study_files.load import load_study
-from wristctl.trial.bend_results import bend_twin, bends_evaluated, logged_course
 from wristctl.trial.homing import Zero
 from wristctl.trial.motions import back, motion_of
 from wristctl.trial.residuals import Limit, limits_of
@@ -28,6 +27,7 @@ from wristctl.trial.run_limits import Logged, stop_of
 from wristctl.trial.safety import SafetyStop
 from wristctl.trial.testbeds import EmulatedTestbed
 from wristctl.trial.tracking import Tracking
+from wristctl.trial.trial_results import evaluated, logged_course, twin
 from wristctl.trial.trials import Trial, motions_of, trials_of
 
 pytestmark = pytest.mark.slow
@@ -76,8 +76,8 @@ def test_a_fast_trial_and_its_simulation_agree(tmp_path: Path) -> None:
     done, settings = performed(tmp_path, **thrown), circling(**thrown)
     assert done.error is None
     study, followed = load_study([]).model_copy(update={"hw_run": settings}), motion_of(settings, WRIST, "dart-thrower")
-    twin = bend_twin(study, Trial(0, "dart-thrower", 0, 0.0, 0), followed, None)
-    simulated, true = np.degrees(twin.trajectory.error), true_errors(done)
+    simulation = twin(study, Trial(0, "dart-thrower", 0, 0.0, 0), None, None)
+    simulated, true = np.degrees(simulation.trajectory.error), true_errors(done)
     assert rmse(simulated) == pytest.approx(rmse(true), rel=0.2)
     ahead = [lead(errors, followed) for errors in (simulated, true)]
     assert np.abs(ahead[0] - ahead[1]).max() < 1.5e-3
@@ -116,13 +116,13 @@ def test_a_rows_metrics_are_those_of_its_log_by_the_formulas_of_simulation(round
     log, truth = round_trip.table("log"), round_trip.table("truth")
     followed = round_trip.experiment.motions["circumduction"]
     trial = Trial(0, "circumduction", 0, 0.0, 0)
-    values = bends_evaluated(trial, log, followed, circling().push, WRIST, truth)
+    values = evaluated(trial, log, followed, circling(), truth)
     course = logged_course(log, followed, WRIST)
     assert values["rmse"] == of_course(course)["rmse"]
     assert values["true_rmse_ulnar"] == pytest.approx(np.radians(rmse(true_errors(round_trip))[0]), rel=1e-3)
     assert math.hypot(values["true_rmse_ulnar"], values["true_rmse_flexion"]) == pytest.approx(values["true_rmse"])
     assert math.isnan(values["recovery"]) and math.isnan(values["push_torque"])
-    short = bends_evaluated(trial, log[log["time"] < 1.0], followed, circling().push, WRIST, truth)
+    short = evaluated(trial, log[log["time"] < 1.0], followed, circling(), truth)
     assert all(map(math.isnan, short.values()))
 
 

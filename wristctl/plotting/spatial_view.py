@@ -132,7 +132,7 @@ def _performed(run: Run, columns: list[str]) -> Array | None:
     """The same of the first trial of a rig in two planes that went to its end: as it truly was, where that is known."""
     if run.config.hw_run.planes == 1:
         return None
-    from wristctl.trial.bend_results import first_course
+    from wristctl.trial.trial_results import first_course
 
     course = first_course(run)
     if course is None:

@@ -116,19 +116,21 @@ def of_course(course: Trajectory) -> dict[str, float]:
 
 def metrics_of(
     period: float,
-    theta: Array,
-    theta_ref: Array,
+    bend: Array,
+    bend_ref: Array,
     tension: Array,
     goals: Goals,
     saturated: Array | None = None,
 ) -> dict[str, float]:
-    """Metrics of one recorded series, sampled every `period` [s]: angles (T,) [rad], tensions (T, 2) [N].
+    """Metrics of one recorded series, sampled every `period` [s]: bends (T,) or (T, P) [rad], tensions of one tendon
+    of each place (T, places) [N].
 
     `goals` are those of the reference (`Motion.goals`), `saturated` (T,) where the torque was out of reach.
     """
-    flags = np.zeros(len(theta)) if saturated is None else np.asarray(saturated, float)
-    totals = totals_of_series(period, theta[:, None], theta_ref[:, None], tension, flags, goals)
-    return {name: float(value[0]) for name, value in summary(totals).items()}
+    flags = np.zeros(len(bend)) if saturated is None else np.asarray(saturated, float)
+    every, wish = bend.reshape(len(bend), -1), bend_ref.reshape(len(bend), -1)
+    totals = totals_of_series(period, every, wish, tension, flags, goals)
+    return {name: float(value[0]) for name, value in summary(totals, metrics_in(every.shape[1])).items()}
 
 
 def totals_of_series(period: float, bend: Array, wish: Array, tension: Array, saturated: Array, goals: Goals) -> Totals:

@@ -9,9 +9,8 @@ from collections.abc import Mapping, Sequence
 
 from wristctl.config.plant import Plant
 from wristctl.config.study import Study
-from wristctl.trial.bend_results import bend_twin
-from wristctl.trial.motions import motion_of
-from wristctl.trial.trials import Trial, twin
+from wristctl.trial.trial_results import twin
+from wristctl.trial.trials import Trial
 from wristctl.wrist.kinematics import Inverse
 
 # A limit is no less [N]: tendons whose zero is 0.3 mm off pull so much more than simulated ones.
@@ -31,11 +30,7 @@ def peak_tension(
     for payload in dict.fromkeys((0.0, settings.payload)):  # an upright wrist needs less with one
         loop = settings.known_loop.model_copy(update={"plant": Plant(payload=payload)})
         for trial in different.values():
-            if settings.planes == 1:
-                done = twin(study, trial, network, tuned, loop)
-            else:
-                followed = motion_of(settings, study.wrist, trial.direction, network)
-                done = bend_twin(study, trial, followed, tuned, loop)
+            done = twin(study, trial, network, tuned, loop)
             peaks.append(math.inf if done.failed else done.metrics["peak_tension"])
     return max(peaks)
 

@@ -16,7 +16,7 @@ from wristctl.trial.experiment import Experiment
 from wristctl.trial.log import TrialLog
 from wristctl.trial.motion_limit import limited, peak_tension
 from wristctl.trial.testbeds import open_testbed
-from wristctl.trial.trial_metrics import metrics_of_trials
+from wristctl.trial.trial_results import metrics_of_trials
 from wristctl.trial.trials import Trial, trials_of
 from wristctl.vision.view import View
 
@@ -67,7 +67,7 @@ def _run(study: Study, tuned: Gains | None) -> dict[int, Rehearsed]:
         finally:
             log.close()
         begun = [trial for trial in trials if trial.number in done.outcomes]
-        metrics = metrics_of_trials(Path(folder), begun, done.motions, settings, wrist)
+        metrics = metrics_of_trials(Path(folder), begun, done.motions, settings)
     found = {}
     for row in range(len(settings.rows)):
         own = [(done.outcomes[t.number], m) for t, m in zip(begun, metrics, strict=True) if t.row == row]

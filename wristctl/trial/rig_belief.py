@@ -5,6 +5,7 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from wristctl.arrays import Array
 from wristctl.board.messages import AXES
@@ -44,13 +45,12 @@ class RigBelief:
         self.planes, self.wrist, self._actuator = tuple(planes), wrist, actuator
         if len(self.planes) == 1:
             self.known, self._facing = known_of_sides(wrist, actuator), [wrist]
-            self._place = np.where(on_plus_side(self.planes[0]), 0, 1)
         else:
             layout = layout_of_axes(wrist)
             turned = [in_plane(wrist, plane) for plane in self.planes]
             self.known = _known_of_axes(wrist, turned, layout, actuator)
             self._facing = [as_pairs(facing, layout, axis) for axis, facing in enumerate(turned)]
-            self._place = np.arange(AXES)
+        self._place = places_of_axes(self.planes)
         wound = np.eye(len(self.known.pulls))[:, self._place]
         self._means = wound / wound.sum(axis=1, keepdims=True)
         self._found = np.zeros(len(self.known.pulls) + len(self.known.arms))
@@ -75,6 +75,11 @@ class RigBelief:
         _paths(self.known, np.ascontiguousarray(bend, np.float64), self._found)
         of_places = self._found.reshape(1 + len(self.planes), -1).take(self._place, axis=1)
         return of_places[0], np.ascontiguousarray(of_places[1:].T)
+
+
+def places_of_axes(planes: Sequence[str]) -> NDArray[np.int64]:
+    """Place of the tendon that each of the board's axes winds (4,): in one plane that of its side, + or -."""
+    return np.where(on_plus_side(planes[0]), 0, 1) if len(planes) == 1 else np.arange(AXES)
 
 
 def names_of_planes(planes: int, plane: str) -> tuple[str, ...]:

@@ -14,7 +14,8 @@ from wristctl.commands.session import Session
 from wristctl.comparison.paper import EXPERIMENT
 from wristctl.control.table import Gains
 from wristctl.simulation.repetitions import Simulation
-from wristctl.trial.trials import Trial, twin
+from wristctl.trial.trial_results import twin
+from wristctl.trial.trials import Trial
 from wristctl.wrist.directions import ACTIVE, DIRECTIONS
 from wristctl.wrist.kinematics import Inverse
 

@@ -94,8 +94,7 @@ def _errors(trials: pd.DataFrame, twins: Mapping[int, Simulation]) -> _Errors:
 
 def bends_performed(session: Session, trials: pd.DataFrame, tuned: Gains | None) -> PerformedBends:
     """Tables, metrics and figures of trials in two planes, with the simulation of each."""
-    from wristctl.trial.bend_results import bend_twin
-    from wristctl.trial.motions import motion_of
+    from wristctl.trial.trial_results import twin
     from wristctl.trial.trials import Trial
 
     study, findings, settings = session.study, session.findings, session.study.hw_run
@@ -107,8 +106,7 @@ def bends_performed(session: Session, trials: pd.DataFrame, tuned: Gains | None)
             key = row["direction"], row["push"], row["label"]
             if key not in simulated:
                 trial = Trial(row["trial"], row["direction"], 0, row["push"], names.index(row["label"]))
-                followed = motion_of(settings, study.wrist, row["direction"])
-                simulated[key] = bend_twin(study, trial, followed, tuned)
+                simulated[key] = twin(study, trial, None, tuned)
             twins[row["trial"]] = simulated[key]
     rows = _means(findings, done, names, twins)
     with session.drawing():
@@ -147,9 +145,9 @@ def _draw(session: Session, done: pd.DataFrame, twins: Mapping[int, Simulation])
     import pandas as pd
 
     from wristctl.commands.hw_run.trial_bend_figures import TrialBends, errors_of_bends, paths_of_bends
-    from wristctl.trial.bend_results import logged_course, true_course
     from wristctl.trial.motions import motion_of
     from wristctl.trial.rig_belief import layout_of_axes
+    from wristctl.trial.trial_results import logged_course, true_course
     from wristctl.wrist.spatial.held_bends import reach_of_bends
 
     findings, study, settings = session.findings, session.study, session.study.hw_run

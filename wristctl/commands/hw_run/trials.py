@@ -18,7 +18,6 @@ from wristctl.control.table import Gains
 from wristctl.errors import fix_of
 from wristctl.records import LiveRun
 from wristctl.simulation.metrics import METRICS, metrics_in
-from wristctl.trial.bend_results import FURTHER, LOGGED, TRULY
 from wristctl.trial.calibration import WristCalibration
 from wristctl.trial.experiment import Experiment, Stop
 from wristctl.trial.log import TrialLog
@@ -26,8 +25,8 @@ from wristctl.trial.residuals import FILE, RESIDUALS, limits_of, plain
 from wristctl.trial.rig_belief import PLANES
 from wristctl.trial.safety import SafetyStop
 from wristctl.trial.testbeds import open_testbed
-from wristctl.trial.trial_metrics import metrics_of_trials
-from wristctl.trial.trials import JUDGED, Trial, trials_of
+from wristctl.trial.trial_results import FURTHER, JUDGED, LOGGED, TRULY, metrics_of_trials
+from wristctl.trial.trials import Trial, trials_of
 from wristctl.vision.camera import Frame
 from wristctl.vision.marker import Sighting
 from wristctl.vision.recordings import COLUMNS as RAW
@@ -160,7 +159,7 @@ def _evaluate(
 ) -> pd.DataFrame:
     """trials.csv: a row for each trial that began, by the log alone."""
     begun = [trial for trial in trials if trial.number in experiment.outcomes]
-    metrics = metrics_of_trials(run.path / "data", begun, experiment.motions, settings, wrist)
+    metrics = metrics_of_trials(run.path / "data", begun, experiment.motions, settings)
     rows = [
         {
             "trial": trial.number,

@@ -1,0 +1,267 @@
+"""What trials came to: motions as logged and as they truly were, metrics by both, and each trial in simulation."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from wristctl.arrays import Array
+from wristctl.config.hw_run import HwRunSettings
+from wristctl.config.loop import Loop
+from wristctl.config.study import Study
+from wristctl.config.wrist import WristParameters
+from wristctl.control.law import in_a_first_repetition
+from wristctl.control.table import controller, gains_of
+from wristctl.records import Run
+from wristctl.simulation.closed_loop import asked_of, repeat, scenario_of
+from wristctl.simulation.metrics import metrics_of, summed
+from wristctl.simulation.motion import Motion
+from wristctl.simulation.oscillation import oscillations
+from wristctl.simulation.repetitions import Simulation
+from wristctl.simulation.trajectory import Trajectory, size_of
+from wristctl.simulation.worlds import Draws
+from wristctl.trial.log import column_of
+from wristctl.trial.motions import motion_of
+from wristctl.trial.rig_belief import PLANES, layout_of_axes, names_of_planes, places_of_axes
+from wristctl.trial.trials import Trial
+from wristctl.wrist.directions import ACTIVE
+from wristctl.wrist.kinematics import Inverse
+from wristctl.wrist.spatial.spatial_kinematics import spatial_tips
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+# The metrics of the paper's tables; also told of the true angle, where it is known.
+JUDGED = ("rmse", "settling", "steady_state", "oscillation")
+# Of a motion in two planes: metrics that the log alone gives, and those that the true bend gives too.
+TRULY = ("rmse_ulnar", "rmse_flexion", "rmse", "largest_error", "steady_state", "oscillation")
+LOGGED = (*TRULY, "peak_tension", "chattering", "saturation")
+# Columns of trials.csv beside the metrics of a motion in two planes: unit and meaning.
+FURTHER: Mapping[str, tuple[str, str]] = {
+    "settling": ("s", "time from which |e| stays within 2 % of the largest bend; empty where it never does"),
+    "true_settling": ("s", "the same of the emulated wrist's true bend"),
+    "recovery": ("s", "from the end of the push in the estimated load until |e| stays within 2 % of the largest bend"),
+    "true_recovery": ("s", "the same by the emulated wrist's true bend, from the true end of the push"),
+    "push_torque": ("N m", "largest load torque of the push, as estimated; empty where the wrist moves meanwhile"),
+}
+# Share of the largest bend within which an error is small.
+_BAND = 0.02
+# Seconds before the push over which the load is taken as quiet.
+_BEFORE = 0.5
+# Seconds by which a person may push too early.
+EARLY = 0.5
+# Load torque [N m] that counts as a push.
+LEAST_PUSH = 0.01
+
+
+def logged_course(course: pd.DataFrame, followed: Motion, wrist: WristParameters) -> Trajectory:
+    """A trial in two planes as logged, on the grid of its motion: the bend as estimated, and pulls as commanded."""
+
+    def planes(name: str) -> Array:
+        return _on(followed.time, course, [f"{name}_{plane}" for plane in PLANES])
+
+    bend = planes("bend")
+    pulls = _on(followed.time, course, [f"tension_{tendon}" for tendon in ACTIVE])
+    return Trajectory(
+        label="",
+        time=followed.time,
+        theta=bend,
+        segment_theta=bend,
+        rate=planes("rate"),
+        theta_ref=followed.bend_ref,
+        theta_desired=followed.bend_ref,
+        tip=spatial_tips(bend, wrist.length),
+        tip_desired=spatial_tips(followed.bend_ref, wrist.length),
+        torque_wanted=planes("torque_wanted"),
+        torque=planes("torque"),
+        tension=pulls,
+        seen=bend,
+        load=planes("load"),
+        share=_on(followed.time, course, ["share"])[:, 0],
+    )
+
+
+def true_course(logged: Trajectory, truth: pd.DataFrame, length: float) -> Trajectory:
+    """The same as it truly was on an emulated bench, of a wrist so long [m]; its rate is still the estimated one."""
+    time = logged.time
+    segments = sum(name.startswith("bend_") and name[5].isdigit() for name in truth.columns) // len(PLANES)
+    names = [f"bend_{k + 1}_{plane}" for k in range(segments) for plane in PLANES]
+    bends = _on(time, truth, names)
+    return replace(
+        logged,
+        theta=_on(time, truth, [f"bend_{plane}" for plane in PLANES]),
+        acting=_on(time, truth, [f"pull_{tendon}" for tendon in ACTIVE]),
+        segment_theta=bends,
+        tip=spatial_tips(bends, length),
+    )
+
+
+def _on(time: Array, table: pd.DataFrame, names: list[str]) -> Array:
+    at = table["time"].to_numpy(float)
+    return np.stack([np.interp(time, at, table[name].to_numpy(float)) for name in names], axis=1)
+
+
+def first_course(run: Run) -> Trajectory | None:
+    """The first trial of a run in two planes that went to its end: as it truly was, where that is known."""
+    trials, log = run.data("trials"), run.data("log")
+    done = trials[trials["outcome"] == "ok"]
+    if done.empty:
+        return None
+    number, name = done.iloc[0]["trial"], str(done.iloc[0]["direction"])
+    followed = motion_of(run.config.hw_run, run.config.wrist, name)
+    course = logged_course(log[log["trial"] == number], followed, run.config.wrist)
+    if not run.has("data/truth.csv"):
+        return course
+    truth = run.data("truth")
+    return true_course(course, truth[truth["trial"] == number], run.config.wrist.length)
+
+
+class PushSeen(NamedTuple):
+    """A push as the record shows it: when it began and ended [s], and its largest load torque [N m]."""
+
+    start: float
+    end: float
+    torque: float
+
+
+def push_seen(time: Array, load: Array, after: float, least: float) -> PushSeen | None:
+    """The push in an estimated load (T,): where it leaves its course by `least` [N m] once the move is over.
+
+    The load's course without a push is its median over the half second before `after` [s], when the push may begin at
+    the earliest; None where the load never leaves it.
+    """
+    quiet = load[(time >= after - _BEFORE) & (time < after)]
+    if not len(quiet):
+        return None
+    rise = np.where(time >= after, np.abs(load - np.median(quiet)), 0.0)
+    peak = int(np.argmax(rise))
+    if rise[peak] < least:
+        return None
+    within = rise < 0.25 * rise[peak]
+    before, later = np.flatnonzero(within[:peak]), np.flatnonzero(within[peak:])
+    end = peak + (later[0] if len(later) else len(time) - 1 - peak)
+    return PushSeen(float(time[before[-1] + 1 if len(before) else 0]), float(time[end]), float(rise[peak]))
+
+
+def recovery(time: Array, error: Array, move: float, end: float) -> float:
+    """Seconds from the end of a push until |error| (T,) [rad] stays within 2 % of the move; nan if it never does."""
+    outside = np.flatnonzero((time >= end) & (np.abs(error) > 0.02 * abs(move)))
+    if not len(outside):
+        return 0.0
+    return float(time[outside[-1] + 1] - end) if outside[-1] + 1 < len(time) else float("nan")
+
+
+def evaluated(
+    trial: Trial, log: pd.DataFrame, followed: Motion, settings: HwRunSettings, truth: pd.DataFrame | None
+) -> dict[str, float]:
+    """Metrics of one whole trial by the estimated bend, of the true one as `true_...`, and what became of a push.
+
+    `log` holds its rows of the log, `truth` those of an emulated bench, whose push ends when it should; by the log it
+    ends when the estimated load has fallen again. All values are nan where the log is not whole.
+    """
+    names, one = names_of_planes(followed.planes, trial.plane), followed.planes == 1
+    by_log, truly = ((*summed(), "oscillation"), JUDGED) if one else (LOGGED, TRULY)
+    settles = () if one else ("settling",)
+    columns = [*by_log, *(f"true_{name}" for name in truly), *_OF_PUSH, *settles, *(f"true_{name}" for name in settles)]
+    metrics = dict.fromkeys(columns, math.nan)
+    grid, push, period = followed.time, settings.push, settings.control_period
+    if log.empty or log["time"].iloc[-1] < followed.horizon - 1.5 * period:
+        return metrics
+
+    def rows(name: str, table: pd.DataFrame = log) -> Array:
+        return table[[column_of(name, plane, len(names)) for plane in names]].to_numpy(float)
+
+    def on_grid(values: Array, table: pd.DataFrame = log) -> Array:
+        time = table["time"].to_numpy(float)
+        return np.stack([np.interp(grid, time, column) for column in values.T], axis=1)
+
+    place, tensions = places_of_axes(names), log[[f"tension_{tendon}" for tendon in ACTIVE]].to_numpy(float)
+    tension = on_grid(np.stack([tensions[:, place == each].mean(axis=1) for each in range(place.max() + 1)], axis=1))
+    beyond = np.abs(rows("torque_wanted") - rows("torque")).max(axis=1, keepdims=True) > 1e-9
+    saturated = (on_grid(beyond.astype(float))[:, 0] > 0.5).astype(float)
+    reach = followed.goals.move if one else float(size_of(followed.bend_ref).max())
+
+    def judged(bend: Array) -> dict[str, float]:
+        values = metrics_of(period, bend, followed.bend_ref, tension, followed.goals, saturated)
+        swings = oscillations(bend.T, followed.bend_ref.T, np.arange(len(names)), period)
+        values["oscillation"] = float(np.max(swings))
+        if not one:  # a path comes to rest nowhere
+            values["settling"] = recovery(grid, size_of(bend - followed.bend_ref), reach, 0.0)
+        return values
+
+    def of(values: dict[str, float], chosen: Sequence[str]) -> dict[str, float]:
+        return {name: values[name] for name in chosen}
+
+    time = log["time"].to_numpy(float)
+    metrics |= of(judged(on_grid(rows("bend"))), (*by_log, *settles))
+    quiet = max(followed.rest, push.start - EARLY) if one else push.start - EARLY
+    if trial.push and followed.rest <= quiet:
+        seen = push_seen(time, _load(time, rows("load"), quiet), quiet, LEAST_PUSH)
+        if seen is not None:
+            metrics["push_torque"] = seen.torque
+            metrics["recovery"] = recovery(time, size_of(rows("error")), reach, seen.end)
+    if truth is not None and len(truth):
+        true = on_grid(rows("bend", truth), truth)
+        metrics |= {f"true_{name}": value for name, value in of(judged(true), (*truly, *settles)).items()}
+        if trial.push:
+            ended = push.start + push.duration
+            metrics["true_recovery"] = recovery(grid, size_of(true - followed.bend_ref), reach, ended)
+    return metrics
+
+
+# Values of a row that a push has.
+_OF_PUSH = ("recovery", "true_recovery", "push_torque")
+
+
+def metrics_of_trials(
+    folder: Path, trials: Sequence[Trial], motions: Mapping[str, Motion], settings: HwRunSettings
+) -> list[dict[str, float]]:
+    """Metrics of each of these trials by the log in a folder, as `evaluated` gives them."""
+    import pandas as pd
+
+    logs, file = pd.read_csv(folder / "log.csv"), folder / "truth.csv"
+    truths = pd.read_csv(file) if file.is_file() else None
+    found = []
+    for trial in trials:
+        log, followed = logs[logs["trial"] == trial.number], motions[trial.direction]
+        truth = None if truths is None else truths[truths["trial"] == trial.number]
+        found.append(evaluated(trial, log, followed, settings, truth))
+    return found
+
+
+def _load(time: Array, load: Array, after: float) -> Array:
+    """The load (T,) [N m] of an estimate (T, P): in one plane signed, in two its size off what it was before."""
+    if load.shape[1] == 1:
+        return load[:, 0]
+    return size_of(load - np.median(load[time < after][-50:], axis=0))
+
+
+def twin(
+    study: Study, trial: Trial, network: Inverse | None, tuned: Mapping[str, Mapping[str, float]] | None,
+    loop: Loop | None = None,
+) -> Simulation:  # fmt: skip
+    """Simulate a trial of the study's hw-run section; of a controller that learns a first repetition, as there.
+
+    `loop` takes the place of the section's own, which on an emulated rig has the emulated wrist.
+    """
+    settings, wrist, scenario = study.hw_run, study.wrist, trial.scenario
+    row, followed = settings.rows[trial.row], motion_of(settings, wrist, trial.direction, network)
+    law = in_a_first_repetition(controller(row.controller))
+    asked = (loop or settings.loop).model_copy(update={"disturbances": trial.disturbances(settings, followed)})
+    if settings.planes == 1:  # the wrist may leave the plane in which its rig bends
+        move = {"reference": settings.reference, "direction": trial.direction, "horizon": settings.horizon}
+        chosen = study.simulate.model_copy(update={"loop": asked, **move})
+        simulated = study.model_copy(update={"simulate": chosen})
+        wrist, asked, followed = asked_of(simulated, settings.control_period, network)
+        scenario = scenario_of(chosen.reference, chosen.direction)
+    else:
+        layout_of_axes(wrist)
+        wrist = wrist.model_copy(update={"tendons": "four"})  # the fifth in the centre is not wound
+    gains = np.array([gains_of(law, row.gains, tuned)])
+    (repeated,) = repeat(law, gains, [followed], np.zeros(1, np.int64), asked, wrist, [scenario], Draws(study.seed))
+    return repeated.first
