@@ -21,7 +21,7 @@ from wristctl.commands.session import Session
 from wristctl.config.study import Study
 from wristctl.errors import UserError
 from wristctl.records import start_run
-from wristctl.trial.log import LOG
+from wristctl.trial.log import tick_columns
 from wristctl.trial.trials import Trial
 
 TRIALS = [Trial(0, "ulnar", 0, 0.0, 0), Trial(1, "radial", 0, 2.0, 0)]
@@ -71,7 +71,7 @@ def screen(monkeypatch: pytest.MonkeyPatch) -> Iterator[Screen]:
 def row(trial: int, degrees: float, verdict: str = "") -> dict[str, Any]:
     """A tick."""
     known = {"trial": trial, "theta": degrees * 3.14159265 / 180.0, "verdict": verdict, "state": "ENABLED"}
-    return dict.fromkeys(LOG, 0.0) | known
+    return dict.fromkeys(tick_columns(1), 0.0) | known
 
 
 def test_the_panel_tells_the_newest_angle_and_verdict_and_counts_the_trials_that_are_done(screen: Screen) -> None:

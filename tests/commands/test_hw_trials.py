@@ -23,7 +23,7 @@ from wristctl.commands.hw_run import trials as hw_trials
 from wristctl.commands.session import Unattended
 from wristctl.records import LiveRun, Run, start_run
 from wristctl.simulation.metrics import METRICS
-from wristctl.trial.log import LOG, TrialLog
+from wristctl.trial.log import TrialLog, tick_columns
 from wristctl.trial.motions import motion_of
 from wristctl.trial.safety import SafetyStop
 from wristctl.trial.tick_timing import TickTiming
@@ -80,7 +80,7 @@ class Bench:
             self.outcomes[number] = "ok"
             for time in motion.time[: self.ticks] + 0.0054:
                 wanted = float(np.interp(time, motion.time, motion.theta_ref))
-                row: dict[str, Any] = dict.fromkeys(LOG, 0.0)
+                row: dict[str, Any] = dict.fromkeys(tick_columns(1), 0.0)
                 row |= {"trial": number, "time": float(time), "theta": wanted + math.radians(off)}
                 row |= {
                     "error": math.radians(off),

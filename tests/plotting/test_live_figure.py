@@ -9,7 +9,7 @@ import pandas as pd
 import pytest
 
 from wristctl.commands.hw_run.live_figure import newest_rows, recent
-from wristctl.trial.log import LOG
+from wristctl.trial.log import tick_columns
 
 PERIOD = 0.005
 
@@ -17,7 +17,7 @@ PERIOD = 0.005
 def rows(count: int) -> pd.DataFrame:
     time = PERIOD * np.arange(count)
     words = {"state": "ENABLED", "verdict": "ok", "faults": "ESTOP"}
-    return pd.DataFrame({name: words.get(name, time) for name in LOG} | {"trial": 1, "theta": 0.1 * time})
+    return pd.DataFrame({name: words.get(name, time) for name in tick_columns(1)} | {"trial": 1, "theta": 0.1 * time})
 
 
 @pytest.mark.parametrize("count", [1, 300, 4000])

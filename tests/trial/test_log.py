@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from wristctl.trial.log import FRAMES, LOG, Disk, Stream, TrialLog, truth_columns
+from wristctl.trial.log import FRAMES, Disk, Stream, TrialLog, tick_columns, truth_columns
 
 
 def test_rows_read_back_exactly_and_nan_is_empty(tmp_path: Path) -> None:
@@ -52,7 +52,7 @@ def test_a_trials_truth_is_written_a_little_with_each_tick_and_whole_at_the_end(
     log.truth(3, truth)
     sizes = []
     for _ in range(10):
-        log.tick(dict.fromkeys(LOG, 0.0) | {"trial": -1})
+        log.tick(dict.fromkeys(tick_columns(1), 0.0) | {"trial": -1})
         sizes.append(len(pd.read_csv(tmp_path / "truth.csv")))
     assert sizes[0] > 5 and max(np.diff(sizes)) < 100 and sizes[-1] < 1000
     log.close()
@@ -64,7 +64,7 @@ def test_on_the_computers_clock_each_tick_has_its_date_and_in_virtual_time_none(
     for name, monotonic in (("real", True), ("virtual", False)):
         (tmp_path / name).mkdir()
         log = TrialLog(tmp_path / name, None, 5e-3, monotonic)
-        log.tick(dict.fromkeys(LOG, 0.0) | {"trial": 0, "clock": time.monotonic() - 100.0})
+        log.tick(dict.fromkeys(tick_columns(1), 0.0) | {"trial": 0, "clock": time.monotonic() - 100.0})
         log.close()
     assert time.time() - pd.read_csv(tmp_path / "real/log.csv")["utc"][0] == pytest.approx(100.0, abs=5.0)
     assert pd.read_csv(tmp_path / "virtual/log.csv")["utc"].isna().all()
@@ -76,7 +76,7 @@ def test_a_full_disk_stops_a_tick_and_never_the_wire(tmp_path: Path) -> None:
     log.disk.pretend_full = True
     log.wire(1.0, "sent", b"\x01\xff")
     with pytest.raises(OSError, match="No space left"):
-        log.tick(dict.fromkeys(LOG, 0.0) | {"trial": 0})
+        log.tick(dict.fromkeys(tick_columns(1), 0.0) | {"trial": 0})
     log.wire(1.5, "came", b"\x02")
     log.close()
     wire = pd.read_csv(tmp_path / "wire.csv", dtype=str)

@@ -29,10 +29,6 @@ def _of_tendons(name: str, unit: str, meaning: str) -> dict[str, tuple[str, str]
     return {f"{name}_{tendon}": (unit, f"{meaning}, tendon {tendon}") for tendon in ACTIVE}
 
 
-def _of_planes(name: str, unit: str, meaning: str) -> dict[str, tuple[str, str]]:
-    return {f"{name}_{plane}": (unit, f"{meaning}, toward {plane}") for plane in PLANES}
-
-
 _CLOCKS: Columns = {
     "trial": ("", "number, from 0"),
     "time": ("s", "since the trial's motion began"),
@@ -52,39 +48,20 @@ _AXES: Columns = {
     "woken": ("s", "part of that for which the computer slept on; the rest is what the tick before took too long"),
     "round_trip": ("s", "from the tick's command to the board's answer"),
 }
-LOG: Columns = {
-    **_CLOCKS,
-    "theta": ("rad", "bending angle as estimated"),
+_OF_A_PLANE: Columns = {
+    "bend": ("rad", "bending angle as estimated"),
     "rate": ("rad/s", "its rate as estimated"),
     "load": ("N m", "load torque as estimated: what the model does not explain"),
-    "theta_measured": ("rad", "newest usable marker angle; empty where none came in this tick"),
+    "bend_measured": ("rad", "newest usable bend by the plane's camera; empty where none came in this tick"),
     "captured": ("s", "when that frame was taken, on the trial's time"),
-    "verdict": ("", "on the newest frame; empty where none came"),
-    "theta_ref": ("rad", "reference angle that the controller follows"),
+    "verdict": ("", "on the newest frame of the plane's camera; empty where none came"),
+    "bend_ref": ("rad", "reference that the controller follows"),
     "rate_ref": ("rad/s", "its rate"),
     "acceleration_ref": ("rad/s^2", "its acceleration"),
-    "theta_desired": ("rad", "true wanted angle"),
-    "error": ("rad", "theta - theta_ref (E12)"),
-    "torque_wanted": ("N m", "the law's torque"),
+    "bend_desired": ("rad", "true wanted angle"),
+    "error": ("rad", "bend less its reference (E12)"),
+    "torque_wanted": ("N m", "torque that the controller wants"),
     "torque": ("N m", "torque of the commanded tensions on the one-segment model"),
-    **_AXES,
-}
-SPATIAL_LOG: Columns = {
-    **_CLOCKS,
-    **_of_planes("bend", "rad", "bend of the last disc as estimated"),
-    **_of_planes("rate", "rad/s", "its rate as estimated"),
-    **_of_planes("load", "N m", "load torque as estimated: what the model does not explain"),
-    **_of_planes("bend_measured", "rad", "newest usable bend by this plane's camera; empty where none came"),
-    **_of_planes("captured", "s", "when that frame was taken, on the trial's time"),
-    **_of_planes("verdict", "", "on the newest frame of this plane's camera; empty where none came"),
-    **_of_planes("bend_ref", "rad", "reference that the controller follows"),
-    **_of_planes("rate_ref", "rad/s", "its rate"),
-    **_of_planes("acceleration_ref", "rad/s^2", "its acceleration"),
-    **_of_planes("error", "rad", "bend less its reference"),
-    **_of_planes("torque_wanted", "N m", "torque that the controller wants"),
-    **_of_planes("torque", "N m", "torque of the commanded tensions on the one-segment model"),
-    "share": ("1", "share of the wanted torque that the tendons could give"),
-    **_AXES,
 }
 OF_LOAD_CELLS: Columns = _of_tendons("pull", "N", "by load cell as read last; empty where it gives nothing")
 WIRE: Columns = {
@@ -114,12 +91,6 @@ FRAMES: Columns = {
         for axis, meaning in (("x", "rightward"), ("y", "downward"))
     },
 }
-SPATIAL_FRAMES: Columns = {
-    "trial": FRAMES["trial"],
-    "plane": ("", "ulnar or flexion: the bending plane that the camera looks at"),
-    **{"bend" if name == "theta" else name: meaning for name, meaning in FRAMES.items() if name != "trial"},
-    "bend": ("rad", "bend in that plane, by the marker's angle and the other bend; empty where unusable"),
-}
 _RESERVED = 4 << 20
 # Rows of truth written in one tick: well above the five that it adds, and nothing that a tick would be late by.
 _AT_ONCE = 40
@@ -134,22 +105,45 @@ def residual_columns(weighed: bool) -> Columns:
     }
 
 
+def tick_columns(planes: int) -> Columns:
+    """Columns of the control ticks of a rig with so many planes; load cells have further ones."""
+    of_planes = _by_plane(planes, _OF_A_PLANE)
+    if planes > 1:  # no network stands behind such a reference, and the planes share the tendons
+        of_planes = {name: column for name, column in of_planes.items() if not name.startswith("bend_desired")}
+        of_planes["share"] = ("1", "share of the wanted torque that the tendons could give")
+    return {**_CLOCKS, **of_planes, **_AXES}
+
+
+def frame_columns(planes: int) -> Columns:
+    """Columns of a trial's frames, of one camera or of two."""
+    if planes == 1:
+        return FRAMES
+    named = {"bend" if name == "theta" else name: meaning for name, meaning in FRAMES.items() if name != "trial"}
+    return {
+        "trial": FRAMES["trial"],
+        "plane": ("", "ulnar or flexion: the bending plane that the camera looks at"),
+        **named,
+        "bend": ("rad", "bend in that plane, by the marker's angle and the other bend; empty where unusable"),
+    }
+
+
 def truth_columns(coordinates: int, planes: int = 1) -> Columns:
     """Columns of the emulated bench's true values, for a wrist of so many coordinates."""
-    of_segments = {f"theta_{k + 1}": ("rad", "true angle of one segment") for k in range(coordinates)}
-    bend = {"theta": ("rad", "true bending angle")}
-    if planes == 2:
-        of_segments = {
-            f"bend_{k // 2 + 1}_{PLANES[k % 2]}": ("rad", f"true bend of one segment, toward {PLANES[k % 2]}")
-            for k in range(coordinates)
-        }
-        bend = _of_planes("bend", "rad", "true bend of the last disc")
+    of_segments = {f"bend_{k + 1}": ("rad", "true angle of one segment") for k in range(coordinates // planes)}
     return {
         "trial": ("", "number, from 0"),
         "time": ("s", "since the trial's motion began"),
-        **of_segments,
-        **bend,
+        **_by_plane(planes, {**of_segments, "bend": ("rad", "true bending angle")}),
         **_of_tendons("pull", "N", "true tension at the spool"),
+    }
+
+
+def _by_plane(planes: int, columns: Columns) -> dict[str, tuple[str, str]]:
+    """The columns of each of so many planes; one alone needs no name."""
+    return {
+        column_of(name, plane, planes): (unit, meaning if planes == 1 else f"{meaning}, toward {plane}")
+        for name, (unit, meaning) in columns.items()
+        for plane in PLANES[:planes]
     }
 
 
@@ -229,9 +223,8 @@ class TrialLog:
     ) -> None:  # fmt: skip
         self.disk, self._monotonic = Disk(folder), monotonic
         self._planes = planes
-        of_ticks, frames = (LOG, FRAMES) if planes == 1 else (SPATIAL_LOG, SPATIAL_FRAMES)
-        ticks = {**of_ticks, **OF_LOAD_CELLS} if weighed else of_ticks
-        tables = {"log": ticks, "between": ticks, "frames": frames, "wire": WIRE}
+        ticks = {**tick_columns(planes), **(OF_LOAD_CELLS if weighed else {})}
+        tables = {"log": ticks, "between": ticks, "frames": frame_columns(planes), "wire": WIRE}
         tables["residuals"] = residual_columns(weighed)
         if coordinates is not None:
             tables["truth"] = truth_columns(coordinates, planes)
