@@ -1,6 +1,6 @@
 """Tables and figures of hw-run: beside the paper's experiment and a simulation of the same trials."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -22,7 +22,10 @@ from wristctl.wrist.kinematics import Inverse
 # The simulation of each trial, by its number.
 Twins = dict[int, Simulation]
 
-_MEANS = ("rmse", "steady_state", "settling", "recovery", "true_rmse", "true_steady_state")
+_MEANS = {
+    "rmse": "rad", "steady_state": "rad", "settling": "s", "recovery": "s", "true_rmse": "rad",
+    "true_steady_state": "rad",
+}  # fmt: skip
 _COLUMNS = (
     "", "trials", "RMSE [rad]", "steady state [rad]", "settling [s]", "recovery [s]", "true RMSE [rad]",
     "true steady state [rad]", "simulated RMSE [rad]", "simulated steady state [rad]",
@@ -40,9 +43,11 @@ def trial_tables(
 ) -> tuple[list[Table], Twins]:
     """Tables of all trials that ended well, with metrics and figures, and the simulation of each."""
     trials = completed(trials)
-    twins = _twins(session, trials, network, tuned)
+    twins = twins_of(session, trials, network, tuned)
     theirs = bool((trials["controller"] == "smc").any())
-    rows = [*_means(session, trials, twins), *(_papers() if theirs else ())]
+    labels = [row.label for row in session.study.hw_run.rows]
+    means = means_of_trials(session.findings, trials, labels, twins, _MEANS, ("rmse", "steady_state"))
+    rows = [*means, *(_papers() if theirs else ())]
     by_trial = Table("Trials, in the order done", list(_BY_TRIAL.values()), trials[list(_BY_TRIAL)].to_numpy().tolist())
     with session.drawing():
         _draw(session, trials, twins)
@@ -50,13 +55,13 @@ def trial_tables(
     return [Table(title, _COLUMNS, rows), by_trial], twins
 
 
-def _twins(session: Session, trials: pd.DataFrame, network: Inverse | None, tuned: Gains | None) -> Twins:
-    """Simulation of every trial. Repetitions share one."""
+def twins_of(session: Session, done: pd.DataFrame, network: Inverse | None, tuned: Gains | None) -> Twins:
+    """Simulation of every trial that ended well. Repetitions share one."""
     names = [row.label for row in session.study.hw_run.rows]
     simulated: dict[tuple[Any, ...], Simulation] = {}
     twins = {}
-    with session.progress("simulating the same trials"):
-        for row in trials.to_dict("records"):
+    with session.progress("compiling and simulating the same trials"):
+        for row in done.to_dict("records"):
             key = row["direction"], row["push"], row["label"]
             if key not in simulated:
                 trial = Trial(row["trial"], row["direction"], 0, row["push"], names.index(row["label"]))
@@ -65,26 +70,26 @@ def _twins(session: Session, trials: pd.DataFrame, network: Inverse | None, tune
     return twins
 
 
-def _means(session: Session, trials: pd.DataFrame, twins: Twins) -> Iterator[tuple[Any, ...]]:
-    """A row for each controller with and without a push; a metric for each number."""
-    labels = [row.label for row in session.study.hw_run.rows]
+def means_of_trials(
+    findings: Findings, done: pd.DataFrame, labels: Sequence[str], twins: Twins, units: Mapping[str, str],
+    simulated: Sequence[str],
+) -> Iterator[tuple[Any, ...]]:  # fmt: skip
+    """A row for each controller with and without a push: number of trials, means of the metrics that have units here,
+    and means of those `simulated`. A metric for each number; what follows a push only with one."""
     for label, pushed in ((label, pushed) for pushed in (False, True) for label in labels):
-        group = trials[(trials["label"] == label) & ((trials["push"] != 0.0) == pushed)]
+        group = done[(done["label"] == label) & ((done["push"] != 0.0) == pushed)]
         if group.empty:
             continue
-        means = {name: float(group[name].mean(skipna=False)) for name in _MEANS}
-        simulated = [
-            float(np.mean([twins[number].metrics[name] for number in group["trial"]]))
-            for name in ("rmse", "steady_state")
-        ]
-        for name, unit in zip(_MEANS, ("rad", "rad", "s", "s", "rad", "rad"), strict=True):
-            if name == "recovery" and not pushed:
+        means = {name: float(group[name].mean(skipna=False)) for name in units}
+        model = [float(np.mean([twins[number].metrics[name] for number in group["trial"]])) for name in simulated]
+        for name, unit in units.items():
+            if name.endswith("recovery") and not pushed:
                 continue
             whose = [label.replace("/", "-").replace(" ", "-")] if len(labels) > 1 else []
             full = "_".join([*["pushed"] * pushed, name, *whose])
             meaning = f"mean over trials{' with a push' * pushed}, {label}"
-            session.findings.metric(full, means[name], unit, "lower", n=len(group), meaning=meaning)
-        yield (f"{label}{', pushed' * pushed}", len(group), *means.values(), *simulated)
+            findings.metric(full, means[name], unit, "lower", n=len(group), meaning=meaning)
+        yield (f"{label}{', pushed' * pushed}", len(group), *means.values(), *model)
 
 
 def _papers() -> Iterator[tuple[Any, ...]]:

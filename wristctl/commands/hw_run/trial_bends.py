@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, NamedTuple
 from wristctl.commands.answer import Answer
 from wristctl.commands.hw_run.answer import APART, ROWS, TrialWords, answer_of, completed, in_deg, in_s, marks_of
 from wristctl.commands.printed_table import Table, two
-from wristctl.commands.results import Findings, StudyResult
+from wristctl.commands.results import StudyResult
 from wristctl.commands.session import Session
 from wristctl.control.table import Gains
 
@@ -20,12 +20,10 @@ if TYPE_CHECKING:
 
     from wristctl.simulation.repetitions import Simulation
 
-_MEANS = (
-    "rmse_ulnar", "rmse_flexion", "rmse", "steady_state", "settling", "recovery", "true_rmse_ulnar",
-    "true_rmse_flexion", "true_rmse", "true_recovery",
-)  # fmt: skip
-_UNITS = ("rad", "rad", "rad", "rad", "s", "s", "rad", "rad", "rad", "s")
-_OF_PUSH = ("recovery", "true_recovery")
+_MEANS = {
+    "rmse_ulnar": "rad", "rmse_flexion": "rad", "rmse": "rad", "steady_state": "rad", "settling": "s", "recovery": "s",
+    "true_rmse_ulnar": "rad", "true_rmse_flexion": "rad", "true_rmse": "rad", "true_recovery": "s",
+}  # fmt: skip
 _BY_TRIAL = {
     "trial": "trial", "direction": "motion", "push": "push [N]", "label": "controller",
     "rmse_ulnar": "RMSE toward ulnar [rad]", "rmse_flexion": "RMSE toward flexion [rad]", "rmse": "RMSE [rad]",
@@ -94,51 +92,20 @@ def _errors(trials: pd.DataFrame, twins: Mapping[int, Simulation]) -> _Errors:
 
 def bends_performed(session: Session, trials: pd.DataFrame, tuned: Gains | None) -> PerformedBends:
     """Tables, metrics and figures of trials in two planes, with the simulation of each."""
-    from wristctl.trial.trial_results import twin
-    from wristctl.trial.trials import Trial
+    from wristctl.commands.hw_run.results import means_of_trials, twins_of
 
-    study, findings, settings = session.study, session.findings, session.study.hw_run
-    done = completed(trials)
-    names, twins = [row.label for row in settings.rows], dict[int, "Simulation"]()
-    simulated = dict[tuple[str, float, str], "Simulation"]()
-    with session.progress("compiling and simulating the same trials"):
-        for row in done.to_dict("records"):
-            key = row["direction"], row["push"], row["label"]
-            if key not in simulated:
-                trial = Trial(row["trial"], row["direction"], 0, row["push"], names.index(row["label"]))
-                simulated[key] = twin(study, trial, None, tuned)
-            twins[row["trial"]] = simulated[key]
-    rows = _means(findings, done, names, twins)
+    study, findings, done = session.study, session.findings, completed(trials)
+    labels = [row.label for row in study.hw_run.rows]
+    twins = twins_of(session, done, None, tuned)
+    rows = list(means_of_trials(findings, done, labels, twins, _MEANS, ("rmse_ulnar", "rmse_flexion")))
     with session.drawing():
         _draw(session, done, twins)
-    columns = ("", "trials", *(f"{name.replace('_', ' ')} [{unit}]" for name, unit in zip(_MEANS, _UNITS, strict=True)))
+    columns = ("", "trials", *(f"{name.replace('_', ' ')} [{unit}]" for name, unit in _MEANS.items()))
     simulated_columns = "simulated RMSE toward ulnar [rad]", "simulated RMSE toward flexion [rad]"
     by_trial = Table("Trials, in the order done", list(_BY_TRIAL.values()), done[list(_BY_TRIAL)].to_numpy().tolist())
     tables = [Table("Means over the trials", (*columns, *simulated_columns), rows), by_trial]
     findings.headline("rmse", "rmse_ulnar", "rmse_flexion", "true_rmse", "pushed_true_rmse")
     return PerformedBends(study, findings, tables, trials, twins)
-
-
-def _means(
-    findings: Findings, done: pd.DataFrame, labels: Sequence[str], twins: Mapping[int, Simulation]
-) -> list[tuple[object, ...]]:
-    """A row for each controller with and without a push; a metric for each number."""
-    rows: list[tuple[object, ...]] = []
-    for label, pushed in ((label, pushed) for pushed in (False, True) for label in labels):
-        group = done[(done["label"] == label) & ((done["push"] != 0.0) == pushed)]
-        if group.empty:
-            continue
-        means = {name: float(group[name].mean(skipna=False)) for name in _MEANS}
-        for name, unit in zip(_MEANS, _UNITS, strict=True):
-            if math.isfinite(means[name]) and (pushed or name not in _OF_PUSH):
-                whose = [label.replace("/", "-").replace(" ", "-")] if len(labels) > 1 else []
-                full = "_".join([*["pushed"] * pushed, name, *whose])
-                meaning = f"mean over trials{' with a push' * pushed}, {label}"
-                findings.metric(full, means[name], unit, "lower", n=len(group), meaning=meaning)
-        courses = [twins[number].metrics for number in group["trial"]]
-        simulated = [sum(course[name] for course in courses) / len(courses) for name in ("rmse_ulnar", "rmse_flexion")]
-        rows.append((f"{label}{', pushed' * pushed}", len(group), *means.values(), *simulated))
-    return rows
 
 
 def _draw(session: Session, done: pd.DataFrame, twins: Mapping[int, Simulation]) -> None:
