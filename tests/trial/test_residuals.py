@@ -268,3 +268,12 @@ def test_pictures_that_are_no_news_and_commands_sent_again_are_counted_over_the_
         expected = {0.0: (5, 0), 0.5: (5, 3), 0.99: (5, 3), 1.01: (0, 3), 3.0: (0, 1)}[clock]
         assert (watch._values["repeated"], watch._values["resent"]) == expected
     assert "5 pictures within a second were no news" in watch.words() and "3 commands" in watch.words()
+
+
+def test_a_tension_is_told_of_spools_that_were_counted_lately_alone() -> None:
+    watch, _ = watching()
+    pulling = WELL._replace(position=np.full(4, 500.0))
+    told = watch.see(pulling._replace(unheard=1.1 * PERIOD), 0.0)["pull"]
+    assert told > 1.0
+    assert math.isnan(watch.see(pulling._replace(unheard=3.0 * PERIOD, clock=0.01), 0.0)["pull"])
+    assert watch.see(pulling._replace(unheard=PERIOD, clock=0.02), 0.0)["pull"] == told

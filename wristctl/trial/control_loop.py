@@ -225,7 +225,8 @@ class ControlLoop:
         """Raises SafetyStop where a residual is beyond its limit; all are logged before."""
         taut, _ = self._belief.taut(estimate.theta)
         delay, resent = late + self._skipped * self._period, self._board.traffic.resent
-        tick = Tick(clock, delay, estimate, position, taut, self._status.state, self._status.lapses, resent)
+        state, lapses = self._status.state, self._status.lapses
+        tick = Tick(clock, delay, estimate, position, taut, state, lapses, resent, clock - self._counted)
         self._log.residuals(trial, clock, self.watch.see(tick, min(self._last_usable)))
         self.watch.judge(tick)
 

@@ -36,6 +36,8 @@ _FIX = (
     "cut the motors' supply, slacken the tendons by hand, look (documentation: Faults and refusals), then wristctl hw "
     "check --rig"
 )
+# Periods after which spools' steps that were counted are old: those of the tick before are one.
+_UNHEARD = 2.5
 # Share of the limit on a bend across by which what stands may seem to bend.
 _DOUBTFUL = 0.5
 _FOLLOWING = "jump", "across", "load", "apart"
@@ -57,6 +59,8 @@ class Tick(NamedTuple):
     """Step rates that have outlived their life, as the board counts, modulo 256."""
     resent: int
     """Commands sent again, as the host counts."""
+    unheard: float = 0.0
+    """Time since the board has counted the spools' steps."""
 
 
 class _Past(NamedTuple):
@@ -141,7 +145,7 @@ class Watch:
             "angle": _size(tick.estimate.theta),
             "rate": _size(tick.estimate.rate),
             "age": tick.clock - last_usable,
-            "pull": max(0.0, float(self._spools.tension(tick.position, tick.taut).max())) if finite else math.nan,
+            "pull": self._pull(tick) if finite else math.nan,
             **self._weighed(tick.clock, tick.position, tick.taut),
             "travel": float(np.abs(tick.position).max()) * self._spools.step,
             "disabled": float(tick.state != State.ENABLED),
@@ -162,6 +166,11 @@ class Watch:
         beyond = self._judge.beyond(tick.clock, self._values)
         if beyond is not None:
             raise self._stop(beyond, tick)
+
+    def _pull(self, tick: Tick) -> float:
+        """Largest tension [N]; of spools that nobody has heard of lately, while the wrist goes on, none is known."""
+        pull = max(0.0, float(self._spools.tension(tick.position, tick.taut).max()))
+        return pull if tick.unheard < _UNHEARD * self._period else math.nan
 
     def _weighed(self, clock: float, position: Array, taut: Array) -> dict[str, float]:
         stretch = self._spools.step * position - taut
