@@ -25,7 +25,7 @@ from wristctl.commands.session import Done, Event
 from wristctl.escape import printable_lines
 
 # Keywords with which the console prints text that is not rich's markup.
-PLAIN: dict[str, Any] = {"markup": False, "highlight": False, "soft_wrap": True}
+PLAIN: dict[str, Any] = {"markup": False, "emoji": False, "highlight": False, "soft_wrap": True}
 
 # Seconds after which a step that is not over has a plain line; each line later doubles the time, up to the most.
 _FIRST_LINE, _LINE_EVERY = 10.0, 300.0

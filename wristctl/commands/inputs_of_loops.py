@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Iterable, Mapping
-from typing import TYPE_CHECKING, Protocol
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Protocol
 
 from wristctl.commands.inputs import Inputs, check_sides
 from wristctl.config.compare import CompareSettings
@@ -16,6 +17,7 @@ from wristctl.config.study import Study
 from wristctl.config.tune import TuneSettings
 from wristctl.config.wrist import WristParameters
 from wristctl.errors import Argument, Call, UserError, meant
+from wristctl.plain_files import read_json
 from wristctl.records import Run
 
 if TYPE_CHECKING:
@@ -26,7 +28,7 @@ if TYPE_CHECKING:
 
 log = logging.getLogger(__name__)
 
-IDENTIFIED = "data/identified.yaml"
+IDENTIFIED, RATIOS = "data/identified.yaml", "data/ratios.json"
 """File of an identify run with its wrist, a study file; missing where too little was told."""
 
 
@@ -222,12 +224,10 @@ def identified(study: Study, command: str, inputs: Inputs) -> Study:
 
     Raises UserError for a wrist with other tendons than the command bends.
     """
-    from wristctl.identification.unknowns import with_identified
-
-    text = inputs.read("from_identified", _identified_yaml)
-    if text is None:
+    found_by = inputs.read("from_identified", _what_was_found)
+    if found_by is None:
         return study
-    found = with_identified(study, command, text)
+    found = with_found(study, command, found_by)
     if command == "hw-run":
         try:
             check_sides(found.wrist, command)
@@ -261,18 +261,46 @@ def _network(earlier: Run | _Training) -> Network:
     return load_network(earlier.file(NETWORK)) if isinstance(earlier, Run) else earlier.network
 
 
-def _identified_yaml(earlier: Run | _Identification) -> str:
+@dataclass
+class Found:
+    """What an identification has found, and whose run it is."""
+
+    run: str
+    yaml: str
+    """Study file of the wrist; empty where a log told ratios alone."""
+    ratios: Mapping[str, Any] | None = None
+    said: bool = False
+    """Whether a person has been told which settings are whose."""
+
+
+def with_found(study: Study, command: str, found: Found) -> Study:
+    """The study with the wrist that was found. UserError where a log told ratios and nobody says the stiffness."""
+    from wristctl.identification.ratios import wrist_by_ratios
+    from wristctl.identification.unknowns import with_identified
+
+    text = found.yaml
+    if found.ratios is not None:
+        wrist = wrist_by_ratios(found.ratios, study, found.run)
+        if not found.said:
+            log.info("%s", wrist.said(found.run))
+        found.said = True
+        text = wrist.yaml
+    return with_identified(study, command, text)
+
+
+def found_in(run: Run) -> Found:
+    """What a run of `identify` has found. Raises UserError where that is no wrist."""
+    if run.has(IDENTIFIED):
+        return Found(run.id, run.file(IDENTIFIED).read_text(encoding="utf-8"))
+    if run.has(RATIOS):
+        return Found(run.id, "", read_json(run.file(RATIOS)))
+    raise UserError("no wrist was identified there", run.id, "an identify run that did not refuse its logs or trials")
+
+
+def _what_was_found(earlier: Run | _Identification) -> Found:
     if isinstance(earlier, Run):
-        text = ""
-        if earlier.has(IDENTIFIED):
-            text = earlier.file(IDENTIFIED).read_text(encoding="utf-8")
-    else:
-        text = getattr(earlier, "yaml", "")
-    if not text:
-        run = earlier.id if isinstance(earlier, Run) else "identify"
-        fix = "identify runs of hw-run, or logs in two planes with model: wrist (documentation: System identification)"
-        raise UserError("no wrist was identified there: its log told ratios alone, or too little", run, fix)
-    return text
+        return found_in(earlier)
+    return Found("identify", getattr(earlier, "yaml", ""), getattr(earlier, "ratios", None))
 
 
 def family_of(families: Mapping[str, Family], name: str, where: str) -> Family:

@@ -221,6 +221,16 @@ def _is_fitted(numbers: NDArray[np.int64]) -> NDArray[np.bool_]:
     return even
 
 
+def rate_of_logs(logs: Sequence[OpenLog]) -> float:
+    """Readings of the motion per second: of what is there of bends or the tip, the median over trials."""
+    rates = []
+    for trial in (trial for log in logs for trial in log.trials().values()):
+        moved = [column for name, column in trial.columns.items() if name.startswith(("bend_", "tip_", "inclination"))]
+        clock = trial.columns["time"][np.isfinite(np.stack(moved)).any(axis=0)]
+        rates.append(1.0 / float(np.median(np.diff(clock))))
+    return float(np.median(rates))
+
+
 def everything_fitted(recordings: Sequence[ArcRecording]) -> list[ArcRecording]:
     """The recordings with all samples for fitting."""
     return [

@@ -33,13 +33,12 @@ class Exported(NamedTuple):
 def study_of(run: Run) -> tuple[Study, str]:
     """The study of a run with the wrist and motors that it found, or else that its controller knew, and which wrist it
     is, in words."""
-    from wristctl.identification.unknowns import with_identified
+    from wristctl.commands.inputs_of_loops import found_in, with_found
 
     source = run if run.kind == "identify" else identified_in(run)
     if source is None:
         return run.config, f"the wrist of run {run.id}"
-    text = source.file("data/identified.yaml").read_text(encoding="utf-8")
-    return with_identified(run.config, "simulate", text), f"the wrist that run {source.id} identified"
+    return with_found(run.config, "simulate", found_in(source)), f"the wrist that run {source.id} identified"
 
 
 def identified_in(run: Run) -> Run | None:

@@ -10,12 +10,11 @@ import numpy as np
 
 from wristctl.arrays import Array
 from wristctl.commands.export.model import identified_in
-from wristctl.commands.inputs_of_loops import IDENTIFIED
+from wristctl.commands.inputs_of_loops import found_in, with_found
 from wristctl.config.loop import Loop
 from wristctl.config.study import Study
 from wristctl.errors import FILE, UserError
 from wristctl.identification.measured_trials import answered
-from wristctl.identification.unknowns import with_identified
 from wristctl.records import Run
 from wristctl.records.formats import read_arrays, read_table
 from wristctl.records.open_log import OpenLog, write_log
@@ -122,7 +121,7 @@ def _study_of(run: Run) -> Study:
     source = identified_in(run)
     if source is None:
         return run.config
-    return with_identified(run.config, "simulate", source.file(IDENTIFIED).read_text(encoding="utf-8"))
+    return with_found(run.config, "simulate", found_in(source))
 
 
 def _slides_freely(loop: Loop) -> bool:

@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from wristctl.commands.answer import Answer
 from wristctl.commands.inputs import Inputs
@@ -39,6 +39,15 @@ class LogTold(StudyResult):
     chosen: TriedModel
     remarks: Sequence[str] = ()
     """Which tendons were taken to pull to which side, where the motion says it, and how many samples were used."""
+    rate: float | None = None
+    """Readings of the motion per second; None without times."""
+
+    @property
+    def ratios(self) -> dict[str, Any]:
+        """What it tells of a wrist whose stiffness is given: `identification.ratios`."""
+        from wristctl.identification.ratios import ratios_of
+
+        return ratios_of(self.fit, self.rate)
 
     @property
     def answer(self) -> Answer:
@@ -65,10 +74,12 @@ class _Read(NamedTuple):
     remarks: list[str]
     """Which tendons pull to which side, where the motion says it, what reading and looking mended, and how many
     samples are used if not all are."""
+    rate: float | None
+    """Readings of the motion per second; None without times."""
 
 
 def _read(study: Study) -> _Read:
-    from wristctl.identification.log_model import recordings_of_logs, robot_of_logs, spools_of_log
+    from wristctl.identification.log_model import rate_of_logs, recordings_of_logs, robot_of_logs, spools_of_log
     from wristctl.records.log_converters import read_log
     from wristctl.records.log_looks import looked_at
 
@@ -80,7 +91,8 @@ def _read(study: Study) -> _Read:
     read, used = sum(map(len, logs)), sum(len(recording.time) for recording in recordings)
     fewer = f"Of {read} samples the models are fitted at {used} instants, evenly over each trial."
     remarks = [remark for log in logs for remark in log.remarks]
-    return _Read(robot, recordings, read, [*remarks, *[sides] * bool(sides), *[fewer] * (used < read)])
+    rate = rate_of_logs(logs) if robot.timed else None
+    return _Read(robot, recordings, read, [*remarks, *[sides] * bool(sides), *[fewer] * (used < read)], rate)
 
 
 def _sides(robot: ArcRobot, numbers: Sequence[int]) -> str:
@@ -94,7 +106,7 @@ def log_plan(study: Study, inputs: Inputs) -> str:
     """Say what is looked for in which logs."""
     if inputs.runs():
         raise UserError("runs and logs at once", "identify.runs", "identify one or the other")
-    robot, recordings, samples, remarks = _read(study)
+    robot, recordings, samples, remarks, _ = _read(study)
     names = ", ".join(robot.unknowns(()))
     plan = f"{names}, then slack, friction and creep, from {len(recordings)} trials of open logs, {samples} samples"
     return "\n".join([plan, *remarks])
@@ -107,10 +119,11 @@ def identify_logs(session: Session) -> LogTold:
     from wristctl.identification.arc_fit import fit_arcs
     from wristctl.identification.log_model import everything_fitted
     from wristctl.identification.model_choice import chosen_of, tried_models
+    from wristctl.identification.ratios import FILE
     from wristctl.identification.real_robots import RealRobot
 
     findings, study = session.findings, session.study
-    robot, recordings, _, remarks = _read(study)
+    robot, recordings, _, remarks, rate = _read(study)
     models = list["TriedModel"]()
     with session.progress("fitting models") as report:
         for model in tried_models(robot, [recordings], False):
@@ -133,9 +146,10 @@ def identify_logs(session: Session) -> LogTold:
         findings.figure("models", errors_of_models, about, models, caption="error of each model")
     findings.overview.figure = "motion"
     result = LogTold(
-        study, findings, [_models_table(models, robot), parameters_table([fit], "")], fit, models, chosen, remarks
+        study, findings, [_models_table(models, robot), parameters_table([fit], "")], fit, models, chosen, remarks, rate
     )
     findings.table("data/parameters.csv", result.frame())
+    findings.plain(FILE, result.ratios)
     _refuse(session, result, recordings)
     return result
 

@@ -1,0 +1,130 @@
+"""What an open log tells without a force: ratios to the wrist's stiffness, which make a wrist once that is known.
+
+The model is `arc_robot`'s single arc: a tendon of stiffness k at radius r weighs k r^2 / K, damping D counts as D / K,
+where K is what the wrist shows in its pose, its springs and its weight together. A winch whose length arrives
+`gain` times is a circle of tendons `gain` times smaller, of tendons gain^2 as stiff.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from wristctl.config.study import Study
+from wristctl.config.wrist import TendonPlace
+from wristctl.errors import UserError
+from wristctl.identification.arc_fit import ArcFit
+from wristctl.identification.unknowns import identified_yaml
+from wristctl.wrist.statics import straight_stiffness
+from wristctl.wrist.tendon_layout import TendonLayout
+
+FILE, SCHEMA = "data/ratios.json", "wristctl.ratios/1"
+# Unknowns of the arc that a wrist's settings have.
+_USED = ("gain", "tendon", "turn", "damping", "delay", "friction", "sheath", "presliding", "force")
+# Largest delay of a camera [frames].
+_MOST_DELAYED = 20.0
+
+
+def ratios_of(fit: ArcFit, rate: float | None) -> dict[str, Any]:
+    """For JSON: each value that the data tell, the tendons' directions [rad] and radius [m], readings a second."""
+    told = {name: one.value for name, one in fit.told.items() if name in _USED and one.known}
+    robot = fit.robot
+    return {
+        "schema": SCHEMA,
+        "values": told,
+        "angles": [float(angle) for angle in robot.angles],
+        "radius": robot.radius,
+        "rate": rate,
+    }
+
+
+class LogWrist(NamedTuple):
+    """A wrist by a log and by what was given beside it."""
+
+    yaml: str
+    """As `identified.yaml`."""
+    told: list[str]
+    """Settings that the log tells, by their paths."""
+    given: list[str]
+    assumed: list[str]
+    """Those that stay as the study has them by default."""
+
+    def said(self, run: str) -> str:
+        """Which settings are whose, in a sentence."""
+        parts = [f"the log of {run} tells {', '.join(self.told) or 'nothing of it'}"]
+        if self.given:
+            parts.append(f"the study {', '.join(self.given)}")
+        if self.assumed:
+            parts.append(f"assumed as by default: {', '.join(self.assumed)}")
+        return f"Of this wrist {'; '.join(parts)}."
+
+
+def wrist_by_ratios(ratios: Mapping[str, Any], study: Study, run: str) -> LogWrist:
+    """The wrist of a log's ratios, its stiffness by the log's tensions or by the study where that says it.
+
+    Raises UserError where neither does.
+    """
+    values, wrist = dict(ratios["values"]), study.wrist
+    stiffness = values.get("force")
+    if stiffness is None and "stiffness" not in wrist.model_fields_set:
+        fix = "--set wrist.stiffness=VALUE in N m/rad; or identify a log with tension_1 [N], ... of all tendons"
+        raise UserError("its log tells ratios to the wrist's stiffness, and nobody has said that", run, fix)
+    weight = float(straight_stiffness(wrist.model_copy(update={"pretension": 0.0}), 1)[0, 0]) - wrist.stiffness
+    shown = wrist.stiffness + weight if stiffness is None else float(stiffness)
+    if shown <= 0.0:
+        fix = "more wrist.stiffness, or how it stands: wrist.gravity, wrist.hand_mass"
+        raise UserError("a wrist of this stiffness buckles under its weight, and the log's did not", run, fix)
+    angles, gain = ratios["angles"], float(values.get("gain", 1.0))
+    radius = float(ratios["radius"]) / gain
+    found = {"stiffness": shown - weight, "tendon_radius": wrist.tendon_radius / gain}
+    told = ["wrist.tendon_radius"] * ("gain" in values) + ["wrist.stiffness"] * ("force" in values)
+    if "damping" in values:
+        found["damping"] = shown * float(values["damping"])
+        told.append("wrist.damping")
+    motors = study.simulate.loop.actuator
+    tendons = {
+        "tendon_stiffness": motors.tendon_stiffness,
+        "friction": motors.friction,
+        "presliding": motors.presliding,
+    }
+    tendons["sheath_friction"] = motors.friction * motors.sheath
+    if "tendon" in values:
+        alike = _tendons_of_one(len(angles), study)
+        tendons["tendon_stiffness"] = float(values["tendon"]) * shown / (float(ratios["radius"]) ** 2 * alike)
+        tendons["tendon_stiffness"] *= gain**2
+        told.append("actuator.tendon_stiffness")
+    for ratio, name in (("friction", "friction"), ("sheath", "sheath_friction"), ("presliding", "presliding")):
+        if ratio in values:
+            tendons[name] = float(values[ratio])
+            told.append(f"actuator.{ratio}")
+    camera = dict[str, float]()
+    if ratios["rate"] is not None and "delay" in values:
+        camera = {"frame_rate": float(ratios["rate"])}
+        camera["delay_frames"] = float(np.clip(values["delay"] * camera["frame_rate"], 0.0, _MOST_DELAYED))
+        told += ["sensor.frame_rate", "sensor.delay_frames"]
+    places = _places(angles, float(values.get("turn", 0.0)), radius, study)
+    told += ["wrist.tendons"] * bool(places)
+    given = sorted(f"wrist.{name}" for name in wrist.model_fields_set if f"wrist.{name}" not in told)
+    weighs = ("wrist.stiffness", "wrist.damping", "wrist.length", "wrist.hand_mass", "wrist.hand_offset",
+              "wrist.gravity", "actuator.tendon_stiffness", "actuator.friction", "sensor.delay_frames")  # fmt: skip
+    assumed = [name for name in weighs if name not in (*told, *given)]
+    return LogWrist(identified_yaml(found | tendons, camera, places), told, given, assumed)
+
+
+def _tendons_of_one(count: int, study: Study) -> int:
+    """How many tendons of the wrist one of the log stands for: of two antagonists each is a side of a square's."""
+    return 2 if count == 2 and TendonLayout.of(study.wrist).planes != 1 else 1
+
+
+def _places(angles: list[float], turn: float, radius: float, study: Study) -> list[TendonPlace]:
+    """Places of tendons that are not those of the study's wrist."""
+    own = TendonLayout.of(study.wrist)
+    if len(angles) == 2:
+        return []
+    at = sorted(round(math.degrees(angle + turn) % 360.0, 3) for angle in angles)
+    if len(set(at)) < len(at) or at == sorted(round(math.degrees(place.angle) % 360.0, 3) for place in own.places):
+        return []
+    return [TendonPlace(angle_deg=math.degrees(angle + turn), radius=radius) for angle in angles]
