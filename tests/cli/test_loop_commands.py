@@ -305,8 +305,9 @@ def test_gains_are_searched_on_worlds_and_rows_ranked_on_others_with_the_answer_
         "compare", *SOFT, "--set", "worlds={family: soft, draws: 12}", "--set", rows, "--tuned", tuned.id
     )
     assert code == 0, err
-    (best,) = [line for line in out.splitlines() if line.startswith("soft (12) ")]
-    assert best.index("ct-dob") < best.index("pd-ff") and "use ct-dob/tuned" in out.splitlines()[0]
+    of = {line.split()[0]: line for line in out.splitlines() if line.startswith(("ct-dob/tuned ", "pd-ff/default "))}
+    assert len(of) == 2 and "*" in of["ct-dob/tuned"] and "*" not in of["pd-ff/default"]
+    assert "use ct-dob/tuned" in out.splitlines()[0]
     run = open_run("latest:compare")
     assert (run.path / "README.md").read_text().index("use ct-dob/tuned") < 2000
     assert run.problems() == [] and len(run.data("worlds")) == 3 * 12

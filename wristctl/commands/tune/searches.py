@@ -21,6 +21,9 @@ if TYPE_CHECKING:
 
 log = logging.getLogger(__name__)
 
+# Seconds of a search from which it is said how long it takes.
+_WORTH_SAYING = 5.0
+
 
 def search_all(session: Session, study: Study, network: Inverse | None) -> dict[str, Search]:
     """Tune every controller of the study's tune section; what was found is kept also where it is cut short."""
@@ -32,9 +35,8 @@ def search_all(session: Session, study: Study, network: Inverse | None) -> dict[
     judge, choose = judges_of(study, network)
     laws = {name: controller(name) for name in settings.controllers}
     fresh = [law for name, law in laws.items() if _known(session, name) is None]
-    if fresh:
-        about = duration(_seconds((judge, choose), fresh, study))
-        log.info("searching gains of %s: about %s", ", ".join(law.name for law in fresh), about)
+    if fresh and (seconds := _seconds((judge, choose), fresh, study)) > _WORTH_SAYING:
+        log.info("searching gains of %s: about %s", ", ".join(law.name for law in fresh), duration(seconds))
     searches: dict[str, Search] = {}
     try:
         for name in settings.controllers:
