@@ -30,7 +30,7 @@ def swing(time: Array, theta: Array) -> tuple[float, float]:
 
 
 @pytest.mark.parametrize("ramp", [50_000.0, 200_000.0])
-@pytest.mark.parametrize("stronger", [1.0, 3.0, 5.0])
+@pytest.mark.parametrize("stronger", [1.0, 5.0])
 @pytest.mark.slow
 def test_a_simulation_swings_as_the_emulated_rig_does(experiment: Run, stronger: float, ramp: float) -> None:
     law = controller("pid-ff")
