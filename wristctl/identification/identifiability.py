@@ -135,9 +135,9 @@ def refuse(lacking: Mapping[str, float], offered: list[Addition], condition: flo
     """UserError that names what the trials do not tell and what to add; nothing where nothing is lacking."""
     if not lacking:
         return
-    told = ", ".join(f"{name} (+-{width_text(name, half)})" for name, half in lacking.items())
+    told = ", ".join(lacking)
     best = next((addition for addition in offered if addition.enough), None)
-    add = best.what if best else f"repetitions of {min(offered, key=_worst).what}"
+    add = best.what if best else f"repetitions of {min(offered, key=worst).what}"
     name = next(iter(lacking))
     fixed = Setting(f"fix.{name}={start[name]:g}", "identify")
     raise UserError(
@@ -148,7 +148,8 @@ def refuse(lacking: Mapping[str, float], offered: list[Addition], condition: flo
     )
 
 
-def _worst(addition: Addition) -> float:
+def worst(addition: Addition) -> float:
+    """The largest half interval that an addition would leave, over the parameter's tolerance."""
     return max(half / UNKNOWNS[name].tolerance for name, half in addition.half_widths.items())
 
 

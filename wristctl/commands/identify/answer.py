@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+import math
 import shlex
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from wristctl.commands.answer import Answer
-from wristctl.commands.printed_table import Table, degrees, number
+from wristctl.commands.printed_table import Table, degrees, joined, number
 
 if TYPE_CHECKING:
     from wristctl.identification.fit import Fit
+    from wristctl.identification.identifiability import Addition
     from wristctl.identification.intervals import Knowledge
     from wristctl.identification.lack_of_fit import Suspicion
 
@@ -45,19 +47,55 @@ def found_answer(fit: Fit, knowledge: Knowledge, suspected: Sequence[Suspicion],
 
 
 def refused_answer(
-    fit: Fit, knowledge: Knowledge, lacking: Mapping[str, float], suspected: Sequence[Suspicion], offers: Table | None
-) -> Answer:
-    """What the trials do not tell, and what to add: the refusal before the figures."""
-    if lacking:
-        sentence = f"Nothing to rely on: these trials do not tell {', '.join(lacking)} well enough."
-    else:
+    fit: Fit, knowledge: Knowledge, lacking: Mapping[str, float], suspected: Sequence[Suspicion],
+    offered: Sequence[Addition], runs: Sequence[str] = (),
+) -> Answer:  # fmt: skip
+    """What the trials do not tell, how well each is told, and the commands that record the rest.
+
+    `runs` are the paths of the runs that were identified; the first one's study is that of the trials to come.
+    """
+    more = "All tables are in the run's README.md."
+    if not lacking:
         sentence = "Nothing to rely on: the model does not fit these trials."
-    return Answer(
-        sentence,
-        parameter_table(fit, knowledge, lacking),
-        [*_misses(knowledge, suspected), *([offers] if offers else [])],
-        "All tables are in the run's README.md.",
-    )
+        return Answer(sentence, parameter_table(fit, knowledge, lacking), _misses(knowledge, suspected), more)
+    from wristctl.identification.identifiability import widest, width_text, worst
+
+    settings, free = fit.problem.settings, fit.problem.free
+    halves = {name: float(knowledge.half_widths[index]) for index, name in enumerate(free)}
+    wide = [name for name in lacking if halves[name] > widest(name, settings)]
+    if wide:
+        sentence = f"Nothing to rely on: these trials do not tell {joined(wide)} well enough"
+        sentence += ", nor the others beside them." if len(lacking) > len(wide) else "."
+    else:
+        sentence = f"Nothing to rely on: of {joined(list(lacking))} these trials tell a mixture, none by itself."
+    best = next((each for each in offered if each.enough), min(offered, key=worst, default=None))
+    heads = ["parameter", "told to within", "asked for", *["with more trials"] * (best is not None)]
+    rows = [
+        (
+            name,
+            width_text(name, halves[name]),
+            width_text(name, widest(name, settings)) if math.isfinite(widest(name, settings)) else "-",
+            *([width_text(name, best.half_widths[name])] if best else []),
+        )
+        for name in lacking
+    ]
+    notes: list[str | Table] = [*_misses(knowledge, suspected)]
+    if best is not None:
+        notes.append(f"More trials: {best.what}{'' if best.enough else ', several times'}.")
+    if runs:
+        mass = fit.problem.trials[0].wrist.hand_mass
+        lighter = mass - 0.2 if mass > 0.25 else mass + 0.2
+        study = f"{runs[0]}/config.yaml"
+        of_both = [f"latest:hw-run:{label}" for label in ("hand", "other-hand")]
+        notes += [
+            f"Quick steps tell damping from delay, and a second known mass, here {lighter:.3g} kg, tells springs from "
+            "tendons. Record both, then identify all together:",
+            f"$ {shlex.join(['wristctl', 'hw-run', study, 'identify', '--label', 'hand'])}",
+            f"$ {shlex.join(['wristctl', 'hw-run', study, 'identify', '--label', 'other-hand'])} "
+            f"--set wrist.hand_mass={lighter:.3g}",
+            f"$ {shlex.join(['wristctl', 'identify', *runs, *of_both])}",
+        ]
+    return Answer(sentence, Table("", tuple(heads), rows), notes, more)
 
 
 def parameter_table(fit: Fit, knowledge: Knowledge, lacking: Mapping[str, float]) -> Table:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import os
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -154,7 +155,8 @@ def identify(session: Session) -> Identified | LogTold | BendsTold:
     for suspicion in suspected:
         if suspicion.evident:
             log.warning("the trials look like %s, which the model has not; intervals are widened", suspicion.told)
-    refused = refused_answer(fitted, estimated, lacking, suspected, additions_table)
+    runs = [os.path.relpath(run.path) for run in session.inputs.runs().values()]
+    refused = refused_answer(fitted, estimated, lacking, suspected, offered, runs)
     with _told_if_refused(session, refused, tables):
         if settings.misfit == "refuse":
             refuse_misfit(fitted, sure, suspected, missed)
