@@ -65,6 +65,8 @@ def test_in_one_plane_all_take_a_fifth_tendon_in_the_centre_and_three_bend_in_tw
 def test_a_rig_says_what_takes_a_wrist_that_its_motors_do_not_wind(call: Call, motion: tuple[str, ...]) -> None:
     _, _, err = call("hw-run", *motion, "--set", "wrist.tendons=three", "--dry-run")
     assert "hw-run moves four tendons" in err and "wristctl simulate bends this wrist in two planes" in err
+    _, _, err = call("hw-run", *motion, "--set", "wrist.tendons=six", "--dry-run")
+    assert "4 axes" in err and "6 tendons off its axis" in err and "wristctl identify" in err
 
 
 def test_the_table_of_the_readme_says_which_command_bends_in_two_planes_and_takes_three_tendons(call: Call) -> None:

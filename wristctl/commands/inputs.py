@@ -172,6 +172,7 @@ def _stopped(ref: str | Path, wanted: EarlierRun, out: Path) -> Run:
 
 def check_sides(wrist: WristParameters, command: str) -> None:
     """UserError, naming what takes this wrist, unless its tendons are the four at 45 deg from both planes."""
+    from wristctl.board.messages import AXES
     from wristctl.wrist.tendon_layout import TendonLayout, key_of_tendon, off_both_sides
 
     odd = off_both_sides(wrist)
@@ -183,10 +184,14 @@ def check_sides(wrist: WristParameters, command: str) -> None:
         does = "judges the claims of the paper, whose wrist has"
     elsewhere = f"tendon {odd} of this wrist is elsewhere"
     problem = f"{command_of(command)} {does} four tendons at 45 deg from both planes; {elsewhere}"
+    wound = sum(place.multiplicity for place in TendonLayout.of(wrist).places if place.radius > 0.0)
+    if rig and wound > AXES:
+        problem = f"the motor board has {AXES} axes, and this wrist {wound} tendons off its axis"
     takes = " bends this wrist in two planes"
     others = " and others take it too (documentation: A wrist in two planes)"
     compares = ("; ", Call("compare"), ", ", Call("tune"), others)
-    fix: Phrase = (Call("simulate"), takes, *(() if rig else compares))
+    reads = ("; ", Call("identify"), " reads its robot's logs, ", Call("recommend"), " finds gains for it")
+    fix: Phrase = (Call("simulate"), takes, *(reads if rig else compares))
     if TendonLayout.of(wrist).planes == 1:  # and in no other
         square = math.sqrt(2.0) * wrist.tendon_radius
         fix = f"two tendons at 0 and two at 180 deg bend as `tendons: four` with tendon_radius: {square:.4g}"
