@@ -13,7 +13,7 @@ import wristctl
 from wristctl.commands.inputs import Inputs
 from wristctl.commands.recommend.answer import Candidate, Recommended
 from wristctl.commands.recommend.command import plan
-from wristctl.commands.recommend.rehearsals import Rehearsal, check_homing
+from wristctl.commands.recommend.rehearsals import Rehearsal, _scales, check_homing
 from wristctl.commands.results import Findings
 from wristctl.errors import UserError
 from wristctl.trial.rehearsed import Rehearsed, rehearse
@@ -82,6 +82,18 @@ def test_a_wrist_that_no_rig_can_home_is_refused_by_that_name_before_any_search(
     with pytest.raises(UserError):
         plan(study, Inputs({}))
     check_homing(wristctl.load_study(None, f"wrist.hand_mass={hand}", "recommend.loop.sensor.level=ideal"), 1)
+
+
+def test_springs_that_were_measured_are_not_taken_to_weaken() -> None:
+    """Upright, springs of 0.44 N m/rad hold the hand, those of 0.7 times as much do not."""
+    believed = wristctl.load_study(None, "wrist.stiffness=0.44")
+    with pytest.raises(UserError, match="weaken to"):
+        check_homing(believed, 1)
+    measured = believed.model_copy(update={"recommend": believed.recommend.measured()})
+    check_homing(measured, 1)
+    assert _scales(believed) == [0.7, 1.0] and _scales(measured) == [1.0]
+    wide = wristctl.load_study(None, "recommend.draw={plant.stiffness: x0.5..2}").recommend
+    assert wide.measured() == wide, "what somebody says stays"
 
 
 @pytest.mark.slow

@@ -285,7 +285,10 @@ def with_found(study: Study, command: str, found: Found) -> Study:
             log.info("%s", wrist.said(found.run))
         found.said = True
         text = wrist.yaml
-    return with_identified(study, command, text)
+    known = with_identified(study, command, text)
+    if command == "recommend":
+        return known.model_copy(update={"recommend": known.recommend.measured()})
+    return known
 
 
 def found_in(run: Run) -> Found:

@@ -1,7 +1,7 @@
 """Settings of `recommend`: which controllers are tuned for a wrist, on which rig, and for which motions."""
 
 from collections.abc import Iterable, Mapping
-from typing import Annotated, Any
+from typing import Annotated, Any, Self
 
 from pydantic import BeforeValidator, Field
 
@@ -24,6 +24,15 @@ _DRAWN: dict[str, Drawn] = {
     "plant_segments": (4, 4, 8),
     "plant.model": ("pcc", "pcc", "hinges"),
     "disturbances.load": "-0.3..0.3",
+}
+# The same of a rig whose wrist and tendons were identified.
+_MEASURED: dict[str, Drawn] = {
+    "plant.actuator.tendon_stiffness": "x0.9..1.1",
+    "plant.actuator.friction": "x0.7..1.4",
+    "plant.actuator.sheath": "x0.7..1.4",
+    "plant.stiffness": "x0.9..1.1",
+    "plant.damping": "x0.8..1.25",
+    "plant.tendon_radius": "x0.99..1.01",
 }
 _MOTIONS = (
     Reference(kind="minimum-jerk", duration=1.0),
@@ -106,6 +115,10 @@ class RecommendSettings(Section):
         ge=0, le=10,
     )  # fmt: skip
     from_identified: str | None = choice(None, "identify run whose parameters replace the study's")
+
+    def measured(self) -> Self:
+        """The settings for a wrist that was identified: where nobody says how, rigs differ by what that leaves open."""
+        return self if "draw" in self.model_fields_set else self.model_copy(update={"draw": _DRAWN | _MEASURED})
 
     def family(self, largest_deg: float, planes: int = 1) -> Family:
         """The simulated rigs, asked for angles of up to `largest_deg` to both sides, in two planes to any side."""

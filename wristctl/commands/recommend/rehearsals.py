@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from wristctl.commands.kept_studies import rig_of
 from wristctl.commands.recommend.study_file import sections_of, trial_of
+from wristctl.config.families import drawn_value
 from wristctl.errors import UserError
 
 if TYPE_CHECKING:
@@ -60,7 +61,8 @@ class Rehearsal(NamedTuple):
 def check_homing(study: Study, planes: int) -> None:
     """UserError, by its name, for a wrist that no rig can home: it buckles under its hand, or sags too far.
 
-    Only where the recommendation is for `hw-run`. Springs may have weakened to 0.7 of what is believed.
+    Only where the recommendation is for `hw-run`. Springs may have weakened to 0.7 of what is believed; those of a
+    wrist that was identified as far as rigs are drawn.
     """
     from wristctl.trial.resting import judge_weight, sag_of
     from wristctl.trial.rig_belief import PLANES
@@ -69,10 +71,11 @@ def check_homing(study: Study, planes: int) -> None:
         return
     names = PLANES if planes == 2 else ("ulnar",)
     judge_weight(study.hw_run, study.wrist, names)
-    weakened = study.wrist.model_copy(update={"stiffness": study.wrist.stiffness * _WEAKEST / _IN_HAND})
+    weakest = _weakest(study)
+    weakened = study.wrist.model_copy(update={"stiffness": study.wrist.stiffness * weakest / _IN_HAND})
     if any(math.isinf(sag_of(weakened, plane)) for plane in names):
         problem = (
-            f"without taut tendons the wrist buckles under its weight where its springs weaken to {_WEAKEST:g} of "
+            f"without taut tendons the wrist buckles under its weight where its springs weaken to {weakest:g} of "
             "their stiffness: no rig can be homed with it"
         )
         raise UserError(problem, "wrist", "a lighter hand, stiffer springs, or a hanging wrist (wrist.gravity)", 3)
@@ -88,7 +91,7 @@ def rehearsed(
     from wristctl.trial.rehearsed import rehearse
 
     runs: list[dict[float, Rehearsed]] = [{} for _ in rows]
-    scales = list(_scales(study))
+    scales = _scales(study)
     with session.progress("rehearsing on the emulated rig", total=len(scales), unit="rigs") as advance:
         for number, scale in enumerate(scales, start=1):
             asked = _asked(study, rows, reach_deg, planes, scale)
@@ -125,9 +128,17 @@ def motion_of_rehearsal(study: Study, reach_deg: float, planes: int) -> tuple[Re
     return asked, settings.horizon
 
 
-def _scales(study: Study) -> Iterator[float]:
-    """Shares of the believed stiffness: the emulated rig's own, and 1."""
-    yield from dict.fromkeys((study.hw_run.bench.plant.stiffness_scale, 1.0))
+def _scales(study: Study) -> list[float]:
+    """Shares of the believed stiffness: the emulated rig's own, where springs may be as weak, and 1."""
+    shares = dict.fromkeys((study.hw_run.bench.plant.stiffness_scale, 1.0))
+    return [share for share in shares if share >= _weakest(study)]
+
+
+def _weakest(study: Study) -> float:
+    """Share of the believed stiffness that springs may have."""
+    drawn = study.recommend.draw.get("plant.stiffness")
+    low = None if drawn is None else drawn_value(drawn, 0.0)
+    return max(_WEAKEST, float(low[1:])) if isinstance(low, str) and low.startswith("x") else _WEAKEST
 
 
 def _asked(
