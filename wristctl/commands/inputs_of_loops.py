@@ -29,6 +29,8 @@ if TYPE_CHECKING:
 log = logging.getLogger(__name__)
 
 IDENTIFIED, RATIOS = "data/identified.yaml", "data/ratios.json"
+# What puts the identified motors and camera into a loop.
+RIG = "--set loop.actuator.level=tendon --set loop.sensor.level=camera --set loop.control_period=0.01 has them"
 """File of an identify run with its wrist, a study file; missing where too little was told."""
 
 
@@ -283,6 +285,10 @@ def with_found(study: Study, command: str, found: Found) -> Study:
         wrist = wrist_by_ratios(found.ratios, study, found.run)
         if not found.said:
             log.info("%s", wrist.said(found.run))
+            if command == "simulate" and study.simulate.loop.is_exact:
+                log.info(
+                    "Motors and camera are exact here: tendons, friction and delay of the log take no part; %s", RIG
+                )
         found.said = True
         text = wrist.yaml
     known = with_identified(study, command, text)

@@ -46,15 +46,16 @@ class LogWrist(NamedTuple):
 
     yaml: str
     """As `identified.yaml`."""
-    told: list[str]
-    """Settings that the log tells, by their paths."""
+    told: dict[str, float | None]
+    """Settings that the log tells, by their paths, with their values; None of what is no number."""
     given: list[str]
     assumed: list[str]
     """Those that stay as the study has them by default."""
 
     def said(self, run: str) -> str:
         """Which settings are whose, in a sentence."""
-        parts = [f"the log of {run} tells {', '.join(self.told) or 'nothing of it'}"]
+        values = [f"{name} = {value:.4g}" if value is not None else name for name, value in self.told.items()]
+        parts = [f"the log of {run} tells {', '.join(values) or 'nothing of it'}"]
         if self.given:
             parts.append(f"the study {', '.join(self.given)}")
         if self.assumed:
@@ -80,10 +81,14 @@ def wrist_by_ratios(ratios: Mapping[str, Any], study: Study, run: str) -> LogWri
     angles, gain = ratios["angles"], float(values.get("gain", 1.0))
     radius = float(ratios["radius"]) / gain
     found = {"stiffness": shown - weight, "tendon_radius": wrist.tendon_radius / gain}
-    told = ["wrist.tendon_radius"] * ("gain" in values) + ["wrist.stiffness"] * ("force" in values)
+    told: dict[str, float | None] = {}
+    if "gain" in values:
+        told["wrist.tendon_radius"] = found["tendon_radius"]
+    if "force" in values:
+        told["wrist.stiffness"] = found["stiffness"]
     if "damping" in values:
         found["damping"] = shown * float(values["damping"])
-        told.append("wrist.damping")
+        told["wrist.damping"] = found["damping"]
     motors = study.simulate.loop.actuator
     tendons = {
         "tendon_stiffness": motors.tendon_stiffness,
@@ -95,18 +100,18 @@ def wrist_by_ratios(ratios: Mapping[str, Any], study: Study, run: str) -> LogWri
         alike = _tendons_of_one(len(angles), study)
         tendons["tendon_stiffness"] = float(values["tendon"]) * shown / (float(ratios["radius"]) ** 2 * alike)
         tendons["tendon_stiffness"] *= gain**2
-        told.append("actuator.tendon_stiffness")
+        told["actuator.tendon_stiffness"] = tendons["tendon_stiffness"]
     for ratio, name in (("friction", "friction"), ("sheath", "sheath_friction"), ("presliding", "presliding")):
         if ratio in values:
-            tendons[name] = float(values[ratio])
-            told.append(f"actuator.{ratio}")
+            tendons[name] = told[f"actuator.{name}"] = float(values[ratio])
     camera = dict[str, float]()
     if ratios["rate"] is not None and "delay" in values:
         camera = {"frame_rate": float(ratios["rate"])}
         camera["delay_frames"] = float(np.clip(values["delay"] * camera["frame_rate"], 0.0, _MOST_DELAYED))
-        told += ["sensor.frame_rate", "sensor.delay_frames"]
+        told |= {f"sensor.{name}": value for name, value in camera.items()}
     places = _places(angles, float(values.get("turn", 0.0)), radius, study)
-    told += ["wrist.tendons"] * bool(places)
+    if places:
+        told["wrist.tendons"] = None
     given = sorted(f"wrist.{name}" for name in wrist.model_fields_set if f"wrist.{name}" not in told)
     weighs = ("wrist.stiffness", "wrist.damping", "wrist.length", "wrist.hand_mass", "wrist.hand_offset",
               "wrist.gravity", "actuator.tendon_stiffness", "actuator.friction", "sensor.delay_frames")  # fmt: skip
