@@ -17,7 +17,7 @@ from wristctl.config.study import Study
 from wristctl.config.wrist import TendonPlace
 from wristctl.errors import UserError
 from wristctl.identification.arc_fit import ArcFit
-from wristctl.identification.unknowns import identified_yaml
+from wristctl.identification.unknowns import identified_yaml, tendons_of_values
 from wristctl.wrist.statics import straight_stiffness
 from wristctl.wrist.tendon_layout import TendonLayout
 
@@ -103,7 +103,8 @@ def wrist_by_ratios(ratios: Mapping[str, Any], study: Study, run: str) -> LogWri
         told["actuator.tendon_stiffness"] = tendons["tendon_stiffness"]
     for ratio, name in (("friction", "friction"), ("sheath", "sheath_friction"), ("presliding", "presliding")):
         if ratio in values:
-            tendons[name] = told[f"actuator.{name}"] = float(values[ratio])
+            tendons[name] = float(values[ratio])
+            told[f"actuator.{ratio}"] = tendons_of_values(tendons)[ratio]
     camera = dict[str, float]()
     if ratios["rate"] is not None and "delay" in values:
         camera = {"frame_rate": float(ratios["rate"])}
