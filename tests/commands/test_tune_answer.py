@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 
 from wristctl import load_study, tune
+from wristctl.commands.tune import searches
 from wristctl.commands.tune.answer import Beside, answer_of, at_edge, beside_feedforward
 from wristctl.commands.tune.command import Tuned
 from wristctl.config.wrist import WristParameters
@@ -68,8 +69,11 @@ def test_figures_are_those_of_the_search_and_fit_a_screen(tuned: Tuned) -> None:
 
 
 @pytest.mark.slow
-def test_the_first_line_says_which_gains_are_searched_and_for_about_how_long(caplog: pytest.LogCaptureFixture) -> None:
+def test_the_first_line_says_which_gains_are_searched_and_for_about_how_long(
+    caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
+) -> None:
     caplog.set_level("INFO", "wristctl")
+    monkeypatch.setattr(searches, "_WORTH_SAYING", 0.0)
     tune(load_study(None, *STUDY))
     first, *others = [record.getMessage() for record in caplog.records]
     assert re.fullmatch(r"searching gains of smc, pid: about \d+ (s|min)", first)

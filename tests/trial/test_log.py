@@ -10,6 +10,7 @@ import pandas as pd
 import pytest
 
 from wristctl.trial.log import FRAMES, Disk, Stream, TrialLog, tick_columns, truth_columns
+from wristctl.trial.residuals import columns
 
 
 def test_rows_read_back_exactly_and_nan_is_empty(tmp_path: Path) -> None:
@@ -81,3 +82,12 @@ def test_a_full_disk_stops_a_tick_and_never_the_wire(tmp_path: Path) -> None:
     log.close()
     wire = pd.read_csv(tmp_path / "wire.csv", dtype=str)
     assert wire.to_numpy().tolist() == [["1.0", "sent", "01ff"], ["1.5", "came", "02"]]
+
+
+def test_residuals_stand_under_their_own_names_in_whatever_order_they_come(tmp_path: Path) -> None:
+    log = TrialLog(tmp_path, None, 0.01)
+    names = list(columns(False))
+    log.residuals(3, 1.5, {name: float(names.index(name)) for name in reversed(names)})
+    log.close()
+    table = pd.read_csv(tmp_path / "residuals.csv")
+    assert table.loc[0].to_dict() == {"trial": 3.0, "clock": 1.5, **{name: float(k) for k, name in enumerate(names)}}

@@ -257,7 +257,9 @@ class TrialLog:
 
     def residuals(self, trial: int, clock: float, values: Mapping[str, float]) -> None:
         """Residuals of a tick, written with its row: also of the tick that they end, which has none."""
-        self.streams["residuals"].wait((trial, clock, *values.values()))
+        row = {"trial": trial, "clock": clock, **values}
+        stream = self.streams["residuals"]
+        stream.wait([row[name] for name in stream.columns])
 
     def wire(self, clock: float, way: str, data: bytes) -> None:
         """Bytes on the wire, written at the next tick: whoever stops the motors must not hear of a full disk."""
