@@ -123,7 +123,7 @@ def test_gains_are_tried_on_the_loop_that_they_were_tuned_for(did: Did, call: Ca
     assert (once.controller, once.gains) == ("ct-dob", gains)
     assert once.reference == tuned.config.tune.scenarios[0].reference and once.horizon == tuned.config.tune.horizon
     assert trial[0] == "hw-run"
-    out, performed = did(*trial)
+    out, performed = did(*trial, "--set", "directions=[ulnar]")
     rows, settings = performed.config.hw_run.rows, performed.config.hw_run
     assert [(row.controller, row.gains) for row in rows] == [("ct-dob", gains)] and wrist_of(performed) == small()
     assert (settings.actuator, settings.sensor) == (once.loop.actuator, once.loop.sensor)
