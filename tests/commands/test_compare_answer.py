@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from wristctl.commands.answer import LINES
 from wristctl.commands.compare.answer import answer_of
 from wristctl.commands.printed_table import COLUMNS, two
-from wristctl.commands.ranking_answer import advice
+from wristctl.commands.ranking_answer import advice, do_not_use_briefly
 from wristctl.commands.ranking_tables import answer_tables, controllers_table, ranking_table, standings_table
 from wristctl.commands.ranking_words import DIGITS, condition, names_of, winner
 from wristctl.comparison.combinations import CLASSES
@@ -202,6 +202,50 @@ def test_the_sentence_says_by_how_much_and_where_not() -> None:
     best = {"f1": "a", "f2": "a", "f3": "b", "f4": "c", "f5": "d"}
     several = [stands(name, rmse=rows | {"d/default": 0.2, f"{law}/default": 1e-5}) for name, law in best.items()]
     assert advice(several).endswith("; others are better in f3, f4 and f5.")
+
+
+def test_the_next_is_the_best_of_those_that_come_second_where_it_differs() -> None:
+    """In one condition it ties with the best, and the last of all comes second there."""
+    rows = {"a/default": 1e-7, "b/default": 1e-7, "last/default": 1e-4}
+    apart = {"a/default": 1e-7, "b/default": 1e-3, "last/default": 1e-1}
+    one, others = stands(rmse=rows), [stands(name, rmse=apart) for name in ("pushed", "off-nominal")]
+    said = told(one, *others)
+    ratio = two(min(other.means[1].value / other.means[0].value for other in others), DIGITS)
+    assert (
+        f"use a/default: RMSE <0.001 deg, more than {ratio} times lower than b/default, the next (in push and" in said
+    )
+    assert "at least more" not in said
+    assert re.search(
+        r"deg, at least [\d.]+ times lower than pid-ff/default, the next, and at", told(stands(), stands("pushed"))
+    )
+
+
+def test_the_sentence_says_where_what_is_recommended_must_not_be_used() -> None:
+    rig = stands("camera and tendons", rmse=RMSE | {"pid-ff/default": 1e-5})
+    said = advice([rig, stands("pushed", swings=("pid-ff/default",)), stands("ideal")])
+    assert "; do not use pid-ff/default in push: it swings by 5.7 deg peak to peak in 12 of 12 cases." in said
+    assert "do not use" not in advice([rig, stands("pushed")])
+    best = {"f1": "a", "f2": "a", "f3": "b", "f4": "c", "f5": "d"}
+    rows = {f"{law}/default": 0.1 for law in "abcd"}
+    several = [
+        stands(name, rows | {f"{law}/default": 1e-5}, swings=("a/default",) if name == "f5" else ())
+        for name, law in best.items()
+    ]
+    assert advice(several).endswith(
+        "; others are better in f3 and f4; do not use a/default in f5: it swings by 5.7 deg peak to peak in 12 of 12 "
+        "cases."
+    )
+
+
+def test_where_reasons_have_no_room_the_names_of_a_handful_stand_and_the_number_of_the_others() -> None:
+    for count, more in ((6, ""), (9, " and 4 more")):
+        bad = tuple(f"c{number}/default" for number in range(count))
+        rig = stands("camera and tendons", rmse=dict.fromkeys(bad, 1e-2) | {"good/default": 1e-3}, swings=bad)
+        said = do_not_use_briefly([rig], names_of([rig]))
+        assert said.startswith("In motors + camera, do not use c") and said.endswith(f"{more}: `--all` says why.")
+        assert len(set(re.findall(r"\bc\d\b", said))) == (5 if more else count) and "good" not in said
+    sound = stands("camera and tendons")
+    assert do_not_use_briefly([sound], names_of([sound])) == ""
 
 
 def test_what_must_not_be_used_without_a_rig_is_named_after_the_rigs_with_its_conditions() -> None:

@@ -11,17 +11,19 @@ from types import ModuleType
 
 import pytest
 
+from tests.commands.test_compare_answer import stands
 from tests.documented import script_of_docs
 from wristctl.cli.operator import TerminalOperator
 from wristctl.cli.progress import Terminal
 from wristctl.commands.hw_run.command import hw_run
 from wristctl.commands.inputs import Inputs
-from wristctl.commands.loop_warnings import warn_outside_conditions
+from wristctl.commands.loop_warnings import outside_conditions, warn_of_lost, warn_outside_conditions
 from wristctl.commands.progress import watched
 from wristctl.commands.results import Findings
 from wristctl.commands.session import Session, Unattended
 from wristctl.config.choices import CONTROLLERS
 from wristctl.config.controller_row import Row
+from wristctl.config.foreign import Foreign
 from wristctl.config.loop import Loop
 from wristctl.control.law import Conditions
 from wristctl.control.table import controller
@@ -99,6 +101,26 @@ def test_a_command_warns_outside_them(
     with caplog.at_level(logging.WARNING, logger="wristctl"):
         warn_outside_conditions([Row(controller=row[0], gains=row[1])], [given])
     assert caplog.messages == [] if told is None else told in " ".join(caplog.messages)
+
+
+def test_a_controller_of_ones_own_that_states_nothing_is_untried(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    """A comparison tries it: it warns of what is not made for a rig, and was lost there, alone."""
+    own = dataclasses.replace(controller("pid"), name="own", presets={"hardware": controller("pid").presets["printed"]})
+    monkeypatch.setitem(CONTROLLERS._entries, "own", own)
+    monkeypatch.setitem(CONTROLLERS._origins, "own", Foreign(tmp_path / "own.py", "OWN", {}, tmp_path))
+    loop = Loop.model_validate({"actuator": {"level": "tendon"}, "sensor": {"level": "camera"}})
+    rows = [Row(controller=name, gains=gains) for name, gains in (("own", "hardware"), ("smc-tracking", "default"))]
+    untried = "own/hardware is untried with elastic tendons behind a camera: it may swing"
+    assert outside_conditions(rows[:1], [loop]) == [untried]
+    errors = {row.label: 1e-3 for row in rows}
+    on_ideal = stands(rmse=errors, swings=tuple(errors))
+    with caplog.at_level(logging.WARNING, logger="wristctl"):
+        warn_of_lost(rows, [loop], [stands("camera and tendons", errors), on_ideal])
+        assert caplog.messages == [], "both held there"
+        warn_of_lost(rows, [loop], [stands("camera and tendons", errors, swings=tuple(errors)), on_ideal])
+    assert len(caplog.messages) == 1 and "smc-tracking/default is not made for" in caplog.messages[0]
 
 
 def test_real_motors_do_not_move_by_gains_that_may_swing_unless_told_to(capsys: pytest.CaptureFixture[str]) -> None:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, NamedTuple
 from wristctl.commands.inputs import Inputs
 from wristctl.commands.inputs_of_loops import ends_of_family, identified
 from wristctl.commands.results import Findings
+from wristctl.config.choices import CONTROLLERS
 from wristctl.config.compare import CompareSettings
 from wristctl.config.controller_row import BY_LOOP, Row
 from wristctl.config.former_names import preset_today
@@ -22,6 +23,7 @@ from wristctl.errors import UserError
 
 if TYPE_CHECKING:
     from wristctl.arrays import Array
+    from wristctl.comparison.controller_ranking import Ranking
     from wristctl.control.law import Conditions
     from wristctl.control.shipped_gains import ShippedGains
     from wristctl.simulation.planes import Asked
@@ -76,11 +78,36 @@ def outside_conditions(rows: Iterable[Row | SimulateSettings], loops: Iterable[L
         stated = law.conditions.get(preset_today(preset, law.presets))
         if real and stated is None:
             instead = f"; made for them: {', '.join(law.conditions)}" if law.conditions else ""
-            warnings.append(f"{name}/{preset} is not made for elastic tendons behind a camera: it may swing{instead}")
+            made = "untried with" if is_untried(name) else "not made for"
+            warnings.append(f"{name}/{preset} is {made} elastic tendons behind a camera: it may swing{instead}")
         for loop in real:
             if stated and (mismatch := _outside(stated, loop)):
                 warnings.append(f"{name}/{preset} was made for {mismatch}: it may swing (documentation: Limit cycles)")
     return warnings
+
+
+def is_untried(name: str) -> bool:
+    """Whether a controller is from elsewhere and states no conditions of any preset: nobody knows where it swings."""
+    from wristctl.control.table import controller
+
+    return CONTROLLERS.origin(name) is not None and not controller(name).conditions
+
+
+def warn_of_lost(rows: Iterable[Row], loops: Iterable[Loop], rankings: Iterable[Ranking]) -> None:
+    """Warn of each preset that is not made for its loop, and was lost with motors or a camera in these rankings.
+
+    One that held there needs no warning, and of an untried one the rankings themselves say that it was lost.
+    """
+    lost = {
+        label
+        for ranking in rankings
+        if ranking.traits.rig
+        for row, label in enumerate(ranking.labels)
+        if ranking.standing.lost[row].times or row in ranking.standing.unusable
+    }
+    told = [row for row in rows if row.label in lost and not is_untried(row.controller)]
+    for warning in outside_conditions(told, loops):
+        log.warning("%s", warning)
 
 
 def warn_outside_conditions(rows: Iterable[Row | SimulateSettings], loops: Iterable[Loop]) -> None:

@@ -45,7 +45,7 @@ def advice(rankings: Sequence[Ranking]) -> str:
     for rig, alike in sides.items():
         where = f"with {rig_whole(alike, simulated=True) if rig else 'exact angles and torques'}"
         where = f"For steps {where}" if alike[0].jumps else capital(where)
-        sentences.append(_use(where, alike, sides.get(True, []) if not rig else []))
+        sentences.append(_use(where, alike, [ranking for ranking in rankings if ranking not in alike]))
     return " ".join(sentences)
 
 
@@ -70,7 +70,7 @@ def _chosen(ranked: Sequence[Ranking]) -> tuple[str, Counter[str]]:
 
 
 def _use(where: str, alike: Sequence[Ranking], others: Sequence[Ranking]) -> str:
-    """What to use in conditions of one kind, how large its error is there, and in which others it must not be used."""
+    """What to use in conditions of one kind, how large its error is there, and where it must not be used."""
     ranked = [ranking for ranking in alike if ranking.standing.groups]
     if not ranked:
         return f"{where}, {_no_ranking(alike)}."
@@ -94,37 +94,41 @@ def _use(where: str, alike: Sequence[Ranking], others: Sequence[Ranking]) -> str
     if any(map(open_loop, (chosen, *equal))):
         text += "; no controller is better than feedforward, which is open loop"
     elif gains:
-        least = f"{'at least ' * (len(gains) > 1)}{_times(gains[0], errors[0][0])}"
-        text += f"{' and' if following else ','} {least} lower than feedforward"
+        least = _times(gains[0], errors[0][0], several=len(gains) > 1)
+        text += f",{' and' if following else ''} {least} lower than feedforward"
     if equal:
         as_good = joined([*map(called, alternatives)]) or f"{len(equal)} others"
         text += f"; {as_good} {'ties' if len(equal) == 1 else 'tie'} with it"
-    text += _elsewhere(chosen, [ranking for ranking in ranked if ranking not in [place[0] for place in places]])
-    text += _seldom([chosen, *alternatives], [ranking for ranking, _ in places])
+    best_in = [ranking for ranking, _ in places]
+    rest = [ranking for ranking in ranked if ranking not in best_in]
+    text += _elsewhere(chosen, rest)
+    text += _seldom([chosen, *alternatives], best_in)
     if few := [condition(ranking) for ranking in alike if ranking.standing.untold]:
         text += f" (no ranking in {joined(few)}: too few cases)"
-    bad = [
-        (ranking, ranking.labels.index(chosen))
-        for ranking in others
-        if chosen in ranking.labels and ranking.labels.index(chosen) in ranking.standing.unusable
-    ]
-    if not bad:
-        return f"{text}."
-    worst = max(bad, key=lambda place: _lost(*place))
-    return f"{text}; do not use {chosen} with {rig_whole([worst[0]])}: it {fact(*worst)}."
+    told = [*best_in, *(rest if len(rest) <= _TOLD else [])]
+    untold = [ranking for ranking in (*alike, *others) if ranking not in told]
+    return f"{text}{_where_not(chosen, untold, on_a_rig=alike[0].traits.rig)}."
 
 
 def _than_the_next(places: Sequence[tuple[Ranking, int]]) -> str:
-    """By how much the error is lower than that of the next that differs: the least of several conditions."""
-    ratios = []
+    """By how much the error is lower than that of the next: the least of the conditions in which they differ.
+
+    The next is, of those that come second in some condition, the one with the least error over all of them.
+    """
+    if any(len(ranking.standing.groups) < 2 for ranking, _ in places):
+        return ""
+    rankings = [ranking for ranking, _ in places]
+    seconds = sorted({ranking.labels[ranking.standing.groups[1][0]] for ranking in rankings})
+    following = min(seconds, key=lambda label: _mean(rankings, label))
+    ratios, where = [], []
     for ranking, row in places:
-        if len(ranking.standing.groups) < 2:
-            return ""
-        after = ranking.standing.groups[1][0]
-        ratio = ranking.means[after].value / ranking.means[row].value
-        ratios.append((ratio, ranking.means[row].value, called(ranking.labels[after])))
-    ratio, rmse, following = min(ratios)
-    return f", {'at least ' * (len(places) > 1)}{_times(ratio, rmse)} lower than {following}, the next"
+        after = ranking.labels.index(following) if following in ranking.labels else row
+        if (ranking.standing.group(after) or 1) > 1:
+            ratios.append((ranking.means[after].value / ranking.means[row].value, ranking.means[row].value))
+            where.append(condition(ranking))
+    ratio, rmse = min(ratios)
+    in_some = f" (in {joined(where)})" if len(where) < len(places) else ""
+    return f", {_times(ratio, rmse, several=len(where) > 1)} lower than {called(following)}, the next{in_some}"
 
 
 # Conditions of which it is told by how much another controller is better there.
@@ -134,7 +138,8 @@ _TOLD = 2
 def _elsewhere(chosen: str, others: Sequence[Ranking]) -> str:
     """In which other conditions of the same kind not to use a controller: what it does there, and what is better."""
     if len(others) > _TOLD:
-        return f"; others are better in {joined([condition(ranking) for ranking in others])}"
+        sound = [condition(ranking) for ranking in others if not _must_not(chosen, ranking)]
+        return f"; others are better in {joined(sound)}" if sound else ""
     text = ""
     for ranking in others:
         first = ranking.standing.groups[0][0]
@@ -145,6 +150,28 @@ def _elsewhere(chosen: str, others: Sequence[Ranking]) -> str:
         elif row != first:
             ratio = _times(ranking.means[row].value / ranking.means[first].value, ranking.means[first].value)
             text += f"; not in {condition(ranking)}, where {better} has {ratio} less"
+    return text
+
+
+def _must_not(label: str, ranking: Ranking) -> bool:
+    """Whether a controller must not be used in a condition."""
+    return label in ranking.labels and ranking.labels.index(label) in ranking.standing.unusable
+
+
+def _where_not(chosen: str, rankings: Sequence[Ranking], on_a_rig: bool) -> str:
+    """The conditions in which a controller must not be used, and why in the worst of them.
+
+    Where it is chosen for ideal conditions, those with motors or a camera are one.
+    """
+    bad = [ranking for ranking in rankings if _must_not(chosen, ranking)]
+    rigs = [] if on_a_rig else _smooth_on_rigs(bad)
+    others = [ranking for ranking in bad if ranking not in rigs]
+    text = ""
+    for alike in filter(None, (rigs, others)):
+        worst = max(alike, key=lambda ranking: _lost(ranking, ranking.labels.index(chosen)))
+        where = f"with {rig_whole([worst])}" if alike is rigs else f"in {joined([condition(one) for one in alike])}"
+        text += f"; do not use {called(chosen)} {where}: it {fact(worst, worst.labels.index(chosen))}"
+        text += f" ({condition(worst)})" if alike is others and len(others) > 1 else ""
     return text
 
 
@@ -190,10 +217,10 @@ def _errors(errors: Sequence[tuple[float, str]]) -> str:
     return f"{shown[0]} ({errors[0][1]}) to {shown[-1]} deg ({errors[-1][1]})"
 
 
-def _times(least: float, rmse: float) -> str:
-    """The least of some ratios of errors in words; of an RMSE that nobody could measure it is a bound."""
-    bound = degrees(rmse).startswith("<")
-    return f"{'more than ' * bound}{two(least, DIGITS)} times"
+def _times(least: float, rmse: float, several: bool = False) -> str:
+    """The least of one or `several` ratios of errors in words; of an RMSE that nobody could measure it is a bound."""
+    bound = "more than " if degrees(rmse).startswith("<") else "at least " * several
+    return f"{bound}{two(least, DIGITS)} times"
 
 
 def _mean(rankings: Sequence[Ranking], label: str) -> float:
@@ -225,22 +252,14 @@ def do_not_use(rankings: Sequence[Ranking], names: Mapping[str, str]) -> str:
 
     Where no condition has them, of all conditions. A row that is bad in several conditions is told for the worst.
     """
-    rigs = _smooth_on_rigs(rankings)
-    chosen = rigs or list(rankings)
-    alone = len(rigs) == 1 and rigs[0].unit == "case"
-    where = f" in {condition(rigs[0])}" if alone else f" with {rig_whole(rigs)}" if rigs else ""
-    worst: dict[str, tuple[Ranking, int]] = {}
-    for ranking in chosen:
-        for row in ranking.standing.unusable:
-            before = worst.get(ranking.labels[row])
-            if before is None or _lost(ranking, row) > _lost(*before):
-                worst[ranking.labels[row]] = (ranking, row)
+    where, worst = _unusable(rankings)
     if not worst:
         return f"Every controller here can be used{where}."
+    several = len(_smooth_on_rigs(rankings) or rankings) > 1
     by_verb: dict[str, list[tuple[str, str]]] = {}
-    for label, (ranking, row) in sorted(worst.items(), key=lambda item: -item[1][0].swing[item[1][1]]):
+    for label, (ranking, row) in worst.items():
         verb, (size, count) = next(iter(facts(ranking, row).items()))
-        place = f", {condition(ranking)}" if len(chosen) > 1 else ""
+        place = f", {condition(ranking)}" if several else ""
         by_verb.setdefault(verb, []).append(
             (f"{names[label]} {size}".rstrip(), f"in {count} of {counted_in(ranking, verb)}{place}")
         )
@@ -253,6 +272,37 @@ def do_not_use(rankings: Sequence[Ranking], names: Mapping[str, str]) -> str:
             text = joined([f"{name} ({count})" for name, count in rows])
         sentences.append(f"that {_THEY[verb]}: {text}")
     return f"{capital(f'{where}, do not use'.strip(' ,'))} controllers {'; '.join(sentences)}."
+
+
+def do_not_use_briefly(rankings: Sequence[Ranking], names: Mapping[str, str]) -> str:
+    """The names of `do_not_use` alone, of many the first and the number of the others; empty without any."""
+    where, worst = _unusable(rankings)
+    if not worst:
+        return ""
+    first = [names[label] for label in worst][: _NAMED if len(worst) > _NAMED + 1 else None]
+    listed = [*first, *([f"{len(worst) - len(first)} more"] if len(worst) > len(first) else [])]
+    return f"{capital(f'{where}, do not use'.strip(' ,'))} {joined(listed)}: `--all` says why."
+
+
+# Controllers that must not be used of which the names are told where the reasons have no room.
+_NAMED = 5
+
+
+def _unusable(rankings: Sequence[Ranking]) -> tuple[str, dict[str, tuple[Ranking, int]]]:
+    """Where controllers must not be used, and the worst place and row of each by its label, the largest swing first.
+
+    That is with motors, tendons and a camera; where no condition has them, in all conditions.
+    """
+    rigs = _smooth_on_rigs(rankings)
+    alone = len(rigs) == 1 and rigs[0].unit == "case"
+    where = f" in {condition(rigs[0])}" if alone else f" with {rig_whole(rigs)}" if rigs else ""
+    worst: dict[str, tuple[Ranking, int]] = {}
+    for ranking in rigs or rankings:
+        for row in ranking.standing.unusable:
+            before = worst.get(ranking.labels[row])
+            if before is None or _lost(ranking, row) > _lost(*before):
+                worst[ranking.labels[row]] = (ranking, row)
+    return where, dict(sorted(worst.items(), key=lambda item: -item[1][0].swing[item[1][1]]))
 
 
 def _smooth_on_rigs(rankings: Sequence[Ranking]) -> list[Ranking]:
@@ -299,53 +349,6 @@ _THEY = {
     "pulls harder than a tendon bears": "pull harder than a tendon bears",
     "changes with the integration step": "change with the integration step",
 }
-
-
-# Questions that a builder of a rig can answer, in the order in which they are asked.
-_QUESTIONS = {
-    "rig": "camera?",
-    "jumps": "steps?",
-    "load": "push?",
-    "unknown": "wrong model?",
-    "uneven": "uneven wrist?",
-}
-
-
-def decision_table(rankings: Sequence[Ranking], names: Mapping[str, str], title: str = "") -> Table:
-    """Questions whose answers part the conditions, and for each answer what to use, its RMSE and the next.
-
-    Of conditions that no question parts the last one stands for all.
-    """
-    ends = _parted(rankings, {})
-    asked = [trait for trait in _QUESTIONS if any(trait in answers for answers, _ in ends)]
-    heads = (*(_QUESTIONS[trait] for trait in asked), "use", "RMSE [deg], 95 %", "as good", "next, times more")
-    rows = [(*(answers.get(trait, "-") for trait in asked), *_leaf(one, rankings, names)) for answers, one in ends]
-    return Table(title, heads, rows)
-
-
-def _parted(rankings: Sequence[Ranking], answers: dict[str, str]) -> list[tuple[dict[str, str], Ranking]]:
-    """The conditions at the ends of the tree of questions, with the answers that lead there."""
-    for trait in _QUESTIONS:
-        sides = {"yes": [one for one in rankings if getattr(one.traits, trait)]}
-        sides["no"] = [one for one in rankings if not getattr(one.traits, trait)]
-        if all(sides.values()):
-            return [end for answer, side in sides.items() for end in _parted(side, {**answers, trait: answer})]
-    return [(answers, rankings[-1])]
-
-
-def _leaf(ranking: Ranking, rankings: Sequence[Ranking], names: Mapping[str, str]) -> tuple[str, ...]:
-    row, groups = winner(ranking, rankings), ranking.standing.groups
-    if row is None:
-        return "too few to rank" if ranking.standing.untold else "none", "", "", ""
-    mean = ranking.means[row]
-    ends = f" [{degrees(mean.low, DIGITS)}, {degrees(mean.high, DIGITS)}]" if mean.low < mean.high < math.inf else ""
-    others = [names[ranking.labels[other]] for other in groups[0] if other != row]
-    following = "-"
-    if len(groups) > 1:
-        after = groups[1][0]
-        following = f"{names[ranking.labels[after]]} {two(ranking.means[after].value / mean.value, DIGITS)}"
-    equal = "-" if not others else others[0] if len(others) == 1 else f"{len(others)} more"
-    return names[ranking.labels[row]], f"{degrees(mean.value, DIGITS)}{ends}", equal, following
 
 
 def certainty(rankings: Sequence[Ranking]) -> str:

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from wristctl.commands.printed_table import COLUMNS, Table, degrees, two
-from wristctl.commands.ranking_answer import decision_table
 from wristctl.commands.ranking_words import (
     DIGITS,
     condition,
@@ -168,3 +168,50 @@ def every_row(ranking: WorldRanking, times: Mapping[str, StepTime] | None = None
     )  # fmt: skip
     title = f"{condition(ranking)}: {ranking.count} held-out worlds, {ranking.motions} motions each"
     return Table(title, heads, rows)
+
+
+# Questions that a builder of a rig can answer, in the order in which they are asked.
+_QUESTIONS = {
+    "rig": "camera?",
+    "jumps": "steps?",
+    "load": "push?",
+    "unknown": "wrong model?",
+    "uneven": "uneven wrist?",
+}
+
+
+def decision_table(rankings: Sequence[Ranking], names: Mapping[str, str], title: str = "") -> Table:
+    """Questions whose answers part the conditions, and for each answer what to use, its RMSE and the next.
+
+    Of conditions that no question parts the last one stands for all.
+    """
+    ends = _parted(rankings, {})
+    asked = [trait for trait in _QUESTIONS if any(trait in answers for answers, _ in ends)]
+    heads = (*(_QUESTIONS[trait] for trait in asked), "use", "RMSE [deg], 95 %", "as good", "next, times more")
+    rows = [(*(answers.get(trait, "-") for trait in asked), *_leaf(one, rankings, names)) for answers, one in ends]
+    return Table(title, heads, rows)
+
+
+def _parted(rankings: Sequence[Ranking], answers: dict[str, str]) -> list[tuple[dict[str, str], Ranking]]:
+    """The conditions at the ends of the tree of questions, with the answers that lead there."""
+    for trait in _QUESTIONS:
+        sides = {"yes": [one for one in rankings if getattr(one.traits, trait)]}
+        sides["no"] = [one for one in rankings if not getattr(one.traits, trait)]
+        if all(sides.values()):
+            return [end for answer, side in sides.items() for end in _parted(side, {**answers, trait: answer})]
+    return [(answers, rankings[-1])]
+
+
+def _leaf(ranking: Ranking, rankings: Sequence[Ranking], names: Mapping[str, str]) -> tuple[str, ...]:
+    row, groups = winner(ranking, rankings), ranking.standing.groups
+    if row is None:
+        return "too few to rank" if ranking.standing.untold else "none", "", "", ""
+    mean = ranking.means[row]
+    ends = f" [{degrees(mean.low, DIGITS)}, {degrees(mean.high, DIGITS)}]" if mean.low < mean.high < math.inf else ""
+    others = [names[ranking.labels[other]] for other in groups[0] if other != row]
+    following = "-"
+    if len(groups) > 1:
+        after = groups[1][0]
+        following = f"{names[ranking.labels[after]]} {two(ranking.means[after].value / mean.value, DIGITS)}"
+    equal = "-" if not others else others[0] if len(others) == 1 else f"{len(others)} more"
+    return names[ranking.labels[row]], f"{degrees(mean.value, DIGITS)}{ends}", equal, following

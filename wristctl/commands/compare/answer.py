@@ -13,6 +13,7 @@ from wristctl.commands.ranking_answer import (
     capital,
     certainty,
     do_not_use,
+    do_not_use_briefly,
     fitted,
     not_elsewhere,
     recommended,
@@ -59,13 +60,12 @@ def answer_of(
         names = names_of(rankings, short=True)
         table = controllers_table(rankings, names, asked)
     more = f"Every rank and figure: `--all`, or {run}/report.html." if run else "Every rank and figure: `.tables`."
-    unusable = do_not_use(rankings, names)
     notes = [
         (bending, bending),
         (" ".join(filter(None, [conditions(rankings), gains_meant(rankings)])), conditions(rankings)),
         (best_on_yours(rankings), ""),
         (" ".join(filter(None, [gains_of_best(rankings, gains or {}), compared(rankings), more])), more),
-        (unusable, "Some controllers must not be used: `--all` says which and why." if unusable else ""),
+        (do_not_use(rankings, names), do_not_use_briefly(rankings, names)),
         (papers(rankings), ""),
         (" ".join(filter(None, [not_elsewhere(rankings, names), papers_order(rankings)])), ""),
         (ties(rankings, names), ""),

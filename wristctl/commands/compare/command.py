@@ -40,9 +40,10 @@ from wristctl.commands.loop_warnings import (
     asked_by,
     warn_if_coarse,
     warn_if_it_buckles,
+    warn_of_earlier_families,
+    warn_of_lost,
     warn_of_one_plane,
     warn_out_of_reach,
-    warn_outside_conditions,
 )
 from wristctl.commands.procedure import Procedure
 from wristctl.commands.ranking_drawing import draw_rankings
@@ -282,7 +283,7 @@ def compare(session: Session) -> Compared:
     loops = judged_loops(study, study.compare).values()
     warn_if_it_buckles(findings, study.wrist, loops)
     warn_if_coarse(loops)
-    warn_outside_conditions(settings.rows, loops)
+    warn_of_earlier_families(settings.rows)
     warn_of_one_plane(study.wrist, asked_of_comparison(study))
     warn_out_of_reach(findings, study.wrist, asked_by(study, settings))
     network = network_for(session.inputs, study.wrist, loops, planes_of(study.wrist, asked_of_comparison(study)))
@@ -292,6 +293,7 @@ def compare(session: Session) -> Compared:
     gains = _gains_of_rows(study, tuned)
     if settings.worlds.family:
         of_worlds = ranked(session, study, network, tuned)
+        warn_of_lost(settings.rows, loops, of_worlds)
         head_with_the_best(findings, of_worlds)
         draw_rankings(findings, of_worlds)
         times = _step_times(session, study, tuned)
@@ -311,6 +313,7 @@ def compare(session: Session) -> Compared:
         rmse = spread(result.repeated.metrics["rmse"])
         findings.metric(f"rmse_{name}", rmse.median, "rad", "lower", rmse.n, rmse.interval)
     rankings = class_rankings(results, settings, study.wrist)
+    warn_of_lost(settings.rows, loops, rankings)
     findings.table("data/standings.csv", standings_frame(rankings), units=STANDING_UNITS)
     head_with_the_best(findings, rankings)
     times = _step_times(session, study, tuned)

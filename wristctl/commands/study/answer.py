@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 
 from wristctl.commands.answer import Answer
 from wristctl.commands.printed_table import Table, joined
-from wristctl.commands.ranking_answer import advice, certainty, decision_table, do_not_use, fitted, not_elsewhere
+from wristctl.commands.ranking_answer import advice, certainty, do_not_use, fitted, not_elsewhere
+from wristctl.commands.ranking_tables import decision_table
 from wristctl.commands.ranking_words import condition, names_of, winner
 from wristctl.commands.who_decides import decided
 
