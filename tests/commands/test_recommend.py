@@ -210,6 +210,10 @@ def test_its_answer_fits_a_screen_and_names_gains_error_and_limits(found: Recomm
     assert found.best is not None and all(f"{name} = {value:.3g}" for name, value in found.best.gains.items())
     assert f"{math.degrees(found.metrics['rmse']):.2g} deg" in text
     assert all(candidate.label in text for candidate in found.candidates)
+    assert "deg on 8 simulated rigs)" in text and "So few rigs prove little: 40 or more with recommend.tests." in text
+    many = replace(found.ranking, scores=np.repeat(found.ranking.scores, 25, axis=1))
+    enough = " ".join(replace(found, ranking=many).answer.lines())
+    assert "deg on 95 % of 200 simulated rigs)" in enough and "prove little" not in enough
 
 
 @pytest.mark.slow

@@ -176,6 +176,10 @@ def test_a_controller_that_swings_is_passed_over_and_ties_are_named() -> None:
 def test_a_preset_that_nothing_beats_is_named() -> None:
     assert "hardware" in _text(_search("smc", origin="hardware"), {})
     assert "preset" not in _text(_search("smc"), {})
+    shipped = list(controller("ct-dob").presets["hardware"].values())
+    came_upon = [value * (1.0 + 1e-12) for value in shipped]
+    assert _text(_search("ct-dob", came_upon), {}).startswith("Keep the preset hardware of ct-dob with w = 35 rad/s")
+    assert _text(_search("ct-dob", [1.01 * shipped[0], *shipped[1:]]), {}).startswith("Use ct-dob")
 
 
 def test_what_the_gains_do_wrong_is_told_with_the_number_of_cases() -> None:

@@ -28,6 +28,8 @@ if TYPE_CHECKING:
 RECOMMENDED = "data/recommended.yaml"
 # Factor on the least error up to which a controller is taken that is lost on fewer rigs.
 NEAR = 1.25
+# Rigs from which 95 % of them are told: of fewer, the ends would be the least and the largest error.
+ENOUGH = 40
 # Angle of the sines by which it is found how fast a motion may be, where the tendons reach it [deg].
 _SINE_DEG = 20.0
 
@@ -177,22 +179,30 @@ def _sentence(result: Recommended) -> str:
     values = ", ".join(_gain(best, name) for name in best.gains)
     sentence = (
         f"Use {best.controller} with {values}. Expect an error of {degrees(median)} deg RMSE ({degrees(low)} to "
-        f"{degrees(high)} deg on 95 of 100 simulated rigs), {two(ranked.gains[row].value)} times lower than "
-        "feedforward alone."
+        f"{degrees(high)} deg on {_share(ranked.count)} simulated rigs), {two(ranked.gains[row].value)} times lower "
+        "than feedforward alone."
     )
+    if ranked.count < ENOUGH:
+        sentence += f" So few rigs prove little: {ENOUGH} or more with recommend.tests."
     if lost := _lost(ranked, row):
         sentence += f" It {lost} of {ranked.count} rigs."
     first = ranked.standing.groups[0]
     if row in first:
         others = joined([result.candidates[other].label for other in first if other != row])
         why = (
-            "with feedback, and at most a quarter more error, it is unstable on the fewest rigs, with the fewest gains"
+            f"These rigs do not tell its error from that of {others}. Of the controllers with feedback whose error is "
+            "at most 25 % above the least, it is unstable on the fewest rigs; of equals it has the fewest gains."
         )
-        return f"{sentence} No test tells {others} from it: {why}." if others else sentence
+        return f"{sentence} {why}" if others else sentence
     lesser = [other for other in first if other in result.near]
     least = ranked.means[row].value / min(ranked.means[other].value for other in lesser)
     others, be = joined([result.candidates[other].label for other in lesser]), "are" if lesser[1:] else "is"
     return f"{sentence} {others} would err up to {two(least)} times less, and {be} unstable on more rigs."
+
+
+def _share(count: int) -> str:
+    """How many of the simulated rigs an interval is of; of few the number alone."""
+    return f"95 % of {count}" if count >= ENOUGH else f"{count}"
 
 
 def _gain(candidate: Candidate, name: str) -> str:
@@ -216,7 +226,8 @@ def _table(result: Recommended) -> Table:
         low, median, high = (degrees(error) if math.isfinite(error) else "-" for error in spread(ranked.rows[k].rmse))
         lost = _lost(ranked, k)
         rows.append((result.candidates[k].label, median, f"{low} to {high}", lost or "stable on all"))
-    heads = ("controller (gains)", "error [deg]", "on 95 of 100 rigs [deg]", f"of {ranked.count} simulated rigs")
+    ends, lost_on = f"on {_share(ranked.count)} rigs [deg]", f"of {ranked.count} simulated rigs"
+    heads = ("controller (gains)", "error [deg]", ends, lost_on)
     return Table("", heads, rows)
 
 
@@ -270,7 +281,10 @@ def _rehearsed(result: Recommended) -> str:
         words.append(f"Rehearsed on the emulated rig it truly errs by {each}, and swings by {swing} deg peak to peak.")
         if result.on_the_trial is not None:
             low, _, high = result.on_the_trial
-            words.append(f"With that motion 95 of 100 simulated rigs err by {degrees(low)} to {degrees(high)} deg.")
+            words.append(
+                f"With that motion {_share(result.ranking.count)} simulated rigs err by {degrees(low)} to "
+                f"{degrees(high)} deg."
+            )
     others = [(result.candidates[row].label, run.fault) for row, run in result.rehearsals.items() if run.fault]
     words += [f"{label} {fault} there, and is not recommended." for label, fault in others]
     return " ".join(words)

@@ -22,6 +22,8 @@ if TYPE_CHECKING:
 
 # Share of a gain's search range, on its logarithmic scale, within which a gain lies at the edge.
 _EDGE = 0.01
+# Relative difference up to which two gains are the same.
+_DIGITS = 1e-4
 # What a mark says of a case, as a verb.
 _VERBS = {
     "failed": "fails",
@@ -197,9 +199,19 @@ def _passed_over(
 
 
 def _preset_of(search: Search) -> str:
-    """The preset that nothing better was found than; empty where something was."""
-    finalists = search.finalists
-    return finalists[0].origin if finalists and finalists[0].origin != "search" else ""
+    """The preset that nothing better was found than, also where the search came upon it; empty where something was."""
+    from wristctl.control.table import controller
+
+    if not search.finalists:
+        return ""
+    if search.finalists[0].origin != "search":
+        return search.finalists[0].origin
+    return next((name for name, gains in controller(search.controller).presets.items() if _same(search, gains)), "")
+
+
+def _same(search: Search, gains: Mapping[str, float]) -> bool:
+    """Whether gains are what a search found, to the four digits that are printed."""
+    return all(math.isclose(value, gains[name], rel_tol=_DIGITS) for name, value in search.gains.items())
 
 
 def _next(file: str, motion: Motion) -> list[str]:
