@@ -172,9 +172,17 @@ def under(path: str) -> Iterator[None]:
 
 
 def nearest(word: str, choices: Iterable[str]) -> str | None:
-    """The choice most like `word`, None where none is alike."""
-    matches = difflib.get_close_matches(word, list(choices), n=1, cutoff=0.6)
-    return matches[0] if matches else None
+    """The choice most like `word`, None where none is alike; capitals, and _ for -, make no difference."""
+    known = list(choices)
+    if not (matches := difflib.get_close_matches(plain(word), map(plain, known), n=1, cutoff=0.6)):
+        return None
+    alike = [choice for choice in known if plain(choice) == matches[0]]
+    return max(alike, key=lambda choice: difflib.SequenceMatcher(None, word, choice).ratio())
+
+
+def plain(name: str) -> str:
+    """A name without capitals, its words joined by -."""
+    return name.casefold().replace("_", "-")
 
 
 def meant(word: str, choices: Iterable[str]) -> str:

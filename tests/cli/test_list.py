@@ -8,7 +8,7 @@ import sys
 import pytest
 
 from wristctl.cli.app import main
-from wristctl.commands.choice_tables import TABLES
+from wristctl.commands.choice_tables import TABLES, first_sentence
 from wristctl.config.choices import CONTROLLERS, METRICS, REFERENCES
 from wristctl.study_files.typed_controllers import parted
 
@@ -38,6 +38,14 @@ def test_each_list_has_a_line_for_every_entry(
         names = [row[0] for row in shown["rows"]]
         assert parted(names, "compare").controllers == names
         assert names == [f"{name}/{preset}" for name in CONTROLLERS for preset in CONTROLLERS[name].presets]
+
+
+def test_a_sentence_ends_at_a_full_stop_outside_brackets() -> None:
+    assert (
+        first_sentence("Learns\nonline (Front. Robot. AI [no. 12]). More. And more.")
+        == "Learns online (Front. Robot. AI [no. 12])"
+    )
+    assert first_sentence("Alone.") == "Alone"
 
 
 def test_the_conditions_say_which_preset_a_name_alone_has(

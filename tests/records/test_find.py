@@ -213,6 +213,11 @@ def test_what_has_no_latest_run_is_made_or_named_rightly(make: Make, results: Pa
     with pytest.raises(UserError, match="fix: run `wristctl train` first"):
         open_run("latest:train", results)
     make()
+    for kind, command in {"tune": "tune", "identify": "identify LOG", "audit": "paper audit"}.items():
+        with pytest.raises(UserError, match=f"no {kind} run .* - fix: run `wristctl {command}` first"):
+            open_run(f"latest:{kind}", results)
+    with pytest.raises(UserError, match=r"no wrist run .* - fix: one of gen-data"):
+        open_run("latest:wrist", results)
     with pytest.raises(UserError, match=r"no gen-dta run that ended ok - latest:gen-dta in .* mean 'gen-data'"):
         open_run("latest:gen-dta", results)
 

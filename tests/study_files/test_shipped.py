@@ -81,12 +81,14 @@ def test_an_include_that_nothing_has_is_told_with_both_places(folder: Path) -> N
         ("quik", r"fix: did you mean 'quick'\?"),
         ("experiments/papr.yaml", r"fix: did you mean 'paper'\?"),
         ("scenario", r"fix: did you mean 'scenarios/\w+'\?"),
+        ("minee.yaml", r"fix: did you mean 'mine.yaml'\?"),
         ("own", "fix: one of .*claims, controllers, "),
         ("../quick", "fix: "),
     ],
 )
 def test_a_name_that_nothing_has_is_told_with_both_places(folder: Path, given: str, told: str) -> None:
     (folder / "experiments").mkdir()
+    (folder / "mine.yaml").touch()
     (folder / "quick.yaml").touch()  # ../quick does not mean it, by way of experiments/
     where = re.escape(str(folder / given))
     with pytest.raises(UserError, match=f"^there is no study file {where}, nor such an experiment of wristctl.*{told}"):

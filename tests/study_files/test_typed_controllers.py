@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from random import Random
 from typing import Any
@@ -56,6 +57,24 @@ def drawn(rng: Random) -> tuple[str, str]:
     }
     kind = rng.choice(list(kinds))
     return rng.choice(kinds[kind]), kind
+
+
+@pytest.mark.parametrize(
+    ("typed", "meant"),
+    [
+        ("CT-DOB", "ct-dob"),
+        ("pid_ff/hardware", "pid-ff/hardware"),
+        ("My_Wrist", "my-wrist.yaml"),
+        ("my-pd", "my_pd.py:MY_PD"),
+        ("broken", "broken.py:NAME"),
+    ],
+)
+def test_capitals_underscores_and_files_of_ones_own_are_known_again(typed: str, meant: str, folder: Path) -> None:
+    (folder / "my-wrist.yaml").write_text(STUDY)
+    (folder / "my_pd.py").write_text("raise SystemExit\nOTHER = 1\nMY_PD = Controller(name='my-pd')\n")
+    (folder / "broken.py").write_text("def (:")
+    with pytest.raises(UserError, match=re.escape(f"did you mean '{meant}'?")):
+        parted([typed], "compare")
 
 
 @pytest.mark.parametrize("seed", range(30))

@@ -19,8 +19,17 @@ def _entries(table: Choices[Any]) -> dict[str, Any]:
 
 def _about(module: str) -> str:
     """The first sentence of a module."""
-    text = " ".join((sys.modules[module].__doc__ or "").split("\n\n")[0].split())
-    return text.partition(". ")[0].removesuffix(".")
+    return first_sentence((sys.modules[module].__doc__ or "").split("\n\n")[0])
+
+
+def first_sentence(text: str) -> str:
+    """The first sentence of a text, without its full stop; a full stop within brackets ends none."""
+    line, depth = " ".join(text.split()), 0
+    for place, letter in enumerate(line):
+        depth += (letter in "([") - (letter in ")]")
+        if depth == 0 and line.startswith(". ", place):
+            return line[:place]
+    return line.removesuffix(".")
 
 
 def controllers() -> Table:

@@ -15,7 +15,7 @@ from wristctl.records.index import RESULTS, IndexEntry, indexed, run_names
 from wristctl.records.manifest import MANIFEST
 from wristctl.records.run import NAME_A_RUN, Run
 from wristctl.records.tags import known_tags
-from wristctl.study_files.keys import command_of
+from wristctl.study_files.keys import command_of, is_command
 
 _log = logging.getLogger(__name__)
 
@@ -141,7 +141,10 @@ def _latest(ref: str, results: Path, content: Content | None = None) -> Run:
         if longest:
             labelled = f"latest:{longest}:{kind.removeprefix(f'{longest}-')}"
             raise UserError(f"no command makes {kind!r} runs", f"{ref} in {results}", f"did you mean {labelled}?")
-        fix: Phrase = meant(kind, kinds) if kinds else ("run `", Call(command_of(kind)), "` first")
+        fix: Phrase = meant(kind, kinds)
+        if is_command(kind) or not kinds:
+            logs = (Argument("runs", "LOG", positional=True),) if kind == "identify" else ()
+            fix = ("run `", Call(command_of(kind), arguments=logs), "` first")
         raise UserError(f"no {kind} run that ended ok", f"{ref} in {results}", fix)
     later = [
         run

@@ -43,6 +43,13 @@ def _given(annotation: Any) -> Any:
 
 # Commands that work on what a section of another name describes: its keys are theirs too.
 SUBJECTS = {"analyse": "simulate", "validate": "real-robot"}
+# Keys of a study that are no section of a command.
+NO_COMMANDS = ("seed", "wrist", "families", "sweep", "controller-settings", "real-robot")
+
+
+def is_command(kind: str) -> bool:
+    """Whether a command makes runs of this kind."""
+    return kind in SUBJECTS or kind in keys_of(Study).keys() - {*NO_COMMANDS}
 
 
 def command_of(kind: str) -> str:

@@ -11,7 +11,7 @@ from wristctl.config.former_names import key_today
 from wristctl.config.given_files import beside, names_a_file
 from wristctl.config.leaves import named_by
 from wristctl.config.study import Study
-from wristctl.errors import Phrase, Setting, UserError, fix_to_read, meant
+from wristctl.errors import Phrase, Setting, UserError, fix_to_read, meant, nearest
 from wristctl.plain_files import read_plain
 from wristctl.plugins.places import check_trust, check_within, placed
 from wristctl.plugins.trust import asking
@@ -25,7 +25,7 @@ from wristctl.study_files.renaming import (
     with_loops_of_today,
 )
 from wristctl.study_files.resolved import check_read
-from wristctl.study_files.shipped import shipped_name, shipped_names, study_file
+from wristctl.study_files.shipped import shipped_name, shipped_names, studies_beside, study_file
 from wristctl.study_files.short_rows import for_their_own_controller, in_lists, with_gains_apart
 from wristctl.study_files.strict_yaml import Document, KeyPath, parse_yaml
 from wristctl.study_files.typed_controllers import put_in
@@ -114,7 +114,8 @@ def _in_place_of(file: str, files: Sequence[Path], command: str | None) -> Phras
     """Advice where there is no such study file: how controllers are given, where it has the name of one."""
     keys = section_keys(command)
     if file not in CONTROLLERS or not keys.keys() & {"controller", "controllers"}:
-        return meant(shipped_name(Path(file)), shipped_names())
+        own = nearest(file, studies_beside(Path(file)))
+        return f"did you mean {own!r}?" if own else meant(shipped_name(Path(file)), shipped_names())
     if "controller" in keys:
         return (f"{file} is a controller: ", Setting(f"controller={file}", option=True))
     names = [str(other) for other in files if str(other) in CONTROLLERS]

@@ -15,7 +15,7 @@ from wristctl.config.plant import is_unsaid
 from wristctl.config.section import OpenSection, Parameter, Section
 from wristctl.config.study import Study
 from wristctl.errors import Phrase, UserError
-from wristctl.study_files.keys import SUBJECTS, choices_of, command_of, keys_of, source_of, unit_of
+from wristctl.study_files.keys import NO_COMMANDS, SUBJECTS, choices_of, command_of, keys_of, source_of, unit_of
 from wristctl.study_files.strict_yaml import parse_yaml
 
 _WORD = re.compile(r"[A-Za-z0-9_./][A-Za-z0-9_./ -]*[A-Za-z0-9_./]|[A-Za-z_/]")
@@ -29,7 +29,6 @@ class _Part(list[Entry]):
 
 _SHARED = ("seed", "wrist")
 _OWN = "controller-settings"
-_NO_COMMANDS = (*_SHARED, "families", "sweep", _OWN, "real-robot")
 _READ: dict[str, tuple[str, ...]] = {"train": ("gen-data",), "simulate": (_OWN, "sweep")}
 _READ |= dict.fromkeys(("hw-run", "recommend"), (_OWN,))
 _READ |= dict.fromkeys(("tune", "compare"), ("families", _OWN, "sweep")) | {"study": ("families", _OWN)}
@@ -52,7 +51,7 @@ def check_read(key: str, command: str, where: Phrase) -> None:
     section = key.partition(".")[0]
     if section not in keys_of(Study) or section in (*_keys(command), *_PASSED_ON.get(command, ())):
         return
-    commands = [name for name in dict.fromkeys([*keys_of(Study), *SUBJECTS]) if name not in _NO_COMMANDS]
+    commands = [name for name in dict.fromkeys([*keys_of(Study), *SUBJECTS]) if name not in NO_COMMANDS]
     readers = [command_of(name) for name in commands if section in _keys(name)]
     read = f"`{'`, `'.join(f'wristctl {reader}' for reader in readers)}` read{'s' * (len(readers) == 1)} it"
     fix = f"{read}; a study file may hold it beside what {command_of(command)} reads"

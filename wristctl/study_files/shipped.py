@@ -40,6 +40,11 @@ def study_file(path: Path, folder: Path = Path()) -> Path | None:
     return file if exists else None
 
 
+def studies_beside(path: Path) -> list[str]:
+    """Study files in the folder of a path, as they are typed: mywrist.yaml."""
+    return [str(file) for file in sorted(path.parent.glob("*.yaml"))]
+
+
 def shipped_name(path: Path) -> str:
     """Name of the experiment at a path."""
     parts = path.parts[1:] if path.parts[:1] == (EXPERIMENTS,) else path.parts

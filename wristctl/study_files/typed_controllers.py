@@ -1,5 +1,6 @@
 """Controllers that are typed among study files: `wristctl compare pid-ff adrc/hardware my.py:LAW mywrist.yaml`."""
 
+import ast
 from collections.abc import Container, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -7,9 +8,9 @@ from typing import Any, NamedTuple
 from wristctl.config.choices import CONTROLLERS
 from wristctl.config.controller_row import BY_LOOP, label_of
 from wristctl.config.foreign import is_reference
-from wristctl.errors import Call, Phrase, Setting, UserError, nearest
+from wristctl.errors import Call, Phrase, Setting, UserError, nearest, plain
 from wristctl.plugins.places import placed
-from wristctl.study_files.shipped import shipped_names, study_file
+from wristctl.study_files.shipped import shipped_names, studies_beside, study_file
 from wristctl.study_files.short_rows import row_typed
 from wristctl.study_files.strict_yaml import KeyPath
 
@@ -50,7 +51,7 @@ def _is_controller(argument: str) -> bool:
     if named or (study is not None and study.suffix != ".py"):
         return named
     if argument.endswith(".py"):
-        raise UserError(f"{argument} should name its controller", argument, f"{argument}:NAME")
+        raise UserError(f"{argument} should name its controller", argument, _named_in(Path(argument)))
     raise UserError(f"'{argument}' is neither a controller nor a study file", "", _neither(argument))
 
 
@@ -66,17 +67,33 @@ def _both(argument: str, study: Path) -> Phrase:
 def _neither(argument: str) -> Phrase:
     """What may have been meant, and where all names are."""
     _, stroke, gains = argument.partition("/")
-    names = [*CONTROLLERS.known(), *shipped_names(), *(f"{file}.yaml" for file in _beside(argument))]
+    studies = studies_beside(Path(argument))
+    names = [*CONTROLLERS.known(), *shipped_names(), *studies]
     names += [f"{name}/{gains}" for name in CONTROLLERS.known() if stroke]
-    best = argument + ".yaml" if argument in _beside(argument) else nearest(argument, names)
+    best = argument + ".yaml" if argument + ".yaml" in studies else nearest(argument, names)
+    if own := _own_file(argument):
+        best = _named_in(own)
     every: Phrase = ("controllers: `", Call("list controllers"), "`; a study file ends in .yaml")
     return (f"did you mean '{best}'? ", every) if best else every
 
 
-def _beside(argument: str) -> list[str]:
-    """Study files in the folder of an argument, without .yaml."""
-    folder = Path(argument).parent
-    return [str(file.with_suffix("")) for file in sorted(folder.glob("*.yaml"))]
+def _own_file(argument: str) -> Path | None:
+    """The Python file in the folder of an argument that has its name: my_pd.py of my-pd; None without one."""
+    beside = sorted(Path(argument).parent.glob("*.py"))
+    return next((file for file in beside if plain(file.stem) == plain(Path(argument).name)), None)
+
+
+def _named_in(file: Path) -> str:
+    """FILE:NAME of the first controller that a Python file makes, which is read and not run; else of NAME itself."""
+    try:
+        statements = ast.parse(file.read_bytes()).body
+    except (OSError, SyntaxError, ValueError):
+        statements = []
+    for statement in statements:
+        match statement:
+            case ast.Assign(targets=[ast.Name(id=name)], value=ast.Call(func=ast.Name(id="Controller"))):
+                return f"{file}:{name}"
+    return f"{file}:NAME"
 
 
 def put_in(
