@@ -303,13 +303,20 @@ def found_in(run: Run) -> Found:
         return Found(run.id, run.file(IDENTIFIED).read_text(encoding="utf-8"))
     if run.has(RATIOS):
         return Found(run.id, "", read_json(run.file(RATIOS)))
-    raise UserError("no wrist was identified there", run.id, "an identify run that did not refuse its logs or trials")
+    raise _nothing_found(run.id)
+
+
+def _nothing_found(run: str) -> UserError:
+    return UserError("no wrist was identified there", run, "an identify run that did not refuse its logs or trials")
 
 
 def _what_was_found(earlier: Run | _Identification) -> Found:
     if isinstance(earlier, Run):
         return found_in(earlier)
-    return Found("identify", getattr(earlier, "yaml", ""), getattr(earlier, "ratios", None))
+    found = Found("identify", getattr(earlier, "yaml", ""), getattr(earlier, "ratios", None))
+    if not found.yaml and found.ratios is None:
+        raise _nothing_found(found.run)
+    return found
 
 
 def family_of(families: Mapping[str, Family], name: str, where: str) -> Family:
