@@ -15,7 +15,7 @@ import pytest
 
 from wristctl.commands.answer import Answer
 from wristctl.commands.compare.csv_data import frame
-from wristctl.commands.printed_table import Table
+from wristctl.commands.printed_table import Table, table_for_people
 from wristctl.comparison.combinations import ComparedRow
 from wristctl.config.learning import TrainSettings
 from wristctl.config.study import Study
@@ -249,7 +249,7 @@ def test_several_runs_are_told_apart_from_the_first_in_columns_of_their_own(tmp_
 
 
 def test_tables_are_in_degrees_by_their_heads_and_by_their_rows_units(tmp_path: Path) -> None:
-    stored = [
+    stored: list[dict[str, Any]] = [
         {"title": "A", "columns": ["who", "RMSE [rad]", "rate [rad/s]"], "rows": [["a", 0.5, 2.0], ["b", None, 1.0]]},
         {"title": "B", "columns": ["metric", "value", "unit"], "rows": [["rmse", 0.5, "rad"], ["peak", 9.5, "N"]]},
         {
@@ -257,8 +257,20 @@ def test_tables_are_in_degrees_by_their_heads_and_by_their_rows_units(tmp_path: 
             "columns": ["name", "95 %", "unit"],
             "rows": [["turn", "-0.5 to 1e-3", "rad"], ["x", "-", "m"]],
         },
+        {
+            "title": "Told",
+            "columns": ["recording", "value", "95 %", "unit"],
+            "rows": [["7", "0.05825", "0.04951 to 0.06699", "rad"], ["8", "not identifiable", "", "rad"]],
+        },
     ]
-    first, second, third = shown_tables(made(tmp_path, {}, tables=stored))
+    run = made(tmp_path, {}, tables=stored)
+    first, second, third, told = shown_tables(run)
+    (printed,) = re.findall(r"^7 +(\S+) +(\S+) to (\S+) +deg", table_for_people(stored[-1]).text(), re.MULTILINE)
+    (on_page,) = [cells[1:3] for cells in rows(page_of(run)) if cells[:1] == ["7"]]
+    for value, low, high in (printed, (on_page[0], *on_page[1].split(" to "))):
+        assert float(low) < float(value) < float(high), "a value lies within its interval"
+    assert told["rows"][1] == ["8", "not identifiable", "", "deg"]
+    assert told["rows"][0] == ["7", "3.337", "2.837 to 3.838", "deg"], "a value in words is in the unit of its interval"
     assert third["rows"] == [["turn", "-28.65 to 0.0573", "deg"], ["x", "-", "m"]], "a range is in its row's unit"
     assert first["columns"] == ["who", "RMSE [deg]", "rate [rad/s]"]
     assert first["rows"] == [["a", pytest.approx(90.0 / np.pi), 2.0], ["b", None, 1.0]]

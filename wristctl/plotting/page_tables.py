@@ -14,17 +14,17 @@ from wristctl.study_files.keys import command_of
 
 # Units of angles in files, and what people read.
 _DEGREES = {"rad": "deg", "rad s": "deg s"}
-_RANGE = re.compile(r"(-?[0-9.]+(?:e[-+]?[0-9]+)?) to (-?[0-9.]+(?:e[-+]?[0-9]+)?)")
+_NUMBER = r"-?[0-9]+(?:\.[0-9]+)?(?:e[-+]?[0-9]+)?"
+_IN_WORDS = re.compile(rf"{_NUMBER}(?: to {_NUMBER})?")
 _WHO = ("loop", "reference", "controller", "gains", "inverse")
 
 
 def in_degrees(value: Any, unit: str) -> tuple[Any, str]:
-    """A number, or a range of two in words, and its unit for people: angles, and their integrals, in degrees."""
+    """A number, also in words, or a range of two, and its unit for people: angles, and their integrals, in degrees."""
     if unit not in _DEGREES:
         return value, unit
-    if isinstance(value, str) and (ends := _RANGE.fullmatch(value)):
-        low, high = (format(math.degrees(float(end)), ".4g") for end in ends.groups())
-        return f"{low} to {high}", _DEGREES[unit]
+    if isinstance(value, str) and _IN_WORDS.fullmatch(value):
+        return " to ".join(format(math.degrees(float(end)), ".4g") for end in value.split(" to ")), _DEGREES[unit]
     is_number = isinstance(value, int | float) and not isinstance(value, bool)
     return (math.degrees(value) if is_number else value), _DEGREES[unit]
 
@@ -58,7 +58,7 @@ def readable(table: dict[str, Any]) -> dict[str, Any]:
                 row[at] = in_degrees(row[at], unit)[0]
     for row in rows:
         if unit_at is not None and row[unit_at] in _DEGREES:
-            row[:] = [in_degrees(cell, row[unit_at])[0] for cell in row]
+            row[1:] = [in_degrees(cell, row[unit_at])[0] for cell in row[1:]]  # the first is a name
             row[unit_at] = _DEGREES[row[unit_at]]
     return table | {"columns": heads, "rows": rows}
 
