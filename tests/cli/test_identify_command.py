@@ -118,7 +118,8 @@ def test_what_cannot_be_told_apart_is_refused_with_what_to_add(call: Call, tmp_p
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
-        ((), "identify needs a hw-run run"),
+        ((), "identify needs a hw-run run or a log - identify.runs - fix: latest:hw-run"),
+        ((), "`wristctl identify my.csv`"),
         (("nothing",), "no such run"),
         (("--set", "fix.damping=1.0"), "needs a hw-run"),
         (("--set", "fix.dampin=1.0"), "did you mean 'damping'"),
@@ -127,6 +128,12 @@ def test_what_cannot_be_told_apart_is_refused_with_what_to_add(call: Call, tmp_p
 def test_without_logged_runs_there_is_nothing_to_identify(call: Call, arguments: tuple[str, ...], said: str) -> None:
     code, _, err = call("identify", *arguments)
     assert code == 2 and said in err
+
+
+def test_a_study_among_the_logs_is_told_where_it_goes(call: Call, tmp_path: Path) -> None:
+    (tmp_path / "my.yaml").write_text("wrist:\n  stiffness: 0.4\n")
+    code, _, err = call("identify", str(tmp_path / "my.yaml"))
+    assert code == 2 and "a study file" in err and f"`wristctl identify my.csv --config {tmp_path}/my.yaml`" in err
 
 
 def test_identified_values_replace_what_a_command_knows_and_leave_its_levels() -> None:

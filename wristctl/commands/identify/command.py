@@ -14,13 +14,13 @@ from wristctl.commands.answer import Answer
 from wristctl.commands.identify.answer import found_answer, refused_answer
 from wristctl.commands.identify.bends import BendsTold, bends_plan, identify_bends
 from wristctl.commands.identify.logs import LogTold, identify_logs, log_plan
-from wristctl.commands.inputs import EarlierRun, Inputs, missing_run
+from wristctl.commands.inputs import EarlierRun, Inputs
 from wristctl.commands.printed_table import Table
 from wristctl.commands.procedure import Procedure, no_tendons
 from wristctl.commands.results import StudyResult
 from wristctl.commands.session import Session
 from wristctl.config.study import Study
-from wristctl.errors import UserError
+from wristctl.errors import Argument, Call, UserError
 from wristctl.records import Run
 from wristctl.records.folders_of_logs import files_of_recording
 
@@ -35,6 +35,7 @@ log = logging.getLogger(__name__)
 
 # Endings of names that are of tables and never of runs.
 _TABLES = (".csv", ".txt", ".tsv", ".parquet", ".mat", ".mcap", ".db3", ".bag")
+_STUDIES = (".yaml", ".yml")
 # Draws of the posterior that a run keeps as a family of worlds.
 _DRAWS = 200
 
@@ -82,8 +83,15 @@ class _Logged(NamedTuple):
 
 
 def with_logs(study: Study) -> Study:
-    """The study with files among its runs named as open logs, and recordings that are folders by their files."""
+    """The study with files among its runs named as open logs, and recordings that are folders by their files.
+
+    Raises UserError for a study file among its runs.
+    """
     runs = study.identify.runs
+    for run in runs:
+        if Path(run).suffix in _STUDIES and Path(run).is_file():
+            fix = ("give a log or a run, and the study beside it: `", _of_a_log(Argument("config", run)), "`")
+            raise UserError("a study file where a log or a run is asked for", run, fix)
     files = {run: files_of_recording(Path(run)) for run in runs}
     logs = {run: found for run, found in files.items() if found != [Path(run)] or _is_log(Path(run))}
     if not logs:
@@ -91,6 +99,10 @@ def with_logs(study: Study) -> Study:
     named = tuple(str(file) for found in logs.values() for file in found)
     changed = {"runs": tuple(run for run in runs if run not in logs), "logs": (*study.identify.logs, *named)}
     return study.model_copy(update={"identify": study.identify.model_copy(update=changed)})
+
+
+def _of_a_log(*arguments: Argument) -> Call:
+    return Call("identify", arguments=(Argument("logs", "my.csv", positional=True), *arguments))
 
 
 def _is_log(path: Path) -> bool:
@@ -193,7 +205,9 @@ def _problem(study: Study, inputs: Inputs) -> Problem:
     from wristctl.identification.unknowns import believed_of
 
     if not inputs.runs():
-        raise missing_run("identify", _RUNS, several=True)
+        latest = Argument("runs", "latest:hw-run", positional=True)
+        runs_or_log = (latest, ", the path or id of a hw-run run, or a log: `", _of_a_log(), "`")
+        raise UserError("identify needs a hw-run run or a log", "identify.runs", runs_or_log)
     settings, trials = study.identify, []
     start: dict[str, float] = {}
     believed = Actuator()
