@@ -116,7 +116,7 @@ ONE_WAY = {name: each if name == "time [s]" else each[:51].repeat(4)[:201] for n
         (text_of(COLUMNS | {"angle [deg]": 5.0 * ANGLE}), "it bends by 150 deg", "", "the angle's unit"),
         (text_of(COLUMNS | {"tension_minus [N]": 0.1 * TIME - 0.9}), "a tendon pushes", ":2", "the load cell's zero"),
         (text_of(COLUMNS | {"angle [deg]": -ANGLE}), "angle falls while tendon 1", ":1", "spool_1=spool_minus"),
-        (text_of(IN_UM), "0.001 times as far", "", "units"),
+        (text_of(IN_UM), "moves 0.0074 mm, and the bend takes 7.4 mm", ":1", "is it in mm?"),
         (text_of(STILL), "no spool moves", ":1", "bend the wrist to both sides"),
         (text_of(ONE_WAY), "never turns", "", "there and back"),
     ],

@@ -103,6 +103,46 @@ def test_counters_that_wrap_go_on_and_it_is_told() -> None:
     assert "enc1, enc2 are reeled in by 43.4 mm" in log.remarks[2]  # where these encoders began
 
 
+@pytest.mark.parametrize("unit", ["m", "mm", "0.175 mm", "0.1 mm", "0.01 mm", "-0.0001 mm"])
+def test_counts_of_a_wrong_length_are_refused_with_one_that_is_taken(unit: str) -> None:
+    """The length that the tendon's way makes of the bend; the encoders were recorded with 0.000719 mm."""
+    names = COUNTS.replace("0.000719 mm", unit)
+    with pytest.raises(
+        UserError, match=r"one count is about 0\.0007 mm if the tendon runs at wrist\.tendon_rad"
+    ) as refused:
+        looked_at(read_log(FIELD / "wrapped_counts.csv", names), tendon_offset=0.0141)
+    sign = "-" if unit.startswith("-") else ""
+    told = names.replace(unit + "]", f"{sign}0.0007 mm]")
+    assert sorted(told.split(", ")) == sorted(refused.value.fix.split("'")[1].split(", "))
+    if not sign:
+        assert len(looked_at(read_log(FIELD / "wrapped_counts.csv", told), tendon_offset=0.0141)) == 1000
+
+
+def test_the_first_proposal_for_counts_is_taken() -> None:
+    with pytest.raises(
+        UserError, match=r"the numbers the unit of enc1, enc2, imu; one count is about 0\.0007"
+    ) as refused:
+        read_log(FIELD / "wrapped_counts.csv")
+    log = looked_at(read_log(FIELD / "wrapped_counts.csv", refused.value.fix.split("'")[1]), tendon_offset=0.0141)
+    np.testing.assert_allclose(np.ptp(log.columns["spool_1"]), 0.0126, rtol=0.05)
+
+
+@pytest.mark.parametrize(("bend", "spool"), [("deg", "mm"), ("deg", "m"), ("rad", "mm")])
+def test_units_that_the_range_of_bend_and_spools_refutes_are_refused(bend: str, spool: str) -> None:
+    names = f"time=t [s], bend_y=theta [{bend}], spool_1=l1 [{spool}], spool_2=l2 [{spool}]"
+    with pytest.raises(UserError, match=r"l1 moves .* mm, and the bend takes .* mm") as refused:
+        looked_at(read_log(FIELD / "log.mat", names), tendon_offset=0.0141)
+    log = looked_at(read_log(FIELD / "log.mat", refused.value.fix.split("'")[1], others=True), tendon_offset=0.0141)
+    assert np.abs(log.columns["spool_1"]).max() == pytest.approx(0.0066, rel=0.02)
+
+
+def test_counts_without_a_bend_are_told_how_long_one_can_be(tmp_path: Path) -> None:
+    table = pd.read_csv(FIELD / "wrapped_counts.csv").rename(columns={"enc1": "spool_1 [mm]"})
+    table[["spool_1 [mm]"]].to_csv(tmp_path / "counts.csv", index=False)
+    with pytest.raises(UserError, match=r"moves 17\.5 m .* the length that one count reels in: less than 0\.11 mm"):
+        looked_at(read_log(tmp_path / "counts.csv"))
+
+
 def test_other_jumps_of_a_counter_are_refused_at_their_line(tmp_path: Path) -> None:
     clean = read_log(FIELD / "clean.csv").columns
     counts = {f"enc{k}": np.round(clean[f"spool_{k}"] / 0.719e-6).astype(int) % 40000 for k in (1, 2)}

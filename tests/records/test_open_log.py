@@ -69,7 +69,7 @@ def test_names_of_another_author_are_mapped_with_their_units(tmp_path: Path) -> 
 )
 def test_a_mapping_that_cannot_be_meant_is_refused(names: str, what: str, fix: str, tmp_path: Path) -> None:
     with pytest.raises(UserError) as caught:
-        log_of(tmp_path, "t [s],imu", "0,1", names=names)
+        log_of(tmp_path, "t [s],imu", "0,10", names=names)
     assert what in caught.value.what and fix in caught.value.fix
 
 
@@ -88,7 +88,7 @@ PROPOSALS = {
 
 @pytest.mark.parametrize("head", list(PROPOSALS))
 def test_columns_of_ones_own_are_answered_with_a_text_that_one_can_paste(tmp_path: Path, head: str) -> None:
-    row = ";".join("0123"[: head.count(";") + 1])
+    row = ";".join(["0", "10", "20", "30"][: head.count(";") + 1])
     with pytest.raises(UserError) as caught:
         log_of(tmp_path, head, row)
     assert f"--columns '{PROPOSALS[head]}'" in caught.value.fix
@@ -98,10 +98,28 @@ def test_columns_of_ones_own_are_answered_with_a_text_that_one_can_paste(tmp_pat
 
 def test_a_proposal_says_what_it_guesses_and_what_it_passes_over(tmp_path: Path) -> None:
     with pytest.raises(UserError) as caught:
-        log_of(tmp_path, "t_s,Winkel,Temperatur", "0,1,2")
+        log_of(tmp_path, "t_s,Winkel,Temperatur", "0,0,2")
     assert "(guessed: the unit of Winkel) (it passes over Temperatur)" in caught.value.fix
     with pytest.raises(UserError, match=r"unknown column 'Temperatur'.* --columns 'NAME=Temperatur .UNIT.'"):
         log_of(tmp_path, "Temperatur", "2")
+
+
+@pytest.mark.parametrize(("head", "turn", "bend"), [("imu", 1.0, "rad"), ("imu [rad]", 1.0, ""), ("imu", 57.3, "deg")])
+@pytest.mark.parametrize(
+    ("scale", "unit"), [(1.0, "m"), (1e3, "mm"), (-1e3, "mm"), (5e4, "0.02 mm"), (2e5, "0.005 mm")]
+)
+def test_units_that_nothing_says_are_guessed_by_the_range_of_the_numbers(
+    head: str, turn: float, bend: str, scale: float, unit: str, tmp_path: Path
+) -> None:
+    theta = 0.5 * np.sin(np.linspace(0.0, 6.0, 60))
+    rows = [f"{turn * angle},{scale * way},{-scale * way}" for angle, way in zip(theta, 0.0141 * theta, strict=True)]
+    with pytest.raises(UserError, match="by the range of the numbers the unit of") as caught:
+        log_of(tmp_path, f"{head},l1,l2", *rows)
+    written = f"bend_y={'imu'} [{bend or 'rad'}], spool_1=l1 [{unit}], spool_2=l2 [{unit}]"
+    assert f"--columns '{written}'" in caught.value.fix
+    log = log_of(tmp_path, f"{head},l1,l2", *rows, names=written)
+    np.testing.assert_allclose(np.ptp(log.columns["bend_y"]), np.ptp(theta), rtol=1e-3)
+    np.testing.assert_allclose(np.ptp(log.columns["spool_1"]), 0.0141 * np.ptp(theta), rtol=0.05)
 
 
 def test_units_in_a_line_may_be_spelt_in_any_way(tmp_path: Path) -> None:

@@ -15,6 +15,7 @@ from wristctl.records.log_converters import read_log
 from wristctl.records.log_looks import looked_at, telling
 from wristctl.records.open_log import OpenLog
 from wristctl.wrist.directions import DIRECTIONS
+from wristctl.wrist.tendon_layout import TendonLayout
 
 _EXAMPLE = "time [s],angle [deg],spool_plus [mm],spool_minus [mm]"
 _FEWEST = 100
@@ -91,7 +92,9 @@ def read_loop(file: Path, wrist: WristParameters, names: str = "", trial: str | 
     `names` are another author's columns as `wristctl.records.open_log` has them, `trial` is that of several to be used.
     A log without times is taken as slow: so much of its way in a second that damping plays no part.
     """
-    log = trial_of(telling(looked_at(read_log(file, names, "measured loop"))), trial)
+    offset = TendonLayout.of(wrist).offset
+    read = read_log(file, names, "measured loop", tendon_offset=offset)
+    log = trial_of(telling(looked_at(read, tendon_offset=offset)), trial)
     slow: Array = _SLOWLY * np.arange(len(log), dtype=np.float64)
     time = log.whole("time", _EXAMPLE) if "time" in log.columns else slow
     bend, spools, tensions = planar_bend(log), in_pairs(log, "spool"), in_pairs(log, "tension")

@@ -7,8 +7,19 @@ import re
 from collections.abc import Collection, Mapping, Sequence
 from typing import NamedTuple
 
+from wristctl.arrays import Array
 from wristctl.errors import Argument, UserError, meant, nearest
 from wristctl.records.column_guesses import UNIT_WORDS, Guess, guesses
+from wristctl.records.column_ranges import (
+    TENDON_OFFSET,
+    count_told,
+    numbers_of,
+    range_of,
+    unit_of_bend,
+    unit_of_spools,
+    way_of_bend,
+)
+from wristctl.records.recorded_table import Cells
 
 Units = Mapping[str, float]
 """Units that a column may have, with their factors to SI."""
@@ -59,6 +70,8 @@ _SPELT = {"°": "deg", "degrees": "deg", "degree": "deg", "sec": "s", "seconds":
           "µm": "um", "μm": "um"}  # fmt: skip
 # Most letters of a column's name.
 _LONGEST = 1000
+BENDS = ("bend_y", "bend_z", "inclination")
+"""Columns that say how far the wrist bends."""
 _HEAD = re.compile(r"\s*(.*?)\s*(?:\[\s*([^]]*?)\s*\])?\s*")
 TENDON = re.compile(rf"({'|'.join(OF_TENDONS)})_([1-9]\d*)")
 """Name of a tendon's column: its quantity and its number."""
@@ -115,7 +128,14 @@ def name_of(head: str) -> str:
 
 
 def chosen_columns(
-    heads: Sequence[str], names: Names, units: Mapping[str, Units], others: bool, dated: Collection[int], where: str
+    heads: Sequence[str],
+    names: Names,
+    units: Mapping[str, Units],
+    others: bool,
+    dated: Collection[int],
+    where: str,
+    cells: Sequence[Cells] = (),
+    tendon_offset: float = TENDON_OFFSET,
 ) -> dict[int, ReadColumn]:
     """The columns that are read, by their places in a header.
 
@@ -136,6 +156,10 @@ def chosen_columns(
         Places of columns that hold dates or Unix times, whose unit they say themselves.
     where
         File and line of the header, for errors.
+    cells
+        Columns of the file, whose ranges tell units that are not said.
+    tendon_offset
+        Distance of the tendons from the axis [m], for the same.
     """
     chosen, missing, unknown = dict[int, ReadColumn](), dict(names), list[int]()
     for place, cell in enumerate(heads):
@@ -160,10 +184,11 @@ def chosen_columns(
             continue
         factor = _factor(unit, known)
         if factor is None:
-            raise _without_factor(written, name, unit, known, heads, names, where)
+            proposed = proposal(heads, names, cells, tendon_offset)
+            raise _without_factor(written, name, unit, known, proposed, where)
         chosen[place] = ReadColumn(name, factor)
     if unknown:
-        raise _unknown(heads, unknown, units, names, where)
+        raise _unknown(heads, unknown, units, proposal(heads, names, cells, tendon_offset), where)
     for theirs, (name, _) in missing.items():
         fix = meant(theirs, [name_of(head) for head in heads])
         raise UserError(f"no column {theirs!r}, which is to be {name}", where, fix)
@@ -179,12 +204,9 @@ def _factor(unit: str, units: Units) -> float | None:
     return float(scaled[1]) * units[scaled[2]] if scaled and scaled[2] in units else None
 
 
-def _without_factor(
-    written: str, name: str, unit: str, units: Units, heads: Sequence[str], names: Names, where: str
-) -> UserError:
+def _without_factor(written: str, name: str, unit: str, units: Units, proposed: Proposal, where: str) -> UserError:
     choices = f"{written} [{'] or ['.join(units)}]"
     mapped = f"{name}={written} [{UNIT_WORDS.get(unit.lower(), next(iter(units)))}]"
-    proposed = proposal(heads, names)
     if unit and unit.lower() not in UNIT_WORDS:
         fix = f"{choices}, or a multiple such as [0.5 {next(iter(units))}]"
         return UserError(f"{written} is in {unit!r}", where, fix)
@@ -195,10 +217,9 @@ def _without_factor(
 
 
 def _unknown(
-    heads: Sequence[str], unknown: Sequence[int], units: Mapping[str, Units], names: Names, where: str
+    heads: Sequence[str], unknown: Sequence[int], units: Mapping[str, Units], proposed: Proposal, where: str
 ) -> UserError:
     written = [name_of(heads[place]) for place in unknown]
-    proposed = proposal(heads, names)
     choices = [*units, *WORDS, *SYNONYMS, "spool_3", "tension_3"]
     like = nearest(written[0], choices) if len(written[0]) > 3 else None
     text = proposed.text or f"NAME={written[0]}{'' if '[' in heads[unknown[0]] else ' [UNIT]'}"
@@ -220,8 +241,27 @@ class Proposal(NamedTuple):
     """Which units are guesses, and which columns it passes over; empty where there are none."""
 
 
-def proposal(heads: Sequence[str], names: Names | None = None) -> Proposal:
-    """The text for `--columns` that columns may be meant by, from their names and units.
+class _Meant(NamedTuple):
+    """A column that a proposal names."""
+
+    theirs: str
+    """Its name in the file, as `--columns` has it."""
+    name: str
+    unit: str
+    """Empty where the header says it."""
+    unsure: bool
+    """Whether the unit is a guess."""
+    standing: bool
+    """Whether the header says all of it."""
+
+
+def proposal(
+    heads: Sequence[str],
+    names: Names | None = None,
+    cells: Sequence[Cells] = (),
+    tendon_offset: float = TENDON_OFFSET,
+) -> Proposal:
+    """The text for `--columns` that columns may be meant by, from their names and units, and from their numbers' range.
 
     Parameters
     ----------
@@ -229,32 +269,77 @@ def proposal(heads: Sequence[str], names: Names | None = None) -> Proposal:
         Names with units in brackets, as they stand in the file.
     names
         What is named already, and stays.
+    cells
+        Columns of the file, whose ranges tell the units of bends and spools that are not said.
+    tendon_offset
+        Distance of the tendons from the axis [m], for the same.
     """
-    named = dict(names or {})
-    entries, guessed, passed = list[str](), list[str](), list[str]()
+    columns = _meant(heads, dict(names or {}))
+    by_range = _units_by_range(heads, columns, cells, tendon_offset) if cells else {}
+    entries, guessed, ranged = list[str](), list[str](), list[str]()
+    count = ""
+    for place, column in enumerate(columns):
+        if column is None or column.standing:
+            continue
+        unit = by_range.get(place, column.unit)
+        entry = _entry(column.name, column.theirs, unit)
+        if not _reads_back(entry):
+            continue
+        entries.append(entry)
+        if column.unsure:
+            (ranged if place in by_range else guessed).append(column.theirs)
+            if column.name.startswith("spool_") and place in by_range and unit not in LENGTH:
+                count = f"; {count_told(unit, tendon_offset)}"
+            elif column.name.startswith("spool_") and place not in by_range and unit == "mm":
+                count = count or "; of a counter [0.175 mm] is what one count reels in"
+    units = [f"the unit of {', '.join(guessed)}"] * bool(guessed)
+    units += [f"by the range of the numbers the unit of {', '.join(ranged)}"] * bool(ranged)
+    doubts = f" (guessed: {'; '.join(units)}{count})" if units else ""
+    passed = [name_of(head) for head, column in zip(heads, columns, strict=True) if column is None]
+    return Proposal(", ".join(entries), doubts + (f" (it passes over {', '.join(passed[:6])})" if passed else ""))
+
+
+def _meant(heads: Sequence[str], named: Names) -> list[_Meant | None]:
+    """What each column is by its name or by its head, None of one that nothing is known of."""
     taken = {name for name, _ in named.values()}
     fresh = [head for head in heads if name_of(head) not in named and head.strip() not in named]
     guess_of = dict(zip(fresh, guesses(fresh, taken, _known_already), strict=True))
+    columns = list[_Meant | None]()
     for head in heads:
         theirs = name_of(head)
         key = theirs if theirs in named else head.strip()
         if key in named:
             name, unit = named[key]
-            written = "" if unit or name in WORDS or _in_header(head, name) else _first_unit(name)
-            guessed += [theirs] if written else []
-            entries.append(_entry(name, key, unit or written))
+            unsure = not (unit or name in WORDS or _in_header(head, name))
+            columns.append(_Meant(key, name, unit or _first_unit(name) * unsure, unsure, False))
+        elif (guess := guess_of[head]) is None:
+            columns.append(None)
+        else:
+            columns.append(_Meant(theirs, guess.name, guess.unit, guess.unsure, guess.standing))
+    return columns
+
+
+def _units_by_range(
+    heads: Sequence[str], columns: Sequence[_Meant | None], cells: Sequence[Cells], tendon_offset: float
+) -> dict[int, str]:
+    """Units of bends and spools that are guesses, by the places of the columns, where the numbers tell them."""
+    units, ranges, spools = dict[int, str](), list[float](), dict[int, Array]()
+    for place, column in enumerate(columns):
+        if column is None:
             continue
-        guess = guess_of[head]
-        if guess is None:
-            passed.append(theirs)
-        elif not guess.standing:
-            entries.append(_entry(guess.name, theirs, guess.unit))
-            guessed += [theirs] if guess.unsure else []
-    entries = [entry for entry in entries if _reads_back(entry)]
-    counts = any(entry == f"spool_{k}={theirs} [mm]" for entry in entries for theirs in guessed for k in range(1, 10))
-    count = "; of a counter [0.175 mm] is what one count reels in" if counts else ""
-    doubts = f" (guessed: the unit of {', '.join(guessed)}{count})" if guessed else ""
-    return Proposal(", ".join(entries), doubts + (f" (it passes over {', '.join(passed[:6])})" if passed else ""))
+        if column.name in BENDS:
+            numbers = numbers_of(cells[place])
+            unit = unit_of_bend(numbers)
+            if column.unsure and unit:
+                units[place] = unit
+            match = _HEAD.fullmatch(heads[place])
+            said = column.unit or (match[2] if match else "") or ""
+            factor = _factor(units.get(place, said), ANGLE)
+            ranges += [factor * range_of(numbers)] if factor else []
+        elif column.name.startswith("spool_") and column.unsure:
+            spools[place] = numbers_of(cells[place])
+    unit = unit_of_spools(list(spools.values()), way_of_bend(ranges, tendon_offset))
+    return units | dict.fromkeys(spools, unit) if unit else units
 
 
 def _known_already(head: str) -> Guess | None:

@@ -18,6 +18,7 @@ import numpy as np
 from wristctl.arrays import Array
 from wristctl.errors import UserError
 from wristctl.plain_files import LARGEST_DATA, open_plain
+from wristctl.records.column_ranges import TENDON_OFFSET
 from wristctl.records.log_columns import Units
 from wristctl.records.open_log import OpenLog, read_table, text_of
 from wristctl.records.parquet_logs import parquet_frame
@@ -264,7 +265,12 @@ CONVERTERS: dict[str, Converter] = {
 
 
 def read_log(
-    file: Path, names: str = "", what: str = "log", others: bool = False, more: Mapping[str, Units] | None = None
+    file: Path,
+    names: str = "",
+    what: str = "log",
+    others: bool = False,
+    more: Mapping[str, Units] | None = None,
+    tendon_offset: float = TENDON_OFFSET,
 ) -> OpenLog:
     """Read an open log: a table, or with the name of a converter as `names` that laboratory's file.
 
@@ -272,4 +278,4 @@ def read_log(
     """
     if names.strip() in CONVERTERS:
         return replace(CONVERTERS[names.strip()].read(file), what=what)
-    return read_table(file, names, what, others, more)
+    return read_table(file, names, what, others, more, tendon_offset)

@@ -7,12 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
-from wristctl.arrays import Array
+from wristctl.records.column_ranges import SIZES, turns_of
 from wristctl.records.open_log import OpenLog
-
-_SIZES = (2**16, 2**32)
-# Largest share of a counter's range that a step between two samples may have for its wraps to be told.
-_SHARE = 0.1
 
 
 def without_wraps(log: OpenLog) -> OpenLog:
@@ -29,8 +25,8 @@ def without_wraps(log: OpenLog) -> OpenLog:
         whole = np.round(counts[there])
         if len(there) < 3 or np.any(np.abs(counts[there] - whole) > 1e-6 * np.maximum(1.0, np.abs(whole))):
             continue
-        for size in _SIZES:
-            turns = _turns(whole, size)
+        for size in SIZES:
+            turns = turns_of(whole, size)
             if turns is None:
                 continue
             columns[name] = columns[name].copy()
@@ -42,16 +38,3 @@ def without_wraps(log: OpenLog) -> OpenLog:
             told.append(f"{log.head(name)} begins again after 2^{power} counts at {where}{more}: it is taken to go on.")
             break
     return replace(log, columns=columns, remarks=[*log.remarks, *told]) if told else log
-
-
-def _turns(counts: Array, size: int) -> Array | None:
-    """Number of turns before each count (T,); None where the counts are not of a counter that wraps at this size."""
-    if counts.min() < -size // 2 or counts.max() >= size or np.ptp(counts) >= size:
-        return None
-    steps = np.diff(counts)
-    wraps = np.abs(steps) > 0.5 * size
-    rest = steps - size * np.sign(steps) * wraps
-    if not wraps.any() or np.any(np.abs(rest) > _SHARE * size):
-        return None
-    turns: Array = np.concatenate([[0.0], np.cumsum(-np.sign(steps) * wraps)])
-    return turns

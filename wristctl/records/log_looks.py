@@ -14,7 +14,18 @@ from numpy.typing import NDArray
 
 from wristctl.arrays import Array
 from wristctl.errors import Argument, Phrase, UserError
-from wristctl.records.log_columns import SYNONYMS, Units, units_of
+from wristctl.records.column_ranges import (
+    FACTOR_OF_A_COUNT,
+    FACTOR_OF_A_UNIT,
+    TENDON_OFFSET,
+    count_of,
+    count_told,
+    range_of,
+    unit_of_bend,
+    unit_or_count,
+    way_of_bend,
+)
+from wristctl.records.log_columns import ANGLE, BENDS, LENGTH, Units, units_of
 from wristctl.records.log_counters import without_wraps
 from wristctl.records.log_sensors import sensors_told
 from wristctl.records.open_log import OpenLog
@@ -42,18 +53,22 @@ def telling(log: OpenLog) -> OpenLog:
     return log
 
 
-def looked_at(log: OpenLog, motion: bool = True) -> OpenLog:
+def looked_at(log: OpenLog, motion: bool = True, tendon_offset: float | None = None) -> OpenLog:
     """The log without repeated rows, in the order of its times, and in a trial for each start of its clock.
 
     Counters that wrap at 2^16 or 2^32 go on. What is mended so, and what is to be looked at (gaps, sensors that stand
     or are at their ends, streams that are apart in time), is said in the log's remarks. Raises UserError, with line and
     column and what may mend it, for spools that stand still where a `motion` is wanted or that jump, for bends, spools,
-    tensions, speeds and times beyond any wrist's, and for two antagonists whose pull goes against the bend.
+    tensions, speeds and times beyond any wrist's, and for two antagonists whose pull goes against the bend. Where the
+    distance of the tendons from the axis is known, `tendon_offset` [m], so are spools whose way is not the bend's, by a
+    factor of 3 where the length of a count was given and of 10 in a plain unit.
     """
     if "time" in log.columns:
         log.without_gaps("time")
     log = _in_order(_parted(_without_repeats(without_wraps(log))))
-    _check_units(log)
+    _check_units(log, TENDON_OFFSET if tendon_offset is None else tendon_offset)
+    if tendon_offset is not None:
+        _check_ways(log, tendon_offset)
     _check_spools(log, motion)
     _check_senses(log)
     told = [*_gaps(log), *_zeros(log), *sensors_told(log)]
@@ -136,8 +151,8 @@ def _in_order(log: OpenLog) -> OpenLog:
     return replace(log, columns=columns, words=words, lines=lines, remarks=[*log.remarks, remark])
 
 
-def _check_units(log: OpenLog) -> None:
-    for name in ("bend_y", "bend_z", "inclination"):
+def _check_units(log: OpenLog, tendon_offset: float) -> None:
+    for name in BENDS:
         column = np.abs(log.columns.get(name, np.empty(0)))
         if np.any(column > _BEND):
             reached, where = math.degrees(float(np.nanmax(column))), log.at(int(np.nanargmax(column)))
@@ -147,7 +162,7 @@ def _check_units(log: OpenLog) -> None:
         reach = float(np.nanmax(column) - np.nanmin(column))
         if reach > _SPOOL:
             where = log.at(int(np.nanargmax(np.abs(column))))
-            fix = _fix(log, "is it in mm?", {name: (log.head(name), "mm") for name in _tendons(log, "spool")})
+            fix = _of_other_units(log, tendon_offset)
             raise UserError(f"{log.head(name)} moves {reach:,.3g} m by its header", where, fix)
     for name, column in _tendons(log, "tension").items():
         if float(np.nanmax(np.abs(column))) > _TENSION:
@@ -160,6 +175,81 @@ def _check_units(log: OpenLog) -> None:
         if slow and float(np.ptp(steps)) < 0.01 * float(np.median(steps)):
             problem = f"{float(np.median(steps)):.3g} s between samples of {log.head('time')}"
             raise UserError(problem, trial.at(1), _fix(log, "is it in ms?", {"time": (log.head("time"), "ms")}))
+
+
+def _check_ways(log: OpenLog, tendon_offset: float) -> None:
+    """Refuse spools that go much further, or less far, than the bend takes."""
+    spools = [name for name in _tendons(log, "spool") if name in log.scales]
+    if not spools:
+        return
+    furthest = max(spools, key=lambda name: np.nan_to_num(_range(log, name)))
+    moved, way = _range(log, furthest), way_of_bend(_bends(log), tendon_offset)
+    if not (moved > 0.0 and way > 0.0 and _is_off(moved, way, log.scales[furthest])):
+        return
+    problem = f"{log.head(furthest)} moves {_in_mm(moved)} mm, and the bend takes {_in_mm(way)} mm"
+    raise UserError(problem, log.header or str(log.file), _of_other_units(log, tendon_offset))
+
+
+def _is_off(moved: float, way: float, scale: float) -> bool:
+    """Whether a spool with such a factor to SI moves much further, or less far [m], than the bend takes [m]."""
+    factor = FACTOR_OF_A_UNIT if scale in LENGTH.values() else FACTOR_OF_A_COUNT
+    return not way / factor <= moved <= way * factor
+
+
+def _in_mm(length: float) -> str:
+    return f"{1e3 * length:,.0f}" if length >= 0.1 else f"{1e3 * length:.2g}"
+
+
+def _of_other_units(log: OpenLog, tendon_offset: float) -> Phrase:
+    """Units of spools, and of bends, with which the spools go as far as the bend takes; without a bend mm for m."""
+    spools = [name for name in _tendons(log, "spool") if name in log.scales]
+    if not spools:
+        return "its unit in the header"
+    in_rad = {name: (log.head(name), "rad") for name in BENDS if _is_in_rad(log, name)}
+    turned = 1.0 / ANGLE["deg"] if in_rad else 1.0
+    way = way_of_bend([turned * bend for bend in _bends(log)], tendon_offset)
+    moves = {name: moved for name in spools if (moved := _range(log, name)) > 0.0}
+    if not (way > 0.0 and moves):
+        moved = max(float(np.nanmax(column) - np.nanmin(column)) for column in _tendons(log, "spool").values())
+        if all(log.scales[name] == 1.0 for name in spools) and 1e-3 * moved < _SPOOL:
+            return _fix(log, "is it in mm?", {name: (log.head(name), "mm") for name in spools})
+        most = count_of(_SPOOL / moved * abs(log.scales[spools[0]]))
+        return f"the length that one count reels in: less than {most}, for no wrist reels in {_SPOOL:g} m"
+    off = [name for name, moved in moves.items() if _is_off(moved, way, log.scales[name])]
+    off = off or [name for name in moves if not in_rad]
+    plain = all(log.scales[name] in LENGTH.values() for name in off)
+    reach = max((moves[name] for name in off), default=math.nan)
+    lengths = {name: log.scales[name] * way / reach for name in off}
+    units = {
+        name: unit_or_count(length, FACTOR_OF_A_UNIT) if plain else count_of(length) for name, length in lengths.items()
+    }
+    meant = in_rad | {name: (log.head(name), unit) for name, unit in units.items()}
+    if in_rad:
+        return _fix(log, f"is {log.head(next(iter(in_rad)))} in rad?", meant)
+    unit = units[off[0]]
+    question = f"is it in {unit}?" if unit in LENGTH else f"{count_told(unit.removeprefix('-'), tendon_offset)}."
+    return _fix(log, question, meant)
+
+
+def _range(log: OpenLog, name: str) -> float:
+    """Largest range of a column in a trial; nan where none tells it."""
+    ranges = (range_of(trial.columns[name]) for trial in log.trials().values())
+    return max((reach for reach in ranges if math.isfinite(reach)), default=math.nan)
+
+
+def _bends(log: OpenLog) -> list[float]:
+    """Range of the bend in each plane [rad]."""
+    bends = log.bends()
+    if bends is None:
+        return []
+    both = replace(log, columns={"y": bends[:, 0], "z": bends[:, 1]})
+    return [_range(both, name) for name in both.columns]
+
+
+def _is_in_rad(log: OpenLog, name: str) -> bool:
+    """Whether a bend was read in degrees whose numbers are those of radians."""
+    scale = log.scales.get(name)
+    return scale == ANGLE["deg"] and unit_of_bend(log.columns[name] / scale) == "rad"
 
 
 def _check_spools(log: OpenLog, motion: bool) -> None:
@@ -228,8 +318,7 @@ def _fix(log: OpenLog, question: str, meant: Mapping[str, tuple[str, str]]) -> P
     if all((log.head(name), _unit(log, name)) == column for name, column in meant.items()):
         unit = next(iter(meant.values()))[1]
         return f"the numbers, or their unit: [0.1 {unit}] is a tenth of one"
-    renamed = {name: head for name, head in log.heads.items() if name not in (head, SYNONYMS.get(head))}
-    mapped = {name: (head, _unit(log, name)) for name, head in renamed.items() if name in log.scales}
+    mapped = {name: (log.head(name), _unit(log, name)) for name in log.scales if name in log.mapped}
     text = ", ".join(f"{name}={head} [{unit}]" for name, (head, unit) in {**mapped, **meant}.items())
     return (f"{question} Then ", Argument("columns", text, quoted=True))
 

@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from wristctl.arrays import Array
 from wristctl.errors import OUT, Phrase, UserError
 from wristctl.plain_files import LARGEST_DATA, read_plain
+from wristctl.records.column_ranges import TENDON_OFFSET
 from wristctl.records.files import replacing, sha256_of
 from wristctl.records.log_columns import (
     COLUMNS,
@@ -69,6 +70,8 @@ class OpenLog:
     """What was passed over or read in another way, a sentence each."""
     scales: Mapping[str, float] = field(default_factory=dict)
     """Factors to SI with which columns were read, by their names: what one count of a counter is."""
+    mapped: frozenset[str] = frozenset()
+    """Names that `--columns` gave to columns."""
 
     def __len__(self) -> int:
         return next((len(column) for column in (*self.columns.values(), *self.words.values())), 0)
@@ -130,7 +133,12 @@ class OpenLog:
 
 
 def read_table(
-    file: Path, names: str = "", what: str = "log", others: bool = False, more: Mapping[str, Units] | None = None
+    file: Path,
+    names: str = "",
+    what: str = "log",
+    others: bool = False,
+    more: Mapping[str, Units] | None = None,
+    tendon_offset: float = TENDON_OFFSET,
 ) -> OpenLog:
     """Read an open log from a table. Raises UserError with line and column for what is none, and says what to mend.
 
@@ -146,6 +154,8 @@ def read_table(
         Whether columns of other names may stand beside them, and are passed over; `names` allows it too.
     more
         Further columns of numbers, with their units.
+    tendon_offset
+        Distance of the tendons from the axis [m]: units of spools that are not said are proposed by it.
     """
     entries = entries_of(names)
     kinds = [entry for entry in entries if entry in FORMATS]
@@ -153,7 +163,7 @@ def read_table(
     bodies = BodyNames(**{key: entry.partition("=")[2].strip() for key, entry in keys.items()})
     rest = ", ".join(entry for entry in entries if entry not in (*kinds, *keys.values()))
     table = _read(file, what, kinds[0] if kinds else "")
-    log = _named(table, file, mapped_names(rest), what, others or bool(entries), more)
+    log = _named(table, file, mapped_names(rest), what, others or bool(entries), more, tendon_offset)
     if not table.bodies or ({"bend_y", "bend_z", "inclination"} & log.columns.keys() and not bodies.said):
         return log
     columns, told = bends_of_bodies(table, bodies, file)
@@ -170,11 +180,18 @@ def _read(file: Path, what: str, kind: str) -> RecordedTable:
 
 
 def _named(
-    table: RecordedTable, file: Path, names: Names, what: str, others: bool, more: Mapping[str, Units] | None
+    table: RecordedTable,
+    file: Path,
+    names: Names,
+    what: str,
+    others: bool,
+    more: Mapping[str, Units] | None,
+    tendon_offset: float,
 ) -> OpenLog:
     where = f"{file}:{table.header_line}" if table.header_line else str(file)
     dated = [place for place, cells in enumerate(table.cells) if is_dated(cells)]
-    chosen = chosen_columns(table.heads, names, {**COLUMNS, **(more or {})}, others, dated, where)
+    units = {**COLUMNS, **(more or {})}
+    chosen = chosen_columns(table.heads, names, units, others, dated, where, table.cells, tendon_offset)
     lengths = {table.heads[place]: len(table.cells[place]) for place in chosen}
     if len(set(lengths.values())) > 1:
         problem = "vectors of different lengths: " + ", ".join(f"{name} {size}" for name, size in lengths.items())
@@ -191,7 +208,8 @@ def _named(
             columns[name] = scale * _numbers(cells, head, file, table.lines)
     written = {name: name_of(table.heads[place]) for place, (name, _) in chosen.items()}
     scales = {name: scale for name, scale in chosen.values() if name not in WORDS and not math.isnan(scale)}
-    return OpenLog(file, what, columns, words, written, table.lines, where, remarks, scales)
+    mapped = frozenset(name for name, _ in names.values())
+    return OpenLog(file, what, columns, words, written, table.lines, where, remarks, scales, mapped)
 
 
 def _is_date(cells: Cells, scale: float) -> bool:

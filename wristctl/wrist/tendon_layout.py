@@ -106,6 +106,11 @@ class TendonLayout:
         """Planes that the tendons bend the wrist in: 1 where all lie on the ulnar axis, else 2."""
         return 1 if not self.cross_section[:, 1].any() else 2
 
+    @property
+    def offset(self) -> float:
+        """Largest distance of a tendon from the axis of bending toward ulnar or flexion [m]."""
+        return float(np.abs(self.cross_section).max())
+
     @cached_property
     def cross_section(self) -> Array:
         """Places (T, 2) [m], toward ulnar and toward flexion."""

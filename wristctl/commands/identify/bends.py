@@ -79,9 +79,12 @@ def _problem(study: Study) -> BendProblem:
     from wristctl.identification.bend_trials import bend_trials, places_of_log
     from wristctl.records.log_converters import read_log
     from wristctl.records.log_looks import looked_at, telling
+    from wristctl.wrist.tendon_layout import TendonLayout
 
     settings = study.identify
-    logs = [telling(looked_at(read_log(Path(file), settings.columns or "", "log"))) for file in settings.logs]
+    offset, columns = TendonLayout.of(study.wrist).offset, settings.columns or ""
+    read = (read_log(Path(file), columns, "log", tendon_offset=offset) for file in settings.logs)
+    logs = [telling(looked_at(log, tendon_offset=offset)) for log in read]
     places = places_of_log(logs[0], study.wrist)
     trials = bend_trials(logs, study.wrist, settings.step, settings.exposure or 0.0)
     return bend_problem(trials, places, study.wrist, Actuator(level="tendon"), settings)

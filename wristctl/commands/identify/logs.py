@@ -82,17 +82,20 @@ def _read(study: Study) -> _Read:
     from wristctl.identification.log_model import rate_of_logs, recordings_of_logs, robot_of_logs, spools_of_log
     from wristctl.records.log_converters import read_log
     from wristctl.records.log_looks import looked_at
+    from wristctl.wrist.tendon_layout import TendonLayout
 
     settings = study.identify
-    logs = [looked_at(read_log(Path(file), settings.columns or "", "log")) for file in settings.logs]
+    offset, columns = TendonLayout.of(study.wrist).offset, settings.columns or ""
+    read = (read_log(Path(file), columns, "log", tendon_offset=offset) for file in settings.logs)
+    logs = [looked_at(log, tendon_offset=offset) for log in read]
     robot = robot_of_logs(logs, study.wrist, settings.radius_error)
     sides = _sides(robot, spools_of_log(logs[0])) if len(robot.angles) > 2 and "turn" not in robot.base else ""
     recordings = recordings_of_logs(logs, robot)
-    read, used = sum(map(len, logs)), sum(len(recording.time) for recording in recordings)
-    fewer = f"Of {read} samples the models are fitted at {used} instants, evenly over each trial."
+    samples, used = sum(map(len, logs)), sum(len(recording.time) for recording in recordings)
+    fewer = f"Of {samples} samples the models are fitted at {used} instants, evenly over each trial."
     remarks = [remark for log in logs for remark in log.remarks]
     rate = rate_of_logs(logs) if robot.timed else None
-    return _Read(robot, recordings, read, [*remarks, *[sides] * bool(sides), *[fewer] * (used < read)], rate)
+    return _Read(robot, recordings, samples, [*remarks, *[sides] * bool(sides), *[fewer] * (used < samples)], rate)
 
 
 def _sides(robot: ArcRobot, numbers: Sequence[int]) -> str:
