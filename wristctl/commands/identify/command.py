@@ -90,7 +90,7 @@ def with_logs(study: Study) -> Study:
     runs = study.identify.runs
     for run in runs:
         if Path(run).suffix in _STUDIES and Path(run).is_file():
-            fix = ("give a log or a run, and the study beside it: `", _of_a_log(Argument("config", run)), "`")
+            fix = f"give a log or a run, and the study beside it: `wristctl identify my.csv --config {run}`"
             raise UserError("a study file where a log or a run is asked for", run, fix)
     files = {run: files_of_recording(Path(run)) for run in runs}
     logs = {run: found for run, found in files.items() if found != [Path(run)] or _is_log(Path(run))}
@@ -99,10 +99,6 @@ def with_logs(study: Study) -> Study:
     named = tuple(str(file) for found in logs.values() for file in found)
     changed = {"runs": tuple(run for run in runs if run not in logs), "logs": (*study.identify.logs, *named)}
     return study.model_copy(update={"identify": study.identify.model_copy(update=changed)})
-
-
-def _of_a_log(*arguments: Argument) -> Call:
-    return Call("identify", arguments=(Argument("logs", "my.csv", positional=True), *arguments))
 
 
 def _is_log(path: Path) -> bool:
@@ -205,8 +201,9 @@ def _problem(study: Study, inputs: Inputs) -> Problem:
     from wristctl.identification.unknowns import believed_of
 
     if not inputs.runs():
-        latest = Argument("runs", "latest:hw-run", positional=True)
-        runs_or_log = (latest, ", the path or id of a hw-run run, or a log: `", _of_a_log(), "`")
+        latest = Argument(_RUNS.leaf, "latest:hw-run", positional=True)
+        log_call = Call("identify", arguments=(Argument(_RUNS.leaf, "my.csv", positional=True),))
+        runs_or_log = (latest, ", or the path or id of a hw-run run; or a log: `", log_call, "`")
         raise UserError("identify needs a hw-run run or a log", "identify.runs", runs_or_log)
     settings, trials = study.identify, []
     start: dict[str, float] = {}
