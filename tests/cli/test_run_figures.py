@@ -91,7 +91,7 @@ def test_a_report_with_all_figures_shows_those_left_for_later(call: Call) -> Non
         (("figures", "latest:compare", "--width", "8800mm"), "4 to 100 cm"),
         (("table", "latest:compare", "-n", "9"), "1 to 7"),
         (("show", "latest:compare:smal"), "did you mean 'small'?"),
-        (("show", "latest:tune"), "one of compare"),
+        (("show", "latest:tune"), "run `wristctl tune` first"),
         (("ls", "--columns", "id,rsme"), "unknown column 'rsme'"),
         (("ls", "--kind", "comprae"), "did you mean 'compare'?"),
         (("ls", "--state", "okk"), "did you mean 'ok'?"),

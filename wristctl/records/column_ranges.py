@@ -15,7 +15,7 @@ TENDON_OFFSET = 0.0141
 """Distance of the tendons from the axis [m] of a wrist that nobody has described."""
 SIZES = (2**16, 2**32)
 """Counts after which a counter begins again."""
-FACTOR_OF_A_COUNT, FACTOR_OF_A_UNIT = 3.0, 10.0
+FACTOR_OF_A_COUNT, FACTOR_OF_A_UNIT = 5.0, 10.0
 """Factors by which spools may go further, or less far, than the bend takes, for the length of a count or for a unit."""
 
 # Largest share of a counter's range that a step between two samples may have for its wraps to be told.

@@ -61,7 +61,7 @@ def looked_at(log: OpenLog, motion: bool = True, tendon_offset: float | None = N
     column and what may mend it, for spools that stand still where a `motion` is wanted or that jump, for bends, spools,
     tensions, speeds and times beyond any wrist's, and for two antagonists whose pull goes against the bend. Where the
     distance of the tendons from the axis is known, `tendon_offset` [m], so are spools whose way is not the bend's, by a
-    factor of 3 where the length of a count was given and of 10 in a plain unit.
+    factor of 5 where the length of a count was given, as far as a gain is looked for, and of 10 in a plain unit.
     """
     if "time" in log.columns:
         log.without_gaps("time")
