@@ -24,7 +24,7 @@ run: .venv/run
 	step gen-data $(STUDY); data=$$made; \
 	step train $(STUDY) --data "$$data"; network=$$made; \
 	step tune $(STUDY) --network "$$network"; tuned=$$made; \
-	compared=$$(answer 1,2,3,4,5,6 compare $(STUDY) --network "$$network" --tuned "$$tuned"); \
+	compared=$$(answer 1,2,3,4,5,7 compare $(STUDY) --network "$$network" --tuned "$$tuned"); \
 	judged=$$(answer 1,2,3,4 paper audit $(CLAIMS)); \
 	printf '\n%s\nWhat of the paper holds in simulation\n%s\n' "$${compared%$$'\n'*}" "$${judged%$$'\n'*}"; \
 	echo "More: $${compared##*$$'\n'} and $${judged##*$$'\n'}"

@@ -38,13 +38,16 @@ def answer_tables(rankings: Sequence[Ranking]) -> list[Table]:
     return [*shown, tree] if len(tree.rows) > 1 else shown
 
 
-# Controllers that a table on the screen has, at most, unless more were asked for, and the lines that it may take.
-_DOZEN, _LINES = 12, 18
+# Controllers that a table on the screen has, at most, unless more were asked for.
+_DOZEN = 12
 
 
-def controllers_table(rankings: Sequence[Ranking], names: Mapping[str, str], asked: Collection[str] = ()) -> Table:
+def controllers_table(
+    rankings: Sequence[Ranking], names: Mapping[str, str], asked: Collection[str] = (), lines: int = 18
+) -> Table:
     """A controller a line and a condition a column: RMSE, or what is wrong with it there; the best and ties marked.
 
+    It takes at most so many lines, if that can be.
     Beyond a dozen controllers the best of each condition, the labels that were `asked` for, and, as far as there is
     room, those that tie. Intervals are left out where they do not fit. Where no controller fits, each condition is a
     line.
@@ -58,7 +61,7 @@ def controllers_table(rankings: Sequence[Ranking], names: Mapping[str, str], ask
         shown = [label for label in labels if label in order[:count]]
         for intervals in (True, False):
             table = _of_controllers(rankings, names, shown, intervals, len(labels) - count)
-            if len(table.text(COLUMNS).split("\n")) <= max(_LINES, count + 4 if count > _DOZEN else 0):
+            if len(table.text(COLUMNS).split("\n")) <= max(lines, count + 4 if count > _DOZEN else 0):
                 return table
     return ranking_table(rankings, names)
 

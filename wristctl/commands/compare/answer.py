@@ -58,7 +58,6 @@ def answer_of(
     table = controllers_table(rankings, names, asked)
     if len(table.within(COLUMNS).columns) < len(table.columns):
         names = names_of(rankings, short=True)
-        table = controllers_table(rankings, names, asked)
     more = f"Every rank and figure: `--all`, or {run}/report.html." if run else "Every rank and figure: `.tables`."
     notes = [
         (bending, bending),
@@ -73,7 +72,12 @@ def answer_of(
         (certainty(rankings), ""),
         ("Your own wrist: `wristctl init DIR` begins a folder for it (documentation: Your own wrist).", ""),
     ]
-    return fitted(Answer(advice(rankings), table), notes)
+    for lines in (18, 15, 12):  # rather fewer controllers than fewer conditions
+        table = controllers_table(rankings, names, asked, lines)
+        whole = fitted(Answer(advice(rankings), table), notes)
+        if whole.table is table:
+            break
+    return whole
 
 
 def best_on_yours(rankings: Sequence[Ranking]) -> str:
