@@ -119,7 +119,7 @@ def test_what_cannot_be_told_apart_is_refused_with_what_to_add(call: Call, tmp_p
     ("arguments", "said"),
     [
         ((), "identify needs a hw-run run or a log - identify.runs - fix: latest:hw-run"),
-        ((), "`wristctl identify my.csv`"),
+        ((), "a log's file: my.csv, or --set logs=[my.csv]"),
         (("nothing",), "no such run"),
         (("--set", "fix.damping=1.0"), "needs a hw-run"),
         (("--set", "fix.dampin=1.0"), "did you mean 'damping'"),

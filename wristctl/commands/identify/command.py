@@ -20,7 +20,7 @@ from wristctl.commands.procedure import Procedure, no_tendons
 from wristctl.commands.results import StudyResult
 from wristctl.commands.session import Session
 from wristctl.config.study import Study
-from wristctl.errors import Argument, UserError
+from wristctl.errors import Argument, Setting, UserError
 from wristctl.records import Run
 from wristctl.records.folders_of_logs import files_of_recording
 
@@ -202,8 +202,8 @@ def _problem(study: Study, inputs: Inputs) -> Problem:
 
     if not inputs.runs():
         latest = Argument(_RUNS.leaf, "latest:hw-run", positional=True)
-        log_too = "or a log: `wristctl identify my.csv` (in Python the study's identify.logs)"
-        runs_or_log = (latest, ", or the path or id of a hw-run run; ", log_too)
+        log_too = Setting("logs=[my.csv]", "identify")
+        runs_or_log = (latest, ", or the path or id of a hw-run run; or a log's file: my.csv, or ", log_too)
         raise UserError("identify needs a hw-run run or a log", "identify.runs", runs_or_log)
     settings, trials = study.identify, []
     start: dict[str, float] = {}
