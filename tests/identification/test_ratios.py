@@ -15,6 +15,7 @@ from wristctl.config.study import Study
 from wristctl.config.wrist import WristParameters
 from wristctl.errors import UserError
 from wristctl.identification.ratios import SCHEMA, LogWrist, wrist_by_ratios
+from wristctl.identification.unknowns import with_identified
 from wristctl.study_files.strict_yaml import parse_yaml
 
 UPRIGHT, LEVEL, HANGING = (-9.81, 0.0), (0.0, -9.81), (9.81, 0.0)
@@ -51,6 +52,14 @@ def test_the_wrist_that_shows_these_ratios_is_found(gravity: tuple[float, float]
     assert loop["actuator"]["tendon_stiffness"] == pytest.approx(tendon)
     assert loop["actuator"]["friction"] * loop["actuator"]["sheath"] == pytest.approx(0.1)
     assert loop["sensor"]["delay_frames"] == pytest.approx(3.0)
+
+
+def test_what_the_log_does_not_tell_of_tendons_stays_as_the_command_has_it() -> None:
+    study = Study(wrist=WristParameters(stiffness=1.1))
+    wrist = wrist_by_ratios(told([0.0, math.pi], 0.014, damping=0.1), study, "a run")
+    known, own = with_identified(study, "recommend", wrist.yaml), study.recommend.loop
+    assert known.wrist.damping == pytest.approx(0.1 * shown(study.wrist))
+    assert known.recommend.loop.actuator == own.actuator and known.recommend.loop.sensor == own.sensor
 
 
 def test_tensions_in_the_log_tell_the_springs_beside_the_weight() -> None:

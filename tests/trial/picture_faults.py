@@ -29,7 +29,7 @@ from wristctl.vision.camera import Frame, Image
 from wristctl.vision.detector import Detector
 from wristctl.vision.view import View
 
-# A picture, seconds since the fault began, the corners of its markers by id.
+# What a picture becomes so many seconds after the fault began.
 Spoil = Callable[[Image, float], Image]
 
 AT = 0.4

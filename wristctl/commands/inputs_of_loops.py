@@ -30,7 +30,7 @@ log = logging.getLogger(__name__)
 
 IDENTIFIED, RATIOS = "data/identified.yaml", "data/ratios.json"
 # What puts the identified motors and camera into a loop.
-RIG = "--set loop.actuator.level=tendon --set loop.sensor.level=camera --set loop.control_period=0.01 has them"
+_RIG = "loop.actuator.level=tendon, loop.sensor.level=camera and loop.control_period=0.01 have them"
 """File of an identify run with its wrist, a study file; missing where too little was told."""
 
 
@@ -277,17 +277,18 @@ class Found:
 
 def with_found(study: Study, command: str, found: Found) -> Study:
     """The study with the wrist that was found. UserError where a log told ratios and nobody says the stiffness."""
-    from wristctl.identification.ratios import wrist_by_ratios
     from wristctl.identification.unknowns import with_identified
 
     text = found.yaml
     if found.ratios is not None:
+        from wristctl.identification.ratios import wrist_by_ratios
+
         wrist = wrist_by_ratios(found.ratios, study, found.run)
         if not found.said:
             log.info("%s", wrist.said(found.run))
             if command == "simulate" and study.simulate.loop.is_exact:
                 log.info(
-                    "Motors and camera are exact here: tendons, friction and delay of the log take no part; %s", RIG
+                    "Motors and camera are exact here: tendons, friction and delay of the log take no part; %s", _RIG
                 )
         found.said = True
         text = wrist.yaml

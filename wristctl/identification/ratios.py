@@ -9,23 +9,26 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from wristctl.config.study import Study
 from wristctl.config.wrist import TendonPlace
-from wristctl.errors import UserError
-from wristctl.identification.arc_fit import ArcFit
+from wristctl.errors import Setting, UserError
+from wristctl.identification.measured_trials import MOST_DELAYED
 from wristctl.identification.unknowns import identified_yaml, tendons_of_values
 from wristctl.wrist.statics import straight_stiffness
 from wristctl.wrist.tendon_layout import TendonLayout
 
-FILE, SCHEMA = "data/ratios.json", "wristctl.ratios/1"
+if TYPE_CHECKING:
+    from wristctl.identification.arc_fit import ArcFit
+
+SCHEMA = "wristctl.ratios/1"
 # Unknowns of the arc that a wrist's settings have.
 _USED = ("gain", "tendon", "turn", "damping", "delay", "friction", "sheath", "presliding", "force")
-# Largest delay of a camera [frames].
-_MOST_DELAYED = 20.0
+# Of these the names as settings are identified by.
+_FRICTION = {"friction": "friction", "sheath": "sheath_friction", "presliding": "presliding"}
 
 
 def ratios_of(fit: ArcFit, rate: float | None) -> dict[str, Any]:
@@ -71,53 +74,40 @@ def wrist_by_ratios(ratios: Mapping[str, Any], study: Study, run: str) -> LogWri
     values, wrist = dict(ratios["values"]), study.wrist
     stiffness = values.get("force")
     if stiffness is None and "stiffness" not in wrist.model_fields_set:
-        fix = "--set wrist.stiffness=VALUE in N m/rad; or identify a log with tension_1 [N], ... of all tendons"
-        raise UserError("its log tells ratios to the wrist's stiffness, and nobody has said that", run, fix)
+        or_log = " with its N m/rad; or identify a log with tension_1 [N], ... of all tendons"
+        problem = "its log tells ratios to the wrist's stiffness, and nobody has said that"
+        raise UserError(problem, run, (Setting("wrist.stiffness=VALUE"), or_log))
     weight = float(straight_stiffness(wrist.model_copy(update={"pretension": 0.0}), 1)[0, 0]) - wrist.stiffness
     shown = wrist.stiffness + weight if stiffness is None else float(stiffness)
     if shown <= 0.0:
         fix = "more wrist.stiffness, or how it stands: wrist.gravity, wrist.hand_mass"
         raise UserError("a wrist of this stiffness buckles under its weight, and the log's did not", run, fix)
-    angles, gain = ratios["angles"], float(values.get("gain", 1.0))
-    radius = float(ratios["radius"]) / gain
-    found = {"stiffness": shown - weight, "tendon_radius": wrist.tendon_radius / gain}
-    told: dict[str, float | None] = {}
+    angles, radius, gain = ratios["angles"], float(ratios["radius"]), float(values.get("gain", 1.0))
+    found = {"stiffness": shown - weight}
     if "gain" in values:
-        told["wrist.tendon_radius"] = found["tendon_radius"]
-    if "force" in values:
-        told["wrist.stiffness"] = found["stiffness"]
+        found["tendon_radius"] = wrist.tendon_radius / gain
     if "damping" in values:
         found["damping"] = shown * float(values["damping"])
-        told["wrist.damping"] = found["damping"]
-    motors = study.simulate.loop.actuator
-    tendons = {
-        "tendon_stiffness": motors.tendon_stiffness,
-        "friction": motors.friction,
-        "presliding": motors.presliding,
-    }
-    tendons["sheath_friction"] = motors.friction * motors.sheath
     if "tendon" in values:
-        alike = _tendons_of_one(len(angles), study)
-        tendons["tendon_stiffness"] = float(values["tendon"]) * shown / (float(ratios["radius"]) ** 2 * alike)
-        tendons["tendon_stiffness"] *= gain**2
-        told["actuator.tendon_stiffness"] = tendons["tendon_stiffness"]
-    for ratio, name in (("friction", "friction"), ("sheath", "sheath_friction"), ("presliding", "presliding")):
-        if ratio in values:
-            tendons[name] = float(values[ratio])
-            told[f"actuator.{ratio}"] = tendons_of_values(tendons)[ratio]
+        of_one = float(values["tendon"]) / _tendons_of_one(len(angles), study)
+        found["tendon_stiffness"] = of_one * shown * (gain / radius) ** 2
+    found |= {name: float(values[ratio]) for ratio, name in _FRICTION.items() if ratio in values}
     camera = dict[str, float]()
     if ratios["rate"] is not None and "delay" in values:
         camera = {"frame_rate": float(ratios["rate"])}
-        camera["delay_frames"] = float(np.clip(values["delay"] * camera["frame_rate"], 0.0, _MOST_DELAYED))
-        told |= {f"sensor.{name}": value for name, value in camera.items()}
-    places = _places(angles, float(values.get("turn", 0.0)), radius, study)
+        camera["delay_frames"] = float(np.clip(values["delay"] * camera["frame_rate"], 0.0, MOST_DELAYED))
+    places = _places(angles, float(values.get("turn", 0.0)), radius / gain, study)
+    by_log = [name for name in ("stiffness", "tendon_radius", "damping") if name in found]
+    told: dict[str, float | None] = {f"wrist.{name}": found[name] for name in by_log[0 if "force" in values else 1 :]}
+    told |= {f"actuator.{name}": value for name, value in tendons_of_values(found).items()}
+    told |= {f"sensor.{name}": value for name, value in camera.items()}
     if places:
         told["wrist.tendons"] = None
     given = sorted(f"wrist.{name}" for name in wrist.model_fields_set if f"wrist.{name}" not in told)
     weighs = ("wrist.stiffness", "wrist.damping", "wrist.length", "wrist.hand_mass", "wrist.hand_offset",
               "wrist.gravity", "actuator.tendon_stiffness", "actuator.friction", "sensor.delay_frames")  # fmt: skip
     assumed = [name for name in weighs if name not in (*told, *given)]
-    return LogWrist(identified_yaml(found | tendons, camera, places), told, given, assumed)
+    return LogWrist(identified_yaml(found, camera, places), told, given, assumed)
 
 
 def _tendons_of_one(count: int, study: Study) -> int:

@@ -65,11 +65,13 @@ _LEAST_FRICTION = 1e-9
 
 
 def tendons_of_values(values: Mapping[str, float]) -> dict[str, float]:
-    """The leaves of an actuator that parameters say: stiffness and friction of its tendons, their sheaths' angle."""
-    friction = max(values["friction"], _LEAST_FRICTION)
-    sheath = values["sheath_friction"] / friction
-    nonideal = {name: values[name] for name in ("tendon_stiffness", "presliding")}
-    return nonideal | {"friction": friction, "sheath": sheath}
+    """The leaves of an actuator that these parameters say: stiffness, friction and presliding, its sheaths' angle."""
+    leaves = {name: values[name] for name in ("tendon_stiffness", "presliding") if name in values}
+    if "friction" in values:
+        leaves["friction"] = friction = max(values["friction"], _LEAST_FRICTION)
+        if "sheath_friction" in values:
+            leaves["sheath"] = values["sheath_friction"] / friction
+    return leaves
 
 
 def believed_of(wrist: WristParameters, actuator: Actuator) -> dict[str, float]:

@@ -138,6 +138,7 @@ class Watch:
         self._began = tick.clock if self._began is None else self._began
         self._count(tick)
         finite = bool(np.isfinite(np.hstack(tick.estimate)).all())
+        heard = tick.unheard < _UNHEARD * self._period  # else the wrist goes on, and nobody knows where spools stand
         self._values = {
             "late": tick.late,
             "lapses": float(len(self._lapsed.values(tick.clock))),
@@ -145,7 +146,7 @@ class Watch:
             "angle": _size(tick.estimate.theta),
             "rate": _size(tick.estimate.rate),
             "age": tick.clock - last_usable,
-            "pull": self._pull(tick) if finite else math.nan,
+            "pull": self._pull(tick.position, tick.taut) if finite and heard else math.nan,
             **self._weighed(tick.clock, tick.position, tick.taut),
             "travel": float(np.abs(tick.position).max()) * self._spools.step,
             "disabled": float(tick.state != State.ENABLED),
@@ -167,10 +168,9 @@ class Watch:
         if beyond is not None:
             raise self._stop(beyond, tick)
 
-    def _pull(self, tick: Tick) -> float:
-        """Largest tension [N]; of spools that nobody has heard of lately, while the wrist goes on, none is known."""
-        pull = max(0.0, float(self._spools.tension(tick.position, tick.taut).max()))
-        return pull if tick.unheard < _UNHEARD * self._period else math.nan
+    def _pull(self, position: Array, taut: Array) -> float:
+        """Largest tension that spools make [N]."""
+        return max(0.0, float(self._spools.tension(position, taut).max()))
 
     def _weighed(self, clock: float, position: Array, taut: Array) -> dict[str, float]:
         stretch = self._spools.step * position - taut
@@ -181,8 +181,7 @@ class Watch:
 
         `theta` is its bend (P,).
         """
-        pull = max(0.0, float(self._spools.tension(position, taut).max()))
-        values = {"angle": _size(theta), "pull": pull, **self._weighed(clock, position, taut)}
+        values = {"angle": _size(theta), "pull": self._pull(position, taut), **self._weighed(clock, position, taut)}
         for limit in self.limits:
             value = values.get(limit.name, 0.0)
             if abs(value) > limit.limit:

@@ -70,11 +70,12 @@ def refused_answer(
         sentence = f"Nothing to rely on: of {joined(list(lacking))} these trials tell a mixture, none by itself."
     best = next((each for each in offered if each.enough), min(offered, key=worst, default=None))
     heads = ["parameter", "told to within", "asked for", *["with more trials"] * (best is not None)]
+    asked = {name: widest(name, settings) for name in lacking}
     rows = [
         (
             name,
             width_text(name, halves[name]),
-            width_text(name, widest(name, settings)) if math.isfinite(widest(name, settings)) else "-",
+            width_text(name, asked[name]) if math.isfinite(asked[name]) else "-",
             *([width_text(name, best.half_widths[name])] if best else []),
         )
         for name in lacking
@@ -86,14 +87,15 @@ def refused_answer(
         mass = fit.problem.trials[0].wrist.hand_mass
         lighter = mass - 0.2 if mass > 0.25 else mass + 0.2
         study = f"{runs[0]}/config.yaml"
-        of_both = [f"latest:hw-run:{label}" for label in ("hand", "other-hand")]
+        typed = [
+            ["hw-run", study, "identify", "--label", "hand"],
+            ["hw-run", study, "identify", "--label", "other-hand", "--set", f"wrist.hand_mass={lighter:.3g}"],
+            ["identify", *runs, "latest:hw-run:hand", "latest:hw-run:other-hand"],
+        ]
         notes += [
             f"Quick steps tell damping from delay, and a second known mass, here {lighter:.3g} kg, tells springs from "
             "tendons. Record both, then identify all together:",
-            f"$ {shlex.join(['wristctl', 'hw-run', study, 'identify', '--label', 'hand'])}",
-            f"$ {shlex.join(['wristctl', 'hw-run', study, 'identify', '--label', 'other-hand'])} "
-            f"--set wrist.hand_mass={lighter:.3g}",
-            f"$ {shlex.join(['wristctl', 'identify', *runs, *of_both])}",
+            *(f"$ {shlex.join(['wristctl', *words])}" for words in typed),
         ]
     return Answer(sentence, Table("", tuple(heads), rows), notes, more)
 

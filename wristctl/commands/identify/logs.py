@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from wristctl.commands.answer import Answer
 from wristctl.commands.inputs import Inputs
+from wristctl.commands.inputs_of_loops import RATIOS
 from wristctl.commands.printed_table import COLUMNS, Table, joined
 from wristctl.commands.results import StudyResult
 from wristctl.commands.session import Session
@@ -122,7 +123,6 @@ def identify_logs(session: Session) -> LogTold:
     from wristctl.identification.arc_fit import fit_arcs
     from wristctl.identification.log_model import everything_fitted
     from wristctl.identification.model_choice import chosen_of, tried_models
-    from wristctl.identification.ratios import FILE
     from wristctl.identification.real_robots import RealRobot
 
     findings, study = session.findings, session.study
@@ -152,7 +152,7 @@ def identify_logs(session: Session) -> LogTold:
         study, findings, [_models_table(models, robot), parameters_table([fit], "")], fit, models, chosen, remarks, rate
     )
     findings.table("data/parameters.csv", result.frame())
-    findings.plain(FILE, result.ratios)
+    findings.plain(RATIOS, result.ratios)
     _refuse(session, result, recordings)
     return result
 
