@@ -18,16 +18,11 @@ PIP := $(BIN)/python -m pip --disable-pip-version-check
 run: .venv/run
 	@set -eo pipefail; \
 	step() { echo; echo "== wristctl $$*"; said=$$($(BIN)/wristctl "$$@"); echo "$$said"; made=$${said##*$$'\n'}; }; \
-	answer() { kept=$$1; shift; echo "== wristctl $$*" >&2; \
-	  $(BIN)/wristctl "$$@" | awk -v RS= -v kept=",$$kept," \
-	    'index(kept, "," NR ",") { print } { made = $$0 } END { print made "/README.md" }'; }; \
 	step gen-data $(STUDY); data=$$made; \
 	step train $(STUDY) --data "$$data"; network=$$made; \
 	step tune $(STUDY) --network "$$network"; tuned=$$made; \
-	compared=$$(answer 1,2,3,4,5,7 compare $(STUDY) --network "$$network" --tuned "$$tuned"); \
-	judged=$$(answer 1,2,3,4 paper audit $(CLAIMS)); \
-	printf '\n%s\nWhat of the paper holds in simulation\n%s\n' "$${compared%$$'\n'*}" "$${judged%$$'\n'*}"; \
-	echo "More: $${compared##*$$'\n'} and $${judged##*$$'\n'}"
+	step compare $(STUDY) --network "$$network" --tuned "$$tuned"; \
+	step paper audit $(CLAIMS)
 
 test: lint
 	$(BIN)/pytest -n auto --maxprocesses 4 -m "not slow"

@@ -12,8 +12,7 @@ import numpy as np
 
 from wristctl.arrays import Array
 from wristctl.commands.printed_table import degrees
-from wristctl.commands.ranking_answer import advice, do_not_use
-from wristctl.commands.ranking_words import names_of
+from wristctl.commands.ranking import advice, names_of, not_to_use
 from wristctl.comparison.bootstrap import paired_ratio, penalised, plain
 from wristctl.comparison.world_ranking import WorldRanking, rank, world_scores
 from wristctl.config.controller_row import Row
@@ -55,7 +54,7 @@ def _ranking(study: Study, family: str) -> list[str]:
 
 
 def _table(found: WorldRanking) -> list[str]:
-    said = f"{advice([found])} {do_not_use([found], names_of([found]))}"
+    said = f"{advice([found])} {not_to_use([found], names_of([found]))}"
     lines = [f"## {found.name}: {found.family.about}", "", said, ""]
     lines += [
         "| group | row | RMSE [deg] | times better than feedforward | fails, swings |",

@@ -64,8 +64,8 @@ def test_rows_that_worlds_cannot_tell_apart_are_one_group_and_others_are_not() -
     gain = found.gains[found.standing.groups[0][0]]
     assert gain.low < 1.0 / 0.3 < gain.high and gain.low > 3.0
     said = told(found)
-    assert re.search("use (a/x: .*; b|b/x: .*; a)/x ties with it", said)
-    assert re.search(r" a [^*=]*\* b [^*=]*= c [\d.]+ \[[^=*]*\] 4 compared", said), "a line each, ties marked"
+    assert re.search(r"use (a/x: .*\. b|b/x: .*\. a)/x ties with it", said)
+    assert re.search(r" a [^*=]*\* b [^*=]*= c [\d.]+ \[[^=*]*\] Every controller", said), "a line each"
     assert "Every controller here can be used" in said
 
 
@@ -74,13 +74,13 @@ def test_a_law_that_is_best_until_it_swings_is_never_called_best() -> None:
     assert found.rows[found.standing.groups[0][0]].label == "calm/x"
     assert found.standing.group(1) is None and found.standing.order[-1] == 1
     said = told(found)
-    assert "use calm/x" in said and "wild" not in said.partition("RMSE [deg]")[0] and "wild swings" in said
-    assert "3 of 40 worlds" in said.partition("Do not use")[2]
+    assert "use calm/x" in said and "wild" not in said.partition("RMSE [deg]")[0] and "wild swings in 3 of 40 " in said
+    assert "Do not use: in made-up wild." in said
 
 
 def test_a_law_that_fails_anywhere_is_kept_and_never_called_best() -> None:
     found = made_up(row("wild/x", hard(1, 0.01), failed=(3, 4, 5)), row("calm/x", hard(2, 0.5)))
-    assert "leave their range: wild (in 3 of 40 worlds)" in told(found)
+    assert "wild fails in 3 of 40 " in told(found) and "use calm/x" in told(found)
     assert found.rows[found.standing.order[0]].label == "calm/x"
     lines = {line["row"]: line for line in ranking_frame(found).to_dict("records")}
     assert lines["wild/x"]["failures"] == 0.075 and lines["wild/x"]["worst_rmse"] == np.inf
@@ -129,7 +129,7 @@ def test_a_row_that_chatters_in_a_world_stands_with_those_that_swing_and_is_name
     assert found.rows[slams].swings.all() and not found.rows[sound].swings.any()
     assert found.standing.fate(slams) == "unreliable" and 300.0 < found.chatter[slams] < 600.0
     assert found.unsound["chatters"][[slams, sound]].tolist() == [3, 0] and found.chatter[sound] == 0.0
-    assert "hatter: super-twisting/default " in told(found) and "3 of 3 worlds" in told(found)
+    assert re.search(r"super-twisting/default chatters \d+/s in 3 of 3 ", told(found))
 
 
 def test_the_table_of_worlds_has_each_row_world_and_motion_in_its_place() -> None:
@@ -200,7 +200,7 @@ def test_a_law_that_is_seldom_lost_keeps_its_place_and_is_told_with_its_share() 
     rows = [row("feedforward/default", hard()), row("a/x", hard(1, 0.1), swings=(3,))]
     kept, gone = ranking("made-up", FAMILY, rows), ranking("made-up", FAMILY, rows, tolerated=0.0)
     assert kept.standing.groups[0] == [1] and gone.standing.unreliable == [1]
-    assert "use a/x" in told(kept) and "use feedforward" in told(gone) and "1 of 40 worlds" in told(gone)
+    assert "use a/x" in told(kept) and "use feedforward" in told(gone) and "1 of 40 worlds" in told(kept)
     lines = {line["row"]: line for line in ranking_frame(kept).to_dict("records")}
     assert (lines["a/x"]["lost"], lines["a/x"]["fate"]) == (1 / 40, "ranked")
     assert lines["a/x"]["lost_low"] < 0.01 < lines["a/x"]["lost_high"]
@@ -208,7 +208,7 @@ def test_a_law_that_is_seldom_lost_keeps_its_place_and_is_told_with_its_share() 
 
 def test_errors_that_nobody_can_measure_are_said_to_be_less() -> None:
     said = told(made_up(row("a/x", np.full(WORLDS, 1e-9)), row("b/x", np.full(WORLDS, 1e-6))))
-    assert re.search("use a/x: RMSE <0.001 deg, .*; b/x ties with it", said)
+    assert re.search(r"use a/x: RMSE <0.001 deg, .*\. b/x ties with it", said)
 
 
 def test_the_same_worlds_give_the_same_ranking_whatever_stands_beside_a_row() -> None:

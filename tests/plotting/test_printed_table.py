@@ -47,6 +47,19 @@ def test_where_there_is_no_room_the_last_columns_are_left_out(width: int, kept: 
     assert [list(row) for row in narrow.rows] == [list(row[:kept]) for row in FOUR.rows]
 
 
+def test_long_heads_are_broken_where_else_the_columns_have_no_room() -> None:
+    wide = Table("", ("name", "RMSE of the moves [deg]", "held"), [("smc", 1, "yes"), ("pid-angle", 2.25, "no")])
+    assert wide.text(100) == wide.text() and "RMSE of the moves [deg]" in wide.text(100).splitlines()[0]
+    assert wide.text(30).splitlines() == [
+        "           RMSE of the",
+        "name       moves [deg]  held",
+        "---------  -----------  ----",
+        "smc                  1  yes",
+        "pid-angle         2.25  no",
+    ]
+    assert list(wide.within(30).columns) == list(wide.columns) and len(wide.within(20).columns) == 2
+
+
 def test_words_stand_to_the_left_and_numbers_to_the_right() -> None:
     mixed = Table("", ("mixed", "words", "count"), [("a", "b", 1), (2, "c", None)]).text().splitlines()
     assert mixed[2:] == ["a      b          1", "2      c          -"]

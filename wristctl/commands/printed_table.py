@@ -14,6 +14,10 @@ if TYPE_CHECKING:
     from wristctl.comparison.tie_groups import Share
 
 
+# Letters of a line of a head that is broken, at least.
+_HEAD = 11
+
+
 @dataclass(frozen=True)
 class Table:
     """A titled table; units stand in the column names. Cells are text, numbers, booleans or None."""
@@ -23,9 +27,12 @@ class Table:
     rows: Sequence[Sequence[Any]]
 
     def text(self, width: int | None = None) -> str:
-        """Aligned columns, numbers to four digits; columns beyond `width` go below, the first repeated."""
-        heads, rows, cells, widths = self._layout()
-        right = [_numeric([row[index] for row in rows]) for index in range(len(self.columns))]
+        """Aligned columns, numbers to four digits; where they do not fit in `width`, heads are broken into lines.
+
+        Columns that do not fit even so go below, the first repeated.
+        """
+        heads, cells, widths = self._layout(width)
+        right = [_numeric([row[index] for row in self.rows]) for index in range(len(self.columns))]
 
         def line(values: Sequence[str], chosen: Sequence[int]) -> str:
             padded = [
@@ -37,21 +44,30 @@ class Table:
         blocks = []
         for chosen in _blocks(widths, width):
             rule = "  ".join("-" * widths[index] for index in chosen)
-            blocks.append("\n".join([line(heads, chosen), rule, *(line(row, chosen) for row in cells)]))
+            high = max(len(heads[index]) for index in chosen)
+            lowered = [
+                [""] * (high - len(head)) + head if index in chosen else [""] * high for index, head in enumerate(heads)
+            ]
+            above = [line(values, chosen) for values in zip(*lowered, strict=True)]
+            blocks.append("\n".join([*above, rule, *(line(row, chosen) for row in cells)]))
         return "\n".join([printable(self.title), ""] * bool(self.title) + ["\n\n".join(blocks)])
 
     def within(self, width: int) -> Table:
         """The table without the columns for which a line of `width` columns has no room."""
-        shown = _blocks(self._layout()[3], width)[0]
+        shown = _blocks(self._layout(width)[2], width)[0]
         chosen = [[row[index] for index in shown] for row in self.rows]
         return Table(self.title, [self.columns[index] for index in shown], chosen)
 
-    def _layout(self) -> tuple[list[str], list[list[Any]], list[list[str]], list[int]]:
-        """Heads, plain values, their text, and the width of each column."""
-        heads = [printable(column) for column in self.columns]
-        rows = [[_plain(value) for value in row] for row in self.rows]
-        cells = [[_cell(value) for value in row] for row in rows]
-        return heads, rows, cells, [max(map(len, column)) for column in zip(heads, *cells, strict=True)]
+    def _layout(self, width: int | None) -> tuple[list[list[str]], list[list[str]], list[int]]:
+        """Lines of each head, text of each cell, and the width of each column."""
+        cells = [[_cell(_plain(value)) for value in row] for row in self.rows]
+        heads = [[printable(column)] for column in self.columns]
+        wide = [max(map(len, column), default=0) for column in zip(*cells, strict=True)] or [0] * len(heads)
+        widths = [max(cell, len(head)) for cell, (head,) in zip(wide, heads, strict=True)]
+        if width is not None and sum(widths) + 2 * (len(widths) - 1) > width:
+            heads = [in_lines(head, max(cell, _HEAD)) or [""] for cell, (head,) in zip(wide, heads, strict=True)]
+            widths = [max(cell, *map(len, head)) for cell, head in zip(wide, heads, strict=True)]
+        return heads, cells, widths
 
 
 def table_for_people(content: dict[str, Any]) -> Table:
@@ -156,6 +172,11 @@ def in_lines(text: str, columns: int = COLUMNS, most: int | None = None, indent:
 def joined(words: Sequence[str], last: str = "and") -> str:
     """Words as a list in a sentence: a, b and c."""
     return f"{', '.join(words[:-1])} {last} {words[-1]}" if len(words) > 1 else "".join(words)
+
+
+def capital(text: str) -> str:
+    """A text that begins a sentence."""
+    return text[:1].upper() + text[1:]
 
 
 def two(value: float, digits: int = 2) -> str:

@@ -60,6 +60,20 @@ class Traits(NamedTuple):
     """Whether the plant is a chain of hinges, of another make than the controllers' model."""
 
 
+class Fault(NamedTuple):
+    """What is wrong with a row, by how much, and in how many cases or motions."""
+
+    kind: Literal["fails", "swings", "chatters", "stops short", "pulls", "depends on step"]
+    """It leaves its range; is in a limit cycle; has tensions that go from limit to limit; stays in its range and does
+    not arrive; pulls harder than a tendon bears; or changes with the integration step."""
+    size: float
+    """A swing from peak to peak [rad], a rate of chatter [1/s] or a tension [N]; 0 where there is none."""
+    times: int
+    of: int
+    unit: str
+    """What is counted: cases, repetitions, worlds or motions."""
+
+
 @dataclass(frozen=True, kw_only=True)
 class Ranking:
     """Controllers with their gains on the same cases, repetitions or worlds, W of them."""
@@ -116,6 +130,20 @@ class Ranking:
     def cases(self) -> str:
         """Their number and kind: 8 cases, 30 repetitions, 60 worlds."""
         return f"{self.count} {self.unit}{'s' * (self.count != 1)}"
+
+    def fault(self, row: int) -> Fault | None:
+        """The gravest fault of a row, also where it is too seldom to rule it out; None of a row without any."""
+        stands, unsound = self.standing, self.unsound
+        faults = [
+            Fault("fails", 0.0, stands.failures[row].times, self.count, f"{self.unit}s"),
+            Fault("swings", 2.0 * self.swing[row], int(unsound["limit cycle"][row]), self.count, f"{self.unit}s"),
+            Fault("chatters", self.chatter[row], int(unsound["chatters"][row]), self.count, f"{self.unit}s"),
+            Fault("stops short", 0.0, int(self.away[row]), self.motions, "motions"),
+            Fault("pulls", self.peak[row], self.count * (self.peak[row] > 0.0), self.count, f"{self.unit}s"),
+            Fault("depends on step", 0.0, int(unsound["not converged"][row]), self.count, f"{self.unit}s"),
+            Fault("swings", 0.0, stands.swings[row].times, self.count, f"{self.unit}s"),
+        ]
+        return next((fault for fault in faults if fault.times), None)
 
     @property
     def more(self) -> str:

@@ -11,8 +11,7 @@ from itertools import pairwise
 from typing import TYPE_CHECKING
 
 from wristctl.commands.answer import LINES, Answer
-from wristctl.commands.printed_table import Table, degrees
-from wristctl.commands.ranking_answer import capital
+from wristctl.commands.printed_table import Table, capital, degrees
 from wristctl.config.loop import LOOPS
 
 if TYPE_CHECKING:

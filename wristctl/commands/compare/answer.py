@@ -7,22 +7,23 @@ from collections.abc import Collection, Container, Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from wristctl.commands.answer import Answer
-from wristctl.commands.printed_table import COLUMNS, Table, joined
-from wristctl.commands.ranking_answer import (
+from wristctl.commands.printed_table import Table, capital, joined
+from wristctl.commands.ranking import (
+    PRINTED,
     advice,
-    capital,
     certainty,
-    do_not_use,
-    do_not_use_briefly,
+    condition,
+    controllers_table,
+    decided,
+    error,
     fitted,
-    not_elsewhere,
+    gains_words,
+    names_of,
+    not_to_use,
+    open_loop,
     recommended,
-    ties,
 )
-from wristctl.commands.ranking_tables import controllers_table
-from wristctl.commands.ranking_words import PRINTED, condition, error, facts, gains_words, names_of, open_loop
 from wristctl.commands.results import Findings
-from wristctl.commands.who_decides import decided
 
 if TYPE_CHECKING:
     from wristctl.comparison.combinations import ComparedRow
@@ -55,29 +56,20 @@ def answer_of(
     if not rankings:
         return None
     names = names_of(rankings)
-    table = controllers_table(rankings, names, asked)
-    if len(table.within(COLUMNS).columns) < len(table.columns):
-        names = names_of(rankings, short=True)
     more = f"Every rank and figure: `--all`, or {run}/report.html." if run else "Every rank and figure: `.tables`."
     notes = [
-        (bending, bending),
-        (" ".join(filter(None, [conditions(rankings), gains_meant(rankings)])), conditions(rankings)),
-        (best_on_yours(rankings), ""),
-        (" ".join(filter(None, [gains_of_best(rankings, gains or {}), compared(rankings), more])), more),
-        (do_not_use(rankings, names), do_not_use_briefly(rankings, names)),
-        (papers(rankings), ""),
-        (" ".join(filter(None, [not_elsewhere(rankings, names), papers_order(rankings)])), ""),
-        (ties(rankings, names), ""),
-        (decided(rankings), ""),
-        (certainty(rankings), ""),
-        ("Your own wrist: `wristctl init DIR` begins a folder for it (documentation: Your own wrist).", ""),
+        bending,
+        conditions(rankings),
+        best_on_yours(rankings),
+        gains_of_best(rankings, gains or {}),
+        not_to_use(rankings, names),
+        papers(rankings),
+        papers_order(rankings),
+        f"{certainty(rankings)} {decided(rankings)}".strip(),
+        gains_meant(rankings),
+        "Your own wrist: `wristctl init DIR` begins a folder for it (documentation: Your own wrist).",
     ]
-    for lines in (18, 15, 12):  # rather fewer controllers than fewer conditions
-        table = controllers_table(rankings, names, asked, lines)
-        whole = fitted(Answer(advice(rankings), table), notes)
-        if whole.table is table:
-            break
-    return whole
+    return fitted(Answer(advice(rankings), controllers_table(rankings, names, asked), more=more), notes)
 
 
 def best_on_yours(rankings: Sequence[Ranking]) -> str:
@@ -115,25 +107,6 @@ def gains_of_best(rankings: Sequence[Ranking], gains: Mapping[str, Mapping[str, 
         if gains[row] and (row == label or (row.split("/")[0] == label and row not in everyone))
     ]
     return f"Gains: {'; '.join(listed)}." if listed else ""
-
-
-def compared(rankings: Sequence[Ranking]) -> str:
-    """The names of all controllers that took part, each with its gains, and which have learned over repetitions."""
-    from wristctl.control.table import CONTROLLERS
-
-    gains: dict[str, list[str]] = {}
-    labels = dict.fromkeys(label for ranking in rankings for label in ranking.labels)
-    for label in labels:
-        name, _, named = label.partition("/")
-        gains.setdefault(name, []).extend([named or "preset by loop"] * (not open_loop(label)))
-    alike: dict[tuple[str, ...], list[str]] = {}
-    for name, several in gains.items():
-        alike.setdefault(tuple(several), []).append(name)
-    groups = [joined(names) + f" ({', '.join(several)})" * bool(several) for several, names in alike.items()]
-    times = {name: CONTROLLERS[name].learning for name in gains if name in CONTROLLERS}
-    several_times = [(name, count) for name, count in times.items() if count > 1]
-    repeated = [f" {name} repeats each motion {count} times, and the last counts." for name, count in several_times]
-    return f"{len(labels)} compared: {'; '.join(groups)}.{''.join(repeated)}"
 
 
 def conditions(rankings: Sequence[Ranking]) -> str:
@@ -181,10 +154,6 @@ def papers(rankings: Sequence[Ranking]) -> str:
     return f"The paper's gains: {'; '.join(sentences)}." if sentences else ""
 
 
-# Faults that a word says of the paper's gains, the commonest last; others by their verb.
-_UNSTEADY = ("swings", "chatters", "pulls harder than a tendon bears", "changes with the integration step")
-
-
 def _outcomes(rankings: Sequence[Ranking], label: str) -> str:
     """Conditions in which a row works, with its error and place, and what is wrong with it in the others."""
     works, bad = list[str](), dict[str, None]()
@@ -193,8 +162,8 @@ def _outcomes(rankings: Sequence[Ranking], label: str) -> str:
             continue
         row = ranking.labels.index(label)
         if row in ranking.standing.unusable:
-            verb = next(iter(facts(ranking, row)))
-            bad["swings or chatters" if verb in _UNSTEADY else verb] = None
+            fault = ranking.fault(row)
+            bad[fault.kind if fault else "fails"] = None
         else:
             group, groups = ranking.standing.group(row), ranking.standing.groups
             better = sum(map(len, groups[: group - 1])) if group else 0

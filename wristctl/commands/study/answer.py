@@ -7,11 +7,18 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from wristctl.commands.answer import Answer
-from wristctl.commands.printed_table import Table, joined
-from wristctl.commands.ranking_answer import advice, certainty, do_not_use, fitted, not_elsewhere
-from wristctl.commands.ranking_tables import decision_table
-from wristctl.commands.ranking_words import condition, names_of, winner
-from wristctl.commands.who_decides import decided
+from wristctl.commands.printed_table import Table
+from wristctl.commands.ranking import (
+    advice,
+    certainty,
+    condition,
+    decided,
+    decision_table,
+    fitted,
+    names_of,
+    not_to_use,
+    winner,
+)
 
 if TYPE_CHECKING:
     from wristctl.comparison.paired_worlds import OrderShift, TermValue
@@ -44,16 +51,16 @@ def answer_of(
         return None
     names = names_of(rankings)
     more = f"Every controller: `--all`, or {run}/report.html." if run else "Every controller: `.tables`."
-    sure = " ".join(
-        filter(None, [certainty(rankings), decided(rankings), few_tunings(rankings), first_again(rankings)])
-    )
-    notes: list[tuple[str | Table, str | Table]] = [
-        (bending, bending),
-        (terms_table(terms) if terms else "", ""),
-        (f"{do_not_use(rankings, names)} {not_elsewhere(rankings, names)}".strip(), _fewer(rankings)),
-        (" ".join(filter(None, [sure, tuned_otherwise(shifts), more])), f"{sure} {more}".strip()),
+    notes: list[str | Table] = [
+        bending,
+        terms_table(terms) if terms else "",
+        not_to_use(rankings, names),
+        f"{certainty(rankings)} {few_tunings(rankings)}".strip(),
+        first_again(rankings),
+        decided(rankings),
+        tuned_otherwise(shifts),
     ]
-    return fitted(Answer(advice(rankings), decision_table(rankings, names)), notes)
+    return fitted(Answer(advice(rankings), decision_table(rankings, names), more=more), notes)
 
 
 def few_tunings(rankings: Sequence[TunedRanking]) -> str:
@@ -80,16 +87,6 @@ def first_again(rankings: Sequence[TunedRanking]) -> str:
     if not facts:
         return ""
     return f"First in how many of {HALVES} halves of the worlds, and with how many tunings: {'; '.join(facts)}."
-
-
-def _fewer(rankings: Sequence[TunedRanking]) -> str:
-    """How many controllers must not be used where, and where they are named."""
-    counts = [
-        f"{len(one.standing.unusable)} of {len(one.labels)} in {condition(one)}"
-        for one in rankings
-        if one.standing.unusable
-    ]
-    return f"Do not use {joined(counts)}: `--all` names them, and why." if counts else ""
 
 
 def terms_table(terms: Sequence[TermValue]) -> Table:
