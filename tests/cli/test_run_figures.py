@@ -89,7 +89,7 @@ def test_a_report_with_all_figures_shows_those_left_for_later(call: Call) -> Non
         (("figures", "latest:compare", "answre"), "did you mean 'answer'?"),
         (("figures", "latest:compare", "--width", "88"), "--width 88mm"),
         (("figures", "latest:compare", "--width", "8800mm"), "4 to 100 cm"),
-        (("table", "latest:compare", "-n", "9"), "1 to 7"),
+        (("table", "latest:compare", "-n", "9"), "1 to 6"),
         (("show", "latest:compare:smal"), "did you mean 'small'?"),
         (("show", "latest:tune"), "run `wristctl tune` first"),
         (("ls", "--columns", "id,rsme"), "unknown column 'rsme'"),
@@ -126,7 +126,7 @@ def test_a_table_is_printed_whole_or_as_latex(call: Call) -> None:
     plain = call("runs", "table", "latest:compare")[1]
     assert plain.count("Loop fast") == 2 and "Control step" in plain
     whole = call("runs", "table", "latest:compare", "--latex")[1]
-    assert whole.count("\\begin{table}") == 7 and "overshoot [\\%]" in whole
+    assert whole.count("\\begin{table}") == 6 and "overshoot [\\%]" in whole
     answer = call("runs", "table", "latest:compare", "-n", "1", "--latex")[1]
     assert whole.startswith(answer.rstrip()) and "{lll}" in answer, "the answer comes first"
     assert "sampled (1) & sampled (steps) (1)" in answer, "a column for moves and one for steps"
