@@ -28,7 +28,7 @@ from wristctl.commands.progress import Watch
 from wristctl.commands.recommend.answer import Recommended
 from wristctl.commands.recommend.command import RECOMMEND
 from wristctl.commands.simulate.command import SIMULATE
-from wristctl.commands.simulate.results import SimulatedLoop
+from wristctl.commands.simulate.results import Simulated
 from wristctl.commands.study.command import FAIR_STUDY
 from wristctl.commands.study.units import Studied
 from wristctl.commands.train.command import TRAIN, Trained
@@ -57,7 +57,7 @@ def load_study(file: str | Path | None = None, *overrides: str, trust_code: bool
 
 @in_python()
 def gen_data(
-    study: StudyOrFile, *, run: Ref | SimulatedLoop | Compared | None = None, out: Folder | None = None,
+    study: StudyOrFile, *, run: Ref | Simulated | Compared | None = None, out: Folder | None = None,
     label: str = "", progress: Watch | None = None,
 ) -> Generated | Moved:  # fmt: skip
     """Samples of tip positions [m] and bends [rad], or of the wrist in motion, by the study's `gen-data` section.
@@ -166,7 +166,7 @@ def simulate(
     study: StudyOrFile, *, network: Ref | Trained | None = None, tuned: Ref | Tuned | None = None,
     from_identified: Ref | Identified | None = None, executor: str = "serial",
     out: Folder | None = None, label: str = "", progress: Watch | None = None,
-) -> SimulatedLoop:  # fmt: skip
+) -> Simulated:  # fmt: skip
     """One closed loop, by the study's `simulate` section.
 
     `network` (train) stands behind a reference with `inverse: network`, `tuned` (tune) behind `gains: tuned`; the

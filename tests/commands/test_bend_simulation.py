@@ -12,7 +12,7 @@ import wristctl
 from wristctl.commands.export.open_log_of_run import open_log_of
 from wristctl.commands.inputs import Inputs
 from wristctl.commands.simulate.command import SIMULATE
-from wristctl.commands.simulate.in_two_planes import SimulatedBends
+from wristctl.commands.simulate.results import Simulated
 from wristctl.config.study import Study
 from wristctl.errors import UserError
 from wristctl.records import Run
@@ -31,9 +31,9 @@ def study_of(*settings: str) -> Study:
     return wristctl.load_study(None, *LOOP, *settings)
 
 
-def simulated(*settings: str, out: Path | None = None) -> SimulatedBends:
+def simulated(*settings: str, out: Path | None = None) -> Simulated:
     result: object = wristctl.simulate(study_of(*settings), out=out)
-    assert isinstance(result, SimulatedBends)
+    assert isinstance(result, Simulated)
     return result
 
 

@@ -15,7 +15,7 @@ import wristctl
 from tests.commands.conftest import columns_of, known_of, repeated, session
 from wristctl.commands.gen_data.command import GEN_DATA, Generated, samples_of
 from wristctl.commands.inputs import Inputs
-from wristctl.commands.simulate.command import Simulated
+from wristctl.commands.simulate.results import Simulated
 from wristctl.commands.train.command import TRAIN
 from wristctl.commands.train.tables import MEANING
 from wristctl.errors import UserError

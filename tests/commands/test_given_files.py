@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import wristctl
-from wristctl.commands.simulate.results import SimulatedLoop
+from wristctl.commands.simulate.results import Simulated
 from wristctl.errors import UserError
 from wristctl.records import Run
 from wristctl.study_files.load import load_study
@@ -18,7 +18,7 @@ QUICK = ("simulate.controller=computed-torque", "simulate.gains=default", "simul
 FILE = "time [s],angle [deg]\n" + "".join(f"{t / 20},{10 * (t / 20) ** 2}\n" for t in range(21))
 
 
-def simulated(folder: Path, *overrides: str, file: Path | None = None) -> SimulatedLoop:
+def simulated(folder: Path, *overrides: str, file: Path | None = None) -> Simulated:
     return wristctl.simulate(wristctl.load_study(file, *QUICK, *overrides), out=folder)
 
 

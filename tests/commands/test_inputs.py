@@ -10,7 +10,7 @@ import pytest
 import wristctl
 from tests.commands.conftest import repeated, session
 from wristctl.commands.inputs import EarlierRun, Inputs, named_for_good, opened
-from wristctl.commands.simulate.command import Simulated
+from wristctl.commands.simulate.results import Simulated
 from wristctl.errors import UserError
 from wristctl.records import InputRun, Run, start_run
 

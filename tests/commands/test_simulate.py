@@ -16,7 +16,8 @@ from tests.commands.conftest import columns_of, known_of, repeated, session
 from wristctl.commands import printed_table as answer_lines
 from wristctl.commands.inputs import Inputs
 from wristctl.commands.printed_table import degrees
-from wristctl.commands.simulate.command import SIMULATE, Simulated
+from wristctl.commands.simulate.command import SIMULATE
+from wristctl.commands.simulate.results import Simulated
 from wristctl.comparison.repetition_spread import spread
 from wristctl.errors import UserError
 from wristctl.records import Run, start_run

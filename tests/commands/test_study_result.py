@@ -18,7 +18,7 @@ from wristctl import commands
 from wristctl.commands.answer import Answer
 from wristctl.commands.printed_table import Table
 from wristctl.commands.results import StudyResult
-from wristctl.commands.simulate.command import Simulated
+from wristctl.commands.simulate.results import Simulated
 from wristctl.errors import UserError
 from wristctl.plotting.page_tables import tables
 

@@ -13,7 +13,7 @@ import pytest
 from pandas.testing import assert_frame_equal
 
 import wristctl
-from wristctl.commands.simulate.results import SimulatedLoop
+from wristctl.commands.simulate.results import Simulated
 from wristctl.commands.sweep.answer import headline, sentence
 from wristctl.commands.sweep.figures import over_key
 from wristctl.config.study import Study
@@ -32,7 +32,7 @@ def swept(study: Study, *sweep: str) -> Study:
     return study.model_copy(update={"sweep": sweep})
 
 
-def at(*overrides: str) -> SimulatedLoop:
+def at(*overrides: str) -> Simulated:
     return wristctl.simulate(wristctl.load_study(None, *FAST, *overrides))
 
 

@@ -16,7 +16,7 @@ from wristctl.config.simulate import SimulateSettings
 from wristctl.config.study import Study
 from wristctl.config.tune import TuneSettings
 from wristctl.config.wrist import WristParameters
-from wristctl.errors import Argument, Call, UserError, meant
+from wristctl.errors import Argument, Call, UserError, meant, under
 from wristctl.plain_files import read_json
 from wristctl.records import Run
 
@@ -150,6 +150,38 @@ def asked_of_search(study: Study) -> list[Asked]:
 
     family = study.tune.worlds.family
     return asked_of_family(study, family) if family else asked_by(study.tune)
+
+
+def asked_of_simulation(study: Study) -> list[Asked]:
+    """The loop of the study's `simulate` section with what it is asked for."""
+    from wristctl.simulation.planes import Asked
+
+    return [Asked(study.simulate.loop, study.simulate.reference, study.simulate.direction)]
+
+
+def planes_of_simulation(study: Study) -> int:
+    """Planes that the loop of the study's `simulate` section bends in. Raises UserError."""
+    from wristctl.simulation.planes import planes_of
+
+    with under("simulate"):
+        return planes_of(study.wrist, asked_of_simulation(study))
+
+
+# Time between two samples of a reference in two planes by which it is checked before a run [s].
+_CHECKED = 0.01
+
+
+def check_motion(study: Study, planes: int) -> None:
+    """UserError for a motion of the study's `simulate` section that the wrist cannot be asked for in so many planes."""
+    from wristctl.simulation.closed_loop import asked_of
+    from wristctl.simulation.reference import by_angles
+
+    chosen = study.simulate
+    if planes == 1:
+        check_reach([chosen.reference], study.wrist, "reference")
+    else:
+        by_bends = chosen.model_copy(update={"reference": by_angles(chosen.reference)})
+        asked_of(study.model_copy(update={"simulate": by_bends}), _CHECKED)
 
 
 def asked_of_comparison(study: Study) -> list[Asked]:

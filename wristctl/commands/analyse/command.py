@@ -25,12 +25,14 @@ from wristctl.commands.analyse.answer import (
 from wristctl.commands.answer import Answer
 from wristctl.commands.inputs import EarlierRun, Inputs
 from wristctl.commands.inputs_of_loops import (
+    asked_of_simulation,
     check_inverses,
-    check_reach,
+    check_motion,
     check_row,
     identified,
     inverses_of,
     network_for,
+    planes_of_simulation,
     tuned_gains,
 )
 from wristctl.commands.loop_warnings import (
@@ -42,7 +44,6 @@ from wristctl.commands.loop_warnings import (
 from wristctl.commands.procedure import Procedure, no_tendons
 from wristctl.commands.results import StudyResult
 from wristctl.commands.session import Session
-from wristctl.commands.simulate.in_two_planes import asked_for_by, check_two_planes, in_two_planes
 from wristctl.commands.stiffness_table import stiffness_table
 from wristctl.config.study import Study
 from wristctl.errors import UserError, meant, under
@@ -115,13 +116,10 @@ def plan(study: Study, inputs: Inputs) -> str:
 
     settings, chosen = study.analyse, study.simulate
     known = identified(study, "simulate", inputs)
-    two = in_two_planes(known)
+    planes = planes_of_simulation(known)
     with under("simulate"):
         check_row(chosen, tuned_gains(inputs), inputs.runs().get("tuned"))
-        if two:
-            check_two_planes(known)
-        else:
-            check_reach([chosen.reference], known.wrist, "reference")
+        check_motion(known, planes)
         check_inverses(inverses_of([chosen.reference]), inputs)
         looks_back(smooth(chosen.loop, settings.friction))
     law = controller(chosen.controller)
@@ -140,7 +138,7 @@ def plan(study: Study, inputs: Inputs) -> str:
         reason = f"{far[0]:g} deg lies outside the wrist's range of +-{study.wrist.range_deg:g} deg"
         raise UserError(reason, "analyse.angles_deg", "smaller angles, or widen wrist.range_deg")
     angles = listed(settings.angles_deg) if settings.angles_deg else "where its reference begins, is half way, and ends"
-    where = " in two planes" * two
+    where = " in two planes" * (planes == 2)
     return f"linearise {chosen.controller}{where} at rest at {angles}, friction {settings.friction}"
 
 
@@ -151,10 +149,10 @@ def analyse(session: Session) -> Analysed:
     is unstable.
     """
     study, findings = identified(session.study, "simulate", session.inputs), session.findings
-    chosen, settings, planes = study.simulate, study.analyse, 2 if in_two_planes(study) else 1
+    chosen, settings, planes = study.simulate, study.analyse, planes_of_simulation(study)
     warn_if_it_buckles(findings, study.wrist, [chosen.loop], planes)
     warn_if_coarse([chosen.loop])
-    warn_of_one_plane(study.wrist, asked_for_by(study))
+    warn_of_one_plane(study.wrist, asked_of_simulation(study))
     warn_outside_conditions([chosen], [chosen.loop])
     _warn_of_frames(chosen.loop)
     network = network_for(session.inputs, study.wrist, [chosen.loop], planes)
@@ -235,7 +233,7 @@ class Rests(NamedTuple):
 
         if self.toward_deg is None:
             return ""
-        why = why_two(study.wrist, asked_for_by(study))
+        why = why_two(study.wrist, asked_of_simulation(study))
         reason = f" ({why})" if " out of " in why else ""
         return f" in two planes{reason} {toward_words(self.toward_deg)}"
 

@@ -1,4 +1,4 @@
-"""The answer of one simulated loop: its scenario, how it ends, and of several repetitions a table of main figures."""
+"""The answer of one simulated loop: its scenario, how it ends, and its main figures."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from wristctl.commands.answer import Answer
+from wristctl.commands.inputs_of_loops import asked_of_simulation
 from wristctl.commands.printed_table import Table, degrees, joined, two
 from wristctl.config.wrist import WristParameters
 from wristctl.wrist.directions import toward_words
@@ -18,7 +19,7 @@ if TYPE_CHECKING:
 
 # Actuators in words, by level.
 _ACTUATORS = {"ideal": "", "lagged": "motors with a lag", "tendon": "stepper motors and elastic tendons"}
-# Figures of the table of repetitions: metric, heading, and for an angle how many times it is shown.
+# Figures of the table, in one plane and in two: metric, heading, and for an angle how many times it is shown.
 _FIGURES = (
     ("rmse", "RMSE [deg]", 1.0),
     ("settling", "settling [s]", None),
@@ -26,6 +27,17 @@ _FIGURES = (
     ("overshoot", "overshoot [%]", None),
     ("peak_tension", "largest tension [N]", None),
     ("oscillation", "swing at the end, peak to peak [deg]", 2.0),
+)
+_OF_TWO = (
+    ("rmse_ulnar", "RMSE toward ulnar [deg]", 1.0),
+    ("rmse_flexion", "RMSE toward flexion [deg]", 1.0),
+    ("rmse", "RMSE over both planes [deg]", 1.0),
+    ("largest_error", "largest error [deg]", 1.0),
+    ("steady_state", "error at the end [deg]", 1.0),
+    ("oscillation", "swing at the end, peak to peak [deg]", 2.0),
+    ("tip_rmse_mm", "RMS distance of the tip [mm]", None),
+    ("peak_tension", "largest tension [N]", None),
+    ("saturation", "share of time out of reach", None),
 )
 # Overshoot [%] from which it is told.
 _OVERSHOOT = 0.5
@@ -47,24 +59,23 @@ def answer(study: Study, repeated: Repeated, reason: str = "", advice: Sequence[
     wrist
         The wrist in words; empty: by its parameters.
     """
-    chosen, count = study.simulate, len(repeated.failed)
-    scenario = (
-        f"{motion_words(chosen.reference, chosen.direction)} on {wrist or wrist_words(study.wrist)} "
-        f"({loop_words(chosen.loop, study.wrist)})"
-    )
-    sentence = outcome(study, scenario, repeated, "" if repeated.first.failed else joined(_told(repeated)), reason)
-    more = "All metrics: `--all`; the motion and its figures: report.html of the run."
-    return Answer(sentence, figures_table(repeated, _FIGURES) if count > 1 else None, advice, more)
+    from wristctl.simulation.planes import why_two
 
-
-def outcome(study: Study, scenario: str, repeated: Repeated, figures: str, reason: str) -> str:
-    """What a controller does in a loop of one plane or two: why it is no good, or that it follows; with its figures."""
-    chosen, count = study.simulate, len(repeated.failed)
+    chosen, count, course = study.simulate, len(repeated.failed), repeated.first.trajectory
+    two, why = course.planes == 2, ""
+    if two:
+        reason_for_two = why_two(study.wrist, asked_of_simulation(study))
+        why = f"{reason_for_two}; " * (" out of " in reason_for_two) + f"{course.tension.shape[1]} tendons, "
+    motion = motion_words(chosen.reference, chosen.direction)
+    place = f"{wrist or wrist_words(study.wrist)}{' in two planes' * two} ({why}{loop_words(chosen.loop, study.wrist)})"
     verdicts = [*_faults(repeated), *([reason] if reason else [])]
+    figures = "" if repeated.first.failed else joined(_told(repeated))
     there = f". There: {figures}" if figures else ""
     does = f"{joined(verdicts)}{there}" if verdicts else f"follows with {figures}"
     median = f" Figures are medians of {count} repetitions." * (count > 1)
-    return f"{scenario}: {controller_words(chosen.controller, chosen.gains)} {does}.{median}"
+    sentence = f"{motion} on {place}: {controller_words(chosen.controller, chosen.gains)} {does}.{median}"
+    table = figures_table(repeated, _OF_TWO if two else _FIGURES) if two or count > 1 else None
+    return Answer(sentence, table, advice, "All metrics: `--all`; the motion and its figures: report.html of the run.")
 
 
 def _rests(repeated: Repeated) -> bool:
@@ -93,7 +104,13 @@ def _faults(repeated: Repeated) -> list[str]:
 
 def _told(repeated: Repeated) -> list[str]:
     """The main figures in words, medians of several repetitions."""
-    values = {name: figure_of(repeated, name) for name, *_ in _FIGURES}
+    course = repeated.first.trajectory
+    values = {name: figure_of(repeated, name) for name, *_ in (_FIGURES if course.planes == 1 else _OF_TWO)}
+    least = f"at most {two(values['peak_tension'])} N in a tendon"
+    if course.planes == 2:
+        each = (("rmse_ulnar", "toward ulnar"), ("rmse_flexion", "toward flexion"), ("rmse", "over both"))
+        errors = [f"{degrees(values[name])} deg {where}" for name, where in each]
+        return [f"RMSE {errors[0]}", *errors[1:], least]
     parts = [f"RMSE {degrees(values['rmse'])} deg"]
     if math.isfinite(values["settling"]):
         parts.append(f"settled after {two(values['settling'])} s")
@@ -102,7 +119,7 @@ def _told(repeated: Repeated) -> list[str]:
         parts.append(f"an overshoot of {two(values['overshoot'])} %")
     if _rests(repeated) and not repeated.swing:
         parts.append("no swing at rest")
-    return [*parts, f"at most {two(values['peak_tension'])} N in a tendon"]
+    return [*parts, least]
 
 
 def figure_of(repeated: Repeated, name: str) -> float:

@@ -5,19 +5,19 @@ from __future__ import annotations
 import math
 import shlex
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING
 
-from wristctl.commands.answer import Answer
 from wristctl.commands.inputs import EarlierRun, Inputs
 from wristctl.commands.inputs_of_loops import (
+    asked_of_simulation,
     check_inverses,
-    check_reach,
+    check_motion,
     check_row,
     identified,
     inverses_of,
     network_for,
+    planes_of_simulation,
     tuned_gains,
     wrist_identified,
 )
@@ -34,14 +34,9 @@ from wristctl.commands.loop_warnings import (
 )
 from wristctl.commands.procedure import Procedure
 from wristctl.commands.session import Session
-from wristctl.commands.simulate.in_two_planes import (
-    asked_for_by,
-    check_two_planes,
-    in_two_planes,
-    simulate_in_two_planes,
-)
-from wristctl.commands.simulate.results import SimulatedLoop, metrics_table, trajectory_table
+from wristctl.commands.simulate.results import Simulated, metrics_table, trajectory_table
 from wristctl.commands.sweep.command import sweepable
+from wristctl.config.choices import REFERENCES
 from wristctl.config.study import Study
 from wristctl.errors import under
 
@@ -52,33 +47,18 @@ if TYPE_CHECKING:
     from wristctl.wrist.kinematics import Inverse
 
 
-@dataclass(frozen=True, repr=False, eq=False)
-class Simulated(SimulatedLoop):
-    """One closed loop in one plane, as often as the study says, and whether the wrist ever left its range."""
-
-    @property
-    def answer(self) -> Answer:
-        """The scenario and how it ends, in a few lines; why a loop does not arrive, and what may help."""
-        from wristctl.commands.simulate.answer import answer
-
-        return answer(self.simulated or self.study, self.repeated, self.short_of, self.advice, self.wrist)
-
-
 def plan(study: Study, inputs: Inputs) -> str:
     """Check the controller and its gains."""
     from wristctl.simulation.closed_loop import check_size
 
     settings, known = study.simulate, identified(study, "simulate", inputs)
-    two = in_two_planes(known)
+    planes = planes_of_simulation(known)
     with under("simulate"):
         check_row(settings, tuned_gains(inputs), inputs.runs().get("tuned"))
-        if two:
-            check_two_planes(known)
-        else:
-            check_reach([settings.reference], known.wrist, "reference")
+        check_motion(known, planes)
         check_inverses(inverses_of([settings.reference]), inputs)
-        check_size(size(study), planes=2 if two else 1)
-    return _in_words(study, " in two planes" * two, known.wrist)
+        check_size(size(study), planes=planes)
+    return _in_words(study, " in two planes" * (planes == 2), known.wrist)
 
 
 def _in_words(study: Study, where: str, wrist: WristParameters) -> str:
@@ -101,59 +81,97 @@ def size(study: Study) -> Size:
     return Size([chosen.loop], chosen.horizon, repetitions * controller(chosen.controller).learning)
 
 
-def simulate(session: Session) -> SimulatedLoop:
-    """Simulate one closed loop and draw it, in one plane, or in two where reference or tendons bend in two."""
-    if in_two_planes(identified(session.study, "simulate", session.inputs)):
-        return simulate_in_two_planes(session)
-    from wristctl.commands.simulate.figures import consistency, sliding
-    from wristctl.commands.truth_table import truth_heading, truth_tables
-    from wristctl.control.table import controller, gains_of
-    from wristctl.plotting.loop_figures import angles, error_sizes, errors, one_motion, tensions
-    from wristctl.plotting.wrist_drawing import stroboscope
+def simulate(session: Session) -> Simulated:
+    """Simulate one closed loop and draw it."""
+    from wristctl.commands.truth_table import truth_tables
     from wristctl.simulation.closed_loop import scenario_of
     from wristctl.simulation.closed_loop import simulate as run_simulation
-    from wristctl.simulation.metrics import METRICS
+    from wristctl.simulation.metrics import metrics_in
     from wristctl.simulation.worlds import Draws
 
     study, findings = identified(session.study, "simulate", session.inputs), session.findings
-    settings, wrist = study.simulate, study.wrist
-    warn_if_it_buckles(findings, wrist, [settings.loop])
+    settings, wrist, planes = study.simulate, study.wrist, planes_of_simulation(study)
+    warn_if_it_buckles(findings, wrist, [settings.loop], planes)
     warn_if_coarse([settings.loop])
-    warn_of_one_plane(wrist, asked_for_by(study))
+    warn_of_one_plane(wrist, asked_of_simulation(study))
     warn_outside_conditions([settings], [settings.loop])
     beyond = warn_out_of_reach(findings, wrist, asked_by(study, settings))
-    network = network_for(session.inputs, wrist, [settings.loop])
+    network = network_for(session.inputs, wrist, [settings.loop], planes)
     with session.progress("compiling and simulating the loop"):
         repeated = run_simulation(study, network, tuned_gains(session.inputs))
-    findings.headline("rmse", "settling", "steady_state", "overshoot", "chattering", "peak_tension")
     scenario = scenario_of(settings.reference, settings.direction)
     findings.note_streams(Draws(study.seed).names([settings.loop], [scenario]))
-    course, failed = repeated.first.trajectory, bool(repeated.failed.any())
+    course = repeated.first.trajectory
     warn_if_outside(course.outside)
-    trajectory_table(findings, "trajectory", course)
-    title = ", ".join(part for part in (course.label, repeated.fate) if part)
-    tables = [metrics_table(findings, title, METRICS, repeated), *truth_tables(wrist, {"simulate": settings.loop})]
+    if planes == 2:
+        findings.numerics(planes=2, substeps=int(repeated.metrics["substeps"].max()), drift=repeated.drift)
+    trajectory_table(findings, "trajectory" if planes == 1 else "bends", course)
+    findings.headline(*_HEADLINES[planes])
+    gains = settings.gains if isinstance(settings.gains, str) else "given"
+    label = course.label if planes == 1 else f"{settings.controller}/{gains} in two planes"
+    title = ", ".join(part for part in (label, repeated.fate) if part)
+    metrics = metrics_in(planes)
+    tables = [metrics_table(findings, title, metrics, repeated), *truth_tables(wrist, {"simulate": settings.loop})]
     with session.drawing():
-        world = truth_heading(wrist, settings.loop)
-        caption = "Bending angle, error and tensions over time; what changes faster is a band about its mean"
-        findings.figure("course", one_motion, course, heading=world, caption=caption)
-        if len(repeated.failed) > 1:
-            findings.figure("error-repetitions", error_sizes, [repeated])
-        later = partial(findings.figure, later=True)
-        later("angle", angles, [course], heading=world)
-        later("error", errors, [course], heading=world)
-        findings.figure("tensions", tensions, course, later=not repeated.marks)
-        if course.load is not None:
-            later("observer", consistency, course, heading=world)
-        law = controller(settings.controller)
-        if law.surface is not None and not failed:
-            gains = dict(zip(law.gains, gains_of(law, settings.gains, tuned_gains(session.inputs)), strict=True))
-            caption = "How the motion comes to the controller's sliding surface: phase plane, and sigma over time"
-            later("sliding", sliding, course, law.surface, gains, caption=caption)
-        later("motion", stroboscope, course, wrist, plant=settings.loop.plant.model)
-    short_of, advice = ("", []) if failed or repeated.arrives else _short_of(session, study, repeated, network, beyond)
+        (_draw if planes == 1 else _draw_bends)(session, study, repeated)
+    arrives = repeated.failed.any() or repeated.arrives
+    short_of, advice = ("", []) if arrives else _short_of(session, study, repeated, network, beyond)
     words = wrist_identified(session.inputs)
     return Simulated(session.study, findings, tables, repeated, short_of, advice, study, words)
+
+
+# Metrics that head the run's page, by planes.
+_HEADLINES = {
+    1: ("rmse", "settling", "steady_state", "overshoot", "chattering", "peak_tension"),
+    2: ("rmse", "rmse_ulnar", "rmse_flexion", "largest_error", "tip_rmse_mm", "peak_tension"),
+}
+
+
+def _draw(session: Session, study: Study, repeated: Repeated) -> None:
+    """Draw a motion in one plane over time, and for later its observer, its sliding surface and the wrist."""
+    from wristctl.commands.simulate.figures import consistency, sliding
+    from wristctl.commands.truth_table import truth_heading
+    from wristctl.control.table import controller, gains_of
+    from wristctl.plotting.loop_figures import angles, error_sizes, errors, one_motion, tensions
+    from wristctl.plotting.wrist_drawing import stroboscope
+
+    settings, findings, course = study.simulate, session.findings, repeated.first.trajectory
+    world, later = truth_heading(study.wrist, settings.loop), partial(findings.figure, later=True)
+    caption = "Bending angle, error and tensions over time; what changes faster is a band about its mean"
+    findings.figure("course", one_motion, course, heading=world, caption=caption)
+    if len(repeated.failed) > 1:
+        findings.figure("error-repetitions", error_sizes, [repeated])
+    later("angle", angles, [course], heading=world)
+    later("error", errors, [course], heading=world)
+    findings.figure("tensions", tensions, course, later=not repeated.marks)
+    if course.load is not None:
+        later("observer", consistency, course, heading=world)
+    law = controller(settings.controller)
+    if law.surface is not None and not repeated.failed.any():
+        gains = dict(zip(law.gains, gains_of(law, settings.gains, tuned_gains(session.inputs)), strict=True))
+        caption = "How the motion comes to the controller's sliding surface: phase plane, and sigma over time"
+        later("sliding", sliding, course, law.surface, gains, caption=caption)
+    later("motion", stroboscope, course, study.wrist, plant=settings.loop.plant.model)
+
+
+def _draw_bends(session: Session, study: Study, repeated: Repeated) -> None:
+    """Draw a motion in two planes: the plane of bends with what the tendons reach, and the wrist in space."""
+    from wristctl.commands.truth_table import truth_heading
+    from wristctl.plotting.bend_figure import bend_motion
+    from wristctl.plotting.spatial_view import motion_in_space
+    from wristctl.simulation.worlds import plant_of
+    from wristctl.wrist.spatial.held_bends import reach_of_bends
+    from wristctl.wrist.tendon_layout import TendonLayout
+
+    wrist, loop, findings, course = study.wrist, study.simulate.loop, session.findings, repeated.first.trajectory
+    world, reach = truth_heading(wrist, loop), reach_of_bends(wrist, TendonLayout.of(wrist))
+    findings.overview.figure = "bends"
+    caption = "The plane of bends with what the tendons reach; errors of both planes and pulls over time"
+    findings.figure("bends", bend_motion, course, reach, world, caption=caption)
+    caption = "The wrist in space where it is bent most, and the path of its tip, wanted and reached"
+    findings.figure(
+        "space", motion_in_space, course, plant_of(wrist, loop.plant), world, loop.plant.model, caption=caption
+    )
 
 
 def _short_of(
@@ -167,10 +185,14 @@ def _short_of(
     from wristctl.control.table import controller
     from wristctl.simulation.arrival import why_not
     from wristctl.simulation.closed_loop import simulate as run_simulation
+    from wristctl.simulation.oscillation import at_rest
 
-    chosen = study.simulate
-    limit = study.wrist.tension_limit if chosen.loop.limits else math.inf
-    short = f"does not arrive: {why_not(repeated.first.trajectory, limit)}"
+    chosen, course = study.simulate, repeated.first.trajectory
+    if course.planes == 1:
+        short = f"does not arrive: {why_not(course, study.wrist.tension_limit if chosen.loop.limits else math.inf)}"
+    else:
+        off = math.degrees(repeated.first.metrics["steady_state"])
+        short = f"does not {'arrive' if at_rest(course) else 'follow'}: {off:.2g} deg off at the end"
     if beyond:
         return f"{short}; {beyond[0].what}", [f"No gains can help: {beyond[0].fix}."]
     arriving = []
@@ -201,7 +223,8 @@ def _search(session: Session, study: Study) -> str:
     from wristctl.wrist.directions import DIRECTIONS
 
     chosen, findings, name = study.simulate, session.findings, "here"
-    if findings.run is None or DIRECTIONS[chosen.direction].plane != "ulnar":
+    own_plane = REFERENCES[chosen.reference.kind].planes == 2 or DIRECTIONS[chosen.direction].plane == "ulnar"
+    if findings.run is None or not own_plane:
         return ""
     settings = {
         "controllers": [chosen.controller],
@@ -227,6 +250,6 @@ SIMULATE = sweepable(
             EarlierRun("from_identified", kind="identify", optional=True),
         ),
         size=size,
-        in_one_plane=lambda study: not in_two_planes(study),
+        in_one_plane=lambda study: planes_of_simulation(study) == 1,
     )
 )

@@ -1,4 +1,4 @@
-"""What a simulated loop is as a result, in one plane or two: its fault, its marks, and the table of its metrics."""
+"""What a simulated loop is as a result: its answer, its fault, its marks, and the table of its metrics."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Protocol
 
+from wristctl.commands.answer import Answer
 from wristctl.commands.printed_table import Table
 from wristctl.commands.results import Findings, StudyResult
 from wristctl.errors import UserError
@@ -19,7 +20,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, repr=False, eq=False)
-class SimulatedLoop(StudyResult):
+class Simulated(StudyResult):
     """One closed loop, as often as the study says."""
 
     kind = "simulate"
@@ -39,6 +40,13 @@ class SimulatedLoop(StudyResult):
     def trajectory(self) -> Trajectory:
         """Trajectory of the first repetition."""
         return self.repeated.first.trajectory
+
+    @property
+    def answer(self) -> Answer:
+        """The scenario and how it ends; why a loop does not arrive, and what may help."""
+        from wristctl.commands.simulate.answer import answer
+
+        return answer(self.simulated or self.study, self.repeated, self.short_of, self.advice, self.wrist)
 
     @property
     def course(self) -> Trajectory:

@@ -17,6 +17,7 @@ from wristctl.commands.inputs import Inputs
 from wristctl.commands.inputs_of_loops import (
     asked_of_comparison,
     asked_of_search,
+    asked_of_simulation,
     check_row,
     identified,
     tuned_gains,
@@ -341,7 +342,6 @@ def _swept(session: Session, command: str) -> Swept:
 
 def _golden(study: Study, command: str) -> Golden:
     """Golden rollout of the loop of simulate or the built-in loop, by which workers show that they compute the same."""
-    from wristctl.commands.simulate.in_two_planes import asked_for_by
     from wristctl.config.loop import LOOPS
     from wristctl.simulation.golden import GOLDEN, golden_spec
     from wristctl.simulation.planes import planes_of
@@ -349,7 +349,7 @@ def _golden(study: Study, command: str) -> Golden:
 
     law, loop, asked = "feedforward", LOOPS["sampled"], asked_of_search
     if command == "simulate":
-        law, loop, asked = study.simulate.controller, study.simulate.loop, asked_for_by
+        law, loop, asked = study.simulate.controller, study.simulate.loop, asked_of_simulation
     elif command == "compare":
         asked = asked_of_comparison
     return Golden.here(GOLDEN, golden_spec([law], [loop], study.wrist, [planes_of(study.wrist, asked(study))]))
