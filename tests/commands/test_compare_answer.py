@@ -170,6 +170,10 @@ def test_beyond_a_dozen_the_table_has_the_best_the_asked_for_and_the_number_of_t
     shown = [row[0] for row in table.rows]
     assert len(shown) == 12 and {"c00", "c20", "c29"} <= set(shown) and shown == sorted(shown)
     assert table.title.endswith("; 18 more controllers: --all")
+    assert all("[" in cell for row in table.rows for cell in row[1:]), "intervals, where there is room for them"
+    five = [stands(name, rmse=many) for name in CLASSES]
+    narrow = controllers_table(five, names)
+    assert len(narrow.rows) == 12 and not any("[" in cell for row in narrow.rows for cell in row[1:])
     asked = controllers_table([one, other], names, list(many)[:15])
     assert [row[0] for row in asked.rows] == sorted([*(f"c{number:02d}" for number in range(15)), "c29"])
     assert asked.title.endswith("; 14 more controllers: --all")

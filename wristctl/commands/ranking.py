@@ -379,7 +379,7 @@ def controllers_table(
         for conditions, intervals in ((rankings, True), (rankings, False), (smooth, True), (smooth, False)):
             table = _of_controllers(rankings, conditions, names, shown, intervals)
             height = len(table.text(COLUMNS).split("\n"))
-            beside = table.within(COLUMNS).columns == table.columns
+            beside = len(table.within(COLUMNS).columns) == len(table.columns)
             last = conditions is smooth and not intervals
             if height <= (max(lines, count + 6) if beside or last else _SHORT):
                 return table
