@@ -67,10 +67,11 @@ def page(content: dict[str, Any]) -> str:
         "warns. How the controllers of a family compare: [study](study.md).",
         "",
         "The same worlds again, with these gains: `wristctl compare experiments/shipped.yaml`, for another family with",
-        "`--set worlds.family=uneven`. The RMSE of every controller in every world (`data/worlds.csv`) is to the last",
-        "bit that in `data/worlds-FAMILY.csv` of the study's run, and as many worlds are lost, as long as neither the",
-        "family nor the simulated drive has changed since. Where one has, this page and every command that uses the",
-        "gains say so. Intervals are over worlds alone, since these gains are of one tuning.",
+        "`--set worlds.family=uneven`, for two planes `experiments/shipped_two_planes.yaml`. The RMSE of every",
+        "controller in every world (`data/worlds.csv`) is to the last bit that in `data/worlds-FAMILY.csv` of the",
+        "study's run, and as many worlds are lost, as long as neither the family nor the simulated drive has changed",
+        "since. Where one has, this page and every command that uses the gains say so. Intervals are over worlds,",
+        "since these gains are of one tuning.",
     ]
     for name, of_family in content.items():
         lines += ["", f"## {name}", "", *_family(name, of_family)]
