@@ -12,7 +12,7 @@ import numpy as np
 
 from wristctl.arrays import Array
 from wristctl.commands.printed_table import degrees
-from wristctl.commands.ranking import advice, names_of, not_to_use
+from wristctl.commands.ranking_answer import advice, names_of, not_to_use
 from wristctl.comparison.bootstrap import paired_ratio, penalised, plain
 from wristctl.comparison.world_ranking import WorldRanking, rank, world_scores
 from wristctl.config.controller_row import Row
@@ -145,8 +145,8 @@ with one budget.
   at 1 kHz, where super-twisting chatters in some worlds and mrac is the best that does not; behind motors and a camera
   super-twisting's preset swings in half of the worlds, and mrac, with slower gains, is in the first group.
 - **Sliding terms** elsewhere (smc-tracking, smc-dob): tuned they tie with the same controller without one.
-- **Networks** (nc, nn-mrac): nc errs a tenth more than the best and holds in nearly all worlds. nn-mrac is the group's
-  law (arXiv 2510.19068) as far as it is specified; its published reference model is far slower.
+- **Networks** (nc, nn-mrac): nc errs a tenth more than the best and holds in nearly all worlds. nn-mrac is the
+  published controller (arXiv 2510.19068) as far as it is specified; its published reference model is far slower.
 - **Learned dynamics** (learned-mpc): MPC over a network of the wrist's dynamics, which `gen-data` and `train` make. On
   a wrist that is as believed it buys nothing; trained on one that is not, it errs a seventeenth of `mpc` with torques
   as commanded, and behind motors and a camera, without an observer of its own, a quarter

@@ -14,17 +14,8 @@ from hypothesis import strategies as st
 from wristctl.commands.answer import LINES
 from wristctl.commands.compare.answer import answer_of
 from wristctl.commands.printed_table import COLUMNS, two
-from wristctl.commands.ranking import (
-    DIGITS,
-    advice,
-    answer_tables,
-    condition,
-    controllers_table,
-    names_of,
-    not_to_use,
-    standings_table,
-    winner,
-)
+from wristctl.commands.ranking_answer import DIGITS, advice, condition, names_of, not_to_use, winner
+from wristctl.commands.ranking_tables import answer_tables, controllers_table, standings_table
 from wristctl.comparison.combinations import CLASSES
 from wristctl.comparison.controller_ranking import Ranking, Traits
 from wristctl.comparison.model_confidence_set import LEAST_PAIRS
@@ -103,7 +94,7 @@ def test_where_all_that_tie_wait_for_their_motors_it_is_said_that_motors_decide(
 
 def told(*rankings: Ranking) -> str:
     """The answer in one line, with all its notes however long it is."""
-    with patch("wristctl.commands.ranking.LINES", 99):
+    with patch("wristctl.commands.ranking_answer.LINES", 99):
         answer = answer_of(rankings)
     assert answer is not None
     return " ".join(" ".join(answer.lines()).split())

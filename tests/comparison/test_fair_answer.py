@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from wristctl.arrays import Array
-from wristctl.commands.ranking import decision_table
+from wristctl.commands.ranking_tables import decision_table
 from wristctl.commands.study.answer import answer_of
 from wristctl.comparison.controller_ranking import undominated
 from wristctl.comparison.paired_worlds import TermValue, order_shift, term_values

@@ -40,7 +40,7 @@ def controllers() -> Table:
 
 def presets() -> Table:
     """Every preset as it is typed, with its gains in their units."""
-    from wristctl.commands.ranking import gains_words
+    from wristctl.commands.ranking_answer import gains_words
 
     laws = _entries(CONTROLLERS).items()
     rows = [
@@ -59,7 +59,7 @@ def references() -> Table:
 
 def conditions() -> Table:
     """Every condition that `compare` ranks under, what it is, and its loops where a study names none, with presets."""
-    from wristctl.commands.ranking import class_words
+    from wristctl.commands.ranking_answer import class_words
     from wristctl.comparison.combinations import CLASS_MEANINGS, class_of
     from wristctl.comparison.controller_ranking import Traits, traits_of
 

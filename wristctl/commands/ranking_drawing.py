@@ -6,7 +6,7 @@ import re
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from wristctl.commands.ranking import condition, winner
+from wristctl.commands.ranking_answer import condition, winner
 from wristctl.commands.results import Findings
 
 if TYPE_CHECKING:

@@ -8,12 +8,11 @@ from typing import TYPE_CHECKING
 
 from wristctl.commands.answer import Answer
 from wristctl.commands.printed_table import Table, capital, joined
-from wristctl.commands.ranking import (
+from wristctl.commands.ranking_answer import (
     PRINTED,
     advice,
     certainty,
     condition,
-    controllers_table,
     decided,
     error,
     fitted,
@@ -23,6 +22,7 @@ from wristctl.commands.ranking import (
     open_loop,
     recommended,
 )
+from wristctl.commands.ranking_tables import controllers_table
 from wristctl.commands.results import Findings
 
 if TYPE_CHECKING:

@@ -46,8 +46,9 @@ from wristctl.commands.loop_warnings import (
     warn_out_of_reach,
 )
 from wristctl.commands.procedure import Procedure
-from wristctl.commands.ranking import answer_tables, condition, every_row
+from wristctl.commands.ranking_answer import condition
 from wristctl.commands.ranking_drawing import draw_rankings
+from wristctl.commands.ranking_tables import answer_tables, every_row
 from wristctl.commands.results import Findings, StudyResult
 from wristctl.commands.session import Session
 from wristctl.commands.sweep.command import sweepable

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, NamedTuple
 from wristctl.commands.answer import Answer
 from wristctl.commands.kept_studies import FOLDER, file_of
 from wristctl.commands.printed_table import Table, degrees, joined, two
-from wristctl.commands.ranking import decided
+from wristctl.commands.ranking_answer import decided
 from wristctl.commands.recommend.study_file import takers_of
 from wristctl.commands.results import StudyResult
 from wristctl.errors import UserError

@@ -8,17 +8,8 @@ from typing import TYPE_CHECKING
 
 from wristctl.commands.answer import Answer
 from wristctl.commands.printed_table import Table
-from wristctl.commands.ranking import (
-    advice,
-    certainty,
-    condition,
-    decided,
-    decision_table,
-    fitted,
-    names_of,
-    not_to_use,
-    winner,
-)
+from wristctl.commands.ranking_answer import advice, certainty, condition, decided, fitted, names_of, not_to_use, winner
+from wristctl.commands.ranking_tables import decision_table
 
 if TYPE_CHECKING:
     from wristctl.comparison.paired_worlds import OrderShift, TermValue

@@ -8,8 +8,8 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from wristctl.commands.printed_table import Table
-from wristctl.commands.ranking import answer_tables, every_row
 from wristctl.commands.ranking_drawing import draw_rankings
+from wristctl.commands.ranking_tables import answer_tables, every_row
 from wristctl.commands.session import Session
 from wristctl.commands.study.published import PUBLISHED, published, published_gains
 from wristctl.commands.study.units import BASE, Studied, StudyPlace, budget_of, families_of, places_in

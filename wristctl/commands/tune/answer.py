@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, NamedTuple
 from wristctl.commands.answer import LINES, Answer
 from wristctl.commands.kept_studies import FOLDER, file_of
 from wristctl.commands.printed_table import Table, degrees, joined, two
-from wristctl.commands.ranking import gains_words
+from wristctl.commands.ranking_answer import gains_words
 
 if TYPE_CHECKING:
     from wristctl.arrays import Array

@@ -1,0 +1,196 @@
+"""Rankings as tables: the answer's, every row of a ranking over worlds, and which controller for which rig."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping, Sequence
+from typing import TYPE_CHECKING
+
+from wristctl.commands.printed_table import COLUMNS, Table, degrees, joined, two
+from wristctl.commands.ranking_answer import (
+    DIGITS,
+    condition,
+    error,
+    fault_words,
+    first_group,
+    is_by_loop,
+    names_of,
+    recommended,
+    winner,
+    with_interval,
+)
+
+if TYPE_CHECKING:
+    from wristctl.comparison.controller_ranking import Ranking
+    from wristctl.comparison.step_cost import StepTime
+    from wristctl.comparison.world_ranking import WorldRanking
+
+# Controllers that a table on the screen has, at most, unless more were asked for.
+_DOZEN = 12
+# Lines of a table of which columns may stand below others, at most.
+_SHORT = 15
+
+
+def answer_tables(rankings: Sequence[Ranking]) -> list[Table]:
+    """Every controller under each condition; where there are several conditions, the best of each as questions."""
+    if not rankings:
+        return []
+    tree = decision_table(rankings, names_of(rankings), "Which controller for which rig")
+    return [standings_table(rankings), *[tree] * (len(tree.rows) > 1)]
+
+
+def controllers_table(
+    rankings: Sequence[Ranking], names: Mapping[str, str], asked: Collection[str] = (), lines: int = 18
+) -> Table:
+    """A controller a line and a condition a column: RMSE, or what is wrong with it there; the best and ties marked.
+
+    Beyond a dozen controllers it has those to use, the best of each condition, the labels that were `asked` for, and
+    then those that tie, as far as there is room. Where that is no short table, and does not fit beside each other in so
+    many lines, first intervals go, then steps where there are other motions, then controllers.
+    """
+    labels = list(dict.fromkeys(label for ranking in rankings for label in ranking.labels))
+    best = [ranking.labels[row] for ranking in rankings if (row := winner(ranking, rankings)) is not None]
+    tied = [label for ranking in rankings for label in first_group(ranking)]
+    order = list(dict.fromkeys([*recommended(rankings), *asked, *best, *tied, *labels]))
+    order = [label for label in order if label in labels]
+    kept = min(max(_DOZEN, len({*best, *asked} & set(labels))), len(labels))
+    smooth = [ranking for ranking in rankings if not ranking.jumps] or rankings
+    for count in range(kept, 0, -1):
+        shown = [label for label in labels if label in order[:count]]
+        for conditions, intervals in ((rankings, True), (rankings, False), (smooth, True), (smooth, False)):
+            table = _of_controllers(rankings, conditions, names, shown, intervals)
+            height = len(table.text(COLUMNS).split("\n"))
+            beside = len(table.within(COLUMNS).columns) == len(table.columns)
+            last = conditions is smooth and not intervals
+            if height <= (max(lines, count + 6) if beside or last else _SHORT):
+                return table
+    return table
+
+
+def _of_controllers(
+    rankings: Sequence[Ranking],
+    conditions: Sequence[Ranking],
+    names: Mapping[str, str],
+    labels: Sequence[str],
+    intervals: bool,
+) -> Table:
+    def cell(ranking: Ranking, label: str) -> str:
+        if label not in ranking.labels:
+            return "-"
+        row = ranking.labels.index(label)
+        if row in ranking.standing.unusable:
+            fault = ranking.fault(row)
+            assert fault is not None
+            return fault_words(fault, unit=False) if intervals else fault.kind
+        mark = " *" if row == winner(ranking, rankings) else " =" if label in first_group(ranking) else ""
+        return f"{with_interval(ranking, row) if intervals else error(ranking, row)}{mark}"
+
+    rows = [(names[label], *(cell(ranking, label) for ranking in conditions)) for label in labels]
+    given = any("[" in text for row in rows for text in row)
+    title = f"RMSE [deg]{', 95 % interval' * given}; * best, = tied with it"
+    if any(is_by_loop(label) for label in labels):
+        title += "; name alone: default if exact, else hardware"
+    left = [f"{len(names) - len(labels)} more controllers"] * (len(names) > len(labels))
+    left += ["steps"] * (len(conditions) < len(rankings))
+    title += f"; {joined(left)}: --all" if left else ""
+    heads = [f"{condition(ranking)} ({ranking.count})" for ranking in conditions]
+    return Table(title, ("controller", *heads), rows)
+
+
+def standings_table(rankings: Sequence[Ranking]) -> Table:
+    """A controller a line: its rank and RMSE under each condition, or what is wrong with it there."""
+    labels = list(dict.fromkeys(label for ranking in rankings for label in ranking.labels))
+
+    def cell(ranking: Ranking, label: str) -> str:
+        if label not in ranking.labels:
+            return "-"
+        row = ranking.labels.index(label)
+        fault = ranking.fault(row)
+        if row in ranking.standing.unusable and fault is not None:
+            return fault_words(fault, unit=False)
+        return f"{ranking.standing.group(row) or '-'}: {with_interval(ranking, row)}"
+
+    rows = [(label, *(cell(ranking, label) for ranking in rankings)) for label in labels]
+    title = "Every controller under each condition, rank: RMSE [deg, 95 %]; those of one rank cannot be told apart"
+    return Table(title, ("controller", *map(condition, rankings)), rows)
+
+
+def every_row(ranking: WorldRanking, times: Mapping[str, StepTime] | None = None) -> Table:
+    """All rows of a ranking, from best to worst, with intervals, faults and costs.
+
+    `times` are those of a tick, by controller or by row.
+    """
+    import numpy as np
+
+    from wristctl.comparison.controller_ranking import undominated
+
+    energy, chattering = ranking.medians("energy"), ranking.medians("chattering")
+    rmse = np.array([estimate.value for estimate in ranking.means])
+    front = undominated(np.column_stack([rmse, chattering, energy]))
+    rows = []
+    for row in ranking.standing.order:
+        mean, gain, group = ranking.means[row], ranking.gains[row], ranking.standing.group(row)
+        failures, swings = ranking.standing.failures[row], ranking.standing.swings[row]
+        lost = [f"{100 * share.value:.3g} % (< {100 * share.high:.2g})" for share in (failures, swings)]
+        name, known = ranking.labels[row], times or {}
+        tick = known.get(name, known.get(name.split("/")[0]))
+        ends = [degrees(end, DIGITS) if mean.high < np.inf else "-" for end in (mean.low, mean.high)]
+        ratio = f"{two(gain.low, DIGITS)} to {two(gain.high, DIGITS)}" if gain.high < np.inf else "-"
+        rows.append((
+            "-" if group is None else str(group), ranking.labels[row], degrees(mean.value, DIGITS), *ends,
+            degrees(float(ranking.scores[row].max()), DIGITS), gain.value, ratio, *lost, chattering[row], energy[row],
+            *(f"{100.0 * shares[row]:.3g} %" for shares in ranking.at_limit.values()),
+            tick.median if tick else None, tick.p99 if tick else None, "yes" if front[row] and group else "",
+        ))  # fmt: skip
+    heads = (
+        "group", "controller", "RMSE [deg]", "95 % low", "high", "worst", "times less than feedforward", "95 %",
+        "fails", "swings or chatters", "tension [N/s]", "work [J]",
+        *(f"at limit of {limit}" for limit in ranking.at_limit), "tick [us]", "tick, P99 [us]", "undominated",
+    )  # fmt: skip
+    title = f"{condition(ranking)}: {ranking.count} held-out worlds, {ranking.motions} motions each"
+    return Table(title, heads, rows)
+
+
+# Questions that a builder of a rig can answer, in the order in which they are asked.
+_QUESTIONS = {
+    "rig": "camera?",
+    "jumps": "steps?",
+    "load": "push?",
+    "unknown": "wrong model?",
+    "uneven": "uneven wrist?",
+}
+
+
+def decision_table(rankings: Sequence[Ranking], names: Mapping[str, str], title: str = "") -> Table:
+    """Questions whose answers part the conditions, and for each answer what to use, its RMSE and the next.
+
+    Of conditions that no question parts the last one stands for all.
+    """
+    ends = _parted(rankings, {})
+    asked = [trait for trait in _QUESTIONS if any(trait in answers for answers, _ in ends)]
+    heads = (*(_QUESTIONS[trait] for trait in asked), "use", "RMSE [deg], 95 %", "as good", "next, times more")
+    rows = [(*(answers.get(trait, "-") for trait in asked), *_leaf(one, rankings, names)) for answers, one in ends]
+    return Table(title, heads, rows)
+
+
+def _parted(rankings: Sequence[Ranking], answers: dict[str, str]) -> list[tuple[dict[str, str], Ranking]]:
+    """The conditions at the ends of the tree of questions, with the answers that lead there."""
+    for trait in _QUESTIONS:
+        sides = {"yes": [one for one in rankings if getattr(one.traits, trait)]}
+        sides["no"] = [one for one in rankings if not getattr(one.traits, trait)]
+        if all(sides.values()):
+            return [end for answer, side in sides.items() for end in _parted(side, {**answers, trait: answer})]
+    return [(answers, rankings[-1])]
+
+
+def _leaf(ranking: Ranking, rankings: Sequence[Ranking], names: Mapping[str, str]) -> tuple[str, ...]:
+    row, groups = winner(ranking, rankings), ranking.standing.groups
+    if row is None:
+        return "too few to rank" if ranking.standing.untold else "none", "", "", ""
+    others = [names[ranking.labels[other]] for other in groups[0] if other != row]
+    following = "-"
+    if len(groups) > 1:
+        after = groups[1][0]
+        ratio = ranking.means[after].value / ranking.means[row].value
+        following = f"{names[ranking.labels[after]]} {two(ratio, DIGITS)}"
+    equal = "-" if not others else others[0] if len(others) == 1 else f"{len(others)} more"
+    return names[ranking.labels[row]], with_interval(ranking, row), equal, following
