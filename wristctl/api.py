@@ -220,7 +220,8 @@ def identify(
     """Stiffness, damping, tendons and delay of a real wrist from the logged trials of `runs` (hw-run).
 
     A run that is a file is an open log (documentation: The open log): the result then is a `LogTold`, what such logs
-    tell, of a log of tensions or currents a `DrivenTold`, or with `identify.model: wrist` a `BendsTold`, what logs in two planes tell of the study's wrist.
+    tell, of a log of tensions or currents a `DrivenTold`, or with `identify.model: wrist` a `BendsTold`, what logs in
+    two planes tell of the study's wrist.
 
     By the study's `identify` section. The result has `.values`, `.fit`, `.knowledge` and `.yaml`, a study file of what
     was found; `.frame()` is a row per parameter with its 95 % interval and unit. Raises UserError without runs, and

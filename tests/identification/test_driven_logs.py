@@ -18,11 +18,13 @@ from wristctl.config.study import Study
 from wristctl.config.wrist import WristParameters
 from wristctl.errors import UserError
 from wristctl.identification.arc_fit import fit_arcs
+from wristctl.identification.bend_trials import places_of_log
 from wristctl.identification.driven_fit import DrivenFit
 from wristctl.identification.driven_forward import STEP, DrivenArc, courses_of_pulls
 from wristctl.identification.driven_log import _at, drive_of_log, driven_robot
 from wristctl.identification.ratios import ratios_of_driven, wrist_by_ratios
-from wristctl.records.open_log import OpenLog
+from wristctl.records.log_looks import looked_at
+from wristctl.records.open_log import OpenLog, read_table
 
 SETTINGS = IdentifySettings()
 STIFFNESS, DAMPING, INERTIA, DELAY = 0.8, 0.12, 2e-3, 0.04
@@ -117,6 +119,29 @@ def test_a_log_in_which_nothing_moves_is_refused_before_a_fit() -> None:
         driven_robot([OpenLog(Path("made.csv"), "log", {**moving, **columns})], BELIEVED, SETTINGS)
 
 
+def test_logs_that_are_not_of_one_robot_at_one_mass_are_refused() -> None:
+    columns = {f"current_{k}": np.sin(k * TIME) for k in (1, 2, 3)}
+    moving = {"time": TIME, "bend_y": 0.3 * np.sin(TIME), "bend_z": 0.2 * np.sin(2.0 * TIME)}
+    whole = OpenLog(Path("made.csv"), "log", {**moving, **columns})
+    heavy, light = (replace(whole, columns={**whole.columns, "mass": np.full(len(TIME), m)}) for m in (0.1, 0.3))
+    with pytest.raises(UserError, match="several masses"):
+        driven_robot([heavy, light], BELIEVED, SETTINGS)
+    with pytest.raises(UserError, match="other columns of tendons"):
+        driven_robot([whole, without(whole, "current_3")], BELIEVED, SETTINGS)
+    with pytest.raises(UserError, match="neither a bend nor the tip"):
+        driven_robot([without(whole, "bend_y", "bend_z")], BELIEVED, SETTINGS)
+    with pytest.raises(UserError, match="driven by spools"):
+        places_of_log(whole, BELIEVED)
+
+
+def test_a_current_in_ma_whose_header_says_a_is_refused_with_the_columns_that_mend_it(tmp_path: Path) -> None:
+    file = tmp_path / "arm.csv"
+    file.write_text("time [s],current_1 [A],current_2 [A],bend_y [deg]\n0,310,20,1\n0.1,290,40,2\n0.2,10,300,3\n")
+    with pytest.raises(UserError, match="reaches 310 A") as caught:
+        looked_at(read_table(file))
+    assert "current_1=current_1 [mA]" in str(caught.value)
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("count", [3, 6])
 @pytest.mark.parametrize("rates", [True, False])
@@ -155,7 +180,7 @@ def test_currents_tell_ratios_alone_and_the_wrong_sign_of_one_is_said() -> None:
     ratios = ratios_of_driven(found.fit, found.robot, 25.0)
     with pytest.raises(UserError, match="nobody has said that") as asked:
         wrist_by_ratios(ratios, Study(), "a run")
-    assert "wrist.stiffness" in str(asked.value)
+    assert "wrist.stiffness" in str(asked.value) and "identify.torque_constant" in str(asked.value)
     said = wrist_by_ratios(ratios, Study(wrist=WristParameters(stiffness=1.2)), "a run")
     assert {"wrist.damping", "wrist.tendons"} <= said.told.keys()
     scaled = SETTINGS.model_copy(update={"torque_constant": 0.12, "spool_radius": 0.01})

@@ -212,7 +212,7 @@ def _regression(recordings: Sequence[ArcRecording]) -> tuple[Array, float]:
             rows.append(at - at.mean(axis=0))
             bends.append(one.measured - one.measured.mean(axis=0))
         made, motion = np.concatenate(rows), np.concatenate(bends)
-        found = np.linalg.lstsq(made, motion, rcond=1e-3)[0]
+        found = np.asarray(np.linalg.lstsq(made, motion, rcond=1e-3)[0], np.float64)
         left = float(np.sum((made @ found - motion) ** 2))
         if left < best[0]:
             best = left, found, float(delay)

@@ -46,7 +46,10 @@ def ratios_of(fit: ArcFit, rate: float | None) -> dict[str, Any]:
 
 
 def ratios_of_driven(fit: ArcFit, robot: DrivenRobot, rate: float) -> dict[str, Any]:
-    """As `ratios_of` of a log of tensions or currents: directions [rad] where all are told, the number of tendons."""
+    """As `ratios_of` of a log of tensions or currents: directions [rad] where all are told, the number of tendons.
+
+    Of currents without a torque constant it has `drive` too.
+    """
     told = {name: one.value for name, one in fit.told.items() if one.known}
     values = {name: told[name] for name in _USED if name in told and name != "force"}
     if robot.drive == "tension" and "stiffness" in told:
@@ -54,7 +57,8 @@ def ratios_of_driven(fit: ArcFit, robot: DrivenRobot, rate: float) -> dict[str, 
     names = [f"direction_{number}" for number in robot.numbers]
     directions = list(robot.angles) if robot.planar else [told[name] for name in names if name in told]
     whole = len(directions) == robot.tendons
-    return {
+    drive = {"drive": robot.drive} if robot.drive == "current" else {}
+    return drive | {
         "schema": SCHEMA,
         "values": values,
         "angles": [float(angle) for angle in directions] if whole else [],
@@ -94,7 +98,8 @@ def wrist_by_ratios(ratios: Mapping[str, Any], study: Study, run: str) -> LogWri
     values, wrist = dict(ratios["values"]), study.wrist
     stiffness = values.get("force")
     if stiffness is None and "stiffness" not in wrist.model_fields_set:
-        or_log = " with its N m/rad; or identify a log with tension_1 [N], ... of all tendons"
+        currents = "the log with identify.torque_constant and identify.spool_radius, or " * ("drive" in ratios)
+        or_log = f" with its N m/rad; or identify {currents}a log with tension_1 [N], ... of all tendons"
         problem = "its log tells ratios to the wrist's stiffness, and nobody has said that"
         raise UserError(problem, run, (Setting("wrist.stiffness=VALUE"), or_log))
     weight = float(straight_stiffness(wrist.model_copy(update={"pretension": 0.0}), 1)[0, 0]) - wrist.stiffness
