@@ -202,6 +202,22 @@ def test_antagonists_that_only_trade_their_pull_do_not_tell_their_gains() -> Non
     assert ratios["angles"] == pytest.approx([0.0, math.pi])
 
 
+@pytest.mark.slow
+def test_a_tendon_that_never_pulls_leaves_the_others_told() -> None:
+    whole = waves(3)
+
+    def two_pull(time: Array) -> Array:
+        return whole(time) * [0.0, 1.0, 1.0] + [2.0, 0.0, 0.0]
+
+    found = plainly_fitted(made(OF_THREE, two_pull, TIME, 10.0))
+    told = found.fit.told
+    assert told["stiffness"].value == pytest.approx(STIFFNESS / (10.0 * BELIEVED.tendon_radius), rel=0.02)
+    assert {"direction_2", "direction_3", "gain_3"} <= {name for name, one in told.items() if one.known}
+    assert "direction_1" not in told and "gain_2" not in told
+    assert "direction_1 and gain_1" in " ".join(driven_answer(found, ()).lines())
+    assert ratios_of_driven(found.fit, found.robot, 25.0)["angles"] == []
+
+
 def test_directions_that_no_log_tells_want_the_studys_own_tendons() -> None:
     ratios = {"values": {"damping": 0.1}, "angles": [], "tendons": 3, "radius": 0.02, "rate": 50.0}
     study = Study(wrist=WristParameters(stiffness=1.2))

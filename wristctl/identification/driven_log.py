@@ -31,6 +31,8 @@ _DELAYS = np.linspace(0.0, 0.4, 21)
 # Standard deviation of a motion over its noise, and least one [rad], and range of a drive over the largest, from which
 # they move.
 _MOVES, _LEAST, _DRIVES = 2.0, 1e-4, 0.02
+# Bend for a tendon's pull over the largest, below which it does not pull.
+_IDLE = 0.05
 # Error of a motion over its size by which it is judged what a straight line tells, and largest deviations then: of
 # stiffness and gains over the value, of directions [rad].
 _ERROR, _WIDEST, _ASIDE = 0.02, 0.25, math.radians(15.0)
@@ -155,7 +157,7 @@ def _recording(
     grid = np.arange(begin, end + STEP, STEP)
     course = np.stack([signs[k] * _at(grid + 0.5 * STEP, clock[told], driven[told, k]) for k in range(len(numbers))], 1)
     rates = np.stack([trial.columns.get(f"rate_{axis}", np.full(len(clock), math.nan)) for axis in "yz"], axis=1)[kept]
-    nothing, at_samples = np.zeros(len(kept), bool), _nearest(clock[kept], clock[told], driven[told])
+    nothing, at_samples = np.zeros(len(kept), bool), _lines(clock[kept], clock[told], driven[told])
     return ArcRecording(
         f"{file}, {name}" if name else file, file, clock[kept], np.array(signs) * at_samples,
         motion[kept], np.diff(clock[kept], prepend=math.nan), nothing, nothing, nothing, np.zeros(len(kept), np.int64),
@@ -174,7 +176,7 @@ def _at(time: Array, clock: Array, column: Array) -> Array:
     return np.asarray(CubicSpline(clock, column)(time))
 
 
-def _nearest(time: Array, clock: Array, values: Array) -> Array:
+def _lines(time: Array, clock: Array, values: Array) -> Array:
     return np.stack([np.interp(time, clock, column) for column in values.T], axis=1)
 
 
@@ -230,29 +232,35 @@ def _robot(
     if planar:
         toward = bends @ np.array([math.cos(plane), math.sin(plane)])
         angles = np.where(toward >= 0.0, plane, plane + math.pi)
-    moving = sizes > 0.05 * sizes.max()
+    moving = moving_tendons(recordings) & (sizes > _IDLE * sizes.max())
     nominal = _nominal(len(numbers), wrist)
     angles = np.where(moving, angles, nominal)
     radius = TendonLayout.of(wrist).offset if planar else wrist.tendon_radius
     per_unit = float(sizes[moving].mean())
     begin = {"stiffness": (radius if drive == "tension" else 1.0) / per_unit, "delay": max(delay, 0.01)}
     gains = sizes / per_unit
-    of_others = zip(numbers[1:], np.clip(gains[1:], 0.1, len(gains) - 0.1), strict=True)
-    begin |= {f"gain_{number}": float(gain) for number, gain in of_others}
+    still = tuple(number for number, moves in zip(numbers, moving, strict=True) if not moves)
+    of_others = zip(numbers, np.clip(gains, 0.1, max(1.0, len(gains) - 0.1)), strict=True)
+    begin |= {f"gain_{number}": float(gain) for number, gain in of_others if number not in still}
     begin["inertia"] = min(0.5, inertia_of_arc(wrist) / wrist.stiffness)
     known_to = {}
     if drive == "tension":
         begin["arm"], known_to["arm"] = 1.0, settings.radius_error
-    untold = _untold(recordings, angles, gains if moving.all() else np.maximum(gains, 0.05), planar, numbers)
+    untold = _untold(recordings, angles, gains, planar, numbers, moving)
     return DrivenRobot(
         (wrist.length,), tuple(angles.tolist()), radius, (1,) * len(angles), "bend", (), begin, known_to,
         spans=wrist.discs - 1, weighed=True, drive=drive, wrist=wrist, planar=planar, quantity=quantity,
-        numbers=tuple(numbers), signs=signs, untold=untold, widest=settings.widest,
+        numbers=tuple(numbers), signs=signs, still=still, untold=untold, widest=settings.widest,
     )  # fmt: skip
 
 
 def _untold(
-    recordings: Sequence[ArcRecording], angles: Array, gains: Array, planar: bool, numbers: Sequence[int]
+    recordings: Sequence[ArcRecording],
+    angles: Array,
+    gains: Array,
+    planar: bool,
+    numbers: Sequence[int],
+    moving: NDArray[np.bool_],
 ) -> tuple[str, ...]:
     """Unknowns of which a wrist that bends in proportion to all pulls tells nothing.
 
@@ -263,9 +271,11 @@ def _untold(
     aside = np.stack([-np.sin(angles), np.cos(angles)], axis=1)
     motion = np.einsum("tm,m,mp->tp", pulls, gains, toward)
     slopes = {"stiffness": -motion}
-    for k, number in enumerate(numbers):
-        if k > 0:
-            slopes[f"gain_{number}"] = pulls[:, k, None] * toward[k] - pulls[:, :1] * toward[0]
+    first, *_ = indices = np.flatnonzero(moving).tolist()
+    for k in indices:
+        number = numbers[k]
+        if k != first:
+            slopes[f"gain_{number}"] = pulls[:, k, None] * toward[k] - pulls[:, first, None] * toward[first]
         if not planar:
             slopes[f"direction_{number}"] = gains[k] * pulls[:, k, None] * aside[k]
     matrix = np.stack([slope.ravel() for slope in slopes.values()], axis=1) / math.sqrt(len(pulls))

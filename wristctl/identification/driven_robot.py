@@ -41,6 +41,8 @@ class DrivenRobot(ArcRobot):
     """Of the tendons in a log."""
     signs: tuple[float, ...] = ()
     """What each column is multiplied by."""
+    still: tuple[int, ...] = ()
+    """Numbers of tendons that pull no more and no less in the log, whose places are as believed."""
     untold: tuple[str, ...] = ()
     """Unknowns that do not show in these data but by what a straight line leaves over."""
     widest: float = 0.25
@@ -61,6 +63,11 @@ class DrivenRobot(ArcRobot):
         """Number of tendons."""
         return len(self.angles)
 
+    @property
+    def moving(self) -> list[int]:
+        """Numbers of the tendons that pull more and less."""
+        return [number for number in self.numbers if number not in self.still]
+
     @cached_property
     def _own(self) -> dict[str, ArcUnknown]:
         """The unknowns of an arc under given tensions, without any term."""
@@ -72,11 +79,13 @@ class DrivenRobot(ArcRobot):
         if "arm" in self.known_to:
             chosen["arm"] = ArcUnknown(1.0, 0.5, 2.0, 0.01, "", "distance of the tendons from the axis, over believed")
         for number, angle in zip(self.numbers, self.angles, strict=True):
+            if number in self.still:
+                continue
             if not self.planar:
                 meaning = f"of tendon {number}'s pull, from bend_y toward bend_z"
                 ends = angle - math.pi, angle + math.pi
                 chosen[f"direction_{number}"] = ArcUnknown(angle, *ends, 0.05, "rad", meaning)
-            if number != self.numbers[0]:
+            if number != self.moving[0]:
                 meaning = f"of tendon {number}, over the mean of all"
                 chosen[f"gain_{number}"] = ArcUnknown(1.0, 0.02, float(self.tendons), 0.05, "", meaning)
         for name in ("damping", "inertia", "delay"):
@@ -142,6 +151,8 @@ class DrivenRobot(ArcRobot):
         )  # fmt: skip
 
     def gains(self, values: Mapping[str, float]) -> Array:
-        """Gain of each tendon over the mean of all (M,)."""
-        others = np.array([values.get(f"gain_{k}", 1.0) for k in self.numbers[1:]])
-        return np.concatenate([[self.tendons - others.sum()], others])
+        """Gain of each tendon over the mean of those that move (M,)."""
+        gains = {number: values.get(f"gain_{number}", 1.0) for number in self.numbers}
+        first, *others = self.moving
+        gains[first] = len(others) + 1.0 - sum(gains[number] for number in others)
+        return np.array([gains[number] for number in self.numbers])

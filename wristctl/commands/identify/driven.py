@@ -139,7 +139,8 @@ def driven_answer(found: DrivenFit, remarks: Sequence[str]) -> Answer:
         f"the bend to {error} deg RMS (95 % {low} to {high}), {100.0 * found.share:.2g} % of its motion."
     )
     notes: list[str | Table] = []
-    untold = [name for name in told if name not in known]
+    still = [f"{what}_{k}" for k in found.robot.still for what in ("direction", "gain")]
+    untold = [*(name for name in told if name not in known), *still]
     if untold:
         motions = dict.fromkeys(motion_for(name) for name in untold)
         notes.append(f"Not identifiable from these data: {joined(untold)}. What would tell: {'; '.join(motions)}.")
