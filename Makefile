@@ -13,7 +13,7 @@ BIN := .venv/bin
 PIP := $(BIN)/python -m pip --disable-pip-version-check
 
 .PHONY: run test lint bench bench-sweeps bench-peers bench-all firmware test-firmware test-faults test-trust test-vision test-identify \
-	test-allocation test-slow test-rig fault-table lost-tendons twins sound-rigs inner-rigs test-posterior test-statistics converge worlds docs clean venv mutants coverage installed matrix
+	test-allocation test-slow test-rig fault-table lost-tendons twins sound-rigs inner-rigs driven-robots test-posterior test-statistics converge worlds docs clean venv mutants coverage installed matrix
 
 run: .venv/run
 	@set -eo pipefail; \
@@ -66,6 +66,11 @@ test-identify: .venv/dev
 # hold? WHICH="--way loop --count 40"
 inner-rigs: .venv/dev
 	$(BIN)/python -m tests.identification.inner_rigs $(WHICH)
+
+# Robots of three tendons that are driven by motor current, from their logs: do intervals of ratios, directions and delays
+# hold, is a circle predicted? Half an hour; goes on where it stopped. WHICH="--count 5"
+driven-robots: .venv/dev
+	$(BIN)/python -m tests.identification.driven_robots $(WHICH)
 
 # Is a law that is said to be best with probability p on an identified wrist the best there? WHICH="--count 100"
 test-posterior: .venv/dev

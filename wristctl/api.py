@@ -22,6 +22,7 @@ from wristctl.commands.gen_data.transitions import Moved
 from wristctl.commands.hysteresis.command import HYSTERESIS, Hysteresis
 from wristctl.commands.identify.bends import BendsTold
 from wristctl.commands.identify.command import IDENTIFY, Identified
+from wristctl.commands.identify.driven import DrivenTold
 from wristctl.commands.identify.logs import LogTold
 from wristctl.commands.perform import RESULTS, Folder, Ref, StudyOrFile, carry_out, in_python
 from wristctl.commands.progress import Watch
@@ -215,11 +216,12 @@ def hysteresis(
 def identify(
     study: StudyOrFile, *, runs: Ref | Sequence[Ref] | None = None, out: Folder | None = None, label: str = "",
     progress: Watch | None = None,
-) -> Identified | LogTold | BendsTold:  # fmt: skip
+) -> Identified | LogTold | DrivenTold | BendsTold:  # fmt: skip
     """Stiffness, damping, tendons and delay of a real wrist from the logged trials of `runs` (hw-run).
 
     A run that is a file is an open log (documentation: The open log): the result then is a `LogTold`, what such logs
-    tell, or with `identify.model: wrist` a `BendsTold`, what logs in two planes tell of the study's wrist.
+    tell, of a log of tensions or currents a `DrivenTold`, or with `identify.model: wrist` a `BendsTold`, what logs in
+    two planes tell of the study's wrist.
 
     By the study's `identify` section. The result has `.values`, `.fit`, `.knowledge` and `.yaml`, a study file of what
     was found; `.frame()` is a row per parameter with its 95 % interval and unit. Raises UserError without runs, and

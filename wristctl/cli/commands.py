@@ -120,6 +120,7 @@ COMMANDS = {
         examples=(
             "wristctl identify latest:hw-run",
             "wristctl identify my.csv --columns 'time=t [ms], spool_1=m1 [mm], spool_2=m2 [mm], bend_y=imu [deg]'",
+            "wristctl identify my.csv --columns 'time=t [ms], current_1=I1 [mA], current_2=I2 [mA], bend_y=imu [deg]'",
             "wristctl identify UPRIGHT_RUN LEVEL_RUN --set fix.friction=0.1",
             "wristctl tune experiments/paper.yaml --from-identified latest:identify",
         ),

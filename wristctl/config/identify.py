@@ -33,6 +33,12 @@ class IdentifySettings(Section):
         "what logs are of: any robot, as arcs without weight; or the study's wrist, in two planes",
     )
     fix: Fixed = Fixed()
+    torque_constant: float | None = quantity(
+        None, "N m/A", "torque of a motor at its spool for an ampere, gears included; null: unknown", gt=0
+    )
+    spool_radius: float | None = quantity(
+        None, "m", "radius of a motor's spool, with torque_constant; null: unknown", gt=0
+    )
     segments: int = choice(4, "constant-curvature segments of the model", "as simulated", ge=1, le=8)
     step: float = quantity(1e-3, "s", "integration step", "as simulated", gt=0, le=5e-3)
     radius_error: float = quantity(

@@ -21,8 +21,9 @@ _DRAWS, _SEED = 4000, 0
 _ZERO_SCALE = {"bend": 0.02, "tip": 2e-3}
 # Range in which zero and slack are looked for [rad or m, m], and change of a difference over the usual change.
 _ZERO_RANGE, _SLACK_RANGE, _STEP = 1.0, 1.5e-2, 1e-4
-# Error of a single sample that the priors are held against: 1 deg, or 2 mm; of a tension [N].
-_ERROR, _TENSION_ERROR = {"bend": math.radians(1.0), "tip": 2e-3}, 0.5
+# Error of a single sample that the priors are held against: 1 deg, or 2 mm; beside it of a tension [N] or
+# a rate [rad/s].
+_ERROR, _ERROR_BESIDE = {"bend": math.radians(1.0), "tip": 2e-3}, 0.5
 # Where samples are weighed: searches, and the least of these errors over that.
 _SEARCHES, _LEAST_ERROR = 3, 1e-3
 # Share of a block's error in a direction that the fit leaves at least.
@@ -67,7 +68,7 @@ class ArcFit:
     centred: bool
     """Whether the mean of the error over what is predicted does not count, as its authors have it."""
     weights: tuple[float, float] = (1.0, 1.0)
-    """Error of a sample of the motion and of a tension, over the usual."""
+    """Error of a sample of the motion and of one beside it, over the usual."""
 
     @property
     def numbers(self) -> int:
@@ -146,7 +147,7 @@ class ArcFit:
             value, half = float(self.x[k]), float(halves[k])
             low, high = value - half, value + half
             at_end = min(value - unknown.low, unknown.high - value) < 1e-2 * unknown.scale
-            wide = half > max(abs(value), 3.0 * unknown.scale)
+            wide = not self.robot.is_told(name, value, half)
             ends = (max(low, unknown.low), high)
             if wide or (at_end and unknown.low != 0.0):
                 ends = (-math.inf, math.inf)
@@ -289,15 +290,15 @@ class _Problem:
         return residuals
 
     def _of(self, values: Mapping[str, Array], own: Array, recording: ArcRecording, part: str) -> Array:
-        expected, pulls = self.robot.expected(values, *_parted(own, self.robot), recording)
+        expected, beside = self.robot.expected(values, *_parted(own, self.robot), recording)
         chosen = getattr(recording, part)
-        error, tension_error = _ERROR[self.robot.measured] * self.weights[0], _TENSION_ERROR * self.weights[1]
+        error, error_beside = _ERROR[self.robot.measured] * self.weights[0], _ERROR_BESIDE * self.weights[1]
         wrong = np.nan_to_num((expected - recording.measured)[:, chosen].reshape(len(own), -1)) / error
-        if recording.tensions is None:
+        if recording.beside is None:
             return np.asarray(wrong)
-        tensions = recording.tensions[chosen]
-        off = np.where(np.isfinite(tensions), pulls[:, chosen] - tensions, 0.0).reshape(len(own), -1)
-        return np.concatenate([wrong, off / tension_error], axis=1)
+        measured = recording.beside[chosen]
+        off = np.where(np.isfinite(measured), beside[:, chosen] - measured, 0.0).reshape(len(own), -1)
+        return np.concatenate([wrong, off / error_beside], axis=1)
 
     def weighed(self, x: Array) -> tuple[float, float]:
         """Weights by the sizes of the residuals at x, of samples that were measured."""
@@ -306,14 +307,14 @@ class _Problem:
         for one in self.fitted:
             rows, chosen = self._of(values, own[one.session], one, "fitted")[0], one.fitted
             parts = rows[: one.measured[chosen].size], rows[one.measured[chosen].size :]
-            there = one.measured, one.tensions if one.tensions is not None else one.measured[:0]
+            there = one.measured, one.beside if one.beside is not None else one.measured[:0]
             for k, (part, signals) in enumerate(zip(parts, there, strict=True)):
                 sums[k] += np.sum(part**2), np.isfinite(signals[chosen]).sum() if len(part) else 0
-        motion, tension = (
+        motion, beside = (
             weight * max(_LEAST_ERROR, math.sqrt(square / count)) if count else weight
             for weight, (square, count) in zip(self.weights, sums, strict=True)
         )
-        return motion, tension
+        return motion, beside
 
     def blocks(self) -> NDArray[np.int64]:
         """Block of each residual of a sample."""
@@ -322,8 +323,8 @@ class _Problem:
             block = np.unique(recording.block[recording.fitted], return_inverse=True)[1] + first
             first = int(block.max()) + 1
             numbers.append(np.repeat(block, recording.measured.shape[1]))
-            if recording.tensions is not None:
-                numbers.append(np.repeat(block, recording.tensions.shape[1]))
+            if recording.beside is not None:
+                numbers.append(np.repeat(block, recording.beside.shape[1]))
         return np.concatenate(numbers)
 
     def jacobian(self, x: Array) -> Array:

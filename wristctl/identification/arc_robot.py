@@ -101,6 +101,21 @@ class ArcRobot:
         """What is measured in that unit, over the same in SI units."""
         return math.degrees(1.0) if self.measured == "bend" else 1e3
 
+    @property
+    def words(self) -> str:
+        """What its model is without any term."""
+        return "elastic arcs and tendons"
+
+    @property
+    def terms(self) -> tuple[Term, ...]:
+        """Terms that its model may have."""
+        return tuple(term for term in OF_TERM if self.timed or term != "creep")
+
+    def is_told(self, name: str, value: float, half: float) -> bool:
+        """Whether a 95 % interval of so much to either side is narrow enough to be told."""
+        scale = (UNKNOWNS[name] if name in UNKNOWNS else UNKNOWNS[name.rpartition("_")[0]]).scale
+        return half <= max(abs(value), 3.0 * scale)
+
     def unknowns(self, terms: Sequence[Term]) -> dict[str, ArcUnknown]:
         """The unknowns of its model with these terms, those of arcs numbered."""
         names = [*self.base, *(name for term in OF_TERM if term in terms for name in OF_TERM[term])]
@@ -170,7 +185,7 @@ class ArcRobot:
             stiffness[:, 2 * k] = stiffness[:, 2 * k + 1] = softened * values.get(f"stiffness_{k + 1}", ones)
             if shortens:
                 stiffness[:, 2 * count + k] = 1.0 / values["shortening"]
-        others = {name: values.get(name, begin * ones) for name, begin in _ABSENT.items()}
+        others = {name: values.get(name, begin * ones) for name, begin in ABSENT.items()}
         return QuasistaticArcs(
             arms, ends, stiffness, tendon, others["friction"], others["sheath"], others["presliding"],
             others["inner_friction"], others["inner_presliding"], others["creep"], others["creep_time"],
@@ -178,10 +193,11 @@ class ArcRobot:
         )  # fmt: skip
 
 
-_ABSENT = {
+ABSENT = {
     "friction": 0.0, "sheath": 0.0, "presliding": 1.0, "inner_friction": 0.0, "inner_presliding": 1.0, "creep": 0.0,
     "creep_time": 1.0, "damping": 0.0, "inertia": 0.0,
 }  # fmt: skip
+"""Values of unknowns that have no effect."""
 
 
 def _of_arc(values: Mapping[str, Array], name: str, arc: int, ones: Array) -> Array:
@@ -214,10 +230,11 @@ class ArcRecording:
     """Number of the block of samples that are drawn together (T,)."""
     mass: float = 0.0
     """On top of the robot [kg]."""
-    tensions: Array | None = None
-    """Measured pulls at the spools (T, M) [N], nan where there is none."""
+    beside: Array | None = None
+    """What was measured beside it, nan where there is nothing: pulls at the spools (T, M) [N]; where tensions are given
+    rates of both bends (T, 2) [rad/s]."""
     course: tuple[Array, Array] | None = None
-    """Fine times (F,) [s] and spools (F, M) [m], where samples are means over the time between two."""
+    """Fine times (F,) [s] and spools (F, M) [m], where samples are means over the time between two; given tensions."""
 
     def delayed(self, delay: float) -> Array:
         """Spools (T, M) [m] a delay [s] earlier, by their course: means over the time of a sample."""

@@ -68,6 +68,9 @@ def places_of_log(log: OpenLog, wrist: WristParameters) -> dict[int, TendonPlace
     """
     numbers, layout = spools_of_log(log), TendonLayout.of(wrist)
     places = [place for place in layout.places if place.radius > 0.0]
+    if not numbers:
+        fix = "columns spool_1 [mm], ...; model: arcs takes tensions or currents alone"
+        raise UserError("model: wrist is driven by spools, and the log has none", log.header or str(log.file), fix)
     if set(numbers) == {number for number, corner in TENDONS.items() if any(corner)} and len(places) == len(numbers):
         numbers = sorted(numbers)
     elif numbers != list(range(1, len(places) + 1)):

@@ -43,7 +43,8 @@ def robot_of_logs(logs: Sequence[OpenLog], wrist: WristParameters, radius_error:
     log, numbers = logs[0], spools_of_log(logs[0])
     if len(numbers) < 2:
         problem = f"{len(numbers)} spools, and the motion is that of two or more tendons"
-        raise UserError(problem, log.header or str(log.file), "columns spool_1 [mm], spool_2 [mm] beside the motion")
+        fix = "columns spool_1 [mm], spool_2 [mm] beside the motion; or tension_1 [N] or current_1 [mA], ... of all"
+        raise UserError(problem, log.header or str(log.file), fix)
     _check_alike(logs, numbers)
     measured = _measured(log)
     angles, radius, paired = _tendons(logs, numbers, wrist)
@@ -172,7 +173,7 @@ def plus_side(logs: Sequence[OpenLog]) -> tuple[int, ...] | None:
 
 def spools_of_log(log: OpenLog) -> list[int]:
     """Numbers of the tendons whose spools are in a log, sorted."""
-    return sorted(int(name.removeprefix("spool_")) for name in log.columns if name.startswith("spool_"))
+    return log.tendons_of("spool")
 
 
 def mass_of_log(log: OpenLog) -> float | None:
@@ -204,15 +205,19 @@ def recordings_of_logs(logs: Sequence[OpenLog], robot: ArcRobot) -> list[ArcReco
     recordings = []
     for log, name in trials:
         recordings.append(_recording(log, robot, numbers, len(trials), Path(log.file).stem, name))
-    whole = len(recordings) >= _WHOLE
-    first = 0
+    return in_parts(recordings)
+
+
+def in_parts(recordings: Sequence[ArcRecording]) -> list[ArcRecording]:
+    """Recordings with what is fitted and what is predicted, as `recordings_of_logs` has it."""
+    whole, first, parted = len(recordings) >= _WHOLE, 0, list[ArcRecording]()
     for k, recording in enumerate(recordings):
         count = len(recording.time)
         block = np.arange(count) * _BLOCKS * (1 if whole else 2) // count
         fitted = _is_fitted(np.full(count, k) if whole else block)
         block, first = first + block, first + int(block.max()) + 1
-        recordings[k] = replace(recording, fitted=fitted, asked=~fitted, block=block)
-    return recordings
+        parted.append(replace(recording, fitted=fitted, asked=~fitted, block=block))
+    return parted
 
 
 def _is_fitted(numbers: NDArray[np.int64]) -> NDArray[np.bool_]:

@@ -32,7 +32,7 @@ class TriedModel:
     @property
     def words(self) -> str:
         """The model's name for a table."""
-        return "elastic arcs and tendons" + "".join(f" + {term}" for term in self.terms)
+        return self.fits[0].robot.words + "".join(f" + {term}" for term in self.terms)
 
     @property
     def numbers(self) -> int:
@@ -74,11 +74,13 @@ def tried_models(
         if terms:
             yield _tried(robot, cases, centred, tuple(terms), plain)
         return
-    slack = _tried(robot, cases, centred, ("slack",), plain)
-    yield slack
-    base = plain if slack.verdict == "unwanted" else slack
+    base = plain
+    if "slack" in robot.terms:
+        slack = _tried(robot, cases, centred, ("slack",), plain)
+        yield slack
+        base = plain if slack.verdict == "unwanted" else slack
     others = list[TriedModel]()
-    for term in (term for term in OF_TERM if term != "slack" and (robot.timed or term != "creep")):
+    for term in (term for term in robot.terms if term != "slack"):
         others.append(_tried(robot, cases, centred, (*base.terms, term), base))
         yield others[-1]
     wanted = sorted((model for model in others if model.verdict == "wanted"), key=lambda model: model.score.error)
@@ -123,7 +125,8 @@ def _tried(
     for number, recordings in enumerate(cases):
         before = without.fits[number].values if without else {}
         starts = [{**begin, **before} for begin in begins] + [{}] * (terms == ("slack",))
-        if robot.weighed and "inner friction" in terms:  # without it tendons and damping may stand for it
+        # Without inner friction tendons and damping may stand for it.
+        if robot.weighed and "slack" in robot.terms and "inner friction" in terms:
             starts += [dict(begin) for begin in begins]
         tried = [fit_arcs(robot, terms, recordings, centred, start) for start in starts]
         fits.append(min(tried, key=lambda fit: fit.cost))

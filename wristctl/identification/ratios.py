@@ -23,6 +23,7 @@ from wristctl.wrist.tendon_layout import TendonLayout
 
 if TYPE_CHECKING:
     from wristctl.identification.arc_fit import ArcFit
+    from wristctl.identification.driven_robot import DrivenRobot
 
 SCHEMA = "wristctl.ratios/1"
 # Unknowns of the arc that a wrist's settings have.
@@ -39,6 +40,29 @@ def ratios_of(fit: ArcFit, rate: float | None) -> dict[str, Any]:
         "schema": SCHEMA,
         "values": told,
         "angles": [float(angle) for angle in robot.angles],
+        "radius": robot.radius,
+        "rate": rate,
+    }
+
+
+def ratios_of_driven(fit: ArcFit, robot: DrivenRobot, rate: float) -> dict[str, Any]:
+    """As `ratios_of` of a log of tensions or currents: directions [rad] where all are told, the number of tendons.
+
+    Of currents without a torque constant it has `drive` too.
+    """
+    told = {name: one.value for name, one in fit.told.items() if one.known}
+    values = {name: told[name] for name in _USED if name in told and name != "force"}
+    if robot.drive == "tension" and "stiffness" in told:
+        values["force"] = told["stiffness"]
+    names = [f"direction_{number}" for number in robot.numbers]
+    directions = list(robot.angles) if robot.planar else [told[name] for name in names if name in told]
+    whole = len(directions) == robot.tendons
+    drive = {"drive": robot.drive} if robot.drive == "current" else {}
+    return drive | {
+        "schema": SCHEMA,
+        "values": values,
+        "angles": [float(angle) for angle in directions] if whole else [],
+        "tendons": robot.tendons,
         "radius": robot.radius,
         "rate": rate,
     }
@@ -74,7 +98,8 @@ def wrist_by_ratios(ratios: Mapping[str, Any], study: Study, run: str) -> LogWri
     values, wrist = dict(ratios["values"]), study.wrist
     stiffness = values.get("force")
     if stiffness is None and "stiffness" not in wrist.model_fields_set:
-        or_log = " with its N m/rad; or identify a log with tension_1 [N], ... of all tendons"
+        currents = "the log with identify.torque_constant and identify.spool_radius, or " * ("drive" in ratios)
+        or_log = f" with its N m/rad; or identify {currents}a log with tension_1 [N], ... of all tendons"
         problem = "its log tells ratios to the wrist's stiffness, and nobody has said that"
         raise UserError(problem, run, (Setting("wrist.stiffness=VALUE"), or_log))
     weight = float(straight_stiffness(wrist.model_copy(update={"pretension": 0.0}), 1)[0, 0]) - wrist.stiffness
@@ -82,6 +107,7 @@ def wrist_by_ratios(ratios: Mapping[str, Any], study: Study, run: str) -> LogWri
     if shown <= 0.0:
         fix = "more wrist.stiffness, or how it stands: wrist.gravity, wrist.hand_mass"
         raise UserError("a wrist of this stiffness buckles under its weight, and the log's did not", run, fix)
+    _check_tendons(ratios, study, run)
     angles, radius, gain = ratios["angles"], float(ratios["radius"]), float(values.get("gain", 1.0))
     found = {"stiffness": shown - weight}
     if "gain" in values:
@@ -108,6 +134,16 @@ def wrist_by_ratios(ratios: Mapping[str, Any], study: Study, run: str) -> LogWri
               "wrist.gravity", "actuator.tendon_stiffness", "actuator.friction", "sensor.delay_frames")  # fmt: skip
     assumed = [name for name in weighs if name not in (*told, *given)]
     return LogWrist(identified_yaml(found, camera, places), told, given, assumed)
+
+
+def _check_tendons(ratios: Mapping[str, Any], study: Study, run: str) -> None:
+    """UserError where the log does not tell the tendons' directions, and the study has other tendons."""
+    own = sum(place.radius > 0.0 for place in TendonLayout.of(study.wrist).places)
+    count = ratios.get("tendons", len(ratios["angles"]))
+    if not ratios["angles"] and count != own:
+        problem = f"its log does not tell the directions of its {count} tendons, and the study's wrist has {own}"
+        named = {3: "three", 4: "four", 5: "five", 6: "six"}.get(count, "[...]")
+        raise UserError(problem, run, (Setting(f"wrist.tendons={named}"), ", or their places"))
 
 
 def _tendons_of_one(count: int, study: Study) -> int:

@@ -21,13 +21,16 @@ UNIT_WORDS = {
     **dict.fromkeys(("cm", "centimeter", "centimetre"), "cm"),
     **dict.fromkeys(("um", "µm", "micron", "microns"), "um"),
     **dict.fromkeys(("n", "newton", "newtons"), "N"),
+    **dict.fromkeys(("amp", "amps", "ampere", "amperes"), "A"),
+    **dict.fromkeys(("ma", "milliamp", "milliamps", "milliampere", "milliamperes"), "mA"),
     **dict.fromkeys(("kg", "kilogram", "kilogramm"), "kg"),
     **dict.fromkeys(("g", "gram", "gramm", "gramme", "grammes"), "g"),
 }
 """Units by what people write for them; German `Grad` is a degree."""
 
 _KINDS = {"s": "time", "ms": "time", "us": "time", "ns": "time", "deg": "angle", "rad": "angle", "m": "length",
-          "mm": "length", "cm": "length", "um": "length", "N": "force", "kg": "mass", "g": "mass"}  # fmt: skip
+          "mm": "length", "cm": "length", "um": "length", "N": "force", "A": "current", "mA": "current",
+          "kg": "mass", "g": "mass"}  # fmt: skip
 # Parts of names, of four letters or more wherever they stand in a word; shorter ones are whole words.
 _OTHERS = (
     "velocity",
@@ -37,6 +40,9 @@ _OTHERS = (
     "accel",
     "gyro",
     "temperat",
+)
+# Commands are passed over where there is what they command.
+_COMMANDS = (
     "ref",
     "soll",
     "cmd",
@@ -54,15 +60,27 @@ _WORDS = {
     "mass": ("mass", "gewicht", "weight", "poids", "payload", "nutzlast", "last"),
     "bend": ("angle", "winkel", "bend", "bieg", "beug", "theta", "flexion", "courb", "inclin", "neigung", "pitch",
              "imu", "tilt", "roll", "yaw"),
+    "current": ("current", "strom", "courant", "ampere", "iq"),
     "spool": ("spool", "seil", "sehne", "cable", "kabel", "cord", "tendon", "wire", "draht", "rope", "motor", "moteur",
               "encod", "codeur", "winch", "winde", "treuil", "servo", "spule", "bobine", "laenge", "lange", "length",
               "longueur", "stepper", "enc", "fil", "m", "l"),
     "trial": ("trial", "versuch", "essai", "episode", "run", "lauf"),
+    "quat": ("quat", "quaternion", "qw", "qx", "qy", "qz", "q"),
+    "gravity": ("gravity", "grav", "schwerkraft", "pesanteur"),
 }  # fmt: skip
+# Words beside which "current" is no motor's.
+_NOW = ("pos", "position", "time", "state", "trial", "run")
+# Of a log without a bend, the direction of gravity in slow motion.
+_ACCELERATION = ("accel", "beschleunig", "acc")
+_RATE = re.compile(r"(?:(deg|grad|°|d)|(rad))\s*(?:/|p|per)\s*s(?:ec)?(?![a-z])", re.IGNORECASE)
 _OF_TIP = ("tip", "spitze", "pointe", "pos", "position", "ee")
 _MINUS = ("minus", "neg", "right", "rechts", "droit", "droite", "b")
-_COMMON = {"time": "s", "bend": "deg", "spool": "mm", "tension": "N", "mass": "kg", "tip": "mm", "trial": ""}
-_OF_KIND = {"time": ("time",), "angle": ("bend",), "length": ("spool", "tip"), "force": ("tension",), "mass": ("mass",)}
+_COMMON = {"time": "s", "bend": "deg", "spool": "mm", "tension": "N", "current": "mA", "mass": "kg", "tip": "mm",
+           "trial": "", "quat": "", "gravity": ""}  # fmt: skip
+_OF_KIND = {"time": ("time",), "angle": ("bend",), "length": ("spool", "tip"), "force": ("tension",),
+            "current": ("current",), "mass": ("mass", "gravity")}  # fmt: skip
+# Quantities without a unit that is asked for.
+_PLAIN = ("trial", "quat", "gravity")
 
 
 class Guess(NamedTuple):
@@ -98,14 +116,23 @@ def guesses(heads: Sequence[str], taken: Collection[str], known: Callable[[str],
     used = {*taken, *(guess.name for guess in found if guess)}
     reads = [_read(head) for head in heads]
     kinds = [None if guess else _kind(read) for guess, read in zip(found, reads, strict=True)]
-    for quantity in ("spool", "tension"):
+    there = {kind for kind in kinds if kind} | {name.partition("_")[0] for name in used}
+    if not there & {"spool", "tension", "current"}:
+        commands = [_kind(read, _OTHERS) if guess is None else None for guess, read in zip(found, reads, strict=True)]
+        kinds = [kind or (other if other in ("tension", "current") else None)
+                 for kind, other in zip(kinds, commands, strict=True)]  # fmt: skip
+    if not there & {"bend", "quat", "gravity", "inclination", "tip"}:
+        shaken = [guess is None and any(_has(word, _ACCELERATION) for word in read.words)
+                  for guess, read in zip(found, reads, strict=True)]  # fmt: skip
+        kinds = ["gravity" if is_shaken else kind for is_shaken, kind in zip(shaken, kinds, strict=True)]
+    for quantity in ("spool", "tension", "current"):
         places = [place for place, kind in enumerate(kinds) if kind == quantity]
         for place, number in zip(places, _numbers([reads[place] for place in places]), strict=True):
             if f"{quantity}_{number}" not in used:
                 used.add(f"{quantity}_{number}")
                 found[place] = _guess(f"{quantity}_{number}", quantity, reads[place])
     for place, kind in enumerate(kinds):
-        if kind in (None, "spool", "tension"):
+        if kind in (None, "spool", "tension", "current"):
             continue
         name = _named(kind, reads[place], used)
         if name is not None and name not in used:
@@ -118,17 +145,24 @@ def _guess(name: str, quantity: str, read: _Read) -> Guess:
     """With the unit that was read where it is one of the quantity's; of a motor's angle, as with a winch of 10 mm."""
     if quantity == "spool" and read.unit in ("deg", "rad"):
         return Guess(name, "0.1745 mm" if read.unit == "deg" else "10 mm", True, False)
-    fits = read.unit and quantity in _OF_KIND[_KINDS[read.unit]]
+    if quantity == "rate":
+        return Guess(name, read.unit, False, False)
+    fits = read.unit in _KINDS and quantity in _OF_KIND[_KINDS[read.unit]]
     unit = read.unit if fits else _COMMON[quantity]
-    return Guess(name, unit, not fits and quantity != "trial", False)
+    return Guess(name, unit, not fits and quantity not in _PLAIN, False)
 
 
 def _read(head: str) -> _Read:
     """Words, number and unit of a name: `Seil1_mm`, `Winkel (Grad)`, `motorAngle2 [deg]`, `ms`."""
+    rate = _RATE.search(head)
+    head = _RATE.sub(" ", head) if rate else re.sub(r"(?<![A-Za-z])mA(?![A-Za-z])", " milliamps", head)
+    head = re.sub(r"[\[(]\s*A\s*[\])]", " amps", head)
     plain = unicodedata.normalize("NFKD", head.replace("ß", "ss").replace("°", " deg ").replace("µ", "u"))
     plain = "".join(letter for letter in plain if not unicodedata.combining(letter))
     parts = re.findall(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+|\d+", plain)
     words = [part.lower() for part in parts if not part.isdigit()]
+    if rate:
+        return _Read(words, None, "rad/s" if rate[2] else "deg/s")
     numbers = [int(part) for part in parts if part.isdigit() and len(part) < 4]
     spelt = UNIT_WORDS.get(words[-1], "") if words else ""
     # One letter is a unit in brackets or after a mark alone: m1 is a motor, x_m is in metres.
@@ -139,15 +173,24 @@ def _read(head: str) -> _Read:
     return _Read(left, numbers[0] if numbers else None, spelt)
 
 
-def _kind(read: _Read) -> str | None:
+def _kind(read: _Read, others: Sequence[str] = (*_OTHERS, *_COMMANDS)) -> str | None:
     """Quantity by the words, of several the one that the unit is of; by the unit where no word says it."""
-    if any(_has(word, _OTHERS) for word in read.words):
+    if read.unit in ("deg/s", "rad/s"):
+        bends = any(_has(word, _WORDS["bend"]) for word in read.words)
+        return "rate" if bends and read.words[-1] in ("y", "z") else None
+    if any(_has(word, others) for word in read.words):
         return None
     fitting = _OF_KIND[_KINDS[read.unit]] if read.unit else ()
     by_words = [kind for kind, parts in _WORDS.items() if any(_has(word, parts) for word in read.words)]
     of_place = read.words and read.words[-1] in ("x", "y", "z")
+    if "current" in by_words and any(word in _NOW for word in read.words):
+        by_words.remove("current")
+    elif read.words == ["i"] and read.number is not None:
+        by_words.insert(0, "current")
     if of_place and (len(read.words) == 1 or any(word in _OF_TIP for word in read.words)):
         by_words.insert(0, "tip")
+    if not read.unit and {"quat", "gravity"} & set(by_words):
+        return "quat" if "quat" in by_words else "gravity"
     both = [kind for kind in by_words if kind in fitting]
     if both:
         return both[0]
@@ -163,8 +206,11 @@ def _has(word: str, parts: Sequence[str]) -> bool:
 
 
 def _named(kind: str, read: _Read, used: Collection[str]) -> str | None:
-    if kind == "tip":
-        return f"tip_{read.words[-1]}"
+    if kind in ("tip", "rate"):
+        return f"{kind}_{read.words[-1]}"
+    if kind in ("quat", "gravity"):
+        axis = read.words[-1].removeprefix("q")
+        return f"{kind}_{axis}" if axis in ("x", "y", "z", "w")[: 4 if kind == "quat" else 3] else None
     if kind != "bend":
         return kind
     if "z" in read.words or "yaw" in read.words or "bend_y" in used:

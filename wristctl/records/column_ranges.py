@@ -22,6 +22,8 @@ FACTOR_OF_A_COUNT, FACTOR_OF_A_UNIT = 5.0, 10.0
 _SHARE = 0.1
 # Numbers below which a bend is in rad, and a spool in m.
 _RAD, _METRES = 1.6, 0.05
+# Current of no small motor [A].
+_AMPERES = 20.0
 # Smallest range of a bend [rad] that tells how far spools go.
 _LEAST_BEND = 0.01
 
@@ -82,6 +84,11 @@ def unit_of_bend(numbers: Array) -> str | None:
     """rad of a bend whose numbers are all below 1.6, else deg; None of one without a number but 0."""
     largest = float(np.nanmax(np.abs(numbers), initial=0.0))
     return None if largest == 0.0 else "rad" if largest < _RAD else "deg"
+
+
+def unit_of_current(numbers: Array) -> str:
+    """mA of currents beyond 20, else A."""
+    return "mA" if float(np.nanmax(np.abs(numbers), initial=0.0)) > _AMPERES else "A"
 
 
 def unit_of_spools(columns: Sequence[Array], way: float) -> str | None:

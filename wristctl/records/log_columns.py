@@ -16,6 +16,7 @@ from wristctl.records.column_ranges import (
     numbers_of,
     range_of,
     unit_of_bend,
+    unit_of_current,
     unit_of_spools,
     way_of_bend,
 )
@@ -29,7 +30,15 @@ ANGLE: Units = {"deg": math.pi / 180.0, "rad": 1.0}
 LENGTH: Units = {"m": 1.0, "mm": 1e-3, "um": 1e-6, "cm": 1e-2}
 FORCE: Units = {"N": 1.0}
 MASS: Units = {"kg": 1.0, "g": 1e-3}
+CURRENT: Units = {"A": 1.0, "mA": 1e-3}
+RATE: Units = {"deg/s": math.pi / 180.0, "rad/s": 1.0}
+SHARE: Units = {"": 1.0}
+GRAVITY: Units = {"m/s^2": 1.0, "g": 9.80665, "": 1.0}
 
+QUATERNION = ("quat_x", "quat_y", "quat_z", "quat_w")
+"""Orientation of an inertial unit on the tip."""
+VERTICAL = ("gravity_x", "gravity_y", "gravity_z")
+"""Direction of gravity, or of what an accelerometer at rest shows, in the axes of such a unit."""
 COLUMNS: Mapping[str, Units] = {
     "time": TIME,
     "bend_y": ANGLE,
@@ -39,11 +48,15 @@ COLUMNS: Mapping[str, Units] = {
     "tip_x": LENGTH,
     "tip_y": LENGTH,
     "tip_z": LENGTH,
+    "rate_y": RATE,
+    "rate_z": RATE,
+    **dict.fromkeys(QUATERNION, SHARE),
+    **dict.fromkeys(VERTICAL, GRAVITY),
     "mass": MASS,
     "pose": ANGLE,
 }
 """Columns of numbers, beside those of tendons."""
-OF_TENDONS: Mapping[str, Units] = {"spool": LENGTH, "tension": FORCE}
+OF_TENDONS: Mapping[str, Units] = {"spool": LENGTH, "tension": FORCE, "current": CURRENT}
 WORDS = ("trial", "marker")
 """Columns of words."""
 
@@ -115,7 +128,7 @@ def mapped_names(text: str) -> dict[str, tuple[str, str]]:
         if not equals or head is None or not head[1]:
             raise UserError(f"{entry.strip()!r} maps no column", "columns", "time=t [ms], bend_y=imu [deg]")
         if units_of(name) is None and name not in WORDS:
-            fix = meant(name, [*COLUMNS, *WORDS, "spool_1", "tension_1"])
+            fix = meant(name, [*COLUMNS, *WORDS, "spool_1", "tension_1", "current_1"])
             raise UserError(f"{name} is no column of an open log", "columns", fix)
         mapped[head[1]] = name, head[2] or ""
     return mapped
@@ -220,7 +233,7 @@ def _unknown(
     heads: Sequence[str], unknown: Sequence[int], units: Mapping[str, Units], proposed: Proposal, where: str
 ) -> UserError:
     written = [name_of(heads[place]) for place in unknown]
-    choices = [*units, *WORDS, *SYNONYMS, "spool_3", "tension_3"]
+    choices = [*units, *WORDS, *SYNONYMS, "spool_3", "tension_3", "current_3"]
     like = nearest(written[0], choices) if len(written[0]) > 3 else None
     text = proposed.text or f"NAME={written[0]}{'' if '[' in heads[unknown[0]] else ' [UNIT]'}"
     option = Argument("columns", text, quoted=True)
@@ -338,6 +351,8 @@ def _units_by_range(
             ranges += [factor * range_of(numbers)] if factor else []
         elif column.name.startswith("spool_") and column.unsure:
             spools[place] = numbers_of(cells[place])
+        elif column.name.startswith("current_") and column.unsure:
+            units[place] = unit_of_current(numbers_of(cells[place]))
     unit = unit_of_spools(list(spools.values()), way_of_bend(ranges, tendon_offset))
     return units | dict.fromkeys(spools, unit) if unit else units
 

@@ -32,8 +32,9 @@ from wristctl.records.open_log import OpenLog
 
 _log = logging.getLogger(__name__)
 
-# Bend [rad], spool [m] and tension [N] beyond any wrist's; steady steps [s] over a time [s] that no motion takes.
-_BEND, _SPOOL, _TENSION, _STEP, _LONG = 4.0 * math.pi, 2.0, 5000.0, 5.0, 3600.0
+# Bend [rad], spool [m], tension [N] and current [A] beyond any wrist's; steady steps [s] over a time [s] that no motion
+# takes.
+_BEND, _SPOOL, _TENSION, _CURRENT, _STEP, _LONG = 4.0 * math.pi, 2.0, 5000.0, 100.0, 5.0, 3600.0
 # Way [m] between two samples, and its speed [m/s], that no motor makes; speed of most steps that no motor has [m/s].
 _JUMP, _SPEED, _MOSTLY = 0.02, 2.0, 10.0
 # Correlation of bend and pull from which the senses are opposite.
@@ -168,6 +169,11 @@ def _check_units(log: OpenLog, tendon_offset: float) -> None:
         if float(np.nanmax(np.abs(column))) > _TENSION:
             problem = f"{log.head(name)} reaches {float(np.nanmax(np.abs(column))):,.0f} N by its header"
             fix = "is it in mN, or a current in mA with a factor for A? [0.001 N] is a thousandth"
+            raise UserError(problem, log.at(int(np.nanargmax(np.abs(column)))), fix)
+    for name, column in _tendons(log, "current").items():
+        if float(np.nanmax(np.abs(column))) > _CURRENT:
+            problem = f"{log.head(name)} reaches {float(np.nanmax(np.abs(column))):,.0f} A by its header"
+            fix = _fix(log, "is it in mA?", {name: (log.head(name), "mA")})
             raise UserError(problem, log.at(int(np.nanargmax(np.abs(column)))), fix)
     for trial in log.trials().values():
         steps = np.diff(trial.columns.get("time", np.empty(0)))

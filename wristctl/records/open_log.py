@@ -22,6 +22,7 @@ from wristctl.errors import OUT, Phrase, UserError
 from wristctl.plain_files import LARGEST_DATA, read_plain
 from wristctl.records.column_ranges import TENDON_OFFSET
 from wristctl.records.files import replacing, sha256_of
+from wristctl.records.inertial_units import bends_of_unit
 from wristctl.records.log_columns import (
     COLUMNS,
     EXAMPLE,
@@ -105,6 +106,11 @@ class OpenLog:
         names = {number: f"{quantity}_{number}" for number in numbers}
         return {number: self.whole(name) for number, name in names.items() if name in self.columns}
 
+    def tendons_of(self, quantity: str) -> list[int]:
+        """Numbers of the tendons whose spools, tensions or currents are in the log, sorted."""
+        matches = (TENDON.fullmatch(name) for name in self.columns)
+        return sorted(int(match[2]) for match in matches if match and match[1] == quantity)
+
     def bends(self) -> Array | None:
         """Bend in both planes (T, 2) [rad], from bend_y and bend_z or from inclination and orientation; None where
         neither is there. One column alone is a bend in the first plane."""
@@ -164,9 +170,12 @@ def read_table(
     rest = ", ".join(entry for entry in entries if entry not in (*kinds, *keys.values()))
     table = _read(file, what, kinds[0] if kinds else "")
     log = _named(table, file, mapped_names(rest), what, others or bool(entries), more, tendon_offset)
-    if not table.bodies or ({"bend_y", "bend_z", "inclination"} & log.columns.keys() and not bodies.said):
+    if {"bend_y", "bend_z", "inclination"} & log.columns.keys() and not bodies.said:
         return log
-    columns, told = bends_of_bodies(table, bodies, file)
+    if table.bodies:
+        columns, told = bends_of_bodies(table, bodies, file)
+    else:
+        columns, told = bends_of_unit(log.columns, bodies, file, log.header, log.at)
     return replace(log, columns={**log.columns, **columns}, remarks=[*log.remarks, *told])
 
 

@@ -49,9 +49,9 @@ def bends_of_bodies(table: RecordedTable, names: BodyNames, file: Path) -> tuple
     """
     tip_name, base_name = _which(table.bodies, names, file)
     tip, base = table.bodies[tip_name], table.bodies.get(base_name)
-    axes = _axes(names, file)
+    axes = axes_of(names, file)
     turn, place = _in_base(tip, base)
-    bends = _bends(turn, axes)
+    bends = bends_of_turns(turn, axes)
     if base is not None and place is not None and not names.along:
         _check_along(place, bends, axes, tip_name, base_name, file)
     columns = {"bend_y": bends[:, 0], "bend_z": bends[:, 1]}
@@ -91,7 +91,7 @@ def _is(name: str, words: Sequence[str]) -> bool:
     return any(part in words for part in parts) or name.lower().replace("-", "").replace(" ", "") in words
 
 
-def _axes(names: BodyNames, file: Path) -> Array:
+def axes_of(names: BodyNames, file: Path) -> Array:
     """Axes of an open log in those of the base, as rows (3, 3): along the straight wrist, bend_y's and bend_z's."""
     along = _axis(names.along or "x", "along")
     following = {"x": "y", "y": "z", "z": "x"}
@@ -147,7 +147,7 @@ def _at(body: RigidBody, time: Array) -> tuple[Array, Array | None]:
     return turn, place
 
 
-def _bends(turn: Array, axes: Array) -> Array:
+def bends_of_turns(turn: Array, axes: Array) -> Array:
     """Bends (T, 2) [rad] toward the second and the third axis of the direction that the first one turns to."""
     from scipy.spatial.transform import Rotation
 
@@ -176,8 +176,14 @@ def _check_along(place: Array, bends: Array, axes: Array, tip: str, base: str, f
         raise UserError(problem, str(file), Argument("columns", f"tip={tip}, base={base}, along={letter}", quoted=True))
 
 
-def _told(table: RecordedTable, tip: str, base: str, axes: Array, bends: Array, file: Path) -> list[str]:
+def axes_told(axes: Array) -> tuple[str, str]:
+    """Letters of the axes along the straight wrist and toward bend_y, as `--columns` has them."""
     along, toward = ("-" * bool(axis.min() < -0.5) + "xyz"[int(np.argmax(np.abs(axis)))] for axis in axes[:2])
+    return along, toward
+
+
+def _told(table: RecordedTable, tip: str, base: str, axes: Array, bends: Array, file: Path) -> list[str]:
+    along, toward = axes_told(axes)
     against = f"rigid body {base}" if base else "the laboratory's axes"
     remarks = [
         f"{file.name}: the bend is that of rigid body {tip} against {against}, the straight wrist along {along}, "

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, NamedTuple
 from wristctl.commands.answer import Answer
 from wristctl.commands.identify.answer import found_answer, refused_answer
 from wristctl.commands.identify.bends import BendsTold, bends_plan, identify_bends
+from wristctl.commands.identify.driven import DrivenTold
 from wristctl.commands.identify.logs import LogTold, identify_logs, log_plan
 from wristctl.commands.inputs import EarlierRun, Inputs
 from wristctl.commands.printed_table import Table
@@ -115,12 +116,13 @@ def plan(study: Study, inputs: Inputs) -> str:
     return f"{', '.join(problem.free)} from {len(problem.trials)} trials, {frames} frames, {poses} poses or masses"
 
 
-def identify(session: Session) -> Identified | LogTold | BendsTold:
+def identify(session: Session) -> Identified | LogTold | DrivenTold | BendsTold:
     """Find stiffness, damping, tendons and delay of a real wrist from logged trials, with 95 % intervals.
 
     Trials are those of hw-run runs, or of open logs (FILE.csv, documentation: The open log) of wrists with two or more
     tendons in one plane or two: of these each parameter comes with its interval or is not identifiable, and which of
-    slack, friction and creep the data want is found by predicting a part of them. With `model: wrist` logs in two
+    slack, friction and creep the data want is found by predicting a part of them. Where a log has tensions or motors'
+    currents in place of spools, these move the wrist's dynamics. With `model: wrist` logs in two
     planes are of the study's wrist: both stiffnesses, the axis of the springs, and the direction and gain of each
     tendon.
     """
@@ -247,6 +249,6 @@ def _camera(inputs: Inputs, fitted: Fit) -> dict[str, float]:
 
 
 _RUNS = EarlierRun("runs", kind="hw-run", optional=True)
-IDENTIFY: Procedure[Identified | LogTold | BendsTold] = Procedure(
+IDENTIFY: Procedure[Identified | LogTold | DrivenTold | BendsTold] = Procedure(
     "identify", plan, identify, (_RUNS,), completed=with_logs, in_one_plane=no_tendons
 )

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from wristctl.commands.answer import Answer
+from wristctl.commands.identify.driven import DrivenTold, driven_plan, identify_driven
 from wristctl.commands.inputs import Inputs
 from wristctl.commands.inputs_of_loops import RATIOS
 from wristctl.commands.printed_table import COLUMNS, Table, joined
@@ -23,6 +24,7 @@ if TYPE_CHECKING:
     from wristctl.identification.arc_fit import ArcFit
     from wristctl.identification.arc_robot import ArcRecording, ArcRobot
     from wristctl.identification.model_choice import TriedModel
+    from wristctl.records.open_log import OpenLog
 
 # Share of the motion's mean square that a prediction may miss before nothing is told.
 _MISSED = 0.5
@@ -79,8 +81,8 @@ class _Read(NamedTuple):
     """Readings of the motion per second; None without times."""
 
 
-def _read(study: Study) -> _Read:
-    from wristctl.identification.log_model import rate_of_logs, recordings_of_logs, robot_of_logs, spools_of_log
+def _logs(study: Study) -> list[OpenLog]:
+    """The study's logs, read and looked at."""
     from wristctl.records.log_converters import read_log
     from wristctl.records.log_looks import looked_at
     from wristctl.wrist.tendon_layout import TendonLayout
@@ -88,7 +90,20 @@ def _read(study: Study) -> _Read:
     settings = study.identify
     offset, columns = TendonLayout.of(study.wrist).offset, settings.columns or ""
     read = (read_log(Path(file), columns, "log", tendon_offset=offset) for file in settings.logs)
-    logs = [looked_at(log, tendon_offset=offset) for log in read]
+    return [looked_at(log, tendon_offset=offset) for log in read]
+
+
+def _are_driven(logs: Sequence[OpenLog], study: Study) -> bool:
+    """Whether tensions or currents move the wrist of the logs, as they have no spools."""
+    from wristctl.identification.driven_log import drive_of_log
+
+    return drive_of_log(logs[0], study.identify) is not None
+
+
+def _read(logs: Sequence[OpenLog], study: Study) -> _Read:
+    from wristctl.identification.log_model import rate_of_logs, recordings_of_logs, robot_of_logs, spools_of_log
+
+    settings = study.identify
     robot = robot_of_logs(logs, study.wrist, settings.radius_error)
     sides = _sides(robot, spools_of_log(logs[0])) if len(robot.angles) > 2 and "turn" not in robot.base else ""
     recordings = recordings_of_logs(logs, robot)
@@ -110,14 +125,24 @@ def log_plan(study: Study, inputs: Inputs) -> str:
     """Say what is looked for in which logs."""
     if inputs.runs():
         raise UserError("runs and logs at once", "identify.runs", "identify one or the other")
-    robot, recordings, samples, remarks, _ = _read(study)
+    logs = _logs(study)
+    if _are_driven(logs, study):
+        return driven_plan(study, logs)
+    robot, recordings, samples, remarks, _ = _read(logs, study)
     names = ", ".join(robot.unknowns(()))
     plan = f"{names}, then slack, friction and creep, from {len(recordings)} trials of open logs, {samples} samples"
     return "\n".join([plan, *remarks])
 
 
-def identify_logs(session: Session) -> LogTold:
+def identify_logs(session: Session) -> LogTold | DrivenTold:
     """Find what open logs tell, in their run."""
+    logs = _logs(session.study)
+    if _are_driven(logs, session.study):
+        return identify_driven(session, logs)
+    return _identify_spooled(session, logs)
+
+
+def _identify_spooled(session: Session, logs: Sequence[OpenLog]) -> LogTold:
     from wristctl.commands.validate.answer import parameters_table
     from wristctl.commands.validate.figures import errors_of_models, left_over, motion
     from wristctl.identification.arc_fit import fit_arcs
@@ -126,7 +151,7 @@ def identify_logs(session: Session) -> LogTold:
     from wristctl.identification.real_robots import RealRobot
 
     findings, study = session.findings, session.study
-    robot, recordings, _, remarks, rate = _read(study)
+    robot, recordings, _, remarks, rate = _read(logs, study)
     models = list["TriedModel"]()
     with session.progress("fitting models") as report:
         for model in tried_models(robot, [recordings], False):

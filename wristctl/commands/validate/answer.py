@@ -50,7 +50,7 @@ def wanted_terms(models: Sequence[TriedModel]) -> str:
         verdict: [term for term, judged in verdicts.items() if judged == verdict]
         for verdict in ("wanted", "unwanted", "not told")
     }
-    wanted = joined(by_verdict["wanted"]) or "nothing beside elastic arcs and tendons"
+    wanted = joined(by_verdict["wanted"]) or f"nothing beside {models[0].words}"
     parts = [f"The data want {wanted}"]
     if by_verdict["unwanted"]:
         parts.append(f"predict worse with {joined(by_verdict['unwanted'])}")

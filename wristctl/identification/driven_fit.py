@@ -1,0 +1,83 @@
+"""A wrist by logs of its tendons' tensions or currents: the models that are tried, the chosen one, what it predicts."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from wristctl.arrays import Array
+from wristctl.config.identify import IdentifySettings
+from wristctl.config.wrist import WristParameters
+from wristctl.identification.arc_fit import ArcFit, fit_arcs
+from wristctl.identification.arc_robot import ArcRecording
+from wristctl.identification.driven_log import driven_robot, recordings_of
+from wristctl.identification.driven_robot import DrivenRobot
+from wristctl.identification.model_choice import TriedModel, chosen_of, tried_models
+from wristctl.records.open_log import OpenLog
+
+LEAST = 0.1
+"""Error of the part that was not fitted over its motion, beyond which nothing is identified."""
+# Time at the begin of another log that gives its zero [s].
+_ZEROED = 2.0
+
+
+@dataclass(frozen=True)
+class DrivenFit:
+    """The chosen model, fitted to all that was recorded, and the models that it was chosen from."""
+
+    fit: ArcFit
+    models: tuple[TriedModel, ...]
+    chosen: TriedModel
+    recordings: tuple[ArcRecording, ...]
+    remarks: tuple[str, ...]
+    samples: int
+
+    @property
+    def robot(self) -> DrivenRobot:
+        """Of the fit."""
+        assert isinstance(self.fit.robot, DrivenRobot)
+        return self.fit.robot
+
+    @cached_property
+    def moved(self) -> float:
+        """Motion of what was not fitted: RMS length about its mean [rad]."""
+        return motion_of([one.measured[one.asked] for one in self.recordings])
+
+    @property
+    def share(self) -> float:
+        """Error of what was not fitted over its motion."""
+        return self.chosen.score.error / self.moved
+
+
+def motion_of(parts: Sequence[Array]) -> float:
+    """RMS length of bends (T, 2) about their mean [rad]."""
+    return float(np.sqrt(np.nanvar(np.concatenate(parts), axis=0).sum()))
+
+
+def fitted_logs(
+    logs: Sequence[OpenLog], wrist: WristParameters, settings: IdentifySettings,
+    report: Callable[[int], None] = lambda count: None,
+) -> DrivenFit:  # fmt: skip
+    """Fit logs, of which a part is predicted by each model that is tried. UserError as `driven_robot`."""
+    robot, recordings, remarks = driven_robot(logs, wrist, settings)
+    models = list[TriedModel]()
+    for model in tried_models(robot, [recordings], False):
+        models.append(model)
+        report(len(models))
+    chosen = chosen_of(models)
+    whole = [replace(one, fitted=one.fitted | one.asked, asked=np.zeros(len(one.time), bool)) for one in recordings]
+    fit = fit_arcs(robot, chosen.terms, whole, begin=chosen.fits[0].values)
+    return DrivenFit(fit, tuple(models), chosen, tuple(recordings), tuple(remarks), sum(map(len, logs)))
+
+
+def predicted(found: DrivenFit, log: OpenLog) -> tuple[float, float]:
+    """RMS error of another log's bends and their motion [rad]; its begin gives its zero."""
+    (recording,) = recordings_of([log], found.robot)
+    begin = recording.time < recording.time[0] + _ZEROED
+    nothing = np.zeros(len(begin), bool)
+    recording = replace(recording, session="another", zeroing=begin, fitted=nothing, asked=~begin)
+    asked = found.fit.asked_of(recording)
+    return asked.rms("asked"), motion_of([recording.measured[~begin]])
