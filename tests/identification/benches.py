@@ -75,9 +75,7 @@ def logged(
     rng, trials = np.random.default_rng([seed, 1]), []
     for number, pose in enumerate(poses):
         tables = rehearse(pose, TENDONS, made(pose), [(each, moves) for each in directions], 5.0, rng)
-        trials += measured_trials(
-            f"run {number}", pose, TENDONS.step_length, 1e-3, *tables, exposure=RehearsedTruth.exposure
-        )
+        trials += measured_trials(f"run {number}", pose, TENDONS, 1e-3, *tables, exposure=RehearsedTruth.exposure)
     return trials, values
 
 

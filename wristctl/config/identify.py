@@ -52,8 +52,8 @@ class IdentifySettings(Section):
         None, "s", "how long the shutter is open; null: the emulated camera's own, a real one's neglected", ge=0
     )
     clock_error: float = quantity(
-        1e-4, "s", "how well the times of spools and of pictures agree, beside the delay: standard deviation",
-        "emulated: 0.02 ms", ge=0,
+        3e-4, "s", "how well the times of spools and of pictures agree, beside the delay: standard deviation",
+        "a frame of USB, 1 ms, at any place of which a tick may begin", ge=0,
     )  # fmt: skip
     widest: float = quantity(
         0.25, "", "half width of a 95 % interval, over the value, beyond which a parameter is not identified", gt=0

@@ -218,7 +218,7 @@ def _problem(study: Study, inputs: Inputs) -> Problem:
         exposure = settings.exposure
         if exposure is None:
             exposure = 0.0 if config.hw_run.port else config.hw_run.bench.camera.exposure
-        trials += measured_trials(run.id, wrist, actuator.step_length, settings.step, *logged, exposure)
+        trials += measured_trials(run.id, wrist, actuator, settings.step, *logged, exposure)
         if not start:
             start, believed = believed_of(wrist, actuator), actuator
     return Problem(trials, start, settings, believed)
