@@ -43,6 +43,11 @@ def answered(log: pd.DataFrame) -> pd.DataFrame:
     return log.drop_duplicates("counted")
 
 
+def has_rates(log: pd.DataFrame) -> bool:
+    """Whether a log has the step rates that were sent."""
+    return {f"sent_{tendon}" for tendon in ACTIVE} <= set(log.columns)
+
+
 def count_times(ticks: pd.DataFrame) -> Array:
     """Times (T, 4) [s] at which the board counted the steps of each axis, of ticks by which it had answered anew.
 
@@ -66,12 +71,12 @@ def spool_paths(log: pd.DataFrame, motors: Actuator) -> SpoolPaths:
     """
     ticks = answered(log)
     times, counts = count_times(ticks), ticks[[f"position_{tendon}" for tendon in ACTIVE]].to_numpy(float)
-    sent = [f"sent_{tendon}" for tendon in ACTIVE]
-    if not set(sent) <= set(log.columns):
+    if not has_rates(log):
         from scipy.interpolate import CubicSpline
 
         splines = [CubicSpline(*column) for column in zip(times.T, counts.T, strict=True)]
         return lambda instants: np.stack([spline(instants) for spline in splines], axis=1)
+    sent = [f"sent_{tendon}" for tendon in ACTIVE]
     changes = _read(log.time.to_numpy(float), times.mean(axis=1), motors) + 0.5 * motors.update
     drive = _Drive(motors, changes, np.nan_to_num(log[sent].to_numpy(float)))
     reckoned = np.stack([drive.at(of_axis)[:, axis] for axis, of_axis in enumerate(times.T)], axis=1)

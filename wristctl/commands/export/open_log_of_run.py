@@ -15,7 +15,7 @@ from wristctl.config.loop import Loop
 from wristctl.config.plant import Actuator
 from wristctl.config.study import Study
 from wristctl.errors import FILE, UserError
-from wristctl.identification.spool_paths import answered, count_times, spool_paths
+from wristctl.identification.spool_paths import answered, count_times, has_rates, spool_paths
 from wristctl.records import Run
 from wristctl.records.formats import read_arrays, read_table
 from wristctl.records.open_log import OpenLog, write_log
@@ -83,10 +83,18 @@ def _trials(run: Run) -> tuple[Columns, Mapping[str, np.ndarray]]:
 
 
 def _reeled(log: pd.DataFrame, motors: Actuator) -> tuple[Array, Columns]:
-    """Lengths on the spools [m] in one trial, so often that lines between them turn no corner that a ramp has not."""
-    counted = count_times(answered(log)).mean(axis=1)
-    times = np.arange(counted[0], counted[-1], _SPOOLS_EVERY)
-    lengths = motors.step_length * spool_paths(log, motors)(times)
+    """Lengths on the spools [m] in one trial, so often that lines between them turn no corner that a ramp has not.
+
+    Those of the counts alone where the log has no step rates.
+    """
+    ticks = answered(log)
+    times = count_times(ticks).mean(axis=1)
+    if has_rates(log) and len(times) > 1:
+        times = np.arange(times[0], times[-1], _SPOOLS_EVERY)
+        steps = spool_paths(log, motors)(times)
+    else:
+        steps = ticks[[f"position_{tendon}" for tendon in ACTIVE]].to_numpy(float)
+    lengths = motors.step_length * steps
     return times, {f"spool_{tendon}": column for tendon, column in zip(ACTIVE, lengths.T, strict=True)}
 
 
