@@ -44,8 +44,7 @@ def row(poses: tuple[WristParameters, ...], moves: Reference, known: dict[str, f
         wrist = pose.model_copy(update={"stiffness": 0.7 * pose.stiffness})
         truth, rng = RehearsedTruth(wrist, actuator), np.random.default_rng(number)
         tables = rehearse(pose, actuator, truth, [(side, moves) for side in SIDES], 5.0, rng)
-        length, label = actuator.step_length, f"run {number}"
-        trials += measured_trials(label, pose, length, settings.step, *tables, exposure=truth.exposure)
+        trials += measured_trials(f"run {number}", pose, actuator, settings.step, *tables, exposure=truth.exposure)
     problem = Problem(trials, believed_of(wrist, actuator) | {"delay": truth.delay}, settings, actuator)
     slopes, weights = [each / NOISE for each in linearise(problem, problem.begin()).slopes], problem.prior()
     half = promised(problem, slopes)

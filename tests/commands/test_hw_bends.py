@@ -121,7 +121,8 @@ def test_its_open_log_is_one_that_identification_reads(whole: Whole) -> None:
     assert "theta" not in whole.run.data("frames"), "no sample of an angle in one plane"
 
 
-def test_a_tick_by_which_no_answer_had_come_is_no_row_of_an_open_log(whole: Whole, tmp_path: Path) -> None:
+def test_a_tick_by_which_no_answer_had_come_moves_no_spool_of_an_open_log(whole: Whole, tmp_path: Path) -> None:
+    """Its row repeats the board's last positions, at their time; where spools were meanwhile, their rates say."""
     late = tmp_path / "late"
     shutil.copytree(whole.run.path, late)
     rows = (late / "data/log.csv").read_text().splitlines()
@@ -131,8 +132,11 @@ def test_a_tick_by_which_no_answer_had_come_is_no_row_of_an_open_log(whole: Whol
         second[names.index(name)] = first[names.index(name)]
     rows[61] = ",".join(second)
     (late / "data/log.csv").write_text("\n".join(rows) + "\n")
-    spools = [np.isfinite(open_log_of(run).columns["spool_1"]).sum() for run in (whole.run, Run(late))]
-    assert spools[1] == spools[0] - 1
+    logs = [open_log_of(run).columns for run in (whole.run, Run(late))]
+    spools = [log["spool_1"][np.isfinite(log["spool_1"])] for log in logs]
+    assert len(spools[0]) == len(spools[1]) and np.ptp(spools[0]) > 1e-3
+    assert np.abs(spools[0] - spools[1]).max() < 2.0 * whole.run.config.hw_run.actuator.step_length
+    assert set(logs[0]["mass"]) == {whole.run.config.wrist.hand_mass}
 
 
 @pytest.mark.parametrize(

@@ -75,9 +75,7 @@ def logged(
     rng, trials = np.random.default_rng([seed, 1]), []
     for number, pose in enumerate(poses):
         tables = rehearse(pose, TENDONS, made(pose), [(each, moves) for each in directions], 5.0, rng)
-        trials += measured_trials(
-            f"run {number}", pose, TENDONS.step_length, 1e-3, *tables, exposure=RehearsedTruth.exposure
-        )
+        trials += measured_trials(f"run {number}", pose, TENDONS, 1e-3, *tables, exposure=RehearsedTruth.exposure)
     return trials, values
 
 
@@ -89,11 +87,13 @@ def problem(trials: list[MeasuredTrial], **settings: object) -> Problem:
 def write_run(
     out: Path, seed: int, pose: WristParameters, moves: Reference = STEPS, sides: tuple[DirectionName, ...] = DIRECTIONS
 ) -> Run:
-    """A run of kind hw-run with the trials of a rehearsed bench."""
+    """A run of kind hw-run with the trials of a rehearsed bench, whose rotors stand where their drives count."""
     made, _ = bench(seed)
     rng = np.random.default_rng([seed, int(abs(pose.gravity_flexion))])
     tables = rehearse(pose, TENDONS, made(pose), [(each, moves) for each in sides], 5.0, rng)
-    with start_run("hw-run", Study(wrist=pose), out=out) as run:
+    stiff_fields = {"bench": {"motors": {"rotor_inertia": 0.0}}}
+    study = Study.model_validate({"wrist": pose.model_dump(), "hw_run": stiff_fields})
+    with start_run("hw-run", study, out=out) as run:
         for name, table in zip(("log", "frames", "trials"), tables, strict=True):
             run.table(f"data/{name}.csv", table)
     return Run(run.path)

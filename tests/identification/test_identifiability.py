@@ -82,12 +82,12 @@ def _tables(push: float, verdict: str) -> tuple[pd.DataFrame, pd.DataFrame, pd.D
 
 def test_trials_take_steps_as_lengths_by_plane_and_only_frames_that_were_seen() -> None:
     wrist = LEVEL.model_copy(update={"gravity": (-1.0, 2.0), "gravity_flexion": 3.0})
-    (trial,) = measured_trials("run", wrist, 1e-5, 1e-3, *_tables(0.0, "jump"))
+    (trial,) = measured_trials("run", wrist, TENDONS, 1e-3, *_tables(0.0, "jump"))
     assert trial.tendons == (2, 5, 1, 4) and trial.wrist.gravity == (-1.0, 3.0)
-    assert trial.reeled[100] == pytest.approx([20e-5 * tendon for tendon in (2, 5, 1, 4)])
+    assert trial.reeled[100] == pytest.approx([20.0 * TENDONS.step_length * tendon for tendon in (2, 5, 1, 4)])
     assert len(trial.angle) == 49 and trial.captured[0] == pytest.approx(0.25)
 
 
 def test_a_pushed_trial_is_no_trial_to_identify_from() -> None:
     with pytest.raises(UserError, match="no trial without a push"):
-        measured_trials("run", KNOWN, TENDONS.step_length, 1e-3, *_tables(2.0, "ok"))
+        measured_trials("run", KNOWN, TENDONS, 1e-3, *_tables(2.0, "ok"))

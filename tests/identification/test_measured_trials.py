@@ -8,11 +8,11 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from tests.identification.benches import KNOWN, LEVEL
+from tests.identification.benches import KNOWN, LEVEL, TENDONS
 from wristctl.errors import UserError
 from wristctl.identification.measured_trials import MeasuredTrial, measured_trials
 
-GRID, STEP = 1e-3, 1e-5
+GRID, STEP = 1e-3, TENDONS.step_length
 
 
 def tables(
@@ -39,7 +39,7 @@ def tables(
 
 def trials(*given: pd.DataFrame, **more: float) -> list[MeasuredTrial]:
     log, frames, kinds = given
-    return measured_trials("run", LEVEL, STEP, GRID, log, frames, kinds, **more)
+    return measured_trials("run", LEVEL, TENDONS, GRID, log, frames, kinds, **more)
 
 
 def test_spools_are_held_at_what_the_middle_of_each_step_has() -> None:

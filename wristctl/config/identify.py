@@ -1,5 +1,6 @@
 """Identification: which runs, what is held fixed, what is known how well, and what counts as identified."""
 
+import math
 from typing import Literal
 
 from wristctl.config.given_files import columns_of_file, given_file
@@ -57,9 +58,13 @@ class IdentifySettings(Section):
     exposure: float | None = quantity(
         None, "s", "how long the shutter is open; null: the emulated camera's own, a real one's neglected", ge=0
     )
+    holding_torque: float | None = quantity(
+        None, "N m", "that the motors hold: a field gives way to its tendon's pull, the more so the harder it pulls; "
+        "null: the emulated motors' own, a real rig's neglected", gt=0,
+    )  # fmt: skip
     clock_error: float = quantity(
-        1e-4, "s", "how well the times of spools and of pictures agree, beside the delay: standard deviation",
-        "emulated: 0.02 ms", ge=0,
+        3e-4, "s", "how well the times of spools and of pictures agree, beside the delay: standard deviation",
+        "a frame of USB, 1 ms, at any place of which a tick may begin", ge=0,
     )  # fmt: skip
     widest: float = quantity(
         0.25, "", "half width of a 95 % interval, over the value, beyond which a parameter is not identified", gt=0
@@ -72,6 +77,11 @@ class IdentifySettings(Section):
         "assumed", gt=1,
     )  # fmt: skip
     misfit: Literal["refuse", "tell"] = choice("refuse", "what to do with trials that the model does not fit")
+
+    @property
+    def holds(self) -> float:
+        """Torque that the motors hold [N m]; inf where nobody says it."""
+        return math.inf if self.holding_torque is None else self.holding_torque
 
     @property
     def fixed(self) -> dict[str, float]:

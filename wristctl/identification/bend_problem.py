@@ -140,7 +140,8 @@ class BendProblem(Problem):
         taut = tuple(float(x[self.coordinates[spool_zero(trial, tendon)]]) for tendon in trial.tendons)
         layout = TendonLayout(tuple(self.places.values()))
         shares = layout.shares(wrist.discs)
-        return SupposedBends(wrist, tendons, self._cross_section(values), taut, shares, layout.multiplicity)
+        section = self._cross_section(values)
+        return SupposedBends(wrist, tendons, section, taut, shares, layout.multiplicity, self.settings.holds)
 
     def planar(self, values: Mapping[str, float]) -> dict[str, float]:
         """The values with those of a wrist whose tendons are on a square."""

@@ -142,7 +142,8 @@ class Problem:
             wrist_values["stiffness"] *= values["flexion_ratio"]
         one, two, three, four = (float(x[self.coordinates[spool_zero(trial, tendon)]]) for tendon in trial.tendons)
         tendons = self.actuator.model_copy(update=tendons_of_values(values))
-        return SupposedWrist(trial.wrist.model_copy(update=wrist_values), tendons, (one, two, three, four))
+        wrist, holding = trial.wrist.model_copy(update=wrist_values), self.settings.holds
+        return SupposedWrist(wrist, tendons, (one, two, three, four), holding=holding)
 
     def simulate(self, trial: MeasuredTrial, candidates: Sequence[SupposedWrist], segments: int | None = None) -> Array:
         """Angles (count, T) of the candidates in a trial; so many segments, or as many as the settings say."""

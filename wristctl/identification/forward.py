@@ -3,6 +3,7 @@
 Candidates run side by side, one a lane: a Jacobian costs a block or two. Actuator and integrator are the simulation's.
 """
 
+import math
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
@@ -11,6 +12,7 @@ import numpy as np
 from wristctl.arrays import Array
 from wristctl.config.plant import Actuator, TendonFacts, TrueWrist
 from wristctl.config.wrist import WristParameters
+from wristctl.identification.rotor_field import Field, field_of, on_rotor
 from wristctl.lanes.blocks import to_blocks, to_rows
 from wristctl.lanes.compiled import by_type, implements
 from wristctl.lanes.lane import zero_like
@@ -32,6 +34,7 @@ class SupposedWrist(NamedTuple):
     """A wrist and its tendons as they may be, and what else they may do.
 
     `taut` is what each tendon has reeled in more [m] than its spool's count says: two of the + side, two of the -.
+    `holding` is the torque [N m] that the motors hold; inf: their rotors stand where their drives count.
     """
 
     wrist: WristParameters
@@ -39,6 +42,7 @@ class SupposedWrist(NamedTuple):
     taut: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 0.0)
     plant: TrueWrist = TrueWrist()
     facts: TendonFacts = TendonFacts()
+    holding: float = math.inf
 
 
 class Reeled(NamedTuple):
@@ -96,16 +100,18 @@ def _advance(
     bend, speed = lanes_like(part(q, 0, (0,))), lanes_like(part(q, 0, (0,)))
     alive = 1.0 + zero
     reeled, taut = spools.lengths, _STIFFNESS + 1
+    field = Field(tendon_rows[taut + 4], tendon_rows[taut + 5])
     for k in range(-spools.settle, reeled.shape[0]):
         now = max(k, 0)
         if k >= 0:
             bend_of(plant, q, rate, bend, speed)
             rows_of(angle)[k] = bend[0]
+        path = travel(plant, q)
         on_spools = (
-            reeled[now, 0] + tendon_rows[taut],
-            reeled[now, 2] + tendon_rows[taut + 2],
-            reeled[now, 1] + tendon_rows[taut + 1],
-            reeled[now, 3] + tendon_rows[taut + 3],
+            on_rotor(field, tendons, reeled[now, 0] + tendon_rows[taut], 0, path[0]),
+            on_rotor(field, tendons, reeled[now, 2] + tendon_rows[taut + 2], 1, path[1]),
+            on_rotor(field, tendons, reeled[now, 1] + tendon_rows[taut + 1], 2, path[0]),
+            on_rotor(field, tendons, reeled[now, 3] + tendon_rows[taut + 3], 3, path[1]),
         )
         lengths = _after_slip(spools.faults, tendons, plant, q, on_spools, k * spools.h + zero)
         alive, _ = advance_or_stop(plant, q, rate, lengths, tendons, spools.h + zero, alive)
@@ -122,7 +128,8 @@ def angles(candidates: Sequence[SupposedWrist], reeled: Array, h: float, n: int,
     nonideal = [nonideal_of(candidate.plant, candidate.tendons, candidate.facts, h) for candidate in candidates]
     faults = Faulty() if any(map(wears, nonideal)) else Faultless()
     tendon_values = [
-        (*new, old.tendons.tendon_stiffness, *old.taut) for new, old in zip(nonideal, candidates, strict=True)
+        (*new, old.tendons.tendon_stiffness, *old.taut, *field_of(old.tendons, old.holding))
+        for new, old in zip(nonideal, candidates, strict=True)
     ]
     tendons, k = to_blocks(np.array(tendon_values)), model.coordinates(n)
     trajectories = np.empty((len(values), len(reeled), *values.shape[2:]))

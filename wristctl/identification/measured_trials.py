@@ -9,9 +9,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from wristctl.arrays import Array
+from wristctl.config.plant import Actuator
 from wristctl.config.wrist import WristParameters
 from wristctl.errors import UserError
-from wristctl.wrist.directions import DIRECTIONS, in_plane, tendons_of
+from wristctl.identification.spool_paths import answered, spool_paths
+from wristctl.wrist.directions import ACTIVE, DIRECTIONS, in_plane, tendons_of
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -71,27 +73,19 @@ class MeasuredTrial:
         return replace(self, reeled=reeled)
 
 
-def answered(log: pd.DataFrame) -> pd.DataFrame:
-    """The ticks of a log by which the board had answered anew: until then its last positions stand there again."""
-    return log.drop_duplicates("counted")
-
-
 def measured_trials(
-    label: str, wrist: WristParameters, step_length: float, grid: float, log: pd.DataFrame, frames: pd.DataFrame,
+    label: str, wrist: WristParameters, motors: Actuator, grid: float, log: pd.DataFrame, frames: pd.DataFrame,
     kinds: pd.DataFrame, exposure: float = 0.0,
 ) -> list[MeasuredTrial]:  # fmt: skip
     """The trials of a run's tables log, frames and trials, without a person's push, on a grid [s].
 
-    `step_length` is what one microstep reels in [m], `exposure` how long the shutter is open [s]. UserError where no
-    trial is of use.
+    `motors` are as believed, `exposure` is how long the shutter is open [s]. UserError where no trial is of use.
     """
-    from scipy.interpolate import CubicSpline
-
     trials = []
     for row in kinds.itertuples():
         number, direction = int(row.trial), str(row.direction)  # type: ignore[arg-type]
-        own, sightings = answered(log[log.trial == number]), frames[frames.trial == number]
-        if float(row.push) != 0.0 or len(own) < _FEWEST:  # type: ignore[arg-type]
+        own, sightings = log[log.trial == number], frames[frames.trial == number]
+        if float(row.push) != 0.0 or len(answered(own)) < _FEWEST:  # type: ignore[arg-type]
             continue
         clock, captured, angle = (column.to_numpy(float) for column in (own.time, sightings.captured, sightings.theta))
         time = np.arange(clock[0], clock[-1], grid)
@@ -103,10 +97,9 @@ def measured_trials(
             f"{label}, trial {number}: {direction}", label, direction, in_plane(wrist, direction),
             time, np.empty((len(time), 4)), captured[usable], angle[usable], exposure,
         )  # fmt: skip
-        steps = own[[f"position_{tendon}" for tendon in trial.tendons]].to_numpy(float)
-        # What is held over a step is what its middle has. Chords would cut the corners of 5 ms.
-        reeled = step_length * CubicSpline(own.counted, steps)(time + 0.5 * grid)
-        trials.append(replace(trial, reeled=reeled))
+        # what is held over a step is what its middle has
+        steps = spool_paths(own, motors)(time + 0.5 * grid)[:, [ACTIVE.index(tendon) for tendon in trial.tendons]]
+        trials.append(replace(trial, reeled=motors.step_length * steps))
     if not trials:
         raise UserError(
             f"no trial without a push has {_FEWEST} usable frames", label, "name an hw-run run with trials that ended"

@@ -3,6 +3,7 @@
 Candidates run side by side, one a lane, on the plant, the tendons and the integrator of the simulation.
 """
 
+import math
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
@@ -12,6 +13,7 @@ from numpy.typing import NDArray
 from wristctl.arrays import Array
 from wristctl.config.plant import Actuator, TendonFacts, TrueWrist
 from wristctl.config.wrist import WristParameters
+from wristctl.identification.rotor_field import Field, field_of, on_rotor
 from wristctl.lanes.blocks import to_blocks, to_rows
 from wristctl.lanes.lane import zero_like
 from wristctl.lanes.rows import beyond, lanes_like, part, rows_of
@@ -43,6 +45,8 @@ class SupposedBends(NamedTuple):
     """Share of the wrist's length that the tendons of each place span (M,)."""
     alike: NDArray[np.int64]
     """Number of tendons of each place (M,)."""
+    holding: float = math.inf
+    """Torque that the motor of one tendon holds [N m]; inf: its rotor stands where its drive counts."""
 
 
 class _Shapes(NamedTuple):
@@ -57,7 +61,8 @@ def _follow(model: Any, values: Any, state: Any, reeled: Any, h: float, settle: 
     m, count = len(shapes.cut), len(shapes.of_pulls)
     wrist, first = parameters_of(model, rows, shapes.of_pulls), FIELDS + OF_A_TENDON * count
     taut, stiffness = part(rows, first, shapes.of_pulls), part(rows, first + count, shapes.of_pulls)
-    nonideal = beyond(rows, first + 2 * count)
+    per_newton, radian = part(rows, first + 2 * count, shapes.of_pulls), rows[first + 3 * count]
+    nonideal = beyond(rows, first + 3 * count + 1)
     tendons = RealPlaces(
         stiffness, read_nonideal(nonideal), read_faults(beyond(nonideal, _NONIDEAL), shapes.of_pulls),
         beyond(states, 2 * m), NoInnerFriction(), shapes.of_pulls,
@@ -67,10 +72,12 @@ def _follow(model: Any, values: Any, state: Any, reeled: Any, h: float, settle: 
     alive = 1.0 + zero
     for k in range(-settle, reeled.shape[0]):
         now = max(k, 0)
+        path = path_before(tendons, wrist, q)
         for t in range(count):
-            spools[t] = reeled[now, t] + taut[t]
+            field = Field(radian, per_newton[t])
+            spools[t] = on_rotor(field, tendons, reeled[now, t] + taut[t], t, shortening(path, t))
         if k >= 0:
-            row, path = rows_of(out[k]), path_before(tendons, wrist, q)
+            row = rows_of(out[k])
             row[0], row[1], _, _, _ = tip_bend(wrist.segment, q, rate)
             for t in range(count):
                 row[2 + t] = spool_pull(tendons, spools[t], t, shortening(path, t))
@@ -110,7 +117,10 @@ def _values(supposed: SupposedBends, n: int, h: float) -> Array:
     tendons, facts = supposed.tendons.model_copy(update={"level": "tendon"}), TendonFacts()
     alike = np.asarray(supposed.alike, float)
     stiffness, faults = alike * tendons.tendon_stiffness, faults_of(tendons, facts, alike)
-    nonideal = nonideal_of(TrueWrist(), tendons, facts, h)
+    nonideal, field = nonideal_of(TrueWrist(), tendons, facts, h), field_of(tendons, supposed.holding)
     return np.concatenate(
-        [own[:FIELDS], rows_of_tendons(supposed.places, along), supposed.taut, stiffness, nonideal, faults.ravel()]
-    )
+        [
+            own[:FIELDS], rows_of_tendons(supposed.places, along), supposed.taut, stiffness, field.per_newton / alike,
+            [field.radian], nonideal, faults.ravel(),
+        ]
+    )  # fmt: skip

@@ -39,7 +39,7 @@ _AXES: Columns = {
     **_of_tendons("tension", "N", "commanded"),
     **_of_tendons("target", "steps", "wanted spool position, 0 where straight and just taut, positive reeled in"),
     **_of_tendons("position", "steps", "spool position by the board's status"),
-    "counted": ("s", "when the board had those positions, on the trial's time"),
+    "counted": ("s", "when the board had those positions, as the host reckons, on the trial's time"),
     "board": ("s", "the board's own clock then"),
     **_of_tendons("sent", "1/s", "step rate really sent"),
     "state": ("", "of the board"),

@@ -12,9 +12,10 @@ from wristctl.arrays import Array
 from wristctl.commands.export.model import identified_in
 from wristctl.commands.inputs_of_loops import found_in, with_found
 from wristctl.config.loop import Loop
+from wristctl.config.plant import Actuator
 from wristctl.config.study import Study
 from wristctl.errors import FILE, UserError
-from wristctl.identification.measured_trials import answered
+from wristctl.identification.spool_paths import answered, count_times, has_rates, spool_paths
 from wristctl.records import Run
 from wristctl.records.formats import read_arrays, read_table
 from wristctl.records.open_log import OpenLog, write_log
@@ -34,6 +35,10 @@ _BENDS = {"time": "time", "bend_ulnar": "bend_y", "bend_flexion": "bend_z"} | {
 }
 
 
+# Time between two rows of a rig's spools [s].
+_SPOOLS_EVERY = 2e-3
+
+
 def open_log_of(run: Run) -> OpenLog:
     """Motions of a run, one after the other. Raises UserError for a run that holds none."""
     if (run.path / "data").is_dir():
@@ -51,32 +56,46 @@ def write_open_log(run: Run, path: Path) -> None:
 
 
 def _trials(run: Run) -> tuple[Columns, Mapping[str, np.ndarray]]:
-    """Trials of a rig: spools at the times of the ticks, bends at those of the frames, in one plane tips too."""
+    """Trials of a rig: spools on their way from count to count, bends at the times of the frames, in one plane tips."""
     log, frames, kinds = (run.data(name) for name in ("log", "frames", "trials"))
-    step = run.config.hw_run.actuator.step_length
+    motors = run.config.hw_run.actuator
     parts: list[tuple[Columns, str]] = []
     for row in kinds.itertuples():
         number, direction = row.trial, DIRECTIONS.get(str(row.direction))
         flexion = direction is not None and direction.plane == "flexion"
-        ticks, seen = answered(log[log.trial == number]), frames[(frames.trial == number) & (frames.verdict == "ok")]
-        spools = {f"spool_{tendon}": step * ticks[f"position_{tendon}"].to_numpy(float) for tendon in ACTIVE}
+        ticks, seen = log[log.trial == number], frames[(frames.trial == number) & (frames.verdict == "ok")]
+        reeled = _reeled(ticks, motors)
         if "plane" in seen:
-            parts.append(
-                (_merged([(ticks.counted.to_numpy(float), spools), *_bends_seen(seen, "captured")]), f"{number}")
-            )
+            parts.append((_merged([reeled, *_bends_seen(seen, "captured")]), f"{number}"))
             continue
         bend, tip = ("bend_z", "tip_z") if flexion else ("bend_y", "tip_y")
         sights = {bend: seen.theta.to_numpy(float)}
         if "tip_x" in seen:
             sights |= {"tip_x": seen.tip_x.to_numpy(float), tip: seen.tip_y.to_numpy(float)}
-        both = [(ticks.counted.to_numpy(float), spools), (seen.captured.to_numpy(float), sights)]
-        parts.append((_merged(both), f"{number}"))
+        parts.append((_merged([reeled, (seen.captured.to_numpy(float), sights)]), f"{number}"))
     names = sorted({name for columns, _ in parts for name in columns}, key=_order)
     columns = {
         name: np.concatenate([part.get(name, np.full(len(part["time"]), np.nan)) for part, _ in parts])
         for name in names
     }
+    columns["mass"] = np.full(len(columns["time"]), run.config.wrist.hand_mass)
     return columns, {"trial": np.concatenate([np.full(len(part["time"]), trial) for part, trial in parts])}
+
+
+def _reeled(log: pd.DataFrame, motors: Actuator) -> tuple[Array, Columns]:
+    """Lengths on the spools [m] in one trial, so often that lines between them turn no corner that a ramp has not.
+
+    Those of the counts alone where the log has no step rates.
+    """
+    ticks = answered(log)
+    times = count_times(ticks).mean(axis=1)
+    if has_rates(log) and len(times) > 1:
+        times = np.arange(times[0], times[-1], _SPOOLS_EVERY)
+        steps = spool_paths(log, motors)(times)
+    else:
+        steps = ticks[[f"position_{tendon}" for tendon in ACTIVE]].to_numpy(float)
+    lengths = motors.step_length * steps
+    return times, {f"spool_{tendon}": column for tendon, column in zip(ACTIVE, lengths.T, strict=True)}
 
 
 def _bends_seen(frames: pd.DataFrame, clock: str) -> list[tuple[Array, Columns]]:

@@ -220,9 +220,12 @@ def _problem(study: Study, inputs: Inputs) -> Problem:
         exposure = settings.exposure
         if exposure is None:
             exposure = 0.0 if config.hw_run.port else config.hw_run.bench.camera.exposure
-        trials += measured_trials(run.id, wrist, actuator.step_length, settings.step, *logged, exposure)
+        trials += measured_trials(run.id, wrist, actuator, settings.step, *logged, exposure)
         if not start:
             start, believed = believed_of(wrist, actuator), actuator
+            motors = config.hw_run.bench.motors
+            if settings.holding_torque is None and not config.hw_run.port and motors.rotor_inertia > 0.0:
+                settings = settings.model_copy(update={"holding_torque": motors.holding_torque})
     return Problem(trials, start, settings, believed)
 
 
