@@ -55,6 +55,14 @@ def test_motions_are_joints_and_poses_on_the_runs_clock(tmp_path: Path) -> None:
     np.testing.assert_allclose([turn.x, turn.y, turn.z, turn.w], [0.0, -np.sin(0.5), 0.0, np.cos(0.5)], atol=1e-12)
 
 
+def test_joints_of_the_urdf_bend_as_the_wrist_does(tmp_path: Path) -> None:
+    found = decoded(export_run(rig_run(tmp_path), "mcap", tmp_path / "a.mcap"))["/joint_states"]
+    assert list(found[0][1].name) == [f"hinge{k}{plane}" for k in range(1, 5) for plane in "yz"] and len(found) == 15
+    # Toward ulnar in the first trial, toward flexion in the second, a quarter at each joint.
+    np.testing.assert_allclose(found[2][1].position, [0.075, 0.0] * 4, atol=1e-12)
+    np.testing.assert_allclose(found[9][1].position, [0.0, 0.25] * 4, atol=1e-12)
+
+
 def test_every_table_over_time_is_a_topic_whose_definition_has_units(tmp_path: Path) -> None:
     reader = pytest.importorskip("mcap.reader")
     file = export_run(rig_run(tmp_path), "mcap", tmp_path / "a.mcap")

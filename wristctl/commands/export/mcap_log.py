@@ -2,8 +2,9 @@
 
 The file is written by mcap, which keeps the run's id and metrics as metadata, messages are serialised by rosbags, whose
 types need no ROS installation. Topics are `/tendons`, `/bend`, `/commands` and `/reference` (sensor_msgs/JointState),
-`/tip` (geometry_msgs/PoseStamped in the frame `wrist_base`), `/trial` (std_msgs/String), `/camera/compressed`
-(sensor_msgs/CompressedImage), and a topic for each table, whose messages' definition is in the file.
+`/joint_states` (the same, of the URDF's joints), `/tip` (geometry_msgs/PoseStamped in the frame `wrist_base`), `/trial`
+(std_msgs/String), `/camera/compressed` (sensor_msgs/CompressedImage), and a topic for each table, whose messages'
+definition is in the file.
 """
 
 from __future__ import annotations
@@ -21,9 +22,11 @@ from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 from wristctl.arrays import Array
 from wristctl.commands.export.pictures import Pictures
 from wristctl.commands.export.recorded_motions import RecordedMotion, Stream
+from wristctl.commands.export.urdf import joint_angles
 from wristctl.errors import UserError
 from wristctl.records import Run
 from wristctl.records.ros_bags import BASE_FRAME, TRIAL
+from wristctl.wrist.hinge_chain import HingeChain
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -97,6 +100,7 @@ class _Log:
 def write_mcap(
     run: Run,
     motions: Sequence[RecordedMotion],
+    chain: HingeChain,
     tables: Tables,
     about: Mapping[str, Mapping[str, str]],
     path: Path,
@@ -108,7 +112,7 @@ def write_mcap(
     begins = _begins(tables)
     with path.open("wb") as stream:
         log = _Log(stream)
-        _motions(log, motions)
+        _motions(log, motions, chain)
         for name, (table, columns) in tables.items():
             seconds = _seconds(table, begins)
             if seconds is not None:
@@ -121,7 +125,7 @@ def write_mcap(
         raise UserError(f"nothing in that {run.kind} run went on in time", str(run.path), "--to mat")
 
 
-def _motions(log: _Log, motions: Sequence[RecordedMotion]) -> None:
+def _motions(log: _Log, motions: Sequence[RecordedMotion], chain: HingeChain) -> None:
     """Motions one after the other; on the run's clock where it has one."""
     after = 0.0
     for motion in motions:
@@ -138,6 +142,7 @@ def _motions(log: _Log, motions: Sequence[RecordedMotion]) -> None:
             _joints(log, "/tendons", stream, begin, ("spool", "tension"))
             _joints(log, "/bend", stream, begin, ("bend", "rate"))
             _tips(log, stream, begin)
+        _shown(log, streams, begin, chain)
         for topic, wanted in (("/commands", motion.commands), ("/reference", motion.reference)):
             if wanted is not None:
                 _joints(log, topic, wanted, begin, tuple(_FIELDS))
@@ -190,6 +195,30 @@ def _tips(log: _Log, stream: Stream, begin: float) -> None:
         turn = types["geometry_msgs/msg/Quaternion"](0.0, -z, y, math.cos(0.5 * float(angle[row])))
         pose = types["geometry_msgs/msg/Pose"](types["geometry_msgs/msg/Point"](*place[row].tolist()), turn)
         log.add("/tip", second, types[_POSE](log.header(second, BASE_FRAME), pose))
+
+
+def _shown(log: _Log, streams: Sequence[Stream], begin: float, chain: HingeChain) -> None:
+    """Joints of the URDF as the wrist bends, at each time at which a bend was measured; the other plane's is held."""
+    seen = [
+        (second, q, value)
+        for stream in streams
+        for q, name in enumerate(("bend_y", "bend_z"))
+        if name in stream.columns
+        for second, value in zip(stream.time.tolist(), stream.columns[name].tolist(), strict=True)
+        if math.isfinite(value)
+    ]
+    if not seen:
+        return
+    bends, now = dict[float, tuple[float, float]](), [0.0, 0.0]
+    for second, q, value in sorted(seen):
+        now[q] = value
+        bends[second] = now[0], now[1]
+    angles = joint_angles(chain, np.array(list(bends.values())))
+    names, positions, empty = list(angles), np.stack(list(angles.values()), axis=1), np.empty(0)
+    log.declare("/joint_states", _JOINTS)
+    for second, position in zip(bends, positions, strict=True):
+        at = begin + second
+        log.add("/joint_states", at, log.store.types[_JOINTS](log.header(at), names, position, empty, empty))
 
 
 def _begins(tables: Tables) -> dict[int, float]:

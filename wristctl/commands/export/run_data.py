@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from wristctl.commands.export.lerobot_data_set import write_data_set
+from wristctl.commands.export.model import viewed_chain
 from wristctl.commands.export.open_log_of_run import write_open_log
 from wristctl.commands.export.recorded_motions import motions_of
 from wristctl.errors import FILE, UserError
@@ -134,7 +135,7 @@ def _mcap(run: Run, path: Path) -> None:
     tables = {name: (table, columns_of(run, name)) for name, table in tables_of(run).items()}
     metrics = {name: json.dumps(metric) for name, metric in run.metrics.items()}
     with replacing(path, FILE) as temporary:
-        write_mcap(run, motions, tables, {"run": about(run), "metrics": metrics}, temporary)
+        write_mcap(run, motions, viewed_chain(run), tables, {"run": about(run), "metrics": metrics}, temporary)
 
 
 # File ending and writer of each format.
