@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -110,9 +111,9 @@ def _trials(run: Run) -> list[RecordedMotion]:
 
 
 def _of_tendons(table: pd.DataFrame, quantity: str, step: float) -> Columns:
-    """Counts of the four spools [steps] as lengths [m]."""
-    names = {f"spool_{tendon}": f"{quantity}_{tendon}" for tendon in ACTIVE}
-    return {name: step * table[theirs].to_numpy(float) for name, theirs in names.items() if theirs in table}
+    """Counts of all spools [steps] as lengths [m]."""
+    named = {name: match[1] for name in map(str, table.columns) if (match := re.fullmatch(rf"{quantity}_(\d+)", name))}
+    return {f"spool_{tendon}": step * table[name].to_numpy(float) for name, tendon in named.items()}
 
 
 def _sight(seen: pd.DataFrame, flexion: bool) -> Stream:
