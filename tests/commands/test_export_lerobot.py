@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import subprocess
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -158,6 +159,7 @@ def test_pictures_are_a_film_with_one_for_each_row(tmp_path: Path) -> None:
         bright.append(float(np.mean(read[1])))
     # the first trial's pictures are dark, the second's light
     assert len(bright) == 40 and max(bright[:20]) < 60.0 < 180.0 < min(bright[20:])
+    assert "observation.images.camera_2" not in info["features"]
     episodes = parquet(folder, "meta/episodes")
     assert episodes["videos/observation.images.camera/from_timestamp"].tolist() == [0.0, 0.2]
 
@@ -172,6 +174,21 @@ def test_without_an_encoder_the_film_is_left_out_and_said(
     info = json.loads((folder / "meta" / "info.json").read_text())
     assert "observation.images.camera" not in info["features"] and not (folder / "videos").exists()
     assert "the video is left out" in caplog.text
+
+
+def test_nothing_is_left_of_a_run_that_measured_nothing_or_where_pyarrow_is_missing(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pytest.importorskip("pyarrow")
+    with start_run("simulate", load_study(), "", tmp_path) as live:
+        live.table("data/trajectory.csv", {"time": np.empty(0), "theta": np.empty(0)})
+    with pytest.raises(UserError, match="ended before anything was measured"):
+        export_run(Run(live.path), "lerobot", tmp_path / "set")
+    run = simulated(tmp_path)
+    monkeypatch.setitem(sys.modules, "pyarrow", None)
+    with pytest.raises(UserError, match="need pyarrow") as caught:
+        export_run(run, "lerobot", tmp_path / "set")
+    assert "wristctl[logs]" in caught.value.fix and not [path for path in tmp_path.iterdir() if "set" in path.name]
 
 
 @pytest.mark.skipif(not READER, reason="make lerobot-reader")

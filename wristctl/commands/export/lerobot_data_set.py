@@ -33,7 +33,9 @@ from wristctl.records.parquet_logs import ACTION, OBSERVED, OBSERVED_AT, STATE
 
 _log = logging.getLogger(__name__)
 
-_WANTED, _CAMERA = "observation.environment_state", "observation.images.camera"
+_WANTED = "observation.environment_state"
+# Features of the cameras' pictures, and the names of their films in a run.
+_CAMERAS = {"observation.images.camera": "raw", "observation.images.camera_2": "raw_2"}
 _PART = "chunk-{chunk_index:03d}/file-{file_index:03d}"
 _COUNTED = ("frame_index", "episode_index", "index", "task_index")
 _QUANTILES = {"q01": 0.01, "q10": 0.1, "q50": 0.5, "q90": 0.9, "q99": 0.99}
@@ -74,10 +76,12 @@ def write_data_set(run: Run, path: Path) -> None:
     Raises UserError for a run without motions, and without pyarrow.
     """
     motions = [motion for motion in motions_of(run) if any(len(stream.time) for stream in motion.measured)]
+    if not motions:
+        raise UserError("its motions ended before anything was measured", str(run.path), "name another run")
     rate = _rate(motions)
     names = _parts(motions)
     tasks = list(dict.fromkeys(motion.task for motion in motions))
-    pictures = Pictures.of(run)
+    films = {key: film for key, name in _CAMERAS.items() if (film := Pictures.of(run, name))}
     columns: dict[str, list[Any]] = {key: [] for key in (*names, OBSERVED, OBSERVED_AT, "timestamp", *_COUNTED)}
     lengths, shown, lost = list[int](), list[Array](), 0
     for episode, motion in enumerate(motions):
@@ -107,9 +111,9 @@ def write_data_set(run: Run, path: Path) -> None:
     table = {key: np.concatenate(parts) for key, parts in columns.items()}
     features = _features(names)
     with _new_folder(path) as folder:
-        film = _film(folder, pictures, shown, rate) if pictures else None
-        if film:
-            features[_CAMERA] = film
+        for key, film in films.items():
+            if described := _film(folder, key, film, shown, rate):
+                features[key] = described
         _write(folder, table, features, lengths, [motion.task for motion in motions], tasks, rate, run)
 
 
@@ -189,13 +193,15 @@ def _features(names: Mapping[str, Sequence[str]]) -> dict[str, dict[str, Any]]:
     return features | {key: {"dtype": "int64", "shape": [1], "names": None} for key in _COUNTED}
 
 
-def _film(folder: Path, pictures: Pictures, shown: Sequence[Array], rate: int) -> dict[str, Any] | None:
+def _film(folder: Path, key: str, film: Pictures, shown: Sequence[Array], rate: int) -> dict[str, Any] | None:
     """Write the picture of every row, and describe them; None where no encoder is there, which is said."""
-    file = folder / "videos" / _CAMERA / f"{_PART.format(chunk_index=0, file_index=0)}.mp4"
+    file = folder / "videos" / key / f"{_PART.format(chunk_index=0, file_index=0)}.mp4"
     file.parent.mkdir(parents=True)
-    size = pictures.write_mp4(file, np.concatenate(shown), rate)
+    size = film.write_mp4(file, np.concatenate(shown), rate)
     if size is None:
-        shutil.rmtree(folder / "videos")
+        shutil.rmtree(folder / "videos" / key)
+        if not any((folder / "videos").iterdir()):
+            (folder / "videos").rmdir()
         _log.warning("the video is left out: OpenCV has no encoder for MP4 here")
         return None
     height, width = size
@@ -237,12 +243,9 @@ def _write(
             "dataset_from_index": end - length,
             "dataset_to_index": end,
         }
-        if _CAMERA in features:
-            row |= {f"videos/{_CAMERA}/chunk_index": 0, f"videos/{_CAMERA}/file_index": 0}
-            row |= {
-                f"videos/{_CAMERA}/from_timestamp": (end - length) / rate,
-                f"videos/{_CAMERA}/to_timestamp": end / rate,
-            }
+        for key in _CAMERAS.keys() & features.keys():
+            row |= {f"videos/{key}/chunk_index": 0, f"videos/{key}/file_index": 0}
+            row |= {f"videos/{key}/from_timestamp": (end - length) / rate, f"videos/{key}/to_timestamp": end / rate}
         of_episode = {key: _statistics(values[end - length : end]) for key, values in described.items()}
         row |= {f"stats/{key}/{name}": value for key, each in of_episode.items() for name, value in each.items()}
         episodes.append(row | {"meta/episodes/chunk_index": 0, "meta/episodes/file_index": 0})
@@ -258,7 +261,7 @@ def _write(
         "fps": rate,
         "splits": {"train": f"0:{len(lengths)}"},
         "data_path": f"data/{_PART}.parquet",
-        "video_path": f"videos/{{video_key}}/{_PART}.mp4" if _CAMERA in features else None,
+        "video_path": f"videos/{{video_key}}/{_PART}.mp4" if _CAMERAS.keys() & features.keys() else None,
         "features": features,
     }
     statistics = {key: _statistics(values) for key, values in described.items()}
