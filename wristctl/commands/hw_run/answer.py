@@ -288,7 +288,8 @@ def unsound(trials: pd.DataFrame, marks: Sequence[str], metrics: Mapping[str, fl
     notes = [f"Trial {row['trial']} does not count: {row['outcome']}." for row in _records(trials, "outcome", "ok")[:3]]
     if odd := _records(trials, "odd", ""):
         told = ". ".join(f"Trial {row['trial']}: {row['odd']}" for row in odd[:3])
-        notes.append(f"{len(odd)} of {len(trials)} trials went through, but were odd. {told}.")
+        were = "was" if len(odd) == 1 else "were"
+        notes.append(f"{len(odd)} of {len(trials)} trials went through, but {were} odd. {told}.")
     notes += [f"Of the completed trials: {'; '.join(marks)}."] if marks else []
     if metrics.get("overruns", 0.0) > 0.0:
         skipped, ticks = int(metrics["overruns"]), int(metrics["ticks"])
