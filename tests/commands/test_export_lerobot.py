@@ -110,6 +110,17 @@ def test_its_samples_come_back_to_the_last_bit(made: Any, tmp_path: Path) -> Non
     assert trials is None or log.words["trial"].tolist() == trials.tolist()
 
 
+def test_a_motion_begins_at_the_time_at_which_the_one_before_it_ended(tmp_path: Path) -> None:
+    pytest.importorskip("pyarrow")
+    arrays = {"theta": np.array([[0.1, 0.2], [0.3, 0.4]]), "time": np.array([[0.0, 0.5], [0.5, 1.0]])}
+    with start_run("compare", load_study(), "", tmp_path) as live:
+        live.arrays("data/trajectories.npz", arrays)
+    (file,) = files_of_recording(export_run(Run(live.path), "lerobot", tmp_path / "set"))
+    trials = read_log(file).trials()
+    assert [trial.columns["bend_y"].tolist() for trial in trials.values()] == [[0.1, 0.2], [0.3, 0.4]]
+    assert [trial.columns["time"].tolist() for trial in trials.values()] == [[0.0, 0.5], [0.5, 1.0]]
+
+
 def test_random_motions_of_gen_data_are_episodes_and_samples_without_time_are_refused(tmp_path: Path) -> None:
     pytest.importorskip("pyarrow")
     bend = np.arange(24.0).reshape(2, 6, 2)
