@@ -13,7 +13,7 @@ BIN := .venv/bin
 PIP := $(BIN)/python -m pip --disable-pip-version-check
 
 .PHONY: run test lint bench bench-sweeps bench-peers bench-all firmware test-firmware test-faults test-trust test-vision test-identify \
-	test-allocation test-slow test-rig fault-table lost-tendons twins sound-rigs inner-rigs driven-robots test-posterior test-statistics converge worlds docs clean venv mutants coverage installed matrix
+	test-allocation test-slow test-rig fault-table lerobot-reader lost-tendons twins sound-rigs inner-rigs driven-robots test-posterior test-statistics converge worlds docs clean venv mutants coverage installed matrix
 
 run: .venv/run
 	@set -eo pipefail; \
@@ -116,6 +116,16 @@ sound-rigs: .venv/dev
 # link and camera found out, hostile bytes. Alone: beside other work they end as skipped.
 test-rig: .venv/dev
 	WRISTCTL_RIG=1 $(BIN)/pytest -s -rs $(AGAIN) tests/rig
+
+# LeRobot's own reader opens what `runs export --to lerobot` writes. It needs Python 3.12 or newer and an environment of its
+# own, build/lerobot: 6 GB where PyTorch comes with CUDA. LEROBOT_PYTHON=/path/to/python3.12 names one.
+LEROBOT_PYTHON ?= $(shell for each in python3.12 python3.13 python3.14 python3; do \
+  $$each -c 'import sys; sys.exit(sys.version_info < (3, 12))' 2>/dev/null && echo $$each && break; done)
+lerobot-reader: .venv/dev
+	$(if $(LEROBOT_PYTHON),,$(error LeRobot needs Python 3.12 or newer: make lerobot-reader LEROBOT_PYTHON=/path/to/python3))
+	@test -x build/lerobot/bin/pip || $(LEROBOT_PYTHON) -m venv build/lerobot
+	build/lerobot/bin/pip install --quiet 'lerobot[dataset]>=0.6,<0.7'
+	WRISTCTL_LEROBOT=$(CURDIR)/build/lerobot/bin/python $(BIN)/pytest tests/commands/test_export_lerobot.py
 
 # The built wheel in an environment of its own and an empty folder: `make installed WITH=python3.13`, `OLDEST=--lowest`.
 installed: .venv/dev

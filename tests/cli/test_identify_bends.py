@@ -40,6 +40,9 @@ def test_what_would_tell_more_is_what_the_logs_have_not() -> None:
     assert "another mass" in said(logs[:1], "stiffness_across")
     assert said(logs, "gain_1", "direction_2") == ""
     assert "mass" not in said(logs[:1], "delay") and "Quicker moves" in said(logs[:1], "delay")
+    assert "both ulnar and flexion" not in said(logs, "stiffness_across")
+    flat = [replace(log, columns={**log.columns, "bend_z": 0.0 * log.columns["bend_z"]}) for log in logs]
+    assert said(flat, "stiffness_across").startswith("Motions toward both ulnar and flexion")
     cells = {f"tension_{k}": 5.0 + 0.0 * logs[0].columns["time"] for k in (1, 2, 4, 5)}
     weighed = replace(logs[0], columns={**logs[0].columns, **cells})
     assert "Tensions" in said(logs[:1], "friction") and said([weighed], "friction") == ""
@@ -103,7 +106,8 @@ def test_three_tendons_are_simulated_and_identified_and_all_else_says_what_takes
     found = open_run(out.splitlines()[-1])
     assert found.metrics["stiffness"]["value"] == pytest.approx(0.5, rel=0.05)
     assert not (found.path / "data" / "posterior.yaml").exists() and "wristctl compare" not in out
-    (advised,) = (shlex.split(line)[1:] for line in out.splitlines() if line.startswith("wristctl "))
+    gains, advised = (shlex.split(line)[1:] for line in out.splitlines() if line.startswith("wristctl "))
+    assert call(*gains, "--dry-run")[0] == 0
     code, out, err = call(*advised)
     assert code == 0 and "circumduction" in out and "3 tendons" in " ".join(out.split()), err
     code, out, _ = call("simulate", "--from-identified", found.id, "--dry-run")

@@ -66,7 +66,7 @@ def _calls(run: Run, kind: str, law: str) -> Iterator[tuple[str, ...]]:
         dry = ["--dry-run"] * ("--dry-run" in options)
         if words[0] == "runs" or words == ("export-model",):
             first = [str(run.path), *first[1:]]
-            to = {"export": ("mat", "mcap", "parquet"), "export-model": ("mujoco", "matlab")}.get(words[-1], ())
+            to = {"export": ("mat", "mcap", "lerobot"), "export-model": ("mujoco", "matlab", "urdf")}.get(words[-1], ())
             for form in to or ("",):
                 yield (*words, *first, *(["--to", form] if form else ()))
             for flag in ("--all-figures", "--json", "--latex", "--signed"):

@@ -219,7 +219,9 @@ COMMANDS = {
     "list": Entry(
         "wristctl.cli.list_choices:app", _MORE, "List controllers, presets, references, conditions or metrics."
     ),
-    "export-model": Entry("wristctl.cli.export_model:app", _MORE, "Write the wrist of a run for MuJoCo or MATLAB."),
+    "export-model": Entry(
+        "wristctl.cli.export_model:app", _MORE, "Write the wrist of a run for MuJoCo, MATLAB or as URDF."
+    ),
     "paper": Entry("wristctl.cli.paper_commands:app", _MORE, "Check the paper's claims one by one."),
 }
 

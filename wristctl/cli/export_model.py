@@ -15,14 +15,15 @@ app = typer.Typer(add_completion=False)
 
 _EPILOG = (
     "Examples:\n\nwristctl export-model latest:identify --to matlab\n\n"
-    "wristctl export-model RUN --to mujoco --planes 2 --motors spools"
+    "wristctl export-model RUN --to mujoco --planes 2 --motors spools\n\n"
+    "wristctl export-model RUN --to urdf"
 )
 
 
 @app.command("export-model", epilog=_EPILOG)
 def export_model(
     ref: Ref,
-    to: Annotated[Literal["mujoco", "matlab"], typer.Option("--to", help="The program that is to read it.")],
+    to: Annotated[Literal["mujoco", "matlab", "urdf"], typer.Option("--to", help="The program that is to read it.")],
     segments: Annotated[int, typer.Option("--segments", min=1, max=8, help="Segments that bend by themselves.")] = 4,
     planes: Annotated[
         int | None,
@@ -36,15 +37,18 @@ def export_model(
         Literal["tensions", "spools"],
         typer.Option("--motors", help="What MuJoCo's actuators take."),
     ] = "tensions",
-    file: Annotated[Path | None, typer.Option("--file", help="By default wrist.xml or wrist_chain.m.")] = None,
+    file: Annotated[
+        Path | None, typer.Option("--file", help="By default wrist.xml, wrist_chain.m or wrist.urdf.")
+    ] = None,
     trust_code: TrustCode = False,
     out: Out = RESULTS,
     debug: Debug = False,
 ) -> None:
     """Write the wrist of a run, identified or as its controller knew it, as a chain of rigid links.
 
-    For MuJoCo a model with tendons and actuators; for MATLAB (or Octave) a function with the equations of motion.
-    How far they are from the wrist here: documentation: The wrist in other programs.
+    For MuJoCo a model with tendons and actuators; for MATLAB (or Octave) a function with the equations of motion; as
+    URDF links and joints alone, for viewers. How far they are from the wrist here: documentation: The wrist in other
+    programs.
     """
     from wristctl.commands.export.model import Exported, export_wrist
     from wristctl.records import require

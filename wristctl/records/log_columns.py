@@ -140,6 +140,13 @@ def name_of(head: str) -> str:
     return match[1] if match else head.strip()
 
 
+def head_of_open_log(head: str) -> str | None:
+    """A head that names a column of an open log in a unit of its own, such as `spool_1 [m]`; None of any other."""
+    match = _HEAD.fullmatch(head)
+    units = units_of(match[1]) if match else None
+    return head if match and units and (match[2] or "") in units else None
+
+
 def chosen_columns(
     heads: Sequence[str],
     names: Names,

@@ -169,7 +169,7 @@ def read_table(
     bodies = BodyNames(**{key: entry.partition("=")[2].strip() for key, entry in keys.items()})
     rest = ", ".join(entry for entry in entries if entry not in (*kinds, *keys.values()))
     table = _read(file, what, kinds[0] if kinds else "")
-    log = _named(table, file, mapped_names(rest), what, others or bool(entries), more, tendon_offset)
+    log = _named(table, file, mapped_names(rest), what, others or bool(entries) or table.others, more, tendon_offset)
     if {"bend_y", "bend_z", "inclination"} & log.columns.keys() and not bodies.said:
         return log
     if table.bodies:

@@ -1,11 +1,15 @@
 """Logs in parquet files: tables with a column each, or parts of a LeRobotDataset with vectors of named joints.
 
 The layout of a LeRobotDataset v3 is that of its documentation: `data/chunk-000/file-000.parquet` holds `timestamp` [s],
-`episode_index` and vectors such as `observation.state`, whose names stand in `meta/info.json`.
+`episode_index` and vectors such as `observation.state`, whose names stand in `meta/info.json`. Parts that are named as
+columns of an open log with their units, such as `spool_1 [m]`, need no other name, and what else the data set has is
+passed over. `observed` and `observed_at`, which `wristctl runs export --to lerobot` writes beside the state, are its
+samples in double precision, and when each was taken.
 """
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +18,13 @@ import numpy as np
 from wristctl.errors import UserError
 from wristctl.plain_files import LARGEST_DATA, open_plain, read_json
 from wristctl.records.folders_of_logs import info_of
+from wristctl.records.log_columns import head_of_open_log
 from wristctl.records.recorded_table import INSTALL, Cells, RecordedTable
+
+STATE, ACTION = "observation.state", "action"
+OBSERVED, OBSERVED_AT = "observed", "observed_at"
+"""Columns of a data set with a part for each of the state: its last sample in double precision, and when that was taken
+[s], since the motion began."""
 
 
 def parquet_table(file: Path, what: str) -> RecordedTable:
@@ -25,21 +35,60 @@ def parquet_table(file: Path, what: str) -> RecordedTable:
     frame = parquet_frame(file, what)
     info = info_of(file)
     names = _names(info) if info else {}
-    of_a_set = (
-        {"timestamp": "timestamp [s]", "episode_index": "trial"} if {"frame_index", "index"} <= set(frame) else {}
-    )
+    if {"frame_index", "index"} <= set(frame):
+        return _data_set(frame, names)
+    heads, cells = _columns(frame, names)
+    return RecordedTable(heads, cells)
+
+
+def _columns(frame: Any, names: Mapping[str, list[str]]) -> tuple[list[str], list[Cells]]:
+    """Heads and cells of all columns, vectors parted."""
     heads, cells = list[str](), list[Cells]()
     for column in map(str, frame.columns):
-        values = _plain(frame[column])
+        values, parts = _plain(frame[column]), names.get(column, [])
         if values.ndim == 1:
-            heads.append(of_a_set.get(column, column))
+            heads.append(f"{column}.{parts[0]}" if len(parts) == 1 else column)
             cells.append(values)
             continue
-        parts = names.get(column, [])
         distinct = len(set(parts)) == values.shape[1]
         heads += [f"{column}.{parts[k] if distinct else k}" for k in range(values.shape[1])]
         cells += list(values.T)
-    return RecordedTable(heads, cells)
+    return heads, cells
+
+
+def _data_set(frame: Any, names: Mapping[str, list[str]]) -> RecordedTable:
+    """Rows of a data set, episodes as trials; samples at their own times where the set says when they were taken."""
+    numbers, parts = frame["episode_index"].to_numpy(), names.get(OBSERVED, [])
+    if {OBSERVED, OBSERVED_AT} <= set(frame) and parts and all(head_of_open_log(part) for part in parts):
+        (_, values), (_, taken) = (_columns(frame[[column]], {}) for column in (OBSERVED, OBSERVED_AT))
+        if len(values) == len(taken) == len(parts):
+            return _samples(parts, values, taken, numbers)
+    standing = {f"{STATE}.{part}": head for part in names.get(STATE, []) if (head := head_of_open_log(part))}
+    heads, cells = _columns(frame, names)
+    own = {"timestamp": "timestamp [s]", "episode_index": "trial"} | standing
+    return RecordedTable([own.get(head, head) for head in heads], cells, others=bool(standing))
+
+
+def _samples(
+    heads: Sequence[str], cells: Sequence[Cells], taken: Sequence[Cells], numbers: np.ndarray[Any, Any]
+) -> RecordedTable:
+    """A row for each time at which any part was taken (N,), without values that are held from the row before."""
+    rows = list[tuple[np.ndarray[Any, Any], np.ndarray[Any, Any], np.ndarray[Any, Any]]]()
+    for values, times in zip(cells, taken, strict=True):
+        at = np.asarray(times, float)
+        fresh = np.isfinite(at)
+        fresh[1:] &= (at[1:] != at[:-1]) | (numbers[1:] != numbers[:-1])
+        rows.append((numbers[fresh], at[fresh], np.asarray(values, float)[fresh]))
+    both = [np.stack([number.astype(float), at], axis=1) for number, at, _ in rows]
+    every, places = np.unique(np.concatenate(both), axis=0, return_inverse=True)
+    columns, begin = list[Cells](), 0
+    for _, _, values in rows:
+        column = np.full(len(every), np.nan)
+        column[places[begin : begin + len(values)]] = values
+        columns.append(column)
+        begin += len(values)
+    trial = every[:, 0].astype(int)
+    return RecordedTable(["trial", "time [s]", *heads], [trial, every[:, 1], *columns], others=True)
 
 
 def parquet_frame(file: Path, what: str) -> Any:

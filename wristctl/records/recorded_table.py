@@ -48,3 +48,5 @@ class RecordedTable:
     """What was passed over or read in another way, a sentence each."""
     bodies: Mapping[str, RigidBody] = field(default_factory=dict)
     """Rigid bodies by their names."""
+    others: bool = False
+    """Whether columns that an open log does not have are passed over, since those that it has stand under its names."""

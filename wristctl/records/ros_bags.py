@@ -2,11 +2,13 @@
 
 A message is a row at the time of its header's stamp, or of its recording where it has none. Columns are
 `/topic.joint.position` of JointState, `/topic` of numbers; rigid bodies are poses, transforms and inertial units by
-their topics.
+their topics. Joints that are named as the spools and bends of an open log, `spool_1` and `bend_y`, need no other name:
+ROS has metres, radians and newtons. A String on a topic named `trial` parts the bag into recordings.
 """
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -15,6 +17,7 @@ import numpy as np
 
 from wristctl.errors import UserError
 from wristctl.plain_files import LARGEST_DATA, open_plain
+from wristctl.records.log_columns import head_of_open_log
 from wristctl.records.recorded_table import INSTALL, RecordedTable, RigidBody
 
 SUFFIXES = (".mcap", ".db3", ".bag")
@@ -24,6 +27,15 @@ _NUMBERS = ("Float64", "Float32", "Int32", "Int64", "UInt32", "UInt16", "Int16")
 _VECTORS = ("Float64MultiArray", "Float32MultiArray", "Int32MultiArray")
 _POSES = ("PoseStamped", "PoseWithCovarianceStamped", "TransformStamped", "Odometry", "Imu")
 _NANOSECONDS = 10**9
+TRIAL, BASE_FRAME = "trial", "wrist_base"
+"""Topic that names the trial, and frame of poses in the axes of an open log."""
+_WANTED = re.compile("cmd|command|ref|target|desired|goal|setpoint|soll|consigne")
+_JOINT = re.compile(r"(spool|bend)_([1-9]\d*|[yz])")
+_STANDING = {
+    ("spool", "position"): "spool_{} [m]",
+    ("spool", "effort"): "tension_{} [N]",
+    ("bend", "position"): "bend_{} [rad]",
+}
 
 
 def bag_table(file: Path, what: str) -> RecordedTable:
@@ -38,14 +50,20 @@ def bag_table(file: Path, what: str) -> RecordedTable:
         raise UserError("bags are read by rosbags, which is not installed", str(file), INSTALL) from None
     columns = dict[str, dict[int, float]]()
     poses = dict[str, dict[int, list[float]]]()
+    trials = dict[int, str]()
     types = set[str]()
     try:
         open_plain(file, LARGEST_DATA).close()
         with AnyReader([file], default_typestore=get_typestore(Stores.LATEST)) as reader:
             types = {connection.msgtype for connection in reader.connections}
-            wanted = [connection for connection in reader.connections if _is_read(connection.msgtype)]
+            wanted = [
+                one for one in reader.connections if _is_read(one.msgtype) or _names_trial(one.topic, one.msgtype)
+            ]
             for connection, recorded, raw in reader.messages(wanted) if wanted else ():
                 message: Any = reader.deserialize(raw, connection.msgtype)
+                if _names_trial(connection.topic, connection.msgtype):
+                    trials[recorded] = message.data
+                    continue
                 _note(connection.topic, connection.msgtype.rpartition("/")[2], message, recorded, columns, poses)
     except Exception as error:  # of a torn file the library's reader fails in any way
         reason = getattr(error, "strerror", None) or error
@@ -56,7 +74,11 @@ def bag_table(file: Path, what: str) -> RecordedTable:
         raise UserError(
             problem, str(file), "JointState, PoseStamped, TransformStamped, Odometry, Imu or Float64 in the bag"
         )
-    return _table(columns, poses)
+    return _table(columns, poses, trials)
+
+
+def _names_trial(topic: str, kind: str) -> bool:
+    return topic.rpartition("/")[2] == TRIAL and kind.endswith("/String")
 
 
 def _is_read(kind: str) -> bool:
@@ -78,7 +100,7 @@ def _note(
     if kind == "JointState":
         for quantity in ("position", "velocity", "effort"):
             for joint, value in zip(message.name, getattr(message, quantity), strict=False):
-                columns.setdefault(f"{topic}.{joint}.{quantity}", {})[time] = float(value)
+                columns.setdefault(_head(topic, joint, quantity), {})[time] = float(value)
     elif kind in _NUMBERS:
         columns.setdefault(topic, {})[time] = float(message.data)
     elif kind in _VECTORS:
@@ -89,6 +111,21 @@ def _note(
         lost = [np.nan] * 3
         position = [place.x, place.y, place.z] if place is not None else lost
         poses.setdefault(topic, {})[time] = [*position, turn.x, turn.y, turn.z, turn.w]
+        if (
+            place is not None
+            and header is not None
+            and header.frame_id == BASE_FRAME
+            and topic.rpartition("/")[2] == "tip"
+        ):
+            for axis, value in zip("xyz", position, strict=True):
+                columns.setdefault(f"tip_{axis} [m]", {})[time] = float(value)
+
+
+def _head(topic: str, joint: str, quantity: str) -> str:
+    """Head of a joint's column; of a measured spool or bend the one that an open log has."""
+    named = None if _WANTED.search(topic) else _JOINT.fullmatch(joint)
+    standing = _STANDING.get((named[1], quantity)) if named and named[2].isdigit() == (named[1] == "spool") else None
+    return standing.format(named[2]) if standing and named else f"{topic}.{joint}.{quantity}"
 
 
 def _pose(kind: str, message: Any) -> tuple[Any, Any]:
@@ -101,8 +138,18 @@ def _pose(kind: str, message: Any) -> tuple[Any, Any]:
     return pose.position, pose.orientation
 
 
-def _table(columns: Mapping[str, Mapping[int, float]], poses: Mapping[str, Mapping[int, list[float]]]) -> RecordedTable:
-    """One row for each time that a message has, with empty cells where the others have none."""
+def _table(
+    columns: Mapping[str, Mapping[int, float]],
+    poses: Mapping[str, Mapping[int, list[float]]],
+    trials: Mapping[int, str],
+) -> RecordedTable:
+    """One row for each time that a message has, with empty cells where the others have none.
+
+    Where joints stand under the names of an open log, what was wanted is no part of the recording.
+    """
+    standing = any(head_of_open_log(head) for head in columns)
+    if standing:
+        columns = {head: stream for head, stream in columns.items() if not _WANTED.search(head)}
     times = np.unique(np.array([time for stream in (*columns.values(), *poses.values()) for time in stream], np.int64))
     seconds = (times - times[0]) / _NANOSECONDS
     cells = [seconds]
@@ -119,4 +166,9 @@ def _table(columns: Mapping[str, Mapping[int, float]], poses: Mapping[str, Mappi
         turn = np.where(size > 0.5, values[:, 3:] / np.where(size > 0.5, size, 1.0), np.nan)
         place = None if np.isnan(values[:, :3]).all() else values[:, :3]
         bodies[topic] = RigidBody(seconds[rows], turn, place, rows)
-    return RecordedTable(["time [s]", *columns], cells, bodies=bodies)
+    heads = ["time [s]", *columns]
+    if trials:
+        begins = sorted(trials)
+        which = np.maximum(np.searchsorted(begins, times, side="right") - 1, 0)
+        heads, cells = ["trial", *heads], [np.array([trials[begin] for begin in begins])[which], *cells]
+    return RecordedTable(heads, cells, bodies=bodies, others=standing)

@@ -180,18 +180,19 @@ def table(
 
 def export(
     ref: Ref,
-    to: Annotated[Literal["csv", "mcap", "mat"], typer.Option("--to", help="The format.")] = "csv",
+    to: Annotated[Literal["csv", "mcap", "lerobot", "mat"], typer.Option("--to", help="The format.")] = "csv",
     file: Annotated[
-        Path | None, typer.Option("--file", help="Where to write it; by default the run's id, in this folder.")
+        Path | None, typer.Option("--file", help="File or folder to write; by default the run's id, in this folder.")
     ] = None,
     out: Out = RESULTS,
     debug: Debug = False,
 ) -> None:
     """Write a run's motions, tables, arrays and videos for other programs, with their units.
 
-    csv: its motions as an open log, which wristctl reads again. mat: one file for MATLAB and Octave. mcap: a log of
-    what went on in time, videos too, for Foxglove, PlotJuggler or Rerun. A table for pandas is the CSV file of the run,
-    or `wristctl.open_run(RUN).data(NAME)` in Python.
+    csv: its motions as an open log. lerobot: the same as a LeRobotDataset (v3), a folder. mcap: messages of ROS 2 with
+    all that went on in time, videos too, for Foxglove, PlotJuggler, Rerun or ros2 bag. `identify` reads these three.
+    mat: one file for MATLAB and Octave. A table for pandas is the CSV file of the run, or
+    `wristctl.open_run(RUN).data(NAME)` in Python.
     """
     from wristctl.commands.export.run_data import export_run
 

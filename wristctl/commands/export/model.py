@@ -3,6 +3,7 @@
 from pathlib import Path
 from typing import Literal, NamedTuple
 
+from wristctl.commands.export.urdf import urdf
 from wristctl.config.loop import DirectionName
 from wristctl.config.study import Study
 from wristctl.errors import FILE, Argument, UserError
@@ -16,7 +17,7 @@ from wristctl.wrist.hinge_chain import HingeChain, Spools, matlab, mjcf
 from wristctl.wrist.tendon_layout import off_both_sides
 
 # Programs, each with its file's usual name.
-FORMATS = {"mujoco": "wrist.xml", "matlab": "wrist_chain.m"}
+FORMATS = {"mujoco": "wrist.xml", "matlab": "wrist_chain.m", "urdf": "wrist.urdf"}
 
 
 class Exported(NamedTuple):
@@ -57,8 +58,12 @@ def export_wrist(run: Run, program: str, file: Path | None, asked: Exported) -> 
         )
     if program == "matlab" and asked.motors == "spools":
         raise UserError("the function for MATLAB takes tensions", Argument("motors", "spools"), "leave --motors out")
+    if program == "urdf" and asked.motors == "spools":
+        raise UserError("a URDF has no motors", Argument("motors", "spools"), "leave --motors out, or --to mujoco")
     if path.exists():
         raise UserError("a file is in the way", str(path), "remove it, or name another with --file")
+    if program == "urdf" and asked.planes is None and asked.direction is None:
+        asked = asked._replace(planes=2)  # a viewer shows a motion in one plane as well
     study, words = study_of(run)
     wrist, loop, planes = study.wrist, study.simulate.loop, _planes(run, study, asked)
     way = "in two planes" if planes == 2 else f"as {asked.direction or 'ulnar'} bends it"
@@ -66,8 +71,19 @@ def export_wrist(run: Run, program: str, file: Path | None, asked: Exported) -> 
     seen = wrist if planes == 2 else in_plane(wrist, asked.direction or "ulnar")
     chain = HingeChain.of(seen, asked.segments, planes, loop.plant.model)
     spools = Spools.of(loop.actuator, wrist) if asked.motors == "spools" else None
-    write_text(path, mjcf(chain, about, spools) if program == "mujoco" else matlab(chain, about), FILE)
+    texts = {
+        "mujoco": lambda: mjcf(chain, about, spools),
+        "matlab": lambda: matlab(chain, about),
+        "urdf": lambda: urdf(chain, wrist.range_deg, about),
+    }
+    write_text(path, texts[program](), FILE)
     return path
+
+
+def viewed_chain(run: Run) -> HingeChain:
+    """The chain in two planes that `export-model --to urdf` writes of a run."""
+    study, _ = study_of(run)
+    return HingeChain.of(study.wrist, Exported().segments, 2, study.simulate.loop.plant.model)
 
 
 def _planes(run: Run, study: Study, asked: Exported) -> int:

@@ -1,4 +1,4 @@
-"""A run's data in formats of other programs: open logs, MATLAB's, and MCAP, which robot log viewers open."""
+"""A run's data in formats of other programs: open logs, MATLAB's, LeRobot's, and MCAP, which robot log viewers open."""
 
 from __future__ import annotations
 
@@ -10,7 +10,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from wristctl.commands.export.lerobot_data_set import write_data_set
+from wristctl.commands.export.model import viewed_chain
 from wristctl.commands.export.open_log_of_run import write_open_log
+from wristctl.commands.export.recorded_motions import motions_of
 from wristctl.errors import FILE, UserError
 from wristctl.records import Run
 from wristctl.records.files import replacing
@@ -39,7 +42,7 @@ def columns_of(run: Run, table: str) -> dict[str, tuple[str, str]]:
 
 
 def export_run(run: Run, to: str, file: Path | None) -> Path:
-    """Write a run's data as `to` (csv, mat, mcap); where they were written.
+    """Write a run's data as `to` (csv, mat, mcap, lerobot); where they were written.
 
     Raises UserError for a run without data, a file in the way, or a package that is not installed.
     """
@@ -124,16 +127,21 @@ def _mcap(run: Run, path: Path) -> None:
     try:
         from wristctl.commands.export.mcap_log import write_mcap
     except ImportError:
-        raise UserError("MCAP needs the package mcap, which is not installed", "--to mcap", INSTALL) from None
+        raise UserError("MCAP needs the packages mcap and rosbags", "--to mcap", INSTALL) from None
+    try:
+        motions = motions_of(run)
+    except UserError:  # its tables may go on in time all the same
+        motions = []
     tables = {name: (table, columns_of(run, name)) for name, table in tables_of(run).items()}
     metrics = {name: json.dumps(metric) for name, metric in run.metrics.items()}
     with replacing(path, FILE) as temporary:
-        write_mcap(run, tables, {"run": about(run), "metrics": metrics}, temporary)
+        write_mcap(run, motions, viewed_chain(run), tables, {"run": about(run), "metrics": metrics}, temporary)
 
 
 # File ending and writer of each format.
 FORMATS: dict[str, tuple[str, Callable[[Run, Path], None]]] = {
     "csv": (".csv", write_open_log),
     "mat": (".mat", _mat),
+    "lerobot": ("-lerobot", write_data_set),
     "mcap": (".mcap", _mcap),
 }

@@ -245,7 +245,7 @@ def _table(done: pd.DataFrame, labels: Sequence[str], twins: Mapping[int, Simula
     by_direction = len(directions) * len(labels) <= ROWS
     heads = (
         "controller", "direction", "error [deg]", "simulated [deg]", "final error [deg]", "settling [s]",
-        "pushed: [deg]", "recovery [s]",
+        "pushed [deg]", "recovery [s]",
     )  # fmt: skip
     rows = []
     for label in labels:
@@ -259,8 +259,9 @@ def _table(done: pd.DataFrame, labels: Sequence[str], twins: Mapping[int, Simula
                 (label, direction, in_deg(free.rmse), in_deg(free.simulated), in_deg(free.steady_state),
                  in_s(free.settling), in_deg(pushed.rmse), in_s(pushed.recovery))
             )  # fmt: skip
-    several = len(labels) > 1
-    return Table("", heads[not several :], [row[not several :] for row in rows])
+    told = [column for column in range(len(heads)) if column < 4 or any(row[column] != "-" for row in rows)]
+    shown = [column for column in told if column > 0 or len(labels) > 1]
+    return Table("", [heads[column] for column in shown], [tuple(row[column] for column in shown) for row in rows])
 
 
 def _apart(done: pd.DataFrame, labels: Sequence[str], twins: Mapping[int, Simulation]) -> list[str]:
@@ -285,7 +286,10 @@ def _apart(done: pd.DataFrame, labels: Sequence[str], twins: Mapping[int, Simula
 def unsound(trials: pd.DataFrame, marks: Sequence[str], metrics: Mapping[str, float]) -> list[str]:
     """Trials that do not count or were odd, what the wrist does wrong, and ticks that were skipped."""
     notes = [f"Trial {row['trial']} does not count: {row['outcome']}." for row in _records(trials, "outcome", "ok")[:3]]
-    notes += [f"Trial {row['trial']} was odd: {row['odd']}." for row in _records(trials, "odd", "")[:3]]
+    if odd := _records(trials, "odd", ""):
+        told = ". ".join(f"Trial {row['trial']}: {row['odd']}" for row in odd[:3])
+        were = "was" if len(odd) == 1 else "were"
+        notes.append(f"{len(odd)} of {len(trials)} trials went through, but {were} odd. {told}.")
     notes += [f"Of the completed trials: {'; '.join(marks)}."] if marks else []
     if metrics.get("overruns", 0.0) > 0.0:
         skipped, ticks = int(metrics["overruns"]), int(metrics["ticks"])

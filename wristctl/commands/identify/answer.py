@@ -17,6 +17,11 @@ if TYPE_CHECKING:
     from wristctl.identification.lack_of_fit import Suspicion
 
 
+def recommendation_for(run: str, known: str) -> str:
+    """Command that finds gains for the wrist that a run found, of a study file with what was known of it."""
+    return shlex.join(["wristctl", "recommend", known, "--from-identified", run])
+
+
 def simulation_of(run: str, known: str) -> str:
     """Command that simulates the wrist that a run found, of a study file with what was known of it."""
     return shlex.join(["wristctl", "simulate", known, "--from-identified", run])
@@ -30,19 +35,20 @@ def comparison_on(run: str) -> str:
 def found_answer(fit: Fit, knowledge: Knowledge, suspected: Sequence[Suspicion], run: str, known: str) -> Answer:
     """What was found; `run` is the path of its run, empty in memory, `known` a study file with the wrist's geometry."""
     trials, frames = len(fit.problem.trials), sum(map(len, fit.residuals))
-    names = ", ".join(fit.problem.free)
+    count = len(fit.problem.free)
     sentence = (
-        f"Identified from {trials} trial{'s' * (trials > 1)} ({frames} frames): {names}. The model leaves over "
-        f"{degrees(float(fit.noise))} deg of the marker's angle (standard deviation)."
+        f"{count} parameter{'s' * (count > 1)} identified from {trials} trial{'s' * (trials > 1)} ({frames} frames). "
+        f"The model leaves over {degrees(float(fit.noise))} deg of the marker's angle (standard deviation)."
     )
     notes = [*_misses(knowledge, suspected)]
     if run:
         notes += [
-            "Next, simulate the wrist that was found, or compare controllers on those that the trials leave possible:",
+            "Next, find its gains, simulate it, or compare controllers on all that the trials leave possible:",
+            f"$ {recommendation_for(run, known)}",
             f"$ {simulation_of(run, known)}",
             f"$ {comparison_on(run)}",
         ]
-    more = f"Correlations, residuals and assumptions: --all. The study file: {run}/data/identified.yaml" if run else ""
+    more = f"All tables: --all. Study file: {run}/data/identified.yaml" if run else ""
     return Answer(sentence, parameter_table(fit, knowledge, {}), notes, more)
 
 

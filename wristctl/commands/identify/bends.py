@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from wristctl.commands.answer import Answer
-from wristctl.commands.identify.answer import comparison_on, simulation_of
+from wristctl.commands.identify.answer import comparison_on, recommendation_for, simulation_of
 from wristctl.commands.inputs import Inputs
 from wristctl.commands.printed_table import COLUMNS, Table, degrees, joined, number
 from wristctl.commands.results import StudyResult
@@ -23,12 +23,15 @@ if TYPE_CHECKING:
 
     from wristctl.identification.arc_fit import Told
     from wristctl.identification.bend_problem import BendProblem
+    from wristctl.identification.bend_trials import BendTrial
     from wristctl.identification.fit import Fit
     from wristctl.identification.intervals import Knowledge
     from wristctl.identification.lack_of_fit import Misfit
 
 # Draws of the posterior that a run keeps as a family of worlds.
 _DRAWS = 200
+# Part of the larger motion up to which the motion in the other plane is none.
+_ASIDE = 0.1
 # What has to be told before a wrist is written down.
 _NEEDED = ("stiffness", "stiffness_across", "damping", "tendon_stiffness")
 
@@ -164,7 +167,7 @@ def what_tells(fit: Fit, lacking: Sequence[str]) -> str:
     trials = [trial for trial in fit.problem.trials if isinstance(trial, BendTrial)]
     springs = any(name.startswith("stiffness") for name in lacking)
     forces = springs or any(name in ("damping", "tendon_stiffness") for name in lacking)
-    parts = []
+    parts = ["motions toward both ulnar and flexion"] * (springs and _in_one_plane(trials))
     if forces and len({trial.wrist.hand_mass for trial in trials}) == 1:
         parts.append("trials with another mass [kg]")
     if springs:
@@ -177,6 +180,19 @@ def what_tells(fit: Fit, lacking: Sequence[str]) -> str:
         parts.append("quicker moves")
     listed = joined(parts)
     return f"{listed[0].upper()}{listed[1:]} tell more (documentation: System identification)." if parts else ""
+
+
+def _in_one_plane(trials: Sequence[BendTrial]) -> bool:
+    """Whether all trials bend in the plane of ulnar and radial, or all in that of flexion and extension."""
+    import numpy as np
+
+    ways = [
+        max(
+            (float(np.ptp(seen)) for trial in trials if (seen := trial.angle[trial.channel == plane]).size), default=0.0
+        )
+        for plane in (0, 1)
+    ]
+    return min(ways) < _ASIDE * max(ways)
 
 
 def _answer(fit: Fit, told: Mapping[str, Told], run: str, square: bool) -> Answer:
@@ -193,9 +209,10 @@ def _answer(fit: Fit, told: Mapping[str, Told], run: str, square: bool) -> Answe
     if lacking := [name for name, one in told.items() if not one.known]:
         notes.append(f"Not told: {joined(lacking)}. {what_tells(fit, lacking)}".strip())
     if run:
-        compares = ", or compare controllers on those that the readings leave possible"
+        compares = ", or compare controllers on all that the readings leave possible"
         notes += [
-            f"Next, bend the wrist that was found{compares * square}:",
+            f"Next, find its gains, bend it in simulation{compares * square}:",
+            f"$ {recommendation_for(run, f'{run}/config.yaml')}",
             f"$ {simulation_of(run, f'{run}/config.yaml')} --reference circumduction",
             *[f"$ {comparison_on(run)}"] * square,
         ]

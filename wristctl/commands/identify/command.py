@@ -179,7 +179,7 @@ def identify(session: Session) -> Identified | LogTold | DrivenTold | BendsTold:
     first = next(iter(session.inputs.runs().values()))
     whole = identified_yaml(fitted.values, camera, known=first.config.wrist)
     findings.text("data/posterior.yaml", whole + posterior_yaml(draws, fitted.values, camera, _period(session.inputs)))
-    known = str(first.path / "config.yaml")
+    known = os.path.relpath(first.path / "config.yaml")
     return Identified(session.study, findings, tables, fitted, estimated, yaml, suspected, known)
 
 

@@ -166,9 +166,8 @@ class Recommended(StudyResult):
     @property
     def answer(self) -> Answer:
         """What to run, what error to expect, what not to use, and the limits."""
-        chosen = "" if self.best is None else f"{RECOMMENDED} of the run, "
-        rows = f"those of each row: {FOLDER}/, each a file for {takers_of(self.study)}. Every rig: data/rigs.csv."
-        return Answer(_sentence(self), _table(self), _notes(self), f"The gains: {chosen}{rows}")
+        more = f"Gains of each row, for {takers_of(self.study)}: {FOLDER}/. Every rig: data/rigs.csv."
+        return Answer(_sentence(self), _table(self), _notes(self), more)
 
 
 def _sentence(result: Recommended) -> str:
@@ -251,18 +250,15 @@ def _notes(result: Recommended) -> list[str]:
     short = f" (asked: {wanted:g} deg)" if result.reach_deg < wanted else ""
     sides = "any side" if result.bending else "either side"
     notes = [result.bending] * bool(result.bending)
-    notes += [f"The tendons hold {result.reach_deg:g} deg to {sides} on every simulated rig{short}."]
-    if told := decided([result.ranking]):
-        notes.append(told)
-    if result.rehearsals:
-        notes.append(_rehearsed(result))
+    hold = f"The tendons hold {result.reach_deg:g} deg to {sides} on every simulated rig{short}."
+    notes += [" ".join(filter(None, (hold, decided([result.ranking]))))]
+    rehearsed = _rehearsed(result) if result.rehearsals else ""
     if result.best is None:
-        return notes
+        return notes + [rehearsed] * bool(rehearsed)
     motion, sides = ("ellipses", "any side") if result.bending else ("sines", "both sides")
     sine = f"{motion} of {sine_deg(result.reach_deg):g} deg to {sides}"
-    notes.append(
-        f"{_up_to(result.motions, 'Hz', sine)} {_up_to(result.payloads, 'kg', 'an unknown payload in the hand')}"
-    )
+    holds = f"{_up_to(result.motions, 'Hz', sine)} {_up_to(result.payloads, 'kg', 'an unknown payload in the hand')}"
+    notes.append(f"{rehearsed} {holds}".strip())
     how = (
         "emulated (on a real rig also --port /dev/ttyACM0 --camera 0 --optics latest:calibrate-camera)"
         if result.on_a_rig

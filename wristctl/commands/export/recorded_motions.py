@@ -1,0 +1,316 @@
+"""The motions of a run: what was measured, commanded and wanted, each at times of its own."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from wristctl.arrays import Array
+from wristctl.commands.export.model import identified_in
+from wristctl.commands.inputs_of_loops import found_in, with_found
+from wristctl.config.loop import Loop
+from wristctl.config.plant import Actuator
+from wristctl.config.study import Study
+from wristctl.errors import UserError
+from wristctl.identification.spool_paths import answered, count_times, has_rates, spool_paths
+from wristctl.records import Run
+from wristctl.records.formats import read_arrays, read_table
+from wristctl.records.log_columns import units_of
+from wristctl.wrist.directions import ACTIVE, DIRECTIONS, tendons_of
+from wristctl.wrist.tendon_layout import TendonLayout
+from wristctl.wrist.tendons import TENDONS_PER_SIDE
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+Columns = dict[str, Array]
+# Columns of a table of a motion in one plane, by their names in an open log.
+_MOTION = {"theta": "bend_y", "tip_x": "tip_x", "tip_y": "tip_y"}
+# The same in two planes; those of tendons follow.
+_BENDS = {"bend_ulnar": "bend_y", "bend_flexion": "bend_z"} | {name: name for name in ("tip_x", "tip_y", "tip_z")}
+_WANTED = {"theta_ref": "bend_y", "bend_ref_ulnar": "bend_y", "bend_ref_flexion": "bend_z"}
+# Time between two rows of a rig's spools [s].
+_SPOOLS_EVERY = 2e-3
+# Units of columns that an open log does not have.
+_UNITS = {"rate_y": "rad/s", "rate_z": "rad/s", "torque_y": "N m", "torque_z": "N m"}
+
+
+def si_unit(name: str) -> str:
+    """SI unit of a column of a motion: `m` of spool_1."""
+    units = units_of(name)
+    return _UNITS[name] if units is None else next(unit for unit, scale in units.items() if scale == 1.0)
+
+
+@dataclass(frozen=True)
+class Stream:
+    """Values that were taken at the same N times; nan where one was not."""
+
+    time: Array
+    """(N,) [s] since the motion began."""
+    columns: Columns
+    """(N,) each, SI units, by the names of an open log; rate_y and torque_y beside them."""
+
+
+@dataclass(frozen=True)
+class RecordedMotion:
+    """One motion of a wrist."""
+
+    name: str
+    """Name of the trial; empty of a run's only motion."""
+    task: str
+    """What the wrist was to do, in words."""
+    measured: Sequence[Stream]
+    commands: Stream | None = None
+    """Spools that motors were to wind, tensions or torques."""
+    reference: Stream | None = None
+    """Bends that the controller followed."""
+    begin: float | None = None
+    """Start on the run's clock [s]; None where the run has none."""
+
+
+def motions_of(run: Run) -> list[RecordedMotion]:
+    """Motions of a run. Raises UserError for a run that holds none."""
+    if (run.path / "data").is_dir():
+        for name, read in _READERS.items():
+            if run.has(f"data/{name}") and (motions := read(run)):
+                return motions
+    problem = f"a {run.kind} run holds no motion over time"
+    kinds = "name a simulate, compare, track, hysteresis or hw-run run, or one of gen-data --source transitions"
+    raise UserError(problem, str(run.path), kinds)
+
+
+def _trials(run: Run) -> list[RecordedMotion]:
+    """Trials of a rig: spools on their way from count to count, bends at those of the frames, in one plane tips too."""
+    log, frames, kinds = (run.data(name) for name in ("log", "frames", "trials"))
+    motors, motions = run.config.hw_run.actuator, list[RecordedMotion]()
+    for row in kinds.itertuples():
+        number, direction = row.trial, DIRECTIONS.get(str(row.direction))
+        ticks = log[log.trial == number]
+        seen = frames[(frames.trial == number) & (frames.verdict == "ok")]
+        measured = [_reeled(ticks, motors)]
+        if "plane" in seen:
+            measured += _bends_seen(seen, "captured")
+        else:
+            measured.append(_sight(seen, direction is not None and direction.plane == "flexion"))
+        time = ticks.time.to_numpy(float) if "time" in ticks else np.empty(0)
+        wanted = _columns(ticks, _WANTED)
+        if direction is not None and direction.plane == "flexion" and "theta_ref" in ticks:
+            wanted = {"bend_z": wanted["bend_y"]}
+        motions.append(
+            RecordedMotion(
+                f"{number}",
+                _task_of_trial(row),
+                measured,
+                Stream(time, targets)
+                if (targets := _of_tendons(ticks, "target", motors.step_length)) and len(time)
+                else None,
+                Stream(time, wanted) if wanted and len(time) else None,
+                float((ticks.clock - ticks.time).iloc[0]) if {"clock", "time"} <= set(ticks) and len(ticks) else None,
+            )
+        )
+    return motions
+
+
+def _reeled(log: pd.DataFrame, motors: Actuator) -> Stream:
+    """Lengths on the spools [m] in one trial, so often that lines between them turn no corner that a ramp has not.
+
+    Those of the counts alone where the log has no step rates.
+    """
+    ticks = answered(log)
+    counted = count_times(ticks).mean(axis=1)
+    if not has_rates(log) or len(counted) < 2:
+        return Stream(counted, _of_tendons(ticks, "position", motors.step_length))
+    times = np.arange(counted[0], counted[-1], _SPOOLS_EVERY)
+    lengths = motors.step_length * spool_paths(log, motors)(times)
+    return Stream(times, {f"spool_{tendon}": column for tendon, column in zip(ACTIVE, lengths.T, strict=True)})
+
+
+def _of_tendons(table: pd.DataFrame, quantity: str, step: float) -> Columns:
+    """Counts of all spools [steps] as lengths [m]."""
+    named = {name: match[1] for name in map(str, table.columns) if (match := re.fullmatch(rf"{quantity}_(\d+)", name))}
+    return {f"spool_{tendon}": step * table[name].to_numpy(float) for name, tendon in named.items()}
+
+
+def _sight(seen: pd.DataFrame, flexion: bool) -> Stream:
+    """Bends and tips that one camera saw, which looks at the plane of the motion."""
+    bend, tip = ("bend_z", "tip_z") if flexion else ("bend_y", "tip_y")
+    sights = {bend: seen.theta.to_numpy(float)}
+    if "tip_x" in seen:
+        sights |= {"tip_x": seen.tip_x.to_numpy(float), tip: seen.tip_y.to_numpy(float)}
+    return Stream(seen.captured.to_numpy(float), sights)
+
+
+def _bends_seen(frames: pd.DataFrame, clock: str) -> list[Stream]:
+    """Bends at the times of the frames that show them, of two cameras; `clock` is the column of these times."""
+    parts = []
+    for plane, name in (("ulnar", "bend_y"), ("flexion", "bend_z")):
+        of_plane = frames[frames.plane == plane]
+        parts.append(Stream(of_plane[clock].to_numpy(float), {name: of_plane.bend.to_numpy(float)}))
+    return parts
+
+
+def _task_of_trial(row: object) -> str:
+    """Task of a trial by its row of the table of trials."""
+    controller, gains = getattr(row, "controller", ""), getattr(row, "gains", "")
+    by = f" with {controller}/{gains}" if controller and gains else ""
+    push = float(getattr(row, "push", 0.0) or 0.0)
+    return f"bend {getattr(row, 'direction', '')}{by}{f', pushed by {push:g} N' if push else ''}"
+
+
+def _columns(table: pd.DataFrame, names: Mapping[str, str]) -> Columns:
+    return {name: table[theirs].to_numpy(float) for theirs, name in names.items() if theirs in table}
+
+
+def _simulated(run: Run) -> list[RecordedMotion]:
+    """A simulated motion in one plane, with the spools of the four tendons where it has any."""
+    table, study = read_table(run.file("data/trajectory.csv")), study_of(run)
+    columns, commands = _columns(table, _MOTION), Columns()
+    for tendon, side in zip(tendons_of("ulnar"), ("plus", "plus", "minus", "minus"), strict=True):
+        if f"tension_{side}" in table:
+            commands[f"tension_{tendon}"] = table[f"tension_{side}"].to_numpy(float)
+        if f"spool_{side}" in table:
+            columns[f"spool_{tendon}"] = table[f"spool_{side}"].to_numpy(float)
+            if _slides_freely(study.simulate.loop):
+                columns[f"tension_{tendon}"] = table[f"acting_{side}"].to_numpy(float)
+    return [_motion(run, table, columns, commands)]
+
+
+def _motion(run: Run, table: pd.DataFrame, columns: Columns, commands: Columns) -> RecordedMotion:
+    """The motion of a simulate run."""
+    settings, time = run.config.simulate, table.time.to_numpy(float)
+    return RecordedMotion(
+        "",
+        f"{settings.reference.kind} with {settings.controller}",
+        [Stream(time, columns)],
+        Stream(time, commands) if commands else None,
+        Stream(time, wanted) if (wanted := _columns(table, _WANTED)) else None,
+    )
+
+
+def study_of(run: Run) -> Study:
+    """The study of a simulate run, with the wrist, motors and sensor that were identified where they were."""
+    source = identified_in(run)
+    if source is None:
+        return run.config
+    return with_found(run.config, "simulate", found_in(source))
+
+
+def _slides_freely(loop: Loop) -> bool:
+    """Whether a tendon pulls as much at its spool as at the wrist."""
+    return loop.actuator.level != "tendon" or not loop.plant.actuator.of(loop.actuator).friction
+
+
+def _tracked(run: Run) -> list[RecordedMotion]:
+    """What one camera saw, or the bends that two cameras saw."""
+    table = read_table(run.file("data/track.csv"))
+    if "plane" in table:
+        seen = _bends_seen(table[np.isfinite(table.bend)], "time")
+    else:
+        seen = [Stream(table.time.to_numpy(float), _columns(table, _MOTION))]
+    return [RecordedMotion("", "recorded by hand or by another program", seen)]
+
+
+def _bends(run: Run) -> list[RecordedMotion]:
+    """A motion in two planes with the spools of all tendons, and with their pulls where these are the spools' too.
+
+    Tendons of the square wrist have the numbers 1, 2, 4 and 5, others those of `wrist.tendons`.
+    """
+    table, study = read_table(run.file("data/bends.csv")), study_of(run)
+    wrist, loop = study.wrist, study.simulate.loop
+    columns, commands = _columns(table, _BENDS), Columns()
+    places = TendonLayout.of(wrist).places
+    square = ACTIVE if wrist.tendons == "four" else range(1, len(places) + 1)
+    for column, (number, place) in enumerate(zip(square, places, strict=True), 1):
+        if place.radius == 0.0:
+            continue
+        if f"pull_{column}" in table:
+            commands[f"tension_{number}"] = table[f"pull_{column}"].to_numpy(float) / place.multiplicity
+        if f"spool_{column}" in table:
+            columns[f"spool_{number}"] = table[f"spool_{column}"].to_numpy(float)
+        if _slides_freely(loop):
+            columns[f"tension_{number}"] = table[f"acting_{column}"].to_numpy(float) / place.multiplicity
+    return [_motion(run, table, columns, commands)]
+
+
+def _compared(run: Run) -> list[RecordedMotion]:
+    """Every motion of a comparison, by its number."""
+    arrays = read_arrays(run.file("data/trajectories.npz"))
+    names = _MOTION if "theta" in arrays else _BENDS
+    shape = arrays["theta" if "theta" in arrays else "bend_ulnar"].shape
+    over_time = {
+        name: np.broadcast_to(values, shape).astype(float)
+        for name, values in arrays.items()
+        if values.shape in (shape, shape[-1:])
+    }
+    tasks = [f"motion {number}" for number in range(shape[0])]
+    if run.has("data/comparison.csv") and len(rows := read_table(run.file("data/comparison.csv"))) == shape[0]:
+        tasks = [f"{row.reference} with {row.controller}/{row.gains}, {row.loop}" for row in rows.itertuples()]
+    sides = {"tension_plus": "tension_1", "tension_minus": "tension_2"}
+    pulls = sorted(name for name in over_time if name.startswith("pull_"))
+    sides |= {name: f"tension_{name.removeprefix('pull_')}" for name in pulls}
+    motions = []
+    for number, task in enumerate(tasks):
+
+        def of_motion(wanted: Mapping[str, str], at: int = number) -> Stream | None:
+            columns = {name: over_time[theirs][at] for theirs, name in wanted.items() if theirs in over_time}
+            return Stream(over_time["time"][at], columns) if columns else None
+
+        seen = of_motion(names)
+        motions.append(RecordedMotion(f"{number}", task, [seen] if seen else [], of_motion(sides), of_motion(_WANTED)))
+    return motions
+
+
+def _loops(run: Run) -> list[RecordedMotion]:
+    """Hysteresis loops by their numbers; tensions are those of one tendon."""
+    courses, motions = read_table(run.file("data/courses.csv")), list[RecordedMotion]()
+    for number, table in courses.groupby("loop", sort=False):
+        columns, commands = Columns(), Columns()
+        for tendon, side in enumerate(("plus", "minus"), 1):
+            if run.config.hysteresis.drive == "spools":
+                columns[f"spool_{tendon}"] = table[f"given_{side}"].to_numpy(float)
+                commands[f"spool_{tendon}"] = columns[f"spool_{tendon}"]
+            columns[f"tension_{tendon}"] = table[f"spool_{side}"].to_numpy(float) / TENDONS_PER_SIDE
+        columns |= {"bend_y": table.theta.to_numpy(float)}
+        time = table.time.to_numpy(float)
+        motions.append(
+            RecordedMotion(
+                f"{number}",
+                "hysteresis loop",
+                [Stream(time, columns)],
+                Stream(time, commands) if commands else None,
+            )
+        )
+    return motions
+
+
+def _transitions(run: Run) -> list[RecordedMotion]:
+    """Random motions of `gen-data --source transitions`; none of a run of samples without time."""
+    arrays = read_arrays(run.file("data/samples.npz"))
+    if not {"bend", "rate", "torque", "period"} <= set(arrays):
+        return []
+    motions = []
+    for number, (bend, rate, torque) in enumerate(zip(*(arrays[k] for k in ("bend", "rate", "torque")), strict=True)):
+        time, planes = float(arrays["period"]) * np.arange(float(len(bend))), "yz"[: bend.shape[1]]
+
+        def columns(name: str, values: Array, planes: str = planes) -> Columns:
+            return {f"{name}_{plane}": values[:, p].astype(float) for p, plane in enumerate(planes)}
+
+        seen = Stream(time, columns("bend", bend) | columns("rate", rate))
+        motions.append(RecordedMotion(f"{number}", "random motion", [seen], Stream(time, columns("torque", torque))))
+    return motions
+
+
+_READERS: Mapping[str, Callable[[Run], list[RecordedMotion]]] = {
+    "log.csv": _trials,
+    "trajectory.csv": _simulated,
+    "bends.csv": _bends,
+    "track.csv": _tracked,
+    "trajectories.npz": _compared,
+    "courses.csv": _loops,
+    "samples.npz": _transitions,
+}
+"""By the file of a run that holds its motions."""
