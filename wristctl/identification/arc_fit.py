@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import NamedTuple
+from typing import NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -68,6 +68,8 @@ class ArcFit:
     """Whether the mean of the error over what is predicted does not count, as its authors have it."""
     weights: tuple[float, float] = (1.0, 1.0)
     """Error of a sample of the motion and of a tension, over the usual."""
+    predicts: bool = True
+    """Whether its model predicts what was left out: of one that does not no unknown is told."""
 
     @property
     def numbers(self) -> int:
@@ -102,15 +104,25 @@ class ArcFit:
         wrong = np.concatenate([e[getattr(r, part)] for e, r in zip(self.errors, self.recordings, strict=True)])
         return float(np.sqrt(np.mean(np.sum(wrong**2, axis=1)))) if len(wrong) else math.nan
 
+    def missed(self) -> float:
+        """Share of the motion of the predicted part that its errors are (RMS), without what differs from row to row.
+
+        The latter is noise, by how far each error lies beside the mean of its neighbours'.
+        """
+        wrong, noise, moved = list[Array](), list[Array](), list[Array]()
+        for errors, recording in zip(self.errors, self.recordings, strict=True):
+            wrong.append(errors[recording.asked])
+            beside = errors[1:-1] - 0.5 * (errors[:-2] + errors[2:])
+            noise.append(beside[recording.asked[1:-1]] / math.sqrt(1.5))
+            moved.append(recording.measured[recording.asked])
+        squares, noises = (float(np.mean(np.sum(np.concatenate(x) ** 2, axis=1))) for x in (wrong, noise))
+        whole = float(np.nansum(np.nanvar(np.concatenate(moved), axis=0)))
+        return math.sqrt(max(0.0, squares - noises) / whole) if whole else math.inf
+
     @cached_property
     def squares(self) -> tuple[Array, Array]:
         """Sum of squared errors and number of samples of each block of what was predicted."""
-        parts = [(e[r.asked], r.block[r.asked]) for e, r in zip(self.errors, self.recordings, strict=True)]
-        wrong, block = np.concatenate([part[0] for part in parts]), np.concatenate([part[1] for part in parts])
-        if self.centred:
-            wrong = wrong - wrong.mean(axis=0)
-        squares, numbers = np.sum(wrong**2, axis=1), np.unique(block, return_inverse=True)[1]
-        return np.bincount(numbers, squares).astype(float), np.bincount(numbers).astype(float)
+        return squares_of_blocks(self.errors, self.recordings, self.centred)
 
     def asked_of(self, recording: ArcRecording) -> ArcFit:
         """The same unknowns on another recording, whose zeroing samples give its zero; it is taken to have no slack."""
@@ -148,10 +160,22 @@ class ArcFit:
             at_end = min(value - unknown.low, unknown.high - value) < 1e-2 * unknown.scale
             wide = half > max(abs(value), 3.0 * unknown.scale)
             ends = (max(low, unknown.low), high)
-            if wide or (at_end and unknown.low != 0.0):
+            if wide or (at_end and unknown.low != 0.0) or not self.predicts:
                 ends = (-math.inf, math.inf)
             told[name] = Told(value, ends[0], ends[1], unknown.unit, unknown.meaning)
         return told
+
+
+def squares_of_blocks(
+    errors: Sequence[Array], recordings: Sequence[ArcRecording], centred: bool
+) -> tuple[Array, Array]:
+    """Sum of squared errors and number of samples of each block of what was predicted, of errors (T, d) each."""
+    parts = [(e[r.asked], r.block[r.asked]) for e, r in zip(errors, recordings, strict=True)]
+    wrong, block = np.concatenate([part[0] for part in parts]), np.concatenate([part[1] for part in parts])
+    if centred:
+        wrong = wrong - wrong.mean(axis=0)
+    squares, numbers = np.sum(wrong**2, axis=1), np.unique(block, return_inverse=True)[1]
+    return np.bincount(numbers, squares).astype(float), np.bincount(numbers).astype(float)
 
 
 def by_blocks(slopes: Array, residual: Array, blocks: NDArray[np.int64], root: Array) -> tuple[Array, Array]:
@@ -177,7 +201,16 @@ def by_blocks(slopes: Array, residual: Array, blocks: NDArray[np.int64], root: A
     return scores, np.maximum(freedom, 1.0)
 
 
-def score_of(fits: Sequence[ArcFit]) -> Score:
+class Predicted(Protocol):
+    """Whatever predicts a part of recordings."""
+
+    @property
+    def squares(self) -> tuple[Array, Array]:
+        """Sum of squared errors and number of samples of each block of what was predicted."""
+        ...
+
+
+def score_of(fits: Sequence[Predicted]) -> Score:
     """RMS error of what was predicted, with an interval by a bootstrap of its blocks."""
     sums, counts = (np.concatenate(parts) for parts in zip(*(fit.squares for fit in fits), strict=True))
     drawn = _drawn(len(sums))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -24,8 +24,9 @@ if TYPE_CHECKING:
     from wristctl.identification.arc_robot import ArcRecording, ArcRobot
     from wristctl.identification.model_choice import TriedModel
 
-# Share of the motion's mean square that a prediction may miss before nothing is told.
-_MISSED = 0.5
+# Share of the motion's mean square that a prediction may miss before a log is refused, and share of the motion, without
+# noise, that it may miss before no parameter is told.
+_MISSED, _MISSED_OF_ALL = 0.5, 0.1
 
 
 @dataclass(frozen=True, repr=False, eq=False)
@@ -66,7 +67,7 @@ class LogTold(StudyResult):
         return pd.DataFrame(rows, columns=["parameter", "value", "low", "high", "unit", "meaning"])
 
 
-class _Read(NamedTuple):
+class ReadLogs(NamedTuple):
     """The robot of open logs, its recordings, and the number of samples that the logs have."""
 
     robot: ArcRobot
@@ -79,8 +80,10 @@ class _Read(NamedTuple):
     """Readings of the motion per second; None without times."""
 
 
-def _read(study: Study) -> _Read:
+def read_logs(study: Study) -> ReadLogs:
+    """A study's logs, read and looked at. Raises UserError for logs that no fit may be asked of."""
     from wristctl.identification.log_model import rate_of_logs, recordings_of_logs, robot_of_logs, spools_of_log
+    from wristctl.identification.log_senses import check_places
     from wristctl.records.log_converters import read_log
     from wristctl.records.log_looks import looked_at
     from wristctl.wrist.tendon_layout import TendonLayout
@@ -90,13 +93,14 @@ def _read(study: Study) -> _Read:
     read = (read_log(Path(file), columns, "log", tendon_offset=offset) for file in settings.logs)
     logs = [looked_at(log, tendon_offset=offset) for log in read]
     robot = robot_of_logs(logs, study.wrist, settings.radius_error)
+    turned = check_places(logs, robot, spools_of_log(logs[0]))
     sides = _sides(robot, spools_of_log(logs[0])) if len(robot.angles) > 2 and "turn" not in robot.base else ""
     recordings = recordings_of_logs(logs, robot)
     samples, used = sum(map(len, logs)), sum(len(recording.time) for recording in recordings)
     fewer = f"Of {samples} samples the models are fitted at {used} instants, evenly over each trial."
-    remarks = [remark for log in logs for remark in log.remarks]
+    remarks = [*(remark for log in logs for remark in log.remarks), *turned]
     rate = rate_of_logs(logs) if robot.timed else None
-    return _Read(robot, recordings, samples, [*remarks, *[sides] * bool(sides), *[fewer] * (used < samples)], rate)
+    return ReadLogs(robot, recordings, samples, [*remarks, *[sides] * bool(sides), *[fewer] * (used < samples)], rate)
 
 
 def _sides(robot: ArcRobot, numbers: Sequence[int]) -> str:
@@ -110,7 +114,7 @@ def log_plan(study: Study, inputs: Inputs) -> str:
     """Say what is looked for in which logs."""
     if inputs.runs():
         raise UserError("runs and logs at once", "identify.runs", "identify one or the other")
-    robot, recordings, samples, remarks, _ = _read(study)
+    robot, recordings, samples, remarks, _ = read_logs(study)
     names = ", ".join(robot.unknowns(()))
     plan = f"{names}, then slack, friction and creep, from {len(recordings)} trials of open logs, {samples} samples"
     return "\n".join([plan, *remarks])
@@ -126,7 +130,7 @@ def identify_logs(session: Session) -> LogTold:
     from wristctl.identification.real_robots import RealRobot
 
     findings, study = session.findings, session.study
-    robot, recordings, _, remarks, rate = _read(study)
+    robot, recordings, _, remarks, rate = read_logs(study)
     models = list["TriedModel"]()
     with session.progress("fitting models") as report:
         for model in tried_models(robot, [recordings], False):
@@ -135,6 +139,10 @@ def identify_logs(session: Session) -> LogTold:
         chosen = chosen_of(models)
         begin = chosen.fits[0].values
         fit = fit_arcs(robot, chosen.terms, everything_fitted(recordings), begin=begin)
+    missed = chosen.fits[0].missed()
+    if missed > _MISSED_OF_ALL and study.identify.misfit != "tell":
+        fit = replace(fit, predicts=False)
+        remarks = [*remarks, _unpredicted(missed)]
     unit, scale = robot.unit, robot.scale
     score = chosen.score
     findings.metric("error", scale * score.error, unit, "lower", score.blocks, (scale * score.low, scale * score.high),
@@ -155,6 +163,14 @@ def identify_logs(session: Session) -> LogTold:
     findings.plain(RATIOS, result.ratios)
     _refuse(session, result, recordings)
     return result
+
+
+def _unpredicted(missed: float) -> str:
+    return (
+        f"Nothing is identifiable: the model misses {100.0 * missed:.0f} % of the motion that was not fitted, beside "
+        f"noise, and a parameter is told where it misses at most {100.0 * _MISSED_OF_ALL:.0f} %. Are senses, order and "
+        "units of spools and bend as they should be, and are all of one clock?"
+    )
 
 
 def _refuse(session: Session, result: LogTold, recordings: Sequence[ArcRecording]) -> None:
