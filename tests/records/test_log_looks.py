@@ -382,3 +382,11 @@ def test_trials_with_a_name_are_parted_where_their_clock_starts_again() -> None:
 
 def test_whole_seconds_over_hours_are_asked_for_their_unit() -> None:
     assert "is it in ms" in told_of(changed("time", lambda time: np.round(1e3 * np.arange(len(time)))))
+
+
+@pytest.mark.parametrize(("millimetres", "rows"), [(0.13, 1), (0.0, 40), (0.02, 1)])
+def test_spools_that_scatter_are_told_and_staircases_are_not(millimetres: float, rows: int) -> None:
+    rng = np.random.default_rng(0)
+    held = np.arange(1000) // rows * rows
+    told = told_of(changed("spool_1", lambda spool: spool[held] + 1e-3 * millimetres * rng.standard_normal(1000)))
+    assert ("spool_1 scatter by 0.1" in told) == (millimetres > 0.1) and ("scatter" in told) == (millimetres > 0.1)

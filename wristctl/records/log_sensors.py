@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import NamedTuple
 
@@ -11,6 +12,9 @@ from wristctl.arrays import Array
 from wristctl.records.log_jumps import lone_cells
 from wristctl.records.open_log import OpenLog
 
+# Median of the absolute value of a normal variable, over its standard deviation; scatter [m] of a spool from which it
+# is noise, and least ratio of its fifth to its third differences.
+_MEDIAN, _SCATTER, _NOISE_LIKE = 0.6745, 5e-5, 0.8
 # Rows of a standstill, and share of its whole way that the rest moves meanwhile, from which a sensor stands alone.
 _ROWS, _MOVED = 20, 0.2
 # The same where it catches up in one step, and of a column in which at most such a share of the other rows stands.
@@ -53,7 +57,9 @@ def sensors_told(log: OpenLog) -> list[str]:
     The motion is the bend or the tip's place across, held against what all spools together make of it by least squares.
     """
     name = next((name for name in ("bend_y", "bend_z", "inclination", "tip_y") if name in log.columns), None)
-    told = [told for column in log.columns if column.startswith(_SEEN) for told in lone_cells(log, column)]
+    told = list[str]()
+    for column in log.columns if "time" in log.columns else ():
+        told += lone_cells(log, column) if column.startswith(_SEEN) else []
     for trial in log.trials().values() if name else ():
         spools = [column for column in trial.columns if column.startswith("spool_")]
         time = trial.columns.get("time", np.arange(len(trial), dtype=np.float64))
@@ -79,6 +85,7 @@ def sensors_told(log: OpenLog) -> list[str]:
                 told += _sentence(trial, spool, seen, alone, "stands at {value} while the wrist moves")
         stand = [run for run in _standing(made, motion) if not np.ptp(reeled[run.first : run.last + 1], axis=0).any()]
         told += _sentence(trial, spools[0], seen, stand, "stands at {value}, as all spools do, while the wrist moves")
+        told += _rough(trial, spools)
         told += _apart(trial, spools, reeled, _motion_of(trial, seen))
         if "time" in trial.columns:
             told += _late(trial, name, time[seen], motion, reeled)
@@ -135,9 +142,18 @@ def _standing(column: Array, rest: Array, others: Array | None = None) -> list[_
         to_end = ends or catches_up or steps[run.last] > _MOVED * np.ptp(column)
         long = way > _MOVED and to_end and run.last - run.first + 1 >= _ROWS
         short = way > _MOVED_A_LITTLE and catches_up
-        if long or short or (way > 0.5 * _MOVED and _moves_elsewhere(steps, run)):
+        alone = (way > 0.5 * _MOVED or (way > _MOVED_A_LITTLE and _jumps_after(steps, run))) and _moves_elsewhere(
+            steps, run
+        )
+        if long or short or alone:
             found.append(run)
     return found
+
+
+def _jumps_after(steps: Array, run: _Run) -> bool:
+    """Whether a step at the end of a run is far larger than those before it and after it."""
+    near = np.concatenate([steps[max(0, run.first - _ROWS) : max(0, run.first - 1)], steps[run.last + 1 :][:_ROWS]])
+    return run.last < len(steps) and bool(steps[run.last] > _CATCHES_UP * float(np.max(near, initial=0.0)))
 
 
 def _moves_elsewhere(steps: Array, run: _Run) -> bool:
@@ -179,6 +195,31 @@ def _motion_of(log: OpenLog, rows: np.ndarray[tuple[int], np.dtype[np.intp]]) ->
     both = bends[rows] if bends is not None else np.stack(tips, axis=1)[rows]
     moved: Array = np.nan_to_num(both - np.nanmean(both, axis=0))
     return moved
+
+
+def _rough(log: OpenLog, spools: list[str]) -> list[str]:
+    """A sentence for spools that differ from row to row as noise does, not as a motion.
+
+    Differences of third and fifth order of noise are as large as their coefficients say; of a motion the fifth are
+    less.
+    """
+    sizes = dict[str, float]()
+    for spool in spools:
+        column = log.columns[spool][np.isfinite(log.columns[spool])]
+        third, fifth = (
+            float(np.median(np.abs(np.diff(column, order)))) / (_MEDIAN * math.sqrt(math.comb(2 * order, order)))
+            for order in (3, 5)
+        )
+        if third > _SCATTER and fifth > _NOISE_LIKE * third:
+            sizes[spool] = third
+    if not sizes:
+        return []
+    names = ", ".join(log.head(spool) for spool in sizes)
+    where = Path(log.header or str(log.file)).name
+    return [
+        f"{where}: {names} scatter by {1e3 * max(sizes.values()):.2g} mm from row to row, as noise does; a fit takes "
+        "that as pulls, and tendons as softer than they are."
+    ]
 
 
 def _apart(log: OpenLog, spools: list[str], reeled: Array, motion: Array) -> list[str]:
