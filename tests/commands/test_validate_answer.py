@@ -17,7 +17,8 @@ from wristctl.commands.validate.answer import (
     validated_answer,
     wanted_terms,
 )
-from wristctl.identification.arc_fit import Score, Told
+from wristctl.identification.arc_fit import Told
+from wristctl.identification.prediction_scores import Score
 from wristctl.identification.real_robots import RealRobot
 
 

@@ -7,9 +7,9 @@ import pytest
 from numpy.typing import NDArray
 
 from wristctl.arrays import Array
-from wristctl.identification.arc_fit import score_of
 from wristctl.identification.arc_robot import ArcRecording
 from wristctl.identification.baselines import baselines, gaussian_process, mean_of_runs
+from wristctl.identification.prediction_scores import score_of
 
 
 def recording(

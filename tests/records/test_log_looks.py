@@ -304,6 +304,15 @@ def test_steps_that_the_wrist_follows_are_no_jumps() -> None:
     assert "jumps" not in told_of(replace(clean, columns={**stepped, "time": clean.columns["time"]}))
 
 
+def test_a_step_of_one_tendon_that_the_wrist_follows_is_no_jump() -> None:
+    clean = read_log(FIELD / "clean.csv")
+    after = np.arange(len(clean)) >= 500
+    moved = {"spool_1": 2e-3 * after, "bend_y": 0.5 * 2e-3 / 0.0141 * after}
+    columns = {name: column + moved.get(name, 0.0) for name, column in clean.columns.items()}
+    assert "jumps" not in told_of(replace(clean, columns=columns))
+    assert "jumps" in told_of(replace(clean, columns={**columns, "bend_y": clean.columns["bend_y"]}))
+
+
 @pytest.mark.parametrize("name", ["bend_y", "spool_2"])
 def test_cells_that_stand_alone_are_told_with_their_lines(name: str) -> None:
     wrong = changed(name, lambda column: 3.0 * column + 0.005, slice(333, 334))

@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,8 +16,8 @@ from scipy.stats import t as student
 from wristctl.arrays import Array
 from wristctl.identification.arc_robot import SLACK_ERROR, ArcRecording, ArcRobot, Term
 from wristctl.identification.intervals import NORMAL_95
+from wristctl.identification.prediction_scores import squares_of_blocks
 
-_DRAWS, _SEED = 4000, 0
 _ZERO_SCALE = {"bend": 0.02, "tip": 2e-3}
 # Range in which zero and slack are looked for [rad or m, m], and change of a difference over the usual change.
 _ZERO_RANGE, _SLACK_RANGE, _STEP = 1.0, 1.5e-2, 1e-4
@@ -27,15 +27,6 @@ _ERROR, _TENSION_ERROR = {"bend": math.radians(1.0), "tip": 2e-3}, 0.5
 _SEARCHES, _LEAST_ERROR = 3, 1e-3
 # Share of a block's error in a direction that the fit leaves at least.
 _LEAST_LEFT = 1e-6
-
-
-class Score(NamedTuple):
-    """RMS error with its 95 % interval, and the number of blocks that were drawn for it."""
-
-    error: float
-    low: float
-    high: float
-    blocks: int
 
 
 class Told(NamedTuple):
@@ -166,18 +157,6 @@ class ArcFit:
         return told
 
 
-def squares_of_blocks(
-    errors: Sequence[Array], recordings: Sequence[ArcRecording], centred: bool
-) -> tuple[Array, Array]:
-    """Sum of squared errors and number of samples of each block of what was predicted, of errors (T, d) each."""
-    parts = [(e[r.asked], r.block[r.asked]) for e, r in zip(errors, recordings, strict=True)]
-    wrong, block = np.concatenate([part[0] for part in parts]), np.concatenate([part[1] for part in parts])
-    if centred:
-        wrong = wrong - wrong.mean(axis=0)
-    squares, numbers = np.sum(wrong**2, axis=1), np.unique(block, return_inverse=True)[1]
-    return np.bincount(numbers, squares).astype(float), np.bincount(numbers).astype(float)
-
-
 def by_blocks(slopes: Array, residual: Array, blocks: NDArray[np.int64], root: Array) -> tuple[Array, Array]:
     """Scores of each block (blocks, P) as if it were not fitted, and Student's degrees of freedom of each unknown (P,).
 
@@ -199,31 +178,6 @@ def by_blocks(slopes: Array, residual: Array, blocks: NDArray[np.int64], root: A
     squares = np.sum(covariance**2, axis=(1, 2)) + 1e-300
     freedom: Array = np.trace(covariance, axis1=1, axis2=2) ** 2 / squares
     return scores, np.maximum(freedom, 1.0)
-
-
-class Predicted(Protocol):
-    """Whatever predicts a part of recordings."""
-
-    @property
-    def squares(self) -> tuple[Array, Array]:
-        """Sum of squared errors and number of samples of each block of what was predicted."""
-        ...
-
-
-def score_of(fits: Sequence[Predicted]) -> Score:
-    """RMS error of what was predicted, with an interval by a bootstrap of its blocks."""
-    sums, counts = (np.concatenate(parts) for parts in zip(*(fit.squares for fit in fits), strict=True))
-    drawn = _drawn(len(sums))
-    low, high = np.quantile(np.sqrt(sums[drawn].sum(axis=1) / counts[drawn].sum(axis=1)), [0.025, 0.975])
-    return Score(math.sqrt(sums.sum() / counts.sum()), float(low), float(high), len(sums))
-
-
-def ratio_of(fits: Sequence[ArcFit], others: Sequence[ArcFit]) -> Score:
-    """Error of what was predicted over that of other fits of the same, paired by blocks."""
-    mine, theirs = (np.concatenate([fit.squares[0] for fit in some]) for some in (fits, others))
-    drawn = _drawn(len(mine))
-    low, high = np.quantile(np.sqrt(mine[drawn].sum(axis=1) / theirs[drawn].sum(axis=1)), [0.025, 0.975])
-    return Score(math.sqrt(mine.sum() / theirs.sum()), float(low), float(high), len(mine))
 
 
 def fit_arcs(
@@ -251,10 +205,6 @@ def fit_arcs(
         if recording.session not in whole:
             whole[recording.session] = problem.zeroed(unknowns, recording)
     return ArcFit(robot, tuple(terms), tuple(recordings), x, whole, centred, problem.weights)
-
-
-def _drawn(blocks: int) -> NDArray[np.int64]:
-    return np.random.default_rng(_SEED).integers(blocks, size=(_DRAWS, blocks))
 
 
 def _parted(own: Array, robot: ArcRobot) -> tuple[Array, Array]:

@@ -18,8 +18,8 @@ from scipy.linalg import LinAlgError, cho_factor, cho_solve
 from scipy.optimize import minimize
 
 from wristctl.arrays import Array
-from wristctl.identification.arc_fit import squares_of_blocks
 from wristctl.identification.arc_robot import ArcRecording
+from wristctl.identification.prediction_scores import squares_of_blocks
 
 # Most samples that the process learns from, evenly over all; where the search for its logarithms of length and noise
 # (over the spread of inputs and outputs) begins, and its most evaluations.

@@ -10,8 +10,9 @@ from wristctl.commands.answer import Answer
 from wristctl.commands.printed_table import Table, joined, number
 
 if TYPE_CHECKING:
-    from wristctl.identification.arc_fit import ArcFit, Score
+    from wristctl.identification.arc_fit import ArcFit
     from wristctl.identification.model_choice import TriedModel
+    from wristctl.identification.prediction_scores import Score
     from wristctl.identification.real_robots import RealRobot
 
 

@@ -21,8 +21,9 @@ from wristctl.records.data_sets import DATA_SETS
 if TYPE_CHECKING:
     import pandas as pd
 
-    from wristctl.identification.arc_fit import ArcFit, Score
+    from wristctl.identification.arc_fit import ArcFit
     from wristctl.identification.model_choice import TriedModel
+    from wristctl.identification.prediction_scores import Score
     from wristctl.identification.real_robots import RealRobot
 
 
@@ -134,9 +135,9 @@ def validate(session: Session) -> Validated:
     """
     from wristctl.commands.validate import figures
     from wristctl.commands.validate.answer import models_table, parameters_table, steps_table
-    from wristctl.identification.arc_fit import score_of
     from wristctl.identification.baselines import baselines
     from wristctl.identification.model_choice import chosen_of, tried_models
+    from wristctl.identification.prediction_scores import score_of
     from wristctl.identification.real_robots import recordings_of
 
     findings, study = session.findings, session.study
