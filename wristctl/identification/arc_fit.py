@@ -25,6 +25,8 @@ _ZERO_RANGE, _SLACK_RANGE, _STEP = 1.0, 1.5e-2, 1e-4
 _ERROR, _TENSION_ERROR = {"bend": math.radians(1.0), "tip": 2e-3}, 0.5
 # Where samples are weighed: searches, and the least of these errors over that.
 _SEARCHES, _LEAST_ERROR = 3, 1e-3
+# Time [s] after which errors of a log that is read between its rows are of other rows.
+_FRAME = 0.04
 # Share of a block's error in a direction that the fit leaves at least.
 _LEAST_LEFT = 1e-6
 
@@ -98,13 +100,14 @@ class ArcFit:
     def missed(self) -> float:
         """Share of the motion of the predicted part that its errors are (RMS), without what differs from row to row.
 
-        The latter is noise, by how far each error lies beside the mean of its neighbours'.
+        The latter is noise, by how far each error lies beside the mean of those a camera's frame away.
         """
         wrong, noise, moved = list[Array](), list[Array](), list[Array]()
         for errors, recording in zip(self.errors, self.recordings, strict=True):
             wrong.append(errors[recording.asked])
-            beside = errors[1:-1] - 0.5 * (errors[:-2] + errors[2:])
-            noise.append(beside[recording.asked[1:-1]] / math.sqrt(1.5))
+            away = max(1, int(_FRAME / float(np.nanmedian(recording.pause))))
+            beside = errors[away:-away] - 0.5 * (errors[: -2 * away] + errors[2 * away :])
+            noise.append(beside[recording.asked[away:-away]] / math.sqrt(1.5))
             moved.append(recording.measured[recording.asked])
         squares, noises = (float(np.mean(np.sum(np.concatenate(x) ** 2, axis=1))) for x in (wrong, noise))
         whole = float(np.nansum(np.nanvar(np.concatenate(moved), axis=0)))
