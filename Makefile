@@ -13,7 +13,7 @@ BIN := .venv/bin
 PIP := $(BIN)/python -m pip --disable-pip-version-check
 
 .PHONY: run test lint bench bench-sweeps bench-peers bench-all firmware test-firmware test-faults test-trust test-vision test-identify \
-	test-allocation test-slow test-rig fault-table lerobot-reader lost-tendons twins sound-rigs inner-rigs driven-robots test-posterior test-statistics converge worlds docs clean venv mutants coverage installed matrix
+	test-allocation test-slow test-rig fault-table lerobot-reader lost-tendons twins sound-rigs damaged-logs inner-rigs driven-robots test-posterior test-statistics converge worlds docs clean venv mutants coverage installed matrix
 
 run: .venv/run
 	@set -eo pipefail; \
@@ -61,6 +61,11 @@ test-firmware: .venv/dev firmware
 # Do 95 % intervals of identified parameters hold the truth in 90 to 99 of 100 benches?
 test-identify: .venv/dev
 	WRISTCTL_THOROUGH=1 $(BIN)/pytest -n auto --maxschedchunk 1 -rP tests/identification
+
+# Logs damaged as users' logs are: is each damage named, or are the numbers those of the sound log? Sound ones are to stay
+# as they are: docs/damaged-logs.md. Keeps what it has tried and goes on from there; WHICH="--count 20 --sound 5"
+damaged-logs: .venv/dev
+	$(BIN)/python -m tests.identification.damaged_logs $(WHICH)
 
 # Friction inside the wrist and slack, from an open log (--way arcs) and from a loop: found where they are, intervals that
 # hold? WHICH="--way loop --count 40"

@@ -18,6 +18,7 @@ BEGIN, END = "<!-- tables by docs/real_robots.py -->\n", "<!-- end -->"
 ROBOTS = {"uc3m-soft-neck": 0, "opencr-v4": 1, "opencr-v6": 1}
 """Robots, and which folder holds their recordings."""
 TITLES = {"uc3m-soft-neck": "soft neck, bend", "opencr-v4": "OpenCR v4, tip", "opencr-v6": "OpenCR v6, tip"}
+BASELINES = {"mean_of_the_other_runs": "mean of the other runs", "gaussian_process": "Gaussian process"}
 TERMS = {"ratio_slack": "slack", "ratio_tendon_friction": "tendon friction", "ratio_inner_friction": "inner friction",
          "ratio_creep": "creep"}  # fmt: skip
 
@@ -42,24 +43,38 @@ def with_interval(metric: dict[str, Any] | None, digits: int = 2) -> str:
 
 def tables(runs: dict[str, Run]) -> str:
     """Errors beside the authors', what each term is worth, and the closed-loop steps of the neck."""
-    lines = ["| robot | its authors' own model | ours, 95 % | ours over theirs | run |", "|---|---|---|---|---|"]
+    heads = ("robot", "its authors' own model", "ours, 95 %", "ours over theirs", *BASELINES.values(), "run")
+    lines = [f"| {' | '.join(heads)} |", "|---" * len(heads) + "|"]
     for robot, run in runs.items():
         metrics = run.metrics
         unit = metrics["error"]["unit"]
         theirs = f"{metrics['authors']['value']:.2f} {unit}" if "authors" in metrics else "none to compare with"
         ours = f"{with_interval(metrics['error'])} {unit}"
         over = with_interval(metrics.get("ratio_to_authors"))
-        lines.append(f"| {TITLES[robot]} | {theirs} | {ours} | {over} | `{run.result_hash[:12]}` |")
+        beside = [f"{with_interval(metrics[name])} {unit}" for name in BASELINES]
+        cells = [TITLES[robot], theirs, ours, over, *beside, f"`{run.result_hash[:12]}`"]
+        lines.append(f"| {' | '.join(cells)} |")
     lines += ["", f"| error with it over without | {' | '.join(TERMS.values())} |", "|---" * (1 + len(TERMS)) + "|"]
     for robot, run in runs.items():
         cells = [with_interval(run.metrics.get(name), 3) for name in TERMS]
         lines.append(f"| {TITLES[robot]} | {' | '.join(cells)} |")
-    steps = {name: metric for name, metric in runs["uc3m-soft-neck"].metrics.items() if name.startswith("step_")}
-    heads = [name.removeprefix("step_").replace("g", " g") for name in steps]
-    lines += ["", f"| closed-loop step | {' | '.join(heads)} |", "|---" * (1 + len(heads)) + "|"]
-    errors = [f"{metric['value']:.2f}" for metric in steps.values()]
-    lines.append(f"| RMS error [deg] | {' | '.join(errors)} |")
-    return "\n".join(lines) + "\n"
+    return "\n".join([*lines, "", *steps_of(runs["uc3m-soft-neck"])]) + "\n"
+
+
+def steps_of(run: Run) -> list[str]:
+    """The neck's closed-loop steps: a row for each step of a file, a column for each load."""
+    steps = {
+        (name.split("_")[0], name.split("_")[1]): metric
+        for name, metric in run.metrics.items()
+        if name.startswith("step")
+    }
+    loads = list(dict.fromkeys(load for _, load in steps))
+    lines = [f"| error of a closed-loop step [deg] | {' | '.join(load.replace('g', ' g') for load in loads)} |",
+             "|---" * (1 + len(loads)) + "|"]  # fmt: skip
+    for number in dict.fromkeys(number for number, _ in steps):
+        errors = [f"{steps[number, load]['value']:.2f}" if (number, load) in steps else "-" for load in loads]
+        lines.append(f"| {number.replace('step', 'step ')} | {' | '.join(errors)} |")
+    return lines
 
 
 def main(neck: str, opencr: str, folder: str = "results/real-robots") -> None:

@@ -17,7 +17,8 @@ from wristctl.commands.validate.answer import (
     validated_answer,
     wanted_terms,
 )
-from wristctl.identification.arc_fit import Score, Told
+from wristctl.identification.arc_fit import Told
+from wristctl.identification.prediction_scores import Score
 from wristctl.identification.real_robots import RealRobot
 
 
@@ -59,7 +60,7 @@ def test_each_model_is_named_by_what_it_adds_to_slack() -> None:
 
 @pytest.mark.parametrize(("scale", "unit"), [(1e3, "mm"), (math.degrees(1.0), "deg")])
 def test_errors_are_in_the_robots_unit_below_those_of_its_authors(scale: float, unit: str) -> None:
-    table = models_table(robot(scale, unit), MODELS)
+    table = models_table(robot(scale, unit), MODELS, {})
     assert f"error [{unit}]" in table.columns
     theirs, others, *ours = table.rows
     assert (theirs[0], theirs[2], others[2]) == ("their best", "3.00", "9.00")
@@ -80,17 +81,17 @@ def test_what_the_data_want_is_told_by_the_models_that_add_one_term() -> None:
     ("authors", "said"), [(2.3, "below the 2.30 mm"), (2.1, "not told apart from the 2.10 mm"), (1.7, "above the 1.70")]
 )
 def test_authors_are_beaten_where_the_whole_interval_is_below_theirs(authors: float, said: str) -> None:
-    answer = validated_answer(robot(authors=authors), MODELS, SLACK, "")
+    answer = validated_answer(robot(authors=authors), MODELS, SLACK, "", {})
     assert said in answer.sentence and "2.00 mm" in answer.sentence and "1.80 to 2.20" in answer.sentence
     assert "predicts the tip of a trunk" in answer.sentence and answer.more == "Somebody 2020."
 
 
 def test_a_robot_without_its_authors_error_is_held_against_nobody() -> None:
-    answer = validated_answer(robot(authors=None, in_sample=True), MODELS, SLACK, "results/x")
+    answer = validated_answer(robot(authors=None, in_sample=True), MODELS, SLACK, "results/x", {})
     notes = " ".join(map(str, answer.notes))
     assert "authors" not in answer.sentence + notes and "fits the tip" in answer.sentence
     assert "12 blocks" in notes and "same prediction" not in notes and "results/x/report.html" in answer.more
-    other = " ".join(map(str, validated_answer(robot(centred=True), MODELS, SLACK, "").notes))
+    other = " ".join(map(str, validated_answer(robot(centred=True), MODELS, SLACK, "", {}).notes))
     assert "7 free numbers" in other and "same prediction" in other and "mean error does not count" in other
 
 
@@ -116,3 +117,9 @@ def test_a_step_has_its_error_over_all_and_over_its_last_second() -> None:
         recordings=[SimpleNamespace(name="0 g", time=time)], errors=[wrong], rms=lambda part: {"asked": 4e-3}[part]
     )
     assert [tuple(row) for row in steps_table(robot(), [step]).rows] == [("0 g", "4.00", "0.50")]
+
+
+def test_errors_without_a_model_stand_between_the_authors_and_ours() -> None:
+    table = models_table(robot(), MODELS, {"Gaussian process": Score(4e-3, 3e-3, 5e-3, 12)})
+    assert [row[0] for row in table.rows[:4]] == ["their best", "another", "Gaussian process", "arcs and tendons"]
+    assert table.rows[2][2] == "4.00 [3.00, 5.00]"

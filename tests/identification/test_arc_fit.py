@@ -9,9 +9,10 @@ import numpy as np
 import pytest
 
 from wristctl.arrays import Array
-from wristctl.identification.arc_fit import ArcFit, by_blocks, fit_arcs, ratio_of, score_of
+from wristctl.identification.arc_fit import ArcFit, by_blocks, fit_arcs
 from wristctl.identification.arc_robot import ArcRecording, ArcRobot, window_means
 from wristctl.identification.model_choice import chosen_of, tried_models
+from wristctl.identification.prediction_scores import ratio_of, score_of
 from wristctl.identification.real_robots import TEE_PROBE
 from wristctl.wrist.spatial.spatial_kinematics import spatial_backbone, spatial_tips
 

@@ -224,3 +224,18 @@ def test_a_logs_arc_begins_with_the_inertia_that_the_wrist_has_straight(
     wrist = WRIST.model_copy(update=changed)
     begun = robot_of_logs([planar()], wrist, 0.01).begin["inertia"] * wrist.stiffness
     assert begun == pytest.approx(terms(segments(wrist, 1), [0.0], [0.0]).mass[0, 0], rel=within)
+
+
+def test_a_share_of_the_motion_is_missed_where_something_else_moves_and_noise_is_no_part_of_it() -> None:
+    log, rng = planar(), np.random.default_rng(1)
+    bend, time = log.columns["bend_y"], log.columns["time"]
+    size = float(np.std(bend))
+    shares = []
+    for more in (0.0 * time, 0.3 * math.sqrt(2.0) * size * np.sin(5.1 * time), 0.3 * size * rng.normal(size=len(time))):
+        changed = replace(log, columns={**log.columns, "bend_y": bend + more})
+        robot = robot_of_logs([changed], WRIST, 0.01)
+        fit = fit_arcs(robot, (), recordings_of_logs([changed], robot))
+        shares.append(fit.missed())
+        assert any(told.known for told in fit.told.values())
+        assert not any(told.known for told in replace(fit, predicts=False).told.values())
+    assert shares[0] < 0.02 and shares[1] == pytest.approx(0.3, abs=0.06) and shares[2] < 0.1

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -68,10 +69,25 @@ def test_the_necks_middle_load_is_predicted_from_the_other_two(monkeypatch: pyte
 def test_the_necks_steps_rest_until_they_begin_and_all_else_is_predicted(monkeypatch: pytest.MonkeyPatch) -> None:
     assert SOFT_NECK.steps is not None
     steps = SOFT_NECK.steps(neck_files(monkeypatch, closed=True))
-    assert [part.name for part in steps] == [f"step, {load} g" for load in (0, 200, 400, 600, 800, 1000)]
+    assert [part.name for part in steps] == [f"step 1, {load} g" for load in (0, 200, 400, 600, 800, 1000)]
     for part in steps:
         assert not part.fitted.any() and (part.zeroing ^ part.asked).all()
         assert part.zeroing.tolist() == (part.time < 0.15).tolist() and part.zeroing.sum() == 1
+
+
+def test_a_file_of_the_closed_loop_has_a_step_for_each_start_of_its_clock(monkeypatch: pytest.MonkeyPatch) -> None:
+    files = neck_files(monkeypatch, closed=True)
+    once = log(np.arange(0.0, 30.0, 0.01), 3, ("bend_y", "bend_z"), mass=np.full(3000, 0.2))
+    names = np.full(2 * len(once), "frontier_test_200gr")
+    columns = {name: np.concatenate([column, column]) for name, column in once.columns.items()}
+    monkeypatch.setattr(
+        real_robots, "read_log", lambda file, kind: replace(once, columns=columns, words={"trial": names})
+    )
+    assert SOFT_NECK.steps is not None
+    steps = SOFT_NECK.steps(files)
+    assert [part.name for part in steps[:3]] == ["step 1, 0 g", "step 2, 0 g", "step 1, 200 g"] and len(steps) == 12
+    for part in steps:
+        np.testing.assert_allclose(part.measured, np.outer(part.time, (4e-3, 5e-3)), atol=1e-9)
 
 
 def test_patterns_are_in_the_order_of_time_and_each_begins_at_the_straight_robot(
@@ -113,13 +129,14 @@ def test_every_sheet_of_the_probe_is_by_itself_and_thinned_to_1500_samples(
     rows: int, step: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     sheets = np.repeat(["up", "down"], rows)
-    book = log(np.tile(np.arange(float(rows)), 2), 2, ("bend_y", "bend_z"), sheets)
-    plain = log(np.arange(90.0), 2, ("bend_y", "bend_z"))
+    time = 0.1 * np.arange(float(rows))
+    book = log(np.tile(time, 2), 2, ("bend_y", "bend_z"), sheets)
+    plain = log(0.1 * np.arange(90.0), 2, ("bend_y", "bend_z"))
     cases = recordings_of(TEE_PROBE, given(monkeypatch, {"book.xlsx": book, "plain.xlsx": plain}))
     parts = [part for (part,) in cases]
     assert [part.name for part in parts] == ["book.xlsx, up", "book.xlsx, down", "plain.xlsx"]
     assert parts[0].time.tolist() == list(range(0, rows, step))
-    np.testing.assert_allclose(parts[0].spools[:, 1], 2e-3 * parts[0].time)
+    np.testing.assert_allclose(parts[0].spools[:, 1], 2e-4 * parts[0].time)
     for part in parts:
         assert part.fitted.all() and part.asked.all() and not part.zeroing.any()
         assert np.isnan(part.pause[0]) and (part.pause[1:] == 1.0).all()

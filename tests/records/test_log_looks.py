@@ -268,3 +268,134 @@ def test_a_wrist_with_slack_and_friction_is_sound() -> None:
     columns = {"time": time, "bend_y": bend, "spool_1": spools[:, 0], "spool_2": spools[:, 1]}
     sound = OpenLog(Path("made.csv"), "log", columns)
     assert looked_at(sound) is sound
+
+
+def told_of(log: OpenLog) -> str:
+    """What the looks say of a log, or why they refuse it."""
+    try:
+        return " ".join(looked_at(log, tendon_offset=0.0141).remarks)
+    except UserError as refused:
+        return str(refused)
+
+
+@pytest.mark.parametrize("tendon", [1, 2])
+def test_one_spool_with_the_other_sign_is_refused_with_what_mends_it(tendon: int, tmp_path: Path) -> None:
+    table = pd.read_csv(FIELD / "clean.csv")
+    table[f"spool_{tendon} [mm]"] *= -1.0
+    table.to_csv(tmp_path / "sign.csv", index=False)
+    with pytest.raises(UserError, match=f"reel in together.*spool_{tendon} with the other sign") as refused:
+        looked_at(read_log(tmp_path / "sign.csv"))
+    log = looked_at(read_log(tmp_path / "sign.csv", refused.value.fix.split("'")[1]))
+    np.testing.assert_allclose(log.columns[f"spool_{tendon}"], read_log(FIELD / "clean.csv").columns[f"spool_{tendon}"])
+
+
+@pytest.mark.parametrize("size", [2048, 4096])
+def test_a_counter_that_wraps_at_a_turn_is_refused_at_the_line_where_it_jumps(size: int) -> None:
+    clean = read_log(FIELD / "clean.csv").columns["spool_1"]
+    counts = np.round(clean / 2e-6).astype(int)
+    wrapped = changed("spool_1", lambda spool: 2e-6 * ((counts - int(np.median(counts))) % size))
+    first = int(np.flatnonzero(np.abs(np.diff(wrapped.columns["spool_1"])) > 1e-6 * size)[0]) + 3
+    assert f"clean.csv:{first} - fix: a counter that wraps" in told_of(wrapped)
+
+
+def test_steps_that_the_wrist_follows_are_no_jumps() -> None:
+    clean = read_log(FIELD / "clean.csv")
+    stepped = {name: column[np.arange(len(clean)) // 100 * 100] for name, column in clean.columns.items()}
+    assert "jumps" not in told_of(replace(clean, columns={**stepped, "time": clean.columns["time"]}))
+
+
+def test_a_step_of_one_tendon_that_the_wrist_follows_is_no_jump() -> None:
+    clean = read_log(FIELD / "clean.csv")
+    after = np.arange(len(clean)) >= 500
+    moved = {"spool_1": 2e-3 * after, "bend_y": 0.5 * 2e-3 / 0.0141 * after}
+    columns = {name: column + moved.get(name, 0.0) for name, column in clean.columns.items()}
+    assert "jumps" not in told_of(replace(clean, columns=columns))
+    assert "jumps" in told_of(replace(clean, columns={**columns, "bend_y": clean.columns["bend_y"]}))
+
+
+@pytest.mark.parametrize("name", ["bend_y", "spool_2"])
+def test_cells_that_stand_alone_are_told_with_their_lines(name: str) -> None:
+    wrong = changed(name, lambda column: 3.0 * column + 0.005, slice(333, 334))
+    told = told_of(wrong)
+    assert f"clean.csv:335: a cell stands alone in {name}" in told
+
+
+@pytest.mark.parametrize(
+    ("names", "rows"),
+    [(("bend_y",), 12), (("spool_1",), 12), (("spool_1", "spool_2"), 12), (("spool_1", "spool_2"), 80)],
+)
+def test_short_standstills_are_told_where_a_column_catches_up_in_one_step(names: tuple[str, ...], rows: int) -> None:
+    clean = read_log(FIELD / "clean.csv")
+    begin = int(np.argmax(np.abs(np.gradient(clean.columns["spool_1"]))[100:800])) + 100
+    columns = dict(clean.columns)
+    for name in names:
+        columns[name] = columns[name].copy()
+        columns[name][begin : begin + rows] = columns[name][begin]
+    assert f"clean.csv:{begin + 2} to {begin + 1 + rows}: {names[0]} stands at" in told_of(
+        replace(clean, columns=columns)
+    )
+
+
+@pytest.mark.parametrize("early", [0.05, 0.2])
+def test_a_motion_that_comes_before_its_pull_is_told(early: float) -> None:
+    time = read_log(FIELD / "clean.csv").columns["time"]
+    assert "ahead of the spools" in told_of(changed("bend_y", lambda bend: np.interp(time + early, time, bend)))
+
+
+def test_two_planes_that_are_late_are_told() -> None:
+    time = 0.02 * np.arange(600.0)
+    bends = [0.3 * np.sin(1.7 * time) * np.cos(0.4 * time), 0.25 * np.sin(2.3 * time + 1.0)]
+    angles = np.radians([0.0, 120.0, 240.0])
+    spools = {f"spool_{k + 1}": 0.02 * (np.cos(a) * bends[0] + np.sin(a) * bends[1]) for k, a in enumerate(angles)}
+    for late, told in ((0.0, ""), (0.6, "0.6 s behind the spools")):
+        seen = {
+            name: np.interp(time - late, time, bend) for name, bend in zip(("bend_y", "bend_z"), bends, strict=True)
+        }
+        log = OpenLog(Path("made.csv"), "log", {"time": time, **seen, **spools})
+        assert told in told_of(log) and bool(told) == bool(told_of(log))
+
+
+def test_a_spool_of_another_unit_than_the_other_is_told() -> None:
+    assert "spool_2 goes with the wrist, and moves 0.01" in told_of(changed("spool_2", lambda spool: 1e-3 * spool))
+
+
+@pytest.mark.parametrize("size", [256, 1000])
+def test_a_counter_that_wraps_every_few_rows_does_not_go_with_the_wrist(size: int) -> None:
+    wrapped = changed("spool_1", lambda spool: 2e-6 * (np.round(spool / 2e-6) % size))
+    assert "spool_1 does not go with the wrist as spool_2 does" in told_of(wrapped)
+
+
+@pytest.mark.parametrize(("unit", "factor"), [("[rad]", 1.0), ("[deg]", np.pi / 180.0)])
+def test_bends_under_the_other_unit_of_angles_are_asked_for(unit: str, factor: float, tmp_path: Path) -> None:
+    table = pd.read_csv(FIELD / "clean.csv").rename(columns={"bend_y [deg]": f"bend_y {unit}"})
+    table[f"bend_y {unit}"] *= 0.5 * factor
+    table[["spool_1 [mm]", "spool_2 [mm]"]] *= 0.5
+    table.to_csv(tmp_path / "angles.csv", index=False)
+    with pytest.raises(UserError, match=r"in deg|in rad") as refused:
+        looked_at(read_log(tmp_path / "angles.csv"), tendon_offset=0.0141)
+    assert "--columns 'bend_y=bend_y" in refused.value.fix
+
+
+@pytest.mark.parametrize("row", [20, 40, 900])
+def test_a_clock_that_starts_again_near_an_end_parts_the_log_there(row: int) -> None:
+    log = changed("time", lambda time: time - time[0], slice(row, None))
+    trials = looked_at(log).trials()
+    assert [len(trial) for trial in trials.values()] == [row, len(log) - row]
+
+
+def test_trials_with_a_name_are_parted_where_their_clock_starts_again() -> None:
+    log = changed("time", lambda time: time - time[0], slice(500, None))
+    named = replace(log, words={"trial": np.full(len(log), "push")})
+    assert list(looked_at(named).trials()) == ["push, 1", "push, 2"]
+
+
+def test_whole_seconds_over_hours_are_asked_for_their_unit() -> None:
+    assert "is it in ms" in told_of(changed("time", lambda time: np.round(1e3 * np.arange(len(time)))))
+
+
+@pytest.mark.parametrize(("millimetres", "rows"), [(0.13, 1), (0.0, 40), (0.02, 1)])
+def test_spools_that_scatter_are_told_and_staircases_are_not(millimetres: float, rows: int) -> None:
+    rng = np.random.default_rng(0)
+    held = np.arange(1000) // rows * rows
+    told = told_of(changed("spool_1", lambda spool: spool[held] + 1e-3 * millimetres * rng.standard_normal(1000)))
+    assert ("spool_1 scatter by 0.1" in told) == (millimetres > 0.1) and ("scatter" in told) == (millimetres > 0.1)

@@ -16,8 +16,8 @@ from scipy.stats import t as student
 from wristctl.arrays import Array
 from wristctl.identification.arc_robot import SLACK_ERROR, ArcRecording, ArcRobot, Term
 from wristctl.identification.intervals import NORMAL_95
+from wristctl.identification.prediction_scores import squares_of_blocks
 
-_DRAWS, _SEED = 4000, 0
 _ZERO_SCALE = {"bend": 0.02, "tip": 2e-3}
 # Range in which zero and slack are looked for [rad or m, m], and change of a difference over the usual change.
 _ZERO_RANGE, _SLACK_RANGE, _STEP = 1.0, 1.5e-2, 1e-4
@@ -26,17 +26,10 @@ _ZERO_RANGE, _SLACK_RANGE, _STEP = 1.0, 1.5e-2, 1e-4
 _ERROR, _ERROR_BESIDE = {"bend": math.radians(1.0), "tip": 2e-3}, 0.5
 # Where samples are weighed: searches, and the least of these errors over that.
 _SEARCHES, _LEAST_ERROR = 3, 1e-3
+# Time [s] after which errors of a log that is read between its rows are of other rows.
+_FRAME = 0.04
 # Share of a block's error in a direction that the fit leaves at least.
 _LEAST_LEFT = 1e-6
-
-
-class Score(NamedTuple):
-    """RMS error with its 95 % interval, and the number of blocks that were drawn for it."""
-
-    error: float
-    low: float
-    high: float
-    blocks: int
 
 
 class Told(NamedTuple):
@@ -69,6 +62,8 @@ class ArcFit:
     """Whether the mean of the error over what is predicted does not count, as its authors have it."""
     weights: tuple[float, float] = (1.0, 1.0)
     """Error of a sample of the motion and of one beside it, over the usual."""
+    predicts: bool = True
+    """Whether its model predicts what was left out: of one that does not no unknown is told."""
 
     @property
     def numbers(self) -> int:
@@ -103,15 +98,26 @@ class ArcFit:
         wrong = np.concatenate([e[getattr(r, part)] for e, r in zip(self.errors, self.recordings, strict=True)])
         return float(np.sqrt(np.mean(np.sum(wrong**2, axis=1)))) if len(wrong) else math.nan
 
+    def missed(self) -> float:
+        """Share of the motion of the predicted part that its errors are (RMS), without what differs from row to row.
+
+        The latter is noise, by how far each error lies beside the mean of those a camera's frame away.
+        """
+        wrong, noise, moved = list[Array](), list[Array](), list[Array]()
+        for errors, recording in zip(self.errors, self.recordings, strict=True):
+            wrong.append(errors[recording.asked])
+            away = max(1, int(_FRAME / float(np.nanmedian(recording.pause))))
+            beside = errors[away:-away] - 0.5 * (errors[: -2 * away] + errors[2 * away :])
+            noise.append(beside[recording.asked[away:-away]] / math.sqrt(1.5))
+            moved.append(recording.measured[recording.asked])
+        squares, noises = (float(np.mean(np.sum(np.concatenate(x) ** 2, axis=1))) for x in (wrong, noise))
+        whole = float(np.nansum(np.nanvar(np.concatenate(moved), axis=0)))
+        return math.sqrt(max(0.0, squares - noises) / whole) if whole else math.inf
+
     @cached_property
     def squares(self) -> tuple[Array, Array]:
         """Sum of squared errors and number of samples of each block of what was predicted."""
-        parts = [(e[r.asked], r.block[r.asked]) for e, r in zip(self.errors, self.recordings, strict=True)]
-        wrong, block = np.concatenate([part[0] for part in parts]), np.concatenate([part[1] for part in parts])
-        if self.centred:
-            wrong = wrong - wrong.mean(axis=0)
-        squares, numbers = np.sum(wrong**2, axis=1), np.unique(block, return_inverse=True)[1]
-        return np.bincount(numbers, squares).astype(float), np.bincount(numbers).astype(float)
+        return squares_of_blocks(self.errors, self.recordings, self.centred)
 
     def asked_of(self, recording: ArcRecording) -> ArcFit:
         """The same unknowns on another recording, whose zeroing samples give its zero; it is taken to have no slack."""
@@ -149,7 +155,7 @@ class ArcFit:
             at_end = min(value - unknown.low, unknown.high - value) < 1e-2 * unknown.scale
             wide = not self.robot.is_told(name, value, half)
             ends = (max(low, unknown.low), high)
-            if wide or (at_end and unknown.low != 0.0):
+            if wide or (at_end and unknown.low != 0.0) or not self.predicts:
                 ends = (-math.inf, math.inf)
             told[name] = Told(value, ends[0], ends[1], unknown.unit, unknown.meaning)
         return told
@@ -178,22 +184,6 @@ def by_blocks(slopes: Array, residual: Array, blocks: NDArray[np.int64], root: A
     return scores, np.maximum(freedom, 1.0)
 
 
-def score_of(fits: Sequence[ArcFit]) -> Score:
-    """RMS error of what was predicted, with an interval by a bootstrap of its blocks."""
-    sums, counts = (np.concatenate(parts) for parts in zip(*(fit.squares for fit in fits), strict=True))
-    drawn = _drawn(len(sums))
-    low, high = np.quantile(np.sqrt(sums[drawn].sum(axis=1) / counts[drawn].sum(axis=1)), [0.025, 0.975])
-    return Score(math.sqrt(sums.sum() / counts.sum()), float(low), float(high), len(sums))
-
-
-def ratio_of(fits: Sequence[ArcFit], others: Sequence[ArcFit]) -> Score:
-    """Error of what was predicted over that of other fits of the same, paired by blocks."""
-    mine, theirs = (np.concatenate([fit.squares[0] for fit in some]) for some in (fits, others))
-    drawn = _drawn(len(mine))
-    low, high = np.quantile(np.sqrt(mine[drawn].sum(axis=1) / theirs[drawn].sum(axis=1)), [0.025, 0.975])
-    return Score(math.sqrt(mine.sum() / theirs.sum()), float(low), float(high), len(mine))
-
-
 def fit_arcs(
     robot: ArcRobot, terms: Sequence[Term], recordings: Sequence[ArcRecording], centred: bool = False,
     begin: Mapping[str, float] | None = None,
@@ -219,10 +209,6 @@ def fit_arcs(
         if recording.session not in whole:
             whole[recording.session] = problem.zeroed(unknowns, recording)
     return ArcFit(robot, tuple(terms), tuple(recordings), x, whole, centred, problem.weights)
-
-
-def _drawn(blocks: int) -> NDArray[np.int64]:
-    return np.random.default_rng(_SEED).integers(blocks, size=(_DRAWS, blocks))
 
 
 def _parted(own: Array, robot: ArcRobot) -> tuple[Array, Array]:

@@ -10,8 +10,9 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
-from wristctl.identification.arc_fit import ArcFit, Score, fit_arcs, ratio_of, score_of
+from wristctl.identification.arc_fit import ArcFit, fit_arcs
 from wristctl.identification.arc_robot import OF_TERM, ArcRecording, ArcRobot, Term
+from wristctl.identification.prediction_scores import Score, ratio_of, score_of
 
 # Beginnings of the search for presliding [m] and [rad]: its errors have several minima. Else it begins where the model
 # without the term ends.

@@ -14,6 +14,7 @@ from wristctl.arrays import Array
 from wristctl.errors import UserError
 from wristctl.identification.arc_robot import ArcRecording, ArcRobot, window_means
 from wristctl.records.log_converters import read_log
+from wristctl.records.log_looks import looked_at, telling
 from wristctl.records.open_log import OpenLog
 
 Cases = list[list[ArcRecording]]
@@ -68,9 +69,13 @@ def _tips(log: OpenLog) -> Array:
     return np.column_stack([log.whole(f"tip_{axis}") for axis in "xyz"])
 
 
-def _neck_recording(file: Path, name: str, fitted: bool, zeroing: float) -> ArcRecording:
+def _looked_at(file: Path, kind: str) -> OpenLog:
+    """A recording with the looks that a log of one's own has; what they say is warned of."""
+    return telling(looked_at(read_log(file, kind)))
+
+
+def _neck_recording(log: OpenLog, name: str, fitted: bool, zeroing: float) -> ArcRecording:
     """Means over 0.1 s of a recording of the soft neck."""
-    log = read_log(file, "humasoft")
     time, bends, spools = log.whole("time"), log.bends(), _spools(log, 3)
     assert bends is not None  # the converter refuses files without
     at = np.arange(time[0] + 0.5 * _PERIOD, time[-1] - 0.5 * _PERIOD, _PERIOD)
@@ -87,22 +92,25 @@ def _neck_recording(file: Path, name: str, fitted: bool, zeroing: float) -> ArcR
 def _neck(files: Mapping[str, Path]) -> Cases:
     loads = {0: True, 1000: True, 500: False}
     endings = {load: f"imu_openloop/spring_test_{load}gr.csv" for load in loads}
-    parts = [_neck_recording(files[endings[load]], f"{load} g", fitted, ZEROS_UNTIL) for load, fitted in loads.items()]
-    return [parts]
+    logs = {load: _looked_at(files[ending], "humasoft") for load, ending in endings.items()}
+    return [[_neck_recording(logs[load], f"{load} g", fitted, ZEROS_UNTIL) for load, fitted in loads.items()]]
 
 
 def _neck_steps(files: Mapping[str, Path]) -> list[ArcRecording]:
-    endings = {
-        load: f"imu_closeloop/frontier_test_{load}gr.csv" for load in ("000", "200", "400", "600", "800", "1000")
-    }
-    return [_neck_recording(files[name], f"step, {int(load)} g", False, _RESTS) for load, name in endings.items()]
+    """Every step of the closed loops: a file has several, each with a clock that starts again."""
+    steps = []
+    for load in ("000", "200", "400", "600", "800", "1000"):
+        log = _looked_at(files[f"imu_closeloop/frontier_test_{load}gr.csv"], "humasoft")
+        for number, trial in enumerate(log.trials().values(), 1):
+            steps.append(_neck_recording(trial, f"step {number}, {int(load)} g", False, _RESTS))
+    return steps
 
 
 def _opencr(files: Mapping[str, Path]) -> Cases:
     """Rows in the order of time; a pattern, with the rows where it is held, begins at the straight robot."""
     parts = []
     for ending, file in files.items():
-        log = read_log(file, "opencr")
+        log = _looked_at(file, "opencr")
         patterns = np.array([str(word).removesuffix("_hold") for word in log.words["trial"]])
         fitted = np.full(len(log), ending.endswith("_train.csv"))
         parts.append((log.whole("time"), _spools(log, 9), _tips(log), patterns, fitted))
@@ -125,7 +133,7 @@ def _silicone_arm(files: Mapping[str, Path]) -> Cases:
     """Of each day the first half is fitted and the second predicted."""
     cases: Cases = []
     for name, file in files.items():
-        log = read_log(file, "deepc-arm")
+        log = _looked_at(file, "deepc-arm")
         if "spool_1" not in log.columns:  # tips of the closed loops
             continue
         time = log.whole("time")
@@ -142,7 +150,7 @@ def _probe(files: Mapping[str, Path]) -> Cases:
     """Every sheet is fitted by itself, whole; thinned to no more samples than a cycle needs."""
     cases: Cases = []
     for name, file in files.items():
-        for sheet, log in read_log(file, "tee-probe").trials().items():
+        for sheet, log in _looked_at(file, "tee-probe").trials().items():
             bends = log.bends()
             assert bends is not None
             kept = np.arange(0, len(log), max(1, math.ceil(len(log) / _MOST)))

@@ -6,10 +6,8 @@ import logging
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
-import pandas as pd
 from numpy.typing import NDArray
 
 from wristctl.arrays import Array
@@ -27,6 +25,8 @@ from wristctl.records.column_ranges import (
 )
 from wristctl.records.log_columns import ANGLE, BENDS, LENGTH, Units, units_of
 from wristctl.records.log_counters import without_wraps
+from wristctl.records.log_jumps import jumps_told
+from wristctl.records.log_order import in_order, parted, place_of, without_repeats
 from wristctl.records.log_sensors import sensors_told
 from wristctl.records.open_log import OpenLog
 
@@ -35,12 +35,14 @@ _log = logging.getLogger(__name__)
 # Bend [rad], spool [m], tension [N] and current [A] beyond any wrist's; steady steps [s] over a time [s] that no motion
 # takes.
 _BEND, _SPOOL, _TENSION, _CURRENT, _STEP, _LONG = 4.0 * math.pi, 2.0, 5000.0, 100.0, 5.0, 3600.0
+# Steps [s] over a time of _LONG that may be those of ms read as s.
+_SLOW = 0.9
 # Way [m] between two samples, and its speed [m/s], that no motor makes; speed of most steps that no motor has [m/s].
-_JUMP, _SPEED, _MOSTLY = 0.02, 2.0, 10.0
-# Correlation of bend and pull from which the senses are opposite.
-_OPPOSITE = -0.9
-# Rows within which one that stands twice, or out of order, is a slip of the recorder, not the start of another trial.
-_NEAR = 50
+_JUMP, _SPEED, _MOSTLY = 0.02, 2.0, 1.0
+# Correlation of bend and pull from which the senses are opposite, and of bend and both spools from which one's sign is.
+_OPPOSITE, _TOGETHER_WITH = -0.9, 0.9
+# Factor within which spools go as far as the bend takes where only the bend's unit is in question.
+_NEARLY = 3.0
 # Number of its usual steps, and time [s], that a recording may skip without a word.
 _GAP, _PAUSE = 10.0, 0.1
 # Length [m] by which all tendons together are reeled in on no wrist.
@@ -66,90 +68,14 @@ def looked_at(log: OpenLog, motion: bool = True, tendon_offset: float | None = N
     """
     if "time" in log.columns:
         log.without_gaps("time")
-    log = _in_order(_parted(_without_repeats(without_wraps(log))))
+    log = in_order(parted(without_repeats(without_wraps(log))))
     _check_units(log, TENDON_OFFSET if tendon_offset is None else tendon_offset)
     if tendon_offset is not None:
         _check_ways(log, tendon_offset)
     _check_spools(log, motion)
     _check_senses(log)
-    told = [*_gaps(log), *_zeros(log), *sensors_told(log)]
+    told = [*jumps_told(log), *_slow_clock(log), *_gaps(log), *_zeros(log), *sensors_told(log)]
     return replace(log, remarks=[*log.remarks, *told]) if told else log
-
-
-def _without_repeats(log: OpenLog) -> OpenLog:
-    if "time" not in log.columns or len(log) < 2:
-        return log
-    rows = pd.DataFrame({**log.columns, **log.words})
-    if not rows.duplicated().any():
-        return log
-    same_rows = pd.Series(np.arange(len(log))).groupby([rows[name] for name in rows], sort=False, dropna=False)
-    before = same_rows.transform("min").to_numpy(dtype=int)
-    behind = np.arange(len(log)) - before
-    same = (behind > 0) & (behind < _NEAR)
-    if not same.any():
-        return log
-    kept, time = np.ones(len(log), dtype=bool), log.columns["time"]
-    for later in np.flatnonzero(same):
-        earlier = int(before[later])
-        # Of two rows that are apart, the one that is out of order goes.
-        early = earlier + 1 < later and time[earlier + 1] < time[earlier]
-        kept[earlier if early else later] = False
-    first = _place(log, int(np.flatnonzero(~kept)[0]))
-    remark = f"{np.sum(~kept)} rows that stand twice, with their time, are used once; the first is at {first}."
-    return replace(log.only(kept), remarks=[*log.remarks, remark])
-
-
-def _parted(log: OpenLog) -> OpenLog:
-    """With a trial for each start of the clock, where no column says the trials."""
-    if "time" not in log.columns or "trial" in log.words:
-        return log
-    time = log.columns["time"]
-    back = np.flatnonzero(np.diff(time) < 0.0) + 1
-    # A clock that restarts is back near its start; single samples out of order are not.
-    starts = [k for k in back if time[k] - time[0] < 0.1 * (time[k - 1] - time[0]) and not _returns(time, int(k))]
-    if not starts:
-        return log
-    trials = 1 + np.searchsorted(np.array(starts), np.arange(len(log)), side="right")
-    places = ", ".join(_place(log, int(k)) for k in starts[:3])
-    remark = f"The clock starts again at {places}: each start is a trial of its own, {len(starts) + 1} in all."
-    return replace(log, words={**log.words, "trial": trials.astype(str)}, remarks=[*log.remarks, remark])
-
-
-def _returns(time: Array, row: int) -> bool:
-    """Whether a time that goes back at a row is where it was soon: single rows have come late."""
-    after = time[row : row + _NEAR]
-    return bool((after >= time[row - 1]).any())
-
-
-def _in_order(log: OpenLog) -> OpenLog:
-    """With each trial's rows in the order of their times. Raises UserError where many would move."""
-    if "time" not in log.columns:
-        return log
-    parts = [np.arange(len(log))]
-    if "trial" in log.words:
-        parts = [np.flatnonzero(log.words["trial"] == name) for name in dict.fromkeys(log.words["trial"])]
-    order, moved = np.arange(len(log)), list[int]()
-    for rows in parts:
-        time = log.columns["time"][rows]
-        if not (np.diff(time) < 0.0).any():
-            continue
-        sorted_rows = np.argsort(time, kind="stable")
-        far = np.abs(sorted_rows - np.arange(len(rows)))
-        if int(far.max()) > _NEAR:
-            late = int(rows[np.flatnonzero(np.diff(time) < 0.0)[0] + 1])
-            step = float(log.columns["time"][late - 1] - log.columns["time"][late])
-            problem = f"{log.head('time')} goes back by {step:.4g} s"
-            raise UserError(problem, log.at(late), "two recordings in one? Give each its own trial in a column trial")
-        moved += rows[np.flatnonzero(np.diff(time) < 0.0) + 1].tolist()
-        order[rows] = rows[sorted_rows]
-    if not moved:
-        return log
-    columns = {name: column[order] for name, column in log.columns.items()}
-    words = {name: column[order] for name, column in log.words.items()}
-    lines = np.asarray(log.lines)[order].tolist() if log.lines else ()
-    first = _place(log, moved[0])
-    remark = f"{len(moved)} rows that come late are put in the order of their times; the first is at {first}."
-    return replace(log, columns=columns, words=words, lines=lines, remarks=[*log.remarks, remark])
 
 
 def _check_units(log: OpenLog, tendon_offset: float) -> None:
@@ -157,7 +83,7 @@ def _check_units(log: OpenLog, tendon_offset: float) -> None:
         column = np.abs(log.columns.get(name, np.empty(0)))
         if np.any(column > _BEND):
             reached, where = math.degrees(float(np.nanmax(column))), log.at(int(np.nanargmax(column)))
-            fix = _fix(log, "is it in degrees?", {name: (log.head(name), "deg")})
+            fix = columns_fix(log, "is it in degrees?", {name: (log.head(name), "deg")})
             raise UserError(f"{log.head(name)} reaches {reached:,.0f} deg by its header", where, fix)
     for name, column in _tendons(log, "spool").items():
         reach = float(np.nanmax(column) - np.nanmin(column))
@@ -173,14 +99,14 @@ def _check_units(log: OpenLog, tendon_offset: float) -> None:
     for name, column in _tendons(log, "current").items():
         if float(np.nanmax(np.abs(column))) > _CURRENT:
             problem = f"{log.head(name)} reaches {float(np.nanmax(np.abs(column))):,.0f} A by its header"
-            fix = _fix(log, "is it in mA?", {name: (log.head(name), "mA")})
+            fix = columns_fix(log, "is it in mA?", {name: (log.head(name), "mA")})
             raise UserError(problem, log.at(int(np.nanargmax(np.abs(column)))), fix)
     for trial in log.trials().values():
         steps = np.diff(trial.columns.get("time", np.empty(0)))
         slow = steps.size > 0 and float(np.min(steps)) > _STEP and float(np.sum(steps)) > _LONG
         if slow and float(np.ptp(steps)) < 0.01 * float(np.median(steps)):
             problem = f"{float(np.median(steps)):.3g} s between samples of {log.head('time')}"
-            raise UserError(problem, trial.at(1), _fix(log, "is it in ms?", {"time": (log.head("time"), "ms")}))
+            raise UserError(problem, trial.at(1), columns_fix(log, "is it in ms?", {"time": (log.head("time"), "ms")}))
 
 
 def _check_ways(log: OpenLog, tendon_offset: float) -> None:
@@ -190,15 +116,18 @@ def _check_ways(log: OpenLog, tendon_offset: float) -> None:
         return
     furthest = max(spools, key=lambda name: np.nan_to_num(_range(log, name)))
     moved, way = _range(log, furthest), way_of_bend(_bends(log), tendon_offset)
+    if not way > 0.0 and any(_is_in_rad(log, name) for name in BENDS):  # too small to tell more than its unit
+        turned = way_of_bend([bend / ANGLE["deg"] for bend in _bends(log)], tendon_offset)
+        way = turned * ANGLE["deg"] if not _is_off(moved, turned, 1.0, _NEARLY) else way
     if not (moved > 0.0 and way > 0.0 and _is_off(moved, way, log.scales[furthest])):
         return
     problem = f"{log.head(furthest)} moves {_in_mm(moved)} mm, and the bend takes {_in_mm(way)} mm"
     raise UserError(problem, log.header or str(log.file), _of_other_units(log, tendon_offset))
 
 
-def _is_off(moved: float, way: float, scale: float) -> bool:
+def _is_off(moved: float, way: float, scale: float, factor: float | None = None) -> bool:
     """Whether a spool with such a factor to SI moves much further, or less far [m], than the bend takes [m]."""
-    factor = FACTOR_OF_A_UNIT if scale in LENGTH.values() else FACTOR_OF_A_COUNT
+    factor = factor or (FACTOR_OF_A_UNIT if scale in LENGTH.values() else FACTOR_OF_A_COUNT)
     return not way / factor <= moved <= way * factor
 
 
@@ -215,10 +144,13 @@ def _of_other_units(log: OpenLog, tendon_offset: float) -> Phrase:
     turned = 1.0 / ANGLE["deg"] if in_rad else 1.0
     way = way_of_bend([turned * bend for bend in _bends(log)], tendon_offset)
     moves = {name: moved for name in spools if (moved := _range(log, name)) > 0.0}
+    in_deg = {name: (log.head(name), "deg") for name in BENDS if log.scales.get(name) == 1.0}
+    if in_deg and way > 0.0 and moves and not _is_off(max(moves.values()), way * ANGLE["deg"], 1.0, _NEARLY):
+        return columns_fix(log, f"is {log.head(next(iter(in_deg)))} in deg?", in_deg)
     if not (way > 0.0 and moves):
         moved = max(float(np.nanmax(column) - np.nanmin(column)) for column in _tendons(log, "spool").values())
         if all(log.scales[name] == 1.0 for name in spools) and 1e-3 * moved < _SPOOL:
-            return _fix(log, "is it in mm?", {name: (log.head(name), "mm") for name in spools})
+            return columns_fix(log, "is it in mm?", {name: (log.head(name), "mm") for name in spools})
         most = count_of(_SPOOL / moved * abs(log.scales[spools[0]]))
         return f"the length that one count reels in: less than {most}, for no wrist reels in {_SPOOL:g} m"
     off = [name for name, moved in moves.items() if _is_off(moved, way, log.scales[name])]
@@ -231,10 +163,10 @@ def _of_other_units(log: OpenLog, tendon_offset: float) -> Phrase:
     }
     meant = in_rad | {name: (log.head(name), unit) for name, unit in units.items()}
     if in_rad:
-        return _fix(log, f"is {log.head(next(iter(in_rad)))} in rad?", meant)
+        return columns_fix(log, f"is {log.head(next(iter(in_rad)))} in rad?", meant)
     unit = units[off[0]]
     question = f"is it in {unit}?" if unit in LENGTH else f"{count_told(unit.removeprefix('-'), tendon_offset)}."
-    return _fix(log, question, meant)
+    return columns_fix(log, question, meant)
 
 
 def _range(log: OpenLog, name: str) -> float:
@@ -284,7 +216,7 @@ def _jumps(trial: OpenLog, names: Sequence[str]) -> dict[str, Array]:
         moving = (ways > 0.0) & (steps > 0.0)
         if moving.sum() >= 20 and float(np.median(ways[moving] / steps[moving])) > _MOSTLY:
             problem = f"{trial.head(name)} moves at {float(np.median(ways[moving] / steps[moving])):.3g} m/s"
-            fix = _fix(trial, f"is {trial.head('time')} in s?", {"time": (trial.head("time"), "s")})
+            fix = columns_fix(trial, f"is {trial.head('time')} in s?", {"time": (trial.head("time"), "s")})
             raise UserError(problem, trial.at(int(there[1])), fix)
         fast = (ways > _JUMP) & (ways > _SPEED * steps)
         found[name] = np.stack([there[1:][fast], ways[fast]], axis=1)
@@ -298,38 +230,69 @@ def _check_senses(log: OpenLog) -> None:
     )
     if not pulls or "bend_y" not in log.columns or "bend_z" in log.columns:
         return
-    first = next(iter(pulls))
+    one, two = pulls
     for name, trial in {"": log, **log.trials()}.items():
         time = trial.columns.get("time", np.arange(len(trial), dtype=np.float64))
         bend = trial.columns["bend_y"]
         reeled = [_at_all(time, trial.columns[pull]) for pull in pulls]
-        pull = reeled[0] - reeled[1]
-        there = np.isfinite(bend) & np.isfinite(pull)
-        bend, pull = bend[there], pull[there]
-        moves = len(bend) > 2 and np.ptp(bend) > 0.0 and np.ptp(pull) > 0.0
-        if moves and float(np.corrcoef(bend, pull)[0, 1]) < _OPPOSITE:
-            act = "is reeled in" if first.startswith("spool") else "pulls more"
-            problem = f"{log.head('bend_y')} falls while tendon 1 {act}{f' in trial {name}' if name else ''}"
-            kind = first.partition("_")[0]
-            one, two = f"{kind}_1", f"{kind}_2"
+        there = np.isfinite(np.stack([bend, *reeled])).all(axis=0)
+        bend, first, second = (column[there] for column in (bend, *reeled))
+        within = f" in trial {name}" if name else ""
+        if _alike(bend, first - second) < _OPPOSITE:
+            act = "is reeled in" if one.startswith("spool") else "pulls more"
+            problem = f"{log.head('bend_y')} falls while tendon 1 {act}{within}"
             question = f"tendons 1 and 2 exchanged, or the bend counted the other way: exchange {one} and {two}."
-            fix = _fix(log, question, {one: (log.head(two), _unit(log, two)), two: (log.head(one), _unit(log, one))})
-            raise UserError(problem, log.header or str(log.file), fix)
+            exchanged = {one: (log.head(two), unit_read(log, two)), two: (log.head(one), unit_read(log, one))}
+            raise UserError(problem, log.header or str(log.file), columns_fix(log, question, exchanged))
+        likeness = _alike(bend, first), _alike(bend, second)
+        if one.startswith("spool") and min(likeness) * max(likeness) > 0.0 and min(map(abs, likeness)) > _TOGETHER_WITH:
+            wrong = two if likeness[0] > 0.0 else one
+            problem = f"{log.head(one)} and {log.head(two)} reel in together{within}, and the wrist bends"
+            turned = {wrong: (log.head(wrong), turned_unit(log, wrong))}
+            question = f"{log.head(wrong)} with the other sign?"
+            raise UserError(problem, log.header or str(log.file), columns_fix(log, question, turned))
 
 
-def _fix(log: OpenLog, question: str, meant: Mapping[str, tuple[str, str]]) -> Phrase:
+def _alike(one: Array, other: Array) -> float:
+    """Correlation of two columns; 0 where one does not move."""
+    if len(one) < 3 or np.ptp(one) == 0.0 or np.ptp(other) == 0.0:
+        return 0.0
+    return float(np.corrcoef(one, other)[0, 1])
+
+
+def _slow_clock(log: OpenLog) -> list[str]:
+    """A sentence where even steps of whole seconds make hours: they may be ms."""
+    if "time" not in log.columns:
+        return []
+    steps = np.diff(log.columns["time"])
+    whole = steps.size > 0 and bool(np.all(log.columns["time"] == np.round(log.columns["time"])))
+    if not (whole and float(np.median(steps)) > _SLOW and float(np.sum(steps)) > _LONG):
+        return []
+    return [
+        f"{place_of(log, 0)}: {log.head('time')} has rows {float(np.median(steps)):.3g} s apart over "
+        f"{float(np.sum(steps)) / 3600.0:.3g} h; is it in ms? Delay and damping go with it."
+    ]
+
+
+def turned_unit(log: OpenLog, name: str) -> str:
+    """Unit with which a column is read with the other sign."""
+    unit = unit_read(log, name)
+    return unit[1:] if unit.startswith("-") else f"-{unit}" if unit[0].isdigit() else f"-1 {unit}"
+
+
+def columns_fix(log: OpenLog, question: str, meant: Mapping[str, tuple[str, str]]) -> Phrase:
     """A question, and the text for `--columns` that answers it: names in the file and units by names in an open log."""
     if not all(name in log.heads for name in meant):
         return question
-    if all((log.head(name), _unit(log, name)) == column for name, column in meant.items()):
+    if all((log.head(name), unit_read(log, name)) == column for name, column in meant.items()):
         unit = next(iter(meant.values()))[1]
         return f"the numbers, or their unit: [0.1 {unit}] is a tenth of one"
-    mapped = {name: (log.head(name), _unit(log, name)) for name in log.scales if name in log.mapped}
+    mapped = {name: (log.head(name), unit_read(log, name)) for name in log.scales if name in log.mapped}
     text = ", ".join(f"{name}={head} [{unit}]" for name, (head, unit) in {**mapped, **meant}.items())
     return (f"{question} Then ", Argument("columns", text, quoted=True))
 
 
-def _unit(log: OpenLog, name: str) -> str:
+def unit_read(log: OpenLog, name: str) -> str:
     """Unit with which a column was read, or the multiple of one."""
     units, scale = units_of(name) or {"": 1.0}, log.scales.get(name, 1.0)
     unit = next((unit for unit, factor in units.items() if math.isclose(factor, scale, rel_tol=1e-9)), None)
@@ -348,7 +311,7 @@ def _gaps(log: OpenLog) -> list[str]:
             steps = np.diff(trial.columns["time"])
             usual = float(np.median(steps)) if steps.size else 0.0
             gaps = np.flatnonzero(steps > max(_GAP * usual, _PAUSE))
-            found += [(_place(trial, int(row) + 1), float(steps[row]), usual) for row in gaps]
+            found += [(place_of(trial, int(row) + 1), float(steps[row]), usual) for row in gaps]
     if not found:
         return []
     where, gap, usual = found[0]
@@ -369,7 +332,7 @@ def _zeros(log: OpenLog) -> list[str]:
         return []
     names = ", ".join(log.head(name) for name in spools)
     return [
-        f"{_place(log, 0)}: {names} are reeled in by {1e3 * together:.3g} mm in the mean; a spool counts from where "
+        f"{place_of(log, 0)}: {names} are reeled in by {1e3 * together:.3g} mm in the mean; a spool counts from where "
         "its tendon is just taut: slack and tendon stiffness are wrong unless you take that off in the file."
     ]
 
@@ -388,8 +351,3 @@ def _at_all(time: Array, column: Array) -> Array:
     if there.all() or not there.any():
         return column
     return np.interp(time, time[there], column[there], np.nan, np.nan)
-
-
-def _place(log: OpenLog, row: int) -> str:
-    """File's name and line of a row, for sentences."""
-    return Path(log.at(row)).name

@@ -2,26 +2,46 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 
 from wristctl.arrays import Array
+from wristctl.records.log_jumps import lone_cells
 from wristctl.records.open_log import OpenLog
 
+# Median of the absolute value of a normal variable, over its standard deviation; scatter [m] of a spool from which it
+# is noise, and least ratio of its fifth to its third differences.
+_MEDIAN, _SCATTER, _NOISE_LIKE = 0.6745, 5e-5, 0.8
 # Rows of a standstill, and share of its whole way that the rest moves meanwhile, from which a sensor stands alone.
 _ROWS, _MOVED = 20, 0.2
+# The same where it catches up in one step, and of a column in which at most such a share of the other rows stands.
+_FEW_ROWS, _MOVED_A_LITTLE, _NEVER = 4, 0.02, 0.02
 # Rows at an end of a sensor's range, and share of its way that the pull moves meanwhile.
 _AT_END, _BEYOND = 5, 0.1
 # Step at the end of a standstill over the largest of 99 in 100 others, from which the sensor had stood alone.
 _CATCHES_UP = 3.0
 # Delay [s], likeness with it, and how many times as far from one the likeness is without it, from which it is told.
 _LATE, _ALIKE, _BETTER = 0.25, 0.98, 4.0
+# The same of a motion that comes before its pull, which no wrist does.
+_EARLY, _BETTER_EARLY = 0.03, 2.0
+# Share of a spool's way that the motion says of one that goes with it, at most of one that does not, and least way of
+# that over the furthest spool's.
+_GOES, _GOES_NOT, _LEAST_WAY = 0.9, 0.5, 0.02
+# Most correlation of what the motion does not say of such a spool with the row before: a motion of its own is smooth.
+_ROUGH = 0.8
+# Share of the furthest spool's way below which one that goes with the motion is of another unit.
+_MUCH_LESS = 0.02
 # Most instants at which two streams are held against each other, and longest delay that is looked for [s].
 _INSTANTS, _LONGEST = 2000, 5.0
 # Delays to either side that are looked at first, and likeness that is as good as the best.
 _COARSE, _ALMOST = 50, 0.02
+
+
+_SEEN = ("bend_", "inclination", "tip_", "spool_", "tension_")
+"""Beginnings of the names of columns that a sensor gives."""
 
 
 class _Run(NamedTuple):
@@ -38,6 +58,8 @@ def sensors_told(log: OpenLog) -> list[str]:
     """
     name = next((name for name in ("bend_y", "bend_z", "inclination", "tip_y") if name in log.columns), None)
     told = list[str]()
+    for column in log.columns if "time" in log.columns else ():
+        told += lone_cells(log, column) if column.startswith(_SEEN) else []
     for trial in log.trials().values() if name else ():
         spools = [column for column in trial.columns if column.startswith("spool_")]
         time = trial.columns.get("time", np.arange(len(trial), dtype=np.float64))
@@ -58,12 +80,15 @@ def sensors_told(log: OpenLog) -> list[str]:
         told += _sentence(trial, name, seen, frozen, "stands at {value} while the spools move")
         for place, spool in enumerate(spools):
             others = np.delete(reeled, place, axis=1)
-            counted = np.flatnonzero(np.isfinite(trial.columns[spool]))
-            if len(counted) == len(seen) and others.size:
+            if others.size and np.isfinite(trial.columns[spool][seen]).all():
                 alone = _standing(reeled[:, place], motion, others)
                 told += _sentence(trial, spool, seen, alone, "stands at {value} while the wrist moves")
+        stand = [run for run in _standing(made, motion) if not np.ptp(reeled[run.first : run.last + 1], axis=0).any()]
+        told += _sentence(trial, spools[0], seen, stand, "stands at {value}, as all spools do, while the wrist moves")
+        told += _rough(trial, spools)
+        told += _apart(trial, spools, reeled, _motion_of(trial, seen))
         if "time" in trial.columns:
-            told += _late(trial, name, time[seen], motion, made)
+            told += _late(trial, name, time[seen], motion, reeled)
     return list(dict.fromkeys(told))[:6]
 
 
@@ -101,18 +126,39 @@ def _moved(column: Array, run: _Run) -> float:
 
 
 def _standing(column: Array, rest: Array, others: Array | None = None) -> list[_Run]:
-    """Runs in which a column stands while the rest moves, until it catches up in one step, or to the end."""
+    """Runs in which a column stands while the rest moves, until it catches up in one step, or to the end.
+
+    Short ones count where the rest moves far, and the column stands nowhere else.
+    """
     if not np.ptp(column):
         return []
     steps = np.abs(np.diff(column))
     usual = float(np.quantile(steps[steps > 0.0], 0.99))
     found = list[_Run]()
-    for run in _runs(column, _ROWS):
-        moves = _moved(rest, run) > _MOVED and (others is None or max(_moved(o, run) for o in others.T) > _MOVED)
+    for run in _runs(column, _FEW_ROWS):
+        way = min(_moved(rest, run), 1.0 if others is None else max(_moved(other, run) for other in others.T))
         ends = run.last + 1 == len(column)
-        if moves and (ends or steps[run.last] > _CATCHES_UP * usual or steps[run.last] > _MOVED * np.ptp(column)):
+        catches_up = not ends and steps[run.last] > _CATCHES_UP * usual
+        to_end = ends or catches_up or steps[run.last] > _MOVED * np.ptp(column)
+        long = way > _MOVED and to_end and run.last - run.first + 1 >= _ROWS
+        short = way > _MOVED_A_LITTLE and catches_up
+        alone = (way > 0.5 * _MOVED or (way > _MOVED_A_LITTLE and _jumps_after(steps, run))) and _moves_elsewhere(
+            steps, run
+        )
+        if long or short or alone:
             found.append(run)
     return found
+
+
+def _jumps_after(steps: Array, run: _Run) -> bool:
+    """Whether a step at the end of a run is far larger than those before it and after it."""
+    near = np.concatenate([steps[max(0, run.first - _ROWS) : max(0, run.first - 1)], steps[run.last + 1 :][:_ROWS]])
+    return run.last < len(steps) and bool(steps[run.last] > _CATCHES_UP * float(np.max(near, initial=0.0)))
+
+
+def _moves_elsewhere(steps: Array, run: _Run) -> bool:
+    """Whether a column with such steps stands hardly ever beside a run."""
+    return float(np.mean(np.delete(steps, np.arange(run.first, run.last)) == 0.0)) < _NEVER
 
 
 def _at_ends(motion: Array, made: Array) -> list[_Run]:
@@ -142,26 +188,83 @@ def _sentence(
     ]
 
 
-def _late(log: OpenLog, name: str, time: Array, motion: Array, made: Array) -> list[str]:
+def _motion_of(log: OpenLog, rows: np.ndarray[tuple[int], np.dtype[np.intp]]) -> Array:
+    """Bends, or the tip's way, at some rows (T, 2 or 3); of what is not measured nothing."""
+    bends = log.bends()
+    tips = [log.columns[name] for name in ("tip_x", "tip_y", "tip_z") if name in log.columns]
+    both = bends[rows] if bends is not None else np.stack(tips, axis=1)[rows]
+    moved: Array = np.nan_to_num(both - np.nanmean(both, axis=0))
+    return moved
+
+
+def _rough(log: OpenLog, spools: list[str]) -> list[str]:
+    """A sentence for spools that differ from row to row as noise does, not as a motion.
+
+    Differences of third and fifth order of noise are as large as their coefficients say; of a motion the fifth are
+    less.
+    """
+    sizes = dict[str, float]()
+    for spool in spools:
+        column = log.columns[spool][np.isfinite(log.columns[spool])]
+        third, fifth = (
+            float(np.median(np.abs(np.diff(column, order)))) / (_MEDIAN * math.sqrt(math.comb(2 * order, order)))
+            for order in (3, 5)
+        )
+        if third > _SCATTER and fifth > _NOISE_LIKE * third:
+            sizes[spool] = third
+    if not sizes:
+        return []
+    names = ", ".join(log.head(spool) for spool in sizes)
+    where = Path(log.header or str(log.file)).name
+    return [
+        f"{where}: {names} scatter by {1e3 * max(sizes.values()):.2g} mm from row to row, as noise does; a fit takes "
+        "that as pulls, and tendons as softer than they are."
+    ]
+
+
+def _apart(log: OpenLog, spools: list[str], reeled: Array, motion: Array) -> list[str]:
+    """A sentence for each spool that does not go with the motion where another does, or goes with it far less."""
+    moved = reeled - reeled.mean(axis=0)
+    ways = np.ptp(moved, axis=0)
+    left = moved - motion @ np.linalg.lstsq(motion, moved, rcond=1e-9)[0]
+    said = 1.0 - np.sum(left**2, axis=0) / np.maximum(np.sum(moved**2, axis=0), 1e-300)
+    if said.max() < _GOES:
+        return []
+    other, furthest = log.head(spools[int(said.argmax())]), log.head(spools[int(ways.argmax())])
+    where, told = Path(log.header or str(log.file)).name, list[str]()
+    for spool, share, way, own in zip(spools, said, ways, left.T, strict=True):
+        rough = float(own[1:] @ own[:-1]) < _ROUGH * float(own @ own)
+        if share < _GOES_NOT and way > _LEAST_WAY * ways.max() and rough:
+            cause = "is it a counter that wraps at every turn, or noise?"
+            told.append(f"{where}: {log.head(spool)} does not go with the wrist as {other} does; {cause}")
+        elif share > _GOES and way < _MUCH_LESS * ways.max():
+            told.append(
+                f"{where}: {log.head(spool)} goes with the wrist, and moves {1e3 * way:.2g} mm where {furthest} moves "
+                f"{1e3 * float(ways.max()):.2g} mm; is it in another unit?"
+            )
+    return told
+
+
+def _late(log: OpenLog, name: str, time: Array, motion: Array, reeled: Array) -> list[str]:
     """A sentence where a motion is like what the spools make of it at another time, and not at its own."""
     count = min(_INSTANTS, len(time))
     even = np.linspace(time[0], time[-1], count)
     step = float(even[1] - even[0])
-    if step <= 0.0 or np.ptp(made) == 0.0:
+    if step <= 0.0:
         return []
     most = min(count // 4, int(_LONGEST / step))
-    one, other = (np.interp(even, time, values) for values in (motion, made))
+    one, others = np.interp(even, time, motion), np.array([np.interp(even, time, spool) for spool in reeled.T]).T
     stride = max(1, most // _COARSE)
     coarse = np.arange(-(most // stride), most // stride + 1) * stride
-    alike = np.array([_likeness(one, other, int(lag)) for lag in coarse])
-    # Of either sense, for half a swing apart a motion looks turned round; of several alike the nearest lag.
-    near = coarse[np.abs(alike) > float(np.abs(alike).max()) - _ALMOST]
+    alike = np.array([_likeness(one, others, int(lag)) for lag in coarse])
+    near = coarse[alike > float(alike.max()) - _ALMOST]  # of several alike the nearest lag
     middle = int(near[np.argmin(np.abs(near))])
     fine = np.arange(max(-most, middle - 2 * stride), min(most, middle + 2 * stride) + 1)
-    likeness = np.abs([_likeness(one, other, int(lag)) for lag in fine])
-    best, now = float(likeness.max()), _likeness(one, other, 0)
+    likeness = np.array([_likeness(one, others, int(lag)) for lag in fine])
+    best, now = float(likeness.max()), _likeness(one, others, 0)
     late = float(fine[np.argmax(likeness)]) * step
-    if abs(late) < _LATE or best < _ALIKE or 1.0 - now < _BETTER * (1.0 - best):
+    least, better = (_LATE, _BETTER) if late > 0.0 else (max(_EARLY, 1.5 * step), _BETTER_EARLY)
+    if abs(late) < least or best < _ALIKE or 1.0 - now < better * (1.0 - best):
         return []
     side = "behind" if late > 0.0 else "ahead of"
     cause = (
@@ -173,10 +276,13 @@ def _late(log: OpenLog, name: str, time: Array, motion: Array, made: Array) -> l
     return [f"{where}: {log.head(name)} is {abs(late):.2g} s {side} the spools all along; {cause}"]
 
 
-def _likeness(motion: Array, made: Array, lag: int) -> float:
-    """Correlation of a motion with what was made of it `lag` instants before."""
+def _likeness(motion: Array, reeled: Array, lag: int) -> float:
+    """Multiple correlation of a motion (T,) with the spools (T, M) `lag` instants before."""
     one = motion[lag:] if lag >= 0 else motion[:lag]
-    other = made[: len(made) - lag] if lag >= 0 else made[-lag:]
-    if np.ptp(one) == 0.0 or np.ptp(other) == 0.0:
+    other = reeled[: len(reeled) - lag] if lag >= 0 else reeled[-lag:]
+    moved, pulled = one - one.mean(), other - other.mean(axis=0)
+    whole = float(moved @ moved)
+    if whole == 0.0:
         return 0.0
-    return float(np.corrcoef(one, other)[0, 1])
+    left = moved - pulled @ np.linalg.lstsq(pulled, moved, rcond=1e-9)[0]
+    return float(np.sqrt(max(0.0, 1.0 - float(left @ left) / whole)))

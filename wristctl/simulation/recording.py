@@ -7,7 +7,7 @@ Curve and Surface Fitting with Splines, 1993). Time counts from the first sample
 """
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
 
@@ -20,7 +20,7 @@ from wristctl.config.wrist import WristParameters
 from wristctl.errors import UserError, meant
 from wristctl.records.log_columns import ANGLE, SYNONYMS
 from wristctl.records.log_converters import read_log
-from wristctl.records.log_looks import telling
+from wristctl.records.log_looks import looked_at, telling
 from wristctl.records.open_log import OpenLog
 from wristctl.simulation.reference import TIP_TOLERANCE, ReferenceKind, beyond_reach
 from wristctl.wrist.kinematics import exact_arc
@@ -52,8 +52,7 @@ def read_recording(file: Path, column: str | None = None, names: str = "") -> Re
     none, with line and column: gaps, times that repeat, jumps, units that are not there or not known.
     """
     more = {} if column is None or column in SYNONYMS or column == "tip" else {column: ANGLE}
-    log = telling(read_log(file, names, "recording", others=True, more=more))
-    log.whole("time", _EXAMPLE)
+    log = _looked_at(read_log(file, names, "recording", others=True, more=more))
     chosen = _angle_in(log, column)
     if chosen is None and not all(name in log.columns for name in TIP):
         fix = f"a header such as {_EXAMPLE}, or time [s],tip_x [mm],tip_y [mm]"
@@ -68,6 +67,13 @@ def read_recording(file: Path, column: str | None = None, names: str = "") -> Re
     time = log.columns["time"]
     _check(log, time, arc[0])
     return Recording(time - time[0], arc, chosen is None)
+
+
+def _looked_at(log: OpenLog) -> OpenLog:
+    """A recording with the looks of a log, of its motion alone: what tendons did then is not asked for."""
+    log.whole("time", _EXAMPLE)
+    seen = {name: column for name, column in log.columns.items() if not name.startswith(("spool_", "tension_"))}
+    return telling(looked_at(replace(log, columns=seen), motion=False))
 
 
 def _angle_in(log: OpenLog, column: str | None) -> Array | None:
@@ -158,8 +164,7 @@ def recorded_bends(reference: Reference, wrist: WristParameters, time: Array) ->
     tip where no arc of the wrist ends.
     """
     file = Path(reference.file or "")
-    log = telling(read_log(file, reference.columns or "", "recording", others=True))
-    log.whole("time", _EXAMPLE)
+    log = _looked_at(read_log(file, reference.columns or "", "recording", others=True))
     bends = log.bends() if {"bend_y", "bend_z"} <= log.columns.keys() or "orientation" in log.columns else None
     if (bends is None or reference.column == "tip") and all(name in log.columns for name in SPATIAL_TIP):
         log = log.only(np.asarray(np.isfinite([log.columns[name] for name in SPATIAL_TIP]).all(axis=0)))

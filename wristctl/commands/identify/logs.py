@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -26,8 +26,9 @@ if TYPE_CHECKING:
     from wristctl.identification.model_choice import TriedModel
     from wristctl.records.open_log import OpenLog
 
-# Share of the motion's mean square that a prediction may miss before nothing is told.
-_MISSED = 0.5
+# Share of the motion's mean square that a prediction may miss before a log is refused, and share of the motion, without
+# noise, that it may miss before no parameter is told.
+_MISSED, _MISSED_OF_ALL = 0.5, 0.1
 
 
 @dataclass(frozen=True, repr=False, eq=False)
@@ -68,7 +69,7 @@ class LogTold(StudyResult):
         return pd.DataFrame(rows, columns=["parameter", "value", "low", "high", "unit", "meaning"])
 
 
-class _Read(NamedTuple):
+class ReadLogs(NamedTuple):
     """The robot of open logs, its recordings, and the number of samples that the logs have."""
 
     robot: ArcRobot
@@ -100,18 +101,25 @@ def _are_driven(logs: Sequence[OpenLog], study: Study) -> bool:
     return drive_of_log(logs[0], study.identify) is not None
 
 
-def _read(logs: Sequence[OpenLog], study: Study) -> _Read:
+def read_logs(study: Study) -> ReadLogs:
+    """A study's logs, read and looked at. Raises UserError for logs that no fit may be asked of."""
+    return _read(_logs(study), study)
+
+
+def _read(logs: Sequence[OpenLog], study: Study) -> ReadLogs:
     from wristctl.identification.log_model import rate_of_logs, recordings_of_logs, robot_of_logs, spools_of_log
+    from wristctl.identification.log_senses import check_places
 
     settings = study.identify
     robot = robot_of_logs(logs, study.wrist, settings.radius_error)
+    turned = check_places(logs, robot, spools_of_log(logs[0]))
     sides = _sides(robot, spools_of_log(logs[0])) if len(robot.angles) > 2 and "turn" not in robot.base else ""
     recordings = recordings_of_logs(logs, robot)
     samples, used = sum(map(len, logs)), sum(len(recording.time) for recording in recordings)
     fewer = f"Of {samples} samples the models are fitted at {used} instants, evenly over each trial."
-    remarks = [remark for log in logs for remark in log.remarks]
+    remarks = [*(remark for log in logs for remark in log.remarks), *turned]
     rate = rate_of_logs(logs) if robot.timed else None
-    return _Read(robot, recordings, samples, [*remarks, *[sides] * bool(sides), *[fewer] * (used < samples)], rate)
+    return ReadLogs(robot, recordings, samples, [*remarks, *[sides] * bool(sides), *[fewer] * (used < samples)], rate)
 
 
 def _sides(robot: ArcRobot, numbers: Sequence[int]) -> str:
@@ -160,6 +168,10 @@ def _identify_spooled(session: Session, logs: Sequence[OpenLog]) -> LogTold:
         chosen = chosen_of(models)
         begin = chosen.fits[0].values
         fit = fit_arcs(robot, chosen.terms, everything_fitted(recordings), begin=begin)
+    missed = chosen.fits[0].missed()
+    if missed > _MISSED_OF_ALL and study.identify.misfit != "tell":
+        fit = replace(fit, predicts=False)
+        remarks = [*remarks, _unpredicted(missed)]
     unit, scale = robot.unit, robot.scale
     score = chosen.score
     findings.metric("error", scale * score.error, unit, "lower", score.blocks, (scale * score.low, scale * score.high),
@@ -180,6 +192,14 @@ def _identify_spooled(session: Session, logs: Sequence[OpenLog]) -> LogTold:
     findings.plain(RATIOS, result.ratios)
     _refuse(session, result, recordings)
     return result
+
+
+def _unpredicted(missed: float) -> str:
+    return (
+        f"Nothing is identifiable: the model misses {100.0 * missed:.0f} % of the motion that was not fitted, beside "
+        f"noise, and a parameter is told where it misses at most {100.0 * _MISSED_OF_ALL:.0f} %. Are senses, order and "
+        "units of spools and bend as they should be, and are all of one clock?"
+    )
 
 
 def _refuse(session: Session, result: LogTold, recordings: Sequence[ArcRecording]) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from wristctl.commands.answer import Answer
@@ -12,31 +12,37 @@ from wristctl.commands.printed_table import Table, joined, number
 if TYPE_CHECKING:
     from wristctl.identification.arc_fit import ArcFit
     from wristctl.identification.model_choice import TriedModel
+    from wristctl.identification.prediction_scores import Score
     from wristctl.identification.real_robots import RealRobot
 
 
-def validated_answer(robot: RealRobot, models: Sequence[TriedModel], chosen: TriedModel, run: str) -> Answer:
-    """The authors' own error in the first row, then ours; `run` is the path of the run, empty in memory."""
+def validated_answer(
+    robot: RealRobot, models: Sequence[TriedModel], chosen: TriedModel, run: str, beside: Mapping[str, Score]
+) -> Answer:
+    """The authors' own error in the first row, then those without a model, then ours.
+
+    `run` is the path of the run, empty in memory; `beside` has the errors of predictions without a model, by name.
+    """
     what = "bend" if robot.unit == "deg" else "tip"
     score, scale = chosen.score, robot.scale
     error, low, high = (f"{scale * value:.2f}" for value in score[:3])
     verb = "fits" if robot.in_sample else "predicts"
-    beside = ""
+    comparison = ""
     if robot.authors:
         theirs = robot.authors[0][1]
         than = (
             "below" if scale * score.high < theirs else "above" if scale * score.low > theirs else "not told apart from"
         )
-        beside = f", {than} the {theirs:.2f} {robot.unit} of its authors' own model"
+        comparison = f", {than} the {theirs:.2f} {robot.unit} of its authors' own model"
     sentence = (
-        f"The model {verb} the {what} of {robot.title} to {error} {robot.unit} RMS (95 % {low} to {high}){beside}."
+        f"The model {verb} the {what} of {robot.title} to {error} {robot.unit} RMS (95 % {low} to {high}){comparison}."
     )
     notes: list[str | Table] = [
         wanted_terms(models),
         f"{robot.parts[0].upper()}{robot.parts[1:]}. {_caveats(robot, chosen)}",
     ]
     more = f"Parameters, each recording, residuals: --all, or {run}/report.html." if run else ""
-    return Answer(sentence, models_table(robot, models), notes, f"{robot.citation}. {more}".strip())
+    return Answer(sentence, models_table(robot, models, beside), notes, f"{robot.citation}. {more}".strip())
 
 
 def wanted_terms(models: Sequence[TriedModel]) -> str:
@@ -71,9 +77,12 @@ def _caveats(robot: RealRobot, chosen: TriedModel) -> str:
     return f"{'; '.join(parts)}."
 
 
-def models_table(robot: RealRobot, models: Sequence[TriedModel]) -> Table:
-    """Errors of the authors' models, then of ours with the ratio to the model without the last term."""
+def models_table(robot: RealRobot, models: Sequence[TriedModel], beside: Mapping[str, Score]) -> Table:
+    """Errors of the authors' models and without a model, then of ours with the ratio to that without the last term."""
     rows = [(name, None, f"{error:.2f}", "", "") for name, error in robot.authors]
+    for name, score in beside.items():
+        error, low, high = (f"{robot.scale * value:.2f}" for value in score[:3])
+        rows.append((name, None, f"{error} [{low}, {high}]", "", ""))
     heads = ("model", "numbers", f"{robot.asked} [{robot.unit}]", "over that without", "")
     return Table("", heads, [*rows, *model_rows(models, robot.scale)])
 

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 
     from wristctl.identification.arc_fit import ArcFit
     from wristctl.identification.model_choice import TriedModel
+    from wristctl.identification.prediction_scores import Score
     from wristctl.identification.real_robots import RealRobot
 
 
@@ -37,13 +38,15 @@ class Validated(StudyResult):
     chosen: TriedModel
     steps: list[ArcFit]
     """Further recordings, predicted with what the chosen model found."""
+    beside: Mapping[str, Score] = field(default_factory=dict)
+    """Errors of predictions without a model, by their names."""
 
     @property
     def answer(self) -> Answer:
         """The authors' own error, then ours, what the data want and what they tell."""
         from wristctl.commands.validate.answer import validated_answer
 
-        return validated_answer(self.robot, self.models, self.chosen, self.place)
+        return validated_answer(self.robot, self.models, self.chosen, self.place, self.beside)
 
     def frame(self) -> pd.DataFrame:
         """One row per model: its terms, free numbers, error of the predicted part with its interval, its ratio."""
@@ -132,7 +135,9 @@ def validate(session: Session) -> Validated:
     """
     from wristctl.commands.validate import figures
     from wristctl.commands.validate.answer import models_table, parameters_table, steps_table
+    from wristctl.identification.baselines import baselines
     from wristctl.identification.model_choice import chosen_of, tried_models
+    from wristctl.identification.prediction_scores import score_of
     from wristctl.identification.real_robots import recordings_of
 
     findings, study = session.findings, session.study
@@ -145,10 +150,16 @@ def validate(session: Session) -> Validated:
     chosen = chosen_of(models)
     steps = [chosen.fits[0].asked_of(recording) for recording in robot.steps(files)] if robot.steps else []
     _write(findings, robot, models, chosen, steps)
-    tables = [models_table(robot, models), parameters_table(chosen.fits)]
+    fair = {} if robot.in_sample else baselines(cases, robot.centred)
+    beside = {name: score_of(predicted) for name, predicted in fair.items()}
+    for name, score in beside.items():
+        ends = (robot.scale * score.low, robot.scale * score.high)
+        key = name.lower().replace(" ", "_")
+        findings.metric(key, robot.scale * score.error, robot.unit, "lower", score.blocks, ends, f"RMS, {robot.asked}")
+    tables = [models_table(robot, models, beside), parameters_table(chosen.fits)]
     if steps:
         tables.append(steps_table(robot, steps))
-    result = Validated(study, findings, tables, robot, models, chosen, steps)
+    result = Validated(study, findings, tables, robot, models, chosen, steps, beside)
     findings.table("data/models.csv", result.frame(), *_units(_MODELS))
     with session.drawing():
         findings.figure("motion", figures.motion, robot, chosen.fits, caption="measured motion and prediction")
