@@ -105,6 +105,9 @@ _DYNAMICS = (
     "whose run has the controller as RUN/code/learned_mpc.py:LEARNED_MPC"
 )
 
+# Rigs of a user's own, `wristctl.rig.Rig`; the board and the emulated bench are not named here.
+RIGS: Choices[Any] = Choices("rig", {}, "wristctl.rigs")
+
 # Table of `wristctl.control.law.Controller`.
 CONTROLLERS: Choices[Any] = Choices(
     "controller",

@@ -35,7 +35,7 @@ def seldom(default: Any, unit: str, meaning: str, **constraints: Any) -> Any:
     return Field(default, description=meaning, json_schema_extra=extra, **constraints)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)  # a table has no hash, and a union of types asks for one
 class OneOf:
     """The type of a leaf that names an entry of a table: `Annotated[str, OneOf(CONTROLLERS)]`."""
 
@@ -60,7 +60,9 @@ class OneOf:
             problem, fix = self.table.made[name]
             raise PydanticCustomError("added_value", "{problem}", {"problem": problem, "fix": fix})
         elif name not in self.table:
-            *first_names, last = (f"'{name}'" for name in self.table.known())
+            *first_names, last = [f"'{name}'" for name in self.table.known()] or [
+                f"file.py:NAME of a {self.table.what}"
+            ]
             expected = f"{', '.join(first_names)} or {last}" if first_names else last
             raise PydanticCustomError("literal_error", "Input should be {expected}", {"expected": expected})
         return name
