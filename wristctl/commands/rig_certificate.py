@@ -10,6 +10,8 @@ from typing import Any, NamedTuple
 
 from wristctl.arrays import Array
 from wristctl.commands.adoption import adopted
+from wristctl.config.choices import RIGS
+from wristctl.config.foreign import is_reference
 from wristctl.config.hw_run import HwRunSettings, RigRow
 from wristctl.config.study import Study
 from wristctl.config.wrist import WristParameters
@@ -53,9 +55,13 @@ class Certificate:
 
         Raises UserError where the file cannot be loaded.
         """
-        entry, origin = load(self._name)
-        for file, digest in origin.files.items():
-            yield RigCheck("source", None, f"{file.relative_to(origin.root)} sha256 {digest}")
+        entry = RIGS.named(self._name)
+        if is_reference(self._name):
+            _, origin = load(self._name)
+            for file, digest in origin.files.items():
+                yield RigCheck("source", None, f"{file.relative_to(origin.root)} sha256 {digest}")
+        else:
+            yield RigCheck("source", None, "wristctl's own")
         try:
             made = rig_of(entry, self._name)
             changes = {"rig": self._name, "rows": (RigRow(controller="pid-ff", gains="hardware"),)}

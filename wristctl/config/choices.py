@@ -105,8 +105,8 @@ _DYNAMICS = (
     "whose run has the controller as RUN/code/learned_mpc.py:LEARNED_MPC"
 )
 
-# Rigs of a user's own, `wristctl.rig.Rig`; the board and the emulated bench are not named here.
-RIGS: Choices[Any] = Choices("rig", {}, "wristctl.rigs")
+# Table of `wristctl.rig.Rig`: what trials may be run on in place of the board with its cameras.
+RIGS: Choices[Any] = Choices("rig", {"bench": "wristctl.trial.board_rig:BenchRig"}, "wristctl.rigs")
 
 # Table of `wristctl.control.law.Controller`.
 CONTROLLERS: Choices[Any] = Choices(

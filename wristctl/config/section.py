@@ -60,9 +60,7 @@ class OneOf:
             problem, fix = self.table.made[name]
             raise PydanticCustomError("added_value", "{problem}", {"problem": problem, "fix": fix})
         elif name not in self.table:
-            *first_names, last = [f"'{name}'" for name in self.table.known()] or [
-                f"file.py:NAME of a {self.table.what}"
-            ]
+            *first_names, last = (f"'{name}'" for name in self.table.known())
             expected = f"{', '.join(first_names)} or {last}" if first_names else last
             raise PydanticCustomError("literal_error", "Input should be {expected}", {"expected": expected})
         return name

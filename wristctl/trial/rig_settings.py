@@ -190,6 +190,11 @@ def _safety(facts: Facts, settings: HwRunSettings) -> dict[str, Any]:
     }  # fmt: skip
 
 
+def share_of_pair(layout: TendonLayout | None, planes: int) -> float:
+    """Tension of a rig's tendons that one of the model's has, which in one plane has two on either side."""
+    return 1.0 if layout is None or planes == 2 else 0.25 * len(layout.places)
+
+
 def sides_of(wrist: WristParameters, layout: TendonLayout) -> WristParameters:
     """The wrist in one plane whose tendons have the lever of this layout's, as models in one plane have it."""
     lever = float(np.abs(layout.cross_section[:, 0]).max())

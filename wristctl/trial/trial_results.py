@@ -28,7 +28,7 @@ from wristctl.simulation.worlds import Draws
 from wristctl.trial.log import column_of
 from wristctl.trial.motions import motion_of
 from wristctl.trial.rig_belief import PLANES, layout_of_axes, layout_of_rig, names_of_planes, places_of_tendons
-from wristctl.trial.rig_settings import sides_of
+from wristctl.trial.rig_settings import share_of_pair, sides_of
 from wristctl.trial.trials import Trial
 from wristctl.wrist.kinematics import Inverse
 from wristctl.wrist.spatial.spatial_kinematics import spatial_tips
@@ -251,7 +251,7 @@ def _pairs(wrist: WristParameters, layout: TendonLayout, loop: Loop) -> tuple[Wr
 
     Each has the share of their stiffness and tension limits that makes a side the same.
     """
-    share = 0.25 * len(layout.places)
+    share = share_of_pair(layout, 1)
     motors = loop.actuator.model_copy(update={"tendon_stiffness": share * loop.actuator.tendon_stiffness})
     tensions = {"pretension": share * wrist.pretension, "tension_limit": share * wrist.tension_limit}
     return sides_of(wrist, layout).model_copy(update=tensions), loop.model_copy(update={"actuator": motors})

@@ -59,7 +59,8 @@ def _trials(run: Run) -> tuple[Columns, Mapping[str, np.ndarray]]:
         number, direction = row.trial, DIRECTIONS.get(str(row.direction))
         flexion = direction is not None and direction.plane == "flexion"
         ticks, seen = answered(log[log.trial == number]), frames[(frames.trial == number) & (frames.verdict == "ok")]
-        spools = {f"spool_{tendon}": step * ticks[f"position_{tendon}"].to_numpy(float) for tendon in ACTIVE}
+        positions = [name for name in ticks.columns if name.startswith("position_")]
+        spools = {name.replace("position", "spool"): step * ticks[name].to_numpy(float) for name in positions}
         if "plane" in seen:
             parts.append(
                 (_merged([(ticks.counted.to_numpy(float), spools), *_bends_seen(seen, "captured")]), f"{number}")
