@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
+from pydantic import ValidationError
 
 from tests.doors.carrier import CARRIED, MARK, carrier
 from tests.doors.conftest import wristctl
@@ -256,6 +257,13 @@ def test_facts_are_the_settings_that_a_study_does_not_give() -> None:
     assert settings.actuator.step_rate * settings.actuator.step_length == pytest.approx(0.1)
     with pytest.raises(UserError, match="tendons are not those of the rig"):
         wrist_of(facts, WristParameters(tendons="four"), "a.py:RIG")
+
+
+def test_settings_of_the_board_are_none_of_another_rig(tmp_path: Path) -> None:
+    reference = written(tmp_path)
+    for name, given in {"port": "/dev/ttyACM0", "video": True, "calibration": "RUN"}.items():
+        with pytest.raises(ValidationError, match=f"{name} is of the board"):
+            HwRunSettings(rig=reference, **{name: given})
 
 
 @pytest.mark.parametrize(

@@ -299,8 +299,13 @@ class HwRunSettings(RigSettings):
 
     @model_validator(mode="after")
     def _one_rig(self) -> Self:
-        if self.rig is not None and self.port is not None:
-            raise Unfitting("a rig of your own has no board's port", "port: null, or no rig")
+        if self.rig is None:
+            return self
+        for name in ("port", "calibration", "load_cells", "optics", "optics_2", "video", "real_time"):
+            if getattr(self, name):
+                raise Unfitting(
+                    f"{name} is of the board with its cameras, and rig names another rig", f"no {name}, or no rig"
+                )
         return self
 
     @model_validator(mode="after")
