@@ -261,7 +261,8 @@ def test_facts_are_the_settings_that_a_study_does_not_give() -> None:
 
 def test_settings_of_the_board_are_none_of_another_rig(tmp_path: Path) -> None:
     reference = written(tmp_path)
-    for name, given in {"port": "/dev/ttyACM0", "video": True, "calibration": "RUN"}.items():
+    wrong: dict[str, Any] = {"port": "/dev/ttyACM0", "video": True, "calibration": "RUN"}
+    for name, given in wrong.items():
         with pytest.raises(ValidationError, match=f"{name} is of the board"):
             HwRunSettings(rig=reference, **{name: given})
 
