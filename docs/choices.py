@@ -19,6 +19,7 @@ from wristctl.config.choices import (
     PLANTS,
     PLANTS_IN_SPACE,
     REFERENCES,
+    RIGS,
 )
 from wristctl.config.learning import PRESETS
 from wristctl.config.loop import Loop, Reference
@@ -31,8 +32,8 @@ OPENING = """# What can be chosen
 
 The configuration of a study. First what has a name: [controllers](#controllers), [references](#references),
 [metrics](#metrics), [optimisers](#optimisers), [disturbances](#disturbances), [plants](#plants),
-[networks](#presets-of-networks); then [every key](#every-key-of-a-study) with its default. `wristctl COMMAND
---dry-run --all` prints the keys of a study. A newcomer to a table is one file and one line:
+[rigs](#rigs), [networks](#presets-of-networks); then [every key](#every-key-of-a-study) with its default.
+`wristctl COMMAND --dry-run --all` prints the keys of a study. A newcomer to a table is one file and one line:
 [CONTRIBUTING](../CONTRIBUTING.md).
 
 Made by `python docs/choices.py` from the tables in `wristctl/config/choices.py` and the schema of studies."""
@@ -219,6 +220,13 @@ How large they are is in the group {link(Loop)}.
 ## Plants
 
 {table("name, in one plane, in two planes", plants())}
+
+## Rigs
+
+Robots in place of the board with its cameras, of `hw-run --rig`. One of your own is a file:
+[your own rig](your-own-rig.md).
+
+{table("name, what it is", ((f"`{k}`", " ".join((v.__doc__ or "").split())) for k, v in RIGS.items()))}
 
 ## Presets of networks
 

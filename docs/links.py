@@ -33,7 +33,7 @@ def working(seconds: float) -> None:
     """From here on the host works so long before each answer of a law."""
 
     def answer(loop: ControlLoop, *given: object) -> object:
-        loop._clock.wait(seconds)
+        loop._drive.wait_until(loop._drive.now() + seconds)
         return ANSWER(loop, *given)  # type: ignore[arg-type]
 
     ControlLoop._answer = answer if seconds else ANSWER  # type: ignore[method-assign, assignment]

@@ -6,13 +6,13 @@ import os
 
 import pytest
 
-from wristctl.bench.rig import Bystander, Rig
+from wristctl.bench.emulated_rig import Bystander, EmulatedRig
 from wristctl.config.bench import BenchSettings
 from wristctl.config.wrist import WristParameters
 
 
 def test_the_button_is_pressed_and_released_and_the_wrist_turned(caplog: pytest.LogCaptureFixture) -> None:
-    rig = Rig(BenchSettings(), WristParameters(), 0)
+    rig = EmulatedRig(BenchSettings(), WristParameters(), 0)
     typed, keyboard = os.pipe()
     bystander = Bystander(rig, typed)
     bystander.look()

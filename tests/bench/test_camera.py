@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tests.bench.conftest import TAUT, Host, HostOn
-from wristctl.bench.rig import Rig
+from wristctl.bench.emulated_rig import EmulatedRig
 from wristctl.bench.virtual_bench import BenchTransport, VirtualBench, VirtualCamera
 from wristctl.config.bench import BenchSettings, FaultKind, InjectedFault, RenderedCamera
 from wristctl.config.camera import Gates, Markers
@@ -37,7 +37,7 @@ class Stage:
     """A bench whose camera sketches."""
 
     def __init__(self, camera: RenderedCamera, *faults: InjectedFault, seed: int = 0) -> None:
-        self.rig = Rig(BenchSettings(motors=TAUT, camera=camera, faults=faults), WRIST, seed)
+        self.rig = EmulatedRig(BenchSettings(motors=TAUT, camera=camera, faults=faults), WRIST, seed)
         self.rig.eyes[0].scene = self.sketch = Sketch()
         self.transport = BenchTransport(self.rig.chip, self.rig.faults)
         self.camera = VirtualCamera(self.rig)

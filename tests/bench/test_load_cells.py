@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from tests.bench.conftest import TAUT, Host, HostOn
-from wristctl.bench.rig import Bystander
+from wristctl.bench.emulated_rig import Bystander
 from wristctl.board.messages import Command, Pulls
 from wristctl.config.bench import BenchSettings, EmulatedCells, InjectedFault
 

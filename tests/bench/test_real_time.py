@@ -21,10 +21,10 @@ import pytest
 from tests.bench.conftest import TAUT
 from tests.bench.record import is_released, last_step, read
 from tests.board.patience import WATCHDOG, patient, wait_for
+from wristctl.bench.emulated_rig import EmulatedRig
 from wristctl.bench.faults import Faults
 from wristctl.bench.frame_process import FrameMemory
 from wristctl.bench.real_time_bench import RealTimeBench, films_of
-from wristctl.bench.rig import Rig
 from wristctl.bench.server import BenchServer, FaultyLine
 from wristctl.board.board_errors import NoAnswer, PortLost, Restarted
 from wristctl.board.driver import Board
@@ -69,7 +69,7 @@ def serving(tmp_path: Path) -> Iterator[Serving]:
         line, wrist = PtyLine(), WristParameters()
         cameras, films, pictures = films_of(settings, wrist, (None, markers_2), tmp_path)
         ours, theirs = multiprocessing.Pipe()
-        rig = Rig(settings, wrist, 0, markers_2=markers_2)
+        rig = EmulatedRig(settings, wrist, 0, markers_2=markers_2)
         server = BenchServer(rig, line, films, tmp_path / "record", theirs)
         thread = threading.Thread(target=server.run, daemon=True)
         thread.start()

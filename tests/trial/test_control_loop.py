@@ -17,6 +17,7 @@ from tests.trial.rig import Marker, RigBoard
 from wristctl.board.messages import Fault, Flag, State
 from wristctl.control.table import controller
 from wristctl.trial.control_loop import ControlLoop
+from wristctl.trial.drives import BoardDrive
 from wristctl.trial.log import TrialLog
 from wristctl.trial.motions import at_rest, back
 from wristctl.trial.safety import SafetyStop
@@ -46,7 +47,8 @@ class Rig:
         self.rows: list[dict[str, Any]] = []
         self.at_rest: list[dict[str, Any]] = []
         chosen = settings_of(**{"control_period": PERIOD, **settings})
-        self.loop = ControlLoop(board, marker, chosen, WRIST, "ulnar", signs, self.timing, self.log, self._shown)
+        drive = BoardDrive(board, chosen, signs)
+        self.loop = ControlLoop(drive, marker, chosen, WRIST, "ulnar", self.timing, self.log, self._shown)
 
     def _shown(self, row: dict[str, Any]) -> None:
         """A tick of a motion, or one behind it, in which no law is asked."""

@@ -152,13 +152,13 @@ def _serve(
 ) -> None:
     """The bench's process: Ctrl-C is the client's affair. It takes the cameras' folder with it."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    from wristctl.bench.rig import Rig
+    from wristctl.bench.emulated_rig import EmulatedRig
     from wristctl.bench.server import BenchServer
     from wristctl.board.emulator.serve import PtyLine
 
     try:
         line = PtyLine()
-        rig = Rig(settings, wrist, seed, markers, markers_2=markers_2)
+        rig = EmulatedRig(settings, wrist, seed, markers, markers_2=markers_2)
         server = BenchServer(rig, line, films, record, control)
         signal.signal(signal.SIGTERM, lambda *_: server.stop())
         control.send(line.address)

@@ -15,9 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wristctl.bench.bench_wrist import BenchWrist, MotorMotion, Truth
+from wristctl.bench.emulated_rig import Bystander, EmulatedRig
 from wristctl.bench.faults import Faults
 from wristctl.bench.motors import PERIOD
-from wristctl.bench.rig import Bystander, Rig
 from wristctl.bench.usb_adapter import UsbAdapter, hand_over_of
 from wristctl.board.emulator.chip import FREQUENCY
 from wristctl.board.emulator.serve import Line, serve
@@ -142,7 +142,7 @@ class BenchServer:
     """
 
     def __init__(
-        self, rig: Rig, line: Line, films: Sequence[Connection], record: Path | None = None,
+        self, rig: EmulatedRig, line: Line, films: Sequence[Connection], record: Path | None = None,
         control: Connection | None = None, bystander: Bystander | None = None,
     ) -> None:  # fmt: skip
         self._rig, self._films, self._control, self._bystander = rig, films, control, bystander

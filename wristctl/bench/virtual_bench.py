@@ -6,8 +6,8 @@ from collections.abc import Callable
 import numpy as np
 
 from wristctl.bench.bench_wrist import MotorMotion, Truth
+from wristctl.bench.emulated_rig import EmulatedRig
 from wristctl.bench.faults import Faults
-from wristctl.bench.rig import Rig
 from wristctl.bench.shutter import picture
 from wristctl.bench.usb_adapter import HandOver, UsbAdapter, hand_over_of
 from wristctl.board.board_errors import PortLost
@@ -121,7 +121,7 @@ class BenchTransport(VirtualTransport):
 class VirtualCamera:
     """Sees what stands on a rig; frames arrive as the chip's clock goes on. `number` is which of its cameras it is."""
 
-    def __init__(self, rig: Rig, number: int = 0) -> None:
+    def __init__(self, rig: EmulatedRig, number: int = 0) -> None:
         self.name = f"rendered {number + 1}" if number else "rendered"
         self._rig, self._eye, self._seen = rig, rig.eyes[number], -1
 
@@ -158,7 +158,7 @@ class VirtualBench:
         markers: Markers | None = None,
         markers_2: Markers | None = None,
     ) -> None:
-        self._rig = Rig(settings, wrist, seed, markers, markers_2=markers_2)
+        self._rig = EmulatedRig(settings, wrist, seed, markers, markers_2=markers_2)
         self.transport = BenchTransport(self._rig.chip, self._rig.faults, settings.line, self._rig.weigh)
         self.cameras = tuple(VirtualCamera(self._rig, number) for number in range(len(self._rig.eyes)))
         self.camera = self.cameras[0]

@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from types import MappingProxyType
 from typing import NamedTuple
 
-_MAIN, _OWN = "From a wrist to its controller", "A controller of your own"
+_MAIN, _OWN = "From a wrist to its controller", "A controller or robot of your own"
 _HARDWARE, _MORE = "Motors and camera", "More"
 # The flag of commands that move motors, and its help.
 YES = {"yes": "Ask nobody before the motors of real hardware move."}
@@ -136,6 +136,7 @@ COMMANDS = {
             "horizon",
             "port",
             "camera",
+            "rig",
             "repetitions",
             "real_time",
             "video",
@@ -148,13 +149,17 @@ COMMANDS = {
             "wristctl hw-run --reference circumduction --set reference.angle_deg=25",
             "wristctl hw-run --dry-run --port /dev/ttyACM0",
             "wristctl hw-run --port /dev/ttyACM0 --camera 0 --calibration latest:calibrate-wrist",
+            "wristctl hw-run pid-ff --rig my_rig.py:RIG",
         ),
     ),
     "runs": Entry("wristctl.cli.runs:app", _MAIN, "Find, show, compare, verify and repeat what commands left."),
-    "new": Entry("wristctl.cli.your_own:new_app", _OWN, "Write a controller, reference or optimiser to begin from."),
+    "new": Entry(
+        "wristctl.cli.your_own:new_app", _OWN, "Write a controller, reference, optimiser or rig to begin from."
+    ),
     "check-controller": Entry(
         "wristctl.cli.your_own:check_controller_app", _OWN, "Check a controller of your own before it is used."
     ),
+    "check-rig": Entry("wristctl.cli.your_own:check_rig_app", _OWN, "Check a robot of your own before trials on it."),
     "hw": Entry(
         "wristctl.cli.hw:app", _HARDWARE, "The motor board: find, check, flash, emulate, stop, move; calibrate."
     ),

@@ -74,14 +74,14 @@ def _serve_with_wrist(chip: Any, line: Any, override: list[str], console: Any, q
         if allowed:
             log.info(allowed)
         with progress(console, no_event, "preparing the wrist (compiled once per version)", None, "", quiet):
+            from wristctl.bench.emulated_rig import Bystander, EmulatedRig
             from wristctl.bench.real_time_bench import films_of
-            from wristctl.bench.rig import Bystander, Rig
             from wristctl.bench.server import BenchServer
 
             asked = study.hw_run
             markers = asked.markers, asked.markers_2 if asked.planes == 2 else None
             cameras, films, pictures = films_of(asked.bench, study.wrist, markers, Path(folder), broadcast=True)
-            rig = Rig(asked.bench, study.wrist, study.seed, markers[0], chip, markers[1])
+            rig = EmulatedRig(asked.bench, study.wrist, study.seed, markers[0], chip, markers[1])
             bystander = Bystander(rig, sys.stdin.fileno()) if sys.stdin and not sys.stdin.closed else None
             server = BenchServer(rig, line, films, bystander=bystander)
         log.info("serving, with a wrist on axes 0 to 3; its cameras' frames: %s", ", ".join(map(str, pictures)))

@@ -14,7 +14,6 @@ from wristctl.cli.progress import Terminal
 from wristctl.commands.session import Session
 from wristctl.trial.control_loop import Shown
 from wristctl.trial.trials import Trial
-from wristctl.wrist.directions import ACTIVE
 
 # Panels a second.
 _PICTURES = 8.0
@@ -44,7 +43,8 @@ class _Panel:
             name = f"toward {suffix[1:]}" if suffix else "angle"
             grid.add_row(name, f"{bent:7.2f} deg", "reference", f"{wanted:7.2f} deg", "load", load)
         for name, unit in (("tension", "N"), ("sent", "steps/s")):
-            values = (f"{tendon}: {row[f'{name}_{tendon}']:6.1f}" for tendon in ACTIVE)
+            own = {key.removeprefix(f"{name}_"): value for key, value in row.items() if key.startswith(f"{name}_")}
+            values = (f"{tendon}: {value:6.1f}" for tendon, value in own.items())
             grid.add_row(name, *values, unit)
         grid.add_row("board", row["state"], "marker", self._verdict, "late", f"{max(0.0, 1e3 * row['late']):.2f} ms")
         grid.add_row("time", f"{row['time']:.2f} s")

@@ -1,4 +1,4 @@
-"""`wristctl new`, `init` and `check-controller`: files of your own to begin from, and a controller checked."""
+"""`wristctl new`, `init`, `check-controller` and `check-rig`: files of your own to begin from, and these checked."""
 
 import keyword
 import os
@@ -17,7 +17,7 @@ from wristctl.cli.command import asked_to_trust
 from wristctl.cli.json_output import print_json
 from wristctl.cli.options import Debug, Json, TrustCode, controllers
 from wristctl.cli.output import say
-from wristctl.config.choices import CONTROLLERS, OPTIMISERS, REFERENCES
+from wristctl.config.choices import CONTROLLERS, OPTIMISERS, REFERENCES, RIGS
 from wristctl.errors import TO, Argument, UserError, writing
 from wristctl.plugins.places import placed
 from wristctl.plugins.trust import asking
@@ -28,24 +28,25 @@ from wristctl.study_files.shipped import EXPERIMENTS, shipped
 
 new_app = typer.Typer(add_completion=False)
 
-_TABLES = {"controller": CONTROLLERS, "reference": REFERENCES, "optimiser": OPTIMISERS}
+_TABLES = {"controller": CONTROLLERS, "reference": REFERENCES, "optimiser": OPTIMISERS, "rig": RIGS}
 _AFTER_NEW = {
     "controller": "wristctl check-controller {0}\nwristctl compare pid-ff adrc {0}",
     "reference": "wristctl simulate --set reference.kind={0}",
     "optimiser": "wristctl tune --set optimiser={0}",
+    "rig": "wristctl check-rig {0}\nwristctl hw-run pid-ff --rig {0}",
 }
 
 
 @new_app.command("new")
 def new(
     kind: Annotated[
-        Literal["controller", "reference", "optimiser"], typer.Argument(metavar="KIND", help=", ".join(_TABLES))
+        Literal["controller", "reference", "optimiser", "rig"], typer.Argument(metavar="KIND", help=", ".join(_TABLES))
     ],
     name: Annotated[str, typer.Argument(metavar="NAME", help="What it shall be called: letters, digits, dashes.")],
     to: Annotated[Path, typer.Option("--to", help="Folder to write to.")] = Path(),
     debug: Debug = False,
 ) -> None:
-    """Write a controller, reference or optimiser that runs as it stands, for you to change."""
+    """Write a controller, reference, optimiser or rig that runs as it stands, for you to change."""
     if not re.fullmatch(r"[a-z][a-z0-9]*(-[a-z0-9]+)*", name):
         raise UserError(f"{name!r} is no name for a {kind}", "NAME", "small letters, digits and dashes: my-controller")
     if keyword.iskeyword(name):
@@ -154,3 +155,47 @@ def check_controller(
     if error:
         raise error
     say(f"{law} is fit for simulate, tune and compare" + f"{', and for hw-run' * (not no_board)}")
+
+
+check_rig_app = typer.Typer(add_completion=False)
+
+
+@check_rig_app.command("check-rig")
+def check_rig(
+    rig: Annotated[str, typer.Argument(metavar="FILE:NAME", help="A rig's file and name.")],
+    config: Annotated[
+        list[Path] | None, typer.Option("--config", "-c", metavar="FILE", help="Study file with its `wrist`.")
+    ] = None,
+    yes: Annotated[bool, typer.Option("--yes", help="Ask nobody before a rig on the wall clock moves.")] = False,
+    trust_code: TrustCode = False,
+    as_json: Json = False,
+    debug: Debug = False,
+) -> None:
+    """Check a robot of your own against its facts: clock, looks, refusals, sense and scale of each tendon, delay,
+    stops, and a trial of 5 deg (exit code 3 where something fails)."""
+    from wristctl.cli.operator import TerminalOperator
+    from wristctl.cli.progress import listening
+    from wristctl.commands.rig_certificate import Certificate, RigCheck
+    from wristctl.trial.rig_experiment import BEFORE_MOTION
+
+    checks: list[RigCheck] = []
+    with asking(partial(asked_to_trust, trust_code)), listening(as_json, False) as console:
+        operator = TerminalOperator(console, as_json, frozenset({"yes"} if yes else ()))
+        study = load_study(config or ())
+        certificate = Certificate(placed(rig, None), study, partial(operator.confirm, BEFORE_MOTION))
+        for check in certificate.checks():
+            checks.append(check)
+            if not as_json:
+                say(f"{_VERDICTS[check.passed]:<6}{check.asked + ':':<10} {check.found}")
+    failed = [check.asked for check in checks if check.passed is False]
+    problem, fix = f"{rig} fails: {', '.join(failed)}", "mend it (documentation: Your own rig)"
+    error = UserError(problem, rig, fix, exit_code=3) if failed else None
+    if as_json:
+        found = [check._asdict() for check in checks]
+        shown = {"schema": "wristctl.rig/1", "rig": rig, "fit": not failed, "checks": found}
+        return print_json(shown | {"allowed": certificate.allowed}, error)
+    if error:
+        raise error
+    say("")
+    for line in certificate.allowed:
+        say(line)

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple, TypeVar
 from pydantic import ValidationError
 
 from wristctl.commands.inputs_of_loops import judged_loops
-from wristctl.config.choices import CONTROLLERS, OPTIMISERS, REFERENCES, Choices
+from wristctl.config.choices import CONTROLLERS, OPTIMISERS, REFERENCES, RIGS, Choices
 from wristctl.config.controller_row import BY_LOOP, Row
 from wristctl.config.foreign import PLAIN, Foreign, is_reference
 from wristctl.config.leaves import named_by, renamed_fields
@@ -68,11 +68,26 @@ def adopted(study: Study, command: str) -> Adopted:
         return names.get((table.what, name), name)
 
     if "hw_run" in read:
-        study = with_planes(study)
+        study = with_planes(with_rig(study))
     if not origins:
         return Adopted(study, ())
     called = renamed_fields(study, own_name, read)
     return Adopted(study.model_copy(update=called | {"controller_settings": settings}), tuple(origins))
+
+
+def with_rig(study: Study) -> Study:
+    """The study with the planes, tendons, motors, sensor and limits of its rig's facts, where nobody gave others.
+
+    Raises UserError where the facts cannot be, or do not fit what was given.
+    """
+    name = study.hw_run.rig
+    if name is None:
+        return study
+    from wristctl.trial.rig_settings import check_facts, settings_of, wrist_of
+
+    facts = check_facts(getattr(RIGS[name], "facts", None), name)
+    wrist = wrist_of(facts, study.wrist, name)
+    return study.model_copy(update={"hw_run": settings_of(facts, study.hw_run, name), "wrist": wrist})
 
 
 def with_planes(study: Study) -> Study:
@@ -221,6 +236,13 @@ def _entry(table: Choices[Any], name: str, entry: Any, origin: Foreign, study: S
         if not (isinstance(entry, type) and issubclass(entry, Optimiser)):
             raise UserError(f"{origin.attribute} is no Optimiser", str(origin.file), "derive it from Optimiser")
         entry_name = str(entry.name)
+    elif table.what == RIGS.what:
+        from wristctl.trial.rig_settings import check_facts
+
+        check_facts(getattr(entry, "facts", None), origin.reference)
+        if not is_reference(name):
+            table.lend(name, entry, origin)
+        return name  # as a reference's
     else:
         from wristctl.simulation.reference import ReferenceKind
 

@@ -10,6 +10,8 @@ from wristctl.loop_priority import prioritised
 
 def describe_rig(settings: RigSettings) -> str:
     """In one line, the first that a command on a rig says."""
+    if (own := getattr(settings, "rig", None)) is not None:
+        return f"on the rig {own}, {settings.planes} plane{'s' * (settings.planes == 2)}"
     two = settings.planes == 2
     if settings.port is not None:
         cameras = f"cameras {settings.camera} and {settings.camera_2}" if two else f"camera {settings.camera}"

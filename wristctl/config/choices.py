@@ -105,6 +105,9 @@ _DYNAMICS = (
     "whose run has the controller as RUN/code/learned_mpc.py:LEARNED_MPC"
 )
 
+# Table of `wristctl.rig.Rig`: what trials may be run on in place of the board with its cameras.
+RIGS: Choices[Any] = Choices("rig", {"bench": "wristctl.trial.board_rig:BenchRig"}, "wristctl.rigs")
+
 # Table of `wristctl.control.law.Controller`.
 CONTROLLERS: Choices[Any] = Choices(
     "controller",

@@ -1,16 +1,17 @@
 """Trials on hardware, real or emulated: what the controller drives and sees, and when it must stop."""
 
 from collections.abc import Mapping
-from typing import Any, Literal, Self, get_args
+from typing import Annotated, Any, Literal, Self, get_args
 
 from pydantic import ValidationInfo, field_validator, model_validator
 
 from wristctl.config.bench import BenchSettings
 from wristctl.config.camera import Device, Gates, Markers
+from wristctl.config.choices import RIGS
 from wristctl.config.controller_row import GAINS, GainsChoice, Row
 from wristctl.config.loop import TICK, DirectionName, Loop, Reference
 from wristctl.config.plant import Actuator, Plant, Push, Sensor, TrueActuator, TrueSensor, TrueWrist
-from wristctl.config.section import Section, choice, quantity, seldom
+from wristctl.config.section import OneOf, Section, choice, quantity, seldom
 from wristctl.config.wrist import WristParameters
 from wristctl.errors import Unfitting
 
@@ -188,7 +189,7 @@ class RigSettings(Section):
     def _two_planes(self) -> Self:
         if self.planes == 1:
             return self
-        if self.port is None and (beyond := self.bench.in_one_plane_only):
+        if self.port is None and getattr(self, "rig", None) is None and (beyond := self.bench.in_one_plane_only):
             raise Unfitting(f"no bench in two planes has {beyond[0]}", "leave it at its default, or planes: 1")
         numbers = [self.markers.base, self.markers.tip, self.markers_2.base, self.markers_2.tip]
         if len(set(numbers)) < len(numbers):
@@ -233,6 +234,9 @@ class RigRow(Row):
 class HwRunSettings(RigSettings):
     """The paper's experiment: directions x repetitions, with and without a push, for each controller."""
 
+    rig: Annotated[str, OneOf(RIGS)] | None = seldom(
+        None, "", "a robot of your own, my_rig.py:RIG, in place of board and camera"
+    )
     rows: tuple[RigRow, ...] = choice(
         (RigRow(controller="smc-tracking"),),
         "controllers with their gains",
@@ -294,6 +298,17 @@ class HwRunSettings(RigSettings):
         return self
 
     @model_validator(mode="after")
+    def _one_rig(self) -> Self:
+        if self.rig is None:
+            return self
+        for name in ("port", "calibration", "load_cells", "optics", "optics_2", "video", "real_time"):
+            if getattr(self, name):
+                raise Unfitting(
+                    f"{name} is of the board with its cameras, and rig names another rig", f"no {name}, or no rig"
+                )
+        return self
+
+    @model_validator(mode="after")
     def _something_to_do(self) -> Self:
         if self.push.force == 0.0 and not self.without_push:
             raise ValueError("without_push: false and push.force: 0 leave no trial")
@@ -347,7 +362,7 @@ class HwRunSettings(RigSettings):
     @property
     def loop(self) -> Loop:
         """Loop of the trials in simulation: the emulated plant, or the known plant of a real or an identified wrist."""
-        if self.port is None and self.from_identified is None:
+        if self.port is None and self.from_identified is None and self.rig is None:
             return self.known_loop.model_copy(update={"plant": self._emulated_world()})
         return self.known_loop
 

@@ -43,7 +43,7 @@ def renamed(section: Any, rename: Rename) -> Any:
 
     def leaf(field: FieldInfo, value: Any) -> Any:
         table = next(tables_of(field.annotation, field.metadata), None)
-        if table is None:
+        if table is None or value is None:
             return value
         return tuple(rename(table, name) for name in value) if isinstance(value, tuple) else rename(table, value)
 

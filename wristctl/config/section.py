@@ -35,7 +35,7 @@ def seldom(default: Any, unit: str, meaning: str, **constraints: Any) -> Any:
     return Field(default, description=meaning, json_schema_extra=extra, **constraints)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)  # a table has no hash, and a union of types asks for one
 class OneOf:
     """The type of a leaf that names an entry of a table: `Annotated[str, OneOf(CONTROLLERS)]`."""
 

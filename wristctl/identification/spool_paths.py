@@ -44,8 +44,8 @@ def answered(log: pd.DataFrame) -> pd.DataFrame:
 
 
 def has_rates(log: pd.DataFrame) -> bool:
-    """Whether a log has the step rates that were sent."""
-    return {f"sent_{tendon}" for tendon in ACTIVE} <= set(log.columns)
+    """Whether a log is of the motor board's four axes, and has the step rates that were sent."""
+    return {f"sent_{tendon}" for tendon in ACTIVE} == {name for name in log.columns if name.startswith("sent_")}
 
 
 def count_times(ticks: pd.DataFrame) -> Array:

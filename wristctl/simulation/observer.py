@@ -9,6 +9,7 @@ stationary one for the frame rate, of each plane by itself.
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from wristctl.config.plant import Actuator
 from wristctl.config.wrist import WristParameters
@@ -99,10 +100,10 @@ class Known(NamedTuple):
     arms: Any
 
 
-def known_of_sides(wrist: WristParameters, actuator: Actuator) -> Known:
-    """Knowledge of a controller's side in one plane."""
-    belief = Sides(segments(wrist, 1)[None], np.array(SIDES))
-    return Known(belief, drive_of(actuator), (0,), (0, 0), (0, 0))
+def known_of_sides(wrist: WristParameters, actuator: Actuator, alike: ArrayLike = SIDES) -> Known:
+    """Knowledge of a controller's side in one plane, with so many tendons alike on either side (2,)."""
+    counts = np.array(alike, float)
+    return Known(Sides(segments(wrist, 1)[None], counts), drive_of(actuator, counts), (0,), (0, 0), (0, 0))
 
 
 @spelled_out

@@ -14,6 +14,7 @@ from wristctl.lanes.compiled import kernel
 from wristctl.lanes.rows import part, rows_of
 from wristctl.simulation.observer import knowing_in_lanes, propagate
 from wristctl.trial.rig_belief import RigBelief
+from wristctl.wrist.tendon_layout import TendonLayout
 
 # Ticks.
 _REMEMBERED = 256
@@ -29,11 +30,12 @@ class BlindModel:
     """
 
     def __init__(
-        self, wrist: WristParameters, actuator: Actuator, softest: float, period: float, planes: Sequence[str]
-    ) -> None:
+        self, wrist: WristParameters, actuator: Actuator, softest: float, period: float, planes: Sequence[str],
+        layout: TendonLayout | None = None,
+    ) -> None:  # fmt: skip
         soft = actuator.model_copy(update={"tendon_stiffness": min(softest, actuator.tendon_stiffness)})
         self._wrists = [
-            (RigBelief(wrist, tendons, planes).known, np.zeros(OF_A_PLANE * len(planes)))
+            (RigBelief(wrist, tendons, planes, layout).known, np.zeros(OF_A_PLANE * len(planes)))
             for tendons in (actuator, soft)
         ]
         self._period, self._tick = period, 0

@@ -27,9 +27,9 @@ class SpatialEvidence(NamedTuple):
     """Evidence of the last moments; SI units, planes in the order ulnar, flexion."""
 
     turned: Array
-    """Steps by which each spool was told to reel in, (4,)."""
+    """Steps by which each spool was told to reel in, (T,)."""
     torque: Array
-    """Torque with which each tendon should bend the straight wrist, by its spool, (4,)."""
+    """Torque with which each tendon should bend the straight wrist, by its spool, (T,)."""
     load: Array
     """(2,)"""
     apart: Array
@@ -44,6 +44,10 @@ class SpatialEvidence(NamedTuple):
     """Number of times that a spool has turned back."""
     pushed: bool = False
     """Whether a person pushes in this trial."""
+    directions: Array | None = None
+    """Direction in which each tendon bends the wrist, from ulnar toward flexion [rad]; None: the board's four."""
+    numbers: tuple[int, ...] = ACTIVE
+    """Numbers of the tendons."""
 
 
 def causes_in_space(evidence: SpatialEvidence) -> list[str]:
@@ -83,20 +87,20 @@ def _away_from_motors(evidence: SpatialEvidence) -> Array:
 
 def _by_direction(evidence: SpatialEvidence) -> list[str]:
     off = _away_from_motors(evidence)
-    directions = pull_directions()
+    directions = pull_directions() if evidence.directions is None else evidence.directions
     toward = np.stack([np.cos(directions), np.sin(directions)], axis=1) @ off
     much, little = int(np.argmax(toward)), int(np.argmin(toward))
     aside = math.acos(min(1.0, float(toward[much])))
     size = float(np.hypot(*evidence.load))
     if aside <= _ASIDE:
-        named = {axis: f"axis {axis} (tendon {ACTIVE[axis]})" for axis in (much, little)}
+        named = {axis: f"axis {axis} (tendon {evidence.numbers[axis]})" for axis in (much, little)}
         lost = [f"the tendon of {named[little]} is off its pulley, cut or slipped, or its motor has stalled"]
         more = [f"the tendon of {named[much]} is caught, or its motor turns the wrong way"]
         carries = float(evidence.torque[little]) >= _ACCOUNTS * size
         return lost + more if carries or evidence.turned[much] >= -TURNED else more + lost
-    plus = [axis for axis in range(len(ACTIVE)) if toward[axis] > 0.3]
-    minus = [axis for axis in range(len(ACTIVE)) if toward[axis] < -0.3]
-    sides = [" and ".join(str(ACTIVE[axis]) for axis in axes) for axes in (plus, minus)]
+    plus = [number for number, along in zip(evidence.numbers, toward, strict=True) if along > 0.3]
+    minus = [number for number, along in zip(evidence.numbers, toward, strict=True) if along < -0.3]
+    sides = [" and ".join(map(str, numbers)) for numbers in (plus, minus)]
     return [
         f"motors of tendons {sides[0]} exchanged with those of {sides[1]}",
         f"tendons {sides[1]} have slipped or come off, or their motors have no power",

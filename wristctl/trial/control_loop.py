@@ -1,12 +1,11 @@
-"""The control loop at a fixed period: marker angle, observer, law, tensions, spool targets, step rates, board.
+"""The control loop at a fixed period: measured bend, observer, law, tensions, spool targets, drive.
 
-A tick sends step rates; the board's answer, its status, is read while the next tick is waited for, so that a slow link
-makes no tick late. What the spools reeled in is the observer's input, a frame is fused at its capture time. Everything
-runs on the transport's clock.
+A tick sends what leads the spools to their targets; the answer is read while the next tick is waited for, so that a
+slow link makes no tick late. What the spools reeled in is the observer's input, a frame is fused at its capture time.
+Everything runs on the clock of the drive: the board with its cameras, the emulated bench or any other rig.
 """
 
 import math
-from collections import deque
 from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
@@ -14,16 +13,15 @@ import numpy as np
 
 from wristctl.arrays import Array
 from wristctl.board.driver import Board
-from wristctl.board.messages import AXES, Fault, Flag
 from wristctl.config.hw_run import HwRunSettings
 from wristctl.config.wrist import WristParameters
 from wristctl.control.law import Controller
 from wristctl.control.response import Estimate
 from wristctl.errors import UserError
 from wristctl.simulation.motion import DERIVATIVES, Motion
-from wristctl.simulation.spool_timing import remembered_rates
-from wristctl.trial.log import TrialLog, column_of, of_axes, of_planes
-from wristctl.trial.rig_belief import RigBelief, names_of_planes
+from wristctl.trial.drives import LoopDrive
+from wristctl.trial.log import TrialLog, column_of, of_planes, of_tendons
+from wristctl.trial.rig_belief import RigBelief, names_of_planes, numbers_of
 from wristctl.trial.safety import SafetyStop
 from wristctl.trial.spools import spools_of
 from wristctl.trial.steering import Answer, HostFaults, Steering
@@ -32,13 +30,10 @@ from wristctl.trial.tendon_pulls import TendonPulls
 from wristctl.trial.tick_timing import TickTiming
 from wristctl.trial.tracking import Tracking, bend_of
 from wristctl.trial.watch import Tick, Watch
+from wristctl.wrist.tendon_layout import TendonLayout
 
 # Takes each tick's row of the log, to show it.
 Shown = Callable[[dict[str, Any]], None]
-
-# By how much longer it takes the board to read a RATE for each step/s of all axes together, whose interrupts come
-# first: by the firmware's cycles [s].
-_BUSY = 6.6e-9
 
 # Seconds within which motors at any speed have ramped down.
 _COMING_TO_REST = 0.5
@@ -64,34 +59,27 @@ def course_of(motion: Motion) -> Array:
 
 
 class ControlLoop:
-    """Drives a homed, enabled board in a bending plane, or in both; `signs` say which way each motor's positive steps
-    turn, `stiffness` is that of the tendons [N/m] where homing has measured less than is believed.
+    """Drives a homed rig in a bending plane, or in both; `stiffness` is that of the tendons [N/m] where homing has
+    measured less than is believed. `layout` has the tendons that the motors wind; None: the board's four.
     """
 
     def __init__(
-        self, board: Board, tracking: Tracking, settings: HwRunSettings, wrist: WristParameters, plane: str,
-        signs: Sequence[int], timing: TickTiming, log: TrialLog, shown: Shown | None = None, oblique: float = 0.0,
-        pulls: TendonPulls | None = None, stiffness: float | None = None,
+        self, drive: LoopDrive, tracking: Tracking, settings: HwRunSettings, wrist: WristParameters, plane: str,
+        timing: TickTiming, log: TrialLog, shown: Shown | None = None, oblique: float = 0.0,
+        pulls: TendonPulls | None = None, stiffness: float | None = None, layout: TendonLayout | None = None,
     ) -> None:  # fmt: skip
-        self._board, self._tracking, self._log, self._timing, self._shown = board, tracking, log, timing, shown
-        self._clock, self._period, self._signs = board.transport, timing.period, np.array(signs)
-        self._life, self._stale = settings.rate_life, settings.safety.stale
+        self._drive, self._tracking, self._log, self._timing, self._shown = drive, tracking, log, timing, shown
+        self._period, self._stale, self._tendons = timing.period, settings.safety.stale, numbers_of(layout)
         self._spools = spools_of(settings.actuator)
-        self._belief = RigBelief(wrist, settings.actuator, names_of_planes(settings.planes, plane))
+        self._belief = RigBelief(wrist, settings.actuator, names_of_planes(settings.planes, plane), layout)
         self._steering = Steering(self._belief, settings.sensor, timing.period)
         self._pulls = pulls
-        self.watch = Watch(settings, wrist, plane, timing, oblique, pulls, stiffness)
-        self._status, self._sent = board.read(), np.zeros(AXES)
+        self.watch = Watch(settings, wrist, plane, timing, oblique, pulls, stiffness, layout)
         timing.camera.expect(settings.planes)
-        self._epoch = self._clock.now()
+        drive.begin()
+        self._epoch = drive.now()
         self._last_usable = [self._epoch] * settings.planes
-        self._underway = settings.actuator.command_delay
-        delay = self._spools.timing.delay
-        self._late, self._rates = int(delay // self._period), np.zeros((AXES, remembered_rates(delay, self._period)))
-        self._since_read = delay - self._late * self._period - self._underway
-        self._place, self._reckoned = self._reeled(), deque[tuple[float, Array]]()
         self._skipped = 0
-        self._counted = self._epoch
 
     @property
     def next_tick(self) -> float:
@@ -116,63 +104,65 @@ class ControlLoop:
             self._tick(task, k)
         self._come_to_rest(task._replace(trial=-1))
 
-    def patience(self) -> Patience:
-        """For waiting between two motions, the wrist in sight."""
-        sight = InSight(self._tracking, self.watch, self._stale, self._belief, self._clock.now, self._signs)
-        return Patience(self._board, sight)
+    def patience(self, board: Board, signs: Sequence[int]) -> Patience:
+        """For waiting beside the board between two motions, the wrist in sight."""
+        sight = InSight(self._tracking, self.watch, self._stale, self._belief, self._drive.now, np.array(signs))
+        return Patience(board, sight)
 
     def _come_to_rest(self, task: Task) -> None:
-        deadline = self._clock.now() + _COMING_TO_REST
-        while self._sent.any() or Flag.MOVING in self._status.flags:
-            if self._clock.now() > deadline:
+        deadline = self._drive.now() + _COMING_TO_REST
+        while self._drive.moving:
+            if self._drive.now() > deadline:
                 raise SafetyStop(f"the motors do not stand {_COMING_TO_REST:g} s after a motion", fix="home again")
             self._tick(task, None)
-        self._listen(self.next_tick)
+        self._drive.listen(self.next_tick)
 
     def _tick(self, task: Task, k: int | None) -> None:
         """One tick at the motion's sample `k`; None: behind its last, where no law is asked."""
-        asleep = self._clock.now() < self.next_tick
-        self._listen(self.next_tick)
-        if (ahead := self.next_tick - self._clock.now()) > 0.0:
-            self._clock.wait(ahead)
-        woken = self._clock.now() - self.next_tick if asleep else 0.0
-        clock, due = self._clock.now(), self.next_tick
+        drive = self._drive
+        asleep = drive.now() < self.next_tick
+        drive.listen(self.next_tick)
+        drive.wait_until(self.next_tick)
+        woken = drive.now() - self.next_tick if asleep else 0.0
+        clock, due = drive.now(), self.next_tick
         marker = self._look(task)
-        estimate, position = self._steering.estimate, self._reeled()
+        estimate, position = self._steering.estimate, drive.reeled()
         self._judge(task.trial, estimate, position, clock, clock - due)
         answer: Answer | None = None
-        tension, target = np.full(AXES, math.nan), position
+        tension, target = np.full(len(position), math.nan), position
         if k is None:
-            self._send(np.zeros(AXES))
+            drive.stand()
         else:
             answer = self._answer(task, k, clock - task.begin)
             tension = answer.tension
-            target = self._turn(tension, position, task.course[k])
+            target = self._turn(tension, task.course[k])
         values = {
             "trial": task.trial,
             "time": clock - task.begin,
             "clock": clock,
             **marker,
             **self._followed(task, k, estimate, answer),
-            "state": self._status.state.name,
-            "faults": "+".join(fault.name or "" for fault in Fault if fault in self._status.faults),
-            "counted": self._counted - task.begin,
-            "board": self._status.time,
+            "state": drive.state.name,
+            "faults": drive.faults,
+            "counted": drive.counted - task.begin,
+            "board": drive.time,
             "late": clock - due,
             "woken": woken,
-            "round_trip": self._board.round_trip,
+            "round_trip": drive.round_trip,
         }
         self._log.disk.pretend_full = task.faults.disk(clock - task.begin)
-        row = values | of_axes(tension=tension, target=target, position=self._reeled(), sent=self._sent)
+        row = values | of_tendons(
+            self._tendons, tension=tension, target=target, position=drive.reeled(), sent=drive.sent
+        )  # fmt: skip
         if self._pulls is not None:
-            row |= of_axes(pull=self._pulls.pull)
+            row |= of_tendons(self._tendons, pull=self._pulls.pull)
         self._log.tick(row)
         if self._shown is not None:
             self._shown(row)
-        took = self._clock.now() - clock
+        took = drive.now() - clock
         self._go_on()
         culprit = self._timing.tick(clock - due, woken, took, self._skipped)
-        self.watch.ticked(clock, self._board.round_trip, self._skipped, culprit)
+        self.watch.ticked(clock, drive.round_trip, self._skipped, culprit)
 
     def _look(self, task: Task) -> dict[str, Any]:
         """Fuse what was seen since the last tick; for the log the newest verdict and the newest angle used."""
@@ -181,7 +171,7 @@ class ControlLoop:
         marker = of_planes(planes, bend_measured=unseen, captured=unseen, verdict=("",) * len(planes))
         for sighting in self._tracking.look():
             captured = sighting.time - self._epoch
-            now, frame = self._clock.now(), None
+            now, frame = self._drive.now(), None
             self.watch.sighted(sighting, now)
             self._timing.camera.add(sighting)
             if math.isfinite(sighting.theta):
@@ -224,9 +214,9 @@ class ControlLoop:
     def _judge(self, trial: int, estimate: Estimate, position: Array, clock: float, late: float) -> None:
         """Raises SafetyStop where a residual is beyond its limit; all are logged before."""
         taut, _ = self._belief.taut(estimate.theta)
-        delay, resent = late + self._skipped * self._period, self._board.traffic.resent
-        state, lapses = self._status.state, self._status.lapses
-        tick = Tick(clock, delay, estimate, position, taut, state, lapses, resent, clock - self._counted)
+        delay, drive = late + self._skipped * self._period, self._drive
+        unheard = clock - drive.counted
+        tick = Tick(clock, delay, estimate, position, taut, drive.state, drive.lapses, drive.resent, unheard)
         self._log.residuals(trial, clock, self.watch.see(tick, min(self._last_usable)))
         self.watch.judge(tick)
 
@@ -242,49 +232,18 @@ class ControlLoop:
             raise SafetyStop("the law's torque is not a number", fix="see its gains and model")
         return answer
 
-    def _turn(self, tension: Array, position: Array, sample: Array) -> Array:
-        """Send the step rates that lead to these tensions at a sample of the course; the targets [steps]."""
+    def _turn(self, tension: Array, sample: Array) -> Array:
+        """Send what leads to these tensions at a sample of the course; the targets [steps]."""
         taut, arms = self._belief.taut(sample[:, 0])
         target, moving = self._spools.target(tension, taut), arms @ sample[:, 1] / self._spools.step
-        # the command acts once an axis takes it up; by then the ones before have moved the spools
-        foreseen = self._spools.foreseen(self._place, self._rates, self._period)
-        gap = target + moving * self._spools.timing.delay - foreseen
-        self._send(self._signs * self._spools.rate(gap, moving, self._sent, self._period))
-        behind = self._spools.behind(gap, moving, self._sent, self._period)
-        self._steering.withheld = self._spools.tension(behind, np.zeros(AXES)) @ arms
+        behind = self._drive.lead(target, moving)
+        self._steering.withheld = self._spools.tension(behind, np.zeros(len(behind))) @ arms
         return target
-
-    def _send(self, rates: Array) -> None:
-        """Step rates of the axes, one of which is 0 for none."""
-        sent, self._posted = self._board.post_turn(rates.tolist(), self._life)
-        self._sent = self._signs * np.array(sent)
-
-    def _listen(self, until: float) -> None:
-        """Take in the board's answers to what was sent, those that come by `until` [s]."""
-        while (answered := self._board.answered(until)) is not None:
-            began, self._status = answered
-            busy = _BUSY * float(np.abs(self._rates[:, 1]).sum())
-            self._counted = began + self._underway + busy
-            while self._reckoned[0][0] < began:  # lost on the way
-                self._reckoned.popleft()
-            self._place = self._place + (self._reeled() - self._reckoned.popleft()[1])
 
     def _go_on(self) -> None:
         """To the next tick that is not over yet, with what the spools hold in the middle of this one."""
-        self._skipped = max(0, int((self._clock.now() - self.next_tick - self._period) / self._period))
-        for skipped in range(1 + self._skipped):
-            ahead = self._spools.foreseen(self._place, self._rates, self._period)
-            self._rates = np.column_stack([self._sent, self._rates[:, :-1]])
-            middle = self._spools.reckoned(self._place, self._rates, 0.5 * self._period, self._period)
+        self._skipped = max(0, int((self._drive.now() - self.next_tick - self._period) / self._period))
+        for middle in self._drive.go_on(1 + self._skipped):
             reeled = self._belief.at_places(self._spools.step * middle)
             self._steering.predict(reeled)
             self.watch.predict(reeled)
-            self._place = ahead
-            if skipped == 0:
-                in_force = self._rates[:, self._late + 1]
-                self._reckoned.append((self._posted, ahead - in_force * self._since_read))
-
-    def _reeled(self) -> Array:
-        """Steps that the spools have reeled in, by the last status."""
-        reeled: Array = self._signs * np.array(self._status.position, float)
-        return reeled

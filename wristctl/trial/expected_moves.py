@@ -87,17 +87,27 @@ def _before_one_camera(wrist: WristParameters, plane: str, away: Sequence[int], 
 
 
 def _before_two(wrist: WristParameters) -> _Alone:
-    """It bends the wrist by K^-1 c T for a pull T at its place c, which takes c.K^-1 c T off its path."""
+    """Of the board's four, before two cameras."""
+    places = wrist.tendon_radius * np.stack([np.cos(pull_directions()), np.sin(pull_directions())], axis=1)
+    toward, path, sizes = bends_alone(wrist, places)
+    return _Alone(toward, path, np.ones(AXES), sizes)
+
+
+def bends_alone(wrist: WristParameters, places: Array) -> tuple[Array, Array, Array]:
+    """A small bend of a slack wrist by one tendon alone, of each at its place c (T, 2) [m].
+
+    It bends the wrist by K^-1 c T for a pull T, which takes c.K^-1 c T off its path. Returns where to, unit vectors
+    (T, 2); what a radian takes off the path (T,) [m/rad]; and the bend by a newton (T,) [rad/N].
+    """
     along, across = wrist.stiffness, wrist.stiffness * wrist.flexion_ratio
     yy, yz, zz = ellipse(along, across, math.radians(wrist.stiffness_axis_deg))
     sinking = [across_of(in_plane(wrist, plane), (0,) * AXES).stiffness for plane in PLANES]
     springs = np.array([[yy, yz], [yz, zz]])
     springs[np.diag_indices(2)] += np.array(sinking) - [in_plane(wrist, plane).stiffness for plane in PLANES]
-    places = wrist.tendon_radius * np.stack([np.cos(pull_directions()), np.sin(pull_directions())], axis=1)
     bends = np.linalg.solve(springs, places.T).T
     sizes = np.hypot(*bends.T)
     toward = bends / sizes[:, None]
-    return _Alone(toward, (places * toward).sum(axis=1), np.ones(AXES), sizes)
+    return toward, (places * toward).sum(axis=1), sizes
 
 
 class ExpectedMoves:

@@ -17,6 +17,7 @@ from wristctl.simulation.spool_timing import remembered_rates
 from wristctl.simulation.worlds import Draws
 from wristctl.trial.calibration import WristCalibration
 from wristctl.trial.control_loop import ControlLoop, Shown, course_of
+from wristctl.trial.drives import BoardDrive
 from wristctl.trial.expected_moves import ExpectedMoves
 from wristctl.trial.homing import Zero, find_zero, slacken
 from wristctl.trial.log import TrialLog
@@ -114,7 +115,7 @@ class Experiment:
             try:
                 self._all(testbed, board, shown)
             except BaseException as error:
-                cause = _of_the_log(error)
+                cause = cause_of(error)
                 with undisturbed():
                     self._stopped(testbed, board, cause)
                 if cause is not error:
@@ -155,7 +156,7 @@ class Experiment:
         for trial in self._trials:
             bends_in = trial.plane if self._settings.planes == 1 else ""  # one set-up sees both planes
             if loop is None or bends_in != plane:
-                patience = Patience(board) if loop is None else loop.patience()
+                patience = Patience(board) if loop is None else loop.patience(board, self._signs)
                 testbed.face(trial.direction, patience.pulse)
                 loop, tracking = self._loop(testbed, board, bends_in, shown)
                 plane = bends_in
@@ -195,11 +196,16 @@ class Experiment:
         assert zero is not None
         stiffness = ExpectedMoves(settings, self._wrist, plane).tendon_stiffness(zero.steps_per_radian)
         loop = ControlLoop(
-            board, tracking, settings, self._facing(plane), plane, zero.signs, self.timing, self._log,
-            shown, 0.0 if pose is None else pose.oblique, self._pulls, stiffness,
+            BoardDrive(board, settings, zero.signs), tracking, settings, self._facing(plane), plane, self.timing,
+            self._log, shown, 0.0 if pose is None else pose.oblique, self._pulls, stiffness,
         )  # fmt: skip
         loop.follow(back(0.0, settings.rest, 0.0, settings.control_period, settings.planes), self._back, ())
         return loop
+
+    @property
+    def _signs(self) -> tuple[int, ...]:
+        assert self.zero is not None
+        return self.zero.signs
 
     def _facing(self, plane: str) -> WristParameters:
         """The wrist as a loop in this plane knows it, or in both."""
@@ -288,7 +294,7 @@ def spared(wrist: WristParameters, settings: HwRunSettings) -> WristParameters:
     return wrist.model_copy(update={"tension_limit": limit})
 
 
-def _of_the_log(error: BaseException) -> BaseException:
+def cause_of(error: BaseException) -> BaseException:
     """The safety stop behind a disk that takes no more rows; any other error as it is."""
     if isinstance(error, OSError):
         return SafetyStop(f"the log cannot be written: {error.strerror}", str(error.filename or "data"), fix_of(error))

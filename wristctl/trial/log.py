@@ -25,8 +25,8 @@ from wristctl.wrist.directions import ACTIVE
 Columns = Mapping[str, tuple[str, str]]
 
 
-def _of_tendons(name: str, unit: str, meaning: str) -> dict[str, tuple[str, str]]:
-    return {f"{name}_{tendon}": (unit, f"{meaning}, tendon {tendon}") for tendon in ACTIVE}
+def _by_tendon(tendons: Sequence[int], name: str, unit: str, meaning: str) -> dict[str, tuple[str, str]]:
+    return {f"{name}_{tendon}": (unit, f"{meaning}, tendon {tendon}") for tendon in tendons}
 
 
 _CLOCKS: Columns = {
@@ -34,19 +34,6 @@ _CLOCKS: Columns = {
     "time": ("s", "since the trial's motion began"),
     "clock": ("s", "the run's one clock"),
     "utc": ("s", "the same moment since 1970-01-01T00:00Z; empty in virtual time"),
-}
-_AXES: Columns = {
-    **_of_tendons("tension", "N", "commanded"),
-    **_of_tendons("target", "steps", "wanted spool position, 0 where straight and just taut, positive reeled in"),
-    **_of_tendons("position", "steps", "spool position by the board's status"),
-    "counted": ("s", "when the board had those positions, as the host reckons, on the trial's time"),
-    "board": ("s", "the board's own clock then"),
-    **_of_tendons("sent", "1/s", "step rate really sent"),
-    "state": ("", "of the board"),
-    "faults": ("", "of the board"),
-    "late": ("s", "from the tick's due time to its beginning"),
-    "woken": ("s", "part of that for which the computer slept on; the rest is what the tick before took too long"),
-    "round_trip": ("s", "from the tick's command to the board's answer"),
 }
 _OF_A_PLANE: Columns = {
     "bend": ("rad", "bending angle as estimated"),
@@ -63,7 +50,7 @@ _OF_A_PLANE: Columns = {
     "torque_wanted": ("N m", "torque that the controller wants"),
     "torque": ("N m", "torque of the commanded tensions on the one-segment model"),
 }
-OF_LOAD_CELLS: Columns = _of_tendons("pull", "N", "by load cell as read last; empty where it gives nothing")
+OF_LOAD_CELLS: Columns = _by_tendon(ACTIVE, "pull", "N", "by load cell as read last; empty where it gives nothing")
 WIRE: Columns = {
     "clock": ("s", "the run's one clock"),
     "way": ("", "sent to the board, or came from it"),
@@ -105,13 +92,31 @@ def residual_columns(weighed: bool) -> Columns:
     }
 
 
-def tick_columns(planes: int) -> Columns:
-    """Columns of the control ticks of a rig with so many planes; load cells have further ones."""
+def _of_motors(tendons: Sequence[int]) -> Columns:
+    """Columns of what the motors are told and do."""
+    where = "spool position, 0 where straight and just taut, positive reeled in"
+    return {
+        **_by_tendon(tendons, "tension", "N", "commanded"),
+        **_by_tendon(tendons, "target", "steps", f"wanted {where}"),
+        **_by_tendon(tendons, "position", "steps", "spool position by the board's status"),
+        "counted": ("s", "when the board had those positions, as the host reckons, on the trial's time"),
+        "board": ("s", "the board's own clock then"),
+        **_by_tendon(tendons, "sent", "1/s", "step rate really sent"),
+        "state": ("", "of the board"),
+        "faults": ("", "of the board"),
+        "late": ("s", "from the tick's due time to its beginning"),
+        "woken": ("s", "part of that for which the computer slept on; the rest is what the tick before took too long"),
+        "round_trip": ("s", "from the tick's command to the board's answer"),
+    }
+
+
+def tick_columns(planes: int, tendons: Sequence[int] = ACTIVE) -> Columns:
+    """Columns of the control ticks of a rig with so many planes and these tendons; load cells have further ones."""
     of_planes = _by_plane(planes, _OF_A_PLANE)
     if planes > 1:  # no network stands behind such a reference, and the planes share the tendons
         of_planes = {name: column for name, column in of_planes.items() if not name.startswith("bend_desired")}
         of_planes["share"] = ("1", "share of the wanted torque that the tendons could give")
-    return {**_CLOCKS, **of_planes, **_AXES}
+    return {**_CLOCKS, **of_planes, **_of_motors(tendons)}
 
 
 def frame_columns(planes: int) -> Columns:
@@ -134,7 +139,7 @@ def truth_columns(coordinates: int, planes: int = 1) -> Columns:
         "trial": ("", "number, from 0"),
         "time": ("s", "since the trial's motion began"),
         **_by_plane(planes, {**of_segments, "bend": ("rad", "true bending angle")}),
-        **_of_tendons("pull", "N", "true tension at the spool"),
+        **_by_tendon(ACTIVE, "pull", "N", "true tension at the spool"),
     }
 
 
@@ -214,17 +219,18 @@ class Stream:
 class TrialLog:
     """log.csv and frames.csv of trials; between.csv for the moves between them; residuals.csv of both; wire.csv with
     all bytes of the whole run; truth.csv of an emulated bench. The clock is `monotonic`, or virtual; a rig is `weighed`
-    where it has load cells. The true wrist of a bench has so many `coordinates`.
+    where it has load cells. The true wrist of a bench has so many `coordinates`. `tendons` are the numbers of those
+    that motors wind. One that is not `wired` has no board, and no wire.csv.
     """
 
     def __init__(
         self, folder: Path, coordinates: int | None, period: float, monotonic: bool = False, weighed: bool = False,
-        planes: int = 1,
+        planes: int = 1, tendons: Sequence[int] = ACTIVE, wired: bool = True,
     ) -> None:  # fmt: skip
         self.disk, self._monotonic = Disk(folder), monotonic
         self._planes = planes
-        ticks = {**tick_columns(planes), **(OF_LOAD_CELLS if weighed else {})}
-        tables = {"log": ticks, "between": ticks, "frames": frame_columns(planes), "wire": WIRE}
+        ticks = {**tick_columns(planes, tendons), **(OF_LOAD_CELLS if weighed else {})}
+        tables = {"log": ticks, "between": ticks, "frames": frame_columns(planes), **({"wire": WIRE} if wired else {})}
         tables["residuals"] = residual_columns(weighed)
         if coordinates is not None:
             tables["truth"] = truth_columns(coordinates, planes)
@@ -244,7 +250,8 @@ class TrialLog:
         stream = self.streams["between" if row["trial"] < 0 else "log"]
         stream.row(values[name] for name in stream.columns)
         self.streams["residuals"].flush()
-        self.streams["wire"].flush()
+        if "wire" in self.streams:
+            self.streams["wire"].flush()
         self._write_truth(_AT_ONCE)
 
     def frame(self, trial: int, used: float, begin: float, sighting: Sighting, frame: Frame | None) -> None:
@@ -286,12 +293,12 @@ class TrialLog:
             stream.close()
 
 
-def of_axes(**values: NDArray[np.float64]) -> dict[str, float]:
-    """Columns of values (4,) of the board's axes."""
+def of_tendons(tendons: Sequence[int], **values: NDArray[np.float64]) -> dict[str, float]:
+    """Columns of values (T,) of the tendons of these numbers."""
     return {
         f"{name}_{tendon}": value
-        for name, four in values.items()
-        for tendon, value in zip(ACTIVE, four.tolist(), strict=True)
+        for name, every in values.items()
+        for tendon, value in zip(tendons, every.tolist(), strict=True)
     }
 
 

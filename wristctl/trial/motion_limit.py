@@ -9,6 +9,8 @@ from collections.abc import Mapping, Sequence
 
 from wristctl.config.plant import Plant
 from wristctl.config.study import Study
+from wristctl.trial.rig_belief import layout_of_rig
+from wristctl.trial.rig_settings import share_of_pair
 from wristctl.trial.trial_results import twin
 from wristctl.trial.trials import Trial
 from wristctl.wrist.kinematics import Inverse
@@ -32,7 +34,8 @@ def peak_tension(
         for trial in different.values():
             done = twin(study, trial, network, tuned, loop)
             peaks.append(math.inf if done.failed else done.metrics["peak_tension"])
-    return max(peaks)
+    share = share_of_pair(layout_of_rig(settings, study.wrist), settings.planes)
+    return max(peaks) / share
 
 
 def limited(study: Study, peak: float) -> Study:

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from wristctl.arrays import Array
 from wristctl.board.messages import AXES
+from wristctl.config.hw_run import HwRunSettings
 from wristctl.config.plant import Actuator, Sensor
 from wristctl.config.wrist import WristParameters
 from wristctl.control.belief import Compensated, Places, belief_in_lanes, lengths_at, moment_arms_at, straight_at
@@ -37,20 +38,24 @@ TOWARD = {
 class RigBelief:
     """Knowledge of a rig's loop in P planes: the one-segment wrist, its drive, and T places of tendons.
 
-    In one plane the places are the + and the - side, and the wrist is as this plane sees it; in two each of the board's
-    axes winds the tendon of its own place. Raises UserError for tendons that no axis winds.
+    In one plane the places are the + and the - side, and the wrist is as this plane sees it; in two each motor winds
+    the tendon of its own place. `layout` has the tendons that motors wind, None: the board's four. Raises UserError for
+    tendons that no axis winds.
     """
 
-    def __init__(self, wrist: WristParameters, actuator: Actuator, planes: Sequence[str]) -> None:
+    def __init__(
+        self, wrist: WristParameters, actuator: Actuator, planes: Sequence[str], layout: TendonLayout | None = None
+    ) -> None:
         self.planes, self.wrist, self._actuator = tuple(planes), wrist, actuator
+        self._place = places_of_tendons(self.planes, layout)
         if len(self.planes) == 1:
-            self.known, self._facing = known_of_sides(wrist, actuator), [wrist]
+            alike = np.bincount(self._place).astype(float)
+            self.known, self._facing = known_of_sides(wrist, actuator, alike), [wrist]
         else:
-            layout = layout_of_axes(wrist)
+            layout = layout or layout_of_axes(wrist)
             turned = [in_plane(wrist, plane) for plane in self.planes]
-            self.known = _known_of_axes(wrist, turned, layout, actuator)
+            self.known = _known_of_places(wrist, turned, layout, actuator)
             self._facing = [as_pairs(facing, layout, axis) for axis, facing in enumerate(turned)]
-        self._place = places_of_axes(self.planes)
         wound = np.eye(len(self.known.pulls))[:, self._place]
         self._means = wound / wound.sum(axis=1, keepdims=True)
         self._found = np.zeros(len(self.known.pulls) + len(self.known.arms))
@@ -61,25 +66,36 @@ class RigBelief:
         return stationary_gains(beliefs).ravel()
 
     def at_places(self, values: Array) -> Array:
-        """Values of the axes (4,), their mean at each place (T,)."""
+        """Values of the motors, their mean at each place (T,)."""
         means: Array = self._means @ values
         return means
 
     def of_axes(self, values: Array) -> Array:
-        """Values of the places (T,), for each axis (4,)."""
+        """Values of the places (T,), for each motor."""
         return values[self._place]
 
     def taut(self, bend: Sequence[float] | Array) -> tuple[Array, Array]:
-        """Reeled-in lengths (4,) of tendons that are just taut at this bend (P,) [m], and their changes by the bend
-        (4, P) [m/rad]."""
+        """Reeled-in lengths (M,) of each motor's tendon that is just taut at this bend (P,) [m], and their changes by
+        the bend (M, P) [m/rad]."""
         _paths(self.known, np.ascontiguousarray(bend, np.float64), self._found)
         of_places = self._found.reshape(1 + len(self.planes), -1).take(self._place, axis=1)
         return of_places[0], np.ascontiguousarray(of_places[1:].T)
 
 
-def places_of_axes(planes: Sequence[str]) -> NDArray[np.int64]:
-    """Place of the tendon that each of the board's axes winds (4,): in one plane that of its side, + or -."""
-    return np.where(on_plus_side(planes[0]), 0, 1) if len(planes) == 1 else np.arange(AXES)
+def places_of_tendons(planes: Sequence[str], layout: TendonLayout | None = None) -> NDArray[np.int64]:
+    """Place of the tendon that each motor winds (M,): in one plane that of its side, + or -.
+
+    `layout` has the tendons that motors wind, None: the board's four.
+    """
+    if len(planes) == 1:
+        plus = on_plus_side(planes[0]) if layout is None else layout.cross_section[:, 0] > 0.0
+        return np.where(plus, 0, 1)
+    return np.arange(AXES if layout is None else len(layout.places))
+
+
+def numbers_of(layout: TendonLayout | None) -> tuple[int, ...]:
+    """Numbers of the tendons that motors wind, in the order of these; None: of the board's four."""
+    return ACTIVE if layout is None else tuple(range(1, 1 + len(layout.places)))
 
 
 def names_of_planes(planes: int, plane: str) -> tuple[str, ...]:
@@ -87,14 +103,15 @@ def names_of_planes(planes: int, plane: str) -> tuple[str, ...]:
     return (plane,) if planes == 1 else PLANES
 
 
-def _known_of_axes(
+def _known_of_places(
     wrist: WristParameters, turned: Sequence[WristParameters], layout: TendonLayout, actuator: Actuator
 ) -> Known:
-    values, alike = placed_values(wrist, layout, 1), np.ones(AXES)
+    count = len(layout.places)
+    values, alike = placed_values(wrist, layout, 1), np.ones(count)
     models = np.array([segments(facing, 1) for facing in turned])
-    pulls = (0,) * AXES
-    belief = Places(models, alike, values, (0,) * (OF_A_TENDON * AXES), pulls, Compensated())
-    return Known(belief, drive_of(actuator, alike), (0,) * len(turned), pulls, (0,) * (len(turned) * AXES))
+    pulls = (0,) * count
+    belief = Places(models, alike, values, (0,) * (OF_A_TENDON * count), pulls, Compensated())
+    return Known(belief, drive_of(actuator, alike), (0,) * len(turned), pulls, (0,) * (len(turned) * count))
 
 
 def layout_of_axes(wrist: WristParameters) -> TendonLayout:
@@ -110,6 +127,13 @@ def layout_of_axes(wrist: WristParameters) -> TendonLayout:
 
 def _angles(layout: TendonLayout) -> list[float]:
     return [place.angle % math.tau for place in layout.places]
+
+
+def layout_of_rig(settings: HwRunSettings, wrist: WristParameters) -> TendonLayout | None:
+    """Tendons that the motors of a rig wind; None: the board's four."""
+    if settings.rig is None:
+        return None
+    return TendonLayout(tuple(place for place in TendonLayout.of(wrist).places if place.radius > 0.0))
 
 
 def pull_directions() -> Array:

@@ -27,11 +27,12 @@ from wristctl.simulation.trajectory import Trajectory, size_of
 from wristctl.simulation.worlds import Draws
 from wristctl.trial.log import column_of
 from wristctl.trial.motions import motion_of
-from wristctl.trial.rig_belief import PLANES, layout_of_axes, names_of_planes, places_of_axes
+from wristctl.trial.rig_belief import PLANES, layout_of_axes, layout_of_rig, names_of_planes, places_of_tendons
+from wristctl.trial.rig_settings import share_of_pair, sides_of
 from wristctl.trial.trials import Trial
-from wristctl.wrist.directions import ACTIVE
 from wristctl.wrist.kinematics import Inverse
 from wristctl.wrist.spatial.spatial_kinematics import spatial_tips
+from wristctl.wrist.tendon_layout import TendonLayout
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -66,7 +67,7 @@ def logged_course(course: pd.DataFrame, followed: Motion, wrist: WristParameters
         return _on(followed.time, course, [f"{name}_{plane}" for plane in PLANES])
 
     bend = planes("bend")
-    pulls = _on(followed.time, course, [f"tension_{tendon}" for tendon in ACTIVE])
+    pulls = _on(followed.time, course, [name for name in course.columns if name.startswith("tension_")])
     return Trajectory(
         label="",
         time=followed.time,
@@ -95,7 +96,7 @@ def true_course(logged: Trajectory, truth: pd.DataFrame, length: float) -> Traje
     return replace(
         logged,
         theta=_on(time, truth, [f"bend_{plane}" for plane in PLANES]),
-        acting=_on(time, truth, [f"pull_{tendon}" for tendon in ACTIVE]),
+        acting=_on(time, truth, [name for name in truth.columns if name.startswith("pull_")]),
         segment_theta=bends,
         tip=spatial_tips(bends, length),
     )
@@ -157,12 +158,14 @@ def recovery(time: Array, error: Array, move: float, end: float) -> float:
 
 
 def evaluated(
-    trial: Trial, log: pd.DataFrame, followed: Motion, settings: HwRunSettings, truth: pd.DataFrame | None
-) -> dict[str, float]:
+    trial: Trial, log: pd.DataFrame, followed: Motion, settings: HwRunSettings, truth: pd.DataFrame | None,
+    layout: TendonLayout | None = None,
+) -> dict[str, float]:  # fmt: skip
     """Metrics of one whole trial by the estimated bend, of the true one as `true_...`, and what became of a push.
 
     `log` holds its rows of the log, `truth` those of an emulated bench, whose push ends when it should; by the log it
-    ends when the estimated load has fallen again. All values are nan where the log is not whole.
+    ends when the estimated load has fallen again. All values are nan where the log is not whole. `layout` has the
+    tendons that the rig's motors wind; None: the board's four.
     """
     names, one = names_of_planes(followed.planes, trial.plane), followed.planes == 1
     by_log, truly = ((*summed(), "oscillation"), JUDGED) if one else (LOGGED, TRULY)
@@ -180,7 +183,8 @@ def evaluated(
         time = table["time"].to_numpy(float)
         return np.stack([np.interp(grid, time, column) for column in values.T], axis=1)
 
-    place, tensions = places_of_axes(names), log[[f"tension_{tendon}" for tendon in ACTIVE]].to_numpy(float)
+    pulls = [name for name in log.columns if name.startswith("tension_")]
+    place, tensions = places_of_tendons(names, layout), log[pulls].to_numpy(float)
     tension = on_grid(np.stack([tensions[:, place == each].mean(axis=1) for each in range(place.max() + 1)], axis=1))
     beyond = np.abs(rows("torque_wanted") - rows("torque")).max(axis=1, keepdims=True) > 1e-9
     saturated = (on_grid(beyond.astype(float))[:, 0] > 0.5).astype(float)
@@ -219,8 +223,9 @@ _OF_PUSH = ("recovery", "true_recovery", "push_torque")
 
 
 def metrics_of_trials(
-    folder: Path, trials: Sequence[Trial], motions: Mapping[str, Motion], settings: HwRunSettings
-) -> list[dict[str, float]]:
+    folder: Path, trials: Sequence[Trial], motions: Mapping[str, Motion], settings: HwRunSettings,
+    layout: TendonLayout | None = None,
+) -> list[dict[str, float]]:  # fmt: skip
     """Metrics of each of these trials by the log in a folder, as `evaluated` gives them."""
     import pandas as pd
 
@@ -230,7 +235,7 @@ def metrics_of_trials(
     for trial in trials:
         log, followed = logs[logs["trial"] == trial.number], motions[trial.direction]
         truth = None if truths is None else truths[truths["trial"] == trial.number]
-        found.append(evaluated(trial, log, followed, settings, truth))
+        found.append(evaluated(trial, log, followed, settings, truth, layout))
     return found
 
 
@@ -239,6 +244,17 @@ def _load(time: Array, load: Array, after: float) -> Array:
     if load.shape[1] == 1:
         return load[:, 0]
     return size_of(load - np.median(load[time < after][-50:], axis=0))
+
+
+def _pairs(wrist: WristParameters, layout: TendonLayout, loop: Loop) -> tuple[WristParameters, Loop]:
+    """A rig in one plane with two tendons on either side, as models have it, in place of as many as it has.
+
+    Each has the share of their stiffness and tension limits that makes a side the same.
+    """
+    share = share_of_pair(layout, 1)
+    motors = loop.actuator.model_copy(update={"tendon_stiffness": share * loop.actuator.tendon_stiffness})
+    tensions = {"pretension": share * wrist.pretension, "tension_limit": share * wrist.tension_limit}
+    return sides_of(wrist, layout).model_copy(update=tensions), loop.model_copy(update={"actuator": motors})
 
 
 def twin(
@@ -252,6 +268,9 @@ def twin(
     settings, wrist, scenario = study.hw_run, study.wrist, trial.scenario
     row, followed = settings.rows[trial.row], motion_of(settings, wrist, trial.direction, network)
     law = in_a_first_repetition(controller(row.controller))
+    if (layout := layout_of_rig(settings, wrist)) is not None and settings.planes == 1:
+        wrist, loop = _pairs(wrist, layout, loop or settings.loop)
+        study = study.model_copy(update={"wrist": wrist})
     asked = (loop or settings.loop).model_copy(update={"disturbances": trial.disturbances(settings, followed)})
     if settings.planes == 1:  # the wrist may leave the plane in which its rig bends
         move = {"reference": settings.reference, "direction": trial.direction, "horizon": settings.horizon}
@@ -259,7 +278,7 @@ def twin(
         simulated = study.model_copy(update={"simulate": chosen})
         wrist, asked, followed = asked_of(simulated, settings.control_period, network)
         scenario = scenario_of(chosen.reference, chosen.direction)
-    else:
+    elif layout is None:
         layout_of_axes(wrist)
         wrist = wrist.model_copy(update={"tendons": "four"})  # the fifth in the centre is not wound
     gains = np.array([gains_of(law, row.gains, tuned)])

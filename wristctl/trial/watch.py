@@ -20,13 +20,14 @@ from wristctl.trial.causes_in_space import SpatialEvidence, causes_in_space
 from wristctl.trial.likely_causes import Evidence, likely_causes, reversals
 from wristctl.trial.marker_lag import MarkerLag
 from wristctl.trial.residuals import RESIDUALS, Judge, Limit, limits_of, notes, stopped_by, worst
-from wristctl.trial.rig_belief import names_of_planes
+from wristctl.trial.rig_belief import names_of_planes, numbers_of, places_of_tendons
 from wristctl.trial.safety import SafetyStop
-from wristctl.trial.spools import on_plus_side, spools_of
+from wristctl.trial.spools import spools_of
 from wristctl.trial.tendon_pulls import TendonPulls
 from wristctl.trial.tick_timing import FIX, TickTiming
 from wristctl.vision.marker import Sighting
 from wristctl.wrist.directions import away_of
+from wristctl.wrist.tendon_layout import TendonLayout
 
 # Seconds over which causes are judged, and whether the loop swings.
 _HISTORY, _SWINGING = 0.2, 1.0
@@ -36,6 +37,7 @@ _FIX = (
     "cut the motors' supply, slacken the tendons by hand, look (documentation: Faults and refusals), then wristctl hw "
     "check --rig"
 )
+_FIX_OF_RIG = "cut the motors' power, slacken the tendons by hand, look, then wristctl check-rig"
 # Periods after which spools' steps that were counted are old: those of the tick before are one.
 _UNHEARD = 2.5
 # Share of the limit on a bend across by which what stands may seem to bend.
@@ -51,9 +53,9 @@ class Tick(NamedTuple):
     """Delay with the ticks that were skipped before."""
     estimate: Estimate
     position: Array
-    """Spools, (4,) [steps], reeled in."""
+    """Spools, (T,) [steps], reeled in."""
     taut: Array
-    """Taut lengths of the tendons at the estimated angle, (4,) [m]."""
+    """Taut lengths of the tendons at the estimated angle, (T,) [m]."""
     state: State
     lapses: int
     """Step rates that have outlived their life, as the board counts, modulo 256."""
@@ -79,16 +81,22 @@ class Watch:
 
     def __init__(
         self, settings: HwRunSettings, wrist: WristParameters, plane: str, timing: TickTiming, oblique: float = 0.0,
-        pulls: TendonPulls | None = None, stiffness: float | None = None,
+        pulls: TendonPulls | None = None, stiffness: float | None = None, layout: TendonLayout | None = None,
     ) -> None:  # fmt: skip
         self._settings, self._timing, self._oblique, self._pulls = settings, timing, oblique, pulls
-        self._plus = () if settings.planes == 2 else tuple(on_plus_side(plane).tolist())
+        self._layout = layout
+        self._plus = () if settings.planes == 2 else tuple((places_of_tendons((plane,), layout) == 0).tolist())
         self._away = () if settings.planes == 2 else away_of(plane, settings.markers.positive)
         self._spools, self._period, self._radius = spools_of(settings.actuator), timing.period, wrist.tendon_radius
         if stiffness is not None:
             self._spools = replace(self._spools, stiffness=stiffness)
         self._blind = BlindModel(
-            wrist, settings.actuator, settings.safety.softest, self._period, names_of_planes(settings.planes, plane)
+            wrist,
+            settings.actuator,
+            settings.safety.softest,
+            self._period,
+            names_of_planes(settings.planes, plane),
+            layout,
         )
         nearer = 2.0 * settings.markers.distance / wrist.length if settings.planes == 1 else math.nan
         doubtful = _DOUBTFUL * math.radians(settings.safety.across_deg)
@@ -234,6 +242,8 @@ class Watch:
         problem = stopped_by(limit, self._values[name])
         if name == "age":
             why, fix = self._timing.camera.missing(tick.clock, limit.limit)
+            if self._settings.rig is not None:
+                problem = problem.replace("marker angle", "bend")
             problem += f" ({why})"
         elif name == "disabled":
             problem = f"the board is {tick.state.name}, not ENABLED"
@@ -244,7 +254,8 @@ class Watch:
         elif RESIDUALS[name].weighed:
             problem += self._named(name)
         elif name in _FOLLOWING or (name == "pull" and self._settings.planes == 2):
-            problem, fix = f"{problem}; likely {', or '.join(self._causes(tick)[:4])}", _FIX
+            fix = _FIX if self._settings.rig is None else _FIX_OF_RIG
+            problem = f"{problem}; likely {', or '.join(self._causes(tick)[:4])}"
         return SafetyStop(problem, fix=fix)
 
     def _named(self, name: str) -> str:
@@ -274,6 +285,8 @@ class Watch:
                     jump=np.array(jumps),
                     reversals=swings,
                     pushed=self._pushed,
+                    directions=None if self._layout is None else self._layout.directions,
+                    numbers=numbers_of(self._layout),
                 )
             )
         ((one, two),) = ends

@@ -120,6 +120,11 @@ class TendonLayout:
         places: Array = radius[:, None] * unit
         return places
 
+    @property
+    def directions(self) -> Array:
+        """Direction of each place from the axis (T,) [rad], from ulnar toward flexion."""
+        return np.array([place.angle for place in self.places])
+
     @cached_property
     def multiplicity(self) -> NDArray[np.int64]:
         """Number of tendons alike at each place (T,)."""

@@ -80,7 +80,7 @@ def plan(study: Study, inputs: Inputs) -> str:
     known = identified(study, "hw-run", inputs).wrist
     with under("hw-run"):
         if settings.planes == 1:
-            check_reach([settings.reference], known, "reference")
+            check_reach([settings.reference], _in_its_plane(settings, known), "reference")
         else:
             check_bends_of_trials(settings, known)
         check_inverses(inverses_of([settings.reference]), inputs)
@@ -95,6 +95,15 @@ def plan(study: Study, inputs: Inputs) -> str:
     return f"{describe_rig(settings)}\n{count} trials, about {count * trial_seconds:.0f} s of motion after homing"
 
 
+def _in_its_plane(settings: HwRunSettings, wrist: WristParameters) -> WristParameters:
+    """The wrist as models in one plane have it."""
+    from wristctl.trial.rig_belief import layout_of_rig
+    from wristctl.trial.rig_settings import sides_of
+
+    layout = layout_of_rig(settings, wrist)
+    return wrist if layout is None else sides_of(wrist, layout)
+
+
 def check_bends_of_trials(settings: HwRunSettings, wrist: WristParameters) -> None:
     """UserError for motions or controllers of trials in two planes that cannot be."""
     from wristctl.control.table import controller
@@ -104,7 +113,8 @@ def check_bends_of_trials(settings: HwRunSettings, wrist: WristParameters) -> No
     from wristctl.trial.rig_belief import layout_of_axes
     from wristctl.trial.trials import motions_of
 
-    layout_of_axes(wrist)
+    if settings.rig is None:
+        layout_of_axes(wrist)
     check_two_planes([World(settings.loop, wrist)])
     for name in motions_of(settings):
         motion_of(settings.model_copy(update={"control_period": _CHECKED}), wrist, name)
@@ -127,7 +137,7 @@ def hw_run(session: Session) -> Performed | PerformedBends:
         network_for(session.inputs, identified_session.study.wrist, [believed.loop]),
         tuned_gains(session.inputs),
     )
-    if believed.port is None:
+    if believed.port is None and believed.rig is None:
         warn_outside_conditions(believed.rows, [believed.loop])
     else:
         warn_of_earlier_families(believed.rows)
@@ -176,4 +186,5 @@ HW_RUN: Procedure[Performed | PerformedBends] = Procedure(
         EarlierRun("tuned", kind="tune", optional=True),
         EarlierRun("network", kind="train", optional=True),
     ),
+    in_one_plane=lambda study: study.hw_run.rig is None,
 )

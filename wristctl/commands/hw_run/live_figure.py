@@ -1,6 +1,7 @@
 """A trial while it goes on, from the end of its growing log."""
 
 import io
+from itertools import cycle
 from pathlib import Path
 
 import numpy as np
@@ -8,7 +9,6 @@ import pandas as pd
 from matplotlib.figure import Figure
 
 from wristctl.plotting.style import BLACK, BLUE, ORANGE, PURPLE, SKY, VERMILLION, WANTED, figure, legend_below, title
-from wristctl.wrist.directions import ACTIVE
 
 # Bytes of a row of the log, at most.
 _ROW = 1000
@@ -44,8 +44,9 @@ def recent(rows: pd.DataFrame) -> Figure:
             above.plot(time, np.degrees(rows[f"{name}{plane}"]), color=colour, label=label)
             captured, seen = time + rows[f"captured{plane}"] - rows["time"], np.degrees(rows[f"{name}_measured{plane}"])
             above.plot(captured, seen, ".", color=BLACK, markersize=2.0, label="marker")
-        for tendon, colour in zip(ACTIVE, _COLOURS, strict=True):
-            below.plot(time, rows[f"tension_{tendon}"], color=colour, label=f"tendon {tendon}")
+        pulls = [name for name in rows.columns if name.startswith("tension_")]
+        for name, colour in zip(pulls, cycle(_COLOURS), strict=False):
+            below.plot(time, rows[name], color=colour, label=f"tendon {name.removeprefix('tension_')}")
         newest = rows.iloc[-1]
         title(above, f"trial {newest['trial'] + 1:.0f}, {newest['time']:.1f} s, board {newest['state']}")
         legend_below(picture, columns=4)

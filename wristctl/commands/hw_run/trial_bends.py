@@ -51,9 +51,10 @@ class PerformedBends(StudyResult):
     @property
     def marks(self) -> list[str]:
         """What the wrist does wrong in trials that ended well: `marks_of`."""
-        from wristctl.board.messages import AXES
+        from wristctl.trial.rig_belief import layout_of_rig, numbers_of
 
-        return marks_of(self.trials, self.twins, self.study.wrist.tension_range, AXES)
+        places = len(numbers_of(layout_of_rig(self.study.hw_run, self.study.wrist)))
+        return marks_of(self.trials, self.twins, self.study.wrist.tension_range, places)
 
     def frame(self) -> pd.DataFrame:
         """One row per trial that began."""
@@ -113,7 +114,7 @@ def _draw(session: Session, done: pd.DataFrame, twins: Mapping[int, Simulation])
 
     from wristctl.commands.hw_run.trial_bend_figures import TrialBends, errors_of_bends, paths_of_bends
     from wristctl.trial.motions import motion_of
-    from wristctl.trial.rig_belief import layout_of_axes
+    from wristctl.trial.rig_belief import layout_of_axes, layout_of_rig
     from wristctl.trial.trial_results import logged_course, true_course
     from wristctl.wrist.spatial.held_bends import reach_of_bends
 
@@ -133,7 +134,7 @@ def _draw(session: Session, done: pd.DataFrame, twins: Mapping[int, Simulation])
         )
         push = (settings.push.start, settings.push.start + settings.push.duration) if record["push"] else None
         courses.append(TrialBends(record["direction"], logged, true, twins[record["trial"]].trajectory, push))
-    reach = reach_of_bends(study.wrist, layout_of_axes(study.wrist))
+    reach = reach_of_bends(study.wrist, layout_of_rig(settings, study.wrist) or layout_of_axes(study.wrist))
     for prefix, pushed in (("", False), ("pushed-", True)):
         some = [course for course in courses if (course.push is not None) == pushed]
         if not some:

@@ -11,7 +11,7 @@ import pandas as pd
 from wristctl.commands.printed_table import Table, degrees
 from wristctl.commands.rig_description import coming_first
 from wristctl.commands.session import Session
-from wristctl.config.choices import PLANTS
+from wristctl.config.choices import PLANTS, RIGS
 from wristctl.config.hw_run import HwRunSettings
 from wristctl.config.wrist import WristParameters
 from wristctl.control.table import Gains
@@ -20,9 +20,12 @@ from wristctl.records import LiveRun
 from wristctl.simulation.metrics import METRICS, metrics_in
 from wristctl.trial.calibration import WristCalibration
 from wristctl.trial.experiment import Experiment, Stop
+from wristctl.trial.guarded_rig import GuardedRig
 from wristctl.trial.log import TrialLog
 from wristctl.trial.residuals import FILE, RESIDUALS, limits_of, plain
-from wristctl.trial.rig_belief import PLANES
+from wristctl.trial.rig_belief import PLANES, layout_of_rig, numbers_of
+from wristctl.trial.rig_experiment import BEFORE_MOTION, RigExperiment
+from wristctl.trial.rig_settings import rig_of
 from wristctl.trial.safety import SafetyStop
 from wristctl.trial.testbeds import open_testbed
 from wristctl.trial.trial_results import FURTHER, JUDGED, LOGGED, TRULY, metrics_of_trials
@@ -32,7 +35,6 @@ from wristctl.vision.marker import Sighting
 from wristctl.vision.recordings import COLUMNS as RAW
 from wristctl.vision.recordings import AnnotatedVideo, RawVideo
 from wristctl.vision.view import View
-from wristctl.wrist.directions import ACTIVE
 from wristctl.wrist.kinematics import Inverse
 
 log = logging.getLogger(__name__)
@@ -85,23 +87,35 @@ def perform_trials(
     cv2.setNumThreads(1)
     trials = trials_of(settings, np.random.default_rng(session.findings.stream("order")))
     calibration = session.inputs.read("calibration", WristCalibration.load)
+    rig = None if settings.rig is None else GuardedRig(rig_of(RIGS[settings.rig], settings.rig), settings.rig)
     plant = PLANTS[settings.bench.plant.model]
-    coordinates = plant.coordinates(settings.bench.segments) if settings.port is None else None
-    monotonic = settings.port is not None or settings.real_time
+    coordinates = plant.coordinates(settings.bench.segments) if settings.port is None and rig is None else None
+    monotonic = settings.port is not None or settings.real_time or (rig is not None and not rig.virtual)
     folder, weighed = run.file("data/log.csv").parent, settings.load_cells is not None
     if coordinates is not None:
         coordinates *= settings.planes
-    trial_log = TrialLog(folder, coordinates, settings.control_period, monotonic, weighed, settings.planes)
+    tendons = numbers_of(layout_of_rig(settings, study.wrist))
+    trial_log = TrialLog(
+        folder, coordinates, settings.control_period, monotonic, weighed, settings.planes, tendons, rig is None
+    )
+    experiment: Experiment | RigExperiment
     try:
-        experiment = Experiment(settings, study.wrist, trials, trial_log, network, tuned, calibration, study.seed)
-        films = _films(run, settings)
+        if rig is not None:
+            experiment = RigExperiment(settings, study.wrist, trials, trial_log, network, tuned)
+        else:
+            experiment = Experiment(settings, study.wrist, trials, trial_log, network, tuned, calibration, study.seed)
+        films = _films(run, settings) if rig is None else []
     except BaseException:
         trial_log.close()
         raise
     stopped: BaseException | None = None
     try:
         with coming_first(session, settings):
-            _perform(session, bench, experiment, films, trials)
+            if isinstance(experiment, RigExperiment):
+                assert rig is not None
+                _perform_on(rig, session, experiment, trials)
+            else:
+                _perform(session, bench, experiment, films, trials)
     except BaseException as error:
         stopped = error
     try:
@@ -134,6 +148,12 @@ def _perform(
         experiment.run(testbed, shown)
 
 
+def _perform_on(rig: GuardedRig, session: Session, experiment: RigExperiment, trials: list[Trial]) -> None:
+    confirm = None if rig.virtual else partial(session.operator.confirm, BEFORE_MOTION)
+    with session.operator.watch(trials, session) as shown:
+        experiment.run(rig, shown, confirm)
+
+
 def _films(run: LiveRun, settings: HwRunSettings) -> Films:
     if not settings.video:
         return []
@@ -155,11 +175,16 @@ def _add(films: Films, frame: Frame, sighting: Sighting) -> None:
 
 
 def _evaluate(
-    run: LiveRun, settings: HwRunSettings, wrist: WristParameters, experiment: Experiment, trials: list[Trial]
+    run: LiveRun,
+    settings: HwRunSettings,
+    wrist: WristParameters,
+    experiment: Experiment | RigExperiment,
+    trials: list[Trial],
 ) -> pd.DataFrame:
     """trials.csv: a row for each trial that began, by the log alone."""
     begun = [trial for trial in trials if trial.number in experiment.outcomes]
-    metrics = metrics_of_trials(run.path / "data", begun, experiment.motions, settings)
+    layout = layout_of_rig(settings, wrist)
+    metrics = metrics_of_trials(run.path / "data", begun, experiment.motions, settings, layout)
     rows = [
         {
             "trial": trial.number,
@@ -206,7 +231,9 @@ def stopped_answer(stop: Stop, table: pd.DataFrame, count: int) -> list[str]:
     return lines
 
 
-def _summarise(session: Session, experiment: Experiment, trial_log: TrialLog, table: pd.DataFrame, count: int) -> None:
+def _summarise(
+    session: Session, experiment: Experiment | RigExperiment, trial_log: TrialLog, table: pd.DataFrame, count: int
+) -> None:
     """Timing, zero, and where it was stopped why, whether the motors stand, and the last second."""
     findings, settings, timing = session.findings, session.study.hw_run, experiment.timing
     findings.metric("ticks", len(timing.late), meaning="control ticks")
@@ -241,7 +268,7 @@ def _summarise(session: Session, experiment: Experiment, trial_log: TrialLog, ta
     log.warning("%s\n%s", stop.reason, text)
 
 
-def _tell_oddities(session: Session, experiment: Experiment) -> None:
+def _tell_oddities(session: Session, experiment: Experiment | RigExperiment) -> None:
     """Report how near trials came to the limits on unexpected motion, and anything odd."""
     findings, most = session.findings, experiment.most
     parts = []
@@ -271,13 +298,14 @@ def _last_second(trial_log: TrialLog) -> Table:
         both = {"bend": "", "bend_ref": "wanted "}
         angles = {f"{name}_{plane}": f"{word}{plane} [deg]" for name, word in both.items() for plane in PLANES}
         verdicts = {f"verdict_{plane}": f"{plane} marker" for plane in PLANES}
-    columns = ("time [s]", *angles.values(), *verdicts.values(), *(f"T{k} [N]" for k in ACTIVE), "state")
+    pulls = {name: f"T{name.removeprefix('tension_')} [N]" for name in shown[0] if name.startswith("tension_")}
+    columns = ("time [s]", *angles.values(), *verdicts.values(), *pulls.values(), "state")
     cells = [
         (
             round(row["time"], 3),
             *(round(float(np.degrees(row[name])), 2) for name in angles),
             *(str(row[name]) or "-" for name in verdicts),
-            *(round(row[f"tension_{k}"], 2) for k in ACTIVE),
+            *(round(row[name], 2) for name in pulls),
             row["state"],
         )
         for row in shown

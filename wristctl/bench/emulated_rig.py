@@ -44,7 +44,7 @@ class Eye:
         return self._scene()
 
 
-class Rig:
+class EmulatedRig:
     """A wrist that hangs on a chip's pins, before its cameras; all times are of the chip's clock [s].
 
     Only through load cells does the wrist act back on the board: beyond `weigh`, which is to be called in time, it may
@@ -125,7 +125,7 @@ _ACTS = f"press, release, hang AXIS KG, or one of {', '.join(DIRECTIONS)}"
 class Bystander:
     """Does what comes as lines from a file descriptor; never waits for one."""
 
-    def __init__(self, rig: Rig, typed: int) -> None:
+    def __init__(self, rig: EmulatedRig, typed: int) -> None:
         self._rig, self._typed = rig, typed
         self._line = b""
         self._there = True

@@ -1,0 +1,201 @@
+"""Between the control loop and what turns the spools: targets in, and where the spools are believed to be.
+
+`BoardDrive` leads the motor board's axes by step rates, `wristctl.trial.rig_drive.RigDrive` a rig by targets.
+"""
+
+from collections import deque
+from collections.abc import Sequence
+from typing import Protocol
+
+import numpy as np
+
+from wristctl.arrays import Array
+from wristctl.board.driver import Board
+from wristctl.board.messages import AXES, Fault, Flag, State
+from wristctl.config.hw_run import HwRunSettings
+from wristctl.simulation.spool_timing import remembered_rates
+from wristctl.trial.spools import spools_of
+
+# By how much longer it takes the board to read a RATE for each step/s of all axes together, whose interrupts come
+# first: by the firmware's cycles [s].
+_BUSY = 6.6e-9
+
+
+class LoopDrive(Protocol):
+    """Motors as the loop has them, in microsteps of `actuator.step_length` reeled in; values (T,) are of tendons."""
+
+    counted: float
+    """When the spools were where they are said to be, on the clock [s]."""
+
+    @property
+    def state(self) -> State:
+        """ENABLED where the motors follow."""
+
+    @property
+    def faults(self) -> str:
+        """Names of faults, for the log; empty without."""
+
+    @property
+    def time(self) -> float:
+        """The motors' own clock when their places were counted [s]."""
+
+    @property
+    def lapses(self) -> int:
+        """Commands that came too late to be followed, modulo 256."""
+
+    @property
+    def resent(self) -> int:
+        """Commands that were sent again."""
+
+    @property
+    def round_trip(self) -> float:
+        """Seconds that the last command took."""
+
+    @property
+    def sent(self) -> Array:
+        """Step rates that were really sent last (T,) [1/s]."""
+
+    @property
+    def moving(self) -> bool:
+        """Whether a motor may still turn."""
+
+    def now(self) -> float:
+        """Seconds on the clock."""
+
+    def wait_until(self, moment: float) -> None:
+        """Let time pass until then."""
+
+    def begin(self) -> None:
+        """Take in where the motors stand; ticks follow."""
+
+    def reeled(self) -> Array:
+        """Steps reeled in (T,) as far as is known."""
+
+    def lead(self, target: Array, moving: Array) -> Array:
+        """Send what leads to targets (T,) [steps] that move at this rate (T,) [1/s].
+
+        Returns by how much the motors will stay behind (T,) [steps], where that is more than one.
+        """
+
+    def stand(self) -> None:
+        """Send what has the motors stand."""
+
+    def listen(self, until: float) -> None:
+        """Take in what the motors answer until then."""
+
+    def go_on(self, ticks: int) -> list[Array]:
+        """Go over so many ticks, the first with what was sent last; where spools are in the middle of each (T,)."""
+
+
+class BoardDrive:
+    """The board's axes. A tick posts step rates, whose answer, the status, is read in the next one.
+
+    `signs` say which way each motor's positive steps turn.
+    """
+
+    def __init__(self, board: Board, settings: HwRunSettings, signs: Sequence[int]) -> None:
+        self._board, self._signs, self._period = board, np.array(signs), settings.control_period
+        self._clock, self._life, self._spools = board.transport, settings.rate_life, spools_of(settings.actuator)
+        self._sent, self._posted, self.counted = np.zeros(AXES), 0.0, 0.0
+        self._underway = settings.actuator.command_delay
+        delay = self._spools.timing.delay
+        self._late, self._rates = int(delay // self._period), np.zeros((AXES, remembered_rates(delay, self._period)))
+        self._since_read = delay - self._late * self._period - self._underway
+
+    def begin(self) -> None:
+        """Read the board's status."""
+        self._status, self.counted = self._board.read(), self._clock.now()
+        self._place, self._reckoned = self.reeled(), deque[tuple[float, Array]]()
+
+    @property
+    def state(self) -> State:
+        """Of the board."""
+        return self._status.state
+
+    @property
+    def faults(self) -> str:
+        """Of the board."""
+        return "+".join(fault.name or "" for fault in Fault if fault in self._status.faults)
+
+    @property
+    def time(self) -> float:
+        """Of the board's status."""
+        return self._status.time
+
+    @property
+    def lapses(self) -> int:
+        """Step rates that have outlived their life."""
+        return self._status.lapses
+
+    @property
+    def resent(self) -> int:
+        """Commands sent again."""
+        return self._board.traffic.resent
+
+    @property
+    def round_trip(self) -> float:
+        """From the last command that was answered to its answer [s]."""
+        return self._board.round_trip
+
+    @property
+    def sent(self) -> Array:
+        """Step rates (4,) [1/s], positive reeling in."""
+        return self._sent
+
+    @property
+    def moving(self) -> bool:
+        """Whether a rate was sent, or the board says that it moves."""
+        return bool(self._sent.any()) or Flag.MOVING in self._status.flags
+
+    def now(self) -> float:
+        """On the transport's clock."""
+        return self._clock.now()
+
+    def wait_until(self, moment: float) -> None:
+        """On the transport's clock."""
+        if (ahead := moment - self._clock.now()) > 0.0:
+            self._clock.wait(ahead)
+
+    def reeled(self) -> Array:
+        """By the last status."""
+        reeled: Array = self._signs * np.array(self._status.position, float)
+        return reeled
+
+    def lead(self, target: Array, moving: Array) -> Array:
+        """As `LoopDrive.lead`: a rate acts once an axis takes it up; by then the ones before have moved the spools."""
+        foreseen = self._spools.foreseen(self._place, self._rates, self._period)
+        gap = target + moving * self._spools.timing.delay - foreseen
+        before = self._sent
+        self._send(self._signs * self._spools.rate(gap, moving, before, self._period))
+        return self._spools.behind(gap, moving, self._sent, self._period)
+
+    def stand(self) -> None:
+        """Step rates of 0."""
+        self._send(np.zeros(AXES))
+
+    def _send(self, rates: Array) -> None:
+        sent, self._posted = self._board.post_turn(rates.tolist(), self._life)
+        self._sent = self._signs * np.array(sent)
+
+    def listen(self, until: float) -> None:
+        """Take in the board's answers to what was sent, those that come by `until` [s]."""
+        while (answered := self._board.answered(until)) is not None:
+            began, self._status = answered
+            busy = _BUSY * float(np.abs(self._rates[:, 1]).sum())
+            self.counted = began + self._underway + busy
+            while self._reckoned[0][0] < began:  # lost on the way
+                self._reckoned.popleft()
+            self._place = self._place + (self.reeled() - self._reckoned.popleft()[1])
+
+    def go_on(self, ticks: int) -> list[Array]:
+        """As `LoopDrive.go_on`, by the rates that were sent and the board's answers to those before."""
+        middles = []
+        for tick in range(ticks):
+            ahead = self._spools.foreseen(self._place, self._rates, self._period)
+            self._rates = np.column_stack([self._sent, self._rates[:, :-1]])
+            middles.append(self._spools.reckoned(self._place, self._rates, 0.5 * self._period, self._period))
+            self._place = ahead
+            if tick == 0:
+                in_force = self._rates[:, self._late + 1]
+                self._reckoned.append((self._posted, ahead - in_force * self._since_read))
+        return middles

@@ -1,0 +1,207 @@
+"""A rig as the control loop drives and sees it: targets in the rig's own unit out, looks in."""
+
+import math
+from collections import deque
+from collections.abc import Sequence
+
+import numpy as np
+
+from wristctl.arrays import Array
+from wristctl.board.messages import State
+from wristctl.config.hw_run import HwRunSettings
+from wristctl.rig import value
+from wristctl.trial.camera_pace import CameraPaces
+from wristctl.trial.guarded_rig import GuardedRig
+from wristctl.trial.safety import SafetyStop
+from wristctl.vision.camera_pose import CameraPose
+from wristctl.vision.marker import Sighting, SightingVerdict
+
+# Seconds by which a look may be ahead of the clock: both are rounded.
+_CLOCKS = 1e-3
+_UNSEEN = np.full((2, 4, 2), np.nan)
+
+
+class RigDrive:
+    """Motors that follow targets after a delay, with a lag: microsteps of `actuator.step_length`, positive reeling in.
+
+    `zero` are the targets (T,) at which every tendon of the straight wrist is just taut. What is believed of the spools
+    is what was sent, after the delay and the lag of the rig's facts.
+    """
+
+    lapses, resent = 0, 0
+    state, faults = State.ENABLED, ""
+
+    def __init__(self, rig: GuardedRig, settings: HwRunSettings, zero: Array) -> None:
+        facts = rig.facts
+        self._rig, self._zero, self._period = rig, np.asarray(zero, float), settings.control_period
+        self._step, self._unit = settings.actuator.step_length, facts.metres_per_unit
+        self._delay, self._lag = value(facts.drive.delay), value(facts.drive.lag)
+        self._fastest = facts.limits.rate / self._step * self._period
+        self._ticks = int(self._delay // self._period)
+        self._since = self._delay - self._ticks * self._period
+        self._target = self._place = np.zeros(len(self._zero))
+        self._sent, self.counted = np.zeros(len(self._zero)), 0.0
+        self._remembered: deque[Array] = deque()
+
+    def at(self, targets: Array) -> None:
+        """Say at which targets (T,) [facts.unit] the motors stand."""
+        self._target = self._place = (targets - self._zero) * (self._unit / self._step)
+
+    @property
+    def targets(self) -> Array:
+        """Targets (T,) that were sent last [facts.unit]."""
+        targets: Array = self._zero + self._target * (self._step / self._unit)
+        return targets
+
+    def begin(self) -> None:
+        """The motors stand where they were sent last."""
+        self._place, self._sent = self._target, np.zeros(len(self._zero))
+        self._remembered = deque([self._target] * (self._ticks + 2), maxlen=self._ticks + 2)
+        self.counted = self._rig.now()
+
+    @property
+    def time(self) -> float:
+        """Of the rig's clock when the places were reckoned."""
+        return self.counted
+
+    @property
+    def round_trip(self) -> float:
+        """Seconds that the last `send` took."""
+        return self._rig.took
+
+    @property
+    def sent(self) -> Array:
+        """Rates that the last targets ask for (T,) [1/s]."""
+        return self._sent
+
+    @property
+    def moving(self) -> bool:
+        """Whether a motor is believed to be more than a step from its target."""
+        return bool((np.abs(self._place - self._target) > 1.0).any())
+
+    def now(self) -> float:
+        """On the rig's clock."""
+        return self._rig.now()
+
+    def wait_until(self, moment: float) -> None:
+        """On the rig's clock."""
+        self._rig.wait_until(moment)
+
+    def reeled(self) -> Array:
+        """As reckoned."""
+        return self._place
+
+    def lead(self, target: Array, moving: Array) -> Array:
+        """As `LoopDrive.lead`: ahead of a moving target by the delay, the lag and half a period."""
+        wanted = target + moving * (self._delay + self._lag + 0.5 * self._period)
+        self._send(self._target + np.clip(wanted - self._target, -self._fastest, self._fastest))
+        behind = wanted - self._target
+        return np.where(np.abs(behind) > 1.0, behind, 0.0)
+
+    def stand(self) -> None:
+        """The last targets once more: a rig may stop by itself where it hears nothing."""
+        self._send(self._target)
+
+    def _send(self, steps: Array) -> None:
+        sent = self._rig.send(self._zero + steps * (self._step / self._unit))
+        before, self._target = self._target, (sent - self._zero) * (self._unit / self._step)
+        self._sent = (self._target - before) / self._period
+
+    def listen(self, until: float) -> None:
+        """A rig answers when it is asked."""
+
+    def go_on(self, ticks: int) -> list[Array]:
+        """As `LoopDrive.go_on`, by what was sent."""
+        middles = []
+        for _ in range(ticks):
+            self._remembered.appendleft(self._target)
+            before, after = self._remembered[self._ticks + 1], self._remembered[self._ticks]
+            middles.append(self._reckoned(before, after, 0.5 * self._period))
+            self._place = self._reckoned(before, after, self._period)
+        self.counted = self._rig.now()
+        return middles
+
+    def _reckoned(self, before: Array, after: Array, time: float) -> Array:
+        """Places at a time in the tick [s], in which the target goes from `before` to `after`."""
+        place = self._followed(self._place, before, min(time, self._since))
+        return self._followed(place, after, max(0.0, time - self._since))
+
+    def _followed(self, place: Array, target: Array, time: float) -> Array:
+        if time <= 0.0:
+            return place
+        left = math.exp(-time / self._lag) if self._lag > 0.0 else 0.0
+        return target + (place - target) * left
+
+
+class LookPaces(CameraPaces):
+    """The pace of a rig's looks, in its own words."""
+
+    def __init__(self, where: str) -> None:
+        super().__init__()
+        self._where, self._last = where, (-math.inf, "")
+
+    def add(self, sighting: Sighting) -> None:
+        """The next look, of one plane."""
+        super().add(sighting)
+        self._last = sighting.came, sighting.verdict
+
+    def summary(self) -> str:
+        """In words."""
+        pace = self.by_camera[0]
+        return f"look() brings {pace.rate:.3g} new bends/s, {1e3 * pace.latency:.0f} ms old when they come."
+
+    def missing(self, now: float, stale: float) -> tuple[str, str]:
+        """Why there has been no bend, and what to do about it."""
+        came, verdict = self._last
+        why = "look() brings nothing new"
+        if now - came <= stale and verdict == SightingVerdict.STAMP:
+            why = "look() dates its bends ahead of the clock"
+        elif now - came <= stale and verdict != SightingVerdict.OK:
+            why = "look() gives no number"
+        return f"{why}", f"see its sensor, and what look() returns: wristctl check-rig {self._where}"
+
+
+class RigTracking:
+    """Looks of a rig as the loop has those of cameras: one sighting a plane, and none of a look that is no news."""
+
+    def __init__(self, rig: GuardedRig) -> None:
+        self._rig, self._time, self._number = rig, -math.inf, 0
+        self.zero: tuple[float, ...] = (0.0,) * rig.facts.planes
+        self.tension: Array | None = None
+        """Tensions (T,) [N] of the last look, where they are measured."""
+
+    def look(self) -> list[Sighting]:
+        """The newest look, where it is news. Raises SafetyStop where a measured tension is beyond the rig's limit."""
+        seen, now = self._rig.look(), self._rig.now()
+        self.tension, most = seen.tension, self._rig.facts.limits.tension
+        if seen.tension is not None and (seen.tension > most).any():
+            worst = int(np.nanargmax(seen.tension))
+            problem = f"tendon {worst + 1} pulls {seen.tension[worst]:.3g} N, beyond {most:g} N"
+            raise SafetyStop(problem, self._rig.where, "something holds the wrist, or tendons pull against each other")
+        if seen.time <= self._time:
+            return []
+        self._number += 1
+        ahead, self._time = seen.time > now + _CLOCKS, seen.time
+        return [
+            Sighting(seen.time, self._number, bend - zero, self._verdict(bend, ahead), _UNSEEN, came=now, plane=plane)
+            if math.isfinite(bend) and not ahead
+            else Sighting(seen.time, self._number, math.nan, self._verdict(bend, ahead), _UNSEEN, came=now, plane=plane)
+            for plane, (bend, zero) in enumerate(zip(seen.bend.tolist(), self.zero, strict=True))
+        ]
+
+    @staticmethod
+    def _verdict(bend: float, ahead: bool) -> SightingVerdict:
+        if ahead:
+            return SightingVerdict.STAMP
+        return SightingVerdict.OK if math.isfinite(bend) else SightingVerdict.NO_TIP
+
+    def bend(self, sighting: Sighting, other: float) -> float:
+        """The bend as it was looked at."""
+        return sighting.theta
+
+    def stand_square(self, sightings: Sequence[Sighting]) -> CameraPose | None:
+        """No camera has to."""
+        return None
+
+    def close(self) -> None:
+        """The rig stays open."""

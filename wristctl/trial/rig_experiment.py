@@ -1,0 +1,201 @@
+"""Trials on a rig that takes targets, from the first call to the last: connect, home, trials, returns, and the stop."""
+
+import logging
+import math
+from collections.abc import Callable, Mapping, Sequence
+
+import numpy as np
+
+from wristctl.config.hw_run import HwRunSettings
+from wristctl.config.wrist import WristParameters
+from wristctl.control.table import controller, gains_of
+from wristctl.errors import UserError
+from wristctl.interrupt import undisturbed
+from wristctl.simulation.motion import Motion
+from wristctl.trial.control_loop import ControlLoop, Shown, course_of
+from wristctl.trial.experiment import Stop, cause_of, spared
+from wristctl.trial.guarded_rig import GuardedRig
+from wristctl.trial.log import TrialLog
+from wristctl.trial.motions import back, motion_of
+from wristctl.trial.motors_ready import Halt
+from wristctl.trial.rig_belief import RigBelief, layout_of_rig, names_of_planes
+from wristctl.trial.rig_drive import LookPaces, RigDrive, RigTracking
+from wristctl.trial.rig_homing import RigHoming, RigZero, find_rig_zero
+from wristctl.trial.rig_settings import sides_of
+from wristctl.trial.safety import SafetyStop
+from wristctl.trial.spools import spools_of
+from wristctl.trial.steering import Steering
+from wristctl.trial.tick_timing import TickTiming
+from wristctl.trial.trials import Trial, motions_of
+from wristctl.trial.watch import Watch
+from wristctl.vision.camera_pose import CameraPose
+from wristctl.wrist.kinematics import Inverse
+
+log = logging.getLogger(__name__)
+
+# The plane of a rig that bends in one.
+PLANE = "ulnar"
+# Seconds within which motors stand after stop(), and between the looks that show it.
+_PATIENCE, _APART = 0.5, 0.05
+# Share of `homing.bend_deg` that a wrist whose motors stand may move by between two looks.
+_STANDS = 0.3
+
+BEFORE_MOTION = (
+    "The rig will now move. Its power switch within reach, nobody's hands in the tendons, wrist straight, and all "
+    "tendons slack?"
+)
+
+
+def halt_rig(rig: GuardedRig, bend: float) -> Halt:
+    """Stop a rig's motors, and see by its looks that the wrist stands; never raises.
+
+    `bend` is the change of a bend [rad] between two looks that counts as none.
+    """
+    trouble, seconds, stands = rig.stop(), 0.0, False
+    try:
+        began = rig.now()
+        before = rig.look().bend
+        while not stands and seconds < _PATIENCE:
+            rig.wait_until(rig.now() + _APART)
+            now = rig.look().bend
+            stands = bool(np.isfinite(now - before).all()) and math.hypot(*(now - before)) < bend
+            before, seconds = now, rig.now() - began
+    except UserError as error:
+        trouble = trouble or str(error.what)
+    if stands and not trouble:
+        return Halt(True, "stop(), and the wrist stands", None, seconds)
+    return Halt(False, f"{trouble or 'the wrist still moves'}; cut the motors' power", None, seconds)
+
+
+class RigExperiment:
+    """Trials on a rig; what it holds is as of `wristctl.trial.experiment.Experiment`.
+
+    Raises UserError for what is wrong with controllers, gains or motions.
+    """
+
+    def __init__(
+        self, settings: HwRunSettings, wrist: WristParameters, trials: Sequence[Trial], kept: TrialLog,
+        network: Inverse | None = None, tuned: Mapping[str, Mapping[str, float]] | None = None,
+    ) -> None:  # fmt: skip
+        settings = settings.within(wrist)
+        layout = layout_of_rig(settings, wrist)
+        assert layout is not None
+        self._settings, self._wrist, self._layout = settings, spared(wrist, settings), layout
+        self._trials, self._log = trials, kept
+        chosen = [(controller(row.controller), row.gains) for row in settings.rows]
+        self._laws = [(law, gains_of(law, gains, tuned)) for law, gains in chosen]
+        self._back = controller("feedforward")
+        facing = self._facing
+        self.motions: dict[str, Motion] = {
+            name: motion_of(settings, facing, name, network) for name in motions_of(settings)
+        }
+        self.timing = TickTiming(settings.control_period, camera=LookPaces(settings.rig or ""))
+        self.outcomes: dict[int, str] = {}
+        self.stop: Stop | None = None
+        self.zero: RigZero | None = None
+        self.most, self.odd = dict[str, float](), dict[int, str]()
+        self.poses: dict[str, CameraPose | None] = {}
+        self._under_way: tuple[int, float] | None = None
+        self._in_doubt: int | None = None
+
+    @property
+    def _facing(self) -> WristParameters:
+        """The wrist as the loop knows it."""
+        return self._wrist if self._settings.planes == 2 else sides_of(self._wrist, self._layout)
+
+    def run(self, rig: GuardedRig, shown: Shown | None = None, confirm: Callable[[], None] | None = None) -> None:
+        """Do all trials and close the rig. Whatever ends them early, the rig is stopped before it is raised.
+
+        `confirm` has a person agree to the first motion. Raises SafetyStop, RigStop, KeyboardInterrupt, and what a bug
+        raises.
+        """
+        try:
+            self._warm_up()
+            try:
+                self._all(rig, shown, confirm)
+            except BaseException as error:
+                cause = cause_of(error)
+                with undisturbed():
+                    self._stopped(rig, cause)
+                if cause is not error:
+                    raise cause from error
+                raise
+            with undisturbed():
+                halted = halt_rig(rig, self._still)
+            if not halted.verified:
+                log.warning("after the last trial: %s", halted.how)
+        finally:
+            with undisturbed():
+                if trouble := rig.close():
+                    log.warning("the rig could not be closed: %s", trouble)
+
+    @property
+    def _still(self) -> float:
+        return _STANDS * math.radians(self._settings.homing.bend_deg)
+
+    def _warm_up(self) -> None:
+        """Have everything compiled before a rig is connected that may stop by itself where it hears nothing."""
+        settings = self._settings
+        belief = RigBelief(self._facing, settings.actuator, names_of_planes(settings.planes, PLANE), self._layout)
+        spools, motion = spools_of(settings.actuator), back(0.0, settings.rest, 0.0, 1e-2, settings.planes)
+        course = course_of(motion)
+        taut, _ = belief.taut(course[0, :, 0])
+        spools.target(np.zeros(len(taut)), taut)
+        reeled = belief.at_places(taut)
+        Watch(settings, self._facing, PLANE, self.timing, layout=self._layout).predict(reeled)
+        steering = Steering(belief, settings.sensor, settings.control_period)
+        for law, gains in [*self._laws, (self._back, ())]:
+            steering.use(law, gains)
+            steering.respond(course)
+            steering.predict(reeled)
+        steering.see(0, 0.0, 0.0)
+
+    def _all(self, rig: GuardedRig, shown: Shown | None, confirm: Callable[[], None] | None) -> None:
+        if confirm is not None:
+            confirm()
+        homing = RigHoming(rig, self._settings, self._wrist, self._layout, rig.connect())
+        zero = self.zero = find_rig_zero(homing, self._settings, rig.where)
+        tracking = RigTracking(rig)
+        tracking.zero = zero.straight
+        for trial in self._trials:
+            drive = RigDrive(rig, self._settings, np.array(zero.targets))
+            drive.at(homing.targets)
+            loop = ControlLoop(
+                drive, tracking, self._settings, self._facing, PLANE, self.timing, self._log, shown, layout=self._layout
+            )
+            loop.follow(self._to_rest(0.0, self._settings.rest, 0.0), self._back, ())
+            self._one(loop, trial)
+            homing.left_at(drive.targets)
+            homing.check(zero)
+            self._in_doubt = None
+
+    def _to_rest(self, bend: object, duration: float, rest: float) -> Motion:
+        settings = self._settings
+        return back(np.asarray(bend, float), duration, rest, settings.control_period, settings.planes)
+
+    def _one(self, loop: ControlLoop, trial: Trial) -> None:
+        """One trial, and the way back to zero."""
+        settings, followed, start = self._settings, self.motions[trial.direction], loop.next_tick
+        law, gains = self._laws[trial.row]
+        self._under_way, self.outcomes[trial.number] = (trial.number, start), "begun"
+        try:
+            loop.follow(followed, law, gains, trial.number, pushed=trial.push != 0.0)
+        finally:
+            self.most = {name: max(size, self.most.get(name, 0.0)) for name, size in loop.watch.most.items()}
+            self.odd[trial.number] = loop.watch.words()
+        self.outcomes[trial.number], self._under_way, self._in_doubt = "ok", None, trial.number
+        loop.follow(self._to_rest(followed.final, settings.back, 0.0), self._back, ())
+
+    def _stopped(self, rig: GuardedRig, error: BaseException) -> None:
+        """Stop the rig, then note what happened."""
+        trial, start = self._under_way or (None, None)
+        try:
+            decided = rig.now()
+        except UserError:
+            decided = math.nan
+        self.stop = Stop(error, trial, None if start is None else decided - start, halt_rig(rig, self._still))
+        if self._in_doubt is not None and isinstance(error, SafetyStop):
+            self.outcomes[self._in_doubt] = f"after it: {self.stop.reason.removeprefix('stopped: ')}"
+        if trial is not None:
+            self.outcomes[trial] = self.stop.reason
+        self._log.disk.give_up_reserve()
