@@ -41,15 +41,9 @@ VERTICAL = ("gravity_x", "gravity_y", "gravity_z")
 """Direction of gravity, or of what an accelerometer at rest shows, in the axes of such a unit."""
 COLUMNS: Mapping[str, Units] = {
     "time": TIME,
-    "bend_y": ANGLE,
-    "bend_z": ANGLE,
-    "inclination": ANGLE,
-    "orientation": ANGLE,
-    "tip_x": LENGTH,
-    "tip_y": LENGTH,
-    "tip_z": LENGTH,
-    "rate_y": RATE,
-    "rate_z": RATE,
+    **dict.fromkeys(("bend_y", "bend_z", "inclination", "orientation"), ANGLE),
+    **dict.fromkeys(("tip_x", "tip_y", "tip_z"), LENGTH),
+    **dict.fromkeys(("rate_y", "rate_z"), RATE),
     **dict.fromkeys(QUATERNION, SHARE),
     **dict.fromkeys(VERTICAL, GRAVITY),
     "mass": MASS,
