@@ -106,8 +106,8 @@ def main() -> None:
 
 _BEGIN = f"""# Which controller for which rig, with presets
 
-With motors, tendons and a camera an impedance with a network and MRAC err least among the presets that hold, on the
-straight and nearly on the uneven wrist; MPC, LQI, computed torque with an observer and smc-tracking err as little and
+With motors, tendons and a camera an impedance with a network and MRAC have the smallest RMSE among the presets that
+hold, on the straight and nearly on the uneven wrist; MPC, LQI, computed torque with an observer and smc-tracking err as little and
 swing in 5 to 13 of 40 worlds. For jumps nothing is told from feedforward for the better by more than 1 %. This page
 ranks presets; tuned at equal budget the answer is [the study's](study.md).
 
@@ -122,7 +122,7 @@ with one budget.
 ## When each wins
 
 - **Computed torque or MPC with a disturbance observer** (ct-dob, mpc): behind motors, tendons and a camera they err as
-  little as the best, and swing in 5 to 9 of 40 worlds. MPC is the same controller wherever no tendon saturates, and a
+  little as the first group, and swing in 5 to 9 of 40 worlds. MPC is the same controller wherever no tendon saturates, and a
   step costs a hundred times as much (some 13 us). With PID or a sliding term in front (pid-dob, smc-dob) they err no
   less; pid-dob swings least of them.
 - **A Lyapunov function within limits** (clf-qp): its programme decides only where a tendon is at its limit, so it ties
@@ -142,17 +142,17 @@ with one budget.
 - **LQI**: like pid-ff, with weights instead of gains; its preset swings twice as often.
 - **ADRC**: needs an inertia and nothing else, and pays for it in accuracy: it has to observe spring and gravity too.
 - **Super-twisting and adaptive control** (super-twisting, mrac): made for torques as commanded and angles as they are
-  at 1 kHz, where super-twisting chatters in some worlds and mrac is the best that does not; behind motors and a camera
+  at 1 kHz, where super-twisting chatters in some worlds and mrac does not; behind motors and a camera
   super-twisting's preset swings in half of the worlds, and mrac, with slower gains, is in the first group.
 - **Sliding terms** elsewhere (smc-tracking, smc-dob): tuned they tie with the same controller without one.
-- **Networks** (nc, nn-mrac): nc errs a tenth more than the best and holds in nearly all worlds. nn-mrac is the
+- **Networks** (nc, nn-mrac): nc errs a tenth more than the first group and holds in nearly all worlds. nn-mrac is the
   published controller (arXiv 2510.19068) as far as it is specified; its published reference model is far slower.
 - **Learned dynamics** (learned-mpc): MPC over a network of the wrist's dynamics, which `gen-data` and `train` make. On
   a wrist that is as believed it buys nothing; trained on one that is not, it errs a seventeenth of `mpc` with torques
   as commanded, and behind motors and a camera, without an observer of its own, a quarter
   ([table](learned-dynamics.md#what-it-buys)). The rankings below leave it out: there is no network of all their wrists.
 - **Rivals of other groups** (impedance, fopi): an impedance with a network for what the model lacks, and a fractional
-  integral of the error; in smooth motions behind motors and a camera the former errs least of all. DeePC is not
+  integral of the error; in smooth motions behind motors and a camera the former is at the top. DeePC is not
   here: its data are those of one rig at one period, and on data of the believed wrist without noise it is the
   predictive control that `mpc` is (Coulson, Lygeros and Dorfler, ECC 2019).
 - **A motion that is repeated** (ilc): a torque that is learned from each repetition of a motion for the next, about

@@ -98,7 +98,7 @@ def test_a_table_of_a_run_that_was_changed_has_no_units(tmp_path: Path) -> None:
     ("text", "what"),
     [
         (FILE.replace("angle [deg]", "angle"), "has no unit"),
-        (FILE.replace(",10.0\n", ",10.0\n0.9,10.0\n"), "time goes back"),
+        (FILE.replace(",10.0\n", ",10.0\n0.9,10.0\n"), "time repeats"),
         (FILE.replace("[deg]", "[rad]"), "the angle jumps by"),
         ("time [s],angle [deg]\n" + "".join(f"{t / 20},{6 * t}\n" for t in range(11)), "bends by 60 deg, beyond"),
     ],
