@@ -107,9 +107,9 @@ def main() -> None:
 _BEGIN = f"""# Which controller for which rig, with presets
 
 With motors, tendons and a camera an impedance with a network and MRAC have the smallest RMSE among the presets that
-hold, on the straight and nearly on the uneven wrist; MPC, LQI, computed torque with an observer and smc-tracking err as little and
-swing in 5 to 13 of 40 worlds. For jumps nothing is told from feedforward for the better by more than 1 %. This page
-ranks presets; tuned at equal budget the answer is [the study's](study.md).
+hold, on the straight and nearly on the uneven wrist; MPC, LQI, computed torque with an observer and smc-tracking err as
+little and swing in 5 to 13 of 40 worlds. For jumps nothing is told from feedforward for the better by more than 1 %.
+This page ranks presets; tuned at equal budget the answer is [the study's](study.md).
 
 Presets on {WORLDS} drawn worlds of each family of experiments/scenarios, all on the same worlds, motions and noise: the
 geometric mean of the RMSE with its 95 % interval over worlds. Controllers of one group are not told apart from its
@@ -122,9 +122,9 @@ with one budget.
 ## When each wins
 
 - **Computed torque or MPC with a disturbance observer** (ct-dob, mpc): behind motors, tendons and a camera they err as
-  little as the first group, and swing in 5 to 9 of 40 worlds. MPC is the same controller wherever no tendon saturates, and a
-  step costs a hundred times as much (some 13 us). With PID or a sliding term in front (pid-dob, smc-dob) they err no
-  less; pid-dob swings least of them.
+  little as the first group, and swing in 5 to 9 of 40 worlds. MPC is the same controller wherever no tendon saturates,
+  and a step costs a hundred times as much (some 13 us). With PID or a sliding term in front (pid-dob, smc-dob) they err
+  no less; pid-dob swings least of them.
 - **A Lyapunov function within limits** (clf-qp): its programme decides only where a tendon is at its limit, so it ties
   with the two above. Tuned for a camera with one budget (16 candidates, 12 iterations, 8 worlds), over 80 cases of 20
   other worlds clf-qp, ct-dob and mpc all err by 0.19 deg, feedforward by 0.52. After a jump of 30 deg on the diagonal,

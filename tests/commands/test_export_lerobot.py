@@ -48,7 +48,7 @@ def parquet(folder: Path, part: str) -> pd.DataFrame:
 
 
 def same_samples(log: OpenLog, other: OpenLog) -> None:
-    """Every sample of the one is in the other, at its trial and time, to the last bit; an open log has the hand's mass."""
+    """Every sample of the one is in the other, at its trial and time, to the last bit, but for the hand's mass."""
     assert set(log.columns) - {"mass"} == set(other.columns) and len(log) == len(other)
     for name, column in other.columns.items():
         np.testing.assert_array_equal(log.columns[name], column, err_msg=name)
