@@ -155,3 +155,16 @@ def test_a_hysteresis_run_is_a_loop_that_can_be_measured(tmp_path: Path) -> None
     first, _ = read_log(export_run(Run(live.path), "csv", tmp_path / "loops.csv")).trials().values()
     assert first.columns["tension_1"].tolist() == [2.0, 3.0] and first.columns["spool_2"].tolist() == [-1e-3, -2e-3]
     assert first.columns["bend_y"].tolist() == [0.1, 0.2]
+
+
+def test_a_motion_ends_where_the_wrist_left_its_range(tmp_path: Path) -> None:
+    """In a simulate run and for each motion of a comparison, whose other motions stay whole."""
+    bend, time = np.array([0.0, 0.5, np.nan, np.nan]), np.arange(4.0)
+    with start_run("simulate", load_study(), "", tmp_path) as live:
+        live.table("data/trajectory.csv", {"time": time, "theta": bend, "tip_x": time, "tip_y": time})
+    log = read_log(export_run(Run(live.path), "csv", tmp_path / "log.csv"))
+    assert log.columns["time"].tolist() == [0.0, 1.0] and log.columns["tip_x"].tolist() == [0.0, 1.0]
+    with start_run("compare", load_study(), "", tmp_path) as live:
+        live.arrays("data/trajectories.npz", {"theta": np.stack([time, bend]), "time": time})
+    trials = read_log(export_run(Run(live.path), "csv", tmp_path / "both.csv")).trials()
+    assert [trial.columns["bend_y"].tolist() for trial in trials.values()] == [[0.0, 1.0, 2.0, 3.0], [0.0, 0.5]]

@@ -61,7 +61,7 @@ def shipped_gains(controller: str, gains: str) -> ShippedGains:
     of_family = _shipped()[family]
     if controller not in of_family["controllers"]:
         problem = f"no gains of {controller} are shipped for '{family}'"
-        raise UserError(problem, "gains", meant(controller, list(of_family["controllers"])))
+        raise UserError(problem, "controller", f"one of {', '.join(of_family['controllers'])}")
     row, limits = of_family["controllers"][controller], of_family["conditions"]
     conditions = Conditions(tuple(limits["period"]), tuple(limits["tendon_stiffness"])) if limits else None
     return ShippedGains(

@@ -74,7 +74,8 @@ def answer_figure(rankings: Sequence[Ranking], places: Mapping[str, str]) -> Fig
     every: dict[str, Any] = {"linestyle": "none", "markersize": 4.5}
     called = in_words if wide else str
     names = dict.fromkeys(label.split("/")[0] for label in labels)
-    handles = [Line2D([], [], marker="o", color=colour(name), label=called(name), **every) for name in names]
+    alone = "o" if len(marks) > 1 else next(iter(marks.values()))
+    handles = [Line2D([], [], marker=alone, color=colour(name), label=called(name), **every) for name in names]
     handles += [
         Line2D([], [], marker=mark, color=GREY, label=f"{gains} gains" if gains else "preset by loop", **every)
         for gains, mark in marks.items()

@@ -104,7 +104,10 @@ def load(reference: str) -> tuple[Any, Foreign]:
     if not hasattr(module, attribute):
         members = {name: member for name, member in vars(module).items() if not name.startswith("_")}
         names = [
-            name for name, member in members.items() if not callable(member) and not isinstance(member, ModuleType)
+            name
+            for name, member in members.items()
+            if not isinstance(member, ModuleType)
+            and (not callable(member) or getattr(member, "__module__", "") == module.__name__)
         ]
         raise UserError(f"{file.name} has no {attribute}", str(file), meant(attribute, names))
     return getattr(module, attribute), Foreign(file, attribute, files, root_of(file))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -26,6 +27,8 @@ from wristctl.wrist.tendons import TENDONS_PER_SIDE
 
 if TYPE_CHECKING:
     import pandas as pd
+
+_log = logging.getLogger(__name__)
 
 Columns = dict[str, Array]
 # Columns of a table of a motion in one plane, by their names in an open log.
@@ -167,7 +170,7 @@ def _columns(table: pd.DataFrame, names: Mapping[str, str]) -> Columns:
 
 def _simulated(run: Run) -> list[RecordedMotion]:
     """A simulated motion in one plane, with the spools of the four tendons where it has any."""
-    table, study = read_table(run.file("data/trajectory.csv")), study_of(run)
+    table, study = _whole(read_table(run.file("data/trajectory.csv")), "theta"), study_of(run)
     columns, commands = _columns(table, _MOTION), Columns()
     for tendon, side in zip(tendons_of("ulnar"), ("plus", "plus", "minus", "minus"), strict=True):
         if f"tension_{side}" in table:
@@ -177,6 +180,15 @@ def _simulated(run: Run) -> list[RecordedMotion]:
             if _slides_freely(study.simulate.loop):
                 columns[f"tension_{tendon}"] = table[f"acting_{side}"].to_numpy(float)
     return [_motion(run, table, columns, commands)]
+
+
+def _whole(table: pd.DataFrame, bend: str) -> pd.DataFrame:
+    """A table of a simulated motion as far as the wrist stayed within its range: its bends end there."""
+    bends = np.flatnonzero(np.isfinite(table[bend].to_numpy(float)))
+    last = int(bends[-1]) + 1 if len(bends) else 0
+    if 0 < last < len(table):
+        _log.warning("the wrist left its range at %.3g s: what came then is left out", table.time.iloc[last - 1])
+    return table.iloc[:last]
 
 
 def _motion(run: Run, table: pd.DataFrame, columns: Columns, commands: Columns) -> RecordedMotion:
@@ -219,7 +231,7 @@ def _bends(run: Run) -> list[RecordedMotion]:
 
     Tendons of the square wrist have the numbers 1, 2, 4 and 5, others those of `wrist.tendons`.
     """
-    table, study = read_table(run.file("data/bends.csv")), study_of(run)
+    table, study = _whole(read_table(run.file("data/bends.csv")), "bend_ulnar"), study_of(run)
     wrist, loop = study.wrist, study.simulate.loop
     columns, commands = _columns(table, _BENDS), Columns()
     places = TendonLayout.of(wrist).places
@@ -254,10 +266,11 @@ def _compared(run: Run) -> list[RecordedMotion]:
     sides |= {name: f"tension_{name.removeprefix('pull_')}" for name in pulls}
     motions = []
     for number, task in enumerate(tasks):
+        whole = np.isfinite(over_time[next(iter(names))][number])  # a wrist that left its range has no bends from then
 
-        def of_motion(wanted: Mapping[str, str], at: int = number) -> Stream | None:
-            columns = {name: over_time[theirs][at] for theirs, name in wanted.items() if theirs in over_time}
-            return Stream(over_time["time"][at], columns) if columns else None
+        def of_motion(wanted: Mapping[str, str], at: int = number, rows: Array = whole) -> Stream | None:
+            columns = {name: over_time[theirs][at][rows] for theirs, name in wanted.items() if theirs in over_time}
+            return Stream(over_time["time"][at][rows], columns) if columns else None
 
         seen = of_motion(names)
         motions.append(RecordedMotion(f"{number}", task, [seen] if seen else [], of_motion(sides), of_motion(_WANTED)))
