@@ -104,9 +104,10 @@ COMMANDS = {
         "wristctl.commands.recommend.command:RECOMMEND",
         _MAIN,
         "Say which controller with which gains to run on a wrist.",
-        shortcuts=("horizon",),
+        shortcuts=("horizon", "rig"),
         examples=(
             "wristctl recommend --set wrist.length=0.12 --set wrist.stiffness=2.0",
+            "wristctl recommend --rig my_rig.py:RIG",
             "wristctl recommend --from-identified latest:identify",
             "wristctl recommend ct-dob pid-ff --set loop.actuator.tendon_stiffness=2e4",
         ),

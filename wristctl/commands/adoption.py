@@ -69,6 +69,10 @@ def adopted(study: Study, command: str) -> Adopted:
 
     if "hw_run" in read:
         study = with_planes(with_rig(study))
+    if "recommend" in read and study.recommend.rig is not None:
+        from wristctl.commands.recommend.own_rig import with_facts
+
+        study = with_facts(study, study.recommend.rig)
     if not origins:
         return Adopted(study, ())
     called = renamed_fields(study, own_name, read)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from pydantic import ValidationError
 
-from wristctl.config.choices import CONTROLLERS, REFERENCES
+from wristctl.config.choices import CONTROLLERS, REFERENCES, RIGS
 from wristctl.config.foreign import PLAIN
 from wristctl.config.hw_run import HwRunSettings
 from wristctl.config.loop import Loop, Reference
@@ -88,7 +88,7 @@ def keep_study(findings: Findings, file: str, title: str, content: Mapping[str, 
     if findings.run is None:
         return
     up, home, code = "../" * file.count("/"), f"{findings.run.path.absolute()}/", findings.run.code
-    tables = {"controller": CONTROLLERS, "controllers": CONTROLLERS, "kind": REFERENCES}
+    tables = {"controller": CONTROLLERS, "controllers": CONTROLLERS, "kind": REFERENCES, "rig": RIGS}
 
     def here(key: str, value: Any) -> Any:
         if isinstance(value, dict):

@@ -5,9 +5,10 @@ from typing import Annotated, Any, Self
 
 from pydantic import BeforeValidator, Field
 
+from wristctl.config.choices import RIGS
 from wristctl.config.families import Drawn, Family
 from wristctl.config.loop import TICK, Loop, Reference
-from wristctl.config.section import Section, choice, quantity
+from wristctl.config.section import OneOf, Section, choice, quantity, seldom
 from wristctl.config.tune import Controllers
 
 # Where a simulated rig differs from what its controller believes. Angle and speed of each motion are drawn too.
@@ -114,6 +115,9 @@ class RecommendSettings(Section):
         3, "of the best, how many are rehearsed on the emulated rig at a time, where hw-run has the rig; 0: none",
         ge=0, le=10,
     )  # fmt: skip
+    rig: Annotated[str, OneOf(RIGS)] | None = seldom(
+        None, "", "a robot of your own, my_rig.py:RIG: rigs are drawn from the ranges of its facts"
+    )
     from_identified: str | None = choice(None, "identify run whose parameters replace the study's")
 
     def measured(self) -> Self:

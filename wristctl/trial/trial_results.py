@@ -246,7 +246,7 @@ def _load(time: Array, load: Array, after: float) -> Array:
     return size_of(load - np.median(load[time < after][-50:], axis=0))
 
 
-def _pairs(wrist: WristParameters, layout: TendonLayout, loop: Loop) -> tuple[WristParameters, Loop]:
+def in_pairs(wrist: WristParameters, layout: TendonLayout, loop: Loop) -> tuple[WristParameters, Loop]:
     """A rig in one plane with two tendons on either side, as models have it, in place of as many as it has.
 
     Each has the share of their stiffness and tension limits that makes a side the same.
@@ -269,7 +269,7 @@ def twin(
     row, followed = settings.rows[trial.row], motion_of(settings, wrist, trial.direction, network)
     law = in_a_first_repetition(controller(row.controller))
     if (layout := layout_of_rig(settings, wrist)) is not None and settings.planes == 1:
-        wrist, loop = _pairs(wrist, layout, loop or settings.loop)
+        wrist, loop = in_pairs(wrist, layout, loop or settings.loop)
         study = study.model_copy(update={"wrist": wrist})
     asked = (loop or settings.loop).model_copy(update={"disturbances": trial.disturbances(settings, followed)})
     if settings.planes == 1:  # the wrist may leave the plane in which its rig bends

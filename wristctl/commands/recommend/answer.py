@@ -87,6 +87,8 @@ class Recommended(StudyResult):
     """Of the candidates that were rehearsed on the emulated rig, by their numbers."""
     on_the_trial: tuple[float, float, float] | None = None
     """Spread of the error over the simulated rigs on the motion of the rehearsal [rad]."""
+    facts: str = ""
+    """What the facts of a robot of one's own say of the simulated rigs, a sentence or two."""
     bending: str = ""
     """Planes that all loops bend in, a sentence; empty where they stay in one."""
 
@@ -249,7 +251,7 @@ def _notes(result: Recommended) -> list[str]:
     wanted = result.study.recommend.largest_deg
     short = f" (asked: {wanted:g} deg)" if result.reach_deg < wanted else ""
     sides = "any side" if result.bending else "either side"
-    notes = [result.bending] * bool(result.bending)
+    notes = [result.bending] * bool(result.bending) + [result.facts] * bool(result.facts)
     hold = f"The tendons hold {result.reach_deg:g} deg to {sides} on every simulated rig{short}."
     notes += [" ".join(filter(None, (hold, decided([result.ranking]))))]
     rehearsed = _rehearsed(result) if result.rehearsals else ""
@@ -260,7 +262,9 @@ def _notes(result: Recommended) -> list[str]:
     holds = f"{_up_to(result.motions, 'Hz', sine)} {_up_to(result.payloads, 'kg', 'an unknown payload in the hand')}"
     notes.append(f"{rehearsed} {holds}".strip())
     how = (
-        "emulated (on a real rig also --port /dev/ttyACM0 --camera 0 --optics latest:calibrate-camera)"
+        f"on {result.study.recommend.rig}"
+        if result.study.recommend.rig is not None
+        else "emulated (on a real rig also --port /dev/ttyACM0 --camera 0 --optics latest:calibrate-camera)"
         if result.on_a_rig
         else "simulated (hw-run has no such rig)"
     )

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from wristctl.commands.inputs import EarlierRun, Inputs
 from wristctl.commands.inputs_of_loops import identified, why_two_planes
-from wristctl.commands.kept_studies import keep_gains, row_of
+from wristctl.commands.kept_studies import gains_content, keep_study, row_of
 from wristctl.commands.loop_warnings import warn_if_coarse, warn_if_it_buckles, warn_of_one_plane
 from wristctl.commands.procedure import Procedure
 from wristctl.commands.recommend.answer import (
@@ -21,6 +21,7 @@ from wristctl.commands.recommend.answer import (
     sine_deg,
     spread,
 )
+from wristctl.commands.recommend.own_rig import drawn_of_facts, on_the_rig, said_of_facts
 from wristctl.commands.recommend.rehearsals import check_homing
 from wristctl.commands.recommend.study_file import next_command, sections_of, takers_of, trial_of
 from wristctl.commands.results import Findings
@@ -60,14 +61,20 @@ def asked_of_rigs(study: Study) -> list[Asked]:
     """The simulated rigs with what they are asked for, before it is known whether that is in two planes."""
     from wristctl.simulation.drawn_worlds import asked_of
 
-    return asked_of(study.recommend.family(LEAST_DEG))
+    return asked_of(_family(study, LEAST_DEG))
+
+
+def _family(study: Study, largest_deg: float, planes: int = 1) -> Family:
+    """As `RecommendSettings.family`; of a robot of one's own with what is drawn from its facts."""
+    family = study.recommend.family(largest_deg, planes)
+    return family if study.recommend.rig is None else drawn_of_facts(study, family)
 
 
 def family_of_rigs(study: Study, largest_deg: float) -> Family:
     """The simulated rigs, in two planes where anything takes them out of one. Raises UserError."""
     from wristctl.simulation.planes import planes_of
 
-    return study.recommend.family(largest_deg, planes_of(study.wrist, asked_of_rigs(study)))
+    return _family(study, largest_deg, planes_of(study.wrist, asked_of_rigs(study)))
 
 
 def reach_deg(study: Study) -> float:
@@ -84,7 +91,7 @@ def reach_deg(study: Study) -> float:
 
     settings, planes = study.recommend, planes_of(study.wrist, asked_of_rigs(study))
     wanted = min(settings.largest_deg, study.wrist.range_deg)
-    family, ends = settings.family(wanted, planes), (0.0, 1.0 - 1e-12)
+    family, ends = _family(study, wanted, planes), (0.0, 1.0 - 1e-12)
     held = wanted
     for near in ends:  # of the radius; all else at the end that asks for more
         for side in ends:  # of the load
@@ -114,7 +121,7 @@ def plan(study: Study, inputs: Inputs) -> str:
     from wristctl.simulation.planes import planes_of
     from wristctl.tuning.search import check_tunable
 
-    study = identified(study, "recommend", inputs)
+    study = on_the_rig(identified(study, "recommend", inputs))
     settings = study.recommend
     with under("recommend"):
         for number, name in enumerate(settings.controllers):
@@ -143,13 +150,15 @@ def recommend(session: Session) -> Recommended:
     from wristctl.simulation.drawn_worlds import streams_of
     from wristctl.tuning.scaled_presets import scaled_to
 
-    study, findings = identified(session.study, "recommend", session.inputs), session.findings
+    known, findings = identified(session.study, "recommend", session.inputs), session.findings
+    study = on_the_rig(known)
     settings, reach = study.recommend, reach_deg(study)
     warn_if_it_buckles(findings, study.wrist, [settings.loop])
     warn_if_coarse([settings.loop])
     warn_of_one_plane(study.wrist, asked_of_rigs(study))
     family, bending = family_of_rigs(study, reach), why_two_planes(study.wrist, asked_of_rigs(study))
     planes = 2 if bending else 1
+    facts = "" if settings.rig is None else said_of_facts(study)
     check_homing(study, planes)
     for split in ("tune", "validation", "test"):
         findings.note_streams(streams_of(family, FAMILY, split))
@@ -159,11 +168,11 @@ def recommend(session: Session) -> Recommended:
     ranking = _tested(session, study, family, candidates)
     tables = [files_table([candidates[row] for row in ranking.standing.order], takers_of(study))]
     result = Recommended(
-        session.study, findings, tables, reach, candidates, ranking, searches, [], [], "", bending=bending
+        session.study, findings, tables, reach, candidates, ranking, searches, [], [], "", facts=facts, bending=bending
     )
     result = _rehearsed(session, study, result, planes)
     if result.best is None:
-        return _recorded(study, result)
+        return _recorded(known, result)
     with session.progress("how fast and how heavy"):
         motions = [
             _limit(study, result.best, rate, _sines(family, reach, rate, planes)) for rate in settings.frequencies
@@ -174,7 +183,7 @@ def recommend(session: Session) -> Recommended:
         result = replace(result, on_the_trial=expected)
     file = str(findings.run.path / RECOMMENDED) if findings.run else RECOMMENDED
     command = next_command(study, session.typed, file)
-    return _recorded(study, replace(result, motions=motions, payloads=payloads, next_command=command))
+    return _recorded(known, replace(result, motions=motions, payloads=payloads, next_command=command))
 
 
 def _searches(session: Session, study: Study, family: Family, scaled: Sequence[Controller]) -> dict[str, Search]:
@@ -248,7 +257,7 @@ def _rehearsed(session: Session, study: Study, result: Recommended, planes: int)
     from wristctl.commands.recommend.rehearsals import rehearsed
 
     at_once = study.recommend.rehearsed
-    if not at_once or trial_of(study) != "hw-run" or result.best_row is None:
+    if not at_once or study.recommend.rig is not None or trial_of(study) != "hw-run" or result.best_row is None:
         return result
     while result.untried:
         rows = result.untried[:at_once]
@@ -359,7 +368,10 @@ def _write_files(study: Study, findings: Findings, result: Recommended) -> None:
     for file, rows in files.items():
         run = f"wristctl {trial_of(study)} THIS"
         found = f"{rows[0].label}, as `wristctl recommend` found it for this wrist on this rig: {run}"
-        keep_gains(findings, file, found, study, [row_of(one.controller, one.gains, 6) for one in rows], **sections)
+        content = gains_content(study, [row_of(one.controller, one.gains, 6) for one in rows], **sections)
+        if study.recommend.rig is not None:
+            content = {name: part for name, part in content.items() if name not in ("simulate", "compare")}
+        keep_study(findings, file, found, content)
 
 
 RECOMMEND = Procedure(
@@ -367,5 +379,5 @@ RECOMMEND = Procedure(
     plan,
     recommend,
     (EarlierRun("from_identified", kind="identify", optional=True),),
-    in_one_plane=lambda study: not why_two_planes(study.wrist, asked_of_rigs(study)),
+    in_one_plane=lambda study: study.recommend.rig is None and not why_two_planes(study.wrist, asked_of_rigs(study)),
 )

@@ -17,8 +17,11 @@ from wristctl.study_files.resolved import sections_read
 def sections_of(study: Study, reach_deg: float, planes: int = 1) -> Mapping[str, Mapping[str, Any]]:
     """Settings of `simulate`, `compare` and, where it can have the rig, `hw_run`, on the rig of `recommend.loop`.
 
-    No motion asks for more than the angle that the tendons hold [deg]. All bend in so many planes.
+    No motion asks for more than the angle that the tendons hold [deg]. All bend in so many planes. A robot of one's own
+    has `hw_run` alone: its motors and sensor are in its facts.
     """
+    if study.recommend.rig is not None:
+        return {"hw_run": {"rig": study.recommend.rig} | _within(study.hw_run.reference, reach_deg)}
     rig, bends = rig_of(study.recommend.loop), {"planes": 2} if planes == 2 else {}
     sections: dict[str, Mapping[str, Any]] = {
         "simulate": {"loop": rig | bends} | _within(study.simulate.reference, reach_deg),
@@ -31,11 +34,13 @@ def sections_of(study: Study, reach_deg: float, planes: int = 1) -> Mapping[str,
 
 def trial_of(study: Study) -> str:
     """The command that tries what is recommended: `hw-run` where it can have the rig."""
-    return "hw-run" if hw_run_fits(study, study.recommend.loop) else "simulate"
+    return "hw-run" if study.recommend.rig is not None or hw_run_fits(study, study.recommend.loop) else "simulate"
 
 
 def takers_of(study: Study) -> str:
     """The commands that take a file of gains, in words."""
+    if study.recommend.rig is not None:
+        return "hw-run"
     return "simulate, compare and hw-run" if trial_of(study) == "hw-run" else "simulate and compare"
 
 
@@ -48,7 +53,8 @@ def next_command(study: Study, typed: Sequence[str], file: str) -> str:
     words, taken = list(typed), {"seed", *sections_read(command)}
     places = [k for k, word in enumerate(words) if words[k - 1] == "--set" and _section(word) not in taken]
     kept = [word for k, word in enumerate(words) if k not in places and k + 1 not in places]
-    return shlex.join(["wristctl", command, *kept, file])
+    rig = ["--rig", study.recommend.rig] if study.recommend.rig is not None else []
+    return shlex.join(["wristctl", command, *rig, *kept, file])
 
 
 def _section(override: str) -> str:

@@ -1,0 +1,214 @@
+"""A robot of one's own as `recommend` draws it: its facts as they are believed, and ranges that some are drawn from.
+
+What a fact has as a number is known; a `Spread` is drawn from its range, all of them together. What the facts do not
+speak of, as friction and the springs, is drawn as for any rig.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from functools import cache
+from typing import TYPE_CHECKING, NamedTuple
+
+from wristctl.config.choices import RIGS
+from wristctl.config.recommend import RecommendSettings
+from wristctl.config.study import Study
+from wristctl.rig import Drive, Facts, Quantity, Sensor, Spread, value
+
+if TYPE_CHECKING:
+    from wristctl.config.families import Drawn, Family
+    from wristctl.config.hw_run import HwRunSettings
+    from wristctl.config.loop import Loop
+
+# Rigs whose facts are drawn; of these each simulated rig has one.
+_ROWS = 32
+_STIFFNESS = "plant.actuator.tendon_stiffness"
+# What is drawn of any rig, and is a fact of this one.
+_OF_FACTS = "plant.sensor.delay_frames", "plant.sensor.noise_deg"
+
+
+class Spoken(NamedTuple):
+    """A fact, in words and as it is drawn."""
+
+    name: str
+    quantity: Quantity
+    unit: str
+    size: float
+    """Of the unit, in SI; 1 of a fact that is in it."""
+
+    def __str__(self) -> str:
+        """Its name with its value or range."""
+        if isinstance(self.quantity, Spread):
+            numbers = f"{self.quantity.low / self.size:.3g} to {self.quantity.high / self.size:.3g}"
+        else:
+            numbers = f"{self.quantity / self.size:.3g}"
+        return f"{self.name} {numbers} {self.unit}"
+
+
+def _spoken(facts: Facts) -> dict[str, Spoken]:
+    """The facts that are believed, or drawn, of a rig."""
+    drive, sensor = facts.drive, facts.sensor
+    return {
+        "delay": Spoken("drive delay", drive.delay, "ms", 1e-3),
+        "lag": Spoken("lag", drive.lag, "ms", 1e-3),
+        "resolution": Spoken("resolution", drive.resolution, "mm", 1e-3),
+        "backlash": Spoken("backlash", drive.backlash, "mm", 1e-3),
+        "stiffness": Spoken("tendon stiffness", drive.stiffness, "kN/m", 1e3),
+        "rate": Spoken("sensor rate", sensor.rate, "1/s", 1.0),
+        "age": Spoken("sensor delay", sensor.delay, "ms", 1e-3),
+        "noise": Spoken("noise", sensor.noise_deg, "deg", 1.0),
+    }
+
+
+def _facts(study: Study) -> tuple[Facts, str]:
+    from wristctl.trial.rig_settings import check_facts
+
+    name = study.recommend.rig
+    assert name is not None
+    return check_facts(getattr(RIGS[name], "facts", None), name), name
+
+
+def _trials(study: Study) -> HwRunSettings:
+    """Settings of `hw-run` on this rig."""
+    from wristctl.trial.rig_settings import settings_of
+
+    facts, name = _facts(study)
+    return settings_of(facts, study.hw_run.model_copy(update={"rig": name}), name)
+
+
+def with_facts(study: Study, name: str) -> Study:
+    """The study with a rig's tendons, wrist, motors and sensor, where nobody gave others, and with what is drawn of it.
+
+    Raises UserError where the facts cannot be, or do not fit what was given.
+    """
+    from wristctl.trial.rig_settings import check_facts, wrist_of
+
+    facts = check_facts(getattr(RIGS[name], "facts", None), name)
+    wrist = wrist_of(facts, study.wrist, name)
+    settings, known = study.recommend, _trials(study).known_loop
+    usual = RecommendSettings.model_fields["loop"].default
+    changed = {
+        part: getattr(known, part)
+        for part in ("actuator", "sensor", "control_period")
+        if getattr(settings.loop, part) == getattr(usual, part)
+    }
+    loop = settings.loop.model_copy(update={**changed, "planes": facts.planes})
+    draw = settings.draw if "draw" in settings.model_fields_set else _drawn(settings, facts)
+    return study.model_copy(
+        update={"wrist": wrist, "recommend": settings.model_copy(update={"loop": loop, "draw": draw})}
+    )
+
+
+def _drawn(settings: RecommendSettings, facts: Facts) -> dict[str, Drawn]:
+    """What is drawn of any rig, but for what the facts say; tendons that were identified are as they were found."""
+    identified = settings.from_identified is not None
+    draw = dict(settings.measured().draw if identified else settings.draw)
+    for key in _OF_FACTS:
+        draw.pop(key, None)
+    stiffness = facts.drive.stiffness
+    if not identified and isinstance(stiffness, Spread) and stiffness.low < stiffness.high:
+        draw[_STIFFNESS] = f"x{stiffness.low / stiffness.value:.6g}..{stiffness.high / stiffness.value:.6g}"
+    elif not identified and stiffness != Drive().stiffness:
+        draw.pop(_STIFFNESS)
+    return draw
+
+
+def on_the_rig(study: Study) -> Study:
+    """The study as `hw-run` simulates its trials on a robot of one's own; any other as it is.
+
+    Tensions stay below what its motors hold. In one plane models have two tendons on either side, in place of as many
+    as it has.
+    """
+    if study.recommend.rig is None:
+        return study
+    from wristctl.trial.experiment import spared
+    from wristctl.trial.rig_belief import layout_of_rig
+    from wristctl.trial.trial_results import in_pairs
+
+    trials, settings = _trials(study), study.recommend
+    wrist, loop = spared(study.wrist, trials), settings.loop
+    layout = layout_of_rig(trials, wrist)
+    if layout is not None and trials.planes == 1:
+        wrist, loop = in_pairs(wrist, layout, loop)
+    return study.model_copy(update={"wrist": wrist, "recommend": settings.model_copy(update={"loop": loop})})
+
+
+def drawn_of_facts(study: Study, family: Family) -> Family:
+    """The family with the facts of its rigs drawn together, but for what the study draws itself."""
+    facts, _ = _facts(study)
+    rows = _rows(study, facts)
+    together = tuple(
+        row for row in ({key: entry for key, entry in row.items() if key not in family.draw} for row in rows) if row
+    )
+    return family.model_copy(update={"together": together})
+
+
+def _rows(study: Study, facts: Facts) -> list[dict[str, float]]:
+    """Facts of so many rigs, evenly from all ranges, as leaves of a loop; none where nothing is to be drawn."""
+    drive, sensor, loop = facts.drive, facts.sensor, study.recommend.loop
+    spreads = [name for name, fact in _spoken(facts).items() if isinstance(fact.quantity, Spread)]
+    spreads = [name for name in spreads if name != "stiffness"]
+    rows = []
+    for shares in _even(len(spreads)) if spreads else [()]:
+        drawn = dict(zip(spreads, shares, strict=True))
+
+        def at(name: str, quantity: Quantity, drawn: dict[str, float] = drawn) -> float:
+            if isinstance(quantity, Spread):
+                return quantity.low + drawn[name] * (quantity.high - quantity.low)
+            return float(quantity)
+
+        rows.append(_row(at, spreads, drive, sensor, loop))
+    return rows
+
+
+def _row(
+    at: Callable[[str, Quantity], float], spreads: Sequence[str], drive: Drive, sensor: Sensor, loop: Loop
+) -> dict[str, float]:
+    """One rig's facts as leaves of the loop; rate and resolution are what the controller believes, too."""
+    row: dict[str, float] = {}
+    if backlash := at("backlash", drive.backlash):
+        row["plant.actuator.backlash"] = backlash
+    if {"delay", "lag"} & set(spreads):
+        row["plant.actuator.command_delay"] = min(0.1, at("delay", drive.delay) + at("lag", drive.lag))
+    if "resolution" in spreads:
+        from wristctl.config.plant import Actuator
+
+        finest = Actuator().step_length
+        ratio = max(at("resolution", drive.resolution), finest) / loop.actuator.step_length
+        row["actuator.pulley_radius"] = ratio * loop.actuator.pulley_radius
+        row["actuator.step_rate"] = loop.actuator.step_rate / ratio
+    rate = loop.sensor.frame_rate
+    if "rate" in spreads:
+        row["sensor.frame_rate"] = rate = min(at("rate", sensor.rate), 1.0 / loop.control_period)
+    if {"rate", "age"} & set(spreads):
+        row["sensor.delay_frames"] = min(20.0, value(sensor.delay) * rate)
+        row["plant.sensor.delay_frames"] = min(20.0, at("age", sensor.delay) * rate)
+    if "noise" in spreads:
+        row["plant.sensor.noise_deg"] = at("noise", sensor.noise_deg)
+    return row
+
+
+@cache
+def _even(count: int) -> tuple[tuple[float, ...], ...]:
+    """Shares in [0, 1) of so many ranges, evenly spread (Halton)."""
+    from scipy.stats.qmc import Halton
+
+    return tuple(tuple(row) for row in Halton(count, scramble=False).random(_ROWS + 1)[1:].tolist())
+
+
+def said_of_facts(study: Study) -> str:
+    """Which facts are believed of a rig, and which are drawn, in two sentences."""
+    facts, name = _facts(study)
+    spoken = _spoken(facts)
+    drawn = [str(fact) for fact in spoken.values() if isinstance(fact.quantity, Spread)]
+    fixed = [str(fact) for key, fact in spoken.items() if not isinstance(fact.quantity, Spread) and _counts(key, facts)]
+    counts = f"{len(facts.tendons)} tendons of up to {facts.limits.tension:g} N in {facts.planes} plane"
+    words = f"From the facts of {name}: {counts}{'s' * (facts.planes == 2)}, {', '.join(fixed)}."
+    if drawn:
+        return f"{words} Drawn from their ranges: {', '.join(drawn)}."
+    return f"{words} No fact is a Spread: the simulated rigs have them all as they are."
+
+
+def _counts(key: str, facts: Facts) -> bool:
+    """Whether a fact that is a number is worth a word: it is not at the default that stands for none."""
+    return key in ("rate", "age", "noise") or getattr(facts.drive, key) != getattr(Drive(), key)
