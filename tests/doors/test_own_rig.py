@@ -185,6 +185,37 @@ def test_a_trial_follows_its_motion_and_homing_finds_the_slack(
     assert (pd.read_csv(tried.folder / "residuals.csv")["late"] == 0.0).all()  # virtual time
 
 
+# The same rig with force sensors, whose scale is wrong by a factor.
+WEIGHED = (
+    ("        self._heard = math.inf", "        self._heard, self._pulls = math.inf, np.zeros(3)"),
+    (PULLS, PULLS.replace("pulls =", "pulls = self._pulls =")),
+    (LOOK, LOOK.replace(", time)", ", time, 1.5 * self._pulls)")),
+)
+
+
+@pytest.mark.slow
+def test_measured_tensions_are_logged_held_against_the_model_and_exported(tmp_path: Path) -> None:
+    reference = written(tmp_path, *WEIGHED)
+    run = wristctl(
+        tmp_path, "hw-run", "pid-ff", "--rig", reference, "--set", "directions=[ulnar]", "--horizon", "1.5", "-q"
+    )
+    assert run.returncode == 0, run.stderr
+    sealed = Run(tmp_path / run.stdout.strip().splitlines()[-1])
+    log, residuals = (pd.read_csv(sealed.path / f"data/{name}.csv") for name in ("log", "residuals"))
+    names = [f"pull_{number}" for number in (1, 2, 3)]
+    assert log[names].notna().all(axis=None) and log["pull_1"].iloc[-1] > 1.5 * 3.0
+    ratio = residuals["tension_ratio"][residuals["trial"] == 0].dropna()
+    assert len(ratio) > 100 and ratio.iloc[-20:].median() == pytest.approx(1.5, rel=0.1)
+    done = wristctl(tmp_path, "runs", "export", str(sealed.path), "--file", "log.csv")
+    assert done.returncode == 0, done.stderr
+    exported = pd.read_csv(tmp_path / "log.csv")
+    told = exported[["time [s]", "tension_1 [N]"]].dropna()
+    assert np.allclose(told["tension_1 [N]"], log["pull_1"]) and np.allclose(told["time [s]"], log["captured_ulnar"])
+    for page in [*sealed.path.glob("*.md"), sealed.path / "data/limits.json", sealed.path / "run.json"]:
+        words = re.findall(r"[^\n]*\b(?:board|markers?|cameras?|pictures?|frames? of)\b[^\n]*", page.read_text())
+        assert not words, (page.name, words)
+
+
 # What goes wrong in a trial once the wrist is bent, in the file's own text, and what is said of it.
 FAILING: dict[str, tuple[str, str, type[UserError], str]] = {
     "lost": (SENDS, f"{BENT}raise Lost('no port')\n{SENDS}", RigStop, "the rig does not answer: no port"),

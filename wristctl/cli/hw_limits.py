@@ -50,7 +50,7 @@ def _tell(
 ) -> None:
     for name, stop in zip(names, stops, strict=True):
         if stop is not None:
-            print(_stopped(name, stop))
+            print(_stopped(name, stop, runs[0].settings.rig is not None))
     if not any(stops):
         print(_went_through(runs, lines[0]))
     print("\n" + _table(lines).within(_WIDTH).text())
@@ -68,11 +68,11 @@ def _logged(run: Run) -> Logged:
     return Logged(values, limits, run.config.hw_run, run.config.wrist)
 
 
-def _stopped(name: str, stop: StopTick) -> str:
+def _stopped(name: str, stop: StopTick, own: bool) -> str:
     from wristctl.trial.residuals import stopped_by
 
     where = f"in trial {stop.trial}" if stop.trial >= 0 else "between trials"
-    return f"{name} was stopped {where}, {stop.clock:.3f} s on its clock: {stopped_by(stop.limit, stop.value)}."
+    return f"{name} was stopped {where}, {stop.clock:.3f} s on its clock: {stopped_by(stop.limit, stop.value, own)}."
 
 
 def _went_through(runs: Sequence[Logged], nearest: Nearness) -> str:

@@ -6,7 +6,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from wristctl.plotting.style import BLUE, GREY, VERMILLION, figure, title, with_unit
-from wristctl.trial.residuals import RESIDUALS
+from wristctl.trial.residuals import residual
 from wristctl.trial.run_limits import Logged, StopTick
 
 _COLUMNS = 3
@@ -28,7 +28,7 @@ def residuals_over_time(logged: Logged, stop: StopTick | None, last: float | Non
     picture, panels = figure(rows, _COLUMNS, sharex=True)
     every: list[Axes] = list(panels.flat)  # type: ignore[arg-type]
     for panel, limit in zip(every, logged.limits, strict=False):
-        unit = RESIDUALS[limit.name].shown
+        unit = residual(limit.name, logged.settings.rig is not None).shown
         panel.plot(clock, values[limit.name].to_numpy(float) / unit.size, color=BLUE, linewidth=0.8)
         for level, style in ((limit.limit, "-"), (limit.odd, ":")):
             if math.isfinite(level):

@@ -154,8 +154,8 @@ class ControlLoop:
         row = values | of_tendons(
             self._tendons, tension=tension, target=target, position=drive.reeled(), sent=drive.sent
         )  # fmt: skip
-        if self._pulls is not None:
-            row |= of_tendons(self._tendons, pull=self._pulls.pull)
+        if (pull := drive.tension if self._pulls is None else self._pulls.pull) is not None:
+            row |= of_tendons(self._tendons, pull=pull)
         self._log.tick(row)
         if self._shown is not None:
             self._shown(row)
@@ -217,6 +217,7 @@ class ControlLoop:
         delay, drive = late + self._skipped * self._period, self._drive
         unheard = clock - drive.counted
         tick = Tick(clock, delay, estimate, position, taut, drive.state, drive.lapses, drive.resent, unheard)
+        tick = tick._replace(tension=drive.tension)
         self._log.residuals(trial, clock, self.watch.see(tick, min(self._last_usable)))
         self.watch.judge(tick)
 

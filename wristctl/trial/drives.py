@@ -56,6 +56,10 @@ class LoopDrive(Protocol):
         """Step rates that were really sent last (T,) [1/s]."""
 
     @property
+    def tension(self) -> Array | None:
+        """Measured tension of each tendon (T,) [N] by the last look, nan where there is none; None: never measured."""
+
+    @property
     def moving(self) -> bool:
         """Whether a motor may still turn."""
 
@@ -92,6 +96,8 @@ class BoardDrive:
 
     `signs` say which way each motor's positive steps turn.
     """
+
+    tension = None
 
     def __init__(self, board: Board, settings: HwRunSettings, signs: Sequence[int]) -> None:
         self._board, self._signs, self._period = board, np.array(signs), settings.control_period

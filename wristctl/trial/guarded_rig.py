@@ -50,6 +50,8 @@ class GuardedRig:
         self._count, self._clock = len(self.facts.tendons), -np.inf
         self.took = 0.0
         """Seconds on the rig's clock that the last `send` took."""
+        self.tension: Array | None = None
+        """Tension (T,) [N] by the last look; None where it gave none."""
 
     @property
     def virtual(self) -> bool:
@@ -90,8 +92,8 @@ class GuardedRig:
         bends = self._values("look", bend, self.facts.planes, finite=False)
         if not np.isfinite(moment):
             raise RigStop("look() does not say when its bend was true", self.where, "Look.time on the rig's own clock")
-        pulls = None if tension is None else self._values("look", tension, self._count, finite=False)
-        return Seen(np.where(np.isfinite(bends), bends, np.nan), moment, pulls)
+        self.tension = None if tension is None else self._values("look", tension, self._count, finite=False)
+        return Seen(np.where(np.isfinite(bends), bends, np.nan), moment, self.tension)
 
     def stop(self) -> str:
         """Stop the motors; what went wrong with that, in words, empty where nothing did."""

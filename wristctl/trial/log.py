@@ -3,6 +3,7 @@
 import errno
 import math
 import os
+import re
 import time
 from collections import deque
 from collections.abc import Iterable, Mapping, Sequence
@@ -51,6 +52,7 @@ _OF_A_PLANE: Columns = {
     "torque": ("N m", "torque of the commanded tensions on the one-segment model"),
 }
 OF_LOAD_CELLS: Columns = _by_tendon(ACTIVE, "pull", "N", "by load cell as read last; empty where it gives nothing")
+_OF_LOOKS = "by the look of this tick; empty where it gives none"
 WIRE: Columns = {
     "clock": ("s", "the run's one clock"),
     "way": ("", "sent to the board, or came from it"),
@@ -83,12 +85,12 @@ _RESERVED = 4 << 20
 _AT_ONCE = 40
 
 
-def residual_columns(weighed: bool) -> Columns:
-    """Columns of the residuals of a rig with load cells, or without."""
+def residual_columns(weighed: bool, own: bool = False) -> Columns:
+    """Columns of the residuals of a rig with load cells, or without, or of one's `own` robot."""
     return {
         "trial": ("", "number, from 0; -1 between trials"),
         "clock": ("s", "the run's one clock"),
-        **columns(weighed),
+        **columns(weighed, own),
     }
 
 
@@ -130,6 +132,48 @@ def frame_columns(planes: int) -> Columns:
         **named,
         "bend": ("rad", "bend in that plane, by the marker's angle and the other bend; empty where unusable"),
     }
+
+
+# Columns that a robot of one's own has not, and those whose meaning is another one there.
+_OF_A_BOARD = "board", "state", "faults"
+_OF_A_RIG = {
+    "bend_measured": "newest bend by look(); empty where it brought none in this tick",
+    "captured": "when it was true, on the trial's time",
+    "verdict": "on the newest look; empty where there was none",
+    "position": "where the spool is reckoned to be by the facts' delay and lag",
+    "counted": "when the spools were there, on the trial's time",
+    "sent": "rate of the target that was really sent",
+    "round_trip": "seconds that send() took",
+}
+_SEEN_BY_A_RIG: Columns = {
+    "trial": ("", "number, from 0"),
+    "number": ("", "of the look that was news, as they are counted"),
+    "captured": ("s", "when it was true, on the trial's time"),
+    "used": ("s", "when the loop had it, on the trial's time"),
+    "theta": ("rad", "bend less zero; empty where it is no number"),
+    "verdict": ("", "whether it can be used, and if not why"),
+    "predicted": ("rad", "bend that targets should have made by then, with tendons as believed; empty where unused"),
+    "predicted_soft": ("rad", "the same with tendons of safety.softest"),
+}
+
+
+def tick_columns_of_a_rig(planes: int, tendons: Sequence[int]) -> Columns:
+    """Columns of the control ticks of a robot of one's own: as of the board, in its words, with measured tensions."""
+    found = {}
+    for name, (unit, meaning) in tick_columns(planes, tendons).items():
+        stem = re.sub(r"_(\d+|ulnar|flexion)$", "", name).replace("theta_measured", "bend_measured")
+        suffix = meaning[meaning.rfind(", t") :] if name[-1].isdigit() or name.endswith(PLANES) else ""
+        found[name] = unit, _OF_A_RIG[stem] + suffix if stem in _OF_A_RIG else meaning
+    measured = _by_tendon(tendons, "pull", "N", f"tension {_OF_LOOKS}")
+    return {name: column for name, column in found.items() if name not in _OF_A_BOARD} | measured
+
+
+def frame_columns_of_a_rig(planes: int) -> Columns:
+    """Columns of a trial's looks at a robot of one's own that were news, a row for each plane."""
+    if planes == 1:
+        return _SEEN_BY_A_RIG
+    named = {"bend" if name == "theta" else name: column for name, column in _SEEN_BY_A_RIG.items() if name != "trial"}
+    return {"trial": _SEEN_BY_A_RIG["trial"], "plane": ("", "ulnar or flexion: that the bend is in"), **named}
 
 
 def truth_columns(coordinates: int, planes: int = 1) -> Columns:
@@ -220,7 +264,7 @@ class TrialLog:
     """log.csv and frames.csv of trials; between.csv for the moves between them; residuals.csv of both; wire.csv with
     all bytes of the whole run; truth.csv of an emulated bench. The clock is `monotonic`, or virtual; a rig is `weighed`
     where it has load cells. The true wrist of a bench has so many `coordinates`. `tendons` are the numbers of those
-    that motors wind. One that is not `wired` has no board, and no wire.csv.
+    that motors wind. A robot of one's own is not `wired`: it has no board and no wire.csv, and may measure tensions.
     """
 
     def __init__(
@@ -229,9 +273,14 @@ class TrialLog:
     ) -> None:  # fmt: skip
         self.disk, self._monotonic = Disk(folder), monotonic
         self._planes = planes
-        ticks = {**tick_columns(planes, tendons), **(OF_LOAD_CELLS if weighed else {})}
-        tables = {"log": ticks, "between": ticks, "frames": frame_columns(planes), **({"wire": WIRE} if wired else {})}
-        tables["residuals"] = residual_columns(weighed)
+        ticks, frames = tick_columns_of_a_rig(planes, tendons), frame_columns_of_a_rig(planes)
+        if wired:
+            ticks, frames = (
+                {**tick_columns(planes, tendons), **(OF_LOAD_CELLS if weighed else {})},
+                frame_columns(planes),
+            )
+        tables = {"log": ticks, "between": ticks, "frames": frames, **({"wire": WIRE} if wired else {})}
+        tables["residuals"] = residual_columns(weighed, not wired)
         if coordinates is not None:
             tables["truth"] = truth_columns(coordinates, planes)
         try:
@@ -260,6 +309,9 @@ class TrialLog:
         seen = sighting.theta, sighting.verdict, sighting.tip_x, sighting.tip_y, sighting.size
         plane = (PLANES[sighting.plane],) if self._planes == 2 else ()
         place = trial, *plane, sighting.number, sighting.time - begin, used
+        if "wire" not in self.streams:
+            self.streams["frames"].row((*place, *seen[:2], *predicted))
+            return
         self.streams["frames"].row((*place, *seen, *predicted, *sighting.corners.ravel().tolist()))
 
     def residuals(self, trial: int, clock: float, values: Mapping[str, float]) -> None:

@@ -184,6 +184,65 @@ RESIDUALS: Mapping[str, Residual] = {
     ),
 }  # fmt: skip
 
+_SENSOR = "the sensor, its cable or program, and what look() returns: wristctl check-rig"
+_TARGETS = "tendons, motors or the sensor do otherwise than the facts say; something holds or pushes the wrist"
+# What a robot of one's own has no part for: a board that counts, markers and their pictures, load cells.
+_NO_PART = (
+    "lapses", "disabled", "doubted", "across", "resent", "moved", "cell_age", "measured_pull", "excess_pull",
+    "missing_pull",
+)  # fmt: skip
+_OF_A_RIG: Mapping[str, Mapping[str, str]] = {
+    "no_number": {"causes": "see the bends in data/frames.csv"},
+    "age": {
+        "meaning": "time since the newest bend was true", "causes": _SENSOR, "stops": "no new bend for {value}",
+        "notes": "no new bend for {value} (limit {limit})",
+    },
+    "pull": {"meaning": "largest tension by targets and estimated bend"},
+    "travel": {"meaning": "target furthest from zero", "stops": "a target {value} from zero, beyond {limit}"},
+    "jump": {
+        "meaning": "bend against where targets should have it, change between two looks",
+        "causes": "the sensor has slipped; bends dated wrongly",
+        "stops": "the bend jumps by {value} from one look to the next, beyond {limit}",
+        "notes": "{value} of jump between looks (limit {limit})",
+    },
+    "load": {"causes": _TARGETS},
+    "apart": {"meaning": "bend against where targets should have it", "causes": _TARGETS},
+    "round_trip": {
+        "meaning": "median time of half a second's send()", "causes": "the robot's link; or a longer control_period",
+        "stops": "send() takes {value}, beyond {limit}", "notes": "send() took {value} (limit {limit})",
+    },
+    "unseen": {
+        "meaning": "share of the bends by sensor.rate of the facts that did not come, over two seconds",
+        "causes": _SENSOR,
+        "notes": "{value} of the bends that sensor.rate promises did not come: no number, or look() brings no news",
+    },
+    "repeated": {
+        "meaning": "looks in the last second that were dated ahead of the clock", "causes": _SENSOR,
+        "notes": "{value} looks within a second were dated ahead of the clock",
+    },
+    "lag": {
+        "meaning": "least time by which the bend comes after its targets, in this motion so far",
+        "causes": "bends older than they are dated, motors slower than drive.delay and drive.lag, or friction",
+        "notes": "the bend comes {value} or more after its targets: bends older than dated, slow motors or friction",
+    },
+}  # fmt: skip
+# Measured over modelled tension beyond which a trial was odd.
+_STIFFER = 2.0
+RESIDUALS_OF_A_RIG: Mapping[str, Residual] = {
+    **{
+        name: line._replace(**_OF_A_RIG.get(name, {}))  # type: ignore[arg-type]
+        for name, line in RESIDUALS.items()
+        if name not in _NO_PART
+    },
+    "tension_ratio": Residual(
+        Shown("", 1.0, ".2g"), "tension that look() gives over that by targets and estimated bend, of all pulled "
+        "tendons together", _never, _STIFFER, "a zero of its force sensors; facts.drive.stiffness; friction",
+        notes="tendons pull {value} times as much as targets and bend explain: the zero of their sensors, "
+        "facts.drive.stiffness, or friction",
+    ),
+}  # fmt: skip
+"""The table of a robot of one's own."""
+
 
 class Limit(NamedTuple):
     """Limit of a residual for one run; SI units."""
@@ -200,22 +259,30 @@ class Limit(NamedTuple):
 def limits_of(settings: HwRunSettings) -> tuple[Limit, ...]:
     """The table for these settings."""
     limits = []
-    for name, residual in _lines(settings.load_cells is not None).items():
-        most, held = residual.limit(settings), settings.safety.odd_for if residual.lasting else 0.0
-        odd = residual.odd * most if math.isfinite(most) and math.isfinite(residual.odd) else residual.odd
-        limits.append(Limit(name, _SI.get(residual.shown.unit, residual.shown.unit), most, held, odd))
+    for name, line in _lines(settings.load_cells is not None, settings.rig is not None).items():
+        most, held = line.limit(settings), settings.safety.odd_for if line.lasting else 0.0
+        odd = line.odd * most if math.isfinite(most) and math.isfinite(line.odd) else line.odd
+        limits.append(Limit(name, _SI.get(line.shown.unit, line.shown.unit), most, held, odd))
     return tuple(limits)
 
 
 _SI = {"ms": "s", "mm": "m", "deg": "rad", "%": ""}
 
 
-def columns(weighed: bool) -> dict[str, tuple[str, str]]:
-    """Unit and meaning of each residual, as the log has them of a rig with load cells or without."""
-    return {name: (_SI.get(line.shown.unit, line.shown.unit), line.meaning) for name, line in _lines(weighed).items()}
+def columns(weighed: bool, own: bool = False) -> dict[str, tuple[str, str]]:
+    """Unit and meaning of each residual, as the log has them: with load cells or without, or of one's `own` robot."""
+    lines = _lines(weighed, own)
+    return {name: (_SI.get(line.shown.unit, line.shown.unit), line.meaning) for name, line in lines.items()}
 
 
-def _lines(weighed: bool) -> dict[str, Residual]:
+def residual(name: str, own: bool = False) -> Residual:
+    """A line of the table of the board, or of one's `own` robot."""
+    return (RESIDUALS_OF_A_RIG if own else RESIDUALS)[name]
+
+
+def _lines(weighed: bool, own: bool) -> dict[str, Residual]:
+    if own:
+        return dict(RESIDUALS_OF_A_RIG)
     return {name: line for name, line in RESIDUALS.items() if weighed or not line.weighed}
 
 
@@ -251,37 +318,36 @@ def worst(values: Mapping[str, float], most: Mapping[str, float]) -> dict[str, f
     return {name: sizes[name] if name == "lag" else max(sizes[name], most.get(name, 0.0)) for name in values}
 
 
-def notes(most: Mapping[str, float], limits: Sequence[Limit]) -> list[str]:
+def notes(most: Mapping[str, float], limits: Sequence[Limit], own: bool = False) -> list[str]:
     """What was odd of a trial with these largest values, in words."""
+    odd = [(residual(limit.name, own), limit) for limit in limits if most.get(limit.name, 0.0) > limit.odd]
     return [
-        RESIDUALS[name].notes.format(value=RESIDUALS[name].shown(most[name]), limit=_limit(name, limit))
-        for name, _, limit, _, odd in limits
-        if most.get(name, 0.0) > odd
+        line.notes.format(value=line.shown(most[limit.name]), limit=_limit(line, limit.limit)) for line, limit in odd
     ]
 
 
-def stopped_by(limit: Limit, value: float) -> str:
+def stopped_by(limit: Limit, value: float, own: bool = False) -> str:
     """Say which limit stopped the motors."""
-    line = RESIDUALS[limit.name]
+    line = residual(limit.name, own)
     signed = value if limit.name in ("angle", "rate") else abs(value)
-    return line.stops.format(value=line.shown(signed), limit=_limit(limit.name, limit.limit))
+    return line.stops.format(value=line.shown(signed), limit=_limit(line, limit.limit))
 
 
-def _limit(name: str, limit: float) -> str:
-    shown = RESIDUALS[name].shown
+def _limit(line: Residual, limit: float) -> str:
+    shown = line.shown
     return f"{limit / shown.size:.3g}{' ' * bool(shown.unit)}{shown.unit}"
 
 
 FILE, SCHEMA = "data/limits.json", "wristctl.limits/1"
 
 
-def plain(limits: Sequence[Limit]) -> dict[str, Any]:
+def plain(limits: Sequence[Limit], own: bool = False) -> dict[str, Any]:
     """For JSON; a limit that never stops is null."""
     rows = [
         {name: value if not isinstance(value, float) or math.isfinite(value) else None
          for name, value in limit._asdict().items()}
-        | {"meaning": RESIDUALS[limit.name].meaning, "causes": RESIDUALS[limit.name].causes}
-        for limit in limits
+        | {"meaning": line.meaning, "causes": line.causes}
+        for limit, line in ((limit, residual(limit.name, own)) for limit in limits)
     ]  # fmt: skip
     return {"schema": SCHEMA, "limits": rows}
 

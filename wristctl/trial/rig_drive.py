@@ -75,6 +75,12 @@ class RigDrive:
         return self._sent
 
     @property
+    def tension(self) -> Array:
+        """Of the rig's last look."""
+        none = np.full(len(self._zero), math.nan)
+        return none if self._rig.tension is None else self._rig.tension
+
+    @property
     def moving(self) -> bool:
         """Whether a motor is believed to be more than a step from its target."""
         return bool((np.abs(self._place - self._target) > 1.0).any())
@@ -167,13 +173,11 @@ class RigTracking:
     def __init__(self, rig: GuardedRig) -> None:
         self._rig, self._time, self._number = rig, -math.inf, 0
         self.zero: tuple[float, ...] = (0.0,) * rig.facts.planes
-        self.tension: Array | None = None
-        """Tensions (T,) [N] of the last look, where they are measured."""
 
     def look(self) -> list[Sighting]:
         """The newest look, where it is news. Raises SafetyStop where a measured tension is beyond the rig's limit."""
         seen, now = self._rig.look(), self._rig.now()
-        self.tension, most = seen.tension, self._rig.facts.limits.tension
+        most = self._rig.facts.limits.tension
         if seen.tension is not None and (seen.tension > most).any():
             worst = int(np.nanargmax(seen.tension))
             problem = f"tendon {worst + 1} pulls {seen.tension[worst]:.3g} N, beyond {most:g} N"

@@ -10,7 +10,7 @@ import pandas as pd
 from wristctl.arrays import Array
 from wristctl.config.hw_run import HwRunSettings
 from wristctl.config.wrist import WristParameters
-from wristctl.trial.residuals import RESIDUALS, Judge, Limit
+from wristctl.trial.residuals import Judge, Limit, residual
 
 # A proposed limit is so many times the largest value, and so large a share of the present limit at least: a few runs
 # show a part of what a sound rig does.
@@ -118,4 +118,4 @@ def _proposed(run: Logged, limit: Limit, seen: float) -> tuple[float | None, str
 
 def shown(name: str, value: float) -> str:
     """A residual's value as people read it."""
-    return RESIDUALS[name].shown(value)
+    return residual(name).shown(value)

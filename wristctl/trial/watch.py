@@ -19,7 +19,7 @@ from wristctl.trial.camera_record import CameraRecord, Frame, Recent, jump_betwe
 from wristctl.trial.causes_in_space import SpatialEvidence, causes_in_space
 from wristctl.trial.likely_causes import Evidence, likely_causes, reversals
 from wristctl.trial.marker_lag import MarkerLag
-from wristctl.trial.residuals import RESIDUALS, Judge, Limit, limits_of, notes, stopped_by, worst
+from wristctl.trial.residuals import Judge, Limit, limits_of, notes, residual, stopped_by, worst
 from wristctl.trial.rig_belief import names_of_planes, numbers_of, places_of_tendons
 from wristctl.trial.safety import SafetyStop
 from wristctl.trial.spools import spools_of
@@ -63,6 +63,8 @@ class Tick(NamedTuple):
     """Commands sent again, as the host counts."""
     unheard: float = 0.0
     """Time since the board has counted the spools' steps."""
+    tension: Array | None = None
+    """Measured tension of each tendon (T,) [N], where a robot of one's own gives any; nan where it gives none."""
 
 
 class _Past(NamedTuple):
@@ -101,7 +103,7 @@ class Watch:
         nearer = 2.0 * settings.markers.distance / wrist.length if settings.planes == 1 else math.nan
         doubtful = _DOUBTFUL * math.radians(settings.safety.across_deg)
         self._cameras = tuple(CameraRecord(nearer, doubtful) for _ in range(settings.planes))
-        self.limits = limits_of(settings)
+        self.limits, self._own = limits_of(settings), settings.rig is not None
         self._judge = Judge(self.limits)
         self._past: deque[_Past] = deque()
         self._positions: deque[Array] = deque(maxlen=round(_SWINGING / self._period))
@@ -122,7 +124,7 @@ class Watch:
 
     def words(self) -> str:
         """What was odd in the motion, in one line."""
-        return "; ".join(notes(self.most, self.limits))
+        return "; ".join(notes(self.most, self.limits, self._own))
 
     def predict(self, reeled: Array) -> None:
         """Go on to the next tick, with so much (T,) [m] reeled in at each place until then."""
@@ -156,6 +158,7 @@ class Watch:
             "age": tick.clock - last_usable,
             "pull": self._pull(tick.position, tick.taut) if finite and heard else math.nan,
             **self._weighed(tick.clock, tick.position, tick.taut),
+            "tension_ratio": self._tension_ratio(tick) if finite else math.nan,
             "travel": float(np.abs(tick.position).max()) * self._spools.step,
             "disabled": float(tick.state != State.ENABLED),
             "doubted": self._doubted(tick.clock),
@@ -184,6 +187,14 @@ class Watch:
         stretch = self._spools.step * position - taut
         return {} if self._pulls is None else self._pulls.residuals(clock, stretch)
 
+    def _tension_ratio(self, tick: Tick) -> float:
+        """Measured tension over that by spools and estimated bend, of all that should pull by more than little."""
+        if tick.tension is None:
+            return math.nan
+        modelled = self._spools.tension(tick.position, tick.taut)
+        pulled = (modelled > self._settings.safety.missing_pull) & np.isfinite(tick.tension)
+        return float(tick.tension[pulled].sum() / modelled[pulled].sum()) if pulled.any() else math.nan
+
     def standing(self, theta: Array, position: Array, taut: Array, clock: float) -> None:
         """Raises SafetyStop where a wrist whose motors stand is bent, or its tendons are pulled, beyond the limits.
 
@@ -193,7 +204,8 @@ class Watch:
         for limit in self.limits:
             value = values.get(limit.name, 0.0)
             if abs(value) > limit.limit:
-                raise SafetyStop(stopped_by(limit, value) + self._named(limit.name), fix=RESIDUALS[limit.name].causes)
+                problem = stopped_by(limit, value, self._own) + self._named(limit.name)
+                raise SafetyStop(problem, fix=residual(limit.name, self._own).causes)
 
     def ticked(self, clock: float, round_trip: float, skipped: int, culprit: str) -> None:
         """A tick has ended: its command's round trip, the ticks after it that are skipped, and by whose fault."""
@@ -238,12 +250,10 @@ class Watch:
         return camera.unseen(clock, since, self._settings.sensor)
 
     def _stop(self, limit: Limit, tick: Tick) -> SafetyStop:
-        name, fix = limit.name, RESIDUALS[limit.name].causes
-        problem = stopped_by(limit, self._values[name])
+        name, line = limit.name, residual(limit.name, self._own)
+        problem, fix = stopped_by(limit, self._values[name], self._own), line.causes
         if name == "age":
             why, fix = self._timing.camera.missing(tick.clock, limit.limit)
-            if self._settings.rig is not None:
-                problem = problem.replace("marker angle", "bend")
             problem += f" ({why})"
         elif name == "disabled":
             problem = f"the board is {tick.state.name}, not ENABLED"
@@ -251,21 +261,21 @@ class Watch:
             blamed = Counter(who for who in self._blamed.values(tick.clock) if math.isfinite(who))
             culprit = list(FIX)[int(blamed.most_common(1)[0][0])]
             problem, fix = f"{problem}: {culprit}", FIX[culprit]
-        elif RESIDUALS[name].weighed:
+        elif line.weighed:
             problem += self._named(name)
         elif name in _FOLLOWING or (name == "pull" and self._settings.planes == 2):
-            fix = _FIX if self._settings.rig is None else _FIX_OF_RIG
+            fix = _FIX_OF_RIG if self._own else _FIX
             problem = f"{problem}; likely {', or '.join(self._causes(tick)[:4])}"
         return SafetyStop(problem, fix=fix)
 
     def _named(self, name: str) -> str:
-        if self._pulls is None or not RESIDUALS[name].weighed:
+        if self._pulls is None or not residual(name).weighed:
             return ""
         return f"; likely {self._pulls.causes(name)}"
 
     def _causes(self, tick: Tick) -> list[str]:
         if not self._past:
-            return [RESIDUALS["load"].causes]
+            return [residual("load", self._own).causes]
         first, last = self._past[0], self._past[-1]
         jumps = [
             max((abs(jump_between(one.frames[k], two.frames[k])) for one, two in pairwise(self._past)), default=0.0)

@@ -94,7 +94,7 @@ def _trials(run: Run) -> list[RecordedMotion]:
         number, direction = row.trial, DIRECTIONS.get(str(row.direction))
         ticks = log[log.trial == number]
         seen = frames[(frames.trial == number) & (frames.verdict == "ok")]
-        measured = [_reeled(ticks, motors)]
+        measured = [_reeled(ticks, motors), *_tensions(ticks)] if run.config.hw_run.rig else [_reeled(ticks, motors)]
         if "plane" in seen:
             measured += _bends_seen(seen, "captured")
         else:
@@ -130,6 +130,19 @@ def _reeled(log: pd.DataFrame, motors: Actuator) -> Stream:
     times = np.arange(counted[0], counted[-1], _SPOOLS_EVERY)
     lengths = motors.step_length * spool_paths(log, motors)(times)
     return Stream(times, {f"spool_{tendon}": column for tendon, column in zip(ACTIVE, lengths.T, strict=True)})
+
+
+def _tensions(ticks: pd.DataFrame) -> list[Stream]:
+    """Tensions that a robot of one's own measured, at the times of the looks that gave them; empty without any."""
+    pulls = {name: match[1] for name in map(str, ticks.columns) if (match := re.fullmatch(r"pull_(\d+)", name))}
+    times = next((name for name in ("captured", "captured_ulnar", "captured_flexion") if name in ticks), None)
+    if times is None:
+        return []
+    told = ticks[np.isfinite(ticks[times]) & ticks[[*pulls]].notna().any(axis=1)] if pulls else ticks[:0]
+    if not len(told):
+        return []
+    columns = {f"tension_{tendon}": told[name].to_numpy(float) for name, tendon in pulls.items()}
+    return [Stream(told[times].to_numpy(float), columns)]
 
 
 def _of_tendons(table: pd.DataFrame, quantity: str, step: float) -> Columns:

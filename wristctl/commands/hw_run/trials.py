@@ -22,7 +22,7 @@ from wristctl.trial.calibration import WristCalibration
 from wristctl.trial.experiment import Experiment, Stop
 from wristctl.trial.guarded_rig import GuardedRig
 from wristctl.trial.log import TrialLog
-from wristctl.trial.residuals import FILE, RESIDUALS, limits_of, plain
+from wristctl.trial.residuals import FILE, limits_of, plain, residual
 from wristctl.trial.rig_belief import PLANES, layout_of_rig, numbers_of
 from wristctl.trial.rig_experiment import BEFORE_MOTION, RigExperiment
 from wristctl.trial.rig_settings import rig_of
@@ -248,8 +248,12 @@ def _summarise(
     if timing.late:
         findings.summary(timing.camera.summary())
     _tell_oddities(session, experiment)
-    findings.plain(FILE, plain(limits_of(settings.within(session.study.wrist))))
-    findings.plain("data/camera_pose.json", {plane: pose and pose.plain() for plane, pose in experiment.poses.items()})
+    own = settings.rig is not None
+    findings.plain(FILE, plain(limits_of(settings.within(session.study.wrist)), own))
+    if not own:
+        findings.plain(
+            "data/camera_pose.json", {plane: pose and pose.plain() for plane, pose in experiment.poses.items()}
+        )
     if experiment.zero is not None:
         findings.plain("data/zero.json", experiment.zero.plain())
     if experiment.stop is None:
@@ -263,7 +267,7 @@ def _summarise(
         findings.summary(stop.reason)
         log.warning("%s", stop.reason)
         return
-    text = _last_second(trial_log).text()
+    text = _last_second(trial_log, settings.rig is not None).text()
     findings.summary(f"{stop.reason}\n\n```\n{text}\n```")
     log.warning("%s\n%s", stop.reason, text)
 
@@ -273,7 +277,7 @@ def _tell_oddities(session: Session, experiment: Experiment | RigExperiment) -> 
     findings, most = session.findings, experiment.most
     parts = []
     for name, unit, limit, *_ in limits_of(session.study.hw_run.within(session.study.wrist)):
-        line = RESIDUALS[name]
+        line = residual(name, session.study.hw_run.rig is not None)
         if math.isfinite(limit) and limit > 0.0 and name in most:
             meaning = f"{line.meaning}; limit {limit:.4g} {unit}"
             findings.metric(f"greatest_{name}", most[name], unit, "lower", meaning=meaning)
@@ -288,16 +292,17 @@ def _tell_oddities(session: Session, experiment: Experiment | RigExperiment) -> 
             findings.summary(text)
 
 
-def _last_second(trial_log: TrialLog) -> Table:
+def _last_second(trial_log: TrialLog, own: bool) -> Table:
     """The last second of ticks, every tenth of it."""
     rows = list(trial_log.last)
     shown = rows[:: -max(1, len(rows) // 10)][::-1]
     angles = {"theta": "theta [deg]", "theta_ref": "reference [deg]"}
-    verdicts = {"verdict": "marker"}
+    seen = "look" if own else "marker"
+    verdicts = {"verdict": seen}
     if shown and "bend_ulnar" in shown[0]:
         both = {"bend": "", "bend_ref": "wanted "}
         angles = {f"{name}_{plane}": f"{word}{plane} [deg]" for name, word in both.items() for plane in PLANES}
-        verdicts = {f"verdict_{plane}": f"{plane} marker" for plane in PLANES}
+        verdicts = {f"verdict_{plane}": f"{plane} {seen}" for plane in PLANES}
     pulls = {name: f"T{name.removeprefix('tension_')} [N]" for name in shown[0] if name.startswith("tension_")}
     columns = ("time [s]", *angles.values(), *verdicts.values(), *pulls.values(), "state")
     cells = [
