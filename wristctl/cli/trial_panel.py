@@ -46,7 +46,7 @@ class _Panel:
             own = {key.removeprefix(f"{name}_"): value for key, value in row.items() if key.startswith(f"{name}_")}
             values = (f"{tendon}: {value:6.1f}" for tendon, value in own.items())
             grid.add_row(name, *values, unit)
-        grid.add_row("board", row["state"], "marker", self._verdict, "late", f"{max(0.0, 1e3 * row['late']):.2f} ms")
+        grid.add_row("motors", row["state"], "seen", self._verdict, "late", f"{max(0.0, 1e3 * row['late']):.2f} ms")
         grid.add_row("time", f"{row['time']:.2f} s")
         title = "between trials" if number < 0 else _title(self._trials[number], len(self._trials))
         layout = Grid.grid()

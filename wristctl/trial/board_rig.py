@@ -78,7 +78,9 @@ class BoardRig:
         self.facts = facts_of(settings, wrist)
         self.clock = _Clock(testbed.transport, virtual)
         self._testbed, self._settings, self._board = testbed, settings, Board(testbed.transport)
-        self._bend, self._times = np.full(settings.planes, np.nan), np.full(settings.planes, -math.inf)
+        self._seen: list[list[tuple[float, float]]] = [[] for _ in range(settings.planes)]
+        self._news = [-math.inf] * settings.planes
+        self._look: Look | None = None
         self._tracking: Tracking | None = None
 
     def connect(self) -> Array:
@@ -107,14 +109,23 @@ class BoardRig:
         return np.rint(targets)
 
     def look(self) -> Look:
-        """The bend of each plane by its newest usable picture, and the time of the older of these."""
+        """The bend of each plane when the older of the cameras' newest usable pictures was taken.
+
+        It is news once every camera has a picture that is. The bend of the newer one is taken between its last two.
+        """
         assert self._tracking is not None
         for sighting in self._tracking.look():
             if math.isfinite(sighting.theta):
-                self._bend[sighting.plane] = bend_of(self._tracking, sighting, np.nan_to_num(self._bend))
-                self._times[sighting.plane] = sighting.time
-        oldest = float(self._times.min())
-        return Look(self._bend.copy(), oldest if math.isfinite(oldest) else self.clock.now())
+                newest = np.array([seen[-1][1] if seen else 0.0 for seen in self._seen])
+                bend = bend_of(self._tracking, sighting, newest)
+                self._seen[sighting.plane] = [*self._seen[sighting.plane][-1:], (sighting.time, bend)]
+        newest_times = [seen[-1][0] if seen else -math.inf for seen in self._seen]
+        time = min(newest_times)
+        is_news = all(new > old for new, old in zip(newest_times, self._news, strict=True))
+        if is_news and all(seen[0][0] <= time for seen in self._seen):
+            bends = [float(np.interp(time, [at for at, _ in seen], [bend for _, bend in seen])) for seen in self._seen]
+            self._look, self._news = Look(np.array(bends), time), newest_times
+        return self._look or Look(np.full(len(self._seen), np.nan), self.clock.now())
 
     def stop(self) -> None:
         """Stop the axes, by a ramp or at once. Raises Lost where they cannot be seen to stand."""

@@ -146,10 +146,13 @@ class CameraRecord:
         return len(self._repeated.values(clock))
 
     def unseen(self, clock: float, since: float, sensor: Sensor) -> float:
-        """Share of the expected usable angles that did not come, `since` seconds after the loop began; nan at first."""
+        """Share of the expected usable angles that did not come, `since` seconds after the loop began; nan at first.
+
+        None are missing where more come than are expected.
+        """
         usable = len(self._usable.values(clock))
         expected = min(since, _SEEN) * sensor.frame_rate * (1.0 - sensor.dropped)
-        return 1.0 - (usable + 1.0) / expected if since > 0.5 * _SEEN else math.nan
+        return max(0.0, 1.0 - (usable + 1.0) / expected) if since > 0.5 * _SEEN else math.nan
 
 
 def jump_between(one: Frame, two: Frame) -> float:
