@@ -82,10 +82,10 @@ def test_the_panel_tells_the_newest_angle_and_verdict_and_counts_the_trials_that
         take(row(0, 11.0, "ok"))
         take(row(0, 12.0))  # a tick between two frames
         shown = screen.panel("12.00 deg")
-        assert "trial 1 of 2: ulnar" in shown and re.search(r"marker +ok", shown) and "━" not in shown
+        assert "trial 1 of 2: ulnar" in shown and re.search(r"seen +ok", shown) and "━" not in shown
         take(row(-1, 3.0, "no tip"))
         shown = screen.panel("3.00 deg")
-        assert "between trials" in shown and re.search(r"marker +no tip", shown) and shown.count("━") == 30
+        assert "between trials" in shown and re.search(r"seen +no tip", shown) and shown.count("━") == 30
         take(row(1, -4.0))
         assert "trial 2 of 2: radial, pushed with 2 N" in screen.panel("-4.00 deg")
         take(row(-1, -1.0))
