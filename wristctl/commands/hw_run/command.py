@@ -19,6 +19,7 @@ from wristctl.commands.inputs_of_loops import (
     network_for,
     tuned_gains,
 )
+from wristctl.commands.live_record import check_live, with_record
 from wristctl.commands.loop_warnings import (
     outside_conditions,
     warn_of_earlier_families,
@@ -73,15 +74,18 @@ class Performed(StudyResult):
 
 def plan(study: Study, inputs: Inputs) -> str:
     """Check controllers and gains and say what would be done; opens nothing."""
+    from wristctl.simulation.live_reference import is_live
+
     settings, tuned = study.hw_run, tuned_gains(inputs)
     for number, row in enumerate(settings.rows):
         with under(f"hw-run.controllers.{number}"):
             check_row(row, tuned)
     known = identified(study, "hw-run", inputs).wrist
     with under("hw-run"):
-        if settings.planes == 1:
+        check_live(settings.reference, [row.controller for row in settings.rows], known, settings.control_period)
+        if settings.planes == 1 and not is_live(settings.reference):
             check_reach([settings.reference], _in_its_plane(settings, known), "reference")
-        else:
+        elif settings.planes == 2:
             check_bends_of_trials(settings, known)
         check_inverses(inverses_of([settings.reference]), inputs)
     pushes = settings.without_push + (settings.push.force != 0.0)
@@ -145,6 +149,7 @@ def hw_run(session: Session) -> Performed | PerformedBends:
             session.operator.dare("; ".join(swinging))
     limited_session = _limited(identified_session, network, tuned)
     trials = perform_trials(limited_session, bench, network, tuned)
+    identified_session = with_record(identified_session)
     if believed.planes == 2:
         performed = bends_performed(identified_session, trials, tuned)
         return replace(performed, study=study)
