@@ -16,6 +16,7 @@ from wristctl.config.loop import LIVE, Reference
 from wristctl.config.section import Parameter
 from wristctl.config.wrist import WristParameters
 from wristctl.errors import UserError
+from wristctl.records.formats import read_table
 from wristctl.simulation.reference import ReferenceKind
 
 # Columns of a record beside its time: bend, rate and acceleration in one plane; in two each with the plane's name.
@@ -149,12 +150,9 @@ def followed_bends(reference: Reference, planes: int, time: Array) -> Array:
 
 def _read(file: Path, planes: int) -> tuple[Array, Array]:
     """Times (T,) and rows (P, 3, T) of a record."""
-    import pandas as pd
-
     names = FOLLOWED if planes == 1 else IN_TWO_PLANES
     try:
-        table = pd.read_csv(file, float_precision="round_trip")
-        values = table[["time", *names]].to_numpy(float)
+        values = read_table(file)[["time", *names]].to_numpy(float)
     except KeyError:
         problem = f"no record of a live reference in {'one plane' if planes == 1 else 'two planes'}"
         fix = f"data/reference.csv of a run in as many planes, with time, {', '.join(names)}"

@@ -85,14 +85,15 @@ class WantedBends:
     def _bend_of(self, data: bytes, sender: Any) -> Array:
         if self._speaks and sender != self._sender:
             raise _Refused("other sender")
-        bend, seq, when = self._parsed(data)
-        if not (np.isfinite(bend).all() and (when is None or math.isfinite(when))):
+        sent, seq, when = self._parsed(data)
+        if not (np.isfinite(sent).all() and (when is None or math.isfinite(when))):
             raise _Refused("not finite")
         if (seq is not None and self._seq is not None and seq <= self._seq) or (
             when is not None and self._time is not None and when < self._time
         ):
             raise _Refused("old")
         self._seq, self._time = (seq if seq is not None else self._seq), (when if when is not None else self._time)
+        bend = sent if len(sent) == self._planes else sent[self._component :][:1]
         if np.hypot.reduce(bend) > self._limits.range:
             raise _Refused("out of range")
         if self._speaks and self._far(bend, self.wanted) and self._far(bend, self._unconfirmed):
@@ -105,7 +106,7 @@ class WantedBends:
         return other is None or float(np.hypot.reduce(bend - other)) > self._limits.jump
 
     def _parsed(self, data: bytes) -> tuple[Array, int | None, float | None]:
-        """Bend (P,) [rad], seq and t of a datagram."""
+        """Bend, one number or a pair [rad], seq and t of a datagram."""
         if len(data) > _LONGEST:
             raise _Refused("malformed")
         try:
@@ -119,10 +120,7 @@ class WantedBends:
         single = self._planes == 1 and not isinstance(given, list)
         if len(numbers) != (1 if single else 2) or (seq is not None and type(seq) is not int):
             raise _Refused("malformed")
-        bend = np.radians([_number(each) for each in numbers])
-        if self._planes == 1 and not single:
-            bend = bend[self._component :][:1]
-        return bend, seq, None if when is None else _number(when)
+        return np.radians([_number(each) for each in numbers]), seq, None if when is None else _number(when)
 
 
 def _number(given: Any) -> float:
