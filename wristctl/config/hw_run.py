@@ -9,7 +9,7 @@ from wristctl.config.bench import BenchSettings
 from wristctl.config.camera import Device, Gates, Markers
 from wristctl.config.choices import RIGS
 from wristctl.config.controller_row import GAINS, GainsChoice, Row
-from wristctl.config.loop import LIVE, TICK, DirectionName, Loop, Reference
+from wristctl.config.loop import TICK, DirectionName, Loop, Reference, comes_live
 from wristctl.config.plant import Actuator, Plant, Push, Sensor, TrueActuator, TrueSensor, TrueWrist
 from wristctl.config.section import OneOf, Section, choice, quantity, seldom
 from wristctl.config.wrist import WristParameters
@@ -280,27 +280,19 @@ class HwRunSettings(RigSettings):
 
     @model_validator(mode="before")
     @classmethod
-    def _one_live_trial(cls, given: Any) -> Any:
+    def _toward_one_side(cls, given: Any) -> Any:
         """Settings with one direction and no push, where a live reference is given and these are not."""
-        reference = given.get("reference") if isinstance(given, Mapping) else None
-        if isinstance(reference, Reference):
-            live = reference.kind == LIVE and reference.file is None
-        else:
-            live = isinstance(reference, Mapping) and reference.get("kind") == LIVE and reference.get("file") is None
+        live = isinstance(given, Mapping) and comes_live(given.get("reference"))
         return {"directions": ("ulnar",), "push": {"force": 0.0}, **given} if live else given
 
     @model_validator(mode="after")
     def _live_by_the_wall_clock(self) -> Self:
-        if self.reference.kind != LIVE or self.reference.file is not None:
-            return self
-        pushes = self.without_push + (self.push.force != 0.0)
-        trials = len(self.rows) * len(set(self.directions)) * self.repetitions * pushes
-        if trials != 1:
-            raise Unfitting(
-                f"a live reference is followed in one trial, and these settings have {trials}",
-                "one controller, direction and repetition; others follow its record (reference.file)",
-            )
-        if self.port is None and self.rig is None and not self.real_time:
+        trials = len(self.rows) * len(set(self.directions)) * self.repetitions
+        trials *= self.without_push + (self.push.force != 0.0)
+        if self.reference.is_live and trials != 1:
+            fix = "one controller, direction and repetition; others follow its record (reference.file)"
+            raise Unfitting(f"a live reference is followed in one trial, and these settings have {trials}", fix)
+        if self.reference.is_live and self.port is None and self.rig is None and not self.real_time:
             raise Unfitting("a live reference comes by the wall clock, and this bench has virtual time", "--real-time")
         return self
 

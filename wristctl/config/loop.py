@@ -149,6 +149,11 @@ class Reference(OpenSection):
     )
 
     @property
+    def is_live(self) -> bool:
+        """Whether it comes while the loop runs: it is live, and no record of one."""
+        return self.kind == LIVE and self.file is None
+
+    @property
     def end_deg(self) -> float:
         """The wanted angle at the end [deg], where it is no tip."""
         return 30.0 if self.angle_deg is None else self.angle_deg
@@ -202,6 +207,13 @@ class Reference(OpenSection):
         if self.listen is not None and (self.kind != LIVE or self.file is not None):
             raise ValueError("listen is of kind: live without a file, and this reference listens to nobody")
         return self
+
+
+def comes_live(given: Any) -> bool:
+    """Whether a reference, as a section or as a study has it, comes while the loop runs."""
+    if isinstance(given, Mapping):
+        return (given.get("kind"), given.get("file")) == (LIVE, None)
+    return isinstance(given, Reference) and given.is_live
 
 
 class Scenario(Section):

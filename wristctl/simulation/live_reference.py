@@ -105,14 +105,9 @@ def _capped(vector: Array, most: float) -> Array:
     return vector if size <= most else most / size * vector
 
 
-def is_live(reference: Reference) -> bool:
-    """Whether it comes while the loop runs: it is live, and no record of one."""
-    return reference.kind == LIVE and reference.file is None
-
-
 def recorded(reference: Reference, record: Path) -> Reference:
     """The reference with this record in place of what comes; one that is not live as it is."""
-    return reference.model_copy(update={"file": str(record), "listen": None}) if is_live(reference) else reference
+    return reference.model_copy(update={"file": str(record), "listen": None}) if reference.is_live else reference
 
 
 def check_law(reference: Reference, name: str, preview: int) -> None:

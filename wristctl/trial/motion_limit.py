@@ -9,7 +9,6 @@ from collections.abc import Mapping, Sequence
 
 from wristctl.config.plant import Plant
 from wristctl.config.study import Study
-from wristctl.simulation.live_reference import is_live
 from wristctl.trial.rig_belief import layout_of_rig
 from wristctl.trial.rig_settings import share_of_pair
 from wristctl.trial.trial_results import twin
@@ -29,7 +28,7 @@ def peak_tension(
     Infinite where a simulation fails, and of a live reference: nothing then says what the motion needs.
     """
     settings, peaks = study.hw_run, list[float]()
-    if is_live(settings.reference):
+    if settings.reference.is_live:
         return math.inf
     different = {(trial.direction, trial.push, trial.row): trial for trial in trials}
     for payload in dict.fromkeys((0.0, settings.payload)):  # an upright wrist needs less with one

@@ -9,7 +9,6 @@ from wristctl.config.hw_run import HwRunSettings
 from wristctl.config.loop import LIVE, DirectionName
 from wristctl.config.wrist import WristParameters
 from wristctl.errors import UserError
-from wristctl.simulation.live_reference import is_live
 from wristctl.simulation.motion import DERIVATIVES, Angles, Motion, resting
 from wristctl.simulation.planes import motion_in, within
 from wristctl.simulation.reference import REFERENCES, motion
@@ -33,7 +32,7 @@ def motion_of(
     A live reference rests until it comes. Raises UserError for one out of reach.
     """
     reference, horizon, period = settings.reference, settings.horizon, settings.control_period
-    if is_live(reference):
+    if reference.is_live:
         return resting(np.zeros(settings.planes), round(horizon / period), period)
     if settings.planes == 1:
         way = cast(DirectionName, direction)

@@ -74,8 +74,6 @@ class Performed(StudyResult):
 
 def plan(study: Study, inputs: Inputs) -> str:
     """Check controllers and gains and say what would be done; opens nothing."""
-    from wristctl.simulation.live_reference import is_live
-
     settings, tuned = study.hw_run, tuned_gains(inputs)
     for number, row in enumerate(settings.rows):
         with under(f"hw-run.controllers.{number}"):
@@ -83,7 +81,7 @@ def plan(study: Study, inputs: Inputs) -> str:
     known = identified(study, "hw-run", inputs).wrist
     with under("hw-run"):
         check_live(settings.reference, [row.controller for row in settings.rows], known, settings.control_period)
-        if settings.planes == 1 and not is_live(settings.reference):
+        if settings.planes == 1 and not settings.reference.is_live:
             check_reach([settings.reference], _in_its_plane(settings, known), "reference")
         elif settings.planes == 2:
             check_bends_of_trials(settings, known)
@@ -175,6 +173,11 @@ def _limited(session: Session, network: Inverse | None, tuned: Gains | None) -> 
         session.operator.tell(
             f"a tension beyond {most:.3g} N stops the motors: in simulation the trials need {peak:.2g} N{carried} "
             f"(hw-run.tension_factor: {factor:g}, hw-run.payload)"
+        )
+    elif study.hw_run.reference.is_live:
+        session.operator.tell(
+            f"a tension beyond {most:.3g} N stops the motors (hw-run.safety.tension): what a live reference needs nobody "
+            "knows beforehand"
         )
     return replace(session, study=changed)
 

@@ -18,7 +18,6 @@ from wristctl.config.wrist import WristParameters
 from wristctl.control.table import Gains
 from wristctl.errors import fix_of
 from wristctl.records import LiveRun
-from wristctl.simulation.live_reference import is_live
 from wristctl.simulation.metrics import METRICS, metrics_in
 from wristctl.trial.calibration import WristCalibration
 from wristctl.trial.experiment import Experiment, Stop
@@ -156,7 +155,7 @@ def _listening(session: Session, trials: list[Trial], rig: GuardedRig | None) ->
     A rig whose clock is virtual waits for the wall clock.
     """
     settings, wrist = session.study.hw_run, session.study.wrist
-    if not is_live(settings.reference):
+    if not settings.reference.is_live:
         return None
     plane, virtual = trials[0].plane or "ulnar", rig is not None and rig.virtual
     live = LiveReference(

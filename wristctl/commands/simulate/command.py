@@ -53,14 +53,13 @@ if TYPE_CHECKING:
 def plan(study: Study, inputs: Inputs) -> str:
     """Check the controller and its gains."""
     from wristctl.simulation.closed_loop import check_size
-    from wristctl.simulation.live_reference import is_live
 
     settings, known = study.simulate, identified(study, "simulate", inputs)
     planes = planes_of_simulation(known)
     with under("simulate"):
         check_row(settings, tuned_gains(inputs), inputs.runs().get("tuned"))
         check_live(settings.reference, [settings.controller], known.wrist, sample_period(settings.loop.control_period))
-        if not is_live(settings.reference):
+        if not settings.reference.is_live:
             check_motion(known, planes)
         check_inverses(inverses_of([settings.reference]), inputs)
         check_size(size(study), planes=planes)
