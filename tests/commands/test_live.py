@@ -97,8 +97,8 @@ def test_a_trial_follows_a_decoder_and_when_it_dies_the_wrist_stands_and_goes_ho
     for name in ("bend_ref_ulnar", "rate_ref_flexion", "acceleration_ref_ulnar"):
         np.testing.assert_array_equal(record[name].iloc[np.rint(log["time"] / 0.01).astype(int)], log[name])
     died = record["time"][record["state"] == "following"].iloc[-1] - 0.2
-    bend = np.degrees(log[["bend_ulnar", "bend_flexion"]])
+    bend = log[["bend_ulnar", "bend_flexion"]].apply(np.degrees)
     stands = (log["time"] > died + 0.5) & (log["time"] < died + 0.95)
     assert stands.sum() > 40 and np.ptp(bend[stands], axis=0).max() < 0.15
-    assert np.hypot(*bend.iloc[-1]) < 0.3
+    assert np.hypot(*bend.to_numpy()[-1]) < 0.3
     assert np.hypot(record["rate_ref_ulnar"], record["rate_ref_flexion"]).max() <= RATE * (1.0 + 1e-9)

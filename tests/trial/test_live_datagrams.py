@@ -282,7 +282,7 @@ def test_records_that_are_none_are_refused_with_their_line(stand: Callable[..., 
     rig.follow(lambda time: None)
     write_table(file, rig.live.record()[0])
     lines = file.read_text().splitlines()
-    again, time = recorded(rig.reference, file), np.arange(10) * PERIOD
+    again, time = recorded(rig.reference, file), PERIOD * np.arange(10, dtype=np.float64)
     for changed, message in (
         ([*lines[:6], lines[6].replace("0.05,0.0", "0.05,nan"), *lines[7:]], r"no number - .*reference.csv:7"),
         ([*lines[:6], *lines[7:]], r"one period apart - .*reference.csv:7"),

@@ -176,8 +176,8 @@ def _limited(session: Session, network: Inverse | None, tuned: Gains | None) -> 
         )
     elif study.hw_run.reference.is_live:
         session.operator.tell(
-            f"a tension beyond {most:.3g} N stops the motors (hw-run.safety.tension): what a live reference needs nobody "
-            "knows beforehand"
+            f"a tension beyond {most:.3g} N stops the motors (hw-run.safety.tension): no simulation says what a live "
+            "reference needs"
         )
     return replace(session, study=changed)
 
