@@ -69,7 +69,8 @@ class LiveLimits(NamedTuple):
 class LimitedReference:
     """Bend, rate and acceleration (P,) of the followed reference; it begins at rest and straight.
 
-    A move to the next sample has a constant acceleration.
+    A move to the next sample has a constant acceleration. Within the range of what was wanted it stays by itself: the
+    filter passes no bend that stands still, and is pulled less far by a nearer one.
     """
 
     def __init__(self, limits: LiveLimits, planes: int, period: float) -> None:
@@ -88,16 +89,9 @@ class LimitedReference:
         self._go(self.rate * (1.0 - change / speed) if speed > change else 0.0 * self.rate)
 
     def _go(self, rate: Array) -> None:
-        limits, size = self._limits, float(np.hypot.reduce(self.bend))
-        rate = _capped(rate, limits.rate)
-        if size > 0.0:  # it must be able to brake before its range ends
-            outward = float(rate @ self.bend) / size
-            excess = outward - max(0.0, limits.range - size) / limits.smoothing
-            if excess > 0.0:
-                rate = rate - excess / size * self.bend
-        moved = self.bend + 0.5 * self._period * (self.rate + rate)
-        self.acceleration = (rate - self.rate) / self._period
-        self.bend, self.rate = _capped(moved, limits.range), rate
+        rate = _capped(rate, self._limits.rate)
+        self.bend = self.bend + 0.5 * self._period * (self.rate + rate)
+        self.acceleration, self.rate = (rate - self.rate) / self._period, rate
 
 
 def _capped(vector: Array, most: float) -> Array:
