@@ -64,7 +64,7 @@ class Bench:
     odd: Mapping[int, str] = {}
 
     def __init__(self, settings: Any, wrist: Any, trials: Any, log: TrialLog, *others: Any) -> None:
-        assert others == (None, None, None, 4) and wrist.stiffness == 77.0
+        assert others == (None, None, None, 4, None) and wrist.stiffness == 77.0
         self.log, self.trials, self.timing = log, trials, TickTiming(settings.control_period, list(self.late), 7)
         self.motions = {"ulnar": motion_of(settings, wrist, "ulnar")}
         self.outcomes: dict[int, str] = {}

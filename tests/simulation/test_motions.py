@@ -26,7 +26,8 @@ WIDE = WRIST.model_copy(update={"range_deg": 70.0})
 TIME = np.arange(0.0, 3.0, 0.01)
 ANGLE = 20.0 * np.sin(2.0 * TIME) ** 2
 IN_ONE_PLANE = {kind: each for kind, each in REFERENCES.items() if each.planes == 1}
-OWN_COURSE = [kind for kind, each in IN_ONE_PLANE.items() if each.targets == "none" and kind != "recording"]
+FROM_FILES = ("recording", "live")
+OWN_COURSE = [kind for kind, each in IN_ONE_PLANE.items() if each.targets == "none" and kind not in FROM_FILES]
 SMOOTH = [kind for kind in OWN_COURSE if kind not in ("square", "limited-square", "random-steps")]
 
 
@@ -51,7 +52,7 @@ def recorded(file: Path, horizon: float = 3.0, **given: object) -> Motion:
     return motion(Reference.model_validate({"kind": "recording", "file": str(file), **given}), WRIST, horizon, 1e-3)
 
 
-@pytest.mark.parametrize("kind", [each for each in IN_ONE_PLANE if each != "recording"])
+@pytest.mark.parametrize("kind", [each for each in IN_ONE_PLANE if each not in FROM_FILES])
 def test_a_kind_of_reference_is_one_of_steps_where_its_angle_jumps(kind: str) -> None:
     """By more than a degree within a tenth of a millisecond, from rest at 0; on none of the others."""
     path: dict[str, object] = {"tips": ((0.078, 0.014), (0.079, 0.01)), "inverse": "closed-form"}

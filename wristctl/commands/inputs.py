@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from wristctl.commands.results import StudyResult
-from wristctl.config.loop import Reference
+from wristctl.config.loop import LIVE, Reference
 from wristctl.config.section import Section
 from wristctl.config.study import Study
 from wristctl.config.wrist import WristParameters
@@ -210,7 +210,7 @@ def check_motions(study: Study, command: str) -> None:
 
 def _recordings(section: Any) -> Iterator[Reference]:
     if isinstance(section, Reference):
-        if section.file:
+        if section.file and section.kind != LIVE:  # the record of a live one is checked where it is read
             yield section
     elif isinstance(section, Section):
         for name in type(section).model_fields:

@@ -156,6 +156,7 @@ REFERENCES: Choices[Any] = Choices(
         "ramp": "wristctl.simulation.excitations:RAMP",
         "random-steps": "wristctl.simulation.excitations:RANDOM_STEPS",
         "recording": "wristctl.simulation.recording:RECORDING",
+        "live": "wristctl.simulation.live_reference:LIVE_REFERENCE",
         "circle": "wristctl.simulation.bend_paths:CIRCLE",
         "figure-of-8": "wristctl.simulation.bend_paths:FIGURE_OF_8",
         "circumduction": "wristctl.simulation.bend_paths:CIRCUMDUCTION",

@@ -9,7 +9,7 @@ from wristctl.config.bench import BenchSettings
 from wristctl.config.camera import Device, Gates, Markers
 from wristctl.config.choices import RIGS
 from wristctl.config.controller_row import GAINS, GainsChoice, Row
-from wristctl.config.loop import TICK, DirectionName, Loop, Reference
+from wristctl.config.loop import TICK, DirectionName, Loop, Reference, comes_live
 from wristctl.config.plant import Actuator, Plant, Push, Sensor, TrueActuator, TrueSensor, TrueWrist
 from wristctl.config.section import OneOf, Section, choice, quantity, seldom
 from wristctl.config.wrist import WristParameters
@@ -277,6 +277,24 @@ class HwRunSettings(RigSettings):
     tuned: str | None = choice(None, "tune run behind gains: tuned")
     network: str | None = choice(None, "train run behind a reference with inverse: network")
     video: bool = choice(False, "keep the frames that were looked at as videos: raw, and with clock and marker angle")
+
+    @model_validator(mode="before")
+    @classmethod
+    def _toward_one_side(cls, given: Any) -> Any:
+        """Settings with one direction and no push, where a live reference is given and these are not."""
+        live = isinstance(given, Mapping) and comes_live(given.get("reference"))
+        return {"directions": ("ulnar",), "push": {"force": 0.0}, **given} if live else given
+
+    @model_validator(mode="after")
+    def _live_by_the_wall_clock(self) -> Self:
+        trials = len(self.rows) * len(set(self.directions)) * self.repetitions
+        trials *= self.without_push + (self.push.force != 0.0)
+        if self.reference.is_live and trials != 1:
+            fix = "one controller, direction and repetition; others follow its record (reference.file)"
+            raise Unfitting(f"a live reference is followed in one trial, and these settings have {trials}", fix)
+        if self.reference.is_live and self.port is None and self.rig is None and not self.real_time:
+            raise Unfitting("a live reference comes by the wall clock, and this bench has virtual time", "--real-time")
+        return self
 
     @property
     def planes_are_open(self) -> bool:

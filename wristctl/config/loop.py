@@ -30,6 +30,10 @@ MOST_SUBSTEPS = 1000
 STIFF = 50e3
 
 
+# Kind of reference whose wanted bends come while the loop runs.
+LIVE = "live"
+
+
 # Default tips of a tip-path, as multiples of the wrist's length.
 _TIP_RATIOS = ((0.975, 0.175), (0.95, 0.2625), (0.9875, -0.125), (0.95, 0.2625))
 
@@ -129,13 +133,25 @@ class Reference(OpenSection):
     )
     duration: float = quantity(1.0, "s", "duration of each minimum-jerk move or step", "assumed", gt=0)
     frequency: float = quantity(0.5, "1/s", "frequency of a sine, a chirp's at first", "assumed", gt=0)
-    file: str | None = given_file("recording: an open log (documentation: The open log)")
+    file: str | None = given_file("recording: an open log (documentation: The open log); live: the record of one")
     column: str | None = of_file("recording: name of the angle's column, or tip; by default angle, bend, theta, tip")
     columns: str | None = columns_of_file()
+    listen: str | None = seldom(
+        None,
+        "",
+        "live: HOST:PORT of the UDP socket; null: 127.0.0.1:5005. Another host than 127.0.0.1 lets other computers "
+        "move the wrist",
+        pattern=r"^(\[[0-9a-fA-F:.]+\]|[^:\s]+):\d{1,5}$",
+    )
     inverse: InverseName = choice(
         "none",
         "how wanted tips become reference angles: a network, one arc's closed-form inverse, or the angle itself",
     )
+
+    @property
+    def is_live(self) -> bool:
+        """Whether it comes while the loop runs: it is live, and no record of one."""
+        return self.kind == LIVE and self.file is None
 
     @property
     def end_deg(self) -> float:
@@ -186,9 +202,18 @@ class Reference(OpenSection):
             raise ValueError("give tips or tip_ratios, not both")
         if (self.tip is not None or self.kind == "tip-path") and self.inverse == "none":
             raise ValueError("a tip target needs inverse: network or closed-form")
-        if (self.kind == "recording") != (self.file is not None):
-            raise ValueError("kind: recording goes with its file, and no other kind does")
+        if (self.kind == "recording") != (self.file is not None) and self.kind != LIVE:
+            raise ValueError("kind: recording goes with its file, and no other kind but live does")
+        if self.listen is not None and (self.kind != LIVE or self.file is not None):
+            raise ValueError("listen is of kind: live without a file, and this reference listens to nobody")
         return self
+
+
+def comes_live(given: Any) -> bool:
+    """Whether a reference, as a section or as a study has it, comes while the loop runs."""
+    if isinstance(given, Mapping):
+        return (given.get("kind"), given.get("file")) == (LIVE, None)
+    return isinstance(given, Reference) and given.is_live
 
 
 class Scenario(Section):

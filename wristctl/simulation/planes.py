@@ -8,9 +8,10 @@ from typing import NamedTuple
 import numpy as np
 
 from wristctl.arrays import Array
-from wristctl.config.loop import DirectionName, Loop, Reference
+from wristctl.config.loop import LIVE, DirectionName, Loop, Reference
 from wristctl.config.wrist import WristParameters
 from wristctl.errors import UserError
+from wristctl.simulation.live_reference import followed_bends
 from wristctl.simulation.motion import Angles, Motion
 from wristctl.simulation.recording import recorded_bends
 from wristctl.simulation.reference import REFERENCES, by_angles, course_of, estimated, motion, toward
@@ -130,6 +131,8 @@ def bends_of(
     time = np.arange(round(horizon / period), dtype=np.float64) * period
     if kind.planes == 2:
         return within(course_of(reference, kind, time), wrist)
+    if reference.kind == LIVE:
+        return within(followed_bends(reference, 2, time), wrist)
     if reference.file:
         return within(recorded_bends(reference, wrist, time), wrist)
     aim = DIRECTIONS[direction]

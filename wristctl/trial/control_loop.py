@@ -20,6 +20,7 @@ from wristctl.control.response import Estimate
 from wristctl.errors import UserError
 from wristctl.simulation.motion import DERIVATIVES, Motion
 from wristctl.trial.drives import LoopDrive
+from wristctl.trial.live_datagrams import LiveReference
 from wristctl.trial.log import TrialLog, column_of, of_planes, of_tendons
 from wristctl.trial.rig_belief import RigBelief, names_of_planes, numbers_of
 from wristctl.trial.safety import SafetyStop
@@ -51,6 +52,8 @@ class Task(NamedTuple):
     begin: float
     """When it begins, on the clock."""
     faults: HostFaults
+    live: LiveReference | None = None
+    """Reference that fills the course while it comes."""
 
 
 def course_of(motion: Motion) -> Array:
@@ -88,20 +91,22 @@ class ControlLoop:
 
     def follow(
         self, motion: Motion, controller: Controller, gains: Sequence[float], trial: int = -1,
-        faults: HostFaults | None = None, pushed: bool = False,
+        faults: HostFaults | None = None, pushed: bool = False, live: LiveReference | None = None,
     ) -> None:  # fmt: skip
         """Follow a motion sampled at the period; its ticks are logged under the number of the trial.
 
-        `pushed` says that a person pushes in it.
+        `pushed` says that a person pushes in it; a `live` reference takes the place of the motion's bends.
         At its end the motors stand, and the board has said so: that takes some ticks more, which belong to no trial.
         Raises SafetyStop, BoardError, CameraError, and OSError where the log cannot be written.
         """
         self._steering.use(controller, gains)
         self.watch.begin(pushed)
-        task = Task(motion, course_of(motion), trial, self.next_tick, faults or HostFaults(()))
+        task = Task(motion, course_of(motion), trial, self.next_tick, faults or HostFaults(()), live)
         first = self._steering.tick
         while (k := self._steering.tick - first) < len(motion.time):
             self._tick(task, k)
+        if live is not None:  # samples that a late loop has missed
+            live.fill(task.course, len(task.course) - 1)
         self._come_to_rest(task._replace(trial=-1))
 
     def patience(self, board: Board, signs: Sequence[int]) -> Patience:
@@ -123,6 +128,8 @@ class ControlLoop:
         asleep = drive.now() < self.next_tick
         drive.listen(self.next_tick)
         drive.wait_until(self.next_tick)
+        if task.live is not None and k is not None:
+            task.live.fill(task.course, k)
         woken = drive.now() - self.next_tick if asleep else 0.0
         clock, due = drive.now(), self.next_tick
         marker = self._look(task)
@@ -203,7 +210,7 @@ class ControlLoop:
             "bend_ref": reference[0],
             "rate_ref": reference[1],
             "acceleration_ref": reference[2],
-            "bend_desired": task.motion.bend_desired[last],
+            "bend_desired": task.motion.bend_desired[last] if task.live is None else reference[0],
             "error": estimate.theta - reference[0],
             "torque_wanted": unknown if answer is None else answer.torque_wanted,
             "torque": unknown if answer is None else answer.torque,

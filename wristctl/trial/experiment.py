@@ -20,6 +20,7 @@ from wristctl.trial.control_loop import ControlLoop, Shown, course_of
 from wristctl.trial.drives import BoardDrive
 from wristctl.trial.expected_moves import ExpectedMoves
 from wristctl.trial.homing import Zero, find_zero, slacken
+from wristctl.trial.live_datagrams import LiveReference
 from wristctl.trial.log import TrialLog
 from wristctl.trial.motions import back, motion_of
 from wristctl.trial.motors_ready import Halt, halt, prepare
@@ -81,9 +82,10 @@ class Experiment:
     def __init__(
         self, settings: HwRunSettings, wrist: WristParameters, trials: Sequence[Trial], kept: TrialLog,
         network: Inverse | None = None, tuned: Mapping[str, Mapping[str, float]] | None = None,
-        calibration: WristCalibration | None = None, seed: int = 0,
+        calibration: WristCalibration | None = None, seed: int = 0, live: LiveReference | None = None,
     ) -> None:  # fmt: skip
         settings = settings.within(wrist)
+        self._live, self._asked = live, wrist
         self._settings, self._wrist, self._trials, self._log = settings, spared(wrist, settings), trials, kept
         self._pulls = tendon_pulls_of(settings)
         self._calibration, self._draws = calibration, Draws(seed, "bench")
@@ -126,6 +128,10 @@ class Experiment:
                 board.close()
         finally:
             testbed.close()
+
+    def replay(self, settings: HwRunSettings) -> None:
+        """Judge the trials by motions of these settings: those of a live reference are known afterwards."""
+        self.motions = {name: motion_of(settings, self._asked, name) for name in motions_of(settings)}
 
     def _warm_up(self) -> None:
         """Have everything compiled or loaded before the first motor is on: from then on the board wants to be fed."""
@@ -248,13 +254,14 @@ class Experiment:
         )
         faults = HostFaults(settings.bench.faults) if testbed.emulated else None
         try:
-            loop.follow(followed, law, gains, trial.number, faults, pushed=trial.push != 0.0)
+            loop.follow(followed, law, gains, trial.number, faults, trial.push != 0.0, self._live)
         finally:
             self.most = {name: max(value, self.most.get(name, 0.0)) for name, value in loop.watch.most.items()}
             self.odd[trial.number] = loop.watch.words()
         self._trial_ended(testbed, "ok")
         self._in_doubt = trial.number
-        loop.follow(back(followed.final, settings.back, 0.0, settings.control_period, settings.planes), self._back, ())
+        final = followed.final if self._live is None else self._live.bend
+        loop.follow(back(final, settings.back, 0.0, settings.control_period, settings.planes), self._back, ())
 
     def _trial_ended(self, testbed: Testbed, outcome: str) -> None:
         if self._under_way is not None:

@@ -25,9 +25,11 @@ def peak_tension(
 ) -> float:  # fmt: skip
     """Largest tension [N] of a tendon over these trials, simulated on the believed wrist with and without its payload.
 
-    Infinite where a simulation fails: it then says nothing of what the motion needs.
+    Infinite where a simulation fails, and of a live reference: nothing then says what the motion needs.
     """
-    settings, peaks = study.hw_run, []
+    settings, peaks = study.hw_run, list[float]()
+    if settings.reference.is_live:
+        return math.inf
     different = {(trial.direction, trial.push, trial.row): trial for trial in trials}
     for payload in dict.fromkeys((0.0, settings.payload)):  # an upright wrist needs less with one
         loop = settings.known_loop.model_copy(update={"plant": Plant(payload=payload)})

@@ -6,10 +6,10 @@ import numpy as np
 
 from wristctl.arrays import Array
 from wristctl.config.hw_run import HwRunSettings
-from wristctl.config.loop import DirectionName
+from wristctl.config.loop import LIVE, DirectionName
 from wristctl.config.wrist import WristParameters
 from wristctl.errors import UserError
-from wristctl.simulation.motion import DERIVATIVES, Angles, Motion
+from wristctl.simulation.motion import DERIVATIVES, Angles, Motion, resting
 from wristctl.simulation.planes import motion_in, within
 from wristctl.simulation.reference import REFERENCES, motion
 from wristctl.simulation.references import minimum_jerk
@@ -20,7 +20,8 @@ from wristctl.wrist.kinematics import Inverse
 
 def has_path(settings: HwRunSettings) -> bool:
     """Whether the reference is a path in two planes of its own, and no motion toward a direction."""
-    return REFERENCES[settings.reference.kind].planes == 2 or settings.reference.file is not None
+    reference = settings.reference
+    return REFERENCES[reference.kind].planes == 2 or reference.file is not None or reference.kind == LIVE
 
 
 def motion_of(
@@ -28,9 +29,11 @@ def motion_of(
 ) -> Motion:
     """A trial's motion in this direction, or along the reference's own path in two planes, at every tick.
 
-    Raises UserError for one out of reach.
+    A live reference rests until it comes. Raises UserError for one out of reach.
     """
     reference, horizon, period = settings.reference, settings.horizon, settings.control_period
+    if reference.is_live:
+        return resting(np.zeros(settings.planes), round(horizon / period), period)
     if settings.planes == 1:
         way = cast(DirectionName, direction)
         found = motion_in(1, reference, way, in_plane(wrist, way), horizon, period, network)

@@ -15,6 +15,7 @@ from wristctl.simulation.motion import Motion
 from wristctl.trial.control_loop import ControlLoop, Shown, course_of
 from wristctl.trial.experiment import Stop, cause_of, spared
 from wristctl.trial.guarded_rig import GuardedRig
+from wristctl.trial.live_datagrams import LiveReference
 from wristctl.trial.log import TrialLog
 from wristctl.trial.motions import back, motion_of
 from wristctl.trial.motors_ready import Halt
@@ -76,10 +77,12 @@ class RigExperiment:
     def __init__(
         self, settings: HwRunSettings, wrist: WristParameters, trials: Sequence[Trial], kept: TrialLog,
         network: Inverse | None = None, tuned: Mapping[str, Mapping[str, float]] | None = None,
+        live: LiveReference | None = None,
     ) -> None:  # fmt: skip
         settings = settings.within(wrist)
         layout = layout_of_rig(settings, wrist)
         assert layout is not None
+        self._live = live
         self._settings, self._wrist, self._layout = settings, spared(wrist, settings), layout
         self._trials, self._log = trials, kept
         chosen = [(controller(row.controller), row.gains) for row in settings.rows]
@@ -102,6 +105,10 @@ class RigExperiment:
     def _facing(self) -> WristParameters:
         """The wrist as the loop knows it."""
         return self._wrist if self._settings.planes == 2 else sides_of(self._wrist, self._layout)
+
+    def replay(self, settings: HwRunSettings) -> None:
+        """Judge the trials by motions of these settings: those of a live reference are known afterwards."""
+        self.motions = {name: motion_of(settings, self._facing, name) for name in motions_of(settings)}
 
     def run(self, rig: GuardedRig, shown: Shown | None = None, confirm: Callable[[], None] | None = None) -> None:
         """Do all trials and close the rig. Whatever ends them early, the rig is stopped before it is raised.
@@ -179,12 +186,13 @@ class RigExperiment:
         law, gains = self._laws[trial.row]
         self._under_way, self.outcomes[trial.number] = (trial.number, start), "begun"
         try:
-            loop.follow(followed, law, gains, trial.number, pushed=trial.push != 0.0)
+            loop.follow(followed, law, gains, trial.number, pushed=trial.push != 0.0, live=self._live)
         finally:
             self.most = {name: max(size, self.most.get(name, 0.0)) for name, size in loop.watch.most.items()}
             self.odd[trial.number] = loop.watch.words()
         self.outcomes[trial.number], self._under_way, self._in_doubt = "ok", None, trial.number
-        loop.follow(self._to_rest(followed.final, settings.back, 0.0), self._back, ())
+        final = followed.final if self._live is None else self._live.bend
+        loop.follow(self._to_rest(final, settings.back, 0.0), self._back, ())
 
     def _stopped(self, rig: GuardedRig, error: BaseException) -> None:
         """Stop the rig, then note what happened."""

@@ -19,6 +19,7 @@ from wristctl.control.law import in_a_first_repetition
 from wristctl.control.table import controller, gains_of
 from wristctl.records import Run
 from wristctl.simulation.closed_loop import asked_of, repeat, scenario_of
+from wristctl.simulation.live_reference import recorded
 from wristctl.simulation.metrics import metrics_of, summed
 from wristctl.simulation.motion import Motion
 from wristctl.simulation.oscillation import oscillations
@@ -50,6 +51,8 @@ FURTHER: Mapping[str, tuple[str, str]] = {
     "true_recovery": ("s", "the same by the emulated wrist's true bend, from the true end of the push"),
     "push_torque": ("N m", "largest load torque of the push, as estimated; empty where the wrist moves meanwhile"),
 }
+# File of a run that has the live reference as it was followed.
+RECORD = "data/reference.csv"
 # Share of the largest bend within which an error is small.
 _BAND = 0.02
 # Seconds before the push over which the load is taken as quiet.
@@ -114,7 +117,9 @@ def first_course(run: Run) -> Trajectory | None:
     if done.empty:
         return None
     number, name = done.iloc[0]["trial"], str(done.iloc[0]["direction"])
-    followed = motion_of(run.config.hw_run, run.config.wrist, name)
+    settings = run.config.hw_run
+    reference = recorded(settings.reference, run.path / RECORD)
+    followed = motion_of(settings.model_copy(update={"reference": reference}), run.config.wrist, name)
     course = logged_course(log[log["trial"] == number], followed, run.config.wrist)
     if not run.has("data/truth.csv"):
         return course

@@ -21,6 +21,7 @@ from wristctl.cli.progress import listening, progress
 from wristctl.commands.printed_table import Table
 from wristctl.commands.procedure import inputs_of, procedure_of
 from wristctl.commands.progress import no_event
+from wristctl.config.loop import comes_live
 from wristctl.errors import UserError
 from wristctl.plain_files import UNREADABLE, unreadable
 from wristctl.plugins.places import check_trust
@@ -190,7 +191,14 @@ def _replay(run: Run, overrides: list[str], as_json: bool) -> None:
     inputs = inputs_of(run)
     check_trust(leaves_of(run), run.path / CONFIG)
     study, _ = read_study([run.path / CONFIG], overrides, run.kind, note=False)  # the repetition notes former names
-    if getattr(getattr(study, run.kind.replace("-", "_")), "port", None) is not None:
+    section = getattr(study, run.kind.replace("-", "_"))
+    if comes_live(getattr(section, "reference", None)):
+        from wristctl.trial.trial_results import RECORD
+
+        record = f"--set 'reference={{kind: live, file: {run.path / RECORD}}}'"
+        fix = f"follow its record: wristctl {command_of(run.kind)} --config {run.path / CONFIG} {record}"
+        raise UserError("nobody sends a live reference again", str(run.path), fix, exit_code=3)
+    if getattr(section, "port", None) is not None:
         fix = "look at it: wristctl runs report; or do the experiment anew by its own command, with a person at the rig"
         raise UserError("a repetition never moves real motors", str(run.path), fix, exit_code=3)
     for output in run.manifest.outputs:

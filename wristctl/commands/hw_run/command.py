@@ -19,6 +19,7 @@ from wristctl.commands.inputs_of_loops import (
     network_for,
     tuned_gains,
 )
+from wristctl.commands.live_record import check_live, with_record
 from wristctl.commands.loop_warnings import (
     outside_conditions,
     warn_of_earlier_families,
@@ -79,9 +80,10 @@ def plan(study: Study, inputs: Inputs) -> str:
             check_row(row, tuned)
     known = identified(study, "hw-run", inputs).wrist
     with under("hw-run"):
-        if settings.planes == 1:
+        check_live(settings.reference, [row.controller for row in settings.rows], known, settings.control_period)
+        if settings.planes == 1 and not settings.reference.is_live:
             check_reach([settings.reference], _in_its_plane(settings, known), "reference")
-        else:
+        elif settings.planes == 2:
             check_bends_of_trials(settings, known)
         check_inverses(inverses_of([settings.reference]), inputs)
     pushes = settings.without_push + (settings.push.force != 0.0)
@@ -145,6 +147,7 @@ def hw_run(session: Session) -> Performed | PerformedBends:
             session.operator.dare("; ".join(swinging))
     limited_session = _limited(identified_session, network, tuned)
     trials = perform_trials(limited_session, bench, network, tuned)
+    identified_session = with_record(identified_session)
     if believed.planes == 2:
         performed = bends_performed(identified_session, trials, tuned)
         return replace(performed, study=study)
@@ -170,6 +173,11 @@ def _limited(session: Session, network: Inverse | None, tuned: Gains | None) -> 
         session.operator.tell(
             f"a tension beyond {most:.3g} N stops the motors: in simulation the trials need {peak:.2g} N{carried} "
             f"(hw-run.tension_factor: {factor:g}, hw-run.payload)"
+        )
+    elif study.hw_run.reference.is_live:
+        session.operator.tell(
+            f"a tension beyond {most:.3g} N stops the motors (hw-run.safety.tension): no simulation says what a live "
+            "reference needs"
         )
     return replace(session, study=changed)
 

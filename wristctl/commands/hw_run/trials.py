@@ -8,6 +8,7 @@ import cv2
 import numpy as np
 import pandas as pd
 
+from wristctl.commands.live_record import keep_live, tell_address, with_record
 from wristctl.commands.printed_table import Table, degrees
 from wristctl.commands.rig_description import coming_first
 from wristctl.commands.session import Session
@@ -21,6 +22,7 @@ from wristctl.simulation.metrics import METRICS, metrics_in
 from wristctl.trial.calibration import WristCalibration
 from wristctl.trial.experiment import Experiment, Stop
 from wristctl.trial.guarded_rig import GuardedRig
+from wristctl.trial.live_datagrams import LiveReference
 from wristctl.trial.log import TrialLog
 from wristctl.trial.residuals import FILE, limits_of, plain, residual
 from wristctl.trial.rig_belief import PLANES, layout_of_rig, numbers_of
@@ -99,14 +101,20 @@ def perform_trials(
         folder, coordinates, settings.control_period, monotonic, weighed, settings.planes, tendons, rig is None
     )
     experiment: Experiment | RigExperiment
+    live: LiveReference | None = None
     try:
+        live = _listening(session, trials, rig)
         if rig is not None:
-            experiment = RigExperiment(settings, study.wrist, trials, trial_log, network, tuned)
+            experiment = RigExperiment(settings, study.wrist, trials, trial_log, network, tuned, live)
         else:
-            experiment = Experiment(settings, study.wrist, trials, trial_log, network, tuned, calibration, study.seed)
+            experiment = Experiment(
+                settings, study.wrist, trials, trial_log, network, tuned, calibration, study.seed, live
+            )
         films = _films(run, settings) if rig is None else []
     except BaseException:
         trial_log.close()
+        if live is not None:
+            live.close()
         raise
     stopped: BaseException | None = None
     try:
@@ -128,11 +136,33 @@ def perform_trials(
         run.columns(f"data/raw{_number(number)}.csv", RAW)
     for name, stream in trial_log.streams.items():
         run.columns(f"data/{name}.csv", stream.columns)
+    if live is not None:
+        live.close()
+        keep_live(session.findings, live)
+        session.operator.tell(live.said())
+        if live.filled > 1:
+            experiment.replay(with_record(session).study.hw_run)
     table = _evaluate(run, settings, study.wrist, experiment, trials)
     _summarise(session, experiment, trial_log, table, len(trials))
     if stopped is not None:
         raise stopped
     return table
+
+
+def _listening(session: Session, trials: list[Trial], rig: GuardedRig | None) -> LiveReference | None:
+    """The live reference of trials, at its socket before any motor moves; None where there is none.
+
+    A rig whose clock is virtual waits for the wall clock.
+    """
+    settings, wrist = session.study.hw_run, session.study.wrist
+    if not settings.reference.is_live:
+        return None
+    plane, virtual = trials[0].plane or "ulnar", rig is not None and rig.virtual
+    live = LiveReference(
+        settings.reference, wrist, settings.planes, plane, settings.horizon, settings.control_period, paced=virtual
+    )
+    tell_address(session, live)
+    return live
 
 
 def _perform(

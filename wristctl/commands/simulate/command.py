@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import shlex
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING
 
@@ -22,6 +23,7 @@ from wristctl.commands.inputs_of_loops import (
     wrist_identified,
 )
 from wristctl.commands.kept_studies import asked_for, keep_study
+from wristctl.commands.live_record import check_live, listened
 from wristctl.commands.loop_warnings import (
     OutOfReach,
     asked_by,
@@ -37,6 +39,7 @@ from wristctl.commands.session import Session
 from wristctl.commands.simulate.results import Simulated, metrics_table, trajectory_table
 from wristctl.commands.sweep.command import sweepable
 from wristctl.config.choices import REFERENCES
+from wristctl.config.loop import sample_period
 from wristctl.config.study import Study
 from wristctl.errors import under
 
@@ -55,7 +58,9 @@ def plan(study: Study, inputs: Inputs) -> str:
     planes = planes_of_simulation(known)
     with under("simulate"):
         check_row(settings, tuned_gains(inputs), inputs.runs().get("tuned"))
-        check_motion(known, planes)
+        check_live(settings.reference, [settings.controller], known.wrist, sample_period(settings.loop.control_period))
+        if not settings.reference.is_live:
+            check_motion(known, planes)
         check_inverses(inverses_of([settings.reference]), inputs)
         check_size(size(study), planes=planes)
     return _in_words(study, " in two planes" * (planes == 2), known.wrist)
@@ -89,6 +94,7 @@ def simulate(session: Session) -> Simulated:
     from wristctl.simulation.metrics import metrics_in
     from wristctl.simulation.worlds import Draws
 
+    asked, session = session.study, replace(session, study=listened(session))
     study, findings = identified(session.study, "simulate", session.inputs), session.findings
     settings, wrist, planes = study.simulate, study.wrist, planes_of_simulation(study)
     warn_if_it_buckles(findings, wrist, [settings.loop], planes)
@@ -117,7 +123,7 @@ def simulate(session: Session) -> Simulated:
     arrives = repeated.failed.any() or repeated.arrives
     short_of, advice = ("", []) if arrives else _short_of(session, study, repeated, network, beyond)
     words = wrist_identified(session.inputs)
-    return Simulated(session.study, findings, tables, repeated, short_of, advice, study, words)
+    return Simulated(asked, findings, tables, repeated, short_of, advice, study, words)
 
 
 # Metrics that head the run's page, by planes.
