@@ -15,6 +15,7 @@ from threadpoolctl import threadpool_limits
 
 from wristctl.arrays import Array
 from wristctl.identification.fit import Coordinate, Fit, Problem
+from wristctl.identification.measured_trials import MeasuredTrial
 from wristctl.identification.unknowns import NOT_NEGATIVE
 
 NORMAL_95 = 1.959964
@@ -22,8 +23,8 @@ NORMAL_95 = 1.959964
 ALIKE = 0.2
 # Share of the deviation beforehand that is left where trials tell hardly anything.
 _ASSUMED = 0.8
-# Frames over which small errors are alike: half a second at 60 a second.
-_LASTING = 30
+# Time over which small errors are alike [s].
+_LASTING = 0.5
 
 
 @dataclass(frozen=True)
@@ -74,10 +75,16 @@ def knowledge(fit: Fit) -> Knowledge:
     count = sum(map(len, residuals))
     bread, variance = sandwich(slopes, residuals, weights, len(fit.problem.free))
     stacked = np.concatenate([*slopes, np.diag(weights)[weights > 0.0]])
-    alike = max(1.0, inflation(residuals, _LASTING))
+    alike = max(1.0, inflation(residuals, _lasting(fit.problem.trials)))
     deviation = _with_clocks(fit.problem, np.sqrt(np.maximum(alike * np.diag(bread), np.diag(variance))))
     information = information_of(slopes, weights)
     return Knowledge(deviation, information, condition(stacked), autocorrelation(residuals), count / alike, weights)
+
+
+def _lasting(trials: Sequence[MeasuredTrial]) -> int:
+    """Frames over which small errors are alike, at most a quarter of the shortest trial."""
+    pause = float(np.median(np.concatenate([np.diff(trial.captured) for trial in trials])))
+    return max(1, min(round(_LASTING / pause), *(len(trial.captured) // 4 for trial in trials)))
 
 
 def sandwich(slopes: Sequence[Array], residuals: Sequence[Array], weights: Array, free: int) -> tuple[Array, Array]:
