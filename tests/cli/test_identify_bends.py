@@ -12,11 +12,15 @@ import numpy as np
 import pytest
 
 from tests.cli.conftest import Call
-from tests.identification.bend_rigs import KNOWN, drawn_rig, logs_of
+from tests.identification.bend_rigs import KNOWN, TENDONS, drawn_rig, logs_of
 from wristctl.commands.identify.bends import what_tells
+from wristctl.config.identify import IdentifySettings
 from wristctl.config.loop import Reference
 from wristctl.config.study import Study
-from wristctl.identification.bend_trials import bend_trials
+from wristctl.config.wrist import WristParameters
+from wristctl.identification.arc_fit import Told
+from wristctl.identification.bend_problem import bend_problem, forces_are_scaled, without_forces
+from wristctl.identification.bend_trials import bend_trials, places_of_log
 from wristctl.identification.unknowns import with_identified
 from wristctl.records import open_run
 from wristctl.records.open_log import OpenLog, write_log
@@ -46,6 +50,28 @@ def test_what_would_tell_more_is_what_the_logs_have_not() -> None:
     cells = {f"tension_{k}": 5.0 + 0.0 * logs[0].columns["time"] for k in (1, 2, 4, 5)}
     weighed = replace(logs[0], columns={**logs[0].columns, **cells})
     assert "Tensions" in said(logs[:1], "friction") and said([weighed], "friction") == ""
+
+
+def test_forces_are_told_where_somebody_has_said_a_mass_or_a_tension() -> None:
+    time = 0.02 * np.arange(50.0)
+    columns = {"time": time, "bend_y": 0.1 * time, "bend_z": 0.1 * time}
+    columns |= {f"spool_{number}": 1e-3 * time for number in (1, 2, 4, 5)}
+
+    def scaled(wrist: WristParameters, *masses: float, **fixed: float) -> bool:
+        weighed = [{"mass": np.full(len(time), mass)} for mass in masses] or [{}]
+        logs = [OpenLog(Path("log.csv"), "log", columns | mass) for mass in weighed]
+        settings = IdentifySettings.model_validate({"fix": fixed})
+        places = places_of_log(logs[0], wrist)
+        return forces_are_scaled(bend_problem(bend_trials(logs, wrist, 1e-3), places, wrist, TENDONS, settings), wrist)
+
+    whole = WristParameters.model_validate(KNOWN.model_dump())
+    assert not scaled(KNOWN) and not scaled(whole) and not scaled(KNOWN, KNOWN.hand_mass)
+    assert scaled(WristParameters(hand_mass=KNOWN.hand_mass)) and scaled(KNOWN, 0.2) and scaled(KNOWN, 0.3, 0.1)
+    assert scaled(KNOWN, tendon_stiffness=2e4) and not scaled(KNOWN, friction=0.1)
+    columns |= {f"tension_{number}": 5.0 + time for number in (1, 2, 4, 5)}
+    assert scaled(KNOWN)
+    told = {"a": Told(1.0, 0.9, 1.1, "N m s/rad", ""), "b": Told(1.0, 0.9, 1.1, "deg", "")}
+    assert [one.known for one in without_forces(told).values()] == [False, True]
 
 
 @pytest.mark.painted
@@ -100,7 +126,7 @@ def test_three_tendons_are_simulated_and_identified_and_all_else_says_what_takes
     assert moved.metrics["rmse"]["value"] < np.radians(1.0)
     log = tmp_path / "three.csv"
     assert call("runs", "export", moved.id, "--file", str(log))[0] == 0
-    told = ("--set", "model=wrist", "--set", "segments=2", "--set", "misfit=tell")
+    told = ("--set", "model=wrist", "--set", "segments=2", "--set", "misfit=tell", "--set", "wrist.hand_mass=0.3")
     code, out, err = call("identify", str(log), *three, *told)
     assert code == 0, err
     found = open_run(out.splitlines()[-1])
@@ -124,7 +150,7 @@ def test_the_log_of_a_simulation_behind_elastic_tendons_tells_the_stiffness_of_t
     call: Call, tmp_path: Path
 ) -> None:
     own = tmp_path / "mywrist.yaml"
-    own.write_text("wrist: {tendons: three, length: 0.095, stiffness: 1.1}\n")
+    own.write_text("wrist: {tendons: three, length: 0.095, stiffness: 1.1, hand_mass: 0.25}\n")
     loop = ("--reference", "circumduction", "--set", "loop.actuator.level=tendon", "--controller", "pid-ff")
     code, out, err = call("simulate", str(own), *loop)
     assert code == 0, err

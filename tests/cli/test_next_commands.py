@@ -378,7 +378,8 @@ def test_a_file_of_three_tendons_goes_through_every_command_and_what_each_advise
     said, recorded, _ = walked("simulate", robot, "--reference", "circumduction", "--controller", "ct-dob", *motors)
     assert call("runs", "export", recorded.id, "--file", "log.csv")[0] == 0
     assert "spool_3 [m]" in Path("log.csv").read_text().partition("\n")[0]
-    belief = ("--config", robot, "--set", "wrist.stiffness=0.8", "--set", "model=wrist", "--set", "segments=1")
+    springs = ("--set", "wrist.stiffness=0.8", "--set", "wrist.hand_mass=0.3")
+    belief = ("--config", robot, *springs, "--set", "model=wrist", "--set", "segments=1")
     out, found = did("identify", "log.csv", *belief)
     assert found.metrics["stiffness"]["value"] == pytest.approx(1.1, rel=0.01)
     (simulate,) = advised(out)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
@@ -11,9 +11,10 @@ import numpy as np
 import pytest
 
 from tests.identification.benches import KNOWN, LEVEL, TENDONS, UPRIGHT, logged, problem, tendons
+from wristctl.arrays import Array
 from wristctl.config.loop import Loop, Reference
 from wristctl.control.table import controller
-from wristctl.identification.fit import SPOOL, Coordinate, Linearisation, fit, linearise
+from wristctl.identification.fit import SPOOL, Coordinate, Linearisation, Problem, fit, linearise
 from wristctl.identification.forward import SupposedWrist, angles
 from wristctl.identification.intervals import (
     autocorrelation,
@@ -23,7 +24,7 @@ from wristctl.identification.intervals import (
     knowledge,
     long_run,
 )
-from wristctl.identification.measured_trials import frame_noise
+from wristctl.identification.measured_trials import MeasuredTrial, frame_noise
 from wristctl.identification.rehearsal import spools
 from wristctl.simulation.actuator import motor_of
 from wristctl.simulation.reference import motion
@@ -65,6 +66,28 @@ def test_slopes_are_the_differences_of_expected_angles() -> None:
         numeric = (ahead - behind) / (2.0 * size)
         apart = np.linalg.norm(slopes[:, at] - numeric) / np.linalg.norm(numeric)
         assert apart < 0.05, each  # friction that turns round at another moment makes a kink
+
+
+class _Jumping(Problem):
+    """A bend that follows the logarithm of each parameter, and jumps where that of damping is 0.4e-6 or more."""
+
+    def courses(self, trial: MeasuredTrial, points: Sequence[Array]) -> Array:
+        x = np.array(points)
+        damping = x[:, self.coordinates[Coordinate("damping")]]
+        bend = 0.02 * x.sum(axis=1) + 1e-6 * (damping > 0.4e-6)
+        return np.repeat(bend[:, None], len(trial.time), axis=1)
+
+
+def test_a_bend_that_jumps_beside_a_point_does_not_change_its_slopes() -> None:
+    """As that of a tendon that becomes taut an integration step earlier does: 50 times the slope in a difference."""
+    time = 1e-3 * np.arange(100.0)
+    still = np.zeros(len(time))
+    trial = MeasuredTrial("jump", "jump", "ulnar", KNOWN, time, np.zeros((len(time), 4)), time, still, 0.0)
+    plain = problem([trial])
+    jumping = _Jumping(plain.trials, plain.start, plain.settings, plain.actuator)
+    slopes = linearise(jumping, jumping.begin()).slopes[0]
+    columns = [jumping.coordinates[Coordinate(name)] for name in jumping.free if name != "delay"]
+    np.testing.assert_allclose(slopes[:, columns], 0.02, rtol=1e-4)
 
 
 @pytest.mark.slow

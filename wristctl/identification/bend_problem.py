@@ -184,6 +184,29 @@ def covariance_of(fit: Fit, knowledge: Knowledge) -> Array:
     return covariance
 
 
+def forces_are_scaled(problem: BendProblem, wrist: WristParameters) -> bool:
+    """Whether anybody has said a force or a mass, without which spools and bends tell ratios alone.
+
+    That is a tension, trials with several masses, a held damping or tendon stiffness, or the hand's mass: in the logs,
+    or in the section of `wrist`. The default says nothing of a robot, nor do a whole section as a run writes it and the
+    log of such a run.
+    """
+    trials = [trial for trial in problem.trials if isinstance(trial, BendTrial)]
+    if not {"damping", "tendon_stiffness"}.isdisjoint(problem.settings.fixed):
+        return True
+    if any((trial.channel >= len(PLANES)).any() for trial in trials):
+        return True
+    default, given = WristParameters.model_fields["hand_mass"].default, wrist.model_fields_set
+    masses = {round(trial.wrist.hand_mass, 6) for trial in trials}
+    by_study = "hand_mass" in given and given < set(WristParameters.model_fields)
+    return by_study or len(masses) > 1 or masses != {default}
+
+
+def without_forces(told: Mapping[str, Told]) -> dict[str, Told]:
+    """The same without ends of all that has newtons in it."""
+    return {name: one._replace(low=-math.inf, high=math.inf) if "N" in one.unit else one for name, one in told.items()}
+
+
 def told_of_bends(fit: Fit, knowledge: Knowledge) -> dict[str, Told]:
     """Every parameter found, with its 95 % interval; without its ends where the readings do not tell it.
 

@@ -18,8 +18,9 @@ from wristctl.identification.measured_trials import MeasuredTrial, frame_noise
 from wristctl.identification.unknowns import NOT_NEGATIVE, SIMULATED, UNKNOWNS, Unknown, tendons_of_values
 from wristctl.processes import cores
 
-# Steps of the finite differences, in parameters and in spools; forward ones are good to about 1e-4 of themselves.
-_NUDGE, _NUDGE_M = 1e-4, 1e-6
+# Steps of the finite differences, in parameters and in spools [m]. Where a tendon becomes taut one integration step
+# earlier, the bend jumps by some 1e-6 rad: few steps this small meet such a jump, and hardly one on both sides.
+_NUDGE, _NUDGE_M = 1e-6, 1e-8
 # Friction with which a search begins that believes in none.
 _OFF_THE_EDGE = 0.02
 # Evaluations of one search; 10 to 20 are usual.
@@ -170,22 +171,30 @@ class Linearisation:
 
 
 def linearise(problem: Problem, x: Array) -> Linearisation:
-    """Expected angles and their derivatives at coordinates x; the finite differences are lanes beside the angles."""
+    """Expected angles and their derivatives at coordinates x; the finite differences are lanes beside the angles.
+
+    Of the differences to either side the smaller one counts: a bend that jumps makes a difference too large. Stiffness,
+    damping and tendons that grow together hardly change a bend that spools prescribe, so that a jump in one of their
+    columns would look like knowledge of all three.
+    """
     coordinates, delay = problem.coordinates, problem.values(x)["delay"]
+    low, _ = problem.bounds()
 
     def one(trial: MeasuredTrial) -> tuple[Array, Array]:
         moved = [Coordinate(name) for name in problem.free if name in problem.simulated]
         moved += [spool_zero(trial, tendon) for tendon in trial.tendons]
-        nudges = [_NUDGE_M if coordinate.kind == SPOOL else _NUDGE for coordinate in moved]
-        near = [
-            x + nudge * (np.arange(len(x)) == coordinates[coordinate])
-            for coordinate, nudge in zip(moved, nudges, strict=True)
-        ]
-        course = problem.courses(trial, (x, *near))
-        expected, *nudged = (trial.shown(angle, delay) for angle in course)
+        columns = np.array([coordinates[coordinate] for coordinate in moved])
+        nudges = np.array([_NUDGE_M if coordinate.kind == SPOOL else _NUDGE for coordinate in moved])
+        # of a parameter at its lower end there is one side alone
+        backward = np.where(x[columns] - nudges < low[columns], nudges, -nudges)
+        nudged = np.tile(x, (2 * len(moved), 1))
+        nudged[np.arange(len(nudged)), np.tile(columns, 2)] += np.concatenate([nudges, backward])
+        course = problem.courses(trial, (x, *nudged))
+        expected, *near = (trial.shown(angle, delay) for angle in course)
         slopes = np.zeros((len(expected), len(x)))
-        for coordinate, nudge, nudged_angle in zip(moved, nudges, nudged, strict=True):
-            slopes[:, coordinates[coordinate]] = (nudged_angle - expected) / nudge
+        sides = (np.array(near) - expected) / np.concatenate([nudges, backward])[:, None]
+        forth, back = sides[: len(moved)], sides[len(moved) :]
+        slopes[:, columns] = np.where(abs(forth) < abs(back), forth, back).T
         if "delay" in problem.free:
             h = problem.settings.step
             early, late = (trial.shown(course[0], delay - shift) for shift in (-h, h))

@@ -4,7 +4,8 @@ Neighbouring residuals may be alike (an error of the model, the camera's filter)
 sandwich of Newey and West (Econometrica 55 (1987) 703) within each trial, with Andrews' bandwidth for a first-order
 autoregression (Econometrica 59 (1991) 817). No interval is narrower than so many independent frames would allow as the
 residuals are worth: small errors that last (the average of the base's marker, a rest on the same pixels) hide behind
-the noise of single frames, and show in the sum of the autocorrelations over half a second.
+the noise of single frames, and show in the sum of the autocorrelations over half a second. Nor is one narrower
+than readings with the least noise of a rig would leave it: what is left over of simulated readings is no noise.
 """
 
 from collections.abc import Sequence
@@ -15,6 +16,7 @@ from threadpoolctl import threadpool_limits
 
 from wristctl.arrays import Array
 from wristctl.identification.fit import Coordinate, Fit, Problem
+from wristctl.identification.measured_trials import LEAST_NOISE, MeasuredTrial
 from wristctl.identification.unknowns import NOT_NEGATIVE
 
 NORMAL_95 = 1.959964
@@ -22,8 +24,8 @@ NORMAL_95 = 1.959964
 ALIKE = 0.2
 # Share of the deviation beforehand that is left where trials tell hardly anything.
 _ASSUMED = 0.8
-# Frames over which small errors are alike: half a second at 60 a second.
-_LASTING = 30
+# Frames, and time [s], over which small errors are alike.
+_FRAMES, _LASTING = 30, 0.5
 
 
 @dataclass(frozen=True)
@@ -74,10 +76,17 @@ def knowledge(fit: Fit) -> Knowledge:
     count = sum(map(len, residuals))
     bread, variance = sandwich(slopes, residuals, weights, len(fit.problem.free))
     stacked = np.concatenate([*slopes, np.diag(weights)[weights > 0.0]])
-    alike = max(1.0, inflation(residuals, _LASTING))
-    deviation = _with_clocks(fit.problem, np.sqrt(np.maximum(alike * np.diag(bread), np.diag(variance))))
+    alike = max(1.0, *(inflation(residuals, lags) for lags in {_FRAMES, _lasting(fit.problem.trials)}))
+    wider = max(1.0, LEAST_NOISE / fit.noise)
+    deviation = _with_clocks(fit.problem, wider * np.sqrt(np.maximum(alike * np.diag(bread), np.diag(variance))))
     information = information_of(slopes, weights)
     return Knowledge(deviation, information, condition(stacked), autocorrelation(residuals), count / alike, weights)
+
+
+def _lasting(trials: Sequence[MeasuredTrial]) -> int:
+    """Frames over which small errors are alike, at most a quarter of the shortest trial."""
+    pause = float(np.median(np.concatenate([np.diff(trial.captured) for trial in trials])))
+    return max(1, min(round(_LASTING / pause), *(len(trial.captured) // 4 for trial in trials)))
 
 
 def sandwich(slopes: Sequence[Array], residuals: Sequence[Array], weights: Array, free: int) -> tuple[Array, Array]:

@@ -6,7 +6,6 @@ Soc. 44 (1948) 50) with the covariance of `intervals`, so that residuals that ar
 matters to a user is by how much each parameter would move if the cause were so.
 """
 
-import math
 from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
@@ -21,7 +20,7 @@ from wristctl.errors import Setting, UserError
 from wristctl.identification.fit import Fit
 from wristctl.identification.forward import SupposedWrist
 from wristctl.identification.intervals import Knowledge, sandwich
-from wristctl.identification.measured_trials import MeasuredTrial, frame_noise
+from wristctl.identification.measured_trials import LEAST_NOISE, MeasuredTrial, frame_noise
 from wristctl.processes import cores
 
 # Standard deviations beyond which a cause is told: one in 430 sound fits has one of them there by chance.
@@ -31,11 +30,6 @@ EVIDENT = 3.5
 #
 # A bend without segments is at 4/3, and fits of wrists of 8 segments move by more than the first order tells.
 _UNSURE = 5.0 / 3.0
-
-# Noise [rad] that readings of a rig have at least.
-#
-# Of simulated readings without noise, the integration step and the search's end are left over, up to 0.002 deg.
-LEAST_NOISE = math.radians(5e-3)
 
 Supposed = tuple[MeasuredTrial, SupposedWrist]
 

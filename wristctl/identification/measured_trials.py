@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
@@ -21,6 +22,12 @@ if TYPE_CHECKING:
 
 # Frames that a trial must have to be of use.
 _FEWEST = 20
+
+LEAST_NOISE = math.radians(5e-3)
+"""Noise that readings of a rig have at least [rad].
+
+Of simulated readings without noise the integration step, the search's end and the spools' microsteps are left over.
+"""
 
 # Instants of an exposure whose mean stands for it.
 _INSTANTS = 5

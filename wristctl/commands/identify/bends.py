@@ -47,11 +47,13 @@ class BendsTold(StudyResult):
     told: Mapping[str, Told]
     yaml: str
     """A study file with the wrist, actuator and sensor that were found; empty where too little is told."""
+    scaled: bool = True
+    """Whether anybody has said a force or a mass."""
 
     @property
     def answer(self) -> Answer:
         """Springs in the sentence, then each parameter with its interval or not identifiable."""
-        return _answer(self.fit, self.told, self.place if self.yaml else "", _in_one_plane_too(self.study))
+        return _answer(self.fit, self.told, self.place if self.yaml else "", _in_one_plane_too(self.study), self.scaled)
 
     @property
     def values(self) -> dict[str, float]:
@@ -109,15 +111,28 @@ def identify_bends(session: Session) -> BendsTold:
 
     from wristctl.commands.identify.figures import bends, residuals
     from wristctl.commands.identify.tables import fit_table, residual_table
-    from wristctl.identification.bend_problem import bends_yaml, misfits_of_bends, told_of_bends
+    from wristctl.identification.bend_problem import (
+        bends_yaml,
+        forces_are_scaled,
+        misfits_of_bends,
+        told_of_bends,
+        without_forces,
+    )
     from wristctl.identification.fit import fit
     from wristctl.identification.intervals import knowledge
 
     findings, settings = session.findings, session.study.identify
     with session.progress("compiling and searching"):
-        fitted = fit(_problem(session.study))
+        problem = _problem(session.study)
+        fitted = fit(problem)
         known = knowledge(fitted)
-    told, missed = told_of_bends(fitted, known), misfits_of_bends(fitted)
+    told, missed, scaled = (
+        told_of_bends(fitted, known),
+        misfits_of_bends(fitted),
+        forces_are_scaled(problem, session.study.wrist),
+    )
+    if not scaled:
+        told = without_forces(told)
     findings.numerics(integrator="RODAS3", step=settings.step, segments=settings.segments, planes=2)
     for name, one in told.items():
         ends = (one.low, one.high) if one.known else None
@@ -126,7 +141,7 @@ def identify_bends(session: Session) -> BendsTold:
     with session.drawing():
         findings.figure("bends", bends, fitted, caption="measured bends, the model's, and the difference")
         findings.figure("residuals", residuals, fitted, known)
-    _refuse(session, fitted, told, missed)
+    _refuse(session, fitted, told, missed, scaled)
     yaml = ""
     if all(told[name].known for name in _NEEDED):
         rng = np.random.default_rng(findings.stream("posterior"))
@@ -134,17 +149,17 @@ def identify_bends(session: Session) -> BendsTold:
         findings.text("data/identified.yaml", yaml)
         if _in_one_plane_too(session.study):
             findings.text("data/posterior.yaml", family)
-    result = BendsTold(session.study, findings, tables, fitted, known, told, yaml)
+    result = BendsTold(session.study, findings, tables, fitted, known, told, yaml, scaled)
     findings.table("data/parameters.csv", result.frame())
     return result
 
 
-def _refuse(session: Session, fitted: Fit, told: Mapping[str, Told], missed: Sequence[Misfit]) -> None:
+def _refuse(session: Session, fitted: Fit, told: Mapping[str, Told], missed: Sequence[Misfit], scaled: bool) -> None:
     """UserError where the model does not fit the readings, with the answer told all the same."""
     settings, worst = session.study.identify, max(missed, key=lambda misfit: misfit.ratio)
     if settings.misfit == "tell" or worst.ratio <= settings.lack_of_fit:
         return
-    text = "\n".join(_answer(fitted, told, "", True).lines())
+    text = "\n".join(_answer(fitted, told, "", True, scaled).lines())
     session.findings.summary(f"```\n{text}\n```")
     session.operator.tell(text)
     problem = f"{worst.direction}: the model is off by {math.sqrt(worst.ratio):.2g} times the readings' own noise"
@@ -195,8 +210,15 @@ def _in_one_plane(trials: Sequence[BendTrial]) -> bool:
     return min(ways) < _ASIDE * max(ways)
 
 
-def _answer(fit: Fit, told: Mapping[str, Told], run: str, square: bool) -> Answer:
-    """The answer; `run` is the path of a run with the wrist, `square` whether its tendons are those of one plane."""
+def _answer(fit: Fit, told: Mapping[str, Told], run: str, square: bool, scaled: bool) -> Answer:
+    """The answer.
+
+    Parameters
+    ----------
+    run : path of a run with the wrist; empty of none
+    square : whether its tendons are those of one plane
+    scaled : whether anybody has said a force or a mass
+    """
     along, across, axis = (told[name] for name in ("stiffness", "stiffness_across", "stiffness_axis_deg"))
     if along.known and across.known:
         where = toward_words(axis.value) if axis.known else "along an axis that is not identifiable"
@@ -208,6 +230,13 @@ def _answer(fit: Fit, told: Mapping[str, Told], run: str, square: bool) -> Answe
     notes = list[str | Table]()
     if lacking := [name for name, one in told.items() if not one.known]:
         notes.append(f"Not told: {joined(lacking)}. {what_tells(fit, lacking)}".strip())
+    if not scaled:
+        mass = fit.problem.trials[0].wrist.hand_mass
+        notes.append(
+            f"Forces need a mass or a tension, and nobody has said one: {mass:g} kg are the hand's by default. Weigh "
+            "it and add `--set wrist.hand_mass=KG`, with `wrist.length` and `wrist.hand_offset` [m]; without "
+            "`model=wrist` the same log tells ratios."
+        )
     if run:
         compares = ", or compare controllers on all that the readings leave possible"
         notes += [
