@@ -276,7 +276,8 @@ _ELEMENTARY = {
 
 
 def _like(of: SymbolRows) -> SymbolRows:
-    return of.tracer.scratch(len(of))
+    made: SymbolRows = of.tracer.scratch(len(of))
+    return made
 
 
 def _stacked(of: SymbolRows, size: int, count: tuple[int, ...]) -> tuple[SymbolRows, ...]:

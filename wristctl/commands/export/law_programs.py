@@ -232,8 +232,7 @@ class _Loop:
         )
         withheld = given["motors"].part(2 * places, planes)
         missed = given["motors"].part(2 * places + planes, planes)
-        wanted, torque = tracer.scratch(planes), tracer.scratch(planes)
-        room = Room(*(tracer.scratch(planes) for _ in range(6)), wanted, torque, tracer.scratch(planes * places))
+        room = Room(*[tracer.scratch(planes) for _ in Room._fields])._replace(arms=tracer.scratch(planes * places))
         limits = Limits(tracer.inputs(self._least), tracer.inputs(self._greatest))
         pulls = tracer.scratch(places)
         share = tracer.runs(
@@ -241,7 +240,7 @@ class _Loop:
             tracer.input("PERIOD"), pulls,
         )  # fmt: skip
         outputs = _results({"motors": given["motors"], "memory": given["memory"]})
-        outputs |= _results({"wanted": wanted, "torque": torque, "pulls": pulls}) | {"share[0]": share}
+        outputs |= _results({"wanted": room.wanted, "torque": room.torque, "pulls": pulls}) | {"share[0]": share}
         return Function(tracer.program(outputs), arrays, ("motors", "memory", "wanted", "torque", "pulls", "share"))
 
     def _actuate(self) -> Function:
