@@ -230,6 +230,9 @@ COMMANDS = {
     "export-model": Entry(
         "wristctl.cli.export_model:app", _MORE, "Write the wrist of a run for MuJoCo, MATLAB or as URDF."
     ),
+    "export-law": Entry(
+        "wristctl.cli.export_law:app", _MORE, "Write a tuned controller in C and NumPy for your own firmware."
+    ),
     "paper": Entry("wristctl.cli.paper_commands:app", _MORE, "Check the paper's claims one by one."),
 }
 

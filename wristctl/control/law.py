@@ -215,8 +215,9 @@ class _NativeLaw(types.WrapperAddressProtocol):
     def __init__(self, law: Law, lanes: int, names: tuple[str, ...], shape: Shape) -> None:
         self._lanes = lanes
         frozen, imported = frozen_values(law)
-        of_planes = _of_both_planes(law, shape) if shape.places else _of_each_plane(law, shape)
-        self._code: Any = CFunc(of_planes, normalize_signature(_signature(lanes, names)), locals={}, options={})
+        self._code: Any = CFunc(
+            of_all_planes(law, shape), normalize_signature(_signature(lanes, names)), locals={}, options={}
+        )
         keep(self._code, law, Path(__file__), *imported, frozen=frozen + repr(shape).encode())
         try:
             self._code.compile()
@@ -233,6 +234,11 @@ class _NativeLaw(types.WrapperAddressProtocol):
 
     def check(self) -> None:
         """Nothing can have gone wrong in native code."""
+
+
+def of_all_planes(law: Law, shape: Shape) -> Law:
+    """The torques of all planes by a law of one plane, or, where `shape` has places of tendons, of both."""
+    return _of_both_planes(law, shape) if shape.places else _of_each_plane(law, shape)
 
 
 def _of_each_plane(law: Law, shape: Shape) -> Law:

@@ -1,0 +1,154 @@
+"""Straight-line programs as C and as NumPy: a statement for each value that is used more than once, by source lines."""
+
+import math
+from collections import Counter
+from collections.abc import Sequence
+from typing import Literal, NamedTuple
+
+from wristctl.commands.export.law_programs import Function
+from wristctl.lanes.straight_line import Operation
+from wristctl.lanes.symbols import Line
+
+Language = Literal["c", "numpy"]
+# Longest expression that stands within another.
+_LONGEST = 80
+_INFIX = {"add": "+", "sub": "-", "mul": "*", "div": "/", "lt": "<", "le": "<=", "gt": ">", "ge": ">="}
+_LOGIC = {"c": {"and": "&&", "or": "||"}, "numpy": {"and": "&", "or": "|"}}
+_BINDING = {"add": 1, "sub": 1, "mul": 2, "div": 2}
+_MASKS = ("lt", "le", "gt", "ge", "and", "or")
+# NumPy's names of functions that <math.h> calls otherwise.
+_NUMPY = {"fabs": "abs", "atan2": "arctan2", "pow": "power", "logb": "_logb"}
+_ATOM, _LOOSE = 3, 0
+
+
+class _Expression(NamedTuple):
+    text: str
+    binding: int
+    """How closely it holds together: an atom, a product, a sum, or a comparison."""
+
+
+def number(value: float, language: Language) -> str:
+    """A number as the language reads it, to the last bit."""
+    if math.isfinite(value):
+        return repr(float(value))
+    name = "NAN" if math.isnan(value) else "INFINITY"
+    name = name if language == "c" else {"NAN": "np.nan", "INFINITY": "np.inf"}[name]
+    return f"-{name}" if value < 0.0 else name
+
+
+def listed(values: Sequence[float]) -> str:
+    """Numbers with commas between them, as both languages read them."""
+    return ", ".join(repr(float(value)) for value in values)
+
+
+def body(function: Function, language: Language) -> list[str]:
+    """Statements of a function: all values, by the lines of Python that they come from, and then what it writes."""
+    return _Writer(function, language).statements()
+
+
+class _Writer:
+    def __init__(self, function: Function, language: Language) -> None:
+        self._language: Language = language
+        self._operations, self._outputs = function.program.operations, function.program.outputs
+        self._used = function.program.used
+        self._uses = Counter(operand for k in self._used for operand in self._operations[k].operands)
+        self._users = {operand: k for k in self._used for operand in self._operations[k].operands}
+        self._given = set(self._outputs.values())
+        self._expressions = dict[int, _Expression]()
+
+    def statements(self) -> list[str]:
+        """All statements, without indentation."""
+        lines, last = list[str](), None
+        for k in self._used:
+            operation = self._operations[k]
+            expression = self._expression(operation)
+            if not self._stands_alone(k, expression):
+                self._expressions[k] = expression
+                continue
+            if operation.line != last:
+                last = operation.line
+                lines.append(self._comment(last))
+            lines.append(self._declared(k, operation.name, expression.text))
+            self._expressions[k] = _Expression(f"t{k}", _ATOM)
+        end = ";" if self._language == "c" else ""
+        # what is passed on unchanged needs no statement
+        written = {name: self._expressions[k].text for name, k in self._outputs.items()}
+        return lines + [f"{name} = {text}{end}" for name, text in written.items() if text != name]
+
+    def _stands_alone(self, k: int, expression: _Expression) -> bool:
+        operation = self._operations[k]
+        if operation.name == "const":
+            return False
+        if operation.name == "input":
+            return "[" in operation.value and self._is_overwritten(k)
+        if self._uses[k] != 1 or k in self._given or len(expression.text) > _LONGEST:
+            return True
+        return self._operations[self._users[k]].line != operation.line
+
+    def _is_overwritten(self, k: int) -> bool:
+        """Whether an entry of an array is written before another result that needs it."""
+        value = self._operations[k].value
+        return k in self._given and any(name != value and at == k for name, at in self._outputs.items())
+
+    def _declared(self, k: int, name: str, text: str) -> str:
+        if self._language == "numpy":
+            return f"t{k} = {text}"
+        return f"const {'int' if name in _MASKS else 'double'} t{k} = {text};"
+
+    def _comment(self, line: Line | None) -> str:
+        words = f"{line.file}:{line.number}: {line.text}" if line else "as it was"
+        return f"/* {words.replace('*/', '* /')} */" if self._language == "c" else f"# {words}"
+
+    def _expression(self, operation: Operation) -> _Expression:
+        name, language = operation.name, self._language
+        if name == "const":
+            text = number(operation.value, language)
+            return _Expression(f"({text})" if text.startswith("-") else text, _ATOM)
+        if name == "input":
+            return _Expression(operation.value, _ATOM)
+        parts = [self._expressions[k] for k in operation.operands]
+        if name == "neg":
+            return _Expression(f"(-{self._bound(parts[0], _ATOM)})", _ATOM)
+        if name == "where":
+            yes, no = (self._bound(part, _LOOSE) for part in parts[1:])
+            if language == "c":
+                return _Expression(f"({self._bound(parts[0], 1)} ? {yes} : {no})", _ATOM)
+            return _Expression(f"np.where({parts[0].text}, {yes}, {no})", _ATOM)
+        if name in _LOGIC[language]:
+            sign = _LOGIC[language][name]
+            return _Expression(f"{self._bound(parts[0], 1)} {sign} {self._bound(parts[1], 1)}", _LOOSE)
+        if name in _INFIX:
+            binding = _BINDING.get(name, _LOOSE)
+            right = binding + 1
+            return _Expression(
+                f"{self._bound(parts[0], binding or 1)} {_INFIX[name]} {self._bound(parts[1], right)}", binding
+            )
+        called = name if language == "c" else _named(name)
+        return _Expression(f"{called}({', '.join(part.text for part in parts)})", _ATOM)
+
+    @staticmethod
+    def _bound(part: _Expression, binding: int) -> str:
+        return part.text if part.binding >= binding else f"({part.text})"
+
+
+def _named(name: str) -> str:
+    other = _NUMPY.get(name, name)
+    return other if other.startswith("_") else f"np.{other}"
+
+
+def c_function(name: str, function: Function) -> str:
+    """A static function of C with this name; arrays that it only reads are const."""
+    parameters = [f"{'' if array in function.written else 'const '}double *{array}" for array in function.arrays]
+    lines = body(function, "c")
+    lines += [f"(void){array};" for array in function.arrays if not any(f"{array}[" in line for line in lines)]
+    return "\n".join([f"static void {name}({', '.join(parameters)})", "{", *_indented(lines), "}"])
+
+
+def numpy_function(name: str, function: Function) -> str:
+    """A function of Python with this name, which writes into the arrays that are its results."""
+    lines = body(function, "numpy") or ["pass"]
+    return "\n".join([f"def {name}({', '.join(function.arrays)}):", *_indented(lines)])
+
+
+def _indented(lines: Sequence[str]) -> list[str]:
+    return [f"    {line}" for line in lines]
