@@ -69,6 +69,8 @@ BROKEN: dict[str, tuple[str, str, str]] = {
     "no stop": ("def stop(self)", "def halt(self)", "contract"),
     "a rate of 0": ("rate=0.2", "rate=0.0", "contract"),
     "tendons on one side": ("Tendon(240.0, RADIUS)", "Tendon(60.0, RADIUS)", "contract"),
+    "a place that is no number": ("Tendon(120.0, RADIUS)", 'Tendon(float("nan"), RADIUS)', "contract"),
+    "goes blind": (LOOK, LOOK.replace("bend +", "(math.nan if now > 1.2 else 1.0) * bend +"), "refuses"),
     "a clock that stands": (CLOCK, f"{CLOCK}\n        self.clock.wait_until = lambda moment: None", "clock"),
     "connect moves": ("return np.zeros(3)", "return np.array([1.5, 0.0, 0.0])", "connect"),
     "looks stand still": (LOOK, LOOK.replace(", time)", ", 0.0)"), "looks"),

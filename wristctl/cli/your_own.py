@@ -188,7 +188,8 @@ def check_rig(
             if not as_json:
                 say(f"{_VERDICTS[check.passed]:<6}{check.asked + ':':<10} {check.found}")
     failed = [check.asked for check in checks if check.passed is False]
-    problem, fix = f"{rig} fails: {', '.join(failed)}", "mend it (documentation: Your own rig)"
+    problem = f"{rig} fails: {', '.join(failed)}"
+    fix = next((check.fix for check in checks if check.fix), "mend it (documentation: Your own rig)")
     error = UserError(problem, rig, fix, exit_code=3) if failed else None
     if as_json:
         found = [check._asdict() for check in checks]

@@ -38,6 +38,8 @@ class RigCheck(NamedTuple):
     asked: str
     passed: bool | None
     found: str
+    fix: str = ""
+    """What would mend it, where that is known."""
 
 
 class Certificate:
@@ -70,7 +72,7 @@ class Certificate:
             layout = layout_of_rig(study.hw_run, study.wrist)
             assert layout is not None
         except UserError as error:
-            yield RigCheck("contract", False, said(error))
+            yield RigCheck("contract", False, said(error), str(error.fix))
             return
         facts = made.facts
         planes = f"{facts.planes} plane{'s' * (facts.planes == 2)}"
@@ -88,7 +90,7 @@ class Certificate:
                 yield RigCheck(asked, True, check())
             except UserError as error:
                 failed = asked
-                yield RigCheck(asked, False, said(error))
+                yield RigCheck(asked, False, said(error), str(error.fix))
         trouble = guarded.stop() or guarded.close()
         yield RigCheck("close", not trouble, trouble or "stopped and closed, without an error")
         for asked, experiment in (("silence", _silence), ("Ctrl-C", _interrupted), ("trial", _trial)):
@@ -97,11 +99,11 @@ class Certificate:
                 continue
             try:
                 again = GuardedRig(rig_of(entry, self._name), self._name)
-                passed, found = experiment(again, study)
+                passed, found, fix = *experiment(again, study), ""
             except UserError as error:
-                passed, found = False, said(error)
+                passed, found, fix = False, said(error), str(error.fix)
             failed = failed or asked * (passed is False)
-            yield RigCheck(asked, passed, found)
+            yield RigCheck(asked, passed, found, fix)
         if not failed and not trouble:
             self.allowed = _allowed(study.hw_run.within(study.wrist), study.wrist, facts)
 

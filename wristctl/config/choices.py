@@ -69,7 +69,8 @@ class Choices(MutableMapping[str, T], Generic[T]):
             problem, fix = self.made[name]
             raise UserError(problem, self.what, fix)
         if name not in self:
-            raise UserError(f"unknown {self.what} '{name}'", self.what, meant(name, self.known()))
+            fix = f"name it in the file: {name}:NAME" if name.endswith(".py") else meant(name, self.known())
+            raise UserError(f"unknown {self.what} '{name}'", self.what, fix)
         return self[name]
 
     def known(self) -> list[str]:

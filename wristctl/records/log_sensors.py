@@ -193,7 +193,8 @@ def _motion_of(log: OpenLog, rows: np.ndarray[tuple[int], np.dtype[np.intp]]) ->
     bends = log.bends()
     tips = [log.columns[name] for name in ("tip_x", "tip_y", "tip_z") if name in log.columns]
     both = bends[rows] if bends is not None else np.stack(tips, axis=1)[rows]
-    moved: Array = np.nan_to_num(both - np.nanmean(both, axis=0))
+    known = np.isfinite(both).any(axis=0)  # a bend that no row has tells nothing
+    moved: Array = np.nan_to_num(both[:, known] - np.nanmean(both[:, known], axis=0))
     return moved
 
 

@@ -92,8 +92,8 @@ class RigTrier:
         """Looks that are news, of so long [s]: their time [s] and bend (P,) [rad], (n, 1 + P). `_arrived` says when."""
         rows, newest, end = list[list[float]](), -math.inf, self._rig.now() + seconds
         self._arrived, self._polls = list[float](), 0
-        while (now := self._rig.now()) < end:
-            seen = self._rig.look()
+        while self._rig.now() < end:
+            seen, now = self._rig.look(), self._rig.now()
             if seen.time > newest and np.isfinite(seen.bend).all():
                 newest = seen.time
                 rows.append([seen.time, *seen.bend.tolist()])
@@ -101,6 +101,14 @@ class RigTrier:
             self._homing.wait(min(5.0 * _POLL, max(_POLL, 0.25 / value(self._facts.sensor.rate))))
             self._polls += 1
         return np.array(rows).reshape(len(rows), 1 + self._facts.planes)
+
+    def _seen(self, seconds: float) -> Array:
+        """Median of the looks of so long [s] that are news (P,) [rad]."""
+        news = self._news(seconds)
+        if not len(news):
+            raise Unfit(f"no look of {seconds:g} s is news: the bend is nan, or its time stands still")
+        bends: Array = np.median(news[:, 1:], axis=0)
+        return bends
 
     def _looks(self) -> str:
         """News come as often as facts say, are no older, and are not of the future."""
@@ -148,7 +156,7 @@ class RigTrier:
         stood, count = self._homing.targets, len(self._homing.targets)
         beyond = -1.5 * self._facts.limits.travel / self._facts.metres_per_unit
         wrong = {"nan": math.nan, "-inf": -math.inf, f"{beyond:.4g} {self._facts.unit}": beyond}
-        before = np.median(self._news(0.2)[:, 1:], axis=0)
+        before = self._seen(0.2)
         for words, target in wrong.items():
             targets = stood.copy()
             targets[count - 1] = target if not math.isfinite(target) else stood[count - 1] + target
@@ -162,7 +170,7 @@ class RigTrier:
                 raise Unfit(f"a target of {words} is not refused: raise Refused in send(), before anything moves")
         self._rig.send(stood)
         self._homing.wait(0.2)
-        moved = _size(np.median(self._news(0.2)[:, 1:], axis=0) - before)
+        moved = _size(self._seen(0.2) - before)
         if moved > math.radians(self._settings.homing.bend_deg):
             raise Unfit(f"refused targets have bent the wrist by {math.degrees(moved):.1f} deg")
         return f"{', '.join(wrong)}: each Refused, and nothing moves"

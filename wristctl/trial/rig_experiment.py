@@ -52,20 +52,22 @@ def halt_rig(rig: GuardedRig, bend: float) -> Halt:
 
     `bend` is the change of a bend [rad] between two looks that counts as none.
     """
-    trouble, seconds, stands = rig.stop(), 0.0, False
+    trouble, seconds, stands, seen = rig.stop(), 0.0, False, False
     try:
         began = rig.now()
         before = rig.look().bend
         while not stands and seconds < _PATIENCE:
             rig.wait_until(rig.now() + _APART)
             now = rig.look().bend
-            stands = bool(np.isfinite(now - before).all()) and math.hypot(*(now - before)) < bend
+            seen = bool(np.isfinite(now - before).all())
+            stands = seen and math.hypot(*(now - before)) < bend
             before, seconds = now, rig.now() - began
     except UserError as error:
         trouble = trouble or str(error.what)
     if stands and not trouble:
         return Halt(True, "stop(), and the wrist stands", None, seconds)
-    return Halt(False, f"{trouble or 'the wrist still moves'}; cut the motors' power", None, seconds)
+    why = "the wrist still moves" if seen else "its bend is not seen"
+    return Halt(False, f"{trouble or why}; cut the motors' power", None, seconds)
 
 
 class RigExperiment:

@@ -146,18 +146,19 @@ class RigHoming:
     def looks(self, frames: int) -> Array:
         """The next so many looks that are news (n, P) [rad]."""
         bends = list[Array]()
-        began, unseen = self._rig.now(), 0
+        began, unseen, came = self._rig.now(), 0, 0
         every = min(0.5 / value(self._facts.sensor.rate), (self._facts.silence or math.inf) / 4.0)
         while len(bends) < frames:
             self.wait(every)
             seen = self._rig.look()
             if began < seen.time <= self._rig.now() and seen.time > self._looked:
                 self._looked = seen.time
+                came += 1
                 unseen += not np.isfinite(seen.bend).all()
                 if np.isfinite(seen.bend).all():
                     bends.append(seen.bend)
             if self._rig.now() - began > _READING + frames / value(self._facts.sensor.rate):
-                why = "it is not a number" if unseen else "its time stands still"
+                why = "it is not a number" if unseen else f"{came} looks are news" if came else "its time stands still"
                 problem = f"the bend could not be read: in {_READING:g} s {why}"
                 raise SafetyStop(problem, self._rig.where, "see what look() returns: wristctl check-rig")
         return np.array(bends)

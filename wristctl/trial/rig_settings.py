@@ -76,6 +76,9 @@ def layout_of_facts(facts: Facts, where: str) -> TendonLayout:
     """Places of a rig's tendons. UserError where they cannot bend the wrist in the rig's planes."""
     if not all(isinstance(tendon, Tendon) and tendon.radius > 0.0 for tendon in facts.tendons):
         raise UserError("facts.tendons are places off the axis", where, "Tendon(angle_deg, radius) for each target")
+    for number, tendon in enumerate(facts.tendons, 1):
+        if not (math.isfinite(tendon.angle_deg) and math.isfinite(tendon.radius)):
+            raise UserError(f"facts.tendons: number {number} is {tendon}", where, "finite angle_deg and radius")
     try:
         layout = TendonLayout.of(WristParameters(tendons=_places(facts)))
     except UserError as error:
