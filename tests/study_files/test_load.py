@@ -8,9 +8,11 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import pytest
+import yaml
 
 from wristctl.config.loop import LOOPS, Loop
 from wristctl.config.plant import Actuator, Plant
+from wristctl.config.study import Study
 from wristctl.errors import UserError
 from wristctl.study_files.load import load_study
 
@@ -258,3 +260,15 @@ def test_a_family_whose_name_is_none_for_a_file_is_refused_before_any_work(name:
         load_study([], [f"families={json.dumps({name: {}})}"])
     assert caught.value.exit_code == 2 and "families" in caught.value.where
     assert list(load_study([], ['families={"my rig-2.5": {}}']).families) == ["my rig-2.5"]
+
+
+def test_a_hands_mass_that_a_run_wrote_of_itself_is_not_given_unless_somebody_gives_it(tmp_path: Path) -> None:
+    """A run writes every key: its default mass says nothing of a robot; an override and a part of it do."""
+    whole = {"wrist": Study().wrist.model_dump(mode="json", exclude={"stiffness_axis_deg"})}
+    (tmp_path / "config.yaml").write_text(yaml.safe_dump(whole))
+    (tmp_path / "own.yaml").write_text("wrist: {hand_mass: 0.3}\n")
+    for file, overrides, given in (
+        ("config.yaml", [], False), ("config.yaml", ["wrist.hand_mass=0.3"], True), ("own.yaml", [], True),
+    ):  # fmt: skip
+        wrist = load_study([tmp_path / file], overrides).wrist
+        assert ("hand_mass" in wrist.model_fields_set) == given and wrist.hand_mass == 0.3

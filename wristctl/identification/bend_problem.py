@@ -188,18 +188,16 @@ def forces_are_scaled(problem: BendProblem, wrist: WristParameters) -> bool:
     """Whether anybody has said a force or a mass, without which spools and bends tell ratios alone.
 
     That is a tension, trials with several masses, a held damping or tendon stiffness, or the hand's mass: in the logs,
-    or in the section of `wrist`. The default says nothing of a robot, nor do a whole section as a run writes it and the
-    log of such a run.
+    where it is not the default, or given in the section `wrist`.
     """
     trials = [trial for trial in problem.trials if isinstance(trial, BendTrial)]
     if not {"damping", "tendon_stiffness"}.isdisjoint(problem.settings.fixed):
         return True
     if any((trial.channel >= len(PLANES)).any() for trial in trials):
         return True
-    default, given = WristParameters.model_fields["hand_mass"].default, wrist.model_fields_set
+    default = WristParameters.model_fields["hand_mass"].default
     masses = {round(trial.wrist.hand_mass, 6) for trial in trials}
-    by_study = "hand_mass" in given and given < set(WristParameters.model_fields)
-    return by_study or len(masses) > 1 or masses != {default}
+    return "hand_mass" in wrist.model_fields_set or len(masses) > 1 or masses != {default}
 
 
 def without_forces(told: Mapping[str, Told]) -> dict[str, Told]:

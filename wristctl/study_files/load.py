@@ -10,6 +10,7 @@ from wristctl.config.choices import CONTROLLERS
 from wristctl.config.former_names import key_today
 from wristctl.config.given_files import beside, names_a_file
 from wristctl.config.leaves import named_by
+from wristctl.config.plant import is_unsaid
 from wristctl.config.study import Study
 from wristctl.errors import Phrase, Setting, UserError, fix_to_read, meant, nearest
 from wristctl.plain_files import read_plain
@@ -96,6 +97,10 @@ def read_study(
     _refuse_horizon_of_worlds(study, origins, command)
     if for_another:
         study.simulate.model_fields_set.discard("gains")
+    given, fields = study.wrist.model_fields_set, type(study.wrist).model_fields
+    every = all(name in given or is_unsaid(field) for name, field in fields.items())
+    if every and not isinstance(origins.get(("wrist", "hand_mass")), Setting):
+        given.discard("hand_mass")  # as a run writes it: nobody has said the default
     return study, origins
 
 
