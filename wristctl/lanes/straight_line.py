@@ -88,7 +88,9 @@ class Tracer:
         numbers = {name: self.symbol(value).number for name, value in outputs.items()}
         made = Program(self._operations, numbers)
         if (count := len(made.used)) > MOST_OPERATIONS:
-            problem = f"this law takes {count} operations a tick, more than the {MOST_OPERATIONS} that are written out"
+            problem = (
+                f"this controller takes {count} operations a tick, more than the {MOST_OPERATIONS} that are written out"
+            )
             raise UserError(problem, "", "another controller, or fewer turns of its loops")
         return made
 
@@ -130,7 +132,9 @@ class Tracer:
             self._numbers[key] = len(self._operations)
             self._operations.append(Operation(name, operands, value, line_of_python() if operands else None))
             if len(self._operations) > 8 * MOST_OPERATIONS:
-                raise UserError("this law takes too many operations a tick to be written out", "", "another controller")
+                raise UserError(
+                    "this controller takes too many operations a tick to be written out", "", "another controller"
+                )
         return Symbol(self, self._numbers[key])
 
     def lifted(self, value: Any) -> Any:

@@ -180,8 +180,8 @@ class Stack(NamedTuple):
 def refuse(problem: str) -> Any:
     """Raise UserError at the line of Python that asks for what has no straight-line form."""
     found = line_of_python()
-    fix = "where(condition, yes, no) for a branch; or write this law by hand (documentation: A law for your firmware)"
-    raise UserError(f"this law cannot be exported: {problem}", f"{found.file}:{found.number}", fix)
+    fix = "where(condition, yes, no) for a branch; or write it by hand (documentation: A controller for your firmware)"
+    raise UserError(f"this controller cannot be exported: {problem}", f"{found.file}:{found.number}", fix)
 
 
 def line_of_python() -> Line:

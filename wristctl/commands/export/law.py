@@ -69,7 +69,9 @@ def _chosen(words: Sequence[str], overrides: Sequence[str], out: Path) -> tuple[
     controllers = [word for word in words if not _is_study(word) and _is_controller(word)]
     refs = [word for word in words if not _is_study(word) and not _is_controller(word)]
     if len(controllers) > 1 or len(refs) > 1 or (refs and files):
-        raise UserError("one law is exported at a time", " ".join(words), "a controller with study files, or a run")
+        raise UserError(
+            "one controller is exported at a time", " ".join(words), "a controller with study files, or a run"
+        )
     if refs:
         return _of_run(_run(refs[0], out), controllers[0] if controllers else None, overrides)
     typed = [f"{key}={value}" for word in controllers for key, value in row_typed(word).items()]
@@ -145,7 +147,7 @@ def _of_trials(run: Run, controller: str | None) -> Study:
     rows = [row for row in settings.rows if controller in (None, row.controller, row.label)]
     if len(rows) != 1:
         names = ", ".join(row.label for row in settings.rows)
-        raise UserError(f"run {run.id} tried {names}", str(run.path), f"name one: `wristctl export-law {run.id} NAME`")
+        raise UserError(f"run {run.id} tried {names}", str(run.path), f"name one after {run.id}")
     simulated = SimulateSettings(
         controller=rows[0].controller, gains=rows[0].gains, loop=settings.known_loop, reference=settings.reference,
         horizon=settings.horizon,

@@ -12,7 +12,7 @@ _PAGE = Template("""\
 
 $about
 
-`$name.c` and `$name.h` are C99 for your firmware; `$name.py` is the same in NumPy. They have the law, the
+`$name.c` and `$name.h` are C99 for your firmware; `$name.py` is the same in NumPy. They have the controller, the
 allocation of its torque to tendons within their limits, $parts. All numbers are doubles.
 Nothing is allocated, and the number of operations of a tick does not depend on any value$frames_cost.
 `vectors.csv` has $ticks ticks of a simulated loop.
@@ -29,7 +29,7 @@ compile with `-ffast-math`.
 2. Every $period s:
 $calls
 3. $send
-4. `${name}_reset` again before a motion starts anew, or after a pause: the law remembers.
+4. `${name}_reset` again before a motion starts anew, or after a pause: the controller remembers.
 
 ## Units and signs
 
@@ -61,7 +61,7 @@ _SEND = {
     "ideal": "Command `tension` to each tendon, or `pull` to each place.",
     "lagged": "Command `tension` to each tendon. `count` is what the motors are reckoned to have come to.",
     "tendon": "Send `spool_speed` to the motor of each spool at once, which holds it until the next tick. From these "
-    "rates the law reckons where the spools are.",
+    "rates the controller reckons where the spools are.",
 }
 _COUNT = {
     "ideal": "the pull again | N",
