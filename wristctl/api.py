@@ -112,21 +112,24 @@ def tune(
 @in_python()
 def compare(
     study: StudyOrFile, *, network: Ref | Trained | None = None, tuned: Ref | Tuned | None = None,
-    executor: str = "serial", out: Folder | None = None, label: str = "", progress: Watch | None = None,
+    from_identified: Ref | Identified | None = None, executor: str = "serial", out: Folder | None = None,
+    label: str = "", progress: Watch | None = None,
 ) -> Compared:  # fmt: skip
     """Controllers x loops x references, by the study's `compare` section, beside the paper's numbers.
 
     Where it names worlds of a family, the rows ranked on those: `.rankings`, of smooth motions and of steps.
 
     `network` (train) stands behind references with `inverse: network`, `tuned` (tune) behind rows with `gains: tuned`.
-    The result has `.rows`, each with the simulation of its loop; `.frame()` is a row per combination: RMSE [rad],
-    settling [s], tensions [N], ... Raises UserError for unknown controllers or gains, inputs that are missing, or
-    controllers that would be judged on what they were tuned on.
+    The parameters of `from_identified` (identify) replace the study's. The result has `.rows`, each with the simulation
+    of its loop; `.frame()` is a row per combination: RMSE [rad], settling [s], tensions [N], ... Raises UserError for
+    unknown controllers or gains, inputs that are missing, or controllers that would be judged on what they were tuned
+    on.
 
     Where the study has a `sweep` the result is a table of its points, which `executor` computes. `out`, `label` and
     `progress` are as in `gen_data`.
     """
-    return carry_out(COMPARE, study, {"network": network, "tuned": tuned}, out, label, progress, executor)
+    given = {"network": network, "tuned": tuned, "from_identified": from_identified}
+    return carry_out(COMPARE, study, given, out, label, progress, executor)
 
 
 @in_python()

@@ -7,14 +7,17 @@ a name says otherwise. docs/your-own-rig.md has an example.
 
 from __future__ import annotations
 
+from __future__ import annotations
+
 import math
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple, Protocol, runtime_checkable
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, runtime_checkable
 
-import numpy as np
-from numpy.typing import ArrayLike, NDArray
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import ArrayLike, NDArray
 
 __all__ = [
     "Clock", "Drive", "Facts", "Fault", "Limits", "Look", "Lost", "Refused", "Rig", "RigError", "Sensor", "Spread",

@@ -82,6 +82,8 @@ def test_what_was_identified_is_a_study_that_simulates_it() -> None:
             assert {name: getattr(loop.sensor, name) for name in CAMERA} == CAMERA
             assert (loop.actuator.level, loop.sensor.level) == (was.actuator.level, was.sensor.level)
             assert loop.control_period == was.control_period and loop.plant_segments == was.plant_segments
+    first = with_identified(load_study([], ["compare.tuning={controllers: [pid-ff]}"]), "compare", text).compare.tuning
+    assert first is not None and all(loop.actuator.friction == 0.055 for loop in first.loops.values()), "a search first"
 
 
 def test_each_place_keeps_where_its_tendons_end_and_how_many_they_are() -> None:

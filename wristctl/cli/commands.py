@@ -98,6 +98,7 @@ COMMANDS = {
         examples=(
             "wristctl compare pid-ff adrc/hardware experiments/own_controllers/lqr.py:LQR quick",
             "wristctl compare pid-ff adrc --tune",
+            "wristctl compare pid-ff adrc --from-identified latest:identify",
             "wristctl compare experiments/paper.yaml --network latest:train --tuned latest:tune",
         ),
     ),

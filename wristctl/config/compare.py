@@ -3,7 +3,7 @@
 from wristctl.config.controller_row import REPETITIONS, Row
 from wristctl.config.families import Worlds
 from wristctl.config.loop import CAMERA, LOOPS, DirectionName, InverseName, Loop, Loops, Reference
-from wristctl.config.section import Section, choice, quantity
+from wristctl.config.section import Section, choice, quantity, seldom
 from wristctl.config.tune import TuneSettings
 
 # Preset of gains for motors, tendons and a camera.
@@ -56,4 +56,5 @@ class CompareSettings(Section):
     repetitions: int = choice(1, REPETITIONS, ge=1, le=1000)
     network: str | None = choice(None, "train run: path, id or latest:train")
     tuned: str | None = choice(None, "tune run: path, id or latest:tune")
+    from_identified: str | None = seldom(None, "", "identify run whose parameters replace the study's")
     tuning: TuneSettings | None = choice(None, "a search for the controllers with gains: tuned, in place of a tune run")

@@ -136,6 +136,8 @@ def with_identified(study: Study, command: str, text: str) -> Study:
             changed[leaf] = _known(value, parts)
         elif leaf == "loops":
             changed[leaf] = {key: _known(part, parts) for key, part in value.items()}
+        elif leaf == "tuning" and value is not None:  # a search that comes first, on loops of its own
+            changed[leaf] = value.model_copy(update={"loops": {k: _known(v, parts) for k, v in value.loops.items()}})
         elif leaf in parts:
             changed[leaf] = value.model_copy(update=parts[leaf])
     found = dict(mapping["wrist"])

@@ -29,6 +29,7 @@ from wristctl.commands.inputs_of_loops import (
     check_row,
     compared_inverses,
     family_of,
+    identified,
     judged_loops,
     network_for,
     tuned_gains,
@@ -223,7 +224,7 @@ def plan(study: Study, inputs: Inputs) -> str:
     from wristctl.simulation.closed_loop import check_size
     from wristctl.simulation.planes import planes_of
 
-    study, _ = with_what_there_is(study, inputs)
+    study, _ = with_what_there_is(identified(study, "compare", inputs), inputs)
     settings, earlier, searched = study.compare, tuned_on(inputs), ""
     found_here = settings.tuning.controllers if settings.tuning is not None else ()
     for number, row in enumerate(settings.rows):
@@ -275,7 +276,7 @@ def compare(session: Session) -> Compared:
     from wristctl.simulation.planes import planes_of
     from wristctl.simulation.worlds import Draws
 
-    study, left_out = with_what_there_is(session.study, session.inputs)
+    study, left_out = with_what_there_is(identified(session.study, "compare", session.inputs), session.inputs)
     findings, searches = session.findings, dict[str, "Search"]()
     if left_out:
         log.warning("left out: %s", "; ".join(left_out))
@@ -366,7 +367,11 @@ COMPARE = sweepable(
         "compare",
         plan,
         compare,
-        (EarlierRun("network", kind="train", optional=True), EarlierRun("tuned", kind="tune", optional=True)),
+        (
+            EarlierRun("network", kind="train", optional=True),
+            EarlierRun("tuned", kind="tune", optional=True),
+            EarlierRun("from_identified", kind="identify", optional=True),
+        ),
         size=size,
         in_one_plane=lambda study: not why_two_planes(study.wrist, asked_of_comparison(study)),
     )
