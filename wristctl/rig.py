@@ -7,8 +7,6 @@ a name says otherwise. docs/your-own-rig.md has an example.
 
 from __future__ import annotations
 
-from __future__ import annotations
-
 import math
 import time
 from collections.abc import Callable, Mapping, Sequence
