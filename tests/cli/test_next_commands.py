@@ -263,7 +263,7 @@ def test_an_identified_wrist_is_simulated_and_compared_on_with_its_geometry(did:
         for pose in (UPRIGHT, LEVEL)
     ]
     out, found = did("identify", *(run.id for run in poses), "--set", "fix.friction=0.1", *OUT)
-    simulate, compare = advised(out)
+    _, simulate, compare = advised(out)
     _, moved = did(*simulate)
     first = poses[0].config.wrist
     assert wrist_of(moved) == first and [one.run for one in moved.manifest.inputs] == [found.id]
@@ -382,7 +382,8 @@ def test_a_file_of_three_tendons_goes_through_every_command_and_what_each_advise
     belief = ("--config", robot, *springs, "--set", "model=wrist", "--set", "segments=1")
     out, found = did("identify", "log.csv", *belief)
     assert found.metrics["stiffness"]["value"] == pytest.approx(1.1, rel=0.01)
-    (simulate,) = advised(out)
+    recommend, simulate = advised(out)
+    assert recommend[0] == "recommend" and found.id in recommend[-1]
     told = f"on the wrist identified in {found.id} in two planes (3 tendons"
     assert told in " ".join(did(*simulate)[0].split())
     for program, file in (("mujoco", "wrist.xml"), ("matlab", "wrist_chain.m")):

@@ -4,8 +4,8 @@ from collections.abc import Mapping, Sequence
 from types import MappingProxyType
 from typing import NamedTuple
 
-_MAIN, _OWN = "From a wrist to its controller", "A controller or robot of your own"
-_HARDWARE, _MORE = "Motors and camera", "More"
+_MAIN, _OWN = "From a wrist to its controller", "Your own controller or robot; motors and camera"
+_HARDWARE, _MORE = _OWN, "More"
 # The flag of commands that move motors, and its help.
 YES = {"yes": "Ask nobody before the motors of real hardware move."}
 # The flag of comparisons that search gains first.
@@ -125,7 +125,6 @@ COMMANDS = {
             "wristctl identify my.csv --columns 'time=t [ms], spool_1=m1 [mm], spool_2=m2 [mm], bend_y=imu [deg]'",
             "wristctl identify my.csv --columns 'time=t [ms], current_1=I1 [mA], current_2=I2 [mA], bend_y=imu [deg]'",
             "wristctl identify UPRIGHT_RUN LEVEL_RUN --set fix.friction=0.1",
-            "wristctl tune experiments/paper.yaml --from-identified latest:identify",
         ),
     ),
     "hw-run": Entry(
@@ -146,13 +145,11 @@ COMMANDS = {
             "priority",
         ),
         flags=YES,
-        advanced=("horizon", "video", "priority", "from_identified", "network"),
+        advanced=("horizon", "repetitions", "video", "priority", "from_identified", "network", "tuned"),
         examples=(
             "wristctl hw-run ct-dob pid-ff --set 'directions=[ulnar]' --set push.force=0",
             "wristctl hw-run --reference circumduction --set reference.angle_deg=25",
-            "wristctl hw-run --dry-run --port /dev/ttyACM0",
             "wristctl hw-run --port /dev/ttyACM0 --camera 0 --calibration latest:calibrate-wrist",
-            "wristctl hw-run pid-ff --rig my_rig.py:RIG",
             "wristctl hw-run pid-ff --rig my_rig.py:RIG --reference live --set reference.listen=127.0.0.1:5005",
         ),
     ),

@@ -15,8 +15,7 @@ app = typer.Typer(add_completion=False)
 
 _EPILOG = (
     "Examples:\n\nwristctl export-model latest:identify --to matlab\n\n"
-    "wristctl export-model RUN --to mujoco --planes 2 --motors spools\n\n"
-    "wristctl export-model RUN --to urdf"
+    "wristctl export-model RUN --to mujoco --planes 2 --motors spools"
 )
 
 

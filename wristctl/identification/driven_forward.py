@@ -72,8 +72,9 @@ class _Shapes(NamedTuple):
 
 
 def _follow(
-    model: Any, values: Any, inner: Any, state: Any, driven: Any, h: float, settle: int, out: Any, shapes: Any
+    model: Any, values: Any, inner: Any, state: Any, driven: Any, steps: tuple[float, int], out: Any, shapes: Any
 ) -> None:
+    h, settle = steps
     rows, states = rows_of(values), rows_of(state)
     m, count = len(shapes.cut), len(shapes.of_pulls)
     wrist, first = parameters_of(model, rows, shapes.of_pulls), FIELDS + OF_A_TENDON * count
@@ -120,7 +121,7 @@ def courses_of_pulls(
     for k, values in enumerate(blocks):
         course, state = np.empty((len(pulls), 4, wide)), np.repeat(begin[:, None], wide, axis=1)
         inner = InnerFrictionInSpace(torque[k], slope[k], bristles[k])
-        follow(PCC_IN_SPACE, values, inner, state, pulls, STEP, round(SETTLE / STEP), course, shapes)
+        follow(PCC_IN_SPACE, values, inner, state, pulls, (STEP, round(SETTLE / STEP)), course, shapes)
         for lane in range(min(wide, count - k * wide)):
             yield k * wide + lane, np.ascontiguousarray(course[..., lane])
 

@@ -119,12 +119,10 @@ def plan(study: Study, inputs: Inputs) -> str:
 def identify(session: Session) -> Identified | LogTold | DrivenTold | BendsTold:
     """Find stiffness, damping, tendons and delay of a real wrist from logged trials, with 95 % intervals.
 
-    Trials are those of hw-run runs, or of open logs (FILE.csv, documentation: The open log) of wrists with two or more
-    tendons in one plane or two: of these each parameter comes with its interval or is not identifiable, and which of
-    slack, friction and creep the data want is found by predicting a part of them. Where a log has tensions or motors'
-    currents in place of spools, these move the wrist's dynamics. With `model: wrist` logs in two
-    planes are of the study's wrist: both stiffnesses, the axis of the springs, and the direction and gain of each
-    tendon.
+    Trials are those of hw-run runs, or of open logs of wrists with two or more tendons in one plane or two. Of logs a
+    parameter has its interval or is not identifiable, and a part that was not fitted decides which of slack, friction
+    and creep they want. Tensions or motors' currents may stand in place of spools. With `model: wrist` logs in two
+    planes are of the study's wrist: springs, their axis, and each tendon's direction and gain.
     """
     if session.study.identify.logs:
         return identify_bends(session) if session.study.identify.model == "wrist" else identify_logs(session)
