@@ -14,10 +14,11 @@ from tests.trial.conftest import WRIST, Run, settings_of
 from wristctl.board.driver import Board
 from wristctl.board.messages import State
 from wristctl.errors import UserError
-from wristctl.trial.experiment import Experiment, spared
+from wristctl.trial.experiment import Experiment
 from wristctl.trial.homing import slacken
 from wristctl.trial.log import TrialLog, tick_columns
 from wristctl.trial.safety import SafetyStop
+from wristctl.trial.trial_series import spared
 from wristctl.trial.trials import trials_of
 from wristctl.trial.zero_checks import check_zero
 

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from wristctl.board.messages import Fault, Flag, State, Status
-from wristctl.trial.experiment import Stop
 from wristctl.trial.motors_ready import Halt
 from wristctl.trial.safety import SafetyStop
+from wristctl.trial.trial_series import Stop
 
 STATUS = Status(1.0, State.FAULT, Fault.LINK, Flag(0), 0.0, (1, 2, 3, 4), (5, 6, 7, 8), 0)
 

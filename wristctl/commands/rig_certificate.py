@@ -18,7 +18,6 @@ from wristctl.config.wrist import WristParameters
 from wristctl.errors import UserError
 from wristctl.plugins.places import load
 from wristctl.rig import Clock, Facts, Fault, Rig
-from wristctl.trial.experiment import spared
 from wristctl.trial.guarded_rig import GuardedRig, RigStop
 from wristctl.trial.log import TrialLog
 from wristctl.trial.motion_limit import LEAST
@@ -26,6 +25,7 @@ from wristctl.trial.rig_belief import layout_of_rig, numbers_of
 from wristctl.trial.rig_checks import RigTrier, said
 from wristctl.trial.rig_experiment import RigExperiment
 from wristctl.trial.rig_settings import rig_of
+from wristctl.trial.trial_series import spared
 from wristctl.trial.trials import Trial
 
 # Bend of the trial that is tried [deg], its duration [s], and ticks after which it is interrupted.

@@ -1,7 +1,6 @@
 """The experiment from the first command to the last: connect, home, trials and returns, and the stop that ends it."""
 
 from collections.abc import Mapping, Sequence
-from typing import Any
 
 import numpy as np
 
@@ -9,10 +8,8 @@ from wristctl.board.driver import Board
 from wristctl.board.messages import AXES
 from wristctl.config.hw_run import HwRunSettings
 from wristctl.config.wrist import WristParameters
-from wristctl.control.table import controller, gains_of
-from wristctl.errors import UserError, fix_of
+from wristctl.errors import UserError
 from wristctl.interrupt import undisturbed
-from wristctl.simulation.motion import Motion
 from wristctl.simulation.spool_timing import remembered_rates
 from wristctl.simulation.worlds import Draws
 from wristctl.trial.calibration import WristCalibration
@@ -22,11 +19,10 @@ from wristctl.trial.expected_moves import ExpectedMoves
 from wristctl.trial.homing import Zero, find_zero, slacken
 from wristctl.trial.live_datagrams import LiveReference
 from wristctl.trial.log import TrialLog
-from wristctl.trial.motions import back, motion_of
-from wristctl.trial.motors_ready import Halt, halt, prepare
+from wristctl.trial.motions import back
+from wristctl.trial.motors_ready import halt, prepare
 from wristctl.trial.resting import judge_rest
 from wristctl.trial.rig_belief import RigBelief, names_of_planes
-from wristctl.trial.safety import SafetyStop
 from wristctl.trial.spools import spools_of
 from wristctl.trial.steering import HostFaults, Steering
 from wristctl.trial.supervised_wait import Patience, medians
@@ -34,50 +30,16 @@ from wristctl.trial.tendon_pulls import tendon_pulls_of
 from wristctl.trial.testbeds import Testbed
 from wristctl.trial.tick_timing import TickTiming
 from wristctl.trial.tracking import Tracking
-from wristctl.trial.trials import Trial, motions_of
+from wristctl.trial.trial_series import TrialSeries, spared
+from wristctl.trial.trials import Trial
 from wristctl.trial.watch import Watch
 from wristctl.trial.zero_checks import check_cocontraction, check_tendons, check_zero
-from wristctl.vision.camera_pose import CameraPose
 from wristctl.wrist.directions import in_plane
 from wristctl.wrist.kinematics import Inverse
 
 
-class Stop:
-    """Why, when (on the time of the trial, where one went on) and how an experiment was stopped before its end."""
-
-    def __init__(self, error: BaseException, trial: int | None, time: float | None, halted: Halt) -> None:
-        self.reason = f"{type(error).__name__}: {error}"
-        if isinstance(error, UserError):
-            self.reason = error.what
-        elif isinstance(error, KeyboardInterrupt):
-            self.reason = "interrupted by the operator"
-        self.trial, self.time, self.halt = trial, time, halted
-
-    def plain(self) -> dict[str, Any]:
-        """For JSON."""
-        status = self.halt.status
-        board: dict[str, Any] = {"state": None, "faults": None, "position": None, "rate": None}
-        if status is not None:
-            faults = status.faults.name or "none"
-            board |= {"state": status.state.name, "faults": faults, "position": status.position, "rate": status.rate}
-        return {
-            "reason": self.reason,
-            "trial": self.trial,
-            "time": self.time,
-            "motors_stand": self.halt.verified,
-            "how": self.halt.how,
-            "seconds": self.halt.seconds,
-            **board,
-        }
-
-
-class Experiment:
-    """Trials; `outcomes` holds how each trial that began has ended, `odd` what was odd in it, `most`
-    the largest of each residual in any, `poses` the camera's by plane (None: calibrated), `stop` why they ended
-    early.
-
-    Raises UserError for what is wrong with controllers, gains or motions.
-    """
+class Experiment(TrialSeries):
+    """Trials on the motor board with its cameras, real or emulated. Raises UserError as TrialSeries does."""
 
     def __init__(
         self, settings: HwRunSettings, wrist: WristParameters, trials: Sequence[Trial], kept: TrialLog,
@@ -85,24 +47,11 @@ class Experiment:
         calibration: WristCalibration | None = None, seed: int = 0, live: LiveReference | None = None,
     ) -> None:  # fmt: skip
         settings = settings.within(wrist)
-        self._live, self._asked = live, wrist
-        self._settings, self._wrist, self._trials, self._log = settings, spared(wrist, settings), trials, kept
+        timing = TickTiming(settings.control_period)
+        super().__init__(settings, spared(wrist, settings), wrist, trials, kept, timing, network, tuned, live)
         self._pulls = tendon_pulls_of(settings)
         self._calibration, self._draws = calibration, Draws(seed, "bench")
-        chosen = [(controller(row.controller), row.gains) for row in settings.rows]
-        self._laws = [(law, gains_of(law, gains, tuned)) for law, gains in chosen]
-        self._back = controller("feedforward")
-        self.motions: dict[str, Motion] = {
-            name: motion_of(settings, wrist, name, network) for name in motions_of(settings)
-        }
-        self.timing = TickTiming(settings.control_period)
-        self.outcomes: dict[int, str] = {}
-        self.stop: Stop | None = None
         self.zero: Zero | None = None
-        self.most, self.odd = dict[str, float](), dict[int, str]()
-        self.poses: dict[str, CameraPose | None] = {}
-        self._under_way: tuple[int, float] | None = None  # number and start of the trial that goes on
-        self._in_doubt: int | None = None  # the trial that has ended, until its tendons have been looked at
 
     def run(self, testbed: Testbed, shown: Shown | None = None) -> None:
         """Do all trials, and close the stand. Whatever ends them early, the motors are stopped before it is raised.
@@ -114,24 +63,13 @@ class Experiment:
         try:
             self._warm_up()
             board.connect()
-            try:
+            with self._stopping(lambda cause: self._stopped(testbed, board, cause)):
                 self._all(testbed, board, shown)
-            except BaseException as error:
-                cause = cause_of(error)
-                with undisturbed():
-                    self._stopped(testbed, board, cause)
-                if cause is not error:
-                    raise cause from error
-                raise
             with undisturbed():
                 halt(board, self._settings.safety.watchdog)
                 board.close()
         finally:
             testbed.close()
-
-    def replay(self, settings: HwRunSettings) -> None:
-        """Judge the trials by motions of these settings: those of a live reference are known afterwards."""
-        self.motions = {name: motion_of(settings, self._asked, name) for name in motions_of(settings)}
 
     def _warm_up(self) -> None:
         """Have everything compiled or loaded before the first motor is on: from then on the board wants to be fed."""
@@ -149,12 +87,7 @@ class Experiment:
         spools.reckoned(still, rates, 0.0, settings.control_period)
         reeled = belief.at_places(taut)
         Watch(settings, self._facing(plane), plane, self.timing).predict(reeled)
-        steering = Steering(belief, settings.sensor, settings.control_period)
-        for law, gains in [*self._laws, (self._back, ())]:
-            steering.use(law, gains)
-            steering.respond(course)
-            steering.predict(reeled)
-        steering.see(0, 0.0, 0.0)
+        self._warm_up_controllers(Steering(belief, settings.sensor, settings.control_period), course, reeled)
 
     def _all(self, testbed: Testbed, board: Board, shown: Shown | None) -> None:
         plane: str | None = None
@@ -246,22 +179,18 @@ class Experiment:
 
     def _one(self, testbed: Testbed, loop: ControlLoop, trial: Trial) -> None:
         """One trial, and the way back to zero."""
-        settings, followed, start = self._settings, self.motions[trial.direction], loop.next_tick
-        law, gains = self._laws[trial.row]
-        self._under_way, self.outcomes[trial.number] = (trial.number, start), "begun"
+        settings, start = self._settings, loop.next_tick
+        self._begun(trial, start)
         testbed.begin(
-            start, trial.disturbances(settings, followed), self._draws.camera(trial.scenario, trial.repetition)
+            start,
+            trial.disturbances(settings, self.motions[trial.direction]),
+            self._draws.camera(trial.scenario, trial.repetition),
         )
-        faults = HostFaults(settings.bench.faults) if testbed.emulated else None
-        try:
-            loop.follow(followed, law, gains, trial.number, faults, trial.push != 0.0, self._live)
-        finally:
-            self.most = {name: max(value, self.most.get(name, 0.0)) for name, value in loop.watch.most.items()}
-            self.odd[trial.number] = loop.watch.words()
+        self._follow(loop, trial, HostFaults(settings.bench.faults) if testbed.emulated else None)
         self._trial_ended(testbed, "ok")
         self._in_doubt = trial.number
-        final = followed.final if self._live is None else self._live.bend
-        loop.follow(back(final, settings.back, 0.0, settings.control_period, settings.planes), self._back, ())
+        way = back(self._final(trial), settings.back, 0.0, settings.control_period, settings.planes)
+        loop.follow(way, self._back, ())
 
     def _trial_ended(self, testbed: Testbed, outcome: str) -> None:
         if self._under_way is not None:
@@ -277,32 +206,8 @@ class Experiment:
             board.transport.close()  # the board's watchdog ends it, and holds
         else:
             board.close(emergency=not halted.verified)
-        trial, start = self._under_way or (None, None)
-        self.stop = Stop(error, trial, None if start is None else decided - start, halted)
-        if self._in_doubt is not None and isinstance(error, SafetyStop):
-            self.outcomes[self._in_doubt] = f"after it: {self.stop.reason.removeprefix('stopped: ')}"
-        self._log.disk.give_up_reserve()
+        stop = self._note_stop(error, decided, halted)
         try:
-            self._trial_ended(testbed, self.stop.reason)
+            self._trial_ended(testbed, stop.reason)
         except (OSError, UserError) as lost:
             error.add_note(f"what the bench knows of the trial is lost: {lost}")
-
-
-# Share of the motors' pull that a law may ask for: they turn meanwhile, and the wrist may be pushed.
-_ASKED = 0.8
-
-
-def spared(wrist: WristParameters, settings: HwRunSettings) -> WristParameters:
-    """The wrist with tensions that its motors can hold. Raises UserError where these are not above pretension."""
-    limit = min(wrist.tension_limit, _ASKED * settings.safety.motor_pull)
-    if limit <= wrist.pretension:
-        problem = f"motors of {settings.safety.motor_pull:g} N cannot hold a pretension of {wrist.pretension:g} N"
-        raise UserError(problem, "safety.motor_pull", "more current (documentation: The rig), or less wrist.pretension")
-    return wrist.model_copy(update={"tension_limit": limit})
-
-
-def cause_of(error: BaseException) -> BaseException:
-    """The safety stop behind a disk that takes no more rows; any other error as it is."""
-    if isinstance(error, OSError):
-        return SafetyStop(f"the log cannot be written: {error.strerror}", str(error.filename or "data"), fix_of(error))
-    return error

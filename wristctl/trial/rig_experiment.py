@@ -8,28 +8,25 @@ import numpy as np
 
 from wristctl.config.hw_run import HwRunSettings
 from wristctl.config.wrist import WristParameters
-from wristctl.control.table import controller, gains_of
 from wristctl.errors import UserError
 from wristctl.interrupt import undisturbed
 from wristctl.simulation.motion import Motion
 from wristctl.trial.control_loop import ControlLoop, Shown, course_of
-from wristctl.trial.experiment import Stop, cause_of, spared
 from wristctl.trial.guarded_rig import GuardedRig
 from wristctl.trial.live_datagrams import LiveReference
 from wristctl.trial.log import TrialLog
-from wristctl.trial.motions import back, motion_of
+from wristctl.trial.motions import back
 from wristctl.trial.motors_ready import Halt
 from wristctl.trial.rig_belief import RigBelief, layout_of_rig, names_of_planes
 from wristctl.trial.rig_drive import LookPaces, RigDrive, RigTracking
 from wristctl.trial.rig_homing import RigHoming, RigZero, find_rig_zero
 from wristctl.trial.rig_settings import sides_of
-from wristctl.trial.safety import SafetyStop
 from wristctl.trial.spools import spools_of
 from wristctl.trial.steering import Steering
 from wristctl.trial.tick_timing import TickTiming
-from wristctl.trial.trials import Trial, motions_of
+from wristctl.trial.trial_series import TrialSeries, spared
+from wristctl.trial.trials import Trial
 from wristctl.trial.watch import Watch
-from wristctl.vision.camera_pose import CameraPose
 from wristctl.wrist.kinematics import Inverse
 
 log = logging.getLogger(__name__)
@@ -70,11 +67,8 @@ def halt_rig(rig: GuardedRig, bend: float) -> Halt:
     return Halt(False, f"{trouble or why}; cut the motors' power", None, seconds)
 
 
-class RigExperiment:
-    """Trials on a rig; what it holds is as of `wristctl.trial.experiment.Experiment`.
-
-    Raises UserError for what is wrong with controllers, gains or motions.
-    """
+class RigExperiment(TrialSeries):
+    """Trials on a rig that takes targets."""
 
     def __init__(
         self, settings: HwRunSettings, wrist: WristParameters, trials: Sequence[Trial], kept: TrialLog,
@@ -84,33 +78,11 @@ class RigExperiment:
         settings = settings.within(wrist)
         layout = layout_of_rig(settings, wrist)
         assert layout is not None
-        self._live = live
-        self._settings, self._wrist, self._layout = settings, spared(wrist, settings), layout
-        self._trials, self._log = trials, kept
-        chosen = [(controller(row.controller), row.gains) for row in settings.rows]
-        self._laws = [(law, gains_of(law, gains, tuned)) for law, gains in chosen]
-        self._back = controller("feedforward")
-        facing = self._facing
-        self.motions: dict[str, Motion] = {
-            name: motion_of(settings, facing, name, network) for name in motions_of(settings)
-        }
-        self.timing = TickTiming(settings.control_period, camera=LookPaces(settings.rig or ""))
-        self.outcomes: dict[int, str] = {}
-        self.stop: Stop | None = None
+        wrist = spared(wrist, settings)
+        self._layout, self._facing = layout, wrist if settings.planes == 2 else sides_of(wrist, layout)
+        timing = TickTiming(settings.control_period, camera=LookPaces(settings.rig or ""))
+        super().__init__(settings, wrist, self._facing, trials, kept, timing, network, tuned, live)
         self.zero: RigZero | None = None
-        self.most, self.odd = dict[str, float](), dict[int, str]()
-        self.poses: dict[str, CameraPose | None] = {}
-        self._under_way: tuple[int, float] | None = None
-        self._in_doubt: int | None = None
-
-    @property
-    def _facing(self) -> WristParameters:
-        """The wrist as the loop knows it."""
-        return self._wrist if self._settings.planes == 2 else sides_of(self._wrist, self._layout)
-
-    def replay(self, settings: HwRunSettings) -> None:
-        """Judge the trials by motions of these settings: those of a live reference are known afterwards."""
-        self.motions = {name: motion_of(settings, self._facing, name) for name in motions_of(settings)}
 
     def run(self, rig: GuardedRig, shown: Shown | None = None, confirm: Callable[[], None] | None = None) -> None:
         """Do all trials and close the rig. Whatever ends them early, the rig is stopped before it is raised.
@@ -120,15 +92,8 @@ class RigExperiment:
         """
         try:
             self._warm_up()
-            try:
+            with self._stopping(lambda cause: self._stopped(rig, cause)):
                 self._all(rig, shown, confirm)
-            except BaseException as error:
-                cause = cause_of(error)
-                with undisturbed():
-                    self._stopped(rig, cause)
-                if cause is not error:
-                    raise cause from error
-                raise
             with undisturbed():
                 halted = halt_rig(rig, self._still)
             if not halted.verified:
@@ -152,12 +117,7 @@ class RigExperiment:
         spools.target(np.zeros(len(taut)), taut)
         reeled = belief.at_places(taut)
         Watch(settings, self._facing, PLANE, self.timing, layout=self._layout).predict(reeled)
-        steering = Steering(belief, settings.sensor, settings.control_period)
-        for law, gains in [*self._laws, (self._back, ())]:
-            steering.use(law, gains)
-            steering.respond(course)
-            steering.predict(reeled)
-        steering.see(0, 0.0, 0.0)
+        self._warm_up_controllers(Steering(belief, settings.sensor, settings.control_period), course, reeled)
 
     def _all(self, rig: GuardedRig, shown: Shown | None, confirm: Callable[[], None] | None) -> None:
         if confirm is not None:
@@ -184,28 +144,17 @@ class RigExperiment:
 
     def _one(self, loop: ControlLoop, trial: Trial) -> None:
         """One trial, and the way back to zero."""
-        settings, followed, start = self._settings, self.motions[trial.direction], loop.next_tick
-        law, gains = self._laws[trial.row]
-        self._under_way, self.outcomes[trial.number] = (trial.number, start), "begun"
-        try:
-            loop.follow(followed, law, gains, trial.number, pushed=trial.push != 0.0, live=self._live)
-        finally:
-            self.most = {name: max(size, self.most.get(name, 0.0)) for name, size in loop.watch.most.items()}
-            self.odd[trial.number] = loop.watch.words()
+        self._begun(trial, loop.next_tick)
+        self._follow(loop, trial)
         self.outcomes[trial.number], self._under_way, self._in_doubt = "ok", None, trial.number
-        final = followed.final if self._live is None else self._live.bend
-        loop.follow(self._to_rest(final, settings.back, 0.0), self._back, ())
+        loop.follow(self._to_rest(self._final(trial), self._settings.back, 0.0), self._back, ())
 
     def _stopped(self, rig: GuardedRig, error: BaseException) -> None:
         """Stop the rig, then note what happened."""
-        trial, start = self._under_way or (None, None)
         try:
             decided = rig.now()
         except UserError:
             decided = math.nan
-        self.stop = Stop(error, trial, None if start is None else decided - start, halt_rig(rig, self._still))
-        if self._in_doubt is not None and isinstance(error, SafetyStop):
-            self.outcomes[self._in_doubt] = f"after it: {self.stop.reason.removeprefix('stopped: ')}"
-        if trial is not None:
-            self.outcomes[trial] = self.stop.reason
-        self._log.disk.give_up_reserve()
+        stop = self._note_stop(error, decided, halt_rig(rig, self._still))
+        if self._under_way is not None:
+            self.outcomes[self._under_way[0]] = stop.reason

@@ -20,7 +20,7 @@ from wristctl.errors import fix_of
 from wristctl.records import LiveRun
 from wristctl.simulation.metrics import METRICS, metrics_in
 from wristctl.trial.calibration import WristCalibration
-from wristctl.trial.experiment import Experiment, Stop
+from wristctl.trial.experiment import Experiment
 from wristctl.trial.guarded_rig import GuardedRig
 from wristctl.trial.live_datagrams import LiveReference
 from wristctl.trial.log import TrialLog
@@ -31,6 +31,7 @@ from wristctl.trial.rig_settings import rig_of
 from wristctl.trial.safety import SafetyStop
 from wristctl.trial.testbeds import open_testbed
 from wristctl.trial.trial_results import FURTHER, JUDGED, LOGGED, TRULY, metrics_of_trials
+from wristctl.trial.trial_series import Stop
 from wristctl.trial.trials import Trial, trials_of
 from wristctl.vision.camera import Frame
 from wristctl.vision.marker import Sighting
