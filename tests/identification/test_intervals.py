@@ -85,12 +85,15 @@ def test_frames_that_are_noisier_where_they_tell_more_widen_the_interval_by_the_
 
 
 def test_residuals_that_last_widen_every_interval_and_count_as_fewer_frames() -> None:
-    """Of one sign for half a second each: as if only one frame of that time told anything."""
+    """Of one sign for thirty frames each: as if one frame alone of them, or of half a second, told anything."""
     rng = np.random.default_rng(2)
     blocks = NOISE * np.repeat(rng.choice([-1.0, 1.0], 40), 30)
     slopes = rng.standard_normal((1200, 8))
-    known = knowledge(ended([slopes], [blocks]))
-    alike = inflation([blocks], 30)
+    fitted = ended([slopes], [blocks])
+    known = knowledge(fitted)
+    half_a_second = round(0.5 / float(np.median(np.diff(fitted.problem.trials[0].captured))))
+    alike = max(inflation([blocks], 30), inflation([blocks], half_a_second))
+    assert half_a_second != 30
     assert 12.0 < alike < 30.0 and known.effective == pytest.approx(1200 / alike) and known.misses_something
     alone = np.sqrt(np.diag(inverse(known.information)))
     assert (known.deviation >= np.sqrt(alike) * alone * (1.0 - 1e-9)).all()
