@@ -165,6 +165,9 @@ def test_beyond_a_dozen_the_table_has_the_best_the_asked_for_and_the_number_of_t
     five = [stands(name, rmse=many) for name in CLASSES]
     narrow = controllers_table(five, names)
     assert len(narrow.rows) == 12 and not any("[" in cell for row in narrow.rows for cell in row[1:])
+    few = [stands(name, rmse=dict(list(many.items())[:5])) for name in CLASSES]
+    for table in (narrow, controllers_table(few, names_of(few))):  # a short table alone goes on below
+        assert len(table.within(COLUMNS).columns) == len(table.columns)
     asked = controllers_table([one, other], names, list(many)[:15])
     assert [row[0] for row in asked.rows] == sorted([*(f"c{number:02d}" for number in range(15)), "c29"])
     assert asked.title.endswith("; 14 more controllers: --all")

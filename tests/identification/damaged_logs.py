@@ -25,7 +25,7 @@ import pandas as pd
 import wristctl
 from tests.drawn_rigs import options, tried
 from wristctl.arrays import Array
-from wristctl.commands.identify.logs import LogTold, read_logs
+from wristctl.commands.identify.logs import LogTold, logs_of, read_logs
 from wristctl.config.plant import Actuator, TrueWrist
 from wristctl.config.study import Study
 from wristctl.config.wrist import WristParameters
@@ -324,7 +324,7 @@ def found(table: pd.DataFrame, kind: Kind, stop_at: str = "(?!)") -> Finding:
     with tempfile.TemporaryDirectory() as folder:
         study = _study(table, kind, Path(folder))
         try:
-            remarks = _of_damage(read_logs(study).remarks)
+            remarks = _of_damage(read_logs(logs_of(study), study).remarks)
             if any(re.search(stop_at, remark) for remark in remarks):
                 return Finding("", remarks, {})
             result = wristctl.identify(study)

@@ -4,18 +4,21 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
 
-from wristctl.identification.static_tentacle import Tentacle
+from tests.documented import script_of_docs
+
+Tentacle = script_of_docs("static_tentacle").Tentacle
 
 ROD = Tentacle(0.36, (0.01, 0.01), 0.008, 0.0, (0.0, -math.tau / 3.0), 0.0, (0.12, 0.345))
 STIFF, LIGHT = 4.0, 1e-6
 """Modulus [MPa] and density [1e3 kg/m^3]."""
 
 
-def values(modulus: float, density: float, rod: Tentacle = ROD, turn: float = 0.0) -> np.ndarray:
+def values(modulus: float, density: float, rod: Any = ROD, turn: float = 0.0) -> np.ndarray:
     begin = rod.begin
     begin[:3] = modulus, density, turn
     return begin

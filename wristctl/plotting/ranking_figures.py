@@ -77,7 +77,7 @@ def answer_figure(rankings: Sequence[Ranking], places: Mapping[str, str]) -> Fig
     alone = "o" if len(marks) > 1 else next(iter(marks.values()))
     handles = [Line2D([], [], marker=alone, color=colour(name), label=called(name), **every) for name in names]
     handles += [
-        Line2D([], [], marker=mark, color=GREY, label=f"{gains} gains" if gains else "preset by loop", **every)
+        Line2D([], [], marker=mark, color=GREY, markerfacecolor="none", label=_gains_words(gains), **every)
         for gains, mark in marks.items()
         if len(marks) > 1
     ]
@@ -85,6 +85,11 @@ def answer_figure(rankings: Sequence[Ranking], places: Mapping[str, str]) -> Fig
         handles.append(Line2D([], [], linestyle="none", label="must not be used", **_UNUSABLE))
     legend_under(picture, handles, 3)
     return picture
+
+
+def _gains_words(gains: str) -> str:
+    """Gains in a legend, whose mark is hollow: a full grey one is a controller."""
+    return f"{gains} gains" if gains else "preset by loop"
 
 
 def _marks(labels: Sequence[str]) -> dict[str, str]:

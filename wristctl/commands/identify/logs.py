@@ -82,7 +82,7 @@ class ReadLogs(NamedTuple):
     """Readings of the motion per second; None without times."""
 
 
-def _logs(study: Study) -> list[OpenLog]:
+def logs_of(study: Study) -> list[OpenLog]:
     """The study's logs, read and looked at."""
     from wristctl.records.log_converters import read_log
     from wristctl.records.log_looks import looked_at
@@ -101,12 +101,8 @@ def _are_driven(logs: Sequence[OpenLog], study: Study) -> bool:
     return drive_of_log(logs[0], study.identify) is not None
 
 
-def read_logs(study: Study) -> ReadLogs:
-    """A study's logs, read and looked at. Raises UserError for logs that no fit may be asked of."""
-    return _read(_logs(study), study)
-
-
-def _read(logs: Sequence[OpenLog], study: Study) -> ReadLogs:
+def read_logs(logs: Sequence[OpenLog], study: Study) -> ReadLogs:
+    """What a study's logs hold. Raises UserError for logs that no fit may be asked of."""
     from wristctl.identification.log_model import rate_of_logs, recordings_of_logs, robot_of_logs, spools_of_log
     from wristctl.identification.log_senses import check_places
 
@@ -133,10 +129,10 @@ def log_plan(study: Study, inputs: Inputs) -> str:
     """Say what is looked for in which logs."""
     if inputs.runs():
         raise UserError("runs and logs at once", "identify.runs", "identify one or the other")
-    logs = _logs(study)
+    logs = logs_of(study)
     if _are_driven(logs, study):
         return driven_plan(study, logs)
-    robot, recordings, samples, remarks, _ = _read(logs, study)
+    robot, recordings, samples, remarks, _ = read_logs(logs, study)
     names = ", ".join(robot.unknowns(()))
     plan = f"{names}, then slack, friction and creep, from {len(recordings)} trials of open logs, {samples} samples"
     return "\n".join([plan, *remarks])
@@ -144,7 +140,7 @@ def log_plan(study: Study, inputs: Inputs) -> str:
 
 def identify_logs(session: Session) -> LogTold | DrivenTold:
     """Find what open logs tell, in their run."""
-    logs = _logs(session.study)
+    logs = logs_of(session.study)
     if _are_driven(logs, session.study):
         return identify_driven(session, logs)
     return _identify_spooled(session, logs)
@@ -159,7 +155,7 @@ def _identify_spooled(session: Session, logs: Sequence[OpenLog]) -> LogTold:
     from wristctl.identification.real_robots import RealRobot
 
     findings, study = session.findings, session.study
-    robot, recordings, _, remarks, rate = _read(logs, study)
+    robot, recordings, _, remarks, rate = read_logs(logs, study)
     models = list["TriedModel"]()
     with session.progress("fitting models") as report:
         for model in tried_models(robot, [recordings], False):
