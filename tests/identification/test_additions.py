@@ -178,8 +178,9 @@ def test_a_fit_moves_as_the_budget_says_where_what_is_believed_is_wrong() -> Non
             step = again.x[at_] - fitted.x[at_]
             assert moved[name][free] == pytest.approx(step, rel=0.2, abs=2e-4), (name, free)
     again = fit(Problem(trials, START, settings.model_copy(update={"segments": 8}), TENDONS))
-    step = again.x[0] - fitted.x[0]
-    assert moved[FINER]["stiffness"] == pytest.approx(step, rel=0.3, abs=1e-3), "0.1 %, which the search may leave"
+    step, sd = again.x[0] - fitted.x[0], float(knowledge(fitted).deviation[0])
+    assert abs(moved[FINER]["stiffness"] - step) < 0.1 * sd, "a search may end so far beside, where a tendon jumps"
+    assert 1e-4 < abs(moved[FINER]["stiffness"]) < 0.1 * sd
 
 
 def test_added_trials_are_reckoned_at_the_start_of_what_is_not_known() -> None:

@@ -272,3 +272,9 @@ def test_a_hands_mass_that_a_run_wrote_of_itself_is_not_given_unless_somebody_gi
     ):  # fmt: skip
         wrist = load_study([tmp_path / file], overrides).wrist
         assert ("hand_mass" in wrist.model_fields_set) == given and wrist.hand_mass == 0.3
+
+
+def test_text_of_another_form_is_refused_with_the_form_in_words() -> None:
+    with pytest.raises(UserError, match=r"'5005' has another form .*HOST:PORT") as caught:
+        load_study([], ["simulate.reference={kind: live, listen: '5005'}"])
+    assert "pattern" not in str(caught.value)

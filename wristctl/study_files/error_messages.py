@@ -79,6 +79,8 @@ def _what(detail: Any) -> str:
     if _as_keys(detail):
         key = next(iter(detail["input"]))
         return f"{detail['loc'][-1]!r} is a list, and given as a whole: {key!r} is no key of it"
+    if detail["type"] == "string_pattern_mismatch":
+        return f"{value} has another form"
     if detail["type"] == "too_short":
         written = "[]" if value == "()" else value
         return f"{written} is too few: at least {detail['ctx']['min_length']}"

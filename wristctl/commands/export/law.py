@@ -94,7 +94,9 @@ def _is_controller(word: str) -> bool:
 
 def _run(ref: str, out: Path) -> Run:
     if not (ref.startswith("latest:") or Path(ref).is_dir() or any(out.glob(f"{ref}*"))):
-        fix = f"{meant(ref, CONTROLLERS.known())} `wristctl list controllers` and `wristctl runs ls` show what there is"
+        fix = (
+            f"{meant(ref, CONTROLLERS.known())}; `wristctl list controllers` and `wristctl runs ls` show what there is"
+        )
         raise UserError(f"'{ref}' is no controller, no study file and no run in {out}", ref, fix)
     return require(ref, None, out)
 
