@@ -130,7 +130,7 @@ TAKEN_FOR_GRANTED = (
     r"no such video - ",
     r"cannot read the (measured loop|measured data|log): No such file",
     r"no such folder - ",
-    r"no file \S+my_rig\.py",
+    r"no file .*my_rig\.py",
     r"no [a-z-]+ run that ended ok - latest:[a-z-]+ in ",
 )
 
