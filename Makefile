@@ -13,7 +13,8 @@ BIN := .venv/bin
 PIP := $(BIN)/python -m pip --disable-pip-version-check
 
 .PHONY: run test lint bench bench-sweeps bench-peers bench-all firmware test-firmware test-faults test-trust test-vision test-identify \
-	test-allocation test-slow test-rig fault-table lerobot-reader lost-tendons twins sound-rigs damaged-logs inner-rigs driven-robots test-posterior test-statistics converge worlds docs clean venv mutants coverage installed matrix
+	test-allocation test-slow test-rig fault-table lerobot-reader lost-tendons twins sound-rigs damaged-logs inner-rigs driven-robots test-posterior test-statistics converge worlds docs clean venv mutants coverage installed matrix \
+	check-package constraints release
 
 run: .venv/run
 	@set -eo pipefail; \
@@ -36,7 +37,7 @@ lint: .venv/dev
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy --strict wristctl tests docs/*.py
-	$(BIN)/mypy --strict benchmarks
+	$(BIN)/mypy --strict benchmarks distribution
 
 bench: .venv/run
 	$(BIN)/python benchmarks/rollouts.py
@@ -135,6 +136,28 @@ lerobot-reader: .venv/dev
 # The built wheel in an environment of its own and an empty folder: `make installed WITH=python3.13`, `OLDEST=--lowest`.
 installed: .venv/dev
 	$(BIN)/python benchmarks/installed.py $(WITH) $(OLDEST)
+
+# Source archive and wheel in dist/, and the package's own descriptions, workflows and settings, checked by others' tools.
+check-package: .venv/dev build/tools/ready
+	$(BIN)/python -c 'import sys; sys.path.insert(0, "distribution"); import release; release.build()'
+	build/tools/bin/twine check --strict dist/wristctl-*
+	build/tools/bin/check-wheel-contents dist
+	build/tools/bin/cffconvert --validate
+	build/tools/bin/zizmor --offline .github
+	build/tools/bin/sp-repo-review .
+
+build/tools/ready: distribution/tools.txt
+	$(PYTHON) -m venv build/tools
+	build/tools/bin/pip install --quiet --disable-pip-version-check -r distribution/tools.txt
+	@touch $@
+
+# The newest versions that fit together, written to constraints.txt (needs uv); then make test test-slow.
+constraints:
+	$(PYTHON) distribution/constraints.py
+
+# A release, but for what only a person does, which it says at its end: make release VERSION=0.2.0
+release: .venv/dev
+	$(BIN)/python distribution/release.py $(VERSION)
 
 # Every Python that is here, one after the other: the wheel, commands and tests, some minutes each.
 matrix: .venv/dev

@@ -1,11 +1,12 @@
 #!/usr/bin/env -S uv run --script
 # /// script
-# dependencies = ["nox>=2025.2.9"]
+# dependencies = ["nox[uv]>=2025.2.9"]
 # ///
 """The matrix of versions: `nox` runs all of it, `nox -l` lists it, `nox -s "tests-3.12(newest)" -- tests/wrist` a part.
 
 Every change is tested by `make test`, with the versions of constraints.txt. Here are the other Pythons, each with the
-newest dependencies, and the oldest Python with the lowest ones that pyproject.toml allows.
+newest dependencies, and the oldest Python with the lowest ones that pyproject.toml allows. A Python that is not there
+is a failure.
 """
 
 from __future__ import annotations
@@ -20,7 +21,8 @@ TORCH_INDEX = "https://download.pytorch.org/whl/cpu"
 SOON = {"PIP_TIMEOUT": "5", "PIP_RETRIES": "0", "UV_HTTP_TIMEOUT": "5", "UV_HTTP_RETRIES": "0"}
 THREADS = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
 
-nox.options.default_venv_backend = "uv|virtualenv"
+nox.options.default_venv_backend = "uv"  # pip knows no lowest versions
+nox.options.error_on_missing_interpreters = True  # what has not run has not passed
 
 
 def install(session: nox.Session, extra: str, *resolution: str) -> None:
@@ -40,22 +42,6 @@ def tests(session: nox.Session, dependencies: str) -> None:
     resolution = ["--resolution", "lowest-direct"] if dependencies == "lowest" else []
     install(session, "dev", *resolution)
     session.run("pytest", "-n", "auto", *session.posargs, env=THREADS)
-
-
-@nox.session
-def package(session: nox.Session) -> None:
-    """Wheel and source archive, checked, and the wheel tried in an environment of its own."""
-    session.install("build", "twine", "check-wheel-contents")
-    session.run("python", "-m", "build", "--outdir", "dist")
-    session.run("twine", "check", "--strict", "dist/*")
-    session.run("check-wheel-contents", "dist")
-
-
-@nox.session
-def docs(session: nox.Session) -> None:
-    """The documentation's site, where a warning is an error."""
-    install(session, "docs")
-    session.run("python", "docs/build_site.py", env=THREADS)
 
 
 if __name__ == "__main__":

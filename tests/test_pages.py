@@ -110,7 +110,9 @@ def test_the_wrist_in_motion_is_a_small_animation() -> None:
 def test_one_version_is_said_everywhere() -> None:
     citation = yaml.safe_load((ROOT / "CITATION.cff").read_text(encoding="utf-8"))
     assert citation["version"] == __version__ and citation["license"] == "MIT"
-    assert __version__ in (ROOT / "CHANGELOG.md").read_text(encoding="utf-8")
+    changes = (ROOT / "CHANGELOG.md").read_text(encoding="utf-8")
+    assert ("\n## Unreleased\n" if "dev" in __version__ else f"\n## {__version__} - ") in changes
+    assert f"version = {{{__version__}}}" in (ROOT / "README.md").read_text(encoding="utf-8")
     assert 'dynamic = ["version"]' in (ROOT / "pyproject.toml").read_text(encoding="utf-8")
 
 
@@ -128,7 +130,7 @@ def test_the_draft_paper_has_what_a_journal_of_software_asks_and_cites_what_it_l
     heads = re.findall(r"^# (.*)", text, re.MULTILINE)
     assert heads == [
         "Summary", "Statement of need", "State of the field", "Software design", "Research impact statement",
-        "AI usage disclosure", "References",
+        "AI usage disclosure", "Acknowledgements", "References",
     ]  # fmt: skip
     assert 750 <= len(text.partition("# Summary")[2].split()) <= 1750
     listed = re.findall(r"^@\w+\{(\w+),", (ROOT / "paper" / "paper.bib").read_text(encoding="utf-8"), re.MULTILINE)

@@ -77,6 +77,9 @@ def test_the_wheel_holds_experiments_firmware_templates_and_types_as_they_are_he
         for file in files:
             assert (there / file.relative_to(here)).read_bytes() == file.read_bytes(), file
     assert not [each for each in installed.iterdir() if not each.name.startswith("wristctl")]
+    (about,) = installed.glob("*.dist-info")
+    for licence in (ROOT / "LICENSE", *(ROOT / "LICENSES").iterdir()):
+        assert (about / "licenses" / licence.relative_to(ROOT)).read_bytes() == licence.read_bytes(), licence
 
 
 def test_the_sdist_holds_the_tests_and_what_they_read(built: Path) -> None:

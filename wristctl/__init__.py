@@ -64,6 +64,7 @@ def __getattr__(name: str) -> Any:
     """The functions are imported when one is first asked for, so that `import wristctl` stays light."""
     if name not in (*__all__, "api"):
         raise AttributeError(f"module 'wristctl' has no attribute {name!r}")
+    import_module("wristctl.platforms").check()
     api = import_module("wristctl.api")
     globals()[name] = found = api if name == "api" else getattr(api, name)
     return found

@@ -21,6 +21,7 @@ def main() -> None:
     """Run the command line; once it has ended nothing is left that Ctrl-C could end."""
     if signal.getsignal(signal.SIGINT) is not signal.SIG_IGN:
         signal.signal(signal.SIGINT, _interrupted)
+    _on_this_system()
     from wristctl.cli.app import main as command_line
 
     try:
@@ -33,6 +34,20 @@ def main() -> None:
         raise
     finally:
         signal.signal(signal.SIGINT, signal.SIG_IGN)
+
+
+def _on_this_system() -> None:
+    """End with a sentence where the system is none that wristctl runs on."""
+    from wristctl.cli.json_output import print_error
+    from wristctl.errors import UserError
+    from wristctl.platforms import check
+
+    try:
+        check()
+    except UserError as error:
+        sys.stderr.write(f"error: {error}\n")
+        print_error(error.what, error.where, error.fix, error.exit_code)
+        raise SystemExit(error.exit_code) from None
 
 
 def _interrupted(*_: object) -> None:

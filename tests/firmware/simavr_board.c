@@ -1,5 +1,5 @@
 /* The motor board on libsimavr, stepped in virtual time: bytes in and out at the line's pace, pin changes with cycle
- * stamps. Used through ctypes by simavr_board.py. Links to simavr (GPL-3): a test tool, never part of the package.
+ * stamps. Used through ctypes by simavr_board.py. Links to simavr (GPL-3): a test tool, never part of the wheel.
  *
  * What simavr 1.6 does otherwise than the chip, and is mended or avoided here:
  *  - an 8N1 byte lasts 11 bits: cycles_per_byte is scaled in board_run();
