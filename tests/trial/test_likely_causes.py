@@ -164,9 +164,12 @@ def test_an_oblique_camera_is_named_where_the_bend_across_may_be_its_own() -> No
 
 def test_a_rig_of_ones_own_has_targets_and_a_sensor_and_no_markers_or_pulleys_to_set() -> None:
     angles = np.radians([90.0, 210.0, 330.0])
-    lost = of(own=True, load=toward(270.0), directions=angles)
-    assert "motors of tendons 2 and 3 exchanged with those of tendon 1" in lost, "between two places"
-    assert of(own=True, load=toward(210.0), directions=angles)[1].startswith("target 2 turns the wrong way")
+    lost = "the tendon of target 1 is off its pulley, cut or slipped, or its motor has stalled"
+    assert of(own=True, load=toward(270.0), directions=angles)[0] == lost, "no tendon is opposite"
+    caught = of(own=True, load=toward(210.0), directions=angles)
+    assert caught[0] == "target 2 turns the wrong way, or its tendon is caught" and "pushes" in caught[1]
+    between = of(own=True, load=toward(240.0), directions=angles)
+    assert between[0] == "motors of tendon 2 exchanged with those of tendon 1"
     assert of(own=True, jump=np.array([0.1, 0.0]))[0] == "the sensor of the bend toward ulnar has slipped"
     seen: list[dict[str, Any]] = [{"jump": 0.1}, {"meant": 0.2}, {"meant": 0.2, "bent": 0.4}, {"load": 1.0}]
     said = " ".join(cause for each in seen for cause in in_one(own=True, **each))

@@ -205,18 +205,21 @@ def _by_direction(evidence: Evidence) -> list[str]:
     toward = np.stack([np.cos(evidence.directions), np.sin(evidence.directions)], axis=1) @ off
     much, little = int(np.argmax(toward)), int(np.argmin(toward))
     moved = bool((np.abs(evidence.turned[[much, little]]) > TURNED).any())
-    single = evidence.aside or len(evidence.jump) > 1
-    if single and math.acos(min(1.0, float(toward[much]))) <= _ASIDE:
-        lost = f"the tendon of {motors[little]} is off its pulley, cut or slipped, or its motor has stalled"
-        more = f"{motors[much]} turns the wrong way, or its tendon is caught"
+    lost, more = list[str](), list[str]()
+    if evidence.aside or len(evidence.jump) > 1:  # else two tendons of a side are not told apart
+        if -float(toward[little]) >= math.cos(_ASIDE):
+            lost = [f"the tendon of {motors[little]} is off its pulley, cut or slipped, or its motor has stalled"]
+        if float(toward[much]) >= math.cos(_ASIDE):
+            more = [f"{motors[much]} turns the wrong way, or its tendon is caught"]
+    if lost or more:
         carries = float(evidence.torque[little]) >= _ACCOUNTS * math.hypot(*evidence.load)
         first, second = (lost, more) if carries or evidence.turned[much] >= -TURNED else (more, lost)
-        return [first, *["motors exchanged"] * moved, second]
+        return [*first, *["motors exchanged"] * moved, *second]
     plus, minus = (_tendons(evidence.parts, sign * toward) for sign in (1.0, -1.0))
     exchanged = [f"motors of {plus} exchanged with those of {minus}"] * bool(plus and minus)
     motor = f"a motor of {minus}" if minus else "a motor"
-    lost = f"{motor} has stalled or no power, or a tendon has slipped or come off"
-    return [*_scaled(evidence), *exchanged, lost]
+    stalled = f"{motor} has stalled or no power, or a tendon has slipped or come off"
+    return [*_scaled(evidence), *exchanged, stalled]
 
 
 def _tendons(parts: Parts, toward: Array) -> str:
