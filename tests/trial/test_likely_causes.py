@@ -136,6 +136,15 @@ def test_load_and_bend_across_together_tell_which_tendon(load: float, across: fl
     assert moving[:3] == [wrong, "motors exchanged", lost]
 
 
+def test_a_motor_that_is_told_to_reel_in_where_its_tendon_lets_go_may_turn_the_wrong_way() -> None:
+    """Of the axis that the load is away from; one that stood, or was told to pay out, has not."""
+    for steps, told in ((100.0, True), (0.0, False), (-100.0, False)):
+        turned = np.array([0.0, 0.0, steps, 0.0])
+        for causes in (in_one(load=-1.0, across=0.05, turned=turned), of(load=toward(135.0), turned=turned)):
+            assert "the tendon of axis 2 (tendon 4) is off its pulley" in causes[0]
+            assert (causes[1] == "axis 2 (tendon 4) turns the wrong way") is told
+
+
 @pytest.mark.parametrize("axis", range(4))
 @pytest.mark.parametrize("plane", PLANES)
 @pytest.mark.parametrize("positive", ["right", "left"])

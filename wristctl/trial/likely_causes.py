@@ -209,6 +209,7 @@ def _by_direction(evidence: Evidence) -> list[str]:
     if evidence.aside or len(evidence.jump) > 1:  # else two tendons of a side are not told apart
         if -float(toward[little]) >= math.cos(_ASIDE):
             lost = [f"the tendon of {motors[little]} is off its pulley, cut or slipped, or its motor has stalled"]
+            lost += [f"{motors[little]} turns the wrong way"] * bool(evidence.turned[little] > TURNED)
         if float(toward[much]) >= math.cos(_ASIDE):
             more = [f"{motors[much]} turns the wrong way, or its tendon is caught"]
     if lost or more:
