@@ -89,6 +89,7 @@ def test_a_ring_shows_its_last_pictures_again_and_again_and_a_frozen_camera_one(
         fault = InjectedFault.model_validate({"kind": kind, "at": 0.51, "size": 3.0})
         shown = [shutter(None, fault).expose(number).shown for number in range(26, 38)]
         assert set(shown) == pictures and all(one == other for one, other in zip(shown, shown[3:], strict=False))
+        assert shown[:3] == sorted(shown[:3]), "in the order in which they were taken"
 
 
 @pytest.mark.parametrize(("kind", "which"), [("marker-covered", "covered"), ("markers-swapped", "swapped")])

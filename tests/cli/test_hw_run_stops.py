@@ -175,7 +175,7 @@ def test_two_faults_together_end_within_the_sooner_ones_time(hw_run: HwRun, faul
 def interrupted_at(moment: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """Have Ctrl-C come as this begins."""
     place, name = {
-        "homing": (homing._Finder, "_go"),
+        "homing": (homing.Finder, "_go"),
         "between trials": (TrialLog, "truth"),
         "drawing": (trial_figures, "errors"),
     }[moment]

@@ -16,8 +16,7 @@ import wristctl
 from tests.commands.conftest import columns_of, session
 from wristctl.commands.adoption import with_planes
 from wristctl.commands.export.open_log_of_run import open_log_of
-from wristctl.commands.hw_run.command import hw_run, plan
-from wristctl.commands.hw_run.trial_bends import PerformedBends
+from wristctl.commands.hw_run.command import Performed, hw_run, plan
 from wristctl.commands.inputs import Inputs
 from wristctl.config.study import Study
 from wristctl.config.wrist import WristParameters
@@ -50,7 +49,7 @@ def study_of(*changes: str) -> Study:
 class Whole:
     """A result with its run."""
 
-    result: PerformedBends
+    result: Performed
     run: Run
 
 
@@ -60,7 +59,6 @@ def whole(tmp_path_factory: pytest.TempPathFactory) -> Whole:
     study = study_of()
     with start_run("hw-run", study, "", tmp_path_factory.mktemp("whole")) as live:
         result = hw_run(session(study, live))
-    assert isinstance(result, PerformedBends)
     return Whole(result, Run(live.path))
 
 
@@ -87,16 +85,40 @@ def test_the_answer_has_both_planes_beside_simulation(whole: Whole) -> None:
     answer = whole.result.answer
     assert answer.sentence.startswith("ct-dob/hardware in two planes: error 0.")
     assert "toward ulnar" in answer.sentence and "toward flexion" in answer.sentence
-    assert "with a push of 1 N" in answer.sentence and "No trial ended early." in answer.sentence
-    assert answer.table is not None and len(answer.table.rows) == 2
+    assert "after a push of 1 N" in answer.sentence and "No trial ended early." in answer.sentence
+    assert "settles" not in answer.sentence, "the path rests nowhere"
+    assert answer.table is not None
+    (row,) = answer.table.rows
+    cells = dict(zip(answer.table.columns, row, strict=True))
+    free, pushed = (whole.result.trials[whole.result.trials["push"] == push].iloc[0] for push in (0.0, 1.0))
+    for plane in ("ulnar", "flexion"):
+        assert float(cells[f"toward {plane} [deg]"]) == pytest.approx(np.degrees(free[f"rmse_{plane}"]), rel=0.06)
+    worse = max(pushed["rmse_ulnar"], pushed["rmse_flexion"])
+    assert float(cells["pushed, worse axis [deg]"]) == pytest.approx(np.degrees(worse), rel=0.06)
+    assert ("recovery [s]" in cells) is math.isfinite(pushed["true_recovery"])
     simulated = [twin.metrics["rmse"] for twin in whole.result.twins.values()]
     assert np.degrees(simulated) == pytest.approx([0.1, 0.1], abs=0.15)
 
 
 def test_it_is_drawn_in_the_plane_of_bends_and_in_space(whole: Whole) -> None:
-    names = {"bends", "errors", "pushed-bends", "pushed-errors"}
+    names = {f"{prefix}{name}" for prefix in ("", "pushed-") for name in ("bends", "errors", "tensions")}
     assert names <= set(whole.result.findings.figures)
     assert all((whole.run.path / f"figures/{name}.svg").is_file() for name in names)
+    figures = whole.result.findings.figures
+    assert [axes.get_title("left") for axes in figures["errors"].axes] == [
+        "dart-thrower, toward ulnar",
+        "dart-thrower, toward flexion",
+    ]
+    log = whole.run.data("log")
+    for axes, plane in zip(figures["pushed-errors"].axes, ("ulnar", "flexion"), strict=True):
+        (line,) = (line for line in axes.lines if line.get_label() == "ct-dob/hardware")
+        of_trial = log[log["trial"] == whole.result.trials.query("push > 0")["trial"].iloc[0]]
+        error = np.degrees(of_trial[f"bend_{plane}"] - of_trial[f"bend_ref_{plane}"])
+        np.testing.assert_allclose(np.asarray(line.get_ydata()), error)
+        assert {"true", "ct-dob/hardware, simulated"} <= {line.get_label() for line in axes.lines}
+        assert [patch.get_label() for patch in axes.patches] == ["push"]
+    (pulls,) = figures["tensions"].axes
+    assert [line.get_label() for line in pulls.lines] == [f"tendon {number}" for number in ACTIVE]
     space = spatial_view(whole.run)
     assert space is not None and len(space["tendons"]) == 4 and space["duration"] == pytest.approx(1.2, abs=0.02)
     wanted = np.array(space["wanted"]) * space["units"]["angle"]

@@ -13,7 +13,7 @@ import pytest
 import wristctl
 from tests.commands.conftest import repeated
 from wristctl.commands.hw_run import results as hw_tables
-from wristctl.commands.hw_run.answer import answer_of, completed, in_one_plane, swings_apart
+from wristctl.commands.hw_run.answer import answer_of, completed, swings_apart
 from wristctl.commands.hw_run.command import Performed
 from wristctl.commands.inputs import Inputs
 from wristctl.commands.printed_table import Table
@@ -24,6 +24,7 @@ from wristctl.records import start_run
 from wristctl.simulation.repetitions import Simulation
 from wristctl.simulation.trajectory import Trajectory
 from wristctl.trial.trials import Trial
+from wristctl.wrist.tendon_layout import TendonLayout, TendonPlace
 
 ROWS = "controllers: [{controller: smc, gains: printed}, {controller: pid, gains: printed}]"
 FACTS = [
@@ -147,6 +148,15 @@ def test_courses_are_drawn_by_their_log_with_and_without_a_push(tmp_path: Path, 
     assert sum(len(axes.lines) for axes in findings.figures["tensions"].axes) == 4, "the first row's, each once"
 
 
+@pytest.mark.parametrize(("direction", "pulls", "holds"), [("ulnar", 1, 2), ("radial", 2, 1)])
+def test_of_three_tendons_in_one_plane_one_of_each_side_is_drawn(direction: str, pulls: int, holds: int) -> None:
+    """At 0, 120 and 240 deg from ulnar."""
+    layout = TendonLayout(tuple(TendonPlace(float(np.radians(angle)), 0.02) for angle in (0.0, 120.0, 240.0)))
+    log = pd.DataFrame({f"tension_{number}": [float(number)] for number in (1, 2, 3)})
+    drawn = hw_tables._tensions(log, direction, ("ulnar",), layout)
+    assert [float(values[0]) for values in drawn.values()] == [pulls, holds]
+
+
 def test_lateness_is_drawn_where_time_is_real(tmp_path: Path, asked: list[Trial]) -> None:
     _, findings, _ = tables(tmp_path, f"real_time: true, {ROWS}")
     axes = findings.figures["lateness"].axes[0]
@@ -196,7 +206,7 @@ def _small() -> pd.DataFrame:
 
 def test_the_answer_gives_error_settling_and_recovery_by_direction_in_degrees() -> None:
     table = _small()
-    answer = answer_of(table, in_one_plane(_twins(0.03)), {}, [], "")
+    answer = answer_of(table, _twins(0.03), {}, [], "")
     lines = answer.lines()
     assert len(lines) <= 32 and max(map(len, lines)) <= 100 and answer.table is not None
     rows = {(row[0], row[1]): row[2:] for row in answer.table.rows}
@@ -217,7 +227,7 @@ def test_an_error_far_from_the_simulated_one_is_told_by_the_true_angle_where_it_
     """A camera that is late, and an estimate that lags, show less error than there is."""
     table = _small().query("controller == 'smc' and push == 0.0 and outcome == 'ok'")
     table = table.assign(rmse=0.01 if known else 0.0345, true_rmse=0.0345 if known else np.nan)
-    lines = " ".join(answer_of(table, in_one_plane(_twins(simulated)), {}, [], "").lines())
+    lines = " ".join(answer_of(table, _twins(simulated), {}, [], "").lines())
     assert ("simulated." in lines) == told and ("truly 2 deg" in lines) == known
     assert not told or ("smaller" if simulated > 0.0345 else "larger") in lines
 
@@ -247,19 +257,19 @@ def test_where_one_of_rig_and_simulation_swings_at_rest_the_kinder_one_is_named(
     assert len(notes) == 2 and all("1 of 5 trials" in note for note in notes)
     assert "the rig swings" in notes[0] and "0.6 deg" in notes[0] and "simulation is kinder" in notes[0]
     assert "the simulation swings" in notes[1] and "by up to 0.7" in notes[1] and "rig is kinder" in notes[1]
-    assert all(note in " ".join(answer_of(table, in_one_plane(twins), {}, [], "").lines()) for note in notes)
+    assert all(note in " ".join(answer_of(table, twins, {}, [], "").lines()) for note in notes)
     alike = table.assign(true_oscillation=table["true_oscillation"] if known else np.nan)
     alike = alike[[(one > 0.2) == (two > 0.2) for one, two in zip(rig, model, strict=True)]]
     assert not swings_apart(completed(alike), twins)
 
 
 def test_timing_is_told_only_where_ticks_were_skipped() -> None:
-    words = in_one_plane(_twins(0.03))
+    words = _twins(0.03)
     quiet, late = (answer_of(_small(), words, {"ticks": 500.0, "overruns": o}, [], "") for o in (0.0, 7.0))
     assert "7 of 500" in " ".join(late.lines()) and "of 500" not in " ".join(quiet.lines())
 
 
 def test_a_trial_that_was_odd_or_never_settled_is_told() -> None:
     table = _small().assign(settling=np.nan, odd=["", "the marker jumped", "", "", "", ""])
-    lines = " ".join(answer_of(table, in_one_plane(_twins(0.03)), {}, ["chatters: 2 of 5 trials"], "").lines())
+    lines = " ".join(answer_of(table, _twins(0.03), {}, ["chatters: 2 of 5 trials"], "").lines())
     assert "the marker jumped" in lines and "never settles" in lines and "chatters: 2 of 5 trials" in lines

@@ -235,7 +235,7 @@ FAILING: dict[str, tuple[str, str, type[UserError], str]] = {
         PULLS,
         f"{BENT}self._reeled = self._reeled - [1.0, 0.0, 0.0]\n{PULLS}",
         SafetyStop,
-        "tendons 1 have slipped or come off",
+        "likely the tendon of target 1 is off its pulley, cut or slipped",
     ),
 }
 

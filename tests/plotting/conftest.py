@@ -13,7 +13,7 @@ from tests.plotting.browser import CHROMIUM, DRIVER, Browser
 from wristctl.api import load_study
 from wristctl.commands.compare.class_figures import error_against_variation, tension_rows
 from wristctl.commands.compare.figures import error_over_disturbance, rmse_map, variation_dots
-from wristctl.commands.hw_run.figures import DIRECTIONS, LoggedTrial, desired_and_obtained, lateness
+from wristctl.commands.hw_run.figures import DIRECTIONS, Course, LoggedTrial, desired_and_obtained, lateness
 from wristctl.commands.hw_run.figures import errors as trial_errors
 from wristctl.commands.hw_run.figures import tensions as trial_tensions
 from wristctl.commands.simulate.figures import sliding
@@ -133,10 +133,17 @@ def search(name: str = "smc", count: int = 3) -> Search:
 def trials() -> list[LoggedTrial]:
     """Two repetitions in three directions, with a simulation, one of them pushed."""
     one = course("smc/exchanged")
-    simulated = one.time, 0.9 * one.theta, 0.1 * one.theta
-    common = one.time, one.theta, one.theta_ref, one.theta_desired, one.tension, simulated
+    bend, ref, wanted = (angle[:, None] for angle in (one.theta, one.theta_ref, one.theta_desired))
+    simulated = Course(one.time, 0.9 * bend, 0.1 * bend)
+    pulls = {"tendons that pull": one.tension[:, 0], "tendons that hold against": one.tension[:, 1]}
     pushes = {"flexion": (2.0, 2.5)}
-    return [LoggedTrial(each, one.label, k, *common, pushes.get(each)) for each in DIRECTIONS[:3] for k in range(2)]
+    return [
+        LoggedTrial(
+            each, one.label, k, ("flexion",), one.time, bend, ref, wanted, pulls, simulated, push=pushes.get(each)
+        )
+        for each in DIRECTIONS[:3]
+        for k in range(2)
+    ]
 
 
 def sightings() -> list[Sighting]:

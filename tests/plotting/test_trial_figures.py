@@ -11,7 +11,16 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from wristctl.commands.hw_run.figures import DIRECTIONS, LoggedTrial, desired_and_obtained, errors, lateness, tensions
+from wristctl.commands.hw_run.figures import (
+    DIRECTIONS,
+    Course,
+    LoggedTrial,
+    desired_and_obtained,
+    errors,
+    lateness,
+    paths,
+    tensions,
+)
 from wristctl.simulation.trajectory import Trajectory
 
 
@@ -19,9 +28,12 @@ from wristctl.simulation.trajectory import Trajectory
 def trial(course: Callable[..., Trajectory]) -> Callable[..., LoggedTrial]:
     def made(direction: str = "flexion", repetition: int = 0, push: tuple[float, float] | None = None) -> LoggedTrial:
         one = course("smc/exchanged", network_error=0.02)
-        simulated = 1.1 * one.time, 0.9 * one.theta, 0.1 * one.theta
-        own = one.time, one.theta, one.theta_ref, one.theta_desired, one.tension + np.array([0.0, 1.0]), simulated, push
-        return LoggedTrial(direction, one.label, repetition, *own)
+        bend, ref, wanted = (angle[:, None] for angle in (one.theta, one.theta_ref, one.theta_desired))
+        simulated = Course(1.1 * one.time, 0.9 * bend, 0.1 * bend)
+        pulls = {"tendons that pull": one.tension[:, 0], "tendons that hold against": one.tension[:, 1] + 1.0}
+        return LoggedTrial(
+            direction, one.label, repetition, ("flexion",), one.time, bend, ref, wanted, pulls, simulated, push=push
+        )
 
     return made
 
@@ -43,9 +55,9 @@ def test_angles_are_in_degrees_beside_what_was_wanted_and_simulated(trial: Maker
     made = desired_and_obtained([one], "Trials")
     (axes,) = made.axes
     for label, time, angle in (
-        ("smc/exchanged", one.time, one.theta),
-        ("desired", one.time, one.theta_desired),
-        ("smc/exchanged, simulated", 1.1 * one.time, 0.9 * one.theta),
+        ("smc/exchanged", one.time, one.bend[:, 0]),
+        ("desired", one.time, one.wanted[:, 0]),
+        ("smc/exchanged, simulated", 1.1 * one.time, 0.9 * one.bend[:, 0]),
     ):
         (line,) = named(axes, label)
         np.testing.assert_array_equal(line.get_xdata(), time)
@@ -58,7 +70,8 @@ def test_errors_are_angle_less_reference_in_degrees_around_zero(trial: Maker) ->
     one = trial()
     made = errors([one])
     (axes,) = made.axes
-    for label, error in (("smc/exchanged", one.theta - one.theta_ref), ("smc/exchanged, simulated", 0.1 * one.theta)):
+    measured, simulated = (one.bend - one.bend_ref)[:, 0], 0.1 * one.bend[:, 0]
+    for label, error in (("smc/exchanged", measured), ("smc/exchanged, simulated", simulated)):
         (line,) = named(axes, label)
         np.testing.assert_allclose(np.asarray(line.get_ydata()), np.degrees(error))
     assert [0.0, 0.0] in [list(np.asarray(each.get_ydata())) for each in axes.lines]
@@ -71,8 +84,8 @@ def test_tensions_are_those_of_the_side_that_pulls_and_of_the_other(trial: Maker
     (axes,) = made.axes
     pulls, holds = axes.lines
     assert (pulls.get_label(), holds.get_label()) == ("tendons that pull", "tendons that hold against")
-    np.testing.assert_array_equal(pulls.get_ydata(), one.tension[:, 0])
-    np.testing.assert_array_equal(holds.get_ydata(), one.tension[:, 1])
+    np.testing.assert_array_equal(pulls.get_ydata(), one.tension["tendons that pull"])
+    np.testing.assert_array_equal(holds.get_ydata(), one.tension["tendons that hold against"])
     assert pulls.get_color() != holds.get_color() and made.get_supylabel() == "tension [N]"
 
 
@@ -122,6 +135,39 @@ def test_a_legend_names_each_course_once(trial: Maker) -> None:
     (legend,) = made.legends
     names = [text.get_text() for text in legend.get_texts()]
     assert sorted(names) == ["desired", "push", "smc/exchanged", "smc/exchanged, simulated"]
+
+
+def in_two(trial: Maker, direction: str = "dart-thrower") -> LoggedTrial:
+    """The same toward ulnar, and twice as far toward flexion; truly a tenth further."""
+    one = trial(direction)
+    both: dict[str, np.ndarray] = {
+        name: getattr(one, name) * np.array([1.0, 2.0]) for name in ("bend", "bend_ref", "wanted")
+    }
+    true = Course(one.time, 1.1 * both["bend"], 1.1 * both["bend"] - both["bend_ref"])
+    return replace(one, planes=("ulnar", "flexion"), simulated=None, true=true, **both)  # type: ignore[arg-type]
+
+
+def test_in_two_planes_each_motion_has_a_panel_for_each_plane_with_its_true_course(trial: Maker) -> None:
+    one, other = in_two(trial), in_two(trial, "circumduction")
+    made = errors([one, other])
+    assert shown(made) == [
+        f"{name}, toward {plane}" for name in (one.direction, other.direction) for plane in ("ulnar", "flexion")
+    ]
+    for plane, axes in enumerate(made.axes[:2]):
+        (line,), (true,) = named(axes, "smc/exchanged"), named(axes, "true")
+        np.testing.assert_allclose(np.asarray(line.get_ydata()), np.degrees(one.bend - one.bend_ref)[:, plane])
+        np.testing.assert_allclose(
+            np.asarray(true.get_ydata()), np.degrees(1.1 * one.bend - one.bend_ref)[:, plane], atol=1e-9
+        )
+    assert shown(tensions([one])) == ["dart-thrower"], "tendons are of both planes"
+
+
+def test_paths_are_drawn_in_the_plane_of_bends_within_what_is_in_reach(trial: Maker) -> None:
+    one, reach = in_two(trial), np.array([[1.0, 0.0], [0.0, 1.0], [-1.0, 0.0], [1.0, 0.0]])
+    (axes,) = paths([one], reach, "smc").axes
+    drawn = {line.get_label(): np.asarray(line.get_xydata()) for line in axes.lines}
+    for label, bends in (("in reach", reach), ("measured", one.bend), ("wanted", one.wanted), ("true", 1.1 * one.bend)):
+        np.testing.assert_allclose(drawn[label], np.degrees(bends))
 
 
 @pytest.mark.parametrize(("latest", "end"), [(2e-3, 5.0), (8e-3, 8.0)])

@@ -104,6 +104,8 @@ class RigBoard:
 class Marker:
     """Tracking that sees a new frame at each look, showing what `angle` gives (nan: unusable)."""
 
+    pace, apart = None, 0.0
+
     def __init__(self, board: RigBoard, angle: Callable[[], float], verdict: SightingVerdict | None = None) -> None:
         self._board, self._angle, self._verdict = board, angle, verdict
         self.zero, self.number, self.delay = (0.0,), -1, 0.0

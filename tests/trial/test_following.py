@@ -13,13 +13,12 @@ from tests.trial.conftest import WRIST, settings_of
 from wristctl.board.messages import State
 from wristctl.control.response import Estimate
 from wristctl.trial.blind_model import BlindModel
-from wristctl.trial.likely_causes import Evidence, likely_causes, reversals
+from wristctl.trial.likely_causes import reversals
 from wristctl.trial.safety import SafetyStop
-from wristctl.trial.spools import on_plus_side
 from wristctl.trial.tick_timing import TickTiming
 from wristctl.trial.watch import Tick, Watch
 from wristctl.vision.marker import Sighting, SightingVerdict
-from wristctl.wrist.directions import away_of
+from wristctl.wrist.directions import ACTIVE
 
 PERIOD, FRAME = 5e-3, 3
 SETTINGS = settings_of()
@@ -37,11 +36,11 @@ def still(time: float) -> float:
 
 def watched(
     theta: Course = still, away: Course = still, load: Course = still, seconds: float = 1.0, position: Course = still,
-    **changes: Any,
+    plane: str = "ulnar", **changes: Any,
 ) -> tuple[Watch, float]:  # fmt: skip
     """A wrist whose spools are said to stand here [steps] and whose marker shows this; when it was stopped."""
     settings = settings_of(**changes)
-    watch = Watch(settings, WRIST, "ulnar", TickTiming(PERIOD))
+    watch = Watch(settings, WRIST, plane, TickTiming(PERIOD))
     held, taut = WRIST.pretension / settings.actuator.tendon_stiffness, np.zeros(4)
     for tick in range(round(seconds / PERIOD)):
         time = tick * PERIOD
@@ -114,6 +113,17 @@ def test_each_limit_stops_once_it_is_exceeded_for_so_long(sign: float) -> None:
     assert "bends 1.1 deg across its plane, beyond 1 deg" in said and late < LIMITS.odd_for + 5 * PERIOD
     said, _ = stopped(theta=slowly(sign * math.radians(1.2 * LIMITS.follow_deg)))
     assert "deg from where they should have it, beyond 3.5 deg" in said
+
+
+@pytest.mark.parametrize(
+    ("plane", "load", "away", "lost"),
+    [("ulnar", 1.0, 1.0, 0), ("ulnar", 1.0, -1.0, 1), ("ulnar", -1.0, -1.0, 3),
+     ("flexion", 1.0, 1.0, 2), ("flexion", -1.0, 1.0, 3), ("flexion", -1.0, -1.0, 1)],
+)  # fmt: skip
+def test_a_load_with_a_bend_across_names_the_tendon_opposite(plane: str, load: float, away: float, lost: int) -> None:
+    """Ulnar to the right of the first picture, flexion behind it; of the second radial is behind."""
+    said, _ = stopped(load=after(load), away=after(away * math.radians(1.05)), plane=plane)
+    assert f"likely the tendon of axis {lost} (tendon {ACTIVE[lost]}) is off its pulley" in said
 
 
 def test_what_is_over_sooner_does_not_stop() -> None:
@@ -190,65 +200,6 @@ def test_between_two_ticks_the_model_is_between_its_angles() -> None:
     assert (before < after_).all()
     assert model.angles(10.25 * PERIOD) == pytest.approx(0.75 * before + 0.25 * after_)
     assert (model.angles(99.0) == model.angles(20 * PERIOD)).all(), "not beyond the present tick"
-
-
-PLUS, AWAY = tuple(on_plus_side("ulnar").tolist()), away_of("ulnar", "right")
-
-
-def test_tendons_that_pull_away_from_the_camera_are_those_on_its_far_side() -> None:
-    assert AWAY == (-1, 1, -1, 1), "toward flexion, which is behind a plane whose ulnar side is to the right"
-    assert away_of("flexion", "right") == (1, 1, -1, -1) and away_of("ulnar", "left") == (1, -1, 1, -1)
-
-
-def of(**seen: Any) -> list[str]:
-    still_: dict[str, Any] = {"turned": np.zeros(4), "load": 0.0, "across": 0.0, "bent": 0.0, "meant": 0.0, "jump": 0.0}
-    return likely_causes(Evidence(**{**still_, "bends": math.radians(1.0), **seen}), PLUS, AWAY)
-
-
-@pytest.mark.parametrize(
-    ("load", "across", "little", "much"),
-    [(-1.0, 0.05, "axis 2 (tendon 4)", "axis 1 (tendon 2)"), (-1.0, -0.05, "axis 3 (tendon 5)", "axis 0 (tendon 1)"),
-     (1.0, 0.05, "axis 0 (tendon 1)", "axis 3 (tendon 5)"), (1.0, -0.05, "axis 1 (tendon 2)", "axis 2 (tendon 4)")],
-)  # fmt: skip
-def test_load_and_bend_across_together_tell_which_tendon(load: float, across: float, little: str, much: str) -> None:
-    """One that pulls too little, or the one at the other corner too much."""
-    at_rest = of(load=load, across=across)
-    assert at_rest[0] == f"the tendon of {little} is off its pulley" and much in at_rest[1]
-    turned = np.zeros(4)
-    turned[int(much[5])] = -100.0
-    moving = of(load=load, across=across, turned=turned)
-    assert moving[0] == f"{much} turns the wrong way, or its direction is stuck"
-    order = ["wrong way", "exchanged", "off its pulley", "slipped", "pushes"]
-    found = [next(k for k, cause in enumerate(moving) if word in cause) for word in order]
-    assert found == sorted(found)
-
-
-def test_causes_of_the_whole_wrist_go_by_how_far_it_moved() -> None:
-    turned = np.array([-200.0, -200.0, 200.0, 200.0])
-    assert of(turned=turned, meant=0.2, bent=0.0)[0] == "the motors have no supply"
-    assert "wrong way" in of(turned=turned, meant=0.2, bent=-0.15)[0]
-    assert "bends by more than its spools say: wrong pulley or microsteps" in of(turned=turned, meant=0.1, bent=0.2)[0]
-    assert "bends by less" in of(turned=turned, meant=0.2, bent=0.1)[0]
-    assert "marker has slipped" in of(jump=0.1)[0]
-    assert of(load=1.0)[-1] == "something holds or pushes the wrist"
-
-
-def test_a_push_comes_first_where_the_trial_has_one_and_last_where_none_is_meant() -> None:
-    for seen in ({"load": 1.0}, {"across": 0.05, "load": 1.0}, {"jump": 0.1}):
-        pushed, alone = of(pushed=True, **seen), of(**seen)
-        assert pushed[0].startswith("this trial's push was harder") and pushed[1:] == alone[:-1]
-        assert "pushes the wrist" in alone[-1]
-
-
-def test_an_oblique_camera_is_named_where_the_bend_across_may_be_its_own() -> None:
-    for across, oblique, first in ((1.5, 6.0, True), (-1.5, 6.0, True), (2.0, 6.0, False), (1.5, 0.0, False)):
-        causes = of(across=math.radians(across), oblique=math.radians(oblique), load=1.0)
-        assert ("does not look square" in causes[0]) is first and "off its pulley" in causes[first]
-
-
-def test_a_loop_that_swings_is_said_to_before_any_tendon_is_blamed() -> None:
-    assert "swings" in of(reversals=3)[0] and "swings" in of(across=0.05, load=1.0, reversals=5)[0]
-    assert not any("swings" in each for each in (*of(reversals=2), *of(across=0.05, load=1.0)))
 
 
 @pytest.mark.parametrize(("frequency", "size", "found"), [(0.5, 300, 1), (2.0, 300, 4), (4.0, 21, 6), (4.0, 19, 0)])

@@ -9,9 +9,10 @@ import pytest
 from tests.trial.conftest import settings_of
 from tests.trial.rig import RigBoard
 from wristctl.board.board_errors import BoardError
-from wristctl.board.messages import Command, Configure, Flag, Limits, State
+from wristctl.board.messages import Command, Configure, Fault, Flag, Limits, State
 from wristctl.config.plant import Actuator
-from wristctl.trial.motors_ready import halt, prepare
+from wristctl.trial.motors_ready import after_a_fault, halt, prepare
+from wristctl.trial.safety import SafetyStop
 from wristctl.trial.spools import spools_of
 
 
@@ -91,6 +92,21 @@ def test_before_anything_moves_ramps_watchdog_and_limits_are_set_and_drives_swit
 
 def test_an_old_fault_is_cleared_first() -> None:
     board: Any = RigBoard()
-    board.state = State.FAULT
-    prepare(board, settings_of())
+    assert prepare(board, settings_of()) == "" and "clear" not in board.told
+    board.told.clear()
+    board.state, board.faults = State.FAULT, Fault.ESTOP_COMMAND | Fault.LINK
+    assert prepare(board, settings_of()) == "LINK and ESTOP_COMMAND"
     assert board.told[0] == "clear" and board.told[1].hold_on_fault == 0 and board.told[-1] == "enable"
+
+
+@pytest.mark.parametrize("cleared", ["", "ESTOP_COMMAND"])
+def test_a_homing_that_stops_after_a_fault_says_that_the_drives_had_let_go(cleared: str) -> None:
+    """Anything else that ends it stays as it is."""
+    why, fix = "tendon 1 pulls differently each time", "see whether it slips"
+    with pytest.raises(SafetyStop) as stop, after_a_fault(cleared):
+        raise SafetyStop(why, "homing", fix)
+    said, advice = str(stop.value.what), str(stop.value.fix)
+    assert said.startswith(f"stopped: {why}") and said.count("stopped") == 1 and stop.value.where == "homing"
+    assert ("let go in a fault before (ESTOP_COMMAND)" in said) is ("hw jog" in advice) is bool(cleared)
+    with pytest.raises(BoardError, match="cable"), after_a_fault(cleared):
+        raise BoardError("cable", "cable")

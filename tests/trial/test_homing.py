@@ -80,4 +80,4 @@ def test_a_rubbing_wrist_on_soft_tendons_is_homed_though_it_takes_more_steps_tha
     settings = settings_of(bench={"motors": {"slack": SLACK}, "plant": plant, "actuator": actuator})
     _, board, tracking = rig_of(settings)
     zero, moves = find_zero(board, tracking, settings, WRIST, "ulnar"), ExpectedMoves(settings, WRIST, "ulnar")
-    assert not all(moves.has_steps(steps) for steps in zero.steps_per_radian), "a wrist that rubs not is stopped"
+    assert not all(moves.has_steps(0, steps) for steps in zero.steps_per_radian), "a wrist that rubs not is stopped"

@@ -384,8 +384,8 @@ def test_a_wrist_that_stays_bent_may_take_more_and_fewer_steps_but_never_twice_o
     model = expected.steps()
     for ratio, still, rubbing in ((1.0, True, True), (0.84, False, True), (1.65, False, True), (1.95, False, False),
                                   (0.55, False, False)):  # fmt: skip
-        assert expected.has_steps(ratio * model) == expected.has_steps(ratio * model, 0.1 * stays) == still
-        assert expected.has_steps(ratio * model, stays) == rubbing
+        assert expected.has_steps(0, ratio * model) == expected.has_steps(0, ratio * model, 0.1 * stays) == still
+        assert expected.has_steps(0, ratio * model, stays) == rubbing
         if not still:
             with pytest.raises(SafetyStop, match="steps for one radian"):
                 expected.judge_steps(2, ratio * model)

@@ -86,7 +86,7 @@ def test_a_full_disk_stops_a_tick_and_never_the_wire(tmp_path: Path) -> None:
 
 def test_residuals_stand_under_their_own_names_in_whatever_order_they_come(tmp_path: Path) -> None:
     log = TrialLog(tmp_path, None, 0.01)
-    names = list(columns(False))
+    names = list(columns(1, False))
     log.residuals(3, 1.5, {name: float(names.index(name)) for name in reversed(names)})
     log.close()
     table = pd.read_csv(tmp_path / "residuals.csv")

@@ -3,25 +3,25 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import pytest
 
 from wristctl.bench.virtual_bench import VirtualBench
-from wristctl.commands.calibrate.wrist import plan
-from wristctl.commands.inputs import Inputs
 from wristctl.config.hw_run import CalibrateWristSettings
-from wristctl.config.study import Study
 from wristctl.config.wrist import WristParameters
-from wristctl.errors import UserError
+from wristctl.trial.rig_belief import pull_directions
 from wristctl.trial.rig_strokes import axis_tried
 from wristctl.trial.safety import SafetyStop
 from wristctl.trial.testbeds import EmulatedTestbed
 from wristctl.vision.view import View
 
 
-def bench_of(**motors: object) -> tuple[VirtualBench, EmulatedTestbed, CalibrateWristSettings]:
-    camera = {"frame_rate": 30.0}
-    given = {"bench": {"motors": motors, "person": {"takes": 0.0}, "camera": camera}, "homing": {"frames": 2}}
+def bench_of(
+    faults: Sequence[object] = (), **motors: object
+) -> tuple[VirtualBench, EmulatedTestbed, CalibrateWristSettings]:
+    bench_settings = {"motors": motors, "person": {"takes": 0.0}, "camera": {"frame_rate": 30.0}, "faults": faults}
+    given = {"bench": bench_settings, "homing": {"frames": 2}}
     settings = CalibrateWristSettings.model_validate(given)
     bench = VirtualBench(settings.bench, WristParameters(), 0)
     return bench, EmulatedTestbed(bench, settings, [View()], None), settings
@@ -34,9 +34,11 @@ def test_sense_and_slack_of_a_motor_are_found_within_two_degrees(axis: int, reve
     bench, testbed, settings = bench_of(slack=slack, reversed=tuple(k == reversed_axis for k in range(4)))
     found = axis_tried(testbed, settings, WristParameters(), axis)
     assert found.sense == (-1 if axis == reversed_axis else 1)
-    bent = 2.0 * abs(found.bend) * WristParameters().tendon_offset  # a tendon alone bends across the plane as much
+    bent = (
+        2.0 * abs(found.bend.theta) * WristParameters().tendon_offset
+    )  # a tendon alone bends across the plane as much
     assert slack[axis] + bent - 5e-5 < found.taken_up < slack[axis] + 1.5 * bent + 1.2e-4
-    assert (found.bend > 0.0) == (axis in (2, 3)), "tendons 4 and 5 are on the ulnar side"
+    assert (found.bend.theta > 0.0) == (axis in (2, 3)), "tendons 4 and 5 are on the ulnar side"
     truth, motion = bench.truth(0.0), bench.motion()
     assert math.radians(0.9) < abs(truth.angle).max() < math.radians(settings.max_deg)
     assert motion.steps == (0, 0, 0, 0) and not any(motion.energised)
@@ -53,7 +55,24 @@ def test_a_tendon_that_is_off_bends_nothing_and_that_is_said() -> None:
     assert not any(bench.motion().energised)
 
 
-def test_one_axis_alone_is_not_tried_where_one_camera_sees_half_of_the_bend() -> None:
-    settings = CalibrateWristSettings(axis=1, planes=2)
-    with pytest.raises(UserError, match="this rig has two"):
-        plan(Study(calibrate_wrist=settings), Inputs())
+@pytest.mark.slow
+def test_a_tendon_on_another_motor_is_named_once_it_is_let_go() -> None:
+    exchanged = {"kind": "motors-exchanged", "axis": 0, "size": 2.0, "at": 0.0, "since": "power-on"}
+    bench, testbed, settings = bench_of((exchanged,), slack=(3e-4,) * 4)
+    with pytest.raises(SafetyStop, match="axis 0 bends the wrist to the other side than tendon 1 should: as tendon"):
+        axis_tried(testbed, settings, WristParameters(), 0)
+    assert bench.motion().steps == (0, 0, 0, 0)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("axis", [1, 2])
+def test_before_two_cameras_an_axis_bends_the_wrist_toward_its_tendon(axis: int) -> None:
+    camera = {"frame_rate": 30.0}
+    given = {"bench": {"person": {"takes": 0.0}, "camera": camera, "camera_2": camera}, "homing": {"frames": 2}}
+    settings = CalibrateWristSettings.model_validate({"planes": 2, **given})
+    bench = VirtualBench(settings.bench, WristParameters(), 0, settings.markers, settings.markers_2)
+    found = axis_tried(EmulatedTestbed(bench, settings, [View(), View()], None), settings, WristParameters(), axis)
+    assert found.sense == 1
+    toward = math.atan2(found.bend.away, found.bend.theta)
+    assert math.cos(toward - pull_directions()[axis]) > math.cos(math.radians(10.0))
+    assert math.radians(0.9) < found.bend.askew < math.radians(settings.max_deg)

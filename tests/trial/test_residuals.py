@@ -124,7 +124,7 @@ SHOWN = {
 def test_what_is_logged_in_si_units_is_read_in_those_that_people_use(name: str) -> None:
     value, unit, said = SHOWN[name]
     limit, line = BY_NAME[name], RESIDUALS[name]
-    assert line.shown(value) == said and columns(True)[name] == (unit, line.meaning) and limit.unit == unit
+    assert line.shown(value) == said and columns(1, True)[name] == (unit, line.meaning) and limit.unit == unit
     if "{value}" in line.stops:
         signed = said if name in ("angle", "rate") else line.shown(abs(value))
         assert signed in stopped_by(limit, value)
@@ -158,8 +158,11 @@ def test_limits_are_the_settings_of_these_names_and_six_of_them_may_be_exceeded_
 
 def test_a_rig_without_load_cells_has_no_line_of_them() -> None:
     of_cells = {"cell_age", "measured_pull", "excess_pull", "missing_pull"}
-    assert set(columns(True)) - set(columns(False)) == of_cells and set(columns(True)) == set(RESIDUALS)
+    assert set(columns(1, True)) - set(columns(1, False)) == of_cells and set(columns(1, True)) == set(RESIDUALS)
     assert {limit.name for limit in limits_of(settings_of())} == set(RESIDUALS) - of_cells
+    by_size = set(columns(1, True)) - set(columns(2, True))
+    assert by_size == {"across", "doubted"}, "two cameras see the bend across"
+    assert {limit.name for limit in limits_of(settings_of(planes=2))} == set(RESIDUALS) - of_cells - by_size
 
 
 def test_limits_written_are_limits_read(tmp_path: Path) -> None:

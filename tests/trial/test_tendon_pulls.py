@@ -48,8 +48,8 @@ def test_a_rig_without_load_cells_has_no_pulls_no_limits_and_no_columns_of_them(
     assert tendon_pulls_of(settings_of()) is None
     assert not {limit.name for limit in limits_of(settings_of())} & set(WEIGHED)
     assert {limit.name for limit in limits_of(SETTINGS)} >= set(WEIGHED)
-    assert list(columns(True)) == [limit.name for limit in limits_of(SETTINGS)]
-    assert list(columns(False)) == [name for name in columns(True) if name not in WEIGHED]
+    assert list(columns(1, True)) == [limit.name for limit in limits_of(SETTINGS)]
+    assert list(columns(1, False)) == [name for name in columns(1, True) if name not in WEIGHED]
 
 
 @given(st.lists(st.floats(0.0, 100.0), min_size=4, max_size=4))

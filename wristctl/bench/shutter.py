@@ -171,7 +171,8 @@ class Shutter:
         shown = [number]
         for fault in self._faults.active(("camera-frozen", "camera-frozen-clock", "camera-repeats"), time):
             first = math.floor(self._faults.begun(fault) * self._settings.frame_rate - self._settings.phase)
-            shown.append(first - (number % round(fault.size) if fault.kind == "camera-repeats" else 0))
+            ring = round(fault.size) if fault.kind == "camera-repeats" else 1
+            shown.append(first - ring + 1 + (number - first - 1) % ring)
         return min(shown)
 
     def _stamp(self, time: float) -> float:

@@ -11,7 +11,7 @@ from wristctl.errors import UserError
 from wristctl.plain_files import read_json
 from wristctl.records import Run
 from wristctl.trial.homing import Zero, find_zero, slacken
-from wristctl.trial.motors_ready import in_sight, prepare
+from wristctl.trial.motors_ready import after_a_fault, in_sight, prepare
 from wristctl.trial.spools import spools_of
 from wristctl.trial.supervised_wait import Patience
 from wristctl.trial.testbeds import Testbed
@@ -69,7 +69,7 @@ def calibrated(testbed: Testbed, settings: CalibrateWristSettings, wrist: WristP
     with in_sight(testbed, settings, wrist) as (board, hello, tracking):
         if settings.planes == 2:  # what one camera sees of a bend depends on the other
             tracking.zero = Patience(board).markers(tracking, 4 * settings.homing.frames)
-        prepare(board, settings)
-        zero = find_zero(board, tracking, settings, wrist, settings.plane)
+        with after_a_fault(prepare(board, settings)):
+            zero = find_zero(board, tracking, settings, wrist, settings.plane)
         position = slacken(board, spools_of(settings.actuator), settings.homing, zero.signs)
     return WristCalibration(zero, settings.plane, hello.boot_nonce, position)

@@ -10,13 +10,16 @@ from wristctl.arrays import Array
 from wristctl.board.messages import AXES
 from wristctl.config.hw_run import RigSettings
 from wristctl.config.wrist import WristParameters
-from wristctl.trial.rig_belief import PLANES, pull_directions
+from wristctl.trial.homing_fixes import OF_RIG, of_board
+from wristctl.trial.likely_causes import parts_of_board, parts_of_rig
+from wristctl.trial.rig_belief import PLANES, names_of_planes, numbers_of, places_of_tendons, pull_directions
 from wristctl.trial.safety import SafetyStop
 from wristctl.trial.spools import on_plus_side, spools_of
 from wristctl.trial.supervised_wait import Reading
-from wristctl.wrist.directions import ACTIVE, OPPOSITE_AXES, away_of, in_plane
+from wristctl.wrist.directions import OPPOSITE_AXES, away_of, in_plane
 from wristctl.wrist.out_of_plane import across_of
 from wristctl.wrist.spatial.spatial_segments import ellipse
+from wristctl.wrist.tendon_layout import TendonLayout
 
 # Springs that are stiffer than believed and friction may ask for so many times the pull that the model says, and with
 # friction of the wrist's own; twice the steps stay wrong.
@@ -29,11 +32,6 @@ LEAST, MOST = 0.6, 1.35
 _RUBS = 0.5
 # Share of the least bend that a wrist without a taut tendon may move by: noise, and springs that creep.
 SLACK = 0.7
-_SCREWED = (
-    "check which tendon is on which motor, and markers.positive",
-    "check which tendon is on which motor, markers.positive of both cameras, and which camera sees which plane",
-)
-"""What to do about tendons that bend the wrist elsewhere, before one camera and before two."""
 
 
 class Bend(NamedTuple):
@@ -67,13 +65,13 @@ class _Alone(NamedTuple):
     """
 
     toward: Array
-    """(4, 2), as a Bend has it: a unit vector, or before one camera 1 and -1 for the sides in the plane and across."""
+    """(T, 2), as a Bend has it: a unit vector, or before one camera 1 and -1 for the sides in the plane and across."""
     path: Array
-    """(4,) [m/rad]"""
+    """(T,) [m/rad]"""
     torque: Array
-    """(4,)"""
+    """(T,)"""
     lever: Array
-    """(4,)"""
+    """(T,)"""
 
 
 def _before_one_camera(wrist: WristParameters, plane: str, away: Sequence[int], torque: float, ratio: float) -> _Alone:
@@ -93,6 +91,15 @@ def _before_two(wrist: WristParameters) -> _Alone:
     return _Alone(toward, path, np.ones(AXES), sizes)
 
 
+def _of_layout(wrist: WristParameters, layout: TendonLayout, planes: int) -> _Alone:
+    """Of these tendons, whose bend is measured in so many planes: of one plane as that sees it."""
+    toward, path, sizes = bends_alone(wrist, layout.cross_section)
+    seen = np.hypot.reduce(toward[:, :planes], axis=1)
+    sides = np.zeros_like(toward)
+    sides[:, :planes] = toward[:, :planes] / seen[:, None]
+    return _Alone(sides, path / seen, np.ones(len(path)), sizes * seen)
+
+
 def bends_alone(wrist: WristParameters, places: Array) -> tuple[Array, Array, Array]:
     """A small bend of a slack wrist by one tendon alone, of each at its place c (T, 2) [m].
 
@@ -110,6 +117,18 @@ def bends_alone(wrist: WristParameters, places: Array) -> tuple[Array, Array, Ar
     return toward, (places * toward).sum(axis=1), sizes
 
 
+def _turns(toward: Array) -> tuple[tuple[int, ...], ...]:
+    """Pairs of axes of which each is the one most opposite to the other; axes without one alone."""
+    against = np.argmin(toward @ toward.T, axis=1).tolist()
+    found = list[tuple[int, ...]]()
+    for axis, other in enumerate(against):
+        if against[other] != axis:
+            found.append((axis,))
+        elif axis < other:
+            found.append((axis, other))
+    return tuple(found)
+
+
 class ExpectedMoves:
     """By the believed wrist: where each axis bends it, alone, and the steps for one radian of what counts.
 
@@ -117,7 +136,9 @@ class ExpectedMoves:
     and its direction tells the tendon.
     """
 
-    def __init__(self, settings: RigSettings, wrist: WristParameters, plane: str) -> None:
+    def __init__(
+        self, settings: RigSettings, wrist: WristParameters, plane: str, layout: TendonLayout | None = None
+    ) -> None:
         self._homing, self._spools, self._planes = settings.homing, spools_of(settings.actuator), settings.planes
         self._softest = min(settings.safety.softest, self._spools.stiffness)
         self._astray = math.radians(settings.homing.direction_deg)
@@ -127,14 +148,38 @@ class ExpectedMoves:
         other = next(name for name in PLANES if name != facing)
         across, beside = (across_of(in_plane(wrist, name), away).stiffness for name in (facing, other))
         ratio = across / beside if across > 0.0 and beside > 0.0 else 1.0
-        self._offset, self._stiffness = wrist.tendon_offset, max(0.0, across)
-        one = self._planes == 1
-        self._alone = _before_one_camera(wrist, plane, away, self._stiffness, ratio) if one else _before_two(wrist)
+        self.lever, self._stiffness = wrist.tendon_offset, max(0.0, across)
+        self.own, self._numbers = layout is not None, numbers_of(layout)
+        names, parts = names_of_planes(settings.planes, facing), parts_of_rig if self.own else parts_of_board
+        self.motors = parts(self._numbers, names).motors
+        """What each axis is called."""
+        self.fixes = OF_RIG if self.own else of_board(settings.planes)
+        if layout is not None:
+            self.lever = float(np.abs(layout.cross_section).max())
+            self._alone = _of_layout(wrist, layout, settings.planes)
+        elif self._planes == 1:
+            self._alone = _before_one_camera(wrist, plane, away, self._stiffness, ratio)
+        else:
+            self._alone = _before_two(wrist)
+        places = places_of_tendons((facing,), layout)
+        self.plus = places == 0
+        """Which axes (T,) wind a tendon of the first plane's + side."""
+        self.turns = OPPOSITE_AXES if layout is None else _turns(self._alone.toward)
+        """Axes that are measured one after the other: opposite pairs, and those alone that have none."""
 
-    def steps(self, stiffness: float | None = None, harder: float = 1.0) -> float:
-        """Reeled in for one radian of what counts, by tendons as believed or of this stiffness; mean of all axes."""
+    def _name(self, axis: int) -> str:
+        return self.motors[axis] if self.own else f"axis {axis}"
+
+    def steps(self, stiffness: float | None = None, harder: float = 1.0, axis: int | None = None) -> float:
+        """Reeled in for one radian of what counts, by tendons as believed or of this stiffness.
+
+        Of an axis of a rig whose tendons differ, or the mean of all.
+        """
         k, (_, path, torque, lever) = self._spools.stiffness if stiffness is None else stiffness, self._alone
-        return math.fsum(path + harder * torque / (lever * k)) / AXES / self._spools.step
+        steps = path + harder * torque / (lever * k)
+        if self.own and axis is not None:
+            return float(steps[axis]) / self._spools.step
+        return math.fsum(steps) / len(path) / self._spools.step
 
     def tendon_stiffness(self, steps: Sequence[float]) -> float:
         """Stiffness of the tendons [N/m] by steps per radian (4,) that homing took: as believed, or less.
@@ -162,6 +207,14 @@ class ExpectedMoves:
         """Size of what counts of a bend, whichever axis has made it [rad]."""
         return math.hypot(*bend[: self._planes])
 
+    def against(self, axis: int) -> int:
+        """The axis that bends the wrist most opposite to one."""
+        return int(np.argmin(self._alone.toward[:, : self._planes] @ self._alone.toward[axis, : self._planes]))
+
+    def toward(self, axis: int) -> Array:
+        """Direction in which an axis bends the wrist, as far as it is measured (P,)."""
+        return self._alone.toward[axis, : self._planes]
+
     def place(self, axis: int) -> float:
         """Direction [rad] in which an axis bends the wrist, from the first part of a bend toward the second."""
         toward, aside = self._alone.toward[axis]
@@ -177,12 +230,14 @@ class ExpectedMoves:
 
         One camera tells sides, of parts of a bend that are no noise; two tell a direction.
         """
-        own, meant = self._alone.toward[axis], f"tendon {ACTIVE[axis]}"
+        own, meant = self._alone.toward[axis], f"tendon {self._numbers[axis]}"
         if self._planes == 1:
             noise = 0.5 * math.radians(self._homing.bend_deg)
             sides = np.where(np.abs(np.nan_to_num(bend)) < noise, own, np.sign(bend))
             where = "to the other side than" if sides[0] != own[0] else "across its plane otherwise than"
-            return self._nearest(Bend(*sides.tolist()))[0], f"{where} {meant} should"
+            shares = self._alone.toward @ sides
+            like = axis if shares[axis] >= shares.max() else int(np.argmax(shares))
+            return like, f"{where} {meant} should"
         off = np.arccos(np.clip(self._alone.toward @ bend / bend.askew, -1.0, 1.0))
         toward, place = (math.degrees(angle) % 360.0 for angle in (math.atan2(bend.away, bend.theta), self.place(axis)))
         nearest = axis if off[axis] <= self._astray else int(np.argmin(off))
@@ -194,14 +249,39 @@ class ExpectedMoves:
         like, where = self._told(axis, bend)
         if like == axis:
             return
-        problem = f"axis {axis} bends the wrist {where}"
+        problem = f"{self._name(axis)} bends the wrist {where}"
         likely = "tendons that run through other holes, or cameras that do not look square at their planes"
+        if self.own:
+            likely = "tendons that run through other holes, or a sensor whose axes are turned"
         if like is not None:
-            problem = f"{problem}: as tendon {ACTIVE[like]} would"
-            likely = f"motors of axes {axis} and {like} exchanged, or tendons {ACTIVE[axis]} and {ACTIVE[like]}"
-            if {axis, like} in map(set, OPPOSITE_AXES):
+            problem = f"{problem}: as tendon {self._numbers[like]} would"
+            one, other = (self._numbers[each] for each in (axis, like))
+            motors = f"targets {one} and {other}" if self.own else f"motors of axes {axis} and {like}"
+            likely = f"{motors} exchanged, or tendons {one} and {other}"
+            if {axis, like} in map(set, self.turns):
                 likely = f"it turns the wrong way while others are taut, or {likely}"
-        raise SafetyStop(f"{problem}; likely {likely}", "homing", _SCREWED[self._planes - 1])
+        raise SafetyStop(f"{problem}; likely {likely}", "homing", self.fixes.wiring)
+
+    def wrong_sense(self, axis: int) -> SafetyStop:
+        """The stop of a rig's motor that reels in by a smaller target."""
+        problem = f"{self._name(axis)} has the wrong sense: a smaller target reels it in"
+        return SafetyStop(problem, "homing", f"turn the sign of {self._name(axis)} in send() and connect()")
+
+    def does_not_bend(self, axis: int) -> SafetyStop:
+        """The stop of a motor that bends the wrist nowhere."""
+        problem = f"{self.motors[axis]} does not bend the wrist within {1e3 * self._homing.slack:g} mm"
+        return SafetyStop(problem, "homing", self.fixes.dead.format(axis=axis))
+
+    def bent_too_far(self, axis: int, bend: Bend) -> SafetyStop:
+        """The stop of a motor that bends the wrist further than homing does."""
+        bent = math.degrees(math.copysign(self.size(bend), self.along(axis, bend)))
+        problem = f"{self._name(axis)} bent the wrist by {bent:.1f} deg while homing"
+        return SafetyStop(problem, "homing", "slacken all tendons first")
+
+    def pulls_differently(self, axis: int) -> SafetyStop:
+        """The stop of a tendon without a line."""
+        problem = f"tendon {self._numbers[axis]} pulls differently each time"
+        return SafetyStop(problem, "homing", "see whether it slips")
 
     def judge_line(self, axis: int, moved: Bend, reeled: Sequence[int], bends: Sequence[Bend]) -> float:
         """Direction [rad] in which bends grow with what an axis has reeled in, nan before one camera.
@@ -218,9 +298,9 @@ class ExpectedMoves:
 
     def _stretch(self, stays: float) -> float:
         """By how much friction that holds a wrist bent by `stays` [rad] stretches the softest tendon [m]."""
-        return self._stiffness * stays / (self._offset * self._softest)
+        return self._stiffness * stays / (self.lever * self._softest)
 
-    def has_steps(self, steps: float, stays: float = 0.0) -> bool:
+    def has_steps(self, axis: int, steps: float, stays: float = 0.0) -> bool:
         """Whether steps per radian are those of the model, within `homing.steps_tolerance`.
 
         The tolerance is doubled where the wrist stays bent by `stays` [rad] when nothing pulls. Its own friction then
@@ -228,22 +308,24 @@ class ExpectedMoves:
         """
         rubs = stays > _RUBS * math.radians(self._homing.bend_deg)
         share, harder = (2.0 if rubs else 1.0) * self._homing.steps_tolerance, _RUBBING if rubs else _HARDER
-        return (1.0 - share) * self.steps() <= steps <= (1.0 + share) * self.steps(self._softest, harder)
+        most = (1.0 + share) * self.steps(self._softest, harder, axis)
+        return (1.0 - share) * self.steps(axis=axis) <= steps <= most
 
     def judge_steps(self, axis: int, steps: float, stays: float = 0.0) -> None:
         """Raises SafetyStop where steps per radian are not those of the model, as `has_steps`."""
-        if self.has_steps(steps, stays):
+        if self.has_steps(axis, steps, stays):
             return
-        fix = (
-            "see the DIP switches of the drive and actuator.microstep, and measure the pulley (actuator.pulley_radius)"
-        )
-        ratio = steps / self.steps()
+        meant = self.steps(axis=axis)
+        ratio, unit = steps / meant, self._spools.step
+        taken = f"{1e3 * steps * unit:.3g} mm of tendon" if self.own else f"{steps:.0f} steps"
+        model = f"{1e3 * meant * unit:.3g} mm" if self.own else f"{meant:.0f}"
+        loose = "a sensor that is not fixed" if self.own else "a marker that is not fixed"
         problem = (
-            f"axis {axis} (tendon {ACTIVE[axis]}) takes {steps:.0f} steps for one radian, {ratio:.2f} times what the "
-            f"model says ({self.steps():.0f}); likely wrong microsteps (DIP switches), a wrong pulley, or "
-            + ("a slipping tendon, or others that were taut" if ratio > 1.0 else "a marker that is not fixed")
+            f"{self.motors[axis]} takes {taken} for one radian, {ratio:.2f} times what the model says ({model}); "
+            f"likely {self.fixes.scaled}, or "
+            + ("a slipping tendon, or others that were taut" if ratio > 1.0 else loose)
         )
-        raise SafetyStop(problem, "homing", fix)
+        raise SafetyStop(problem, "homing", self.fixes.scale)
 
     def judge_slack(self, axis: int, slack: float, stays: float = 0.0) -> None:
         """Raises SafetyStop where a tendon was taut before anything was reeled in.
@@ -253,8 +335,8 @@ class ExpectedMoves:
         """
         if slack >= -self._homing.taut - self._stretch(stays):
             return
-        problem = f"tendon {ACTIVE[axis]} was taut by {-1e3 * slack:.2f} mm when homing began"
-        raise SafetyStop(problem, "homing", "slacken all tendons first: wristctl hw slacken, or by hand")
+        problem = f"tendon {self._numbers[axis]} was taut by {-1e3 * slack:.2f} mm when homing began"
+        raise SafetyStop(problem, "homing", self.fixes.taut)
 
     def judge_friction(self, axis: int, friction: float, stays: float) -> None:
         """Raises SafetyStop where a tendon sticks by more than `homing.sticks` between reeling in and letting go [m].
@@ -264,7 +346,7 @@ class ExpectedMoves:
         """
         if friction <= self._homing.sticks + 2.0 * self._stretch(stays):
             return
-        problem = f"tendon {ACTIVE[axis]} sticks: {1e3 * friction:.2f} mm between reeling in and letting go"
+        problem = f"tendon {self._numbers[axis]} sticks: {1e3 * friction:.2f} mm between reeling in and letting go"
         fix = "see whether it chafes or its sheath is bent sharply; or raise homing.sticks"
         raise SafetyStop(problem, "homing", fix)
 
@@ -277,10 +359,10 @@ class ExpectedMoves:
         """The stop of a wrist that moved toward the tendon of one axis, away from another's."""
         problem = f"a slackened wrist still moved by {math.degrees(bend.askew):.1f} deg when it was slackened further"
         likely = (
-            f"tendon {ACTIVE[holds]} is shorter than it was, caught or slipped on its pulley, or axis {pulls} "
-            f"(tendon {ACTIVE[pulls]}) turns the wrong way"
+            f"tendon {self._numbers[holds]} is shorter than it was, caught or slipped on its pulley, or "
+            f"{self.motors[pulls]} turns the wrong way"
         )
-        fix = "see tendons and motors, then calibrate the wrist again"
+        fix = f"see tendons and motors, then {self.fixes.again}"
         return SafetyStop(f"{problem}; likely {likely}", "homing", fix)
 
     def judge_cocontraction(self, bend: Bend) -> None:
@@ -290,18 +372,18 @@ class ExpectedMoves:
 
     def _against_each_other(self, bend: Bend, pulls: int) -> SafetyStop:
         """The stop of a wrist that bent toward the tendon of an axis."""
+        whose = "" if self.own else f" (axis {pulls})"
         problem = (
             f"tendons pull against each other: the slackened wrist bent by {math.degrees(bend.askew):.1f} deg when one "
-            f"side was let out; likely tendon {ACTIVE[pulls]} (axis {pulls}) and one opposite are shorter than the "
-            "motors' positions say: steps that nobody counted, a knot, or zero positions that are wrong; or a marker "
-            "has slipped"
+            f"side was let out; likely tendon {self._numbers[pulls]}{whose} and one opposite are shorter than the "
+            f"motors' positions say: {self.fixes.against}"
         )
-        fix = "see tendons, motor cables and their shields, then calibrate the wrist again"
+        fix = f"see tendons, motor cables and their shields, then {self.fixes.again}"
         return SafetyStop(problem, "homing", fix)
 
     def judge_small_move(self, axis: int, reeled: float, bend: Bend) -> None:
         """Raises SafetyStop where reeling in by so many steps beyond the taut point did not bend as it should."""
-        meant, size = reeled / self.steps(), self.size(bend)
+        meant, size = reeled / self.steps(axis=axis), self.size(bend)
         if max(size, abs(np.nan_to_num(bend.away))) < LEAST * meant:
             raise self.bends_too_little(axis, bend, meant)
         self.judge_side(axis, bend)
@@ -311,8 +393,8 @@ class ExpectedMoves:
     def bends_too_little(self, axis: int, bend: Bend, meant: float) -> SafetyStop:
         """The stop of an axis that bends the wrist by less than was meant [rad]."""
         problem = (
-            f"axis {axis} (tendon {ACTIVE[axis]}) bends the wrist by {math.degrees(self.along(axis, bend)):.1f} deg "
+            f"{self.motors[axis]} bends the wrist by {math.degrees(self.along(axis, bend)):.1f} deg "
             f"instead of {math.degrees(meant):.1f} deg; likely it turns the wrong way, its tendon is off the pulley, "
             "or it has no power"
         )
-        return SafetyStop(problem, "homing", "calibrate the wrist again; see motor, drive and tendon")
+        return SafetyStop(problem, "homing", f"{self.fixes.again}; see motor, drive and tendon")

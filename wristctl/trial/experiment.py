@@ -20,7 +20,7 @@ from wristctl.trial.homing import Zero, find_zero, slacken
 from wristctl.trial.live_datagrams import LiveReference
 from wristctl.trial.log import TrialLog
 from wristctl.trial.motions import back
-from wristctl.trial.motors_ready import halt, prepare
+from wristctl.trial.motors_ready import after_a_fault, halt, prepare
 from wristctl.trial.resting import judge_rest
 from wristctl.trial.rig_belief import RigBelief, names_of_planes
 from wristctl.trial.spools import spools_of
@@ -121,8 +121,8 @@ class Experiment(TrialSeries):
         if self.zero is None:  # the marker is seen, and nothing moves yet
             judge_rest(seen, settings, self._wrist, names)
             testbed.confirm(Patience(board).pulse)
-            prepare(board, settings)
-            self.zero = self._home(board, tracking, plane)
+            with after_a_fault(prepare(board, settings)):
+                self.zero = self._home(board, tracking, plane)
             markers = self.zero.markers
         else:
             markers = check_zero(board, tracking, settings, self._wrist, plane, self.zero)

@@ -19,18 +19,16 @@ from typing import Any, NamedTuple, Self
 
 import numpy as np
 
-from wristctl.board.driver import Board
 from wristctl.board.messages import AXES, JOG_RATE
 from wristctl.config.hw_run import Homing, RigSettings
 from wristctl.config.wrist import WristParameters
 from wristctl.trial.expected_moves import Bend, ExpectedMoves, middle
 from wristctl.trial.resting import judge_slack
-from wristctl.trial.rig_belief import names_of_planes
-from wristctl.trial.safety import SafetyStop
+from wristctl.trial.rig_belief import names_of_planes, numbers_of
 from wristctl.trial.spools import Spools, spools_of
-from wristctl.trial.supervised_wait import Patience, Reading
+from wristctl.trial.supervised_wait import Motors, Patience, Reading
 from wristctl.trial.tracking import Tracking
-from wristctl.wrist.directions import ACTIVE, OPPOSITE_AXES
+from wristctl.wrist.tendon_layout import TendonLayout
 
 log = logging.getLogger(__name__)
 
@@ -81,7 +79,7 @@ class Zero:
         return cls(signs, slopes, markers, slack, friction, directions)
 
 
-class _Line(NamedTuple):
+class Line(NamedTuple):
     """Bend by what an axis has reeled in, a line; where the wrist rested after it was let go."""
 
     slope: float
@@ -101,7 +99,7 @@ class _Line(NamedTuple):
         return (straight - self.offset) / self.slope
 
 
-def rest_of(board: Board, tracking: Tracking, expected: ExpectedMoves, homing: Homing) -> Reading:
+def rest_of(board: Motors, tracking: Tracking, expected: ExpectedMoves, homing: Homing) -> Reading:
     """Where a wrist rests that has been let go: once it moves no more, and at the latest after `homing.let_go`."""
     patience, clock = Patience(board), board.transport
     deadline, before = clock.now() + homing.let_go, None
@@ -115,11 +113,11 @@ def rest_of(board: Board, tracking: Tracking, expected: ExpectedMoves, homing: H
         before = reading
 
 
-class _Finder:
+class Finder:
     """Moves one axis at a time; positions are microsteps reeled in from where the finder began."""
 
     def __init__(
-        self, board: Board, tracking: Tracking, spools: Spools, settings: Homing, expected: ExpectedMoves,
+        self, board: Motors, tracking: Tracking, spools: Spools, settings: Homing, expected: ExpectedMoves,
         judge_slack: Callable[[Bend], None],
     ) -> None:  # fmt: skip
         self._board, self._tracking, self._settings, self._expected = board, tracking, settings, expected
@@ -128,11 +126,11 @@ class _Finder:
             max(1, round(length / spools.step)) for length in (settings.slack, settings.pull, settings.move)
         )
         self._start = board.read().position
-        self._at, self._signs = np.zeros(AXES, int), np.ones(AXES, int)
+        self._at, self._signs = np.zeros(len(self._start), int), np.ones(len(self._start), int)
         self._bend = math.radians(settings.bend_deg)
         self._straight = Patience(board).reading(tracking, 4 * settings.frames)
         self._rest, self._stays = expected.bend(self._straight, self._straight), 0.0
-        self.directions = [math.nan] * AXES
+        self.directions = [math.nan] * len(self._start)
         """Direction of each axis that has been measured in two planes [rad]."""
 
     @property
@@ -148,12 +146,12 @@ class _Finder:
                 moved = self._bent(axis).since(self._rest)
                 if moved.askew > self._bend:
                     self._let_go(axis, 0)
+                    if self._expected.own and self._signs[axis] < 0:
+                        raise self._expected.wrong_sense(axis)
                     self._expected.judge_side(axis, moved)
                     return reeled
             self._let_go(axis, 0)
-        slack, fix = 1e3 * self._settings.slack, "see that the tendon is on its pulley and the motor has power"
-        problem = f"axis {axis} (tendon {ACTIVE[axis]}) does not bend the wrist within {slack:g} mm"
-        raise SafetyStop(problem, "homing", f"{fix}: wristctl hw check --wiring {axis}; or raise homing.slack")
+        raise self._expected.does_not_bend(axis)
 
     def slacken(self) -> None:
         """Let all tendons go, so far that none holds against another while it is measured. SafetyStop where it sags."""
@@ -168,18 +166,18 @@ class _Finder:
         self._bent(axis)
         self._let_go(axis, -2 * self._pull)
 
-    def line(self, axis: int, about: int) -> _Line:
+    def line(self, axis: int, about: int) -> Line:
         """How the wrist bends by an axis that bends it at `about`. Lets go again.
 
         Steps that are not the model's are measured once more, with more time for each reading, before they are judged.
         """
         measured = self._measured(axis, about, 1)
-        if not self._expected.has_steps(measured.per_radian, self._stays):
+        if not self._expected.has_steps(axis, measured.per_radian, self._stays):
             measured = self._measured(axis, about, _AGAIN)
         self._expected.judge_steps(axis, measured.per_radian, self._stays)
         return measured
 
-    def _measured(self, axis: int, about: int, slowly: int) -> _Line:
+    def _measured(self, axis: int, about: int, slowly: int) -> Line:
         reeled, bends = [], []
         along, rested = self._expected.along, self._rest
         for position in range(min(0, about - 3 * self._move), about + 2 * self._pull, self._move):
@@ -193,7 +191,7 @@ class _Finder:
         if len(reeled) < 3:
             self._let_go(axis, -2 * self._pull)
             self._judge_slack(self._rest)  # one that sags slowly has gone on
-            raise SafetyStop(f"tendon {ACTIVE[axis]} pulls differently each time", "homing", "see whether it slips")
+            raise self._expected.pulls_differently(axis)
         slope, offset = np.polyfit(reeled, [along(axis, bent) for bent in bends], 1)
         self._reel(axis, reeled[0])
         Patience(self._board).wait(4.0 * self._settings.rest)  # a wrist that is let go comes back by its springs alone
@@ -202,10 +200,19 @@ class _Finder:
         self.directions[axis] = self._expected.judge_line(axis, bend.since(rested), reeled, bends)
         held = abs(along(axis, back.since(self._rest))) > 0.5 * self._bend  # the tendon was not slack yet
         friction = (along(axis, back) - offset) / slope - reeled[0] if held else 0.0
-        line = _Line(float(slope), float(offset), float(friction), self._rest)
+        line = Line(float(slope), float(offset), float(friction), self._rest)
         if reeled[0] <= 0:  # it bends the wrist where it was at the start: the line alone may err by friction
             self._expected.judge_slack(axis, line.taut(0.0) * self._spools.step, self._stays)
         return line
+
+    def turn(self, axes: Sequence[int], about: Sequence[int]) -> dict[int, Line]:
+        """Lines of axes that pull against each other, by `about` where they bend the wrist, each after the other one.
+
+        One that has no other is measured after the one that pulls against it most.
+        """
+        against = axes[-1] if len(axes) > 1 else self._expected.against(axes[0])
+        self.bend_once(against, about[against])
+        return {axis: self.line(axis, about[axis]) for axis in axes}
 
     def settle(self, taut: Sequence[float]) -> tuple[int, ...]:
         """Take up every tendon's slack, all at once, and call that zero. Senses of turning."""
@@ -221,9 +228,7 @@ class _Finder:
         bend = self._expected.bend(self._straight, patience.reading(self._tracking, slowly * self._settings.frames))
         if self._expected.size(bend) > math.radians(_FURTHEST_DEG):
             self._reel(axis, -2 * self._pull)
-            bent = math.degrees(math.copysign(self._expected.size(bend), self._expected.along(axis, bend)))
-            problem = f"axis {axis} bent the wrist by {bent:.1f} deg while homing"
-            raise SafetyStop(problem, "homing", "slacken all tendons first")
+            raise self._expected.bent_too_far(axis, bend)
         return bend
 
     def _let_go(self, axis: int, reeled: int) -> None:
@@ -245,46 +250,53 @@ class _Finder:
 
 
 def slacken(
-    board: Board, spools: Spools, settings: Homing, signs: Sequence[int], times: float = 1.0
+    board: Motors, spools: Spools, settings: Homing, signs: Sequence[int], times: float = 1.0
 ) -> tuple[int, ...]:
     """Let the tendons of a homed wrist go, so that nothing holds it; where the motors then stand [steps].
 
     They are let out by so many times `homing.pull`.
     """
     reeled = -round(times * settings.pull / spools.step)
-    one, two, four, five = (reeled * sign for sign in signs)
-    return board.go_to((one, two, four, five), JOG_RATE).position
+    position: tuple[int, ...] = board.go_to([reeled * sign for sign in signs], JOG_RATE).position
+    return position
+
+
+def finder_of(
+    board: Motors, tracking: Tracking, settings: RigSettings, wrist: WristParameters, plane: str,
+    expected: ExpectedMoves,
+) -> Finder:  # fmt: skip
+    """What finds zero of enabled motors with slack tendons."""
+    planes = names_of_planes(settings.planes, plane)
+    sags = partial(judge_slack, settings=settings, wrist=wrist, planes=planes)
+    return Finder(board, tracking, spools_of(settings.actuator), settings.homing, expected, sags)
 
 
 def find_zero(
-    board: Board, tracking: Tracking, settings: RigSettings, wrist: WristParameters, plane: str,
-    signs: Sequence[int] | None = None,
+    board: Motors, tracking: Tracking, settings: RigSettings, wrist: WristParameters, plane: str,
+    signs: Sequence[int] | None = None, layout: TendonLayout | None = None,
 ) -> Zero:  # fmt: skip
-    """Find zero of an enabled board with slack tendons, and home the board there; `signs` where they are known.
+    """Find zero of enabled motors with slack tendons, and call that their zero; `signs` where they are known.
+
+    `layout` has the tendons that they wind; None: the board's four.
 
     Raises SafetyStop where a tendon does not bend the wrist, bends it too far, the wrong way or by another's steps, was
     taut before or sticks, or where the marker is lost. In two planes readings of the slack wrist have been taken off.
     """
-    expected, spools = ExpectedMoves(settings, wrist, plane), spools_of(settings.actuator)
-    planes = names_of_planes(settings.planes, plane)
-    sags = partial(judge_slack, settings=settings, wrist=wrist, planes=planes)
-    finder = _Finder(board, tracking, spools, settings.homing, expected, sags)
-    about = [finder.sense(axis, (1, -1) if signs is None else (signs[axis],)) for axis in range(AXES)]
+    expected, spools = ExpectedMoves(settings, wrist, plane, layout), spools_of(settings.actuator)
+    finder, count = finder_of(board, tracking, settings, wrist, plane, expected), len(expected.motors)
+    about = [finder.sense(axis, (1, -1) if signs is None else (signs[axis],)) for axis in range(count)]
     finder.slacken()
-    measured: dict[int, _Line] = {}
-    for axis, opposite in OPPOSITE_AXES:
-        finder.bend_once(opposite, about[opposite])
-        measured |= {turn: finder.line(turn, about[turn]) for turn in (axis, opposite)}
-    lines = [measured[axis] for axis in range(AXES)]
+    measured = {turn: line for turns in expected.turns for turn, line in finder.turn(turns, about).items()}
+    lines = [measured[axis] for axis in range(count)]
     straight = middle([line.rest for line in lines])
     taut = [line.taut(expected.along(axis, straight)) for axis, line in enumerate(lines)]
     slopes = tuple(line.per_radian for line in lines)
     slack, sticking = tuple(spools.step * at for at in taut), tuple(spools.step * line.friction for line in lines)
     stays = max(expected.size(line.rest.since(straight)) for line in lines)
-    for axis in range(AXES):
+    for axis in range(count):
         expected.judge_friction(axis, sticking[axis], stays)
     senses = finder.settle(taut)
-    for tendon, sense, length, slope in zip(ACTIVE, senses, slack, slopes, strict=True):
+    for tendon, sense, length, slope in zip(numbers_of(layout), senses, slack, slopes, strict=True):
         log.info("tendon %d: sense %+d, slack %.2f mm, %.0f steps per rad", tendon, sense, 1e3 * length, slope)
     seen = zip(tracking.zero, finder.began, straight, strict=False)
     markers = tuple(began + bent + taken_off for taken_off, began, bent in seen)

@@ -1,11 +1,19 @@
-"""Likely causes of a wrist that does not do what its motors do, in words, likeliest first."""
+"""Likely causes of a wrist that does not do what its motors do, in words, likeliest first: of P planes and T tendons.
+
+Where the wrist is off its motors is a direction in the plane of bends. A tendon that is lost leaves a load away from
+its place, one that pulls too much a load toward it; motors that are exchanged leave one along the line between their
+places; a push comes from anywhere. One camera sees one component of that direction, and of the other its side, by the
+size of the marker: without that, it tells the two sides of its plane, and no single tendon of two.
+"""
 
 import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
+import numpy as np
+
 from wristctl.arrays import Array
-from wristctl.wrist.directions import ACTIVE
+from wristctl.trial.rig_belief import TOWARD, unit_toward
 
 # Steps in the time looked at from which a motor has turned.
 TURNED = 40.0
@@ -13,40 +21,123 @@ TURNED = 40.0
 MEANT = math.radians(2.0)
 # Turnings back, in the time looked at for them, from which a loop swings: a motion there and back has one.
 SWINGS = 3
-LOOP_SWINGS = "the loop swings: friction in the sheaths, a camera later than is believed, or gains too high for them"
-_PUSHED = "this trial's push was harder than safety.load and safety.follow_deg allow, or went across the plane"
+LOOP_SWINGS = "the loop swings: friction in the sheaths, a sensor later than is believed, or gains too high for them"
+# Change from one frame to the next that no motion at rest makes.
+JUMP = math.radians(2.0)
+_PUSHED = "this trial's push was harder than safety.load and safety.follow_deg allow"
+_ACROSS = ", or went across the plane"
 _OBLIQUE = "the camera does not look square at the plane: calibrate it, then --optics"
 # Share of a camera's angle off square that it may show a bend in the plane as one across it.
 _SLIGHTLY = 0.3
-# Change from one frame to the next that no motion at rest makes.
-JUMP = math.radians(2.0)
+# Shares of the meant bend: below the first the wrist stood; nearer to 1 than the second it did what its motors did.
+_STOOD, _SCALED = 0.15, 0.2
+# A load this far off a tendon's direction [rad] may still be that tendon's doing.
+_ASIDE = math.radians(28.0)
+# Least share of the load that the lost pull must account for.
+_ACCOUNTS = 0.4
+# Share of one camera's jump below which the other one saw none.
+_ALONE = 0.3
+# Cosine from which a tendon is on the side of a direction.
+_SIDE = 0.3
+
+
+class Parts(NamedTuple):
+    """What the parts of a rig are called."""
+
+    numbers: tuple[int, ...]
+    """Of the tendons."""
+    motors: tuple[str, ...]
+    """Each tendon's motor."""
+    slipped: tuple[str, ...]
+    """What is said of each plane's sensor that has slipped."""
+    wrong: tuple[str, ...]
+    """What is said of each plane's sensor that shows or dates bends wrongly."""
+    old: str
+    """What is said of sensors that show the past."""
+    scale: str
+    """What makes a motor turn its spool by more or less than it is told."""
+
+
+def parts_of_board(numbers: Sequence[int], planes: Sequence[str]) -> Parts:
+    """Of a motor board with a camera for each of these planes."""
+    several = len(planes) > 1
+    markers = [f"the marker before the {plane} camera" if several else "the tip's marker" for plane in planes]
+    cameras = [f"the {plane} camera" if several else "the camera" for plane in planes]
+    return Parts(
+        tuple(numbers),
+        tuple(f"axis {axis} (tendon {number})" for axis, number in enumerate(numbers)),
+        tuple(f"{marker} has slipped on its disc" for marker in markers),
+        tuple(f"{camera} shows or dates pictures wrongly" for camera in cameras),
+        f"{'both cameras show' if several else 'the camera shows'} old pictures",
+        "wrong pulley or microsteps (DIP switches)",
+    )
+
+
+def parts_of_rig(numbers: Sequence[int], planes: Sequence[str]) -> Parts:
+    """Of a rig that takes targets and gives bends in these planes."""
+    bends = [f"the bend toward {plane}" if len(planes) > 1 else "the bend" for plane in planes]
+    return Parts(
+        tuple(numbers),
+        tuple(f"target {number}" for number in numbers),
+        tuple(f"the sensor of {bend} has slipped" for bend in bends),
+        tuple(f"look() gives or dates {bend} wrongly" for bend in bends),
+        "look() gives old bends",
+        "facts.metres_per_unit",
+    )
 
 
 class Evidence(NamedTuple):
-    """Evidence of the last moments; SI units."""
+    """Evidence of the last moments; SI units. Pairs are toward ulnar and flexion, zero where no sensor tells."""
 
     turned: Array
-    """Steps by which each spool was told to reel in, (4,)."""
-    load: float
-    across: float
-    """Away from the camera."""
-    bent: float
-    meant: float
-    """Bend of the wrist that its spools should have made; `bent` is the measured one."""
-    jump: float
-    """Largest change of the marker's angle from one frame to the next, off what the spools make."""
-    bends: float
+    """Steps by which each spool was told to reel in, (T,)."""
+    torque: Array
+    """Torque with which each tendon should bend the straight wrist, by its spool, (T,)."""
+    load: Array
+    """(2,)"""
+    apart: Array
+    """Bend less what the spools should have made of it, (2,)."""
+    across: Array
+    """Bend across the plane of a single camera by the size of its marker, (2,); zero of two."""
+    bent: Array
+    """Measured change of the bend, (2,)."""
+    meant: Array
+    """Change of the bend that the spools should have made, (2,)."""
+    jump: Array
+    """Largest change of each sensor's angle from one frame to the next, off what the spools make, (P,)."""
+    directions: Array
+    """Direction in which each tendon bends the wrist, from ulnar toward flexion, (T,) [rad]."""
+    parts: Parts
+    bends: float = math.inf
     """Bend across that is beyond the limit."""
+    oblique: float = 0.0
+    """How far off square an uncalibrated camera looks at the plane."""
     reversals: int = 0
     """Number of times that a spool has turned back."""
     pushed: bool = False
     """Whether a person pushes in this trial."""
-    oblique: float = 0.0
-    """How far off square an uncalibrated camera looks at the plane."""
+
+    @property
+    def jumps(self) -> bool:
+        """Whether a sensor jumped, and no other one beside it."""
+        one, *others = sorted(self.jump.tolist(), reverse=True)
+        return one > JUMP and all(other < _ALONE * one for other in others)
+
+    @property
+    def aside(self) -> bool:
+        """Whether the wrist has left the plane of its only camera: one whose marker jumps tells no size."""
+        return math.hypot(*self.across) > 0.5 * self.bends and not self.jumps
+
+    @property
+    def off(self) -> Array:
+        """Direction in which the wrist is off its motors, a unit vector (2,) or zero: of the load, without one of the
+        bend. With a bend across, of which the size is not told, it is the quadrant of both."""
+        load = _unit(self.load) if self.load.any() else _unit(self.apart)
+        return _unit(load + _unit(self.across)) if self.aside else load
 
 
 def reversals(positions: Array) -> int:
-    """Largest number of times that a spool of (n, 4) [steps] has turned back, by enough to count as turned."""
+    """Largest number of times that a spool of (n, T) [steps] has turned back, by enough to count as turned."""
     return max(_turned_back(course) for course in positions.T.tolist())
 
 
@@ -61,52 +152,86 @@ def _turned_back(course: Sequence[float]) -> int:
     return turns
 
 
-def likely_causes(evidence: Evidence, plus: Sequence[bool], away: Sequence[int]) -> list[str]:
-    """Causes in words.
-
-    A load toward one side means that a tendon of the other pulls less than its spool says, or one of the same side
-    more. Of each pair the bend across tells which: it is away from a camera for a tendon that pulls too much on the
-    far side, or too little on the near one.
-    """
-    swings = [_PUSHED] * evidence.pushed + [LOOP_SWINGS] * (evidence.reversals >= SWINGS)
-    if abs(evidence.across) > 0.5 * evidence.bends and evidence.jump <= JUMP:
-        slight = abs(evidence.across) < _SLIGHTLY * evidence.oblique
-        return [*swings, *[_OBLIQUE] * slight, *_of_one_tendon(evidence, plus, away)]
-    causes, meant = swings, abs(evidence.meant) > MEANT
-    if evidence.jump > JUMP:
-        causes += ["the tip's marker has slipped on its disc", "the camera shows or dates pictures wrongly"]
-    share = evidence.bent / evidence.meant if meant else math.nan
-    if abs(share) < 0.15:
-        causes.append("the motors have no supply")
-    if share < 0.15:
-        causes.append("both motors of a side turn the wrong way, are stuck, or are exchanged with the other side's")
-    turning = bool((abs(evidence.turned) > TURNED).any())
-    if meant and share >= 0.15:
-        much = "more" if share > 1.0 else "less"
-        causes.append(f"the wrist bends by {much} than its spools say: wrong pulley or microsteps (DIP switches)")
-    if turning:
-        causes.append("motors exchanged, detached or slipped tendons on a side, or a stalled motor")
-    else:
-        causes.append("a side's tendons slipped or came off, or the motors' supply was lost")
-    if evidence.jump <= JUMP:
-        causes += ["the camera shows old pictures", "the tip's marker has slipped on its disc"]
-    return [*dict.fromkeys(causes), *["something holds or pushes the wrist"] * (not evidence.pushed)]
+def likely_causes(evidence: Evidence) -> list[str]:
+    """Causes in words."""
+    alone, parts = len(evidence.jump) == 1, evidence.parts
+    causes = [_PUSHED + _ACROSS * alone] * evidence.pushed + [LOOP_SWINGS] * (evidence.reversals >= SWINGS)
+    if evidence.jumps:
+        plane = int(np.argmax(evidence.jump))
+        causes += [parts.slipped[plane], parts.wrong[plane]]
+    if math.hypot(*evidence.across) < _SLIGHTLY * evidence.oblique and evidence.aside:
+        causes.append(_OBLIQUE)
+    if not evidence.aside:
+        causes += _of_all_motors(evidence)
+    causes += _by_direction(evidence)
+    if not evidence.pushed and (alone or not evidence.jumps):  # a blow makes two sensors jump
+        causes.append(f"something pushes the wrist{_toward(evidence.off)}, or holds it")
+    return list(dict.fromkeys(causes))
 
 
-def _of_one_tendon(evidence: Evidence, plus: Sequence[bool], away: Sequence[int]) -> list[str]:
-    far, toward_plus = evidence.across > 0.0, evidence.load > 0.0
-    much = next(k for k in range(4) if plus[k] == toward_plus and (away[k] > 0) == far)
-    little = next(k for k in range(4) if plus[k] != toward_plus and (away[k] > 0) != far)
-    named = {axis: f"axis {axis} (tendon {ACTIVE[axis]})" for axis in (much, little)}
-    causes = []
-    if evidence.turned[much] < -TURNED:
-        causes.append(f"{named[much]} turns the wrong way, or its direction is stuck")
-    if evidence.turned[little] > TURNED:
-        causes.append(f"{named[little]} turns the wrong way")
-    if abs(evidence.turned[much]) > TURNED or abs(evidence.turned[little]) > TURNED:
-        causes.append("motors exchanged")
-    causes.append(f"the tendon of {named[little]} is off its pulley")
-    causes.append(f"it has slipped on it, or that of {named[much]} has")
-    if abs(evidence.turned[little]) > TURNED:
-        causes.append(f"{named[little]} has stalled or has no power")
-    return [*causes, *["something pushes the wrist across its plane"] * (not evidence.pushed)]
+def _unit(vector: Array) -> Array:
+    size = math.hypot(*vector)
+    return vector / size if size > 1e-9 else np.zeros(2)
+
+
+def _of_all_motors(evidence: Evidence) -> list[str]:
+    """Causes that all motors share, by the share of the meant bend that was made."""
+    meant = math.hypot(*evidence.meant)
+    share = float(evidence.bent @ evidence.meant) / meant**2 if meant > MEANT else math.nan
+    if abs(share) < _STOOD:
+        return [f"the motors have no supply, or {evidence.parts.old}"]
+    if share < 0.0:
+        return ["the wrist goes the other way than its motors: motors that turn the wrong way or are exchanged"]
+    return []
+
+
+def _scaled(evidence: Evidence) -> list[str]:
+    """Said of a wrist that bends where its motors bend it, by more or by less."""
+    meant = math.hypot(*evidence.meant)
+    if meant <= MEANT:
+        return []
+    share = float(evidence.bent @ evidence.meant) / meant**2
+    beside = math.hypot(*(evidence.bent - share * evidence.meant)) / meant
+    if share < _STOOD or abs(share - 1.0) < _SCALED or beside > math.tan(_ASIDE) * abs(share - 1.0):
+        return []
+    much = "more" if share > 1.0 else "less"
+    return [f"the wrist bends by {much} than its spools say: {evidence.parts.scale}"]
+
+
+def _by_direction(evidence: Evidence) -> list[str]:
+    off, motors = evidence.off, evidence.parts.motors
+    if not off.any():
+        return _scaled(evidence)
+    toward = np.stack([np.cos(evidence.directions), np.sin(evidence.directions)], axis=1) @ off
+    much, little = int(np.argmax(toward)), int(np.argmin(toward))
+    moved = bool((np.abs(evidence.turned[[much, little]]) > TURNED).any())
+    lost, more = list[str](), list[str]()
+    if evidence.aside or len(evidence.jump) > 1:  # else two tendons of a side are not told apart
+        if -float(toward[little]) >= math.cos(_ASIDE):
+            lost = [f"the tendon of {motors[little]} is off its pulley, cut or slipped, or its motor has stalled"]
+            lost += [f"{motors[little]} turns the wrong way"] * bool(evidence.turned[little] > TURNED)
+        if float(toward[much]) >= math.cos(_ASIDE):
+            more = [f"{motors[much]} turns the wrong way, or its tendon is caught"]
+    if lost or more:
+        carries = float(evidence.torque[little]) >= _ACCOUNTS * math.hypot(*evidence.load)
+        first, second = (lost, more) if carries or evidence.turned[much] >= -TURNED else (more, lost)
+        return [*first, *["motors exchanged"] * moved, *second]
+    plus, minus = (_tendons(evidence.parts, sign * toward) for sign in (1.0, -1.0))
+    exchanged = [f"motors of {plus} exchanged with those of {minus}"] * bool(plus and minus)
+    motor = f"a motor of {minus}" if minus else "a motor"
+    stalled = f"{motor} has stalled or no power, or a tendon has slipped or come off"
+    return [*_scaled(evidence), *exchanged, stalled]
+
+
+def _tendons(parts: Parts, toward: Array) -> str:
+    """Tendons on the side of a direction, by the cosine of each; empty without one."""
+    numbers = [str(number) for number, along in zip(parts.numbers, toward, strict=True) if along > _SIDE]
+    return f"tendon{'s' * (len(numbers) > 1)} {' and '.join(numbers)}" if numbers else ""
+
+
+def _toward(unit: Array) -> str:
+    """The anatomical direction nearest to a unit vector, in words."""
+    if not unit.any():
+        return ""
+    name = max(TOWARD, key=lambda name: float(unit_toward(TOWARD[name]) @ unit))
+    return f" toward {name.replace('-', ' and ')}"

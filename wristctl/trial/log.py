@@ -85,12 +85,12 @@ _RESERVED = 4 << 20
 _AT_ONCE = 40
 
 
-def residual_columns(weighed: bool, own: bool = False) -> Columns:
-    """Columns of the residuals of a rig with load cells, or without, or of one's `own` robot."""
+def residual_columns(planes: int, weighed: bool, own: bool = False) -> Columns:
+    """Columns of the residuals of a rig in so many planes, with load cells or without, or of one's `own` robot."""
     return {
         "trial": ("", "number, from 0; -1 between trials"),
         "clock": ("s", "the run's one clock"),
-        **columns(weighed, own),
+        **columns(planes, weighed, own),
     }
 
 
@@ -280,7 +280,7 @@ class TrialLog:
                 frame_columns(planes),
             )
         tables = {"log": ticks, "between": ticks, "frames": frames, **({"wire": WIRE} if wired else {})}
-        tables["residuals"] = residual_columns(weighed, not wired)
+        tables["residuals"] = residual_columns(planes, weighed, not wired)
         if coordinates is not None:
             tables["truth"] = truth_columns(coordinates, planes)
         try:

@@ -6,12 +6,13 @@ from typing import NamedTuple
 
 from wristctl.board.board_errors import BoardError
 from wristctl.board.driver import Board
-from wristctl.board.messages import Command, Configure, Flag, Hello, Limits, State, Status
+from wristctl.board.messages import Command, Configure, Fault, Flag, Hello, Limits, State, Status
 from wristctl.config.hw_run import CalibrateWristSettings, RigSettings
 from wristctl.config.wrist import WristParameters
 from wristctl.interrupt import undisturbed
 from wristctl.trial.resting import judge_rest
 from wristctl.trial.rig_belief import PLANES
+from wristctl.trial.safety import SafetyStop
 from wristctl.trial.spools import spools_of
 from wristctl.trial.supervised_wait import Patience
 from wristctl.trial.tendon_pulls import tendon_pulls_of
@@ -97,14 +98,16 @@ def in_sight(
         testbed.close()
 
 
-def prepare(board: Board, settings: RigSettings, reach: float | None = None) -> None:
+def prepare(board: Board, settings: RigSettings, reach: float | None = None) -> str:
     """Set ramps, watchdog and soft limits of a board, clear an old fault, and switch the drives on.
 
     Until the axes are homed none may creep further than `reach` [m] of tendon from where they are switched on; None:
-    as far as homing goes.
+    as far as homing goes. Returns the names of the faults that it has cleared, in which the drives have let go.
     """
     limits, spools = settings.safety, spools_of(settings.actuator)
-    if board.read().state == State.FAULT:
+    cleared, status = "", board.read()
+    if status.state == State.FAULT:
+        cleared = " and ".join(fault.name or "" for fault in Fault if fault in status.faults)
         board.clear()
     furthest = round(limits.travel / spools.step)
     ramps = Configure(limits.watchdog, int(limits.hold), round(settings.actuator.ramp))
@@ -112,3 +115,18 @@ def prepare(board: Board, settings: RigSettings, reach: float | None = None) -> 
     jog = round((homing.slack + homing.pull + 3.0 * homing.move if reach is None else reach) / spools.step)
     board.set_up(ramps, Limits((-furthest,) * 4, (furthest,) * 4, jog))
     board.enable()
+    return cleared
+
+
+@contextmanager
+def after_a_fault(cleared: str) -> Iterator[None]:
+    """Within the block, a homing that stops says that its tendons hang slack where `prepare` has `cleared` a fault."""
+    try:
+        yield
+    except SafetyStop as stop:
+        if not cleared:
+            raise
+        problem = str(stop.what).removeprefix("stopped: ")
+        problem += f"; the drives have let go in a fault before ({cleared}), which leaves tendons slack or crossed"
+        fix = "see that each tendon lies on its pulley, take its slack up (wristctl hw jog), then home again"
+        raise SafetyStop(problem, str(stop.where), fix) from stop

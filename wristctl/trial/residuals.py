@@ -47,6 +47,8 @@ class Residual(NamedTuple):
     """Whether it may exceed its limit for `safety.odd_for`; others stop at once."""
     weighed: bool = False
     """Whether it needs load cells: without them it has no line."""
+    by_size: bool = False
+    """Whether it goes by a marker's size: where two cameras see the bend it has no line."""
 
 
 def _never(settings: HwRunSettings) -> float:
@@ -133,12 +135,13 @@ RESIDUALS: Mapping[str, Residual] = {
         _SHARE, "share of a second's pictures that tell no bend across", lambda s: 0.9, 0.3,
         "light that changes (a fixed exposure, LEDs on DC), dirt or glare on a marker, focus or zoom",
         "{value} of a second's pictures tell no bend across: markers change their size or grey level as no wrist does",
-        "{value} of a second's pictures told no bend across: light, dirt, focus or zoom",
+        "{value} of a second's pictures told no bend across: light, dirt, focus or zoom", by_size=True,
     ),
     "across": Residual(
         _DEG, "bend across the plane, by the size of the tip's marker", lambda s: math.radians(s.safety.across_deg),
         0.8, "one tendon of two is lost or pulls alone; motors exchanged; a camera that is not square",
         "the wrist bends {value} across its plane, beyond {limit}", "{value} across the plane (limit {limit})", True,
+        by_size=True,
     ),
     "load": Residual(
         Shown("N m", 1.0, ".2f"), "load torque as estimated", lambda s: s.safety.load, 0.6, _TENDONS,
@@ -259,7 +262,7 @@ class Limit(NamedTuple):
 def limits_of(settings: HwRunSettings) -> tuple[Limit, ...]:
     """The table for these settings."""
     limits = []
-    for name, line in _lines(settings.load_cells is not None, settings.rig is not None).items():
+    for name, line in _lines(settings.planes, settings.load_cells is not None, settings.rig is not None).items():
         most, held = line.limit(settings), settings.safety.odd_for if line.lasting else 0.0
         odd = line.odd * most if math.isfinite(most) and math.isfinite(line.odd) else line.odd
         limits.append(Limit(name, _SI.get(line.shown.unit, line.shown.unit), most, held, odd))
@@ -269,9 +272,12 @@ def limits_of(settings: HwRunSettings) -> tuple[Limit, ...]:
 _SI = {"ms": "s", "mm": "m", "deg": "rad", "%": ""}
 
 
-def columns(weighed: bool, own: bool = False) -> dict[str, tuple[str, str]]:
-    """Unit and meaning of each residual, as the log has them: with load cells or without, or of one's `own` robot."""
-    lines = _lines(weighed, own)
+def columns(planes: int, weighed: bool, own: bool = False) -> dict[str, tuple[str, str]]:
+    """Unit and meaning of each residual, as the log has them.
+
+    Of a rig in so many planes, with load cells or without, or of one's `own` robot.
+    """
+    lines = _lines(planes, weighed, own)
     return {name: (_SI.get(line.shown.unit, line.shown.unit), line.meaning) for name, line in lines.items()}
 
 
@@ -280,10 +286,14 @@ def residual(name: str, own: bool = False) -> Residual:
     return (RESIDUALS_OF_A_RIG if own else RESIDUALS)[name]
 
 
-def _lines(weighed: bool, own: bool) -> dict[str, Residual]:
+def _lines(planes: int, weighed: bool, own: bool) -> dict[str, Residual]:
     if own:
         return dict(RESIDUALS_OF_A_RIG)
-    return {name: line for name, line in RESIDUALS.items() if weighed or not line.weighed}
+    return {
+        name: line
+        for name, line in RESIDUALS.items()
+        if (weighed or not line.weighed) and (planes == 1 or not line.by_size)
+    }
 
 
 class Judge:

@@ -10,9 +10,13 @@ from wristctl.config.hw_run import HwRunSettings
 from wristctl.config.wrist import WristParameters
 from wristctl.errors import UserError
 from wristctl.rig import Refused, Spread, most, value
+from wristctl.trial.expected_moves import ExpectedMoves, middle
 from wristctl.trial.guarded_rig import GuardedRig, RigStop
+from wristctl.trial.homing import Line, finder_of, rest_of
+from wristctl.trial.rig_drive import RigTracking
 from wristctl.trial.rig_experiment import halt_rig
-from wristctl.trial.rig_homing import RigHoming
+from wristctl.trial.rig_homing import PLANE
+from wristctl.trial.rig_motors import RigMotors
 from wristctl.wrist.tendon_layout import TendonLayout
 
 # Seconds for which looks are watched, a response to a step, and between two polls of a rig.
@@ -46,7 +50,7 @@ class RigTrier:
         self._rig, self._facts, self._settings = rig, rig.facts, settings
         self._wrist, self._layout = wrist, layout
         self._noise = 0.0
-        self._about: list[float] = []
+        self._about: list[int] = []
         self._slack: Array = np.zeros(0)
         self._metres: Array = np.zeros(0)
         self.checks: dict[str, Callable[[], str]] = {
@@ -77,10 +81,12 @@ class RigTrier:
 
     def _connect(self) -> str:
         stood = self._rig.connect()
-        self._homing = RigHoming(self._rig, self._settings, self._wrist, self._layout, stood)
+        self._motors, self._tracking = RigMotors(self._rig, self._settings, stood), RigTracking(self._rig)
+        self._plane = PLANE if self._facts.planes == 1 else ""
+        self._expected = ExpectedMoves(self._settings, self._wrist, self._plane, self._layout)
         before = self._silent_news(min(0.2, (self._facts.silence or math.inf) / 3.0))[:, 1:]
         self._rig.send(stood)
-        self._homing.wait(0.3)
+        self._motors.wait(0.3)
         after = self._silent_news(min(0.2, (self._facts.silence or math.inf) / 3.0))[:, 1:]
         if np.isfinite(before).all() and np.isfinite(after).all():
             moved = _size(np.median(after, axis=0) - np.median(before, axis=0))
@@ -98,7 +104,7 @@ class RigTrier:
                 newest = seen.time
                 rows.append([seen.time, *seen.bend.tolist()])
                 self._arrived.append(now)
-            self._homing.wait(min(5.0 * _POLL, max(_POLL, 0.25 / value(self._facts.sensor.rate))))
+            self._motors.wait(min(5.0 * _POLL, max(_POLL, 0.25 / value(self._facts.sensor.rate))))
             self._polls += 1
         return np.array(rows).reshape(len(rows), 1 + self._facts.planes)
 
@@ -140,11 +146,11 @@ class RigTrier:
     def _sent(self) -> str:
         """What send() returns is what was asked for, but for the resolution."""
         finest = max(value(self._facts.drive.resolution), 1e-6)
-        asked = self._homing.targets_at(np.full(self._layout.directions.shape, -self._settings.homing.move))
+        asked = self._motors.targets_at(np.full(self._layout.directions.shape, -self._settings.homing.move))
         sent = self._rig.send(asked)
         off = float(np.abs(sent - asked).max()) * self._facts.metres_per_unit
-        self._homing.left_at(asked)
-        self._homing.reel(np.zeros(len(asked)))
+        self._motors.left_at(asked)
+        self._motors.reel(np.zeros(len(asked)))
         if off > 1.01 * finest:
             raise Unfit(
                 f"send() returns {1e3 * off:.3g} mm off what was asked for; the resolution is {1e3 * finest:.3g} mm"
@@ -153,7 +159,7 @@ class RigTrier:
 
     def _refuses(self) -> str:
         """Targets that are no number or beyond the limits are Refused, and nothing moves. None of them reels in."""
-        stood, count = self._homing.targets, len(self._homing.targets)
+        stood, count = self._motors.targets, len(self._motors.targets)
         beyond = -1.5 * self._facts.limits.travel / self._facts.metres_per_unit
         wrong = {"nan": math.nan, "-inf": -math.inf, f"{beyond:.4g} {self._facts.unit}": beyond}
         before = self._seen(0.2)
@@ -169,30 +175,45 @@ class RigTrier:
                 self._rig.send(stood)
                 raise Unfit(f"a target of {words} is not refused: raise Refused in send(), before anything moves")
         self._rig.send(stood)
-        self._homing.wait(0.2)
+        self._motors.wait(0.2)
         moved = _size(self._seen(0.2) - before)
         if moved > math.radians(self._settings.homing.bend_deg):
             raise Unfit(f"refused targets have bent the wrist by {math.degrees(moved):.1f} deg")
         return f"{', '.join(wrong)}: each Refused, and nothing moves"
 
     def _sense(self) -> str:
-        straight = self._homing.reading(4 * self._settings.homing.frames)
-        self._about = [self._homing.sense(tendon, straight) for tendon in range(len(self._layout.places))]
+        self._finder = finder_of(self._motors, self._tracking, self._settings, self._wrist, self._plane, self._expected)
+        step, count = self._settings.actuator.step_length, len(self._layout.places)
+        self._about = [self._finder.sense(tendon, (1, -1)) for tendon in range(count)]
         return "; ".join(
-            f"target {tendon}: bends after {1e3 * slack:.2f} mm" for tendon, slack in enumerate(self._about, 1)
+            f"target {tendon}: bends after {1e3 * step * about:.2f} mm" for tendon, about in enumerate(self._about, 1)
         )
 
     def _scale(self) -> str:
-        self._homing.let_go(times=2.0)
-        straight = self._homing.rest()
-        lines = [self._homing.line(tendon, about, straight) for tendon, about in enumerate(self._about)]
-        self._slack, self._metres = (np.array([line[k] for line in lines]) for k in range(2))
-        meant = self._homing.per_radian
+        step, expected = self._settings.actuator.step_length, self._expected
+        self._finder.slacken()
+        found: dict[int, Line] = {}
+        for turns in expected.turns:
+            found |= self._finder.turn(turns, self._about)
+        lines = [found[tendon] for tendon in range(len(self._about))]
+        straight = middle([line.rest for line in lines])
+        self._slack = step * np.array([line.taut(expected.along(k, straight)) for k, line in enumerate(lines)])
+        self._metres = step * np.array([line.per_radian for line in lines])
+        meant = [step * expected.steps(axis=tendon) for tendon in range(len(lines))]
+        toward = [expected.place(k) if math.isnan(found) else found for k, found in enumerate(self._finder.directions)]
         return "; ".join(
             f"target {tendon}: {1e3 * metres:.3g} mm/rad (model {1e3 * model:.3g}) toward "
-            f"{math.degrees(line[2]) % 360.0:.0f} deg"
-            for tendon, (line, metres, model) in enumerate(zip(lines, self._metres, meant, strict=True), 1)
+            f"{math.degrees(angle) % 360.0:.0f} deg"
+            for tendon, (metres, model, angle) in enumerate(zip(self._metres, meant, toward, strict=True), 1)
         )
+
+    def _rests(self) -> Array:
+        """Bend (P,) [rad] of a wrist that was let go, once it moves no more."""
+        rest = rest_of(self._motors, self._tracking, self._expected, self._settings.homing)
+        return np.array([rest.theta, rest.beside][: self._facts.planes])
+
+    def _let_go(self) -> None:
+        self._motors.reel(self._slack - 2.0 * self._settings.homing.pull)
 
     def _delay(self) -> str:
         """From send() until the bend has changed, by the times of looks: what the drive's delay and lag explain."""
@@ -218,21 +239,21 @@ class RigTrier:
         """
         position = self._slack - 2.0 * pull
         position[tendon] = self._slack[tendon]
-        self._homing.reel(position)
-        rest, toward = self._homing.rest(), self._homing.toward(tendon)
+        self._motors.reel(position)
+        rest, toward = self._rests(), self._expected.toward(tendon)
         position[tendon] += pull
         sent_at = self._rig.now()
-        self._rig.send(self._homing.targets_at(position))
+        self._rig.send(self._motors.targets_at(position))
         if stop:
             self._rig.stop()
             news = self._silent_news(_RESPONSE)
         else:
-            self._homing.left_at(self._homing.targets_at(position))
+            self._motors.left_at(self._motors.targets_at(position))
             news = self._news(_RESPONSE)
         along = (news[:, 1:] - rest) @ toward
         meant, last = pull / float(self._metres[tendon]), float(np.median(along[-5:]))
         if not stop:
-            self._homing.let_go(self._slack, 2.0)
+            self._let_go()
             if last < 0.4 * meant:
                 raise Unfit(
                     f"a step of target {tendon + 1} bends the wrist by {math.degrees(last):.2f} of "

@@ -172,6 +172,8 @@ class RigTracking:
 
     def __init__(self, rig: GuardedRig) -> None:
         self._rig, self._time, self._number = rig, -math.inf, 0
+        self.pace: CameraPaces | None = LookPaces(rig.where)
+        self.apart = 1.0 / value(rig.facts.sensor.rate)
         self.zero: tuple[float, ...] = (0.0,) * rig.facts.planes
 
     def look(self) -> list[Sighting]:

@@ -19,7 +19,8 @@ from wristctl.trial.motions import back
 from wristctl.trial.motors_ready import Halt
 from wristctl.trial.rig_belief import RigBelief, layout_of_rig, names_of_planes
 from wristctl.trial.rig_drive import LookPaces, RigDrive, RigTracking
-from wristctl.trial.rig_homing import RigHoming, RigZero, find_rig_zero
+from wristctl.trial.rig_homing import PLANE, RigHoming, RigZero
+from wristctl.trial.rig_motors import RigMotors
 from wristctl.trial.rig_settings import sides_of
 from wristctl.trial.spools import spools_of
 from wristctl.trial.steering import Steering
@@ -31,8 +32,6 @@ from wristctl.wrist.kinematics import Inverse
 
 log = logging.getLogger(__name__)
 
-# The plane of a rig that bends in one.
-PLANE = "ulnar"
 # Seconds within which motors stand after stop(), and between the looks that show it.
 _PATIENCE, _APART = 0.5, 0.05
 # Share of `homing.bend_deg` that a wrist whose motors stand may move by between two looks.
@@ -122,20 +121,19 @@ class RigExperiment(TrialSeries):
     def _all(self, rig: GuardedRig, shown: Shown | None, confirm: Callable[[], None] | None) -> None:
         if confirm is not None:
             confirm()
-        homing = RigHoming(rig, self._settings, self._wrist, self._layout, rig.connect())
-        zero = self.zero = find_rig_zero(homing, self._settings, rig.where)
-        tracking = RigTracking(rig)
-        tracking.zero = zero.straight
+        motors, tracking = RigMotors(rig, self._settings, rig.connect()), RigTracking(rig)
+        homing = RigHoming(motors, tracking, self._settings, self._wrist, self._layout, rig.where)
+        zero = self.zero = homing.find()
         for trial in self._trials:
             drive = RigDrive(rig, self._settings, np.array(zero.targets))
-            drive.at(homing.targets)
+            drive.at(motors.targets)
             loop = ControlLoop(
                 drive, tracking, self._settings, self._facing, PLANE, self.timing, self._log, shown, layout=self._layout
             )
             loop.follow(self._to_rest(0.0, self._settings.rest, 0.0), self._back, ())
             self._one(loop, trial)
-            homing.left_at(drive.targets)
-            homing.check(zero)
+            motors.left_at(drive.targets)
+            homing.check()
             self._in_doubt = None
 
     def _to_rest(self, bend: object, duration: float, rest: float) -> Motion:

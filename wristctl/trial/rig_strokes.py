@@ -14,7 +14,7 @@ from wristctl.board.messages import AXES, JOG_RATE, Flag, State, Target
 from wristctl.board.transport import underway
 from wristctl.config.hw_run import CalibrateWristSettings, RigSettings
 from wristctl.config.wrist import WristParameters
-from wristctl.trial.expected_moves import Bend
+from wristctl.trial.expected_moves import Bend, ExpectedMoves
 from wristctl.trial.motors_ready import in_sight, prepare
 from wristctl.trial.safety import SafetyStop
 from wristctl.trial.supervised_wait import Patience
@@ -311,17 +311,19 @@ class AxisTried(NamedTuple):
     """1 where positive steps reel in, -1 where they pay out."""
     taken_up: float
     """Tendon [m] until the wrist bent by half of what it may."""
-    bend: float
-    """Bend of the wrist then [rad], + as the markers count."""
+    bend: Bend
+    """Bend of the wrist then, + as the markers count."""
 
 
 def axis_tried(testbed: Testbed, settings: CalibrateWristSettings, wrist: WristParameters, axis: int) -> AxisTried:
     """Try an axis, let its tendon go again, and release the drives. Closes the testbed.
 
-    Raises SafetyStop where it bends the wrist too far, or not at all; BoardError and CameraError.
+    Raises SafetyStop where it bends the wrist too far, not at all, or as another tendon would; BoardError and
+    CameraError.
     """
     with in_sight(testbed, settings, wrist) as (board, _, tracking):
         strokes = RigStrokes(board, tracking, settings, axis, math.radians(settings.max_deg))
         steps, bend = strokes.taken_up()
         strokes.let_go()
-    return AxisTried(1 if steps > 0 else -1, abs(steps) * settings.actuator.step_length, bend.theta)
+        ExpectedMoves(settings, wrist, settings.plane).judge_side(axis, bend)
+    return AxisTried(1 if steps > 0 else -1, abs(steps) * settings.actuator.step_length, bend)

@@ -2,12 +2,12 @@
 
 import math
 from collections.abc import Callable, Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
 from wristctl.arrays import Array
-from wristctl.board.driver import Board
+from wristctl.board.driver import Cells
 from wristctl.board.messages import State, Status
 from wristctl.config.hw_run import Homing
 from wristctl.trial.camera_pace import CameraPaces
@@ -36,6 +36,49 @@ _LOOK = 0.05
 _READING = 2.0
 
 
+class Waits(Protocol):
+    """A clock that can be waited on."""
+
+    def now(self) -> float:
+        """Seconds on it."""
+
+    def wait(self, seconds: float) -> None:
+        """Let time pass."""
+
+
+class Motors(Protocol):
+    """Motors that homing moves step by step: a board's, or a rig's (`wristctl.trial.rig_motors.RigMotors`)."""
+
+    @property
+    def transport(self) -> Waits:
+        """Their clock."""
+
+    @property
+    def cells(self) -> Cells | None:
+        """Load cells of their tendons."""
+
+    def read(self) -> Any:
+        """A Status, of as many axes as there are."""
+
+    def ping(self) -> None:
+        """Say that somebody is there."""
+
+    def jog(self, positions: Sequence[int]) -> Any:
+        """Creep to these positions (T,) [steps] before zero is known, and wait until they stand there."""
+
+    def go_to(self, positions: Sequence[int], rate: int) -> Any:
+        """Go to these positions (T,) [steps] no faster than so [steps/s], and wait; the status then."""
+
+    def home(self) -> Any:
+        """Call zero where they stand."""
+
+    def faulted(self, status: Any) -> Exception:
+        """The error of a status in a fault."""
+
+    def see_restart(self) -> None:
+        """Raises where positions are no longer those of before."""
+
+
 class Reading(NamedTuple):
     """The marker of a wrist that stands."""
 
@@ -59,7 +102,7 @@ class Patience:
     SafetyStop. `judge` is shown every status too, and may raise.
     """
 
-    def __init__(self, board: Board, judge: Callable[[Status], None] = lambda status: None) -> None:
+    def __init__(self, board: Motors, judge: Callable[[Status], None] = lambda status: None) -> None:
         self._board, self._judge = board, judge
         self._stood = board.read()
         self.pace = CameraPaces()
@@ -108,20 +151,22 @@ class Patience:
     def sightings(self, tracking: Tracking, frames: int) -> list[Sighting]:
         """The next usable frames, so many of each camera at least. Raises SafetyStop where none come."""
         usable: list[Sighting] = []
-        counts = [0] * len(tracking.zero)
-        self.pace.expect(len(counts))
+        counts, pace = [0] * len(tracking.zero), tracking.pace or self.pace
+        longest = _READING + frames * tracking.apart
+        pace.expect(len(counts))
         tracking.look()
         began = self._board.transport.now()
         while min(counts) < frames:
             self.pulse()
             for sighting in tracking.look():
-                self.pace.add(sighting)
+                pace.add(sighting)
                 if sighting.time >= began and math.isfinite(sighting.theta):
                     usable.append(sighting)
                     counts[sighting.plane] += 1
-            if self._board.transport.now() - began > _READING:
-                why, fix = self.pace.missing(self._board.transport.now(), _READING)
-                raise SafetyStop(f"the marker's angle could not be read ({why})", "homing", fix)
+            if self._board.transport.now() - began > longest:
+                why, fix = pace.missing(self._board.transport.now(), longest)
+                what = "the marker's angle" if tracking.pace is None else "the bend"
+                raise SafetyStop(f"{what} could not be read ({why})", "homing", fix)
         return usable
 
     def stand_square(self, tracking: Tracking, homing: Homing) -> tuple[CameraPose | None, ...]:

@@ -12,6 +12,7 @@ import numpy as np
 
 from wristctl.arrays import Array
 from wristctl.loop_priority import beside_the_loop
+from wristctl.trial.camera_pace import CameraPaces
 from wristctl.vision.camera import Camera, CameraError, Frame
 from wristctl.vision.camera_pose import CameraPose
 from wristctl.vision.marker import Sighting, SightingVerdict, Tracker
@@ -77,6 +78,10 @@ class Tracking(Protocol):
 
     zero: tuple[float, ...]
     """Marker angle of the straight wrist [rad] as each camera sees it, taken off its every angle."""
+    pace: CameraPaces | None
+    """Counts looks in words of its own; None: pictures are."""
+    apart: float
+    """Seconds between two usable sightings that a reading is waited for, beyond what it is for any."""
 
     def look(self) -> list[Sighting]:
         """Sightings since the last look, oldest first, of one camera or of both; never waits for a frame."""
@@ -108,6 +113,9 @@ def bend_of(tracking: Tracking, sighting: Sighting, bends: Array) -> float:
 
 class InlineTracking:
     """Looks when asked: in virtual time, where looking takes none. `now` is the clock of the camera's times."""
+
+    pace: CameraPaces | None = None
+    apart = 0.0
 
     def __init__(
         self, camera: Camera, tracker: Tracker, keep: Kept | None = None, now: Callable[[], float] = time.monotonic,
@@ -152,6 +160,9 @@ class ThreadedTracking:
 
     A frame is kept once the loop can have its angle: drawing and encoding it takes milliseconds.
     """
+
+    pace: CameraPaces | None = None
+    apart = 0.0
 
     def __init__(
         self, camera: Camera, tracker: Tracker, keep: Kept | None = None, now: Callable[[], float] = time.monotonic,
@@ -203,6 +214,9 @@ class ThreadedTracking:
 
 class PairedTracking:
     """Both cameras of a wrist in two planes, each with a tracking of its own, in the order of their planes."""
+
+    pace: CameraPaces | None = None
+    apart = 0.0
 
     def __init__(self, trackings: Sequence[InlineTracking | ThreadedTracking]) -> None:
         self._trackings = tuple(trackings)

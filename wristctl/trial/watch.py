@@ -16,17 +16,16 @@ from wristctl.config.wrist import WristParameters
 from wristctl.control.response import Estimate
 from wristctl.trial.blind_model import BlindModel
 from wristctl.trial.camera_record import CameraRecord, Frame, Recent, jump_between
-from wristctl.trial.causes_in_space import SpatialEvidence, causes_in_space
-from wristctl.trial.likely_causes import Evidence, likely_causes, reversals
+from wristctl.trial.likely_causes import Evidence, likely_causes, parts_of_board, parts_of_rig, reversals
 from wristctl.trial.marker_lag import MarkerLag
 from wristctl.trial.residuals import Judge, Limit, limits_of, notes, residual, stopped_by, worst
-from wristctl.trial.rig_belief import names_of_planes, numbers_of, places_of_tendons
+from wristctl.trial.rig_belief import TOWARD, names_of_planes, numbers_of, pull_directions, unit_toward
 from wristctl.trial.safety import SafetyStop
 from wristctl.trial.spools import spools_of
 from wristctl.trial.tendon_pulls import TendonPulls
 from wristctl.trial.tick_timing import FIX, TickTiming
 from wristctl.vision.marker import Sighting
-from wristctl.wrist.directions import away_of
+from wristctl.wrist.directions import away_from_camera
 from wristctl.wrist.tendon_layout import TendonLayout
 
 # Seconds over which causes are judged, and whether the loop swings.
@@ -87,8 +86,10 @@ class Watch:
     ) -> None:  # fmt: skip
         self._settings, self._timing, self._oblique, self._pulls = settings, timing, oblique, pulls
         self._layout = layout
-        self._plus = () if settings.planes == 2 else tuple((places_of_tendons((plane,), layout) == 0).tolist())
-        self._away = () if settings.planes == 2 else away_of(plane, settings.markers.positive)
+        planes, own = names_of_planes(settings.planes, plane), settings.rig is not None
+        self._seen_in = np.array([unit_toward(TOWARD[name]) for name in planes])
+        self._away = away_from_camera(plane, settings.markers.positive) if settings.planes == 1 else np.zeros(2)
+        self._parts = (parts_of_rig if own else parts_of_board)(numbers_of(layout), planes)
         self._spools, self._period, self._radius = spools_of(settings.actuator), timing.period, wrist.tendon_radius
         if stiffness is not None:
             self._spools = replace(self._spools, stiffness=stiffness)
@@ -97,13 +98,13 @@ class Watch:
             settings.actuator,
             settings.safety.softest,
             self._period,
-            names_of_planes(settings.planes, plane),
+            planes,
             layout,
         )
         nearer = 2.0 * settings.markers.distance / wrist.length if settings.planes == 1 else math.nan
         doubtful = _DOUBTFUL * math.radians(settings.safety.across_deg)
         self._cameras = tuple(CameraRecord(nearer, doubtful) for _ in range(settings.planes))
-        self.limits, self._own = limits_of(settings), settings.rig is not None
+        self.limits, self._own = limits_of(settings), own
         self._judge = Judge(self.limits)
         self._past: deque[_Past] = deque()
         self._positions: deque[Array] = deque(maxlen=round(_SWINGING / self._period))
@@ -281,38 +282,26 @@ class Watch:
             max((abs(jump_between(one.frames[k], two.frames[k])) for one, two in pairwise(self._past)), default=0.0)
             for k in range(len(last.frames))
         ]
-        turned, swings = last.position - first.position, reversals(np.array(self._positions))
         ends = list(zip(first.frames, last.frames, strict=True))
-        if len(last.frames) == 2:
-            return causes_in_space(
-                SpatialEvidence(
-                    turned=turned,
-                    torque=self._radius * np.maximum(0.0, self._spools.tension(tick.position, tick.taut)),
-                    load=np.array(tick.estimate.load),
-                    apart=np.array([frame.apart for frame in last.frames]),
-                    bent=np.array([two.seen - one.seen for one, two in ends]),
-                    meant=np.array([(two.predicted - one.predicted)[0] for one, two in ends]),
-                    jump=np.array(jumps),
-                    reversals=swings,
-                    pushed=self._pushed,
-                    directions=None if self._layout is None else self._layout.directions,
-                    numbers=numbers_of(self._layout),
-                )
+        across = last.frames[0].away if len(ends) == 1 and math.isfinite(last.frames[0].away) else 0.0
+        return likely_causes(
+            Evidence(
+                turned=last.position - first.position,
+                torque=self._radius * np.maximum(0.0, self._spools.tension(tick.position, tick.taut)),
+                load=np.atleast_1d(tick.estimate.load) @ self._seen_in,
+                apart=np.array([frame.apart for frame in last.frames]) @ self._seen_in,
+                across=across * self._away,
+                bent=np.array([two.seen - one.seen for one, two in ends]) @ self._seen_in,
+                meant=np.array([(two.predicted - one.predicted)[0] for one, two in ends]) @ self._seen_in,
+                jump=np.array(jumps),
+                directions=pull_directions() if self._layout is None else self._layout.directions,
+                parts=self._parts,
+                bends=math.radians(self._settings.safety.across_deg),
+                oblique=self._oblique,
+                reversals=reversals(np.array(self._positions)),
+                pushed=self._pushed,
             )
-        ((one, two),) = ends
-        evidence = Evidence(
-            turned=turned,
-            load=self._values["load"],
-            across=0.0 if math.isnan(two.away) else two.away,
-            bent=two.seen - one.seen,
-            meant=float((two.predicted - one.predicted)[0]),
-            jump=jumps[0],
-            bends=math.radians(self._settings.safety.across_deg),
-            reversals=swings,
-            pushed=self._pushed,
-            oblique=self._oblique,
         )
-        return likely_causes(evidence, self._plus, self._away)
 
 
 def _size(value: Any) -> float:

@@ -3,6 +3,9 @@
 import math
 from typing import NamedTuple
 
+import numpy as np
+
+from wristctl.arrays import Array
 from wristctl.config.wrist import WristParameters
 
 
@@ -47,8 +50,14 @@ def away_of(plane: str, positive: str) -> tuple[int, ...]:
 
     Tangent, ulnar and flexion are right-handed axes.
     """
-    side = 1 if positive == "right" else -1
-    return tuple(side * (TENDONS[tendon][1] if plane == "ulnar" else -TENDONS[tendon][0]) for tendon in ACTIVE)
+    ulnar, flexion = away_from_camera(plane, positive)
+    return tuple(int(ulnar * TENDONS[tendon][0] + flexion * TENDONS[tendon][1]) for tendon in ACTIVE)
+
+
+def away_from_camera(plane: str, positive: str) -> Array:
+    """Unit vector (2,), toward ulnar and flexion, away from the camera of `away_of`."""
+    side = 1.0 if positive == "right" else -1.0
+    return np.array([0.0, side] if plane == "ulnar" else [-side, 0.0])
 
 
 def tendons_of(plane: str) -> tuple[int, int, int, int]:

@@ -12,7 +12,6 @@ from wristctl.commands.results import StudyResult
 from wristctl.commands.rig_description import coming_first, describe_rig
 from wristctl.commands.session import Session
 from wristctl.config.study import Study
-from wristctl.errors import UserError
 from wristctl.records.find import Content
 
 if TYPE_CHECKING:
@@ -24,6 +23,7 @@ if TYPE_CHECKING:
 # What a run of one axis alone lacks.
 CALIBRATION = Content("data/wrist.json", "calibration of all axes")
 _OF_AXIS = ("axis", "tendon", "sense", "taken up [mm]", "bend [deg]")
+_TOWARD = ("toward [deg]", "its tendon [deg]")
 _COLUMNS = ("axis", "tendon", "sense", "steps per rad", "by the model", "slack [mm]", "friction [mm]")
 
 
@@ -52,16 +52,13 @@ class AxisFound(StudyResult):
         """One row."""
         import pandas as pd
 
-        return pd.DataFrame(self.tables[0].rows, columns=_OF_AXIS)
+        return pd.DataFrame(self.tables[0].rows, columns=list(self.tables[0].columns))
 
 
 def plan(study: Study, inputs: Inputs) -> str:
     """Plan of a calibration. Opens no device."""
     settings = study.calibrate_wrist
     slack = 1e3 * settings.homing.slack
-    if settings.axis is not None and settings.planes == 2:
-        problem = "one axis alone is watched by one camera, and this rig has two"
-        raise UserError(problem, "calibrate-wrist.axis", "planes: 1 with --camera of the plane that it bends in")
     if settings.axis is not None:
         until = f"until its tendon bends the wrist, by {settings.max_deg:g} deg at most"
         return f"{describe_rig(settings)}\naxis {settings.axis} reels in by at most {slack:g} mm {until}"
@@ -121,16 +118,23 @@ def calibrate_wrist(session: Session) -> WristCalibrated | AxisFound:
 def _one_axis(session: Session, testbed: Testbed, axis: int) -> AxisFound:
     import numpy as np
 
+    from wristctl.trial.expected_moves import ExpectedMoves
     from wristctl.trial.rig_strokes import axis_tried
     from wristctl.wrist.directions import ACTIVE
 
-    findings, study = session.findings, session.study
+    findings, study, settings = session.findings, session.study, session.study.calibrate_wrist
     with session.progress(f"trying axis {axis}"):
-        axis_result = axis_tried(testbed, study.calibrate_wrist, study.wrist, axis)
-    findings.metric("taken_up", axis_result.taken_up, "m", meaning=f"tendon {ACTIVE[axis]}, until the wrist bent")
-    findings.metric("bend", axis_result.bend, "rad", meaning="of the wrist then")
-    row = axis, ACTIVE[axis], f"{axis_result.sense:+d}", 1e3 * axis_result.taken_up, float(np.degrees(axis_result.bend))
-    return AxisFound(study, findings, [Table("One axis", _OF_AXIS, [row])])
+        tried = axis_tried(testbed, settings, study.wrist, axis)
+    findings.metric("taken_up", tried.taken_up, "m", meaning=f"tendon {ACTIVE[axis]}, until the wrist bent")
+    bend, columns, directions = tried.bend.theta, list(_OF_AXIS), list[float]()
+    if settings.planes == 2:
+        bend, toward = tried.bend.askew, float(np.arctan2(tried.bend.away, tried.bend.theta))
+        place = ExpectedMoves(settings, study.wrist, settings.plane).place(axis)
+        findings.metric("direction", toward, "rad", meaning="of that bend, from ulnar toward flexion")
+        columns, directions = [*_OF_AXIS, *_TOWARD], [float(np.degrees(angle)) % 360.0 for angle in (toward, place)]
+    findings.metric("bend", bend, "rad", meaning="of the wrist then")
+    row = axis, ACTIVE[axis], f"{tried.sense:+d}", 1e3 * tried.taken_up, float(np.degrees(bend)), *directions
+    return AxisFound(study, findings, [Table("One axis", columns, [row])])
 
 
 CALIBRATE_WRIST: Procedure[WristCalibrated | AxisFound] = Procedure(

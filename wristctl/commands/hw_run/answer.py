@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Hashable, Mapping, Sequence
-from functools import partial
+from collections.abc import Hashable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from wristctl.commands.answer import Answer
@@ -30,23 +29,28 @@ class Means(NamedTuple):
     """Means over trials that ended well; nan where there is none, or where one of them never settles."""
 
     trials: int
-    rmse: float
-    """[rad]"""
+    rmse: tuple[float, ...]
+    """In each plane [rad]."""
     steady_state: float
     """[rad]"""
     settling: float
     """[s]"""
     recovery: float
-    """[s]"""
+    """By the true bend, where an emulated rig knows it [s]."""
     simulated: float
-    """RMSE of the same trials in simulation, of the true angle [rad]."""
+    """RMSE of the same trials in simulation, of the true bend in the worse plane [rad]."""
     true: float
-    """RMSE of the true angle, where an emulated rig knows it [rad]."""
+    """RMSE of the true bend in the worse plane, where an emulated rig knows it [rad]."""
+
+    @property
+    def worse(self) -> float:
+        """RMSE in the worse plane [rad]."""
+        return max(self.rmse)
 
     @property
     def compared(self) -> float:
         """What the simulation is held against: the true error where it is known, else the measured one [rad]."""
-        return self.true if math.isfinite(self.true) else self.rmse
+        return self.true if math.isfinite(self.true) else self.worse
 
     @property
     def apart(self) -> bool:
@@ -55,73 +59,84 @@ class Means(NamedTuple):
         return math.isfinite(ratio) and not 1.0 / APART <= ratio <= APART
 
 
+def errors_of(trials: pd.DataFrame) -> dict[str, str]:
+    """Names of the RMSE in each plane, with where it is toward; of one plane that is not said."""
+    by_plane = {f"rmse_{plane}": f" toward {plane}" for plane in ("ulnar", "flexion")}
+    return by_plane if set(by_plane) <= set(trials) else {"rmse": ""}
+
+
 def means_of(trials: pd.DataFrame, twins: Mapping[int, Simulation]) -> Means:
     """Means of some trials."""
     import numpy as np
 
-    names = "rmse", "steady_state", "settling", "recovery"
-    rmse, rest, settling, recovery = (
-        float(trials[name].mean(skipna=False)) if len(trials) else math.nan for name in names
-    )
-    simulated = [twins[number].metrics["rmse"] for number in trials["trial"]]
+    def mean(name: str) -> float:
+        return float(trials[name].mean(skipna=False)) if len(trials) and name in trials else math.nan
+
+    names = list(errors_of(trials))
+    simulated = [max(twins[number].metrics[name] for name in names) for number in trials["trial"]]
     model = float(np.mean(simulated)) if simulated else math.nan
-    true = float(trials["true_rmse"].mean(skipna=False)) if len(trials) and "true_rmse" in trials else math.nan
-    return Means(len(trials), rmse, rest, settling, recovery, model, true)
-
-
-class TrialWords(NamedTuple):
-    """What is said of trials that ended well, and of which controllers."""
-
-    sentence: Callable[[pd.DataFrame, str], str]
-    """of those of one controller"""
-    table: Callable[[pd.DataFrame, Sequence[str]], Table]
-    apart: Callable[[pd.DataFrame, Sequence[str]], list[str]]
-    """where they and their simulation do not agree"""
-    twins: Mapping[int, Simulation]
-    """their simulation, by the trial's number"""
-
-
-def in_one_plane(twins: Mapping[int, Simulation]) -> TrialWords:
-    """Words for trials in one plane beside their simulation, by the trial's number."""
-    return TrialWords(
-        partial(_sentence, twins=twins), partial(_table, twins=twins), partial(_apart, twins=twins), twins
-    )
+    true, truly = math.nan, [f"true_{name}" for name in names]
+    if len(trials) and set(truly) <= set(trials):
+        true = float(trials[truly].max(axis=1, skipna=False).mean(skipna=False))
+    known = "true_recovery" in trials and trials["true_recovery"].notna().any()
+    recovery = mean("true_recovery" if known else "recovery")
+    rmse = tuple(map(mean, names))
+    return Means(len(trials), rmse, mean("steady_state"), mean("settling"), recovery, model, true)
 
 
 def answer_of(
-    trials: pd.DataFrame, words: TrialWords, metrics: Mapping[str, float], marks: Sequence[str], run: str
+    trials: pd.DataFrame, twins: Mapping[int, Simulation], metrics: Mapping[str, float], marks: Sequence[str], run: str
 ) -> Answer:
-    """What the trials came to; `trials` are all that began, `run` is the path of their run."""
+    """What the trials came to.
+
+    `trials` are all that began; `twins` has the simulation of those that ended well, by their numbers; `run` is the
+    path of their run.
+    """
     done = completed(trials)
     labels = list(dict.fromkeys(done["label"]))
     more = f"All tables: --all. Every trial: {run}/report.html" if run else "All tables: `.tables`."
-    notes = [*words.apart(done, labels), *swings_apart(done, words.twins), *unsound(trials, marks, metrics)]
+    notes = [*_apart(done, labels, twins), *swings_apart(done, twins), *unsound(trials, marks, metrics)]
     if not labels:
         return Answer(f"None of {len(trials)} trials was completed.", None, notes, more)
-    sentences = [words.sentence(done[done["label"] == label], label) for label in labels[:2]]
+    sentences = [_sentence(done[done["label"] == label], label, twins) for label in labels[:2]]
     stopped = len(trials) - len(done)
     sentences.append(f"{stopped} of {len(trials)} trials left out." if stopped else "No trial ended early.")
-    return Answer(" ".join(sentences), words.table(done, labels), notes, more)
+    return Answer(" ".join(sentences), _table(done, labels, twins), notes, more)
 
 
 def _sentence(trials: pd.DataFrame, label: str, twins: Mapping[int, Simulation]) -> str:
+    from wristctl.simulation.trajectory import rests
+
     free, pushed = trials[trials["push"] == 0.0], trials[trials["push"] != 0.0]
+    toward = list(errors_of(trials).values())
     parts = []
+
+    def error(means: Means) -> str:
+        angles = [
+            f"{in_deg(angle)} deg{' RMSE' * (not k)}{way}"
+            for k, (angle, way) in enumerate(zip(means.rmse, toward, strict=True))
+        ]
+        return f"error {', '.join(angles)}"
+
+    def truly(means: Means) -> list[str]:
+        worse = " on the worse axis" * (len(toward) > 1)
+        return [f"truly {in_deg(means.true)} deg{worse}"] * math.isfinite(means.true)
+
     if len(free):
         means = means_of(free, twins)
-        each = [means_of(group, twins).rmse for _, group in free.groupby("direction", sort=False)]
-        said = [f"truly {in_deg(means.true)} deg"] * math.isfinite(means.true)
+        each = [means_of(group, twins).worse for _, group in free.groupby("direction", sort=False)]
+        said = truly(means)
         said += [f"{degrees(min(each))} to {degrees(max(each))} deg by direction"] * (len(each) > 1)
-        parts.append(f"error {in_deg(means.rmse)} deg RMSE" + f" ({'; '.join(said)})" * bool(said))
-        parts.append(_within("settles", means.settling))
+        parts.append(error(means) + f" ({'; '.join(said)})" * bool(said))
+        if all(rests(twins[number].trajectory) for number in free["trial"]):
+            parts.append(_within("settles", means.settling))
     if len(pushed):
         means = means_of(pushed, twins)
         force = ", ".join(f"{newtons:g}" for newtons in sorted({abs(force) for force in pushed["push"]}))
-        after = f"after a push of {force} N"
         recovers = "is back at once" if means.recovery == 0.0 else _within("recovers", means.recovery)
-        truly = f", truly {in_deg(means.true)} deg" * math.isfinite(means.true)
-        parts.append(f"{recovers} {after} (error {in_deg(means.rmse)} deg RMSE with it{truly})")
-    return f"{label}: {', '.join(parts)}."
+        with_it = f"{error(means)} with it{''.join(f', {words}' for words in truly(means))}"
+        parts.append(f"{recovers} after a push of {force} N ({with_it})")
+    return f"{label}{' in two planes' * (len(toward) > 1)}: {', '.join(parts)}."
 
 
 def _within(verb: str, seconds: float) -> str:
@@ -240,12 +255,14 @@ def swings_apart(done: pd.DataFrame, twins: Mapping[int, Simulation]) -> list[st
 
 
 def _table(done: pd.DataFrame, labels: Sequence[str], twins: Mapping[int, Simulation]) -> Table:
-    """A row for each direction and controller, with and without a push; for very many a row for each controller."""
+    """A row for each motion and controller, with and without a push; for very many a row for each controller."""
     directions = list(dict.fromkeys(done["direction"]))
     by_direction = len(directions) * len(labels) <= ROWS
+    toward = list(errors_of(done).values())
+    worse = ", worse axis" * (len(toward) > 1)
     heads = (
-        "controller", "direction", "error [deg]", "simulated [deg]", "final error [deg]", "settling [s]",
-        "pushed [deg]", "recovery [s]",
+        "controller", "motion" if worse else "direction", *(f"{way[1:] or 'error'} [deg]" for way in toward),
+        f"simulated{worse} [deg]", "final error [deg]", "settling [s]", f"pushed{worse} [deg]", "recovery [s]",
     )  # fmt: skip
     rows = []
     for label in labels:
@@ -256,10 +273,11 @@ def _table(done: pd.DataFrame, labels: Sequence[str], twins: Mapping[int, Simula
                 continue
             free, pushed = (means_of(group[(group["push"] != 0.0) == push], twins) for push in (False, True))
             rows.append(
-                (label, direction, in_deg(free.rmse), in_deg(free.simulated), in_deg(free.steady_state),
-                 in_s(free.settling), in_deg(pushed.rmse), in_s(pushed.recovery))
+                (label, direction, *map(in_deg, (*free.rmse, free.simulated, free.steady_state)),
+                 in_s(free.settling), in_deg(pushed.worse), in_s(pushed.recovery))
             )  # fmt: skip
-    told = [column for column in range(len(heads)) if column < 4 or any(row[column] != "-" for row in rows)]
+    always = 3 + len(toward)
+    told = [column for column in range(len(heads)) if column < always or any(row[column] != "-" for row in rows)]
     shown = [column for column in told if column > 0 or len(labels) > 1]
     return Table("", [heads[column] for column in shown], [tuple(row[column] for column in shown) for row in rows])
 
@@ -267,6 +285,7 @@ def _table(done: pd.DataFrame, labels: Sequence[str], twins: Mapping[int, Simula
 def _apart(done: pd.DataFrame, labels: Sequence[str], twins: Mapping[int, Simulation]) -> list[str]:
     """Where measured and simulated errors differ much, in one paragraph."""
     facts = []
+    worse = " on the worse axis" * (len(errors_of(done)) > 1)
     for label in labels:
         for pushed in (False, True):
             means = means_of(done[(done["label"] == label) & ((done["push"] != 0.0) == pushed)], twins)
@@ -274,9 +293,9 @@ def _apart(done: pd.DataFrame, labels: Sequence[str], twins: Mapping[int, Simula
                 ratio = means.compared / means.simulated
                 times = f"{two(max(ratio, 1.0 / ratio))} times {'larger' if ratio > 1.0 else 'smaller'}"
                 where = f"{f'{label} ' * (len(labels) > 1)}{'with' if pushed else 'without'} a push"
-                true = "truly " * math.isfinite(means.true)
+                true, simulated = "truly " * math.isfinite(means.true), in_deg(means.simulated)
                 facts.append(
-                    f"{where} {true}{in_deg(means.compared)} deg, {times} than {in_deg(means.simulated)} deg simulated"
+                    f"{where} {true}{in_deg(means.compared)} deg{worse}, {times} than {simulated} deg simulated"
                 )
     if not facts:
         return []

@@ -1,8 +1,8 @@
-"""Figures of trials as in the paper: desired and obtained angle, error, in four directions, with and without a push."""
+"""Figures of trials: bends and paths wanted and obtained, errors and tensions, with and without a push."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Any, NamedTuple
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -15,7 +15,9 @@ from wristctl.plotting.style import (
     LIGHT,
     ORANGE,
     PURPLE,
+    SILVER,
     SIMULATED,
+    VERMILLION,
     WANTED,
     figure,
     legend_below,
@@ -27,25 +29,43 @@ from wristctl.plotting.style import (
 # In the paper's order.
 DIRECTIONS = ("extension", "flexion", "radial", "ulnar")
 
-_SIDES = {"tendons that pull": ORANGE, "tendons that hold against": PURPLE}
+_COLOURS = ORANGE, PURPLE, BLUE, VERMILLION
+_TRUE: dict[str, Any] = {"color": VERMILLION, "linewidth": 0.8, "label": "true"}
+
+
+class Course(NamedTuple):
+    """A trial that is drawn beside the logged one: N samples, P planes; SI units."""
+
+    time: Array
+    bend: Array
+    """(N, P)"""
+    error: Array
+    """(N, P)"""
 
 
 @dataclass(frozen=True)
 class LoggedTrial:
-    """One trial over time, T samples, as logged; SI units."""
+    """One trial over time, N samples in P planes, as logged; SI units."""
 
     direction: str
+    """Or the path."""
     label: str
     """controller/gains"""
     repetition: int
+    planes: tuple[str, ...]
     time: Array
-    theta: Array
-    theta_ref: Array
-    theta_desired: Array
-    tension: Array
-    """(T, 2), per tendon of the side that the direction lies on and of the other"""
-    simulated: tuple[Array, Array, Array] | None = None
-    """Time, angle and error of the same trial in simulation."""
+    bend: Array
+    """(N, P)"""
+    bend_ref: Array
+    """(N, P)"""
+    wanted: Array
+    """(N, P)"""
+    tension: Mapping[str, Array]
+    """(N,) each, by what is said of the tendons"""
+    simulated: Course | None = None
+    """The same trial in simulation."""
+    true: Course | None = None
+    """As it truly was on an emulated rig."""
     push: tuple[float, float] | None = None
     """When the push began and ended [s]."""
 
@@ -54,30 +74,48 @@ def desired_and_obtained(courses: Sequence[LoggedTrial], heading: str = "") -> F
     """Desired and obtained bending angle [deg] over time [s], one panel for each direction."""
     picture, panels = _panels(courses)
     for course in courses:
-        panel = panels[course.direction]
-        _draw_simulated(panel, course, 1)
-        panel.plot(course.time, np.degrees(course.theta), label=course.label, **line(course.label))
-        panel.plot(course.time, np.degrees(course.theta_desired), **WANTED)
+        _draw_beside(panels, course, "bend")
+        for panel, wanted, bend in zip(_own(panels, course), course.wanted.T, course.bend.T, strict=True):
+            panel.plot(course.time, np.degrees(bend), label=course.label, **line(course.label))
+            panel.plot(course.time, np.degrees(wanted), **WANTED)
     return _finished(picture, panels, courses, heading, "bending angle [deg]")
 
 
+def paths(courses: Sequence[LoggedTrial], reach: Array, heading: str = "") -> Figure:
+    """Paths in the plane of bends [deg]; `reach` is a closed line (K, 2) [rad], as `reach_of_bends` gives it."""
+    picture = Figure(figsize=(5.2, 5.6), layout="constrained")
+    axes = picture.add_subplot()
+    axes.plot(*np.rad2deg(reach).T, color=SILVER, label="in reach")
+    for course in courses:
+        axes.plot(*np.rad2deg(course.wanted).T, **WANTED | {"label": "wanted"})
+        axes.plot(*np.rad2deg(course.bend).T, color=BLUE, linewidth=1.0, label="measured")
+        if course.true is not None:
+            axes.plot(*np.rad2deg(course.true.bend).T, **_TRUE)
+    axes.set_aspect("equal", adjustable="datalim")  # a box of another shape would push the title off the picture
+    axes.set(xlabel="bend toward ulnar [deg]", ylabel="bend toward flexion [deg]")
+    title(axes, heading)
+    legend_below(picture)
+    return picture
+
+
 def errors(courses: Sequence[LoggedTrial], heading: str = "") -> Figure:
-    """Error e = theta - theta_ref [deg] over time [s], one panel for each direction."""
+    """Error e = bend - reference [deg] over time [s], one panel for each direction, and for each plane of two."""
     picture, panels = _panels(courses, sharey=True)
     for course in courses:
-        panel = panels[course.direction]
-        _draw_simulated(panel, course, 2)
-        panel.plot(course.time, np.degrees(course.theta - course.theta_ref), label=course.label, **line(course.label))
-        panel.axhline(0.0, color=BLACK, linewidth=0.8, zorder=1.0)
+        _draw_beside(panels, course, "error")
+        for panel, error in zip(_own(panels, course), (course.bend - course.bend_ref).T, strict=True):
+            panel.plot(course.time, np.degrees(error), label=course.label, **line(course.label))
+            panel.axhline(0.0, color=BLACK, linewidth=0.8, zorder=1.0)
     return _finished(picture, panels, courses, heading, "error [deg]")
 
 
 def tensions(courses: Sequence[LoggedTrial], heading: str = "") -> Figure:
-    """Commanded tension [N] of each tendon of both sides over time [s], one panel for each direction."""
-    picture, panels = _panels(courses, sharey=True)
+    """Commanded tension [N] of tendons over time [s], one panel for each direction."""
+    picture, panels = _panels(courses, by_plane=False, sharey=True)
     for course in courses:
-        for (side, colour), tension in zip(_SIDES.items(), course.tension.T, strict=True):
-            panels[course.direction].plot(course.time, tension, color=colour, linewidth=1.0, label=side)
+        for number, (name, tension) in enumerate(course.tension.items()):
+            colour = _COLOURS[number % len(_COLOURS)]
+            panels[course.direction, ""].plot(course.time, tension, color=colour, linewidth=1.0, label=name)
     return _finished(picture, panels, courses, heading, "tension [N]")
 
 
@@ -90,28 +128,43 @@ def lateness(late: Array, period: float) -> Figure:
     return picture
 
 
-def _draw_simulated(panel: Axes, course: LoggedTrial, which: Literal[1, 2]) -> None:
-    """Angle (1) or error (2) in simulation, beside the first repetition alone."""
-    if course.simulated is not None and course.repetition == 0:
-        style: Any = {"color": line(course.label)["color"], "label": f"{course.label}, simulated"}
-        panel.plot(course.simulated[0], np.degrees(course.simulated[which]), **style | SIMULATED)
+# Panels by motion and plane; the plane is empty where there is one panel for all.
+_Panels = dict[tuple[str, str], Axes]
 
 
-def _panels(courses: Sequence[LoggedTrial], **shared: Any) -> tuple[Figure, dict[str, Axes]]:
-    names = [name for name in DIRECTIONS if any(course.direction == name for course in courses)]
-    columns = min(2, len(names))
-    rows = -(-len(names) // columns)
+def _own(panels: _Panels, course: LoggedTrial) -> list[Axes]:
+    """Panels of a trial, in the order of its planes."""
+    return [panel for (direction, _), panel in panels.items() if direction == course.direction]
+
+
+def _draw_beside(panels: _Panels, course: LoggedTrial, what: str) -> None:
+    """What is simulated and what is true, beside the first repetition alone."""
+    styles: list[tuple[Course | None, dict[str, Any]]] = [
+        (course.true, _TRUE),
+        (course.simulated, {"color": line(course.label)["color"], "label": f"{course.label}, simulated"} | SIMULATED),
+    ]
+    for drawn, style in styles if course.repetition == 0 else []:
+        if drawn is not None:
+            for panel, values in zip(_own(panels, course), getattr(drawn, what).T, strict=True):
+                panel.plot(drawn.time, np.degrees(values), **style)
+
+
+def _panels(courses: Sequence[LoggedTrial], by_plane: bool = True, **shared: Any) -> tuple[Figure, _Panels]:
+    motions = dict.fromkeys(course.direction for course in courses)
+    names = [name for name in DIRECTIONS if name in motions] + [name for name in motions if name not in DIRECTIONS]
+    planes = courses[0].planes if by_plane and len(courses[0].planes) > 1 else ("",)
+    keys = [(name, plane) for name in names for plane in planes]
+    columns = min(2, len(keys))
+    rows = -(-len(keys) // columns)
     picture, axes = figure(rows, columns, height=0.9 + 1.9 * rows, sharex=True, **shared)
-    for panel in axes.flat[len(names) :]:
+    for panel in axes.flat[len(keys) :]:
         panel.set_visible(False)
-    return picture, dict(zip(names, axes.ravel().tolist(), strict=False))
+    return picture, dict(zip(keys, axes.ravel().tolist(), strict=False))
 
 
-def _finished(
-    picture: Figure, panels: dict[str, Axes], courses: Sequence[LoggedTrial], heading: str, ylabel: str
-) -> Figure:
-    for name, panel in panels.items():
-        title(panel, name)
+def _finished(picture: Figure, panels: _Panels, courses: Sequence[LoggedTrial], heading: str, ylabel: str) -> Figure:
+    for (name, plane), panel in panels.items():
+        title(panel, f"{name}, toward {plane}" if plane else name)
         pushes = {course.push for course in courses if course.direction == name and course.push is not None}
         for start, end in pushes:
             panel.axvspan(start, end, color=LIGHT, zorder=0.5, label="push")
