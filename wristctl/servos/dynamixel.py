@@ -18,7 +18,7 @@ from wristctl.board.check import latency_timer, shorter
 from wristctl.rig import Clock, Facts, Fault, Look, Lost, Refused, WallClock
 from wristctl.servos.emulated import Emulated, ServoRehearsal
 from wristctl.servos.servo_bus import ServoBus, opened
-from wristctl.servos.servo_settings import ServoSettings
+from wristctl.servos.servo_settings import Servo, ServoSettings
 from wristctl.servos.servo_watch import ServoWatch
 from wristctl.servos.x_series import (
     BUS_WATCHDOG,
@@ -43,6 +43,8 @@ from wristctl.servos.x_series import (
     Item,
     named_errors,
 )
+
+__all__ = ["DynamixelRig", "Servo", "ServoSettings"]
 
 log = logging.getLogger(__name__)
 
@@ -73,17 +75,25 @@ class DynamixelRig:
         """The emulated servos with their wrist; None of real ones."""
         self.clock = WallClock() if self.rehearsal is None else self.rehearsal.clock
         self._port: Any = None
+        self._sensing = False
         self._bus: ServoBus | None = None
         self._missed, self.missed = 0, 0
         """Exchanges that brought no answer since `connect`."""
         self._units = np.ones(len(self._ids))
         self._tension: Array | None = None
 
+    def open_sensor(self) -> None:
+        """Make the robot's own sensor ready; not called in a rehearsal."""
+
     def bend(self) -> tuple[Any, float]:
-        """Newest bend (P,) [rad] of the wrist, and when it was true on `clock` [s]: the robot's own sensor."""
-        if self.rehearsal is None:
-            raise NotImplementedError("the rig's class has no bend(): the bend by your sensor, and its time")
-        return self.rehearsal.bend()
+        """Newest bend (P,) [rad] of the wrist by the robot's own sensor, and when it was true on `clock` [s].
+
+        Does not wait for another. Not called in a rehearsal.
+        """
+        raise NotImplementedError("the rig's class has no bend(): the bend by your sensor, and its time")
+
+    def close_sensor(self) -> None:
+        """Give the robot's own sensor back."""
 
     def connect(self) -> Array:
         """Find, set up and energise the servos where they stand; their positions as targets (T,) [counts].
@@ -96,6 +106,8 @@ class DynamixelRig:
                 self._port = self.rehearsal.port()
             else:
                 self._port = opened(self._path, self.settings.baud)
+                self._sensing = True
+                self.open_sensor()
             self._bus = bus = ServoBus(self._port, self._ids, self._path)
             bus.find()
             for number in self._ids:
@@ -122,7 +134,7 @@ class DynamixelRig:
         self._goals, self._missed, self.missed = list(stood), 0, 0
         self._zero = np.array(stood) * self._senses
         self._heard()
-        return self._zero.astype(float)
+        return np.asarray(self._zero, float)
 
     def _why_slow(self) -> str:
         timer = latency_timer(self._path)
@@ -152,7 +164,8 @@ class DynamixelRig:
         current = math.floor(self.settings.current / unit)
         fastest = max(1, math.floor(self.settings.rate / self.settings.spool_radius / VELOCITY_UNIT))
         if current < 2:
-            raise Fault(f"{self.settings.tension:g} N are {1e3 * self.settings.current:.1f} mA, too few for servo {number}")
+            needed = 1e3 * self.settings.current
+            raise Fault(f"{self.settings.tension:g} N are {needed:.1f} mA, too few for servo {number} to tell")
         settings: list[tuple[Item, int, str]] = [
             (TORQUE_ENABLE, 0, "Torque Enable"),
             (BUS_WATCHDOG, 0, "Bus Watchdog"),
@@ -207,15 +220,15 @@ class DynamixelRig:
         answering = bus.answering()
         silent = [number for number in self._ids if number not in answering]
         if not answering:
-            raise Lost(f"no servo answers in time on {self._path}: see their power, the adapter's cable and its latency")
+            raise Lost(f"no servo answers in time on {self._path}: see its power, the adapter's cable and its latency")
         if silent:
             which = " and ".join(f"servo {number} (tendon {self._ids.index(number) + 1})" for number in silent)
             raise Lost(f"{which} no longer answers; others do: see its plugs and its power")
-        raise Lost(f"answers on {self._path} are lost again and again, though each servo answers by itself: see the cable")
+        raise Lost(f"answers on {self._path} are lost again and again, though each servo answers alone: see its cables")
 
     def look(self) -> Look:
         """The bend by `bend()`, and the tensions by the servos' currents."""
-        bend, time = self.bend()
+        bend, time = self.bend() if self.rehearsal is None else self.rehearsal.bend()
         return Look(bend, time, self._tension)
 
     def stop(self) -> None:
@@ -232,8 +245,7 @@ class DynamixelRig:
         if status is not None:
             trusted = self._watch.trusted
             self._goals = [
-                one.position if trusts else goal
-                for one, trusts, goal in zip(status, trusted, self._goals, strict=True)
+                one.position if trusts else goal for one, trusts, goal in zip(status, trusted, self._goals, strict=True)
             ]
             self._watch.stopped(status)
         for number, trusts in zip(self._ids, self._watch.trusted, strict=True):
@@ -241,7 +253,8 @@ class DynamixelRig:
                 bus.release(number)
         bus.follow(self._goals)
         if status is None:
-            raise Lost(f"the servos do not answer; they stop {self.settings.watchdog * WATCHDOG_UNIT:g} s after the last packet")
+            silence = self.settings.watchdog * WATCHDOG_UNIT
+            raise Lost(f"the servos do not answer; they stop {silence:g} s after the last packet")
 
     def close(self) -> None:
         """Take the torque off all servos and close the port."""
@@ -251,3 +264,6 @@ class DynamixelRig:
                 bus.release(number)
         if port is not None:
             port.closePort()
+        if self._sensing:
+            self._sensing = False
+            self.close_sensor()

@@ -138,10 +138,10 @@ class ServoRehearsal:
             self._look_at = max(self._look_at + 1.0 / value(sensor.rate), end)
             noise = self._rng.normal(0.0, math.radians(value(sensor.noise_deg)), len(bend))
             self._seen.append((end, bend + noise))
-        if self.began is None and self._fault.fault and self._fault.fault not in FROM_THE_START:
-            if np.hypot.reduce(bend) > math.radians(self._fault.bent_deg):
-                self.began = end
-                self._begin()
+        comes = self._fault.fault and self._fault.fault not in FROM_THE_START and self.began is None
+        if comes and np.hypot.reduce(bend) > math.radians(self._fault.bent_deg):
+            self.began = end
+            self._begin()
         if self.began is not None and self._fault.fault == "hot":
             self.servos[self._faulty].temperature = _WARM + _WARMS * (end - self.began)
 

@@ -11,7 +11,7 @@ from collections.abc import Iterable
 import numpy as np
 
 from wristctl.arrays import Array
-from wristctl.servos.servo_wrist import CLOSED, GOAL, LOOP, MOST, PLACE
+from wristctl.servos.servo_wrist import CLOSED, GOAL, MOST, PLACE
 from wristctl.servos.x_series import (
     BUS_WATCHDOG,
     COUNTS,
@@ -112,8 +112,8 @@ class EmulatedServo:
     """
 
     def __init__(
-        self, number: int, row: Array | None, newton_ampere: float, metres_per_count: float, position: int, sense: int = 1,
-        model: int = 1020,
+        self, number: int, row: Array | None, newton_ampere: float, metres_per_count: float, position: int,
+        sense: int = 1, model: int = 1020,
     ) -> None:  # fmt: skip
         self.number, self.row = number, np.zeros(12) if row is None else row
         self._newton, self._unit, self._sense = newton_ampere, sense * metres_per_count, sense
@@ -156,7 +156,7 @@ class EmulatedServo:
         return bool(self._get(TORQUE_ENABLE))
 
     def _get(self, item: Item) -> int:
-        return item.decoded(self._table[item.address : item.address + item.size])
+        return item.decoded(bytes(self._table[item.address : item.address + item.size]))
 
     def _put(self, item: Item, value: int) -> None:
         self._table[item.address : item.address + item.size] = item.encoded(value)

@@ -1,4 +1,4 @@
-"""A bus with Dynamixel servos, through the maker's `dynamixel-sdk`: settings read back, goals and status of all at once.
+"""A bus with Dynamixel servos, through the maker's `dynamixel-sdk`: settings read back, goals and status of all.
 
 What the rig asks every tick stands side by side in each servo's indirect data, so that one exchange reads it all.
 """
@@ -96,7 +96,7 @@ class ServoBus:
             if reads.count(self._garbled) >= _COLLIDED:
                 raise Lost(f"answers of id {number} collide: two servos on {self._name} have this id")
             if model not in MODELS:
-                raise Fault(f"servo {number} is of model {model}, which does not limit its current: X series but XL430, XC430")
+                raise Fault(f"servo {number}, model {model}, limits no current: X series but XL430 and XC430 do")
             self.models[number] = MODELS[model]
 
     def _pinged(self, number: int) -> int | None:

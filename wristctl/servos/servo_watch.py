@@ -14,7 +14,7 @@ from wristctl.servos.servo_settings import ServoSettings
 from wristctl.servos.x_series import TICKS, WATCHDOG_UNIT, named_errors
 
 # Tendon [m] by which a servo may be off all its recent goals, and for how long [s].
-_OFF, _FOR = 0.4e-3, 0.1
+_OFF, _FOR = 0.4e-3, 0.05
 # Tendon [m] beyond what its largest speed explains from which a position has jumped.
 _JUMP = 1e-3
 # Degrees below a servo's limit at which it counts as hot.
@@ -34,8 +34,8 @@ class ServoWatch:
     def __init__(self, settings: ServoSettings, hottest: Sequence[int], stood: Sequence[int], now: float) -> None:
         self._settings, self._hottest = settings, hottest
         self._names = [f"servo {servo.id} (tendon {k})" for k, servo in enumerate(settings.servos, 1)]
-        # Goals of longer ago are over: even slow servos have reached them.
-        self._window = most(settings.drive_delay) + 5.0 * most(settings.drive_lag)
+        # Goals of longer ago are over: even slow servos have all but reached them.
+        self._window = most(settings.drive_delay) + 3.0 * most(settings.drive_lag)
         self._goals: deque[tuple[float, Array]] = deque([(now, np.array(stood))])
         self._positions, self._at = np.array(stood), now
         self._least: Array | None = None
@@ -79,7 +79,8 @@ class ServoWatch:
         self._positions, self._at = positions, now
         if (jumps > _JUMP).any():
             worst = int(np.argmax(jumps))
-            raise Fault(f"wrong zero: the position of {self._names[worst]} jumps by {1e3 * jumps[worst]:.3g} mm of tendon")
+            jump = f"{1e3 * jumps[worst]:.3g} mm of tendon"
+            raise Fault(f"wrong zero: the position of {self._names[worst]} jumps by {jump}; home again")
         self._goals.append((now, goals))
         while len(self._goals) > 1 and self._goals[1][0] < now - self._window:
             self._goals.popleft()
