@@ -204,6 +204,8 @@ class DynamixelRig:
         bus = self._connected()
         status = bus.status()
         now = self.clock.now()
+        if status is not None:
+            self._watch.judge(status)
         if status is None or not self._watch.is_new(status, now):
             self._missed, self.missed = self._missed + 1, self.missed + 1
             if self._missed >= _LOST:
@@ -212,7 +214,8 @@ class DynamixelRig:
         self._missed = 0
         currents = np.array([one.current for one in status]) * self._senses * self._units
         self._tension = np.maximum(0.0, currents * self.settings.torque_constant / self.settings.spool_radius)
-        self._watch.judge(status, self._goals, self._tension, now)
+        positions = np.array([one.position for one in status])
+        self._watch.judge_positions(positions, np.array(self._goals), self._tension, now)
 
     def _name_lost(self, bus: ServoBus, old: bool) -> NoReturn:
         if old:
@@ -223,7 +226,7 @@ class DynamixelRig:
             raise Lost(f"no servo answers in time on {self._path}: see its power, the adapter's cable and its latency")
         if silent:
             which = " and ".join(f"servo {number} (tendon {self._ids.index(number) + 1})" for number in silent)
-            raise Lost(f"{which} no longer answers; others do: see its plugs and its power")
+            raise Lost(f"no answer from {which}; others answer: see plugs and power")
         raise Lost(f"answers on {self._path} are lost again and again, though each servo answers alone: see its cables")
 
     def look(self) -> Look:

@@ -36,8 +36,8 @@ _STEP, _POLL, _SLACK = 1e-3, 5e-5, 0.4e-3
 # Seconds for which an adapter holds an answer back: by itself, and where its latency timer is the usual one.
 _ADAPTER, _LATE = 0.5e-3, 16e-3
 # Share of answers that are lost, positions by which an encoder errs, degrees a second by which a hot servo warms from
-# which temperature on, id of a servo as nobody set it.
-_LOST, _TURN, _WARMS, _WARM, _FACTORY = 0.02, 4096, 8.0, 66.0, 57
+# which temperature on, id of a servo as nobody set it, jump of the sensor's zero [rad].
+_LOST, _TURN, _WARMS, _WARM, _FACTORY, _ASTRAY = 0.02, 4096, 8.0, 66.0, 57, math.radians(6.0)
 
 FAULTS = {
     "detached": "a tendon comes off",
@@ -52,6 +52,7 @@ FAULTS = {
     "stale-position": "a servo says the same position for ever",
     "hot": "a servo warms",
     "wrong-zero": "a servo's encoder jumps by a turn",
+    "wrong-bend": "the zero of the bend's sensor jumps by 6 deg",
 }
 """Faults of a rehearsal, in words."""
 FROM_THE_START = ("exchanged", "id-missing", "id-doubled", "packet-lost")
@@ -137,7 +138,8 @@ class ServoRehearsal:
         if end >= self._look_at:
             self._look_at = max(self._look_at + 1.0 / value(sensor.rate), end)
             noise = self._rng.normal(0.0, math.radians(value(sensor.noise_deg)), len(bend))
-            self._seen.append((end, bend + noise))
+            astray = _ASTRAY if self.began is not None and self._fault.fault == "wrong-bend" else 0.0
+            self._seen.append((end, bend + noise + astray))
         comes = self._fault.fault and self._fault.fault not in FROM_THE_START and self.began is None
         if comes and np.hypot.reduce(bend) > math.radians(self._fault.bent_deg):
             self.began = end

@@ -71,6 +71,26 @@ def _decoded(data: bytes) -> Status:
     return Status(*values)
 
 
+def packet_handler() -> Any:
+    """The SDK's packets of the protocol 2.0."""
+    from dynamixel_sdk import Protocol2PacketHandler
+
+    class Packets(Protocol2PacketHandler):  # type: ignore[misc]
+        """The SDK 4.1 sends packets without the bytes that it stuffs, and takes some out that are none."""
+
+        def addStuffing(self, packet: list[int]) -> list[int]:
+            """Stuff a packet where it stands."""
+            packet[:] = super().addStuffing(packet)
+            return packet
+
+        def removeStuffing(self, packet: list[int]) -> list[int]:
+            """Take the stuffed bytes out of a packet."""
+            body = bytes(packet[7:-2]).replace(b"\xff\xff\xfd\xfd", b"\xff\xff\xfd")
+            return [*packet[:5], *(len(body) + 2).to_bytes(2, "little"), *body, *packet[-2:]]
+
+    return Packets()
+
+
 class ServoBus:
     """Servos with these ids on a port of the SDK's kind.
 
@@ -78,10 +98,10 @@ class ServoBus:
     """
 
     def __init__(self, port: Any, ids: Sequence[int], name: str) -> None:
-        from dynamixel_sdk import COMM_RX_CORRUPT, COMM_SUCCESS, Protocol2PacketHandler
+        from dynamixel_sdk import COMM_RX_CORRUPT, COMM_SUCCESS
 
         self._port, self._ids, self._name = port, tuple(ids), name
-        self._packets, self._fine, self._garbled = Protocol2PacketHandler(), COMM_SUCCESS, COMM_RX_CORRUPT
+        self._packets, self._fine, self._garbled = packet_handler(), COMM_SUCCESS, COMM_RX_CORRUPT
         self._data, self._fast = INDIRECT_DATA[0], True
         self.models: dict[int, Model] = {}
         port.patience = _PATIENT

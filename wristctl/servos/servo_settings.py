@@ -38,8 +38,8 @@ class ServoSettings:
     planes: int = 2
     travel: float = 0.02
     """Furthest from where a servo stands at first [m]."""
-    rate: float = 0.1
-    """Fastest that a tendon is reeled in or let out [m/s]."""
+    rate: float = 0.03
+    """Fastest that a tendon is reeled in or let out [m/s]: at most the servo's speed without load at this radius."""
     drive_delay: Quantity = field(default_factory=lambda: Spread(3e-3, 1e-3, 6e-3))
     """From a packet until the servos follow it [s]."""
     drive_lag: Quantity = field(default_factory=lambda: Spread(0.016, 0.008, 0.03))

@@ -55,11 +55,8 @@ class ServoWatch:
         self._least, self._told = self._least + np.minimum(late, allowed), now
         return bool((late - allowed < _OLD).all())
 
-    def judge(self, status: Sequence[Status], goals: Sequence[int], tension: Array, now: float) -> None:
-        """Raise Fault for what a status (T,) says, its servos sent to these goals (T,) [counts] before.
-
-        `tension` (T,) [N] is that of their currents.
-        """
+    def judge(self, status: Sequence[Status]) -> None:
+        """Raise Fault for what servos (T,) say of themselves."""
         for name, one, hottest in zip(self._names, status, self._hottest, strict=True):
             if one.error:
                 errors = ", ".join(named_errors(one.error))
@@ -71,9 +68,12 @@ class ServoWatch:
                 raise Fault(f"restart: {name} has let go: see its power and plugs, then home again")
             if one.temperature >= hottest - _HOT:
                 raise Fault(f"heat: {name} is at {one.temperature} degrees, and shuts down at {hottest}: let it cool")
-        self._follows(np.array([one.position for one in status]), np.array(goals), tension, now)
 
-    def _follows(self, positions: Array, goals: Array, tension: Array, now: float) -> None:
+    def judge_positions(self, positions: Array, goals: Array, tension: Array, now: float) -> None:
+        """Raise Fault where a position (T,) [counts] jumps, or is off all recent goals (T,); these are the newest.
+
+        `tension` (T,) [N] is that of the servos' currents.
+        """
         unit, rate = self._settings.metres_per_count, self._settings.rate
         jumps = np.abs(positions - self._positions) * unit - rate * (now - self._at)
         self._positions, self._at = positions, now
