@@ -21,8 +21,7 @@ def cases() -> Iterator[tuple[str, int, int, str]]:
     """Fault, servo, number of tendons and motion of each trial."""
     yield from SOUND
     for fault in FAULTS:
-        for servo in (1, 2, 3):
-            yield fault, servo, 3, "circumduction"
+        yield fault, 2, 3, "circumduction"
     for fault in FAULTS:
         yield fault, 4, 4, "dart-thrower"
 

@@ -24,7 +24,7 @@ from wristctl.trial.log import TrialLog
 from wristctl.trial.rig_belief import layout_of_rig, numbers_of
 from wristctl.trial.rig_experiment import RigExperiment
 from wristctl.trial.rig_settings import settings_of, wrist_of
-from wristctl.trial.trials import Trial
+from wristctl.trial.trials import trials_of
 
 SURVIVED = ("", "packet-lost")
 """Faults with which a trial is to end well."""
@@ -77,7 +77,7 @@ def tried(fault: str, servo: int = 2, tendons: int = 3, motion: str = "circumduc
     with tempfile.TemporaryDirectory() as scratch:
         numbers = numbers_of(layout_of_rig(settings, wrist))
         log = TrialLog(Path(scratch), None, settings.control_period, planes=2, tendons=numbers, wired=False)
-        experiment = RigExperiment(settings, wrist, [Trial(0, "ulnar", 0, 0.0, 0)], log)
+        experiment = RigExperiment(settings, wrist, trials_of(settings, np.random.default_rng(0)), log)
         try:
             experiment.run(GuardedRig(rig, "servos"))
             outcome = experiment.outcomes[0]

@@ -92,7 +92,8 @@ def test_a_servo_pulls_no_more_than_its_limit_where_the_wrist_is_held() -> None:
         for counts in range(0, 1000, 2):  # slowly, all three against each other
             passed(rig, 0.01, stood + counts)
     assert 20.0 < servos.largest_pull < 1.1 * 25.0
-    assert rig.look().tension is not None and np.max(rig.look().tension) <= 25.0
+    tension = rig.look().tension
+    assert tension is not None and np.asarray(tension).max() <= 25.0
 
 
 def test_tension_is_that_of_the_currents_within_the_gears_friction() -> None:

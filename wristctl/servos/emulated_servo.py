@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
+from struct import Struct
 
 import numpy as np
 
@@ -72,6 +73,12 @@ def _crc_of_byte(byte: int) -> int:
 
 
 _CRCS = tuple(map(_crc_of_byte, range(256)))
+# Of the control table's items, by size and sign.
+_FORMS = {
+    (size, signed): Struct("<" + (letter if signed else letter.upper()))
+    for size, letter in ((1, "b"), (2, "h"), (4, "i"))
+    for signed in (False, True)
+}
 
 
 def stuffed(body: bytes) -> bytes:
@@ -155,11 +162,17 @@ class EmulatedServo:
         """Whether it holds its position."""
         return bool(self._get(TORQUE_ENABLE))
 
+    @property
+    def heard(self) -> bool:
+        """Whether its watchdog has not stopped it."""
+        return self._get(BUS_WATCHDOG) != -1
+
     def _get(self, item: Item) -> int:
-        return item.decoded(bytes(self._table[item.address : item.address + item.size]))
+        number: int = _FORMS[item.size, item.signed].unpack_from(self._table, item.address)[0]
+        return number
 
     def _put(self, item: Item, value: int) -> None:
-        self._table[item.address : item.address + item.size] = item.encoded(value)
+        _FORMS[item.size, item.signed].pack_into(self._table, item.address, value)
 
     def power_off(self) -> None:
         """Its plug is out: it neither answers nor holds anything."""

@@ -33,10 +33,13 @@ _READ = (
     PRESENT_POSITION,
 )  # fmt: skip
 _SIZE = sum(item.size for item in _READ)
-# Bytes around the parameters of an answer, and around those of each servo in the one answer to a fast read.
-_AROUND, _EACH = 11, 4
+# Bytes around the data of an answer, and around those of each servo in the one answer to a fast read; where in an
+# answer its id is, and where its data begin.
+_AROUND, _EACH, _ID, _DATA = 11, 4, 4, 9
 # Seconds for which an answer is waited for until it is known how quickly they come; tries of what has to succeed.
 _PATIENT, _TRIES = 0.04, 4
+# Least time for which an answer is waited for [s].
+_LEAST = 3e-3
 # Longest wait for bytes at a port [s].
 _POLL = 2e-4
 # Exchanges that are timed, reads that may collide, and how many of those that do tell of two servos.
@@ -108,25 +111,25 @@ class ServoBus:
 
     def find(self) -> None:
         """See that every id answers, once, and is of a model that takes a current."""
-        numbers = {number: self._pinged(number) for number in self._ids}
-        if missing := [number for number, model in numbers.items() if model is None]:
+        if missing := [number for number in self._ids if not self._pinged(number)]:
             raise Lost(self._missing(missing))
-        for number, model in numbers.items():
+        for number in self._ids:
             reads = [self._tried(number, REALTIME_TICK.address, 27)[1] for _ in range(2 * _COLLIDED)]
             if reads.count(self._garbled) >= _COLLIDED:
                 raise Lost(f"answers of id {number} collide: two servos on {self._name} have this id")
+            model = self.value(number, MODEL_NUMBER)
             if model not in MODELS:
                 raise Fault(f"servo {number}, model {model}, limits no current: X series but XL430 and XC430 do")
             self.models[number] = MODELS[model]
 
-    def _pinged(self, number: int) -> int | None:
+    def _pinged(self, number: int) -> bool:
         for _ in range(_TRIES):
-            model, result, _ = self._packets.ping(self._port, number)
+            _, result, _ = self._packets.ping(self._port, number)
             if result == self._fine:
-                return int(model)
+                return True
             if result == self._garbled:
                 raise Lost(f"answers of id {number} collide: two servos on {self._name} have this id")
-        return None
+        return False
 
     def _missing(self, missing: Sequence[int]) -> str:
         found = sorted(self._packets.broadcastPing(self._port)[0])
@@ -145,13 +148,20 @@ class ServoBus:
                                                       for _ in range(2))]  # fmt: skip
 
     def _tried(self, number: int, address: int, size: int) -> tuple[bytes, int]:
-        data, result, _ = self._packets.readTxRx(self._port, number, address, size)
-        return bytes(data[:size]), result
+        self._packets.readTx(self._port, number, address, size)
+        return self._answer(number, size)
+
+    def _answer(self, number: int, size: int) -> tuple[bytes, int]:
+        """Data of a servo's answer to a read, and the SDK's result; one of another size is to an earlier question."""
+        while True:
+            packet, result = self._packets.rxPacket(self._port, False)
+            if result != self._fine or (packet[_ID] == number and len(packet) == size + _AROUND):
+                return bytes(packet[_DATA : _DATA + size]), result
 
     def _bytes(self, number: int, address: int, size: int) -> bytes:
         for _ in range(_TRIES):
             data, result = self._tried(number, address, size)
-            if result == self._fine and len(data) == size:
+            if result == self._fine:
                 return data
         raise Lost(f"servo {number} does not answer on {self._name}")
 
@@ -161,9 +171,11 @@ class ServoBus:
 
     def set(self, number: int, item: Item, value: int, name: str) -> None:
         """Write a value and read it back. Raises Fault where the servo has another one then."""
-        self._write(number, item.address, item.encoded(value))
-        if (kept := self.value(number, item)) != value:
-            raise Fault(f"servo {number} takes {kept} as {name} ({item.address}) where {value} is written")
+        for _ in range(2):
+            self._write(number, item.address, item.encoded(value))
+            if (kept := self.value(number, item)) == value:
+                return
+        raise Fault(f"servo {number} takes {kept} as {name} ({item.address}) where {value} is written")
 
     def _write(self, number: int, address: int, data: bytes) -> None:
         for _ in range(_TRIES):
@@ -207,7 +219,7 @@ class ServoBus:
                     times.append(clock() - begin)
             if len(times) > _TIMED // 2:
                 median = sorted(times)[len(times) // 2]
-                self._port.patience = max(1.5e-3, 1.5 * median)
+                self._port.patience = max(_LEAST, 1.5 * median)
                 return median
         raise Lost(f"the servos on {self._name} do not answer when all are asked at once")
 
@@ -227,10 +239,8 @@ class ServoBus:
         ids, packets = list(self._ids), self._packets
         packets.syncReadTx(self._port, self._data, _SIZE, ids, len(ids), self._fast)
         if not self._fast:
-            answers = [packets.readRx(self._port, number, _SIZE) for number in ids]
-            if any(result != self._fine or len(data) != _SIZE for data, result, _ in answers):
-                return None
-            return [_decoded(bytes(data)) for data, _, _ in answers]
+            answers = [self._answer(number, _SIZE) for number in ids]
+            return [_decoded(data) for data, _ in answers] if all(one[1] == self._fine for one in answers) else None
         data, result, _ = packets.fastSyncReadRx(self._port, 254, (_SIZE + _EACH) * len(ids))
         if result != self._fine or len(data) < (_SIZE + _EACH) * len(ids) - 2:
             return None
