@@ -113,7 +113,7 @@ def test_a_setting_that_a_servo_does_not_take_is_named(monkeypatch: pytest.Monke
         return 0 if (servo.number, address) == (3, GOAL_CURRENT.address) else write(servo, address, data)
 
     monkeypatch.setattr(EmulatedServo, "write", stubborn)
-    with pytest.raises(Fault, match=r"servo 3 takes 1193 as Goal Current \(102\) where 66 is written"):
+    with pytest.raises(Fault, match=r"servo 3 takes 1193 as Goal Current \(102\) where 91 is written"):
         rig.connect()
     assert not any(servo.torque for servo in servos.servos)
 

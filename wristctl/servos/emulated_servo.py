@@ -1,6 +1,6 @@
 """An emulated Dynamixel X servo: control table, protocol 2.0, shutdown, bus watchdog; what it winds is simulated.
 
-By the maker's e-manual: packets of the protocol 2.0, the control table of the XM430-W350.
+By the maker's e-manual: packets of the protocol 2.0, the control table of the XM430-W210.
 """
 
 from __future__ import annotations
@@ -120,7 +120,7 @@ class EmulatedServo:
 
     def __init__(
         self, number: int, row: Array | None, newton_ampere: float, metres_per_count: float, position: int,
-        sense: int = 1, model: int = 1020,
+        sense: int = 1, model: int = 1030,
     ) -> None:  # fmt: skip
         self.number, self.row = number, np.zeros(12) if row is None else row
         self._newton, self._unit, self._sense = newton_ampere, sense * metres_per_count, sense
