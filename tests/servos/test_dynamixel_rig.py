@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import sys
 from typing import Any
 
 import numpy as np
@@ -11,6 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tests.servos.bus_of import other, passed, rehearsed
+from wristctl.errors import UserError
 from wristctl.rig import Fault, Lost, Refused, Rig
 from wristctl.servos.emulated import Emulated
 from wristctl.servos.emulated_servo import OVERHEATING, OVERLOAD, EmulatedServo
@@ -316,5 +318,12 @@ def test_the_bench_and_its_class_have_the_facts_of_the_settings() -> None:
 
 
 def test_a_fault_that_there_is_not_is_named() -> None:
-    with pytest.raises(Exception, match=r"no fault 'stuck'"):
+    with pytest.raises(UserError, match=r"no fault 'stuck'"):
         Emulated("stuck")
+
+
+def test_without_the_makers_library_it_is_said_how_to_install_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "dynamixel_sdk", None)
+    with pytest.raises(UserError, match="dynamixel-sdk is not installed") as error:
+        rehearsed()[0].connect()
+    assert "wristctl[servos]" in str(error.value.fix)

@@ -147,7 +147,7 @@ class _Unit:
 
 
 def test_the_file_of_the_page_reads_its_inertial_unit_and_moves_its_servos() -> None:
-    module = ModuleType("my_servos")
+    module: Any = ModuleType("my_servos")
     exec(compile(example(), "my_servos.py", "exec"), module.__dict__)
     module.SETTINGS = replace(module.SETTINGS, silence=2.5)
     servos = ServoRehearsal(module.SETTINGS, Emulated())

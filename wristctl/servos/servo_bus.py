@@ -6,6 +6,7 @@ What the rig asks every tick stands side by side in each servo's indirect data, 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from importlib import import_module
 from typing import Any, NamedTuple
 
 from wristctl.errors import UserError
@@ -74,11 +75,19 @@ def _decoded(data: bytes) -> Status:
     return Status(*values)
 
 
+def sdk() -> Any:
+    """The maker's library. UserError where it is not installed."""
+    try:
+        return import_module("dynamixel_sdk")
+    except ImportError:
+        raise UserError("dynamixel-sdk is not installed", "servos", "pip install 'wristctl[servos]'") from None
+
+
 def packet_handler() -> Any:
     """The SDK's packets of the protocol 2.0."""
-    from dynamixel_sdk import Protocol2PacketHandler
+    handler: Any = sdk().Protocol2PacketHandler
 
-    class Packets(Protocol2PacketHandler):  # type: ignore[misc]
+    class Packets(handler):  # type: ignore[misc]
         """The SDK 4.1 sends packets without the bytes that it stuffs, and takes some out that are none."""
 
         def addStuffing(self, packet: list[int]) -> list[int]:
@@ -101,10 +110,9 @@ class ServoBus:
     """
 
     def __init__(self, port: Any, ids: Sequence[int], name: str) -> None:
-        from dynamixel_sdk import COMM_RX_CORRUPT, COMM_SUCCESS
-
+        maker = sdk()
         self._port, self._ids, self._name = port, tuple(ids), name
-        self._packets, self._fine, self._garbled = packet_handler(), COMM_SUCCESS, COMM_RX_CORRUPT
+        self._packets, self._fine, self._garbled = packet_handler(), maker.COMM_SUCCESS, maker.COMM_RX_CORRUPT
         self._data, self._fast = INDIRECT_DATA[0], True
         self.models: dict[int, Model] = {}
         port.patience = _PATIENT
@@ -256,13 +264,11 @@ def opened(name: str, baud: int) -> Any:
 
     Raises UserError where the SDK is not installed, Lost where the port cannot be opened.
     """
-    try:
-        from dynamixel_sdk import PortHandler
-    except ImportError:
-        raise UserError("dynamixel-sdk is not installed", name, "pip install 'wristctl[servos]'") from None
     import serial
 
-    class Port(PortHandler):  # type: ignore[misc]
+    handler: Any = sdk().PortHandler
+
+    class Port(handler):  # type: ignore[misc]
         """The SDK's port; its own waits 34 ms for each answer, more than a tick."""
 
         patience = _PATIENT
