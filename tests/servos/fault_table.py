@@ -39,9 +39,12 @@ def row(name: str, came: list[Came]) -> str:
     """A row of the table: trials of one kind."""
     fine = sum(one.outcome == "ok" for one in came)
     within = [one.named_within for one in came if math.isfinite(one.named_within)]
-    slowest = "before motion" if not within else f"{1e3 * max(within):.0f} ms" if came[0].fault not in SURVIVED else ""
-    pull = f"{max(one.largest_pull for one in came):.1f}"
-    words = came[0].outcome.removeprefix("stopped: ").removeprefix("before it: ").split(";")[0]
+    largest = max(one.largest_pull for one in came)
+    slowest = f"{1e3 * max(within):.0f} ms" if within else "homing" if largest > 0.0 else "connecting"
+    pull, words = f"{largest:.1f}", came[0].outcome
+    for begin in ("before it: ", "stopped: ", "the rig has stopped by itself: ", "the rig does not answer: "):
+        words = words.removeprefix(begin)
+    words = words.split(";")[0]
     if came[0].fault in SURVIVED:
         worst = max(one.error_deg for one in came)
         words, slowest = f"followed, {worst:.2f} deg off at most, {sum(one.lost for one in came)} answers lost", ""

@@ -26,6 +26,8 @@ from wristctl.trial.rig_experiment import RigExperiment
 from wristctl.trial.rig_settings import settings_of, wrist_of
 from wristctl.trial.trials import trials_of
 
+# Bend of each motion [deg].
+_SIZES = {"circumduction": 30.0, "dart-thrower": 20.0}
 SURVIVED = ("", "packet-lost")
 """Faults with which a trial is to end well."""
 
@@ -65,7 +67,8 @@ def tried(fault: str, servo: int = 2, tendons: int = 3, motion: str = "circumduc
     rig = DynamixelRig(servos, Emulated(fault, servo=servo, bent_deg=bent_deg))
     assert rig.rehearsal is not None
     rows = (RigRow(controller="pid-ff", gains="hardware"),)
-    given = HwRunSettings(rig="servos", rows=rows, reference=Reference(kind=motion), directions=("ulnar",), horizon=4.0)
+    reference = Reference(kind=motion, angle_deg=_SIZES[motion])
+    given = HwRunSettings(rig="servos", rows=rows, reference=reference, directions=("ulnar",), horizon=4.0)
     settings, wrist = settings_of(rig.facts, given, "servos"), wrist_of(rig.facts, WristParameters(), "servos")
     stops, stop = list[float](), rig.stop
 
