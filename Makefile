@@ -13,8 +13,9 @@ BIN := .venv/bin
 PIP := $(BIN)/python -m pip --disable-pip-version-check
 
 .PHONY: run test lint bench bench-sweeps bench-peers bench-all firmware test-firmware test-faults test-trust test-vision test-identify \
-	test-allocation test-slow test-rig fault-table lerobot-reader lost-tendons twins sound-rigs damaged-logs inner-rigs driven-robots test-posterior test-statistics converge worlds docs clean venv mutants coverage installed matrix \
-	check-package constraints release
+	test-allocation test-slow test-rig fault-table lerobot-reader lost-tendons twins sound-rigs damaged-logs \
+	inner-rigs driven-robots test-posterior test-statistics converge worlds docs clean venv mutants coverage \
+	installed matrix check-package constraints release servo-faults
 
 run: .venv/run
 	@set -eo pipefail; \
@@ -99,6 +100,10 @@ test-vision: .venv/dev
 test-faults: .venv/dev
 	WRISTCTL_THOROUGH=1 $(BIN)/pytest -s tests/trial/test_fault_table.py
 	WRISTCTL_THOROUGH=1 $(BIN)/pytest -s tests/cli/test_hw_run_stops.py tests/cli/test_hw_run_killed.py
+
+# Each fault of each emulated servo: docs/servos.md. Keeps what it has tried in build/servo-faults.
+servo-faults: .venv/dev
+	$(BIN)/python -m tests.servos.fault_table $(WHICH)
 
 # Faults that creep, cancel each other or come again: docs/hardware/fault-table.md. Keeps what it has tried in
 # build/fault-table and goes on from there; WHICH="--phase moving --count 10" tries some.

@@ -107,7 +107,11 @@ _DYNAMICS = (
 )
 
 # Table of `wristctl.rig.Rig`: what trials may be run on in place of the board with its cameras.
-RIGS: Choices[Any] = Choices("rig", {"bench": "wristctl.trial.board_rig:BenchRig"}, "wristctl.rigs")
+RIGS: Choices[Any] = Choices(
+    "rig",
+    {"bench": "wristctl.trial.board_rig:BenchRig", "servos": "wristctl.servos.servo_bench:ServoBench"},
+    "wristctl.rigs",
+)
 
 # Table of `wristctl.control.law.Controller`.
 CONTROLLERS: Choices[Any] = Choices(

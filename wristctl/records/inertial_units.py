@@ -96,6 +96,14 @@ def _by_gravity(values: Array, axes: Array, where: str) -> Array:
         problem = "gravity is across the straight wrist: a bend about it does not show"
         fix = "a wrist that stands or hangs, along=x, y or z in --columns if the unit's axes are others, or quaternions"
         raise UserError(problem, where, fix)
+    return bends_of_gravity(now, first)
+
+
+def bends_of_gravity(now: Array, first: Array) -> Array:
+    """Bends (T, 2) [rad] by directions of gravity (T, 3), which at the straight wrist is `first` (3,).
+
+    Both are unit vectors on axes along the wrist and toward both bends.
+    """
     change = now - first
     across = np.hypot(change[:, 1], change[:, 2])
     share = np.divide(1.0, across, out=np.zeros_like(across), where=across > 1e-12)

@@ -1,0 +1,60 @@
+"""A rehearsal's bus behind a pseudo-terminal, in real time: any program that speaks to Dynamixel servos can open it."""
+
+from __future__ import annotations
+
+import os
+import pty
+import select
+import threading
+import time
+import tty
+from collections import deque
+from types import TracebackType
+from typing import Self
+
+from wristctl.servos.emulated import ServoRehearsal
+
+# Longest wait for a byte [s].
+_WAIT = 1e-3
+
+
+class PseudoTerminal:
+    """Within the block the bus is at `path`, and the simulated servos move as time passes.
+
+    `lock` is held while they do.
+    """
+
+    def __init__(self, rehearsal: ServoRehearsal) -> None:
+        self._rehearsal, self._ended = rehearsal, threading.Event()
+        self._bus, self._host = pty.openpty()
+        tty.setraw(self._host)
+        self.path = os.ttyname(self._host)
+        self.lock = threading.Lock()
+        self._thread = threading.Thread(target=self._serve, name="servo bus", daemon=True)
+
+    def __enter__(self) -> Self:
+        self._thread.start()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
+    ) -> None:
+        self._ended.set()
+        self._thread.join()
+        os.close(self._bus)
+        os.close(self._host)
+
+    def _serve(self) -> None:
+        clock = self._rehearsal.clock
+        began, coming = time.monotonic() - clock.now(), deque[tuple[float, bytes]]()
+        while not self._ended.is_set():
+            now = time.monotonic() - began
+            with self.lock:
+                clock.wait_until(now)
+            while coming and coming[0][0] <= now:
+                os.write(self._bus, coming.popleft()[1])
+            wait = min(_WAIT, max(0.0, coming[0][0] - now)) if coming else _WAIT
+            if select.select([self._bus], [], [], wait)[0]:
+                data = os.read(self._bus, 4096)
+                with self.lock:
+                    coming.extend(self._rehearsal.receive(data))
