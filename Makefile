@@ -12,10 +12,10 @@ CLAIMS ?= experiments/claims.yaml
 BIN := .venv/bin
 PIP := $(BIN)/python -m pip --disable-pip-version-check
 
-.PHONY: run test lint bench bench-sweeps bench-peers bench-all firmware test-firmware test-faults test-trust test-vision test-identify \
-	test-allocation test-slow test-rig fault-table lerobot-reader lost-tendons twins sound-rigs damaged-logs \
-	inner-rigs driven-robots test-posterior test-statistics converge worlds docs clean venv mutants coverage \
-	installed matrix check-package constraints release servo-faults
+.PHONY: run test lint bench bench-sweeps bench-peers bench-all firmware test-firmware test-faults test-trust \
+	test-vision test-identify test-allocation test-slow test-rig fault-table lerobot-reader lost-tendons twins \
+	sound-rigs damaged-logs inner-rigs driven-robots test-posterior test-statistics converge worlds docs clean venv \
+	mutants coverage installed matrix check-package constraints release servo-faults identified
 
 run: .venv/run
 	@set -eo pipefail; \
@@ -63,6 +63,11 @@ test-firmware: .venv/dev firmware
 # Do 95 % intervals of identified parameters hold the truth in 90 to 99 of 100 benches?
 test-identify: .venv/dev
 	WRISTCTL_THOROUGH=1 $(BIN)/pytest -n auto --maxschedchunk 1 -rP tests/identification
+
+# What identification finds on the emulated rig, whose wrist is known: do its intervals hold the truth? docs/identify.md;
+# two minutes a seed, ten with WHICH="--planes 2 --seeds 10"; goes on where it stopped.
+identified: .venv/dev
+	$(BIN)/python benchmarks/identified_bench.py --out build/identified --seeds 20 $(WHICH)
 
 # Logs damaged as users' logs are: is each damage named, or are the numbers those of the sound log? Sound ones are to stay
 # as they are: docs/damaged-logs.md. Keeps what it has tried and goes on from there; WHICH="--count 20 --sound 5"

@@ -7,8 +7,14 @@ import pytest
 
 from tests.identification.benches import KNOWN, LEVEL, TENDONS, tendons
 from wristctl.arrays import Array
-from wristctl.identification.forward import SupposedWrist, angles
+from wristctl.bench.bench_wrist import BenchWrist
+from wristctl.bench.motors import CYCLES
+from wristctl.board.emulator.atmega2560 import EDGE
+from wristctl.config.bench import BenchSettings, Motors
+from wristctl.identification.forward import SupposedWrist, across_plane, angles
+from wristctl.identification.rotor_field import Rotors
 from wristctl.identification.spatial_forward import SupposedBends, courses_of_bends
+from wristctl.wrist.directions import ACTIVE, DIRECTIONS, in_plane, tendons_of
 from wristctl.wrist.statics import equilibrium
 from wristctl.wrist.tendon_layout import TendonLayout
 
@@ -83,7 +89,7 @@ RIGID = SupposedBends(
 
 def test_a_rotor_gives_way_by_the_arc_sine_of_its_pull() -> None:
     reeled = np.tile([2.2e-3, 1.9e-3, 4e-4, 5e-4], (600, 1))
-    yielding = courses_of_bends([RIGID._replace(holding=HOLDING)], reeled, STEP, 2)[0, -1]
+    yielding = courses_of_bends([RIGID._replace(rotors=Rotors(HOLDING))], reeled, STEP, 2)[0, -1]
     less = given_way(yielding[2:])
     assert less.max() > 2e-6
     without, with_less = (courses_of_bends([RIGID], each, STEP, 2)[0, -1] for each in (reeled, reeled - less))
@@ -93,9 +99,78 @@ def test_a_rotor_gives_way_by_the_arc_sine_of_its_pull() -> None:
 def test_in_one_plane_rotors_give_way_as_in_two() -> None:
     plus, minus = 2.2e-3, 4e-4
     both = np.tile([minus, minus, plus, plus], (600, 1))
-    wrists = [RIGID, RIGID._replace(holding=HOLDING)]
+    wrists = [RIGID, RIGID._replace(rotors=Rotors(HOLDING))]
     ulnar = [float(courses_of_bends([wrist], both, STEP, 2)[0, -1, 0]) for wrist in wrists]
-    supposed = [SupposedWrist(KNOWN, tendons(STIFF, 0.0), holding=holding) for holding in (np.inf, HOLDING)]
+    supposed = [SupposedWrist(KNOWN, tendons(STIFF, 0.0), rotors=Rotors(holding)) for holding in (np.inf, HOLDING)]
     alone = [float(course[-1]) for course in angles(supposed, held(plus, minus, 600), STEP, 2)]
     assert ulnar[0] - ulnar[1] > 1e-5
     assert alone[0] - alone[1] == pytest.approx(ulnar[0] - ulnar[1], rel=0.05)
+
+
+SWINGING = Rotors(HOLDING, 3.07e-5, 2e-3)
+
+
+def test_a_rotor_that_swings_comes_to_rest_where_one_that_stands_is() -> None:
+    """In one plane and in two; the stiffness that is given is that of tendon and field in series."""
+    uneven = np.tile([2.2e-3, 1.9e-3, 4e-4, 5e-4], (600, 1))
+    supposed = [SupposedWrist(KNOWN, tendons(STIFF, 0.0), rotors=rotors) for rotors in (Rotors(HOLDING), SWINGING)]
+    standing, swung = (float(angles([each], uneven, STEP, 4)[0, -1]) for each in supposed)
+    rigid = float(angles([supposed[0]._replace(rotors=Rotors())], uneven, STEP, 4)[0, -1])
+    assert abs(rigid - standing) > 2e-5 and swung == pytest.approx(standing, abs=0.1 * abs(rigid - standing))
+    in_two = [
+        courses_of_bends([RIGID._replace(rotors=each)], uneven, STEP, 2)[0, -1] for each in (Rotors(HOLDING), SWINGING)
+    ]
+    np.testing.assert_allclose(in_two[1][:2], in_two[0][:2], atol=2e-6)
+    np.testing.assert_allclose(in_two[1][2:], in_two[0][2:], rtol=2e-3)
+
+
+def moved_bench(settings: BenchSettings, direction: str, uneven: int) -> tuple[Array, Array]:
+    """Lengths on the fields (T, 4) [m] in the middle of every millisecond, of `tendons_of` the plane, and the bend (T,)
+    of a bench whose + side is reeled in as its - side is paid out, and back; one tendon by some steps more."""
+    sides = tendons_of(DIRECTIONS[direction].plane)
+    wrist = BenchWrist(settings, KNOWN)
+    wrist.face(direction)
+    wrist.hear(np.array([(0, ord("C"), 0)], EDGE))
+    turns: list[tuple[int, int, bool]] = []
+    for place, tendon in enumerate(sides):
+        axis, back = ACTIVE.index(tendon), place >= 2
+        more = uneven if place == 0 else 0
+        turns += [(CYCLES * 2 * k + 100 * axis, axis, False) for k in range(30 + more)]
+        turns += [(CYCLES * 700 + 4000 * k + 2000, axis, back) for k in range(400)]
+        turns += [(CYCLES * 1000 + 4000 * k + 2000, axis, not back) for k in range(300)]
+    turns.sort()
+    for cycle, axis, back in turns:
+        levels = (0b10 if back else 0) << 2 * axis
+        wrist.hear(np.array([(cycle, ord("A"), level) for level in (levels, levels | 1 << 2 * axis, levels)], EDGE))
+    wrist.follow(1400 * CYCLES)
+    middle = CYCLES * np.arange(1400) + CYCLES // 2
+    counts = np.zeros((1400, 4))
+    for place, tendon in enumerate(sides):
+        own = [(cycle, -1 if back else 1) for cycle, axis, back in turns if axis == ACTIVE.index(tendon)]
+        counts[:, place] = [sum(way for cycle, way in own if cycle < until) for until in middle]
+    return settings.actuator.step_length * counts, wrist.truth().angle
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("direction", ["ulnar", "flexion"])
+def test_the_model_moves_as_the_emulated_rig_does_and_less_so_without_swing_or_bend_across(direction: str) -> None:
+    settings = BenchSettings(motors=Motors(slack=(0.0,) * 4))
+    reeled, truth = moved_bench(settings, direction, uneven=12)
+    plane, own = DIRECTIONS[direction].plane, in_plane(KNOWN, direction)
+    soft = own.model_copy(update={"stiffness": settings.plant.stiffness_scale * own.stiffness})
+    motors = settings.actuator.model_copy(update={"tendon_stiffness": settings.stiffness_with_field})
+    ulnar = settings.plant.stiffness_scale * KNOWN.stiffness
+    whole = SupposedWrist(
+        soft, motors, rotors=SWINGING, across=across_plane(soft, plane, ulnar, KNOWN.flexion_ratio)
+    )  # fmt: skip
+    moved = slice(690, 1390)
+
+    def off(supposed: SupposedWrist) -> float:
+        # a row of truth is the end of a millisecond, one of the model the begin of the next
+        error = angles([supposed], reeled, STEP, settings.segments)[0][1:] - truth[:-1]
+        return float(np.sqrt(np.mean(error[moved] ** 2)))
+
+    assert np.ptp(truth) > 0.2
+    assert off(whole) < 3e-5
+    assert off(whole._replace(across=None)) > 3.0 * off(whole)
+    assert off(whole._replace(rotors=Rotors(HOLDING))) > 3.0 * off(whole)

@@ -15,11 +15,11 @@ from wristctl.config.loop import DirectionName, Reference
 from wristctl.config.plant import Actuator, TendonFacts, TrueActuator, TrueWrist
 from wristctl.errors import UserError
 from wristctl.identification import rehearsal
-from wristctl.identification.forward import SupposedWrist, angles
+from wristctl.identification.forward import SupposedWrist, across_plane, angles
 from wristctl.identification.rehearsal import RehearsedTruth, rehearse
 from wristctl.simulation.actuator import motor_of
 from wristctl.simulation.reference import toward
-from wristctl.wrist.directions import in_plane
+from wristctl.wrist.directions import DIRECTIONS, in_plane
 
 pytestmark = pytest.mark.slow
 
@@ -78,7 +78,9 @@ def test_pictures_show_the_true_wrist_a_delay_ago_and_the_markers_zero_of_its_pl
     taut = {"radial": (3e-4, -4e-4, 1e-4, -2e-4), "flexion": (-2e-4, -4e-4, 1e-4, 3e-4)}
     for number, (direction, zero) in enumerate((("radial", 3.0), ("flexion", -5.0))):
         reeled = rehearsal.spools(in_plane(LEVEL, direction), toward(STEPS, direction), TENDONS, 5.0, MOTOR)  # type: ignore[arg-type]
-        own = SupposedWrist(in_plane(SOFT, direction), TENDONS, taut[direction])
+        soft, plane = in_plane(SOFT, direction), DIRECTIONS[direction].plane
+        across = across_plane(soft, plane, SOFT.stiffness, SOFT.flexion_ratio)
+        own = SupposedWrist(soft, TENDONS, taut[direction], across=across)
         course = angles([own], np.repeat(reeled, 2, axis=1), 1e-3, 4)[0]
         then = of(frames, number, "captured") - 0.02
         wanted = np.interp(then, 1e-3 * np.arange(5000), course) + np.radians(zero)

@@ -24,7 +24,7 @@ from wristctl.wrist.plant import kernel_of
 from wristctl.wrist.spatial.pcc_in_space import PCC_IN_SPACE, placed_values
 from wristctl.wrist.spatial.spatial_kinematics import tip_bends
 from wristctl.wrist.tendon_layout import TendonLayout
-from wristctl.wrist.tendon_mechanics import X
+from wristctl.wrist.tendon_mechanics import PLAY, X
 
 
 class Load(Protocol):
@@ -133,7 +133,9 @@ class PlanarLoad:
         tendon_states = of_tendons(self._tendons, AXES)[np.argsort(self._axes)][axes]
         path = np.append(plant.length - self._model.taut(plant, coordinates), np.abs(coordinates).sum())
         self._tendons = unmoved(spools.reeled[axes], path, np.zeros(AXES), coordinates)
-        of_tendons(self._tendons, AXES)[:, :X] = tendon_states[:, :X]
+        turned = of_tendons(self._tendons, AXES)
+        turned[:, :X] = tendon_states[:, :X]
+        turned[:, PLAY] += turned[:, X] - tendon_states[:, X]  # they pull as before
         self._inner = inner_of([self._drawn], coordinates[None], np.array([bristle]), lambda rows: rows[0])
         self._axes = axes
 

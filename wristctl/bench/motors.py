@@ -17,12 +17,13 @@ from wristctl.board.emulator.chip import FREQUENCY
 from wristctl.board.messages import AXES
 from wristctl.config.bench import BenchSettings
 from wristctl.lanes.compiled import compiled
-from wristctl.lanes.lane import where, zero_like
+from wristctl.lanes.lane import zero_like
 from wristctl.lanes.rows import part, rows_of
 from wristctl.simulation.nonideal import electrical_turn, tendon_after_slip, torque_share
-from wristctl.wrist.dahl import bristle, bristle_slope, inner_in_lanes
+from wristctl.wrist.dahl import inner_in_lanes
+from wristctl.wrist.out_of_plane import advance_across
 from wristctl.wrist.plant import advance_or_stop, disturbed, parameters_of, travel
-from wristctl.wrist.tendon_mechanics import RealTendons, read_nonideal, spool_pull
+from wristctl.wrist.tendon_mechanics import PLAY, RealTendons, read_nonideal, row_of, shortening, spool_pull
 
 PERIOD = 1e-3
 CYCLES = round(PERIOD * FREQUENCY)
@@ -171,10 +172,11 @@ def _swing(spools: Any, motor: Any, axis: int, cycle: int, taut_at: float, stiff
 
 @compiled
 def turn_spools(spools: Any, motor: Any, stiffness: float, edges: Any, heard: int, until: int) -> int:
-    """Turn the spools for the period before a cycle, by the edges from `heard` on and the pulls at its start.
+    """Turn the spools for the period before a cycle, by the edges from `heard` on.
 
-    A tendon that pulls then pulls by its stiffness [N/m] harder or less as its spool turns; a slack one stays slack.
-    Returns the number of edges heard.
+    The pulls are those of the spools at its start and of the paths in its middle: were the paths older, the rotors
+    would give way to the wrist late, which damps it. A tendon that pulls then pulls by its stiffness [N/m] harder or
+    less as its spool turns; a slack one stays slack. Returns the number of edges heard.
     """
     if motor.mass > 0.0:
         taut_at = (
@@ -225,23 +227,6 @@ class Hanging(NamedTuple):
     rubbing: tuple[float, float]
 
 
-@compiled
-def _bend_across(bent: Any, pulls: Any, levers: Any, across: Any, rubbing: Any, stiffness: float) -> None:
-    """A period of the bend across the plane, linearly implicit in damping, stiffness and friction; lanes."""
-    torque, slope = rubbing
-    rate = bent[1]
-    resisting = across.stiffness + torque * bristle_slope(bent[2], rate, slope)
-    moment = across.moment - across.stiffness * bent[0] - torque * bent[2]
-    for axis in range(AXES):
-        moment = moment + levers[axis] * pulls[axis]
-        resisting = resisting + where(pulls[axis] > 0.0, stiffness * levers[axis] * levers[axis], 0.0)
-    push = moment - (across.damping + PERIOD * resisting) * rate
-    rate = rate + PERIOD * push / (across.inertia + PERIOD * across.damping + PERIOD * PERIOD * resisting)
-    bent[0] = bent[0] + PERIOD * rate
-    bent[1] = rate
-    bent[2] = bristle(bent[2], PERIOD * rate, slope)
-
-
 def follow(
     hanging: Any, spools: Any, state: Any, acting: Any, edges: Any, first: int, start: float, out: Any, cut: Any
 ) -> int:
@@ -262,12 +247,15 @@ def follow(
     nonideal, inner = read_nonideal(rows_of(hanging.nonideal)), inner_in_lanes(hanging.inner)
     tendons = RealTendons(hanging.stiffness + zero, nonideal, rows_of(hanging.tendons), inner)
     ahead, behind, ahead_too, behind_too = sides[0], sides[2], sides[1], sides[3]
+    order = ahead, behind, ahead_too, behind_too
     edge = 0
     for k in range(acting.shape[0]):
         middle = (first + k) * CYCLES + CYCLES // 2
-        edge = turn_spools(spools, motor, hanging.stiffness, edges, edge, middle)
         plant = disturbed(undisturbed, (0.0, acting[k, 0], 0.0), acting[k, 1])
         time, path = (first + k) * PERIOD - start + zero, travel(plant, q)
+        for t in range(AXES):
+            pull[order[t]] = spool_pull(tendons, tendons.state[row_of(t, PLAY)], t, shortening(path, t))
+        edge = turn_spools(spools, motor, hanging.stiffness, edges, edge, middle)
         on_spools = (
             tendon_after_slip(tendons, 0, reeled[ahead] - levers[ahead] * bent[0], zero, time, path[0], 0.0),
             tendon_after_slip(tendons, 1, reeled[behind] - levers[behind] * bent[0], zero, time, path[1], 1.0),
@@ -278,7 +266,7 @@ def follow(
         pull[behind] = spool_pull(tendons, on_spools[1], 1, path[1])
         pull[ahead_too] = spool_pull(tendons, on_spools[2], 2, path[0])
         pull[behind_too] = spool_pull(tendons, on_spools[3], 3, path[1])
-        _bend_across(bent, pull, levers, across, hanging.rubbing, hanging.stiffness)
+        advance_across(bent, pull, levers, across, hanging.rubbing, hanging.stiffness, PERIOD)
         advance_or_stop(plant, q, rate, on_spools, tendons, PERIOD + zero, 1.0 + zero)
         for i in range(2 * n):
             out[k, i] = state[i]

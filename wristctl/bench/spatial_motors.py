@@ -13,7 +13,7 @@ from wristctl.simulation.nonideal import place_after_slip
 from wristctl.wrist.dahl import inner_in_lanes
 from wristctl.wrist.plant import advance_or_stop, disturbed, parameters_of, path_before
 from wristctl.wrist.spatial.spooled_tendons import RealPlaces, read_faults
-from wristctl.wrist.tendon_mechanics import read_nonideal, shortening, spool_pull
+from wristctl.wrist.tendon_mechanics import PLAY, read_nonideal, row_of, shortening, spool_pull
 
 
 class SpatialHanging(NamedTuple):
@@ -58,9 +58,11 @@ def follow_in_space(
     edge = 0
     for k in range(acting.shape[0]):
         middle = (first + k) * CYCLES + CYCLES // 2
-        edge = turn_spools(spools, motor, hanging.stiffness, edges, edge, middle)
         plant = disturbed(undisturbed, (acting[k, 0], acting[k, 1], acting[k, 2]), acting[k, 3])
         time, path = (first + k) * PERIOD - start + zero, path_before(tendons, undisturbed, q)
+        for t in range(AXES):
+            pull[t] = spool_pull(tendons, tendons.state[row_of(t, PLAY)], t, shortening(path, t))
+        edge = turn_spools(spools, motor, hanging.stiffness, edges, edge, middle)
         for t in range(AXES):
             x = shortening(path, t)
             on_spool[t] = place_after_slip(tendons, t, reeled[t], zero, time, x)

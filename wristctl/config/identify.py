@@ -1,6 +1,5 @@
 """Identification: which runs, what is held fixed, what is known how well, and what counts as identified."""
 
-import math
 from typing import Literal
 
 from wristctl.config.given_files import columns_of_file, given_file
@@ -62,6 +61,13 @@ class IdentifySettings(Section):
         None, "N m", "that the motors hold: a field gives way to its tendon's pull, the more so the harder it pulls; "
         "null: the emulated motors' own, a real rig's neglected", gt=0,
     )  # fmt: skip
+    rotor_inertia: float | None = quantity(
+        None, "kg m^2", "of a motor's rotor and its spool, with holding_torque: it swings about its field; null: the "
+        "emulated motors' own, a real rig's neglected", gt=0,
+    )  # fmt: skip
+    rotor_damping: float = quantity(
+        2e-3, "N m s/rad", "viscous, of an energised rotor that has inertia", "assumed, as the emulated motors'", ge=0
+    )
     clock_error: float = quantity(
         3e-4, "s", "how well the times of spools and of pictures agree, beside the delay: standard deviation",
         "a frame of USB, 1 ms, at any place of which a tick may begin", ge=0,
@@ -77,11 +83,6 @@ class IdentifySettings(Section):
         "assumed", gt=1,
     )  # fmt: skip
     misfit: Literal["refuse", "tell"] = choice("refuse", "what to do with trials that the model does not fit")
-
-    @property
-    def holds(self) -> float:
-        """Torque that the motors hold [N m]; inf where nobody says it."""
-        return math.inf if self.holding_torque is None else self.holding_torque
 
     @property
     def fixed(self) -> dict[str, float]:

@@ -27,6 +27,7 @@ from wristctl.identification.intervals import NORMAL_95, Knowledge, interval
 from wristctl.identification.lack_of_fit import Misfit
 from wristctl.identification.measured_trials import MOST_DELAYED, MeasuredTrial, frame_noise
 from wristctl.identification.posterior import posterior_draws, posterior_yaml
+from wristctl.identification.rotor_field import rotors_of
 from wristctl.identification.spatial_forward import SupposedBends, courses_of_bends
 from wristctl.identification.unknowns import UNKNOWNS, Unknown, believed_of, identified_yaml, tendons_of_values
 from wristctl.wrist.spatial.spatial_segments import ellipse
@@ -141,7 +142,7 @@ class BendProblem(Problem):
         layout = TendonLayout(tuple(self.places.values()))
         shares = layout.shares(wrist.discs)
         section = self._cross_section(values)
-        return SupposedBends(wrist, tendons, section, taut, shares, layout.multiplicity, self.settings.holds)
+        return SupposedBends(wrist, tendons, section, taut, shares, layout.multiplicity, rotors_of(self.settings))
 
     def planar(self, values: Mapping[str, float]) -> dict[str, float]:
         """The values with those of a wrist whose tendons are on a square."""

@@ -13,8 +13,9 @@ from threadpoolctl import threadpool_limits
 from wristctl.arrays import Array
 from wristctl.config.identify import IdentifySettings
 from wristctl.config.plant import Actuator
-from wristctl.identification.forward import SupposedWrist, angles
+from wristctl.identification.forward import SupposedWrist, across_plane, angles
 from wristctl.identification.measured_trials import MeasuredTrial, frame_noise
+from wristctl.identification.rotor_field import rotors_of
 from wristctl.identification.unknowns import NOT_NEGATIVE, SIMULATED, UNKNOWNS, Unknown, tendons_of_values
 from wristctl.processes import cores
 
@@ -143,8 +144,10 @@ class Problem:
             wrist_values["stiffness"] *= values["flexion_ratio"]
         one, two, three, four = (float(x[self.coordinates[spool_zero(trial, tendon)]]) for tendon in trial.tendons)
         tendons = self.actuator.model_copy(update=tendons_of_values(values))
-        wrist, holding = trial.wrist.model_copy(update=wrist_values), self.settings.holds
-        return SupposedWrist(wrist, tendons, (one, two, three, four), holding=holding)
+        wrist = trial.wrist.model_copy(update=wrist_values)
+        across = across_plane(wrist, trial.plane, values["stiffness"], values["flexion_ratio"])
+        rotors = rotors_of(self.settings)
+        return SupposedWrist(wrist, tendons, (one, two, three, four), rotors=rotors, across=across)
 
     def simulate(self, trial: MeasuredTrial, candidates: Sequence[SupposedWrist], segments: int | None = None) -> Array:
         """Angles (count, T) of the candidates in a trial; so many segments, or as many as the settings say."""

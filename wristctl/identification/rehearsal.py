@@ -19,7 +19,7 @@ from wristctl.config.wrist import WristParameters
 from wristctl.control.belief import Sides, belief_in_lanes
 from wristctl.control.table import controller
 from wristctl.errors import UserError
-from wristctl.identification.forward import SupposedWrist, angles
+from wristctl.identification.forward import SupposedWrist, across_plane, angles
 from wristctl.lanes.compiled import kernel
 from wristctl.lanes.lane import zero_like
 from wristctl.lanes.rows import lanes_like, part, rows_of
@@ -153,4 +153,8 @@ def _own(truth: RehearsedTruth, direction: DirectionName) -> SupposedWrist:
     taut = dict(zip(ACTIVE, truth.taut, strict=True))
     one, two, three, four = (taut[tendon] for tendon in tendons_of(DIRECTIONS[direction].plane))
     wrist = plant_of(*facing(truth.wrist, truth.plant, direction))
-    return SupposedWrist(wrist, truth.actuator, (one, two, three, four), truth.plant, truth.facts)
+    plane, ulnar = DIRECTIONS[direction].plane, plant_of(*facing(truth.wrist, truth.plant, "ulnar"))
+    flexion = plant_of(*facing(truth.wrist, truth.plant, "flexion"))
+    across = across_plane(wrist, plane, ulnar.stiffness, flexion.stiffness / ulnar.stiffness)
+    taken = one, two, three, four
+    return SupposedWrist(wrist, truth.actuator, taken, truth.plant, truth.facts, across=across)

@@ -3,7 +3,6 @@
 Candidates run side by side, one a lane, on the plant, the tendons and the integrator of the simulation.
 """
 
-import math
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
@@ -13,7 +12,14 @@ from numpy.typing import NDArray
 from wristctl.arrays import Array
 from wristctl.config.plant import Actuator, TendonFacts, TrueWrist
 from wristctl.config.wrist import WristParameters
-from wristctl.identification.rotor_field import Field, field_of, on_rotor
+from wristctl.identification.rotor_field import (
+    Field,
+    Rotors,
+    field_of,
+    motion_of,
+    own_stiffness,
+    turn_rotor,
+)
 from wristctl.lanes.blocks import to_blocks, to_rows
 from wristctl.lanes.lane import zero_like
 from wristctl.lanes.rows import beyond, lanes_like, part, rows_of
@@ -45,15 +51,16 @@ class SupposedBends(NamedTuple):
     """Share of the wrist's length that the tendons of each place span (M,)."""
     alike: NDArray[np.int64]
     """Number of tendons of each place (M,)."""
-    holding: float = math.inf
-    """Torque that the motor of one tendon holds [N m]; inf: its rotor stands where its drive counts."""
+    rotors: Rotors = Rotors()
+    """The motor of one tendon; where it is known to swing, the stiffness of `tendons` has its field in series."""
 
 
 class _Shapes(NamedTuple):
-    """Tuples with an entry, of no meaning, for each coordinate and each tendon."""
+    """Tuples with an entry, of no meaning, for each coordinate and each tendon; and how rotors move."""
 
     cut: Any
     of_pulls: Any
+    rotors: Any
 
 
 def _follow(model: Any, values: Any, state: Any, reeled: Any, h: float, settle: int, out: Any, shapes: Any) -> None:
@@ -61,21 +68,28 @@ def _follow(model: Any, values: Any, state: Any, reeled: Any, h: float, settle: 
     m, count = len(shapes.cut), len(shapes.of_pulls)
     wrist, first = parameters_of(model, rows, shapes.of_pulls), FIELDS + OF_A_TENDON * count
     taut, stiffness = part(rows, first, shapes.of_pulls), part(rows, first + count, shapes.of_pulls)
-    per_newton, radian = part(rows, first + 2 * count, shapes.of_pulls), rows[first + 3 * count]
-    nonideal = beyond(rows, first + 3 * count + 1)
+    per_newton, per_mass = (
+        part(rows, first + 2 * count, shapes.of_pulls),
+        part(rows, first + 3 * count, shapes.of_pulls),
+    )
+    radian, decay = rows[first + 4 * count], rows[first + 4 * count + 1]
+    nonideal = beyond(rows, first + 4 * count + 2)
     tendons = RealPlaces(
         stiffness, read_nonideal(nonideal), read_faults(beyond(nonideal, _NONIDEAL), shapes.of_pulls),
-        beyond(states, 2 * m), NoInnerFriction(), shapes.of_pulls,
+        beyond(states, 2 * (m + count)), NoInnerFriction(), shapes.of_pulls,
     )  # fmt: skip
     q, rate, spools = part(states, 0, shapes.cut), part(states, m, shapes.cut), lanes_like(taut)
-    zero = zero_like(taut[0])
+    turning, zero = beyond(states, 2 * m), zero_like(taut[0])
     alive = 1.0 + zero
+    for t in range(count):
+        turning[2 * t] = reeled[0, t] + taut[t]
     for k in range(-settle, reeled.shape[0]):
-        now = max(k, 0)
+        now, before = max(k, 0), max(k - 1, 0)
         path = path_before(tendons, wrist, q)
         for t in range(count):
-            field = Field(radian, per_newton[t])
-            spools[t] = on_rotor(field, tendons, reeled[now, t] + taut[t], t, shortening(path, t))
+            field = Field(radian, per_newton[t], per_mass[t], decay)
+            counted = reeled[before, t] + taut[t], reeled[now, t] + taut[t]
+            spools[t] = turn_rotor(shapes.rotors, field, tendons, counted, turning, t, shortening(path, t), h)
         if k >= 0:
             row = rows_of(out[k])
             row[0], row[1], _, _, _ = tip_bend(wrist.segment, q, rate)
@@ -96,13 +110,14 @@ def courses_of_bends(candidates: Sequence[SupposedBends], reeled: Array, h: floa
         (T, M) [m], held over each step; at first the wrist is at rest
     """
     tendons, coordinates, count = reeled.shape[1], 2 * n, len(candidates)
-    shapes, follow = _Shapes((0,) * coordinates, (0,) * tendons), kernel_of(_follow, PCC_IN_SPACE)
+    rotors = motion_of(candidates[0].tendons, candidates[0].rotors, h)
+    shapes, follow = _Shapes((0,) * coordinates, (0,) * tendons, rotors), kernel_of(_follow, PCC_IN_SPACE)
     rows = np.array([_values(candidate, n, h) for candidate in candidates])
     blocks = to_blocks(np.repeat(rows, 2, axis=0) if count == 1 else rows)  # one width is compiled
     spools = np.ascontiguousarray(reeled, float)
     out = np.empty((len(blocks), len(spools), 2 + tendons, blocks.shape[2]))
     at_rest = unmoved(np.zeros(tendons), np.zeros(2 * tendons), np.zeros(tendons), np.zeros(coordinates))
-    begin = np.append(np.zeros(2 * coordinates), at_rest)
+    begin = np.append(np.zeros(2 * (coordinates + tendons)), at_rest)
     for values, course in zip(blocks, out, strict=True):
         state = np.repeat(begin[:, None], blocks.shape[2], axis=1)
         follow(PCC_IN_SPACE, values, state, spools, h, round(SETTLE / h), course, shapes)
@@ -116,11 +131,11 @@ def _values(supposed: SupposedBends, n: int, h: float) -> Array:
     own = own_values(wrist, n, TendonLayout.four(wrist.tendon_radius))
     tendons, facts = supposed.tendons.model_copy(update={"level": "tendon"}), TendonFacts()
     alike = np.asarray(supposed.alike, float)
-    stiffness, faults = alike * tendons.tendon_stiffness, faults_of(tendons, facts, alike)
-    nonideal, field = nonideal_of(TrueWrist(), tendons, facts, h), field_of(tendons, supposed.holding)
+    stiffness, faults = alike * own_stiffness(tendons, supposed.rotors), faults_of(tendons, facts, alike)
+    nonideal, field = nonideal_of(TrueWrist(), tendons, facts, h), field_of(tendons, supposed.rotors)
     return np.concatenate(
         [
             own[:FIELDS], rows_of_tendons(supposed.places, along), supposed.taut, stiffness, field.per_newton / alike,
-            [field.radian], nonideal, faults.ravel(),
+            field.per_mass / alike, [field.radian, field.decay], nonideal, faults.ravel(),
         ]
     )  # fmt: skip

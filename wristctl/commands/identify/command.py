@@ -223,7 +223,12 @@ def _problem(study: Study, inputs: Inputs) -> Problem:
             start, believed = believed_of(wrist, actuator), actuator
             motors = config.hw_run.bench.motors
             if settings.holding_torque is None and not config.hw_run.port and motors.rotor_inertia > 0.0:
-                settings = settings.model_copy(update={"holding_torque": motors.holding_torque})
+                own = {
+                    "holding_torque": motors.holding_torque,
+                    "rotor_inertia": motors.rotor_inertia + motors.spool_inertia,
+                    "rotor_damping": motors.damping,
+                }
+                settings = settings.model_copy(update=own)
     return Problem(trials, start, settings, believed)
 
 
