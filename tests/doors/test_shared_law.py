@@ -1,4 +1,4 @@
-"""C that export-law wrote comes back as a shared library, and moves the wrist as the controller that it was made from."""
+"""C that export-law wrote comes back as a shared library, and moves the wrist as the controller it was made from."""
 
 from __future__ import annotations
 
@@ -38,7 +38,12 @@ def compiled(source: Path, library: Path) -> Path:
 
 
 def rmse(controller: str, *overrides: str) -> float:
-    chosen = (f"simulate.controller={controller}", "simulate.horizon=0.8", "simulate.reference.duration=0.5")
+    chosen = (
+        f"simulate.controller={controller}",
+        "simulate.gains=default",
+        "simulate.horizon=0.8",
+        "simulate.reference.duration=0.5",
+    )
     found = face.simulate(face.load_study(None, *chosen, *overrides)).metrics["rmse"]
     assert isinstance(found, float)
     return found
@@ -49,7 +54,7 @@ def rmse(controller: str, *overrides: str) -> float:
 @pytest.mark.parametrize("planes", PLANES)
 def test_an_exported_controller_comes_back_with_the_same_error(tmp_path: Path, name: str, planes: str) -> None:
     loop = ["loop.control_period=0.005", *PLANES[planes], "reference.angle_deg=25"]
-    export_law([name], [*loop, "reference.duration=0.5", "horizon=0.8"], tmp_path / "c", tmp_path)
+    export_law([f"{name}/default"], [*loop, "reference.duration=0.5", "horizon=0.8"], tmp_path / "c", tmp_path)
     stem = f"{name.replace('-', '_')}_law"
     compiled(tmp_path / "c" / f"{stem}.c", tmp_path / f"{stem}.so")
     (tmp_path / "mine.py").write_text(MINE.format(stem))
@@ -86,7 +91,7 @@ def spring(folder: Path, planes: int, preview: int) -> Path:
 def test_c_of_ones_own_sees_bend_rate_and_the_reference_to_come(tmp_path: Path, planes: int, preview: int) -> None:
     """Its torque at random states is the formula's, of which one term is the reference at the end of the preview."""
     controller = shared_law(spring(tmp_path, planes, preview), "spring")
-    assert (controller.planes, controller.preview, controller.name) == (planes, preview, "spring-c (plain Python)")
+    assert (controller.planes, controller.preview, controller.name) == (planes, preview, "spring-c(py)")
     tried = vet(controller, "a test")
     theta, rate, reference, reference_rate = tried.signals[:, :4].T
     if preview:

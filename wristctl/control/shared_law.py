@@ -1,4 +1,4 @@
-"""A controller out of a shared library, as `export-law` writes its C: one of one's own, which runs as plain Python does.
+"""A controller out of a shared library, as `export-law` writes its C; it runs as one of plain Python does.
 
     from wristctl.control.shared_law import shared_law
     from wristctl.plugins.import_hook import data_file
