@@ -296,14 +296,15 @@ def _balanced(model: Any, data: Any, spools: Spooled, tension: Values) -> Values
         mujoco.mj_fwdPosition(model, data)
         spools.pull(data, tension)
         mujoco.mj_forward(model, data)
-        return data.qacc.copy()
+        found: Values = data.qacc.copy()
+        return found
 
-    def moved(at: Values, by: Values) -> Values:
+    def moved(at: Values, by: ArrayLike) -> Values:
         there = at.copy()
         mujoco.mj_integratePos(model, there, by, 1.0)
         return there
 
-    at = data.qpos.copy()
+    at: Values = data.qpos.copy()
     for _ in range(_TRIES):
         here = acceleration(at)
         slopes = [(acceleration(moved(at, by)) - here) / _APART for by in _APART * np.eye(model.nv)]

@@ -78,7 +78,7 @@ class MujocoRig:
             found, self._spools, drive, sensor, Limits(travel or math.inf, rate, self._spools.tension), tendons, wrist,
             slack,
         )  # fmt: skip
-        self.model.opt.timestep = found.step
+        self.model.opt.timestep = self._step = found.step
         self.data = mujoco.MjData(self.model)
         self._noise = np.random.default_rng(seed)
         self.clock = VirtualClock(self._advance)
@@ -145,7 +145,7 @@ class MujocoRig:
                 self._wanted = self._coming.popleft()[1]
             steps = 1
             if (left := self._wanted - self._reeled).any():
-                step = self.model.opt.timestep
+                step = self._step
                 follows = left * -math.expm1(-step / self._lag) if self._lag > 0.0 else left
                 self._reeled = self._reeled + np.clip(follows, -self._rate * step, self._rate * step)
             elif self._spools.alone:  # nothing changes before the next target or frame
@@ -158,15 +158,15 @@ class MujocoRig:
                 self._capture()
 
     def _time(self, steps: int) -> float:
-        return self._origin + steps * self.model.opt.timestep
+        return self._origin + steps * self._step
 
     def _step_at(self, time: float) -> int:
         """Steps that have been made by then."""
-        return math.floor((time - self._origin) / self.model.opt.timestep + 1e-6)
+        return math.floor((time - self._origin) / self._step + 1e-6)
 
     def _frame_step(self) -> int:
         """Steps after which the next frame is due."""
-        return math.ceil(self._frames / value(self.facts.sensor.rate) / self.model.opt.timestep - 1e-6)
+        return math.ceil(self._frames / value(self.facts.sensor.rate) / self._step - 1e-6)
 
     def _capture(self) -> None:
         """Keep a frame: the bend that the sensor sees, and the true one."""

@@ -52,7 +52,12 @@ PULLS = {
 
 def rod(pulls: str, **given: Any) -> MujocoRig:
     text = "".join(PULLS[pulls].format(name) for name in ("left", "right"))
-    return MujocoRig(ROD.format(text), "tip", **{"tension": 50.0, "sensor": EXACT, "slack": 0.0} | given)
+    chosen: dict[str, Any] = {"tension": 50.0, "sensor": EXACT, "slack": 0.0} | given
+    return MujocoRig(ROD.format(text), "tip", **chosen)
+
+
+def bend_of(rig: MujocoRig) -> float:
+    return float(np.ravel(rig.look().bend)[0])
 
 
 def moved(rig: MujocoRig, *targets: float, seconds: float = 3.0) -> Any:
@@ -149,17 +154,15 @@ def test_motors_wait_for_their_delay_lag_behind_round_and_stop() -> None:
     rig.clock.wait_until(rig.clock.now() + 0.029)
     assert np.abs(rig.motion[:, 1]).max() < 1e-12
     rig.clock.wait_until(rig.clock.now() + 0.1)
-    half = rig.look().bend[0]
+    half = bend_of(rig)
     rig.stop()
     rig.clock.wait_until(rig.clock.now() + 2.0)
     whole = 20e3 * 0.02 * 2e-3 / (2.0 + 20e3 * 0.02**2)
-    assert (
-        rig.look().bend[0] == pytest.approx(whole * -math.expm1(-0.99), rel=0.02) and 0.3 * whole < half < 0.9 * whole
-    )
+    assert bend_of(rig) == pytest.approx(whole * -math.expm1(-0.99), rel=0.02) and 0.3 * whole < half < 0.9 * whole
     rig.send(np.array([2e-3, -3e-3]))
     rig.stop()
     rig.clock.wait_until(rig.clock.now() + 1.0)
-    assert rig.look().bend[0] < 0.7 * whole
+    assert bend_of(rig) < 0.7 * whole
 
 
 def test_the_clock_goes_on_when_it_is_connected_again_and_the_robot_stands_as_at_first() -> None:
@@ -168,7 +171,7 @@ def test_the_clock_goes_on_when_it_is_connected_again_and_the_robot_stands_as_at
     first = moved(rig, 2e-3, -2e-3)
     later = rig.clock.now()
     np.testing.assert_array_equal(rig.connect(), [0.0, 0.0])
-    assert rig.clock.now() == later and rig.look().bend[0] == 0.0 and rig.look().time == later
+    assert rig.clock.now() == later and bend_of(rig) == 0.0 and rig.look().time == later
     np.testing.assert_allclose(moved(rig, 2e-3, -2e-3), first, rtol=1e-9)
 
 
@@ -194,7 +197,7 @@ def test_the_tip_is_told_in_the_axes_of_the_bend() -> None:
     assert bend > 0.1 and tip == pytest.approx([0.1 * math.cos(bend), 0.1 * math.sin(bend), 0.0], abs=1e-12)
 
 
-WRONG = {
+WRONG: dict[str, tuple[str, dict[str, Any], str]] = {
     "no XML": ("<mujoco", {}, "MuJoCo cannot read the model"),
     "no site": (ROD.format(PULLS["lengths"].format("left")), {"bend": "top"}, "no site 'top'"),
     "no actuator": (ROD.format(""), {}, "no actuator of the model pulls a tendon"),
