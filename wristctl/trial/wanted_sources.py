@@ -38,7 +38,7 @@ class Wanted(Protocol):
 
 def source_of(listen: str) -> Wanted:
     """The source that a setting names, HOST:PORT or lsl:NAME. Raises UserError where it cannot be listened to."""
-    return Stream(listen.removeprefix(STREAM)) if listen.startswith(STREAM) else Datagrams(listen)
+    return LslStream(listen.removeprefix(STREAM)) if listen.startswith(STREAM) else Datagrams(listen)
 
 
 class Datagrams:
@@ -71,7 +71,7 @@ class Datagrams:
         self._socket.close()
 
 
-class Stream:
+class LslStream:
     """An LSL stream of this name, whose channels are the wanted bend [deg] toward ulnar and toward flexion, or one.
 
     Each sample is as a datagram with the time of the sample, from the stream's own computer. Raises UserError without
