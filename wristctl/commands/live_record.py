@@ -30,10 +30,8 @@ def check_live(reference: Reference, controllers: Iterable[str], wrist: WristPar
 
 def tell_address(session: Session, live: LiveReference) -> None:
     """Say where wanted bends are listened for, and who may send them."""
-    address = live.address
-    here = address.startswith(("127.", "::1"))
-    warning = "" if here else "; EVERY computer that reaches this address can move the wrist"
-    session.operator.tell(f"listening for wanted bends at {address} (UDP){warning}")
+    warning = "" if live.source.guarded else "; EVERY computer that reaches this one can move the wrist"
+    session.operator.tell(f"listening for wanted bends at {live.source.words}{warning}")
 
 
 def keep_live(findings: Findings, live: LiveReference) -> None:

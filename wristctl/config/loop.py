@@ -139,9 +139,9 @@ class Reference(OpenSection):
     listen: str | None = seldom(
         None,
         "",
-        "live: HOST:PORT of the UDP socket; null: 127.0.0.1:5005. Another host than 127.0.0.1 lets other computers "
-        "move the wrist",
-        pattern=r"^(\[[0-9a-fA-F:.]+\]|[^:\s]+):\d{1,5}$",
+        "live: HOST:PORT of the UDP socket, or lsl:NAME of an LSL stream; null: 127.0.0.1:5005. Another host than "
+        "127.0.0.1, and a stream, let other computers move the wrist",
+        pattern=r"^(lsl:.*\S|(\[[0-9a-fA-F:.]+\]|[^:\s]+):\d{1,5})$",
     )
     inverse: InverseName = choice(
         "none",

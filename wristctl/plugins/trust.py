@@ -7,7 +7,7 @@ import hashlib
 import os
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
-from importlib.machinery import all_suffixes
+from importlib.machinery import BYTECODE_SUFFIXES
 from pathlib import Path
 
 from wristctl.errors import Argument, UserError
@@ -90,8 +90,7 @@ def digest_of(root: Path, files: Mapping[Path, str]) -> str:
 
 def _sources(root: Path) -> dict[Path, str]:
     """All below a folder but what Python would load in place of sources, and nothing here ever does."""
-    compiled_suffixes = tuple(set(all_suffixes()) - {".py"})
-    sources = (path for path in root.rglob("*") if path.is_file() and not path.name.endswith(compiled_suffixes))
+    sources = (path for path in root.rglob("*") if path.is_file() and not path.name.endswith(tuple(BYTECODE_SUFFIXES)))
     return {source: hashlib.sha256(_content(source)).hexdigest() for source in sources}
 
 

@@ -1,12 +1,11 @@
-"""Wanted bends from a UDP socket, one JSON object a datagram: what is refused, and the reference that follows.
+"""Wanted bends, one JSON object a datagram: what is refused, and the reference that follows.
 
-Nothing is ever sent back. Whoever can send to the socket moves the wrist, within the limits of the reference: it is
-bound to this computer alone unless a setting asks for more.
+Nothing is ever sent back. Whoever can send to the socket, or has the stream, moves the wrist, within the limits of the
+reference: a socket is bound to this computer alone unless a setting asks for more.
 """
 
 import json
 import math
-import socket
 import time
 from collections import Counter
 from collections.abc import Callable
@@ -17,13 +16,13 @@ import numpy as np
 from wristctl.arrays import Array
 from wristctl.config.loop import Reference
 from wristctl.config.wrist import WristParameters
-from wristctl.errors import UserError
 from wristctl.simulation.live_reference import FOLLOWED, IN_TWO_PLANES, LimitedReference, LiveLimits
+from wristctl.trial.wanted_sources import LONGEST, source_of
 
 # Where wanted bends are listened for, if no setting says so.
 LISTEN = "127.0.0.1:5005"
-# Bytes of the longest datagram, and datagrams that one sample reads at most.
-_LONGEST, _AT_ONCE = 1024, 256
+# Datagrams that one sample reads at most.
+_AT_ONCE = 256
 
 Refusal = Literal["malformed", "not finite", "old", "out of range", "jump", "other sender"]
 # Kinds of refused datagrams, and what each is.
@@ -107,7 +106,7 @@ class WantedBends:
 
     def _parsed(self, data: bytes) -> tuple[Array, int | None, float | None]:
         """Bend, one number or a pair [rad], seq and t of a datagram."""
-        if len(data) > _LONGEST:
+        if len(data) > LONGEST:
             raise _Refused("malformed")
         try:
             content = json.loads(data)
@@ -172,13 +171,13 @@ class LiveReference:
         self._began: float | None = None
         self.behind = 0.0
         """Longest time by which a paced sample was behind the wall clock [s]."""
-        self._socket = _bound(reference.listen or LISTEN)
+        self.source = source_of(reference.listen or LISTEN)
+        """Where wanted bends come from."""
 
     @property
     def address(self) -> str:
-        """HOST:PORT that is listened at."""
-        host, port = self._socket.getsockname()[:2]
-        return f"{host}:{port}"
+        """HOST:PORT that is listened at, or the stream's name."""
+        return self.source.address
 
     @property
     def bend(self) -> Array:
@@ -192,7 +191,7 @@ class LiveReference:
         bend.
         """
         if self._began is None:
-            while self._received() is not None:
+            while self.source.received() is not None:
                 pass
             self.bends.begin()
             self._began = self._clock()
@@ -203,7 +202,7 @@ class LiveReference:
             self.behind = max(self.behind, -ahead)
         now = self._clock()
         for _ in range(_AT_ONCE):
-            if (came := self._received()) is None:
+            if (came := self.source.received()) is None:
                 break
             self.bends.take(*came, now)
         first = self.filled
@@ -229,12 +228,6 @@ class LiveReference:
         if state == FOLLOWING and wanted is not None:
             self._wanted[sample] = wanted
         self.states[sample] = state
-
-    def _received(self) -> tuple[bytes, Any] | None:
-        try:
-            return self._socket.recvfrom(_LONGEST + 1)
-        except OSError:  # nothing more has come
-            return None
 
     def listen(self) -> None:
         """Follow all samples by the wall clock, where no loop asks for them."""
@@ -267,20 +260,5 @@ class LiveReference:
         return f"live reference: {counts['followed']} datagrams followed, {refused or 'none'} refused{slow}"
 
     def close(self) -> None:
-        """Give the socket back."""
-        self._socket.close()
-
-
-def _bound(listen: str) -> socket.socket:
-    host, _, port = listen.rpartition(":")
-    family = socket.AF_INET6 if ":" in host else socket.AF_INET
-    made = socket.socket(family, socket.SOCK_DGRAM)
-    try:
-        made.setblocking(False)
-        made.bind((host.strip("[]"), int(port)))
-    except (OSError, OverflowError) as error:
-        made.close()
-        fix = "end the program that listens there, or another HOST:PORT of this computer"
-        reason = getattr(error, "strerror", None) or str(error)
-        raise UserError(f"cannot listen at {listen}: {reason}", "reference.listen", fix) from error
-    return made
+        """Give the source back."""
+        self.source.close()

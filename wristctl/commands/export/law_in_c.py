@@ -46,7 +46,7 @@ void ${name}_tick(${name}_state *state, $measured const double *reference, ${nam
 
 /* Torque [N m] in each plane that your motors could not give of the last command. */
 double *${name}_withheld(${name}_state *state);
-
+$shared_declared
 #ifdef __cplusplus
 }
 #endif
@@ -97,6 +97,37 @@ $see    respond(seen, reference, state->motors, state->memory, out->wanted, out-
         out->tension[t] = out->pull[t] / alike[t];
 $speed_set    }
 $predict    state->tick += 1;
+}
+$shared_defined""")
+
+_SHARED = Template("""
+/* Out of a shared library, for `wristctl compare`: planes, periods of preview and bytes of a state; the period [s]. */
+void ${name}_shape(int shape[3], double *period);
+
+/* Torque [N m] that is wanted in each plane. The state began as zeros. */
+void ${name}_wanted(
+    void *state, const double *bend, const double *rate, const double *reference, double *torque);
+""")
+
+_SHARED_BODY = Template("""
+void ${name}_shape(int shape[3], double *period)
+{
+    shape[0] = $planes;
+    shape[1] = $preview;
+    shape[2] = (int)sizeof(${name}_state);
+    *period = ${upper}_PERIOD;
+}
+
+void ${name}_wanted(
+    void *state, const double *bend, const double *rate, const double *reference, double *torque)
+{
+    ${name}_state *own = state;
+    ${name}_output out;
+    if (own->tick == 0) {
+        ${name}_reset(own);
+    }
+    ${name}_tick(own, bend, rate, reference, &out);
+    memcpy(torque, out.wanted, sizeof out.wanted);
 }
 """)
 
@@ -247,8 +278,11 @@ def _measured(programs: LawPrograms) -> dict[str, str]:
         f"        seen[{OF_A_PLANE} * p + 2] = 0.0;",
         "    }\n",
     ]
+    words = {"name": programs.name, "upper": programs.name.upper(), "planes": str(planes)}
+    words |= {"preview": str(programs.preview)}
     return {
         "observed": "", "frame_declared": "", "frame_defined": "", "reset": "", "predict": "",
+        "shared_declared": _SHARED.substitute(words), "shared_defined": _SHARED_BODY.substitute(words),
         "measured": "const double *bend, const double *rate,", "see": "\n".join(see),
         "call": f"{programs.name}_tick(&state, values + 1, values + {1 + planes}, values + {1 + 2 * planes}, &out);",
     }  # fmt: skip
@@ -278,6 +312,7 @@ def _observed(programs: LawPrograms, observer: Observed) -> dict[str, str]:
     return {
         "observed": "\n".join(state), "frame_declared": _FRAME.substitute(words),
         "frame_defined": _FRAME_BODY.substitute(words), "predict": _PREDICT.substitute(words),
+        "shared_declared": "", "shared_defined": "",
         "reset": "\n".join(reset), "measured": "", "see": "    const double *seen = state->now;\n",
         "call": "\n".join(call),
     }  # fmt: skip
