@@ -17,7 +17,8 @@ from wristctl.commands.compare.figures import rmse_map, variation_dots
 from wristctl.comparison.combinations import ComparedRow
 from wristctl.config.learning import TrainSettings
 from wristctl.config.study import Study
-from wristctl.plotting.page import page, several_page
+from wristctl.plotting.page import page
+from wristctl.plotting.several_page import several_page
 from wristctl.records import InputRun, Run, start_run
 from wristctl.records.manifest import OVERVIEW, Overview
 from wristctl.simulation.repetitions import Repeated

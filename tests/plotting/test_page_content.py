@@ -19,8 +19,9 @@ from wristctl.commands.printed_table import Table, table_for_people
 from wristctl.comparison.combinations import ComparedRow
 from wristctl.config.learning import TrainSettings
 from wristctl.config.study import Study
-from wristctl.plotting.page import LARGEST, blocks, figures, inline_figure, page, several_page
+from wristctl.plotting.page import LARGEST, blocks, figures, inline_figure, page
 from wristctl.plotting.page_tables import shown_tables, tables
+from wristctl.plotting.several_page import several_page
 from wristctl.records import InputRun, Run, start_run
 from wristctl.records.manifest import OVERVIEW, Overview, read_overview
 from wristctl.simulation.repetitions import Repeated

@@ -1,6 +1,5 @@
-"""`wristctl runs report`, `figures`, `table` and `export`."""
+"""`wristctl runs figures`, `table` and `export`."""
 
-import hashlib
 import logging
 import re
 from collections.abc import Callable, Collection, Iterable, Sequence
@@ -12,14 +11,13 @@ from typing import Annotated, Literal
 import typer
 
 from wristctl.cli.command import asked_to_trust
-from wristctl.cli.options import RESULTS, Debug, Out, Quiet, Ref, Refs, TrustCode
+from wristctl.cli.options import RESULTS, Debug, Out, Quiet, Ref, TrustCode
 from wristctl.cli.output import say
 from wristctl.cli.progress import Terminal, listening, progress
 from wristctl.commands.progress import no_event
 from wristctl.errors import TO, Argument, UserError, meant, reason_of, writing
 from wristctl.plugins.trust import asking
 from wristctl.records import Run, open_run
-from wristctl.records.files import write_text
 from wristctl.records.index import DRAWN
 from wristctl.records.manifest import read_overview
 
@@ -54,40 +52,6 @@ def _draw(names: Sequence[str], write: Callable[[str], None], console: Terminal,
                 failed.append(name)
             advance(count)
     return failed
-
-
-def report(
-    refs: Refs,
-    out: Out = RESULTS,
-    to: Annotated[Path | None, typer.Option("--to", help="The file to write; by default beside the runs.")] = None,
-    all_figures: Annotated[
-        bool, typer.Option("--all-figures", help="Draw those too that the run left for later, into a folder beside it.")
-    ] = False,
-    trust_code: TrustCode = False,
-    quiet: Quiet = False,
-    debug: Debug = False,
-) -> None:
-    """Write a page about one run, or about several beside each other: one HTML file that needs no network.
-
-    Where the folder of the runs cannot be written to, the page goes to the working directory.
-    """
-    from wristctl.plotting.page import page, several_page
-
-    runs = [open_run(ref, out) for ref in refs]
-    name = hashlib.sha256(" ".join(run.id for run in runs).encode()).hexdigest()[:6]
-    file = to or runs[0].path.parent / f"report-{runs[0].id if len(runs) == 1 else name}.html"
-    with asking(partial(asked_to_trust, trust_code)):
-        drawn = draw_later(runs[0], quiet) if all_figures and len(runs) == 1 else None
-        text = page(runs[0], runs[0].manifest, drawn) if len(runs) == 1 else several_page(runs)
-    try:
-        write_text(file, text, TO)
-    except UserError as error:
-        if to:
-            raise
-        _log.warning("%s (%s): the page is written here", error.what, error.where)
-        file = Path(file.name)
-        write_text(file, text)
-    say(file)
 
 
 class FigureFormat(StrEnum):
