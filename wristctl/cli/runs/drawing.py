@@ -1,4 +1,4 @@
-"""`wristctl runs figures`, `table` and `export`."""
+"""`wristctl runs figures`, `table`, `cite` and `export`."""
 
 import logging
 import re
@@ -123,12 +123,15 @@ def table(
     number: Annotated[
         list[int] | None, typer.Option("--table", "-n", help="Which of its tables, from 1; repeatable. All where none.")
     ] = None,
-    latex: Annotated[bool, typer.Option("--latex", help="As LaTeX, for booktabs.")] = False,
+    latex: Annotated[
+        bool, typer.Option("--latex", help="As LaTeX, a column wide: booktabs, siunitx, array, graphicx.")
+    ] = False,
     out: Out = RESULTS,
     debug: Debug = False,
 ) -> None:
     """Print the tables of a run, angles in degrees: all that the command printed or kept back."""
-    from wristctl.commands.printed_table import latex_table, table_for_people
+    from wristctl.cli.runs.latex import latex_table
+    from wristctl.commands.printed_table import table_for_people
     from wristctl.plotting.page_tables import tables
 
     run = open_run(ref, out)
@@ -138,8 +141,21 @@ def table(
     for position in number or ():
         if not 1 <= position <= len(run_tables):
             raise UserError(f"no table {position}", str(run.path), f"1 to {len(run_tables)}")
-    chosen = [run_tables[position - 1] for position in number] if number else run_tables
-    print("\n\n".join(latex_table(chosen_table) if latex else chosen_table.text() for chosen_table in chosen))
+    positions = number or range(1, len(run_tables) + 1)
+    caption = f"{run.kind}: run {run.id}"
+    texts = [
+        latex_table(chosen, f"{run.kind}-{position}", caption) if latex else chosen.text()
+        for position in positions
+        for chosen in [run_tables[position - 1]]
+    ]
+    print("\n\n".join(texts))
+
+
+def cite(ref: Ref, out: Out = RESULTS, debug: Debug = False) -> None:
+    """Print BibTeX of a run, by its id and the hash of its result, and of wristctl."""
+    from wristctl.cli.runs.latex import bibtex
+
+    print(bibtex(open_run(ref, out).manifest))
 
 
 def export(
