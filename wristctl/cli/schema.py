@@ -8,7 +8,7 @@ from wristctl.cli.options import Debug
 app = typer.Typer(add_completion=False)
 
 
-@app.command("schema", epilog="Examples:\nwristctl schema > study.schema.json")
+@app.command("schema")
 def schema(debug: Debug = False) -> None:
     """Print the JSON schema of study files, by which editors complete keys and check values.
 
