@@ -132,8 +132,8 @@ def test_short_forms_are_taken(validator: Draft202012Validator, text: str) -> No
     assert refused(validator, text) == []
 
 
-def test_an_editor_shows_unit_meaning_range_and_choices(validator: Draft202012Validator) -> None:
-    sections = validator.schema["$defs"]
+def test_an_editor_shows_unit_meaning_range_and_choices() -> None:
+    sections = study_schema()["$defs"]
     length = sections["WristParameters"]["properties"]["length"]
     assert length["exclusiveMinimum"] == 0 and length["default"] == 0.08
     assert length["description"].startswith("[m] arc length from the first to the last disc")
