@@ -178,12 +178,13 @@ def test_a_table_of_the_answer_stands_once_and_a_long_one_is_folded(tmp_path: Pa
     answered = Answer("It follows.", Table("", ("who", "error [deg]"), [("a", 0.123456), ("b", 2.0)]), [], "")
     stored: list[dict[str, Any]] = [
         {"title": "", "columns": ["who", "error [deg]"], "rows": [["a", 0.123456], ["b", 2.0]]},
+        {"title": "Others", "columns": ["who", "tension [N]"], "rows": [["a", 7.25], ["b", 3.0]]},
         {"title": "Long", "columns": ["k"], "rows": [[k] for k in range(13)]},
     ]
     run = made(tmp_path, {}, tables=stored)
     (run.path / OVERVIEW).write_text(Overview(answered.lines()).text())
     text = page_of(run)
-    assert [row for row in rows(text) if row and row[0] == "a"] == [["a", "0.1235"]]
+    assert [row for row in rows(text) if row and row[0] == "a"] == [["a", "0.1235"], ["a", "7.25"]]
     assert "<summary>Long (13 rows)</summary>" in text
     (run.path / OVERVIEW).write_text(Overview(["It follows."]).text())
     assert ["b", "2"] in rows(page_of(run)), "what the answer lacks stands below"
