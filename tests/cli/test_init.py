@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import json
 import re
 import shlex
 from pathlib import Path
 
 import pytest
 import yaml
+from jsonschema import Draft202012Validator
 
 from tests.cli.conftest import ROOT, Command
 from wristctl.config.study import Study
+from wristctl.study_files.json_schema import NAMED, SCHEMA_FILE, study_schema
 from wristctl.study_files.load import load_study
 
 SOURCE = ROOT / "experiments"
@@ -27,7 +30,7 @@ def test_init_lays_all_experiments_out_and_its_next_lines_run(
     done = wristctl("init", "my study")
     assert done.returncode == 0 and _files(tmp_path / "my study" / "experiments") == _files(SOURCE)
     names = {each.name for each in (tmp_path / "my study").iterdir()}
-    assert names == {"experiments", "mywrist.yaml", "README.md"}
+    assert names == {"experiments", "mywrist.yaml", "README.md", "study.schema.json"}
     lines = [shlex.split(line) for line in re.findall(r"^  (.*)$", done.stdout, re.MULTILINE)]
     assert lines[0] == ["cd", "my study"] and len(lines) == 4
     monkeypatch.chdir(lines[0][1])
@@ -48,7 +51,7 @@ def test_the_wrist_of_init_is_the_default_one_with_each_value_explained(wristctl
     assert "length: 0.12" in wristctl("simulate", "mywrist.yaml", "--dry-run").stdout
 
 
-@pytest.mark.parametrize("name", ["mywrist.yaml", "README.md", "experiments"])
+@pytest.mark.parametrize("name", ["mywrist.yaml", "README.md", "experiments", "study.schema.json"])
 def test_init_writes_over_no_file_of_yours(wristctl: Command, tmp_path: Path, name: str) -> None:
     (tmp_path / name).write_text("mine")
     done = wristctl("init", ".")
@@ -83,3 +86,14 @@ def test_init_that_cannot_write_leaves_nothing(
     done = wristctl("init", "study")
     assert done.returncode == 2 and "No space left on device" in done.stderr
     assert list((tmp_path / "study").iterdir()) == []
+
+
+def test_init_lays_the_schema_beside_the_study_that_names_it(wristctl: Command, tmp_path: Path) -> None:
+    assert wristctl("init", ".").returncode == 0
+    first = (tmp_path / "mywrist.yaml").read_text().partition("\n")[0]
+    named = re.fullmatch(r"# yaml-language-server: \$schema=(\S+)", first)
+    assert first == NAMED and named and named[1] == SCHEMA_FILE
+    printed = wristctl("schema")
+    schema = json.loads((tmp_path / SCHEMA_FILE).read_text())
+    assert printed.returncode == 0 and json.loads(printed.stdout) == schema == study_schema()
+    assert Draft202012Validator(schema).is_valid(yaml.safe_load((tmp_path / "mywrist.yaml").read_text()))

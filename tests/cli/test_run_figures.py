@@ -13,7 +13,8 @@ from pathlib import Path
 import pytest
 
 from tests.cli.conftest import Call
-from wristctl.commands.printed_table import Table, latex_table
+from wristctl.cli.runs.latex import latex_table
+from wristctl.commands.printed_table import Table
 from wristctl.records import open_run
 
 COMPARE = (
@@ -126,14 +127,20 @@ def test_a_table_is_printed_whole_or_as_latex(call: Call) -> None:
     plain = call("runs", "table", "latest:compare")[1]
     assert plain.count("Loop fast") == 2 and "Control step" in plain
     whole = call("runs", "table", "latest:compare", "--latex")[1]
-    assert whole.count("\\begin{table}") == 6 and "overshoot [\\%]" in whole
+    assert whole.count("\\begin{table}") == 6 and "overshoot [\\unit{\\percent}]" in whole
     answer = call("runs", "table", "latest:compare", "-n", "1", "--latex")[1]
-    assert whole.startswith(answer.rstrip()) and "{lll}" in answer, "the answer comes first"
-    assert "sampled (1) & sampled (steps) (1)" in answer, "a column for moves and one for steps"
+    assert whole.startswith(answer.rstrip()) and "\\label{tab:compare-1}" in answer, "the answer comes first"
+    assert answer.index("sampled (1)") < answer.index("sampled (steps) (1)"), "a column for moves and one for steps"
 
 
 def test_latex_writes_out_what_it_would_read_and_aligns_numbers() -> None:
     text = latex_table(Table("50 % & more_", ("a_b", "x"), [("p & q", 1.23456), ("r", None)]))
     less = latex_table(Table("<1", ("RMSE > 0",), [("<0.001",)]))
-    assert "<" not in less and ">" not in less and less.count("\\textless{}") == 2 and "\\textgreater{}" in less
-    assert "50 \\% \\& more\\_" in text and "p \\& q & 1.235" in text and "{lr}" in text and "a\\_b" in text
+    assert "\\caption{\\textless{}1}" in less and "{RMSE \\textgreater{} 0}" in less
+    assert "S[table-format=<1.3]" in less and "\n<0.001 " in less, "siunitx sets what compares"
+    assert (
+        "50 \\% \\& more\\_" in text
+        and "p \\& q & 1.235" in text
+        and "lS[table-format=1.3]" in text
+        and "a\\_b" in text
+    )

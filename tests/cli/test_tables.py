@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 
 import wristctl
-from wristctl.commands.printed_table import Table, latex_table, table_for_people
+from wristctl.cli.runs.latex import latex_table
+from wristctl.commands.printed_table import Table, table_for_people
 
 TABLE = Table("T", ("name", "rmse [rad]", "ok"), [("smc", 1 / 3, True), ("pid", None, False), ("x", math.nan, True)])
 
@@ -67,9 +68,11 @@ def test_a_table_without_rows_shows_its_columns() -> None:
     assert Table("", ("a", "b"), []).text() == "a  b\n-  -"
 
 
-def test_latex_has_the_title_as_caption_and_a_wide_table_is_scaled_to_the_text() -> None:
-    narrow = latex_table(TABLE)
-    assert "\\caption{T}" in narrow and "resizebox" not in narrow
-    wide = latex_table(Table("W", [f"column {number} [rad]" for number in range(12)], [tuple(range(12))]))
-    assert wide.index("resizebox{\\textwidth}") < wide.index("begin{tabular}") and "end{tabular}}" in wide
-    assert wide.count("{") == wide.count("}")
+def test_latex_has_caption_and_label_and_columns_below_each_other_where_they_are_many() -> None:
+    narrow = latex_table(TABLE, "own-1")
+    assert "\\caption{T}" in narrow and "\\label{tab:own-1}" in narrow and narrow.count("begin{tabular}") == 1
+    wide = latex_table(
+        Table("", [f"column {number} [rad]" for number in range(12)], [tuple(range(12))]), "", "of a run"
+    )
+    assert "\\caption{of a run}" in wide and "label" not in wide and wide.count("begin{tabular}") > 2
+    assert wide.count("{") == wide.count("}") and wide.count("column 0 [") == wide.count("begin{tabular}")

@@ -46,6 +46,10 @@ class Browser:
 
     def open(self, file: Path, width: int, dark: bool) -> None:
         """Show a file at a width, in the light or dark scheme; what the page before it said and asked is forgotten."""
+        self.visit(file.as_uri(), width, dark)
+
+    def visit(self, address: str, width: int, dark: bool) -> None:
+        """Show the page at an address, as `open` does a file."""
         self._post("/url", {"url": "about:blank"})
         self.console()
         self.requests()
@@ -53,7 +57,7 @@ class Browser:
         self._devtools("Emulation.setDeviceMetricsOverride", size)
         scheme = {"name": "prefers-color-scheme", "value": "dark" if dark else "light"}
         self._devtools("Emulation.setEmulatedMedia", {"features": [scheme]})
-        self._post("/url", {"url": file.as_uri()})
+        self._post("/url", {"url": address})
 
     def run(self, script: str) -> Any:
         """What the body of a function returns in the page."""

@@ -13,7 +13,8 @@ import pytest
 from tests.plotting.browser import Browser
 from wristctl.cli.app import main
 from wristctl.config.study import Study
-from wristctl.plotting.page import page, several_page
+from wristctl.plotting.page import page
+from wristctl.plotting.several_page import several_page
 from wristctl.records import InputRun, Run, start_run
 from wristctl.records.seal import write_seal
 

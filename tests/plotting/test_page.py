@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import re
 import time
 from dataclasses import replace
@@ -17,7 +18,8 @@ from wristctl.commands.compare.figures import rmse_map, variation_dots
 from wristctl.comparison.combinations import ComparedRow
 from wristctl.config.learning import TrainSettings
 from wristctl.config.study import Study
-from wristctl.plotting.page import page, several_page
+from wristctl.plotting.page import page
+from wristctl.plotting.several_page import several_page
 from wristctl.records import InputRun, Run, start_run
 from wristctl.records.manifest import OVERVIEW, Overview
 from wristctl.simulation.repetitions import Repeated
@@ -107,6 +109,54 @@ def test_a_browser_shows_the_page_without_an_error_or_a_request(
     assert (max(map(int, re.findall(r"\d+", ground))) < 64) == dark
 
 
+CONTRASTS = """
+const parse = text => { const c = text.match(/[\\d.]+/g).map(Number); return c.length < 4 ? [...c, 1] : c; };
+const light = c => c.slice(0, 3).map(v => v / 255).map(v => v <= .03928 ? v / 12.92 : ((v + .055) / 1.055) ** 2.4)
+  .reduce((sum, v, k) => sum + v * [.2126, .7152, .0722][k], 0);
+const ground = e => {
+  for (; e; e = e.parentElement) { const c = parse(getComputedStyle(e).backgroundColor); if (c[3] === 1) return c; }
+};
+const written = [...document.querySelectorAll('main *')].filter(e => !e.closest('.drawn, svg, option, script') &&
+  [...e.childNodes].some(n => n.nodeType === 3 && n.textContent.trim()) && e.getClientRects().length);
+return written.map(e => { const [a, b] = [parse(getComputedStyle(e).color), ground(e)].map(light);
+  return [(Math.max(a, b) + .05) / (Math.min(a, b) + .05), e.outerHTML.slice(0, 80)]; });
+"""
+"""Contrast of each text with its ground, as WCAG 2 reckons it, and the beginning of its element."""
+
+CUT = """
+document.querySelectorAll('details').forEach(each => { each.open = true; });
+return [...document.querySelectorAll('main *')].filter(e => !e.closest('.wide, pre, svg, select, [hidden]') &&
+  getComputedStyle(e).display !== 'inline' && e.scrollWidth > e.clientWidth + 1).map(e => e.outerHTML.slice(0, 120));
+"""
+"""Elements that hold more than their width, beside those that scroll."""
+
+
+@pytest.mark.parametrize("dark", [False, True], ids=["light", "dark"])
+@pytest.mark.parametrize("width", [400, 1280], ids=["phone", "desktop"])
+def test_every_text_is_legible_and_none_is_cut(browser: Any, compared: Run, width: int, dark: bool) -> None:
+    """4.5 to 1 is what WCAG 2 asks of text (level AA)."""
+    for file, name in ((compared.file("report.html"), "one"), (compared.path.parent / "two.html", "two")):
+        if name == "two":
+            file.write_text(several_page([compared, compared]))
+        browser.open(file, width, dark)
+        found = browser.run(CONTRASTS)
+        assert len(found) > 10 and min(found)[0] >= 4.5, min(found)
+        assert browser.run(CUT) == []
+        assert browser.run("return document.documentElement.scrollWidth") <= width, "folded tables too"
+
+
+@pytest.mark.parametrize("width", [400, 1280])
+def test_the_wrist_and_its_angle_fill_the_card_and_figures_scale(browser: Any, compared: Run, width: int) -> None:
+    browser.open(compared.file("report.html"), width, False)
+    read = "const r = s => document.querySelector(s).getBoundingClientRect(); "
+    card, drawings, figure = browser.run(read + "return ['#animation', '#wrists', 'figure img'].map(s => r(s).width)")
+    assert drawings > card - 60 and figure <= width
+    (cut,) = {
+        browser.run("return [...document.querySelectorAll('#wrists .plot')].filter(p => p.clientHeight < 40).length")
+    }
+    assert cut == 0
+
+
 @pytest.mark.parametrize("width", [390, 1280], ids=["phone", "desktop"])
 def test_a_long_line_of_an_answer_is_not_cut_off_at_the_edge(browser: Any, tmp_path: Path, width: int) -> None:
     with start_run("train", Study(), "", tmp_path, [], page=lambda path, man, _: page(Run(path), man)) as live:
@@ -176,5 +226,6 @@ def test_two_runs_on_one_page_show_only_what_differs(browser: Any, tmp_path: Pat
     file.write_text(several_page(runs))
     browser.open(file, 1280, False)
     rows = browser.run("return [...document.querySelectorAll('tbody tr')].map(row => row.innerText)")
-    assert [row.split("\t") for row in rows[2:]] == [["train.epochs", "5", "6"], ["rmse", "0.2", "0.1667"]]
+    told = [["train.epochs", "5", "6"], ["RMSE", "deg", f"{math.degrees(1 / 5):.4g}", f"{math.degrees(1 / 6):.4g}"]]
+    assert [row.split("\t") for row in rows[:2]] == told
     assert browser.console() == []

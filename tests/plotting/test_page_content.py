@@ -19,8 +19,9 @@ from wristctl.commands.printed_table import Table, table_for_people
 from wristctl.comparison.combinations import ComparedRow
 from wristctl.config.learning import TrainSettings
 from wristctl.config.study import Study
-from wristctl.plotting.page import LARGEST, blocks, figures, inline_figure, page, several_page
+from wristctl.plotting.page import LARGEST, blocks, figures, inline_figure, page
 from wristctl.plotting.page_tables import shown_tables, tables
+from wristctl.plotting.several_page import several_page
 from wristctl.records import InputRun, Run, start_run
 from wristctl.records.manifest import OVERVIEW, Overview, read_overview
 from wristctl.simulation.repetitions import Repeated
@@ -65,7 +66,7 @@ def test_where_none_is_chosen_the_first_that_may_be_better_or_worse_head_it(tmp_
     assert [name for name, _ in cards(plain)] == [f"m {k}" for k in range(20, 14, -1)]
 
 
-def test_the_answer_begins_the_page_then_overlays_and_one_table_before_all_else(tmp_path: Path) -> None:
+def test_the_answer_begins_the_page_then_metrics_overlays_and_one_table_before_all_else(tmp_path: Path) -> None:
     stored = [{"title": title, "columns": ["a"], "rows": [["b"]]} for title in ("All", "Folded")]
     run = made(tmp_path, {"rmse": 1.0}, tables=stored)
     folder = run.path / "figures"
@@ -77,11 +78,11 @@ def test_the_answer_begins_the_page_then_overlays_and_one_table_before_all_else(
     (run.path / OVERVIEW).write_text(Overview(["smc < pid", "", "holds"], "first", ["rmse"], captions).text())
     text = page_of(run)
     order = [
-        "smc &lt; pid", "holds", "the answer drawn", "two courses", "the angle", "All", "Folded", 'class="card"',
+        "smc &lt; pid", "holds", 'class="card"', "the answer drawn", "two courses", "the angle", ">All<", "Folded",
         "comes &lt;second&gt;", "a early", "alone", "drawn later",
     ]  # fmt: skip
     places = [text.index(mark) for mark in order]
-    assert places == sorted(places) and "<summary>Folded</summary>" in text and "<summary>All</summary>" not in text
+    assert places == sorted(places) and "<summary>Folded (1 row)</summary>" in text and "<summary>All" not in text
     assert f"wristctl runs report --all-figures {run.id}" in text
     assert [name for name, *_ in figures(run)] == ["first", "b-late", "a-early", "overlay-ideal", "angle", "alone"]
 
@@ -109,7 +110,7 @@ def test_the_badge_is_the_verdict_and_ok_only_where_nothing_is_wrong(tmp_path: P
 def test_an_overview_that_cannot_be_read_costs_nothing(tmp_path: Path, content: str) -> None:
     run = made(tmp_path, {"rmse": 1.0})
     (run.path / OVERVIEW).write_text(content)
-    assert read_overview(run.path) == Overview() and cards(run) == [("rmse", "1")]
+    assert read_overview(run.path) == Overview() and cards(run) == [("RMSE", "1")]
 
 
 def test_all_metrics_stand_in_a_table_with_unit_direction_and_meaning(tmp_path: Path) -> None:
@@ -126,7 +127,7 @@ def test_angles_are_in_degrees_in_cards_and_metrics_and_nothing_else_is(tmp_path
     ):
         run = made(tmp_path / shown.replace("/", ""), {"rmse": 0.25}, unit)
         text = page_of(run)
-        assert cards(run) == [("rmse", f"{0.25 * factor:.4g}")] and f"<small>{shown}</small>" in text
+        assert cards(run) == [("RMSE", f"{0.25 * factor:.4g}")] and f"<small>{shown}</small>" in text
         assert ["rmse", f"{0.25 * factor:.4g}", shown, "lower", "1", "says rmse"] in rows(text)
         assert run.metrics["rmse"]["value"] == 0.25
 
@@ -146,6 +147,69 @@ def test_an_answer_is_paragraphs_a_table_by_its_rule_and_commands_to_copy() -> N
     assert command == {"kind": "command", "text": "wristctl tune a.yaml --set x=1"}
     assert more["text"] == "See report.html." and blocks([]) == [] and blocks(["", " "]) == []
     assert blocks(["a: 1", "    b"]) == [{"kind": "lines", "text": "a: 1\n    b"}], "indented lines stay lines"
+
+
+def test_heads_in_several_lines_are_those_of_one_table() -> None:
+    lines = ["             feedforward's", "controller   [deg]", "----------  --------------", "pid-ff      0.22"]
+    (table,) = blocks(lines)
+    assert table == {"kind": "table", "columns": ["controller", "feedforward's [deg]"], "rows": [["pid-ff", "0.22"]]}
+
+
+def test_a_page_shows_no_option_of_the_command_line_in_its_answer_or_titles(tmp_path: Path) -> None:
+    told = [
+        "It follows.",
+        "",
+        "All tables: --all. The gains, each a file:",
+        "/x/gains/",
+        "",
+        "Every rank: `--all`, or",
+        "/x/report.html.",
+    ]
+    stored = [{"title": "Ranks; ideal and push: --all", "columns": ["a"], "rows": [[1.0]]}]
+    run = made(tmp_path, {"rmse": 1.0}, tables=stored)
+    (run.path / OVERVIEW).write_text(Overview(told).text())
+    text = page_of(run)
+    answer = text[text.index('<section id="answer">') : text.index("<section", text.index('id="answer"'))]
+    assert re.findall(r"<p.*?>(.*?)</p>", answer) == ["It follows.", "The gains, each a file: /x/gains/"]
+    assert ">Ranks</caption>" in text
+
+
+def test_a_table_of_the_answer_stands_once_and_a_long_one_is_folded(tmp_path: Path) -> None:
+    answered = Answer("It follows.", Table("", ("who", "error [deg]"), [("a", 0.123456), ("b", 2.0)]), [], "")
+    stored: list[dict[str, Any]] = [
+        {"title": "", "columns": ["who", "error [deg]"], "rows": [["a", 0.123456], ["b", 2.0]]},
+        {"title": "Others", "columns": ["who", "tension [N]"], "rows": [["a", 7.25], ["b", 3.0]]},
+        {"title": "Long", "columns": ["k"], "rows": [[k] for k in range(13)]},
+    ]
+    run = made(tmp_path, {}, tables=stored)
+    (run.path / OVERVIEW).write_text(Overview(answered.lines()).text())
+    text = page_of(run)
+    assert [row for row in rows(text) if row and row[0] == "a"] == [["a", "0.1235"], ["a", "7.25"]]
+    assert "<summary>Long (13 rows)</summary>" in text
+    (run.path / OVERVIEW).write_text(Overview(["It follows."]).text())
+    assert ["b", "2"] in rows(page_of(run)), "what the answer lacks stands below"
+
+
+def test_errors_of_the_angle_come_before_delays_at_the_head_of_a_page(tmp_path: Path) -> None:
+    with start_run("hw-run", Study(), "", tmp_path) as live:
+        for name, unit, better in (("late", "s", "lower"), ("angle", "rad", ""), ("rmse", "rad", "lower")):
+            live.metric(name, 0.5, unit, better)  # type: ignore[arg-type]
+    assert [name for name, _ in cards(Run(live.path))] == ["RMSE", "late"]
+
+
+def test_a_run_that_stopped_has_no_metrics_at_its_head(tmp_path: Path) -> None:
+    run = made(tmp_path, {"late": 1.0})
+    assert cards(run) == [("late", "1")]
+    run.manifest.state = "interrupted"
+    assert cards(run) == []
+
+
+def test_an_angle_that_nobody_can_measure_is_small_in_every_place(tmp_path: Path) -> None:
+    stored = [{"title": "T", "columns": ["metric", "value", "unit"], "rows": [["x", 1e-17, "rad"], ["y", 1e-17, "N"]]}]
+    run = made(tmp_path, {"rmse": 1e-17}, "rad", tables=stored)
+    assert cards(run) == [("RMSE", "&lt;0.001")]
+    found = rows(page_of(run))
+    assert ["x", "&lt;0.001", "deg"] in found and ["y", "1e-17", "N"] in found
 
 
 def test_cells_are_words_whole_numbers_four_digits_or_a_dash(tmp_path: Path) -> None:
@@ -237,10 +301,12 @@ def test_several_runs_are_told_apart_from_the_first_in_columns_of_their_own(tmp_
     text = several_page(runs)
     found = rows(text)
     assert ["train.epochs", "5", "6", "5"] in found and ["train.learning_rate", "0.1", "0.1", "0.2"] in found
-    assert ["rmse", "5", "6", "5"] in found
-    assert 0 < text.index(">Configuration<") < text.index(">Metrics<")
+    assert ["RMSE", "deg", *(f"{np.degrees(value):.4g}" for value in (5, 6, 5))] in found
+    assert (
+        0 < text.index(">What differs<") < text.index(">Settings<") < text.index(">Metrics<") < text.index(">Findings<")
+    )
     assert f"{runs[0].id} | n1 | n2" in text
-    assert [row[0] for row in found[:4] if row] == [run.id for run in runs], "one row each"
+    assert [row[:2] for row in found if row][-3:] == [[name, run.id] for name, run in zip("ABC", runs, strict=True)]
     assert [shown(url) for url in re.findall(r'src="(data:image/svg[^"]*)"', text)] == [
         "<svg >0</svg>",
         "<svg >1</svg>",

@@ -16,7 +16,8 @@ from tests.plotting.test_spatial_view import course, run_of
 from wristctl.commands.export.run_data import export_run
 from wristctl.errors import UserError
 from wristctl.identification.rig_trend import reading_of
-from wristctl.plotting.page import page, several_page
+from wristctl.plotting.page import page
+from wristctl.plotting.several_page import several_page
 from wristctl.records import Run
 from wristctl.records.manifest import MANIFEST, SUMS
 from wristctl.records.seal import CHANGED, write_seal

@@ -69,8 +69,7 @@ def lazy_group(commands: Mapping[str, Entry]) -> type[TyperGroup]:
 _EXAMPLES = """Examples:
 wristctl init my-wrist
 wristctl simulate --controller smc --gains exchanged
-wristctl compare pid-ff adrc ct-dob
-wristctl compare --help"""
+wristctl compare pid-ff adrc ct-dob"""
 
 
 app = typer.Typer(cls=lazy_group(COMMANDS), epilog=_EXAMPLES, context_settings={"help_option_names": ["-h", "--help"]})

@@ -225,6 +225,7 @@ COMMANDS = {
     "list": Entry(
         "wristctl.cli.list_choices:app", _MORE, "List controllers, presets, references, conditions or metrics."
     ),
+    "schema": Entry("wristctl.cli.schema:app", _MORE, "Print the JSON schema of study files, for editors."),
     "export-model": Entry(
         "wristctl.cli.export_model:app", _MORE, "Write the wrist of a run for MuJoCo, MATLAB or as URDF."
     ),

@@ -1,5 +1,6 @@
 """`wristctl new`, `init`, `check-controller` and `check-rig`: files of your own to begin from, and these checked."""
 
+import json
 import keyword
 import os
 import re
@@ -23,6 +24,7 @@ from wristctl.plugins.places import placed
 from wristctl.plugins.trust import asking
 from wristctl.records.files import write_text
 from wristctl.records.manifest import README
+from wristctl.study_files.json_schema import NAMED, SCHEMA_FILE, study_schema
 from wristctl.study_files.load import load_study
 from wristctl.study_files.shipped import EXPERIMENTS, shipped
 
@@ -86,7 +88,7 @@ def init(
 ) -> None:
     """Begin a folder for a wrist of your own: mywrist.yaml with its values, and studies and laws to change."""
     to = folder / EXPERIMENTS
-    for place in (to, folder / _WRIST, folder / README):
+    for place in (to, folder / _WRIST, folder / README, folder / SCHEMA_FILE):
         if os.path.lexists(place):
             raise UserError("this is there already, and it may be changed", str(place), "another folder")
     with writing(to, Argument("folder", metavar="DIR", positional=True)):
@@ -99,9 +101,11 @@ def init(
             templates = files("wristctl.cli") / "templates"
             for name in (_WRIST, README):
                 text = (templates / f"{name}.txt").read_text(encoding="utf-8")
-                (Path(scratch) / name).write_text(text.replace("@commands@", "\n".join(_AFTER_INIT)), encoding="utf-8")
+                text = text.replace("@commands@", "\n".join(_AFTER_INIT)).replace("@schema@", NAMED)
+                (Path(scratch) / name).write_text(text, encoding="utf-8")
+            (Path(scratch) / SCHEMA_FILE).write_text(json.dumps(study_schema(), indent=1) + "\n", encoding="utf-8")
             copies.rename(to)
-            for name in (_WRIST, README):
+            for name in (_WRIST, README, SCHEMA_FILE):
                 (Path(scratch) / name).rename(folder / name)
     say(f"{folder / _WRIST} is written: put the values of your wrist in. Then:")
     for line in (f"cd {shlex.quote(str(folder))}", *_AFTER_INIT):

@@ -1,4 +1,4 @@
-"""Results as text: aligned tables for people, plain values for programs, LaTeX for papers, and sentences in lines."""
+"""Results as text: aligned tables for people, plain values for programs, and sentences in lines."""
 
 from __future__ import annotations
 
@@ -111,39 +111,6 @@ def _blocks(widths: Sequence[int], width: int | None) -> list[list[int]]:
         blocks[-1].append(index)
         used += 2 + widths[index]
     return blocks
-
-
-def latex_table(table: Table) -> str:
-    """A table for the packages booktabs and caption, numbers to four digits and aligned to the right.
-
-    One that is wider than an answer is scaled to the width of the text (package graphicx).
-    """
-    import pandas as pd
-
-    columns = [printable(column) for column in table.columns]
-    cells = [[_latex_cell(value) for value in row] for row in table.rows]
-    numeric = [not any(isinstance(row[index], str | bool) for row in table.rows) for index in range(len(columns))]
-    styled = pd.DataFrame(cells, columns=columns).style.hide(axis="index").format(escape="latex")
-    styled = styled.format_index(escape="latex", axis="columns")
-    aligned = "".join("r" if is_number else "l" for is_number in numeric)
-    caption = escaped(printable(table.title)) or None
-    text: str = styled.to_latex(
-        column_format=aligned, hrules=True, caption=caption, position_float="centering" if caption else None
-    )
-    if len(table.text().split("\n", 2 * bool(table.title) + 1)[-1].split("\n", 1)[0]) > COLUMNS:
-        text = text.replace(r"\begin{tabular}", r"\resizebox{\textwidth}{!}{%" "\n" r"\begin{tabular}")
-        text = text.replace(r"\end{tabular}", r"\end{tabular}}")
-    for character in "<>":  # which print as others in LaTeX's first encoding
-        text = text.replace(character, _ESCAPED[character])
-    return text.rstrip()
-
-
-def _latex_cell(value: Any) -> str:
-    if value is None:
-        return "-"
-    if isinstance(value, bool):
-        return "yes" if value else "no"
-    return printable(value) if isinstance(value, str) else number(float(value))
 
 
 _ESCAPED = {character: f"\\{character}" for character in "&%$#_{}"} | {

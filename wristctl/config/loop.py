@@ -180,6 +180,11 @@ class Reference(OpenSection):
         parameters: Mapping[str, Parameter] = REFERENCES[self.kind].parameters
         return parameters
 
+    @classmethod
+    def addable(cls) -> Mapping[str, Parameter]:
+        """Parameters of every reference."""
+        return {name: parameter for kind in REFERENCES for name, parameter in REFERENCES[kind].parameters.items()}
+
     def mirrored(self) -> Reference:
         """Reference with the same motion to the other side."""
         turned = {name: -self.value(name) for name, parameter in self.added().items() if parameter.mirrors}

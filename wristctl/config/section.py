@@ -4,8 +4,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, NamedTuple, Self
 
-from pydantic import BaseModel, ConfigDict, Field, GetCoreSchemaHandler, model_validator
+from pydantic import BaseModel, ConfigDict, Field, GetCoreSchemaHandler, GetJsonSchemaHandler, model_validator
 from pydantic.config import JsonDict
+from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 
 from wristctl.config.choices import Choices
@@ -44,6 +45,11 @@ class OneOf:
     def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
         """The string's schema, and then that the table has it; the error is that of a Literal."""
         return core_schema.no_info_after_validator_function(self.checked, handler(source))
+
+    def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchemaValue:
+        """The names of the table; a name in a file where it takes some from elsewhere."""
+        names: JsonSchemaValue = {"enum": self.table.known()}
+        return {"anyOf": [names, {"type": "string", "pattern": r"\.py:[A-Za-z_]\w*$"}]} if self.table.group else names
 
     def checked(self, name: str) -> str:
         """The name, where the table has it; PydanticCustomError where not."""
@@ -90,6 +96,22 @@ class OpenSection(Section):
     def added(self) -> Mapping[str, Parameter]:
         """Parameters that entries of the table add to this section, by name."""
         raise NotImplementedError
+
+    @classmethod
+    def __get_pydantic_json_schema__(cls, schema: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchemaValue:
+        """The declared leaves, and the parameters that may be added, of whichever entries."""
+        shown = handler(schema)
+        place = handler.resolve_ref_schema(shown)
+        place["additionalProperties"] = False
+        for name, parameter in cls.addable().items():
+            described = {"type": "number", "default": parameter.default, "description": parameter.meaning}
+            place["properties"].setdefault(name, described | {"unit": parameter.unit})
+        return shown
+
+    @classmethod
+    def addable(cls) -> Mapping[str, Parameter]:
+        """Parameters that entries of the table may add to some section of this kind, by name."""
+        return cls().added()
 
     def value(self, name: str) -> float:
         """Value of an added parameter, or its default."""

@@ -17,8 +17,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 from wristctl.escape import printable, printable_lines
 from wristctl.plain_files import read_plain, unreadable
 from wristctl.plotting.animation import animation
-from wristctl.plotting.page_tables import in_degrees, shown_tables
-from wristctl.records.difference import difference
+from wristctl.plotting.page_tables import in_degrees, in_words, shown_tables
 from wristctl.records.lineage import Ancestor, ancestry
 from wristctl.records.manifest import CONFIG, Manifest, read_overview
 from wristctl.records.run import Run
@@ -109,7 +108,7 @@ _RULE = re.compile(r"-+(  -+)*")
 def blocks(lines: Sequence[str]) -> list[dict[str, Any]]:
     """The blocks of an answer, which empty lines part: a `table`, a `command`, `lines` as they are, or `text`.
 
-    An aligned table's columns are those of the rule below its heads.
+    An aligned table's columns are those of the rule below its heads, which may be broken into lines.
     """
     parts: list[list[str]] = [[]]
     for line in lines:
@@ -121,15 +120,51 @@ def blocks(lines: Sequence[str]) -> list[dict[str, Any]]:
 
 
 def _block(part: Sequence[str]) -> dict[str, Any]:
-    if len(part) > 1 and _RULE.fullmatch(part[1]):
-        starts = [0, *(space.end() for space in re.finditer(" +", part[1]))]
+    rule = next((at for at, line in enumerate(part[1:], start=1) if _RULE.fullmatch(line)), None)
+    if rule:
+        starts = [0, *(space.end() for space in re.finditer(" +", part[rule]))]
         spans = list(zip(starts, [*starts[1:], None], strict=True))
-        heads, _, *rows = [[line[start:end].strip() for start, end in spans] for line in part]
-        return {"kind": "table", "columns": heads, "rows": rows}
+        cells = [[line[start:end].strip() for start, end in spans] for line in part]
+        heads = [" ".join(filter(None, words)) for words in zip(*cells[:rule], strict=True)]
+        return {"kind": "table", "columns": heads, "rows": cells[rule + 1 :]}
     if len(part) == 1 and part[0].startswith("wristctl "):
         return {"kind": "command", "text": part[0]}
     as_is = any(line.startswith(" ") for line in part)
     return {"kind": "lines" if as_is else "text", "text": "\n".join(part) if as_is else " ".join(part)}
+
+
+# What only a terminal's reader can use: options, and the name of the page itself.
+_OPTION = re.compile(r"--all\b|report\.html")
+_SENTENCE = re.compile(r"(?<=[.!?:;])\s+(?=[A-Z])")
+_IN_A_TITLE = re.compile(r"; [^;]*: --all$")
+
+
+def for_a_page(answer: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
+    """The blocks of an answer without sentences on options of the command line, all of which the page shows."""
+    shown = []
+    for block in answer:
+        if block["kind"] in ("text", "lines") and _OPTION.search(block["text"]):
+            kept = [part for part in _SENTENCE.split(block["text"]) if not _OPTION.search(part)]
+            block = block | {"text": " ".join(kept)}
+        if block.get("text", True):
+            shown.append(block)
+    return shown
+
+
+def without_options(table: dict[str, Any]) -> dict[str, Any]:
+    """The table with a title that names no option."""
+    return table | {"title": _IN_A_TITLE.sub("", table["title"])}
+
+
+def _stands_in(answer: Sequence[dict[str, Any]], table: dict[str, Any]) -> bool:
+    """Whether the answer holds the table: the same heads, and in each row the same first cell."""
+    firsts = [str(row[0]) for row in table["rows"] if row]
+    return any(
+        block["kind"] == "table"
+        and block["columns"] == [str(head) for head in table["columns"]]
+        and [row[0] for row in block["rows"]] == firsts
+        for block in answer
+    )
 
 
 _LEAST_DEG = 1e-3
@@ -168,6 +203,7 @@ def page(run: Run, manifest: Manifest, beside: Path | None = None, undrawn: Undr
             return default
 
     overview, drawn = read_overview(run.path), figures(run, beside)
+    answer = for_a_page(blocks(overview.answer))
     known = {*(name for name, *_ in drawn), *(name.removeprefix("figure ") for name in manifest.undrawn)}
     moving = part("the animation", lambda: animation(run), None)
     space = part("the view in space", lambda: _in_space(run), None)
@@ -180,10 +216,10 @@ def page(run: Run, manifest: Manifest, beside: Path | None = None, undrawn: Undr
         manifest=manifest,
         command=command_of(manifest.kind),
         verdict=", ".join(overview.marks) if manifest.state == "ok" else "",
-        answer=blocks(overview.answer),
-        headline=_headline(run.metrics, overview.cards),
+        answer=answer,
+        headline=_headline(run.metrics, overview.cards, manifest.state == "ok"),
         metrics=_metrics(run),
-        tables=results,
+        tables=[without_options(table) for table in results if not _stands_in(answer, table)],
         figures=[picture for picture in drawn if picture not in first],
         first=first,
         later=[caption or name for name, caption in overview.captions.items() if name not in known],
@@ -218,7 +254,7 @@ def _templates() -> Environment:
     environment = Environment(
         loader=FileSystemLoader(folder), autoescape=True, trim_blocks=True, lstrip_blocks=True, finalize=_shown
     )
-    environment.filters["cell"] = _cell
+    environment.filters["cell"], environment.filters["words"] = _cell, in_words
     scripts = [environment.get_template(script.name).render().encode() for script in sorted(folder.glob("*.js"))]
     hashes = [base64.b64encode(hashlib.sha256(script).digest()).decode() for script in scripts]
     environment.globals["allowed"] = " ".join(
@@ -244,7 +280,7 @@ def _shown(value: Any) -> Any:
 
 def _cell(value: Any, head: Any = "") -> str:
     """A cell for a person, below its column's head: an angle that nobody can measure is one of less than 0.001 deg."""
-    if isinstance(value, float) and str(head).endswith("[deg]") and 0.0 < abs(value) < _LEAST_DEG:
+    if isinstance(value, float) and str(head).endswith(("[deg]", "[deg s]")) and 0.0 < abs(value) < _LEAST_DEG:
         return f"<{_LEAST_DEG:g}"
     if value is None:
         return "-"
@@ -255,11 +291,20 @@ def _cell(value: Any, head: Any = "") -> str:
     return str(value)
 
 
-def _headline(metrics: dict[str, dict[str, Any]], cards: Sequence[str]) -> list[tuple[str, dict[str, Any]]]:
-    """The metrics that the command chose; where it chose none, the first that may be better or worse."""
+def _headline(
+    metrics: dict[str, dict[str, Any]], cards: Sequence[str], ended: bool
+) -> list[tuple[str, dict[str, Any]]]:
+    """The metrics that the command chose; where a run that ended ok chose none, the first that may be better or worse.
+
+    Of these errors of the angle come first, for they say how well the wrist was controlled.
+    What stopped before it chose has no result: its metrics are of how it went.
+    """
     with_value = {name: metric for name, metric in metrics.items() if metric["value"] is not None}
     chosen = [name for name in cards if name in with_value]
-    chosen = chosen or [name for name, metric in with_value.items() if metric.get("better")] or list(with_value)
+    if not (chosen or ended):
+        return []
+    judged = [name for name, metric in with_value.items() if metric.get("better")]
+    chosen = chosen or sorted(judged, key=lambda name: with_value[name].get("unit") != "rad") or list(with_value)
     return [(name, _for_people(with_value[name])) for name in chosen[:_CARDS]]
 
 
@@ -291,52 +336,3 @@ def _provenance(manifest: Manifest) -> list[tuple[str, str]]:
         ("numerics", ", ".join(f"{name} {value}" for name, value in manifest.numerics.items()) or "-"),
         ("memory, processor time", f"{manifest.timing.max_rss_mb or 0:.0f} MB, {manifest.timing.cpu_s or 0:.1f} s"),
     ]
-
-
-_TITLES = {
-    "config": "Configuration",
-    "metrics": "Metrics",
-    "code": "Code",
-    "environment": "Environment",
-    "inputs": "Inputs",
-}
-
-
-def several_page(runs: list[Run]) -> str:
-    """The page of several runs, each of them against the first."""
-    rows = [(run.id, run.kind, run.state, run.manifest.timing.started[:19], run.manifest.timing.wall_s) for run in runs]
-    return render(
-        "several.html",
-        heading=" | ".join(run.manifest.label or run.id for run in runs),
-        runs=runs,
-        rows=rows,
-        differences=_differences(runs),
-        pictures=_pictures(runs),
-    )
-
-
-def _differences(runs: list[Run]) -> list[dict[str, Any]]:
-    """A table for each part that differs: a row per leaf or metric, a column per run."""
-    first, *later_runs = runs
-    differences = [vars(difference(first, later_run)) for later_run in later_runs]
-    tables = []
-    for part, title in _TITLES.items():
-        names = list(dict.fromkeys(change.name for parts in differences for change in parts[part]))
-        rows = []
-        for name in names:
-            changes = [next((change for change in parts[part] if change.name == name), None) for parts in differences]
-            before = next(change.before for change in changes if change)
-            values = [before, *(change.after if change else before for change in changes)]
-            rows.append((name, *(value if part == "metrics" else str(value) for value in values)))
-        if rows:
-            tables.append({"title": title, "columns": ["what", *(run.id for run in runs)], "rows": rows})
-    return tables
-
-
-def _pictures(runs: list[Run]) -> list[tuple[str, Figures]]:
-    """The figures by name, each with one picture per run that has it."""
-    pictures: dict[str, Figures] = {}
-    for run in runs:
-        for _, caption, picture in figures(run):
-            pictures.setdefault(caption, []).append((run.id, run.id, picture))
-    return list(pictures.items())

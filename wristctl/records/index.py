@@ -40,6 +40,12 @@ class IndexEntry:
     about: str = ""
     chief: str = ""
     """The metric that heads its page."""
+    answer: str = ""
+    """First sentence of its answer."""
+    marks: list[str] = field(default_factory=list)
+    """Why a run that ended ok is no good, in a word or two each."""
+    figure: str = ""
+    """Name of the figure that goes with the answer."""
 
     def value(self, name: str) -> Any:
         """A metric, or one of the entry's own fields; None where it has neither."""
@@ -95,8 +101,9 @@ def _remembered(old: list[Any], name: str) -> IndexEntry | None:
     """Entry of a run as the index remembers it. None where that entry is invalid."""
     try:
         entry = IndexEntry(**old[1])
-        texts = (entry.id, entry.kind, entry.label, entry.state, entry.started, entry.note, entry.about, entry.chief)
-        lists = [*entry.inputs, *entry.tags, *entry.metrics]
+        texts = [entry.id, entry.kind, entry.label, entry.state, entry.started, entry.note, entry.about, entry.chief]
+        texts += [entry.answer, entry.figure]
+        lists = [*entry.inputs, *entry.tags, *entry.metrics, *entry.marks]
         numbers = [value for value in (entry.wall_s, *entry.metrics.values()) if value is not None]
         fits = all(isinstance(text, str) for text in (*texts, *lists)) and entry.id == name
         return entry if fits and all(isinstance(value, int | float) for value in numbers) else None
@@ -129,6 +136,9 @@ def _entry(run: Run) -> IndexEntry:
         inputs,
         about=manifest.about,
         chief=next(iter(overview.cards), ""),
+        answer=overview.sentence,
+        marks=overview.marks,
+        figure=overview.figure or next(iter(overview.captions), ""),
     )
 
 
@@ -161,8 +171,17 @@ def _read_index(results: Path) -> dict[str, Any]:
 
 
 def _write_index(results: Path, runs: dict[str, Any]) -> None:
-    """Replace the index; a folder that cannot be written does without. Several may list at once: each its own file."""
-    text = json.dumps({"schema": _SCHEMA, "fields": list(IndexEntry.__dataclass_fields__), "runs": runs})
+    """Replace the index."""
+    write_beside(
+        results, INDEX, json.dumps({"schema": _SCHEMA, "fields": list(IndexEntry.__dataclass_fields__), "runs": runs})
+    )
+
+
+def write_beside(results: Path, name: str, text: str) -> None:
+    """Replace a file of a results folder that may be deleted at any time; a folder that cannot be written does without.
+
+    Several may write at once: each has a temporary file of its own.
+    """
     with suppress(OSError):
         descriptor, temporary = tempfile.mkstemp(prefix=TEMPORARY, dir=results)
         try:
@@ -171,6 +190,6 @@ def _write_index(results: Path, runs: dict[str, Any]) -> None:
                 file.write(text)
                 file.flush()
                 os.chmod(temporary, stat.S_IMODE(os.stat(results).st_mode) & 0o666)  # whoever may read the folder
-                os.replace(temporary, results / INDEX)
+                os.replace(temporary, results / name)
         except OSError:
             os.unlink(temporary)

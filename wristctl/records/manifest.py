@@ -4,9 +4,11 @@ What others act on (ids, kinds, roles, hashes, names of files) has one form, and
 """
 
 import json
+import re
 import shlex
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field
+from itertools import takewhile
 from pathlib import Path, PurePosixPath
 from typing import Annotated, Any, Literal
 
@@ -190,6 +192,12 @@ class Overview:
     """Caption of each figure by name, in reading order. It includes figures that were not drawn."""
     marks: list[str] = field(default_factory=list)
     """Why a run that was done is no good, in a word or two each; empty where it is sound."""
+
+    @property
+    def sentence(self) -> str:
+        """First sentence of the answer; empty without an answer."""
+        first = " ".join(takewhile(str.strip, self.answer))
+        return re.split(r"(?<=[.!?])\s", first, maxsplit=1)[0]
 
     def text(self) -> str:
         """As the file holds it."""

@@ -2,15 +2,17 @@
 
 import typer
 
-from wristctl.cli.runs.drawing import export, figures, report, table
+from wristctl.cli.runs.drawing import cite, export, figures, table
 from wristctl.cli.runs.housekeeping import gc, pack, rm, unpack
 from wristctl.cli.runs.listing import diff, lineage, ls, show, tag
+from wristctl.cli.runs.pages import report, serve
 from wristctl.cli.runs.trend import trend
 from wristctl.cli.runs.verification import replay, sign, verify
 
 app = typer.Typer(help="Find, compare, verify and repeat runs.", no_args_is_help=True, add_completion=False)
 
 for verb in (
-    ls, show, lineage, diff, trend, verify, sign, replay, report, figures, table, export, pack, unpack, tag, rm, gc,
+    ls, show, lineage, diff, trend, verify, sign, replay, report, serve, figures, table, cite, export, pack,
+    unpack, tag, rm, gc,
 ):  # fmt: skip
     app.command(verb.__name__)(verb)

@@ -1,6 +1,5 @@
-"""`wristctl runs report`, `figures`, `table` and `export`."""
+"""`wristctl runs figures`, `table`, `cite` and `export`."""
 
-import hashlib
 import logging
 import re
 from collections.abc import Callable, Collection, Iterable, Sequence
@@ -12,14 +11,13 @@ from typing import Annotated, Literal
 import typer
 
 from wristctl.cli.command import asked_to_trust
-from wristctl.cli.options import RESULTS, Debug, Out, Quiet, Ref, Refs, TrustCode
+from wristctl.cli.options import RESULTS, Debug, Out, Quiet, Ref, TrustCode
 from wristctl.cli.output import say
 from wristctl.cli.progress import Terminal, listening, progress
 from wristctl.commands.progress import no_event
 from wristctl.errors import TO, Argument, UserError, meant, reason_of, writing
 from wristctl.plugins.trust import asking
 from wristctl.records import Run, open_run
-from wristctl.records.files import write_text
 from wristctl.records.index import DRAWN
 from wristctl.records.manifest import read_overview
 
@@ -54,40 +52,6 @@ def _draw(names: Sequence[str], write: Callable[[str], None], console: Terminal,
                 failed.append(name)
             advance(count)
     return failed
-
-
-def report(
-    refs: Refs,
-    out: Out = RESULTS,
-    to: Annotated[Path | None, typer.Option("--to", help="The file to write; by default beside the runs.")] = None,
-    all_figures: Annotated[
-        bool, typer.Option("--all-figures", help="Draw those too that the run left for later, into a folder beside it.")
-    ] = False,
-    trust_code: TrustCode = False,
-    quiet: Quiet = False,
-    debug: Debug = False,
-) -> None:
-    """Write a page about one run, or about several beside each other: one HTML file that needs no network.
-
-    Where the folder of the runs cannot be written to, the page goes to the working directory.
-    """
-    from wristctl.plotting.page import page, several_page
-
-    runs = [open_run(ref, out) for ref in refs]
-    name = hashlib.sha256(" ".join(run.id for run in runs).encode()).hexdigest()[:6]
-    file = to or runs[0].path.parent / f"report-{runs[0].id if len(runs) == 1 else name}.html"
-    with asking(partial(asked_to_trust, trust_code)):
-        drawn = draw_later(runs[0], quiet) if all_figures and len(runs) == 1 else None
-        text = page(runs[0], runs[0].manifest, drawn) if len(runs) == 1 else several_page(runs)
-    try:
-        write_text(file, text, TO)
-    except UserError as error:
-        if to:
-            raise
-        _log.warning("%s (%s): the page is written here", error.what, error.where)
-        file = Path(file.name)
-        write_text(file, text)
-    say(file)
 
 
 class FigureFormat(StrEnum):
@@ -159,12 +123,15 @@ def table(
     number: Annotated[
         list[int] | None, typer.Option("--table", "-n", help="Which of its tables, from 1; repeatable. All where none.")
     ] = None,
-    latex: Annotated[bool, typer.Option("--latex", help="As LaTeX, for booktabs.")] = False,
+    latex: Annotated[
+        bool, typer.Option("--latex", help="As LaTeX, a column wide: booktabs, siunitx, array, graphicx.")
+    ] = False,
     out: Out = RESULTS,
     debug: Debug = False,
 ) -> None:
     """Print the tables of a run, angles in degrees: all that the command printed or kept back."""
-    from wristctl.commands.printed_table import latex_table, table_for_people
+    from wristctl.cli.runs.latex import latex_table
+    from wristctl.commands.printed_table import table_for_people
     from wristctl.plotting.page_tables import tables
 
     run = open_run(ref, out)
@@ -174,8 +141,21 @@ def table(
     for position in number or ():
         if not 1 <= position <= len(run_tables):
             raise UserError(f"no table {position}", str(run.path), f"1 to {len(run_tables)}")
-    chosen = [run_tables[position - 1] for position in number] if number else run_tables
-    print("\n\n".join(latex_table(chosen_table) if latex else chosen_table.text() for chosen_table in chosen))
+    positions = number or range(1, len(run_tables) + 1)
+    caption = f"{run.kind}: run {run.id}"
+    texts = [
+        latex_table(chosen, f"{run.kind}-{position}", caption) if latex else chosen.text()
+        for position in positions
+        for chosen in [run_tables[position - 1]]
+    ]
+    print("\n\n".join(texts))
+
+
+def cite(ref: Ref, out: Out = RESULTS, debug: Debug = False) -> None:
+    """Print BibTeX of a run, by its id and the hash of its result, and of wristctl."""
+    from wristctl.cli.runs.latex import bibtex
+
+    print(bibtex(open_run(ref, out).manifest))
 
 
 def export(

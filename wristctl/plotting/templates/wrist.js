@@ -2,7 +2,7 @@
 // Plays the wrist's bending from the logged segment angles; x along the base goes up, +y to the right, lengths in mm.
 {
   const { wrist, step, duration, courses } = JSON.parse(document.getElementById("courses").textContent);
-  const UNIT = 1e-4, SPACE = "http://www.w3.org/2000/svg", GREY = "#7F7F7F", PLOT = 34;
+  const UNIT = 1e-4, SPACE = "http://www.w3.org/2000/svg", GREY = "#7F7F7F", WIDE = 600, HIGH = 200, EDGE = 8;
   const length = 1e3 * wrist.length, rim = 1250 * wrist.radius, reach = length + 2e3 * wrist.hand, half = 0.72 * reach;
   const groups = document.getElementById("group"), place = document.getElementById("wrists");
   let panels = [];
@@ -45,8 +45,9 @@
     const box = document.createElement("div"), title = document.createElement("p"), said = document.createElement("p");
     box.dataset.course = course.name;
     title.textContent = course.name;
-    const height = reach + 20 + PLOT + 8, svg = element("svg", { viewBox: `${-half} ${-reach - 6} ${2 * half} ${height}`, role: "img", "aria-label": course.name });
-    const part = style => svg.appendChild(element("path", { fill: "none", "stroke-linejoin": "round", ...style }));
+    const height = reach + 20, svg = element("svg", { viewBox: `${-half} ${-reach - 6} ${2 * half} ${height}`, role: "img", "aria-label": course.name });
+    const plot = element("svg", { viewBox: `0 0 ${WIDE} ${HIGH}`, preserveAspectRatio: "none", "aria-hidden": "true" });
+    const part = (style, into = svg) => into.appendChild(element("path", { fill: "none", "stroke-linejoin": "round", ...style }));
     const shapes = {
       hand: part({ stroke: course.colour, "stroke-width": 1.5 * rim, "stroke-opacity": 0.18, "stroke-linecap": "round" }),
       wanted: part({ stroke: GREY, "stroke-width": 1.5, "stroke-dasharray": "4 3" }),
@@ -57,15 +58,18 @@
     const sums = course.theta.map(angles => angles.reduce((a, b) => a + b, 0));
     const all = [...course.wanted, ...course.wanted.map(angle => 1.5 * angle), 0];
     const low = Math.min(...all), high = Math.max(...all, low + 1);
-    const across = k => -half + 4 + (2 * half - 8) * k * step / duration;
-    const up = angle => 16 + PLOT * (1 - (Math.max(low, Math.min(high, angle)) - low) / (high - low));
+    const across = k => EDGE + (WIDE - 2 * EDGE) * k * step / duration;
+    const up = angle => EDGE + (HIGH - 2 * EDGE) * (1 - (Math.max(low, Math.min(high, angle)) - low) / (high - low));
     const curve = angles => line(angles.map((angle, k) => `${across(k).toFixed(1)} ${up(angle).toFixed(1)}`));
-    part({ stroke: GREY, "stroke-dasharray": "4 3", "stroke-width": 1, d: curve(course.wanted) });
-    part({ stroke: course.colour, "stroke-width": 1.5, d: curve(sums.length ? sums : [0]) });
-    const cursor = part({ stroke: "#000", "stroke-width": 0.8 });
+    part({ stroke: GREY, "stroke-dasharray": "4 3", "stroke-width": 1, d: curve(course.wanted) }, plot);
+    part({ stroke: course.colour, "stroke-width": 1.5, d: curve(sums.length ? sums : [0]) }, plot);
+    const cursor = part({ stroke: "#000", "stroke-width": 1 }, plot);
     const drawn = document.createElement("div");
     drawn.className = "drawn";
-    drawn.append(svg);
+    const beside = document.createElement("div");
+    beside.className = "plot";
+    beside.append(plot);
+    drawn.append(svg, beside);
     box.append(title, drawn, said);
     place.append(box);
 
@@ -79,7 +83,7 @@
       shapes.hand.setAttribute("d", line([spot(tip, 0, 0.8 * rim), spot(tip, 0, Math.max(0.8 * rim, 2e3 * wrist.hand - 0.8 * rim))]));
       const goal = frames([wanted], 16);
       shapes.wanted.setAttribute("d", line([...goal.map(frame => spot(frame, 0)), spot(goal.at(-1), 0, 2e3 * wrist.hand)]));
-      cursor.setAttribute("d", `M${across(time / step)} 14V${20 + PLOT}`);
+      cursor.setAttribute("d", `M${across(time / step)} 0V${HIGH}`);
       const degrees = theta.reduce((a, b) => a + b, 0) * 180 / Math.PI;
       said.textContent = ended ? "diverged" : `${degrees.toFixed(1)}°, wanted ${(wanted * 180 / Math.PI).toFixed(1)}°`;
     };
