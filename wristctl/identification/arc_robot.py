@@ -10,6 +10,7 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
 
 from wristctl.arrays import Array
 from wristctl.wrist.quasistatic_arcs import SMOOTH, QuasistaticArcs
@@ -97,6 +98,8 @@ class ArcRobot:
     widest: float = 1.0
     """Half of a 95 % interval over the value, or over the unknown's usual change where it may be 0, beyond which it is
     not told; friction, presliding, creep, damping and inertia may be wider."""
+    untold: tuple[str, ...] = ()
+    """Unknowns that its data cannot tell."""
 
     @property
     def unit(self) -> str:
@@ -120,6 +123,8 @@ class ArcRobot:
 
     def is_told(self, name: str, value: float, half: float) -> bool:
         """Whether a 95 % interval of so much to either side is narrow enough to be told."""
+        if name in self.untold:
+            return False
         root = name if name in UNKNOWNS else name.rpartition("_")[0]
         unknown, share = UNKNOWNS[root], max(self.widest, _WIDE.get(root, 0.0))
         return half <= share * max(abs(value), unknown.scale if unknown.low <= 0.0 else 0.0)
@@ -250,9 +255,9 @@ class ArcRecording:
         return window_means(*self.course, self.time - delay, float(np.median(np.diff(self.time))))
 
     def later(self, coordinates: Array, delay: float) -> Array:
-        """Coordinates (T, N) as they are seen a delay [s] later."""
-        moved = [np.interp(self.time - delay, self.time, column) for column in coordinates.T]
-        return np.stack(moved, axis=1)
+        """Coordinates (T, N) as they are seen a delay [s] later: smooth, as lines make a quick motion smaller."""
+        at = np.clip(self.time - delay, self.time[0], self.time[-1])
+        return np.asarray(CubicSpline(self.time, coordinates)(at))
 
 
 def window_means(time: Array, values: Array, at: Array, width: float) -> Array:

@@ -66,7 +66,7 @@ def robot_of_logs(
     return ArcRobot(
         (wrist.length,), tuple(angles), radius, (1,) * len(numbers), measured, tuple(base),
         {"gain": 1.0, "turn": 0.0, "delay": 0.03, "inertia": _inertia(wrist)}, known_to, timed, wrist.discs - 1,
-        True, _SMOOTH, widest,
+        True, _SMOOTH, widest, ("delay",) if any(log.two_clocks for log in logs) else (),
     )  # fmt: skip
 
 

@@ -86,15 +86,23 @@ class ReadLogs(NamedTuple):
 
 
 def logs_of(study: Study) -> list[OpenLog]:
-    """The study's logs, read and looked at."""
+    """The study's logs, read and looked at; those of motors and motion in files of their own are joined."""
+    from wristctl.records.joined_logs import joined_logs
     from wristctl.records.log_converters import read_log
     from wristctl.records.log_looks import looked_at
     from wristctl.wrist.tendon_layout import TendonLayout
 
     settings = study.identify
-    offset, columns = TendonLayout.of(study.wrist).offset, settings.columns or ""
-    read = (read_log(Path(file), columns, "log", tendon_offset=offset) for file in settings.logs)
-    return [looked_at(log, tendon_offset=offset) for log in read]
+    offset, names = TendonLayout.of(study.wrist).offset, (settings.columns or "").split(";")
+    if len(names) not in (1, len(settings.logs)):
+        problem = f"names for {len(names)} logs, and there are {len(settings.logs)}"
+        raise UserError(problem, "identify.columns", "names for all of them, or with ; between those of each log")
+    names *= len(settings.logs) // len(names)
+    read = [
+        looked_at(read_log(Path(file), own.strip(), "log", tendon_offset=offset), tendon_offset=offset)
+        for file, own in zip(settings.logs, names, strict=True)
+    ]
+    return [looked_at(log, tendon_offset=offset) if log.two_clocks else log for log in joined_logs(read)]
 
 
 def _are_driven(logs: Sequence[OpenLog], study: Study) -> bool:
