@@ -241,7 +241,7 @@ def test_even_readings_are_fitted_as_they_are(every: int, instants: int) -> None
 @pytest.mark.parametrize(
     ("name", "value", "narrow", "wide"),
     [("gain", 1.0, 0.2, 0.9), ("tendon", 16.0, 3.9, 10.0), ("tendon", 2.0, 0.4, 3.0), ("damping", 0.2, 0.09, 0.12),
-     ("damping", 0.0, 0.02, 0.06), ("delay", 0.0, 4e-3, 0.02), ("friction", 0.0, 0.09, 0.2)],
+     ("damping", 0.0, 0.02, 0.06), ("delay", 0.0, 0.04, 0.06), ("friction", 0.0, 0.09, 0.2)],
 )  # fmt: skip
 def test_a_wide_interval_is_not_identified(name: str, value: float, narrow: float, wide: float) -> None:
     robot = robot_of_logs([planar()], WRIST, 0.01)

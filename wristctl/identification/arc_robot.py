@@ -61,7 +61,7 @@ OF_TERM: dict[Term, tuple[str, ...]] = {
 }
 """Unknowns that a term adds; slack adds a length for each tendon and session."""
 # Least half of an interval over the value, or over the usual change, beyond which an unknown is not told.
-_WIDE = {"damping": 0.5, "inertia": 0.5, "turn": 1.0} | dict.fromkeys(
+_WIDE = {"damping": 0.5, "inertia": 0.5, "turn": 1.0, "delay": 2.5} | dict.fromkeys(
     [name for term in OF_TERM.values() for name in term], 1.0
 )
 SLACK_ERROR = 3e-3
