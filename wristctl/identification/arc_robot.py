@@ -10,7 +10,6 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import CubicSpline
 
 from wristctl.arrays import Array
 from wristctl.wrist.quasistatic_arcs import SMOOTH, QuasistaticArcs
@@ -255,9 +254,9 @@ class ArcRecording:
         return window_means(*self.course, self.time - delay, float(np.median(np.diff(self.time))))
 
     def later(self, coordinates: Array, delay: float) -> Array:
-        """Coordinates (T, N) as they are seen a delay [s] later: smooth, as lines make a quick motion smaller."""
-        at = np.clip(self.time - delay, self.time[0], self.time[-1])
-        return np.asarray(CubicSpline(self.time, coordinates)(at))
+        """Coordinates (T, N) as they are seen a delay [s] later."""
+        moved = [np.interp(self.time - delay, self.time, column) for column in coordinates.T]
+        return np.stack(moved, axis=1)
 
 
 def window_means(time: Array, values: Array, at: Array, width: float) -> Array:
