@@ -137,6 +137,7 @@ def test_what_homing_has_found_is_kept_by_tendon_and_camera(whole: Whole) -> Non
 def test_its_open_log_is_one_that_identification_reads(whole: Whole) -> None:
     log = open_log_of(whole.run)
     assert {"time", "bend_y", "bend_z", *(f"spool_{tendon}" for tendon in ACTIVE)} <= set(log.columns)
+    assert all((np.diff(trial.columns["time"]) > 0.0).all() for trial in log.trials().values()), "a row for each time"
     trials = bend_trials([log], WristParameters(), 0.005)
     assert len(trials) == 2 and all(len(trial.angle) > 80 for trial in trials)
     assert {0, 1} == {int(channel) for trial in trials for channel in trial.channel}

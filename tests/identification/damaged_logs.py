@@ -433,7 +433,8 @@ def page(rows: Sequence[Mapping[str, Any]], sounds: Sequence[Mapping[str, Any]])
         "- **same**: nothing is said, and every parameter lies in the sound log's 95 % interval",
         "- **wider**: nothing is said; a parameter lies outside, and its own interval holds the sound log's value",
         "- **untold**: parameters that the sound log tells are *not identifiable*, and the others are the same",
-        "- **wrong**: nothing is said, and a parameter is told whose interval misses the sound log's value", "",
+        "- **wrong**: nothing is said, and a parameter is told whose interval misses the sound log's value;",
+        "  noise alone makes one interval of 95 % in twenty miss", "",
         f"| damage | {' | '.join(VERDICTS)} |", "|---" * (1 + len(VERDICTS)) + "|",
     ]  # fmt: skip
     for name, count in counts.items():
@@ -449,14 +450,19 @@ def page(rows: Sequence[Mapping[str, Any]], sounds: Sequence[Mapping[str, Any]])
         lines += [
             "## Sound logs", "",
             f"{len(sounds)} sound logs: {met} are refused or changed, {told} have a remark. No number is changed,",
-            f"so the intervals are those without the looks. {sum(every)} of {len(every)} that are told hold the truth.",
-            "", "| log | " + " | ".join(_PARAMETERS) + " |", "|---" * (1 + len(_PARAMETERS)) + "|",
+            f"so the intervals are those without the looks. {sum(every)} of {len(every)} that are told hold the truth",
+            f"({100.0 * sum(every) / max(1, len(every)):.0f} %), in the table by parameter. Each motion is a sum of",
+            "three sines in each plane, of 1 to 10 rad/s and 4 to 8 mm of spool, with 0.03 deg of noise. The wrist",
+            "that is seen 100 times a second has friction in its tendons, which not every such motion parts from their",
+            "stiffness: there the interval is wide, or it is",
+            "*not identifiable*.", "",
+            "| log | logs | " + " | ".join(_PARAMETERS) + " |", "|---" * (2 + len(_PARAMETERS)) + "|",
         ]  # fmt: skip
         for kind in KINDS:
             some = [one["holds"] for one in sounds if one["kind"] == kind.words]
             cells = [[holds[name] for holds in some if name in holds] for name in _PARAMETERS]
             shown = [f"{sum(cell)} of {len(cell)}" if cell else "-" for cell in cells]
-            lines.append(f"| {kind.words} | {' | '.join(shown)} |")
+            lines.append(f"| {kind.words} | {len(some)} | {' | '.join(shown)} |")
     return "\n".join(lines).rstrip() + "\n"
 
 

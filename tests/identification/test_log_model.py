@@ -13,7 +13,13 @@ from wristctl.commands.identify.logs import told_answer
 from wristctl.config.wrist import TendonPlace, WristParameters
 from wristctl.errors import UserError
 from wristctl.identification.arc_fit import fit_arcs
-from wristctl.identification.log_model import everything_fitted, recordings_of_logs, robot_of_logs
+from wristctl.identification.log_model import (
+    everything_fitted,
+    rate_of_logs,
+    readings_of_log,
+    recordings_of_logs,
+    robot_of_logs,
+)
 from wristctl.identification.model_choice import tried_models
 from wristctl.records.open_log import OpenLog
 from wristctl.wrist.compiled_model import terms
@@ -204,6 +210,43 @@ def test_spools_and_motion_may_have_times_of_their_own() -> None:
     )
     at = np.interp(with_gaps.time, whole.time, whole.measured[:, 0])
     assert with_gaps.measured[:, 0] == pytest.approx(at, abs=5e-3)
+
+
+def test_bends_of_two_planes_may_have_rows_of_their_own() -> None:
+    log = planar()
+    both = {**log.columns, "bend_z": 0.5 * log.columns["bend_y"]}
+    row = np.arange(len(log)) % 2
+    apart = {**both, "bend_y": np.where(row, both["bend_y"], math.nan),
+             "bend_z": np.where(row, math.nan, both["bend_z"])}  # fmt: skip
+    robot = robot_of_logs([OpenLog(log.file, "log", both)], WRIST, 0.01)
+    (whole,), (parted,) = (recordings_of_logs([OpenLog(log.file, "log", some)], robot) for some in (both, apart))
+    assert parted.time[0] == pytest.approx(0.02) and parted.time[-1] == pytest.approx(5.96)
+    for plane in (0, 1):
+        at = np.interp(parted.time, whole.time, whole.measured[:, plane])
+        assert parted.measured[:, plane] == pytest.approx(at, abs=2e-3)
+    assert rate_of_logs([OpenLog(log.file, "log", apart)]) == pytest.approx(25.0)
+    assert readings_of_log(OpenLog(log.file, "log", apart)) == len(log)
+
+
+@pytest.mark.parametrize(("every", "instants"), [(1, 300), (2, 150)])
+def test_even_readings_are_fitted_as_they_are(every: int, instants: int) -> None:
+    log = planar()
+    seen = np.arange(len(log)) % every == 0
+    some = OpenLog(log.file, "log", {**log.columns, "bend_y": np.where(seen, log.columns["bend_y"], math.nan)})
+    (recording,) = recordings_of_logs([some], robot_of_logs([some], WRIST, 0.01))
+    assert len(recording.time) == instants
+    assert recording.measured[:, 0] == pytest.approx(log.columns["bend_y"][seen], abs=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "narrow", "wide"),
+    [("gain", 1.0, 0.2, 0.9), ("tendon", 16.0, 3.9, 10.0), ("tendon", 2.0, 0.4, 3.0), ("damping", 0.2, 0.09, 0.12),
+     ("damping", 0.0, 0.02, 0.06), ("delay", 0.0, 0.04, 0.06), ("friction", 0.0, 0.09, 0.2)],
+)  # fmt: skip
+def test_a_wide_interval_is_not_identified(name: str, value: float, narrow: float, wide: float) -> None:
+    robot = robot_of_logs([planar()], WRIST, 0.01)
+    assert robot.is_told(name, value, narrow) and not robot.is_told(name, value, wide)
+    assert robot_of_logs([planar()], WRIST, 0.01, widest=5.0).is_told(name, value, wide)
 
 
 def test_logs_without_spools_or_motion_are_refused() -> None:

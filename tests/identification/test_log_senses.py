@@ -88,3 +88,51 @@ def test_a_motion_along_one_direction_tells_nothing_of_places() -> None:
     log = made(3)
     columns = {**log.columns, "bend_z": 0.01 * log.columns["bend_z"]}
     assert said(with_order(replace(log, columns=columns), (0, 2, 1), 3), 3) == []
+
+
+def along_a_line(tendons: int, toward_deg: float, noise: float = 0.0) -> OpenLog:
+    """A wrist that bends along one line; its bends are noisy."""
+    sound, rng = made(tendons), np.random.default_rng(1)
+    toward, way = math.radians(toward_deg), 0.3 * np.sin(1.7 * sound.columns["time"])
+    y, z = way * math.cos(toward), way * math.sin(toward)
+    columns = {"time": sound.columns["time"]}
+    columns |= {"bend_y": y + noise * rng.standard_normal(300), "bend_z": z + noise * rng.standard_normal(300)}
+    for number, angle in zip(NUMBERS[tendons], ANGLES[tendons], strict=True):
+        pulls = math.radians(angle)
+        columns[f"spool_{number}"] = 2e-4 + 0.02 * (math.cos(pulls) * y + math.sin(pulls) * z)
+    return OpenLog(Path("made.csv"), "log", columns)
+
+
+@pytest.mark.parametrize("tendons", [3, 4])
+@pytest.mark.parametrize("toward_deg", [0.0, 45.0, 90.0, 200.0])
+def test_a_sound_log_of_a_motion_along_one_line_has_no_finding(tendons: int, toward_deg: float) -> None:
+    assert said(along_a_line(tendons, toward_deg, 0.005), tendons) == []
+
+
+@pytest.mark.parametrize(
+    ("toward_deg", "order", "which"), [(0.0, (3, 1, 2, 0), "spool_1 and spool_5"), (90.0, (0, 3, 2, 1), "")]
+)
+def test_spools_exchanged_across_the_line_of_a_motion_are_named_and_on_one_side_they_are_alike(
+    toward_deg: float, order: tuple[int, ...], which: str
+) -> None:
+    log = with_order(along_a_line(4, toward_deg, 0.005), order, 4)
+    if not which:  # 2 and 5 pull alike toward flexion
+        assert said(log, 4) == []
+        return
+    with pytest.raises(UserError, match=f"{which} were exchanged"):
+        said(log, 4)
+    bare = {name: column for name, column in log.columns.items() if name != "bend_z"}
+    with pytest.raises(UserError, match=f"{which} were exchanged"):
+        said(replace(log, columns=bare), 4)
+
+
+def test_a_spool_with_the_other_sign_is_named_of_a_motion_along_one_line() -> None:
+    log = along_a_line(3, 0.0)
+    with pytest.raises(UserError, match="spool_2 had the other sign"):
+        said(replace(log, columns={**log.columns, "spool_2": -log.columns["spool_2"]}), 3)
+
+
+def test_a_bend_of_a_motion_along_one_line_that_is_counted_the_other_way_is_said() -> None:
+    log = along_a_line(4, 0.0)
+    (told,) = said(replace(log, columns={**log.columns, "bend_y": -log.columns["bend_y"]}), 4)
+    assert "180 deg from where wrist.tendons has them" in told and "bend_y were counted the other way" in told

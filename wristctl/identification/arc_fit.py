@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import NamedTuple
 
@@ -64,6 +64,8 @@ class ArcFit:
     """Error of a sample of the motion and of one beside it, over the usual."""
     predicts: bool = True
     """Whether its model predicts what was left out: of one that does not no unknown is told."""
+    left_open: Mapping[str, float] = field(default_factory=dict)
+    """Standard deviations that terms which the data leave open add to unknowns."""
 
     @property
     def numbers(self) -> int:
@@ -150,7 +152,8 @@ class ArcFit:
         halves = problem.scale * np.maximum(np.hypot(blockwise, assumed), alone)  # where residuals show no such change
         told = {}
         for k, (name, unknown) in enumerate(self.robot.unknowns(self.terms).items()):
-            value, half = float(self.x[k]), float(halves[k])
+            value = float(self.x[k])
+            half = math.hypot(float(halves[k]), NORMAL_95 * self.left_open.get(name, 0.0))
             low, high = value - half, value + half
             at_end = min(value - unknown.low, unknown.high - value) < 1e-2 * unknown.scale
             wide = not self.robot.is_told(name, value, half)

@@ -59,6 +59,10 @@ OF_TERM: dict[Term, tuple[str, ...]] = {
     "creep": ("creep", "creep_time"),
 }
 """Unknowns that a term adds; slack adds a length for each tendon and session."""
+# Least half of an interval over the value, or over the usual change, beyond which an unknown is not told.
+_WIDE = {"damping": 0.5, "inertia": 0.5, "turn": 1.0, "delay": 2.5} | dict.fromkeys(
+    [name for term in OF_TERM.values() for name in term], 1.0
+)
 SLACK_ERROR = 3e-3
 """How well it is known where a tendon is taut: standard deviation [m]."""
 
@@ -90,6 +94,11 @@ class ArcRobot:
     """Whether samples count by the size of their residuals against what is known beforehand, not by 1 deg or 2 mm."""
     smooth: float = SMOOTH
     """Stretch below which a tendon passes smoothly from slack to taut [m]."""
+    widest: float = 1.0
+    """Half of a 95 % interval over the value, or over the unknown's usual change where it may be 0, beyond which it is
+    not told; friction, presliding, creep, damping and inertia may be wider."""
+    untold: tuple[str, ...] = ()
+    """Unknowns that its data cannot tell."""
 
     @property
     def unit(self) -> str:
@@ -113,8 +122,11 @@ class ArcRobot:
 
     def is_told(self, name: str, value: float, half: float) -> bool:
         """Whether a 95 % interval of so much to either side is narrow enough to be told."""
-        scale = (UNKNOWNS[name] if name in UNKNOWNS else UNKNOWNS[name.rpartition("_")[0]]).scale
-        return half <= max(abs(value), 3.0 * scale)
+        if name in self.untold:
+            return False
+        root = name if name in UNKNOWNS else name.rpartition("_")[0]
+        unknown, share = UNKNOWNS[root], max(self.widest, _WIDE.get(root, 0.0))
+        return half <= share * max(abs(value), unknown.scale if unknown.low <= 0.0 else 0.0)
 
     def unknowns(self, terms: Sequence[Term]) -> dict[str, ArcUnknown]:
         """The unknowns of its model with these terms, those of arcs numbered."""

@@ -85,6 +85,8 @@ def driven_robot(
     recordings = in_parts(raw)
     _check_motion(recordings, first, quantity)
     robot = _robot(recordings, drive, wrist, settings, quantity, numbers, signs)
+    if any(log.two_clocks for log in logs):
+        robot = replace(robot, untold=(*robot.untold, "delay"))
     remarks = [_counts_told(flipped, quantity)] * bool(flipped)
     if quantity != drive:
         remarks.append(f"One ampere is taken as {scale:.3g} N, by identify.torque_constant and identify.spool_radius.")

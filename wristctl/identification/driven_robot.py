@@ -43,10 +43,6 @@ class DrivenRobot(ArcRobot):
     """What each column is multiplied by."""
     still: tuple[int, ...] = ()
     """Numbers of tendons that pull no more and no less in the log, whose places are as believed."""
-    untold: tuple[str, ...] = ()
-    """Unknowns that do not show in these data but by what a straight line leaves over."""
-    widest: float = 0.25
-    """Half of an interval over the value beyond which stiffness and gains are not told."""
 
     @property
     def words(self) -> str:

@@ -32,8 +32,10 @@ _SMOOTH = 4e-6
 GRAVITY = 9.81
 
 
-def robot_of_logs(logs: Sequence[OpenLog], wrist: WristParameters, radius_error: float) -> ArcRobot:
-    """The robot that logs are of: its tendons by their numbers, its geometry by a wrist.
+def robot_of_logs(
+    logs: Sequence[OpenLog], wrist: WristParameters, radius_error: float, widest: float = 0.25
+) -> ArcRobot:
+    """The robot that logs are of: its tendons by their numbers, its geometry by a wrist; `widest` as ArcRobot has it.
 
     Two tendons alone are antagonists in one plane; of four numbered 1 to 4 in a log of one plane the motion says which
     side each pulls to (`plus_side`); 1, 2, 4 and 5 are those of the square wrist; as many as the wrist has are those of
@@ -64,7 +66,7 @@ def robot_of_logs(logs: Sequence[OpenLog], wrist: WristParameters, radius_error:
     return ArcRobot(
         (wrist.length,), tuple(angles), radius, (1,) * len(numbers), measured, tuple(base),
         {"gain": 1.0, "turn": 0.0, "delay": 0.03, "inertia": _inertia(wrist)}, known_to, timed, wrist.discs - 1,
-        True, _SMOOTH,
+        True, _SMOOTH, widest, ("delay",) if any(log.two_clocks for log in logs) else (),
     )  # fmt: skip
 
 
@@ -230,10 +232,19 @@ def rate_of_logs(logs: Sequence[OpenLog]) -> float:
     """Readings of the motion per second: of what is there of bends or the tip, the median over trials."""
     rates = []
     for trial in (trial for log in logs for trial in log.trials().values()):
-        moved = [column for name, column in trial.columns.items() if name.startswith(("bend_", "tip_", "inclination"))]
-        clock = trial.columns["time"][np.isfinite(np.stack(moved)).any(axis=0)]
-        rates.append(1.0 / float(np.median(np.diff(clock))))
+        times = [trial.columns["time"][np.isfinite(column)] for column in _motion(trial)]
+        rates += [1.0 / float(np.median(np.diff(clock))) for clock in times if len(clock) > 1]
     return float(np.median(rates))
+
+
+def readings_of_log(log: OpenLog) -> int:
+    """Number of samples at which some of the motion was read."""
+    return int(np.isfinite(np.stack(_motion(log))).any(axis=0).sum())
+
+
+def _motion(log: OpenLog) -> list[Array]:
+    """Columns of the motion: of bends or of the tip."""
+    return [column for name, column in log.columns.items() if name.startswith(("bend_", "tip_", "inclination"))]
 
 
 def everything_fitted(recordings: Sequence[ArcRecording]) -> list[ArcRecording]:
@@ -252,24 +263,30 @@ def _recording(
         motion = np.stack([log.columns.get(f"tip_{axis}", empty) for axis in "xyz"], axis=1)
     spools = np.stack([log.columns[f"spool_{number}"] for number in numbers], axis=1)
     tensions = np.stack([log.columns.get(f"tension_{k}", np.full(len(log), math.nan)) for k in numbers], axis=1)
-    there = np.isfinite(motion).any(axis=0)
-    seen, counted = np.isfinite(motion[:, there]).all(axis=1) & there.any(), np.isfinite(spools).all(axis=1)
-    if min(seen.sum(), counted.sum()) < _FEWEST:
-        problem = f"{int(min(seen.sum(), counted.sum()))} samples of trial {name or file}"
-        raise UserError(problem, str(log.file), f"{_FEWEST} or more with spools and motion")
+    seen, counted = np.isfinite(motion), np.isfinite(spools).all(axis=1)
+    seen = seen[:, seen.any(axis=0)]
+    if not robot.timed:
+        seen = seen.all(axis=1, keepdims=True)
+    fewest = int(min(*seen.sum(axis=0), counted.sum())) if seen.size else 0
+    if fewest < _FEWEST:
+        raise UserError(
+            f"{fewest} samples of trial {name or file}", str(log.file), f"{_FEWEST} or more with spools and motion"
+        )
     most = max(_FEWEST, _MOST // trials)
     title = f"{file}, {name}" if name else file
     mass = mass_of_log(log) or 0.0
     if not robot.timed:
-        kept = np.flatnonzero(seen & counted)
+        kept = np.flatnonzero(seen[:, 0] & counted)
         kept = kept[:: max(1, math.ceil(len(kept) / most))]
         time, pause = kept.astype(float), np.full(len(kept), _NO_TIME)
         columns = motion[kept], spools[kept], tensions[kept]
     else:
         clock = log.columns["time"]
-        begin, end = clock[seen][0], clock[seen][-1]
-        step = max(_SHORTEST, (end - begin) / most)
-        time = np.arange(begin, end + 0.5 * step, step)
+        read = [clock[column] for column in seen.T]
+        begin, end = max(times[0] for times in read), min(times[-1] for times in read)
+        # Even readings are taken as they are: lines between them would make a quick motion smaller than the spools'.
+        shortest = max(_SHORTEST, (end - begin) / most, *(float(np.median(np.diff(times))) for times in read))
+        time, step = np.linspace(begin, end, 1 + round((end - begin) / shortest), retstep=True)
         pause = np.full(len(time), step)
         columns = _at(time, clock, motion), _at(time, clock, spools), _at(time, clock, tensions)
     pause[0] = math.nan

@@ -1,4 +1,4 @@
-"""Spools of logs in two planes against their tendons' places: which are exchanged, and whose sign is the other one."""
+"""Spools of logs against the places of their tendons: which are exchanged, and whose sign is the other one."""
 
 from __future__ import annotations
 
@@ -17,7 +17,8 @@ from wristctl.records.open_log import OpenLog
 
 # Share of the spools' slopes that their places have to say, and of a spool's way that the bend has to say.
 _LIKE, _SAID = 0.9, 0.5
-# Smaller over larger standard deviation of the bends of two planes from which both are moved enough.
+# Smaller over larger standard deviation of the bends of two planes from which both are moved enough; else the motion is
+# along one line, and places count by what they pull along that.
 _BOTH = 0.2
 # Most tendons of which every order is tried.
 _ORDERS = 5
@@ -35,14 +36,18 @@ class _Reading(NamedTuple):
 def check_places(logs: Sequence[OpenLog], robot: ArcRobot, numbers: Sequence[int]) -> list[str]:
     """Sentences where tendons pull toward other sides than their places say, all turned alike.
 
-    The slopes of the spools' lengths over both bends, or over the tip's way across, are the tendons' directions. Raises
+    The slopes of the spools' lengths over both bends, or over the tip's way across, are the tendons' directions; of a
+    motion along one line they are what each tendon pulls along it. Raises
     UserError where they are none of the robot's, turned by less than half the angle between two tendons, but would be
     with one sign or with spools exchanged; the fix says so.
     """
-    slopes = _slopes(logs, numbers)
-    if slopes is None or "turn" not in robot.base:
+    found = _slopes(logs, numbers)
+    if found is None or "turn" not in robot.base:
         return []
+    slopes, line = found
     places = np.exp(1j * np.array(robot.angles))
+    if line is not None:
+        places = line * (places * line.conjugate()).real
     around = np.sort(np.mod(robot.angles, math.tau))
     half = 0.5 * float(np.min(np.diff([*around, around[0] + math.tau])))
     like, turn = _likeness(slopes, places)
@@ -101,8 +106,11 @@ def _readings(log: OpenLog, slopes: Array, numbers: Sequence[int]) -> Iterator[_
         yield _Reading(f"spools were exchanged: {words}", slopes[list(order_of)], taken)
 
 
-def _slopes(logs: Sequence[OpenLog], numbers: Sequence[int]) -> Array | None:
-    """Slopes of the spools (M,) over the bends, complex: toward y and z; None where the motion does not tell them."""
+def _slopes(logs: Sequence[OpenLog], numbers: Sequence[int]) -> tuple[Array, complex | None] | None:
+    """Slopes of the spools (M,) over the bends, complex: toward y and z, and the direction of a motion along one line.
+
+    None where the motion does not tell them.
+    """
     moved, reeled = list[Array](), list[Array]()
     for trial in (trial for log in logs for trial in log.trials().values()):
         motion = _motion(trial)
@@ -120,15 +128,15 @@ def _slopes(logs: Sequence[OpenLog], numbers: Sequence[int]) -> Array | None:
     if not moved:
         return None
     motion, spool = np.concatenate(moved), np.concatenate(reeled)
-    sizes = np.linalg.svd(motion, compute_uv=False)
-    if sizes[1] < _BOTH * sizes[0]:
-        return None
-    both = np.linalg.lstsq(motion, spool, rcond=None)[0]
+    _, sizes, axes = np.linalg.svd(motion, full_matrices=False)
+    flat = sizes[1] < _BOTH * sizes[0]
+    both = np.linalg.lstsq(motion, spool, rcond=_BOTH)[0]
     left, whole = np.sum((spool - motion @ both) ** 2, axis=0), np.sum(spool**2, axis=0)
-    if np.any(left > (1.0 - _SAID) * whole):
+    if flat:  # a tendon across the line does not move with it
+        left, whole = left.sum(keepdims=True), whole.sum(keepdims=True)
+    if not whole.any() or np.any(left > (1.0 - _SAID) * whole):
         return None
-    slopes: Array = both[0] + 1j * both[1]
-    return slopes
+    return both[0] + 1j * both[1], complex(*axes[0]) if flat else None
 
 
 def _motion(log: OpenLog) -> Array | None:

@@ -6,12 +6,16 @@ error of the predicted part smaller, by a 95 % interval of the ratio paired by b
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
+
+from scipy.stats import norm
 
 from wristctl.identification.arc_fit import ArcFit, fit_arcs
 from wristctl.identification.arc_robot import OF_TERM, ArcRecording, ArcRobot, Term
+from wristctl.identification.intervals import NORMAL_95
 from wristctl.identification.prediction_scores import Score, ratio_of, score_of
 
 # Beginnings of the search for presliding [m] and [rad]: its errors have several minima. Else it begins where the model
@@ -56,6 +60,19 @@ class TriedModel:
         if self.ratio is None:
             return ""
         return "wanted" if self.ratio.high < 1.0 - _LEAST_GAIN else "unwanted" if self.ratio.low > 1.0 else "not told"
+
+    @property
+    def likely(self) -> float:
+        """Probability that the last term lessens the error, by the interval of the ratio."""
+        if self.ratio is None:
+            return 1.0
+        deviation = math.log(self.ratio.high / self.ratio.low) / (2.0 * NORMAL_95)
+        return float(norm.cdf(-math.log(self.ratio.error) / deviation)) if deviation else float(self.ratio.error < 1.0)
+
+    def extends(self, other: TriedModel) -> bool:
+        """Whether it has one term more than another, slack aside."""
+        without = self.without.terms if self.without else ()
+        return {*without, "slack"} == {*other.terms, "slack"}
 
 
 def tried_models(
@@ -114,6 +131,24 @@ def chosen_of(models: Sequence[TriedModel]) -> TriedModel:
         model for model in models if model.without is None or model.verdict == "wanted" or model.terms == ("slack",)
     ]
     return min(fair, key=lambda model: model.score.error) if len(models) > 2 else models[-1]
+
+
+def whole_fit(models: Sequence[TriedModel], recordings: Sequence[ArcRecording]) -> ArcFit:
+    """The chosen model fitted to all that is marked as fitted, with intervals that terms which are not told widen.
+
+    A term that is not told is there with the probability that it predicts better. By that, times the square of the
+    shift that it makes, an unknown's variance grows (Buckland, Burnham and Augustin, Biometrics 53 (1997) 603).
+    """
+    chosen = chosen_of(models)
+    first = chosen.fits[0]
+    fit = fit_arcs(first.robot, chosen.terms, recordings, begin=first.values)
+    variances = dict.fromkeys(fit.values, 0.0)
+    for model in models:
+        if model.verdict == "not told" and model.terms[-1] not in chosen.terms and model.extends(chosen):
+            before = model.without.fits[0].values if model.without else {}
+            for name in before.keys() & variances.keys():
+                variances[name] += model.likely * (model.fits[0].values[name] - before[name]) ** 2
+    return replace(fit, left_open={name: math.sqrt(variance) for name, variance in variances.items()})
 
 
 def _tried(

@@ -73,6 +73,8 @@ class OpenLog:
     """Factors to SI with which columns were read, by their names: what one count of a counter is."""
     mapped: frozenset[str] = frozenset()
     """Names that `--columns` gave to columns."""
+    two_clocks: bool = False
+    """Whether motors and motion were joined from files on clocks of their own, which tell no delay."""
 
     def __len__(self) -> int:
         return next((len(column) for column in (*self.columns.values(), *self.words.values())), 0)

@@ -49,13 +49,13 @@ def _order(name: str) -> tuple[bool, str]:
 
 def _merged(streams: Sequence[Stream]) -> Columns:
     """Columns at times of their own as columns at all times, in their order; cells of other times are empty."""
-    time = np.concatenate([stream.time for stream in streams])
-    order, begin, merged = np.argsort(time, kind="stable"), 0, {"time": time}
+    time = np.unique(np.concatenate([stream.time for stream in streams]))
+    merged = {"time": time}
     for stream in streams:
+        rows = np.searchsorted(time, stream.time)
         for name, column in stream.columns.items():
             if units_of(name) is None:
                 continue
             merged[name] = np.full(len(time), np.nan)
-            merged[name][begin : begin + len(stream.time)] = column
-        begin += len(stream.time)
-    return {name: column[order] for name, column in merged.items()}
+            merged[name][rows] = column
+    return merged

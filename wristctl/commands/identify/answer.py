@@ -22,6 +22,17 @@ def recommendation_for(run: str, known: str) -> str:
     return shlex.join(["wristctl", "recommend", known, "--from-identified", run])
 
 
+def recommendation_by_ratios(run: str, scaled: bool) -> list[str]:
+    """What is next after a log that tells ratios; `scaled`: it tells the stiffness too, which else has to be given."""
+    command = recommendation_for(run, f"{run}/config.yaml")
+    if scaled:
+        return ["Next, find its gains:", f"$ {command}"]
+    return [
+        "Next, find its gains; VALUE is its bending stiffness in N m/rad, measured or known:",
+        f"$ {command} --set wrist.stiffness=VALUE",
+    ]
+
+
 def simulation_of(run: str, known: str) -> str:
     """Command that simulates the wrist that a run found, of a study file with what was known of it."""
     return shlex.join(["wristctl", "simulate", known, "--from-identified", run])

@@ -5,11 +5,11 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from wristctl.commands.answer import Answer
 from wristctl.commands.identify.answer import comparison_on, recommendation_for, simulation_of
+from wristctl.commands.identify.logs import logs_of
 from wristctl.commands.inputs import Inputs
 from wristctl.commands.printed_table import COLUMNS, Table, degrees, joined, number
 from wristctl.commands.results import StudyResult
@@ -82,14 +82,10 @@ def _problem(study: Study) -> BendProblem:
     from wristctl.config.plant import Actuator
     from wristctl.identification.bend_problem import bend_problem
     from wristctl.identification.bend_trials import bend_trials, places_of_log
-    from wristctl.records.log_converters import read_log
-    from wristctl.records.log_looks import looked_at, telling
-    from wristctl.wrist.tendon_layout import TendonLayout
+    from wristctl.records.log_looks import telling
 
     settings = study.identify
-    offset, columns = TendonLayout.of(study.wrist).offset, settings.columns or ""
-    read = (read_log(Path(file), columns, "log", tendon_offset=offset) for file in settings.logs)
-    logs = [telling(looked_at(log, tendon_offset=offset)) for log in read]
+    logs = [telling(log) for log in logs_of(study)]
     places = places_of_log(logs[0], study.wrist)
     trials = bend_trials(logs, study.wrist, settings.step, settings.exposure or 0.0)
     return bend_problem(trials, places, study.wrist, Actuator(level="tendon"), settings)

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from wristctl.commands.answer import Answer
+from wristctl.commands.identify.answer import recommendation_by_ratios
 from wristctl.commands.inputs_of_loops import RATIOS
 from wristctl.commands.printed_table import COLUMNS, Table, degrees, joined, number
 from wristctl.commands.results import StudyResult
@@ -50,7 +51,7 @@ class DrivenTold(StudyResult):
     @property
     def answer(self) -> Answer:
         """Parameters with intervals, and the motions that would tell the others."""
-        return driven_answer(self.found, self.remarks)
+        return driven_answer(self.found, self.remarks, self.place)
 
     def frame(self) -> pd.DataFrame:
         """One row per parameter: value and ends of its interval, nan where the data do not tell it, and unit."""
@@ -126,7 +127,7 @@ def _refuse(session: Session, found: DrivenFit, remarks: Sequence[str]) -> None:
     raise UserError(problem, found.recordings[0].name, wanted_motion(), exit_code=3)
 
 
-def driven_answer(found: DrivenFit, remarks: Sequence[str]) -> Answer:
+def driven_answer(found: DrivenFit, remarks: Sequence[str], run: str = "") -> Answer:
     """What is identified and how well the rest is predicted, each parameter, and what would tell the others."""
     from wristctl.commands.validate.answer import wanted_terms
     from wristctl.identification.driven_log import motion_for
@@ -150,6 +151,8 @@ def driven_answer(found: DrivenFit, remarks: Sequence[str]) -> Answer:
             "Currents have no scale in newtons: this is stiffness over the motors' gain, and damping and inertia over "
             "stiffness. N m/rad needs identify.torque_constant and identify.spool_radius, or tension_1 [N], ..."
         )
+    if run and known:
+        notes += recommendation_by_ratios(run, found.robot.drive == "tension" and "stiffness" in known)
     more = "Errors of each model, figures: --all, or the run's report.html."
     return Answer(sentence, _table(told).within(COLUMNS), notes, more)
 

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from wristctl.commands.answer import Answer
+from wristctl.commands.identify.answer import recommendation_by_ratios
 from wristctl.commands.identify.driven import DrivenTold, driven_plan, identify_driven
 from wristctl.commands.inputs import Inputs
 from wristctl.commands.inputs_of_loops import RATIOS
@@ -42,9 +43,11 @@ class LogTold(StudyResult):
     models: list[TriedModel]
     chosen: TriedModel
     remarks: Sequence[str] = ()
-    """Which tendons were taken to pull to which side, where the motion says it, and how many samples were used."""
+    """Which tendons were taken to pull to which side, where the motion says it, and what was mended."""
     rate: float | None = None
     """Readings of the motion per second; None without times."""
+    samples: int = 0
+    """Of the motion in the logs."""
 
     @property
     def ratios(self) -> dict[str, Any]:
@@ -56,7 +59,8 @@ class LogTold(StudyResult):
     @property
     def answer(self) -> Answer:
         """Parameters with intervals or not identifiable, the terms that the data want, and what would tell more."""
-        return told_answer(self.fit, self.models, self.chosen, self.remarks)
+        run = self.place if self.fit.predicts else ""
+        return told_answer(self.fit, self.models, self.chosen, self.remarks, self.samples, run)
 
     def frame(self) -> pd.DataFrame:
         """One row per parameter: value and ends of its interval, nan where the data do not tell it, and unit."""
@@ -70,28 +74,35 @@ class LogTold(StudyResult):
 
 
 class ReadLogs(NamedTuple):
-    """The robot of open logs, its recordings, and the number of samples that the logs have."""
+    """The robot of open logs, its recordings, and the number of samples of the motion that the logs have."""
 
     robot: ArcRobot
     recordings: list[ArcRecording]
     samples: int
     remarks: list[str]
-    """Which tendons pull to which side, where the motion says it, what reading and looking mended, and how many
-    samples are used if not all are."""
+    """Which tendons pull to which side, where the motion says it, and what reading and looking mended."""
     rate: float | None
     """Readings of the motion per second; None without times."""
 
 
 def logs_of(study: Study) -> list[OpenLog]:
-    """The study's logs, read and looked at."""
+    """The study's logs, read and looked at; those of motors and motion in files of their own are joined."""
+    from wristctl.records.joined_logs import joined_logs
     from wristctl.records.log_converters import read_log
     from wristctl.records.log_looks import looked_at
     from wristctl.wrist.tendon_layout import TendonLayout
 
     settings = study.identify
-    offset, columns = TendonLayout.of(study.wrist).offset, settings.columns or ""
-    read = (read_log(Path(file), columns, "log", tendon_offset=offset) for file in settings.logs)
-    return [looked_at(log, tendon_offset=offset) for log in read]
+    offset, names = TendonLayout.of(study.wrist).offset, (settings.columns or "").split(";")
+    if len(names) not in (1, len(settings.logs)):
+        problem = f"names for {len(names)} logs, and there are {len(settings.logs)}"
+        raise UserError(problem, "identify.columns", "names for all of them, or with ; between those of each log")
+    names *= len(settings.logs) // len(names)
+    read = [
+        looked_at(read_log(Path(file), own.strip(), "log", tendon_offset=offset), tendon_offset=offset)
+        for file, own in zip(settings.logs, names, strict=True)
+    ]
+    return [looked_at(log, tendon_offset=offset) if log.two_clocks else log for log in joined_logs(read)]
 
 
 def _are_driven(logs: Sequence[OpenLog], study: Study) -> bool:
@@ -103,19 +114,23 @@ def _are_driven(logs: Sequence[OpenLog], study: Study) -> bool:
 
 def read_logs(logs: Sequence[OpenLog], study: Study) -> ReadLogs:
     """What a study's logs hold. Raises UserError for logs that no fit may be asked of."""
-    from wristctl.identification.log_model import rate_of_logs, recordings_of_logs, robot_of_logs, spools_of_log
+    from wristctl.identification.log_model import (
+        rate_of_logs,
+        readings_of_log,
+        recordings_of_logs,
+        robot_of_logs,
+        spools_of_log,
+    )
     from wristctl.identification.log_senses import check_places
 
     settings = study.identify
-    robot = robot_of_logs(logs, study.wrist, settings.radius_error)
+    robot = robot_of_logs(logs, study.wrist, settings.radius_error, settings.widest)
     turned = check_places(logs, robot, spools_of_log(logs[0]))
     sides = _sides(robot, spools_of_log(logs[0])) if len(robot.angles) > 2 and "turn" not in robot.base else ""
     recordings = recordings_of_logs(logs, robot)
-    samples, used = sum(map(len, logs)), sum(len(recording.time) for recording in recordings)
-    fewer = f"Of {samples} samples the models are fitted at {used} instants, evenly over each trial."
-    remarks = [*(remark for log in logs for remark in log.remarks), *turned]
+    remarks = [*(remark for log in logs for remark in log.remarks), *turned, *[sides] * bool(sides)]
     rate = rate_of_logs(logs) if robot.timed else None
-    return ReadLogs(robot, recordings, samples, [*remarks, *[sides] * bool(sides), *[fewer] * (used < samples)], rate)
+    return ReadLogs(robot, recordings, sum(map(readings_of_log, logs)), remarks, rate)
 
 
 def _sides(robot: ArcRobot, numbers: Sequence[int]) -> str:
@@ -149,21 +164,19 @@ def identify_logs(session: Session) -> LogTold | DrivenTold:
 def _identify_spooled(session: Session, logs: Sequence[OpenLog]) -> LogTold:
     from wristctl.commands.validate.answer import parameters_table
     from wristctl.commands.validate.figures import errors_of_models, left_over, motion
-    from wristctl.identification.arc_fit import fit_arcs
     from wristctl.identification.log_model import everything_fitted
-    from wristctl.identification.model_choice import chosen_of, tried_models
+    from wristctl.identification.model_choice import chosen_of, tried_models, whole_fit
     from wristctl.identification.real_robots import RealRobot
 
     findings, study = session.findings, session.study
-    robot, recordings, _, remarks, rate = read_logs(logs, study)
+    robot, recordings, samples, remarks, rate = read_logs(logs, study)
     models = list["TriedModel"]()
     with session.progress("fitting models") as report:
         for model in tried_models(robot, [recordings], False):
             models.append(model)
             report(len(models))
         chosen = chosen_of(models)
-        begin = chosen.fits[0].values
-        fit = fit_arcs(robot, chosen.terms, everything_fitted(recordings), begin=begin)
+        fit = whole_fit(models, everything_fitted(recordings))
     missed = chosen.fits[0].missed()
     if missed > _MISSED_OF_ALL and study.identify.misfit != "tell":
         fit = replace(fit, predicts=False)
@@ -181,9 +194,8 @@ def _identify_spooled(session: Session, logs: Sequence[OpenLog]) -> LogTold:
         findings.figure("left-over", left_over, about, chosen.fits, caption="what is left of the motion")
         findings.figure("models", errors_of_models, about, models, caption="error of each model")
     findings.overview.figure = "motion"
-    result = LogTold(
-        study, findings, [_models_table(models, robot), parameters_table([fit], "")], fit, models, chosen, remarks, rate
-    )
+    tables = [_models_table(models, robot), parameters_table([fit], "")]
+    result = LogTold(study, findings, tables, fit, models, chosen, remarks, rate, samples)
     findings.table("data/parameters.csv", result.frame())
     findings.plain(RATIOS, result.ratios)
     _refuse(session, result, recordings)
@@ -222,8 +234,18 @@ def _refuse(session: Session, result: LogTold, recordings: Sequence[ArcRecording
     raise UserError(problem, recordings[0].name, accept, exit_code=3)
 
 
-def told_answer(fit: ArcFit, models: Sequence[TriedModel], chosen: TriedModel, remarks: Sequence[str] = ()) -> Answer:
-    """Parameters with intervals or not identifiable, the terms that the data want, and what would tell more."""
+def told_answer(
+    fit: ArcFit, models: Sequence[TriedModel], chosen: TriedModel, remarks: Sequence[str] = (), samples: int = 0,
+    run: str = "",
+) -> Answer:  # fmt: skip
+    """Parameters with intervals or not identifiable, the terms that the data want, what would tell more, what is next.
+
+    Parameters
+    ----------
+    remarks : what reading and looking found
+    samples : of the motion in the logs
+    run : path of the run on whose wrist one may go on; empty where there is none
+    """
     from wristctl.commands.validate.answer import parameters_table, wanted_terms
 
     unit, scale = fit.robot.unit, fit.robot.scale
@@ -233,12 +255,16 @@ def told_answer(fit: ArcFit, models: Sequence[TriedModel], chosen: TriedModel, r
         f"Identified: {joined(told) or 'none of the parameters'}. Of the part that was not fitted the model "
         f"predicts the {fit.robot.measured} to {error} {unit} RMS (95 % {low} to {high})."
     )
-    notes: list[str | Table] = [wanted_terms(models), *remarks]
+    used = sum(len(recording.time) for recording in fit.recordings)
+    fewer = f" Of {samples} samples the models are fitted at {used} instants, evenly over each trial."
+    notes: list[str | Table] = [wanted_terms(models) + fewer * (used < samples), *remarks]
     if "force" not in fit.values:
         more = (
             "" if "softening" in fit.values else "; trials with several masses tell how much a load softens the wrist"
         )
         notes.append(f"Stiffness in N m/rad is not identifiable: it needs tension_1 [N], ... of all tendons{more}.")
+    if run and any(one.known for one in fit.told.values()):
+        notes += recommendation_by_ratios(run, "force" in fit.told and fit.told["force"].known)
     return Answer(
         sentence,
         parameters_table([fit], "").within(COLUMNS),

@@ -1,0 +1,75 @@
+"""The chosen model's intervals have what terms change that the data neither want nor refuse."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tests.identification.test_log_model import WRIST, planar
+from wristctl.identification.arc_fit import ArcFit, fit_arcs
+from wristctl.identification.arc_robot import ArcRecording
+from wristctl.identification.log_model import everything_fitted, recordings_of_logs, robot_of_logs
+from wristctl.identification.model_choice import TriedModel, whole_fit
+from wristctl.identification.prediction_scores import Score
+
+
+@pytest.fixture(scope="module")
+def recordings() -> list[ArcRecording]:
+    log = planar()
+    return recordings_of_logs([log], robot_of_logs([log], WRIST, 0.01))
+
+
+@pytest.fixture(scope="module")
+def plain(recordings: list[ArcRecording]) -> ArcFit:
+    return fit_arcs(robot_of_logs([planar()], WRIST, 0.01), (), recordings)
+
+
+def with_term(plain: ArcFit, shift: float, ratio: Score) -> tuple[TriedModel, TriedModel, TriedModel]:
+    """Elastic arcs alone, with slack that is unwanted, and with creep, which makes tendons stiffer by so much."""
+    without = TriedModel((), (plain,), None)
+    unknowns = len(plain.values)
+    changed = np.insert(plain.x, unknowns, [0.1, 5.0])
+    changed[list(plain.values).index("tendon")] += shift
+    model = TriedModel(("creep",), (replace(plain, terms=("creep",), x=changed),), without)
+    model.__dict__["ratio"] = ratio
+    slack = TriedModel(("slack",), (plain,), without)
+    slack.__dict__["ratio"] = Score(1.1, 1.05, 1.2, 8)
+    return without, slack, model
+
+
+@pytest.mark.parametrize("shift", [1.5, -3.0])
+@pytest.mark.parametrize(("error", "likely"), [(1.0, 0.5), (0.98, 0.98), (1.01, 0.15)])
+def test_a_term_that_is_not_told_widens_by_its_shift_as_likely_as_it_predicts_better(
+    recordings: list[ArcRecording], plain: ArcFit, shift: float, error: float, likely: float
+) -> None:
+    models = with_term(plain, shift, Score(error, 0.98 * error, 1.02 * error, 8))
+    assert models[2].verdict == "not told" and models[2].likely == pytest.approx(likely, abs=0.02)
+    whole = whole_fit(models, everything_fitted(recordings))
+    assert whole.left_open["tendon"] == pytest.approx(math.sqrt(models[2].likely) * abs(shift))
+    bare = replace(whole, left_open={})
+    for name in ("gain", "tendon"):
+        half, alone = ((fit.told[name].high - fit.told[name].value) for fit in (whole, bare))
+        added = 1.96 * whole.left_open[name]
+        assert math.isinf(half) or half == pytest.approx(math.hypot(alone, added), rel=1e-3)
+    assert whole.told["gain"] == bare.told["gain"]
+
+
+@pytest.mark.parametrize(("error", "verdict"), [(0.9, "wanted"), (1.1, "unwanted")])
+def test_a_term_on_which_the_data_decide_widens_nothing(
+    recordings: list[ArcRecording], plain: ArcFit, error: float, verdict: str
+) -> None:
+    models = with_term(plain, 2.0, Score(error, 0.98 * error, 1.02 * error, 8))
+    assert models[2].verdict == verdict
+    assert not any(whole_fit(models, everything_fitted(recordings)).left_open.values())
+
+
+def test_a_term_beside_another_model_than_the_chosen_one_widens_nothing(
+    recordings: list[ArcRecording], plain: ArcFit
+) -> None:
+    without, slack, model = with_term(plain, 2.0, Score(1.0, 0.98, 1.02, 8))
+    elsewhere = replace(model, without=replace(without, terms=("inner friction",)))
+    elsewhere.__dict__["ratio"] = model.ratio
+    assert not any(whole_fit([without, slack, elsewhere], everything_fitted(recordings)).left_open.values())
