@@ -17,7 +17,7 @@ from tests.commands.conftest import columns_of, session
 from wristctl.commands.adoption import with_planes
 from wristctl.commands.export.open_log_of_run import open_log_of
 from wristctl.commands.hw_run.command import hw_run, plan
-from wristctl.commands.hw_run.trial_bends import PerformedBends
+from wristctl.commands.hw_run.results import Performed
 from wristctl.commands.inputs import Inputs
 from wristctl.config.study import Study
 from wristctl.config.wrist import WristParameters
@@ -50,7 +50,7 @@ def study_of(*changes: str) -> Study:
 class Whole:
     """A result with its run."""
 
-    result: PerformedBends
+    result: Performed
     run: Run
 
 
@@ -60,7 +60,7 @@ def whole(tmp_path_factory: pytest.TempPathFactory) -> Whole:
     study = study_of()
     with start_run("hw-run", study, "", tmp_path_factory.mktemp("whole")) as live:
         result = hw_run(session(study, live))
-    assert isinstance(result, PerformedBends)
+    assert isinstance(result, Performed)
     return Whole(result, Run(live.path))
 
 
@@ -87,7 +87,7 @@ def test_the_answer_has_both_planes_beside_simulation(whole: Whole) -> None:
     answer = whole.result.answer
     assert answer.sentence.startswith("ct-dob/hardware in two planes: error 0.")
     assert "toward ulnar" in answer.sentence and "toward flexion" in answer.sentence
-    assert "with a push of 1 N" in answer.sentence and "No trial ended early." in answer.sentence
+    assert "a push of 1 N" in answer.sentence and "No trial ended early." in answer.sentence
     assert answer.table is not None and len(answer.table.rows) == 2
     simulated = [twin.metrics["rmse"] for twin in whole.result.twins.values()]
     assert np.degrees(simulated) == pytest.approx([0.1, 0.1], abs=0.15)

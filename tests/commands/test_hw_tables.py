@@ -12,9 +12,8 @@ import pytest
 
 import wristctl
 from tests.commands.conftest import repeated
-from wristctl.commands.hw_run import results as hw_tables
-from wristctl.commands.hw_run.answer import answer_of, completed, in_one_plane, swings_apart
-from wristctl.commands.hw_run.command import Performed
+from wristctl.commands.hw_run.answer import answer_of, swings_apart
+from wristctl.commands.hw_run.results import Performed, completed, performed
 from wristctl.commands.inputs import Inputs
 from wristctl.commands.printed_table import Table
 from wristctl.commands.progress import watched
@@ -57,7 +56,7 @@ def asked(monkeypatch: pytest.MonkeyPatch) -> list[Trial]:
         found.append(trial)
         return repeated("twin", [trial.number + 1.0], steady_state=0.5).first
 
-    monkeypatch.setattr(hw_tables, "twin", twin)
+    monkeypatch.setattr("wristctl.trial.trial_results.twin", twin)
     return found
 
 
@@ -75,8 +74,8 @@ def tables(tmp_path: Path, settings: str = ROWS) -> tuple[list[Table], Findings,
         findings = Findings(0, run)
         findings.figure = lambda name, draw, *of, **how: findings.figures.add(name, lambda: draw(*of, **how))  # type: ignore[method-assign]
         session = Session(study, Inputs(), findings, watched(None), Unattended())
-        found, twins = hw_tables.trial_tables(session, trials(), None, None)
-    return found, findings, twins
+        done = performed(session, trials(), None, None)
+    return list(done.tables), findings, done.twins
 
 
 def test_the_papers_numbers_stand_beside_its_own_law_alone(
@@ -92,25 +91,30 @@ def test_the_papers_numbers_stand_beside_its_own_law_alone(
 
 def test_means_are_over_what_ended_well_with_and_without_a_push(tmp_path: Path, asked: list[Trial]) -> None:
     (means, by_trial), _, twins = tables(tmp_path)
-    assert means.columns[:4] == ("", "trials", "RMSE [rad]", "steady state [rad]")
-    smc, pid, pushed, *papers = means.rows
+    rows = [dict(zip(means.columns, row, strict=True)) for row in means.rows]
+    smc, pid, pushed, *papers = rows
+    assert (smc["controller"], smc["trials"]) == ("smc/printed", 3)
     number = 9.0 / 3.0  # of trials 1, 2 and 6, counted from 1
-    assert smc[:2] == ("smc/printed", 3)
-    assert smc[2:8] == pytest.approx([10.0**k * number for k in range(6)])
-    assert smc[8:] == pytest.approx((4.0 / 3.0, 0.5)), "the repetition shares the first one's simulation"
-    assert (pid[:3], pushed[:3]) == (("pid/printed", 1, 5.0), ("smc/printed, pushed", 1, 4.0))
-    assert [paper[:5] for paper in papers] == [
+    names = ("RMSE [rad]", "steady state [rad]", "settling [s]", "recovery [s]", "true RMSE [rad]")
+    assert [smc[name] for name in (*names, "true steady state [rad]")] == pytest.approx(
+        [10.0**k * number for k in range(6)]
+    )
+    simulated = smc["simulated RMSE [rad]"], smc["simulated steady state [rad]"]
+    assert simulated == pytest.approx((4.0 / 3.0, 0.5)), "the repetition shares the first one's simulation"
+    shown = [(row["controller"], row["trials"], row["RMSE [rad]"]) for row in (pid, pushed)]
+    assert shown == [("pid/printed", 1, 5.0), ("smc/printed, pushed", 1, 4.0)]
+    heads = ("controller", "trials", "RMSE [rad]", "steady state [rad]", "settling [s]")
+    assert [tuple(paper[head] for head in heads) for paper in papers] == [
         ("paper: four directions", 4, 0.157, 0.032, 3.0),
         ("paper: pushed, radial", 1, 0.207, 0.029, 3.0),
         ("paper: pushed, flexion", 1, 0.291, 0.031, 3.0),
     ]
-    assert {len(row) for row in means.rows} == {len(means.columns)}
     assert [row[0] for row in by_trial.rows] == [0, 1, 3, 4, 5]
     first = dict(zip(by_trial.columns, by_trial.rows[2], strict=True))
-    assert (first["direction"], first["push [N]"], first["controller"]) == ("ulnar", 5.0, "smc/printed")
+    assert (first["motion"], first["push [N]"], first["controller"]) == ("ulnar", 5.0, "smc/printed")
     assert (first["RMSE [rad]"], first["peak tension [N]"], first["outcome"]) == (4.0, 4e7, "ok")
-    simulated = [(each.number, each.push, each.row) for each in asked]
-    assert simulated == [(0, 0.0, 0), (1, 0.0, 0), (3, 5.0, 0), (4, 0.0, 1)]
+    tried = [(each.number, each.push, each.row) for each in asked]
+    assert tried == [(0, 0.0, 0), (1, 0.0, 0), (3, 5.0, 0), (4, 0.0, 1)]
     assert twins[5] is twins[0] and set(twins) == {0, 1, 3, 4, 5}
 
 
@@ -196,16 +200,20 @@ def _small() -> pd.DataFrame:
 
 def test_the_answer_gives_error_settling_and_recovery_by_direction_in_degrees() -> None:
     table = _small()
-    answer = answer_of(table, in_one_plane(_twins(0.03)), {}, [], "")
+    answer = answer_of(table, _twins(0.03), {}, [], "")
     lines = answer.lines()
     assert len(lines) <= 32 and max(map(len, lines)) <= 100 and answer.table is not None
-    rows = {(row[0], row[1]): row[2:] for row in answer.table.rows}
-    assert set(rows) == {("smc/printed", "ulnar"), ("smc/printed", "radial"), ("pid/printed", "ulnar")}
-    ulnar = rows["smc/printed", "ulnar"]  # trials 1 and 6 without a push, 4 with one
-    assert float(ulnar[0]) == pytest.approx(np.degrees(0.035), rel=0.05)
-    assert float(ulnar[4]) == pytest.approx(np.degrees(0.04), rel=0.05)
-    assert float(ulnar[5]) == pytest.approx(4000.0) and rows["pid/printed", "ulnar"][4:] == ("-", "-")
-    assert f"{float(ulnar[1]):.3g}" == f"{float(f'{np.degrees(0.03):.2g}'):.3g}"
+    rows = {row[:3]: dict(zip(answer.table.columns, row, strict=True)) for row in answer.table.rows}
+    assert list(rows) == [
+        ("smc/printed", "ulnar", 0.0), ("smc/printed", "ulnar", 5.0), ("smc/printed", "radial", 0.0),
+        ("pid/printed", "ulnar", 0.0),
+    ]  # fmt: skip
+    free, pushed = rows["smc/printed", "ulnar", 0.0], rows["smc/printed", "ulnar", 5.0]
+    assert free["RMSE [rad]"] == pytest.approx(0.035), "of trials 1 and 6"
+    assert pushed["RMSE [rad]"] == pytest.approx(0.04) and pushed["recovery [s]"] == pytest.approx(4000.0)
+    assert free["simulated RMSE [rad]"] == pytest.approx(0.03)
+    shown = next(line.split() for line in lines if line.startswith("smc/printed  ulnar"))
+    assert shown[3] == "2.01", "as people read it, in degrees"
     assert "1 of 6 trials" in " ".join(lines), "one was stopped"
 
 
@@ -217,7 +225,7 @@ def test_an_error_far_from_the_simulated_one_is_told_by_the_true_angle_where_it_
     """A camera that is late, and an estimate that lags, show less error than there is."""
     table = _small().query("controller == 'smc' and push == 0.0 and outcome == 'ok'")
     table = table.assign(rmse=0.01 if known else 0.0345, true_rmse=0.0345 if known else np.nan)
-    lines = " ".join(answer_of(table, in_one_plane(_twins(simulated)), {}, [], "").lines())
+    lines = " ".join(answer_of(table, _twins(simulated), {}, [], "").lines())
     assert ("simulated." in lines) == told and ("truly 2 deg" in lines) == known
     assert not told or ("smaller" if simulated > 0.0345 else "larger") in lines
 
@@ -247,19 +255,19 @@ def test_where_one_of_rig_and_simulation_swings_at_rest_the_kinder_one_is_named(
     assert len(notes) == 2 and all("1 of 5 trials" in note for note in notes)
     assert "the rig swings" in notes[0] and "0.6 deg" in notes[0] and "simulation is kinder" in notes[0]
     assert "the simulation swings" in notes[1] and "by up to 0.7" in notes[1] and "rig is kinder" in notes[1]
-    assert all(note in " ".join(answer_of(table, in_one_plane(twins), {}, [], "").lines()) for note in notes)
+    assert all(note in " ".join(answer_of(table, twins, {}, [], "").lines()) for note in notes)
     alike = table.assign(true_oscillation=table["true_oscillation"] if known else np.nan)
     alike = alike[[(one > 0.2) == (two > 0.2) for one, two in zip(rig, model, strict=True)]]
     assert not swings_apart(completed(alike), twins)
 
 
 def test_timing_is_told_only_where_ticks_were_skipped() -> None:
-    words = in_one_plane(_twins(0.03))
-    quiet, late = (answer_of(_small(), words, {"ticks": 500.0, "overruns": o}, [], "") for o in (0.0, 7.0))
+    twins = _twins(0.03)
+    quiet, late = (answer_of(_small(), twins, {"ticks": 500.0, "overruns": o}, [], "") for o in (0.0, 7.0))
     assert "7 of 500" in " ".join(late.lines()) and "of 500" not in " ".join(quiet.lines())
 
 
 def test_a_trial_that_was_odd_or_never_settled_is_told() -> None:
     table = _small().assign(settling=np.nan, odd=["", "the marker jumped", "", "", "", ""])
-    lines = " ".join(answer_of(table, in_one_plane(_twins(0.03)), {}, ["chatters: 2 of 5 trials"], "").lines())
+    lines = " ".join(answer_of(table, _twins(0.03), {}, ["chatters: 2 of 5 trials"], "").lines())
     assert "the marker jumped" in lines and "never settles" in lines and "chatters: 2 of 5 trials" in lines

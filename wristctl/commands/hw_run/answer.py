@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Hashable, Mapping, Sequence
-from functools import partial
+from collections.abc import Hashable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from wristctl.commands.answer import Answer
+from wristctl.commands.hw_run.results import completed, means, quantities, with_simulation
 from wristctl.commands.printed_table import Table, degrees, two
+from wristctl.commands.quantities import table_of
+from wristctl.simulation.trajectory import PLANES
 
 if TYPE_CHECKING:
     import numpy as np
@@ -22,127 +24,106 @@ if TYPE_CHECKING:
 
 # Factor between measured and simulated error beyond which that is said.
 APART = 1.5
-# Rows of a table by direction; with more there is a row for each controller.
+# Rows of a table by motion; with more there is a row for each controller and push.
 ROWS = 16
 
 
-class Means(NamedTuple):
-    """Means over trials that ended well; nan where there is none, or where one of them never settles."""
-
-    trials: int
-    rmse: float
-    """[rad]"""
-    steady_state: float
-    """[rad]"""
-    settling: float
-    """[s]"""
-    recovery: float
-    """[s]"""
-    simulated: float
-    """RMSE of the same trials in simulation, of the true angle [rad]."""
-    true: float
-    """RMSE of the true angle, where an emulated rig knows it [rad]."""
-
-    @property
-    def compared(self) -> float:
-        """What the simulation is held against: the true error where it is known, else the measured one [rad]."""
-        return self.true if math.isfinite(self.true) else self.rmse
-
-    @property
-    def apart(self) -> bool:
-        """Whether that and the simulated error differ by more than APART."""
-        ratio = self.compared / self.simulated if self.simulated > 0.0 else math.nan
-        return math.isfinite(ratio) and not 1.0 / APART <= ratio <= APART
-
-
-def means_of(trials: pd.DataFrame, twins: Mapping[int, Simulation]) -> Means:
-    """Means of some trials."""
-    import numpy as np
-
-    names = "rmse", "steady_state", "settling", "recovery"
-    rmse, rest, settling, recovery = (
-        float(trials[name].mean(skipna=False)) if len(trials) else math.nan for name in names
-    )
-    simulated = [twins[number].metrics["rmse"] for number in trials["trial"]]
-    model = float(np.mean(simulated)) if simulated else math.nan
-    true = float(trials["true_rmse"].mean(skipna=False)) if len(trials) and "true_rmse" in trials else math.nan
-    return Means(len(trials), rmse, rest, settling, recovery, model, true)
-
-
-class TrialWords(NamedTuple):
-    """What is said of trials that ended well, and of which controllers."""
-
-    sentence: Callable[[pd.DataFrame, str], str]
-    """of those of one controller"""
-    table: Callable[[pd.DataFrame, Sequence[str]], Table]
-    apart: Callable[[pd.DataFrame, Sequence[str]], list[str]]
-    """where they and their simulation do not agree"""
-    twins: Mapping[int, Simulation]
-    """their simulation, by the trial's number"""
-
-
-def in_one_plane(twins: Mapping[int, Simulation]) -> TrialWords:
-    """Words for trials in one plane beside their simulation, by the trial's number."""
-    return TrialWords(
-        partial(_sentence, twins=twins), partial(_table, twins=twins), partial(_apart, twins=twins), twins
-    )
-
-
 def answer_of(
-    trials: pd.DataFrame, words: TrialWords, metrics: Mapping[str, float], marks: Sequence[str], run: str
+    trials: pd.DataFrame, twins: Mapping[int, Simulation], metrics: Mapping[str, float], marks: Sequence[str], run: str
 ) -> Answer:
-    """What the trials came to; `trials` are all that began, `run` is the path of their run."""
+    """What the trials came to beside their simulation, by the trial's number; `run` is the path of their run."""
     done = completed(trials)
-    labels = list(dict.fromkeys(done["label"]))
+    compared, labels = with_simulation(done, twins), list(dict.fromkeys(done["label"]))
     more = f"All tables: --all. Every trial: {run}/report.html" if run else "All tables: `.tables`."
-    notes = [*words.apart(done, labels), *swings_apart(done, words.twins), *unsound(trials, marks, metrics)]
+    notes = [*_apart(compared, labels), *swings_apart(done, twins), *unsound(trials, marks, metrics)]
     if not labels:
         return Answer(f"None of {len(trials)} trials was completed.", None, notes, more)
-    sentences = [words.sentence(done[done["label"] == label], label) for label in labels[:2]]
+    sentences = [_sentence(compared[compared["label"] == label], label) for label in labels[:2]]
     stopped = len(trials) - len(done)
     sentences.append(f"{stopped} of {len(trials)} trials left out." if stopped else "No trial ended early.")
-    return Answer(" ".join(sentences), words.table(done, labels), notes, more)
+    return Answer(" ".join(sentences), _table(compared), notes, more)
 
 
-def _sentence(trials: pd.DataFrame, label: str, twins: Mapping[int, Simulation]) -> str:
+def _sentence(trials: pd.DataFrame, label: str) -> str:
+    """Errors, settling and recovery of the trials of one controller."""
+    two_planes = "rmse_ulnar" in trials
     free, pushed = trials[trials["push"] == 0.0], trials[trials["push"] != 0.0]
     parts = []
     if len(free):
-        means = means_of(free, twins)
-        each = [means_of(group, twins).rmse for _, group in free.groupby("direction", sort=False)]
-        said = [f"truly {in_deg(means.true)} deg"] * math.isfinite(means.true)
-        said += [f"{degrees(min(each))} to {degrees(max(each))} deg by direction"] * (len(each) > 1)
-        parts.append(f"error {in_deg(means.rmse)} deg RMSE" + f" ({'; '.join(said)})" * bool(said))
-        parts.append(_within("settles", means.settling))
+        told = means(free)
+        error, said = _error(told)
+        each = free.groupby("direction", sort=False)["rmse"].mean()
+        if len(each) > 1:
+            said.append(f"{degrees(float(each.min()))} to {degrees(float(each.max()))} deg by direction")
+        parts.append(error + f" ({'; '.join(said)})" * bool(said))
+        if not two_planes or math.isfinite(told["settling"]):
+            parts.append(_within("settles", told["settling"]))
     if len(pushed):
-        means = means_of(pushed, twins)
-        force = ", ".join(f"{newtons:g}" for newtons in sorted({abs(force) for force in pushed["push"]}))
-        after = f"after a push of {force} N"
-        recovers = "is back at once" if means.recovery == 0.0 else _within("recovers", means.recovery)
-        truly = f", truly {in_deg(means.true)} deg" * math.isfinite(means.true)
-        parts.append(f"{recovers} {after} (error {in_deg(means.rmse)} deg RMSE with it{truly})")
-    return f"{label}: {', '.join(parts)}."
+        told = means(pushed)
+        force = ", ".join(f"{newtons:g}" for newtons in sorted(set(pushed["force"])))
+        recovers = "is back at once" if told["recovery"] == 0.0 else _within("recovers", told["recovery"])
+        error, said = _error(told)
+        parts.append(f"{recovers} after a push of {force} N ({', '.join([f'{error} with it', *said])})")
+    return f"{label}{' in two planes' * two_planes}: {', '.join(parts)}."
+
+
+def _error(told: Mapping[str, float]) -> tuple[str, list[str]]:
+    """The error in degrees; and what it is by plane where there are two, and truly where that is known."""
+    each = [f"{_in_deg(told[f'rmse_{plane}'])} deg toward {plane}" for plane in PLANES if f"rmse_{plane}" in told]
+    known = math.isfinite(told["true_rmse"])
+    return f"error {_in_deg(told['rmse'])} deg RMSE", [*each, *[f"truly {_in_deg(told['true_rmse'])} deg"] * known]
 
 
 def _within(verb: str, seconds: float) -> str:
     return f"{verb} within {two(seconds)} s" if math.isfinite(seconds) else f"never {verb} in some trial"
 
 
-def in_deg(angle: float) -> str:
-    """An angle [rad] in degrees; a dash where there is none."""
+def _in_deg(angle: float) -> str:
     return degrees(angle) if math.isfinite(angle) else "-"
 
 
-def in_s(seconds: float) -> str:
-    """A time [s]; a dash where there is none."""
-    return two(seconds) if math.isfinite(seconds) else "-"
+# Means in the table of the answer.
+_TOLD = (
+    "rmse_ulnar", "rmse_flexion", "rmse", "true_rmse", "simulated_rmse", "steady_state", "settling", "recovery",
+    "true_recovery",
+)  # fmt: skip
 
 
-def completed(trials: pd.DataFrame) -> pd.DataFrame:
-    """Trials that ended well, with `label`, and their swings at rest from crest to crest [rad], by log and truly."""
-    done = trials[trials["outcome"] == "ok"]
-    swings = {f"{true}swing": 2.0 * done[f"{true}oscillation"] for true in ("", "true_")}
-    return done.assign(label=done["controller"] + "/" + done["gains"], **swings)
+def _table(trials: pd.DataFrame) -> Table:
+    """A row for each controller, motion and push; for very many a row for each controller and push.
+
+    Columns without a number are left out.
+    """
+    by = ["label", "direction", "force"]
+    if trials.groupby(by).ngroups > ROWS:
+        by.remove("direction")
+    first = {name: list(dict.fromkeys(trials[name])) for name in ("label", "direction")}
+    groups: list[dict[str, Any]] = [
+        dict(zip(by, key, strict=True)) | means(group) for key, group in trials.groupby(by, sort=False)
+    ]
+    groups.sort(key=lambda group: [first[name].index(group[name]) if name in first else group[name] for name in by])
+    named = [name for name in by if name != "label" or trials["label"].nunique() > 1]
+    known = [name for name in _TOLD if any(math.isfinite(group.get(name, math.nan)) for group in groups)]
+    return table_of("", quantities([*named, *known]), groups)
+
+
+def _apart(trials: pd.DataFrame, labels: Sequence[str]) -> list[str]:
+    """Where measured, or where it is known true, and simulated errors differ much, in one paragraph."""
+    facts = []
+    for label in labels:
+        for pushed in (False, True):
+            told = means(trials[(trials["label"] == label) & ((trials["push"] != 0.0) == pushed)])
+            known = math.isfinite(told["true_rmse"])
+            measured, simulated = told["true_rmse"] if known else told["rmse"], told["simulated_rmse"]
+            ratio = measured / simulated if simulated > 0.0 else math.nan
+            if math.isfinite(ratio) and not 1.0 / APART <= ratio <= APART:
+                times = f"{two(max(ratio, 1.0 / ratio))} times {'larger' if ratio > 1.0 else 'smaller'}"
+                where = f"{f'{label} ' * (len(labels) > 1)}{'with' if pushed else 'without'} a push"
+                size = f"{'truly ' * known}{_in_deg(measured)} deg"
+                facts.append(f"{where} {size}, {times} than {_in_deg(simulated)} deg simulated")
+    if not facts:
+        return []
+    return [f"Measured and simulated errors do not agree: {'; '.join(facts)}. Do not rely on that simulation here."]
 
 
 class Swings(NamedTuple):
@@ -237,50 +218,6 @@ def swings_apart(done: pd.DataFrame, twins: Mapping[int, Simulation]) -> list[st
             f"deg: {kinder}, by {degrees(float(one[worst] - other[worst]))} deg. Do not rely on that simulation here."
         )
     return notes
-
-
-def _table(done: pd.DataFrame, labels: Sequence[str], twins: Mapping[int, Simulation]) -> Table:
-    """A row for each direction and controller, with and without a push; for very many a row for each controller."""
-    directions = list(dict.fromkeys(done["direction"]))
-    by_direction = len(directions) * len(labels) <= ROWS
-    heads = (
-        "controller", "direction", "error [deg]", "simulated [deg]", "final error [deg]", "settling [s]",
-        "pushed [deg]", "recovery [s]",
-    )  # fmt: skip
-    rows = []
-    for label in labels:
-        of_label = done[done["label"] == label]
-        for direction in directions if by_direction else ["all"]:
-            group = of_label if direction == "all" else of_label[of_label["direction"] == direction]
-            if group.empty:
-                continue
-            free, pushed = (means_of(group[(group["push"] != 0.0) == push], twins) for push in (False, True))
-            rows.append(
-                (label, direction, in_deg(free.rmse), in_deg(free.simulated), in_deg(free.steady_state),
-                 in_s(free.settling), in_deg(pushed.rmse), in_s(pushed.recovery))
-            )  # fmt: skip
-    told = [column for column in range(len(heads)) if column < 4 or any(row[column] != "-" for row in rows)]
-    shown = [column for column in told if column > 0 or len(labels) > 1]
-    return Table("", [heads[column] for column in shown], [tuple(row[column] for column in shown) for row in rows])
-
-
-def _apart(done: pd.DataFrame, labels: Sequence[str], twins: Mapping[int, Simulation]) -> list[str]:
-    """Where measured and simulated errors differ much, in one paragraph."""
-    facts = []
-    for label in labels:
-        for pushed in (False, True):
-            means = means_of(done[(done["label"] == label) & ((done["push"] != 0.0) == pushed)], twins)
-            if means.apart:
-                ratio = means.compared / means.simulated
-                times = f"{two(max(ratio, 1.0 / ratio))} times {'larger' if ratio > 1.0 else 'smaller'}"
-                where = f"{f'{label} ' * (len(labels) > 1)}{'with' if pushed else 'without'} a push"
-                true = "truly " * math.isfinite(means.true)
-                facts.append(
-                    f"{where} {true}{in_deg(means.compared)} deg, {times} than {in_deg(means.simulated)} deg simulated"
-                )
-    if not facts:
-        return []
-    return [f"Measured and simulated errors do not agree: {'; '.join(facts)}. Do not rely on that simulation here."]
 
 
 def unsound(trials: pd.DataFrame, marks: Sequence[str], metrics: Mapping[str, float]) -> list[str]:

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from wristctl.commands.answer import Answer
 from wristctl.commands.calibrate.wrist import CALIBRATION
-from wristctl.commands.hw_run.answer import answer_of, in_one_plane, marks_of
+from wristctl.commands.hw_run.results import Performed, performed
 from wristctl.commands.inputs import EarlierRun, Inputs
 from wristctl.commands.inputs_of_loops import (
     check_inverses,
@@ -27,49 +26,19 @@ from wristctl.commands.loop_warnings import (
     warn_outside_conditions,
 )
 from wristctl.commands.procedure import Procedure
-from wristctl.commands.results import StudyResult
 from wristctl.commands.rig_description import describe_rig
 from wristctl.commands.session import Session
 from wristctl.config.study import Study
 from wristctl.errors import under
 
 if TYPE_CHECKING:
-    import pandas as pd
-
-    from wristctl.commands.hw_run.trial_bends import PerformedBends
     from wristctl.config.hw_run import HwRunSettings
     from wristctl.config.wrist import WristParameters
     from wristctl.control.table import Gains
-    from wristctl.simulation.repetitions import Simulation
     from wristctl.wrist.kinematics import Inverse
 
 # Time between two samples of a motion by which it is checked before a run [s].
 _CHECKED = 0.01
-
-
-@dataclass(frozen=True, repr=False, eq=False)
-class Performed(StudyResult):
-    """Trials on a rig, and the same in simulation."""
-
-    kind = "hw-run"
-
-    trials: pd.DataFrame
-    twins: dict[int, Simulation]
-    """by the trial's number"""
-
-    @property
-    def answer(self) -> Answer:
-        """Error by direction, settling and recovery, and how far simulation agrees."""
-        return answer_of(self.trials, in_one_plane(self.twins), self.metrics, self.marks, self.place)
-
-    @property
-    def marks(self) -> list[str]:
-        """What the wrist does wrong in trials that ended well: `marks_of`."""
-        return marks_of(self.trials, self.twins, self.study.wrist.tension_range, 2)
-
-    def frame(self) -> pd.DataFrame:
-        """One row per trial that began."""
-        return self.trials
 
 
 def plan(study: Study, inputs: Inputs) -> str:
@@ -124,12 +93,10 @@ def check_bends_of_trials(settings: HwRunSettings, wrist: WristParameters) -> No
         controller(row.controller)
 
 
-def hw_run(session: Session) -> Performed | PerformedBends:
+def hw_run(session: Session) -> Performed:
     """Perform trials, emulated or on hardware: in four directions or both planes at once, with and without a push."""
     session.operator.tell(describe_rig(session.study.hw_run))
     warn_of_first_repetitions(session.study.hw_run.rows)
-    from wristctl.commands.hw_run.results import trial_tables
-    from wristctl.commands.hw_run.trial_bends import bends_performed
     from wristctl.commands.hw_run.trials import perform_trials
 
     study, bench = session.study, session.study.wrist
@@ -148,11 +115,7 @@ def hw_run(session: Session) -> Performed | PerformedBends:
     limited_session = _limited(identified_session, network, tuned)
     trials = perform_trials(limited_session, bench, network, tuned)
     identified_session = with_record(identified_session)
-    if believed.planes == 2:
-        performed = bends_performed(identified_session, trials, tuned)
-        return replace(performed, study=study)
-    tables, twins = trial_tables(identified_session, trials, network, tuned)
-    return Performed(study, session.findings, tables, trials, twins)
+    return replace(performed(identified_session, trials, network, tuned), study=study)
 
 
 def _limited(session: Session, network: Inverse | None, tuned: Gains | None) -> Session:
@@ -182,7 +145,7 @@ def _limited(session: Session, network: Inverse | None, tuned: Gains | None) -> 
     return replace(session, study=changed)
 
 
-HW_RUN: Procedure[Performed | PerformedBends] = Procedure(
+HW_RUN: Procedure[Performed] = Procedure(
     "hw-run",
     plan,
     hw_run,

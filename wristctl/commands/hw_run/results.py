@@ -1,62 +1,140 @@
-"""Tables and figures of hw-run: beside the paper's experiment and a simulation of the same trials."""
+"""Trials on a rig as a result: their metrics beside a simulation of the same trials and the paper's experiment."""
 
-from collections.abc import Iterator, Mapping, Sequence
-from typing import Any
+from __future__ import annotations
 
-import numpy as np
-import pandas as pd
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
 
-from wristctl.commands.hw_run import figures as trial_figures
-from wristctl.commands.hw_run.answer import completed
-from wristctl.commands.printed_table import Table
-from wristctl.commands.results import Findings
+from wristctl.commands.answer import Answer
+from wristctl.commands.quantities import Quantity, table_of
+from wristctl.commands.results import Findings, StudyResult
 from wristctl.commands.session import Session
-from wristctl.comparison.paper import EXPERIMENT
-from wristctl.control.table import Gains
-from wristctl.simulation.repetitions import Simulation
-from wristctl.trial.trial_results import twin
-from wristctl.trial.trials import Trial
-from wristctl.wrist.directions import ACTIVE, DIRECTIONS
-from wristctl.wrist.kinematics import Inverse
 
-# The simulation of each trial, by its number.
-Twins = dict[int, Simulation]
+if TYPE_CHECKING:
+    import pandas as pd
 
-_MEANS = {
-    "rmse": "rad", "steady_state": "rad", "settling": "s", "recovery": "s", "true_rmse": "rad",
-    "true_steady_state": "rad",
-}  # fmt: skip
-_COLUMNS = (
-    "", "trials", "RMSE [rad]", "steady state [rad]", "settling [s]", "recovery [s]", "true RMSE [rad]",
-    "true steady state [rad]", "simulated RMSE [rad]", "simulated steady state [rad]",
+    from wristctl.control.table import Gains
+    from wristctl.simulation.repetitions import Simulation
+    from wristctl.wrist.kinematics import Inverse
+
+_QUANTITIES = {
+    quantity.name: quantity
+    for quantity in (
+        Quantity("trial"),
+        Quantity("label", heading="controller"),
+        Quantity("direction", heading="motion"),
+        Quantity("force", "N", heading="push"),
+        Quantity("push", "N"),
+        Quantity("trials"),
+        Quantity("rmse_ulnar", "rad", heading="RMSE toward ulnar"),
+        Quantity("rmse_flexion", "rad", heading="RMSE toward flexion"),
+        Quantity("rmse", "rad", heading="RMSE"),
+        Quantity("largest_error", "rad"),
+        Quantity("steady_state", "rad"),
+        Quantity("settling", "s"),
+        Quantity("recovery", "s"),
+        Quantity("overshoot", "%"),
+        Quantity("swing", "rad", heading="swing at rest, peak to peak"),
+        Quantity("peak_tension", "N"),
+        Quantity("outcome"),
+    )
+}
+# Metrics of which means are taken, by the log and truly; those also of the trials' simulation; and those of each trial.
+_BY_LOG = ("rmse_ulnar", "rmse_flexion", "rmse", "steady_state", "settling", "recovery")
+_OF_MEANS = (*_BY_LOG, "true_rmse_ulnar", "true_rmse_flexion", "true_rmse", "true_steady_state", "true_recovery")
+_SIMULATED = ("rmse_ulnar", "rmse_flexion", "rmse", "steady_state")
+_OF_A_TRIAL = (
+    "trial", "direction", "push", "label", "rmse_ulnar", "rmse_flexion", "rmse", "true_rmse", "largest_error",
+    "steady_state", "overshoot", "swing", "true_swing", "settling", "recovery", "true_recovery", "peak_tension",
+    "outcome",
 )  # fmt: skip
-_BY_TRIAL = {
-    "trial": "trial", "direction": "direction", "push": "push [N]", "label": "controller", "rmse": "RMSE [rad]",
-    "steady_state": "steady state [rad]", "settling": "settling [s]", "recovery": "recovery [s]",
-    "overshoot": "overshoot [%]", "swing": "swing at rest, peak to peak [rad]",
-    "true_swing": "true swing [rad]", "peak_tension": "peak tension [N]", "outcome": "outcome",
-}  # fmt: skip
 
 
-def trial_tables(
-    session: Session, trials: pd.DataFrame, network: Inverse | None, tuned: Gains | None
-) -> tuple[list[Table], Twins]:
+def quantities(names: Iterable[str]) -> list[Quantity]:
+    """Quantities of trials by name, after `true_` of the true bend, after `simulated_` of the trials' simulation."""
+    found = []
+    for name in names:
+        begin, _, rest = name.partition("_")
+        if begin in ("true", "simulated"):
+            of_log = _QUANTITIES[rest]
+            heading = f"{begin} {of_log.heading.partition(',')[0] or rest.replace('_', ' ')}"
+            found.append(replace(of_log, name=name, heading=heading))
+        else:
+            found.append(_QUANTITIES[name])
+    return found
+
+
+@dataclass(frozen=True, repr=False, eq=False)
+class Performed(StudyResult):
+    """Trials on a rig in one plane or two, and the same in simulation."""
+
+    kind = "hw-run"
+
+    trials: pd.DataFrame
+    twins: dict[int, Simulation]
+    """by the trial's number"""
+
+    @property
+    def answer(self) -> Answer:
+        """Error by motion, settling and recovery, and how far simulation agrees."""
+        from wristctl.commands.hw_run.answer import answer_of
+
+        return answer_of(self.trials, self.twins, self.metrics, self.marks, self.place)
+
+    @property
+    def marks(self) -> list[str]:
+        """What the wrist does wrong in trials that ended well: `marks_of`."""
+        from wristctl.commands.hw_run.answer import marks_of
+        from wristctl.trial.rig_belief import layout_of_rig, numbers_of
+
+        settings, wrist = self.study.hw_run, self.study.wrist
+        places = 2 if settings.planes == 1 else len(numbers_of(layout_of_rig(settings, wrist)))
+        return marks_of(self.trials, self.twins, wrist.tension_range, places)
+
+    def frame(self) -> pd.DataFrame:
+        """One row per trial that began."""
+        return self.trials
+
+
+def performed(session: Session, trials: pd.DataFrame, network: Inverse | None, tuned: Gains | None) -> Performed:
     """Tables of all trials that ended well, with metrics and figures, and the simulation of each."""
-    trials = completed(trials)
-    twins = twins_of(session, trials, network, tuned)
-    theirs = bool((trials["controller"] == "smc").any())
+    from wristctl.commands.hw_run.figures import draw_trials
+
+    findings, done = session.findings, completed(trials)
+    twins = twins_of(session, done, network, tuned)
+    theirs = bool((done["controller"] == "smc").any())
     labels = [row.label for row in session.study.hw_run.rows]
-    means = means_of_trials(session.findings, trials, labels, twins, _MEANS, ("rmse", "steady_state"))
-    rows = [*means, *(_papers() if theirs else ())]
-    by_trial = Table("Trials, in the order done", list(_BY_TRIAL.values()), trials[list(_BY_TRIAL)].to_numpy().tolist())
+    compared = with_simulation(done, twins)
+    rows = [*_means_kept(findings, compared, labels), *(_papers() if theirs else ())]
     with session.drawing():
-        _draw(session, trials, twins)
+        draw_trials(session, done, twins)
     title = "Means over the trials" + ", beside the paper's experiment with the same law" * theirs
-    return [Table(title, _COLUMNS, rows), by_trial], twins
+    columns = ("label", "trials", *_known(compared))
+    of_trials = [name for name in _OF_A_TRIAL if name in done]
+    tables = [
+        table_of(title, quantities(columns), rows),
+        table_of("Trials, in the order done", quantities(of_trials), done[of_trials].to_dict("records")),
+    ]
+    if "rmse_ulnar" in done:
+        findings.headline("rmse", "rmse_ulnar", "rmse_flexion", "true_rmse", "pushed_true_rmse")
+    return Performed(session.study, findings, tables, trials, twins)
 
 
-def twins_of(session: Session, done: pd.DataFrame, network: Inverse | None, tuned: Gains | None) -> Twins:
-    """Simulation of every trial that ended well. Repetitions share one."""
+def completed(trials: pd.DataFrame) -> pd.DataFrame:
+    """Trials that ended well, with `label`, and their swings at rest from crest to crest [rad], by log and truly."""
+    done = trials[trials["outcome"] == "ok"]
+    swings = {f"{true}swing": 2.0 * done[f"{true}oscillation"] for true in ("", "true_")}
+    return done.assign(label=done["controller"] + "/" + done["gains"], force=done["push"].abs(), **swings)
+
+
+def twins_of(
+    session: Session, done: pd.DataFrame, network: Inverse | None, tuned: Gains | None
+) -> dict[int, Simulation]:
+    """Simulation of every trial that ended well, by its number. Repetitions share one."""
+    from wristctl.trial.trial_results import twin
+    from wristctl.trial.trials import Trial
+
     names = [row.label for row in session.study.hw_run.rows]
     simulated: dict[tuple[Any, ...], Simulation] = {}
     twins = {}
@@ -70,79 +148,45 @@ def twins_of(session: Session, done: pd.DataFrame, network: Inverse | None, tune
     return twins
 
 
-def means_of_trials(
-    findings: Findings, done: pd.DataFrame, labels: Sequence[str], twins: Twins, units: Mapping[str, str],
-    simulated: Sequence[str],
-) -> Iterator[tuple[Any, ...]]:  # fmt: skip
-    """A row for each controller with and without a push: number of trials, means of the metrics that have units here,
-    and means of those `simulated`. A metric for each number; what follows a push only with one."""
+def with_simulation(done: pd.DataFrame, twins: Mapping[int, Simulation]) -> pd.DataFrame:
+    """The trials with the metrics of their simulation as `simulated_...`."""
+    names = [name for name in _SIMULATED if name in done]
+    courses = [twins[number].metrics for number in done["trial"]]
+    return done.assign(**{f"simulated_{name}": [metrics[name] for metrics in courses] for name in names})
+
+
+def _known(trials: pd.DataFrame) -> list[str]:
+    return [name for name in (*_OF_MEANS, *(f"simulated_{name}" for name in _SIMULATED)) if name in trials]
+
+
+def means(trials: pd.DataFrame) -> dict[str, float]:
+    """Number of trials, and means of their metrics; nan where there is none, or where one of them has no value."""
+    values = trials[_known(trials)].astype(float).mean(skipna=False)
+    return {"trials": len(trials), **{str(name): float(value) for name, value in values.items()}}
+
+
+def _means_kept(findings: Findings, trials: pd.DataFrame, labels: Sequence[str]) -> Iterator[dict[str, Any]]:
+    """Means for each controller with and without a push, each number a metric; what follows a push only with one."""
     for label, pushed in ((label, pushed) for pushed in (False, True) for label in labels):
-        group = done[(done["label"] == label) & ((done["push"] != 0.0) == pushed)]
+        group = trials[(trials["label"] == label) & ((trials["push"] != 0.0) == pushed)]
         if group.empty:
             continue
-        means = {name: float(group[name].mean(skipna=False)) for name in units}
-        model = [float(np.mean([twins[number].metrics[name] for number in group["trial"]])) for name in simulated]
-        for name, unit in units.items():
-            if name.endswith("recovery") and not pushed:
+        values = means(group)
+        for quantity in quantities(name for name in _OF_MEANS if name in values):
+            if quantity.name.endswith("recovery") and not pushed:
                 continue
             whose = [label.replace("/", "-").replace(" ", "-")] if len(labels) > 1 else []
-            full = "_".join([*["pushed"] * pushed, name, *whose])
+            name = "_".join([*["pushed"] * pushed, quantity.name, *whose])
             meaning = f"mean over trials{' with a push' * pushed}, {label}"
-            findings.metric(full, means[name], unit, "lower", n=len(group), meaning=meaning)
-        yield (f"{label}{', pushed' * pushed}", len(group), *means.values(), *model)
+            findings.metric(name, values[quantity.name], quantity.unit, "lower", n=len(group), meaning=meaning)
+        yield {"label": f"{label}{', pushed' * pushed}", **values}
 
 
-def _papers() -> Iterator[tuple[Any, ...]]:
+def _papers() -> Iterator[dict[str, Any]]:
     """Hardware results of the paper's own law."""
+    from wristctl.comparison.paper import EXPERIMENT
+
     for name, printed in EXPERIMENT.items():
         count = 4 if name == "four directions" else 1
-        yield (f"paper: {name}", count, printed.rmse, printed.steady_state, printed.settling, *[None] * 5)
-
-
-def _draw(session: Session, trials: pd.DataFrame, twins: Twins) -> None:
-    findings, settings = session.findings, session.study.hw_run
-    push, log = settings.push, _logged(findings, "log")
-    courses = []
-    for record in trials.to_dict("records"):
-        course, simulated = log[log["trial"] == record["trial"]], twins[record["trial"]].trajectory
-        courses.append(
-            trial_figures.LoggedTrial(
-                direction=record["direction"],
-                label=record["label"],
-                repetition=record["repetition"],
-                **{name: course[name].to_numpy(float) for name in ("time", "theta", "theta_ref", "theta_desired")},
-                tension=_sides(course, record["direction"]),
-                simulated=(simulated.time, simulated.theta, simulated.error),
-                push=(push.start, push.start + push.duration) if record["push"] else None,
-            )
-        )
-    for prefix, some in (
-        ("", [course for course in courses if course.push is None]),
-        ("pushed-", [course for course in courses if course.push is not None]),
-    ):
-        if some:
-            findings.figure(f"{prefix}directions", trial_figures.desired_and_obtained, some)
-            findings.figure(f"{prefix}errors", trial_figures.errors, some)
-            row = settings.rows[0]
-            first = [
-                logged_trial
-                for logged_trial in some
-                if logged_trial.label == row.label and logged_trial.repetition == 0
-            ]
-            findings.figure(f"{prefix}tensions", trial_figures.tensions, first, row.label)
-    if settings.real_time or settings.port is not None:
-        logs = (log, _logged(findings, "between"))
-        late = np.concatenate([table["late"].to_numpy(float) for table in logs])
-        findings.figure("lateness", trial_figures.lateness, late, settings.control_period)
-
-
-def _logged(findings: Findings, name: str) -> pd.DataFrame:
-    assert findings.run is not None
-    return pd.read_csv(findings.run.file(f"data/{name}.csv"))
-
-
-def _sides(course: pd.DataFrame, direction: str) -> Any:
-    """Commanded tension (T, 2) of one tendon of the direction's side and of one of the other."""
-    pulling = DIRECTIONS[direction].tendons
-    holding = next(tendon for tendon in ACTIVE if tendon not in pulling)
-    return course[[f"tension_{pulling[0]}", f"tension_{holding}"]].to_numpy(float)
+        numbers = {"rmse": printed.rmse, "steady_state": printed.steady_state, "settling": printed.settling}
+        yield {"label": f"paper: {name}", "trials": count, **numbers}
