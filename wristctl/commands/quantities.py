@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from wristctl.identification.arc_fit import Told
 
 # Factors from a unit of files to one that people read; a table turns angles into degrees by itself.
-_SCALES = {("s", "ms"): 1e3, ("m", "mm"): 1e3, ("m", "um"): 1e6, ("J", "mJ"): 1e3, ("", "%"): 100.0}
+_SCALES = {("1/s", "Hz"): 1.0, ("s", "ms"): 1e3, ("m", "mm"): 1e3, ("m", "um"): 1e6, ("J", "mJ"): 1e3, ("", "%"): 100.0}
 
 
 @dataclass(frozen=True)
