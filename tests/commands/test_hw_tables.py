@@ -13,7 +13,8 @@ import pytest
 import wristctl
 from tests.commands.conftest import repeated
 from wristctl.commands.hw_run.answer import answer_of, swings_apart
-from wristctl.commands.hw_run.results import Performed, completed, performed
+from wristctl.commands.hw_run.results import Performed, performed
+from wristctl.commands.hw_run.trial_means import completed
 from wristctl.commands.inputs import Inputs
 from wristctl.commands.printed_table import Table
 from wristctl.commands.progress import watched

@@ -7,7 +7,7 @@ from collections.abc import Hashable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from wristctl.commands.answer import Answer
-from wristctl.commands.hw_run.results import completed, means, quantities, with_simulation
+from wristctl.commands.hw_run.trial_means import completed, means, quantities, with_simulation
 from wristctl.commands.printed_table import Table, degrees, two
 from wristctl.commands.quantities import table_of
 from wristctl.simulation.trajectory import PLANES

@@ -26,6 +26,7 @@ from wristctl.plotting.style import (
     VERMILLION,
     WANTED,
     figure,
+    grid,
     legend_below,
     line,
     logarithmic,
@@ -116,12 +117,8 @@ def _draw_simulated(panel: Axes, course: LoggedTrial, which: Literal[1, 2]) -> N
 
 def _panels(courses: Sequence[LoggedTrial], **shared: Any) -> tuple[Figure, dict[str, Axes]]:
     names = [name for name in DIRECTIONS if any(course.direction == name for course in courses)]
-    columns = min(2, len(names))
-    rows = -(-len(names) // columns)
-    picture, axes = figure(rows, columns, height=0.9 + 1.9 * rows, sharex=True, **shared)
-    for panel in axes.flat[len(names) :]:
-        panel.set_visible(False)
-    return picture, dict(zip(names, axes.ravel().tolist(), strict=False))
+    picture, panels = grid(len(names), 2, 1.9, sharex=True, **shared)
+    return picture, dict(zip(names, panels, strict=True))
 
 
 def _finished(
