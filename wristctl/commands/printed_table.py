@@ -66,7 +66,12 @@ class Table:
         """Heads and cells as people read them."""
         columns, rows = readable(self.columns, [[_plain(value) for value in row] for row in self.rows])
         angles = [column.endswith("[deg]") for column in columns]
-        cells = [[_cell(value, digits, angle) for value, angle in zip(row, angles, strict=False)] for row in rows]
+        unit_at = columns.index("unit") if "unit" in columns else None
+        cells = []
+        for row in rows:
+            is_angle = unit_at is not None and row[unit_at] == "deg"
+            values = zip(row, angles, strict=False)
+            cells.append([_cell(value, digits, angle or is_angle) for value, angle in values])
         return [printable(column) for column in columns], cells
 
     def _numeric(self) -> list[bool]:
