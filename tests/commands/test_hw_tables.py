@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -272,3 +273,23 @@ def test_a_trial_that_was_odd_or_never_settled_is_told() -> None:
     table = _small().assign(settling=np.nan, odd=["", "the marker jumped", "", "", "", ""])
     lines = " ".join(answer_of(table, _twins(0.03), {}, ["chatters: 2 of 5 trials"], "").lines())
     assert "the marker jumped" in lines and "never settles" in lines and "chatters: 2 of 5 trials" in lines
+
+
+@pytest.mark.parametrize(
+    ("known", "said"),
+    [
+        (math.nan, "with a push of 5 N error 2.3 deg RMSE"),
+        (0.0, "is back at once after a push of 5 N"),
+        (0.25, "recovers within 0.25 s after a push of 5 N"),
+    ],
+)
+def test_in_two_planes_errors_are_told_by_plane_and_a_recovery_only_where_it_is_known(known: float, said: str) -> None:
+    """By the true bend, where the log does not show when the push ended."""
+    planes = {"rmse_ulnar": np.radians(1.0), "rmse_flexion": np.radians(2.0)}
+    table = _small().query("controller == 'smc'").assign(recovery=math.nan, true_recovery=known, true_rmse=math.nan)
+    twins = {number: repeated("twin", [0.04], **planes).first for number in table["trial"]}
+    answer = answer_of(table.assign(**planes), twins, {}, [], "")
+    assert answer.sentence.startswith("smc/printed in two planes: error ") and said in answer.sentence
+    assert "1 deg toward ulnar" in answer.sentence and "2 deg toward flexion" in answer.sentence
+    assert "settles" not in answer.sentence and "never" not in answer.sentence
+    assert answer.table is not None and "simulated RMSE [rad]" in answer.table.columns

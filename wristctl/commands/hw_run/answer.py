@@ -56,14 +56,19 @@ def _sentence(trials: pd.DataFrame, label: str) -> str:
         if len(each) > 1:
             said.append(f"{degrees(float(each.min()))} to {degrees(float(each.max()))} deg by direction")
         parts.append(error + f" ({'; '.join(said)})" * bool(said))
-        if not two_planes or math.isfinite(told["settling"]):
+        if not two_planes:  # a path comes to rest nowhere
             parts.append(_within("settles", told["settling"]))
     if len(pushed):
         told = means(pushed)
         force = ", ".join(f"{newtons:g}" for newtons in sorted(set(pushed["force"])))
-        recovers = "is back at once" if told["recovery"] == 0.0 else _within("recovers", told["recovery"])
+        known = told.get("true_recovery", math.nan) if two_planes else math.nan
+        recovery = known if math.isfinite(known) else told["recovery"]
         error, said = _error(told)
-        parts.append(f"{recovers} after a push of {force} N ({', '.join([f'{error} with it', *said])})")
+        if two_planes and not math.isfinite(recovery):
+            parts.append(f"with a push of {force} N {error}" + f" ({'; '.join(said)})" * bool(said))
+        else:
+            recovers = "is back at once" if recovery == 0.0 else _within("recovers", recovery)
+            parts.append(f"{recovers} after a push of {force} N ({', '.join([f'{error} with it', *said])})")
     return f"{label}{' in two planes' * two_planes}: {', '.join(parts)}."
 
 
