@@ -270,7 +270,7 @@ def test_timing_is_told_only_where_ticks_were_skipped() -> None:
 
 
 def test_a_trial_that_was_odd_or_never_settled_is_told() -> None:
-    table = _small().assign(settling=np.nan, odd=["", "the marker jumped", "", "", "", ""])
+    table = _small().assign(settling=[np.nan, *[1.0] * 5], odd=["", "the marker jumped", "", "", "", ""])
     lines = " ".join(answer_of(table, _twins(0.03), {}, ["chatters: 2 of 5 trials"], "").lines())
     assert "the marker jumped" in lines and "never settles" in lines and "chatters: 2 of 5 trials" in lines
 
