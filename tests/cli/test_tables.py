@@ -11,7 +11,8 @@ import pytest
 
 import wristctl
 from wristctl.cli.runs.latex import latex_table
-from wristctl.commands.printed_table import Table, table_for_people
+from wristctl.commands.printed_table import Table
+from wristctl.reader_units import readable
 
 TABLE = Table("T", ("name", "rmse [rad]", "ok"), [("smc", 1 / 3, True), ("pid", None, False), ("x", math.nan, True)])
 
@@ -20,18 +21,29 @@ def test_columns_are_aligned_and_numbers_have_four_digits() -> None:
     assert TABLE.text().splitlines() == [
         "T",
         "",
-        "name  rmse [rad]  ok",
+        "name  rmse [deg]  ok",
         "----  ----------  ---",
-        "smc       0.3333  yes",
+        "smc         19.1  yes",
         "pid            -  no",
         "x              -  yes",
     ]
 
 
-def test_a_kept_table_is_shown_in_degrees_whatever_else_is_kept_with_it() -> None:
-    kept = {"title": "T", "columns": ["name", "rmse [rad]"], "rows": [["smc", math.pi], ["pid", None]], "note": "more"}
-    shown = table_for_people(kept)
-    assert list(shown.columns) == ["name", "rmse [deg]"] and list(shown.rows) == [["smc", 180.0], ["pid", None]]
+def test_angles_are_read_in_degrees_by_column_and_by_row_and_counts_are_none() -> None:
+    heads, rows = readable(["name", "rmse [rad]"], [["smc", math.pi], ["pid", None]])
+    assert heads == ["name", "rmse [deg]"] and rows == [["smc", 180.0], ["pid", None]]
+    by_row = Table("", ("metric", "value", "unit", "n"), [("rmse", math.pi, "rad", 7), ("peak", 9.5, "N", 7)])
+    assert [line.split() for line in by_row.text().splitlines()[2:]] == [
+        ["rmse", "180", "deg", "7"],
+        ["peak", "9.5", "N", "7"],
+    ]
+    assert by_row.rows[0][1] == math.pi, "a program reads what was computed"
+
+
+def test_an_answer_has_three_digits_and_no_angle_that_nobody_could_measure() -> None:
+    errors = Table("", ("name", "error [rad]", "time [s]"), [("a", 1e-9, 1e-9), ("b", 0.0, 15000.0), ("c", 1.0, 1 / 3)])
+    cells = [line.split() for line in errors.text(digits=3).splitlines()[2:]]
+    assert cells == [["a", "<0.001", "1e-9"], ["b", "0", "15000"], ["c", "57.3", "0.333"]]
 
 
 def test_the_readme_of_a_run_has_its_angles_in_degrees(tmp_path: Path) -> None:
@@ -47,7 +59,7 @@ def test_the_readme_of_a_run_has_its_angles_in_degrees(tmp_path: Path) -> None:
 def test_a_narrow_terminal_gets_the_columns_below_each_other() -> None:
     text = TABLE.text(18)
     assert max(map(len, text.splitlines())) <= 18
-    assert [line.split() for line in text.splitlines() if line.startswith("smc")] == [["smc", "0.3333"], ["smc", "yes"]]
+    assert [line.split() for line in text.splitlines() if line.startswith("smc")] == [["smc", "19.1"], ["smc", "yes"]]
 
 
 def test_counts_are_whole_whatever_library_made_them() -> None:

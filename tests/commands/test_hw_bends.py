@@ -16,8 +16,10 @@ import wristctl
 from tests.commands.conftest import columns_of, session
 from wristctl.commands.adoption import with_planes
 from wristctl.commands.export.open_log_of_run import open_log_of
-from wristctl.commands.hw_run.command import Performed, hw_run, plan
+from wristctl.commands.hw_run.command import hw_run, plan
+from wristctl.commands.hw_run.results import Performed
 from wristctl.commands.inputs import Inputs
+from wristctl.commands.printed_table import degrees
 from wristctl.config.study import Study
 from wristctl.config.wrist import WristParameters
 from wristctl.errors import UserError
@@ -59,6 +61,7 @@ def whole(tmp_path_factory: pytest.TempPathFactory) -> Whole:
     study = study_of()
     with start_run("hw-run", study, "", tmp_path_factory.mktemp("whole")) as live:
         result = hw_run(session(study, live))
+    assert isinstance(result, Performed)
     return Whole(result, Run(live.path))
 
 
@@ -85,17 +88,22 @@ def test_the_answer_has_both_planes_beside_simulation(whole: Whole) -> None:
     answer = whole.result.answer
     assert answer.sentence.startswith("ct-dob/hardware in two planes: error 0.")
     assert "toward ulnar" in answer.sentence and "toward flexion" in answer.sentence
-    assert "after a push of 1 N" in answer.sentence and "No trial ended early." in answer.sentence
-    assert "settles" not in answer.sentence, "the path rests nowhere"
+    assert "a push of 1 N" in answer.sentence and "No trial ended early." in answer.sentence
+    assert "settles" not in answer.sentence and "never" not in answer.sentence, "the path rests nowhere"
     assert answer.table is not None
-    (row,) = answer.table.rows
-    cells = dict(zip(answer.table.columns, row, strict=True))
-    free, pushed = (whole.result.trials[whole.result.trials["push"] == push].iloc[0] for push in (0.0, 1.0))
-    for plane in ("ulnar", "flexion"):
-        assert float(cells[f"toward {plane} [deg]"]) == pytest.approx(np.degrees(free[f"rmse_{plane}"]), rel=0.06)
-    worse = max(pushed["rmse_ulnar"], pushed["rmse_flexion"])
-    assert float(cells["pushed, worse axis [deg]"]) == pytest.approx(np.degrees(worse), rel=0.06)
-    assert ("recovery [s]" in cells) is math.isfinite(pushed["true_recovery"])
+    rows = {
+        row["push [N]"]: row for row in (dict(zip(answer.table.columns, row, strict=True)) for row in answer.table.rows)
+    }
+    trials = {push: whole.result.trials[whole.result.trials["push"] == push].iloc[0] for push in (0.0, 1.0)}
+    assert list(rows) == [0.0, 1.0]
+    for push, row in rows.items():
+        for plane in ("ulnar", "flexion"):
+            assert row[f"RMSE toward {plane} [rad]"] == pytest.approx(trials[push][f"rmse_{plane}"])
+            assert f"truly {degrees(trials[push][f'true_rmse_{plane}'])} deg" in answer.sentence
+        assert row["true RMSE [rad]"] == pytest.approx(trials[push]["true_rmse"])
+    known = trials[1.0]["true_recovery"]
+    assert ("after a push of 1 N" in answer.sentence) is math.isfinite(known)
+    assert rows[1.0].get("recovery [s]", math.nan) == pytest.approx(known, nan_ok=True)
     simulated = [twin.metrics["rmse"] for twin in whole.result.twins.values()]
     assert np.degrees(simulated) == pytest.approx([0.1, 0.1], abs=0.15)
 

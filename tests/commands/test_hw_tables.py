@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -12,9 +13,11 @@ import pytest
 
 import wristctl
 from tests.commands.conftest import repeated
-from wristctl.commands.hw_run import results as hw_tables
-from wristctl.commands.hw_run.answer import answer_of, completed, swings_apart
-from wristctl.commands.hw_run.command import Performed
+from wristctl.commands.answer import Answer
+from wristctl.commands.hw_run.answer import answer_of, swings_apart
+from wristctl.commands.hw_run.figures import _tensions
+from wristctl.commands.hw_run.results import Performed, performed
+from wristctl.commands.hw_run.trial_means import completed
 from wristctl.commands.inputs import Inputs
 from wristctl.commands.printed_table import Table
 from wristctl.commands.progress import watched
@@ -58,7 +61,7 @@ def asked(monkeypatch: pytest.MonkeyPatch) -> list[Trial]:
         found.append(trial)
         return repeated("twin", [trial.number + 1.0], steady_state=0.5).first
 
-    monkeypatch.setattr(hw_tables, "twin", twin)
+    monkeypatch.setattr("wristctl.trial.trial_results.twin", twin)
     return found
 
 
@@ -73,11 +76,13 @@ def tables(tmp_path: Path, settings: str = ROWS) -> tuple[list[Table], Findings,
     with start_run("hw-run", study, "", tmp_path) as run:
         for name in ("log", "between"):
             pd.concat(log).to_csv(run.file(f"data/{name}.csv"), index=False)
+        truth = [table[["trial", "time"]].assign(theta=table["theta"] + 0.05) for table in log]
+        pd.concat(truth).to_csv(run.file("data/truth.csv"), index=False)
         findings = Findings(0, run)
         findings.figure = lambda name, draw, *of, **how: findings.figures.add(name, lambda: draw(*of, **how))  # type: ignore[method-assign]
         session = Session(study, Inputs(), findings, watched(None), Unattended())
-        found, twins = hw_tables.trial_tables(session, trials(), None, None)
-    return found, findings, twins
+        done = performed(session, trials(), None, None)
+    return list(done.tables), findings, done.twins
 
 
 def test_the_papers_numbers_stand_beside_its_own_law_alone(
@@ -93,25 +98,30 @@ def test_the_papers_numbers_stand_beside_its_own_law_alone(
 
 def test_means_are_over_what_ended_well_with_and_without_a_push(tmp_path: Path, asked: list[Trial]) -> None:
     (means, by_trial), _, twins = tables(tmp_path)
-    assert means.columns[:4] == ("", "trials", "RMSE [rad]", "steady state [rad]")
-    smc, pid, pushed, *papers = means.rows
+    rows = [dict(zip(means.columns, row, strict=True)) for row in means.rows]
+    smc, pid, pushed, *papers = rows
+    assert (smc["controller"], smc["trials"]) == ("smc/printed", 3)
     number = 9.0 / 3.0  # of trials 1, 2 and 6, counted from 1
-    assert smc[:2] == ("smc/printed", 3)
-    assert smc[2:8] == pytest.approx([10.0**k * number for k in range(6)])
-    assert smc[8:] == pytest.approx((4.0 / 3.0, 0.5)), "the repetition shares the first one's simulation"
-    assert (pid[:3], pushed[:3]) == (("pid/printed", 1, 5.0), ("smc/printed, pushed", 1, 4.0))
-    assert [paper[:5] for paper in papers] == [
+    names = ("RMSE [rad]", "steady state [rad]", "settling [s]", "recovery [s]", "true RMSE [rad]")
+    assert [smc[name] for name in (*names, "true steady state [rad]")] == pytest.approx(
+        [10.0**k * number for k in range(6)]
+    )
+    simulated = smc["simulated RMSE [rad]"], smc["simulated steady state [rad]"]
+    assert simulated == pytest.approx((4.0 / 3.0, 0.5)), "the repetition shares the first one's simulation"
+    shown = [(row["controller"], row["trials"], row["RMSE [rad]"]) for row in (pid, pushed)]
+    assert shown == [("pid/printed", 1, 5.0), ("smc/printed, pushed", 1, 4.0)]
+    heads = ("controller", "trials", "RMSE [rad]", "steady state [rad]", "settling [s]")
+    assert [tuple(paper[head] for head in heads) for paper in papers] == [
         ("paper: four directions", 4, 0.157, 0.032, 3.0),
         ("paper: pushed, radial", 1, 0.207, 0.029, 3.0),
         ("paper: pushed, flexion", 1, 0.291, 0.031, 3.0),
     ]
-    assert {len(row) for row in means.rows} == {len(means.columns)}
     assert [row[0] for row in by_trial.rows] == [0, 1, 3, 4, 5]
     first = dict(zip(by_trial.columns, by_trial.rows[2], strict=True))
-    assert (first["direction"], first["push [N]"], first["controller"]) == ("ulnar", 5.0, "smc/printed")
+    assert (first["motion"], first["push [N]"], first["controller"]) == ("ulnar", 5.0, "smc/printed")
     assert (first["RMSE [rad]"], first["peak tension [N]"], first["outcome"]) == (4.0, 4e7, "ok")
-    simulated = [(each.number, each.push, each.row) for each in asked]
-    assert simulated == [(0, 0.0, 0), (1, 0.0, 0), (3, 5.0, 0), (4, 0.0, 1)]
+    tried = [(each.number, each.push, each.row) for each in asked]
+    assert tried == [(0, 0.0, 0), (1, 0.0, 0), (3, 5.0, 0), (4, 0.0, 1)]
     assert twins[5] is twins[0] and set(twins) == {0, 1, 3, 4, 5}
 
 
@@ -138,6 +148,11 @@ def test_courses_are_drawn_by_their_log_with_and_without_a_push(tmp_path: Path, 
     assert [float(np.asarray(line.get_ydata())[0]) for line in drawn] == pytest.approx(angles)
     (simulated,) = (line for line in ulnar.lines if line.get_label() == "pid/printed, simulated")
     np.testing.assert_allclose(np.asarray(simulated.get_ydata()), np.degrees(twins[4].trajectory.theta))
+    truly = [float(np.asarray(line.get_ydata())[0]) for line in ulnar.lines if line.get_label() == "true"]
+    assert truly == pytest.approx(np.degrees([0.05, 0.45])), "of each controller's first repetition"
+    off = {axes.get_title("left"): axes for axes in findings.figures["errors"].axes}["ulnar"]
+    true_errors = [float(np.asarray(line.get_ydata())[0]) for line in off.lines if line.get_label() == "true"]
+    assert true_errors == pytest.approx(np.degrees([0.05 - 0.2, 0.45 - 0.2]))
     assert not ulnar.patches
     (pushed,) = findings.figures["pushed-errors"].axes
     (span,) = pushed.patches
@@ -153,7 +168,7 @@ def test_of_three_tendons_in_one_plane_one_of_each_side_is_drawn(direction: str,
     """At 0, 120 and 240 deg from ulnar."""
     layout = TendonLayout(tuple(TendonPlace(float(np.radians(angle)), 0.02) for angle in (0.0, 120.0, 240.0)))
     log = pd.DataFrame({f"tension_{number}": [float(number)] for number in (1, 2, 3)})
-    drawn = hw_tables._tensions(log, direction, ("ulnar",), layout)
+    drawn = _tensions(log, direction, ("ulnar",), layout)
     assert [float(values[0]) for values in drawn.values()] == [pulls, holds]
 
 
@@ -209,13 +224,17 @@ def test_the_answer_gives_error_settling_and_recovery_by_direction_in_degrees() 
     answer = answer_of(table, _twins(0.03), {}, [], "")
     lines = answer.lines()
     assert len(lines) <= 32 and max(map(len, lines)) <= 100 and answer.table is not None
-    rows = {(row[0], row[1]): row[2:] for row in answer.table.rows}
-    assert set(rows) == {("smc/printed", "ulnar"), ("smc/printed", "radial"), ("pid/printed", "ulnar")}
-    ulnar = rows["smc/printed", "ulnar"]  # trials 1 and 6 without a push, 4 with one
-    assert float(ulnar[0]) == pytest.approx(np.degrees(0.035), rel=0.05)
-    assert float(ulnar[4]) == pytest.approx(np.degrees(0.04), rel=0.05)
-    assert float(ulnar[5]) == pytest.approx(4000.0) and rows["pid/printed", "ulnar"][4:] == ("-", "-")
-    assert f"{float(ulnar[1]):.3g}" == f"{float(f'{np.degrees(0.03):.2g}'):.3g}"
+    rows = {row[:3]: dict(zip(answer.table.columns, row, strict=True)) for row in answer.table.rows}
+    assert list(rows) == [
+        ("smc/printed", "ulnar", 0.0), ("smc/printed", "ulnar", 5.0), ("smc/printed", "radial", 0.0),
+        ("pid/printed", "ulnar", 0.0),
+    ]  # fmt: skip
+    free, pushed = rows["smc/printed", "ulnar", 0.0], rows["smc/printed", "ulnar", 5.0]
+    assert free["RMSE [rad]"] == pytest.approx(0.035), "of trials 1 and 6"
+    assert pushed["RMSE [rad]"] == pytest.approx(0.04) and pushed["recovery [s]"] == pytest.approx(4000.0)
+    assert free["simulated RMSE [rad]"] == pytest.approx(0.03)
+    shown = next(line.split() for line in lines if line.startswith("smc/printed  ulnar"))
+    assert shown[3] == "2.01", "as people read it, in degrees"
     assert "1 of 6 trials" in " ".join(lines), "one was stopped"
 
 
@@ -264,12 +283,86 @@ def test_where_one_of_rig_and_simulation_swings_at_rest_the_kinder_one_is_named(
 
 
 def test_timing_is_told_only_where_ticks_were_skipped() -> None:
-    words = _twins(0.03)
-    quiet, late = (answer_of(_small(), words, {"ticks": 500.0, "overruns": o}, [], "") for o in (0.0, 7.0))
+    twins = _twins(0.03)
+    quiet, late = (answer_of(_small(), twins, {"ticks": 500.0, "overruns": o}, [], "") for o in (0.0, 7.0))
     assert "7 of 500" in " ".join(late.lines()) and "of 500" not in " ".join(quiet.lines())
 
 
 def test_a_trial_that_was_odd_or_never_settled_is_told() -> None:
-    table = _small().assign(settling=np.nan, odd=["", "the marker jumped", "", "", "", ""])
+    table = _small().assign(settling=[np.nan, *[1.0] * 5], odd=["", "the marker jumped", "", "", "", ""])
     lines = " ".join(answer_of(table, _twins(0.03), {}, ["chatters: 2 of 5 trials"], "").lines())
     assert "the marker jumped" in lines and "never settles" in lines and "chatters: 2 of 5 trials" in lines
+
+
+@pytest.mark.parametrize(
+    ("known", "said"),
+    [
+        (math.nan, "with a push of 5 N error 2.3 deg RMSE"),
+        (0.0, "is back at once after a push of 5 N"),
+        (0.25, "recovers within 0.25 s after a push of 5 N"),
+    ],
+)
+def test_in_two_planes_errors_are_told_by_plane_and_a_recovery_only_where_it_is_known(known: float, said: str) -> None:
+    """By the true bend, where the log does not show when the push ended."""
+    answer = _in_two_planes(rests=False, true_recovery=known)
+    assert answer.sentence.startswith("smc/printed in two planes: error ") and said in answer.sentence
+    assert "1 deg toward ulnar" in answer.sentence and "2 deg toward flexion" in answer.sentence
+    assert "settles" not in answer.sentence and "never" not in answer.sentence
+    assert answer.table is not None and "simulated RMSE [rad]" in answer.table.columns
+    (pushed,) = (row for row in answer.table.rows if row[answer.table.columns.index("push [N]")] == 5.0)
+    assert dict(zip(answer.table.columns, pushed, strict=True)).get("recovery [s]", math.nan) == pytest.approx(
+        known, nan_ok=True
+    )
+
+
+def test_in_two_planes_settling_and_that_a_wrist_never_recovers_are_told_of_motions_that_rest() -> None:
+    """That it never recovers is known where the true bend is."""
+    sentence = _in_two_planes(rests=True).sentence
+    assert "settles within" in sentence and "never" not in sentence
+    true = {"true_rmse": 0.04, "true_rmse_ulnar": np.radians(1.5), "true_rmse_flexion": np.radians(2.5)}
+    known = _in_two_planes(rests=True, **true).sentence
+    assert "never recovers in some trial after a push of 5 N" in known
+    assert "1 deg toward ulnar, truly 1.5 deg; 2 deg toward flexion, truly 2.5 deg; truly 2.3 deg" in known
+    assert ", stays within 2 % of its bend, " in _in_two_planes(rests=True, settling=0.0).sentence
+    moving = _in_two_planes(rests=False, **true).sentence
+    assert "settles" not in moving and "never" not in moving and "with a push of 5 N" in moving
+
+
+@pytest.mark.parametrize("known", [True, False])
+@pytest.mark.parametrize("worse", ["ulnar", "flexion"])
+def test_in_two_planes_simulation_is_held_against_the_worse_plane(worse: str, known: bool) -> None:
+    """By the true bend where that is known; over both planes the errors here agree within a factor of 1.5."""
+    other = "flexion" if worse == "ulnar" else "ulnar"
+    true = {f"true_rmse_{worse}": np.radians(2.6), f"true_rmse_{other}": 0.0, "true_rmse": np.radians(2.6)}
+    seen = {f"rmse_{worse}": np.radians(2.6), f"rmse_{other}": np.radians(0.1)}
+    if known:
+        seen = {f"rmse_{worse}": np.radians(1.6), f"rmse_{other}": np.radians(1.6)}
+    note = " ".join(_in_two_planes(rests=True, simulated=1.6, **seen, **(true if known else {})).lines())
+    assert (
+        f"without a push {'truly ' * known}2.6 deg on the worse axis, 1.6 times larger than 1.6 deg simulated" in note
+    )
+    agree = {name: np.radians(1.6) for name in ("rmse_ulnar", "rmse_flexion")}
+    assert "do not agree" not in " ".join(_in_two_planes(rests=True, simulated=1.6, **agree).lines())
+
+
+def test_in_one_plane_a_recovery_is_the_true_one_where_that_is_known() -> None:
+    table = _small().query("controller == 'smc'").assign(recovery=0.5)
+    said = [answer_of(table.assign(**true), _twins(0.03), {}, [], "") for true in ({}, {"true_recovery": 0.25})]
+    assert "recovers within 0.5 s" in said[0].sentence and "recovers within 0.25 s" in said[1].sentence
+    for answer, seconds in zip(said, (0.5, 0.25), strict=True):
+        assert answer.table is not None
+        at = answer.table.columns.index("recovery [s]")
+        assert seconds in [row[at] for row in answer.table.rows]
+
+
+def _in_two_planes(rests: bool, simulated: float = 2.0, **metrics: float) -> Answer:
+    """The answer for trials with 1 deg toward ulnar, 2 deg toward flexion, and nothing known of what is true."""
+    names = "recovery", "true_recovery", "true_rmse", "true_rmse_ulnar", "true_rmse_flexion"
+    own = dict.fromkeys(names, math.nan) | {"rmse_ulnar": np.radians(1.0), "rmse_flexion": np.radians(2.0)} | metrics
+    table = _small().query("controller == 'smc'").assign(**own)
+    model = {name: np.radians(simulated) for name in ("rmse_ulnar", "rmse_flexion")}
+    one = repeated("twin", [0.04], **model).first
+    course = one.trajectory
+    if not rests:
+        course = replace(course, theta_ref=np.radians(10.0) * np.sin(course.time))
+    return answer_of(table, {number: replace(one, trajectory=course) for number in table["trial"]}, {}, [], "")

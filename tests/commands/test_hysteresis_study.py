@@ -35,22 +35,22 @@ def done(tmp_path_factory: pytest.TempPathFactory) -> Hysteresis:
     return wristctl.hysteresis(study(), out=tmp_path_factory.mktemp("hysteresis"))
 
 
-def test_the_answer_comes_first_in_words_and_its_numbers_are_the_runs(done: Hysteresis) -> None:
-    first, second, third = done.tables[0].title.split("\n")
+def test_the_numbers_of_the_answer_are_the_runs(done: Hysteresis) -> None:
     band = next(each for each in done.dead_bands if each.tendons == CABLE)
-    assert (
-        first.startswith("mu 0.1, sheath 1 rad: dead band ")
-        and f"{math.degrees(band.width):.3g} deg at 10 deg" in first
-    )
     slow, fast = (each for each in done.loops if each.case.tendons == CABLE and each.case.low == 0.0)
-    assert f"friction takes {1e3 * slow.friction_work:.3g} mJ a cycle of 0 to 20 deg" in second and "2 Hz" in second
-    assert f"{1e3 * fast.damped_work:.3g} mJ at 2 Hz" in third
+    said = done.answer.sentence
+    assert "friction coefficient of 0.1 and a sheath of 1 rad" in said
+    assert f"dead band is {math.degrees(band.width):.3g} deg at 10 deg" in said
+    assert f"Friction takes {1e3 * slow.friction_work:.3g} mJ in a cycle of 0 to 20 deg" in said
+    loops = [dict(zip(done.tables[0].columns, row, strict=True)) for row in done.tables[0].rows]
+    (quick,) = [row for row in loops if (row["sheath [rad]"], row["frequency [Hz]"]) == (1.0, 2.0)]
+    assert quick["damping [mJ]"] == pytest.approx(1e3 * fast.damped_work) and quick["presliding [um]"] == 20.0
     assert done.metrics["friction_work"] == slow.friction_work
     assert done.metrics["dead_band"] == pytest.approx(math.degrees(band.width))
     assert done.metrics["friction_work_change"] == pytest.approx(abs(fast.friction_work / slow.friction_work - 1.0))
     assert done.run is not None and done.run.problems() == []
     told = (done.run.path / "README.md").read_text()
-    assert told.index("mu 0.1, sheath 1 rad: dead band") < told.index("frequency [Hz]")
+    assert told.index("the dead band is") < told.index("frequency [Hz]")
 
 
 def test_its_files_hold_every_loop_and_dead_band(done: Hysteresis) -> None:
@@ -77,8 +77,7 @@ def recorded(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_a_measured_loop_is_fitted_and_told_before_all_else(recorded: Path, tmp_path: Path) -> None:
     done = wristctl.hysteresis(study(f"hysteresis.measured={recorded}"), out=tmp_path)
     assert done.fit is not None and done.run is not None
-    title = done.tables[0].title
-    assert title.startswith("rig.csv tells mu ") and ", sheath " in title and " um" in title and "\n" not in title
+    assert done.answer.sentence.startswith("The loop of rig.csv by itself")
     for name, truth in CABLE._asdict().items():
         found = done.run.metrics[name]
         assert found["value"] == getattr(done.fit, name).value == done.metrics[name]
@@ -109,7 +108,7 @@ def test_the_answer_without_a_loop_gives_the_dead_band_and_the_width_of_each_she
     assert [row[1] for row in rows] == [0.0, 1.0, 3.0]
     own = next(row for row in rows if row[1] == CABLE.sheath)
     slow = next(loop for loop in done.loops if loop.case.tendons == CABLE and loop.case.frequency == 0.5)
-    assert own[2] == pytest.approx(done.metrics["dead_band"]) and own[3] == pytest.approx(math.degrees(slow.width))
+    assert math.degrees(own[2]) == pytest.approx(done.metrics["dead_band"]) and own[3] == pytest.approx(slow.width)
     assert own[4] == pytest.approx(1e3 * done.metrics["friction_work"])
     assert f"{done.metrics['dead_band']:.3g} deg" in " ".join(done.summary)
 
@@ -119,10 +118,11 @@ def test_what_a_narrow_loop_does_not_tell_is_said(tmp_path: Path) -> None:
     narrow = made_loop(CABLE, 2, SHORT._replace(low=13.0, high=17.0, what="spools")).loop
     named = f"hysteresis.measured={written(narrow, tmp_path / 'narrow.csv')}"
     done = wristctl.hysteresis(study(named))
-    title = done.tables[0].title
-    assert "tells mu (bend + sheath)" in title and "not mu and the sheath apart" in title and "wider range" in title
+    assert done.fit is not None
+    said = " ".join(map(str, done.answer.notes))
+    assert "only together" in said and f"up to {done.fit.friction.high:.3g}" in said and "wider range" in said
     assert math.isnan(done.metrics["sheath"]) and done.metrics["exponent"] > 0.0
-    assert done.tables[0].rows[1][3] is None, "no end of the sheath's interval"
+    assert done.findings.metrics["sheath"]["interval"] is None, "it has no end"
     assert [row[1] for row in _rows_of_a_screen(done)[:2]] == ["-", "-"]
 
 
@@ -168,7 +168,7 @@ def test_what_does_not_converge_is_marked_where_its_numbers_are(monkeypatch: pyt
     told = [row[list(table.columns).index("fate")] for row in table.rows]
     outer = [each for each in found.loops if each.case.low == 0.0]
     assert [bool(each) for each in told] == [each.drift > 0.0 for each in outer] and any(told)
-    assert "NOT CONVERGED" in table.title
+    assert "have not converged" in " ".join(map(str, found.answer.notes))
     frame = found.frame()
     assert frame["drift"].tolist() == [each.drift for each in found.loops] and (frame["step"] <= 1e-3).all()
 

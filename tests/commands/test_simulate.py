@@ -180,8 +180,10 @@ def test_an_answer_names_its_scenario_wrist_and_gains_and_of_repetitions_has_a_t
     for fact in ("30 deg radial in 1 s", "120 mm", "elastic tendons", "60 Hz", "5 ms", "Kp = 10, Ki = 2, Kd = 0.1"):
         assert fact in text, fact
     several = simulate(repeated("smc/exchanged", NINE, settling=3.0)).answer
-    assert several.table is not None and "9 repetitions" in several.table.columns[-1]
+    assert several.table is not None and "9 repetitions" in several.table.columns[3]
     rows = {str(row[0]): row[1:] for row in several.table.rows}
     expected = spread(np.array(NINE))
-    assert rows["RMSE [deg]"] == (degrees(5.0), f"{degrees(expected.low)} to {degrees(expected.high)}")
+    assert rows["RMSE"] == (5.0, expected.low, expected.high, "rad")
+    (shown,) = [line.split() for line in several.lines() if line.startswith("RMSE ")]
+    assert shown[-1] == "deg" and float(shown[1]) == pytest.approx(np.degrees(5.0), rel=5e-3), "as people read it"
     assert simulate(repeated("smc/exchanged")).answer.table is None

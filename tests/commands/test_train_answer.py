@@ -26,10 +26,13 @@ def test_errors_are_those_of_the_metrics_in_degrees_and_fit_a_screen(trained: Tr
     lines, table, run = trained.summary, trained.answer.table, trained.run
     assert table is not None and run is not None and len(lines) <= 32
     assert all(len(line) <= 100 for line in lines if str(run.path) not in line)
-    errors = {row[:2]: row[2:] for row in table.rows}
-    expected = trained.metrics["rmse_deg"], trained.metrics["max_error_deg"]
-    assert [float(cell) for cell in errors["network", "test samples"]] == pytest.approx(expected, rel=0.05)
-    assert errors["closed form", "test samples"] == ("<0.001", "<0.001") and trained.metrics["exact_rmse_deg"] < 1e-3
+    errors = {row[:2]: dict(zip(table.columns, row, strict=True)) for row in table.rows}
+    network, closed = (errors[inverse, "test samples"] for inverse in ("network", "exact inverse"))
+    assert network["RMSE [deg]"] == trained.metrics["rmse_deg"] and network["R^2"] == trained.metrics["r2"]
+    assert network["max error [deg]"] == trained.metrics["max_error_deg"] and network["parameters"] > 0
+    (shown,) = (line.split() for line in lines if line.startswith("exact inverse  test samples"))
+    assert closed["RMSE [deg]"] == trained.metrics["exact_rmse_deg"] < 1e-3 and shown[5:7] == ["<0.001", "<0.001"]
+    assert not any(each.columns == table.columns for each in trained.tables), "it is told once"
     assert " ".join(lines).startswith(f"On {len(trained.split.test)} samples")
     (file,) = (Path(word) for line in lines for word in line.split() if word.endswith(".safetensors"))
     assert file.is_file()

@@ -12,7 +12,6 @@ from wristctl.commands.train.figures import (
     accuracy_against_cost,
     coverage,
     error_over_workspace,
-    errors_at_samples,
     learning_curves,
     predicted_angles,
 )
@@ -99,7 +98,7 @@ def test_a_map_of_the_workspace_ends_a_little_beyond_its_tips(samples: Samples) 
 @pytest.mark.parametrize(("width", "height"), [(0.04, 0.04), (0.04, 0.02), (0.1, 0.02), (0.01, 0.08)])
 def test_a_map_is_as_tall_as_equal_scales_need_within_a_page(width: float, height: float) -> None:
     tip = np.array([[0.0, 0.0], [height, width]])
-    tall = errors_at_samples(tip, np.zeros(2)).get_figheight()
+    tall = error_over_workspace(tip, np.zeros(2)).get_figheight()
     assert tall == pytest.approx(np.clip(5.6 * height / width + 1.1, 2.4, 7.0))
 
 
@@ -109,7 +108,7 @@ def test_many_dots_are_drawn_as_pixels(count: int, pixels: bool) -> None:
     tip = np.column_stack([np.cos(theta), np.sin(theta)])
     own = pd.DataFrame({"x": tip[:, 0], "y": tip[:, 1], "theta": theta, "theta_network": theta})
     assert coverage(own).axes[0].collections[0].get_rasterized() == pixels
-    assert errors_at_samples(tip, theta).axes[0].collections[0].get_rasterized() == pixels
+    assert error_over_workspace(tip, theta).axes[0].collections[0].get_rasterized() == pixels
     assert all(axes.lines[1].get_rasterized() == pixels for axes in predicted_angles(own).axes)
 
 
@@ -161,7 +160,7 @@ def test_the_error_map_is_of_sizes_in_degrees_at_each_tip() -> None:
 
 def test_errors_at_samples_are_drawn_in_mm_and_degrees_the_greatest_on_top() -> None:
     tip = np.array([[0.08, 0.01], [0.07, -0.02], [0.075, 0.0]])
-    made = errors_at_samples(tip, np.radians([1.0, -3.0, 2.0]))
+    made = error_over_workspace(tip, np.radians([1.0, -3.0, 2.0]))
     (dots,) = made.axes[0].collections
     np.testing.assert_allclose(np.asarray(dots.get_array()), [1.0, 2.0, 3.0])
     np.testing.assert_allclose(np.asarray(dots.get_offsets()), [[10.0, 80.0], [0.0, 75.0], [-20.0, 70.0]])

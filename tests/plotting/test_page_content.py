@@ -15,7 +15,7 @@ import pytest
 
 from wristctl.commands.answer import Answer
 from wristctl.commands.compare.csv_data import frame
-from wristctl.commands.printed_table import Table, table_for_people
+from wristctl.commands.printed_table import Table
 from wristctl.comparison.combinations import ComparedRow
 from wristctl.config.learning import TrainSettings
 from wristctl.config.study import Study
@@ -331,7 +331,7 @@ def test_tables_are_in_degrees_by_their_heads_and_by_their_rows_units(tmp_path: 
     ]
     run = made(tmp_path, {}, tables=stored)
     first, second, third, told = shown_tables(run)
-    (printed,) = re.findall(r"^7 +(\S+) +(\S+) to (\S+) +deg", table_for_people(stored[-1]).text(), re.MULTILINE)
+    (printed,) = re.findall(r"^7 +(\S+) +(\S+) to (\S+) +deg", Table(*stored[-1].values()).text(), re.MULTILINE)
     (on_page,) = [cells[1:3] for cells in rows(page_of(run)) if cells[:1] == ["7"]]
     for value, low, high in (printed, (on_page[0], *on_page[1].split(" to "))):
         assert float(low) < float(value) < float(high), "a value lies within its interval"

@@ -19,8 +19,9 @@ import wristctl
 from tests.commands.conftest import session
 from tests.drawn_rigs import options, tried
 from tests.trial.fault_runs import rig_settings
-from wristctl.commands.hw_run.answer import completed, swings_of
+from wristctl.commands.hw_run.answer import swings_of
 from wristctl.commands.hw_run.command import hw_run
+from wristctl.commands.hw_run.trial_means import completed
 from wristctl.control.table import controller
 from wristctl.errors import UserError
 from wristctl.records import start_run

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 from wristctl.commands.printed_table import COLUMNS, Table, in_lines
 
-# Lines of a terminal that an answer may take.
-LINES = 32
+# Lines of a terminal that an answer may take, and digits of its numbers.
+LINES, _DIGITS = 32, 3
 
 
 @dataclass(frozen=True)
@@ -28,7 +28,7 @@ class Answer:
         """The answer in lines of at most COLUMNS columns; a table and each paragraph stand apart by an empty line."""
         blocks = [in_lines(self.sentence)]
         if self.table is not None:
-            blocks.append(self.table.text(COLUMNS).split("\n"))
+            blocks.append(self.table.text(COLUMNS, _DIGITS).split("\n"))
         blocks += [_lines(note) for note in self.notes]
         blocks += [in_lines(self.more)] * bool(self.more)
         return [line for k, block in enumerate(blocks) for line in [*[""] * bool(k), *block]]
@@ -36,5 +36,5 @@ class Answer:
 
 def _lines(note: str | Table) -> list[str]:
     if isinstance(note, Table):
-        return note.text(COLUMNS).split("\n")
+        return note.text(COLUMNS, _DIGITS).split("\n")
     return [note[2:]] if note.startswith("$ ") else in_lines(note)

@@ -13,7 +13,7 @@ from typing import Any, Generic
 from wristctl.commands.adoption import adopted, with_places, with_presets
 from wristctl.commands.inputs import Inputs, check_motions, named_for_good, opened
 from wristctl.commands.plain_python import warn_of_plain
-from wristctl.commands.printed_table import Table, table_for_people
+from wristctl.commands.printed_table import Table
 from wristctl.commands.procedure import Found, Procedure, check_tendons, procedure_of
 from wristctl.commands.progress import Watch, watched
 from wristctl.commands.results import Findings, StudyResult
@@ -168,7 +168,7 @@ def perform(
 
 def _summary(result: StudyResult, overview: Overview, undrawn: Container[str]) -> str:
     """A result for README.md: the answer with its figure, then the tables, folded where there is an answer."""
-    tables = "\n\n".join(table_for_people(content).text() for content in plain_tables(result.tables))
+    tables = "\n\n".join(table.text() for table in result.tables)
     if not overview.answer:
         return f"```\n{tables}\n```" if tables else ""
     drawn = overview.figure in overview.captions and f"figure {overview.figure}" not in undrawn

@@ -9,30 +9,34 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from wristctl.escape import printable
+from wristctl.reader_units import readable
 
 if TYPE_CHECKING:
     from wristctl.comparison.tie_groups import Share
 
 
-# Letters of a line of a head that is broken, at least.
-_HEAD = 11
+# Letters of a line of a head that is broken, at least; digits of a number from which it is printed as it is.
+_HEAD, _DIGITS = 11, 4
 
 
 @dataclass(frozen=True)
 class Table:
-    """A titled table; units stand in the column names. Cells are text, numbers, booleans or None."""
+    """A titled table; units stand in the column names. Cells are text, numbers, booleans or None.
+
+    Programs read it as it is; people read its angles [rad] in degrees.
+    """
 
     title: str
     columns: Sequence[str]
     rows: Sequence[Sequence[Any]]
 
-    def text(self, width: int | None = None) -> str:
-        """Aligned columns, numbers to four digits; where they do not fit in `width`, heads are broken into lines.
+    def text(self, width: int | None = None, digits: int = _DIGITS) -> str:
+        """Aligned columns, numbers to so many digits; where they do not fit in `width`, heads are broken into lines.
 
         Columns that do not fit even so go below, the first repeated.
         """
-        heads, cells, widths = self._layout(width)
-        right = [_numeric([row[index] for row in self.rows]) for index in range(len(self.columns))]
+        heads, cells, widths = self._layout(width, digits)
+        right = self._numeric()
 
         def line(values: Sequence[str], chosen: Sequence[int]) -> str:
             padded = [
@@ -58,24 +62,32 @@ class Table:
         chosen = [[row[index] for index in shown] for row in self.rows]
         return Table(self.title, [self.columns[index] for index in shown], chosen)
 
-    def _layout(self, width: int | None) -> tuple[list[list[str]], list[list[str]], list[int]]:
+    def _cells(self, digits: int = _DIGITS) -> tuple[list[str], list[list[str]]]:
+        """Heads and cells as people read them."""
+        columns, rows = readable(self.columns, [[_plain(value) for value in row] for row in self.rows])
+        angles = [column.endswith("[deg]") for column in columns]
+        unit_at = columns.index("unit") if "unit" in columns else None
+        cells = []
+        for row in rows:
+            is_angle = unit_at is not None and row[unit_at] == "deg"
+            values = zip(row, angles, strict=False)
+            cells.append([_cell(value, digits, angle or is_angle) for value, angle in values])
+        return [printable(column) for column in columns], cells
+
+    def _numeric(self) -> list[bool]:
+        """Which columns hold numbers alone."""
+        return [not any(isinstance(row[index], str | bool) for row in self.rows) for index in range(len(self.columns))]
+
+    def _layout(self, width: int | None, digits: int = _DIGITS) -> tuple[list[list[str]], list[list[str]], list[int]]:
         """Lines of each head, text of each cell, and the width of each column."""
-        cells = [[_cell(_plain(value)) for value in row] for row in self.rows]
-        heads = [[printable(column)] for column in self.columns]
+        columns, cells = self._cells(digits)
+        heads = [[column] for column in columns]
         wide = [max(map(len, column), default=0) for column in zip(*cells, strict=True)] or [0] * len(heads)
         widths = [max(cell, len(head)) for cell, (head,) in zip(wide, heads, strict=True)]
         if width is not None and sum(widths) + 2 * (len(widths) - 1) > width:
             heads = [in_lines(head, max(cell, _HEAD)) or [""] for cell, (head,) in zip(wide, heads, strict=True)]
             widths = [max(cell, *map(len, head)) for cell, head in zip(wide, heads, strict=True)]
         return heads, cells, widths
-
-
-def table_for_people(content: dict[str, Any]) -> Table:
-    """The table that a run keeps (title, columns, rows), angles in degrees."""
-    from wristctl.plotting.page_tables import readable
-
-    shown = readable(content)
-    return Table(shown["title"], shown["columns"], shown["rows"])
 
 
 def number(value: float) -> str:
@@ -87,18 +99,17 @@ def _plain(value: Any) -> Any:
     return value.item() if hasattr(value, "item") else value
 
 
-def _cell(value: Any) -> str:
+def _cell(value: Any, digits: int, is_angle: bool) -> str:
+    """Text of a cell; of a rounded angle [deg] that nobody could measure that it is less."""
     if value is None:
         return "-"
     if isinstance(value, bool):
         return "yes" if value else "no"
     if isinstance(value, str | int):
         return printable(value)
-    return number(float(value))
-
-
-def _numeric(column: Sequence[Any]) -> bool:
-    return not any(isinstance(value, str | bool) for value in column)
+    if digits >= _DIGITS or not math.isfinite(value):
+        return number(float(value))
+    return degrees(math.radians(value), digits) if is_angle and value > 0.0 else two(value, digits)
 
 
 def _blocks(widths: Sequence[int], width: int | None) -> list[list[int]]:

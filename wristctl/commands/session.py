@@ -13,6 +13,8 @@ from wristctl.config.study import Study
 from wristctl.errors import UserError
 
 if TYPE_CHECKING:
+    from wristctl.commands.answer import Answer
+    from wristctl.commands.printed_table import Table
     from wristctl.trial.control_loop import Shown
     from wristctl.trial.supervised_wait import Meanwhile
     from wristctl.trial.trials import Trial
@@ -75,6 +77,13 @@ class Session:
     def progress(self, task: str, total: int | None = None, unit: str = "") -> AbstractContextManager[Done]:
         """Show the progress of `task`: a context manager that yields `done(count, **figures)`."""
         return self.show(self.findings.event, task, total, unit)
+
+    def tell_refused(self, answer: Answer, tables: Sequence[Table] = ()) -> None:
+        """Tell the answer of a result that is refused, and keep it with its tables in the run's README."""
+        text = "\n".join(answer.lines())
+        parts = [text, *(table.text() for table in tables)]
+        self.findings.summary("\n\n".join(f"```\n{part}\n```" for part in parts))
+        self.operator.tell(text)
 
     @contextmanager
     def drawing(self) -> Iterator[None]:

@@ -2,31 +2,17 @@
 
 from __future__ import annotations
 
-import math
 import re
 from collections.abc import Sequence
 from typing import Any
 
 from wristctl.errors import Call, UserError
+from wristctl.reader_units import in_degrees, readable
 from wristctl.records.manifest import TABLES
 from wristctl.records.run import Run
 from wristctl.study_files.keys import command_of
 
-# Units of angles in files, and what people read.
-_DEGREES = {"rad": "deg", "rad s": "deg s"}
-_NUMBER = r"-?[0-9]+(?:\.[0-9]+)?(?:e[-+]?[0-9]+)?"
-_IN_WORDS = re.compile(rf"{_NUMBER}(?: to {_NUMBER})?")
 _WHO = ("loop", "reference", "controller", "gains", "inverse")
-
-
-def in_degrees(value: Any, unit: str) -> tuple[Any, str]:
-    """A number, also in words, or a range of two, and its unit for people: angles, and their integrals, in degrees."""
-    if unit not in _DEGREES:
-        return value, unit
-    if isinstance(value, str) and _IN_WORDS.fullmatch(value):
-        return " to ".join(format(math.degrees(float(end)), ".4g") for end in value.split(" to ")), _DEGREES[unit]
-    is_number = isinstance(value, int | float) and not isinstance(value, bool)
-    return (math.degrees(value) if is_number else value), _DEGREES[unit]
 
 
 def tables(run: Run) -> list[dict[str, Any]]:
@@ -43,24 +29,11 @@ def shown_tables(run: Run) -> list[dict[str, Any]]:
     stored = tables(run)
     if run.kind == "compare" and run.has("data/comparison.csv"):
         stored = _in_one(run, stored)
-    return [readable(table) for table in stored]
-
-
-def readable(table: dict[str, Any]) -> dict[str, Any]:
-    """The table with angles in degrees, of columns that say `[rad]` and of rows that have their unit in a column."""
-    heads, rows = [str(head) for head in table["columns"]], [list(row) for row in table["rows"]]
-    unit_at = heads.index("unit") if "unit" in heads else None
-    for at, head in enumerate(heads):
-        name, _, unit = head.removesuffix("]").rpartition("[")
-        if head.endswith("]") and unit in _DEGREES:
-            heads[at] = f"{name}[{_DEGREES[unit]}]"
-            for row in rows:
-                row[at] = in_degrees(row[at], unit)[0]
-    for row in rows:
-        if unit_at is not None and row[unit_at] in _DEGREES:
-            row[1:] = [in_degrees(cell, row[unit_at])[0] for cell in row[1:]]  # the first is a name
-            row[unit_at] = _DEGREES[row[unit_at]]
-    return table | {"columns": heads, "rows": rows}
+    shown = []
+    for table in stored:
+        heads, rows = readable(table["columns"], table["rows"])
+        shown.append(table | {"columns": heads, "rows": rows})
+    return shown
 
 
 def _is_table(stored: object) -> bool:

@@ -20,6 +20,7 @@ from wristctl.plotting.style import (
     colour,
     columns_within,
     figure,
+    grid,
     in_words,
     legend_below,
     legend_under,
@@ -103,13 +104,10 @@ def _marks(labels: Sequence[str]) -> dict[str, str]:
 def _panels(rankings: Sequence[Ranking], height: float, width: float, **shared: Any) -> tuple[Figure, list[Any]]:
     """A figure with a panel for each ranking."""
     columns = columns_within(len(rankings), width)
-    deep = -(-len(rankings) // columns)
-    picture, axes = figure(deep, columns, height=deep * height + 0.9, **shared)
-    panels = axes.ravel().tolist()
+    picture, panels = grid(len(rankings), columns, height, **shared)
     for place, panel in enumerate(panels):
-        panel.set_visible(place < len(rankings))
         panel.tick_params(axis="x", labelbottom=place + columns >= len(rankings))
-    return picture, panels[: len(rankings)]
+    return picture, panels
 
 
 def _label(panels: Sequence[Any], text: str) -> None:

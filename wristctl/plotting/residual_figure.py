@@ -2,10 +2,9 @@
 
 import math
 
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from wristctl.plotting.style import BLUE, GREY, VERMILLION, figure, title, with_unit
+from wristctl.plotting.style import BLUE, GREY, VERMILLION, grid, title, with_unit
 from wristctl.trial.residuals import residual
 from wristctl.trial.run_limits import Logged, StopTick
 
@@ -24,10 +23,9 @@ def residuals_over_time(logged: Logged, stop: StopTick | None, last: float | Non
     values = logged.values if stop is None else logged.values.iloc[: stop.row + 1]
     if last is not None:
         values = values[values["clock"] >= float(values["clock"].iloc[-1]) - last]
-    clock, rows = values["clock"].to_numpy(float), math.ceil(len(logged.limits) / _COLUMNS)
-    picture, panels = figure(rows, _COLUMNS, sharex=True)
-    every: list[Axes] = list(panels.flat)  # type: ignore[arg-type]
-    for panel, limit in zip(every, logged.limits, strict=False):
+    clock = values["clock"].to_numpy(float)
+    picture, panels = grid(len(logged.limits), _COLUMNS, 1.8, sharex=True)
+    for panel, limit in zip(panels, logged.limits, strict=True):
         unit = residual(limit.name, logged.settings.rig is not None).shown
         panel.plot(clock, values[limit.name].to_numpy(float) / unit.size, color=BLUE, linewidth=0.8)
         for level, style in ((limit.limit, "-"), (limit.odd, ":")):
@@ -37,8 +35,7 @@ def residuals_over_time(logged: Logged, stop: StopTick | None, last: float | Non
         if stop is not None:
             panel.axvline(stop.clock, color=GREY, linewidth=0.8)
         title(panel, with_unit(limit.name, unit.unit) + ("  stopped here" if stop and stop.limit == limit else ""))
-    for panel in every[len(logged.limits) :]:
-        panel.remove()
-    for panel in panels[-1]:
+    for panel in panels[-_COLUMNS:]:
         panel.set_xlabel("clock [s]")
+        panel.tick_params(labelbottom=True)
     return picture

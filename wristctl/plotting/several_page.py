@@ -6,7 +6,8 @@ from string import ascii_uppercase
 from typing import Any
 
 from wristctl.plotting.page import Figures, figures, render
-from wristctl.plotting.page_tables import in_degrees, in_words
+from wristctl.plotting.page_tables import in_words
+from wristctl.reader_units import in_degrees
 from wristctl.records.difference import difference
 from wristctl.records.manifest import read_overview
 from wristctl.records.run import Run

@@ -1,13 +1,11 @@
 """Figure of what runs of one rig have measured, with the line through each quantity."""
 
-import math
 from collections.abc import Sequence
 
-import numpy as np
 from matplotlib.figure import Figure
 
 from wristctl.identification.rig_trend import Trend
-from wristctl.plotting.style import BLUE, GREY, VERMILLION, figure, title, with_unit
+from wristctl.plotting.style import BLUE, GREY, VERMILLION, grid, title, with_unit
 
 _COLUMNS = 2
 
@@ -20,15 +18,11 @@ def trends_over_runs(trends: Sequence[Trend], axis: str) -> Figure:
     trends : lines of the quantities
     axis : what they run over, with its unit
     """
-    rows = math.ceil(len(trends) / _COLUMNS)
-    picture, panels = figure(rows, _COLUMNS)
-    every = list(np.ravel(panels))
-    for panel, trend in zip(every, trends, strict=False):
+    picture, panels = grid(len(trends), _COLUMNS, 1.8)
+    for panel, trend in zip(panels, trends, strict=True):
         line = trend.values.mean() + trend.slope * (trend.places - trend.places.mean())
         panel.plot(trend.places, trend.values, "o", color=BLUE, markersize=3.0)
         panel.plot(trend.places, line, color=VERMILLION if trend.drifts else GREY, linewidth=1.0)
         title(panel, with_unit(trend.name, trend.unit) + ("  drifts" if trend.drifts else ""))
         panel.set_xlabel(axis)
-    for panel in every[len(trends) :]:
-        panel.remove()
     return picture

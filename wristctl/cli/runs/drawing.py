@@ -131,11 +131,11 @@ def table(
 ) -> None:
     """Print the tables of a run, angles in degrees: all that the command printed or kept back."""
     from wristctl.cli.runs.latex import latex_table
-    from wristctl.commands.printed_table import table_for_people
+    from wristctl.commands.printed_table import Table
     from wristctl.plotting.page_tables import tables
 
     run = open_run(ref, out)
-    run_tables = [table_for_people(content) for content in tables(run)]
+    run_tables = [Table(kept["title"], kept["columns"], kept["rows"]) for kept in tables(run)]
     if not run_tables:
         raise UserError(f"run {run.id} has no tables", str(run.path), "its data are in data/")
     for position in number or ():

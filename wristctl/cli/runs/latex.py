@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 
 from wristctl.commands.printed_table import Table, escaped, number
 from wristctl.escape import printable
+from wristctl.reader_units import readable
 from wristctl.records.manifest import Manifest
 from wristctl.study_files.keys import command_of
 from wristctl.version import __version__
@@ -59,7 +60,8 @@ def latex_table(table: Table, label: str = "", caption: str = "") -> str:
 
     Columns that do not fit beside the others stand below, the first repeated; what is still too wide is scaled.
     """
-    columns = [part for at, head in enumerate(table.columns) for part in _parted(table, at, printable(head))]
+    heads, rows = readable(table.columns, table.rows)
+    columns = [part for at, head in enumerate(heads) for part in _parted([row[at] for row in rows], printable(head))]
     lines = [r"\begin{table}[!t]", r"\centering", r"\footnotesize", rf"\caption{{{_text(table.title or caption)}}}"]
     lines += [rf"\label{{tab:{label}}}"] * bool(label)
     for block in _blocks(columns):
@@ -68,8 +70,8 @@ def latex_table(table: Table, label: str = "", caption: str = "") -> str:
     return "\n".join([*lines, r"\end{table}"])
 
 
-def _parted(table: Table, at: int, head: str) -> list[_Column]:
-    cells = [_cell(row[at]) for row in table.rows]
+def _parted(values: Sequence[Any], head: str) -> list[_Column]:
+    cells = [_cell(value) for value in values]
     parts = [_CELL.fullmatch(cell) for cell in cells]
     kinds = [kind for kind in ("rank", "value", "low", "high", "mark") if any(part and part[kind] for part in parts)]
     if len(kinds) < 2:

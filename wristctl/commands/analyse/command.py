@@ -7,19 +7,15 @@ import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from wristctl.commands.analyse.answer import (
+from wristctl.commands.analyse.answer import answer_of, listed
+from wristctl.commands.analyse.results import (
     CUTS,
     LoopResults,
-    answer,
     draw,
-    each_plane_table,
     limit_table,
-    listed,
     locus_table,
-    margin_table,
-    on_a_screen,
     portrait_table,
-    step_table,
+    tables_of_margins,
     write,
 )
 from wristctl.commands.answer import Answer
@@ -67,13 +63,12 @@ _CURVED = 0.05
 
 @dataclass(frozen=True, repr=False, eq=False)
 class Analysed(StudyResult):
-    """One loop about each of its resting angles [deg]; `sentence` is what it comes to."""
+    """One loop about each of its resting angles [deg]."""
 
     kind = "analyse"
 
     label: str
     """Controller with its gains."""
-    sentence: str
     angles: Sequence[float]
     found: Sequence[LoopAnalysis]
     """Analysis at each resting angle."""
@@ -87,7 +82,11 @@ class Analysed(StudyResult):
     @property
     def answer(self) -> Answer:
         """Whether the loop is stable, with its least margins."""
-        return on_a_screen(self.label, self.sentence, self.found, self.angles)
+        return answer_of(self.label, self._results.records(), self.found)
+
+    @property
+    def _results(self) -> LoopResults:
+        return LoopResults(self.angles, self.found, self.locus, self.portrait, self.toward_deg)
 
     @property
     def fault(self) -> UserError | None:
@@ -100,12 +99,7 @@ class Analysed(StudyResult):
 
     def frame(self) -> pd.DataFrame:
         """Margins and step, a row per resting angle [deg]; SI units, phase margins in rad, inf: no limit."""
-        import pandas as pd
-
-        from wristctl.commands.analyse.answer import margins_of
-
-        rows = zip(self.angles, self.found, strict=True)
-        return pd.DataFrame([margins_of(angle, analysis, self.toward_deg) for angle, analysis in rows])
+        return self._results.frame()
 
 
 def plan(study: Study, inputs: Inputs) -> str:
@@ -168,16 +162,13 @@ def analyse(session: Session) -> Analysed:
             locus = row.locus(rests.bend(last), settings.over, settings.span)
     portrait = _portrait(session, row, study, rests, last)
     label = f"{row.law.name}/{chosen.gains if isinstance(chosen.gains, str) else 'given'}{rests.words(study)}"
-    sentence = answer(label, analyses, angles)
     findings.overview.figure = "bode"
     findings.numerics(planes=planes)
     results = LoopResults(angles, analyses, locus, portrait, rests.toward_deg)
     write(findings, results)
     with session.drawing():
         draw(findings, label, results)
-    tables = [margin_table(sentence, analyses, angles), step_table(analyses, angles)]
-    if planes == 2:
-        tables.insert(1, each_plane_table(analyses, angles))
+    tables = tables_of_margins(results.records())
     if locus is not None:
         value = None if settings.over == "loop" else row.gains[settings.over]
         tables.append(
@@ -186,9 +177,7 @@ def analyse(session: Session) -> Analysed:
     tables.append(limit_table(analyses[-1], CUTS[chosen.loop.sensor.level]))
     tables.append(stiffness_table(row.wrist, row.loop, planes))
     tables += [] if portrait is None else [portrait_table(portrait)]
-    return Analysed(
-        session.study, findings, tables, label, sentence, angles, analyses, locus, portrait, rests.toward_deg
-    )  # fmt: skip
+    return Analysed(session.study, findings, tables, label, angles, analyses, locus, portrait, rests.toward_deg)
 
 
 def _row(study: Study, inputs: Inputs, planes: int) -> AnalysedRow:

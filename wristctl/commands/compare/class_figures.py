@@ -1,6 +1,7 @@
 """Figures of classes of conditions: the answer at once, and controllers beside each other."""
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -19,6 +20,7 @@ from wristctl.plotting.style import (
     colour,
     columns_within,
     figure,
+    grid,
     legend_below,
     legend_under,
     logarithmic,
@@ -73,14 +75,17 @@ def error_against_variation(results: Sequence[ComparedRow], classes: Sequence[Ra
     physical is a cross and no part of it.
     """
     columns = columns_within(len(classes), 1.8)
-    deep = -(-len(classes) // columns)
-    fig, axes = figure(deep, columns, height=2.4 * deep + 0.9, sharex=True, sharey=True)
+    fig, panels = grid(len(classes), columns, 2.4, sharex=True, sharey=True)
     drawn_laws: dict[str, Line2D] = {}
-    for panel, standing in zip(axes.ravel().tolist(), classes, strict=False):
+    for panel, standing in zip(panels, classes, strict=True):
         points, stands = _points(standing.of(results)), standing.standing
         sound = {label: stands.fate(row) in ("ranked", "too few to tell") for row, label in enumerate(standing.labels)}
         for row, (error, variation) in points.items():
-            style = {"color": colour(row.split("/")[0]), "linestyle": "none", "marker": "o" if sound[row] else "x"}
+            style: dict[str, Any] = {
+                "color": colour(row.split("/")[0]),
+                "linestyle": "none",
+                "marker": "o" if sound[row] else "x",
+            }
             (drawn,) = panel.plot(variation, error, markersize=5.0, **style)
             drawn_laws.setdefault(row.split("/")[0], drawn)
         costs = np.array([points[row] for row in points if sound[row]]).reshape(-1, 2)
@@ -88,14 +93,13 @@ def error_against_variation(results: Sequence[ComparedRow], classes: Sequence[Ra
         front = front[np.argsort(front[:, 1])]
         panel.plot(front[:, 1], front[:, 0], color=BLACK, linewidth=0.8, zorder=1.5)
         title(panel, standing.name)
-    for panel in axes.ravel().tolist()[len(classes) :]:
-        panel.set_visible(False)
-    for panel in axes.ravel().tolist():
+    for panel in panels:
         logarithmic(panel.xaxis)
         logarithmic(panel.yaxis)
         panel.tick_params(axis="both", which="minor", labelbottom=False, labelleft=False)
-    axes[-1, 0].set_xlabel("total variation of tension per second [N/s]", loc="left")
-    for panel in axes[:, 0]:
+    first_in_row = panels[::columns]
+    first_in_row[-1].set_xlabel("total variation of tension per second [N/s]", loc="left")
+    for panel in first_in_row:
         panel.set_ylabel("RMSE [deg]")
     fig.suptitle(heading, fontsize=10.0, x=0.02, ha="left")
     handles = [

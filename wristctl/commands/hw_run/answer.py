@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Hashable, Mapping, Sequence
+from collections.abc import Container, Hashable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from wristctl.commands.answer import Answer
+from wristctl.commands.hw_run.trial_means import completed, means, quantities, with_simulation
 from wristctl.commands.printed_table import Table, degrees, two
+from wristctl.commands.quantities import table_of
+from wristctl.simulation.trajectory import PLANES, rests
 
 if TYPE_CHECKING:
     import numpy as np
@@ -21,143 +24,130 @@ if TYPE_CHECKING:
 
 # Factor between measured and simulated error beyond which that is said.
 APART = 1.5
-# Rows of a table by direction; with more there is a row for each controller.
+# Rows of a table by motion; with more there is a row for each controller and push.
 ROWS = 16
-
-
-class Means(NamedTuple):
-    """Means over trials that ended well; nan where there is none, or where one of them never settles."""
-
-    trials: int
-    rmse: tuple[float, ...]
-    """In each plane [rad]."""
-    steady_state: float
-    """[rad]"""
-    settling: float
-    """[s]"""
-    recovery: float
-    """By the true bend, where an emulated rig knows it [s]."""
-    simulated: float
-    """RMSE of the same trials in simulation, of the true bend in the worse plane [rad]."""
-    true: float
-    """RMSE of the true bend in the worse plane, where an emulated rig knows it [rad]."""
-
-    @property
-    def worse(self) -> float:
-        """RMSE in the worse plane [rad]."""
-        return max(self.rmse)
-
-    @property
-    def compared(self) -> float:
-        """What the simulation is held against: the true error where it is known, else the measured one [rad]."""
-        return self.true if math.isfinite(self.true) else self.worse
-
-    @property
-    def apart(self) -> bool:
-        """Whether that and the simulated error differ by more than APART."""
-        ratio = self.compared / self.simulated if self.simulated > 0.0 else math.nan
-        return math.isfinite(ratio) and not 1.0 / APART <= ratio <= APART
-
-
-def errors_of(trials: pd.DataFrame) -> dict[str, str]:
-    """Names of the RMSE in each plane, with where it is toward; of one plane that is not said."""
-    by_plane = {f"rmse_{plane}": f" toward {plane}" for plane in ("ulnar", "flexion")}
-    return by_plane if set(by_plane) <= set(trials) else {"rmse": ""}
-
-
-def means_of(trials: pd.DataFrame, twins: Mapping[int, Simulation]) -> Means:
-    """Means of some trials."""
-    import numpy as np
-
-    def mean(name: str) -> float:
-        return float(trials[name].mean(skipna=False)) if len(trials) and name in trials else math.nan
-
-    names = list(errors_of(trials))
-    simulated = [max(twins[number].metrics[name] for name in names) for number in trials["trial"]]
-    model = float(np.mean(simulated)) if simulated else math.nan
-    true, truly = math.nan, [f"true_{name}" for name in names]
-    if len(trials) and set(truly) <= set(trials):
-        true = float(trials[truly].max(axis=1, skipna=False).mean(skipna=False))
-    known = "true_recovery" in trials and trials["true_recovery"].notna().any()
-    recovery = mean("true_recovery" if known else "recovery")
-    rmse = tuple(map(mean, names))
-    return Means(len(trials), rmse, mean("steady_state"), mean("settling"), recovery, model, true)
 
 
 def answer_of(
     trials: pd.DataFrame, twins: Mapping[int, Simulation], metrics: Mapping[str, float], marks: Sequence[str], run: str
 ) -> Answer:
-    """What the trials came to.
-
-    `trials` are all that began; `twins` has the simulation of those that ended well, by their numbers; `run` is the
-    path of their run.
-    """
+    """What the trials came to beside their simulation, by the trial's number; `run` is the path of their run."""
     done = completed(trials)
-    labels = list(dict.fromkeys(done["label"]))
+    compared, labels = with_simulation(done, twins), list(dict.fromkeys(done["label"]))
     more = f"All tables: --all. Every trial: {run}/report.html" if run else "All tables: `.tables`."
-    notes = [*_apart(done, labels, twins), *swings_apart(done, twins), *unsound(trials, marks, metrics)]
+    notes = [*_apart(compared, labels), *swings_apart(done, twins), *unsound(trials, marks, metrics)]
     if not labels:
         return Answer(f"None of {len(trials)} trials was completed.", None, notes, more)
-    sentences = [_sentence(done[done["label"] == label], label, twins) for label in labels[:2]]
+    moving = {number for number, twin in twins.items() if not rests(twin.trajectory)}
+    sentences = [_sentence(compared[compared["label"] == label], label, moving) for label in labels[:2]]
     stopped = len(trials) - len(done)
     sentences.append(f"{stopped} of {len(trials)} trials left out." if stopped else "No trial ended early.")
-    return Answer(" ".join(sentences), _table(done, labels, twins), notes, more)
+    return Answer(" ".join(sentences), _table(compared), notes, more)
 
 
-def _sentence(trials: pd.DataFrame, label: str, twins: Mapping[int, Simulation]) -> str:
-    from wristctl.simulation.trajectory import rests
-
+def _sentence(trials: pd.DataFrame, label: str, moving: set[int]) -> str:
+    """Errors, settling and recovery of the trials of one controller; numbers of those that never rest are `moving`."""
+    two_planes = bool(_planes(trials))
     free, pushed = trials[trials["push"] == 0.0], trials[trials["push"] != 0.0]
-    toward = list(errors_of(trials).values())
     parts = []
-
-    def error(means: Means) -> str:
-        angles = [
-            f"{in_deg(angle)} deg{' RMSE' * (not k)}{way}"
-            for k, (angle, way) in enumerate(zip(means.rmse, toward, strict=True))
-        ]
-        return f"error {', '.join(angles)}"
-
-    def truly(means: Means) -> list[str]:
-        worse = " on the worse axis" * (len(toward) > 1)
-        return [f"truly {in_deg(means.true)} deg{worse}"] * math.isfinite(means.true)
-
     if len(free):
-        means = means_of(free, twins)
-        each = [means_of(group, twins).worse for _, group in free.groupby("direction", sort=False)]
-        said = truly(means)
-        said += [f"{degrees(min(each))} to {degrees(max(each))} deg by direction"] * (len(each) > 1)
-        parts.append(error(means) + f" ({'; '.join(said)})" * bool(said))
-        if all(rests(twins[number].trajectory) for number in free["trial"]):
-            parts.append(_within("settles", means.settling))
+        told = means(free)
+        error, said = _error(told)
+        each = free.groupby("direction", sort=False)["rmse"].mean()
+        if len(each) > 1:
+            said.append(f"{degrees(float(each.min()))} to {degrees(float(each.max()))} deg by direction")
+        parts.append(error + f" ({'; '.join(said)})" * bool(said))
+        if moving.isdisjoint(free["trial"]):
+            on_path = told["settling"] == 0.0
+            parts.append("stays within 2 % of its bend" if on_path else _within("settles", told["settling"]))
     if len(pushed):
-        means = means_of(pushed, twins)
-        force = ", ".join(f"{newtons:g}" for newtons in sorted({abs(force) for force in pushed["push"]}))
-        recovers = "is back at once" if means.recovery == 0.0 else _within("recovers", means.recovery)
-        with_it = f"{error(means)} with it{''.join(f', {words}' for words in truly(means))}"
-        parts.append(f"{recovers} after a push of {force} N ({with_it})")
-    return f"{label}{' in two planes' * (len(toward) > 1)}: {', '.join(parts)}."
+        told = means(pushed)
+        force = ", ".join(f"{newtons:g}" for newtons in sorted(set(pushed["force"])))
+        recovery, known = _recovery(pushed)
+        error, said = _error(told)
+        never = moving.isdisjoint(pushed["trial"]) and (known or not two_planes)  # else it cannot be known
+        if not math.isfinite(recovery) and not never:
+            parts.append(f"with a push of {force} N {error}" + f" ({'; '.join(said)})" * bool(said))
+        else:
+            recovers = "is back at once" if recovery == 0.0 else _within("recovers", recovery)
+            parts.append(f"{recovers} after a push of {force} N ({'; '.join([f'{error} with it', *said])})")
+    return f"{label}{' in two planes' * two_planes}: {', '.join(parts)}."
+
+
+def _error(told: Mapping[str, float]) -> tuple[str, list[str]]:
+    """The error in degrees; and what it is by plane where there are two, and truly where that is known."""
+
+    def truly(name: str) -> list[str]:
+        true = told.get(f"true_{name}", math.nan)
+        return [f"truly {_in_deg(true)} deg"] * math.isfinite(true)
+
+    each = [(f"{_in_deg(told[f'rmse_{plane}'])} deg toward {plane}", f"rmse_{plane}") for plane in _planes(told)]
+    by_plane = [", ".join([words, *truly(name)]) for words, name in each]
+    return f"error {_in_deg(told['rmse'])} deg RMSE", [*by_plane, *truly("rmse")]
+
+
+def _planes(names: Container[str]) -> list[str]:
+    """Planes of which these names have an error of their own: both, or in one plane none."""
+    return [plane for plane in PLANES if f"rmse_{plane}" in names]
+
+
+def _recovery(pushed: pd.DataFrame) -> tuple[float, bool]:
+    """Mean recovery [s], by the true bend where that is known, and whether it is."""
+    known = "true_recovery" in pushed and bool(pushed[["true_rmse", "true_recovery"]].notna().any(axis=None))
+    return means(pushed)["true_recovery" if known else "recovery"], known
 
 
 def _within(verb: str, seconds: float) -> str:
     return f"{verb} within {two(seconds)} s" if math.isfinite(seconds) else f"never {verb} in some trial"
 
 
-def in_deg(angle: float) -> str:
-    """An angle [rad] in degrees; a dash where there is none."""
+def _in_deg(angle: float) -> str:
     return degrees(angle) if math.isfinite(angle) else "-"
 
 
-def in_s(seconds: float) -> str:
-    """A time [s]; a dash where there is none."""
-    return two(seconds) if math.isfinite(seconds) else "-"
+# Means in the table of the answer, the last those that a narrow line may go without.
+_TOLD = (
+    "rmse_ulnar", "rmse_flexion", "rmse", "true_rmse", "simulated_rmse", "settling", "recovery", "steady_state",
+)  # fmt: skip
 
 
-def completed(trials: pd.DataFrame) -> pd.DataFrame:
-    """Trials that ended well, with `label`, and their swings at rest from crest to crest [rad], by log and truly."""
-    done = trials[trials["outcome"] == "ok"]
-    swings = {f"{true}swing": 2.0 * done[f"{true}oscillation"] for true in ("", "true_")}
-    return done.assign(label=done["controller"] + "/" + done["gains"], **swings)
+def _table(trials: pd.DataFrame) -> Table:
+    """A row for each controller, motion and push; for very many a row for each controller and push.
+
+    Columns without a number are left out.
+    """
+    by = ["label", "direction", "force"]
+    if trials.groupby(by).ngroups > ROWS:
+        by.remove("direction")
+    first = {name: list(dict.fromkeys(trials[name])) for name in ("label", "direction")}
+    groups: list[dict[str, Any]] = [
+        dict(zip(by, key, strict=True)) | means(group) | {"recovery": _recovery(group)[0]}
+        for key, group in trials.groupby(by, sort=False)
+    ]
+    groups.sort(key=lambda group: [first[name].index(group[name]) if name in first else group[name] for name in by])
+    named = [name for name in by if name != "label" or trials["label"].nunique() > 1]
+    known = [name for name in _TOLD if any(math.isfinite(group.get(name, math.nan)) for group in groups)]
+    return table_of("", quantities([*named, *known]), groups)
+
+
+def _apart(trials: pd.DataFrame, labels: Sequence[str]) -> list[str]:
+    """Where measured, or where it is known true, and simulated errors differ much, in one paragraph."""
+    facts, names = [], [f"rmse_{plane}" for plane in _planes(trials)] or ["rmse"]
+    worse = " on the worse axis" * (len(names) > 1)
+    for label in labels:
+        for pushed in (False, True):
+            told = means(trials[(trials["label"] == label) & ((trials["push"] != 0.0) == pushed)])
+            known = math.isfinite(told["true_rmse"])
+            measured, simulated = (max(told[f"{of}{name}"] for name in names) for of in ("true_" * known, "simulated_"))
+            ratio = measured / simulated if simulated > 0.0 else math.nan
+            if math.isfinite(ratio) and not 1.0 / APART <= ratio <= APART:
+                times = f"{two(max(ratio, 1.0 / ratio))} times {'larger' if ratio > 1.0 else 'smaller'}"
+                where = f"{f'{label} ' * (len(labels) > 1)}{'with' if pushed else 'without'} a push"
+                size = f"{'truly ' * known}{_in_deg(measured)} deg{worse}"
+                facts.append(f"{where} {size}, {times} than {_in_deg(simulated)} deg simulated")
+    if not facts:
+        return []
+    return [f"Measured and simulated errors do not agree: {'; '.join(facts)}. Do not rely on that simulation here."]
 
 
 class Swings(NamedTuple):
@@ -211,7 +201,7 @@ def marks_of(trials: pd.DataFrame, twins: Mapping[int, Simulation], tension_rang
 
     from wristctl.simulation.arrival import SHORT
     from wristctl.simulation.oscillation import LIMIT_CYCLE, chatter
-    from wristctl.simulation.trajectory import rests, size_of
+    from wristctl.simulation.trajectory import size_of
 
     done = completed(trials)
     chatters = chatter(done["chattering"].to_numpy(float), tension_range, places) > 0.0
@@ -252,54 +242,6 @@ def swings_apart(done: pd.DataFrame, twins: Mapping[int, Simulation]) -> list[st
             f"deg: {kinder}, by {degrees(float(one[worst] - other[worst]))} deg. Do not rely on that simulation here."
         )
     return notes
-
-
-def _table(done: pd.DataFrame, labels: Sequence[str], twins: Mapping[int, Simulation]) -> Table:
-    """A row for each motion and controller, with and without a push; for very many a row for each controller."""
-    directions = list(dict.fromkeys(done["direction"]))
-    by_direction = len(directions) * len(labels) <= ROWS
-    toward = list(errors_of(done).values())
-    worse = ", worse axis" * (len(toward) > 1)
-    heads = (
-        "controller", "motion" if worse else "direction", *(f"{way[1:] or 'error'} [deg]" for way in toward),
-        f"simulated{worse} [deg]", "final error [deg]", "settling [s]", f"pushed{worse} [deg]", "recovery [s]",
-    )  # fmt: skip
-    rows = []
-    for label in labels:
-        of_label = done[done["label"] == label]
-        for direction in directions if by_direction else ["all"]:
-            group = of_label if direction == "all" else of_label[of_label["direction"] == direction]
-            if group.empty:
-                continue
-            free, pushed = (means_of(group[(group["push"] != 0.0) == push], twins) for push in (False, True))
-            rows.append(
-                (label, direction, *map(in_deg, (*free.rmse, free.simulated, free.steady_state)),
-                 in_s(free.settling), in_deg(pushed.worse), in_s(pushed.recovery))
-            )  # fmt: skip
-    always = 3 + len(toward)
-    told = [column for column in range(len(heads)) if column < always or any(row[column] != "-" for row in rows)]
-    shown = [column for column in told if column > 0 or len(labels) > 1]
-    return Table("", [heads[column] for column in shown], [tuple(row[column] for column in shown) for row in rows])
-
-
-def _apart(done: pd.DataFrame, labels: Sequence[str], twins: Mapping[int, Simulation]) -> list[str]:
-    """Where measured and simulated errors differ much, in one paragraph."""
-    facts = []
-    worse = " on the worse axis" * (len(errors_of(done)) > 1)
-    for label in labels:
-        for pushed in (False, True):
-            means = means_of(done[(done["label"] == label) & ((done["push"] != 0.0) == pushed)], twins)
-            if means.apart:
-                ratio = means.compared / means.simulated
-                times = f"{two(max(ratio, 1.0 / ratio))} times {'larger' if ratio > 1.0 else 'smaller'}"
-                where = f"{f'{label} ' * (len(labels) > 1)}{'with' if pushed else 'without'} a push"
-                true, simulated = "truly " * math.isfinite(means.true), in_deg(means.simulated)
-                facts.append(
-                    f"{where} {true}{in_deg(means.compared)} deg{worse}, {times} than {simulated} deg simulated"
-                )
-    if not facts:
-        return []
-    return [f"Measured and simulated errors do not agree: {'; '.join(facts)}. Do not rely on that simulation here."]
 
 
 def unsound(trials: pd.DataFrame, marks: Sequence[str], metrics: Mapping[str, float]) -> list[str]:

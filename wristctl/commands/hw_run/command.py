@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from wristctl.commands.answer import Answer
 from wristctl.commands.calibrate.wrist import CALIBRATION
-from wristctl.commands.hw_run.answer import answer_of, marks_of
+from wristctl.commands.hw_run.results import Performed, performed
 from wristctl.commands.inputs import EarlierRun, Inputs
 from wristctl.commands.inputs_of_loops import (
     check_inverses,
@@ -27,52 +26,19 @@ from wristctl.commands.loop_warnings import (
     warn_outside_conditions,
 )
 from wristctl.commands.procedure import Procedure
-from wristctl.commands.results import StudyResult
 from wristctl.commands.rig_description import describe_rig
 from wristctl.commands.session import Session
 from wristctl.config.study import Study
 from wristctl.errors import under
 
 if TYPE_CHECKING:
-    import pandas as pd
-
     from wristctl.config.hw_run import HwRunSettings
     from wristctl.config.wrist import WristParameters
     from wristctl.control.table import Gains
-    from wristctl.simulation.repetitions import Simulation
     from wristctl.wrist.kinematics import Inverse
 
 # Time between two samples of a motion by which it is checked before a run [s].
 _CHECKED = 0.01
-
-
-@dataclass(frozen=True, repr=False, eq=False)
-class Performed(StudyResult):
-    """Trials on a rig, and the same in simulation."""
-
-    kind = "hw-run"
-
-    trials: pd.DataFrame
-    twins: dict[int, Simulation]
-    """by the trial's number"""
-
-    @property
-    def answer(self) -> Answer:
-        """Error by direction and plane, settling and recovery, and how far simulation agrees."""
-        return answer_of(self.trials, self.twins, self.metrics, self.marks, self.place)
-
-    @property
-    def marks(self) -> list[str]:
-        """What the wrist does wrong in trials that ended well: `marks_of`."""
-        from wristctl.trial.rig_belief import layout_of_rig, numbers_of
-
-        settings, wrist = self.study.hw_run, self.study.wrist
-        places = 2 if settings.planes == 1 else len(numbers_of(layout_of_rig(settings, wrist)))
-        return marks_of(self.trials, self.twins, wrist.tension_range, places)
-
-    def frame(self) -> pd.DataFrame:
-        """One row per trial that began."""
-        return self.trials
 
 
 def plan(study: Study, inputs: Inputs) -> str:
@@ -131,7 +97,6 @@ def hw_run(session: Session) -> Performed:
     """Perform trials, emulated or on hardware: in four directions or both planes at once, with and without a push."""
     session.operator.tell(describe_rig(session.study.hw_run))
     warn_of_first_repetitions(session.study.hw_run.rows)
-    from wristctl.commands.hw_run.results import trial_tables
     from wristctl.commands.hw_run.trials import perform_trials
 
     study, bench = session.study, session.study.wrist
@@ -150,8 +115,7 @@ def hw_run(session: Session) -> Performed:
     limited_session = _limited(identified_session, network, tuned)
     trials = perform_trials(limited_session, bench, network, tuned)
     identified_session = with_record(identified_session)
-    tables, twins = trial_tables(identified_session, trials, network, tuned)
-    return Performed(study, session.findings, tables, trials, twins)
+    return replace(performed(identified_session, trials, network, tuned), study=study)
 
 
 def _limited(session: Session, network: Inverse | None, tuned: Gains | None) -> Session:

@@ -1,14 +1,17 @@
 """Figures of trials: bends and paths wanted and obtained, errors and tensions, with and without a push."""
 
+from __future__ import annotations
+
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from wristctl.arrays import Array
+from wristctl.commands.session import Session
 from wristctl.plotting.style import (
     BLACK,
     BLUE,
@@ -20,11 +23,24 @@ from wristctl.plotting.style import (
     VERMILLION,
     WANTED,
     figure,
+    grid,
     legend_below,
     line,
     logarithmic,
     title,
 )
+from wristctl.trial.log import column_of
+from wristctl.trial.rig_belief import layout_of_axes, layout_of_rig, names_of_planes, numbers_of, places_of_tendons
+from wristctl.wrist.directions import DIRECTIONS as WAYS
+from wristctl.wrist.spatial.held_bends import reach_of_bends
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from wristctl.commands.results import Findings
+    from wristctl.config.hw_run import HwRunSettings
+    from wristctl.simulation.repetitions import Simulation
+    from wristctl.wrist.tendon_layout import TendonLayout
 
 # In the paper's order.
 DIRECTIONS = ("extension", "flexion", "radial", "ulnar")
@@ -154,12 +170,8 @@ def _panels(courses: Sequence[LoggedTrial], by_plane: bool = True, **shared: Any
     names = [name for name in DIRECTIONS if name in motions] + [name for name in motions if name not in DIRECTIONS]
     planes = courses[0].planes if by_plane and len(courses[0].planes) > 1 else ("",)
     keys = [(name, plane) for name in names for plane in planes]
-    columns = min(2, len(keys))
-    rows = -(-len(keys) // columns)
-    picture, axes = figure(rows, columns, height=0.9 + 1.9 * rows, sharex=True, **shared)
-    for panel in axes.flat[len(keys) :]:
-        panel.set_visible(False)
-    return picture, dict(zip(keys, axes.ravel().tolist(), strict=False))
+    picture, panels = grid(len(keys), 2, 1.9, sharex=True, **shared)
+    return picture, dict(zip(keys, panels, strict=True))
 
 
 def _finished(picture: Figure, panels: _Panels, courses: Sequence[LoggedTrial], heading: str, ylabel: str) -> Figure:
@@ -175,3 +187,84 @@ def _finished(picture: Figure, panels: _Panels, courses: Sequence[LoggedTrial], 
     picture.supylabel(ylabel, fontsize=10.0)
     legend_below(picture)
     return picture
+
+
+def draw_trials(session: Session, done: pd.DataFrame, twins: Mapping[int, Simulation]) -> None:
+    """Draw all trials that ended well, each with its simulation by its number."""
+    findings, settings, wrist = session.findings, session.study.hw_run, session.study.wrist
+    log, layout, first = _logged(findings, "log"), layout_of_rig(settings, wrist), settings.rows[0].label
+    truth = _logged(findings, "truth")
+    courses = [_course(record, log, truth, settings, layout, twins) for record in done.to_dict("records")]
+    for prefix, pushed in (("", False), ("pushed-", True)):
+        some = [course for course in courses if (course.push is not None) == pushed]
+        if not some:
+            continue
+        alone = [course for course in some if course.label == first and course.repetition == 0]
+        if settings.planes == 1:
+            findings.figure(f"{prefix}directions", desired_and_obtained, some)
+        else:
+            reach = reach_of_bends(wrist, layout or layout_of_axes(wrist))
+            caption = "The plane of bends: wanted, measured and true, within what the tendons reach"
+            findings.figure(f"{prefix}bends", paths, alone, reach, first, caption=caption)
+            findings.overview.figure = findings.overview.figure or f"{prefix}bends"
+        findings.figure(f"{prefix}errors", errors, some)
+        findings.figure(f"{prefix}tensions", tensions, alone, first)
+    if settings.real_time or settings.port is not None:
+        logs = (log, _logged(findings, "between"))
+        late = np.concatenate([table["late"].to_numpy(float) for table in logs])
+        findings.figure("lateness", lateness, late, settings.control_period)
+
+
+def _course(
+    record: Mapping[Any, Any], logs: pd.DataFrame, truths: pd.DataFrame, settings: HwRunSettings,
+    layout: TendonLayout | None, twins: Mapping[int, Simulation],
+) -> LoggedTrial:  # fmt: skip
+    """One trial, as logged, beside its simulation and what is true of it."""
+    log, direction, push = logs[logs["trial"] == record["trial"]], record["direction"], settings.push
+    planes = names_of_planes(settings.planes, WAYS[direction].plane if settings.planes == 1 else "")
+
+    def of_planes(name: str, table: pd.DataFrame = log) -> Array:
+        return table[[column_of(name, plane, len(planes)) for plane in planes]].to_numpy(float)
+
+    time, wanted, true = log["time"].to_numpy(float), of_planes("bend_ref"), None
+    if len(truths) and len(truth := truths[truths["trial"] == record["trial"]]):
+        at, bend = truth["time"].to_numpy(float), of_planes("bend", truth)
+        asked = np.stack([np.interp(at, time, course) for course in wanted.T], axis=1)
+        true = Course(at, bend, bend - asked)
+    simulated = twins[record["trial"]].trajectory
+    return LoggedTrial(
+        direction=direction,
+        label=record["label"],
+        repetition=record["repetition"],
+        planes=planes,
+        time=time,
+        bend=of_planes("bend"),
+        bend_ref=wanted,
+        wanted=of_planes("bend_desired") if len(planes) == 1 else wanted,
+        tension=_tensions(log, direction, planes, layout),
+        simulated=Course(simulated.time, simulated.bend, simulated.bend - simulated.bend_ref),
+        true=true,
+        push=(push.start, push.start + push.duration) if record["push"] else None,
+    )
+
+
+def _logged(findings: Findings, name: str) -> pd.DataFrame:
+    """A table of the run; empty where it has none."""
+    import pandas as pd
+
+    assert findings.run is not None
+    file = findings.run.path / f"data/{name}.csv"
+    return pd.read_csv(file) if file.is_file() else pd.DataFrame()
+
+
+def _tensions(
+    log: pd.DataFrame, direction: str, planes: Sequence[str], layout: TendonLayout | None
+) -> dict[str, Array]:  # fmt: skip
+    """Commanded tensions (N,) by tendon; in one plane of one on the direction's side, and of one on the other."""
+    columns = {f"tendon {number}": log[f"tension_{number}"].to_numpy(float) for number in numbers_of(layout)}
+    if len(planes) > 1:
+        return columns
+    place, side = places_of_tendons(planes, layout), 0 if WAYS[direction].sign > 0 else 1
+    pulls, holds = (int(np.flatnonzero((place == side) == on)[0]) for on in (True, False))
+    tensions = list(columns.values())
+    return {"tendons that pull": tensions[pulls], "tendons that hold against": tensions[holds]}

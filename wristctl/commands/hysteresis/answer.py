@@ -7,7 +7,9 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from wristctl.commands.answer import Answer
+from wristctl.commands.hysteresis.tables import LOOPS, record_of, still_change
 from wristctl.commands.printed_table import Table, degrees, two
+from wristctl.commands.quantities import Quantity, table_of
 from wristctl.wrist.directions import toward_words
 
 if TYPE_CHECKING:
@@ -20,6 +22,8 @@ if TYPE_CHECKING:
 
 # Rows that a table may have; of more, those of the main coefficient of friction.
 _ROWS = 14
+# Quantities of a row beside its dead band.
+_OF_A_ROW = ("friction", "sheath", "width", "friction_work", "damped_work")
 # Ratio of an interval's ends beyond which a stiffness is not told.
 _TOLD = 3.0
 
@@ -115,9 +119,10 @@ def _notes(fits: Sequence[FrictionFit]) -> list[str]:
         left += f" and {two(float(max(tensions)))} N of tension"
     notes = [f"The model leaves over (standard deviation) {left}, of {fit.count} samples.", *_wanted(fits)]
     if not _told_apart(fit):
+        most, least = two(fit.friction.high, 3), two(math.degrees(fit.sheath.low), 3)
         notes.append(
-            "The loop tells coefficient and sheath only together, so neither has a value. A wider range of bend would "
-            "tell them apart."
+            f"The loop tells coefficient and sheath only together: the coefficient may be up to {most}, the sheath "
+            f"{least} deg or more. A wider range of bend would tell them apart."
         )
     if not math.isfinite(fit.presliding.high):
         notes.append("The loop does not tell presliding. More samples at its turns would.")
@@ -141,21 +146,14 @@ def model_answer(
     if len(rows) > _ROWS:
         rows = [loop for loop in rows if loop.case.tendons.friction == main.friction][:_ROWS]
     held = {band.tendons: band for band in _middle(bands)}
-    heads = ("friction", "sheath [rad]", "dead band [deg]", "width [deg]", "friction's work [mJ]", "damping's [mJ]")
-    cells = [
-        (
-            loop.case.tendons.friction,
-            loop.case.tendons.sheath,
-            math.degrees(held[loop.case.tendons].width) if loop.case.tendons in held else None,
-            math.degrees(loop.width),
-            1e3 * loop.friction_work,
-            1e3 * loop.damped_work,
-        )
-        for loop in rows
+    quantities = [quantity for quantity in LOOPS if quantity.name in _OF_A_ROW]
+    quantities.insert(2, Quantity("dead_band", "rad"))
+    records = [
+        record_of(loop) | {"dead_band": band.width if (band := held.get(loop.case.tendons)) else None} for loop in rows
     ]
     notes = [f"Width and works are of a cycle at {slowest:g} Hz, with a presliding of {1e6 * main.presliding:g} um."]
     every: list[HysteresisLoop | DeadBand | HysteresisCircle] = [*driven, *bands, *around]
-    if open_ := sum(item.drift > 0.0 for item in every):
+    if open_ := still_change(every):
         parts = "loops, dead bands and circles" if around else "loops and dead bands"
         notes.append(f"Do not rely on all of them: {open_} of {len(every)} {parts} have not converged (--all).")
     if slow_circles := [circle for circle in around if circle.case.tendons == main]:
@@ -168,7 +166,7 @@ def model_answer(
         toward = math.degrees(math.atan2(own.toward[1], own.toward[0])) % 360.0
         aside = f"friction takes the wrist off that line by {degrees(own.aside, 3)} deg at most"
         notes.append(f"In two planes ({why_two}), bent {toward_words(toward)}; {aside}.")
-    return Answer(_of_wrist(own, held.get(main)), Table("", heads, cells), notes, more)
+    return Answer(_of_wrist(own, held.get(main)), table_of("", quantities, records), notes, more)
 
 
 def _middle(bands: Sequence[DeadBand]) -> list[DeadBand]:

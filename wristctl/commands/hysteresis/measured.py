@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from wristctl.commands.printed_table import Table, number
+from wristctl.commands.printed_table import Table
 from wristctl.commands.results import Findings
 from wristctl.commands.session import Session
 from wristctl.config.study import Study
@@ -75,7 +75,8 @@ def fit_measured(session: Session) -> tuple[list[FrictionFit], list[Table]]:
     findings.plain("data/source.json", {"name": source.name, "sha256": sha256_of(source)})
     _write_fit(findings, friction_fit)
     findings.figure("measured", measured, friction_fit)
-    return fits, [_fit_table(findings, friction_fit), _tried_table(findings, fits)]
+    _keep_fit(findings, friction_fit)
+    return fits, [_tried_table(findings, fits)]
 
 
 def _tried_table(findings: Findings, fits: Sequence[FrictionFit]) -> Table:
@@ -124,30 +125,18 @@ def _write_fit(findings: Findings, friction_fit: FrictionFit) -> None:
     findings.table("data/measured.csv", columns, units)
 
 
-def _fit_table(findings: Findings, friction_fit: FrictionFit) -> Table:
-    rows: list[tuple[str, float, float | None, float | None, str, str]] = []
+def _keep_fit(findings: Findings, friction_fit: FrictionFit) -> None:
+    """Keep what was found as metrics; of a value whose interval has no end the metric has none either."""
     for name, (unit, meaning) in FITTED.items():
         value, low, high = getattr(friction_fit, name)
-        ended = math.isfinite(high)
-        rows.append((name, value, low, high if ended else None, unit, meaning))
-        findings.metric(
-            name, value if ended else None, unit, "", friction_fit.count, (low, high) if ended else None, meaning
-        )
+        found, ends = (value, (low, high)) if math.isfinite(high) else (None, None)
+        findings.metric(name, found, unit, "", friction_fit.count, ends, meaning)
     bend, exponent = friction_fit.told_best
-    meaning = f"mu (bend + sheath) at a bend of {math.degrees(bend):.3g} deg, where it is told best"
-    findings.metric("exponent", exponent.value, "", "", friction_fit.count, (exponent.low, exponent.high), meaning)
-    rows.append(("exponent", *exponent, "", meaning))
-    for name, estimate, unit, meaning in _of_wrist(friction_fit):
+    best = f"mu (bend + sheath) at a bend of {math.degrees(bend):.3g} deg, where it is told best"
+    for name, estimate, unit, meaning in [("exponent", exponent, "", best), *_of_wrist(friction_fit)]:
         findings.metric(name, estimate.value, unit, "", friction_fit.count, (estimate.low, estimate.high), meaning)
-        rows.append((name, *estimate, unit, meaning))
-    findings.metric("correlation", friction_fit.correlation, n=friction_fit.count, meaning=_CORRELATION)
-    rows.append(("correlation", friction_fit.correlation, None, None, "", _CORRELATION))
-    for name, unit, noise in zip(
-        ("angle", "+ tension", "- tension"), ("rad", "N", "N"), friction_fit.noise, strict=False
-    ):
-        rows.append((f"{name}, left over", float(noise), None, None, unit, "standard deviation of measured less model"))
-    heads = ("", "value", "95 % low", "95 % high", "unit", "meaning")
-    return Table(_fit_heading(friction_fit), heads, rows)
+    meaning = "of mu with bend + sheath, as logarithms, at the mean bend"
+    findings.metric("correlation", friction_fit.correlation, n=friction_fit.count, meaning=meaning)
 
 
 def _of_wrist(fit: FrictionFit) -> list[tuple[str, FrictionEstimate, str, str]]:
@@ -162,26 +151,3 @@ def _of_wrist(fit: FrictionFit) -> list[tuple[str, FrictionEstimate, str, str]]:
         found += [("tendon_radius", fit.tendon_radius, "m", "radius of the tendons' circle")]
     names = zip(("slack_plus", "slack_minus"), fit.slack, strict=False)
     return found + [(name, slack, "m", "reeled in before it pulls, over its spool's count") for name, slack in names]
-
-
-_CORRELATION = "of mu with bend + sheath, as logarithms, at the mean bend"
-
-
-def _fit_heading(friction_fit: FrictionFit) -> str:
-    """Heading of the fit's table."""
-    friction, sheath, path = friction_fit.friction, friction_fit.sheath, friction_fit.presliding
-    presliding = f"presliding {_between(path, 1e6)} um" if math.isfinite(path.high) else "nothing of presliding"
-    if friction.low > 0.0 and math.isfinite(sheath.high):
-        apart = f"mu {_between(friction)}, sheath {_between(sheath)} rad"
-        return f"{friction_fit.problem.loop.name} tells {apart} and {presliding}"
-    bend, exponent = friction_fit.told_best
-    return (
-        f"{friction_fit.problem.loop.name} tells mu (bend + sheath), {_between(exponent)} at a bend of "
-        f"{math.degrees(bend):.3g} deg, and {presliding},\nbut not mu and the sheath apart: mu may be up to "
-        f"{number(friction.high)}, the sheath {number(sheath.low)} rad or more; a wider range of bend would tell"
-    )
-
-
-def _between(estimate: FrictionEstimate, scale: float = 1.0) -> str:
-    value, low, high = (number(scale * end) for end in estimate)
-    return f"{value} ({low} to {high})"

@@ -11,7 +11,8 @@ from wristctl.commands.answer import Answer
 from wristctl.commands.identify.answer import comparison_on, recommendation_for, simulation_of
 from wristctl.commands.identify.logs import logs_of
 from wristctl.commands.inputs import Inputs
-from wristctl.commands.printed_table import COLUMNS, Table, degrees, joined, number
+from wristctl.commands.printed_table import COLUMNS, Table, degrees, joined
+from wristctl.commands.quantities import keep_told, told_frame, told_table
 from wristctl.commands.results import StudyResult
 from wristctl.commands.session import Session
 from wristctl.config.study import Study
@@ -62,13 +63,7 @@ class BendsTold(StudyResult):
 
     def frame(self) -> pd.DataFrame:
         """One row per parameter: value and ends of its interval, nan where the readings do not tell it, and unit."""
-        import pandas as pd
-
-        rows = [
-            (name, *((one.value, one.low, one.high) if one.known else [math.nan] * 3), one.unit, one.meaning)
-            for name, one in self.told.items()
-        ]
-        return pd.DataFrame(rows, columns=["parameter", "value", "low", "high", "unit", "meaning"])
+        return told_frame(self.told)
 
 
 def _in_one_plane_too(study: Study) -> bool:
@@ -130,10 +125,8 @@ def identify_bends(session: Session) -> BendsTold:
     if not scaled:
         told = without_forces(told)
     findings.numerics(integrator="RODAS3", step=settings.step, segments=settings.segments, planes=2)
-    for name, one in told.items():
-        ends = (one.low, one.high) if one.known else None
-        findings.metric(name, one.value if one.known else None, one.unit, "", 1, ends, one.meaning)
-    tables = [_told_table(told), fit_table(findings, fitted, known), residual_table(missed)]
+    keep_told(findings, told)
+    tables = [told_table(told, "What the readings tell"), fit_table(findings, fitted, known), residual_table(missed)]
     with session.drawing():
         findings.figure("bends", bends, fitted, caption="measured bends, the model's, and the difference")
         findings.figure("residuals", residuals, fitted, known)
@@ -155,20 +148,10 @@ def _refuse(session: Session, fitted: Fit, told: Mapping[str, Told], missed: Seq
     settings, worst = session.study.identify, max(missed, key=lambda misfit: misfit.ratio)
     if settings.misfit == "tell" or worst.ratio <= settings.lack_of_fit:
         return
-    text = "\n".join(_answer(fitted, told, "", True, scaled).lines())
-    session.findings.summary(f"```\n{text}\n```")
-    session.operator.tell(text)
+    session.tell_refused(_answer(fitted, told, "", True, scaled))
     problem = f"{worst.direction}: the model is off by {math.sqrt(worst.ratio):.2g} times the readings' own noise"
     accept = ("check geometry, masses and senses; or take it as it is: ", Setting("misfit=tell", "identify"))
     raise UserError(problem, "identify", accept, exit_code=3)
-
-
-def _told_table(told: Mapping[str, Told]) -> Table:
-    rows = []
-    for name, one in told.items():
-        value, interval = number(one.value), f"{number(one.low)} to {number(one.high)}"
-        rows.append((name, *((value, interval) if one.known else ("not identifiable", "")), one.unit, one.meaning))
-    return Table("What the readings tell", ("parameter", "value", "95 %", "unit", "meaning"), rows)
 
 
 def what_tells(fit: Fit, lacking: Sequence[str]) -> str:
@@ -241,5 +224,4 @@ def _answer(fit: Fit, told: Mapping[str, Told], run: str, square: bool, scaled: 
             f"$ {simulation_of(run, f'{run}/config.yaml')} --reference circumduction",
             *[f"$ {comparison_on(run)}"] * square,
         ]
-    table = _told_table(told)
-    return Answer(f"{springs} {left}", Table("", table.columns, table.rows).within(COLUMNS), notes, "Figures: --all.")
+    return Answer(f"{springs} {left}", told_table(told).within(COLUMNS), notes, "Figures: --all.")

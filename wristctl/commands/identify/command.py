@@ -187,9 +187,7 @@ def _told_if_refused(session: Session, refused: Answer, tables: Sequence[Table])
     try:
         yield
     except UserError:
-        text = "\n\n".join(table.text() for table in tables)
-        session.findings.summary(f"```\n{text}\n```")
-        session.operator.tell("\n".join(refused.lines()))
+        session.tell_refused(refused, tables)
         raise
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
@@ -10,7 +9,8 @@ from typing import TYPE_CHECKING, Any
 from wristctl.commands.answer import Answer
 from wristctl.commands.identify.answer import recommendation_by_ratios
 from wristctl.commands.inputs_of_loops import RATIOS
-from wristctl.commands.printed_table import COLUMNS, Table, degrees, joined, number
+from wristctl.commands.printed_table import COLUMNS, Table, degrees, joined
+from wristctl.commands.quantities import keep_told, told_frame, told_table
 from wristctl.commands.results import StudyResult
 from wristctl.commands.session import Session
 from wristctl.config.study import Study
@@ -20,7 +20,9 @@ if TYPE_CHECKING:
     import pandas as pd
 
     from wristctl.identification.arc_fit import Told
+    from wristctl.identification.arc_robot import ArcRobot
     from wristctl.identification.driven_fit import DrivenFit
+    from wristctl.identification.model_choice import TriedModel
     from wristctl.records.open_log import OpenLog
 
 
@@ -55,13 +57,7 @@ class DrivenTold(StudyResult):
 
     def frame(self) -> pd.DataFrame:
         """One row per parameter: value and ends of its interval, nan where the data do not tell it, and unit."""
-        import pandas as pd
-
-        rows = [
-            (name, *((told.value, told.low, told.high) if told.known else [math.nan] * 3), told.unit, told.meaning)
-            for name, told in self.told.items()
-        ]
-        return pd.DataFrame(rows, columns=["parameter", "value", "low", "high", "unit", "meaning"])
+        return told_frame(self.told)
 
 
 def driven_plan(study: Study, logs: Sequence[OpenLog]) -> str:
@@ -76,38 +72,42 @@ def driven_plan(study: Study, logs: Sequence[OpenLog]) -> str:
 
 def identify_driven(session: Session, logs: Sequence[OpenLog]) -> DrivenTold:
     """Find what logs of tensions or currents tell, in their run."""
-    from wristctl.commands.validate.answer import model_rows
-    from wristctl.commands.validate.figures import errors_of_models, left_over, motion
     from wristctl.identification.driven_fit import fitted_logs
     from wristctl.identification.driven_forward import STEP
     from wristctl.identification.log_model import rate_of_logs
-    from wristctl.identification.real_robots import RealRobot
 
     findings, study = session.findings, session.study
     with session.progress("fitting models") as report:
         found = fitted_logs(logs, study.wrist, study.identify, report)
-    robot, score, scale = found.robot, found.chosen.score, found.robot.scale
     findings.numerics(integrator="RODAS3", step=STEP, segments=1, planes=2)
-    findings.metric("error", scale * score.error, "deg", "lower", score.blocks, (scale * score.low, scale * score.high),
-                    "RMS of the part that was predicted")  # fmt: skip
-    findings.metric("error_share", found.share, "", "lower", score.blocks, None, "that over its motion")
-    about = RealRobot("this robot", "", robot, lambda files: [], "", "predicted part")
-    with session.drawing():
-        findings.figure("motion", motion, about, found.chosen.fits, caption="measured motion and prediction")
-        findings.figure("left-over", left_over, about, found.chosen.fits, caption="what is left of the motion")
-        findings.figure("models", errors_of_models, about, found.models, caption="error of each model")
-    findings.overview.figure = "motion"
-    heads = ("model", "numbers", "predicted part [deg]", "over that without", "")
-    models = Table("What each model misses", heads, model_rows(found.models, scale))
+    models = keep_prediction(session, found.robot, found.models, found.chosen)
+    findings.metric("error_share", found.share, "", "lower", found.chosen.score.blocks, None, "that over its motion")
     remarks = [*(remark for log in logs for remark in log.remarks), *found.remarks]
     _refuse(session, found, remarks)
-    for name, told in found.fit.told.items():
-        ends = (told.low, told.high) if told.known else None
-        findings.metric(name, told.value if told.known else None, told.unit, "", 1, ends, told.meaning)
-    result = DrivenTold(study, findings, [models, _table(found.fit.told)], found, rate_of_logs(logs), remarks)
+    keep_told(findings, found.fit.told)
+    result = DrivenTold(study, findings, [models, told_table(found.fit.told)], found, rate_of_logs(logs), remarks)
     findings.table("data/parameters.csv", result.frame())
     findings.plain(RATIOS, result.ratios)
     return result
+
+
+def keep_prediction(session: Session, robot: ArcRobot, models: Sequence[TriedModel], chosen: TriedModel) -> Table:
+    """Keep how well the chosen model predicts the part that was not fitted, with its figures; a table of all models."""
+    from wristctl.commands.validate.answer import model_rows
+    from wristctl.commands.validate.figures import errors_of_models, left_over, motion
+    from wristctl.identification.real_robots import RealRobot
+
+    findings, (error, low, high) = session.findings, (robot.scale * value for value in chosen.score[:3])
+    meaning = "RMS of the part that was predicted"
+    findings.metric("error", error, robot.unit, "lower", chosen.score.blocks, (low, high), meaning)
+    about = RealRobot("this robot", "", robot, lambda files: [], "", "predicted part")
+    with session.drawing():
+        findings.figure("motion", motion, about, chosen.fits, caption="measured motion and prediction")
+        findings.figure("left-over", left_over, about, chosen.fits, caption="what is left of the motion")
+        findings.figure("models", errors_of_models, about, models, caption="error of each model")
+    findings.overview.figure = "motion"
+    heads = ("model", "numbers", f"predicted part [{robot.unit}]", "over that without", "")
+    return Table("What each model misses", heads, model_rows(models, robot.scale))
 
 
 def _refuse(session: Session, found: DrivenFit, remarks: Sequence[str]) -> None:
@@ -154,16 +154,4 @@ def driven_answer(found: DrivenFit, remarks: Sequence[str], run: str = "") -> An
     if run and known:
         notes += recommendation_by_ratios(run, found.robot.drive == "tension" and "stiffness" in known)
     more = "Errors of each model, figures: --all, or the run's report.html."
-    return Answer(sentence, _table(told).within(COLUMNS), notes, more)
-
-
-def _table(told: Mapping[str, Told]) -> Table:
-    """Parameters with their 95 % intervals, angles in degrees."""
-    rows = []
-    for name, one in told.items():
-        turned = math.degrees(1.0) if one.unit == "rad" else 1.0
-        value, low, high = (number(turned * part) for part in (one.value, one.low, one.high))
-        unit = "deg" if one.unit == "rad" else one.unit
-        cells = (value, f"{low} to {high}") if one.known else ("not identifiable", "")
-        rows.append((name, *cells, unit, one.meaning))
-    return Table("", ("parameter", "value", "95 %", "unit", "meaning"), rows)
+    return Answer(sentence, told_table(told).within(COLUMNS), notes, more)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -10,10 +9,11 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from wristctl.commands.answer import Answer
 from wristctl.commands.identify.answer import recommendation_by_ratios
-from wristctl.commands.identify.driven import DrivenTold, driven_plan, identify_driven
+from wristctl.commands.identify.driven import DrivenTold, driven_plan, identify_driven, keep_prediction
 from wristctl.commands.inputs import Inputs
 from wristctl.commands.inputs_of_loops import RATIOS
 from wristctl.commands.printed_table import COLUMNS, Table, joined
+from wristctl.commands.quantities import keep_told, told_frame, told_table
 from wristctl.commands.results import StudyResult
 from wristctl.commands.session import Session
 from wristctl.config.study import Study
@@ -64,13 +64,7 @@ class LogTold(StudyResult):
 
     def frame(self) -> pd.DataFrame:
         """One row per parameter: value and ends of its interval, nan where the data do not tell it, and unit."""
-        import pandas as pd
-
-        rows = [
-            (name, *((told.value, told.low, told.high) if told.known else [math.nan] * 3), told.unit, told.meaning)
-            for name, told in self.fit.told.items()
-        ]
-        return pd.DataFrame(rows, columns=["parameter", "value", "low", "high", "unit", "meaning"])
+        return told_frame(self.fit.told)
 
 
 class ReadLogs(NamedTuple):
@@ -162,11 +156,8 @@ def identify_logs(session: Session) -> LogTold | DrivenTold:
 
 
 def _identify_spooled(session: Session, logs: Sequence[OpenLog]) -> LogTold:
-    from wristctl.commands.validate.answer import parameters_table
-    from wristctl.commands.validate.figures import errors_of_models, left_over, motion
     from wristctl.identification.log_model import everything_fitted
     from wristctl.identification.model_choice import chosen_of, tried_models, whole_fit
-    from wristctl.identification.real_robots import RealRobot
 
     findings, study = session.findings, session.study
     robot, recordings, samples, remarks, rate = read_logs(logs, study)
@@ -181,20 +172,8 @@ def _identify_spooled(session: Session, logs: Sequence[OpenLog]) -> LogTold:
     if missed > _MISSED_OF_ALL and study.identify.misfit != "tell":
         fit = replace(fit, predicts=False)
         remarks = [*remarks, _unpredicted(missed)]
-    unit, scale = robot.unit, robot.scale
-    score = chosen.score
-    findings.metric("error", scale * score.error, unit, "lower", score.blocks, (scale * score.low, scale * score.high),
-                    "RMS of the part that was predicted")  # fmt: skip
-    for name, told in fit.told.items():
-        ends = (told.low, told.high) if told.known else None
-        findings.metric(name, told.value if told.known else None, told.unit, "", 1, ends, told.meaning)
-    about = RealRobot("this robot", "", robot, lambda files: [], "", "predicted part")
-    with session.drawing():
-        findings.figure("motion", motion, about, chosen.fits, caption="measured motion and prediction")
-        findings.figure("left-over", left_over, about, chosen.fits, caption="what is left of the motion")
-        findings.figure("models", errors_of_models, about, models, caption="error of each model")
-    findings.overview.figure = "motion"
-    tables = [_models_table(models, robot), parameters_table([fit], "")]
+    keep_told(findings, fit.told)
+    tables = [keep_prediction(session, robot, models, chosen), told_table(fit.told)]
     result = LogTold(study, findings, tables, fit, models, chosen, remarks, rate, samples)
     findings.table("data/parameters.csv", result.frame())
     findings.plain(RATIOS, result.ratios)
@@ -220,9 +199,7 @@ def _refuse(session: Session, result: LogTold, recordings: Sequence[ArcRecording
     if score.error**2 <= _MISSED * moved**2 or session.study.identify.misfit == "tell":
         return
     unit, scale = result.fit.robot.unit, result.fit.robot.scale
-    text = "\n".join(result.answer.lines())
-    session.findings.summary(f"```\n{text}\n```")
-    session.operator.tell(text)
+    session.tell_refused(result.answer)
     problem = (
         f"the model misses {scale * score.error:.3g} {unit} of a motion of {scale * moved:.3g} {unit} that it was to "
         "predict: nothing of it is to be relied on"
@@ -246,7 +223,7 @@ def told_answer(
     samples : of the motion in the logs
     run : path of the run on whose wrist one may go on; empty where there is none
     """
-    from wristctl.commands.validate.answer import parameters_table, wanted_terms
+    from wristctl.commands.validate.answer import wanted_terms
 
     unit, scale = fit.robot.unit, fit.robot.scale
     error, low, high = (f"{scale * value:.3g}" for value in chosen.score[:3])
@@ -267,15 +244,7 @@ def told_answer(
         notes += recommendation_by_ratios(run, "force" in fit.told and fit.told["force"].known)
     return Answer(
         sentence,
-        parameters_table([fit], "").within(COLUMNS),
+        told_table(fit.told).within(COLUMNS),
         notes,
         "Errors of each model, figures: --all, or the run's report.html.",
     )
-
-
-def _models_table(models: Sequence[TriedModel], robot: ArcRobot) -> Table:
-    from wristctl.commands.validate.answer import model_rows
-
-    unit, scale = robot.unit, robot.scale
-    heads = ("model", "numbers", f"predicted part [{unit}]", "over that without", "")
-    return Table("What each model misses", heads, model_rows(models, scale))

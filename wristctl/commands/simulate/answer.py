@@ -13,32 +13,28 @@ from wristctl.config.wrist import WristParameters
 from wristctl.wrist.directions import toward_words
 
 if TYPE_CHECKING:
+    from wristctl.comparison.repetition_spread import Spread
     from wristctl.config.loop import DirectionName, Loop, Reference
     from wristctl.config.study import Study
     from wristctl.simulation.repetitions import Repeated
 
 # Actuators in words, by level.
 _ACTUATORS = {"ideal": "", "lagged": "motors with a lag", "tendon": "stepper motors and elastic tendons"}
-# Figures of the table, in one plane and in two: metric, heading, and for an angle how many times it is shown.
-_FIGURES = (
-    ("rmse", "RMSE [deg]", 1.0),
-    ("settling", "settling [s]", None),
-    ("steady_state", "error at the end [deg]", 1.0),
-    ("overshoot", "overshoot [%]", None),
-    ("peak_tension", "largest tension [N]", None),
-    ("oscillation", "swing at the end, peak to peak [deg]", 2.0),
-)
-_OF_TWO = (
-    ("rmse_ulnar", "RMSE toward ulnar [deg]", 1.0),
-    ("rmse_flexion", "RMSE toward flexion [deg]", 1.0),
-    ("rmse", "RMSE over both planes [deg]", 1.0),
-    ("largest_error", "largest error [deg]", 1.0),
-    ("steady_state", "error at the end [deg]", 1.0),
-    ("oscillation", "swing at the end, peak to peak [deg]", 2.0),
-    ("tip_rmse_mm", "RMS distance of the tip [mm]", None),
-    ("peak_tension", "largest tension [N]", None),
-    ("saturation", "share of time out of reach", None),
-)
+# Figures of the table, in one plane and in two.
+_FIGURES = {
+    1: ("rmse", "settling", "steady_state", "overshoot", "peak_tension", "swing"),
+    2: (
+        "rmse_ulnar", "rmse_flexion", "rmse", "largest_error", "steady_state", "swing", "tip_rmse_mm", "peak_tension",
+        "saturation",
+    ),
+}  # fmt: skip
+# Their words where these are other than their names.
+_WORDS = {
+    "rmse": "RMSE", "rmse_ulnar": "RMSE toward ulnar", "rmse_flexion": "RMSE toward flexion",
+    "steady_state": "error at the end", "peak_tension": "largest tension",
+    "swing": "swing at the end, peak to peak", "tip_rmse_mm": "RMS distance of the tip",
+    "saturation": "share of time out of reach",
+}  # fmt: skip
 # Overshoot [%] from which it is told.
 _OVERSHOOT = 0.5
 
@@ -74,7 +70,7 @@ def answer(study: Study, repeated: Repeated, reason: str = "", advice: Sequence[
     does = f"{joined(verdicts)}{there}" if verdicts else f"follows with {figures}"
     median = f" Figures are medians of {count} repetitions." * (count > 1)
     sentence = f"{motion} on {place}: {controller_words(chosen.controller, chosen.gains)} {does}.{median}"
-    table = figures_table(repeated, _OF_TWO if two else _FIGURES) if two or count > 1 else None
+    table = _table(repeated) if two or count > 1 else None
     return Answer(sentence, table, advice, "All metrics: `--all`; the motion and its figures: report.html of the run.")
 
 
@@ -105,7 +101,7 @@ def _faults(repeated: Repeated) -> list[str]:
 def _told(repeated: Repeated) -> list[str]:
     """The main figures in words, medians of several repetitions."""
     course = repeated.first.trajectory
-    values = {name: figure_of(repeated, name) for name, *_ in (_FIGURES if course.planes == 1 else _OF_TWO)}
+    values = {name: _estimate(repeated, name).median for name in _FIGURES[course.planes]}
     least = f"at most {two(values['peak_tension'])} N in a tendon"
     if course.planes == 2:
         each = (("rmse_ulnar", "toward ulnar"), ("rmse_flexion", "toward flexion"), ("rmse", "over both"))
@@ -122,33 +118,29 @@ def _told(repeated: Repeated) -> list[str]:
     return [*parts, least]
 
 
-def figure_of(repeated: Repeated, name: str) -> float:
-    """A metric of a loop, of several repetitions the median; nan where there is none."""
+def _estimate(repeated: Repeated, name: str) -> Spread:
+    """A metric of a loop with its interval, of several repetitions the median; a swing is twice its amplitude."""
+    import numpy as np
+
     from wristctl.comparison.repetition_spread import spread
 
-    return spread(repeated.metrics[name]).median if name in repeated.metrics else math.nan
+    metric, times = ("oscillation", 2.0) if name == "swing" else (name, 1.0)
+    return spread(times * np.asarray(repeated.metrics.get(metric, [math.nan])))
 
 
-def figures_table(repeated: Repeated, figures: Sequence[tuple[str, str, float | None]]) -> Table:
-    """Figures of a loop, of several repetitions medians with 95 % intervals; `-` where there is none.
+def _table(repeated: Repeated) -> Table:
+    """Figures of a loop, of several repetitions medians with 95 % intervals; nan where there is none."""
+    from wristctl.simulation.metrics import metrics_in
 
-    Each is a metric, its heading, and for an angle [rad] how many times it is shown, in degrees.
-    """
-    from wristctl.comparison.repetition_spread import spread
-
-    rows: list[tuple[str, ...]] = []
-    several = len(repeated.failed) > 1
-    for name, heading, times in figures:
-        if name not in repeated.metrics:
-            continue
-        estimate = spread(repeated.metrics[name])
-        shown = [
-            "-" if not math.isfinite(value) else two(value, 3) if times is None else degrees(times * value)
-            for value in (estimate.median, estimate.low, estimate.high)
-        ]
-        rows.append((heading, shown[0], f"{shown[1]} to {shown[2]}") if several else (heading, shown[0]))
-    heads = ("figure", "median", f"95 % interval, {len(repeated.failed)} repetitions")
-    return Table("", heads if several else ("figure", "value"), rows)
+    planes, several = repeated.first.trajectory.planes, len(repeated.failed) > 1
+    metrics, rows = metrics_in(planes), []
+    for name in _FIGURES[planes]:
+        found, unit = _estimate(repeated, name), metrics["oscillation" if name == "swing" else name].unit
+        values = (found.median, found.low, found.high) if several else (found.median,)
+        rows.append((_WORDS.get(name, name.replace("_", " ")), *values, unit))
+    count = f", {len(repeated.failed)} repetitions"
+    heads = ("median", "95 % low", f"95 % high{count}") if several else ("value",)
+    return Table("", ("figure", *heads, "unit"), rows)
 
 
 def controller_words(name: str, gains: str | Mapping[str, float]) -> str:

@@ -23,6 +23,7 @@ from wristctl.plotting.style import (
     colour,
     columns_within,
     figure,
+    grid,
     legend_below,
     logarithmic,
     title,
@@ -74,12 +75,8 @@ def _short(name: str) -> str:
 def terms_by_rig(values: Sequence[TermValue]) -> Figure:
     """RMSE without each term over RMSE with it, with its interval, a panel for each family; grey where 1 is within."""
     families, terms = (list(dict.fromkeys(getattr(value, name) for value in values)) for name in ("family", "term"))
-    columns = columns_within(len(families), 0.8)
-    deep = -(-len(families) // columns)
-    fig, axes = figure(deep, columns, height=0.8 + deep * (0.5 + 0.27 * len(terms)), sharey=True)
-    panels = dict(zip(families, axes.ravel().tolist(), strict=False))
-    for panel in axes.ravel().tolist()[len(families) :]:
-        panel.set_visible(False)
+    fig, every = grid(len(families), columns_within(len(families), 0.8), 0.5 + 0.27 * len(terms), sharey=True)
+    panels = dict(zip(families, every, strict=True))
     for term_value in values:
         panel, place, times = panels[term_value.family], terms.index(term_value.term), term_value.times
         shade = SILVER if times.is_one else BLUE if times.value > 1.0 else VERMILLION
@@ -97,8 +94,8 @@ def terms_by_rig(values: Sequence[TermValue]) -> Figure:
         else:
             panel.xaxis.set_major_locator(LogLocator(numticks=3))
         title(panel, _short(family))
-    axes[0, 0].set_yticks(range(len(terms)), terms)
-    axes[0, 0].invert_yaxis()
+    every[0].set_yticks(range(len(terms)), terms)
+    every[0].invert_yaxis()
     label = "times less RMSE, with 95 % interval; grey: cannot be told"
     fig.supxlabel(fill(label, round(_LETTERS * fig.get_figwidth())), fontsize=10.0)
     return fig

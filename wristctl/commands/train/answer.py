@@ -21,39 +21,31 @@ def answer_of(
 ) -> Answer:
     """What the network is worth on `held_out` test samples.
 
-    `errors` has a row for each inverse and place: name, place, R^2, RMSE [deg], largest error [deg]. `kept` is
-    the name of the one of so many networks; `run` is the path of the run, empty in memory; `data` that of the run with
-    the samples, empty where the training drew its own, of a wrist of so many segments. In two planes the last two
-    columns are the RMSE of each.
+    `errors` has a row for each inverse and place, as `error_table` makes it. `kept` is the name of the one of so many
+    networks; `run` is the path of the run, empty in memory; `data` that of the run with the samples, empty where the
+    training drew its own, of a wrist of so many segments.
     """
     from wristctl.learning.network_file import NETWORK
 
     name, networks = kept
     planes = 2 if errors.columns[-2:] == OF_PLANES else 1
-    of_planes = [row[-2:] if planes == 2 else () for row in errors.rows]
-    rows = [
-        (row[0], row[1], _deg(row[3]), _deg(row[4]), *map(_deg, each))
-        for row, each in zip(errors.rows, of_planes, strict=True)
-    ]
-    rmse, largest, *by_plane = next(row[2:] for row in rows if row[0] == "network")
-    over = f" over both planes ({by_plane[0]} deg toward ulnar, {by_plane[1]} deg toward flexion)" if by_plane else ""
+    network, closed = (next(row for row in errors.rows if row[0] == inverse) for inverse in ("network", _CLOSED_FORM))
+    over = ""
+    if planes == 2:
+        ulnar, flexion = map(_deg, network[-2:])
+        over = f" over both planes ({ulnar} deg toward ulnar, {flexion} deg toward flexion)"
     sentence = (
         f"On {held_out} samples that it was not trained on the network{f' {name}' * (networks > 1)} has an RMSE of "
-        f"{rmse} deg{over}, at most {largest} deg off."
+        f"{_deg(network[3])} deg{over}, at most {_deg(network[4])} deg off. The closed form {CLOSED_FORM[planes]} has "
+        f"one of {_deg(closed[3])} deg, at most {_deg(closed[4])} deg off."
     )
-    closed, most, *_ = next(row[2:] for row in rows if row[0] == _CLOSED_FORM)
-    sentence += f" The closed form {CLOSED_FORM[planes]} has one of {closed} deg, at most {most} deg off."
-    named = [("closed form" if row[0] == _CLOSED_FORM else row[0], *row[1:]) for row in rows]
-    heads = OF_PLANES if planes == 2 else ()
     notes = [f"It is the one of {networks} networks with the least validation loss."] * (networks > 1)
     if run:
         cut = ["--set", "loop.planes=2"] * (planes == 2) + ["--set", f"loop.plant_segments={segments}"] * (segments > 1)
         words = ["wristctl", "simulate", f"{data or run}/config.yaml", "--set", "reference.inverse=network", *cut]
         notes += ["Next, one motion of this wrist through this network:", f"$ {shlex.join([*words, '--network', run])}"]
     more = f"All tables: --all. The network: {run}/{NETWORK}" if run else "All tables: `.tables`."
-    return Answer(
-        sentence, Table("", ("inverse", "inputs", "RMSE [deg]", "largest error [deg]", *heads), named), notes, more
-    )
+    return Answer(sentence, errors, notes, more)
 
 
 def _deg(error_deg: float) -> str:

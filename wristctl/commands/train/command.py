@@ -284,7 +284,6 @@ def train(session: Session) -> Trained | TrainedDynamics:
     measures = trials_frame(trials, where)
     tables += ranking_tables(findings, settings, trials, measures)
     errors = error_table(findings, kept, samples, split, where)
-    tables.append(errors)
     tables.append(timing_table(findings, kept, samples, split, seconds))
     if checkpoints:
         shutil.rmtree(checkpoints, ignore_errors=True)

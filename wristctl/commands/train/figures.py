@@ -44,7 +44,8 @@ def coverage(samples: pd.DataFrame, count: int | None = None) -> Figure:
     shown = f"{len(samples)} of {count}" if count not in (None, len(samples)) else f"{len(samples)}"
     if "z" in samples:
         return _both_sides(samples, f"{shown} samples of the tip")
-    picture, axes = _workspace(1e3 * samples["y"], 1e3 * samples["x"], f"{shown} samples of the tip")
+    picture, axes = _workspace(1e3 * samples["y"], 1e3 * samples["x"])
+    title(axes, f"{shown} samples of the tip")
     bend = float(np.degrees(samples["theta"].abs().max()))
     dots = axes.scatter(
         1e3 * samples["y"],
@@ -111,24 +112,10 @@ def predicted_angles(predictions: pd.DataFrame) -> Figure:
 
 
 def error_over_workspace(tip: Array, error: Array) -> Figure:
-    """Absolute error of a network on a grid of tips (A, L, 2) [m]; errors (A, L) [rad]."""
-    degrees, x, y = np.abs(np.degrees(error)), 1e3 * tip[..., 0], 1e3 * tip[..., 1]
-    picture, axes = _workspace(y, x, f"greatest error {degrees.max():.3g} deg, at the circle")
-    image = axes.pcolormesh(y, x, degrees, shading="gouraud", cmap=ERRORS, vmin=0.0, rasterized=True)
-    worst = np.unravel_index(degrees.argmax(), degrees.shape)
-    axes.plot(y[worst], x[worst], "o", color=VERMILLION, fillstyle="none", markersize=10, markeredgewidth=1.5)
-    picture.colorbar(image, ax=axes, label="absolute error [deg]")
-    return picture
-
-
-def errors_at_samples(tip: Array, error: Array) -> Figure:
-    """Absolute error of a network at tips (N, 2) [m] that fill no grid; errors (N,) [rad]."""
-    degrees, x, y = np.abs(np.degrees(error)), 1e3 * tip[:, 0], 1e3 * tip[:, 1]
-    picture, axes = _workspace(y, x, f"greatest error {degrees.max():.3g} deg, on the test samples")
-    order = np.argsort(degrees)
-    options: Any = {"s": 8.0, "cmap": ERRORS, "vmin": 0.0, "linewidths": 0.0, "rasterized": len(x) > MOST_PATHS}
-    dots = axes.scatter(y[order], x[order], c=degrees[order], **options)
-    picture.colorbar(dots, ax=axes, label="absolute error [deg]")
+    """Absolute error of a network at tips [m]: on a grid (A, L, 2) filled, of samples (N, 2) as dots; errors [rad]."""
+    up, across = np.moveaxis(1e3 * tip, -1, 0)
+    picture, axes = _workspace(across, up)
+    picture.colorbar(_draw_errors(axes, across, up, error), ax=axes, label="absolute error [deg]")
     return picture
 
 
@@ -139,22 +126,27 @@ def worst_over_lengths(grid: ErrorMap) -> tuple[Array, Array]:
 
 def errors_over_bends(bends: Array, error: Array) -> Figure:
     """Errors of a network [rad] in the plane of bends: on a grid (A, D, 2) [rad] filled, of samples (N, 2) as dots."""
-    degrees = np.degrees(error)
-    y, z = np.moveaxis(np.degrees(bends), -1, 0)
     picture, ((axes,),) = figure(height=4.6)
-    if error.ndim == 2:
-        image: Any = axes.pcolormesh(y, z, degrees, shading="gouraud", cmap=ERRORS, vmin=0.0, rasterized=True)
-        worst = np.unravel_index(degrees.argmax(), degrees.shape)
-        axes.plot(y[worst], z[worst], "o", color=VERMILLION, fillstyle="none", markersize=10, markeredgewidth=1.5)
-        title(axes, f"greatest error {degrees.max():.3g} deg, at the circle; the worst of all arc lengths")
-    else:
-        order = np.argsort(degrees)
-        options: Any = {"s": 8.0, "cmap": ERRORS, "vmin": 0.0, "linewidths": 0.0, "rasterized": len(y) > MOST_PATHS}
-        image = axes.scatter(y[order], z[order], c=degrees[order], **options)
-        title(axes, f"greatest error {degrees.max():.3g} deg, on the test samples")
+    across, up = np.moveaxis(np.degrees(bends), -1, 0)
+    drawn = _draw_errors(axes, across, up, error, "; the worst of all arc lengths")
     axes.set(xlabel="bend toward ulnar [deg]", ylabel="bend toward flexion [deg]", aspect="equal")
-    picture.colorbar(image, ax=axes, label="error over both planes [deg]")
+    picture.colorbar(drawn, ax=axes, label="error over both planes [deg]")
     return picture
+
+
+def _draw_errors(axes: Axes, across: Array, up: Array, error: Array, of_a_grid: str = "") -> Any:
+    """Draw sizes of errors [deg] at places: a grid's filled with its greatest in a circle, those of samples as dots."""
+    degrees = np.abs(np.degrees(error))
+    where = f"at the circle{of_a_grid}" if error.ndim == 2 else "on the test samples"
+    title(axes, f"greatest error {degrees.max():.3g} deg, {where}")
+    if error.ndim == 2:
+        worst = np.unravel_index(degrees.argmax(), degrees.shape)
+        ring: Any = {"fillstyle": "none", "markersize": 10, "markeredgewidth": 1.5}
+        axes.plot(across[worst], up[worst], "o", color=VERMILLION, **ring)
+        return axes.pcolormesh(across, up, degrees, shading="gouraud", cmap=ERRORS, vmin=0.0, rasterized=True)
+    order = np.argsort(degrees)
+    options: Any = {"s": 8.0, "cmap": ERRORS, "vmin": 0.0, "linewidths": 0.0, "rasterized": len(up) > MOST_PATHS}
+    return axes.scatter(across[order], up[order], c=degrees[order], **options)
 
 
 def _both_sides(samples: pd.DataFrame, heading: str) -> Figure:
@@ -199,7 +191,7 @@ def accuracy_against_cost(grid: pd.DataFrame, chosen: int) -> Figure:
     return picture
 
 
-def _workspace(across: ArrayLike, up: ArrayLike, heading: str) -> tuple[Figure, Axes]:
+def _workspace(across: ArrayLike, up: ArrayLike) -> tuple[Figure, Axes]:
     """A figure as tall as a map of these positions [mm] needs at equal scales."""
     low, high = (np.array([f(across), f(up)]) for f in (np.min, np.max))
     width, height = high - low
@@ -207,5 +199,4 @@ def _workspace(across: ArrayLike, up: ArrayLike, heading: str) -> tuple[Figure, 
     edge = 0.04 * width
     axes.set(xlim=(low[0] - edge, high[0] + edge), ylim=(low[1] - edge, high[1] + edge), aspect="equal")
     axes.set(xlabel="y [mm]", ylabel="x [mm]")
-    title(axes, heading)
     return picture, axes

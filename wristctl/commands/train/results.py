@@ -223,7 +223,6 @@ def error_table(findings: Findings, kept: TrainingResult, samples: Samples, spli
     """Errors of the kept network, a polynomial and the exact inverse in every place."""
     from wristctl.commands.train.figures import (
         error_over_workspace,
-        errors_at_samples,
         errors_over_bends,
         predicted_angles,
         worst_over_lengths,
@@ -247,7 +246,7 @@ def error_table(findings: Findings, kept: TrainingResult, samples: Samples, spli
     elif samples.planes == 2:
         findings.figure("error-map", errors_over_bends, test.theta, size_of(angles[0] - test.theta, 2))
     else:
-        findings.figure("error-map", errors_at_samples, test.inputs[:, :2], angles[0] - test.theta)
+        findings.figure("error-map", error_over_workspace, test.inputs[:, :2], angles[0] - test.theta)
 
     rows, rmse = [], {}
     for name, (angle, parameters, multiply_adds) in beside.items():
@@ -277,11 +276,13 @@ def error_table(findings: Findings, kept: TrainingResult, samples: Samples, spli
             findings.summary(
                 f"On {place.name} the network's RMSE is {verdict} the exact inverse's ({ratio:.3g} of it)."
             )
-    columns = ("inverse", "inputs", "R^2", "RMSE [deg]", "max error [deg]", "within 0.5 deg [share]", "parameters")
+    columns = (
+        "inverse", "inputs", "R^2", "RMSE [deg]", "max error [deg]", "within 0.5 deg [share]", "parameters",
+        "multiply-adds",
+    )  # fmt: skip
     if samples.planes == 2:
-        heads = (*columns, "multiply-adds", *OF_PLANES)
-        return Table("Errors of the bend, over both planes", heads, rows)
-    return Table("Errors of the bending angle", (*columns, "multiply-adds"), rows)
+        return Table("Errors of the bend, over both planes", (*columns, *OF_PLANES), rows)
+    return Table("Errors of the bending angle", columns, rows)
 
 
 def timing_table(findings: Findings, kept: TrainingResult, samples: Samples, split: Split, seconds: float) -> Table:

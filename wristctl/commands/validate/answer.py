@@ -7,7 +7,8 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from wristctl.commands.answer import Answer
-from wristctl.commands.printed_table import Table, joined, number
+from wristctl.commands.printed_table import Table, joined
+from wristctl.commands.quantities import told_table
 
 if TYPE_CHECKING:
     from wristctl.identification.arc_fit import ArcFit
@@ -100,16 +101,13 @@ def model_rows(models: Sequence[TriedModel], scale: float) -> list[tuple[str, in
     return rows
 
 
-def parameters_table(fits: Sequence[ArcFit], title: str = "What the data tell of the chosen model") -> Table:
+def parameters_table(fits: Sequence[ArcFit]) -> Table:
     """Unknowns of a model with their 95 % intervals, or that the data do not tell them."""
-    several, rows = len(fits) > 1, []
-    for fit in fits:
-        for name, told in fit.told.items():
-            value = number(told.value) if told.known else "not identifiable"
-            interval = f"{number(told.low)} to {number(told.high)}" if told.known else ""
-            rows.append((*([fit.recordings[0].name] * several), name, value, interval, told.unit, told.meaning))
-    heads = (*["recording"] * several, "parameter", "value", "95 %", "unit", "meaning")
-    return Table(title, heads, rows)
+    title, of_fits = "What the data tell of the chosen model", [told_table(fit.told) for fit in fits]
+    if len(fits) == 1:
+        return Table(title, of_fits[0].columns, of_fits[0].rows)
+    rows = [(fit.recordings[0].name, *row) for fit, of_fit in zip(fits, of_fits, strict=True) for row in of_fit.rows]
+    return Table(title, ("recording", *of_fits[0].columns), rows)
 
 
 def steps_table(robot: RealRobot, steps: Sequence[ArcFit]) -> Table:

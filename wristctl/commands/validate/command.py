@@ -11,6 +11,7 @@ from wristctl.commands.answer import Answer
 from wristctl.commands.inputs import Inputs
 from wristctl.commands.printed_table import Table
 from wristctl.commands.procedure import Procedure, no_tendons
+from wristctl.commands.quantities import Quantity, documented, keep_told
 from wristctl.commands.results import Findings, StudyResult
 from wristctl.commands.session import Session
 from wristctl.config.choices import ROBOTS
@@ -58,23 +59,23 @@ class Validated(StudyResult):
             ends = (ratio.error, ratio.low, ratio.high) if ratio else (None, None, None)
             fitted = max(fit.rms() for fit in model.fits)
             rows.append((model.words, model.numbers, fitted, *score[:3], score.blocks, *ends, model.verdict))
-        return pd.DataFrame(rows, columns=list(_MODELS))
+        return pd.DataFrame(rows, columns=[quantity.name for quantity in _MODELS])
 
 
 _SI = "rad or m"
-_MODELS = {
-    "model": ("", "what it has"),
-    "numbers": ("", "free numbers of what is fitted"),
-    "fitted": (_SI, "RMS error of what was fitted, the largest of the cases"),
-    "error": (_SI, "RMS error of what was predicted"),
-    "low": (_SI, "of its 95 % interval"),
-    "high": (_SI, "of its 95 % interval"),
-    "blocks": ("", "blocks that were drawn for it"),
-    "ratio": ("", "error over that of the model without the last term, paired by blocks"),
-    "ratio_low": ("", "of its 95 % interval"),
-    "ratio_high": ("", "of its 95 % interval"),
-    "verdict": ("", "whether the data want the last term"),
-}
+_MODELS = (
+    Quantity("model", "", "what it has"),
+    Quantity("numbers", "", "free numbers of what is fitted"),
+    Quantity("fitted", _SI, "RMS error of what was fitted, the largest of the cases"),
+    Quantity("error", _SI, "RMS error of what was predicted"),
+    Quantity("low", _SI, "of its 95 % interval"),
+    Quantity("high", _SI, "of its 95 % interval"),
+    Quantity("blocks", "", "blocks that were drawn for it"),
+    Quantity("ratio", "", "error over that of the model without the last term, paired by blocks"),
+    Quantity("ratio_low", "", "of its 95 % interval"),
+    Quantity("ratio_high", "", "of its 95 % interval"),
+    Quantity("verdict", "", "whether the data want the last term"),
+)
 
 
 def listed() -> Table:
@@ -160,7 +161,7 @@ def validate(session: Session) -> Validated:
     if steps:
         tables.append(steps_table(robot, steps))
     result = Validated(study, findings, tables, robot, models, chosen, steps, beside)
-    findings.table("data/models.csv", result.frame(), *_units(_MODELS))
+    findings.table("data/models.csv", result.frame(), *documented(_MODELS))
     with session.drawing():
         findings.figure("motion", figures.motion, robot, chosen.fits, caption="measured motion and prediction")
         findings.figure("left-over", figures.left_over, robot, chosen.fits, caption="what is left of the motion")
@@ -168,12 +169,6 @@ def validate(session: Session) -> Validated:
     findings.overview.figure = "motion"
     findings.headline("error", "authors", "ratio_to_authors")
     return result
-
-
-def _units(columns: dict[str, tuple[str, str]]) -> tuple[dict[str, str], dict[str, str]]:
-    return {name: unit for name, (unit, _) in columns.items()}, {
-        name: meaning for name, (_, meaning) in columns.items()
-    }
 
 
 def _write(
@@ -200,11 +195,7 @@ def _write(
             findings.metric(name, model.ratio.error, "", "lower", model.ratio.blocks, ends, meaning)
     for number, fit in enumerate(chosen.fits):
         of_case = f"_{number + 1}" if len(chosen.fits) > 1 else ""
-        for name, told in fit.told.items():
-            ends_of = (told.low, told.high) if told.known else None
-            findings.metric(
-                f"{name}{of_case}", told.value if told.known else None, told.unit, "", 1, ends_of, told.meaning
-            )
+        keep_told(findings, fit.told, of_case)
     for step in steps:
         name = step.recordings[0].name.replace(", ", "_").replace(" ", "")
         findings.metric(name, scale * step.rms("asked"), unit, "lower", meaning="RMS error of a step in a closed loop")

@@ -1,0 +1,86 @@
+"""Quantities of results, described once: for a table's columns, a file's columns and a run's metrics."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Literal
+
+from wristctl.commands.printed_table import Table, number
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from wristctl.commands.results import Findings
+    from wristctl.identification.arc_fit import Told
+
+# Factors from a unit of files to one that people read; a table turns angles into degrees by itself.
+_SCALES = {("1/s", "Hz"): 1.0, ("s", "ms"): 1e3, ("m", "mm"): 1e3, ("m", "um"): 1e6, ("J", "mJ"): 1e3, ("", "%"): 100.0}
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """One quantity: its name in files, and how people read it."""
+
+    name: str
+    unit: str = ""
+    """Of its values in files; SI."""
+    meaning: str = ""
+    heading: str = ""
+    """Over its column, without the unit; empty: its name in words."""
+    shown: str = ""
+    """Unit in which people read it; empty: that of files."""
+    better: Literal["lower", "higher", ""] = ""
+
+    @property
+    def head(self) -> str:
+        """Head of its column, with the unit."""
+        unit = self.shown or self.unit
+        words = self.heading or self.name.replace("_", " ")
+        return f"{words} [{unit}]" if unit else words
+
+    def cell(self, value: Any) -> Any:
+        """A value as a cell of its column; words and None as they are."""
+        if not self.shown or value is None or isinstance(value, str | bool):
+            return value
+        return _SCALES[self.unit, self.shown] * value
+
+
+def table_of(title: str, quantities: Sequence[Quantity], records: Iterable[Mapping[Any, Any]]) -> Table:
+    """A table with a column for each quantity and a row for each record, by the quantities' names."""
+    rows = [tuple(quantity.cell(record.get(quantity.name)) for quantity in quantities) for record in records]
+    return Table(title, tuple(quantity.head for quantity in quantities), rows)
+
+
+def documented(quantities: Iterable[Quantity]) -> tuple[dict[str, str], dict[str, str]]:
+    """Units and meanings of a file's columns by their names."""
+    every = list(quantities)
+    return {each.name: each.unit for each in every}, {each.name: each.meaning for each in every}
+
+
+def told_table(told: Mapping[str, Told], title: str = "") -> Table:
+    """Parameters with their 95 % intervals, or that the data do not tell them."""
+    rows = []
+    for name, one in told.items():
+        cells = (number(one.value), f"{number(one.low)} to {number(one.high)}")
+        rows.append((name, *(cells if one.known else ("not identifiable", "")), one.unit, one.meaning))
+    return Table(title, ("parameter", "value", "95 %", "unit", "meaning"), rows)
+
+
+def told_frame(told: Mapping[str, Told]) -> pd.DataFrame:
+    """One row per parameter: value and ends of its interval, nan where the data do not tell it, unit and meaning."""
+    import pandas as pd
+
+    rows = [
+        (name, *((one.value, one.low, one.high) if one.known else [math.nan] * 3), one.unit, one.meaning)
+        for name, one in told.items()
+    ]
+    return pd.DataFrame(rows, columns=["parameter", "value", "low", "high", "unit", "meaning"])
+
+
+def keep_told(findings: Findings, told: Mapping[str, Told], of: str = "") -> None:
+    """Parameters as metrics, without a value where the data do not tell it; `of` follows each name."""
+    for name, one in told.items():
+        ends = (one.low, one.high) if one.known else None
+        findings.metric(f"{name}{of}", one.value if one.known else None, one.unit, "", 1, ends, one.meaning)
