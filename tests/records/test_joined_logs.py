@@ -32,7 +32,7 @@ def way(time: Array) -> Array:
 
 def motors(quantity: str = "spool", scale: float = 0.02, moved: Callable[[Array], Array] = way) -> OpenLog:
     """Twenty seconds of three motors, 100 rows/s."""
-    time = 0.01 * np.arange(2000)
+    time = 0.01 * np.arange(2000.0)
     pulls = scale * moved(time) @ np.stack([np.cos(ANGLES), np.sin(ANGLES)])
     columns = {"time": time} | {f"{quantity}_{k + 1}": column for k, column in enumerate(pulls.T)}
     return OpenLog(Path("motors.csv"), "log", columns)

@@ -113,8 +113,9 @@ def init(
 
 
 def _files() -> list[Path]:
-    """From the folder of experiments."""
-    return sorted(file.relative_to(shipped()) for suffix in ("yaml", "py") for file in shipped().rglob(f"*.{suffix}"))
+    """From the folder of experiments: studies, code, and models of robots that it names."""
+    found = (file for suffix in ("yaml", "py", "xml") for file in shipped().rglob(f"*.{suffix}"))
+    return sorted(file.relative_to(shipped()) for file in found)
 
 
 check_controller_app = typer.Typer(add_completion=False)

@@ -266,7 +266,7 @@ def _recording(
     seen, counted = np.isfinite(motion), np.isfinite(spools).all(axis=1)
     seen = seen[:, seen.any(axis=0)]
     if not robot.timed:
-        seen = seen.all(axis=1, keepdims=True)
+        seen = np.logical_and.reduce(seen, axis=1, keepdims=True)
     fewest = int(min(*seen.sum(axis=0), counted.sum())) if seen.size else 0
     if fewest < _FEWEST:
         raise UserError(
