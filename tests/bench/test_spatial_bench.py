@@ -238,7 +238,8 @@ def test_a_step_of_a_millisecond_is_fine_enough() -> None:
 @pytest.mark.parametrize(("damping", "share"), [(0.105, 1e-3), (1e-4, 0.02)])
 def test_energy_goes_to_damping_alone(damping: float, share: float) -> None:
     """Of the wrist and its stretched tendons on held spools, without friction; of one that hardly damps at last too."""
-    wrist, settings = WristParameters(damping=damping), BenchSettings(motors=EXACT, actuator=SLIDING)
+    holding = EXACT.model_copy(update={"holding_torque": 1.0})  # of the 118 N of the first period too
+    wrist, settings = WristParameters(damping=damping), BenchSettings(motors=holding, actuator=SLIDING)
     rows, values = moved(settings, 1, wrist)[301:], values_of(wrist, settings)
     q, rate, reeled = rows[:, :8], rows[:, 8:16], rows[:, 20:24]
     stretch = np.maximum(0.0, reeled - WRIST.length + spatial_terms(values, q, rate).lengths)

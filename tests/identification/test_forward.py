@@ -11,8 +11,9 @@ from wristctl.bench.bench_wrist import BenchWrist
 from wristctl.bench.motors import CYCLES
 from wristctl.board.emulator.atmega2560 import EDGE
 from wristctl.config.bench import BenchSettings, Motors
+from wristctl.config.identify import IdentifySettings
 from wristctl.identification.forward import SupposedWrist, across_plane, angles
-from wristctl.identification.rotor_field import Rotors
+from wristctl.identification.rotor_field import Rotors, rotors_of, with_rotors
 from wristctl.identification.spatial_forward import SupposedBends, courses_of_bends
 from wristctl.wrist.directions import ACTIVE, DIRECTIONS, in_plane, tendons_of
 from wristctl.wrist.statics import equilibrium
@@ -174,3 +175,11 @@ def test_the_model_moves_as_the_emulated_rig_does_and_less_so_without_swing_or_b
     assert off(whole) < 3e-5
     assert off(whole._replace(across=None)) > 3.0 * off(whole)
     assert off(whole._replace(rotors=Rotors(HOLDING))) > 3.0 * off(whole)
+
+
+def test_a_rigs_own_rotors_are_known_where_nobody_says_what_they_are() -> None:
+    motors = Motors(holding_torque=0.5, rotor_inertia=4e-5, spool_inertia=1e-6, damping=3e-3)
+    assert rotors_of(with_rotors(IdentifySettings(), motors)) == pytest.approx((0.5, 4.1e-5, 3e-3))
+    said = IdentifySettings(holding_torque=0.2)
+    assert rotors_of(with_rotors(said, motors)) == Rotors(0.2, 0.0, said.rotor_damping)
+    assert rotors_of(with_rotors(IdentifySettings(), Motors(rotor_inertia=0.0))) == Rotors()

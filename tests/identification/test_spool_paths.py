@@ -38,8 +38,8 @@ class Turned(NamedTuple):
         return count
 
 
-def turned(begun: float) -> Turned:
-    """A board that is sent MOVES, its host's ticks `begun` seconds after it was ready."""
+def turned(begun: float, moves: Array = MOVES) -> Turned:
+    """A board that is sent step rates (T, 4), its host's ticks `begun` seconds after it was ready."""
     wire, rows = BenchTransport(Atmega2560(), Faults(())), []
     with Board(wire) as board:
         board.set_up(Configure(0.5, 0, round(MOTORS.ramp)), Limits((-100_000,) * 4, (100_000,) * 4))
@@ -48,7 +48,7 @@ def turned(begun: float) -> Turned:
         wire.wait(begun)
         first = wire.now()
         wire.chip.events()
-        for tick, rates in enumerate(MOVES.tolist()):
+        for tick, rates in enumerate(moves.tolist()):
             began = wire.now() - first
             sent, status = board.turn(rates, 0.1)
             row = {"time": began, "counted": began + MOTORS.command_delay, "board": status.time}
@@ -127,3 +127,24 @@ def test_rates_that_no_answer_followed_turn_spools_all_the_same() -> None:
     instants = np.arange(0.02, 0.4, 1e-3)
     apart = spool_paths(lost, MOTORS)(instants) - spool_paths(board.log, MOTORS)(instants)
     assert np.abs(apart).max() < 1.5, "microsteps, of 60 on the way"
+
+
+@pytest.mark.slow
+def test_a_path_is_off_by_a_delay_alone_and_not_by_what_goes_with_the_direction_of_a_move() -> None:
+    """Microsteps: half of one, against each move, would be friction that the tendons have not."""
+    swings = 2.0 * np.pi * PERIOD * np.arange(300)[:, None] / np.array([0.47, 0.61, 0.83, 1.13])
+    board = turned(0.35e-3, 2500.0 * np.sin(swings) * np.sin(0.31 * swings + 1.0))
+    shift, _ = unknown_shift(board, count_times(board.log))
+    instants = np.arange(board.log.time.iloc[1], board.log.time.iloc[-1], 1e-3)
+
+    def made(*since: float) -> Array:
+        """Mean (T, 4) of the steps made at these times since each instant."""
+        times = instants + shift + np.array(since)[:, None]
+        return np.stack([board.made(axis, times).mean(axis=0) for axis in range(AXES)], axis=1)
+
+    ahead = spool_paths(board.log, MOTORS)(instants) - made(*np.linspace(-4e-4, 4e-4, 5))
+    rates = (made(10e-3) - made(-10e-3)) / 20e-3
+    turning = rates != 0.0
+    columns = np.stack([np.sign(rates[turning]), rates[turning]], axis=1)
+    (against, delay), *_ = np.linalg.lstsq(columns, ahead[turning], rcond=None)
+    assert abs(against) < 0.04 and abs(delay) < 4e-5

@@ -9,6 +9,7 @@ where the motors' holding torque is, and the swing where the rotors' inertia and
 import math
 from typing import Any, NamedTuple
 
+from wristctl.config.bench import Motors
 from wristctl.config.identify import IdentifySettings
 from wristctl.config.plant import Actuator
 from wristctl.lanes.compiled import by_type, compiled, implements
@@ -68,6 +69,19 @@ def rotors_of(settings: IdentifySettings) -> Rotors:
     if settings.holding_torque is None:
         return Rotors()
     return Rotors(settings.holding_torque, settings.rotor_inertia or 0.0, settings.rotor_damping)
+
+
+def with_rotors(settings: IdentifySettings, motors: Motors) -> IdentifySettings:
+    """The settings with these motors' own rotors, unless they say already what a motor holds."""
+    if settings.holding_torque is not None or motors.rotor_inertia == 0.0:
+        return settings
+    return settings.model_copy(
+        update={
+            "holding_torque": motors.holding_torque,
+            "rotor_inertia": motors.rotor_inertia + motors.spool_inertia,
+            "rotor_damping": motors.damping,
+        }
+    )
 
 
 def field_of(motors: Actuator, rotors: Rotors, alike: float = 1.0) -> Field:

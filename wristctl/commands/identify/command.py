@@ -196,6 +196,7 @@ def _problem(study: Study, inputs: Inputs) -> Problem:
     from wristctl.config.plant import Actuator
     from wristctl.identification.fit import Problem
     from wristctl.identification.measured_trials import measured_trials
+    from wristctl.identification.rotor_field import with_rotors
     from wristctl.identification.unknowns import believed_of
 
     if not inputs.runs():
@@ -219,14 +220,8 @@ def _problem(study: Study, inputs: Inputs) -> Problem:
         trials += measured_trials(run.id, wrist, actuator, settings.step, *logged, exposure)
         if not start:
             start, believed = believed_of(wrist, actuator), actuator
-            motors = config.hw_run.bench.motors
-            if settings.holding_torque is None and not config.hw_run.port and motors.rotor_inertia > 0.0:
-                own = {
-                    "holding_torque": motors.holding_torque,
-                    "rotor_inertia": motors.rotor_inertia + motors.spool_inertia,
-                    "rotor_damping": motors.damping,
-                }
-                settings = settings.model_copy(update=own)
+            if config.hw_run.port is None and config.hw_run.rig is None:
+                settings = with_rotors(settings, config.hw_run.bench.motors)
     return Problem(trials, start, settings, believed)
 
 
