@@ -22,7 +22,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from wristctl.errors import UserError
 from wristctl.mujoco_facts import Axes, Spooled, pulled, said_of
-from wristctl.rig import Drive, Facts, Limits, Look, Refused, Sensor, Tendon, VirtualClock, value
+from wristctl.rig import Drive, Facts, Limits, Look, Reeled, Refused, Sensor, Tendon, VirtualClock, value
 
 try:
     import mujoco
@@ -127,7 +127,8 @@ class MujocoRig:
         while len(self._seen) > 1 and self._seen[1][0] <= now:
             self._seen.popleft()
         moment, bend = self._seen[0]
-        return Look(bend if moment <= now else np.full(len(bend), math.nan), min(moment, self.clock.now()))
+        seen = bend if moment <= now else np.full(len(bend), math.nan)
+        return Look(seen, min(moment, self.clock.now()), None, Reeled(self._reeled, self.clock.now()))
 
     def stop(self) -> None:
         """The motors stand where they are."""

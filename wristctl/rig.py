@@ -18,8 +18,8 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
 __all__ = [
-    "Clock", "Drive", "Facts", "Fault", "Limits", "Look", "Lost", "Refused", "Rig", "RigError", "Sensor", "Spread",
-    "Tendon", "VirtualClock", "WallClock", "most", "value",
+    "Clock", "Drive", "Facts", "Fault", "Limits", "Look", "Lost", "Reeled", "Refused", "Rig", "RigError", "Sensor",
+    "Spread", "Tendon", "VirtualClock", "WallClock", "most", "value",
 ]  # fmt: skip
 
 
@@ -135,6 +135,15 @@ class Facts:
     """What is known of the wrist, by the keys of a study's section `wrist`; a study file goes before it."""
 
 
+class Reeled(NamedTuple):
+    """Where the motors are by sensors of their own."""
+
+    targets: ArrayLike
+    """Targets (T,) [facts.unit] that they have reached."""
+    time: float
+    """When, on the rig's clock [s]."""
+
+
 class Look(NamedTuple):
     """One look at the wrist."""
 
@@ -144,6 +153,8 @@ class Look(NamedTuple):
     """When it was true, on the rig's clock [s]. The same time again is no news."""
     tension: ArrayLike | None = None
     """Measured tension of each tendon (T,) [N], or None."""
+    reeled: Reeled | None = None
+    """Where the motors are; None: they are believed to follow their targets as `facts.drive` says."""
 
 
 class Clock(Protocol):

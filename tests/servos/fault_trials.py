@@ -61,13 +61,16 @@ def settings_with(tendons: int) -> ServoSettings:
     return replace(SETTINGS, servos=[Servo(number, place) for number, place in enumerate(places, 1)])
 
 
-def tried(fault: str, servo: int = 2, tendons: int = 3, motion: str = "circumduction", bent_deg: float = 8.0) -> Came:
-    """Home, follow a motion and come back."""
+def tried(
+    fault: str, servo: int = 2, tendons: int = 3, motion: str = "circumduction", bent_deg: float = 8.0,
+    angle_deg: float | None = None,
+) -> Came:  # fmt: skip
+    """Home, follow a motion, of a usual bend or this one, and come back."""
     servos = settings_with(tendons)
     rig = DynamixelRig(servos, Emulated(fault, servo=servo, bent_deg=bent_deg))
     assert rig.rehearsal is not None
     rows = (RigRow(controller="pid-ff", gains="hardware"),)
-    reference = Reference(kind=motion, angle_deg=_SIZES[motion])
+    reference = Reference(kind=motion, angle_deg=angle_deg or _SIZES[motion])
     given = HwRunSettings(rig="servos", rows=rows, reference=reference, directions=("ulnar",), horizon=4.0)
     settings, wrist = settings_of(rig.facts, given, "servos"), wrist_of(rig.facts, WristParameters(), "servos")
     stops, stop = list[float](), rig.stop

@@ -15,7 +15,7 @@ import numpy as np
 
 from wristctl.arrays import Array
 from wristctl.board.check import latency_timer, shorter
-from wristctl.rig import Clock, Facts, Fault, Look, Lost, Refused, WallClock
+from wristctl.rig import Clock, Facts, Fault, Look, Lost, Reeled, Refused, WallClock
 from wristctl.servos.emulated import Emulated, ServoRehearsal
 from wristctl.servos.servo_bus import ServoBus, opened
 from wristctl.servos.servo_settings import Servo, ServoSettings
@@ -81,6 +81,7 @@ class DynamixelRig:
         """Exchanges that brought no answer since `connect`."""
         self._units = np.ones(len(self._ids))
         self._tension: Array | None = None
+        self._reeled: Reeled | None = None
 
     def open_sensor(self) -> None:
         """Make the robot's own sensor ready; not called in a rehearsal."""
@@ -201,7 +202,7 @@ class DynamixelRig:
 
     def _heard(self) -> None:
         """Read all servos once, and judge what they say. Raises Fault and Lost."""
-        bus = self._connected()
+        bus, asked = self._connected(), self.clock.now()
         status = bus.status()
         now = self.clock.now()
         if status is not None:
@@ -215,6 +216,7 @@ class DynamixelRig:
         currents = np.array([one.current for one in status]) * self._senses * self._units
         self._tension = np.maximum(0.0, currents * self.settings.torque_constant / self.settings.spool_radius)
         positions = np.array([one.position for one in status])
+        self._reeled = Reeled(positions * self._senses, 0.5 * (asked + now))
         self._watch.judge_positions(positions, np.array(self._goals), self._tension, now)
 
     def _name_lost(self, bus: ServoBus, old: bool) -> NoReturn:
@@ -230,9 +232,9 @@ class DynamixelRig:
         raise Lost(f"answers on {self._path} are lost again and again, though each servo answers alone: see its cables")
 
     def look(self) -> Look:
-        """The bend by `bend()`, and the tensions by the servos' currents."""
+        """The bend by `bend()`, the tensions by the servos' currents, and where they are."""
         bend, time = self.bend() if self.rehearsal is None else self.rehearsal.bend()
-        return Look(bend, time, self._tension)
+        return Look(bend, time, self._tension, self._reeled)
 
     def stop(self) -> None:
         """Have every servo stay where it is; one whose position cannot be trusted lets go.

@@ -225,7 +225,7 @@ class ExpectedMoves:
         shares = self._alone.toward @ np.nan_to_num(bend)
         return int(np.argmax(shares)), int(np.argmin(shares))
 
-    def _told(self, axis: int, bend: Bend) -> tuple[int | None, str]:
+    def told(self, axis: int, bend: Bend) -> tuple[int | None, str]:
         """The axis as whose a bend by this one is seen, None for no axis; and in words where that bends the wrist.
 
         One camera tells sides, of parts of a bend that are no noise; two tell a direction.
@@ -246,7 +246,7 @@ class ExpectedMoves:
 
     def judge_side(self, axis: int, bend: Bend) -> None:
         """Raises SafetyStop where a bend by reeling in is another tendon's, or before two cameras no tendon's."""
-        like, where = self._told(axis, bend)
+        like, where = self.told(axis, bend)
         if like == axis:
             return
         problem = f"{self._name(axis)} bends the wrist {where}"

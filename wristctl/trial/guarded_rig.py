@@ -10,7 +10,7 @@ from wristctl.board.board_errors import HARDWARE
 from wristctl.errors import UserError
 from wristctl.interrupt import from_outside
 from wristctl.plugins.places import raised_at
-from wristctl.rig import Facts, Fault, Lost, Refused, Rig, RigError
+from wristctl.rig import Facts, Fault, Lost, Reeled, Refused, Rig, RigError
 
 # What each error of a rig says, and what to do about it.
 _SAYS = {
@@ -52,6 +52,8 @@ class GuardedRig:
         """Seconds on the rig's clock that the last `send` took."""
         self.tension: Array | None = None
         """Tension (T,) [N] by the last look; None where it gave none."""
+        self.reeled: tuple[Array, float] | None = None
+        """Targets (T,) [facts.unit] that the motors had reached by the last look, and when [s]; None: it gave none."""
 
     @property
     def virtual(self) -> bool:
@@ -85,15 +87,23 @@ class GuardedRig:
         """The newest bend. A bend that is infinite counts as not seen."""
         look = self._call("look", self.rig.look)
         try:
-            bend, time, tension = look
-            moment = float(time)
+            bend, time, *measured = look
+            tension, reeled = (*measured, None, None)[: max(2, len(measured))]
+            moment, reeled = float(time), None if reeled is None else Reeled(*reeled)
         except (TypeError, ValueError) as error:
-            raise RigStop(f"look() returns {look!r}", self.where, "return Look(bend, time, tension or None)") from error
+            fix = "return Look(bend, time, tension or None, Reeled(targets, time) or None)"
+            raise RigStop(f"look() returns {look!r}", self.where, fix) from error
         bends = self._values("look", bend, self.facts.planes, finite=False)
         if not np.isfinite(moment):
             raise RigStop("look() does not say when its bend was true", self.where, "Look.time on the rig's own clock")
         self.tension = None if tension is None else self._values("look", tension, self._count, finite=False)
+        self.reeled = None if reeled is None else self._reeled(reeled)
         return Seen(np.where(np.isfinite(bends), bends, np.nan), moment, self.tension)
+
+    def _reeled(self, reeled: Reeled) -> tuple[Array, float]:
+        places, (moment,) = (self._values("look", values, count) for values, count in
+                             ((reeled.targets, self._count), ([reeled.time], 1)))  # fmt: skip
+        return places, float(moment)
 
     def stop(self) -> str:
         """Stop the motors; what went wrong with that, in words, empty where nothing did."""

@@ -139,12 +139,18 @@ class Finder:
         return self._straight.theta, self._straight.beside
 
     def sense(self, axis: int, tried: Sequence[int]) -> int:
-        """Find which way the axis turns, and about where its tendon bends the wrist [steps]."""
+        """Find which way the axis turns, and about where its tendon bends the wrist [steps].
+
+        A small bend to another side than the tendon's is doubtful: a larger one is read with more time, and judged.
+        """
         for self._signs[axis] in tried:
             for reeled in range(2 * self._move, self._slack + 2 * self._move, 2 * self._move):
                 self._reel(axis, reeled)
                 moved = self._bent(axis).since(self._rest)
                 if moved.askew > self._bend:
+                    if self._expected.told(axis, moved)[0] != axis:
+                        self._reel(axis, reeled + 2 * self._move)
+                        moved = self._bent(axis, _AGAIN).since(self._rest)
                     self._let_go(axis, 0)
                     if self._expected.own and self._signs[axis] < 0:
                         raise self._expected.wrong_sense(axis)

@@ -200,7 +200,7 @@ _OF_A_RIG: Mapping[str, Mapping[str, str]] = {
         "meaning": "time since the newest bend was true", "causes": _SENSOR, "stops": "no new bend for {value}",
         "notes": "no new bend for {value} (limit {limit})",
     },
-    "pull": {"meaning": "largest tension by targets and estimated bend"},
+    "pull": {"meaning": "largest tension by where the motors are and the estimated bend"},
     "travel": {"meaning": "target furthest from zero", "stops": "a target {value} from zero, beyond {limit}"},
     "jump": {
         "meaning": "bend against where targets should have it, change between two looks",
@@ -238,9 +238,9 @@ RESIDUALS_OF_A_RIG: Mapping[str, Residual] = {
         if name not in _NO_PART
     },
     "tension_ratio": Residual(
-        Shown("", 1.0, ".2g"), "tension that look() gives over that by targets and estimated bend, of all pulled "
+        Shown("", 1.0, ".2g"), "tension that look() gives over that by motors and estimated bend, of all pulled "
         "tendons together", _never, _STIFFER, "a zero of its force sensors; facts.drive.stiffness; friction",
-        notes="tendons pull {value} times as much as targets and bend explain: the zero of their sensors, "
+        notes="tendons pull {value} times as much as motors and bend explain: the zero of their sensors, "
         "facts.drive.stiffness, or friction",
     ),
 }  # fmt: skip

@@ -16,6 +16,8 @@ from wristctl.trial.safety import SafetyStop
 from wristctl.vision.camera_pose import CameraPose
 from wristctl.vision.marker import Sighting, SightingVerdict
 
+# Ticks for which reckoned places are remembered: motors that were measured before are believed to follow.
+_REMEMBERED = 50
 # Seconds by which a look may be ahead of the clock: both are rounded.
 _CLOCKS = 1e-3
 _UNSEEN = np.full((2, 4, 2), np.nan)
@@ -25,7 +27,8 @@ class RigDrive:
     """Motors that follow targets after a delay, with a lag: microsteps of `actuator.step_length`, positive reeling in.
 
     `zero` are the targets (T,) at which every tendon of the straight wrist is just taut. What is believed of the spools
-    is what was sent, after the delay and the lag of the rig's facts.
+    is what was sent, after the delay and the lag of the rig's facts; where looks say where the motors are, they are as
+    far from there as when they were looked at.
     """
 
     lapses, resent = 0, 0
@@ -42,6 +45,7 @@ class RigDrive:
         self._target = self._place = np.zeros(len(self._zero))
         self._sent, self.counted = np.zeros(len(self._zero)), 0.0
         self._remembered: deque[Array] = deque()
+        self._reckoned_at, self._off = deque[tuple[float, Array]](maxlen=_REMEMBERED), np.zeros(len(self._zero))
 
     def at(self, targets: Array) -> None:
         """Say at which targets (T,) [facts.unit] the motors stand."""
@@ -58,6 +62,8 @@ class RigDrive:
         self._place, self._sent = self._target, np.zeros(len(self._zero))
         self._remembered = deque([self._target] * (self._ticks + 2), maxlen=self._ticks + 2)
         self.counted = self._rig.now()
+        self._reckoned_at.clear()
+        self._reckoned_at.append((self.counted, self._place))
 
     @property
     def time(self) -> float:
@@ -94,8 +100,14 @@ class RigDrive:
         self._rig.wait_until(moment)
 
     def reeled(self) -> Array:
-        """As reckoned."""
-        return self._place
+        """As reckoned, and as far off that as the last look said."""
+        if self._rig.reeled is not None:
+            targets, time = self._rig.reeled
+            times, places = zip(*self._reckoned_at, strict=True)
+            if time >= times[0]:
+                reckoned = [np.interp(time, times, each) for each in np.transpose(places)]
+                self._off = (targets - self._zero) * (self._unit / self._step) - reckoned
+        return self._place + self._off
 
     def lead(self, target: Array, moving: Array) -> Array:
         """As `LoopDrive.lead`: ahead of a moving target by the delay, the lag and half a period."""
@@ -122,8 +134,9 @@ class RigDrive:
         for _ in range(ticks):
             self._remembered.appendleft(self._target)
             before, after = self._remembered[self._ticks + 1], self._remembered[self._ticks]
-            middles.append(self._reckoned(before, after, 0.5 * self._period))
+            middles.append(self._reckoned(before, after, 0.5 * self._period) + self._off)
             self._place = self._reckoned(before, after, self._period)
+            self._reckoned_at.append((self._reckoned_at[-1][0] + self._period, self._place))
         self.counted = self._rig.now()
         return middles
 
