@@ -114,7 +114,9 @@ def init(
 
 def _files() -> list[Path]:
     """From the folder of experiments."""
-    return sorted(file.relative_to(shipped()) for suffix in ("yaml", "py") for file in shipped().rglob(f"*.{suffix}"))
+    return sorted(
+        file.relative_to(shipped()) for suffix in ("yaml", "py", "csv") for file in shipped().rglob(f"*.{suffix}")
+    )
 
 
 check_controller_app = typer.Typer(add_completion=False)
