@@ -6,6 +6,8 @@ All of it is from the schema, in its order; a comment gives the unit.
 from __future__ import annotations
 
 import inspect
+import subprocess
+import sys
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from types import NoneType, UnionType
@@ -61,6 +63,8 @@ def typed(kind: Any, shown: dict[type[Section], None]) -> str:
     if origin is Annotated:
         return typed(parts[0], shown)
     if origin in (Union, UnionType):
+        if all(get_origin(part) is Literal for part in parts):
+            return typed(Literal[tuple(value for part in parts for value in get_args(part))], shown)
         return " | ".join(dict.fromkeys(typed(part, shown) for part in parts))
     if origin is Literal:
         return f"Literal[{', '.join(f'{part!r}' for part in parts)}]".replace("'", '"')
@@ -134,3 +138,4 @@ def written() -> str:
 
 if __name__ == "__main__":
     FILE.write_text(written(), encoding="utf-8")
+    subprocess.run([sys.executable, "-m", "ruff", "format", "-q", str(FILE)], check=True)

@@ -377,8 +377,16 @@ class HwRunArguments(SharedArguments, total=False):
     rig: str | None
     controllers: Sequence[RowKeys | str]
     directions: Sequence[
-        Literal["ulnar", "radial", "flexion", "extension"]
-        | Literal["ulnar-flexion", "radial-flexion", "radial-extension", "ulnar-extension"]
+        Literal[
+            "ulnar",
+            "radial",
+            "flexion",
+            "extension",
+            "ulnar-flexion",
+            "radial-flexion",
+            "radial-extension",
+            "ulnar-extension",
+        ]
     ]
     repetitions: int
     push: PushKeys
