@@ -38,6 +38,8 @@ COMMANDS = (
 """Commands whose functions take keywords of their own section."""
 TYPED = (WristParameters, TendonPlace, Reference, Loop, Disturbances, Push, Actuator, Sensor)
 """Sections within others that have types of their own; any mapping is taken for the others, as those of a bench."""
+LONGEST = 6
+"""Names of a choice beyond which its type is any text."""
 HEAD = '''\
 """Keyword arguments of the functions of wristctl.api, by their types; `docs/argument_types.py` writes this file.
 
@@ -66,6 +68,8 @@ def typed(kind: Any, shown: dict[type[Section], None]) -> str:
         if all(get_origin(part) is Literal for part in parts):
             return typed(Literal[tuple(value for part in parts for value in get_args(part))], shown)
         return " | ".join(dict.fromkeys(typed(part, shown) for part in parts))
+    if origin is Literal and len(parts) > LONGEST:
+        return "str"
     if origin is Literal:
         return f"Literal[{', '.join(f'{part!r}' for part in parts)}]".replace("'", '"')
     if origin is tuple:

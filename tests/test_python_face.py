@@ -154,8 +154,8 @@ def test_a_result_shows_its_sentence_its_table_and_its_figure() -> None:
     done = wristctl.simulate(wrist={"stiffness": 0.9}, controller="pid-ff", horizon=1.5)
     shown = done._repr_html_()
     assert re.search(r'<p class="sentence">30 deg ulnar in 1 s .*pid-ff', shown)
-    value = re.escape(f"{math.degrees(done.metrics['rmse']):.3g}")
-    assert re.search(rf"<td>RMSE</td><td>{value}\d*</td><td>deg</td>", shown)
+    value = re.escape(f"{math.degrees(done.metrics['rmse']):.4g}")
+    assert re.search(rf"<td>RMSE</td><td>{value}</td><td>deg</td>", shown)
     assert shown.count('src="data:image/png;base64,') == 1
     assert "--all" not in shown and str(done.answer).startswith("30 deg ulnar")
 

@@ -376,18 +376,7 @@ class HwRunArguments(SharedArguments, total=False):
     optics_2: str | None
     rig: str | None
     controllers: Sequence[RowKeys | str]
-    directions: Sequence[
-        Literal[
-            "ulnar",
-            "radial",
-            "flexion",
-            "extension",
-            "ulnar-flexion",
-            "radial-flexion",
-            "radial-extension",
-            "ulnar-extension",
-        ]
-    ]
+    directions: Sequence[str]
     repetitions: int
     push: PushKeys
     push_toward_deg: float | None  # deg

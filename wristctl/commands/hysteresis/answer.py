@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from wristctl.commands.answer import Answer
 from wristctl.commands.printed_table import Table, degrees, two
+from wristctl.wrist.directions import toward_words
 
 if TYPE_CHECKING:
     from wristctl.config.wrist import WristParameters
@@ -166,8 +167,6 @@ def model_answer(
     if why_two:
         toward = math.degrees(math.atan2(own.toward[1], own.toward[0])) % 360.0
         aside = f"friction takes the wrist off that line by {degrees(own.aside, 3)} deg at most"
-        from wristctl.wrist.directions import toward_words
-
         notes.append(f"In two planes ({why_two}), bent {toward_words(toward)}; {aside}.")
     return Answer(_of_wrist(own, held.get(main)), Table("", heads, cells), notes, more)
 
