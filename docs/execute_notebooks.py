@@ -47,7 +47,8 @@ def run_cell(source: str, names: dict[str, Any], place: str) -> Output:
     """Execute a cell among `names`. An error in it is raised, with `place` as its file."""
     import matplotlib.pyplot as plt
 
-    tree, value, printed = ast.parse(source, place), None, io.StringIO()
+    value: Any = None
+    tree, printed = ast.parse(source, place), io.StringIO()
     last = tree.body.pop() if tree.body and isinstance(tree.body[-1], ast.Expr) else None
     with redirect_stdout(printed):
         exec(compile(tree, place, "exec"), names)
@@ -107,7 +108,13 @@ def notebook(text: str, outputs: list[Output]) -> dict[str, Any]:
             {"output_type": "display_data", "metadata": {}, "data": {"text/html": each.splitlines(keepends=True)}}
             for each in output.shown
         ]
-        cell = {"cell_type": "code", "id": name, "metadata": {}, "source": source, "execution_count": number // 2 + 1}
+        cell: dict[str, Any] = {
+            "cell_type": "code",
+            "id": name,
+            "metadata": {},
+            "source": source,
+            "execution_count": number // 2 + 1,
+        }
         cells.append({**cell, "outputs": shown})
     kernel = {"display_name": "Python 3", "language": "python", "name": "python3"}
     return {"cells": cells, "metadata": {"kernelspec": kernel}, "nbformat": 4, "nbformat_minor": 5}

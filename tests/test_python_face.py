@@ -18,6 +18,7 @@ import pytest
 
 import wristctl
 from tests.documented import script_of_docs
+from wristctl.arguments import PushKeys, WristKeys
 from wristctl.errors import UserError
 
 PACKAGE = Path(wristctl.__file__).parent
@@ -111,14 +112,14 @@ def test_every_public_name_has_a_docstring() -> None:
     assert not missing
 
 
-THREE = {"tendons": "three", "length": 0.095, "stiffness": 1.1}
+THREE: WristKeys = {"tendons": "three", "length": 0.095, "stiffness": 1.1}
 
 
 @pytest.mark.slow
 def test_a_wrist_in_plain_arguments_moves_as_that_of_a_study_file(tmp_path: Path) -> None:
     file = tmp_path / "mine.yaml"
     file.write_text("wrist: {tendons: three, length: 0.095, stiffness: 1.1}\nsimulate: {horizon: 1.2}\n")
-    typed = wristctl.simulate(wrist={**THREE}, controller="ct-dob", horizon=1.2)  # type: ignore[typeddict-item]
+    typed = wristctl.simulate(wrist=THREE, controller="ct-dob", horizon=1.2)
     for other in (
         wristctl.simulate(file, controller="ct-dob"),
         wristctl.simulate(wristctl.load_study(file), controller="ct-dob"),
@@ -162,7 +163,7 @@ def test_a_result_shows_its_sentence_its_table_and_its_figure() -> None:
 
 @pytest.mark.slow
 def test_a_result_in_two_planes_shows_the_table_of_its_answer() -> None:
-    done = wristctl.simulate(wrist={**THREE}, controller="ct-dob", horizon=1.2)  # type: ignore[typeddict-item]
+    done = wristctl.simulate(wrist=THREE, controller="ct-dob", horizon=1.2)
     shown, table = done._repr_html_(), done.answer.table
     assert table is not None and "<td>peak tension</td>" not in shown
     assert shown.count("<tr>") == 1 + len(table.rows) and all(f"<td>{row[0]}</td>" in shown for row in table.rows)
@@ -170,9 +171,9 @@ def test_a_result_in_two_planes_shows_the_table_of_its_answer() -> None:
 
 @pytest.mark.slow
 def test_emulated_trials_have_a_course_of_the_same_columns_and_a_sealed_run(tmp_path: Path) -> None:
-    push = {"force": 0.0}
+    push: PushKeys = {"force": 0.0}
     done = wristctl.hw_run(
-        controllers=["pid-ff"], directions=["ulnar", "radial"], push=push, horizon=1.5, out=tmp_path  # type: ignore[typeddict-item]
+        controllers=["pid-ff"], directions=["ulnar", "radial"], push=push, horizon=1.5, out=tmp_path
     )  # fmt: skip
     course = done.course
     assert done.run is not None and done.run.kind == "hw-run" and done.run.state == "ok"
