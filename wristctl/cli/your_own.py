@@ -115,7 +115,9 @@ def init(
 def _files() -> list[Path]:
     """From the folder of experiments."""
     return sorted(
-        file.relative_to(shipped()) for suffix in ("yaml", "py", "csv") for file in shipped().rglob(f"*.{suffix}")
+        file.relative_to(shipped())
+        for suffix in ("yaml", "py", "csv", "xml")
+        for file in shipped().rglob(f"*.{suffix}")
     )
 
 
