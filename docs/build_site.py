@@ -1,7 +1,7 @@
 """Build the site: `make docs`, or `python docs/build_site.py`; it needs no network. Open build/site/html/index.html.
 
 The source is the pages of this folder and of the root, and pages that are generated: the help of every command, the
-messages of the motor board, the manifest of runs, and the gallery with its runs.
+messages of the motor board, the manifest of runs, the gallery with its runs, and the notebooks with what they show.
 """
 
 from __future__ import annotations
@@ -160,6 +160,17 @@ def _type(of: dict[str, Any]) -> str:
     return str(of.get("type", "any"))
 
 
+def notebook_pages(source: Path, work: Path) -> None:
+    """Run the notebooks in the folder `work`, and put their pages with outputs in place of those without."""
+    for page in sorted((ROOT / "docs" / "notebooks").glob("*.md")):
+        folder = work / page.stem
+        shutil.rmtree(folder, ignore_errors=True)
+        command = [sys.executable, str(ROOT / "docs" / "execute_notebooks.py"), str(page), str(folder)]
+        subprocess.run(command, env=os.environ | {"OMP_NUM_THREADS": "1"}, check=True)
+        for name in (page.name, f"{page.stem}.ipynb"):
+            shutil.copy(folder / name, source / "docs" / "notebooks")
+
+
 def build(source: Path, html: Path) -> int:
     """Run Sphinx; a warning is an error. Returns its exit code."""
     conf = ["-c", str(ROOT / "docs")]
@@ -175,7 +186,9 @@ def build(source: Path, html: Path) -> int:
 def main() -> None:
     """Assemble, generate, build."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
-    parser.add_argument("--without-gallery", action="store_true", help="run nothing: the gallery stays empty")
+    parser.add_argument(
+        "--without-gallery", action="store_true", help="run nothing: the gallery stays empty, notebooks show no output"
+    )
     parser.add_argument("--into", type=Path, default=ROOT / "build" / "site", help="folder of source and HTML")
     asked = parser.parse_args()
     source, html = asked.into / "source", asked.into / "html"
@@ -185,6 +198,8 @@ def main() -> None:
     board_page(source)
     manifest_page(source)
     write_gallery(source / "docs", asked.into / "gallery", run=not asked.without_gallery)
+    if not asked.without_gallery:
+        notebook_pages(source, asked.into / "notebooks")
     code = build(source, html)
     if code == 0:
         sys.stdout.write(f"open {html / 'index.html'}\n")

@@ -4,21 +4,28 @@ from __future__ import annotations
 
 import ast
 import inspect
+import math
+import os
 import re
 import subprocess
 import sys
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+import pandas as pd
 import pytest
 
 import wristctl
+from tests.documented import script_of_docs
+from wristctl.arguments import PushKeys, WristKeys
+from wristctl.errors import UserError
 
 PACKAGE = Path(wristctl.__file__).parent
 
 FACE = {
-    "analyse", "audit", "compare", "gen_data", "hysteresis", "identify", "load_study", "open_run", "recommend", "runs",
-    "simulate", "study", "train", "tune",
+    "analyse", "audit", "compare", "gen_data", "hw_run", "hysteresis", "identify", "load_study", "open_run",
+    "recommend", "runs", "simulate", "study", "train", "tune",
 }  # fmt: skip
 
 SMALL = """
@@ -103,3 +110,124 @@ def test_every_public_name_has_a_docstring() -> None:
         missing += [f"{file.name}:{n.name}" for n in names if not n.name.startswith("_") and not ast.get_docstring(n)]
         assert ast.get_docstring(tree), file
     assert not missing
+
+
+THREE: WristKeys = {"tendons": "three", "length": 0.095, "stiffness": 1.1}
+
+
+@pytest.mark.slow
+def test_a_wrist_in_plain_arguments_moves_as_that_of_a_study_file(tmp_path: Path) -> None:
+    file = tmp_path / "mine.yaml"
+    file.write_text("wrist: {tendons: three, length: 0.095, stiffness: 1.1}\nsimulate: {horizon: 1.2}\n")
+    typed = wristctl.simulate(wrist=THREE, controller="ct-dob", horizon=1.2)
+    for other in (
+        wristctl.simulate(file, controller="ct-dob"),
+        wristctl.simulate(wristctl.load_study(file), controller="ct-dob"),
+        wristctl.simulate(wrist=file, controller="ct-dob", horizon=1.2),
+        wristctl.simulate(wristctl.load_study(file, "simulate.controller=ct-dob")),
+    ):
+        pd.testing.assert_frame_equal(typed.course, other.course, check_exact=True)
+    assert list(typed.course) == [
+        "time", "bend_ulnar", "bend_flexion", "reference_ulnar", "reference_flexion", "torque_ulnar", "torque_flexion",
+        "tension_1", "tension_2", "tension_3", "tip_x", "tip_y", "tip_z",
+    ]  # fmt: skip
+    end = typed.course.iloc[-1]
+    assert end["bend_ulnar"] == pytest.approx(math.radians(30), abs=1e-3) and abs(end["bend_flexion"]) < 1e-9
+    assert math.hypot(end["tip_x"], end["tip_y"]) == pytest.approx(0.095 * math.sin(x := math.pi / 12) / x, rel=2e-2)
+
+
+@pytest.mark.parametrize(("direction", "sign"), [("ulnar", 1.0), ("radial", -1.0)])
+def test_a_course_in_one_plane_has_the_sense_of_its_motion(direction: Any, sign: float) -> None:
+    done = wristctl.simulate(controller="computed-torque", gains="default", direction=direction, horizon=1.5)
+    course, trajectory = done.course, done.trajectory
+    assert list(course) == [
+        "time", "bend", "reference", "torque", "tension_plus", "tension_minus", "tip_x", "tip_y"
+    ]  # fmt: skip
+    assert course["bend"].iloc[-1] == pytest.approx(sign * math.radians(30), abs=1e-3)
+    assert math.copysign(1.0, course["tip_y"].iloc[-1]) == sign
+    moving = course.iloc[len(course) // 10]
+    assert math.copysign(1.0, moving["tension_plus"] - moving["tension_minus"]) == sign
+    np.testing.assert_array_equal(course["reference"], trajectory.theta_ref)
+    np.testing.assert_array_equal(course["torque"], trajectory.torque)
+
+
+def test_a_result_shows_its_sentence_its_table_and_its_figure() -> None:
+    done = wristctl.simulate(wrist={"stiffness": 0.9}, controller="pid-ff", horizon=1.5)
+    shown = done._repr_html_()
+    assert re.search(r'<p class="sentence">30 deg ulnar in 1 s .*pid-ff', shown)
+    value = re.escape(f"{math.degrees(done.metrics['rmse']):.4g}")
+    assert re.search(rf"<td>RMSE</td><td>{value}</td><td>deg</td>", shown)
+    assert shown.count('src="data:image/png;base64,') == 1
+    assert "--all" not in shown and str(done.answer).startswith("30 deg ulnar")
+
+
+@pytest.mark.slow
+def test_a_result_in_two_planes_shows_the_table_of_its_answer() -> None:
+    done = wristctl.simulate(wrist=THREE, controller="ct-dob", horizon=1.2)
+    shown, table = done._repr_html_(), done.answer.table
+    assert table is not None and "<td>peak tension</td>" not in shown
+    assert shown.count("<tr>") == 1 + len(table.rows) and all(f"<td>{row[0]}</td>" in shown for row in table.rows)
+
+
+@pytest.mark.slow
+def test_emulated_trials_have_a_course_of_the_same_columns_and_a_sealed_run(tmp_path: Path) -> None:
+    push: PushKeys = {"force": 0.0}
+    done = wristctl.hw_run(
+        controllers=["pid-ff"], directions=["ulnar", "radial"], push=push, horizon=1.5, out=tmp_path
+    )  # fmt: skip
+    course = done.course
+    assert done.run is not None and done.run.kind == "hw-run" and done.run.state == "ok"
+    assert list(course) == [
+        "trial", "time", "bend", "reference", "torque", "tension_1", "tension_2", "tension_4", "tension_5", "tip_x",
+        "tip_y",
+    ]  # fmt: skip
+    assert set(course["trial"]) == {0, 1} == set(done.frame()["trial"])
+    for number, direction in zip(done.frame()["trial"], done.frame()["direction"], strict=True):
+        of_trial = course[course["trial"] == number]
+        end, sign = of_trial.iloc[-1], 1.0 if direction == "ulnar" else -1.0
+        assert of_trial["time"].iloc[0] == 0.0 and of_trial["time"].is_monotonic_increasing
+        assert end["bend"] == pytest.approx(sign * math.radians(30), abs=math.radians(0.3))
+        half = end["bend"] / 2  # the chord of an arc turns by half its angle
+        assert math.atan2(end["tip_y"], end["tip_x"]) == pytest.approx(half, abs=1e-12)
+        assert math.hypot(end["tip_x"], end["tip_y"]) == pytest.approx(0.080 * math.sin(half) / half)
+        assert (of_trial.filter(like="tension") >= 2.0 - 1e-9).all(axis=None)
+
+
+def test_motors_that_are_real_are_left_to_the_command_line() -> None:
+    with pytest.raises(UserError, match="wristctl hw-run"):
+        wristctl.hw_run(port="/dev/ttyACM0")
+
+
+SCRIPT = """
+import wristctl
+import wristctl.arguments
+
+wrist: wristctl.arguments.WristKeys = {"tendons": "three", "length": 0.095, "stiffness": 1.1}
+done = wristctl.simulate(wrist=wrist, controller="ct-dob", reference={"kind": "sine", "offset_deg": 3.0})
+done.course["bend"].max()
+rows: list[wristctl.arguments.RowKeys | str] = ["pid-ff", {"controller": "my.py:LAW", "gains": {"Kp": 1.0}}]
+compared = wristctl.compare(controllers=rows, wrist="mine.yaml")
+compared.frame()
+wristctl.hw_run(controllers=["pid-ff"], wrist=wrist, push={"force": 0.0}).trials
+wristctl.simulate("quick", from_identified=wristctl.identify(runs="my.csv", wrist=wrist))
+"""
+
+
+@pytest.mark.slow
+def test_a_users_script_passes_mypy_and_a_wrong_key_in_it_does_not(tmp_path: Path) -> None:
+    (tmp_path / "right.py").write_text(SCRIPT)
+    wrong = {"length": "lenght", "controller=": "contoller=", '"three"': '"treee"', '"offset_deg"': '"ofset_deg"'}
+    for number, (right, mistaken) in enumerate(wrong.items()):
+        assert right in SCRIPT
+        (tmp_path / f"wrong_{number}.py").write_text(SCRIPT.replace(right, mistaken, 1))
+    command = [sys.executable, "-m", "mypy", "--strict", "--cache-dir", str(tmp_path / "cache"), str(tmp_path)]
+    environment = os.environ | {"MYPYPATH": str(PACKAGE.parent)}
+    said = subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True, text=True, check=False).stdout
+    faulty = set(re.findall(r"(\w+)\.py:\d+: error", said))
+    assert faulty == {f"wrong_{number}" for number in range(len(wrong))}, said
+
+
+def test_the_types_of_arguments_are_those_of_the_schema() -> None:
+    script = script_of_docs("argument_types")
+    here = ast.dump(ast.parse(script.FILE.read_text(encoding="utf-8")))  # which ruff has laid out
+    assert here == ast.dump(ast.parse(script.written())), "python docs/argument_types.py"

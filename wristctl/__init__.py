@@ -4,16 +4,18 @@ In a notebook:
 
     import wristctl
 
-    study = wristctl.load_study("experiments/paper.yaml", "simulate.gains=exchanged")
-    done = wristctl.simulate(study)
-    done.frame()                                 # a DataFrame
+    wrist = {"tendons": "three", "length": 0.095, "stiffness": 1.1}
+    done = wristctl.simulate(wrist=wrist, controller="ct-dob")
+    done                                         # the answer, its table and its figure
+    done.course                                  # a DataFrame: time, bend, reference, torque, tension, tip
     done.metrics["rmse"]                         # rad
     done.figures["angle"]                        # drawn now
+    wristctl.compare("experiments/paper.yaml", controllers=["pid-ff", "my.py:LAW"], wrist=wrist)
     wristctl.runs(kind="compare", newer="2d")    # a DataFrame
     wristctl.open_run("latest:compare").data("comparison")
 
-`gen_data`, `train`, `tune`, `compare`, `study`, `analyse`, `hysteresis`, `identify`, `recommend` and `audit`
-go the same way: wristctl.api.
+`gen_data`, `train`, `tune`, `study`, `hw_run`, `analyse`, `hysteresis`, `identify`, `recommend` and `audit` go the
+same way: wristctl.api.
 """
 
 from __future__ import annotations
@@ -29,6 +31,7 @@ if TYPE_CHECKING:
         audit,
         compare,
         gen_data,
+        hw_run,
         hysteresis,
         identify,
         load_study,
@@ -47,6 +50,7 @@ __all__ = [
     "audit",
     "compare",
     "gen_data",
+    "hw_run",
     "hysteresis",
     "identify",
     "load_study",

@@ -1,16 +1,21 @@
 """The functions that `import wristctl` offers: what the commands do, for notebooks and scripts.
 
-Each takes a study, its file or the name of an experiment, and returns a result with `.metrics`, `.tables`, `.figures`
-(drawn when asked for), `.frame()` and `.run`. Inputs are named as on the command line (a path, an id, the beginning of
-one, latest:<kind>), or are `Run` objects, or earlier results. With `out=None` nothing is written; with a folder the
-result is also a sealed run directory there, as the command writes it. Nothing is printed: `progress(what, count,
-total, figures)` is called as it goes on, warnings go to the logger "wristctl". What is wrong is a UserError that says
-what, where and how to mend it.
+Each takes a study, its file or the name of an experiment, and keyword arguments that come on top of it: sections of a
+study (`wrist`, `seed`), or keys of the command's own section (`controller`, `reference`, `horizon`), as a study file
+has them: `wristctl.simulate(wrist={"length": 0.095}, controller="ct-dob")`. `wrist` may be a study file too, whose
+section `wrist` is taken. The types of all of them are in `wristctl.arguments`.
+
+Each returns a result with `.metrics`, `.tables`, `.figures` (drawn when asked for), `.frame()` and `.run`, which a
+notebook shows as its answer, table and first figure. Inputs are named as on the command line (a path, an id, the
+beginning of one, latest:<kind>), or are `Run` objects, or earlier results. With `out=None` nothing is written; with a
+folder the result is also a sealed run directory there, as the command writes it. Nothing is printed: `progress(what,
+count, total, figures)` is called as it goes on, warnings go to the logger "wristctl". What is wrong is a UserError that
+says what, where and how to mend it.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -19,12 +24,13 @@ from wristctl.commands.audit.command import AUDIT, Audited
 from wristctl.commands.compare.command import COMPARE, Compared
 from wristctl.commands.gen_data.command import GEN_DATA, Generated
 from wristctl.commands.gen_data.transitions import Moved
+from wristctl.commands.hw_run.command import HW_RUN, Performed
 from wristctl.commands.hysteresis.command import HYSTERESIS, Hysteresis
 from wristctl.commands.identify.bends import BendsTold
 from wristctl.commands.identify.command import IDENTIFY, Identified
 from wristctl.commands.identify.driven import DrivenTold
 from wristctl.commands.identify.logs import LogTold
-from wristctl.commands.perform import RESULTS, Folder, Ref, StudyOrFile, carry_out, in_python
+from wristctl.commands.perform import RESULTS, Folder, Ref, StudyOrFile, carry_out, in_python, study_with
 from wristctl.commands.progress import Watch
 from wristctl.commands.recommend.answer import Recommended
 from wristctl.commands.recommend.command import RECOMMEND
@@ -36,12 +42,31 @@ from wristctl.commands.train.command import TRAIN, Trained
 from wristctl.commands.train.learned_dynamics import TrainedDynamics
 from wristctl.commands.tune.command import TUNE, Tuned
 from wristctl.config.study import Study
+from wristctl.errors import UserError
 from wristctl.records import Run
 from wristctl.records import open_run as _open_run
 from wristctl.study_files.load import load_study as _load_study
 
 if TYPE_CHECKING:
+    from typing import Unpack
+
     import pandas as pd
+
+    from wristctl.arguments import (
+        AnalyseArguments,
+        CompareArguments,
+        GenDataArguments,
+        HwRunArguments,
+        HysteresisArguments,
+        IdentifyArguments,
+        RecommendArguments,
+        SimulateArguments,
+        TrainArguments,
+        TuneArguments,
+    )
+
+# What identify tells: of trials, of a log of spools, of one of tensions or currents, or of one in two planes.
+Told = Identified | LogTold | DrivenTold | BendsTold
 
 
 @in_python()
@@ -58,8 +83,9 @@ def load_study(file: str | Path | None = None, *overrides: str, trust_code: bool
 
 @in_python()
 def gen_data(
-    study: StudyOrFile, *, run: Ref | Simulated | Compared | None = None, out: Folder | None = None,
+    study: StudyOrFile | None = None, *, run: Ref | Simulated | Compared | None = None, out: Folder | None = None,
     label: str = "", progress: Watch | None = None,
+    **settings: Unpack[GenDataArguments],
 ) -> Generated | Moved:  # fmt: skip
     """Samples of tip positions [m] and bends [rad], or of the wrist in motion, by the study's `gen-data` section.
 
@@ -68,14 +94,16 @@ def gen_data(
     a file that is none, or too few samples.
 
     With a folder `out` it is a sealed run directory too, named by `label`; `progress` is called as it goes on.
+    `settings` are sections or keys of a study, on top of `study`.
     """
-    return carry_out(GEN_DATA, study, {"run": run}, out, label, progress)
+    return carry_out(GEN_DATA, study, {"run": run}, out, label, progress, settings=settings)
 
 
 @in_python()
 def train(
-    study: StudyOrFile, *, data: Ref | Generated | Moved | None = None, resume: Ref | None = None,
+    study: StudyOrFile | None = None, *, data: Ref | Generated | Moved | None = None, resume: Ref | None = None,
     out: Folder | None = None, label: str = "", progress: Watch | None = None,
+    **settings: Unpack[TrainArguments],
 ) -> Trained | TrainedDynamics:  # fmt: skip
     """Networks from tip position [m] to bend [rad], or of the wrist's dynamics, by the study's `train` section.
 
@@ -86,14 +114,16 @@ def train(
     split leaves too few samples to judge by, or every training diverged.
 
     With a folder `out` it is a sealed run directory too, named by `label`; `progress` is called as it goes on.
+    `settings` are sections or keys of a study, on top of `study`.
     """
-    return carry_out(TRAIN, study, {"data": data, "resume": resume}, out, label, progress)
+    return carry_out(TRAIN, study, {"data": data, "resume": resume}, out, label, progress, settings=settings)
 
 
 @in_python()
 def tune(
-    study: StudyOrFile, *, network: Ref | Trained | None = None, from_identified: Ref | Identified | None = None,
-    executor: str = "serial", out: Folder | None = None, label: str = "", progress: Watch | None = None,
+    study: StudyOrFile | None = None, *, network: Ref | Trained | None = None,
+    from_identified: Ref | Told | None = None, executor: str = "serial", out: Folder | None = None,
+    label: str = "", progress: Watch | None = None, **settings: Unpack[TuneArguments],
 ) -> Tuned:  # fmt: skip
     """Gains by search, by the study's `tune` section: the same budget and objective for every controller.
 
@@ -102,18 +132,19 @@ def tune(
     `.searches`; `.frame()` is a row per candidate. Raises UserError for an unknown controller, one without gains, or a
     network that is missing.
 
-    Where the study has a `sweep` the result is a table of its points, which `executor` computes. `out`, `label` and
-    `progress` are as in `gen_data`.
+    Where the study has a `sweep` the result is a table of its points, which `executor` computes. `out`, `label`,
+    `progress` and `settings` are as in `gen_data`.
     """
     given = {"network": network, "from_identified": from_identified}
-    return carry_out(TUNE, study, given, out, label, progress, executor)
+    return carry_out(TUNE, study, given, out, label, progress, executor, settings=settings)
 
 
 @in_python()
 def compare(
-    study: StudyOrFile, *, network: Ref | Trained | None = None, tuned: Ref | Tuned | None = None,
-    from_identified: Ref | Identified | None = None, executor: str = "serial", out: Folder | None = None,
+    study: StudyOrFile | None = None, *, network: Ref | Trained | None = None, tuned: Ref | Tuned | None = None,
+    from_identified: Ref | Told | None = None, executor: str = "serial", out: Folder | None = None,
     label: str = "", progress: Watch | None = None,
+    **settings: Unpack[CompareArguments],
 ) -> Compared:  # fmt: skip
     """Controllers x loops x references, by the study's `compare` section, beside the paper's numbers.
 
@@ -125,11 +156,11 @@ def compare(
     unknown controllers or gains, inputs that are missing, or controllers that would be judged on what they were tuned
     on.
 
-    Where the study has a `sweep` the result is a table of its points, which `executor` computes. `out`, `label` and
-    `progress` are as in `gen_data`.
+    Where the study has a `sweep` the result is a table of its points, which `executor` computes. `out`, `label`,
+    `progress` and `settings` are as in `gen_data`.
     """
     given = {"network": network, "tuned": tuned, "from_identified": from_identified}
-    return carry_out(COMPARE, study, given, out, label, progress, executor)
+    return carry_out(COMPARE, study, given, out, label, progress, executor, settings=settings)
 
 
 @in_python()
@@ -150,8 +181,8 @@ def study(
 
 @in_python()
 def recommend(
-    study: Study, *, from_identified: Ref | Identified | None = None, out: Folder | None = None, label: str = "",
-    progress: Watch | None = None,
+    study: StudyOrFile | None = None, *, from_identified: Ref | Told | None = None, out: Folder | None = None,
+    label: str = "", progress: Watch | None = None, **settings: Unpack[RecommendArguments],
 ) -> Recommended:  # fmt: skip
     """A controller with gains for the study's wrist, by its `recommend` section.
 
@@ -161,65 +192,71 @@ def recommend(
     tendons cannot bend by 5 deg.
 
     With a folder `out` it is a sealed run directory too, named by `label`; `progress` is called as it goes on.
+    `settings` are sections or keys of a study, on top of `study`.
     """
-    return carry_out(RECOMMEND, study, {"from_identified": from_identified}, out, label, progress)
+    return carry_out(RECOMMEND, study, {"from_identified": from_identified}, out, label, progress, settings=settings)
 
 
 @in_python()
 def simulate(
-    study: StudyOrFile, *, network: Ref | Trained | None = None, tuned: Ref | Tuned | None = None,
-    from_identified: Ref | Identified | None = None, executor: str = "serial",
+    study: StudyOrFile | None = None, *, network: Ref | Trained | None = None, tuned: Ref | Tuned | None = None,
+    from_identified: Ref | Told | None = None, executor: str = "serial",
     out: Folder | None = None, label: str = "", progress: Watch | None = None,
+    **settings: Unpack[SimulateArguments],
 ) -> Simulated:  # fmt: skip
     """One closed loop, by the study's `simulate` section.
 
     `network` (train) stands behind a reference with `inverse: network`, `tuned` (tune) behind `gains: tuned`; the
-    parameters of `from_identified` (identify) replace the study's. The result has `.trajectory` (in two planes
-    `.course`), whose table in SI units is `.frame()`, and `.failed`, whether the wrist left its range. Raises UserError
-    for unknown controllers or gains, a reference out of reach, inputs that are missing, or a start in equilibrium of a
-    wrist that buckles.
+    parameters of `from_identified` (identify) replace the study's. The result has `.course` (a DataFrame of time, bend,
+    reference, torque, tension and tip, as that of `hw_run`), `.trajectory`, of which `.frame()` has every column, and
+    `.failed`, whether the wrist left its range. SI units. Raises UserError for unknown controllers
+    or gains, a reference out of reach, inputs that are missing, or a start in equilibrium of a wrist that buckles.
 
-    Where the study has a `sweep` the result is a table of its points, which `executor` computes. `out`, `label` and
-    `progress` are as in `gen_data`.
+    Where the study has a `sweep` the result is a table of its points, which `executor` computes. `out`, `label`,
+    `progress` and `settings` are as in `gen_data`.
     """
     given = {"network": network, "tuned": tuned, "from_identified": from_identified}
-    return carry_out(SIMULATE, study, given, out, label, progress, executor)
+    return carry_out(SIMULATE, study, given, out, label, progress, executor, settings=settings)
 
 
 @in_python()
 def analyse(
-    study: StudyOrFile, *, network: Ref | Trained | None = None, tuned: Ref | Tuned | None = None,
-    from_identified: Ref | Identified | None = None, out: Folder | None = None, label: str = "",
+    study: StudyOrFile | None = None, *, network: Ref | Trained | None = None, tuned: Ref | Tuned | None = None,
+    from_identified: Ref | Told | None = None, out: Folder | None = None, label: str = "",
     progress: Watch | None = None,
+    **settings: Unpack[AnalyseArguments],
 ) -> Analysed:  # fmt: skip
     """The loop of the study's `simulate` section, linearised about where it rests, by its `analyse` section.
 
     `network`, `tuned` and `from_identified` are as in `simulate`. The result has `.answer`, `.found` about each of
     `.angles`, `.locus`, `.portrait`; `.frame()` is a row per angle. Raises UserError as `simulate` does, and where the
-    loop cannot rest. `out`, `label` and `progress` are as in `gen_data`.
+    loop cannot rest. `out`, `label`, `progress` and `settings` are as in
+    `gen_data`.
     """
     inputs = {"network": network, "tuned": tuned, "from_identified": from_identified}
-    return carry_out(ANALYSE, study, inputs, out, label, progress)
+    return carry_out(ANALYSE, study, inputs, out, label, progress, settings=settings)
 
 
 @in_python()
 def hysteresis(
-    study: StudyOrFile, *, out: Folder | None = None, label: str = "", progress: Watch | None = None
-) -> Hysteresis:
+    study: StudyOrFile | None = None, *, out: Folder | None = None, label: str = "", progress: Watch | None = None,
+    **settings: Unpack[HysteresisArguments],
+) -> Hysteresis:  # fmt: skip
     """Loops of a wrist whose tendons have friction, by the study's `hysteresis` section, which may name a measured one.
 
     The result has `.loops`, `.dead_bands` and, of a measured loop, `.fit` (coefficient, sheath and presliding with 95 %
     intervals); `.frame()` is a row per loop, SI units. Raises UserError for ranges in which the wrist cannot be held,
-    and for a measured file that is none, with its line. `out`, `label`, `progress`: as `gen_data`.
+    and for a measured file that is none, with its line. `out`, `label`, `progress`,
+    `settings`: as `gen_data`.
     """
-    return carry_out(HYSTERESIS, study, {}, out, label, progress)
+    return carry_out(HYSTERESIS, study, {}, out, label, progress, settings=settings)
 
 
 @in_python()
 def identify(
-    study: StudyOrFile, *, runs: Ref | Sequence[Ref] | None = None, out: Folder | None = None, label: str = "",
-    progress: Watch | None = None,
-) -> Identified | LogTold | DrivenTold | BendsTold:  # fmt: skip
+    study: StudyOrFile | None = None, *, runs: Ref | Sequence[Ref] | None = None, out: Folder | None = None,
+    label: str = "", progress: Watch | None = None, **settings: Unpack[IdentifyArguments],
+) -> Told:  # fmt: skip
     """Stiffness, damping, tendons and delay of a real wrist from the logged trials of `runs` (hw-run).
 
     A run that is a file is an open log (documentation: The open log): the result then is a `LogTold`, what such logs
@@ -231,8 +268,37 @@ def identify(
     where these do not tell every parameter: it says what to add.
 
     With a folder `out` it is a sealed run directory too, named by `label`; `progress` is called as it goes on.
+    `settings` are sections or keys of a study, on top of `study`.
     """
-    return carry_out(IDENTIFY, study, {"runs": runs}, out, label, progress)
+    several = [runs] if isinstance(runs, str | Path | Run) else list(runs or ())
+    named = [str(each.path if isinstance(each, Run) else each) for each in several]
+    every: Mapping[str, object] = {**settings, "runs": named} if named else settings
+    return carry_out(IDENTIFY, study, {}, out, label, progress, settings=every)
+
+
+@in_python()
+def hw_run(
+    study: StudyOrFile | None = None, *, network: Ref | Trained | None = None, tuned: Ref | Tuned | None = None,
+    from_identified: Ref | Told | None = None, calibration: Ref | None = None, out: Folder = RESULTS,
+    label: str = "", progress: Watch | None = None, **settings: Unpack[HwRunArguments],
+) -> Performed:  # fmt: skip
+    """Trials on the emulated rig, by the study's `hw-run` section: the same firmware, tendons and camera pictures.
+
+    `network`, `tuned` and `from_identified` are as in `simulate`; `calibration` (calibrate-wrist) says how far each
+    spool bends the wrist. Trials are logged as they go, so they always make a sealed run directory in the folder `out`,
+    named by `label`. The result has `.course` (every tick of every trial) and `.twins`, the same trials simulated;
+    `.frame()` is a row per trial. Raises UserError for a rig with a `port`, which the command line drives with a person
+    beside it, and where a trial stops the motors.
+
+    `progress` and `settings` are as in `gen_data`.
+    """
+    given = {"network": network, "tuned": tuned, "from_identified": from_identified, "calibration": calibration}
+    whole, _ = study_with(study, "hw-run", settings)
+    if whole.hw_run.port is not None:
+        raise UserError(
+            "motors that are real turn with a person beside them", "hw-run.port", "the command `wristctl hw-run`"
+        )
+    return carry_out(HW_RUN, study, given, out, label, progress, settings=settings)
 
 
 @in_python()

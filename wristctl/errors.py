@@ -12,6 +12,7 @@ from pathlib import Path
 _FUNCTIONS = {
     "gen-data": "gen_data", "train": "train", "tune": "tune", "compare": "compare", "simulate": "simulate",
     "analyse": "analyse", "hysteresis": "hysteresis", "identify": "identify", "paper audit": "audit", "runs ls": "runs",
+    "hw-run": "hw_run",
 }  # fmt: skip
 """The function of each command that Python has; the others are called at the shell from there too."""
 
@@ -67,6 +68,23 @@ class Setting:
     def in_python(self) -> str:
         """As an override of load_study."""
         return f"load_study(..., {'.'.join(part for part in (self.section, self.text) if part)!r})"
+
+
+@dataclass(frozen=True)
+class Keyword(Setting):
+    """A setting given to a function by keyword: `simulate(controller='pid-ff')`; its text ends the same way."""
+
+    function: str = ""
+
+    @property
+    def in_python(self) -> str:
+        """As the call has it."""
+        return f"{self.function}({self.text})"
+
+    @property
+    def typed(self) -> str:
+        """The same: the command line has no such setting."""
+        return self.in_python
 
 
 @dataclass(frozen=True)

@@ -9,19 +9,20 @@ from wristctl.errors import UserError
 from wristctl.records.log_converters import read_log
 
 FIELD = Path(__file__).parents[1] / "data" / "field"
+CLEAN = Path(__file__).parents[2] / "experiments" / "logs" / "clean.csv"
 MATLAB = "time=t [s], bend_y=theta [rad], spool_1=l1 [m], spool_2=l2 [m]"
 
 
 @pytest.mark.parametrize("name", ["german.csv", "units_row.csv"])
 def test_other_dialects_read_to_the_same_numbers(name: str) -> None:
-    clean, other = read_log(FIELD / "clean.csv"), read_log(FIELD / name)
+    clean, other = read_log(CLEAN), read_log(FIELD / name)
     assert {key: column.tolist() for key, column in other.columns.items()} == {
         key: column.tolist() for key, column in clean.columns.items()
     }
 
 
 def test_text_among_the_numbers_is_passed_over_and_told_with_its_lines() -> None:
-    clean, serial = read_log(FIELD / "clean.csv"), read_log(FIELD / "serial.txt")
+    clean, serial = read_log(CLEAN), read_log(FIELD / "serial.txt")
     np.testing.assert_array_equal(serial.columns["bend_y"], clean.columns["bend_y"])
     assert "2 lines of text (line 1, 403)" in serial.remarks[0]
     assert serial.lines[400] == 404  # not the line of the text
@@ -47,12 +48,12 @@ def test_a_torn_row_of_numbers_is_no_text(tmp_path: Path) -> None:
 
 
 def test_utf_16_and_a_repeated_header(tmp_path: Path) -> None:
-    text = (FIELD / "clean.csv").read_text()
+    text = CLEAN.read_text()
     head, rows = text.partition("\n")[0], text.splitlines()[1:]
     file = tmp_path / "log.csv"
     file.write_text("\n".join([head, *rows[:400], head, *rows[400:]]), encoding="utf-16")
     log = read_log(file)
-    np.testing.assert_array_equal(log.columns["time"], read_log(FIELD / "clean.csv").columns["time"])
+    np.testing.assert_array_equal(log.columns["time"], read_log(CLEAN).columns["time"])
     assert len(log.remarks) == 1
 
 
@@ -77,7 +78,7 @@ def test_a_decimal_comma_and_a_point_in_one_file_are_refused(tmp_path: Path) -> 
 
 
 def test_vectors_of_matlab() -> None:
-    clean, log = read_log(FIELD / "clean.csv"), read_log(FIELD / "log.mat", MATLAB)
+    clean, log = read_log(CLEAN), read_log(FIELD / "log.mat", MATLAB)
     for name, column in clean.columns.items():
         np.testing.assert_allclose(
             log.columns[name], column, atol=1e-6

@@ -17,6 +17,7 @@ from wristctl.records.log_looks import looked_at
 from wristctl.records.open_log import OpenLog
 
 FIELD = Path(__file__).parents[1] / "data" / "field"
+CLEAN = Path(__file__).parents[2] / "experiments" / "logs" / "clean.csv"
 COUNTS = "time=ms [ms], bend_y=imu [deg], spool_1=enc1 [0.000719 mm], spool_2=enc2 [0.000719 mm]"
 
 
@@ -47,7 +48,7 @@ def test_the_fix_can_be_pasted_and_gives_the_clean_numbers(name: str, told: str)
     with pytest.raises(UserError) as refused:
         looked_at(read_log(FIELD / name))
     assert f"--columns '{told}'" in refused.value.fix
-    clean, log = read_log(FIELD / "clean.csv"), looked_at(read_log(FIELD / name, told))
+    clean, log = read_log(CLEAN), looked_at(read_log(FIELD / name, told))
     for column, values in clean.columns.items():
         np.testing.assert_allclose(log.columns[column], values, rtol=1e-12, atol=1e-15)
 
@@ -65,7 +66,7 @@ def test_the_fix_keeps_what_was_named(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("tendon", [1, 2])
 def test_millimetres_under_a_head_of_metres_are_refused_at_the_furthest_sample(tendon: int, tmp_path: Path) -> None:
-    table = pd.read_csv(FIELD / "clean.csv")
+    table = pd.read_csv(CLEAN)
     (head,) = (name for name in map(str, table) if name.startswith(f"spool_{tendon} [mm]"))
     changed = table.rename(columns={head: f"spool_{tendon} [m]"})
     changed.to_csv(tmp_path / "metres.csv", index=False)
@@ -76,12 +77,12 @@ def test_millimetres_under_a_head_of_metres_are_refused_at_the_furthest_sample(t
 
 
 def test_a_sound_log_stays_as_it_is() -> None:
-    log = read_log(FIELD / "clean.csv")
+    log = read_log(CLEAN)
     assert looked_at(log) is log
 
 
 def test_repeated_rows_are_left_out_and_told() -> None:
-    clean, log = read_log(FIELD / "clean.csv"), looked_at(read_log(FIELD / "duplicate.csv"))
+    clean, log = read_log(CLEAN), looked_at(read_log(FIELD / "duplicate.csv"))
     for name, column in clean.columns.items():
         np.testing.assert_array_equal(log.columns[name], column)
     assert log.remarks[0].startswith("3 rows")
@@ -96,7 +97,7 @@ def test_a_clock_that_starts_again_parts_the_log() -> None:
 
 
 def test_counters_that_wrap_go_on_and_it_is_told() -> None:
-    clean, log = read_log(FIELD / "clean.csv"), looked_at(read_log(FIELD / "wrapped_counts.csv", COUNTS))
+    clean, log = read_log(CLEAN), looked_at(read_log(FIELD / "wrapped_counts.csv", COUNTS))
     for name in ("spool_1", "spool_2"):
         assert np.ptp(log.columns[name] - clean.columns[name]) < 3e-6  # a count is 0.7 um
     assert log.remarks[0].startswith("enc1 begins again after 2^16 counts at wrapped_counts.csv:27, 8 times")
@@ -144,7 +145,7 @@ def test_counts_without_a_bend_are_told_how_long_one_can_be(tmp_path: Path) -> N
 
 
 def test_other_jumps_of_a_counter_are_refused_at_their_line(tmp_path: Path) -> None:
-    clean = read_log(FIELD / "clean.csv").columns
+    clean = read_log(CLEAN).columns
     counts = {f"enc{k}": np.round(clean[f"spool_{k}"] / 0.719e-6).astype(int) % 40000 for k in (1, 2)}
     table = pd.DataFrame({"ms": 1e3 * clean["time"], "imu": np.degrees(clean["bend_y"]), **counts})
     table.to_csv(tmp_path / "turn.csv", index=False)
@@ -154,7 +155,7 @@ def test_other_jumps_of_a_counter_are_refused_at_their_line(tmp_path: Path) -> N
 
 @pytest.mark.parametrize("signed", [True, False])
 def test_clocks_and_counters_of_32_bits_wrap_too(signed: bool, tmp_path: Path) -> None:
-    clean = read_log(FIELD / "clean.csv")
+    clean = read_log(CLEAN)
     clock = (2**32 - 2_000_000 + np.round(1e6 * clean.columns["time"]).astype(np.int64)) % 2**32
     counts = np.round(clean.columns["spool_1"] / 1e-7).astype(np.int64)
     counts = (counts + 2**31 + 2**31) % 2**32 if not signed else (counts + 2**31 + 2**31) % 2**32 - 2**31
@@ -168,14 +169,14 @@ def test_clocks_and_counters_of_32_bits_wrap_too(signed: bool, tmp_path: Path) -
 
 def changed(name: str, change: Callable[[Array], Array], rows: slice = slice(None)) -> OpenLog:
     """The clean log with something done to some rows of a column."""
-    clean = read_log(FIELD / "clean.csv")
+    clean = read_log(CLEAN)
     column = clean.columns[name].copy()
     column[rows] = change(column[rows])
     return replace(clean, columns={**clean.columns, name: column})
 
 
 def test_rows_that_come_late_are_put_in_their_place_and_recordings_in_one_are_refused() -> None:
-    clean = read_log(FIELD / "clean.csv")
+    clean = read_log(CLEAN)
     order = np.arange(len(clean))
     order[[200, 201, 202]] = [202, 200, 201]
     late = replace(clean, columns={name: column[order] for name, column in clean.columns.items()})
@@ -217,11 +218,11 @@ def test_what_a_fit_would_take_as_motion_is_told_with_its_line(
 
 
 def test_units_that_no_wrist_has_are_refused(tmp_path: Path) -> None:
-    clean = read_log(FIELD / "clean.csv")
+    clean = read_log(CLEAN)
     newtons = {f"tension_{k}": 8000.0 + 1e6 * clean.columns[f"spool_{k}"] for k in (1, 2)}
     with pytest.raises(UserError, match=r"tension_1 reaches .* N by its header .* in mN, or a current in mA"):
         looked_at(replace(clean, columns={**clean.columns, **newtons}))
-    seconds = pd.read_csv(FIELD / "clean.csv").rename(columns={"time [s]": "time [ms]"})
+    seconds = pd.read_csv(CLEAN).rename(columns={"time [s]": "time [ms]"})
     seconds.to_csv(tmp_path / "s.csv", index=False)
     with pytest.raises(
         UserError, match=r"spool_1 moves at .* m/s - .*s\.csv:3 - fix: is time in s\? .* 'time=time \[s\]'"
@@ -233,7 +234,7 @@ def test_units_that_no_wrist_has_are_refused(tmp_path: Path) -> None:
 
 
 def test_tendons_exchanged_in_one_trial_or_in_tensions_are_refused() -> None:
-    clean = read_log(FIELD / "clean.csv")
+    clean = read_log(CLEAN)
     half = np.arange(len(clean)) >= 500
     one, two = (clean.columns[f"spool_{k}"] for k in (1, 2))
     columns = {**clean.columns, "spool_1": np.where(half, two, one), "spool_2": np.where(half, one, two)}
@@ -280,18 +281,18 @@ def told_of(log: OpenLog) -> str:
 
 @pytest.mark.parametrize("tendon", [1, 2])
 def test_one_spool_with_the_other_sign_is_refused_with_what_mends_it(tendon: int, tmp_path: Path) -> None:
-    table = pd.read_csv(FIELD / "clean.csv")
+    table = pd.read_csv(CLEAN)
     table[f"spool_{tendon} [mm]"] *= -1.0
     table.to_csv(tmp_path / "sign.csv", index=False)
     with pytest.raises(UserError, match=f"reel in together.*spool_{tendon} with the other sign") as refused:
         looked_at(read_log(tmp_path / "sign.csv"))
     log = looked_at(read_log(tmp_path / "sign.csv", refused.value.fix.split("'")[1]))
-    np.testing.assert_allclose(log.columns[f"spool_{tendon}"], read_log(FIELD / "clean.csv").columns[f"spool_{tendon}"])
+    np.testing.assert_allclose(log.columns[f"spool_{tendon}"], read_log(CLEAN).columns[f"spool_{tendon}"])
 
 
 @pytest.mark.parametrize("size", [2048, 4096])
 def test_a_counter_that_wraps_at_a_turn_is_refused_at_the_line_where_it_jumps(size: int) -> None:
-    clean = read_log(FIELD / "clean.csv").columns["spool_1"]
+    clean = read_log(CLEAN).columns["spool_1"]
     counts = np.round(clean / 2e-6).astype(int)
     wrapped = changed("spool_1", lambda spool: 2e-6 * ((counts - int(np.median(counts))) % size))
     first = int(np.flatnonzero(np.abs(np.diff(wrapped.columns["spool_1"])) > 1e-6 * size)[0]) + 3
@@ -299,13 +300,13 @@ def test_a_counter_that_wraps_at_a_turn_is_refused_at_the_line_where_it_jumps(si
 
 
 def test_steps_that_the_wrist_follows_are_no_jumps() -> None:
-    clean = read_log(FIELD / "clean.csv")
+    clean = read_log(CLEAN)
     stepped = {name: column[np.arange(len(clean)) // 100 * 100] for name, column in clean.columns.items()}
     assert "jumps" not in told_of(replace(clean, columns={**stepped, "time": clean.columns["time"]}))
 
 
 def test_a_step_of_one_tendon_that_the_wrist_follows_is_no_jump() -> None:
-    clean = read_log(FIELD / "clean.csv")
+    clean = read_log(CLEAN)
     after = np.arange(len(clean)) >= 500
     moved = {"spool_1": 2e-3 * after, "bend_y": 0.5 * 2e-3 / 0.0141 * after}
     columns = {name: column + moved.get(name, 0.0) for name, column in clean.columns.items()}
@@ -325,7 +326,7 @@ def test_cells_that_stand_alone_are_told_with_their_lines(name: str) -> None:
     [(("bend_y",), 12), (("spool_1",), 12), (("spool_1", "spool_2"), 12), (("spool_1", "spool_2"), 80)],
 )
 def test_short_standstills_are_told_where_a_column_catches_up_in_one_step(names: tuple[str, ...], rows: int) -> None:
-    clean = read_log(FIELD / "clean.csv")
+    clean = read_log(CLEAN)
     begin = int(np.argmax(np.abs(np.gradient(clean.columns["spool_1"]))[100:800])) + 100
     columns = dict(clean.columns)
     for name in names:
@@ -338,7 +339,7 @@ def test_short_standstills_are_told_where_a_column_catches_up_in_one_step(names:
 
 @pytest.mark.parametrize("early", [0.05, 0.2])
 def test_a_motion_that_comes_before_its_pull_is_told(early: float) -> None:
-    time = read_log(FIELD / "clean.csv").columns["time"]
+    time = read_log(CLEAN).columns["time"]
     assert "ahead of the spools" in told_of(changed("bend_y", lambda bend: np.interp(time + early, time, bend)))
 
 
@@ -367,7 +368,7 @@ def test_a_counter_that_wraps_every_few_rows_does_not_go_with_the_wrist(size: in
 
 @pytest.mark.parametrize(("unit", "factor"), [("[rad]", 1.0), ("[deg]", np.pi / 180.0)])
 def test_bends_under_the_other_unit_of_angles_are_asked_for(unit: str, factor: float, tmp_path: Path) -> None:
-    table = pd.read_csv(FIELD / "clean.csv").rename(columns={"bend_y [deg]": f"bend_y {unit}"})
+    table = pd.read_csv(CLEAN).rename(columns={"bend_y [deg]": f"bend_y {unit}"})
     table[f"bend_y {unit}"] *= 0.5 * factor
     table[["spool_1 [mm]", "spool_2 [mm]"]] *= 0.5
     table.to_csv(tmp_path / "angles.csv", index=False)

@@ -11,6 +11,7 @@ from wristctl.errors import UserError
 from wristctl.records.log_converters import read_log
 
 FIELD = Path(__file__).parents[1] / "data" / "field"
+CLEAN = Path(__file__).parents[2] / "experiments" / "logs" / "clean.csv"
 BENDS = np.radians([[0.0, 0.0], [10.0, 0.0], [15.0, -20.0], [-5.0, 30.0]])
 LENGTH = 0.08
 
@@ -64,7 +65,7 @@ def bends_of(file: Path, names: str = "") -> np.ndarray:
 
 
 def test_one_rigid_body_is_the_tip_in_the_laboratorys_axes() -> None:
-    clean, log = read_log(FIELD / "clean.csv"), read_log(FIELD / "motive.csv", "motive")
+    clean, log = read_log(CLEAN), read_log(FIELD / "motive.csv", "motive")
     np.testing.assert_allclose(log.columns["bend_y"], clean.columns["bend_y"], atol=2e-6)  # six digits of a quaternion
     np.testing.assert_array_equal(log.columns["time"], clean.columns["time"])
     assert log.columns["tip_x"][0] == pytest.approx(0.08) and log.at(0).endswith("motive.csv:7")

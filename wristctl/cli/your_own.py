@@ -113,8 +113,8 @@ def init(
 
 
 def _files() -> list[Path]:
-    """From the folder of experiments: studies, code, and models of robots that it names."""
-    found = (file for suffix in ("yaml", "py", "xml") for file in shipped().rglob(f"*.{suffix}"))
+    """From the folder of experiments: studies, code, logs, and models of robots that code names."""
+    found = (file for suffix in ("yaml", "py", "csv", "xml") for file in shipped().rglob(f"*.{suffix}"))
     return sorted(file.relative_to(shipped()) for file in found)
 
 

@@ -33,6 +33,9 @@ class Answer:
         blocks += [in_lines(self.more)] * bool(self.more)
         return [line for k, block in enumerate(blocks) for line in [*[""] * bool(k), *block]]
 
+    def __str__(self) -> str:
+        return "\n".join(self.lines())
+
 
 def _lines(note: str | Table) -> list[str]:
     if isinstance(note, Table):

@@ -8,6 +8,7 @@ from collections.abc import Container, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any, Generic
 
 from wristctl.commands.adoption import adopted, with_places, with_presets
@@ -21,13 +22,15 @@ from wristctl.commands.session import Operator, Session, ShowProgress, Unattende
 from wristctl.config.foreign import Foreign
 from wristctl.config.given_files import with_files
 from wristctl.config.study import Study
-from wristctl.errors import UserError
+from wristctl.errors import Phrase, UserError
 from wristctl.records import LiveRun, Run, start_run
 from wristctl.records.copied_inputs import sealed_references
 from wristctl.records.journal import jsonable
 from wristctl.records.manifest import MANIFEST, TABLES, Manifest, Overview
 from wristctl.records.run_writer import Undrawn
-from wristctl.study_files.load import load_study
+from wristctl.study_files.error_messages import located
+from wristctl.study_files.load import read_study
+from wristctl.study_files.strict_yaml import KeyPath
 
 # Laws that a listing names.
 _NAMED = 2
@@ -213,9 +216,18 @@ def check_executor(named: str) -> None:
     Workers.of(named)
 
 
+def study_with(
+    study: StudyOrFile | None, command: str, settings: Mapping[str, Any]
+) -> tuple[Study, Mapping[KeyPath, Phrase]]:
+    """A study, or that of a file, with `settings` on top, and where each key is from. Raises UserError."""
+    if isinstance(study, Study):
+        return read_study(command=command, keywords=settings, base=study) if settings else (study, {})
+    return read_study([Path(study)] if study is not None else [], command=command, keywords=settings)
+
+
 def carry_out(
-    procedure: Procedure[Found], study: StudyOrFile, named_inputs: Mapping[str, Any], out: Folder | None, label: str,
-    progress: Watch | None, executor: str = "serial",
+    procedure: Procedure[Found], study: StudyOrFile | None, named_inputs: Mapping[str, Any], out: Folder | None,
+    label: str, progress: Watch | None, executor: str = "serial", settings: Mapping[str, Any] = MappingProxyType({}),
 ) -> Found:  # fmt: skip
     """Plan and perform a procedure.
 
@@ -224,7 +236,7 @@ def carry_out(
     procedure
         Procedure of the command.
     study
-        Study to perform, or its file, or the name of an experiment.
+        Study to perform, or its file, or the name of an experiment; None for the defaults.
     named_inputs
         Inputs by role.
     out
@@ -235,11 +247,16 @@ def carry_out(
         Callback of the progress; None for no display.
     executor
         Name of the executor of units of work.
+    settings
+        Sections of a study, or keys of the command's own, that come after it.
     """
-    study = study if isinstance(study, Study) else load_study([Path(study)])
+    whole, origins = study_with(study, procedure.kind, settings)
     folder, show = Path(RESULTS if out is None else out), watched(progress)
-    prepared = prepare(procedure, study, folder, named_inputs)
-    prepared.plan()
+    try:
+        prepared = prepare(procedure, whole, folder, named_inputs)
+        prepared.plan()
+    except UserError as error:
+        raise located(error, origins) from error
     check_executor(executor)
     if out is None:
         return perform(prepared, None, show, Unattended(), executor)

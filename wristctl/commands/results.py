@@ -300,10 +300,17 @@ class StudyResult(ABC):
         return Run(self.findings.run.path) if self.findings.run else None
 
     def _repr_html_(self) -> str:
-        """The answer, or the tables where there is none, with the figure of the answer, for a notebook."""
-        text = "\n".join(self.summary) or "\n\n".join(table.text() for table in self.tables)
+        """The answer and its table as the run's page shows them, then the figure of the answer, for a notebook.
+
+        An answer without a table has the metrics that head the page in its place.
+        """
+        from wristctl.plotting.page import blocks, for_a_page, headline, render
+
+        answer = for_a_page(blocks(self.summary or str(self).split("\n")))
+        tabled = any(block["kind"] == "table" for block in answer)
+        metrics = [] if tabled else headline(self.findings.metrics, self.findings.overview.cards, ended=True)
         name = self.findings.overview.figure or next(iter(self.figures), "")
-        return f"<pre>{html.escape(text)}</pre>{_picture(self.figures, name) if name else ''}"
+        return render("notebook.html", answer=answer, headline=metrics) + (_picture(self.figures, name) if name else "")
 
     def __str__(self) -> str:
         return "\n\n".join([*["\n".join(self.summary)] * bool(self.summary), *(table.text() for table in self.tables)])

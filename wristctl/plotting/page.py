@@ -218,7 +218,7 @@ def page(run: Run, manifest: Manifest, beside: Path | None = None, undrawn: Undr
         command=command_of(manifest.kind),
         verdict=", ".join(overview.marks) if manifest.state == "ok" else "",
         answer=answer,
-        headline=_headline(run.metrics, overview.cards, manifest.state == "ok"),
+        headline=headline(run.metrics, overview.cards, manifest.state == "ok"),
         metrics=_metrics(run),
         tables=[without_options(table) for table in results if not _stands_in(answer, table)],
         figures=[picture for picture in drawn if picture not in first],
@@ -292,9 +292,7 @@ def _cell(value: Any, head: Any = "") -> str:
     return str(value)
 
 
-def _headline(
-    metrics: dict[str, dict[str, Any]], cards: Sequence[str], ended: bool
-) -> list[tuple[str, dict[str, Any]]]:
+def headline(metrics: dict[str, dict[str, Any]], cards: Sequence[str], ended: bool) -> list[tuple[str, dict[str, Any]]]:
     """The metrics that the command chose; where a run that ended ok chose none, the first that may be better or worse.
 
     Of these errors of the angle come first, for they say how well the wrist was controlled.

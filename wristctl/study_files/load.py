@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 from pydantic import ValidationError
@@ -12,12 +13,13 @@ from wristctl.config.given_files import beside, names_a_file
 from wristctl.config.leaves import named_by
 from wristctl.config.plant import is_unsaid
 from wristctl.config.study import Study
-from wristctl.errors import Phrase, Setting, UserError, fix_to_read, meant, nearest
+from wristctl.errors import Keyword, Phrase, Setting, UserError, fix_to_read, meant, nearest
 from wristctl.plain_files import read_plain
 from wristctl.plugins.places import check_trust, check_within, placed
 from wristctl.plugins.trust import asking
 from wristctl.study_files.error_messages import explained
 from wristctl.study_files.keys import field_at, keys_of, section_keys, whole_key
+from wristctl.study_files.keywords import as_a_file_has_it, keyword, path_of
 from wristctl.study_files.renaming import (
     NewNames,
     leave_out_removed,
@@ -63,13 +65,17 @@ def read_study(
     note: bool = True,
     controllers: Sequence[str] = (),
     tune: bool = False,
+    keywords: Mapping[str, Any] = MappingProxyType({}),
+    base: Study | None = None,
 ) -> tuple[Study, Mapping[KeyPath, Phrase]]:
     """As load_study, with the file and line (or override) of each key that was given.
 
     A note names the former names among them, unless none is wanted. `controllers` were typed among the files of
-    `command`, which tunes them first if it is to `tune`.
+    `command`, which tunes them first if it is to `tune`. `keywords` are sections of a study, or keys of the command's
+    own, as the function of `command` is given them: `wrist` may be a study file. All of it comes after the study
+    `base`.
     """
-    data: dict[str, Any] = {}
+    data: dict[str, Any] = {} if base is None else base.model_dump(by_alias=True, exclude_unset=True)
     origins: dict[KeyPath, Phrase] = {}
     former = NewNames()
     for file in files:
@@ -83,6 +89,8 @@ def read_study(
         setting = Setting(override)
         document = with_gains_apart(with_keys_of_today(_override(override, command), setting, former), setting)
         _merge(data, _whole(document, None), setting, origins)
+    for name, value in keywords.items():
+        _merge_keyword(data, origins, name, value, command or "", former)
     with_loops_of_today(data, origins, former)
     put_in(data, origins, controllers, command or "", tune)
     note_presets(data, origins, former)
@@ -157,6 +165,37 @@ def _merge_file(
     lines = {path: line for path, line in document.lines.items() if path[0] != INCLUDE}
     document = with_gains_apart(with_keys_of_today(Document(content, lines), str(file), former), str(file))
     _merge(data, _whole(document, file), str(file), origins)
+
+
+def _merge_keyword(
+    data: dict[str, Any], origins: dict[KeyPath, Phrase], name: str, value: Any, command: str, former: NewNames
+) -> None:
+    """An argument of a command's function: a section, a key of the command's own, or the wrist of a study file."""
+    where, path = keyword(name, value, command), path_of(name, command)
+    if name == "wrist" and isinstance(value, str | Path):
+        _merge_wrist(data, origins, Path(value), where, former)
+        return
+    whole = as_a_file_has_it(value, where)
+    for key in reversed(path):
+        whole = {key: whole}
+    document = with_gains_apart(with_keys_of_today(Document(whole, {}), where, former), where)
+    _merge(data, _whole(document, None), where, origins)
+
+
+def _merge_wrist(
+    data: dict[str, Any], origins: dict[KeyPath, Phrase], named: Path, where: Keyword, former: NewNames
+) -> None:
+    """The wrist of a study file, whose other sections are not read."""
+    file = study_file(named)
+    if file is None:
+        raise UserError(f"there is no study file {Path.cwd() / named}", where, _in_place_of(str(named), (), None))
+    content: dict[str, Any] = {}
+    lines: dict[KeyPath, Phrase] = {}
+    _merge_file(content, file, lines, (), former)
+    if "wrist" not in content:
+        raise UserError("the file has no section wrist", str(file), "wrist: {length: 0.09, stiffness: 0.8}")
+    _merge(data, Document({"wrist": content["wrist"]}, {}), str(file), origins)
+    origins.update({path: line for path, line in lines.items() if path[0] == "wrist"})
 
 
 def _read(file: Path) -> Document:

@@ -1,12 +1,14 @@
 """The four anatomical directions: bending planes, tendons that pull, and gravity as each plane sees it."""
 
+from __future__ import annotations
+
 import math
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
-import numpy as np
-
-from wristctl.arrays import Array
 from wristctl.config.wrist import WristParameters
+
+if TYPE_CHECKING:
+    from wristctl.arrays import Array
 
 
 class Direction(NamedTuple):
@@ -56,6 +58,8 @@ def away_of(plane: str, positive: str) -> tuple[int, ...]:
 
 def away_from_camera(plane: str, positive: str) -> Array:
     """Unit vector (2,), toward ulnar and flexion, away from the camera of `away_of`."""
+    import numpy as np
+
     side = 1.0 if positive == "right" else -1.0
     return np.array([0.0, side] if plane == "ulnar" else [-side, 0.0])
 

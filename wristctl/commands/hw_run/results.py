@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from wristctl.commands.answer import Answer
+from wristctl.commands.course_table import course_of_log
 from wristctl.commands.hw_run.answer import answer_of, marks_of
 from wristctl.commands.hw_run.trial_means import (
     OF_MEANS,
@@ -58,6 +59,13 @@ class Performed(StudyResult):
         settings, wrist = self.study.hw_run, self.study.wrist
         places = 2 if settings.planes == 1 else len(numbers_of(layout_of_rig(settings, wrist)))
         return marks_of(self.trials, self.twins, wrist.tension_range, places)
+
+    @property
+    def course(self) -> pd.DataFrame:
+        """Every tick of every trial: trial, time, bend, reference, torque, tension, tip; SI units."""
+        if self.run is None:
+            raise RuntimeError("trials are logged in a run directory, and there is none")
+        return course_of_log(self.run.data("log"), self.study.wrist)
 
     def frame(self) -> pd.DataFrame:
         """One row per trial that began."""

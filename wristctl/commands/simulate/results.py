@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Protocol
 
 from wristctl.commands.answer import Answer
+from wristctl.commands.course_table import course_of_trajectory
 from wristctl.commands.printed_table import Table
 from wristctl.commands.results import Findings, StudyResult
 from wristctl.errors import UserError
@@ -49,9 +50,9 @@ class Simulated(StudyResult):
         return answer(self.simulated or self.study, self.repeated, self.short_of, self.advice, self.wrist)
 
     @property
-    def course(self) -> Trajectory:
-        """The trajectory, under the name that a loop in two planes had for it."""
-        return self.trajectory
+    def course(self) -> pd.DataFrame:
+        """The motion: time, bend, reference, torque, tension, tip; SI units."""
+        return course_of_trajectory(self.trajectory)
 
     def courses(self) -> Mapping[str, Mapping[str, Any]]:
         """The columns of the trajectory, by the name of its table."""
@@ -63,7 +64,7 @@ class Simulated(StudyResult):
         return "trajectory" if self.trajectory.planes == 1 else "bends"
 
     def frame(self) -> pd.DataFrame:
-        """The trajectory: time, bend, tip, tensions, ...; SI units."""
+        """Every column of the trajectory; SI units."""
         return self.trajectory.frame()
 
     @property
