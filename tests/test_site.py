@@ -91,7 +91,10 @@ SEARCHED = {
     "minimum jerk": "docs/motions", "stiffness": "docs/identify", "exit codes": "docs/reference",
     "prosthesis": "docs/overview", "EMG": "docs/overview", "ROS": "docs/overview", "ROS bag": "docs/open-log",
     "DOF": "docs/two-planes", "three tendons": "docs/two-planes", "inverse kinematics": "docs/networks",
-    "Simulink": "docs/models", "sample rate": "docs/hardware/real-time",
+    "Simulink": "docs/models", "sample rate": "docs/hardware/real-time", "sampling rate": "docs/hardware/real-time",
+    "backlash": "docs/hysteresis", "calibration": "docs/hardware/camera", "rosbag": "docs/open-log",
+    "Dynamixel": "docs/servos", "3 tendons": "docs/two-planes", "degrees of freedom": "docs/two-planes",
+    "Windows": "docs/platforms", "two planes": "docs/two-planes",
 }  # fmt: skip
 
 
