@@ -53,6 +53,17 @@ def test_every_page_is_within_three_clicks_of_the_front(site: Path) -> None:
     assert len(pages) > 60
 
 
+def test_the_front_page_leads_to_the_gallery_and_platforms_and_shows_results(site: Path) -> None:
+    front = site / "docs" / "index.html"
+    article = re.search("<article.*</article>", front.read_text(encoding="utf-8"), re.DOTALL)
+    assert article is not None
+    for name in ("gallery", "platforms"):
+        assert f'href="{name}.html"' in article[0]
+    pictures = re.findall(r'<img [^>]*src="([^"]+)"', article[0])
+    assert {Path(each).name for each in pictures} >= {"motion.gif", "answer.png", "report.png"}
+    assert all((front.parent / each).is_file() for each in pictures)
+
+
 def test_every_command_of_the_help_has_a_page_with_all_its_options(site: Path) -> None:
     for name, entry in COMMANDS.items():
         page = site / "docs" / "reference" / "command-line" / f"{name}.html"
