@@ -4,7 +4,7 @@ const width = document.documentElement.clientWidth, found = [];
 const line = (element, why) => `${element.tagName} ${why}: ${element.textContent.trim().slice(0, 50)}`;
 const flows = (element) => getComputedStyle(element).overflowX;
 const scrolled = (element) => {
-  for (let box = element.parentElement; box && box !== document.body; box = box.parentElement)
+  for (let box = element.parentElement; box && box.tagName !== "ARTICLE"; box = box.parentElement)
     if (/auto|scroll|hidden|clip/.test(flows(box))) return true;
   return false;
 };
