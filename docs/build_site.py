@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import argparse
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -54,6 +55,16 @@ def add_index(source: Path) -> None:
         title, rest = page.read_text(encoding="utf-8").split("\n", 1)
         entries = ", ".join(f"! {word}" for word in words)
         page.write_text(f"{title}\n\n```{{index}} {entries}\n```\n{rest}", encoding="utf-8")
+
+
+def link_gallery(source: Path) -> None:
+    """Let the front page lead to the gallery, which is there on the site alone."""
+    front = source / "docs" / "index.md"
+    text = front.read_text(encoding="utf-8")
+    linked = re.sub(r"a gallery of runs(.*), on the site that .*", r"[a gallery of runs](gallery.md)\1.", text)
+    if linked == text:
+        raise ValueError("docs/index.md names no gallery of runs")
+    front.write_text(linked, encoding="utf-8")
 
 
 def calls() -> Iterator[list[str]]:
@@ -194,6 +205,7 @@ def main() -> None:
     source, html = asked.into / "source", asked.into / "html"
     assemble(source)
     add_index(source)
+    link_gallery(source)
     command_pages(source)
     board_page(source)
     manifest_page(source)

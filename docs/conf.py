@@ -33,11 +33,14 @@ nitpicky = False
 
 html_theme = "pydata_sphinx_theme"
 html_title = "wristctl"
-html_static_path: list[str] = []
+html_static_path = ["_static"]
+html_css_files = ["site.css"]
+html_context = {"default_mode": "auto"}  # light or dark, as the reader's system is
 html_show_sourcelink = False
 html_copy_source = False
 html_theme_options = {
     "navbar_align": "left",
+    "header_links_before_dropdown": 8,
     "navigation_with_keys": True,
     "show_prev_next": True,
     "show_nav_level": 1,

@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Any
 import pytest
 from hypothesis import HealthCheck, settings
 
+from tests.plotting.browser import CHROMIUM, DRIVER, Browser
 from wristctl.config.choices import CONTROLLERS, OPTIMISERS, REFERENCES
 from wristctl.records import formats, provenance, start
 from wristctl.records.manifest import Code
@@ -217,3 +218,13 @@ def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> Any:
             return nodeid.partition("::")[0]
 
     return ByFile(config, log)
+
+
+@pytest.fixture(scope="module")
+def browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
+    """A headless Chromium for the tests of a module, which skip without one."""
+    if not (CHROMIUM and DRIVER):
+        pytest.skip("needs Debian's chromium and chromium-driver")
+    made = Browser(tmp_path_factory.mktemp("profile"))
+    yield made
+    made.close()

@@ -16,6 +16,7 @@ from urllib.parse import unquote
 import pytest
 import snowballstemmer
 
+from tests.plotting.browser import Browser
 from wristctl.cli.commands import COMMANDS
 
 ROOT = Path(__file__).parents[1]
@@ -50,6 +51,17 @@ def test_every_page_is_within_three_clicks_of_the_front(site: Path) -> None:
     pages = {page.resolve() for page in (site / "docs").rglob("*.html")}
     assert {page.name for page in pages if clicks.get(page, 99) > 3} == set()
     assert len(pages) > 60
+
+
+def test_the_front_page_leads_to_the_gallery_and_platforms_and_shows_results(site: Path) -> None:
+    front = site / "docs" / "index.html"
+    article = re.search("<article.*</article>", front.read_text(encoding="utf-8"), re.DOTALL)
+    assert article is not None
+    for name in ("gallery", "platforms"):
+        assert f'href="{name}.html"' in article[0]
+    pictures = re.findall(r'<img [^>]*src="([^"]+)"', article[0])
+    assert {Path(each).name for each in pictures} >= {"motion.gif", "answer.png", "report.png"}
+    assert all((front.parent / each).is_file() for each in pictures)
 
 
 def test_every_command_of_the_help_has_a_page_with_all_its_options(site: Path) -> None:
@@ -91,7 +103,10 @@ SEARCHED = {
     "minimum jerk": "docs/motions", "stiffness": "docs/identify", "exit codes": "docs/reference",
     "prosthesis": "docs/overview", "EMG": "docs/overview", "ROS": "docs/overview", "ROS bag": "docs/open-log",
     "DOF": "docs/two-planes", "three tendons": "docs/two-planes", "inverse kinematics": "docs/networks",
-    "Simulink": "docs/models", "sample rate": "docs/hardware/real-time",
+    "Simulink": "docs/models", "sample rate": "docs/hardware/real-time", "sampling rate": "docs/hardware/real-time",
+    "backlash": "docs/hysteresis", "calibration": "docs/hardware/camera", "rosbag": "docs/open-log",
+    "Dynamixel": "docs/servos", "3 tendons": "docs/two-planes", "degrees of freedom": "docs/two-planes",
+    "Windows": "docs/platforms", "two planes": "docs/two-planes",
 }  # fmt: skip
 
 
@@ -103,6 +118,47 @@ def test_a_search_for_words_of_the_field_gives_the_right_page_first(site: Path) 
     answer = subprocess.run(script, text=True, capture_output=True, check=True)
     first = {word: pages[0] if pages else "" for word, pages in json.loads(answer.stdout).items()}
     assert {word: page for word, page in first.items() if page != SEARCHED[word]} == {}
+
+
+# Pages that are looked at: the front, three tutorials, what is looked up and what is widest.
+SEEN = (
+    "index", "five-minutes", "your-own-wrist", "two-planes", "commands", "choices", "models", "study", "recommend",
+    "runs", "your-own-rig", "servos", "reference/command-line/simulate",
+)  # fmt: skip
+CLIPPED = (Path(__file__).parent / "data" / "clipped.js").read_text(encoding="utf-8")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("dark", [False, True], ids=["light", "dark"])
+@pytest.mark.parametrize("width", [1280, 400])
+@pytest.mark.parametrize("page", SEEN)
+def test_nothing_of_a_page_is_out_of_sight(site: Path, browser: Browser, page: str, width: int, dark: bool) -> None:
+    browser.open(site / "docs" / f"{page}.html", width, dark)
+    assert browser.run(CLIPPED) == []
+    assert browser.errors() == []
+
+
+WIDE = {
+    "<table><tr>" + "<td>column</td>" * 40 + "</tr></table>": "TABLE",
+    "<div style='overflow-x: auto'><table><tr>" + "<td>column</td>" * 40 + "</tr></table></div>": "",
+    f"<pre style='overflow: auto'>{'word ' * 60}</pre>": "PRE",
+    f"<pre style='white-space: pre-wrap'>{'word ' * 60}</pre>": "",
+    f"<div style='overflow: hidden; white-space: nowrap'>{'word ' * 60}</div>": "DIV",
+    "<p>left<span style='position: absolute; left: -20px'>of it</span></p>": "SPAN",
+    "<img src='none.png' alt=''>": "IMG",
+    "<p>narrow</p>": "",
+}
+
+
+@pytest.mark.parametrize("content", WIDE)
+def test_what_is_out_of_sight_is_seen(browser: Browser, tmp_path: Path, content: str) -> None:
+    page = tmp_path / "page.html"
+    article = f"<div style='overflow: auto'><article>{content}</article></div>"  # as the theme has it
+    page.write_text(f"<!doctype html><meta name=viewport content='width=device-width'>{article}")
+    for width in (1280, 400):
+        browser.open(page, width, dark=False)
+        found = {each.split()[0] for each in browser.run(CLIPPED)}
+        assert WIDE[content] in found if WIDE[content] else not found, (width, found)
 
 
 def test_a_word_of_the_index_names_one_page(site: Path) -> None:

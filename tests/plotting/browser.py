@@ -65,7 +65,11 @@ class Browser:
 
     def console(self) -> list[str]:
         """Messages and errors of the page so far."""
-        return [entry["message"] for entry in self._post("/se/log", {"type": "browser"})]
+        return [entry["message"] for entry in self._log()]
+
+    def errors(self) -> list[str]:
+        """Warnings and errors of the page so far, without what it says by the way."""
+        return [entry["message"] for entry in self._log() if entry["level"] in ("WARNING", "SEVERE")]
 
     def requests(self) -> list[str]:
         """Addresses that the page asked for so far, but for data within it."""
@@ -87,6 +91,10 @@ class Browser:
         finally:
             self._driver.terminate()
             self._driver.wait(10)
+
+    def _log(self) -> list[dict[str, Any]]:
+        entries: list[dict[str, Any]] = self._post("/se/log", {"type": "browser"})
+        return entries
 
     def _devtools(self, command: str, parameters: dict[str, Any]) -> Any:
         return self._post("/goog/cdp/execute", {"cmd": command, "params": parameters})

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
-from tests.plotting.browser import CHROMIUM, DRIVER, Browser
 from wristctl.api import load_study
 from wristctl.commands.compare.class_figures import error_against_variation, tension_rows
 from wristctl.commands.compare.figures import error_over_disturbance, rmse_map, variation_dots
@@ -40,15 +39,6 @@ from wristctl.vision.marker import Sighting, SightingVerdict
 from wristctl.wrist.kinematics import chain_tip
 
 WRIST = WristParameters()
-
-
-@pytest.fixture(scope="module")
-def browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
-    if not (CHROMIUM and DRIVER):
-        pytest.skip("needs Debian's chromium and chromium-driver")
-    made = Browser(tmp_path_factory.mktemp("profile"))
-    yield made
-    made.close()
 
 
 REFERENCES = ("step 30 deg", "minimum jerk 1 s 30 deg", "minimum jerk 2 s 30 deg")
