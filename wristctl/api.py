@@ -24,7 +24,8 @@ from wristctl.commands.audit.command import AUDIT, Audited
 from wristctl.commands.compare.command import COMPARE, Compared
 from wristctl.commands.gen_data.command import GEN_DATA, Generated
 from wristctl.commands.gen_data.transitions import Moved
-from wristctl.commands.hw_run.command import HW_RUN, Performed
+from wristctl.commands.hw_run.command import HW_RUN
+from wristctl.commands.hw_run.results import Performed
 from wristctl.commands.hysteresis.command import HYSTERESIS, Hysteresis
 from wristctl.commands.identify.bends import BendsTold
 from wristctl.commands.identify.command import IDENTIFY, Identified

@@ -40,7 +40,7 @@ def simulated(*settings: str, out: Path | None = None) -> Simulated:
 def test_a_dart_throw_is_answered_by_plane_and_as_one_norm_in_a_sealed_run(tmp_path: Path) -> None:
     done = simulated("simulate.reference.kind=dart-thrower", out=tmp_path)
     assert list(done.metrics) == list(metrics_in(2))
-    error = done.course.error
+    error = done.trajectory.error
     assert done.metrics["rmse_ulnar"] == pytest.approx(np.sqrt(np.mean(error[:, 0] ** 2)))
     assert done.metrics["rmse"] == pytest.approx(np.hypot(done.metrics["rmse_ulnar"], done.metrics["rmse_flexion"]))
     text = " ".join(done.summary)
@@ -49,19 +49,19 @@ def test_a_dart_throw_is_answered_by_plane_and_as_one_norm_in_a_sealed_run(tmp_p
     run = done.run
     assert run is not None and not run.problems()
     table = Run(run.path).data("bends")
-    np.testing.assert_allclose(table["bend_flexion"], done.course.bend[:, 1], rtol=1e-12)
+    np.testing.assert_allclose(table["bend_flexion"], done.trajectory.bend[:, 1], rtol=1e-12)
     assert {"acting_4", "pull_1", "tip_z", "bend_4_ulnar", "load_seen_flexion"} <= set(table)
     log = open_log_of(Run(run.path))
     bends = log.bends()
     assert bends is not None
-    np.testing.assert_allclose(bends, done.course.bend, rtol=1e-12)
+    np.testing.assert_allclose(bends, done.trajectory.bend, rtol=1e-12)
     assert sorted(log.tendons("tension")) == [1, 2, 4, 5] and not log.tendons("spool")
     assert "figures/bends.png" in (run.path / "README.md").read_text()
 
 
 def test_the_result_says_where_its_motion_is_whether_in_one_plane_or_in_two() -> None:
     bends = wristctl.simulate(study_of("simulate.reference.kind=dart-thrower"))
-    assert bends.trajectory is bends.course and len(bends.frame()) == len(bends.course.bend)
+    assert len(bends.frame()) == len(bends.trajectory.bend) == len(bends.course)
     planar = wristctl.simulate(study_of())
     assert planar.trajectory.theta.ndim == 1 and len(planar.frame()) == len(planar.trajectory.theta)
     assert (bends.trajectory.planes, planar.trajectory.planes) == (2, 1)
@@ -70,7 +70,7 @@ def test_the_result_says_where_its_motion_is_whether_in_one_plane_or_in_two() ->
 
 
 def test_what_a_motion_in_two_planes_had_under_other_names_is_found_under_them() -> None:
-    course = simulated("simulate.reference.kind=circle").course
+    course = simulated("simulate.reference.kind=circle").trajectory
     assert course.pulls is course.tension and course.coordinates is course.segment_theta  # type: ignore[attr-defined]
     with pytest.raises(AttributeError, match="no metrics"):
         _ = course.metrics  # type: ignore[attr-defined]
@@ -158,13 +158,13 @@ def test_a_motion_in_one_plane_is_the_same_with_gravity_from_the_side(direction:
         "simulate.loop.planes=2", f"simulate.direction={direction}", "simulate.reference.angle_deg=20",
         "simulate.reference.duration=0.5", "wrist.gravity=[0.0, -9.81]",
     )  # fmt: skip
-    assert done.course.bend_ref[-1, plane] == pytest.approx(sign * np.deg2rad(20.0))
-    assert not done.course.bend_ref[:, 1 - plane].any()
+    assert done.trajectory.bend_ref[-1, plane] == pytest.approx(sign * np.deg2rad(20.0))
+    assert not done.trajectory.bend_ref[:, 1 - plane].any()
 
 
 @pytest.mark.parametrize("kind", ["minimum-jerk", "circle"])
 def test_three_tendons_bend_in_two_planes_on_any_reference(kind: str) -> None:
-    course = simulated("wrist.tendons=three", f"simulate.reference.kind={kind}").course
+    course = simulated("wrist.tendons=three", f"simulate.reference.kind={kind}").trajectory
     assert course.tension.shape[1] == 3 and not course.failed
     with pytest.raises(UserError, match="in two planes, and the loop in one"):
         wristctl.simulate(study_of("wrist.tendons=three", f"simulate.reference.kind={kind}", "simulate.loop.planes=1"))
@@ -236,6 +236,6 @@ def test_a_push_from_the_side_bends_toward_its_direction_and_is_told_with_it() -
         "simulate.loop.disturbances.push={force: 5.0, start: 0.1, duration: 0.5}", "simulate.horizon=0.4",
     )  # fmt: skip
     done = simulated(*settings)
-    ulnar, flexion = done.course.bend[200]
+    ulnar, flexion = done.trajectory.bend[200]
     assert np.rad2deg(np.arctan2(flexion, ulnar)) == pytest.approx(130.0, abs=1.0)
     assert "a push of 5 N at 0.1 s, toward 130 deg from ulnar" in " ".join(done.summary)
