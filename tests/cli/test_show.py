@@ -54,7 +54,7 @@ def test_show_tells_each_fact_metric_and_file(call: Call, data: Run, network: Ru
         ["code", "9.8 0123456789ab with uncommitted changes"],
         ["result hash", data.result_hash],
         ["metric", "value", "unit", "better", "n"],
-        ["rmse", "0.25", "rad", "lower", "7"],
+        ["rmse", "14.32", "deg", "lower", "7"],
         ["path", "bytes", "sha256"],
     ):
         assert line in lines

@@ -184,7 +184,7 @@ def test_a_table_of_the_answer_stands_once_and_a_long_one_is_folded(tmp_path: Pa
     run = made(tmp_path, {}, tables=stored)
     (run.path / OVERVIEW).write_text(Overview(answered.lines()).text())
     text = page_of(run)
-    assert [row for row in rows(text) if row and row[0] == "a"] == [["a", "0.1235"], ["a", "7.25"]]
+    assert [row for row in rows(text) if row and row[0] == "a"] == [["a", "0.123"], ["a", "7.25"]]
     assert "<summary>Long (13 rows)</summary>" in text
     (run.path / OVERVIEW).write_text(Overview(["It follows."]).text())
     assert ["b", "2"] in rows(page_of(run)), "what the answer lacks stands below"

@@ -164,10 +164,10 @@ def test_the_file_of_the_page_reads_its_inertial_unit_and_moves_its_servos() -> 
             bend = np.zeros(2)
             while np.linalg.norm(bend) < 0.02:
                 passed(rig, 0.02, targets)
-                bend, seen, _ = rig.look()
+                bend, seen, *_ = rig.look()
             for _ in range(60):
                 passed(rig, 0.02, targets)
-                bend, seen, _ = rig.look()
+                bend, seen, *_ = rig.look()
             with terminal.lock:
                 true = servos.wrist.bend
             assert np.linalg.norm(true) > 0.02 and bend == pytest.approx(true, abs=3e-3)
