@@ -201,4 +201,4 @@ def test_listing_showing_and_replaying_say_what_was_not_drawn(
 @pytest.mark.slow
 def test_a_notebook_shows_the_answer_of_a_result_whose_figure_fails(found: dict[str, StudyResult]) -> None:
     shown = found["gen_data"]._repr_html_()
-    assert "<pre>" in shown and "figure coverage could not be drawn: ZeroDivisionError" in shown
+    assert 'class="sentence"' in shown and "figure coverage could not be drawn: ZeroDivisionError" in shown

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from typing import Any
 
+import mpmath
 import numpy as np
 import pytest
 
 from wristctl.config.wrist import WristParameters
+from wristctl.control import gvsc
 from wristctl.control.gvsc import strain_model
 from wristctl.control.law import wrist_of
 from wristctl.control.model import one_segment
@@ -76,3 +78,18 @@ def test_inertia_matches_a_finely_segmented_wrist_that_moves_through_equilibria(
     along = (ahead - behind) / (2 * step)
     mass = terms(segments(wrist, FINE), equilibrium_at(wrist, theta, FINE)[0], np.zeros(FINE)).mass
     assert strain(wrist, theta)[0] == pytest.approx(along @ mass @ along, rel=5e-3)
+
+
+def test_nodes_and_weights_of_its_quadrature_are_the_exact_ones_rounded_on_every_processor() -> None:
+    with mpmath.workdps(40):
+        count = len(gvsc._NODES)
+        roots = [mpmath.findroot(lambda x: mpmath.legendre(count, x), 2.0 * node - 1.0) for node in gvsc._NODES]
+        slopes = [mpmath.diff(lambda x: mpmath.legendre(count, x), root) for root in roots]
+        nodes = [(root + 1) / 2 for root in roots]
+        powers = mpmath.matrix([[node**k for k in range(count)] for node in nodes])
+        moments = mpmath.matrix([[node ** (k + 1) / (k + 1) for k in range(count)] for node in nodes])
+        partial = moments * powers**-1
+        assert tuple(map(float, nodes)) == gvsc._NODES
+        weights = (1 / ((1 - root**2) * slope**2) for root, slope in zip(roots, slopes, strict=True))
+        assert tuple(map(float, weights)) == gvsc._WEIGHTS
+        assert tuple(float(partial[i, k]) for i in range(count) for k in range(count)) == gvsc._PARTIAL

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from wristctl.errors import UserError
@@ -165,6 +165,7 @@ VALUES = st.floats(-1e300, 1e300) | st.just(math.nan)
 def test_what_is_written_reads_back_exactly(
     names: list[str], values: list[float], tmp_path_factory: pytest.TempPathFactory
 ) -> None:
+    assume(not {"gravity_x", "gravity_y", "gravity_z"} <= set(names))  # read as bends, which numbers like these are not
     columns = {name: np.array(values) * (k + 1.0) for k, name in enumerate(names)}
     file = tmp_path_factory.getbasetemp() / "again.csv"
     write_log(OpenLog(file, "log", columns, {"trial": np.array([f"no {k}" for k in range(len(values))])}), file)

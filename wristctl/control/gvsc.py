@@ -7,25 +7,26 @@ Stiffness and damping are diagonal: K, K/3 and D, D/3. A tendon parallel to the 
 
 from typing import Any
 
-import numpy as np
-
 from wristctl.control.law import BY_TRIAL, Conditions, Controller, Gain
 from wristctl.lanes.compiled import compiled
 from wristctl.lanes.functions import bessel
 from wristctl.lanes.lane import dot, planar, turn, zero_like
 
-
-def _gauss(count: int) -> tuple[tuple[float, ...], tuple[float, ...], tuple[float, ...]]:
-    """Gauss nodes on [0, 1], weights, and the weights of the integrals from 0 to each node (row after row)."""
-    nodes, weights = np.polynomial.legendre.leggauss(count)
-    nodes, weights = 0.5 * (nodes + 1.0), 0.5 * weights
-    powers = np.arange(count)
-    moments = nodes[:, None] ** (powers + 1) / (powers + 1)
-    partial = moments @ np.linalg.inv(nodes[:, None] ** powers)
-    return tuple(map(float, nodes)), tuple(map(float, weights)), tuple(map(float, partial.reshape(-1)))
-
-
-_NODES, _WEIGHTS, _PARTIAL = _gauss(5)
+# Gauss nodes on [0, 1], weights, and row after row the weights of the integrals from 0 to each node, correctly rounded:
+# what LAPACK finds differs in its last bits from one processor to another.
+_NODES = (
+    0.046910077030668004, 0.23076534494715845, 0.5, 0.7692346550528415, 0.953089922969332,
+)  # fmt: skip
+_WEIGHTS = (
+    0.11846344252809454, 0.23931433524968324, 0.28444444444444444, 0.23931433524968324, 0.11846344252809454,
+)  # fmt: skip
+_PARTIAL = (
+    0.05923172126404727, -0.019570364359076036, 0.011254400818642955, -0.005593793660812185, 0.0015881129678659985,
+    0.12815100567004528, 0.11965716762484162, -0.0245921146196422, 0.010318280670683357, -0.002768994398769603,
+    0.1137762880042246, 0.2600046516806415, 0.14222222222222222, -0.020690316430958283, 0.004687154523869941,
+    0.12123243692686414, 0.22899605457899988, 0.30903655906408667, 0.11965716762484162, -0.009687563141950739,
+    0.11687532956022854, 0.24490812891049543, 0.2731900436258015, 0.25888469960875926, 0.05923172126404727,
+)  # fmt: skip
 _COUNT = len(_NODES)
 
 

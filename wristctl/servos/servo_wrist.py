@@ -33,8 +33,9 @@ _VALUES = 12
 
 
 def _follow(
-    model: Any, values: Any, stiffness: Any, servos: Any, state: Any, out: Any, cut: Any, pulls: Any, steps: int, h: Any
+    model: Any, values: Any, stiffness: Any, servos: Any, state: Any, out: Any, sizes: Any, span: Any
 ) -> None:  # fmt: skip
+    (cut, pulls), (steps, h) = sizes, span
     plant, count, m = parameters_of(model, rows_of(values), pulls), len(pulls), len(cut)
     row, result = rows_of(servos), rows_of(out)
     q, rate = part(rows_of(state), 0, cut), part(rows_of(state), m, cut)
@@ -104,6 +105,6 @@ class ServoWrist:
         steps = max(1, math.ceil(seconds / _STEP - 1e-9))
         cut, pulls = (0,) * (2 * _SEGMENTS), (0,) * len(self.values)
         self._kernel(
-            PCC_IN_SPACE, self._wrist, self._stiffness, self.values.reshape(-1), self._state, self._out, cut, pulls,
-            steps, seconds / steps,
+            PCC_IN_SPACE, self._wrist, self._stiffness, self.values.reshape(-1), self._state, self._out, (cut, pulls),
+            (steps, seconds / steps),
         )  # fmt: skip
