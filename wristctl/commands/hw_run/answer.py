@@ -10,7 +10,6 @@ from wristctl.commands.answer import Answer
 from wristctl.commands.hw_run.trial_means import completed, means, quantities, with_simulation
 from wristctl.commands.printed_table import Table, degrees, two
 from wristctl.commands.quantities import table_of
-from wristctl.simulation.trajectory import PLANES, rests
 
 if TYPE_CHECKING:
     import numpy as np
@@ -32,6 +31,8 @@ def answer_of(
     trials: pd.DataFrame, twins: Mapping[int, Simulation], metrics: Mapping[str, float], marks: Sequence[str], run: str
 ) -> Answer:
     """What the trials came to beside their simulation, by the trial's number; `run` is the path of their run."""
+    from wristctl.simulation.trajectory import rests
+
     done = completed(trials)
     compared, labels = with_simulation(done, twins), list(dict.fromkeys(done["label"]))
     more = f"All tables: --all. Every trial: {run}/report.html" if run else "All tables: `.tables`."
@@ -88,6 +89,8 @@ def _error(told: Mapping[str, float]) -> tuple[str, list[str]]:
 
 def _planes(names: Container[str]) -> list[str]:
     """Planes of which these names have an error of their own: both, or in one plane none."""
+    from wristctl.simulation.trajectory import PLANES
+
     return [plane for plane in PLANES if f"rmse_{plane}" in names]
 
 
@@ -201,7 +204,7 @@ def marks_of(trials: pd.DataFrame, twins: Mapping[int, Simulation], tension_rang
 
     from wristctl.simulation.arrival import SHORT
     from wristctl.simulation.oscillation import LIMIT_CYCLE, chatter
-    from wristctl.simulation.trajectory import size_of
+    from wristctl.simulation.trajectory import rests, size_of
 
     done = completed(trials)
     chatters = chatter(done["chattering"].to_numpy(float), tension_range, places) > 0.0
