@@ -107,9 +107,9 @@ def _less(faults: Any, tendons: Any, plant: Any, q: Any, on_spools: Any, time: A
 
 
 def _advance(
-    model: Any, values: Any, friction: Any, spools: Any, memory: Any, others: Any, state: Any, angle: Any, cut: Any
+    model: Any, values: Any, friction: Any, spools: Any, memories: Any, state: Any, angle: Any, cut: Any
 ) -> None:
-    tendon, inner = friction
+    (tendon, inner), (memory, others) = friction, memories
     plant, tendon_rows = parameters_of(model, rows_of(values)), rows_of(tendon)
     zero = zero_like(tendon_rows[0])
     tendons = RealTendons(tendon_rows[_STIFFNESS], read_nonideal(tendon_rows), rows_of(memory), inner_in_lanes(inner))
@@ -197,8 +197,7 @@ def angles(candidates: Sequence[SupposedWrist], reeled: Array, h: float, n: int,
             value,
             (tendon, one_block(friction, block)),
             spools,
-            memory,
-            np.zeros((3 + 2 * len(_SPOOLS), *wide)),
+            (memory, np.zeros((3 + 2 * len(_SPOOLS), *wide))),
             np.zeros((2 * k, *wide)),
             angle,
             (0,) * k,

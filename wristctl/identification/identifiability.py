@@ -13,9 +13,9 @@ import numpy as np
 from wristctl.arrays import Array
 from wristctl.config.identify import IdentifySettings
 from wristctl.config.plant import TrueWrist
+from wristctl.config.wrist import WristParameters
 from wristctl.errors import Setting, UserError
 from wristctl.identification.fit import Coordinate, Fit, Problem, linearise
-from wristctl.identification.forward import SupposedWrist
 from wristctl.identification.intervals import Knowledge, inverse, promised
 from wristctl.identification.measured_trials import MeasuredTrial
 from wristctl.identification.unknowns import NOT_NEGATIVE, UNKNOWNS
@@ -153,19 +153,19 @@ def worst(addition: Addition) -> float:
     return max(half / UNKNOWNS[name].tolerance for name, half in addition.half_widths.items())
 
 
-def _more(name: str) -> Callable[[SupposedWrist], SupposedWrist]:
-    def changed(supposed: SupposedWrist) -> SupposedWrist:
-        return supposed._replace(wrist=supposed.wrist.model_copy(update={name: 1.01 * getattr(supposed.wrist, name)}))
+def _more(name: str) -> Callable[[WristParameters], WristParameters]:
+    def changed(wrist: WristParameters) -> WristParameters:
+        return wrist.model_copy(update={name: 1.01 * getattr(wrist, name)})
 
     return changed
 
 
-def _turned(supposed: SupposedWrist) -> SupposedWrist:
-    return supposed._replace(wrist=plant_of(supposed.wrist, TrueWrist(tilt_deg=1.0)))
+def _turned(wrist: WristParameters) -> WristParameters:
+    return plant_of(wrist, TrueWrist(tilt_deg=1.0))
 
 
-# Changes of the facts that identification takes as known.
-KNOWN: dict[str, Callable[[SupposedWrist], SupposedWrist]] = {
+# Changes of the facts of a trial's wrist that identification takes as known.
+KNOWN: dict[str, Callable[[WristParameters], WristParameters]] = {
     "1 % more mass of the hand": _more("hand_mass"),
     "1 % more distance of the hand's centre of mass": _more("hand_offset"),
     "1 % more length of the wrist": _more("length"),
@@ -183,7 +183,8 @@ def budget(fit: Fit, knowledge: Knowledge) -> dict[str, dict[str, float]]:
     push = {name: np.zeros(len(fit.x)) for name in (*KNOWN, FINER)}
     for trial, slopes in zip(problem.trials, fit.slopes, strict=True):
         candidate = problem.candidate(trial, fit.x)
-        course = [*problem.simulate(trial, [candidate, *(change(candidate) for change in KNOWN.values())])]
+        others = [replace(trial, wrist=change(trial.wrist)) for change in KNOWN.values()]
+        course = [*problem.simulate(trial, [candidate, *(problem.candidate(other, fit.x) for other in others)])]
         course += [*problem.simulate(trial, [candidate], _FINER)]
         expected, *pushed = (trial.shown(angle, fit.values["delay"]) for angle in course)
         for name, pushed_angle in zip(push, pushed, strict=True):
