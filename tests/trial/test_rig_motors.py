@@ -89,6 +89,9 @@ def test_a_rig_that_stops_in_silence_hears_its_targets_while_it_is_waited_for(si
     times = np.array([0.0, *(time for time, _ in rig.sent), rig.clock.now()])
     assert np.diff(times).max() <= 0.25 * (silence or 0.08) + 1e-9
     assert all(targets == pytest.approx([5.0, -3.0]) for _, targets in rig.sent)
+    motors.jog([400, -40])
+    assert np.diff([time for time, _ in rig.sent]).max() <= 0.25 * (silence or 0.08) + 1e-9, "while it moves too"
+    assert motors.targets == pytest.approx([5.0 + 4e5 * STEP, -3.0 - 4e4 * STEP])
 
 
 def test_a_reading_is_of_the_rigs_looks_and_in_its_words_where_there_is_none() -> None:

@@ -49,11 +49,11 @@ class RigMotors:
 
     def reel(self, position: Array) -> None:
         """Go slowly to a position (T,) [m], and wait until the motors are there."""
-        pace = min(_SLOWLY, 0.5 * self._facts.limits.rate) * _EVERY
+        pace = min(_SLOWLY, 0.5 * self._facts.limits.rate) * self._every
         while (left := position - self._at).any():
             self._at = self._at + np.clip(left, -pace, pace)
             self._rig.send(self.targets)
-            self._rig.wait_until(self._rig.now() + _EVERY)
+            self._rig.wait_until(self._rig.now() + self._every)
         self.wait(self._settles)
 
     def now(self) -> float:
