@@ -149,7 +149,7 @@ installed: .venv/dev
 
 # Source archive and wheel in dist/, and the package's own descriptions, workflows and settings, checked by others' tools.
 check-package: .venv/dev build/tools/ready
-	$(BIN)/python -c 'import sys; sys.path.insert(0, "distribution"); import release; release.build()'
+	$(BIN)/python distribution/release.py --build
 	build/tools/bin/twine check --strict dist/wristctl-*
 	build/tools/bin/check-wheel-contents dist
 	build/tools/bin/cffconvert --validate

@@ -80,7 +80,7 @@ def check_tree(root: Path = ROOT) -> None:
         raise NotReady(f"not committed: {', '.join(line.split(maxsplit=1)[1] for line in changed.splitlines())}")
 
 
-def build(root: Path = ROOT) -> tuple[Path, Path]:
+def build(root: Path = ROOT) -> None:
     """Source archive and wheel in dist/, the wheel from the archive, as an installer would build it."""
     folder = root / "dist"
     for old in folder.glob("wristctl-*"):
@@ -90,8 +90,6 @@ def build(root: Path = ROOT) -> tuple[Path, Path]:
     subprocess.run(
         [sys.executable, "-m", "pip", "wheel", "--quiet", "--no-deps", "-w", str(folder), source], check=True
     )
-    (wheel,) = folder.glob("*.whl")
-    return source, wheel
 
 
 def main() -> None:
@@ -99,11 +97,14 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("version", nargs="?", help="to release, as 0.2.0")
     parser.add_argument("--open", metavar="VERSION", help="the next development version, as 0.3.0.dev0")
+    parser.add_argument("--build", action="store_true", help="source archive and wheel into dist/, nothing else")
     parser.add_argument("--check-tag", metavar="TAG", help="fail unless it is the code's version")
     given = parser.parse_args()
     try:
         if given.check_tag:
             check_tag(given.check_tag)
+        elif given.build:
+            build()
         elif given.open:
             if not DEVELOPMENT.fullmatch(given.open):
                 raise NotReady(f"{given.open} is no development version, as 0.3.0.dev0")
@@ -111,7 +112,7 @@ def main() -> None:
         elif given.version:
             _release(given.version)
         else:
-            parser.error("give a version, --open or --check-tag")
+            parser.error("give a version, --open, --build or --check-tag")
     except NotReady as why:
         sys.exit(f"not ready: {why}")
     except subprocess.CalledProcessError as failed:
@@ -126,8 +127,8 @@ def _release(new: str) -> None:
     check_tree()
     stamped = stamp(new, day=datetime.now(UTC).strftime("%Y-%m-%d"))
     print(f"stamped {new}: {', '.join(str(file.relative_to(ROOT)) for file in stamped)}", flush=True)
-    source, wheel = build()
     subprocess.run(["make", "check-package"], cwd=ROOT, check=True)
+    (source,), (wheel,) = ((ROOT / "dist").glob(f"wristctl-*{ending}") for ending in (".tar.gz", ".whl"))
     for file in (source, wheel):
         print(f"{file.name}, in an environment of its own:", flush=True)
         subprocess.run([sys.executable, "benchmarks/installed.py", "--dist", str(file)], cwd=ROOT, check=True)

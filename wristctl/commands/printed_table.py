@@ -62,8 +62,8 @@ class Table:
         chosen = [[row[index] for index in shown] for row in self.rows]
         return Table(self.title, [self.columns[index] for index in shown], chosen)
 
-    def _cells(self, digits: int = _DIGITS) -> tuple[list[str], list[list[str]]]:
-        """Heads and cells as people read them."""
+    def cells(self, digits: int = _DIGITS) -> tuple[list[str], list[list[str]]]:
+        """Heads and cells as people read them, numbers to so many digits."""
         columns, rows = readable(self.columns, [[_plain(value) for value in row] for row in self.rows])
         angles = [column.endswith("[deg]") for column in columns]
         unit_at = columns.index("unit") if "unit" in columns else None
@@ -80,7 +80,7 @@ class Table:
 
     def _layout(self, width: int | None, digits: int = _DIGITS) -> tuple[list[list[str]], list[list[str]], list[int]]:
         """Lines of each head, text of each cell, and the width of each column."""
-        columns, cells = self._cells(digits)
+        columns, cells = self.cells(digits)
         heads = [[column] for column in columns]
         wide = [max(map(len, column), default=0) for column in zip(*cells, strict=True)] or [0] * len(heads)
         widths = [max(cell, len(head)) for cell, (head,) in zip(wide, heads, strict=True)]

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
-from wristctl.commands.printed_table import Table, escaped, number
+from wristctl.commands.printed_table import Table, escaped
 from wristctl.escape import printable
-from wristctl.reader_units import readable
 from wristctl.records.manifest import Manifest
 from wristctl.study_files.keys import command_of
 from wristctl.version import __version__
@@ -60,8 +59,8 @@ def latex_table(table: Table, label: str = "", caption: str = "") -> str:
 
     Columns that do not fit beside the others stand below, the first repeated; what is still too wide is scaled.
     """
-    heads, rows = readable(table.columns, table.rows)
-    columns = [part for at, head in enumerate(heads) for part in _parted([row[at] for row in rows], printable(head))]
+    heads, rows = table.cells()
+    columns = [part for at, head in enumerate(heads) for part in _parted([row[at] for row in rows], head)]
     lines = [r"\begin{table}[!t]", r"\centering", r"\footnotesize", rf"\caption{{{_text(table.title or caption)}}}"]
     lines += [rf"\label{{tab:{label}}}"] * bool(label)
     for block in _blocks(columns):
@@ -70,8 +69,7 @@ def latex_table(table: Table, label: str = "", caption: str = "") -> str:
     return "\n".join([*lines, r"\end{table}"])
 
 
-def _parted(values: Sequence[Any], head: str) -> list[_Column]:
-    cells = [_cell(value) for value in values]
+def _parted(cells: Sequence[str], head: str) -> list[_Column]:
     parts = [_CELL.fullmatch(cell) for cell in cells]
     kinds = [kind for kind in ("rank", "value", "low", "high", "mark") if any(part and part[kind] for part in parts)]
     if len(kinds) < 2:
@@ -83,15 +81,6 @@ def _parted(values: Sequence[Any], head: str) -> list[_Column]:
         ])
         for kind in kinds
     ]  # fmt: skip
-
-
-def _cell(value: Any) -> str:
-    value = value.item() if hasattr(value, "item") else value
-    if value is None:
-        return "-"
-    if isinstance(value, bool):
-        return "yes" if value else "no"
-    return printable(value) if isinstance(value, str | int) else number(float(value))
 
 
 def _blocks(columns: Sequence[_Column]) -> list[list[_Column]]:

@@ -84,21 +84,20 @@ _SIDES = (
     Quantity("wrist", "N", "pull of all its tendons at the wrist, of the {}"),
     Quantity("z", "", "state of the {}'s bristle"),
 )
+_BENDS = (Quantity("bend_ulnar", "rad", "bend toward ulnar"), Quantity("bend_flexion", "rad", "bend toward flexion"))
 _COURSES = (
     Quantity("loop", "", "row of loops.csv, from 0"),
     Quantity("time", "s", "since the range's high end"),
     Quantity("unhindered", "rad", "angle without friction on these spools"),
     Quantity("theta", "rad", "angle, of two planes along the direction of the loop"),
-    Quantity("bend_ulnar", "rad", "bend toward ulnar"),
-    Quantity("bend_flexion", "rad", "bend toward flexion"),
+    *_BENDS,
 )
 _CIRCLE_COURSES = (
     Quantity("circle", "", "row of circles.csv, from 0"),
     Quantity("time", "s", "since the turn began"),
     Quantity("unhindered_ulnar", "rad", "bend toward ulnar without friction on these spools"),
     Quantity("unhindered_flexion", "rad", "and toward flexion"),
-    Quantity("bend_ulnar", "rad", "bend toward ulnar"),
-    Quantity("bend_flexion", "rad", "bend toward flexion"),
+    *_BENDS,
 )
 # Loops and dead bands that are all printed; of more, those with the main path of presliding, all being in data.
 _MOST = 60
