@@ -14,6 +14,7 @@ from wristctl.rig import Clock, Drive, Facts, Limits, Look, Sensor, Tendon, Virt
 from wristctl.trial.expected_moves import Bend, ExpectedMoves
 from wristctl.trial.guarded_rig import GuardedRig
 from wristctl.trial.rig_drive import RigTracking
+from wristctl.trial.rig_homing import RigHoming
 from wristctl.trial.rig_motors import RigMotors
 from wristctl.trial.safety import SafetyStop
 from wristctl.trial.supervised_wait import Patience
@@ -163,3 +164,31 @@ def test_one_sensor_in_one_plane_tells_sides_of_any_number_of_tendons() -> None:
         three.judge_side(axis, Bend(side * 0.02, unseen))
         with pytest.raises(SafetyStop, match="to the other side than"):
             three.judge_side(axis, Bend(-side * 0.02, unseen))
+
+
+class Scattering(Rig):
+    """Its bend is so many degrees to one side, and in the next look to the other."""
+
+    def __init__(self, scatter_deg: float) -> None:
+        super().__init__()
+        self._scatter = math.radians(scatter_deg)
+
+    def look(self) -> Look:
+        frame = math.floor(50.0 * self.clock.now() + 1e-6)
+        return Look([self._scatter * (-1) ** frame], frame / 50.0)
+
+
+@pytest.mark.parametrize(("scatter_deg", "refused"), [(0.19, False), (0.21, True)])
+def test_a_sensor_that_scatters_is_refused_where_a_reading_errs_by_two_fifths_of_a_bend(
+    scatter_deg: float, refused: bool
+) -> None:
+    """Readings are of one look here, and 0.5 deg is a bend."""
+    motors, guarded = motors_of(rig := Scattering(scatter_deg))
+    layout = TendonLayout((TendonPlace(0.0, 0.02), TendonPlace(math.pi, 0.02)))
+    settings: Any = settings_of(planes=1)
+    assert (settings.homing.frames, settings.homing.bend_deg) == (1, 0.5)
+    with pytest.raises(SafetyStop) as stop:
+        RigHoming(motors, RigTracking(guarded), settings, WRIST, layout, "my_rig.py:RIG").find()
+    assert ("unsteadily" in str(stop.value)) is refused
+    stood = bool(np.ptp([targets for _, targets in rig.sent], axis=0).max() == 0.0)
+    assert stood is refused, "nothing is moved by what cannot be seen"
