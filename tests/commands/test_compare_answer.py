@@ -12,10 +12,11 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from wristctl.commands.answer import LINES
-from wristctl.commands.compare.answer import answer_of
+from wristctl.commands.compare.answer import answer_of, head_with_the_best
 from wristctl.commands.printed_table import COLUMNS, two
 from wristctl.commands.ranking_answer import DIGITS, advice, condition, names_of, not_to_use, winner
 from wristctl.commands.ranking_tables import answer_tables, controllers_table, standings_table
+from wristctl.commands.results import Findings
 from wristctl.comparison.combinations import CLASSES
 from wristctl.comparison.controller_ranking import Ranking, Traits
 from wristctl.comparison.model_confidence_set import LEAST_PAIRS
@@ -325,6 +326,12 @@ def test_of_equal_errors_the_one_is_best_that_is_so_in_most_conditions() -> None
     one = stands(rmse=tiny)
     assert one.labels[winner(one, [one, other]) or 0] == "b/default" and winner(one) == 0
     assert "use b/default: RMSE <0.001 deg" in told(one, other)
+    findings = Findings(0)
+    head_with_the_best(findings, [one, other])
+    heads = [about["meaning"] for about in findings.metrics.values()]
+    assert len(heads) == 2 and all("RMSE of b/default, the best there" in head for head in heads), (
+        "as the table's stars"
+    )
 
 
 def test_too_few_cases_are_no_ranking_and_no_tie() -> None:

@@ -21,6 +21,7 @@ from wristctl.commands.ranking_answer import (
     not_to_use,
     open_loop,
     recommended,
+    winner,
 )
 from wristctl.commands.ranking_tables import controllers_table
 from wristctl.commands.results import Findings
@@ -200,8 +201,7 @@ def head_with_the_best(findings: Findings, rankings: Sequence[Ranking]) -> None:
     """Let the run's page be headed by the error of the best row under each condition."""
     headed: list[str] = []
     for ranking in rankings:
-        if ranking.standing.groups:
-            best = ranking.standing.groups[0][0]
+        if (best := winner(ranking, rankings)) is not None:
             mean, name = ranking.means[best], f"best_{ranking.name.replace(',', '').replace(' ', '_')}"
             interval = (mean.low, mean.high) if math.isfinite(mean.high) else None
             meaning = f"RMSE of {ranking.labels[best]}, the best there, over {ranking.cases}"
