@@ -3,7 +3,7 @@
 Builds the wheel (`--dist FILE` takes that wheel or source archive), installs it into an environment of its own, and
 tries the commands of the README there, in an empty folder: no clone and no git. Prints a line a command, and ends with
 1 where one failed, or was left out: without a CPU build of torch for this Python, in its own index or pip's, that is
-`train`; `--without-torch` takes this as it is.
+`train`; `--without-torch` takes this as it is, `--cuda` takes the build of several GB that pip finds.
 """
 
 from __future__ import annotations
@@ -58,7 +58,9 @@ def installer(commands: Path) -> list[str]:
     return [str(commands / "pip"), "install", "--quiet", "--disable-pip-version-check"]
 
 
-def environment(folder: Path, python: str, oldest: bool, built: Path | None = None) -> tuple[Path, bool]:
+def environment(
+    folder: Path, python: str, oldest: bool, built: Path | None = None, cuda: bool = False
+) -> tuple[Path, bool]:
     """The environment's folder of commands, and whether torch is there; `built` is installed, or a wheel built now."""
     commands = folder / "env" / "bin"
     uv = shutil.which("uv")  # much faster, where it is there
@@ -76,10 +78,10 @@ def environment(folder: Path, python: str, oldest: bool, built: Path | None = No
     (pinned,) = [each for each in pins if TORCH.match(each)]
     indexes = ([*pip, "--no-deps", "--index-url", TORCH_INDEX], [*pip, "--only-binary=:all:", "--no-deps"])
     with_torch = any(subprocess.run([*each, f"{pinned}+cpu"], capture_output=True).returncode == 0 for each in indexes)
-    if with_torch:
-        subprocess.run([*pip, f"{pinned}+cpu"], check=True)  # what it needs
+    if with_torch or cuda:
+        subprocess.run([*pip, f"{pinned}+cpu" if with_torch else pinned], check=True)  # what it needs
     subprocess.run([*pip, "--no-deps", str(built)], check=True)
-    return commands, with_torch
+    return commands, with_torch or cuda
 
 
 def tried(commands: Path, folder: Path, command: str) -> str:
@@ -97,10 +99,12 @@ def main() -> None:
     parser.add_argument("--lowest", action="store_true")
     parser.add_argument("--dist", type=Path, help="wheel or source archive, instead of a wheel built now")
     parser.add_argument("--without-torch", action="store_true", help="train may be left out")
+    parser.add_argument("--cuda", action="store_true", help="without a CPU build of torch, take one with CUDA")
     given = parser.parse_args()
+    built = given.dist and given.dist.resolve()
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        commands, with_torch = environment(folder, given.python, given.lowest, given.dist and given.dist.resolve())
+        commands, with_torch = environment(folder, given.python, given.lowest, built, given.cuda)
         version = subprocess.run([commands / "python", "-V"], capture_output=True, text=True).stdout.strip()
         age, torch = "oldest" if given.lowest else "newest", "with" if with_torch else "without"
         print(f"{version}, {age} dependencies, {torch} torch", flush=True)

@@ -97,7 +97,7 @@ def foreseen(timing: Any, place: Any, rates: Any, h: float) -> Any:
     to be reached within a tick.
     """
     whole = floor(timing.delay / h)
-    for k in range(len(rates) - 1):
+    for k in range(len(rates) - 2):  # the delay is shorter than so many ticks: `remembered_rates`
         place = place + where(whole >= float(k), way(timing, rates[k + 1], rates[k], h), 0.0)
     return place
 
