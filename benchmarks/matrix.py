@@ -22,6 +22,7 @@ from installed import ROOT, environment, installer, tried
 
 OLDEST = (3, 11)
 COMMANDS = ("--version", "--help", "simulate --controller ct-dob", "runs verify")
+TRAINED = ("gen-data quick", "train quick --data latest:gen-data --set epochs=2")
 TESTS = (
     "tests/wrist/test_kinematics.py", "tests/wrist/test_tendons.py", "tests/simulation/test_reference.py",
     "tests/config/test_section.py", "tests/records/test_verify.py", "tests/board/test_framing.py",
@@ -60,19 +61,19 @@ def tests(commands: Path, folder: Path) -> str:
     return "" if done.returncode == 0 else f"exit {done.returncode}: {(done.stdout + done.stderr).strip()[-1500:]}"
 
 
-def attempt(python: str, oldest: bool) -> tuple[str, list[str]]:
+def attempt(python: str, oldest: bool, cuda: bool) -> tuple[str, list[str]]:
     """The environment in words, and what failed in it."""
     failed = []
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        commands, with_torch = environment(folder, python, oldest)
+        commands, with_torch = environment(folder, python, oldest, cuda=cuda)
         version = subprocess.run([commands / "python", "-V"], capture_output=True, text=True).stdout.strip()
         about = f"{version}, {'lowest' if oldest else 'newest'} dependencies{'' if with_torch else ', without torch'}"
         sys.stdout.write(f"{about}\n")
         sys.stdout.flush()
         for place in ("empty", "tried"):
             (folder / place).mkdir()
-        for step in (*COMMANDS, "tests"):
+        for step in (*COMMANDS, *(TRAINED if with_torch else ()), "tests"):
             began = time.perf_counter()
             why = tests(commands, folder / "tried") if step == "tests" else tried(commands, folder / "empty", step)
             took = time.perf_counter() - began
@@ -89,11 +90,12 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("python", nargs="*", help="instead of every Python that is here")
     parser.add_argument("--lowest", action="store_true", help="only with the lowest dependencies")
+    parser.add_argument("--cuda", action="store_true", help="without a CPU build of torch, train with one with CUDA")
     asked = parser.parse_args()
     every = asked.python or pythons()
     wanted = [] if asked.lowest else [(python, False) for python in every]
     wanted += [(python, True) for python in (every if asked.lowest else [] if asked.python else every[:1])]
-    outcomes = [attempt(python, oldest) for python, oldest in wanted]
+    outcomes = [attempt(python, oldest, asked.cuda) for python, oldest in wanted]
     for about, failed in outcomes:
         sys.stdout.write(f"{'failed: ' + ', '.join(failed) if failed else 'passed':10} {about}\n")
     sys.exit(any(failed for _, failed in outcomes))

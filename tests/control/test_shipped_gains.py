@@ -149,6 +149,13 @@ def test_gains_are_of_today_until_a_motion_a_world_or_the_drive_changes(
     assert "shipped no more" in published.what_changed("handling", "", None)
 
 
+def test_a_family_that_states_its_defaults_is_the_same_family(experiments: Callable[..., Family]) -> None:
+    """A run's own settings hold all of them; what is tuned on when it goes on is no other family."""
+    family = experiments()
+    whole = Family.model_validate_json(family.model_dump_json(by_alias=True))
+    assert whole.settings_hash() == family.settings_hash() != experiments(angles="10..30").settings_hash()
+
+
 def test_the_page_says_of_each_family_whether_it_is_that_of_today(experiments: Callable[..., Family]) -> None:
     content = json.loads(json.dumps(shipped_gains._shipped()["camera"]))
     page, same = script_of_docs("published_gains").page, {"family_sha256": experiments().settings_hash()}

@@ -97,8 +97,8 @@ class Family(Section):
         return Reference.model_validate(data)
 
     def settings_hash(self) -> str:
-        """SHA-256 of all that is set in it but `about`, in any order: alike families have the same."""
-        content = self.model_dump(mode="json", by_alias=True, exclude_unset=True, exclude={"about"})
+        """SHA-256 of all in it that is no default, but `about`, in any order: alike families have the same."""
+        content = self.model_dump(mode="json", by_alias=True, exclude_defaults=True, exclude={"about"})
         return hashlib.sha256(json.dumps(content, sort_keys=True, separators=(",", ":")).encode()).hexdigest()
 
     def drawn_of(self, number: int) -> list[str]:
