@@ -171,7 +171,7 @@ release: .venv/dev
 
 # Every Python that is here, one after the other: the wheel, commands and tests, some minutes each.
 matrix: .venv/dev
-	$(BIN)/python benchmarks/matrix.py
+	$(BIN)/python benchmarks/matrix.py $(WHICH)
 
 # A sweep over each kind of setting beside a batch of as many gains, 6 min.
 bench-sweeps: .venv/run
