@@ -59,6 +59,23 @@ def test_a_command_says_which_metrics_head_its_page(tmp_path: Path) -> None:
     assert cards(run) == [("m 7", "7"), ("m 3", "3")], "what is not known is none"
 
 
+def test_a_card_does_not_repeat_the_unit_beside_its_value_in_its_name(tmp_path: Path) -> None:
+    run = made(tmp_path, {"tip_rmse_mm": 2.0, "r2": 0.5, "mm_of_it": 1.0}, "mm")
+    assert cards(run) == [("tip RMSE", "2"), ("R^2", "0.5"), ("mm of it", "1")]
+
+
+def test_every_table_has_a_name_of_its_own_and_every_head_a_word(tmp_path: Path) -> None:
+    """Who cannot see the page goes through it by these names."""
+    stored = [{"title": title, "columns": ["a", ""], "rows": [[k, "b"]]} for k, title in enumerate(("", "B", "C"))]
+    run = made(tmp_path, {"x": 1.0}, tables=stored)
+    answer = ["One.", "", "a  b", "-  -", "1  2", "", "a  b", "-  -", "3  4"]
+    (run.path / OVERVIEW).write_text(Overview(answer).text())
+    text = page_of(run)
+    names = re.findall(r'role="region" aria-label="(.*?)"', text)
+    assert len(names) >= 7 and len(set(names)) == len(names) and all(names)
+    assert "></button>" not in text and '<th scope="col"></th>' not in text
+
+
 def test_where_none_is_chosen_the_first_that_may_be_better_or_worse_head_it(tmp_path: Path) -> None:
     run = made(tmp_path, {"none": float("nan")} | {f"m_{k}": 12.0 - k for k in range(11)})
     assert cards(run) == [(f"m {k}", f"{12 - k}") for k in range(6)]
@@ -210,6 +227,9 @@ def test_an_angle_that_nobody_can_measure_is_small_in_every_place(tmp_path: Path
     assert cards(run) == [("RMSE", "&lt;0.001")]
     found = rows(page_of(run))
     assert ["x", "&lt;0.001", "deg"] in found and ["y", "1e-17", "N"] in found
+    stored = [{"title": "T", "columns": ["quantity", "greatest"], "rows": [["error [deg]", 1e-17], ["x [mm]", 1e-17]]}]
+    found = rows(page_of(made(tmp_path, {}, tables=stored)))
+    assert ["error [deg]", "&lt;0.001"] in found and ["x [mm]", "1e-17"] in found, "a unit in the row's own name too"
 
 
 def test_cells_are_words_whole_numbers_four_digits_or_a_dash(tmp_path: Path) -> None:
