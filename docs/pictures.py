@@ -151,7 +151,7 @@ def report() -> None:
         trial = [sys.executable, "-m", "wristctl", "hw-run", "--reference", "circumduction"]
         subprocess.run([*trial, "--set", "reference.angle_deg=25"], check=True, cwd=folder)
         (page,) = Path(folder).glob("results/*-hw-run-*/report.html")
-        shot(page, HERE / "images" / "report.png", 1000, 1160)
+        shot(page, HERE / "images" / "report.png", 1000, 1400)
 
 
 def main() -> None:

@@ -10,12 +10,15 @@ from pathlib import Path
 from PIL import Image
 
 COLOURS = 64
+_BARS = 200
+"""Height that a window has beside its page, at most [px]."""
 
 
-def few_colours(source: Path, picture: Path) -> None:
-    """The picture `source` as the PNG `picture` of 64 colours."""
+def few_colours(source: Path, picture: Path, height: int | None = None) -> None:
+    """The picture `source`, or its upper `height` pixels, as the PNG `picture` of 64 colours."""
     with Image.open(source) as whole:
-        few = whole.convert("RGB").quantize(COLOURS, dither=Image.Dither.NONE)
+        upper = whole.crop((0, 0, whole.width, height or whole.height))
+        few = upper.convert("RGB").quantize(COLOURS, dither=Image.Dither.NONE)
         few.save(picture, optimize=True)
 
 
@@ -27,7 +30,7 @@ def shot(page: Path, picture: Path, width: int, height: int) -> None:
     with tempfile.TemporaryDirectory() as folder:
         taken = Path(folder) / "shot.png"
         options = ["--headless", "--no-sandbox", "--disable-gpu", "--hide-scrollbars"]
-        options += ["--disable-background-networking"]
-        options += [f"--user-data-dir={folder}/profile", f"--window-size={width},{height}", f"--screenshot={taken}"]
+        options += ["--disable-background-networking", f"--user-data-dir={folder}/profile"]
+        options += [f"--window-size={width},{height + _BARS}", f"--screenshot={taken}"]
         subprocess.run([browser, *options, page.resolve().as_uri()], check=True, capture_output=True)
-        few_colours(taken, picture)
+        few_colours(taken, picture, height)

@@ -26,7 +26,7 @@ SAVED = re.compile(r"Save as `([^`]+)`[^`]*\Z")
 PICTURE = re.compile(r"^<!-- (\S+) -->\n!\[[^\]]*\]\(([^)]+)\)$", re.MULTILINE)
 COLUMNS = 100
 """Width of the terminal [characters]."""
-SHOWN = (1000, 900)
+SHOWN = (1000, 960)
 """Of a report: width and height [px]."""
 
 

@@ -166,6 +166,17 @@ def test_an_answer_is_paragraphs_a_table_by_its_rule_and_commands_to_copy() -> N
     assert blocks(["a: 1", "    b"]) == [{"kind": "lines", "text": "a: 1\n    b"}], "indented lines stay lines"
 
 
+def test_a_table_that_was_too_wide_for_a_terminal_is_one_on_a_page() -> None:
+    wide = Table("", ("who", "first of them", "second of them", "third of them"), [("a", 1, 2, 3), ("b", 4, 5, 6)])
+    text = wide.text(width=24)
+    assert text.count("who") == 2, "it goes on below"
+    (table,) = blocks(text.splitlines())
+    assert table["columns"] == list(wide.columns)
+    assert table["rows"] == [["a", "1", "2", "3"], ["b", "4", "5", "6"]]
+    other = "\nc".join(text.rsplit("\nb", 1))
+    assert [len(each["rows"]) for each in blocks(other.splitlines())] == [2, 2], "other rows are another table"
+
+
 def test_heads_in_several_lines_are_those_of_one_table() -> None:
     lines = ["             feedforward's", "controller   [deg]", "----------  --------------", "pid-ff      0.22"]
     (table,) = blocks(lines)
@@ -332,6 +343,20 @@ def test_several_runs_are_told_apart_from_the_first_in_columns_of_their_own(tmp_
         "<svg >1</svg>",
         "<svg >2</svg>",
     ]
+
+
+def test_beside_each_other_headlines_come_first_and_settings_have_the_digits_that_people_read(tmp_path: Path) -> None:
+    runs = []
+    for rate in (0.1, 0.1 + 0.2):
+        with start_run("train", Study(train=TrainSettings(learning_rate=rate)), "", tmp_path) as live:
+            for name in ("ticks", "tip_rmse_mm", "late"):
+                live.metric(name, rate, "mm")
+            live.file(OVERVIEW).write_text(Overview(cards=["tip_rmse_mm"]).text())
+        runs.append(Run(live.path))
+    found = rows(several_page(runs))
+    assert ["train.learning_rate", "0.1", "0.3"] in found
+    names = [row[0] for row in found if row and row[1:2] == ["mm"]]
+    assert names == ["tip RMSE", "ticks", "late"]
 
 
 def test_tables_are_in_degrees_by_their_heads_and_by_their_rows_units(tmp_path: Path) -> None:

@@ -198,15 +198,17 @@ def draw_trials(session: Session, done: pd.DataFrame, twins: Mapping[int, Simula
         if not some:
             continue
         alone = [course for course in some if course.label == first and course.repetition == 0]
+        said = ", with a push" * pushed
         if settings.planes == 1:
-            findings.figure(f"{prefix}directions", desired_and_obtained, some)
+            caption = f"The bend, wanted and obtained, in each direction{said}"
+            findings.figure(f"{prefix}directions", desired_and_obtained, some, caption=caption)
         else:
             reach = reach_of_bends(wrist, layout or layout_of_axes(wrist))
-            caption = "The plane of bends: wanted, measured and true, within what the tendons reach"
+            caption = "The plane of bends: wanted, measured and true, within what the tendons reach" + said
             findings.figure(f"{prefix}bends", paths, alone, reach, first, caption=caption)
             findings.overview.figure = findings.overview.figure or f"{prefix}bends"
-        findings.figure(f"{prefix}errors", errors, some)
-        findings.figure(f"{prefix}tensions", tensions, alone, first)
+        findings.figure(f"{prefix}errors", errors, some, caption=f"The error of the bend over time{said}")
+        findings.figure(f"{prefix}tensions", tensions, alone, first, caption=f"Commanded tensions over time{said}")
     if settings.real_time or settings.port is not None:
         logs = (log, _logged(findings, "between"))
         late = np.concatenate([table["late"].to_numpy(float) for table in logs])

@@ -91,8 +91,7 @@ def performed(session: Session, trials: pd.DataFrame, network: Inverse | None, t
         table_of(title, quantities(columns), rows),
         table_of("Trials, in the order done", quantities(of_trials), done[of_trials].to_dict("records")),
     ]
-    if "rmse_ulnar" in done:
-        findings.headline("rmse", "rmse_ulnar", "rmse_flexion", "true_rmse", "pushed_true_rmse")
+    findings.headline("rmse", "rmse_ulnar", "rmse_flexion", "true_rmse", "settling", "pushed_true_rmse")
     return Performed(session.study, findings, tables, trials, twins)
 
 
