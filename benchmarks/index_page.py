@@ -32,11 +32,12 @@ def main() -> None:
         browser = Browser(Path(folder) / "profile")
         try:
             for _ in range(3):
-                began = time.monotonic()
+                began, computed = time.monotonic(), browser.processor_time()
                 browser.open(page, 1280, dark=False)
                 shown = browser.run("return document.querySelectorAll('#runs > li').length")
                 loaded = browser.run("return performance.getEntriesByType('navigation')[0].loadEventEnd")
                 print(f"{shown} runs opened in {time.monotonic() - began:.2f} s, loaded after {loaded / 1e3:.2f} s")
+                print(f"processor time of the browser: {browser.processor_time() - computed:.2f} s")
                 typed = (
                     "const s = document.getElementById('search'); s.value = 'tune n199'; const b = performance.now();"
                 )

@@ -23,6 +23,7 @@ CELL = re.compile(r"^```python\n(.*?)^```\n", re.DOTALL | re.MULTILINE)
 STYLE = """\
 <style>
 .cell { border-left: 3px solid #8aa; padding-left: 1em; margin-bottom: 1.5em; overflow-x: auto; }
+.cell pre { white-space: pre-wrap; overflow-wrap: anywhere; }
 .cell td, .cell th { padding: 0.1em 0.7em; text-align: right; }
 .cell td:first-child, .cell th:first-child { text-align: left; }
 </style>
@@ -40,7 +41,7 @@ class Output:
     def html(self) -> str:
         """All of it below the cell; empty where it leaves nothing."""
         parts = [f"<pre>{html.escape(self.printed)}</pre>"] * bool(self.printed) + list(self.shown)
-        return f'<div class="cell">{"".join(parts)}</div>' if parts else ""
+        return f'<div class="cell" tabindex="0">{"".join(parts)}</div>' if parts else ""
 
 
 def run_cell(source: str, names: dict[str, Any], place: str) -> Output:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import shutil
 import subprocess
 import sys
 import tempfile
@@ -13,7 +12,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 from matplotlib.figure import Figure
-from PIL import Image
+from shots import shot
 
 from wristctl.commands.hysteresis.figures import loops as loops_by_speed
 from wristctl.commands.ranking_drawing import places_of
@@ -148,26 +147,11 @@ def answer() -> None:
 
 def report() -> None:
     """The head of a report in Chromium: emulated trials in two planes."""
-    browser = shutil.which("chromium")
-    if browser is None:
-        raise SystemExit("error: no chromium - fix: apt-get install chromium")
     with tempfile.TemporaryDirectory() as folder:
         trial = [sys.executable, "-m", "wristctl", "hw-run", "--reference", "circumduction"]
         subprocess.run([*trial, "--set", "reference.angle_deg=25"], check=True, cwd=folder)
         (page,) = Path(folder).glob("results/*-hw-run-*/report.html")
-        picture = Path(folder) / "report.png"
-        options = [
-            "--headless",
-            "--no-sandbox",
-            "--disable-gpu",
-            "--hide-scrollbars",
-            f"--user-data-dir={folder}/profile",
-        ]
-        options += ["--disable-background-networking", "--window-size=1000,1160", f"--screenshot={picture}"]
-        subprocess.run([browser, *options, page.as_uri()], check=True, capture_output=True)
-        with Image.open(picture) as shot:
-            few = shot.convert("RGB").quantize(64, dither=Image.Dither.NONE)
-            few.save(HERE / "images" / "report.png", optimize=True)
+        shot(page, HERE / "images" / "report.png", 1000, 1400)
 
 
 def main() -> None:

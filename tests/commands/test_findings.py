@@ -54,3 +54,17 @@ def test_a_metric_is_of_one_unless_said_and_the_same_in_the_run(tmp_path: Path) 
     volatile = {each.path: each.volatile for each in run.manifest.outputs}
     assert volatile["data/loose.json"] and not volatile["data/plain.json"]
     assert run.file("figures/shown.png").is_file()
+
+
+def test_a_figure_without_a_caption_is_captioned_by_the_first_line_of_what_draws_it() -> None:
+    def draw() -> Any:
+        """Error [deg] over time [s].
+
+        Further words.
+        """
+
+    findings = Findings(7)
+    findings.figure("said", draw, caption="What it is")
+    findings.figure("told", draw)
+    findings.figure("silent", lambda: figure()[0])
+    assert findings.overview.captions == {"said": "What it is", "told": "Error [deg] over time [s]", "silent": ""}

@@ -78,8 +78,7 @@ def tables(tmp_path: Path, settings: str = ROWS) -> tuple[list[Table], Findings,
             pd.concat(log).to_csv(run.file(f"data/{name}.csv"), index=False)
         truth = [table[["trial", "time"]].assign(theta=table["theta"] + 0.05) for table in log]
         pd.concat(truth).to_csv(run.file("data/truth.csv"), index=False)
-        findings = Findings(0, run)
-        findings.figure = lambda name, draw, *of, **how: findings.figures.add(name, lambda: draw(*of, **how))  # type: ignore[method-assign]
+        findings = Findings(0, run, draws=False)
         session = Session(study, Inputs(), findings, watched(None), Unattended())
         done = performed(session, trials(), None, None)
     return list(done.tables), findings, done.twins
@@ -138,10 +137,24 @@ def test_each_mean_is_a_metric_named_by_push_and_where_there_are_several_by_cont
     assert metrics["pushed_rmse_smc-printed"]["meaning"] == "mean over trials with a push, smc/printed"
 
 
+def test_the_means_have_no_column_in_which_nothing_was_measured(
+    tmp_path: Path, asked: list[Trial], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (whole, _), _, _ = tables(tmp_path / "a")
+    unknown = {name: np.nan for name in trials().columns if name.startswith("true_")}
+    of_a_real_rig = trials().assign(**unknown)
+    monkeypatch.setattr("tests.commands.test_hw_tables.trials", lambda: of_a_real_rig)
+    (means, _), _, _ = tables(tmp_path / "b")
+    truly = [head for head in whole.columns if head.startswith("true ")]
+    assert truly and list(means.columns) == [head for head in whole.columns if head not in truly]
+
+
 def test_courses_are_drawn_by_their_log_with_and_without_a_push(tmp_path: Path, asked: list[Trial]) -> None:
     _, findings, twins = tables(tmp_path)
     kinds = ["directions", "errors", "tensions"]
     assert list(findings.figures) == [*kinds, *(f"pushed-{name}" for name in kinds)]
+    captions = findings.overview.captions
+    assert [captions[f"pushed-{name}"] for name in kinds] == [f"{captions[name]}, with a push" for name in kinds]
     ulnar = {axes.get_title("left"): axes for axes in findings.figures["directions"].axes}["ulnar"]
     angles = [np.degrees(0.1 * k) for k in (0, 4, 5)]
     drawn = [line for line in ulnar.lines if line.get_label() in ("smc/printed", "pid/printed")]

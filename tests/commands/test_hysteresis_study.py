@@ -39,7 +39,7 @@ def test_the_numbers_of_the_answer_are_the_runs(done: Hysteresis) -> None:
     band = next(each for each in done.dead_bands if each.tendons == CABLE)
     slow, fast = (each for each in done.loops if each.case.tendons == CABLE and each.case.low == 0.0)
     said = done.answer.sentence
-    assert "friction coefficient of 0.1 and a sheath of 1 rad" in said
+    assert "friction coefficient of 0.1 and a sheath of 1 rad (57.3 deg)" in said
     assert f"dead band is {math.degrees(band.width):.3g} deg at 10 deg" in said
     assert f"Friction takes {1e3 * slow.friction_work:.3g} mJ in a cycle of 0 to 20 deg" in said
     loops = [dict(zip(done.tables[0].columns, row, strict=True)) for row in done.tables[0].rows]

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from wristctl.commands.quantities import told_table
 from wristctl.commands.validate.answer import (
     model_rows,
     models_table,
@@ -17,6 +18,7 @@ from wristctl.commands.validate.answer import (
     validated_answer,
     wanted_terms,
 )
+from wristctl.commands.validate.figures import motion
 from wristctl.identification.arc_fit import Told
 from wristctl.identification.prediction_scores import Score
 from wristctl.identification.real_robots import RealRobot
@@ -123,3 +125,31 @@ def test_errors_without_a_model_stand_between_the_authors_and_ours() -> None:
     table = models_table(robot(), MODELS, {"Gaussian process": Score(4e-3, 3e-3, 5e-3, 12)})
     assert [row[0] for row in table.rows[:4]] == ["their best", "another", "Gaussian process", "arcs and tendons"]
     assert table.rows[2][2] == "4.00 [3.00, 5.00]"
+
+
+def test_an_error_below_a_tenth_has_the_digits_in_which_its_interval_is_seen() -> None:
+    (row,) = model_rows([model(error=0.0177)], 1.0)
+    assert row[2] == "0.0177 [0.0159, 0.0195]"
+
+
+@pytest.mark.parametrize(("value", "shown"), [(3e-12, "0"), (-3e-12, "0"), (2e-3, "0.002"), (-0.5, "-0.5")])
+def test_a_value_that_is_nothing_beside_its_interval_is_printed_as_nothing(value: float, shown: str) -> None:
+    (row,) = told_table({"sheath": Told(value, min(value, 0.0), 0.04, "", "wrap")}).rows
+    assert row[1] == shown
+
+
+@pytest.mark.parametrize("still", [0, 1])
+def test_the_figure_of_a_motion_has_the_bends_that_move_and_no_line_over_what_was_fitted(still: int) -> None:
+    measured = np.stack([np.arange(8.0), np.arange(8.0) ** 2], axis=1)
+    measured[:, still] = 0.25
+    asked = np.array([True, True, False, False, True, True, False, True])
+    recording = SimpleNamespace(measured=measured, asked=asked, name="all")
+    fit: Any = SimpleNamespace(recordings=[recording], errors=[np.full((8, 2), 0.5)])
+    of_bends: Any = SimpleNamespace(robot=SimpleNamespace(measured="bend"), scale=2.0, unit="deg", asked="part")
+    (axes,) = motion(of_bends, [fit]).axes
+    assert axes.get_ylabel() == f"bend {'zy'[still]} [deg]"
+    points, line = axes.lines
+    np.testing.assert_array_equal(np.asarray(points.get_ydata()), 2.0 * measured[asked, 1 - still])
+    drawn = np.asarray(line.get_ydata())
+    assert list(np.flatnonzero(np.isnan(drawn))) == [2, 5], "a gap where samples between were fitted"
+    np.testing.assert_array_equal(drawn[~np.isnan(drawn)], 2.0 * (measured[asked, 1 - still] + 0.5))

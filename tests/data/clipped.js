@@ -16,8 +16,8 @@ for (const element of document.querySelectorAll("article, article *")) {
   if ((place.right > width + 1 || place.left < -1) && !scrolled(element)) found.push(line(element, "beyond the page"));
   if (element.scrollWidth <= element.clientWidth + 1 || !element.clientWidth) continue;
   if (/hidden|clip/.test(flows(element))) found.push(line(element, "cut off"));
-  // The help of a command keeps its 100 columns on a telephone.
-  const columns = width < 600 && element.closest(".highlight-text");
+  // The help of a command, and what a terminal prints, keep their 100 columns on a telephone.
+  const columns = width < 600 && element.closest(".highlight-text, .highlight-console");
   if (element.tagName === "PRE" && !columns) found.push(line(element, "to be scrolled"));
 }
 return found;

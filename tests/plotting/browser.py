@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 import json
+import os
 import shutil
 import socket
 import subprocess
@@ -77,6 +78,20 @@ class Browser:
         events = [json.loads(entry["message"])["message"] for entry in log]
         sent = [event["params"] for event in events if event["method"] == "Network.requestWillBeSent"]
         return [each["request"]["url"] for each in sent if not each["request"]["url"].startswith("data:")]
+
+    def processor_time(self) -> float:
+        """Processor time [s] that the browser's processes have taken, however busy the machine."""
+        parents, taken = dict[int, int](), dict[int, int]()
+        for file in Path("/proc").glob("[0-9]*/stat"):
+            try:
+                fields = file.read_text().rpartition(")")[2].split()
+            except OSError:  # it has ended
+                continue
+            parents[int(file.parent.name)], taken[int(file.parent.name)] = int(fields[1]), sum(map(int, fields[11:13]))
+        own = {self._driver.pid}
+        while further := {process for process, parent in parents.items() if parent in own} - own:
+            own |= further
+        return sum(taken[process] for process in own) / os.sysconf("SC_CLK_TCK")
 
     def screenshot(self, file: Path) -> None:
         """A picture of the whole page."""

@@ -59,6 +59,23 @@ def test_a_command_says_which_metrics_head_its_page(tmp_path: Path) -> None:
     assert cards(run) == [("m 7", "7"), ("m 3", "3")], "what is not known is none"
 
 
+def test_a_card_does_not_repeat_the_unit_beside_its_value_in_its_name(tmp_path: Path) -> None:
+    run = made(tmp_path, {"tip_rmse_mm": 2.0, "r2": 0.5, "mm_of_it": 1.0}, "mm")
+    assert cards(run) == [("tip RMSE", "2"), ("R^2", "0.5"), ("mm of it", "1")]
+
+
+def test_every_table_has_a_name_of_its_own_and_every_head_a_word(tmp_path: Path) -> None:
+    """Who cannot see the page goes through it by these names."""
+    stored = [{"title": title, "columns": ["a", ""], "rows": [[k, "b"]]} for k, title in enumerate(("", "B", "C"))]
+    run = made(tmp_path, {"x": 1.0}, tables=stored)
+    answer = ["One.", "", "a  b", "-  -", "1  2", "", "a  b", "-  -", "3  4"]
+    (run.path / OVERVIEW).write_text(Overview(answer).text())
+    text = page_of(run)
+    names = re.findall(r'role="region" aria-label="(.*?)"', text)
+    assert len(names) >= 7 and len(set(names)) == len(names) and all(names)
+    assert "></button>" not in text and '<th scope="col"></th>' not in text
+
+
 def test_where_none_is_chosen_the_first_that_may_be_better_or_worse_head_it(tmp_path: Path) -> None:
     run = made(tmp_path, {"none": float("nan")} | {f"m_{k}": 12.0 - k for k in range(11)})
     assert cards(run) == [(f"m {k}", f"{12 - k}") for k in range(6)]
@@ -149,6 +166,17 @@ def test_an_answer_is_paragraphs_a_table_by_its_rule_and_commands_to_copy() -> N
     assert blocks(["a: 1", "    b"]) == [{"kind": "lines", "text": "a: 1\n    b"}], "indented lines stay lines"
 
 
+def test_a_table_that_was_too_wide_for_a_terminal_is_one_on_a_page() -> None:
+    wide = Table("", ("who", "first of them", "second of them", "third of them"), [("a", 1, 2, 3), ("b", 4, 5, 6)])
+    text = wide.text(width=24)
+    assert text.count("who") == 2, "it goes on below"
+    (table,) = blocks(text.splitlines())
+    assert table["columns"] == list(wide.columns)
+    assert table["rows"] == [["a", "1", "2", "3"], ["b", "4", "5", "6"]]
+    other = "\nc".join(text.rsplit("\nb", 1))
+    assert [len(each["rows"]) for each in blocks(other.splitlines())] == [2, 2], "other rows are another table"
+
+
 def test_heads_in_several_lines_are_those_of_one_table() -> None:
     lines = ["             feedforward's", "controller   [deg]", "----------  --------------", "pid-ff      0.22"]
     (table,) = blocks(lines)
@@ -210,6 +238,9 @@ def test_an_angle_that_nobody_can_measure_is_small_in_every_place(tmp_path: Path
     assert cards(run) == [("RMSE", "&lt;0.001")]
     found = rows(page_of(run))
     assert ["x", "&lt;0.001", "deg"] in found and ["y", "1e-17", "N"] in found
+    stored = [{"title": "T", "columns": ["quantity", "greatest"], "rows": [["error [deg]", 1e-17], ["x [mm]", 1e-17]]}]
+    found = rows(page_of(made(tmp_path, {}, tables=stored)))
+    assert ["error [deg]", "&lt;0.001"] in found and ["x [mm]", "1e-17"] in found, "a unit in the row's own name too"
 
 
 def test_cells_are_words_whole_numbers_four_digits_or_a_dash(tmp_path: Path) -> None:
@@ -312,6 +343,20 @@ def test_several_runs_are_told_apart_from_the_first_in_columns_of_their_own(tmp_
         "<svg >1</svg>",
         "<svg >2</svg>",
     ]
+
+
+def test_beside_each_other_headlines_come_first_and_settings_have_the_digits_that_people_read(tmp_path: Path) -> None:
+    runs = []
+    for rate in (0.1, 0.1 + 0.2):
+        with start_run("train", Study(train=TrainSettings(learning_rate=rate)), "", tmp_path) as live:
+            for name in ("ticks", "tip_rmse_mm", "late"):
+                live.metric(name, rate, "mm")
+            live.file(OVERVIEW).write_text(Overview(cards=["tip_rmse_mm"]).text())
+        runs.append(Run(live.path))
+    found = rows(several_page(runs))
+    assert ["train.learning_rate", "0.1", "0.3"] in found
+    names = [row[0] for row in found if row and row[1:2] == ["mm"]]
+    assert names == ["tip RMSE", "ticks", "late"]
 
 
 def test_tables_are_in_degrees_by_their_heads_and_by_their_rows_units(tmp_path: Path) -> None:

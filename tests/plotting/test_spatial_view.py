@@ -14,6 +14,7 @@ import pytest
 import wristctl
 from tests.plotting.browser import Browser
 from wristctl.arrays import Array
+from wristctl.config.hw_run import HwRunSettings
 from wristctl.config.study import Study
 from wristctl.config.wrist import WristParameters
 from wristctl.plotting import spatial_view as view_module
@@ -112,6 +113,18 @@ def test_a_real_wrist_of_which_one_arc_is_seen_bends_by_its_share_in_every_segme
     assert table is not None
     np.testing.assert_allclose(table[:, 1:9], np.tile(whole.bend / 4.0, 4))
     assert np.array_equal(table[:, 0], whole.time) and np.array_equal(table[:, 9], seen_as_one.columns()["tip_x"])
+
+
+def test_tendons_have_the_numbers_of_the_runs_tables() -> None:
+    """The motor board's four are the paper's, whose third runs through the centre."""
+    board: Any = SimpleNamespace(kind="hw-run", config=SimpleNamespace(hw_run=HwRunSettings(), wrist=WristParameters()))
+    servos: Any = SimpleNamespace(
+        kind="hw-run",
+        config=SimpleNamespace(hw_run=HwRunSettings(rig="servos"), wrist=WristParameters(tendons="three")),
+    )
+    assert tuple(view_module._numbers(board, 4)) == (1, 2, 4, 5)
+    assert tuple(view_module._numbers(servos, 3)) == (1, 2, 3)
+    assert tuple(view_module._numbers(SimpleNamespace(kind="simulate"), 6)) == (1, 2, 3, 4, 5, 6)  # type: ignore[arg-type]
 
 
 def test_the_wrist_is_drawn_as_it_is_and_not_as_it_is_believed(tmp_path: Path) -> None:

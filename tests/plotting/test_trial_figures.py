@@ -4,13 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
+import pandas as pd
 import pytest
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
+from wristctl.commands.hw_run import figures as trial_figures
 from wristctl.commands.hw_run.figures import (
     DIRECTIONS,
     Course,
@@ -21,6 +25,7 @@ from wristctl.commands.hw_run.figures import (
     paths,
     tensions,
 )
+from wristctl.config.hw_run import HwRunSettings
 from wristctl.simulation.trajectory import Trajectory
 
 
@@ -180,3 +185,18 @@ def test_lateness_counts_every_tick_in_ms_up_to_a_period_or_the_latest(latest: f
     assert sum(height for x, _, height in bars if x < 1.0) == 99 and len(bars) > 40
     assert (axes.get_xlabel(), axes.get_ylabel()) == ("from due to begun [ms]", "ticks [1]")
     assert axes.get_yscale() == "log"
+
+
+@pytest.mark.parametrize("trial_number", [0, 1])
+def test_what_is_true_is_drawn_while_a_bend_is_asked_for_and_not_beyond(trial_number: int) -> None:
+    """The emulated rig goes on for some milliseconds after the last tick."""
+    time = np.linspace(0.0, 1.0, 11)
+    log = pd.DataFrame({"trial": trial_number, "time": time, "theta": time, "theta_ref": time, "theta_desired": time})
+    log = log.assign(**{f"tension_{number}": 2.0 + number for number in (1, 2, 4, 5)})
+    later = np.linspace(0.0, 1.5, 16)
+    truth = pd.concat(pd.DataFrame({"trial": number, "time": later, "theta": later + 0.1}) for number in (0, 1, 2))
+    record = {"trial": trial_number, "direction": "flexion", "label": "a/b", "repetition": 0, "push": 0.0}
+    twin: Any = SimpleNamespace(trajectory=SimpleNamespace(time=time, bend=time[:, None], bend_ref=time[:, None]))
+    made = trial_figures._course(record, log, truth, HwRunSettings(), None, {trial_number: twin})
+    assert made.true is not None and made.true.time.max() == 1.0
+    np.testing.assert_allclose(made.true.error, 0.1)

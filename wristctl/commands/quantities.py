@@ -15,6 +15,8 @@ if TYPE_CHECKING:
     from wristctl.commands.results import Findings
     from wristctl.identification.arc_fit import Told
 
+# Share of an interval's wider end below which the value within it is printed as 0.
+_NOTHING = 1e-6
 # Factors from a unit of files to one that people read; a table turns angles into degrees by itself.
 _SCALES = {("1/s", "Hz"): 1.0, ("s", "ms"): 1e3, ("m", "mm"): 1e3, ("m", "um"): 1e6, ("J", "mJ"): 1e3, ("", "%"): 100.0}
 
@@ -59,11 +61,16 @@ def documented(quantities: Iterable[Quantity]) -> tuple[dict[str, str], dict[str
     return {each.name: each.unit for each in every}, {each.name: each.meaning for each in every}
 
 
+MEANT = "Parameters and their meaning"
+"""Title of the table of parameters where a run keeps it with every column."""
+
+
 def told_table(told: Mapping[str, Told], title: str = "") -> Table:
     """Parameters with their 95 % intervals, or that the data do not tell them."""
     rows = []
     for name, one in told.items():
-        cells = (number(one.value), f"{number(one.low)} to {number(one.high)}")
+        nothing = abs(one.value) < _NOTHING * max(abs(one.low), abs(one.high))
+        cells = (number(0.0 if nothing else one.value), f"{number(one.low)} to {number(one.high)}")
         rows.append((name, *(cells if one.known else ("not identifiable", "")), one.unit, one.meaning))
     return Table(title, ("parameter", "value", "95 %", "unit", "meaning"), rows)
 

@@ -38,6 +38,11 @@ _log = logging.getLogger(__name__)
 _FURTHER = "further figures"
 
 
+def _subject(draw: Callable[..., Figure]) -> str:
+    """First line of a function's docstring, without its full stop; empty where there is none."""
+    return (draw.__doc__ or "").partition("\n")[0].removesuffix(".")
+
+
 class Metrics(dict[str, float]):
     """Numbers by name. An unknown name is a KeyError that says which is meant."""
 
@@ -151,7 +156,7 @@ class Findings:
         of
             Arguments of `draw`.
         caption
-            Subject of the figure.
+            Subject of the figure; without one it is the first line of `draw`'s docstring.
         later
             Whether it is drawn only when somebody asks for it, also with a run.
         options
@@ -159,7 +164,7 @@ class Findings:
         """
         drawer = partial(draw, *of, **options)
         self.figures.add(name, drawer)
-        self.overview.captions[name] = caption
+        self.overview.captions[name] = caption or _subject(draw)
         if self.run and self._draws and not later:
             self.run.figure(name, drawer)
 
@@ -328,4 +333,4 @@ def _picture(figures: Figures, name: str) -> str:
     except Exception as error:
         return f"<p>{html.escape(f'figure {name} could not be drawn: {reason_of(error)}')}</p>"
     source = f"data:image/png;base64,{base64.b64encode(content.getvalue()).decode('ascii')}"
-    return f'<img style="max-width: 100%" src="{source}">'
+    return f'<img alt="{html.escape(name)}" style="max-width: 100%" src="{source}">'

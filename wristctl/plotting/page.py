@@ -109,7 +109,8 @@ _RULE = re.compile(r"-+(  -+)*")
 def blocks(lines: Sequence[str]) -> list[dict[str, Any]]:
     """The blocks of an answer, which empty lines part: a `table`, a `command`, `lines` as they are, or `text`.
 
-    An aligned table's columns are those of the rule below its heads, which may be broken into lines.
+    An aligned table's columns are those of the rule below its heads, which may be broken into lines. One that was
+    too wide for a terminal goes on in the next, with its first column again: here they are one.
     """
     parts: list[list[str]] = [[]]
     for line in lines:
@@ -117,7 +118,19 @@ def blocks(lines: Sequence[str]) -> list[dict[str, Any]]:
             parts[-1].append(line)
         else:
             parts.append([])
-    return [_block(part) for part in parts if part]
+    found = list[dict[str, Any]]()
+    for block in (_block(part) for part in parts if part):
+        if found and block["kind"] == found[-1]["kind"] == "table" and _first(block) == _first(found[-1]):
+            found[-1]["columns"] += block["columns"][1:]
+            found[-1]["rows"] = [[*row, *more[1:]] for row, more in zip(found[-1]["rows"], block["rows"], strict=True)]
+        else:
+            found.append(block)
+    return found
+
+
+def _first(table: dict[str, Any]) -> list[str]:
+    """Head and cells of a table's first column."""
+    return [table["columns"][0], *(row[0] for row in table["rows"])]
 
 
 def _block(part: Sequence[str]) -> dict[str, Any]:

@@ -87,6 +87,7 @@ def _head(name: str, unit: str) -> str:
     return f"{in_words(name)} [{unit}]" if unit and unit != "1" else in_words(name)
 
 
-def in_words(name: str) -> str:
-    """Name of a metric for people: RMSE toward ulnar is `RMSE ulnar`."""
-    return re.sub(r"\brmse\b", "RMSE", name.replace("_", " "))
+def in_words(name: str, unit: str = "") -> str:
+    """Name of a metric for people, without the unit that stands beside it: `tip_rmse_mm` [mm] is `tip RMSE`."""
+    words = name.removesuffix(f"_{unit}").replace("_", " ")
+    return re.sub(r"\brmse\b", "RMSE", re.sub(r"^r2$", "R^2", words))

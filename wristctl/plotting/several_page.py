@@ -42,12 +42,14 @@ def several_page(runs: list[Run]) -> str:
 
 
 def _differences(runs: list[Run], names: list[str], titles: dict[str, str]) -> list[dict[str, Any]]:
-    """A table for each part that differs: a row per leaf or metric, a column per run."""
+    """A table for each part that differs: a row per leaf or metric, a run's headline first, and a column per run."""
     first, *later_runs = runs
     differences = [vars(difference(first, later_run)) for later_run in later_runs]
+    heading = dict.fromkeys(name for run in runs for name in read_overview(run.path).cards)
     tables = []
     for part, title in titles.items():
         changed = list(dict.fromkeys(change.name for parts in differences for change in parts[part]))
+        changed.sort(key=lambda name: name not in heading)
         rows = []
         for name in changed:
             changes = [next((change for change in parts[part] if change.name == name), None) for parts in differences]
@@ -63,11 +65,14 @@ def _differences(runs: list[Run], names: list[str], titles: dict[str, str]) -> l
 def _metric(runs: list[Run], name: str, values: list[Any]) -> list[Any]:
     """The row of a metric, angles in degrees; its unit is that of the first run that has it."""
     unit = next((run.metrics[name].get("unit") or "" for run in runs if name in run.metrics), "")
-    return [in_words(name), in_degrees(None, unit)[1], *(in_degrees(value, unit)[0] for value in values)]
+    shown = in_degrees(None, unit)[1]
+    return [in_words(name, shown), shown, *(in_degrees(value, unit)[0] for value in values)]
 
 
 def _text(value: Any) -> str:
-    return "-" if value is None else str(value)
+    if value is None:
+        return "-"
+    return f"{value:.6g}" if isinstance(value, float) else str(value)
 
 
 def _pictures(runs: list[Run], names: list[str]) -> list[tuple[str, Figures]]:

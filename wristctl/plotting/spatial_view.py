@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import csv
 import math
+from collections.abc import Sequence
 from functools import partial
 from itertools import cycle
 from typing import Any, NamedTuple
@@ -108,7 +109,8 @@ def spatial_view(run: Run) -> dict[str, Any] | None:
     return {
         "wrist": {"length": wrist.length, "discs": wrist.discs, "rim": rim(wrist), "hand": wrist.hand_offset},
         "tendons": [
-            {**cable._asdict(), "colour": TENDON_COLOURS[k % len(TENDON_COLOURS)]} for k, cable in enumerate(places)
+            {**cable._asdict(), "number": number, "colour": TENDON_COLOURS[k % len(TENDON_COLOURS)]}
+            for k, (cable, number) in enumerate(zip(places, _numbers(run, len(places)), strict=True))
         ],
         "units": {"angle": ANGLE, "place": PLACE, "pull": PULL},
         "from": {"azimuth": AZIMUTH, "elevation": ELEVATION},
@@ -118,6 +120,15 @@ def spatial_view(run: Run) -> dict[str, Any] | None:
         name: np.rint(part / unit).astype(np.int64).tolist()
         for part, (name, (_, unit)) in zip(parts, groups.items(), strict=True)
     }
+
+
+def _numbers(run: Run, count: int) -> Sequence[int]:
+    """Numbers of the tendons in the run's tables."""
+    if run.kind == "simulate":
+        return range(1, count + 1)
+    from wristctl.trial.rig_belief import layout_of_rig, numbers_of
+
+    return numbers_of(layout_of_rig(run.config.hw_run, run.config.wrist))
 
 
 def _simulated(run: Run, columns: list[str]) -> Array:

@@ -16,10 +16,9 @@ from wristctl.plotting.style import (
     BLACK,
     BLUE,
     LIGHT,
-    ORANGE,
-    PURPLE,
     SILVER,
     SIMULATED,
+    TENDON_COLOURS,
     VERMILLION,
     WANTED,
     figure,
@@ -45,7 +44,6 @@ if TYPE_CHECKING:
 # In the paper's order.
 DIRECTIONS = ("extension", "flexion", "radial", "ulnar")
 
-_COLOURS = ORANGE, PURPLE, BLUE, VERMILLION
 _TRUE: dict[str, Any] = {"color": VERMILLION, "linewidth": 0.8, "label": "true"}
 
 
@@ -130,7 +128,7 @@ def tensions(courses: Sequence[LoggedTrial], heading: str = "") -> Figure:
     picture, panels = _panels(courses, by_plane=False, sharey=True)
     for course in courses:
         for number, (name, tension) in enumerate(course.tension.items()):
-            colour = _COLOURS[number % len(_COLOURS)]
+            colour = TENDON_COLOURS[number % len(TENDON_COLOURS)]
             panels[course.direction, ""].plot(course.time, tension, color=colour, linewidth=1.0, label=name)
     return _finished(picture, panels, courses, heading, "tension [N]")
 
@@ -200,15 +198,17 @@ def draw_trials(session: Session, done: pd.DataFrame, twins: Mapping[int, Simula
         if not some:
             continue
         alone = [course for course in some if course.label == first and course.repetition == 0]
+        said = ", with a push" * pushed
         if settings.planes == 1:
-            findings.figure(f"{prefix}directions", desired_and_obtained, some)
+            caption = f"The bend, wanted and obtained, in each direction{said}"
+            findings.figure(f"{prefix}directions", desired_and_obtained, some, caption=caption)
         else:
             reach = reach_of_bends(wrist, layout or layout_of_axes(wrist))
-            caption = "The plane of bends: wanted, measured and true, within what the tendons reach"
+            caption = "The plane of bends: wanted, measured and true, within what the tendons reach" + said
             findings.figure(f"{prefix}bends", paths, alone, reach, first, caption=caption)
             findings.overview.figure = findings.overview.figure or f"{prefix}bends"
-        findings.figure(f"{prefix}errors", errors, some)
-        findings.figure(f"{prefix}tensions", tensions, alone, first)
+        findings.figure(f"{prefix}errors", errors, some, caption=f"The error of the bend over time{said}")
+        findings.figure(f"{prefix}tensions", tensions, alone, first, caption=f"Commanded tensions over time{said}")
     if settings.real_time or settings.port is not None:
         logs = (log, _logged(findings, "between"))
         late = np.concatenate([table["late"].to_numpy(float) for table in logs])
@@ -227,7 +227,8 @@ def _course(
         return table[[column_of(name, plane, len(planes)) for plane in planes]].to_numpy(float)
 
     time, wanted, true = log["time"].to_numpy(float), of_planes("bend_ref"), None
-    if len(truths) and len(truth := truths[truths["trial"] == record["trial"]]):
+    # What is true is known beyond the last tick, where no bend was asked for.
+    if len(truths) and len(truth := truths[(truths["trial"] == record["trial"]) & (truths["time"] <= time[-1])]):
         at, bend = truth["time"].to_numpy(float), of_planes("bend", truth)
         asked = np.stack([np.interp(at, time, course) for course in wanted.T], axis=1)
         true = Course(at, bend, bend - asked)

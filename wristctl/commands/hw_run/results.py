@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -85,15 +85,21 @@ def performed(session: Session, trials: pd.DataFrame, network: Inverse | None, t
     with session.drawing():
         draw_trials(session, done, twins)
     title = "Means over the trials" + ", beside the paper's experiment with the same law" * theirs
-    columns = ("label", "trials", *known_means(compared))
+    columns = ("label", "trials", *_measured(known_means(compared), rows))
     of_trials = [name for name in _OF_A_TRIAL if name in done]
     tables = [
         table_of(title, quantities(columns), rows),
         table_of("Trials, in the order done", quantities(of_trials), done[of_trials].to_dict("records")),
     ]
-    if "rmse_ulnar" in done:
-        findings.headline("rmse", "rmse_ulnar", "rmse_flexion", "true_rmse", "pushed_true_rmse")
+    findings.headline("rmse", "rmse_ulnar", "rmse_flexion", "true_rmse", "settling", "pushed_true_rmse")
     return Performed(session.study, findings, tables, trials, twins)
+
+
+def _measured(names: Iterable[str], rows: Sequence[Mapping[str, Any]]) -> list[str]:
+    """Names that have a value in a row: of a real rig nothing is true, and without a push nothing recovers."""
+    import pandas as pd
+
+    return [name for name in names if any(pd.notna(row.get(name)) for row in rows)]
 
 
 def twins_of(

@@ -17,6 +17,7 @@ from wristctl.config.hw_run import HwRunSettings
 from wristctl.config.wrist import WristParameters
 from wristctl.control.table import Gains
 from wristctl.errors import fix_of
+from wristctl.reader_units import in_degrees
 from wristctl.records import LiveRun
 from wristctl.simulation.metrics import METRICS, metrics_in
 from wristctl.trial.calibration import WristCalibration
@@ -310,7 +311,8 @@ def _tell_oddities(session: Session, experiment: Experiment | RigExperiment) -> 
     for name, unit, limit, *_ in limits_of(session.study.hw_run.within(session.study.wrist)):
         line = residual(name, session.study.hw_run.rig is not None)
         if math.isfinite(limit) and limit > 0.0 and name in most:
-            meaning = f"{line.meaning}; limit {limit:.4g} {unit}"
+            shown, people = in_degrees(limit, unit)
+            meaning = f"{line.meaning}; limit {shown:.3g} {people}"
             findings.metric(f"greatest_{name}", most[name], unit, "lower", meaning=meaning)
             parts.append(f"{name} {line.shown(most[name])} of {line.shown(limit)}")
     if parts:

@@ -179,7 +179,8 @@ def _middle(bands: Sequence[DeadBand]) -> list[DeadBand]:
 
 def _of_wrist(loop: HysteresisLoop, band: DeadBand | None) -> str:
     case = loop.case
-    begin = f"With a friction coefficient of {case.tendons.friction:g} and a sheath of {case.tendons.sheath:g} rad"
+    sheath = f"{case.tendons.sheath:g} rad ({math.degrees(case.tendons.sheath):.3g} deg)"
+    begin = f"With a friction coefficient of {case.tendons.friction:g} and a sheath of {sheath}"
     if band is not None:
         dead = f"the dead band is {degrees(band.width, 3)} deg at {math.degrees(band.unhindered):g} deg"
         begin += f" {dead}, and"

@@ -10,7 +10,7 @@ from wristctl.commands.answer import Answer
 from wristctl.commands.identify.answer import recommendation_by_ratios
 from wristctl.commands.inputs_of_loops import RATIOS
 from wristctl.commands.printed_table import COLUMNS, Table, degrees, joined
-from wristctl.commands.quantities import keep_told, told_frame, told_table
+from wristctl.commands.quantities import MEANT, keep_told, told_frame, told_table
 from wristctl.commands.results import StudyResult
 from wristctl.commands.session import Session
 from wristctl.config.study import Study
@@ -85,7 +85,8 @@ def identify_driven(session: Session, logs: Sequence[OpenLog]) -> DrivenTold:
     remarks = [*(remark for log in logs for remark in log.remarks), *found.remarks]
     _refuse(session, found, remarks)
     keep_told(findings, found.fit.told)
-    result = DrivenTold(study, findings, [models, told_table(found.fit.told)], found, rate_of_logs(logs), remarks)
+    tables = [models, told_table(found.fit.told, MEANT)]
+    result = DrivenTold(study, findings, tables, found, rate_of_logs(logs), remarks)
     findings.table("data/parameters.csv", result.frame())
     findings.plain(RATIOS, result.ratios)
     return result
@@ -93,7 +94,7 @@ def identify_driven(session: Session, logs: Sequence[OpenLog]) -> DrivenTold:
 
 def keep_prediction(session: Session, robot: ArcRobot, models: Sequence[TriedModel], chosen: TriedModel) -> Table:
     """Keep how well the chosen model predicts the part that was not fitted, with its figures; a table of all models."""
-    from wristctl.commands.validate.answer import model_rows
+    from wristctl.commands.validate.answer import RATIO, model_rows
     from wristctl.commands.validate.figures import errors_of_models, left_over, motion
     from wristctl.identification.real_robots import RealRobot
 
@@ -106,7 +107,7 @@ def keep_prediction(session: Session, robot: ArcRobot, models: Sequence[TriedMod
         findings.figure("left-over", left_over, about, chosen.fits, caption="what is left of the motion")
         findings.figure("models", errors_of_models, about, models, caption="error of each model")
     findings.overview.figure = "motion"
-    heads = ("model", "numbers", f"predicted part [{robot.unit}]", "over that without", "")
+    heads = ("model", "free numbers", f"error of the predicted part [{robot.unit}]", *RATIO)
     return Table("What each model misses", heads, model_rows(models, robot.scale))
 
 

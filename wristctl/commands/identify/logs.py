@@ -13,7 +13,7 @@ from wristctl.commands.identify.driven import DrivenTold, driven_plan, identify_
 from wristctl.commands.inputs import Inputs
 from wristctl.commands.inputs_of_loops import RATIOS
 from wristctl.commands.printed_table import COLUMNS, Table, joined
-from wristctl.commands.quantities import keep_told, told_frame, told_table
+from wristctl.commands.quantities import MEANT, keep_told, told_frame, told_table
 from wristctl.commands.results import StudyResult
 from wristctl.commands.session import Session
 from wristctl.config.study import Study
@@ -173,7 +173,7 @@ def _identify_spooled(session: Session, logs: Sequence[OpenLog]) -> LogTold:
         fit = replace(fit, predicts=False)
         remarks = [*remarks, _unpredicted(missed)]
     keep_told(findings, fit.told)
-    tables = [keep_prediction(session, robot, models, chosen), told_table(fit.told)]
+    tables = [keep_prediction(session, robot, models, chosen), told_table(fit.told, MEANT)]
     result = LogTold(study, findings, tables, fit, models, chosen, remarks, rate, samples)
     findings.table("data/parameters.csv", result.frame())
     findings.plain(RATIOS, result.ratios)

@@ -140,7 +140,7 @@ def world_map(ranking: WorldRanking) -> Figure:
     scores = np.array([row.rmse for row in ranking.rows])
     best = np.where(np.isfinite(scores), scores, np.inf).min(axis=0)
     worlds, rows = np.argsort(best, kind="stable"), np.array(ranking.standing.order)
-    fig, ((axes,),) = figure(height=1.3 + 0.22 * len(rows))
+    fig, ((axes,),) = figure(height=max(2.6, 1.3 + 0.22 * len(rows)))  # room for the label of its colours
     undress(axes)
     ratios = (scores / best)[np.ix_(rows, worlds)]
     shown = np.where(np.isfinite(ratios), ratios, np.nan)

@@ -78,13 +78,17 @@ def _caveats(robot: RealRobot, chosen: TriedModel) -> str:
     return f"{'; '.join(parts)}."
 
 
+RATIO = ("over that without the term", "term")
+"""Heads of the ratio of a model's error to that of the model without its last term, and of what it says of the term."""
+
+
 def models_table(robot: RealRobot, models: Sequence[TriedModel], beside: Mapping[str, Score]) -> Table:
     """Errors of the authors' models and without a model, then of ours with the ratio to that without the last term."""
     rows = [(name, None, f"{error:.2f}", "", "") for name, error in robot.authors]
     for name, score in beside.items():
         error, low, high = (f"{robot.scale * value:.2f}" for value in score[:3])
         rows.append((name, None, f"{error} [{low}, {high}]", "", ""))
-    heads = ("model", "numbers", f"{robot.asked} [{robot.unit}]", "over that without", "")
+    heads = ("model", "free numbers", f"{robot.asked} [{robot.unit}]", *RATIO)
     return Table("", heads, [*rows, *model_rows(models, robot.scale)])
 
 
@@ -92,7 +96,8 @@ def model_rows(models: Sequence[TriedModel], scale: float) -> list[tuple[str, in
     """Name, free numbers, error and ratio with intervals, verdict of each model; `scale` is of a unit over SI."""
     rows = []
     for model in models:
-        error, low, high = (f"{scale * value:.2f}" for value in model.score[:3])
+        digits = 2 if scale * model.score.error >= 0.1 else 4
+        error, low, high = (f"{scale * value:.{digits}f}" for value in model.score[:3])
         ratio = "{:.3f} [{:.3f}, {:.3f}]".format(*model.ratio[:3]) if model.ratio else ""
         name = model.words.replace("elastic ", "")
         if len(model.terms) > 1 and model.terms[0] == "slack":

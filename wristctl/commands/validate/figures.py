@@ -21,18 +21,25 @@ def _parts(fits: Sequence[ArcFit]) -> list[tuple[ArcFit, int]]:
 
 
 def motion(robot: RealRobot, fits: Sequence[ArcFit]) -> Figure:
-    """Measured and predicted coordinates [deg or mm] of the predicted samples, in their order."""
+    """Measured and predicted coordinates [deg or mm] of the predicted samples, in their order.
+
+    A coordinate that never moves, as the second bend of a log in one plane, is not drawn.
+    """
     parts = _parts(fits)
-    axes_of = ("y", "z") if robot.robot.measured == "bend" else ("x", "y", "z")
+    names = ("y", "z") if robot.robot.measured == "bend" else ("x", "y", "z")
+    moving = np.any([np.ptp(fit.recordings[k].measured, axis=0) > 0.0 for fit, k in parts], axis=0)
+    axes_of = [(name, at) for at, name in enumerate(names) if moving[at]]
     picture, axes = figure(len(axes_of), len(parts), height=1.0 + 1.6 * len(axes_of), sharex="col")
     for column, (fit, k) in enumerate(parts):
         recording, wrong = fit.recordings[k], fit.errors[k]
         asked = recording.asked
-        across = np.arange(int(asked.sum()))
-        for row, name in enumerate(axes_of):
-            panel, measured = axes[row, column], robot.scale * recording.measured[asked, row]
+        across = np.arange(float(asked.sum()))
+        gaps = np.flatnonzero(np.diff(np.flatnonzero(asked)) > 1) + 1  # between what is predicted other samples lie
+        for row, (name, at) in enumerate(axes_of):
+            panel, measured = axes[row, column], robot.scale * recording.measured[asked, at]
             panel.plot(across, measured, ".", color=GREY, markersize=2.5, label="measured")
-            panel.plot(across, measured + robot.scale * wrong[asked, row], color=BLUE, linewidth=1.0, label="model")
+            model = np.insert(measured + robot.scale * wrong[asked, at], gaps, np.nan)
+            panel.plot(np.insert(across, gaps, np.nan), model, color=BLUE, linewidth=1.0, label="model")
             if column == 0:
                 what = "bend" if robot.robot.measured == "bend" else "tip"
                 panel.set_ylabel(f"{what} {name} [{robot.unit}]")

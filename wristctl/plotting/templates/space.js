@@ -109,7 +109,7 @@
   };
   entry(`5px solid ${BAND}`, "tip wanted");
   entry(`2px solid ${GREEN}`, "tip reached");
-  const forces = tendons.map((tendon, k) => [entry(`3px solid ${tendon.colour}`, ""), `tendon ${k + 1}${tendon.discs < wrist.discs ? `, to disc ${tendon.discs}` : ""}`]);
+  const forces = tendons.map((tendon, k) => [entry(`3px solid ${tendon.colour}`, ""), `tendon ${tendon.number}${tendon.discs < wrist.discs ? `, to disc ${tendon.discs}` : ""}`]);
   entry(`1px solid ${SILVER}`, `radius ${ground} mm`);
 
   // A path of the tip in two parts: what is farther away than the tip, and what is nearer.
