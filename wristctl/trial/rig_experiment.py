@@ -13,13 +13,14 @@ from wristctl.interrupt import undisturbed
 from wristctl.simulation.motion import Motion
 from wristctl.trial.control_loop import ControlLoop, Shown, course_of
 from wristctl.trial.guarded_rig import GuardedRig
+from wristctl.trial.homing import Zero
 from wristctl.trial.live_datagrams import LiveReference
 from wristctl.trial.log import TrialLog
 from wristctl.trial.motions import back
 from wristctl.trial.motors_ready import Halt
 from wristctl.trial.rig_belief import RigBelief, layout_of_rig, names_of_planes
 from wristctl.trial.rig_drive import LookPaces, RigDrive, RigTracking
-from wristctl.trial.rig_homing import PLANE, RigHoming, RigZero
+from wristctl.trial.rig_homing import PLANE, RigHoming
 from wristctl.trial.rig_motors import RigMotors
 from wristctl.trial.rig_settings import sides_of
 from wristctl.trial.spools import spools_of
@@ -81,7 +82,7 @@ class RigExperiment(TrialSeries):
         self._layout, self._facing = layout, wrist if settings.planes == 2 else sides_of(wrist, layout)
         timing = TickTiming(settings.control_period, camera=LookPaces(settings.rig or ""))
         super().__init__(settings, wrist, self._facing, trials, kept, timing, network, tuned, live)
-        self.zero: RigZero | None = None
+        self.zero: Zero | None = None
 
     def run(self, rig: GuardedRig, shown: Shown | None = None, confirm: Callable[[], None] | None = None) -> None:
         """Do all trials and close the rig. Whatever ends them early, the rig is stopped before it is raised.
