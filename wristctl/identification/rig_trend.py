@@ -151,7 +151,7 @@ def _at_rest(run: Run) -> dict[str, float]:
     """
     log, trials = run.data("log"), run.data("trials")
     spools_of_board = [f"position_{tendon}" for tendon in ACTIVE]
-    if "theta" not in log or [name for name in log if name.startswith("position_")] != spools_of_board:
+    if "theta" not in log or [name for name in map(str, log) if name.startswith("position_")] != spools_of_board:
         return {}
     sound = trials[(trials["outcome"] == "ok") & (trials["push"] == 0.0)]
     believed = run.config.wrist
