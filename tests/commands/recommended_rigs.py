@@ -38,8 +38,8 @@ SEED = 20261126
 PAGE = Path(__file__).parents[2] / "docs" / "hardware" / "recommended-rigs.md"
 RESTS, CALM = 0.2, 0.95
 """A wrist rests where it swings by no more than this peak to peak [deg]; so many of all are to."""
-WIDE, NEAR = 3.0, 1.25
-"""Largest ratio of the ends of a printed range, and of the error to that of the best rehearsed finalist."""
+WRISTS, WIDE, NEAR = 20, 3.0, 1.25
+"""Wrists to try; largest ratio of a printed range's ends, and of the error to that of the best rehearsed finalist."""
 
 
 class Drawn(NamedTuple):
@@ -147,12 +147,13 @@ def page(rows: Sequence[tuple[int, dict[str, Any]]], left_out: int, planes: int)
     counts = [f"- {sum(getattr(each, name) for each in verdicts)} {words}" for name, words in _CHECKS.items()]
     lines = [
         "# Does what `recommend` prints hold on the emulated rig?", "",
-        f"{len(rows)} wrists in {'one plane' if planes == 1 else 'two planes'}, drawn with lengths of 60 to 140 mm,",
+        f"Wrists in {'one plane' if planes == 1 else 'two planes'}, drawn with lengths of 60 to 140 mm,",
         "stiffness of 0.2 to 3 N m/rad and a hand of 0 to 0.5 kg. For each, the command that `recommend` prints was",
         "run on the emulated rig: a board with its firmware, motors, elastic tendons, a camera, and springs 30 %",
         "weaker than believed. Errors and swings are of the emulated wrist's own angle; a swing is the largest of all",
         f"trials, pushed ones too. {left_out} more were drawn that no rig can home: they buckle under their hand.",
-        "Made by `make recommended-rigs`.", "", f"Of {len(verdicts)} with a recommendation", "", *counts, "",
+        f"`make recommended-rigs` has tried {len(rows)} of {WRISTS}, and goes on there.", "",
+        f"Of {len(verdicts)} with a recommendation", "", *counts, "",
         "| wrist: length, stiffness, hand | use | RMSE [deg] | printed range [deg] | best finalist [deg] | "
         "swing [deg] | kept |",
         "|---|---|---|---|---|---|---|",
@@ -181,7 +182,7 @@ def page(rows: Sequence[tuple[int, dict[str, Any]]], left_out: int, planes: int)
 def main() -> int:
     """Try wrists until there are enough, a line each, and write the page; 1 where they do not keep what is promised."""
     parser = options(__doc__, 400, "recommended-rigs")
-    parser.add_argument("--wrists", type=int, default=20, help="so many are to be tried")
+    parser.add_argument("--wrists", type=int, default=WRISTS, help="so many are to be tried")
     parser.add_argument("--planes", type=int, default=1, choices=(1, 2))
     parser.add_argument("--page", action="store_true", help="only write the page, of what was tried")
     asked, rows, left_out = parser.parse_args(), list[tuple[int, dict[str, Any]]](), 0

@@ -34,7 +34,11 @@ def test_a_trial_that_is_stopped_keeps_nothing_but_the_width_of_its_range() -> N
     text = page([(0, KEPT), (1, stopped), (2, {"refused": "all swing"})], 4, 1)
     assert "Of 2 with a recommendation" in text and "- 1 swing at rest by at most 0.2 deg" in text
     assert text.count("| yes |") == 1 and "**not rests, not within, not near**" in text and "none: all swing" in text
-    assert "3 wrists in one plane" in text and "4 more were drawn that no rig can home" in text
+    assert (
+        "Wrists in one plane" in text
+        and "has tried 3 of 20" in text
+        and "4 more were drawn that no rig can home" in text
+    )
 
 
 def test_the_other_finalists_are_run_by_the_printed_command_with_the_file_of_their_gains() -> None:
