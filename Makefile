@@ -15,7 +15,7 @@ PIP := $(BIN)/python -m pip --disable-pip-version-check
 .PHONY: run test lint bench bench-sweeps bench-peers bench-all firmware test-firmware test-faults test-trust \
 	test-vision test-identify test-allocation test-slow test-rig fault-table lerobot-reader lost-tendons twins \
 	sound-rigs damaged-logs inner-rigs driven-robots test-posterior test-statistics converge worlds docs clean venv \
-	mutants coverage installed matrix check-package constraints release servo-faults identified
+	mutants coverage installed matrix check-package constraints release servo-faults identified recommended-rigs
 
 run: .venv/run
 	@set -eo pipefail; \
@@ -68,6 +68,11 @@ test-identify: .venv/dev
 # two minutes a seed, ten with WHICH="--planes 2 --seeds 10"; goes on where it stopped.
 identified: .venv/dev
 	$(BIN)/python benchmarks/identified_bench.py --out build/identified --seeds 20 $(WHICH)
+
+# Does the command that `recommend` prints keep on the emulated rig what it says? 20 drawn wrists, a quarter of an hour of
+# processor time each: docs/hardware/recommended-rigs.md. Goes on where it stopped; WHICH="--wrists 5", "--planes 2", "--page".
+recommended-rigs: .venv/dev
+	$(BIN)/python -m tests.commands.recommended_rigs $(WHICH)
 
 # Logs damaged as users' logs are: is each damage named, or are the numbers those of the sound log? Sound ones are to stay
 # as they are: docs/damaged-logs.md. Keeps what it has tried and goes on from there; WHICH="--count 20 --sound 5"

@@ -113,7 +113,7 @@ def tried(folder: Path, model: Path, number: int) -> Held:
     during = motion[(motion[:, 0] >= ticks["clock"].iloc[0]) & (motion[:, 0] <= ticks["clock"].iloc[-1])]
     wanted = np.column_stack([np.interp(during[:, 0], ticks["clock"], ticks[name]) for name in names])
     assert experiment.zero is not None
-    off = np.degrees(during[:, 1:3] - wanted - np.array(experiment.zero.straight))
+    off = np.degrees(during[:, 1:3] - wanted - np.array(experiment.zero.markers))
     swing = np.ptp(np.degrees(during[during[:, 0] > during[-1, 0] - REST, 1:3]), axis=0).max()
     return Held(
         factors, experiment.outcomes[0], float(np.sqrt(np.square(off).sum(axis=1).mean())), float(swing)

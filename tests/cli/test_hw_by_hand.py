@@ -18,7 +18,7 @@ from wristctl.board.messages import Limits
 from wristctl.config.plant import Actuator
 
 STEP_MM = 1e3 * Actuator().step_length
-VERBS = (("jog", "--axis", "1", "--mm", "0.5"), ("home",), ("limits",), ("slacken",), ("clear",))
+VERBS = (("jog", "--axis", "1", "--mm", "0.5"), ("home",), ("limits",), ("slacken",), ("tension",), ("clear",))
 
 
 class Emulated(VirtualTransport):
@@ -179,3 +179,25 @@ def test_a_latched_fault_is_told_and_cleared_after_a_yes(call: Call, monkeypatch
     monkeypatch.setattr(Emulated, "__init__", init)
     code, out, _ = call("hw", "clear", "--port", "emulated", "--yes")
     assert code == 0 and out == "no fault is latched; the board is DISABLED\n"
+
+
+def test_a_tendon_is_reeled_in_until_its_person_says_taut_and_let_go_before_the_next(
+    call: Call, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    typed(monkeypatch, "yes\nm\nm\n\n\nm\n\n\n")
+    code, out, err = call("hw", "tension", "--mm", "0.2", "--port", "emulated")
+    reeled = (0.6, 0.2, 0.4, 0.2)
+    assert code == 0 and "each axis in turn reels in 0.2 mm at a time until you say so" in err
+    assert out.splitlines() == [
+        f"axis {k}: taut after {mm:.2f} mm, and paid out by 0.6 mm" for k, mm in enumerate(reeled)
+    ]
+    (board,), one, back = Emulated.made, round(0.2 / STEP_MM), round(0.6 / STEP_MM)
+    assert Board(board).read().position == tuple(round(mm / 0.2) * one - back for mm in reeled)
+    assert board.energised == [False] * 4
+
+
+def test_where_nobody_answers_a_tendon_is_reeled_in_no_further(call: Call, monkeypatch: pytest.MonkeyPatch) -> None:
+    typed(monkeypatch, "")
+    code, out, _ = call("hw", "tension", "--axis", "3", "--port", "emulated", "--yes")
+    assert code == 0 and out == "axis 3: taut after 0.10 mm, and paid out by 0.6 mm\n"
+    assert Board(Emulated.made[0]).read().position == (0, 0, 0, round(0.1 / STEP_MM) - round(0.6 / STEP_MM))

@@ -78,6 +78,28 @@ def test_a_row_has_errors_by_plane_estimated_and_true(whole: Whole) -> None:
     assert columns["true_recovery"][0] == "s" and columns["push_torque"][0] == "N m"
 
 
+def test_the_ellipse_of_the_error_is_in_rows_means_answer_and_figure(whole: Whole) -> None:
+    table, log = whole.run.data("trials"), whole.run.data("log")
+    still = table[table["push"] == 0.0].iloc[0]
+    error = log.loc[log["trial"] == still["trial"], ["error_ulnar", "error_flexion"]].to_numpy(float)
+    covariance, found = np.cov(error.T), [still[name] for name in ("error_major", "error_minor", "error_toward")]
+    assert np.square(found[:2]) == pytest.approx(np.linalg.eigvalsh(covariance)[::-1], rel=0.05)
+    axis = np.array([math.cos(found[2]), math.sin(found[2])])
+    assert covariance @ axis == pytest.approx(found[0] ** 2 * axis, abs=0.05 * found[0] ** 2)
+    true = math.hypot(still["true_error_major"], still["true_error_minor"])
+    assert 0.5 * still["true_rmse"] < true <= still["true_rmse"] * (1.0 + 1e-9), "but for the mean it is the error"
+    known = whole.result.metrics
+    assert [known[name] for name in ("error_major", "error_minor", "error_toward")] == pytest.approx(found)
+    said = f"an ellipse of {degrees(found[0])} by {degrees(found[1])} deg, longest {math.degrees(found[2]):.0f} deg"
+    assert said in whole.result.answer.sentence
+    assert f"(truly {degrees(still['true_error_major'])} by {degrees(still['true_error_minor'])} deg)" in (
+        whole.result.answer.sentence
+    )
+    (panel,) = whole.result.findings.figures["ellipses"].axes
+    drawn = np.radians(next(each for each in panel.lines if each.get_label() == "ct-dob/hardware").get_xydata())
+    assert np.hypot(*(drawn - error.mean(axis=0)).T).max() == pytest.approx(2.0 * found[0], rel=0.05)
+
+
 def test_nothing_is_asked_of_the_board_between_a_trial_and_its_first_tick(whole: Whole) -> None:
     """In the emulated time an exchange of half a tick would make the first one late."""
     log = whole.run.data("log")
@@ -109,7 +131,7 @@ def test_the_answer_has_both_planes_beside_simulation(whole: Whole) -> None:
 
 
 def test_it_is_drawn_in_the_plane_of_bends_and_in_space(whole: Whole) -> None:
-    names = {f"{prefix}{name}" for prefix in ("", "pushed-") for name in ("bends", "errors", "tensions")}
+    names = {f"{prefix}{name}" for prefix in ("", "pushed-") for name in ("bends", "ellipses", "errors", "tensions")}
     assert names <= set(whole.result.findings.figures)
     assert all((whole.run.path / f"figures/{name}.svg").is_file() for name in names)
     figures = whole.result.findings.figures

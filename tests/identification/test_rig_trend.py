@@ -16,6 +16,7 @@ import pytest
 from wristctl.config.wrist import WristParameters
 from wristctl.errors import UserError
 from wristctl.identification.rig_trend import Trend, reading_of
+from wristctl.trial.homing import Zero
 from wristctl.wrist.directions import ACTIVE, DIRECTIONS, TENDONS
 
 BELIEVED = WristParameters(stiffness=0.6, flexion_ratio=1.5)
@@ -111,6 +112,20 @@ def test_what_homing_found_is_told_in_millimetres_and_degrees_by_tendon(tmp_path
         slack = {f"slack of tendon {tendon}": 0.1 * (k + 1) for k, tendon in enumerate(ACTIVE)}
         others = {"steps per radian at homing": 950.0, "friction at homing": 0.2, "marker's zero": 0.5}
         assert values == pytest.approx(slack | others)
+
+
+def test_tendons_of_a_rig_that_takes_targets_are_numbered_in_their_order(tmp_path: Path) -> None:
+    zero = Zero((1,) * 3, (900.0,) * 3, (0.01, 0.02), (1e-4, 2e-4, 3e-4), (0.0,) * 3, (0.0, 2.1, -2.1), (5.0, 6.0, 7.0))
+    (tmp_path / "data").mkdir()
+    (tmp_path / "data" / "zero.json").write_text(json.dumps(zero.plain()))
+    one = run([trial(0, "ulnar", 0.5, 900.0)], tmp_path)
+    names = {f"position_{tendon}": f"position_{number}" for number, tendon in enumerate(ACTIVE, 1)}
+    one.data = {"log": one.data("log").rename(columns=names), "trials": one.data("trials")}.__getitem__
+    values = reading_of(one).values
+    assert not any(name.endswith("ulnar") for name in values)
+    slack = {name: value for name, value in values.items() if name.startswith("slack")}
+    assert slack == pytest.approx({"slack of tendon 1": 0.1, "slack of tendon 2": 0.2, "slack of tendon 3": 0.3})
+    assert Zero.of_plain(json.loads(json.dumps(zero.plain()))) == zero
 
 
 def test_what_was_identified_is_told_by_its_own_units(tmp_path: Path) -> None:

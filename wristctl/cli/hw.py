@@ -6,7 +6,7 @@ from typing import Annotated, Any
 import typer
 
 from wristctl.cli.hw_bench import emulate, watch
-from wristctl.cli.hw_by_hand import clear, home, jog, limits, slacken
+from wristctl.cli.hw_by_hand import clear, home, jog, limits, slacken, tension
 from wristctl.cli.hw_calibrate import app as calibrations
 from wristctl.cli.hw_check import check
 from wristctl.cli.hw_drawings import drawings
@@ -99,5 +99,5 @@ app = typer.Typer(
 )
 
 app.add_typer(calibrations, name="calibrate")
-for command in (watch, ports, check, flash, emulate, stop, jog, home, limits, slacken, clear, weigh, drawings):
+for command in (watch, ports, check, flash, emulate, stop, jog, home, limits, slacken, tension, clear, weigh, drawings):
     app.command(command.__name__)(command)

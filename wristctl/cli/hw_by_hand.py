@@ -1,4 +1,4 @@
-"""`wristctl hw jog`, `home`, `limits`, `slacken` and `clear`: the motors by a person's word.
+"""`wristctl hw jog`, `home`, `limits`, `slacken`, `tension` and `clear`: the motors by a person's word.
 
 The drives hold while the person thinks, and are released at the end: a board keeps no zero without them.
 """
@@ -6,9 +6,9 @@ The drives hold while the person thinks, and are released at the end: a board ke
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, closing, contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -19,6 +19,8 @@ from wristctl.errors import UserError
 from wristctl.study_files.load import load_study
 
 if TYPE_CHECKING:
+    from wristctl.board.driver import Board
+    from wristctl.config.study import Study
     from wristctl.trial.by_hand import ByHand
 
 Override = Annotated[
@@ -111,6 +113,54 @@ def slacken(
             print(f"paid out: {hand.jog([-_length(str(mm))] * 4)} steps")
 
 
+def tension(
+    axis: Annotated[
+        int | None, typer.Option("--axis", min=0, max=3, help="This axis alone, 0 to 3; without it all, one by one.")
+    ] = None,
+    mm: Annotated[float, typer.Option("--mm", min=0.02, max=1.0, help="Tendon to reel in by one move.")] = 0.1,
+    camera: Annotated[
+        str | None, typer.Option("--camera", help="Camera that sees a tendon bend the wrist; without it you say so.")
+    ] = None,
+    port: Port = None, baud: Baud = BAUD, override: Override = None, calibration: Calibration = None,
+    out: Out = RESULTS, dry_run: Dry = False, yes: Yes = False, debug: Debug = False,
+) -> None:  # fmt: skip
+    """Take up each tendon's slack: reel it in until it is taut, by your word or the camera's, then pay out a little.
+
+    Tendons hang slack after a stop that released the drives, and after one was changed.
+    """
+    axes, who = range(4) if axis is None else (axis,), "you say so" if camera is None else "the wrist bends"
+    which = "each axis in turn" if axis is None else f"axis {axis}"
+    plan = f"{which} reels in {1e3 * _length(str(mm)):g} mm at a time until {who}, then pays out by homing.pull"
+    with _connected(plan, port, baud, override, calibration, out, dry_run, yes) as connected, ExitStack() as opened:
+        if connected is None:
+            return
+        from wristctl.trial.by_hand import bent_by_tendon, take_up
+        from wristctl.trial.supervised_wait import Patience
+        from wristctl.trial.tracking import ThreadedTracking
+        from wristctl.vision.device_camera import DeviceCamera
+        from wristctl.vision.marker import Tracker
+        from wristctl.vision.view import View
+
+        board, study, signs = connected
+        settings = study.calibrate_wrist
+
+        def told(reeled: float) -> bool:
+            typer.echo(
+                f"{1e3 * reeled:.2f} mm reeled in. m and Enter for more, Enter where it is taut: ", nl=False, err=True
+            )
+            return typed_line(Patience(board).pulse).strip() != "m"
+
+        if camera is not None:
+            eye = opened.enter_context(closing(DeviceCamera(camera, settings.device)))
+            tracking = opened.enter_context(
+                closing(ThreadedTracking(eye, Tracker(settings.markers, View(), settings.gates)))
+            )
+        for one in axes:
+            taut = told if camera is None else bent_by_tendon(board, tracking, settings, study.wrist, settings.plane)
+            length = take_up(board, settings, signs, one, _length(str(mm)), taut)
+            print(f"axis {one}: taut after {1e3 * length:.2f} mm, and paid out by {1e3 * settings.homing.pull:g} mm")
+
+
 def clear(port: Port = None, baud: Baud = BAUD, dry_run: Dry = False, yes: Yes = False, debug: Debug = False) -> None:
     """Clear a latched fault once its cause is mended; drives that hold let go."""
     from wristctl.board.driver import Board
@@ -132,11 +182,27 @@ def clear(port: Port = None, baud: Baud = BAUD, dry_run: Dry = False, yes: Yes =
 
 
 @contextmanager
-def _session(
+def _session(*asked: Any) -> Iterator[ByHand | None]:
+    """The drives on, after a yes, until the block ends (at once where that goes wrong); None in a dry run.
+
+    Its arguments are those of `_connected`.
+    """
+    with _connected(*asked) as connected:
+        if connected is None:
+            yield None
+            return
+        from wristctl.trial.by_hand import ByHand
+
+        board, study, signs = connected
+        yield ByHand(board, study.calibrate_wrist, signs)
+
+
+@contextmanager
+def _connected(
     plan: str, port: str | None, baud: int, override: list[str] | None, calibration: str | None, out: Path,
     dry_run: bool, yes: bool,
-) -> Iterator[ByHand | None]:  # fmt: skip
-    """The drives on, after a yes, until the block ends (at once where that goes wrong); None in a dry run."""
+) -> Iterator[tuple[Board, Study, tuple[int, ...]] | None]:  # fmt: skip
+    """A board after a yes, the study of its rig and the senses of its motors; None in a dry run."""
     study = load_study((), override or (), "calibrate-wrist")
     settings = study.calibrate_wrist.within(study.wrist)
     if dry_run:
@@ -147,7 +213,6 @@ def _session(
     from wristctl.board.transport import open_transport
     from wristctl.commands.calibrate.wrist import CALIBRATION
     from wristctl.records import require
-    from wristctl.trial.by_hand import ByHand
     from wristctl.trial.calibration import WristCalibration
     from wristctl.trial.supervised_wait import Patience
     from wristctl.trial.tendon_pulls import tendon_pulls_of
@@ -158,7 +223,7 @@ def _session(
     with Board(open_transport(port, baud)) as board:
         board.cells = tendon_pulls_of(settings)
         _agree(f"{plan}. {_TENDONS}", yes, Patience(board).pulse)
-        yield ByHand(board, settings, signs)
+        yield board, study.model_copy(update={"calibrate_wrist": settings}), signs
 
 
 def _agree(plan: str, yes: bool, meanwhile: Callable[[], None]) -> None:

@@ -134,7 +134,8 @@ def _homed(run: Run, name: str) -> dict[str, float]:
     if not run.has(name):
         return {}
     zero = run.json(name)
-    slack = {f"slack of tendon {tendon}": float(value) for tendon, value in zip(ACTIVE, zero["slack"], strict=True)}
+    numbers = range(1, 1 + len(zero["slack"])) if "targets" in zero else ACTIVE  # of a rig of one's own, of a board
+    slack = {f"slack of tendon {tendon}": float(value) for tendon, value in zip(numbers, zero["slack"], strict=True)}
     means = {"steps per radian at homing": float(np.mean(zero["steps_per_radian"]))}
     if "friction" in zero:  # which runs of version 0.1.0 have not
         means["friction at homing"] = float(np.mean(zero["friction"]))
@@ -146,10 +147,11 @@ def _at_rest(run: Run) -> dict[str, float]:
 
     At rest a torque tau bends the wrist by tau = K theta, and the observer, which believes K_b, finds the load
     (K_b - K) theta. Means over directions, so that a constant load cancels between both sides of a plane. Nothing of
-    trials in two planes.
+    trials in two planes, and of other tendons than a board winds.
     """
     log, trials = run.data("log"), run.data("trials")
-    if "theta" not in log:
+    spools_of_board = [f"position_{tendon}" for tendon in ACTIVE]
+    if "theta" not in log or [name for name in map(str, log) if name.startswith("position_")] != spools_of_board:
         return {}
     sound = trials[(trials["outcome"] == "ok") & (trials["push"] == 0.0)]
     believed = run.config.wrist
@@ -157,7 +159,7 @@ def _at_rest(run: Run) -> dict[str, float]:
     for trial, name in zip(sound["trial"], sound["direction"], strict=True):
         if (rest := _rest(log[log["trial"] == trial])) is not None:
             plane, theta = DIRECTIONS[name].plane, float(rest["theta"].mean())
-            spools = rest[[f"position_{tendon}" for tendon in ACTIVE]].mean().to_numpy(float)
+            spools = rest[spools_of_board].mean().to_numpy(float)
             plus = on_plus_side(plane)
             way = 0.5 * (spools[plus].mean() - spools[~plus].mean())
             stiff = believed.stiffness * (believed.flexion_ratio if plane == "flexion" else 1.0)

@@ -1,15 +1,19 @@
 """Motors moved by a person's word: before anything is known of the wrist, or after something went wrong."""
 
-from collections.abc import Sequence
+import math
+from collections.abc import Callable, Sequence
 
 from wristctl.board.board_errors import BoardError, Refused
 from wristctl.board.driver import Board
 from wristctl.board.messages import AXES, JOG_RATE, Result, Target
 from wristctl.config.hw_run import RigSettings
+from wristctl.config.wrist import WristParameters
 from wristctl.errors import UserError
+from wristctl.trial.expected_moves import ExpectedMoves
 from wristctl.trial.motors_ready import prepare
 from wristctl.trial.spools import spools_of
 from wristctl.trial.supervised_wait import Patience
+from wristctl.trial.tracking import Tracking
 
 # Tendon [m] that one word may move.
 MOST = 5e-3
@@ -83,3 +87,65 @@ class ByHand:
                 self._board.stop()
                 raise BoardError("firmware", f"axis {axis} has no soft limit", fix="wristctl hw flash")
         return self._furthest
+
+
+def take_up(
+    board: Board, settings: RigSettings, signs: Sequence[int], axis: int, move: float, taut: Callable[[float], bool]
+) -> float:
+    """Reel a tendon in by one move [m] after the other until it is taut, then let it go by `homing.pull`.
+
+    The drives are released before it is let go: a stalled motor's tendon then keeps no more than the motor's detent
+    holds. They are released afterwards too.
+
+    Parameters
+    ----------
+    board, settings, signs
+        as for `ByHand`, with the drives released
+    axis
+        0 to 3
+    move
+        tendon reeled in before `taut` is asked [m]
+    taut
+        says of the length that is reeled in so far [m] whether the tendon is taut
+
+    Returns
+    -------
+    float
+        length reeled in [m]: the slack that it had, and what a taut tendon has let go where the drives were released on
+        the way, since they lead no further than `ByHand.reach`
+
+    Raises
+    ------
+    UserError
+        where it is not taut within `safety.travel`
+    """
+    reeled, most = 0.0, settings.safety.travel
+    while reeled + move <= most:
+        hand, begun = ByHand(board, settings, signs), reeled
+        while reeled + move <= min(begun + hand.reach, most):
+            hand.jog([move * (k == axis) for k in range(AXES)])
+            reeled += move
+            if taut(reeled):
+                board.disable()
+                ByHand(board, settings, signs).jog([-settings.homing.pull * (k == axis) for k in range(AXES)])
+                board.disable()
+                return reeled
+        board.disable()
+    problem = f"axis {axis} has reeled in {1e3 * reeled:.1f} mm, and its tendon is not taut"
+    raise UserError(problem, fix=f"see tendon, pulley and motor: wristctl hw check --wiring {axis}", exit_code=4)
+
+
+def bent_by_tendon(
+    board: Board, tracking: Tracking, settings: RigSettings, wrist: WristParameters, plane: str
+) -> Callable[[float], bool]:
+    """For `take_up`: says whether the wrist has bent by `homing.bend_deg` since it was read here at rest."""
+    homing, expected = settings.homing, ExpectedMoves(settings, wrist, plane)
+    straight = Patience(board).reading(tracking, 4 * homing.frames)
+
+    def taut(reeled: float) -> bool:
+        patience = Patience(board)
+        patience.wait(homing.rest)
+        bend = expected.bend(straight, patience.reading(tracking, homing.frames))
+        return bend.askew > math.radians(homing.bend_deg)
+
+    return taut

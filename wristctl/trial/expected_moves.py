@@ -10,7 +10,7 @@ from wristctl.arrays import Array
 from wristctl.board.messages import AXES
 from wristctl.config.hw_run import RigSettings
 from wristctl.config.wrist import WristParameters
-from wristctl.trial.homing_fixes import OF_RIG, of_board
+from wristctl.trial.homing_fixes import DEAD, OF_RIG, of_board
 from wristctl.trial.likely_causes import parts_of_board, parts_of_rig
 from wristctl.trial.rig_belief import PLANES, names_of_planes, numbers_of, places_of_tendons, pull_directions
 from wristctl.trial.safety import SafetyStop
@@ -269,7 +269,7 @@ class ExpectedMoves:
 
     def does_not_bend(self, axis: int) -> SafetyStop:
         """The stop of a motor that bends the wrist nowhere."""
-        problem = f"{self.motors[axis]} does not bend the wrist within {1e3 * self._homing.slack:g} mm"
+        problem = f"{self.motors[axis]} does not bend the wrist within {1e3 * self._homing.slack:g} mm; likely {DEAD}"
         return SafetyStop(problem, "homing", self.fixes.dead.format(axis=axis))
 
     def bent_too_far(self, axis: int, bend: Bend) -> SafetyStop:

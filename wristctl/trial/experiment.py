@@ -2,29 +2,24 @@
 
 from collections.abc import Mapping, Sequence
 
-import numpy as np
-
 from wristctl.board.driver import Board
-from wristctl.board.messages import AXES
 from wristctl.config.hw_run import HwRunSettings
 from wristctl.config.wrist import WristParameters
 from wristctl.errors import UserError
 from wristctl.interrupt import undisturbed
-from wristctl.simulation.spool_timing import remembered_rates
 from wristctl.simulation.worlds import Draws
 from wristctl.trial.calibration import WristCalibration
-from wristctl.trial.control_loop import ControlLoop, Shown, course_of
+from wristctl.trial.control_loop import ControlLoop, Shown
 from wristctl.trial.drives import BoardDrive
 from wristctl.trial.expected_moves import ExpectedMoves
 from wristctl.trial.homing import Zero, find_zero, slacken
 from wristctl.trial.live_datagrams import LiveReference
 from wristctl.trial.log import TrialLog
-from wristctl.trial.motions import back
 from wristctl.trial.motors_ready import after_a_fault, halt, prepare
 from wristctl.trial.resting import judge_rest
-from wristctl.trial.rig_belief import RigBelief, names_of_planes
+from wristctl.trial.rig_belief import names_of_planes
 from wristctl.trial.spools import spools_of
-from wristctl.trial.steering import HostFaults, Steering
+from wristctl.trial.steering import HostFaults
 from wristctl.trial.supervised_wait import Patience, medians
 from wristctl.trial.tendon_pulls import tendon_pulls_of
 from wristctl.trial.testbeds import Testbed
@@ -32,7 +27,6 @@ from wristctl.trial.tick_timing import TickTiming
 from wristctl.trial.tracking import Tracking
 from wristctl.trial.trial_series import TrialSeries, spared
 from wristctl.trial.trials import Trial
-from wristctl.trial.watch import Watch
 from wristctl.trial.zero_checks import check_cocontraction, check_tendons, check_zero
 from wristctl.wrist.directions import in_plane
 from wristctl.wrist.kinematics import Inverse
@@ -61,7 +55,8 @@ class Experiment(TrialSeries):
         board = Board(testbed.transport, self._log.wire)
         board.cells = self._pulls
         try:
-            self._warm_up()
+            plane = self._trials[0].plane
+            self._warm_up(self._facing(plane), plane)
             board.connect()
             with self._stopping(lambda cause: self._stopped(testbed, board, cause)):
                 self._all(testbed, board, shown)
@@ -70,24 +65,6 @@ class Experiment(TrialSeries):
                 board.close()
         finally:
             testbed.close()
-
-    def _warm_up(self) -> None:
-        """Have everything compiled or loaded before the first motor is on: from then on the board wants to be fed."""
-        settings, plane = self._settings, self._trials[0].plane
-        belief = RigBelief(self._facing(plane), settings.actuator, names_of_planes(settings.planes, plane))
-        spools, still = spools_of(settings.actuator), np.zeros(AXES)
-        motion = back(0.0, settings.rest, 0.0, settings.control_period, settings.planes)
-        course = course_of(motion)
-        taut, _ = belief.taut(course[0, :, 0])
-        spools.target(still, taut)
-        spools.rate(still, still, still, settings.control_period)
-        spools.behind(still, still, still, settings.control_period)
-        rates = np.zeros((AXES, remembered_rates(spools.timing.delay, settings.control_period)))
-        spools.foreseen(still, rates, settings.control_period)
-        spools.reckoned(still, rates, 0.0, settings.control_period)
-        reeled = belief.at_places(taut)
-        Watch(settings, self._facing(plane), plane, self.timing).predict(reeled)
-        self._warm_up_controllers(Steering(belief, settings.sensor, settings.control_period), course, reeled)
 
     def _all(self, testbed: Testbed, board: Board, shown: Shown | None) -> None:
         plane: str | None = None
@@ -138,7 +115,7 @@ class Experiment(TrialSeries):
             BoardDrive(board, settings, zero.signs), tracking, settings, self._facing(plane), plane, self.timing,
             self._log, shown, 0.0 if pose is None else pose.oblique, self._pulls, stiffness,
         )  # fmt: skip
-        loop.follow(back(0.0, settings.rest, 0.0, settings.control_period, settings.planes), self._back, ())
+        loop.follow(self._to_rest(0.0, settings.rest, 0.0), self._back, ())
         return loop
 
     @property
@@ -188,9 +165,7 @@ class Experiment(TrialSeries):
         )
         self._follow(loop, trial, HostFaults(settings.bench.faults) if testbed.emulated else None)
         self._trial_ended(testbed, "ok")
-        self._in_doubt = trial.number
-        way = back(self._final(trial), settings.back, 0.0, settings.control_period, settings.planes)
-        loop.follow(way, self._back, ())
+        self._come_back(loop, trial)
 
     def _trial_ended(self, testbed: Testbed, outcome: str) -> None:
         if self._under_way is not None:

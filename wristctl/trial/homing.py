@@ -42,20 +42,22 @@ _STILL = 0.2
 
 @dataclass(frozen=True)
 class Zero:
-    """Result of homing; axes in the order of tendons 1, 2, 4, 5."""
+    """Result of homing; values (T,) in the order of the motors: of a board tendons 1, 2, 4, 5."""
 
     signs: tuple[int, ...]
     """1 where positive steps reel in, -1 where they pay out."""
     steps_per_radian: tuple[float, ...]
     """Reeled in for one radian of bend, near the straight wrist."""
     markers: tuple[float, ...]
-    """Angle between the markers on the straight wrist, as each camera sees it [rad]."""
+    """Angle between the markers on the straight wrist, as each camera sees it, or as a rig looks [rad]."""
     slack: tuple[float, ...]
     """Reeled in until the tendon was taut on the straight wrist [m]."""
     friction: tuple[float, ...] = (0.0,) * AXES
     """Path between reeling in and letting go for the same bend [m]."""
     directions: tuple[float, ...] = ()
     """Direction in which each tendon bends the wrist, from ulnar toward flexion [rad]; of one camera none."""
+    targets: tuple[float, ...] = ()
+    """Of a rig that takes targets: those at which each tendon of the straight wrist is just taut [facts.unit]."""
 
     def plain(self) -> dict[str, Any]:
         """For JSON; the angle before a second camera is `marker_2`."""
@@ -68,15 +70,17 @@ class Zero:
             "friction": self.friction,
         }
         further = {f"marker_{camera}": angle for camera, angle in enumerate(others, 2)}
-        return known | further | ({"directions": self.directions} if others else {})
+        some = {"directions": self.directions, "targets": self.targets}
+        return known | further | {name: values for name, values in some.items() if values}
 
     @classmethod
     def of_plain(cls, table: dict[str, Any]) -> Self:
         """Read what `plain` has given. Raises KeyError, TypeError and ValueError."""
         signs, slopes, slack = (tuple(table[name]) for name in ("signs", "steps_per_radian", "slack"))
         markers = tuple(float(table[name]) for name in ("marker", "marker_2") if name == "marker" or name in table)
-        friction, directions = tuple(table.get("friction", (0.0,) * len(signs))), tuple(table.get("directions", ()))
-        return cls(signs, slopes, markers, slack, friction, directions)
+        friction = tuple(table.get("friction", (0.0,) * len(signs)))
+        directions, targets = (tuple(table.get(name, ())) for name in ("directions", "targets"))
+        return cls(signs, slopes, markers, slack, friction, directions, targets)
 
 
 class Line(NamedTuple):

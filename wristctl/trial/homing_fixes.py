@@ -9,6 +9,10 @@ _SCREWED = (
 """What to do about tendons that bend the wrist elsewhere, before one camera and before two."""
 
 
+DEAD = "its tendon is slack (motors that a stop released keep none taut) or off, or it has no power"
+"""Likely causes where a motor bends nothing."""
+
+
 class Fixes(NamedTuple):
     """What to do about what homing finds."""
 
@@ -29,8 +33,8 @@ class Fixes(NamedTuple):
 
 _OF_BOARD = Fixes(
     "",
-    "see that the tendon is on its pulley and the motor has power: wristctl hw check --wiring {axis}; or raise "
-    "homing.slack",
+    "take its slack up: wristctl hw tension --axis {axis}; see pulley and power: wristctl hw check --wiring {axis}; or "
+    "raise homing.slack",
     "see the DIP switches of the drive and actuator.microstep, and measure the pulley (actuator.pulley_radius)",
     "wrong microsteps (DIP switches), a wrong pulley",
     "slacken all tendons first: wristctl hw slacken, or by hand",
@@ -39,7 +43,8 @@ _OF_BOARD = Fixes(
 )
 OF_RIG = Fixes(
     "see the order of facts.tendons and of the targets, and the axes of look()",
-    "see that its motor has power and its tendon is on; facts.metres_per_unit; or raise homing.slack",
+    "take its slack up; see that its motor has power and its tendon is on; facts.metres_per_unit; or raise "
+    "homing.slack",
     "see facts.metres_per_unit, the tendon's radius, wrist.stiffness and facts.drive.stiffness",
     "wrong facts",
     "slacken all tendons before the rig is connected",

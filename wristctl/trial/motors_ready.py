@@ -128,5 +128,5 @@ def after_a_fault(cleared: str) -> Iterator[None]:
             raise
         problem = str(stop.what).removeprefix("stopped: ")
         problem += f"; the drives have let go in a fault before ({cleared}), which leaves tendons slack or crossed"
-        fix = "see that each tendon lies on its pulley, take its slack up (wristctl hw jog), then home again"
+        fix = "see that each tendon lies on its pulley, take its slack up (wristctl hw tension), then home again"
         raise SafetyStop(problem, str(stop.where), fix) from stop

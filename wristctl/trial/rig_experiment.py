@@ -10,24 +10,20 @@ from wristctl.config.hw_run import HwRunSettings
 from wristctl.config.wrist import WristParameters
 from wristctl.errors import UserError
 from wristctl.interrupt import undisturbed
-from wristctl.simulation.motion import Motion
-from wristctl.trial.control_loop import ControlLoop, Shown, course_of
+from wristctl.trial.control_loop import ControlLoop, Shown
 from wristctl.trial.guarded_rig import GuardedRig
+from wristctl.trial.homing import Zero
 from wristctl.trial.live_datagrams import LiveReference
 from wristctl.trial.log import TrialLog
-from wristctl.trial.motions import back
 from wristctl.trial.motors_ready import Halt
-from wristctl.trial.rig_belief import RigBelief, layout_of_rig, names_of_planes
+from wristctl.trial.rig_belief import layout_of_rig
 from wristctl.trial.rig_drive import LookPaces, RigDrive, RigTracking
-from wristctl.trial.rig_homing import PLANE, RigHoming, RigZero
+from wristctl.trial.rig_homing import PLANE, RigHoming
 from wristctl.trial.rig_motors import RigMotors
 from wristctl.trial.rig_settings import sides_of
-from wristctl.trial.spools import spools_of
-from wristctl.trial.steering import Steering
 from wristctl.trial.tick_timing import TickTiming
 from wristctl.trial.trial_series import TrialSeries, spared
 from wristctl.trial.trials import Trial
-from wristctl.trial.watch import Watch
 from wristctl.wrist.kinematics import Inverse
 
 log = logging.getLogger(__name__)
@@ -81,7 +77,7 @@ class RigExperiment(TrialSeries):
         self._layout, self._facing = layout, wrist if settings.planes == 2 else sides_of(wrist, layout)
         timing = TickTiming(settings.control_period, camera=LookPaces(settings.rig or ""))
         super().__init__(settings, wrist, self._facing, trials, kept, timing, network, tuned, live)
-        self.zero: RigZero | None = None
+        self.zero: Zero | None = None
 
     def run(self, rig: GuardedRig, shown: Shown | None = None, confirm: Callable[[], None] | None = None) -> None:
         """Do all trials and close the rig. Whatever ends them early, the rig is stopped before it is raised.
@@ -90,7 +86,7 @@ class RigExperiment(TrialSeries):
         raises.
         """
         try:
-            self._warm_up()
+            self._warm_up(self._facing, PLANE, self._layout)
             with self._stopping(lambda cause: self._stopped(rig, cause)):
                 self._all(rig, shown, confirm)
             with undisturbed():
@@ -105,18 +101,6 @@ class RigExperiment(TrialSeries):
     @property
     def _still(self) -> float:
         return _STANDS * math.radians(self._settings.homing.bend_deg)
-
-    def _warm_up(self) -> None:
-        """Have everything compiled before a rig is connected that may stop by itself where it hears nothing."""
-        settings = self._settings
-        belief = RigBelief(self._facing, settings.actuator, names_of_planes(settings.planes, PLANE), self._layout)
-        spools, motion = spools_of(settings.actuator), back(0.0, settings.rest, 0.0, 1e-2, settings.planes)
-        course = course_of(motion)
-        taut, _ = belief.taut(course[0, :, 0])
-        spools.target(np.zeros(len(taut)), taut)
-        reeled = belief.at_places(taut)
-        Watch(settings, self._facing, PLANE, self.timing, layout=self._layout).predict(reeled)
-        self._warm_up_controllers(Steering(belief, settings.sensor, settings.control_period), course, reeled)
 
     def _all(self, rig: GuardedRig, shown: Shown | None, confirm: Callable[[], None] | None) -> None:
         if confirm is not None:
@@ -136,16 +120,12 @@ class RigExperiment(TrialSeries):
             homing.check()
             self._in_doubt = None
 
-    def _to_rest(self, bend: object, duration: float, rest: float) -> Motion:
-        settings = self._settings
-        return back(np.asarray(bend, float), duration, rest, settings.control_period, settings.planes)
-
     def _one(self, loop: ControlLoop, trial: Trial) -> None:
         """One trial, and the way back to zero."""
         self._begun(trial, loop.next_tick)
         self._follow(loop, trial)
-        self.outcomes[trial.number], self._under_way, self._in_doubt = "ok", None, trial.number
-        loop.follow(self._to_rest(self._final(trial), self._settings.back, 0.0), self._back, ())
+        self.outcomes[trial.number], self._under_way = "ok", None
+        self._come_back(loop, trial)
 
     def _stopped(self, rig: GuardedRig, error: BaseException) -> None:
         """Stop the rig, then note what happened."""

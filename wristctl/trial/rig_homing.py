@@ -1,8 +1,7 @@
 """Zero of a rig that takes targets, as the board's is found, and the checks after each trial."""
 
 import math
-from dataclasses import asdict, dataclass
-from typing import Any
+from dataclasses import replace
 
 import numpy as np
 
@@ -26,28 +25,6 @@ PLANE = "ulnar"
 _STEADY = 0.4
 
 
-@dataclass(frozen=True)
-class RigZero:
-    """Result of homing; values (T,) in the order of the rig's targets."""
-
-    targets: tuple[float, ...]
-    """At which each tendon of the straight wrist is just taut [facts.unit]."""
-    straight: tuple[float, ...]
-    """Bend that the straight wrist shows (P,) [rad]."""
-    metres_per_radian: tuple[float, ...]
-    """Reeled in for one radian of measured bend, near the straight wrist."""
-    slack: tuple[float, ...]
-    """Reeled in from where the rig was connected until the tendon was taut [m]."""
-    friction: tuple[float, ...]
-    """Path between reeling in and letting go for the same bend [m]."""
-    directions: tuple[float, ...]
-    """Direction in which each tendon bends the wrist, from ulnar toward flexion [rad]; in one plane 0 or pi."""
-
-    def plain(self) -> dict[str, Any]:
-        """For JSON."""
-        return asdict(self)
-
-
 class RigHoming:
     """Homing of a connected rig with slack tendons. Raises SafetyStop and RigStop."""
 
@@ -62,17 +39,14 @@ class RigHoming:
         self._zero: Zero | None = None
         judge_weight(settings, wrist, names_of_planes(settings.planes, PLANE))
 
-    def find(self) -> RigZero:
+    def find(self) -> Zero:
         """Zero of the rig, at which its tendons stand then; bends are of the straight wrist from here on."""
         self._judge_noise()
-        settings, step = self._settings, self._settings.actuator.step_length
-        zero = find_zero(self._motors, self._tracking, settings, self._wrist, self._plane, layout=self._layout)
-        self._zero, self._tracking.zero = zero, zero.markers
-        placed = [self.expected.place(axis) for axis in range(len(zero.slack))]
-        metres = tuple(steps * step for steps in zero.steps_per_radian)
-        targets = tuple(self._motors.targets.tolist())
-        directions = zero.directions or tuple(placed)
-        return RigZero(targets, zero.markers, metres, zero.slack, zero.friction, directions)
+        zero = find_zero(self._motors, self._tracking, self._settings, self._wrist, self._plane, layout=self._layout)
+        placed = tuple(self.expected.place(axis) for axis in range(len(zero.slack)))
+        self._tracking.zero = zero.markers
+        self._zero = replace(zero, directions=zero.directions or placed, targets=tuple(self._motors.targets.tolist()))
+        return self._zero
 
     def _judge_noise(self) -> None:
         homing, planes = self._settings.homing, range(self._settings.planes)

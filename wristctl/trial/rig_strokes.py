@@ -241,7 +241,8 @@ class RigStrokes:
                 return position, bend
             self._watch(0, JOG_RATE, _REST)
         problem = f"axis {self._axis} does not bend the wrist within {1e3 * self._slack:g} mm"
-        raise SafetyStop(problem, "one axis alone", "see its tendon and power; --axis tries another; homing.slack")
+        fix = f"take its slack up: wristctl hw tension --axis {self._axis}; see its tendon, its power, homing.slack"
+        raise SafetyStop(problem, "one axis alone", fix)
 
     def _crept(self, begin: int, sense: int, wanted: float, most: float) -> tuple[int, Bend]:
         """Reel in slowly, by `most` [m] at most, to a bend of `wanted` [rad] in a plane; position [steps] and bend."""

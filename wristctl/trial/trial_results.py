@@ -19,6 +19,7 @@ from wristctl.control.law import in_a_first_repetition
 from wristctl.control.table import controller, gains_of
 from wristctl.records import Run
 from wristctl.simulation.closed_loop import asked_of, repeat, scenario_of
+from wristctl.simulation.error_ellipse import ErrorEllipse, error_ellipse
 from wristctl.simulation.live_reference import recorded
 from wristctl.simulation.metrics import metrics_of, summed
 from wristctl.simulation.motion import Motion
@@ -50,7 +51,15 @@ FURTHER: Mapping[str, tuple[str, str]] = {
     "recovery": ("s", "from the end of the push in the estimated load until |e| stays within 2 % of the largest bend"),
     "true_recovery": ("s", "the same by the emulated wrist's true bend, from the true end of the push"),
     "push_torque": ("N m", "largest load torque of the push, as estimated; empty where the wrist moves meanwhile"),
+    "error_major": ("rad", "standard deviation of the error along the longer axis of its covariance"),
+    "error_minor": ("rad", "the same across that axis"),
+    "error_toward": ("rad", "direction of that axis, from ulnar toward flexion, within a right angle of ulnar"),
+    "true_error_major": ("rad", "the same as error_major of the emulated wrist's true bend"),
+    "true_error_minor": ("rad", "the same as error_minor of the emulated wrist's true bend"),
+    "true_error_toward": ("rad", "the same as error_toward of the emulated wrist's true bend"),
 }
+# Columns of the error's ellipse, in the order of its values.
+ELLIPSE = tuple(f"error_{name}" for name in ErrorEllipse._fields)
 # File of a run that has the live reference as it was followed.
 RECORD = "data/reference.csv"
 # Share of the largest bend within which an error is small.
@@ -174,8 +183,8 @@ def evaluated(
     """
     names, one = names_of_planes(followed.planes, trial.plane), followed.planes == 1
     by_log, truly = ((*summed(), "oscillation"), JUDGED) if one else (LOGGED, TRULY)
-    settles = () if one else ("settling",)
-    columns = [*by_log, *(f"true_{name}" for name in truly), *_OF_PUSH, *settles, *(f"true_{name}" for name in settles)]
+    spatial = () if one else ("settling", *ELLIPSE)
+    columns = [*by_log, *(f"true_{name}" for name in truly), *_OF_PUSH, *spatial, *(f"true_{name}" for name in spatial)]
     metrics = dict.fromkeys(columns, math.nan)
     grid, push, period = followed.time, settings.push, settings.control_period
     if log.empty or log["time"].iloc[-1] < followed.horizon - 1.5 * period:
@@ -200,14 +209,16 @@ def evaluated(
         swings = oscillations(bend.T, followed.bend_ref.T, np.arange(len(names)), period)
         values["oscillation"] = float(np.max(swings))
         if not one:  # a path comes to rest nowhere
-            values["settling"] = recovery(grid, size_of(bend - followed.bend_ref), reach, 0.0)
+            error = bend - followed.bend_ref
+            values["settling"] = recovery(grid, size_of(error), reach, 0.0)
+            values |= zip(ELLIPSE, error_ellipse(error), strict=True)
         return values
 
     def of(values: dict[str, float], chosen: Sequence[str]) -> dict[str, float]:
         return {name: values[name] for name in chosen}
 
     time = log["time"].to_numpy(float)
-    metrics |= of(judged(on_grid(rows("bend"))), (*by_log, *settles))
+    metrics |= of(judged(on_grid(rows("bend"))), (*by_log, *spatial))
     quiet = max(followed.rest, push.start - EARLY) if one else push.start - EARLY
     if trial.push and followed.rest <= quiet:
         seen = push_seen(time, _load(time, rows("load"), quiet), quiet, LEAST_PUSH)
@@ -216,7 +227,7 @@ def evaluated(
             metrics["recovery"] = recovery(time, size_of(rows("error")), reach, seen.end)
     if truth is not None and len(truth):
         true = on_grid(rows("bend", truth), truth)
-        metrics |= {f"true_{name}": value for name, value in of(judged(true), (*truly, *settles)).items()}
+        metrics |= {f"true_{name}": value for name, value in of(judged(true), (*truly, *spatial)).items()}
         if trial.push:
             ended = push.start + push.duration
             metrics["true_recovery"] = recovery(grid, size_of(true - followed.bend_ref), reach, ended)

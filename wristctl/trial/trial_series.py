@@ -4,24 +4,30 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import Any
 
-from wristctl.arrays import Array
+import numpy as np
+
 from wristctl.config.hw_run import HwRunSettings
 from wristctl.config.wrist import WristParameters
 from wristctl.control.table import controller, gains_of
 from wristctl.errors import UserError, fix_of
 from wristctl.interrupt import undisturbed
 from wristctl.simulation.motion import Motion
-from wristctl.trial.control_loop import ControlLoop
+from wristctl.simulation.spool_timing import remembered_rates
+from wristctl.trial.control_loop import ControlLoop, course_of
 from wristctl.trial.live_datagrams import LiveReference
 from wristctl.trial.log import TrialLog
-from wristctl.trial.motions import motion_of
+from wristctl.trial.motions import back, motion_of
 from wristctl.trial.motors_ready import Halt
+from wristctl.trial.rig_belief import RigBelief, names_of_planes
 from wristctl.trial.safety import SafetyStop
+from wristctl.trial.spools import spools_of
 from wristctl.trial.steering import HostFaults, Steering
 from wristctl.trial.tick_timing import TickTiming
 from wristctl.trial.trials import Trial, motions_of
+from wristctl.trial.watch import Watch
 from wristctl.vision.camera_pose import CameraPose
 from wristctl.wrist.kinematics import Inverse
+from wristctl.wrist.tendon_layout import TendonLayout
 
 
 class Stop:
@@ -99,8 +105,33 @@ class TrialSeries:
                 raise cause from error
             raise
 
-    def _warm_up_controllers(self, steering: Steering, course: Array, reeled: Array) -> None:
-        """Have every controller compiled, that of the ways back too."""
+    def _to_rest(self, bend: Any, duration: float, rest: float) -> Motion:
+        """The way from a bend [rad] to zero, and rest there."""
+        return back(bend, duration, rest, self._settings.control_period, self._settings.planes)
+
+    def _come_back(self, loop: ControlLoop, trial: Trial) -> None:
+        """The way back to zero after a trial that has ended; it is in doubt until its tendons have been looked at."""
+        self._in_doubt = trial.number
+        loop.follow(self._to_rest(self._final(trial), self._settings.back, 0.0), self._back, ())
+
+    def _warm_up(self, facing: WristParameters, plane: str, layout: TendonLayout | None = None) -> None:
+        """Have all compiled or loaded before the first motor is on: from then on a rig wants to be fed.
+
+        `facing` is the wrist as a loop in this plane knows it, or in both; `layout` as `Watch` has it.
+        """
+        settings, period = self._settings, self._settings.control_period
+        belief = RigBelief(facing, settings.actuator, names_of_planes(settings.planes, plane), layout)
+        spools, course = spools_of(settings.actuator), course_of(self._to_rest(0.0, settings.rest, 0.0))
+        taut, _ = belief.taut(course[0, :, 0])
+        still, reeled = np.zeros(len(taut)), belief.at_places(taut)
+        spools.target(still, taut)
+        spools.rate(still, still, still, period)
+        spools.behind(still, still, still, period)
+        rates = np.zeros((len(taut), remembered_rates(spools.timing.delay, period)))
+        spools.foreseen(still, rates, period)
+        spools.reckoned(still, rates, 0.0, period)
+        Watch(settings, facing, plane, self.timing, layout=layout).predict(reeled)
+        steering = Steering(belief, settings.sensor, period)
         for law, gains in [*self._laws, (self._back, ())]:
             steering.use(law, gains)
             steering.respond(course)

@@ -84,7 +84,20 @@ def _error(told: Mapping[str, float]) -> tuple[str, list[str]]:
 
     each = [(f"{_in_deg(told[f'rmse_{plane}'])} deg toward {plane}", f"rmse_{plane}") for plane in _planes(told)]
     by_plane = [", ".join([words, *truly(name)]) for words, name in each]
-    return f"error {_in_deg(told['rmse'])} deg RMSE", [*by_plane, *truly("rmse")]
+    return f"error {_in_deg(told['rmse'])} deg RMSE", [*by_plane, *truly("rmse"), *_ellipse(told)]
+
+
+def _ellipse(told: Mapping[str, float]) -> list[str]:
+    """The ellipse of an error in two planes: standard deviations along its axes, and where the longer one points."""
+    if not math.isfinite(told.get("error_major", math.nan)):
+        return []
+    axes, truly = (
+        " by ".join(_in_deg(told.get(f"{of}error_{axis}", math.nan)) for axis in ("major", "minor")) + " deg"
+        for of in ("", "true_")
+    )
+    known = f" (truly {truly})" * math.isfinite(told.get("true_error_major", math.nan))
+    toward = f"{math.degrees(told['error_toward']):.0f} deg from ulnar toward flexion"
+    return [f"an ellipse of {axes}, longest {toward}{known}"]
 
 
 def _planes(names: Container[str]) -> list[str]:

@@ -28,6 +28,7 @@ from wristctl.plotting.style import (
     logarithmic,
     title,
 )
+from wristctl.simulation.error_ellipse import error_ellipse
 from wristctl.trial.log import column_of
 from wristctl.trial.rig_belief import layout_of_axes, layout_of_rig, names_of_planes, numbers_of, places_of_tendons
 from wristctl.wrist.directions import DIRECTIONS as WAYS
@@ -44,6 +45,8 @@ if TYPE_CHECKING:
 # In the paper's order.
 DIRECTIONS = ("extension", "flexion", "radial", "ulnar")
 
+# Standard deviations at which an ellipse of errors is drawn.
+_DEVIATIONS = 2.0
 _TRUE: dict[str, Any] = {"color": VERMILLION, "linewidth": 0.8, "label": "true"}
 
 
@@ -112,6 +115,36 @@ def paths(courses: Sequence[LoggedTrial], reach: Array, heading: str = "") -> Fi
     return picture
 
 
+def ellipses(courses: Sequence[LoggedTrial], heading: str = "") -> Figure:
+    """Error toward flexion over that toward ulnar [deg], and the ellipse of its covariance, a panel for each motion.
+
+    The first repetition of each controller, as measured; of the true error the ellipse alone.
+    """
+    picture, panels = _panels(courses, by_plane=False, height=3.4)
+    for course in courses:
+        if course.repetition:
+            continue
+        panel, error = panels[course.direction, ""], course.bend - course.bend_ref
+        colour = line(course.label)["color"]
+        panel.plot(*np.rad2deg(error).T, color=colour, linewidth=0.5, alpha=0.5)
+        panel.plot(*_outline(error), color=colour, linewidth=1.6, label=course.label)
+        if course.true is not None:
+            panel.plot(*_outline(course.true.error), **_TRUE | {"linewidth": 1.2})
+    for (name, _), panel in panels.items():
+        title(panel, name)
+        panel.set_aspect("equal", adjustable="datalim")
+        panel.set(xlabel="error toward ulnar [deg]", ylabel="error toward flexion [deg]")
+    picture.suptitle(heading, fontsize=10.0)
+    legend_below(picture)
+    return picture
+
+
+def _outline(error: Array) -> Array:
+    """Line (2, K) [deg] at two standard deviations about the mean of an error (N, 2) [rad]."""
+    outline: Array = np.rad2deg(error.mean(axis=0) + error_ellipse(error).outline(_DEVIATIONS)).T
+    return outline
+
+
 def errors(courses: Sequence[LoggedTrial], heading: str = "") -> Figure:
     """Error e = bend - reference [deg] over time [s], one panel for each direction, and for each plane of two."""
     picture, panels = _panels(courses, sharey=True)
@@ -163,12 +196,14 @@ def _draw_beside(panels: _Panels, course: LoggedTrial, what: str) -> None:
                 panel.plot(drawn.time, np.degrees(values), **style)
 
 
-def _panels(courses: Sequence[LoggedTrial], by_plane: bool = True, **shared: Any) -> tuple[Figure, _Panels]:
+def _panels(
+    courses: Sequence[LoggedTrial], by_plane: bool = True, height: float = 1.9, **shared: Any
+) -> tuple[Figure, _Panels]:  # fmt: skip
     motions = dict.fromkeys(course.direction for course in courses)
     names = [name for name in DIRECTIONS if name in motions] + [name for name in motions if name not in DIRECTIONS]
     planes = courses[0].planes if by_plane and len(courses[0].planes) > 1 else ("",)
     keys = [(name, plane) for name in names for plane in planes]
-    picture, panels = grid(len(keys), 2, 1.9, sharex=True, **shared)
+    picture, panels = grid(len(keys), 2, height, sharex=True, **shared)
     return picture, dict(zip(keys, panels, strict=True))
 
 
@@ -207,6 +242,9 @@ def draw_trials(session: Session, done: pd.DataFrame, twins: Mapping[int, Simula
             caption = "The plane of bends: wanted, measured and true, within what the tendons reach" + said
             findings.figure(f"{prefix}bends", paths, alone, reach, first, caption=caption)
             findings.overview.figure = findings.overview.figure or f"{prefix}bends"
+            caption = f"Error in the plane of bends{said}, and its ellipse at {_DEVIATIONS:g} standard deviations"
+            only = first if len(settings.rows) == 1 else ""
+            findings.figure(f"{prefix}ellipses", ellipses, some, only, caption=caption)
         findings.figure(f"{prefix}errors", errors, some, caption=f"The error of the bend over time{said}")
         findings.figure(f"{prefix}tensions", tensions, alone, first, caption=f"Commanded tensions over time{said}")
     if settings.real_time or settings.port is not None:

@@ -10,6 +10,7 @@ from wristctl.commands.answer import Answer
 from wristctl.commands.course_table import course_of_log
 from wristctl.commands.hw_run.answer import answer_of, marks_of
 from wristctl.commands.hw_run.trial_means import (
+    ELLIPSE,
     OF_MEANS,
     completed,
     known_means,
@@ -31,7 +32,7 @@ if TYPE_CHECKING:
 # Quantities of the table of trials.
 _OF_A_TRIAL = (
     "trial", "direction", "push", "label", "rmse_ulnar", "rmse_flexion", "rmse", "true_rmse_ulnar", "true_rmse_flexion",
-    "true_rmse", "largest_error", "steady_state", "overshoot", "swing", "true_swing", "settling", "recovery",
+    "true_rmse", *ELLIPSE, "largest_error", "steady_state", "overshoot", "swing", "true_swing", "settling", "recovery",
     "true_recovery", "peak_tension", "outcome",
 )  # fmt: skip
 
@@ -134,8 +135,10 @@ def _means_kept(findings: Findings, trials: pd.DataFrame, labels: Sequence[str])
                 continue
             whose = [label.replace("/", "-").replace(" ", "-")] if len(labels) > 1 else []
             name = "_".join([*["pushed"] * pushed, quantity.name, *whose])
-            meaning = f"mean over trials{' with a push' * pushed}, {label}"
-            findings.metric(name, values[quantity.name], quantity.unit, "lower", n=len(group), meaning=meaning)
+            of = quantity.meaning or "mean"
+            meaning = f"{of} over trials{' with a push' * pushed}, {label}"
+            value, aimless = values[quantity.name], quantity.name.endswith("error_toward")
+            findings.metric(name, value, quantity.unit, "" if aimless else "lower", n=len(group), meaning=meaning)
         yield {"label": f"{label}{', pushed' * pushed}", **values}
 
 

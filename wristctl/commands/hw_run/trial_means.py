@@ -13,6 +13,7 @@ if TYPE_CHECKING:
 
     from wristctl.simulation.repetitions import Simulation
 
+_SPREAD, _AXIS = "standard deviation of the error", "the longer axis of its mean covariance"
 _QUANTITIES = {
     quantity.name: quantity
     for quantity in (
@@ -32,12 +33,22 @@ _QUANTITIES = {
         Quantity("overshoot", "%"),
         Quantity("swing", "rad", heading="swing at rest, peak to peak"),
         Quantity("peak_tension", "N"),
+        Quantity("error_major", "rad", f"{_SPREAD} along {_AXIS}", "long axis of the error"),
+        Quantity("error_minor", "rad", f"{_SPREAD} across {_AXIS}", "short axis of the error"),
+        Quantity(
+            "error_toward", "rad", f"direction of {_AXIS}, from ulnar toward flexion", "direction of the long axis"
+        ),
         Quantity("outcome"),
     )
 }
+ELLIPSE = ("error_major", "error_minor", "error_toward")
+"""The ellipse of an error in two planes, as `ErrorEllipse` has its values."""
 # Metrics of which means are taken, by the log and truly; and those also of the trials' simulation.
 _BY_LOG = ("rmse_ulnar", "rmse_flexion", "rmse", "steady_state", "settling", "recovery")
-OF_MEANS = (*_BY_LOG, "true_rmse_ulnar", "true_rmse_flexion", "true_rmse", "true_steady_state", "true_recovery")
+OF_MEANS = (
+    *_BY_LOG, *ELLIPSE, "true_rmse_ulnar", "true_rmse_flexion", "true_rmse", "true_steady_state", "true_recovery",
+    *(f"true_{name}" for name in ELLIPSE),
+)  # fmt: skip
 _SIMULATED = ("rmse_ulnar", "rmse_flexion", "rmse", "steady_state")
 
 
@@ -75,6 +86,16 @@ def known_means(trials: pd.DataFrame) -> list[str]:
 
 
 def means(trials: pd.DataFrame) -> dict[str, float]:
-    """Number of trials, and means of their metrics; nan where there is none, or where one of them has no value."""
-    values = trials[known_means(trials)].astype(float).mean(skipna=False)
-    return {"trials": len(trials), **{str(name): float(value) for name, value in values.items()}}
+    """Number of trials, and means of their metrics; nan where there is none, or where one of them has no value.
+
+    Of ellipses of the error it is that of the mean covariance.
+    """
+    from wristctl.simulation.error_ellipse import ErrorEllipse, mean_ellipse
+
+    values = trials[known_means(trials)].astype(float)
+    found = {str(name): float(value) for name, value in values.mean(skipna=False).items()}
+    for names in (ELLIPSE, tuple(f"true_{name}" for name in ELLIPSE)):
+        if len(trials) and names[0] in values:
+            ellipses = [ErrorEllipse(*row) for row in values[list(names)].itertuples(index=False)]
+            found |= zip(names, mean_ellipse(ellipses), strict=True)
+    return {"trials": len(trials), **found}
