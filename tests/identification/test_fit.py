@@ -26,7 +26,7 @@ from wristctl.identification.intervals import (
 )
 from wristctl.identification.measured_trials import MeasuredTrial, frame_noise
 from wristctl.identification.rehearsal import spools
-from wristctl.simulation.actuator import motor_of
+from wristctl.simulation.drives import motor_of
 from wristctl.simulation.reference import motion
 from wristctl.simulation.rollout import rollout
 from wristctl.wrist.statics import equilibrium

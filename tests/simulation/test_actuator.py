@@ -16,18 +16,16 @@ from wristctl.control.table import controller
 from wristctl.lanes.compiled import kernel
 from wristctl.lanes.lane import zero_like
 from wristctl.lanes.rows import lanes_like, part, rows_of
-from wristctl.simulation.actuator import (
+from wristctl.simulation.actuator import Aim, actuate, deliver
+from wristctl.simulation.drives import (
     DRIVE,
     SIDES,
-    Aim,
     Drive,
     IdealDrive,
     LaggedDrive,
     Motor,
     SpoolDrive,
-    actuate,
     at_rest,
-    deliver,
     drive_in_lanes,
     drive_of,
 )

@@ -23,9 +23,10 @@ from wristctl.errors import UserError
 from wristctl.lanes.compiled import kernel
 from wristctl.lanes.lane import zero_like
 from wristctl.lanes.rows import lanes_like, part, rows_of
-from wristctl.simulation.actuator import Aim, actuate, drive_in_lanes, winding_of
+from wristctl.simulation.actuator import Aim, actuate
 from wristctl.simulation.batch import Batch, Lanes, batch
 from wristctl.simulation.closed_loop import simulate
+from wristctl.simulation.drives import drive_in_lanes, winding_of
 from wristctl.simulation.kernel import run_blocks
 from wristctl.simulation.observer import Knowing, go_on, sense
 from wristctl.simulation.reference import motion

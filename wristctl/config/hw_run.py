@@ -212,7 +212,9 @@ class RigSettings(Section):
 
     @model_validator(mode="after")
     def _spools_and_frames(self) -> Self:
-        if self.actuator.level != "tendon" or self.sensor.level != "camera":
+        own = getattr(self, "rig", None) is not None
+        levels = ("tendon", "servo") if own else ("tendon",)
+        if self.actuator.level not in levels or self.sensor.level != "camera":
             raise ValueError("a rig has actuator.level: tendon and sensor.level: camera")
         return self
 

@@ -9,7 +9,7 @@ from wristctl.arrays import Array
 from wristctl.control.response import OF_A_PLANE
 from wristctl.lanes.blocks import lanes_of, spread
 from wristctl.seeds import Entropy
-from wristctl.simulation.actuator import SIDES
+from wristctl.simulation.drives import SIDES
 from wristctl.simulation.frames import frame_counts, readings, remembered, side_by_side
 from wristctl.simulation.observer import NoCamera, Observer, Schedule, Watch
 from wristctl.simulation.stationary_filter import beliefs_of, stationary_gains

@@ -14,9 +14,9 @@ from wristctl.control.law import Controller
 from wristctl.lanes.blocks import to_rows
 from wristctl.processes import cores, stoppable
 from wristctl.seeds import Entropy
-from wristctl.simulation.actuator import SIDES
 from wristctl.simulation.batch import Batch, Lanes, Start, batch
 from wristctl.simulation.convergence import has_kinks, more_finely, settled
+from wristctl.simulation.drives import SIDES
 from wristctl.simulation.kernel import Span, columns_of_brief, columns_of_sample, run_blocks
 from wristctl.simulation.metrics import Totals, metrics_in, summary
 from wristctl.simulation.motion import GOALS, Motion

@@ -10,7 +10,7 @@ from wristctl.config.hw_run import HwRunSettings
 from wristctl.config.wrist import WristParameters
 from wristctl.errors import UserError
 from wristctl.interrupt import undisturbed
-from wristctl.simulation.spool_timing import remembered_rates
+from wristctl.simulation.spool_timing import remembered_commands
 from wristctl.simulation.worlds import Draws
 from wristctl.trial.calibration import WristCalibration
 from wristctl.trial.control_loop import ControlLoop, Shown, course_of
@@ -82,7 +82,7 @@ class Experiment(TrialSeries):
         spools.target(still, taut)
         spools.rate(still, still, still, settings.control_period)
         spools.behind(still, still, still, settings.control_period)
-        rates = np.zeros((AXES, remembered_rates(spools.timing.delay, settings.control_period)))
+        rates = np.zeros((AXES, remembered_commands(spools.timing.delay, settings.control_period)))
         spools.foreseen(still, rates, settings.control_period)
         spools.reckoned(still, rates, 0.0, settings.control_period)
         reeled = belief.at_places(taut)

@@ -90,7 +90,7 @@ class RigExperiment(TrialSeries):
         raises.
         """
         try:
-            self._warm_up()
+            self._warm_up(rig)
             with self._stopping(lambda cause: self._stopped(rig, cause)):
                 self._all(rig, shown, confirm)
             with undisturbed():
@@ -106,7 +106,7 @@ class RigExperiment(TrialSeries):
     def _still(self) -> float:
         return _STANDS * math.radians(self._settings.homing.bend_deg)
 
-    def _warm_up(self) -> None:
+    def _warm_up(self, rig: GuardedRig) -> None:
         """Have everything compiled before a rig is connected that may stop by itself where it hears nothing."""
         settings = self._settings
         belief = RigBelief(self._facing, settings.actuator, names_of_planes(settings.planes, PLANE), self._layout)
@@ -114,7 +114,9 @@ class RigExperiment(TrialSeries):
         course = course_of(motion)
         taut, _ = belief.taut(course[0, :, 0])
         spools.target(np.zeros(len(taut)), taut)
-        reeled = belief.at_places(taut)
+        reeled, drive = belief.at_places(taut), RigDrive(rig, settings, np.zeros(len(taut)))
+        drive.begin()
+        drive.go_on(1)
         Watch(settings, self._facing, PLANE, self.timing, layout=self._layout).predict(reeled)
         self._warm_up_controllers(Steering(belief, settings.sensor, settings.control_period), course, reeled)
 
