@@ -93,18 +93,20 @@ def reel_in(drive: Any, state: Any, rates: Any, t: int, target: Any, moving: Any
 def lead_on(drive: Any, state: Any, targets: Any, t: int, target: Any, moving: Any, h: float) -> Any:
     """Send a target that leads the motor of a place to its moving target, ahead of it by delay, lag and half a period.
 
-    Returns as `reel_in`, with the length from the target that was sent to the one that is wanted.
+    Returns the mean of the place over the period by its host's belief, which steps within it, and the pull that is
+    withheld: of the length from the target that was sent to the one that is wanted.
     """
     motor, believed = drive.motor, drive.believed
-    state[2 * t], _ = motor_at(motor, state[2 * t], targets, h, h)
-    state[2 * t + 1], _ = motor_at(believed, state[2 * t + 1], targets, h, h)
+    tick = h + zero_like(target)
+    state[2 * t], _, _ = motor_at(motor, state[2 * t], targets, tick, h)
+    state[2 * t + 1], _, _ = motor_at(believed, state[2 * t + 1], targets, tick, h)
     wanted = target + rounded(moving * (believed.delay + believed.lag + 0.5 * h))
     sent = target_sent(believed, believed.step, wanted, targets[0], h)
     remember(targets, sent)
     behind = wanted - sent
     withheld = where(abs(behind) > believed.step + _ROUNDING, drive.stiffness[t] * behind, 0.0)
-    place, _ = motor_at(believed, state[2 * t + 1], targets, 0.5 * h, h)
-    return place, withheld
+    _, _, summed = motor_at(believed, state[2 * t + 1], targets, tick, h)
+    return summed / h, withheld
 
 
 @compiled
@@ -240,7 +242,7 @@ def _followed(drive: Any, told: Any, time: Any, motion: Any) -> None:
     delivered, speeds = motion
     for t in range(len(counts)):
         targets = _sent_to(drive.targets, state, len(counts), len(bend), t)
-        place, speed = motor_at(drive.motor, state[2 * t], targets, time, h)
+        place, speed, _ = motor_at(drive.motor, state[2 * t], targets, time, h)
         delivered[t] = winding[0] * place + winding[1 + t]
         speeds[t] = winding[0] * speed
 

@@ -22,26 +22,33 @@ _AT_ONCE, _FINEST = 1e-12, 1e-15
 
 @compiled
 def followed(motor: Any, place: Any, target: Any, time: Any) -> Any:
-    """Place and speed of a motor after a time of following a target that is held."""
-    gap = target - place
-    lag, distance = maximum(motor.lag, zero_like(gap) + _AT_ONCE), abs(gap)
-    ramp = minimum(time, maximum(distance / motor.speed - motor.lag, zero_like(gap)))
-    left = maximum(distance - motor.speed * ramp, zero_like(gap)) * exp(-(time - ramp) / lag)
+    """Place and speed of a motor after a time of following a target that is held, and its place summed over that time.
+
+    The last is the integral of the place, by which its mean is known.
+    """
+    gap, none = target - place, zero_like(target)
+    lag, distance = maximum(motor.lag, none + _AT_ONCE), abs(gap)
+    ramp = minimum(time, maximum(distance / motor.speed - motor.lag, none))
+    there = maximum(distance - motor.speed * ramp, none)
+    left = there * exp(-(time - ramp) / lag)
     moving = minimum(left / lag, motor.speed)
-    return target - where(gap < 0.0, -left, left), where(gap < 0.0, -moving, moving)
+    short = 0.5 * (distance + there) * ramp + lag * (there - left)
+    side = where(gap < 0.0, -1.0, 1.0)
+    return target - side * left, side * moving, target * time - side * short
 
 
 @compiled
 def motor_at(motor: Any, place: Any, targets: Any, time: Any, h: float) -> Any:
-    """Place and speed of a motor at a time in this tick [s] of h [s], which was at `place` when the tick began.
+    """Place and speed of a motor at a time in this tick [s] of h [s], which was at `place` when the tick began, and its
+    place summed up to then.
 
     The newest of `targets` is this tick's.
     """
     since = motor.delay - h * floor(motor.delay / h)
     before, after = in_effect(motor, targets, 1, h), in_effect(motor, targets, 0, h)
-    there, was = followed(motor, place, before, minimum(time, since))
-    then, moving = followed(motor, there, after, maximum(time - since, zero_like(since)))
-    return then, where(time < since, was, moving)
+    there, was, first = followed(motor, place, before, minimum(time, since))
+    then, moving, second = followed(motor, there, after, maximum(time - since, zero_like(since)))
+    return then, where(time < since, was, moving), first + second
 
 
 @compiled

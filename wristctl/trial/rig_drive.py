@@ -130,16 +130,15 @@ class RigDrive:
         """A rig answers when it is asked."""
 
     def go_on(self, ticks: int) -> list[Array]:
-        """As `LoopDrive.go_on`, by what was sent."""
-        middles = []
+        """As `LoopDrive.go_on`, by what was sent: of places that step within a tick their means over it."""
+        means = []
         for _ in range(ticks):
             self._remembered.appendleft(self._target)
-            targets, period = np.array(self._remembered).T, self._period
-            middles.append(self._motor.places(self._place, targets, 0.5 * period, period) + self._off)
-            self._place = self._motor.places(self._place, targets, period, period)
+            self._place, mean = self._motor.over(self._place, np.array(self._remembered).T, self._period)
+            means.append(mean + self._off)
             self._reckoned_at.append((self._reckoned_at[-1][0] + self._period, self._place))
         self.counted = self._rig.now()
-        return middles
+        return means
 
 
 class LookPaces(CameraPaces):

@@ -139,15 +139,16 @@ class Follower(NamedTuple):
     """Time constant of the motors behind it [s]."""
     speed: float
 
-    def places(self, place: Array, targets: Array, time: float, period: float) -> Array:
-        """Places (T,) of the motors at a time [s] in this tick, at whose begin they were at `place`.
+    def over(self, place: Array, targets: Array, period: float) -> tuple[Array, Array]:
+        """Places (T,) of the motors at the end of a tick [s], at whose begin they were at `place`, and their means over
+        it.
 
         The newest of `targets` (T, n) are those of this tick.
         """
-        places: Array = np.empty(len(place))
+        ends, means = np.empty(len(place)), np.empty(len(place))
         targets = np.ascontiguousarray(targets)
-        _followed(np.array(self), place, targets, (0,) * targets.shape[1], time, period, places)
-        return places
+        _followed(np.array(self), place, targets, (0,) * targets.shape[1], period, ends, means)
+        return ends, means
 
 
 # A Follower of lanes from rows of lanes, in compiled code.
@@ -155,11 +156,12 @@ _read_follower = tuple_of(Follower)
 
 
 @kernel
-def _followed(motor: Any, place: Any, targets: Any, sent: Any, time: float, period: float, places: Any) -> None:
-    follower, before, out = _read_follower(rows_of(motor)), rows_of(place), rows_of(places)
+def _followed(motor: Any, place: Any, targets: Any, sent: Any, period: float, ends: Any, means: Any) -> None:
+    follower, before, out, mean = _read_follower(rows_of(motor)), rows_of(place), rows_of(ends), rows_of(means)
     for axis in range(len(place)):
         own = part(rows_of(targets[axis]), 0, sent)
-        out[axis], _ = motor_at(follower, before[axis], own, time + zero_like(before[axis]), period)
+        out[axis], _, summed = motor_at(follower, before[axis], own, period + zero_like(before[axis]), period)
+        mean[axis] = summed / period
 
 
 def _where_spools_are(timing: Timing, place: Array, rates: Array, time: float, period: float) -> Array:
