@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import pytest
@@ -175,7 +175,7 @@ def test_the_host_of_a_trial_reckons_as_the_motors_move(
         assert mean[0] == pytest.approx(summed, abs=tolerance)
 
 
-def loop_of(actuator: Actuator, planes: int | None = None, **plant: Any) -> Loop:
+def loop_of(actuator: Actuator, planes: Literal[1, 2] | None = None, **plant: Any) -> Loop:
     """A loop behind a camera."""
     return Loop(
         actuator=actuator, sensor=Sensor(level="camera", dropped=0.0), control_period=PERIOD,
@@ -187,7 +187,7 @@ def loop_of(actuator: Actuator, planes: int | None = None, **plant: Any) -> Loop
 @pytest.mark.parametrize("side", [1.0, -1.0])
 def test_one_plane_and_two_move_alike(side: float) -> None:
     law, wrist = controller("pid-ff"), WristParameters(gravity=(0.0, 0.0), tendons="four")
-    gains, actuator = gains_of(law, "hardware"), servo(8e-3, 10e-3, 0.1)
+    gains, actuator = np.array(gains_of(law, "hardware")), servo(8e-3, 10e-3, 0.1)
     planar = motion(Reference(angle_deg=25.0 * side), wrist, 1.5, PERIOD)
     moves = np.stack([planar.theta_ref, planar.rate_ref, planar.acceleration_ref])
     spatial = Motion.of_bends(np.stack([moves, 0.0 * moves]), PERIOD, wrist.length)
@@ -203,7 +203,7 @@ def test_one_plane_and_two_move_alike(side: float) -> None:
 def test_a_light_wrist_swings_with_delayed_motors_and_not_with_those_that_are_at_once() -> None:
     """The drive decides: what held with motors at once loses its phase with 25 ms of delay."""
     law = controller("pid-ff")
-    gains = [3.0 * gain for gain in gains_of(law, "hardware")]
+    gains = 3.0 * np.array(gains_of(law, "hardware"))
     wrist = WristParameters()
     followed = motion(Reference(), wrist, 3.0, PERIOD)
     swing = [
@@ -216,7 +216,7 @@ def test_a_light_wrist_swings_with_delayed_motors_and_not_with_those_that_are_at
 @pytest.mark.slow
 def test_what_motors_truly_are_is_not_what_their_host_believes() -> None:
     law, wrist = controller("pid-ff"), WristParameters()
-    gains, followed = gains_of(law, "hardware"), motion(Reference(), wrist, 2.0, PERIOD)
+    gains, followed = np.array(gains_of(law, "hardware")), motion(Reference(), wrist, 2.0, PERIOD)
     actuator = servo(5e-3, 0.0, 0.3)
     believed = follow(law, gains, followed, wrist, loop_of(actuator)).metrics["rmse"]
     slower = follow(law, gains, followed, wrist, loop_of(actuator, lag=0.05, command_delay=0.03)).metrics["rmse"]

@@ -190,12 +190,14 @@ class RigTracking:
             return []
         self._number += 1
         ahead, self._time = seen.time > now + _CLOCKS, seen.time
+        along, *across = [math.nan] * (len(self.zero) + 1) if seen.tip is None else seen.tip.tolist()
         return [
-            Sighting(seen.time, self._number, bend - zero, self._verdict(bend, ahead), _UNSEEN, came=now, plane=plane)
-            if math.isfinite(bend) and not ahead
-            else Sighting(seen.time, self._number, math.nan, self._verdict(bend, ahead), _UNSEEN, came=now, plane=plane)
-            for plane, (bend, zero) in enumerate(zip(seen.bend.tolist(), self.zero, strict=True))
-        ]
+            Sighting(
+                seen.time, self._number, bend - zero if math.isfinite(bend) and not ahead else math.nan,
+                self._verdict(bend, ahead), _UNSEEN, tip_x=along, tip_y=aside, came=now, plane=plane,
+            )
+            for plane, (bend, zero, aside) in enumerate(zip(seen.bend.tolist(), self.zero, across, strict=True))
+        ]  # fmt: skip
 
     @staticmethod
     def _verdict(bend: float, ahead: bool) -> SightingVerdict:

@@ -153,8 +153,8 @@ class _Loop:
             self._motor = self._named([f"MOTOR_{field.upper()}" for field in Motor._fields], self.drive.motor)
             self._stiffness = self._places("STIFFNESS_", self.drive.stiffness)
         if isinstance(self.drive, SpoolDrive | ServoDrive):
-            fields: Sequence[str] = Timing._fields if isinstance(self.drive, SpoolDrive) else Motor._fields
-            self._board = self._named([f"BOARD_{field.upper()}" for field in fields], self.drive.believed)
+            known: Sequence[str] = Timing._fields if isinstance(self.drive, SpoolDrive) else Motor._fields
+            self._board = self._named([f"BOARD_{field.upper()}" for field in known], self.drive.believed)
 
     def _named(self, names: Sequence[str], values: Any) -> list[str]:
         self._constants |= dict(zip(names, map(float, np.ravel(values)), strict=True))
