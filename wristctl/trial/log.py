@@ -275,8 +275,8 @@ class TrialLog:
     """log.csv and frames.csv of trials; between.csv for the moves between them; residuals.csv of both; wire.csv with
     all bytes of the whole run; truth.csv of an emulated bench. The clock is `monotonic`, or virtual; a rig is `weighed`
     where it has load cells. The true wrist of a bench has so many `coordinates`. `tendons` are the numbers of those
-    that motors wind. A robot of one's own is not `wired`: it has no board and no wire.csv, and may measure tensions, and
-    tips, which are in looks.csv.
+    that motors wind. A robot of one's own is not `wired`: it has no board and no wire.csv; it may measure tensions,
+    and tips, which are in looks.csv.
     """
 
     def __init__(
