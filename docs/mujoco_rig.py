@@ -44,11 +44,16 @@ MODELS, BY = 10, 0.2
 HORIZON, REST, SWING_DEG = 2.5, 0.5, 0.2
 """Duration of a trial and of its end [s], and the swing there, peak to peak, beyond which a trial does not hold."""
 SHORT = (
-    "controllers=[pid-ff]", "draws=6", "validation=8", "tests=24", "candidates=6", "iterations=3", "frequencies=[0.2]",
+    "controllers=[pid-ff]", "draws=4", "validation=4", "tests=10", "candidates=4", "iterations=2", "frequencies=[0.2]",
     "payloads=[0.1]",
 )  # fmt: skip
 """Settings of `recommend` with which it takes minutes."""
-CIRCLE = "--reference", "circumduction", "--set", "reference.angle_deg=25", "--horizon", "12"
+LIGHT = (
+    "controllers=[{controller: pid-ff, gains: {Kp: 0.396, Kd: 0.00792, Ki: 4.75}}, "
+    "{controller: feedforward, gains: default}]"
+)
+"""Setting of `hw-run`: pid-ff with the gains that `recommend --rig` has for the chain, and no feedback."""
+CIRCLE = "--reference", "circumduction", "--set", "reference.angle_deg=25", "--horizon", "8"
 SPIRAL_DEG, TURNS, LASTS, TIMES = 28.0, 4, 16.0, 3
 """Largest bend of the spiral that is learned from, its turns, its duration [s], and its repetitions."""
 POINTS, POINT_DEG, APART = (0.0, 120.0, 240.0), 20.0, 3.0
@@ -209,7 +214,7 @@ def tips(looks: pd.DataFrame, file: Path) -> Values:
 def ends(run: Run, asked: Values) -> Values:
     """Distances [m] from each tip that was asked for to the mean of where it was seen at the end of its rest."""
     looks = run.data("looks")
-    found = []
+    looks, found = looks[looks["trial"] == 0], []
     for number, tip in enumerate(asked, 1):
         rest = looks[(looks["time"] > APART * number - REST) & (looks["time"] <= APART * number)]
         found.append(float(np.linalg.norm(rest[["tip_x", "tip_y", "tip_z"]].to_numpy().mean(axis=0) - tip)))
@@ -234,7 +239,7 @@ def chain(folder: Path) -> str:
     learned = wristctl(folder, "hw-run", "feedforward", *words, "--set", f"repetitions={TIMES}", "--horizon", LASTS)
     typed(folder, "runs", "export", learned.path, "--file", log)
     found = wristctl(folder, "identify", log, "--config", learned.path / "config.yaml")
-    wide = ("hw-run", "pid-ff", "feedforward", "--rig", CHAIN, *CIRCLE, "--set", "tension_factor=4")
+    wide = ("hw-run", "--rig", CHAIN, "--set", LIGHT, *CIRCLE)
     before, after = (
         errors(wristctl(folder, *wide, *identified)) for identified in ((), ("--from-identified", found.path))
     )
@@ -266,8 +271,8 @@ def network(folder: Path, learned: Run) -> tuple[Run, Values]:
     words = ("kind=recording", f"file={folder / 'tips.csv'}", "column=tip", "inverse=network")
     settings = [word for setting in words for word in ("--set", f"reference.{setting}")]
     horizon = APART * len(POINTS)
-    wide = ("--network", trained.path, "--set", "tension_factor=4", "--horizon", horizon)
-    return wristctl(folder, "hw-run", "pid-ff", "--rig", CHAIN, *settings, *wide), asked
+    wide = ("--network", trained.path, "--set", LIGHT, "--horizon", horizon)
+    return wristctl(folder, "hw-run", "--rig", CHAIN, *settings, *wide), asked
 
 
 PARTS = {"chain": chain, "wrists": wrists}

@@ -17,7 +17,10 @@ from wristctl.lanes.compiled import kernel
 from wristctl.lanes.lane import zero_like
 from wristctl.lanes.rows import lanes_like, part, rows_of
 from wristctl.simulation.actuator import Aim, actuate, deliver
-from wristctl.simulation.drives import (
+from wristctl.simulation.outcome import Outcome
+from wristctl.simulation.reference import motion
+from wristctl.simulation.rollout import rollout
+from wristctl.simulation.simulated_drives import (
     DRIVE,
     SIDES,
     Drive,
@@ -29,9 +32,6 @@ from wristctl.simulation.drives import (
     drive_in_lanes,
     drive_of,
 )
-from wristctl.simulation.outcome import Outcome
-from wristctl.simulation.reference import motion
-from wristctl.simulation.rollout import rollout
 from wristctl.wrist.pcc import PCC
 from wristctl.wrist.segments import segments
 

@@ -20,9 +20,9 @@ from wristctl.lanes.lane import zero_like
 from wristctl.lanes.rows import lanes_like, part, rows_of
 from wristctl.simulation.actuator import Aim, actuate, deliver
 from wristctl.simulation.closed_loop import follow
-from wristctl.simulation.drives import SIDES, at_rest, drive_in_lanes, drive_of, motor_of
 from wristctl.simulation.motion import Motion
 from wristctl.simulation.reference import motion
+from wristctl.simulation.simulated_drives import SIDES, at_rest, drive_in_lanes, drive_of, motor_of
 from wristctl.trial.spools import Follower
 from wristctl.wrist.pcc import PCC
 from wristctl.wrist.segments import segments

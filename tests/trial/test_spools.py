@@ -17,7 +17,7 @@ from wristctl.lanes.compiled import kernel
 from wristctl.lanes.lane import zero_like
 from wristctl.lanes.rows import part, rows_of
 from wristctl.simulation.actuator import reel_in
-from wristctl.simulation.drives import drive_in_lanes, drive_of
+from wristctl.simulation.simulated_drives import drive_in_lanes, drive_of
 from wristctl.simulation.spool_timing import spool_at
 from wristctl.trial.rig_belief import RigBelief
 from wristctl.trial.spools import on_plus_side, spools_of

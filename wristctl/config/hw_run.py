@@ -212,9 +212,7 @@ class RigSettings(Section):
 
     @model_validator(mode="after")
     def _spools_and_frames(self) -> Self:
-        own = getattr(self, "rig", None) is not None
-        levels = ("tendon", "servo") if own else ("tendon",)
-        if self.actuator.level not in levels or self.sensor.level != "camera":
+        if not self.actuator.winds or self.sensor.level != "camera":
             raise ValueError("a rig has actuator.level: tendon and sensor.level: camera")
         return self
 

@@ -25,7 +25,7 @@ from wristctl.lanes.compiled import by_type, compiled, implements
 from wristctl.lanes.functions import clip, maximum
 from wristctl.lanes.lane import floor, rounded, sqrt, where, zero_like
 from wristctl.lanes.rows import part
-from wristctl.simulation.drives import IdealDrive, LaggedDrive, ServoDrive, SpoolDrive
+from wristctl.simulation.simulated_drives import IdealDrive, LaggedDrive, ServoDrive, SpoolDrive
 from wristctl.simulation.spool_timing import foreseen, reached, reckoned, remember, spool_at
 from wristctl.simulation.target_following import motor_at, target_sent
 

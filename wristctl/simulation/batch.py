@@ -21,10 +21,18 @@ from wristctl.lanes.blocks import aligned, lanes_of, spread
 from wristctl.seeds import Entropy
 from wristctl.simulation.cameras import cameras_of
 from wristctl.simulation.disturbances import acting_in_space
-from wristctl.simulation.drives import SIDES, at_rest, believed_of, counted_motor, drive_with, motor_of, winding_of
 from wristctl.simulation.kernel import Disturbed, LoopCourse, LoopState, LoopValues, Scratch, Setup, Undisturbed
 from wristctl.simulation.motion import DERIVATIVES, Motion
 from wristctl.simulation.nonideal import faults_of, inner_of, is_ideal, nonideal_of, unmoved
+from wristctl.simulation.simulated_drives import (
+    SIDES,
+    at_rest,
+    believed_of,
+    counted_motor,
+    drive_with,
+    motor_of,
+    winding_of,
+)
 from wristctl.simulation.spool_timing import remembered_commands
 from wristctl.simulation.sums import no_sums
 from wristctl.simulation.worlds import World, bending_limit, check_stops

@@ -15,9 +15,9 @@ from wristctl.lanes.lane import where, zero_like
 from wristctl.lanes.named_tuples import block_of, borrowed
 from wristctl.lanes.rows import lanes_like, part, rows_of
 from wristctl.simulation.actuator import Aim, actuate, deliver
-from wristctl.simulation.drives import IdealDrive, LaggedDrive, ServoDrive, SpoolDrive, drive_in_lanes
 from wristctl.simulation.nonideal import spools_after_slip
 from wristctl.simulation.observer import Knowing, go_on, sense
+from wristctl.simulation.simulated_drives import IdealDrive, LaggedDrive, ServoDrive, SpoolDrive, drive_in_lanes
 from wristctl.simulation.sums import SUMS, gather, watch_range
 from wristctl.wrist.plant import advance_or_stop, bend_of, disturbed, parameters_of, path_before
 from wristctl.wrist.tendon_mechanics import acting_pulls, tendons_in_lanes

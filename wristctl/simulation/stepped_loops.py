@@ -24,10 +24,10 @@ from wristctl.lanes.rows import lanes_like, part, rows_at, rows_of
 from wristctl.simulation.batch import Lanes, Start, batch
 from wristctl.simulation.cases import Case
 from wristctl.simulation.convergence import has_kinks, in_one_go
-from wristctl.simulation.drives import SIDES, drive_in_lanes
 from wristctl.simulation.kernel import Span, gather_lanes, run_blocks
 from wristctl.simulation.observer import Knowing, sense
 from wristctl.simulation.rollout import check_two_planes, outcome_of, plant_in, worlds_of
+from wristctl.simulation.simulated_drives import SIDES, drive_in_lanes
 from wristctl.simulation.sums import SUMS
 from wristctl.simulation.worlds import bending_limit
 from wristctl.wrist.plant import bend_of, kernel_of, parameters_of

@@ -12,7 +12,7 @@ from wristctl.config.loop import Loop
 from wristctl.config.wrist import WristParameters
 from wristctl.control.law import Surface
 from wristctl.simulation.disturbances import DISTURBANCES
-from wristctl.simulation.drives import motor_of
+from wristctl.simulation.simulated_drives import motor_of
 from wristctl.simulation.worlds import World
 from wristctl.stability.linearise import LinearLoop
 from wristctl.stability.sampled_loop import Complex, Mode

@@ -14,12 +14,12 @@ from wristctl.control.law import Controller
 from wristctl.errors import UserError
 from wristctl.lanes.blocks import to_blocks, to_rows
 from wristctl.simulation.batch import Batch, Lanes, batch
-from wristctl.simulation.drives import SIDES, IdealDrive, ServoDrive, SpoolDrive, commands_of
 from wristctl.simulation.frames import schedule
 from wristctl.simulation.kernel import Span, parts_of_sample, run_blocks
 from wristctl.simulation.motion import resting
 from wristctl.simulation.observer import Schedule, Watch
 from wristctl.simulation.rollout import plant_in
+from wristctl.simulation.simulated_drives import SIDES, IdealDrive, ServoDrive, SpoolDrive, commands_of
 from wristctl.simulation.sums import SUMS
 from wristctl.simulation.worlds import World
 from wristctl.stability.smooth_loop import cycle_of

@@ -24,7 +24,7 @@ from wristctl.lanes.lane import zero_like
 from wristctl.lanes.named_tuples import tuple_of
 from wristctl.lanes.rows import part, rows_of
 from wristctl.simulation.actuator import left_behind, spool_speed, spool_target
-from wristctl.simulation.drives import read_timing
+from wristctl.simulation.simulated_drives import read_timing
 from wristctl.simulation.spool_timing import Timing, foreseen, reckoned, timing_of
 from wristctl.simulation.target_following import motor_at
 from wristctl.wrist.directions import ACTIVE, tendons_of

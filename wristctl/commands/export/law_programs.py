@@ -20,8 +20,8 @@ from wristctl.lanes.straight_line import Program, Tracer
 from wristctl.lanes.symbols import Stack, SymbolRows
 from wristctl.simulation.actuator import Aim, actuate
 from wristctl.simulation.batch import PLANES, Batch
-from wristctl.simulation.drives import IdealDrive, LaggedDrive, Motor, ServoDrive, SpoolDrive, commands_of
 from wristctl.simulation.observer import Knowing, NoCamera, propagate
+from wristctl.simulation.simulated_drives import IdealDrive, LaggedDrive, Motor, ServoDrive, SpoolDrive, commands_of
 from wristctl.simulation.spool_timing import Timing
 from wristctl.wrist.segments import Segments
 from wristctl.wrist.spatial.spatial_segments import OF_A_TENDON, SpatialSegments, SpatialWrist
