@@ -24,7 +24,6 @@ from wristctl.simulation.simulated_drives import (
     DRIVE,
     SIDES,
     Drive,
-    IdealDrive,
     LaggedDrive,
     Motor,
     SpoolDrive,
@@ -80,7 +79,7 @@ def motor_of_side(drive: LaggedDrive | SpoolDrive) -> Motor:
 
 def driven(actuator: Actuator, period: float = PERIOD) -> LaggedDrive | SpoolDrive:
     drive = drive_of(actuator, SIDES, period)
-    assert not isinstance(drive, IdealDrive)
+    assert isinstance(drive, LaggedDrive | SpoolDrive)
     return drive
 
 
