@@ -94,8 +94,9 @@ class ReferenceKeys(TypedDict, total=False):
 class ActuatorKeys(TypedDict, total=False):
     """Motors and tendons. ideal: tension = command; lagged: first-order lag, in steps; tendon: stepper, elastic."""
 
-    level: Literal["ideal", "lagged", "tendon"]
+    level: Literal["ideal", "lagged", "tendon", "servo"]
     lag: float  # s
+    resolution: float  # m
     tendon_stiffness: float  # N/m
     friction: float
     sheath: float  # rad

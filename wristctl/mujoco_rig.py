@@ -47,7 +47,8 @@ class MujocoRig:
     model : path of an MJCF file, or its text
     bend : name of the site whose turning is the bend
     actuators : names of those that pull, in the order of the targets; none: all that pull a tendon
-    sensor : rate, age and noise with which the bend is seen: CAMERA, EXACT or one's own
+    sensor : rate, age and noise with which the bend is seen: CAMERA, EXACT or one's own. The tip is seen with the same
+        noise of its direction from the base
     drive : delay, lag and resolution of the motors, and the stiffness of a tendon [N/m] behind an actuator that takes a
         force. One that takes a length has the stiffness of the model
     along, toward : the straight robot's direction and that of ulnar bends, in the model's axes
@@ -80,7 +81,7 @@ class MujocoRig:
         )  # fmt: skip
         self.model.opt.timestep = self._step = found.step
         self.data = mujoco.MjData(self.model)
-        self._noise = np.random.default_rng(seed)
+        self._noise, self._tip_noise = np.random.default_rng(seed), np.random.default_rng([seed, 1])
         self.clock = VirtualClock(self._advance)
         self._origin = 0.0
         self._begin()
@@ -94,7 +95,7 @@ class MujocoRig:
         self._steps, self._frames, self._origin = 0, 0, self.clock.now()
         self._spools.reel(self.data, self._reeled - self._slack)
         mujoco.mj_forward(self.model, self.data)
-        self._seen: deque[tuple[float, NDArray[np.float64]]] = deque()
+        self._seen: deque[tuple[float, NDArray[np.float64], NDArray[np.float64]]] = deque()
         self._motion = list[NDArray[np.float64]]()
         self._capture()
 
@@ -126,9 +127,9 @@ class MujocoRig:
         now = self.clock.now() - value(self.facts.sensor.delay) + 1e-9
         while len(self._seen) > 1 and self._seen[1][0] <= now:
             self._seen.popleft()
-        moment, bend = self._seen[0]
-        seen = bend if moment <= now else np.full(len(bend), math.nan)
-        return Look(seen, min(moment, self.clock.now()), None, Reeled(self._reeled, self.clock.now()))
+        moment, bend, tip = self._seen[0]
+        seen = (bend, tip) if moment <= now else (math.nan * bend, math.nan * tip)
+        return Look(seen[0], min(moment, self.clock.now()), None, Reeled(self._reeled, self.clock.now()), seen[1])
 
     def stop(self) -> None:
         """The motors stand where they are."""
@@ -175,8 +176,10 @@ class MujocoRig:
         moment, planes = self._time(self._steps), self.facts.planes
         bend = self._axes.bend(self.data)[:planes]
         scatter = math.radians(value(self.facts.sensor.noise_deg))
-        self._seen.append((moment, bend + self._noise.normal(0.0, scatter, planes)))
-        self._motion.append(np.concatenate([[moment], bend, self._axes.tip(self.data)]))
+        tip = self._axes.tip(self.data)
+        shown = tip + self._tip_noise.normal(0.0, scatter * float(np.linalg.norm(tip)), 3)
+        self._seen.append((moment, bend + self._noise.normal(0.0, scatter, planes), shown[: planes + 1]))
+        self._motion.append(np.concatenate([[moment], bend, tip]))
         self._frames += 1
 
 

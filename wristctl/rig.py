@@ -155,6 +155,9 @@ class Look(NamedTuple):
     """Measured tension of each tendon (T,) [N], or None."""
     reeled: Reeled | None = None
     """Where the motors are; None: they are believed to follow their targets as `facts.drive` says."""
+    tip: ArrayLike | None = None
+    """Place of the last disc (P + 1,) [m] at that time, from the first one: along the straight wrist, toward ulnar and,
+    in two planes, toward flexion; None where it is not measured. `gen-data` takes samples of it."""
 
 
 class Clock(Protocol):

@@ -78,6 +78,7 @@ def vectors_in(folder: Path) -> Any:
     [
         ("pid-ff", ()),
         ("ct-dob/hardware", (*CAMERA, "loop.sensor.dropped=0.3")),
+        ("pid-ff/hardware", (*CAMERA, "loop.actuator.level=servo", "loop.actuator.resolution=1e-5")),
         ("adrc/hardware", (*CAMERA, "loop.planes=2", "wrist.tendons=three", "loop.actuator.tendon_stiffness=30e3")),
     ],
 )

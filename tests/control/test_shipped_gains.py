@@ -25,7 +25,7 @@ from wristctl.control.shipped_gains import PREFIX, families
 from wristctl.control.table import CONTROLLERS, controller, gains_of
 from wristctl.errors import UserError
 from wristctl.simulation import actuator
-from wristctl.simulation.actuator import DRIVE
+from wristctl.simulation.simulated_drives import DRIVE
 
 CAMERA = {
     "about": "a rig",

@@ -26,9 +26,9 @@ from wristctl.identification.intervals import (
 )
 from wristctl.identification.measured_trials import MeasuredTrial, frame_noise
 from wristctl.identification.rehearsal import spools
-from wristctl.simulation.actuator import motor_of
 from wristctl.simulation.reference import motion
 from wristctl.simulation.rollout import rollout
+from wristctl.simulation.simulated_drives import motor_of
 from wristctl.wrist.statics import equilibrium
 
 

@@ -17,8 +17,8 @@ from wristctl.errors import UserError
 from wristctl.identification import rehearsal
 from wristctl.identification.forward import SupposedWrist, across_plane, angles
 from wristctl.identification.rehearsal import RehearsedTruth, rehearse
-from wristctl.simulation.actuator import motor_of
 from wristctl.simulation.reference import toward
+from wristctl.simulation.simulated_drives import motor_of
 from wristctl.wrist.directions import DIRECTIONS, in_plane
 
 pytestmark = pytest.mark.slow

@@ -16,24 +16,21 @@ from wristctl.control.table import controller
 from wristctl.lanes.compiled import kernel
 from wristctl.lanes.lane import zero_like
 from wristctl.lanes.rows import lanes_like, part, rows_of
-from wristctl.simulation.actuator import (
-    DRIVE,
-    SIDES,
-    Aim,
-    Drive,
-    IdealDrive,
-    LaggedDrive,
-    Motor,
-    SpoolDrive,
-    actuate,
-    at_rest,
-    deliver,
-    drive_in_lanes,
-    drive_of,
-)
+from wristctl.simulation.actuator import Aim, actuate, deliver
 from wristctl.simulation.outcome import Outcome
 from wristctl.simulation.reference import motion
 from wristctl.simulation.rollout import rollout
+from wristctl.simulation.simulated_drives import (
+    DRIVE,
+    SIDES,
+    Drive,
+    LaggedDrive,
+    Motor,
+    SpoolDrive,
+    at_rest,
+    drive_in_lanes,
+    drive_of,
+)
 from wristctl.wrist.pcc import PCC
 from wristctl.wrist.segments import segments
 
@@ -82,7 +79,7 @@ def motor_of_side(drive: LaggedDrive | SpoolDrive) -> Motor:
 
 def driven(actuator: Actuator, period: float = PERIOD) -> LaggedDrive | SpoolDrive:
     drive = drive_of(actuator, SIDES, period)
-    assert not isinstance(drive, IdealDrive)
+    assert isinstance(drive, LaggedDrive | SpoolDrive)
     return drive
 
 

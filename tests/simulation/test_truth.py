@@ -23,13 +23,14 @@ from wristctl.errors import UserError
 from wristctl.lanes.compiled import kernel
 from wristctl.lanes.lane import zero_like
 from wristctl.lanes.rows import lanes_like, part, rows_of
-from wristctl.simulation.actuator import Aim, actuate, drive_in_lanes, winding_of
+from wristctl.simulation.actuator import Aim, actuate
 from wristctl.simulation.batch import Batch, Lanes, batch
 from wristctl.simulation.closed_loop import simulate
 from wristctl.simulation.kernel import run_blocks
 from wristctl.simulation.observer import Knowing, go_on, sense
 from wristctl.simulation.reference import motion
 from wristctl.simulation.rollout import advance_blocks, columns_of
+from wristctl.simulation.simulated_drives import drive_in_lanes, winding_of
 from wristctl.simulation.worlds import World, facing, mismatches, plant_of
 from wristctl.study_files.load import load_study
 from wristctl.study_files.resolved import config_hash, resolved_yaml

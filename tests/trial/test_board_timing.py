@@ -18,7 +18,7 @@ from wristctl.board.emulator.atmega2560 import Atmega2560
 from wristctl.board.emulator.chip import FREQUENCY
 from wristctl.board.messages import AXES, Configure, Limits
 from wristctl.config.plant import Actuator
-from wristctl.simulation.spool_timing import remembered_rates
+from wristctl.simulation.spool_timing import remembered_commands
 from wristctl.trial.spools import Spools, spools_of
 
 PERIOD = 10e-3
@@ -55,7 +55,7 @@ def stepped(rates: Array, ramp: float, begun: float) -> Array:
 
 def simulated(rates: Array, counted: Array, spools: Spools) -> Array:
     """Steps (T, 4) at the end of each tick as the simulation has them, from those counted at its begin."""
-    ends, sent = np.empty_like(rates), np.zeros((AXES, remembered_rates(spools.timing.delay, PERIOD)))
+    ends, sent = np.empty_like(rates), np.zeros((AXES, remembered_commands(spools.timing.delay, PERIOD)))
     for tick, now in enumerate(rates):
         # where it was when a rate took effect in the last tick, so that it is now where it is counted
         place = counted[tick] - spools.reckoned(np.zeros(AXES), np.column_stack([now, sent[:, :-1]]), 0.0, PERIOD)

@@ -16,7 +16,8 @@ from wristctl.config.wrist import WristParameters
 from wristctl.lanes.compiled import kernel
 from wristctl.lanes.lane import zero_like
 from wristctl.lanes.rows import part, rows_of
-from wristctl.simulation.actuator import drive_in_lanes, drive_of, reel_in
+from wristctl.simulation.actuator import reel_in
+from wristctl.simulation.simulated_drives import drive_in_lanes, drive_of
 from wristctl.simulation.spool_timing import spool_at
 from wristctl.trial.rig_belief import RigBelief
 from wristctl.trial.spools import on_plus_side, spools_of

@@ -86,6 +86,8 @@ def with_rig(study: Study) -> Study:
     """
     name = study.hw_run.rig
     if name is None:
+        if study.hw_run.actuator.level == "servo":
+            raise UserError("the board leads its motors by rates", "hw-run.actuator.level", "level: tendon")
         return study
     from wristctl.trial.rig_settings import check_facts, settings_of, wrist_of
 

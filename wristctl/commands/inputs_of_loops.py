@@ -264,11 +264,35 @@ def identified(study: Study, command: str, inputs: Inputs) -> Study:
     found = with_found(study, command, found_by)
     if command == "hw-run":
         try:
+            if study.hw_run.rig is not None:
+                return _on_its_rig(study, found)
             check_sides(found.wrist, command)
         except UserError as error:
             run = inputs.runs().get("from_identified")
             raise error.at(str(run.path) if run else "from_identified") from error
     return found
+
+
+# Keys of an actuator that a log tells; the others are of motors, whose facts say them.
+_OF_TENDONS = "tendon_stiffness", "friction", "sheath", "presliding"
+
+
+def _on_its_rig(study: Study, found: Study) -> Study:
+    """An identified wrist on a robot of one's own, whose motors and sensor are as its facts say: a log has the times at
+    which its bends were true. UserError where it has other tendons.
+    """
+    from wristctl.trial.rig_belief import layout_of_rig
+
+    known, believed = (layout_of_rig(study.hw_run, wrist) for wrist in (study.wrist, found.wrist))
+    assert known is not None and believed is not None
+    if len(known.places) != len(believed.places):
+        what = f"{len(believed.places)} tendons were identified, and the rig has {len(known.places)}"
+        raise UserError(what, "from_identified", "identify a log of this rig: wristctl runs export latest:hw-run")
+    told = {key: getattr(found.hw_run.actuator, key) for key in _OF_TENDONS}
+    motors = study.hw_run.actuator.model_copy(update=told)
+    return found.model_copy(
+        update={"hw_run": found.hw_run.model_copy(update={"actuator": motors, "sensor": study.hw_run.sensor})}
+    )
 
 
 def wrist_identified(inputs: Inputs) -> str:

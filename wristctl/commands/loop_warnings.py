@@ -163,7 +163,7 @@ def warn_if_coarse(loops: Iterable[Loop]) -> None:
     """Warn where configured substeps are longer than elastic tendons allow."""
     for loop in loops:
         step = loop.control_period / loop.steps
-        if loop.actuator.level == "tendon" and step > longest_step(loop.actuator) * (1.0 + 1e-9):
+        if loop.actuator.winds and step > longest_step(loop.actuator) * (1.0 + 1e-9):
             message = "integration steps of %.3g ms are too long for elastic tendons: substeps: null, or at least %d"
             log.warning(message, 1e3 * step, loop.fewest_steps)
 

@@ -23,7 +23,7 @@ def stiffness_table(wrist: WristParameters, loop: Loop, planes: int) -> Table:
     for degrees in sorted({0.01, loop.stiffness_over_deg, 3.0}):
         bend = math.radians(degrees)
         rows.append((degrees, *held.over(bend), most_stiffness(wrist, loop, layout, bend)))
-    on = "spools" if loop.actuator.level == "tendon" else "pulls"
+    on = "spools" if loop.actuator.winds else "pulls"
     alike = ", ".join(f"{pull:.3g}" for pull in held.pulls / held.layout.multiplicity)
     title = f"Stiffness [N m/rad] of the straight wrist on held {on}, its tendons pulling {alike} N"
     return Table(title, ("over [deg]", "least", "largest", "least, by co-contraction"), rows)

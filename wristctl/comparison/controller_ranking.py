@@ -208,8 +208,8 @@ def traits_of(loops: Sequence[Loop], wrist: WristParameters, jumps: bool = False
     """What holds of all of these loops."""
     classes = [class_of(loop, wrist) for loop in loops]
     camera = all(loop.sensor.level == "camera" for loop in loops)
-    tendons = all(loop.actuator.level == "tendon" for loop in loops)
-    either = all(loop.sensor.level == "camera" or loop.actuator.level == "tendon" for loop in loops)
+    tendons = all(loop.actuator.winds for loop in loops)
+    either = all(loop.sensor.level == "camera" or loop.actuator.winds for loop in loops)
     load, unknown = (all(name == kind for name in classes) for kind in ("pushed", "off-nominal"))
     uneven = all(loop.plant.model == "hinges" for loop in loops)
     return Traits(either, camera, tendons, jumps, load, unknown, uneven)

@@ -212,7 +212,7 @@ class RigSettings(Section):
 
     @model_validator(mode="after")
     def _spools_and_frames(self) -> Self:
-        if self.actuator.level != "tendon" or self.sensor.level != "camera":
+        if not self.actuator.winds or self.sensor.level != "camera":
             raise ValueError("a rig has actuator.level: tendon and sensor.level: camera")
         return self
 

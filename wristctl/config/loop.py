@@ -95,7 +95,7 @@ class Loop(Section):
     @property
     def steps(self) -> int:
         """Integration steps within one control period."""
-        return self.substeps or (self.fewest_steps if self.actuator.level == "tendon" else 1)
+        return self.substeps or (self.fewest_steps if self.actuator.winds else 1)
 
     @property
     def fewest_steps(self) -> int:

@@ -133,7 +133,7 @@ def check_speeds(corner: float, top: float | None) -> None:
 class TrueActuator(Overrides, TendonFacts):
     """Motors and tendons as they are, where that is not what the controller believes."""
 
-    lag: Positive = truth("s", "time constant of the motor's force (lagged)")
+    lag: NotNegative = truth("s", "time constant of the motor's force (lagged), or behind its target (servo)")
     tendon_stiffness: Positive = truth("N/m", "stiffness of one tendon")
     friction: NotNegative = truth("", "coefficient of the tendons' friction; the observer counts on none")
     sheath: NotNegative = truth("rad", "angle by which each tendon is wrapped before it reaches the wrist (tendon)")
@@ -142,7 +142,7 @@ class TrueActuator(Overrides, TendonFacts):
     step_rate: Positive = truth("1/s", "largest rate of microsteps")
     step_acceleration: Positive = truth("1/s^2", "largest change of that rate by the host (tendon)")
     ramp: Positive = truth("1/s^2", "change of that rate by the board, within a tick (tendon)")
-    command_delay: NotNegative = truth("s", "from a tick until the board has read its step rates (tendon)")
+    command_delay: NotNegative = truth("s", "from a tick until the board has its rates, or motors follow their targets")
     update: Positive = truth("s", "between two changes of an axis' rate by the board (tendon)")
     torque: float | None = fact(
         None, "N m", "of a standing motor: pulled harder it falls back by four full steps; null: never (tendon)", gt=0
@@ -255,10 +255,18 @@ class Disturbances(OpenSection):
 
 
 class Actuator(Section):
-    """Motors and tendons. ideal: tension = command; lagged: first-order lag, in steps; tendon: stepper, elastic."""
+    """Motors and tendons. ideal: tension = command; lagged: first-order lag, in steps; tendon: stepper, elastic.
 
-    level: Literal["ideal", "lagged", "tendon"] = choice("ideal", "how much of motors and tendons is simulated")
-    lag: float = quantity(5e-3, "s", "time constant of the motor's force (lagged)", "assumed", gt=0)
+    servo: motors that follow targets by themselves, after `command_delay`, with `lag`, at `step_rate` at most.
+    """
+
+    level: Literal["ideal", "lagged", "tendon", "servo"] = choice(
+        "ideal", "how much of motors and tendons is simulated"
+    )
+    lag: float = quantity(
+        5e-3, "s", "time constant of the motor's force (lagged), or behind its target (servo)", "assumed", ge=0
+    )
+    resolution: float = seldom(0.0, "m", "smallest change of a target (servo); 0: finer than matters", ge=0)
     tendon_stiffness: float = quantity(20e3, "N/m", "stiffness of one tendon", "assumed; sweep 2-50 kN/m", gt=0)
     friction: float = quantity(0.1, "", "coefficient of the tendons' friction (tendon)", "assumed", ge=0)
     sheath: float = quantity(
@@ -280,13 +288,18 @@ class Actuator(Section):
         "the board's most; a NEMA 23 at 34 N follows 810,000, with a drum of 0.44 kg 95,000", gt=0,
     )  # fmt: skip
     command_delay: float = quantity(
-        1.98e-3, "s", "from a tick until the board has read its step rates (tendon)",
+        1.98e-3, "s", "from a tick until the board has read its rates (tendon), or motors follow their targets (servo)",
         "half a frame of USB, 26 bytes at 250 kBd, 0.44 ms of the firmware", ge=0, le=0.1,
     )  # fmt: skip
     update: float = quantity(
         3e-3, "s", "between two changes of an axis' rate by the board (tendon)",
         "firmware: 2 ms, up to 4 where it looks after one axis a millisecond", gt=0, le=0.1,
     )  # fmt: skip
+
+    @property
+    def winds(self) -> bool:
+        """Whether motors wind elastic tendons onto spools."""
+        return self.level in ("tendon", "servo")
 
     @property
     def step_length(self) -> float:

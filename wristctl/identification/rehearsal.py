@@ -23,19 +23,10 @@ from wristctl.identification.forward import SupposedWrist, across_plane, angles
 from wristctl.lanes.compiled import kernel
 from wristctl.lanes.lane import zero_like
 from wristctl.lanes.rows import lanes_like, part, rows_of
-from wristctl.simulation.actuator import (
-    SIDES,
-    Aim,
-    Motor,
-    actuate,
-    at_rest,
-    counted_motor,
-    deliver,
-    drive_in_lanes,
-    drive_of,
-)
+from wristctl.simulation.actuator import Aim, actuate, deliver
 from wristctl.simulation.reference import motion, toward
 from wristctl.simulation.rollout import rollout
+from wristctl.simulation.simulated_drives import SIDES, Motor, at_rest, counted_motor, drive_in_lanes, drive_of
 from wristctl.simulation.worlds import facing, plant_of
 from wristctl.wrist.directions import ACTIVE, DIRECTIONS, in_plane, tendons_of
 from wristctl.wrist.pcc import PCC

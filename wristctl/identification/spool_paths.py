@@ -18,7 +18,7 @@ from wristctl.config.plant import Actuator
 from wristctl.lanes.compiled import kernel
 from wristctl.lanes.lane import zero_like
 from wristctl.lanes.rows import rows_of
-from wristctl.simulation.actuator import read_timing
+from wristctl.simulation.simulated_drives import read_timing
 from wristctl.simulation.spool_timing import rate_after, timing_of, way
 from wristctl.wrist.directions import ACTIVE
 

@@ -2,9 +2,10 @@
 
 lagged: T' = (command - T)/lag, no faster than the motor can stretch the tendon, in whole microsteps of it.
 tendon: a stepper reels tendon in; what its elastic tendons then pull is `wristctl.wrist.tendon_mechanics`'s.
+servo: a motor that follows targets reels it in (`wristctl.simulation.target_following`).
 The spool's target is command/k + the shortening at theta_ref: at the measured angle, delayed, it would feed back
-positively with a gain near 1. A spool moves at the speed of the reference's shortening, and closes its gap on top.
-Its rates take effect when the board has them, and ramp (`wristctl.simulation.spool_timing`).
+positively with a gain near 1. A stepper moves at the speed of the reference's shortening, and closes its gap on top.
+A stepper's rates take effect when the board has them, and ramp (`wristctl.simulation.spool_timing`).
 
 A host sends steps and believes what they are: it counts in lengths and pulls of its own belief, and what the motors
 deliver for that count is the world's (`Winding`).
@@ -13,184 +14,23 @@ There is a motor for each of T places of tendons; in one plane these are the + a
 has two rows for each, its count, a pull or a reeled length, and its speed; a row for the torque [N m] that all of them
 withhold in each of P planes follows, and one for what each plane missed of its last torque. A spool's count and speed
 are those of when a rate took effect in the last tick; the rates that its host has sent, the newest first, come last.
+A motor that follows targets has its place when the tick began, and the place where its host believes it to be; its
+targets come last.
 """
 
-import math
 from typing import Any, NamedTuple
 
-import numpy as np
-
-from wristctl.arrays import Array
-from wristctl.config.plant import Actuator
 from wristctl.control.belief import lengths_at, moment_arms_at, straight_at
 from wristctl.lanes.compiled import by_type, compiled, implements
 from wristctl.lanes.functions import clip, maximum
 from wristctl.lanes.lane import floor, rounded, sqrt, where, zero_like
-from wristctl.lanes.named_tuples import tuple_of
-from wristctl.lanes.rows import part, rows_of
-from wristctl.simulation.spool_timing import (
-    Timing,
-    foreseen,
-    reached,
-    reckoned,
-    remember,
-    remembered_rates,
-    spool_at,
-    timing_of,
-)
-from wristctl.wrist.tendons import TENDONS_PER_SIDE
+from wristctl.lanes.rows import part
+from wristctl.simulation.simulated_drives import IdealDrive, LaggedDrive, ServoDrive, SpoolDrive
+from wristctl.simulation.spool_timing import foreseen, reached, reckoned, remember, spool_at
+from wristctl.simulation.target_following import motor_at, target_sent
 
-# Version of the simulated drive: another one where motors deliver something else for the same settings and commands.
-# 1 moved spools at the start of a tick; 2 moves them as a board does, after its delay, by its updates and its ramp.
-DRIVE = 2
 # Length of tendon [m] that is none, however fine the microsteps.
 _ROUNDING = 1e-9
-# Tendons at each place in one plane: the + and the - side's.
-SIDES = (float(TENDONS_PER_SIDE), float(TENDONS_PER_SIDE))
-
-
-class Motor(NamedTuple):
-    """A motor, SI units; `stiffness` is that of one tendon, what comes last is the `Timing` of its board."""
-
-    lag: Any
-    stiffness: Any
-    step: Any
-    speed: Any
-    acceleration: Any
-    ramp: Any
-    delay: Any
-    update: Any
-
-
-class IdealDrive(NamedTuple):
-    """Pulls are as commanded; nothing of a motor is simulated."""
-
-
-class LaggedDrive(NamedTuple):
-    """Motors whose pulls lag behind their commands; `stiffness` (T,) is that of all tendons of each place [N/m]."""
-
-    motor: Any
-    stiffness: Any
-
-
-class SpoolDrive(NamedTuple):
-    """Motors that reel elastic tendons onto spools; `stiffness` (T,) is that of all tendons of each place [N/m].
-
-    `believed` is the Timing that their host reckons with; `rates` is a tuple with an entry, whose value means nothing,
-    for each rate of a spool that is remembered.
-    """
-
-    motor: Any
-    stiffness: Any
-    believed: Any
-    rates: Any
-
-
-Drive = IdealDrive | LaggedDrive | SpoolDrive
-
-# A Motor and a Timing of lanes from rows of lanes, in compiled code.
-read_motor, read_timing = tuple_of(Motor), tuple_of(Timing)
-
-
-class Winding(NamedTuple):
-    """Winding error: the motors deliver `scale` times the count of their host, and `offset` [m]."""
-
-    scale: float
-    offset: float
-
-
-def motor_of(actuator: Actuator) -> Motor:
-    """The values of an actuator section."""
-    step = actuator.step_length
-    return Motor(
-        lag=actuator.lag,
-        stiffness=actuator.tendon_stiffness,
-        step=step,
-        speed=step * actuator.step_rate,
-        acceleration=step * actuator.step_acceleration,
-        **timing_of(actuator, step)._asdict(),
-    )
-
-
-def drive_with(level: str, motor: Any, stiffness: Any, believed: Any, rates: int) -> Drive:
-    """The drive of a level with this Motor, places of this stiffness, believed Timing and so many rates that spools
-    remember, or with the rows of a batch; an ideal drive has none."""
-    if level == "ideal":
-        return IdealDrive()
-    return LaggedDrive(motor, stiffness) if level == "lagged" else SpoolDrive(motor, stiffness, believed, (0,) * rates)
-
-
-def drive_of(
-    actuator: Actuator, alike: Array | tuple[float, ...] = SIDES, period: float = math.inf, motor: Motor | None = None
-) -> Drive:
-    """The drive of an actuator section, as arrays, with so many tendons at each place (T,).
-
-    Parameters
-    ----------
-    actuator : as its host believes
-    alike : tendons at each place (T,)
-    period : of control [s], where rates are sent
-    motor : as it is; None: as believed
-    """
-    motor, believed = motor or motor_of(actuator), timing_of(actuator, actuator.step_length)
-    rates = remembered_rates(max(motor.delay, believed.delay), period)
-    return drive_with(actuator.level, np.array(motor), motor.stiffness * np.asarray(alike), np.array(believed), rates)
-
-
-@by_type
-def drive_in_lanes(drive: Any) -> Any:
-    """A drive of lanes from a drive whose motor is one block's array."""
-    raise NotImplementedError("compiled code only")
-
-
-@implements(drive_in_lanes, IdealDrive)
-def _ideal_in_lanes(drive: Any) -> Any:
-    return drive
-
-
-@implements(drive_in_lanes, LaggedDrive)
-def _lagged_in_lanes(drive: Any) -> Any:
-    return LaggedDrive(read_motor(rows_of(drive.motor)), rows_of(drive.stiffness))
-
-
-@implements(drive_in_lanes, SpoolDrive)
-def _spools_in_lanes(drive: Any) -> Any:
-    believed = read_timing(rows_of(drive.believed))
-    return SpoolDrive(read_motor(rows_of(drive.motor)), rows_of(drive.stiffness), believed, drive.rates)
-
-
-def counted_motor(believed: Actuator, actual: Actuator) -> Motor:
-    """The motor as its host counts: lengths and pulls are what it believes, only how fast it is, it is in truth."""
-    step = believed.step_length
-    limits = {"lag": actual.lag, "speed": step * actual.step_rate, "acceleration": step * actual.step_acceleration}
-    return motor_of(believed)._replace(**limits, **timing_of(actual, step)._asdict())
-
-
-def winding_of(believed: Actuator, actual: Actuator, pull: float, creep: float = 0.0) -> Winding:
-    """Meaning of a count: each tendon was homed at this pull [N] on the straight wrist, where the counts are right.
-
-    `creep` is the share of the tendons' stiffness that had relaxed by then.
-    """
-    counts, does = motor_of(believed), motor_of(actual)
-    if believed.level == "lagged":
-        return Winding(does.stiffness * does.step / (counts.stiffness * counts.step), 0.0)
-    scale = does.step / counts.step
-    return Winding(scale, pull / (does.stiffness * (1.0 - creep)) - scale * (pull / counts.stiffness))
-
-
-def at_rest(drive: Drive, pulls: Array, straight: float, taut: Array, scale: float = 1.0, planes: int = 1) -> Array:
-    """State of the motors at rest at these pulls (T,) [N], none of which withholds anything.
-
-    Tendons that are just taut are `taut` (T,) long on the wrist as it stands, and `straight` on the straight one [m];
-    `drive` is as the host counts, `scale` that of the winding.
-    """
-    rates = len(drive.rates) if isinstance(drive, SpoolDrive) else 0
-    state = np.zeros((2 + rates) * len(pulls) + 2 * planes)
-    counts = state[: 2 * len(pulls) : 2]
-    counts[:] = pulls
-    if isinstance(drive, SpoolDrive):
-        counts[:] = pulls / drive.stiffness + straight / scale - taut / scale
-    return state
 
 
 @compiled
@@ -227,9 +67,9 @@ def left_behind(acceleration: Any, gap: Any, closing: Any, h: float) -> Any:
 
 
 @compiled
-def _rates_of(drive: Any, state: Any, places: int, planes: int, t: int) -> Any:
-    """Rates that the host has sent to the spool of a place, the newest first."""
-    return part(state, 2 * (places + planes) + len(drive.rates) * t, drive.rates)
+def _sent_to(remembered: Any, state: Any, places: int, planes: int, t: int) -> Any:
+    """Rates or targets that the host has sent to the motor of a place, the newest first."""
+    return part(state, 2 * (places + planes) + len(remembered) * t, remembered)
 
 
 @compiled
@@ -247,6 +87,26 @@ def reel_in(drive: Any, state: Any, rates: Any, t: int, target: Any, moving: Any
     behind = left_behind(motor.acceleration, gap, speed - moving, h)
     withheld = where(abs(behind) > motor.step + _ROUNDING, drive.stiffness[t] * behind, 0.0)
     return reckoned(believed, state[2 * t], rates, 0.5 * h + zero_like(gap), h), withheld
+
+
+@compiled
+def lead_on(drive: Any, state: Any, targets: Any, t: int, target: Any, moving: Any, h: float) -> Any:
+    """Send a target that leads the motor of a place to its moving target, ahead of it by delay, lag and half a period.
+
+    Returns the mean of the place over the period by its host's belief, which steps within it, and the pull that is
+    withheld: of the length from the target that was sent to the one that is wanted.
+    """
+    motor, believed = drive.motor, drive.believed
+    tick = h + zero_like(target)
+    state[2 * t], _, _ = motor_at(motor, state[2 * t], targets, tick, h)
+    state[2 * t + 1], _, _ = motor_at(believed, state[2 * t + 1], targets, tick, h)
+    wanted = target + rounded(moving * (believed.delay + believed.lag + 0.5 * h))
+    sent = target_sent(believed, believed.step, wanted, targets[0], h)
+    remember(targets, sent)
+    behind = wanted - sent
+    withheld = where(abs(behind) > believed.step + _ROUNDING, drive.stiffness[t] * behind, 0.0)
+    _, _, summed = motor_at(believed, state[2 * t + 1], targets, tick, h)
+    return summed / h, withheld
 
 
 @compiled
@@ -306,7 +166,23 @@ def _lagged(drive: Any, state: Any, known: Any, aim: Any, pulls: Any, h: float, 
         _withhold(state, pulls, aim, t, less)
 
 
-@implements(actuate, SpoolDrive)
+@by_type
+def _wind(drive: Any, state: Any, places: int, planes: int, t: int, target: Any, moving: Any, h: float) -> Any:
+    """Lead the motor of a place to its moving target: what `reel_in` or `lead_on` returns."""
+    raise NotImplementedError("compiled code only")
+
+
+@implements(_wind, SpoolDrive)
+def _by_rates(drive: Any, state: Any, places: int, planes: int, t: int, target: Any, moving: Any, h: float) -> Any:
+    return reel_in(drive, state, _sent_to(drive.rates, state, places, planes, t), t, target, moving, h)
+
+
+@implements(_wind, ServoDrive)
+def _by_targets(drive: Any, state: Any, places: int, planes: int, t: int, target: Any, moving: Any, h: float) -> Any:
+    return lead_on(drive, state, _sent_to(drive.targets, state, places, planes, t), t, target, moving, h)
+
+
+@implements(actuate, SpoolDrive, ServoDrive)
 def _reeled(drive: Any, state: Any, known: Any, aim: Any, pulls: Any, h: float, counts: Any) -> None:
     count = len(pulls)
     lengths_at(known.wrist, aim.bend, counts)
@@ -318,8 +194,7 @@ def _reeled(drive: Any, state: Any, known: Any, aim: Any, pulls: Any, h: float, 
         for p in range(1, len(aim.bend)):
             moving = moving + rounded(aim.arms[count * p + t] * aim.rate[p])
         target = spool_target(pulls[t], drive.stiffness[t], straight_at(known.wrist, t), counts[t])
-        rates = _rates_of(drive, state, count, len(aim.bend), t)
-        counts[t], less = reel_in(drive, state, rates, t, target, moving, h)
+        counts[t], less = _wind(drive, state, count, len(aim.bend), t, target, moving, h)
         _withhold(state, pulls, aim, t, less)
 
 
@@ -355,10 +230,21 @@ def _wound(drive: Any, told: Any, time: Any, motion: Any) -> None:
     state, winding, counts, bend, h = told
     delivered, speeds = motion
     for t in range(len(counts)):
-        rates = _rates_of(drive, state, len(counts), len(bend), t)
+        rates = _sent_to(drive.rates, state, len(counts), len(bend), t)
         place, rate = spool_at(drive.motor, state[2 * t], state[2 * t + 1], rates, time, h)
         delivered[t] = winding[0] * (drive.motor.step * floor(place / drive.motor.step + 0.5)) + winding[1 + t]
         speeds[t] = winding[0] * rate
+
+
+@implements(deliver, ServoDrive)
+def _followed(drive: Any, told: Any, time: Any, motion: Any) -> None:
+    state, winding, counts, bend, h = told
+    delivered, speeds = motion
+    for t in range(len(counts)):
+        targets = _sent_to(drive.targets, state, len(counts), len(bend), t)
+        place, speed, _ = motor_at(drive.motor, state[2 * t], targets, time, h)
+        delivered[t] = winding[0] * place + winding[1 + t]
+        speeds[t] = winding[0] * speed
 
 
 @by_type
@@ -373,7 +259,7 @@ def _delivered_pulls(drive: Any, known: Any, bend: Any, counts: Any, pulls: Any)
         pulls[t] = counts[t]
 
 
-@implements(frictionless_pulls, SpoolDrive)
+@implements(frictionless_pulls, SpoolDrive, ServoDrive)
 def _stretched(drive: Any, known: Any, bend: Any, counts: Any, pulls: Any) -> None:
     lengths_at(known.wrist, bend, pulls)
     for t in range(len(pulls)):
@@ -392,6 +278,6 @@ def _none(drive: Any, zero: Any) -> Any:
     return zero
 
 
-@implements(held_stiffness, SpoolDrive)
+@implements(held_stiffness, SpoolDrive, ServoDrive)
 def _on_spools(drive: Any, zero: Any) -> Any:
     return drive.motor.stiffness

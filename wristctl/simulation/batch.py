@@ -19,13 +19,21 @@ from wristctl.control.response import OF_A_PLANE
 from wristctl.errors import UserError
 from wristctl.lanes.blocks import aligned, lanes_of, spread
 from wristctl.seeds import Entropy
-from wristctl.simulation.actuator import SIDES, at_rest, counted_motor, drive_with, motor_of, winding_of
 from wristctl.simulation.cameras import cameras_of
 from wristctl.simulation.disturbances import acting_in_space
 from wristctl.simulation.kernel import Disturbed, LoopCourse, LoopState, LoopValues, Scratch, Setup, Undisturbed
 from wristctl.simulation.motion import DERIVATIVES, Motion
 from wristctl.simulation.nonideal import faults_of, inner_of, is_ideal, nonideal_of, unmoved
-from wristctl.simulation.spool_timing import remembered_rates, timing_of
+from wristctl.simulation.simulated_drives import (
+    SIDES,
+    at_rest,
+    believed_of,
+    counted_motor,
+    drive_with,
+    motor_of,
+    winding_of,
+)
+from wristctl.simulation.spool_timing import remembered_commands
 from wristctl.simulation.sums import no_sums
 from wristctl.simulation.worlds import World, bending_limit, check_stops
 from wristctl.wrist.dahl import NoInnerFriction
@@ -144,28 +152,28 @@ class _Worlds:
         That compiles code; of tendons that are not wound it is of no use, and 0.
         """
         wrist, places = self.actual[index], len(self.alike)
-        if self.level != "tendon":
+        if not self.loop.actuator.winds:
             return np.zeros(3 if self.layout is None else 2 * places)
         if self.layout is None:
             return np.append(wrist.length - model.taut(wrist, at), np.abs(at).sum())
         return path_at(model, model.values(wrist, self.loop.plant_segments), at, places)
 
-    def timing(self, index: int) -> Array:
-        """Timing of the motors' board as believed."""
-        believed = self.worlds[index].loop.actuator
-        return np.array(timing_of(believed, believed.step_length))
+    def believed(self, index: int) -> Array:
+        """Motors as their host reckons with them."""
+        return np.array(believed_of(self.worlds[index].loop.actuator))
 
     @property
-    def rates(self) -> int:
-        """Rates that each spool remembers."""
-        believed = [timing_of(world.loop.actuator).delay for world in self.worlds]
+    def remembered(self) -> int:
+        """Rates or targets that each motor remembers."""
+        believed = [believed_of(world.loop.actuator).delay for world in self.worlds]
         delays = [*believed, *(motor.delay for motor in self.counted)]
-        return remembered_rates(max(delays), self.period)
+        return remembered_commands(max(delays), self.period)
 
     def motors(self, index: int, travel: Array) -> Array:
         """State of the motors at rest where the tendons' paths are so much shorter than on the straight wrist (T,)."""
         wrist = self.actual[index]
-        drive = drive_with(self.level, self.counted[index], self.stiffness(index), self.timing(index), self.rates)
+        motor, believed = self.counted[index], self.believed(index)
+        drive = drive_with(self.level, motor, self.stiffness(index), believed, self.remembered)
         pulls = self.least(index) if self.worlds[index].loop.stiffness else self.alike * wrist.pretension
         planes = 1 if self.layout is None else 2
         return at_rest(drive, pulls, wrist.length, wrist.length - travel, self.windings[index].scale, planes)
@@ -218,8 +226,8 @@ def batch(
             of.level,
             of.rows(lambda index: np.array(of.counted[index])),
             of.rows(of.stiffness),
-            of.rows(of.timing),
-            of.rates,
+            of.rows(of.believed),
+            of.remembered,
         ),
         lead=of.rows(lambda index: np.array([float(of.worlds[index].loop.spool_lead)])),
         winding=of.rows(of.offsets),
@@ -277,7 +285,7 @@ def _tendons(of: _Worlds, coordinates: Array, paths: Sequence[Array], counts: Se
         lambda rows: spread(np.ascontiguousarray(rows[of.which]), of.count),
         planes,
     )
-    elastic, pulls = of.level == "tendon", (0,) * len(of.alike)
+    elastic, pulls = of.loop.actuator.winds, (0,) * len(of.alike)
 
     def stiffness_of(index: int) -> Array:
         alike = of.alike[:1] if of.layout is None else of.alike

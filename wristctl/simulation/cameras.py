@@ -9,9 +9,9 @@ from wristctl.arrays import Array
 from wristctl.control.response import OF_A_PLANE
 from wristctl.lanes.blocks import lanes_of, spread
 from wristctl.seeds import Entropy
-from wristctl.simulation.actuator import SIDES
 from wristctl.simulation.frames import frame_counts, readings, remembered, side_by_side
 from wristctl.simulation.observer import NoCamera, Observer, Schedule, Watch
+from wristctl.simulation.simulated_drives import SIDES
 from wristctl.simulation.stationary_filter import beliefs_of, stationary_gains
 from wristctl.simulation.worlds import World
 from wristctl.wrist.tendon_layout import TendonLayout

@@ -119,7 +119,7 @@ def trajectory(
         values = outcome.part(kind, index)
         return values[:, 0] if planes == 1 else values
 
-    coordinates, observed, wound = outcome.coordinates(index), loop.sensor.level == "camera", loop.actuator.level
+    coordinates, observed, wound = outcome.coordinates(index), loop.sensor.level == "camera", loop.actuator.winds
     return Trajectory(
         label="",
         time=followed.time,
@@ -141,7 +141,7 @@ def trajectory(
         substeps=int(outcome.steps[index]),
         drift=float(outcome.drift[index]),
         outside=followed.outside,
-        spools=outcome.part("delivered", index) if wound == "tendon" else None,
+        spools=outcome.part("delivered", index) if wound else None,
     )
 
 

@@ -116,7 +116,7 @@ def _difference(one: Outcome, finer: Outcome) -> Array:
 def has_kinks(loop: Loop) -> bool:
     """Whether forces on the wrist have kinks: friction and slack of elastic tendons, end stops, or inner friction."""
     plant = loop.plant
-    return loop.actuator.level == "tendon" or plant.end_stop_deg is not None or plant.inner_friction > 0.0
+    return loop.actuator.winds or plant.end_stop_deg is not None or plant.inner_friction > 0.0
 
 
 def more_finely(loop: Loop, times: int) -> Loop:

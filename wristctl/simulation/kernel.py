@@ -14,9 +14,10 @@ from wristctl.lanes.functions import norm
 from wristctl.lanes.lane import where, zero_like
 from wristctl.lanes.named_tuples import block_of, borrowed
 from wristctl.lanes.rows import lanes_like, part, rows_of
-from wristctl.simulation.actuator import Aim, IdealDrive, LaggedDrive, SpoolDrive, actuate, deliver, drive_in_lanes
+from wristctl.simulation.actuator import Aim, actuate, deliver
 from wristctl.simulation.nonideal import spools_after_slip
 from wristctl.simulation.observer import Knowing, go_on, sense
+from wristctl.simulation.simulated_drives import IdealDrive, LaggedDrive, ServoDrive, SpoolDrive, drive_in_lanes
 from wristctl.simulation.sums import SUMS, gather, watch_range
 from wristctl.wrist.plant import advance_or_stop, bend_of, disturbed, parameters_of, path_before
 from wristctl.wrist.tendon_mechanics import acting_pulls, tendons_in_lanes
@@ -266,7 +267,7 @@ def _stays(drive: Any, told: Any, step: Any, spools: Any, tendons: Any, plant: A
     pass
 
 
-@implements(_onward, SpoolDrive)
+@implements(_onward, SpoolDrive, ServoDrive)
 def _turns_on(drive: Any, told: Any, step: Any, spools: Any, tendons: Any, plant: Any, q: Any) -> None:
     (tick, since, h), (delivered, speeds, held) = step, spools
     deliver(drive, told, since + 0.5 * h, (delivered, speeds))

@@ -49,7 +49,7 @@ def electrical_turn(actuator: Actuator) -> float:
 
 def nonideal_of(plant: TrueWrist, actuator: Actuator, facts: TendonFacts, step: float) -> Nonideal:
     """The values of a world at an integration step [s]."""
-    elastic = actuator.level == "tendon"
+    elastic = actuator.winds
     motor = facts if isinstance(facts, TrueActuator) else TrueActuator()
     return Nonideal(
         friction=actuator.friction * elastic,
@@ -79,7 +79,7 @@ def faults_of(actuator: Actuator, facts: TendonFacts, alike: Array) -> Array:
     Raises UserError for a place that there is not.
     """
     places, never = len(alike), math.inf
-    elastic = actuator.level == "tendon"
+    elastic = actuator.winds
     torque = facts.torque if isinstance(facts, TrueActuator) else None
     faults = np.array([np.full(places, never), 1.0 - 1.0 / alike, np.full(places, never), np.full(places, never)])
     for row, time, place, key in (

@@ -19,7 +19,8 @@ from wristctl.control.response import OF_A_PLANE
 from wristctl.lanes.compiled import by_type, compiled, implements, spelled_out
 from wristctl.lanes.lane import rounded, where, zero_like
 from wristctl.lanes.rows import lanes_like, part, rows_at, rows_of
-from wristctl.simulation.actuator import SIDES, drive_in_lanes, drive_of, frictionless_pulls, held_stiffness
+from wristctl.simulation.actuator import frictionless_pulls, held_stiffness
+from wristctl.simulation.simulated_drives import SIDES, drive_in_lanes, drive_of
 from wristctl.wrist.segments import load_segments, segments
 
 

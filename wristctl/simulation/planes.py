@@ -13,11 +13,11 @@ from wristctl.config.wrist import WristParameters
 from wristctl.errors import UserError
 from wristctl.simulation.live_reference import followed_bends
 from wristctl.simulation.motion import Angles, Motion
-from wristctl.simulation.recording import recorded_bends
+from wristctl.simulation.recording import recorded_bends, recorded_tips
 from wristctl.simulation.reference import REFERENCES, by_angles, course_of, estimated, motion, toward
 from wristctl.simulation.worlds import plant_of
 from wristctl.wrist.directions import DIRECTIONS, in_plane
-from wristctl.wrist.kinematics import Inverse
+from wristctl.wrist.kinematics import Inverse, TipPath
 from wristctl.wrist.spatial.spatial_kinematics import tips_along
 from wristctl.wrist.tendon_layout import TendonLayout, off_both_sides
 
@@ -102,16 +102,32 @@ def motion_in(
     if planes == 1:
         directed = reference if direction is None else toward(reference, direction)
         return motion(directed, wrist, horizon, period, network, later)
+    if reference.inverse == "network" and reference.kind == "recording":
+        tips = recorded_tips(reference, _grid(horizon, period))
+        if tips is not None:  # of a wrist that need be no arc
+            rows, outside = _through(network, tips)
+            through = Motion.of_bends(within(rows, wrist, "reference.file"), period, wrist.length)
+            return replace(through, tips=tips.position, outside=outside)
     way = _direction(reference, direction)
     bends = bends_of(reference, way, wrist, horizon, period)
     wanted = Motion.of_bends(bends, period, wrist.length)
     if reference.inverse != "network":
         return wanted
-    estimate = estimated(network, tips_along(bends, wrist.length))
-    rows = np.stack([estimate.theta, estimate.rate, estimate.acceleration]).transpose(2, 0, 1)
+    rows, outside = _through(network, tips_along(bends, wrist.length))
     reached = Angles.of(np.ascontiguousarray(rows).reshape(-1, bends.shape[2]))
-    outside = float(np.mean(estimate.outside))
     return replace(wanted, angles=reached, turn=bends[:, 0, -1], outside=outside, wanted=wanted.angles)
+
+
+def _through(network: Inverse | None, tips: TipPath) -> tuple[Array, float]:
+    """The network's bends with two derivatives (2, 3, T), and the share of tips that it has not learned."""
+    estimate = estimated(network, tips)
+    rows = np.stack([estimate.theta, estimate.rate, estimate.acceleration]).transpose(2, 0, 1)
+    return np.ascontiguousarray(rows), float(np.mean(estimate.outside))
+
+
+def _grid(horizon: float, period: float) -> Array:
+    time: Array = np.arange(round(horizon / period), dtype=np.float64) * period
+    return time
 
 
 def _direction(reference: Reference, direction: DirectionName | None) -> DirectionName:
@@ -128,7 +144,7 @@ def bends_of(
     """
     reference = by_angles(reference)
     kind = REFERENCES[reference.kind]
-    time = np.arange(round(horizon / period), dtype=np.float64) * period
+    time = _grid(horizon, period)
     if kind.planes == 2:
         return within(course_of(reference, kind, time), wrist)
     if reference.kind == LIVE:

@@ -23,7 +23,7 @@ from wristctl.records.log_converters import read_log
 from wristctl.records.log_looks import looked_at, telling
 from wristctl.records.open_log import OpenLog
 from wristctl.simulation.reference import TIP_TOLERANCE, ReferenceKind, beyond_reach
-from wristctl.wrist.kinematics import exact_arc
+from wristctl.wrist.kinematics import TipPath, exact_arc
 from wristctl.wrist.spatial.spatial_kinematics import exact_bend
 
 TIP = ("tip_x", "tip_y")
@@ -182,6 +182,29 @@ def recorded_bends(reference: Reference, wrist: WristParameters, time: Array) ->
     course = np.stack([_splined(since, plane, noise, within) for plane in reference.value("scale") * bends.T])
     course[:, 1:, (time < 0.0) | (time > since[-1] + 1e-12)] = 0.0
     return course
+
+
+def recorded_tips(reference: Reference, time: Array) -> TipPath | None:
+    """Path of a recording's tips in space, as they are, at times (T,) [s]; None where its bends are followed.
+
+    Raises UserError as `read_recording`, and for what is of bends alone: a scale, and noise that is smoothed.
+    """
+    log = _looked_at(read_log(Path(reference.file or ""), reference.columns or "", "recording", others=True))
+    bends = {"bend_y", "bend_z"} <= log.columns.keys() or "orientation" in log.columns
+    if (bends and reference.column != "tip") or not all(name in log.columns for name in SPATIAL_TIP):
+        return None
+    if reference.value("scale") != 1.0 or reference.value("noise_deg") != 0.0:
+        fix = "leave scale and noise_deg out, or write the tips that are wanted"
+        raise UserError("recorded tips behind a network are followed as they are", "reference.scale", fix)
+    log = log.only(np.asarray(np.isfinite([log.columns[name] for name in SPATIAL_TIP]).all(axis=0)))
+    tips, since = np.stack([log.columns[name] for name in SPATIAL_TIP]), log.columns["time"]
+    for plane in exact_bend(tips.T)[0].T:
+        _check(log, since, plane)
+    since = since - since[0]
+    within = np.clip(time, 0.0, since[-1])
+    course = np.stack([_splined(since, axis, 0.0, within) for axis in tips])
+    course[:, 1:, (time < 0.0) | (time > since[-1] + 1e-12)] = 0.0
+    return TipPath(*course.transpose(1, 2, 0))
 
 
 def _bends_of_tips(log: OpenLog, wrist: WristParameters) -> Array:

@@ -14,13 +14,13 @@ from wristctl.control.law import Controller
 from wristctl.lanes.blocks import to_rows
 from wristctl.processes import cores, stoppable
 from wristctl.seeds import Entropy
-from wristctl.simulation.actuator import SIDES
 from wristctl.simulation.batch import Batch, Lanes, Start, batch
 from wristctl.simulation.convergence import has_kinks, more_finely, settled
 from wristctl.simulation.kernel import Span, columns_of_brief, columns_of_sample, run_blocks
 from wristctl.simulation.metrics import Totals, metrics_in, summary
 from wristctl.simulation.motion import GOALS, Motion
 from wristctl.simulation.outcome import KeptSamples, Outcome
+from wristctl.simulation.simulated_drives import SIDES
 from wristctl.simulation.sums import SUMS, sums_by_name
 from wristctl.simulation.worlds import World
 from wristctl.wrist.plant import PLANTS, PLANTS_IN_SPACE, PlantModel, kernel_of

@@ -19,8 +19,8 @@ from wristctl.lanes.compiled import by_type, implements
 from wristctl.lanes.lane import where, zero_like
 from wristctl.lanes.rows import lanes_like, part, rows_of
 from wristctl.processes import cores, stoppable
-from wristctl.simulation.actuator import SIDES
 from wristctl.simulation.nonideal import faults_of, inner_of, nonideal_of, of_tendons, unmoved
+from wristctl.simulation.simulated_drives import SIDES
 from wristctl.wrist.pcc import PCC
 from wristctl.wrist.plant import advance_or_stop, bend_of, kernel_of, parameters_of, path_at, path_before
 from wristctl.wrist.segments import Segments

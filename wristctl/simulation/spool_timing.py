@@ -28,12 +28,12 @@ class Timing(NamedTuple):
 
 def timing_of(actuator: Actuator, length: float = 1.0) -> Timing:
     """Timing of an actuator section's board, with microsteps of this length."""
-    delay = actuator.command_delay + 0.5 * actuator.update
-    return Timing(length * actuator.ramp, delay, actuator.update)
+    waits = 0.0 if actuator.level == "servo" else 0.5 * actuator.update
+    return Timing(length * actuator.ramp, actuator.command_delay + waits, actuator.update)
 
 
-def remembered_rates(delay: float, period: float) -> int:
-    """Number of rates, the newest one with them, that say where a spool is in a tick [s] with this `Timing.delay`."""
+def remembered_commands(delay: float, period: float) -> int:
+    """Number of rates or targets, with the newest, that say where a spool is in a tick [s] with this `Timing.delay`."""
     return int(delay // period) + 3
 
 
@@ -56,8 +56,11 @@ def rate_after(timing: Any, before: Any, after: Any, time: Any) -> Any:
 
 
 @compiled
-def _sent(timing: Any, rates: Any, back: int, h: float) -> Any:
-    """Rate that was sent `back` ticks before the one that takes effect in this tick; `rates` begin with the newest."""
+def in_effect(timing: Any, rates: Any, back: int, h: float) -> Any:
+    """Rate that was sent `back` ticks before the one that takes effect in this tick; `rates` begin with the newest.
+
+    Of targets it is the target.
+    """
     ago, rate = floor(timing.delay / h) + float(back), rates[0]
     for k in range(1, len(rates)):
         rate = where(ago >= float(k), rates[k], rate)
@@ -70,7 +73,7 @@ def reached(timing: Any, place: Any, moving: Any, rates: Any, h: float) -> Any:
 
     The newest of `rates` is the last tick's.
     """
-    after = _sent(timing, rates, 1, h)
+    after = in_effect(timing, rates, 1, h)
     return place + way(timing, moving, after, h), rate_after(timing, moving, after, h)
 
 
@@ -82,7 +85,7 @@ def spool_at(timing: Any, place: Any, moving: Any, rates: Any, time: Any, h: flo
     tick's.
     """
     since = timing.delay - h * floor(timing.delay / h)
-    before, after = _sent(timing, rates, 1, h), _sent(timing, rates, 0, h)
+    before, after = in_effect(timing, rates, 1, h), in_effect(timing, rates, 0, h)
     first, second = h - since + minimum(time, since), maximum(time - since, zero_like(since))
     at_change = rate_after(timing, moving, before, h)
     now = where(time < since, rate_after(timing, moving, before, first), rate_after(timing, at_change, after, second))
@@ -97,7 +100,7 @@ def foreseen(timing: Any, place: Any, rates: Any, h: float) -> Any:
     to be reached within a tick.
     """
     whole = floor(timing.delay / h)
-    for k in range(len(rates) - 2):  # the delay is shorter than so many ticks: `remembered_rates`
+    for k in range(len(rates) - 2):  # the delay is shorter than so many ticks: `remembered_commands`
         place = place + where(whole >= float(k), way(timing, rates[k + 1], rates[k], h), 0.0)
     return place
 
@@ -105,13 +108,13 @@ def foreseen(timing: Any, place: Any, rates: Any, h: float) -> Any:
 @compiled
 def reckoned(timing: Any, place: Any, rates: Any, time: Any, h: float) -> Any:
     """Place of a spool at a time in this tick [s], as `spool_at`, each rate taken to be reached within a tick."""
-    there, _ = spool_at(timing, place, _sent(timing, rates, 2, h), rates, time, h)
+    there, _ = spool_at(timing, place, in_effect(timing, rates, 2, h), rates, time, h)
     return there
 
 
 @compiled
 def remember(rates: Any, newest: Any) -> None:
-    """Put the newest rate before the others, the last of which is forgotten."""
+    """Put the newest rate, or target, before the others, the last of which is forgotten."""
     for k in range(len(rates) - 1):
         rates[len(rates) - 1 - k] = rates[len(rates) - 2 - k]
     rates[0] = newest

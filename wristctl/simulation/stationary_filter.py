@@ -11,8 +11,8 @@ from wristctl.config.plant import Actuator, Sensor
 from wristctl.config.wrist import WristParameters
 from wristctl.lanes.compiled import kernel
 from wristctl.lanes.rows import part, rows_of
-from wristctl.simulation.actuator import SIDES, at_rest
 from wristctl.simulation.observer import Observer, knowing_in_lanes, known_of_sides, propagate
+from wristctl.simulation.simulated_drives import SIDES, at_rest
 from wristctl.simulation.worlds import World
 from wristctl.wrist.directions import in_plane
 from wristctl.wrist.pcc import PCC

@@ -21,13 +21,13 @@ from wristctl.lanes.functions import norm
 from wristctl.lanes.lane import where, zero_like
 from wristctl.lanes.named_tuples import block_of
 from wristctl.lanes.rows import lanes_like, part, rows_at, rows_of
-from wristctl.simulation.actuator import SIDES, drive_in_lanes
 from wristctl.simulation.batch import Lanes, Start, batch
 from wristctl.simulation.cases import Case
 from wristctl.simulation.convergence import has_kinks, in_one_go
 from wristctl.simulation.kernel import Span, gather_lanes, run_blocks
 from wristctl.simulation.observer import Knowing, sense
 from wristctl.simulation.rollout import check_two_planes, outcome_of, plant_in, worlds_of
+from wristctl.simulation.simulated_drives import SIDES, drive_in_lanes
 from wristctl.simulation.sums import SUMS
 from wristctl.simulation.worlds import bending_limit
 from wristctl.wrist.plant import bend_of, kernel_of, parameters_of

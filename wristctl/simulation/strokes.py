@@ -13,8 +13,8 @@ from wristctl.config.hysteresis import HysteresisSettings
 from wristctl.config.loop import Loop, Reference
 from wristctl.config.wrist import WristParameters
 from wristctl.errors import UserError
-from wristctl.simulation.actuator import SIDES
 from wristctl.simulation.planes import Asked, why_two
+from wristctl.simulation.simulated_drives import SIDES
 from wristctl.simulation.spool_driven import SpooledWrist
 from wristctl.wrist.compiled_model import terms
 from wristctl.wrist.directions import toward_words

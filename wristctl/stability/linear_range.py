@@ -11,8 +11,8 @@ from wristctl.arrays import Array
 from wristctl.config.loop import Loop
 from wristctl.config.wrist import WristParameters
 from wristctl.control.law import Surface
-from wristctl.simulation.actuator import motor_of
 from wristctl.simulation.disturbances import DISTURBANCES
+from wristctl.simulation.simulated_drives import motor_of
 from wristctl.simulation.worlds import World
 from wristctl.stability.linearise import LinearLoop
 from wristctl.stability.sampled_loop import Complex, Mode
@@ -110,19 +110,22 @@ def linearity_limits(
         limits.append(LinearityLimit("the camera's noise", False, noise, "none, and no frame lost"))
     if level != "ideal":
         motor = motor_of(loop.actuator)
-        scale, count = (1.0, np.ones_like(alike)) if level == "tendon" else (motor.stiffness, alike)
+        scale, count = (1.0, np.ones_like(alike)) if loop.actuator.winds else (motor.stiffness, alike)
         finest = _over(0.5 * scale * motor.step, swing.motor(0, count))
         speed = scale * loop.actuator.step_length * world.actuator.step_rate
+        step = "a motor's resolution" if level == "servo" else "a motor's microstep"
+        limits += [LinearityLimit(step, False, finest, "no steps: any length")] if motor.step else []
         limits += [
-            LinearityLimit("a motor's microstep", False, finest, "no steps: any length"),
             LinearityLimit("a motor's speed", True, _over(speed, swing.motor(1, count)), "as fast as it has to be"),
         ]
-    if level == "tendon":
+    if loop.actuator.winds:
         play = loop.plant.actuator.backlash / radii[radii > 0.0].min()
         limits += [LinearityLimit("backlash", False, play, "none")] if play else []
+    if level == "tendon":
         acceleration = _SHARE * loop.actuator.step_length * world.actuator.step_acceleration
         most = _over(acceleration, swing.motor(2))
         limits += [LinearityLimit("the stepper's acceleration", True, most, "where it is told to be after a period")]
+    if loop.actuator.winds:
         limits += [*_friction(world, friction, radii), _slack(world, swing.linear, radii)]
     if loop.limits:
         left = wrist.tension_limit - max(swing.linear.tensions)

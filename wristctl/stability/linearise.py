@@ -164,7 +164,7 @@ def linearise(
     ticks, point = sliding, resting_point(sliding)
     if point is None:
         return None
-    if friction == "stuck" and loop.actuator.level == "tendon":
+    if friction == "stuck" and loop.actuator.winds:
         ticks = LoopTicks(law, gains, smooth(loop, "stuck"), wrist, theta)
         point = with_relaxed_bristles(ticks, sliding, point)
     memory = np.array(ticks.names) == "memory"

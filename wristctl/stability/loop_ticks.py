@@ -13,13 +13,13 @@ from wristctl.config.wrist import WristParameters
 from wristctl.control.law import Controller
 from wristctl.errors import UserError
 from wristctl.lanes.blocks import to_blocks, to_rows
-from wristctl.simulation.actuator import SIDES, IdealDrive, SpoolDrive
 from wristctl.simulation.batch import Batch, Lanes, batch
 from wristctl.simulation.frames import schedule
 from wristctl.simulation.kernel import Span, parts_of_sample, run_blocks
 from wristctl.simulation.motion import resting
 from wristctl.simulation.observer import Schedule, Watch
 from wristctl.simulation.rollout import plant_in
+from wristctl.simulation.simulated_drives import SIDES, IdealDrive, ServoDrive, SpoolDrive, commands_of
 from wristctl.simulation.sums import SUMS
 from wristctl.simulation.worlds import World
 from wristctl.stability.smooth_loop import cycle_of
@@ -62,13 +62,14 @@ def state_parts(batch: Batch, law: Controller, tick: int, back: Remembered) -> I
     yield StatePart("memory", state.memory, _beside(kept, memory), np.ones(planes * memory))
     yield StatePart("angle", state.coordinates, np.arange(k), np.full(k, _ANGLE))
     yield StatePart("rate", state.coordinates, np.arange(k, 2 * k), np.full(k, _RATE))
-    size = _LENGTH if isinstance(drive, SpoolDrive) else _PULL
+    size = _LENGTH if isinstance(drive, SpoolDrive | ServoDrive) else _PULL
     if not isinstance(drive, IdealDrive):
         yield StatePart("motor", state.motors, np.arange(0, 2 * places, 2), np.full(places, size))
-    if isinstance(drive, SpoolDrive):
-        sent = np.arange(2 * (places + planes), (2 + len(drive.rates)) * places + 2 * planes)
-        rates = np.concatenate([np.arange(1, 2 * places, 2), sent])
-        yield StatePart("motor rate", state.motors, rates, np.full(len(rates), _SPEED))
+    if isinstance(drive, SpoolDrive | ServoDrive):
+        sent = np.arange(2 * (places + planes), (2 + commands_of(drive)) * places + 2 * planes)
+        further = np.concatenate([np.arange(1, 2 * places, 2), sent])
+        name, unit = ("motor rate", _SPEED) if isinstance(drive, SpoolDrive) else ("motor target", _LENGTH)
+        yield StatePart(name, state.motors, further, np.full(len(further), unit))
     if isinstance(state.tendons, (RealTendons, RealPlaces)):
         rows, per_tendon = state.tendons.state, len(OF_A_TENDON)
         first = per_tendon * np.arange(places)

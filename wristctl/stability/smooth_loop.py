@@ -62,6 +62,7 @@ def cycle_of(loop: Loop) -> tuple[int, int]:
 def _steady(actuator: Actuator) -> Actuator:
     changes = {
         "microstep": actuator.microstep * _FINER,
+        "resolution": 0.0,
         "step_rate": actuator.step_rate * _FINER * _FASTER,
         "step_acceleration": actuator.step_acceleration * _FINER * _FASTER,
         "ramp": actuator.ramp * _FINER * _FASTER,

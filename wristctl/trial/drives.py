@@ -13,7 +13,7 @@ from wristctl.arrays import Array
 from wristctl.board.driver import Board
 from wristctl.board.messages import AXES, Fault, Flag, State
 from wristctl.config.hw_run import HwRunSettings
-from wristctl.simulation.spool_timing import remembered_rates
+from wristctl.simulation.spool_timing import remembered_commands
 from wristctl.trial.spools import spools_of
 
 # By how much longer it takes the board to read a RATE for each step/s of all axes together, whose interrupts come
@@ -105,7 +105,7 @@ class BoardDrive:
         self._sent, self._posted, self.counted = np.zeros(AXES), 0.0, 0.0
         self._underway = settings.actuator.command_delay
         delay = self._spools.timing.delay
-        self._late, self._rates = int(delay // self._period), np.zeros((AXES, remembered_rates(delay, self._period)))
+        self._late, self._rates = int(delay // self._period), np.zeros((AXES, remembered_commands(delay, self._period)))
         self._since_read = delay - self._late * self._period - self._underway
 
     def begin(self) -> None:

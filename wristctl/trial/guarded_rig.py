@@ -36,6 +36,8 @@ class Seen(NamedTuple):
     """On the rig's clock [s]."""
     tension: Array | None
     """(T,) [N]; None where it is not measured."""
+    tip: Array | None = None
+    """(P + 1,) [m]; None where it is not measured."""
 
 
 class GuardedRig:
@@ -88,17 +90,18 @@ class GuardedRig:
         look = self._call("look", self.rig.look)
         try:
             bend, time, *measured = look
-            tension, reeled = (*measured, None, None)[: max(2, len(measured))]
+            tension, reeled, tip = (*measured, None, None, None)[: max(3, len(measured))]
             moment, reeled = float(time), None if reeled is None else Reeled(*reeled)
         except (TypeError, ValueError) as error:
-            fix = "return Look(bend, time, tension or None, Reeled(targets, time) or None)"
+            fix = "return Look(bend, time, tension or None, Reeled(targets, time) or None, tip or None)"
             raise RigStop(f"look() returns {look!r}", self.where, fix) from error
         bends = self._values("look", bend, self.facts.planes, finite=False)
         if not np.isfinite(moment):
             raise RigStop("look() does not say when its bend was true", self.where, "Look.time on the rig's own clock")
         self.tension = None if tension is None else self._values("look", tension, self._count, finite=False)
         self.reeled = None if reeled is None else self._reeled(reeled)
-        return Seen(np.where(np.isfinite(bends), bends, np.nan), moment, self.tension)
+        place = None if tip is None else self._values("look", tip, self.facts.planes + 1, finite=False)
+        return Seen(np.where(np.isfinite(bends), bends, np.nan), moment, self.tension, place)
 
     def _reeled(self, reeled: Reeled) -> tuple[Array, float]:
         places, (moment,) = (self._values("look", values, count) for values, count in

@@ -176,6 +176,17 @@ def frame_columns_of_a_rig(planes: int) -> Columns:
     return {"trial": _SEEN_BY_A_RIG["trial"], "plane": ("", "ulnar or flexion: that the bend is in"), **named}
 
 
+def look_columns(planes: int) -> Columns:
+    """Columns of a trial's looks at a robot of one's own that saw its tip, from which networks learn."""
+    axes = {"x": "along the straight wrist", "y": "toward ulnar", "z": "toward flexion"}
+    tips = {
+        f"tip_{axis}": ("m", f"place of the tip from the first disc, {way}")
+        for axis, way in [*axes.items()][: planes + 1]
+    }
+    bends = _by_plane(planes, {"bend": ("rad", "bend less zero, by the same look")})
+    return {"trial": ("", "number, from 0"), "time": ("s", "when it was true, on the trial's time"), **tips, **bends}
+
+
 def truth_columns(coordinates: int, planes: int = 1) -> Columns:
     """Columns of the emulated bench's true values, for a wrist of so many coordinates."""
     of_segments = {f"bend_{k + 1}": ("rad", "true angle of one segment") for k in range(coordinates // planes)}
@@ -264,7 +275,8 @@ class TrialLog:
     """log.csv and frames.csv of trials; between.csv for the moves between them; residuals.csv of both; wire.csv with
     all bytes of the whole run; truth.csv of an emulated bench. The clock is `monotonic`, or virtual; a rig is `weighed`
     where it has load cells. The true wrist of a bench has so many `coordinates`. `tendons` are the numbers of those
-    that motors wind. A robot of one's own is not `wired`: it has no board and no wire.csv, and may measure tensions.
+    that motors wind. A robot of one's own is not `wired`: it has no board and no wire.csv; it may measure tensions,
+    and tips, which are in looks.csv.
     """
 
     def __init__(
@@ -272,7 +284,7 @@ class TrialLog:
         planes: int = 1, tendons: Sequence[int] = ACTIVE, wired: bool = True,
     ) -> None:  # fmt: skip
         self.disk, self._monotonic = Disk(folder), monotonic
-        self._planes = planes
+        self._planes, self._sightings = planes, list[Sighting]()
         ticks, frames = tick_columns_of_a_rig(planes, tendons), frame_columns_of_a_rig(planes)
         if wired:
             ticks, frames = (
@@ -280,6 +292,8 @@ class TrialLog:
                 frame_columns(planes),
             )
         tables = {"log": ticks, "between": ticks, "frames": frames, **({"wire": WIRE} if wired else {})}
+        if not wired:
+            tables["looks"] = look_columns(planes)
         tables["residuals"] = residual_columns(planes, weighed, not wired)
         if coordinates is not None:
             tables["truth"] = truth_columns(coordinates, planes)
@@ -311,8 +325,18 @@ class TrialLog:
         place = trial, *plane, sighting.number, sighting.time - begin, used
         if "wire" not in self.streams:
             self.streams["frames"].row((*place, *seen[:2], *predicted))
+            self._look(trial, sighting, begin)
             return
         self.streams["frames"].row((*place, *seen, *predicted, *sighting.corners.ravel().tolist()))
+
+    def _look(self, trial: int, sighting: Sighting, begin: float) -> None:
+        """The sighting of one plane of a look; that of the last makes its row, where all of it was seen."""
+        self._sightings = [*self._sightings, sighting] if sighting.plane else [sighting]
+        if len(self._sightings) == self._planes:
+            across, bends = ([getattr(one, name) for one in self._sightings] for name in ("tip_y", "theta"))
+            values = [sighting.tip_x, *across, *bends]
+            if np.isfinite(values).all():
+                self.streams["looks"].row((trial, sighting.time - begin, *values))
 
     def residuals(self, trial: int, clock: float, values: Mapping[str, float]) -> None:
         """Residuals of a tick, written with its row: also of the tick that they end, which has none."""

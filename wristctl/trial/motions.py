@@ -38,10 +38,7 @@ def motion_of(
         way = cast(DirectionName, direction)
         found = motion_in(1, reference, way, in_plane(wrist, way), horizon, period, network)
     elif has_path(settings):
-        if reference.inverse == "network":
-            problem, fix = "no network stands behind a path of trials", "inverse: closed-form"
-            raise UserError(problem, "reference.inverse", fix)
-        found = motion_in(2, reference, None, wrist, horizon, period)
+        found = motion_in(2, reference, None, wrist, horizon, period, network)
     else:
         of_plane = REFERENCES[reference.kind].plane
         if of_plane and of_plane != direction:

@@ -16,8 +16,8 @@ from wristctl.control.belief import Compensated, Places, belief_in_lanes, length
 from wristctl.errors import UserError
 from wristctl.lanes.compiled import kernel
 from wristctl.lanes.rows import part, rows_of
-from wristctl.simulation.actuator import drive_of
 from wristctl.simulation.observer import Known, known_of_sides
+from wristctl.simulation.simulated_drives import drive_of
 from wristctl.simulation.stationary_filter import Belief, as_pairs, stationary_gains
 from wristctl.trial.spools import on_plus_side
 from wristctl.wrist.directions import ACTIVE, TENDONS, in_plane

@@ -10,9 +10,11 @@ from wristctl.arrays import Array
 from wristctl.board.messages import State
 from wristctl.config.hw_run import HwRunSettings
 from wristctl.rig import value
+from wristctl.simulation.spool_timing import remembered_commands
 from wristctl.trial.camera_pace import CameraPaces
 from wristctl.trial.guarded_rig import GuardedRig
 from wristctl.trial.safety import SafetyStop
+from wristctl.trial.spools import Follower
 from wristctl.vision.camera_pose import CameraPose
 from wristctl.vision.marker import Sighting, SightingVerdict
 
@@ -27,8 +29,8 @@ class RigDrive:
     """Motors that follow targets after a delay, with a lag: microsteps of `actuator.step_length`, positive reeling in.
 
     `zero` are the targets (T,) at which every tendon of the straight wrist is just taut. What is believed of the spools
-    is what was sent, after the delay and the lag of the rig's facts; where looks say where the motors are, they are as
-    far from there as when they were looked at.
+    is what was sent, after the delay and the lag of the rig's facts and at no more than its rate; where looks say where
+    the motors are, they are as far from there as when they were looked at.
     """
 
     lapses, resent = 0, 0
@@ -38,13 +40,12 @@ class RigDrive:
         facts = rig.facts
         self._rig, self._zero, self._period = rig, np.asarray(zero, float), settings.control_period
         self._step, self._unit = settings.actuator.step_length, facts.metres_per_unit
-        self._delay, self._lag = value(facts.drive.delay), value(facts.drive.lag)
-        self._fastest = facts.limits.rate / self._step * self._period
-        self._ticks = int(self._delay // self._period)
-        self._since = self._delay - self._ticks * self._period
+        delay, lag = value(facts.drive.delay), value(facts.drive.lag)
+        self._motor = Follower(delay, lag, facts.limits.rate / self._step)
+        self._ahead, self._fastest = delay + lag + 0.5 * self._period, self._motor.speed * self._period
         self._target = self._place = np.zeros(len(self._zero))
         self._sent, self.counted = np.zeros(len(self._zero)), 0.0
-        self._remembered: deque[Array] = deque()
+        self._remembered: deque[Array] = deque(maxlen=remembered_commands(delay, self._period))
         self._reckoned_at, self._off = deque[tuple[float, Array]](maxlen=_REMEMBERED), np.zeros(len(self._zero))
 
     def at(self, targets: Array) -> None:
@@ -60,7 +61,7 @@ class RigDrive:
     def begin(self) -> None:
         """The motors stand where they were sent last."""
         self._place, self._sent = self._target, np.zeros(len(self._zero))
-        self._remembered = deque([self._target] * (self._ticks + 2), maxlen=self._ticks + 2)
+        self._remembered.extend([self._target] * (self._remembered.maxlen or 0))
         self.counted = self._rig.now()
         self._reckoned_at.clear()
         self._reckoned_at.append((self.counted, self._place))
@@ -111,7 +112,7 @@ class RigDrive:
 
     def lead(self, target: Array, moving: Array) -> Array:
         """As `LoopDrive.lead`: ahead of a moving target by the delay, the lag and half a period."""
-        wanted = target + moving * (self._delay + self._lag + 0.5 * self._period)
+        wanted = target + moving * self._ahead
         self._send(self._target + np.clip(wanted - self._target, -self._fastest, self._fastest))
         behind = wanted - self._target
         return np.where(np.abs(behind) > 1.0, behind, 0.0)
@@ -129,27 +130,15 @@ class RigDrive:
         """A rig answers when it is asked."""
 
     def go_on(self, ticks: int) -> list[Array]:
-        """As `LoopDrive.go_on`, by what was sent."""
-        middles = []
+        """As `LoopDrive.go_on`, by what was sent: of places that step within a tick their means over it."""
+        means = []
         for _ in range(ticks):
             self._remembered.appendleft(self._target)
-            before, after = self._remembered[self._ticks + 1], self._remembered[self._ticks]
-            middles.append(self._reckoned(before, after, 0.5 * self._period) + self._off)
-            self._place = self._reckoned(before, after, self._period)
+            self._place, mean = self._motor.over(self._place, np.array(self._remembered).T, self._period)
+            means.append(mean + self._off)
             self._reckoned_at.append((self._reckoned_at[-1][0] + self._period, self._place))
         self.counted = self._rig.now()
-        return middles
-
-    def _reckoned(self, before: Array, after: Array, time: float) -> Array:
-        """Places at a time in the tick [s], in which the target goes from `before` to `after`."""
-        place = self._followed(self._place, before, min(time, self._since))
-        return self._followed(place, after, max(0.0, time - self._since))
-
-    def _followed(self, place: Array, target: Array, time: float) -> Array:
-        if time <= 0.0:
-            return place
-        left = math.exp(-time / self._lag) if self._lag > 0.0 else 0.0
-        return target + (place - target) * left
+        return means
 
 
 class LookPaces(CameraPaces):
@@ -201,12 +190,14 @@ class RigTracking:
             return []
         self._number += 1
         ahead, self._time = seen.time > now + _CLOCKS, seen.time
+        along, *across = [math.nan] * (len(self.zero) + 1) if seen.tip is None else seen.tip.tolist()
         return [
-            Sighting(seen.time, self._number, bend - zero, self._verdict(bend, ahead), _UNSEEN, came=now, plane=plane)
-            if math.isfinite(bend) and not ahead
-            else Sighting(seen.time, self._number, math.nan, self._verdict(bend, ahead), _UNSEEN, came=now, plane=plane)
-            for plane, (bend, zero) in enumerate(zip(seen.bend.tolist(), self.zero, strict=True))
-        ]
+            Sighting(
+                seen.time, self._number, bend - zero if math.isfinite(bend) and not ahead else math.nan,
+                self._verdict(bend, ahead), _UNSEEN, tip_x=along, tip_y=aside, came=now, plane=plane,
+            )
+            for plane, (bend, zero, aside) in enumerate(zip(seen.bend.tolist(), self.zero, across, strict=True))
+        ]  # fmt: skip
 
     @staticmethod
     def _verdict(bend: float, ahead: bool) -> SightingVerdict:

@@ -87,6 +87,7 @@ class RigExperiment(TrialSeries):
         """
         try:
             self._warm_up(self._facing, PLANE, self._layout)
+            self._warm_up_drive(rig)
             with self._stopping(lambda cause: self._stopped(rig, cause)):
                 self._all(rig, shown, confirm)
             with undisturbed():
@@ -101,6 +102,12 @@ class RigExperiment(TrialSeries):
     @property
     def _still(self) -> float:
         return _STANDS * math.radians(self._settings.homing.bend_deg)
+
+    def _warm_up_drive(self, rig: GuardedRig) -> None:
+        """Have it compiled before a rig is connected that may stop by itself where it hears nothing."""
+        drive = RigDrive(rig, self._settings, np.zeros(len(self._layout.places)))
+        drive.begin()
+        drive.go_on(1)
 
     def _all(self, rig: GuardedRig, shown: Shown | None, confirm: Callable[[], None] | None) -> None:
         if confirm is not None:

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from pydantic import ValidationError
 
-from wristctl.config.hw_run import RAMPS, HwRunSettings
+from wristctl.config.hw_run import HwRunSettings
 from wristctl.config.plant import Actuator, Sensor
 from wristctl.config.wrist import TendonPlace, WristParameters
 from wristctl.errors import UserError, meant
@@ -17,8 +17,6 @@ from wristctl.wrist.tendon_layout import TendonLayout
 
 # Microsteps of a motor's turn, by which a rig's resolution is a length on a pulley.
 _MICROSTEPS = 3200
-# Seconds between two changes of a target that a rig is believed to follow.
-_UPDATE = 1e-3
 # Resolutions that a homing move is worth at least.
 _FINE = 4.0
 # Relative difference below which two levers are alike.
@@ -132,8 +130,7 @@ def settings_of(facts: Facts, settings: HwRunSettings, where: str) -> HwRunSetti
     changes: dict[str, Any] = {"planes": facts.planes}
     if "planes" in given and settings.planes != facts.planes:
         raise UserError(f"the rig has {facts.planes} planes", "hw-run.planes", "leave the key out")
-    if "actuator" not in given:
-        changes["actuator"] = _actuator(facts)
+    changes["actuator"] = _actuator(facts, settings.actuator if "actuator" in given else Actuator())
     if "sensor" not in given:
         changes["sensor"] = _sensor(facts, settings.control_period)
     if "push" not in given:
@@ -154,20 +151,22 @@ def _missing(section: Any, values: Mapping[str, Any]) -> dict[str, Any]:
     return {name: each for name, each in values.items() if name not in section.model_fields_set}
 
 
-def _actuator(facts: Facts) -> Actuator:
-    """A resolution finer than a usual microstep is taken as one: the model's motors could not be fast enough else."""
-    usual, drive = Actuator(level="tendon"), facts.drive
-    step = max(value(drive.resolution), usual.step_length)
-    return usual.model_copy(
-        update={
-            "tendon_stiffness": value(drive.stiffness),
-            "pulley_radius": step * _MICROSTEPS / (2.0 * math.pi),
-            "step_rate": facts.limits.rate / step,
-            "step_acceleration": RAMPS[1],
-            "command_delay": min(0.1, value(drive.delay) + value(drive.lag)),
-            "update": _UPDATE,
-        }
-    )
+def _actuator(facts: Facts, given: Actuator) -> Actuator:
+    """Motors that follow targets as the facts say, where the study gives nothing else.
+
+    Where motors are is counted in steps of the resolution, or of a usual microstep if that is longer.
+    """
+    drive = facts.drive
+    step = max(value(drive.resolution), Actuator().step_length)
+    own = {
+        "lag": value(drive.lag),
+        "resolution": value(drive.resolution),
+        "tendon_stiffness": value(drive.stiffness),
+        "pulley_radius": step * _MICROSTEPS / (2.0 * math.pi),
+        "step_rate": facts.limits.rate / step,
+        "command_delay": min(0.1, value(drive.delay)),
+    }
+    return given.model_copy(update={"level": "servo", **_missing(given, own)})
 
 
 def _sensor(facts: Facts, period: float) -> Sensor:

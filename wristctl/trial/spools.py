@@ -12,7 +12,7 @@ delayed, `taut` would feed back positively with a gain near 1.
 
 import math
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,9 +21,12 @@ from wristctl.arrays import Array
 from wristctl.config.plant import Actuator
 from wristctl.lanes.compiled import kernel
 from wristctl.lanes.lane import zero_like
+from wristctl.lanes.named_tuples import tuple_of
 from wristctl.lanes.rows import part, rows_of
-from wristctl.simulation.actuator import left_behind, read_timing, spool_speed, spool_target
+from wristctl.simulation.actuator import left_behind, spool_speed, spool_target
+from wristctl.simulation.simulated_drives import read_timing
 from wristctl.simulation.spool_timing import Timing, foreseen, reckoned, timing_of
+from wristctl.simulation.target_following import motor_at
 from wristctl.wrist.directions import ACTIVE, tendons_of
 
 
@@ -125,6 +128,40 @@ def _behind(acceleration: float, gap: Any, closing: Any, period: float, left: An
     gaps, speeds, out = rows_of(gap), rows_of(closing), rows_of(left)
     for axis in range(len(gap)):
         out[axis] = left_behind(acceleration, gaps[axis], speeds[axis], period)
+
+
+class Follower(NamedTuple):
+    """Motors that follow targets; lengths in any one unit."""
+
+    delay: float
+    """From when a target is sent until the motors begin to follow it [s]."""
+    lag: float
+    """Time constant of the motors behind it [s]."""
+    speed: float
+
+    def over(self, place: Array, targets: Array, period: float) -> tuple[Array, Array]:
+        """Places (T,) of the motors at the end of a tick [s], at whose begin they were at `place`, and their means over
+        it.
+
+        The newest of `targets` (T, n) are those of this tick.
+        """
+        ends, means = np.empty(len(place)), np.empty(len(place))
+        targets = np.ascontiguousarray(targets)
+        _followed(np.array(self), place, targets, (0,) * targets.shape[1], period, ends, means)
+        return ends, means
+
+
+# A Follower of lanes from rows of lanes, in compiled code.
+_read_follower = tuple_of(Follower)
+
+
+@kernel
+def _followed(motor: Any, place: Any, targets: Any, sent: Any, period: float, ends: Any, means: Any) -> None:
+    follower, before, out, mean = _read_follower(rows_of(motor)), rows_of(place), rows_of(ends), rows_of(means)
+    for axis in range(len(place)):
+        own = part(rows_of(targets[axis]), 0, sent)
+        out[axis], _, summed = motor_at(follower, before[axis], own, period + zero_like(before[axis]), period)
+        mean[axis] = summed / period
 
 
 def _where_spools_are(timing: Timing, place: Array, rates: Array, time: float, period: float) -> Array:

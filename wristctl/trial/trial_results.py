@@ -23,7 +23,7 @@ from wristctl.simulation.error_ellipse import ErrorEllipse, error_ellipse
 from wristctl.simulation.live_reference import recorded
 from wristctl.simulation.metrics import metrics_of, summed
 from wristctl.simulation.motion import Motion
-from wristctl.simulation.oscillation import oscillations
+from wristctl.simulation.oscillation import oscillation, oscillations
 from wristctl.simulation.repetitions import Simulation
 from wristctl.simulation.trajectory import Trajectory, size_of
 from wristctl.simulation.worlds import Draws
@@ -128,12 +128,24 @@ def first_course(run: Run) -> Trajectory | None:
     number, name = done.iloc[0]["trial"], str(done.iloc[0]["direction"])
     settings = run.config.hw_run
     reference = recorded(settings.reference, run.path / RECORD)
-    followed = motion_of(settings.model_copy(update={"reference": reference}), run.config.wrist, name)
-    course = logged_course(log[log["trial"] == number], followed, run.config.wrist)
+    rows = log[log["trial"] == number]
+    if reference.inverse == "network":  # which the log has passed through already
+        followed = _followed_in(rows, settings, run.config.wrist)
+    else:
+        followed = motion_of(settings.model_copy(update={"reference": reference}), run.config.wrist, name)
+    course = logged_course(rows, followed, run.config.wrist)
     if not run.has("data/truth.csv"):
         return course
     truth = run.data("truth")
     return true_course(course, truth[truth["trial"] == number], run.config.wrist.length)
+
+
+def _followed_in(log: pd.DataFrame, settings: HwRunSettings, wrist: WristParameters) -> Motion:
+    """The motion in two planes that a trial's ticks have followed."""
+    time: Array = settings.control_period * np.arange(round(settings.horizon / settings.control_period), dtype=float)
+    names = ("bend_ref", "rate_ref", "acceleration_ref")
+    rows = [_on(time, log, [f"{name}_{plane}" for name in names]).T for plane in PLANES]
+    return Motion.of_bends(np.stack(rows), settings.control_period, wrist.length)
 
 
 class PushSeen(NamedTuple):
@@ -275,11 +287,12 @@ def in_pairs(wrist: WristParameters, layout: TendonLayout, loop: Loop) -> tuple[
 
 def twin(
     study: Study, trial: Trial, network: Inverse | None, tuned: Mapping[str, Mapping[str, float]] | None,
-    loop: Loop | None = None,
+    loop: Loop | None = None, seen: bool = False,
 ) -> Simulation:  # fmt: skip
     """Simulate a trial of the study's hw-run section; of a controller that learns a first repetition, as there.
 
-    `loop` takes the place of the section's own, which on an emulated rig has the emulated wrist.
+    `loop` takes the place of the section's own, which on an emulated rig has the emulated wrist. With `seen` its bend
+    is the one that its observer sees, as a trial's is whose true bend nobody knows.
     """
     settings, wrist, scenario = study.hw_run, study.wrist, trial.scenario
     row, followed = settings.rows[trial.row], motion_of(settings, wrist, trial.direction, network)
@@ -299,4 +312,15 @@ def twin(
         wrist = wrist.model_copy(update={"tendons": "four"})  # the fifth in the centre is not wound
     gains = np.array([gains_of(law, row.gains, tuned)])
     (repeated,) = repeat(law, gains, [followed], np.zeros(1, np.int64), asked, wrist, [scenario], Draws(study.seed))
-    return repeated.first
+    return _as_seen(repeated.first, followed, settings.control_period) if seen else repeated.first
+
+
+def _as_seen(simulated: Simulation, followed: Motion, period: float) -> Simulation:
+    """A simulation with the bend that its observer sees, and errors and swing of that."""
+    if simulated.trajectory.seen is None or simulated.failed:
+        return simulated
+    course = replace(simulated.trajectory, theta=simulated.trajectory.seen)
+    values = metrics_of(period, course.theta, course.theta_ref, course.tension, followed.goals)
+    values["oscillation"] = oscillation(course)
+    told = {name: values[name] for name in (*TRULY, "settling") if name in values}
+    return replace(simulated, trajectory=course, metrics=simulated.metrics | told)

@@ -12,7 +12,7 @@ from wristctl.control.table import controller, gains_of
 from wristctl.errors import UserError, fix_of
 from wristctl.interrupt import undisturbed
 from wristctl.simulation.motion import Motion
-from wristctl.simulation.spool_timing import remembered_rates
+from wristctl.simulation.spool_timing import remembered_commands
 from wristctl.trial.control_loop import ControlLoop, course_of
 from wristctl.trial.live_datagrams import LiveReference
 from wristctl.trial.log import TrialLog
@@ -127,7 +127,7 @@ class TrialSeries:
         spools.target(still, taut)
         spools.rate(still, still, still, period)
         spools.behind(still, still, still, period)
-        rates = np.zeros((len(taut), remembered_rates(spools.timing.delay, period)))
+        rates = np.zeros((len(taut), remembered_commands(spools.timing.delay, period)))
         spools.foreseen(still, rates, period)
         spools.reckoned(still, rates, 0.0, period)
         Watch(settings, facing, plane, self.timing, layout=layout).predict(reeled)

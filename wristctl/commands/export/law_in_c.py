@@ -227,6 +227,7 @@ _COUNTS = {
     "ideal": "the pull again [N]",
     "lagged": "the pull that the motors have come to [N]",
     "tendon": "where the spool is believed to be in the middle of this period, reeled in [m]",
+    "servo": "where the spool is believed to be in the middle of this period, reeled in [m]",
 }
 
 
@@ -255,12 +256,11 @@ def _words(programs: LawPrograms, about: str) -> dict[str, str]:
         "observer_words": ", its drive and its observer" if programs.observer else " and its drive",
         "speed_member": "", "speed_set": "",
     }  # fmt: skip
-    if programs.rates:
-        words["speed_member"] = (
-            f"    double spool_speed[{places}]; /* rate to send to each spool [m/s], + reels in */\n"
-        )
+    if programs.remembered:
+        sent = {"tendon": "rate to send to each spool [m/s]", "servo": "target to send to each spool [m]"}
+        words["speed_member"] = f"    double {programs.driven}[{places}]; /* {sent[programs.level]}, + reels in */\n"
         words["speed_set"] = (
-            f"        out->spool_speed[t] = state->motors[{2 * (places + planes)} + {programs.rates} * t];\n"
+            f"        out->{programs.driven}[t] = state->motors[{2 * (places + planes)} + {programs.remembered} * t];\n"
         )
     values = programs.constants.items()
     words["constants"] = "\n".join(f"static const double {key} = {number(value, 'c')};" for key, value in values)

@@ -129,10 +129,10 @@ def numpy_module(programs: LawPrograms, about: str) -> str:
         "alike": listed(programs.alike), "driven": programs.driven, "expected": str(programs.inputs),
         "speed_field": "", "speed": "",
     }  # fmt: skip
-    if programs.rates:
+    if programs.remembered:
         first = 2 * (programs.places + programs.planes)
-        words["speed_field"] = "    spool_speed: np.ndarray\n"
-        words["speed"] = f", self.motors[{first} :: {programs.rates}].copy()"
+        words["speed_field"] = f"    {programs.driven}: np.ndarray\n"
+        words["speed"] = f", self.motors[{first} :: {programs.remembered}].copy()"
     values = [(key, value) for key, value in programs.constants.items() if key != "PERIOD"]
     words["constants"] = "\n".join(f"{key} = np.float64({number(value, 'numpy')})" for key, value in values)
     functions = programs.functions.items()

@@ -18,9 +18,10 @@ from wristctl.control.response import OF_A_PLANE, Controlled, Room, Seen, respon
 from wristctl.errors import UserError
 from wristctl.lanes.straight_line import Program, Tracer
 from wristctl.lanes.symbols import Stack, SymbolRows
-from wristctl.simulation.actuator import Aim, IdealDrive, LaggedDrive, Motor, SpoolDrive, actuate
+from wristctl.simulation.actuator import Aim, actuate
 from wristctl.simulation.batch import PLANES, Batch
 from wristctl.simulation.observer import Knowing, NoCamera, propagate
+from wristctl.simulation.simulated_drives import IdealDrive, LaggedDrive, Motor, ServoDrive, SpoolDrive, commands_of
 from wristctl.simulation.spool_timing import Timing
 from wristctl.wrist.segments import Segments
 from wristctl.wrist.spatial.spatial_segments import OF_A_TENDON, SpatialSegments, SpatialWrist
@@ -57,14 +58,14 @@ class LawPrograms(NamedTuple):
     period: float
     memory: int
     motors: tuple[float, ...]
-    rates: int
-    """Rates that each spool remembers; 0 without spools."""
+    remembered: int
+    """Rates or targets that each spool remembers; 0 without spools."""
     alike: tuple[float, ...]
     """Tendons at each place."""
     limits: tuple[tuple[float, float], ...]
     """Least and greatest pull of each place [N]."""
     level: str
-    """Level of the motors: ideal, lagged or tendon."""
+    """Level of the motors: ideal, lagged, tendon or servo."""
     constants: Mapping[str, float]
     respond: Function
     actuate: Function
@@ -82,8 +83,8 @@ class LawPrograms(NamedTuple):
 
     @property
     def driven(self) -> str:
-        """What the motors are sent: `spool_speed`, or `count`."""
-        return "spool_speed" if self.rates else "count"
+        """What the motors are sent: `spool_speed`, `spool_target`, or `count`."""
+        return {"tendon": "spool_speed", "servo": "spool_target"}.get(self.level, "count")
 
     @property
     def functions(self) -> dict[str, Function]:
@@ -118,6 +119,9 @@ def _place(controller: Controller) -> str:
     return f"{code.co_filename}:{code.co_firstlineno}" if code else controller.name
 
 
+_LEVELS = {LaggedDrive: "lagged", SpoolDrive: "tendon", ServoDrive: "servo"}
+
+
 class _Loop:
     """A batch of one rollout, taken apart into named constants and programs."""
 
@@ -145,11 +149,12 @@ class _Loop:
             self._space = self._named(fields + tendons, world.belief.wrist)
         self._level = "ideal"
         if not isinstance(self.drive, IdealDrive):
-            self._level = "lagged" if isinstance(self.drive, LaggedDrive) else "tendon"
+            self._level = _LEVELS[type(self.drive)]
             self._motor = self._named([f"MOTOR_{field.upper()}" for field in Motor._fields], self.drive.motor)
             self._stiffness = self._places("STIFFNESS_", self.drive.stiffness)
-        if isinstance(self.drive, SpoolDrive):
-            self._board = self._named([f"BOARD_{field.upper()}" for field in Timing._fields], self.drive.believed)
+        if isinstance(self.drive, SpoolDrive | ServoDrive):
+            known: Sequence[str] = Timing._fields if isinstance(self.drive, SpoolDrive) else Motor._fields
+            self._board = self._named([f"BOARD_{field.upper()}" for field in known], self.drive.believed)
 
     def _named(self, names: Sequence[str], values: Any) -> list[str]:
         self._constants |= dict(zip(names, map(float, np.ravel(values)), strict=True))
@@ -180,7 +185,7 @@ class _Loop:
         return LawPrograms(
             f"{identifier(self.controller.name)}_law", self.controller.name, self.planes, self.places, self.preview,
             float(self.batch.setup.period), self.planes * max(1, self.controller.memory),
-            tuple(state.motors.ravel().tolist()), len(self.drive.rates) if isinstance(self.drive, SpoolDrive) else 0,
+            tuple(state.motors.ravel().tolist()), commands_of(self.drive),
             self._of(self._alike), tuple(zip(self._of(self._least), self._of(self._greatest), strict=True)),
             self._level, constants, *functions, observer,
         )  # fmt: skip
@@ -205,6 +210,8 @@ class _Loop:
         motor, stiffness = Motor(*tracer.inputs(self._motor)), tracer.inputs(self._stiffness)
         if isinstance(self.drive, LaggedDrive):
             return LaggedDrive(motor, stiffness)
+        if isinstance(self.drive, ServoDrive):
+            return ServoDrive(motor, stiffness, Motor(*tracer.inputs(self._board)), self.drive.targets)
         return SpoolDrive(motor, stiffness, Timing(*tracer.inputs(self._board)), self.drive.rates)
 
     def _respond(self) -> Function:

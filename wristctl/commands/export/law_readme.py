@@ -62,11 +62,14 @@ _SEND = {
     "lagged": "Command `tension` to each tendon. `count` is what the motors are reckoned to have come to.",
     "tendon": "Send `spool_speed` to the motor of each spool at once, which holds it until the next tick. From these "
     "rates the controller reckons where the spools are.",
+    "servo": "Send `spool_target` to the motor of each spool at once. From these targets the controller reckons where "
+    "the spools are.",
 }
 _COUNT = {
     "ideal": "the pull again | N",
     "lagged": "pull that the motors are reckoned to have come to | N",
     "tendon": "length that each spool is reckoned to have reeled in, in the middle of this period | m",
+    "servo": "length that each spool is reckoned to have reeled in, in the middle of this period | m",
 }
 
 
@@ -105,8 +108,11 @@ def _values(programs: LawPrograms) -> list[str]:
         "| `pull`, `tension` | of all tendons of a place, and of one of them | N |",
         f"| `count` | {_COUNT[programs.level]} |",
     ]
-    spools = "| `spool_speed` | rate to send to each spool's motor; + reels in | m/s |"
-    return rows + [spools] * bool(programs.rates)
+    sent = {
+        "tendon": "| `spool_speed` | rate to send to each spool's motor; + reels in | m/s |",
+        "servo": "| `spool_target` | length that each spool's motor is to reel in, from where the tendon is taut | m |",
+    }
+    return rows + [sent[programs.level]] * bool(programs.remembered)
 
 
 def _places(programs: LawPrograms) -> str:

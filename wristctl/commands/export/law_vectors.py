@@ -107,9 +107,12 @@ def _picture(rollout: Batch, before: int, tick: int, planes: int) -> Array:
 
 
 def _sent(programs: LawPrograms, rollout: Batch, delivered: Array) -> Array:
-    """What the motors are sent: the newest rate of each spool, or else what they deliver."""
+    """What the motors are sent: the newest rate or target of each spool, or else what they deliver."""
     first = 2 * (programs.places + programs.planes)
-    return rollout.state.motors.reshape(-1)[first :: programs.rates].copy() if programs.rates else delivered
+    if not programs.remembered:
+        return delivered
+    sent: Array = rollout.state.motors.reshape(-1)[first :: programs.remembered].copy()
+    return sent
 
 
 def _columns(programs: LawPrograms) -> tuple[str, ...]:

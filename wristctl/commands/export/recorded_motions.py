@@ -226,7 +226,7 @@ def study_of(run: Run) -> Study:
 
 def _slides_freely(loop: Loop) -> bool:
     """Whether a tendon pulls as much at its spool as at the wrist."""
-    return loop.actuator.level != "tendon" or not loop.plant.actuator.of(loop.actuator).friction
+    return not loop.actuator.winds or not loop.plant.actuator.of(loop.actuator).friction
 
 
 def _tracked(run: Run) -> list[RecordedMotion]:

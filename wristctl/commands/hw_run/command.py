@@ -87,10 +87,18 @@ def check_bends_of_trials(settings: HwRunSettings, wrist: WristParameters) -> No
     if settings.rig is None:
         layout_of_axes(wrist)
     check_two_planes([World(settings.loop, wrist)])
-    for name in motions_of(settings):
+    through = settings.reference.inverse == "network"
+    for name in () if through else motions_of(settings):
         motion_of(settings.model_copy(update={"control_period": _CHECKED}), wrist, name)
     for row in settings.rows:
         controller(row.controller)
+
+
+def _planes_of_network(settings: HwRunSettings) -> int:
+    """Planes in which a network stands behind the reference: two of a path, one of a motion toward a direction."""
+    from wristctl.trial.motions import has_path
+
+    return 2 if settings.planes == 2 and has_path(settings) else 1
 
 
 def hw_run(session: Session) -> Performed:
@@ -103,7 +111,7 @@ def hw_run(session: Session) -> Performed:
     identified_session = replace(session, study=identified(study, "hw-run", session.inputs))
     believed = identified_session.study.hw_run
     network, tuned = (
-        network_for(session.inputs, identified_session.study.wrist, [believed.loop]),
+        network_for(session.inputs, identified_session.study.wrist, [believed.loop], _planes_of_network(believed)),
         tuned_gains(session.inputs),
     )
     if believed.port is None and believed.rig is None:

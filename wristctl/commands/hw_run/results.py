@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
@@ -116,9 +117,10 @@ def twins_of(
     with session.progress("compiling and simulating the same trials"):
         for row in done.to_dict("records"):
             key = row["direction"], row["push"], row["label"]
+            seen = not math.isfinite(row.get("true_rmse", math.nan))
             if key not in simulated:
                 trial = Trial(row["trial"], row["direction"], 0, row["push"], names.index(row["label"]))
-                simulated[key] = twin(session.study, trial, network, tuned)
+                simulated[key] = twin(session.study, trial, network, tuned, seen=seen)
             twins[row["trial"]] = simulated[key]
     return twins
 

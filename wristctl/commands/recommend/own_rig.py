@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from functools import cache
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from wristctl.config.choices import RIGS
 from wristctl.config.recommend import RecommendSettings
@@ -87,12 +87,14 @@ def with_facts(study: Study, name: str) -> Study:
     wrist = wrist_of(facts, study.wrist, name)
     settings, known = study.recommend, _trials(study).known_loop
     usual = RecommendSettings.model_fields["loop"].default
-    changed = {
-        part: getattr(known, part)
-        for part in ("actuator", "sensor", "control_period")
-        if getattr(settings.loop, part) == getattr(usual, part)
-    }
-    loop = settings.loop.model_copy(update={**changed, "planes": facts.planes})
+    changed: dict[str, Any] = {"planes": facts.planes}
+    for section in ("actuator", "sensor"):
+        given, default = getattr(settings.loop, section), getattr(usual, section)
+        others = {key: entry for key, entry in given if entry != getattr(default, key)}
+        changed[section] = getattr(known, section).model_copy(update=others)
+    if settings.loop.control_period == usual.control_period:
+        changed["control_period"] = known.control_period
+    loop = settings.loop.model_copy(update=changed)
     draw = settings.draw if "draw" in settings.model_fields_set else _drawn(settings, facts)
     return study.model_copy(
         update={"wrist": wrist, "recommend": settings.model_copy(update={"loop": loop, "draw": draw})}
@@ -168,15 +170,12 @@ def _row(
     row: dict[str, float] = {}
     if backlash := at("backlash", drive.backlash):
         row["plant.actuator.backlash"] = backlash
-    if {"delay", "lag"} & set(spreads):
-        row["plant.actuator.command_delay"] = min(0.1, at("delay", drive.delay) + at("lag", drive.lag))
+    if "delay" in spreads:
+        row["plant.actuator.command_delay"] = min(0.1, at("delay", drive.delay))
+    if "lag" in spreads:
+        row["plant.actuator.lag"] = at("lag", drive.lag)
     if "resolution" in spreads:
-        from wristctl.config.plant import Actuator
-
-        finest = Actuator().step_length
-        ratio = max(at("resolution", drive.resolution), finest) / loop.actuator.step_length
-        row["actuator.pulley_radius"] = ratio * loop.actuator.pulley_radius
-        row["actuator.step_rate"] = loop.actuator.step_rate / ratio
+        row["actuator.resolution"] = at("resolution", drive.resolution)
     rate = loop.sensor.frame_rate
     if "rate" in spreads:
         row["sensor.frame_rate"] = rate = min(at("rate", sensor.rate), 1.0 / loop.control_period)

@@ -19,7 +19,10 @@ if TYPE_CHECKING:
     from wristctl.simulation.repetitions import Repeated
 
 # Actuators in words, by level.
-_ACTUATORS = {"ideal": "", "lagged": "motors with a lag", "tendon": "stepper motors and elastic tendons"}
+_ACTUATORS = {
+    "ideal": "", "lagged": "motors with a lag", "tendon": "stepper motors and elastic tendons",
+    "servo": "motors that follow targets, and elastic tendons",
+}  # fmt: skip
 # Figures of the table, in one plane and in two.
 _FIGURES = {
     1: ("rmse", "settling", "steady_state", "overshoot", "peak_tension", "swing"),

@@ -61,7 +61,7 @@ def published(ranking: TunedRanking, searches: Mapping[StudyPlace, Search]) -> d
 
 def drive_version(family: Family) -> int | None:
     """Version of the simulated drive that a family's motors are; None where it has none."""
-    from wristctl.simulation.actuator import DRIVE
+    from wristctl.simulation.simulated_drives import DRIVE
 
     return None if family.loop.actuator.level == "ideal" else DRIVE
 

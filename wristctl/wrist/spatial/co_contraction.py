@@ -76,7 +76,7 @@ def held_wrist(wrist: WristParameters, loop: Loop, layout: TendonLayout | None, 
     """The straight wrist on what its motors hold, tendons pulling `pull` [N] at most against each other beside
     pretension; in one plane, without a layout, by both sides."""
     places = layout or TendonLayout.pair_of_sides(wrist.tendon_offset)
-    stretches = loop.actuator.tendon_stiffness if loop.actuator.level == "tendon" else 0.0
+    stretches = loop.actuator.tendon_stiffness if loop.actuator.winds else 0.0
     pulls = wrist.pretension * places.multiplicity + pull * against_each_other(wrist, places)
     return HeldWrist(wrist, places, pulls, stretches * places.multiplicity.astype(float))
 
@@ -89,7 +89,7 @@ def least_pulls(wrist: WristParameters, loop: Loop, layout: TendonLayout | None)
     wanted, over = loop.stiffness, math.radians(loop.stiffness_over_deg)
     if wanted is None:
         return held_wrist(wrist, loop, layout).pulls
-    if loop.actuator.level != "tendon":
+    if not loop.actuator.winds:
         fix = "actuator.level: tendon, or stiffness: null"
         raise UserError("held pulls stiffen no wrist, only tendons that stretch do", "loop.stiffness", fix)
     pull, low, high = _pull_for(wrist, loop.actuator.tendon_stiffness, layout, wanted, over)
