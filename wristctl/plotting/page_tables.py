@@ -84,9 +84,9 @@ def _row(entry: dict[Any, Any], units: dict[str, str], many: bool, verdicts: dic
 
 
 def _head(name: str, unit: str) -> str:
-    return f"{in_words(name)} [{unit}]" if unit and unit != "1" else in_words(name)
+    return f"{metric_in_words(name)} [{unit}]" if unit and unit != "1" else metric_in_words(name)
 
 
-def in_words(name: str) -> str:
+def metric_in_words(name: str) -> str:
     """Name of a metric for people: RMSE toward ulnar is `RMSE ulnar`."""
     return re.sub(r"\brmse\b", "RMSE", name.replace("_", " "))

@@ -93,7 +93,7 @@ def identify_driven(session: Session, logs: Sequence[OpenLog]) -> DrivenTold:
 
 def keep_prediction(session: Session, robot: ArcRobot, models: Sequence[TriedModel], chosen: TriedModel) -> Table:
     """Keep how well the chosen model predicts the part that was not fitted, with its figures; a table of all models."""
-    from wristctl.commands.validate.answer import model_rows
+    from wristctl.commands.validate.answer import model_heads, model_rows
     from wristctl.commands.validate.figures import errors_of_models, left_over, motion
     from wristctl.identification.real_robots import RealRobot
 
@@ -106,7 +106,7 @@ def keep_prediction(session: Session, robot: ArcRobot, models: Sequence[TriedMod
         findings.figure("left-over", left_over, about, chosen.fits, caption="what is left of the motion")
         findings.figure("models", errors_of_models, about, models, caption="error of each model")
     findings.overview.figure = "motion"
-    heads = ("model", "numbers", f"predicted part [{robot.unit}]", "over that without", "")
+    heads = model_heads("predicted part", robot.unit)
     return Table("What each model misses", heads, model_rows(models, robot.scale))
 
 

@@ -84,8 +84,12 @@ def models_table(robot: RealRobot, models: Sequence[TriedModel], beside: Mapping
     for name, score in beside.items():
         error, low, high = (f"{robot.scale * value:.2f}" for value in score[:3])
         rows.append((name, None, f"{error} [{low}, {high}]", "", ""))
-    heads = ("model", "numbers", f"{robot.asked} [{robot.unit}]", "over that without", "")
-    return Table("", heads, [*rows, *model_rows(models, robot.scale)])
+    return Table("", model_heads(robot.asked, robot.unit), [*rows, *model_rows(models, robot.scale)])
+
+
+def model_heads(asked: str, unit: str) -> tuple[str, ...]:
+    """Heads of the rows of `model_rows`, of an error of what was `asked`."""
+    return "model", "numbers", f"{asked} [{unit}]", "over that without", "last term"
 
 
 def model_rows(models: Sequence[TriedModel], scale: float) -> list[tuple[str, int, str, str, str]]:
