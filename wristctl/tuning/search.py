@@ -9,7 +9,7 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, nullcontext
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -218,13 +218,14 @@ def search(
     judges: tuple[Judge, Judge | None],
     progress: Callable[[Search], None] | None = None,
     known: Tried | None = None,
+    choosing: AbstractContextManager[object] | None = None,
 ) -> Search:
     """Tune one controller with the study's optimiser, budget and objective.
 
-    `judges` are of the cases to search on and of those to choose by, None where there are none. `streams` gives the
-    entropy of each of the searches by its name. `progress` gets the search so far after every iteration, so that an
-    interrupted one loses nothing; `known` is what such a one had tried, which is not run again. Raises UserError where
-    that is of another search.
+    `judges` are of the cases to search on and of those to choose by, None where there are none; the choice is made in
+    the context `choosing`. `streams` gives the entropy of each of the searches by its name. `progress` gets the search
+    so far after every iteration; `known` is what an interrupted one had tried, which is not run again. Raises UserError
+    where that is of another search.
     """
     check_tunable(controller)
     settings, space, (judge, choose) = study.tune, GainSpace.of(controller.gains), judges
@@ -244,7 +245,8 @@ def search(
         result = _found(controller, Tried(np.array(values), np.array(tried)), settings.restarts)
         if progress is not None:
             progress(result)
-    return _chosen(controller, result, judge, choose, settings.finalists)
+    with choosing or nullcontext():
+        return _chosen(controller, result, judge, choose, settings.finalists)
 
 
 def _searches(
@@ -307,9 +309,7 @@ def _chosen(controller: Controller, result: Search, judge: Judge, choose: Judge 
     every = [Finalist(*each, float(value)) for each, value in zip(candidates, validated, strict=True)]
     ordered = tuple(sorted(every, key=lambda finalist: finalist.validated))
     best = dict(zip(controller.gains, ordered[0].gains, strict=True))
-    return Search(
-        controller.name, best, ordered[0].validated, result.evaluations, result.tried, result.restarts, ordered
-    )  # fmt: skip
+    return replace(result, gains=best, objective=ordered[0].validated, finalists=ordered)
 
 
 def search_unit(study: Study, law: str, tuning: int = 0) -> Unit:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
+from wristctl.commands.step_times import after_rollouts
 from wristctl.config.study import Study
 
 if TYPE_CHECKING:
@@ -23,7 +24,7 @@ def ranked(session: Session, study: Study, network: Inverse | None, tuned: Tuned
     from wristctl.simulation.drawn_worlds import streams_of
 
     findings, worlds = session.findings, study.compare.worlds
-    with session.progress("ranking", total=100, unit="%") as report:
+    with session.progress("ranking", 100, "%", after=after_rollouts(len(study.compare.rows))) as report:
         rankings = rank(study, tuned, network, lambda share: report(round(100 * share)))
     if worlds.sealed is None:
         findings.note_streams(streams_of(study.families[worlds.family], worlds.family, worlds.split))

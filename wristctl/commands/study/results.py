@@ -11,6 +11,7 @@ from wristctl.commands.printed_table import Table
 from wristctl.commands.ranking_drawing import draw_rankings
 from wristctl.commands.ranking_tables import answer_tables, every_row
 from wristctl.commands.session import Session
+from wristctl.commands.step_times import timed_steps
 from wristctl.commands.study.published import PUBLISHED, published, published_gains
 from wristctl.commands.study.units import BASE, Studied, StudyPlace, budget_of, families_of, places_in
 from wristctl.config.study import Study
@@ -19,8 +20,8 @@ if TYPE_CHECKING:
     import numpy as np
 
     from wristctl.comparison.paired_worlds import OrderShift, TermValue
-    from wristctl.comparison.step_cost import StepTime
     from wristctl.comparison.tuned_ranking import TunedRanking
+    from wristctl.control.law import Controller
     from wristctl.tuning.search import Search
     from wristctl.work.fan_out import Poisoned
 
@@ -51,7 +52,7 @@ def written(session: Session, judged: Pieces, searches: dict[StudyPlace, Search]
         shifts = _shifts(study, judged)
     _note_streams(session)
     _tables(session, rankings, terms, shifts, searches)
-    times = _step_times(session, searches)
+    times = timed_steps(session, _laws(searches))
     with session.drawing():
         _draw(session, rankings, terms)
     shown = answer_tables(list(rankings.values()))
@@ -183,20 +184,16 @@ def _tables(
         findings.table("data/sensitivity.csv", frame, dict.fromkeys(map(str, frame.columns), "1"))
 
 
-def _step_times(session: Session, searches: Mapping[StudyPlace, Search]) -> dict[str, StepTime]:
-    """Time of a control tick of each law on this machine; gains make no difference to it."""
-    from wristctl.comparison.step_cost import step_time
+def _laws(searches: Mapping[StudyPlace, Search]) -> dict[str, tuple[Controller, tuple[float, ...]]]:
+    """Every controller with gains of one of its searches: for the time of a step they make no difference."""
     from wristctl.control.table import controller
     from wristctl.tuning.objective import YARDSTICK
 
-    times = {YARDSTICK: step_time(controller(YARDSTICK), (), session.study.wrist)}
-    with session.progress("timing the control step"):
-        for place, search in searches.items():
-            if place.law not in times:
-                law = controller(place.law)
-                times[place.law] = step_time(law, law.values(search.gains), session.study.wrist)
-    session.findings.plain("timing.json", {name: time._asdict() for name, time in times.items()})
-    return times
+    laws: dict[str, tuple[Controller, tuple[float, ...]]] = {YARDSTICK: (controller(YARDSTICK), ())}
+    for place, search in searches.items():
+        law = controller(place.law)
+        laws.setdefault(place.law, (law, law.values(search.gains)))
+    return laws
 
 
 def _draw(session: Session, rankings: Mapping[str, TunedRanking], terms: Sequence[TermValue]) -> None:

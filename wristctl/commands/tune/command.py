@@ -177,6 +177,7 @@ def tune(session: Session) -> Tuned:
 
     from wristctl.commands.truth_table import truth_tables
     from wristctl.control.table import controller
+    from wristctl.tuning.margin import LADDERS
     from wristctl.tuning.objective import marks_of
     from wristctl.tuning.search import own_loop, tuning_cases
 
@@ -188,9 +189,12 @@ def tune(session: Session) -> Tuned:
     warn_out_of_reach(session.findings, study.wrist, asked_by(study, study.tune))
     planes = 2 if why_two_planes(study.wrist, asked_of_search(study)) else 1
     network = network_for(session.inputs, study.wrist, loops, planes)
-    searches = search_all(session, study, network)
     searched, chosen = tuning_cases(study, network)
     cases = chosen or searched
+    changes = sum(map(len, LADDERS)) * len(searched)
+    tried = (3 + len(study.tune.loops)) * len(cases) + changes
+    budget = study.tune.iterations * study.tune.restarts * study.tune.candidates * len(searched)
+    searches = search_all(session, study, network, then=tried / budget)
     lost = {
         name: marks_of(law, np.array(law.values(searches[name].gains)), cases, study.wrist)
         for name, law in ((name, controller(name)) for name in searches)
