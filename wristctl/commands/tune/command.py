@@ -30,12 +30,11 @@ from wristctl.commands.loop_warnings import (
     warn_of_one_plane,
     warn_out_of_reach,
 )
-from wristctl.commands.printed_table import Table
 from wristctl.commands.procedure import Procedure
 from wristctl.commands.results import Findings, StudyResult
 from wristctl.commands.session import Session
 from wristctl.commands.sweep.command import sweepable
-from wristctl.commands.tune.answer import Beside, Motion, answer_of, beside_feedforward
+from wristctl.commands.tune.answer import Beside, Motion, answer_of, beside_feedforward, searches_table
 from wristctl.commands.tune.searches import search_all
 from wristctl.config.families import Family
 from wristctl.config.loop import Reference
@@ -199,19 +198,11 @@ def tune(session: Session) -> Tuned:
         name: marks_of(law, np.array(law.values(searches[name].gains)), cases, study.wrist)
         for name, law in ((name, controller(name)) for name in searches)
     }
-    fates = {
-        name: ", ".join(f"{mark} in {count} of {len(cases)} cases" for mark, count in marks.items())
-        for name, marks in lost.items()
-    }
-    rows = [
-        (name, result.objective, fates[name], result.finalists[0].origin, result.evaluations, _told(result.gains))
-        for name, result in sorted(searches.items(), key=lambda named_search: named_search[1].objective)
-    ]
-    columns = ("controller", "objective", "fate", "found by", "evaluations", "gains")
-    tables = [Table("Tuned gains, best first; objective in decades beside feedforward", columns, rows)]
-    tables += truth_tables(study.wrist, judged_loops(study, study.tune))
     gains = {name: best.gains for name, best in searches.items()}
     errors = beside_feedforward(gains, cases, study.wrist)
+    title = "Tuned gains, best first; objective in decades beside feedforward"
+    tables = [searches_table(searches, errors, lost, len(cases), title)]
+    tables += truth_tables(study.wrist, judged_loops(study, study.tune))
     elsewhere = _elsewhere(session, study, network, gains)
     stood = _stood(session, own_loop(study, searched, network), gains)
     _write_files(session.findings, study, gains)
@@ -299,10 +290,6 @@ def _elsewhere(
 def _references(settings: TuneSettings, families: Mapping[str, Family]) -> list[Reference]:
     family = settings.worlds.family
     return list(families[family].references) if family else [scenario.reference for scenario in settings.scenarios]
-
-
-def _told(gains: Mapping[str, float]) -> str:
-    return "  ".join(f"{name} = {value:.4g}" for name, value in gains.items())
 
 
 TUNE = sweepable(
