@@ -126,8 +126,8 @@ def _held_again(
 
 
 def most_models(robot: ArcRobot) -> int:
-    """The number of models that are tried of a robot, at most by one."""
-    return len(robot.terms) + 2
+    """The number of models that are tried of a robot, as a rule."""
+    return len(robot.terms) + (4 if robot.weighed else 2)
 
 
 def chosen_of(models: Sequence[TriedModel]) -> TriedModel:

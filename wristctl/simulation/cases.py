@@ -127,7 +127,7 @@ def measure(
     cases: Sequence[Case],
     wrist: WristParameters,
     metrics: Sequence[str],
-    progress: Callable[[float], None] | None = None,
+    progress: Callable[[float], object] | None = None,
     converge: bool = True,
 ) -> Measured:
     """Run gains (P, g) of a law on all the cases; with `converge` at integration steps that are short enough.

@@ -55,7 +55,6 @@ from wristctl.commands.session import Session
 from wristctl.commands.step_times import after_rollouts, timed_steps
 from wristctl.commands.sweep.command import sweepable
 from wristctl.commands.tune.command import planned_search
-from wristctl.commands.tune.command import size as tune_size
 from wristctl.commands.tune.searches import search_all
 from wristctl.config.choices import CONTROLLERS
 from wristctl.config.controller_row import BY_LOOP, label_of
@@ -292,8 +291,8 @@ def compare(session: Session) -> Compared:
     network = network_for(session.inputs, study.wrist, loops, planes_of(study.wrist, asked_of_comparison(study)))
     if settings.tuning is not None:
         tuning = study.model_copy(update={"tune": settings.tuning})
-        ratio = size(study).rollouts * settings.horizon / (tune_size(tuning).rollouts * settings.tuning.horizon)
-        searches = search_all(session, tuning, network, ratio)
+        later = size(study).rollouts * settings.horizon / settings.tuning.horizon / len(settings.tuning.controllers)
+        searches = search_all(session, tuning, network, later)
     tuned = dict(tuned_gains(session.inputs) or {}) | {name: search.gains for name, search in searches.items()}
     gains = _gains_of_rows(study, tuned)
     if settings.worlds.family:

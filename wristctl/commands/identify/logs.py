@@ -31,8 +31,8 @@ if TYPE_CHECKING:
 # noise, that it may miss before no parameter is told.
 _MISSED, _MISSED_OF_ALL = 0.5, 0.1
 
-# Seconds of the last fit and the figures.
-_AFTER_FITS = 4.0
+# Time of the last fit over that of all models, and seconds of the figures.
+_AFTER_FITS = 0.4, 3.0
 
 
 @dataclass(frozen=True, repr=False, eq=False)
@@ -165,7 +165,7 @@ def _identify_spooled(session: Session, logs: Sequence[OpenLog]) -> LogTold:
     findings, study = session.findings, session.study
     robot, recordings, samples, remarks, rate = read_logs(logs, study)
     models = list["TriedModel"]()
-    with session.progress("fitting models", most_models(robot), "models", after=_AFTER_FITS) as report:
+    with session.progress("fitting models", most_models(robot), "models", *_AFTER_FITS) as report:
         for model in tried_models(robot, [recordings], False):
             models.append(model)
             report(len(models))

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import math
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from wristctl.commands.printed_table import Table
-from wristctl.commands.ranking_drawing import draw_rankings
+from wristctl.commands.ranking_drawing import draw_intervals, draw_rankings, keep_error
 from wristctl.commands.ranking_tables import answer_tables, every_row
 from wristctl.commands.session import Session
 from wristctl.commands.step_times import timed_steps
@@ -150,17 +149,14 @@ def _tables(
     from wristctl.control.table import write_gains
 
     findings = session.findings
-    units = ranked_units() | dict.fromkeys(("rmse_low", "rmse_high", "worst_rmse"), "rad")
     for name, ranking in rankings.items():
         slug = _slug(name)
-        findings.table(f"data/ranking-{slug}.csv", ranking_frame(ranking), units=units)
+        findings.table(f"data/ranking-{slug}.csv", ranking_frame(ranking), units=ranked_units())
         worlds = {"world": range(ranking.count)} | {row.label: row.rmse for row in ranking.rows}
         meaning = {row.label: "geometric mean of the RMSE over motions and noises; inf: failed" for row in ranking.rows}
         findings.table(f"data/worlds-{slug}.csv", pd.DataFrame(worlds), dict.fromkeys(meaning, "rad"), meaning)
         for index, row in enumerate(ranking.rows):
-            mean = ranking.means[index]
-            interval = (mean.low, mean.high) if math.isfinite(mean.high) else None
-            findings.metric(f"rmse_{slug}_{row.label}", mean.value, "rad", "lower", ranking.count, interval)
+            keep_error(findings, f"rmse_{slug}_{row.label}", ranking, index)
         if len(tunings := ranking.tunings_frame()):
             findings.table(f"data/tunings-{slug}.csv", tunings, dict.fromkeys(map(str, tunings.columns), "1"))
     if firsts := [frame for ranking in rankings.values() if len(frame := ranking.firsts_frame())]:
@@ -198,7 +194,6 @@ def _laws(searches: Mapping[StudyPlace, Search]) -> dict[str, tuple[Controller, 
 
 def _draw(session: Session, rankings: Mapping[str, TunedRanking], terms: Sequence[TermValue]) -> None:
     from wristctl.commands.study.figures import laws_by_rig, pareto, terms_by_rig, world_map
-    from wristctl.plotting.ranking_figures import ranking_intervals
 
     findings = session.findings
     draw_rankings(findings, list(rankings.values()))
@@ -211,8 +206,7 @@ def _draw(session: Session, rankings: Mapping[str, TunedRanking], terms: Sequenc
         findings.figure("terms", terms_by_rig, terms, caption="How many times less RMSE a term of a controller gives")
     for name, ranking in rankings.items():
         slug = _slug(name)
-        caption = f"RMSE of every controller on {name}, with 95 % intervals over worlds"
-        findings.figure(f"ranking-{slug}", ranking_intervals, ranking, caption=caption)
+        draw_intervals(findings, ranking, f"-{slug}")
         caption = f"RMSE against variation of tension and work on {name}; hollow rows must not be used"
         findings.figure(f"pareto-{slug}", pareto, ranking, caption=caption)
         caption = f"RMSE over the least one in each world of {name}; a cross fails, a dot swings"

@@ -7,7 +7,7 @@ import shlex
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
-from wristctl.commands.answer import LINES, Answer
+from wristctl.commands.answer import Answer
 from wristctl.commands.kept_studies import FOLDER, file_of
 from wristctl.commands.printed_table import Table, degrees, joined, two
 from wristctl.commands.quantities import Quantity, table_of
@@ -141,7 +141,7 @@ def answer_of(
         Answer(sentence, searches_table(searches, errors, lost, cases, columns=shown), notes, more)
         for shown in (columns, columns[:-1])
     ]
-    return answers[0] if len(answers[0].lines()) <= LINES or len(ordered) == 1 else answers[1]
+    return answers[0] if answers[0].fits or len(ordered) == 1 else answers[1]
 
 
 def _is_sound(beside: Beside, lost: Mapping[str, int]) -> bool:

@@ -50,6 +50,8 @@ if TYPE_CHECKING:
     from wristctl.tuning.search import Search
     from wristctl.wrist.kinematics import Inverse
 
+# Time of a rollout on another loop, which may have more segments, over that of one on the loop of the search.
+_ELSEWHERE = 3
 # Share of what a family draws at which one of its motions is tried.
 _WITHIN = 0.75
 
@@ -190,10 +192,8 @@ def tune(session: Session) -> Tuned:
     network = network_for(session.inputs, study.wrist, loops, planes)
     searched, chosen = tuning_cases(study, network)
     cases = chosen or searched
-    changes = sum(map(len, LADDERS)) * len(searched)
-    tried = (3 + len(study.tune.loops)) * len(cases) + changes
-    budget = study.tune.iterations * study.tune.restarts * study.tune.candidates * len(searched)
-    searches = search_all(session, study, network, then=tried / budget)
+    tried = (3 + _ELSEWHERE * len(study.tune.loops)) * len(cases) + sum(map(len, LADDERS)) * len(searched)
+    searches = search_all(session, study, network, tried)
     lost = {
         name: marks_of(law, np.array(law.values(searches[name].gains)), cases, study.wrist)
         for name, law in ((name, controller(name)) for name in searches)
@@ -274,16 +274,16 @@ def _elsewhere(
     searched = {scenario.loop for scenario in settings.scenarios}
     others = [] if settings.worlds.family else [name for name in settings.loops if name not in searched]
     tried: dict[str, dict[str, dict[str, int]]] = {name: {} for name in gains}
-    with session.progress("trying the gains on other loops", total=len(others), unit="loops") as advance:
-        for number, loop in enumerate(others, start=1):
+    with session.progress("trying the gains on other loops", len(others) * len(gains), "trials") as advance:
+        for number, loop in enumerate(others):
             scenarios = tuple(dict.fromkeys(one.model_copy(update={"loop": loop}) for one in settings.scenarios))
             elsewhere = study.model_copy(update={"tune": settings.model_copy(update={"scenarios": scenarios})})
             cases = tuning_cases(elsewhere, network)[0]
-            for name, values in gains.items():
+            for law_number, (name, values) in enumerate(gains.items(), start=1):
                 law = controller(name)
                 if law.keeps_up(settings.loops[loop].control_period):
                     tried[name][loop] = marks_of(law, np.array(law.values(values)), cases, study.wrist)
-            advance(number)
+                advance(number * len(gains) + law_number)
     return tried
 
 

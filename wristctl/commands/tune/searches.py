@@ -13,8 +13,9 @@ if TYPE_CHECKING:
     from wristctl.tuning.search import Search, Tried
     from wristctl.wrist.kinematics import Inverse
 
-# Time of a rollout of the final choice over that of a rollout of the search: as measured on one and two loops.
-_CHOICE = 2.0
+# Time of a rollout at short steps over that of a search's; rollouts whose time an iteration takes beside those that it
+# runs; candidates of it that are looked at closely.
+_CLOSELY, _BESIDE, _PROMISING = 1.2, 20, 2
 # Seconds that the figures of a controller take.
 _DRAWN = 1.0
 
@@ -22,9 +23,10 @@ _DRAWN = 1.0
 def search_all(session: Session, study: Study, network: Inverse | None, then: float = 0.0) -> dict[str, Search]:
     """Tune every controller of the study's tune section; what was found is kept also where it is cut short.
 
-    `then` is the time that the command takes after it, as a multiple of the time of all searches.
+    `then` are the rollouts that the command runs after it, for each controller.
     """
     from wristctl.control.table import controller
+    from wristctl.tuning.margin import CHANGES
     from wristctl.tuning.search import judges_of, search
 
     settings = study.tune
@@ -32,13 +34,15 @@ def search_all(session: Session, study: Study, network: Inverse | None, then: fl
     judge, choose = judges_of(study, network)
     laws = {name: controller(name) for name in settings.controllers}
     total, searches = settings.iterations * settings.restarts, dict[str, "Search"]()
-    choice = _CHOICE * settings.finalists * (choose or judge).count / (settings.candidates * judge.count * total)
-    whole = sum(law.learning for law in laws.values())
+    closely = _CLOSELY * judge.count + len(CHANGES) * judge.own_loop.count
+    searched = total * (settings.candidates * judge.count + _PROMISING * closely + _BESIDE)
+    choice = _CLOSELY * min(settings.finalists, total * settings.candidates) * (choose or judge).count / searched
+    rest = _CLOSELY * then / searched * sum(law.learning for law in laws.values())
     drawn = _DRAWN * len(laws)
     try:
         for number, (name, law) in enumerate(laws.items(), start=1):
             later = sum(other.learning for other in list(laws.values())[number:])
-            following = choice + (1.0 + choice) * (later + then * whole) / law.learning
+            following = choice + ((1.0 + choice) * later + rest) / law.learning
             with session.progress(f"tuning {name}", total, "iterations", following, drawn) as advance:
 
                 def so_far(result: Search, name: str = name, report: Done = advance) -> None:
@@ -46,7 +50,8 @@ def search_all(session: Session, study: Study, network: Inverse | None, then: fl
                     report(len(result.tried.values), best=result.objective)
 
                 tried = _known(session, name)
-                choosing = session.progress(f"choosing gains of {name}")
+                after_choice = ((1.0 + 1.0 / choice) * later + rest / choice) / law.learning
+                choosing = session.progress(f"choosing gains of {name}", 100, "%", after_choice, drawn)
                 searches[name] = search(study, law, session.findings.stream, (judge, choose), so_far, tried, choosing)
     finally:
         _keep(session.findings, searches, choose or judge)
