@@ -121,9 +121,9 @@ class Bar:
         over = threading.Event()
         if self._lines:
             threading.Thread(target=self._tell, args=(over,), daemon=True).start()
-        self._bar.start()
         try:
             with counting(event, task, total, unit, self._show, then, after) as advance:
+                self._bar.start()
                 yield advance
         finally:
             over.set()

@@ -59,7 +59,7 @@ class Count:
         if not 0 < count <= whole or passed < _TELLS or (count == whole and not self.then + self.after):
             return None
         reached = passed if self.reached is None else self.reached
-        task = max(reached * whole / count, passed * whole / min(count + 1, whole))
+        task = reached if count == whole else max(reached * whole / count, passed * whole / (count + 1))
         return task * (1.0 + self.then) + self.after - passed
 
     def remaining(self) -> str:

@@ -29,6 +29,8 @@ from wristctl.simulation.worlds import plant_of
 
 # Numbers that are kept of rollouts whose samples are wanted.
 _RECORDED_AT_ONCE = 6_000_000
+# Share of the time of rollouts that goes by before those in doubt run again with shorter integration steps.
+_FIRST_PASS = 0.5
 # Loops whose spectra are worked out at once.
 _SPECTRA = 256
 
@@ -141,7 +143,12 @@ def measure(
     for numbers in _alike(cases):
         for rows, columns in _pieces(len(gains), numbers, cases[numbers[0]], _recorded(metrics)):
             chosen = [cases[number] for number in columns]
-            outcome, values = _measured(law, gains[rows], chosen, wrist, metrics, converge)
+
+            def so_far(share: float, before: int = finished, count: int = len(rows) * len(columns)) -> None:
+                if progress is not None:
+                    progress((before + (_FIRST_PASS if converge else 1.0) * share * count) / failed.size)
+
+            outcome, values = _measured(law, gains[rows], chosen, wrist, metrics, converge, so_far)
             cells, places = np.ix_(rows, columns), outcome.places
             for name in metrics:
                 measured[name][cells] = values[name].reshape(len(rows), -1)
@@ -208,7 +215,13 @@ def at_once(metrics: Sequence[str], outcome: Outcome, which: NDArray[np.int64], 
 
 
 def _measured(
-    law: Controller, gains: Array, cases: Sequence[Case], wrist: WristParameters, metrics: Sequence[str], converge: bool
+    law: Controller,
+    gains: Array,
+    cases: Sequence[Case],
+    wrist: WristParameters,
+    metrics: Sequence[str],
+    converge: bool,
+    progress: Callable[[float], None],
 ) -> tuple[Outcome, dict[str, Array]]:
     """The metrics (rows * cases,) of a batch."""
     motions = list({id(case.motion): case.motion for case in cases}.values())
@@ -220,6 +233,7 @@ def _measured(
     outcome = rollout(
         law, np.repeat(gains, count, axis=0), motions, which, loops[0] if one else loops, wrist,
         streams=[case.stream for case in cases] * rows, record=_recorded(metrics), converge=converge,
+        progress=progress,
     )  # fmt: skip
     values = {
         name: outcome.metrics[name] for name in metrics if name not in AT_ONCE and METRICS[name].of_totals is not None

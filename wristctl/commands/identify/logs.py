@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 _MISSED, _MISSED_OF_ALL = 0.5, 0.1
 
 # Time of the last fit over that of all models, and seconds of the figures.
-_AFTER_FITS = 0.4, 3.0
+_AFTER_FITS = 0.2, 2.0
 
 
 @dataclass(frozen=True, repr=False, eq=False)

@@ -274,16 +274,15 @@ def _elsewhere(
     searched = {scenario.loop for scenario in settings.scenarios}
     others = [] if settings.worlds.family else [name for name in settings.loops if name not in searched]
     tried: dict[str, dict[str, dict[str, int]]] = {name: {} for name in gains}
-    with session.progress("trying the gains on other loops", len(others) * len(gains), "trials") as advance:
-        for number, loop in enumerate(others):
+    with session.progress("trying the gains on other loops"):
+        for loop in others:
             scenarios = tuple(dict.fromkeys(one.model_copy(update={"loop": loop}) for one in settings.scenarios))
             elsewhere = study.model_copy(update={"tune": settings.model_copy(update={"scenarios": scenarios})})
             cases = tuning_cases(elsewhere, network)[0]
-            for law_number, (name, values) in enumerate(gains.items(), start=1):
+            for name, values in gains.items():
                 law = controller(name)
                 if law.keeps_up(settings.loops[loop].control_period):
                     tried[name][loop] = marks_of(law, np.array(law.values(values)), cases, study.wrist)
-                advance(number * len(gains) + law_number)
     return tried
 
 
