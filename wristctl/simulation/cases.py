@@ -29,8 +29,6 @@ from wristctl.simulation.worlds import plant_of
 
 # Numbers that are kept of rollouts whose samples are wanted.
 _RECORDED_AT_ONCE = 6_000_000
-# Share of the time of rollouts that goes by before those in doubt run again with shorter integration steps.
-_FIRST_PASS = 0.5
 # Loops whose spectra are worked out at once.
 _SPECTRA = 256
 
@@ -146,7 +144,7 @@ def measure(
 
             def so_far(share: float, before: int = finished, count: int = len(rows) * len(columns)) -> None:
                 if progress is not None:
-                    progress((before + (_FIRST_PASS if converge else 1.0) * share * count) / failed.size)
+                    progress((before + share * count) / failed.size)
 
             outcome, values = _measured(law, gains[rows], chosen, wrist, metrics, converge, so_far)
             cells, places = np.ix_(rows, columns), outcome.places
