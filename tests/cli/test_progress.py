@@ -90,6 +90,16 @@ def test_between_two_counts_the_time_left_runs_down_until_the_next_is_overdue(cl
         assert count.seconds_left() == pytest.approx(left), "3 s each, until 9 s have passed"
 
 
+def test_the_next_count_is_overdue_when_a_step_as_large_as_the_last_takes_longer(clock: list[float]) -> None:
+    seen: list[Count] = []
+    with counting(no_event, "judging", 1000, "rollouts", seen.append) as done:
+        for clock[0], count in ((5.0, 100), (10.0, 300)):
+            done(count)
+        for clock[0], whole in ((12.0, 100.0 / 3.0), (16.0, 100.0 / 3.0), (20.0, 40.0)):
+            left = seen[-1].seconds_left()
+            assert left is not None and left + clock[0] == pytest.approx(whole), "200 more were due after 16.7 s"
+
+
 @pytest.mark.parametrize(("then", "after"), [(0.5, 0.0), (0.0, 7.0), (2.0, 3.0)])
 def test_what_follows_a_task_is_part_of_the_time_left_also_when_all_of_it_is_counted(
     then: float, after: float, clock: list[float]

@@ -44,6 +44,8 @@ class Count:
     """Seconds that had been spent on compiling when it began."""
     reached: float | None = None
     """Seconds of work until the count was what it is; None: it is so now."""
+    step: int = 1
+    """What it grew by last: by as much it is taken to grow next."""
 
     def worked(self) -> float:
         """Seconds since it began in which nothing was compiled."""
@@ -59,7 +61,8 @@ class Count:
         if not 0 < count <= whole or passed < _TELLS or (count == whole and not self.then + self.after):
             return None
         reached = passed if self.reached is None else self.reached
-        task = reached if count == whole else max(reached * whole / count, passed * whole / (count + 1))
+        following = min(count + self.step, whole)
+        task = reached if count == whole else max(reached * whole / count, passed * whole / following)
         return task * (1.0 + self.then) + self.after - passed
 
     def remaining(self) -> str:
@@ -118,6 +121,8 @@ def counting(
 
     def done(count: int = 0, kept: int = 0, **figures: float) -> None:
         nonlocal last_event
+        if count > state.count:
+            state.step = count - state.count
         state.count, state.kept, state.reached = count, kept, state.worked()
         state.figures |= figures
         show(state)
