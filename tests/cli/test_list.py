@@ -10,6 +10,7 @@ import pytest
 from wristctl.cli.app import main
 from wristctl.commands.choice_tables import TABLES, first_sentence
 from wristctl.config.choices import CONTROLLERS, METRICS, REFERENCES
+from wristctl.control.shipped_gains import families, shipped_gains
 from wristctl.study_files.typed_controllers import parted
 
 NAMES = {"controllers": CONTROLLERS, "references": REFERENCES, "metrics": METRICS}
@@ -27,7 +28,10 @@ def test_each_list_has_a_line_for_every_entry(
     what: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     _listed(what, monkeypatch=monkeypatch)
-    _, rule, *lines = capsys.readouterr().out.splitlines()
+    out = capsys.readouterr().out.splitlines()
+    assert max(map(len, out)) <= 100
+    _, rule, *every = out
+    lines = [line for line in every if not line.startswith(" ")]
     _listed(what, "--json", monkeypatch=monkeypatch)
     shown = json.loads(capsys.readouterr().out)
     assert set(rule) == {"-", " "} and [line.split("  ")[0] for line in lines] == [row[0] for row in shown["rows"]]
@@ -37,7 +41,14 @@ def test_each_list_has_a_line_for_every_entry(
     if what == "presets":
         names = [row[0] for row in shown["rows"]]
         assert parted(names, "compare").controllers == names
-        assert names == [f"{name}/{preset}" for name in CONTROLLERS for preset in CONTROLLERS[name].presets]
+        shipped = [name for name in names if "/tuned:" in name]
+        assert {name for name in names if name not in shipped} == {
+            f"{name}/{preset}" for name in CONTROLLERS for preset in CONTROLLERS[name].presets
+        }
+        for name in shipped:
+            controller, _, gains = name.partition("/")
+            assert list(shipped_gains(controller, gains).gains) == list(CONTROLLERS[controller].gains)
+        assert {name.partition(":")[2] for name in shipped} == set(families())
 
 
 def test_a_sentence_ends_at_a_full_stop_outside_brackets() -> None:

@@ -12,7 +12,8 @@ import pytest
 from rich.console import Console
 
 from wristctl.cli import progress as module
-from wristctl.commands.progress import Count, counting, no_event
+from wristctl.commands.progress import Ahead, Count, counting, no_event
+from wristctl.lanes.compile_time import COMPILE_TIME
 
 
 def _shown(total: int | None, quiet: bool = False) -> tuple[list[str], list[dict[str, Any]]]:
@@ -70,6 +71,83 @@ def test_the_time_that_is_left_is_told_at_the_pace_so_far(monkeypatch: pytest.Mo
         assert Count("drawing", 1750, "samples", 1000, began=0.0, kept=750).remaining() == left, "at the pace of today"
     for known in (Count("drawing", 1000, "samples", 1000, began=0.0), Count("drawing", None, "samples", 3, began=0.0)):
         assert known.seconds_left() is None and known.remaining() == ""
+
+
+@pytest.fixture
+def clock(monkeypatch: pytest.MonkeyPatch) -> list[float]:
+    """The time, which the test sets."""
+    now = [0.0]
+    monkeypatch.setattr("time.monotonic", lambda: now[0])
+    return now
+
+
+def test_between_two_counts_the_time_left_runs_down_until_the_next_is_overdue(clock: list[float]) -> None:
+    count = Count("tuning", 10, "iterations", began=0.0)
+    clock[0] = 6.0
+    count.count, count.reached = 2, count.worked()
+    for now, left in ((6.0, 24.0), (8.0, 22.0), (9.0, 21.0), (12.0, 28.0)):
+        clock[0] = now
+        assert count.seconds_left() == pytest.approx(left), "3 s each, until 9 s have passed"
+
+
+def test_the_next_count_is_overdue_when_a_step_as_large_as_the_last_takes_longer(clock: list[float]) -> None:
+    seen: list[Count] = []
+    with counting(no_event, "judging", 1000, "rollouts", seen.append) as done:
+        for clock[0], count in ((5.0, 100), (10.0, 300)):
+            done(count)
+        for clock[0], whole in ((12.0, 100.0 / 3.0), (16.0, 100.0 / 3.0), (20.0, 40.0)):
+            left = seen[-1].seconds_left()
+            assert left is not None and left + clock[0] == pytest.approx(whole), "200 more were due after 16.7 s"
+
+
+@pytest.mark.parametrize(("then", "after"), [(0.5, 0.0), (0.0, 7.0), (2.0, 3.0)])
+def test_what_follows_a_task_is_part_of_the_time_left_also_when_all_of_it_is_counted(
+    then: float, after: float, clock: list[float]
+) -> None:
+    count = Count("tuning", 4, "iterations", 1, began=0.0, then=then, after=after)
+    clock[0] = 5.0
+    assert count.seconds_left() == pytest.approx(15.0 + 20.0 * then + after)
+    count.count, clock[0] = 4, 20.0
+    assert count.seconds_left() == pytest.approx(20.0 * then + after)
+
+
+def test_compiling_is_no_part_of_the_pace(clock: list[float]) -> None:
+    count = Count("ranking", 10, "", began=0.0)
+    with COMPILE_TIME.counted():
+        clock[0] = 50.0
+        with COMPILE_TIME.counted():  # another thread, at once
+            clock[0] = 90.0
+        assert COMPILE_TIME.goes_on and count.worked() == pytest.approx(0.0)
+    assert not COMPILE_TIME.goes_on
+    clock[0], count.count = 94.0, 1
+    assert count.seconds_left() == pytest.approx(36.0)
+
+
+def test_a_task_without_a_count_goes_by_what_those_before_it_told(clock: list[float]) -> None:
+    ahead, count = Ahead(), Count("ranking", 2, "", 1, began=0.0, after=6.0)
+    assert ahead.seconds_left(Count("reading", None, "", began=0.0)) is None
+    clock[0] = 4.0
+    assert ahead.seconds_left(count) == pytest.approx(10.0)
+    clock[0] = 9.0
+    assert ahead.seconds_left(Count("drawing", None, "", began=8.0)) == pytest.approx(5.0)
+    clock[0] = 15.0
+    assert ahead.seconds_left(Count("drawing", None, "", began=8.0)) is None, "it is over its time"
+
+
+def test_the_tasks_of_a_command_have_one_line_whose_bar_only_grows() -> None:
+    console, shares = Console(file=io.StringIO(), force_terminal=True, width=100), list[float]()
+    with module.Bar(console, False) as bar:
+        (line,) = bar._bar.tasks
+        for task in ("tuning smc", "drawing"):
+            with bar(no_event, task, 4, "steps", after=1.0) as done:
+                bar._count.began -= 8.0
+                for count in range(1, 5):
+                    done(count)
+                    assert line.description == f"{task}: {count} of 4 steps"
+                    shares.append(line.percentage)
+            assert bar._bar.live.is_started and bar._bar.tasks == [line]
+    assert not bar._bar.live.is_started
+    assert max(shares) < 100.0 and shares[:4] == sorted(shares[:4])
 
 
 def test_nothing_is_announced_and_quiet_is_quiet(monkeypatch: pytest.MonkeyPatch) -> None:

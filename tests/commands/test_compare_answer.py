@@ -95,7 +95,7 @@ def test_where_all_that_tie_wait_for_their_motors_it_is_said_that_motors_decide(
 
 def told(*rankings: Ranking) -> str:
     """The answer in one line, with all its notes however long it is."""
-    with patch("wristctl.commands.ranking_answer.LINES", 99):
+    with patch("wristctl.commands.answer.LINES", 99):
         answer = answer_of(rankings)
     assert answer is not None
     return " ".join(" ".join(answer.lines()).split())

@@ -64,14 +64,19 @@ def test_ranges_are_told_in_deg_mm_and_kg(generate: Generate) -> None:
     error = angle_errors(exact_angle(TIP), THETA)
     degrees = np.degrees(THETA)
     (table,) = done.tables
-    assert table.title == "4 samples" and table.columns == ("quantity", "least", "greatest")
+    assert table.title == "4 samples" and table.columns == ("quantity", "least", "greatest", "unit")
     names = ["theta [deg]", "arc_length [mm]", "x [mm]", "y [mm]", "pose [deg]", "hand_mass [kg]"]
-    assert [row[0] for row in table.rows] == [*names, "error of the exact inverse [deg]"]
+    assert [row[0] for row in table.rows] == [
+        "bending angle", "arc length", "tip, along the straight wrist", "tip, aside", "tilt of the wrist",
+        "mass in the hand", "error of the exact inverse",
+    ]  # fmt: skip
+    assert [row[3] for row in table.rows] == ["deg", "mm", "mm", "mm", "deg", "kg", "deg"]
+    assert done.answer.table is not None and list(done.answer.table.rows) == list(table.rows[:-1])
     ends = [
         (degrees.min(), degrees.max()), (81.0, 95.0), (50.0, 80.0), (-20.0, 40.0),
         (math.degrees(-0.5), math.degrees(0.25)), (0.1, 0.4), (0.0, 3.0),
     ]  # fmt: skip
-    np.testing.assert_allclose([row[1:] for row in table.rows], ends, atol=1e-9)
+    np.testing.assert_allclose([row[1:3] for row in table.rows], ends, atol=1e-9)
     for name, (low, high) in zip(names, ends[:-1], strict=True):
         quantity, unit = name.removesuffix("]").split(" [")
         metrics = [done.findings.metrics[f"{quantity}_{end}_{unit}"] for end in ("min", "max")]
@@ -92,7 +97,7 @@ def test_ranges_are_told_in_deg_mm_and_kg(generate: Generate) -> None:
 
 def test_samples_without_other_inputs_name_none(generate: Generate) -> None:
     rows = generate("pcc").tables[0].rows
-    assert [row[0].split()[0] for row in rows] == ["theta", "arc_length", "x", "y", "error"]
+    assert [row[0].split()[0] for row in rows] == ["bending", "arc", "tip,", "tip,", "error"]
 
 
 def test_a_run_keeps_samples_that_are_read_back_whole(generate: Generate, tmp_path: Path) -> None:

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import math
-import re
 import shlex
 from collections.abc import Sequence
+from contextlib import AbstractContextManager
 from dataclasses import replace
+from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
@@ -14,9 +15,11 @@ import numpy as np
 import pytest
 
 from wristctl import load_study, tune
-from wristctl.commands.tune import searches
+from wristctl.commands.perform import perform, prepare
+from wristctl.commands.progress import counting, no_event
+from wristctl.commands.session import Done, Event, Unattended
 from wristctl.commands.tune.answer import Beside, answer_of, at_edge, beside_feedforward
-from wristctl.commands.tune.command import Tuned
+from wristctl.commands.tune.command import TUNE, Tuned
 from wristctl.config.wrist import WristParameters
 from wristctl.control.law import Controller
 from wristctl.control.table import controller
@@ -69,15 +72,22 @@ def test_figures_are_those_of_the_search_and_fit_a_screen(tuned: Tuned) -> None:
 
 
 @pytest.mark.slow
-def test_the_first_line_says_which_gains_are_searched_and_for_about_how_long(
-    caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    caplog.set_level("INFO", "wristctl")
-    monkeypatch.setattr(searches, "_WORTH_SAYING", 0.0)
-    tune(load_study(None, *STUDY))
-    first, *others = [record.getMessage() for record in caplog.records]
-    assert re.fullmatch(r"searching gains of smc, pid: about \d+ (s|min)", first)
-    assert not any("about" in line for line in others)
+def test_the_time_left_of_a_search_counts_the_choice_the_other_searches_and_what_is_tried_of_the_gains() -> None:
+    """Where both controllers cost alike, the first leaves at least as much to do as it takes."""
+    told: dict[str, tuple[int | None, float]] = {}
+
+    def show(
+        event: Event, task: str, total: int | None, unit: str, then: float = 0.0, after: float = 0.0
+    ) -> AbstractContextManager[Done]:
+        told[task] = total, then
+        return counting(no_event, task, total, unit, lambda count: None)
+
+    perform(prepare(TUNE, load_study(None, *STUDY), Path("none")), None, show, Unattended())
+    steps = list(told)
+    assert steps[:4] == ["tuning smc", "choosing gains of smc", "tuning pid", "choosing gains of pid"]
+    (total, first), (_, last) = told["tuning smc"], told["tuning pid"]
+    assert total == load_study(None, *STUDY).tune.iterations and first == pytest.approx(last * 2.0 + 1.0, rel=0.5)
+    assert first > 1.0 + last > 1.0
 
 
 def test_the_error_stands_beside_that_of_feedforward_on_the_same_cases(tuned: Tuned) -> None:

@@ -218,7 +218,7 @@ def test_the_statistic_of_a_pair_is_halls_transform_of_its_mean_over_its_deviati
     """t + g t^2/3 + g^2 t^3/27 + g/(6 n), with the skewness g of a few differences made larger by 6/n, 2 at most."""
     rng = np.random.default_rng(worlds)
     logarithms = np.stack([np.zeros(worlds), rng.gamma(6.0, 0.1, worlds), rng.gamma(0.1, 1.0, worlds)])
-    found = PairedComparisons(logarithms, 5)._statistics
+    found = PairedComparisons(logarithms, 5)._statistics.T
     for pair, (one, other) in enumerate(((0, 1), (0, 2), (1, 2))):
         differences = logarithms[one] - logarithms[other]
         ratio = differences.mean() / differences.std(ddof=1)
@@ -231,7 +231,7 @@ def test_the_statistic_of_a_pair_is_halls_transform_of_its_mean_over_its_deviati
 def test_every_flip_of_a_few_worlds_is_tried_once_with_the_first_worlds_sign_as_it_is(worlds: int) -> None:
     """A flip of all signs changes no size: of 2^W flips half are enough."""
     differences = np.random.default_rng(1).standard_normal(worlds)
-    found = PairedComparisons(np.stack([differences, np.zeros(worlds)]), 5)._statistics
+    found = PairedComparisons(np.stack([differences, np.zeros(worlds)]), 5)._statistics.T
     assert found.shape == (2 ** (worlds - 1), 1) and len(np.unique(found.round(12))) == len(found)
-    mirrored = PairedComparisons(np.stack([np.zeros(worlds), differences]), 5)._statistics
+    mirrored = PairedComparisons(np.stack([np.zeros(worlds), differences]), 5)._statistics.T
     np.testing.assert_allclose(np.sort(mirrored, axis=0), np.sort(found, axis=0), atol=1e-12)

@@ -28,6 +28,23 @@ def test_a_run_is_found_by_path_id_prefix_and_kind(make: Make, results: Path) ->
     assert open_run("latest:gen-data", results).path == last.path
 
 
+def test_latest_alone_is_the_last_run_of_any_kind_that_ended_ok(
+    make: Make, results: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    with pytest.raises(UserError, match="no run that ended ok"):
+        open_run("latest", results)
+    make()
+    with start_run("train", Study(), "", results) as other:
+        pass
+    assert open_run("latest", results).path == require("latest", "train", results).path == other.path
+    with pytest.raises(RuntimeError), start_run("tune", Study(), "", results):
+        raise RuntimeError
+    with caplog.at_level(logging.INFO, "wristctl.records.find"):
+        assert open_run("latest", results).path == other.path
+    assert "the last tune run" in caplog.text
+    assert make().path == open_run("latest", results).path
+
+
 def test_latest_passes_over_runs_that_did_not_end_well(make: Make, results: Path) -> None:
     good = make()
     with pytest.raises(RuntimeError), start_run("gen-data", Study(), "", results):

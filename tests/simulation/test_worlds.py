@@ -150,6 +150,21 @@ def test_gains_are_tuned_under_other_noise_than_they_are_judged_under() -> None:
     assert Draws(0).camera("step 30 deg, ulnar", 0) != Draws(0).camera("step 30 deg, radial", 0)
 
 
+@pytest.mark.parametrize("converge", [True, False])
+def test_what_is_told_of_measuring_only_grows_and_ends_with_all(converge: bool) -> None:
+    """Two loops of other structures are a batch each; where all converge at once there is no further pass."""
+    law, told = controller("smc-tracking"), list[float]()
+    gains = np.tile([[20.0, 250.0, 100.0, 10.0]], (40, 1))
+    base = [
+        "tune.scenarios=[{loop: camera}, {loop: exact}]", "tune.horizon=0.3",
+        "tune.loops={camera: {sensor: {level: camera}}, exact: {}}", "tune.repetitions=1",
+    ]  # fmt: skip
+    cases, _ = tuning_cases(load_study([], base))
+    measure(law, gains, cases, WRIST, ["rmse"], told.append, converge)
+    assert told == sorted(told) and told[-1] == 1.0 and 0.5 in told
+    assert any(0.16 < share < 0.5 for share in told) is not converge and any(0.0 < share < 0.5 for share in told)
+
+
 def test_an_objective_over_repetitions_is_the_mean_of_theirs() -> None:
     law, gains = controller("smc-tracking"), np.array([[20.0, 250.0, 100.0, 10.0], [30.0, 250.0, 80.0, 10.0]])
     base = [

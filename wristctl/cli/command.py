@@ -131,7 +131,7 @@ def _perform(
 ) -> None:
     from wristctl.cli.operator import TerminalOperator  # here, where a completion does not wait for them
     from wristctl.cli.output import print_plan, print_result
-    from wristctl.cli.progress import PLAIN, listening, progress
+    from wristctl.cli.progress import PLAIN, Bar, listening
     from wristctl.commands.perform import check_executor, perform, prepare, recording
     from wristctl.study_files.error_messages import check_sizes, located
     from wristctl.study_files.load import read_study
@@ -158,9 +158,10 @@ def _perform(
         label = options.label or re.sub(r"[^A-Za-z0-9_.-]", "-", files[-1].stem if files else "")[:60]
         settings = [whole_key(override, procedure.kind) for override in (*(options.override or ()), *seed)]
         typed = [*map(str, files), *(word for setting in settings for word in ("--set", setting))]
-        show, run = partial(progress, console, quiet=options.quiet), None
+        run = None
         try:
-            with recording(prepared, options.out, label, ["wristctl", *sys.argv[1:]]) as run:
+            command = ["wristctl", *sys.argv[1:]]
+            with Bar(console, options.quiet) as show, recording(prepared, options.out, label, command) as run:
                 outcome = perform(prepared, run, show, TerminalOperator(console, options.quiet, flags), executor, typed)
         except KeyboardInterrupt as interruption:
             if not run:

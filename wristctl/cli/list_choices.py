@@ -8,6 +8,7 @@ from wristctl.cli.json_output import print_json
 from wristctl.cli.options import Debug, Json
 from wristctl.cli.output import say
 from wristctl.commands.choice_tables import TABLES
+from wristctl.commands.printed_table import COLUMNS
 from wristctl.errors import UserError, meant
 
 app = typer.Typer(add_completion=False)
@@ -29,5 +30,5 @@ def list_choices(
     table = TABLES[what]()
     if as_json:
         return print_json({"schema": "wristctl.list/1", "columns": table.columns, "rows": table.rows})
-    for line in table.text().split("\n"):
+    for line in table.folded(COLUMNS).text().split("\n"):
         say(line)

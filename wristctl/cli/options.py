@@ -215,14 +215,16 @@ RESULTS = Path("results")
 Ref = Annotated[
     str,
     typer.Argument(
-        metavar="RUN", help="Path, id, beginning of an id, latest:KIND or latest:KIND:LABEL.", autocompletion=run_ids
+        metavar="RUN",
+        help="Path, id, beginning of an id, latest, latest:KIND or latest:KIND:LABEL.",
+        autocompletion=run_ids,
     ),
 ]
 Refs = Annotated[
     list[str],
     typer.Argument(
         metavar="RUN...",
-        help="Paths, ids, beginnings of ids, latest:KIND or latest:KIND:LABEL.",
+        help="Paths, ids, beginnings of ids, latest, latest:KIND or latest:KIND:LABEL.",
         autocompletion=run_ids,
     ),
 ]

@@ -4,25 +4,20 @@ import logging
 import os
 import sys
 import threading
-from collections.abc import Iterator
+import time
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
-from typing import Any
+from typing import Any, Self
 
 from rich.console import Console
 from rich.live import Live
-from rich.progress import (
-    BarColumn,
-    MofNCompleteColumn,
-    Progress,
-    ProgressColumn,
-    SpinnerColumn,
-    TextColumn,
-    TimeElapsedColumn,
-)
+from rich.progress import BarColumn, Progress, ProgressColumn, SpinnerColumn, Task, TextColumn, TimeElapsedColumn
+from rich.text import Text
 
-from wristctl.commands.progress import Count, counting, duration
+from wristctl.commands.progress import Ahead, Count, counting, duration, left_words
 from wristctl.commands.session import Done, Event
 from wristctl.escape import printable_lines
+from wristctl.lanes.compile_time import COMPILE_TIME
 
 # Keywords with which the console prints text that is not rich's markup.
 PLAIN: dict[str, Any] = {"markup": False, "emoji": False, "highlight": False, "soft_wrap": True}
@@ -45,7 +40,9 @@ class Terminal(Console):
             os.close(devnull)
 
     def set_live(self, live: Live) -> Any:
-        """Something begins to be drawn."""
+        """Something begins to be drawn, in place of what was: lives are not nested."""
+        if self._live_now is not None:
+            self._live_now.stop()
         self._live_now = live
         return super().set_live(live)
 
@@ -93,41 +90,83 @@ def listening(quiet: bool, verbose: bool) -> Iterator[Terminal]:
         logger.removeHandler(handler)
 
 
-@contextmanager
-def progress(
-    console: Console, event: Event, activity: str, total: int | None, unit: str, quiet: bool
-) -> Iterator[Done]:
-    """Show the progress of a step; yields `done(count, **figures)`, to be called as often as one likes.
+class Bar:
+    """The one live line of a command, whose tasks follow each other; off a terminal plain lines.
 
-    Without a `total` the length is unknown. Figures stand beside the count and go to `event`, at most once a second.
-    Off a terminal a step that takes long has a line after 10 s, 20 s, 40 s and so on.
+    Its bar is the share of the whole command, as far as that can be told. Off a terminal a task that takes long has a
+    line after 10 s, 20 s, 40 s and so on.
     """
-    live, lines = console.is_terminal and not quiet, not (console.is_terminal or quiet)
-    bar = Progress(*_columns(), console=console, transient=True, disable=not live)
-    task = bar.add_task(activity, total=total, figures="", left="")
-    over, current = threading.Event(), Count(activity, total, unit)
 
-    def tell() -> None:
+    def __init__(self, console: Console, quiet: bool) -> None:
+        self._console, self._began, self._ahead = console, time.monotonic(), Ahead()
+        self._live, self._lines = console.is_terminal and not quiet, not (console.is_terminal or quiet)
+        self._bar = Progress(
+            SpinnerColumn(), TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn(), _Left(self._left),
+            console=console, transient=True, disable=not self._live,
+        )  # fmt: skip
+        self._task = self._bar.add_task("", total=None)
+        self._count = Count("", None, "")
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._bar.stop()
+
+    @contextmanager
+    def __call__(
+        self, event: Event, task: str, total: int | None, unit: str, then: float = 0.0, after: float = 0.0
+    ) -> Iterator[Done]:
+        """Show the progress of a task; yields `done(count, **figures)`, to be called as often as one likes."""
+        over = threading.Event()
+        if self._lines:
+            threading.Thread(target=self._tell, args=(over,), daemon=True).start()
+        try:
+            with counting(event, task, total, unit, self._show, then, after) as advance:
+                self._bar.start()
+                yield advance
+        finally:
+            over.set()
+
+    def _tell(self, over: threading.Event) -> None:
         passed = 0.0
         for wait in _waits():
             if over.wait(wait):
                 return
             passed += wait
-            remaining = current.remaining() or f"{duration(passed)} so far"
-            console.print(f"{current.line()}, {remaining}", **PLAIN)
+            remaining = self._left() or f"{duration(passed)} so far"
+            self._console.print(f"{self._count.line()}, {remaining}", **PLAIN)
 
-    def show(count: Count) -> None:
-        nonlocal current
-        current = count
-        bar.update(task, completed=count.count, figures=count.beside(), left=count.remaining())
+    def _show(self, count: Count) -> None:
+        self._count, left = count, self._ahead.seconds_left(count)
+        self._bar.update(self._task, description=count.line())
+        if left is not None:
+            passed = time.monotonic() - self._began
+            self._bar.update(self._task, total=1.0, completed=passed / (passed + left))
 
-    if lines:
-        threading.Thread(target=tell, daemon=True).start()
-    try:
-        with counting(event, activity, total, unit, show) as advance, bar:
-            yield advance
-    finally:
-        over.set()
+    def _left(self) -> str:
+        return "compiling, once" if COMPILE_TIME.goes_on else left_words(self._ahead.seconds_left(self._count))
+
+
+class _Left(ProgressColumn):
+    """What is left, as it is when it is drawn."""
+
+    def __init__(self, told: Callable[[], str]) -> None:
+        super().__init__()
+        self._told = told
+
+    def render(self, task: Task) -> Text:
+        """The words."""
+        return Text(self._told())
+
+
+@contextmanager
+def progress(
+    console: Console, event: Event, activity: str, total: int | None, unit: str, quiet: bool
+) -> Iterator[Done]:
+    """Show the progress of a command that has one task."""
+    with Bar(console, quiet) as bar, bar(event, activity, total, unit) as advance:
+        yield advance
 
 
 def _waits() -> Iterator[float]:
@@ -137,9 +176,3 @@ def _waits() -> Iterator[float]:
         yield wait
         passed += wait
         wait = min(passed, _LINE_EVERY)
-
-
-def _columns() -> tuple[ProgressColumn, ...]:
-    text, figures = TextColumn("{task.description}"), TextColumn("{task.fields[figures]}")
-    passed, left = TimeElapsedColumn(), TextColumn("{task.fields[left]}")
-    return SpinnerColumn(), text, BarColumn(), MofNCompleteColumn(), passed, left, figures

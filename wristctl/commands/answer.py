@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from wristctl.commands.printed_table import COLUMNS, Table, in_lines
 
@@ -32,6 +32,19 @@ class Answer:
         blocks += [_lines(note) for note in self.notes]
         blocks += [in_lines(self.more)] * bool(self.more)
         return [line for k, block in enumerate(blocks) for line in [*[""] * bool(k), *block]]
+
+    @property
+    def fits(self) -> bool:
+        """Whether it fits one screen."""
+        return len(self.lines()) <= LINES
+
+    def fitted(self, notes: Sequence[str | Table]) -> Answer:
+        """The answer with those of these notes for which a screen has room, the first ones first."""
+        kept: list[str | Table] = []
+        for note in notes:
+            if note and replace(self, notes=[*kept, note]).fits:
+                kept.append(note)
+        return replace(self, notes=kept)
 
     def __str__(self) -> str:
         return "\n".join(self.lines())

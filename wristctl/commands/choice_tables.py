@@ -39,14 +39,14 @@ def controllers() -> Table:
 
 
 def presets() -> Table:
-    """Every preset as it is typed, with its gains in their units."""
+    """Every preset as it is typed, with its gains in their units; after a controller's own those that are shipped."""
     from wristctl.commands.ranking_answer import gains_words
+    from wristctl.control.shipped_gains import shipped_for
 
-    laws = _entries(CONTROLLERS).items()
     rows = [
         (f"{name}/{preset}", gains_words(name, gains) or "no gains")
-        for name, law in laws
-        for preset, gains in law.presets.items()
+        for name, law in _entries(CONTROLLERS).items()
+        for preset, gains in {**law.presets, **shipped_for(name)}.items()
     ]
     return Table("", ("preset", "gains"), rows)
 

@@ -62,6 +62,15 @@ class Table:
         chosen = [[row[index] for index in shown] for row in self.rows]
         return Table(self.title, [self.columns[index] for index in shown], chosen)
 
+    def folded(self, width: int) -> Table:
+        """The table no wider than `width`: texts of its last column go on in further rows, without the other cells."""
+        room = max(_HEAD, width - sum(each + 2 for each in self._layout(None)[2][:-1]))
+        rows = list[Sequence[Any]]()
+        for *others, text in self.rows:
+            first, *further = in_lines(str(text), room) or [""]
+            rows += [(*others, first), *((*[""] * len(others), line) for line in further)]
+        return Table(self.title, self.columns, rows)
+
     def cells(self, digits: int = _DIGITS) -> tuple[list[str], list[list[str]]]:
         """Heads and cells as people read them, numbers to so many digits."""
         columns, rows = readable(self.columns, [[_plain(value) for value in row] for row in self.rows])

@@ -9,6 +9,7 @@ from typing import Any
 
 from wristctl.commands.printed_table import number
 from wristctl.commands.session import Done, Event, ShowProgress
+from wristctl.lanes.compile_time import COMPILE_TIME
 
 log = logging.getLogger(__name__)
 
@@ -35,18 +36,38 @@ class Count:
     began: float = field(default_factory=lambda: time.monotonic())
     kept: int = 0
     """Part of the count that an earlier run had done, which says nothing of the pace."""
+    then: float = 0.0
+    """Time that the command takes after this task, as a multiple of the task's own."""
+    after: float = 0.0
+    """The same in seconds, of what does not grow with the task."""
+    compiled: float = field(default_factory=lambda: COMPILE_TIME.seconds)
+    """Seconds that had been spent on compiling when it began."""
+    reached: float | None = None
+    """Seconds of work until the count was what it is; None: it is so now."""
+    step: int = 1
+    """What it grew by last: by as much it is taken to grow next."""
+
+    def worked(self) -> float:
+        """Seconds since it began in which nothing was compiled."""
+        return max(0.0, time.monotonic() - self.began - (COMPILE_TIME.seconds - self.compiled))
 
     def seconds_left(self) -> float | None:
-        """Time left at the pace so far [s]; None where it is unknown, or all is done."""
-        passed = time.monotonic() - self.began
-        if self.total is None or not self.kept < self.count < self.total or passed < _TELLS:
+        """Time left of the command at the pace so far [s]; None where it is unknown, or all is done.
+
+        Between two counts the pace is that of the last one, until the next is overdue.
+        """
+        passed, whole = self.worked(), (self.total or 0) - self.kept
+        count = self.count - self.kept
+        if not 0 < count <= whole or passed < _TELLS or (count == whole and not self.then + self.after):
             return None
-        return passed * (self.total - self.count) / (self.count - self.kept)
+        reached = passed if self.reached is None else self.reached
+        following = min(count + self.step, whole)
+        task = reached if count == whole else max(reached * whole / count, passed * whole / following)
+        return task * (1.0 + self.then) + self.after - passed
 
     def remaining(self) -> str:
         """Time left in words; empty where it is unknown."""
-        left = self.seconds_left()
-        return "" if left is None else f"about {duration(left)} left"
+        return left_words(self.seconds_left())
 
     def beside(self) -> str:
         """The figures as text."""
@@ -65,7 +86,15 @@ class Count:
 
 
 @contextmanager
-def counting(event: Event, task: str, total: int | None, unit: str, show: Callable[[Count], None]) -> Iterator[Done]:
+def counting(
+    event: Event,
+    task: str,
+    total: int | None,
+    unit: str,
+    show: Callable[[Count], None],
+    then: float = 0.0,
+    after: float = 0.0,
+) -> Iterator[Done]:
     """Count while a block works: each call is shown, and at most one a second is an event.
 
     In the end one line of the log names the step and its time; of a step shorter than a second it is a detail.
@@ -82,13 +111,19 @@ def counting(event: Event, task: str, total: int | None, unit: str, show: Callab
         Unit of the count.
     show
         Display of the count.
+    then
+        Time that the command takes after the task, as a multiple of the task's own.
+    after
+        The same in seconds, of what does not grow with the task.
     """
-    state = Count(task, total, unit)
+    state = Count(task, total, unit, then=then, after=after)
     last_event = state.began - _EVENT_EVERY
 
     def done(count: int = 0, kept: int = 0, **figures: float) -> None:
         nonlocal last_event
-        state.count, state.kept = count, kept
+        if count > state.count:
+            state.step = count - state.count
+        state.count, state.kept, state.reached = count, kept, state.worked()
         state.figures |= figures
         show(state)
         instant = time.monotonic()
@@ -96,6 +131,7 @@ def counting(event: Event, task: str, total: int | None, unit: str, show: Callab
             last_event = instant
             event("progress", **state.fields())
 
+    show(state)
     yield done
     event("progress", **state.fields())
     passed = time.monotonic() - state.began
@@ -110,6 +146,25 @@ def duration(seconds: float) -> str:
     return f"{seconds:.0f} s"
 
 
+def left_words(seconds: float | None) -> str:
+    """Time left in words; empty where it is unknown."""
+    return "" if seconds is None else f"about {duration(seconds)} left"
+
+
+class Ahead:
+    """Time left of a command whose tasks follow each other: a task that tells none goes by what those before told."""
+
+    def __init__(self) -> None:
+        self._ends: float | None = None
+
+    def seconds_left(self, count: Count) -> float | None:
+        """Time left of the command by what the task that goes on tells [s]; None where it is unknown."""
+        now, left = time.monotonic(), count.seconds_left()
+        if left is not None:
+            self._ends = now + left
+        return None if self._ends is None or self._ends - now < 0.5 else self._ends - now
+
+
 def watched(watch: Watch | None) -> ShowProgress:
     """Progress for a script or notebook: nothing is printed, and `watch` is called at the start and at every step."""
 
@@ -117,9 +172,10 @@ def watched(watch: Watch | None) -> ShowProgress:
         if watch is not None:
             watch(count.what, count.count, count.total, dict(count.figures))
 
-    def shown(event: Event, task: str, total: int | None, unit: str) -> AbstractContextManager[Done]:
-        show(Count(task, total, unit))
-        return counting(event, task, total, unit, show)
+    def shown(
+        event: Event, task: str, total: int | None, unit: str, then: float = 0.0, after: float = 0.0
+    ) -> AbstractContextManager[Done]:
+        return counting(event, task, total, unit, show, then, after)
 
     return shown
 

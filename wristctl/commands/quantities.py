@@ -11,6 +11,7 @@ from wristctl.commands.printed_table import Table, number
 
 if TYPE_CHECKING:
     import pandas as pd
+    from numpy.typing import ArrayLike
 
     from wristctl.commands.results import Findings
     from wristctl.identification.arc_fit import Told
@@ -18,7 +19,12 @@ if TYPE_CHECKING:
 # Share of an interval's wider end below which the value within it is printed as 0.
 _NOTHING = 1e-6
 # Factors from a unit of files to one that people read; a table turns angles into degrees by itself.
-_SCALES = {("1/s", "Hz"): 1.0, ("s", "ms"): 1e3, ("m", "mm"): 1e3, ("m", "um"): 1e6, ("J", "mJ"): 1e3, ("", "%"): 100.0}
+_SCALES = {
+    ("1/s", "Hz"): 1.0, ("s", "ms"): 1e3, ("m", "mm"): 1e3, ("m", "um"): 1e6, ("J", "mJ"): 1e3, ("", "%"): 100.0,
+    ("rad", "deg"): 180.0 / math.pi,
+}  # fmt: skip
+# Heads of a table of ranges, and of one of single values.
+RANGE, VALUE = ("quantity", "least", "greatest", "unit"), ("what", "value")
 
 
 @dataclass(frozen=True)
@@ -36,11 +42,15 @@ class Quantity:
     better: Literal["lower", "higher", ""] = ""
 
     @property
+    def words(self) -> str:
+        """What people call it."""
+        return self.heading or self.name.replace("_", " ")
+
+    @property
     def head(self) -> str:
         """Head of its column, with the unit."""
         unit = self.shown or self.unit
-        words = self.heading or self.name.replace("_", " ")
-        return f"{words} [{unit}]" if unit else words
+        return f"{self.words} [{unit}]" if unit else self.words
 
     def cell(self, value: Any) -> Any:
         """A value as a cell of its column; words and None as they are."""
@@ -63,6 +73,34 @@ def documented(quantities: Iterable[Quantity]) -> tuple[dict[str, str], dict[str
 
 MEANT = "Parameters and their meaning"
 """Title of the table of parameters where a run keeps it with every column."""
+
+
+def keep_values(
+    findings: Findings, values: Iterable[tuple[Quantity, float | None, int]]
+) -> list[tuple[str, float | None]]:
+    """Values of quantities, each with its sample size, as metrics; a row of VALUE for each."""
+    rows = []
+    for quantity, value, count in values:
+        findings.metric(quantity.name, value, quantity.unit, quantity.better, count, meaning=quantity.meaning)
+        rows.append((quantity.head, quantity.cell(value)))
+    return rows
+
+
+def keep_range(
+    findings: Findings, quantity: Quantity, values: ArrayLike, unit_in_name: bool = False
+) -> tuple[str, float, float, str]:
+    """Least and greatest of the values of a quantity, in the unit that people read, as metrics; a row of RANGE.
+
+    The metrics are NAME_min and NAME_max, or NAME_min_UNIT and NAME_max_UNIT.
+    """
+    import numpy as np
+
+    array, unit = np.asarray(values, float), quantity.shown or quantity.unit
+    ends = [quantity.cell(float(end)) for end in (array.min(), array.max())]
+    for name, words, end in (("min", "least", ends[0]), ("max", "greatest", ends[1])):
+        meaning = f"{words}: {quantity.meaning}"
+        findings.metric(f"{quantity.name}_{name}{f'_{unit}' * unit_in_name}", end, unit, n=len(array), meaning=meaning)
+    return quantity.words, ends[0], ends[1], unit
 
 
 def told_table(told: Mapping[str, Told], title: str = "") -> Table:

@@ -8,11 +8,9 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from wristctl.commands.answer import LINES, Answer
-from wristctl.commands.printed_table import Table, degrees, joined, two
+from wristctl.commands.printed_table import degrees, joined, two
 
 if TYPE_CHECKING:
     from wristctl.comparison.controller_ranking import Fault, Ranking, Traits
@@ -333,12 +331,3 @@ def decided(rankings: Sequence[Ranking]) -> str:
         return text
     where = f"In {joined(motors)} motors" if len(rankings) > 1 else "There motors"
     return f"{text} {where} decide: all of the best wait for theirs {100.0 * MOTORS_DECIDE:g} % of the time or more."
-
-
-def fitted(answer: Answer, notes: Sequence[str | Table]) -> Answer:
-    """The answer with those of its notes for which a screen has room, the first ones first."""
-    kept: list[str | Table] = []
-    for note in notes:
-        if note and len(replace(answer, notes=[*kept, note]).lines()) <= LINES:
-            kept.append(note)
-    return replace(answer, notes=kept)

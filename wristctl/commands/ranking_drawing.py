@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
@@ -11,6 +12,7 @@ from wristctl.commands.results import Findings
 
 if TYPE_CHECKING:
     from wristctl.comparison.controller_ranking import Ranking
+    from wristctl.comparison.world_ranking import WorldRanking
 
 
 def draw_rankings(findings: Findings, rankings: Sequence[Ranking], later: bool = False) -> None:
@@ -42,6 +44,21 @@ def draw_rankings(findings: Findings, rankings: Sequence[Ranking], later: bool =
         name, place = re.sub(r"[^A-Za-z0-9.-]+", "-", ranking.name), places[ranking.name]
         caption = f"Probability that a controller (row) has less RMSE than another (column) in a {unit}: {place}"
         findings.figure(f"probability-{name}", probability_of_better, ranking, place, caption=caption, later=True)
+
+
+def keep_error(findings: Findings, name: str, ranking: Ranking, row: int, meaning: str = "") -> None:
+    """Keep the geometric mean of a row's RMSE, with its interval if it has one, as a metric."""
+    mean = ranking.means[row]
+    ends = (mean.low, mean.high) if math.isfinite(mean.high) else None
+    findings.metric(name, mean.value, "rad", "lower", ranking.count, ends, meaning)
+
+
+def draw_intervals(findings: Findings, ranking: WorldRanking, end: str) -> None:
+    """Draw every row of a ranking over worlds with its interval; `end` follows `ranking` in the figure's name."""
+    from wristctl.plotting.ranking_figures import ranking_intervals
+
+    caption = f"RMSE of every controller on {ranking.name}, with 95 % intervals over worlds"
+    findings.figure(f"ranking{end}", ranking_intervals, ranking, caption=caption)
 
 
 def places_of(rankings: Sequence[Ranking]) -> dict[str, str]:

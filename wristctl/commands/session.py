@@ -34,7 +34,9 @@ Event = Callable[..., None]
 class ShowProgress(Protocol):
     """Display of the progress of a task while a block works on it; notes it as events."""
 
-    def __call__(self, event: Event, task: str, total: int | None, unit: str) -> AbstractContextManager[Done]:
+    def __call__(
+        self, event: Event, task: str, total: int | None, unit: str, then: float = 0.0, after: float = 0.0
+    ) -> AbstractContextManager[Done]:
         """Begin to show `task`; without a `total` its length is unknown."""
 
 
@@ -74,9 +76,15 @@ class Session:
     typed: Sequence[str] = ()
     """The study's files and settings as the command line had them, for commands that are advised."""
 
-    def progress(self, task: str, total: int | None = None, unit: str = "") -> AbstractContextManager[Done]:
-        """Show the progress of `task`: a context manager that yields `done(count, **figures)`."""
-        return self.show(self.findings.event, task, total, unit)
+    def progress(
+        self, task: str, total: int | None = None, unit: str = "", then: float = 0.0, after: float = 0.0
+    ) -> AbstractContextManager[Done]:
+        """Show the progress of `task`: a context manager that yields `done(count, **figures)`.
+
+        The time left is that of the command: what it takes after the task is `then` times the task's own time, and
+        `after` [s], which does not grow with the task.
+        """
+        return self.show(self.findings.event, task, total, unit, then, after)
 
     def tell_refused(self, answer: Answer, tables: Sequence[Table] = ()) -> None:
         """Tell the answer of a result that is refused, and keep it with its tables in the run's README."""

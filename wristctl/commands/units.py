@@ -18,7 +18,14 @@ log = logging.getLogger(__name__)
 
 
 def performed(
-    session: Session, command: str, task: str, units: Sequence[Unit], golden: Golden | None, counted: str = "rollouts"
+    session: Session,
+    command: str,
+    task: str,
+    units: Sequence[Unit],
+    golden: Golden | None,
+    counted: str = "rollouts",
+    then: float = 0.0,
+    after: float = 0.0,
 ) -> UnitsDone:
     """Compute a command's units with the session's workers, into the run where there is one, and show the progress.
 
@@ -38,6 +45,8 @@ def performed(
         Numbers that all workers must reproduce; None for no check.
     counted
         Unit of the units' sizes.
+    then, after
+        Time that the command takes after them, as `Session.progress` has it.
     """
     from wristctl.commands.adoption import adoption, sources_in
     from wristctl.work.executors import Workers
@@ -56,7 +65,7 @@ def performed(
         units = [replace(unit, spec={**unit.spec, "sources": sources}) for unit in units]
         furnish = Furnish("wristctl.commands.adoption:adopt", adoption(session.study, command))
     count = kept = 0
-    with session.progress(task, total=sum(unit.size for unit in units), unit=counted) as report:
+    with session.progress(task, sum(unit.size for unit in units), counted, then, after) as report:
 
         def told(unit: Unit, computed: Computed | None) -> None:
             nonlocal count, kept

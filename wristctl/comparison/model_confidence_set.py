@@ -10,6 +10,7 @@ from functools import lru_cache
 from itertools import combinations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from wristctl.arrays import Array
 from wristctl.comparison.bootstrap import LEVEL, on_grid
@@ -37,7 +38,7 @@ class PairedComparisons:
         self._pairs = np.array(list(combinations(range(len(gridded)), 2)), int).reshape(-1, 2)
         self._differences: Array = gridded[self._pairs[:, 0]] - gridded[self._pairs[:, 1]]
         self._statistics = _flipped(self._differences, seed)
-        """Statistic of every sign flip and pair, (F, P); the first flip leaves all signs as they are."""
+        """Statistic of every pair and sign flip, (P, F); the first flip leaves all signs as they are."""
         self._level = (1.0 - LEVEL) * (1.0 - 2.0 / gridded.shape[1])
         """Share of the flips; less than 5 % for few worlds, of which the rare bad ones may all be missing."""
 
@@ -50,12 +51,18 @@ class PairedComparisons:
         left = sorted(rows, key=lambda row: (self.means[row], row))
         while len(left) > 1:
             among = np.flatnonzero(np.isin(self._pairs, left).all(axis=1))
-            statistics = self._statistics[:, among]
-            largest = statistics.max(axis=1)
+            largest = self._largest(among)
             if np.mean(largest >= largest[0] * (1.0 - 1e-9)) > self._level or largest[0] == 0.0:
                 break
-            left.remove(max(self._pairs[among[np.argmax(statistics[0])]], key=left.index))
+            left.remove(max(self._pairs[among[np.argmax(self._statistics[among, 0])]], key=left.index))
         return left
+
+    def _largest(self, pairs: NDArray[np.int64]) -> Array:
+        """Largest statistic of these pairs under every flip, (F,); a pair at a time, since all are many megabytes."""
+        largest = np.zeros(self._statistics.shape[1])
+        for pair in pairs:
+            np.maximum(largest, self._statistics[pair], out=largest)
+        return largest
 
     def resolution(self, rows: Sequence[int]) -> float:
         """The smallest ratio that these worlds tell from 1 as a rule, among so many rows.
@@ -68,19 +75,20 @@ class PairedComparisons:
             return float("nan")
         if self._differences.shape[1] < LEAST_PAIRS:
             return float("inf")
-        needed = np.quantile(self._statistics[:, among].max(axis=1), 1.0 - self._level)
+        needed = np.quantile(self._largest(among), 1.0 - self._level)
         return float(np.exp(needed * np.median(self._differences[among].std(axis=1, ddof=1))))
 
 
 def _flipped(differences: Array, seed: int | Entropy) -> Array:
-    """Size of each pair's statistic, in standard deviations of its differences (P, W), under every flip, (F, P)."""
+    """Size of each pair's statistic, in standard deviations of its differences (P, W), under every flip, (P, F)."""
     signs = _signs(differences.shape[1], seed)
-    statistics = np.empty((len(signs), len(differences)))
+    statistics = np.empty((len(differences), len(signs)))
     squares, cubes = (differences**2).mean(axis=1), differences**3
     for first in range(0, len(signs), _AT_ONCE):
         some = signs[first : first + _AT_ONCE]
         n = some.shape[1]
-        statistics[first : first + _AT_ONCE] = _transformed(some @ differences.T / n, squares, some @ cubes.T / n, n)
+        of_flips = _transformed(some @ differences.T / n, squares, some @ cubes.T / n, n)
+        statistics[:, first : first + _AT_ONCE] = of_flips.T
     return statistics
 
 

@@ -51,8 +51,9 @@ RANKED = (
 
 
 def ranked_units() -> dict[str, str]:
-    """Units of RANKED, by name; what goes on swinging in motion is no metric by itself."""
-    return {name: METRICS[name].unit or "1" for name in RANKED if name in METRICS} | {"sustained": "rad"}
+    """Units of RANKED and of a ranking's errors, by name; what goes on swinging in motion is no metric by itself."""
+    angles = dict.fromkeys(("sustained", "rmse_low", "rmse_high", "worst_rmse"), "rad")
+    return {name: METRICS[name].unit or "1" for name in RANKED if name in METRICS} | angles
 
 
 class RankedRow(NamedTuple):

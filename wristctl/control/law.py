@@ -33,6 +33,7 @@ from wristctl.control.plain_law import PlainLaw, Shape
 from wristctl.errors import UserError
 from wristctl.lanes import functions, lane
 from wristctl.lanes.blocks import width
+from wristctl.lanes.compile_time import COMPILE_TIME
 from wristctl.lanes.compiled import compiled, frozen_values, keep
 from wristctl.lanes.rows import part, rows_named, stack_named, stacked
 from wristctl.lanes.types import LaneType, RowsType
@@ -220,7 +221,8 @@ class _NativeLaw(types.WrapperAddressProtocol):
         )
         keep(self._code, law, Path(__file__), *imported, frozen=frozen + repr(shape).encode())
         try:
-            self._code.compile()
+            with COMPILE_TIME.counted():
+                self._code.compile()
         except NumbaError as error:
             raise _refused(law, error) from error
 

@@ -52,6 +52,12 @@ def families() -> list[str]:
     return list(_shipped())
 
 
+def shipped_for(controller: str) -> dict[str, dict[str, float]]:
+    """Gains of a controller that are shipped, by the names that people type: `tuned:FAMILY`."""
+    shipped = {PREFIX + family: content["controllers"] for family, content in _shipped().items()}
+    return {name: dict(rows[controller]["gains"]) for name, rows in shipped.items() if controller in rows}
+
+
 def shipped_gains(controller: str, gains: str) -> ShippedGains:
     """The gains of a controller that `tuned:FAMILY` names. UserError with what there is, where there are none."""
     family = gains.removeprefix(PREFIX)

@@ -125,6 +125,11 @@ def _held_again(
         best = more if more.verdict == "wanted" else best
 
 
+def most_models(robot: ArcRobot) -> int:
+    """The number of models that are tried of a robot, as a rule."""
+    return len(robot.terms) + (4 if robot.weighed else 2)
+
+
 def chosen_of(models: Sequence[TriedModel]) -> TriedModel:
     """The model with the smallest error among those of which every term is wanted or told by none."""
     fair = [

@@ -28,6 +28,7 @@ from numba.core.caching import CompileResultCacheImpl, FunctionCache, UserProvid
 from numba.core.registry import CPUDispatcher
 from numba.extending import overload
 
+from wristctl.lanes.compile_time import COMPILE_TIME
 from wristctl.lanes.kernel_folder import kernels_folder, own_folder
 
 _PACKAGE = Path(__file__).resolve().parents[1]
@@ -225,7 +226,8 @@ class _Kernel(CPUDispatcher):
 
     def compile(self, sig: Any) -> Any:
         signature = hashlib.sha256(str(sig).encode()).hexdigest()[:16]
-        with _alone(self.kept and self.kept / f"{self.py_func.__qualname__}.{signature}.lock"):
+        lock = self.kept and self.kept / f"{self.py_func.__qualname__}.{signature}.lock"
+        with COMPILE_TIME.counted(), _alone(lock):
             return super().compile(sig)
 
 

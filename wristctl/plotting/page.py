@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 from wristctl.escape import printable, printable_lines
 from wristctl.plain_files import read_plain, unreadable
 from wristctl.plotting.animation import animation
-from wristctl.plotting.page_tables import in_words, shown_tables
+from wristctl.plotting.page_tables import metric_in_words, shown_tables
 from wristctl.reader_units import in_degrees
 from wristctl.records.lineage import Ancestor, ancestry
 from wristctl.records.manifest import CONFIG, Manifest, read_overview
@@ -268,7 +268,7 @@ def _templates() -> Environment:
     environment = Environment(
         loader=FileSystemLoader(folder), autoescape=True, trim_blocks=True, lstrip_blocks=True, finalize=_shown
     )
-    environment.filters["cell"], environment.filters["words"] = _cell, in_words
+    environment.filters["cell"], environment.filters["words"] = _cell, metric_in_words
     scripts = [environment.get_template(script.name).render().encode() for script in sorted(folder.glob("*.js"))]
     hashes = [base64.b64encode(hashlib.sha256(script).digest()).decode() for script in scripts]
     environment.globals["allowed"] = " ".join(

@@ -84,10 +84,10 @@ def _row(entry: dict[Any, Any], units: dict[str, str], many: bool, verdicts: dic
 
 
 def _head(name: str, unit: str) -> str:
-    return f"{in_words(name)} [{unit}]" if unit and unit != "1" else in_words(name)
+    return f"{metric_in_words(name)} [{unit}]" if unit and unit != "1" else metric_in_words(name)
 
 
-def in_words(name: str, unit: str = "") -> str:
+def metric_in_words(name: str, unit: str = "") -> str:
     """Name of a metric for people, without the unit that stands beside it: `tip_rmse_mm` [mm] is `tip RMSE`."""
     words = name.removesuffix(f"_{unit}").replace("_", " ")
     return re.sub(r"\brmse\b", "RMSE", re.sub(r"^r2$", "R^2", words))

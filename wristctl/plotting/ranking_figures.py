@@ -19,9 +19,9 @@ from wristctl.plotting.style import (
     SILVER,
     colour,
     columns_within,
+    controller_in_words,
     figure,
     grid,
-    in_words,
     legend_below,
     legend_under,
     line,
@@ -73,7 +73,7 @@ def answer_figure(rankings: Sequence[Ranking], places: Mapping[str, str]) -> Fig
     wide = picture.get_figwidth() >= _ROOM
     axes.set_xlabel("RMSE [deg]: geometric mean with 95 % interval" if wide else "RMSE [deg], 95 % interval")
     every: dict[str, Any] = {"linestyle": "none", "markersize": 4.5}
-    called = in_words if wide else str
+    called = controller_in_words if wide else str
     names = dict.fromkeys(label.split("/")[0] for label in labels)
     alone = "o" if len(marks) > 1 else next(iter(marks.values()))
     handles = [Line2D([], [], marker=alone, color=colour(name), label=called(name), **every) for name in names]

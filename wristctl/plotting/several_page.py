@@ -6,7 +6,7 @@ from string import ascii_uppercase
 from typing import Any
 
 from wristctl.plotting.page import Figures, figures, render
-from wristctl.plotting.page_tables import in_words
+from wristctl.plotting.page_tables import metric_in_words
 from wristctl.reader_units import in_degrees
 from wristctl.records.difference import difference
 from wristctl.records.manifest import read_overview
@@ -66,7 +66,7 @@ def _metric(runs: list[Run], name: str, values: list[Any]) -> list[Any]:
     """The row of a metric, angles in degrees; its unit is that of the first run that has it."""
     unit = next((run.metrics[name].get("unit") or "" for run in runs if name in run.metrics), "")
     shown = in_degrees(None, unit)[1]
-    return [in_words(name, shown), shown, *(in_degrees(value, unit)[0] for value in values)]
+    return [metric_in_words(name, shown), shown, *(in_degrees(value, unit)[0] for value in values)]
 
 
 def _text(value: Any) -> str:

@@ -268,7 +268,7 @@ def colour(controller: str) -> str:
     return _CONTROLLERS.get(controller) or _OTHERS[zlib.crc32(controller.encode()) % len(_OTHERS)]
 
 
-def in_words(controller: str) -> str:
+def controller_in_words(controller: str) -> str:
     """The controller's name, and what it is: smc (sliding mode)."""
     words = _IN_WORDS.get(controller)
     return f"{controller} ({words})" if words else controller

@@ -1,4 +1,4 @@
-"""Runs found by path, id, the beginning of an id or `latest:<kind>`, and chosen by state, tag, age and metrics."""
+"""Runs found by path, id, the beginning of an id or `latest`, and chosen by state, tag, age and metrics."""
 
 import logging
 import re
@@ -34,12 +34,12 @@ def list_runs(results: Path = RESULTS) -> list[Run]:
 def open_run(ref: str | Path, results: Path = RESULTS) -> Run:
     """The run that `ref` names: a path, an id in `results` or its beginning, `latest:<kind>` (that ended ok).
 
-    `latest:<kind>:<label>` is the latest with that label.
+    `latest:<kind>:<label>` is the latest with that label, `latest` alone the latest of all kinds.
 
     Raises UserError where there is none, more than one, or what is there is not a run. A run whose manifest was
     changed after sealing is one still; reading the manifest raises.
     """
-    if str(ref).startswith("latest:"):
+    if _is_latest(ref):
         return _latest(str(ref), results)
     path = Path(ref)
     if path.name == MANIFEST:
@@ -86,7 +86,7 @@ def require(ref: str | Path, kind: str | None, results: Path = RESULTS, content:
 
     It must have the content too; `latest:` passes over runs without.
     """
-    run = _latest(str(ref), results, content) if str(ref).startswith("latest:") else open_run(ref, results)
+    run = _latest(str(ref), results, content) if _is_latest(ref) else open_run(ref, results)
     actual_kind = run.manifest.kind  # raises where the manifest was changed, and with it perhaps kind and state
     if kind not in (None, actual_kind):
         raise UserError(
@@ -109,17 +109,22 @@ def _readable(path: Path) -> Run:
     return run
 
 
+def _is_latest(ref: str | Path) -> bool:
+    """Whether it names the latest of a kind, or, where no such file is there, of all."""
+    return str(ref).startswith("latest:") or (str(ref) == "latest" and not Path(ref).exists())
+
+
 def _latest(ref: str, results: Path, content: Content | None = None) -> Run:
-    kind, _, label = ref.removeprefix("latest:").partition(":")
+    kind, _, label = ref.removeprefix("latest").removeprefix(":").partition(":")
     entries = indexed(results, renew=False)
-    ended = [run for run in entries if run.state == "ok"]
-    fitting = [run for run in ended if run.kind == kind and label in ("", run.label)]
+    asked = [run for run in entries if kind in ("", run.kind) and label in ("", run.label) and run.state != "broken"]
+    fitting = [run for run in asked if run.state == "ok"]
     empty = [run for run in fitting if content and not content.of(results / run.id)]
     latest = max((run for run in fitting if run not in empty), key=lambda run: run.started, default=None)
     for run in (Run(results / entry.id) for entry in entries if entry.state == "broken"):
         stamp, _, name = run.id.partition("-")
         if (
-            name.startswith(f"{kind}-{label}")
+            name.startswith(kind and f"{kind}-{label}")
             and run.sealed
             and (latest is None or stamp >= latest.id.partition("-")[0])
         ):
@@ -128,15 +133,17 @@ def _latest(ref: str, results: Path, content: Content | None = None) -> Run:
         problem = f"no {kind} run that ended ok holds a {content.what} ({content.file})"
         raise UserError(problem, f"{ref} in {results}", ("run `", Call(command_of(kind)), "` again"))
     if latest is None:
-        others = [run for run in entries if run.kind == kind and label in ("", run.label) and run.state != "broken"]
-        if others:
-            last = max(others, key=lambda run: run.started)
-            problem = f"no {kind} run{f' with the label {label!r}' if label else ''} that ended ok"
+        if asked:
+            last = max(asked, key=lambda run: run.started)
+            problem = f"no {f'{kind} ' * bool(kind)}run{f' with the label {label!r}' if label else ''} that ended ok"
             why = f": {last.note}" if last.note else ""
             raise UserError(problem, f"{ref} in {results}", f"{last.id} (state: {last.state}{why})")
+        ended = [run for run in entries if run.state == "ok"]
         kinds, labels = {run.kind for run in ended}, {run.label for run in ended if run.kind == kind}
         if labels:
             raise UserError(f"no {kind} run with the label {label!r}", f"{ref} in {results}", meant(label, labels))
+        if not kind:
+            raise UserError("no run that ended ok", f"{ref} in {results}", ("name the results folder with ", OUT))
         longest = max((one for one in kinds if kind.startswith(f"{one}-")), key=len, default="")
         if longest:
             labelled = f"latest:{longest}:{kind.removeprefix(f'{longest}-')}"
@@ -146,16 +153,12 @@ def _latest(ref: str, results: Path, content: Content | None = None) -> Run:
             logs = (Argument("runs", "LOG", positional=True),) if kind == "identify" else ()
             fix = ("run `", Call(command_of(kind), arguments=logs), "` first")
         raise UserError(f"no {kind} run that ended ok", f"{ref} in {results}", fix)
-    later = [
-        run
-        for run in entries
-        if run.kind == kind and label in ("", run.label) and run.state != "broken" and run.started > latest.started
-    ]
+    later = [run for run in asked if run.started > latest.started]
     if later:
         last = max(later, key=lambda run: run.started)  # not by id, which has no more than the second
         why = f"holds no {content.what}" if content and last in empty else f"is {last.state}"
         note = f" ({last.note})" if last.note else ""
-        _log.info("the last %s run, %s, %s%s: %s is taken", kind, last.id, why, note, latest.id)
+        _log.info("the last %s run, %s, %s%s: %s is taken", kind or last.kind, last.id, why, note, latest.id)
     return Run(results / latest.id)
 
 

@@ -127,7 +127,7 @@ def measure(
     cases: Sequence[Case],
     wrist: WristParameters,
     metrics: Sequence[str],
-    progress: Callable[[float], None] | None = None,
+    progress: Callable[[float], object] | None = None,
     converge: bool = True,
 ) -> Measured:
     """Run gains (P, g) of a law on all the cases; with `converge` at integration steps that are short enough.
@@ -141,7 +141,12 @@ def measure(
     for numbers in _alike(cases):
         for rows, columns in _pieces(len(gains), numbers, cases[numbers[0]], _recorded(metrics)):
             chosen = [cases[number] for number in columns]
-            outcome, values = _measured(law, gains[rows], chosen, wrist, metrics, converge)
+
+            def so_far(share: float, before: int = finished, count: int = len(rows) * len(columns)) -> None:
+                if progress is not None:
+                    progress((before + share * count) / failed.size)
+
+            outcome, values = _measured(law, gains[rows], chosen, wrist, metrics, converge, so_far)
             cells, places = np.ix_(rows, columns), outcome.places
             for name in metrics:
                 measured[name][cells] = values[name].reshape(len(rows), -1)
@@ -208,7 +213,13 @@ def at_once(metrics: Sequence[str], outcome: Outcome, which: NDArray[np.int64], 
 
 
 def _measured(
-    law: Controller, gains: Array, cases: Sequence[Case], wrist: WristParameters, metrics: Sequence[str], converge: bool
+    law: Controller,
+    gains: Array,
+    cases: Sequence[Case],
+    wrist: WristParameters,
+    metrics: Sequence[str],
+    converge: bool,
+    progress: Callable[[float], None],
 ) -> tuple[Outcome, dict[str, Array]]:
     """The metrics (rows * cases,) of a batch."""
     motions = list({id(case.motion): case.motion for case in cases}.values())
@@ -220,6 +231,7 @@ def _measured(
     outcome = rollout(
         law, np.repeat(gains, count, axis=0), motions, which, loops[0] if one else loops, wrist,
         streams=[case.stream for case in cases] * rows, record=_recorded(metrics), converge=converge,
+        progress=progress,
     )  # fmt: skip
     values = {
         name: outcome.metrics[name] for name in metrics if name not in AT_ONCE and METRICS[name].of_totals is not None

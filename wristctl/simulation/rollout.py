@@ -28,6 +28,8 @@ from wristctl.wrist.tendon_layout import TendonLayout
 
 # Control ticks of a block between two looks at whether the user has asked to stop.
 _SLICE_TICKS = 200_000
+# Share of the time of rollouts before those in doubt run again, and of what is then left that each further pass takes.
+FIRST_PASS, AGAIN = 0.3, 0.5
 # Least number of pieces of work for each thread, where there are so many blocks, so that all end together.
 _SHARES = 8
 _ALIVE = SUMS.index("alive")
@@ -84,14 +86,13 @@ def rollout(
     stop = stop or Event()
     everyone = np.arange(count)
 
-    def run(rollouts: NDArray[np.int64], times: int, progress: Callable[[float], None] | None = None) -> Outcome:
+    def run(rollouts: NDArray[np.int64], times: int, progress: Callable[[float], object]) -> Outcome:
         groups = [rollouts[lane : lane + 1] for lane in range(len(rollouts))] if controller.plain else [rollouts]
         parts = list[Outcome]()
         for number, group in enumerate(groups):
 
             def so_far(share: float, number: int = number) -> None:
-                if progress is not None:
-                    progress((number + share) / len(groups))
+                progress((number + share) / len(groups))
 
             group_worlds, group_lanes, followed = *part_of(worlds, lanes, group), motions
             if times > 1:
@@ -106,13 +107,23 @@ def rollout(
             )  # fmt: skip
         return parts[0] if len(parts) == 1 else Outcome.joined(parts, np.arange(len(rollouts)))
 
-    outcome = run(everyone, 1, progress)
+    told, report = 0.0, progress or (lambda share: None)
+
+    def pass_of(rollouts: NDArray[np.int64], times: int, share: float = AGAIN) -> Outcome:
+        """Rollouts that take this share of what is left to be told."""
+        nonlocal told
+        begin, told = told, told + share * (1.0 - told)
+        return run(rollouts, times, lambda done: report(begin + (told - begin) * done))
+
+    outcome = pass_of(everyone, 1, FIRST_PASS if converge else 1.0)
     if stop.is_set() or not converge:
         return outcome
     by_hand = np.array([setting.loop.substeps is not None for setting in worlds])[world]
     kinked = np.array([has_kinks(setting.loop) for setting in worlds])[world]
     bears = np.array([setting.wrist.tension_range for setting in worlds])[world]
-    return settled(outcome, run, by_hand, kinked, bears, stop)
+    outcome = settled(outcome, pass_of, by_hand, kinked, bears, stop)
+    report(1.0)
+    return outcome
 
 
 def plant_in(planes: int, loop: Loop) -> PlantModel:

@@ -1,6 +1,6 @@
 """Objective of a search for gains: their metrics on many cases beside those of `feedforward` there, in decades."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -91,9 +91,9 @@ class Judge:
             best = min(best, float(values[first]))
         return values
 
-    def choice(self, law: Controller, gains: Array) -> Array:
+    def choice(self, law: Controller, gains: Array, progress: Callable[[float], object] | None = None) -> Array:
         """Objective (P,) of gains (P, g) to choose the least by: what costs more without changes is not changed."""
-        values, best, costs = self._on_the_cases(law, gains), np.inf, dict[int, float]()
+        values, best, costs = self._on_the_cases(law, gains, progress), np.inf, dict[int, float]()
         while values[first := int(np.argmin(values))] < best:
             values[first] += self._cost_of(first, law, gains, values < best, values, costs)
             best = min(best, float(values[first]))
@@ -116,8 +116,8 @@ class Judge:
             costs |= dict(zip(chosen, map(float, self._without_margin(law, gains[chosen])), strict=True))
         return costs[first]
 
-    def _on_the_cases(self, law: Controller, gains: Array) -> Array:
-        return self.value(measure(law, gains, self._cases, self._wrist, self._metrics))
+    def _on_the_cases(self, law: Controller, gains: Array, progress: Callable[[float], object] | None = None) -> Array:
+        return self.value(measure(law, gains, self._cases, self._wrist, self._metrics, progress))
 
     def _without_margin(self, law: Controller, gains: Array) -> Array:
         """What it costs gains (P, g) that they lose a share of the changed loops, (P,) [decades]."""

@@ -9,7 +9,7 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, nullcontext
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -218,12 +218,13 @@ def search(
     judges: tuple[Judge, Judge | None],
     progress: Callable[[Search], None] | None = None,
     known: Tried | None = None,
+    choosing: AbstractContextManager[Callable[[int], object]] | None = None,
 ) -> Search:
     """Tune one controller with the study's optimiser, budget and objective.
 
-    `judges` are of the cases to search on and of those to choose by, None where there are none. `streams` gives the
-    entropy of each of the searches by its name. `progress` gets the search so far after every iteration, so that an
-    interrupted one loses nothing; `known` is what such a one had tried, which is not run again. Raises UserError where
+    `judges` are of the cases to search on and of those to choose by, None where there are none; the choice is made in
+    `choosing`, told per cent. `streams` gives the entropy of each search by its name. `progress` gets the search so far
+    after every iteration; `known` is what an interrupted one had tried, which is not run again. Raises UserError where
     that is of another search.
     """
     check_tunable(controller)
@@ -244,7 +245,8 @@ def search(
         result = _found(controller, Tried(np.array(values), np.array(tried)), settings.restarts)
         if progress is not None:
             progress(result)
-    return _chosen(controller, result, judge, choose, settings.finalists)
+    with choosing or nullcontext(int) as report:
+        return _chosen(controller, result, judge, choose, settings.finalists, report)
 
 
 def _searches(
@@ -292,7 +294,10 @@ def _found(controller: Controller, tried: Tried, restarts: int) -> Search:
     return Search(controller.name, gains, float(tried.values.min()), tried.values.size, tried, restarts)
 
 
-def _chosen(controller: Controller, result: Search, judge: Judge, choose: Judge | None, count: int) -> Search:
+def _chosen(
+    controller: Controller, result: Search, judge: Judge, choose: Judge | None, count: int,
+    report: Callable[[int], object],
+) -> Search:  # fmt: skip
     """The best on the cases to choose by, of the search's best candidates and the presets."""
     flat, values = result.tried.gains.reshape(-1, len(controller.gains)), result.tried.values.ravel()
     distinct: dict[tuple[float, ...], float] = {}
@@ -300,16 +305,14 @@ def _chosen(controller: Controller, result: Search, judge: Judge, choose: Judge 
         distinct.setdefault(tuple(map(float, flat[index])), float(values[index]))
     candidates = [(gains, "search", value) for gains, value in list(distinct.items())[:count]]
     if presets := _presets(controller, GainSpace.of(controller.gains)):
-        judged = judge(controller, np.array(list(presets.values())))
-        for (name, each), value in zip(presets.items(), judged, strict=True):
-            candidates.append((tuple(map(float, each)), name, float(value)))
-    validated = (choose or judge).choice(controller, np.array([gains for gains, *_ in candidates]))
-    every = [Finalist(*each, float(value)) for each, value in zip(candidates, validated, strict=True)]
-    ordered = tuple(sorted(every, key=lambda finalist: finalist.validated))
+        judged = zip(presets.items(), judge(controller, np.array(list(presets.values()))), strict=True)
+        candidates += [(tuple(map(float, each)), name, float(value)) for (name, each), value in judged]
+    every = np.array([gains for gains, *_ in candidates])
+    validated = (choose or judge).choice(controller, every, lambda share: report(round(100.0 * share)))
+    finalists = [Finalist(*each, float(value)) for each, value in zip(candidates, validated, strict=True)]
+    ordered = tuple(sorted(finalists, key=lambda finalist: finalist.validated))
     best = dict(zip(controller.gains, ordered[0].gains, strict=True))
-    return Search(
-        controller.name, best, ordered[0].validated, result.evaluations, result.tried, result.restarts, ordered
-    )  # fmt: skip
+    return replace(result, gains=best, objective=ordered[0].validated, finalists=ordered)
 
 
 def search_unit(study: Study, law: str, tuning: int = 0) -> Unit:
@@ -318,12 +321,8 @@ def search_unit(study: Study, law: str, tuning: int = 0) -> Unit:
     Every `tuning` is on other worlds of it, with another stream of the optimiser.
     """
     family, settings = study.tune.worlds.family, study.tune
-    needed = study.model_copy(
-        update={
-            "families": {family: study.families[family]},
-            "tune": settings.model_copy(update={"controllers": (law,)}),
-        }
-    )
+    own = settings.model_copy(update={"controllers": (law,)})
+    needed = study.model_copy(update={"families": {family: study.families[family]}, "tune": own})
     content = json.loads(needed.model_dump_json(by_alias=True, include={"seed", "wrist", "families", "tune"}))
     rollouts = settings.candidates * settings.iterations * settings.restarts * settings.worlds.draws
     rollouts += settings.finalists * settings.worlds.validation

@@ -13,7 +13,7 @@ import typer
 from wristctl.cli.command import asked_to_trust
 from wristctl.cli.options import RESULTS, Debug, Out, Quiet, Ref, TrustCode
 from wristctl.cli.output import say
-from wristctl.cli.progress import Terminal, listening, progress
+from wristctl.cli.progress import Bar, Terminal, listening, progress
 from wristctl.commands.progress import no_event
 from wristctl.errors import TO, Argument, UserError, meant, reason_of, writing
 from wristctl.plugins.trust import asking
@@ -31,7 +31,8 @@ def draw_later(run: Run, quiet: bool) -> Path:
 
     folder = run.path.parent / f"{DRAWN}{run.id}"
     with listening(quiet, False) as console:
-        drawn = redrawn(run, partial(progress, console, quiet=quiet)).figures
+        with Bar(console, quiet) as bar:
+            drawn = redrawn(run, bar).figures
         left = [name for name in drawn if not (run.path / "figures" / f"{name}.svg").exists()]
         folder.mkdir(parents=True, exist_ok=True)
         _draw(left, lambda name: write_figure(folder / name, drawn[name]), console, quiet)
@@ -86,7 +87,8 @@ def figures(
     _check_names(names or (), read_overview(run.path).captions, run)
     trust = asking(partial(asked_to_trust, trust_code))
     with listening(quiet, False) as console, for_paper(inches), trust:
-        drawn = redrawn(run, partial(progress, console, quiet=quiet)).figures
+        with Bar(console, quiet) as bar:
+            drawn = redrawn(run, bar).figures
         _check_names(names or (), drawn, run)
         chosen = list(names or drawn)
         with writing(folder, TO):

@@ -10,7 +10,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
-from wristctl.commands.answer import LINES, Answer
+from wristctl.commands.answer import Answer
 from wristctl.commands.printed_table import Table, capital, degrees
 from wristctl.config.loop import LOOPS
 
@@ -32,7 +32,7 @@ _MORE = "Settling, pushes and every claim with its reason: add --all, or see rep
 def answer_of(judged: Sequence[Judgement], strips: Sequence[Strip] = (), limit: float = math.inf) -> Answer:
     """What holds, the heaviest claims with both numbers, and what is contradicted, open or not tested.
 
-    At most LINES lines; sentences are left out from the end.
+    One screen; sentences are left out from the end.
 
     Parameters
     ----------
@@ -53,13 +53,13 @@ def answer_of(judged: Sequence[Judgement], strips: Sequence[Strip] = (), limit: 
     decided = [first] if first else []
     rest = [*[networks] * bool(networks), *_by_topic(claims), *second, *_untested(claims)]
     apart = Answer(sentence, table, [*decided, *rest], _MORE)
-    return apart if len(apart.lines()) <= LINES else _fitted(sentence, table, decided, rest)
+    return apart if apart.fits else _fitted(sentence, table, decided, rest)
 
 
 def _fitted(sentence: str, table: Table | None, decided: Sequence[str], rest: Sequence[str]) -> Answer:
-    """The answer in at most LINES lines: `rest` is one paragraph, and sentences are left out from its end."""
+    """The answer on one screen: `rest` is one paragraph, and sentences are left out from its end."""
     answer = Answer(sentence, table, [*decided, *[" ".join(rest)] * bool(rest)], _MORE)
-    if len(answer.lines()) <= LINES or not rest:
+    if answer.fits or not rest:
         return answer
     return _fitted(sentence, table, decided, rest[:-1])
 

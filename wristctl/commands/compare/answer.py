@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Collection, Container, Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING
 
@@ -15,7 +14,6 @@ from wristctl.commands.ranking_answer import (
     condition,
     decided,
     error,
-    fitted,
     gains_words,
     names_of,
     not_to_use,
@@ -23,6 +21,7 @@ from wristctl.commands.ranking_answer import (
     recommended,
     winner,
 )
+from wristctl.commands.ranking_drawing import keep_error
 from wristctl.commands.ranking_tables import controllers_table
 from wristctl.commands.results import Findings
 
@@ -70,7 +69,7 @@ def answer_of(
         gains_meant(rankings),
         "Your own wrist: `wristctl init DIR` begins a folder for it (documentation: Your own wrist).",
     ]
-    return fitted(Answer(advice(rankings), controllers_table(rankings, names, asked), more=more), notes)
+    return Answer(advice(rankings), controllers_table(rankings, names, asked), more=more).fitted(notes)
 
 
 def best_on_yours(rankings: Sequence[Ranking]) -> str:
@@ -202,10 +201,9 @@ def head_with_the_best(findings: Findings, rankings: Sequence[Ranking]) -> None:
     headed: list[str] = []
     for ranking in rankings:
         if (best := winner(ranking, rankings)) is not None:
-            mean, name = ranking.means[best], f"best_{ranking.name.replace(',', '').replace(' ', '_')}"
-            interval = (mean.low, mean.high) if math.isfinite(mean.high) else None
+            name = f"best_{ranking.name.replace(',', '').replace(' ', '_')}"
             meaning = f"RMSE of {ranking.labels[best]}, the best there, over {ranking.cases}"
-            findings.metric(name, mean.value, "rad", "lower", ranking.count, interval, meaning)
+            keep_error(findings, name, ranking, best, meaning)
             headed.append(name)
     findings.headline(*headed)
 

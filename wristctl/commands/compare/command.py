@@ -52,6 +52,7 @@ from wristctl.commands.ranking_drawing import draw_rankings
 from wristctl.commands.ranking_tables import answer_tables, every_row
 from wristctl.commands.results import Findings, StudyResult
 from wristctl.commands.session import Session
+from wristctl.commands.step_times import after_rollouts, timed_steps
 from wristctl.commands.sweep.command import sweepable
 from wristctl.commands.tune.command import planned_search
 from wristctl.commands.tune.searches import search_all
@@ -289,7 +290,9 @@ def compare(session: Session) -> Compared:
     warn_out_of_reach(findings, study.wrist, asked_by(study, settings))
     network = network_for(session.inputs, study.wrist, loops, planes_of(study.wrist, asked_of_comparison(study)))
     if settings.tuning is not None:
-        searches = search_all(session, study.model_copy(update={"tune": settings.tuning}), network)
+        tuning = study.model_copy(update={"tune": settings.tuning})
+        later = size(study).rollouts * settings.horizon / settings.tuning.horizon / len(settings.tuning.controllers)
+        searches = search_all(session, tuning, network, later)
     tuned = dict(tuned_gains(session.inputs) or {}) | {name: search.gains for name, search in searches.items()}
     gains = _gains_of_rows(study, tuned)
     if settings.worlds.family:
@@ -297,10 +300,10 @@ def compare(session: Session) -> Compared:
         warn_of_lost(settings.rows, loops, of_worlds)
         head_with_the_best(findings, of_worlds)
         draw_rankings(findings, of_worlds)
-        times = _step_times(session, study, tuned)
+        times = timed_steps(session, _laws_of_rows(study, tuned))
         shown = [*answer_tables(of_worlds), *(every_row(ranking, times) for ranking in of_worlds)]
         return Compared(study, findings, shown, [], searches, times, of_worlds, gains)
-    with session.progress("comparing", total=100, unit="%") as report:
+    with session.progress("comparing", 100, "%", after=after_rollouts(len(settings.rows))) as report:
         results = run_comparison(study, network, tuned, lambda share: report(round(100 * share)))
     scenarios = [scenario_of(reference, way) for reference in settings.references for way in settings.directions]
     findings.note_streams(Draws(study.seed).names(loops, scenarios))
@@ -317,7 +320,7 @@ def compare(session: Session) -> Compared:
     warn_of_lost(settings.rows, loops, rankings)
     findings.table("data/standings.csv", standings_frame(rankings), units=STANDING_UNITS)
     head_with_the_best(findings, rankings)
-    times = _step_times(session, study, tuned)
+    times = timed_steps(session, _laws_of_rows(study, tuned))
     with session.drawing():
         draw(findings, study, results, rankings)
     by_loop = [loop_tables(loop, [r for r in results if r.loop == loop], cells) for loop in settings.loops]
@@ -348,18 +351,13 @@ def _gains_of_rows(study: Study, tuned: Gains) -> dict[str, dict[str, float]]:
     }
 
 
-def _step_times(session: Session, study: Study, tuned: Gains) -> dict[str, StepTime]:
-    from wristctl.comparison.step_cost import step_time
+def _laws_of_rows(study: Study, tuned: Gains) -> dict[str, tuple[Controller, tuple[float, ...]]]:
+    """Controller and gains of every row, by its label; of gains by loop those of the first one."""
     from wristctl.control.table import controller, gains_of
 
-    times = {}
-    with session.progress("timing the control step"):
-        for row in study.compare.rows:
-            law = controller(row.controller)
-            gains = gains_of(law, row.gains, tuned, next(iter(judged_loops(study, study.compare).values())))
-            times[row.label] = step_time(law, gains, study.wrist)
-    session.findings.plain("timing.json", {name: time._asdict() for name, time in times.items()})
-    return times
+    first = next(iter(judged_loops(study, study.compare).values()))
+    laws = {row.label: (controller(row.controller), row.gains) for row in study.compare.rows}
+    return {label: (law, gains_of(law, gains, tuned, first)) for label, (law, gains) in laws.items()}
 
 
 COMPARE = sweepable(

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-import math
 from typing import TYPE_CHECKING
 
+from wristctl.commands.ranking_drawing import draw_intervals, keep_error
+from wristctl.commands.step_times import after_rollouts
 from wristctl.config.study import Study
 
 if TYPE_CHECKING:
@@ -19,25 +20,21 @@ def ranked(session: Session, study: Study, network: Inverse | None, tuned: Tuned
     import pandas as pd
 
     from wristctl.comparison.world_ranking import rank, ranked_units, ranking_frame, worlds_frame
-    from wristctl.plotting.ranking_figures import ranking_intervals
     from wristctl.simulation.drawn_worlds import streams_of
 
     findings, worlds = session.findings, study.compare.worlds
-    with session.progress("ranking", total=100, unit="%") as report:
+    with session.progress("ranking", 100, "%", after=after_rollouts(len(study.compare.rows))) as report:
         rankings = rank(study, tuned, network, lambda share: report(round(100 * share)))
     if worlds.sealed is None:
         findings.note_streams(streams_of(study.families[worlds.family], worlds.family, worlds.split))
-    units = ranked_units() | {f"rmse_{end}": "rad" for end in ("low", "high")}
     ranking = pd.concat([ranking_frame(one_ranking) for one_ranking in rankings], ignore_index=True)
-    findings.table("data/ranking.csv", ranking, units=units | {"worst_rmse": "rad"})
+    findings.table("data/ranking.csv", ranking, units=ranked_units())
     frames = pd.concat([worlds_frame(one_ranking) for one_ranking in rankings], ignore_index=True)
-    findings.table("data/worlds.csv", frames, units=units)
+    findings.table("data/worlds.csv", frames, units=ranked_units())
     for index, world_ranking in enumerate(rankings):
         end = "_steps" if index else ""
-        for label, mean in zip(world_ranking.labels, world_ranking.means, strict=True):
-            ends = (mean.low, mean.high) if math.isfinite(mean.high) else None
-            findings.metric(f"rmse_{label}{end}", mean.value, "rad", "lower", world_ranking.count, ends)
+        for row, label in enumerate(world_ranking.labels):
+            keep_error(findings, f"rmse_{label}{end}", world_ranking, row)
         with session.drawing():
-            caption = f"RMSE of every controller on {world_ranking.name}, with 95 % intervals over worlds"
-            findings.figure(f"ranking{end}", ranking_intervals, world_ranking, caption=caption)
+            draw_intervals(findings, world_ranking, end)
     return rankings

@@ -5,18 +5,35 @@ from __future__ import annotations
 import math
 import shlex
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING, NamedTuple
 
 from wristctl.commands.answer import Answer
 from wristctl.commands.printed_table import Table, degrees, number
+from wristctl.commands.quantities import Quantity
 
 if TYPE_CHECKING:
     from wristctl.learning.measured_samples import RecordedCourse
 
-# Factor and unit in which a quantity is shown; of others 1e3 and mm.
-RANGES = dict.fromkeys(("theta", "bend", "bend_ulnar", "bend_flexion", "pose", "roll"), (180.0 / math.pi, "deg")) | {
-    "hand_mass": (1.0, "kg")
+SAMPLED = {
+    quantity.name: quantity
+    for quantity in (
+        Quantity("x", "m", "tip position along the straight wrist", "tip, along the straight wrist", "mm"),
+        Quantity("y", "m", "tip position across it, toward positive bending", "tip, aside", "mm"),
+        Quantity("z", "m", "tip position toward flexion", "tip, toward flexion", "mm"),
+        Quantity("theta", "rad", "bending angle", "bending angle", "deg"),
+        Quantity("arc_length", "m", "length of the arc from the first to the last disc", shown="mm"),
+        Quantity("pose", "rad", "tilt of the base from upright", "tilt of the wrist", "deg"),
+        Quantity("roll", "rad", "direction of the tilt, from ulnar toward flexion", "direction of the tilt", "deg"),
+        Quantity("bend", "rad", "size of the bend", "size of the bend", "deg"),
+        Quantity("bend_ulnar", "rad", "bend, toward ulnar", "bend toward ulnar", "deg"),
+        Quantity("bend_flexion", "rad", "bend, toward flexion", "bend toward flexion", "deg"),
+        Quantity("hand_mass", "kg", "mass of hand and payload", "mass in the hand"),
+        Quantity("held_out", "1", "0: not; held out of training by 1: its payload, 2: its pose"),
+        Quantity("recording", "1", "which of the recordings it was measured in"),
+    )
 }
+"""Quantities of samples, by name."""
 # Quantities of samples beside further inputs, by the number of planes.
 QUANTITIES = {
     1: ("theta", "arc_length", "x", "y"),
@@ -24,11 +41,6 @@ QUANTITIES = {
 }
 CLOSED_FORM = {1: "2 atan2(y, x)", 2: "2 atan2(hypot(y, z), x) toward (y, z)"}
 """The closed form of one arc, by the number of planes."""
-# Quantities in words.
-_WORDS = {"theta": "bending angle", "arc_length": "arc length", "x": "tip, along the straight wrist", "y": "tip, aside",
-          "bend": "size of the bend", "bend_ulnar": "bend toward ulnar", "bend_flexion": "bend toward flexion",
-          "z": "tip, toward flexion", "pose": "tilt of the wrist", "roll": "direction of the tilt",
-          "hand_mass": "mass in the hand"}  # fmt: skip
 
 
 class Measured(NamedTuple):
@@ -59,7 +71,7 @@ def counted(count: int, name: str) -> str:
 
 
 def answer_of(
-    inputs: Sequence[str],
+    ranges: Table,
     metrics: Mapping[str, float],
     run: str,
     split: str | None,
@@ -68,8 +80,9 @@ def answer_of(
 ) -> Answer:
     """What was drawn, or read of recordings.
 
-    `inputs` are those beside the tip, `run` is the path of the run, empty in memory; `split` is how `train` can part
-    the samples, None where it cannot; `why_two` says why the samples bend in two planes, where that is to be said.
+    `ranges` has the quantities of the samples, `run` is the path of the run, empty in memory; `split` is how `train`
+    can part the samples, None where it cannot; `why_two` says why the samples bend in two planes, where that is to be
+    said.
     """
     count, planes = int(metrics["samples"]), 2 if "bend_max_deg" in metrics else 1
     source = ""
@@ -99,14 +112,11 @@ def answer_of(
         neighbours = ", which is tested by neighbours of what it was trained on" * bool(parted)
         notes += [f"Next, train a network on them{neighbours}:", f"$ {shlex.join(words)}"]
     more = f"The samples: {run}/data/samples.npz" if run else ""
-    return Answer(
-        sentence, Table("", ("quantity", "least", "greatest", "unit"), _rows(planes, inputs, metrics)), notes, more
-    )
+    return Answer(sentence, ranges, notes, more)
 
 
-def _rows(planes: int, inputs: Sequence[str], metrics: Mapping[str, float]) -> list[tuple[str, float, float, str]]:
-    rows, words = [], _WORDS | ({"y": "tip, toward ulnar"} if planes == 2 else {})
-    for name in (*QUANTITIES[planes], *inputs):
-        unit = RANGES.get(name, (1e3, "mm"))[1]
-        rows.append((words.get(name, name), metrics[f"{name}_min_{unit}"], metrics[f"{name}_max_{unit}"], unit))
-    return rows
+def ranged(planes: int, inputs: Sequence[str]) -> list[Quantity]:
+    """The quantities of samples in so many planes with these further inputs, in the order of a table."""
+    quantities = [SAMPLED[name] for name in (*QUANTITIES[planes], *inputs)]
+    aside = "tip, toward ulnar" if planes == 2 else "tip, aside"
+    return [replace(each, heading=aside) if each.name == "y" else each for each in quantities]

@@ -9,12 +9,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from wristctl.commands.answer import Answer
-from wristctl.commands.gen_data.answer import CLOSED_FORM, QUANTITIES, RANGES, Measured, answer_of, counted, measured_of
+from wristctl.commands.gen_data.answer import CLOSED_FORM, QUANTITIES, Measured, answer_of, counted, measured_of, ranged
 from wristctl.commands.gen_data.transitions import Moved, plan_transitions, record_transitions
 from wristctl.commands.inputs import EarlierRun, Given, Inputs
 from wristctl.commands.loop_warnings import warn_of_one_plane
 from wristctl.commands.printed_table import Table
 from wristctl.commands.procedure import Procedure
+from wristctl.commands.quantities import RANGE, keep_range
 from wristctl.commands.results import StudyResult
 from wristctl.commands.session import Session
 from wristctl.config.learning import TrainSettings
@@ -48,7 +49,8 @@ class Generated(StudyResult):
     def answer(self) -> Answer:
         """What was drawn or read, with its ranges in deg and mm."""
         why = "" if self.measured else _why_two(self.study)
-        return answer_of(self.samples.names, self.metrics, self.place, split_of(self.samples), self.measured, why)
+        ranges = Table("", RANGE, self.tables[0].rows[:-1])
+        return answer_of(ranges, self.metrics, self.place, split_of(self.samples), self.measured, why)
 
     def frame(self) -> pd.DataFrame:
         """One row per sample: the tip, the other inputs, the bend, arc_length; SI units."""
@@ -121,23 +123,19 @@ def gen_data(session: Session) -> Generated | Moved:
     for code, name in ((HELD_PAYLOAD, "payload"), (HELD_POSE, "pose")):
         share = float(np.mean(samples.held_out == code))
         findings.metric(f"held_out_{name}_share", share, n=count, meaning=f"share held out of training by its {name}")
-    rows: list[tuple[str, float, float]] = []
-    for name in (*QUANTITIES[planes], *samples.names):
-        scale, unit = RANGES.get(name, (1e3, "mm"))
-        values = samples.size if name == "bend" else table[name]
-        low, high = scale * float(values.min()), scale * float(values.max())
-        rows.append((f"{name} [{unit}]", low, high))
-        findings.metric(f"{name}_min_{unit}", low, unit=unit, n=count, meaning=f"least: {MEANING[name]}")
-        findings.metric(f"{name}_max_{unit}", high, unit=unit, n=count, meaning=f"greatest: {MEANING[name]}")
+    rows = [
+        keep_range(findings, quantity, samples.size if quantity.name == "bend" else table[quantity.name], True)
+        for quantity in ranged(planes, samples.names)
+    ]
     for name in ("rmse_deg", "max_error_deg"):
         meaning = f"error of the exact inverse {CLOSED_FORM[planes]} on these samples"
         findings.metric(f"exact_inverse_{name}", getattr(exact, name), "deg", "lower", count, meaning=meaning)
-    rows.append(("error of the exact inverse [deg]", 0.0, exact.max_error_deg))
+    rows.append(("error of the exact inverse", 0.0, exact.max_error_deg, "deg"))
     first = QUANTITIES[planes][0]
     findings.headline(
         "samples", f"{first}_min_deg", f"{first}_max_deg", "exact_inverse_rmse_deg", "exact_inverse_max_error_deg"
     )
-    tables = [Table(f"{count} samples", ("quantity", "least", "greatest"), rows)]
+    tables = [Table(f"{count} samples", RANGE, rows)]
     return Generated(session.study, findings, tables, samples, measured_of(courses) if courses else None)
 
 

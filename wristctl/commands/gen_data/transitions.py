@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-import math
 import shlex
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from wristctl.commands.answer import Answer
 from wristctl.commands.loop_warnings import warn_of_one_plane
 from wristctl.commands.printed_table import Table
+from wristctl.commands.quantities import RANGE, Quantity, keep_range
 from wristctl.commands.results import StudyResult
 from wristctl.commands.session import Session
 from wristctl.config.study import Study
@@ -20,13 +20,13 @@ if TYPE_CHECKING:
 
     from wristctl.learning.transitions import Transitions
 
-# Unit of each quantity, its size in SI units, and what it is.
 QUANTITIES = {
-    "bend": ("deg", 180.0 / math.pi, "bend of the last disc"),
-    "rate": ("rad/s", 1.0, "its rate"),
-    "torque": ("N m", 1.0, "torque of the commanded tensions until the next tick"),
-    "acceleration": ("rad/s^2", 1.0, "mean acceleration until then"),
+    "bend": Quantity("bend", "rad", "bend of the last disc", shown="deg"),
+    "rate": Quantity("rate", "rad/s", "its rate"),
+    "torque": Quantity("torque", "N m", "torque of the commanded tensions until the next tick"),
+    "acceleration": Quantity("acceleration", "rad/s^2", "mean acceleration until then"),
 }
+"""Quantities of a plane, by name."""
 
 
 @dataclass(frozen=True, repr=False, eq=False)
@@ -99,19 +99,17 @@ def record_transitions(session: Session) -> Moved:
     table = transitions_table(samples)
     findings.arrays("data/samples.npz", samples.arrays())
     findings.figure("coverage", coverage, table)
-    count, rows = len(table), []
-    findings.metric("samples", count, meaning="number of transitions")
-    for column in table.columns[2:]:
-        name, _, plane = column.partition("_")
-        unit, size, meaning = QUANTITIES[name]
-        low, high = size * float(table[column].min()), size * float(table[column].max())
-        said = f"{meaning}{plane and f', toward {plane}'}"
-        for end, value in (("min", low), ("max", high)):
-            findings.metric(f"{column}_{end}", value, unit, n=count, meaning=f"{end}imum of the {said}")
-        rows.append((f"{name} toward {plane}" if plane else name, low, high, unit))
+    findings.metric("samples", len(table), meaning="number of transitions")
+    rows = [keep_range(findings, _quantity(column), table[column]) for column in table.columns[2:]]
     findings.headline("samples")
-    tables = [Table("", ("quantity", "least", "greatest", "unit"), rows)]
-    return Moved(study, findings, tables, samples)
+    return Moved(study, findings, [Table("", RANGE, rows)], samples)
+
+
+def _quantity(column: str) -> Quantity:
+    """The quantity of a column, in two planes toward one of them."""
+    name, _, plane = column.partition("_")
+    toward, of_plane = plane and f" toward {plane}", QUANTITIES[name]
+    return replace(of_plane, name=column, heading=f"{name}{toward}", meaning=f"{of_plane.meaning}{toward}")
 
 
 def coverage(table: pd.DataFrame) -> Figure:

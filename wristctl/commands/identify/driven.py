@@ -94,7 +94,7 @@ def identify_driven(session: Session, logs: Sequence[OpenLog]) -> DrivenTold:
 
 def keep_prediction(session: Session, robot: ArcRobot, models: Sequence[TriedModel], chosen: TriedModel) -> Table:
     """Keep how well the chosen model predicts the part that was not fitted, with its figures; a table of all models."""
-    from wristctl.commands.validate.answer import RATIO, model_rows
+    from wristctl.commands.validate.answer import model_heads, model_rows
     from wristctl.commands.validate.figures import errors_of_models, left_over, motion
     from wristctl.identification.real_robots import RealRobot
 
@@ -107,7 +107,7 @@ def keep_prediction(session: Session, robot: ArcRobot, models: Sequence[TriedMod
         findings.figure("left-over", left_over, about, chosen.fits, caption="what is left of the motion")
         findings.figure("models", errors_of_models, about, models, caption="error of each model")
     findings.overview.figure = "motion"
-    heads = ("model", "free numbers", f"error of the predicted part [{robot.unit}]", *RATIO)
+    heads = model_heads("error of the predicted part", robot.unit)
     return Table("What each model misses", heads, model_rows(models, robot.scale))
 
 

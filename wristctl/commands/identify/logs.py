@@ -31,6 +31,9 @@ if TYPE_CHECKING:
 # noise, that it may miss before no parameter is told.
 _MISSED, _MISSED_OF_ALL = 0.5, 0.1
 
+# Time of the last fit over that of all models, and seconds of the figures.
+_AFTER_FITS = 0.2, 2.0
+
 
 @dataclass(frozen=True, repr=False, eq=False)
 class LogTold(StudyResult):
@@ -157,12 +160,12 @@ def identify_logs(session: Session) -> LogTold | DrivenTold:
 
 def _identify_spooled(session: Session, logs: Sequence[OpenLog]) -> LogTold:
     from wristctl.identification.log_model import everything_fitted
-    from wristctl.identification.model_choice import chosen_of, tried_models, whole_fit
+    from wristctl.identification.model_choice import chosen_of, most_models, tried_models, whole_fit
 
     findings, study = session.findings, session.study
     robot, recordings, samples, remarks, rate = read_logs(logs, study)
     models = list["TriedModel"]()
-    with session.progress("fitting models") as report:
+    with session.progress("fitting models", most_models(robot), "models", *_AFTER_FITS) as report:
         for model in tried_models(robot, [recordings], False):
             models.append(model)
             report(len(models))

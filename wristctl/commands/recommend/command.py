@@ -52,6 +52,8 @@ TOLERATED = 0.05
 _SWINGS = ("rmse", "oscillation", "sustained")
 # Rigs on which the limits of motion and payload are looked for.
 _RIGS_AT_LIMITS = 12
+# Time of a rollout at short steps over that of a search's; seconds of limits and figures, and of rehearsals.
+_CLOSELY, _DRAWN, _REHEARSED = 2.0, 5.0, 15.0
 TUNED, SCALED = "tuned", "scaled preset"
 # Relative difference of two gains that is none: a search begins at the preset, to its last bit but one.
 _ALIKE = 1e-9
@@ -186,6 +188,11 @@ def recommend(session: Session) -> Recommended:
     return _recorded(known, replace(result, motions=motions, payloads=payloads, next_command=command))
 
 
+def _afterwards(study: Study) -> float:
+    """Seconds that rehearsals, limits and figures take."""
+    return _DRAWN + _REHEARSED * bool(study.recommend.rehearsed and study.recommend.rig is None)
+
+
 def _searches(session: Session, study: Study, family: Family, scaled: Sequence[Controller]) -> dict[str, Search]:
     from wristctl.tuning.search import judges_of, search
 
@@ -202,10 +209,17 @@ def _searches(session: Session, study: Study, family: Family, scaled: Sequence[C
         }
     )  # fmt: skip
     judges, searches = judges_of(tuning), dict[str, "Search"]()
-    with session.progress("tuning", total=len(scaled), unit="controllers") as advance:
-        for number, law in enumerate(scaled, start=1):
-            searches[law.name] = search(tuning, law, session.findings.stream, judges)
-            advance(number)
+    total, count = settings.iterations * sum(law.learning for law in scaled), 0
+    budget = settings.iterations * settings.candidates * settings.draws
+    then = _CLOSELY * (settings.candidates * settings.validation + 2 * settings.tests) / budget
+    with session.progress("tuning", total, "iterations", then, _afterwards(study)) as advance:
+        for law in scaled:
+
+            def so_far(result: Search, before: int = count, learning: int = law.learning) -> None:
+                advance(before + learning * len(result.tried.values))
+
+            searches[law.name] = search(tuning, law, session.findings.stream, judges, so_far)
+            count += settings.iterations * law.learning
     return searches
 
 
@@ -234,7 +248,7 @@ def _tested(session: Session, study: Study, family: Family, candidates: Sequence
     tests = study.recommend.tests
     cases = drawn_cases(family, FAMILY, "test", study.seed, tests, study.wrist)
     measured: list[Measured] = []
-    with session.progress("testing", total=len(candidates), unit="candidates") as advance:
+    with session.progress("testing", len(candidates), "candidates", after=_afterwards(study)) as advance:
         for number, candidate in enumerate(candidates, start=1):
             law = controller(candidate.controller)
             gains = np.array([list(law.values(candidate.gains))])

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from wristctl.commands.answer import Answer
 from wristctl.commands.printed_table import Table
-from wristctl.commands.ranking_answer import advice, certainty, condition, decided, fitted, names_of, not_to_use, winner
+from wristctl.commands.ranking_answer import advice, certainty, condition, decided, names_of, not_to_use, winner
 from wristctl.commands.ranking_tables import decision_table
 
 if TYPE_CHECKING:
@@ -51,7 +51,7 @@ def answer_of(
         decided(rankings),
         tuned_otherwise(shifts),
     ]
-    return fitted(Answer(advice(rankings), decision_table(rankings, names), more=more), notes)
+    return Answer(advice(rankings), decision_table(rankings, names), more=more).fitted(notes)
 
 
 def few_tunings(rankings: Sequence[TunedRanking]) -> str:

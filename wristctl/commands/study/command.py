@@ -10,6 +10,7 @@ from wristctl.commands.inputs_of_loops import asked_of_family
 from wristctl.commands.loop_warnings import warn_of_one_plane
 from wristctl.commands.procedure import Procedure
 from wristctl.commands.session import Session
+from wristctl.commands.step_times import after_rollouts
 from wristctl.commands.study.results import written
 from wristctl.commands.study.units import (
     Studied,
@@ -35,10 +36,8 @@ if TYPE_CHECKING:
 def plan(study: Study, inputs: Inputs) -> str:
     """Check all names, and state the number of rollouts."""
     from wristctl.commands.inputs_of_loops import check_family_reach, check_inverses, check_row, family_of, inverses_of
-    from wristctl.comparison.world_ranking import noises_of
     from wristctl.control.table import controller
     from wristctl.simulation.closed_loop import Size, check_size, check_steps
-    from wristctl.tuning.objective import YARDSTICK
     from wristctl.tuning.search import check_optimiser, check_tunable
 
     settings = study.study
@@ -75,12 +74,7 @@ def plan(study: Study, inputs: Inputs) -> str:
             check_inverses(inverses_of(family.references), inputs)
     for name in families:
         check_family_reach(study, name)
-    searches = sum(unit.size for unit in search_units(study).values())
-    per_world = sum(len(family.references) * noises_of(family, budget.noises) for family in families.values())
-    alone = {f"{YARDSTICK}/default": YARDSTICK} | {row.label: row.controller for row in settings.presets}
-    rows = budget.tunings * sum(controller(name).learning for name in settings.laws)
-    rows += sum(controller(name).learning for name in alone.values())
-    judged = per_world * budget.worlds * rows
+    searches, judged = sum(unit.size for unit in search_units(study).values()), _rollouts_of_tests(study)
     longest = max(Size([studied.loop], studied.horizon).steps for studied in families.values())
     with under("study"):
         check_steps((searches + judged) * longest, searches + judged)
@@ -91,6 +85,21 @@ def plan(study: Study, inputs: Inputs) -> str:
         f"{len(labels) - len(settings.laws)} presets on {budget.worlds} held-out worlds of each: "
         f"{searches} rollouts of searches and {judged} of tests"
     )
+
+
+def _rollouts_of_tests(study: Study) -> int:
+    """Rollouts in which tuned gains and presets are judged."""
+    from wristctl.comparison.world_ranking import noises_of
+    from wristctl.control.table import controller
+    from wristctl.tuning.objective import YARDSTICK
+
+    settings, budget = study.study, budget_of(study.study)
+    families = [study.families[name] for name in families_of(study)]
+    per_world = sum(len(family.references) * noises_of(family, budget.noises) for family in families)
+    alone = {f"{YARDSTICK}/default": YARDSTICK} | {row.label: row.controller for row in settings.presets}
+    rows = budget.tunings * sum(controller(name).learning for name in settings.laws)
+    rows += sum(controller(name).learning for name in alone.values())
+    return per_world * budget.worlds * rows
 
 
 def _labels(study: Study) -> list[str]:
@@ -112,14 +121,17 @@ def fair_study(session: Session) -> Studied:
         golden = golden_of(study)
     session.findings.numerics(golden=golden.expected, executor=session.executor)
     wanted = search_units(study)
-    tuned = performed(session, "study", "tuning", list(wanted.values()), golden)
+    after = len(families_of(study)) * after_rollouts(len(study.study.laws))
+    then = _rollouts_of_tests(study) / sum(unit.size for unit in wanted.values())
+    tuned = performed(session, "study", "tuning", list(wanted.values()), golden, then=then, after=after)
     searches = {
         place: search_of(arrays, place.law, 1)
         for place, arrays in zip(wanted, tuned.arrays, strict=True)
         if arrays is not None
     }
     pieces = judge_all(study, {place: search.gains for place, search in searches.items()})
-    judged = performed(session, "study", "judging", [unit for units in pieces.values() for unit in units], golden)
+    tests = [unit for units in pieces.values() for unit in units]
+    judged = performed(session, "study", "judging", tests, golden, after=after)
     poisoned = [*tuned.poisoned, *judged.poisoned]
     return written(session, _whole(pieces, judged.arrays), searches, poisoned)
 

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-import math
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from wristctl.commands.printed_table import Table
-from wristctl.commands.ranking_drawing import draw_rankings
+from wristctl.commands.ranking_drawing import draw_intervals, draw_rankings, keep_error
 from wristctl.commands.ranking_tables import answer_tables, every_row
 from wristctl.commands.session import Session
+from wristctl.commands.step_times import timed_steps
 from wristctl.commands.study.published import PUBLISHED, published, published_gains
 from wristctl.commands.study.units import BASE, Studied, StudyPlace, budget_of, families_of, places_in
 from wristctl.config.study import Study
@@ -19,8 +19,8 @@ if TYPE_CHECKING:
     import numpy as np
 
     from wristctl.comparison.paired_worlds import OrderShift, TermValue
-    from wristctl.comparison.step_cost import StepTime
     from wristctl.comparison.tuned_ranking import TunedRanking
+    from wristctl.control.law import Controller
     from wristctl.tuning.search import Search
     from wristctl.work.fan_out import Poisoned
 
@@ -51,7 +51,7 @@ def written(session: Session, judged: Pieces, searches: dict[StudyPlace, Search]
         shifts = _shifts(study, judged)
     _note_streams(session)
     _tables(session, rankings, terms, shifts, searches)
-    times = _step_times(session, searches)
+    times = timed_steps(session, _laws(searches))
     with session.drawing():
         _draw(session, rankings, terms)
     shown = answer_tables(list(rankings.values()))
@@ -149,17 +149,14 @@ def _tables(
     from wristctl.control.table import write_gains
 
     findings = session.findings
-    units = ranked_units() | dict.fromkeys(("rmse_low", "rmse_high", "worst_rmse"), "rad")
     for name, ranking in rankings.items():
         slug = _slug(name)
-        findings.table(f"data/ranking-{slug}.csv", ranking_frame(ranking), units=units)
+        findings.table(f"data/ranking-{slug}.csv", ranking_frame(ranking), units=ranked_units())
         worlds = {"world": range(ranking.count)} | {row.label: row.rmse for row in ranking.rows}
         meaning = {row.label: "geometric mean of the RMSE over motions and noises; inf: failed" for row in ranking.rows}
         findings.table(f"data/worlds-{slug}.csv", pd.DataFrame(worlds), dict.fromkeys(meaning, "rad"), meaning)
         for index, row in enumerate(ranking.rows):
-            mean = ranking.means[index]
-            interval = (mean.low, mean.high) if math.isfinite(mean.high) else None
-            findings.metric(f"rmse_{slug}_{row.label}", mean.value, "rad", "lower", ranking.count, interval)
+            keep_error(findings, f"rmse_{slug}_{row.label}", ranking, index)
         if len(tunings := ranking.tunings_frame()):
             findings.table(f"data/tunings-{slug}.csv", tunings, dict.fromkeys(map(str, tunings.columns), "1"))
     if firsts := [frame for ranking in rankings.values() if len(frame := ranking.firsts_frame())]:
@@ -183,25 +180,20 @@ def _tables(
         findings.table("data/sensitivity.csv", frame, dict.fromkeys(map(str, frame.columns), "1"))
 
 
-def _step_times(session: Session, searches: Mapping[StudyPlace, Search]) -> dict[str, StepTime]:
-    """Time of a control tick of each law on this machine; gains make no difference to it."""
-    from wristctl.comparison.step_cost import step_time
+def _laws(searches: Mapping[StudyPlace, Search]) -> dict[str, tuple[Controller, tuple[float, ...]]]:
+    """Every controller with gains of one of its searches: for the time of a step they make no difference."""
     from wristctl.control.table import controller
     from wristctl.tuning.objective import YARDSTICK
 
-    times = {YARDSTICK: step_time(controller(YARDSTICK), (), session.study.wrist)}
-    with session.progress("timing the control step"):
-        for place, search in searches.items():
-            if place.law not in times:
-                law = controller(place.law)
-                times[place.law] = step_time(law, law.values(search.gains), session.study.wrist)
-    session.findings.plain("timing.json", {name: time._asdict() for name, time in times.items()})
-    return times
+    laws: dict[str, tuple[Controller, tuple[float, ...]]] = {YARDSTICK: (controller(YARDSTICK), ())}
+    for place, search in searches.items():
+        law = controller(place.law)
+        laws.setdefault(place.law, (law, law.values(search.gains)))
+    return laws
 
 
 def _draw(session: Session, rankings: Mapping[str, TunedRanking], terms: Sequence[TermValue]) -> None:
     from wristctl.commands.study.figures import laws_by_rig, pareto, terms_by_rig, world_map
-    from wristctl.plotting.ranking_figures import ranking_intervals
 
     findings = session.findings
     draw_rankings(findings, list(rankings.values()))
@@ -214,8 +206,7 @@ def _draw(session: Session, rankings: Mapping[str, TunedRanking], terms: Sequenc
         findings.figure("terms", terms_by_rig, terms, caption="How many times less RMSE a term of a controller gives")
     for name, ranking in rankings.items():
         slug = _slug(name)
-        caption = f"RMSE of every controller on {name}, with 95 % intervals over worlds"
-        findings.figure(f"ranking-{slug}", ranking_intervals, ranking, caption=caption)
+        draw_intervals(findings, ranking, f"-{slug}")
         caption = f"RMSE against variation of tension and work on {name}; hollow rows must not be used"
         findings.figure(f"pareto-{slug}", pareto, ranking, caption=caption)
         caption = f"RMSE over the least one in each world of {name}; a cross fails, a dot swings"

@@ -6,13 +6,14 @@ import logging
 import math
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 from wristctl.commands.inputs import EarlierRun, Inputs
 from wristctl.commands.printed_table import Table
 from wristctl.commands.procedure import Procedure, no_tendons
+from wristctl.commands.quantities import VALUE, Quantity, documented, keep_values
 from wristctl.commands.results import StudyResult
 from wristctl.commands.session import Session
 from wristctl.config.study import Study
@@ -31,24 +32,26 @@ log = logging.getLogger(__name__)
 
 # Skew from which the user is warned [deg]; noise of the corners alone is below 0.1.
 _ASKEW = 0.3
+_USABLE = Quantity("usable", meaning="share of frames with an angle", better="higher")
+_SKEW = Quantity("askew", "deg", "largest error, by the base's marker that is no square", better="lower")
 _PLANES = ("ulnar", "flexion")
 _CORNERS = [f"{marker}_{axis}{k}" for marker in ("base", "tip") for k in (1, 2, 3, 4) for axis in "xy"]
-_UNITS = {"time": "s", "theta": "rad", "tip_x": "m", "tip_y": "m"} | dict.fromkeys(_CORNERS, "px")
-_MEANING = {
-    "time": "of the frame in the recording",
-    "number": "of the frame",
-    "theta": "bending angle, empty where the frame cannot be used",
-    "tip_x": "tip from the first disc along the base's marker; track.markers says where that stands",
-    "tip_y": "tip across, toward theta > 0",
-    "verdict": "ok, or why it cannot be used",
-} | dict.fromkeys(_CORNERS, "marker's corner, from its top left clockwise")
-
-
+_COLUMNS = [
+    Quantity("time", "s", "of the frame in the recording"),
+    Quantity("number", meaning="of the frame"),
+    Quantity("theta", "rad", "bending angle, empty where the frame cannot be used"),
+    Quantity("tip_x", "m", "tip from the first disc along the base's marker; track.markers says where that stands"),
+    Quantity("tip_y", "m", "tip across, toward theta > 0"),
+    Quantity("verdict", meaning="ok, or why it cannot be used"),
+    *(Quantity(name, "px", "marker's corner, from its top left clockwise") for name in _CORNERS),
+]
 # What the table of two cameras has beside that: the plane that a frame's camera looks at, and the bend about it.
-_IN_TWO_PLANES = {
-    "plane": ("", "that the frame's camera looks at: ulnar or flexion"),
-    "bend": ("rad", "bend of the last disc about it, by what the other camera sees; empty where that sees nothing"),
-}
+_IN_TWO_PLANES = [
+    Quantity("plane", meaning="that the frame's camera looks at: ulnar or flexion"),
+    Quantity(
+        "bend", "rad", "bend of the last disc about it, by what the other camera sees; empty where that sees nothing"
+    ),
+]
 
 
 @dataclass(frozen=True, repr=False, eq=False)
@@ -124,9 +127,8 @@ def track(session: Session) -> Tracked:
     sources = [str(source) for source in (settings.video, settings.video_2) if source is not None]
     cameras = [_see(session, number, source, len(sources) == 2) for number, source in enumerate(sources)]
     sightings, bends = _together(cameras, settings.video_2 is not None)
-    told = _IN_TWO_PLANES if bends is not None else {}
-    units, meaning = ({name: column[i] for name, column in told.items()} for i in range(2))
-    findings.table("data/track.csv", _frame(sightings, bends), _UNITS | units, _MEANING | meaning)
+    columns = _COLUMNS if bends is None else [*_COLUMNS, *_IN_TWO_PLANES]
+    findings.table("data/track.csv", _frame(sightings, bends), *documented(columns))
     recordings = [
         {"name": seen.source, "sha256": _digest(Path(seen.source)), "frames": len(seen.sightings)} for seen in cameras
     ]
@@ -136,7 +138,7 @@ def track(session: Session) -> Tracked:
         findings.figure("frames", frames, [picture for seen in cameras for picture in seen.pictures])
     counts = Counter(sighting.verdict for sighting in sightings)
     usable, total = counts[SightingVerdict.OK], len(sightings)
-    findings.metric("usable", usable / total, "", "higher", total, meaning="share of frames with an angle")
+    share = keep_values(findings, [(_USABLE, usable / total, total)])
     for seen in cameras:
         verdicts = Counter(sighting.verdict for sighting in seen.sightings)
         if not verdicts[SightingVerdict.OK]:
@@ -145,37 +147,30 @@ def track(session: Session) -> Tracked:
             fix = "see figures/frames.png; are both markers (4x4_50, ids track.markers) uncovered and 40 px or larger?"
             raise UserError(reason, seen.source, fix, exit_code=3)
     seconds = sightings[-1].time - sightings[0].time
-    rows: list[tuple[str, float | None]] = [
-        ("frames", total),
-        ("frames per second", (total - 1) / seconds if seconds else None),
-        ("usable", usable / total),
-    ]
+    rows = [("frames", total), ("frames per second", (total - 1) / seconds if seconds else None), *share]
     for name, heading, degrees in _courses(sightings, bends):
         some = degrees[np.isfinite(degrees)]
         if not len(some):
             fix = "recordings that begin together, or both with the table of their times beside them"
             raise UserError("the cameras see the wrist at no common time", sources[0], fix, exit_code=3)
-        noise = angle_noise(degrees)
-        findings.metric(f"{name}_min", float(some.min()), "deg", n=len(some), meaning=f"least {heading}")
-        findings.metric(f"{name}_max", float(some.max()), "deg", n=len(some), meaning=f"greatest {heading}")
-        named = "noise" if bends is None else f"noise_{name}"
-        findings.metric(named, noise, "deg", "lower", len(some), meaning="deviation from steady motion")
-        rows += [
-            (f"least {heading} [deg]", float(some.min())),
-            (f"greatest {heading} [deg]", float(some.max())),
-            (f"noise{'' if bends is None else f' of that, {name}'} [deg]", noise),
+        values = [
+            (Quantity(f"{name}_{key}", "deg", f"{end} {heading}", f"{end} {heading}"), float(value))
+            for key, end, value in (("min", "least", some.min()), ("max", "greatest", some.max()))
         ]
+        noise = Quantity("noise", "deg", "deviation from steady motion", better="lower")
+        if bends is not None:
+            noise = replace(noise, name=f"noise_{name}", heading=f"noise of that, {name}")
+        values.append((noise, angle_noise(degrees)))
+        rows += keep_values(findings, [(quantity, value, len(some)) for quantity, value in values])
     skew = math.degrees(max(base_askew(seen.view, seen.sightings) for seen in cameras))
-    meant = "largest error, by the base's marker that is no square"
-    findings.metric("askew", skew, "deg", "lower", usable, meaning=meant)
+    rows += keep_values(findings, [(_SKEW, skew, usable)])
     if skew > _ASKEW:
         fix = "calibrate the camera where it stands now, and name that run with --calibration"
         log.warning("angles may be up to %.1f deg off, for the base's marker looks askew - fix: %s", skew, fix)
-    rows.append(("askew [deg]", skew))
     why = [(str(verdict), count, count / total, MEANING[verdict]) for verdict, count in counts.most_common()]
-    columns = ("verdict", "frames", "share", "meaning")
+    heads = ("verdict", "frames", "share", "meaning")
     title = " and ".join(Path(source).name for source in sources)
-    tables = [Table(title, ("what", "value"), rows), Table("Frames by verdict", columns, why)]
+    tables = [Table(title, VALUE, rows), Table("Frames by verdict", heads, why)]
     return Tracked(session.study, findings, tables, sightings, bends)
 
 

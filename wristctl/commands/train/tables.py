@@ -9,6 +9,8 @@ import numpy as np
 import pandas as pd
 
 from wristctl.arrays import Array
+from wristctl.commands.gen_data.answer import SAMPLED
+from wristctl.commands.quantities import Quantity, documented
 from wristctl.learning.dataset import Samples
 from wristctl.learning.network_file import TIP
 from wristctl.simulation.trajectory import PLANES
@@ -17,54 +19,25 @@ if TYPE_CHECKING:
     from wristctl.learning.selection import CrossValidated
     from wristctl.learning.training_result import Epoch
 
-# Units of the columns of all tables here.
-UNITS = {
-    "x": "m",
-    "y": "m",
-    "z": "m",
-    "theta": "rad",
-    "arc_length": "m",
-    "theta_network": "rad",
-    "theta_exact": "rad",
-    "theta_polynomial": "rad",
-    "pose": "rad",
-    "roll": "rad",
-    "hand_mass": "kg",
-    "held_out": "1",
-    "recording": "1",
-    "trial": "1",
-    "epoch": "1",
-    "train_loss": "rad^2",
-    "validation_loss": "rad^2",
-}
-
-# Meaning of the columns of all training tables.
-MEANING = {
-    "x": "tip position along the straight wrist",
-    "y": "tip position across it, toward positive bending",
-    "z": "tip position toward flexion",
-    "theta": "bending angle",
-    "arc_length": "length of the arc from the first to the last disc",
-    "theta_network": "the network's angle",
-    "theta_exact": "the exact inverse's angle, 2 atan2(y, x)",
-    "theta_polynomial": "the angle of a polynomial of the inputs",
-    "pose": "tilt of the base from upright",
-    "roll": "direction of the tilt, from ulnar toward flexion",
-    "bend": "size of the bend",
-    "hand_mass": "mass of hand and payload",
-    "held_out": "0: not; held out of training by 1: its payload, 2: its pose",
-    "recording": "which of the recordings it was measured in",
-    "trial": "which of the trainings with different initial weights",
-    "epoch": "passes over the training data so far",
-    "train_loss": "mean squared error of the angle over the epoch's batches, each before its own step",
-    "validation_loss": "mean squared error of the angle on the validation samples, after the epoch",
-}
-
-# The bends in two planes, as the trajectories of loops name them.
-for _plane in PLANES:
-    for _end, _whose in (("", "bend"), ("_network", "the network's bend"), ("_exact", "the exact inverse's bend"),
-                         ("_polynomial", "the bend of a polynomial of the inputs")):  # fmt: skip
-        UNITS[f"bend_{_plane}{_end}"], MEANING[f"bend_{_plane}{_end}"] = "rad", f"{_whose}, toward {_plane}"
+_COLUMNS = [
+    *SAMPLED.values(),
+    Quantity("theta_network", "rad", "the network's angle"),
+    Quantity("theta_exact", "rad", "the exact inverse's angle, 2 atan2(y, x)"),
+    Quantity("theta_polynomial", "rad", "the angle of a polynomial of the inputs"),
+    *(
+        Quantity(f"bend_{plane}_{end}", "rad", f"the bend of {whose}, toward {plane}")
+        for plane in PLANES
+        for end, whose in (("network", "the network"), ("exact", "the exact inverse"), ("polynomial", "a polynomial"))
+    ),
+    Quantity("trial", "1", "which of the trainings with different initial weights"),
+    Quantity("epoch", "1", "passes over the training data so far"),
+    Quantity(
+        "train_loss", "rad^2", "mean squared error of the angle over the epoch's batches, each before its own step"
+    ),
+    Quantity("validation_loss", "rad^2", "mean squared error of the angle on the validation samples, after the epoch"),
+]
+# Unit and meaning of the columns of all tables here, by name.
+UNITS, MEANING = documented(_COLUMNS)
 
 # Units of grid_table's columns.
 GRID_UNITS = {"rmse_deg": "deg", "error_deg": "deg"}

@@ -7,9 +7,10 @@ import shlex
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
-from wristctl.commands.answer import LINES, Answer
+from wristctl.commands.answer import Answer
 from wristctl.commands.kept_studies import FOLDER, file_of
 from wristctl.commands.printed_table import Table, degrees, joined, two
+from wristctl.commands.quantities import Quantity, table_of
 from wristctl.commands.ranking_answer import gains_words
 
 if TYPE_CHECKING:
@@ -135,10 +136,12 @@ def answer_of(
         notes += _next(f"{run}/{file_of(best)}", motion)
         takers = "simulate, compare and hw-run" if motion.on_a_rig else "simulate and compare"
         more = f"All tables: --all. The gains, each a file for {takers}: {run}/{FOLDER}/"
-    whole = Answer(sentence, _table(ordered, searches, errors), notes, more)
-    if len(whole.lines()) <= LINES or len(ordered) == 1:
-        return whole
-    return Answer(whole.sentence, _table(ordered, searches, errors, with_gains=False), notes, more)
+    columns = ("controller", "objective", "error", "feedforward", "gains")
+    answers = [
+        Answer(sentence, searches_table(searches, errors, lost, cases, columns=shown), notes, more)
+        for shown in (columns, columns[:-1])
+    ]
+    return answers[0] if answers[0].fits or len(ordered) == 1 else answers[1]
 
 
 def _is_sound(beside: Beside, lost: Mapping[str, int]) -> bool:
@@ -231,17 +234,44 @@ def _times(beside: Beside) -> str:
     return f"{two(beside.ratio)} times less than" if beside.ratio > 1.0 else f"{two(1.0 / beside.ratio)} times"
 
 
-def _table(
-    ordered: Sequence[str], searches: Mapping[str, Search], errors: Mapping[str, Beside], with_gains: bool = True
+_TUNED = {
+    quantity.name: quantity
+    for quantity in (
+        Quantity("controller"),
+        Quantity("objective", meaning="decades beside feedforward", better="lower"),
+        Quantity("error", "rad", better="lower"),
+        Quantity("feedforward", "rad", heading="feedforward's"),
+        Quantity("fate"),
+        Quantity("origin", heading="found by"),
+        Quantity("evaluations"),
+        Quantity("gains"),
+    )
+}
+
+
+def searches_table(
+    searches: Mapping[str, Search],
+    errors: Mapping[str, Beside],
+    lost: Mapping[str, Mapping[str, int]],
+    cases: int,
+    title: str = "",
+    columns: Sequence[str] = tuple(_TUNED),
 ) -> Table:
-    """A row for each controller, best objective first."""
-    heads = ("controller", "objective", "error [deg]", "feedforward's [deg]", *["gains"] * with_gains)
-    rows = []
-    for name in ordered:
-        beside = errors[name]
-        figures = (degrees(beside.error), degrees(beside.feedforward)) if beside.cases else ("-", "-")
-        rows.append((name, searches[name].objective, *figures, *[gains_words(name, searches[name].gains)] * with_gains))
-    return Table("", heads, rows)
+    """A row for each controller, best objective first; all columns, or some by name."""
+    records = [
+        {
+            "controller": name,
+            "objective": search.objective,
+            "error": errors[name].error if errors[name].cases else None,
+            "feedforward": errors[name].feedforward if errors[name].cases else None,
+            "fate": ", ".join(f"{mark} in {count} of {cases} cases" for mark, count in lost[name].items()),
+            "origin": search.finalists[0].origin if search.finalists else "search",
+            "evaluations": search.evaluations,
+            "gains": gains_words(name, search.gains),
+        }
+        for name, search in sorted(searches.items(), key=lambda named_search: named_search[1].objective)
+    ]
+    return table_of(title, [_TUNED[name] for name in columns], records)
 
 
 def _edges(ordered: Sequence[str], searches: Mapping[str, Search]) -> list[str]:

@@ -30,12 +30,11 @@ from wristctl.commands.loop_warnings import (
     warn_of_one_plane,
     warn_out_of_reach,
 )
-from wristctl.commands.printed_table import Table
 from wristctl.commands.procedure import Procedure
 from wristctl.commands.results import Findings, StudyResult
 from wristctl.commands.session import Session
 from wristctl.commands.sweep.command import sweepable
-from wristctl.commands.tune.answer import Beside, Motion, answer_of, beside_feedforward
+from wristctl.commands.tune.answer import Beside, Motion, answer_of, beside_feedforward, searches_table
 from wristctl.commands.tune.searches import search_all
 from wristctl.config.families import Family
 from wristctl.config.loop import Reference
@@ -51,6 +50,8 @@ if TYPE_CHECKING:
     from wristctl.tuning.search import Search
     from wristctl.wrist.kinematics import Inverse
 
+# Time of a rollout on another loop, which may have more segments, over that of one on the loop of the search.
+_ELSEWHERE = 3
 # Share of what a family draws at which one of its motions is tried.
 _WITHIN = 0.75
 
@@ -177,6 +178,7 @@ def tune(session: Session) -> Tuned:
 
     from wristctl.commands.truth_table import truth_tables
     from wristctl.control.table import controller
+    from wristctl.tuning.margin import LADDERS
     from wristctl.tuning.objective import marks_of
     from wristctl.tuning.search import own_loop, tuning_cases
 
@@ -188,26 +190,19 @@ def tune(session: Session) -> Tuned:
     warn_out_of_reach(session.findings, study.wrist, asked_by(study, study.tune))
     planes = 2 if why_two_planes(study.wrist, asked_of_search(study)) else 1
     network = network_for(session.inputs, study.wrist, loops, planes)
-    searches = search_all(session, study, network)
     searched, chosen = tuning_cases(study, network)
     cases = chosen or searched
+    tried = (3 + _ELSEWHERE * len(study.tune.loops)) * len(cases) + sum(map(len, LADDERS)) * len(searched)
+    searches = search_all(session, study, network, tried)
     lost = {
         name: marks_of(law, np.array(law.values(searches[name].gains)), cases, study.wrist)
         for name, law in ((name, controller(name)) for name in searches)
     }
-    fates = {
-        name: ", ".join(f"{mark} in {count} of {len(cases)} cases" for mark, count in marks.items())
-        for name, marks in lost.items()
-    }
-    rows = [
-        (name, result.objective, fates[name], result.finalists[0].origin, result.evaluations, _told(result.gains))
-        for name, result in sorted(searches.items(), key=lambda named_search: named_search[1].objective)
-    ]
-    columns = ("controller", "objective", "fate", "found by", "evaluations", "gains")
-    tables = [Table("Tuned gains, best first; objective in decades beside feedforward", columns, rows)]
-    tables += truth_tables(study.wrist, judged_loops(study, study.tune))
     gains = {name: best.gains for name, best in searches.items()}
     errors = beside_feedforward(gains, cases, study.wrist)
+    title = "Tuned gains, best first; objective in decades beside feedforward"
+    tables = [searches_table(searches, errors, lost, len(cases), title)]
+    tables += truth_tables(study.wrist, judged_loops(study, study.tune))
     elsewhere = _elsewhere(session, study, network, gains)
     stood = _stood(session, own_loop(study, searched, network), gains)
     _write_files(session.findings, study, gains)
@@ -279,8 +274,8 @@ def _elsewhere(
     searched = {scenario.loop for scenario in settings.scenarios}
     others = [] if settings.worlds.family else [name for name in settings.loops if name not in searched]
     tried: dict[str, dict[str, dict[str, int]]] = {name: {} for name in gains}
-    with session.progress("trying the gains on other loops", total=len(others), unit="loops") as advance:
-        for number, loop in enumerate(others, start=1):
+    with session.progress("trying the gains on other loops"):
+        for loop in others:
             scenarios = tuple(dict.fromkeys(one.model_copy(update={"loop": loop}) for one in settings.scenarios))
             elsewhere = study.model_copy(update={"tune": settings.model_copy(update={"scenarios": scenarios})})
             cases = tuning_cases(elsewhere, network)[0]
@@ -288,17 +283,12 @@ def _elsewhere(
                 law = controller(name)
                 if law.keeps_up(settings.loops[loop].control_period):
                     tried[name][loop] = marks_of(law, np.array(law.values(values)), cases, study.wrist)
-            advance(number)
     return tried
 
 
 def _references(settings: TuneSettings, families: Mapping[str, Family]) -> list[Reference]:
     family = settings.worlds.family
     return list(families[family].references) if family else [scenario.reference for scenario in settings.scenarios]
-
-
-def _told(gains: Mapping[str, float]) -> str:
-    return "  ".join(f"{name} = {value:.4g}" for name, value in gains.items())
 
 
 TUNE = sweepable(

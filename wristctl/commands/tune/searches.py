@@ -2,83 +2,60 @@
 
 from __future__ import annotations
 
-import logging
-import math
-import time
-from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
-from wristctl.commands.progress import duration
 from wristctl.commands.results import Findings
 from wristctl.commands.session import Done, Session
 from wristctl.config.study import Study
 
 if TYPE_CHECKING:
-    from wristctl.control.law import Controller
     from wristctl.tuning.objective import Judge
     from wristctl.tuning.search import Search, Tried
     from wristctl.wrist.kinematics import Inverse
 
-log = logging.getLogger(__name__)
+# Time of a rollout at short steps over that of a search's; rollouts whose time an iteration takes beside those that it
+# runs; candidates of it that are looked at closely.
+_CLOSELY, _BESIDE, _PROMISING = 1.2, 20, 2
+# Seconds that the figures of a controller take.
+_DRAWN = 1.0
 
-# Seconds of a search from which it is said how long it takes.
-_WORTH_SAYING = 5.0
 
+def search_all(session: Session, study: Study, network: Inverse | None, then: float = 0.0) -> dict[str, Search]:
+    """Tune every controller of the study's tune section; what was found is kept also where it is cut short.
 
-def search_all(session: Session, study: Study, network: Inverse | None) -> dict[str, Search]:
-    """Tune every controller of the study's tune section; what was found is kept also where it is cut short."""
+    `then` are the rollouts that the command runs after it, for each controller.
+    """
     from wristctl.control.table import controller
+    from wristctl.tuning.margin import CHANGES
     from wristctl.tuning.search import judges_of, search
 
     settings = study.tune
     _note_streams(session, study)
     judge, choose = judges_of(study, network)
     laws = {name: controller(name) for name in settings.controllers}
-    fresh = [law for name, law in laws.items() if _known(session, name) is None]
-    if fresh and (seconds := _seconds((judge, choose), fresh, study)) > _WORTH_SAYING:
-        log.info("searching gains of %s: about %s", ", ".join(law.name for law in fresh), duration(seconds))
-    searches: dict[str, Search] = {}
+    total, searches = settings.iterations * settings.restarts, dict[str, "Search"]()
+    closely = _CLOSELY * judge.count + len(CHANGES) * judge.own_loop.count
+    searched = total * (settings.candidates * judge.count + _PROMISING * closely + _BESIDE)
+    choice = _CLOSELY * min(settings.finalists, total * settings.candidates) * (choose or judge).count / searched
+    rest = _CLOSELY * then / searched * sum(law.learning for law in laws.values())
+    drawn = _DRAWN * len(laws)
     try:
-        for name in settings.controllers:
-            total = settings.iterations * settings.restarts
-            with session.progress(f"tuning {name}", total=total, unit="iterations") as advance:
+        for number, (name, law) in enumerate(laws.items(), start=1):
+            later = sum(other.learning for other in list(laws.values())[number:])
+            following = choice + ((1.0 + choice) * later + rest) / law.learning
+            with session.progress(f"tuning {name}", total, "iterations", following, drawn) as advance:
 
                 def so_far(result: Search, name: str = name, report: Done = advance) -> None:
                     searches[name] = result
                     report(len(result.tried.values), best=result.objective)
 
                 tried = _known(session, name)
-                searches[name] = search(study, laws[name], session.findings.stream, (judge, choose), so_far, tried)
+                after_choice = ((1.0 + 1.0 / choice) * later + rest / choice) / law.learning
+                choosing = session.progress(f"choosing gains of {name}", 100, "%", after_choice, drawn)
+                searches[name] = search(study, law, session.findings.stream, (judge, choose), so_far, tried, choosing)
     finally:
         _keep(session.findings, searches, choose or judge)
     return searches
-
-
-# Promising candidates of an iteration, which run again at short steps and with changes of the loop, and the time of a
-# rollout of the final choice over that of a rollout of the search: as measured on scenarios of one and two loops.
-_PROMISING, _CHOICE = 2, 2.0
-
-
-def _seconds(judges: tuple[Judge, Judge | None], laws: Sequence[Controller], study: Study) -> float:
-    """About how long the searches of controllers take [s], by the time of one batch of candidates of the first."""
-    import numpy as np
-
-    (judge, choose), first, settings = judges, laws[0], study.tune
-    middle = [math.sqrt(gain.low * gain.high) for gain in first.gains.values()]
-    values = first.values(list(first.presets.values())[-1]) if first.presets else middle
-    candidates = np.tile(np.array(values), (settings.candidates, 1))
-
-    def timed(call: Callable[[], object]) -> float:
-        call()  # compiles
-        began = time.monotonic()
-        call()
-        return (time.monotonic() - began) / first.learning
-
-    batch = timed(lambda: judge.beside(first, candidates, -math.inf))
-    iteration = batch + _PROMISING * timed(lambda: judge(first, candidates[:1]))
-    chosen = settings.finalists * (choose or judge).count / (settings.candidates * judge.count)
-    search = settings.iterations * settings.restarts * iteration + _CHOICE * chosen * batch
-    return search * sum(law.learning for law in laws)
 
 
 def _note_streams(session: Session, study: Study) -> None:

@@ -78,18 +78,18 @@ def _caveats(robot: RealRobot, chosen: TriedModel) -> str:
     return f"{'; '.join(parts)}."
 
 
-RATIO = ("over that without the term", "term")
-"""Heads of the ratio of a model's error to that of the model without its last term, and of what it says of the term."""
-
-
 def models_table(robot: RealRobot, models: Sequence[TriedModel], beside: Mapping[str, Score]) -> Table:
     """Errors of the authors' models and without a model, then of ours with the ratio to that without the last term."""
     rows = [(name, None, f"{error:.2f}", "", "") for name, error in robot.authors]
     for name, score in beside.items():
         error, low, high = (f"{robot.scale * value:.2f}" for value in score[:3])
         rows.append((name, None, f"{error} [{low}, {high}]", "", ""))
-    heads = ("model", "free numbers", f"{robot.asked} [{robot.unit}]", *RATIO)
-    return Table("", heads, [*rows, *model_rows(models, robot.scale)])
+    return Table("", model_heads(robot.asked, robot.unit), [*rows, *model_rows(models, robot.scale)])
+
+
+def model_heads(asked: str, unit: str) -> tuple[str, ...]:
+    """Heads of the rows of `model_rows`, of an error of what was `asked`."""
+    return "model", "free numbers", f"{asked} [{unit}]", "over that without the term", "term"
 
 
 def model_rows(models: Sequence[TriedModel], scale: float) -> list[tuple[str, int, str, str, str]]:
