@@ -7,7 +7,8 @@ import json
 import math
 import re
 from pathlib import Path
-from typing import Any
+from types import SimpleNamespace
+from typing import Any, cast
 
 import numpy as np
 import pandas as pd
@@ -17,6 +18,7 @@ from pydantic import ValidationError
 from tests.doors.carrier import CARRIED, MARK, carrier
 from tests.doors.conftest import wristctl
 from wristctl.commands.adoption import adopted
+from wristctl.commands.export.open_log_of_run import _mass_is_said
 from wristctl.commands.rig_certificate import Certificate, RigCheck
 from wristctl.config.hw_run import HwRunSettings, RigRow
 from wristctl.config.study import Study
@@ -212,10 +214,20 @@ def test_measured_tensions_are_logged_held_against_the_model_and_exported(tmp_pa
     assert done.returncode == 0, done.stderr
     exported = pd.read_csv(tmp_path / "log.csv")
     told = exported[["time [s]", "tension_1 [N]"]].dropna()
+    assert np.allclose(exported["mass [kg]"], 0.198), "as the facts say it"
     assert np.allclose(told["tension_1 [N]"], log["pull_1"]) and np.allclose(told["time [s]"], log["captured_ulnar"])
     for page in [*sealed.path.glob("*.md"), sealed.path / "data/limits.json", sealed.path / "run.json"]:
         words = re.findall(r"[^\n]*\b(?:board|markers?|cameras?|pictures?|frames? of)\b[^\n]*", page.read_text())
         assert not words, (page.name, words)
+
+
+@pytest.mark.parametrize(
+    ("rig", "mass", "said"), [("mine.py:MINE", 0.3, False), ("mine.py:MINE", 0.2, True), (None, 0.3, True)]
+)
+def test_the_default_mass_of_a_hand_is_no_mass_of_a_rig_of_ones_own(rig: str | None, mass: float, said: bool) -> None:
+    study = Study(wrist=WristParameters(hand_mass=mass))
+    study = study.model_copy(update={"hw_run": study.hw_run.model_copy(update={"rig": rig})})
+    assert _mass_is_said(cast(Run, SimpleNamespace(config=study))) is said
 
 
 # What goes wrong in a trial once the wrist is bent, in the file's own text, and what is said of it.

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -14,7 +15,13 @@ from tests.identification.bend_rigs import KNOWN, LAYOUT, SETTINGS, TENDONS, dra
 from wristctl.config.identify import Fixed, IdentifySettings
 from wristctl.config.wrist import WristParameters
 from wristctl.errors import UserError
-from wristctl.identification.bend_problem import bend_problem, oblique_of, springs_of, told_of_bends
+from wristctl.identification.bend_problem import (
+    bend_problem,
+    oblique_of,
+    overruled_mass,
+    springs_of,
+    told_of_bends,
+)
 from wristctl.identification.bend_rehearsal import Hold, RehearsedBends, planned_spools, rehearse_bends
 from wristctl.identification.bend_trials import BendTrial, bend_trials, places_of_log
 from wristctl.identification.fit import Fit, Rival, fit
@@ -247,3 +254,17 @@ def test_trials_whose_clocks_are_apart_do_not_make_springs_of_one_plane_softer(l
                 assert told[f"direction_{number}"].value + turned < told[f"direction_{number}"].high
     apart, together = (abs(math.log(springs["flexion_ratio"])) for springs in ratios)
     assert together > 2.0 * apart, "with clocks that are known to agree one plane's springs take it up"
+
+
+def test_a_mass_of_the_log_goes_before_one_that_the_study_gives() -> None:
+    places = dict(enumerate(TendonLayout.of(THREE).places, 1))
+    trials = one_plane_each(0.0)
+
+    def overruled(trials: list[BendTrial], wrist: WristParameters) -> float | None:
+        return overruled_mass(bend_problem(trials, places, wrist, TENDONS, IdentifySettings(segments=1)), wrist)
+
+    assert overruled(trials, WristParameters(tendons="three", hand_mass=0.19)) == pytest.approx(0.2)
+    assert overruled(trials, WristParameters(tendons="three", hand_mass=0.2)) is None, "they agree"
+    assert overruled(trials, WristParameters(tendons="three")) is None, "nobody has given another"
+    light = replace(trials[1], wrist=THREE.model_copy(update={"hand_mass": 0.1}))
+    assert overruled([trials[0], light], WristParameters(tendons="three", hand_mass=0.19)) is None, "several masses"

@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -237,7 +238,7 @@ def weighing(gravity: float) -> tuple[OpenLog, WristParameters]:
     rng, time = np.random.default_rng(3), np.arange(0.0, 30.0, 0.02)
     pulls, radius = plan(rng), wrist.tendon_radius
 
-    def tensions(at: Array, which: Array) -> Array:
+    def tensions(at: Array, which: Any) -> Array:
         return np.repeat(pulls(at)[:, :, None] / radius, len(which), axis=2)
 
     free = Actuator(level="tendon", friction=0.0)
