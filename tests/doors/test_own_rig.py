@@ -7,7 +7,8 @@ import json
 import math
 import re
 from pathlib import Path
-from typing import Any
+from types import SimpleNamespace
+from typing import Any, cast
 
 import numpy as np
 import pandas as pd
@@ -17,10 +18,11 @@ from pydantic import ValidationError
 from tests.doors.carrier import CARRIED, MARK, carrier
 from tests.doors.conftest import wristctl
 from wristctl.commands.adoption import adopted
+from wristctl.commands.export.open_log_of_run import _mass_is_said
 from wristctl.commands.rig_certificate import Certificate, RigCheck
 from wristctl.config.hw_run import HwRunSettings, RigRow
 from wristctl.config.study import Study
-from wristctl.config.wrist import WristParameters
+from wristctl.config.wrist import TendonPlace, WristParameters
 from wristctl.errors import UserError
 from wristctl.records import Run
 from wristctl.rig import Facts, Limits, Lost, Sensor, Spread, Tendon, VirtualClock, WallClock
@@ -31,6 +33,7 @@ from wristctl.trial.rig_experiment import RigExperiment
 from wristctl.trial.rig_settings import check_facts, rig_of, settings_of, wrist_of
 from wristctl.trial.safety import SafetyStop
 from wristctl.trial.trials import Trial
+from wristctl.wrist.tendon_layout import TendonLayout
 
 TEMPLATE = Path(__file__).parents[2] / "wristctl" / "cli" / "templates" / "rig.py.txt"
 RIG = TEMPLATE.read_text(encoding="utf-8").replace("@OBJECT@", "RIG").replace("@Title@", "Test")
@@ -212,10 +215,20 @@ def test_measured_tensions_are_logged_held_against_the_model_and_exported(tmp_pa
     assert done.returncode == 0, done.stderr
     exported = pd.read_csv(tmp_path / "log.csv")
     told = exported[["time [s]", "tension_1 [N]"]].dropna()
+    assert np.allclose(exported["mass [kg]"], 0.198), "as the facts say it"
     assert np.allclose(told["tension_1 [N]"], log["pull_1"]) and np.allclose(told["time [s]"], log["captured_ulnar"])
     for page in [*sealed.path.glob("*.md"), sealed.path / "data/limits.json", sealed.path / "run.json"]:
         words = re.findall(r"[^\n]*\b(?:board|markers?|cameras?|pictures?|frames? of)\b[^\n]*", page.read_text())
         assert not words, (page.name, words)
+
+
+@pytest.mark.parametrize(
+    ("rig", "mass", "said"), [("mine.py:MINE", 0.3, False), ("mine.py:MINE", 0.2, True), (None, 0.3, True)]
+)
+def test_the_default_mass_of_a_hand_is_no_mass_of_a_rig_of_ones_own(rig: str | None, mass: float, said: bool) -> None:
+    study = Study(wrist=WristParameters(hand_mass=mass))
+    study = study.model_copy(update={"hw_run": study.hw_run.model_copy(update={"rig": rig})})
+    assert _mass_is_said(cast(Run, SimpleNamespace(config=study))) is said
 
 
 # What goes wrong in a trial once the wrist is bent, in the file's own text, and what is said of it.
@@ -290,6 +303,26 @@ def test_facts_are_the_settings_that_a_study_does_not_give() -> None:
     assert settings.actuator.step_rate * settings.actuator.step_length == pytest.approx(0.1)
     with pytest.raises(UserError, match="tendons are not those of the rig"):
         wrist_of(facts, WristParameters(tendons="four"), "a.py:RIG")
+
+
+@pytest.mark.parametrize(("turned", "wider", "near"), [(2.0, 1.03, True), (-12.0, 0.95, True), (30.0, 1.0, False)])
+def test_tendons_where_identification_finds_them_are_the_rigs_and_those_elsewhere_are_not(
+    turned: float, wider: float, near: bool
+) -> None:
+    facts = _facts()
+    places = tuple(
+        TendonPlace(angle_deg=one.angle_deg + (turned if k == 3 else 0.0), radius=wider * one.radius)
+        for k, one in enumerate(facts.tendons)
+    )
+    study = WristParameters(tendons=places)
+    if not near:
+        with pytest.raises(UserError, match="tendons are not those of the rig"):
+            wrist_of(facts, study, "a.py:RIG")
+        return
+    here = TendonLayout.of(wrist_of(facts, study, "a.py:RIG"))
+    assert here.cross_section == pytest.approx(TendonLayout.of(study).cross_section)
+    with pytest.raises(UserError, match="tendons are not those of the rig"):
+        wrist_of(facts, WristParameters(tendons=places[:4]), "a.py:RIG")
 
 
 def test_settings_of_the_board_are_none_of_another_rig(tmp_path: Path) -> None:

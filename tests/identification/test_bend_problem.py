@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -11,14 +12,20 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tests.identification.bend_rigs import KNOWN, LAYOUT, SETTINGS, TENDONS, drawn_rig, logs_of, spools
-from wristctl.config.identify import IdentifySettings
+from wristctl.config.identify import Fixed, IdentifySettings
 from wristctl.config.wrist import WristParameters
 from wristctl.errors import UserError
-from wristctl.identification.bend_problem import bend_problem, oblique_of, springs_of, told_of_bends
+from wristctl.identification.bend_problem import (
+    bend_problem,
+    oblique_of,
+    overruled_mass,
+    springs_of,
+    told_of_bends,
+)
 from wristctl.identification.bend_rehearsal import Hold, RehearsedBends, planned_spools, rehearse_bends
-from wristctl.identification.bend_trials import bend_trials, places_of_log
-from wristctl.identification.fit import Fit, Rival
-from wristctl.identification.intervals import Knowledge
+from wristctl.identification.bend_trials import BendTrial, bend_trials, places_of_log
+from wristctl.identification.fit import Fit, Rival, fit
+from wristctl.identification.intervals import Knowledge, knowledge
 from wristctl.identification.spatial_forward import SupposedBends, courses_of_bends
 from wristctl.records.log_converters import read_log
 from wristctl.records.open_log import write_log
@@ -193,3 +200,71 @@ def test_what_two_minima_have_different_is_told_only_where_one_fits_significantl
     turned[problem.free.index("oblique_cos")], turned[problem.free.index("oblique_sin")] = -0.08, -0.06
     told = told_of_bends(Fit(problem, x, 1e-3, residuals, [], 1, (Rival(turned, 1.0),)), known)
     assert not told["stiffness_axis_deg"].known and told["damping"].known
+
+
+LATE = 5e-4
+THREE = WristParameters(tendons="three", gravity=(0.0, 0.0), stiffness=1.2, damping=0.12, hand_mass=0.2)
+HELD = {"friction": 0.0, "sheath_friction": 0.0, "presliding": 2e-5}
+
+
+def one_plane_each(late: float) -> list[BendTrial]:
+    """A motion toward ulnar, seen so much later than the mean delay of 30 ms, and one toward flexion, as much earlier.
+
+    Three tendons stay tight, so that the wrist's inertia alone tells its springs from theirs.
+    """
+    layout, tendons = TendonLayout.of(THREE), TENDONS.model_copy(update={"friction": 0.0})
+    time, rng, trials = 1e-3 * np.arange(2500.0), np.random.default_rng(5), []
+    for plane, side in enumerate((1.0, -1.0)):
+        bend = np.zeros((len(time), 2))
+        bend[:, plane] = 0.3 * np.sin(5.0 * time) * np.minimum(1.0, time**2)
+        reeled = 4e-4 + bend @ layout.cross_section.T
+        supposed = SupposedBends(THREE, tendons, layout.cross_section, (0.0,) * 3, np.ones(3), np.ones(3, np.int64))
+        (course,) = courses_of_bends([supposed], reeled, 1e-3, 1)
+        captured = np.arange(0.05, 2.45, 0.01)
+        seen = [np.interp(captured - 0.03 - side * late, time, bends) for bends in course[:, :2].T]
+        angle = np.concatenate(seen) + math.radians(0.02) * rng.standard_normal(2 * len(captured))
+        trials.append(
+            BendTrial(
+                f"log, {plane}", "log", "both", THREE, time, reeled, np.tile(captured, 2), angle, 0.0, (1, 2, 3),
+                np.repeat([0, 1], len(captured)), 1.0,
+            )
+        )  # fmt: skip
+    return trials
+
+
+@pytest.mark.parametrize("late", [LATE, -LATE])
+def test_trials_whose_clocks_are_apart_do_not_make_springs_of_one_plane_softer(late: float) -> None:
+    places = dict(enumerate(TendonLayout.of(THREE).places, 1))
+    ratios = []
+    for error in (3e-4, 0.0):
+        settings = IdentifySettings(segments=1, fix=Fixed(**HELD), clock_error=error)
+        problem = bend_problem(one_plane_each(late), places, THREE, TENDONS, settings)
+        found = fit(problem)
+        ratios.append(springs_of(*(found.values[name] for name in ("stiffness", "oblique_cos", "oblique_sin"))))
+        if error:
+            x, (ulnar, flexion) = found.x, problem.trials
+            apart = problem.delay(ulnar, x) - problem.delay(flexion, x)
+            assert apart == pytest.approx(2.0 * late, abs=4e-4), "the trials tell much of it themselves"
+            told = told_of_bends(found, knowledge(found))
+            for name in ("stiffness", "stiffness_across"):
+                assert told[name].low < THREE.stiffness < told[name].high
+            for number, degrees in ((2, 120.0), (3, 240.0 - 360.0)):
+                turned = math.remainder(degrees - told[f"direction_{number}"].value, 360.0)
+                assert told[f"direction_{number}"].low < told[f"direction_{number}"].value + turned
+                assert told[f"direction_{number}"].value + turned < told[f"direction_{number}"].high
+    apart, together = (abs(math.log(springs["flexion_ratio"])) for springs in ratios)
+    assert together > 2.0 * apart, "with clocks that are known to agree one plane's springs take it up"
+
+
+def test_a_mass_of_the_log_goes_before_one_that_the_study_gives() -> None:
+    places = dict(enumerate(TendonLayout.of(THREE).places, 1))
+    trials = one_plane_each(0.0)
+
+    def overruled(trials: list[BendTrial], wrist: WristParameters) -> float | None:
+        return overruled_mass(bend_problem(trials, places, wrist, TENDONS, IdentifySettings(segments=1)), wrist)
+
+    assert overruled(trials, WristParameters(tendons="three", hand_mass=0.19)) == pytest.approx(0.2)
+    assert overruled(trials, WristParameters(tendons="three", hand_mass=0.2)) is None, "they agree"
+    assert overruled(trials, WristParameters(tendons="three")) is None, "nobody has given another"
+    light = replace(trials[1], wrist=THREE.model_copy(update={"hand_mass": 0.1}))
+    assert overruled([trials[0], light], WristParameters(tendons="three", hand_mass=0.19)) is None, "several masses"

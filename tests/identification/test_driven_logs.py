@@ -6,25 +6,29 @@ import math
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
-from tests.identification.driven_robots import BELIEVED, counted, summary
+from tests.identification.driven_robots import BELIEVED, counted, plan, summary
 from wristctl.arrays import Array
 from wristctl.commands.identify.driven import driven_answer
 from wristctl.config.identify import IdentifySettings
+from wristctl.config.plant import Actuator, TrueWrist
 from wristctl.config.study import Study
 from wristctl.config.wrist import WristParameters
 from wristctl.errors import UserError
 from wristctl.identification.arc_fit import fit_arcs
 from wristctl.identification.bend_trials import places_of_log
 from wristctl.identification.driven_fit import DrivenFit
-from wristctl.identification.driven_forward import STEP, DrivenArc, courses_of_pulls
+from wristctl.identification.driven_forward import STEP, DrivenArc, _softening, courses_of_pulls
 from wristctl.identification.driven_log import _at, drive_of_log, driven_robot
 from wristctl.identification.ratios import ratios_of_driven, wrist_by_ratios
 from wristctl.records.log_looks import looked_at
 from wristctl.records.open_log import OpenLog, read_table
+from wristctl.simulation.spool_driven import SpooledWrist, spooled
+from wristctl.wrist.statics import straight_stiffness
 
 SETTINGS = IdentifySettings()
 STIFFNESS, DAMPING, INERTIA, DELAY = 0.8, 0.12, 2e-3, 0.04
@@ -226,6 +230,53 @@ def test_directions_that_no_log_tells_want_the_studys_own_tendons() -> None:
     assert "wrist.tendons=three" in str(caught.value)
     three = Study(wrist=WristParameters(stiffness=1.2, tendons="three"))
     assert "wrist.tendons" not in wrist_by_ratios(ratios, three, "a run").told
+
+
+def weighing(gravity: float) -> tuple[OpenLog, WristParameters]:
+    """The log of a simulated wrist of four segments with a hand of 0.2 kg in this gravity along its base's tangent."""
+    wrist = BELIEVED.model_copy(update={"stiffness": 1.0, "damping": 0.1, "gravity": (gravity, 0.0)})
+    rng, time = np.random.default_rng(3), np.arange(0.0, 30.0, 0.02)
+    pulls, radius = plan(rng), wrist.tendon_radius
+
+    def tensions(at: Array, which: Any) -> Array:
+        return np.repeat(pulls(at)[:, :, None] / radius, len(which), axis=2)
+
+    free = Actuator(level="tendon", friction=0.0)
+    lane = SpooledWrist(wrist, free, np.zeros(8), winch=True, plant=TrueWrist(), planes=2)
+    done = spooled([lane], tensions, 30_100, 1e-3)
+    seen = np.clip(time - DELAY, 0.0, None)
+    bends = [np.interp(seen, 1e-3 * np.arange(done.bends.shape[1]), one) for one in done.bends[0].T]
+    columns = {"time": time} | {
+        name: one + 1e-3 * rng.standard_normal(len(time)) for name, one in zip(("bend_y", "bend_z"), bends, strict=True)
+    }
+    columns |= {f"tension_{k}": one / radius for k, one in enumerate(pulls(time).T, 1)}
+    return OpenLog(Path("made.csv"), "log", columns), wrist
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("gravity", [-9.81, 9.81, 0.0])
+def test_a_wrist_that_stands_or_hangs_tells_what_weight_takes_of_its_stiffness(gravity: float) -> None:
+    log, wrist = weighing(gravity)
+    shown = float(straight_stiffness(wrist.model_copy(update={"pretension": 0.0}), 1)[0, 0])
+    anywhere = WristParameters(tendons="three", hand_mass=0.2)
+    robot, recordings, _ = driven_robot([log], anywhere, SETTINGS)
+    whole = [replace(one, fitted=one.fitted | one.asked, asked=0 * one.block > 0) for one in recordings]
+    told = fit_arcs(robot, (), whole).told
+    truth = {"stiffness": shown, "weight": wrist.stiffness / shown - 1.0, "damping": wrist.damping / shown}
+    for name, value in truth.items():
+        assert told[name].known and told[name].low < value < told[name].high, name
+    assert told["weight"].high - told["weight"].low < 0.08
+    weightless = anywhere.model_copy(update={"gravity": (0.0, 0.0)})
+    weightless.model_fields_set.add("gravity")
+    bare = driven_robot([log], weightless, SETTINGS)[0]
+    assert "weight" in robot.unknowns(()) and "weight" not in bare.unknowns(())
+
+
+@pytest.mark.parametrize(("length", "offset"), [(0.08, 0.06), (0.2, 0.0)])
+def test_a_hand_takes_of_a_standing_arcs_stiffness_its_weight_times_a_third_of_the_length_and_its_offset(
+    length: float, offset: float
+) -> None:
+    assert _softening(length, 1e-9, 0.3, offset) == pytest.approx(0.3 * (length / 3.0 + offset), rel=1e-4)
 
 
 @pytest.mark.slow

@@ -95,6 +95,51 @@ def test_a_motion_that_comes_back_after_some_parts_is_fitted_and_predicted_at_ev
         assert one.fitted[there].any() and one.asked[there].any()
 
 
+@pytest.mark.parametrize("length", [6.0, 1.2])
+def test_a_trial_that_begins_in_motion_is_fitted_once_nobody_needs_to_know_how_it_began(length: float) -> None:
+    """Half a second later, or after a quarter of a short trial; one that begins at rest is fitted from its begin."""
+    resting = planar()
+    robot = robot_of_logs([resting], WRIST, 0.01)
+    (whole,) = recordings_of_logs([resting], robot)
+    assert (whole.fitted | whole.asked).all()
+    kept = (resting.columns["time"] >= 0.7) & (resting.columns["time"] < 0.7 + length)
+    cut = replace(resting, columns={name: column[kept] for name, column in resting.columns.items()}, words={})
+    (begun,) = recordings_of_logs([cut], robot)
+    used = begun.fitted | begun.asked
+    first = begun.time[used][0] - begun.time[0]
+    assert first == pytest.approx(min(0.5, 0.25 * (begun.time[-1] - begun.time[0])), abs=0.021)
+    assert not used[: int(used.argmax())].any() and used[int(used.argmax()) :].all()
+    (all_of_it,) = everything_fitted([begun])
+    assert (all_of_it.fitted == used).all() and not all_of_it.asked.any()
+
+
+def cut_in_motion(damping: float, whole: bool) -> OpenLog:
+    """A damped wrist that friction holds back, by its own model; whole, or as two trials, the second cut in motion."""
+    time = np.arange(0.0, 10.0, 0.0125)
+    robot = robot_of_logs([planar()], WRIST, 0.01)
+    way = 6e-3 * np.sin(4.1 * time) * np.cos(2.3 * time) * np.minimum(1.0, time**2)
+    spools = np.stack([6e-4 + way, 6e-4 - way], axis=1)
+    pause = np.diff(time, prepend=math.nan)
+    values = {"gain": 1.0, "tendon": 12.0, "damping": damping, "inertia": 4e-3, "friction": 0.2, "presliding": 2e-5}
+    arcs = robot.arcs({name: np.array([value]) for name, value in values.items()}, 0.0, 1)
+    bend = arcs.rest(spools[None], pause)[0, :, 0]
+    noise = math.radians(0.015) * np.random.default_rng(3).standard_normal(len(time))
+    columns = {"time": time, "spool_1": spools[:, 0], "spool_2": spools[:, 1], "bend_y": bend + noise}
+    words = {} if whole else {"trial": np.where(time < 4.4, "a", "b")}
+    return OpenLog(Path("made.csv"), "log", columns, words)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("damping", [0.15, 0.35])
+def test_a_log_tells_the_same_damping_and_friction_whole_or_as_two_trials(damping: float) -> None:
+    for log in (cut_in_motion(damping, True), cut_in_motion(damping, False)):
+        robot = robot_of_logs([log], WRIST, 0.01)
+        fit = fit_arcs(robot, ("tendon friction",), everything_fitted(recordings_of_logs([log], robot)))
+        assert fit.told["damping"].low < damping < fit.told["damping"].high
+        assert fit.values["presliding"] == pytest.approx(2e-5, rel=0.5)
+        assert math.degrees(fit.rms()) == pytest.approx(0.015, rel=0.1)
+
+
 def test_tendons_are_those_of_the_square_wrist_of_the_study_or_evenly_around() -> None:
     log = planar()
     square = OpenLog(

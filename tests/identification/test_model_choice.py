@@ -66,6 +66,43 @@ def test_a_term_on_which_the_data_decide_widens_nothing(
     assert not any(whole_fit(models, everything_fitted(recordings)).left_open.values())
 
 
+def rival_of(
+    plain: ArcFit, monkeypatch: pytest.MonkeyPatch, ratio: Score, more: float
+) -> tuple[TriedModel, TriedModel, TriedModel]:
+    """Arcs alone, a chosen model with inner friction, and one with creep that predicts by this ratio to the chosen."""
+    without = TriedModel((), (plain,), None)
+    unknowns = len(plain.values)
+    chosen_x = np.insert(plain.x, unknowns, [0.06, 0.01])
+    chosen = TriedModel(("inner friction",), (replace(plain, terms=("inner friction",), x=chosen_x),), without)
+    rival_x = np.insert(plain.x, unknowns, [0.2, 5.0])
+    rival_x[list(plain.values).index("tendon")] += more
+    rival = TriedModel(("creep",), (replace(plain, terms=("creep",), x=rival_x),), without)
+    for model, error in ((chosen, 0.7), (rival, 0.71), (without, 1.0)):
+        model.__dict__["score"] = Score(error, 0.98 * error, 1.02 * error, 8)
+        model.__dict__["ratio"] = Score(error, 0.9 * error, 1.1 * error, 8) if model.without else None
+    ratios = {id(rival.fits): ratio, id(without.fits): Score(1.4, 1.3, 1.5, 8)}
+    monkeypatch.setattr("wristctl.identification.model_choice.ratio_of", lambda fits, others: ratios[id(fits)])
+    return without, chosen, rival
+
+
+@pytest.mark.parametrize("more", [2.0, -1.0])
+def test_a_rival_that_predicts_as_well_widens_what_it_shifts_and_the_amount_that_it_has_not(
+    recordings: list[ArcRecording], plain: ArcFit, monkeypatch: pytest.MonkeyPatch, more: float
+) -> None:
+    models = rival_of(plain, monkeypatch, Score(1.0, 0.97, 1.03, 8), more)
+    left_open = whole_fit(models, everything_fitted(recordings)).left_open
+    assert left_open["tendon"] == pytest.approx(math.sqrt(0.5) * abs(more))
+    assert left_open["inner_friction"] == pytest.approx(math.sqrt(0.5) * 0.06)
+    assert left_open["gain"] == 0.0 == left_open["inner_presliding"]
+
+
+def test_a_rival_that_predicts_worse_beyond_chance_widens_nothing(
+    recordings: list[ArcRecording], plain: ArcFit, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    models = rival_of(plain, monkeypatch, Score(1.05, 1.01, 1.09, 8), 2.0)
+    assert not any(whole_fit(models, everything_fitted(recordings)).left_open.values())
+
+
 def test_a_term_beside_another_model_than_the_chosen_one_widens_nothing(
     recordings: list[ArcRecording], plain: ArcFit
 ) -> None:

@@ -22,7 +22,7 @@ from wristctl.config.wrist import WristParameters
 from wristctl.errors import UserError
 from wristctl.identification.arc_fit import Told
 from wristctl.identification.bend_trials import PLANES, BendTrial
-from wristctl.identification.fit import SPOOL, ZERO, Coordinate, Fit, Problem, spool_zero
+from wristctl.identification.fit import CLOCK, SPOOL, ZERO, Coordinate, Fit, Problem, spool_zero
 from wristctl.identification.intervals import NORMAL_95, Knowledge, interval
 from wristctl.identification.lack_of_fit import Misfit
 from wristctl.identification.measured_trials import MOST_DELAYED, MeasuredTrial, frame_noise
@@ -68,8 +68,9 @@ def springs_of(mean: float, p: float, q: float) -> dict[str, float]:
 class BendProblem(Problem):
     """Trials in two planes, the parameters to find and those that are held.
 
-    `start` is by the names of `unknowns`. Beside the parameters the camera's zeros of each run and plane and the zero
-    of each spool of each run are found.
+    `start` is by the names of `unknowns`. Beside the parameters the camera's zeros of each run and plane, the zero of
+    each spool of each run and the clocks of each trial are found: one that is late in one plane would look like softer
+    springs there, as a wrist on tight tendons tells them by its inertia alone.
     """
 
     places: Mapping[int, TendonPlace]
@@ -126,6 +127,10 @@ class BendProblem(Problem):
             Coordinate(ZERO, trial.run, plane): (trial.channel == channel).astype(float)
             for channel, plane in enumerate(PLANES)
         }
+
+    def clocks(self, trial: MeasuredTrial) -> tuple[Coordinate, ...]:
+        """Its own."""
+        return (Coordinate(CLOCK, trial.label),)
 
     def courses(self, trial: MeasuredTrial, points: Sequence[Array]) -> Array:
         """Bends and tensions, these as large as the trial's readings, (count, T, 2 + M)."""
@@ -197,8 +202,20 @@ def forces_are_scaled(problem: BendProblem, wrist: WristParameters) -> bool:
     if any((trial.channel >= len(PLANES)).any() for trial in trials):
         return True
     default = WristParameters.model_fields["hand_mass"].default
-    masses = {round(trial.wrist.hand_mass, 6) for trial in trials}
+    masses = _masses(trials)
     return "hand_mass" in wrist.model_fields_set or len(masses) > 1 or masses != {default}
+
+
+def overruled_mass(problem: BendProblem, wrist: WristParameters) -> float | None:
+    """Mass [kg] that the logs have in place of another one that the section `wrist` gives; None where there is none."""
+    masses = _masses(problem.trials)
+    given = "hand_mass" in wrist.model_fields_set and masses.isdisjoint({round(wrist.hand_mass, 6)})
+    return masses.pop() if given and len(masses) == 1 else None
+
+
+def _masses(trials: Sequence[MeasuredTrial]) -> set[float]:
+    """Masses of the hand in trials [kg], each once."""
+    return {round(trial.wrist.hand_mass, 6) for trial in trials}
 
 
 def without_forces(told: Mapping[str, Told]) -> dict[str, Told]:

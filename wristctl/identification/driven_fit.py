@@ -11,11 +11,11 @@ import numpy as np
 from wristctl.arrays import Array
 from wristctl.config.identify import IdentifySettings
 from wristctl.config.wrist import WristParameters
-from wristctl.identification.arc_fit import ArcFit, fit_arcs
+from wristctl.identification.arc_fit import ArcFit
 from wristctl.identification.arc_robot import ArcRecording
 from wristctl.identification.driven_log import driven_robot, recordings_of
 from wristctl.identification.driven_robot import DrivenRobot
-from wristctl.identification.model_choice import TriedModel, chosen_of, tried_models
+from wristctl.identification.model_choice import TriedModel, chosen_of, tried_models, whole_fit
 from wristctl.records.open_log import OpenLog
 
 LEAST = 0.1
@@ -69,7 +69,7 @@ def fitted_logs(
         report(len(models))
     chosen = chosen_of(models)
     whole = [replace(one, fitted=one.fitted | one.asked, asked=np.zeros(len(one.time), bool)) for one in recordings]
-    fit = fit_arcs(robot, chosen.terms, whole, begin=chosen.fits[0].values)
+    fit = whole_fit(models, whole)
     return DrivenFit(fit, tuple(models), chosen, tuple(recordings), tuple(remarks), sum(map(len, logs)))
 
 

@@ -1,12 +1,14 @@
 """The forward model of a wrist whose tendons' tensions are given: the bend that it takes, as one arc in two planes.
 
-All of it is over the wrist's stiffness, which is 1: damping [s], inertia [s^2], torques of friction [rad] and pulls
-[1/m]. Candidates run side by side, one a lane, on the plant, the tendons and the integrator of the simulation. A pull
-that is given is a spool behind a tendon so soft that nothing the wrist does in a step changes it
-(`wristctl.simulation.spool_driven`), so that friction along the tendon is the same element as on spools.
+All of it is over the stiffness that the straight wrist shows, its springs' less what weight takes. That is 1: damping
+has [s], inertia [s^2], torques of friction [rad] and pulls [1/m]. Candidates run side by side, one a lane, on the
+plant, the tendons and the integrator of the simulation. A pull that is given is a spool behind a tendon so soft that
+nothing the wrist does in a step changes it (`wristctl.simulation.spool_driven`), so that friction along the tendon is
+the same element as on spools.
 """
 
 from collections.abc import Iterator, Sequence
+from functools import cache
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -22,6 +24,7 @@ from wristctl.wrist.dahl import InnerFrictionInSpace, inner_in_lanes, inner_stat
 from wristctl.wrist.plant import advance_or_stop, kernel_of, parameters_of, path_before
 from wristctl.wrist.spatial.pcc_in_space import PCC_IN_SPACE
 from wristctl.wrist.spatial.posture import tip_bend
+from wristctl.wrist.spatial.spatial_model import spatial_terms
 from wristctl.wrist.spatial.spatial_segments import FIELDS, OF_A_TENDON, own_values, rows_of_tendons
 from wristctl.wrist.spatial.spooled_tendons import RealPlaces, read_faults
 from wristctl.wrist.tendon_layout import TendonLayout
@@ -62,6 +65,8 @@ class DrivenArc(NamedTuple):
     """Share of the stiffness that relaxes."""
     creep_time: float = 1.0
     """Time constant of that [s]."""
+    weight: float = 0.0
+    """Share of its straight stiffness that weight takes away from it as it stands; less than 0 of one that hangs."""
 
 
 class _Shapes(NamedTuple):
@@ -131,12 +136,24 @@ def inertia_of_arc(wrist: WristParameters) -> float:
     return wrist.mass * wrist.length**2 / 20.0 + wrist.hand_mass * (0.5 * wrist.length + wrist.hand_offset) ** 2
 
 
+@cache
+def _softening(length: float, mass: float, hand_mass: float, hand_offset: float) -> float:
+    """Stiffness that weight takes from the straight wrist as it stands, over gravity's acceleration [kg m/rad]."""
+    wrist = WristParameters(
+        length=length, mass=mass, hand_mass=hand_mass, hand_offset=hand_offset, gravity=(-1.0, 0.0)
+    )  # fmt: skip
+    bend = np.array([1e-4, 0.0])
+    layout = TendonLayout.four(wrist.tendon_radius)
+    return -float(spatial_terms(own_values(wrist, 1, layout), bend, 0.0 * bend).bias[0] / bend[0])
+
+
 def _values(arc: DrivenArc, wrist: WristParameters) -> Array:
     heavier = arc.inertia / inertia_of_arc(wrist)
+    softens = heavier * _softening(wrist.length, wrist.mass, wrist.hand_mass, wrist.hand_offset)
     scaled = wrist.model_copy(
         update={
-            "stiffness": 1.0, "damping": arc.damping, "mass": heavier * wrist.mass,
-            "hand_mass": heavier * wrist.hand_mass, "gravity": (0.0, 0.0), "gravity_flexion": 0.0,
+            "stiffness": 1.0 + arc.weight, "damping": arc.damping, "mass": heavier * wrist.mass,
+            "hand_mass": heavier * wrist.hand_mass, "gravity": (-arc.weight / softens, 0.0), "gravity_flexion": 0.0,
         }
     )  # fmt: skip
     own, count = own_values(scaled, 1, TendonLayout.four(wrist.tendon_radius)), len(arc.places)

@@ -36,6 +36,8 @@ _IDLE = 0.05
 # Error of a motion over its size by which it is judged what a straight line tells, and largest deviations then: of
 # stiffness and gains over the value, of directions [rad].
 _ERROR, _WIDEST, _ASIDE = 0.02, 0.25, math.radians(15.0)
+# Share of the stiffness that weight may take: standard deviation.
+_WEIGHT = 0.3
 # Share of the squared pull of a tendon off the plane of all from which they pull in two.
 _ONE_PLANE = 0.02
 
@@ -248,11 +250,14 @@ def _robot(
     known_to = {}
     if drive == "tension":
         begin["arm"], known_to["arm"] = 1.0, settings.radius_error
+    weighs = "gravity" not in wrist.model_fields_set or any(wrist.gravity)
+    if weighs:
+        begin["weight"], known_to["weight"] = 0.0, _WEIGHT
     untold = _untold(recordings, angles, gains, planar, numbers, moving)
     return DrivenRobot(
         (wrist.length,), tuple(angles.tolist()), radius, (1,) * len(angles), "bend", (), begin, known_to,
         spans=wrist.discs - 1, weighed=True, drive=drive, wrist=wrist, planar=planar, quantity=quantity,
-        numbers=tuple(numbers), signs=signs, still=still, untold=untold, widest=settings.widest,
+        numbers=tuple(numbers), signs=signs, still=still, untold=untold, widest=settings.widest, weighs=weighs,
     )  # fmt: skip
 
 
@@ -310,6 +315,7 @@ MOTIONS = {
     "damping": "quick steps, logged at 50 Hz or more",
     "inertia": "quick steps that swing, logged at 100 Hz or more",
     "delay": "quick steps, logged at 50 Hz or more",
+    "weight": "slow circles of up to 40 deg and more",
     "friction": "slow strokes to and fro of several sizes at several co-contractions",
     "sheath": "slow strokes to and fro of several sizes at several co-contractions",
     "presliding": "slow strokes to and fro that turn round after a few degrees",

@@ -22,8 +22,10 @@ from wristctl.identification.driven_forward import STEP, DrivenArc, courses_of_p
 
 Drive = Literal["tension", "current"]
 """What a log has of the tendons: tensions [N], or currents [A] without a torque constant."""
-# Half of an interval beyond which it is not told: of a direction [rad], of a delay [s], of others over the value.
-_ASIDE, _LATE, _WIDE = math.radians(15.0), 0.05, {"stiffness": 0.25, "gain": 0.25, "damping": 0.5, "inertia": 0.5}
+# Half of an interval beyond which it is not told: of a direction [rad], of a delay [s] and of the weight's share, of
+# others over the value.
+_ASIDE, _NARROW = math.radians(15.0), {"delay": 0.05, "weight": 0.1}
+_WIDE = {"stiffness": 0.25, "gain": 0.25, "damping": 0.5, "inertia": 0.5}
 
 
 @dataclass(frozen=True)
@@ -41,6 +43,8 @@ class DrivenRobot(ArcRobot):
     """Of the tendons in a log."""
     signs: tuple[float, ...] = ()
     """What each column is multiplied by."""
+    weighs: bool = False
+    """Whether the wrist stands or hangs, so that its weight is found: by how its stiffness changes as it bends."""
     still: tuple[int, ...] = ()
     """Numbers of tendons that pull no more and no less in the log, whose places are as believed."""
 
@@ -86,6 +90,9 @@ class DrivenRobot(ArcRobot):
                 chosen[f"gain_{number}"] = ArcUnknown(1.0, 0.02, float(self.tendons), 0.05, "", meaning)
         for name in ("damping", "inertia", "delay"):
             chosen[name] = UNKNOWNS[name]
+        if self.weighs:
+            meaning = "share of the straight wrist's stiffness that weight takes as it stands; below 0: it hangs"
+            chosen["weight"] = ArcUnknown(0.0, -0.9, 5.0, 0.05, "", meaning)
         chosen["delay"] = chosen["delay"]._replace(high=0.5, meaning="of the measured motion behind the tendons' log")
         return chosen
 
@@ -102,8 +109,8 @@ class DrivenRobot(ArcRobot):
             return False
         if kind == "direction":
             return half <= _ASIDE
-        if name == "delay":
-            return half <= _LATE
+        if name in _NARROW:
+            return half <= _NARROW[name]
         if kind in _WIDE:
             return half <= max(self.widest, _WIDE[kind]) * abs(value)
         if name in self._own:
@@ -144,6 +151,7 @@ class DrivenRobot(ArcRobot):
             others["damping"], max(others["inertia"], STEP**2), radius * toward,
             gains / (values["stiffness"] * arm), others["friction"], others["sheath"], others["presliding"],
             others["inner_friction"], others["inner_presliding"], others["creep"], others["creep_time"],
+            values.get("weight", 0.0),
         )  # fmt: skip
 
     def gains(self, values: Mapping[str, float]) -> Array:

@@ -42,7 +42,8 @@ _LEAST_NOISE = 1e-6
 class Coordinate(NamedTuple):
     """Coordinate of a search: a parameter by name, or a small error of one place in one run.
 
-    That is the camera's zero in a bending plane (ZERO), or what a tendon's spool has reeled in unknown (SPOOL).
+    That is the camera's zero in a bending plane (ZERO), what a tendon's spool has reeled in unknown (SPOOL), or by how
+    much one trial's clocks are further apart (CLOCK).
     """
 
     kind: str
@@ -50,15 +51,15 @@ class Coordinate(NamedTuple):
     place: str | int = ""
 
 
-ZERO, SPOOL = "camera's zero", "spool's zero"
+ZERO, SPOOL, CLOCK = "camera's zero", "spool's zero", "trial's clock"
 
 
 @dataclass(frozen=True)
 class Problem:
     """Trials, the parameters to find and those that are held, each with the value at which it starts.
 
-    Beside the parameters three kinds of small errors are found, of which the size is known beforehand: the camera's
-    zero angle of each run and plane, and the zero of each spool of each run.
+    Beside the parameters small errors are found, of which the size is known beforehand: the camera's zero angle of each
+    run and plane, the zero of each spool of each run, and in two planes the clocks of each trial.
     """
 
     trials: Sequence[MeasuredTrial]
@@ -90,7 +91,8 @@ class Problem:
         free = [Coordinate(name) for name in self.free]
         zeros = [zero for trial in self.trials for zero in self.zeros(trial)]
         spools = [spool_zero(trial, tendon) for trial in self.trials for tendon in trial.tendons]
-        return {coordinate: index for index, coordinate in enumerate(dict.fromkeys([*free, *zeros, *spools]))}
+        clocks = [clock for trial in self.trials for clock in self.clocks(trial)]
+        return {coordinate: index for index, coordinate in enumerate(dict.fromkeys([*free, *zeros, *spools, *clocks]))}
 
     def begin(self) -> Array:
         """The coordinates at the start; at an edge the search would stay there."""
@@ -118,6 +120,7 @@ class Problem:
             "presliding": 1.0 / self.settings.presliding_error,
             ZERO: 1.0 / np.deg2rad(self.settings.zero_error_deg),
             SPOOL: 1.0 / self.settings.spool_error,
+            CLOCK: 1.0 / max(self.settings.clock_error, _LEAST_CLOCK),
         }
         return np.array([beginning.get(coordinate.kind, 0.0) for coordinate in self.coordinates])
 
@@ -131,6 +134,14 @@ class Problem:
     def zeros(self, trial: MeasuredTrial) -> dict[Coordinate, Array]:
         """The camera's zeros that a trial's angles (F,) hold, each with its share in every angle."""
         return {Coordinate(ZERO, trial.run, trial.plane): np.ones(len(trial.angle))}
+
+    def clocks(self, trial: MeasuredTrial) -> tuple[Coordinate, ...]:
+        """Coordinates by which a trial's frames are later than by the delay [s]; none where a board dates counts."""
+        return ()
+
+    def delay(self, trial: MeasuredTrial, x: Array) -> float:
+        """How much older a trial's frames are than their time stamps [s] at coordinates x."""
+        return float(self.values(x)["delay"] + sum(x[self.coordinates[clock]] for clock in self.clocks(trial)))
 
     def courses(self, trial: MeasuredTrial, points: Sequence[Array]) -> Array:
         """What a trial's wrist does at each of some coordinates: (count, T), as `trial.shown` takes it."""
@@ -154,8 +165,8 @@ class Problem:
         return angles(candidates, trial.reeled, self.settings.step, segments or self.settings.segments)
 
 
-# Largest of these errors [rad, m].
-_WIDEST = {ZERO: 0.2, SPOOL: 2e-3}
+# Largest of these errors [rad, m, s], and least error of a clock that counts as known [s].
+_WIDEST, _LEAST_CLOCK = {ZERO: 0.2, SPOOL: 2e-3, CLOCK: 1e-2}, 1e-6
 
 
 def spool_zero(trial: MeasuredTrial, tendon: int) -> Coordinate:
@@ -180,7 +191,7 @@ def linearise(problem: Problem, x: Array) -> Linearisation:
     damping and tendons that grow together hardly change a bend that spools prescribe, so that a jump in one of their
     columns would look like knowledge of all three.
     """
-    coordinates, delay = problem.coordinates, problem.values(x)["delay"]
+    coordinates = problem.coordinates
     low, _ = problem.bounds()
 
     def one(trial: MeasuredTrial) -> tuple[Array, Array]:
@@ -192,16 +203,17 @@ def linearise(problem: Problem, x: Array) -> Linearisation:
         backward = np.where(x[columns] - nudges < low[columns], nudges, -nudges)
         nudged = np.tile(x, (2 * len(moved), 1))
         nudged[np.arange(len(nudged)), np.tile(columns, 2)] += np.concatenate([nudges, backward])
-        course = problem.courses(trial, (x, *nudged))
+        course, delay = problem.courses(trial, (x, *nudged)), problem.delay(trial, x)
         expected, *near = (trial.shown(angle, delay) for angle in course)
         slopes = np.zeros((len(expected), len(x)))
         sides = (np.array(near) - expected) / np.concatenate([nudges, backward])[:, None]
         forth, back = sides[: len(moved)], sides[len(moved) :]
         slopes[:, columns] = np.where(abs(forth) < abs(back), forth, back).T
-        if "delay" in problem.free:
+        delays = [*[Coordinate("delay")] * ("delay" in problem.free), *problem.clocks(trial)]
+        if delays:
             h = problem.settings.step
             early, late = (trial.shown(course[0], delay - shift) for shift in (-h, h))
-            slopes[:, coordinates[Coordinate("delay")]] = (early - late) / (2.0 * h)
+            slopes[:, [coordinates[each] for each in delays]] = ((early - late) / (2.0 * h))[:, None]
         for zero, share in problem.zeros(trial).items():
             slopes[:, coordinates[zero]] = share
             expected = expected + share * x[coordinates[zero]]

@@ -27,6 +27,13 @@ _NO_TIME = 1.0
 _WHOLE = 4
 # Correlation with the motion from which a spool goes with it.
 _GOES_WITH = 0.5
+SETTLE = 0.5
+"""Time [s] after which a robot moves as if it had been followed from before."""
+# Largest share of a recording that this may be.
+_LONGEST = 0.25
+# Change over the first two samples over the usual one from which a recording begins in motion, and change to the first
+# of them over that to the second: a robot at rest only begins to move.
+_MOVES, _AS_FAST = 0.2, 0.75
 # Stretch below which a tendon passes smoothly from slack to taut [m]: a fifth of what 0.4 N do to one of 20 kN/m.
 _SMOOTH = 4e-6
 GRAVITY = 9.81
@@ -207,7 +214,19 @@ def recordings_of_logs(logs: Sequence[OpenLog], robot: ArcRobot) -> list[ArcReco
     recordings = []
     for log, name in trials:
         recordings.append(_recording(log, robot, numbers, len(trials), Path(log.file).stem, name))
-    return in_parts(recordings)
+    return [_settled(one) if robot.timed else one for one in in_parts(recordings)]
+
+
+def _settled(recording: ArcRecording) -> ArcRecording:
+    """Without the begin of a recording that begins in motion: nobody knows how the robot came there.
+
+    The model has it at rest there, so that the begin would say what damping and friction are.
+    """
+    if not _begins_in_motion(recording.measured):
+        return recording
+    time = recording.time
+    late = time >= time[0] + min(SETTLE, _LONGEST * (time[-1] - time[0]))
+    return replace(recording, fitted=recording.fitted & late, asked=recording.asked & late)
 
 
 def in_parts(recordings: Sequence[ArcRecording]) -> list[ArcRecording]:
@@ -226,6 +245,14 @@ def _is_fitted(numbers: NDArray[np.int64]) -> NDArray[np.bool_]:
     """Whether the numbers' binary ones are even."""
     even: NDArray[np.bool_] = np.bitwise_count(numbers) % 2 == 0
     return even
+
+
+def _begins_in_motion(measured: Array) -> bool:
+    """Whether bends or tips (T, d) move from the first sample on as fast as after it; from rest they only begin to."""
+    whole = np.nan_to_num(measured)
+    first, second = np.linalg.norm(np.diff(whole[:3], axis=0), axis=1)
+    usual = math.sqrt(float(np.mean(np.sum((whole[2:] - whole[:-2]) ** 2, axis=1))))
+    return bool(first > _AS_FAST * second and np.linalg.norm(whole[2] - whole[0]) > _MOVES * usual)
 
 
 def rate_of_logs(logs: Sequence[OpenLog]) -> float:
@@ -248,10 +275,8 @@ def _motion(log: OpenLog) -> list[Array]:
 
 
 def everything_fitted(recordings: Sequence[ArcRecording]) -> list[ArcRecording]:
-    """The recordings with all samples for fitting."""
-    return [
-        replace(one, fitted=np.ones(len(one.time), bool), asked=np.zeros(len(one.time), bool)) for one in recordings
-    ]
+    """The recordings with all samples for fitting that were fitted or predicted."""
+    return [replace(one, fitted=one.fitted | one.asked, asked=np.zeros(len(one.time), bool)) for one in recordings]
 
 
 def _recording(

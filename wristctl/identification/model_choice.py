@@ -21,6 +21,8 @@ from wristctl.identification.prediction_scores import Score, ratio_of, score_of
 # Beginnings of the search for presliding [m] and [rad]: its errors have several minima. Else it begins where the model
 # without the term ends.
 _BEGINS = ({"presliding": 5e-5, "inner_presliding": 0.01}, {"presliding": 5e-4, "inner_presliding": 0.1})
+# Unknowns that are 0 in a model without their term.
+_AMOUNTS = ("friction", "sheath", "inner_friction", "creep")
 # Share of the error by which a term lessens it at least where it is wanted: less is of nobody's concern.
 _LEAST_GAIN = 5e-3
 
@@ -64,15 +66,18 @@ class TriedModel:
     @property
     def likely(self) -> float:
         """Probability that the last term lessens the error, by the interval of the ratio."""
-        if self.ratio is None:
-            return 1.0
-        deviation = math.log(self.ratio.high / self.ratio.low) / (2.0 * NORMAL_95)
-        return float(norm.cdf(-math.log(self.ratio.error) / deviation)) if deviation else float(self.ratio.error < 1.0)
+        return 1.0 if self.ratio is None else _likely(self.ratio)
 
     def extends(self, other: TriedModel) -> bool:
         """Whether it has one term more than another, slack aside."""
         without = self.without.terms if self.without else ()
         return {*without, "slack"} == {*other.terms, "slack"}
+
+
+def _likely(ratio: Score) -> float:
+    """Probability that a ratio of errors is below 1, by its interval."""
+    deviation = math.log(ratio.high / ratio.low) / (2.0 * NORMAL_95)
+    return float(norm.cdf(-math.log(ratio.error) / deviation)) if deviation else float(ratio.error < 1.0)
 
 
 def tried_models(
@@ -139,21 +144,42 @@ def chosen_of(models: Sequence[TriedModel]) -> TriedModel:
 
 
 def whole_fit(models: Sequence[TriedModel], recordings: Sequence[ArcRecording]) -> ArcFit:
-    """The chosen model fitted to all that is marked as fitted, with intervals that terms which are not told widen.
+    """The chosen model fitted to all that is marked as fitted, with intervals that other models widen.
 
-    A term that is not told is there with the probability that it predicts better. By that, times the square of the
-    shift that it makes, an unknown's variance grows (Buckland, Burnham and Augustin, Biometrics 53 (1997) 603).
+    Another model is the right one with the probability that it predicts better. By that, times the square of the shift
+    that it makes, an unknown's variance grows (Buckland, Burnham and Augustin, Biometrics 53 (1997) 603). Others are
+    those with a term more, which is not told, and rivals: those with another term in place of one, that predict as
+    well. Terms come together, rivals in place of each other, and some rivals are in both: the larger growth counts.
     """
     chosen = chosen_of(models)
     first = chosen.fits[0]
     fit = fit_arcs(first.robot, chosen.terms, recordings, begin=first.values)
-    variances = dict.fromkeys(fit.values, 0.0)
+    variances = {name: max(_by_terms(models, chosen, name), _by_rivals(models, chosen, name)) for name in fit.values}
+    return replace(fit, left_open={name: math.sqrt(variance) for name, variance in variances.items()})
+
+
+def _by_terms(models: Sequence[TriedModel], chosen: TriedModel, name: str) -> float:
+    """Variance of an unknown by terms that the data leave open."""
+    variance = 0.0
     for model in models:
         if model.verdict == "not told" and model.terms[-1] not in chosen.terms and model.extends(chosen):
             before = model.without.fits[0].values if model.without else {}
-            for name in before.keys() & variances.keys():
-                variances[name] += model.likely * (model.fits[0].values[name] - before[name]) ** 2
-    return replace(fit, left_open={name: math.sqrt(variance) for name, variance in variances.items()})
+            if name in before:
+                variance += model.likely * (model.fits[0].values[name] - before[name]) ** 2
+    return variance
+
+
+def _by_rivals(models: Sequence[TriedModel], chosen: TriedModel, name: str) -> float:
+    """Variance of an unknown by models without a term of the chosen one, none of which predicts worse beyond chance."""
+    odds, sum_of_squares = 0.0, 0.0
+    value = chosen.fits[0].values[name]
+    for model in {model.terms: model for model in models if not {*chosen.terms} <= {*model.terms}}.values():
+        ratio = ratio_of(model.fits, chosen.fits)
+        if ratio.low < 1.0:
+            share = _likely(ratio) / max(1.0 - _likely(ratio), 1e-3)
+            other = model.fits[0].values.get(name, 0.0 if name in _AMOUNTS else value)
+            odds, sum_of_squares = odds + share, sum_of_squares + share * (other - value) ** 2
+    return sum_of_squares / (1.0 + odds)
 
 
 def _tried(

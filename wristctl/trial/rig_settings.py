@@ -93,6 +93,10 @@ def layout_of_facts(facts: Facts, where: str) -> TendonLayout:
     return layout
 
 
+# How far a tendon may be from where a rig's facts have it, over its radius: some 17 deg; and what is no distance [m].
+_NEAR, _ALIKE = 0.3, 1e-6
+
+
 def _places(facts: Facts) -> tuple[TendonPlace, ...]:
     return tuple(TendonPlace(angle_deg=float(one.angle_deg), radius=float(one.radius)) for one in facts.tendons)
 
@@ -100,7 +104,8 @@ def _places(facts: Facts) -> tuple[TendonPlace, ...]:
 def wrist_of(facts: Facts, wrist: WristParameters, where: str) -> WristParameters:
     """The wrist with the tendons of a rig, and what its facts know of it where the study gives nothing else.
 
-    UserError where the study has other tendons.
+    A study may place each tendon near where the facts have it, as identification finds it. UserError where it has other
+    tendons.
     """
     for key in facts.wrist:
         if key not in WristParameters.model_fields or key == "tendons":
@@ -111,9 +116,14 @@ def wrist_of(facts: Facts, wrist: WristParameters, where: str) -> WristParameter
     if "tendons" in given:
         there, here = TendonLayout.of(wrist), TendonLayout.of(WristParameters(tendons=places))
         wound = [place for place in there.cross_section if place.any()]
-        if len(wound) != len(here.places) or not np.allclose(wound, here.cross_section, atol=1e-6):
+        alike = len(wound) == len(here.places)
+        off = np.hypot(*(np.array(wound) - here.cross_section).T) if alike else np.full(len(here.places), np.inf)
+        if (off > _NEAR * np.array([place.radius for place in here.places])).any():
             fix = "leave the key out: the rig's facts say where its tendons are"
             raise UserError("the study's tendons are not those of the rig", "wrist.tendons", fix)
+        if (off > _ALIKE).any():
+            places = tuple(TendonPlace(angle_deg=math.degrees(place.angle), radius=place.radius)
+                           for place in there.places if place.radius > 0.0)  # fmt: skip
     try:
         return WristParameters.model_validate({**own, **given, "tendons": places})
     except ValidationError as error:

@@ -9,6 +9,7 @@ import numpy as np
 
 from wristctl.arrays import Array
 from wristctl.commands.export.recorded_motions import Columns, RecordedMotion, Stream, motions_of
+from wristctl.config.wrist import WristParameters
 from wristctl.errors import FILE
 from wristctl.records import Run
 from wristctl.records.log_columns import units_of
@@ -25,9 +26,15 @@ def open_log_of(run: Run) -> OpenLog:
     columns: dict[str, Array] = {
         name: np.concatenate([part.get(name, np.full(len(part["time"]), np.nan)) for part in parts]) for name in names
     }
-    if run.kind == "hw-run":
+    if run.kind == "hw-run" and _mass_is_said(run):
         columns["mass"] = np.full(len(columns["time"]), run.config.wrist.hand_mass)
     return OpenLog(run.path, "log", columns, _trials(motions, parts))
+
+
+def _mass_is_said(run: Run) -> bool:
+    """Whether somebody has said the hand's mass: of a rig of one's own the default is nobody's."""
+    default = WristParameters.model_fields["hand_mass"].default
+    return run.config.hw_run.rig is None or run.config.wrist.hand_mass != default
 
 
 def write_open_log(run: Run, path: Path) -> None:

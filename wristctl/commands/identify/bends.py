@@ -50,11 +50,14 @@ class BendsTold(StudyResult):
     """A study file with the wrist, actuator and sensor that were found; empty where too little is told."""
     scaled: bool = True
     """Whether anybody has said a force or a mass."""
+    remark: str = ""
+    """Which of two masses counts."""
 
     @property
     def answer(self) -> Answer:
         """Springs in the sentence, then each parameter with its interval or not identifiable."""
-        return _answer(self.fit, self.told, self.place if self.yaml else "", _in_one_plane_too(self.study), self.scaled)
+        run, square = self.place if self.yaml else "", _in_one_plane_too(self.study)
+        return _answer(self.fit, self.told, run, square, self.scaled, self.remark)
 
     @property
     def values(self) -> dict[str, float]:
@@ -106,6 +109,7 @@ def identify_bends(session: Session) -> BendsTold:
         bends_yaml,
         forces_are_scaled,
         misfits_of_bends,
+        overruled_mass,
         told_of_bends,
         without_forces,
     )
@@ -130,7 +134,12 @@ def identify_bends(session: Session) -> BendsTold:
     with session.drawing():
         findings.figure("bends", bends, fitted, caption="measured bends, the model's, and the difference")
         findings.figure("residuals", residuals, fitted, known)
-    _refuse(session, fitted, told, missed, scaled)
+    mass = overruled_mass(problem, session.study.wrist)
+    remark = "" if mass is None else (
+        f"The mass that the logs say counts, {mass:g} kg, and not {session.study.wrist.hand_mass:g} kg of "
+        "wrist.hand_mass: mend the column `mass`, or leave it out."
+    )  # fmt: skip
+    _refuse(session, fitted, told, missed, scaled, remark)
     yaml = ""
     if all(told[name].known for name in _NEEDED):
         rng = np.random.default_rng(findings.stream("posterior"))
@@ -138,17 +147,19 @@ def identify_bends(session: Session) -> BendsTold:
         findings.text("data/identified.yaml", yaml)
         if _in_one_plane_too(session.study):
             findings.text("data/posterior.yaml", family)
-    result = BendsTold(session.study, findings, tables, fitted, known, told, yaml, scaled)
+    result = BendsTold(session.study, findings, tables, fitted, known, told, yaml, scaled, remark)
     findings.table("data/parameters.csv", result.frame())
     return result
 
 
-def _refuse(session: Session, fitted: Fit, told: Mapping[str, Told], missed: Sequence[Misfit], scaled: bool) -> None:
+def _refuse(
+    session: Session, fitted: Fit, told: Mapping[str, Told], missed: Sequence[Misfit], scaled: bool, remark: str
+) -> None:
     """UserError where the model does not fit the readings, with the answer told all the same."""
     settings, worst = session.study.identify, max(missed, key=lambda misfit: misfit.ratio)
     if settings.misfit == "tell" or worst.ratio <= settings.lack_of_fit:
         return
-    session.tell_refused(_answer(fitted, told, "", True, scaled))
+    session.tell_refused(_answer(fitted, told, "", True, scaled, remark))
     problem = f"{worst.direction}: the model is off by {math.sqrt(worst.ratio):.2g} times the readings' own noise"
     accept = ("check geometry, masses and senses; or take it as it is: ", Setting("misfit=tell", "identify"))
     raise UserError(problem, "identify", accept, exit_code=3)
@@ -189,7 +200,7 @@ def _in_one_plane(trials: Sequence[BendTrial]) -> bool:
     return min(ways) < _ASIDE * max(ways)
 
 
-def _answer(fit: Fit, told: Mapping[str, Told], run: str, square: bool, scaled: bool) -> Answer:
+def _answer(fit: Fit, told: Mapping[str, Told], run: str, square: bool, scaled: bool, remark: str = "") -> Answer:
     """The answer.
 
     Parameters
@@ -197,6 +208,7 @@ def _answer(fit: Fit, told: Mapping[str, Told], run: str, square: bool, scaled: 
     run : path of a run with the wrist; empty of none
     square : whether its tendons are those of one plane
     scaled : whether anybody has said a force or a mass
+    remark : on what the logs say in place of the study
     """
     along, across, axis = (told[name] for name in ("stiffness", "stiffness_across", "stiffness_axis_deg"))
     if along.known and across.known:
@@ -206,7 +218,7 @@ def _answer(fit: Fit, told: Mapping[str, Told], run: str, square: bool, scaled: 
         springs = "The springs are not identifiable from these readings."
     readings = sum(map(len, fit.residuals))
     left = f"{degrees(float(fit.noise))} deg are left over of {readings} readings (standard deviation)."
-    notes = list[str | Table]()
+    notes: list[str | Table] = [remark] * bool(remark)
     if lacking := [name for name, one in told.items() if not one.known]:
         notes.append(f"Not told: {joined(lacking)}. {what_tells(fit, lacking)}".strip())
     if not scaled:
