@@ -127,8 +127,10 @@ def test_a_tip_of_another_shape_is_refused(tip: Any) -> None:
 
 def halved(path: TipPath) -> AnglePath:
     """An inverse that no arc has: bends are 20 rad/m of the tip's way aside, and half as much toward flexion."""
-    bends = [20.0 * rows[:, 1:] * [1.0, 0.5] for rows in (path.position, path.velocity, path.acceleration)]
-    return AnglePath(bends[0], bends[1], bends[2], path.position[:, 0] < 0.05)
+    theta, rate, acceleration = (
+        20.0 * rows[:, 1:] * np.array([1.0, 0.5]) for rows in (path.position, path.velocity, path.acceleration)
+    )
+    return AnglePath(theta, rate, acceleration, np.asarray(path.position[:, 0] < 0.05))
 
 
 @pytest.mark.parametrize("side", [1.0, -1.0])

@@ -112,7 +112,7 @@ def _values(programs: LawPrograms) -> list[str]:
         "tendon": "| `spool_speed` | rate to send to each spool's motor; + reels in | m/s |",
         "servo": "| `spool_target` | length that each spool's motor is to reel in, from where the tendon is taut | m |",
     }
-    return rows + [sent[programs.level]] * bool(programs.remembered)
+    return [*rows, sent[programs.level]] if programs.remembered else rows
 
 
 def _places(programs: LawPrograms) -> str:
