@@ -48,11 +48,16 @@ SHORT = (
     "payloads=[0.1]",
 )  # fmt: skip
 """Settings of `recommend` with which it takes minutes."""
-LIGHT = (
-    "controllers=[{controller: pid-ff, gains: {Kp: 0.396, Kd: 0.00792, Ki: 4.75}}, "
-    "{controller: feedforward, gains: default}]"
-)
-"""Setting of `hw-run`: pid-ff with the gains that `recommend --rig` has for the chain, and no feedback."""
+KP, KD, KI, TIMES_MORE = 0.396, 0.00792, 4.75, 3.0
+"""Gains of pid-ff that `recommend --rig` has for the chain, and how many times as large they are tried too."""
+TRIED = {
+    "feedforward": "{controller: feedforward, gains: default}",
+    **{
+        name: f"{{controller: pid-ff, gains: {{Kp: {more * KP:g}, Kd: {more * KD:g}, Ki: {more * KI:g}}}}}"
+        for name, more in (("pid-ff", 1.0), (f"pid-ff, gains x {TIMES_MORE:g}", TIMES_MORE))
+    },
+}
+"""Rows of `hw-run` for the chain, by what the page calls them."""
 CIRCLE = "--reference", "circumduction", "--set", "reference.angle_deg=25", "--horizon", "8"
 SPIRAL_DEG, TURNS, LASTS, TIMES = 28.0, 4, 16.0, 3
 """Largest bend of the spiral that is learned from, its turns, its duration [s], and its repetitions."""
@@ -221,13 +226,12 @@ def ends(run: Run, asked: Values) -> Values:
     return np.array(found)
 
 
-def errors(run: Run) -> dict[str, tuple[float, float]]:
-    """RMSE of each controller [deg] in the rig's trial, and in its simulation."""
+def errors(run: Run) -> list[tuple[float, float]]:
+    """RMSE of each row [deg] in the rig's trial, and in its simulation."""
     table_of_trials = run.json("tables.json")[0]
     names = table_of_trials["columns"]
-    chosen = [names.index(name) for name in ("controller", "RMSE [rad]", "simulated RMSE [rad]")]
-    rows = [[row[column] for column in chosen] for row in table_of_trials["rows"]]
-    return {str(name).partition("/")[0]: (math.degrees(rmse), math.degrees(twin)) for name, rmse, twin in rows}
+    of_rig, simulated = (names.index(name) for name in ("RMSE [rad]", "simulated RMSE [rad]"))
+    return [(math.degrees(row[of_rig]), math.degrees(row[simulated])) for row in table_of_trials["rows"]]
 
 
 def chain(folder: Path) -> str:
@@ -239,11 +243,14 @@ def chain(folder: Path) -> str:
     learned = wristctl(folder, "hw-run", "feedforward", *words, "--set", f"repetitions={TIMES}", "--horizon", LASTS)
     typed(folder, "runs", "export", learned.path, "--file", log)
     found = wristctl(folder, "identify", log, "--config", learned.path / "config.yaml")
-    wide = ("hw-run", "--rig", CHAIN, "--set", LIGHT, *CIRCLE)
+    wide = ("hw-run", "--rig", CHAIN, "--set", f"controllers=[{', '.join(TRIED.values())}]", *CIRCLE)
     before, after = (
         errors(wristctl(folder, *wide, *identified)) for identified in ((), ("--from-identified", found.path))
     )
-    rows = [[name, *(f"{size:.2f}" for size in before[name] + after[name])] for name in ("feedforward", "pid-ff")]
+    rows = [
+        [name, *(f"{size:.2f}" for size in facts + known)]
+        for name, facts, known in zip(TRIED, before, after, strict=True)
+    ]
     names = (
         "RMSE on a circle of 25 deg",
         "by the facts [deg]",
@@ -271,7 +278,7 @@ def network(folder: Path, learned: Run) -> tuple[Run, Values]:
     words = ("kind=recording", f"file={folder / 'tips.csv'}", "column=tip", "inverse=network")
     settings = [word for setting in words for word in ("--set", f"reference.{setting}")]
     horizon = APART * len(POINTS)
-    wide = ("--network", trained.path, "--set", LIGHT, "--horizon", horizon)
+    wide = ("--network", trained.path, "--set", f"controllers=[{TRIED['pid-ff']}]", "--horizon", horizon)
     return wristctl(folder, "hw-run", "--rig", CHAIN, *settings, *wide), asked
 
 

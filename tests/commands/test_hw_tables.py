@@ -57,7 +57,7 @@ def asked(monkeypatch: pytest.MonkeyPatch) -> list[Trial]:
     """The trials that were simulated; each comes out with an RMSE of one more than its number."""
     found: list[Trial] = []
 
-    def twin(_study: Any, trial: Trial, *_: Any) -> Simulation:
+    def twin(_study: Any, trial: Trial, *_: Any, seen: bool) -> Simulation:
         found.append(trial)
         return repeated("twin", [trial.number + 1.0], steady_state=0.5).first
 

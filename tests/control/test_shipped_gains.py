@@ -24,7 +24,7 @@ from wristctl.control import shipped_gains
 from wristctl.control.shipped_gains import PREFIX, families
 from wristctl.control.table import CONTROLLERS, controller, gains_of
 from wristctl.errors import UserError
-from wristctl.simulation import actuator
+from wristctl.simulation import simulated_drives
 from wristctl.simulation.simulated_drives import DRIVE
 
 CAMERA = {
@@ -139,7 +139,7 @@ def test_gains_are_of_today_until_a_motion_a_world_or_the_drive_changes(
     (family,) = warned()
     assert family.startswith("tuned:camera: the family camera has changed since")
     experiments()
-    monkeypatch.setattr(actuator, "DRIVE", DRIVE + 1)
+    monkeypatch.setattr(simulated_drives, "DRIVE", DRIVE + 1)
     (drive,) = warned()
     assert "the simulated drive has changed since" in drive and "family" not in drive
     experiments(angles="10..30")

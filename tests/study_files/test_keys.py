@@ -20,7 +20,7 @@ from wristctl.study_files.keys import (
 @pytest.mark.parametrize(
     ("key", "unit", "choices"),
     [
-        ("simulate.loop.actuator.level", "", ("ideal", "lagged", "tendon")),
+        ("simulate.loop.actuator.level", "", ("ideal", "lagged", "tendon", "servo")),
         ("simulate.loop.sensor.level", "", ("ideal", "camera")),
         ("wrist.length", "m", ()),
         ("wrist.gravity", "m/s^2", ()),

@@ -107,6 +107,6 @@ def test_a_homing_that_stops_after_a_fault_says_that_the_drives_had_let_go(clear
         raise SafetyStop(why, "homing", fix)
     said, advice = str(stop.value.what), str(stop.value.fix)
     assert said.startswith(f"stopped: {why}") and said.count("stopped") == 1 and stop.value.where == "homing"
-    assert ("let go in a fault before (ESTOP_COMMAND)" in said) is ("hw jog" in advice) is bool(cleared)
+    assert ("let go in a fault before (ESTOP_COMMAND)" in said) is ("hw tension" in advice) is bool(cleared)
     with pytest.raises(BoardError, match="cable"), after_a_fault(cleared):
         raise BoardError("cable", "cable")
