@@ -44,8 +44,9 @@ def test_rigs_are_drawn_from_the_ranges_of_the_facts(tmp_path: Path) -> None:
     loops = [family.world(dict.fromkeys(family.draw, 0.5) | {"together": (k + 0.5) / 32}) for k in range(32)]
     sensors = [loop.plant.sensor.of(loop.sensor) for loop in loops]
     drawn: dict[str, tuple[list[Any], float, float]] = {
-        "delay and lag [s]": ([loop.plant.actuator.command_delay for loop in loops], 0.009, 0.024),
-        "step [m]": ([loop.actuator.step_length for loop in loops], 1.47e-5, 5e-5),
+        "delay [s]": ([loop.plant.actuator.command_delay for loop in loops], 0.008, 0.020),
+        "lag [s]": ([loop.plant.actuator.lag for loop in loops], 0.001, 0.004),
+        "resolution [m]": ([loop.actuator.resolution for loop in loops], 1e-5, 5e-5),
         "fastest [m/s]": ([loop.actuator.step_length * loop.actuator.step_rate for loop in loops], 0.2, 0.2),
         "rate [1/s]": ([loop.sensor.frame_rate for loop in loops], 40.0, 80.0),
         "age [s]": ([sensor.delay_frames / sensor.frame_rate for sensor in sensors], 0.01, 0.03),
@@ -54,7 +55,7 @@ def test_rigs_are_drawn_from_the_ranges_of_the_facts(tmp_path: Path) -> None:
     }
     for name, (values, low, high) in drawn.items():
         assert low * (1 - 1e-2) <= min(values) and max(values) <= high * (1 + 1e-9), name
-        assert max(values) - min(values) >= 0.7 * (high - low), name  # of a sum of two the ends are seldom
+        assert max(values) - min(values) >= 0.7 * (high - low), name
     assert "plant.actuator.friction" in family.draw  # which no fact speaks of
     said = said_of_facts(study)
     assert "Drawn from their ranges: drive delay 8 to 20 ms, lag 1 to 4 ms, resolution 0.01 to 0.05 mm" in said
