@@ -19,7 +19,7 @@ from wristctl.commands.hw_run.figures import _tensions
 from wristctl.commands.hw_run.results import Performed, performed
 from wristctl.commands.hw_run.trial_means import completed
 from wristctl.commands.inputs import Inputs
-from wristctl.commands.printed_table import Table
+from wristctl.commands.printed_table import Table, two
 from wristctl.commands.progress import watched
 from wristctl.commands.results import Findings
 from wristctl.commands.session import Session, Unattended
@@ -290,6 +290,10 @@ def test_where_one_of_rig_and_simulation_swings_at_rest_the_kinder_one_is_named(
     assert "the rig swings" in notes[0] and "0.6 deg" in notes[0] and "simulation is kinder" in notes[0]
     assert "the simulation swings" in notes[1] and "by up to 0.7" in notes[1] and "rig is kinder" in notes[1]
     assert all(note in " ".join(answer_of(table, twins, {}, [], "").lines()) for note in notes)
+    told = " ".join(" ".join(answer_of(table, twins, {}, [], "").lines()).split())
+    largest = (0.3 if known else 0.6, 0.6)
+    assert f"moves by at most {largest[0]} deg peak to peak at rest{' (truly 0.6 deg)' * known}" in told
+    assert f"asked for at most {two(float(table['peak_tension'].max()))} N" in told
     alike = table.assign(true_oscillation=table["true_oscillation"] if known else np.nan)
     alike = alike[[(one > 0.2) == (two > 0.2) for one, two in zip(rig, model, strict=True)]]
     assert not swings_apart(completed(alike), twins)

@@ -200,8 +200,10 @@ def test_what_the_gains_do_wrong_is_told_with_the_number_of_cases() -> None:
 
 def test_the_loops_that_it_was_not_tuned_on_are_told_by_what_the_gains_do_there() -> None:
     text = " ".join(_text(_search("smc"), {}, {"camera": {"limit cycle": 2}, "exact": {}, "sampled": {}}).split())
-    assert "on other loops: smc holds on exact and sampled, swings on camera." in text
+    assert "other loops: smc holds on exact and sampled, swings on camera. Do not use gains on a loop" in text
     assert "other loops" not in _text(_search("smc"), {})
+    sound = _text(_search("smc"), {}, {"camera": {}, "exact": {}})
+    assert "holds on camera and exact" in sound and "Do not use gains" not in sound
 
 
 def test_the_margin_is_told_with_its_loop_and_what_is_less_than_it_should_be_is_named(tuned: Tuned) -> None:

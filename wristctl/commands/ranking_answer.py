@@ -233,7 +233,7 @@ def _ties(best: Sequence[Ranking], chosen: str) -> str:
         return ""
     names = [called(label) for label in tied]
     names = names if len(names) <= _NAMED else [*names[: _NAMED - 1], f"{len(names) - _NAMED + 1} more"]
-    return f"{joined([f'{names[0]}, without feedback,', *names[1:]] if open_loop(tied[0]) else names)} " + (
+    return f"{joined([f'{names[0]} (without feedback)', *names[1:]] if open_loop(tied[0]) else names)} " + (
         "ties with it." if len(tied) == 1 else "tie with it."
     )
 
@@ -249,7 +249,7 @@ def _limits(chosen: str, best: Sequence[Ranking], alike: Sequence[Ranking], othe
     if bad:
         (first, fault), places = next(iter(bad.items())), _counted(list(bad))
         there = f" ({first})" * (len(bad) > 1)
-        told.append(f"Do not use it in {places}: it {fault_words(fault)}{there}." if fault else "")
+        told.append(f"Do not use {called(chosen)} in {places}: it {fault_words(fault)}{there}." if fault else "")
     better = [one for one in alike if one.standing.groups and one not in best and condition(one) not in bad]
     if len(better) == 1:
         (only,) = better

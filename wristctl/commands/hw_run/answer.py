@@ -36,7 +36,12 @@ def answer_of(
     done = completed(trials)
     compared, labels = with_simulation(done, twins), list(dict.fromkeys(done["label"]))
     more = f"All tables: --all. Every trial: {run}/report.html" if run else "All tables: `.tables`."
-    notes = [*_apart(compared, labels), *swings_apart(done, twins), *unsound(trials, marks, metrics)]
+    notes = [
+        *_at_rest(done, twins),
+        *_apart(compared, labels),
+        *swings_apart(done, twins),
+        *unsound(trials, marks, metrics),
+    ]
     if not labels:
         return Answer(f"None of {len(trials)} trials was completed.", None, notes, more)
     moving = {number for number, twin in twins.items() if not rests(twin.trajectory)}
@@ -144,6 +149,22 @@ def _table(trials: pd.DataFrame) -> Table:
     named = [name for name in by if name != "label" or trials["label"].nunique() > 1]
     known = [name for name in _TOLD if any(math.isfinite(group.get(name, math.nan)) for group in groups)]
     return table_of("", quantities([*named, *known]), groups)
+
+
+def _at_rest(done: pd.DataFrame, twins: Mapping[int, Simulation]) -> list[str]:
+    """The largest swing at rest, where the wrist rests at all, and the largest pull, of trials that ended well."""
+    import numpy as np
+
+    if not len(done):
+        return []
+    swings, told = swings_of(done, twins), []
+    if swings.seen.any():
+        known = swings.true[np.isfinite(swings.true)]
+        truly = f" (truly {degrees(float(known.max()))} deg)" if len(known) else ""
+        told.append(f"the wrist moves by at most {degrees(float(swings.seen.max()))} deg peak to peak at rest{truly}")
+    told.append(f"tendons are asked for at most {two(float(done['peak_tension'].max()))} N")
+    facts = "; ".join(told)
+    return [f"{facts[0].upper()}{facts[1:]}."]
 
 
 def _apart(trials: pd.DataFrame, labels: Sequence[str]) -> list[str]:

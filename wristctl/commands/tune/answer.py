@@ -339,4 +339,6 @@ def _elsewhere(ordered: Sequence[str], elsewhere: Mapping[str, Mapping[str, Mapp
         words = [f"holds on {joined(holds)}"] * bool(holds)
         words += [f"{' and '.join(_VERBS[mark] for mark in wrong)} on {loop}" for loop, wrong in marks.items() if wrong]
         facts += [f"{name} {', '.join(words)}"] * bool(words)
-    return [f"The same motions on other loops: {'; '.join(facts)}."] * bool(facts)
+    unsound = any(wrong for marks in elsewhere.values() for wrong in marks.values())
+    warned = " Do not use gains on a loop where they swing or fail." * unsound
+    return [f"The same motions on the study's other loops: {'; '.join(facts)}.{warned}"] * bool(facts)
