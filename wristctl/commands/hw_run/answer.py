@@ -153,15 +153,11 @@ def _table(trials: pd.DataFrame) -> Table:
 
 def _at_rest(done: pd.DataFrame, twins: Mapping[int, Simulation]) -> list[str]:
     """The largest swing at rest, where the wrist rests at all, and the largest pull, of trials that ended well."""
-    import numpy as np
-
     if not len(done):
         return []
     swings, told = swings_of(done, twins), []
     if swings.seen.any():
-        known = swings.true[np.isfinite(swings.true)]
-        truly = f" (truly {degrees(float(known.max()))} deg)" if len(known) else ""
-        told.append(f"the wrist moves by at most {degrees(float(swings.seen.max()))} deg peak to peak at rest{truly}")
+        told.append(f"the wrist moves by at most {swings.largest()}")
     told.append(f"tendons are asked for at most {two(float(done['peak_tension'].max()))} N")
     facts = "; ".join(told)
     return [f"{facts[0].upper()}{facts[1:]}."]
@@ -207,6 +203,15 @@ class Swings(NamedTuple):
         swings: Mask = np.where(np.isnan(self.true), self.seen, self.true) > 2.0 * LIMIT_CYCLE
         return swings
 
+    def largest(self, among: Mask | slice = slice(None)) -> str:
+        """The largest, among these trials, as seen and, where that is known, as it truly is."""
+        import numpy as np
+
+        true = self.true[among]
+        known = true[np.isfinite(true)]
+        truly = f" (truly {degrees(float(known.max()))} deg)" if len(known) else ""
+        return f"{degrees(float(self.seen[among].max()))} deg peak to peak at rest{truly}"
+
     @property
     def simulation(self) -> Mask:
         """In which trials their simulation swings, (N,)."""
@@ -247,11 +252,7 @@ def marks_of(trials: pd.DataFrame, twins: Mapping[int, Simulation], tension_rang
     short = done["steady_state"].to_numpy(float) > SHORT * goals
     swings = swings_of(done, twins)
     swinging = swings.rig | (swings.seen > 2.0 * LIMIT_CYCLE)
-    size = ""
-    if swinging.any():
-        size = f"{degrees(float(swings.seen[swinging].max()))} deg peak to peak at rest"
-        if np.isfinite(swings.true[swinging]).any():
-            size += f" (truly {degrees(float(np.nanmax(swings.true[swinging])))} deg)"
+    size = swings.largest(swinging) if swinging.any() else ""
     found = {"does not arrive": short, f"swings by up to {size}": swinging, "chatters": chatters}
     return [f"{mark}: {int(where.sum())} of {len(done)} trials" for mark, where in found.items() if where.any()]
 
