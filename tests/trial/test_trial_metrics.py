@@ -16,6 +16,7 @@ from wristctl.config.hw_run import HwRunSettings
 from wristctl.config.loop import DirectionName
 from wristctl.config.plant import Push
 from wristctl.simulation.motion import Angles, Motion
+from wristctl.simulation.oscillation import WINDOW
 from wristctl.study_files.load import load_study
 from wristctl.trial.motions import motion_of
 from wristctl.trial.trial_results import JUDGED, evaluated, twin
@@ -208,6 +209,21 @@ def test_a_trials_push_in_simulation_is_the_benchs_and_against_the_bend(directio
     sign = DIRECTIONS[direction].sign
     given = sign * (pushed.theta - free.theta)[pushed.time > 0.75]
     assert sign * free.theta[-1] > 0.05 and (given < 0.0).all() and given.min() < -0.003
+
+
+def test_a_simulation_as_its_observer_sees_it_has_the_errors_and_the_swing_of_that() -> None:
+    rows = ({"controller": "feedforward", "gains": "default"},)
+    study = load_study([]).model_copy(update={"hw_run": settings_of(directions=("ulnar",), rows=rows, horizon=3.5)})
+    true, seen = (twin(study, Trial(0, "ulnar", 0, 0.0, 0), None, None, seen=one) for one in (False, True))
+    course = seen.trajectory
+    np.testing.assert_array_equal(course.theta, true.trajectory.seen)
+    off = course.theta - course.theta_ref
+    assert seen.metrics["rmse"] == pytest.approx(math.sqrt(float(np.square(off).mean())), rel=0.02)
+    assert seen.metrics["rmse"] != pytest.approx(true.metrics["rmse"], rel=1e-3)
+    rest = course.time > course.time[-1] - WINDOW
+    line = np.polynomial.Polynomial.fit(course.time[rest], course.theta[rest], 1)(course.time[rest])
+    assert 0.5 < seen.metrics["oscillation"] / (0.5 * np.ptp(course.theta[rest] - line)) <= 1.0  # the trend is no line
+    assert seen.metrics["peak_tension"] == true.metrics["peak_tension"]
 
 
 @pytest.mark.slow
