@@ -190,6 +190,8 @@ def test_a_page_shows_no_option_of_the_command_line_in_its_answer_or_titles(tmp_
         "All tables: --all. The gains, each a file:",
         "/x/gains/",
         "",
+        "RMSE [deg]; * best, = tied; 4 more controllers: --all",
+        "",
         "Every rank: `--all`, or",
         "/x/report.html.",
     ]
@@ -198,7 +200,8 @@ def test_a_page_shows_no_option_of_the_command_line_in_its_answer_or_titles(tmp_
     (run.path / OVERVIEW).write_text(Overview(told).text())
     text = page_of(run)
     answer = text[text.index('<section id="answer">') : text.index("<section", text.index('id="answer"'))]
-    assert re.findall(r"<p.*?>(.*?)</p>", answer) == ["It follows.", "The gains, each a file: /x/gains/"]
+    kept = ["It follows.", "The gains, each a file: /x/gains/", "RMSE [deg]; * best, = tied"]
+    assert re.findall(r"<p.*?>(.*?)</p>", answer) == kept
     assert ">Ranks</caption>" in text
 
 

@@ -154,12 +154,12 @@ _IN_A_TITLE = re.compile(r"; [^;]*: --all$")
 
 
 def for_a_page(answer: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
-    """The blocks of an answer without sentences on options of the command line, all of which the page shows."""
+    """The blocks of an answer without what is said of options of the command line, all of which the page shows."""
     shown = []
     for block in answer:
         if block["kind"] in ("text", "lines") and _OPTION.search(block["text"]):
-            kept = [part for part in _SENTENCE.split(block["text"]) if not _OPTION.search(part)]
-            block = block | {"text": " ".join(kept)}
+            sentences = _SENTENCE.split(_IN_A_TITLE.sub("", block["text"]))
+            block = block | {"text": " ".join(part for part in sentences if not _OPTION.search(part))}
         if block.get("text", True):
             shown.append(block)
     return shown
