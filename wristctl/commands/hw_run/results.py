@@ -114,7 +114,7 @@ def twins_of(
     names = [row.label for row in session.study.hw_run.rows]
     simulated: dict[tuple[Any, ...], Simulation] = {}
     twins = {}
-    with session.progress("compiling and simulating the same trials"):
+    with session.progress("simulating the same trials"):
         for row in done.to_dict("records"):
             key = row["direction"], row["push"], row["label"]
             seen = not math.isfinite(row.get("true_rmse", math.nan))

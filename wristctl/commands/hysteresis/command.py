@@ -110,7 +110,7 @@ def hysteresis(session: Session) -> Hysteresis:
 
     findings, settings = session.findings, session.study.hysteresis
     driven_strokes = strokes(session.study.wrist, settings)
-    with session.progress("compiling and driving loops", 100, "%") as advance:
+    with session.progress("driving loops", 100, "%") as advance:
         driven = loops(driven_strokes, lambda share: advance(round(100.0 * share)))
         bands = dead_bands(driven_strokes)
     around: list[HysteresisCircle] = []

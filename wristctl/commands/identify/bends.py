@@ -117,7 +117,7 @@ def identify_bends(session: Session) -> BendsTold:
     from wristctl.identification.intervals import knowledge
 
     findings, settings = session.findings, session.study.identify
-    with session.progress("compiling and searching"):
+    with session.progress("searching"):
         problem = _problem(session.study)
         fitted = fit(problem)
         known = knowledge(fitted)

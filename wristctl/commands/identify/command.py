@@ -139,7 +139,7 @@ def identify(session: Session) -> Identified | LogTold | DrivenTold | BendsTold:
 
     findings, settings = session.findings, session.study.identify
     problem = _problem(session.study, session.inputs)
-    with session.progress("compiling and searching"):
+    with session.progress("searching"):
         fitted = fit(problem)
         sure, suspected, missed = knowledge(fitted), suspicions(fitted), misfits(fitted)
         moved = budget(fitted, sure)

@@ -103,7 +103,7 @@ def simulate(session: Session) -> Simulated:
     warn_outside_conditions([settings], [settings.loop])
     beyond = warn_out_of_reach(findings, wrist, asked_by(study, settings))
     network = network_for(session.inputs, wrist, [settings.loop], planes)
-    with session.progress("compiling and simulating the loop"):
+    with session.progress("simulating the loop"):
         repeated = run_simulation(study, network, tuned_gains(session.inputs))
     scenario = scenario_of(settings.reference, settings.direction)
     findings.note_streams(Draws(study.seed).names([settings.loop], [scenario]))
