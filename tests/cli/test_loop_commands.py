@@ -319,6 +319,20 @@ def test_gains_are_searched_on_worlds_and_rows_ranked_on_others_with_the_answer_
 
 
 @pytest.mark.slow
+def test_smooth_motions_and_steps_of_a_family_are_ranked_in_tables_of_their_own(call: Call) -> None:
+    """A step's error is that of the jump: no mean is of both, and no table has a row twice."""
+    both = SOFT[1].replace("{duration: 0.3}", "{kind: step}, {duration: 0.3}")
+    assert both != SOFT[1]
+    rows = "controllers=[pd-ff, ct-dob]"
+    code, _, err = call("compare", "--set", both, "--set", "worlds={family: soft, draws: 8}", "--set", rows)
+    assert code == 0, err
+    run = open_run("latest:compare")
+    smooth, steps = (run.data(name).set_index("row")["rmse"] for name in ("ranking", "ranking-steps"))
+    assert sorted(smooth.index) == sorted(steps.index) == ["ct-dob/default", "feedforward/default", "pd-ff/default"]
+    assert smooth["ct-dob/default"] < 0.1 * steps["ct-dob/default"]
+
+
+@pytest.mark.slow
 def test_a_search_that_was_cut_short_goes_on_in_a_new_run_to_the_same_result(call: Call) -> None:
     assert call(*SEARCH)[0] == 0
     whole = open_run("latest:tune")

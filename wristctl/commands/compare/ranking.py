@@ -27,12 +27,11 @@ def ranked(session: Session, study: Study, network: Inverse | None, tuned: Tuned
         rankings = rank(study, tuned, network, lambda share: report(round(100 * share)))
     if worlds.sealed is None:
         findings.note_streams(streams_of(study.families[worlds.family], worlds.family, worlds.split))
-    ranking = pd.concat([ranking_frame(one_ranking) for one_ranking in rankings], ignore_index=True)
-    findings.table("data/ranking.csv", ranking, units=ranked_units())
     frames = pd.concat([worlds_frame(one_ranking) for one_ranking in rankings], ignore_index=True)
     findings.table("data/worlds.csv", frames, units=ranked_units())
     for index, world_ranking in enumerate(rankings):
         end = "_steps" if index else ""
+        findings.table(f"data/ranking{end.replace('_', '-')}.csv", ranking_frame(world_ranking), units=ranked_units())
         for row, label in enumerate(world_ranking.labels):
             keep_error(findings, f"rmse_{label}{end}", world_ranking, row)
         with session.drawing():
