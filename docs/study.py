@@ -1,17 +1,18 @@
-"""The answer of a study of controllers, as a page: `python docs/study.py RUN [SECOND]` writes docs/study.md.
+"""Which controller for which rig, as a page: `python docs/study.py RUN... --judged RUN...` writes docs/study.md.
 
-RUN is a sealed run of `wristctl study experiments/fair_study.yaml --budget full --executor processes`, SECOND another
-with `--set seed=2`: other worlds, searches and noise. With it the page says what of its answer comes out again.
+Each RUN is of `wristctl study experiments/fair_study.yaml --budget full --set 'study.families=[NAME]'`, which tunes at
+equal budget and judges every tuning, or of `wristctl compare experiments/shipped.yaml --set worlds.family=NAME`: the
+gains of the tuning in the middle (docs/gains.md) in the same worlds, which no search has seen. The others, after
+`--judged`, are of experiments/shipped_judged.yaml: these gains in other worlds, with motions that are in no family.
 """
 
 from __future__ import annotations
 
+import argparse
 import itertools
 import json
 import math
-import re
 import shutil
-import sys
 import textwrap
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
@@ -19,20 +20,23 @@ from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any
 
+import numpy as np
+import pandas as pd
 from choices import about
+from other_motions import asked_again, confirmed, unsettled
+from published_gains import SHIPPED, source_of
 from ranking_rows import Rankings, Row, deg, first_group, group, interval, short, three
-from second_study import again, asked_twice, unsettled
 
 from wristctl.commands.printed_table import joined
-from wristctl.commands.study.units import families_of
-from wristctl.comparison.repeated_tunings import HALVES
+from wristctl.commands.study.units import families_of as families_studied
+from wristctl.comparison.bootstrap import paired_ratio, penalised
 from wristctl.comparison.world_ranking import kinds_of
 from wristctl.config.families import Family
+from wristctl.control.shipped_gains import PREFIX
 from wristctl.control.table import controller
 from wristctl.records import Run
-from wristctl.records.manifest import asked_again
+from wristctl.study_files.load import load_study
 
 HERE = Path(__file__).parent
 # Times the lowest RMSE up to which a controller that is not told from it is about the same; upper over lower end of a
@@ -41,63 +45,69 @@ ALIKE, WIDE, USELESS = 1.1, 1.5, 0.5
 # Share of the worlds that a controller may lose.
 LOST = 0.01
 _EXACT, _RIG = "with exact angles and torques", "on rigs with motors, tendons and a camera"
-FIGURES = {"laws": "RMSE of every controller on every rig", "terms": "What each term of a controller buys"}
+STUDY = HERE.parent / "experiments" / "fair_study.yaml"
+"""What tuned the gains, and names pairs of controllers that tell what a term buys."""
+PICTURE = "camera"
 PAPER = ("smc/tuned", "smc/printed", "smc/exchanged", "pid/tuned", "pid/printed")
 
 _SIMULATED = """**All of it is simulated: nothing here was measured on a real rig.** [How the model meets recordings of
 real robots](real-robots.md)."""
 _ABOUT = """Each row of the table is a family of {worlds} simulated worlds, each another wrist on another rig, none of
 them seen in tuning. Each controller was tuned {tunings} times, each time with {evaluations} sets of gains on {draws}
-other worlds; the RMSE is the geometric mean over worlds and tunings. Intervals are of 95 %, by a bootstrap over tunings
-and worlds, and of the mean, not of single wrists. Controllers are distinguished by their paired differences in the same
-worlds: one may be worse though its RMSE lies in the other's interval, and one of a larger RMSE may not be distinguished
-where its tunings differ much. That does not mean equal: an RMSE more than a tenth above the lowest stands beside the
-name. Halves of the worlds are drawn at random, {halves} times, with the same tunings: what is lowest in all of them may
-owe it to its tunings. Where a line above is of several rigs, it names what is not distinguished from the lowest on the
-most of them, and of these the one of the least errors.
+other worlds. Beside an RMSE stand those of the best and the worst of its tunings, as the study found them. The RMSE is
+the geometric mean over worlds{over_all}, by a bootstrap, and of the mean, not of single wrists. Controllers are
+distinguished by their paired differences in the same worlds: one may be worse though its RMSE lies in the other's
+interval{by_overlap}. Not distinguished does not mean equal: an RMSE more than a tenth above the lowest stands beside
+the name. Where a line above is of several rigs, it names what is not distinguished from the lowest on the most of them,
+and of these the one of the least errors.
 
 A world is lost where the controller [fails, swings or chatters](glossary.md); a failure counts as 90 deg in the RMSE.
 Not to be used is what is shown, at 95 %, to lose more than 1 % of the worlds; it is in no other column, and up to {few}
 of {worlds} do not show it. Feedforward alone comes near behind motors, whose spools follow the motion; with torques
 alone it has the whole error of its model.
-Gains are tuned where a name has no suffix; [what controllers are](choices.md#controllers). The gains of the tuning
-whose error is the median: `wristctl simulate --gains tuned:camera`, [of all families](gains.md). For a wrist of your
-own: [recommend](recommend.md)."""
+Gains are tuned where a name has no suffix; [what controllers are](choices.md#controllers). The same gains elsewhere:
+`wristctl simulate --gains tuned:camera`. For a wrist of your own: [recommend](recommend.md)."""
 _PAPER = """How many times the lowest RMSE on the rig; of what may not be used, the share of worlds that are lost.
 The gains of [the paper](paper.md)'s sliding mode are P1, P2 and P3, those of its PID Kp, Ki and Kd: `printed` as the
 paper prints them, `exchanged` with P1 and P2 swapped, our hypothesis of a misprint."""
+_OVER = """, and in {of_studies} over tunings; elsewhere it is of the tuning in the middle, whose gains are
+[shipped](gains.md). Intervals are of 95 %, over what the mean is over"""
+_OVERLAP = """; where one tuning is tested, those whose tunings overlap the lowest's are not distinguished from it"""
+_CONFIRMED = """What is named to be used is in the first group with [other motions](#other-motions) in other worlds too,
+unless its line says that this is not settled."""
+_JUDGED = """The same gains in other worlds, and with motions that are in no family: slower and quicker moves, other
+strokes, other jumps (`experiments/shipped_judged.yaml`). How large errors are depends on the motion; what is asked here
+is whether the order comes out again."""
 _BOUGHT = """How many times less RMSE the second controller has, which has the term, than the first, or how many times
 more. `none shown`: the 95 % interval holds 1; `unknown`: and its ends are more than {wide} times apart. With * the
 second is among what not to use on that rig, for the worlds that it loses; `lost`: these are more than half."""
-_FIRST = re.compile(r"([\w-]+(?: \(steps\))?) [\w-]+ (\d+) and (\d+ of \d+)(?=[;.])")
 
 
 @dataclass(frozen=True)
-class Study:
-    """What the page shows of a run.
+class Judged:
+    """What the page shows.
 
-    What to use, rankings by family, best first, what the families are, values of terms, orders tuned otherwise,
-    how often the best of a family is first, how it was tuned and tested, and what of it a second study finds again: a
-    sentence and a section, empty without one.
+    What to use, rankings by family, best first, errors of tunings by rig and label, what the families are, values of
+    terms, how it was tuned and tested, and the section on what other motions find again, empty without them.
     """
 
     answer: Sequence[str]
-    rankings: Mapping[str, Sequence[Row]]
+    rankings: Rankings
+    tunings: Mapping[tuple[str, str], tuple[float, float]]
     about: Mapping[str, str]
     terms: Sequence[Row]
-    sensitivity: Sequence[Row]
-    first: Mapping[str, str]
     settings: str
-    again: Sequence[str] = ()
     compared: Sequence[str] = ()
 
 
-def decision(rankings: Mapping[str, Sequence[Row]], first: Mapping[str, str]) -> list[str]:
-    """A line for each rig: what to run, how often it is first, what is as good, what comes next, and the gain."""
+def decision(rankings: Rankings, tunings: Mapping[tuple[str, str], tuple[float, float]]) -> list[str]:
+    """A line for each rig: what to run, how its tunings did, what is as good, what comes next, and the gain.
+
+    `tunings` has the best and the worst error of a controller's tunings by rig and label.
+    """
     lines = [
-        "| rig | lowest RMSE | RMSE [deg], 95 % | lowest in: halves of the worlds, tunings "
-        "| not distinguished from it | first that is worse | feedforward's RMSE / the lowest "
-        "| [do not use](#what-not-to-use) |",
+        "| rig | lowest RMSE | RMSE [deg], 95 % | its tunings | not distinguished from it | first that is worse "
+        "| feedforward's RMSE / the lowest | [do not use](#what-not-to-use) |",
         "| --- | --- | --- | --- | --- | --- | --- | --- |",
     ]
     for name, rows in rankings.items():
@@ -111,7 +121,8 @@ def decision(rankings: Mapping[str, Sequence[Row]], first: Mapping[str, str]) ->
         same = ", ".join(short(row["row"]) + _beside(row, best) for row in ties)
         then = f"{short(after['row'])} {deg(after['rmse'])}" if after else "-"
         lines.append(
-            f"| {name} | **{short(best['row'])}** | {interval(best)} | {first.get(name, '-')} | {same or '-'} | {then} "
+            f"| {name} | **{short(best['row'])}** | {interval(best)} "
+            f"| {' to '.join(map(deg, tunings.get((name, best['row']), ()))) or '-'} | {same or '-'} | {then} "
             f"| {three(best['times_better'])} | {lost} of {len(rows)} |"
         )
     return lines
@@ -132,7 +143,7 @@ def recommended(rankings: Mapping[str, Sequence[Row]]) -> list[str]:
 def use(rankings: Mapping[str, Sequence[Row]], where: str, otherwise: Mapping[str, str] = MappingProxyType({})) -> str:
     """What to use on rigs of a kind: how large its error is on each, and what is not distinguished from it.
 
-    `otherwise` names what a second study recommends on the rigs where it shares no controller with this one.
+    `otherwise` names what other motions recommend on the rigs where they share no controller with these.
     """
     if not recommended(rankings):
         return f"- **{where}**: none may be used."
@@ -149,7 +160,7 @@ def use(rankings: Mapping[str, Sequence[Row]], where: str, otherwise: Mapping[st
     words = f"use {short(label)}: RMSE {joined(errors)}; {least}{', hardly more' * (min(better) < ALIKE)}."
     unsettled = [f"{other} in {name}" for name, other in otherwise.items() if name in rankings]
     if unsettled:
-        words += f" That is not settled: [a second study](#asked-twice) has {joined(unsettled)}."
+        words += f" That is not settled: [other motions](#other-motions) have {joined(unsettled)}."
     if len(rankings) == 1:
         ((row, rows),) = zip(chosen.values(), firsts.values(), strict=True)
         near = [other for other in others if rows[other]["rmse"] <= WIDE * row["rmse"]]
@@ -159,6 +170,11 @@ def use(rankings: Mapping[str, Sequence[Row]], where: str, otherwise: Mapping[st
         words += f" Too uncertain to be told from it: {joined(far)}." if far else ""
     elif len(chosen) == len(rankings) and others:
         words += f" On each of these none is shown to be better than {joined([short(o) for o in others], 'or')} either."
+    for name in (name for name in rankings if name not in chosen and first_group(rankings[name])):
+        rows = {row["row"]: row for row in rankings[name]}
+        lowest = first_group(rankings[name])[0]
+        why = "it must not be used: there " if label in rows and group(rows[label]) is None else ""
+        words += f" In {name} {why}use {short(lowest['row'])}: RMSE {interval(lowest)} deg."
     lost = [f"{100.0 * _lost(row):.2g} % of the worlds of {name}" for name, row in chosen.items() if _lost(row)]
     if lost:
         words += f" It fails, swings or chatters in {joined(lost)}."
@@ -177,17 +193,18 @@ def _lost(row: Row) -> float:
     return float(row["failures"] + row["swings"])
 
 
-def lead(run: Run, rankings: Rankings, otherwise: Mapping[str, str]) -> list[str]:
+def lead(families: Mapping[str, Family], rankings: Rankings, otherwise: Mapping[str, str]) -> list[str]:
     """What to use, a line for each kind of rig and of motion, and what the controllers are that it names.
 
-    `otherwise` names what a second study recommends on the rigs where it shares no controller with this one.
+    `otherwise` names what other motions recommend on the rigs where they share no controller with these.
     """
     lines, named = [], dict[str, None]()
     for rig, steps in itertools.product((True, False), (False, True)):
-        alike = {name: rows for name, rows in rankings.items() if _kind(run, name) == (rig, steps)}
+        alike = {name: rows for name, rows in rankings.items() if _kind(families, name) == (rig, steps)}
         where = f"{'Steps' if steps else 'Smooth motions'} {_RIG if rig else _EXACT}"
         lines += [use(alike, where, otherwise)] if alike else []
-        named |= {label.split("/")[0]: None for label in recommended(alike)}
+        used = [*recommended(alike)[:1], *(first_group(rows)[0]["row"] for rows in alike.values() if first_group(rows))]
+        named |= {label.split("/")[0]: None for label in used}
     what = [f"| {name} | {about(controller(name).law.__module__)} |" for name in named]
     return [*lines, "", "| controller | what it is |", "| --- | --- |", *what]
 
@@ -224,11 +241,11 @@ def bought(terms: Sequence[Row], rankings: Mapping[str, Sequence[Row]]) -> list[
         values = {row["family"]: row for row in terms if row["term"] == term}
         pair = next(iter(values.values()))
         named = f"{term}: {short(pair['without'])} to {short(pair['with'])}"
-        shares = {name: lost.get((name, pair["with"]), 0.0) for name in rankings}
-        cells = [
-            "lost" if share > USELESS else f"{_times(values[name])}{' *' if share else ''}"
-            for name, share in shares.items()
-        ]
+        cells = []
+        for name in rankings:
+            share = lost.get((name, pair["with"]), 0.0)
+            told = f"{_times(values[name])}{' *' if share else ''}" if name in values else "-"
+            cells.append("lost" if share > USELESS else told)
         lines.append(f"| {named} | {' | '.join(cells)} |")
     return lines
 
@@ -273,43 +290,29 @@ def ranking(rows: Sequence[Row]) -> list[str]:
     return [f"| {' | '.join(heads)} |", "| --- " * len(heads) + "|", *lines]
 
 
-def sensitivity(rows: Sequence[Row]) -> list[str]:
-    """What another way to tune does to the order."""
-    heads = (
-        "tuned otherwise", "pairs of controllers", "told apart both times", "the other way round", "Kendall's tau",
-        "lowest before -> after", "all RMSE times",
-    )  # fmt: skip
-    lines = [
-        f"| {row['variant']} | {row['pairs']} | {row['resolved']} | {row['reversed']} | {row['tau']:.2f} "
-        f"| {row['best']} | {row['ratio']:.3f} |"
-        for row in rows
-    ]
-    return [f"| {' | '.join(heads)} |", "| --- " * len(heads) + "|", *lines]
-
-
-def page(study: Study, made: str) -> str:
-    """The page: answer and tables; `made` is the paragraph on the run."""
-    rankings = study.rankings
+def page(judged: Judged, made: Sequence[str]) -> str:
+    """The page: answer and tables; `made` tells the runs."""
+    rankings = judged.rankings
     lines = [
         "# Which controller for which rig, tuned at equal budget", "", _SIMULATED, "",
-        *study.answer, "",
-        *study.again,
-        *decision(rankings, study.first), "",
-        *(f"- **{name}**: {about}" for name, about in study.about.items()), "",
-        study.settings, "",
+        *judged.answer, "",
+        *([_CONFIRMED, ""] if judged.compared else []),
+        *decision(rankings, judged.tunings), "",
+        *(f"- **{name}**: {about}" for name, about in judged.about.items()), "",
+        judged.settings, "",
+        f"![RMSE of each controller in each world of {PICTURE}](images/study-{PICTURE}.png)", "",
+        "A dot is a world, a cross a controller that must not be used.", "",
         "## The paper's controllers", "",
         _PAPER, "",
         *of_the_paper(rankings), "",
         "## What a term buys", "",
         _BOUGHT.format(wide=WIDE), "",
-        *bought(study.terms, rankings), "",
+        *bought(judged.terms, rankings), "",
         "## What not to use", "", "With the share of worlds that are lost:", "",
         *unusable(rankings), "",
-        *(part for name, told in FIGURES.items() for part in (f"![{told}](images/study-{name}.png)", "")),
-        made, "",
-        *study.compared,
+        *judged.compared,
         *(part for name, rows in rankings.items() for part in (f"## {name}", "", *ranking(rows), "")),
-        "## Tuned otherwise", "", *sensitivity(study.sensitivity), "", "Made by `python docs/study.py RUN [SECOND]`.",
+        "## Runs", "", *made, "", "Made by `python docs/study.py RUN... --judged RUN...`.",
     ]  # fmt: skip
     text = "\n".join(lines) + "\n"
     for name in rankings:
@@ -331,123 +334,134 @@ def named(families: Mapping[str, Family]) -> dict[str, str]:
     }
 
 
-def first_of(run: Run, rankings: Rankings) -> dict[str, str]:
-    """How often the best of each family is first, in halves of the worlds and in tunings."""
-    if not (run.path / "data" / "firsts.csv").exists():
-        return _first_in_words(run)
-    table = run.data("firsts").set_index(["family", "row"]).to_dict("index")
-    best = {name: (name, first_group(rows)[0]["row"]) for name, rows in rankings.items() if first_group(rows)}
-    lines = {name: table[place] for name, place in best.items() if place in table}
-    return {
-        name: f"{line['first_in_halves']} of {line['halves']}, {line['first_in_tunings']} of {line['tunings']}"
-        for name, line in lines.items()
-    }
-
-
-def _first_in_words(run: Run) -> dict[str, str]:
-    """The same of a run from before studies had a table of it: from the words of its answer."""
-    text = " ".join(_overview(run)).partition("First in how many")[2]
-    return {
-        name.replace(" (steps)", ", steps"): f"{halves} of {HALVES}, {of_tunings}"
-        for name, halves, of_tunings in _FIRST.findall(text)
-    }
-
-
-def _overview(run: Run) -> list[str]:
-    """Lines of the answer that a run begins with."""
-    lines: list[str] = json.loads(run.file("overview.json").read_text(encoding="utf-8"))["answer"]
-    return lines
-
-
-def rankings_of(run: Run) -> dict[str, list[Row]]:
-    """Rankings of a run by family, best first."""
-    files = {name: f"ranking-{name.replace(', ', '-')}" for name in named(studied(run))}
+def rankings_of(run: Run) -> dict[str, Sequence[Row]]:
+    """The rankings of a run by family, best first; of gains tuned for its family, a row's label says `tuned` alone."""
+    one = run.kind == "compare"
+    files = {name: f"ranking-{name.replace(', ', '-')}" for name in named(families_of(run))}
+    if one:
+        (family,) = families_of(run)
+        files = {name: file.replace(f"-{family}", "") for name, file in files.items()}
     present = {name: file for name, file in files.items() if (run.path / "data" / f"{file}.csv").exists()}
-    return {name: list(run.data(file).to_dict("records")) for name, file in present.items()}
+    rankings: dict[str, Sequence[Row]] = {name: run.data(file).to_dict("records") for name, file in present.items()}
+    if not one:
+        return rankings
+    plain = {name: [{**row, "row": plainly(row["row"], family)} for row in rows] for name, rows in rankings.items()}
+    return {name: by_tunings(rows, tunings_of([name])) for name, rows in plain.items()}
 
 
-def studied(run: Run) -> dict[str, Family]:
-    """The families of a study by name."""
-    return {name: run.config.families[name] for name in families_of(run.config)}
+def by_tunings(rows: Sequence[Row], tunings: Mapping[tuple[str, str], tuple[float, float]]) -> list[Row]:
+    """A ranking of one tuning each, with all in its first group whose tunings overlap those of its lowest."""
+    ends = {label: best_and_worst for (_, label), best_and_worst in tunings.items()}
+    best = first_group(rows)[:1]
+    if not best or best[0]["row"] not in ends:
+        return list(rows)
+    low, high = ends[best[0]["row"]]
+    alike = {label for label, (least, most) in ends.items() if least <= high and low <= most}
+    return [{**row, "group": 1.0} if group(row) and row["row"] in alike else row for row in rows]
 
 
-def _kind(run: Run, name: str) -> tuple[bool, bool]:
+def tunings_of(families: Iterable[str]) -> dict[tuple[str, str], tuple[float, float]]:
+    """The RMSE of the best and of the worst of a controller's tunings [rad], as its study found them on a family."""
+    shipped = json.loads(SHIPPED.read_text(encoding="utf-8"))
+    return {
+        (family, f"{name}/tuned"): tuple(row["tunings"])
+        for family in families
+        if family in shipped
+        for name, row in shipped[family]["controllers"].items()
+    }
+
+
+def plainly(label: str, family: str) -> str:
+    """A row's label, of gains tuned for this family without its name."""
+    return label.removesuffix(f"{PREFIX}{family}") + "tuned" if label.endswith(f"{PREFIX}{family}") else label
+
+
+def families_of(run: Run) -> dict[str, Family]:
+    """The families that a study or a comparison is over, by name."""
+    names = [run.config.compare.worlds.family] if run.kind == "compare" else families_studied(run.config)
+    return {name: run.config.families[name] for name in names}
+
+
+def terms_of(run: Run, terms: Mapping[str, tuple[str, str]]) -> Sequence[Row]:
+    """How many times less the RMSE is with each term, in the same worlds, with its interval over these."""
+    if run.kind == "study":
+        return run.data("terms").to_dict("records")
+    found = list[Row]()
+    for name in rankings_of(run):
+        scores = scores_of(run, name)
+        for term, (without, with_term) in terms.items():
+            if {without, with_term} <= set(scores):
+                times = paired_ratio(scores[without], scores[with_term], run.config.seed)
+                found.append(
+                    {"term": term, "family": name, "without": without, "with": with_term}
+                    | {"times": times.value, "low": times.low, "high": times.high}
+                )
+    return found
+
+
+def scores_of(run: Run, name: str) -> pd.DataFrame:
+    """RMSE [rad] of a comparison in each world, a column per row: the geometric mean over a ranking's motions."""
+    ((family, content),) = families_of(run).items()
+    every = run.data("worlds")
+    wanted = kinds_of(content)[name.endswith(", steps") or set(kinds_of(content)) == {True}]
+    chosen = every[every["motion"].isin(wanted)]
+    errors = pd.DataFrame(
+        {
+            "row": chosen["row"].map(lambda label: plainly(str(label), family)),
+            "world": chosen["world"],
+            "rmse": np.log(penalised(np.where(chosen["failed"], np.inf, chosen["rmse"]))),
+        }
+    )
+    return errors.groupby(["world", "row"])["rmse"].mean().unstack().map(math.exp)
+
+
+def _kind(families: Mapping[str, Family], name: str) -> tuple[bool, bool]:
     """Whether a ranking is of rigs with a camera, and whether it is of steps."""
-    family = studied(run)[name.removesuffix(", steps")]
+    family = families[name.removesuffix(", steps")]
     return family.loop.sensor.level == "camera", name.endswith(", steps") or set(kinds_of(family)) == {True}
 
 
-def second_of(run: Run, second: Run) -> tuple[dict[str, str], list[str], list[str]]:
-    """What a second study finds again of the families that both have: a sentence, and a section; where nothing, what.
-
-    SystemExit where it asked something else of them, or had the same seed.
-    """
-    shared = [name for name in studied(run) if name in studied(second)]
-    if not shared or asked_of(run, shared) != asked_of(second, shared) or run.config.seed == second.config.seed:
-        sys.exit("two studies of the same question differ in their seed, in their families, and in nothing else")
-    rankings = rankings_of(run), rankings_of(second)
-    families = {name: studied(run)[name] for name in shared}
-    rigs = [name for name, family in families.items() if family.loop.sensor.level == "camera"]
-    smooth = [name for name in rigs if False in kinds_of(families[name])]
-    made = [
-        f"`{asked_again(second.manifest.argv)}`, {second.id},",
-        f"has the hash `{second.manifest.result_sha256}`.",
-        "None of its worlds, searches and noise are those of the first study.",
-    ]
-    return unsettled(*rankings), again(*rankings, smooth), asked_twice(*rankings, "\n".join(made))
-
-
-def resumed(run: Run) -> list[Run]:
-    """The run, the one that it resumed, and so on, as far as they lie beside it."""
-    units = run.manifest.units
-    earlier = run.path.parent / units.run if units and units.run else None
-    return [run, *(resumed(Run(earlier)) if earlier and earlier.exists() else [])]
-
-
-def asked_of(run: Run, families: Sequence[str]) -> dict[str, Any]:
-    """What a study asked of these families: all but its seed, and what it asked beside."""
-    beside = {"families", "variants", "varied", "resume"}
-    asked = run.config.model_dump(include={"wrist", "families", "study"})
-    of_families = {name: asked["families"][name] for name in families}
-    return {
-        "wrist": asked["wrist"],
-        "families": of_families,
-        "study": {key: value for key, value in asked["study"].items() if key not in beside},
-    }
+def told(run: Run) -> str:
+    """A run as the page tells it: the command that asks for it again, and its hash."""
+    source = source_of(run)
+    return f"- `{source['command']}`, {source['run']},\n  hash `{source['result_sha256']}`."
 
 
 def main() -> None:
-    """Write the page and its pictures."""
-    run = Run(Path(sys.argv[1]))
-    for name in FIGURES:
-        shutil.copyfile(run.path / "figures" / f"{name}.png", HERE / "images" / f"study-{name}.png")
-    budget = run.config.study.budgets[run.config.study.budget]
-    rankings = rankings_of(run)
+    """Write the page and its picture."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("runs", nargs="+", type=Path)
+    parser.add_argument("--judged", nargs="*", type=Path, default=[])
+    arguments = parser.parse_args()
+    runs, others = ([Run(path) for path in paths] for paths in (arguments.runs, arguments.judged))
+    rankings, judged = (
+        {name: rows for run in which for name, rows in rankings_of(run).items()} for which in (runs, others)
+    )
+    families = {name: family for run in runs for name, family in families_of(run).items()}
+    study = load_study([STUDY])
+    budget = study.study.budgets["full"]
+    (worlds,) = {run.config.compare.worlds.draws if run.kind == "compare" else budget.worlds for run in runs}
+    studied = [name for run in runs if run.kind == "study" for name in families_of(run)]
     how = _ABOUT.format(
-        worlds=budget.worlds,
+        worlds=worlds,
         tunings=budget.tunings,
         evaluations=budget.candidates * budget.iterations,
         draws=budget.draws,
-        halves=HALVES,
-        few=max(round(budget.worlds * _lost(row)) for rows in rankings.values() for row in rows if group(row)),
+        over_all=_OVER.format(of_studies=joined(studied)) if studied else "",
+        by_overlap=_OVERLAP if len(studied) < len(families) else "",
+        few=max(round(worlds * _lost(row)) for rows in rankings.values() for row in rows if group(row)),
     )
-    differing, *repeated = second_of(run, Run(Path(sys.argv[2]))) if len(sys.argv) > 2 else ({}, [], [])
-    about = {name: words for name, words in named(studied(run)).items() if name in rankings}
-    terms, otherwise = (run.data(name).to_dict("records") for name in ("terms", "sensitivity"))
-    study = Study(
-        lead(run, rankings, differing), rankings, about, terms, otherwise, first_of(run, rankings), how, *repeated
+    about = {name: words for name, words in named(families).items() if name in rankings}
+    terms = [line for run in runs for line in terms_of(run, study.study.terms)]
+    compared = asked_again(rankings, judged, _JUDGED) if others else []
+    answer = lead(families, confirmed(rankings, judged), unsettled(rankings, judged))
+    for run in runs:
+        if PICTURE in families_of(run):
+            shutil.copyfile(run.path / "figures" / "ranking.png", HERE / "images" / f"study-{PICTURE}.png")
+    made = [told(run) for run in (*runs, *others)]
+    (HERE / "study.md").write_text(
+        page(Judged(answer, rankings, tunings_of(families), about, terms, how, compared), made), encoding="utf-8"
     )
-    runs = resumed(run)
-    minutes = sum(one.manifest.timing.wall_s or 0.0 for one in runs) / 60.0
-    part = f" in {len(runs)} parts" if len(runs) > 1 else ""
-    made = "\n".join(
-        [
-            f"`{asked_again(run.manifest.argv)}`, {minutes:.0f} minutes on two cores{part}, {run.id}.",
-            "Its result, the same by any executor and after any interruption, has the hash",
-            f"`{run.manifest.result_sha256}`. What it costs elsewhere: [cost](cost.md).",
-        ]
-    )
-    (HERE / "study.md").write_text(page(study, made), encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -38,11 +38,23 @@ ROWS = [row("mpc/tuned", 1, 0.1, 9.0), row("ct-dob/tuned", 1, 0.11, 3.0), row("l
 def test_a_rigs_line_has_the_lowest_error_of_what_may_be_used_what_is_as_good_and_what_comes_next(
     script: ModuleType,
 ) -> None:
-    lines = script.decision(
-        {"camera": ROWS, "hard": [row("pid/tuned", math.nan, 0.1, 1.0, 0.5)]}, {"camera": "31 of 50, 2 of 5"}
-    )[2:]
-    assert lines[0] == "| camera | **mpc** | 0.1 [0.09, 0.11] | 31 of 50, 2 of 5 | ct-dob | lqi 0.2 | 2,000 | 1 of 4 |"
+    tunings = {
+        ("camera", "mpc/tuned"): (math.radians(0.09), math.radians(0.12)),
+        ("camera", "ct-dob/tuned"): (0.1, 0.2),
+    }
+    lines = script.decision({"camera": ROWS, "hard": [row("pid/tuned", math.nan, 0.1, 1.0, 0.5)]}, tunings)[2:]
+    assert lines[0] == "| camera | **mpc** | 0.1 [0.09, 0.11] | 0.09 to 0.12 | ct-dob | lqi 0.2 | 2,000 | 1 of 4 |"
     assert lines[1] == "| hard | none | - | - | - | - | - | 1 of 1 |"
+
+
+def test_of_one_tuning_each_those_whose_tunings_overlap_the_lowests_are_not_told_from_it(script: ModuleType) -> None:
+    ends = {"mpc": (0.09, 0.19), "ct-dob": (0.1, 0.12), "lqi": (0.18, 0.3), "smc": (0.05, 0.3), "pid": (0.2, 0.3)}
+    tunings = {("camera", f"{name}/tuned"): (math.radians(a), math.radians(b)) for name, (a, b) in ends.items()}
+    ranked = [*ROWS, row("pid/tuned", 3, 0.25, 1.0), row("smc/tuned", math.nan, 0.1, 1.0, 0.5)]
+    found = {each["row"]: each["group"] for each in script.by_tunings(ranked, tunings)}
+    assert [label for label, number in found.items() if number == 1] == ["mpc/tuned", "ct-dob/tuned", "lqi/tuned"]
+    assert found["pid/tuned"] == 3 and math.isnan(found["smc/tuned"])
+    assert script.by_tunings(ROWS, {}) == ROWS
 
 
 def test_what_has_no_group_must_not_be_used_however_small_its_error(script: ModuleType) -> None:
@@ -91,7 +103,7 @@ def test_what_to_use_says_what_is_lower_somewhere_and_what_is_as_little_distingu
     assert "Too uncertain to be told from it: nc (2 [1.8, 2.2])" in " ".join(
         script.use({"steps": unlike}, "Steps").split()
     )
-    assert "has lqi in steps" in " ".join(script.use({"steps": unlike}, "Steps", {"steps": "lqi"}).split())
+    assert "have lqi in steps" in " ".join(script.use({"steps": unlike}, "Steps", {"steps": "lqi"}).split())
     assert "not settled" not in script.use({"steps": unlike}, "Steps", {"ideal": "lqi"})
     assert "none may be used" in script.use({"camera": ROWS[-1:]}, "Rigs")
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import os
-import shutil
 import signal
 import subprocess
 import sys
@@ -146,24 +145,12 @@ def test_what_is_shipped_of_it_is_the_median_tuning_with_its_figures_and_run(don
         assert row["reliable"] == (place not in ranking.standing.unusable)
 
 
-def test_how_often_a_controller_is_first_is_data_that_the_page_reads(
-    done: Studied, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Of a run from before there was such a table the page takes it from the words of the answer: the same."""
-    monkeypatch.syspath_prepend(DOCS)
-    script, run, ranking = script_of_docs("study"), run_of(done), done.rankings["rig"]
-    table = run.data("firsts").set_index("row")
+def test_how_often_a_controller_is_first_is_data(done: Studied) -> None:
+    ranking, table = done.rankings["rig"], run_of(done).data("firsts").set_index("row")
     for label, line in table.iterrows():
         firsts = ranking.firsts(ranking.labels.index(str(label)))
         assert tuple(line[["first_in_halves", "first_in_tunings", "tunings"]]) == firsts and line["halves"] == 50
     assert table["first_in_halves"].sum() == 50 and table["first_in_tunings"].sum() == 2, "one is first in every half"
-    rankings = script.rankings_of(run)
-    (told,) = script.first_of(run, rankings).values()
-    best = table.loc[script.first_group(rankings["rig"])[0]["row"]]
-    assert told == f"{best['first_in_halves']} of 50, {best['first_in_tunings']} of 2"
-    shutil.copytree(run.path, tmp_path / run.id)
-    (tmp_path / run.id / "data" / "firsts.csv").unlink()
-    assert script.first_of(Run(tmp_path / run.id), rankings) == {"rig": told}
 
 
 @pytest.mark.slow
@@ -180,35 +167,24 @@ def test_a_comparison_of_what_a_study_ships_has_its_figures_to_the_last_bit(
     monkeypatch.setattr(shipped_gains, "_shipped", lambda: shipped)
     rows = [Row(controller=law, gains="tuned:worlds") for law in study.study.laws]
     asked = study.compare.model_copy(update={"rows": rows, "worlds": Worlds(family="rig", draws=10)})
-    (again,) = wristctl.compare(study.model_copy(update={"compare": asked})).rankings
+    compared = wristctl.compare(study.model_copy(update={"compare": asked}), out=tmp_path)
+    (again,) = compared.rankings
     for law in study.study.laws:
         row, before = again.labels.index(f"{law}/tuned:rig"), found.rankings["rig"].labels.index(f"{law}/tuned")
         assert np.array_equal(again.scores[row], found.rankings["rig"].scores[before])
         assert again.means[row].value == shipped["rig"]["controllers"][law]["rmse"]
         assert again.standing.lost[row].times == shipped["rig"]["controllers"][law]["lost"]
-
-
-def test_only_another_seed_makes_a_second_study_of_the_same_question(
-    done: Studied, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Families and variants that one of them lacks do not matter."""
     monkeypatch.syspath_prepend(DOCS)
-    script, run = script_of_docs("study"), run_of(done)
-
-    def copied(name: str, *changes: tuple[str, str]) -> Run:
-        shutil.copytree(run.path, tmp_path / name)
-        text = (tmp_path / name / "config.yaml").read_text()
-        for before, after in changes:
-            assert before in text
-            text = text.replace(before, after)
-        (tmp_path / name / "config.yaml").write_text(text)
-        return Run(tmp_path / name)
-
-    _, _, section = script.second_of(run, copied("again", ("seed: 3", "seed: 4"), ("RMSE alone:", "another:")))
-    assert "## Asked twice" in section and any(line.startswith("- **rig**: in both") for line in section)
-    for other in (run, copied("longer", ("seed: 3", "seed: 4"), ("horizon: 1.0", "horizon: 2.0"))):
-        with pytest.raises(SystemExit, match="differ in their seed"):
-            script.second_of(run, other)
+    page, run = script_of_docs("study"), run_of(compared)
+    ((name, shown),) = page.rankings_of(run).items()
+    assert name == "rig" and {line["row"] for line in shown} >= {f"{law}/tuned" for law in study.study.laws}
+    scores = page.scores_of(run, name)
+    for line in shown:
+        assert line["rmse"] == pytest.approx(np.exp(np.log(scores[line["row"]]).mean()))
+    one, other = (f"{law}/tuned" for law in study.study.laws[:2])
+    (term,) = page.terms_of(run, {"a term": (one, other)})
+    times = again.times_better(again.labels.index(f"{other}:rig"), again.labels.index(f"{one}:rig"))
+    assert (term["times"], term["low"], term["high"]) == pytest.approx(times[:3], rel=0.01)
 
 
 def test_a_variant_is_held_against_the_one_that_it_names(done: Studied) -> None:
