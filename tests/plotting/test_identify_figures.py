@@ -142,6 +142,6 @@ def test_correlations_are_those_of_the_parameters_that_were_searched_for() -> No
         column, row = (int(each) for each in text.get_position())
         assert text.get_text() == f"{expected[row, column]:.2f}"
         if row == column or abs(expected[row, column]) < 0.5:
-            assert (text.get_color() == "white") == (row == column), "readable on a dark cell"
+            assert (text.get_color() == "w") == (row == column), "readable on a dark cell"
     assert len(axes.texts) == len(names) ** 2 and axes.get_title("left") == "condition number 123"
     assert not any(line.get_visible() for line in axes.get_xgridlines())

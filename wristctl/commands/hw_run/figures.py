@@ -12,17 +12,18 @@ from matplotlib.figure import Figure
 
 from wristctl.arrays import Array
 from wristctl.commands.session import Session
+from wristctl.plotting.bend_figure import WANTED_PATH, draw_plane_of_bends
 from wristctl.plotting.style import (
     BLACK,
     BLUE,
     LIGHT,
-    SILVER,
     SIMULATED,
     TENDON_COLOURS,
     VERMILLION,
     WANTED,
     figure,
     grid,
+    headed,
     legend_below,
     line,
     logarithmic,
@@ -101,16 +102,11 @@ def desired_and_obtained(courses: Sequence[LoggedTrial], heading: str = "") -> F
 def paths(courses: Sequence[LoggedTrial], reach: Array, heading: str = "") -> Figure:
     """Paths in the plane of bends [deg]; `reach` is a closed line (K, 2) [rad], as `reach_of_bends` gives it."""
     picture = Figure(figsize=(5.2, 5.6), layout="constrained")
-    axes = picture.add_subplot()
-    axes.plot(*np.rad2deg(reach).T, color=SILVER, label="in reach")
+    drawn = list[tuple[Array, Mapping[str, Any]]]()
     for course in courses:
-        axes.plot(*np.rad2deg(course.wanted).T, **WANTED | {"label": "wanted"})
-        axes.plot(*np.rad2deg(course.bend).T, color=BLUE, linewidth=1.0, label="measured")
-        if course.true is not None:
-            axes.plot(*np.rad2deg(course.true.bend).T, **_TRUE)
-    axes.set_aspect("equal", adjustable="datalim")  # a box of another shape would push the title off the picture
-    axes.set(xlabel="bend toward ulnar [deg]", ylabel="bend toward flexion [deg]")
-    title(axes, heading)
+        drawn += [(course.wanted, WANTED_PATH), (course.bend, {"color": BLUE, "linewidth": 1.0, "label": "measured"})]
+        drawn += [(course.true.bend, _TRUE)] if course.true is not None else []
+    draw_plane_of_bends(picture.add_subplot(), drawn, heading, reach)
     legend_below(picture)
     return picture
 
@@ -134,7 +130,7 @@ def ellipses(courses: Sequence[LoggedTrial], heading: str = "") -> Figure:
         title(panel, name)
         panel.set_aspect("equal", adjustable="datalim")
         panel.set(xlabel="error toward ulnar [deg]", ylabel="error toward flexion [deg]")
-    picture.suptitle(heading, fontsize=10.0)
+    headed(picture, heading)
     legend_below(picture)
     return picture
 
@@ -216,7 +212,7 @@ def _finished(picture: Figure, panels: _Panels, courses: Sequence[LoggedTrial], 
     for panel in list(panels.values())[-2:]:
         panel.set_xlabel("time [s]")
         panel.tick_params(labelbottom=True)  # of three panels the second has an empty place below it
-    picture.suptitle(heading, fontsize=10.0)
+    headed(picture, heading)
     picture.supylabel(ylabel, fontsize=10.0)
     legend_below(picture)
     return picture

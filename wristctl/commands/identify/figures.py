@@ -4,6 +4,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 
 from wristctl.arrays import Array
@@ -11,6 +12,7 @@ from wristctl.identification.bend_trials import PLANES, BendTrial
 from wristctl.identification.fit import Fit
 from wristctl.identification.intervals import Knowledge
 from wristctl.identification.measured_trials import MeasuredTrial
+from wristctl.plotting.kinds import draw_cells
 from wristctl.plotting.style import BLACK, BLUE, GREY, VERMILLION, figure, legend, legend_below, title
 
 # Trials drawn, spread over all of them.
@@ -115,11 +117,7 @@ def correlations(fit: Fit, knowledge: Knowledge) -> Figure:
     names = fit.problem.free
     matrix = knowledge.correlation[: len(names), : len(names)]
     picture, ((axes,),) = figure(width=5.6, height=4.8)
-    axes.grid(False)
-    image = axes.imshow(matrix, cmap="RdBu_r", vmin=-1.0, vmax=1.0)
-    for (row, column), value in np.ndenumerate(matrix):
-        shade = "white" if abs(value) > 0.6 else BLACK
-        axes.text(column, row, f"{value:.2f}", ha="center", va="center", fontsize=9.0, color=shade)
+    image = draw_cells(axes, matrix, "RdBu_r", Normalize(-1.0, 1.0), lambda row, at: {"s": f"{matrix[row, at]:.2f}"})
     axes.set_xticks(range(len(names)), names, rotation=30, ha="right")
     axes.set_yticks(range(len(names)), names)
     picture.colorbar(image, label="correlation")

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from textwrap import fill
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -25,6 +24,7 @@ from wristctl.plotting.style import (
     VERMILLION,
     columns_within,
     figure,
+    headed,
     legend_below,
     logarithmic,
 )
@@ -43,8 +43,6 @@ _HUES = (BLUE, ORANGE, GREEN, PURPLE, SKY, BLACK)
 _DOT: dict[str, Any] = {"markersize": 6.0}
 _RING: dict[str, Any] = {"markersize": 7.0, "fillstyle": "none"}
 _CROSS: dict[str, Any] = {"markersize": 5.0, "clip_on": False}
-# Letters of a heading to an inch.
-_LETTERS = 13.0
 # Width of a panel [in] that has room for the name of a setting.
 _PANEL = 2.2
 
@@ -96,13 +94,7 @@ def over_setting(
         panel.set_visible(False)
     if len(lines) > 1:
         legend_below(picture)
-    picture.suptitle(
-        fill(
-            _heading(table, [key, *other_keys], metrics, len(lines) > 1),
-            round(_LETTERS * picture.get_figwidth()),
-        ),
-        fontsize=10.0,
-    )
+    headed(picture, _heading(table, [key, *other_keys], metrics, len(lines) > 1))
     return picture
 
 

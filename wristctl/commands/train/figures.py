@@ -6,7 +6,6 @@ import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import LogLocator, NullFormatter
 from numpy.typing import ArrayLike
 
 from wristctl.arrays import Array
@@ -74,10 +73,8 @@ def learning_curves(curves: pd.DataFrame, kept: int = 0) -> Figure:
             axes.plot(rows["epoch"], rmse, color=colour, **style)
     if curves["trial"].nunique() > 1:
         title(axes, f"trial {kept} was kept; faint: trials that were not")
-    axes.set(xlabel="epoch", ylabel="RMSE of the angle [deg]", yscale="log")
-    axes.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
-    axes.yaxis.set_major_formatter("{x:g}")
-    axes.yaxis.set_minor_formatter(NullFormatter())
+    axes.set(xlabel="epoch", ylabel="RMSE of the angle [deg]")
+    logarithmic(axes.yaxis, (1.0, 2.0, 5.0))
     legend(axes, loc="upper right")
     return picture
 
