@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from wristctl.api import load_study
 from wristctl.commands.compare.class_figures import error_against_variation, tension_rows
 from wristctl.commands.compare.figures import error_over_disturbance, rmse_map, variation_dots
-from wristctl.commands.hw_run.figures import DIRECTIONS, Course, LoggedTrial, desired_and_obtained, lateness
+from wristctl.commands.hw_run.figures import DIRECTIONS, Course, LoggedTrial, bends_over_time, lateness
 from wristctl.commands.hw_run.figures import errors as trial_errors
 from wristctl.commands.hw_run.figures import tensions as trial_tensions
 from wristctl.commands.simulate.figures import sliding
@@ -182,7 +182,7 @@ FIGURES: dict[str, Callable[[], Figure]] = {
     "convergence": lambda: convergence([search("smc"), search("pid"), search("computed-torque")]),
     "gain history of smc": lambda: gain_history(search("smc"), SMC.gains),
     "gain history of pid": lambda: gain_history(search("pid"), PID.gains),
-    "trials, angles": lambda: desired_and_obtained(trials(), "Trials"),
+    "trials, angles": lambda: bends_over_time(trials(), "Trials"),
     "trials, errors": lambda: trial_errors(trials(), "Trials"),
     "trials, tensions": lambda: trial_tensions(trials(), "Trials"),
     "lateness": lambda: lateness(np.random.default_rng(0).exponential(2e-4, 2000), 5e-3),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -88,15 +88,28 @@ class LoggedTrial:
     """When the push began and ended [s]."""
 
 
-def desired_and_obtained(courses: Sequence[LoggedTrial], heading: str = "") -> Figure:
+def bends_over_time(courses: Sequence[LoggedTrial], heading: str = "") -> Figure:
     """Desired and obtained bending angle [deg] over time [s], one panel for each direction."""
-    picture, panels = _panels(courses)
+    return _over_time(courses, "bend", heading)
+
+
+def errors(courses: Sequence[LoggedTrial], heading: str = "") -> Figure:
+    """Error e = bend - reference [deg] over time [s], one panel for each direction, and for each plane of two."""
+    return _over_time(courses, "error", heading)
+
+
+def _over_time(courses: Sequence[LoggedTrial], what: Literal["bend", "error"], heading: str) -> Figure:
+    picture, panels = _panels(courses, sharey=what == "error")
     for course in courses:
-        _draw_beside(panels, course, "bend")
-        for panel, wanted, bend in zip(_own(panels, course), course.wanted.T, course.bend.T, strict=True):
-            panel.plot(course.time, np.degrees(bend), label=course.label, **line(course.label))
-            panel.plot(course.time, np.degrees(wanted), **WANTED)
-    return _finished(picture, panels, courses, heading, "bending angle [deg]")
+        _draw_beside(panels, course, what)
+        drawn = course.bend if what == "bend" else course.bend - course.bend_ref
+        for panel, values, wanted in zip(_own(panels, course), drawn.T, course.wanted.T, strict=True):
+            panel.plot(course.time, np.degrees(values), label=course.label, **line(course.label))
+            if what == "bend":
+                panel.plot(course.time, np.degrees(wanted), **WANTED)
+            else:
+                panel.axhline(0.0, color=BLACK, linewidth=0.8, zorder=1.0)
+    return _finished(picture, panels, courses, heading, "bending angle [deg]" if what == "bend" else "error [deg]")
 
 
 def paths(courses: Sequence[LoggedTrial], reach: Array, heading: str = "") -> Figure:
@@ -139,17 +152,6 @@ def _outline(error: Array) -> Array:
     """Line (2, K) [deg] at two standard deviations about the mean of an error (N, 2) [rad]."""
     outline: Array = np.rad2deg(error.mean(axis=0) + error_ellipse(error).outline(_DEVIATIONS)).T
     return outline
-
-
-def errors(courses: Sequence[LoggedTrial], heading: str = "") -> Figure:
-    """Error e = bend - reference [deg] over time [s], one panel for each direction, and for each plane of two."""
-    picture, panels = _panels(courses, sharey=True)
-    for course in courses:
-        _draw_beside(panels, course, "error")
-        for panel, error in zip(_own(panels, course), (course.bend - course.bend_ref).T, strict=True):
-            panel.plot(course.time, np.degrees(error), label=course.label, **line(course.label))
-            panel.axhline(0.0, color=BLACK, linewidth=0.8, zorder=1.0)
-    return _finished(picture, panels, courses, heading, "error [deg]")
 
 
 def tensions(courses: Sequence[LoggedTrial], heading: str = "") -> Figure:
@@ -232,7 +234,7 @@ def draw_trials(session: Session, done: pd.DataFrame, twins: Mapping[int, Simula
         said = ", with a push" * pushed
         if settings.planes == 1:
             caption = f"The bend, wanted and obtained, in each direction{said}"
-            findings.figure(f"{prefix}directions", desired_and_obtained, some, caption=caption)
+            findings.figure(f"{prefix}directions", bends_over_time, some, caption=caption)
         else:
             reach = reach_of_bends(wrist, layout or layout_of_axes(wrist))
             caption = "The plane of bends: wanted, measured and true, within what the tendons reach" + said
