@@ -52,16 +52,7 @@ def answer_of(judged: Sequence[Judgement], strips: Sequence[Strip] = (), limit: 
     networks = " ".join(_networks(claims))
     decided = [first] if first else []
     rest = [*[networks] * bool(networks), *_by_topic(claims), *second, *_untested(claims)]
-    apart = Answer(sentence, table, [*decided, *rest], _MORE)
-    return apart if apart.fits else _fitted(sentence, table, decided, rest)
-
-
-def _fitted(sentence: str, table: Table | None, decided: Sequence[str], rest: Sequence[str]) -> Answer:
-    """The answer on one screen: `rest` is one paragraph, and sentences are left out from its end."""
-    answer = Answer(sentence, table, [*decided, *[" ".join(rest)] * bool(rest)], _MORE)
-    if answer.fits or not rest:
-        return answer
-    return _fitted(sentence, table, decided, rest[:-1])
+    return Answer(sentence, table, decided, _MORE).ending(rest)
 
 
 def _tried(loops: Sequence[str], limit: float) -> list[str]:
