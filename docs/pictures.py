@@ -21,7 +21,7 @@ from wristctl.comparison.controller_ranking import class_rankings
 from wristctl.comparison.paper import T2
 from wristctl.config.camera import Gates, Markers, SceneSettings
 from wristctl.config.wrist import WristParameters
-from wristctl.plotting.loop_figures import errors
+from wristctl.plotting.loop_figures import over_time
 from wristctl.plotting.ranking_figures import answer_figure
 from wristctl.plotting.wrist_drawing import directions
 from wristctl.records.formats import write_figure
@@ -169,7 +169,7 @@ def main() -> None:
             for r in results
             if r.loop == loop and r.label in shown and r.reference.startswith("minimum jerk 1")
         ]
-        figure = errors(courses, f"loop {loop}: 30 deg in 1 s, error of the bending angle", log=True)
+        figure = over_time(courses, "size", heading=f"loop {loop}: 30 deg in 1 s, error of the bending angle")
         keep(f"errors-{loop}", figure)
     keep("directions", directions(study.wrist))
     (HERE / "results.md").write_text(page(results))

@@ -43,3 +43,9 @@ def readable(columns: Sequence[Any], rows: Sequence[Sequence[Any]]) -> tuple[lis
             row[1:] = [in_degrees(cell, row[unit_at])[0] for cell in row[1:]]  # the first is a name
             row[unit_at] = _DEGREES[row[unit_at]]
     return heads, shown
+
+
+def metric_in_words(name: str, unit: str = "") -> str:
+    """Name of a metric for people, without the unit that stands beside it: `tip_rmse_mm` [mm] is `tip RMSE`."""
+    words = name.removesuffix(f"_{unit}").replace("_", " ")
+    return re.sub(r"\brmse\b", "RMSE", re.sub(r"^r2$", "R^2", words))

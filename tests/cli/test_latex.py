@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 import shutil
 import subprocess
@@ -14,7 +15,10 @@ from tests.cli.conftest import ROOT, Call
 from tests.plotting.many_runs import many_runs, run_name
 from wristctl.cli.runs.latex import PACKAGES, SOFTWARE, latex_table
 from wristctl.commands.printed_table import Table
-from wristctl.records import Run
+from wristctl.commands.results import Findings
+from wristctl.config.study import Study
+from wristctl.records import Run, start_run
+from wristctl.records.manifest import TABLES as TABLES_OF_RUNS
 
 ODD = "50 % & more_of #1 {x} ~ ^ \\\\ $y$ <z> |"
 TABLES = {
@@ -61,6 +65,32 @@ def test_every_row_has_as_many_cells_as_its_layout_has_columns() -> None:
         for layout, body in zip(layouts, tabulars(text), strict=True):
             bare = re.sub(r"\[.*?\]|>\{.*?\}|p\{.*?\}", lambda part: "p" * part[0].startswith("p"), layout)
             assert name == "odd" or not table.rows or {len(row) for row in body} == {len(bare)}, (name, layout)
+
+
+@pytest.mark.parametrize(
+    ("names", "repeated"),
+    [(("a", "b", "c"), 1), (("a", "a", "b"), 2), (("a", "a", "a"), 2), (("a much longer name than others",) * 3, 1)],
+)
+def test_words_that_tell_rows_apart_stand_beside_every_part_of_a_table(names: tuple[str, ...], repeated: int) -> None:
+    """Of a sweep over two settings: the second one too, unless the first is enough, or there is no room."""
+    rows = [(name, f"kind {k} of motion", *(0.1 * k + j for j in range(4))) for k, name in enumerate(names)]
+    text = latex_table(Table("T", ("controller", "motion", *(f"quantity {j} [deg]" for j in range(4))), rows))
+    heads = re.findall(r"toprule\n(.*) ", text)
+    assert len(heads) > 1 and all(head.startswith("{controller}") for head in heads)
+    assert all(("{motion}" in head) == (repeated == 2) for head in heads[1:]) and "{motion}" in heads[0]
+
+
+def test_the_table_of_an_answer_has_its_sentence_for_a_caption(call: Call, tmp_path: Path) -> None:
+    with start_run("simulate", Study(), "", tmp_path / "results") as live:
+        findings = Findings(0, live)
+        findings.overview.answer[:] = ["simulate at 2 points: lowest RMSE 1 deg", "at 100 % of it.", "", "x  y"]
+        findings.keep_overview()
+        tables = [{"title": title, "columns": ["x"], "rows": [[1.0]]} for title in ("", "T")]
+        live.file(TABLES_OF_RUNS).write_text(json.dumps(tables), encoding="utf-8")
+    text = call("runs", "table", "latest:simulate", "--latex")[1]
+    name = live.path.name.replace("_", r"\_")
+    captions = re.findall(r"caption\{(.*)\}", text)
+    assert captions == [rf"Simulate at 2 points: lowest RMSE 1 deg at 100 \% of it. Run {name}.", "T"]
 
 
 def test_bibtex_names_the_run_by_its_result_and_wristctl_as_the_readme_does(call: Call, tmp_path: Path) -> None:

@@ -146,6 +146,7 @@ def test_the_tasks_of_a_command_have_one_line_whose_bar_only_grows() -> None:
                     assert line.description == f"{task}: {count} of 4 steps"
                     shares.append(line.percentage)
             assert bar._bar.live.is_started and bar._bar.tasks == [line]
+            assert line.description == "writing", "a count stays at its total no longer than its task"
     assert not bar._bar.live.is_started
     assert max(shares) < 100.0 and shares[:4] == sorted(shares[:4])
 

@@ -276,3 +276,17 @@ def test_without_loops_there_is_no_sentence_and_no_table_about_them() -> None:
     answer = answer_of(judge_all(text, Grounds()))
     assert answer.table is None and answer.sentence
     assert not any("loops" in str(note) or "RMSE" in str(note) for note in answer.notes) and answer.notes
+
+
+@pytest.mark.parametrize(("lines", "apart", "kept"), [(5, True, 3), (27, False, 3), (29, False, 2), (31, False, 0)])
+def test_what_ends_an_answer_stands_apart_then_together_then_loses_its_last_sentences(
+    lines: int, apart: bool, kept: int
+) -> None:
+    """On a screen of 32 lines; a sentence fills a line, and an empty one stands before each paragraph."""
+    sentences = [f"{letter * (COLUMNS - 10)}." for letter in "abc"]
+    answer = Answer("It is so.", None, [f"$ {k}" for k in range((lines - 1) // 2)])
+    assert len(answer.lines()) == lines
+    ended = answer.ending(sentences)
+    added = ended.notes[len(answer.notes) :]
+    assert added == (sentences if apart else [" ".join(sentences[:kept])] if kept else [])
+    assert ended.fits

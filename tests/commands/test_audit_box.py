@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 import wristctl
-from wristctl.commands.audit.command import AUDIT
+from wristctl.commands.audit.command import AUDIT, box_table
 from wristctl.commands.inputs import Inputs
+from wristctl.comparison.robust import Leaf, Strip, strips_frame
+from wristctl.config.audit import Claim
 from wristctl.errors import UserError
 from wristctl.records import list_runs
 
@@ -73,3 +76,21 @@ def test_a_box_that_would_run_for_weeks_is_refused_at_once(
     with pytest.raises(UserError, match=r"steps of .* rollouts") as caught:
         plan_of(tmp_path, **beyond)
     assert "audit.box" in caught.value.where and "shorter horizon" in str(caught.value)
+
+
+def test_the_table_of_shares_has_the_file_s_figures_and_a_second_unknown_only_beside_a_first_that_decides() -> None:
+    claim = Claim.model_validate(
+        {"id": "A", "says": "", "evidence": "arrival", "controller": "smc", "gains": "printed"}
+    )
+    verdicts: list[Any] = ["reproduced", "reproduced", "does not hold", None]
+    leaves, ratios = [Leaf("limit", 0.5), Leaf("gravity", 0.3)], np.ones(4)
+    boxed = [Strip(claim, ratios, verdicts, some, None, told)
+             for some, told in ((leaves, "where limit < 50"), (leaves, ""), ([], ""))]  # fmt: skip
+    for shown in (boxed, boxed[2:]):
+        frame = strips_frame(shown)
+        table = box_table(shown, frame)
+        assert "of 4 settings" in table.title and "up to 1, are not counted" in table.title
+        assert [row[2] for row in table.rows] == frame["reproduced"].tolist() == pytest.approx([2 / 3] * len(shown))
+        assert [row[1] for row in table.rows] == [1] * len(shown) and table.columns[2] == "holds in"
+    last = [row[-2:] for row in box_table(boxed, strips_frame(boxed)).rows]
+    assert last == [("where limit < 50", "gravity"), ("", ""), ("", "")]

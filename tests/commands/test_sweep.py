@@ -14,8 +14,8 @@ from pandas.testing import assert_frame_equal
 
 import wristctl
 from wristctl.commands.simulate.results import Simulated
-from wristctl.commands.sweep.answer import headline, sentence
-from wristctl.commands.sweep.figures import over_key
+from wristctl.commands.sweep.answer import headline, quantities, sentence
+from wristctl.commands.sweep.figures import over_setting
 from wristctl.config.study import Study
 from wristctl.errors import UserError
 from wristctl.simulation import swept_loops
@@ -118,7 +118,7 @@ def test_a_sweep_is_one_run_with_a_table_with_units_and_a_figure_for_each_key(tm
         assert (done.run.path / "figures" / f"sweep-{key}.png").is_file()
     best = done.frame().sort_values("rmse").iloc[0]
     said = " ".join((done.run.path / "README.md").read_text().split())
-    assert f"simulate.controller = {best['simulate.controller']}" in said and "lowest rmse " in said
+    assert f", controller = {best['simulate.controller']}" in said and "lowest RMSE " in said
     listed = wristctl.runs("points=8", kind="simulate", out=tmp_path)
     assert listed["rmse_least"].iloc[0] == best["rmse"]
 
@@ -127,7 +127,7 @@ def test_the_answer_of_a_sweep_is_in_degrees_in_the_order_of_its_values_and_fits
     done = wristctl.simulate(swept(wristctl.load_study(None, *FAST), "wrist.stiffness=~0.4..0.9:30"))
     table, lines = done.frame(), done.summary
     best = table.iloc[int(table["rmse"].argmin())]
-    assert f"lowest rmse {np.rad2deg(best['rmse']):.3g} deg at wrist.stiffness = " in " ".join(lines)
+    assert f"lowest RMSE {np.rad2deg(best['rmse']):.3g} deg at wrist.stiffness = " in " ".join(lines)
     shown = [float(line.split()[0]) for line in lines if re.match(r" *0\.\d+  ", line)]
     assert shown == sorted(shown) and 6 < len(shown) < 30
     assert shown[0] == pytest.approx(table["wrist.stiffness"].min(), rel=5e-3)
@@ -136,14 +136,14 @@ def test_the_answer_of_a_sweep_is_in_degrees_in_the_order_of_its_values_and_fits
 
 
 def test_of_errors_that_nobody_could_measure_none_is_least() -> None:
-    frame = pd.DataFrame({"k": ["a", "b", "c"], "point": [0, 1, 2], "rmse": [2e-4, 1e-4, 0.5]})
-    units = {"k": "1", "rmse": "deg"}
+    frame = pd.DataFrame({"k": ["a", "b", "c"], "point": [0, 1, 2], "rmse": np.radians([2e-4, 1e-4, 0.5])})
+    key, _, rmse = quantities(frame, {"k": "1"}, {}).values()
     assert "below 0.001 deg at 2 of 3 rollouts, such as k = b; highest 0.5 deg at k = c" in sentence(
-        "simulate", frame, ["k"], ["rmse"], units
+        "simulate", frame, [key], [rmse]
     )
-    tiny = sentence("simulate", frame[:2], ["k"], ["rmse"], units)
+    tiny = sentence("simulate", frame[:2], [key], [rmse])
     assert "below 0.001 deg at every point" in tiny and "most" not in tiny
-    assert "lowest rmse 0.5 deg at k = c" in sentence("simulate", frame[2:], ["k"], ["rmse"], units)
+    assert "lowest RMSE 0.5 deg at k = c" in sentence("simulate", frame[2:], [key], [rmse])
 
 
 def test_a_figure_of_a_sweep_has_a_line_for_each_value_of_a_second_setting_and_marks_what_is_no_good() -> None:
@@ -151,28 +151,29 @@ def test_a_figure_of_a_sweep_has_a_line_for_each_value_of_a_second_setting_and_m
     frame = pd.DataFrame(
         {
             "stiffness": [1.0, 2.0, 3.0] * 2, "controller": ["pid"] * 3 + ["smc"] * 3,
-            "rmse": [0.1, 0.2, 0.3, 4.0, 5.0, 90.0], "failed": [False] * 5 + [True],
+            "rmse": np.radians([0.1, 0.2, 0.3, 4.0, 5.0, 90.0]), "failed": [False] * 5 + [True],
             "fate": ["", "", "does not arrive", "", "", "failed"],
         }
     )  # fmt: skip
-    units = {"stiffness": "N m/rad", "controller": "1", "rmse": "deg"}
-    picture = over_key(frame, "stiffness", ["controller"], ["rmse"], units)
+    stiffness, controller, rmse, *_ = quantities(frame, {"stiffness": "N m/rad", "controller": "1"}, {}).values()
+    picture = over_setting(frame, stiffness, [controller], [rmse])
     (panel,) = picture.axes
     drawn = [(line.get_marker(), line.get_linestyle(), np.asarray(line.get_xydata()).tolist()) for line in panel.lines]
     lines = [points for _, style, points in drawn if style == "-"]
-    assert lines == [[[1.0, 0.1], [2.0, 0.2], [3.0, 0.3]], [[1.0, 4.0], [2.0, 5.0]]]
-    assert [points for marker, _, points in drawn if marker == "o"] == [[[3.0, 0.3]]]
+    for line, points in zip(lines, [[[1.0, 0.1], [2.0, 0.2], [3.0, 0.3]], [[1.0, 4.0], [2.0, 5.0]]], strict=True):
+        assert line == [pytest.approx(point, rel=1e-12) for point in points]
+    assert [points for marker, _, points in drawn if marker == "o"] == [[[3.0, pytest.approx(0.3, rel=1e-12)]]]
     assert [points[0][0] for marker, _, points in drawn if marker == "x"] == [3.0]
     assert {text.get_text() for text in picture.legends[0].get_texts()} == {"controller = pid", "controller = smc"}
-    named = over_key(frame, "controller", [], ["rmse"], units)
+    named = over_setting(frame, controller, [], [rmse])
     assert [label.get_text() for label in named.axes[0].get_xticklabels()] == ["pid", "smc"]
     assert not [line for line in named.axes[0].lines if line.get_linestyle() == "-"]
 
 
 def test_angles_that_nobody_could_measure_are_not_shown() -> None:
-    names = ["rmse", "oscillation", "steady_state"]
     frame = pd.DataFrame({"rmse": [1e-9, 1e-8], "oscillation": [1e-12, 1e-9], "steady_state": [1e-9, 1e-3]})
-    assert headline(frame, names, dict.fromkeys(names, "rad")) == ["rmse", "steady_state"]
+    metrics = list(quantities(frame, {}, {}).values())
+    assert [metric.name for metric in headline(frame, metrics)] == ["rmse", "steady_state"]
 
 
 @pytest.mark.slow
@@ -191,7 +192,7 @@ def test_a_point_where_the_wrist_fails_is_told_and_stays_in_the_table() -> None:
     done = wristctl.simulate(swept(study, "wrist.range_deg=31,50", "simulate.loop.plant.payload=0,3"))
     assert done.frame()["failed"].tolist() == [False, True, False, True]
     assert done.frame()["fate"].tolist() == ["", "failed", "", "failed"]
-    assert "2 of 4 rollouts: failed" in str(done) and done.marks == ["failed: 2 of 4"]
+    assert "2 of 4 rollouts: failed" in " ".join(done.summary) and done.marks == ["failed: 2 of 4"]
 
 
 @pytest.mark.slow

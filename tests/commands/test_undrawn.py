@@ -104,7 +104,7 @@ def test_every_figure_of_a_run_is_drawn_where_a_fault_costs_the_figure_alone() -
                 handed |= {known[text] for text in map(ast.unparse, node.args[1:2]) if text in known}
     assert {name.rpartition(".")[2] for name in called} == {"gain_sensitivity", "board_page", "marker_page"}
     left = {name.rpartition(".")[2] for name in makers - handed - called}
-    assert left == {"bend_figure", "directions", "recent", "residuals_over_time", "trends_over_runs"}, "of no run"
+    assert left == {"directions", "recent", "residuals_over_time", "trends_over_runs"}, "of no run"
 
 
 def _small() -> Any:

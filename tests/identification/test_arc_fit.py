@@ -129,7 +129,14 @@ def test_a_probe_that_stays_bent_while_its_tendons_are_slack_wants_inner_frictio
 
 
 def test_a_robot_without_friction_does_not_want_it() -> None:
-    models = list(tried_models(NECK, [[made(NECK, TRUE, SLACK, math.radians(0.1))]], False))
+    shares, fitted = list[float](), list[int]()
+    tried = tried_models(NECK, [[made(NECK, TRUE, SLACK, math.radians(0.1))]], False, told=shares.append)
+    models = [model for model in tried if not fitted.append(len(shares))]  # type: ignore[func-returns-value]
+    assert fitted[:3] == [1, 3, 5], "fits: elastic arcs once, slack from two beginnings, friction too"
+    assert shares == sorted(shares) and 0.0 < shares[0] < shares[-1] < 1.0, "of what the data may yet ask for"
+    asked = list[float]()
+    assert len(list(tried_models(NECK, [[made(NECK, TRUE, SLACK, 0.0)]], False, ("slack",), asked.append))) == 2
+    assert asked == [pytest.approx(k / 3) for k in (1, 2, 3)]
     assert not [model for model in models if model.verdict == "wanted" and model.terms[-1] != "slack"]
     assert chosen_of(models).terms in ((), ("slack",))
 

@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from wristctl.api import load_study
 from wristctl.commands.compare.class_figures import error_against_variation, tension_rows
 from wristctl.commands.compare.figures import error_over_disturbance, rmse_map, variation_dots
-from wristctl.commands.hw_run.figures import DIRECTIONS, Course, LoggedTrial, desired_and_obtained, lateness
+from wristctl.commands.hw_run.figures import DIRECTIONS, Course, LoggedTrial, bends_over_time, lateness
 from wristctl.commands.hw_run.figures import errors as trial_errors
 from wristctl.commands.hw_run.figures import tensions as trial_tensions
 from wristctl.commands.simulate.figures import sliding
@@ -24,7 +24,7 @@ from wristctl.config.wrist import WristParameters
 from wristctl.control.pid import PID
 from wristctl.control.smc import SMC
 from wristctl.control.table import CONTROLLERS
-from wristctl.plotting.loop_figures import angles, errors, overlay, tensions
+from wristctl.plotting.loop_figures import over_time, tensions
 from wristctl.plotting.ranking_figures import (
     answer_figure,
     paired_ratios,
@@ -152,11 +152,13 @@ SURFACE = SMC.surface
 PUSHES = ("disturbances.push.force", {"a": 0.0, "b": 1.0, "c": 2.0})
 
 FIGURES: dict[str, Callable[[], Figure]] = {
-    "angles": lambda: angles([course(row, 0.1 * k + 0.1, k == 1) for k, row in enumerate(ROWS)], "Loop default"),
-    "errors": lambda: errors([course("smc/printed"), course("smc/tuned", 0.1)], "SMC"),
-    "errors, log": lambda: errors([course("pid/printed"), course("pid/tuned", 0.1)], log=True),
+    "angles": lambda: over_time(
+        [course(row, 0.1 * k + 0.1, k == 1) for k, row in enumerate(ROWS)], "angle", heading="Loop default"
+    ),
+    "errors": lambda: over_time([course("smc/printed"), course("smc/tuned", 0.1)], "error", heading="SMC"),
+    "errors, log": lambda: over_time([course("pid/printed"), course("pid/tuned", 0.1)], "size"),
     "tensions": lambda: tensions(course("smc/exchanged")),
-    "angles, late": lambda: angles([late()]),
+    "angles, late": lambda: over_time([late()], "angle"),
     "tensions, late": lambda: tensions(late()),
     "rmse map": lambda: rmse_map(results(), "Loop default"),
     "answer": lambda: answer_figure(rankings(), PLACES),
@@ -166,7 +168,9 @@ FIGURES: dict[str, Callable[[], Figure]] = {
     "performance profile": lambda: performance_profile(rankings(), PLACES),
     "ratios to feedforward": lambda: paired_ratios(rankings(), "feedforward/default", PLACES),
     "who beats whom": lambda: probability_of_better(rankings()[0], "sampled"),
-    "overlay": lambda: overlay([course(row, 0.1 * k + 0.1, k == 1) for k, row in enumerate(ROWS)], "ideal"),
+    "overlay": lambda: over_time(
+        [course(row, 0.1 * k + 0.1, k == 1) for k, row in enumerate(ROWS)], "angle", "measurable size", heading="ideal"
+    ),
     "error against variation": lambda: error_against_variation(results(), rankings()),
     "tensions of several": lambda: tension_rows([course(row, 0.1 * k + 0.1) for k, row in enumerate(ROWS[:3])], "all"),
     "error over a disturbance": lambda: error_over_disturbance(
@@ -178,7 +182,7 @@ FIGURES: dict[str, Callable[[], Figure]] = {
     "convergence": lambda: convergence([search("smc"), search("pid"), search("computed-torque")]),
     "gain history of smc": lambda: gain_history(search("smc"), SMC.gains),
     "gain history of pid": lambda: gain_history(search("pid"), PID.gains),
-    "trials, angles": lambda: desired_and_obtained(trials(), "Trials"),
+    "trials, angles": lambda: bends_over_time(trials(), "Trials"),
     "trials, errors": lambda: trial_errors(trials(), "Trials"),
     "trials, tensions": lambda: trial_tensions(trials(), "Trials"),
     "lateness": lambda: lateness(np.random.default_rng(0).exponential(2e-4, 2000), 5e-3),

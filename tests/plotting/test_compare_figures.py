@@ -14,7 +14,7 @@ from wristctl.commands.compare.figures import rmse_map, variation_dots
 from wristctl.commands.printed_table import degrees
 from wristctl.comparison.combinations import ComparedRow
 from wristctl.comparison.paper import T2
-from wristctl.plotting.loop_figures import error_sizes
+from wristctl.plotting.loop_figures import over_time, spread_of_sizes
 from wristctl.plotting.style import WIDTH, for_paper
 from wristctl.simulation.repetitions import Repeated
 
@@ -76,7 +76,7 @@ def test_errors_of_repetitions_are_their_median_with_its_interval_at_every_momen
     time = one_result().simulation.trajectory.time
     errors = np.outer(np.arange(1.0, 13.0) * (-1.0) ** np.arange(12), np.linspace(1.0, 2.0, len(time)))
     own = dataclasses.replace(one_result().repeated, errors=errors, failed=np.arange(12) < 2)
-    (axes,) = error_sizes([own]).axes
+    (axes,) = over_time([own.first.trajectory], spread_of_sizes([own])).axes
     median, _zero = axes.lines
     drawn = np.radians(np.asarray(median.get_ydata(), float))
     np.testing.assert_allclose(drawn, 6.5 * np.linspace(1.0, 2.0, len(time)))
@@ -85,7 +85,9 @@ def test_errors_of_repetitions_are_their_median_with_its_interval_at_every_momen
     assert places[:, 1].min() == pytest.approx(3.0) and places[:, 1].max() == pytest.approx(20.0)
     assert axes.get_ylabel() == "median |error| of 12 [deg]" and median.get_label() == "smc/tuned, 2 failed"
     diverged = dataclasses.replace(own, errors=np.where(np.arange(12)[:, None] < 7, np.nan, errors))
-    assert np.isnan(np.asarray(error_sizes([diverged]).axes[0].lines[0].get_ydata())).all()
+    assert np.isnan(
+        np.asarray(over_time([own.first.trajectory], spread_of_sizes([diverged])).axes[0].lines[0].get_ydata())
+    ).all()
 
 
 def test_several_inverses_are_rows_of_their_own(results: list[ComparedRow]) -> None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from matplotlib.collections import LineCollection
@@ -13,6 +15,7 @@ from wristctl.commands.identify.figures import _short, angles, correlations, res
 from wristctl.config.identify import IdentifySettings
 from wristctl.config.plant import Actuator
 from wristctl.config.wrist import WristParameters
+from wristctl.identification.bend_trials import BendTrial
 from wristctl.identification.fit import Fit, Problem
 from wristctl.identification.intervals import Knowledge
 from wristctl.identification.measured_trials import MeasuredTrial
@@ -75,6 +78,31 @@ def test_differences_share_one_scale_that_holds_the_largest() -> None:
     for right in angles(one).axes[1::2]:
         low, high = right.get_ylim()
         assert low == -high and most < high < 1.2 * most
+
+
+def test_of_bends_each_plane_is_drawn_by_itself_and_tensions_are_not() -> None:
+    """Readings of both bends, and of a tension whose residuals are large, in turn; four trials of many."""
+    one = fit([np.where(np.arange(60) % 3 == 2, 9.0, 1e-3 * (k + 1)) for k in range(9)])
+    turn = np.arange(60) % 3
+    trials = [
+        BendTrial(
+            trial.label, trial.run, trial.direction, trial.wrist, trial.time, trial.reeled, trial.captured,
+            trial.angle, 0.0, (1, 2), turn, 1.0,
+        )
+        for trial in one.problem.trials
+    ]  # fmt: skip
+    made = angles(replace(one, problem=replace(one.problem, trials=trials)))
+    assert rows(made) == [f"trial {k}" for k in (0, 3, 5, 8)]
+    for k, (left, right) in zip((0, 3, 5, 8), np.array(made.axes).reshape(4, 2), strict=True):
+        measured, models = left.lines[::2], left.lines[1::2]
+        assert [line.get_label() for line in models] == ["model, ulnar", "model, flexion"]
+        for plane, (line, model) in enumerate(zip(measured, models, strict=True)):
+            angle = np.degrees(trials[k].angle[turn == plane])
+            np.testing.assert_allclose(line.get_ydata(), angle)
+            np.testing.assert_allclose(model.get_ydata(), angle - np.degrees(1e-3 * (k + 1)))
+        low, high = right.get_ylim()
+        assert low == -high and np.degrees(9e-3) < high < 1.2 * np.degrees(9e-3)
+        assert left.get_ylabel() == "bend [deg]"
 
 
 @pytest.mark.parametrize(
@@ -142,6 +170,6 @@ def test_correlations_are_those_of_the_parameters_that_were_searched_for() -> No
         column, row = (int(each) for each in text.get_position())
         assert text.get_text() == f"{expected[row, column]:.2f}"
         if row == column or abs(expected[row, column]) < 0.5:
-            assert (text.get_color() == "white") == (row == column), "readable on a dark cell"
+            assert (text.get_color() == "w") == (row == column), "readable on a dark cell"
     assert len(axes.texts) == len(names) ** 2 and axes.get_title("left") == "condition number 123"
     assert not any(line.get_visible() for line in axes.get_xgridlines())

@@ -10,7 +10,7 @@ import pytest
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 
-from wristctl.plotting.loop_figures import angles, envelope, errors, one_motion, tensions
+from wristctl.plotting.loop_figures import envelope, one_motion, over_time, tensions
 from wristctl.simulation.trajectory import Trajectory
 
 Course = Callable[..., Trajectory]
@@ -27,33 +27,33 @@ def labels(axes: Axes) -> list[str]:
 
 def test_angles_are_drawn_in_degrees_against_the_desired_angle(course: Course) -> None:
     one = course("smc/tuned")
-    (axes,) = angles([one]).axes
+    (axes,) = over_time([one], "angle").axes
     np.testing.assert_array_equal(line(axes, "smc/tuned").get_ydata(), np.degrees(one.theta))
     np.testing.assert_allclose(np.asarray(line(axes, "desired").get_ydata()), 30.0)
 
 
 def test_reference_is_drawn_where_a_network_makes_it_differ_from_the_desired_angle(course: Course) -> None:
-    assert "reference" not in labels(angles([course("smc/tuned")]).axes[0])
-    (axes,) = angles([course("smc/tuned", network_error=0.01)]).axes
+    assert "reference" not in labels(over_time([course("smc/tuned")], "angle").axes[0])
+    (axes,) = over_time([course("smc/tuned", network_error=0.01)], "angle").axes
     np.testing.assert_allclose(np.asarray(line(axes, "reference").get_ydata()), 30.0 + np.degrees(0.01))
 
 
 def test_loop_that_diverges_is_named_so_and_hides_no_other(course: Course) -> None:
-    (axes,) = angles([course("smc/tuned"), course("pid/printed", diverges=True)]).axes
+    (axes,) = over_time([course("smc/tuned"), course("pid/printed", diverges=True)], "angle").axes
     assert "pid/printed (diverged)" in labels(axes)
     assert axes.get_ylim()[1] <= 45.0
 
 
 def test_errors_are_drawn_in_degrees(course: Course) -> None:
     one = course("smc/printed")
-    (axes,) = errors([one], "SMC").axes
+    (axes,) = over_time([one], "error", heading="SMC").axes
     np.testing.assert_array_equal(line(axes, "smc/printed").get_ydata(), np.degrees(one.error))
     assert axes.get_title("left") == "SMC"
 
 
 def test_logarithmic_errors_are_positive_and_leave_out_what_is_too_small(course: Course) -> None:
     one = course("smc/printed", tau=0.1)
-    (axes,) = errors([one], log=True).axes
+    (axes,) = over_time([one], "size").axes
     drawn = np.asarray(line(axes, "smc/printed").get_ydata())
     known = np.abs(one.error) >= 1e-8
     np.testing.assert_allclose(drawn[known], np.degrees(np.abs(one.error))[known], rtol=1e-12)
@@ -116,9 +116,9 @@ def test_what_the_controller_sees_and_what_acts_are_drawn_where_they_differ(cour
     one = course("smc/exchanged")
     seen, acting = np.roll(one.theta, 3), 0.5 * one.tension
     late = replace(one, seen=seen, acting=acting)
-    (axes,) = angles([late]).axes
+    (axes,) = over_time([late], "angle").axes
     np.testing.assert_array_equal(line(axes, "smc/exchanged as seen").get_ydata(), np.degrees(seen))
-    (axes,) = errors([late]).axes
+    (axes,) = over_time([late], "error").axes
     np.testing.assert_array_equal(line(axes, "smc/exchanged as seen").get_ydata(), np.degrees(seen - late.theta_ref))
     plus, _, minus, *_ = tensions(late).axes
     for side, drawn in enumerate((plus, minus)):
@@ -126,12 +126,12 @@ def test_what_the_controller_sees_and_what_acts_are_drawn_where_they_differ(cour
         np.testing.assert_array_equal(line(drawn, name).get_ydata(), late.tension[:, side])
         np.testing.assert_array_equal(line(drawn, "tension that acts").get_ydata(), acting[:, side])
     same = replace(one, seen=one.theta, acting=one.tension)
-    assert labels(angles([same]).axes[0]) == ["smc/exchanged", "desired"]
+    assert labels(over_time([same], "angle").axes[0]) == ["smc/exchanged", "desired"]
     assert "tension that acts" not in labels(tensions(same).axes[0])
 
 
 def test_angles_are_named_and_have_their_units(course: Course) -> None:
-    (axes,) = angles([course("smc/tuned")], "Loop fast").axes
+    (axes,) = over_time([course("smc/tuned")], "angle", heading="Loop fast").axes
     assert (axes.get_xlabel(), axes.get_ylabel()) == ("time [s]", "bending angle [deg]")
     assert axes.get_title("left") == "Loop fast"
 
@@ -142,40 +142,40 @@ def test_a_diverging_angle_is_shown_to_half_a_move_beyond_what_is_desired(course
     far = replace(
         one, theta=sign * np.tan(one.time), theta_ref=sign * one.theta_ref, theta_desired=sign * one.theta_ref
     )
-    low, high = angles([far]).axes[0].get_ylim()
+    low, high = over_time([far], "angle").axes[0].get_ylim()
     assert (low, high) == pytest.approx((-15.0, 45.0) if sign > 0.0 else (-45.0, 15.0))
 
 
 def test_an_axis_of_angles_is_no_wider_than_what_is_drawn(course: Course) -> None:
-    low, high = angles([course("smc/tuned")]).axes[0].get_ylim()
+    low, high = over_time([course("smc/tuned")], "angle").axes[0].get_ylim()
     assert -3.0 < low < 0.0 and 30.0 < high < 33.0
 
 
 def test_a_small_move_is_shown_to_5_deg_beyond_it(course: Course) -> None:
     one = course("pid/printed", diverges=True)
     far = replace(one, theta=np.tan(one.time), theta_ref=0.1 * one.theta_ref, theta_desired=0.1 * one.theta_desired)
-    assert angles([far]).axes[0].get_ylim() == pytest.approx((-5.0, 8.0))
+    assert over_time([far], "angle").axes[0].get_ylim() == pytest.approx((-5.0, 8.0))
 
 
 def test_a_reference_is_drawn_once_however_many_loops_follow_it(course: Course) -> None:
     loops = [course(name, network_error=0.01) for name in ("smc/tuned", "pid/tuned")]
-    assert labels(angles(loops).axes[0]) == ["smc/tuned", "pid/tuned", "desired", "reference"]
+    assert labels(over_time(loops, "angle").axes[0]) == ["smc/tuned", "pid/tuned", "desired", "reference"]
     mixed = [course("smc/tuned"), course("pid/tuned", network_error=0.01), course("mrac/tuned", network_error=0.02)]
-    (axes,) = angles(mixed).axes
+    (axes,) = over_time(mixed, "angle").axes
     drawn = [float(np.asarray(each.get_ydata())[0]) for each in axes.lines if each.get_label() == "reference"]
     assert labels(axes).count("reference") == 2 and len(set(drawn)) == 2
 
 
 def test_the_desired_angle_is_that_of_the_first_loop(course: Course) -> None:
     other = replace(course("pid/tuned"), theta_desired=0.5 * course("pid/tuned").theta_desired)
-    (axes,) = angles([course("smc/tuned"), other]).axes
+    (axes,) = over_time([course("smc/tuned"), other], "angle").axes
     desired = line(axes, "desired")
     np.testing.assert_allclose(np.asarray(desired.get_ydata()), 30.0)
     np.testing.assert_array_equal(desired.get_xdata(), other.time)
 
 
 def test_errors_are_measured_around_zero_and_a_diverging_one_hides_no_other(course: Course) -> None:
-    (axes,) = errors([course("smc/printed")]).axes
+    (axes,) = over_time([course("smc/printed")], "error").axes
     assert axes.get_ylim()[0] < -30.0 and axes.get_yscale() == "linear"
     assert (axes.get_xlabel(), axes.get_ylabel()) == ("time [s]", "error [deg]")
     assert [0.0, 0.0] in [list(np.asarray(each.get_ydata())) for each in axes.lines]
@@ -183,7 +183,7 @@ def test_errors_are_measured_around_zero_and_a_diverging_one_hides_no_other(cour
     for sign in (1.0, -1.0):
         wild = replace(one, theta=sign * np.tan(one.time))
         reach = 2.0 * 30.0
-        low, high = errors([replace(wild, theta_ref=half), wild]).axes[0].get_ylim()
+        low, high = over_time([replace(wild, theta_ref=half), wild], "error").axes[0].get_ylim()
         assert (low, high) == pytest.approx((-reach, reach), abs=1.0)
         assert low < -reach < reach < high, "a whole move to either side, and a little more"
 
@@ -191,7 +191,7 @@ def test_errors_are_measured_around_zero_and_a_diverging_one_hides_no_other(cour
 def test_the_logarithm_of_an_error_is_of_its_size_alone(course: Course) -> None:
     one = course("smc/printed")
     late = replace(one, seen=np.roll(one.theta, 3))
-    (axes,) = errors([late], log=True).axes
+    (axes,) = over_time([late], "size").axes
     assert labels(axes) == ["smc/printed"] and axes.get_ylabel() == "|error| [deg]"
 
 
@@ -254,11 +254,11 @@ def test_what_differs_by_less_than_a_millionth_is_not_drawn_twice(course: Course
     one = course("smc/exchanged")
     for share, apart in ((0.9e-6, False), (1.1e-6, True)):
         seen = one.theta + share * one.theta.max()
-        assert ("smc/exchanged as seen" in labels(angles([replace(one, seen=seen)]).axes[0])) == apart
+        assert ("smc/exchanged as seen" in labels(over_time([replace(one, seen=seen)], "angle").axes[0])) == apart
 
 
 def test_errors_below_a_hundred_millionth_are_left_out(course: Course) -> None:
     one = course("smc/printed")
     theta = one.theta_ref + np.where(np.arange(200) % 2, 1.1e-8, -0.9e-8)
-    drawn = np.asarray(errors([replace(one, theta=theta)], log=True).axes[0].lines[0].get_ydata())
+    drawn = np.asarray(over_time([replace(one, theta=theta)], "size").axes[0].lines[0].get_ydata())
     assert np.isnan(drawn[::2]).all() and np.isfinite(drawn[1::2]).all()

@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 import pytest
 from matplotlib.axes import Axes
-from matplotlib.collections import QuadMesh
 from matplotlib.lines import Line2D
 
 from tests.comparison.test_fair_answer import HARD, WORLDS, ranked, row
@@ -83,8 +82,9 @@ def test_worlds_stand_from_the_easiest_on_each_with_its_ratio_to_the_best_one_th
     rows = (row("smc/tuned", 1.0), row("pid/tuned", 2.0, failed=3), row("gvsc/tuned", 3.0, swings=9))
     ranking = ranked(*rows)
     axes = world_map(ranking).axes[0]
-    (mesh,) = [each for each in axes.collections if isinstance(each, QuadMesh)]
-    ratios = np.ma.filled(np.ma.masked_invalid(np.asarray(mesh.get_array(), float)), np.nan).reshape(4, WORLDS)
+    (drawn,) = axes.images
+    ratios = np.ma.filled(np.ma.masked_invalid(np.asarray(drawn.get_array(), float)), np.nan)
+    assert ratios.shape == (4, WORLDS)
     scores = np.array([ranking.rows[index].rmse for index in ranking.standing.order])
     easiest_first = np.argsort(scores.min(axis=0))
     wanted = (scores / scores.min(axis=0))[:, easiest_first]
@@ -95,8 +95,8 @@ def test_worlds_stand_from_the_easiest_on_each_with_its_ratio_to_the_best_one_th
     assert (fails.get_marker(), swings.get_marker()) == ("x", ".")
     for line, name, worlds in ((fails, "pid/tuned", 3), (swings, "gvsc/tuned", 9)):
         across, down = xy(line)
-        assert set(down) == {names.index(name) + 0.5}
-        assert set(easiest_first[(across - 0.5).astype(int)]) == set(range(worlds))
+        assert set(down) == {names.index(name)}
+        assert set(easiest_first[across.astype(int)]) == set(range(worlds))
 
 
 def test_a_term_that_helps_one_that_harms_and_one_that_nobody_can_tell_differ_in_colour() -> None:
@@ -137,8 +137,8 @@ def test_a_ranking_has_each_mean_with_its_interval_and_its_worlds_best_on_top() 
         assert ("x" in drawn) == bad and ("o" in drawn) != bad
         if bad:
             assert drawn["x"].get_color() == BLACK
-        caps = sorted(float(xy(line)[0][0]) for line in mine if line.get_marker() == "|")
-        assert caps == pytest.approx(sorted(mean[1:]))
+        (interval,) = [line for line in mine if len(xy(line)[0]) == 2]
+        assert sorted(xy(interval)[0]) == pytest.approx(sorted(mean[1:]))
 
 
 @pytest.mark.parametrize("width", [None, 1.6])

@@ -19,7 +19,7 @@ from wristctl.commands.hw_run.figures import (
     DIRECTIONS,
     Course,
     LoggedTrial,
-    desired_and_obtained,
+    bends_over_time,
     errors,
     lateness,
     paths,
@@ -57,7 +57,7 @@ Drawing = Callable[[Sequence[LoggedTrial], str], Figure]
 
 def test_angles_are_in_degrees_beside_what_was_wanted_and_simulated(trial: Maker) -> None:
     one = trial()
-    made = desired_and_obtained([one], "Trials")
+    made = bends_over_time([one], "Trials")
     (axes,) = made.axes
     for label, time, angle in (
         ("smc/exchanged", one.time, one.bend[:, 0]),
@@ -96,7 +96,7 @@ def test_tensions_are_those_of_the_side_that_pulls_and_of_the_other(trial: Maker
 
 def test_a_simulation_is_drawn_once_beside_the_first_repetition(trial: Maker) -> None:
     again = [trial(repetition=k) for k in range(3)]
-    for draw in (desired_and_obtained, errors):
+    for draw in (bends_over_time, errors):
         (axes,) = draw(again).axes
         assert len(named(axes, "smc/exchanged")) == 3 and len(named(axes, "smc/exchanged, simulated")) == 1
         alone = draw([again[1]]).axes[0], draw([replace(again[0], simulated=None)]).axes[0]
@@ -104,7 +104,7 @@ def test_a_simulation_is_drawn_once_beside_the_first_repetition(trial: Maker) ->
 
 
 @pytest.mark.parametrize("count", [1, 2, 3, 4])
-@pytest.mark.parametrize("draw", [desired_and_obtained, errors, tensions])
+@pytest.mark.parametrize("draw", [bends_over_time, errors, tensions])
 def test_each_direction_has_its_panel_in_the_papers_order(trial: Maker, draw: Drawing, count: int) -> None:
     names = DIRECTIONS[-count:]
     made = draw([trial(each) for each in reversed(names)], "")
@@ -136,7 +136,7 @@ def test_a_push_is_shaded_in_its_own_direction_from_its_beginning_to_its_end(tri
 
 
 def test_a_legend_names_each_course_once(trial: Maker) -> None:
-    made = desired_and_obtained([trial(each, k, (2.0, 2.5)) for each in DIRECTIONS for k in range(2)])
+    made = bends_over_time([trial(each, k, (2.0, 2.5)) for each in DIRECTIONS for k in range(2)])
     (legend,) = made.legends
     names = [text.get_text() for text in legend.get_texts()]
     assert sorted(names) == ["desired", "push", "smc/exchanged", "smc/exchanged, simulated"]

@@ -9,7 +9,7 @@ from wristctl.config.wrist import WristParameters
 from wristctl.control.response import FULL
 from wristctl.control.table import controller, gains_of
 from wristctl.errors import UserError
-from wristctl.plotting.bend_figure import bend_figure
+from wristctl.plotting.bend_figure import bend_motion
 from wristctl.simulation.bend_paths import BEND_PATHS, bend_path
 from wristctl.simulation.closed_loop import follow
 from wristctl.simulation.motion import Angles, Motion
@@ -208,7 +208,7 @@ def test_the_reach_of_weak_tendons_is_where_a_held_bend_saturates() -> None:
 
 def test_the_picture_draws_what_is_wanted_followed_and_in_reach() -> None:
     course = followed(bend_path("figure-of-8", 20.0, 1.0, 1.0))
-    (axes,) = bend_figure(course, reach_of_bends(WRIST, TendonLayout.of(WRIST))).axes
+    axes = bend_motion(course, reach_of_bends(WRIST, TendonLayout.of(WRIST))).axes[-1]
     lines = {line.get_label(): line.get_xydata() for line in axes.get_lines()}
     assert set(lines) == {"in reach", "wanted", "followed"}
     assert np.array(lines["followed"]) == pytest.approx(np.rad2deg(course.bend))

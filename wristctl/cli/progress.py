@@ -22,6 +22,8 @@ from wristctl.lanes.compile_time import COMPILE_TIME
 # Keywords with which the console prints text that is not rich's markup.
 PLAIN: dict[str, Any] = {"markup": False, "emoji": False, "highlight": False, "soft_wrap": True}
 
+# What goes on between two tasks, and after the last one: what was found is written.
+_BETWEEN = "writing"
 # Seconds after which a step that is not over has a plain line; each line later doubles the time, up to the most.
 _FIRST_LINE, _LINE_EVERY = 10.0, 300.0
 
@@ -127,6 +129,7 @@ class Bar:
                 yield advance
         finally:
             over.set()
+            self._show(Count(_BETWEEN, None, ""))
 
     def _tell(self, over: threading.Event) -> None:
         passed = 0.0

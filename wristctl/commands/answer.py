@@ -46,6 +46,15 @@ class Answer:
                 kept.append(note)
         return replace(self, notes=kept)
 
+    def ending(self, sentences: Sequence[str]) -> Answer:
+        """The answer with these sentences last: a paragraph each, else in one as many as a screen has room for."""
+        apart = replace(self, notes=[*self.notes, *sentences])
+        if apart.fits:
+            return apart
+        counts = range(len(sentences), 0, -1)
+        together = (replace(self, notes=[*self.notes, " ".join(sentences[:count])]) for count in counts)
+        return next((answer for answer in together if answer.fits), self)
+
     def __str__(self) -> str:
         return "\n".join(self.lines())
 

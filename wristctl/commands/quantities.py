@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal
 
 from wristctl.commands.printed_table import Table, number
+from wristctl.reader_units import metric_in_words
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -23,6 +24,8 @@ _SCALES = {
     ("1/s", "Hz"): 1.0, ("s", "ms"): 1e3, ("m", "mm"): 1e3, ("m", "um"): 1e6, ("J", "mJ"): 1e3, ("", "%"): 100.0,
     ("rad", "deg"): 180.0 / math.pi,
 }  # fmt: skip
+# Digits of a number in a sentence.
+_DIGITS = 3
 # Heads of a table of ranges, and of one of single values.
 RANGE, VALUE = ("quantity", "least", "greatest", "unit"), ("what", "value")
 
@@ -57,6 +60,22 @@ class Quantity:
         if not self.shown or value is None or isinstance(value, str | bool):
             return value
         return _SCALES[self.unit, self.shown] * value
+
+    def said(self, value: Any) -> str:
+        """A value with its unit in a sentence, to three digits."""
+        cell, unit = self.cell(value), self.shown or self.unit
+        text = str(cell) if isinstance(cell, str | bool) else f"{cell:.{_DIGITS}g}"
+        return f"{text} {unit}" if unit else text
+
+
+def of_metric(name: str, unit: str = "") -> Quantity:
+    """A metric of a closed loop under its heading in tables, or another number in `unit`. Less is better."""
+    from wristctl.simulation.metrics import metrics_in
+
+    metric = metrics_in(2).get(name)
+    unit, meaning, heading = (metric.unit, metric.formula, metric.heading) if metric else (unit, "", "")
+    words = heading.partition(" [")[0] or metric_in_words(name, unit)
+    return Quantity(name, unit, meaning, words, "deg" if unit == "rad" else "", "lower")
 
 
 def table_of(title: str, quantities: Sequence[Quantity], records: Iterable[Mapping[Any, Any]]) -> Table:

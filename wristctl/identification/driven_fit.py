@@ -59,14 +59,14 @@ def motion_of(parts: Sequence[Array]) -> float:
 
 def fitted_logs(
     logs: Sequence[OpenLog], wrist: WristParameters, settings: IdentifySettings,
-    report: Callable[[int], None] = lambda count: None,
+    told: Callable[[float], object] = lambda share: None,
 ) -> DrivenFit:  # fmt: skip
-    """Fit logs, of which a part is predicted by each model that is tried. UserError as `driven_robot`."""
+    """Fit logs, of which a part is predicted by each model that is tried. UserError as `driven_robot`.
+
+    `told` is called with the share of the models' work that is done.
+    """
     robot, recordings, remarks = driven_robot(logs, wrist, settings)
-    models = list[TriedModel]()
-    for model in tried_models(robot, [recordings], False):
-        models.append(model)
-        report(len(models))
+    models = list(tried_models(robot, [recordings], False, told=told))
     chosen = chosen_of(models)
     whole = [replace(one, fitted=one.fitted | one.asked, asked=np.zeros(len(one.time), bool)) for one in recordings]
     fit = whole_fit(models, whole)

@@ -7,7 +7,7 @@ error of the predicted part smaller, by a 95 % interval of the ratio paired by b
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -21,6 +21,9 @@ from wristctl.identification.prediction_scores import Score, ratio_of, score_of
 # Beginnings of the search for presliding [m] and [rad]: its errors have several minima. Else it begins where the model
 # without the term ends.
 _BEGINS = ({"presliding": 5e-5, "inner_presliding": 0.01}, {"presliding": 5e-4, "inner_presliding": 0.1})
+# Time of a fit with friction of tendons over that of one without, and of one with more than two terms over that of one
+# with fewer; fits that are expected once each term was tried alone: those of a robot with both frictions, as most have.
+_RUBBING, _LONGER, _FOLLOWING = 3.0, 2.7, 30.0
 # Unknowns that are 0 in a model without their term.
 _AMOUNTS = ("friction", "sheath", "inner_friction", "creep")
 # Share of the error by which a term lessens it at least where it is wanted: less is of nobody's concern.
@@ -80,9 +83,32 @@ def _likely(ratio: Score) -> float:
     return float(norm.cdf(-math.log(ratio.error) / deviation)) if deviation else float(ratio.error < 1.0)
 
 
+class _Work:
+    """Fits that were made and that are expected, in those of a model without friction."""
+
+    def __init__(self, told: Callable[[float], object], robot: ArcRobot, cases: int) -> None:
+        self._told, self._robot, self._cases = told, robot, cases
+        self._done = self._ahead = 0.0
+
+    def expect(self, models: Sequence[tuple[Term, ...]], more: float = 0.0) -> None:
+        """Expect these models next, and `more` fits of each case after them."""
+        fits = sum(len(_starts(self._robot, terms)) * _effort(terms) for terms in models)
+        self._ahead = self._cases * (fits + more)
+
+    def made(self, terms: tuple[Term, ...]) -> None:
+        """Tell the share of the work that is done by now, after another fit with these terms."""
+        self._done, self._ahead = self._done + _effort(terms), max(0.0, self._ahead - _effort(terms))
+        self._told(self._done / (self._done + self._ahead))
+
+
+def _effort(terms: Sequence[Term]) -> float:
+    return _RUBBING ** ("tendon friction" in terms) * _LONGER ** (len(terms) > 2)
+
+
 def tried_models(
-    robot: ArcRobot, cases: Sequence[Sequence[ArcRecording]], centred: bool, terms: Sequence[Term] | None = None
-) -> Iterator[TriedModel]:
+    robot: ArcRobot, cases: Sequence[Sequence[ArcRecording]], centred: bool, terms: Sequence[Term] | None = None,
+    told: Callable[[float], object] = lambda share: None,
+) -> Iterator[TriedModel]:  # fmt: skip
     """Models as they are fitted: elastic arcs alone, with slack, then with each other term, last with all wanted ones.
 
     Parameters
@@ -90,49 +116,62 @@ def tried_models(
     cases : recordings that are fitted together, several times
     centred : whether the mean error of what is predicted does not count
     terms : those of the one model that is fitted beside elastic arcs alone; None: what the data want is looked for
+    told : called after each fit with the share of the work that is done, as far as it is known by then
     """
-    plain = _tried(robot, cases, centred, (), None)
+    work = _Work(told, robot, len(cases))
+
+    def tried(terms: tuple[Term, ...], without: TriedModel | None) -> TriedModel:
+        return _tried(robot, cases, centred, terms, without, work)
+
+    single = [term for term in robot.terms if term != "slack"]
+    slack_first: tuple[Term, ...] = ("slack",) if "slack" in robot.terms else ()
+    if terms is None:
+        work.expect([(), *[slack_first] * len(slack_first), *((*slack_first, term) for term in single)], _FOLLOWING)
+    else:
+        work.expect([(), tuple(terms)] if terms else [()])
+    plain = tried((), None)
     yield plain
     if terms is not None:
         if terms:
-            yield _tried(robot, cases, centred, tuple(terms), plain)
+            yield tried(tuple(terms), plain)
         return
     base = plain
-    if "slack" in robot.terms:
-        slack = _tried(robot, cases, centred, ("slack",), plain)
+    if slack_first:
+        slack = tried(slack_first, plain)
         yield slack
         base = plain if slack.verdict == "unwanted" else slack
     others = list[TriedModel]()
-    for term in (term for term in robot.terms if term != "slack"):
-        others.append(_tried(robot, cases, centred, (*base.terms, term), base))
+    for term in single:
+        others.append(tried((*base.terms, term), base))
         yield others[-1]
     wanted = sorted((model for model in others if model.verdict == "wanted"), key=lambda model: model.score.error)
-    if robot.weighed and wanted:
-        yield from _held_again(robot, cases, centred, wanted, base)
-    elif len(wanted) > 1:
-        best, *rest = wanted
-        yield _tried(robot, cases, centred, (*best.terms, *(model.terms[-1] for model in rest)), best)
+    if not wanted:
+        return
+    best, *rest = wanted
+    if robot.weighed:
+        yield from _held_again(tried, work, wanted, base)
+    elif rest:
+        together = (*best.terms, *(model.terms[-1] for model in rest))
+        work.expect([together])
+        yield tried(together, best)
 
 
 def _held_again(
-    robot: ArcRobot, cases: Sequence[Sequence[ArcRecording]], centred: bool, wanted: Sequence[TriedModel],
+    tried: Callable[[tuple[Term, ...], TriedModel | None], TriedModel], work: _Work, wanted: Sequence[TriedModel],
     base: TriedModel,
 ) -> Iterator[TriedModel]:  # fmt: skip
     """Slack that was not told and other wanted terms, each beside the best term: without it they may stand for it."""
     best, *rest = wanted
-    if base.terms == ("slack",) and base.verdict != "wanted":
-        bare = _tried(robot, cases, centred, best.terms[1:], None)
+    alone = [best.terms[1:]] if base.terms == ("slack",) and base.verdict != "wanted" else []
+    work.expect([*alone, *((*best.terms, model.terms[-1]) for model in rest)])
+    for terms in alone:
+        bare = tried(terms, None)
         yield bare
         yield TriedModel((*bare.terms, "slack"), best.fits, bare)
     for model in rest:
-        more = _tried(robot, cases, centred, (*best.terms, model.terms[-1]), best)
+        more = tried((*best.terms, model.terms[-1]), best)
         yield more
         best = more if more.verdict == "wanted" else best
-
-
-def most_models(robot: ArcRobot) -> int:
-    """The number of models that are tried of a robot, as a rule."""
-    return len(robot.terms) + (4 if robot.weighed else 2)
 
 
 def chosen_of(models: Sequence[TriedModel]) -> TriedModel:
@@ -182,19 +221,29 @@ def _by_rivals(models: Sequence[TriedModel], chosen: TriedModel, name: str) -> f
     return sum_of_squares / (1.0 + odds)
 
 
-def _tried(
-    robot: ArcRobot, cases: Sequence[Sequence[ArcRecording]], centred: bool, terms: tuple[Term, ...],
-    without: TriedModel | None,
-) -> TriedModel:  # fmt: skip
+def _starts(robot: ArcRobot, terms: tuple[Term, ...]) -> list[tuple[Mapping[str, float], bool]]:
+    """Beginnings of the searches for a model, and whether each goes on from the model without its last term."""
     added = [name for term in terms for name in OF_TERM[term]]
     begins = _BEGINS if any(name.endswith("presliding") for name in added) else ({},)
+    starts: list[tuple[Mapping[str, float], bool]] = [(begin, True) for begin in begins]
+    if terms == ("slack",):
+        starts.append(({}, False))
+    # Without inner friction tendons and damping may stand for it.
+    if robot.weighed and "slack" in robot.terms and "inner friction" in terms:
+        starts += [(begin, False) for begin in begins]
+    return starts
+
+
+def _tried(
+    robot: ArcRobot, cases: Sequence[Sequence[ArcRecording]], centred: bool, terms: tuple[Term, ...],
+    without: TriedModel | None, work: _Work,
+) -> TriedModel:  # fmt: skip
     fits = []
     for number, recordings in enumerate(cases):
         before = without.fits[number].values if without else {}
-        starts = [{**begin, **before} for begin in begins] + [{}] * (terms == ("slack",))
-        # Without inner friction tendons and damping may stand for it.
-        if robot.weighed and "slack" in robot.terms and "inner friction" in terms:
-            starts += [dict(begin) for begin in begins]
-        tried = [fit_arcs(robot, terms, recordings, centred, start) for start in starts]
-        fits.append(min(tried, key=lambda fit: fit.cost))
+        found = list[ArcFit]()
+        for begin, goes_on in _starts(robot, terms):
+            found.append(fit_arcs(robot, terms, recordings, centred, {**begin, **(before if goes_on else {})}))
+            work.made(terms)
+        fits.append(min(found, key=lambda fit: fit.cost))
     return TriedModel(terms, tuple(fits), without)

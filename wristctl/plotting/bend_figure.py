@@ -1,6 +1,7 @@
 """Figures of a motion in two planes: the plane of bends with the tendons' reach, and errors and pulls over time."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -25,13 +26,8 @@ from wristctl.simulation.trajectory import Trajectory
 
 # In colours that no tendon has: they share a legend.
 _OF_PLANES = (("toward ulnar", INDIGO), ("toward flexion", SKY))
-
-
-def bend_figure(course: Trajectory, reach: Array, heading: str = "") -> Figure:
-    """The plane of bends; `reach` is a closed line (K, 2) [rad], as `reach_of_bends` gives it."""
-    picture = Figure(figsize=(5.0, 5.0), layout="constrained")
-    _plane_of_bends(picture.add_subplot(), course, reach, heading).legend(loc="upper right")
-    return picture
+# Line style of a path that is wanted in the plane of bends.
+WANTED_PATH = WANTED | {"label": "wanted"}
 
 
 def bend_motion(course: Trajectory, reach: Array, heading: str = "") -> Figure:
@@ -39,7 +35,8 @@ def bend_motion(course: Trajectory, reach: Array, heading: str = "") -> Figure:
     picture, axes = figure(2, 2, height=4.6, width_ratios=(1.0, 1.25))
     for panel in axes[:, 0]:
         panel.remove()
-    _plane_of_bends(picture.add_subplot(axes[0, 0].get_gridspec()[:, 0]), course, reach, heading)
+    paths = [(course.bend_ref, WANTED_PATH), (course.bend, {"color": GREEN, "label": "followed"})]
+    draw_plane_of_bends(picture.add_subplot(axes[0, 0].get_gridspec()[:, 0]), paths, heading, reach)
     errors, pulls = axes[:, 1]
     for error, (name, shade) in zip(course.error.T, _OF_PLANES, strict=True):
         draw_course(errors, course.time, np.degrees(error), shade, f"error {name}")
@@ -59,23 +56,25 @@ def bend_overlay(courses: Sequence[Trajectory], heading: str = "") -> Figure:
     What nobody can measure is drawn as 0.001 deg.
     """
     picture, ((left, right),) = figure(1, 2, height=3.8, width_ratios=(1.0, 1.25))
-    left.plot(*np.rad2deg(courses[0].bend_ref).T, **WANTED | {"label": "wanted"})
-    for course in courses:
-        left.plot(*np.rad2deg(course.bend).T, label=label(course), **line(course.label))
-    left.set_aspect("equal", adjustable="datalim")
-    left.set(xlabel="bend toward ulnar [deg]", ylabel="bend toward flexion [deg]")
+    followed = [(course.bend, {**line(course.label), "label": label(course)}) for course in courses]
+    draw_plane_of_bends(left, [(courses[0].bend_ref, WANTED_PATH), *followed], heading)
     draw_sizes_of_errors(right, courses)
-    title(left, heading)
+    right.set_xlabel("time [s]")
     legend_below(picture)
     return picture
 
 
-def _plane_of_bends(axes: Axes, course: Trajectory, reach: Array, heading: str) -> Axes:
-    axes.plot(*np.rad2deg(reach).T, **DOTTED, label="in reach")
-    axes.plot(*np.rad2deg(course.bend_ref).T, **WANTED | {"label": "wanted"})
-    axes.plot(*np.rad2deg(course.bend).T, color=GREEN, label="followed")
-    axes.set_aspect("equal")
-    axes.set_xlabel("bend toward ulnar [deg]")
-    axes.set_ylabel("bend toward flexion [deg]")
+def draw_plane_of_bends(
+    axes: Axes, paths: Iterable[tuple[Array, Mapping[str, Any]]], heading: str = "", reach: Array | None = None
+) -> None:
+    """Draw paths (N, 2) [rad] in the plane of bends [deg], each in its style with its label.
+
+    `reach` is a closed line (K, 2) [rad], as `reach_of_bends` gives it.
+    """
+    if reach is not None:
+        axes.plot(*np.rad2deg(reach).T, **DOTTED, label="in reach")
+    for path, style in paths:
+        axes.plot(*np.rad2deg(path).T, **style)
+    axes.set_aspect("equal", adjustable="datalim")  # a box of another shape would push the title off the picture
+    axes.set(xlabel="bend toward ulnar [deg]", ylabel="bend toward flexion [deg]")
     title(axes, heading)
-    return axes

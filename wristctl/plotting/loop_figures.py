@@ -1,6 +1,6 @@
 """Figures of closed loops over time: angle, error, tensions and torque."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -36,21 +36,22 @@ _LAST = 20
 _COLUMNS, _SAMPLES_OF_PART = 500, 4
 
 
-def angles(trajectories: Sequence[Trajectory], heading: str = "") -> Figure:
-    """Desired and obtained bending angle [deg] over time [s], one line for each trajectory.
+# Draws a part of courses over time on its axes, and names it.
+Part = Callable[[Axes, Sequence[Trajectory]], None]
 
-    The reference is drawn on its own where it differs from the desired angle (a network's error), and so is what the
-    controller sees where that differs from the angle (a camera's delay).
+
+def over_time(courses: Sequence[Trajectory], *parts: str | Part, heading: str = "") -> Figure:
+    """Courses over time [s], a line for each; the parts stand below each other.
+
+    `angle` and `error` [deg] are drawn also as the controller sees them where that differs (a camera's delay and
+    noise), a reference on its own where it differs from the desired angle (a network's error). `size` is that of the
+    error, log, and `measurable size` the same with 0.001 deg for what nobody can measure.
     """
-    picture, ((axes,),) = figure(height=3.4)
-    for course in trajectories:
-        axes.plot(course.time, np.degrees(course.theta), label=label(course), **line(course.label))
-        if (measured := _apart(course.seen, course.theta)) is not None:
-            axes.plot(course.time, np.degrees(measured), label=f"{course.label} as seen", **THIN)
-    draw_desired(axes, trajectories)
-    within_half_a_move(axes, trajectories)
-    axes.set(xlabel="time [s]", ylabel="bending angle [deg]")
-    title(axes, heading)
+    picture, axes = figure(len(parts), 1, height=2.4 + len(parts), sharex=True)
+    for panel, part in zip(axes[:, 0], parts, strict=True):
+        (_PARTS[part] if isinstance(part, str) else part)(panel, courses)
+    axes[-1, 0].set_xlabel("time [s]")
+    title(axes[0, 0], heading)
     legend_below(picture)
     return picture
 
@@ -62,27 +63,47 @@ def one_motion(course: Trajectory, heading: str = "") -> Figure:
     """
     picture, axes = figure(3, 1, height=5.4, sharex=True, height_ratios=(3, 2, 2))
     above, middle, below = axes[:, 0]
-    style = line(course.label)
-    above.plot(course.time, np.degrees(course.theta), label=label(course), **style)
-    middle.plot(course.time, np.degrees(course.error), **style)
-    if (measured := _apart(course.seen, course.theta)) is not None:
-        above.plot(course.time, np.degrees(measured), label="as seen", **THIN)
-        middle.plot(course.time, np.degrees(measured - course.theta_ref), **THIN)
-    draw_desired(above, [course])
-    within_half_a_move(above, [course])
-    middle.axhline(0.0, color=BLACK, linewidth=0.8, zorder=1.0)
-    _within_errors(middle, [course])
+    _draw_angles(above, [course], "as seen")
+    _draw_errors(middle, [course], "as seen")
     for side, shade, tension in zip("+-", (ORANGE, PURPLE), course.tension.T, strict=True):
         draw_course(below, course.time, tension, shade, label=f"{side} side")
     below.set_ylim(bottom=0.0)
-    legend(below, loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=2, borderaxespad=0.0)
-    for panel, name in zip((above, middle, below), ("angle [deg]", "error [deg]", "tension [N]"), strict=True):
-        panel.set_ylabel(name)
-    below.set_xlabel("time [s]")
+    above.set_ylabel("angle [deg]")
+    below.set(xlabel="time [s]", ylabel="tension [N]")
     picture.align_ylabels()
     title(above, heading)
     legend(above, loc="lower right")
+    legend(below, loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=2, borderaxespad=0.0)
     return picture
+
+
+def _draw_angles(axes: Axes, trajectories: Sequence[Trajectory], seen: str = "{} as seen") -> None:
+    for course in trajectories:
+        axes.plot(course.time, np.degrees(course.theta), label=label(course), **line(course.label))
+        if (measured := _apart(course.seen, course.theta)) is not None:
+            axes.plot(course.time, np.degrees(measured), label=seen.format(course.label), **THIN)
+    draw_desired(axes, trajectories)
+    within_half_a_move(axes, trajectories)
+    axes.set_ylabel("bending angle [deg]")
+
+
+def _draw_errors(axes: Axes, trajectories: Sequence[Trajectory], seen: str = "{} as seen") -> None:
+    for course in trajectories:
+        axes.plot(course.time, np.degrees(course.error), label=label(course), **line(course.label))
+        if (measured := _apart(course.seen, course.theta)) is not None:
+            error = np.degrees(measured - course.theta_ref)
+            axes.plot(course.time, error, label=seen.format(course.label), **THIN)
+    axes.axhline(0.0, color=BLACK, linewidth=0.8, zorder=1.0)
+    _within_errors(axes, trajectories)
+    axes.set_ylabel("error [deg]")
+
+
+def _draw_sizes(axes: Axes, trajectories: Sequence[Trajectory]) -> None:
+    for course in trajectories:
+        size = np.degrees(np.where(course.distance < _SMALLEST, np.nan, course.distance))
+        axes.plot(course.time, size, label=label(course), **line(course.label))
+    logarithmic(axes.yaxis)
+    axes.set_ylabel("|error| [deg]")
 
 
 def draw_course(axes: Axes, time: Array, course: Array, shade: str, label: str = "") -> None:
@@ -108,48 +129,6 @@ def in_parts(course: Array) -> Array:
     return course[: len(course) // size * size].reshape(-1, size)
 
 
-def errors(trajectories: Sequence[Trajectory], heading: str = "", log: bool = False) -> Figure:
-    """Error e = theta - theta_ref [deg] over time [s], as in the paper's figures of SMC and PID; `log` for |e|.
-
-    Beside it, but not with `log`, the error that the controller sees where that differs (a camera's delay and noise).
-    """
-    picture, ((axes,),) = figure(height=3.4)
-    for course in trajectories:
-        error = np.where(course.distance < _SMALLEST, np.nan, course.distance) if log else course.error
-        axes.plot(course.time, np.degrees(error), label=label(course), **line(course.label))
-        if not log and (measured := _apart(course.seen, course.theta)) is not None:
-            seen = np.degrees(measured - course.theta_ref)
-            axes.plot(course.time, seen, label=f"{course.label} as seen", **THIN)
-    if log:
-        logarithmic(axes.yaxis)
-    else:
-        axes.axhline(0.0, color=BLACK, linewidth=0.8, zorder=1.0)
-        _within_errors(axes, trajectories)
-    axes.set(xlabel="time [s]", ylabel="|error| [deg]" if log else "error [deg]")
-    title(axes, heading)
-    legend_below(picture)
-    return picture
-
-
-def overlay(trajectories: Sequence[Trajectory], heading: str = "") -> Figure:
-    """Angle and, below it, size of the error [deg] over time [s], one line for each trajectory.
-
-    What nobody can measure is drawn as 0.001 deg.
-    """
-    picture, ((above,), (below,)) = figure(2, 1, height=4.4, sharex=True)
-    for course in trajectories:
-        above.plot(course.time, np.degrees(course.theta), label=label(course), **line(course.label))
-    draw_desired(above, trajectories)
-    within_half_a_move(above, trajectories)
-    draw_sizes_of_errors(below, trajectories)
-    largest = max(float(np.degrees(np.abs(course.theta_ref)).max()) for course in trajectories)
-    _at_most(below, 0.5 * _LEAST_DEG, 2.0 * largest + 1.0)
-    above.set(ylabel="bending angle [deg]")
-    title(above, heading)
-    legend_below(picture)
-    return picture
-
-
 def draw_sizes_of_errors(axes: Axes, trajectories: Sequence[Trajectory]) -> None:
     """Draw the size of each error [deg] over time [s] on a logarithmic axis.
 
@@ -159,6 +138,8 @@ def draw_sizes_of_errors(axes: Axes, trajectories: Sequence[Trajectory]) -> None
     for course, size in zip(trajectories, sizes, strict=True):
         axes.plot(course.time, np.maximum(size, _LEAST_DEG), **line(course.label))
     logarithmic(axes.yaxis)
+    largest = max(float(np.degrees(size_of(course.bend_ref)).max()) for course in trajectories)
+    _at_most(axes, 0.5 * _LEAST_DEG, 2.0 * largest + 1.0)
     floored = any((size < _LEAST_DEG).any() for size in sizes)
     least = f"\n(less than {_LEAST_DEG:g} as {_LEAST_DEG:g})" if floored else ""
     axes.set(xlabel="time [s]", ylabel=f"|error| [deg]{least}")
@@ -257,22 +238,27 @@ def _at_most(axes: Axes, low: float, high: float) -> None:
     axes.set_ylim(max(bottom, low), min(top, high))
 
 
-def error_sizes(repeated: Sequence[Repeated], heading: str = "") -> Figure:
-    """Size of the error |theta - theta_ref| [deg] over time [s]: the repetitions' median with its 95 % interval.
+def spread_of_sizes(repeated: Sequence[Repeated]) -> Part:
+    """The part of `over_time` with the size of the error [deg]: the repetitions' median with its 95 % interval.
 
     A repetition that diverged counts as the largest error; with fewer than six there is no band.
     """
-    picture, ((axes,),) = figure(height=3.4)
-    for loop in repeated:
-        course = loop.first.trajectory
-        errors = np.degrees(size_of(loop.errors.reshape(*loop.errors.shape[:2], -1)))
-        median, low, high = spread_over_time(errors)
-        style = line(course.label)
-        label = course.label + (f", {loop.failed.sum()} failed" if loop.failed.any() else "")
-        axes.plot(course.time, np.where(np.isfinite(median), median, np.nan), label=label, **style)
-        axes.fill_between(course.time, low, high, color=style["color"], alpha=0.25, linewidth=0.0)
-    axes.axhline(0.0, color=BLACK, linewidth=0.8, zorder=1.0)
-    axes.set(xlabel="time [s]", ylabel=f"median |error| of {len(repeated[0].errors)} [deg]")
-    title(axes, heading)
-    legend_below(picture)
-    return picture
+
+    def draw(axes: Axes, _: Sequence[Trajectory]) -> None:
+        for loop in repeated:
+            course = loop.first.trajectory
+            errors = np.degrees(size_of(loop.errors.reshape(*loop.errors.shape[:2], -1)))
+            median, low, high = spread_over_time(errors)
+            style = line(course.label)
+            label = course.label + (f", {loop.failed.sum()} failed" if loop.failed.any() else "")
+            axes.plot(course.time, np.where(np.isfinite(median), median, np.nan), label=label, **style)
+            axes.fill_between(course.time, low, high, color=style["color"], alpha=0.25, linewidth=0.0)
+        axes.axhline(0.0, color=BLACK, linewidth=0.8, zorder=1.0)
+        axes.set_ylabel(f"median |error| of {len(repeated[0].errors)} [deg]")
+
+    return draw
+
+
+_PARTS: dict[str, Part] = {
+    "angle": _draw_angles, "error": _draw_errors, "size": _draw_sizes, "measurable size": draw_sizes_of_errors,
+}  # fmt: skip

@@ -17,8 +17,8 @@ from typing import TYPE_CHECKING, Any, TypeVar
 from wristctl.escape import printable, printable_lines
 from wristctl.plain_files import read_plain, unreadable
 from wristctl.plotting.animation import animation
-from wristctl.plotting.page_tables import metric_in_words, shown_tables
-from wristctl.reader_units import in_degrees
+from wristctl.plotting.page_tables import shown_tables
+from wristctl.reader_units import in_degrees, metric_in_words
 from wristctl.records.lineage import Ancestor, ancestry
 from wristctl.records.manifest import CONFIG, Manifest, read_overview
 from wristctl.records.run import Run

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Sequence
 from typing import Any
 
 from wristctl.errors import Call, UserError
-from wristctl.reader_units import in_degrees, readable
+from wristctl.reader_units import in_degrees, metric_in_words, readable
 from wristctl.records.manifest import TABLES
 from wristctl.records.run import Run
 from wristctl.study_files.keys import command_of
@@ -85,9 +84,3 @@ def _row(entry: dict[Any, Any], units: dict[str, str], many: bool, verdicts: dic
 
 def _head(name: str, unit: str) -> str:
     return f"{metric_in_words(name)} [{unit}]" if unit and unit != "1" else metric_in_words(name)
-
-
-def metric_in_words(name: str, unit: str = "") -> str:
-    """Name of a metric for people, without the unit that stands beside it: `tip_rmse_mm` [mm] is `tip RMSE`."""
-    words = name.removesuffix(f"_{unit}").replace("_", " ")
-    return re.sub(r"\brmse\b", "RMSE", re.sub(r"^r2$", "R^2", words))

@@ -6,6 +6,7 @@ from textwrap import fill
 from typing import Any
 
 import numpy as np
+from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import LogLocator
@@ -13,6 +14,7 @@ from matplotlib.ticker import LogLocator
 from wristctl.comparison.bootstrap import penalised
 from wristctl.comparison.controller_ranking import Ranking, probability_of_less
 from wristctl.comparison.tie_groups import performance_profiles
+from wristctl.plotting.kinds import UNUSABLE, Dot, draw_cells, draw_dots, name_rows
 from wristctl.plotting.style import (
     BLACK,
     GREY,
@@ -27,14 +29,11 @@ from wristctl.plotting.style import (
     line,
     logarithmic,
     title,
-    undress,
 )
 
 _FACTORS = np.geomspace(1.0, 30.0, 200)
 # Controllers in one panel, at most.
 _SHOWN = 7
-# Mark of what must not be used: in black, which is no controller's colour.
-_UNUSABLE: dict[str, Any] = {"marker": "x", "color": BLACK, "markersize": 4.5, "markeredgewidth": 1.2}
 # Marks of gains, and of further presets in their order.
 _MARKS = {"default": "o", "printed": "v", "exchanged": "D", "tuned": "s"}
 _FURTHER = ("^", "P", "h", "<", ">", "*")
@@ -53,15 +52,11 @@ def answer_figure(rankings: Sequence[Ranking], places: Mapping[str, str]) -> Fig
     marks = _marks(labels)
     picture, ((axes,),) = figure(height=1.4 + len(rankings) * (0.25 + 0.055 * most))
     for band, ranking in enumerate(rankings):
+        dots = []
         for step, row in enumerate(ranking.standing.order):
-            name, _, gains = ranking.labels[row].partition("/")
-            mean, height = ranking.means[row], band + 0.9 * ((step + 0.5) / most - 0.5)
-            ends, shade = np.degrees([mean.low, mean.high]), colour(name)
-            if np.isfinite(ends).all():
-                axes.plot(ends, [height, height], color=shade, linewidth=1.0, zorder=1.8)
-            usable = row not in ranking.standing.unusable
-            mark = {"marker": marks[gains], "color": shade, "markersize": 4.5} if usable else _UNUSABLE
-            axes.plot(np.degrees(mean.value), height, linestyle="none", **mark)
+            _, _, gains = ranking.labels[row].partition("/")
+            dots.append(_dot(ranking, row, band + 0.9 * ((step + 0.5) / most - 0.5), {"marker": marks[gains]}))
+        draw_dots(axes, dots, 1.0, 4.5)
         if band:
             axes.axhline(band - 0.5, color=SILVER, linewidth=0.8)
     axes.set_yticks(range(len(rankings)), [places[ranking.name] for ranking in rankings])
@@ -83,9 +78,18 @@ def answer_figure(rankings: Sequence[Ranking], places: Mapping[str, str]) -> Fig
         if len(marks) > 1
     ]
     if any(ranking.standing.unusable for ranking in rankings):
-        handles.append(Line2D([], [], linestyle="none", label="must not be used", **_UNUSABLE))
+        handles.append(Line2D([], [], linestyle="none", label="must not be used", **UNUSABLE))
     legend_under(picture, handles, 3)
     return picture
+
+
+def _dot(ranking: Ranking, row: int, place: float, mark: Mapping[str, Any], cases: bool = False) -> Dot:
+    """Mean error of a row [deg] with its 95 % interval, and with those of its cases where they are asked for."""
+    mean, scores = ranking.means[row], ranking.scores[row]
+    points = np.degrees(scores[np.isfinite(scores)]) if cases else scores[:0]
+    value, low, high = np.degrees([mean.value, mean.low, mean.high]).tolist()
+    mark = UNUSABLE if row in ranking.standing.unusable else mark
+    return Dot(place, value, colour(ranking.labels[row].split("/")[0]), (low, high), points, mark)
 
 
 def _gains_words(gains: str) -> str:
@@ -166,18 +170,18 @@ def paired_ratios(rankings: Sequence[Ranking], baseline: str, places: Mapping[st
     picture, panels = _panels(having, 0.5 + 0.19 * len(labels), 0.95, sharex=True, sharey=True)
     for panel, ranking in zip(panels, having, strict=True):
         base = ranking.labels.index(baseline)
-        scores, bad = penalised(ranking.scores), ranking.standing.unusable
+        scores, dots = penalised(ranking.scores), list[Dot]()
         for height, label in enumerate(labels):
             if label not in ranking.labels:
                 continue
             row = ranking.labels.index(label)
-            inverse, shade = ranking.times_better(row, base), colour(label.split("/")[0])
-            ratios = scores[row] / scores[base]
-            panel.plot(ratios, np.full(len(ratios), height), ".", color=shade, markersize=2.5, alpha=0.4)
-            if np.isfinite(inverse.high) and inverse.low > 0.0:
-                panel.plot([1.0 / inverse.high, 1.0 / inverse.low], [height] * 2, color=shade, linewidth=1.6)
-            mark = _UNUSABLE if row in bad else {"marker": "D", "color": shade, "markersize": 3.5}
-            panel.plot(1.0 / inverse.value, height, linestyle="none", **mark)
+            inverse = ranking.times_better(row, base)
+            told = np.isfinite(inverse.high) and inverse.low > 0.0
+            ends = (1.0 / inverse.high, 1.0 / inverse.low) if told else (np.nan, np.nan)
+            mark = UNUSABLE if row in ranking.standing.unusable else {"marker": "D"}
+            shade = colour(label.split("/")[0])
+            dots.append(Dot(height, 1.0 / inverse.value, shade, ends, scores[row] / scores[base], mark))
+        draw_dots(panel, dots, size=3.5)
         panel.axvline(1.0, color=BLACK, linewidth=0.8)
         logarithmic(panel.xaxis)
         panel.xaxis.set_major_locator(LogLocator(numticks=3))
@@ -192,7 +196,7 @@ def paired_ratios(rankings: Sequence[Ranking], baseline: str, places: Mapping[st
         Line2D([], [], marker=".", markersize=4.0, label=f"a {having[0].unit}", **marks),
     ]
     if any(ranking.standing.unusable for ranking in having):
-        handles.append(Line2D([], [], linestyle="none", label="must not be used", **_UNUSABLE))
+        handles.append(Line2D([], [], linestyle="none", label="must not be used", **UNUSABLE))
     legend_under(picture, handles, 3)
     return picture
 
@@ -222,13 +226,12 @@ def probability_of_better(ranking: Ranking, place: str) -> Figure:
     shares = shares[:-1, 1:] if len(order) > 1 else shares
     names = [_called(ranking.labels[row]) for row in order]
     picture, ((axes,),) = figure(height=max(2.8, 1.5 + 0.28 * len(order)))
-    undress(axes)
-    drawn = axes.imshow(shares, cmap="PuOr", vmin=-40.0, vmax=140.0, aspect="auto")
+
+    def said(row: int, column: int) -> dict[str, Any]:
+        return {"s": f"{shares[row, column]:.0f}", "fontsize": 7.5}
+
     room = picture.get_figwidth() / (len(order) + 5)
-    if room > 0.24:
-        for (row, column), share in np.ndenumerate(shares):
-            if np.isfinite(share):
-                axes.text(column, row, f"{share:.0f}", ha="center", va="center", fontsize=7.5)
+    drawn = draw_cells(axes, shares, "PuOr", Normalize(-40.0, 140.0), said if room > 0.24 else None)
     axes.set_xticks(range(shares.shape[1]), names[-shares.shape[1] :], rotation=90.0)
     axes.set_yticks(range(shares.shape[0]), names[: shares.shape[0]])
     title(axes, f"{place}, {ranking.cases}")
@@ -252,26 +255,15 @@ def ranking_intervals(ranking: Ranking) -> Figure:
     """
     order = ranking.standing.order
     picture, ((axes,),) = figure(height=0.8 + 0.28 * len(order))
-    width, bad = picture.get_figwidth(), ranking.standing.unusable
-    for place, row in enumerate(order):
-        scores, mean = ranking.scores[row], ranking.means[row]
-        row_colour = colour(ranking.labels[row].split("/")[0])
-        worlds = np.degrees(scores[np.isfinite(scores)])
-        axes.plot(worlds, np.full(len(worlds), place), ".", color=row_colour, markersize=2.0, alpha=0.35)
-        ends = np.degrees([[mean.value - mean.low], [mean.high - mean.value]])
-        if np.isfinite(ends).all():
-            axes.errorbar(np.degrees(mean.value), place, xerr=ends, color=row_colour, capsize=3.0, linewidth=1.6)
-        dot = {"marker": "o", "color": row_colour, "markersize": 5.0, "markeredgecolor": BLACK}
-        axes.plot(np.degrees(mean.value), place, linestyle="none", **(_UNUSABLE if row in bad else dot))
+    width = picture.get_figwidth()
+    draw_dots(axes, [_dot(ranking, row, k, {"markeredgecolor": BLACK}, cases=True) for k, row in enumerate(order)])
     first = 0
     for group_rows in ranking.standing.groups:
         if len(group_rows) > 1:
             axes.plot([1.015, 1.015], [first - 0.3, first + len(group_rows) - 0.7], color=BLACK, linewidth=2.5,
                       transform=axes.get_yaxis_transform(), clip_on=False)  # fmt: skip
         first += len(group_rows)
-    axes.set_yticks(range(len(order)), [_called(ranking.labels[row]) for row in order])
-    axes.invert_yaxis()
-    axes.set_xscale("log")
+    name_rows(axes, [_called(ranking.labels[row]) for row in order])
     logarithmic(axes.xaxis)
     axes.set_xlabel("RMSE [deg]")
     title(axes, fill(f"{ranking.name}, {ranking.cases}: a bar joins what cannot be told apart", round(9 * width)))

@@ -6,8 +6,7 @@ from string import ascii_uppercase
 from typing import Any
 
 from wristctl.plotting.page import Figures, figures, render
-from wristctl.plotting.page_tables import metric_in_words
-from wristctl.reader_units import in_degrees
+from wristctl.reader_units import in_degrees, metric_in_words
 from wristctl.records.difference import difference
 from wristctl.records.manifest import read_overview
 from wristctl.records.run import Run

@@ -18,7 +18,7 @@ from matplotlib.colors import Colormap, ListedColormap
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.text import Text
-from matplotlib.ticker import LogFormatterSciNotation
+from matplotlib.ticker import LogFormatterSciNotation, LogLocator, NullFormatter
 from numpy.typing import NDArray
 
 from wristctl.config.former_names import label_today
@@ -107,6 +107,8 @@ _LEGEND: dict[str, Any] = {"fontsize": 9.0, "frameon": False, "handlelength": 2.
 _PAPER: ContextVar[float | None] = ContextVar("_PAPER", default=None)
 # Scale of letters in a column of a page, and the width [in] below which a figure fills a column.
 _SMALLEST, _PRINTED = 0.72, 6.0
+# Letters of a heading to an inch.
+_LETTERS_OF_HEADING = 12.5
 # Mean width of a letter of a title [in]; height of a legend's row [in], and rows that figures have room for.
 _LETTER, _ROW, _ROWS = 0.076, 0.19, 2
 # Width [in] of a figure that axes in one column, and axes side by side, leave to labels.
@@ -203,11 +205,13 @@ class PowersOfTen(LogFormatterSciNotation):
         return base + power.translate(_RAISED)
 
 
-def logarithmic(axis: Axis) -> None:
-    """Give an axis a logarithmic scale in powers of ten."""
+def logarithmic(axis: Axis, steps: Sequence[float] = ()) -> None:
+    """Give an axis a logarithmic scale in powers of ten, or of plain numbers with these steps within a decade."""
     axis.axes.set(**{f"{axis.axis_name}scale": "log"})  # type: ignore[attr-defined]  # XAxis and YAxis have it
-    axis.set_major_formatter(PowersOfTen())
-    axis.set_minor_formatter(PowersOfTen())
+    if steps:
+        axis.set_major_locator(LogLocator(subs=steps))
+    axis.set_major_formatter("{x:g}" if steps else PowersOfTen())
+    axis.set_minor_formatter(NullFormatter() if steps else PowersOfTen())
 
 
 def title(axes: Axes, text: str) -> None:
@@ -223,6 +227,12 @@ def title(axes: Axes, text: str) -> None:
             fill(part, letters, break_long_words=False, break_on_hyphens=False) for part in text.split("\n")
         )
     axes.set_title(text, loc="left", fontsize=10.0)
+
+
+def headed(picture: Figure, text: str) -> None:
+    """A heading over all axes of a figure at its left edge, in as many lines as its width needs."""
+    letters = round(_LETTERS_OF_HEADING * picture.get_figwidth())
+    picture.suptitle(fill(text, letters), fontsize=10.0, x=0.01, ha="left")
 
 
 def with_unit(name: str, unit: str) -> str:

@@ -5,6 +5,7 @@ import re
 from collections.abc import Callable, Collection, Iterable, Sequence
 from enum import StrEnum
 from functools import partial
+from itertools import takewhile
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -133,7 +134,7 @@ def table(
 ) -> None:
     """Print the tables of a run, angles in degrees: all that the command printed or kept back."""
     from wristctl.cli.runs.latex import latex_table
-    from wristctl.commands.printed_table import Table
+    from wristctl.commands.printed_table import Table, capital
     from wristctl.plotting.page_tables import tables
 
     run = open_run(ref, out)
@@ -144,7 +145,8 @@ def table(
         if not 1 <= position <= len(run_tables):
             raise UserError(f"no table {position}", str(run.path), f"1 to {len(run_tables)}")
     positions = number or range(1, len(run_tables) + 1)
-    caption = f"{run.kind}: run {run.id}"
+    sentence = " ".join(takewhile(bool, read_overview(run.path).answer))  # the answer's own table has no title
+    caption = f"{capital(sentence)} Run {run.id}." if sentence else f"{run.kind}: run {run.id}"
     texts = [
         latex_table(chosen, f"{run.kind}-{position}", caption) if latex else chosen.text()
         for position in positions

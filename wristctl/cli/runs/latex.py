@@ -14,6 +14,8 @@ from wristctl.version import __version__
 
 # Characters that fit into a column of 3.5 in at the size of a footnote; longest text in one line of a cell.
 _COLUMN, _LINE = 56, 24
+# Characters of the columns that stand in every part of a table, at most.
+_NAMES = 38
 _NUMBER = r"[<>]?-?\d+(?:\.\d+)?(?:e[-+]?\d+)?"
 _CELL = re.compile(
     rf"(?:(?P<rank>\d+): )?(?P<value>{_NUMBER})(?: \[(?P<low>{_NUMBER}), (?P<high>{_NUMBER})\])?(?: (?P<mark>[*=]))?"
@@ -57,7 +59,8 @@ def latex_table(table: Table, label: str = "", caption: str = "") -> str:
     caption
         Where the table has no title.
 
-    Columns that do not fit beside the others stand below, the first repeated; what is still too wide is scaled.
+    Columns that do not fit beside the others stand below, with those that name the rows; what is still too wide is
+    scaled.
     """
     heads, rows = table.cells()
     columns = [part for at, head in enumerate(heads) for part in _parted([row[at] for row in rows], head)]
@@ -91,14 +94,27 @@ def _blocks(columns: Sequence[_Column]) -> list[list[_Column]]:
             groups[-1].append(column)
         else:
             groups.append([column])
-    first, *others = groups or [[]]
+    naming = _naming(groups)
+    first = [column for group in groups[:naming] for column in group]
     blocks = [list(first)]
-    for group in others:
+    for group in groups[naming:]:
         wide = sum(column.width for column in (*blocks[-1], *group))
         if wide > _COLUMN and len(blocks[-1]) > len(first):
             blocks.append(list(first))
         blocks[-1] += group
     return blocks
+
+
+def _naming(groups: Sequence[Sequence[_Column]]) -> int:
+    """Number of columns, from the first, whose words tell rows apart and stand in every block, as far as they fit."""
+    count = min(1, len(groups))
+    while count < len(groups) and not groups[count][0].is_number:
+        names = list(zip(*(column.cells for group in groups[:count] for column in group), strict=True))
+        wide = sum(column.width for group in groups[: count + 1] for column in group)
+        if len(set(names)) == len(names) or wide > _NAMES:
+            break
+        count += 1
+    return count
 
 
 def _tabular(columns: Sequence[_Column]) -> list[str]:

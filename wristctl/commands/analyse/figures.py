@@ -7,6 +7,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
+from numpy.typing import NDArray
 
 from wristctl.arrays import Array
 from wristctl.plotting.style import (
@@ -47,8 +48,7 @@ def bode(analyses: Sequence[LoopAnalysis], angles: Sequence[float], heading: str
     gain, phase = axes[:, 0]
     alone = all(loop.is_open for loop in analyses)
     for analysis, angle, style in zip(analyses, angles, _styles(len(analyses)), strict=True):
-        frequency = analysis.omega / _TURN
-        shown = frequency >= min(_SLOWEST, 0.1 * frequency[-1])
+        frequency, shown = _frequencies(analysis)
         loci = analysis.plant_loci if alone else analysis.loci
         for response, dashes, label in zip(loci, _DASHES, (f"at {angle:g} deg", None), strict=False):
             gain.plot(frequency[shown], np.abs(response)[shown], label=label, linestyle=dashes, **style)
@@ -78,6 +78,12 @@ def _mark(axes: Axes, analysis: LoopAnalysis, colour: str) -> None:
     axes.plot(crossed, np.ones(len(crossed)), "s", color=colour, markersize=4.0)
 
 
+def _frequencies(analysis: LoopAnalysis) -> tuple[Array, NDArray[np.bool_]]:
+    """Frequencies [Hz], and a mask of those that are drawn."""
+    frequency = analysis.omega / _TURN
+    return frequency, frequency >= min(_SLOWEST, 0.1 * frequency[-1])
+
+
 def _phase(response: Complex) -> Array:
     """Degrees, without jumps, begun within half a turn of 0."""
     unwrapped = np.degrees(np.unwrap(np.angle(response)))
@@ -93,11 +99,10 @@ def sensitivity(analyses: Sequence[LoopAnalysis], angles: Sequence[float]) -> Fi
     """|S| = |1/(1 + L)| and |T| = |L/(1 + L)| over frequency [Hz]; in two planes largest singular values."""
     fig, ((axes,),) = figure(height=3.2)
     for analysis, angle, style in zip(analyses, angles, _styles(len(analyses)), strict=True):
-        frequency = analysis.omega / _TURN
-        shown = frequency >= min(_SLOWEST, 0.1 * frequency[-1])
-        axes.plot(frequency[shown], amplified(analysis.transfer)[shown], label=f"S at {angle:g} deg", **style)
-        reached = carried(analysis.transfer)[shown]
-        axes.plot(frequency[shown], reached, linestyle="--", label=f"T at {angle:g} deg", **style)
+        frequency, shown = _frequencies(analysis)
+        for name, of_transfer, dashes in (("S", amplified, "-"), ("T", carried, "--")):
+            drawn = of_transfer(analysis.transfer)[shown]
+            axes.plot(frequency[shown], drawn, linestyle=dashes, label=f"{name} at {angle:g} deg", **style)
     axes.axhline(1.0, **DOTTED)
     logarithmic(axes.xaxis)
     logarithmic(axes.yaxis)

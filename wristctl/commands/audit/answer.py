@@ -11,7 +11,7 @@ from itertools import pairwise
 from typing import TYPE_CHECKING
 
 from wristctl.commands.answer import Answer
-from wristctl.commands.printed_table import Table, capital, degrees
+from wristctl.commands.printed_table import Table, capital, degrees, joined
 from wristctl.config.loop import LOOPS
 
 if TYPE_CHECKING:
@@ -52,16 +52,7 @@ def answer_of(judged: Sequence[Judgement], strips: Sequence[Strip] = (), limit: 
     networks = " ".join(_networks(claims))
     decided = [first] if first else []
     rest = [*[networks] * bool(networks), *_by_topic(claims), *second, *_untested(claims)]
-    apart = Answer(sentence, table, [*decided, *rest], _MORE)
-    return apart if apart.fits else _fitted(sentence, table, decided, rest)
-
-
-def _fitted(sentence: str, table: Table | None, decided: Sequence[str], rest: Sequence[str]) -> Answer:
-    """The answer on one screen: `rest` is one paragraph, and sentences are left out from its end."""
-    answer = Answer(sentence, table, [*decided, *[" ".join(rest)] * bool(rest)], _MORE)
-    if answer.fits or not rest:
-        return answer
-    return _fitted(sentence, table, decided, rest[:-1])
+    return Answer(sentence, table, decided, _MORE).ending(rest)
 
 
 def _tried(loops: Sequence[str], limit: float) -> list[str]:
@@ -70,7 +61,7 @@ def _tried(loops: Sequence[str], limit: float) -> list[str]:
     plural = "s" * (len(loops) > 1)
     bare = all(name in LOOPS and LOOPS[name].actuator.level == "ideal" for name in loops)
     where = f"{count} loop{plural} of ours{' without motors or camera' * bare}, as the paper describes none"
-    return [f"Smooth moves of 30 deg in 1 and 2 s on {where}: {_and(kinds)}."] * bool(loops)
+    return [f"Smooth moves of 30 deg in 1 and 2 s on {where}: {joined(kinds)}."] * bool(loops)
 
 
 def _word(name: str) -> str:
@@ -165,7 +156,7 @@ def _ranking(claims: Sequence[Judgement], loops: Sequence[str]) -> list[str]:
     return [
         *sentences,
         f"The paper's ranking ({', '.join(name.upper() for name in order)}) cannot be tested without equations of "
-        f"{_and(named)}; with our designs, and P1 and P2 exchanged, it holds {_on(holds, loops)}.",
+        f"{joined(named)}; with our designs, and P1 and P2 exchanged, it holds {_on(holds, loops)}.",
     ]
 
 
@@ -205,7 +196,7 @@ def _over_the_box(strips: Sequence[Strip]) -> list[str]:
     if not used:
         return []
     shares = {
-        evidence: _and([f"{_SHORT.get(strip.claim.label, strip.claim.label)} in {_share(strip)}" for strip in parts])
+        evidence: joined([f"{_SHORT.get(strip.claim.label, strip.claim.label)} in {_share(strip)}" for strip in parts])
         for evidence, parts in in_box.items()
     }
     sentences = []
@@ -352,7 +343,7 @@ def _on(holding: Sequence[str], loops: Iterable[str] = ()) -> str:
     if len(holding) == len(tried) > 1:
         return "on all loops"
     only = " only" * (len(tried) > 1 == len(holding))
-    return f"on the {_and(list(map(_word, holding)))} loop{'s' * (len(holding) > 1)}{only}" if holding else "on no loop"
+    return f"on the {joined([*map(_word, holding)])} loop{'s' * (len(holding) > 1)}{only}" if holding else "on no loop"
 
 
 def _where(findings: Mapping[str, Finding], verdict: str) -> list[str]:
@@ -368,7 +359,3 @@ def _percent(share: float) -> str:
     """Two digits; 0 and 100 % are none and all, and nothing else is."""
     percent = 100.0 * share
     return f"{min(percent, 99.0) if share < 1.0 else percent:.0f} %" if percent >= 10.0 else f"{percent:.2g} %"
-
-
-def _and(names: Sequence[str]) -> str:
-    return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}" if names else ""

@@ -12,6 +12,7 @@ from wristctl.commands.compare.command import Compared, compare
 from wristctl.commands.inputs import EarlierRun, Given, Inputs
 from wristctl.commands.printed_table import Table
 from wristctl.commands.procedure import Procedure
+from wristctl.commands.quantities import Quantity, documented, table_of
 from wristctl.commands.results import Findings, StudyResult
 from wristctl.commands.session import Session
 from wristctl.config.audit import Claim
@@ -94,6 +95,7 @@ def audit(session: Session) -> Audited:
     from wristctl.commands.audit.figures import ours_over_the_papers
     from wristctl.commands.audit.ledger import ledger_tables
     from wristctl.comparison.claims import TRAININGS, Grounds, conditions_of, evidence_study, judge_all, ledger_frame
+    from wristctl.comparison.robust import strips_frame
     from wristctl.control.table import CONTROLLERS
 
     findings, inputs, study = session.findings, session.inputs, session.study
@@ -115,15 +117,7 @@ def audit(session: Session) -> Audited:
         findings.figure("ledger", ours_over_the_papers, judged)
     shown_by = {name: _name(source) for name, source in (*compared.items(), *inputs.items())}
 
-    units = {"paper": "", "low": "", "high": ""}
-    meaning = {
-        "paper": "the paper's value",
-        "verdict": "of all loops: where it fails on all, the gravest; else where they differ, not specified enough; "
-        "none: a setting",
-        "whose": "paper, ours (a check of its auditors) or group (its authors elsewhere)",
-        "part_of": "the statement that it is a detail of",
-    }
-    findings.table("data/claims.csv", ledger_frame(judged), units, meaning)
+    findings.table("data/claims.csv", ledger_frame(judged), *documented(_OF_CLAIMS))
     findings.plain("evidence.json", shown_by, volatile=True)
     theirs = [j for j in judged if j.claim.whose == "paper" and not j.claim.part_of]
     counted = [j.verdict for j in theirs if j.verdict is not None]
@@ -131,9 +125,34 @@ def audit(session: Session) -> Audited:
         says = f"claims of the paper whose verdict is: {verdict}"
         findings.metric(verdict.replace(" ", "_"), count, n=len(counted), meaning=says)
     evidence = Table("Runs that show it", ("shown by", "run"), list(shown_by.items()))
-    tables = [*ledger_tables(judged), *([box_table(boxed)] if boxed else []), evidence]
+    tables = [*ledger_tables(judged), *([box_table(boxed, strips_frame(boxed))] if boxed else []), evidence]
     return Audited(study, findings, tables, judged, compared, boxed)
 
+
+# Columns of data/claims.csv that do not explain themselves.
+_OF_CLAIMS = (
+    Quantity("paper", meaning="the paper's value"),
+    Quantity("verdict", meaning="of all loops: where it fails on all, the gravest; else where they differ, not "
+             "specified enough; none: a setting"),
+    Quantity("whose", meaning="paper, ours (a check of its auditors) or group (its authors elsewhere)"),
+    Quantity("part_of", meaning="the statement that it is a detail of"),
+)  # fmt: skip
+# Columns of data/box.csv; those with a heading are in the table.
+_OF_BOX = (
+    Quantity("claim", heading="claim"),
+    Quantity("draws", meaning="settings that were drawn"),
+    Quantity("not_converged", meaning="of these, which are not counted", heading="not converged"),
+    Quantity("reproduced", meaning="share in which the claim holds", heading="holds in"),
+    Quantity("reproduced_low", meaning="lower end of its 95 % interval", heading="95 % low"),
+    Quantity("reproduced_high", meaning="upper end of its 95 % interval", heading="high"),
+    Quantity("better", meaning="share in which ours is less than the paper's", heading="better in"),
+    Quantity("fails", meaning="share in which it fails", heading="fails in"),
+    Quantity("decided", meaning="where it holds by the unknown that decides most", heading="decided by"),
+    Quantity("leaf_1", meaning="unknown that decides most"),
+    Quantity("explained_1", meaning="share of the verdicts' variance that it explains"),
+    Quantity("leaf_2", meaning="the next one", heading="then by"),
+    Quantity("explained_2", meaning="share of the variance that it explains"),
+)
 
 _METRICS = ("comparison", "ordering", "symmetry", "hardware")
 
@@ -227,7 +246,7 @@ def judged_in_box(session: Session) -> list[Strip]:
             symmetric, settings, lambda part: report(round(100 * (share + (1 - share) * part))), mirrored=True
         )
     in_box = strips(claims, drawn, mirrored)
-    findings.table("data/box.csv", strips_frame(in_box))
+    findings.table("data/box.csv", strips_frame(in_box), *documented(_OF_BOX))
     findings.table("data/draws.csv", draws_frame(drawn))
     specified = [
         claim_strip
@@ -245,21 +264,16 @@ def judged_in_box(session: Session) -> list[Strip]:
     return in_box
 
 
-def box_table(boxed: list[Strip]) -> Table:
+def box_table(boxed: Sequence[Strip], frame: pd.DataFrame) -> Table:
     """Table of the shares of drawn settings in which each claim holds, with the unknowns that decide it."""
-    from wristctl.comparison.verdicts import FAILING
-
-    rows = []
-    for strip in boxed:
-        held = strip.share("reproduced")
-        beside = (strip.share("better than the paper").value, strip.share(*FAILING).value)
-        second = strip.leaves[1].name if strip.told and len(strip.leaves) > 1 else ""
-        rows.append((strip.claim.id, strip.uncounted, held.value, held.low, held.high, *beside, strip.told, second))
-    heads = ("claim", "not converged", "holds in", "95 % low", "high", "better in", "fails in", "decided by", "then by")
-    draws = len(boxed[0].verdicts) if boxed else 0
-    most = max((claim_strip.uncounted for claim_strip in boxed), default=0)
+    records = [
+        record | {"leaf_2": record.get("leaf_2", "") if record["decided"] else ""}
+        for record in frame.fillna(dict.fromkeys(frame.columns.intersection(["leaf_2"]), "")).to_dict("records")
+    ]
+    draws, most = len(boxed[0].verdicts), max(strip.uncounted for strip in boxed)
     left = f"; those that did not converge, up to {most}, are not counted" * bool(most)
-    return Table(f"Shares of {draws} settings drawn from what the paper leaves open{left}", heads, rows)
+    title = f"Shares of {draws} settings drawn from what the paper leaves open{left}"
+    return table_of(title, [quantity for quantity in _OF_BOX if quantity.heading], records)
 
 
 AUDIT = Procedure(

@@ -23,6 +23,7 @@ from wristctl.plotting.style import (
     VERMILLION,
     WIDTH,
     figure,
+    headed,
     legend_below,
     logarithmic,
     title,
@@ -63,7 +64,7 @@ def shares(strips: Sequence[Strip], heading: str = "") -> Figure:
     _beside(panel, len(strips) - 0.2, "holds in", 40.0, ha="right", fontsize=8.0)
     _beside(panel, len(strips) - 0.2, "by what decides most", 46.0, fontsize=8.0)
     panel.set_xlabel(f"share of {counted(strips)}", fontsize=10.0)
-    fig.suptitle(heading, fontsize=10.0, x=0.01, ha="left")
+    headed(fig, heading)
     legend_below(fig, 2)
     return fig
 

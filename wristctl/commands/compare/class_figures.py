@@ -9,7 +9,8 @@ from matplotlib.lines import Line2D
 
 from wristctl.commands.compare.csv_data import metrics_of
 from wristctl.comparison.combinations import ComparedRow
-from wristctl.comparison.controller_ranking import Ranking, undominated
+from wristctl.comparison.controller_ranking import Ranking
+from wristctl.plotting.kinds import draw_front
 from wristctl.plotting.loop_figures import envelope, label
 from wristctl.plotting.style import (
     BLACK,
@@ -21,6 +22,7 @@ from wristctl.plotting.style import (
     columns_within,
     figure,
     grid,
+    headed,
     legend_below,
     legend_under,
     logarithmic,
@@ -55,7 +57,7 @@ def tension_rows(courses: Sequence[Trajectory], heading: str = "") -> Figure:
     axes[0, 0].set_ylim(0.0, 1.15 * largest)
     axes[-1, 0].set_xlabel("time [s]")
     fig.supylabel("commanded tension of each tendon [N]", fontsize=9.0)
-    fig.suptitle(heading, fontsize=10.0, x=0.02, ha="left")
+    headed(fig, heading)
     legend_below(fig)
     return fig
 
@@ -88,10 +90,9 @@ def error_against_variation(results: Sequence[ComparedRow], classes: Sequence[Ra
             }
             (drawn,) = panel.plot(variation, error, markersize=5.0, **style)
             drawn_laws.setdefault(row.split("/")[0], drawn)
-        costs = np.array([points[row] for row in points if sound[row]]).reshape(-1, 2)
-        front = costs[undominated(costs)]
-        front = front[np.argsort(front[:, 1])]
-        panel.plot(front[:, 1], front[:, 0], color=BLACK, linewidth=0.8, zorder=1.5)
+        errors, costs = np.array(list(points.values())).reshape(-1, 2).T
+        usable = np.array([sound[row] for row in points], bool)
+        draw_front(panel, costs, errors, usable, {"color": BLACK, "linewidth": 0.8, "zorder": 1.5})
         title(panel, standing.name)
     for panel in panels:
         logarithmic(panel.xaxis)
@@ -101,7 +102,7 @@ def error_against_variation(results: Sequence[ComparedRow], classes: Sequence[Ra
     first_in_row[-1].set_xlabel("total variation of tension per second [N/s]", loc="left")
     for panel in first_in_row:
         panel.set_ylabel("RMSE [deg]")
-    fig.suptitle(heading, fontsize=10.0, x=0.02, ha="left")
+    headed(fig, heading)
     handles = [
         Line2D([], [], color=mark.get_color(), marker="o", linestyle="none", label=law)
         for law, mark in drawn_laws.items()

@@ -98,7 +98,7 @@ def _of_class(findings: Findings, ranking: Ranking, results: Sequence[ComparedRo
     """Errors and tensions over time of the best rows and of the paper's, on the motion that stands for the class."""
     from wristctl.commands.compare.class_figures import shown_rows, tension_rows
     from wristctl.plotting.bend_figure import bend_overlay
-    from wristctl.plotting.loop_figures import error_sizes, errors, overlay
+    from wristctl.plotting.loop_figures import over_time, spread_of_sizes
 
     later = partial(findings.figure, later=True)
     cell = _stands_for(ranking.of(results))
@@ -108,17 +108,25 @@ def _of_class(findings: Findings, ranking: Ranking, results: Sequence[ComparedRo
     slug, where = _slug(ranking.name), f"{condition(ranking)}: loop {cell[0]}, {cell[1]}"
     caption = f"Angle and error of the best controllers and of the paper's, {where}"
     if courses[0].planes == 1:
-        findings.figure(f"overlay-{slug}", overlay, courses, where, later=ranking.jumps, caption=caption)
+        parts: dict[str, Any] = {"heading": where, "later": ranking.jumps, "caption": caption}
+        findings.figure(f"overlay-{slug}", over_time, courses, "angle", "measurable size", **parts)
     else:
         findings.figure(f"overlay-{slug}", bend_overlay, courses, where, later=ranking.jumps, caption=caption)
     caption = f"|theta - reference| of the best rows and of the paper's laws, {where}"
-    later(f"error-over-time-{slug}", errors, courses, where, log=True, caption=caption)
+    later(f"error-over-time-{slug}", over_time, courses, "size", heading=where, caption=caption)
     tendons = "both sides" if courses[0].planes == 1 else "each tendon"
     later(f"tension-over-time-{slug}", tension_rows, courses, where, caption=f"Commanded tension of {tendons}, {where}")
     repeated = [result.repeated for result in shown if len(result.repeated.failed) > 1]
     if repeated:
         caption = f"|error| over repetitions: median and 95 % interval, {where}"
-        later(f"error-of-repetitions-{slug}", error_sizes, repeated, where, caption=caption)
+        later(
+            f"error-of-repetitions-{slug}",
+            over_time,
+            courses[:1],
+            spread_of_sizes(repeated),
+            heading=where,
+            caption=caption,
+        )
 
 
 def _of_every_row(findings: Findings, study: Study, results: Sequence[ComparedRow]) -> None:

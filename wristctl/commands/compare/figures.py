@@ -20,6 +20,7 @@ from wristctl.comparison.combinations import ComparedRow
 from wristctl.comparison.paper import T2
 from wristctl.comparison.repetition_spread import spread
 from wristctl.config.loop import Loop
+from wristctl.plotting.kinds import draw_cells, name_rows
 from wristctl.plotting.style import (
     BLACK,
     GREY,
@@ -32,7 +33,6 @@ from wristctl.plotting.style import (
     line,
     logarithmic,
     title,
-    undress,
 )
 from wristctl.study_files.keys import field_at, unit_of
 
@@ -72,17 +72,25 @@ def rmse_map(
     positive = shown[shown > 0.0]
     norm = LogNorm(max(np.degrees(MEASURABLE), positive.min(initial=10.0)), positive.max(initial=0.01))
     widths = (len(columns), 1)
-    size = {"width": max(WIDTH, 2.5 + 0.9 * len(columns)), "height": 1.2 + (0.62 if below else 0.34) * len(rows)}
+    shape = {"width": max(WIDTH, 2.5 + 0.9 * len(columns)), "height": 1.2 + (0.62 if below else 0.34) * len(rows)}
     beside = bool(np.isfinite(printed).any())
-    fig, axes = figure(1, 1 + beside, width_ratios=widths[: 1 + beside], sharey=True, **size)
+    fig, axes = figure(1, 1 + beside, width_ratios=widths[: 1 + beside], sharey=True, **shape)
     ours = axes[0, 0]
     room = (fig.get_figwidth() - _BESIDE_CELLS) / (len(columns) + beside)
     narrow = room < _NUMBER  # then colours and bar have to do
-    style: dict[str, Any] = {"numbers": not narrow, "size": 9.0 if room >= _USUAL_NUMBER else 7.5}
+    size = 9.0 if room >= _USUAL_NUMBER else 7.5
     turned = 90.0 if room < _USUAL_NUMBER else 0.0
-    image = _cells(ours, values, norm, below, **style)
+
+    def drawn(panel: Axes, cells: Array, texts: Mapping[tuple[int, int], str]) -> AxesImage:
+        def said(row: int, column: int) -> dict[str, Any]:
+            text = texts.get((row, column), "")
+            return {"s": f"{degrees(np.radians(cells[row, column]))}{text}", "fontsize": 7.5 if text else size}
+
+        return draw_cells(panel, cells, "cividis", norm, None if narrow else said)
+
+    image = drawn(ours, values, below)
     if beside:
-        _cells(axes[0, 1], printed, norm, **style)
+        drawn(axes[0, 1], printed, {})
         axes[0, 1].set_xticks([0], ["the paper's T2" if turned else "the paper's\nT2"], rotation=turned)
     ground = "none" if narrow else "w"
     for row, column in np.argwhere(np.isnan(values)):
@@ -123,20 +131,15 @@ def variation_dots(results: Sequence[ComparedRow], heading: str = "") -> Figure:
         positive = values[np.isfinite(values) & (values > 0.0)]
         failed = any(result.repeated.failed.any() for result in of_row)
         shade = colour(of_row[0].controller)
-        axes.plot(
-            positive, np.full(len(positive), index), "x" if failed else "o", color=shade, markersize=4.5, alpha=0.8
-        )
-        axes.plot(
-            [np.median(positive)] * 2 if len(positive) else [],
-            [index - 0.3, index + 0.3] if len(positive) else [],
-            color=BLACK,
-        )
+        dots = np.full(len(positive), index)
+        axes.plot(positive, dots, "x" if failed else "o", color=shade, markersize=4.5, alpha=0.8)
+        median = [np.median(positive)] * 2 if len(positive) else []
+        axes.plot(median, [index - 0.3, index + 0.3][: len(median)], color=BLACK)
         for dot in spreads:
             if dot.interval is not None:
                 axes.plot(dot.interval, [index, index], color=shade, linewidth=1.0)
     logarithmic(axes.xaxis)
-    axes.set_yticks(range(len(rows)), rows)
-    axes.invert_yaxis()
+    name_rows(axes, rows)
     axes.set_xlabel("total variation of tension per second [N/s]")
     title(axes, heading)
     handles = [
@@ -165,36 +168,6 @@ def _below(result: ComparedRow) -> str:
     rmse, failed = spread(result.repeated.metrics["rmse"]), result.repeated.failed
     ends = "" if rmse.interval is None else "\n{} to {}".format(*map(degrees, rmse.interval))
     return ends + (f"\n{failed.sum()} of {rmse.n} failed" if failed.any() else "")
-
-
-def _cells(
-    axes: Axes,
-    values: Array,
-    norm: LogNorm,
-    below: Mapping[tuple[int, int], str] | None = None,
-    numbers: bool = True,
-    size: float = 9.0,
-) -> AxesImage:
-    """Angles (rows, columns) [deg] as coloured cells with their numbers, texts below them; nothing where they are nan.
-
-    `size` is that of the numbers [pt].
-    """
-    undress(axes)
-    image = axes.imshow(values, norm=norm, cmap="cividis", aspect="auto")
-    for row, column in np.argwhere(np.isfinite(values) & numbers):
-        value = values[row, column]
-        text = (below or {}).get((int(row), int(column)), "")
-        ink = "w" if value <= 0.0 or norm(value) < 0.5 else "k"
-        axes.text(
-            column,
-            row,
-            f"{degrees(np.radians(value))}{text}",
-            ha="center",
-            va="center",
-            fontsize=7.5 if text else size,
-            color=ink,
-        )
-    return image
 
 
 # Fewest sizes that make a curve.

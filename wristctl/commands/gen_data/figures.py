@@ -11,6 +11,7 @@ from matplotlib.figure import Figure
 from wristctl.arrays import Array
 from wristctl.config.wrist import WristParameters
 from wristctl.errors import UserError
+from wristctl.plotting.bend_figure import draw_plane_of_bends
 from wristctl.plotting.style import BLACK, BLUE, GREY, figure, legend, title
 from wristctl.wrist.kinematics import arcs_backbone
 from wristctl.wrist.spatial.held_bends import reach_of_bends
@@ -74,19 +75,17 @@ def workspace(wrist: WristParameters, planes: int = 1) -> Figure:
 def _held_bends(wrist: WristParameters) -> Figure:
     layout = TendonLayout.of(wrist)
     picture, ((axes,),) = figure(height=4.6)
+    paths = []
     for factor, style in ((_SOFTER, "--"), (1.0, "-"), (_STIFFER, ":")):
         stiffer = wrist.model_copy(update={"stiffness": factor * wrist.stiffness})
         label = "as believed" if factor == 1.0 else f"springs x{factor:g}"
-        reach = np.degrees(reach_of_bends(stiffer, layout))
-        axes.plot(*reach.T, style, color=BLUE if factor == 1.0 else GREY, label=label)
+        look = {"linestyle": style, "color": BLUE if factor == 1.0 else GREY, "label": label}
+        paths.append((reach_of_bends(stiffer, layout), look))
+    limit = f"{wrist.range_deg:g} deg held within {wrist.tension_limit:g} N"
+    draw_plane_of_bends(axes, paths, f"bends of up to {limit}, and where each tendon pulls")
     for number, place in enumerate(layout.places, 1):
         if place.radius > 0.0:
             at = 1.08 * wrist.range_deg * np.array([np.cos(place.angle), np.sin(place.angle)])
             axes.text(*at, f"{number}", ha="center", va="center")
-    axes.set(xlabel="bend toward ulnar [deg]", ylabel="bend toward flexion [deg]", aspect="equal")
-    title(
-        axes,
-        f"bends of up to {wrist.range_deg:g} deg held within {wrist.tension_limit:g} N, and where each tendon pulls",
-    )
     legend(axes, loc="center")
     return picture

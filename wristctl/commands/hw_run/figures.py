@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -12,17 +12,18 @@ from matplotlib.figure import Figure
 
 from wristctl.arrays import Array
 from wristctl.commands.session import Session
+from wristctl.plotting.bend_figure import WANTED_PATH, draw_plane_of_bends
 from wristctl.plotting.style import (
     BLACK,
     BLUE,
     LIGHT,
-    SILVER,
     SIMULATED,
     TENDON_COLOURS,
     VERMILLION,
     WANTED,
     figure,
     grid,
+    headed,
     legend_below,
     line,
     logarithmic,
@@ -87,30 +88,38 @@ class LoggedTrial:
     """When the push began and ended [s]."""
 
 
-def desired_and_obtained(courses: Sequence[LoggedTrial], heading: str = "") -> Figure:
+def bends_over_time(courses: Sequence[LoggedTrial], heading: str = "") -> Figure:
     """Desired and obtained bending angle [deg] over time [s], one panel for each direction."""
-    picture, panels = _panels(courses)
+    return _over_time(courses, "bend", heading)
+
+
+def errors(courses: Sequence[LoggedTrial], heading: str = "") -> Figure:
+    """Error e = bend - reference [deg] over time [s], one panel for each direction, and for each plane of two."""
+    return _over_time(courses, "error", heading)
+
+
+def _over_time(courses: Sequence[LoggedTrial], what: Literal["bend", "error"], heading: str) -> Figure:
+    picture, panels = _panels(courses, sharey=what == "error")
     for course in courses:
-        _draw_beside(panels, course, "bend")
-        for panel, wanted, bend in zip(_own(panels, course), course.wanted.T, course.bend.T, strict=True):
-            panel.plot(course.time, np.degrees(bend), label=course.label, **line(course.label))
-            panel.plot(course.time, np.degrees(wanted), **WANTED)
-    return _finished(picture, panels, courses, heading, "bending angle [deg]")
+        _draw_beside(panels, course, what)
+        drawn = course.bend if what == "bend" else course.bend - course.bend_ref
+        for panel, values, wanted in zip(_own(panels, course), drawn.T, course.wanted.T, strict=True):
+            panel.plot(course.time, np.degrees(values), label=course.label, **line(course.label))
+            if what == "bend":
+                panel.plot(course.time, np.degrees(wanted), **WANTED)
+            else:
+                panel.axhline(0.0, color=BLACK, linewidth=0.8, zorder=1.0)
+    return _finished(picture, panels, courses, heading, "bending angle [deg]" if what == "bend" else "error [deg]")
 
 
 def paths(courses: Sequence[LoggedTrial], reach: Array, heading: str = "") -> Figure:
     """Paths in the plane of bends [deg]; `reach` is a closed line (K, 2) [rad], as `reach_of_bends` gives it."""
     picture = Figure(figsize=(5.2, 5.6), layout="constrained")
-    axes = picture.add_subplot()
-    axes.plot(*np.rad2deg(reach).T, color=SILVER, label="in reach")
+    drawn = list[tuple[Array, Mapping[str, Any]]]()
     for course in courses:
-        axes.plot(*np.rad2deg(course.wanted).T, **WANTED | {"label": "wanted"})
-        axes.plot(*np.rad2deg(course.bend).T, color=BLUE, linewidth=1.0, label="measured")
-        if course.true is not None:
-            axes.plot(*np.rad2deg(course.true.bend).T, **_TRUE)
-    axes.set_aspect("equal", adjustable="datalim")  # a box of another shape would push the title off the picture
-    axes.set(xlabel="bend toward ulnar [deg]", ylabel="bend toward flexion [deg]")
-    title(axes, heading)
+        drawn += [(course.wanted, WANTED_PATH), (course.bend, {"color": BLUE, "linewidth": 1.0, "label": "measured"})]
+        drawn += [(course.true.bend, _TRUE)] if course.true is not None else []
+    draw_plane_of_bends(picture.add_subplot(), drawn, heading, reach)
     legend_below(picture)
     return picture
 
@@ -134,7 +143,7 @@ def ellipses(courses: Sequence[LoggedTrial], heading: str = "") -> Figure:
         title(panel, name)
         panel.set_aspect("equal", adjustable="datalim")
         panel.set(xlabel="error toward ulnar [deg]", ylabel="error toward flexion [deg]")
-    picture.suptitle(heading, fontsize=10.0)
+    headed(picture, heading)
     legend_below(picture)
     return picture
 
@@ -143,17 +152,6 @@ def _outline(error: Array) -> Array:
     """Line (2, K) [deg] at two standard deviations about the mean of an error (N, 2) [rad]."""
     outline: Array = np.rad2deg(error.mean(axis=0) + error_ellipse(error).outline(_DEVIATIONS)).T
     return outline
-
-
-def errors(courses: Sequence[LoggedTrial], heading: str = "") -> Figure:
-    """Error e = bend - reference [deg] over time [s], one panel for each direction, and for each plane of two."""
-    picture, panels = _panels(courses, sharey=True)
-    for course in courses:
-        _draw_beside(panels, course, "error")
-        for panel, error in zip(_own(panels, course), (course.bend - course.bend_ref).T, strict=True):
-            panel.plot(course.time, np.degrees(error), label=course.label, **line(course.label))
-            panel.axhline(0.0, color=BLACK, linewidth=0.8, zorder=1.0)
-    return _finished(picture, panels, courses, heading, "error [deg]")
 
 
 def tensions(courses: Sequence[LoggedTrial], heading: str = "") -> Figure:
@@ -216,7 +214,7 @@ def _finished(picture: Figure, panels: _Panels, courses: Sequence[LoggedTrial], 
     for panel in list(panels.values())[-2:]:
         panel.set_xlabel("time [s]")
         panel.tick_params(labelbottom=True)  # of three panels the second has an empty place below it
-    picture.suptitle(heading, fontsize=10.0)
+    headed(picture, heading)
     picture.supylabel(ylabel, fontsize=10.0)
     legend_below(picture)
     return picture
@@ -236,7 +234,7 @@ def draw_trials(session: Session, done: pd.DataFrame, twins: Mapping[int, Simula
         said = ", with a push" * pushed
         if settings.planes == 1:
             caption = f"The bend, wanted and obtained, in each direction{said}"
-            findings.figure(f"{prefix}directions", desired_and_obtained, some, caption=caption)
+            findings.figure(f"{prefix}directions", bends_over_time, some, caption=caption)
         else:
             reach = reach_of_bends(wrist, layout or layout_of_axes(wrist))
             caption = "The plane of bends: wanted, measured and true, within what the tendons reach" + said

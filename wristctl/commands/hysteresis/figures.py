@@ -6,6 +6,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from wristctl.identification.friction_fit import FrictionFit
+from wristctl.plotting.bend_figure import draw_plane_of_bends
 from wristctl.plotting.style import (
     BLACK,
     BLUE,
@@ -167,17 +168,16 @@ def circles(around: Sequence[HysteresisCircle]) -> Figure:
     first = max(around, key=lambda each: (each.case.radius, -each.case.frequency)).case
     mine = [each for each in around if (each.case.radius, each.case.frequency) == (first.radius, first.frequency)]
     picture, ((left, right),) = figure(1, 2, height=3.8)
-    left.plot(*np.degrees(mine[0].unhindered.T), label="without friction", **_ROOTS)
+    paths = [(mine[0].unhindered, {"label": "without friction", **_ROOTS})]
     cases = _some([each.case.tendons for each in mine])
     for each, colour in zip((one for one in mine if one.case.tendons in cases), _COLOURS, strict=False):
-        left.plot(*np.degrees(each.course.bends.T), color=colour, linewidth=1.2, label=case_text(each.case.tendons))
+        paths.append((each.course.bends, {"color": colour, "linewidth": 1.2, "label": case_text(each.case.tendons)}))
         for plane, dashes in ((0, "-"), (1, ":")):
             apart = np.degrees(each.course.bends[:, plane] - each.unhindered[:, plane])
             right.plot(each.case.frequency * each.time, apart, color=colour, linewidth=1.2, linestyle=dashes)
     for name, dashes in (("toward ulnar", "-"), ("toward flexion", ":")):
         right.plot([], [], color=GREY, linestyle=dashes, label=name)
-    left.set_aspect("equal")
-    left.set(xlabel="bend toward ulnar [deg]", ylabel="bend toward flexion [deg]")
+    draw_plane_of_bends(left, paths)
     right.set(xlabel="turn", ylabel="bend less that without friction [deg]")
     legend_below(picture, 3)
     return picture

@@ -103,7 +103,7 @@ def identify_bends(session: Session) -> BendsTold:
     """Find what open logs in two planes tell of the study's wrist, in their run."""
     import numpy as np
 
-    from wristctl.commands.identify.figures import bends, residuals
+    from wristctl.commands.identify.figures import angles, residuals
     from wristctl.commands.identify.tables import fit_table, residual_table
     from wristctl.identification.bend_problem import (
         bends_yaml,
@@ -132,7 +132,7 @@ def identify_bends(session: Session) -> BendsTold:
     keep_told(findings, told)
     tables = [told_table(told, "What the readings tell"), fit_table(findings, fitted, known), residual_table(missed)]
     with session.drawing():
-        findings.figure("bends", bends, fitted, caption="measured bends, the model's, and the difference")
+        findings.figure("bends", angles, fitted, caption="measured bends, the model's, and the difference")
         findings.figure("residuals", residuals, fitted, known)
     mass = overruled_mass(problem, session.study.wrist)
     remark = "" if mass is None else (

@@ -1,16 +1,17 @@
 """Figures of an identification: measured and expected angles, what is left over, and what depends on what."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
-from matplotlib.axes import Axes
+from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 
-from wristctl.arrays import Array
 from wristctl.identification.bend_trials import PLANES, BendTrial
 from wristctl.identification.fit import Fit
 from wristctl.identification.intervals import Knowledge
 from wristctl.identification.measured_trials import MeasuredTrial
+from wristctl.plotting.kinds import draw_cells
 from wristctl.plotting.style import BLACK, BLUE, GREY, VERMILLION, figure, legend, legend_below, title
 
 # Trials drawn, spread over all of them.
@@ -19,61 +20,40 @@ _LAGS = 30
 
 
 def angles(fit: Fit) -> Figure:
-    """Marker's angle and the model's at the frames [deg], and the difference, of up to eight trials."""
-    drawn: list[Axes] = []
-
-    def draw(left: Axes, right: Axes, trial: MeasuredTrial, residual: Array) -> None:
-        left.plot(trial.captured, np.degrees(trial.angle), ".", color=GREY, markersize=3.0, label="marker")
-        left.plot(trial.captured, np.degrees(trial.angle - residual), color=BLUE, linewidth=1.0, label="model")
-        right.plot(trial.captured, np.degrees(residual), ".", color=VERMILLION, markersize=2.0)
-        drawn.append(right)
-
-    chosen = _chosen(fit, _SHOWN)
-    picture = _beside(fit, chosen, draw, "angle [deg]", max(2.6, 0.7 + 1.35 * len(chosen)))
-    most = 1.05 * max(float(np.abs(np.degrees(fit.residuals[index])).max()) for index in chosen)
-    for right in drawn:
-        right.set_ylim(-most, most)
-    return picture
-
-
-def bends(fit: Fit) -> Figure:
-    """Readings of both bends and the model's [deg], and the difference, of up to four trials."""
-
-    def draw(left: Axes, right: Axes, trial: MeasuredTrial, residual: Array) -> None:
-        assert isinstance(trial, BendTrial)
-        for channel, (plane, color) in enumerate(zip(PLANES, (BLUE, VERMILLION), strict=True)):
-            own = trial.channel == channel
-            time, angle, less = trial.captured[own], np.degrees(trial.angle[own]), np.degrees(residual[own])
-            left.plot(time, angle, ".", color=GREY, markersize=2.5, label="" if channel else "measured")
-            left.plot(time, angle - less, color=color, linewidth=1.0, label=f"model, {plane}")
-            right.plot(time, less, ".", color=color, markersize=2.0)
-
-    chosen = _chosen(fit, _SHOWN // 2)
-    return _beside(fit, chosen, draw, "bend [deg]", 0.9 + 1.8 * len(chosen))
-
-
-def _chosen(fit: Fit, most: int) -> list[int]:
-    """Numbers of so many trials at most, spread over all of them."""
-    count = len(fit.problem.trials)
-    return sorted(set(np.linspace(0, count - 1, min(count, most)).round().astype(int).tolist()))
-
-
-def _beside(
-    fit: Fit, chosen: Sequence[int], draw: Callable[[Axes, Axes, MeasuredTrial, Array], None], what: str, height: float
-) -> Figure:
-    """A row of each chosen trial: on the left `what` was measured and the model's, on the right the difference."""
-    titles = _short([fit.problem.trials[index].label for index in chosen])
+    """Measured angles and the model's at the frames [deg], and the difference, of up to eight trials; of bends four."""
+    trials = fit.problem.trials
+    two = isinstance(trials[0], BendTrial)
+    chosen = sorted(set(np.linspace(0, len(trials) - 1, min(len(trials), _SHOWN // (1 + two))).round().astype(int)))
+    height = max(2.6, 0.7 + (1.35 + 0.45 * two) * len(chosen))
     picture, axes = figure(len(chosen), 2, height=height, sharex=True, width_ratios=(3, 2))
+    drawn = [fit.residuals[index][readings] for index in chosen for readings, *_ in _channels(trials[index])]
+    most = 1.05 * float(np.degrees(np.abs(np.concatenate(drawn)).max()))
+    titles = _short([trials[index].label for index in chosen])
     for (left, right), index, text in zip(axes, chosen, titles, strict=True):
-        draw(left, right, fit.problem.trials[index], fit.residuals[index])
+        trial = trials[index]
+        for readings, modelled, remaining, name in _channels(trial):
+            time, angle = trial.captured[readings], np.degrees(trial.angle[readings])
+            residual = np.degrees(fit.residuals[index][readings])
+            left.plot(time, angle, ".", color=GREY, markersize=2.5, label="measured" if two else "marker")
+            left.plot(time, angle - residual, color=modelled, linewidth=1.0, label=name)
+            right.plot(time, residual, ".", color=remaining, markersize=2.0)
         right.axhline(0.0, color=BLACK, linewidth=0.8)
-        left.set_ylabel(what)
+        right.set_ylim(-most, most)
+        left.set_ylabel("bend [deg]" if two else "angle [deg]")
         title(left, text)
     title(axes[0, 1], "difference [deg]")
     for panel in axes[-1]:
         panel.set_xlabel("time [s]")
     legend_below(picture)
     return picture
+
+
+def _channels(trial: MeasuredTrial) -> list[tuple[Any, str, str, str]]:
+    """Readings of one angle each: which they are, colours of the model and of the difference, name of the model."""
+    if not isinstance(trial, BendTrial):
+        return [(slice(None), BLUE, VERMILLION, "model")]
+    shades = zip(PLANES, (BLUE, VERMILLION), strict=True)
+    return [(trial.channel == k, shade, shade, f"model, {plane}") for k, (plane, shade) in enumerate(shades)]
 
 
 def _short(labels: Sequence[str]) -> list[str]:
@@ -115,11 +95,7 @@ def correlations(fit: Fit, knowledge: Knowledge) -> Figure:
     names = fit.problem.free
     matrix = knowledge.correlation[: len(names), : len(names)]
     picture, ((axes,),) = figure(width=5.6, height=4.8)
-    axes.grid(False)
-    image = axes.imshow(matrix, cmap="RdBu_r", vmin=-1.0, vmax=1.0)
-    for (row, column), value in np.ndenumerate(matrix):
-        shade = "white" if abs(value) > 0.6 else BLACK
-        axes.text(column, row, f"{value:.2f}", ha="center", va="center", fontsize=9.0, color=shade)
+    image = draw_cells(axes, matrix, "RdBu_r", Normalize(-1.0, 1.0), lambda row, at: {"s": f"{matrix[row, at]:.2f}"})
     axes.set_xticks(range(len(names)), names, rotation=30, ha="right")
     axes.set_yticks(range(len(names)), names)
     picture.colorbar(image, label="correlation")

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from wristctl.commands.answer import Answer
 from wristctl.commands.identify.answer import recommendation_by_ratios
-from wristctl.commands.identify.driven import DrivenTold, driven_plan, identify_driven, keep_prediction
+from wristctl.commands.identify.driven import DRAWN, TRIED, DrivenTold, driven_plan, identify_driven, keep_prediction
 from wristctl.commands.inputs import Inputs
 from wristctl.commands.inputs_of_loops import RATIOS
 from wristctl.commands.printed_table import COLUMNS, Table, joined
@@ -30,9 +30,6 @@ if TYPE_CHECKING:
 # Share of the motion's mean square that a prediction may miss before a log is refused, and share of the motion, without
 # noise, that it may miss before no parameter is told.
 _MISSED, _MISSED_OF_ALL = 0.5, 0.1
-
-# Time of the last fit over that of all models, and seconds of the figures.
-_AFTER_FITS = 0.2, 2.0
 
 
 @dataclass(frozen=True, repr=False, eq=False)
@@ -160,17 +157,15 @@ def identify_logs(session: Session) -> LogTold | DrivenTold:
 
 def _identify_spooled(session: Session, logs: Sequence[OpenLog]) -> LogTold:
     from wristctl.identification.log_model import everything_fitted
-    from wristctl.identification.model_choice import chosen_of, most_models, tried_models, whole_fit
+    from wristctl.identification.model_choice import chosen_of, tried_models, whole_fit
 
     findings, study = session.findings, session.study
     robot, recordings, samples, remarks, rate = read_logs(logs, study)
-    models = list["TriedModel"]()
-    with session.progress("fitting models", most_models(robot), "models", *_AFTER_FITS) as report:
-        for model in tried_models(robot, [recordings], False):
-            models.append(model)
-            report(len(models))
+    with session.progress("fitting models", 100, "%", after=DRAWN) as report:
+        models = list(tried_models(robot, [recordings], False, told=lambda share: report(round(TRIED * share))))
         chosen = chosen_of(models)
         fit = whole_fit(models, everything_fitted(recordings))
+        report(100)
     missed = chosen.fits[0].missed()
     if missed > _MISSED_OF_ALL and study.identify.misfit != "tell":
         fit = replace(fit, predicts=False)

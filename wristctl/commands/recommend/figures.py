@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import FormatStrFormatter, LogLocator, NullFormatter
 
 from wristctl.commands.recommend.answer import spread
-from wristctl.plotting.style import BLUE, GREY, VERMILLION, figure
+from wristctl.plotting.kinds import Dot, draw_dots
+from wristctl.plotting.style import BLUE, GREY, VERMILLION, figure, logarithmic
 
 if TYPE_CHECKING:
     from wristctl.commands.recommend.answer import Limit, Recommended
@@ -31,6 +31,7 @@ def errors(result: Recommended) -> Figure:
     sizes = [np.degrees(ranked.rows[k].rmse) for k in order]
     finite = np.concatenate([row[np.isfinite(row)] for row in sizes])
     edge = 1.3 * float(finite.max()) if finite.size else 1.0
+    dots = list[Dot]()
     for place, (k, row) in enumerate(zip(order, sizes, strict=True)):
         failed = ~np.isfinite(row)
         lost, at = failed | ranked.rows[k].swings, np.where(failed, edge, row)
@@ -41,13 +42,10 @@ def errors(result: Recommended) -> Figure:
         low, median, high = (
             edge if not math.isfinite(error) else math.degrees(error) for error in spread(ranked.rows[k].rmse)
         )
-        axes.plot([low, high], [place, place], color=shade, linewidth=2.0, zorder=4)
-        axes.plot([median], [place], "o", color=shade, markersize=6, zorder=4)
+        dots.append(Dot(place, median, shade, (low, high)))
+    draw_dots(axes, dots, 2.0, 6.0)
     axes.set_yticks(range(len(order)), [result.candidates[k].label for k in order])
-    axes.set_xscale("log")
-    axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
-    axes.xaxis.set_major_formatter(FormatStrFormatter("%g"))
-    axes.xaxis.set_minor_formatter(NullFormatter())
+    logarithmic(axes.xaxis, (1.0, 2.0, 5.0))
     axes.set_xlabel("RMSE on a simulated rig [deg]\ncross: swings or chatters there; at the right edge: fails")
     return picture
 

@@ -138,7 +138,7 @@ def _draw(session: Session, study: Study, repeated: Repeated) -> None:
     from wristctl.commands.simulate.figures import consistency, sliding
     from wristctl.commands.truth_table import truth_heading
     from wristctl.control.table import controller, gains_of
-    from wristctl.plotting.loop_figures import angles, error_sizes, errors, one_motion, tensions
+    from wristctl.plotting.loop_figures import one_motion, over_time, spread_of_sizes, tensions
     from wristctl.plotting.wrist_drawing import stroboscope
 
     settings, findings, course = study.simulate, session.findings, repeated.first.trajectory
@@ -146,9 +146,10 @@ def _draw(session: Session, study: Study, repeated: Repeated) -> None:
     caption = "Bending angle, error and tensions over time; what changes faster is a band about its mean"
     findings.figure("course", one_motion, course, heading=world, caption=caption)
     if len(repeated.failed) > 1:
-        findings.figure("error-repetitions", error_sizes, [repeated])
-    later("angle", angles, [course], heading=world)
-    later("error", errors, [course], heading=world)
+        caption = "Size of the error over time: the repetitions' median with its 95 % interval"
+        findings.figure("error-repetitions", over_time, [course], spread_of_sizes([repeated]), caption=caption)
+    for part, caption in (("angle", "Desired and obtained bending angle over time"), ("error", "Its error over time")):
+        later(part, over_time, [course], part, heading=world, caption=caption)
     findings.figure("tensions", tensions, course, later=not repeated.marks)
     if course.load is not None:
         later("observer", consistency, course, heading=world)

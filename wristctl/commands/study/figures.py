@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from textwrap import fill
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -11,9 +12,9 @@ from matplotlib.ticker import LogLocator, NullFormatter
 
 from wristctl.arrays import Array
 from wristctl.comparison.bootstrap import plain
-from wristctl.comparison.controller_ranking import undominated
 from wristctl.comparison.paired_worlds import TermValue
 from wristctl.comparison.world_ranking import WorldRanking
+from wristctl.plotting.kinds import Dot, draw_cells, draw_dots, draw_front, name_rows
 from wristctl.plotting.style import (
     BLACK,
     BLUE,
@@ -24,13 +25,15 @@ from wristctl.plotting.style import (
     columns_within,
     figure,
     grid,
+    headed,
     legend_below,
     logarithmic,
     title,
-    undress,
 )
 
 _COLOURS = "RdYlBu"
+# Letters of what is best, and of what must not be used.
+_LOOKS = {"best": {"fontweight": "bold"}, "unusable": {"fontstyle": "italic"}}
 # Letters of a heading in an inch.
 _LETTERS = 12
 _AXES = (("chattering", "total variation of tension [N/s]"), ("energy", "work on the wrist [J]"))
@@ -47,23 +50,17 @@ def laws_by_rig(rankings: Mapping[str, WorldRanking]) -> Figure:
             kinds[place] = "best" if group == 1 else "" if group else "unusable"
     order = np.argsort(-np.nanmean(np.log(times), axis=1), kind="stable")
     fig, ((axes,),) = figure(height=1.2 + 0.27 * len(labels))
-    undress(axes)
     most = max(2.0, float(np.nanmax(times)))
-    drawn = axes.pcolormesh(times[order], cmap=_COLOURS, norm=LogNorm(1.0 / most, most), edgecolors="white")
-    dark = drawn.to_rgba(times)[..., :3] @ np.array([0.299, 0.587, 0.114]) < 0.5
-    for y, index in enumerate(order):
-        for x in range(len(rankings)):
-            weight, slant = "bold" if kinds[index, x] == "best" else None, kinds[index, x] == "unusable"
-            if np.isfinite(times[index, x]):
-                axes.text(x + 0.5, y + 0.5, plain(times[index, x]), ha="center", va="center", fontsize=8.5,
-                          color="white" if dark[index, x] else BLACK, fontweight=weight,
-                          fontstyle="italic" if slant else None)  # fmt: skip
-    axes.set_xticks(np.arange(len(rankings)) + 0.5, [_short(name) for name in rankings])
-    axes.set_yticks(np.arange(len(labels)) + 0.5, [labels[line] for line in order])
-    axes.invert_yaxis()
+
+    def said(row: int, column: int) -> dict[str, Any]:
+        return {"s": plain(times[order[row], column]), **_LOOKS.get(kinds[order[row], column], {})}
+
+    draw_cells(axes, times[order], _COLOURS, LogNorm(1.0 / most, most), said)
+    axes.set_xticks(range(len(rankings)), [_short(name) for name in rankings])
+    axes.set_yticks(range(len(labels)), [labels[line] for line in order])
     axes.xaxis.tick_top()
     heading = "How many times less RMSE than feedforward; bold: nothing is better; slanted: must not be used"
-    fig.suptitle(fill(heading, round(_LETTERS * fig.get_figwidth())), fontsize=10.0)
+    headed(fig, heading)
     return fig
 
 
@@ -78,24 +75,21 @@ def terms_by_rig(values: Sequence[TermValue]) -> Figure:
     fig, every = grid(len(families), columns_within(len(families), 0.8), 0.5 + 0.27 * len(terms), sharey=True)
     panels = dict(zip(families, every, strict=True))
     for term_value in values:
-        panel, place, times = panels[term_value.family], terms.index(term_value.term), term_value.times
+        place, times, edge = terms.index(term_value.term), term_value.times, {"markeredgecolor": BLACK}
         shade = SILVER if times.is_one else BLUE if times.value > 1.0 else VERMILLION
-        if np.isfinite(times.high):
-            panel.plot([times.low, times.high], [place, place], color=shade, linewidth=3.0)
-        panel.plot(times.value, place, "o", color=shade, markeredgecolor=BLACK, markersize=5.0)
+        dot = Dot(place, times.value, shade, (times.low, times.high), mark=edge)
+        draw_dots(panels[term_value.family], [dot], 3.0)
     for family, panel in panels.items():
         panel.axvline(1.0, color=BLACK, linewidth=0.8)
         logarithmic(panel.xaxis)
         panel.xaxis.set_minor_formatter(NullFormatter())
         low, high = panel.get_xlim()
         if high < 30.0 * low:
-            panel.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0) if high < 8.0 * low else (1.0, 3.0)))
-            panel.xaxis.set_major_formatter("{x:g}")
+            logarithmic(panel.xaxis, (1.0, 2.0, 5.0) if high < 8.0 * low else (1.0, 3.0))
         else:
             panel.xaxis.set_major_locator(LogLocator(numticks=3))
         title(panel, _short(family))
-    every[0].set_yticks(range(len(terms)), terms)
-    every[0].invert_yaxis()
+    name_rows(every[0], terms)
     label = "times less RMSE, with 95 % interval; grey: cannot be told"
     fig.supxlabel(fill(label, round(_LETTERS * fig.get_figwidth())), fontsize=10.0)
     return fig
@@ -113,16 +107,14 @@ def pareto(ranking: WorldRanking) -> Figure:
         axes.set_xlabel(label)
     left.set_ylabel("RMSE [deg]")
     heading = f"{ranking.name}: error and its price; hollow: must not be used"
-    fig.suptitle(fill(heading, round(_LETTERS * fig.get_figwidth())), fontsize=10.0)
+    headed(fig, heading)
     legend_below(fig, 4)
     return fig
 
 
 def _front(axes: Axes, cost: Array, rmse: Array, ranking: WorldRanking) -> None:
     sound = np.array([ranking.standing.group(row) is not None for row in range(len(rmse))])
-    best = np.flatnonzero(sound)[undominated(np.column_stack([cost, rmse])[sound])]
-    best = best[np.argsort(cost[best])]
-    axes.plot(cost[best], rmse[best], color=GREY, linewidth=1.0, zorder=1)
+    draw_front(axes, cost, rmse, sound, {"color": GREY, "linewidth": 1.0, "zorder": 1})
     for index in ranking.standing.order:
         shade = colour(ranking.rows[index].label.split("/")[0])
         axes.plot(cost[index], rmse[index], "o", color=shade, markersize=6.0, linestyle="none",
@@ -141,16 +133,13 @@ def world_map(ranking: WorldRanking) -> Figure:
     best = np.where(np.isfinite(scores), scores, np.inf).min(axis=0)
     worlds, rows = np.argsort(best, kind="stable"), np.array(ranking.standing.order)
     fig, ((axes,),) = figure(height=max(2.6, 1.3 + 0.22 * len(rows)))  # room for the label of its colours
-    undress(axes)
     ratios = (scores / best)[np.ix_(rows, worlds)]
-    shown = np.where(np.isfinite(ratios), ratios, np.nan)
-    drawn = axes.pcolormesh(shown, cmap="viridis_r", norm=LogNorm(1.0, 10.0), rasterized=True)
+    drawn = draw_cells(axes, np.where(np.isfinite(ratios), ratios, np.nan), "viridis_r", LogNorm(1.0, 10.0))
     failed = np.argwhere(~np.isfinite(ratios))
     swings = np.argwhere(np.array([row.swings for row in ranking.rows])[np.ix_(rows, worlds)] & np.isfinite(ratios))
     for places, mark in ((failed, "x"), (swings, ".")):
-        axes.plot(places[:, 1] + 0.5, places[:, 0] + 0.5, mark, color=VERMILLION, markersize=2.5, linestyle="none")
-    axes.set_yticks(np.arange(len(rows)) + 0.5, [ranking.rows[index].label for index in rows])
-    axes.invert_yaxis()
+        axes.plot(places[:, 1], places[:, 0], mark, color=VERMILLION, markersize=2.5, linestyle="none")
+    axes.set_yticks(range(len(rows)), [ranking.rows[index].label for index in rows])
     axes.set_xlabel(f"{ranking.count} worlds, the easiest first")
     fig.colorbar(drawn, ax=axes, label="RMSE over the least one there [-]", extend="max")
     title(axes, f"{ranking.name}: world by world; x fails, a dot swings")

@@ -23,9 +23,10 @@ from wristctl.commands.inputs_of_loops import (
     tuned_gains,
 )
 from wristctl.commands.procedure import Procedure, check_tendons
-from wristctl.commands.results import StudyResult
+from wristctl.commands.quantities import Quantity, documented
+from wristctl.commands.results import Findings, StudyResult
 from wristctl.commands.session import Session
-from wristctl.commands.sweep.answer import answer, fates, for_people, headline, rows_of
+from wristctl.commands.sweep.answer import answer, fates, headline, metrics_of, quantities, rows_of
 from wristctl.config.study import Study
 from wristctl.errors import Argument, UserError
 from wristctl.study_files.sweeps import SweepAxis, axes_of, points_of, study_at, unit_at
@@ -289,7 +290,7 @@ def _corners(axes: Sequence[SweepAxis]) -> list[tuple[Any, ...]]:
 def _swept(session: Session, command: str) -> Swept:
     import pandas as pd
 
-    from wristctl.commands.sweep.figures import over_key
+    from wristctl.commands.sweep.figures import over_setting
     from wristctl.commands.units import performed
 
     study, findings = session.study, session.findings
@@ -322,22 +323,19 @@ def _swept(session: Session, command: str) -> Swept:
             exit_code=3,
         )
     table = pd.concat(parts, ignore_index=True)
-    keys = {axis.key: [points[index][number] for index in table["point"]] for number, axis in enumerate(axes)}
-    table = pd.concat([pd.DataFrame(keys), table], axis=1)
-    metrics = [str(name) for name in table if name not in {*keys, "point", "repetition", "failed", "until", "fate"}]
-    columns = {axis.key: unit_at(base, axis.path) for axis in axes} | _units(metrics, known_units)
-    findings.table("data/sweep.csv", table, columns)
-    shown = headline(table, metrics, columns)
-    _note(session, table, shown, known_units)
-    told, units_told = for_people(table, columns)
+    for number, axis in enumerate(axes):
+        table.insert(number, axis.key, [points[index][number] for index in table["point"]])
+    columns = quantities(table, {axis.key: unit_at(base, axis.path) for axis in axes}, known_units)
+    findings.table("data/sweep.csv", table, *documented(columns.values()))
+    keys = [columns[axis.key] for axis in axes]
+    shown = headline(table, metrics_of(columns, keys))
+    _note(findings, table, shown)
     with session.drawing():
-        for axis in axes:
-            others = [other_axis.key for other_axis in axes if other_axis is not axis]
-            findings.figure(f"sweep-{axis.key}", over_key, told, axis.key, others, shown, units_told)
-    place = str(findings.run.path) if findings.run else ""
-    screen = answer(command, told, list(keys), shown, units_told, place)
-    lines = rows_of(told.head(_PRINTED), list(keys), shown, units_told)
-    return Swept(study, findings, [lines], table, outcome.poisoned, screen)
+        for key in keys:
+            others = [other for other in keys if other is not key]
+            findings.figure(f"sweep-{key.name}", over_setting, table, key, others, shown)
+    screen = answer(command, table, keys, shown, str(findings.run.path) if findings.run else "")
+    return Swept(study, findings, [rows_of(table.head(_PRINTED), keys, shown)], table, outcome.poisoned, screen)
 
 
 def _golden(study: Study, command: str) -> Golden:
@@ -355,27 +353,14 @@ def _golden(study: Study, command: str) -> Golden:
     return Golden.here(GOLDEN, golden_spec([law], [loop], study.wrist, [planes_of(study.wrist, asked(study))]))
 
 
-def _units(metrics: Sequence[str], units: dict[str, str]) -> dict[str, str]:
-    from wristctl.simulation.metrics import metrics_in
-
-    known = metrics_in(2)
-    of_table = {name: known[name].unit or "1" for name in metrics if name in known}
-    return (
-        {"point": "1", "repetition": "1", "failed": "1", "until": "s", "fate": "1"}
-        | of_table
-        | {k: v or "1" for k, v in units.items()}
-    )
-
-
-def _note(session: Session, table: pd.DataFrame, shown: Sequence[str], known_units: dict[str, str]) -> None:
+def _note(findings: Findings, table: pd.DataFrame, shown: Sequence[Quantity]) -> None:
     """Note the metrics that `runs ls` can filter by."""
-    findings, units = session.findings, _units(shown, known_units)
     findings.metric("points", int(table["point"].nunique()), meaning="of the sweep")
     if "failed" in table:
         findings.metric(
             "failed", float(table["failed"].mean()), better="lower", n=len(table), meaning="share that left its range"
         )
-    for name in shown:
-        values = table[name].dropna()
-        findings.metric(f"{name}_least", float(values.min()), units[name], "lower", len(values))
-        findings.metric(f"{name}_most", float(values.max()), units[name], "lower", len(values))
+    for metric in shown:
+        values = table[metric.name].dropna()
+        for end, value in (("least", values.min()), ("most", values.max())):
+            findings.metric(f"{metric.name}_{end}", float(value), metric.unit, metric.better, len(values))

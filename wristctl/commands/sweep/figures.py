@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from textwrap import fill
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -12,7 +11,8 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
-from wristctl.commands.sweep.answer import FAILED, fates, in_unit, least, measurable
+from wristctl.commands.quantities import Quantity
+from wristctl.commands.sweep.answer import FAILED, fates, least, measurable
 from wristctl.plotting.style import (
     BLACK,
     BLUE,
@@ -24,16 +24,14 @@ from wristctl.plotting.style import (
     VERMILLION,
     columns_within,
     figure,
+    headed,
     legend_below,
     logarithmic,
-    with_unit,
 )
 
 if TYPE_CHECKING:
     import pandas as pd
 
-# Sections of the commands that can be swept.
-_COMMANDS = ("simulate", "tune", "compare")
 # Range beyond which an axis is logarithmic; places at which a line of medians is drawn.
 _DECADES, _BINS = 20.0, 25
 # Median over largest value below which swept values crowd at the small ones.
@@ -45,34 +43,32 @@ _HUES = (BLUE, ORANGE, GREEN, PURPLE, SKY, BLACK)
 _DOT: dict[str, Any] = {"markersize": 6.0}
 _RING: dict[str, Any] = {"markersize": 7.0, "fillstyle": "none"}
 _CROSS: dict[str, Any] = {"markersize": 5.0, "clip_on": False}
-# Letters of a heading to an inch.
-_LETTERS = 13.0
 # Width of a panel [in] that has room for the name of a setting.
 _PANEL = 2.2
 
 
-def over_key(
-    table: pd.DataFrame, key: str, other_keys: Sequence[str], metrics: Sequence[str], units: Mapping[str, str]
+def over_setting(
+    table: pd.DataFrame, key: Quantity, other_keys: Sequence[Quantity], metrics: Sequence[Quantity]
 ) -> Figure:
-    """Metrics over one key, under the answer in words.
+    """Metrics over one setting, under the answer in words.
 
-    Where one further key was swept over few values, each of these has a line; else all else that was swept spreads the
+    Where one further one was swept over few values, each of these has a line; else all else that was swept spreads the
     dots, and a line runs through their medians. Rings and crosses mark rollouts that are no good; a failed one is of
     no error, and its cross stands at the upper edge.
     """
     columns = columns_within(min(2, max(1, len(metrics))), _PANEL)
     rows = max(1, -(-len(metrics) // columns))
     picture, axes = figure(rows, columns, height=0.6 + 2.3 * rows, sharex=True)
-    values = table[key].to_numpy()
+    values = key.cell(table[key.name].to_numpy())
     labels = list(dict.fromkeys(map(str, values))) if values.dtype.kind not in "if" else None
     places = values.astype(float) if labels is None else np.array([labels.index(str(value)) for value in values], float)
     fate = table["fate"].to_numpy(str) if "fate" in table else np.full(len(table), "")
     failed = table["failed"].to_numpy(bool) if "failed" in table else np.zeros(len(table), bool)
     bad = (fate != "") & ~failed
-    lines = _lines(table, other_keys, units)
+    lines = _lines(table, other_keys)
     panels = [panel for row in axes.tolist() for panel in row]
-    for panel, name in zip(panels, metrics, strict=False):
-        heights = np.where(failed, np.nan, measurable(table[name], units[name]))
+    for panel, metric in zip(panels, metrics, strict=False):
+        heights = np.where(failed, np.nan, metric.cell(measurable(table[metric.name], metric)))
         for (label, chosen), hue in zip(lines, _HUES, strict=False):
             panel.plot(places[chosen], heights[chosen], ".", color=hue, label=label, **_DOT)
             if labels is None:
@@ -82,11 +78,11 @@ def over_key(
         if failed.any():
             edge = panel.get_xaxis_transform()
             panel.plot(places[failed], np.ones(failed.sum()), "x", color=VERMILLION, transform=edge, **_CROSS)
-        panel.set_ylabel(with_unit(_metric(name), units[name]))
+        panel.set_ylabel(metric.head)
         if _is_wide(heights):
             logarithmic(panel.yaxis)
     for panel in axes[-1]:
-        panel.set_xlabel(with_unit(_setting(key), units[key]))
+        panel.set_xlabel(key.head)
         if labels is not None:
             panel.set_xticks(range(len(labels)), labels, rotation=30, ha="right")
             panel.margins(x=0.1)
@@ -98,38 +94,28 @@ def over_key(
         panel.set_visible(False)
     if len(lines) > 1:
         legend_below(picture)
-    picture.suptitle(
-        fill(
-            _heading(table, [key, *other_keys], metrics, units, len(lines) > 1),
-            round(_LETTERS * picture.get_figwidth()),
-        ),
-        fontsize=10.0,
-    )
+    headed(picture, _heading(table, [key, *other_keys], metrics, len(lines) > 1))
     return picture
 
 
-def _lines(
-    table: pd.DataFrame, other_keys: Sequence[str], units: Mapping[str, str]
-) -> list[tuple[str, NDArray[np.bool_]]]:
+def _lines(table: pd.DataFrame, other_keys: Sequence[Quantity]) -> list[tuple[str, NDArray[np.bool_]]]:
     """Names and rows of what has a line of its own: each value of the other key; else one without a name for all."""
     whole = [("", np.ones(len(table), bool))]
     if len(other_keys) != 1:
         return whole
     (key,) = other_keys
-    values = list(dict.fromkeys(table[key]))
+    values = list(dict.fromkeys(table[key.name]))
     if not 1 < len(values) <= len(_HUES):
         return whole
-    return [(f"{_setting(key)} = {in_unit(key, value, units)}", (table[key] == value).to_numpy()) for value in values]
+    return [(f"{key.words} = {key.said(value)}", (table[key.name] == value).to_numpy()) for value in values]
 
 
-def _heading(
-    table: pd.DataFrame, keys: Sequence[str], metrics: Sequence[str], units: Mapping[str, str], lined: bool
-) -> str:
+def _heading(table: pd.DataFrame, keys: Sequence[Quantity], metrics: Sequence[Quantity], lined: bool) -> str:
     """Where the main metric is least, and the meaning of dots, line, rings and crosses."""
-    parts = [least(table, keys, metrics[0], units)] if metrics else []
+    parts = [least(table, keys, metrics[0])] if metrics else []
     if len(keys) > 1 and not lined:
-        line = ", line: median" * (table[keys[0]].dtype.kind in "if")
-        parts.append(f"dots: {', '.join(map(_setting, keys[1:]))} as swept{line}")
+        line = ", line: median" * (table[keys[0].name].dtype.kind in "if")
+        parts.append(f"dots: {', '.join(key.words for key in keys[1:])} as swept{line}")
     marks = fates(table)
     crosses = marks.pop(FAILED, 0)
     if marks:
@@ -137,20 +123,6 @@ def _heading(
     if crosses:
         parts.append("crosses: left the range")
     return "; ".join([*parts, "less is better"])
-
-
-def _metric(name: str) -> str:
-    """What a metric is called in tables: RMSE; one without a heading has its name."""
-    from wristctl.simulation.metrics import METRICS
-
-    heading = METRICS[name].heading if name in METRICS else ""
-    return heading.partition(" [")[0] or name
-
-
-def _setting(key: str) -> str:
-    """The name of a setting without the command's section: `loop.control_period`."""
-    section, _, rest = key.partition(".")
-    return rest if section in _COMMANDS and rest else key
 
 
 def _is_wide(values: np.ndarray) -> bool:

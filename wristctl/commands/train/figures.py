@@ -6,7 +6,6 @@ import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import LogLocator, NullFormatter
 from numpy.typing import ArrayLike
 
 from wristctl.arrays import Array
@@ -47,17 +46,8 @@ def coverage(samples: pd.DataFrame, count: int | None = None) -> Figure:
     picture, axes = _workspace(1e3 * samples["y"], 1e3 * samples["x"])
     title(axes, f"{shown} samples of the tip")
     bend = float(np.degrees(samples["theta"].abs().max()))
-    dots = axes.scatter(
-        1e3 * samples["y"],
-        1e3 * samples["x"],
-        c=np.degrees(samples["theta"]),
-        s=float(np.clip(12_000 / len(samples), 0.5, 12.0)),
-        cmap=darkened(ANGLES),
-        vmin=-bend,
-        vmax=bend,
-        linewidths=0.0,
-        rasterized=len(samples) > MOST_PATHS,
-    )
+    across, up, shade = 1e3 * samples["y"], 1e3 * samples["x"], np.degrees(samples["theta"])
+    dots = _dots(axes, across, up, shade, cmap=darkened(ANGLES), vmin=-bend, vmax=bend)
     picture.colorbar(dots, ax=axes, label="bending angle [deg]")
     return picture
 
@@ -74,10 +64,8 @@ def learning_curves(curves: pd.DataFrame, kept: int = 0) -> Figure:
             axes.plot(rows["epoch"], rmse, color=colour, **style)
     if curves["trial"].nunique() > 1:
         title(axes, f"trial {kept} was kept; faint: trials that were not")
-    axes.set(xlabel="epoch", ylabel="RMSE of the angle [deg]", yscale="log")
-    axes.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
-    axes.yaxis.set_major_formatter("{x:g}")
-    axes.yaxis.set_minor_formatter(NullFormatter())
+    axes.set(xlabel="epoch", ylabel="RMSE of the angle [deg]")
+    logarithmic(axes.yaxis, (1.0, 2.0, 5.0))
     legend(axes, loc="upper right")
     return picture
 
@@ -145,18 +133,21 @@ def _draw_errors(axes: Axes, across: Array, up: Array, error: Array, of_a_grid: 
         axes.plot(across[worst], up[worst], "o", color=VERMILLION, **ring)
         return axes.pcolormesh(across, up, degrees, shading="gouraud", cmap=ERRORS, vmin=0.0, rasterized=True)
     order = np.argsort(degrees)
-    options: Any = {"s": 8.0, "cmap": ERRORS, "vmin": 0.0, "linewidths": 0.0, "rasterized": len(up) > MOST_PATHS}
-    return axes.scatter(across[order], up[order], c=degrees[order], **options)
+    return _dots(axes, across[order], up[order], degrees[order], s=8.0, cmap=ERRORS, vmin=0.0)
+
+
+def _dots(axes: Axes, across: ArrayLike, up: ArrayLike, values: ArrayLike, **options: Any) -> Any:
+    """Draw samples as dots coloured by their values, which are smaller where they are many, as pixels beyond some."""
+    count = np.size(values)
+    size = {"s": float(np.clip(12_000 / count, 0.5, 12.0)), "rasterized": count > MOST_PATHS}
+    return axes.scatter(across, up, c=values, linewidths=0.0, **size | options)
 
 
 def _both_sides(samples: pd.DataFrame, heading: str) -> Figure:
     size = np.degrees(np.hypot(samples["bend_ulnar"], samples["bend_flexion"]))
     picture, (panels,) = figure(1, 2, height=2.2)
     for axes, aside, toward in zip(panels, "yz", _OF_PLANES, strict=True):
-        dots = axes.scatter(
-            1e3 * samples[aside], 1e3 * samples["x"], c=size, s=float(np.clip(12_000 / len(samples), 0.5, 12.0)),
-            cmap=ERRORS, vmin=0.0, linewidths=0.0, rasterized=len(samples) > MOST_PATHS,
-        )  # fmt: skip
+        dots = _dots(axes, 1e3 * samples[aside], 1e3 * samples["x"], size, cmap=ERRORS, vmin=0.0)
         axes.set(xlabel=f"{aside}, toward {toward} [mm]", ylabel="x [mm]", aspect="equal")
     title(panels[0], heading)
     picture.colorbar(dots, ax=list(panels), label="size of the bend [deg]")

@@ -51,7 +51,9 @@ if TYPE_CHECKING:
     from wristctl.wrist.kinematics import Inverse
 
 # Time of a rollout on another loop, which may have more segments, over that of one on the loop of the search.
-_ELSEWHERE = 3
+_ELSEWHERE = 5
+# Seconds in which the margins of a controller are found.
+_MARGINS = 0.1
 # Share of what a family draws at which one of its motions is tried.
 _WITHIN = 0.75
 
@@ -194,12 +196,13 @@ def tune(session: Session) -> Tuned:
     cases = chosen or searched
     tried = (3 + _ELSEWHERE * len(study.tune.loops)) * len(cases) + sum(map(len, LADDERS)) * len(searched)
     searches = search_all(session, study, network, tried)
-    lost = {
-        name: marks_of(law, np.array(law.values(searches[name].gains)), cases, study.wrist)
-        for name, law in ((name, controller(name)) for name in searches)
-    }
     gains = {name: best.gains for name, best in searches.items()}
-    errors = beside_feedforward(gains, cases, study.wrist)
+    with session.progress("trying the gains found"):
+        lost = {
+            name: marks_of(law, np.array(law.values(gains[name])), cases, study.wrist)
+            for name, law in ((name, controller(name)) for name in gains)
+        }
+        errors = beside_feedforward(gains, cases, study.wrist)
     title = "Tuned gains, best first; objective in decades beside feedforward"
     tables = [searches_table(searches, errors, lost, len(cases), title)]
     tables += truth_tables(study.wrist, judged_loops(study, study.tune))
@@ -267,6 +270,7 @@ def _elsewhere(
     import numpy as np
 
     from wristctl.control.table import controller
+    from wristctl.simulation.closed_loop import Size
     from wristctl.tuning.objective import marks_of
     from wristctl.tuning.search import tuning_cases
 
@@ -274,8 +278,11 @@ def _elsewhere(
     searched = {scenario.loop for scenario in settings.scenarios}
     others = [] if settings.worlds.family else [name for name in settings.loops if name not in searched]
     tried: dict[str, dict[str, dict[str, int]]] = {name: {} for name in gains}
-    with session.progress("trying the gains on other loops"):
-        for loop in others:
+    loops = [settings.loops[name] for name in others]
+    efforts = [loop.plant_segments * Size([loop], settings.horizon).steps for loop in loops]
+    done, whole = 0.0, sum(efforts) * len(gains)
+    with session.progress("trying the gains on other loops", 100, "%", after=_MARGINS * len(gains)) as report:
+        for loop, effort in zip(others, efforts, strict=True):
             scenarios = tuple(dict.fromkeys(one.model_copy(update={"loop": loop}) for one in settings.scenarios))
             elsewhere = study.model_copy(update={"tune": settings.model_copy(update={"scenarios": scenarios})})
             cases = tuning_cases(elsewhere, network)[0]
@@ -283,6 +290,8 @@ def _elsewhere(
                 law = controller(name)
                 if law.keeps_up(settings.loops[loop].control_period):
                     tried[name][loop] = marks_of(law, np.array(law.values(values)), cases, study.wrist)
+                done += effort
+                report(round(100.0 * done / whole))
     return tried
 
 

@@ -143,11 +143,10 @@ def validate(session: Session) -> Validated:
 
     findings, study = session.findings, session.study
     robot, files = _recordings(study)
-    cases, models = recordings_of(robot, files), list["TriedModel"]()
-    with session.progress("fitting models") as report:
-        for model in tried_models(robot.robot, cases, robot.centred, study.real_robot.terms):
-            models.append(model)
-            report(len(models))
+    cases = recordings_of(robot, files)
+    with session.progress("fitting models", 100, "%") as report:
+        tried = robot.robot, cases, robot.centred, study.real_robot.terms
+        models = list(tried_models(*tried, told=lambda share: report(round(100 * share))))
     chosen = chosen_of(models)
     steps = [chosen.fits[0].asked_of(recording) for recording in robot.steps(files)] if robot.steps else []
     _write(findings, robot, models, chosen, steps)

@@ -8,6 +8,7 @@ from matplotlib.figure import Figure
 from wristctl.identification.arc_fit import ArcFit
 from wristctl.identification.model_choice import TriedModel
 from wristctl.identification.real_robots import RealRobot
+from wristctl.plotting.kinds import Dot, draw_dots, name_rows
 from wristctl.plotting.style import BLACK, BLUE, GREY, VERMILLION, figure, legend, legend_below, title
 
 # Recordings drawn at most.
@@ -74,14 +75,11 @@ def left_over(robot: RealRobot, fits: Sequence[ArcFit]) -> Figure:
 def errors_of_models(robot: RealRobot, models: Sequence[TriedModel]) -> Figure:
     """Error of the predicted part of each model with its 95 % interval, and of the authors' own."""
     picture, ((axes,),) = figure(1, 1, height=1.2 + 0.35 * len(models))
-    for place, model in enumerate(models):
-        error, low, high = (robot.scale * value for value in model.score[:3])
-        axes.plot([low, high], [place, place], color=BLUE, linewidth=1.5)
-        axes.plot(error, place, "o", color=BLUE, markersize=5.0)
+    scores = [[robot.scale * value for value in model.score[:3]] for model in models]
+    draw_dots(axes, [Dot(place, error, BLUE, (low, high)) for place, (error, low, high) in enumerate(scores)])
     for name, error in robot.authors[:1]:
         axes.axvline(error, color=VERMILLION, linewidth=1.2, label=name)
-    axes.set_yticks(range(len(models)), [model.words.replace("elastic ", "") for model in models])
-    axes.invert_yaxis()
+    name_rows(axes, [model.words.replace("elastic ", "") for model in models])
     axes.set_xlabel(f"RMS error, {robot.asked} [{robot.unit}]")
     axes.set_xlim(left=0.0)
     if robot.authors:
