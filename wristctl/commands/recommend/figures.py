@@ -11,7 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import FormatStrFormatter, LogLocator, NullFormatter
 
-from wristctl.commands.recommend.answer import spread
+from wristctl.commands.recommend.candidate import spread
 from wristctl.plotting.style import BLUE, GREY, VERMILLION, figure
 
 if TYPE_CHECKING:
