@@ -20,6 +20,7 @@ from wristctl.commands.recommend.candidate import Candidate, spread
 from wristctl.commands.recommend.command import _limit
 from wristctl.commands.recommend.figures import errors
 from wristctl.commands.recommend.reach import FAMILY, TOLERATED, family_of_rigs, reach_deg
+from wristctl.commands.recommend.rehearsals import Rehearsal
 from wristctl.commands.recommend.study_file import next_command, sections_of, takers_of
 from wristctl.config.loop import Loop, Reference
 from wristctl.config.study import Study
@@ -32,6 +33,7 @@ from wristctl.simulation.oscillation import FASTEST, oscillations, sustained
 from wristctl.simulation.reference import motion
 from wristctl.simulation.rollout import rollout
 from wristctl.study_files.load import load_study
+from wristctl.trial.rehearsed import Rehearsed
 from wristctl.tuning.scaled_presets import dynamic_stiffness, scaled_to
 from wristctl.wrist.compiled_model import terms
 from wristctl.wrist.segments import segments
@@ -406,6 +408,11 @@ def test_of_what_errs_hardly_more_the_one_is_taken_that_is_lost_on_fewer_rigs(
     safer = told(5, [least], [more], [open_loop])
     assert safer.best_row == (least if kept else more)
     assert ("unstable on more rigs" in " ".join(safer.answer.lines())) != kept
+    if not kept:
+        run = Rehearsed("ok", 0.01, 0.0)
+        worse = {least: Rehearsal({1.0: run._replace(rmse=0.1)}), more: Rehearsal({1.0: run})}
+        other = replace(told(0, [least], [more], [open_loop]), rehearsals=worse)
+        assert other.best_row == more and "does worse when rehearsed" in " ".join(other.answer.lines())
     behind = told(5, [least], [open_loop], [more])
     assert behind.best_row == least, "what errs more than feedforward alone is no choice"
 

@@ -209,8 +209,8 @@ def _sentence(result: Recommended) -> str:
     lesser = [other for other in first if other in result.near]
     least = ranked.means[row].value / min(ranked.means[other].value for other in lesser)
     others, be = joined([result.candidates[other].label for other in lesser]), "are" if lesser[1:] else "is"
-    shown = any(result.lost_more(other, row) for other in lesser)
-    but = f"{be} unstable on more rigs" if shown else f"{'do' if lesser[1:] else 'does'} worse when rehearsed"
+    rehearsed = all(other in result.rehearsals for other in lesser)
+    but = f"{'do' if lesser[1:] else 'does'} worse when rehearsed" if rehearsed else f"{be} unstable on more rigs"
     return f"{sentence} {others} would err up to {two(least)} times less, and {but}."
 
 
