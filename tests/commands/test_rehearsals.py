@@ -7,30 +7,47 @@ from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
+import numpy as np
 import pytest
 
 import wristctl
 from wristctl.commands.inputs import Inputs
-from wristctl.commands.recommend.answer import Candidate, Recommended
+from wristctl.commands.recommend.answer import Recommended
+from wristctl.commands.recommend.candidate import Candidate
 from wristctl.commands.recommend.command import plan
-from wristctl.commands.recommend.rehearsals import Rehearsal, _scales, check_homing
+from wristctl.commands.recommend.rehearsals import (
+    Rehearsal,
+    _asked,
+    _circling,
+    _scales,
+    check_homing,
+    motions_of_trial,
+)
 from wristctl.commands.results import Findings
 from wristctl.errors import UserError
 from wristctl.trial.rehearsed import Rehearsed, rehearse
 
 
-def rehearsal(weak: float, strong: float, swing_deg: float = 0.05, outcome: str = "ok") -> Rehearsal:
-    """One with these errors with weak springs and strong ones [deg]."""
+def rehearsal(
+    weak: float, strong: float, swing_deg: float = 0.05, outcome: str = "ok", around: tuple[float, ...] = ()
+) -> Rehearsal:
+    """One with these errors with weak springs and strong ones, and while the hand circles [deg]; stopped where nan."""
     of = {0.7: (weak, outcome), 1.0: (strong, "ok")}
+    circles = {
+        scale: Rehearsed("rate" if math.isnan(error) else "ok", math.radians(error), 0.0)
+        for scale, error in zip(of, around, strict=False)
+    }
     return Rehearsal(
-        {scale: Rehearsed(end, math.radians(error), math.radians(swing_deg)) for scale, (error, end) in of.items()}
+        {scale: Rehearsed(end, math.radians(error), math.radians(swing_deg)) for scale, (error, end) in of.items()},
+        circles,
     )
 
 
 def test_what_swings_or_is_stopped_in_its_rehearsal_is_out_and_says_with_which_springs() -> None:
-    assert rehearsal(0.1, 0.1).fault == "" and rehearsal(0.1, 0.4).rmse == pytest.approx(math.radians(0.2))
+    assert rehearsal(0.1, 0.1).fault == ""
     assert rehearsal(0.1, 0.1, swing_deg=0.19).fault == ""
     assert "swings by 0.21 deg peak to peak with springs x0.7" in rehearsal(0.1, 0.1, swing_deg=0.21).fault
+    assert "stopped on circumduction with springs x1 (rate)" in rehearsal(0.1, 0.1, around=(0.1, math.nan)).fault
     stopped = rehearsal(math.nan, 0.1, outcome="rate 11.0 rad/s beyond +-10 rad/s; likely gains")
     assert stopped.fault == "is stopped with springs x0.7 (rate 11.0 rad/s beyond +-10 rad/s)"
 
@@ -41,6 +58,12 @@ def test_what_swings_or_is_stopped_in_its_rehearsal_is_out_and_says_with_which_s
         ({}, 0),
         ({0: rehearsal(0.1, 0.1), 1: rehearsal(0.09, 0.09)}, 0),  # the first, if it errs hardly more
         ({0: rehearsal(0.2, 0.1), 1: rehearsal(0.1, 0.1)}, 1),
+        ({0: rehearsal(0.13, 1.0), 1: rehearsal(0.1, 1.0)}, 1),  # with weak springs, though both are far off else
+        ({0: rehearsal(1.0, 0.13), 1: rehearsal(1.0, 0.1)}, 1),
+        ({0: rehearsal(0.1, 0.14), 1: rehearsal(0.15, 0.1)}, 0),  # each errs more somewhere, and the first least so
+        ({0: rehearsal(0.1, 0.16), 1: rehearsal(0.15, 0.1)}, 1),
+        ({0: rehearsal(0.1, 0.1, around=(0.3, 0.1)), 1: rehearsal(0.1, 0.1, around=(0.2, 0.1))}, 1),
+        ({0: rehearsal(0.1, 0.1, around=(math.nan, 0.1)), 1: rehearsal(0.3, 0.3, around=(0.2, 0.1))}, 1),
         ({0: rehearsal(0.1, 0.1, swing_deg=0.5), 1: rehearsal(0.3, 0.3)}, 1),
         ({0: rehearsal(0.1, 0.1, swing_deg=0.5), 1: rehearsal(0.3, 0.3, swing_deg=3.0)}, None),
     ],
@@ -59,7 +82,8 @@ def test_of_those_near_the_best_the_first_is_taken_that_is_sound_and_near_the_le
     assert result.near == [0, 1, 2] and result.best_row == best
     assert result.untried == [row for row in (0, 1, 2) if row not in runs]
     assert best is not None or result.fault is not None
-    assert replace(result, rehearsals={**runs, 2: rehearsal(0.01, 0.01)}).best_row == 2
+    circling = (0.01, 0.01) if any(run.around for run in runs.values()) else ()
+    assert replace(result, rehearsals={**runs, 2: rehearsal(0.01, 0.01, around=circling)}).best_row == 2
 
 
 @pytest.mark.parametrize(
@@ -94,6 +118,50 @@ def test_springs_that_were_measured_are_not_taken_to_weaken() -> None:
     assert _scales(believed) == [0.7, 1.0] and _scales(measured) == [1.0]
     wide = wristctl.load_study(None, "recommend.draw={plant.stiffness: x0.5..2}").recommend
     assert wide.measured() == wide, "what somebody says stays"
+
+
+def lost_on(*counts: int) -> Any:
+    """A ranking of candidates that swing on so many of 200 rigs, the first rigs, and feedforward that never does."""
+    every = [*counts, 0]
+    standing = SimpleNamespace(
+        groups=[[*range(len(counts))], [len(counts)]], lost=[SimpleNamespace(times=count) for count in every],
+        group=lambda row: 1 if row < len(counts) else 2,
+    )  # fmt: skip
+    rows = [SimpleNamespace(swings=np.arange(200) < count, rmse=np.ones(200)) for count in every]
+    means = [*[SimpleNamespace(value=1.0)] * len(counts), SimpleNamespace(value=9.0)]
+    return SimpleNamespace(standing=standing, rows=rows, means=means)
+
+
+@pytest.mark.parametrize(("counts", "first"), [((7, 7), 1), ((7, 8), 1), ((7, 11), 1), ((7, 12), 0), ((20, 7), 1)])
+def test_the_fewest_gains_are_taken_where_no_test_tells_which_is_lost_on_fewer_rigs(
+    counts: tuple[int, int], first: int
+) -> None:
+    """Rigs on which one of both is lost are heads or tails: four more are chance in one of 16, five in one of 32."""
+    gains = ({"a": 1.0, "b": 1.0}, {"a": 1.0})
+    candidates = [Candidate(str(k), "tuned", one) for k, one in enumerate(gains)] + [Candidate("feedforward", "", {})]
+    ranking = lost_on(*counts)
+    result = Recommended(wristctl.load_study(None), Findings(0), [], 30.0, candidates, ranking, {}, [], [], "")
+    assert result.near[0] == result.best_row == first and sorted(result.near) == [0, 1]
+
+
+def test_a_rehearsal_goes_to_both_sides_and_simulated_rigs_are_asked_for_the_same() -> None:
+    study = wristctl.load_study(None)
+    assert _asked(study, [], 20.0, 1, 1.0).directions == ("ulnar", "radial")
+    motions, horizon = motions_of_trial(study, 20.0, 1)
+    assert [one.end_deg for one in motions] == [20.0, -20.0] and horizon == study.hw_run.horizon
+    assert _asked(study, [], 20.0, 2, 1.0).directions == ("ulnar-flexion", "radial-extension")
+    motions, _ = motions_of_trial(study, 20.0, 2)
+    assert [(one.value("toward_deg"), one.end_deg) for one in motions] == [(45.0, 20.0), (225.0, 20.0)]
+    assert _circling(motions[0]).end_deg == 20.0
+
+
+def test_the_motion_of_ones_own_study_is_rehearsed_where_it_says_one() -> None:
+    study = wristctl.load_study(None, "hw-run.directions=[radial]", "hw-run.reference.angle_deg=12")
+    motions, _ = motions_of_trial(study, 20.0, 1)
+    assert [one.end_deg for one in motions] == [-12.0] and _asked(study, [], 20.0, 1, 1.0).directions == ("radial",)
+    path = wristctl.load_study(None, "hw-run={planes: 2, reference: {kind: circle, angle_deg: 12}}")
+    motions, _ = motions_of_trial(path, 20.0, 2)
+    assert [one.kind for one in motions] == ["circle"], "which has its own direction"
 
 
 @pytest.mark.slow

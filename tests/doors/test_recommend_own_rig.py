@@ -14,8 +14,8 @@ import pytest
 from tests.doors.conftest import wristctl
 from tests.doors.test_own_rig import ONE_PLANE, written
 from wristctl.commands.adoption import adopted
-from wristctl.commands.recommend.command import asked_of_rigs, family_of_rigs
 from wristctl.commands.recommend.own_rig import on_the_rig, said_of_facts
+from wristctl.commands.recommend.reach import asked_of_rigs, family_of_rigs
 from wristctl.config.loop import Reference
 from wristctl.config.recommend import RecommendSettings
 from wristctl.config.study import Study

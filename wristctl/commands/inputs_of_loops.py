@@ -335,7 +335,7 @@ def with_found(study: Study, command: str, found: Found) -> Study:
     """The study with the wrist that was found. UserError where a log told ratios and nobody says the stiffness."""
     from wristctl.identification.unknowns import with_identified
 
-    text = found.yaml
+    text, told = found.yaml, None
     if found.ratios is not None:
         from wristctl.identification.ratios import wrist_by_ratios
 
@@ -347,10 +347,10 @@ def with_found(study: Study, command: str, found: Found) -> Study:
                     "Motors and camera are exact here: tendons, friction and delay of the log take no part; %s", _RIG
                 )
         found.said = True
-        text = wrist.yaml
+        text, told = wrist.yaml, {"wrist.stiffness", *wrist.told}
     known = with_identified(study, command, text)
     if command == "recommend":
-        return known.model_copy(update={"recommend": known.recommend.measured()})
+        return known.model_copy(update={"recommend": known.recommend.measured(told)})
     return known
 
 

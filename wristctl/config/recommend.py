@@ -1,6 +1,6 @@
 """Settings of `recommend`: which controllers are tuned for a wrist, on which rig, and for which motions."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from typing import Annotated, Any, Self
 
 from pydantic import BeforeValidator, Field
@@ -11,14 +11,15 @@ from wristctl.config.loop import TICK, Loop, Reference
 from wristctl.config.section import OneOf, Section, choice, quantity, seldom
 from wristctl.config.tune import Controllers
 
-# Where a simulated rig differs from what its controller believes. Angle and speed of each motion are drawn too.
+# Where a simulated rig differs from what its controller believes. Angle and speed of each motion are drawn too. What
+# nobody told of a hand, and what it carries, weigh up to half as much as it does: 0.15 kg of the default one.
 _DRAWN: dict[str, Drawn] = {
     "plant.actuator.tendon_stiffness": "x0.7..1.4 log",
     "plant.actuator.friction": "0.03..0.2",
     "plant.actuator.sheath": "0..3",
     "plant.stiffness": "x0.6..1.4",
     "plant.damping": "x0.5..2",
-    "plant.payload": "0..0.15",
+    "plant.hand_mass": "x1..1.5",
     "plant.tendon_radius": "x0.97..1.03",
     "plant.sensor.delay_frames": "1..3",
     "plant.sensor.noise_deg": "0.03..0.1",
@@ -26,8 +27,7 @@ _DRAWN: dict[str, Drawn] = {
     "plant.model": ("pcc", "pcc", "hinges"),
     "disturbances.load": "-0.3..0.3",
 }
-# The same of a rig whose wrist and tendons were identified.
-_MEASURED: dict[str, Drawn] = {
+MEASURED: dict[str, str] = {
     "plant.actuator.tendon_stiffness": "x0.9..1.1",
     "plant.actuator.friction": "x0.7..1.4",
     "plant.actuator.sheath": "x0.7..1.4",
@@ -35,6 +35,8 @@ _MEASURED: dict[str, Drawn] = {
     "plant.damping": "x0.8..1.25",
     "plant.tendon_radius": "x0.99..1.01",
 }
+"""The same of a rig whose wrist and tendons were identified."""
+DELAY = "plant.sensor.delay_frames"
 _MOTIONS = (
     Reference(kind="minimum-jerk", duration=1.0),
     Reference(kind="minimum-jerk", duration=0.7),
@@ -120,9 +122,22 @@ class RecommendSettings(Section):
     )
     from_identified: str | None = choice(None, "identify run whose parameters replace the study's")
 
-    def measured(self) -> Self:
-        """The settings for a wrist that was identified: where nobody says how, rigs differ by what that leaves open."""
-        return self if "draw" in self.model_fields_set else self.model_copy(update={"draw": _DRAWN | _MEASURED})
+    def measured(self, told: Collection[str] | None = None) -> Self:
+        """The settings for a wrist that was identified: where nobody says how, rigs differ by what that leaves open.
+
+        `told` are the settings that it tells, `wrist.damping`, `actuator.friction`, ...; None: all. What it does not
+        tell is drawn as of any rig. A delay is known to half a frame.
+        """
+        if "draw" in self.model_fields_set:
+            return self
+        draw = dict(_DRAWN)
+        for key, source in MEASURED.items():
+            leaf = key.removeprefix("plant.")
+            if told is None or leaf in told or f"wrist.{leaf}" in told:
+                draw[key] = source
+        if told is None or "sensor.delay_frames" in told:
+            draw[DELAY] = known_delay(self.loop)
+        return self.model_copy(update={"draw": draw})
 
     def family(self, largest_deg: float, planes: int = 1) -> Family:
         """The simulated rigs, asked for angles of up to `largest_deg` to both sides, in two planes to any side."""
@@ -135,6 +150,12 @@ class RecommendSettings(Section):
         if planes == 2:
             drawn = in_any_direction(drawn, references)
         return Family(loop=self.loop, draw=drawn, references=references, horizon=self.horizon)
+
+
+def known_delay(loop: Loop) -> str:
+    """What the frames of delay are drawn from once they are known to half a frame."""
+    delay = loop.sensor.delay_frames
+    return f"{max(0.0, delay - 0.5):.6g}..{delay + 0.5:.6g}"
 
 
 def in_any_direction(drawn: Mapping[str, Drawn], references: Iterable[Reference]) -> dict[str, Drawn]:

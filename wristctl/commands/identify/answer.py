@@ -17,6 +17,10 @@ if TYPE_CHECKING:
     from wristctl.identification.lack_of_fit import Suspicion
 
 
+# What the log of a robot of one's own does not say.
+_OWN = " (on a robot of your own also --rig my_rig.py:RIG)"
+
+
 def recommendation_for(run: str, known: str) -> str:
     """Command that finds gains for the wrist that a run found, of a study file with what was known of it."""
     return shlex.join(["wristctl", "recommend", known, "--from-identified", run])
@@ -26,9 +30,9 @@ def recommendation_by_ratios(run: str, scaled: bool) -> list[str]:
     """What is next after a log that tells ratios; `scaled`: it tells the stiffness too, which else has to be given."""
     command = recommendation_for(run, f"{run}/config.yaml")
     if scaled:
-        return ["Next, find its gains:", f"$ {command}"]
+        return [f"Next, find its gains{_OWN}:", f"$ {command}"]
     return [
-        "Next, find its gains; VALUE is its bending stiffness in N m/rad, measured or known:",
+        f"Next, find its gains{_OWN}; VALUE is its bending stiffness in N m/rad, measured or known:",
         f"$ {command} --set wrist.stiffness=VALUE",
     ]
 

@@ -211,6 +211,9 @@ def _problem(study: Study, inputs: Inputs) -> Problem:
         if run.config.hw_run.planes == 2:
             fix = "wristctl runs export RUN, then wristctl identify FILE --set model=wrist"
             raise UserError("its trials bend in two planes, which are fitted by their open log", run.id, fix)
+        if run.config.hw_run.rig is not None:
+            fix = "wristctl runs export RUN, then wristctl identify FILE"
+            raise UserError("its trials are of a robot of your own, which are fitted by their open log", run.id, fix)
         config, logged = run.config, inputs.read(role, _logged)
         assert logged is not None
         actuator, wrist = config.hw_run.actuator, config.wrist
@@ -220,7 +223,7 @@ def _problem(study: Study, inputs: Inputs) -> Problem:
         trials += measured_trials(run.id, wrist, actuator, settings.step, *logged, exposure)
         if not start:
             start, believed = believed_of(wrist, actuator), actuator
-            if config.hw_run.port is None and config.hw_run.rig is None:
+            if config.hw_run.port is None:
                 settings = with_rotors(settings, config.hw_run.bench.motors)
     return Problem(trials, start, settings, believed)
 

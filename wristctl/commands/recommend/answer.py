@@ -9,27 +9,29 @@ from itertools import chain
 from typing import TYPE_CHECKING, NamedTuple
 
 from wristctl.commands.answer import Answer
-from wristctl.commands.kept_studies import FOLDER, file_of
+from wristctl.commands.kept_studies import FOLDER
 from wristctl.commands.printed_table import Table, degrees, joined, two
 from wristctl.commands.ranking_answer import decided
-from wristctl.commands.recommend.study_file import takers_of
+from wristctl.commands.recommend.candidate import ENOUGH, Candidate, share_of, spread
+from wristctl.commands.recommend.study_file import own_rig, takers_of
 from wristctl.commands.results import StudyResult
 from wristctl.errors import UserError
 
 if TYPE_CHECKING:
     import pandas as pd
 
-    from wristctl.arrays import Array
+    from wristctl.commands.recommend.expected import Expected
     from wristctl.commands.recommend.rehearsals import Rehearsal
     from wristctl.comparison.world_ranking import WorldRanking
+    from wristctl.trial.rehearsed import Rehearsed
     from wristctl.tuning.search import Search
 
 # File with what is recommended, for `simulate`, `compare` and `hw-run`.
 RECOMMENDED = "data/recommended.yaml"
 # Factor on the least error up to which a controller is taken that is lost on fewer rigs.
 NEAR = 1.25
-# Rigs from which 95 % of them are told: of fewer, the ends would be the least and the largest error.
-ENOUGH = 40
+# Probability below which equals would differ as much, so that a difference counts as shown.
+_SHOWN = 0.05
 # Angle of the sines by which it is found how fast a motion may be, where the tendons reach it [deg].
 _SINE_DEG = 20.0
 
@@ -48,25 +50,6 @@ class Limit(NamedTuple):
     """Largest swing of any rig, at rest or beside the reference's own motion [rad]."""
 
 
-class Candidate(NamedTuple):
-    """A controller with gains that are tested."""
-
-    controller: str
-    origin: str
-    """`tuned`, or `scaled preset`."""
-    gains: dict[str, float]
-
-    @property
-    def label(self) -> str:
-        """Controller and origin."""
-        return f"{self.controller} ({self.origin})" if self.gains else self.controller
-
-    @property
-    def file(self) -> str:
-        """Its study file in the run: data/controllers/ct-dob-tuned.yaml."""
-        return file_of(self.label)
-
-
 @dataclass(frozen=True, repr=False, eq=False)
 class Recommended(StudyResult):
     """Candidates in order on rigs that no search has seen; how fast the best may move, and what it may carry."""
@@ -74,7 +57,7 @@ class Recommended(StudyResult):
     kind = "recommend"
 
     reach_deg: float
-    """Angle [deg] to either side that the tendons hold on every simulated rig."""
+    """Angle [deg] to either side that the tendons hold on 19 of 20 simulated rigs."""
     candidates: list[Candidate]
     ranking: WorldRanking
     """`ranking.rows` are the candidates in order, feedforward last."""
@@ -85,8 +68,10 @@ class Recommended(StudyResult):
     """Command that tries the recommendation on the rig."""
     rehearsals: Mapping[int, Rehearsal] = field(default_factory=dict)
     """Of the candidates that were rehearsed on the emulated rig, by their numbers."""
-    on_the_trial: tuple[float, float, float] | None = None
-    """Spread of the error over the simulated rigs on the motion of the rehearsal [rad]."""
+    on_the_trial: Expected | None = None
+    """Error over the simulated rigs in the trial that is rehearsed."""
+    reach_identified: float | None = None
+    """Angle [deg] that the tendons would hold, were the wrist identified; None where that is not asked."""
     facts: str = ""
     """What the facts of a robot of one's own say of the simulated rigs, a sentence or two."""
     bending: str = ""
@@ -107,15 +92,23 @@ class Recommended(StudyResult):
         """Its number among the candidates and the ranking's rows; None where no feedback is in the first group.
 
         The first of `near`; where some were rehearsed, the first of these that is sound on the emulated rig and errs
-        there at most a quarter more than the least of them.
+        there at most a quarter more than the least of them with the same springs and motion. Where each errs more than
+        that somewhere, the one that errs least more.
         """
         if not any(self.candidates[row].gains for row in chain(*self.ranking.standing.groups[:1])):
             return None
         if not self.rehearsals:
             return self.near[0]
+        excess = self.excess
+        calm = [row for row in excess if excess[row] <= NEAR]
+        return calm[0] if calm else min(excess, key=excess.__getitem__, default=None)
+
+    @property
+    def excess(self) -> dict[int, float]:
+        """Of those of `near` that are sound in their rehearsal, in order, by how much they err more than the least."""
         sound = [row for row in self.near if row in self.rehearsals and not self.rehearsals[row].fault]
-        least = min((self.rehearsals[row].rmse for row in sound), default=math.nan)
-        return next((row for row in sound if self.rehearsals[row].rmse <= NEAR * least), None)
+        others = [self.rehearsals[row] for row in sound]
+        return {row: self.rehearsals[row].excess(others) for row in sound}
 
     @property
     def untried(self) -> list[int]:
@@ -126,15 +119,32 @@ class Recommended(StudyResult):
     def near(self) -> list[int]:
         """Rows with feedback that err at most a quarter more than the least of them, none more than feedforward.
 
-        First what is lost on the fewest rigs; of these those of the first group, then those with the fewest gains.
+        First what is not shown to be lost on more rigs than the one that is lost on the fewest; of these those of the
+        first group, then those with the fewest gains.
         """
         standing, errors = self.ranking.standing, [mean.value for mean in self.ranking.means]
         open_loop = standing.group(len(self.candidates) - 1) or len(standing.groups)
         sound = [row for row in chain(*standing.groups[:open_loop]) if self.candidates[row].gains]
         near = [row for row in sound if errors[row] <= NEAR * min(errors[other] for other in sound)]
+        calmest = min(near, key=lambda row: standing.lost[row].times, default=0)
         return sorted(
-            near, key=lambda row: (standing.lost[row].times, standing.group(row), len(self.candidates[row].gains))
-        )
+            near,
+            key=lambda row: (
+                self.lost_more(row, calmest), standing.group(row), len(self.candidates[row].gains),
+                standing.lost[row].times,
+            ),
+        )  # fmt: skip
+
+    def lost_more(self, row: int, other: int) -> bool:
+        """Whether a row is shown to be lost on more rigs than another, by those on which one of both is (sign test)."""
+        import numpy as np
+        from scipy.stats import binomtest
+
+        if self.ranking.standing.lost[row].times <= self.ranking.standing.lost[other].times:
+            return False
+        own, its = (each.swings | ~np.isfinite(each.rmse) for each in map(self.ranking.rows.__getitem__, (row, other)))
+        more, fewer = int((own & ~its).sum()), int((its & ~own).sum())
+        return bool(binomtest(more, more + fewer, alternative="greater").pvalue < _SHOWN)
 
     @property
     def why_none(self) -> str:
@@ -180,7 +190,7 @@ def _sentence(result: Recommended) -> str:
     values = ", ".join(_gain(best, name) for name in best.gains)
     sentence = (
         f"Use {best.controller} with {values}. Expect an error of {degrees(median)} deg RMSE ({degrees(low)} to "
-        f"{degrees(high)} deg on {_share(ranked.count)} simulated rigs), {two(ranked.gains[row].value)} times lower "
+        f"{degrees(high)} deg on {share_of(ranked.count)} simulated rigs), {two(ranked.gains[row].value)} times lower "
         "than feedforward alone."
     )
     if ranked.count < ENOUGH:
@@ -192,32 +202,22 @@ def _sentence(result: Recommended) -> str:
         others = joined([result.candidates[other].label for other in first if other != row])
         why = (
             f"These rigs do not tell its error from that of {others}. Of the controllers with feedback whose error is "
-            "at most 25 % above the least, it is unstable on the fewest rigs; of equals it has the fewest gains."
+            "at most 25 % above the least, none is shown to be stable on more rigs; of equals it has the fewest gains"
+            f"{' of those that do well in their rehearsal' * bool(result.rehearsals)}."
         )
         return f"{sentence} {why}" if others else sentence
     lesser = [other for other in first if other in result.near]
     least = ranked.means[row].value / min(ranked.means[other].value for other in lesser)
     others, be = joined([result.candidates[other].label for other in lesser]), "are" if lesser[1:] else "is"
-    return f"{sentence} {others} would err up to {two(least)} times less, and {be} unstable on more rigs."
-
-
-def _share(count: int) -> str:
-    """How many of the simulated rigs an interval is of; of few the number alone."""
-    return f"95 % of {count}" if count >= ENOUGH else f"{count}"
+    rehearsed = all(other in result.rehearsals for other in lesser)
+    but = f"{'do' if lesser[1:] else 'does'} worse when rehearsed" if rehearsed else f"{be} unstable on more rigs"
+    return f"{sentence} {others} would err up to {two(least)} times less, and {but}."
 
 
 def _gain(candidate: Candidate, name: str) -> str:
     from wristctl.control.table import controller
 
     return f"{name} = {candidate.gains[name]:.3g} {controller(candidate.controller).gains[name].unit}".rstrip()
-
-
-def spread(errors: Array) -> tuple[float, float, float]:
-    """Error [rad] that 2.5, 50 and 97.5 of 100 rigs stay below."""
-    import numpy as np
-
-    low, median, high = np.percentile(errors, (2.5, 50.0, 97.5), method="nearest")
-    return float(low), float(median), float(high)
 
 
 def _table(result: Recommended) -> Table:
@@ -227,7 +227,7 @@ def _table(result: Recommended) -> Table:
         low, median, high = (degrees(error) if math.isfinite(error) else "-" for error in spread(ranked.rows[k].rmse))
         lost = _lost(ranked, k)
         rows.append((result.candidates[k].label, median, f"{low} to {high}", lost or "stable on all"))
-    ends, lost_on = f"on {_share(ranked.count)} rigs [deg]", f"of {ranked.count} simulated rigs"
+    ends, lost_on = f"on {share_of(ranked.count)} rigs [deg]", f"of {ranked.count} simulated rigs"
     heads = ("controller (gains)", "error [deg]", ends, lost_on)
     return Table("", heads, rows)
 
@@ -252,7 +252,11 @@ def _notes(result: Recommended) -> list[str]:
     short = f" (asked: {wanted:g} deg)" if result.reach_deg < wanted else ""
     sides = "any side" if result.bending else "either side"
     notes = [result.bending] * bool(result.bending) + [result.facts] * bool(result.facts)
-    hold = f"The tendons hold {result.reach_deg:g} deg to {sides} on every simulated rig{short}."
+    most = "on 19 of 20 simulated rigs" if result.ranking.count >= ENOUGH else "on the simulated rigs"
+    hold = f"The tendons hold {result.reach_deg:g} deg to {sides} {most}{short}"
+    if result.reach_identified is not None and result.reach_identified > result.reach_deg:
+        hold += f", {result.reach_identified:g} deg once tendons and springs are known (wristctl identify)"
+    hold += "."
     notes += [" ".join(filter(None, (hold, decided([result.ranking]))))]
     rehearsed = _rehearsed(result) if result.rehearsals else ""
     if result.best is None:
@@ -261,13 +265,11 @@ def _notes(result: Recommended) -> list[str]:
     sine = f"{motion} of {sine_deg(result.reach_deg):g} deg to {sides}"
     holds = f"{_up_to(result.motions, 'Hz', sine)} {_up_to(result.payloads, 'kg', 'an unknown payload in the hand')}"
     notes.append(f"{rehearsed} {holds}".strip())
-    how = (
-        f"on {result.study.recommend.rig}"
-        if result.study.recommend.rig is not None
-        else "emulated (on a real rig also --port /dev/ttyACM0 --camera 0 --optics latest:calibrate-camera)"
-        if result.on_a_rig
-        else "simulated (hw-run has no such rig)"
-    )
+    how = "simulated; on a robot of your own, hw-run --rig my_rig.py:RIG in place of simulate"
+    if (own := own_rig(result.study)) is not None:
+        how = f"on {own}"
+    elif result.on_a_rig:
+        how = "emulated (on a real rig also --port /dev/ttyACM0 --camera 0 --optics latest:calibrate-camera)"
     return [*notes, f"Next, {how}:", f"$ {result.next_command}"]
 
 
@@ -275,19 +277,26 @@ def _rehearsed(result: Recommended) -> str:
     """What the emulated rig says of the finalists: the true errors of the recommended one, and who is out and why."""
     words = []
     if result.best_row is not None:
-        runs = result.rehearsals[result.best_row].runs
-        each = joined([f"{degrees(run.rmse)} deg with springs x{scale:g}" for scale, run in runs.items()])
-        swing = degrees(result.rehearsals[result.best_row].swing)
-        words.append(f"Rehearsed on the emulated rig it truly errs by {each}, and swings by {swing} deg peak to peak.")
+        best = result.rehearsals[result.best_row]
+        each = _errors(best.runs)
+        circles = f", circling by {_errors(best.around)}" if best.around else ""
+        swing = degrees(best.swing)
+        words.append(
+            f"Rehearsed on the emulated rig it truly errs by {each}{circles}, and swings by {swing} deg peak to peak."
+        )
         if result.on_the_trial is not None:
-            low, _, high = result.on_the_trial
-            words.append(
-                f"With that motion {_share(result.ranking.count)} simulated rigs err by {degrees(low)} to "
-                f"{degrees(high)} deg."
-            )
+            words.append(result.on_the_trial.said)
+    excess, order = result.excess, list(result.excess)
+    passed = order[: order.index(result.best_row)] if result.best_row is not None else []
+    for label, times in ((result.candidates[row].label, two(excess[row])) for row in passed):
+        words.append(f"{label} errs there up to {times} times as much as the least of all, and is not recommended.")
     others = [(result.candidates[row].label, run.fault) for row, run in result.rehearsals.items() if run.fault]
     words += [f"{label} {fault} there, and is not recommended." for label, fault in others]
     return " ".join(words)
+
+
+def _errors(runs: Mapping[float, Rehearsed]) -> str:
+    return joined([f"{degrees(run.rmse)} deg with springs x{scale:g}" for scale, run in runs.items()])
 
 
 def _up_to(limits: Sequence[Limit], unit: str, subject: str) -> str:

@@ -14,16 +14,17 @@ from wristctl.commands.loop_warnings import warn_if_coarse, warn_if_it_buckles, 
 from wristctl.commands.procedure import Procedure
 from wristctl.commands.recommend.answer import (
     RECOMMENDED,
-    Candidate,
     Limit,
     Recommended,
     files_table,
     sine_deg,
-    spread,
 )
-from wristctl.commands.recommend.own_rig import drawn_of_facts, on_the_rig, said_of_facts
+from wristctl.commands.recommend.candidate import Candidate, spread
+from wristctl.commands.recommend.expected import asked_for, expected
+from wristctl.commands.recommend.own_rig import on_the_rig, said_of_facts
+from wristctl.commands.recommend.reach import FAMILY, LEAST_DEG, TOLERATED, asked_of_rigs, family_of_rigs, reach_deg
 from wristctl.commands.recommend.rehearsals import check_homing
-from wristctl.commands.recommend.study_file import next_command, sections_of, takers_of, trial_of
+from wristctl.commands.recommend.study_file import next_command, own_rig, sections_of, takers_of, trial_of
 from wristctl.commands.results import Findings
 from wristctl.commands.session import Session
 from wristctl.config.families import Family, TuningWorlds
@@ -37,83 +38,21 @@ if TYPE_CHECKING:
     from wristctl.comparison.world_ranking import WorldRanking
     from wristctl.control.law import Controller
     from wristctl.simulation.cases import Measured
-    from wristctl.simulation.planes import Asked
     from wristctl.tuning.search import Search
 
-# Name of the family of simulated rigs, of which the draws are named.
-FAMILY = "recommend"
-# Angle [deg] that the tendons must reach on every simulated rig for a motion to be worth a search.
-LEAST_DEG = 5.0
 # Weight of swings in a search [decades]: gains that swing on any rig of a search are not wanted.
 _SWINGING = 3.0
-# Share of rigs that a controller must not be shown to lose: those drawn have the worst of friction, delay and load.
-TOLERATED = 0.05
+# What is drawn of what a hand carries.
+_CARRIED = "plant.payload", "plant.hand_mass"
 # What the limits of motion and payload are told by.
 _SWINGS = ("rmse", "oscillation", "sustained")
 # Rigs on which the limits of motion and payload are looked for.
 _RIGS_AT_LIMITS = 12
 # Time of a rollout at short steps over that of a search's; seconds of limits and figures, and of rehearsals.
-_CLOSELY, _DRAWN, _REHEARSED = 2.0, 5.0, 15.0
+_CLOSELY, _DRAWN, _REHEARSED = 2.0, 10.0, 40.0
 TUNED, SCALED = "tuned", "scaled preset"
 # Relative difference of two gains that is none: a search begins at the preset, to its last bit but one.
 _ALIKE = 1e-9
-
-
-def asked_of_rigs(study: Study) -> list[Asked]:
-    """The simulated rigs with what they are asked for, before it is known whether that is in two planes."""
-    from wristctl.simulation.drawn_worlds import asked_of
-
-    return asked_of(_family(study, LEAST_DEG))
-
-
-def _family(study: Study, largest_deg: float, planes: int = 1) -> Family:
-    """As `RecommendSettings.family`; of a robot of one's own with what is drawn from its facts."""
-    family = study.recommend.family(largest_deg, planes)
-    return family if study.recommend.rig is None else drawn_of_facts(study, family)
-
-
-def family_of_rigs(study: Study, largest_deg: float) -> Family:
-    """The simulated rigs, in two planes where anything takes them out of one. Raises UserError."""
-    from wristctl.simulation.planes import planes_of
-
-    return _family(study, largest_deg, planes_of(study.wrist, asked_of_rigs(study)))
-
-
-def reach_deg(study: Study) -> float:
-    """Largest whole angle [deg] to both sides that the tendons hold on every rig that can be drawn, at most the wanted.
-
-    In two planes to any side. The worst rig has the stiffest springs, the largest payload and load, and the tendons
-    nearest to the middle.
-    """
-    from wristctl.simulation.planes import planes_of
-    from wristctl.simulation.worlds import plant_of
-    from wristctl.wrist.spatial.held_bends import held_all_around
-    from wristctl.wrist.statics import shortfall
-    from wristctl.wrist.tendon_layout import TendonLayout
-
-    settings, planes = study.recommend, planes_of(study.wrist, asked_of_rigs(study))
-    wanted = min(settings.largest_deg, study.wrist.range_deg)
-    family, ends = _family(study, wanted, planes), (0.0, 1.0 - 1e-12)
-    held = wanted
-    for near in ends:  # of the radius; all else at the end that asks for more
-        for side in ends:  # of the load
-            shares = dict.fromkeys(family.draw, ends[1])
-            shares |= {key: near for key in family.draw if "radius" in key}
-            shares |= {key: side for key in family.draw if key.endswith(".load")}
-            loop = family.world(shares)
-            if not loop.limits:
-                continue
-            actual = plant_of(study.wrist, loop.plant)
-            if planes == 2:
-                layout, load = TendonLayout.of(actual), abs(loop.disturbances.load)
-                held = min(held, held_all_around(actual, layout, load, wanted))
-                continue
-            for toward in (-1.0, 1.0):
-                bound = math.radians(toward * wanted)
-                short = shortfall(actual, min(bound, 0.0), max(bound, 0.0), loop.disturbances.load)
-                if short is not None:
-                    held = min(held, 0.0 if math.isnan(short.angle) else math.degrees(abs(short.angle)))
-    return float(math.floor(held))
 
 
 def plan(study: Study, inputs: Inputs) -> str:
@@ -132,7 +71,11 @@ def plan(study: Study, inputs: Inputs) -> str:
     reach = reach_deg(study)
     if reach < LEAST_DEG:
         reason = f"the tendons hold the wrist to {reach:g} deg only: no controller can help"
-        raise UserError(reason, "wrist", "a larger tension_limit or tendon_radius, a softer wrist, or a lighter hand")
+        fix = "a larger tension_limit or tendon_radius, a softer wrist, or a lighter hand"
+        known = _reach_identified(study, reach)
+        if known is not None and known >= LEAST_DEG:
+            fix += f"; or wristctl identify: with springs and tendons known they hold {known:g} deg"
+        raise UserError(reason, "wrist", fix)
     family, asked = family_of_rigs(study, reach), asked_of_rigs(study)
     check_homing(study, planes_of(study.wrist, asked))
     searched = settings.candidates * settings.iterations * settings.draws + settings.validation * settings.candidates
@@ -170,8 +113,9 @@ def recommend(session: Session) -> Recommended:
     ranking = _tested(session, study, family, candidates)
     tables = [files_table([candidates[row] for row in ranking.standing.order], takers_of(study))]
     result = Recommended(
-        session.study, findings, tables, reach, candidates, ranking, searches, [], [], "", facts=facts, bending=bending
-    )
+        session.study, findings, tables, reach, candidates, ranking, searches, [], [], "", facts=facts, bending=bending,
+        reach_identified=_reach_identified(study, reach),
+    )  # fmt: skip
     result = _rehearsed(session, study, result, planes)
     if result.best is None:
         return _recorded(known, result)
@@ -181,16 +125,23 @@ def recommend(session: Session) -> Recommended:
         ]
         payloads = [_limit(study, result.best, mass, _laden(family, mass)) for mass in settings.payloads]
     if result.rehearsals:
-        expected = _on_the_trials_motion(study, result.best, family, reach, planes)
-        result = replace(result, on_the_trial=expected)
+        result = replace(result, on_the_trial=expected(study, result.best, family, reach, planes))
     file = str(findings.run.path / RECOMMENDED) if findings.run else RECOMMENDED
     command = next_command(study, session.typed, file)
     return _recorded(known, replace(result, motions=motions, payloads=payloads, next_command=command))
 
 
+def _reach_identified(study: Study, reach: float) -> float | None:
+    """Angle [deg] that the tendons would hold, were they and the springs known; None where nobody asks for more."""
+    settings = study.recommend
+    if settings.rig is not None or reach >= math.floor(min(settings.largest_deg, study.wrist.range_deg)):
+        return None
+    return reach_deg(study.model_copy(update={"recommend": settings.measured()}))
+
+
 def _afterwards(study: Study) -> float:
     """Seconds that rehearsals, limits and figures take."""
-    return _DRAWN + _REHEARSED * bool(study.recommend.rehearsed and study.recommend.rig is None)
+    return _DRAWN + _REHEARSED * bool(study.recommend.rehearsed and own_rig(study) is None)
 
 
 def _searches(session: Session, study: Study, family: Family, scaled: Sequence[Controller]) -> dict[str, Search]:
@@ -271,7 +222,7 @@ def _rehearsed(session: Session, study: Study, result: Recommended, planes: int)
     from wristctl.commands.recommend.rehearsals import rehearsed
 
     at_once = study.recommend.rehearsed
-    if not at_once or study.recommend.rig is not None or trial_of(study) != "hw-run" or result.best_row is None:
+    if not at_once or own_rig(study) is not None or trial_of(study) != "hw-run" or result.best_row is None:
         return result
     while result.untried:
         rows = result.untried[:at_once]
@@ -290,21 +241,15 @@ def _sines(family: Family, reach: float, frequency: float, planes: int) -> Famil
     horizon = float(max(family.horizon, math.ceil(2.0 / frequency)))
     if planes == 1:
         sine = Reference(kind="two-sided-sine", frequency=frequency, angle_deg=sine_deg(reach))
-        return _asked_for(family, sine, horizon)
+        return asked_for(family, [sine], horizon)
     ellipse = {"kind": "ellipse", "turn": 1.0 / frequency, "angle_deg": sine_deg(reach)}
-    asked = _asked_for(family, Reference.model_validate(ellipse), horizon)
+    asked = asked_for(family, [Reference.model_validate(ellipse)], horizon)
     return asked.model_copy(update={"draw": in_any_direction(asked.draw, asked.references)})
 
 
-def _asked_for(family: Family, motion: Reference, horizon: float) -> Family:
-    """The rigs asked for this motion alone, of which nothing is drawn, for so long [s]."""
-    draw = {key: source for key, source in family.draw.items() if not key.startswith("reference.")}
-    return family.model_copy(update={"draw": draw, "references": (motion,), "horizon": horizon})
-
-
 def _laden(family: Family, mass: float) -> Family:
-    """The rigs with a payload of this mass [kg]."""
-    draw = {key: source for key, source in family.draw.items() if key != "plant.payload"}
+    """The rigs whose hand carries this mass [kg] and nothing else that nobody told of."""
+    draw = {key: source for key, source in family.draw.items() if key not in _CARRIED}
     plant = family.loop.plant.model_copy(update={"payload": mass})
     return family.model_copy(update={"draw": draw, "loop": family.loop.model_copy(update={"plant": plant})})
 
@@ -328,25 +273,6 @@ def _limit(study: Study, best: Candidate, value: float, family: Family) -> Limit
     return Limit(value, _RIGS_AT_LIMITS, int(lost.sum()), error, own.largest_swing(open_loop))
 
 
-def _on_the_trials_motion(
-    study: Study, best: Candidate, family: Family, reach: float, planes: int
-) -> tuple[float, float, float]:
-    """Spread of the error over the simulated rigs [rad] on the motion that is rehearsed."""
-    import numpy as np
-
-    from wristctl.commands.recommend.rehearsals import motion_of_rehearsal
-    from wristctl.comparison.world_ranking import world_scores
-    from wristctl.control.table import controller
-    from wristctl.simulation.cases import measure
-    from wristctl.simulation.drawn_worlds import drawn_cases
-
-    asked = _asked_for(family, *motion_of_rehearsal(study, reach, planes))
-    law, tests = controller(best.controller), study.recommend.tests
-    cases = drawn_cases(asked, FAMILY, "test", study.seed, tests, study.wrist)
-    measured = measure(law, np.array([law.values(best.gains)]), cases, study.wrist, ["rmse"])
-    return spread(world_scores(measured, tests)[0])
-
-
 def _recorded(study: Study, result: Recommended) -> Recommended:
     """The result, its figures, tables and study file written; `study` has the wrist that was identified."""
     from wristctl.commands.recommend.figures import errors, limits
@@ -355,7 +281,7 @@ def _recorded(study: Study, result: Recommended) -> Recommended:
     findings, ranked, best = result.findings, result.ranking, result.best
     findings.table("data/ranking.csv", result.frame())
     findings.table("data/rigs.csv", worlds_frame(ranked))
-    findings.metric("reach_deg", result.reach_deg, "deg", "higher", meaning="angle held on every simulated rig")
+    findings.metric("reach_deg", result.reach_deg, "deg", "higher", meaning="angle held on 19 of 20 simulated rigs")
     caption = "Error of each controller over the simulated rigs: median, 95 of 100 rigs, and each rig"
     findings.figure("errors", errors, result, caption=caption)
     findings.overview.figure = "errors"
@@ -383,7 +309,7 @@ def _write_files(study: Study, findings: Findings, result: Recommended) -> None:
         run = f"wristctl {trial_of(study)} THIS"
         found = f"{rows[0].label}, as `wristctl recommend` found it for this wrist on this rig: {run}"
         content = gains_content(study, [row_of(one.controller, one.gains, 6) for one in rows], **sections)
-        if study.recommend.rig is not None:
+        if own_rig(study) is not None:
             content = {name: part for name, part in content.items() if name not in ("simulate", "compare")}
         keep_study(findings, file, found, content)
 

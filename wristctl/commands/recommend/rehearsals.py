@@ -15,13 +15,15 @@ from wristctl.errors import UserError
 
 if TYPE_CHECKING:
     from wristctl.commands.session import Session
-    from wristctl.config.hw_run import HwRunSettings
+    from wristctl.config.hw_run import HwRunSettings, RigDirection
     from wristctl.config.loop import Reference
     from wristctl.config.study import Study
     from wristctl.trial.rehearsed import Rehearsed
 
 # Springs that weaken to this share of the believed still hold the hand up, with so much in hand: else nobody can home.
 _WEAKEST, _IN_HAND = 0.7, 1.2
+# Directions of a rehearsal by the number of planes.
+_BOTH_SIDES: dict[int, tuple[RigDirection, ...]] = {1: ("ulnar", "radial"), 2: ("ulnar-flexion", "radial-extension")}
 # Settings of a rehearsal: nobody pushes, and all is found anew in virtual time.
 _ALONE = {
     "port": None, "real_time": False, "priority": False, "video": False, "calibration": None, "positions": "find",
@@ -34,11 +36,18 @@ class Rehearsal(NamedTuple):
     """A candidate's trials on the emulated rig, by the springs' share of the believed stiffness."""
 
     runs: Mapping[float, Rehearsed]
+    """Toward both sides, or on the study's own path in two planes."""
+    around: Mapping[float, Rehearsed] = {}
+    """In two planes with the hand circling, too."""
 
-    @property
-    def rmse(self) -> float:
-        """Geometric mean of the true errors [rad]; nan where a run did not end well."""
-        return math.exp(sum(math.log(run.rmse) for run in self.runs.values()) / len(self.runs))
+    def excess(self, others: Sequence[Rehearsal]) -> float:
+        """Largest ratio of its true error to the least of the others on the same springs and motion."""
+        ratios = []
+        for number, own in enumerate((self.runs, self.around)):
+            for scale, run in own.items():
+                least = min((other.runs, other.around)[number][scale].rmse for other in others)
+                ratios.append(run.rmse / least)
+        return max(ratios)
 
     @property
     def swing(self) -> float:
@@ -50,11 +59,12 @@ class Rehearsal(NamedTuple):
         """Why it is not to be used; empty where it is sound."""
         from wristctl.simulation.oscillation import LIMIT_CYCLE
 
-        for scale, run in self.runs.items():
-            if run.outcome != "ok":
-                return f"is stopped with springs x{scale:g} ({run.outcome.partition(';')[0]})"
-            if run.swing > 2.0 * LIMIT_CYCLE:
-                return f"swings by {math.degrees(run.swing):.2g} deg peak to peak with springs x{scale:g}"
+        for motion, own in (("", self.runs), (" on circumduction", self.around)):
+            for scale, run in own.items():
+                if run.outcome != "ok":
+                    return f"is stopped{motion} with springs x{scale:g} ({run.outcome.partition(';')[0]})"
+                if not motion and run.swing > 2.0 * LIMIT_CYCLE:
+                    return f"swings by {math.degrees(run.swing):.2g} deg peak to peak with springs x{scale:g}"
         return ""
 
 
@@ -67,7 +77,7 @@ def check_homing(study: Study, planes: int) -> None:
     from wristctl.trial.resting import judge_weight, sag_of
     from wristctl.trial.rig_belief import PLANES
 
-    if trial_of(study) != "hw-run":
+    if trial_of(study) != "hw-run" or study.hw_run.rig is not None:
         return
     names = PLANES if planes == 2 else ("ulnar",)
     judge_weight(study.hw_run, study.wrist, names)
@@ -88,19 +98,37 @@ def rehearsed(
 
     Raises SafetyStop where the emulated rig cannot be homed.
     """
-    from wristctl.trial.rehearsed import rehearse
+    from wristctl.trial.motions import has_path
 
     runs: list[dict[float, Rehearsed]] = [{} for _ in rows]
+    around: list[dict[float, Rehearsed]] = [{} for _ in rows]
     scales = _scales(study)
     with session.progress("rehearsing on the emulated rig", total=len(scales), unit="rigs") as advance:
         for number, scale in enumerate(scales, start=1):
             asked = _asked(study, rows, reach_deg, planes, scale)
-            with _quietly():
-                done = rehearse(study.model_copy(update={"hw_run": asked}))
-            for of_candidate, run in zip(runs, done, strict=True):
-                of_candidate[scale] = run
+            _rehearse(study, asked, scale, runs)
+            if planes == 2 and not has_path(asked):
+                circling = asked.model_copy(update={"reference": _circling(asked.reference)})
+                _rehearse(study, circling, scale, around)
             advance(number)
-    return [Rehearsal(each) for each in runs]
+    return [Rehearsal(*each) for each in zip(runs, around, strict=True)]
+
+
+def _rehearse(study: Study, asked: HwRunSettings, scale: float, runs: Sequence[dict[float, Rehearsed]]) -> None:
+    """Try all candidates with springs of this share, and note how each does."""
+    from wristctl.trial.rehearsed import rehearse
+
+    with _quietly():
+        done = rehearse(study.model_copy(update={"hw_run": asked}))
+    for of_candidate, run in zip(runs, done, strict=True):
+        of_candidate[scale] = run
+
+
+def _circling(reference: Reference) -> Reference:
+    """The hand circles with a bend as large as the reference's."""
+    from wristctl.config.loop import Reference
+
+    return Reference.model_validate({"kind": "circumduction", "angle_deg": abs(reference.end_deg)})
 
 
 @contextmanager
@@ -115,17 +143,22 @@ def _quietly() -> Iterator[None]:
         told.setLevel(before)
 
 
-def motion_of_rehearsal(study: Study, reach_deg: float, planes: int) -> tuple[Reference, float]:
-    """The motion as simulated rigs are asked for it, and how long it is looked at [s]."""
+def motions_of_trial(study: Study, reach_deg: float, planes: int) -> tuple[list[Reference], float]:
+    """The motions of the rehearsed trials as simulated rigs are asked for them, and how long each is looked at [s]."""
     from wristctl.config.loop import Reference
     from wristctl.trial.motions import has_path
+    from wristctl.trial.rig_belief import TOWARD
 
     settings = _asked(study, [], reach_deg, planes, 1.0)
     asked = settings.reference
-    if planes == 2 and not has_path(settings):
-        toward = {"kind": "diagonal", "toward_deg": 45.0, "duration": asked.duration, "angle_deg": asked.end_deg}
-        asked = Reference.model_validate(toward)
-    return asked, settings.horizon
+    if planes == 1:
+        sides = dict.fromkeys(direction in ("ulnar", "flexion") for direction in settings.directions)
+        return [asked if ahead else asked.mirrored() for ahead in sides], settings.horizon
+    if has_path(settings):
+        return [asked], settings.horizon
+    toward = dict.fromkeys(TOWARD[direction] for direction in settings.directions)
+    line = {"kind": "diagonal", "duration": asked.duration, "angle_deg": asked.end_deg}
+    return [Reference.model_validate({**line, "toward_deg": angle}) for angle in toward], settings.horizon
 
 
 def _scales(study: Study) -> list[float]:
@@ -144,19 +177,22 @@ def _weakest(study: Study) -> float:
 def _asked(
     study: Study, rows: Sequence[Mapping[str, Any]], reach_deg: float, planes: int, scale: float
 ) -> HwRunSettings:
-    """Trials of all these controllers in one direction on the rig of `recommend.loop`, emulated."""
+    """Trials of all these controllers on the rig of `recommend.loop`, emulated.
+
+    In the directions that the study has, else to both sides.
+    """
     from wristctl.config.hw_run import HwRunSettings
 
     own = study.hw_run
-    plant = own.bench.plant.model_copy(update={"stiffness_scale": scale})
     given = own.model_dump(by_alias=True, include=own.model_fields_set)
     tried = {"controllers": tuple(rows)} if rows else {}
     section = sections_of(study, reach_deg, planes)["hw_run"]
-    toward = ("ulnar-flexion",) if planes == 2 else ("ulnar",)
+    leaves = {**section.get("bench", {}), "plant": {"stiffness_scale": scale}}
+    bench = {part: getattr(own.bench, part).model_copy(update=values) for part, values in leaves.items()}
     changes = {
         **tried,
-        "directions": toward,
+        "directions": own.directions if "directions" in own.model_fields_set else _BOTH_SIDES[planes],
         "planes": planes,
-        "bench": own.bench.model_copy(update={"plant": plant}),
+        "bench": own.bench.model_copy(update=bench),
     }
     return HwRunSettings.model_validate({**given, **section, **rig_of(study.recommend.loop), **_ALONE, **changes})

@@ -10,6 +10,7 @@ from typing import Any
 from wristctl.commands.kept_studies import asked_for, hw_run_fits, rig_of
 from wristctl.config.compare import CompareSettings
 from wristctl.config.loop import Reference
+from wristctl.config.recommend import RecommendSettings
 from wristctl.config.study import Study
 from wristctl.study_files.resolved import sections_read
 
@@ -20,26 +21,56 @@ def sections_of(study: Study, reach_deg: float, planes: int = 1) -> Mapping[str,
     No motion asks for more than the angle that the tendons hold [deg]. All bend in so many planes. A robot of one's own
     has `hw_run` alone: its motors and sensor are in its facts.
     """
-    if study.recommend.rig is not None:
-        return {"hw_run": {"rig": study.recommend.rig} | _within(study.hw_run.reference, reach_deg)}
+    if (own := own_rig(study)) is not None:
+        return {"hw_run": {"rig": own} | _within(study.hw_run.reference, reach_deg)}
     rig, bends = rig_of(study.recommend.loop), {"planes": 2} if planes == 2 else {}
     sections: dict[str, Mapping[str, Any]] = {
         "simulate": {"loop": rig | bends} | _within(study.simulate.reference, reach_deg),
         "compare": {"loops": {"rig": rig | bends}} | _moves(reach_deg),
     }
     if hw_run_fits(study, study.recommend.loop):
-        sections["hw_run"] = rig | bends | _within(study.hw_run.reference, reach_deg)
+        sections["hw_run"] = rig | bends | _within(study.hw_run.reference, reach_deg) | _emulated(study, planes)
     return sections
+
+
+# What of tendons and camera an emulated rig has of its own.
+_OF_TENDONS, _OF_CAMERA = ("tendon_stiffness", "friction", "sheath", "presliding"), ("frame_rate", "delay_frames")
+
+
+def _emulated(study: Study, planes: int) -> dict[str, Any]:
+    """The emulated rig with tendons and camera as the study states, or has identified, those of the rig; else empty.
+
+    Where it states others of the emulated rig itself, these stay.
+    """
+    loop, usual = study.recommend.loop, RecommendSettings.model_fields["loop"].default
+    cameras = ("camera", "camera_2") if planes == 2 else ("camera",)
+    parts: dict[str, tuple[Any, Any, tuple[str, ...]]] = {"actuator": (loop.actuator, usual.actuator, _OF_TENDONS)}
+    parts |= dict.fromkeys(cameras, (loop.sensor, usual.sensor, _OF_CAMERA))
+    bench: dict[str, dict[str, Any]] = {}
+    for part, (believed, default, names) in parts.items():
+        own = getattr(study.hw_run.bench, part)
+        stated = {name: getattr(believed, name) for name in names if getattr(believed, name) != getattr(default, name)}
+        stated = {name: value for name, value in stated.items() if name not in own.model_fields_set}
+        if "frame_rate" in stated and "exposure" not in own.model_fields_set:
+            stated["exposure"] = min(own.exposure, 0.5 / stated["frame_rate"])
+        if stated:
+            bench[part] = stated
+    return {"bench": bench} if bench else {}
+
+
+def own_rig(study: Study) -> str | None:
+    """The robot of one's own that the study is of: `recommend` is told it, or the study's trials are on it."""
+    return study.recommend.rig or study.hw_run.rig
 
 
 def trial_of(study: Study) -> str:
     """The command that tries what is recommended: `hw-run` where it can have the rig."""
-    return "hw-run" if study.recommend.rig is not None or hw_run_fits(study, study.recommend.loop) else "simulate"
+    return "hw-run" if own_rig(study) is not None or hw_run_fits(study, study.recommend.loop) else "simulate"
 
 
 def takers_of(study: Study) -> str:
     """The commands that take a file of gains, in words."""
-    if study.recommend.rig is not None:
+    if own_rig(study) is not None:
         return "hw-run"
     return "simulate, compare and hw-run" if trial_of(study) == "hw-run" else "simulate and compare"
 
@@ -53,8 +84,8 @@ def next_command(study: Study, typed: Sequence[str], file: str) -> str:
     words, taken = list(typed), {"seed", *sections_read(command)}
     places = [k for k, word in enumerate(words) if words[k - 1] == "--set" and _section(word) not in taken]
     kept = [word for k, word in enumerate(words) if k not in places and k + 1 not in places]
-    rig = ["--rig", study.recommend.rig] if study.recommend.rig is not None else []
-    return shlex.join(["wristctl", command, *rig, *kept, file])
+    own = own_rig(study)
+    return shlex.join(["wristctl", command, *(["--rig", own] if own is not None else []), *kept, file])
 
 
 def _section(override: str) -> str:
