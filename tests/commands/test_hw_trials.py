@@ -23,6 +23,8 @@ from wristctl.commands.hw_run import trials as hw_trials
 from wristctl.commands.session import Unattended
 from wristctl.records import LiveRun, Run, start_run
 from wristctl.simulation.metrics import METRICS
+from wristctl.simulation.worlds import Draws
+from wristctl.trial.board_stand import BoardStand
 from wristctl.trial.log import TrialLog, tick_columns
 from wristctl.trial.motions import motion_of
 from wristctl.trial.safety import SafetyStop
@@ -64,7 +66,7 @@ class Bench:
     odd: Mapping[int, str] = {}
 
     def __init__(self, settings: Any, wrist: Any, trials: Any, log: TrialLog, *others: Any) -> None:
-        assert others == (None, None, None, 4, None) and wrist.stiffness == 77.0
+        assert others == (None, None, None) and wrist.stiffness == 77.0
         self.log, self.trials, self.timing = log, trials, TickTiming(settings.control_period, list(self.late), 7)
         self.motions = {"ulnar": motion_of(settings, wrist, "ulnar")}
         self.outcomes: dict[int, str] = {}
@@ -73,8 +75,9 @@ class Bench:
         self.zero = SimpleNamespace(plain=lambda: {"marker": 0.5})
         self.stop: Any = None
 
-    def run(self, testbed: str, shown: Any) -> None:
-        assert (testbed, shown) == ("testbed", print)
+    def run(self, stand: Any, shown: Any) -> None:
+        assert (type(stand), shown) == (BoardStand, print)
+        assert (stand._testbed, stand._calibration, stand._draws) == ("testbed", None, Draws(4, "bench"))
         motion = self.motions["ulnar"]
         for number, off in ((0, 2.0), (1, -1.2346)):
             self.outcomes[number] = "ok"

@@ -1,0 +1,145 @@
+"""The motor board with its cameras, real or emulated, as experiments are performed on it."""
+
+from wristctl.arrays import Array
+from wristctl.board.driver import Board
+from wristctl.config.hw_run import HwRunSettings
+from wristctl.config.wrist import WristParameters
+from wristctl.errors import UserError
+from wristctl.simulation.motion import Motion
+from wristctl.simulation.worlds import Draws
+from wristctl.trial.calibration import WristCalibration
+from wristctl.trial.control_loop import ControlLoop
+from wristctl.trial.drives import BoardDrive
+from wristctl.trial.expected_moves import ExpectedMoves
+from wristctl.trial.homing import Zero, find_zero, slacken
+from wristctl.trial.log import TrialLog
+from wristctl.trial.motors_ready import Halt, after_a_fault, halt, prepare
+from wristctl.trial.resting import judge_rest
+from wristctl.trial.rig_belief import names_of_planes
+from wristctl.trial.spools import spools_of
+from wristctl.trial.stands import AtZero
+from wristctl.trial.steering import HostFaults
+from wristctl.trial.supervised_wait import Patience, medians
+from wristctl.trial.tendon_pulls import tendon_pulls_of
+from wristctl.trial.testbeds import Testbed
+from wristctl.trial.trials import Trial
+from wristctl.trial.zero_checks import check_cocontraction, check_tendons, check_zero
+from wristctl.vision.camera_pose import CameraPose
+
+
+class BoardStand:
+    """A `Stand` of a testbed. Raises BoardError, CameraError, and UserError for a calibration that does not fit."""
+
+    def __init__(self, testbed: Testbed, calibration: WristCalibration | None = None, seed: int = 0) -> None:
+        self._testbed, self._calibration, self._draws = testbed, calibration, Draws(seed, "bench")
+        self.zero: Zero | None = None
+        self.poses = dict[str, CameraPose | None]()
+        self._plane: str | None = None  # that the wrist is set up in
+
+    def open(self, settings: HwRunSettings, wrist: WristParameters, log: TrialLog) -> None:
+        """Greet the board."""
+        self._settings, self._wrist, self._pulls = settings, wrist, tendon_pulls_of(settings)
+        self._board = Board(self._testbed.transport, log.wire)
+        self._board.cells = self._pulls
+        self._board.connect()
+
+    def now(self) -> float:
+        """On the transport's clock."""
+        return self._board.transport.now()
+
+    def ready(self, trial: Trial, loop: ControlLoop | None) -> AtZero | None:
+        """Have the wrist turned to the trial's plane, and homed once; in two planes one set-up sees both."""
+        plane = trial.plane if self._settings.planes == 1 else ""
+        if plane == self._plane:
+            return None
+        patience = Patience(self._board) if loop is None else loop.patience(self._board, self._signs)
+        self._testbed.face(trial.direction, patience.pulse)
+        self._tracking, self._plane = self._testbed.tracking(), plane
+        self._set_up(plane)
+        return self._at_zero(plane)
+
+    def _set_up(self, plane: str) -> None:
+        """See the slack wrist's marker in this plane; the first time home the board, else check what homing found."""
+        settings, board, tracking = self._settings, self._board, self._tracking
+        if self.zero is not None:
+            self._let_go(self.zero)
+        watching = Patience(board)
+        names = names_of_planes(settings.planes, plane)
+        self.poses |= dict(zip(names, watching.stand_square(tracking, settings.homing), strict=True))
+        seen = watching.sightings(tracking, 4 * settings.homing.frames)
+        markers = medians(seen, settings.planes)
+        watching.pace.fits(settings.safety.stale)
+        if settings.planes == 2:  # what one camera sees of a bend depends on the other
+            tracking.zero = markers
+        if self.zero is None:  # the marker is seen, and nothing moves yet
+            judge_rest(seen, settings, self._wrist, names)
+            self._testbed.confirm(Patience(board).pulse)
+            with after_a_fault(prepare(board, settings)):
+                self.zero = self._home(plane)
+            markers = self.zero.markers
+        else:
+            markers = check_zero(board, tracking, settings, self._wrist, plane, self.zero)
+        tracking.zero = markers
+
+    def _home(self, plane: str) -> Zero:
+        board, tracking, settings, calibration = self._board, self._tracking, self._settings, self._calibration
+        if calibration is not None and settings.positions == "stored":
+            if len(calibration.zero.markers) != settings.planes:
+                problem = f"the calibration knows {len(calibration.zero.markers)} cameras of {settings.planes}"
+                raise UserError(problem, "calibration", "positions: find, or calibrate the wrist with the same planes")
+            calibration.restore(board)
+            self._let_go(calibration.zero)
+            check_zero(board, tracking, settings, self._wrist, plane, calibration.zero)
+            return calibration.zero
+        signs = calibration.zero.signs if calibration else None
+        return find_zero(board, tracking, settings, self._wrist, plane, signs)
+
+    def _let_go(self, zero: Zero) -> None:
+        """Slacken the tendons, and give the wrist time to straighten."""
+        slacken(self._board, spools_of(self._settings.actuator), self._settings.homing, zero.signs)
+        Patience(self._board).wait(self._settings.homing.let_go)
+
+    def _at_zero(self, plane: str) -> AtZero:
+        assert self.zero is not None
+        settings, pose = self._settings, self.poses.get(plane)
+        drive = BoardDrive(self._board, settings, self._signs)
+        stiffness = ExpectedMoves(settings, self._wrist, plane).tendon_stiffness(self.zero.steps_per_radian)
+        oblique = 0.0 if pose is None else pose.oblique
+        return AtZero(drive, self._tracking, plane, oblique, self._pulls, stiffness)
+
+    @property
+    def _signs(self) -> tuple[int, ...]:
+        assert self.zero is not None
+        return self.zero.signs
+
+    def begin(self, trial: Trial, motion: Motion, start: float) -> HostFaults | None:
+        """An emulated wrist is disturbed, and host and bench have their faults."""
+        noise = self._draws.camera(trial.scenario, trial.repetition)
+        self._testbed.begin(start, trial.disturbances(self._settings, motion), noise)
+        return HostFaults(self._settings.bench.faults) if self._testbed.emulated else None
+
+    def truth(self, start: float) -> Array:
+        """Of an emulated wrist."""
+        return self._testbed.truth(start)
+
+    def check(self) -> AtZero:
+        """In two planes each tendon is tried too; then the wrist rests at zero, in sight of who waits."""
+        assert self.zero is not None and self._plane is not None
+        common = self._board, self._tracking, self._settings, self._wrist
+        told = check_cocontraction(*common, self._plane, self.zero)
+        if told and self._settings.planes == 2:
+            check_tendons(*common, self.zero)
+        return self._at_zero(self._plane)
+
+    def stop(self, early: bool) -> Halt:
+        """Stop the axes; after an early stop a board that is to hold ends by its watchdog, and holds."""
+        halted = halt(self._board, self._settings.safety.watchdog)
+        if early and self._settings.safety.hold and halted.verified:
+            self._board.transport.close()
+        else:
+            self._board.close(emergency=not halted.verified)
+        return halted
+
+    def close(self) -> None:
+        """Close the testbed."""
+        self._testbed.close()
