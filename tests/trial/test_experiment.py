@@ -14,11 +14,11 @@ from tests.trial.conftest import WRIST, Run, settings_of
 from wristctl.board.driver import Board
 from wristctl.board.messages import State
 from wristctl.errors import UserError
+from wristctl.trial.control_loop import AtZero
 from wristctl.trial.experiment import Experiment, log_of, spared
 from wristctl.trial.homing import slacken
 from wristctl.trial.log import tick_columns
 from wristctl.trial.safety import SafetyStop
-from wristctl.trial.stands import AtZero
 from wristctl.trial.trials import trials_of
 from wristctl.trial.zero_checks import check_zero
 

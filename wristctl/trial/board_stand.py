@@ -8,7 +8,7 @@ from wristctl.errors import UserError
 from wristctl.simulation.motion import Motion
 from wristctl.simulation.worlds import Draws
 from wristctl.trial.calibration import WristCalibration
-from wristctl.trial.control_loop import ControlLoop
+from wristctl.trial.control_loop import AtZero, ControlLoop
 from wristctl.trial.drives import BoardDrive
 from wristctl.trial.expected_moves import ExpectedMoves
 from wristctl.trial.homing import Zero, find_zero, slacken
@@ -17,7 +17,6 @@ from wristctl.trial.motors_ready import Halt, after_a_fault, halt, prepare
 from wristctl.trial.resting import judge_rest
 from wristctl.trial.rig_belief import names_of_planes
 from wristctl.trial.spools import spools_of
-from wristctl.trial.stands import AtZero
 from wristctl.trial.steering import HostFaults
 from wristctl.trial.supervised_wait import Patience, medians
 from wristctl.trial.tendon_pulls import tendon_pulls_of
@@ -28,7 +27,11 @@ from wristctl.vision.camera_pose import CameraPose
 
 
 class BoardStand:
-    """A `Stand` of a testbed. Raises BoardError, CameraError, and UserError for a calibration that does not fit."""
+    """A testbed as an experiment has it; `zero` is what homing has found, `poses` are those of each plane's camera,
+    None of a calibrated one.
+
+    Raises SafetyStop, BoardError, CameraError, and UserError for a calibration that does not fit.
+    """
 
     def __init__(self, testbed: Testbed, calibration: WristCalibration | None = None, seed: int = 0) -> None:
         self._testbed, self._calibration, self._draws = testbed, calibration, Draws(seed, "bench")
@@ -37,18 +40,21 @@ class BoardStand:
         self._plane: str | None = None  # that the wrist is set up in
 
     def open(self, settings: HwRunSettings, wrist: WristParameters, log: TrialLog) -> None:
-        """Greet the board."""
+        """See that all answer; nothing moves. `log` takes what is on the wire."""
         self._settings, self._wrist, self._pulls = settings, wrist, tendon_pulls_of(settings)
         self._board = Board(self._testbed.transport, log.wire)
         self._board.cells = self._pulls
         self._board.connect()
 
     def now(self) -> float:
-        """On the transport's clock."""
+        """Seconds on its clock."""
         return self._board.transport.now()
 
     def ready(self, trial: Trial, loop: ControlLoop | None) -> AtZero | None:
-        """Have the wrist turned to the trial's plane, and homed once; in two planes one set-up sees both."""
+        """The wrist, homed once, and turned to the trial's plane: in two planes one set-up sees both.
+
+        None where it has been already: `loop`, which has brought it to rest, goes on.
+        """
         plane = trial.plane if self._settings.planes == 1 else ""
         if plane == self._plane:
             return None
@@ -113,17 +119,20 @@ class BoardStand:
         return self.zero.signs
 
     def begin(self, trial: Trial, motion: Motion, start: float) -> HostFaults | None:
-        """An emulated wrist is disturbed, and host and bench have their faults."""
+        """The motion of a trial starts at `start` [s]. Returns the loop's own faults where any are injected."""
         noise = self._draws.camera(trial.scenario, trial.repetition)
         self._testbed.begin(start, trial.disturbances(self._settings, motion), noise)
         return HostFaults(self._settings.bench.faults) if self._testbed.emulated else None
 
     def truth(self, start: float) -> Array:
-        """Of an emulated wrist."""
+        """True values since `start` [s], by the log's columns; no rows of a real wrist."""
         return self._testbed.truth(start)
 
     def check(self) -> AtZero:
-        """In two planes each tendon is tried too; then the wrist rests at zero, in sight of who waits."""
+        """See that no tendons pull against each other and, in two planes, that each one bends the wrist.
+
+        Returns the slack wrist, which is to rest at zero until the next trial.
+        """
         assert self.zero is not None and self._plane is not None
         common = self._board, self._tracking, self._settings, self._wrist
         told = check_cocontraction(*common, self._plane, self.zero)
@@ -132,7 +141,7 @@ class BoardStand:
         return self._at_zero(self._plane)
 
     def stop(self, early: bool) -> Halt:
-        """Stop the axes; after an early stop a board that is to hold ends by its watchdog, and holds."""
+        """Stop the motors, `early` or after the last trial; the watchdog ends a board that is to hold."""
         halted = halt(self._board, self._settings.safety.watchdog)
         if early and self._settings.safety.hold and halted.verified:
             self._board.transport.close()
@@ -141,5 +150,5 @@ class BoardStand:
         return halted
 
     def close(self) -> None:
-        """Close the testbed."""
+        """Give everything back."""
         self._testbed.close()

@@ -1,6 +1,6 @@
 """The experiment from the first command to the last: connect, home, trials and returns, and the stop that ends it.
 
-What it is performed on, a board with its cameras or a rig that takes targets, is a `wristctl.trial.stands.Stand`.
+What it is performed on is a part of it, a `Stand`: it connects, homes, begins trials, checks the tendons and stops.
 """
 
 import logging
@@ -19,7 +19,8 @@ from wristctl.errors import UserError, fix_of
 from wristctl.interrupt import undisturbed
 from wristctl.simulation.motion import Motion
 from wristctl.simulation.spool_timing import remembered_commands
-from wristctl.trial.control_loop import ControlLoop, Shown, course_of
+from wristctl.trial.board_stand import BoardStand
+from wristctl.trial.control_loop import AtZero, ControlLoop, Shown, course_of
 from wristctl.trial.homing import Zero
 from wristctl.trial.live_datagrams import LiveReference
 from wristctl.trial.log import TrialLog
@@ -28,9 +29,9 @@ from wristctl.trial.motors_ready import Halt
 from wristctl.trial.rig_belief import RigBelief, layout_of_rig, names_of_planes, numbers_of
 from wristctl.trial.rig_drive import LookPaces
 from wristctl.trial.rig_settings import as_modelled
+from wristctl.trial.rig_stand import RigStand
 from wristctl.trial.safety import SafetyStop
 from wristctl.trial.spools import spools_of
-from wristctl.trial.stands import AtZero, Stand
 from wristctl.trial.steering import HostFaults, Steering
 from wristctl.trial.tick_timing import TickTiming
 from wristctl.trial.trials import Trial, motions_of
@@ -40,6 +41,8 @@ from wristctl.wrist.directions import in_plane
 from wristctl.wrist.kinematics import Inverse
 
 log = logging.getLogger(__name__)
+
+Stand = BoardStand | RigStand
 
 # Share of the motors' pull that a law may ask for: they turn meanwhile, and the wrist may be pushed.
 _ASKED = 0.8
@@ -145,10 +148,8 @@ class Experiment:
 
     def _at_rest(self, ready: AtZero, shown: Shown | None) -> ControlLoop:
         """A loop that has brought the homed, slack wrist to rest at zero."""
-        loop = ControlLoop(
-            ready.drive, ready.tracking, self._settings, self._facing(ready.plane), ready.plane, self.timing, self._log,
-            shown, ready.oblique, ready.pulls, ready.stiffness, self._layout,
-        )  # fmt: skip
+        facing = self._facing(ready.plane)
+        loop = ControlLoop(ready, self._settings, facing, self.timing, self._log, shown, self._layout)
         loop.follow(self._to_rest(0.0, self._settings.rest, 0.0), self._back, ())
         return loop
 

@@ -12,7 +12,7 @@ from wristctl.config.hw_run import HwRunSettings
 from wristctl.config.wrist import WristParameters
 from wristctl.errors import UserError
 from wristctl.simulation.motion import Motion
-from wristctl.trial.control_loop import ControlLoop
+from wristctl.trial.control_loop import AtZero, ControlLoop
 from wristctl.trial.expected_moves import ExpectedMoves
 from wristctl.trial.guarded_rig import GuardedRig
 from wristctl.trial.homing import Zero, find_zero, rest_of, slacken
@@ -24,7 +24,6 @@ from wristctl.trial.rig_drive import RigDrive, RigTracking
 from wristctl.trial.rig_motors import RigMotors
 from wristctl.trial.safety import SafetyStop
 from wristctl.trial.spools import spools_of
-from wristctl.trial.stands import AtZero
 from wristctl.trial.supervised_wait import Patience
 from wristctl.trial.trials import Trial
 from wristctl.trial.zero_checks import check_cocontraction, check_tendons
@@ -67,7 +66,10 @@ def halt_rig(rig: GuardedRig, settings: HwRunSettings) -> Halt:
 
 
 class RigStand:
-    """A `Stand` of a rig; `confirm` has a person agree to the first motion. Raises RigStop."""
+    """A rig as an experiment has it, as `BoardStand`; `confirm` has a person agree to the first motion.
+
+    Raises SafetyStop and RigStop.
+    """
 
     def __init__(self, rig: GuardedRig, confirm: Callable[[], None] = lambda: None) -> None:
         self._rig, self._confirm = rig, confirm
@@ -92,7 +94,7 @@ class RigStand:
             return math.nan
 
     def ready(self, trial: Trial, loop: ControlLoop | None) -> AtZero:
-        """Before the first trial the rig is connected and homed."""
+        """The wrist, homed once: the rig is connected before its first trial."""
         if self.zero is None:
             self._confirm()
             self._motors = RigMotors(self._rig, self._settings, self._rig.connect())
@@ -124,7 +126,7 @@ class RigStand:
         return np.empty((0, 0))
 
     def check(self) -> None:
-        """The wrist rests straight too, and every tendon bends it."""
+        """As `BoardStand.check`, and that the wrist rests straight; it stays slack until the next trial."""
         assert self.zero is not None
         settings, expected, motors, tracking = self._settings, self._expected, self._motors, self._tracking
         motors.left_at(self._drive.targets)

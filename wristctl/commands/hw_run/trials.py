@@ -22,7 +22,7 @@ from wristctl.records import LiveRun
 from wristctl.simulation.metrics import METRICS, metrics_in
 from wristctl.trial.board_stand import BoardStand
 from wristctl.trial.calibration import WristCalibration
-from wristctl.trial.experiment import Experiment, Stop, log_of
+from wristctl.trial.experiment import Experiment, Stand, Stop, log_of
 from wristctl.trial.guarded_rig import GuardedRig
 from wristctl.trial.live_datagrams import LiveReference
 from wristctl.trial.log import TrialLog
@@ -31,7 +31,6 @@ from wristctl.trial.rig_belief import PLANES, layout_of_rig
 from wristctl.trial.rig_settings import rig_of
 from wristctl.trial.rig_stand import BEFORE_MOTION, RigStand
 from wristctl.trial.safety import SafetyStop
-from wristctl.trial.stands import Stand
 from wristctl.trial.testbeds import open_testbed
 from wristctl.trial.trial_results import FURTHER, JUDGED, LOGGED, TRULY, metrics_of_trials
 from wristctl.trial.trials import Trial, trials_of
