@@ -353,7 +353,7 @@ def test_steps_per_radian_are_the_models_but_for_what_soft_tendons_add(share: fl
     if not refused:
         assert wrist.homed().steps_per_radian == pytest.approx([share * steps] * 4)
         return
-    with pytest.raises(SafetyStop, match=rf"{share:.2f} times what the model says .* wrong microsteps"):
+    with pytest.raises(SafetyStop, match=rf"{share:.2f} times what the model says .* wrong pulley or microsteps"):
         wrist.homed()
 
 

@@ -301,7 +301,7 @@ def find_zero(
     taut before or sticks, or where the marker is lost. In two planes readings of the slack wrist have been taken off.
     """
     expected, spools = ExpectedMoves(settings, wrist, plane, layout), spools_of(settings.actuator)
-    finder, count = finder_of(board, tracking, settings, wrist, plane, expected), len(expected.motors)
+    finder, count = finder_of(board, tracking, settings, wrist, plane, expected), len(expected.plus)
     about = [finder.sense(axis, (1, -1) if signs is None else (signs[axis],)) for axis in range(count)]
     finder.slacken()
     lines, straight, taut = finder.lines(about)

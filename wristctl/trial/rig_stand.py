@@ -133,7 +133,7 @@ class RigStand:
         slacken(motors, spools_of(settings.actuator), settings.homing, self.zero.signs)
         rest = rest_of(motors, tracking, expected, settings.homing)
         off, step = math.hypot(rest.theta, np.nan_to_num(rest.beside)), settings.actuator.step_length
-        rigid = min(expected.steps(math.inf, axis=axis) for axis in range(len(expected.motors))) * step
+        rigid = min(expected.steps(math.inf, axis=axis) for axis in range(len(expected.plus))) * step
         if off > settings.homing.pull / rigid:
             problem = f"the slack wrist rests {math.degrees(off):.1f} deg off where it was straight"
             fix = "a tendon is shorter than it was, caught or slipped, or the bend's zero has moved: home again"

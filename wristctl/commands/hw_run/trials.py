@@ -244,7 +244,7 @@ def stopped_answer(stop: Stop, table: pd.DataFrame, count: int) -> list[str]:
 
 
 def _summarise(session: Session, experiment: Experiment, trial_log: TrialLog, table: pd.DataFrame, count: int) -> None:
-    """Timing, zero, and where it was stopped why, whether the motors stand, and the last second."""
+    """Timing, zero, and where it was stopped whether the motors stand, and the last second: the error says why."""
     findings, settings, timing = session.findings, session.study.hw_run, experiment.timing
     findings.metric("ticks", len(timing.late), meaning="control ticks")
     meaning = "ticks skipped because one before took too long"
@@ -275,11 +275,10 @@ def _summarise(session: Session, experiment: Experiment, trial_log: TrialLog, ta
     log.warning("%s after %.0f ms (%s)", _stand(stop), 1e3 * stop.halt.seconds, stop.halt.how)
     if not trial_log.last:
         findings.summary(stop.reason)
-        log.warning("%s", stop.reason)
         return
     text = _last_second(trial_log, settings.rig is not None).text()
     findings.summary(f"{stop.reason}\n\n```\n{text}\n```")
-    log.warning("%s\n%s", stop.reason, text)
+    log.warning("%s", text)
 
 
 def _tell_oddities(session: Session, experiment: Experiment) -> None:
