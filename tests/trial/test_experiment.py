@@ -11,16 +11,14 @@ import numpy as np
 import pytest
 
 from tests.trial.conftest import WRIST, Run, settings_of
-from wristctl.board.driver import Board
 from wristctl.board.messages import State
 from wristctl.errors import UserError
 from wristctl.trial.control_loop import AtZero
 from wristctl.trial.experiment import Experiment, log_of, spared
-from wristctl.trial.homing import slacken
 from wristctl.trial.log import tick_columns
 from wristctl.trial.safety import SafetyStop
 from wristctl.trial.trials import trials_of
-from wristctl.trial.zero_checks import check_zero
+from wristctl.trial.zero_checks import HomedWrist
 
 NAMES = "log", "between", "frames", "residuals", "truth", "wire"
 
@@ -139,22 +137,22 @@ def test_the_same_seed_gives_the_same_bytes(experiment: Run) -> None:
 def test_a_stored_zero_is_checked_on_a_wrist_that_has_had_time_to_straighten(
     experiment: Run, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    times: list[float] = []
+    times, slacken, check_zero = list[tuple[str, float]](), HomedWrist.slacken, HomedWrist.check_zero
 
-    def slackened(board: Board, *given: Any) -> Any:
-        position = slacken(board, *given)
-        times.append(board.transport.now())
-        return position
+    def slackened(homed: HomedWrist, *given: float) -> None:
+        slacken(homed, *given)
+        times.append(("slack", homed._board.transport.now()))
 
-    def checked(board: Board, *given: Any) -> tuple[float, ...]:
-        times.append(board.transport.now())
-        return check_zero(board, *given)
+    def checked(homed: HomedWrist) -> tuple[float, ...]:
+        times.append(("check", homed._board.transport.now()))
+        return check_zero(homed)
 
-    monkeypatch.setattr("wristctl.trial.board_stand.slacken", slackened)
-    monkeypatch.setattr("wristctl.trial.board_stand.check_zero", checked)
+    monkeypatch.setattr(HomedWrist, "slacken", slackened)
+    monkeypatch.setattr(HomedWrist, "check_zero", checked)
     done = experiment()
-    assert done.error is None and len(times) == 2
-    assert times[1] - times[0] >= settings_of().homing.let_go > 0.0
+    (slack, since), (check, then), *after = times
+    assert done.error is None and (slack, check) == ("slack", "check") and all(name == "slack" for name, _ in after)
+    assert then - since >= settings_of().homing.let_go > 0.0
 
 
 @pytest.mark.slow
@@ -166,11 +164,13 @@ def test_the_zero_of_a_further_plane_is_what_its_checks_find(experiment: Run, mo
         seen.append(ready.tracking.zero)
         return at_rest(performed, ready, *given)
 
-    def checked(*given: Any) -> tuple[float, ...]:
-        return (check_zero(*given)[0] + 0.01,)
+    check_zero = HomedWrist.check_zero
+
+    def checked(homed: HomedWrist) -> tuple[float, ...]:
+        return (check_zero(homed)[0] + 0.01,)
 
     monkeypatch.setattr(Experiment, "_at_rest", resting)
-    monkeypatch.setattr("wristctl.trial.board_stand.check_zero", checked)
+    monkeypatch.setattr(HomedWrist, "check_zero", checked)
     done = experiment(directions=("ulnar", "flexion"))
     assert done.error is None and len(seen) >= 3
     assert seen[0] == (0.0,), "the calibration's"

@@ -11,18 +11,17 @@ from wristctl.trial.calibration import WristCalibration
 from wristctl.trial.control_loop import AtZero, ControlLoop
 from wristctl.trial.drives import BoardDrive
 from wristctl.trial.expected_moves import ExpectedMoves
-from wristctl.trial.homing import Zero, find_zero, slacken
+from wristctl.trial.homing import Zero, find_zero
 from wristctl.trial.log import TrialLog
 from wristctl.trial.motors_ready import Halt, after_a_fault, halt, prepare
 from wristctl.trial.resting import judge_rest
 from wristctl.trial.rig_belief import names_of_planes
-from wristctl.trial.spools import spools_of
 from wristctl.trial.steering import HostFaults
 from wristctl.trial.supervised_wait import Patience, medians
 from wristctl.trial.tendon_pulls import tendon_pulls_of
 from wristctl.trial.testbeds import Testbed
 from wristctl.trial.trials import Trial
-from wristctl.trial.zero_checks import check_cocontraction, check_tendons, check_zero
+from wristctl.trial.zero_checks import HomedWrist
 from wristctl.vision.camera_pose import CameraPose
 
 
@@ -37,7 +36,7 @@ class BoardStand:
         self._testbed, self._calibration, self._draws = testbed, calibration, Draws(seed, "bench")
         self.zero: Zero | None = None
         self.poses = dict[str, CameraPose | None]()
-        self._plane: str | None = None  # that the wrist is set up in
+        self._plane = ""
 
     def open(self, settings: HwRunSettings, wrist: WristParameters, log: TrialLog) -> None:
         """See that all answer; nothing moves. `log` takes what is on the wire."""
@@ -56,21 +55,21 @@ class BoardStand:
         None where it has been already: `loop`, which has brought it to rest, goes on.
         """
         plane = trial.plane if self._settings.planes == 1 else ""
-        if plane == self._plane:
+        if loop is not None and plane == self._plane:
             return None
         patience = Patience(self._board) if loop is None else loop.patience(self._board, self._signs)
         self._testbed.face(trial.direction, patience.pulse)
         self._tracking, self._plane = self._testbed.tracking(), plane
-        self._set_up(plane)
-        return self._at_zero(plane)
+        self._set_up()
+        return self._at_zero()
 
-    def _set_up(self, plane: str) -> None:
+    def _set_up(self) -> None:
         """See the slack wrist's marker in this plane; the first time home the board, else check what homing found."""
         settings, board, tracking = self._settings, self._board, self._tracking
         if self.zero is not None:
-            self._let_go(self.zero)
+            self._let_go(self._homed(self.zero))
         watching = Patience(board)
-        names = names_of_planes(settings.planes, plane)
+        names = names_of_planes(settings.planes, self._plane)
         self.poses |= dict(zip(names, watching.stand_square(tracking, settings.homing), strict=True))
         seen = watching.sightings(tracking, 4 * settings.homing.frames)
         markers = medians(seen, settings.planes)
@@ -81,33 +80,37 @@ class BoardStand:
             judge_rest(seen, settings, self._wrist, names)
             self._testbed.confirm(Patience(board).pulse)
             with after_a_fault(prepare(board, settings)):
-                self.zero = self._home(plane)
+                self.zero = self._home()
             markers = self.zero.markers
         else:
-            markers = check_zero(board, tracking, settings, self._wrist, plane, self.zero)
+            markers = self._homed(self.zero).check_zero()
         tracking.zero = markers
 
-    def _home(self, plane: str) -> Zero:
-        board, tracking, settings, calibration = self._board, self._tracking, self._settings, self._calibration
+    def _home(self) -> Zero:
+        settings, calibration = self._settings, self._calibration
         if calibration is not None and settings.positions == "stored":
             if len(calibration.zero.markers) != settings.planes:
                 problem = f"the calibration knows {len(calibration.zero.markers)} cameras of {settings.planes}"
                 raise UserError(problem, "calibration", "positions: find, or calibrate the wrist with the same planes")
-            calibration.restore(board)
-            self._let_go(calibration.zero)
-            check_zero(board, tracking, settings, self._wrist, plane, calibration.zero)
+            calibration.restore(self._board)
+            homed = self._homed(calibration.zero)
+            self._let_go(homed)
+            homed.check_zero()
             return calibration.zero
         signs = calibration.zero.signs if calibration else None
-        return find_zero(board, tracking, settings, self._wrist, plane, signs)
+        return find_zero(self._board, self._tracking, settings, self._wrist, self._plane, signs)
 
-    def _let_go(self, zero: Zero) -> None:
+    def _homed(self, zero: Zero) -> HomedWrist:
+        return HomedWrist(self._board, self._tracking, self._settings, self._wrist, self._plane, zero)
+
+    def _let_go(self, homed: HomedWrist) -> None:
         """Slacken the tendons, and give the wrist time to straighten."""
-        slacken(self._board, spools_of(self._settings.actuator), self._settings.homing, zero.signs)
+        homed.slacken()
         Patience(self._board).wait(self._settings.homing.let_go)
 
-    def _at_zero(self, plane: str) -> AtZero:
+    def _at_zero(self) -> AtZero:
         assert self.zero is not None
-        settings, pose = self._settings, self.poses.get(plane)
+        settings, plane, pose = self._settings, self._plane, self.poses.get(self._plane)
         drive = BoardDrive(self._board, settings, self._signs)
         stiffness = ExpectedMoves(settings, self._wrist, plane).tendon_stiffness(self.zero.steps_per_radian)
         oblique = 0.0 if pose is None else pose.oblique
@@ -133,12 +136,11 @@ class BoardStand:
 
         Returns the slack wrist, which is to rest at zero until the next trial.
         """
-        assert self.zero is not None and self._plane is not None
-        common = self._board, self._tracking, self._settings, self._wrist
-        told = check_cocontraction(*common, self._plane, self.zero)
-        if told and self._settings.planes == 2:
-            check_tendons(*common, self.zero)
-        return self._at_zero(self._plane)
+        assert self.zero is not None
+        homed = self._homed(self.zero)
+        if homed.check_cocontraction() and self._settings.planes == 2:
+            homed.check_tendons()
+        return self._at_zero()
 
     def stop(self, early: bool) -> Halt:
         """Stop the motors, `early` or after the last trial; the watchdog ends a board that is to hold."""

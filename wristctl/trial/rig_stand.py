@@ -15,18 +15,16 @@ from wristctl.simulation.motion import Motion
 from wristctl.trial.control_loop import AtZero, ControlLoop
 from wristctl.trial.expected_moves import ExpectedMoves
 from wristctl.trial.guarded_rig import GuardedRig
-from wristctl.trial.homing import Zero, find_zero, rest_of, slacken
+from wristctl.trial.homing import Zero, find_zero
 from wristctl.trial.log import TrialLog
 from wristctl.trial.motors_ready import Halt
 from wristctl.trial.resting import judge_looks, judge_weight
 from wristctl.trial.rig_belief import layout_of_rig, names_of_planes
 from wristctl.trial.rig_drive import RigDrive, RigTracking
 from wristctl.trial.rig_motors import RigMotors
-from wristctl.trial.safety import SafetyStop
-from wristctl.trial.spools import spools_of
 from wristctl.trial.supervised_wait import Patience
 from wristctl.trial.trials import Trial
-from wristctl.trial.zero_checks import check_cocontraction, check_tendons
+from wristctl.trial.zero_checks import HomedWrist
 from wristctl.vision.camera_pose import CameraPose
 
 log = logging.getLogger(__name__)
@@ -110,13 +108,10 @@ class RigStand:
         judge_weight(settings, self._wrist, names_of_planes(settings.planes, PLANE))
         judge_looks(Patience(motors).sightings(tracking, 4 * settings.homing.frames), settings, self._rig.where)
         zero = find_zero(motors, tracking, settings, self._wrist, self._plane, layout=self._layout)
-        placed = tuple(self._expected.place(axis) for axis in range(len(zero.slack)))
+        expected = ExpectedMoves(settings, self._wrist, self._plane, self._layout)
+        placed = tuple(expected.place(axis) for axis in range(len(zero.slack)))
         tracking.zero = zero.markers
         return replace(zero, directions=zero.directions or placed, targets=tuple(motors.targets.tolist()))
-
-    @property
-    def _expected(self) -> ExpectedMoves:
-        return ExpectedMoves(self._settings, self._wrist, self._plane, self._layout)
 
     def begin(self, trial: Trial, motion: Motion, start: float) -> None:
         """Nothing is injected."""
@@ -128,19 +123,12 @@ class RigStand:
     def check(self) -> None:
         """As `BoardStand.check`, and that the wrist rests straight; it stays slack until the next trial."""
         assert self.zero is not None
-        settings, expected, motors, tracking = self._settings, self._expected, self._motors, self._tracking
+        motors, tracking = self._motors, self._tracking
         motors.left_at(self._drive.targets)
-        slacken(motors, spools_of(settings.actuator), settings.homing, self.zero.signs)
-        rest = rest_of(motors, tracking, expected, settings.homing)
-        off, step = math.hypot(rest.theta, np.nan_to_num(rest.beside)), settings.actuator.step_length
-        rigid = min(expected.steps(math.inf, axis=axis) for axis in range(len(expected.plus))) * step
-        if off > settings.homing.pull / rigid:
-            problem = f"the slack wrist rests {math.degrees(off):.1f} deg off where it was straight"
-            fix = "a tendon is shorter than it was, caught or slipped, or the bend's zero has moved: home again"
-            raise SafetyStop(problem, self._rig.where, fix)
-        common = motors, tracking, settings, self._wrist
-        check_cocontraction(*common, self._plane, self.zero, self._layout)
-        check_tendons(*common, self.zero, self._layout)
+        homed = HomedWrist(motors, tracking, self._settings, self._wrist, self._plane, self.zero, self._layout)
+        homed.check_straight(self._rig.where)
+        homed.check_cocontraction()
+        homed.check_tendons()
 
     def stop(self, early: bool) -> Halt:
         """Stop the rig; what holds its tendons is its own."""
