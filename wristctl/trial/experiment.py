@@ -32,7 +32,7 @@ from wristctl.trial.rig_settings import as_modelled
 from wristctl.trial.rig_stand import RigStand
 from wristctl.trial.safety import SafetyStop
 from wristctl.trial.spools import spools_of
-from wristctl.trial.steering import HostFaults, Steering
+from wristctl.trial.steering import Steering
 from wristctl.trial.tick_timing import TickTiming
 from wristctl.trial.trials import Trial, motions_of
 from wristctl.trial.watch import Watch
@@ -154,24 +154,19 @@ class Experiment:
         return loop
 
     def _one(self, stand: Stand, loop: ControlLoop, trial: Trial) -> None:
-        """One trial, and the way back to zero."""
-        start, motion = loop.next_tick, self.motions[trial.direction]
+        """One trial, whose residuals are kept however it ends, and the way back to zero."""
+        start, motion, (law, gains) = loop.next_tick, self.motions[trial.direction], self._laws[trial.row]
         self._under_way, self.outcomes[trial.number] = (trial.number, start), "begun"
-        self._follow(loop, trial, stand.begin(trial, motion, start))
+        faults = stand.begin(trial, motion, start)
+        try:
+            loop.follow(motion, law, gains, trial.number, faults, trial.push != 0.0, self._live)
+        finally:
+            self.most = {name: max(size, self.most.get(name, 0.0)) for name, size in loop.watch.most.items()}
+            self.odd[trial.number] = loop.watch.words()
         self._trial_ended(stand, "ok")
         self._in_doubt = trial.number
         final = motion.final if self._live is None else self._live.bend
         loop.follow(self._to_rest(final, self._settings.back, 0.0), self._back, ())
-
-    def _follow(self, loop: ControlLoop, trial: Trial, faults: HostFaults | None) -> None:
-        """Have a loop follow the motion of a trial, and keep its residuals however it ends."""
-        law, gains = self._laws[trial.row]
-        try:
-            followed = self.motions[trial.direction]
-            loop.follow(followed, law, gains, trial.number, faults, trial.push != 0.0, self._live)
-        finally:
-            self.most = {name: max(size, self.most.get(name, 0.0)) for name, size in loop.watch.most.items()}
-            self.odd[trial.number] = loop.watch.words()
 
     def _trial_ended(self, stand: Stand, outcome: str) -> None:
         if self._under_way is not None:
