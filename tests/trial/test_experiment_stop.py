@@ -99,6 +99,54 @@ def test_the_largest_residual_of_all_trials_counts_and_what_was_odd_is_of_each()
     assert trials.outcomes == {0: "ok", 1: "begun"}
 
 
+@pytest.mark.parametrize("rests", [True, False], ids=["board", "rig"])
+def test_trials_are_checked_each_before_the_next_and_one_that_is_stopped_leaves_those_before_sound(
+    monkeypatch: pytest.MonkeyPatch, rests: bool
+) -> None:
+    """A board's wrist is brought to rest after its check, a rig's before the next trial; the third trial is stopped."""
+    (trials, _), did = trials_of_two(), list[str]()
+    trials._trials = [trial(0), trial(1), trial(2)]
+
+    class Watched(_Stand):
+        zero, poses = "zero", {"ulnar": "pose"}
+
+        def open(self, *_: object) -> None:
+            did.append("open")
+
+        def ready(self, one: Trial, loop: object) -> str | None:
+            did.append(f"ready {one.number}")
+            return "slack" if loop is None else None
+
+        def check(self) -> str | None:
+            did.append("check")
+            return "slack" if rests else None
+
+        def close(self) -> None:
+            did.append("close")
+
+    class Third(_Loop):
+        def follow(self, *given: Any) -> None:
+            did.append(f"trial {given[3]}" if len(given) > 3 else "back")
+            if given[3:4] == (2,):
+                raise SafetyStop("heat", "motor")
+
+    def at_rest(self: Experiment, ready: str, shown: object) -> Any:
+        did.append("rest")
+        return Third()
+
+    monkeypatch.setattr(Experiment, "_at_rest", at_rest)
+    monkeypatch.setattr(Experiment, "_warm_up", lambda self, plane: did.append("warm"))
+    stand = Watched()
+    with pytest.raises(SafetyStop):
+        trials.run(stand)
+    assert trials.outcomes == {0: "ok", 1: "ok", 2: "stopped: heat"} and stand.stopped == [True]
+    assert (trials.zero, trials.poses, trials.stop.trial) == ("zero", {"ulnar": "pose"}, 2)
+    one = "trial 0 back check rest ready 1 trial 1 back check rest ready 2 trial 2 close"
+    if not rests:
+        one = one.replace("rest ready 1", "ready 1 rest").replace("rest ready 2", "ready 2 rest")
+    assert " ".join(did) == f"warm open ready 0 rest {one}"
+
+
 def test_after_a_trial_its_truth_is_kept_and_the_wrist_is_led_back_outside_of_it() -> None:
     (trials, true), loop = trials_of_two(), _Loop()
     trials._one(_Stand(), loop, trial(3))

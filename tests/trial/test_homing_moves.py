@@ -246,6 +246,26 @@ def test_tendons_that_pull_against_each_other_bend_a_wrist_whose_one_side_is_let
     assert board.position.tolist() == [-slack * sign for sign in signs]
 
 
+@pytest.mark.parametrize("share", [0.95, 1.05, -0.95, -1.05])
+def test_a_slack_wrist_that_rests_further_off_than_its_slack_lets_it_is_refused(share: float) -> None:
+    """Rigid tendons that are let out by `homing.pull` let it bend so far; it is slack then, refused or not."""
+    board: Any = Slackened()
+    rig: Any = settings_of(homing={"frames": 1, "rest": 0.0})
+    held = rig.homing.pull / (ExpectedMoves(rig, WRIST, "ulnar").steps(math.inf) * SPOOLS.step)
+    marker: Any = Marker(board, lambda: GLUED + share * held)
+    marker.zero = (GLUED,)
+    homed = HomedWrist(board, marker, rig, WRIST, "ulnar", Zero((1, -1, 1, 1), tuple(PER_RADIAN), (GLUED,), (0.0,) * 4))
+    if abs(share) < 1.0:
+        homed.check_straight("my_rig.py:RIG")
+    else:
+        off = math.degrees(abs(share) * held)
+        with pytest.raises(SafetyStop, match=rf"rests {off:.1f} deg off where it was straight") as stopped:
+            homed.check_straight("my_rig.py:RIG")
+        assert stopped.value.where == "my_rig.py:RIG"
+    slack = round(rig.homing.pull / SPOOLS.step)
+    assert board.position.tolist() == [-slack, slack, -slack, -slack]
+
+
 @pytest.mark.parametrize("plane", ["ulnar", "flexion"])
 def test_what_a_slackened_wrist_moves_away_from_is_named_and_what_it_moves_to(plane: str) -> None:
     expected = ExpectedMoves(settings_of(), WRIST, plane)
