@@ -29,10 +29,9 @@ from wristctl.errors import UserError
 from wristctl.plugins.places import load
 from wristctl.records import Run
 from wristctl.simulation.references import minimum_jerk
+from wristctl.trial.experiment import Experiment, log_of
 from wristctl.trial.guarded_rig import GuardedRig
-from wristctl.trial.log import TrialLog
-from wristctl.trial.rig_belief import layout_of_rig, numbers_of
-from wristctl.trial.rig_experiment import RigExperiment
+from wristctl.trial.rig_stand import RigStand
 from wristctl.trial.trials import Trial
 from wristctl.wrist.hinge_chain import HingeChain, Spools, mjcf
 
@@ -143,11 +142,10 @@ def tried(folder: Path, model: Path, number: int, row: RigRow) -> Held:
     settings, data = study.hw_run, folder / f"data_{number}"
     data.mkdir()
     robot, _ = load(rig)
-    tendons = numbers_of(layout_of_rig(settings, study.wrist))
-    log = TrialLog(data, None, settings.control_period, planes=settings.planes, tendons=tendons, wired=False)
-    experiment = RigExperiment(settings, study.wrist, [Trial(0, direction, 0, 0.0, 0)], log)
+    log = log_of(data, settings, study.wrist)
+    experiment = Experiment(settings, study.wrist, [Trial(0, direction, 0, 0.0, 0)], log)
     try:
-        experiment.run(GuardedRig(robot, rig))
+        experiment.run(RigStand(GuardedRig(robot, rig)))
     except UserError as error:
         return Held(factors, str(error.what), math.nan, math.nan)
     finally:

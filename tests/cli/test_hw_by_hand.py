@@ -184,10 +184,11 @@ def test_a_latched_fault_is_told_and_cleared_after_a_yes(call: Call, monkeypatch
 def test_a_tendon_is_reeled_in_until_its_person_says_taut_and_let_go_before_the_next(
     call: Call, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    typed(monkeypatch, "yes\nm\nm\n\n\nm\n\n\n")
+    typed(monkeypatch, "yes\nm\nmore\nm\n\n\nm\n\n\n")
     code, out, err = call("hw", "tension", "--mm", "0.2", "--port", "emulated")
     reeled = (0.6, 0.2, 0.4, 0.2)
     assert code == 0 and "each axis in turn reels in 0.2 mm at a time until you say so" in err
+    assert err.count("axis 0: 0.40 mm reeled in. m and Enter for more, Enter where it is taut") == 2, "asked again"
     assert out.splitlines() == [
         f"axis {k}: taut after {mm:.2f} mm, and paid out by 0.6 mm" for k, mm in enumerate(reeled)
     ]
@@ -197,7 +198,8 @@ def test_a_tendon_is_reeled_in_until_its_person_says_taut_and_let_go_before_the_
 
 
 def test_where_nobody_answers_a_tendon_is_reeled_in_no_further(call: Call, monkeypatch: pytest.MonkeyPatch) -> None:
-    typed(monkeypatch, "")
-    code, out, _ = call("hw", "tension", "--axis", "3", "--port", "emulated", "--yes")
-    assert code == 0 and out == "axis 3: taut after 0.10 mm, and paid out by 0.6 mm\n"
-    assert Board(Emulated.made[0]).read().position == (0, 0, 0, round(0.1 / STEP_MM) - round(0.6 / STEP_MM))
+    typed(monkeypatch, "m\n")
+    code, out, err = call("hw", "tension", "--axis", "3", "--port", "emulated", "--yes")
+    assert code == 3 and out == "" and "nobody says whether the tendon is taut - axis 3" in err
+    assert Board(Emulated.made[0]).read().position == (0, 0, 0, 2 * round(0.1 / STEP_MM))
+    assert Emulated.made[0].energised == [False] * 4

@@ -23,6 +23,8 @@ from wristctl.commands.hw_run import trials as hw_trials
 from wristctl.commands.session import Unattended
 from wristctl.records import LiveRun, Run, start_run
 from wristctl.simulation.metrics import METRICS
+from wristctl.simulation.worlds import Draws
+from wristctl.trial.board_stand import BoardStand
 from wristctl.trial.log import TrialLog, tick_columns
 from wristctl.trial.motions import motion_of
 from wristctl.trial.safety import SafetyStop
@@ -64,7 +66,7 @@ class Bench:
     odd: Mapping[int, str] = {}
 
     def __init__(self, settings: Any, wrist: Any, trials: Any, log: TrialLog, *others: Any) -> None:
-        assert others == (None, None, None, 4, None) and wrist.stiffness == 77.0
+        assert others == (None, None, None) and wrist.stiffness == 77.0
         self.log, self.trials, self.timing = log, trials, TickTiming(settings.control_period, list(self.late), 7)
         self.motions = {"ulnar": motion_of(settings, wrist, "ulnar")}
         self.outcomes: dict[int, str] = {}
@@ -73,8 +75,9 @@ class Bench:
         self.zero = SimpleNamespace(plain=lambda: {"marker": 0.5})
         self.stop: Any = None
 
-    def run(self, testbed: str, shown: Any) -> None:
-        assert (testbed, shown) == ("testbed", print)
+    def run(self, stand: Any, shown: Any) -> None:
+        assert (type(stand), shown) == (BoardStand, print)
+        assert (stand._testbed, stand._calibration, stand._draws) == ("testbed", None, Draws(4, "bench"))
         motion = self.motions["ulnar"]
         for number, off in ((0, 2.0), (1, -1.2346)):
             self.outcomes[number] = "ok"
@@ -189,7 +192,7 @@ def test_lateness_is_shown_where_time_is_real_and_ticks_there_were(
 def test_a_stop_before_any_tick_has_no_table(perform: Perform, caplog: pytest.LogCaptureFixture) -> None:
     with caplog.at_level(logging.WARNING):
         _, run, _, _ = perform(stops=SafetyStop("it smokes", "bench", "water"), ticks=0, truth=False)
-    assert caplog.records[-1].getMessage() == "it smokes" and "it smokes" in run.file("README.md").read_text()
+    assert "the motors stand" in caplog.messages[-1] and "it smokes" in run.file("README.md").read_text()
     assert "The last second" not in run.file("README.md").read_text()
 
 
@@ -204,10 +207,10 @@ def test_a_stop_is_told_with_the_last_second_by_tenths(
     assert json.loads(run.file("data/stop.json").read_text()) == {"reason": "it smokes"}
     halted, last = (record.getMessage() for record in caplog.records)
     assert said in halted and "after 250 ms (by a ramp)" in halted
-    assert (
-        last.startswith("it smokes\nThe last second\n") and last.split("\n", 1)[1] in run.file("README.md").read_text()
-    )
-    head, _, *rows = last.splitlines()[3:]
+    readme = run.file("README.md").read_text()
+    assert last.startswith("The last second\n") and last in readme and "it smokes" in readme
+    assert "it smokes" not in halted + last, "the error that is raised says it"
+    head, _, *rows = last.splitlines()[2:]
     assert [part.strip() for part in head.split("  ") if part] == [
         "time [s]", "theta [deg]", "reference [deg]", "marker", "T1 [N]", "T2 [N]", "T4 [N]", "T5 [N]", "state",
     ]  # fmt: skip
@@ -221,7 +224,7 @@ def test_a_stop_is_told_with_the_last_second_by_tenths(
 def test_a_few_ticks_are_all_told(perform: Perform, caplog: pytest.LogCaptureFixture) -> None:
     with caplog.at_level(logging.WARNING):
         perform(ticks=7, stops=SafetyStop("it smokes", "bench", "water"))
-    assert len(caplog.messages[-1].splitlines()) == 5 + 14, "seven of each trial"
+    assert len(caplog.messages[-1].splitlines()) == 4 + 14, "seven of each trial"
 
 
 @pytest.mark.slow

@@ -26,11 +26,10 @@ from wristctl.config.wrist import TendonPlace, WristParameters
 from wristctl.errors import UserError
 from wristctl.records import Run
 from wristctl.rig import Facts, Limits, Lost, Sensor, Spread, Tendon, VirtualClock, WallClock
+from wristctl.trial.experiment import Experiment, log_of
 from wristctl.trial.guarded_rig import GuardedRig, RigStop
-from wristctl.trial.log import TrialLog
-from wristctl.trial.rig_belief import layout_of_rig, numbers_of
-from wristctl.trial.rig_experiment import RigExperiment
 from wristctl.trial.rig_settings import check_facts, rig_of, settings_of, wrist_of
+from wristctl.trial.rig_stand import RigStand
 from wristctl.trial.safety import SafetyStop
 from wristctl.trial.trials import Trial
 from wristctl.wrist.tendon_layout import TendonLayout
@@ -158,16 +157,13 @@ class _Tried:
         self.rig = namespace["RIG"]()
         self.folder = folder / "data"
         self.folder.mkdir()
-        tendons = numbers_of(layout_of_rig(self.settings, self.wrist))
-        self.log = TrialLog(
-            self.folder, None, self.settings.control_period, planes=self.settings.planes, tendons=tendons, wired=False
-        )
+        self.log = log_of(self.folder, self.settings, self.wrist)
         direction = self.settings.directions[0]
-        self.experiment = RigExperiment(self.settings, self.wrist, [Trial(0, direction, 0, 0.0, 0)], self.log)
+        self.experiment = Experiment(self.settings, self.wrist, [Trial(0, direction, 0, 0.0, 0)], self.log)
 
-    def run(self) -> RigExperiment:
+    def run(self) -> Experiment:
         try:
-            self.experiment.run(GuardedRig(self.rig, "my_rig.py:RIG"))
+            self.experiment.run(RigStand(GuardedRig(self.rig, "my_rig.py:RIG")))
         finally:
             self.log.close()
         return self.experiment

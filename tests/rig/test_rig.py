@@ -180,16 +180,24 @@ def steps() -> list[str]:
     return re.findall(r"^ {7,}wristctl (.+)$", text, re.MULTILINE)
 
 
+def typed_at(process: subprocess.Popen[str], question: str, answer: str) -> str:
+    """What a process has said until it asks this; it is answered."""
+    assert process.stdin is not None and process.stderr is not None
+    said = ""
+    while question not in said.lower():
+        assert select.select([process.stderr], [], [], 60.0)[0]
+        more = os.read(process.stderr.fileno(), 4096).decode()
+        assert more, said
+        said += more
+    process.stdin.write(answer)
+    process.stdin.flush()
+    return said
+
+
 def pressed_in_a_jog(command: str, served: Bridge) -> str:
     """The button, while the motor creeps."""
     process = wristctl(*command.split())
-    assert process.stdin is not None and process.stderr is not None
-    process.stdin.write("yes\n")
-    process.stdin.flush()
-    said = ""
-    while "type yes" not in said.lower():
-        assert select.select([process.stderr], [], [], 60.0)[0]
-        said += os.read(process.stderr.fileno(), 4096).decode()
+    said = typed_at(process, "type yes", "yes\n")
     time.sleep(0.5)  # drives settle for 0.2 s, and 3 mm take 0.5 s
     served.type("press")
     _, err = process.communicate(timeout=60.0)
@@ -260,6 +268,34 @@ def test_first_power_up_is_walked_from_flashing_to_the_first_motion(bridge: Call
         code, out, err = do(here(), "yes\nyes\n")
         assert code == 0 and "No trial ended early" in " ".join(out.split()), out + err
         assert next(walk, None) is None and served.alive
+
+
+@pytest.mark.parametrize("planes", [1, 2])
+def test_slack_is_taken_up_by_word_and_by_camera_and_ctrl_c_lets_the_drives_go(
+    bridge: Callable[..., Bridge], planes: int
+) -> None:
+    """In two planes the first camera is enough: each tendon bends the wrist in both."""
+    slack = "bench.motors.slack=[0.0003, 0.0003, 0.0009, 0.0003]"
+    sets = (f"planes={planes}", slack, "bench.camera.frame_rate=15", "bench.camera_2.frame_rate=15", "priority=true")
+    served = bridge(*(part for each in sets for part in ("--set", each)))
+    tension = f"hw tension --port {served.port} --set safety.watchdog=0.5"
+    with in_time(served):
+        code, out, err = do(f"{tension} --axis 1 --mm 0.2", "yes\nm\nquick\nm\n\n")
+        assert code == 0 and out == "axis 1: taut after 0.60 mm, and paid out by 0.6 mm\n", out + err
+        assert err.count("axis 1: 0.40 mm reeled in") == 2, "asked again"
+        code, out, err = do(f"{tension} --axis 2 --yes --camera {served.camera}")
+        taken_up = re.fullmatch(r"axis 2: taut after ([\d.]+) mm, and paid out by 0\.6 mm\n", out)
+        assert code == 0 and taken_up and 0.9 < float(taken_up[1]) < 1.6, out + err
+        process = wristctl(*tension.split(), "--axis", "3")
+        typed_at(process, "type yes", "yes\n")
+        typed_at(process, "axis 3: 0.10 mm", "m\n")
+        typed_at(process, "axis 3: 0.20 mm", "")
+        process.send_signal(signal.SIGINT)
+        out, err = process.communicate(timeout=30.0)
+        assert process.returncode == 130 and out == "", err
+        assert "interrupted: axis 3 is not done, and its drive lets go; go on: wristctl hw tension --axis 3" in err
+        code, out, err = do(f"hw check --port {served.port}")
+        assert code == 0 and re.search(r"state +DISABLED", out) and re.search(r"faults +none", out), out + err
 
 
 def test_hostile_bytes_at_full_rate_for_a_minute_do_not_end_the_bench(bridge: Callable[..., Bridge]) -> None:

@@ -19,11 +19,10 @@ from wristctl.rig import Tendon
 from wristctl.servos.dynamixel import DynamixelRig, Servo, ServoSettings
 from wristctl.servos.emulated import Emulated
 from wristctl.servos.servo_bench import SETTINGS
+from wristctl.trial.experiment import Experiment, log_of
 from wristctl.trial.guarded_rig import GuardedRig
-from wristctl.trial.log import TrialLog
-from wristctl.trial.rig_belief import layout_of_rig, numbers_of
-from wristctl.trial.rig_experiment import RigExperiment
 from wristctl.trial.rig_settings import settings_of, wrist_of
+from wristctl.trial.rig_stand import RigStand
 from wristctl.trial.trials import trials_of
 
 # Bend of each motion [deg].
@@ -81,11 +80,10 @@ def tried(
 
     rig.stop = noted  # type: ignore[method-assign]
     with tempfile.TemporaryDirectory() as scratch:
-        numbers = numbers_of(layout_of_rig(settings, wrist))
-        log = TrialLog(Path(scratch), None, settings.control_period, planes=2, tendons=numbers, wired=False)
-        experiment = RigExperiment(settings, wrist, trials_of(settings, np.random.default_rng(0)), log)
+        log = log_of(Path(scratch), settings, wrist)
+        experiment = Experiment(settings, wrist, trials_of(settings, np.random.default_rng(0)), log)
         try:
-            experiment.run(GuardedRig(rig, "servos"))
+            experiment.run(RigStand(GuardedRig(rig, "servos")))
             outcome = experiment.outcomes[0]
         except UserError as error:
             outcome = experiment.outcomes.get(0, f"before it: {error.what}")

@@ -15,10 +15,10 @@ from wristctl.bench.virtual_bench import VirtualBench
 from wristctl.board.driver import Board
 from wristctl.config.hw_run import HwRunSettings
 from wristctl.config.wrist import WristParameters
+from wristctl.trial.board_stand import BoardStand
 from wristctl.trial.calibration import WristCalibration
-from wristctl.trial.experiment import Experiment
+from wristctl.trial.experiment import Experiment, log_of
 from wristctl.trial.homing import Zero
-from wristctl.trial.log import TrialLog
 from wristctl.trial.testbeds import EmulatedTestbed
 from wristctl.trial.trials import trials_of
 from wristctl.vision.view import View
@@ -79,13 +79,12 @@ def experiment(tmp_path: Path, at_zero: WristCalibration) -> Run:
     ) -> Done:  # fmt: skip
         settings = settings_of(**changes)
         bench = VirtualBench(settings.bench, wrist, seed, settings.markers)
-        weighed = settings.load_cells is not None
-        log = TrialLog(tmp_path, settings.bench.segments, settings.control_period, weighed=weighed)
-        trials = trials_of(settings, np.random.default_rng(0))
-        performed = Experiment(settings, wrist, trials, log, calibration=at_zero, seed=seed)
+        log = log_of(tmp_path, settings, wrist)
+        performed = Experiment(settings, wrist, trials_of(settings, np.random.default_rng(0)), log)
+        stand = BoardStand(EmulatedTestbed(bench, settings, [View()], None), at_zero, seed)
         error = None
         try:
-            performed.run(EmulatedTestbed(bench, settings, [View()], None), shown)
+            performed.run(stand, shown)
         except BaseException as raised:
             error = raised
         log.close()

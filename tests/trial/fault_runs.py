@@ -24,11 +24,12 @@ from wristctl.config.hw_run import HwRunSettings
 from wristctl.config.study import Study
 from wristctl.config.wrist import WristParameters
 from wristctl.errors import UserError
+from wristctl.trial.board_stand import BoardStand
 from wristctl.trial.calibration import WristCalibration
-from wristctl.trial.experiment import Experiment
+from wristctl.trial.experiment import Experiment, log_of
 from wristctl.trial.homing import Zero
-from wristctl.trial.log import TrialLog
 from wristctl.trial.motion_limit import limited, peak_tension
+from wristctl.trial.motors_ready import Halt
 from wristctl.trial.testbeds import EmulatedTestbed
 from wristctl.trial.trials import trials_of
 from wristctl.vision.view import View
@@ -82,12 +83,13 @@ def _needed(settings: str, wrist: str, study: Study) -> float:
     return _NEEDED[settings, wrist]
 
 
-class _Watched(Experiment):
+class _Watched(BoardStand):
     decided = np.inf
 
-    def _stopped(self, testbed: Any, board: Board, error: BaseException) -> None:
-        self.decided = board.transport.now()
-        super()._stopped(testbed, board, error)
+    def stop(self, early: bool) -> Halt:
+        if early:
+            self.decided = self.now()
+        return super().stop(early)
 
 
 def perform(
@@ -104,13 +106,12 @@ def perform(
     def shown(row: dict[str, Any]) -> None:
         rows.append((row["trial"], row["clock"], row["theta_ref"], row["rate_ref"]))
 
-    folder, weighed = Path(tempfile.mkdtemp()), settings.load_cells is not None
-    log = TrialLog(folder, settings.bench.segments, settings.control_period, weighed=weighed)
-    trials = trials_of(settings, np.random.default_rng(0))
-    done = _Watched(settings, WRIST, trials, log, calibration=stored, seed=seed)
+    log = log_of(Path(tempfile.mkdtemp()), settings, WRIST)
+    done = Experiment(settings, WRIST, trials_of(settings, np.random.default_rng(0)), log)
+    stand = _Watched(EmulatedTestbed(bench, settings, [View()], None), stored, seed)
     reason, fix, code = "", "", 0
     try:
-        done.run(EmulatedTestbed(bench, settings, [View()], None), shown)
+        done.run(stand, shown)
     except UserError as raised:
         reason, fix, code = raised.what, str(raised.fix), raised.exit_code
     finally:
@@ -125,7 +126,7 @@ def perform(
     odd = "; ".join(words for words in done.odd.values() if words)
     return Course(
         start, truth.time, truth.angle, truth.across, truth.pull.max(axis=1), error,
-        min(done.decided, stopped) if reason else np.inf, max(steps, default=0.0), reason, fix, code, odd,
+        min(stand.decided, stopped) if reason else np.inf, max(steps, default=0.0), reason, fix, code, odd,
         told[np.abs(told[:, 3]) > 0.05, 1],
     )  # fmt: skip
 

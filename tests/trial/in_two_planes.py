@@ -11,10 +11,10 @@ from tests.trial.conftest import WRIST, Done
 from wristctl.bench.virtual_bench import VirtualBench
 from wristctl.board.driver import Board
 from wristctl.config.hw_run import HwRunSettings
+from wristctl.trial.board_stand import BoardStand
 from wristctl.trial.calibration import WristCalibration
-from wristctl.trial.experiment import Experiment
+from wristctl.trial.experiment import Experiment, log_of
 from wristctl.trial.homing import Zero
-from wristctl.trial.log import TrialLog
 from wristctl.trial.testbeds import EmulatedTestbed
 from wristctl.trial.trials import trials_of
 from wristctl.vision.view import View
@@ -52,11 +52,10 @@ def performed(folder: Path, seed: int = 0, zero: Zero = AT_ZERO, **changes: Any)
     settings = circling(**changes)
     nonce = Board(bench_of(settings).transport).connect().boot_nonce
     at_zero = WristCalibration(zero, "ulnar", nonce, (0, 0, 0, 0))
-    bench, log = bench_of(settings, seed), TrialLog(folder, 2 * settings.bench.segments, 1e-2, planes=2)
-    trials = trials_of(settings, np.random.default_rng(0))
-    experiment, error = Experiment(settings, WRIST, trials, log, calibration=at_zero, seed=seed), None
+    bench, log = bench_of(settings, seed), log_of(folder, settings, WRIST)
+    experiment, error = Experiment(settings, WRIST, trials_of(settings, np.random.default_rng(0)), log), None
     try:
-        experiment.run(EmulatedTestbed(bench, settings, [View(), View()], None))
+        experiment.run(BoardStand(EmulatedTestbed(bench, settings, [View(), View()], None), at_zero, seed))
     except BaseException as raised:
         error = raised
     log.close()

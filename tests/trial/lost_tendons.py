@@ -22,11 +22,10 @@ from tests.trial.fault_runs import Prepared, as_limited, forked
 from wristctl.bench.virtual_bench import VirtualBench
 from wristctl.board.messages import AXES
 from wristctl.config.bench import InjectedFault
-from wristctl.config.choices import PLANTS
 from wristctl.config.hw_run import HwRunSettings
 from wristctl.errors import UserError
-from wristctl.trial.experiment import Experiment
-from wristctl.trial.log import TrialLog
+from wristctl.trial.board_stand import BoardStand
+from wristctl.trial.experiment import Experiment, log_of
 from wristctl.trial.testbeds import EmulatedTestbed
 from wristctl.trial.trials import trials_of
 from wristctl.vision.view import View
@@ -69,11 +68,10 @@ def performed(motion: str, prepared: Prepared) -> Ended:
     )
     bench = VirtualBench(settings.bench, WRIST, 0, settings.markers, settings.markers_2)
     prepared(bench)
-    coordinates = 2 * PLANTS[settings.bench.plant.model].coordinates(settings.bench.segments)
-    log = TrialLog(Path(tempfile.mkdtemp()), coordinates, settings.control_period, planes=2)
+    log = log_of(Path(tempfile.mkdtemp()), settings, WRIST)
     done = Experiment(settings, WRIST, trials_of(settings, np.random.default_rng(0)), log)
     try:
-        done.run(EmulatedTestbed(bench, settings, [View(), View()], None))
+        done.run(BoardStand(EmulatedTestbed(bench, settings, [View(), View()], None)))
     except UserError:
         pass
     finally:

@@ -18,11 +18,10 @@ import numpy as np
 from tests.trial.conftest import WRIST
 from tests.trial.fault_runs import as_limited
 from wristctl.bench.virtual_bench import VirtualBench, VirtualCamera
-from wristctl.config.choices import PLANTS
 from wristctl.config.hw_run import HwRunSettings
 from wristctl.errors import UserError
-from wristctl.trial.experiment import Experiment
-from wristctl.trial.log import TrialLog
+from wristctl.trial.board_stand import BoardStand
+from wristctl.trial.experiment import Experiment, log_of
 from wristctl.trial.testbeds import EmulatedTestbed
 from wristctl.trial.trials import trials_of
 from wristctl.vision.camera import Frame, Image
@@ -138,12 +137,11 @@ def performed(spoil: Spoil | None, planes: int = 1, **bench: Any) -> tuple[str, 
     made = VirtualBench(settings.bench, WRIST, 0, settings.markers, settings.markers_2 if planes == 2 else None)
     if spoil is not None:
         made.cameras = tuple(Spoiled(made, number, spoil) for number in range(planes))
-    coordinates = planes * PLANTS[settings.bench.plant.model].coordinates(settings.bench.segments)
     with tempfile.TemporaryDirectory() as folder:
-        log = TrialLog(Path(folder), coordinates, settings.control_period, planes=planes)
+        log = log_of(Path(folder), settings, WRIST)
         done = Experiment(settings, WRIST, trials_of(settings, np.random.default_rng(0)), log)
         try:
-            done.run(EmulatedTestbed(made, settings, [View(), View()], None))
+            done.run(BoardStand(EmulatedTestbed(made, settings, [View(), View()], None)))
         except UserError:
             pass
         finally:

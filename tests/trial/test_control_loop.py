@@ -16,7 +16,7 @@ from tests.trial.conftest import WRIST, settings_of
 from tests.trial.rig import Marker, RigBoard
 from wristctl.board.messages import Fault, Flag, State
 from wristctl.control.table import controller
-from wristctl.trial.control_loop import ControlLoop
+from wristctl.trial.control_loop import AtZero, ControlLoop
 from wristctl.trial.drives import BoardDrive
 from wristctl.trial.log import TrialLog
 from wristctl.trial.motions import at_rest, back
@@ -48,7 +48,7 @@ class Rig:
         self.at_rest: list[dict[str, Any]] = []
         chosen = settings_of(**{"control_period": PERIOD, **settings})
         drive = BoardDrive(board, chosen, signs)
-        self.loop = ControlLoop(drive, marker, chosen, WRIST, "ulnar", self.timing, self.log, self._shown)
+        self.loop = ControlLoop(AtZero(drive, marker, "ulnar"), chosen, WRIST, self.timing, self.log, self._shown)
 
     def _shown(self, row: dict[str, Any]) -> None:
         """A tick of a motion, or one behind it, in which no law is asked."""

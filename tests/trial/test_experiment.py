@@ -11,16 +11,14 @@ import numpy as np
 import pytest
 
 from tests.trial.conftest import WRIST, Run, settings_of
-from wristctl.board.driver import Board
 from wristctl.board.messages import State
 from wristctl.errors import UserError
-from wristctl.trial.experiment import Experiment
-from wristctl.trial.homing import slacken
-from wristctl.trial.log import TrialLog, tick_columns
+from wristctl.trial.control_loop import AtZero
+from wristctl.trial.experiment import Experiment, log_of, spared
+from wristctl.trial.log import tick_columns
 from wristctl.trial.safety import SafetyStop
-from wristctl.trial.trial_series import spared
 from wristctl.trial.trials import trials_of
-from wristctl.trial.zero_checks import check_zero
+from wristctl.trial.zero_checks import HomedWrist
 
 NAMES = "log", "between", "frames", "residuals", "truth", "wire"
 
@@ -139,22 +137,22 @@ def test_the_same_seed_gives_the_same_bytes(experiment: Run) -> None:
 def test_a_stored_zero_is_checked_on_a_wrist_that_has_had_time_to_straighten(
     experiment: Run, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    times: list[float] = []
+    times, slacken, check_zero = list[tuple[str, float]](), HomedWrist.slacken, HomedWrist.check_zero
 
-    def slackened(board: Board, *given: Any) -> Any:
-        position = slacken(board, *given)
-        times.append(board.transport.now())
-        return position
+    def slackened(homed: HomedWrist, *given: float) -> None:
+        slacken(homed, *given)
+        times.append(("slack", homed._board.transport.now()))
 
-    def checked(board: Board, *given: Any) -> tuple[float, ...]:
-        times.append(board.transport.now())
-        return check_zero(board, *given)
+    def checked(homed: HomedWrist) -> tuple[float, ...]:
+        times.append(("check", homed._board.transport.now()))
+        return check_zero(homed)
 
-    monkeypatch.setattr("wristctl.trial.experiment.slacken", slackened)
-    monkeypatch.setattr("wristctl.trial.experiment.check_zero", checked)
+    monkeypatch.setattr(HomedWrist, "slacken", slackened)
+    monkeypatch.setattr(HomedWrist, "check_zero", checked)
     done = experiment()
-    assert done.error is None and len(times) == 2
-    assert times[1] - times[0] >= settings_of().homing.let_go > 0.0
+    (slack, since), (check, then), *after = times
+    assert done.error is None and (slack, check) == ("slack", "check") and all(name == "slack" for name, _ in after)
+    assert then - since >= settings_of().homing.let_go > 0.0
 
 
 @pytest.mark.slow
@@ -162,15 +160,17 @@ def test_the_zero_of_a_further_plane_is_what_its_checks_find(experiment: Run, mo
     seen: list[tuple[float, ...]] = []
     at_rest = Experiment._at_rest
 
-    def resting(performed: Experiment, board: Board, tracking: Any, *given: Any) -> Any:
-        seen.append(tracking.zero)
-        return at_rest(performed, board, tracking, *given)
+    def resting(performed: Experiment, ready: AtZero, *given: Any) -> Any:
+        seen.append(ready.tracking.zero)
+        return at_rest(performed, ready, *given)
 
-    def checked(*given: Any) -> tuple[float, ...]:
-        return (check_zero(*given)[0] + 0.01,)
+    check_zero = HomedWrist.check_zero
+
+    def checked(homed: HomedWrist) -> tuple[float, ...]:
+        return (check_zero(homed)[0] + 0.01,)
 
     monkeypatch.setattr(Experiment, "_at_rest", resting)
-    monkeypatch.setattr("wristctl.trial.experiment.check_zero", checked)
+    monkeypatch.setattr(HomedWrist, "check_zero", checked)
     done = experiment(directions=("ulnar", "flexion"))
     assert done.error is None and len(seen) >= 3
     assert seen[0] == (0.0,), "the calibration's"
@@ -183,10 +183,10 @@ def test_a_loop_in_one_plane_knows_the_springs_of_that_plane_and_one_in_two_the_
 ) -> None:
     wrist = WRIST.model_copy(update={"flexion_ratio": 1.4, "gravity_flexion": -3.0})
     settings = settings_of(planes=planes)
-    trials, log = trials_of(settings, np.random.default_rng(0)), TrialLog(tmp_path, None, settings.control_period)
+    trials, log = trials_of(settings, np.random.default_rng(0)), log_of(tmp_path, settings, wrist)
     own = Experiment(settings, wrist, trials, log)
     log.close()
-    ulnar, flexion = own._facing("ulnar"), own._facing("flexion")
+    ulnar, flexion = (own._facing(plane if planes == 1 else "") for plane in ("ulnar", "flexion"))
     assert ulnar.stiffness == WRIST.stiffness and ulnar.gravity[1] == WRIST.gravity[1]
     assert flexion.stiffness == pytest.approx((1.4 if planes == 1 else 1.0) * WRIST.stiffness)
     assert flexion.gravity[1] == (-3.0 if planes == 1 else WRIST.gravity[1])
@@ -212,7 +212,7 @@ def test_zero_is_found_anew_by_a_calibrations_senses_unless_its_positions_are_st
         senses.append(given[-1])
         raise SafetyStop("far enough", fix="none")
 
-    monkeypatch.setattr("wristctl.trial.experiment.find_zero", found)
+    monkeypatch.setattr("wristctl.trial.board_stand.find_zero", found)
     done = experiment(positions="find")
     assert isinstance(done.error, SafetyStop) and senses == [at_zero.zero.signs]
 

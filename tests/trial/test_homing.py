@@ -10,25 +10,25 @@ import pytest
 from tests.trial.conftest import WRIST, settings_of
 from wristctl.bench.virtual_bench import VirtualBench
 from wristctl.board.driver import Board
-from wristctl.config.hw_run import RigSettings
+from wristctl.config.hw_run import HwRunSettings
 from wristctl.trial.expected_moves import ExpectedMoves
 from wristctl.trial.homing import Zero, find_zero
 from wristctl.trial.motors_ready import prepare
 from wristctl.trial.safety import SafetyStop
 from wristctl.trial.testbeds import EmulatedTestbed
 from wristctl.trial.tracking import Tracking
-from wristctl.trial.zero_checks import check_zero
+from wristctl.trial.zero_checks import HomedWrist
 from wristctl.vision.view import View
 
 QUICK = {"move": 1e-4, "rest": 0.15, "frames": 2, "slack": 8e-4, "let_go": 1.0}
 SLACK = (3e-4, 2e-4, 4e-4, 2.5e-4)
 
 
-def settings_with(plant: dict[str, Any] | None = None, **motors: Any) -> RigSettings:
+def settings_with(plant: dict[str, Any] | None = None, **motors: Any) -> HwRunSettings:
     return settings_of(homing=QUICK, bench={"motors": {"slack": SLACK, **motors}, "plant": plant or {}})
 
 
-def rig_of(settings: RigSettings) -> tuple[VirtualBench, Board, Tracking]:
+def rig_of(settings: HwRunSettings) -> tuple[VirtualBench, Board, Tracking]:
     bench = VirtualBench(settings.bench, WRIST, 0)
     board = Board(bench.transport)
     board.connect()
@@ -63,7 +63,7 @@ def test_friction_inside_the_wrist_turns_no_bend_aside(friction: float) -> None:
     assert zero.slack == pytest.approx(SLACK, abs=5e-5 + 2.5e-2 * friction)
     bench.face("flexion")
     tracking.zero = (0.0,)
-    check_zero(board, tracking, settings, WRIST, "flexion", zero)
+    HomedWrist(board, tracking, settings, WRIST, "flexion", zero).check_zero()
 
 
 @pytest.mark.slow

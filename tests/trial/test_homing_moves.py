@@ -22,7 +22,7 @@ from wristctl.trial.expected_moves import Bend, ExpectedMoves
 from wristctl.trial.homing import Zero, find_zero, slacken
 from wristctl.trial.safety import SafetyStop
 from wristctl.trial.spools import on_plus_side, spools_of
-from wristctl.trial.zero_checks import check_cocontraction, check_zero
+from wristctl.trial.zero_checks import HomedWrist
 from wristctl.wrist.directions import ACTIVE, away_of
 
 SPOOLS = spools_of(Actuator(level="tendon"))
@@ -207,10 +207,10 @@ def test_a_tendon_that_is_still_taut_where_all_are_slackened_is_found(short: int
     zero = Zero(signs, tuple(PER_RADIAN), (GLUED,), (0.0,) * 4)
     slacken(board, SPOOLS, settings.homing, signs)
     if not refused:
-        check_zero(board, tracking, settings, WRIST, "ulnar", zero)
+        HomedWrist(board, tracking, settings, WRIST, "ulnar", zero).check_zero()
         return
     with pytest.raises(SafetyStop, match=r"a slackened wrist still moved by .* when it was slackened further"):
-        check_zero(board, tracking, settings, WRIST, "ulnar", zero)
+        HomedWrist(board, tracking, settings, WRIST, "ulnar", zero).check_zero()
 
 
 @pytest.mark.parametrize("plane", ["ulnar", "flexion"])
@@ -238,12 +238,32 @@ def test_tendons_that_pull_against_each_other_bend_a_wrist_whose_one_side_is_let
     assert angle() == pytest.approx(GLUED)
     if refused:
         with pytest.raises(SafetyStop, match="tendons pull against each other") as stopped:
-            check_cocontraction(board, tracking, settings, WRIST, plane, zero)
+            HomedWrist(board, tracking, settings, WRIST, plane, zero).check_cocontraction()
         assert stopped.value.exit_code == 5
     else:
-        check_cocontraction(board, tracking, settings, WRIST, plane, zero)
+        HomedWrist(board, tracking, settings, WRIST, plane, zero).check_cocontraction()
     slack = round(settings.homing.pull / SPOOLS.step)
     assert board.position.tolist() == [-slack * sign for sign in signs]
+
+
+@pytest.mark.parametrize("share", [0.95, 1.05, -0.95, -1.05])
+def test_a_slack_wrist_that_rests_further_off_than_its_slack_lets_it_is_refused(share: float) -> None:
+    """Rigid tendons that are let out by `homing.pull` let it bend so far; it is slack then, refused or not."""
+    board: Any = Slackened()
+    rig: Any = settings_of(homing={"frames": 1, "rest": 0.0})
+    held = rig.homing.pull / (ExpectedMoves(rig, WRIST, "ulnar").steps(math.inf) * SPOOLS.step)
+    marker: Any = Marker(board, lambda: GLUED + share * held)
+    marker.zero = (GLUED,)
+    homed = HomedWrist(board, marker, rig, WRIST, "ulnar", Zero((1, -1, 1, 1), tuple(PER_RADIAN), (GLUED,), (0.0,) * 4))
+    if abs(share) < 1.0:
+        homed.check_straight("my_rig.py:RIG")
+    else:
+        off = math.degrees(abs(share) * held)
+        with pytest.raises(SafetyStop, match=rf"rests {off:.1f} deg off where it was straight") as stopped:
+            homed.check_straight("my_rig.py:RIG")
+        assert stopped.value.where == "my_rig.py:RIG"
+    slack = round(rig.homing.pull / SPOOLS.step)
+    assert board.position.tolist() == [-slack, slack, -slack, -slack]
 
 
 @pytest.mark.parametrize("plane", ["ulnar", "flexion"])
@@ -319,14 +339,16 @@ def test_a_wrist_that_stays_bent_passes_its_checks_and_a_dead_motor_does_not(
     slack = round(Homing().pull / SPOOLS.step)
     board.position[:] = -slack
     zero = Zero((1,) * 4, tuple(PER_RADIAN), (GLUED,), (0.0,) * 4)
-    straight = check_zero(board, Marker(board, angle), rig, WRIST, plane, zero)  # type: ignore[arg-type]
+    marker: Any = Marker(board, angle)
+    straight = HomedWrist(board, marker, rig, WRIST, plane, zero).check_zero()
     assert straight == pytest.approx((GLUED,), abs=math.radians(0.05))
     furthest = min(min(where) for _, where, _ in board.told)
     assert furthest == -2 * slack, "a motor that is wired the other way round reels in what is let out"
     for dead in range(4):
         board.position[:] = -slack
         with pytest.raises(SafetyStop, match=rf"axis {dead} .* bends the wrist by"):
-            check_zero(board, Marker(board, partial(angle, dead)), rig, WRIST, plane, zero)  # type: ignore[arg-type]
+            marker = Marker(board, partial(angle, dead))
+            HomedWrist(board, marker, rig, WRIST, plane, zero).check_zero()
 
 
 def test_a_wrist_that_stays_bent_may_hold_its_tendons_longer() -> None:
@@ -353,7 +375,7 @@ def test_steps_per_radian_are_the_models_but_for_what_soft_tendons_add(share: fl
     if not refused:
         assert wrist.homed().steps_per_radian == pytest.approx([share * steps] * 4)
         return
-    with pytest.raises(SafetyStop, match=rf"{share:.2f} times what the model says .* wrong microsteps"):
+    with pytest.raises(SafetyStop, match=rf"{share:.2f} times what the model says .* wrong pulley or microsteps"):
         wrist.homed()
 
 

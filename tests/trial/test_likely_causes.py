@@ -8,8 +8,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from wristctl.trial.likely_causes import Evidence, likely_causes, parts_of_board, parts_of_rig
+from wristctl.trial.likely_causes import Evidence, likely_causes
 from wristctl.trial.rig_belief import PLANES, pull_directions
+from wristctl.trial.rig_words import words_of_board, words_of_rig
 from wristctl.wrist.directions import ACTIVE, away_from_camera, away_of
 
 
@@ -20,8 +21,8 @@ def of(planes: tuple[str, ...] = PLANES, own: bool = False, **seen: Any) -> list
     nothing: dict[str, Any] = {name: np.zeros(2) for name in ("load", "apart", "across", "bent", "meant")}
     nothing |= {"turned": np.zeros(count), "torque": np.full(count, 1.0), "jump": np.zeros(len(planes))}
     numbers = tuple(range(1, count + 1)) if own else ACTIVE
-    parts = (parts_of_rig if own else parts_of_board)(numbers, planes)
-    return likely_causes(Evidence(**{**nothing, "bends": math.radians(1.0), **seen}, parts=parts))
+    words = (words_of_rig if own else words_of_board)(numbers, planes)
+    return likely_causes(Evidence(**{**nothing, "bends": math.radians(1.0), **seen}, words=words))
 
 
 def in_one(plane: str = "ulnar", positive: str = "right", own: bool = False, **seen: Any) -> list[str]:

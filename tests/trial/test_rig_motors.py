@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -14,10 +14,12 @@ from wristctl.rig import Clock, Drive, Facts, Limits, Look, Sensor, Tendon, Virt
 from wristctl.trial.expected_moves import Bend, ExpectedMoves
 from wristctl.trial.guarded_rig import GuardedRig
 from wristctl.trial.rig_drive import RigTracking
-from wristctl.trial.rig_homing import RigHoming
 from wristctl.trial.rig_motors import RigMotors
+from wristctl.trial.rig_settings import wrist_of
+from wristctl.trial.rig_stand import RigStand
 from wristctl.trial.safety import SafetyStop
 from wristctl.trial.supervised_wait import Patience
+from wristctl.trial.trials import Trial
 from wristctl.wrist.directions import OPPOSITE_AXES
 from wristctl.wrist.tendon_layout import TendonLayout, TendonPlace
 
@@ -183,12 +185,14 @@ def test_a_sensor_that_scatters_is_refused_where_a_reading_errs_by_two_fifths_of
     scatter_deg: float, refused: bool
 ) -> None:
     """Readings are of one look here, and 0.5 deg is a bend."""
-    motors, guarded = motors_of(rig := Scattering(scatter_deg))
-    layout = TendonLayout((TendonPlace(0.0, 0.02), TendonPlace(math.pi, 0.02)))
-    settings: Any = settings_of(planes=1)
+    guarded = GuardedRig(rig := Scattering(scatter_deg), "my_rig.py:RIG")
+    settings: Any = settings_of(planes=1).model_copy(update={"rig": "my_rig.py:RIG"})
     assert (settings.homing.frames, settings.homing.bend_deg) == (1, 0.5)
+    stand, log = RigStand(guarded), cast(Any, None)
+    stand.open(settings, wrist_of(rig.facts, WRIST, "my_rig.py:RIG"), log)
+    assert not rig.sent, "nothing is told to a rig that is not connected"
     with pytest.raises(SafetyStop) as stop:
-        RigHoming(motors, RigTracking(guarded), settings, WRIST, layout, "my_rig.py:RIG").find()
+        stand.ready(Trial(0, "ulnar", 0, 0.0, 0), None)
     assert ("unsteadily" in str(stop.value)) is refused
     stood = bool(np.ptp([targets for _, targets in rig.sent], axis=0).max() == 0.0)
     assert stood is refused, "nothing is moved by what cannot be seen"

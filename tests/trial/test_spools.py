@@ -30,7 +30,7 @@ SPOOLS, BELIEF = spools_of(ACTUATOR), RigBelief(WRIST, ACTUATOR, ("ulnar",))
 @kernel
 def _follow(drive: Any, state: Any, targets: Any, moving: float, h: float, out: Any) -> None:
     spools, rows = drive_in_lanes(drive), rows_of(state)
-    rates = part(rows, 4, drive.rates)
+    rates = part(rows, 4, drive.sent)
     for tick in range(len(targets)):
         now = rows_of(out[tick])
         now[2], _ = reel_in(spools, rows, rates, 0, targets[tick] + zero_like(rows[0]), moving + zero_like(rows[0]), h)
@@ -113,10 +113,10 @@ def test_a_trial_and_a_simulation_send_the_same_rates_and_see_the_same_spool(per
     rng, moving = np.random.default_rng(seed), 400.0
     targets = moving * period * np.arange(60.0) + rng.uniform(-30.0, 30.0, 60)
     drive, out = drive_of(ACTUATOR, (1.0,), period), np.zeros((60, 4))
-    state = np.zeros(4 + len(drive.rates))  # type: ignore[union-attr]
+    state = np.zeros(4 + len(drive.sent))  # type: ignore[union-attr]
     _follow(drive, state, targets * SPOOLS.step, moving * SPOOLS.step, period, out)
     out /= SPOOLS.step
-    rates = np.zeros((1, len(drive.rates)))  # type: ignore[union-attr]
+    rates = np.zeros((1, len(drive.sent)))  # type: ignore[union-attr]
     for target, (place, rate, believed, true) in zip(targets, out, strict=True):
         gap = target + moving * SPOOLS.timing.delay - SPOOLS.foreseen(np.array([place]), rates, period)
         sent = SPOOLS.rate(gap, np.array([moving]), rates[:, 0], period)

@@ -140,13 +140,20 @@ def test_a_loop_is_stopped_by_pulls_that_last_and_says_which_tendons() -> None:
             watch.judge(at)
     assert at.clock == pytest.approx(SETTINGS.safety.odd_for * 10.0 / 15.0, abs=0.011)
     assert "against each other" in stopped.value.what and "tendon 5" in stopped.value.what
+    assert stopped.value.fix.startswith("cut the motors' supply"), "no cause is said twice"
 
 
 def test_a_standing_wrist_is_judged_by_its_load_cells_too() -> None:
     still = np.zeros(4)
     watching((9.0,) * 4).standing(np.zeros(1), still, still, 0.0)
-    with pytest.raises(SafetyStop, match=r"11 N more than its spool explains.*against each other"):
+    with pytest.raises(SafetyStop, match=r"11 N more than its spool explains.*against each other") as stopped:
         watching((11.0,) * 4).standing(np.zeros(1), still, still, 0.0)
+    assert stopped.value.fix.startswith("cut the motors' supply"), "no cause is said twice"
+    with pytest.raises(SafetyStop, match=r"a load cell for .*the amplifier of axis 2") as silent:
+        Watch(SETTINGS, WRIST, "ulnar", TickTiming(0.01), 0.0, pulls_of((1.0,) * 4, age=(0.0, 0.0, 9.0, 0.0))).standing(
+            np.zeros(1), still, still, 0.0
+        )
+    assert "see its plugs" in silent.value.fix
 
 
 WITH_CELLS: dict[str, Any] = {"load_cells": {}, "horizon": 0.6}

@@ -26,7 +26,7 @@ def loaded():
 def on(self):
     before.append(loaded())
     enable(self)
-def off(self):
+def off(self, emergency=False):
     kernels, modules = loaded()
     late = [name for name, count in kernels.items() if count != before[0][0].get(name, 0)]
     print(json.dumps([sum(kernels.values()), late + [each for each in modules - before[0][1]]]), flush=True)

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, closing, contextmanager
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -115,7 +116,8 @@ def slacken(
 
 def tension(
     axis: Annotated[
-        int | None, typer.Option("--axis", min=0, max=3, help="This axis alone, 0 to 3; without it all, one by one.")
+        int | None,
+        typer.Option("--axis", min=0, max=3, help="This axis alone, 0 to 3, of tendons 1, 2, 4, 5; without it all."),
     ] = None,
     mm: Annotated[float, typer.Option("--mm", min=0.02, max=1.0, help="Tendon to reel in by one move.")] = 0.1,
     camera: Annotated[
@@ -135,7 +137,6 @@ def tension(
         if connected is None:
             return
         from wristctl.trial.by_hand import bent_by_tendon, take_up
-        from wristctl.trial.supervised_wait import Patience
         from wristctl.trial.tracking import ThreadedTracking
         from wristctl.vision.device_camera import DeviceCamera
         from wristctl.vision.marker import Tracker
@@ -143,22 +144,36 @@ def tension(
 
         board, study, signs = connected
         settings = study.calibrate_wrist
-
-        def told(reeled: float) -> bool:
-            typer.echo(
-                f"{1e3 * reeled:.2f} mm reeled in. m and Enter for more, Enter where it is taut: ", nl=False, err=True
-            )
-            return typed_line(Patience(board).pulse).strip() != "m"
-
         if camera is not None:
             eye = opened.enter_context(closing(DeviceCamera(camera, settings.device)))
             tracking = opened.enter_context(
                 closing(ThreadedTracking(eye, Tracker(settings.markers, View(), settings.gates)))
             )
         for one in axes:
-            taut = told if camera is None else bent_by_tendon(board, tracking, settings, study.wrist, settings.plane)
-            length = take_up(board, settings, signs, one, _length(str(mm)), taut)
+            try:
+                taut: Callable[[float], bool] = partial(_says_taut, board, one)
+                if camera is not None:
+                    taut = bent_by_tendon(board, tracking, settings, study.wrist, settings.plane)
+                length = take_up(board, settings, signs, one, _length(str(mm)), taut)
+            except KeyboardInterrupt:
+                again = f"wristctl hw tension --axis {one}"
+                typer.echo(f"\ninterrupted: axis {one} is not done, and its drive lets go; go on: {again}", err=True)
+                raise
             print(f"axis {one}: taut after {1e3 * length:.2f} mm, and paid out by {1e3 * settings.homing.pull:g} mm")
+
+
+def _says_taut(board: Board, axis: int, reeled: float) -> bool:
+    """Whether the person says that a tendon is taut which has been reeled in so far [m]; UserError without a person."""
+    from wristctl.trial.supervised_wait import Patience
+
+    answer, ended = "m and Enter for more, Enter where it is taut", "\x04"
+    while True:
+        typer.echo(f"axis {axis}: {1e3 * reeled:.2f} mm reeled in. {answer}: ", nl=False, err=True)
+        typed = typed_line(Patience(board).pulse, ended).strip()
+        if typed == ended:
+            raise UserError("nobody says whether the tendon is taut", f"axis {axis}", f"{answer}; or --camera", 3)
+        if typed in ("", "m"):
+            return not typed
 
 
 def clear(port: Port = None, baud: Baud = BAUD, dry_run: Dry = False, yes: Yes = False, debug: Debug = False) -> None:

@@ -27,15 +27,15 @@ if TYPE_CHECKING:
 _MOMENT = 0.02
 
 
-def typed_line(meanwhile: Meanwhile) -> str:
-    """The next line of stdin, its end cut off; empty where stdin has ended.
+def typed_line(meanwhile: Meanwhile, ended: str = "") -> str:
+    """The next line of stdin, its end cut off; `ended` where stdin has ended.
 
     `meanwhile` is called until the line is there, and may raise: reading never waits, not even for half a line.
     """
     try:
         stdin = sys.stdin.fileno()
     except (io.UnsupportedOperation, ValueError):  # no file of the system: what is in it has come already
-        return sys.stdin.readline().rstrip("\r\n")
+        return (sys.stdin.readline() or ended).rstrip("\r\n")
     typed = bytearray()
     while not typed.endswith(b"\n"):
         if not select.select([stdin], [], [], 0.0)[0]:
@@ -44,7 +44,7 @@ def typed_line(meanwhile: Meanwhile) -> str:
             typed += byte
         else:
             break
-    return typed.decode(errors="replace").rstrip("\r\n")
+    return typed.decode(errors="replace").rstrip("\r\n") if typed else ended
 
 
 def idle() -> None:

@@ -181,7 +181,7 @@ def check_rig(
     from wristctl.cli.operator import TerminalOperator
     from wristctl.cli.progress import listening
     from wristctl.commands.rig_certificate import Certificate, RigCheck
-    from wristctl.trial.rig_experiment import BEFORE_MOTION
+    from wristctl.trial.rig_stand import BEFORE_MOTION
 
     checks: list[RigCheck] = []
     with asking(partial(asked_to_trust, trust_code)), listening(as_json, False) as console:

@@ -18,14 +18,14 @@ from wristctl.config.wrist import WristParameters
 from wristctl.errors import UserError
 from wristctl.plugins.places import load
 from wristctl.rig import Clock, Facts, Fault, Rig
+from wristctl.trial.experiment import Experiment, log_of, spared
 from wristctl.trial.guarded_rig import GuardedRig, RigStop
 from wristctl.trial.log import TrialLog
 from wristctl.trial.motion_limit import LEAST
-from wristctl.trial.rig_belief import layout_of_rig, numbers_of
+from wristctl.trial.rig_belief import layout_of_rig
 from wristctl.trial.rig_checks import RigTrier, said
-from wristctl.trial.rig_experiment import RigExperiment
 from wristctl.trial.rig_settings import rig_of
-from wristctl.trial.trial_series import spared
+from wristctl.trial.rig_stand import RigStand
 from wristctl.trial.trials import Trial
 
 # Bend of the trial that is tried [deg], its duration [s], and ticks after which it is interrupted.
@@ -169,7 +169,7 @@ def _interrupted(rig: GuardedRig, study: Study) -> tuple[bool | None, str]:
     interrupting = _Interrupting(rig.rig, _INTERRUPTED)
     with _experiment(study) as (experiment, _):
         try:
-            experiment.run(GuardedRig(interrupting, rig.where))
+            experiment.run(RigStand(GuardedRig(interrupting, rig.where)))
         except KeyboardInterrupt:
             stop = experiment.stop
             assert stop is not None
@@ -180,16 +180,15 @@ def _interrupted(rig: GuardedRig, study: Study) -> tuple[bool | None, str]:
 
 
 @contextmanager
-def _experiment(study: Study) -> Iterator[tuple[RigExperiment, TrialLog]]:
+def _experiment(study: Study) -> Iterator[tuple[Experiment, TrialLog]]:
     """A short trial, and its log in a folder that is deleted in the end."""
     reference = study.hw_run.reference.model_copy(update={"angle_deg": _BEND_DEG})
     directions = study.hw_run.directions[:1]
     settings = study.hw_run.model_copy(update={"reference": reference, "horizon": _HORIZON, "directions": directions})
-    tendons, period = numbers_of(layout_of_rig(settings, study.wrist)), settings.control_period
     with tempfile.TemporaryDirectory(prefix="wristctl-check-") as scratch:
-        log = TrialLog(Path(scratch), None, period, planes=settings.planes, tendons=tendons, wired=False)
+        log = log_of(Path(scratch), settings, study.wrist)
         try:
-            yield RigExperiment(settings, study.wrist, [Trial(0, directions[0], 0, 0.0, 0)], log), log
+            yield Experiment(settings, study.wrist, [Trial(0, directions[0], 0, 0.0, 0)], log), log
         finally:
             log.close()
 
@@ -197,7 +196,7 @@ def _experiment(study: Study) -> Iterator[tuple[RigExperiment, TrialLog]]:
 def _trial(rig: GuardedRig, study: Study) -> tuple[bool, str]:
     """A trial of a small bend: homed, followed, and back."""
     with _experiment(study) as (experiment, log):
-        experiment.run(rig)
+        experiment.run(RigStand(rig))
     late = max(experiment.timing.late)
     odd = f"; odd: {experiment.odd[0]}" if experiment.odd.get(0) else ""
     error = max(abs(value) for row in log.last for name, value in row.items() if name.startswith("error"))

@@ -72,25 +72,37 @@ def _sent_to(remembered: Any, state: Any, places: int, planes: int, t: int) -> A
     return part(state, 2 * (places + planes) + len(remembered) * t, remembered)
 
 
+@by_type
+def wind(drive: Any, state: Any, sent: Any, t: int, target: Any, moving: Any, h: float) -> Any:
+    """Lead the motor of a place to its moving target, by what was `sent` to it, the newest first.
+
+    Returns the place where its host believes it to be in the middle of the period, or its mean over it, and the pull
+    that is withheld.
+    """
+    raise NotImplementedError("compiled code only")
+
+
+@implements(wind, SpoolDrive)
 @compiled
-def reel_in(drive: Any, state: Any, rates: Any, t: int, target: Any, moving: Any, h: float) -> Any:
+def reel_in(drive: Any, state: Any, sent: Any, t: int, target: Any, moving: Any, h: float) -> Any:
     """Send a rate, of bounded speed and acceleration, that leads the spool of a place to its moving target.
 
     Returns the place where its host believes it to be in the middle of the period, and its withheld pull: of the length
     from where it can stop to its target, where that is more than a microstep.
     """
     motor, believed = drive.motor, drive.believed
-    state[2 * t], state[2 * t + 1] = reached(motor, state[2 * t], state[2 * t + 1], rates, h)
-    gap = target + rounded(moving * believed.delay) - foreseen(believed, state[2 * t], rates, h)
-    speed = spool_speed(motor.speed, motor.acceleration, gap, moving, rates[0], h)
-    remember(rates, speed)
+    state[2 * t], state[2 * t + 1] = reached(motor, state[2 * t], state[2 * t + 1], sent, h)
+    gap = target + rounded(moving * believed.delay) - foreseen(believed, state[2 * t], sent, h)
+    speed = spool_speed(motor.speed, motor.acceleration, gap, moving, sent[0], h)
+    remember(sent, speed)
     behind = left_behind(motor.acceleration, gap, speed - moving, h)
     withheld = where(abs(behind) > motor.step + _ROUNDING, drive.stiffness[t] * behind, 0.0)
-    return reckoned(believed, state[2 * t], rates, 0.5 * h + zero_like(gap), h), withheld
+    return reckoned(believed, state[2 * t], sent, 0.5 * h + zero_like(gap), h), withheld
 
 
+@implements(wind, ServoDrive)
 @compiled
-def lead_on(drive: Any, state: Any, targets: Any, t: int, target: Any, moving: Any, h: float) -> Any:
+def lead_on(drive: Any, state: Any, sent: Any, t: int, target: Any, moving: Any, h: float) -> Any:
     """Send a target that leads the motor of a place to its moving target, ahead of it by delay, lag and half a period.
 
     Returns the mean of the place over the period by its host's belief, which steps within it, and the pull that is
@@ -98,14 +110,14 @@ def lead_on(drive: Any, state: Any, targets: Any, t: int, target: Any, moving: A
     """
     motor, believed = drive.motor, drive.believed
     tick = h + zero_like(target)
-    state[2 * t], _, _ = motor_at(motor, state[2 * t], targets, tick, h)
-    state[2 * t + 1], _, _ = motor_at(believed, state[2 * t + 1], targets, tick, h)
+    state[2 * t], _, _ = motor_at(motor, state[2 * t], sent, tick, h)
+    state[2 * t + 1], _, _ = motor_at(believed, state[2 * t + 1], sent, tick, h)
     wanted = target + rounded(moving * (believed.delay + believed.lag + 0.5 * h))
-    sent = target_sent(believed, believed.step, wanted, targets[0], h)
-    remember(targets, sent)
-    behind = wanted - sent
+    newest = target_sent(believed, believed.step, wanted, sent[0], h)
+    remember(sent, newest)
+    behind = wanted - newest
     withheld = where(abs(behind) > believed.step + _ROUNDING, drive.stiffness[t] * behind, 0.0)
-    _, _, summed = motor_at(believed, state[2 * t + 1], targets, tick, h)
+    _, _, summed = motor_at(believed, state[2 * t + 1], sent, tick, h)
     return summed / h, withheld
 
 
@@ -166,22 +178,6 @@ def _lagged(drive: Any, state: Any, known: Any, aim: Any, pulls: Any, h: float, 
         _withhold(state, pulls, aim, t, less)
 
 
-@by_type
-def _wind(drive: Any, state: Any, places: int, planes: int, t: int, target: Any, moving: Any, h: float) -> Any:
-    """Lead the motor of a place to its moving target: what `reel_in` or `lead_on` returns."""
-    raise NotImplementedError("compiled code only")
-
-
-@implements(_wind, SpoolDrive)
-def _by_rates(drive: Any, state: Any, places: int, planes: int, t: int, target: Any, moving: Any, h: float) -> Any:
-    return reel_in(drive, state, _sent_to(drive.rates, state, places, planes, t), t, target, moving, h)
-
-
-@implements(_wind, ServoDrive)
-def _by_targets(drive: Any, state: Any, places: int, planes: int, t: int, target: Any, moving: Any, h: float) -> Any:
-    return lead_on(drive, state, _sent_to(drive.targets, state, places, planes, t), t, target, moving, h)
-
-
 @implements(actuate, SpoolDrive, ServoDrive)
 def _reeled(drive: Any, state: Any, known: Any, aim: Any, pulls: Any, h: float, counts: Any) -> None:
     count = len(pulls)
@@ -194,7 +190,8 @@ def _reeled(drive: Any, state: Any, known: Any, aim: Any, pulls: Any, h: float, 
         for p in range(1, len(aim.bend)):
             moving = moving + rounded(aim.arms[count * p + t] * aim.rate[p])
         target = spool_target(pulls[t], drive.stiffness[t], straight_at(known.wrist, t), counts[t])
-        counts[t], less = _wind(drive, state, count, len(aim.bend), t, target, moving, h)
+        sent = _sent_to(drive.sent, state, count, len(aim.bend), t)
+        counts[t], less = wind(drive, state, sent, t, target, moving, h)
         _withhold(state, pulls, aim, t, less)
 
 
@@ -230,7 +227,7 @@ def _wound(drive: Any, told: Any, time: Any, motion: Any) -> None:
     state, winding, counts, bend, h = told
     delivered, speeds = motion
     for t in range(len(counts)):
-        rates = _sent_to(drive.rates, state, len(counts), len(bend), t)
+        rates = _sent_to(drive.sent, state, len(counts), len(bend), t)
         place, rate = spool_at(drive.motor, state[2 * t], state[2 * t + 1], rates, time, h)
         delivered[t] = winding[0] * (drive.motor.step * floor(place / drive.motor.step + 0.5)) + winding[1 + t]
         speeds[t] = winding[0] * rate
@@ -241,7 +238,7 @@ def _followed(drive: Any, told: Any, time: Any, motion: Any) -> None:
     state, winding, counts, bend, h = told
     delivered, speeds = motion
     for t in range(len(counts)):
-        targets = _sent_to(drive.targets, state, len(counts), len(bend), t)
+        targets = _sent_to(drive.sent, state, len(counts), len(bend), t)
         place, speed, _ = motor_at(drive.motor, state[2 * t], targets, time, h)
         delivered[t] = winding[0] * place + winding[1 + t]
         speeds[t] = winding[0] * speed

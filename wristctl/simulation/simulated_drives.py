@@ -53,27 +53,27 @@ class LaggedDrive(NamedTuple):
 class SpoolDrive(NamedTuple):
     """Motors that reel elastic tendons onto spools; `stiffness` (T,) is that of all tendons of each place [N/m].
 
-    `believed` is the Timing that their host reckons with; `rates` is a tuple with an entry, whose value means nothing,
+    `believed` is the Timing that their host reckons with; `sent` is a tuple with an entry, whose value means nothing,
     for each rate of a spool that is remembered.
     """
 
     motor: Any
     stiffness: Any
     believed: Any
-    rates: Any
+    sent: Any
 
 
 class ServoDrive(NamedTuple):
     """Motors that reel elastic tendons in by following targets; `stiffness` (T,) is as SpoolDrive's.
 
-    `believed` is the Motor that their host reckons with; `targets` is a tuple with an entry, whose value means nothing,
+    `believed` is the Motor that their host reckons with; `sent` is a tuple with an entry, whose value means nothing,
     for each target of a motor that is remembered.
     """
 
     motor: Any
     stiffness: Any
     believed: Any
-    targets: Any
+    sent: Any
 
 
 Drive = IdealDrive | LaggedDrive | SpoolDrive | ServoDrive
@@ -128,9 +128,7 @@ def drive_with(level: str, motor: Any, stiffness: Any, believed: Any, remembered
 
 def commands_of(drive: Drive) -> int:
     """Number of rates or targets that each motor of a drive remembers."""
-    if isinstance(drive, ServoDrive):
-        return len(drive.targets)
-    return len(drive.rates) if isinstance(drive, SpoolDrive) else 0
+    return len(drive.sent) if isinstance(drive, SpoolDrive | ServoDrive) else 0
 
 
 def drive_of(
@@ -169,13 +167,13 @@ def _lagged_in_lanes(drive: Any) -> Any:
 @implements(drive_in_lanes, SpoolDrive)
 def _spools_in_lanes(drive: Any) -> Any:
     believed = read_timing(rows_of(drive.believed))
-    return SpoolDrive(read_motor(rows_of(drive.motor)), rows_of(drive.stiffness), believed, drive.rates)
+    return SpoolDrive(read_motor(rows_of(drive.motor)), rows_of(drive.stiffness), believed, drive.sent)
 
 
 @implements(drive_in_lanes, ServoDrive)
 def _servos_in_lanes(drive: Any) -> Any:
     believed = read_motor(rows_of(drive.believed))
-    return ServoDrive(read_motor(rows_of(drive.motor)), rows_of(drive.stiffness), believed, drive.targets)
+    return ServoDrive(read_motor(rows_of(drive.motor)), rows_of(drive.stiffness), believed, drive.sent)
 
 
 def counted_motor(believed: Actuator, actual: Actuator) -> Motor:

@@ -5,6 +5,7 @@ from collections import Counter, deque
 
 import numpy as np
 
+from wristctl.trial.rig_words import REPEATS
 from wristctl.vision.camera import CameraError
 from wristctl.vision.marker import Sighting, SightingVerdict
 
@@ -28,7 +29,7 @@ FIX = {
     SightingVerdict.BASE_MOVED: "fasten camera and clamp, and home again; wristctl hw calibrate camera",
     SightingVerdict.SWAPPED: "markers.base belongs on the clamp, markers.tip on the last disc; or both are upside down",
     SightingVerdict.JUMP: "see that the tip's marker sits fast on its disc, and that no other one is taken for it",
-    SightingVerdict.FROZEN: "the camera or its driver repeats old pictures: plug it in again, another USB port",
+    SightingVerdict.FROZEN: REPEATS,
     SightingVerdict.STAMP: "the camera's driver gives times that cannot be: plug it in again, another USB port",
 }
 

@@ -61,17 +61,30 @@ def course_of(motion: Motion) -> Array:
     return np.ascontiguousarray(motion.angles.rows.reshape(motion.planes, DERIVATIVES, -1).transpose(2, 0, 1))
 
 
+class AtZero(NamedTuple):
+    """A homed, slack wrist, as a loop takes it up."""
+
+    drive: LoopDrive
+    tracking: Tracking
+    plane: str
+    """In which it bends; empty for both."""
+    oblique: float = 0.0
+    """How far off square an uncalibrated camera looks at the plane [rad]."""
+    pulls: TendonPulls | None = None
+    """By load cells."""
+    stiffness: float | None = None
+    """Of the tendons [N/m] where homing has measured less than is believed."""
+
+
 class ControlLoop:
-    """Drives a homed rig in a bending plane, or in both; `stiffness` is that of the tendons [N/m] where homing has
-    measured less than is believed. `layout` has the tendons that the motors wind; None: the board's four.
-    """
+    """Drives a homed wrist. `layout` has the tendons that the motors wind; None: the board's four."""
 
     def __init__(
-        self, drive: LoopDrive, tracking: Tracking, settings: HwRunSettings, wrist: WristParameters, plane: str,
-        timing: TickTiming, log: TrialLog, shown: Shown | None = None, oblique: float = 0.0,
-        pulls: TendonPulls | None = None, stiffness: float | None = None, layout: TendonLayout | None = None,
+        self, ready: AtZero, settings: HwRunSettings, wrist: WristParameters, timing: TickTiming, log: TrialLog,
+        shown: Shown | None = None, layout: TendonLayout | None = None,
     ) -> None:  # fmt: skip
-        self._drive, self._tracking, self._log, self._timing, self._shown = drive, tracking, log, timing, shown
+        drive, self._tracking, plane, oblique, pulls, stiffness = ready
+        self._drive, self._log, self._timing, self._shown = drive, log, timing, shown
         self._period, self._stale, self._tendons = timing.period, settings.safety.stale, numbers_of(layout)
         self._spools = spools_of(settings.actuator)
         self._belief = RigBelief(wrist, settings.actuator, names_of_planes(settings.planes, plane), layout)

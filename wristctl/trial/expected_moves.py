@@ -10,9 +10,8 @@ from wristctl.arrays import Array
 from wristctl.board.messages import AXES
 from wristctl.config.hw_run import RigSettings
 from wristctl.config.wrist import WristParameters
-from wristctl.trial.homing_fixes import DEAD, OF_RIG, of_board
-from wristctl.trial.likely_causes import parts_of_board, parts_of_rig
 from wristctl.trial.rig_belief import PLANES, names_of_planes, numbers_of, places_of_tendons, pull_directions
+from wristctl.trial.rig_words import AGAINST, DEAD, words_of_board, words_of_rig
 from wristctl.trial.safety import SafetyStop
 from wristctl.trial.spools import on_plus_side, spools_of
 from wristctl.trial.supervised_wait import Reading
@@ -150,10 +149,8 @@ class ExpectedMoves:
         ratio = across / beside if across > 0.0 and beside > 0.0 else 1.0
         self.lever, self._stiffness = wrist.tendon_offset, max(0.0, across)
         self.own, self._numbers = layout is not None, numbers_of(layout)
-        names, parts = names_of_planes(settings.planes, facing), parts_of_rig if self.own else parts_of_board
-        self.motors = parts(self._numbers, names).motors
-        """What each axis is called."""
-        self.fixes = OF_RIG if self.own else of_board(settings.planes)
+        words_of = words_of_rig if self.own else words_of_board
+        self._words = words_of(self._numbers, names_of_planes(settings.planes, facing))
         if layout is not None:
             self.lever = float(np.abs(layout.cross_section).max())
             self._alone = _of_layout(wrist, layout, settings.planes)
@@ -166,9 +163,6 @@ class ExpectedMoves:
         """Which axes (T,) wind a tendon of the first plane's + side."""
         self.turns = OPPOSITE_AXES if layout is None else _turns(self._alone.toward)
         """Axes that are measured one after the other: opposite pairs, and those alone that have none."""
-
-    def _name(self, axis: int) -> str:
-        return self.motors[axis] if self.own else f"axis {axis}"
 
     def steps(self, stiffness: float | None = None, harder: float = 1.0, axis: int | None = None) -> float:
         """Reeled in for one radian of what counts, by tendons as believed or of this stiffness.
@@ -249,33 +243,31 @@ class ExpectedMoves:
         like, where = self.told(axis, bend)
         if like == axis:
             return
-        problem = f"{self._name(axis)} bends the wrist {where}"
-        likely = "tendons that run through other holes, or cameras that do not look square at their planes"
-        if self.own:
-            likely = "tendons that run through other holes, or a sensor whose axes are turned"
+        problem = f"{self._words.names[axis]} bends the wrist {where}"
+        likely = f"tendons that run through other holes, or {self._words.askew}"
         if like is not None:
             problem = f"{problem}: as tendon {self._numbers[like]} would"
             one, other = (self._numbers[each] for each in (axis, like))
-            motors = f"targets {one} and {other}" if self.own else f"motors of axes {axis} and {like}"
+            motors = self._words.exchanged.format(axis, like, one, other)
             likely = f"{motors} exchanged, or tendons {one} and {other}"
             if {axis, like} in map(set, self.turns):
                 likely = f"it turns the wrong way while others are taut, or {likely}"
-        raise SafetyStop(f"{problem}; likely {likely}", "homing", self.fixes.wiring)
+        raise SafetyStop(f"{problem}; likely {likely}", "homing", self._words.wiring)
 
     def wrong_sense(self, axis: int) -> SafetyStop:
         """The stop of a rig's motor that reels in by a smaller target."""
-        problem = f"{self._name(axis)} has the wrong sense: a smaller target reels it in"
-        return SafetyStop(problem, "homing", f"turn the sign of {self._name(axis)} in send() and connect()")
+        problem = f"{self._words.names[axis]} has the wrong sense: a smaller target reels it in"
+        return SafetyStop(problem, "homing", f"turn the sign of {self._words.names[axis]} in send() and connect()")
 
     def does_not_bend(self, axis: int) -> SafetyStop:
         """The stop of a motor that bends the wrist nowhere."""
-        problem = f"{self.motors[axis]} does not bend the wrist within {1e3 * self._homing.slack:g} mm; likely {DEAD}"
-        return SafetyStop(problem, "homing", self.fixes.dead.format(axis=axis))
+        problem = f"{self._words.motors[axis]} does not bend the wrist within {1e3 * self._homing.slack:g} mm"
+        return SafetyStop(f"{problem}; likely {DEAD}", "homing", self._words.dead.format(axis=axis))
 
     def bent_too_far(self, axis: int, bend: Bend) -> SafetyStop:
         """The stop of a motor that bends the wrist further than homing does."""
         bent = math.degrees(math.copysign(self.size(bend), self.along(axis, bend)))
-        problem = f"{self._name(axis)} bent the wrist by {bent:.1f} deg while homing"
+        problem = f"{self._words.names[axis]} bent the wrist by {bent:.1f} deg while homing"
         return SafetyStop(problem, "homing", "slacken all tendons first")
 
     def pulls_differently(self, axis: int) -> SafetyStop:
@@ -319,13 +311,12 @@ class ExpectedMoves:
         ratio, unit = steps / meant, self._spools.step
         taken = f"{1e3 * steps * unit:.3g} mm of tendon" if self.own else f"{steps:.0f} steps"
         model = f"{1e3 * meant * unit:.3g} mm" if self.own else f"{meant:.0f}"
-        loose = "a sensor that is not fixed" if self.own else "a marker that is not fixed"
+        words, slips = self._words, "a slipping tendon, or others that were taut"
         problem = (
-            f"{self.motors[axis]} takes {taken} for one radian, {ratio:.2f} times what the model says ({model}); "
-            f"likely {self.fixes.scaled}, or "
-            + ("a slipping tendon, or others that were taut" if ratio > 1.0 else loose)
+            f"{words.motors[axis]} takes {taken} for one radian, {ratio:.2f} times what the model says ({model}); "
+            f"likely {words.scale}, or {slips if ratio > 1.0 else words.loose}"
         )
-        raise SafetyStop(problem, "homing", self.fixes.scale)
+        raise SafetyStop(problem, "homing", words.rescale)
 
     def judge_slack(self, axis: int, slack: float, stays: float = 0.0) -> None:
         """Raises SafetyStop where a tendon was taut before anything was reeled in.
@@ -336,7 +327,7 @@ class ExpectedMoves:
         if slack >= -self._homing.taut - self._stretch(stays):
             return
         problem = f"tendon {self._numbers[axis]} was taut by {-1e3 * slack:.2f} mm when homing began"
-        raise SafetyStop(problem, "homing", self.fixes.taut)
+        raise SafetyStop(problem, "homing", self._words.taut)
 
     def judge_friction(self, axis: int, friction: float, stays: float) -> None:
         """Raises SafetyStop where a tendon sticks by more than `homing.sticks` between reeling in and letting go [m].
@@ -360,9 +351,9 @@ class ExpectedMoves:
         problem = f"a slackened wrist still moved by {math.degrees(bend.askew):.1f} deg when it was slackened further"
         likely = (
             f"tendon {self._numbers[holds]} is shorter than it was, caught or slipped on its pulley, or "
-            f"{self.motors[pulls]} turns the wrong way"
+            f"{self._words.motors[pulls]} turns the wrong way"
         )
-        fix = f"see tendons and motors, then {self.fixes.again}"
+        fix = f"see tendons and motors, then {self._words.again}"
         return SafetyStop(f"{problem}; likely {likely}", "homing", fix)
 
     def judge_cocontraction(self, bend: Bend) -> None:
@@ -374,11 +365,11 @@ class ExpectedMoves:
         """The stop of a wrist that bent toward the tendon of an axis."""
         whose = "" if self.own else f" (axis {pulls})"
         problem = (
-            f"tendons pull against each other: the slackened wrist bent by {math.degrees(bend.askew):.1f} deg when one "
+            f"{AGAINST}: the slackened wrist bent by {math.degrees(bend.askew):.1f} deg when one "
             f"side was let out; likely tendon {self._numbers[pulls]}{whose} and one opposite are shorter than the "
-            f"motors' positions say: {self.fixes.against}"
+            f"motors' positions say: {self._words.against}"
         )
-        fix = f"see tendons, motor cables and their shields, then {self.fixes.again}"
+        fix = f"see tendons, motor cables and their shields, then {self._words.again}"
         return SafetyStop(problem, "homing", fix)
 
     def judge_small_move(self, axis: int, reeled: float, bend: Bend) -> None:
@@ -393,8 +384,8 @@ class ExpectedMoves:
     def bends_too_little(self, axis: int, bend: Bend, meant: float) -> SafetyStop:
         """The stop of an axis that bends the wrist by less than was meant [rad]."""
         problem = (
-            f"{self.motors[axis]} bends the wrist by {math.degrees(self.along(axis, bend)):.1f} deg "
+            f"{self._words.motors[axis]} bends the wrist by {math.degrees(self.along(axis, bend)):.1f} deg "
             f"instead of {math.degrees(meant):.1f} deg; likely it turns the wrong way, its tendon is off the pulley, "
             "or it has no power"
         )
-        return SafetyStop(problem, "homing", f"{self.fixes.again}; see motor, drive and tendon")
+        return SafetyStop(problem, "homing", f"{self._words.again}; see motor, drive and tendon")

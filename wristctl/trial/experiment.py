@@ -1,188 +1,263 @@
-"""The experiment from the first command to the last: connect, home, trials and returns, and the stop that ends it."""
+"""The experiment from the first command to the last: connect, home, trials and returns, and the stop that ends it.
 
-from collections.abc import Mapping, Sequence
+What it is performed on is a part of it, a `Stand`: it connects, homes, begins trials, checks the tendons and stops.
+"""
 
-from wristctl.board.driver import Board
+import logging
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from wristctl.config.choices import PLANTS
 from wristctl.config.hw_run import HwRunSettings
 from wristctl.config.wrist import WristParameters
-from wristctl.errors import UserError
+from wristctl.control.table import controller, gains_of
+from wristctl.errors import UserError, fix_of
 from wristctl.interrupt import undisturbed
-from wristctl.simulation.worlds import Draws
-from wristctl.trial.calibration import WristCalibration
-from wristctl.trial.control_loop import ControlLoop, Shown
-from wristctl.trial.drives import BoardDrive
-from wristctl.trial.expected_moves import ExpectedMoves
-from wristctl.trial.homing import Zero, find_zero, slacken
+from wristctl.simulation.motion import Motion
+from wristctl.simulation.spool_timing import remembered_commands
+from wristctl.trial.board_stand import BoardStand
+from wristctl.trial.control_loop import AtZero, ControlLoop, Shown, course_of
+from wristctl.trial.homing import Zero
 from wristctl.trial.live_datagrams import LiveReference
 from wristctl.trial.log import TrialLog
-from wristctl.trial.motors_ready import after_a_fault, halt, prepare
-from wristctl.trial.resting import judge_rest
-from wristctl.trial.rig_belief import names_of_planes
+from wristctl.trial.motions import back, motion_of
+from wristctl.trial.motors_ready import Halt
+from wristctl.trial.rig_belief import RigBelief, layout_of_rig, names_of_planes, numbers_of
+from wristctl.trial.rig_drive import LookPaces
+from wristctl.trial.rig_settings import as_modelled
+from wristctl.trial.rig_stand import RigStand
+from wristctl.trial.safety import SafetyStop
 from wristctl.trial.spools import spools_of
-from wristctl.trial.steering import HostFaults
-from wristctl.trial.supervised_wait import Patience, medians
-from wristctl.trial.tendon_pulls import tendon_pulls_of
-from wristctl.trial.testbeds import Testbed
+from wristctl.trial.steering import Steering
 from wristctl.trial.tick_timing import TickTiming
-from wristctl.trial.tracking import Tracking
-from wristctl.trial.trial_series import TrialSeries, spared
-from wristctl.trial.trials import Trial
-from wristctl.trial.zero_checks import check_cocontraction, check_tendons, check_zero
+from wristctl.trial.trials import Trial, motions_of
+from wristctl.trial.watch import Watch
+from wristctl.vision.camera_pose import CameraPose
 from wristctl.wrist.directions import in_plane
 from wristctl.wrist.kinematics import Inverse
 
+log = logging.getLogger(__name__)
 
-class Experiment(TrialSeries):
-    """Trials on the motor board with its cameras, real or emulated. Raises UserError as TrialSeries does."""
+Stand = BoardStand | RigStand
+
+# Share of the motors' pull that a law may ask for: they turn meanwhile, and the wrist may be pushed.
+_ASKED = 0.8
+
+
+class Stop:
+    """Why, when (on the time of the trial, where one went on) and how an experiment was stopped before its end."""
+
+    def __init__(self, error: BaseException, trial: int | None, time: float | None, halted: Halt) -> None:
+        self.reason = f"{type(error).__name__}: {error}"
+        if isinstance(error, UserError):
+            self.reason = error.what
+        elif isinstance(error, KeyboardInterrupt):
+            self.reason = "interrupted by the operator"
+        self.trial, self.time, self.halt = trial, time, halted
+
+    def plain(self) -> dict[str, Any]:
+        """For JSON."""
+        status = self.halt.status
+        board: dict[str, Any] = {"state": None, "faults": None, "position": None, "rate": None}
+        if status is not None:
+            faults = status.faults.name or "none"
+            board |= {"state": status.state.name, "faults": faults, "position": status.position, "rate": status.rate}
+        return {
+            "reason": self.reason,
+            "trial": self.trial,
+            "time": self.time,
+            "motors_stand": self.halt.verified,
+            "how": self.halt.how,
+            "seconds": self.halt.seconds,
+            **board,
+        }
+
+
+class Experiment:
+    """Trials one after the other; `outcomes` holds how each trial that began has ended, `odd` what was odd in it,
+    `most` the largest of each residual in any, `zero` and `poses` what the stand has found, `stop` why they ended
+    early.
+
+    Raises UserError for what is wrong with controllers, gains or motions.
+    """
 
     def __init__(
         self, settings: HwRunSettings, wrist: WristParameters, trials: Sequence[Trial], kept: TrialLog,
         network: Inverse | None = None, tuned: Mapping[str, Mapping[str, float]] | None = None,
-        calibration: WristCalibration | None = None, seed: int = 0, live: LiveReference | None = None,
+        live: LiveReference | None = None,
     ) -> None:  # fmt: skip
-        settings = settings.within(wrist)
-        timing = TickTiming(settings.control_period)
-        super().__init__(settings, spared(wrist, settings), wrist, trials, kept, timing, network, tuned, live)
-        self._pulls = tendon_pulls_of(settings)
-        self._calibration, self._draws = calibration, Draws(seed, "bench")
+        self._settings, self._layout = settings.within(wrist), layout_of_rig(settings, wrist)
+        self._wrist = spared(wrist, self._settings)
+        self._trials, self._log, self._live = trials, kept, live
+        chosen = [(controller(row.controller), row.gains) for row in settings.rows]
+        self._laws = [(law, gains_of(law, gains, tuned)) for law, gains in chosen]
+        self._back = controller("feedforward")
+        self.motions = self._motions(self._settings, network)
+        self.timing = TickTiming(settings.control_period)
+        if settings.rig is not None:
+            self.timing.camera = LookPaces(settings.rig)
+        self.outcomes: dict[int, str] = {}
+        self.stop: Stop | None = None
+        self.most, self.odd = dict[str, float](), dict[int, str]()
         self.zero: Zero | None = None
+        self.poses: dict[str, CameraPose | None] = {}
+        self._under_way: tuple[int, float] | None = None  # number and start of the trial that goes on
+        self._in_doubt: int | None = None  # the trial that has ended, until its tendons have been looked at
 
-    def run(self, testbed: Testbed, shown: Shown | None = None) -> None:
+    def _motions(self, settings: HwRunSettings, network: Inverse | None = None) -> dict[str, Motion]:
+        wrist = as_modelled(self._wrist, self._layout, settings.planes)
+        return {name: motion_of(settings, wrist, name, network) for name in motions_of(settings)}
+
+    def replay(self, settings: HwRunSettings) -> None:
+        """Judge the trials by motions of these settings: those of a live reference are known afterwards."""
+        self.motions = self._motions(settings)
+
+    def run(self, stand: Stand, shown: Shown | None = None) -> None:
         """Do all trials, and close the stand. Whatever ends them early, the motors are stopped before it is raised.
 
-        Raises SafetyStop, BoardError, CameraError, KeyboardInterrupt, and what a bug raises.
+        Raises SafetyStop, what the stand raises, KeyboardInterrupt, and what a bug raises.
         """
-        board = Board(testbed.transport, self._log.wire)
-        board.cells = self._pulls
         try:
-            plane = self._trials[0].plane
-            self._warm_up(self._facing(plane), plane)
-            board.connect()
-            with self._stopping(lambda cause: self._stopped(testbed, board, cause)):
-                self._all(testbed, board, shown)
+            self._warm_up(self._trials[0].plane if self._settings.planes == 1 else "")
+            stand.open(self._settings, self._wrist, self._log)
+            with self._stopping(stand):
+                self._all(stand, shown)
             with undisturbed():
-                halt(board, self._settings.safety.watchdog)
-                board.close()
+                halted = stand.stop(early=False)
+            if not halted.verified:
+                log.warning("after the last trial: %s", halted.how)
         finally:
-            testbed.close()
+            self.zero, self.poses = stand.zero, stand.poses
+            with undisturbed():
+                stand.close()
 
-    def _all(self, testbed: Testbed, board: Board, shown: Shown | None) -> None:
-        plane: str | None = None
+    def _all(self, stand: Stand, shown: Shown | None) -> None:
         loop: ControlLoop | None = None
         for trial in self._trials:
-            bends_in = trial.plane if self._settings.planes == 1 else ""  # one set-up sees both planes
-            if loop is None or bends_in != plane:
-                patience = Patience(board) if loop is None else loop.patience(board, self._signs)
-                testbed.face(trial.direction, patience.pulse)
-                loop, tracking = self._loop(testbed, board, bends_in, shown)
-                plane = bends_in
-            self._one(testbed, loop, trial)
-            loop = self._relaxed(board, tracking, bends_in, shown)
+            ready = stand.ready(trial, loop)
+            loop = loop if ready is None else self._at_rest(ready, shown)
+            assert loop is not None
+            self._one(stand, loop, trial)
+            ready = stand.check()
+            self._in_doubt = None
+            loop = None if ready is None else self._at_rest(ready, shown)
 
-    def _loop(
-        self, testbed: Testbed, board: Board, plane: str, shown: Shown | None
-    ) -> tuple[ControlLoop, Tracking]:  # fmt: skip
-        """A loop at rest at zero in this plane, and its camera; the first one homes the board, others read the slack
-        wrist's marker."""
-        settings, tracking = self._settings, testbed.tracking()
-        if self.zero is not None:
-            self._let_go(board, self.zero)
-        watching = Patience(board)
-        names = names_of_planes(settings.planes, plane)
-        self.poses |= dict(zip(names, watching.stand_square(tracking, settings.homing), strict=True))
-        seen = watching.sightings(tracking, 4 * settings.homing.frames)
-        markers = medians(seen, settings.planes)
-        watching.pace.fits(settings.safety.stale)
-        if settings.planes == 2:  # what one camera sees of a bend depends on the other
-            tracking.zero = markers
-        if self.zero is None:  # the marker is seen, and nothing moves yet
-            judge_rest(seen, settings, self._wrist, names)
-            testbed.confirm(Patience(board).pulse)
-            with after_a_fault(prepare(board, settings)):
-                self.zero = self._home(board, tracking, plane)
-            markers = self.zero.markers
-        else:
-            markers = check_zero(board, tracking, settings, self._wrist, plane, self.zero)
-        tracking.zero = markers
-        return self._at_rest(board, tracking, plane, shown), tracking
-
-    def _at_rest(self, board: Board, tracking: Tracking, plane: str, shown: Shown | None) -> ControlLoop:
+    def _at_rest(self, ready: AtZero, shown: Shown | None) -> ControlLoop:
         """A loop that has brought the homed, slack wrist to rest at zero."""
-        settings, pose, zero = self._settings, self.poses.get(plane), self.zero
-        assert zero is not None
-        stiffness = ExpectedMoves(settings, self._wrist, plane).tendon_stiffness(zero.steps_per_radian)
-        loop = ControlLoop(
-            BoardDrive(board, settings, zero.signs), tracking, settings, self._facing(plane), plane, self.timing,
-            self._log, shown, 0.0 if pose is None else pose.oblique, self._pulls, stiffness,
-        )  # fmt: skip
-        loop.follow(self._to_rest(0.0, settings.rest, 0.0), self._back, ())
+        facing = self._facing(ready.plane)
+        loop = ControlLoop(ready, self._settings, facing, self.timing, self._log, shown, self._layout)
+        loop.follow(self._to_rest(0.0, self._settings.rest, 0.0), self._back, ())
         return loop
 
-    @property
-    def _signs(self) -> tuple[int, ...]:
-        assert self.zero is not None
-        return self.zero.signs
+    def _one(self, stand: Stand, loop: ControlLoop, trial: Trial) -> None:
+        """One trial, whose residuals are kept however it ends, and the way back to zero."""
+        start, motion, (law, gains) = loop.next_tick, self.motions[trial.direction], self._laws[trial.row]
+        self._under_way, self.outcomes[trial.number] = (trial.number, start), "begun"
+        faults = stand.begin(trial, motion, start)
+        try:
+            loop.follow(motion, law, gains, trial.number, faults, trial.push != 0.0, self._live)
+        finally:
+            self.most = {name: max(size, self.most.get(name, 0.0)) for name, size in loop.watch.most.items()}
+            self.odd[trial.number] = loop.watch.words()
+        self._trial_ended(stand, "ok")
+        self._in_doubt = trial.number
+        final = motion.final if self._live is None else self._live.bend
+        loop.follow(self._to_rest(final, self._settings.back, 0.0), self._back, ())
 
-    def _facing(self, plane: str) -> WristParameters:
-        """The wrist as a loop in this plane knows it, or in both."""
-        return self._wrist if self._settings.planes == 2 else in_plane(self._wrist, plane)
-
-    def _relaxed(self, board: Board, tracking: Tracking, plane: str, shown: Shown | None) -> ControlLoop:
-        """After a trial see that no tendons pull against each other and that none is lost; rest at zero again."""
-        assert self.zero is not None
-        told = check_cocontraction(board, tracking, self._settings, self._wrist, plane, self.zero)
-        if told and self._settings.planes == 2:
-            check_tendons(board, tracking, self._settings, self._wrist, self.zero)
-        self._in_doubt = None
-        return self._at_rest(board, tracking, plane, shown)
-
-    def _home(self, board: Board, tracking: Tracking, plane: str) -> Zero:
-        settings, calibration = self._settings, self._calibration
-        if calibration is not None and settings.positions == "stored":
-            if len(calibration.zero.markers) != settings.planes:
-                problem = f"the calibration knows {len(calibration.zero.markers)} cameras of {settings.planes}"
-                raise UserError(problem, "calibration", "positions: find, or calibrate the wrist with the same planes")
-            calibration.restore(board)
-            self._let_go(board, calibration.zero)
-            check_zero(board, tracking, settings, self._wrist, plane, calibration.zero)
-            return calibration.zero
-        signs = calibration.zero.signs if calibration else None
-        return find_zero(board, tracking, settings, self._wrist, plane, signs)
-
-    def _let_go(self, board: Board, zero: Zero) -> None:
-        """Slacken the tendons, and give the wrist time to straighten."""
-        slacken(board, spools_of(self._settings.actuator), self._settings.homing, zero.signs)
-        Patience(board).wait(self._settings.homing.let_go)
-
-    def _one(self, testbed: Testbed, loop: ControlLoop, trial: Trial) -> None:
-        """One trial, and the way back to zero."""
-        settings, start = self._settings, loop.next_tick
-        self._begun(trial, start)
-        testbed.begin(
-            start,
-            trial.disturbances(settings, self.motions[trial.direction]),
-            self._draws.camera(trial.scenario, trial.repetition),
-        )
-        self._follow(loop, trial, HostFaults(settings.bench.faults) if testbed.emulated else None)
-        self._trial_ended(testbed, "ok")
-        self._come_back(loop, trial)
-
-    def _trial_ended(self, testbed: Testbed, outcome: str) -> None:
+    def _trial_ended(self, stand: Stand, outcome: str) -> None:
         if self._under_way is not None:
             number, start = self._under_way
             self.outcomes[number], self._under_way = outcome, None
-            self._log.truth(number, testbed.truth(start))
+            self._log.truth(number, stand.truth(start))
 
-    def _stopped(self, testbed: Testbed, board: Board, error: BaseException) -> None:
-        """Stop the motors and let the board go, then note what happened."""
-        decided = board.transport.now()
-        halted = halt(board, self._settings.safety.watchdog)
-        if self._settings.safety.hold and halted.verified:
-            board.transport.close()  # the board's watchdog ends it, and holds
-        else:
-            board.close(emergency=not halted.verified)
-        stop = self._note_stop(error, decided, halted)
+    @contextmanager
+    def _stopping(self, stand: Stand) -> Iterator[None]:
+        """Whatever ends the block early, the stand is stopped before its cause is raised."""
         try:
-            self._trial_ended(testbed, stop.reason)
+            yield
+        except BaseException as error:
+            cause = cause_of(error)
+            with undisturbed():
+                self._stopped(stand, cause)
+            if cause is not error:
+                raise cause from error
+            raise
+
+    def _stopped(self, stand: Stand, error: BaseException) -> None:
+        """Stop the motors, then note why, when and how."""
+        decided = stand.now()
+        halted = stand.stop(early=True)
+        trial, start = self._under_way or (None, None)
+        self.stop = Stop(error, trial, None if start is None else decided - start, halted)
+        if self._in_doubt is not None and isinstance(error, SafetyStop):
+            self.outcomes[self._in_doubt] = f"after it: {self.stop.reason.removeprefix('stopped: ')}"
+        self._log.disk.give_up_reserve()
+        try:
+            self._trial_ended(stand, self.stop.reason)
         except (OSError, UserError) as lost:
             error.add_note(f"what the bench knows of the trial is lost: {lost}")
+
+    def _facing(self, plane: str) -> WristParameters:
+        """The wrist as a loop in this plane knows it, or in both."""
+        wrist = as_modelled(self._wrist, self._layout, self._settings.planes)
+        return in_plane(wrist, plane) if plane else wrist
+
+    def _to_rest(self, bend: Any, duration: float, rest: float) -> Motion:
+        """The way from a bend [rad] to zero, and rest there."""
+        return back(bend, duration, rest, self._settings.control_period, self._settings.planes)
+
+    def _warm_up(self, plane: str) -> None:
+        """Have all compiled or loaded before the first motor is on: from then on a rig wants to be fed.
+
+        It is for a loop in this plane; empty: in both.
+        """
+        settings, period, facing = self._settings, self._settings.control_period, self._facing(plane)
+        belief = RigBelief(facing, settings.actuator, names_of_planes(settings.planes, plane), self._layout)
+        spools, course = spools_of(settings.actuator), course_of(self._to_rest(0.0, settings.rest, 0.0))
+        taut, _ = belief.taut(course[0, :, 0])
+        still, reeled = np.zeros(len(taut)), belief.at_places(taut)
+        spools.target(still, taut)
+        spools.rate(still, still, still, period)
+        spools.behind(still, still, still, period)
+        rates = np.zeros((len(taut), remembered_commands(spools.timing.delay, period)))
+        spools.foreseen(still, rates, period)
+        spools.reckoned(still, rates, 0.0, period)
+        Watch(settings, facing, plane, self.timing, layout=self._layout).predict(reeled)
+        steering = Steering(belief, settings.sensor, period)
+        for law, gains in [*self._laws, (self._back, ())]:
+            steering.use(law, gains)
+            steering.respond(course)
+            steering.predict(reeled)
+        steering.see(0, 0.0, 0.0)
+
+
+def spared(wrist: WristParameters, settings: HwRunSettings) -> WristParameters:
+    """The wrist with tensions that its motors can hold. Raises UserError where these are not above pretension."""
+    limit = min(wrist.tension_limit, _ASKED * settings.safety.motor_pull)
+    if limit <= wrist.pretension:
+        problem = f"motors of {settings.safety.motor_pull:g} N cannot hold a pretension of {wrist.pretension:g} N"
+        raise UserError(problem, "safety.motor_pull", "more current (documentation: The rig), or less wrist.pretension")
+    return wrist.model_copy(update={"tension_limit": limit})
+
+
+def cause_of(error: BaseException) -> BaseException:
+    """The safety stop behind a disk that takes no more rows; any other error as it is."""
+    if isinstance(error, OSError):
+        return SafetyStop(f"the log cannot be written: {error.strerror}", str(error.filename or "data"), fix_of(error))
+    return error
+
+
+def log_of(folder: Path, settings: HwRunSettings, wrist: WristParameters, monotonic: bool = False) -> TrialLog:
+    """The files that an experiment with these settings leaves: an emulated one has the true wrist's too."""
+    own, coordinates = settings.rig is not None, None
+    if not own and settings.port is None:
+        bench = settings.bench
+        coordinates = settings.planes * PLANTS[bench.plant.model].coordinates(bench.segments)
+    return TrialLog(
+        folder, coordinates, settings.control_period, monotonic, settings.load_cells is not None, settings.planes,
+        numbers_of(layout_of_rig(settings, wrist)), not own,
+    )  # fmt: skip

@@ -224,6 +224,14 @@ class Finder:
         self.bend_once(against, about[against])
         return {axis: self.line(axis, about[axis]) for axis in axes}
 
+    def lines(self, about: Sequence[int]) -> tuple[list[Line], Bend, list[float]]:
+        """Lines of all axes, by `about` where they bend the wrist; where it is straight, and where each tendon of it is
+        just taut [steps]."""
+        measured = {axis: line for turns in self._expected.turns for axis, line in self.turn(turns, about).items()}
+        lines = [measured[axis] for axis in range(len(about))]
+        straight = middle([line.rest for line in lines])
+        return lines, straight, [line.taut(self._expected.along(axis, straight)) for axis, line in enumerate(lines)]
+
     def settle(self, taut: Sequence[float]) -> tuple[int, ...]:
         """Take up every tendon's slack, all at once, and call that zero. Senses of turning."""
         self._at[:] = np.rint(taut)
@@ -293,13 +301,10 @@ def find_zero(
     taut before or sticks, or where the marker is lost. In two planes readings of the slack wrist have been taken off.
     """
     expected, spools = ExpectedMoves(settings, wrist, plane, layout), spools_of(settings.actuator)
-    finder, count = finder_of(board, tracking, settings, wrist, plane, expected), len(expected.motors)
+    finder, count = finder_of(board, tracking, settings, wrist, plane, expected), len(expected.plus)
     about = [finder.sense(axis, (1, -1) if signs is None else (signs[axis],)) for axis in range(count)]
     finder.slacken()
-    measured = {turn: line for turns in expected.turns for turn, line in finder.turn(turns, about).items()}
-    lines = [measured[axis] for axis in range(count)]
-    straight = middle([line.rest for line in lines])
-    taut = [line.taut(expected.along(axis, straight)) for axis, line in enumerate(lines)]
+    lines, straight, taut = finder.lines(about)
     slopes = tuple(line.per_radian for line in lines)
     slack, sticking = tuple(spools.step * at for at in taut), tuple(spools.step * line.friction for line in lines)
     stays = max(expected.size(line.rest.since(straight)) for line in lines)

@@ -14,6 +14,7 @@ import numpy as np
 
 from wristctl.arrays import Array
 from wristctl.trial.rig_belief import TOWARD, unit_toward
+from wristctl.trial.rig_words import LOST, Words
 
 # Steps in the time looked at from which a motor has turned.
 TURNED = 40.0
@@ -41,51 +42,6 @@ _ALONE = 0.3
 _SIDE = 0.3
 
 
-class Parts(NamedTuple):
-    """What the parts of a rig are called."""
-
-    numbers: tuple[int, ...]
-    """Of the tendons."""
-    motors: tuple[str, ...]
-    """Each tendon's motor."""
-    slipped: tuple[str, ...]
-    """What is said of each plane's sensor that has slipped."""
-    wrong: tuple[str, ...]
-    """What is said of each plane's sensor that shows or dates bends wrongly."""
-    old: str
-    """What is said of sensors that show the past."""
-    scale: str
-    """What makes a motor turn its spool by more or less than it is told."""
-
-
-def parts_of_board(numbers: Sequence[int], planes: Sequence[str]) -> Parts:
-    """Of a motor board with a camera for each of these planes."""
-    several = len(planes) > 1
-    markers = [f"the marker before the {plane} camera" if several else "the tip's marker" for plane in planes]
-    cameras = [f"the {plane} camera" if several else "the camera" for plane in planes]
-    return Parts(
-        tuple(numbers),
-        tuple(f"axis {axis} (tendon {number})" for axis, number in enumerate(numbers)),
-        tuple(f"{marker} has slipped on its disc" for marker in markers),
-        tuple(f"{camera} shows or dates pictures wrongly" for camera in cameras),
-        f"{'both cameras show' if several else 'the camera shows'} old pictures",
-        "wrong pulley or microsteps (DIP switches)",
-    )
-
-
-def parts_of_rig(numbers: Sequence[int], planes: Sequence[str]) -> Parts:
-    """Of a rig that takes targets and gives bends in these planes."""
-    bends = [f"the bend toward {plane}" if len(planes) > 1 else "the bend" for plane in planes]
-    return Parts(
-        tuple(numbers),
-        tuple(f"target {number}" for number in numbers),
-        tuple(f"the sensor of {bend} has slipped" for bend in bends),
-        tuple(f"look() gives or dates {bend} wrongly" for bend in bends),
-        "look() gives old bends",
-        "facts.metres_per_unit",
-    )
-
-
 class Evidence(NamedTuple):
     """Evidence of the last moments; SI units. Pairs are toward ulnar and flexion, zero where no sensor tells."""
 
@@ -107,7 +63,7 @@ class Evidence(NamedTuple):
     """Largest change of each sensor's angle from one frame to the next, off what the spools make, (P,)."""
     directions: Array
     """Direction in which each tendon bends the wrist, from ulnar toward flexion, (T,) [rad]."""
-    parts: Parts
+    words: Words
     bends: float = math.inf
     """Bend across that is beyond the limit."""
     oblique: float = 0.0
@@ -154,11 +110,11 @@ def _turned_back(course: Sequence[float]) -> int:
 
 def likely_causes(evidence: Evidence) -> list[str]:
     """Causes in words."""
-    alone, parts = len(evidence.jump) == 1, evidence.parts
+    alone, words = len(evidence.jump) == 1, evidence.words
     causes = [_PUSHED + _ACROSS * alone] * evidence.pushed + [LOOP_SWINGS] * (evidence.reversals >= SWINGS)
     if evidence.jumps:
         plane = int(np.argmax(evidence.jump))
-        causes += [parts.slipped[plane], parts.wrong[plane]]
+        causes += [words.slipped[plane], words.wrong[plane]]
     if math.hypot(*evidence.across) < _SLIGHTLY * evidence.oblique and evidence.aside:
         causes.append(_OBLIQUE)
     if not evidence.aside:
@@ -179,7 +135,7 @@ def _of_all_motors(evidence: Evidence) -> list[str]:
     meant = math.hypot(*evidence.meant)
     share = float(evidence.bent @ evidence.meant) / meant**2 if meant > MEANT else math.nan
     if abs(share) < _STOOD:
-        return [f"the motors have no supply, or {evidence.parts.old}"]
+        return [f"the motors have no supply, or {evidence.words.old}"]
     if share < 0.0:
         return ["the wrist goes the other way than its motors: motors that turn the wrong way or are exchanged"]
     return []
@@ -195,11 +151,11 @@ def _scaled(evidence: Evidence) -> list[str]:
     if share < _STOOD or abs(share - 1.0) < _SCALED or beside > math.tan(_ASIDE) * abs(share - 1.0):
         return []
     much = "more" if share > 1.0 else "less"
-    return [f"the wrist bends by {much} than its spools say: {evidence.parts.scale}"]
+    return [f"the wrist bends by {much} than its spools say: {evidence.words.scale}"]
 
 
 def _by_direction(evidence: Evidence) -> list[str]:
-    off, motors = evidence.off, evidence.parts.motors
+    off, motors = evidence.off, evidence.words.motors
     if not off.any():
         return _scaled(evidence)
     toward = np.stack([np.cos(evidence.directions), np.sin(evidence.directions)], axis=1) @ off
@@ -208,7 +164,7 @@ def _by_direction(evidence: Evidence) -> list[str]:
     lost, more = list[str](), list[str]()
     if evidence.aside or len(evidence.jump) > 1:  # else two tendons of a side are not told apart
         if -float(toward[little]) >= math.cos(_ASIDE):
-            lost = [f"the tendon of {motors[little]} is off its pulley, cut or slipped, or its motor has stalled"]
+            lost = [LOST.format(f"the tendon of {motors[little]}")]
             lost += [f"{motors[little]} turns the wrong way"] * bool(evidence.turned[little] > TURNED)
         if float(toward[much]) >= math.cos(_ASIDE):
             more = [f"{motors[much]} turns the wrong way, or its tendon is caught"]
@@ -216,16 +172,16 @@ def _by_direction(evidence: Evidence) -> list[str]:
         carries = float(evidence.torque[little]) >= _ACCOUNTS * math.hypot(*evidence.load)
         first, second = (lost, more) if carries or evidence.turned[much] >= -TURNED else (more, lost)
         return [*first, *["motors exchanged"] * moved, *second]
-    plus, minus = (_tendons(evidence.parts, sign * toward) for sign in (1.0, -1.0))
+    plus, minus = (_tendons(evidence.words, sign * toward) for sign in (1.0, -1.0))
     exchanged = [f"motors of {plus} exchanged with those of {minus}"] * bool(plus and minus)
     motor = f"a motor of {minus}" if minus else "a motor"
     stalled = f"{motor} has stalled or no power, or a tendon has slipped or come off"
     return [*_scaled(evidence), *exchanged, stalled]
 
 
-def _tendons(parts: Parts, toward: Array) -> str:
+def _tendons(words: Words, toward: Array) -> str:
     """Tendons on the side of a direction, by the cosine of each; empty without one."""
-    numbers = [str(number) for number, along in zip(parts.numbers, toward, strict=True) if along > _SIDE]
+    numbers = [str(number) for number, along in zip(words.numbers, toward, strict=True) if along > _SIDE]
     return f"tendon{'s' * (len(numbers) > 1)} {' and '.join(numbers)}" if numbers else ""
 
 

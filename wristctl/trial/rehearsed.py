@@ -7,13 +7,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wristctl.config.choices import PLANTS
 from wristctl.config.hw_run import HwRunSettings
 from wristctl.config.study import Study
 from wristctl.control.table import Gains
 from wristctl.errors import UserError
-from wristctl.trial.experiment import Experiment
-from wristctl.trial.log import TrialLog
+from wristctl.trial.board_stand import BoardStand
+from wristctl.trial.experiment import Experiment, log_of
 from wristctl.trial.motion_limit import limited, peak_tension
 from wristctl.trial.testbeds import open_testbed
 from wristctl.trial.trial_results import metrics_of_trials
@@ -53,15 +52,14 @@ def _run(study: Study, tuned: Gains | None) -> dict[int, Rehearsed]:
     trials = _by_row(study.hw_run)
     study = limited(study, peak_tension(study, trials, None, tuned))
     settings, wrist = study.hw_run, study.wrist
-    coordinates = settings.planes * PLANTS[settings.bench.plant.model].coordinates(settings.bench.segments)
     with tempfile.TemporaryDirectory(prefix="wristctl-rehearsal-") as folder:
-        log = TrialLog(Path(folder), coordinates, settings.control_period, planes=settings.planes)
+        log = log_of(Path(folder), settings, wrist)
         try:
-            done = Experiment(settings, wrist, trials, log, tuned=tuned, seed=study.seed)
+            done = Experiment(settings, wrist, trials, log, tuned=tuned)
             testbed = open_testbed(settings, wrist, study.seed, View(), lambda text, meanwhile: None)
             stop: UserError | None = None
             try:
-                done.run(testbed)
+                done.run(BoardStand(testbed, seed=study.seed))
             except UserError as error:
                 stop = error
         finally:

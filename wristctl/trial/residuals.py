@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 
 from wristctl.config.hw_run import HwRunSettings
 from wristctl.plain_files import read_json
+from wristctl.trial.rig_words import AGAINST, CELL, LOST, PUSHED, REPEATS
 
 
 class Shown(NamedTuple):
@@ -56,9 +57,7 @@ def _never(settings: HwRunSettings) -> float:
 
 
 _CALMER = "gentler gains or reference, or widen safety.{}"
-_TENDONS = (
-    "tendons, motors or the tip's marker do otherwise than the board believes; something holds or pushes the wrist"
-)
+_TENDONS = f"tendons, motors or the tip's marker do otherwise than the board believes; {PUSHED}"
 _CAMERA = "the camera's light, focus, cable or mode; what covers a marker"
 _CABLE = "close other programs, or see that the cable and its plugs are sound"
 _LINK = "the USB adapter's latency timer or a hub: wristctl hw check --rig; or a longer control_period"
@@ -97,24 +96,24 @@ RESIDUALS: Mapping[str, Residual] = {
     ),
     "cell_age": Residual(
         _MS, "time since the last reading of a load cell, of the oldest", lambda s: s.safety.cell_age, math.inf,
-        "an amplifier is unplugged or without supply, or a wire of its cell is broken",
+        CELL.format("an amplifier"),
         "no reading of a load cell for {value} (limit {limit})", weighed=True,
     ),
     "measured_pull": Residual(
         _N, "largest pull by load cell", lambda s: min(s.safety.tension, s.safety.motor_pull), 0.8,
-        "tendons pull against each other; something holds the wrist; the drives' current is above safety.motor_pull",
+        f"{AGAINST}; something holds the wrist; the drives' current is above safety.motor_pull",
         "a tendon pulls {value} by its load cell, beyond {limit}", "a pull of {value} by load cell (limit {limit})",
         True, weighed=True,
     ),
     "excess_pull": Residual(
         _N, "pull by load cell beyond what its spool explains", lambda s: s.safety.excess_pull, 0.8,
-        "tendons pull against each other, are caught or stiffer than safety.stiffest; a cell's zero: wristctl hw weigh",
+        f"{AGAINST}, are caught or stiffer than safety.stiffest; a cell's zero: wristctl hw weigh",
         "a tendon pulls {value} more than its spool explains, beyond {limit}",
         "{value} of pull that no spool explains (limit {limit})", True, weighed=True,
     ),
     "missing_pull": Residual(
         _N, "pull that a spool should make at least, of a tendon whose load cell shows less than a quarter",
-        lambda s: s.safety.missing_pull, 0.8, "a tendon is off its pulley, cut or slipped; a stalled motor",
+        lambda s: s.safety.missing_pull, 0.8, LOST.format("a tendon"),
         "a tendon does not pull: its spool should make {value} at least, beyond {limit}",
         "{value} that a spool should make and no load cell shows (limit {limit})", True, weighed=True,
     ),
@@ -169,7 +168,7 @@ RESIDUALS: Mapping[str, Residual] = {
     ),
     "repeated": Residual(
         _COUNT, "pictures in the last second that were no news, or whose time cannot be", _never, 3.0,
-        "the camera or its driver repeats old pictures: plug it in again, another USB port",
+        REPEATS,
         notes="{value} pictures within a second were no news",
     ),
     "resent": Residual(
@@ -188,7 +187,7 @@ RESIDUALS: Mapping[str, Residual] = {
 }  # fmt: skip
 
 _SENSOR = "the sensor, its cable or program, and what look() returns: wristctl check-rig"
-_TARGETS = "tendons, motors or the sensor do otherwise than the facts say; something holds or pushes the wrist"
+_TARGETS = f"tendons, motors or the sensor do otherwise than the facts say; {PUSHED}"
 # What a robot of one's own has no part for: a board that counts, markers and their pictures, load cells.
 _NO_PART = (
     "lapses", "disabled", "doubted", "across", "resent", "moved", "cell_age", "measured_pull", "excess_pull",

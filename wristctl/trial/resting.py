@@ -106,10 +106,24 @@ def _judge_noise(
     if by_size:
         seen["size"] = [scale * math.log(sighting.size) for sighting in sightings]
     for what, bends in seen.items():
-        errs = math.degrees(float(np.std(bends))) / math.sqrt(settings.homing.frames)
+        errs = _error(bends, settings)
         if len(bends) > 2 and errs > _STEADY * settings.homing.bend_deg:
             problem = (
                 f"the markers{whose} are seen unsteadily: by the {what} of the tip's a reading errs by {errs:.2f} deg, "
                 f"and homing tells tendons apart by {0.5 * settings.homing.bend_deg:g} deg"
             )
             raise SafetyStop(problem, "homing", "more light, a longer device.exposure, focus; or more homing.frames")
+
+
+def judge_looks(sightings: Sequence[Sighting], settings: RigSettings, where: str) -> None:
+    """Raises SafetyStop where looks of a rig at a wrist that rests scatter too much; `where` is the rig's place."""
+    planes = range(settings.planes)
+    errs = max(_error([look.theta for look in sightings if look.plane == plane], settings) for plane in planes)
+    if errs > _STEADY * settings.homing.bend_deg:
+        problem = f"the bend is seen unsteadily: a reading errs by {errs:.2f} deg"
+        raise SafetyStop(problem, where, "a steadier sensor, more homing.frames, or a larger homing.bend_deg")
+
+
+def _error(bends: Sequence[float], settings: RigSettings) -> float:
+    """Standard deviation of a reading [deg] of bends that scatter so [rad]."""
+    return math.degrees(float(np.std(bends))) / math.sqrt(settings.homing.frames)

@@ -10,13 +10,12 @@ from wristctl.config.hw_run import HwRunSettings
 from wristctl.config.wrist import WristParameters
 from wristctl.errors import UserError
 from wristctl.rig import Refused, Spread, most, value
-from wristctl.trial.expected_moves import ExpectedMoves, middle
+from wristctl.trial.expected_moves import ExpectedMoves
 from wristctl.trial.guarded_rig import GuardedRig, RigStop
-from wristctl.trial.homing import Line, finder_of, rest_of
+from wristctl.trial.homing import finder_of, rest_of
 from wristctl.trial.rig_drive import RigTracking
-from wristctl.trial.rig_experiment import halt_rig
-from wristctl.trial.rig_homing import PLANE
 from wristctl.trial.rig_motors import RigMotors
+from wristctl.trial.rig_stand import PLANE, halt_rig
 from wristctl.wrist.tendon_layout import TendonLayout
 
 # Seconds for which looks are watched, a response to a step, and between two polls of a rig.
@@ -192,12 +191,8 @@ class RigTrier:
     def _scale(self) -> str:
         step, expected = self._settings.actuator.step_length, self._expected
         self._finder.slacken()
-        found: dict[int, Line] = {}
-        for turns in expected.turns:
-            found |= self._finder.turn(turns, self._about)
-        lines = [found[tendon] for tendon in range(len(self._about))]
-        straight = middle([line.rest for line in lines])
-        self._slack = step * np.array([line.taut(expected.along(k, straight)) for k, line in enumerate(lines)])
+        lines, _, taut = self._finder.lines(self._about)
+        self._slack = step * np.array(taut)
         self._metres = step * np.array([line.per_radian for line in lines])
         meant = [step * expected.steps(axis=tendon) for tendon in range(len(lines))]
         toward = [expected.place(k) if math.isnan(found) else found for k, found in enumerate(self._finder.directions)]
@@ -275,7 +270,7 @@ class RigTrier:
         """A step that is stopped at once goes no further, where the rig's delay leaves the time for it."""
         drive = self._facts.drive
         _, share = self._step(0, self._settings.homing.pull, stop=True)
-        halted = halt_rig(self._rig, 0.3 * math.radians(self._settings.homing.bend_deg))
+        halted = halt_rig(self._rig, self._settings)
         if not halted.verified:
             raise Unfit(f"after stop() {halted.how}")
         if value(drive.delay) + value(drive.lag) > 4.0 * _POLL and share > _GONE_ON:

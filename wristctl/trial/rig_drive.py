@@ -13,6 +13,7 @@ from wristctl.rig import value
 from wristctl.simulation.spool_timing import remembered_commands
 from wristctl.trial.camera_pace import CameraPaces
 from wristctl.trial.guarded_rig import GuardedRig
+from wristctl.trial.rig_words import AGAINST
 from wristctl.trial.safety import SafetyStop
 from wristctl.trial.spools import Follower
 from wristctl.vision.camera_pose import CameraPose
@@ -185,7 +186,7 @@ class RigTracking:
         if seen.tension is not None and (seen.tension > most).any():
             worst = int(np.nanargmax(seen.tension))
             problem = f"tendon {worst + 1} pulls {seen.tension[worst]:.3g} N, beyond {most:g} N"
-            raise SafetyStop(problem, self._rig.where, "something holds the wrist, or tendons pull against each other")
+            raise SafetyStop(problem, self._rig.where, f"something holds the wrist, or {AGAINST}")
         if seen.time <= self._time:
             return []
         self._number += 1

@@ -207,6 +207,11 @@ def share_of_pair(layout: TendonLayout | None, planes: int) -> float:
     return 1.0 if layout is None or planes == 2 else 0.25 * len(layout.places)
 
 
+def as_modelled(wrist: WristParameters, layout: TendonLayout | None, planes: int) -> WristParameters:
+    """The wrist as models of a rig with these tendons have it; None: of a board with its four."""
+    return wrist if layout is None or planes == 2 else sides_of(wrist, layout)
+
+
 def sides_of(wrist: WristParameters, layout: TendonLayout) -> WristParameters:
     """The wrist in one plane whose tendons have the lever of this layout's, as models in one plane have it."""
     lever = float(np.abs(layout.cross_section[:, 0]).max())

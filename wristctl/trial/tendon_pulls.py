@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from wristctl.arrays import Array
 from wristctl.board.messages import AXES, Pulls
 from wristctl.config.hw_run import RigSettings
+from wristctl.trial.rig_words import AGAINST, CELL, LOST
 from wristctl.trial.safety import SafetyStop
 from wristctl.trial.weighing import at_an_end, newtons
 from wristctl.wrist.directions import ACTIVE
@@ -24,8 +25,7 @@ _SHOWN = 0.25
 _PART = 0.5
 
 _AGAINST = (
-    "tendons pull against each other: they are shorter than at homing, or motors make steps that nobody counts "
-    "(wires beside motor wires)"
+    f"{AGAINST}: they are shorter than at homing, or motors make steps that nobody counts (wires beside motor wires)"
 )
 _FIX = "cut the motors' supply, slacken the tendons by hand, and look (documentation: Load cells)"
 _CELL_FIX = (
@@ -71,10 +71,10 @@ class TendonPulls:
     def judge(self) -> None:
         """Raises SafetyStop where a cell is silent, or a tendon beside motors that stand pulls beyond all limits."""
         if self.age.max() > self._limits.cell_age:
-            raise SafetyStop(f"no reading of a load cell: {self.causes('cell_age')}", fix=_CELL_FIX)
+            raise SafetyStop(f"no reading of a load cell: {self.causes('cell_age')}", fix=self.fix("cell_age"))
         if np.nanmax(self.pull, initial=0.0) > self.most:
             problem = f"a tendon pulls {np.nanmax(self.pull):.0f} N by its load cell, beyond {self.most:.0f} N"
-            raise SafetyStop(f"{problem}; likely {self.causes('measured_pull')}", fix=_FIX)
+            raise SafetyStop(f"{problem}; likely {self.causes('measured_pull')}", fix=self.fix("measured_pull"))
 
     def residuals(self, clock: float, stretch: Array) -> dict[str, float]:
         """Residuals of load cells at a time, with tendons stretched so far [m] by their spools (negative: slack).
@@ -96,14 +96,19 @@ class TendonPulls:
             "missing_pull": float(self._least.max()),
         }
 
+    @staticmethod
+    def fix(name: str) -> str:
+        """What to do about a residual beyond its limit."""
+        return _CELL_FIX if name == "cell_age" else _FIX
+
     def causes(self, name: str) -> str:
         """Likely causes of a residual's size, with the tendons that have part in it."""
         if name == "cell_age":
             named = _named(self.age > self._limits.cell_age)
-            return f"the amplifier of {named} is unplugged or without supply, or a wire of its cell is broken"
+            return CELL.format(f"the amplifier of {named}")
         if name == "missing_pull":
             named = _named(self._least > _PART * self._least.max())
-            return f"the tendon of {named} is off its pulley, cut or slipped, or its motor has stalled"
+            return LOST.format(f"the tendon of {named}")
         beyond = self.pull if name == "measured_pull" else self._more
         pulling = beyond > _PART * np.nanmax(beyond)
         if pulling.sum() > 1:

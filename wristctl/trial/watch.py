@@ -16,10 +16,11 @@ from wristctl.config.wrist import WristParameters
 from wristctl.control.response import Estimate
 from wristctl.trial.blind_model import BlindModel
 from wristctl.trial.camera_record import CameraRecord, Frame, Recent, jump_between
-from wristctl.trial.likely_causes import Evidence, likely_causes, parts_of_board, parts_of_rig, reversals
+from wristctl.trial.likely_causes import Evidence, likely_causes, reversals
 from wristctl.trial.marker_lag import MarkerLag
 from wristctl.trial.residuals import Judge, Limit, limits_of, notes, residual, stopped_by, worst
 from wristctl.trial.rig_belief import TOWARD, names_of_planes, numbers_of, pull_directions, unit_toward
+from wristctl.trial.rig_words import words_of_board, words_of_rig
 from wristctl.trial.safety import SafetyStop
 from wristctl.trial.spools import spools_of
 from wristctl.trial.tendon_pulls import TendonPulls
@@ -32,11 +33,6 @@ from wristctl.wrist.tendon_layout import TendonLayout
 _HISTORY, _SWINGING = 0.2, 1.0
 # Seconds that are summed up: of ticks, of lapsed rates, of commands sent again.
 _TICKS, _EVENTS, _SEEN = 0.5, 1.0, 2.0
-_FIX = (
-    "cut the motors' supply, slacken the tendons by hand, look (documentation: Faults and refusals), then wristctl hw "
-    "check --rig"
-)
-_FIX_OF_RIG = "cut the motors' power, slacken the tendons by hand, look, then wristctl check-rig"
 # Periods after which spools' steps that were counted are old: those of the tick before are one.
 _UNHEARD = 2.5
 # Share of the limit on a bend across by which what stands may seem to bend.
@@ -89,7 +85,7 @@ class Watch:
         planes, own = names_of_planes(settings.planes, plane), settings.rig is not None
         self._seen_in = np.array([unit_toward(TOWARD[name]) for name in planes])
         self._away = away_from_camera(plane, settings.markers.positive) if settings.planes == 1 else np.zeros(2)
-        self._parts = (parts_of_rig if own else parts_of_board)(numbers_of(layout), planes)
+        self._words = (words_of_rig if own else words_of_board)(numbers_of(layout), planes)
         self._spools, self._period, self._radius = spools_of(settings.actuator), timing.period, wrist.tendon_radius
         if stiffness is not None:
             self._spools = replace(self._spools, stiffness=stiffness)
@@ -205,8 +201,8 @@ class Watch:
         for limit in self.limits:
             value = values.get(limit.name, 0.0)
             if abs(value) > limit.limit:
-                problem = stopped_by(limit, value, self._own) + self._named(limit.name)
-                raise SafetyStop(problem, fix=residual(limit.name, self._own).causes)
+                problem, fix = self._told(limit, value)
+                raise SafetyStop(problem, fix=fix)
 
     def ticked(self, clock: float, round_trip: float, skipped: int, culprit: str) -> None:
         """A tick has ended: its command's round trip, the ticks after it that are skipped, and by whose fault."""
@@ -251,8 +247,8 @@ class Watch:
         return camera.unseen(clock, since, self._settings.sensor)
 
     def _stop(self, limit: Limit, tick: Tick) -> SafetyStop:
-        name, line = limit.name, residual(limit.name, self._own)
-        problem, fix = stopped_by(limit, self._values[name], self._own), line.causes
+        name = limit.name
+        problem, fix = self._told(limit, self._values[name])
         if name == "age":
             why, fix = self._timing.camera.missing(tick.clock, limit.limit)
             problem += f" ({why})"
@@ -262,17 +258,17 @@ class Watch:
             blamed = Counter(who for who in self._blamed.values(tick.clock) if math.isfinite(who))
             culprit = list(FIX)[int(blamed.most_common(1)[0][0])]
             problem, fix = f"{problem}: {culprit}", FIX[culprit]
-        elif line.weighed:
-            problem += self._named(name)
         elif name in _FOLLOWING or (name == "pull" and self._settings.planes == 2):
-            fix = _FIX_OF_RIG if self._own else _FIX
+            fix = self._words.stopped
             problem = f"{problem}; likely {', or '.join(self._causes(tick)[:4])}"
         return SafetyStop(problem, fix=fix)
 
-    def _named(self, name: str) -> str:
-        if self._pulls is None or not residual(name).weighed:
-            return ""
-        return f"; likely {self._pulls.causes(name)}"
+    def _told(self, limit: Limit, value: float) -> tuple[str, str]:
+        """What stops the motors, and what to do about it; load cells tell which tendons have part in it."""
+        problem, line = stopped_by(limit, value, self._own), residual(limit.name, self._own)
+        if self._pulls is None or not line.weighed:
+            return problem, line.causes
+        return f"{problem}; likely {self._pulls.causes(limit.name)}", self._pulls.fix(limit.name)
 
     def _causes(self, tick: Tick) -> list[str]:
         if not self._past:
@@ -295,7 +291,7 @@ class Watch:
                 meant=np.array([(two.predicted - one.predicted)[0] for one, two in ends]) @ self._seen_in,
                 jump=np.array(jumps),
                 directions=pull_directions() if self._layout is None else self._layout.directions,
-                parts=self._parts,
+                words=self._words,
                 bends=math.radians(self._settings.safety.across_deg),
                 oblique=self._oblique,
                 reversals=reversals(np.array(self._positions)),

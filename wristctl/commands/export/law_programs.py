@@ -211,8 +211,8 @@ class _Loop:
         if isinstance(self.drive, LaggedDrive):
             return LaggedDrive(motor, stiffness)
         if isinstance(self.drive, ServoDrive):
-            return ServoDrive(motor, stiffness, Motor(*tracer.inputs(self._board)), self.drive.targets)
-        return SpoolDrive(motor, stiffness, Timing(*tracer.inputs(self._board)), self.drive.rates)
+            return ServoDrive(motor, stiffness, Motor(*tracer.inputs(self._board)), self.drive.sent)
+        return SpoolDrive(motor, stiffness, Timing(*tracer.inputs(self._board)), self.drive.sent)
 
     def _respond(self) -> Function:
         tracer, planes, places = Tracer(), self.planes, self.places

@@ -36,12 +36,9 @@ def answer_of(
     done = completed(trials)
     compared, labels = with_simulation(done, twins), list(dict.fromkeys(done["label"]))
     more = f"All tables: --all. Every trial: {run}/report.html" if run else "All tables: `.tables`."
-    notes = [
-        *_at_rest(done, twins),
-        *_apart(compared, labels),
-        *swings_apart(done, twins),
-        *unsound(trials, marks, metrics),
-    ]
+    apart = [*_apart(compared, labels), *swings_apart(done, twins)]
+    apart[-1:] = [f"{last} Do not rely on that simulation here." for last in apart[-1:]]
+    notes = [*_at_rest(done, twins), *apart, *unsound(trials, marks, metrics)]
     if not labels:
         return Answer(f"None of {len(trials)} trials was completed.", None, notes, more)
     moving = {number for number, twin in twins.items() if not rests(twin.trajectory)}
@@ -180,7 +177,7 @@ def _apart(trials: pd.DataFrame, labels: Sequence[str]) -> list[str]:
                 facts.append(f"{where} {size}, {times} than {_in_deg(simulated)} deg simulated")
     if not facts:
         return []
-    return [f"Measured and simulated errors do not agree: {'; '.join(facts)}. Do not rely on that simulation here."]
+    return [f"Measured and simulated errors do not agree: {'; '.join(facts)}."]
 
 
 class Swings(NamedTuple):
@@ -277,7 +274,7 @@ def swings_apart(done: pd.DataFrame, twins: Mapping[int, Simulation]) -> list[st
         notes.append(
             f"In {int(where.sum())} of {len(done)} trials the {swinging} swings at rest, by up to "
             f"{degrees(float(one[worst]))} deg peak to peak, where the {resting} has {degrees(float(other[worst]))} "
-            f"deg: {kinder}, by {degrees(float(one[worst] - other[worst]))} deg. Do not rely on that simulation here."
+            f"deg: {kinder}, by {degrees(float(one[worst] - other[worst]))} deg."
         )
     return notes
 

@@ -51,7 +51,7 @@ def plan(study: Study, inputs: Inputs) -> str:
     with under("hw-run"):
         check_live(settings.reference, [row.controller for row in settings.rows], known, settings.control_period)
         if settings.planes == 1 and not settings.reference.is_live:
-            check_reach([settings.reference], _in_its_plane(settings, known), "reference")
+            check_reach([settings.reference], _as_modelled(settings, known), "reference")
         elif settings.planes == 2:
             check_bends_of_trials(settings, known)
         check_inverses(inverses_of([settings.reference]), inputs)
@@ -66,13 +66,11 @@ def plan(study: Study, inputs: Inputs) -> str:
     return f"{describe_rig(settings)}\n{count} trials, about {count * trial_seconds:.0f} s of motion after homing"
 
 
-def _in_its_plane(settings: HwRunSettings, wrist: WristParameters) -> WristParameters:
-    """The wrist as models in one plane have it."""
+def _as_modelled(settings: HwRunSettings, wrist: WristParameters) -> WristParameters:
     from wristctl.trial.rig_belief import layout_of_rig
-    from wristctl.trial.rig_settings import sides_of
+    from wristctl.trial.rig_settings import as_modelled
 
-    layout = layout_of_rig(settings, wrist)
-    return wrist if layout is None else sides_of(wrist, layout)
+    return as_modelled(wrist, layout_of_rig(settings, wrist), settings.planes)
 
 
 def check_bends_of_trials(settings: HwRunSettings, wrist: WristParameters) -> None:

@@ -12,7 +12,7 @@ from wristctl.commands.live_record import keep_live, tell_address, with_record
 from wristctl.commands.printed_table import Table, degrees
 from wristctl.commands.rig_description import coming_first
 from wristctl.commands.session import Session
-from wristctl.config.choices import PLANTS, RIGS
+from wristctl.config.choices import RIGS
 from wristctl.config.hw_run import HwRunSettings
 from wristctl.config.wrist import WristParameters
 from wristctl.control.table import Gains
@@ -20,19 +20,19 @@ from wristctl.errors import fix_of
 from wristctl.reader_units import in_degrees
 from wristctl.records import LiveRun
 from wristctl.simulation.metrics import METRICS, metrics_in
+from wristctl.trial.board_stand import BoardStand
 from wristctl.trial.calibration import WristCalibration
-from wristctl.trial.experiment import Experiment
+from wristctl.trial.experiment import Experiment, Stand, Stop, log_of
 from wristctl.trial.guarded_rig import GuardedRig
 from wristctl.trial.live_datagrams import LiveReference
 from wristctl.trial.log import TrialLog
 from wristctl.trial.residuals import FILE, limits_of, plain, residual
-from wristctl.trial.rig_belief import PLANES, layout_of_rig, numbers_of
-from wristctl.trial.rig_experiment import BEFORE_MOTION, RigExperiment
+from wristctl.trial.rig_belief import PLANES, layout_of_rig
 from wristctl.trial.rig_settings import rig_of
+from wristctl.trial.rig_stand import BEFORE_MOTION, RigStand
 from wristctl.trial.safety import SafetyStop
 from wristctl.trial.testbeds import open_testbed
 from wristctl.trial.trial_results import FURTHER, JUDGED, LOGGED, TRULY, metrics_of_trials
-from wristctl.trial.trial_series import Stop
 from wristctl.trial.trials import Trial, trials_of
 from wristctl.vision.camera import Frame
 from wristctl.vision.marker import Sighting
@@ -92,26 +92,12 @@ def perform_trials(
     trials = trials_of(settings, np.random.default_rng(session.findings.stream("order")))
     calibration = session.inputs.read("calibration", WristCalibration.load)
     rig = None if settings.rig is None else GuardedRig(rig_of(RIGS[settings.rig], settings.rig), settings.rig)
-    plant = PLANTS[settings.bench.plant.model]
-    coordinates = plant.coordinates(settings.bench.segments) if settings.port is None and rig is None else None
     monotonic = settings.port is not None or settings.real_time or (rig is not None and not rig.virtual)
-    folder, weighed = run.file("data/log.csv").parent, settings.load_cells is not None
-    if coordinates is not None:
-        coordinates *= settings.planes
-    tendons = numbers_of(layout_of_rig(settings, study.wrist))
-    trial_log = TrialLog(
-        folder, coordinates, settings.control_period, monotonic, weighed, settings.planes, tendons, rig is None
-    )
-    experiment: Experiment | RigExperiment
+    trial_log = log_of(run.file("data/log.csv").parent, settings, study.wrist, monotonic)
     live: LiveReference | None = None
     try:
         live = _listening(session, trials, rig)
-        if rig is not None:
-            experiment = RigExperiment(settings, study.wrist, trials, trial_log, network, tuned, live)
-        else:
-            experiment = Experiment(
-                settings, study.wrist, trials, trial_log, network, tuned, calibration, study.seed, live
-            )
+        experiment = Experiment(settings, study.wrist, trials, trial_log, network, tuned, live)
         films = _films(run, settings) if rig is None else []
     except BaseException:
         trial_log.close()
@@ -121,11 +107,9 @@ def perform_trials(
     stopped: BaseException | None = None
     try:
         with coming_first(session, settings):
-            if isinstance(experiment, RigExperiment):
-                assert rig is not None
-                _perform_on(rig, session, experiment, trials)
-            else:
-                _perform(session, bench, experiment, films, trials)
+            stand = _stand_of(session, bench, rig, calibration, films)
+            with session.operator.watch(trials, session) as shown:
+                experiment.run(stand, shown)
     except BaseException as error:
         stopped = error
     try:
@@ -167,23 +151,19 @@ def _listening(session: Session, trials: list[Trial], rig: GuardedRig | None) ->
     return live
 
 
-def _perform(
-    session: Session, bench: WristParameters, experiment: Experiment, films: Films, trials: list[Trial]
-) -> None:
+def _stand_of(
+    session: Session, bench: WristParameters, rig: GuardedRig | None, calibration: WristCalibration | None, films: Films
+) -> Stand:
+    """The rig, or the opened board with its cameras."""
     study, settings = session.study, session.study.hw_run
+    if rig is not None:
+        return RigStand(rig) if rig.virtual else RigStand(rig, partial(session.operator.confirm, BEFORE_MOTION))
     with session.progress("preparing the emulated bench" if settings.port is None else "opening board and camera"):
         runs = session.inputs.runs()
         view, view_2 = View.of(runs.get("optics")), View.of(runs.get("optics_2"))
         keep = partial(_add, films) if films else None
         testbed = open_testbed(settings, bench, study.seed, view, session.operator.confirm, keep, view_2)
-    with session.operator.watch(trials, session) as shown:
-        experiment.run(testbed, shown)
-
-
-def _perform_on(rig: GuardedRig, session: Session, experiment: RigExperiment, trials: list[Trial]) -> None:
-    confirm = None if rig.virtual else partial(session.operator.confirm, BEFORE_MOTION)
-    with session.operator.watch(trials, session) as shown:
-        experiment.run(rig, shown, confirm)
+    return BoardStand(testbed, calibration, study.seed)
 
 
 def _films(run: LiveRun, settings: HwRunSettings) -> Films:
@@ -210,7 +190,7 @@ def _evaluate(
     run: LiveRun,
     settings: HwRunSettings,
     wrist: WristParameters,
-    experiment: Experiment | RigExperiment,
+    experiment: Experiment,
     trials: list[Trial],
 ) -> pd.DataFrame:
     """trials.csv: a row for each trial that began, by the log alone."""
@@ -263,10 +243,8 @@ def stopped_answer(stop: Stop, table: pd.DataFrame, count: int) -> list[str]:
     return lines
 
 
-def _summarise(
-    session: Session, experiment: Experiment | RigExperiment, trial_log: TrialLog, table: pd.DataFrame, count: int
-) -> None:
-    """Timing, zero, and where it was stopped why, whether the motors stand, and the last second."""
+def _summarise(session: Session, experiment: Experiment, trial_log: TrialLog, table: pd.DataFrame, count: int) -> None:
+    """Timing, zero, and where it was stopped whether the motors stand, and the last second: the error says why."""
     findings, settings, timing = session.findings, session.study.hw_run, experiment.timing
     findings.metric("ticks", len(timing.late), meaning="control ticks")
     meaning = "ticks skipped because one before took too long"
@@ -297,14 +275,13 @@ def _summarise(
     log.warning("%s after %.0f ms (%s)", _stand(stop), 1e3 * stop.halt.seconds, stop.halt.how)
     if not trial_log.last:
         findings.summary(stop.reason)
-        log.warning("%s", stop.reason)
         return
     text = _last_second(trial_log, settings.rig is not None).text()
     findings.summary(f"{stop.reason}\n\n```\n{text}\n```")
-    log.warning("%s\n%s", stop.reason, text)
+    log.warning("%s", text)
 
 
-def _tell_oddities(session: Session, experiment: Experiment | RigExperiment) -> None:
+def _tell_oddities(session: Session, experiment: Experiment) -> None:
     """Report how near trials came to the limits on unexpected motion, and anything odd."""
     findings, most = session.findings, experiment.most
     parts = []

@@ -123,9 +123,9 @@ def on_the_rig(study: Study) -> Study:
     """
     if study.recommend.rig is None:
         return study
+    from wristctl.trial.experiment import spared
     from wristctl.trial.rig_belief import layout_of_rig
     from wristctl.trial.trial_results import in_pairs
-    from wristctl.trial.trial_series import spared
 
     trials, settings = _trials(study), study.recommend
     wrist, loop = spared(study.wrist, trials), settings.loop
