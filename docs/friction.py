@@ -41,6 +41,8 @@ WORLDS = {
 MOVE, HOLD, STREAMS = 4.0, 61.0, 5
 CLOSED = 0.01
 """Error [deg] below which a controller is said to have closed the dead band."""
+MICROSTEP = 0.06
+"""What a microstep of a spool turns the wrist by [deg]."""
 
 
 class Measured(NamedTuple):
@@ -78,14 +80,26 @@ def driven(name: str, gains: str, loop: Loop, horizon: float, streams: int = 1) 
 
 
 def presets() -> list[tuple[str, str]]:
+    """Those whose stated conditions hold the rig on which all are tried."""
+    return [each for each in stated() if within(*each)]
+
+
+def stated() -> list[tuple[str, str]]:
     """Those that state the conditions that they are made for."""
     return [(name, gains) for name in CONTROLLERS for gains in controller(name).conditions]
 
 
+def within(name: str, gains: str) -> bool:
+    """Whether period and stiffness of the rig on which all are tried are within a preset's conditions."""
+    conditions = controller(name).conditions[gains]
+    ranges = (conditions.period, conditions.tendon_stiffness)
+    return all(low <= value <= high for value, (low, high) in zip(NOMINAL, ranges, strict=True))
+
+
 def corners(name: str, gains: str) -> list[tuple[float, float]]:
     """Shortest and longest period with softest and stiffest tendons of a preset's conditions."""
-    stated = controller(name).conditions[gains]
-    return [(period, stiffness) for period in stated.period for stiffness in stated.tendon_stiffness]
+    conditions = controller(name).conditions[gains]
+    return [(period, stiffness) for period in conditions.period for stiffness in conditions.tendon_stiffness]
 
 
 def swing(done: Sequence[Repeated]) -> float:
@@ -163,10 +177,22 @@ def told(found: Found) -> list[str]:
         f"friction ({names[first]}) and {three[last, rmse]:.2g} deg with 3 rad ({names[last]}).",
         f"Friction damps: {better} of {len(names)} presets swing less at rest with 3 rad of sheath than without "
         f"friction. Nowhere inside their conditions do they swing by more than {outermost:.2g} deg.",
-        f"None hunts: over the second half of a minute, with a camera without noise, friction leaves at most "
-        f"{hunting[:, 1:].max():.2g} deg of movement ({names[most[0]]}); a microstep of a spool is 0.06 deg. A stepper "
-        "holds its spool: there is little that stick-slip could feed on.",
+        f"{_hunting(dict(zip(names, hunting[:, 1:].max(axis=1), strict=True)))} Over the second half of a minute, with "
+        f"a camera without noise, friction leaves at most {hunting[:, 1:].max():.2g} deg of movement "
+        f"({names[most[0]]}).",
     ]
+
+
+def _hunting(moved: dict[str, float]) -> str:
+    """Which presets move by more than a spool's microstep, as half a peak-to-peak has it [deg]."""
+    more = [name for name, size in moved.items() if size > MICROSTEP]
+    if more:
+        hunt = "hunt" if len(more) > 1 else "hunts"
+        return f"{', '.join(more)} {hunt}: by more than a microstep of a spool, {MICROSTEP:g} deg."
+    return (
+        f"None hunts by more than a microstep of a spool, {MICROSTEP:g} deg: a spool "
+        "holds, and stick-slip has little to feed on."
+    )
 
 
 def _growth(ratios: np.ndarray) -> str:
@@ -175,14 +201,20 @@ def _growth(ratios: np.ndarray) -> str:
 
 _HOW = """
 What closes the band is an integral of the error, or what is adapted; stiffness and feedback alone do not. Every preset
-that states its conditions, behind steppers, tendons of 20 kN/m and a camera of 60 Hz, two frames late with 0.1 deg of
-noise, at 5 ms, which is within the conditions of them all (a rig ticks every 10 ms); minimum-jerk moves of 1 s to 5,
-15, 30 and 45 deg on both sides, 5 streams of noise, 4 s each. Columns have four numbers: without friction, and with a
+whose stated conditions hold tendons of 20 kN/m and a period of 5 ms (a rig ticks every 10 ms), behind steppers and a
+camera of 60 Hz, two frames late with 0.1 deg of noise; minimum-jerk moves of 1 s to 5, 15, 30 and 45 deg on both
+sides, 5 streams of noise, 4 s each.{others} Columns have four numbers: without friction, and with a
 coefficient of 0.1 and no sheath, 1 rad and 3 rad of it. `left` is the mean error over the second half of a minute's
 hold, `hunting` half the peak-to-peak there, trend removed, both with a camera without noise; `corners` is the largest
 oscillation at the corners of the preset's conditions. What friction does to the wrist itself:
 [hysteresis.md](hysteresis.md). Made by `python docs/friction.py`.
 """
+
+
+def _others() -> str:
+    """Which presets are not here, as this rig is not within their conditions."""
+    others = [f"{name}/{gains}" for name, gains in stated() if not within(name, gains)]
+    return f" Not within its conditions there, and so not here: {', '.join(others)}." if others else ""
 
 
 def page(found: Found) -> str:
@@ -195,7 +227,7 @@ def page(found: Found) -> str:
         "",
         "![Errors of each preset without friction and with three angles of sheath](images/friction.png)",
         "",
-        *_HOW.strip().splitlines(),
+        *textwrap.wrap(_HOW.format(others=_others()).strip(), 119, break_on_hyphens=False, break_long_words=False),
         "",
         "| preset | RMSE [deg] | steady state [deg] | left [deg] | oscillation [deg] | corners [deg] | hunting [deg] |",
         "| --- | --- | --- | --- | --- | --- | --- |",

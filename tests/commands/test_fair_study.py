@@ -175,7 +175,8 @@ def test_a_comparison_of_what_a_study_ships_has_its_figures_to_the_last_bit(
         assert again.means[row].value == shipped["rig"]["controllers"][law]["rmse"]
         assert again.standing.lost[row].times == shipped["rig"]["controllers"][law]["lost"]
     monkeypatch.syspath_prepend(DOCS)
-    page, run = script_of_docs("study"), run_of(compared)
+    page, run = script_of_docs("study"), compared.run
+    assert run is not None
     ((name, shown),) = page.rankings_of(run).items()
     assert name == "rig" and {line["row"] for line in shown} >= {f"{law}/tuned" for law in study.study.laws}
     scores = page.scores_of(run, name)
