@@ -31,7 +31,7 @@ COMMANDS = (
     "compare quick --tuned latest:tune",
     "simulate --controller smc --gains exchanged",
     "analyse --controller gvsc --gains default",
-    "study fair_study --executor processes --set study.families=[ideal]",
+    "study pid-ff ct-dob scenarios/ideal --executor processes",
     "paper audit claims",
     "hysteresis hysteresis",
     "hw-run --set directions=[ulnar] --set push.force=0",
