@@ -29,6 +29,7 @@ from published_gains import SHIPPED, source_of
 from ranking_rows import Rankings, Row, deg, first_group, group, interval, short, three
 
 from wristctl.commands.printed_table import joined
+from wristctl.commands.study.published import what_changed
 from wristctl.commands.study.units import families_of as families_studied
 from wristctl.comparison.bootstrap import paired_ratio, penalised
 from wristctl.comparison.world_ranking import kinds_of
@@ -54,8 +55,8 @@ _SIMULATED = """**All of it is simulated: nothing here was measured on a real ri
 real robots](real-robots.md)."""
 _ABOUT = """Each row of the table is a family of {worlds} simulated worlds, each another wrist on another rig, none of
 them seen in tuning. Each controller was tuned {tunings} times, each time with {evaluations} sets of gains on {draws}
-other worlds. Beside an RMSE stand those of the best and the worst of its tunings, as the study found them. The RMSE is
-the geometric mean over worlds{over_all}, by a bootstrap, and of the mean, not of single wrists. Controllers are
+other worlds. Beside an RMSE stand those of the best and the worst of its tunings, as the study found them{former}. The
+RMSE is the geometric mean over worlds{over_all}, by a bootstrap, and of the mean, not of single wrists. Controllers are
 distinguished by their paired differences in the same worlds: one may be worse though its RMSE lies in the other's
 interval{by_overlap}. Not distinguished does not mean equal: an RMSE more than a tenth above the lowest stands beside
 the name. Where a line above is of several rigs, it names what is not distinguished from the lowest on the most of them,
@@ -170,16 +171,16 @@ def use(rankings: Mapping[str, Sequence[Row]], where: str, otherwise: Mapping[st
         words += f" Too uncertain to be told from it: {joined(far)}." if far else ""
     elif len(chosen) == len(rankings) and others:
         words += f" On each of these none is shown to be better than {joined([short(o) for o in others], 'or')} either."
-    for name in (name for name in rankings if name not in chosen and first_group(rankings[name])):
-        rows = {row["row"]: row for row in rankings[name]}
-        lowest = first_group(rankings[name])[0]
-        why = "it must not be used: there " if label in rows and group(rows[label]) is None else ""
-        words += f" In {name} {why}use {short(lowest['row'])}: RMSE {interval(lowest)} deg."
     lost = [f"{100.0 * _lost(row):.2g} % of the worlds of {name}" for name, row in chosen.items() if _lost(row)]
     if lost:
         words += f" It fails, swings or chatters in {joined(lost)}."
     if any(_lost(row) > LOST for row in chosen.values()):
         words += f" More than {100.0 * LOST:.0f} % would forbid its use, which so few worlds do not show at 95 %."
+    for name in (name for name in rankings if name not in chosen and first_group(rankings[name])):
+        rows = {row["row"]: row for row in rankings[name]}
+        lowest = first_group(rankings[name])[0]
+        why = "it must not be used: there " if label in rows and group(rows[label]) is None else ""
+        words += f" In {name} {why}use {short(lowest['row'])}: RMSE {interval(lowest)} deg."
     return "\n".join(textwrap.wrap(f"- **{where}**: {words}", 120, subsequent_indent="  "))
 
 
@@ -371,6 +372,12 @@ def tunings_of(families: Iterable[str]) -> dict[tuple[str, str], tuple[float, fl
     }
 
 
+def has_changed(family: str) -> bool:
+    """Whether a family or its drive is another than when its gains were found."""
+    found = json.loads(SHIPPED.read_text(encoding="utf-8"))[family]
+    return bool(what_changed(family, found["family_sha256"], found["drive"]))
+
+
 def plainly(label: str, family: str) -> str:
     """A row's label, of gains tuned for this family without its name."""
     return label.removesuffix(f"{PREFIX}{family}") + "tuned" if label.endswith(f"{PREFIX}{family}") else label
@@ -442,11 +449,13 @@ def main() -> None:
     budget = study.study.budgets["full"]
     (worlds,) = {run.config.compare.worlds.draws if run.kind == "compare" else budget.worlds for run in runs}
     studied = [name for run in runs if run.kind == "study" for name in families_of(run)]
+    former = [name for name in families if has_changed(name)]
     how = _ABOUT.format(
         worlds=worlds,
         tunings=budget.tunings,
         evaluations=budget.candidates * budget.iterations,
         draws=budget.draws,
+        former=f" ({joined(former)}: with the motions and the budget of that time)" if former else "",
         over_all=_OVER.format(of_studies=joined(studied)) if studied else "",
         by_overlap=_OVERLAP if len(studied) < len(families) else "",
         few=max(round(worlds * _lost(row)) for rows in rankings.values() for row in rows if group(row)),
