@@ -48,12 +48,24 @@ def test_a_rigs_line_has_the_lowest_error_of_what_may_be_used_what_is_as_good_an
 
 
 def test_of_one_tuning_each_those_whose_tunings_overlap_the_lowests_are_not_told_from_it(script: ModuleType) -> None:
-    ends = {"mpc": (0.09, 0.19), "ct-dob": (0.1, 0.12), "lqi": (0.18, 0.3), "smc": (0.05, 0.3), "pid": (0.2, 0.3)}
+    ends = {
+        "mpc": (0.09, 0.19),
+        "ct-dob": (0.1, 0.12),
+        "lqi": (0.18, 0.3),
+        "smc": (0.05, 0.3),
+        "pid": (0.2, 0.3),
+        "nc": (0.01, 0.08),
+    }
     tunings = {("camera", f"{name}/tuned"): (math.radians(a), math.radians(b)) for name, (a, b) in ends.items()}
-    ranked = [*ROWS, row("pid/tuned", 3, 0.25, 1.0), row("smc/tuned", math.nan, 0.1, 1.0, 0.5)]
+    ranked = [
+        *ROWS,
+        row("pid/tuned", 3, 0.25, 1.0),
+        row("nc/tuned", 2, 0.2, 1.0),
+        row("smc/tuned", math.nan, 0.1, 1.0, 0.5),
+    ]
     found = {each["row"]: each["group"] for each in script.by_tunings(ranked, tunings)}
     assert [label for label, number in found.items() if number == 1] == ["mpc/tuned", "ct-dob/tuned", "lqi/tuned"]
-    assert found["pid/tuned"] == 3 and math.isnan(found["smc/tuned"])
+    assert found["pid/tuned"] == 3 and found["nc/tuned"] == 2 and math.isnan(found["smc/tuned"])
     assert script.by_tunings(ROWS, {}) == ROWS
 
 
