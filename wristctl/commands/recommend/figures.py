@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 
 def errors(result: Recommended) -> Figure:
-    """Every candidate's error on each rig, with median and 10 to 90 % of rigs; crosses are rigs that it loses.
+    """Every candidate's error on each rig, with median and the ends of 95 % of rigs; crosses are rigs that it loses.
 
     What cannot be relied on is grey, as is what has no feedback. A rig on which the wrist fails has no error: its cross
     stands at the right edge.
