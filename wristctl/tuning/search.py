@@ -39,6 +39,10 @@ if TYPE_CHECKING:
     from wristctl.control.law import Gain
 
 
+# Origin of gains that are not a preset's.
+SEARCHED = "search"
+
+
 @dataclass(frozen=True)
 class GainSpace:
     """Boxes of g positive gains; a coordinate u in [0, 1] is the gain low * (high / low)^u."""
@@ -108,6 +112,13 @@ class Search:
     restarts: int
     finalists: tuple[Finalist, ...] = ()
     """Best first; none as long as it goes on."""
+
+    @property
+    def best_preset(self) -> Finalist | None:
+        """The best of the controller's presets, of gains that the search came upon itself; else None."""
+        if not self.finalists or self.finalists[0].origin != SEARCHED:
+            return None
+        return next((finalist for finalist in self.finalists if finalist.origin != SEARCHED), None)
 
     @property
     def best_so_far(self) -> Array:
@@ -303,7 +314,7 @@ def _chosen(
     distinct: dict[tuple[float, ...], float] = {}
     for index in np.argsort(values, kind="stable"):
         distinct.setdefault(tuple(map(float, flat[index])), float(values[index]))
-    candidates = [(gains, "search", value) for gains, value in list(distinct.items())[:count]]
+    candidates = [(gains, SEARCHED, value) for gains, value in list(distinct.items())[:count]]
     if presets := _presets(controller, GainSpace.of(controller.gains)):
         judged = zip(presets.items(), judge(controller, np.array(list(presets.values()))), strict=True)
         candidates += [(tuple(map(float, each)), name, float(value)) for (name, each), value in judged]

@@ -121,7 +121,8 @@ def hw_run(session: Session) -> Performed:
     limited_session = _limited(identified_session, network, tuned)
     trials = perform_trials(limited_session, bench, network, tuned)
     identified_session = with_record(identified_session)
-    return replace(performed(identified_session, trials, network, tuned), study=study)
+    most = limited_session.study.hw_run.safety.tension
+    return replace(performed(identified_session, trials, network, tuned), study=study, tension_limit=most)
 
 
 def _limited(session: Session, network: Inverse | None, tuned: Gains | None) -> Session:
