@@ -15,8 +15,8 @@ from typing import Any
 from tutorials import FENCE, walk
 
 PAGE = Path(__file__).with_name("data-flow.md")
-STOP = re.compile(r"^(\| [^|]+ \| `[^`|]+` \| `([^`|]+)` \| )`[^`|]*` \|$", re.MULTILINE)
-"""A stop: its meaning, its place, its line of Python, and what that shows."""
+STOP = re.compile(r"^(\| [^|]+ \| `([^`|]+)` \| )`[^`|]*` \|$", re.MULTILINE)
+"""A stop: its meaning with its place, its line of Python, and what that shows."""
 
 
 def filled(text: str, folder: Path) -> str:
