@@ -83,7 +83,7 @@ def python(copy: Path, *arguments: str) -> str:
     """What Python prints in the copy."""
     own = os.environ | {"PYTHONPATH": str(copy), "COLUMNS": "200"}
     done = subprocess.run([sys.executable, *arguments], cwd=copy, env=own, capture_output=True, text=True)
-    assert done.returncode == 0, done.stderr
+    assert done.returncode == 0 and "Warning" not in done.stderr, done.stderr
     return done.stdout
 
 
@@ -102,6 +102,22 @@ def test_the_newcomers_shown_are_tuned_compared_and_told_of(copy: Path) -> None:
     tuned, default = (table.xs(gains, level="gains") for gains in ("tuned", "default"))
     assert (tuned["rmse"] < 0.5 * default["rmse"]).all() and "jerk [rad/s^3]" in said
     assert default["jerk"]["shaken"] > 1.5 * default["jerk"]["still"] > 0.0
+
+
+JERK = """
+from types import SimpleNamespace
+import numpy as np
+from wristctl.simulation.jerk import JERK
+time = np.linspace(0.0, 1.0, 11)
+for planes, rate in ((1, 5.0 * time**2), (2, np.outer(time**2, [3.0, 4.0]))):
+    print(JERK.of_trajectory(SimpleNamespace(time=time, rate=rate, planes=planes)))
+"""
+
+
+@pytest.mark.slow
+def test_the_metric_shown_is_the_same_in_every_plane(copy: Path) -> None:
+    """Rates of 5 t^2 along an axis, and along an oblique one: 10 rad/s^3."""
+    assert [float(line) for line in python(copy, "-c", JERK).splitlines()] == pytest.approx([10.0, 10.0])
 
 
 @pytest.mark.slow
