@@ -170,6 +170,17 @@ def _stopped(ref: str | Path, wanted: EarlierRun, out: Path) -> Run:
     return run
 
 
+def check_wound(wrist: WristParameters, planes: int, command: str) -> None:
+    """UserError unless a board's four axes wind this wrist's tendons in so many planes."""
+    from wristctl.board.messages import AXES
+    from wristctl.wrist.tendon_layout import wound_by
+
+    if planes == 1:
+        check_sides(wrist, command)
+    else:
+        wound_by(wrist, AXES)
+
+
 def check_sides(wrist: WristParameters, command: str) -> None:
     """UserError, naming what takes this wrist, unless its tendons are the four at 45 deg from both planes."""
     from wristctl.board.messages import AXES
