@@ -107,7 +107,7 @@ def with_planes(study: Study) -> Study:
     if loaded := _loaded(REFERENCES, name):
         _entry(REFERENCES, name, *loaded, study)
     planes = REFERENCES[name].planes
-    if settings.rig is None and "planes" not in settings.model_fields_set and all_around(study.wrist):
+    if settings.rig is None and "planes" not in settings.model_fields_set and wound_in_both_planes(study.wrist):
         return _bending_in(study, 2)
     if not settings.planes_are_open:
         if planes > settings.planes:
@@ -117,13 +117,17 @@ def with_planes(study: Study) -> Study:
     return _bending_in(study, planes)
 
 
-def all_around(wrist: WristParameters) -> bool:
-    """Whether tendons bend the wrist in both planes, and are none of two sides."""
+def wound_in_both_planes(wrist: WristParameters) -> bool:
+    """Whether a board winds the wrist's tendons, and they are not those of two sides: it bends in both planes then."""
     if wrist.tendons == "four":
         return False
-    from wristctl.wrist.tendon_layout import TendonLayout, off_both_sides
+    from wristctl.board.messages import AXES
+    from wristctl.wrist.tendon_layout import off_both_sides, wound_by
 
-    return off_both_sides(wrist) is not None and TendonLayout.of(wrist).planes == 2
+    try:
+        return off_both_sides(wrist) is not None and wound_by(wrist, AXES) is not None
+    except UserError:  # which is said where its tendons are looked at
+        return False
 
 
 def _bending_in(study: Study, planes: int) -> Study:

@@ -102,7 +102,7 @@ class BoardStand:
             homed.check_zero()
             return calibration.zero
         signs = calibration.zero.signs if calibration else None
-        return find_zero(self._motors, self._tracking, settings, self._wrist, self._plane, signs, self._layout)
+        return find_zero(self._motors, self._tracking, settings, self._wrist, self._plane, signs, layout=self._layout)
 
     def _homed(self, zero: Zero) -> HomedWrist:
         return HomedWrist(self._motors, self._tracking, self._settings, self._wrist, self._plane, zero, self._layout)

@@ -6,7 +6,7 @@ import math
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from wristctl.commands.adoption import all_around
+from wristctl.commands.adoption import wound_in_both_planes
 from wristctl.commands.calibrate.wrist import CALIBRATION
 from wristctl.commands.hw_run.results import Performed, performed
 from wristctl.commands.inputs import EarlierRun, Inputs
@@ -167,7 +167,7 @@ def _in_one_plane(study: Study) -> bool:
     return (
         settings.rig is None
         and settings.planes == 1
-        and ("planes" in settings.model_fields_set or not all_around(study.wrist))
+        and ("planes" in settings.model_fields_set or not wound_in_both_planes(study.wrist))
     )
 
 
