@@ -62,7 +62,9 @@ def test_three_tendons_take_the_true_wrist_round_as_its_simulation_goes(tmp_path
     log, truth = done.table("log"), done.table("truth")
     assert np.degrees(log[[f"bend_{p}" for p in PLANES]].abs().max()).min() > 10.0, "in both planes"
     for name, table in (("tension", log), ("position", log), ("sent", log), ("pull", truth)):
-        assert [column for column in table if column.startswith(f"{name}_")] == [f"{name}_{k}" for k in (1, 2, 3)]
+        assert [column for column in map(str, table) if column.startswith(f"{name}_")] == [
+            f"{name}_{k}" for k in (1, 2, 3)
+        ]
     assert done.bench.motion().steps[3] == 0 and min(np.ptp(log[f"position_{k}"]) for k in (1, 2, 3)) > 100
     study = load_study([], ["wrist.tendons=three"]).model_copy(update={"hw_run": circling()})
     simulation = twin(study, Trial(0, "circumduction", 0, 0.0, 0), None, None)
