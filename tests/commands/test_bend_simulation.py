@@ -87,6 +87,12 @@ def test_a_recording_of_two_planes_is_followed_in_both(tmp_path: Path) -> None:
     wanted = bends_of(chosen.reference, chosen.direction, study.wrist, 0.98, 1e-3)
     assert np.rad2deg(wanted[:, 0, ::20]) == pytest.approx(bends[:, : wanted[:, 0, ::20].shape[1]], abs=1e-6)
     assert wanted[1, 2, 500] == pytest.approx(np.deg2rad(-14.0), rel=1e-4)
+    for scale in (0.5, -1.0):
+        scaled = study_of("simulate.loop.planes=2", "simulate.reference.kind=recording",
+                          f"simulate.reference={{file: {file}, scale: {scale}}}").simulate.reference  # fmt: skip
+        scaled_bends = bends_of(scaled, chosen.direction, study.wrist, 1.5, 1e-3)
+        np.testing.assert_allclose(scaled_bends[:, :, :980], scale * wanted, atol=1e-9)
+        assert not scaled_bends[:, 1:, 981:].any() and np.ptp(scaled_bends[:, 0, 981:], axis=1).max() == 0.0, "it rests"
     one = tmp_path / "one.csv"
     rows = "\n".join(f"{t:.3f},{y:.6f}" for t, y in zip(time, bends[0], strict=True))
     one.write_text(f"time [s],angle [deg]\n{rows}\n")

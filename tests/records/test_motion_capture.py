@@ -147,6 +147,16 @@ def test_objects_of_vicon_with_quaternions_and_segments_with_rotation_vectors(tm
     assert any("rotation vectors" in remark for remark in read_log(file).remarks)
 
 
+def test_segments_of_two_subjects_that_are_called_alike_are_told_apart(tmp_path: Path) -> None:
+    base, tip, at_base, at_tip = poses(BENDS)
+    rows = cells(base.as_quat(), 1e3 * at_base, tip.as_quat(), 1e3 * at_tip)
+    head, units = ["RX", "RY", "RZ", "RW", "TX", "TY", "TZ"], ["", "", "", "", "mm", "mm", "mm"]
+    file = vicon(tmp_path, "Segments", ["One:Root", "Two:Root"], head, units, rows)
+    np.testing.assert_allclose(bends_of(file, "tip=Two:Root, base=Root"), BENDS, atol=1e-7)
+    with pytest.raises(UserError, match="2 rigid bodies, Root, Two:Root"):
+        read_log(file)
+
+
 MARKERS = 0.03 * np.array([[0, 1, 0], [0, -1, 0.2], [0.3, 0, 1], [1, 0, -1]])
 
 

@@ -71,9 +71,12 @@ def test_a_larger_target_reels_in_whatever_the_sense_and_the_turns() -> None:
         passed(rig, 0.3, stood)
 
 
-def test_a_servo_that_stands_too_many_turns_away_is_named() -> None:
-    rig, _ = rehearsed(turns=(0, 256))
-    with pytest.raises(Fault, match=r"servo 2 stands 25[67] turns"):
+@pytest.mark.parametrize(
+    ("turns", "named"), [((0, 256), r"servo 2 stands 25[67]"), ((0, 0, -257), r"servo 3 .* -25[67]")]
+)
+def test_a_servo_that_stands_too_many_turns_away_is_named(turns: tuple[int, ...], named: str) -> None:
+    rig, _ = rehearsed(turns=turns)
+    with pytest.raises(Fault, match=f"{named} turns"):
         rig.connect()
 
 

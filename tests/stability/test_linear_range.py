@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -209,6 +210,15 @@ def test_what_happens_at_times_is_listed_as_left_out() -> None:
         assert found[name].read_as == "left out" and math.isnan(found[name].swing)
     assert "a spool that slips" not in found
     assert not TrueActuator().backlash and "backlash" not in _limits(row("smc-tracking", "hardware", BEHIND))
+
+
+@pytest.mark.parametrize("bend", [(-25.0, 0.0), (0.0, 25.0), (15.0, -20.0)])
+def test_the_end_stops_are_as_far_as_the_bend_of_both_planes_leaves_room(bend: tuple[float, float]) -> None:
+    swing = _swing(0.0)
+    linear = replace(swing.linear, theta=np.radians(bend), tensions=(5.0, 6.0, 7.0, 8.0))
+    assert linear.planes == 2
+    found = _told(replace(swing, linear=linear), EVERYTHING)
+    assert found["the end stops"].swing == pytest.approx(math.radians(15.0))
 
 
 def test_lagged_motors_have_steps_and_a_speed() -> None:

@@ -76,3 +76,18 @@ def test_before_two_cameras_an_axis_bends_the_wrist_toward_its_tendon(axis: int)
     toward = math.atan2(found.bend.away, found.bend.theta)
     assert math.cos(toward - pull_directions()[axis]) > math.cos(math.radians(10.0))
     assert math.radians(0.9) < found.bend.askew < math.radians(settings.max_deg)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("axis", "flexion_ratio", "plane"), [(0, 0.3, 1), (1, 3.0, 0)])
+def test_a_tendon_counts_as_taut_by_the_plane_that_bends_most_to_either_side(
+    axis: int, flexion_ratio: float, plane: int
+) -> None:
+    """One plane is softer, and both tendons bend the wrist to that plane's other side."""
+    camera, wrist = {"frame_rate": 30.0}, WristParameters(flexion_ratio=flexion_ratio, gravity=(9.81, 0.0))
+    given = {"bench": {"person": {"takes": 0.0}, "camera": camera, "camera_2": camera}, "homing": {"frames": 2}}
+    settings = CalibrateWristSettings.model_validate({"planes": 2, **given})
+    bench = VirtualBench(settings.bench, wrist, 0, settings.markers, settings.markers_2)
+    bend = axis_tried(EmulatedTestbed(bench, settings, [View(), View()], None), settings, wrist, axis).bend
+    most, least = (bend.away, bend.theta) if plane else (bend.theta, bend.away)
+    assert -math.radians(1.4) < most < -math.radians(1.0) and abs(least) < 0.7 * abs(most)
