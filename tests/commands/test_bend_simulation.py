@@ -103,6 +103,20 @@ def test_a_recording_of_two_planes_is_followed_in_both(tmp_path: Path) -> None:
     assert planes_of(study.wrist, [Asked(one_plane.loop, one_plane.reference)]) == 1
 
 
+def test_noise_of_a_recording_in_two_planes_is_smoothed_away(tmp_path: Path) -> None:
+    time, rng = np.arange(0.0, 2.0, 0.01), np.random.default_rng(0)
+    clean = np.array([10.0 * np.sin(2.0 * time), 8.0 * np.cos(2.0 * time)])
+    rows = zip(time, *(clean + 0.2 * rng.standard_normal(clean.shape)), strict=True)
+    file = tmp_path / "noisy.csv"
+    file.write_text("time [s],bend_y [deg],bend_z [deg]\n" + "\n".join(f"{t:.2f},{y:.6f},{z:.6f}" for t, y, z in rows))
+    for noise, most in ((0.0, None), (0.2, 0.08)):
+        asked = study_of("simulate.loop.planes=2", "simulate.reference.kind=recording",
+                         f"simulate.reference={{file: {file}, noise_deg: {noise}}}")  # fmt: skip
+        wanted = np.rad2deg(bends_of(asked.simulate.reference, "ulnar", asked.wrist, 1.99, 0.01))
+        off = np.sqrt(np.mean((wanted[:, 0] - clean[:, :199]) ** 2, axis=1))
+        assert (off == pytest.approx(0.2, rel=0.2)) if most is None else (off < most).all()
+
+
 def tips_file(folder: Path, tips: np.ndarray, more: str = "") -> Study:
     """A study that follows tips (T, 3) [m], 50 a second, in two planes."""
     rows = "\n".join(f"{0.02 * k:.3f},{x:.7f},{y:.7f},{z:.7f}" for k, (x, y, z) in enumerate(1e3 * tips))

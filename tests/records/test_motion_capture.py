@@ -157,6 +157,19 @@ def test_segments_of_two_subjects_that_are_called_alike_are_told_apart(tmp_path:
         read_log(file)
 
 
+def test_of_a_body_in_two_sections_the_first_counts(tmp_path: Path) -> None:
+    base, tip, at_base, at_tip = poses(BENDS)
+    head, units = ["RX", "RY", "RZ", "RW", "TX", "TY", "TZ"], ["", "", "", "", "mm", "mm", "mm"]
+    names, still = ["Base", "Hand"], np.tile([0.0, 0.0, 0.0, 1.0], (len(BENDS), 1))
+    texts = []
+    for kind, turns in (("Objects", (base.as_quat(), tip.as_quat())), ("Segments", (still, still))):
+        rows = cells(turns[0], 1e3 * at_base, turns[1], 1e3 * at_tip)
+        texts.append(vicon(tmp_path, kind, names, head, units, rows).read_text())
+    file = tmp_path / "both.csv"
+    file.write_text("\n".join(texts))
+    np.testing.assert_allclose(bends_of(file), BENDS, atol=1e-7)
+
+
 MARKERS = 0.03 * np.array([[0, 1, 0], [0, -1, 0.2], [0.3, 0, 1], [1, 0, -1]])
 
 

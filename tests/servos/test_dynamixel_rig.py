@@ -258,6 +258,21 @@ def test_a_stop_holds_the_servos_where_they_are_and_they_can_go_on() -> None:
     assert servos.servos[0].place == pytest.approx(stood[0], abs=2.0)
 
 
+def test_a_stop_lets_go_of_a_servo_that_says_the_same_position_for_ever_and_never_sends_it_there() -> None:
+    """Should the packet that lets go be lost too, the servo stays at its goal."""
+    rig, servos = rehearsed("stale-position")
+    stood = rig.connect()
+    away = stood + np.array([300.0, 700.0, 0.0])
+    with pytest.raises(Fault, match="stall: servo 2"):
+        passed(rig, 2.0, away)
+    rig.stop()
+    rig.clock.wait_until(rig.clock.now() + 0.05)
+    assert [servo.torque for servo in servos.servos] == [1, 0, 1]
+    goals = [kept(servo, GOAL_POSITION) for servo in servos.servos]
+    assert goals[1] == SETTINGS.servos[1].sense * away[1]
+    assert goals[0] == pytest.approx(servos.servos[0].place, abs=10.0)
+
+
 def test_a_lost_answer_now_and_then_is_counted_and_survived() -> None:
     rig, _ = rehearsed("packet-lost", seed=3)
     stood = rig.connect()
