@@ -191,9 +191,7 @@ def test_rows_that_come_late_are_put_in_their_place_and_recordings_in_one_are_re
     log = looked_at(late)
     np.testing.assert_array_equal(log.columns["bend_y"], clean.columns["bend_y"])
     assert log.remarks == ["1 rows that come late are put in the order of their times; the first is at clean.csv:203."]
-    assert [log.at(row) for row in (199, 200, 201, 202)] == [clean.at(row) for row in (199, 201, 202, 200)], (
-        "in its file"
-    )
+    assert [log.at(row) for row in (199, 200, 201, 202)] == [clean.at(row) for row in (199, 201, 202, 200)]
     late = replace(clean, columns={name: np.roll(column, 300) for name, column in clean.columns.items()})
     again = looked_at(late)
     assert len(again.trials()) == 2  # from its first time on
