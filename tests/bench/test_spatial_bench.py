@@ -287,6 +287,15 @@ def test_what_it_does_not_have_is_refused(settings: dict[str, Any], key: str) ->
     assert refused.value.where == key and refused.value.exit_code == 2
 
 
+@pytest.mark.parametrize("axis", [0, 3])
+def test_the_first_and_the_last_tendon_break_when_they_should(axis: int) -> None:
+    """It bends to the side of the opposite one, which has nothing to pull against then."""
+    truth = course(ALL, Disturbances(), actuator={"broken_at": 0.6, "broken_tendon": axis + 1})
+    assert truth.pull[500].min() > 20.0 and truth.pull[-1, axis] == 0.0 and truth.pull[-1, [1, 2]].min() > 20.0
+    place = TENDONS[ACTIVE[axis]]
+    assert np.abs(truth.angle[500]).max() < 0.01 and (truth.angle[-1] * place < -0.005).all()
+
+
 def test_a_bench_in_one_plane_loads_no_kernel_of_two() -> None:
     code = (
         "import sys\n"
