@@ -14,6 +14,7 @@ from pydantic_core import PydanticUndefined
 from wristctl.config.choices import (
     CONTROLLERS,
     DISTURBANCES,
+    LOG_FORMATS,
     METRICS,
     OPTIMISERS,
     PLANTS,
@@ -32,7 +33,8 @@ OPENING = """# What can be chosen
 
 The configuration of a study. First what has a name: [controllers](#controllers), [references](#references),
 [metrics](#metrics), [optimisers](#optimisers), [disturbances](#disturbances), [plants](#plants),
-[rigs](#rigs), [networks](#presets-of-networks); then [every key](#every-key-of-a-study) with its default.
+[rigs](#rigs), [log formats](#log-formats), [networks](#presets-of-networks); then
+[every key](#every-key-of-a-study) with its default.
 `wristctl COMMAND --dry-run --all` prints the keys of a study. A newcomer to a table is one file and one line:
 [CONTRIBUTING](../CONTRIBUTING.md).
 
@@ -227,6 +229,12 @@ Robots in place of the board with its cameras, of `hw-run --rig`. One of your ow
 [your own rig](your-own-rig.md).
 
 {table("name, what it is", ((f"`{k}`", " ".join((v.__doc__ or "").split())) for k, v in RIGS.items()))}
+
+## Log formats
+
+Text of other programs, known by how it begins, or by its name in `--columns`: [the open log](open-log.md).
+
+{table("name, what it is", ((f"`{k}`", v.what) for k, v in LOG_FORMATS.items()))}
 
 ## Presets of networks
 

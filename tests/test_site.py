@@ -124,7 +124,7 @@ def test_a_search_for_words_of_the_field_gives_the_right_page_first(site: Path) 
 SEEN = (
     "index", "five-minutes", "your-own-wrist", "two-planes", "commands", "choices", "models", "study", "recommend",
     "runs", "your-own-rig", "servos", "reference/command-line/simulate", "tutorials", "tutorials/wrist-to-controller",
-    "tutorials/my-controller", "tutorials/log-to-controller",
+    "tutorials/my-controller", "tutorials/log-to-controller", "data-flow",
 )  # fmt: skip
 CLIPPED = (Path(__file__).parent / "data" / "clipped.js").read_text(encoding="utf-8")
 

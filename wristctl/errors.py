@@ -190,8 +190,13 @@ def under(path: str) -> Iterator[None]:
 
 
 def nearest(word: str, choices: Iterable[str]) -> str | None:
-    """The choice most like `word`, None where none is alike; capitals, and _ for -, make no difference."""
+    """The choice most like `word`, None where none is alike; capitals, and _ for -, make no difference.
+
+    Of choices whose first words are `word` it is the shortest: pd-ff of pd.
+    """
     known = list(choices)
+    if whole := [choice for choice in known if plain(choice).startswith(f"{plain(word)}-")]:
+        return min(whole, key=len)
     if not (matches := difflib.get_close_matches(plain(word), map(plain, known), n=1, cutoff=0.6)):
         return None
     alike = [choice for choice in known if plain(choice) == matches[0]]

@@ -41,6 +41,17 @@ def test_the_next_one_is_the_earliest_that_begins_later() -> None:
     assert faults().next("host-silent", 10.7) == math.inf and faults().next("board-reset", 0.0) == math.inf
 
 
+def test_of_several_trials_a_fault_is_in_each_or_in_the_first_alone() -> None:
+    each, first = InjectedFault(kind="port-lost", at=1.0), InjectedFault(kind="port-lost", at=1.0, since="first trial")
+    powered = InjectedFault(kind="port-lost", at=1.0, since="power-on")
+    schedule = Faults([each, first, powered])
+    begins = []
+    for start in (10.0, 20.0, 30.0):
+        schedule.begin(start)
+        begins.append([schedule.begun(fault) for fault in (each, first, powered)])
+    assert begins == [[11.0, 11.0, 1.0], [21.0, 11.0, 1.0], [31.0, 11.0, 1.0]]
+
+
 def test_before_a_trial_begins_none_is_on_and_none_is_next() -> None:
     idle = Faults([InjectedFault(kind="port-lost", at=0.0)])
     assert not idle.on("port-lost", 1e9) and idle.next("port-lost", 0.0) == math.inf

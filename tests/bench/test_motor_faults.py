@@ -84,3 +84,24 @@ def test_a_tendon_that_creeps_does_so_for_as_long_as_it_is_told_beside_others_th
     assert motors.next(0.0) == 0.5 and motors.creeping(0.49) == motors.creeping(0.71) == []
     assert motors.creeping(0.5) == [(1, -1.5e-3)]
     assert 0.5 < motors.next(0.5) <= 0.51 and motors.next(0.6) == 0.602, "in small pieces"
+
+
+def test_of_faults_at_once_drives_multiply_weak_supplies_bound_by_the_least_and_loads_add() -> None:
+    def fault(kind: Any, size: float, at: float, duration: float | None = None) -> InjectedFault:
+        return InjectedFault(kind=kind, size=size, at=at, duration=duration, axis=2, since="power-on")
+
+    known = MotorFaults(
+        Faults([
+            fault("drive-rescaled", 0.5, 1.0), fault("drive-rescaled", 0.8, 2.0, 1.0),
+            fault("torque-lost", 9.0, 1.0), fault("torque-lost", 4.0, 2.0, 1.0),
+            fault("payload-taken", 0.3, 1.0), fault("payload-taken", 0.1, 2.0, 1.0),
+        ]), (0, 1, 2, 3),
+    )  # fmt: skip
+    for time, scale, most, load in (
+        (0.5, 1.0, np.inf, 0.0),
+        (1.5, 0.5, 9.0, 0.3),
+        (2.5, 0.4, 4.0, 0.4),
+        (3.5, 0.5, 9.0, 0.3),
+    ):
+        assert known.rescaled(time) == pytest.approx([1.0, 1.0, scale, 1.0])
+        assert known.holding(time) == most and known.carried(time) == pytest.approx(load)

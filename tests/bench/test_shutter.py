@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
@@ -98,6 +99,14 @@ def test_only_its_own_fault_covers_or_swaps(kind: Any, which: str) -> None:
     for number, on in ((24, False), (25, True), (29, True), (31, False)):
         exposure = taken.expose(number)
         assert getattr(exposure, which) == on and exposure.covered + exposure.swapped == on
+
+
+def test_a_marker_that_peels_turns_from_when_it_began_and_one_that_is_turned_stands_askew() -> None:
+    peels = InjectedFault(kind="marker-peels", at=1.0, size=3.0, duration=2.0)
+    askew = InjectedFault(kind="marker-turned", at=2.0, size=-5.0)
+    taken = shutter(None, peels, askew)
+    turned = [math.degrees(taken.expose(number).turned) for number in (49, 50, 75, 125, 160)]
+    assert turned == pytest.approx([0.0, 0.0, 1.5, 4.5 - 5.0, -5.0], abs=1e-12)
 
 
 def test_frames_are_lost_by_chance_and_by_fault() -> None:

@@ -38,7 +38,7 @@ from wristctl.wrist.directions import ACTIVE, TENDONS
 from wristctl.wrist.spatial.spatial_model import spatial_terms
 from wristctl.wrist.spatial.spatial_segments import spatial_values
 from wristctl.wrist.spatial.spatial_statics import spatial_energy, spatial_equilibrium
-from wristctl.wrist.tendon_layout import TendonLayout
+from wristctl.wrist.tendon_layout import TendonLayout, wound_by
 
 pytestmark = pytest.mark.slow
 
@@ -68,7 +68,7 @@ def course(steps: tuple[int, ...], push: Disturbances | None = None, planes: int
 def values_of(wrist: WristParameters, settings: BenchSettings) -> np.ndarray:
     """The plant's values as the bench has it."""
     plant = plant_of(wrist, settings.plant)
-    layout = TendonLayout.four(plant.tendon_radius)
+    layout = wound_by(plant, 4) or TendonLayout.four(plant.tendon_radius)
     return spatial_values(plant, layout, settings.segments, axis=np.radians(plant.stiffness_axis_deg))
 
 
@@ -79,14 +79,16 @@ def values_of(wrist: WristParameters, settings: BenchSettings) -> np.ndarray:
         WristParameters(gravity=(0.0, 9.81)),
         WristParameters(gravity=(0.0, 0.0), gravity_flexion=9.81),
         WristParameters(stiffness_axis_deg=30.0, flexion_ratio=2.0),
+        WristParameters(tendons="three"),
     ],
 )
 def test_at_rest_it_stands_where_statics_put_it_under_the_same_pulls(wrist: WristParameters) -> None:
     settings = BenchSettings(motors=TAUT, actuator=SLIDING, plant=WeakenedPlant(payload=0.05))
     host = hosted(wrist, actuator=SLIDING, plant=settings.plant)
-    host.reel((-300, -100, -80, 500))
+    host.reel((-300, -100, -80, 500) if wrist.tendons == "four" else (-300, 500, 250, 200))  # the last winds none
     host.rest(4.0)
     truth = host.bench.truth()
+    assert truth.pull.shape[1] == (4 if wrist.tendons == "four" else 3)
     assert truth.angle.shape == (len(truth.time), 2) and truth.theta.shape == (len(truth.time), 8)
     resting = spatial_equilibrium(values_of(wrist, settings), settings.segments, truth.pull[-1], truth.theta[-1])
     assert np.abs(truth.angle[-1]).min() > 0.1 and np.abs(truth.theta[-1] - resting).max() < 1e-6
@@ -283,6 +285,15 @@ def test_what_it_does_not_have_is_refused(settings: dict[str, Any], key: str) ->
     with pytest.raises(UserError) as refused:
         VirtualBench(BenchSettings.model_validate(settings), WRIST, 0, None, SECOND)
     assert refused.value.where == key and refused.value.exit_code == 2
+
+
+@pytest.mark.parametrize("axis", [0, 3])
+def test_the_first_and_the_last_tendon_break_when_they_should(axis: int) -> None:
+    """It bends to the side of the opposite one, which has nothing to pull against then."""
+    truth = course(ALL, Disturbances(), actuator={"broken_at": 0.6, "broken_tendon": axis + 1})
+    assert truth.pull[500].min() > 20.0 and truth.pull[-1, axis] == 0.0 and truth.pull[-1, [1, 2]].min() > 20.0
+    place = TENDONS[ACTIVE[axis]]
+    assert np.abs(truth.angle[500]).max() < 0.01 and (truth.angle[-1] * place < -0.005).all()
 
 
 def test_a_bench_in_one_plane_loads_no_kernel_of_two() -> None:

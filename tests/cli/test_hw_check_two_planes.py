@@ -177,7 +177,7 @@ def test_a_camera_without_pictures_is_named(
     ("setting", "said"),
     [
         ("bench.plant.model=hinges", "no bench in two planes has bench.plant.model"),
-        ("wrist.tendons=three", "hw check moves four tendons at 45 deg from both planes; tendon 1 of this wrist"),
+        ("wrist.tendons=six", "the motor board has 4 axes, and this wrist 6 tendons off its axis"),
     ],
 )
 def test_what_cannot_be_checked_in_two_planes_is_refused_before_anything_is_opened(

@@ -30,8 +30,8 @@ TWO_PLANES = {
 """How a motion in two planes is asked for, of commands whose motions can be chosen."""
 WRIST = {"simulate", "gen-data", "train", "tune", "compare", "recommend", "hw-run", "study", "analyse", "hysteresis"}
 """Commands that compute with a wrist of the user's."""
-ANY = {"simulate", "compare", "tune", "study", "recommend", "analyse", "hysteresis", "gen-data", "train"}
-"""Of these, those that take tendons at any places."""
+ANY = {"simulate", "compare", "tune", "study", "recommend", "analyse", "hysteresis", "gen-data", "train", "hw-run"}
+"""Of these, those that take tendons at any places; of a motor board it is as many as its axes wind."""
 MUST = {"study": ("two_planes_study",)}
 """Study files without which a command has nothing to do."""
 
@@ -63,8 +63,12 @@ def test_in_one_plane_all_take_a_fifth_tendon_in_the_centre_and_three_bend_in_tw
 
 @pytest.mark.parametrize("motion", [(), ("--reference", "circumduction")])
 def test_a_rig_says_what_takes_a_wrist_that_its_motors_do_not_wind(call: Call, motion: tuple[str, ...]) -> None:
-    _, _, err = call("hw-run", *motion, "--set", "wrist.tendons=three", "--dry-run")
-    assert "hw-run moves four tendons" in err and "wristctl simulate bends this wrist in two planes" in err
+    code, out, _ = call("hw-run", *motion, "--set", "wrist.tendons=three", "--dry-run")
+    assert code == 0 and "planes: 2" in out, "nobody has to ask for them"
+    code, _, err = call("hw-run", *motion, "--set", "wrist.tendons=three", "--set", "hw-run.planes=1", "--dry-run")
+    assert code == 2 and "planes=2" in err
+    code, _, err = call("hw-run", *motion, "--set", "wrist.tendons=three", "--set", "hw-run.load_cells={}", "--dry-run")
+    assert code == 2 and "load_cells of a board are of the tendons 1, 2, 4 and 5" in err
     _, _, err = call("hw-run", *motion, "--set", "wrist.tendons=six", "--dry-run")
     assert "4 axes" in err and "6 tendons off its axis" in err and "wristctl identify" in err
 

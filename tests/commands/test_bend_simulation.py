@@ -87,6 +87,12 @@ def test_a_recording_of_two_planes_is_followed_in_both(tmp_path: Path) -> None:
     wanted = bends_of(chosen.reference, chosen.direction, study.wrist, 0.98, 1e-3)
     assert np.rad2deg(wanted[:, 0, ::20]) == pytest.approx(bends[:, : wanted[:, 0, ::20].shape[1]], abs=1e-6)
     assert wanted[1, 2, 500] == pytest.approx(np.deg2rad(-14.0), rel=1e-4)
+    for scale in (0.5, -1.0):
+        scaled = study_of("simulate.loop.planes=2", "simulate.reference.kind=recording",
+                          f"simulate.reference={{file: {file}, scale: {scale}}}").simulate.reference  # fmt: skip
+        scaled_bends = bends_of(scaled, chosen.direction, study.wrist, 1.5, 1e-3)
+        np.testing.assert_allclose(scaled_bends[:, :, :980], scale * wanted, atol=1e-9)
+        assert not scaled_bends[:, 1:, 981:].any() and np.ptp(scaled_bends[:, 0, 981:], axis=1).max() == 0.0, "it rests"
     one = tmp_path / "one.csv"
     rows = "\n".join(f"{t:.3f},{y:.6f}" for t, y in zip(time, bends[0], strict=True))
     one.write_text(f"time [s],angle [deg]\n{rows}\n")
@@ -95,6 +101,20 @@ def test_a_recording_of_two_planes_is_followed_in_both(tmp_path: Path) -> None:
         SIMULATE.plan(alone, Inputs())
     one_plane = alone.simulate.model_copy(update={"loop": alone.simulate.loop.model_copy(update={"planes": None})})
     assert planes_of(study.wrist, [Asked(one_plane.loop, one_plane.reference)]) == 1
+
+
+def test_noise_of_a_recording_in_two_planes_is_smoothed_away(tmp_path: Path) -> None:
+    time, rng = np.arange(0.0, 2.0, 0.01), np.random.default_rng(0)
+    clean = np.array([10.0 * np.sin(2.0 * time), 8.0 * np.cos(2.0 * time)])
+    rows = zip(time, *(clean + 0.2 * rng.standard_normal(clean.shape)), strict=True)
+    file = tmp_path / "noisy.csv"
+    file.write_text("time [s],bend_y [deg],bend_z [deg]\n" + "\n".join(f"{t:.2f},{y:.6f},{z:.6f}" for t, y, z in rows))
+    for noise, most in ((0.0, None), (0.2, 0.08)):
+        asked = study_of("simulate.loop.planes=2", "simulate.reference.kind=recording",
+                         f"simulate.reference={{file: {file}, noise_deg: {noise}}}")  # fmt: skip
+        wanted = np.rad2deg(bends_of(asked.simulate.reference, "ulnar", asked.wrist, 1.99, 0.01))
+        off = np.sqrt(np.mean((wanted[:, 0] - clean[:, :199]) ** 2, axis=1))
+        assert (off == pytest.approx(0.2, rel=0.2)) if most is None else (off < most).all()
 
 
 def tips_file(folder: Path, tips: np.ndarray, more: str = "") -> Study:

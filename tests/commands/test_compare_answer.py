@@ -12,7 +12,7 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from wristctl.commands.answer import LINES
-from wristctl.commands.compare.answer import answer_of, head_with_the_best
+from wristctl.commands.compare.answer import answer_of, head_with_the_best, presets_of_names
 from wristctl.commands.printed_table import COLUMNS, two
 from wristctl.commands.ranking_answer import DIGITS, advice, condition, names_of, not_to_use, winner
 from wristctl.commands.ranking_tables import answer_tables, controllers_table, standings_table
@@ -139,7 +139,6 @@ def test_a_controller_is_a_line_and_a_condition_a_column_in_the_order_that_was_t
     assert table.columns == ("controller", "sampled (12)", "push (12)")
     assert [row[0] for row in table.rows] == list(typed)
     assert names_of([one, other])["adrc/hardware"] == "adrc/hardware", "adrc alone would be another row"
-    assert "name alone: default if exact, else hardware" in table.title
     first = one.labels[winner(one, [one, other]) or 0]
     for label, cells in zip(typed, [row[1:] for row in table.rows], strict=True):
         for ranking, cell in zip((one, other), cells, strict=True):
@@ -151,7 +150,30 @@ def test_a_controller_is_a_line_and_a_condition_a_column_in_the_order_that_was_t
                 "swings 5.7 deg in 12 of 12" if swings else f"{two(np.degrees(mean.value), DIGITS)}{ends}{mark}"
             )
     given = controllers_table([stands()], names_of([stands()]))
-    assert "name alone" not in given.title and "more" not in given.title
+    assert "more" not in given.title
+
+
+def test_a_name_alone_is_told_with_its_preset_under_each_condition() -> None:
+    """Behind motors and camera the one for them; what has no such preset is named, and what was typed whole is not."""
+    typed = {"pid-ff": 2e-3, "smc": 1e-3, "mine": 1e-3, "feedforward": 0.1, "adrc/hardware": 1e-3}
+    exact, rig = stands(rmse=typed), stands("camera and tendons", rmse=typed)
+    default, hardware = {"pid-ff/default": {"Kp": 1.0}}, {"pid-ff/hardware": {"Kp": 5.0}}
+    one = {"mine/default": {"k": 1.0}}
+    gains = {
+        **default,
+        **hardware,
+        "smc/printed": {"P1": 1.0},
+        "smc/hardware": {"P1": 2.0},
+        **one,
+        "feedforward/default": {},
+    }
+    said = presets_of_names([exact, rig], gains | {"adrc/hardware": {"wc": 30.0}})
+    assert "hardware in motors + camera, default elsewhere (smc printed; mine default in all)" in said
+    assert "adrc" not in said and "feedforward" not in said
+    assert "preset hardware:" in presets_of_names([rig], hardware) and "preset default:" in presets_of_names(
+        [exact], default
+    )
+    assert not presets_of_names([stands()], {"pid-ff/default": {"Kp": 1.0}}), "none was typed by its name alone"
 
 
 def test_beyond_a_dozen_the_table_has_the_best_the_asked_for_and_the_number_of_the_rest() -> None:

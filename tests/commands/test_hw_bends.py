@@ -196,7 +196,7 @@ def test_a_tick_by_which_no_answer_had_come_moves_no_spool_of_an_open_log(whole:
     ("change", "problem"),
     [
         ("hw-run.reference.angle_deg=70", "a bend of 70 deg is beyond the wrist's range"),
-        ("wrist.tendons=three", "winds the four tendons 1, 2, 4 and 5"),
+        ("wrist.tendons=six", "the motor board has 4 axes, and this wrist 6 tendons off its axis"),
     ],
 )
 def test_what_cannot_be_is_refused_before_a_rig_is_opened(change: str, problem: str) -> None:

@@ -249,6 +249,8 @@ def test_the_answer_gives_error_settling_and_recovery_by_direction_in_degrees() 
     shown = next(line.split() for line in lines if line.startswith("smc/printed  ulnar"))
     assert shown[3] == "2.01", "as people read it, in degrees"
     assert "1 of 6 trials" in " ".join(lines), "one was stopped"
+    limited = " ".join(answer_of(table, _twins(0.03), {}, [], "", 31.4).lines())
+    assert "more than 31.4 N" in limited and "more than" not in " ".join(lines)
 
 
 @pytest.mark.parametrize(("simulated", "told"), [(0.02, True), (0.031, False), (0.05, False), (0.06, True)])

@@ -439,9 +439,10 @@ BEST = Candidate("pid-ff", "tuned", {"Kp": 3.0, "Ki": 1.23456789, "Kd": 0.2})
 
 def test_only_commands_that_can_have_the_wrist_are_named_for_its_files() -> None:
     assert takers_of(study_of(RIG)) == "simulate, compare and hw-run"
-    for other in ("wrist.tendons=six", "wrist.tendons=three"):
-        assert takers_of(study_of(RIG, other)) == "simulate and compare"
-        assert next_command(study_of(RIG, other), (), "f.yaml") == "wristctl simulate f.yaml"
+    three, six = (study_of(RIG, f"wrist.tendons={tendons}") for tendons in ("three", "six"))
+    assert takers_of(three) == "simulate, compare and hw-run" and takers_of(six) == "simulate and compare"
+    assert next_command(three, (), "f.yaml") == "wristctl hw-run f.yaml"
+    assert next_command(six, (), "f.yaml") == "wristctl simulate f.yaml", "a board has four axes"
 
 
 def test_the_next_command_is_of_the_wrist_and_not_of_the_recommendation() -> None:

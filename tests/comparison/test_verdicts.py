@@ -88,6 +88,14 @@ def test_a_perfect_follower_of_any_motion_reproduces_no_settling_time() -> None:
     assert of_settling(1.2, [0.0, NEVER], [1.0, 2.0]).verdict == OPEN
 
 
+@pytest.mark.parametrize("motions", [[0.0, 1.0], [1.0, 0.0]])
+def test_among_motions_of_which_one_is_a_step_the_papers_time_stays_open(motions: list[float]) -> None:
+    assert of_settling(1.2, [1.2, 1.2], motions).verdict == OPEN
+    assert of_settling(1.2, [0.5, 0.5], motions).verdict == OPEN
+    assert of_settling(1.2, [1.8 * (1 + HAIR), 5.0], motions).verdict == WORSE
+    assert of_settling(1.2, [NEVER, NEVER], motions).verdict == WORSE
+
+
 def test_after_a_step_settling_times_compare_as_any_number() -> None:
     assert of_settling(1.2, [1.2 * 1.5], [0.0]).verdict == "reproduced"
     assert of_settling(1.2, [1.8 * (1 + HAIR)], [0.0]).verdict == WORSE

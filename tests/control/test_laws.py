@@ -168,6 +168,8 @@ def test_every_controller_states_units_boxes_and_presets_of_all_its_gains(name: 
 def test_unknown_names_get_the_nearest_one() -> None:
     with pytest.raises(UserError, match="did you mean 'smc'"):
         controller("scm")
+    with pytest.raises(UserError, match="did you mean 'pd-ff'"):
+        controller("pd")
     with pytest.raises(UserError, match="did you mean 'printed'"):
         gains_of(controller("smc"), "prnted")
     with pytest.raises(UserError, match="unknown gain 'P4'"):

@@ -123,6 +123,16 @@ def test_a_log_in_which_nothing_moves_is_refused_before_a_fit() -> None:
         driven_robot([OpenLog(Path("made.csv"), "log", {**moving, **columns})], BELIEVED, SETTINGS)
 
 
+def test_one_log_of_two_clocks_leaves_the_delay_untold_whichever_it_is() -> None:
+    columns = {f"current_{k}": np.sin(k * TIME) for k in (1, 2, 3)}
+    moving = {"time": TIME, "bend_y": 0.3 * np.sin(TIME), "bend_z": 0.2 * np.sin(2.0 * TIME)}
+    one = OpenLog(Path("made.csv"), "log", {**moving, **columns})
+    two = replace(one, two_clocks=True)
+    for logs, told in (([one, one], True), ([one, two], False), ([two, one], False)):
+        robot, _, _ = driven_robot(logs, BELIEVED, SETTINGS)
+        assert ("delay" not in robot.untold) is told
+
+
 def test_logs_that_are_not_of_one_robot_at_one_mass_are_refused() -> None:
     columns = {f"current_{k}": np.sin(k * TIME) for k in (1, 2, 3)}
     moving = {"time": TIME, "bend_y": 0.3 * np.sin(TIME), "bend_z": 0.2 * np.sin(2.0 * TIME)}

@@ -5,14 +5,16 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 from pathlib import Path
+from unittest.mock import patch
 
 import numpy as np
 import pytest
 
-from wristctl.commands.identify.logs import told_answer
+from wristctl.commands.identify.logs import settings_told, told_answer
 from wristctl.config.wrist import TendonPlace, WristParameters
 from wristctl.errors import UserError
 from wristctl.identification.arc_fit import fit_arcs
+from wristctl.identification.driven_log import MOTIONS, motions_for
 from wristctl.identification.log_model import (
     everything_fitted,
     rate_of_logs,
@@ -237,6 +239,25 @@ def test_masses_are_asked_for_only_where_the_logs_have_not_several_and_no_tensio
     said = " ".join(told_answer(model.fits[0], [model], model).lines())
     assert ("tension_1 [N]" in said) == asks_for_tensions
     assert ("several masses" in " ".join(said.split())) == asks_for_masses
+
+
+def test_what_a_log_does_not_tell_is_named_with_the_motions_that_would() -> None:
+    logs = [planar()]
+    robot = robot_of_logs(logs, WRIST, 0.01)
+    model = next(iter(tried_models(robot, [recordings_of_logs(logs, robot)], False)))
+    fit = model.fits[0]
+    known = {name: one._replace(low=0.9, high=1.1) for name, one in fit.told.items()}
+    one_less = known | {"damping": known["damping"]._replace(low=-math.inf, high=math.inf)}
+    for told, named in ((one_less, True), (known, False)):
+        with patch.dict(vars(fit), told=told):
+            said = " ".join(" ".join(told_answer(fit, [model], model).lines()).split())
+        assert ("To tell damping, record: quick steps" in said) == named
+    assert motions_for(["gain", "tendon", "nothing that a motion tells"]) == [MOTIONS["gain"]], "each motion once"
+
+
+def test_settings_that_a_log_does_not_tell_are_named_as_given_or_not() -> None:
+    said = settings_told(WristParameters.model_validate({"length": 0.1}))
+    assert "wrist.length = 0.1 m (given)" in said and "tendon_radius = 0.02 m (by default)" in said
 
 
 def test_spools_and_motion_may_have_times_of_their_own() -> None:

@@ -11,6 +11,7 @@ import pytest
 
 import wristctl
 from wristctl.commands.export.open_log_of_run import open_log_of
+from wristctl.commands.export.recorded_motions import motions_of
 from wristctl.config.identify import IdentifySettings
 from wristctl.config.plant import Actuator
 from wristctl.config.wrist import WristParameters
@@ -148,8 +149,12 @@ def test_tendons_keep_the_numbers_that_identification_reads(
     columns = dict.fromkeys(("time", "bend_ulnar", "bend_flexion", "tip_x", "tip_y", "tip_z"), time)
     columns |= {f"spool_{k + 1}": k + time for k in range(len(places))}
     columns |= {f"acting_{k + 1}": 100.0 + k + time for k in range(len(places))}
+    columns |= {f"pull_{k + 1}": 200.0 + k + time for k in range(len(places))}
     with start_run("simulate", study, out=tmp_path) as run:
         run.table("data/bends.csv", columns)
+    with start_run("compare", study, out=tmp_path) as comparison:
+        rows = {name: np.stack([column, column + 1.0]) for name, column in columns.items()}
+        comparison.arrays("data/trajectories.npz", {**rows, "time": time})
     log = open_log_of(Run(run.path))
     off_axis = [k for k, place in enumerate(places) if place.radius > 0.0]
     assert tuple(log.tendons("spool")) == tuple(log.tendons("tension")) == numbers
@@ -157,5 +162,10 @@ def test_tendons_keep_the_numbers_that_identification_reads(
         np.testing.assert_array_equal(spool, k + time)
         tension = log.columns[f"tension_{number}"]
         np.testing.assert_array_equal(tension, (100.0 + k + time) / places[k].multiplicity)
+    for later, motion in enumerate([*motions_of(Run(run.path)), *motions_of(Run(comparison.path))]):
+        assert motion.commands is not None
+        assert list(motion.commands.columns) == [f"tension_{number}" for number in numbers]
+        for (_, tension), k in zip(motion.commands.columns.items(), off_axis, strict=True):
+            np.testing.assert_array_equal(tension, (200.0 + k + time + (later == 2)) / places[k].multiplicity)
     if max(place.multiplicity for place in places) == 1:
         assert tuple(places_of_log(log, study.wrist)) == numbers

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import csv
+import json
 import os
 import re
 import shutil
@@ -16,7 +18,7 @@ from wristctl.records import Run
 
 ROOT = Path(__file__).parents[2]
 PAGE = (ROOT / "CONTRIBUTING.md").read_text()
-KINDS = ("controller", "reference", "metric", "optimiser", "disturbance", "plant", "command")
+KINDS = ("controller", "reference", "metric", "optimiser", "disturbance", "plant", "rig", "log format", "command")
 STUDY = """\
 compare:
   horizon: 0.5
@@ -77,14 +79,19 @@ def copy(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
+def python(copy: Path, *arguments: str) -> str:
+    """What Python prints in the copy."""
+    own = os.environ | {"PYTHONPATH": str(copy), "COLUMNS": "200"}
+    done = subprocess.run([sys.executable, *arguments], cwd=copy, env=own, capture_output=True, text=True)
+    assert done.returncode == 0 and "Warning" not in done.stderr, done.stderr
+    return done.stdout
+
+
 def run(copy: Path, *arguments: str) -> tuple[Run, str]:
     """The run that `wristctl ...` of the copy leaves, and what it printed."""
     (copy / "study.yaml").write_text(STUDY)
-    own = os.environ | {"PYTHONPATH": str(copy), "COLUMNS": "200"}
-    command = [sys.executable, "-m", "wristctl", *arguments]
-    done = subprocess.run(command, cwd=copy, env=own, capture_output=True, text=True)
-    assert done.returncode == 0, done.stderr
-    return Run(copy / done.stdout.splitlines()[-1]), done.stdout
+    said = python(copy, "-m", "wristctl", *arguments)
+    return Run(copy / said.splitlines()[-1]), said
 
 
 @pytest.mark.slow
@@ -95,6 +102,56 @@ def test_the_newcomers_shown_are_tuned_compared_and_told_of(copy: Path) -> None:
     tuned, default = (table.xs(gains, level="gains") for gains in ("tuned", "default"))
     assert (tuned["rmse"] < 0.5 * default["rmse"]).all() and "jerk [rad/s^3]" in said
     assert default["jerk"]["shaken"] > 1.5 * default["jerk"]["still"] > 0.0
+
+
+JERK = """
+from types import SimpleNamespace
+import numpy as np
+from wristctl.simulation.jerk import JERK
+time = np.linspace(0.0, 1.0, 11)
+for planes, rate in ((1, 5.0 * time**2), (2, np.outer(time**2, [3.0, 4.0]))):
+    print(JERK.of_trajectory(SimpleNamespace(time=time, rate=rate, planes=planes)))
+"""
+
+
+@pytest.mark.slow
+def test_the_metric_shown_is_the_same_in_every_plane(copy: Path) -> None:
+    """Rates of 5 t^2 along an axis, and along an oblique one: 10 rad/s^3."""
+    assert [float(line) for line in python(copy, "-c", JERK).splitlines()] == pytest.approx([10.0, 10.0])
+
+
+@pytest.mark.slow
+def test_the_rig_shown_is_what_its_facts_say_and_homes_and_follows_a_trial(copy: Path) -> None:
+    told = json.loads(python(copy, "-m", "wristctl", "check-rig", "actuators", "--json"))
+    passed = {check["asked"]: check["passed"] for check in told["checks"]}
+    assert told["fit"] and all(passed[asked] for asked in ("sense", "scale", "delay", "stop", "Ctrl-C", "trial"))
+
+
+LOGS = """
+import sys
+from pathlib import Path
+import wristctl
+from wristctl.commands.identify.logs import logs_of, read_logs
+from wristctl.records.open_log import write_log
+for number, file in enumerate(sys.argv[1:]):
+    study = wristctl.load_study(None, f"identify.logs=['{file}']")
+    (log,) = logs_of(study)
+    write_log(log, Path(f"read_{number}.csv"))
+    print(read_logs([log], study).samples, *log.remarks, sep="; ")
+"""
+
+
+@pytest.mark.slow
+def test_the_log_format_shown_is_known_by_how_it_begins_and_read_for_identification(copy: Path) -> None:
+    heads, *rows = csv.reader((ROOT / "experiments" / "logs" / "clean.csv").read_text().splitlines())
+    labels = [head.replace(" ", "") for head in heads]
+    lines = [" ".join(f"{label}:{cell}" for label, cell in zip(labels, row, strict=True)) for row in rows]
+    lines[5:5] = ["Homing done", "bend_y[deg]:3.1"]
+    (copy / "monitor.txt").write_text("\n".join(lines))
+    shutil.copy(ROOT / "experiments" / "logs" / "clean.csv", copy)
+    clean, plotter = python(copy, "-c", LOGS, "clean.csv", "monitor.txt").splitlines()
+    assert (copy / "read_0.csv").read_text() == (copy / "read_1.csv").read_text()
+    assert plotter == f"{clean}; monitor.txt: 2 lines are passed over."
 
 
 @pytest.mark.slow

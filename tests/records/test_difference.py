@@ -112,6 +112,10 @@ def test_an_input_differs_by_its_result_and_not_by_its_name(results: Path) -> No
     assert not any(vars(difference(a, b)).values()), "another run with the same result is no difference"
     found = difference(a, c)
     assert found.inputs == [Change("network", first.result_hash, other.result_hash)] and found.config == []
+    without = _run(results, "tune", Study())
+    for one, two, change in ((without, a, (None, first.result_hash)), (a, without, (first.result_hash, None))):
+        found = difference(one, two)
+        assert found.inputs == [Change("network", *change)] and found.config == [], "of either run"
 
 
 def test_an_input_is_looked_for_beside_the_run_and_then_where_it_was(results: Path, tmp_path: Path) -> None:

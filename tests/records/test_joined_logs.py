@@ -85,6 +85,8 @@ def test_the_delay_of_two_clocks_is_not_identifiable() -> None:
     assert not robot_of_logs([log], wrist, 0.01).is_told("delay", 0.05, 1e-4)
     both = OpenLog(log.file, "log", log.columns)
     assert robot_of_logs([both], wrist, 0.01).is_told("delay", 0.05, 1e-4)
+    for logs in ([both, log], [log, both]):
+        assert not robot_of_logs(logs, wrist, 0.01).is_told("delay", 0.05, 1e-4), "whichever of several it is"
 
 
 def test_logs_that_have_both_stay_as_they_are() -> None:

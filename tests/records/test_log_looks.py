@@ -14,6 +14,7 @@ from wristctl.arrays import Array
 from wristctl.errors import UserError
 from wristctl.records.log_converters import read_log
 from wristctl.records.log_looks import looked_at
+from wristctl.records.log_order import parted
 from wristctl.records.open_log import OpenLog
 
 FIELD = Path(__file__).parents[1] / "data" / "field"
@@ -153,6 +154,13 @@ def test_other_jumps_of_a_counter_are_refused_at_their_line(tmp_path: Path) -> N
         looked_at(read_log(tmp_path / "turn.csv", COUNTS))
 
 
+def test_each_start_of_a_clock_counts_from_the_one_before() -> None:
+    """The first recording begins at 0, those after it at 5 s."""
+    time = np.concatenate([np.arange(0.0, 100.0, 0.5), np.arange(5.0, 20.0, 0.5), np.arange(5.0, 40.0, 0.5)])
+    log = parted(OpenLog(Path("three.csv"), "log", {"time": time, "bend_y": np.sin(time)}))
+    assert [len(trial) for trial in log.trials().values()] == [200, 30, 70] and list(log.trials()) == ["1", "2", "3"]
+
+
 @pytest.mark.parametrize("signed", [True, False])
 def test_clocks_and_counters_of_32_bits_wrap_too(signed: bool, tmp_path: Path) -> None:
     clean = read_log(CLEAN)
@@ -183,6 +191,7 @@ def test_rows_that_come_late_are_put_in_their_place_and_recordings_in_one_are_re
     log = looked_at(late)
     np.testing.assert_array_equal(log.columns["bend_y"], clean.columns["bend_y"])
     assert log.remarks == ["1 rows that come late are put in the order of their times; the first is at clean.csv:203."]
+    assert [log.at(row) for row in (199, 200, 201, 202)] == [clean.at(row) for row in (199, 201, 202, 200)]
     late = replace(clean, columns={name: np.roll(column, 300) for name, column in clean.columns.items()})
     again = looked_at(late)
     assert len(again.trials()) == 2  # from its first time on

@@ -147,6 +147,29 @@ def test_objects_of_vicon_with_quaternions_and_segments_with_rotation_vectors(tm
     assert any("rotation vectors" in remark for remark in read_log(file).remarks)
 
 
+def test_segments_of_two_subjects_that_are_called_alike_are_told_apart(tmp_path: Path) -> None:
+    base, tip, at_base, at_tip = poses(BENDS)
+    rows = cells(base.as_quat(), 1e3 * at_base, tip.as_quat(), 1e3 * at_tip)
+    head, units = ["RX", "RY", "RZ", "RW", "TX", "TY", "TZ"], ["", "", "", "", "mm", "mm", "mm"]
+    file = vicon(tmp_path, "Segments", ["One:Root", "Two:Root"], head, units, rows)
+    np.testing.assert_allclose(bends_of(file, "tip=Two:Root, base=Root"), BENDS, atol=1e-7)
+    with pytest.raises(UserError, match="2 rigid bodies, Root, Two:Root"):
+        read_log(file)
+
+
+def test_of_a_body_in_two_sections_the_first_counts(tmp_path: Path) -> None:
+    base, tip, at_base, at_tip = poses(BENDS)
+    head, units = ["RX", "RY", "RZ", "RW", "TX", "TY", "TZ"], ["", "", "", "", "mm", "mm", "mm"]
+    names, still = ["Base", "Hand"], np.tile([0.0, 0.0, 0.0, 1.0], (len(BENDS), 1))
+    texts = []
+    for kind, turns in (("Objects", (base.as_quat(), tip.as_quat())), ("Segments", (still, still))):
+        rows = cells(turns[0], 1e3 * at_base, turns[1], 1e3 * at_tip)
+        texts.append(vicon(tmp_path, kind, names, head, units, rows).read_text())
+    file = tmp_path / "both.csv"
+    file.write_text("\n".join(texts))
+    np.testing.assert_allclose(bends_of(file), BENDS, atol=1e-7)
+
+
 MARKERS = 0.03 * np.array([[0, 1, 0], [0, -1, 0.2], [0.3, 0, 1], [1, 0, -1]])
 
 

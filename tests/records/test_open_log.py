@@ -58,6 +58,8 @@ def test_names_of_another_author_are_mapped_with_their_units(tmp_path: Path) -> 
         ("bend_y=imv [deg]", "no column 'imv', which is to be bend_y", "did you mean 'imu'?"),
         ("bent=imu [deg]", "bent is no column of an open log", "did you mean"),
         ("bend_y", "'bend_y' maps no column", "bend_y=imu [deg]"),
+        ("qualysis", "unknown log format 'qualysis'", "did you mean 'qualisys'?"),
+        ("humasof", "unknown log format 'humasof'", "did you mean 'humasoft'?"),
         ("bend_y=imu [N]", "imu is in 'N'", "imu [deg] or [rad]"),
         (
             "bend_y=imu",

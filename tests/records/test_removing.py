@@ -72,7 +72,7 @@ def test_leftovers_of_every_kind_are_found_and_runs_are_not(make: Make, results:
     manifest.write_text(manifest.read_text().replace('"state": "ok"', '"state": "running"'))
     begun = results / "20260101T000000Z-tune-abcdef"
     mine = results / "20260101T000000Z-notes"
-    for folder in (results / ".20250101T000000Z-tune-123456.removed", begun, mine):
+    for folder in (results / ".20250101T000000Z-tune-123456.removed", begun, mine, results / "figures"):
         folder.mkdir()
     left = [begun / LOCK, begun / "config.yaml", begun / ".environment.txt.part", results / ".index-abcd1234"]
     left += [results / ".tags.json.part", crashed.path / ".reserve", crashed.path / "data" / ".samples.csv.part"]
@@ -89,7 +89,7 @@ def test_leftovers_of_every_kind_are_found_and_runs_are_not(make: Make, results:
         clear(each)
     assert list(leftovers(results)) == []
     assert {each.name for each in results.iterdir() if not each.name.startswith(".")} == {
-        run.id, crashed.id, mine.name, "tags.json",
+        run.id, crashed.id, mine.name, "figures", "tags.json",
     }  # fmt: skip
     run.check()
 

@@ -78,6 +78,17 @@ def test_joints_and_poses_of_a_bag_stand_at_their_own_times(tmp_path: Path, mcap
     assert "rigid body /hand against rigid body /base" in log.remarks[0]
 
 
+def test_poses_that_are_recorded_late_stand_at_their_stamps(tmp_path: Path) -> None:
+    """The one of 2.9 ms is recorded after the one of 3.0 ms."""
+    kind, times = "geometry_msgs/msg/PoseStamped", (0, 1_000_000, 2_900_000, 3_000_000, 4_000_000)
+    messages = [("/hand", kind, time, pose(1e-7 * time, 0.08)) for time in times]
+    recorded = [1_000_000 + time + time % 3_000_000 for time in times]
+    assert recorded[2] > recorded[3]
+    log = read_log(bag(tmp_path, True, messages), "tip=/hand, along=x")
+    np.testing.assert_allclose(log.columns["time"], 1e-9 * np.array(times), atol=1e-12)
+    np.testing.assert_allclose(log.columns["bend_y"], 1e-7 * np.array(times), atol=1e-9)
+
+
 def test_an_inertial_unit_is_a_body_and_one_without_orientation_is_none(tmp_path: Path) -> None:
     kind = "sensor_msgs/msg/Imu"
     file = bag(tmp_path, True, [("/imu", kind, k * 10**7, imu(0.1 * k, known=k != 2)) for k in range(4)])

@@ -71,9 +71,12 @@ def test_a_larger_target_reels_in_whatever_the_sense_and_the_turns() -> None:
         passed(rig, 0.3, stood)
 
 
-def test_a_servo_that_stands_too_many_turns_away_is_named() -> None:
-    rig, _ = rehearsed(turns=(0, 256))
-    with pytest.raises(Fault, match=r"servo 2 stands 25[67] turns"):
+@pytest.mark.parametrize(
+    ("turns", "named"), [((0, 256), r"servo 2 stands 25[67]"), ((0, 0, -257), r"servo 3 .* -25[67]")]
+)
+def test_a_servo_that_stands_too_many_turns_away_is_named(turns: tuple[int, ...], named: str) -> None:
+    rig, _ = rehearsed(turns=turns)
+    with pytest.raises(Fault, match=f"{named} turns"):
         rig.connect()
 
 
@@ -253,6 +256,21 @@ def test_a_stop_holds_the_servos_where_they_are_and_they_can_go_on() -> None:
     rig.stop()
     passed(rig, 0.6, stood)
     assert servos.servos[0].place == pytest.approx(stood[0], abs=2.0)
+
+
+def test_a_stop_lets_go_of_a_servo_that_says_the_same_position_for_ever_and_never_sends_it_there() -> None:
+    """Should the packet that lets go be lost too, the servo stays at its goal."""
+    rig, servos = rehearsed("stale-position")
+    stood = rig.connect()
+    away = stood + np.array([300.0, 700.0, 0.0])
+    with pytest.raises(Fault, match="stall: servo 2"):
+        passed(rig, 2.0, away)
+    rig.stop()
+    rig.clock.wait_until(rig.clock.now() + 0.05)
+    assert [servo.torque for servo in servos.servos] == [1, 0, 1]
+    goals = [kept(servo, GOAL_POSITION) for servo in servos.servos]
+    assert goals[1] == SETTINGS.servos[1].sense * away[1]
+    assert goals[0] == pytest.approx(servos.servos[0].place, abs=10.0)
 
 
 def test_a_lost_answer_now_and_then_is_counted_and_survived() -> None:

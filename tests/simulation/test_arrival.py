@@ -46,6 +46,10 @@ def test_the_reason_tells_limits_from_gains() -> None:
     weak = replace(one, torque_wanted=np.full(200, 0.1), torque=np.full(200, 0.1))
     assert why_not(limited, 60.0).startswith("ends at 15 of 30 deg; tensions of 60 N give at most 2 N m of the 9")
     assert "no more than 0.1 N m there: its gains are too small" in why_not(weak, 60.0)
+    for each in (limited, weak):
+        names = ("theta", "theta_ref", "torque", "torque_wanted")
+        mirrored = replace(each, **{name: -getattr(each, name) for name in names})
+        assert why_not(mirrored, 60.0) == why_not(each, 60.0).replace("at 15 of 30", "at -15 of -30")
 
 
 def test_the_papers_exchanged_gains_arrive_sampled_and_not_on_four_segments() -> None:

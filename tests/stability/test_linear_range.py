@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -209,6 +210,33 @@ def test_what_happens_at_times_is_listed_as_left_out() -> None:
         assert found[name].read_as == "left out" and math.isnan(found[name].swing)
     assert "a spool that slips" not in found
     assert not TrueActuator().backlash and "backlash" not in _limits(row("smc-tracking", "hardware", BEHIND))
+
+
+@pytest.mark.parametrize("bend", [(-25.0, 0.0), (0.0, 25.0), (15.0, -20.0)])
+def test_the_end_stops_are_as_far_as_the_bend_of_both_planes_leaves_room(bend: tuple[float, float]) -> None:
+    swing = _swing(0.0)
+    linear = replace(swing.linear, theta=np.radians(bend), tensions=(5.0, 6.0, 7.0, 8.0))
+    assert linear.planes == 2
+    found = _told(replace(swing, linear=linear), EVERYTHING)
+    assert found["the end stops"].swing == pytest.approx(math.radians(15.0))
+    assert found["saturation"].read_as == f"none: tensions rest {WRIST.tension_limit - 8.0:.3g} N below their limit"
+
+
+@pytest.mark.parametrize("reading", ["slipping", "stuck"])
+def test_of_tendons_at_several_radii_the_outer_ones_friction_turns_and_the_inner_ones_play_is_felt_longest(
+    reading: FrictionReading,
+) -> None:
+    radii = (0.012, 0.02, 0.016)
+    places = tuple({"angle_deg": 120.0 * k, "radius": radius} for k, radius in enumerate(radii))
+    wrist = WristParameters.model_validate({"tendons": places})
+    swing = _swing(0.0)
+    linear = replace(swing.linear, theta=np.zeros(2), tensions=(6.0, 5.0, 7.0))
+    limits = linearity_limits(replace(swing, linear=linear), EVERYTHING, wrist, reading, None, {})
+    found = {each.what: each.swing for each in limits}
+    friction = "friction that sticks" if reading == "slipping" else "friction that slips"
+    assert found[friction] == pytest.approx(TENDON.presliding / 0.02)
+    assert found["backlash"] == pytest.approx(1e-4 / 0.012)
+    assert found["a slack tendon"] == pytest.approx(5.0 / (TENDON.tendon_stiffness * 0.02))
 
 
 def test_lagged_motors_have_steps_and_a_speed() -> None:

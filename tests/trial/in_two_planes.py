@@ -11,6 +11,7 @@ from tests.trial.conftest import WRIST, Done
 from wristctl.bench.virtual_bench import VirtualBench
 from wristctl.board.driver import Board
 from wristctl.config.hw_run import HwRunSettings
+from wristctl.config.wrist import WristParameters
 from wristctl.trial.board_stand import BoardStand
 from wristctl.trial.calibration import WristCalibration
 from wristctl.trial.experiment import Experiment, log_of
@@ -39,21 +40,25 @@ def circling(**changes: Any) -> HwRunSettings:
     return HwRunSettings.model_validate({**CIRCLING, **changes})
 
 
-def bench_of(settings: HwRunSettings, seed: int = 0) -> VirtualBench:
+def bench_of(settings: HwRunSettings, seed: int = 0, wrist: WristParameters = WRIST) -> VirtualBench:
     """The bench of these settings."""
-    return VirtualBench(settings.bench, WRIST, seed, settings.markers, settings.markers_2)
+    return VirtualBench(settings.bench, wrist, seed, settings.markers, settings.markers_2)
 
 
 AT_ZERO = Zero((1, 1, 1, 1), (1380.0,) * 4, (0.0, 0.0), (0.0,) * 4)
+THREE = WristParameters(tendons="three")
+THREE_AT_ZERO = Zero((1, 1, 1), (1460.0,) * 3, (0.0, 0.0), (0.0,) * 3)
 
 
-def performed(folder: Path, seed: int = 0, zero: Zero = AT_ZERO, **changes: Any) -> Done:
+def performed(
+    folder: Path, seed: int = 0, zero: Zero = AT_ZERO, wrist: WristParameters = WRIST, **changes: Any
+) -> Done:
     """The short experiment, changed, done on a bench that stands at zero; what stopped it is kept."""
     settings = circling(**changes)
-    nonce = Board(bench_of(settings).transport).connect().boot_nonce
+    nonce = Board(bench_of(settings, wrist=wrist).transport).connect().boot_nonce
     at_zero = WristCalibration(zero, "ulnar", nonce, (0, 0, 0, 0))
-    bench, log = bench_of(settings, seed), log_of(folder, settings, WRIST)
-    experiment, error = Experiment(settings, WRIST, trials_of(settings, np.random.default_rng(0)), log), None
+    bench, log = bench_of(settings, seed, wrist), log_of(folder, settings, wrist)
+    experiment, error = Experiment(settings, wrist, trials_of(settings, np.random.default_rng(0)), log), None
     try:
         experiment.run(BoardStand(EmulatedTestbed(bench, settings, [View(), View()], None), at_zero, seed))
     except BaseException as raised:

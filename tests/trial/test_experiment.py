@@ -208,7 +208,7 @@ def test_zero_is_found_anew_by_a_calibrations_senses_unless_its_positions_are_st
 ) -> None:
     senses: list[Any] = []
 
-    def found(*given: Any) -> Any:
+    def found(*given: Any, layout: Any) -> Any:
         senses.append(given[-1])
         raise SafetyStop("far enough", fix="none")
 

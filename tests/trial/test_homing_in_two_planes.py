@@ -11,13 +11,13 @@ import pytest
 from tests.trial.conftest import WRIST
 from tests.trial.in_two_planes import bench_of, circling
 from wristctl.board.driver import Board
-from wristctl.config.wrist import WristParameters
+from wristctl.config.wrist import TendonPlace, WristParameters
 from wristctl.trial.expected_moves import Bend, ExpectedMoves
 from wristctl.trial.homing import Zero, find_zero
 from wristctl.trial.motors_ready import prepare
-from wristctl.trial.rig_belief import pull_directions
+from wristctl.trial.rig_belief import layout_of_rig, pull_directions
 from wristctl.trial.safety import SafetyStop
-from wristctl.trial.supervised_wait import Patience
+from wristctl.trial.supervised_wait import Patience, WoundAxes
 from wristctl.trial.testbeds import EmulatedTestbed
 from wristctl.vision.view import View
 from wristctl.wrist.directions import ACTIVE
@@ -26,9 +26,9 @@ QUICK = {"move": 1e-4, "rest": 0.15, "frames": 5, "slack": 8e-4, "let_go": 1.0}
 SLACK = (3e-4, 2e-4, 4e-4, 2.5e-4)
 
 
-def homed(seed: int = 0, **motors: Any) -> Zero:
+def homed(seed: int = 0, wrist: WristParameters = WRIST, **motors: Any) -> Zero:
     settings = circling(homing=QUICK, bench={"motors": {"slack": SLACK, **motors}})
-    bench = bench_of(settings, seed)
+    bench, layout = bench_of(settings, seed, wrist), layout_of_rig(settings, wrist)
     tracking = EmulatedTestbed(bench, settings, [View(), View()], None).tracking()
     board = Board(bench.transport)
     board.connect()
@@ -36,7 +36,8 @@ def homed(seed: int = 0, **motors: Any) -> Zero:
     patience.stand_square(tracking, settings.homing)
     tracking.zero = patience.markers(tracking, 10)
     prepare(board, settings)
-    return find_zero(board, tracking, settings, WRIST, "")
+    motors_of_tendons = board if layout is None else WoundAxes(board, len(layout.places))
+    return find_zero(motors_of_tendons, tracking, settings, wrist, "", layout=layout)
 
 
 @pytest.mark.slow
@@ -49,6 +50,20 @@ def test_every_tendon_is_found_where_it_is_within_a_degree_and_a_half() -> None:
     assert zero.slack == pytest.approx(SLACK, abs=5e-5)
     assert zero.steps_per_radian == pytest.approx([ExpectedMoves(circling(), WRIST, "").steps()] * 4, rel=0.1)
     assert len(zero.markers) == 2 and max(map(abs, zero.markers)) < math.radians(1.0)
+
+
+@pytest.mark.slow
+def test_three_tendons_at_drawn_places_are_found_there_and_exchanged_ones_named() -> None:
+    """Also one whose motor turns the other way; the axis that winds none stays where it was."""
+    places = (TendonPlace(angle_deg=80.0), TendonPlace(angle_deg=200.0, radius=0.017), TendonPlace(angle_deg=310.0))
+    wrist = WristParameters(tendons=places)
+    zero = homed(wrist=wrist, reversed=(False, True, False, False))
+    assert zero.signs == (1, -1, 1) and zero.slack == pytest.approx(SLACK[:3], abs=5e-5)
+    off = np.degrees(zero.directions) - [80.0, 200.0, 310.0]
+    assert np.abs((off + 180.0) % 360.0 - 180.0).max() < 2.0
+    assert zero.steps_per_radian[1] < 0.9 * min(zero.steps_per_radian[0], zero.steps_per_radian[2]), "a shorter lever"
+    with pytest.raises(SafetyStop, match=r"axis 0 bends .* as tendon 3 would.*axes 0 and 2 exchanged"):
+        homed(wrist=wrist, order=(2, 1, 0, 3))
 
 
 @pytest.mark.slow

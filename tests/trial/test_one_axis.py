@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from contextlib import nullcontext
 
 import pytest
 
 from wristctl.bench.virtual_bench import VirtualBench
 from wristctl.config.hw_run import CalibrateWristSettings
 from wristctl.config.wrist import WristParameters
+from wristctl.trial.motors_ready import in_sight
 from wristctl.trial.rig_belief import pull_directions
-from wristctl.trial.rig_strokes import axis_tried
+from wristctl.trial.rig_strokes import RigStrokes, axis_tried
 from wristctl.trial.safety import SafetyStop
 from wristctl.trial.testbeds import EmulatedTestbed
 from wristctl.vision.view import View
@@ -64,15 +66,45 @@ def test_a_tendon_on_another_motor_is_named_once_it_is_let_go() -> None:
     assert bench.motion().steps == (0, 0, 0, 0)
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("axis", [1, 2])
-def test_before_two_cameras_an_axis_bends_the_wrist_toward_its_tendon(axis: int) -> None:
+def before_two_cameras(wrist: WristParameters) -> tuple[EmulatedTestbed, CalibrateWristSettings]:
     camera = {"frame_rate": 30.0}
     given = {"bench": {"person": {"takes": 0.0}, "camera": camera, "camera_2": camera}, "homing": {"frames": 2}}
     settings = CalibrateWristSettings.model_validate({"planes": 2, **given})
-    bench = VirtualBench(settings.bench, WristParameters(), 0, settings.markers, settings.markers_2)
-    found = axis_tried(EmulatedTestbed(bench, settings, [View(), View()], None), settings, WristParameters(), axis)
+    bench = VirtualBench(settings.bench, wrist, 0, settings.markers, settings.markers_2)
+    return EmulatedTestbed(bench, settings, [View(), View()], None), settings
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("axis", [1, 2])
+def test_before_two_cameras_an_axis_bends_the_wrist_toward_its_tendon(axis: int) -> None:
+    testbed, settings = before_two_cameras(WristParameters())
+    found = axis_tried(testbed, settings, WristParameters(), axis)
     assert found.sense == 1
     toward = math.atan2(found.bend.away, found.bend.theta)
     assert math.cos(toward - pull_directions()[axis]) > math.cos(math.radians(10.0))
     assert math.radians(0.9) < found.bend.askew < math.radians(settings.max_deg)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("axis", "flexion_ratio", "plane"), [(0, 0.3, 1), (1, 3.0, 0)])
+def test_a_tendon_counts_as_taut_by_the_plane_that_bends_most_to_either_side(
+    axis: int, flexion_ratio: float, plane: int
+) -> None:
+    """One plane is softer, and both tendons bend the wrist to that plane's other side."""
+    wrist = WristParameters(flexion_ratio=flexion_ratio, gravity=(9.81, 0.0))
+    testbed, settings = before_two_cameras(wrist)
+    bend = axis_tried(testbed, settings, wrist, axis).bend
+    most, least = (bend.away, bend.theta) if plane else (bend.theta, bend.away)
+    assert -math.radians(1.4) < most < -math.radians(1.0) and abs(least) < 0.7 * abs(most)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("furthest", "refused"), [(1.8, True), (2.4, False)])
+def test_a_stroke_stops_by_the_bend_of_both_planes_together(furthest: float, refused: bool) -> None:
+    """1.2 mm bend this wrist by 1.3 deg in the one and 1.6 in the other, 2 in all."""
+    wrist = WristParameters(flexion_ratio=0.3, gravity=(9.81, 0.0))
+    testbed, settings = before_two_cameras(wrist)
+    stops = pytest.raises(SafetyStop, match="a stroke of axis 0 bends the wrist too far") if refused else nullcontext()
+    with stops, in_sight(testbed, settings, wrist) as (board, _, tracking):
+        strokes = RigStrokes(board, tracking, settings, 0, math.radians(furthest))
+        strokes._stroke(0, round(1.2e-3 / settings.actuator.step_length), 0.15)

@@ -11,7 +11,7 @@ import pytest
 
 from tests.trial.conftest import SHORT, WRIST, Run, settings_of
 from wristctl.config.wrist import WristParameters
-from wristctl.trial.resting import judge_rest, judge_slack, judge_weight, sag_of
+from wristctl.trial.resting import judge_looks, judge_rest, judge_slack, judge_weight, sag_of
 from wristctl.trial.safety import SafetyStop
 from wristctl.vision import detector
 from wristctl.vision.detector import Detector
@@ -117,6 +117,25 @@ def test_markers_that_are_seen_unsteadily_are_named_by_what_scatters() -> None:
     with pytest.raises(SafetyStop, match="by the size of the tip's"):
         judge_rest(sized, rig, WRIST, ("ulnar",))
     judge_rest([*sized, *sightings(0.0, 1)], rig, WRIST, ("ulnar", "flexion"))
+
+
+@pytest.mark.parametrize("plane", [0, 1])
+def test_what_scatters_in_either_plane_alone_is_refused(plane: int) -> None:
+    """By the cameras of a board's rig, and by the looks of a rig of one's own."""
+    rig = settings_of(homing={**SHORT["homing"], "frames": 4}, planes=2)
+    limit = 2.0 * math.radians(0.4 * rig.homing.bend_deg) / float(np.std(STEADY))
+    planes = ("ulnar", "flexion")
+    steady = sightings(0.0, 1 - plane, noise=0.95 * limit)
+    for noise, refused in ((0.95, False), (1.05, True)):
+        seen = sorted([*steady, *sightings(0.0, plane, noise=noise * limit)], key=lambda sighting: sighting.plane)
+        if not refused:
+            judge_rest(seen, rig, WRIST, planes)
+            judge_looks(seen, rig, "my_rig.py")
+            continue
+        with pytest.raises(SafetyStop, match=f"the markers of camera {plane + 1} are seen unsteadily"):
+            judge_rest(seen, rig, WRIST, planes)
+        with pytest.raises(SafetyStop, match="the bend is seen unsteadily"):
+            judge_looks(seen, rig, "my_rig.py")
 
 
 @pytest.mark.parametrize("name", detector._OTHERS)

@@ -116,7 +116,7 @@ def test_a_reading_is_of_the_rigs_looks_and_in_its_words_where_there_is_none() -
 
 def expected(*degrees: float, planes: int = 2, radius: float = 0.02) -> ExpectedMoves:
     layout = TendonLayout(tuple(TendonPlace(math.radians(angle), radius) for angle in degrees))
-    settings: Any = settings_of(planes=planes)
+    settings: Any = settings_of(planes=planes).model_copy(update={"rig": "mine.py:RIG"})
     return ExpectedMoves(settings, WRIST, "ulnar" if planes == 1 else "", layout)
 
 

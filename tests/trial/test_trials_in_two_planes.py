@@ -11,7 +11,7 @@ import pytest
 from pydantic import ValidationError
 
 from tests.trial.conftest import WRIST, Done
-from tests.trial.in_two_planes import CIRCLING, PLANES, circling, performed, rmse, true_errors
+from tests.trial.in_two_planes import CIRCLING, PLANES, THREE, THREE_AT_ZERO, circling, performed, rmse, true_errors
 from wristctl.commands.adoption import with_planes
 from wristctl.config.hw_run import HwRunSettings
 from wristctl.config.study import Study
@@ -53,6 +53,32 @@ def test_the_true_wrist_goes_round_within_half_a_degree_in_both_planes(round_tri
     assert (rmse(true_errors(round_trip)) < 0.4).all()
     log = round_trip.table("log")
     assert np.degrees(log[[f"bend_{p}" for p in PLANES]].abs().max()).min() > 10.0, "in both planes"
+
+
+def test_three_tendons_take_the_true_wrist_round_as_its_simulation_goes(tmp_path: Path) -> None:
+    """The board's fourth axis winds none of them and stands; the log has three tendons."""
+    done = performed(tmp_path, zero=THREE_AT_ZERO, wrist=THREE)
+    assert done.error is None and done.experiment.outcomes == {0: "ok"} and done.experiment.odd == {0: ""}
+    log, truth = done.table("log"), done.table("truth")
+    assert np.degrees(log[[f"bend_{p}" for p in PLANES]].abs().max()).min() > 10.0, "in both planes"
+    for name, table in (("tension", log), ("position", log), ("sent", log), ("pull", truth)):
+        assert [column for column in map(str, table) if column.startswith(f"{name}_")] == [
+            f"{name}_{k}" for k in (1, 2, 3)
+        ]
+    assert done.bench.motion().steps[3] == 0 and min(np.ptp(log[f"position_{k}"]) for k in (1, 2, 3)) > 100
+    study = load_study([], ["wrist.tendons=three"]).model_copy(update={"hw_run": circling()})
+    simulation = twin(study, Trial(0, "circumduction", 0, 0.0, 0), None, None)
+    simulated, true = np.degrees(simulation.trajectory.error), true_errors(done)
+    assert (rmse(true) < 0.4).all() and rmse(simulated) == pytest.approx(rmse(true), rel=0.25)
+
+
+@pytest.mark.parametrize("axis", range(3))
+def test_of_three_tendons_the_one_that_is_lost_is_named(tmp_path: Path, axis: int) -> None:
+    lost = {"kind": "tendon-detached", "at": 0.2 + 0.3 * axis, "axis": axis}
+    bench = {"motors": {"slack": (0.0,) * 4}, "person": {"takes": 0.1}, "faults": (lost,)}
+    done = performed(tmp_path, zero=THREE_AT_ZERO, wrist=THREE, bench=bench)
+    assert isinstance(done.error, SafetyStop) and done.experiment.outcomes[0] != "ok"
+    assert f"axis {axis} (tendon {axis + 1})" in done.error.what
 
 
 def test_a_trial_does_not_count_whose_resting_tendon_is_lost(tmp_path: Path) -> None:

@@ -27,9 +27,9 @@ from wristctl.simulation.oscillation import FASTEST, LIMIT_CYCLE
 from wristctl.simulation.reference import motion
 from wristctl.simulation.worlds import Draws
 from wristctl.study_files.load import load_study
+from wristctl.tuning.gain_space import GainSpace
 from wristctl.tuning.objective import Judge, marks_of
 from wristctl.tuning.search import (
-    GainSpace,
     Search,
     Tried,
     check_loops,

@@ -7,7 +7,8 @@ import pytest
 
 from wristctl.control.law import Controller, Gain
 from wristctl.errors import UserError
-from wristctl.tuning.search import GainSpace, _presets, _start
+from wristctl.tuning.gain_space import GainSpace
+from wristctl.tuning.search import _presets, _start
 
 SPACE = GainSpace.of({"P1": Gain("1/rad", "", 1e-1, 1e5), "P2": Gain("s/rad", "", 1e-3, 1e3)})
 

@@ -3,15 +3,32 @@
 from __future__ import annotations
 
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+from wristctl.vision.camera import Frame
 from wristctl.vision.marker import Sighting, SightingVerdict
-from wristctl.vision.recordings import angle_noise, base_askew
+from wristctl.vision.recordings import RawVideo, angle_noise, base_askew, times_beside
 from wristctl.vision.view import View
 
 SQUARE = 22.0 * np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]]) + 200.0
+
+
+def test_the_table_beside_a_video_is_its_own_where_it_has_a_row_for_each_frame(tmp_path: Path) -> None:
+    times, grey = [0.1, 0.1 + 1.0 / 3.0, 7.0], np.full((48, 64), 90, np.uint8)
+    video = RawVideo(tmp_path / "raw.avi", 30.0)
+    for number, time in enumerate(times):
+        video.add(Frame(grey, time, number), sighting(SQUARE))
+    video.close()
+    found = times_beside(tmp_path / "raw.avi", 3)
+    assert found is not None and found.tolist() == times
+    assert times_beside(tmp_path / "raw.avi", 2) is None and times_beside(tmp_path / "raw.avi", 4) is None
+    table = tmp_path / "raw.csv"
+    table.write_text(table.read_text().replace("number,clock", "clock,number"))
+    assert times_beside(tmp_path / "raw.avi", 3) is None
+    assert times_beside(tmp_path / "other.avi", 3) is None and times_beside(tmp_path, 3) is None
 
 
 def test_noise_is_told_apart_from_motion() -> None:

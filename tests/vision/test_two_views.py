@@ -11,13 +11,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from wristctl.arrays import Array
 from wristctl.config.camera import Gates, Markers, SceneSettings
 from wristctl.config.wrist import WristParameters
 from wristctl.vision.camera import Frame
 from wristctl.vision.detector import side_angle, square_angle
 from wristctl.vision.marker import Sighting, SightingVerdict, Tracker
 from wristctl.vision.scene import Scene
-from wristctl.vision.two_views import bend_seen
+from wristctl.vision.two_views import NEAR, bend_seen, paired_bends
 from wristctl.vision.view import Pinhole, View
 from wristctl.wrist.spatial.spatial_kinematics import spatial_frames, tip_bends
 
@@ -93,6 +94,40 @@ def test_without_a_calibrated_view_the_angle_is_that_of_the_tangent_from_far_awa
     nothing = np.full((2, 4, 2), math.nan)
     far = Sighting(0.0, 0, math.atan2(across, along), SightingVerdict.OK, nothing, plane=plane)
     assert bend_seen(far, View(), bend[1 - plane]) == pytest.approx(bend[plane], abs=1e-9)
+
+
+def seen_at(times: Array, thetas: Array, plane: Plane) -> list[Sighting]:
+    """Sightings whose angles are those of the tangent from far away; none where the angle is nan."""
+    corners = np.full((2, 4, 2), math.nan)
+    return [
+        Sighting(time, k, theta, SightingVerdict.OK, corners, plane=plane)
+        for k, (time, theta) in enumerate(zip(times.tolist(), thetas.tolist(), strict=True))
+    ]
+
+
+@pytest.mark.parametrize("later", [0, 1])
+def test_a_bend_is_told_where_the_other_camera_sees_before_after_and_near(later: int) -> None:
+    """One camera looks for a second; the other begins after it, ends before it, and sees nothing for a while."""
+    whole = np.arange(0.0, 1.0, 0.02)
+    part = np.arange(0.21, 0.8, 0.02)
+    angles = np.where((part > 0.4) & (part < 0.6), math.nan, 0.2)
+    sightings = [seen_at(whole, np.full(len(whole), 0.3), 0), seen_at(part, angles, 1)]
+    if later == 0:
+        sightings = [seen_at(part, angles, 0), seen_at(whole, np.full(len(whole), 0.3), 1)]
+    bends = paired_bends(sightings, [View(), View()], [0.0, 0.0], [1.0, 1.0])
+    told = np.isfinite(bends[1 - later])
+    np.testing.assert_array_equal(np.isfinite(bends[later]), np.isfinite(angles))
+    known = part[np.isfinite(angles)]
+    near = np.abs(whole[:, None] - known).min(axis=1) <= NEAR
+    np.testing.assert_array_equal(told, near & (whole >= known[0]) & (whole <= known[-1]))
+    assert told.sum() >= 15 and np.ptp(bends[1 - later][told]) < 1e-9
+    both = float(bends[1 - later][told][0]), float(bends[later][np.isfinite(angles)][0])
+    size = math.hypot(*both)
+    for bend, angle in zip(both, (0.3, 0.2), strict=True):  # of the one arc whose tangent looks so from either side
+        assert math.tan(angle) * math.cos(size) == pytest.approx(bend * math.sin(size) / size, abs=1e-5)
+    unseen = [sightings[1 - later], [each._replace(theta=math.nan) for each in sightings[later]]]
+    ordered = unseen if later == 1 else unseen[::-1]
+    assert not any(np.isfinite(each).any() for each in paired_bends(ordered, [View()] * 2, [0.0] * 2, [1.0] * 2))
 
 
 def test_no_angle_is_no_bend() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 from itertools import pairwise
 from pathlib import Path
@@ -25,7 +26,7 @@ from wristctl.study_files.error_messages import located
 from wristctl.study_files.load import load_study, read_study
 from wristctl.study_files.resolved import changed_yaml, resolved_yaml
 from wristctl.wrist.directions import ACTIVE, DIRECTIONS
-from wristctl.wrist.tendon_layout import TendonLayout, TendonPlace, off_both_sides
+from wristctl.wrist.tendon_layout import TendonLayout, TendonPlace, off_both_sides, wound_by
 
 WRIST = WristParameters()
 THREE = TendonLayout.three(0.02, first=0.3)
@@ -256,3 +257,38 @@ def test_an_error_has_the_line_of_the_place(tmp_path: Path) -> None:
     file.write_text("\n".join(lines).replace("240", "left"), encoding="utf-8")
     with pytest.raises(UserError, match=r"'left' should be a valid number .*study.yaml:5: wrist.tendons.2.angle_deg"):
         load_study([file])
+
+
+@pytest.mark.parametrize(
+    ("tendons", "wound"),
+    [
+        ("four", None), ("five", None), ("three", 3),
+        ([{"angle_deg": 225}, {"angle_deg": 135}, {"angle_deg": 315}, {"angle_deg": 45}], None),
+        ([{"angle_deg": 45}, {"angle_deg": 135}, {"angle_deg": 225}, {"angle_deg": 315}], 4),
+        ([{"angle_deg": 225, "radius": 0.015}, {"angle_deg": 135}, {"angle_deg": 315}, {"angle_deg": 45}], 4),
+        ([{"angle_deg": 0, "radius": 0}, {"angle_deg": 0}, {"angle_deg": 120}, {"angle_deg": 240}], 3),
+    ],
+)  # fmt: skip
+def test_four_axes_wind_any_tendons_off_the_axis_in_their_order(tendons: Any, wound: int | None) -> None:
+    """None: the paper's four, which the axes have had all along."""
+    wrist = load_study([], [f"wrist.tendons={json.dumps(tendons)}"]).wrist
+    layout = wound_by(wrist, 4)
+    assert (layout and len(layout.places)) == wound
+    if layout is not None:
+        off_the_axis = [place for place in TendonLayout.of(wrist).places if place.radius > 0.0]
+        assert list(layout.places) == off_the_axis
+
+
+@pytest.mark.parametrize(
+    ("tendons", "said"),
+    [
+        ("six", "6 tendons off its axis"),
+        ([{"angle_deg": 0, "multiplicity": 2}, {"angle_deg": 120}, {"angle_deg": 240}], "two tendons at one place"),
+        ([{"angle_deg": 0}, {"angle_deg": 180}], "in one plane"),
+        ([{"angle_deg": 0, "multiplicity": 3}, {"angle_deg": 120}, {"angle_deg": 240}], "5 tendons off its axis"),
+    ],
+)
+def test_what_four_axes_do_not_wind_one_by_one_is_refused(tendons: Any, said: str) -> None:
+    with pytest.raises(UserError, match=said) as refused:
+        wound_by(load_study([], [f"wrist.tendons={json.dumps(tendons)}"]).wrist, 4)
+    assert "wrist.tendons" in str(refused.value) and refused.value.fix

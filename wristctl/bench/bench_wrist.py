@@ -35,9 +35,10 @@ class Truth(NamedTuple):
     rate: Array
     """(T, q) [rad/s]"""
     pull: Array
-    """(T, 4) at their spools [N], of tendons 1, 2, 4, 5, when the millisecond that ends then began"""
+    """(T, M) at their spools [N], of the tendons that motors wind, in the order of the axes, when the millisecond that
+    ends then began"""
     reeled: Array
-    """(T, 4) tendon on the spools [m] in the middle of that millisecond, 0 where it is taut without pulling on the
+    """(T, M) tendon on the spools [m] in the middle of that millisecond, 0 where it is taut without pulling on the
     straight wrist"""
     across: Array
     """(T,) [rad] bend across the plane, away from the camera, when the millisecond ended; in two planes 0"""
@@ -161,7 +162,8 @@ class BenchWrist:
         rows, n = self._record[self._rows - fresh : self._rows].copy(), self._n
         time = PERIOD * np.arange(self._periods - fresh + 1, self._periods + 1, dtype=np.float64)
         theta, rate, pull, reeled, across = np.split(rows, [n, 2 * n, 2 * n + AXES, 2 * n + 2 * AXES], axis=1)
-        return Truth(time, theta, self._load.bend(theta), rate, pull, reeled, across[:, 0])
+        wound = self._load.wound
+        return Truth(time, theta, self._load.bend(theta), rate, pull[:, :wound], reeled[:, :wound], across[:, 0])
 
     def turned(self, ends: Array) -> float:
         """How far the last disc turns between two places (2, q) [rad]."""

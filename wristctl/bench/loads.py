@@ -23,7 +23,7 @@ from wristctl.wrist.out_of_plane import across_of
 from wristctl.wrist.plant import kernel_of
 from wristctl.wrist.spatial.pcc_in_space import PCC_IN_SPACE, placed_values
 from wristctl.wrist.spatial.spatial_kinematics import tip_bends
-from wristctl.wrist.tendon_layout import TendonLayout
+from wristctl.wrist.tendon_layout import TendonLayout, wound_by
 from wristctl.wrist.tendon_mechanics import PLAY, X
 
 
@@ -33,6 +33,8 @@ class Load(Protocol):
     coordinates: int
     plane: str | None
     """Name of +y in the plane that it bends in; None: it bends in two."""
+    wound: int
+    """Motors that wind a tendon, the first of the axes."""
 
     def face(self, direction: str, spools: SpoolState) -> None:
         """Bend in this direction's plane from here on; where that is another plane, at rest at first as it is bent."""
@@ -61,6 +63,7 @@ class PlanarLoad:
     """The wrist in the plane that it faces, ulnar at first."""
 
     plane: str | None
+    wound = AXES
 
     def __init__(
         self, settings: BenchSettings, wrist: WristParameters, stream: Entropy, positive: Literal["right", "left"],
@@ -167,10 +170,11 @@ class SpatialLoad:
     def __init__(
         self, settings: BenchSettings, wrist: WristParameters, stream: Entropy, spools: SpoolState, substeps: int = 1
     ) -> None:
-        check_in_space(settings)
+        check_in_space(settings, len(_layout(wrist).places))
         own, motors = drawn(settings.plant, stream), settings.actuator
         self._wrist, self._own, self._segments, self._carried = wrist, own, settings.segments, 0.0
-        n, alike = settings.segments, np.ones(AXES)
+        self.wound = len(_layout(wrist).places)
+        n, alike = settings.segments, np.ones(self.wound)
         self.coordinates = 2 * n
         at_rest = np.zeros(self.coordinates)
         from wristctl.bench.spatial_motors import SpatialHanging, follow_in_space
@@ -183,12 +187,12 @@ class SpatialLoad:
             stiffnesses=motors.tendon_stiffness * alike,
             nonideal=np.array(nonideal_of(own, motors, motors, PERIOD / substeps)),
             faults=faults_of(motors, motors, alike).ravel(),
-            tendons=unmoved(spools.reeled, np.zeros(2 * AXES), np.zeros(AXES), at_rest),
+            tendons=unmoved(spools.reeled[: self.wound], np.zeros(2 * self.wound), np.zeros(self.wound), at_rest),
             inner=inner_of([own], at_rest[None], np.zeros(1), lambda rows: rows[0], 2),
             motor=None,
             substeps=substeps,
             coordinates=(0,) * self.coordinates,
-            pulls=(0,) * AXES,
+            pulls=(0,) * self.wound,
         )
         self._state = np.zeros(2 * self.coordinates)
 
@@ -204,7 +208,7 @@ class SpatialLoad:
     def _weighed(self) -> Array:
         own = self._own.model_copy(update={"payload": self._own.payload + self._carried})
         plant = plant_of(self._wrist, own)
-        return placed_values(plant, TendonLayout.four(plant.tendon_radius), self._segments)
+        return placed_values(plant, _layout(plant), self._segments)
 
     def follow(
         self, spools: SpoolState, stepper: Stepper, acting: tuple[Disturbances, Array], edges: Edges, first: int,
@@ -227,8 +231,13 @@ class SpatialLoad:
         return float(np.hypot(*np.diff(self.bend(ends), axis=0)[0]))
 
 
-def check_in_space(settings: BenchSettings) -> None:
-    """UserError for what a bench has in one plane and not in two."""
+def _layout(wrist: WristParameters) -> TendonLayout:
+    """Tendons that the axes wind, in their order. UserError where there are more of them."""
+    return wound_by(wrist, AXES) or TendonLayout.four(wrist.tendon_radius)
+
+
+def check_in_space(settings: BenchSettings, tendons: int) -> None:
+    """UserError for what a bench has in one plane and not in two, and for a fault of a tendon that it has not."""
     if beyond := settings.in_one_plane_only:
         raise UserError(f"no bench in two planes has {beyond[0]}", beyond[0], "leave it at its default")
     motors = settings.actuator
@@ -236,5 +245,5 @@ def check_in_space(settings: BenchSettings) -> None:
         ("broken_tendon", motors.broken_tendon, "break"),
         ("slipping_tendon", motors.slipping_tendon, "slip"),
     ):
-        if tendon > AXES:
-            raise UserError(f"tendon {tendon} of {AXES} cannot {verb}", f"bench.actuator.{key}", f"1 to {AXES}")
+        if tendon > tendons:
+            raise UserError(f"tendon {tendon} of {tendons} cannot {verb}", f"bench.actuator.{key}", f"1 to {tendons}")

@@ -1,6 +1,7 @@
-"""Four steppers with their spools and tendons, and the wrist in two planes that these pull, in steps of 1 ms.
+"""Four steppers with their spools, and the wrist in two planes that up to four tendons pull, in steps of 1 ms.
 
-Motors and spools are those of `wristctl.bench.motors`; each tendon has its place, stretches and rubs by itself.
+Motors and spools are those of `wristctl.bench.motors`; each tendon has its place, stretches and rubs by itself. The
+first axes wind one each, the others none.
 """
 
 from typing import Any, NamedTuple
@@ -19,7 +20,7 @@ from wristctl.wrist.tendon_mechanics import PLAY, read_nonideal, row_of, shorten
 class SpatialHanging(NamedTuple):
     """Load of the motors: plant and tendons, in the order of the axes.
 
-    The plant (its model and the values of its parameters), a tendon's stiffness [N/m] and that of each (4,), the values
+    The plant (its model and the values of its parameters), a tendon's stiffness [N/m] and that of each (T,), the values
     of Nonideal, those of Fault of each, the tendons' state, friction inside the wrist; the motors, steps of the
     integration in a period; and tuples with an entry, of no meaning, for each coordinate and tendon.
     """
@@ -60,10 +61,10 @@ def follow_in_space(
         middle = (first + k) * CYCLES + CYCLES // 2
         plant = disturbed(undisturbed, (acting[k, 0], acting[k, 1], acting[k, 2]), acting[k, 3])
         time, path = (first + k) * PERIOD - start + zero, path_before(tendons, undisturbed, q)
-        for t in range(AXES):
+        for t in range(len(hanging.pulls)):
             pull[t] = spool_pull(tendons, tendons.state[row_of(t, PLAY)], t, shortening(path, t))
         edge = turn_spools(spools, motor, hanging.stiffness, edges, edge, middle)
-        for t in range(AXES):
+        for t in range(len(hanging.pulls)):
             x = shortening(path, t)
             on_spool[t] = place_after_slip(tendons, t, reeled[t], zero, time, x)
             pull[t] = spool_pull(tendons, on_spool[t], t, x)

@@ -63,12 +63,12 @@ def _serve_with_wrist(chip: Any, line: Any, override: list[str], console: Any, q
     from tempfile import TemporaryDirectory
 
     from wristctl.commands.adoption import with_planes
-    from wristctl.commands.inputs import check_sides
+    from wristctl.commands.inputs import check_wound
     from wristctl.loop_priority import prioritised
     from wristctl.study_files.load import load_study
 
     study = with_planes(load_study((), override, "hw-run"))
-    check_sides(study.wrist, "hw emulate")
+    check_wound(study.wrist, study.hw_run.planes, "hw emulate")
     priority = prioritised(study.hw_run.priority)
     with TemporaryDirectory(prefix="wristctl-bench-") as folder, priority as allowed:
         if allowed:

@@ -12,7 +12,7 @@ from wristctl.cli.json_output import print_json
 from wristctl.cli.operator import typed_line
 from wristctl.cli.options import BAUD, Baud, Debug, Json, Port, Quiet, facts_of
 from wristctl.cli.progress import listening, progress
-from wristctl.commands.inputs import check_sides
+from wristctl.commands.inputs import check_wound
 from wristctl.commands.printed_table import Table
 from wristctl.commands.progress import no_event
 from wristctl.errors import UserError
@@ -121,7 +121,6 @@ def check_rig(
     from wristctl.commands.adoption import with_planes
     from wristctl.loop_priority import prioritised
     from wristctl.records import require
-    from wristctl.trial.rig_belief import layout_of_axes
     from wristctl.trial.rig_facts import Pictures, measure, troubles
     from wristctl.trial.supervised_wait import Patience
     from wristctl.trial.testbeds import open_testbed
@@ -130,9 +129,7 @@ def check_rig(
     study = with_planes(load_study((), override, "hw-run"))
     overrides: dict[str, Any] = {"baud": baud, "port": None if port == EMULATED else port or only_board()}
     settings = study.hw_run.model_copy(update=overrides | chosen)
-    check_sides(study.wrist, "hw check")
-    if settings.planes == 2:
-        layout_of_axes(study.wrist)
+    check_wound(study.wrist, settings.planes, "hw check")
     runs = (require(run, "calibrate-camera") if run else None for run in (settings.optics, settings.optics_2))
     view, view_2 = map(View.of, runs)
     pictures = Pictures()

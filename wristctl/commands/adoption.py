@@ -15,6 +15,7 @@ from wristctl.config.leaves import named_by, renamed_fields
 from wristctl.config.loop import Loop
 from wristctl.config.simulate import SimulateSettings
 from wristctl.config.study import Study
+from wristctl.config.wrist import WristParameters
 from wristctl.errors import UserError, nearest, under
 from wristctl.plugins.places import entry_point_names
 from wristctl.study_files.error_messages import explained
@@ -97,7 +98,7 @@ def with_rig(study: Study) -> Study:
 
 
 def with_planes(study: Study) -> Study:
-    """The study with as many planes of its rig as the reference of the trials has, where nobody gave the rig's.
+    """The study with as many planes of its rig as the trials' reference, or a board's tendons, need, if nobody gave it.
 
     The reference is loaded for it. Raises UserError where it bends in more planes than a rig was given, and where other
     settings do not fit them.
@@ -106,13 +107,33 @@ def with_planes(study: Study) -> Study:
     if loaded := _loaded(REFERENCES, name):
         _entry(REFERENCES, name, *loaded, study)
     planes = REFERENCES[name].planes
+    if settings.rig is None and "planes" not in settings.model_fields_set and wound_in_both_planes(study.wrist):
+        return _bending_in(study, 2)
     if not settings.planes_are_open:
         if planes > settings.planes:
             problem = f"{name} bends in two planes, and the rig in one"
             raise UserError(problem, "hw-run.planes", "planes: 2")
         return study
+    return _bending_in(study, planes)
+
+
+def wound_in_both_planes(wrist: WristParameters) -> bool:
+    """Whether a board winds the wrist's tendons, and they are not those of two sides: it bends in both planes then."""
+    if wrist.tendons == "four":
+        return False
+    from wristctl.board.messages import AXES
+    from wristctl.wrist.tendon_layout import off_both_sides, wound_by
+
     try:
-        return study.model_copy(update={"hw_run": settings.bending_in(planes)})
+        return off_both_sides(wrist) is not None and wound_by(wrist, AXES) is not None
+    except UserError:  # which is said where its tendons are looked at
+        return False
+
+
+def _bending_in(study: Study, planes: int) -> Study:
+    """The study with a rig of so many planes. UserError where other settings do not fit them."""
+    try:
+        return study.model_copy(update={"hw_run": study.hw_run.bending_in(planes)})
     except ValidationError as error:
         raise explained(error, {}).at("hw-run") from error
 

@@ -12,7 +12,7 @@ from wristctl.config.loop import LIVE, Reference
 from wristctl.config.section import Section
 from wristctl.config.study import Study
 from wristctl.config.wrist import WristParameters
-from wristctl.errors import Argument, Call, Phrase, UserError
+from wristctl.errors import Argument, Call, Phrase, Setting, UserError
 from wristctl.records import InputRun, Run, open_run, require
 from wristctl.records.find import Content
 from wristctl.records.manifest import MANIFEST
@@ -170,6 +170,17 @@ def _stopped(ref: str | Path, wanted: EarlierRun, out: Path) -> Run:
     return run
 
 
+def check_wound(wrist: WristParameters, planes: int, command: str) -> None:
+    """UserError unless a board's four axes wind this wrist's tendons in so many planes."""
+    from wristctl.board.messages import AXES
+    from wristctl.wrist.tendon_layout import wound_by
+
+    if planes == 1:
+        check_sides(wrist, command)
+    else:
+        wound_by(wrist, AXES)
+
+
 def check_sides(wrist: WristParameters, command: str) -> None:
     """UserError, naming what takes this wrist, unless its tendons are the four at 45 deg from both planes."""
     from wristctl.board.messages import AXES
@@ -192,6 +203,8 @@ def check_sides(wrist: WristParameters, command: str) -> None:
     compares = ("; ", Call("compare"), ", ", Call("tune"), others)
     reads = ("; ", Call("identify"), " reads its robot's logs, ", Call("recommend"), " finds gains for it")
     fix: Phrase = (Call("simulate"), takes, *(reads if rig else compares))
+    if command.startswith("hw") and wound <= AXES:
+        fix = (Setting("planes=2", "hw-run"), ", with a camera for each plane")
     if TendonLayout.of(wrist).planes == 1:  # and in no other
         square = math.sqrt(2.0) * wrist.tendon_radius
         fix = f"two tendons at 0 and two at 180 deg bend as `tendons: four` with tendon_radius: {square:.4g}"

@@ -14,6 +14,7 @@ from wristctl.config.foreign import PLAIN
 from wristctl.config.hw_run import HwRunSettings
 from wristctl.config.loop import Loop, Reference
 from wristctl.config.study import Study
+from wristctl.errors import UserError
 
 if TYPE_CHECKING:
     from wristctl.commands.results import Findings
@@ -43,13 +44,14 @@ def rig_of(loop: Loop) -> dict[str, Any]:
 def hw_run_fits(study: Study, loop: Loop) -> bool:
     """Whether `hw-run` can have the loop's rig: motors, tendons that its board winds, a camera, and ticks that it can
     follow."""
-    from wristctl.wrist.tendon_layout import off_both_sides
+    from wristctl.board.messages import AXES
+    from wristctl.wrist.tendon_layout import off_both_sides, wound_by
 
-    if off_both_sides(study.wrist) is not None:
-        return False
     try:
+        if off_both_sides(study.wrist) is not None:
+            wound_by(study.wrist, AXES)
         HwRunSettings.model_validate(study.hw_run.model_dump(by_alias=True) | rig_of(loop))
-    except ValidationError:
+    except (UserError, ValidationError):
         return False
     return True
 

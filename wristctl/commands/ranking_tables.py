@@ -12,7 +12,6 @@ from wristctl.commands.ranking_answer import (
     error,
     fault_words,
     first_group,
-    is_by_loop,
     names_of,
     recommended,
     winner,
@@ -87,8 +86,6 @@ def _of_controllers(
     rows = [(names[label], *(cell(ranking, label) for ranking in conditions)) for label in labels]
     given = any("[" in text for row in rows for text in row)
     title = f"RMSE [deg]{', 95 % interval' * given}; * best, = tied with it"
-    if any(is_by_loop(label) for label in labels):
-        title += "; name alone: default if exact, else hardware"
     left = [f"{len(names) - len(labels)} more controllers"] * (len(names) > len(labels))
     left += ["steps"] * (len(conditions) < len(rankings))
     title += f"; {joined(left)}: --all" if left else ""

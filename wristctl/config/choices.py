@@ -1,4 +1,4 @@
-"""Tables of what a study may name: controllers, references, disturbances, metrics, optimisers, plants.
+"""Tables of what has a name: controllers, references, disturbances, metrics, optimisers, plants, rigs, log formats.
 
 Each is a mapping from the name in a study to what it names, which is imported when it is first asked for: here stand
 names and places only. A newcomer in this package is one file and one line here; one from elsewhere is named by its
@@ -109,8 +109,21 @@ _DYNAMICS = (
 # Table of `wristctl.rig.Rig`: what trials may be run on in place of the board with its cameras.
 RIGS: Choices[Any] = Choices(
     "rig",
-    {"bench": "wristctl.trial.board_rig:BenchRig", "servos": "wristctl.servos.servo_bench:ServoBench"},
+    {
+        "bench": "wristctl.trial.board_rig:BenchRig",
+        "servos": "wristctl.servos.servo_bench:ServoBench",
+    },
     "wristctl.rigs",
+)
+
+# Table of `wristctl.records.recorded_table.LogFormat`: what other programs write, known by how it begins.
+LOG_FORMATS: Choices[Any] = Choices(
+    "log format",
+    {
+        "motive": "wristctl.records.motion_capture:MOTIVE",
+        "vicon": "wristctl.records.motion_capture:VICON",
+        "qualisys": "wristctl.records.motion_capture:QUALISYS",
+    },
 )
 
 # Table of `wristctl.control.law.Controller`.

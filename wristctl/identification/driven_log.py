@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -308,6 +308,7 @@ def _nominal(count: int, wrist: WristParameters) -> Array:
 
 
 MOTIONS = {
+    "tendon": "pull each tendon by itself, or change what antagonists pull together",
     "direction": "pull each tendon by itself, the others slack or held",
     "gain": "pull each tendon by itself, or change what antagonists pull together",
     "stiffness": "slow circles of several sizes, each tendon pulling in turn",
@@ -325,9 +326,10 @@ MOTIONS = {
 """Motions that tell an unknown, by the first word of its name."""
 
 
-def motion_for(name: str) -> str:
-    """The motion that would tell an unknown."""
-    return MOTIONS[name.partition("_")[0]]
+def motions_for(names: Iterable[str]) -> list[str]:
+    """The motions that would tell unknowns, each once; none for what no motion tells."""
+    words = [MOTIONS.get(name.partition("_")[0]) for name in names]
+    return list(dict.fromkeys(filter(None, words)))
 
 
 def wanted_motion() -> Phrase:

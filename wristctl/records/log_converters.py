@@ -16,7 +16,8 @@ from typing import Any
 import numpy as np
 
 from wristctl.arrays import Array
-from wristctl.errors import UserError
+from wristctl.config.choices import LOG_FORMATS
+from wristctl.errors import UserError, nearest
 from wristctl.plain_files import LARGEST_DATA, open_plain
 from wristctl.records.column_ranges import TENDON_OFFSET
 from wristctl.records.log_columns import Units
@@ -274,8 +275,13 @@ def read_log(
 ) -> OpenLog:
     """Read an open log: a table, or with the name of a converter as `names` that laboratory's file.
 
-    Parameters and errors are those of `wristctl.records.open_log.read_table`.
+    Parameters and errors are those of `wristctl.records.open_log.read_table`. Raises UserError for a name that is
+    nearly that of a format.
     """
-    if names.strip() in CONVERTERS:
-        return replace(CONVERTERS[names.strip()].read(file), what=what)
+    name = names.strip()
+    if name in CONVERTERS:
+        return replace(CONVERTERS[name].read(file), what=what)
+    formats = [*LOG_FORMATS, *CONVERTERS]
+    if "=" not in name and name not in formats and (like := nearest(name, formats)):
+        raise UserError(f"unknown log format '{name}'", "columns", f"did you mean '{like}'?")
     return read_table(file, names, what, others, more, tendon_offset)

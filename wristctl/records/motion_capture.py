@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from wristctl.arrays import Array
 from wristctl.errors import UserError
 from wristctl.records.log_columns import ANGLE, LENGTH
-from wristctl.records.recorded_table import RecordedTable, RigidBody
+from wristctl.records.recorded_table import LogFormat, RecordedTable, RigidBody
 from wristctl.records.table_text import cells_of
 
 _LENGTHS = {"meters": 1.0, "centimeters": 1e-2, "millimeters": 1e-3, **LENGTH}
@@ -33,16 +33,6 @@ class _Grid(NamedTuple):
 
     numbers: Array
     lines: list[int]
-
-
-def reader_of(text: str) -> Callable[[str, Path], RecordedTable] | None:
-    """Reader of an export by how it begins."""
-    first = re.split(r"[,;\t\n]", text[:200].lstrip(), maxsplit=1)[0].strip().strip('"')
-    if first == "Format Version":
-        return motive_table
-    if first in _VICON:
-        return vicon_table
-    return qualisys_table if first in _QUALISYS else None
 
 
 def motive_table(text: str, file: Path) -> RecordedTable:
@@ -318,3 +308,13 @@ def _table(
 def _none(file: Path) -> UserError:
     fix = "export rigid bodies with their rotations, or three or more markers of each, named Body:1, Body:2, ..."
     return UserError("no rigid body in this export", str(file), fix)
+
+
+def _first_cell(words: Collection[str]) -> Callable[[str], bool]:
+    """Whether a first line begins with a cell that is one of these words."""
+    return lambda line: re.split(r"[,;\t]", line, maxsplit=1)[0].strip().strip('"') in words
+
+
+MOTIVE = LogFormat("rigid bodies of Motive: CSV", _first_cell(["Format Version"]), motive_table)
+VICON = LogFormat("objects, segments or markers of Vicon's Nexus and Tracker: CSV", _first_cell(_VICON), vicon_table)
+QUALISYS = LogFormat("6DOF bodies or markers of Qualisys Track Manager: TSV", _first_cell(_QUALISYS), qualisys_table)

@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wristctl.arrays import Array
+from wristctl.config.choices import LOG_FORMATS
 from wristctl.errors import OUT, Phrase, UserError
 from wristctl.plain_files import LARGEST_DATA, read_plain
 from wristctl.records.column_ranges import TENDON_OFFSET
@@ -41,7 +42,6 @@ from wristctl.records.log_columns import (
 from wristctl.records.log_times import MISSING, is_dated, is_unix, seconds_of
 from wristctl.records.manifest import MANIFEST
 from wristctl.records.matlab_vectors import vectors_of
-from wristctl.records.motion_capture import motive_table, qualisys_table, reader_of, vicon_table
 from wristctl.records.parquet_logs import parquet_table
 from wristctl.records.recorded_table import Cells, RecordedTable
 from wristctl.records.rigid_bodies import KEYS, BodyNames, bends_of_bodies
@@ -166,7 +166,7 @@ def read_table(
         Distance of the tendons from the axis [m]: units of spools that are not said are proposed by it.
     """
     entries = entries_of(names)
-    kinds = [entry for entry in entries if entry in FORMATS]
+    kinds = [entry for entry in entries if entry in LOG_FORMATS]
     keys = {key: entry for entry in entries if (key := entry.partition("=")[0].strip()) in KEYS and "=" in entry}
     bodies = BodyNames(**{key: entry.partition("=")[2].strip() for key, entry in keys.items()})
     rest = ", ".join(entry for entry in entries if entry not in (*kinds, *keys.values()))
@@ -182,12 +182,13 @@ def read_table(
 
 
 def _read(file: Path, what: str, kind: str) -> RecordedTable:
-    """Columns of a file by its ending, or by how its text begins; of a kind of text that is named, as that."""
+    """Columns of a file by its ending, or by how its text begins; of a log format that is named, as that."""
     if file.suffix in _READERS:
         return _READERS[file.suffix](file, what)
     text = text_of(file, what)
-    reader = FORMATS[kind] if kind else reader_of(text)
-    return reader(text, file) if reader else _text_table(text, file, what)
+    first = text[:1000].lstrip().partition("\n")[0]
+    known = LOG_FORMATS[kind] if kind else next((one for one in LOG_FORMATS.values() if one.begins(first)), None)
+    return known.read(text, file) if known else _text_table(text, file, what)
 
 
 def _named(
@@ -243,13 +244,6 @@ def _matlab_table(file: Path, what: str) -> RecordedTable:
     vectors = vectors_of(file, what)
     return RecordedTable(list(vectors), list(vectors.values()))
 
-
-FORMATS: Mapping[str, Callable[[str, Path], RecordedTable]] = {
-    "motive": motive_table,
-    "vicon": vicon_table,
-    "qualisys": qualisys_table,
-}
-"""Exports of motion capture by the names that `--columns` has for them; how they begin says it too."""
 
 _READERS: Mapping[str, Callable[[Path, str], RecordedTable]] = {
     ".parquet": parquet_table,

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -50,3 +51,15 @@ class RecordedTable:
     """Rigid bodies by their names."""
     others: bool = False
     """Whether columns that an open log does not have are passed over, since those that it has stand under its names."""
+
+
+@dataclass(frozen=True)
+class LogFormat:
+    """Text that another program writes: an entry of `wristctl.config.choices.LOG_FORMATS`."""
+
+    what: str
+    """Description of the files, for a list."""
+    begins: Callable[[str], bool]
+    """Whether a file is of this format, by its first line that is not blank."""
+    read: Callable[[str, Path], RecordedTable]
+    """Columns and rigid bodies of a text; the file is for errors. Raises UserError where it has none."""

@@ -2,6 +2,7 @@
 
 from wristctl.arrays import Array
 from wristctl.board.driver import Board
+from wristctl.board.messages import AXES
 from wristctl.config.hw_run import HwRunSettings
 from wristctl.config.wrist import WristParameters
 from wristctl.errors import UserError
@@ -15,9 +16,9 @@ from wristctl.trial.homing import Zero, find_zero
 from wristctl.trial.log import TrialLog
 from wristctl.trial.motors_ready import Halt, after_a_fault, halt, prepare
 from wristctl.trial.resting import judge_rest
-from wristctl.trial.rig_belief import names_of_planes
+from wristctl.trial.rig_belief import layout_of_rig, names_of_planes, numbers_of
 from wristctl.trial.steering import HostFaults
-from wristctl.trial.supervised_wait import Patience, medians
+from wristctl.trial.supervised_wait import Motors, Patience, WoundAxes, medians
 from wristctl.trial.tendon_pulls import tendon_pulls_of
 from wristctl.trial.testbeds import Testbed
 from wristctl.trial.trials import Trial
@@ -41,9 +42,12 @@ class BoardStand:
     def open(self, settings: HwRunSettings, wrist: WristParameters, log: TrialLog) -> None:
         """See that all answer; nothing moves. `log` takes what is on the wire."""
         self._settings, self._wrist, self._pulls = settings, wrist, tendon_pulls_of(settings)
+        self._layout = layout_of_rig(settings, wrist)
         self._board = Board(self._testbed.transport, log.wire)
         self._board.cells = self._pulls
         self._board.connect()
+        count = len(numbers_of(self._layout))
+        self._motors: Motors = self._board if count == AXES else WoundAxes(self._board, count)
 
     def now(self) -> float:
         """Seconds on its clock."""
@@ -57,7 +61,7 @@ class BoardStand:
         plane = trial.plane if self._settings.planes == 1 else ""
         if loop is not None and plane == self._plane:
             return None
-        patience = Patience(self._board) if loop is None else loop.patience(self._board, self._signs)
+        patience = Patience(self._motors) if loop is None else loop.patience(self._motors, self._signs)
         self._testbed.face(trial.direction, patience.pulse)
         self._tracking, self._plane = self._testbed.tracking(), plane
         self._set_up()
@@ -98,10 +102,10 @@ class BoardStand:
             homed.check_zero()
             return calibration.zero
         signs = calibration.zero.signs if calibration else None
-        return find_zero(self._board, self._tracking, settings, self._wrist, self._plane, signs)
+        return find_zero(self._motors, self._tracking, settings, self._wrist, self._plane, signs, layout=self._layout)
 
     def _homed(self, zero: Zero) -> HomedWrist:
-        return HomedWrist(self._board, self._tracking, self._settings, self._wrist, self._plane, zero)
+        return HomedWrist(self._motors, self._tracking, self._settings, self._wrist, self._plane, zero, self._layout)
 
     def _let_go(self, homed: HomedWrist) -> None:
         """Slacken the tendons, and give the wrist time to straighten."""
@@ -112,7 +116,8 @@ class BoardStand:
         assert self.zero is not None
         settings, plane, pose = self._settings, self._plane, self.poses.get(self._plane)
         drive = BoardDrive(self._board, settings, self._signs)
-        stiffness = ExpectedMoves(settings, self._wrist, plane).tendon_stiffness(self.zero.steps_per_radian)
+        expected = ExpectedMoves(settings, self._wrist, plane, self._layout)
+        stiffness = expected.tendon_stiffness(self.zero.steps_per_radian)
         oblique = 0.0 if pose is None else pose.oblique
         return AtZero(drive, self._tracking, plane, oblique, self._pulls, stiffness)
 

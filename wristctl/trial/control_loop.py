@@ -12,7 +12,6 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from wristctl.arrays import Array
-from wristctl.board.driver import Board
 from wristctl.config.hw_run import HwRunSettings
 from wristctl.config.wrist import WristParameters
 from wristctl.control.law import Controller
@@ -26,7 +25,7 @@ from wristctl.trial.rig_belief import RigBelief, names_of_planes, numbers_of
 from wristctl.trial.safety import SafetyStop
 from wristctl.trial.spools import spools_of
 from wristctl.trial.steering import Answer, HostFaults, Steering
-from wristctl.trial.supervised_wait import InSight, Patience
+from wristctl.trial.supervised_wait import InSight, Motors, Patience
 from wristctl.trial.tendon_pulls import TendonPulls
 from wristctl.trial.tick_timing import TickTiming
 from wristctl.trial.tracking import Tracking, bend_of
@@ -122,7 +121,7 @@ class ControlLoop:
             live.fill(task.course, len(task.course) - 1)
         self._come_to_rest(task._replace(trial=-1))
 
-    def patience(self, board: Board, signs: Sequence[int]) -> Patience:
+    def patience(self, board: Motors, signs: Sequence[int]) -> Patience:
         """For waiting beside the board between two motions, the wrist in sight."""
         sight = InSight(self._tracking, self.watch, self._stale, self._belief, self._drive.now, np.array(signs))
         return Patience(board, sight)

@@ -94,7 +94,7 @@ class LoopDrive(Protocol):
 class BoardDrive:
     """The board's axes. A tick posts step rates, whose answer, the status, is read in the next one.
 
-    `signs` say which way each motor's positive steps turn.
+    `signs` (T,) say which way each motor's positive steps turn; axes beyond these wind nothing, and stand.
     """
 
     tension = None
@@ -102,10 +102,12 @@ class BoardDrive:
     def __init__(self, board: Board, settings: HwRunSettings, signs: Sequence[int]) -> None:
         self._board, self._signs, self._period = board, np.array(signs), settings.control_period
         self._clock, self._life, self._spools = board.transport, settings.rate_life, spools_of(settings.actuator)
-        self._sent, self._posted, self.counted = np.zeros(AXES), 0.0, 0.0
+        self._sent, self._posted, self.counted = np.zeros(len(signs)), 0.0, 0.0
+        self._idle = [0.0] * (AXES - len(signs))
         self._underway = settings.actuator.command_delay
         delay = self._spools.timing.delay
-        self._late, self._rates = int(delay // self._period), np.zeros((AXES, remembered_commands(delay, self._period)))
+        remembered = remembered_commands(delay, self._period)
+        self._late, self._rates = int(delay // self._period), np.zeros((len(signs), remembered))
         self._since_read = delay - self._late * self._period - self._underway
 
     def begin(self) -> None:
@@ -145,7 +147,7 @@ class BoardDrive:
 
     @property
     def sent(self) -> Array:
-        """Step rates (4,) [1/s], positive reeling in."""
+        """Step rates (T,) [1/s], positive reeling in."""
         return self._sent
 
     @property
@@ -164,7 +166,7 @@ class BoardDrive:
 
     def reeled(self) -> Array:
         """By the last status."""
-        reeled: Array = self._signs * np.array(self._status.position, float)
+        reeled: Array = self._signs * np.array(self._status.position[: len(self._signs)], float)
         return reeled
 
     def lead(self, target: Array, moving: Array) -> Array:
@@ -177,11 +179,11 @@ class BoardDrive:
 
     def stand(self) -> None:
         """Step rates of 0."""
-        self._send(np.zeros(AXES))
+        self._send(np.zeros(len(self._signs)))
 
     def _send(self, rates: Array) -> None:
-        sent, self._posted = self._board.post_turn(rates.tolist(), self._life)
-        self._sent = self._signs * np.array(sent)
+        sent, self._posted = self._board.post_turn([*rates.tolist(), *self._idle], self._life)
+        self._sent = self._signs * np.array(sent[: len(rates)])
 
     def listen(self, until: float) -> None:
         """Take in the board's answers to what was sent, those that come by `until` [s]."""

@@ -148,7 +148,8 @@ class ExpectedMoves:
         across, beside = (across_of(in_plane(wrist, name), away).stiffness for name in (facing, other))
         ratio = across / beside if across > 0.0 and beside > 0.0 else 1.0
         self.lever, self._stiffness = wrist.tendon_offset, max(0.0, across)
-        self.own, self._numbers = layout is not None, numbers_of(layout)
+        self.own, self._numbers = getattr(settings, "rig", None) is not None, numbers_of(layout)
+        self._alike = layout is None
         words_of = words_of_rig if self.own else words_of_board
         self._words = words_of(self._numbers, names_of_planes(settings.planes, facing))
         if layout is not None:
@@ -171,7 +172,7 @@ class ExpectedMoves:
         """
         k, (_, path, torque, lever) = self._spools.stiffness if stiffness is None else stiffness, self._alone
         steps = path + harder * torque / (lever * k)
-        if self.own and axis is not None:
+        if axis is not None and not self._alike:
             return float(steps[axis]) / self._spools.step
         return math.fsum(steps) / len(path) / self._spools.step
 

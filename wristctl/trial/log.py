@@ -187,14 +187,14 @@ def look_columns(planes: int) -> Columns:
     return {"trial": ("", "number, from 0"), "time": ("s", "when it was true, on the trial's time"), **tips, **bends}
 
 
-def truth_columns(coordinates: int, planes: int = 1) -> Columns:
+def truth_columns(coordinates: int, planes: int = 1, tendons: Sequence[int] = ACTIVE) -> Columns:
     """Columns of the emulated bench's true values, for a wrist of so many coordinates."""
     of_segments = {f"bend_{k + 1}": ("rad", "true angle of one segment") for k in range(coordinates // planes)}
     return {
         "trial": ("", "number, from 0"),
         "time": ("s", "since the trial's motion began"),
         **_by_plane(planes, {**of_segments, "bend": ("rad", "true bending angle")}),
-        **_by_tendon(ACTIVE, "pull", "N", "true tension at the spool"),
+        **_by_tendon(tendons, "pull", "N", "true tension at the spool"),
     }
 
 
@@ -296,7 +296,7 @@ class TrialLog:
             tables["looks"] = look_columns(planes)
         tables["residuals"] = residual_columns(planes, weighed, not wired)
         if coordinates is not None:
-            tables["truth"] = truth_columns(coordinates, planes)
+            tables["truth"] = truth_columns(coordinates, planes, tendons)
         try:
             self.streams = {name: Stream(folder / f"{name}.csv", table, self.disk) for name, table in tables.items()}
         except OSError:

@@ -14,6 +14,7 @@ from wristctl.errors import UserError
 from wristctl.trial.board_stand import BoardStand
 from wristctl.trial.experiment import Experiment, log_of
 from wristctl.trial.motion_limit import limited, peak_tension
+from wristctl.trial.rig_belief import layout_of_rig
 from wristctl.trial.testbeds import open_testbed
 from wristctl.trial.trial_results import metrics_of_trials
 from wristctl.trial.trials import Trial, trials_of
@@ -65,7 +66,7 @@ def _run(study: Study, tuned: Gains | None) -> dict[int, Rehearsed]:
         finally:
             log.close()
         begun = [trial for trial in trials if trial.number in done.outcomes]
-        metrics = metrics_of_trials(Path(folder), begun, done.motions, settings)
+        metrics = metrics_of_trials(Path(folder), begun, done.motions, settings, layout_of_rig(settings, wrist))
     found = {}
     for row in range(len(settings.rows)):
         own = [(done.outcomes[t.number], m) for t, m in zip(begun, metrics, strict=True) if t.row == row]

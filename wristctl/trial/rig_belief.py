@@ -24,7 +24,7 @@ from wristctl.wrist.directions import ACTIVE, TENDONS, in_plane
 from wristctl.wrist.segments import segments
 from wristctl.wrist.spatial.pcc_in_space import placed_values
 from wristctl.wrist.spatial.spatial_segments import OF_A_TENDON
-from wristctl.wrist.tendon_layout import TendonLayout
+from wristctl.wrist.tendon_layout import TendonLayout, wound_by
 
 # Planes of the two bends, in their order: also that of the cameras.
 PLANES = ("ulnar", "flexion")
@@ -130,9 +130,12 @@ def _angles(layout: TendonLayout) -> list[float]:
 
 
 def layout_of_rig(settings: HwRunSettings, wrist: WristParameters) -> TendonLayout | None:
-    """Tendons that the motors of a rig wind; None: the board's four."""
+    """Tendons that the motors of a rig wind; None: the paper's four on a board.
+
+    Raises UserError for a board in two planes that has too few axes for them.
+    """
     if settings.rig is None:
-        return None
+        return None if settings.planes == 1 else wound_by(wrist, AXES)
     return TendonLayout(tuple(place for place in TendonLayout.of(wrist).places if place.radius > 0.0))
 
 

@@ -16,7 +16,7 @@ from wristctl.config.wrist import WristParameters
 from wristctl.trial.camera_pace import BY_CHECK, FIX, CameraPace, CameraPaces
 from wristctl.trial.expected_moves import Bend, ExpectedMoves
 from wristctl.trial.resting import judge_rest
-from wristctl.trial.rig_belief import PLANES
+from wristctl.trial.rig_belief import PLANES, layout_of_rig
 from wristctl.trial.rig_strokes import Latency, RigStrokes, find_latency
 from wristctl.trial.safety import SafetyStop
 from wristctl.trial.supervised_wait import OBLIQUE_FIX
@@ -137,7 +137,8 @@ def measure(
         strokes = RigStrokes(board, tracking, settings, axis)
         taut, bend = strokes.taken_up()
         if settings.planes == 2:
-            direction = _direction_of(axis, bend, ExpectedMoves(settings, wrist, ""))
+            expected = ExpectedMoves(settings, wrist, "", layout_of_rig(settings, wrist))
+            direction = _direction_of(axis, bend, expected)
         if direction is None or direction.astray is None:
             for cameras in strokes.strokes(taut, progress):
                 latencies = [find_latency(motor_strokes, strokes.hold) for motor_strokes in cameras]

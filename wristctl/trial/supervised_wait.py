@@ -7,8 +7,8 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 
 from wristctl.arrays import Array
-from wristctl.board.driver import Cells
-from wristctl.board.messages import State, Status
+from wristctl.board.driver import Board, Cells
+from wristctl.board.messages import AXES, State, Status
 from wristctl.config.hw_run import Homing
 from wristctl.trial.camera_pace import CameraPaces
 from wristctl.trial.resting import judge_turn
@@ -77,6 +77,37 @@ class Motors(Protocol):
 
     def see_restart(self) -> None:
         """Raises where positions are no longer those of before."""
+
+
+class WoundAxes:
+    """The first so many axes of a board as motors: those that wind a tendon. The others stand."""
+
+    def __init__(self, board: Board, count: int) -> None:
+        self._board, self._count, self.transport = board, count, board.transport
+        self.ping, self.faulted, self.see_restart, self.home = board.ping, board.faulted, board.see_restart, board.home
+
+    @property
+    def cells(self) -> Cells | None:
+        """As the board has them."""
+        return self._board.cells
+
+    def read(self) -> Any:
+        """The board's status, with the positions of these axes."""
+        return self._of_these(self._board.read())
+
+    def jog(self, positions: Sequence[int]) -> Any:
+        """As `Motors.jog`."""
+        return self._of_these(self._board.jog(self._all(positions)))
+
+    def go_to(self, positions: Sequence[int], rate: int) -> Any:
+        """As `Motors.go_to`."""
+        return self._of_these(self._board.go_to(self._all(positions), rate))
+
+    def _of_these(self, status: Any) -> Any:
+        return status._replace(position=status.position[: self._count])
+
+    def _all(self, positions: Sequence[int]) -> list[int]:
+        return [*positions, *[0] * (AXES - self._count)]
 
 
 class Reading(NamedTuple):

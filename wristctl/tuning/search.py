@@ -29,6 +29,7 @@ from wristctl.simulation.closed_loop import scenario_of
 from wristctl.simulation.drawn_worlds import asked_of, drawn_cases
 from wristctl.simulation.planes import Asked, motion_in, planes_of
 from wristctl.simulation.worlds import Draws, is_random, loops_of
+from wristctl.tuning.gain_space import GainSpace
 from wristctl.tuning.margin import OwnLoop
 from wristctl.tuning.objective import YARDSTICK, Judge
 from wristctl.tuning.optimisers import OPTIMISERS, Optimiser
@@ -36,42 +37,11 @@ from wristctl.work.worker import Unit
 from wristctl.wrist.kinematics import Inverse
 
 if TYPE_CHECKING:
-    from wristctl.control.law import Gain
+    pass
 
 
-@dataclass(frozen=True)
-class GainSpace:
-    """Boxes of g positive gains; a coordinate u in [0, 1] is the gain low * (high / low)^u."""
-
-    names: tuple[str, ...]
-    low: Array
-    """(g,)"""
-    high: Array
-    """(g,)"""
-
-    @classmethod
-    def of(cls, gains: Mapping[str, Gain]) -> GainSpace:
-        """The search boxes of a controller's gains, in their order."""
-        low, high = (np.array([getattr(gain, side) for gain in gains.values()]) for side in ("low", "high"))
-        return cls(tuple(gains), low, high)
-
-    @property
-    def decades(self) -> Array:
-        """Width of each box in powers of ten, (g,)."""
-        return np.log10(self.high / self.low)
-
-    def gains(self, unit: Array) -> Array:
-        """Gains (..., g) at points (..., g) of the unit cube; never outside the box by rounding."""
-        return np.clip(self.low * 10.0 ** (self.decades * unit), self.low, self.high)
-
-    def unit(self, gains: Array) -> Array:
-        """Points (..., g) of the unit cube of gains (..., g); UserError for a gain outside its box."""
-        outside = ~((gains >= self.low) & (gains <= self.high))
-        if outside.any():
-            column = int(np.argmax(outside.reshape(-1, len(self.names)).any(axis=0)))
-            box = f"{self.low[column]:g} to {self.high[column]:g}"
-            raise UserError(f"gain {self.names[column]} outside its search box", fix=f"start within {box}")
-        return np.log10(gains / self.low) / self.decades
+# Origin of gains that are not a preset's.
+SEARCHED = "search"
 
 
 class Tried(NamedTuple):
@@ -108,6 +78,13 @@ class Search:
     restarts: int
     finalists: tuple[Finalist, ...] = ()
     """Best first; none as long as it goes on."""
+
+    @property
+    def best_preset(self) -> Finalist | None:
+        """The best of the controller's presets, of gains that the search came upon itself; else None."""
+        if not self.finalists or self.finalists[0].origin != SEARCHED:
+            return None
+        return next((finalist for finalist in self.finalists if finalist.origin != SEARCHED), None)
 
     @property
     def best_so_far(self) -> Array:
@@ -303,7 +280,7 @@ def _chosen(
     distinct: dict[tuple[float, ...], float] = {}
     for index in np.argsort(values, kind="stable"):
         distinct.setdefault(tuple(map(float, flat[index])), float(values[index]))
-    candidates = [(gains, "search", value) for gains, value in list(distinct.items())[:count]]
+    candidates = [(gains, SEARCHED, value) for gains, value in list(distinct.items())[:count]]
     if presets := _presets(controller, GainSpace.of(controller.gains)):
         judged = zip(presets.items(), judge(controller, np.array(list(presets.values()))), strict=True)
         candidates += [(tuple(map(float, each)), name, float(value)) for (name, each), value in judged]

@@ -256,6 +256,29 @@ def off_both_sides(wrist: WristParameters) -> int | None:
     return None
 
 
+def wound_by(wrist: WristParameters, axes: int) -> TendonLayout | None:
+    """Tendons off the axis, in their order, where each is wound by one of so many motors; None: the paper's 1, 2, 4, 5.
+
+    Raises UserError where there are more of them than motors, or where they bend the wrist in one plane alone.
+    """
+    layout, four = TendonLayout.of(wrist), TendonLayout.four(wrist.tendon_radius)
+    around = tuple(place for place in layout.places if place.radius > 0.0)
+    if len(around) == len(four.places) and all(place.multiplicity == 1 and place.ends_at is None for place in around):
+        off = np.hypot(*(TendonLayout(around).cross_section - four.cross_section).T)
+        if off.max() <= _APART * wrist.tendon_offset:
+            return None
+    wound = sum(place.multiplicity for place in around)
+    key = _KEY if isinstance(wrist.tendons, str) else f"{_KEY}.0"
+    if wound > axes:
+        problem = f"the motor board has {axes} axes, and this wrist {wound} tendons off its axis"
+        raise UserError(problem, key, "a rig of your own takes more (hw-run.rig)")
+    if wound > len(around):
+        raise UserError("two tendons at one place are wound by two motors", key, "a place for each tendon")
+    if layout.planes == 1:
+        raise UserError("these tendons bend the wrist in one plane", key, "`tendons: four`, or a rig of your own")
+    return TendonLayout(around)
+
+
 def key_of_tendon(wrist: WristParameters, number: int) -> str:
     """Key of a tendon's place; that of all where they have a name."""
     return _KEY if isinstance(wrist.tendons, str) else _key(number)

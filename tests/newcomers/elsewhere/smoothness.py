@@ -10,7 +10,8 @@ from wristctl.simulation.trajectory import Trajectory
 
 def _jerk(trajectory: Trajectory) -> float:
     step = float(trajectory.time[1] - trajectory.time[0])
-    return float(np.sqrt(np.mean((np.diff(trajectory.rate, 2) / step**2) ** 2)))
+    jerk = np.diff(trajectory.rate, 2, axis=0) / step**2
+    return float(np.sqrt(trajectory.planes * np.mean(jerk**2)))
 
 
 JERK = Metric("rad/s^3", "root mean square of the angle's third derivative", of_trajectory=_jerk, heading="jerk")

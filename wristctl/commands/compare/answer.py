@@ -15,6 +15,7 @@ from wristctl.commands.ranking_answer import (
     decided,
     error,
     gains_words,
+    is_by_loop,
     names_of,
     not_to_use,
     open_loop,
@@ -59,10 +60,10 @@ def answer_of(
     more = f"Every rank and figure: `--all`, or {run}/report.html." if run else "Every rank and figure: `.tables`."
     notes = [
         bending,
-        conditions(rankings),
+        not_to_use(rankings, names),
+        f"{conditions(rankings)} {presets_of_names(rankings, gains or {})}".strip(),
         best_on_yours(rankings),
         gains_of_best(rankings, gains or {}),
-        not_to_use(rankings, names),
         papers(rankings),
         papers_order(rankings),
         f"{certainty(rankings)} {decided(rankings)}".strip(),
@@ -95,6 +96,24 @@ def best_on_yours(rankings: Sequence[Ranking]) -> str:
             f"{shares[row].times} of {shares[row].n} worlds, each a motion and a wrist that your trials leave possible."
         )
     return " ".join(sentences)
+
+
+def presets_of_names(rankings: Sequence[Ranking], gains: Mapping[str, Mapping[str, float]]) -> str:
+    """Which preset a controller has under which condition that was typed by its name alone; empty where none was."""
+    rig = {condition(one): one.traits.rig for one in rankings}
+    usual = [preset for preset, wanted in (("hardware", True), ("default", False)) if wanted in rig.values()]
+    alone = dict.fromkeys(label for one in rankings for label in one.labels if is_by_loop(label))
+    presets = [row.split("/", 1) for row, values in gains.items() if values and "/" in row]
+    own = {label: [preset for name, preset in presets if name == label] for label in alone}
+    others = [f"{label} {preset}" for label, found in own.items() for preset in found if preset not in usual]
+    others += [f"{label} default in all" for label, found in own.items() if found == ["default"] and len(usual) > 1]
+    if not any(own.values()):
+        return ""
+    words = f"preset {usual[0]}"
+    if len(usual) > 1:
+        words = f"preset hardware in {joined([name for name, is_rig in rig.items() if is_rig])}, default elsewhere"
+    odd = f" ({'; '.join(others)})" if others else ""
+    return f"A name alone has its {words}{odd}: none is tuned for this."
 
 
 def gains_of_best(rankings: Sequence[Ranking], gains: Mapping[str, Mapping[str, float]]) -> str:

@@ -16,6 +16,7 @@ from wristctl.commands.inputs_of_loops import found_in, with_found
 from wristctl.config.loop import Loop
 from wristctl.config.plant import Actuator
 from wristctl.config.study import Study
+from wristctl.config.wrist import WristParameters
 from wristctl.errors import UserError
 from wristctl.identification.spool_paths import answered, count_times, has_rates, spool_paths
 from wristctl.records import Run
@@ -240,25 +241,30 @@ def _tracked(run: Run) -> list[RecordedMotion]:
 
 
 def _bends(run: Run) -> list[RecordedMotion]:
-    """A motion in two planes with the spools of all tendons, and with their pulls where these are the spools' too.
-
-    Tendons of the square wrist have the numbers 1, 2, 4 and 5, others those of `wrist.tendons`.
-    """
+    """A motion in two planes with the spools of all tendons, and with their pulls where these are the spools' too."""
     table, study = _whole(read_table(run.file("data/bends.csv")), "bend_ulnar"), study_of(run)
-    wrist, loop = study.wrist, study.simulate.loop
+    loop = study.simulate.loop
     columns, commands = _columns(table, _BENDS), Columns()
-    places = TendonLayout.of(wrist).places
-    square = ACTIVE if wrist.tendons == "four" else range(1, len(places) + 1)
-    for column, (number, place) in enumerate(zip(square, places, strict=True), 1):
-        if place.radius == 0.0:
-            continue
+    for column, number, alike in _numbered(study.wrist):
         if f"pull_{column}" in table:
-            commands[f"tension_{number}"] = table[f"pull_{column}"].to_numpy(float) / place.multiplicity
+            commands[f"tension_{number}"] = table[f"pull_{column}"].to_numpy(float) / alike
         if f"spool_{column}" in table:
             columns[f"spool_{number}"] = table[f"spool_{column}"].to_numpy(float)
         if _slides_freely(loop):
-            columns[f"tension_{number}"] = table[f"acting_{column}"].to_numpy(float) / place.multiplicity
+            columns[f"tension_{number}"] = table[f"acting_{column}"].to_numpy(float) / alike
     return [_motion(run, table, columns, commands)]
+
+
+def _numbered(wrist: WristParameters) -> list[tuple[int, int, int]]:
+    """Number of each place's column, number of its tendon in an open log, and how many tendons are there.
+
+    Tendons of the square wrist have the numbers 1, 2, 4 and 5, others those of `wrist.tendons`; what bends nothing has
+    none.
+    """
+    places = TendonLayout.of(wrist).places
+    numbers = ACTIVE if wrist.tendons == "four" else range(1, len(places) + 1)
+    every = enumerate(zip(numbers, places, strict=True), 1)
+    return [(column, number, place.multiplicity) for column, (number, place) in every if place.radius > 0.0]
 
 
 def _compared(run: Run) -> list[RecordedMotion]:
@@ -275,8 +281,10 @@ def _compared(run: Run) -> list[RecordedMotion]:
     if run.has("data/comparison.csv") and len(rows := read_table(run.file("data/comparison.csv"))) == shape[0]:
         tasks = [f"{row.reference} with {row.controller}/{row.gains}, {row.loop}" for row in rows.itertuples()]
     sides = {"tension_plus": "tension_1", "tension_minus": "tension_2"}
-    pulls = sorted(name for name in over_time if name.startswith("pull_"))
-    sides |= {name: f"tension_{name.removeprefix('pull_')}" for name in pulls}
+    for column, tendon, alike in _numbered(run.config.wrist):
+        if f"pull_{column}" in over_time:
+            over_time[f"pull_{column}"] /= alike
+            sides[f"pull_{column}"] = f"tension_{tendon}"
     motions = []
     for number, task in enumerate(tasks):
         whole = np.isfinite(over_time[next(iter(names))][number])  # a wrist that left its range has no bends from then

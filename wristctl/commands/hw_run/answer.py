@@ -28,9 +28,13 @@ ROWS = 16
 
 
 def answer_of(
-    trials: pd.DataFrame, twins: Mapping[int, Simulation], metrics: Mapping[str, float], marks: Sequence[str], run: str
-) -> Answer:
-    """What the trials came to beside their simulation, by the trial's number; `run` is the path of their run."""
+    trials: pd.DataFrame, twins: Mapping[int, Simulation], metrics: Mapping[str, float], marks: Sequence[str], run: str,
+    tension_limit: float = math.inf,
+) -> Answer:  # fmt: skip
+    """What the trials came to beside their simulation, by the trial's number; `run` is the path of their run.
+
+    A tension beyond `tension_limit` [N] would have stopped them.
+    """
     from wristctl.simulation.trajectory import rests
 
     done = completed(trials)
@@ -38,7 +42,7 @@ def answer_of(
     more = f"All tables: --all. Every trial: {run}/report.html" if run else "All tables: `.tables`."
     apart = [*_apart(compared, labels), *swings_apart(done, twins)]
     apart[-1:] = [f"{last} Do not rely on that simulation here." for last in apart[-1:]]
-    notes = [*_at_rest(done, twins), *apart, *unsound(trials, marks, metrics)]
+    notes = [*_at_rest(done, twins, tension_limit), *apart, *unsound(trials, marks, metrics)]
     if not labels:
         return Answer(f"None of {len(trials)} trials was completed.", None, notes, more)
     moving = {number for number, twin in twins.items() if not rests(twin.trajectory)}
@@ -148,14 +152,15 @@ def _table(trials: pd.DataFrame) -> Table:
     return table_of("", quantities([*named, *known]), groups)
 
 
-def _at_rest(done: pd.DataFrame, twins: Mapping[int, Simulation]) -> list[str]:
+def _at_rest(done: pd.DataFrame, twins: Mapping[int, Simulation], tension_limit: float) -> list[str]:
     """The largest swing at rest, where the wrist rests at all, and the largest pull, of trials that ended well."""
     if not len(done):
         return []
     swings, told = swings_of(done, twins), []
     if swings.seen.any():
         told.append(f"the wrist moves by at most {swings.largest()}")
-    told.append(f"tendons are asked for at most {two(float(done['peak_tension'].max()))} N")
+    stops = f" (more than {tension_limit:.3g} N would stop the motors)" if math.isfinite(tension_limit) else ""
+    told.append(f"tendons are asked for at most {two(float(done['peak_tension'].max()))} N{stops}")
     facts = "; ".join(told)
     return [f"{facts[0].upper()}{facts[1:]}."]
 

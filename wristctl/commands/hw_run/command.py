@@ -6,6 +6,7 @@ import math
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
+from wristctl.commands.adoption import wound_in_both_planes
 from wristctl.commands.calibrate.wrist import CALIBRATION
 from wristctl.commands.hw_run.results import Performed, performed
 from wristctl.commands.inputs import EarlierRun, Inputs
@@ -29,7 +30,7 @@ from wristctl.commands.procedure import Procedure
 from wristctl.commands.rig_description import describe_rig
 from wristctl.commands.session import Session
 from wristctl.config.study import Study
-from wristctl.errors import under
+from wristctl.errors import UserError, under
 
 if TYPE_CHECKING:
     from wristctl.config.hw_run import HwRunSettings
@@ -79,17 +80,25 @@ def check_bends_of_trials(settings: HwRunSettings, wrist: WristParameters) -> No
     from wristctl.simulation.rollout import check_two_planes
     from wristctl.simulation.worlds import World
     from wristctl.trial.motions import motion_of
-    from wristctl.trial.rig_belief import layout_of_axes
+    from wristctl.trial.rig_belief import layout_of_rig
     from wristctl.trial.trials import motions_of
 
-    if settings.rig is None:
-        layout_of_axes(wrist)
+    if layout_of_rig(settings, wrist) is not None and settings.rig is None:
+        _check_of_the_paper(settings)
     check_two_planes([World(settings.loop, wrist)])
     through = settings.reference.inverse == "network"
     for name in () if through else motions_of(settings):
         motion_of(settings.model_copy(update={"control_period": _CHECKED}), wrist, name)
     for row in settings.rows:
         controller(row.controller)
+
+
+def _check_of_the_paper(settings: HwRunSettings) -> None:
+    """UserError for what a board has of the paper's four tendons alone."""
+    for key in ("load_cells", "calibration"):
+        if getattr(settings, key):
+            problem = f"{key} of a board are of the tendons 1, 2, 4 and 5, and this wrist has others"
+            raise UserError(problem, key, "leave it out: the wrist is homed anew")
 
 
 def _planes_of_network(settings: HwRunSettings) -> int:
@@ -121,7 +130,8 @@ def hw_run(session: Session) -> Performed:
     limited_session = _limited(identified_session, network, tuned)
     trials = perform_trials(limited_session, bench, network, tuned)
     identified_session = with_record(identified_session)
-    return replace(performed(identified_session, trials, network, tuned), study=study)
+    most = limited_session.study.hw_run.safety.tension
+    return replace(performed(identified_session, trials, network, tuned), study=study, tension_limit=most)
 
 
 def _limited(session: Session, network: Inverse | None, tuned: Gains | None) -> Session:
@@ -151,6 +161,16 @@ def _limited(session: Session, network: Inverse | None, tuned: Gains | None) -> 
     return replace(session, study=changed)
 
 
+def _in_one_plane(study: Study) -> bool:
+    """Whether a board's trials bend the wrist in one plane: its tendons may ask for both where nobody gave planes."""
+    settings = study.hw_run
+    return (
+        settings.rig is None
+        and settings.planes == 1
+        and ("planes" in settings.model_fields_set or not wound_in_both_planes(study.wrist))
+    )
+
+
 HW_RUN: Procedure[Performed] = Procedure(
     "hw-run",
     plan,
@@ -163,5 +183,5 @@ HW_RUN: Procedure[Performed] = Procedure(
         EarlierRun("tuned", kind="tune", optional=True),
         EarlierRun("network", kind="train", optional=True),
     ),
-    in_one_plane=lambda study: study.hw_run.rig is None,
+    in_one_plane=_in_one_plane,
 )

@@ -47,11 +47,13 @@ class Performed(StudyResult):
     trials: pd.DataFrame
     twins: dict[int, Simulation]
     """by the trial's number"""
+    tension_limit: float = math.inf
+    """Tension [N] beyond which the trials would have been stopped."""
 
     @property
     def answer(self) -> Answer:
         """Error by motion, settling and recovery, and how far simulation agrees."""
-        return answer_of(self.trials, self.twins, self.metrics, self.marks, self.place)
+        return answer_of(self.trials, self.twins, self.metrics, self.marks, self.place, self.tension_limit)
 
     @property
     def marks(self) -> list[str]:

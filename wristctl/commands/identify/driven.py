@@ -135,7 +135,7 @@ def _refuse(session: Session, found: DrivenFit, remarks: Sequence[str]) -> None:
 def driven_answer(found: DrivenFit, remarks: Sequence[str], run: str = "") -> Answer:
     """What is identified and how well the rest is predicted, each parameter, and what would tell the others."""
     from wristctl.commands.validate.answer import wanted_terms
-    from wristctl.identification.driven_log import motion_for
+    from wristctl.identification.driven_log import motions_for
 
     told = found.fit.told
     known = [name for name, one in told.items() if one.known]
@@ -148,8 +148,8 @@ def driven_answer(found: DrivenFit, remarks: Sequence[str], run: str = "") -> An
     still = [f"{what}_{k}" for k in found.robot.still for what in ("direction", "gain")]
     untold = [*(name for name in told if name not in known), *still]
     if untold:
-        motions = dict.fromkeys(motion_for(name) for name in untold)
-        notes.append(f"Not identifiable from these data: {joined(untold)}. What would tell: {'; '.join(motions)}.")
+        what = "; ".join(motions_for(untold))
+        notes.append(f"Not identifiable from these data: {joined(untold)}. What would tell: {what}.")
     notes += [wanted_terms(found.models), *remarks]
     if found.robot.drive == "current":
         notes.append(

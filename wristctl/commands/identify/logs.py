@@ -22,6 +22,7 @@ from wristctl.errors import Setting, UserError
 if TYPE_CHECKING:
     import pandas as pd
 
+    from wristctl.config.wrist import WristParameters
     from wristctl.identification.arc_fit import ArcFit
     from wristctl.identification.arc_robot import ArcRecording, ArcRobot
     from wristctl.identification.model_choice import TriedModel
@@ -60,7 +61,8 @@ class LogTold(StudyResult):
     def answer(self) -> Answer:
         """Parameters with intervals or not identifiable, the terms that the data want, and what would tell more."""
         run = self.place if self.fit.predicts else ""
-        return told_answer(self.fit, self.models, self.chosen, self.remarks, self.samples, run)
+        remarks = [*self.remarks, settings_told(self.study.wrist)]
+        return told_answer(self.fit, self.models, self.chosen, remarks, self.samples, run)
 
     def frame(self) -> pd.DataFrame:
         """One row per parameter: value and ends of its interval, nan where the data do not tell it, and unit."""
@@ -209,6 +211,16 @@ def _refuse(session: Session, result: LogTold, recordings: Sequence[ArcRecording
     raise UserError(problem, recordings[0].name, accept, exit_code=3)
 
 
+def settings_told(wrist: WristParameters) -> str:
+    """Which lengths a fit of open logs takes from the study, since these logs do not tell them."""
+    values = {"length": wrist.length, "tendon_radius": wrist.tendon_radius}
+    words = [
+        f"wrist.{name} = {value:.4g} m ({'given' if name in wrist.model_fields_set else 'by default'})"
+        for name, value in values.items()
+    ]
+    return f"Not found but taken from settings: {joined(words)}."
+
+
 def told_answer(
     fit: ArcFit, models: Sequence[TriedModel], chosen: TriedModel, remarks: Sequence[str] = (), samples: int = 0,
     run: str = "",
@@ -222,6 +234,7 @@ def told_answer(
     run : path of the run on whose wrist one may go on; empty where there is none
     """
     from wristctl.commands.validate.answer import wanted_terms
+    from wristctl.identification.driven_log import motions_for
 
     unit, scale = fit.robot.unit, fit.robot.scale
     error, low, high = (f"{scale * value:.3g}" for value in chosen.score[:3])
@@ -233,6 +246,10 @@ def told_answer(
     used = sum(len(recording.time) for recording in fit.recordings)
     fewer = f" Of {samples} samples the models are fitted at {used} instants, evenly over each trial."
     notes: list[str | Table] = [wanted_terms(models) + fewer * (used < samples), *remarks]
+    untold = [name for name, one in fit.told.items() if not one.known]
+    if what := "; ".join(motions_for(untold)):
+        steps = " Quick steps: `wristctl hw-run identify --rig my_rig.py:RIG`." * ("quick steps" in what)
+        notes.append(f"To tell {joined(untold)}, record: {what}.{steps}")
     if "force" not in fit.values:
         more = (
             "" if "softening" in fit.values else "; trials with several masses tell how much a load softens the wrist"

@@ -32,6 +32,8 @@ RECOMMENDED = "data/recommended.yaml"
 NEAR = 1.25
 # Probability below which equals would differ as much, so that a difference counts as shown.
 _SHOWN = 0.05
+# What nothing here says anything of.
+_BEYOND = "Do not use it beyond these limits, or on another wrist or rig, without trying it there."
 # Angle of the sines by which it is found how fast a motion may be, where the tendons reach it [deg].
 _SINE_DEG = 20.0
 
@@ -264,7 +266,7 @@ def _notes(result: Recommended) -> list[str]:
     motion, sides = ("ellipses", "any side") if result.bending else ("sines", "both sides")
     sine = f"{motion} of {sine_deg(result.reach_deg):g} deg to {sides}"
     holds = f"{_up_to(result.motions, 'Hz', sine)} {_up_to(result.payloads, 'kg', 'an unknown payload in the hand')}"
-    notes.append(f"{rehearsed} {holds}".strip())
+    notes.append(f"{rehearsed} {holds} {_BEYOND}".strip())
     how = "simulated; on a robot of your own, hw-run --rig my_rig.py:RIG in place of simulate"
     if (own := own_rig(result.study)) is not None:
         how = f"on {own}"

@@ -35,6 +35,8 @@ _VERBS = {
 
 # Difference of two errors' ratio from 1 that counts as none, and the same in decades, of two objectives.
 _SAME = 0.01
+# The same up to which it is told without its size.
+_HARDLY = 0.05
 _TIE = math.log10(1.0 + _SAME)
 
 
@@ -55,8 +57,17 @@ class Motion(NamedTuple):
     """Path of the run behind a reference through a network; empty without one."""
 
 
+class Start(NamedTuple):
+    """The best of a controller's presets, where a search found other gains that are better by its objective."""
+
+    preset: str
+    beside: Beside
+    lost: Mapping[str, int]
+    """What it does wrong, and in how many cases, by mark."""
+
+
 class Beside(NamedTuple):
-    """RMSE of tuned gains and of feedforward on the same cases, [rad]: the geometric mean of those where both last."""
+    """RMSE of gains and of feedforward on the same cases, [rad]: the geometric mean of those where both last."""
 
     error: float
     feedforward: float
@@ -94,6 +105,23 @@ def beside_feedforward(
     return results
 
 
+def starts_of(searches: Mapping[str, Search], cases: Sequence[Case], wrist: WristParameters) -> dict[str, Start]:
+    """The best preset of each controller for which a search found better gains, on the cases these were chosen by."""
+    import numpy as np
+
+    from wristctl.control.table import controller
+    from wristctl.tuning.objective import marks_of
+
+    presets = {name: search.best_preset for name, search in searches.items() if not _preset_of(search)}
+    found = {name: preset for name, preset in presets.items() if preset is not None}
+    gains = {name: dict(zip(controller(name).gains, preset.gains, strict=True)) for name, preset in found.items()}
+    errors = beside_feedforward(gains, cases, wrist)
+    return {
+        name: Start(preset.origin, errors[name], marks_of(controller(name), np.array(preset.gains), cases, wrist))
+        for name, preset in found.items()
+    }
+
+
 def answer_of(
     searches: Mapping[str, Search],
     errors: Mapping[str, Beside],
@@ -104,12 +132,14 @@ def answer_of(
     motion: Motion | None = None,
     stood: Mapping[str, Stood] | None = None,
     bending: str = "",
+    starts: Mapping[str, Start] | None = None,
 ) -> Answer | None:
     """The answer of a search on so many `cases`; None where nothing was searched. `run` is its path, if it has one.
 
     `elsewhere` has the marks of the gains on other loops, by controller and loop; `motion` is the one to try them on,
     and `stood` how much they stand on its loop, by controller. `bending` says in which planes all loops bend, where
-    these are two.
+    these are two, and `starts` what the best preset of each controller is worth, of those for which a search found
+    better gains.
     """
     if not searches:
         return None
@@ -119,16 +149,13 @@ def answer_of(
     little = [name for name in ordered if name in (stood or {}) and not (stood or {})[name].enough]
     sentence = " ".join([
         _verdict(searches[best], errors[best], lost[best], cases, best in little),
-        *_error(errors[best], cases),
+        *_error(errors[best], cases, (starts or {}).get(best)),
         *_ties(best, sound, searches),
         *_passed_over(ordered[0], best, errors, lost, cases),
     ])  # fmt: skip
-    notes = [
-        *[bending] * bool(bending),
-        *_edges(ordered, searches),
-        *_presets([name for name in ordered if name != best], searches),
-        *_lost(ordered, lost, cases),
-    ]
+    others = [name for name in ordered if name != best]
+    notes = [bending] * bool(bending)
+    notes.append(" ".join([_edges(ordered, searches), *_presets(others, searches), _lost(ordered, lost, cases)]))
     notes += _margins(ordered, stood or {}, little, motion.where if motion else "the loop")
     notes += _elsewhere(ordered, elsewhere)
     more = "All tables: `.tables`."
@@ -175,11 +202,17 @@ def _faults(lost: Mapping[str, int], cases: int) -> str:
     return " and ".join(f"{_VERBS[mark]} in {count} of {cases} cases" for mark, count in lost.items())
 
 
-def _error(beside: Beside, cases: int) -> list[str]:
-    """Error of the best gains beside feedforward's; nothing where they fail everywhere."""
+def _error(beside: Beside, cases: int, start: Start | None) -> list[str]:
+    """Error of the best gains beside feedforward's and the best preset's; nothing where they fail everywhere."""
     if not beside.cases:
         return []
-    times = f"{_times(beside)} feedforward's {degrees(beside.feedforward)} deg"
+    times = f"{_times(beside.ratio)} feedforward's {degrees(beside.feedforward)} deg"
+    if start is not None and (start.lost or not start.beside.cases):
+        faults = _faults(start.lost, cases) if start.lost else "fails in each case"
+        times += f"; its best preset, {start.preset}, {faults}"
+    elif start is not None:
+        ratio = start.beside.error / beside.error
+        times += f", {_times(ratio)} that of its best preset, {start.preset}, {degrees(start.beside.error)} deg"
     where = f"{cases} cases" if beside.cases == cases else f"{beside.cases} of {cases} cases (in the others it fails)"
     return [f"Its error is {degrees(beside.error)} deg RMSE over {where}: {times}."]
 
@@ -204,10 +237,11 @@ def _passed_over(
 def _preset_of(search: Search) -> str:
     """The preset that nothing better was found than, also where the search came upon it; empty where something was."""
     from wristctl.control.table import controller
+    from wristctl.tuning.search import SEARCHED
 
     if not search.finalists:
         return ""
-    if search.finalists[0].origin != "search":
+    if search.finalists[0].origin != SEARCHED:
         return search.finalists[0].origin
     return next((name for name, gains in controller(search.controller).presets.items() if _same(search, gains)), "")
 
@@ -228,10 +262,13 @@ def _next(file: str, motion: Motion) -> list[str]:
     return [f"{words}:", *(f"$ {shlex.join(command)}" for command in commands)]
 
 
-def _times(beside: Beside) -> str:
-    if abs(beside.ratio - 1.0) < _SAME:
+def _times(ratio: float) -> str:
+    """How an error is beside another one that is `ratio` times as large."""
+    if abs(ratio - 1.0) < _SAME:
         return "the same as"
-    return f"{two(beside.ratio)} times less than" if beside.ratio > 1.0 else f"{two(1.0 / beside.ratio)} times"
+    if abs(ratio - 1.0) < _HARDLY:
+        return f"hardly {'less' if ratio > 1.0 else 'more'} than"
+    return f"{two(ratio)} times less than" if ratio > 1.0 else f"{two(1.0 / ratio)} times"
 
 
 _TUNED = {
@@ -274,7 +311,7 @@ def searches_table(
     return table_of(title, [_TUNED[name] for name in columns], records)
 
 
-def _edges(ordered: Sequence[str], searches: Mapping[str, Search]) -> list[str]:
+def _edges(ordered: Sequence[str], searches: Mapping[str, Search]) -> str:
     """Gains that lie at an end of the range in which they were searched: beyond it may be better ones."""
     lines = []
     for name in ordered:
@@ -282,7 +319,7 @@ def _edges(ordered: Sequence[str], searches: Mapping[str, Search]) -> list[str]:
             f"{gain} = {value:.4g} of {name} is at the edge of its box ({low:g} to {high:g} {unit}".rstrip() + ")."
             for gain, value, low, high, unit in at_edge(searches[name])
         ]
-    return [" ".join(lines)] * bool(lines)
+    return " ".join(lines) or "No gain lies at the edge of the box that was searched."
 
 
 def at_edge(search: Search) -> list[tuple[str, float, float, float, str]]:
@@ -308,12 +345,12 @@ def _presets(ordered: Sequence[str], searches: Mapping[str, Search]) -> list[str
     return [" ".join(lines)] * bool(lines)
 
 
-def _lost(ordered: Sequence[str], lost: Mapping[str, Mapping[str, int]], cases: int) -> list[str]:
+def _lost(ordered: Sequence[str], lost: Mapping[str, Mapping[str, int]], cases: int) -> str:
     """What the gains do wrong, and in how many cases; a sentence also where they do nothing wrong."""
     facts = [f"{name} {_faults(lost[name], cases)}" for name in ordered if lost[name]]
     if facts:
-        return [f"Do not rely on these: {'; '.join(facts)}."]
-    return [f"In none of the {cases} cases does any of them fail, swing or chatter."]
+        return f"Do not rely on these: {'; '.join(facts)}."
+    return f"In none of the {cases} cases does any of them fail, swing or chatter."
 
 
 # Controllers whose margins are told one by one.

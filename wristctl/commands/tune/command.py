@@ -34,7 +34,15 @@ from wristctl.commands.procedure import Procedure
 from wristctl.commands.results import Findings, StudyResult
 from wristctl.commands.session import Session
 from wristctl.commands.sweep.command import sweepable
-from wristctl.commands.tune.answer import Beside, Motion, answer_of, beside_feedforward, searches_table
+from wristctl.commands.tune.answer import (
+    Beside,
+    Motion,
+    Start,
+    answer_of,
+    beside_feedforward,
+    searches_table,
+    starts_of,
+)
 from wristctl.commands.tune.searches import search_all
 from wristctl.config.families import Family
 from wristctl.config.loop import Reference
@@ -80,13 +88,15 @@ class Tuned(StudyResult):
     """by controller, how much its best gains stand on the loop that they were tuned for"""
     bending: str
     """Planes that all loops bend in, a sentence; empty where they stay in one."""
+    starts: dict[str, Start]
+    """by controller, what its best preset is worth on those cases; of those for which better gains were found"""
 
     @property
     def answer(self) -> Answer | None:
         """Best gains, their error beside feedforward, and what they do wrong."""
         motion = motion_of(self.study, self.place)
         found = self.searches, self.errors, self.lost, self.cases, self.place, self.elsewhere
-        return answer_of(*found, motion, self.stood, self.bending)
+        return answer_of(*found, motion, self.stood, self.bending, self.starts)
 
     @property
     def marks(self) -> list[str]:
@@ -194,7 +204,7 @@ def tune(session: Session) -> Tuned:
     network = network_for(session.inputs, study.wrist, loops, planes)
     searched, chosen = tuning_cases(study, network)
     cases = chosen or searched
-    tried = (3 + _ELSEWHERE * len(study.tune.loops)) * len(cases) + sum(map(len, LADDERS)) * len(searched)
+    tried = (5 + _ELSEWHERE * len(study.tune.loops)) * len(cases) + sum(map(len, LADDERS)) * len(searched)
     searches = search_all(session, study, network, tried)
     gains = {name: best.gains for name, best in searches.items()}
     with session.progress("trying the gains found"):
@@ -202,7 +212,7 @@ def tune(session: Session) -> Tuned:
             name: marks_of(law, np.array(law.values(gains[name])), cases, study.wrist)
             for name, law in ((name, controller(name)) for name in gains)
         }
-        errors = beside_feedforward(gains, cases, study.wrist)
+        errors, starts = beside_feedforward(gains, cases, study.wrist), starts_of(searches, cases, study.wrist)
     title = "Tuned gains, best first; objective in decades beside feedforward"
     tables = [searches_table(searches, errors, lost, len(cases), title)]
     tables += truth_tables(study.wrist, judged_loops(study, study.tune))
@@ -210,7 +220,9 @@ def tune(session: Session) -> Tuned:
     stood = _stood(session, own_loop(study, searched, network), gains)
     _write_files(session.findings, study, gains)
     bending = why_two_planes(study.wrist, asked_of_search(study))
-    return Tuned(session.study, session.findings, tables, searches, lost, errors, len(cases), elsewhere, stood, bending)
+    return Tuned(
+        session.study, session.findings, tables, searches, lost, errors, len(cases), elsewhere, stood, bending, starts
+    )
 
 
 def motion_of(study: Study, run: str) -> Motion:
