@@ -246,7 +246,6 @@ def advance_blocks(
     ticks_of_block = samples * setup.ticks * setup.substeps
     together = max(1, min(_SLICE_TICKS // ticks_of_block, blocks // (_SHARES * workers)))
     piece = max(1, _SLICE_TICKS // (setup.ticks * setup.substeps))
-    ended = [0] * blocks
 
     def run(begin: int) -> None:
         end, scratch = min(begin + together, blocks), rollouts.scratch()
@@ -255,17 +254,16 @@ def advance_blocks(
                 return
             last = min(first + piece, samples)
             kernel(setup, rollouts.course, rollouts.world, rollouts.state, scratch, Span(begin, end, first, last))
-            ended[begin:end] = [last] * (end - begin)
 
     pieces = range(0, blocks, together)
     if min(workers, len(pieces)) == 1:
-        for begin in pieces:
+        for number, begin in enumerate(pieces, start=1):
             run(begin)
-            progress(sum(ended) / (blocks * samples))
+            progress(number / len(pieces))
         return
     with stoppable(workers, stop) as pool:
-        for _ in pool.map(run, pieces):
-            progress(sum(ended) / (blocks * samples))
+        for number, _ in enumerate(pool.map(run, pieces), start=1):
+            progress(number / len(pieces))
 
 
 def stream(

@@ -257,7 +257,7 @@ def _next(file: str, motion: Motion) -> list[str]:
     words = f"Next, one motion on {motion.where}, for which they were tuned"
     commands = [["wristctl", "simulate", file, *network]]
     if motion.on_a_rig:
-        words += ", and trials of them on the emulated rig"
+        words += ", and trials of them on the emulated rig, to be done before any on a real one"
         commands += [["wristctl", "hw-run", file, *network]]
     return [f"{words}:", *(f"$ {shlex.join(command)}" for command in commands)]
 
