@@ -96,6 +96,14 @@ def test_after_the_last_attempt_it_is_given_up_with_what_was_seen() -> None:
     assert garbled.bad_frames >= 2
 
 
+def test_answers_that_are_only_too_late_are_no_garbled_bytes() -> None:
+    """A busy computer reads the answer to the command before: cable and firmware are not at fault."""
+    late = Exchange(Wire(lambda frame, n: answer(frame, sequence=-1)))
+    with pytest.raises(NoAnswer, match="no answer to STATUS after 2 attempts"):
+        late.ask(Command.STATUS, b"", 0.003, 2)
+    assert late.traffic.stale >= 1 and late.bad_frames == 0
+
+
 def test_bad_frames_are_those_that_are_none_and_those_with_a_wrong_check_sum() -> None:
     spoilt = bytearray(answer(WireFrame(1, 1, b"")))
     spoilt[3] ^= 0x40

@@ -40,6 +40,8 @@ class _Sent(NamedTuple):
     """When it was sent [s]."""
     bytes_before: int
     """Bytes that had been read by then."""
+    stale_before: int
+    """Answers that had come too late by then."""
 
     def is_answered_by(self, frame: WireFrame) -> bool:
         """Whether a frame is the answer."""
@@ -81,8 +83,7 @@ class Exchange:
             if (answer := self._answer(asked, self.transport.now() + patience)) is not None:
                 return answer
         overslept = self.transport.now() - asked.began - attempts * patience
-        bytes_seen = self.traffic.bytes_read - asked.bytes_before
-        raise NoAnswer(self.transport.name, command, attempts, bytes_seen, overslept)
+        raise NoAnswer(self.transport.name, command, attempts, self._unread(asked), overslept)
 
     def post(self, command: Command, payload: bytes) -> float:
         """Send a command that the next of its kind repeats, and do not wait for the answer; when that was [s]."""
@@ -109,8 +110,7 @@ class Exchange:
                 self.traffic.stale += 1
             oldest, now = self._posted[0], self.transport.now()
             if now - oldest.began > patience:
-                bytes_seen = self.traffic.bytes_read - oldest.bytes_before
-                raise NoAnswer(self.transport.name, oldest.command, len(self._posted), bytes_seen)
+                raise NoAnswer(self.transport.name, oldest.command, len(self._posted), self._unread(oldest))
             if now >= until:
                 return None
         return None
@@ -120,8 +120,13 @@ class Exchange:
         began = self.transport.now()
         gap = began - self._last_fed if self._last_fed else 0.0
         self.silence = gap if command in FEEDS_WATCHDOG else max(gap, self.silence)
-        asked = _Sent(command, self._sequence, began, self.traffic.bytes_read)
+        asked = _Sent(command, self._sequence, began, self.traffic.bytes_read, self.traffic.stale)
         return encode(command, self._sequence, payload), asked
+
+    def _unread(self, asked: _Sent) -> int:
+        """Bytes that have come since a command and say nothing; none where answers came that were only too late."""
+        late = self.traffic.stale > asked.stale_before
+        return 0 if late else self.traffic.bytes_read - asked.bytes_before
 
     def _write(self, frame: bytes) -> None:
         self._overheard(self.transport.now(), "sent", frame)
