@@ -285,6 +285,7 @@ def test_four_axes_wind_any_tendons_off_the_axis_in_their_order(tendons: Any, wo
         ("six", "6 tendons off its axis"),
         ([{"angle_deg": 0, "multiplicity": 2}, {"angle_deg": 120}, {"angle_deg": 240}], "two tendons at one place"),
         ([{"angle_deg": 0}, {"angle_deg": 180}], "in one plane"),
+        ([{"angle_deg": 0, "ends_at": 3}, {"angle_deg": 120}, {"angle_deg": 240}], "ends inside the wrist"),
         ([{"angle_deg": 0, "multiplicity": 3}, {"angle_deg": 120}, {"angle_deg": 240}], "5 tendons off its axis"),
     ],
 )

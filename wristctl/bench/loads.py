@@ -170,10 +170,10 @@ class SpatialLoad:
     def __init__(
         self, settings: BenchSettings, wrist: WristParameters, stream: Entropy, spools: SpoolState, substeps: int = 1
     ) -> None:
-        check_in_space(settings, len(_layout(wrist).places))
+        self.wound = len(_layout(wrist).places)
+        check_in_space(settings, self.wound)
         own, motors = drawn(settings.plant, stream), settings.actuator
         self._wrist, self._own, self._segments, self._carried = wrist, own, settings.segments, 0.0
-        self.wound = len(_layout(wrist).places)
         n, alike = settings.segments, np.ones(self.wound)
         self.coordinates = 2 * n
         at_rest = np.zeros(self.coordinates)

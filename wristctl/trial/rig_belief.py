@@ -116,17 +116,11 @@ def _known_of_places(
 
 def layout_of_axes(wrist: WristParameters) -> TendonLayout:
     """Places of the tendons that the board's axes wind. Raises UserError where they are not the paper's 1, 2, 4, 5."""
-    layout = TendonLayout.four(wrist.tendon_radius)
-    places = TendonLayout.of(wrist)
-    around = [place for place in places.places if place.radius > 0.0]
-    if len(around) != AXES or not np.allclose([place.angle % math.tau for place in around], _angles(layout)):
-        fix = f"angle_deg {', '.join(f'{math.degrees(angle):.0f}' for angle in _angles(layout))}, in this order"
+    four = TendonLayout.four(wrist.tendon_radius)
+    if wound_by(wrist, AXES) is not None:
+        fix = f"angle_deg {', '.join(f'{angle % 360.0:.0f}' for angle in np.degrees(four.directions))}, in this order"
         raise UserError("a rig in two planes winds the four tendons 1, 2, 4 and 5", "wrist.tendons", fix)
-    return layout
-
-
-def _angles(layout: TendonLayout) -> list[float]:
-    return [place.angle % math.tau for place in layout.places]
+    return four
 
 
 def layout_of_rig(settings: HwRunSettings, wrist: WristParameters) -> TendonLayout | None:

@@ -10,7 +10,7 @@ import json
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -35,10 +35,6 @@ from wristctl.tuning.objective import YARDSTICK, Judge
 from wristctl.tuning.optimisers import OPTIMISERS, Optimiser
 from wristctl.work.worker import Unit
 from wristctl.wrist.kinematics import Inverse
-
-if TYPE_CHECKING:
-    pass
-
 
 # Origin of gains that are not a preset's.
 SEARCHED = "search"

@@ -259,7 +259,8 @@ def off_both_sides(wrist: WristParameters) -> int | None:
 def wound_by(wrist: WristParameters, axes: int) -> TendonLayout | None:
     """Tendons off the axis, in their order, where each is wound by one of so many motors; None: the paper's 1, 2, 4, 5.
 
-    Raises UserError where there are more of them than motors, or where they bend the wrist in one plane alone.
+    Raises UserError where there are more of them than motors, where one ends inside the wrist, or where they bend it in
+    one plane alone.
     """
     layout, four = TendonLayout.of(wrist), TendonLayout.four(wrist.tendon_radius)
     around = tuple(place for place in layout.places if place.radius > 0.0)
@@ -274,6 +275,8 @@ def wound_by(wrist: WristParameters, axes: int) -> TendonLayout | None:
         raise UserError(problem, key, "a rig of your own takes more (hw-run.rig)")
     if wound > len(around):
         raise UserError("two tendons at one place are wound by two motors", key, "a place for each tendon")
+    if any(place.ends_at is not None for place in around):
+        raise UserError("the trials know no tendon that ends inside the wrist", key, "leave ends_at out")
     if layout.planes == 1:
         raise UserError("these tendons bend the wrist in one plane", key, "`tendons: four`, or a rig of your own")
     return TendonLayout(around)
