@@ -66,7 +66,10 @@ def test_a_rig_says_what_takes_a_wrist_that_its_motors_do_not_wind(call: Call, m
     code, out, _ = call("hw-run", *motion, "--set", "wrist.tendons=three", "--dry-run")
     assert code == 0 and "planes: 2" in out, "nobody has to ask for them"
     code, _, err = call("hw-run", *motion, "--set", "wrist.tendons=three", "--set", "hw-run.planes=1", "--dry-run")
-    assert code == 2 and "planes=2" in err
+    assert code == 2 and "in one plane" in err and "planes=2" in err
+    inner = "wrist.tendons=[{angle_deg: 0, ends_at: 3}, {angle_deg: 120}, {angle_deg: 240}]"
+    code, _, err = call("hw-run", *motion, "--set", inner, "--dry-run")
+    assert code == 2 and "ends inside the wrist" in err and "planes=2" not in err
     code, _, err = call("hw-run", *motion, "--set", "wrist.tendons=three", "--set", "hw-run.load_cells={}", "--dry-run")
     assert code == 2 and "load_cells of a board are of the tendons 1, 2, 4 and 5" in err
     _, _, err = call("hw-run", *motion, "--set", "wrist.tendons=six", "--dry-run")

@@ -184,7 +184,7 @@ def check_wound(wrist: WristParameters, planes: int, command: str) -> None:
 def check_sides(wrist: WristParameters, command: str) -> None:
     """UserError, naming what takes this wrist, unless its tendons are the four at 45 deg from both planes."""
     from wristctl.board.messages import AXES
-    from wristctl.wrist.tendon_layout import TendonLayout, key_of_tendon, off_both_sides
+    from wristctl.wrist.tendon_layout import TendonLayout, key_of_tendon, off_both_sides, wound_by
 
     odd = off_both_sides(wrist)
     if odd is None:
@@ -203,7 +203,9 @@ def check_sides(wrist: WristParameters, command: str) -> None:
     compares = ("; ", Call("compare"), ", ", Call("tune"), others)
     reads = ("; ", Call("identify"), " reads its robot's logs, ", Call("recommend"), " finds gains for it")
     fix: Phrase = (Call("simulate"), takes, *(reads if rig else compares))
-    if command.startswith("hw") and wound <= AXES:
+    if command.startswith("hw") and wound <= AXES and TendonLayout.of(wrist).planes == 2:
+        wound_by(wrist, AXES)
+        problem = f"in one plane {problem}"
         fix = (Setting("planes=2", "hw-run"), ", with a camera for each plane")
     if TendonLayout.of(wrist).planes == 1:  # and in no other
         square = math.sqrt(2.0) * wrist.tendon_radius
