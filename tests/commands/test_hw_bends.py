@@ -29,6 +29,8 @@ from wristctl.plotting.page import page
 from wristctl.plotting.spatial_view import spatial_view
 from wristctl.records import Run, start_run
 from wristctl.simulation.metrics import metrics_in
+from wristctl.trial.motion_limit import LEAST, peak_tension
+from wristctl.trial.trials import trials_of
 from wristctl.wrist.directions import ACTIVE
 
 pytestmark = pytest.mark.slow
@@ -76,6 +78,15 @@ def test_a_row_has_errors_by_plane_estimated_and_true(whole: Whole) -> None:
     pushed = table[table["push"] > 0.0].iloc[0]
     assert math.isnan(pushed["push_torque"]), "the wrist moves meanwhile"
     assert columns["true_recovery"][0] == "s" and columns["push_torque"][0] == "N m"
+
+
+def test_the_tension_that_would_have_stopped_the_trials_is_that_of_their_simulation(whole: Whole) -> None:
+    """Twice what simulated trials need, and no less than what a zero that is a little off may ask for."""
+    study = study_of()
+    peak = peak_tension(study, trials_of(study.hw_run, np.random.default_rng(0)), None, None)
+    limit = max(LEAST, study.hw_run.tension_factor * peak)
+    assert whole.result.tension_limit == pytest.approx(limit) and limit < study.hw_run.safety.tension
+    assert f"more than {limit:.3g} N would stop the motors" in " ".join(str(whole.result.answer).split())
 
 
 def test_the_ellipse_of_the_error_is_in_rows_means_answer_and_figure(whole: Whole) -> None:

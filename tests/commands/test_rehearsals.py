@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 import wristctl
+from wristctl.commands.adoption import with_planes
 from wristctl.commands.inputs import Inputs
 from wristctl.commands.recommend.answer import Recommended
 from wristctl.commands.recommend.candidate import Candidate
@@ -176,3 +177,16 @@ def test_a_controller_that_swings_is_found_and_ends_nobody_elses_rehearsal() -> 
     swinging, sound = rehearse(study)
     assert swinging.outcome != "ok" or swinging.swing > math.radians(1.0)
     assert sound.outcome == "ok" and sound.swing < math.radians(0.2) and 0.0 < sound.rmse < math.radians(0.3)
+
+
+@pytest.mark.slow
+def test_three_tendons_are_rehearsed_as_the_board_winds_them() -> None:
+    study = wristctl.load_study(
+        None,
+        "hw-run={controllers: [{controller: pid-ff, gains: hardware}], directions: [flexion], push: {force: 0}, "
+        "horizon: 3.0, back: 0.3, rest: 0.1, reference: {angle_deg: 10, duration: 0.6}, bench: {person: {takes: 0}}, "
+        "homing: {frames: 2, rest: 0.1, let_go: 0.6}}",
+        "wrist.tendons=three",
+    )
+    (done,) = rehearse(with_planes(study))
+    assert done.outcome == "ok" and done.swing < math.radians(0.2) and 0.0 < done.rmse < math.radians(0.3)

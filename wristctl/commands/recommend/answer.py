@@ -271,7 +271,10 @@ def _notes(result: Recommended) -> list[str]:
     if (own := own_rig(result.study)) is not None:
         how = f"on {own}"
     elif result.on_a_rig:
-        how = "emulated (on a real rig also --port /dev/ttyACM0 --camera 0 --optics latest:calibrate-camera)"
+        cameras = (
+            "--set camera_2=2 --optics RUN --optics-2 RUN" if result.bending else "--optics latest:calibrate-camera"
+        )
+        how = f"emulated (on a real rig also --port /dev/ttyACM0 --camera 0 {cameras})"
     return [*notes, f"Next, {how}:", f"$ {result.next_command}"]
 
 
