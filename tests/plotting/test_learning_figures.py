@@ -95,6 +95,16 @@ def test_a_map_of_the_workspace_ends_a_little_beyond_its_tips(samples: Samples) 
         assert start - near == pytest.approx(far - end) and 0.02 < (start - near) / (high - low)[0] < 0.06
 
 
+@pytest.mark.parametrize("spread", [(0.0, 0.0), (0.03, 0.0), (0.0, 0.03), (1e-9, 1e-9)])
+@pytest.mark.parametrize("count", [1, 3])
+def test_a_map_of_few_samples_shows_each_with_room_around(count: int, spread: tuple[float, float]) -> None:
+    tip = np.array([0.08, -0.02]) + np.linspace(0.0, 1.0, count)[:, None] * spread
+    few = pd.DataFrame({"x": tip[:, 0], "y": tip[:, 1], "theta": np.zeros(count)})
+    for axes in (coverage(few).axes[0], error_over_workspace(tip, np.zeros(count)).axes[0]):
+        for (near, far), places in zip((axes.get_xlim(), axes.get_ylim()), 1e3 * tip.T[::-1], strict=True):
+            assert near < places.min() <= places.max() < far and far - near >= 1.0 - 1e-9
+
+
 @pytest.mark.parametrize(("width", "height"), [(0.04, 0.04), (0.04, 0.02), (0.1, 0.02), (0.01, 0.08)])
 def test_a_map_is_as_tall_as_equal_scales_need_within_a_page(width: float, height: float) -> None:
     tip = np.array([[0.0, 0.0], [height, width]])

@@ -183,11 +183,11 @@ def accuracy_against_cost(grid: pd.DataFrame, chosen: int) -> Figure:
 
 
 def _workspace(across: ArrayLike, up: ArrayLike) -> tuple[Figure, Axes]:
-    """A figure as tall as a map of these positions [mm] needs at equal scales."""
+    """A figure as tall as a map of these positions [mm] needs at equal scales; of a single one a millimetre is seen."""
     low, high = (np.array([f(across), f(up)]) for f in (np.min, np.max))
-    width, height = high - low
+    width, height = np.maximum(high - low, 1.0)
     picture, ((axes,),) = figure(height=float(np.clip(5.6 * height / width + 1.1, 2.4, 7.0)))
-    edge = 0.04 * width
-    axes.set(xlim=(low[0] - edge, high[0] + edge), ylim=(low[1] - edge, high[1] + edge), aspect="equal")
+    edge = np.maximum(0.04 * width, 0.5 * (1.0 - (high - low)))
+    axes.set(xlim=(low[0] - edge[0], high[0] + edge[0]), ylim=(low[1] - edge[1], high[1] + edge[1]), aspect="equal")
     axes.set(xlabel="y [mm]", ylabel="x [mm]")
     return picture, axes
