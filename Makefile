@@ -70,7 +70,7 @@ identified: .venv/dev
 	$(BIN)/python benchmarks/identified_bench.py --out build/identified --seeds 20 $(WHICH)
 
 # Does the command that `recommend` prints keep on the emulated rig what it says? 20 drawn wrists, a quarter of an hour of
-# processor time each: docs/hardware/recommended-rigs.md. Goes on where it stopped; WHICH="--wrists 5", "--planes 2", "--page".
+# processor time each: docs/hardware/recommended-rigs.md. Goes on where it stopped; WHICH="--count 5", "--page".
 recommended-rigs: .venv/dev
 	$(BIN)/python -m tests.commands.recommended_rigs $(WHICH)
 
