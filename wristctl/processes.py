@@ -75,6 +75,12 @@ def cores() -> int:
     return max(1, min(there, int(said))) if said.isdigit() else there
 
 
+def crowding() -> float:
+    """How many times longer than alone a process takes on this machine: waiting processes of the last minute a core."""
+    there = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    return max(1.0, os.getloadavg()[0] / there)
+
+
 @contextmanager
 def stoppable(workers: int, stop: Event) -> Iterator[ThreadPoolExecutor]:
     """So many threads. Where the block is left by an exception `stop` is set, at which they should look now and then,

@@ -75,8 +75,9 @@ def test_the_time_that_is_left_is_told_at_the_pace_so_far(monkeypatch: pytest.Mo
 
 @pytest.fixture
 def clock(monkeypatch: pytest.MonkeyPatch) -> list[float]:
-    """The time, which the test sets."""
+    """The time, which the test sets, on a machine that does nothing else."""
     now = [0.0]
+    monkeypatch.setattr("os.getloadavg", lambda: (0.2, 0.0, 0.0))
     monkeypatch.setattr("time.monotonic", lambda: now[0])
     return now
 
@@ -109,6 +110,17 @@ def test_what_follows_a_task_is_part_of_the_time_left_also_when_all_of_it_is_cou
     assert count.seconds_left() == pytest.approx(15.0 + 20.0 * then + after)
     count.count, clock[0] = 4, 20.0
     assert count.seconds_left() == pytest.approx(20.0 * then + after)
+
+
+@pytest.mark.parametrize(("waiting", "longer"), [(0.5, 1.0), (1.0, 1.0), (3.0, 3.0)])
+def test_seconds_that_follow_are_longer_on_a_crowded_machine(
+    waiting: float, longer: float, clock: list[float], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("os.sched_getaffinity", lambda process: range(4), raising=False)
+    monkeypatch.setattr("os.getloadavg", lambda: (4.0 * waiting, 99.0, 99.0))
+    count = Count("ranking", 4, "", 4, began=0.0, after=7.0)
+    clock[0] = 20.0
+    assert count.seconds_left() == pytest.approx(7.0 * longer)
 
 
 def test_compiling_is_no_part_of_the_pace(clock: list[float]) -> None:

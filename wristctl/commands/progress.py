@@ -10,6 +10,7 @@ from typing import Any
 from wristctl.commands.printed_table import number
 from wristctl.commands.session import Done, Event, ShowProgress
 from wristctl.lanes.compile_time import COMPILE_TIME
+from wristctl.processes import crowding
 
 log = logging.getLogger(__name__)
 
@@ -39,7 +40,7 @@ class Count:
     then: float = 0.0
     """Time that the command takes after this task, as a multiple of the task's own."""
     after: float = 0.0
-    """The same in seconds, of what does not grow with the task."""
+    """The same in seconds on a machine that does nothing else, of what does not grow with the task."""
     compiled: float = field(default_factory=lambda: COMPILE_TIME.seconds)
     """Seconds that had been spent on compiling when it began."""
     reached: float | None = None
@@ -63,7 +64,7 @@ class Count:
         reached = passed if self.reached is None else self.reached
         following = min(count + self.step, whole)
         task = reached if count == whole else max(reached * whole / count, passed * whole / following)
-        return task * (1.0 + self.then) + self.after - passed
+        return task * (1.0 + self.then) + self.after * crowding() - passed
 
     def remaining(self) -> str:
         """Time left in words; empty where it is unknown."""
@@ -114,7 +115,7 @@ def counting(
     then
         Time that the command takes after the task, as a multiple of the task's own.
     after
-        The same in seconds, of what does not grow with the task.
+        The same in seconds on a machine that does nothing else, of what does not grow with the task.
     """
     state = Count(task, total, unit, then=then, after=after)
     last_event = state.began - _EVENT_EVERY
