@@ -55,7 +55,7 @@ from wristctl.simulation.reference import motion
 from wristctl.simulation.rollout import rollout
 from wristctl.simulation.worlds import World
 try:
-    from wristctl.simulation.bend_paths import bend_path
+    from wristctl.simulation.spatial_references import bend_path
     from wristctl.simulation.motion import Motion
 except ImportError:  # a checkout in which two planes have a loop of their own
     from wristctl.simulation.two_planes import bend_path, rollout_bends

@@ -26,11 +26,11 @@ from wristctl.lanes.compiled import compiled
 from wristctl.lanes.functions import maximum
 from wristctl.lanes.lane import where, zero_like
 from wristctl.lanes.rows import lanes_like, part, square_like
-from wristctl.simulation.bend_paths import turned
 from wristctl.simulation.closed_loop import scenario_of
 from wristctl.simulation.motion import Motion
 from wristctl.simulation.planes import bends_of
 from wristctl.simulation.rollout import rollout
+from wristctl.simulation.spatial_references import turned
 from wristctl.simulation.worlds import Draws
 from wristctl.wrist.spatial.posture import bend_segments, posture_like
 from wristctl.wrist.spatial.spatial_dynamics import momenta_like, spatial_mass_matrix

@@ -8,7 +8,7 @@ from truth import GAINS, HORIZON, PERIOD
 
 from wristctl.config.loop import Loop
 from wristctl.config.wrist import WristParameters
-from wristctl.simulation.bend_paths import bend_path
+from wristctl.simulation.spatial_references import bend_path
 from wristctl.simulation.worlds import bending_limit
 from wristctl.wrist.directions import in_plane
 from wristctl.wrist.segments import segments

@@ -16,9 +16,9 @@ from wristctl.commands.simulate.results import Simulated
 from wristctl.config.study import Study
 from wristctl.errors import UserError
 from wristctl.records import Run
-from wristctl.simulation.bend_paths import bend_path
 from wristctl.simulation.metrics import metrics_in
 from wristctl.simulation.planes import Asked, bends_of, planes_of
+from wristctl.simulation.spatial_references import bend_path
 from wristctl.wrist.spatial.spatial_kinematics import exact_bend, spatial_tips
 
 pytestmark = pytest.mark.slow

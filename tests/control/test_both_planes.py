@@ -19,11 +19,11 @@ from wristctl.control.vetting import vet
 from wristctl.errors import UserError
 from wristctl.lanes.compiled import compiled
 from wristctl.lanes.rows import beyond
-from wristctl.simulation.bend_paths import bend_path
 from wristctl.simulation.motion import Motion
 from wristctl.simulation.outcome import Outcome
 from wristctl.simulation.reference import motion
 from wristctl.simulation.rollout import rollout
+from wristctl.simulation.spatial_references import bend_path
 
 WRISTS = {tendons: WristParameters(tendons=tendons) for tendons in ("three", "four")}
 PERIOD = 1e-3

@@ -30,11 +30,11 @@ from wristctl.control.table import CONTROLLERS
 from wristctl.control.vetting import vet
 from wristctl.errors import UserError
 from wristctl.interrupt import from_outside, interrupts
-from wristctl.simulation.bend_paths import bend_path
 from wristctl.simulation.motion import Motion
 from wristctl.simulation.outcome import Outcome
 from wristctl.simulation.reference import motion
 from wristctl.simulation.rollout import rollout
+from wristctl.simulation.spatial_references import bend_path
 from wristctl.study_files.load import load_study
 
 WRIST = WristParameters()

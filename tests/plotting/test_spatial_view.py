@@ -22,7 +22,7 @@ from wristctl.plotting.page import page
 from wristctl.plotting.spatial_view import ANGLE, MOST, PLACE, PULL, cables, motion_in_space, rim, seen, spatial_view
 from wristctl.plotting.style import TENDON_COLOURS
 from wristctl.records import Run, start_run
-from wristctl.simulation.bend_paths import bend_path
+from wristctl.simulation.spatial_references import bend_path
 from wristctl.simulation.trajectory import Trajectory
 from wristctl.trial import trial_results
 from wristctl.wrist.spatial.spatial_kinematics import spatial_frames, spatial_tips

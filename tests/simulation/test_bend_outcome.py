@@ -7,7 +7,6 @@ from wristctl.arrays import Array
 from wristctl.config.loop import Loop, Reference
 from wristctl.config.wrist import WristParameters
 from wristctl.control.table import controller, gains_of
-from wristctl.simulation.bend_paths import bend_path
 from wristctl.simulation.closed_loop import follow, trajectory
 from wristctl.simulation.metrics import METRICS, metrics_in, of_course
 from wristctl.simulation.motion import Motion
@@ -15,6 +14,7 @@ from wristctl.simulation.outcome import Outcome
 from wristctl.simulation.reference import motion
 from wristctl.simulation.repetitions import Simulation
 from wristctl.simulation.rollout import How, rollout
+from wristctl.simulation.spatial_references import bend_path
 from wristctl.wrist.directions import in_plane
 
 pytestmark = pytest.mark.slow

@@ -13,11 +13,11 @@ from wristctl.config.wrist import TendonPlace, WristParameters
 from wristctl.control.table import controller, gains_of
 from wristctl.errors import UserError
 from wristctl.plotting.spatial_view import motion_in_space
-from wristctl.simulation.bend_paths import bend_path
 from wristctl.simulation.closed_loop import follow
 from wristctl.simulation.motion import Angles, Motion
 from wristctl.simulation.repetitions import Simulation
 from wristctl.simulation.rollout import rollout
+from wristctl.simulation.spatial_references import bend_path
 from wristctl.wrist.plant import PLANTS, PLANTS_IN_SPACE
 
 LAW = controller("pid-ff")

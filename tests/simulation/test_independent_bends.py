@@ -11,9 +11,9 @@ from tests.oracles.spatial_augmented import Rubbing, parameters_of, spatial_moti
 from wristctl.config.loop import Loop
 from wristctl.config.wrist import WristParameters
 from wristctl.control.table import controller, gains_of
-from wristctl.simulation.bend_paths import bend_path
 from wristctl.simulation.closed_loop import follow
 from wristctl.simulation.motion import Motion
+from wristctl.simulation.spatial_references import bend_path
 
 LAW = controller("pid-ff")
 # Springs on oblique axes, gravity across, and a force aside.

@@ -14,10 +14,10 @@ from wristctl.config.loop import Loop
 from wristctl.config.plant import Actuator, TrueActuator, TrueWrist
 from wristctl.config.wrist import WristParameters
 from wristctl.control.table import controller, gains_of
-from wristctl.simulation.bend_paths import dart_thrower, turned
 from wristctl.simulation.closed_loop import equilibrium, follow
 from wristctl.simulation.motion import Angles, Motion
 from wristctl.simulation.rollout import rollout
+from wristctl.simulation.spatial_references import dart_thrower, turned
 from wristctl.simulation.worlds import World
 from wristctl.wrist.directions import in_plane
 from wristctl.wrist.spatial.spatial_kinematics import tip_bends

@@ -8,11 +8,11 @@ from wristctl.config.loop import Loop
 from wristctl.config.wrist import WristParameters
 from wristctl.control.table import controller, gains_of
 from wristctl.errors import UserError
-from wristctl.simulation.bend_paths import circumduction, dart_thrower, turned
 from wristctl.simulation.closed_loop import follow
 from wristctl.simulation.motion import Angles, Motion
 from wristctl.simulation.repetitions import Simulation
 from wristctl.simulation.rollout import rollout
+from wristctl.simulation.spatial_references import circumduction, dart_thrower, turned
 from wristctl.simulation.trajectory import Trajectory
 from wristctl.wrist.directions import in_plane
 from wristctl.wrist.tendon_layout import TendonLayout

@@ -10,13 +10,13 @@ from wristctl.control.response import FULL
 from wristctl.control.table import controller, gains_of
 from wristctl.errors import UserError
 from wristctl.plotting.bend_figure import bend_motion
-from wristctl.simulation.bend_paths import BEND_PATHS, bend_path
 from wristctl.simulation.closed_loop import follow
 from wristctl.simulation.motion import Angles, Motion
 from wristctl.simulation.planes import bends_of
 from wristctl.simulation.references import minimum_jerk
 from wristctl.simulation.repetitions import Simulation
 from wristctl.simulation.rollout import rollout
+from wristctl.simulation.spatial_references import BEND_PATHS, bend_path
 from wristctl.simulation.trajectory import Trajectory
 from wristctl.wrist.spatial.held_bends import reach_of_bends
 from wristctl.wrist.tendon_layout import TendonLayout

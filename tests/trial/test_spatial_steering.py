@@ -12,9 +12,9 @@ from wristctl.config.plant import Actuator, Sensor
 from wristctl.config.wrist import WristParameters
 from wristctl.control.table import controller, gains_of
 from wristctl.errors import UserError
-from wristctl.simulation.bend_paths import bend_path
 from wristctl.simulation.closed_loop import follow
 from wristctl.simulation.motion import Motion
+from wristctl.simulation.spatial_references import bend_path
 from wristctl.trial.blind_model import BlindModel
 from wristctl.trial.control_loop import course_of
 from wristctl.trial.rig_belief import PLANES, RigBelief

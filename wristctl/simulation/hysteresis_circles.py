@@ -19,9 +19,9 @@ from wristctl.arrays import Array
 from wristctl.config.hysteresis import HysteresisSettings
 from wristctl.config.wrist import WristParameters
 from wristctl.errors import UserError
-from wristctl.simulation.bend_paths import circumduction
 from wristctl.simulation.convergence import ABSOLUTE, RELATIVE
 from wristctl.simulation.hysteresis import converged, friction_cases, gained, largest_change
+from wristctl.simulation.spatial_references import circumduction
 from wristctl.simulation.spool_driven import Spooled, SpooledWrist, spooled
 from wristctl.simulation.strokes import FrictionCase, held_in_space
 
