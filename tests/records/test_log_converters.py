@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 import re
-import zipfile
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
 import pytest
+from openpyxl import Workbook
 from scipy.io import savemat
 from scipy.spatial.transform import Rotation
 
 from wristctl.errors import UserError
 from wristctl.records.log_converters import ARM_STEP, read_log, spirob_log
-from wristctl.records.xlsx import read_sheets
+from wristctl.records.workbooks import read_sheets
 
 NECK_OPEN = (
     "time,target_motor1,encoder1,target_motor2,encoder2,target_motor3,encoder3,inclination_target,inclination_sensor,"
@@ -89,37 +89,14 @@ def test_the_silicone_arm_is_read_from_text_and_from_matlab_alike(tmp_path: Path
 
 
 def workbook(file: Path, sheets: Mapping[str, Sequence[Sequence[str | float]]]) -> Path:
-    """An Excel workbook as spreadsheets write it, with texts both shared and in place."""
-    main = 'xmlns="http://schemas.openxmlformats.org/spreadsheetml/2006/main"'
-    office = "http://schemas.openxmlformats.org/officeDocument/2006/relationships"
-    shared: list[str] = []
-
-    def cell(value: str | float, row: int, column: int) -> str:
-        place = f"{chr(65 + column)}{row}"
-        if isinstance(value, float | int):
-            return f'<c r="{place}"><v>{value!r}</v></c>'
-        if not value:
-            return ""
-        shared.append(value)
-        return f'<c r="{place}" t="s"><v>{len(shared) - 1}</v></c>'
-
-    with zipfile.ZipFile(file, "w") as archive:
-        for number, rows in enumerate(sheets.values(), 1):
-            body = "".join(
-                f'<row r="{r}">{"".join(cell(value, r, c) for c, value in enumerate(row))}</row>'
-                for r, row in enumerate(rows, 1)
-            )
-            archive.writestr(
-                f"xl/worksheets/sheet{number}.xml", f"<worksheet {main}><sheetData>{body}</sheetData></worksheet>"
-            )
-        names = "".join(f'<sheet name="{name}" sheetId="{k}" r:id="rId{k}"/>' for k, name in enumerate(sheets, 1))
-        archive.writestr("xl/workbook.xml", f'<workbook {main} xmlns:r="{office}"><sheets>{names}</sheets></workbook>')
-        links = "".join(
-            f'<Relationship Id="rId{k}" Target="worksheets/sheet{k}.xml"/>' for k in range(1, 1 + len(sheets))
-        )
-        archive.writestr("xl/_rels/workbook.xml.rels", f"<Relationships>{links}</Relationships>")
-        texts = "".join(f"<si><t>{text}</t></si>" for text in shared)
-        archive.writestr("xl/sharedStrings.xml", f"<sst {main}>{texts}</sst>")
+    """An Excel workbook."""
+    book = Workbook()
+    book.remove(book.worksheets[0])
+    for name, rows in sheets.items():
+        sheet = book.create_sheet(name)
+        for row in rows:
+            sheet.append([None if cell == "" else cell for cell in row])
+    book.save(file)
     return file
 
 
@@ -170,8 +147,8 @@ def test_the_probes_bend_is_its_turn_in_the_base_whichever_way_that_stands(tmp_p
 
 
 def test_rows_of_a_sheet_are_as_long_as_its_longest(tmp_path: Path) -> None:
-    file = workbook(tmp_path / "a.xlsx", {"One": [["a", "b", "c"], [1.0], [2.0, 3.0]], "None": []})
-    assert read_sheets(file) == {"One": [["a", "b", "c"], ["1.0", "", ""], ["2.0", "3.0", ""]], "None": []}
+    file = workbook(tmp_path / "a.xlsx", {"One": [["a", "b", "c"], [1.0], [2.0, 3.5]], "None": []})
+    assert read_sheets(file) == {"One": [["a", "b", "c"], ["1", "", ""], ["2", "3.5", ""]], "None": []}
 
 
 def test_the_spirobs_lengths_become_spools_and_its_joints_one_bend() -> None:

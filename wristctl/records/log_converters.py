@@ -23,7 +23,7 @@ from wristctl.records.column_ranges import TENDON_OFFSET
 from wristctl.records.log_columns import Units
 from wristctl.records.open_log import OpenLog, read_table, text_of
 from wristctl.records.parquet_logs import parquet_frame
-from wristctl.records.xlsx import read_sheets
+from wristctl.records.workbooks import read_sheets
 
 NECK_WINCH = 0.010
 """Radius of the soft neck's winches [m]: 0.1745 mm of tendon a degree."""

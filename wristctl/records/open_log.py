@@ -48,6 +48,8 @@ from wristctl.records.rigid_bodies import KEYS, BodyNames, bends_of_bodies
 from wristctl.records.ros_bags import SUFFIXES, bag_table
 from wristctl.records.run import Run
 from wristctl.records.table_text import decoded, table_of
+from wristctl.records.workbooks import SUFFIXES as WORKBOOKS
+from wristctl.records.workbooks import text_of_workbook
 
 Words = NDArray[np.str_]
 
@@ -153,7 +155,8 @@ def read_table(
     Parameters
     ----------
     file
-        CSV, parquet, MATLAB's vectors of equal length (before version 7.3), an export of motion capture, a bag of ROS.
+        CSV, an Excel workbook, parquet, MATLAB's vectors of equal length (before version 7.3), an export of motion
+        capture, a bag of ROS.
     names
         Names of another author's columns and rigid bodies, as `--columns` has them.
     what
@@ -245,9 +248,14 @@ def _matlab_table(file: Path, what: str) -> RecordedTable:
     return RecordedTable(list(vectors), list(vectors.values()))
 
 
+def _workbook_table(file: Path, what: str) -> RecordedTable:
+    return _text_table(text_of_workbook(file), file, what)
+
+
 _READERS: Mapping[str, Callable[[Path, str], RecordedTable]] = {
     ".parquet": parquet_table,
     ".mat": _matlab_table,
+    **dict.fromkeys(WORKBOOKS, _workbook_table),
     **dict.fromkeys(SUFFIXES, bag_table),
 }
 

@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 log = logging.getLogger(__name__)
 
 # Endings of names that are of tables and never of runs.
-_TABLES = (".csv", ".txt", ".tsv", ".parquet", ".mat", ".mcap", ".db3", ".bag")
+_TABLES = (".csv", ".txt", ".tsv", ".xlsx", ".xlsm", ".parquet", ".mat", ".mcap", ".db3", ".bag")
 _STUDIES = (".yaml", ".yml")
 # Draws of the posterior that a run keeps as a family of worlds.
 _DRAWS = 200
