@@ -16,7 +16,7 @@ from wristctl.records.open_log import read_table
 
 TIME = np.arange(40) / 50.0
 HEADS = ["time [s]", "spool_1 [mm]", "spool_2 [mm]", "bend_y [deg]"]
-ROWS = np.round(np.column_stack([TIME, 4.0 * np.sin(TIME), -4.0 * np.sin(TIME), 10.0 * np.sin(TIME) / 3.0]), 9).tolist()
+ROWS: list[list[Any]] = np.round(np.column_stack([TIME, 4.0 * np.sin(TIME), -4.0 * np.sin(TIME), 10.0 * np.sin(TIME) / 3.0]), 9).tolist()
 
 
 def saved(file: Path, *sheets: tuple[str, Sequence[Sequence[Any]]]) -> Path:
