@@ -15,8 +15,10 @@ from wristctl.errors import UserError
 from wristctl.records.open_log import read_table
 
 TIME = np.arange(40) / 50.0
-HEADS = ["time [s]", "spool_1 [mm]", "spool_2 [mm]", "bend_y [deg]"]
-ROWS: list[list[Any]] = np.round(np.column_stack([TIME, 4.0 * np.sin(TIME), -4.0 * np.sin(TIME), 10.0 * np.sin(TIME) / 3.0]), 9).tolist()
+HEADS: list[Any] = ["time [s]", "spool_1 [mm]", "spool_2 [mm]", "bend_y [deg]"]
+ROWS: list[list[Any]] = np.round(
+    np.column_stack([TIME, 4.0 * np.sin(TIME), -4.0 * np.sin(TIME), 10.0 * np.sin(TIME) / 3.0]), 9
+).tolist()
 
 
 def saved(file: Path, *sheets: tuple[str, Sequence[Sequence[Any]]]) -> Path:
@@ -50,7 +52,11 @@ def test_a_workbook_has_the_numbers_of_the_same_log_in_text(
 
 
 def test_sheets_under_the_same_header_are_trials_and_others_are_none_of_the_log(tmp_path: Path) -> None:
-    sheets = ("Up", [HEADS, *ROWS]), ("Plot", [["x", "y"], [1.0, 2.0]]), ("Down", [HEADS, *ROWS[:25]])
+    sheets: list[tuple[str, list[list[Any]]]] = [
+        ("Up", [HEADS, *ROWS]),
+        ("Plot", [["x", "y"], [1.0, 2.0]]),
+        ("Down", [HEADS, *ROWS[:25]]),
+    ]
     log = read_table(saved(tmp_path / "log.xlsx", *sheets))
     assert {name: len(trial.columns["time"]) for name, trial in log.trials().items()} == {"Up": 40, "Down": 25}
 
