@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -62,9 +62,11 @@ def limits(result: Recommended) -> Figure:
 def _limit(axes: Axes, tried: Sequence[Limit], label: str) -> None:
     values, sizes = [limit.value for limit in tried], np.degrees([limit.error for limit in tried])
     axes.plot(values, sizes, color=BLUE, linewidth=1.2)
-    for limit, size in zip(tried, sizes, strict=True):
+    for place, (limit, size) in enumerate(zip(tried, sizes, strict=True)):
         axes.plot([limit.value], [size], "x" if limit.lost else "o", color=VERMILLION if limit.lost else BLUE)
-        if limit.lost:
-            axes.annotate(f"{limit.lost} of {limit.rigs} lost", (limit.value, size), (3, 4), textcoords="offset points")
+        if limit.lost:  # beside a line that rises: left of it above, where it begins right of it below
+            beside: Any = {"xytext": (-4, 5), "ha": "right"} if place else {"xytext": (5, -11), "ha": "left"}
+            text = f"{limit.lost} of {limit.rigs} lost"
+            axes.annotate(text, (limit.value, size), textcoords="offset points", fontsize=8.0, **beside)
     axes.set_ylim(0.0, 1.2 * np.nanmax(sizes))
     axes.set_xlabel(label)
