@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -26,6 +27,7 @@ from wristctl.config.study import Study
 from wristctl.control.table import controller
 from wristctl.simulation.cases import measure
 from wristctl.simulation.drawn_worlds import drawn_cases
+from wristctl.study_files.resolved import resolved_yaml
 from wristctl.tuning.scaled_presets import scaled_to
 
 TENDONS, SPRINGS, HAND, CAMERA = FACTS
@@ -109,6 +111,17 @@ def test_what_is_known_is_no_wider_than_a_study_says() -> None:
         _known(again, [CAMERA]).draw["plant.sensor.delay_frames"] == "1.5..2.5"
         and _narrower("1.9..2", "1..3") == "1.9..2"
     )
+
+
+def test_a_runs_own_config_draws_the_rigs_that_the_run_drew(tmp_path: Path) -> None:
+    """It has every setting, what is drawn too, which nobody gave."""
+    study = study_of("recommend.from_identified=RUN")
+    (tmp_path / "config.yaml").write_text(resolved_yaml(study, "recommend"))
+    again = wristctl.load_study(tmp_path / "config.yaml").recommend
+    assert "draw" in again.model_fields_set and again.measured({"wrist.damping"}) == study.recommend.measured(
+        {"wrist.damping"}
+    )
+    assert again.measured().draw["plant.stiffness"] == "x0.9..1.1"
 
 
 def test_the_words_are_of_the_fact_that_lowers_the_upper_end_by_most() -> None:

@@ -122,20 +122,20 @@ class RecommendSettings(Section):
     )
     from_identified: str | None = choice(None, "identify run whose parameters replace the study's")
 
-    def measured(self, told: Collection[str] | None = None) -> Self:
+    def measured(self, told: Collection[str] | None = None, usual: Mapping[str, Drawn] = _DRAWN) -> Self:
         """The settings for a wrist that was identified: where nobody says how, rigs differ by what that leaves open.
 
         `told` are the settings that it tells, `wrist.damping`, `actuator.friction`, ...; None: all. What it does not
-        tell is drawn as of any rig. A delay is known to half a frame.
+        tell is drawn as of any rig, or as is `usual` of this one. A delay is known to half a frame.
         """
-        if "draw" in self.model_fields_set:
+        if self.draw != usual:
             return self
-        draw = dict(_DRAWN)
+        draw = dict(usual)
         for key, source in MEASURED.items():
             leaf = key.removeprefix("plant.")
             if told is None or leaf in told or f"wrist.{leaf}" in told:
                 draw[key] = source
-        if told is None or "sensor.delay_frames" in told:
+        if DELAY in draw and (told is None or "sensor.delay_frames" in told):
             draw[DELAY] = known_delay(self.loop)
         return self.model_copy(update={"draw": draw})
 

@@ -95,22 +95,22 @@ def with_facts(study: Study, name: str) -> Study:
     if settings.loop.control_period == usual.control_period:
         changed["control_period"] = known.control_period
     loop = settings.loop.model_copy(update=changed)
-    draw = settings.draw if "draw" in settings.model_fields_set else _drawn(settings, facts)
+    draw = settings.draw if "draw" in settings.model_fields_set else drawn_by_facts(name)
     return study.model_copy(
         update={"wrist": wrist, "recommend": settings.model_copy(update={"loop": loop, "draw": draw})}
     )
 
 
-def _drawn(settings: RecommendSettings, facts: Facts) -> dict[str, Drawn]:
-    """What is drawn of any rig, but for what the facts say; tendons that were identified are as they were found."""
-    identified = settings.from_identified is not None
-    draw = dict(settings.measured().draw if identified else settings.draw)
-    for key in _OF_FACTS:
-        draw.pop(key, None)
+def drawn_by_facts(name: str) -> dict[str, Drawn]:
+    """What is drawn of any rig, but for what the facts of the rig of this name say. UserError where they cannot be."""
+    from wristctl.trial.rig_settings import check_facts
+
+    facts = check_facts(getattr(RIGS[name], "facts", None), name)
+    draw = {key: drawn for key, drawn in RecommendSettings().draw.items() if key not in _OF_FACTS}
     stiffness = facts.drive.stiffness
-    if not identified and isinstance(stiffness, Spread) and stiffness.low < stiffness.high:
+    if isinstance(stiffness, Spread) and stiffness.low < stiffness.high:
         draw[_STIFFNESS] = f"x{stiffness.low / stiffness.value:.6g}..{stiffness.high / stiffness.value:.6g}"
-    elif not identified and stiffness != Drive().stiffness:
+    elif stiffness != Drive().stiffness:
         draw.pop(_STIFFNESS)
     return draw
 
