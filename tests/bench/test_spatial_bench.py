@@ -276,7 +276,6 @@ def test_load_cells_show_the_pulls() -> None:
 @pytest.mark.parametrize(
     ("settings", "key"),
     [
-        ({"plant": {"model": "hinges"}}, "bench.plant.model"),
         ({"actuator": {"slips_at": 1.0, "slipping_tendon": 6}}, "bench.actuator.slipping_tendon"),
         ({"actuator": {"broken_at": 1.0, "broken_tendon": 5}}, "bench.actuator.broken_tendon"),
     ],

@@ -9,7 +9,6 @@ from wristctl.bench.faults import Edges
 from wristctl.bench.motors import PERIOD, Hanging, SpoolState, Stepper, follow
 from wristctl.board.messages import AXES
 from wristctl.config.bench import BenchSettings
-from wristctl.config.choices import PLANTS
 from wristctl.config.plant import Disturbances
 from wristctl.config.wrist import WristParameters
 from wristctl.errors import UserError
@@ -20,9 +19,7 @@ from wristctl.simulation.worlds import drawn, facing, plant_of
 from wristctl.wrist.dahl import NoInnerFriction
 from wristctl.wrist.directions import ACTIVE, DIRECTIONS, away_of, tendons_of
 from wristctl.wrist.out_of_plane import across_of
-from wristctl.wrist.plant import kernel_of
-from wristctl.wrist.spatial.pcc_in_space import PCC_IN_SPACE, placed_values
-from wristctl.wrist.spatial.spatial_kinematics import tip_bends
+from wristctl.wrist.plant import kernel_of, plant_in
 from wristctl.wrist.tendon_layout import TendonLayout, wound_by
 from wristctl.wrist.tendon_mechanics import PLAY, X
 
@@ -71,7 +68,7 @@ class PlanarLoad:
     ) -> None:  # fmt: skip
         self._settings, self._wrist, self._positive = settings, wrist, positive
         self._drawn, self._carried = drawn(settings.plant, stream), 0.0
-        self._model = PLANTS[settings.plant.model]
+        self._model = plant_in(1, settings.plant.model)
         self.coordinates = self._model.coordinates(settings.segments)
         self._follow = kernel_of(follow, self._model)
         motors = settings.actuator
@@ -170,18 +167,18 @@ class SpatialLoad:
     def __init__(
         self, settings: BenchSettings, wrist: WristParameters, stream: Entropy, spools: SpoolState, substeps: int = 1
     ) -> None:
-        self.wound = len(_layout(wrist).places)
-        check_in_space(settings, self.wound)
+        self.wound = len(TendonLayout.of(_wound(wrist)).places)
+        check_tendons(settings, self.wound)
         own, motors = drawn(settings.plant, stream), settings.actuator
         self._wrist, self._own, self._segments, self._carried = wrist, own, settings.segments, 0.0
-        n, alike = settings.segments, np.ones(self.wound)
-        self.coordinates = 2 * n
+        self._model, alike = plant_in(2, settings.plant.model), np.ones(self.wound)
+        self.coordinates = self._model.coordinates(settings.segments)
         at_rest = np.zeros(self.coordinates)
         from wristctl.bench.spatial_motors import SpatialHanging, follow_in_space
 
-        self._follow = kernel_of(follow_in_space, PCC_IN_SPACE)
+        self._follow = kernel_of(follow_in_space, self._model)
         self._hanging = SpatialHanging(
-            model=PCC_IN_SPACE,
+            model=self._model,
             values=self._weighed(),
             stiffness=motors.tendon_stiffness,
             stiffnesses=motors.tendon_stiffness * alike,
@@ -207,8 +204,7 @@ class SpatialLoad:
 
     def _weighed(self) -> Array:
         own = self._own.model_copy(update={"payload": self._own.payload + self._carried})
-        plant = plant_of(self._wrist, own)
-        return placed_values(plant, _layout(plant), self._segments)
+        return self._model.values(_wound(plant_of(self._wrist, own)), self._segments)
 
     def follow(
         self, spools: SpoolState, stepper: Stepper, acting: tuple[Disturbances, Array], edges: Edges, first: int,
@@ -223,23 +219,25 @@ class SpatialLoad:
         return heard
 
     def bend(self, coordinates: Array) -> Array:
-        """Bends (..., 2) [rad] of the last disc at coordinates (..., 2n)."""
-        return tip_bends(coordinates)
+        """Bends (..., 2) [rad] of the last disc at coordinates (..., q)."""
+        return self._model.angle(coordinates)
 
     def turned(self, ends: Array) -> float:
-        """How far the last disc turns between two places (2, 2n) [rad], in either plane or between."""
+        """How far the last disc turns between two places (2, q) [rad], in either plane or between."""
         return float(np.hypot(*np.diff(self.bend(ends), axis=0)[0]))
 
 
-def _layout(wrist: WristParameters) -> TendonLayout:
-    """Tendons that the axes wind, in their order. UserError where there are more of them."""
-    return wound_by(wrist, AXES) or TendonLayout.four(wrist.tendon_radius)
+def _wound(wrist: WristParameters) -> WristParameters:
+    """The wrist with the tendons alone that the axes wind, in their order. UserError where there are more of them."""
+    if wound_by(wrist, AXES) is None:
+        return wrist.model_copy(update={"tendons": "four"})
+    if isinstance(wrist.tendons, str):
+        return wrist
+    return wrist.model_copy(update={"tendons": tuple(place for place in wrist.tendons if place.radius != 0.0)})
 
 
-def check_in_space(settings: BenchSettings, tendons: int) -> None:
-    """UserError for what a bench has in one plane and not in two, and for a fault of a tendon that it has not."""
-    if beyond := settings.in_one_plane_only:
-        raise UserError(f"no bench in two planes has {beyond[0]}", beyond[0], "leave it at its default")
+def check_tendons(settings: BenchSettings, tendons: int) -> None:
+    """UserError for a fault of a tendon that a bench has not."""
     motors = settings.actuator
     for key, tendon, verb in (
         ("broken_tendon", motors.broken_tendon, "break"),
