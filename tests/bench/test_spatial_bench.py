@@ -302,7 +302,7 @@ def test_a_bench_in_one_plane_loads_no_kernel_of_two() -> None:
         "from wristctl.config.bench import BenchSettings\n"
         "from wristctl.config.wrist import WristParameters\n"
         "VirtualBench(BenchSettings(), WristParameters(), 0).transport.wait(0.01)\n"
-        "sys.exit('wristctl.bench.spatial_motors' in sys.modules)\n"
+        "sys.exit('wristctl.wrist.spatial.spatial_step' in sys.modules)\n"
     )
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
 
