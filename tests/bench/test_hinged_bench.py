@@ -26,7 +26,8 @@ from wristctl.wrist.spatial.hinges_in_space import hinged_equilibrium
 pytestmark = pytest.mark.slow
 
 LINKS: dict[str, Any] = {"model": "hinges", "taper": 2.0}
-FIFTH = (*(TendonPlace(angle_deg=angle) for angle in (225.0, 135.0, 315.0, 45.0)), TendonPlace(angle_deg=0, radius=0))
+CENTRE = TendonPlace(angle_deg=0.0, radius=0.0)
+THREE = tuple(TendonPlace(angle_deg=angle) for angle in (10.0, 130.0, 230.0))
 PUSH = Disturbances(push=Push(force=2.0, start=0.2, duration=0.3))
 
 
@@ -36,22 +37,24 @@ def toward(direction: str) -> tuple[int, ...]:
 
 
 @pytest.mark.parametrize(
-    "wrist",
+    ("wrist", "wound"),
     [
-        WristParameters(),
-        WristParameters(gravity=(0.0, 9.81), gravity_flexion=-4.0),
-        WristParameters(stiffness_axis_deg=30.0, flexion_ratio=2.0),
-        WristParameters(tendons="three"),
-        WristParameters(tendons=FIFTH),
+        (WristParameters(), "four"),
+        (WristParameters(gravity=(0.0, 9.81), gravity_flexion=-4.0), "four"),
+        (WristParameters(stiffness_axis_deg=30.0, flexion_ratio=2.0, tendons="five"), "four"),
+        (WristParameters(tendons="three"), "three"),
+        (WristParameters(tendons=(CENTRE, *THREE)), THREE),
     ],
 )
-def test_on_held_spools_it_rests_where_the_simulated_plant_does_under_the_same_pulls(wrist: WristParameters) -> None:
-    plant, three = WeakenedPlant(**LINKS, payload=0.05), wrist.tendons == "three"
+def test_on_held_spools_it_rests_where_the_simulated_plant_does_under_the_same_pulls(
+    wrist: WristParameters, wound: Any
+) -> None:
+    plant, three = WeakenedPlant(**LINKS, payload=0.05), wound != "four"
     host = hosted(wrist, actuator=SLIDING, plant=plant)
     host.reel((-300, 300, 50, 200) if three else (-300, -100, -80, 500))  # the last of four winds none of three
     host.rest(4.0)
     truth = host.bench.truth()
-    true = plant_of(wrist, plant).model_copy(update={} if three else {"tendons": "four"})
+    true = plant_of(wrist, plant).model_copy(update={"tendons": wound})
     resting = hinged_equilibrium(true, BenchSettings().segments, truth.pull[-1])
     assert truth.pull.shape[1] == (3 if three else 4) and np.abs(truth.angle[-1]).min() > 0.04
     assert np.abs(truth.theta[-1] - resting).max() < 1e-6
