@@ -128,6 +128,13 @@ def test_a_push_bends_it_toward_where_it_pushes() -> None:
         assert angle / np.hypot(*angle) == pytest.approx(along, abs=0.03)
 
 
+def test_in_one_plane_all_of_a_push_acts_in_that_plane() -> None:
+    straight, none = course(BEND, Disturbances(push=PUSH), planes=1), course(BEND, Disturbances(), planes=1)
+    aside = course(BEND, Disturbances(push=PUSH, toward_deg=90.0), planes=1)
+    np.testing.assert_array_equal(aside.theta, straight.theta)
+    assert np.abs(straight.theta - none.theta).max() > 0.01
+
+
 @pytest.mark.parametrize("axis", range(4))
 @pytest.mark.parametrize(("kind", "size"), [("tendon-detached", 1.0), ("tendon-slipped", 0.5), ("motor-stalled", 1.0)])
 def test_a_tendon_that_gives_way_lets_the_others_bend_it_to_the_opposite_side(
