@@ -32,8 +32,9 @@ from wristctl.board.emulator.chip import FREQUENCY
 from wristctl.board.emulator.serve import PtyLine
 from wristctl.board.messages import BAUD, Flag, Target
 from wristctl.board.transport import SerialTransport
-from wristctl.config.bench import BenchSettings, InjectedFault, RenderedCamera, SerialLine
+from wristctl.config.bench import BenchSettings, InjectedFault, RenderedCamera, SerialLine, WeakenedPlant
 from wristctl.config.camera import Markers, SceneSettings
+from wristctl.config.choices import PLANTS_IN_SPACE
 from wristctl.config.wrist import WristParameters
 from wristctl.errors import UserError
 from wristctl.processes import NO_HARDWARE
@@ -63,9 +64,10 @@ def serving(tmp_path: Path) -> Iterator[Serving]:
     """Starts a bench's server in a thread."""
     running: list[tuple[Served, threading.Thread]] = []
 
-    def start(*faults: InjectedFault, markers_2: Markers | None = None) -> Served:
+    def start(*faults: InjectedFault, markers_2: Markers | None = None, model: str = "pcc") -> Served:
         camera = RenderedCamera(scene=SMALL if markers_2 is None else SceneSettings(), dropped=0.0)
-        settings = BenchSettings(motors=TAUT, camera=camera, camera_2=camera, faults=faults)
+        plant = WeakenedPlant(model=model)
+        settings = BenchSettings(motors=TAUT, plant=plant, camera=camera, camera_2=camera, faults=faults)
         line, wrist = PtyLine(), WristParameters()
         cameras, films, pictures = films_of(settings, wrist, (None, markers_2), tmp_path)
         ours, theirs = multiprocessing.Pipe()
@@ -104,9 +106,10 @@ def test_a_process_that_may_open_no_hardware_opens_the_emulated_bench(
 
 
 @pytest.mark.slow
-def test_two_cameras_see_both_planes_of_a_wrist_in_real_time(serving: Serving) -> None:
+@pytest.mark.parametrize("model", PLANTS_IN_SPACE)
+def test_two_cameras_see_both_planes_of_a_wrist_in_real_time(serving: Serving, model: str) -> None:
     """Tendons 1 and 2 are let out and 4 and 5 reeled in: it bends toward ulnar, and the second camera sees no bend."""
-    _, bench, record = serving(markers_2=Markers(base=2, tip=3))
+    _, bench, record = serving(markers_2=Markers(base=2, tip=3), model=model)
     board = ready(bench)
     board.send(Target((-130, -130, 150, 150), (400,) * 4))
     board.wait_while(Flag.MOVING, timeout=60.0)

@@ -128,6 +128,13 @@ def test_a_push_bends_it_toward_where_it_pushes() -> None:
         assert angle / np.hypot(*angle) == pytest.approx(along, abs=0.03)
 
 
+def test_in_one_plane_all_of_a_push_acts_in_that_plane() -> None:
+    straight, none = course(BEND, Disturbances(push=PUSH), planes=1), course(BEND, Disturbances(), planes=1)
+    aside = course(BEND, Disturbances(push=PUSH, toward_deg=90.0), planes=1)
+    np.testing.assert_array_equal(aside.theta, straight.theta)
+    assert np.abs(straight.theta - none.theta).max() > 0.01
+
+
 @pytest.mark.parametrize("axis", range(4))
 @pytest.mark.parametrize(("kind", "size"), [("tendon-detached", 1.0), ("tendon-slipped", 0.5), ("motor-stalled", 1.0)])
 def test_a_tendon_that_gives_way_lets_the_others_bend_it_to_the_opposite_side(
@@ -276,7 +283,6 @@ def test_load_cells_show_the_pulls() -> None:
 @pytest.mark.parametrize(
     ("settings", "key"),
     [
-        ({"plant": {"model": "hinges"}}, "bench.plant.model"),
         ({"actuator": {"slips_at": 1.0, "slipping_tendon": 6}}, "bench.actuator.slipping_tendon"),
         ({"actuator": {"broken_at": 1.0, "broken_tendon": 5}}, "bench.actuator.broken_tendon"),
     ],
@@ -303,7 +309,7 @@ def test_a_bench_in_one_plane_loads_no_kernel_of_two() -> None:
         "from wristctl.config.bench import BenchSettings\n"
         "from wristctl.config.wrist import WristParameters\n"
         "VirtualBench(BenchSettings(), WristParameters(), 0).transport.wait(0.01)\n"
-        "sys.exit('wristctl.bench.spatial_motors' in sys.modules)\n"
+        "sys.exit('wristctl.wrist.spatial.spatial_step' in sys.modules)\n"
     )
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
 

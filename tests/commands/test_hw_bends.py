@@ -30,8 +30,10 @@ from wristctl.plotting.spatial_view import spatial_view
 from wristctl.records import Run, start_run
 from wristctl.simulation.metrics import metrics_in
 from wristctl.trial.motion_limit import LEAST, peak_tension
+from wristctl.trial.rig_belief import PLANES
 from wristctl.trial.trials import trials_of
 from wristctl.wrist.directions import ACTIVE
+from wristctl.wrist.spatial.spatial_kinematics import tip_bends
 
 pytestmark = pytest.mark.slow
 
@@ -166,6 +168,34 @@ def test_it_is_drawn_in_the_plane_of_bends_and_in_space(whole: Whole) -> None:
     assert np.degrees(np.hypot(*wanted.T)).max() == pytest.approx(8.0, abs=0.1)
     assert animation(whole.run) is None
     assert 'id="space"' in page(whole.run, whole.run.manifest)
+
+
+def test_a_wrist_of_links_is_homed_and_run_and_drawn_as_it_is_seen(whole: Whole, tmp_path: Path) -> None:
+    """Its joints bend more toward the tip; the page, which draws arcs, has those that its estimated bend says."""
+    links = "hw-run.bench.plant={model: hinges, taper: 3.0}"
+    study = study_of(links, "hw-run.push.force=0")
+    with start_run("hw-run", study, "", tmp_path) as live:
+        result = hw_run(session(study, live))
+    assert isinstance(result, Performed)
+    run = Run(live.path)
+    (trial,) = run.data("trials").to_dict("records")
+    assert trial["outcome"] == "ok" and np.degrees(trial["true_rmse"]) < 0.5
+    names = [[f"bend_{k}_{plane}" for plane in PLANES] for k in (1, 2, 3, 4)]
+    bent, arcs = run.data("truth"), whole.run.data("truth")
+    (base, _, _, tip), even = (
+        [np.ptp(table[each].to_numpy(float), axis=0) for each in names] for table in (bent, arcs)
+    )
+    assert (tip / base > 1.3 * even[3] / even[0]).all()
+    joints = bent[[name for each in names for name in each]].to_numpy(float)
+    assert bent[[f"bend_{plane}" for plane in PLANES]].to_numpy(float) == pytest.approx(tip_bends(joints), abs=1e-9)
+    (twin,) = result.twins.values()
+    simulated = twin.trajectory.segment_theta[np.argmax(np.hypot(*twin.trajectory.theta.T))].reshape(4, 2)
+    assert np.hypot(*simulated[3]) > 1.2 * np.hypot(*simulated[0]), "its simulation is of links too"
+    space = spatial_view(run)
+    assert space is not None
+    drawn, log = space["units"]["angle"] * np.array(space["bends"]).reshape(-1, 4, 2), run.data("log")
+    assert np.ptp(drawn, axis=1).max() < 2.0 * space["units"]["angle"]
+    assert drawn.sum(axis=1)[0] == pytest.approx(log[[f"bend_{plane}" for plane in PLANES]].iloc[0], abs=1e-3)
 
 
 def test_what_homing_has_found_is_kept_by_tendon_and_camera(whole: Whole) -> None:

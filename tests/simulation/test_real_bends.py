@@ -20,6 +20,7 @@ from wristctl.simulation.rollout import rollout
 from wristctl.simulation.spatial_references import dart_thrower, turned
 from wristctl.simulation.worlds import World
 from wristctl.wrist.directions import in_plane
+from wristctl.wrist.plant import PLANTS_IN_SPACE
 from wristctl.wrist.spatial.spatial_kinematics import tip_bends
 from wristctl.wrist.tendon_layout import TendonLayout, TendonPlace
 
@@ -204,8 +205,10 @@ def test_a_wrist_that_begins_in_equilibrium_stays_there_while_nothing_pulls_more
     assert outcome.part("acting", 0)[0] == pytest.approx(np.full(3, wrist.pretension), abs=0.1 if ideal else 0.3)
 
 
-def test_the_equilibrium_of_a_wrist_that_hangs_in_a_plane_is_that_of_one_plane() -> None:
-    wrist, loop = WristParameters(gravity=(-8.0, 3.0), gravity_flexion=0.0), Loop(planes=2)
+@pytest.mark.parametrize("model", PLANTS_IN_SPACE)
+def test_the_equilibrium_of_a_wrist_that_hangs_in_a_plane_is_that_of_one_plane(model: str) -> None:
+    wrist = WristParameters(gravity=(-8.0, 3.0), gravity_flexion=0.0)
+    loop = Loop.model_validate({"planes": 2, "plant": {"model": model}})
     q = equilibrium(loop, 2)(wrist)
     assert q[::2] == pytest.approx(equilibrium(loop)(wrist), abs=1e-12) and np.abs(q[::2]).min() > 0.01
     assert np.abs(q[1::2]).max() < 1e-12

@@ -13,6 +13,7 @@ from wristctl.board.driver import Board
 from wristctl.board.messages import Target
 from wristctl.config.bench import BenchSettings, InjectedFault
 from wristctl.config.camera import Markers
+from wristctl.config.choices import PLANTS
 from wristctl.config.hw_run import RigSettings
 from wristctl.config.plant import Disturbances
 from wristctl.config.wrist import WristParameters
@@ -175,11 +176,14 @@ def test_a_camera_may_be_given_by_its_number() -> None:
 @pytest.mark.parametrize(
     ("settings", "said"),
     [
-        ({"bench": {"plant": {"model": "hinges"}}}, "no bench in two planes has bench.plant.model"),
+        ({"bench": {"plant": {"model": "rod"}}}, "plant rod bends in one plane"),
         ({"markers_2": {"base": 1, "tip": 2}}, "different ids"),
     ],
 )
-def test_what_no_rig_in_two_planes_can_have_is_refused(settings: dict[str, Any], said: str) -> None:
+def test_what_no_rig_in_two_planes_can_have_is_refused(
+    monkeypatch: pytest.MonkeyPatch, settings: dict[str, Any], said: str
+) -> None:
+    monkeypatch.setitem(PLANTS, "rod", PLANTS["hinges"])
     assert RigSettings.model_validate(settings).planes == 1
     with pytest.raises(ValidationError, match=said):
         RigSettings.model_validate({"planes": 2, **settings})

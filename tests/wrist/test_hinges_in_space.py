@@ -15,6 +15,7 @@ from scipy.spatial.transform import Rotation
 from tests.wrist.turned_in_space import turned
 from wristctl.arrays import Array
 from wristctl.config.wrist import TendonPlace, WristParameters
+from wristctl.errors import UserError
 from wristctl.lanes.compiled import kernel
 from wristctl.lanes.lane import zero_like
 from wristctl.lanes.named_tuples import tuple_of
@@ -22,7 +23,7 @@ from wristctl.lanes.rows import beyond, lanes_like, part, rows_of, square_like
 from wristctl.wrist.hinges import HINGES, Hinges
 from wristctl.wrist.integrator import step
 from wristctl.wrist.plant import kernel_of, parameters_of
-from wristctl.wrist.spatial.hinges_in_space import HINGES_IN_SPACE, SpatialHinges
+from wristctl.wrist.spatial.hinges_in_space import HINGES_IN_SPACE, SpatialHinges, hinged_equilibrium
 from wristctl.wrist.spatial.spatial_dynamics import bent_wrist, spatial_bias
 from wristctl.wrist.spatial.spatial_jacobian import spatial_jacobians
 from wristctl.wrist.spatial.spatial_step import spatial_step
@@ -335,6 +336,21 @@ class Reduced:
         passive = self.stiffness @ q + N * self.wrist.damping * rate
         found: Array = np.linalg.solve(g.T @ mass @ g, g.T @ force - passive)
         return found
+
+
+def test_a_long_time_ends_at_the_equilibrium() -> None:
+    pulls = np.array([20.0, 6.0, 2.0, 14.0])
+    rest = hinged_equilibrium(WRIST, N, pulls)
+    bends, speed = moved(values_of(WRIST), np.zeros(2 * N), np.zeros(2 * N), np.tile(pulls, (8000, 1)))
+    assert np.abs(rest).min() > 0.05
+    np.testing.assert_allclose(bends, rest, atol=1e-9)
+    np.testing.assert_allclose(speed, 0.0, atol=1e-8)
+
+
+def test_a_wrist_that_is_too_heavy_has_no_equilibrium() -> None:
+    heavy = WRIST.model_copy(update={"gravity": (-9.81, 0.0), "hand_mass": 5.0})
+    with pytest.raises(UserError, match="buckles: no stable equilibrium under pulls of 5 N at most"):
+        HINGES_IN_SPACE.rest(heavy, N, (5.0, 5.0))
 
 
 def pulled(time: Array | float) -> Array:

@@ -70,7 +70,7 @@ class BenchWrist:
         self._steps = self._spools.step.copy()
         self._load: Load
         if planes == 1:
-            self._load = PlanarLoad(settings, wrist, stream, positive, self._spools)
+            self._load = PlanarLoad(settings, wrist, stream, self._spools, positive)
         else:
             self._load = SpatialLoad(settings, wrist, stream, self._spools)
         self._n = self._load.coordinates

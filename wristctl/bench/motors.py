@@ -1,4 +1,4 @@
-"""Four steppers with their spools and tendons, and the wrist these pull, in steps of 1 ms.
+"""Four steppers with their spools and tendons, and the wrist that these pull in one plane or two, in steps of 1 ms.
 
 An energised rotor hangs on the magnetic spring of its field, which stands where the drive counts. It swings about the
 field and lags behind it by the angle at which it holds its tendon. Pulled harder than it can hold, or driven faster
@@ -18,12 +18,11 @@ from wristctl.board.messages import AXES
 from wristctl.config.bench import BenchSettings
 from wristctl.lanes.compiled import compiled
 from wristctl.lanes.lane import zero_like
-from wristctl.lanes.rows import part, rows_of
-from wristctl.simulation.nonideal import electrical_turn, tendon_after_slip, torque_share
-from wristctl.wrist.dahl import inner_in_lanes
+from wristctl.lanes.rows import lanes_like, part, rows_of
+from wristctl.simulation.nonideal import electrical_turn, place_after_slip, torque_share
 from wristctl.wrist.out_of_plane import advance_across
-from wristctl.wrist.plant import advance_or_stop, disturbed, parameters_of, travel
-from wristctl.wrist.tendon_mechanics import PLAY, RealTendons, read_nonideal, row_of, shortening, spool_pull
+from wristctl.wrist.plant import advance_or_stop, disturbed, parameters_of, path_along
+from wristctl.wrist.tendon_mechanics import PLAY, row_of, shortening, spool_pull, tendons_in_lanes
 
 PERIOD = 1e-3
 CYCLES = round(PERIOD * FREQUENCY)
@@ -207,67 +206,56 @@ def _taut_at(spools: Any, axis: int, stiffness: float) -> float:
 
 
 class Hanging(NamedTuple):
-    """Load of the motors: plant and tendons.
+    """Load of the motors: plant, tendons, and what bends across the plane.
 
-    The plant (its model and the values of its parameters), a tendon's stiffness [N/m], the values of Nonideal and the
-    state that go with four of them, friction inside the wrist, the motors, the axes of two tendons on the + and two on
-    the - side, and what bends across the plane (`Across`) against friction inside the wrist: its torque [N m], and one
-    over the bend in which it turns round [1/rad].
+    The plant (its model and the values of its parameters), its tendons (RealTendons in one plane, RealPlaces in two),
+    the stiffness of one [N/m] and the axis that winds each; what bends across the plane (`Across`) against friction
+    inside the wrist: its torque [N m], and one over the bend in which it turns round [1/rad]; the motors, steps of the
+    integration in a period; and tuples with an entry, of no meaning, for each coordinate and tendon.
     """
 
     model: Any
     values: Any
-    stiffness: float
-    nonideal: Any
     tendons: Any
-    inner: Any
-    motor: Any
-    sides: Any
+    stiffness: float
+    axes: Any
     across: Any
     rubbing: tuple[float, float]
+    motor: Any
+    substeps: int
+    coordinates: Any
+    pulls: Any
 
 
-def follow(
-    hanging: Any, spools: Any, state: Any, acting: Any, edges: Any, first: int, start: float, out: Any, cut: Any
-) -> int:
-    """Advance spools and wrist by a period for each row (tip force, stiffness scale) of `acting`; the edges used up.
+def follow(hanging: Any, spools: Any, state: Any, acting: Any, edges: Any, first: int, start: float, out: Any) -> int:
+    """Advance spools and wrist by a period for each row (tip force (3,), stiffness scale) of `acting`; the edges used.
 
     `edges` (E, 3) are changes of latches (cycle, port, value), `first` the period's number since power-on. A row of
     `out` is what is so at a period's end: coordinates, rates; and what was in its middle: pulls at the spools, reeled
-    lengths; and the bend across. Tendons break and slip so long after `start` [s].
+    lengths; and the bend across. Tendons break and slip so long after `start` [s]. A wrist that leaves what its series
+    hold for stays where it was.
     """
-    undisturbed = parameters_of(hanging.model, rows_of(hanging.values))
-    motor, sides = hanging.motor, hanging.sides
-    across, bent = hanging.across, rows_of(spools.bent)
-    levers = rows_of(across.levers)
+    undisturbed, n = parameters_of(hanging.model, rows_of(hanging.values), hanging.pulls), len(hanging.coordinates)
+    motor, substeps, axes, across = hanging.motor, hanging.substeps, hanging.axes, hanging.across
+    levers, bent = rows_of(across.levers), rows_of(spools.bent)
     reeled, pull = rows_of(spools.reeled), rows_of(spools.pull)
-    n = len(cut)
-    q, rate = part(rows_of(state), 0, cut), part(rows_of(state), n, cut)
-    zero = zero_like(reeled[0])
-    nonideal, inner = read_nonideal(rows_of(hanging.nonideal)), inner_in_lanes(hanging.inner)
-    tendons = RealTendons(hanging.stiffness + zero, nonideal, rows_of(hanging.tendons), inner)
-    ahead, behind, ahead_too, behind_too = sides[0], sides[2], sides[1], sides[3]
-    order = ahead, behind, ahead_too, behind_too
-    edge = 0
+    q, rate = part(rows_of(state), 0, hanging.coordinates), part(rows_of(state), n, hanging.coordinates)
+    tendons, on_spools = tendons_in_lanes(hanging.tendons), lanes_like(part(pull, 0, hanging.pulls))
+    zero, edge = zero_like(reeled[0]), 0
     for k in range(acting.shape[0]):
         middle = (first + k) * CYCLES + CYCLES // 2
-        plant = disturbed(undisturbed, (0.0, acting[k, 0], 0.0), acting[k, 1])
-        time, path = (first + k) * PERIOD - start + zero, travel(plant, q)
-        for t in range(AXES):
-            pull[order[t]] = spool_pull(tendons, tendons.state[row_of(t, PLAY)], t, shortening(path, t))
+        plant = disturbed(undisturbed, (acting[k, 0], acting[k, 1], acting[k, 2]), acting[k, 3])
+        time, path = (first + k) * PERIOD - start + zero, path_along(tendons, plant, q)
+        for t in range(len(hanging.pulls)):
+            pull[axes[t]] = spool_pull(tendons, tendons.state[row_of(t, PLAY)], t, shortening(path, t))
         edge = turn_spools(spools, motor, hanging.stiffness, edges, edge, middle)
-        on_spools = (
-            tendon_after_slip(tendons, 0, reeled[ahead] - levers[ahead] * bent[0], zero, time, path[0], 0.0),
-            tendon_after_slip(tendons, 1, reeled[behind] - levers[behind] * bent[0], zero, time, path[1], 1.0),
-            tendon_after_slip(tendons, 2, reeled[ahead_too] - levers[ahead_too] * bent[0], zero, time, path[0], 1.0),
-            tendon_after_slip(tendons, 3, reeled[behind_too] - levers[behind_too] * bent[0], zero, time, path[1], 1.0),
-        )
-        pull[ahead] = spool_pull(tendons, on_spools[0], 0, path[0])
-        pull[behind] = spool_pull(tendons, on_spools[1], 1, path[1])
-        pull[ahead_too] = spool_pull(tendons, on_spools[2], 2, path[0])
-        pull[behind_too] = spool_pull(tendons, on_spools[3], 3, path[1])
+        for t in range(len(hanging.pulls)):
+            axis, x = axes[t], shortening(path, t)
+            on_spools[t] = place_after_slip(tendons, t, reeled[axis] - levers[axis] * bent[0], zero, time, x)
+            pull[axis] = spool_pull(tendons, on_spools[t], t, x)
         advance_across(bent, pull, levers, across, hanging.rubbing, hanging.stiffness, PERIOD)
-        advance_or_stop(plant, q, rate, on_spools, tendons, PERIOD + zero, 1.0 + zero)
+        for _ in range(substeps):
+            advance_or_stop(plant, q, rate, on_spools, tendons, PERIOD / substeps + zero, 1.0 + zero)
         for i in range(2 * n):
             out[k, i] = state[i]
         for axis in range(AXES):

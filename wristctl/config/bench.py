@@ -231,9 +231,3 @@ class BenchSettings(Section):
             return tendon
         teeth = self.actuator.motor_steps / 4.0
         return 1.0 / (1.0 / tendon + self.actuator.pulley_radius**2 / (teeth * motors.holding_torque))
-
-    @property
-    def in_one_plane_only(self) -> list[str]:
-        """Keys that are set, of what a bench in two planes has not."""
-        of_arcs = [name for name in ("model", "taper") if getattr(self.plant, name) != getattr(TrueWrist(), name)]
-        return [f"bench.plant.{key}" for key in of_arcs]

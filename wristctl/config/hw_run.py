@@ -7,7 +7,7 @@ from pydantic import ValidationInfo, field_validator, model_validator
 
 from wristctl.config.bench import BenchSettings
 from wristctl.config.camera import Device, Gates, Markers
-from wristctl.config.choices import RIGS
+from wristctl.config.choices import PLANTS_IN_SPACE, RIGS
 from wristctl.config.controller_row import GAINS, GainsChoice, Row
 from wristctl.config.loop import TICK, DirectionName, Loop, Reference, comes_live
 from wristctl.config.plant import Actuator, Plant, Push, Sensor, TrueActuator, TrueSensor, TrueWrist
@@ -189,8 +189,9 @@ class RigSettings(Section):
     def _two_planes(self) -> Self:
         if self.planes == 1:
             return self
-        if self.port is None and getattr(self, "rig", None) is None and (beyond := self.bench.in_one_plane_only):
-            raise Unfitting(f"no bench in two planes has {beyond[0]}", "leave it at its default, or planes: 1")
+        plant, emulated = self.bench.plant.model, self.port is None and getattr(self, "rig", None) is None
+        if emulated and plant not in PLANTS_IN_SPACE:
+            raise Unfitting(f"plant {plant} bends in one plane", f"bench.plant.model: {', '.join(PLANTS_IN_SPACE)}")
         numbers = [self.markers.base, self.markers.tip, self.markers_2.base, self.markers_2.tip]
         if len(set(numbers)) < len(numbers):
             raise Unfitting(f"four markers need different ids, they are {numbers}", "other ids in markers_2")

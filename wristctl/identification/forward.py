@@ -24,10 +24,10 @@ from wristctl.lanes.compiled import by_type, implements
 from wristctl.lanes.lane import zero_like
 from wristctl.lanes.named_tuples import tuple_of
 from wristctl.lanes.rows import beyond, lanes_like, part, rows_of
-from wristctl.simulation.nonideal import inner_of, nonideal_of, tendon_after_slip, unmoved, wears
+from wristctl.simulation.nonideal import inner_of, nonideal_of, place_after_slip, unmoved, wears
 from wristctl.wrist.dahl import inner_in_lanes, one_block
 from wristctl.wrist.directions import ACTIVE, away_of, in_plane, tendons_of
-from wristctl.wrist.out_of_plane import Across, across_of, advance_across
+from wristctl.wrist.out_of_plane import IN_PLANE, Across, across_of, advance_across
 from wristctl.wrist.pcc import PCC
 from wristctl.wrist.plant import PlantModel, advance_or_stop, bend_of, kernel_of, parameters_of, travel
 from wristctl.wrist.tendon_mechanics import Nonideal, RealTendons, read_nonideal, shortening, spool_pull
@@ -96,14 +96,10 @@ def _all(faults: Any, tendons: Any, plant: Any, q: Any, on_spools: Any, time: An
 
 @implements(_after_slip, Faulty)
 def _less(faults: Any, tendons: Any, plant: Any, q: Any, on_spools: Any, time: Any) -> Any:
-    path = travel(plant, q)
-    zero = zero_like(time)
-    return (
-        tendon_after_slip(tendons, 0, on_spools[0], zero, time, path[0], 0.0),
-        tendon_after_slip(tendons, 1, on_spools[1], zero, time, path[1], 1.0),
-        tendon_after_slip(tendons, 2, on_spools[2], zero, time, path[0], 1.0),
-        tendon_after_slip(tendons, 3, on_spools[3], zero, time, path[1], 1.0),
-    )
+    path, zero, lengths = travel(plant, q), zero_like(time), lanes_like(on_spools)
+    for t in range(len(lengths)):
+        lengths[t] = place_after_slip(tendons, t, on_spools[t], zero, time, shortening(path, t))
+    return lengths
 
 
 def _advance(
@@ -150,8 +146,7 @@ def across_plane(wrist: WristParameters, plane: str, stiffness: float, flexion_r
     )
 
 
-# A wrist that stays in its plane, and the constants of one block's lanes.
-_IN_PLANE = Across(1.0, 1.0, 1.0, 0.0, np.zeros(len(_SPOOLS)))
+# The constants of one block's lanes.
 read_across = tuple_of(Across)
 
 
@@ -169,14 +164,16 @@ def angles(candidates: Sequence[SupposedWrist], reeled: Array, h: float, n: int,
     A candidate that bends a segment beyond a full turn stays where it was.
     """
     values = to_blocks(np.array([model.values(candidate.wrist, n) for candidate in candidates]))
-    nonideal = [nonideal_of(candidate.plant, candidate.tendons, candidate.facts, h) for candidate in candidates]
+    nonideal = [
+        nonideal_of(candidate.plant, candidate.tendons, candidate.facts, h, alike=1) for candidate in candidates
+    ]
     faults = Faulty() if any(map(wears, nonideal)) else Faultless()
     tendon_values = [
         (
             *new,
             own_stiffness(old.tendons, old.rotors),
             *np.take(old.taut, _COLUMNS),
-            *_across_values(old.across or _IN_PLANE),
+            *_across_values(old.across or IN_PLANE),
             *field_of(old.tendons, old.rotors),
         )
         for new, old in zip(nonideal, candidates, strict=True)

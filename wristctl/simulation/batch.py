@@ -42,7 +42,6 @@ from wristctl.wrist.plant import PlantModel, path_at
 from wristctl.wrist.segments import segments
 from wristctl.wrist.spatial.co_contraction import least_pulls
 from wristctl.wrist.spatial.pcc_in_space import PCC_IN_SPACE
-from wristctl.wrist.spatial.spatial_kinematics import tip_bends
 from wristctl.wrist.spatial.spatial_segments import OF_A_TENDON
 from wristctl.wrist.spatial.spooled_tendons import ElasticPlaces, PulledPlaces, RealPlaces
 from wristctl.wrist.tendon_layout import TendonLayout
@@ -209,7 +208,7 @@ def batch(
     paths = [of.path(model, index, at) for index, at in enumerate(coordinates)]
     motors = [of.motors(index, path[:places]) for index, path in enumerate(paths)]
     tendons = _tendons(of, coordinates, paths, [state[: 2 * places : 2] for state in motors])
-    starts = model.angle(coordinates)[:, None] if layout is None else tip_bends(coordinates)
+    starts = model.angle(coordinates).reshape(-1, planes)
     watch, frames = cameras_of(filmed, lanes.world, lanes.streams, motions[0].horizon, starts[body], layout)
     belief: Sides | Places
     if layout is None:

@@ -23,11 +23,12 @@ from wristctl.simulation.outcome import Outcome
 from wristctl.simulation.planes import Asked, motion_in, planes_of
 from wristctl.simulation.reference import reference_name
 from wristctl.simulation.repetitions import Gathered, Repeated, Simulation
-from wristctl.simulation.rollout import check_two_planes, plant_in, rollout
+from wristctl.simulation.rollout import check_two_planes, rollout
 from wristctl.simulation.stationary_filter import beliefs_of, expected_error
 from wristctl.simulation.trajectory import Trajectory
 from wristctl.simulation.worlds import Draws, World, is_random, loop_facing, loops_of, plant_of
 from wristctl.wrist.kinematics import Inverse
+from wristctl.wrist.plant import plant_in
 from wristctl.wrist.tendon_layout import TendonLayout
 
 # Rollouts that are recorded at once.
@@ -128,7 +129,7 @@ def trajectory(
         rate=of("rate"),
         theta_ref=followed.theta_ref,
         theta_desired=followed.theta_desired,
-        tip=plant_in(planes, loop).tips(plant, coordinates),
+        tip=plant_in(planes, loop.plant.model).tips(plant, coordinates),
         tip_desired=followed.tip_desired,
         torque_wanted=of("torque_wanted"),
         torque=of("torque"),
@@ -152,7 +153,7 @@ def scenario_of(reference: Reference, direction: DirectionName) -> str:
 
 def equilibrium(loop: Loop, planes: int = 1) -> Start:
     """Equilibrium at which a plant of this loop in so many planes rests at pretension."""
-    model, n = plant_in(planes, loop), loop.plant_segments
+    model, n = plant_in(planes, loop.plant.model), loop.plant_segments
     return lambda plant: model.rest(plant, n, (plant.pretension, plant.pretension))
 
 

@@ -38,8 +38,6 @@ from wristctl.wrist.tendons import TENDONS_PER_SIDE
 
 # Electrical, of a two-phase motor.
 _FULL_STEPS_PER_TURN = 4
-# Share of a side's tendons that is left where one of them breaks.
-_ONE_OF_A_SIDE_LESS = 1.0 - 1.0 / TENDONS_PER_SIDE
 
 
 def electrical_turn(actuator: Actuator) -> float:
@@ -47,8 +45,10 @@ def electrical_turn(actuator: Actuator) -> float:
     return _FULL_STEPS_PER_TURN * actuator.microstep * actuator.step_length
 
 
-def nonideal_of(plant: TrueWrist, actuator: Actuator, facts: TendonFacts, step: float) -> Nonideal:
-    """The values of a world at an integration step [s]."""
+def nonideal_of(
+    plant: TrueWrist, actuator: Actuator, facts: TendonFacts, step: float, alike: int = TENDONS_PER_SIDE
+) -> Nonideal:
+    """The values of a world at an integration step [s]; in one plane a tendon stands for so many that are `alike`."""
     elastic = actuator.winds
     motor = facts if isinstance(facts, TrueActuator) else TrueActuator()
     return Nonideal(
@@ -64,19 +64,20 @@ def nonideal_of(plant: TrueWrist, actuator: Actuator, facts: TendonFacts, step: 
         stop_dissipation=plant.end_stop_dissipation,
         backlash=facts.backlash * elastic,
         broken_at=_time(facts.broken_at),
+        left=1.0 - 1.0 / alike,
         slips_at=_time(facts.slips_at) if elastic else math.inf,
         slip=facts.slip,
-        torque=math.inf if motor.torque is None else TENDONS_PER_SIDE * motor.torque / actuator.pulley_radius,
+        torque=math.inf if motor.torque is None else alike * motor.torque / actuator.pulley_radius,
         corner_speed=motor.corner_speed * actuator.step_length,
         top_speed=math.inf if motor.top_speed is None else motor.top_speed * actuator.step_length,
         turn=electrical_turn(actuator),
     )
 
 
-def faults_of(actuator: Actuator, facts: TendonFacts, alike: Array) -> Array:
+def faults_of(actuator: Actuator, facts: TendonFacts, alike: Array, section: str = "loop.plant.actuator") -> Array:
     """Rows of Fault of each place of a layout with so many tendons alike (T,), (4, T).
 
-    Raises UserError for a place that there is not.
+    Raises UserError for a place that there is not, with its key in the `section` of the facts.
     """
     places, never = len(alike), math.inf
     elastic = actuator.winds
@@ -89,7 +90,7 @@ def faults_of(actuator: Actuator, facts: TendonFacts, alike: Array) -> Array:
         if time is not None:
             if place > places:
                 what = f"tendon {place} of {places} cannot {'break' if row == 0 else 'slip'}"
-                raise UserError(what, f"loop.plant.actuator.{key}", f"1 to {places}")
+                raise UserError(what, f"{section}.{key}", f"1 to {places}")
             faults[row, place - 1] = time
     if torque is not None:
         faults[3] = alike * torque / actuator.pulley_radius
@@ -166,51 +167,18 @@ def _break(tendons: Any, t: int, time: Any, fault: Any) -> None:
     state[share] = minimum(state[share], where(time >= fault.broken_at, fault.left, 1.0))
 
 
-@compiled
-def _fall_back(tendons: Any, t: int, delivered: Any, speed: Any, time: Any, x: Any, fault: Any) -> Any:
-    """Length [m] that one of the tendons has reeled in, of the length that its motor delivers at a speed [m/s].
-
-    It falls back where its motor is pulled harder than it holds, lags within the backlash, slips, and breaks; both of
-    the last for good.
-    """
-    nonideal, state = tendons.nonideal, tendons.state
-    play, lost, slip = row_of(t, PLAY), row_of(t, LOST), row_of(t, SLIPPED)
-    _break(tendons, t, time, fault)
-    state[slip] = maximum(state[slip], where(time >= fault.slips_at, nonideal.slip, 0.0))
-    holds = fault.holds * torque_share(speed, nonideal.corner_speed, nonideal.top_speed)
-    state[lost] = state[lost] + where(spool_pull(tendons, state[play], t, x) > holds, nonideal.turn, 0.0)
-    on_spool = delivered - state[lost] - state[slip]
-    state[play] = clip(state[play], on_spool, on_spool + nonideal.backlash)
-    return state[play]
-
-
-@compiled
-def _fault_of_a_side(nonideal: Any, t: int, breaks: bool, left: Any) -> Any:
-    """Fault of one of a plane's tendons; those of the + side slip."""
-    never = zero_like(nonideal.slip) + math.inf
-    broken_at, slips_at = nonideal.broken_at if breaks else never, nonideal.slips_at if t % 2 == 0 else never
-    return Fault(broken_at, left + zero_like(never), slips_at, nonideal.torque)
-
-
-@compiled
-def tendon_after_slip(tendons: Any, t: int, delivered: Any, speed: Any, time: Any, x: Any, left: float) -> Any:
-    """Length [m] that one of the RealTendons has reeled in, of the length that its motor delivers at a speed [m/s].
-
-    Where it breaks the share `left` of it is left; with 1 it does not.
-    """
-    fault = _fault_of_a_side(tendons.nonideal, t, True, left)
-    return _fall_back(tendons, t, delivered, speed, time, x, fault)
-
-
 @by_type
 def fault_at(tendons: Any, t: int) -> Any:
-    """Fault of a place of tendons; of a plane's one of the + side's two breaks."""
+    """Fault of a place of tendons; of a plane's the + side's slip, and the first of them breaks."""
     raise NotImplementedError("compiled code only")
 
 
 @implements(fault_at, PulledTendons, RealTendons)
 def _fault_of_sides(tendons: Any, t: int) -> Any:
-    return _fault_of_a_side(tendons.nonideal, t, t == 0, _ONE_OF_A_SIDE_LESS)
+    nonideal = tendons.nonideal
+    never = zero_like(nonideal.slip) + math.inf
+    broken_at, slips_at = nonideal.broken_at if t == 0 else never, nonideal.slips_at if t % 2 == 0 else never
+    return Fault(broken_at, nonideal.left, slips_at, nonideal.torque)
 
 
 @implements(fault_at, PulledPlaces, RealPlaces)
@@ -221,8 +189,20 @@ def _fault_of_places(tendons: Any, t: int) -> Any:
 
 @compiled
 def place_after_slip(tendons: Any, t: int, delivered: Any, speed: Any, time: Any, x: Any) -> Any:
-    """As `tendon_after_slip`, with the fault of its place."""
-    return _fall_back(tendons, t, delivered, speed, time, x, fault_at(tendons, t))
+    """Length [m] that a tendon, or all of a place, has reeled in, of what its motor delivers at a speed [m/s].
+
+    It falls back where its motor is pulled harder than it holds, lags within the backlash, slips, and breaks; both of
+    the last for good.
+    """
+    nonideal, state, fault = tendons.nonideal, tendons.state, fault_at(tendons, t)
+    play, lost, slip = row_of(t, PLAY), row_of(t, LOST), row_of(t, SLIPPED)
+    _break(tendons, t, time, fault)
+    state[slip] = maximum(state[slip], where(time >= fault.slips_at, nonideal.slip, 0.0))
+    holds = fault.holds * torque_share(speed, nonideal.corner_speed, nonideal.top_speed)
+    state[lost] = state[lost] + where(spool_pull(tendons, state[play], t, x) > holds, nonideal.turn, 0.0)
+    on_spool = delivered - state[lost] - state[slip]
+    state[play] = clip(state[play], on_spool, on_spool + nonideal.backlash)
+    return state[play]
 
 
 @by_type

@@ -23,7 +23,7 @@ from wristctl.simulation.outcome import KeptSamples, Outcome
 from wristctl.simulation.simulated_drives import SIDES
 from wristctl.simulation.sums import SUMS, sums_by_name
 from wristctl.simulation.worlds import World
-from wristctl.wrist.plant import PLANTS, PLANTS_IN_SPACE, PlantModel, kernel_of
+from wristctl.wrist.plant import PlantModel, kernel_of, plant_in
 from wristctl.wrist.tendon_layout import TendonLayout
 
 # Control ticks of a block between two looks at whether the user has asked to stop.
@@ -77,7 +77,7 @@ def rollout(
     """
     count = len(gains)
     worlds, world = worlds_of(loop, wrist, count)
-    model = plant_in(motions[0].planes, worlds[0].loop)
+    model = plant_in(motions[0].planes, worlds[0].loop.plant.model)
     if model.planes == 2:
         check_two_planes(worlds)
     if force is not None:
@@ -126,18 +126,13 @@ def rollout(
     return outcome
 
 
-def plant_in(planes: int, loop: Loop) -> PlantModel:
-    """Plant of a loop in so many planes."""
-    return PLANTS[loop.plant.model] if planes == 1 else PLANTS_IN_SPACE.named(loop.plant.model)
-
-
 def check_two_planes(worlds: Sequence[World]) -> None:
     """UserError for facts that no loop in two planes has, or wrists that no plant there can be.
 
     ValueError for wrists with other numbers of tendons.
     """
     for world in worlds:
-        plant_in(2, world.loop).values(world.plant, world.loop.plant_segments)
+        plant_in(2, world.loop.plant.model).values(world.plant, world.loop.plant_segments)
     if len({len(TendonLayout.of(world.wrist).places) for world in worlds}) != 1:
         raise ValueError("wrists of one batch have other numbers of tendons")
 

@@ -26,11 +26,11 @@ from wristctl.simulation.cases import Case
 from wristctl.simulation.convergence import has_kinks, in_one_go
 from wristctl.simulation.kernel import Span, gather_lanes, run_blocks
 from wristctl.simulation.observer import Knowing, sense
-from wristctl.simulation.rollout import check_two_planes, outcome_of, plant_in, worlds_of
+from wristctl.simulation.rollout import check_two_planes, outcome_of, worlds_of
 from wristctl.simulation.simulated_drives import SIDES, drive_in_lanes
 from wristctl.simulation.sums import SUMS
 from wristctl.simulation.worlds import bending_limit
-from wristctl.wrist.plant import bend_of, kernel_of, parameters_of
+from wristctl.wrist.plant import bend_of, kernel_of, parameters_of, plant_in
 from wristctl.wrist.segments import load_segments, segments
 from wristctl.wrist.tendon_layout import TendonLayout
 from wristctl.wrist.tendons import TENDONS_PER_SIDE, reach
@@ -85,7 +85,7 @@ class SteppedLoops:
         one = all(loop is loops[0] for loop in loops)
         worlds, world = worlds_of(loops[0] if one else loops, wrist, count)
         lanes = Lanes(which, world, [case.stream for case in cases])
-        model = plant_in(motions[0].planes, loops[0])
+        model = plant_in(motions[0].planes, loops[0].plant.model)
         if model.planes == 2:
             check_two_planes(worlds)
         self.count, self.sample, self.samples = count, 0, len(motions[0].time)

@@ -18,13 +18,12 @@ from wristctl.simulation.frames import schedule
 from wristctl.simulation.kernel import Span, parts_of_sample, run_blocks
 from wristctl.simulation.motion import resting
 from wristctl.simulation.observer import Schedule, Watch
-from wristctl.simulation.rollout import plant_in
 from wristctl.simulation.simulated_drives import SIDES, IdealDrive, ServoDrive, SpoolDrive, commands_of
 from wristctl.simulation.sums import SUMS
 from wristctl.simulation.worlds import World
 from wristctl.stability.smooth_loop import cycle_of
 from wristctl.wrist.dahl import InnerFriction, InnerFrictionInSpace
-from wristctl.wrist.plant import kernel_of
+from wristctl.wrist.plant import kernel_of, plant_in
 from wristctl.wrist.spatial.spooled_tendons import PulledPlaces, RealPlaces
 from wristctl.wrist.tendon_layout import TendonLayout
 from wristctl.wrist.tendon_mechanics import CREPT, OF_A_TENDON, WRAPPED, PulledTendons, RealTendons, X, Z
@@ -201,7 +200,7 @@ class LoopTicks:
         self._theta = np.atleast_1d(np.asarray(theta, float))
         self._planes = len(self._theta)
         self._acceleration = np.broadcast_to(np.asarray(acceleration, float), self._planes)
-        self._model = plant_in(self._planes, loop)
+        self._model = plant_in(self._planes, loop.plant.model)
         self._kernel = kernel_of(run_blocks, self._model)
         self._early, self._back = looks_back(loop)
         self._first = self._early + self.cycle * math.ceil(_WARM_UP / self.cycle)

@@ -13,8 +13,8 @@ from wristctl.control.law import Controller, Surface
 from wristctl.simulation.batch import Start
 from wristctl.simulation.closed_loop import repeat
 from wristctl.simulation.motion import resting
-from wristctl.simulation.rollout import plant_in
 from wristctl.simulation.worlds import Draws
+from wristctl.wrist.plant import plant_in
 
 # The name that the camera's noise goes by.
 SCENARIO = "phase portrait"
@@ -60,7 +60,7 @@ def phase_portrait(
         return None
     toward = np.ones(1) if toward is None else toward
     planes, period = len(toward), sample_period(loop.control_period)
-    segments = plant_in(planes, loop).coordinates(loop.plant_segments) // planes
+    segments = plant_in(planes, loop.plant.model).coordinates(loop.plant_segments) // planes
     followed = resting(theta * toward, round(horizon / period), period)
     courses = []
     for begin in _begins(theta, math.radians(wrist.range_deg)):

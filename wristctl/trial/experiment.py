@@ -11,7 +11,6 @@ from typing import Any
 
 import numpy as np
 
-from wristctl.config.choices import PLANTS
 from wristctl.config.hw_run import HwRunSettings
 from wristctl.config.wrist import WristParameters
 from wristctl.control.table import controller, gains_of
@@ -39,6 +38,7 @@ from wristctl.trial.watch import Watch
 from wristctl.vision.camera_pose import CameraPose
 from wristctl.wrist.directions import in_plane
 from wristctl.wrist.kinematics import Inverse
+from wristctl.wrist.plant import plant_in
 
 log = logging.getLogger(__name__)
 
@@ -256,7 +256,7 @@ def log_of(folder: Path, settings: HwRunSettings, wrist: WristParameters, monoto
     own, coordinates = settings.rig is not None, None
     if not own and settings.port is None:
         bench = settings.bench
-        coordinates = settings.planes * PLANTS[bench.plant.model].coordinates(bench.segments)
+        coordinates = plant_in(settings.planes, bench.plant.model).coordinates(bench.segments)
     return TrialLog(
         folder, coordinates, settings.control_period, monotonic, settings.load_cells is not None, settings.planes,
         numbers_of(layout_of_rig(settings, wrist)), not own,

@@ -120,7 +120,7 @@ def _on(time: Array, table: pd.DataFrame, names: list[str]) -> Array:
 
 
 def first_course(run: Run) -> Trajectory | None:
-    """The first trial of a run in two planes that went to its end: as it truly was, where that is known."""
+    """The first trial of a run in two planes that went to its end: as it truly was, where that is known of arcs."""
     trials, log = run.data("trials"), run.data("log")
     done = trials[trials["outcome"] == "ok"]
     if done.empty:
@@ -134,7 +134,7 @@ def first_course(run: Run) -> Trajectory | None:
     else:
         followed = motion_of(settings.model_copy(update={"reference": reference}), run.config.wrist, name)
     course = logged_course(rows, followed, run.config.wrist)
-    if not run.has("data/truth.csv"):
+    if not run.has("data/truth.csv") or settings.bench.plant.model != "pcc":
         return course
     truth = run.data("truth")
     return true_course(course, truth[truth["trial"] == number], run.config.wrist.length)

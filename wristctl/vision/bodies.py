@@ -13,10 +13,11 @@ from wristctl.arrays import Array
 from wristctl.config.wrist import WristParameters
 from wristctl.vision.scene_parts import Stroke, bent_across, last_disc, moving, moving_in_space, with_last_disc
 from wristctl.wrist.kinematics import Backbone
-from wristctl.wrist.spatial.spatial_kinematics import spatial_frames
 
 # Points (m, 3) [m] moved to where they are.
 Carry = Callable[[Array], Array]
+# `frames` of a plant in two planes.
+Frames = Callable[[WristParameters, Array, Array], tuple[Array, Array]]
 
 
 class Disc(NamedTuple):
@@ -64,14 +65,14 @@ class PlanarBody:
 
 
 class SpatialBody:
-    """The wrist in two planes at coordinates (2n,), before the camera that looks at one of them.
+    """The wrist of a plant in two planes, before the camera that looks at one of them.
 
     `side` is 1 where that camera sees its plane's + side on the right. Tangent, ulnar and flexion are right-handed: the
     ulnar plane's camera has flexion behind the wrist, the other one ulnar before it.
     """
 
-    def __init__(self, wrist: WristParameters, plane: Literal[0, 1], side: float) -> None:
-        self._wrist, self._edge_on = wrist, plane == 1
+    def __init__(self, frames: Frames, wrist: WristParameters, plane: Literal[0, 1], side: float) -> None:
+        self._frames_of, self._wrist, self._edge_on = frames, wrist, plane == 1
         own, away = ([0.0, 1.0, 0.0], [0.0, 0.0, side]) if plane == 0 else ([0.0, 0.0, 1.0], [0.0, -side, 0.0])
         self._axes = np.array([[1.0, 0.0, 0.0], own, away])
 
@@ -97,5 +98,5 @@ class SpatialBody:
 
     def _frames(self, q: Array, shares: Array) -> tuple[Array, Array]:
         """Centres (m, 3) [m] and rotations (m, 3, 3) of cross-sections at shares (m,) of the length."""
-        centres, frames = spatial_frames(q, self._wrist.length, shares)
+        centres, frames = self._frames_of(self._wrist, q, shares)
         return centres @ self._axes.T, self._axes @ frames @ self._axes.T

@@ -12,7 +12,7 @@ from scipy.special import ndtri
 
 from wristctl.arrays import Array
 from wristctl.config.camera import CharucoBoard, Markers, SceneSettings
-from wristctl.config.choices import PLANTS
+from wristctl.config.choices import PLANTS, PLANTS_IN_SPACE
 from wristctl.config.wrist import WristParameters
 from wristctl.vision.bodies import Body, Carry, PlanarBody, SpatialBody
 from wristctl.vision.camera import Frame, Image
@@ -39,9 +39,11 @@ class Scene:
     ) -> None:  # fmt: skip
         self._settings, self._markers = settings, markers or Markers()
         self.camera = Pinhole(settings, self._markers.positive)
-        self._body: Body = PlanarBody(PLANTS[plant].backbone, wrist)
-        if plane is not None:
-            self._body = SpatialBody(wrist, plane, self.camera.side)
+        self._body: Body
+        if plane is None:
+            self._body = PlanarBody(PLANTS[plant].backbone, wrist)
+        else:
+            self._body = SpatialBody(PLANTS_IN_SPACE.named(plant).frames, wrist, plane, self.camera.side)
         numbers = self._markers.base, self._markers.tip
         self._prints = [self._printed(number) for number in numbers]
         self._film = Film(settings)

@@ -223,7 +223,7 @@ def equilibrium(wrist: WristParameters, n: int, tensions: tuple[float, float]) -
         _balance(parameters, np.concatenate([q, np.zeros(n), pulls]), out, (0,) * n)
         return out[:n].copy(), out[n:].reshape(n, n).copy()
 
-    return settled(balance, n, tensions)
+    return settled(balance, np.zeros(n), f"{tensions[0]:g} N and {tensions[1]:g} N")
 
 
 HINGES = PlantModel(

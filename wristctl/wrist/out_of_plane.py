@@ -29,6 +29,10 @@ class Across(NamedTuple):
     """(4,) by axis: what a tendon's pull bends by, and what the bend takes off its path [m]."""
 
 
+# Of a wrist that bends in no way across.
+IN_PLANE = Across(1.0, 1.0, 1.0, 0.0, np.zeros(_TENDONS))
+
+
 def across_of(wrist: WristParameters, away: Sequence[int]) -> Across:
     """Values across of a wrist as its other plane knows it; `away` says to which side each axis pulls (`away_of`).
 

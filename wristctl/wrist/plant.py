@@ -43,7 +43,7 @@ from wristctl.wrist.tendon_mechanics import (
 
 
 def _unknown(*_: Any) -> Any:
-    raise NotImplementedError("a plant in two planes has no one angle, and no two sides")
+    raise NotImplementedError("a plant in two planes has no two sides, and no backbone in a plane")
 
 
 def _unseen(*_: Any) -> Any:
@@ -78,7 +78,7 @@ class PlantModel:
     tip_pose: Any = None
     tip_jacobian: Any = None
     angle: Callable[[Array], Array] = _unknown
-    """Bending angles (...) [rad] of the last disc at coordinates (..., q)."""
+    """Bending angles (...) [rad] of the last disc at coordinates (..., q); in two planes its bends (..., 2)."""
     taut: Callable[[WristParameters, Array], Array] = _unknown
     """Lengths (2,) [m] of the + and the - side's taut tendons at coordinates (q,)."""
     backbone: Backbone = _unknown
@@ -108,6 +108,11 @@ class PlantModel:
 
 PLANTS: Choices[PlantModel] = _TABLE
 PLANTS_IN_SPACE: Choices[PlantModel] = _IN_SPACE
+
+
+def plant_in(planes: int, name: str) -> PlantModel:
+    """Plant of this name that bends in so many planes; UserError if there is none."""
+    return (PLANTS if planes == 1 else PLANTS_IN_SPACE).named(name)
 
 
 class PlantType(numba.types.Type):

@@ -66,26 +66,31 @@ def equilibrium(wrist: WristParameters, n: int, tensions: tuple[float, float]) -
     UserError where the wrist buckles, so that no stable equilibrium is found.
     """
     still, pulls = np.zeros(n), TENDONS_PER_SIDE * np.asarray(tensions)
-    return settled(lambda theta: linearised(segments(wrist, n), theta, still, still, pulls)[:2], n, tensions)
+    under = f"{tensions[0]:g} N and {tensions[1]:g} N"
+    return settled(lambda theta: linearised(segments(wrist, n), theta, still, still, pulls)[:2], still, under)
 
 
-def settled(balance: Callable[[Array], tuple[Array, Array]], n: int, tensions: tuple[float, float]) -> Array:
-    """Angles of a stable rest, where a `balance` of n torques, given with its derivative, is 0; by Newton's method."""
-    theta = np.zeros(n)
+def settled(balance: Callable[[Array], tuple[Array, Array]], guess: Array, under: str) -> Array:
+    """Coordinates of a stable rest (n,) [rad], by Newton's method from a guess.
+
+    There a `balance` of n torques, given with its derivative, is 0. `under` says of which pulls, where the wrist
+    buckles and so meets no stable rest, which is a UserError.
+    """
+    q = guess
     for _ in range(100):
-        r, tangent = balance(theta)
+        r, tangent = balance(q)
         change = np.linalg.solve(tangent, -r)
-        theta = theta + change * min(1.0, 0.3 / max(1e-300, float(np.abs(change).max())))
+        q = q + change * min(1.0, 0.3 / max(1e-300, float(np.abs(change).max())))
         if np.abs(change).max() < 1e-13:
             break
     tangent = 0.5 * (tangent + tangent.T)
-    if not np.all(np.isfinite(theta)) or np.linalg.eigvalsh(tangent)[0] <= 0.0 or np.abs(r).max() > 1e-9:
+    if not np.all(np.isfinite(q)) or np.linalg.eigvalsh(tangent)[0] <= 0.0 or np.abs(r).max() > 1e-9:
         raise UserError(
-            f"the wrist buckles: no stable equilibrium under {tensions[0]:g} N and {tensions[1]:g} N",
+            f"the wrist buckles: no stable equilibrium under {under}",
             where="wrist",
             fix="lower wrist.hand_mass, hand_offset or the tensions, or raise wrist.stiffness",
         )
-    return theta
+    return q
 
 
 def equilibria_at(parameters: Array, n: int, angle: Array, pretension: float) -> Equilibria:

@@ -46,7 +46,9 @@ class Nonideal(NamedTuple):
     stop_dissipation: Any
     backlash: Any
     broken_at: Any
-    """Time [s] from which one of the + side's two tendons does not pull."""
+    """Time [s] from which the + side's first tendon does not pull."""
+    left: Any
+    """Share of it that is left then: of one tendon none, of two that are one here a half."""
     slips_at: Any
     slip: Any
     torque: Any

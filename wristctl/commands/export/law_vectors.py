@@ -15,9 +15,9 @@ from wristctl.simulation.batch import PLANES, Batch, Lanes, batch
 from wristctl.simulation.closed_loop import asked_of
 from wristctl.simulation.kernel import Span, parts_of_sample, run_blocks
 from wristctl.simulation.observer import NoCamera
-from wristctl.simulation.rollout import columns_of, plant_in, worlds_of
+from wristctl.simulation.rollout import columns_of, worlds_of
 from wristctl.simulation.stepped_loops import places_of
-from wristctl.wrist.plant import kernel_of
+from wristctl.wrist.plant import kernel_of, plant_in
 
 _SEEN, _REFERENCE = NOW.index("theta"), NOW.index("theta_ref")
 
@@ -49,7 +49,7 @@ def loop_of(study: Study, controller: Controller, gains: Array, most: int) -> Ba
     horizon = min(chosen.horizon, most * period)
     asked = study.model_copy(update={"simulate": chosen.model_copy(update={"horizon": horizon})})
     wrist, loop, motion = asked_of(asked, period)
-    model, (worlds, which) = plant_in(motion.planes, loop), worlds_of(loop, wrist, 1)
+    model, (worlds, which) = plant_in(motion.planes, loop.plant.model), worlds_of(loop, wrist, 1)
     columns = columns_of(True, model.coordinates(loop.plant_segments), model.planes, places_of(wrist, model.planes))
     lanes = Lanes(np.zeros(1, np.int64), which, [(study.seed,)])
     made = batch(controller, gains, [motion], worlds, lanes, model, None, columns)

@@ -9,18 +9,21 @@ l cos(|u|/2) - c.u S(|u|/2) apart, S(x) = sin(x)/x. There is a disc at either en
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from wristctl.arrays import Array
 from wristctl.config.wrist import WristParameters
-from wristctl.lanes.compiled import compiled, implements
+from wristctl.lanes.compiled import compiled, implements, kernel
 from wristctl.lanes.lane import zero_like
 from wristctl.lanes.named_tuples import tuple_of
-from wristctl.lanes.rows import part
+from wristctl.lanes.rows import lanes_like, part, rows_of, square_like
 from wristctl.wrist.hinges import tapered
 from wristctl.wrist.plant import PlantModel
 from wristctl.wrist.spatial.pcc_in_space import bend_in_space, load_in_space, within_bends
 from wristctl.wrist.spatial.spatial_chain import Chord, chord_of, chord_unit, springs_of
-from wristctl.wrist.spatial.spatial_kinematics import turned_by
+from wristctl.wrist.spatial.spatial_dynamics import bent_wrist, spatial_bias
+from wristctl.wrist.spatial.spatial_jacobian import spatial_jacobians
+from wristctl.wrist.spatial.spatial_kinematics import tip_bends, turned_by
 from wristctl.wrist.spatial.spatial_segments import FIELDS, SpatialSegments, own_values, rows_of_tendons
 from wristctl.wrist.spatial.spatial_step import spatial_step
 from wristctl.wrist.spatial.spatial_tendons import (
@@ -33,6 +36,7 @@ from wristctl.wrist.spatial.spatial_tendons import (
 )
 from wristctl.wrist.spatial.spooled_tendons import travel_in_space
 from wristctl.wrist.spatial.stumpff import slopes, stumpff
+from wristctl.wrist.statics import settled
 from wristctl.wrist.tendon_layout import TendonLayout
 
 
@@ -70,8 +74,13 @@ class HingedWrist(NamedTuple):
 _load, _FIELDS = tuple_of(SpatialHinges), len(SpatialHinges._fields)
 
 
-def _read(model: Any, rows: Any, pulls: Any = ()) -> Any:
+@compiled
+def _wrist(rows: Any, pulls: Any) -> Any:
     return HingedWrist(_load(rows), part(rows, _FIELDS, pulls + pulls + pulls))
+
+
+def _read(model: Any, rows: Any, pulls: Any = ()) -> Any:
+    return _wrist(rows, pulls)
 
 
 @implements(chord_unit, SpatialHinges)
@@ -177,6 +186,40 @@ def values(wrist: WristParameters, n: int) -> Array:
     return np.concatenate([hinges, rows_of_tendons(layout.cross_section, layout.ends(wrist.discs, n))])
 
 
+@kernel
+def _balance(parameters: Any, state: Any, out: Any, cut: Any, pulls: Any) -> None:
+    rows, result, m = rows_of(state), rows_of(out), len(cut)
+    wrist = _wrist(rows_of(parameters), pulls)
+    q, still = part(rows, 0, cut), part(rows, m, cut)
+    r, mass, by_q, by_rate = lanes_like(q), square_like(q), square_like(q), square_like(q)
+    bent = bent_wrist(wrist, q, part(rows, 2 * m, pulls), mass)
+    spatial_bias(wrist.segment, q, still, bent.posture, bent.tangent, bent.torques.torque, r)
+    spatial_jacobians(wrist.segment, q, still, still, bent, by_q, by_rate)
+    for i in range(m):
+        result[i] = r[i]
+        for j in range(m):
+            result[m + m * i + j] = by_q[i, j]
+
+
+def hinged_equilibrium(wrist: WristParameters, n: int, pulls: ArrayLike) -> Array:
+    """Bends of the joints (2n,) [rad] at rest under pulls (T,) [N] of all tendons of each place.
+
+    Raises UserError if it buckles.
+    """
+    parameters, held, m = values(wrist, n), np.asarray(pulls, float), 2 * n
+    out = np.empty(m + m * m)
+
+    def balance(q: Array) -> tuple[Array, Array]:
+        _balance(parameters, np.concatenate([q, np.zeros(m), held]), out, (0,) * m, (0,) * len(held))
+        return out[:m].copy(), out[m:].reshape(m, m).copy()
+
+    return settled(balance, np.zeros(m), f"pulls of {held.max():g} N at most")
+
+
+def _equilibrium(wrist: WristParameters, n: int, tensions: tuple[float, float]) -> Array:
+    return hinged_equilibrium(wrist, n, TendonLayout.of(wrist).multiplicity * tensions[0])
+
+
 def _links(q: Array) -> Array:
     """Axes of the base's half link and of what is beyond each joint, as columns, (..., n + 1, 3, 3)."""
     bends = q.reshape(*q.shape[:-1], -1, 2)
@@ -214,4 +257,6 @@ HINGES_IN_SPACE = PlantModel(
     tips=_tips,
     frames=_frames,
     read=_read,
+    angle=tip_bends,
+    equilibrium=_equilibrium,
 )

@@ -10,7 +10,7 @@ from wristctl.lanes.rows import part
 from wristctl.wrist.pcc import check_even
 from wristctl.wrist.plant import PlantModel
 from wristctl.wrist.spatial.posture import tip_bend
-from wristctl.wrist.spatial.spatial_kinematics import spatial_frames, spatial_tips
+from wristctl.wrist.spatial.spatial_kinematics import spatial_frames, spatial_tips, tip_bends
 from wristctl.wrist.spatial.spatial_segments import (
     FIELDS,
     SpatialWrist,
@@ -90,5 +90,6 @@ PCC_IN_SPACE = PlantModel(
     tips=lambda wrist, q: spatial_tips(q, wrist.length),
     frames=lambda wrist, q, shares: spatial_frames(q, wrist.length, shares),
     read=_read,
+    angle=tip_bends,
     equilibrium=_equilibrium,
 )

@@ -12,6 +12,7 @@ from wristctl.errors import UserError
 from wristctl.wrist.allocation import allocated
 from wristctl.wrist.spatial.spatial_model import spatial_linearised, spatial_terms
 from wristctl.wrist.spatial.spatial_segments import FIELDS, SpatialSegments, own_values
+from wristctl.wrist.statics import settled
 from wristctl.wrist.tendon_layout import TendonLayout
 
 _STEPS = 100
@@ -66,21 +67,12 @@ def spatial_equilibrium(parameters: ArrayLike, n: int, pulls: ArrayLike, guess: 
     By Newton's method from a guess, the straight wrist where none is given. UserError where the wrist buckles, so that
     no stable rest is met.
     """
-    q, still = np.zeros(2 * n) if guess is None else np.array(guess, float), np.zeros(2 * n)
-    for _ in range(_STEPS):
-        r, tangent, _ = spatial_linearised(parameters, q, still, still, pulls)
-        change = np.linalg.solve(tangent, -r)
-        q = q + change * min(1.0, _STRIDE / max(1e-300, float(np.abs(change).max())))
-        if np.abs(change).max() < 1e-13:
-            break
-    least = np.linalg.eigvalsh(0.5 * (tangent + tangent.T))[0]
-    if not np.isfinite(q).all() or least <= 0.0 or np.abs(r).max() > 1e-9:
-        raise UserError(
-            f"the wrist buckles: no stable equilibrium under pulls of {np.max(pulls):g} N at most",
-            where="wrist",
-            fix="lower wrist.hand_mass, hand_offset or the tensions, or raise wrist.stiffness",
-        )
-    return q
+    begin, still = np.zeros(2 * n) if guess is None else np.array(guess, float), np.zeros(2 * n)
+
+    def balance(q: Array) -> tuple[Array, Array]:
+        return spatial_linearised(parameters, q, still, still, pulls)[:2]
+
+    return settled(balance, begin, f"pulls of {np.max(pulls):g} N at most")
 
 
 def spatial_equilibria_at(parameters: Array, n: int, bends: Array, arms: Array, least: Array) -> SpatialEquilibria:
