@@ -8,13 +8,13 @@ from typing import NamedTuple
 
 import numpy as np
 
+from tests.identification.bend_rehearsal import RehearsedBends, planned_spools, rehearse_bends
 from wristctl.arrays import Array
 from wristctl.config.identify import IdentifySettings
 from wristctl.config.plant import Actuator
 from wristctl.config.wrist import WristParameters
 from wristctl.identification.arc_fit import Told
 from wristctl.identification.bend_problem import bend_problem, misfits_of_bends, oblique_of, springs_of, told_of_bends
-from wristctl.identification.bend_rehearsal import RehearsedBends, planned_spools, rehearse_bends
 from wristctl.identification.bend_trials import bend_trials, places_of_log
 from wristctl.identification.fit import Fit, fit
 from wristctl.identification.intervals import Knowledge, knowledge

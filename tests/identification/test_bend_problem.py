@@ -11,6 +11,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from tests.identification.bend_rehearsal import Hold, RehearsedBends, planned_spools, rehearse_bends
 from tests.identification.bend_rigs import KNOWN, LAYOUT, SETTINGS, TENDONS, drawn_rig, logs_of, spools
 from wristctl.config.identify import Fixed, IdentifySettings
 from wristctl.config.wrist import WristParameters
@@ -22,7 +23,6 @@ from wristctl.identification.bend_problem import (
     springs_of,
     told_of_bends,
 )
-from wristctl.identification.bend_rehearsal import Hold, RehearsedBends, planned_spools, rehearse_bends
 from wristctl.identification.bend_trials import BendTrial, bend_trials, places_of_log
 from wristctl.identification.fit import Fit, Rival, fit
 from wristctl.identification.intervals import Knowledge, knowledge

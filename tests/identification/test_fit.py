@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from tests.identification.benches import KNOWN, LEVEL, TENDONS, UPRIGHT, logged, problem, tendons
+from tests.identification.rehearsal import spools
 from wristctl.arrays import Array
 from wristctl.config.loop import Loop, Reference
 from wristctl.control.table import controller
@@ -25,7 +26,6 @@ from wristctl.identification.intervals import (
     long_run,
 )
 from wristctl.identification.measured_trials import MeasuredTrial, frame_noise
-from wristctl.identification.rehearsal import spools
 from wristctl.simulation.reference import motion
 from wristctl.simulation.rollout import rollout
 from wristctl.simulation.simulated_drives import motor_of

@@ -10,13 +10,13 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from tests.identification import rehearsal
 from tests.identification.benches import LEVEL, STEPS, TENDONS
+from tests.identification.rehearsal import RehearsedTruth, rehearse
 from wristctl.config.loop import DirectionName, Reference
 from wristctl.config.plant import Actuator, TendonFacts, TrueActuator, TrueWrist
 from wristctl.errors import UserError
-from wristctl.identification import rehearsal
 from wristctl.identification.forward import SupposedWrist, across_plane, angles
-from wristctl.identification.rehearsal import RehearsedTruth, rehearse
 from wristctl.simulation.reference import toward
 from wristctl.simulation.simulated_drives import motor_of
 from wristctl.wrist.directions import DIRECTIONS, in_plane

@@ -9,12 +9,12 @@ from typing import Any
 import numpy as np
 import pytest
 
+from tests.identification.bend_rehearsal import Hold, planned_spools
 from wristctl.config.plant import Actuator
 from wristctl.config.wrist import WristParameters
 from wristctl.errors import UserError
 from wristctl.identification import bend_problem
 from wristctl.identification.bend_problem import oblique_of, springs_of
-from wristctl.identification.bend_rehearsal import Hold, planned_spools
 from wristctl.wrist.tendon_layout import TendonLayout
 
 WRIST = WristParameters(gravity=(0.0, 0.0))

@@ -1,6 +1,6 @@
 """Rehearsals: the log that a bench would write of a wrist whose parameters are given.
 
-For judging an experiment before anyone performs it: does it tell what is to be found, and how well?
+For weighing an experiment before anyone performs it: does it tell what is to be found, and how well?
 """
 
 from __future__ import annotations
