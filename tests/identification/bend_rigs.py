@@ -14,10 +14,11 @@ from wristctl.config.identify import IdentifySettings
 from wristctl.config.plant import Actuator
 from wristctl.config.wrist import WristParameters
 from wristctl.identification.arc_fit import Told
-from wristctl.identification.bend_problem import bend_problem, misfits_of_bends, oblique_of, springs_of, told_of_bends
-from wristctl.identification.bend_trials import bend_trials, places_of_log
+from wristctl.identification.bend_problem import bend_problem, oblique_of, springs_of, told_of_bends
 from wristctl.identification.fit import Fit, fit
 from wristctl.identification.intervals import Knowledge, knowledge
+from wristctl.identification.lack_of_fit import misfits
+from wristctl.identification.measured_trials import places_of_log, trials_of_logs
 from wristctl.records.open_log import OpenLog
 from wristctl.wrist.tendon_layout import TendonLayout, TendonPlace
 
@@ -109,8 +110,8 @@ class Identified(NamedTuple):
 
 def identified(logs: list[OpenLog], settings: IdentifySettings = SETTINGS) -> Identified:
     """What logs tell to somebody who believes in the wrist of the study."""
-    trials = bend_trials(logs, KNOWN, settings.step, settings.exposure or 0.0)
+    trials = trials_of_logs(logs, KNOWN, settings.step, settings.exposure or 0.0)
     problem = bend_problem(trials, places_of_log(logs[0], KNOWN), KNOWN, TENDONS, settings)
     found = fit(problem)
     known = knowledge(found)
-    return Identified(found, known, told_of_bends(found, known), max(one.ratio for one in misfits_of_bends(found)))
+    return Identified(found, known, told_of_bends(found, known), max(one.ratio for one in misfits(found)))

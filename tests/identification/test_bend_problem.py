@@ -23,9 +23,9 @@ from wristctl.identification.bend_problem import (
     springs_of,
     told_of_bends,
 )
-from wristctl.identification.bend_trials import BendTrial, bend_trials, places_of_log
 from wristctl.identification.fit import Fit, Rival, fit
 from wristctl.identification.intervals import Knowledge, knowledge
+from wristctl.identification.measured_trials import MeasuredTrial, places_of_log, trials_of_logs
 from wristctl.identification.spatial_forward import SupposedBends, courses_of_bends
 from wristctl.records.log_converters import read_log
 from wristctl.records.open_log import write_log
@@ -103,7 +103,7 @@ def test_a_rehearsed_log_is_read_back_as_it_was_written(tmp_path: Path) -> None:
     rng = np.random.default_rng(0)
     log = logs_of(drawn_rig(rng), rng, tension_noise=0.2)[0]
     write_log(log, tmp_path / "hand.csv")
-    written, again = (bend_trials([one], KNOWN, 1e-3, 4e-3)[0] for one in (log, read_log(tmp_path / "hand.csv")))
+    written, again = (trials_of_logs([one], KNOWN, 1e-3, 4e-3)[0] for one in (log, read_log(tmp_path / "hand.csv")))
     assert written.wrist.hand_mass == again.wrist.hand_mass == pytest.approx(0.3)
     assert again.angle == pytest.approx(written.angle) and (again.channel == written.channel).all()
     bends = [written.angle[written.channel == plane] for plane in (0, 1)]
@@ -118,7 +118,7 @@ def test_at_the_truth_nothing_but_noise_is_left_of_bends_and_tensions() -> None:
     rig = drawn_rig(rng)
     bench = RehearsedBends(rig.wrist, rig.actuator, rig.layout, tension_noise=0.2, segments=2)
     log = rehearse_bends(bench, spools(), TENDONS.step_length, rng)
-    (trial,) = bend_trials([log], KNOWN, 1e-3, bench.exposure)
+    (trial,) = trials_of_logs([log], KNOWN, 1e-3, bench.exposure)
     problem = bend_problem([trial], places_of_log(log, KNOWN), KNOWN, TENDONS, SETTINGS)
     mean, p, q = oblique_of(rig.wrist)
     true = rig.truth(0.0) | {"stiffness": mean, "oblique_cos": p, "oblique_sin": q}
@@ -140,8 +140,8 @@ def test_a_log_of_another_wrist_or_of_one_plane_is_refused() -> None:
         places_of_log(log, three)
     columns = {name: column for name, column in log.columns.items() if name != "bend_z"}
     with pytest.raises(UserError, match="bend_z is not in the log"):
-        bend_trials([type(log)(log.file, "log", columns)], KNOWN, 1e-3)
-    trials = bend_trials([log], KNOWN, 1e-3)
+        trials_of_logs([type(log)(log.file, "log", columns)], KNOWN, 1e-3)
+    trials = trials_of_logs([log], KNOWN, 1e-3)
     held = IdentifySettings.model_validate({"fix": {"flexion_ratio": 1.0}})
     with pytest.raises(UserError, match="flexion_ratio"):
         bend_problem(trials, places_of_log(log, KNOWN), KNOWN, TENDONS, held)
@@ -151,7 +151,7 @@ def test_what_the_readings_leave_open_is_not_told() -> None:
     """Springs alike all around have no axis, and what was known beforehand is nothing that the readings told."""
     rng = np.random.default_rng(0)
     log = logs_of(drawn_rig(rng), rng)[0]
-    problem = bend_problem(bend_trials([log], KNOWN, 1e-3), places_of_log(log, KNOWN), KNOWN, TENDONS, SETTINGS)
+    problem = bend_problem(trials_of_logs([log], KNOWN, 1e-3), places_of_log(log, KNOWN), KNOWN, TENDONS, SETTINGS)
     x = problem.begin()
     x[problem.free.index("oblique_cos")] = 1e-3
     deviation = np.full(len(x), 2e-3)
@@ -177,7 +177,7 @@ def test_what_the_readings_leave_open_is_not_told() -> None:
 def test_what_two_minima_have_different_is_told_only_where_one_fits_significantly_better(excess: float) -> None:
     rng = np.random.default_rng(0)
     log = logs_of(drawn_rig(rng), rng)[0]
-    problem = bend_problem(bend_trials([log], KNOWN, 1e-3), places_of_log(log, KNOWN), KNOWN, TENDONS, SETTINGS)
+    problem = bend_problem(trials_of_logs([log], KNOWN, 1e-3), places_of_log(log, KNOWN), KNOWN, TENDONS, SETTINGS)
     x, deviation = problem.begin(), np.full(len(problem.coordinates), 2e-3)
     x[problem.free.index("oblique_cos")] = -0.1
     residuals = [np.full(len(trial.angle), 1e-3) for trial in problem.trials]
@@ -207,7 +207,7 @@ THREE = WristParameters(tendons="three", gravity=(0.0, 0.0), stiffness=1.2, damp
 HELD = {"friction": 0.0, "sheath_friction": 0.0, "presliding": 2e-5}
 
 
-def one_plane_each(late: float) -> list[BendTrial]:
+def one_plane_each(late: float) -> list[MeasuredTrial]:
     """A motion toward ulnar, seen so much later than the mean delay of 30 ms, and one toward flexion, as much earlier.
 
     Three tendons stay tight, so that the wrist's inertia alone tells its springs from theirs.
@@ -224,7 +224,7 @@ def one_plane_each(late: float) -> list[BendTrial]:
         seen = [np.interp(captured - 0.03 - side * late, time, bends) for bends in course[:, :2].T]
         angle = np.concatenate(seen) + math.radians(0.02) * rng.standard_normal(2 * len(captured))
         trials.append(
-            BendTrial(
+            MeasuredTrial(
                 f"log, {plane}", "log", "both", THREE, time, reeled, np.tile(captured, 2), angle, 0.0, (1, 2, 3),
                 np.repeat([0, 1], len(captured)), 1.0,
             )
@@ -260,7 +260,7 @@ def test_a_mass_of_the_log_goes_before_one_that_the_study_gives() -> None:
     places = dict(enumerate(TendonLayout.of(THREE).places, 1))
     trials = one_plane_each(0.0)
 
-    def overruled(trials: list[BendTrial], wrist: WristParameters) -> float | None:
+    def overruled(trials: list[MeasuredTrial], wrist: WristParameters) -> float | None:
         return overruled_mass(bend_problem(trials, places, wrist, TENDONS, IdentifySettings(segments=1)), wrist)
 
     assert overruled(trials, WristParameters(tendons="three", hand_mass=0.19)) == pytest.approx(0.2)

@@ -75,7 +75,7 @@ class _Jumping(Problem):
         x = np.array(points)
         damping = x[:, self.coordinates[Coordinate("damping")]]
         bend = 0.02 * x.sum(axis=1) + 1e-6 * (damping > 0.4e-6)
-        return np.repeat(bend[:, None], len(trial.time), axis=1)
+        return np.repeat(bend[:, None, None], len(trial.time), axis=1)
 
 
 def test_a_bend_that_jumps_beside_a_point_does_not_change_its_slopes() -> None:
@@ -160,7 +160,7 @@ def test_a_picture_shows_the_mean_of_its_exposure() -> None:
     (trial, *_), _ = logged(0, poses=(UPRIGHT,), directions=("ulnar",))
     rate, exposure = 2.0 * np.pi * 10.0, 0.02
     within = trial.captured[(trial.captured > 0.1) & (trial.captured < 4.9)]
-    seen = replace(trial, exposure=exposure, captured=within).shown(np.sin(rate * trial.time), 0.03)
+    seen = replace(trial, exposure=exposure, captured=within).shown(np.sin(rate * trial.time)[:, None], 0.03)
     weaker = np.sin(0.5 * rate * exposure) / (0.5 * rate * exposure)
     assert weaker < 0.95
     np.testing.assert_allclose(seen, weaker * np.sin(rate * (within - 0.03)), rtol=0.0, atol=4e-3)

@@ -26,7 +26,7 @@ class Lines(Problem):
     def simulate(self, trial: MeasuredTrial, candidates: Sequence[SupposedWrist], segments: int | None = None) -> Array:
         rng = np.random.default_rng(len(trial.label))
         own = rng.standard_normal((3, len(TIME))), 50.0 * rng.standard_normal((4, len(TIME)))
-        return np.array([self._angle(each, *own) for each in candidates])
+        return np.array([self._angle(each, *own) for each in candidates])[..., None]
 
     def _angle(self, each: SupposedWrist, of: Array, spools: Array) -> Array:
         stiffness = np.log(each.wrist.stiffness / START["stiffness"])
@@ -105,7 +105,7 @@ def test_the_zero_of_a_plane_moves_its_own_frames_and_no_others() -> None:
 @pytest.mark.parametrize("scale", [0.1, 1.0, 20.0])
 def test_the_search_ends_at_weighed_least_squares_whatever_the_noise(scale: float) -> None:
     """Where the gradient of residuals over their own deviation and of what was known beforehand is nothing."""
-    trials = [trial(each.run, each.plane, k, scale, each.label) for k, each in enumerate(TRIALS)]
+    trials = [trial(each.run, each.direction, k, scale, each.label) for k, each in enumerate(TRIALS)]
     found = fit(problem(*trials))
     residual, slopes = np.concatenate(found.residuals), np.concatenate(found.slopes)
     shown = np.concatenate([each.angle for each in trials])

@@ -21,11 +21,9 @@ from wristctl.config.wrist import TendonPlace as Place
 from wristctl.config.wrist import WristParameters
 from wristctl.errors import UserError
 from wristctl.identification.arc_fit import Told
-from wristctl.identification.bend_trials import PLANES, BendTrial
-from wristctl.identification.fit import CLOCK, SPOOL, ZERO, Coordinate, Fit, Problem, spool_zero
+from wristctl.identification.fit import CLOCK, SPOOL, Coordinate, Fit, Problem, spool_zero
 from wristctl.identification.intervals import NORMAL_95, Knowledge, interval
-from wristctl.identification.lack_of_fit import Misfit
-from wristctl.identification.measured_trials import MOST_DELAYED, MeasuredTrial, frame_noise
+from wristctl.identification.measured_trials import MOST_DELAYED, PLANES, MeasuredTrial
 from wristctl.identification.posterior import posterior_draws, posterior_yaml
 from wristctl.identification.rotor_field import rotors_of
 from wristctl.identification.spatial_forward import SupposedBends, courses_of_bends
@@ -120,14 +118,6 @@ class BendProblem(Problem):
                 weights[index] = 1.0 / self.settings.radius_error
         return weights
 
-    def zeros(self, trial: MeasuredTrial) -> dict[Coordinate, Array]:
-        """The camera's zeros of both planes."""
-        assert isinstance(trial, BendTrial)
-        return {
-            Coordinate(ZERO, trial.run, plane): (trial.channel == channel).astype(float)
-            for channel, plane in enumerate(PLANES)
-        }
-
     def clocks(self, trial: MeasuredTrial) -> tuple[Coordinate, ...]:
         """Its own."""
         return (Coordinate(CLOCK, trial.label),)
@@ -166,7 +156,7 @@ class BendProblem(Problem):
 
 
 def bend_problem(
-    trials: Sequence[BendTrial], places: Mapping[int, TendonPlace], wrist: WristParameters, actuator: Actuator,
+    trials: Sequence[MeasuredTrial], places: Mapping[int, TendonPlace], wrist: WristParameters, actuator: Actuator,
     settings: IdentifySettings,
 ) -> BendProblem:  # fmt: skip
     """The search over trials, begun at what is believed. Raises UserError for a held value that the model has not."""
@@ -196,10 +186,10 @@ def forces_are_scaled(problem: BendProblem, wrist: WristParameters) -> bool:
     That is a tension, trials with several masses, a held damping or tendon stiffness, or the hand's mass: in the logs,
     where it is not the default, or given in the section `wrist`.
     """
-    trials = [trial for trial in problem.trials if isinstance(trial, BendTrial)]
+    trials = problem.trials
     if not {"damping", "tendon_stiffness"}.isdisjoint(problem.settings.fixed):
         return True
-    if any((trial.channel >= len(PLANES)).any() for trial in trials):
+    if any(np.any(trial.channel >= len(PLANES)) for trial in trials):
         return True
     default = WristParameters.model_fields["hand_mass"].default
     masses = _masses(trials)
@@ -285,25 +275,6 @@ def _springs_told(fit: Fit, knowledge: Knowledge, rivals: Sequence[Array]) -> di
     return told
 
 
-def misfits_of_bends(fit: Fit) -> list[Misfit]:
-    """Misfit of the bends of each plane, and of the tensions where there are any."""
-    parts = dict[str, list[Array]]()
-    for trial, residual in zip(fit.problem.trials, fit.residuals, strict=True):
-        assert isinstance(trial, BendTrial)
-        for channel in np.unique(trial.channel):
-            name = PLANES[channel] if channel < len(PLANES) else "tensions"
-            own = trial.channel == channel
-            parts.setdefault(name, []).append(residual[own])
-    return [
-        Misfit(name, sum(map(len, residuals)), _rms(residuals), frame_noise(residuals))
-        for name, residuals in parts.items()
-    ]
-
-
-def _rms(residuals: Sequence[Array]) -> float:
-    return float(np.sqrt(np.mean(np.concatenate(residuals) ** 2)))
-
-
 def bends_yaml(
     fit: Fit, knowledge: Knowledge, wrist: WristParameters, count: int, rng: np.random.Generator
 ) -> tuple[str, str]:
@@ -314,7 +285,7 @@ def bends_yaml(
     """
     problem = fit.problem
     assert isinstance(problem, BendProblem)
-    captured = [trial.captured[trial.channel == 0] for trial in problem.trials if isinstance(trial, BendTrial)]
+    captured = [trial.captured[trial.of(0)] for trial in problem.trials]
     rate = 1.0 / float(np.median(np.concatenate([np.diff(times) for times in captured])))
     camera = {
         "frame_rate": rate,

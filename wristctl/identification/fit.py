@@ -81,7 +81,7 @@ class Problem:
     @cached_property
     def free(self) -> tuple[str, ...]:
         """The parameters to find; how the planes differ only where there are trials of both."""
-        one_plane = len({trial.plane for trial in self.trials}) == 1
+        one_plane = len({plane for trial in self.trials for plane in trial.planes}) == 1
         held = {*self.settings.fixed, *(["flexion_ratio"] if one_plane else [])}
         return tuple(name for name in UNKNOWNS if name not in held)
 
@@ -132,8 +132,8 @@ class Problem:
         return {name: held[name] for name in self.unknowns}
 
     def zeros(self, trial: MeasuredTrial) -> dict[Coordinate, Array]:
-        """The camera's zeros that a trial's angles (F,) hold, each with its share in every angle."""
-        return {Coordinate(ZERO, trial.run, trial.plane): np.ones(len(trial.angle))}
+        """The camera's zeros that a trial's readings (R,) hold, each with its share in every reading."""
+        return {Coordinate(ZERO, trial.run, plane): trial.of(k).astype(float) for k, plane in enumerate(trial.planes)}
 
     def clocks(self, trial: MeasuredTrial) -> tuple[Coordinate, ...]:
         """Coordinates by which a trial's frames are later than by the delay [s]; none where a board dates counts."""
@@ -144,25 +144,26 @@ class Problem:
         return float(self.values(x)["delay"] + sum(x[self.coordinates[clock]] for clock in self.clocks(trial)))
 
     def courses(self, trial: MeasuredTrial, points: Sequence[Array]) -> Array:
-        """What a trial's wrist does at each of some coordinates: (count, T), as `trial.shown` takes it."""
+        """What a trial's wrist does at each of some coordinates: (count, T, P + M), as `trial.shown` takes it."""
         return self.simulate(trial, [self.candidate(trial, x) for x in points])
 
     def candidate(self, trial: MeasuredTrial, x: Array) -> SupposedWrist:
         """The trial's wrist and tendons at coordinates x."""
         values = self.values(x)
         wrist_values = {name: values[name] for name in ("stiffness", "damping", "tendon_radius")}
-        if trial.plane == "flexion":
+        (plane,) = trial.planes
+        if plane == "flexion":
             wrist_values["stiffness"] *= values["flexion_ratio"]
         one, two, three, four = (float(x[self.coordinates[spool_zero(trial, tendon)]]) for tendon in trial.tendons)
         tendons = self.actuator.model_copy(update=tendons_of_values(values))
         wrist = trial.wrist.model_copy(update=wrist_values)
-        across = across_plane(wrist, trial.plane, values["stiffness"], values["flexion_ratio"])
+        across = across_plane(wrist, plane, values["stiffness"], values["flexion_ratio"])
         rotors = rotors_of(self.settings)
         return SupposedWrist(wrist, tendons, (one, two, three, four), rotors=rotors, across=across)
 
     def simulate(self, trial: MeasuredTrial, candidates: Sequence[SupposedWrist], segments: int | None = None) -> Array:
-        """Angles (count, T) of the candidates in a trial; so many segments, or as many as the settings say."""
-        return angles(candidates, trial.reeled, self.settings.step, segments or self.settings.segments)
+        """Bends (count, T, 1) of the candidates in a trial; so many segments, or as many as the settings say."""
+        return angles(candidates, trial.reeled, self.settings.step, segments or self.settings.segments)[..., None]
 
 
 # Largest of these errors [rad, m, s], and least error of a clock that counts as known [s].

@@ -62,7 +62,7 @@ def _play(trial: MeasuredTrial, supposed: SupposedWrist) -> Supposed:
 
 
 def _flexion_more_damped(trial: MeasuredTrial, supposed: SupposedWrist) -> Supposed:
-    factor = 1.01 if trial.plane == "flexion" else 1.0
+    factor = 1.01 if trial.planes == ("flexion",) else 1.0
     return trial, supposed._replace(
         wrist=supposed.wrist.model_copy(update={"damping": factor * supposed.wrist.damping})
     )
@@ -151,7 +151,7 @@ def _suspicion(fit: Fit, cause: str, columns: list[Array]) -> Suspicion | None:
 
 
 class Misfit(NamedTuple):
-    """Residuals of a plane's direction: their root mean square and the frames' own noise [rad]."""
+    """Residuals of a direction, a plane's bend or tensions: their root mean square and the frames' own noise [rad]."""
 
     direction: str
     frames: int
@@ -165,10 +165,11 @@ class Misfit(NamedTuple):
 
 
 def misfits(fit: Fit) -> list[Misfit]:
-    """Misfit of every direction with trials."""
+    """Misfit of every direction with trials; of trials in two planes that of each bend, and of tensions."""
     residuals_of = dict[str, list[Array]]()
     for trial, residual in zip(fit.problem.trials, fit.residuals, strict=True):
-        residuals_of.setdefault(trial.direction, []).append(residual)
+        for name, own in trial.named_channels():
+            residuals_of.setdefault(name, []).append(residual[own])
     return [
         Misfit(name, len(every), float(np.sqrt(np.mean(every**2))), frame_noise(parts))
         for name, parts in residuals_of.items()
