@@ -18,7 +18,7 @@ from wristctl.arrays import Array
 from wristctl.config.plant import Actuator
 from wristctl.config.wrist import WristParameters
 from wristctl.errors import UserError
-from wristctl.identification.spatial_forward import SupposedBends, courses_of_bends
+from wristctl.identification.forward import Places, Supposed, courses
 from wristctl.records.open_log import OpenLog
 from wristctl.simulation.references import minimum_jerk
 from wristctl.wrist.allocation import allocated
@@ -146,9 +146,9 @@ def rehearse_bends(
     """
     layout, tendons = truth.layout, counts.shape[1]
     numbers = (1, 2, 4, 5) if tendons == 4 else tuple(range(1, tendons + 1))
-    shares = layout.shares(truth.wrist.discs)
-    supposed = SupposedBends(truth.wrist, truth.actuator, layout.cross_section, truth.taut, shares, layout.multiplicity)
-    course = courses_of_bends([supposed], truth.actuator.step_length * counts, _PERIOD, truth.segments)[0]
+    supposed = Supposed(truth.wrist, truth.actuator, truth.taut, Places.of(layout, truth.wrist.discs))
+    reeled = truth.actuator.step_length * counts
+    course = courses([supposed], reeled, _PERIOD, truth.segments, pulls=True)[0]
     time = _PERIOD * np.arange(len(course))
     ticks = slice(None, None, _LOGGED)
     captured = np.arange(rng.uniform(0.0, 1.0), time[-1] * truth.frame_rate) / truth.frame_rate

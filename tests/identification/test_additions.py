@@ -13,7 +13,7 @@ from wristctl.config.identify import IdentifySettings
 from wristctl.errors import UserError
 from wristctl.identification import identifiability
 from wristctl.identification.fit import Fit, Linearisation, Problem, fit, linearise
-from wristctl.identification.forward import SupposedWrist
+from wristctl.identification.forward import Supposed
 from wristctl.identification.identifiability import (
     ADDITIONS,
     FINER,
@@ -218,7 +218,7 @@ def test_an_added_trial_bends_as_before_under_its_own_load(monkeypatch: pytest.M
 
     def course(trial: MeasuredTrial) -> np.ndarray:
         wrist = trial.wrist.model_copy(update={"stiffness": found.values["stiffness"]})
-        supposed = SupposedWrist(wrist, TENDONS)
+        supposed = Supposed(wrist, TENDONS)
         bent: np.ndarray = problem.simulate(trial, [supposed])[0]
         return bent
 

@@ -24,9 +24,9 @@ from wristctl.identification.bend_problem import (
     told_of_bends,
 )
 from wristctl.identification.fit import Fit, Rival, fit
+from wristctl.identification.forward import Places, Supposed, courses
 from wristctl.identification.intervals import Knowledge, knowledge
 from wristctl.identification.measured_trials import MeasuredTrial, places_of_log, trials_of_logs
-from wristctl.identification.spatial_forward import SupposedBends, courses_of_bends
 from wristctl.records.log_converters import read_log
 from wristctl.records.open_log import write_log
 from wristctl.wrist.spatial.spatial_model import spatial_terms
@@ -57,10 +57,8 @@ def test_a_wrist_on_held_spools_comes_to_rest_where_its_tendons_hold_springs_and
     wrist = KNOWN.model_copy(update={"flexion_ratio": 1.3, "stiffness_axis_deg": 25.0, "gravity_flexion": 3.0})
     sliding = TENDONS.model_copy(update={"friction": 0.0})
     reeled = np.tile([-2e-3, 1e-3, -1.5e-3, 6e-3], (1500, 1))
-    supposed = SupposedBends(
-        wrist, sliding, LAYOUT.cross_section, (1e-4, 0.0, 0.0, -1e-4), np.ones(4), np.ones(4, np.int64)
-    )
-    (course,) = courses_of_bends([supposed], reeled, 1e-3, 1)
+    supposed = Supposed(wrist, sliding, (1e-4, 0.0, 0.0, -1e-4), Places.of(LAYOUT, wrist.discs))
+    (course,) = courses([supposed], reeled, 1e-3, 1, pulls=True)
     bend, pulls = course[-1, :2], course[-1, 2:]
     assert np.hypot(*bend) > 0.1 and pulls.min() == 0.0 and np.abs(course[-1] - course[-200]).max() < 1e-6
     at_rest = spatial_terms(spatial_values(wrist, LAYOUT, 1, axis=math.radians(25.0)), bend, 0.0 * bend)
@@ -76,9 +74,9 @@ def test_a_place_of_two_tendons_and_one_that_ends_early_pull_on_held_spools_as_t
     wrist = WristParameters.model_validate({"tendons": places})
     layout, sliding = TendonLayout.of(wrist), TENDONS.model_copy(update={"friction": 0.0})
     shares = layout.shares(wrist.discs)
-    supposed = SupposedBends(wrist, sliding, layout.cross_section, (1e-4,) * 3, shares, layout.multiplicity)
+    supposed = Supposed(wrist, sliding, (1e-4,) * 3, Places.of(layout, wrist.discs))
     reeled = np.array([6e-3, -1e-3, -2e-3])
-    (course,) = courses_of_bends([supposed], np.tile(reeled, (1500, 1)), 1e-3, 1)
+    (course,) = courses([supposed], np.tile(reeled, (1500, 1)), 1e-3, 1, pulls=True)
     bend, pulls = course[-1, :2], course[-1, 2:]
     at_rest = spatial_terms(spatial_values(wrist, layout, 1), bend, 0.0 * bend)
     stretch = 1e-4 + reeled - (shares * wrist.length - at_rest.lengths)
@@ -218,8 +216,8 @@ def one_plane_each(late: float) -> list[MeasuredTrial]:
         bend = np.zeros((len(time), 2))
         bend[:, plane] = 0.3 * np.sin(5.0 * time) * np.minimum(1.0, time**2)
         reeled = 4e-4 + bend @ layout.cross_section.T
-        supposed = SupposedBends(THREE, tendons, layout.cross_section, (0.0,) * 3, np.ones(3), np.ones(3, np.int64))
-        (course,) = courses_of_bends([supposed], reeled, 1e-3, 1)
+        supposed = Supposed(THREE, tendons, places=Places.of(layout, THREE.discs))
+        (course,) = courses([supposed], reeled, 1e-3, 1, pulls=True)
         captured = np.arange(0.05, 2.45, 0.01)
         seen = [np.interp(captured - 0.03 - side * late, time, bends) for bends in course[:, :2].T]
         angle = np.concatenate(seen) + math.radians(0.02) * rng.standard_normal(2 * len(captured))

@@ -11,7 +11,7 @@ from tests.identification.benches import KNOWN, START, TENDONS
 from wristctl.arrays import Array
 from wristctl.config.identify import IdentifySettings
 from wristctl.identification.fit import SPOOL, ZERO, Coordinate, Problem, fit, linearise
-from wristctl.identification.forward import SupposedWrist
+from wristctl.identification.forward import Supposed
 from wristctl.identification.measured_trials import MeasuredTrial
 from wristctl.identification.unknowns import UNKNOWNS
 
@@ -23,12 +23,12 @@ TIME = 0.005 * np.arange(200.0)
 class Lines(Problem):
     """Angles that are linear in logarithms of stiffness and radius, in friction, and in the spools' zeros."""
 
-    def simulate(self, trial: MeasuredTrial, candidates: Sequence[SupposedWrist], segments: int | None = None) -> Array:
+    def simulate(self, trial: MeasuredTrial, candidates: Sequence[Supposed], segments: int | None = None) -> Array:
         rng = np.random.default_rng(len(trial.label))
         own = rng.standard_normal((3, len(TIME))), 50.0 * rng.standard_normal((4, len(TIME)))
         return np.array([self._angle(each, *own) for each in candidates])[..., None]
 
-    def _angle(self, each: SupposedWrist, of: Array, spools: Array) -> Array:
+    def _angle(self, each: Supposed, of: Array, spools: Array) -> Array:
         stiffness = np.log(each.wrist.stiffness / START["stiffness"])
         radius = np.log(each.wrist.tendon_radius / START["tendon_radius"])
         found: Array = 0.1 * np.array([stiffness, each.tendons.friction, radius]) @ of + np.array(each.taut) @ spools

@@ -18,6 +18,7 @@ from wristctl.config.wrist import WristParameters
 from wristctl.identification.arc_fit import fit_arcs
 from wristctl.identification.bend_problem import bend_problem, told_of_bends
 from wristctl.identification.fit import fit
+from wristctl.identification.forward import courses
 from wristctl.identification.intervals import knowledge
 from wristctl.identification.lack_of_fit import misfits
 from wristctl.identification.log_model import everything_fitted, recordings_of_logs, robot_of_logs
@@ -133,7 +134,8 @@ def test_springs_that_differ_between_planes_are_found_where_equal_ones_are_belie
         assert (known or name == "damping") and told[name].low < value < told[name].high, name
     assert found.noise == pytest.approx(math.radians(0.003), rel=0.03)
     (trial,) = problem.trials
-    assert problem.courses(trial, [found.x])[0][:, 2:].min() > 0.0
+    candidate = problem.candidate(trial, found.x)
+    assert courses([candidate], trial.reeled, search.step, search.segments, pulls=True)[0, :, 2:].min() > 0.0
 
 
 @pytest.mark.parametrize(

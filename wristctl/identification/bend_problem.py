@@ -22,11 +22,11 @@ from wristctl.config.wrist import WristParameters
 from wristctl.errors import UserError
 from wristctl.identification.arc_fit import Told
 from wristctl.identification.fit import CLOCK, SPOOL, Coordinate, Fit, Problem, spool_zero
+from wristctl.identification.forward import Places, Supposed, courses
 from wristctl.identification.intervals import NORMAL_95, Knowledge, interval
 from wristctl.identification.measured_trials import MOST_DELAYED, PLANES, MeasuredTrial
 from wristctl.identification.posterior import posterior_draws, posterior_yaml
 from wristctl.identification.rotor_field import rotors_of
-from wristctl.identification.spatial_forward import SupposedBends, courses_of_bends
 from wristctl.identification.unknowns import UNKNOWNS, Unknown, believed_of, identified_yaml, tendons_of_values
 from wristctl.wrist.spatial.spatial_segments import ellipse
 from wristctl.wrist.tendon_layout import TendonLayout, TendonPlace
@@ -124,10 +124,10 @@ class BendProblem(Problem):
 
     def courses(self, trial: MeasuredTrial, points: Sequence[Array]) -> Array:
         """Bends and tensions, these as large as the trial's readings, (count, T, 2 + M)."""
-        supposed = [self.supposed(trial, x) for x in points]
-        return courses_of_bends(supposed, trial.reeled, self.settings.step, self.settings.segments)
+        supposed, tensions = [self.candidate(trial, x) for x in points], bool(np.any(trial.channel >= len(PLANES)))
+        return courses(supposed, trial.reeled, self.settings.step, self.settings.segments, pulls=tensions)
 
-    def supposed(self, trial: MeasuredTrial, x: Array) -> SupposedBends:
+    def candidate(self, trial: MeasuredTrial, x: Array) -> Supposed:
         """The trial's wrist and tendons at coordinates x."""
         values = self.values(x)
         springs = springs_of(values["stiffness"], values["oblique_cos"], values["oblique_sin"])
@@ -135,9 +135,8 @@ class BendProblem(Problem):
         tendons = self.actuator.model_copy(update=tendons_of_values(values))
         taut = tuple(float(x[self.coordinates[spool_zero(trial, tendon)]]) for tendon in trial.tendons)
         layout = TendonLayout(tuple(self.places.values()))
-        shares = layout.shares(wrist.discs)
-        section = self._cross_section(values)
-        return SupposedBends(wrist, tendons, section, taut, shares, layout.multiplicity, rotors_of(self.settings))
+        places = Places.of(layout, wrist.discs)._replace(cross_section=self._cross_section(values))
+        return Supposed(wrist, tendons, taut, places, rotors=rotors_of(self.settings))
 
     def planar(self, values: Mapping[str, float]) -> dict[str, float]:
         """The values with those of a wrist whose tendons are on a square."""

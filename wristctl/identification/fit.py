@@ -13,7 +13,7 @@ from threadpoolctl import threadpool_limits
 from wristctl.arrays import Array
 from wristctl.config.identify import IdentifySettings
 from wristctl.config.plant import Actuator
-from wristctl.identification.forward import SupposedWrist, across_plane, angles
+from wristctl.identification.forward import Supposed, across_plane, courses
 from wristctl.identification.measured_trials import MeasuredTrial, frame_noise
 from wristctl.identification.rotor_field import rotors_of
 from wristctl.identification.unknowns import NOT_NEGATIVE, SIMULATED, UNKNOWNS, Unknown, tendons_of_values
@@ -147,7 +147,7 @@ class Problem:
         """What a trial's wrist does at each of some coordinates: (count, T, P + M), as `trial.shown` takes it."""
         return self.simulate(trial, [self.candidate(trial, x) for x in points])
 
-    def candidate(self, trial: MeasuredTrial, x: Array) -> SupposedWrist:
+    def candidate(self, trial: MeasuredTrial, x: Array) -> Supposed:
         """The trial's wrist and tendons at coordinates x."""
         values = self.values(x)
         wrist_values = {name: values[name] for name in ("stiffness", "damping", "tendon_radius")}
@@ -159,11 +159,11 @@ class Problem:
         wrist = trial.wrist.model_copy(update=wrist_values)
         across = across_plane(wrist, plane, values["stiffness"], values["flexion_ratio"])
         rotors = rotors_of(self.settings)
-        return SupposedWrist(wrist, tendons, (one, two, three, four), rotors=rotors, across=across)
+        return Supposed(wrist, tendons, (one, two, three, four), rotors=rotors, across=across)
 
-    def simulate(self, trial: MeasuredTrial, candidates: Sequence[SupposedWrist], segments: int | None = None) -> Array:
+    def simulate(self, trial: MeasuredTrial, candidates: Sequence[Supposed], segments: int | None = None) -> Array:
         """Bends (count, T, 1) of the candidates in a trial; so many segments, or as many as the settings say."""
-        return angles(candidates, trial.reeled, self.settings.step, segments or self.settings.segments)[..., None]
+        return courses(candidates, trial.reeled, self.settings.step, segments or self.settings.segments)
 
 
 # Largest of these errors [rad, m, s], and least error of a clock that counts as known [s].
