@@ -11,10 +11,11 @@ from wristctl.config.identify import IdentifySettings
 from wristctl.config.loop import DirectionName, Reference
 from wristctl.config.plant import Actuator
 from wristctl.config.wrist import WristParameters
-from wristctl.identification.fit import Problem, linearise
+from wristctl.identification.fit import linearise
 from wristctl.identification.identifiability import widest, width_text
 from wristctl.identification.intervals import condition, promised
 from wristctl.identification.measured_trials import measured_trials
+from wristctl.identification.problem import Problem
 from wristctl.identification.unknowns import UNKNOWNS, believed_of
 
 HERE = Path(__file__).parent

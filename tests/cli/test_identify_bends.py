@@ -19,8 +19,9 @@ from wristctl.config.loop import Reference
 from wristctl.config.study import Study
 from wristctl.config.wrist import WristParameters
 from wristctl.identification.arc_fit import Told
-from wristctl.identification.bend_problem import bend_problem, forces_are_scaled, without_forces
+from wristctl.identification.bend_estimates import forces_are_scaled, without_forces
 from wristctl.identification.measured_trials import places_of_log, trials_of_logs
+from wristctl.identification.problem import bend_problem
 from wristctl.identification.unknowns import with_identified
 from wristctl.records import open_run
 from wristctl.records.open_log import OpenLog, write_log

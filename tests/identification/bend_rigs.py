@@ -14,11 +14,13 @@ from wristctl.config.identify import IdentifySettings
 from wristctl.config.plant import Actuator
 from wristctl.config.wrist import WristParameters
 from wristctl.identification.arc_fit import Told
-from wristctl.identification.bend_problem import bend_problem, oblique_of, springs_of, told_of_bends
+from wristctl.identification.bend_estimates import told_of_bends
 from wristctl.identification.fit import Fit, fit
 from wristctl.identification.intervals import Knowledge, knowledge
 from wristctl.identification.lack_of_fit import misfits
 from wristctl.identification.measured_trials import places_of_log, trials_of_logs
+from wristctl.identification.problem import bend_problem
+from wristctl.identification.unknowns import oblique_of, springs_of
 from wristctl.records.open_log import OpenLog
 from wristctl.wrist.tendon_layout import TendonLayout, TendonPlace
 

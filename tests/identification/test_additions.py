@@ -12,7 +12,7 @@ from tests.identification.benches import KNOWN, LEVEL, START, TENDONS, UPRIGHT
 from wristctl.config.identify import IdentifySettings
 from wristctl.errors import UserError
 from wristctl.identification import identifiability
-from wristctl.identification.fit import Fit, Linearisation, Problem, fit, linearise
+from wristctl.identification.fit import Fit, Linearisation, fit, linearise
 from wristctl.identification.forward import Supposed
 from wristctl.identification.identifiability import (
     ADDITIONS,
@@ -27,6 +27,7 @@ from wristctl.identification.identifiability import (
 )  # fmt: skip
 from wristctl.identification.intervals import Knowledge, knowledge
 from wristctl.identification.measured_trials import MeasuredTrial
+from wristctl.identification.problem import Problem
 from wristctl.identification.unknowns import UNKNOWNS
 
 TIME = 0.005 * np.arange(400.0)

@@ -15,7 +15,7 @@ from tests.identification.rehearsal import spools
 from wristctl.arrays import Array
 from wristctl.config.loop import Loop, Reference
 from wristctl.control.table import controller
-from wristctl.identification.fit import SPOOL, Coordinate, Linearisation, Problem, fit, linearise
+from wristctl.identification.fit import Linearisation, fit, linearise
 from wristctl.identification.forward import Supposed, courses
 from wristctl.identification.intervals import (
     autocorrelation,
@@ -26,6 +26,7 @@ from wristctl.identification.intervals import (
     long_run,
 )
 from wristctl.identification.measured_trials import MeasuredTrial, frame_noise
+from wristctl.identification.problem import SPOOL, Coordinate, Problem
 from wristctl.simulation.reference import motion
 from wristctl.simulation.rollout import rollout
 from wristctl.simulation.simulated_drives import motor_of

@@ -10,9 +10,10 @@ import pytest
 from tests.identification.benches import KNOWN, START, TENDONS
 from wristctl.arrays import Array
 from wristctl.config.identify import IdentifySettings
-from wristctl.identification.fit import SPOOL, ZERO, Coordinate, Problem, fit, linearise
+from wristctl.identification.fit import fit, linearise
 from wristctl.identification.forward import Supposed
 from wristctl.identification.measured_trials import MeasuredTrial
+from wristctl.identification.problem import SPOOL, ZERO, Coordinate, Problem
 from wristctl.identification.unknowns import UNKNOWNS
 
 FREE = ("stiffness", "friction", "tendon_radius")

@@ -16,7 +16,7 @@ from wristctl.config.identify import IdentifySettings
 from wristctl.config.plant import Actuator
 from wristctl.config.wrist import WristParameters
 from wristctl.identification.arc_fit import fit_arcs
-from wristctl.identification.bend_problem import bend_problem, told_of_bends
+from wristctl.identification.bend_estimates import told_of_bends
 from wristctl.identification.fit import fit
 from wristctl.identification.forward import courses
 from wristctl.identification.intervals import knowledge
@@ -24,6 +24,7 @@ from wristctl.identification.lack_of_fit import misfits
 from wristctl.identification.log_model import everything_fitted, recordings_of_logs, robot_of_logs
 from wristctl.identification.measured_trials import places_of_log, trials_of_logs
 from wristctl.identification.model_choice import chosen_of, tried_models
+from wristctl.identification.problem import bend_problem
 from wristctl.records import Run, start_run
 from wristctl.records.open_log import OpenLog
 from wristctl.wrist.tendon_layout import TendonLayout

@@ -15,9 +15,10 @@ from wristctl.commands.identify.figures import _short, angles, correlations, res
 from wristctl.config.identify import IdentifySettings
 from wristctl.config.plant import Actuator
 from wristctl.config.wrist import WristParameters
-from wristctl.identification.fit import Fit, Problem
+from wristctl.identification.fit import Fit
 from wristctl.identification.intervals import Knowledge
 from wristctl.identification.measured_trials import MeasuredTrial
+from wristctl.identification.problem import Problem
 from wristctl.identification.unknowns import UNKNOWNS
 
 COUNT = len(UNKNOWNS) - 1

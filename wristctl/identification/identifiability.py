@@ -15,9 +15,10 @@ from wristctl.config.identify import IdentifySettings
 from wristctl.config.plant import TrueWrist
 from wristctl.config.wrist import WristParameters
 from wristctl.errors import Setting, UserError
-from wristctl.identification.fit import Coordinate, Fit, Problem, linearise
+from wristctl.identification.fit import Fit, linearise
 from wristctl.identification.intervals import Knowledge, inverse, promised
 from wristctl.identification.measured_trials import MeasuredTrial
+from wristctl.identification.problem import Coordinate, Problem
 from wristctl.identification.unknowns import NOT_NEGATIVE, UNKNOWNS
 from wristctl.simulation.worlds import plant_of
 

@@ -23,11 +23,11 @@ if TYPE_CHECKING:
     import pandas as pd
 
     from wristctl.identification.arc_fit import Told
-    from wristctl.identification.bend_problem import BendProblem
     from wristctl.identification.fit import Fit
     from wristctl.identification.intervals import Knowledge
     from wristctl.identification.lack_of_fit import Misfit
     from wristctl.identification.measured_trials import MeasuredTrial
+    from wristctl.identification.problem import Problem
 
 # Draws of the posterior that a run keeps as a family of worlds.
 _DRAWS = 200
@@ -76,10 +76,10 @@ def _in_one_plane_too(study: Study) -> bool:
     return off_both_sides(study.wrist) is None
 
 
-def _problem(study: Study) -> BendProblem:
+def _problem(study: Study) -> Problem:
     from wristctl.config.plant import Actuator
-    from wristctl.identification.bend_problem import bend_problem
     from wristctl.identification.measured_trials import places_of_log, trials_of_logs
+    from wristctl.identification.problem import bend_problem
     from wristctl.records.log_looks import telling
 
     settings = study.identify
@@ -105,7 +105,7 @@ def identify_bends(session: Session) -> BendsTold:
 
     from wristctl.commands.identify.figures import angles, residuals
     from wristctl.commands.identify.tables import fit_table, residual_table
-    from wristctl.identification.bend_problem import (
+    from wristctl.identification.bend_estimates import (
         bends_yaml,
         forces_are_scaled,
         overruled_mass,

@@ -16,17 +16,13 @@ from tests.identification.bend_rigs import KNOWN, LAYOUT, SETTINGS, TENDONS, dra
 from wristctl.config.identify import Fixed, IdentifySettings
 from wristctl.config.wrist import WristParameters
 from wristctl.errors import UserError
-from wristctl.identification.bend_problem import (
-    bend_problem,
-    oblique_of,
-    overruled_mass,
-    springs_of,
-    told_of_bends,
-)
+from wristctl.identification.bend_estimates import overruled_mass, told_of_bends
 from wristctl.identification.fit import Fit, Rival, fit
 from wristctl.identification.forward import Places, Supposed, courses
 from wristctl.identification.intervals import Knowledge, knowledge
 from wristctl.identification.measured_trials import MeasuredTrial, places_of_log, trials_of_logs
+from wristctl.identification.problem import bend_problem
+from wristctl.identification.unknowns import oblique_of, springs_of
 from wristctl.records.log_converters import read_log
 from wristctl.records.open_log import write_log
 from wristctl.wrist.spatial.spatial_model import spatial_terms
