@@ -73,6 +73,10 @@ class RehearsedBends:
     delay: float = 0.03
     noise_deg: float = 0.05
     zero_deg: tuple[float, float] = (0.0, 0.0)
+    turn_deg: tuple[float, float] = (0.0, 0.0)
+    """Turn of the view of each plane about the wrist's axis, from ulnar toward flexion."""
+    too_much: tuple[float, float] = (0.0, 0.0)
+    """Share of its bend that the view of each plane shows too much."""
     frame_rate: float = 60.0
     exposure: float = 4e-3
     dropped: float = 0.05
@@ -169,7 +173,9 @@ def rehearse_bends(
             noise = truth.tension_noise * rng.standard_normal(count)
             columns[f"tension_{number}"] = placed(course[ticks, 2 + k] + noise, 0)
     for plane, bend in enumerate(("bend_y", "bend_z")):
-        seen = np.interp(shutter, time, course[:, plane]).mean(axis=0)
+        turned = math.radians((1, -1)[plane] * truth.turn_deg[plane]) * course[:, 1 - plane]
+        shown = (1.0 + truth.too_much[plane]) * course[:, plane] + turned
+        seen = np.interp(shutter, time, shown).mean(axis=0)
         noise = truth.noise_deg * rng.standard_normal(len(captured)) + truth.zero_deg[plane]
         columns[bend] = placed(seen + np.radians(noise), count)
     words = {"trial": np.full(len(clock), trial)} if trial else {}

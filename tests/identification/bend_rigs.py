@@ -86,7 +86,15 @@ def logs_of(
     rig: Rig, rng: np.random.Generator, segments: int = SEGMENTS, counts: Array | None = None,
     tension_noise: float | None = None,
 ) -> list[OpenLog]:  # fmt: skip
-    """The logs of its two runs, one a mass of the hand; each has been homed and its camera zeroed anew."""
+    """The logs of its two runs, one a mass of the hand; each has been homed and its camera zeroed anew.
+
+    Views are turned and scaled as far off as the settings say, alike in both runs.
+    """
+    (of_views,) = rng.spawn(1)
+    turn, too_much = (
+        SETTINGS.turn_error_deg * of_views.standard_normal(2),
+        SETTINGS.view_error * of_views.standard_normal(2),
+    )
     clock = SETTINGS.clock_error * rng.standard_normal()
     logs = []
     for name, mass in MASSES.items():
@@ -94,6 +102,7 @@ def logs_of(
         wrist = rig.wrist.model_copy(update={"hand_mass": mass})
         truth = RehearsedBends(
             wrist, rig.actuator, rig.layout, taut=tuple(taut), delay=0.03 + clock, zero_deg=(zero[0], zero[1]),
+            turn_deg=(turn[0], turn[1]), too_much=(too_much[0], too_much[1]),
             segments=segments, tension_noise=tension_noise,
         )  # fmt: skip
         logs.append(rehearse_bends(truth, spools() if counts is None else counts, TENDONS.step_length, rng, name=name))

@@ -14,7 +14,7 @@ from wristctl.config.plant import Actuator
 from wristctl.config.wrist import WristParameters
 from wristctl.errors import UserError
 from wristctl.identification.forward import Places, Supposed, across_plane, courses
-from wristctl.identification.measured_trials import BOTH, MeasuredTrial
+from wristctl.identification.measured_trials import BOTH, PLANES, MeasuredTrial
 from wristctl.identification.rotor_field import rotors_of
 from wristctl.identification.unknowns import (
     NOT_NEGATIVE,
@@ -36,10 +36,11 @@ _TIGHTER = 6.0
 
 
 class Coordinate(NamedTuple):
-    """Coordinate of a search: a parameter by name, or a small error of one place in one run.
+    """Coordinate of a search: a parameter by name, or a small error of one place, most in one run.
 
-    That is the camera's zero in a bending plane (ZERO), what a tendon's spool has reeled in unknown (SPOOL), or by how
-    much one trial's clocks are further apart (CLOCK).
+    That is the camera's zero in a bending plane (ZERO), what a tendon's spool has reeled in unknown (SPOOL), by how
+    much one trial's clocks are further apart (CLOCK), or how a plane's view is turned about the wrist's axis (TURN) and
+    what share of the bend it shows too much (GAIN).
     """
 
     kind: str
@@ -47,7 +48,7 @@ class Coordinate(NamedTuple):
     place: str | int = ""
 
 
-ZERO, SPOOL, CLOCK = "camera's zero", "spool's zero", "trial's clock"
+ZERO, SPOOL, CLOCK, TURN, GAIN = "camera's zero", "spool's zero", "trial's clock", "view's turn", "view's gain"
 
 
 @dataclass(frozen=True)
@@ -56,8 +57,9 @@ class Problem:
 
     `start` is by the names of `unknowns`. Beside the parameters small errors are found, of which the size is known
     beforehand: the camera's zero angle of each run and plane, the zero of each spool of each run, and in two planes the
-    clocks of each trial. One that is late in one plane would look like softer springs there, as a wrist on tight
-    tendons tells them by its inertia alone.
+    clocks of each trial and the turn and the gain of each view. A trial that is late in one plane would look like
+    softer springs there, as a wrist on tight tendons tells them by its inertia alone; a view that is turned moves all
+    tendons.
     """
 
     trials: Sequence[MeasuredTrial]
@@ -82,12 +84,13 @@ class Problem:
 
     @cached_property
     def coordinates(self) -> dict[Coordinate, int]:
-        """Index of every coordinate of the search: free parameters, zeros, spools."""
+        """Index of every coordinate of the search: free parameters, then small errors."""
         free = [Coordinate(name) for name in self.free]
         zeros = [zero for trial in self.trials for zero in self.zeros(trial)]
         spools = [spool_zero(trial, tendon) for trial in self.trials for tendon in trial.tendons]
         clocks = [clock for trial in self.trials for clock in self.clocks(trial)]
-        return {coordinate: index for index, coordinate in enumerate(dict.fromkeys([*free, *zeros, *spools, *clocks]))}
+        every = dict.fromkeys([*free, *zeros, *spools, *clocks, *self.views])
+        return {coordinate: index for index, coordinate in enumerate(every)}
 
     def begin(self) -> Array:
         """The coordinates at the start; at an edge the search would stay there."""
@@ -124,6 +127,8 @@ class Problem:
             ZERO: 1.0 / np.deg2rad(self.settings.zero_error_deg),
             SPOOL: 1.0 / self.settings.spool_error,
             CLOCK: 1.0 / max(self.settings.clock_error, _LEAST_CLOCK),
+            TURN: 1.0 / np.deg2rad(self.settings.turn_error_deg),
+            GAIN: 1.0 / self.settings.view_error,
         } | {f"gain_{number}": 1.0 / self.settings.radius_error for number in self.places}
         return np.array([beginning.get(coordinate.kind, 0.0) for coordinate in self.coordinates])
 
@@ -137,6 +142,29 @@ class Problem:
     def zeros(self, trial: MeasuredTrial) -> dict[Coordinate, Array]:
         """The camera's zeros that a trial's readings (R,) hold, each with its share in every reading."""
         return {Coordinate(ZERO, trial.run, plane): trial.of(k).astype(float) for k, plane in enumerate(trial.planes)}
+
+    @cached_property
+    def views(self) -> dict[Coordinate, Array]:
+        """Errors of the views in two planes, each with the bends (P, P) that it adds to those of the wrist.
+
+        A view that is turned from ulnar toward flexion shows part of the other plane's bend.
+        """
+        if not self.places:
+            return {}
+        ulnar, flexion = PLANES
+        return {
+            Coordinate(TURN, place=ulnar): np.array([[0.0, 1.0], [0.0, 0.0]]),
+            Coordinate(TURN, place=flexion): np.array([[0.0, 0.0], [-1.0, 0.0]]),
+            Coordinate(GAIN, place=ulnar): np.diag([1.0, 0.0]),
+            Coordinate(GAIN, place=flexion): np.diag([0.0, 1.0]),
+        }
+
+    def viewed(self, courses: Array, x: Array) -> Array:
+        """Courses (..., P + M) as their views show them at coordinates x."""
+        viewed, bends = courses.copy(), courses[..., : len(PLANES)]
+        for view, added in self.views.items():
+            viewed[..., : len(PLANES)] += x[self.coordinates[view]] * bends @ added.T
+        return viewed
 
     def clocks(self, trial: MeasuredTrial) -> tuple[Coordinate, ...]:
         """Coordinates by which a trial's frames are later than by the delay [s]; none where a board dates counts."""
@@ -191,8 +219,8 @@ class Problem:
         return courses(candidates, trial.reeled, self.settings.step, segments or self.settings.segments, pulls=tensions)
 
 
-# Largest of these errors [rad, m, s], and least error of a clock that counts as known [s].
-_WIDEST, _LEAST_CLOCK = {ZERO: 0.2, SPOOL: 2e-3, CLOCK: 1e-2}, 1e-6
+# Largest of these errors [rad, m, s, 1], and least error of a clock that counts as known [s].
+_WIDEST, _LEAST_CLOCK = {ZERO: 0.2, SPOOL: 2e-3, CLOCK: 1e-2, TURN: 0.1, GAIN: 0.1}, 1e-6
 
 
 def spool_zero(trial: MeasuredTrial, tendon: int) -> Coordinate:
