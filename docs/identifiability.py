@@ -1,4 +1,4 @@
-"""Make docs/identifiability.md anew: `python docs/identifiability.py`."""
+"""Make docs/identifiability.md anew: `python -m docs.identifiability`."""
 
 from __future__ import annotations
 
@@ -6,15 +6,16 @@ from pathlib import Path
 
 import numpy as np
 
+from tests.identification.rehearsal import RehearsedTruth, rehearse
 from wristctl.config.identify import IdentifySettings
 from wristctl.config.loop import DirectionName, Reference
 from wristctl.config.plant import Actuator
 from wristctl.config.wrist import WristParameters
-from wristctl.identification.fit import Problem, linearise
+from wristctl.identification.fit import linearise
 from wristctl.identification.identifiability import widest, width_text
 from wristctl.identification.intervals import condition, promised
 from wristctl.identification.measured_trials import measured_trials
-from wristctl.identification.rehearsal import RehearsedTruth, rehearse
+from wristctl.identification.problem import Problem
 from wristctl.identification.unknowns import UNKNOWNS, believed_of
 
 HERE = Path(__file__).parent
@@ -63,7 +64,7 @@ def main() -> None:
     lines += [f"| {name} | {' | '.join(row(*experiment))} |" for name, experiment in EXPERIMENTS.items()]
     (HERE / "identifiability.md").write_text(
         "# Identifiability and experiment design: which trials tell which parameters\n\n"
-        "Made by `python docs/identifiability.py`: half the 95 % interval that "
+        "Made by `python -m docs.identifiability`: half the 95 % interval that "
         "each experiment promises, all of its parameters found together, by the Jacobian at the true ones (springs 30 "
         "% softer than believed, 20 kN/m tendons, 60 frames a second with 0.05 deg of noise, four directions of 5 s "
         "for each pose; level: the forearm level and rolled by 45 deg, gravity across both planes). Struck out: too "

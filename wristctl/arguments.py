@@ -345,6 +345,8 @@ class IdentifyArguments(SharedArguments, total=False):
     rotor_inertia: float | None  # kg m^2
     rotor_damping: float  # N m s/rad
     clock_error: float  # s
+    turn_error_deg: float  # deg
+    view_error: float
     widest: float
     condition_limit: float
     lack_of_fit: float

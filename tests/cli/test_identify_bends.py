@@ -19,8 +19,9 @@ from wristctl.config.loop import Reference
 from wristctl.config.study import Study
 from wristctl.config.wrist import WristParameters
 from wristctl.identification.arc_fit import Told
-from wristctl.identification.bend_problem import bend_problem, forces_are_scaled, without_forces
-from wristctl.identification.bend_trials import bend_trials, places_of_log
+from wristctl.identification.bend_estimates import forces_are_scaled, without_forces
+from wristctl.identification.measured_trials import places_of_log, trials_of_logs
+from wristctl.identification.problem import bend_problem
 from wristctl.identification.unknowns import with_identified
 from wristctl.records import open_run
 from wristctl.records.open_log import OpenLog, write_log
@@ -36,7 +37,7 @@ def test_what_would_tell_more_is_what_the_logs_have_not() -> None:
     assert len({float(log.columns["mass"][0]) for log in logs}) > 1
 
     def said(used: list[OpenLog], *lacking: str) -> str:
-        trials = bend_trials(used, KNOWN, 1e-3)
+        trials = trials_of_logs(used, KNOWN, 1e-3)
         fit: Any = SimpleNamespace(problem=SimpleNamespace(trials=trials))
         return what_tells(fit, lacking)
 
@@ -62,7 +63,9 @@ def test_forces_are_told_where_somebody_has_said_a_mass_or_a_tension() -> None:
         logs = [OpenLog(Path("log.csv"), "log", columns | mass) for mass in weighed]
         settings = IdentifySettings.model_validate({"fix": fixed})
         places = places_of_log(logs[0], wrist)
-        return forces_are_scaled(bend_problem(bend_trials(logs, wrist, 1e-3), places, wrist, TENDONS, settings), wrist)
+        return forces_are_scaled(
+            bend_problem(trials_of_logs(logs, wrist, 1e-3), places, wrist, TENDONS, settings), wrist
+        )
 
     assert not scaled(KNOWN) and not scaled(KNOWN, KNOWN.hand_mass)
     assert scaled(WristParameters(hand_mass=KNOWN.hand_mass)) and scaled(KNOWN, 0.2) and scaled(KNOWN, 0.3, 0.1)

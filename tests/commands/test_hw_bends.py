@@ -23,7 +23,7 @@ from wristctl.commands.printed_table import degrees
 from wristctl.config.study import Study
 from wristctl.config.wrist import WristParameters
 from wristctl.errors import UserError
-from wristctl.identification.bend_trials import bend_trials
+from wristctl.identification.measured_trials import trials_of_logs
 from wristctl.plotting.animation import animation
 from wristctl.plotting.page import page
 from wristctl.plotting.spatial_view import spatial_view
@@ -209,7 +209,7 @@ def test_its_open_log_is_one_that_identification_reads(whole: Whole) -> None:
     log = open_log_of(whole.run)
     assert {"time", "bend_y", "bend_z", *(f"spool_{tendon}" for tendon in ACTIVE)} <= set(log.columns)
     assert all((np.diff(trial.columns["time"]) > 0.0).all() for trial in log.trials().values()), "a row for each time"
-    trials = bend_trials([log], WristParameters(), 0.005)
+    trials = trials_of_logs([log], WristParameters(), 0.005)
     assert len(trials) == 2 and all(len(trial.angle) > 80 for trial in trials)
     assert {0, 1} == {int(channel) for trial in trials for channel in trial.channel}
     assert "theta" not in whole.run.data("frames"), "no sample of an angle in one plane"

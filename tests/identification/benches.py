@@ -9,15 +9,15 @@ from typing import Any
 
 import numpy as np
 
+from tests.identification import rehearsal
+from tests.identification.rehearsal import RehearsedTruth, rehearse
 from wristctl.config.identify import IdentifySettings
 from wristctl.config.loop import DirectionName, Reference
 from wristctl.config.plant import Actuator
 from wristctl.config.study import Study
 from wristctl.config.wrist import WristParameters
-from wristctl.identification import rehearsal
-from wristctl.identification.fit import Problem
 from wristctl.identification.measured_trials import MeasuredTrial, measured_trials
-from wristctl.identification.rehearsal import RehearsedTruth, rehearse
+from wristctl.identification.problem import Problem
 from wristctl.identification.unknowns import believed_of, tendons_of_values
 from wristctl.records import Run, start_run
 

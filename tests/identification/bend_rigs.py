@@ -8,16 +8,19 @@ from typing import NamedTuple
 
 import numpy as np
 
+from tests.identification.bend_rehearsal import RehearsedBends, planned_spools, rehearse_bends
 from wristctl.arrays import Array
 from wristctl.config.identify import IdentifySettings
 from wristctl.config.plant import Actuator
 from wristctl.config.wrist import WristParameters
 from wristctl.identification.arc_fit import Told
-from wristctl.identification.bend_problem import bend_problem, misfits_of_bends, oblique_of, springs_of, told_of_bends
-from wristctl.identification.bend_rehearsal import RehearsedBends, planned_spools, rehearse_bends
-from wristctl.identification.bend_trials import bend_trials, places_of_log
+from wristctl.identification.bend_estimates import told_of_bends
 from wristctl.identification.fit import Fit, fit
 from wristctl.identification.intervals import Knowledge, knowledge
+from wristctl.identification.lack_of_fit import misfits
+from wristctl.identification.measured_trials import places_of_log, trials_of_logs
+from wristctl.identification.problem import bend_problem
+from wristctl.identification.unknowns import oblique_of, springs_of
 from wristctl.records.open_log import OpenLog
 from wristctl.wrist.tendon_layout import TendonLayout, TendonPlace
 
@@ -83,7 +86,15 @@ def logs_of(
     rig: Rig, rng: np.random.Generator, segments: int = SEGMENTS, counts: Array | None = None,
     tension_noise: float | None = None,
 ) -> list[OpenLog]:  # fmt: skip
-    """The logs of its two runs, one a mass of the hand; each has been homed and its camera zeroed anew."""
+    """The logs of its two runs, one a mass of the hand; each has been homed and its camera zeroed anew.
+
+    Views are turned and scaled as far off as the settings say, alike in both runs.
+    """
+    (of_views,) = rng.spawn(1)
+    turn, too_much = (
+        SETTINGS.turn_error_deg * of_views.standard_normal(2),
+        SETTINGS.view_error * of_views.standard_normal(2),
+    )
     clock = SETTINGS.clock_error * rng.standard_normal()
     logs = []
     for name, mass in MASSES.items():
@@ -91,6 +102,7 @@ def logs_of(
         wrist = rig.wrist.model_copy(update={"hand_mass": mass})
         truth = RehearsedBends(
             wrist, rig.actuator, rig.layout, taut=tuple(taut), delay=0.03 + clock, zero_deg=(zero[0], zero[1]),
+            turn_deg=(turn[0], turn[1]), too_much=(too_much[0], too_much[1]),
             segments=segments, tension_noise=tension_noise,
         )  # fmt: skip
         logs.append(rehearse_bends(truth, spools() if counts is None else counts, TENDONS.step_length, rng, name=name))
@@ -109,8 +121,8 @@ class Identified(NamedTuple):
 
 def identified(logs: list[OpenLog], settings: IdentifySettings = SETTINGS) -> Identified:
     """What logs tell to somebody who believes in the wrist of the study."""
-    trials = bend_trials(logs, KNOWN, settings.step, settings.exposure or 0.0)
+    trials = trials_of_logs(logs, KNOWN, settings.step, settings.exposure or 0.0)
     problem = bend_problem(trials, places_of_log(logs[0], KNOWN), KNOWN, TENDONS, settings)
     found = fit(problem)
     known = knowledge(found)
-    return Identified(found, known, told_of_bends(found, known), max(one.ratio for one in misfits_of_bends(found)))
+    return Identified(found, known, told_of_bends(found, known), max(one.ratio for one in misfits(found)))

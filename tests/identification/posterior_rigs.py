@@ -24,9 +24,10 @@ from wristctl.commands.compare.answer import best_on_yours
 from wristctl.comparison.world_ranking import WorldRanking, rank
 from wristctl.config.controller_row import Row
 from wristctl.config.identify import IdentifySettings
-from wristctl.identification.fit import Fit, Problem, fit
+from wristctl.identification.fit import Fit, fit
 from wristctl.identification.intervals import Knowledge, inverse, knowledge
 from wristctl.identification.posterior import FAMILY, posterior_draws, posterior_yaml
+from wristctl.identification.problem import Problem
 from wristctl.identification.unknowns import identified_yaml
 from wristctl.study_files.load import load_study
 

@@ -12,8 +12,8 @@ from tests.identification.benches import KNOWN, LEVEL, START, TENDONS, UPRIGHT
 from wristctl.config.identify import IdentifySettings
 from wristctl.errors import UserError
 from wristctl.identification import identifiability
-from wristctl.identification.fit import Fit, Linearisation, Problem, fit, linearise
-from wristctl.identification.forward import SupposedWrist
+from wristctl.identification.fit import Fit, Linearisation, fit, linearise
+from wristctl.identification.forward import Supposed
 from wristctl.identification.identifiability import (
     ADDITIONS,
     FINER,
@@ -27,6 +27,7 @@ from wristctl.identification.identifiability import (
 )  # fmt: skip
 from wristctl.identification.intervals import Knowledge, knowledge
 from wristctl.identification.measured_trials import MeasuredTrial
+from wristctl.identification.problem import Problem
 from wristctl.identification.unknowns import UNKNOWNS
 
 TIME = 0.005 * np.arange(400.0)
@@ -218,7 +219,7 @@ def test_an_added_trial_bends_as_before_under_its_own_load(monkeypatch: pytest.M
 
     def course(trial: MeasuredTrial) -> np.ndarray:
         wrist = trial.wrist.model_copy(update={"stiffness": found.values["stiffness"]})
-        supposed = SupposedWrist(wrist, TENDONS)
+        supposed = Supposed(wrist, TENDONS)
         bent: np.ndarray = problem.simulate(trial, [supposed])[0]
         return bent
 

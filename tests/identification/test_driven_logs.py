@@ -20,10 +20,10 @@ from wristctl.config.study import Study
 from wristctl.config.wrist import WristParameters
 from wristctl.errors import UserError
 from wristctl.identification.arc_fit import fit_arcs
-from wristctl.identification.bend_trials import places_of_log
 from wristctl.identification.driven_fit import DrivenFit
 from wristctl.identification.driven_forward import STEP, DrivenArc, _softening, courses_of_pulls
 from wristctl.identification.driven_log import _at, drive_of_log, driven_robot
+from wristctl.identification.measured_trials import places_of_log
 from wristctl.identification.ratios import ratios_of_driven, wrist_by_ratios
 from wristctl.records.log_looks import looked_at
 from wristctl.records.open_log import OpenLog, read_table

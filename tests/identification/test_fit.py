@@ -11,11 +11,12 @@ import numpy as np
 import pytest
 
 from tests.identification.benches import KNOWN, LEVEL, TENDONS, UPRIGHT, logged, problem, tendons
+from tests.identification.rehearsal import spools
 from wristctl.arrays import Array
 from wristctl.config.loop import Loop, Reference
 from wristctl.control.table import controller
-from wristctl.identification.fit import SPOOL, Coordinate, Linearisation, Problem, fit, linearise
-from wristctl.identification.forward import SupposedWrist, angles
+from wristctl.identification.fit import Linearisation, fit, linearise
+from wristctl.identification.forward import Supposed, courses
 from wristctl.identification.intervals import (
     autocorrelation,
     bandwidth,
@@ -25,7 +26,7 @@ from wristctl.identification.intervals import (
     long_run,
 )
 from wristctl.identification.measured_trials import MeasuredTrial, frame_noise
-from wristctl.identification.rehearsal import spools
+from wristctl.identification.problem import SPOOL, Coordinate, Problem
 from wristctl.simulation.reference import motion
 from wristctl.simulation.rollout import rollout
 from wristctl.simulation.simulated_drives import motor_of
@@ -39,7 +40,7 @@ def test_the_forward_model_repeats_the_closed_loop_from_its_spools() -> None:
     loop, law = Loop(actuator=TENDONS), controller("feedforward")
     done = rollout(law, np.zeros((1, 0)), [followed], np.zeros(1, np.int64), loop, UPRIGHT, record=True, threads=1)
     reeled = np.repeat(spools(UPRIGHT, reference, TENDONS, 1.0, motor_of(TENDONS)), 2, axis=1)
-    found = angles([SupposedWrist(UPRIGHT, TENDONS)], reeled, 1e-3, 4)[0]
+    found = courses([Supposed(UPRIGHT, TENDONS)], reeled, 1e-3, 4)[0, :, 0]
     assert np.abs(found).max() > 0.3
     np.testing.assert_allclose(found, done.column("theta", 0), rtol=0.0, atol=1e-12)
 
@@ -47,7 +48,7 @@ def test_the_forward_model_repeats_the_closed_loop_from_its_spools() -> None:
 def test_slack_tendons_leave_the_wrist_to_gravity() -> None:
     wrist = LEVEL.model_copy(update={"stiffness": 0.8})
     slack = np.full((2500, 4), -0.01)
-    at_rest = angles([SupposedWrist(wrist, tendons(20e3, 0.1))], slack, 1e-3, 4)[0, -1]
+    at_rest = courses([Supposed(wrist, tendons(20e3, 0.1))], slack, 1e-3, 4)[0, -1, 0]
     assert at_rest == pytest.approx(equilibrium(wrist, 4, (0.0, 0.0)).sum(), rel=1e-4)
 
 
@@ -75,7 +76,7 @@ class _Jumping(Problem):
         x = np.array(points)
         damping = x[:, self.coordinates[Coordinate("damping")]]
         bend = 0.02 * x.sum(axis=1) + 1e-6 * (damping > 0.4e-6)
-        return np.repeat(bend[:, None], len(trial.time), axis=1)
+        return np.repeat(bend[:, None, None], len(trial.time), axis=1)
 
 
 def test_a_bend_that_jumps_beside_a_point_does_not_change_its_slopes() -> None:
@@ -160,7 +161,7 @@ def test_a_picture_shows_the_mean_of_its_exposure() -> None:
     (trial, *_), _ = logged(0, poses=(UPRIGHT,), directions=("ulnar",))
     rate, exposure = 2.0 * np.pi * 10.0, 0.02
     within = trial.captured[(trial.captured > 0.1) & (trial.captured < 4.9)]
-    seen = replace(trial, exposure=exposure, captured=within).shown(np.sin(rate * trial.time), 0.03)
+    seen = replace(trial, exposure=exposure, captured=within).shown(np.sin(rate * trial.time)[:, None], 0.03)
     weaker = np.sin(0.5 * rate * exposure) / (0.5 * rate * exposure)
     assert weaker < 0.95
     np.testing.assert_allclose(seen, weaker * np.sin(rate * (within - 0.03)), rtol=0.0, atol=4e-3)
@@ -186,8 +187,8 @@ def test_the_condition_number_sees_columns_that_point_the_same_way_whatever_thei
 
 def test_tendons_move_nothing_that_is_not_theirs() -> None:
     """A spool's zero that is off by some length bends the wrist about as its tendon's share of four would."""
-    candidates = [SupposedWrist(KNOWN, tendons(20e3, 0.0), taut) for taut in ((0.0,) * 4, (1e-5, 0.0, 0.0, 0.0))]
-    straight, bent = angles(candidates, np.full((50, 4), 2e-4), 1e-3, 1)[:, -1]
+    candidates = [Supposed(KNOWN, tendons(20e3, 0.0), taut) for taut in ((0.0,) * 4, (1e-5, 0.0, 0.0, 0.0))]
+    straight, bent = courses(candidates, np.full((50, 4), 2e-4), 1e-3, 1)[:, -1, 0]
     assert bent - straight == pytest.approx(1e-5 / (4.0 * KNOWN.tendon_offset), rel=0.05)
 
 

@@ -10,9 +10,10 @@ import pytest
 from tests.identification.benches import KNOWN, START, TENDONS
 from wristctl.arrays import Array
 from wristctl.config.identify import IdentifySettings
-from wristctl.identification.fit import SPOOL, ZERO, Coordinate, Problem, fit, linearise
-from wristctl.identification.forward import SupposedWrist
+from wristctl.identification.fit import fit, linearise
+from wristctl.identification.forward import Supposed
 from wristctl.identification.measured_trials import MeasuredTrial
+from wristctl.identification.problem import SPOOL, ZERO, Coordinate, Problem
 from wristctl.identification.unknowns import UNKNOWNS
 
 FREE = ("stiffness", "friction", "tendon_radius")
@@ -23,12 +24,12 @@ TIME = 0.005 * np.arange(200.0)
 class Lines(Problem):
     """Angles that are linear in logarithms of stiffness and radius, in friction, and in the spools' zeros."""
 
-    def simulate(self, trial: MeasuredTrial, candidates: Sequence[SupposedWrist], segments: int | None = None) -> Array:
+    def simulate(self, trial: MeasuredTrial, candidates: Sequence[Supposed], segments: int | None = None) -> Array:
         rng = np.random.default_rng(len(trial.label))
         own = rng.standard_normal((3, len(TIME))), 50.0 * rng.standard_normal((4, len(TIME)))
-        return np.array([self._angle(each, *own) for each in candidates])
+        return np.array([self._angle(each, *own) for each in candidates])[..., None]
 
-    def _angle(self, each: SupposedWrist, of: Array, spools: Array) -> Array:
+    def _angle(self, each: Supposed, of: Array, spools: Array) -> Array:
         stiffness = np.log(each.wrist.stiffness / START["stiffness"])
         radius = np.log(each.wrist.tendon_radius / START["tendon_radius"])
         found: Array = 0.1 * np.array([stiffness, each.tendons.friction, radius]) @ of + np.array(each.taut) @ spools
@@ -105,7 +106,7 @@ def test_the_zero_of_a_plane_moves_its_own_frames_and_no_others() -> None:
 @pytest.mark.parametrize("scale", [0.1, 1.0, 20.0])
 def test_the_search_ends_at_weighed_least_squares_whatever_the_noise(scale: float) -> None:
     """Where the gradient of residuals over their own deviation and of what was known beforehand is nothing."""
-    trials = [trial(each.run, each.plane, k, scale, each.label) for k, each in enumerate(TRIALS)]
+    trials = [trial(each.run, each.direction, k, scale, each.label) for k, each in enumerate(TRIALS)]
     found = fit(problem(*trials))
     residual, slopes = np.concatenate(found.residuals), np.concatenate(found.slopes)
     shown = np.concatenate([each.angle for each in trials])

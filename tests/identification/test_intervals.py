@@ -10,7 +10,7 @@ import pytest
 from tests.identification.benches import KNOWN, START, TENDONS
 from wristctl.arrays import Array
 from wristctl.config.identify import IdentifySettings
-from wristctl.identification.fit import SPOOL, ZERO, Coordinate, Fit, Problem
+from wristctl.identification.fit import Fit
 from wristctl.identification.intervals import (
     Knowledge,
     autocorrelation,
@@ -24,6 +24,7 @@ from wristctl.identification.intervals import (
     promised,
 )
 from wristctl.identification.measured_trials import MeasuredTrial
+from wristctl.identification.problem import SPOOL, ZERO, Coordinate, Problem
 from wristctl.identification.unknowns import UNKNOWNS
 
 FREE = ("stiffness", "friction", "delay")

@@ -66,7 +66,7 @@ def test_a_tick_by_which_no_answer_had_come_says_nothing_of_the_spools() -> None
 def test_trials_keep_their_names_and_their_wrists_lie_in_their_planes() -> None:
     found = trials(*tables(directions=("radial", "flexion")), exposure=4e-3)
     assert [each.label for each in found] == ["run, trial 0: radial", "run, trial 1: flexion"]
-    assert [each.plane for each in found] == ["ulnar", "flexion"] and {each.run for each in found} == {"run"}
+    assert [each.planes for each in found] == [("ulnar",), ("flexion",)] and {each.run for each in found} == {"run"}
     assert all(each.exposure == 4e-3 for each in found) and trials(*tables())[0].exposure == 0.0
     np.testing.assert_array_equal(found[0].angle, 0.1 + found[0].captured)
 
@@ -114,16 +114,16 @@ def drawn(exposure: float = 0.0) -> MeasuredTrial:
 
 def test_a_frame_shows_what_was_a_delay_before_its_time_stamp() -> None:
     trial = drawn()
-    np.testing.assert_allclose(trial.shown(3.0 * trial.time, 0.1), 3.0 * (trial.captured - 0.1))
-    np.testing.assert_allclose(drawn(0.05).shown(3.0 * trial.time, -0.05), 3.0 * (trial.captured + 0.05))
+    np.testing.assert_allclose(trial.shown(3.0 * trial.time[:, None], 0.1), 3.0 * (trial.captured - 0.1))
+    np.testing.assert_allclose(drawn(0.05).shown(3.0 * trial.time[:, None], -0.05), 3.0 * (trial.captured + 0.05))
 
 
 def test_an_exposure_lies_evenly_about_the_time_stamp() -> None:
     """Of a square the mean over a time e is the middle's plus e^2/12, of five instants 0.96 of that."""
     fine = 1.0 + 1e-5 * np.arange(100001.0)
     trial = MeasuredTrial("", "", "ulnar", KNOWN, fine, np.zeros((1, 4)), np.array([1.5]), np.zeros(1), 0.2)
-    assert trial.shown((fine - 1.5) ** 2, 0.0)[0] == pytest.approx(0.96 * 0.2**2 / 12.0, rel=1e-6)
-    assert trial.shown((fine - 1.5) ** 3, 0.0)[0] == pytest.approx(0.0, abs=1e-9)
+    assert trial.shown((fine[:, None] - 1.5) ** 2, 0.0)[0] == pytest.approx(0.96 * 0.2**2 / 12.0, rel=1e-6)
+    assert trial.shown((fine[:, None] - 1.5) ** 3, 0.0)[0] == pytest.approx(0.0, abs=1e-9)
 
 
 def test_a_faster_move_takes_a_fraction_of_the_time_and_then_rests() -> None:

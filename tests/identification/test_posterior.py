@@ -14,9 +14,10 @@ from wristctl.config.families import Family
 from wristctl.config.identify import IdentifySettings
 from wristctl.config.plant import Actuator
 from wristctl.config.wrist import WristParameters
-from wristctl.identification.fit import Fit, Problem
+from wristctl.identification.fit import Fit
 from wristctl.identification.intervals import Knowledge, inverse
 from wristctl.identification.posterior import FAMILY, posterior_draws, posterior_yaml
+from wristctl.identification.problem import Problem
 from wristctl.identification.unknowns import believed_of, identified_yaml
 from wristctl.simulation.drawn_worlds import world_of
 from wristctl.study_files.load import load_study

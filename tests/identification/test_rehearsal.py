@@ -10,13 +10,13 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from tests.identification import rehearsal
 from tests.identification.benches import LEVEL, STEPS, TENDONS
+from tests.identification.rehearsal import RehearsedTruth, rehearse
 from wristctl.config.loop import DirectionName, Reference
 from wristctl.config.plant import Actuator, TendonFacts, TrueActuator, TrueWrist
 from wristctl.errors import UserError
-from wristctl.identification import rehearsal
-from wristctl.identification.forward import SupposedWrist, across_plane, angles
-from wristctl.identification.rehearsal import RehearsedTruth, rehearse
+from wristctl.identification.forward import Supposed, across_plane, courses
 from wristctl.simulation.reference import toward
 from wristctl.simulation.simulated_drives import motor_of
 from wristctl.wrist.directions import DIRECTIONS, in_plane
@@ -80,8 +80,8 @@ def test_pictures_show_the_true_wrist_a_delay_ago_and_the_markers_zero_of_its_pl
         reeled = rehearsal.spools(in_plane(LEVEL, direction), toward(STEPS, direction), TENDONS, 5.0, MOTOR)  # type: ignore[arg-type]
         soft, plane = in_plane(SOFT, direction), DIRECTIONS[direction].plane
         across = across_plane(soft, plane, SOFT.stiffness, SOFT.flexion_ratio)
-        own = SupposedWrist(soft, TENDONS, taut[direction], across=across)
-        course = angles([own], np.repeat(reeled, 2, axis=1), 1e-3, 4)[0]
+        own = Supposed(soft, TENDONS, taut[direction], across=across)
+        course = courses([own], np.repeat(reeled, 2, axis=1), 1e-3, 4)[0, :, 0]
         then = of(frames, number, "captured") - 0.02
         wanted = np.interp(then, 1e-3 * np.arange(5000), course) + np.radians(zero)
         np.testing.assert_allclose(of(frames, number, "theta"), wanted, atol=1e-12)

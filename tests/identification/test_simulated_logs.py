@@ -16,12 +16,15 @@ from wristctl.config.identify import IdentifySettings
 from wristctl.config.plant import Actuator
 from wristctl.config.wrist import WristParameters
 from wristctl.identification.arc_fit import fit_arcs
-from wristctl.identification.bend_problem import bend_problem, misfits_of_bends, told_of_bends
-from wristctl.identification.bend_trials import bend_trials, places_of_log
+from wristctl.identification.bend_estimates import told_of_bends
 from wristctl.identification.fit import fit
+from wristctl.identification.forward import courses
 from wristctl.identification.intervals import knowledge
+from wristctl.identification.lack_of_fit import misfits
 from wristctl.identification.log_model import everything_fitted, recordings_of_logs, robot_of_logs
+from wristctl.identification.measured_trials import places_of_log, trials_of_logs
 from wristctl.identification.model_choice import chosen_of, tried_models
+from wristctl.identification.problem import bend_problem
 from wristctl.records import Run, start_run
 from wristctl.records.open_log import OpenLog
 from wristctl.wrist.tendon_layout import TendonLayout
@@ -100,10 +103,10 @@ def test_a_simulated_wrist_in_two_planes_is_found_again_from_its_log(tmp_path: P
     log, search = seen(whole, 0.003, 4, seed=2), IdentifySettings()
     believed = WRIST.model_copy(update={"stiffness": 0.9 * WRIST.stiffness, "damping": 1.15 * WRIST.damping})
     motors = TENDONS.model_copy(update={"tendon_stiffness": 1.1 * TENDONS.tendon_stiffness})
-    trials = bend_trials([log], believed, search.step)
+    trials = trials_of_logs([log], believed, search.step)
     found = fit(bend_problem(trials, places_of_log(log, believed), believed, motors, search))
     told = told_of_bends(found, knowledge(found))
-    assert max(misfit.ratio for misfit in misfits_of_bends(found)) < search.lack_of_fit
+    assert max(misfit.ratio for misfit in misfits(found)) < search.lack_of_fit
     truth = {"stiffness": WRIST.stiffness, "stiffness_across": WRIST.stiffness, "damping": WRIST.damping, "delay": 0.0,
              "tendon_stiffness": TENDONS.tendon_stiffness, "friction": TENDONS.friction,
              "presliding": TENDONS.presliding}  # fmt: skip
@@ -122,7 +125,7 @@ def test_springs_that_differ_between_planes_are_found_where_equal_ones_are_belie
     """No tendon of these motions goes slack; a search that lets some go slack ends in a wrong minimum."""
     motion = ("simulate.reference.kind=circumduction", "simulate.controller=pd-ff", f"wrist.flexion_ratio={ratio}")
     log, search = seen(simulated(tmp_path, MOTORS, *SMOOTH, *motion), 0.003, 4), IdentifySettings()
-    problem = bend_problem(bend_trials([log], WRIST, search.step), places_of_log(log, WRIST), WRIST, TENDONS, search)
+    problem = bend_problem(trials_of_logs([log], WRIST, search.step), places_of_log(log, WRIST), WRIST, TENDONS, search)
     found = fit(problem)
     told = told_of_bends(found, knowledge(found))
     truth = {"stiffness": WRIST.stiffness, "stiffness_across": ratio * WRIST.stiffness, "stiffness_axis_deg": 0.0,
@@ -132,7 +135,8 @@ def test_springs_that_differ_between_planes_are_found_where_equal_ones_are_belie
         assert (known or name == "damping") and told[name].low < value < told[name].high, name
     assert found.noise == pytest.approx(math.radians(0.003), rel=0.03)
     (trial,) = problem.trials
-    assert problem.courses(trial, [found.x])[0][:, 2:].min() > 0.0
+    candidate = problem.candidate(trial, found.x)
+    assert courses([candidate], trial.reeled, search.step, search.segments, pulls=True)[0, :, 2:].min() > 0.0
 
 
 @pytest.mark.parametrize(

@@ -9,12 +9,12 @@ from typing import Any
 import numpy as np
 import pytest
 
+from tests.identification.bend_rehearsal import Hold, planned_spools
 from wristctl.config.plant import Actuator
 from wristctl.config.wrist import WristParameters
 from wristctl.errors import UserError
-from wristctl.identification import bend_problem
-from wristctl.identification.bend_problem import oblique_of, springs_of
-from wristctl.identification.bend_rehearsal import Hold, planned_spools
+from wristctl.identification import bend_estimates
+from wristctl.identification.unknowns import oblique_of, springs_of
 from wristctl.wrist.tendon_layout import TendonLayout
 
 WRIST = WristParameters(gravity=(0.0, 0.0))
@@ -98,10 +98,10 @@ def test_an_axis_is_told_only_where_another_minimum_has_it_too(
     def values(x: np.ndarray) -> dict[str, float]:
         return dict(zip(free, x.tolist(), strict=True))
 
-    monkeypatch.setattr(bend_problem, "covariance_of", lambda fit, knowledge: 1e-6 * np.eye(3))
+    monkeypatch.setattr(bend_estimates, "covariance_of", lambda fit, knowledge: 1e-6 * np.eye(3))
     asked: Any = SimpleNamespace(free=free, values=values, settings=SimpleNamespace(widest=0.3))
     fit: Any = SimpleNamespace(problem=asked, values=values(springs(axis)))
-    told = bend_problem._springs_told(fit, fit, [springs(other)])["stiffness_axis_deg"]
+    told = bend_estimates._springs_told(fit, fit, [springs(other)])["stiffness_axis_deg"]
     assert told.value == pytest.approx(axis) and told.known == known
     if known:
         assert told.high - told.value == pytest.approx(math.degrees(1.96e-3 / 0.6), rel=1e-3)

@@ -12,14 +12,14 @@ import wristctl.identification
 from tests.values import changeable
 from wristctl.config.identify import Fixed
 from wristctl.config.wrist import TendonPlace
-from wristctl.identification.unknowns import SIMULATED, UNKNOWNS, identified_yaml, tendons_of_values, with_identified
+from wristctl.identification.unknowns import UNKNOWNS, identified_yaml, tendons_of_values, with_identified
 from wristctl.study_files.load import load_study
 
 LOGARITHMS = {name for name, each in UNKNOWNS.items() if each.log}
 
 
 def test_the_table_holds_what_a_study_may_fix_and_all_but_the_delay_is_simulated() -> None:
-    assert set(UNKNOWNS) == set(Fixed.model_fields) == {*SIMULATED, "delay"}
+    assert set(UNKNOWNS) == set(Fixed.model_fields)
     assert {name: each.unit for name, each in UNKNOWNS.items()} == {
         name: (each.json_schema_extra or {})["unit"] if isinstance(each.json_schema_extra, dict) else ""
         for name, each in Fixed.model_fields.items()

@@ -15,12 +15,12 @@ import pytest
 from numba.core.registry import CPUDispatcher
 
 from tests.bench.conftest import TAUT, HostOn, host_on
+from tests.identification.rehearsal import RehearsedTruth, rehearse
 from wristctl.config.bench import BenchSettings, WeakenedPlant
 from wristctl.config.loop import DirectionName, Loop, Reference
 from wristctl.config.plant import Actuator, Disturbances, Plant, TrueWrist
 from wristctl.config.wrist import WristParameters
 from wristctl.control.table import controller, gains_of
-from wristctl.identification.rehearsal import RehearsedTruth, rehearse
 from wristctl.lanes.compiled import _BODIES, sources
 from wristctl.simulation.outcome import Outcome
 from wristctl.simulation.reference import motion

@@ -15,10 +15,10 @@ from wristctl.commands.identify.figures import _short, angles, correlations, res
 from wristctl.config.identify import IdentifySettings
 from wristctl.config.plant import Actuator
 from wristctl.config.wrist import WristParameters
-from wristctl.identification.bend_trials import BendTrial
-from wristctl.identification.fit import Fit, Problem
+from wristctl.identification.fit import Fit
 from wristctl.identification.intervals import Knowledge
 from wristctl.identification.measured_trials import MeasuredTrial
+from wristctl.identification.problem import Problem
 from wristctl.identification.unknowns import UNKNOWNS
 
 COUNT = len(UNKNOWNS) - 1
@@ -85,8 +85,8 @@ def test_of_bends_each_plane_is_drawn_by_itself_and_tensions_are_not() -> None:
     one = fit([np.where(np.arange(60) % 3 == 2, 9.0, 1e-3 * (k + 1)) for k in range(9)])
     turn = np.arange(60) % 3
     trials = [
-        BendTrial(
-            trial.label, trial.run, trial.direction, trial.wrist, trial.time, trial.reeled, trial.captured,
+        MeasuredTrial(
+            trial.label, trial.run, "both", trial.wrist, trial.time, trial.reeled, trial.captured,
             trial.angle, 0.0, (1, 2), turn, 1.0,
         )
         for trial in one.problem.trials

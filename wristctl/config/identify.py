@@ -72,6 +72,14 @@ class IdentifySettings(Section):
         3e-4, "s", "how well the times of spools and of pictures agree, beside the delay: standard deviation",
         "a frame of USB, 1 ms, at any place of which a tick may begin", ge=0,
     )  # fmt: skip
+    turn_error_deg: float = quantity(
+        0.05, "deg", "how well each view's turn about the wrist's axis is known, in two planes: standard deviation",
+        "the emulated cameras', of ten rigs, whose pose is fitted at rest: 0.04", gt=0,
+    )  # fmt: skip
+    view_error: float = quantity(
+        2e-4, "", "how well the scale of each view's bends is known, in two planes: relative standard deviation",
+        "the emulated cameras', of ten rigs", gt=0,
+    )  # fmt: skip
     widest: float = quantity(
         0.25, "", "half width of a 95 % interval, over the value, beyond which a parameter is not identified", gt=0
     )

@@ -1,9 +1,8 @@
 """Nonlinear least squares of the forward model's angle against the marker's, at the times of the frames."""
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -11,19 +10,13 @@ from scipy.optimize import least_squares
 from threadpoolctl import threadpool_limits
 
 from wristctl.arrays import Array
-from wristctl.config.identify import IdentifySettings
-from wristctl.config.plant import Actuator
-from wristctl.identification.forward import SupposedWrist, across_plane, angles
 from wristctl.identification.measured_trials import MeasuredTrial, frame_noise
-from wristctl.identification.rotor_field import rotors_of
-from wristctl.identification.unknowns import NOT_NEGATIVE, SIMULATED, UNKNOWNS, Unknown, tendons_of_values
+from wristctl.identification.problem import SPOOL, Coordinate, Problem, spool_zero
 from wristctl.processes import cores
 
 # Steps of the finite differences, in parameters and in spools [m]. Where a tendon becomes taut one integration step
 # earlier, the bend jumps by some 1e-6 rad: few steps this small meet such a jump, and hardly one on both sides.
 _NUDGE, _NUDGE_M = 1e-6, 1e-8
-# Friction with which a search begins that believes in none.
-_OFF_THE_EDGE = 0.02
 # Evaluations of one search; 10 to 20 are usual.
 _MOST = 200
 # Evaluations after which several beginnings are compared, and part of the best's chi-square by which others that go on
@@ -37,141 +30,6 @@ _KEPT = 4
 
 # Least noise of a marker's angle [rad].
 _LEAST_NOISE = 1e-6
-
-
-class Coordinate(NamedTuple):
-    """Coordinate of a search: a parameter by name, or a small error of one place in one run.
-
-    That is the camera's zero in a bending plane (ZERO), what a tendon's spool has reeled in unknown (SPOOL), or by how
-    much one trial's clocks are further apart (CLOCK).
-    """
-
-    kind: str
-    run: str = ""
-    place: str | int = ""
-
-
-ZERO, SPOOL, CLOCK = "camera's zero", "spool's zero", "trial's clock"
-
-
-@dataclass(frozen=True)
-class Problem:
-    """Trials, the parameters to find and those that are held, each with the value at which it starts.
-
-    Beside the parameters small errors are found, of which the size is known beforehand: the camera's zero angle of each
-    run and plane, the zero of each spool of each run, and in two planes the clocks of each trial.
-    """
-
-    trials: Sequence[MeasuredTrial]
-    start: Mapping[str, float]
-    settings: IdentifySettings
-    actuator: Actuator
-    """As believed: what of the tendons is not found."""
-
-    @property
-    def unknowns(self) -> Mapping[str, Unknown]:
-        """Parameters of the model, found or held, by name."""
-        return UNKNOWNS
-
-    @property
-    def simulated(self) -> Collection[str]:
-        """Parameters on which a simulated course depends."""
-        return SIMULATED
-
-    @cached_property
-    def free(self) -> tuple[str, ...]:
-        """The parameters to find; how the planes differ only where there are trials of both."""
-        one_plane = len({trial.plane for trial in self.trials}) == 1
-        held = {*self.settings.fixed, *(["flexion_ratio"] if one_plane else [])}
-        return tuple(name for name in UNKNOWNS if name not in held)
-
-    @cached_property
-    def coordinates(self) -> dict[Coordinate, int]:
-        """Index of every coordinate of the search: free parameters, zeros, spools."""
-        free = [Coordinate(name) for name in self.free]
-        zeros = [zero for trial in self.trials for zero in self.zeros(trial)]
-        spools = [spool_zero(trial, tendon) for trial in self.trials for tendon in trial.tendons]
-        clocks = [clock for trial in self.trials for clock in self.clocks(trial)]
-        return {coordinate: index for index, coordinate in enumerate(dict.fromkeys([*free, *zeros, *spools, *clocks]))}
-
-    def begin(self) -> Array:
-        """The coordinates at the start; at an edge the search would stay there."""
-        x = np.zeros(len(self.coordinates))
-        for index, name in enumerate(self.free):
-            x[index] = self.unknowns[name].coordinate(self.start[name], self.start[name])
-            if name in NOT_NEGATIVE:
-                x[index] = max(x[index], _OFF_THE_EDGE)
-        return x
-
-    def begins(self) -> list[Array]:
-        """Coordinates at which searches begin, of which the best is taken."""
-        return [self.begin()]
-
-    def bounds(self) -> tuple[Array, Array]:
-        """Least and largest coordinates."""
-        widest = np.array([_WIDEST[coordinate.kind] for coordinate in self.coordinates if coordinate.kind in _WIDEST])
-        low, high = np.array([self.unknowns[name].bounds() for name in self.free]).reshape(-1, 2).T
-        return np.concatenate([low, -widest]), np.concatenate([high, widest])
-
-    def prior(self) -> Array:
-        """One over the standard deviation with which each coordinate is known beforehand; 0 where nothing is known."""
-        beginning = {
-            "tendon_radius": 1.0 / self.settings.radius_error,
-            "presliding": 1.0 / self.settings.presliding_error,
-            ZERO: 1.0 / np.deg2rad(self.settings.zero_error_deg),
-            SPOOL: 1.0 / self.settings.spool_error,
-            CLOCK: 1.0 / max(self.settings.clock_error, _LEAST_CLOCK),
-        }
-        return np.array([beginning.get(coordinate.kind, 0.0) for coordinate in self.coordinates])
-
-    def values(self, x: Array) -> dict[str, float]:
-        """Every parameter at coordinates x, found or held."""
-        held = {**self.start, **self.settings.fixed}
-        for name, value in zip(self.free, x, strict=False):
-            held[name] = self.unknowns[name].value(float(value), self.start[name])
-        return {name: held[name] for name in self.unknowns}
-
-    def zeros(self, trial: MeasuredTrial) -> dict[Coordinate, Array]:
-        """The camera's zeros that a trial's angles (F,) hold, each with its share in every angle."""
-        return {Coordinate(ZERO, trial.run, trial.plane): np.ones(len(trial.angle))}
-
-    def clocks(self, trial: MeasuredTrial) -> tuple[Coordinate, ...]:
-        """Coordinates by which a trial's frames are later than by the delay [s]; none where a board dates counts."""
-        return ()
-
-    def delay(self, trial: MeasuredTrial, x: Array) -> float:
-        """How much older a trial's frames are than their time stamps [s] at coordinates x."""
-        return float(self.values(x)["delay"] + sum(x[self.coordinates[clock]] for clock in self.clocks(trial)))
-
-    def courses(self, trial: MeasuredTrial, points: Sequence[Array]) -> Array:
-        """What a trial's wrist does at each of some coordinates: (count, T), as `trial.shown` takes it."""
-        return self.simulate(trial, [self.candidate(trial, x) for x in points])
-
-    def candidate(self, trial: MeasuredTrial, x: Array) -> SupposedWrist:
-        """The trial's wrist and tendons at coordinates x."""
-        values = self.values(x)
-        wrist_values = {name: values[name] for name in ("stiffness", "damping", "tendon_radius")}
-        if trial.plane == "flexion":
-            wrist_values["stiffness"] *= values["flexion_ratio"]
-        one, two, three, four = (float(x[self.coordinates[spool_zero(trial, tendon)]]) for tendon in trial.tendons)
-        tendons = self.actuator.model_copy(update=tendons_of_values(values))
-        wrist = trial.wrist.model_copy(update=wrist_values)
-        across = across_plane(wrist, trial.plane, values["stiffness"], values["flexion_ratio"])
-        rotors = rotors_of(self.settings)
-        return SupposedWrist(wrist, tendons, (one, two, three, four), rotors=rotors, across=across)
-
-    def simulate(self, trial: MeasuredTrial, candidates: Sequence[SupposedWrist], segments: int | None = None) -> Array:
-        """Angles (count, T) of the candidates in a trial; so many segments, or as many as the settings say."""
-        return angles(candidates, trial.reeled, self.settings.step, segments or self.settings.segments)
-
-
-# Largest of these errors [rad, m, s], and least error of a clock that counts as known [s].
-_WIDEST, _LEAST_CLOCK = {ZERO: 0.2, SPOOL: 2e-3, CLOCK: 1e-2}, 1e-6
-
-
-def spool_zero(trial: MeasuredTrial, tendon: int) -> Coordinate:
-    """What a tendon's spool has reeled in unknown, in a trial's run."""
-    return Coordinate(SPOOL, trial.run, tendon)
 
 
 @dataclass(frozen=True)
@@ -195,7 +53,7 @@ def linearise(problem: Problem, x: Array) -> Linearisation:
     low, _ = problem.bounds()
 
     def one(trial: MeasuredTrial) -> tuple[Array, Array]:
-        moved = [Coordinate(name) for name in problem.free if name in problem.simulated]
+        moved = [Coordinate(name) for name in problem.free if name != "delay"]
         moved += [spool_zero(trial, tendon) for tendon in trial.tendons]
         columns = np.array([coordinates[coordinate] for coordinate in moved])
         nudges = np.array([_NUDGE_M if coordinate.kind == SPOOL else _NUDGE for coordinate in moved])
@@ -203,7 +61,8 @@ def linearise(problem: Problem, x: Array) -> Linearisation:
         backward = np.where(x[columns] - nudges < low[columns], nudges, -nudges)
         nudged = np.tile(x, (2 * len(moved), 1))
         nudged[np.arange(len(nudged)), np.tile(columns, 2)] += np.concatenate([nudges, backward])
-        course, delay = problem.courses(trial, (x, *nudged)), problem.delay(trial, x)
+        bends, delay = problem.courses(trial, (x, *nudged)), problem.delay(trial, x)
+        course = problem.viewed(bends, x)
         expected, *near = (trial.shown(angle, delay) for angle in course)
         slopes = np.zeros((len(expected), len(x)))
         sides = (np.array(near) - expected) / np.concatenate([nudges, backward])[:, None]
@@ -214,6 +73,9 @@ def linearise(problem: Problem, x: Array) -> Linearisation:
             h = problem.settings.step
             early, late = (trial.shown(course[0], delay - shift) for shift in (-h, h))
             slopes[:, [coordinates[each] for each in delays]] = ((early - late) / (2.0 * h))[:, None]
+        for view in problem.views:
+            alone = np.arange(len(x)) == coordinates[view]
+            slopes[:, coordinates[view]] = trial.shown(problem.viewed(bends[0], alone) - bends[0], delay)
         for zero, share in problem.zeros(trial).items():
             slopes[:, coordinates[zero]] = share
             expected = expected + share * x[coordinates[zero]]

@@ -1,139 +1,160 @@
-"""The forward model: the angle that a wrist on elastic tendons takes where its spools are moved as recorded.
+"""The forward model: what a wrist on elastic tendons does where its spools are moved as recorded.
 
-Candidates run side by side, one a lane: a Jacobian costs a block or two. Actuator and integrator are the simulation's.
+Candidates run side by side, one a lane: a Jacobian costs a block or two. Plants, tendons and integrator are the
+simulation's; a wrist whose tendons have places bends in two planes.
 """
 
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Self
 
 import numpy as np
+from numpy.typing import NDArray
 
 from wristctl.arrays import Array
 from wristctl.config.plant import Actuator, TendonFacts, TrueWrist
 from wristctl.config.wrist import WristParameters
-from wristctl.identification.rotor_field import (
-    Rotors,
-    field_of,
-    motion_of,
-    own_stiffness,
-    read_field,
-    turn_rotor,
-)
-from wristctl.lanes.blocks import to_blocks, to_rows
-from wristctl.lanes.compiled import by_type, implements
+from wristctl.identification.rotor_field import Field, Rotors, field_of, motion_of, own_stiffness, turn_rotor
+from wristctl.lanes.blocks import one_block, to_blocks, to_rows
 from wristctl.lanes.lane import zero_like
 from wristctl.lanes.named_tuples import tuple_of
 from wristctl.lanes.rows import beyond, lanes_like, part, rows_of
-from wristctl.simulation.nonideal import inner_of, nonideal_of, place_after_slip, unmoved, wears
-from wristctl.wrist.dahl import inner_in_lanes, one_block
+from wristctl.simulation.nonideal import (
+    faults_of,
+    inner_of,
+    nonideal_of,
+    place_after_slip,
+    unmoved,
+    wears,
+)
 from wristctl.wrist.directions import ACTIVE, away_of, in_plane, tendons_of
 from wristctl.wrist.out_of_plane import IN_PLANE, Across, across_of, advance_across
 from wristctl.wrist.pcc import PCC
-from wristctl.wrist.plant import PlantModel, advance_or_stop, bend_of, kernel_of, parameters_of, travel
-from wristctl.wrist.tendon_mechanics import Nonideal, RealTendons, read_nonideal, shortening, spool_pull
-
-_STIFFNESS, _FIELD = len(Nonideal._fields), 8 + len(Across._fields)
-"""Row of a tendon's stiffness, before those of each tendon; and of their field, after what the wrist does across."""
-
-_COLUMNS = (0, 2, 1, 3)
-"""Columns of lengths (T, 4) by the tendons' order: one of each side, then the others."""
-_SPOOLS = (0, 0, 0, 0)
-"""Tuple with an entry, of no meaning, for each spool."""
+from wristctl.wrist.plant import PlantModel, advance_or_stop, bend_of, kernel_of, parameters_of, path_before
+from wristctl.wrist.spatial.pcc_in_space import PCC_IN_SPACE
+from wristctl.wrist.spatial.spatial_segments import FIELDS, own_values, rows_of_tendons
+from wristctl.wrist.spatial.spooled_tendons import RealPlaces
+from wristctl.wrist.tendon_layout import TendonLayout
+from wristctl.wrist.tendon_mechanics import (
+    Nonideal,
+    RealTendons,
+    shortening,
+    spool_pull,
+    stiffness_at,
+    tendons_in_lanes,
+)
 
 SETTLE = 0.5
 """Time [s] that a wrist is given to come to rest on its first spool positions; on elastic tendons it is fast."""
 
+# Tendons of one plane by the model's order: one of each side, then the others.
+_SIDES = [0, 2, 1, 3]
 
-class SupposedWrist(NamedTuple):
+
+class Places(NamedTuple):
+    """Places of M tendons of a wrist in two planes."""
+
+    cross_section: Array
+    """(M, 2) [m], toward ulnar and toward flexion."""
+    shares: Array
+    """Share of the wrist's length that the tendons of each place span (M,)."""
+    alike: NDArray[np.int64]
+    """Number of tendons of each place (M,)."""
+
+    @classmethod
+    def of(cls, layout: TendonLayout, discs: int) -> Self:
+        """Those of a layout in a wrist with so many discs."""
+        return cls(layout.cross_section, layout.shares(discs), layout.multiplicity)
+
+
+class Supposed(NamedTuple):
     """A wrist and its tendons as they may be, and what else they may do.
 
-    `taut` is what each tendon has reeled in more [m] than its spool's count says: two of the + side, two of the -. A
-    wrist bends `across` the plane too, whose levers are in this order; None: it stays in the plane.
     Where `rotors` are known to swing, the stiffness of `tendons` has their field in series with them.
     """
 
     wrist: WristParameters
     tendons: Actuator
-    taut: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 0.0)
+    taut: tuple[float, ...] = ()
+    """What each tendon has reeled in more than its spool's count says [m]; nothing where none is given."""
+    places: Places | None = None
+    """None: two tendons of the + side, then two of the -, which bend the wrist in one plane."""
     plant: TrueWrist = TrueWrist()
     facts: TendonFacts = TendonFacts()
     rotors: Rotors = Rotors()
+    """The motor of one tendon."""
     across: Across | None = None
+    """What a wrist in one plane does across it, levers by the tendons' order; None: it stays in the plane."""
 
 
-class Reeled(NamedTuple):
-    """Tendon lengths reeled in by the spools (T, 4) [m], held over each step of h [s].
+class _Lanes(NamedTuple):
+    """Candidates of one block: arrays of rows."""
 
-    A wrist has `settle` steps to settle on the first lengths; `faults` are Faultless or Faulty, `rotors` Standing or
-    Swinging.
-    """
+    wrist: Any
+    tendons: Any
+    """RealTendons, or RealPlaces in two planes."""
+    spools: Any
+    """Of each tendon what it has reeled in more [m], its lever across [m], `per_newton` and `per_mass` of its field;
+    then `radian` and `decay` of all fields, and Across."""
+    state: Any
+    """Coordinates and rates, place and speed of each rotor, what the wrist does across."""
+
+
+class _Reeled(NamedTuple):
+    """Lengths on the spools (T, M) [m], held over each step of h [s], after `settle` steps on the first ones."""
 
     lengths: Any
     h: float
     settle: int
-    faults: Any
     rotors: Any
+    """Standing or Swinging."""
 
 
-class Faultless(NamedTuple):
-    """No tendon slips, breaks or has backlash."""
+class _Shapes(NamedTuple):
+    """Tuples with an entry, of no meaning, for each coordinate, plane, tendon, pull that is wanted, and tendon that may
+    slip, break or have backlash."""
+
+    cut: Any
+    bends: Any
+    tendons: Any
+    pulls: Any
+    worn: Any
 
 
-class Faulty(NamedTuple):
-    """Some tendons may slip, break or have backlash."""
-
-
-@by_type
-def _after_slip(faults: Any, tendons: Any, plant: Any, q: Any, on_spools: Any, time: Any) -> Any:
-    """Lengths [m] that four tendons have reeled in of those on their spools."""
-    raise NotImplementedError("compiled code only")
-
-
-@implements(_after_slip, Faultless)
-def _all(faults: Any, tendons: Any, plant: Any, q: Any, on_spools: Any, time: Any) -> Any:
-    return on_spools
-
-
-@implements(_after_slip, Faulty)
-def _less(faults: Any, tendons: Any, plant: Any, q: Any, on_spools: Any, time: Any) -> Any:
-    path, zero, lengths = travel(plant, q), zero_like(time), lanes_like(on_spools)
-    for t in range(len(lengths)):
-        lengths[t] = place_after_slip(tendons, t, on_spools[t], zero, time, shortening(path, t))
-    return lengths
-
-
-def _advance(
-    model: Any, values: Any, friction: Any, spools: Any, memories: Any, state: Any, angle: Any, cut: Any
-) -> None:
-    (tendon, inner), (memory, others) = friction, memories
-    plant, tendon_rows = parameters_of(model, rows_of(values)), rows_of(tendon)
-    zero = zero_like(tendon_rows[0])
-    tendons = RealTendons(tendon_rows[_STIFFNESS], read_nonideal(tendon_rows), rows_of(memory), inner_in_lanes(inner))
-    n = len(cut)
-    q, rate = part(rows_of(state), 0, cut), part(rows_of(state), n, cut)
-    bend, speed = lanes_like(part(q, 0, (0,))), lanes_like(part(q, 0, (0,)))
-    alive = 1.0 + zero
-    reeled, rest = spools.lengths, beyond(tendon_rows, _STIFFNESS + 1)
-    taut, levers = part(rest, 0, _SPOOLS), part(rest, 4, _SPOOLS)
-    bent, turning = rows_of(others), beyond(rows_of(others), 3)
-    across, field = read_across(beyond(rest, 8)), read_field(beyond(rest, _FIELD))
+def _follow(model: Any, lanes: Any, reeled: Any, shapes: Any, out: Any) -> None:
+    n, count, planes = len(shapes.cut), len(shapes.tendons), len(shapes.bends)
+    own, state, h = rows_of(lanes.spools), rows_of(lanes.state), reeled.h
+    wrist, tendons = parameters_of(model, rows_of(lanes.wrist), shapes.tendons), tendons_in_lanes(lanes.tendons)
+    q, rate = part(state, 0, shapes.cut), part(state, n, shapes.cut)
+    turning, bent = beyond(state, 2 * n), beyond(state, 2 * n + 2 * count)
+    taut, levers = part(own, 0, shapes.tendons), part(own, count, shapes.tendons)
+    per_newton, per_mass = part(own, 2 * count, shapes.tendons), part(own, 3 * count, shapes.tendons)
+    radian, decay, across = own[4 * count], own[4 * count + 1], read_across(beyond(own, 4 * count + 2))
+    bend, speed = lanes_like(part(q, 0, shapes.bends)), lanes_like(part(q, 0, shapes.bends))
     on_spools, pulls = lanes_like(taut), lanes_like(taut)
-    for t in range(len(_SPOOLS)):
-        turning[2 * t] = reeled[0, _COLUMNS[t]] + taut[t]
-    for k in range(-spools.settle, reeled.shape[0]):
-        now, before = max(k, 0), max(k - 1, 0)
-        if k >= 0:
-            bend_of(plant, q, rate, bend, speed)
-            rows_of(angle)[k] = bend[0]
-        path = travel(plant, q)
-        for t in range(len(_SPOOLS)):
-            counted = reeled[before, _COLUMNS[t]] + taut[t], reeled[now, _COLUMNS[t]] + taut[t]
+    zero = zero_like(radian)
+    alive = 1.0 + zero
+    for t in range(count):
+        turning[2 * t] = reeled.lengths[0, t] + taut[t]
+    for k in range(-reeled.settle, reeled.lengths.shape[0]):
+        now, before, path = max(k, 0), max(k - 1, 0), path_before(tendons, wrist, q)
+        for t in range(count):
+            field = Field(radian, per_newton[t], per_mass[t], decay)
+            counted = reeled.lengths[before, t] + taut[t], reeled.lengths[now, t] + taut[t]
             aside, x = levers[t] * bent[0], shortening(path, t)
-            on_spools[t] = turn_rotor(spools.rotors, field, tendons, counted, turning, t, x + aside, spools.h) - aside
+            on_spools[t] = turn_rotor(reeled.rotors, field, tendons, counted, turning, t, x + aside, h) - aside
             pulls[t] = spool_pull(tendons, on_spools[t], t, x)
-        advance_across(bent, pulls, levers, across, (zero, zero), tendons.stiffness, spools.h)
-        lengths = _after_slip(spools.faults, tendons, plant, q, on_spools, k * spools.h + zero)
-        alive, _ = advance_or_stop(plant, q, rate, lengths, tendons, spools.h + zero, alive)
+        if k >= 0:
+            row = rows_of(out[k])
+            bend_of(wrist, q, rate, bend, speed)
+            for p in range(planes):
+                row[p] = bend[p]
+            for t in range(len(shapes.pulls)):
+                row[planes + t] = pulls[t]
+        if planes == 1:
+            advance_across(bent, pulls, levers, across, (zero, zero), stiffness_at(tendons, 0), h)
+        for t in range(len(shapes.worn)):
+            on_spools[t] = place_after_slip(tendons, t, on_spools[t], zero, k * h + zero, shortening(path, t))
+        alive, _ = advance_or_stop(wrist, q, rate, on_spools, tendons, h + zero, alive)
 
 
 def across_plane(wrist: WristParameters, plane: str, stiffness: float, flexion_ratio: float) -> Across:
@@ -146,57 +167,78 @@ def across_plane(wrist: WristParameters, plane: str, stiffness: float, flexion_r
     )
 
 
-# The constants of one block's lanes.
 read_across = tuple_of(Across)
 
 
-def _across_values(across: Across) -> tuple[float, ...]:
-    """Levers by the tendons' order, then the other constants, in whose place of levers nothing is."""
-    *constants, levers = across
-    return (*levers[list(_COLUMNS)], *constants, 0.0)
+def courses(
+    candidates: Sequence[Supposed], reeled: Array, h: float, n: int, model: PlantModel = PCC, pulls: bool = False
+) -> Array:
+    """Bends (count, T, P) [rad] of candidates in P planes at steps of h [s], with `pulls` (count, T, P + M).
 
+    A pull is that of one tendon of each place at its spool [N].
 
-def angles(candidates: Sequence[SupposedWrist], reeled: Array, h: float, n: int, model: PlantModel = PCC) -> Array:
-    """Bending angles (count, T) [rad] of the candidates, plants of this model cut into n segments, at steps of h [s].
-
-    `reeled` (T, 4) [m] is what the spools have reeled in since the straight wrist's tendons were taut and free of
-    tension, held over each step: two tendons of the + side, then the two of the - side. At first the wrist is at rest.
-    A candidate that bends a segment beyond a full turn stays where it was.
+    Parameters
+    ----------
+    candidates : wrists cut into n segments, at first at rest; one that leaves what its plant can be, as by a segment
+        bent beyond a full turn, stays where it was
+    reeled : lengths that the spools have reeled in since the straight wrist's tendons were taut and free of tension
+        (T, M) [m], held over each step
+    model : plant of a wrist in one plane
     """
-    values = to_blocks(np.array([model.values(candidate.wrist, n) for candidate in candidates]))
-    nonideal = [
-        nonideal_of(candidate.plant, candidate.tendons, candidate.facts, h, alike=1) for candidate in candidates
-    ]
-    faults = Faulty() if any(map(wears, nonideal)) else Faultless()
-    tendon_values = [
-        (
-            *new,
-            own_stiffness(old.tendons, old.rotors),
-            *np.take(old.taut, _COLUMNS),
-            *_across_values(old.across or IN_PLANE),
-            *field_of(old.tendons, old.rotors),
-        )
-        for new, old in zip(nonideal, candidates, strict=True)
-    ]
-    tendons, k = to_blocks(np.array(tendon_values)), model.coordinates(n)
-    trajectories = np.empty((len(values), len(reeled), *values.shape[2:]))
-    rotors = motion_of(candidates[0].tendons, candidates[0].rotors, h)
-    spools = Reeled(np.ascontiguousarray(reeled, float), h, round(SETTLE / h), faults, rotors)
-    advance, rest = kernel_of(_advance, model), unmoved(np.zeros(4), np.zeros(3), np.zeros(4), np.zeros(k))
-    friction = inner_of(
-        [c.plant for c in candidates], np.zeros((len(candidates), k)), np.zeros(len(candidates)), to_blocks
-    )
-    for block, (value, tendon, angle) in enumerate(zip(values, tendons, trajectories, strict=True)):
-        wide = angle.shape[1:]
-        memory = np.ascontiguousarray(np.broadcast_to(rest.reshape(-1, *[1] * len(wide)), (len(rest), *wide)))
-        advance(
-            model,
-            value,
-            (tendon, one_block(friction, block)),
-            spools,
-            (memory, np.zeros((3 + 2 * len(_SPOOLS), *wide))),
-            np.zeros((2 * k, *wide)),
-            angle,
-            (0,) * k,
-        )
-    return to_rows(trajectories, len(candidates))
+    first, tendons, count = candidates[0], reeled.shape[1], len(candidates)
+    if first.places is not None:
+        model = PCC_IN_SPACE
+    order = np.array(_SIDES if first.places is None else range(tendons))
+    nonideal = [nonideal_of(each.plant, each.tendons, each.facts, h, alike=1) for each in candidates]
+    shapes = _Shapes(
+        (0,) * model.coordinates(n), (0,) * model.planes, (0,) * tendons, (0,) * (tendons * pulls),
+        (0,) * (tendons * any(map(wears, nonideal))),
+    )  # fmt: skip
+    lanes = _lanes(candidates, nonideal, order, n, model)
+    lengths, rotors = np.ascontiguousarray(reeled[:, order], float), motion_of(first.tendons, first.rotors, h)
+    follow, driven = kernel_of(_follow, model), _Reeled(lengths, h, round(SETTLE / h), rotors)
+    blocks, wide = len(lanes.wrist), lanes.wrist.shape[2:]
+    out = np.empty((blocks, len(reeled), model.planes + tendons * pulls, *wide))
+    for block, course in enumerate(out):
+        follow(model, one_block(lanes, block), driven, shapes, course)
+    course = to_rows(out.reshape(blocks, -1, *wide), count).reshape(count, len(reeled), -1)
+    if pulls:
+        course[..., model.planes :] = course[..., model.planes + np.argsort(order)] / _alike(first, tendons)
+    return course
+
+
+def _alike(supposed: Supposed, tendons: int) -> Array:
+    return np.ones(tendons) if supposed.places is None else supposed.places.alike.astype(float)
+
+
+def _lanes(
+    candidates: Sequence[Supposed], nonideal: Sequence[Nonideal], order: NDArray[np.int64], n: int, model: PlantModel
+) -> _Lanes:
+    tendons, coordinates, count = len(order), model.coordinates(n), len(candidates)
+    path = np.zeros(3 if model.planes == 1 else 2 * tendons)
+    memory = unmoved(np.zeros(tendons), path, np.zeros(tendons), np.zeros(coordinates))
+    rows = []
+    for each, imperfect in zip(candidates, nonideal, strict=True):
+        alike, field = _alike(each, tendons), field_of(each.tendons, each.rotors)
+        *constants, levers = IN_PLANE if each.across is None else each.across
+        taut, fields = each.taut or np.zeros(tendons), (field.per_newton / alike, field.per_mass / alike)
+        of_each = np.array([taut, np.resize(levers, tendons), *fields])[:, order]
+        spools = [*of_each.ravel(), field.radian, field.decay, *constants, 0.0]
+        stiffness = alike * own_stiffness(each.tendons, each.rotors)
+        faults = faults_of(each.tendons, each.facts, alike).ravel()
+        rows.append((_values(each, n, model), stiffness, imperfect, faults, memory, spools))
+    columns = (to_blocks(np.array(column)) for column in zip(*rows, strict=True))
+    values, stiffnesses, nonideals, of_faults, memories, of_spools = columns
+    at_rest = np.zeros((count, coordinates))
+    inner = inner_of([each.plant for each in candidates], at_rest, np.zeros(count), to_blocks, model.planes)
+    places = RealPlaces(stiffnesses, nonideals, of_faults, memories, inner, (0,) * tendons)
+    own = RealTendons(stiffnesses, nonideals, memories, inner) if model.planes == 1 else places
+    return _Lanes(values, own, of_spools, np.zeros((len(values), 2 * coordinates + 2 * tendons + 3, *values.shape[2:])))
+
+
+def _values(supposed: Supposed, n: int, model: PlantModel) -> Array:
+    if supposed.places is None:
+        return model.values(supposed.wrist, n)
+    section, shares, _ = supposed.places
+    own = own_values(supposed.wrist, n, TendonLayout.four(supposed.wrist.tendon_radius))
+    return np.concatenate([own[:FIELDS], rows_of_tendons(section, n * shares)])

@@ -15,9 +15,10 @@ from wristctl.config.identify import IdentifySettings
 from wristctl.config.plant import TrueWrist
 from wristctl.config.wrist import WristParameters
 from wristctl.errors import Setting, UserError
-from wristctl.identification.fit import Coordinate, Fit, Problem, linearise
+from wristctl.identification.fit import Fit, linearise
 from wristctl.identification.intervals import Knowledge, inverse, promised
 from wristctl.identification.measured_trials import MeasuredTrial
+from wristctl.identification.problem import Coordinate, Problem
 from wristctl.identification.unknowns import NOT_NEGATIVE, UNKNOWNS
 from wristctl.simulation.worlds import plant_of
 
@@ -126,7 +127,7 @@ def _following(problem: Problem, x: Array, trial: MeasuredTrial, load: Added) ->
     """The trial under another load, its angle as it was: one side's spools pull more, the other's keep theirs."""
     loaded = load(trial)
     before, after = (problem.simulate(trial_run, [problem.candidate(trial_run, x)])[0] for trial_run in (trial, loaded))
-    more = 2.0 * trial.wrist.tendon_offset * (before - after)
+    more = 2.0 * trial.wrist.tendon_offset * (before - after)[:, 0]
     pulls = np.stack([more, more, -more, -more], axis=1).clip(0.0)
     return replace(loaded, reeled=trial.reeled + pulls)
 

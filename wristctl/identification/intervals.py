@@ -15,8 +15,9 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from wristctl.arrays import Array
-from wristctl.identification.fit import Coordinate, Fit, Problem
+from wristctl.identification.fit import Fit
 from wristctl.identification.measured_trials import LEAST_NOISE, MeasuredTrial
+from wristctl.identification.problem import Coordinate, Problem
 from wristctl.identification.unknowns import NOT_NEGATIVE
 
 NORMAL_95 = 1.959964

@@ -18,7 +18,7 @@ from wristctl.arrays import Array
 from wristctl.config.plant import TendonFacts, TrueWrist
 from wristctl.errors import Setting, UserError
 from wristctl.identification.fit import Fit
-from wristctl.identification.forward import SupposedWrist
+from wristctl.identification.forward import Supposed
 from wristctl.identification.intervals import Knowledge, sandwich
 from wristctl.identification.measured_trials import LEAST_NOISE, MeasuredTrial, frame_noise
 from wristctl.processes import cores
@@ -31,13 +31,13 @@ EVIDENT = 3.5
 # A bend without segments is at 4/3, and fits of wrists of 8 segments move by more than the first order tells.
 _UNSURE = 5.0 / 3.0
 
-Supposed = tuple[MeasuredTrial, SupposedWrist]
+Changed = tuple[MeasuredTrial, Supposed]
 
 
 class Cause(NamedTuple):
     """A change of the model by `size` in a unit, and what to do where it is so."""
 
-    change: Callable[[MeasuredTrial, SupposedWrist], Supposed]
+    change: Callable[[MeasuredTrial, Supposed], Changed]
     size: float
     unit: str
     advice: str
@@ -46,29 +46,29 @@ class Cause(NamedTuple):
     """Whether less than none of it can be."""
 
 
-def _creeping_springs(trial: MeasuredTrial, supposed: SupposedWrist) -> Supposed:
+def _creeping_springs(trial: MeasuredTrial, supposed: Supposed) -> Changed:
     return trial, supposed._replace(plant=TrueWrist(creep=0.01))
 
 
-def _creeping_tendons(trial: MeasuredTrial, supposed: SupposedWrist) -> Supposed:
+def _creeping_tendons(trial: MeasuredTrial, supposed: Supposed) -> Changed:
     return trial, supposed._replace(facts=TendonFacts(creep=0.01))
 
 
-def _play(trial: MeasuredTrial, supposed: SupposedWrist) -> Supposed:
+def _play(trial: MeasuredTrial, supposed: Supposed) -> Changed:
     reeled = trial.reeled.copy()
     for before, now in pairwise(reeled):
         np.clip(before, now, now + 2e-5, out=now)
     return replace(trial, reeled=reeled), supposed
 
 
-def _flexion_more_damped(trial: MeasuredTrial, supposed: SupposedWrist) -> Supposed:
-    factor = 1.01 if trial.plane == "flexion" else 1.0
+def _flexion_more_damped(trial: MeasuredTrial, supposed: Supposed) -> Changed:
+    factor = 1.01 if trial.planes == ("flexion",) else 1.0
     return trial, supposed._replace(
         wrist=supposed.wrist.model_copy(update={"damping": factor * supposed.wrist.damping})
     )
 
 
-def _cut_finer(trial: MeasuredTrial, supposed: SupposedWrist) -> Supposed:
+def _cut_finer(trial: MeasuredTrial, supposed: Supposed) -> Changed:
     return trial, supposed
 
 
@@ -117,7 +117,7 @@ def suspicions(fit: Fit) -> list[Suspicion]:
     def columns(trial: MeasuredTrial) -> list[Array]:
         candidate = problem.candidate(trial, fit.x)
 
-        def shown(trial: MeasuredTrial, supposed: SupposedWrist, segments: int | None = None) -> Array:
+        def shown(trial: MeasuredTrial, supposed: Supposed, segments: int | None = None) -> Array:
             return trial.shown(problem.simulate(trial, [supposed], segments)[0], fit.values["delay"])
 
         expected = shown(trial, candidate)
@@ -151,7 +151,7 @@ def _suspicion(fit: Fit, cause: str, columns: list[Array]) -> Suspicion | None:
 
 
 class Misfit(NamedTuple):
-    """Residuals of a plane's direction: their root mean square and the frames' own noise [rad]."""
+    """Residuals of a direction, a plane's bend or tensions: their root mean square and the frames' own noise [rad]."""
 
     direction: str
     frames: int
@@ -165,10 +165,11 @@ class Misfit(NamedTuple):
 
 
 def misfits(fit: Fit) -> list[Misfit]:
-    """Misfit of every direction with trials."""
+    """Misfit of every direction with trials; of trials in two planes that of each bend, and of tensions."""
     residuals_of = dict[str, list[Array]]()
     for trial, residual in zip(fit.problem.trials, fit.residuals, strict=True):
-        residuals_of.setdefault(trial.direction, []).append(residual)
+        for name, own in trial.named_channels():
+            residuals_of.setdefault(name, []).append(residual[own])
     return [
         Misfit(name, len(every), float(np.sqrt(np.mean(every**2))), frame_noise(parts))
         for name, parts in residuals_of.items()

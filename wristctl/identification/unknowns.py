@@ -12,6 +12,8 @@ from wristctl.config.wrist import TendonPlace, WristParameters
 from wristctl.simulation.planes import Asked, planes_of
 from wristctl.study_files.strict_yaml import parse_yaml
 from wristctl.wrist.directions import ACTIVE
+from wristctl.wrist.spatial.spatial_segments import ellipse
+from wristctl.wrist.tendon_layout import TendonPlace as Place
 from wristctl.wrist.tendon_layout import off_both_sides
 
 
@@ -84,8 +86,49 @@ def believed_of(wrist: WristParameters, actuator: Actuator) -> dict[str, float]:
 # Parameters with a lower bound of zero, which they may reach.
 NOT_NEGATIVE = ("friction", "sheath_friction")
 
-# Parameters of the forward model; the delay shifts its outcome in time.
-SIMULATED = tuple(name for name in UNKNOWNS if name != "delay")
+# What wrists in one plane and in two have alike.
+SHARED = ("stiffness", "damping", "tendon_stiffness", "friction", "sheath_friction", "presliding", "delay")
+# Largest part of the springs' mean that an axis may have more or less, and error of a tendon's direction [rad].
+_OBLIQUE, _ASIDE = 0.6, 0.6
+
+
+def unknowns_of_places(places: Mapping[int, Place]) -> dict[str, Unknown]:
+    """The table of parameters in two planes, with a direction and a gain of each tendon; `places` are as believed.
+
+    The springs' stiffness is m (1 + [[p, q], [q, -p]]) over bends toward ulnar and flexion: its mean m, and two numbers
+    that are well behaved where the springs are nearly alike all around and their axis is not to be told. They stand in
+    a run's table as the stiffness along the ellipse's axis, that across, and the axis' direction.
+    """
+    found = {name: UNKNOWNS[name] for name in SHARED}
+    found["stiffness"] = UNKNOWNS["stiffness"]._replace(meaning="bending stiffness, mean of all directions")
+    for name, meaning in (("oblique_cos", "ulnar less flexion"), ("oblique_sin", "between the planes")):
+        found[name] = Unknown(name, "", f"of the springs, {meaning}", False, -_OBLIQUE, _OBLIQUE, 0.4)
+    for number, place in places.items():
+        ends = place.angle - _ASIDE, place.angle + _ASIDE
+        direction, gain = f"direction_{number}", f"gain_{number}"
+        found[direction] = Unknown(direction, "rad", "of a tendon, from ulnar toward flexion", False, *ends, 0.2)
+        found[gain] = Unknown(gain, "", "bend for a length reeled in, over that believed", True, 0.8, 1.25, 1.0)
+    return found
+
+
+def oblique_of(wrist: WristParameters) -> tuple[float, float, float]:
+    """Mean stiffness [N m/rad] and the two numbers of the ellipse."""
+    across = wrist.stiffness * wrist.flexion_ratio
+    yy, yz, zz = ellipse(wrist.stiffness, across, math.radians(wrist.stiffness_axis_deg))
+    mean = 0.5 * (yy + zz)
+    return float(mean), float(0.5 * (yy - zz) / mean), float(yz / mean)
+
+
+def springs_of(mean: float, p: float, q: float) -> dict[str, float]:
+    """Stiffness, flexion_ratio and stiffness_axis_deg of a wrist; the axis is within 45 deg of ulnar."""
+    side = 1.0 if p >= 0.0 else -1.0
+    size = side * math.hypot(p, q)
+    axis = 0.5 * math.degrees(math.atan2(side * q, side * p))
+    return {
+        "stiffness": mean * (1.0 + size),
+        "flexion_ratio": (1.0 - size) / (1.0 + size),
+        "stiffness_axis_deg": axis,
+    }
 
 
 _WRIST = ("stiffness", "flexion_ratio", "stiffness_axis_deg", "damping", "tendon_radius")

@@ -4,6 +4,8 @@ A block holds LANES rollouts along its last axis; a rollout alone is a block wit
 filled up with the last rollout.
 """
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -52,3 +54,10 @@ def to_rows(blocks: Array, count: int) -> Array:
     if blocks.ndim == 2:
         return blocks
     return np.ascontiguousarray(blocks.transpose(0, 2, 1).reshape(-1, blocks.shape[1])[:count])
+
+
+def one_block(lanes: Any, number: int) -> Any:
+    """One block of NamedTuples of blocks; tuples that are none stay as they are."""
+    if hasattr(lanes, "_fields"):
+        return type(lanes)(*(one_block(value, number) for value in lanes))
+    return lanes if isinstance(lanes, tuple) else lanes[number]

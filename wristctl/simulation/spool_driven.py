@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from wristctl.arrays import Array
 from wristctl.config.plant import Actuator, TendonFacts, TrueWrist
 from wristctl.config.wrist import WristParameters
-from wristctl.lanes.blocks import lanes_of, to_blocks, to_rows
+from wristctl.lanes.blocks import lanes_of, one_block, to_blocks, to_rows
 from wristctl.lanes.compiled import by_type, implements
 from wristctl.lanes.lane import where, zero_like
 from wristctl.lanes.rows import lanes_like, part, rows_of
@@ -231,7 +231,7 @@ def spooled(wrists: Sequence[SpooledWrist], inputs: Told, steps: int, h: float, 
     move, stop = kernel_of(_move, model), Event()
 
     def run(block: int) -> None:
-        block_lanes = _one_block(blocks, block)
+        block_lanes = one_block(blocks, block)
         for first in range(0, steps, _CHUNK):
             if stop.is_set():
                 return
@@ -251,13 +251,6 @@ def spooled(wrists: Sequence[SpooledWrist], inputs: Told, steps: int, h: float, 
 
 def _places(driven: SpooledWrist) -> int:
     return len(SIDES) if driven.planes == 1 else len(TendonLayout.of(driven.wrist).places)
-
-
-def _one_block(lanes: Any, number: int) -> Any:
-    """One block of NamedTuples of arrays; tuples that are none stay as they are."""
-    if hasattr(lanes, "_fields"):
-        return type(lanes)(*(_one_block(value, number) for value in lanes))
-    return lanes if isinstance(lanes, tuple) else lanes[number]
 
 
 def _lanes(wrists: Sequence[SpooledWrist], h: float) -> _Lanes:

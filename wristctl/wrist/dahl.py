@@ -78,11 +78,6 @@ def inner_state(q: Array, z: float = 0.0) -> Array:
     return np.concatenate([np.full(len(q), z), q])
 
 
-def one_block(inner: Inner, number: int) -> Inner:
-    """Inner friction of one block's lanes."""
-    return type(inner)(*(rows[number] for rows in inner))
-
-
 @by_type
 def inner_in_lanes(inner: Any) -> Any:
     """Inner friction of lanes from that of one block's arrays."""

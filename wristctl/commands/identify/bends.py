@@ -23,11 +23,11 @@ if TYPE_CHECKING:
     import pandas as pd
 
     from wristctl.identification.arc_fit import Told
-    from wristctl.identification.bend_problem import BendProblem
-    from wristctl.identification.bend_trials import BendTrial
     from wristctl.identification.fit import Fit
     from wristctl.identification.intervals import Knowledge
     from wristctl.identification.lack_of_fit import Misfit
+    from wristctl.identification.measured_trials import MeasuredTrial
+    from wristctl.identification.problem import Problem
 
 # Draws of the posterior that a run keeps as a family of worlds.
 _DRAWS = 200
@@ -76,16 +76,16 @@ def _in_one_plane_too(study: Study) -> bool:
     return off_both_sides(study.wrist) is None
 
 
-def _problem(study: Study) -> BendProblem:
+def _problem(study: Study) -> Problem:
     from wristctl.config.plant import Actuator
-    from wristctl.identification.bend_problem import bend_problem
-    from wristctl.identification.bend_trials import bend_trials, places_of_log
+    from wristctl.identification.measured_trials import places_of_log, trials_of_logs
+    from wristctl.identification.problem import bend_problem
     from wristctl.records.log_looks import telling
 
     settings = study.identify
     logs = [telling(log) for log in logs_of(study)]
     places = places_of_log(logs[0], study.wrist)
-    trials = bend_trials(logs, study.wrist, settings.step, settings.exposure or 0.0)
+    trials = trials_of_logs(logs, study.wrist, settings.step, settings.exposure or 0.0)
     return bend_problem(trials, places, study.wrist, Actuator(level="tendon"), settings)
 
 
@@ -105,16 +105,16 @@ def identify_bends(session: Session) -> BendsTold:
 
     from wristctl.commands.identify.figures import angles, residuals
     from wristctl.commands.identify.tables import fit_table, residual_table
-    from wristctl.identification.bend_problem import (
+    from wristctl.identification.bend_estimates import (
         bends_yaml,
         forces_are_scaled,
-        misfits_of_bends,
         overruled_mass,
         told_of_bends,
         without_forces,
     )
     from wristctl.identification.fit import fit
     from wristctl.identification.intervals import knowledge
+    from wristctl.identification.lack_of_fit import misfits
 
     findings, settings = session.findings, session.study.identify
     with session.progress("searching"):
@@ -123,7 +123,7 @@ def identify_bends(session: Session) -> BendsTold:
         known = knowledge(fitted)
     told, missed, scaled = (
         told_of_bends(fitted, known),
-        misfits_of_bends(fitted),
+        misfits(fitted),
         forces_are_scaled(problem, session.study.wrist),
     )
     if not scaled:
@@ -167,9 +167,11 @@ def _refuse(
 
 def what_tells(fit: Fit, lacking: Sequence[str]) -> str:
     """What of it the logs have not, and would tell the parameters that are lacking; empty where nothing is known."""
-    from wristctl.identification.bend_trials import PLANES, BendTrial
+    import numpy as np
 
-    trials = [trial for trial in fit.problem.trials if isinstance(trial, BendTrial)]
+    from wristctl.identification.measured_trials import PLANES
+
+    trials = fit.problem.trials
     springs = any(name.startswith("stiffness") for name in lacking)
     forces = springs or any(name in ("damping", "tendon_stiffness") for name in lacking)
     parts = ["motions toward both ulnar and flexion"] * (springs and _in_one_plane(trials))
@@ -178,7 +180,7 @@ def what_tells(fit: Fit, lacking: Sequence[str]) -> str:
     if springs:
         parts.append("tendons that go slack")
     if (forces or any("friction" in name for name in lacking)) and not any(
-        (trial.channel >= len(PLANES)).any() for trial in trials
+        np.any(trial.channel >= len(PLANES)) for trial in trials
     ):
         parts.append("tensions")
     if any(name in ("delay", "damping") for name in lacking):
@@ -187,14 +189,12 @@ def what_tells(fit: Fit, lacking: Sequence[str]) -> str:
     return f"{listed[0].upper()}{listed[1:]} tell more (documentation: System identification)." if parts else ""
 
 
-def _in_one_plane(trials: Sequence[BendTrial]) -> bool:
+def _in_one_plane(trials: Sequence[MeasuredTrial]) -> bool:
     """Whether all trials bend in the plane of ulnar and radial, or all in that of flexion and extension."""
     import numpy as np
 
     ways = [
-        max(
-            (float(np.ptp(seen)) for trial in trials if (seen := trial.angle[trial.channel == plane]).size), default=0.0
-        )
+        max((float(np.ptp(seen)) for trial in trials if (seen := trial.angle[trial.of(plane)]).size), default=0.0)
         for plane in (0, 1)
     ]
     return min(ways) < _ASIDE * max(ways)

@@ -28,9 +28,10 @@ from wristctl.records.folders_of_logs import files_of_recording
 if TYPE_CHECKING:
     import pandas as pd
 
-    from wristctl.identification.fit import Fit, Problem
+    from wristctl.identification.fit import Fit
     from wristctl.identification.intervals import Knowledge
     from wristctl.identification.lack_of_fit import Suspicion
+    from wristctl.identification.problem import Problem
 
 log = logging.getLogger(__name__)
 
@@ -194,8 +195,8 @@ def _told_if_refused(session: Session, refused: Answer, tables: Sequence[Table])
 def _problem(study: Study, inputs: Inputs) -> Problem:
     """The trials of all runs, and where the search for the parameters begins: at what the first run's study says."""
     from wristctl.config.plant import Actuator
-    from wristctl.identification.fit import Problem
     from wristctl.identification.measured_trials import measured_trials
+    from wristctl.identification.problem import Problem
     from wristctl.identification.rotor_field import with_rotors
     from wristctl.identification.unknowns import believed_of
 

@@ -7,10 +7,9 @@ import numpy as np
 from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 
-from wristctl.identification.bend_trials import PLANES, BendTrial
 from wristctl.identification.fit import Fit
 from wristctl.identification.intervals import Knowledge
-from wristctl.identification.measured_trials import MeasuredTrial
+from wristctl.identification.measured_trials import BOTH, PLANES, MeasuredTrial
 from wristctl.plotting.kinds import draw_cells
 from wristctl.plotting.style import BLACK, BLUE, GREY, VERMILLION, figure, legend, legend_below, title
 
@@ -22,7 +21,7 @@ _LAGS = 30
 def angles(fit: Fit) -> Figure:
     """Measured angles and the model's at the frames [deg], and the difference, of up to eight trials; of bends four."""
     trials = fit.problem.trials
-    two = isinstance(trials[0], BendTrial)
+    two = trials[0].direction == BOTH
     chosen = sorted(set(np.linspace(0, len(trials) - 1, min(len(trials), _SHOWN // (1 + two))).round().astype(int)))
     height = max(2.6, 0.7 + (1.35 + 0.45 * two) * len(chosen))
     picture, axes = figure(len(chosen), 2, height=height, sharex=True, width_ratios=(3, 2))
@@ -50,10 +49,10 @@ def angles(fit: Fit) -> Figure:
 
 def _channels(trial: MeasuredTrial) -> list[tuple[Any, str, str, str]]:
     """Readings of one angle each: which they are, colours of the model and of the difference, name of the model."""
-    if not isinstance(trial, BendTrial):
+    if trial.direction != BOTH:
         return [(slice(None), BLUE, VERMILLION, "model")]
     shades = zip(PLANES, (BLUE, VERMILLION), strict=True)
-    return [(trial.channel == k, shade, shade, f"model, {plane}") for k, (plane, shade) in enumerate(shades)]
+    return [(trial.of(k), shade, shade, f"model, {plane}") for k, (plane, shade) in enumerate(shades)]
 
 
 def _short(labels: Sequence[str]) -> list[str]:

@@ -64,8 +64,8 @@ def fit_table(findings: Findings, fitted: Fit, knowledge: Knowledge) -> Table:
     small = pd.DataFrame(
         {"error": list(fitted.problem.coordinates)[size:], "value": errors[0], "half_width": errors[1]}
     )
-    units = {"value": "rad (zero), m (spool)", "half_width": "rad (zero), m (spool)"}
-    findings.table("data/zeros.csv", small, units)
+    unit = "rad (zero, turn), m (spool), s (clock), 1 (gain)"
+    findings.table("data/zeros.csv", small, {"value": unit, "half_width": unit})
     return Table("Fit", ("", "value", "unit", "meaning"), rows)
 
 

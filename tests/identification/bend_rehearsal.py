@@ -18,7 +18,7 @@ from wristctl.arrays import Array
 from wristctl.config.plant import Actuator
 from wristctl.config.wrist import WristParameters
 from wristctl.errors import UserError
-from wristctl.identification.spatial_forward import SupposedBends, courses_of_bends
+from wristctl.identification.forward import Places, Supposed, courses
 from wristctl.records.open_log import OpenLog
 from wristctl.simulation.references import minimum_jerk
 from wristctl.wrist.allocation import allocated
@@ -73,6 +73,10 @@ class RehearsedBends:
     delay: float = 0.03
     noise_deg: float = 0.05
     zero_deg: tuple[float, float] = (0.0, 0.0)
+    turn_deg: tuple[float, float] = (0.0, 0.0)
+    """Turn of the view of each plane about the wrist's axis, from ulnar toward flexion."""
+    too_much: tuple[float, float] = (0.0, 0.0)
+    """Share of its bend that the view of each plane shows too much."""
     frame_rate: float = 60.0
     exposure: float = 4e-3
     dropped: float = 0.05
@@ -146,9 +150,9 @@ def rehearse_bends(
     """
     layout, tendons = truth.layout, counts.shape[1]
     numbers = (1, 2, 4, 5) if tendons == 4 else tuple(range(1, tendons + 1))
-    shares = layout.shares(truth.wrist.discs)
-    supposed = SupposedBends(truth.wrist, truth.actuator, layout.cross_section, truth.taut, shares, layout.multiplicity)
-    course = courses_of_bends([supposed], truth.actuator.step_length * counts, _PERIOD, truth.segments)[0]
+    supposed = Supposed(truth.wrist, truth.actuator, truth.taut, Places.of(layout, truth.wrist.discs))
+    reeled = truth.actuator.step_length * counts
+    course = courses([supposed], reeled, _PERIOD, truth.segments, pulls=True)[0]
     time = _PERIOD * np.arange(len(course))
     ticks = slice(None, None, _LOGGED)
     captured = np.arange(rng.uniform(0.0, 1.0), time[-1] * truth.frame_rate) / truth.frame_rate
@@ -169,7 +173,9 @@ def rehearse_bends(
             noise = truth.tension_noise * rng.standard_normal(count)
             columns[f"tension_{number}"] = placed(course[ticks, 2 + k] + noise, 0)
     for plane, bend in enumerate(("bend_y", "bend_z")):
-        seen = np.interp(shutter, time, course[:, plane]).mean(axis=0)
+        turned = math.radians((1, -1)[plane] * truth.turn_deg[plane]) * course[:, 1 - plane]
+        shown = (1.0 + truth.too_much[plane]) * course[:, plane] + turned
+        seen = np.interp(shutter, time, shown).mean(axis=0)
         noise = truth.noise_deg * rng.standard_normal(len(captured)) + truth.zero_deg[plane]
         columns[bend] = placed(seen + np.radians(noise), count)
     words = {"trial": np.full(len(clock), trial)} if trial else {}

@@ -1,6 +1,6 @@
 """Rehearsals: the log that a bench would write of a wrist whose parameters are given.
 
-For judging an experiment before anyone performs it: does it tell what is to be found, and how well?
+For weighing an experiment before anyone performs it: does it tell what is to be found, and how well?
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from wristctl.config.wrist import WristParameters
 from wristctl.control.belief import Sides, belief_in_lanes
 from wristctl.control.table import controller
 from wristctl.errors import UserError
-from wristctl.identification.forward import SupposedWrist, across_plane, angles
+from wristctl.identification.forward import Supposed, across_plane, courses
 from wristctl.lanes.compiled import kernel
 from wristctl.lanes.lane import zero_like
 from wristctl.lanes.rows import lanes_like, part, rows_of
@@ -119,7 +119,7 @@ def rehearse(
         reeled = spools(in_plane(wrist, direction), toward(reference, direction), actuator, horizon, motor)
         own, model = _own(truth, direction), PLANTS[truth.plant.model]
         wound = reeled * (truth.actuator.step_length / actuator.step_length)
-        angle = angles([own], np.repeat(wound, 2, axis=1), _PERIOD, truth.segments, model)[0]
+        angle = courses([own], np.repeat(wound, 2, axis=1), _PERIOD, truth.segments, model)[0, :, 0]
         time = _PERIOD * np.arange(len(angle))
         ticks = slice(None, None, _LOGGED)
         steps = np.rint(reeled[ticks] / actuator.step_length).astype(int)
@@ -140,7 +140,7 @@ def rehearse(
     return pd.concat(logs), pd.concat(sightings), pd.DataFrame(kinds)
 
 
-def _own(truth: RehearsedTruth, direction: DirectionName) -> SupposedWrist:
+def _own(truth: RehearsedTruth, direction: DirectionName) -> Supposed:
     taut = dict(zip(ACTIVE, truth.taut, strict=True))
     one, two, three, four = (taut[tendon] for tendon in tendons_of(DIRECTIONS[direction].plane))
     wrist = plant_of(*facing(truth.wrist, truth.plant, direction))
@@ -148,4 +148,4 @@ def _own(truth: RehearsedTruth, direction: DirectionName) -> SupposedWrist:
     flexion = plant_of(*facing(truth.wrist, truth.plant, "flexion"))
     across = across_plane(wrist, plane, ulnar.stiffness, flexion.stiffness / ulnar.stiffness)
     taken = one, two, three, four
-    return SupposedWrist(wrist, truth.actuator, taken, truth.plant, truth.facts, across=across)
+    return Supposed(wrist, truth.actuator, taken, plant=truth.plant, facts=truth.facts, across=across)

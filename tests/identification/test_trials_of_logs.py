@@ -11,7 +11,7 @@ import pytest
 
 from wristctl.config.wrist import TendonPlace, WristParameters
 from wristctl.errors import UserError
-from wristctl.identification.bend_trials import bend_trials, places_of_log
+from wristctl.identification.measured_trials import places_of_log, trials_of_logs
 from wristctl.records.open_log import OpenLog
 
 WRIST = WristParameters()
@@ -70,7 +70,7 @@ def test_a_trial_holds_every_reading_at_its_own_time() -> None:
     noise = np.random.default_rng(0).standard_normal((2, 401))
     bends["bend_y"] = 0.1 * np.sin(TIME) + 1e-4 * noise[0]
     pulls: dict[str, Any] = {"tension_4": np.where(seen, 3.0 + 0.5 * noise[1], np.nan)}
-    (trial,) = bend_trials([log(**bends, **pulls)], WRIST, 0.01, exposure=4e-3)
+    (trial,) = trials_of_logs([log(**bends, **pulls)], WRIST, 0.01, exposure=4e-3)
     assert (trial.label, trial.run, trial.exposure) == ("first", "first", 4e-3) and trial.time[0] == TIME[0]
     np.testing.assert_allclose(trial.reeled, np.outer(trial.time + 0.005, (1e-3, 2e-3, 4e-3, 5e-3)), atol=1e-12)
     channels = {0: bends["bend_y"], 1: bends["bend_z"], 4: trial.per_newton * pulls["tension_4"]}
@@ -84,16 +84,16 @@ def test_a_trial_holds_every_reading_at_its_own_time() -> None:
 
 
 def test_without_tensions_a_newton_is_a_radian_and_a_mass_is_the_hands() -> None:
-    (plain,) = bend_trials([log()], WRIST, 0.01)
+    (plain,) = trials_of_logs([log()], WRIST, 0.01)
     assert plain.per_newton == 1.0 and plain.wrist == WRIST and set(plain.channel.tolist()) == {0, 1}
-    (heavy,) = bend_trials([log(mass=np.full(401, 0.7))], WRIST, 0.01)
+    (heavy,) = trials_of_logs([log(mass=np.full(401, 0.7))], WRIST, 0.01)
     assert heavy.wrist == WRIST.model_copy(update={"hand_mass": 0.7})
 
 
 def test_trials_are_named_by_their_log_and_their_own_name() -> None:
     words = {"trial": np.where(TIME < 4.0, "slow", "quick")}
     parted = replace(log(), words=words)
-    labels = [(trial.label, trial.run) for trial in bend_trials([parted, log(name="a/second.csv")], WRIST, 0.01)]
+    labels = [(trial.label, trial.run) for trial in trials_of_logs([parted, log(name="a/second.csv")], WRIST, 0.01)]
     assert labels == [("first, slow", "first"), ("first, quick", "first"), ("second", "second")]
 
 
@@ -101,9 +101,9 @@ def test_logs_with_less_than_both_bends_and_times_are_refused() -> None:
     for name in ("time", "bend_y", "bend_z"):
         less = replace(log(), columns={each: column for each, column in log().columns.items() if each != name})
         with pytest.raises(UserError, match=f"{name} is not in the log"):
-            bend_trials([less], WRIST, 0.01)
+            trials_of_logs([less], WRIST, 0.01)
     with pytest.raises(UserError, match="other numbers") as caught:
-        bend_trials([log(), log((1, 2, 3), "second.csv")], WRIST, 0.01)
+        trials_of_logs([log(), log((1, 2, 3), "second.csv")], WRIST, 0.01)
     assert "second.csv" in caught.value.where
 
 
@@ -113,6 +113,6 @@ def test_a_trial_with_too_few_readings_is_refused_and_says_how_many() -> None:
         columns = {count: np.where(np.arange(401) % 20 == 0, log().columns[name], np.nan) for count in (20, 19)}
         for count, column in columns.items():
             column[np.flatnonzero(np.isfinite(column))[count:]] = np.nan
-        bend_trials([changed(name, columns[20])], WRIST, 0.01)
+        trials_of_logs([changed(name, columns[20])], WRIST, 0.01)
         with pytest.raises(UserError, match="19 "):
-            bend_trials([changed(name, columns[19])], WRIST, 0.01)
+            trials_of_logs([changed(name, columns[19])], WRIST, 0.01)
