@@ -11,6 +11,7 @@ import numpy as np
 from wristctl.arrays import Array
 from wristctl.bench.motors import PERIOD
 from wristctl.bench.virtual_bench import VirtualBench
+from wristctl.config.plant import Disturbances
 
 # Force [N] on the last disc by plane (P,), from the bend [rad] and its rate [rad/s] there, (P,) each.
 Grip = Callable[[Array, Array], Array]
@@ -43,7 +44,7 @@ def edge(further: float, stiffness: float) -> Grip:
 
 
 def lay_hand_on(bench: VirtualBench, grip: Grip, since: float, duration: float = math.inf) -> None:
-    """Let this act from so long after the first trial began [s]."""
+    """Let this act from so long after the first trial began [s], in trials that nobody pushes."""
     load, starts = bench._rig.wrist._load, bench._rig.faults._starts
     follow, n = load.follow, load.coordinates
 
@@ -56,12 +57,7 @@ def lay_hand_on(bench: VirtualBench, grip: Grip, since: float, duration: float =
             within = (first + k) * PERIOD - starts["first trial"] - since
             if 0.0 <= within < duration:
                 bend, rate = (np.atleast_1d(load.bend(part)) for part in np.split(load._state, [n]))  # type: ignore[attr-defined]
-                force = np.append(grip(bend, rate), 0.0)[:2]
-                here = disturbances.model_copy(
-                    update={"load": float(np.hypot(*force)), "toward_deg": math.degrees(math.atan2(*force[::-1]))}
-                    if len(bend) == 2
-                    else {"load": float(force[0])}
-                )
+                here = _with_force(disturbances, grip(bend, rate))
             else:
                 here = disturbances
             one = slice(k, k + 1)
@@ -69,3 +65,14 @@ def lay_hand_on(bench: VirtualBench, grip: Grip, since: float, duration: float =
         return heard
 
     load.follow = held  # type: ignore[method-assign]
+
+
+def _with_force(disturbances: Disturbances, force: Array) -> Disturbances:
+    """These with so much more force on the last disc, by plane (P,) [N]."""
+    assert disturbances.push.force == 0.0, "in two planes a push has the direction of the force"
+    if len(force) == 1:
+        return disturbances.model_copy(update={"load": disturbances.load + float(force[0])})
+    toward = math.radians(disturbances.toward_deg)
+    ulnar, flexion = force + disturbances.load * np.array([math.cos(toward), math.sin(toward)])
+    changed = {"load": math.hypot(ulnar, flexion), "toward_deg": math.degrees(math.atan2(flexion, ulnar))}
+    return disturbances.model_copy(update=changed)
