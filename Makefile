@@ -14,7 +14,7 @@ PIP := $(BIN)/python -m pip --disable-pip-version-check
 
 .PHONY: run test lint bench bench-sweeps bench-peers bench-all firmware test-firmware test-faults test-trust \
 	test-vision test-identify test-allocation test-slow test-rig fault-table lerobot-reader lost-tendons twins \
-	sound-rigs damaged-logs inner-rigs driven-robots test-posterior test-statistics converge worlds docs clean venv \
+	largest-pulls sound-rigs damaged-logs inner-rigs driven-robots test-posterior test-statistics converge worlds docs clean venv \
 	mutants coverage installed matrix check-package constraints release servo-faults identified recommended-rigs
 
 run: .venv/run
@@ -129,7 +129,14 @@ lost-tendons: .venv/dev
 twins: .venv/dev
 	$(BIN)/python -m tests.trial.twins $(WHICH)
 
-# Sound rigs drawn with pose, light, link and friction: which are stopped all the same? WHICH="--first 40 --count 20"
+# One motor that fails, motors exchanged, a hand or an edge that holds the wrist, at either current, and a load that the
+# hand takes up: how hard does a tendon pull? docs/hardware/largest-pulls.md; goes on where it stopped.
+# WHICH="--motion ulnar --current '2.4 A'", "--page" of what was tried.
+largest-pulls: .venv/dev
+	$(BIN)/python -m tests.trial.largest_pulls $(WHICH)
+
+# 100 sound rigs drawn with wrist, gains, motion, pose, light, link, friction and declared load: which are stopped all the
+# same? docs/hardware/sound-rigs.md; goes on where it stopped. WHICH="--first 40 --count 20"
 sound-rigs: .venv/dev
 	$(BIN)/python -m tests.trial.sound_rigs $(WHICH)
 

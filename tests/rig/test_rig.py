@@ -9,6 +9,7 @@ import json
 import os
 import re
 import select
+import shlex
 import signal
 import subprocess
 import sys
@@ -93,13 +94,24 @@ class Bridge:
     def __init__(self, *options: str) -> None:
         self._process = wristctl("hw", "emulate", "--wrist", *options)
         assert self._process.stdout is not None
-        self.port, self.camera = (self._process.stdout.readline().strip() for _ in range(2))
-        assert self.port.startswith("/dev/") and self.camera.startswith("http://127.0.0.1:"), self._process.stderr
+        cameras = 2 if "planes=2" in options else 1
+        self.port, *self.cameras = (self._process.stdout.readline().strip() for _ in range(1 + cameras))
+        assert self.port.startswith("/dev/"), self._process.stderr
+        assert all(each.startswith("http://127.0.0.1:") for each in self.cameras)
 
     def type(self, act: str) -> None:
         assert self._process.stdin is not None
         self._process.stdin.write(act + "\n")
         self._process.stdin.flush()
+
+    def at_its(self, command: str) -> str:
+        """A command of the page with the port and the cameras that are here."""
+        command = command.replace("/dev/ttyACM0", self.port).replace("--camera 0", f"--camera {self.camera}")
+        return command.replace("camera_2=2", f"camera_2={self.cameras[-1]}")
+
+    @property
+    def camera(self) -> str:
+        return self.cameras[0]
 
     @property
     def alive(self) -> bool:
@@ -146,7 +158,7 @@ def bridge(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable
 
 def do(command: str, typed: str = "", timeout: float = 240.0) -> tuple[int, str, str]:
     """A command as it is typed, and the answers to what it asks."""
-    process = wristctl(*command.split())
+    process = wristctl(*shlex.split(command))
     out, err = process.communicate(typed, timeout)
     return process.returncode, out, err
 
@@ -174,10 +186,11 @@ def test_a_slow_link_and_camera_are_named_and_the_latency_is_found_to_three_mill
         assert age == pytest.approx(0.060, abs=3e-3)
 
 
-def steps() -> list[str]:
-    """The commands of first-power-up.md, in their order."""
+def steps(planes: int) -> list[str]:
+    """The commands of first-power-up.md, in their order; those of two planes stand for the others that they replace."""
     text = (ROOT / "docs" / "hardware" / "first-power-up.md").read_text(encoding="utf-8")
-    return re.findall(r"^ {7,}wristctl (.+)$", text, re.MULTILINE)
+    one, two = (re.findall(r"^ {4,}wristctl (.+)$", part, re.MULTILINE) for part in text.split("## In two planes"))
+    return one if planes == 1 else [two[0], *one[1 : 1 - len(two)], *two[1:]]
 
 
 def typed_at(process: subprocess.Popen[str], question: str, answer: str) -> str:
@@ -206,21 +219,24 @@ def pressed_in_a_jog(command: str, served: Bridge) -> str:
     return said + err
 
 
-def _steps_per_radian() -> float:
-    """Of a tendon that bends the wrist alone, across the plane as much as in it."""
-    return 2.0 * WristParameters().tendon_offset / HwRunSettings().actuator.step_length
+def _steps_per_radian(planes: int) -> float:
+    """Of a tendon that bends the wrist alone, toward itself: one camera sees the part in its plane."""
+    wrist = WristParameters()
+    reeled = wrist.tendon_radius if planes == 2 else 2.0 * wrist.tendon_offset
+    return reeled / HwRunSettings().actuator.step_length
 
 
 @pytest.mark.skipif(not BOOT_LOADER.exists(), reason="needs arduino-core-avr (the stock boot loader)")
-def test_first_power_up_is_walked_from_flashing_to_the_first_motion(bridge: Callable[..., Bridge]) -> None:
-    walk = iter(steps())
+@pytest.mark.parametrize("planes", [1, 2])
+def test_first_power_up_is_walked_from_flashing_to_the_first_motion(bridge: Callable[..., Bridge], planes: int) -> None:
+    walk = iter(steps(planes))
     hw, emulate, wrist, *options = next(walk).split()
     assert (hw, emulate, wrist) == ("hw", "emulate", "--wrist")
-    options += ["--set", "bench.camera.frame_rate=30"]
+    options += ["--set", "bench.camera.frame_rate=30", "--set", "bench.camera_2.frame_rate=30"]
     served = bridge("--boot-loader", str(BOOT_LOADER), *options, *TENDONS_OFF)
 
     def here() -> str:
-        return next(walk).replace("/dev/ttyACM0", served.port).replace("--camera 0", f"--camera {served.camera}")
+        return served.at_its(next(walk))
 
     with in_time(served):
         flash, check = here(), here()
@@ -253,9 +269,10 @@ def test_first_power_up_is_walked_from_flashing_to_the_first_motion(bridge: Call
         code, out, err = do(here(), "yes\n2 0.2\n\n")
         assert code == 0 and "positions (0, 0, 14, 0)" in out, out + err
     served = bridge(*options)  # its tendons as they were before
+    in_both = " in two planes" * (planes == 2)
     with in_time(served):
         code, out, err = do(here(), "yes\n")
-        assert code == 0 and out.startswith("This rig can run the loop of 10 ms"), out + err
+        assert code == 0 and out.startswith(f"This rig can run the loop of 10 ms{in_both}"), out + err
         code, out, err = do(here(), "yes\nyes\n")
         taken_up = re.search(r"^ *2 +4 +\+1 +([\d.]+)", out, re.MULTILINE)  # slack of 0.4 mm, and 1 deg in both planes
         assert code == 0 and taken_up and 0.9 < float(taken_up[1]) < 1.5, out + err
@@ -263,7 +280,7 @@ def test_first_power_up_is_walked_from_flashing_to_the_first_motion(bridge: Call
         assert code == 0, err
         slopes = np.array(re.findall(r"^ *\d +\d +\+1 +([\d.]+) +([\d.]+)", out, re.MULTILINE), float)
         assert slopes.shape == (4, 2) and slopes[:, 0] == pytest.approx(slopes[:, 1], rel=0.15), "by the model"
-        stretch = slopes[:, 1] / _steps_per_radian() - 1.0
+        stretch = slopes[:, 1] / _steps_per_radian(planes) - 1.0
         assert stretch.min() > 0.0 and stretch.max() < 0.1
         code, out, err = do(here(), "yes\nyes\n")
         assert code == 0 and "No trial ended early" in " ".join(out.split()), out + err

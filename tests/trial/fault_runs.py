@@ -138,10 +138,8 @@ class _EndedByForks(BaseException):
 def fan_out(phase: Phase, groups: Sequence[Sequence[Case]], workers: int = 2) -> list[Judged]:
     """Judge faults of one moment, alone or together: the experiment is done once up to there, then once for each."""
     sound, since = sound_course(phase), "power-on" if phase == "homing" else "first trial"
-    injected = [
-        [InjectedFault.model_validate(each) for case in group for each in case.faults(phase)] for group in groups
-    ]
-    courses = forked(partial(_performed, _settings(phase)), injected, since, AT[phase], workers)
+    changes = [injecting([each for case in group for each in case.faults(phase)]) for group in groups]
+    courses = forked(partial(_performed, _settings(phase)), changes, since, AT[phase], workers)
     return [judge(groups[number], phase, course, sound) for number, course in courses.items()]
 
 
@@ -149,23 +147,33 @@ def _performed(changes: Mapping[str, Any], prepared: Prepared) -> Course:
     return perform(changes, prepared=prepared)
 
 
-def forked(
-    run: Callable[[Prepared], Any], injected: Sequence[Sequence[InjectedFault]], since: str, at: float, workers: int = 2
-) -> dict[int, Any]:
-    """What a run comes to with each of these groups of faults, by number, so long [s] after power-on or a trial.
+def injecting(faults: Sequence[Mapping[str, Any]]) -> Prepared:
+    """What injects these faults into a bench."""
+    injected = tuple(InjectedFault.model_validate(each) for each in faults)
 
-    `run` is given what prepares its bench. A process forks at that moment; its children go on with one group each.
+    def change(bench: VirtualBench) -> None:
+        bench._rig.faults._faults = injected
+
+    return change
+
+
+def forked(
+    run: Callable[[Prepared], Any], changes: Sequence[Prepared], since: str, at: float, workers: int = 2
+) -> dict[int, Any]:
+    """What a run comes to with each of these changes of its bench, by number, so long [s] after power-on or a trial.
+
+    `run` is given what prepares its bench. A process forks at that moment; its children go on with one change each.
     """
     mine: list[int] = []
     with tempfile.TemporaryDirectory() as folder:
 
         def fork(bench: VirtualBench) -> None:
             children: set[int] = set()
-            for number, group in enumerate(injected):
+            for number, change in enumerate(changes):
                 while len(children) >= workers:
                     children.discard(os.wait()[0])
                 if not (child := os.fork()):
-                    bench._rig.faults._faults = tuple(group)
+                    change(bench)
                     mine.append(number)
                     return
                 children.add(child)
@@ -190,7 +198,7 @@ def forked(
             Path(folder, str(mine[0])).write_bytes(pickle.dumps(ended))
             os._exit(0)
         except _EndedByForks:
-            files = [(number, Path(folder, str(number))) for number in range(len(injected))]
+            files = [(number, Path(folder, str(number))) for number in range(len(changes))]
             return {number: pickle.loads(file.read_bytes()) for number, file in files if file.exists()}
         except BaseException:
             if mine:

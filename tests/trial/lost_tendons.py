@@ -10,33 +10,24 @@ from __future__ import annotations
 import argparse
 import json
 import sys
-import tempfile
 from functools import partial
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
-from tests.trial.conftest import WRIST
-from tests.trial.fault_runs import Prepared, as_limited, forked
-from wristctl.bench.virtual_bench import VirtualBench
+from tests.trial.fault_runs import forked, injecting
+from tests.trial.single_trials import Ended, performed
 from wristctl.board.messages import AXES
-from wristctl.config.bench import InjectedFault
-from wristctl.config.hw_run import HwRunSettings
-from wristctl.errors import UserError
-from wristctl.trial.board_stand import BoardStand
-from wristctl.trial.experiment import Experiment, log_of
-from wristctl.trial.testbeds import EmulatedTestbed
-from wristctl.trial.trials import trials_of
-from wristctl.vision.view import View
 
 PAGE = Path(__file__).parents[2] / "docs" / "hardware" / "lost-tendons.md"
 DIAGONALS = "ulnar-flexion", "radial-flexion", "radial-extension", "ulnar-extension"
-MOTIONS: dict[str, dict[str, Any]] = {
+_PATHS: dict[str, dict[str, Any]] = {
     "circumduction": {"reference": {"kind": "circumduction", "angle_deg": 25.0, "turn": 4.0}, "horizon": 5.0},
     "dart-thrower": {"reference": {"kind": "dart-thrower", "angle_deg": 30.0, "turn": 1.5}, "horizon": 3.0},
     **{name: {"directions": (name,), "horizon": 3.0} for name in DIAGONALS},
 }
+MOTIONS = {name: {"planes": 2, **path} for name, path in _PATHS.items()}
 FAULTS: dict[str, dict[str, Any]] = {
     "tendon off its pulley": {"kind": "tendon-detached"},
     "motor stalls": {"kind": "motor-stalled"},
@@ -46,58 +37,14 @@ AT = 0.2
 """When it happens: seconds after the motion has begun."""
 
 
-class Ended(NamedTuple):
-    """How a run has ended."""
-
-    outcome: str
-    odd: str
-    after: float
-    """From the fault to the stop [s]; nan where there was none."""
-    pull: float
-    """Largest true pull since the fault [N]."""
-    error: float
-    """Largest true error in the trial [rad]."""
-
-
-def performed(motion: str, prepared: Prepared) -> Ended:
-    """One trial of this motion on an emulated rig whose bench is prepared."""
-    settings = as_limited(
-        HwRunSettings.model_validate(
-            {"planes": 2, "push": {"force": 0.0}, "bench": {"person": {"takes": 0.0}}, **MOTIONS[motion]}
-        )
-    )
-    bench = VirtualBench(settings.bench, WRIST, 0, settings.markers, settings.markers_2)
-    prepared(bench)
-    log = log_of(Path(tempfile.mkdtemp()), settings, WRIST)
-    done = Experiment(settings, WRIST, trials_of(settings, np.random.default_rng(0)), log)
-    try:
-        done.run(BoardStand(EmulatedTestbed(bench, settings, [View(), View()], None)))
-    except UserError:
-        pass
-    finally:
-        log.close()
-    stopped, begun = bench.transport.now(), bench._rig.faults._starts["first trial"]
-    truth, followed = bench.truth(begun), next(iter(done.motions.values()))
-    at = truth.time - begun
-    moving = at < followed.horizon if done.stop is None or done.stop.time is None else at < done.stop.time
-    wanted = np.stack([np.interp(at, followed.time, plane) for plane in followed.bend_ref.T], axis=1)
-    apart = np.hypot(*(truth.theta.reshape(len(at), -1, 2).sum(axis=1) - wanted).T)
-    return Ended(
-        done.outcomes[0], done.odd.get(0, ""), np.nan if done.stop is None else stopped - begun - AT,
-        float(truth.pull[at >= AT].max(initial=0.0)), float(apart[moving].max(initial=0.0)),
-    )  # fmt: skip
-
-
 def tried(motion: str, kept: Path, workers: int) -> list[tuple[str, str, int, Ended]]:
     """Each fault of each axis over a motion; what was tried before is not tried again."""
     cases = [(name, axis) for name in FAULTS for axis in range(AXES)]
     files = {case: kept / f"{motion}-{case[0].replace('/', ' of ')}-{case[1]}.json" for case in cases}
     if left := [case for case in cases if not files[case].is_file()]:
-        injected = [
-            [InjectedFault.model_validate({**FAULTS[name], "axis": axis, "at": AT, "since": "first trial"})]
-            for name, axis in left
-        ]
-        for number, ended in forked(partial(performed, motion), injected, "first trial", AT, workers).items():
+        changes = [injecting([{**FAULTS[name], "axis": axis, "at": AT, "since": "first trial"}]) for name, axis in left]
+        run = partial(performed, MOTIONS[motion], at=AT)
+        for number, ended in forked(run, changes, "first trial", AT, workers).items():
             files[left[number]].write_text(json.dumps(ended))
     return [
         (motion, name, axis, Ended(*json.loads(files[name, axis].read_text())))

@@ -93,7 +93,7 @@ def test_no_sound_rig_raises_a_false_alarm() -> None:
     sound_course("homing")
     with ProcessPoolExecutor(WORKERS, get_context("fork")) as pool:
         ended = list(pool.map(ended_on, range(RIGS)))
-    alarms = [each for each in ended if each[1]]
+    alarms = [(number, each) for number, each in enumerate(ended) if each.outcome != "ok"]
     print(f"\n{RIGS - len(alarms)} of {RIGS} sound rigs without a false alarm")
     assert not alarms
 

@@ -129,3 +129,17 @@ def test_a_small_move_is_as_large_as_the_model_says() -> None:
         MOVES.judge_small_move(2, reeled, bend(math.degrees(pull_directions()[0]), meant))
     with pytest.raises(SafetyStop, match="times what the model says"):
         MOVES.judge_small_move(2, reeled, bend(place, 1.6 * meant))
+
+
+def test_a_small_move_is_judged_by_tendons_as_soft_as_homing_has_measured_them() -> None:
+    """A stiff wrist on tendons of 5 kN/m bends by half of what it does on those of 20 kN/m that are believed."""
+    stiff = ExpectedMoves(circling(), WRIST.model_copy(update={"stiffness": 4.0}), "")
+    told = stiff.tendon_stiffness([stiff.steps(5e3)] * 4)
+    reeled, place = 30, math.degrees(pull_directions()[2])
+    meant = reeled / stiff.steps(5e3)
+    stiff.judge_small_move(2, reeled, bend(place, meant), told)
+    for bent, stiffness in ((meant, None), (0.3 * meant, told)):
+        with pytest.raises(SafetyStop, match="instead of"):
+            stiff.judge_small_move(2, reeled, bend(place, bent), stiffness)
+    with pytest.raises(SafetyStop, match="times what the model says"):
+        stiff.judge_small_move(2, reeled, bend(place, 2.5 * meant), told)

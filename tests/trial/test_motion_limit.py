@@ -11,10 +11,11 @@ import pytest
 import wristctl
 from tests.trial.conftest import WRIST, Run, settings_of
 from wristctl.config.study import Study
-from wristctl.trial.expected_moves import ExpectedMoves
+from wristctl.trial.expected_moves import Bend, ExpectedMoves
 from wristctl.trial.motion_limit import LEAST, limited, peak_tension
 from wristctl.trial.trial_results import twin
 from wristctl.trial.trials import Trial, trials_of
+from wristctl.trial.zero_checks import _goes_on
 
 pytestmark = pytest.mark.slow
 
@@ -70,18 +71,31 @@ def test_a_limit_is_so_many_times_what_trials_need_and_never_above_what_tendons_
     )
 
 
-@pytest.mark.parametrize(("declared", "outcome"), [(0.0, "more load than declared"), (0.5, "ok")])
+@pytest.mark.parametrize("taken", [0.25, 0.5])
+@pytest.mark.parametrize("declared", [False, True])
 def test_a_load_that_nobody_declared_ends_as_such_and_a_declared_one_is_carried(
-    experiment: Run, declared: float, outcome: str
+    experiment: Run, declared: bool, taken: float
 ) -> None:
-    """An upright wrist that holds 0.5 kg sags once its tendons let it, which they do not for 0.6 mm."""
-    taken: dict[str, Any] = {"kind": "payload-taken", "size": 0.5, "at": 0.1}
+    """An upright wrist that holds it sags once its tendons let it, which they do not for 0.6 mm.
+
+    Half a kilogram does so at once, of 0.25 kg it still falls while tendons are let out on one side.
+    """
+    happens: dict[str, Any] = {"kind": "payload-taken", "size": taken, "at": 0.1}
     motors = {"slack": (0.0, 0.0, 0.0, 0.0)}
     done = experiment(
-        payload=declared, bench={"motors": motors, "person": {"takes": 0.0}, "faults": (taken,)}, horizon=0.6,
+        payload=taken if declared else 0.0, horizon=0.6,
+        bench={"motors": motors, "person": {"takes": 0.0}, "faults": (happens,)},
     )  # fmt: skip
-    assert outcome in done.experiment.outcomes[0]
-    assert (done.error is None) == (declared > 0.0)
+    assert ("ok" if declared else "more load than declared") in done.experiment.outcomes[0]
+    assert (done.error is None) == declared
+
+
+@pytest.mark.parametrize("away", [4e-3, -4e-3, math.nan])
+def test_a_wrist_that_tendons_bring_back_carries_no_load_and_one_that_goes_on_does(away: float) -> None:
+    bent = Bend(6e-3, away)
+    for times, goes_on in ((0.0, False), (0.4, False), (-2.0, False), (0.6, True), (3.0, True)):
+        assert _goes_on(bent, Bend(times * 6e-3, times * away)) == goes_on
+    assert not _goes_on(Bend(6e-3, 0.0), Bend(0.0, 9e-3)), "aside of where it bent"
 
 
 @pytest.mark.parametrize("planes", [1, 2])

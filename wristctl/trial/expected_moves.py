@@ -373,9 +373,12 @@ class ExpectedMoves:
         fix = f"see tendons, motor cables and their shields, then {self._words.again}"
         return SafetyStop(problem, "homing", fix)
 
-    def judge_small_move(self, axis: int, reeled: float, bend: Bend) -> None:
-        """Raises SafetyStop where reeling in by so many steps beyond the taut point did not bend as it should."""
-        meant, size = reeled / self.steps(axis=axis), self.size(bend)
+    def judge_small_move(self, axis: int, reeled: float, bend: Bend, stiffness: float | None = None) -> None:
+        """Raises SafetyStop where reeling in by so many steps beyond the taut point did not bend as it should.
+
+        Tendons are as believed, or of the stiffness [N/m] that homing has measured.
+        """
+        meant, size = reeled / self.steps(stiffness, axis=axis), self.size(bend)
         if max(size, abs(np.nan_to_num(bend.away))) < LEAST * meant:
             raise self.bends_too_little(axis, bend, meant)
         self.judge_side(axis, bend)

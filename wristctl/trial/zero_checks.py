@@ -24,6 +24,8 @@ _SETTLES = 0.5
 # Shares of the bend at which tendons let out by `homing.pull` hold a wrist that sags: from which on they may, and by
 # which it sags on where they are let out twice as far.
 _HELD, _FURTHER = 0.6, 0.5
+# Share of a bend that is left where tendons have brought a wrist back.
+_BACK = 0.5
 
 
 class HomedWrist:
@@ -39,6 +41,7 @@ class HomedWrist:
         self._board, self._tracking, self._settings, self._zero = board, tracking, settings, zero
         self._expected, self._spools = ExpectedMoves(settings, wrist, plane, layout), spools_of(settings.actuator)
         self._homing, self._slack = settings.homing, round(settings.homing.pull / self._spools.step)
+        self._stiffness = self._expected.tendon_stiffness(zero.steps_per_radian)
 
     def slacken(self, times: float = 1.0) -> None:
         """Let its tendons out by so many times `homing.pull`."""
@@ -94,10 +97,17 @@ class HomedWrist:
         patience.wait(_SETTLES)
         bend = self._expected.bend(held, patience.reading(self._tracking, 4 * self._homing.frames))
         self.slacken()
-        loaded = self._is_loaded(held)
-        if not loaded:
+        if self._is_loaded(held):
+            return False
+        try:
             self._expected.judge_cocontraction(bend)
-        return not loaded
+        except SafetyStop:
+            rest = self._rest()
+            if not _goes_on(bend, self._expected.bend(held, rest)):
+                raise
+            self._judge_load(_sag(rest))
+            return False
+        return True
 
     def _is_loaded(self, held: Reading) -> bool:
         """Whether a wrist that was `held` by tendons let out by `homing.pull` sags on when they are let out further.
@@ -113,8 +123,13 @@ class HomedWrist:
         self.slacken()
         if sag - before < _FURTHER * held_at:
             return False
+        self._judge_load(sag)
+        return True
+
+    def _judge_load(self, sag: float) -> None:
+        """Raises SafetyStop where no payload was declared of a wrist that sags by this bend [rad]."""
         if self._settings.payload > 0.0:
-            return True
+            return
         problem = f"the slack wrist sags by {math.degrees(sag):.1f} deg, as it did not when it was homed"
         likely = "more load than declared (hw-run.payload), or something that pushes at the hand"
         raise SafetyStop(f"{problem}; likely {likely}", "homing", "lay the load down, or declare it")
@@ -138,7 +153,7 @@ class HomedWrist:
         expected, reeled = self._expected, round(_CHECKED * self._homing.pull / self._spools.step)
         against = pair[1] if len(pair) > 1 else expected.against(pair[0])
         bend, rest = self._bent(against, 2 * reeled, rest)
-        meant = reeled / expected.steps(axis=against)
+        meant = reeled / expected.steps(self._stiffness, axis=against)
         if expected.size(bend) < LEAST * meant:
             raise expected.bends_too_little(against, bend, meant)
         rests, bends = [_bend_of(rest)], []
@@ -148,8 +163,8 @@ class HomedWrist:
             rests.append(_bend_of(rest))
         straight = middle(rests[1:])
         for axis, before, bend in zip(pair, rests, bends, strict=False):
-            away = expected.along(axis, straight.since(before)) * expected.steps(axis=axis)
-            expected.judge_small_move(axis, reeled + away, bend)
+            away = expected.along(axis, straight.since(before)) * expected.steps(self._stiffness, axis=axis)
+            expected.judge_small_move(axis, reeled + away, bend, self._stiffness)
         return straight, rest
 
     def _bent(self, axis: int, by: int, rest: Reading) -> tuple[Bend, Reading]:
@@ -178,6 +193,15 @@ class HomedWrist:
 def _sag(rest: Reading) -> float:
     """How far off straight a wrist rests [rad]."""
     return float(np.hypot.reduce(np.nan_to_num(_bend_of(rest))))
+
+
+def _goes_on(bend: Bend, since: Bend) -> bool:
+    """Whether a wrist that bent while tendons were let out on one side has not come back since they pull as before.
+
+    Tendons that pull against each other bring it back; under a load that it hardly bears it goes on.
+    """
+    there, now = (np.nan_to_num(each) for each in (bend, since))
+    return float(there @ now) > _BACK * float(there @ there)
 
 
 def _bend_of(rest: Reading) -> Bend:
