@@ -166,15 +166,34 @@ def test_a_page_of_eight_seconds_stays_small(tmp_path: Path) -> None:
     assert run.file("report.html").stat().st_size < 150_000
 
 
-@pytest.mark.parametrize("tendons", [3, 4])
-def test_the_figure_shows_both_paths_of_the_tip_and_every_tendon(tendons: int) -> None:
-    made, wrist = course(tendons, name="figure-of-8"), WristParameters(tendons="three" if tendons == 3 else "four")
+@pytest.mark.parametrize(
+    ("setting", "pieces"),
+    [
+        ("wrist.tendons=three", [4, 4, 4]),
+        ("wrist.tendons=four", [4, 4, 4, 4]),
+        (INNER, [4, 4, 4, 2]),
+        (INNER.replace("{angle_deg: 0}", "{angle_deg: 0, ends_at: 4}").replace(" 3}", " 2}"), [3, 4, 4, 1]),
+    ],
+)
+def test_the_figure_shows_both_paths_of_the_tip_and_every_tendon_to_where_it_ends(
+    setting: str, pieces: list[int]
+) -> None:
+    wrist = wristctl.load_study(None, setting).wrist
+    made = course(len(pieces), name="figure-of-8")
     left, right = motion_in_space(made, wrist, "as believed").axes
     drawn: dict[Any, Any] = {line.get_label(): line.get_xydata() for line in right.get_lines()}
     np.testing.assert_allclose(drawn["tip reached"], 1e3 * made.tip[:, 1:], atol=1e-9)
     np.testing.assert_allclose(drawn["tip wanted"], 1e3 * made.tip_desired[:, 1:], atol=1e-9)
-    colours = [line.get_color() for line in left.get_lines()]
-    assert [colours.count(colour) for colour in TENDON_COLOURS[:4]] == [4] * tendons + [0] * (4 - tendons)
+    lines: dict[Any, list[Any]] = {colour: [] for colour in TENDON_COLOURS[:4]}
+    for line in left.get_lines():
+        lines.get(line.get_color(), []).append(line.get_xydata())
+    assert [len(each) for each in lines.values()] == [*pieces, *[0] * (4 - len(pieces))]
+    bent = int(np.argmax(np.hypot(*made.bend.T)))
+    centres, frames = spatial_frames(made.segment_theta[bent], wrist.length, np.linspace(0.0, 1.0, wrist.discs))
+    for cable, parts in zip(cables(wrist), lines.values(), strict=False):
+        holes = 1e3 * seen(centres + frames @ np.array([0.0, cable.y, cable.z]))[:, :2]
+        ends = {tuple(np.round(end, 6)) for part in parts for end in part}
+        assert ends == {tuple(np.round(hole, 6)) for hole in holes[: cable.discs]}
     assert len(left.patches) == wrist.discs and left.get_title(loc="left") == "as believed"
     assert rim(wrist) > wrist.tendon_radius
 
