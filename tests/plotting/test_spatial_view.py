@@ -198,6 +198,24 @@ def test_the_figure_shows_both_paths_of_the_tip_and_every_tendon_to_where_it_end
     assert rim(wrist) > wrist.tendon_radius
 
 
+@pytest.mark.parametrize("planes", [(1.0, 0.2), (-1.0, 0.2), (0.2, 1.0), (0.2, -1.0)])
+def test_the_figure_shows_the_wrist_where_it_is_bent_most_in_whichever_plane(planes: tuple[float, float]) -> None:
+    """It bends and comes back, late in one plane and early in the other, which bends little."""
+    still = course()
+    time = still.time
+    late, early = (25.0 * np.exp(-(((time - at) / 0.2) ** 2)) for at in (1.0, 0.4))
+    most, little = np.radians(late), np.radians(early)
+    bends = np.stack([most, little] if abs(planes[0]) == 1.0 else [little, most], axis=1) * np.array(planes)
+    segments = np.tile(0.25 * bends, 4)
+    made = dataclasses.replace(still, theta=bends, segment_theta=segments, tip=spatial_tips(segments, 0.08))
+    left, right = motion_in_space(made, WristParameters()).axes
+    assert right.get_title(loc="left") == "bent most at 1.00 s"
+    (here,) = (line for line in right.get_lines() if line.get_marker() == "o")
+    np.testing.assert_allclose(np.asarray(here.get_xydata(), float), 1e3 * made.tip[[1000], 1:])
+    (dot,) = (line for line in left.get_lines() if line.get_marker() == "o")
+    np.testing.assert_allclose(np.asarray(dot.get_xydata(), float), 1e3 * seen(made.tip[[1000]])[:, :2])
+
+
 SEEK = "const s = document.getElementById('instant'); s.value = {}; s.dispatchEvent(new Event('input'));"
 LOOK = "const v = document.getElementById('view'); v.selectedIndex = {}; v.dispatchEvent(new Event('change'));"
 PICTURE = "return document.querySelector('#stage g').innerHTML"
