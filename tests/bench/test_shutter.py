@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import pytest
@@ -150,10 +150,14 @@ def test_a_frozen_camera_shows_the_last_frame_exposed_before_it_froze(phase: flo
     assert frozen.expose(40).shown == shown and frozen.expose(shown).shown == shown
 
 
-def test_a_fault_added_while_the_rig_stands_reaches_the_camera_it_is_of() -> None:
+@pytest.mark.parametrize("camera", [1, 2])
+def test_a_fault_added_while_the_rig_stands_reaches_the_camera_it_is_of(camera: Literal[1, 2]) -> None:
     schedule = Faults(())
-    first, second = CameraFaults(schedule, 1), CameraFaults(schedule, 2)
-    schedule._faults = (InjectedFault(kind="camera-lost", at=1.0, camera=2),)
+    cameras = {number: CameraFaults(schedule, number) for number in (1, 2)}
+    schedule._faults = (InjectedFault(kind="camera-lost", at=1.0, camera=camera),)
     schedule.begin(3.0)
-    assert second.on("camera-lost", 4.0) and not second.on("camera-lost", 3.9)
-    assert not first.on("camera-lost", 4.0) and second.next("camera-lost", 0.0) == 4.0
+    own, other = cameras[camera], cameras[3 - camera]
+    assert own.on("camera-lost", 4.0) and not own.on("camera-lost", 3.9)
+    assert own.next("camera-lost", 0.0) == own.since("camera-lost", 4.0) == 4.0
+    assert not other.on("camera-lost", 4.0) and other.next("camera-lost", 0.0) == math.inf
+    assert other.of(("camera-lost",)) == [] and len(own.of(("camera-lost",))) == 1

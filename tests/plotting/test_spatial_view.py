@@ -166,17 +166,54 @@ def test_a_page_of_eight_seconds_stays_small(tmp_path: Path) -> None:
     assert run.file("report.html").stat().st_size < 150_000
 
 
-@pytest.mark.parametrize("tendons", [3, 4])
-def test_the_figure_shows_both_paths_of_the_tip_and_every_tendon(tendons: int) -> None:
-    made, wrist = course(tendons, name="figure-of-8"), WristParameters(tendons="three" if tendons == 3 else "four")
+@pytest.mark.parametrize(
+    ("setting", "pieces"),
+    [
+        ("wrist.tendons=three", [4, 4, 4]),
+        ("wrist.tendons=four", [4, 4, 4, 4]),
+        (INNER, [4, 4, 4, 2]),
+        (INNER.replace("{angle_deg: 0}", "{angle_deg: 0, ends_at: 4}").replace(" 3}", " 2}"), [3, 4, 4, 1]),
+    ],
+)
+def test_the_figure_shows_both_paths_of_the_tip_and_every_tendon_to_where_it_ends(
+    setting: str, pieces: list[int]
+) -> None:
+    wrist = wristctl.load_study(None, setting).wrist
+    made = course(len(pieces), name="figure-of-8")
     left, right = motion_in_space(made, wrist, "as believed").axes
     drawn: dict[Any, Any] = {line.get_label(): line.get_xydata() for line in right.get_lines()}
     np.testing.assert_allclose(drawn["tip reached"], 1e3 * made.tip[:, 1:], atol=1e-9)
     np.testing.assert_allclose(drawn["tip wanted"], 1e3 * made.tip_desired[:, 1:], atol=1e-9)
-    colours = [line.get_color() for line in left.get_lines()]
-    assert [colours.count(colour) for colour in TENDON_COLOURS[:4]] == [4] * tendons + [0] * (4 - tendons)
+    lines: dict[Any, list[Any]] = {colour: [] for colour in TENDON_COLOURS[:4]}
+    for line in left.get_lines():
+        lines.get(line.get_color(), []).append(line.get_xydata())
+    assert [len(each) for each in lines.values()] == [*pieces, *[0] * (4 - len(pieces))]
+    bent = int(np.argmax(np.hypot(*made.bend.T)))
+    centres, frames = spatial_frames(made.segment_theta[bent], wrist.length, np.linspace(0.0, 1.0, wrist.discs))
+    for cable, parts in zip(cables(wrist), lines.values(), strict=False):
+        holes = 1e3 * seen(centres + frames @ np.array([0.0, cable.y, cable.z]))[:, :2]
+        ends = {tuple(np.round(end, 6)) for part in parts for end in part}
+        assert ends == {tuple(np.round(hole, 6)) for hole in holes[: cable.discs]}
     assert len(left.patches) == wrist.discs and left.get_title(loc="left") == "as believed"
     assert rim(wrist) > wrist.tendon_radius
+
+
+@pytest.mark.parametrize("planes", [(1.0, 0.2), (-1.0, 0.2), (0.2, 1.0), (0.2, -1.0)])
+def test_the_figure_shows_the_wrist_where_it_is_bent_most_in_whichever_plane(planes: tuple[float, float]) -> None:
+    """It bends and comes back, late in one plane and early in the other, which bends little."""
+    still = course()
+    time = still.time
+    late, early = (25.0 * np.exp(-(((time - at) / 0.2) ** 2)) for at in (1.0, 0.4))
+    most, little = np.radians(late), np.radians(early)
+    bends = np.stack([most, little] if abs(planes[0]) == 1.0 else [little, most], axis=1) * np.array(planes)
+    segments = np.tile(0.25 * bends, 4)
+    made = dataclasses.replace(still, theta=bends, segment_theta=segments, tip=spatial_tips(segments, 0.08))
+    left, right = motion_in_space(made, WristParameters()).axes
+    assert right.get_title(loc="left") == "bent most at 1.00 s"
+    (here,) = (line for line in right.get_lines() if line.get_marker() == "o")
+    np.testing.assert_allclose(np.asarray(here.get_xydata(), float), 1e3 * made.tip[[1000], 1:])
+    (dot,) = (line for line in left.get_lines() if line.get_marker() == "o")
+    np.testing.assert_allclose(np.asarray(dot.get_xydata(), float), 1e3 * seen(made.tip[[1000]])[:, :2])
 
 
 SEEK = "const s = document.getElementById('instant'); s.value = {}; s.dispatchEvent(new Event('input'));"

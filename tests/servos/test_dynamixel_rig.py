@@ -26,6 +26,7 @@ from wristctl.servos.x_series import (
     GOAL_CURRENT,
     GOAL_POSITION,
     HARDWARE_ERROR,
+    MODEL_NUMBER,
     OPERATING_MODE,
     PROFILE_VELOCITY,
     REALTIME_TICK,
@@ -101,13 +102,21 @@ def test_a_servo_pulls_no_more_than_its_limit_where_the_wrist_is_held() -> None:
     assert tension is not None and np.asarray(tension).max() <= 25.0
 
 
-def test_tension_is_that_of_the_currents_within_the_gears_friction() -> None:
-    rig, servos = rehearsed()
+@pytest.mark.parametrize("pulled", [0, 1, 2])
+@pytest.mark.parametrize(("senses", "model"), [((1, 1, 1), 1030), ((1, -1, -1), 1010)])
+def test_tension_is_that_of_the_currents_within_the_gears_friction(
+    senses: tuple[int, int, int], model: int, pulled: int
+) -> None:
+    """Whichever servo pulls, in either sense, and where the last servo is of a model with another unit of current."""
+    winding = [Servo(one.id, one.tendon, sense) for one, sense in zip(SETTINGS.servos, senses, strict=True)]
+    rig, servos = rehearsed(settings=other(servos=winding))
+    servos.servos[2]._model = model
+    servos.servos[2]._put(MODEL_NUMBER, model)
     stood = rig.connect()
-    passed(rig, 1.0, stood + np.array([180.0, 0.0, 0.0]))
+    passed(rig, 1.0, stood + 180.0 * np.eye(3)[pulled])
     tension = rig.look().tension
     friction = 0.015 / SETTINGS.spool_radius
-    assert servos.wrist.pull[0] > 5.0 and tension == pytest.approx(servos.wrist.pull, abs=friction + 0.7)
+    assert servos.wrist.pull[pulled] > 5.0 and tension == pytest.approx(servos.wrist.pull, abs=friction + 0.7)
 
 
 def test_a_setting_that_a_servo_does_not_take_is_named(monkeypatch: pytest.MonkeyPatch) -> None:

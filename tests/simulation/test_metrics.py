@@ -203,6 +203,18 @@ def test_metrics_of_a_trajectory_are_those_of_its_tip_and_of_the_true_wanted_ang
     }
 
 
+def test_errors_in_two_planes_are_distances() -> None:
+    """Off by 0.03 rad toward radial and 0.04 toward flexion; the tip by 2, 3 and 6 mm along the three axes."""
+    path, tips, still = np.zeros((1000, 2)), np.zeros((1000, 3)), np.zeros((1000, 4))
+    course = Trajectory(
+        "", np.arange(1000.0) * 1e-3, path + np.array([-0.03, 0.04]), still, path, path, path,
+        tips + np.array([2e-3, -3e-3, 6e-3]), tips, path, path, still,
+    )  # fmt: skip
+    found = of_trajectory(course)
+    assert found["rmse_desired"] == pytest.approx(0.05)
+    assert (found["tip_rmse_mm"], found["tip_steady_mm"]) == pytest.approx((7.0, 7.0))
+
+
 def test_the_observer_is_judged_by_what_it_expects_of_itself_in_both_planes() -> None:
     """Off by 0.02 rad toward ulnar and 0.06 toward flexion: where it expects that it is as good as it thinks."""
     off, path, tips = np.tile((0.02, -0.06), (50, 1)), np.zeros((50, 2)), np.zeros((50, 3))

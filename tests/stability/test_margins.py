@@ -30,8 +30,8 @@ PLANTS = {
 }
 
 
-def _open(name: str) -> tuple[control.StateSpace, SampledLoop]:
-    own = control.ss(control.c2d(control.ss(PLANTS[name]), PERIOD))
+def _open(name: str, gain: float = 1.0) -> tuple[control.StateSpace, SampledLoop]:
+    own = control.ss(control.c2d(control.ss(gain * PLANTS[name]), PERIOD))
     return own, closed(np.array(own.A), np.array(own.B)[:, 0], np.array(own.C)[0], PERIOD)
 
 
@@ -96,6 +96,16 @@ def test_a_loop_bears_whole_ticks_of_delay_up_to_its_margin(name: str) -> None:
         assert all(late(loop, ticks) < 1.0 for ticks in range(30))
     else:
         assert late(loop, math.floor(found.delay / PERIOD)) < 1.0 < late(loop, math.floor(found.delay / PERIOD) + 2)
+
+
+@pytest.mark.parametrize("name", ["double integrator with lead", "resonances, many crossings"])
+def test_what_a_plane_bears_by_itself_is_within_its_margins_and_all_of_its_phase_margin_at_some_gain(name: str) -> None:
+    """Where the locus is nearest to -1 as it crosses the unit circle, which loops do whose phase rises there."""
+    every = [margins(_open(name, gain)[1]) for gain in np.geomspace(0.1, 10.0, 9)]
+    found = [each for each in every if each.stable]
+    assert all(each.least.value < each.of_each.least < 1.0 < each.of_each.most < each.most.value for each in found)
+    shares = [each.of_each.phase / abs(each.phase.value) for each in found]
+    assert 0.99 < max(shares) <= 1.0 + 1e-9
 
 
 def test_an_unstable_loop_tells_where_it_would_be_stable() -> None:

@@ -62,6 +62,21 @@ def test_each_plane_bears_any_gain_within_its_own_margin_whatever_the_other_bear
     assert not any(_grows(loop, np.array([first, second])) for first in gains for second in gains)
 
 
+@pytest.mark.parametrize("across", [0.0, 1.0])
+def test_each_plane_bears_any_phase_within_its_own_margin_to_either_side_whatever_the_other_bears(
+    across: float,
+) -> None:
+    """As many radians as take a gain to the same disk about -1 as the least and the largest factor do."""
+    loop = _coupled(across)
+    found = margins(loop)
+    each = found.of_each
+    phases = each.phase * np.linspace(-0.999, 0.999, 13)
+    turns = np.exp(1j * phases)
+    assert not any(_grows(loop, np.array([first, second])) for first in turns for second in turns)
+    for factor in (each.least, each.most, *np.exp(1j * each.phase * np.array([-1.0, 1.0]))):
+        assert abs(1.0 / factor - 1.0) == pytest.approx(1.0 / found.sensitivity.value)
+
+
 def test_a_delay_takes_both_planes_to_their_margin() -> None:
     """The loop with one whole tick of delay more in both, by its poles."""
     loop = _coupled(0.5)

@@ -86,6 +86,21 @@ def test_leaves_of_lists_and_whole_numbers_given_as_ranges_are_reached() -> None
     ].plant_segments == 3
 
 
+@pytest.mark.parametrize("item", [0, 1, 2])
+def test_the_other_items_of_a_list_stay_whichever_is_swept(item: int) -> None:
+    """Rows of settings, numbers, and numbers within a row."""
+    rows = "compare.controllers=[{controller: smc, gains: printed}, {controller: pid}, {controller: ct-dob}]"
+    places = "wrist.tendons=[{angle_deg: 0}, {angle_deg: 120}, {angle_deg: 240}]"
+    study = load_study(overrides=[rows, places, "wrist.gravity=[-9.0, 2.0]"])
+    swept = (f"controllers.{item}.controller=mrac", f"wrist.tendons.{item}.angle_deg=7", f"wrist.gravity.{item % 2}=3")
+    at = study_at(study, axes_of(study.model_copy(update={"sweep": swept}), "compare"), ["mrac", 7.0, 3.0])
+    names, angles, gravity = ["smc", "pid", "ct-dob"], [0.0, 120.0, 240.0], [-9.0, 2.0]
+    names[item], angles[item], gravity[item % 2] = "mrac", 7.0, 3.0
+    assert [row.controller for row in at.compare.rows] == names
+    assert not isinstance(at.wrist.tendons, str) and [place.angle_deg for place in at.wrist.tendons] == angles
+    assert list(at.wrist.gravity) == gravity
+
+
 @pytest.mark.parametrize(
     "sweep, told",
     [

@@ -234,9 +234,11 @@ def test_a_few_skipped_ticks_are_borne_and_the_last_half_second_alone_counts() -
         ticks(watch, timing, 60, skips=1)
 
 
-def sighting(number: int, verdict: SightingVerdict = SightingVerdict.OK, shift: float = 0.0) -> Sighting:
+def sighting(
+    number: int, verdict: SightingVerdict = SightingVerdict.OK, shift: float = 0.0, theta: float = 0.0, plane: int = 0
+) -> Sighting:
     corners = np.stack([SQUARE + np.array([0.0, down]) for down in (shift, -300.0)])
-    return Sighting(number / 60.0, number, 0.0, verdict, corners, 1.0, stands=1.0, grey=100.0)
+    return Sighting(number / 60.0, number, theta, verdict, corners, 1.0, stands=1.0, grey=100.0, plane=plane)
 
 
 @pytest.mark.parametrize(("dropped", "share"), [(0.0, 0.05), (0.0, 0.3), (0.4, 0.05), (0.4, 0.3)])
@@ -271,6 +273,30 @@ def test_pictures_that_are_no_news_and_commands_sent_again_are_counted_over_the_
         expected = {0.0: (5, 0), 0.5: (5, 3), 0.99: (5, 3), 1.01: (0, 3), 3.0: (0, 1)}[clock]
         assert (watch._values["repeated"], watch._values["resent"]) == expected
     assert "5 pictures within a second were no news" in watch.words() and "3 commands" in watch.words()
+
+
+@pytest.mark.parametrize("worse", [0, 1])
+def test_of_two_cameras_the_one_counts_that_sees_less_or_shows_more(worse: int) -> None:
+    """Angles that do not come, pictures that are no news, a base that moves, and a marker that lags."""
+    watch, timing = watching(planes=2)
+    reeled = np.array([1.0, 1.0, -1.0, -1.0]) if worse == 0 else np.array([1.0, -1.0, 1.0, -1.0])
+    way = 1e-3 * np.sin(6.0 * PERIOD * np.arange(401))
+    for tick in range(400):
+        watch.predict((way[tick + 1] - way[tick]) * reeled)
+        for plane in (0, 1):
+            if plane != worse or tick % 3 == 0:
+                bend = watch._blind.angles(max(0.0, tick * PERIOD - 0.05 * (plane == worse)))[0, plane]
+                watch.saw(sighting(tick, theta=float(bend), plane=plane), tick * PERIOD, tick * PERIOD)
+        watch.sighted(sighting(tick, shift=8.0 * (tick > 0), plane=worse), tick * PERIOD)
+        watch.sighted(sighting(tick, plane=1 - worse), tick * PERIOD)
+        ticks(watch, timing, 1)
+    for _ in range(3):
+        watch.sighted(sighting(0, SightingVerdict.FROZEN, 8.0, plane=worse), 400 * PERIOD)
+    watch.sighted(sighting(0, SightingVerdict.FROZEN, plane=1 - worse), 400 * PERIOD)
+    ticks(watch, timing, 1)
+    assert watch._values["unseen"] == pytest.approx(1.0 - 1.0 / (3.0 * PERIOD * 60.0 * 0.95), abs=0.02)
+    assert (watch._values["repeated"], watch._values["moved"]) == pytest.approx((3.0, 0.2))
+    assert 0.03 < watch._values["lag"] <= 0.05, "as much as there is at least"
 
 
 def test_a_tension_is_told_of_spools_that_were_counted_lately_alone() -> None:

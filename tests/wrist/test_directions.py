@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from wristctl.comparison.combinations import compare
 from wristctl.config.wrist import WristParameters
@@ -53,6 +55,21 @@ def test_each_plane_has_its_own_stiffness() -> None:
     for plane, same in (("ulnar", even), ("radial", even), ("flexion", stiff), ("extension", stiff)):
         np.testing.assert_array_equal(uneven[plane], same[plane])
     assert in_plane(WristParameters(flexion_ratio=0.8), "flexion").flexion_ratio == 1.25
+
+
+@given(st.floats(0.2, 5.0), st.floats(-90.0, 90.0), st.sampled_from(list(DIRECTIONS.values())))
+def test_springs_along_an_oblique_axis_are_as_each_plane_alone_meets_them(
+    ratio: float, axis: float, seen: Direction
+) -> None:
+    """The diagonal of the stiffness whose principal axes are turned."""
+    c, s = np.cos(np.radians(axis)), np.sin(np.radians(axis))
+    turn, springs = np.array([[c, -s], [s, c]]), np.diag([0.6, 0.6 * ratio])
+    of_ulnar, of_flexion = np.diag(turn @ springs @ turn.T)
+    own, other = (of_ulnar, of_flexion) if seen.plane == "ulnar" else (of_flexion, of_ulnar)
+    wrist = WristParameters(stiffness=0.6, flexion_ratio=ratio, stiffness_axis_deg=axis)
+    met = in_plane(wrist, seen.name)
+    assert (met.stiffness, met.flexion_ratio) == pytest.approx((own, other / own))
+    assert met.stiffness_axis_deg == 0.0
 
 
 @pytest.mark.parametrize("each", DIRECTIONS.values(), ids=lambda d: d.name)

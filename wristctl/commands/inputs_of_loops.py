@@ -349,15 +349,11 @@ def with_found(study: Study, command: str, found: Found) -> Study:
         found.said = True
         text, told = wrist.yaml, {"wrist.stiffness", *wrist.told}
     known = with_identified(study, command, text)
-    if command != "recommend":
-        return known
-    if known.recommend.rig is None:
-        measured = known.recommend.measured(told)
-    else:
-        from wristctl.commands.recommend.own_rig import drawn_by_facts
+    if command == "recommend":
+        from wristctl.commands.recommend.own_rig import narrowed
 
-        measured = known.recommend.measured(told, drawn_by_facts(known.recommend.rig))
-    return known.model_copy(update={"recommend": measured})
+        return narrowed(known, told)
+    return known
 
 
 def found_in(run: Run) -> Found:

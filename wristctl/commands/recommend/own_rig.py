@@ -6,7 +6,7 @@ speak of, as friction and the springs, is drawn as for any rig.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from functools import cache
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -113,6 +113,13 @@ def drawn_by_facts(name: str) -> dict[str, Drawn]:
     elif stiffness != Drive().stiffness:
         draw.pop(_STIFFNESS)
     return draw
+
+
+def narrowed(study: Study, told: Collection[str] | None) -> Study:
+    """The study of an identified wrist, whose rigs differ by what the settings that are `told` leave open; None: all."""
+    settings = study.recommend
+    usual = RecommendSettings().draw if settings.rig is None else drawn_by_facts(settings.rig)
+    return study.model_copy(update={"recommend": settings.measured(told, usual)})
 
 
 def on_the_rig(study: Study) -> Study:
