@@ -56,7 +56,7 @@ def lay_hand_on(bench: VirtualBench, grip: Grip, since: float, duration: float =
         for k in range(len(out)):
             within = (first + k) * PERIOD - starts["first trial"] - since
             if 0.0 <= within < duration:
-                bend, rate = (np.atleast_1d(load.bend(part)) for part in np.split(load._state, [n]))  # type: ignore[attr-defined]
+                bend, rate = (np.atleast_1d(load.bend(part)) for part in np.split(load._state, [n]))
                 here = _with_force(disturbances, grip(bend, rate))
             else:
                 here = disturbances

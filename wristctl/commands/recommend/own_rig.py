@@ -116,7 +116,7 @@ def drawn_by_facts(name: str) -> dict[str, Drawn]:
 
 
 def narrowed(study: Study, told: Collection[str] | None) -> Study:
-    """The study of an identified wrist, whose rigs differ by what the settings that are `told` leave open; None: all."""
+    """The study of an identified wrist, whose rigs differ by what the `told` settings leave open; None: all."""
     settings = study.recommend
     usual = RecommendSettings().draw if settings.rig is None else drawn_by_facts(settings.rig)
     return study.model_copy(update={"recommend": settings.measured(told, usual)})
