@@ -86,9 +86,6 @@ EDGES = {
         {**TWO_PLANES, "markers": {"base": 0, "tip": 1}, "markers_2": {"base": 2, "tip": 3}},
         {"markers_2": {"base": 2, "tip": 1}},
     ),
-    "bench of two planes": Edge(
-        RigSettings, {"planes": 2, "real_time": False}, {"bench": {"plant": {"model": "hinges"}}}
-    ),
     "motors": Edge(RigSettings, {"actuator": {"level": "tendon"}}, {"actuator": {"level": "lagged"}}),
     "board ahead": Edge(
         RigSettings,

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Protocol
 
 from wristctl.commands.inputs import Inputs, check_sides
+from wristctl.commands.recommend.own_rig import narrowed
 from wristctl.config.compare import CompareSettings
 from wristctl.config.controller_row import BY_LOOP, Row
 from wristctl.config.families import Family
@@ -349,11 +350,7 @@ def with_found(study: Study, command: str, found: Found) -> Study:
         found.said = True
         text, told = wrist.yaml, {"wrist.stiffness", *wrist.told}
     known = with_identified(study, command, text)
-    if command == "recommend":
-        from wristctl.commands.recommend.own_rig import narrowed
-
-        return narrowed(known, told)
-    return known
+    return narrowed(known, told) if command == "recommend" else known
 
 
 def found_in(run: Run) -> Found:
