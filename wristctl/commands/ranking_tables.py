@@ -30,7 +30,7 @@ _SHORT = 15
 
 
 # What a condition's number in brackets is of: a case is a motion that was asked for.
-_COUNTED = {"case": "motions", "repetition": "repetitions of all motions", "world": "worlds"}
+_COUNTED = {"case": "motions", "repetition": "repetitions", "world": "worlds"}
 
 
 def answer_tables(rankings: Sequence[Ranking]) -> list[Table]:
@@ -89,8 +89,9 @@ def _of_controllers(
 
     rows = [(names[label], *(cell(ranking, label) for ranking in conditions)) for label in labels]
     given = any("[" in text for row in rows for text in row)
-    counted = joined(list(dict.fromkeys(_COUNTED[ranking.unit] for ranking in conditions)))
-    title = f"RMSE [deg]{', 95 % interval' * given}; * best, = tied with it; in brackets the number of {counted}"
+    units = list(dict.fromkeys(_COUNTED[ranking.unit] for ranking in conditions))
+    counted = f"; (n): {units[0]}" if len(units) == 1 else ""
+    title = f"RMSE [deg]{', 95 % interval' * given}; * best, = tied{counted}"
     left = [f"{len(names) - len(labels)} more controllers"] * (len(names) > len(labels))
     left += ["steps"] * (len(conditions) < len(rankings))
     title += f"; {joined(left)}: --all" if left else ""
