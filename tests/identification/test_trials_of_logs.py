@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -9,9 +10,12 @@ from typing import Any
 import numpy as np
 import pytest
 
+from wristctl.config.identify import IdentifySettings
+from wristctl.config.plant import Actuator
 from wristctl.config.wrist import TendonPlace, WristParameters
 from wristctl.errors import UserError
 from wristctl.identification.measured_trials import places_of_log, trials_of_logs
+from wristctl.identification.problem import GAIN, TURN, bend_problem
 from wristctl.records.open_log import OpenLog
 
 WRIST = WristParameters()
@@ -116,3 +120,26 @@ def test_a_trial_with_too_few_readings_is_refused_and_says_how_many() -> None:
         trials_of_logs([changed(name, columns[20])], WRIST, 0.01)
         with pytest.raises(UserError, match="19 "):
             trials_of_logs([changed(name, columns[19])], WRIST, 0.01)
+
+
+def test_bends_at_times_of_their_own_are_of_cameras_whose_views_may_stand_askew() -> None:
+    """Bends beside the counts of all spools are one instrument's; one row is enough to say so."""
+    together, gap = log(), math.nan
+    seen = np.arange(len(TIME)) % 2 == 0
+    columns = {
+        name: np.where(seen ^ name.startswith("spool"), column, gap) for name, column in together.columns.items()
+    }
+    columns["time"] = TIME
+    apart = replace(together, columns=columns)
+    (one,), (cameras,) = (trials_of_logs([each], WRIST, 1e-3) for each in (together, apart))
+    assert not one.by_cameras and cameras.by_cameras
+    kinds = [
+        {
+            view.kind
+            for view in bend_problem(
+                trials, places_of_log(log(), WRIST), WRIST, Actuator(level="tendon"), IdentifySettings()
+            ).views
+        }
+        for trials in ([one], [cameras], [one, cameras])
+    ]
+    assert kinds == [set(), {TURN, GAIN}, {TURN, GAIN}]

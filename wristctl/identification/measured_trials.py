@@ -67,6 +67,8 @@ class MeasuredTrial:
     channel: NDArray[np.int64] = field(default_factory=lambda: np.zeros((), np.int64))
     """What each reading is of (R,), or all: the bend of each plane, then the tension of each tendon."""
     per_newton: float = 1.0
+    by_cameras: bool = True
+    """Whether the bends were seen at times of their own; else they stand beside the counts, as one instrument's."""
 
     @property
     def planes(self) -> tuple[str, ...]:
@@ -209,6 +211,7 @@ def _trial_of_log(
         if name.startswith("bend") and there.sum() < _FEWEST:
             raise UserError(f"{int(there.sum())} readings of {name}", label, f"{_FEWEST} or more")
         readings.append((clock[there], column[there]))
+    beside = counted & within & np.isfinite([log.columns[name] for name in ("bend_y", "bend_z")]).all(axis=0)
     per_newton = 1.0
     if tensions := [values for _, values in readings[2:] if len(values) >= _FEWEST]:
         per_newton = frame_noise([values for _, values in readings[:2]]) / max(frame_noise(tensions), 1e-9)
@@ -218,6 +221,7 @@ def _trial_of_log(
         np.concatenate([times for times, _ in readings]),
         np.concatenate([scale * values for scale, (_, values) in zip(scales, readings, strict=True)]),
         exposure, tuple(numbers), np.repeat(np.arange(len(names)), [len(times) for times, _ in readings]), per_newton,
+        not beside.any(),
     )  # fmt: skip
 
 

@@ -147,9 +147,10 @@ class Problem:
     def views(self) -> dict[Coordinate, Array]:
         """Errors of the views in two planes, each with the bends (P, P) that it adds to those of the wrist.
 
-        A view that is turned from ulnar toward flexion shows part of the other plane's bend.
+        A view that is turned from ulnar toward flexion shows part of the other plane's bend. One instrument that takes
+        both planes' bends has no such errors.
         """
-        if not self.places:
+        if not self.places or not any(trial.by_cameras for trial in self.trials):
             return {}
         ulnar, flexion = PLANES
         return {
