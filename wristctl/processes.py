@@ -70,15 +70,19 @@ def check_hardware_allowed(what: str, where: str) -> None:
 
 def cores() -> int:
     """Cores that this process may use; OMP_NUM_THREADS may say fewer, as it does in a worker that shares a machine."""
-    there = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    there = _there()
     said = os.environ.get("OMP_NUM_THREADS", "").partition(",")[0]
     return max(1, min(there, int(said))) if said.isdigit() else there
 
 
 def crowding() -> float:
     """How many times longer than alone a process takes on this machine: waiting processes of the last minute a core."""
-    there = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-    return max(1.0, os.getloadavg()[0] / there)
+    return max(1.0, os.getloadavg()[0] / _there())
+
+
+def _there() -> int:
+    """Cores that the system gives this process."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 @contextmanager

@@ -8,17 +8,14 @@ import numpy as np
 import pytest
 
 from tests.bench.conftest import TAUT
-from tests.bench.test_spatial_bench import SECOND, SLIDING, course, hosted, looked
+from tests.bench.test_spatial_bench import SECOND, SLIDING, course, hosted, off_the_truth
 from wristctl.bench.bench_wrist import Truth
 from wristctl.bench.virtual_bench import VirtualBench
 from wristctl.config.bench import BenchSettings, WeakenedPlant
-from wristctl.config.camera import Gates, Markers
 from wristctl.config.plant import Disturbances, Push
 from wristctl.config.wrist import TendonPlace, WristParameters
 from wristctl.errors import UserError
 from wristctl.simulation.worlds import plant_of
-from wristctl.vision.marker import Tracker
-from wristctl.vision.two_views import bend_seen
 from wristctl.wrist.directions import ACTIVE, DIRECTIONS, TENDONS
 from wristctl.wrist.plant import PLANTS_IN_SPACE
 from wristctl.wrist.spatial.hinges_in_space import hinged_equilibrium
@@ -110,20 +107,7 @@ def test_a_taper_bends_it_more_at_its_tip_and_less_at_its_base(sign: int) -> Non
 
 def test_each_camera_tells_the_true_bend_of_its_plane() -> None:
     host = hosted(plant=LINKS)
-    trackers = [
-        Tracker(markers, eye.scene.view, Gates(), plane=plane)  # type: ignore[arg-type]
-        for plane, (markers, eye) in enumerate(zip((Markers(), SECOND), host.bench._rig.eyes, strict=True))
-    ]
-    off: list[list[float]] = [[], []]
-    for steps in ((-300, -100, -80, 500), (300, -600, 900, -100)):
-        host.reel(steps)
-        for plane, frames in enumerate(looked(host, 0.3)):
-            truth = host.bench.truth()
-            for _, frame in frames:
-                true = [np.interp(frame.time, truth.time, column) for column in truth.angle.T]
-                seen = trackers[plane].see(frame)
-                off[plane].append(bend_seen(seen, trackers[plane].view, true[1 - plane]) - true[plane])
-    assert np.ptp(host.bench.truth().angle, axis=0).min() > 0.2
+    off = off_the_truth(host, host.reel, 0.3)
     assert min(map(len, off)) > 20 and np.degrees(np.abs(np.concatenate(off)).max()) < 0.3
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import subprocess
 import sys
 from collections import Counter
+from collections.abc import Callable
 from typing import Any, Literal
 
 import numpy as np
@@ -327,23 +328,28 @@ def looked(host: Host, seconds: float) -> list[list[Any]]:
     return frames
 
 
-def test_each_camera_tells_the_true_bend_of_its_plane() -> None:
-    host = hosted()
-    rig = host.bench._rig
+def off_the_truth(host: Host, move: Callable[[tuple[int, int, int, int]], object], seconds: float) -> list[list[float]]:
+    """By how much each camera's angles are off the true bend of its plane [rad], so long from two moves on."""
     trackers = [
         Tracker(markers, eye.scene.view, Gates(), plane=plane)  # type: ignore[arg-type]
-        for plane, (markers, eye) in enumerate(zip((Markers(), SECOND), rig.eyes, strict=True))
+        for plane, (markers, eye) in enumerate(zip((Markers(), SECOND), host.bench._rig.eyes, strict=True))
     ]
     off: list[list[float]] = [[], []]
     for steps in ((-300, -100, -80, 500), (300, -600, 900, -100)):
-        host.board.send(Target(steps, (2000,) * 4))
-        for plane, frames in enumerate(looked(host, 0.5)):
+        move(steps)
+        for plane, frames in enumerate(looked(host, seconds)):
             truth = host.bench.truth()
             for _, frame in frames:
                 true = [np.interp(frame.time, truth.time, column) for column in truth.angle.T]
                 sighting = trackers[plane].see(frame)
                 off[plane].append(bend_seen(sighting, trackers[plane].view, true[1 - plane]) - true[plane])
     assert np.ptp(host.bench.truth().angle, axis=0).min() > 0.2
+    return off
+
+
+def test_each_camera_tells_the_true_bend_of_its_plane() -> None:
+    host = hosted()
+    off = off_the_truth(host, lambda steps: host.board.send(Target(steps, (2000,) * 4)), 0.5)
     assert min(map(len, off)) > 40 and np.degrees(np.abs(np.concatenate(off)).max()) < 0.3
 
 

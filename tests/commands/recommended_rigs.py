@@ -30,7 +30,6 @@ from wristctl.commands.inputs import Inputs
 from wristctl.commands.recommend.answer import RECOMMENDED, Recommended
 from wristctl.commands.recommend.command import plan, recommend
 from wristctl.config.study import Study
-from wristctl.config.wrist import WristParameters
 from wristctl.errors import UserError
 from wristctl.records import start_run
 
@@ -59,16 +58,16 @@ class Drawn(NamedTuple):
     """[kg]"""
 
     @property
-    def settings(self) -> dict[str, Any]:
-        """What the wrist is told by."""
+    def study(self) -> Study:
+        """The study that asks for a recommendation for the wrist."""
         own = self._asdict()
-        upward = _GRAVITY if own.pop("hanging") else -_GRAVITY
-        return own | {"gravity": (upward, 0.0)}
+        own["gravity"] = [_GRAVITY if own.pop("hanging") else -_GRAVITY, 0.0]
+        return wristctl.load_study(None, *(f"wrist.{key}={value}" for key, value in own.items()))
 
     @property
     def buckles(self) -> bool:
         """Whether it is upright and falls over with springs of 0.7, a fifth in hand: K < g (m (L/3 + h) + m_w L/6)."""
-        wrist = WristParameters.model_validate(self.settings)
+        wrist = self.study.wrist
         tips = self.hand_mass * (self.length / 3.0 + wrist.hand_offset) + wrist.mass * self.length / 6.0
         return not self.hanging and SPRINGS[0] * self.stiffness < 1.2 * _GRAVITY * tips
 
@@ -80,18 +79,9 @@ def drawn(number: int) -> Drawn:
     return Drawn("four" if number % 2 else "three", number % 4 < 2, *map(float, generator.uniform(lows, highs)))
 
 
-def study_of(number: int) -> Study:
-    """The study that asks for a recommendation for the wrist."""
-    return wristctl.load_study(None, *(f"wrist.{key}={_typed(value)}" for key, value in drawn(number).settings.items()))
-
-
-def _typed(value: Any) -> Any:
-    return list(value) if isinstance(value, tuple) else value
-
-
 def tried_out(number: int) -> dict[str, Any]:
     """What `recommend` says of a wrist, and how the commands for its finalists end; angles in degrees."""
-    study = study_of(number)
+    study = drawn(number).study
     try:
         plan(study, Inputs({}))
     except UserError as error:

@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from tests.commands.recommended_rigs import Verdict, _command, drawn, page, right, study_of, verdict
+from tests.commands.recommended_rigs import Verdict, _command, drawn, page, right, verdict
 from wristctl.commands.inputs import Inputs
 from wristctl.commands.recommend.command import plan
 from wristctl.errors import UserError
@@ -92,7 +92,7 @@ def test_only_upright_wrists_fall_over_and_just_these_are_refused() -> None:
     assert fall and not any(drawn(number).hanging for number in fall)
     for number in [*fall, 3, 7, 12]:
         try:
-            plan(study_of(number), Inputs({}))
+            plan(drawn(number).study, Inputs({}))
         except UserError as error:
             assert right(number, {"not_tried": str(error.what)}) and "buckles" in str(error.what)
             assert not right(3, {"not_tried": str(error.what)})

@@ -14,8 +14,9 @@ import pytest
 from tests.doors.conftest import wristctl
 from tests.doors.test_own_rig import ONE_PLANE, written
 from wristctl.commands.adoption import adopted
-from wristctl.commands.recommend.own_rig import drawn_by_facts, on_the_rig, said_of_facts
+from wristctl.commands.recommend.own_rig import drawn_by_facts, narrowed, on_the_rig, said_of_facts
 from wristctl.commands.recommend.reach import asked_of_rigs, family_of_rigs
+from wristctl.config.choices import RIGS
 from wristctl.config.loop import Reference
 from wristctl.config.recommend import MEASURED, RecommendSettings
 from wristctl.config.study import Study
@@ -79,17 +80,19 @@ def test_a_fact_that_is_a_number_is_not_drawn_and_a_study_goes_before(tmp_path: 
 def test_a_log_narrows_what_it_tells_and_the_facts_stay_for_the_rest(tmp_path: Path) -> None:
     """Also where a run's own config.yaml, which has what is drawn, is run again."""
     spread = ("stiffness=TENDON", "stiffness=Spread(2e4, 1e4, 4e4)")
-    usual = study_of(tmp_path, SPREADS[0], spread).recommend
-    name, key = usual.rig, "plant.actuator.tendon_stiffness"
-    assert name is not None and usual.draw == drawn_by_facts(name) and usual.draw[key] == "x0.5..2"
-    told = usual.measured({"wrist.damping"}, drawn_by_facts(name)).draw
+    study = study_of(tmp_path, SPREADS[0], spread)
+    usual, name, key = study.recommend, study.recommend.rig, "plant.actuator.tendon_stiffness"
+    assert name is not None and usual.draw == drawn_by_facts(RIGS[name].facts) and usual.draw[key] == "x0.5..2"
+    told = narrowed(study, {"wrist.damping"}).recommend.draw
     assert told == usual.draw | {"plant.damping": MEASURED["plant.damping"]} != usual.draw
-    whole = usual.measured(None, drawn_by_facts(name)).draw
+    whole = narrowed(study, None).recommend.draw
     assert whole == usual.draw | MEASURED and not {"plant.sensor.delay_frames", "plant.sensor.noise_deg"} & set(whole)
-    again = RecommendSettings.model_validate(usual.model_dump())
-    assert again.measured({"wrist.damping"}, drawn_by_facts(name)).draw == told
-    own = RecommendSettings(rig=name, draw={key: "x0.9..1.2"})
-    assert own.measured(None, drawn_by_facts(name)) is own, "what somebody says stays"
+    again = study.model_copy(update={"recommend": RecommendSettings.model_validate(usual.model_dump())})
+    assert narrowed(again, {"wrist.damping"}).recommend.draw == told
+    own = study.model_copy(update={"recommend": RecommendSettings(rig=name, draw={key: "x0.9..1.2"})})
+    assert narrowed(own, None).recommend == own.recommend, "what somebody says stays"
+    any_rig = narrowed(Study(), {"wrist.damping"}).recommend.draw
+    assert any_rig == RecommendSettings().draw | {"plant.damping": MEASURED["plant.damping"]}
 
 
 def test_in_one_plane_a_side_has_the_stiffness_and_the_lever_of_its_tendons(tmp_path: Path) -> None:

@@ -288,11 +288,11 @@ def test_views_that_are_turned_alike_show_a_turned_wrist_and_a_gain_is_its_plane
     for plane in PLANES:
         x[problem.coordinates[Coordinate(TURN, place=plane)]] = turn
     turned = course @ np.array([[math.cos(turn), -math.sin(turn)], [math.sin(turn), math.cos(turn)]])
-    np.testing.assert_allclose(problem.viewed(course, x), turned, atol=turn**2)
+    np.testing.assert_allclose(problem.viewed(trial, course, x), turned, atol=turn**2)
     assert np.abs(turned - course).max() > 100.0 * turn**2
     x = problem.begin()
     x[problem.coordinates[Coordinate(GAIN, place="flexion")]] = 0.01
-    np.testing.assert_allclose(problem.viewed(course, x), course * [1.0, 1.01], atol=1e-12)
+    np.testing.assert_allclose(problem.viewed(trial, course, x), course * [1.0, 1.01], atol=1e-12)
 
 
 def test_slopes_of_views_are_the_differences_of_what_is_expected() -> None:

@@ -133,13 +133,14 @@ def test_bends_at_times_of_their_own_are_of_cameras_whose_views_may_stand_askew(
     apart = replace(together, columns=columns)
     (one,), (cameras,) = (trials_of_logs([each], WRIST, 1e-3) for each in (together, apart))
     assert not one.by_cameras and cameras.by_cameras
-    kinds = [
-        {
-            view.kind
-            for view in bend_problem(
-                trials, places_of_log(log(), WRIST), WRIST, Actuator(level="tendon"), IdentifySettings()
-            ).views
-        }
+    places, tendons = places_of_log(log(), WRIST), Actuator(level="tendon")
+    problems = [
+        bend_problem(trials, places, WRIST, tendons, IdentifySettings())
         for trials in ([one], [cameras], [one, cameras])
     ]
+    kinds = [{coordinate.kind for coordinate in problem.coordinates} & {TURN, GAIN} for problem in problems]
     assert kinds == [set(), {TURN, GAIN}, {TURN, GAIN}]
+    both, bends = problems[-1], np.ones((3, 2))
+    moved = [both.viewed(trial, bends, np.full(len(both.coordinates), 1e-3)) for trial in (one, cameras)]
+    np.testing.assert_array_equal(moved[0], bends)
+    np.testing.assert_allclose(moved[1], np.tile([1.002, 1.0], (3, 1)))

@@ -61,6 +61,22 @@ def test_sheets_under_the_same_header_are_trials_and_others_are_none_of_the_log(
     assert {name: len(trial.columns["time"]) for name, trial in log.trials().items()} == {"Up": 40, "Down": 25}
 
 
+@pytest.mark.parametrize("sheet", [0, 1])
+def test_what_is_wrong_in_a_sheet_is_at_the_row_that_this_sheet_shows(sheet: int, tmp_path: Path) -> None:
+    rows = [[list(row) for row in ROWS] for _ in range(2)]
+    rows[sheet][7][2] = "lost"
+    sheets = ("Up", [HEADS, *rows[0]]), ("Down", [["Of the afternoon."], HEADS, *rows[1]])
+    with pytest.raises(UserError, match=rf"'lost' - .*log\.xlsx:{9 + sheet} "):
+        read_table(saved(tmp_path / "log.xlsx", *sheets))
+
+
+def test_sheets_of_one_header_in_other_units_are_refused(tmp_path: Path) -> None:
+    bare, metres = [head.split(" [")[0] for head in HEADS], ["s", "m", "m", "deg"]
+    sheets = ("Up", [bare, ["s", "mm", "mm", "deg"], *ROWS]), ("Down", [bare, metres, *ROWS])
+    with pytest.raises(UserError, match="other units"):
+        read_table(saved(tmp_path / "log.xlsx", *sheets))
+
+
 def test_a_cell_that_nobody_filled_is_nan_also_at_the_end_of_a_row(tmp_path: Path) -> None:
     rows = [list(row) for row in ROWS]
     rows[3][3] = rows[5][1] = None

@@ -8,7 +8,6 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Protocol
 
 from wristctl.commands.inputs import Inputs, check_sides
-from wristctl.commands.recommend.own_rig import narrowed
 from wristctl.config.compare import CompareSettings
 from wristctl.config.controller_row import BY_LOOP, Row
 from wristctl.config.families import Family
@@ -334,6 +333,7 @@ class Found:
 
 def with_found(study: Study, command: str, found: Found) -> Study:
     """The study with the wrist that was found. UserError where a log told ratios and nobody says the stiffness."""
+    from wristctl.commands.recommend.own_rig import narrowed
     from wristctl.identification.unknowns import with_identified
 
     text, told = found.yaml, None

@@ -62,7 +62,7 @@ def linearise(problem: Problem, x: Array) -> Linearisation:
         nudged = np.tile(x, (2 * len(moved), 1))
         nudged[np.arange(len(nudged)), np.tile(columns, 2)] += np.concatenate([nudges, backward])
         bends, delay = problem.courses(trial, (x, *nudged)), problem.delay(trial, x)
-        course = problem.viewed(bends, x)
+        course = problem.viewed(trial, bends, x)
         expected, *near = (trial.shown(angle, delay) for angle in course)
         slopes = np.zeros((len(expected), len(x)))
         sides = (np.array(near) - expected) / np.concatenate([nudges, backward])[:, None]
@@ -73,9 +73,9 @@ def linearise(problem: Problem, x: Array) -> Linearisation:
             h = problem.settings.step
             early, late = (trial.shown(course[0], delay - shift) for shift in (-h, h))
             slopes[:, [coordinates[each] for each in delays]] = ((early - late) / (2.0 * h))[:, None]
-        for view in problem.views:
+        for view in problem.views(trial):
             alone = np.arange(len(x)) == coordinates[view]
-            slopes[:, coordinates[view]] = trial.shown(problem.viewed(bends[0], alone) - bends[0], delay)
+            slopes[:, coordinates[view]] = trial.shown(problem.viewed(trial, bends[0], alone) - bends[0], delay)
         for zero, share in problem.zeros(trial).items():
             slopes[:, coordinates[zero]] = share
             expected = expected + share * x[coordinates[zero]]

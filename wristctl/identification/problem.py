@@ -89,7 +89,8 @@ class Problem:
         zeros = [zero for trial in self.trials for zero in self.zeros(trial)]
         spools = [spool_zero(trial, tendon) for trial in self.trials for tendon in trial.tendons]
         clocks = [clock for trial in self.trials for clock in self.clocks(trial)]
-        every = dict.fromkeys([*free, *zeros, *spools, *clocks, *self.views])
+        views = [view for trial in self.trials for view in self.views(trial)]
+        every = dict.fromkeys([*free, *zeros, *spools, *clocks, *views])
         return {coordinate: index for index, coordinate in enumerate(every)}
 
     def begin(self) -> Array:
@@ -143,14 +144,13 @@ class Problem:
         """The camera's zeros that a trial's readings (R,) hold, each with its share in every reading."""
         return {Coordinate(ZERO, trial.run, plane): trial.of(k).astype(float) for k, plane in enumerate(trial.planes)}
 
-    @cached_property
-    def views(self) -> dict[Coordinate, Array]:
-        """Errors of the views in two planes, each with the bends (P, P) that it adds to those of the wrist.
+    def views(self, trial: MeasuredTrial) -> dict[Coordinate, Array]:
+        """Errors of a trial's views in two planes, each with the bends (P, P) that it adds to those of the wrist.
 
         A view that is turned from ulnar toward flexion shows part of the other plane's bend. One instrument that takes
         both planes' bends has no such errors.
         """
-        if not self.places or not any(trial.by_cameras for trial in self.trials):
+        if not self.places or not trial.by_cameras:
             return {}
         ulnar, flexion = PLANES
         return {
@@ -160,10 +160,10 @@ class Problem:
             Coordinate(GAIN, place=flexion): np.diag([0.0, 1.0]),
         }
 
-    def viewed(self, courses: Array, x: Array) -> Array:
-        """Courses (..., P + M) as their views show them at coordinates x."""
+    def viewed(self, trial: MeasuredTrial, courses: Array, x: Array) -> Array:
+        """A trial's courses (..., P + M) as its views show them at coordinates x."""
         viewed, bends = courses.copy(), courses[..., : len(PLANES)]
-        for view, added in self.views.items():
+        for view, added in self.views(trial).items():
             viewed[..., : len(PLANES)] += x[self.coordinates[view]] * bends @ added.T
         return viewed
 

@@ -12,6 +12,7 @@ import csv
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import chain
 from pathlib import Path
 
 import numpy as np
@@ -49,7 +50,7 @@ from wristctl.records.ros_bags import SUFFIXES, bag_table
 from wristctl.records.run import Run
 from wristctl.records.table_text import decoded, table_of
 from wristctl.records.workbooks import SUFFIXES as WORKBOOKS
-from wristctl.records.workbooks import text_of_workbook
+from wristctl.records.workbooks import texts_of_sheets
 
 Words = NDArray[np.str_]
 
@@ -249,7 +250,18 @@ def _matlab_table(file: Path, what: str) -> RecordedTable:
 
 
 def _workbook_table(file: Path, what: str) -> RecordedTable:
-    return _text_table(text_of_workbook(file), file, what)
+    """A sheet, or several under the same header as trials, which a column `trial` names where they have none."""
+    sheets = {name: _text_table(text, file, what) for name, text in texts_of_sheets(file).items()}
+    first, *_ = tables = list(sheets.values())
+    if not all(table.heads == first.heads for table in tables):  # units stand in a line of their own
+        raise UserError("sheets under one header with other units", str(file), "the units of the first in all")
+    heads, columns = list(first.heads), zip(*(table.cells for table in tables), strict=True)
+    cells: list[Cells] = [[*chain(*of_sheets)] for of_sheets in columns]
+    if len(sheets) > 1 and "trial" not in heads:
+        heads.append("trial")
+        cells.append([name for name, table in sheets.items() for _ in table.lines])
+    remarks = dict.fromkeys(chain(*(table.remarks for table in tables)))
+    return RecordedTable(heads, cells, [*chain(*(table.lines for table in tables))], first.header_line, list(remarks))
 
 
 _READERS: Mapping[str, Callable[[Path, str], RecordedTable]] = {

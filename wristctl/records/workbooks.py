@@ -39,28 +39,23 @@ def _text(cell: Any) -> str:
     return cell.isoformat() if isinstance(cell, date) else str(cell)
 
 
-def text_of_workbook(file: Path) -> str:
-    """The log in a workbook as text whose cells tabs part; its lines are the rows of the first sheet with two columns.
+def texts_of_sheets(file: Path) -> dict[str, str]:
+    """Texts, whose cells tabs part, of the sheets that are a log, by their names; the lines are the sheets' rows.
 
-    Sheets under the same header are trials, which a column `trial` names; others are none of it. Raises UserError where
-    no sheet has two columns.
+    They are those under the header of the first that has two columns. Raises UserError where none has.
     """
     sheets = {name: [_filled(row) for row in rows] for name, rows in read_sheets(file).items()}
     heads = {name: next((row for row in rows if len(row) > 1 and all(row)), None) for name, rows in sheets.items()}
     header = next(filter(None, heads.values()), None)
     if header is None:
         raise UserError("no sheet of the workbook has two columns", str(file), "a header and samples below it")
-    trials = [name for name, head in heads.items() if head == header]
-    parted = len(trials) > 1 and "trial" not in header
-    lines = list[list[str]]()
-    for number, name in enumerate(trials):
-        rows = sheets[name] if number == 0 else sheets[name][sheets[name].index(header) + 1 :]
-        for row in rows:
-            whole = row if len(row) < 2 else [*row, *[""] * (len(header) - len(row))]
-            mark = [] if not parted or len(row) < 2 else ["trial" if row == header else name]
-            lines.append([*whole, *mark])
+    return {name: _text_of(sheets[name], len(header)) for name, head in heads.items() if head == header}
+
+
+def _text_of(rows: list[list[str]], width: int) -> str:
     text = io.StringIO()
-    csv.writer(text, delimiter="\t", lineterminator="\n").writerows(lines)
+    whole = ([*row, *[""] * (width - len(row))] if len(row) > 1 else row for row in rows)
+    csv.writer(text, delimiter="\t", lineterminator="\n").writerows(whole)
     return text.getvalue()
 
 

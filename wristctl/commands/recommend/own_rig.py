@@ -61,11 +61,16 @@ def _spoken(facts: Facts) -> dict[str, Spoken]:
 
 
 def _facts(study: Study) -> tuple[Facts, str]:
-    from wristctl.trial.rig_settings import check_facts
-
     name = study.recommend.rig
     assert name is not None
-    return check_facts(getattr(RIGS[name], "facts", None), name), name
+    return _facts_of(name), name
+
+
+def _facts_of(name: str) -> Facts:
+    """Facts of the rig of this name. Raises UserError where they cannot be."""
+    from wristctl.trial.rig_settings import check_facts
+
+    return check_facts(getattr(RIGS[name], "facts", None), name)
 
 
 def _trials(study: Study) -> HwRunSettings:
@@ -81,9 +86,9 @@ def with_facts(study: Study, name: str) -> Study:
 
     Raises UserError where the facts cannot be, or do not fit what was given.
     """
-    from wristctl.trial.rig_settings import check_facts, wrist_of
+    from wristctl.trial.rig_settings import wrist_of
 
-    facts = check_facts(getattr(RIGS[name], "facts", None), name)
+    facts = _facts_of(name)
     wrist = wrist_of(facts, study.wrist, name)
     settings, known = study.recommend, _trials(study).known_loop
     usual = RecommendSettings.model_fields["loop"].default
@@ -95,17 +100,14 @@ def with_facts(study: Study, name: str) -> Study:
     if settings.loop.control_period == usual.control_period:
         changed["control_period"] = known.control_period
     loop = settings.loop.model_copy(update=changed)
-    draw = settings.draw if "draw" in settings.model_fields_set else drawn_by_facts(name)
+    draw = settings.draw if "draw" in settings.model_fields_set else drawn_by_facts(facts)
     return study.model_copy(
         update={"wrist": wrist, "recommend": settings.model_copy(update={"loop": loop, "draw": draw})}
     )
 
 
-def drawn_by_facts(name: str) -> dict[str, Drawn]:
-    """What is drawn of any rig, but for what the facts of the rig of this name say. UserError where they cannot be."""
-    from wristctl.trial.rig_settings import check_facts
-
-    facts = check_facts(getattr(RIGS[name], "facts", None), name)
+def drawn_by_facts(facts: Facts) -> dict[str, Drawn]:
+    """What is drawn of any rig, but for what the facts of this one say."""
     draw = {key: drawn for key, drawn in RecommendSettings().draw.items() if key not in _OF_FACTS}
     stiffness = facts.drive.stiffness
     if isinstance(stiffness, Spread) and stiffness.low < stiffness.high:
@@ -118,8 +120,8 @@ def drawn_by_facts(name: str) -> dict[str, Drawn]:
 def narrowed(study: Study, told: Collection[str] | None) -> Study:
     """The study of an identified wrist, whose rigs differ by what the `told` settings leave open; None: all."""
     settings = study.recommend
-    usual = RecommendSettings().draw if settings.rig is None else drawn_by_facts(settings.rig)
-    return study.model_copy(update={"recommend": settings.measured(told, usual)})
+    own = {} if settings.rig is None else {"usual": drawn_by_facts(_facts_of(settings.rig))}
+    return study.model_copy(update={"recommend": settings.measured(told, **own)})
 
 
 def on_the_rig(study: Study) -> Study:
