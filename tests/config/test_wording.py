@@ -41,6 +41,13 @@ def test_every_part_has_words_for_the_command_line_and_for_python(phrase: Phrase
     assert str(error) == f"it is missing - reference.inverse - fix: {in_python}" and error.fix == in_python
 
 
+def test_of_a_key_that_nobody_gave_no_other_override_is_the_place_and_a_file_is() -> None:
+    error = UserError("no taper", "hw-run.wrist.taper")
+    assert located(error, read_study([], ["hw-run.directions=[ulnar]"])[1]).where == "hw-run.wrist.taper"
+    given = UserError("no such side", "hw-run.directions.0")
+    assert located(given, {("hw-run",): "a.yaml:1"}).where == "a.yaml:1: hw-run.directions.0"
+
+
 def test_an_error_that_learns_its_place_keeps_what_to_give() -> None:
     with pytest.raises(UserError) as caught, under("simulate"):
         raise UserError("no tuned gains", "gains", (Argument("tuned"), ", a tune run"), exit_code=3)

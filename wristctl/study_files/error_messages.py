@@ -10,7 +10,7 @@ from pydantic import ValidationError
 from wristctl.config.plant import Actuator
 from wristctl.config.study import Study
 from wristctl.config.wrist import WristParameters
-from wristctl.errors import Phrase, UserError, meant, nearest
+from wristctl.errors import Phrase, Setting, UserError, meant, nearest
 from wristctl.study_files.keys import field_at, keys_of, unit_of
 from wristctl.study_files.strict_yaml import KeyPath
 
@@ -32,14 +32,19 @@ def explained(error: ValidationError, origins: Mapping[KeyPath, Phrase]) -> User
 
 
 def located(error: UserError, origins: Mapping[KeyPath, Phrase]) -> UserError:
-    """The error with the file and line (or override) of the key path that it names; as it is where it names none."""
+    """The error with the file and line (or override) of the key path that it names; as it is where it names none.
+
+    Of a key that nobody gave its section's, but for a section of overrides: those are of other keys.
+    """
     path: KeyPath = ()
     for key in error.where.split("."):
         deeper = (*path, int(key) if key.isdigit() else key)
         if deeper not in origins:
             break
         path = deeper
-    return error.at((origins[path], f": {error.where}")) if path else error
+    if not path or (len(path) < error.where.count(".") + 1 and isinstance(origins[path], Setting)):
+        return error
+    return error.at((origins[path], f": {error.where}"))
 
 
 def fault_of(detail: Any) -> tuple[str, str]:
