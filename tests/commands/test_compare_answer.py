@@ -137,6 +137,9 @@ def test_a_controller_is_a_line_and_a_condition_a_column_in_the_order_that_was_t
     one, other = stands(rmse=typed), stands("pushed", rmse=typed | {"pid-ff": 1e-4}, swings=("mine",))
     table = controllers_table([one, other], names_of([one, other]))
     assert table.columns == ("controller", "sampled (12)", "push (12)")
+    drawn = replace(one, unit="world")
+    for rankings, counted in (([one, other], "; (n): motions"), ([drawn], "; (n): worlds"), ([one, drawn], "tied")):
+        assert str(controllers_table(rankings, names_of(rankings)).title).endswith(counted)
     assert [row[0] for row in table.rows] == list(typed)
     assert names_of([one, other])["adrc/hardware"] == "adrc/hardware", "adrc alone would be another row"
     first = one.labels[winner(one, [one, other]) or 0]

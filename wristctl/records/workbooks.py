@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
-from datetime import date
 from pathlib import Path
-from typing import Any
 
 from wristctl.errors import UserError
 from wristctl.plain_files import LARGEST_DATA, open_plain
@@ -32,11 +30,7 @@ def read_sheets(file: Path) -> dict[str, list[list[str]]]:
         raise UserError(f"cannot read the workbook: {reason}", str(file), "check the path") from error
     except Exception as error:  # openpyxl names no errors of its own for a file that is none: BadZipFile, KeyError, ...
         raise UserError("it is no Excel workbook", str(file), _FIX) from error
-    return {str(name): [list(map(_text, row)) for row in frame.to_numpy()] for name, frame in frames.items()}
-
-
-def _text(cell: Any) -> str:
-    return cell.isoformat() if isinstance(cell, date) else str(cell)
+    return {str(name): [list(map(str, row)) for row in frame.to_numpy()] for name, frame in frames.items()}
 
 
 def texts_of_sheets(file: Path) -> dict[str, str]:
