@@ -76,7 +76,7 @@ def cores() -> int:
 
 
 def crowding() -> float:
-    """How many times longer than alone a process takes on this machine: waiting processes of the last minute a core."""
+    """How many times longer a process takes here than alone: what ran or waited in the last minute, for each core."""
     return max(1.0, os.getloadavg()[0] / _there())
 
 

@@ -62,7 +62,7 @@ def test_a_trial_that_is_stopped_keeps_nothing_but_the_width_of_its_range() -> N
         "none: all swing" in text
         and "has tried 4 of 20" in text
         and "1 of 4 fall over" in text
-        and "For 3 it is right" in text
+        and "and no other: 3 of 4 are treated so" in text
     )
 
 
