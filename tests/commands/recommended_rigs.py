@@ -181,8 +181,8 @@ def page(rows: Sequence[tuple[int, dict[str, Any]]]) -> str:
         "tendons, a camera for each plane, and springs weakened to 0.7 of what is believed, then as believed. Errors",
         "and swings are of the emulated wrist's own angle; a swing is the largest of all trials, pushed ones too.",
         f"`make recommended-rigs` has tried {len(rows)} of {WRISTS}, and goes on there.", "",
-        f"{falling} of {len(rows)} fall over: upright, with springs of 0.7 too soft for the hand, a fifth in hand. Such a",
-        f"wrist is to be refused before a motor turns, and no other: {met} of {len(rows)} are treated so.", "",
+        f"{falling} of {len(rows)} fall over: upright, with springs of 0.7 too soft for the hand, a fifth in hand.",
+        f"Such a wrist is to be refused before a motor turns, and no other: {met} of {len(rows)} are treated so.", "",
         f"Of {len(verdicts)} with a recommendation", "", *counts, "",
         "| wrist: tendons, length, stiffness, hand | use | RMSE [deg], springs x0.7, x1 | printed range [deg] | "
         "best finalist [deg] | swing [deg] | kept |",
