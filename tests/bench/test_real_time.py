@@ -115,13 +115,13 @@ def test_two_cameras_see_both_planes_of_a_wrist_in_real_time(serving: Serving, m
     board.wait_while(Flag.MOVING, timeout=60.0)
     board.ping()
     time.sleep(0.5)
-    shown = [camera.newest() for camera in bench.cameras]
+    settled = time.monotonic()
+    shown = [wait_for(lambda of=camera: (new := of.newest()) and new.time > settled and new) for camera in bench.cameras]
     angle = bench.truth().angle[-1]
     board.close()
     assert angle.shape == (2,) and angle[0] > 0.1 and abs(angle[1]) < 0.01
     seen = []
     for plane, (frame, markers) in enumerate(zip(shown, (Markers(), Markers(base=2, tip=3)), strict=True)):
-        assert frame is not None
         found = Detector().everywhere(frame.image, fine=True)
         assert set(found) == {markers.base, markers.tip}, plane
         tip, base = (found[each][0][1] - found[each][0][0] for each in (markers.tip, markers.base))
