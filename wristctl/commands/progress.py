@@ -20,7 +20,7 @@ Watch = Callable[[str, int, int | None, Mapping[str, float]], None]
 # Time between two events [s].
 _EVENT_EVERY = 1.0
 # Time after which a pace is meaningful [s].
-_TELLS = 1.5
+_TELLS = 1.0
 # Time from which a step has a line of the log, unless details are asked for [s].
 _LONG = 1.0
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from contextlib import nullcontext
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -49,7 +50,7 @@ _SWINGS = ("rmse", "oscillation", "sustained")
 # Rigs on which the limits of motion and payload are looked for.
 _RIGS_AT_LIMITS = 12
 # Time of a rollout at short steps over that of a search's; seconds of limits and figures, and of rehearsals.
-_CLOSELY, _DRAWN, _REHEARSED = 2.0, 10.0, 40.0
+_CLOSELY, _DRAWN, _REHEARSED = 2.0, 6.0, 40.0
 TUNED, SCALED = "tuned", "scaled preset"
 # Relative difference of two gains that is none: a search begins at the preset, to its last bit but one.
 _ALIKE = 1e-9
@@ -160,17 +161,21 @@ def _searches(session: Session, study: Study, family: Family, scaled: Sequence[C
         }
     )  # fmt: skip
     judges, searches = judges_of(tuning), dict[str, "Search"]()
-    total, count = settings.iterations * sum(law.learning for law in scaled), 0
-    budget = settings.iterations * settings.candidates * settings.draws
-    then = _CLOSELY * (settings.candidates * settings.validation + 2 * settings.tests) / budget
-    with session.progress("tuning", total, "iterations", then, _afterwards(study)) as advance:
+    searching, choosing = settings.iterations * settings.draws, _CLOSELY * settings.validation
+    total, ended = (searching + choosing) * sum(law.learning for law in scaled), 0.0
+    then = 2.0 * _CLOSELY * settings.tests / (settings.candidates * (searching + choosing))
+    with session.progress("tuning", 100, "%", then, _afterwards(study)) as advance:
         for law in scaled:
 
-            def so_far(result: Search, before: int = count, learning: int = law.learning) -> None:
-                advance(before + learning * len(result.tried.values))
+            def searched(result: Search, before: float = ended, learning: int = law.learning) -> None:
+                advance(round(100.0 * (before + learning * settings.draws * len(result.tried.values)) / total))
 
-            searches[law.name] = search(tuning, law, session.findings.stream, judges, so_far)
-            count += settings.iterations * law.learning
+            def chosen(percent: int, before: float = ended, learning: int = law.learning) -> None:
+                advance(round(100.0 * (before + learning * (searching + choosing * percent / 100.0)) / total))
+
+            told = nullcontext(chosen)
+            searches[law.name] = search(tuning, law, session.findings.stream, judges, searched, choosing=told)
+            ended += law.learning * (searching + choosing)
     return searches
 
 

@@ -121,7 +121,7 @@ def fair_study(session: Session) -> Studied:
         golden = golden_of(study)
     session.findings.numerics(golden=golden.expected, executor=session.executor)
     wanted = search_units(study)
-    after = len(families_of(study)) * after_rollouts(len(study.study.laws))
+    after = after_rollouts(len(families_of(study)) * len(study.study.laws))
     then = _rollouts_of_tests(study) / sum(unit.size for unit in wanted.values())
     tuned = performed(session, "study", "tuning", list(wanted.values()), golden, then=then, after=after)
     searches = {
