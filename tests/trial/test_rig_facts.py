@@ -68,7 +68,7 @@ def told_of_two(first: CameraFacts, second: CameraFacts, **changes: Any) -> list
 
 
 def test_a_sound_rig_has_no_troubles() -> None:
-    assert told() == [] == told(pose=posed(3.0, -3.0))
+    assert told() == [] == told(pose=posed(3.0, -3.0)) == told(pace=pace(60.0, 0.095))
 
 
 @pytest.mark.parametrize(
@@ -80,6 +80,8 @@ def test_a_sound_rig_has_no_troubles() -> None:
         ({"pace": pace(40.0, 0.033)}, False, "gives 40 pictures/s; the loop's observer counts on 60", "device.fourcc"),
         ({"pace": pace(60.0, 0.0, 61, jitter=4e-3)}, False, "unevenly, +-12 ms", "hub"),
         ({"pace": pace(60.0, 0.14)}, True, "beyond safety.stale (150 ms)", "safety.stale of 0.2"),
+        ({"pace": pace(30.0, 0.066)}, False, "lost one after the other, the angle is 167 ms old", "safety.stale=0.2"),
+        ({"pace": pace(60.0, 0.105)}, False, "the angle is 156 ms old", "safety.stale=0.2"),
         ({"latency": Latency(0.06, 3e-4, 40.0, 5e-4, 99)}, False, "60 ms older than their time stamps say",
          "device.delay=0.0600"),
         ({"latency": Latency(0.12, 3e-4, 40.0, 5e-4, 99)}, True, "beyond safety.stale", "safety.stale of 0.2 s"),

@@ -280,10 +280,25 @@ def _of_a_camera(camera: CameraFacts, settings: HwRunSettings) -> list[Trouble]:
         pace.fits(settings.safety.stale, hidden)
     except CameraError as error:
         met.append(Trouble(True, error.what, error.fix))
+    else:
+        met += _of_two_lost(pace.oldest + hidden + 1.0 / pace.rate, pace.whose, settings.safety.stale)
     if pace.jitter * pace.rate > _UNEVEN:
         problem = f"pictures{pace.whose} come unevenly, +-{1e3 * pace.jitter:.0f} ms"
         met.append(Trouble(False, problem, "another USB port or hub, or a computer that does less besides"))
     return met
+
+
+def _of_two_lost(oldest: float, whose: str, stale: float) -> list[Trouble]:
+    """Of an angle that is so old [s] before the next one comes, where two pictures are lost one after the other."""
+    if oldest <= stale:
+        return []
+    problem = (
+        f"where two pictures{whose} are lost one after the other, the angle is {1e3 * oldest:.0f} ms old before the "
+        f"next: beyond safety.stale ({1e3 * stale:.0f} ms), that ends a trial"
+    )
+    return [
+        Trouble(False, problem, f"a faster mode of the camera, or --set safety.stale={math.ceil(20 * oldest) / 20:g}")
+    ]
 
 
 def _of_the_age(facts: RigFacts, settings: HwRunSettings) -> list[Trouble]:
