@@ -12,6 +12,7 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
+from functools import partial
 from pathlib import Path
 from typing import NamedTuple
 
@@ -23,7 +24,7 @@ from tests.bench.record import is_released, last_step, read
 from tests.board.patience import WATCHDOG, patient, wait_for
 from wristctl.bench.emulated_rig import EmulatedRig
 from wristctl.bench.faults import Faults
-from wristctl.bench.frame_process import FrameMemory
+from wristctl.bench.frame_process import FrameMemory, SharedCamera
 from wristctl.bench.real_time_bench import RealTimeBench, films_of
 from wristctl.bench.server import BenchServer, FaultyLine
 from wristctl.board.board_errors import NoAnswer, PortLost, Restarted
@@ -116,7 +117,12 @@ def test_two_cameras_see_both_planes_of_a_wrist_in_real_time(serving: Serving, m
     board.ping()
     time.sleep(0.5)
     settled = time.monotonic()
-    shown = [wait_for(lambda of=camera: (new := of.newest()) and new.time > settled and new) for camera in bench.cameras]
+
+    def newer(camera: SharedCamera) -> Frame | None:
+        frame = camera.newest()
+        return frame if frame is not None and frame.time > settled else None
+
+    shown = [wait_for(partial(newer, camera)) for camera in bench.cameras]
     angle = bench.truth().angle[-1]
     board.close()
     assert angle.shape == (2,) and angle[0] > 0.1 and abs(angle[1]) < 0.01

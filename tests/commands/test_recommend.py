@@ -340,7 +340,11 @@ def test_of_what_errs_hardly_more_the_one_is_taken_that_is_lost_on_fewer_rigs(
         of["standing"] = of["standing"]._replace(groups=[*groups])
         return replace(found, ranking=replace(ranked, **of))
 
-    assert told(0, [least], [more], [open_loop]).best_row == least
+    alone, tied = told(0, [least], [more], [open_loop]), told(0, [least, more], [open_loop])
+    assert alone.best_row == least and tied.best_row in (least, more)
+    every, none = (" ".join(each.answer.lines()) for each in (alone, tied))
+    assert "tell its error from that of every other" in every and "do not tell its error" not in every
+    assert "do not tell its error" in none and "of every other" not in none
     safer = told(5, [least], [more], [open_loop])
     assert safer.best_row == (least if kept else more)
     assert ("unstable on more rigs" in " ".join(safer.answer.lines())) != kept

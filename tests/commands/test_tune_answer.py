@@ -178,7 +178,10 @@ def test_use_is_said_only_of_what_holds(
 )
 def test_what_a_search_gained_on_the_best_preset_is_told(preset: Beside, lost: dict[str, int], told: str) -> None:
     found = {"smc": _search("smc")}, {"smc": Beside(1e-3, 2e-2, 8)}, {"smc": dict[str, int]()}
-    answer = answer_of(*found, 8, "", {}, starts={"smc": Start("hardware", preset, lost)})
+    answer, begun = (
+        answer_of(*found, 8, "", {}, starts={"smc": Start("hardware", preset, lost, began)}) for began in (False, True)
+    )
+    assert begun is not None and told.replace("hardware,", "hardware, with which the search began,") in begun.sentence
     without = answer_of(*found, 8, "", {})
     assert answer is not None and without is not None
     assert told in answer.sentence and "preset" not in without.sentence

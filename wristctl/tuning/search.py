@@ -255,10 +255,17 @@ def _presets(controller: Controller, space: GainSpace) -> dict[str, Array]:
     return {name: gains for name, gains in preset_gains.items() if ((gains >= space.low) & (gains <= space.high)).all()}
 
 
+def first_tried(controller: Controller) -> str | None:
+    """The preset with which a search begins: the last, for the hardest conditions; None where there is none."""
+    return next(reversed(_presets(controller, GainSpace.of(controller.gains))), None)
+
+
 def _start(controller: Controller, space: GainSpace) -> Array:
-    """A preset in the unit box: the last, which is for the hardest conditions; the middle where there is none."""
-    presets = list(_presets(controller, space).values())
-    return np.clip(space.unit(presets[-1]), 0.0, 1.0) if presets else np.full(len(space.names), 0.5)
+    """The preset with which a search begins, in the unit box; the middle where there is none."""
+    preset = first_tried(controller)
+    if preset is None:
+        return np.full(len(space.names), 0.5)
+    return np.clip(space.unit(_presets(controller, space)[preset]), 0.0, 1.0)
 
 
 def _found(controller: Controller, tried: Tried, restarts: int) -> Search:

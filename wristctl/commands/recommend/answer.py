@@ -207,7 +207,7 @@ def _sentence(result: Recommended) -> str:
             "at most 25 % above the least, none is shown to be stable on more rigs; of equals it has the fewest gains"
             f"{' of those that do well in their rehearsal' * bool(result.rehearsals)}."
         )
-        return f"{sentence} {why}" if others else sentence
+        return f"{sentence} {why}" if others else f"{sentence} These rigs tell its error from that of every other."
     lesser = [other for other in first if other in result.near]
     least = ranked.means[row].value / min(ranked.means[other].value for other in lesser)
     others, be = joined([result.candidates[other].label for other in lesser]), "are" if lesser[1:] else "is"

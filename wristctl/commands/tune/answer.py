@@ -64,6 +64,8 @@ class Start(NamedTuple):
     beside: Beside
     lost: Mapping[str, int]
     """What it does wrong, and in how many cases, by mark."""
+    began: bool = False
+    """Whether the search began with it."""
 
 
 class Beside(NamedTuple):
@@ -111,13 +113,15 @@ def starts_of(searches: Mapping[str, Search], cases: Sequence[Case], wrist: Wris
 
     from wristctl.control.table import controller
     from wristctl.tuning.objective import marks_of
+    from wristctl.tuning.search import first_tried
 
     presets = {name: search.best_preset for name, search in searches.items() if not _preset_of(search)}
     found = {name: preset for name, preset in presets.items() if preset is not None}
     gains = {name: dict(zip(controller(name).gains, preset.gains, strict=True)) for name, preset in found.items()}
     errors = beside_feedforward(gains, cases, wrist)
+    lost = {name: marks_of(controller(name), np.array(preset.gains), cases, wrist) for name, preset in found.items()}
     return {
-        name: Start(preset.origin, errors[name], marks_of(controller(name), np.array(preset.gains), cases, wrist))
+        name: Start(preset.origin, errors[name], lost[name], preset.origin == first_tried(controller(name)))
         for name, preset in found.items()
     }
 
@@ -209,12 +213,16 @@ def _error(beside: Beside, cases: int, start: Start | None) -> list[str]:
     times = f"{_times(beside.ratio)} feedforward's {degrees(beside.feedforward)} deg"
     if start is not None and (start.lost or not start.beside.cases):
         faults = _faults(start.lost, cases) if start.lost else "fails in each case"
-        times += f"; its best preset, {start.preset}, {faults}"
+        times += f"; its best preset, {_named(start)}, {faults}"
     elif start is not None:
         ratio = start.beside.error / beside.error
-        times += f", {_times(ratio)} that of its best preset, {start.preset}, {degrees(start.beside.error)} deg"
+        times += f", {_times(ratio)} that of its best preset, {_named(start)}, {degrees(start.beside.error)} deg"
     where = f"{cases} cases" if beside.cases == cases else f"{beside.cases} of {cases} cases (in the others it fails)"
     return [f"Its error is {degrees(beside.error)} deg RMSE over {where}: {times}."]
+
+
+def _named(start: Start) -> str:
+    return f"{start.preset}, with which the search began" if start.began else start.preset
 
 
 def _ties(best: str, sound: Sequence[str], searches: Mapping[str, Search]) -> list[str]:
