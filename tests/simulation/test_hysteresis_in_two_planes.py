@@ -51,6 +51,8 @@ def test_what_the_spools_give_in_a_cycle_friction_and_damping_take(tendons: obje
     area = sum(np.trapezoid(pull, path) for pull, path in zip(loop.course.spool.T, travel.T, strict=True))
     assert area == pytest.approx(loop.raw_work, rel=2e-2)
     assert 0.0 < loop.exact_width < loop.width < 2.0 * loop.exact_width
+    off = loop.course.bends - np.outer(loop.bend, loop.toward)
+    assert loop.aside == pytest.approx(np.hypot(*off.T).max(), rel=1e-9) and loop.aside < 0.1 * loop.bend.max()
 
 
 @pytest.mark.slow
