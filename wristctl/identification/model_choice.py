@@ -23,7 +23,7 @@ from wristctl.identification.prediction_scores import Score, ratio_of, score_of
 _BEGINS = ({"presliding": 5e-5, "inner_presliding": 0.01}, {"presliding": 5e-4, "inner_presliding": 0.1})
 # Time of a fit with friction of tendons over that of one without, and of one with more than two terms over that of one
 # with fewer; fits that are expected once each term was tried alone: those of a robot with both frictions, as most have.
-_RUBBING, _LONGER, _FOLLOWING = 3.0, 2.7, 30.0
+_RUBBING, _LONGER, _FOLLOWING = 1.2, 1.7, 11.0
 # Unknowns that are 0 in a model without their term.
 _AMOUNTS = ("friction", "sheath", "inner_friction", "creep")
 # Share of the error by which a term lessens it at least where it is wanted: less is of nobody's concern.
