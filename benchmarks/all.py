@@ -1,7 +1,7 @@
 """All measurements of docs/benchmarks.md, and the page itself: `python benchmarks/all.py` (or `make bench-all`).
 
-Some ten minutes on a quiet machine, more the first time, when peers are installed and compiled. Results go to a folder
-under results/ and from there to benchmarks/results, which the page is made of and which is meant to be committed.
+Some twelve minutes on a quiet machine, more the first time, when peers are installed and compiled. Results go to a
+folder under results/ and from there to benchmarks/results, of which the page is made; these are meant to be committed.
 """
 
 from __future__ import annotations
@@ -27,6 +27,7 @@ def main() -> None:
         ["peers/run.py", "--out", str(out), *sys.argv[1:]],
         ["cost_model.py", "--out", str(out / "cost_model.json")],
         ["cold_start.py", "--out", str(out / "cold_start.json")],
+        ["scaling.py", "--out", str(out / "scaling.json")],
     ]
     for step in steps:
         run(step)

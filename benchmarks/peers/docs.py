@@ -1,6 +1,7 @@
 """docs/benchmarks.md from one run's results: `python benchmarks/peers/docs.py FOLDER`.
 
-The folder holds peers.json of run.py, cold_start.json and cost_model.json; a part whose file is missing is left out.
+The folder holds peers.json of run.py, cold_start.json, cost_model.json and scaling.json; a part whose file is missing
+is left out.
 """
 
 from __future__ import annotations
@@ -169,10 +170,33 @@ def cost_model(costs: dict[str, Any]) -> str:
     return "\n".join(lines) + "\n"
 
 
+def scaling(found: dict[str, Any]) -> str:
+    """Shares of the workers' time that go to units of work, by their number."""
+    dask, simulated, most = found["dask"], found["simulated"], found["most"]
+    lines = [
+        "## Over a cluster's workers\n",
+        "A study is handed out in [units of work](cluster.md); one of tests takes 20 s and more of a core "
+        f"([what rollouts cost](cost.md)). Here are units that wait for {found['takes']:g} s, so that cores are no "
+        "limit: the share of the workers' time that they fill, on worker processes of a Dask scheduler on this "
+        "machine, and on simulated ones, whose units end by a clock while handing out and keeping results is the "
+        "program's own.\n",
+        "| workers | Dask processes | simulated |\n|---|---|---|",
+    ]  # fmt: skip
+    for many, share in simulated.items():
+        measured = f"{100.0 * dask[many]:.1f} %" if many in dask else "-"
+        lines.append(f"| {int(many):,} | {measured} | {100.0 * share:.1f} % |")
+    least = max(map(int, simulated)) / most["dask"]
+    lines.append(
+        f"\nOf units that take no time {most['simulated']:.0f} a second are handed out and kept, {most['dask']:.0f} "
+        f"through Dask on this machine, by whichever 1,000 workers are kept busy with units of {least:.0f} s or more."
+    )
+    return "\n".join(lines) + "\n"
+
+
 def main() -> None:
     """Write docs/benchmarks.md and its picture."""
     folder = Path(sys.argv[1])
-    read = {name: folder / f"{name}.json" for name in ("peers", "cost_model", "cold_start")}
+    read = {name: folder / f"{name}.json" for name in ("peers", "cost_model", "cold_start", "scaling")}
     found = {name: json.loads(file.read_text()) for name, file in read.items() if file.exists()}
     result = Result(found["peers"])
     claims: list[Claim] = beside_peers(result)
@@ -188,6 +212,8 @@ def main() -> None:
         if name in found:
             claims += claimed(found[name])
             parts.append(section(found[name]))
+    if "scaling" in found:
+        parts.append(scaling(found["scaling"]))
     page = [about(result), "## Wanted and measured\n", claims_table(claims), ONE_LANE]
     page += [
         "![Closed loops a second by wristctl and its peers, and their ratios](images/benchmarks.svg)\n",

@@ -59,7 +59,7 @@ if TYPE_CHECKING:
     from wristctl.wrist.kinematics import Inverse
 
 # Time of a rollout on another loop, which may have more segments, over that of one on the loop of the search.
-_ELSEWHERE = 5
+_ELSEWHERE = 6
 # Seconds in which the margins of a controller are found.
 _MARGINS = 0.1
 # Share of what a family draws at which one of its motions is tried.
@@ -204,7 +204,7 @@ def tune(session: Session) -> Tuned:
     network = network_for(session.inputs, study.wrist, loops, planes)
     searched, chosen = tuning_cases(study, network)
     cases = chosen or searched
-    tried = (5 + _ELSEWHERE * len(study.tune.loops)) * len(cases) + sum(map(len, LADDERS)) * len(searched)
+    tried = (7 + _ELSEWHERE * len(study.tune.loops)) * len(cases) + sum(map(len, LADDERS)) * len(searched)
     searches = search_all(session, study, network, tried)
     gains = {name: best.gains for name, best in searches.items()}
     with session.progress("trying the gains found"):
