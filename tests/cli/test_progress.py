@@ -65,7 +65,13 @@ def test_a_step_has_one_line_in_the_end_and_none_if_it_takes_less_than_a_second(
 
 def test_the_time_that_is_left_is_told_at_the_pace_so_far(monkeypatch: pytest.MonkeyPatch) -> None:
     count = Count("drawing", 1000, "samples", 250, began=0.0)
-    for now, left in ((1.0, ""), (20.0, "about 60 s left"), (200.0, "about 10 min left"), (2400.0, "about 2 h left")):
+    for now, left in (
+        (0.9, ""),
+        (1.0, "about 3 s left"),
+        (20.0, "about 60 s left"),
+        (200.0, "about 10 min left"),
+        (2400.0, "about 2 h left"),
+    ):
         monkeypatch.setattr("time.monotonic", lambda now=now: now)
         assert count.remaining() == left
         assert Count("drawing", 1750, "samples", 1000, began=0.0, kept=750).remaining() == left, "at the pace of today"
