@@ -58,7 +58,7 @@ def judged(study: Study, family: str, name: str) -> Judged:
     seen, unseen = (
         drawn_cases(own, family, split, 0, draws, study.wrist) for split, draws in (("tune", most), ("test", JUDGED_ON))
     )
-    metrics = list(OBJECTIVES["as it is"].weights())
+    metrics = list(dict.fromkeys([*OBJECTIVES["as it is"].weights(), "oscillation", "sustained"]))
     measured = measure(law, gains, seen, study.wrist, metrics)
     objectives = {}
     for worlds in TUNED_ON:
