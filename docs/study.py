@@ -431,7 +431,8 @@ def _kind(families: Mapping[str, Family], name: str) -> tuple[bool, bool]:
 def told(run: Run) -> str:
     """A run as the page tells it: the command that asks for it again, and its hash."""
     source = source_of(run)
-    return f"- `{source['command']}`, {source['run']},\n  hash `{source['result_sha256']}`."
+    command = source["command"].replace(f"{HERE.parent}/", "")
+    return f"- `{command}`, {source['run']},\n  hash `{source['result_sha256']}`."
 
 
 def main() -> None:
