@@ -2,7 +2,8 @@
 
 Units that only wait, so that cores are no limit: on 1 to 8 worker processes of a Dask scheduler on this machine, and on
 up to 1,000 simulated workers, whose units end by a clock while the part that hands them out and keeps what they give is
-the program's own. What is told is the share of the workers' time that is spent on units, once each has had its first.
+the program's own; no network lies between. What is told is the share of the workers' time that units fill, after the
+first of each worker. `docs/cost.py` tells by the same units what an executor adds to each.
 """
 
 from __future__ import annotations
@@ -78,6 +79,20 @@ def simulated(many: int, takes: float) -> Workers:
     return Workers("simulated", many, opened)
 
 
+@contextmanager
+def on_dask(many: int) -> Iterator[Workers]:
+    """So many worker processes of a Dask scheduler on this machine."""
+    from distributed import LocalCluster
+
+    with LocalCluster(n_workers=many, threads_per_worker=1, dashboard_address=None) as cluster:
+        yield Workers.of("dask://" + str(cluster.scheduler_address).removeprefix("tcp://"))
+
+
+def help_workers_find_this() -> None:
+    """Worker processes import the units' function from this folder."""
+    os.environ["PYTHONPATH"] = os.pathsep.join([str(HERE), str(HERE.parent), os.environ.get("PYTHONPATH", "")])
+
+
 def ends(workers: Workers, count: int, takes: float) -> list[float]:
     """When each of so many units was done and kept, sorted [s]."""
     units, done = [Unit("scaling:waited", {"number": k, "takes": takes}) for k in range(count)], list[float]()
@@ -87,28 +102,28 @@ def ends(workers: Workers, count: int, takes: float) -> list[float]:
 
 
 def busy(workers: Workers, many: int, waiting: float) -> float:
-    """Share of the workers' time that goes to units of TAKES, after the first of each; of `waiting` they know it."""
+    """Share of the workers' time that goes to units of TAKES, after the first of each.
+
+    `waiting` is how long a unit waits by itself [s]: simulated workers wait in its place.
+    """
     done = ends(workers, (WAVES + 1) * many, waiting)
     return (len(done) - many) * TAKES / (many * (done[-1] - done[many - 1]))
 
 
 def a_second(done: list[float]) -> float:
-    """Units that were done in a second, on the average."""
+    """Units that were done in a second, on average."""
     return (len(done) - 1) / (done[-1] - done[0])
 
 
 def main() -> None:
     """Measure, and print."""
-    from distributed import LocalCluster
-
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--out", type=Path)
     options = parser.parse_args()
-    os.environ["PYTHONPATH"] = os.pathsep.join([str(HERE), os.environ.get("PYTHONPATH", "")])
-    found: dict[str, Any] = {"takes": TAKES, "dask": {}, "simulated": {}, "most": {}}
+    help_workers_find_this()
+    found: dict[str, Any] = {"date": time.strftime("%Y-%m-%d"), "takes": TAKES, "dask": {}, "simulated": {}, "most": {}}
     for many in DASK:
-        with LocalCluster(n_workers=many, threads_per_worker=1, dashboard_address=None) as cluster:
-            workers = Workers.of("dask://" + str(cluster.scheduler_address).removeprefix("tcp://"))
+        with on_dask(many) as workers:
             ends(workers, many, 0.0)  # what a worker does once
             found["dask"][many] = busy(workers, many, TAKES)
             if many == max(DASK):

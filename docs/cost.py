@@ -5,15 +5,13 @@ Processor time of this process and its threads, which a busy machine changes lit
 
 from __future__ import annotations
 
-import os
 import platform
 import sys
-import tempfile
 import textwrap
 import time
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -30,8 +28,6 @@ from wristctl.simulation.cases import Case, measure
 from wristctl.simulation.drawn_worlds import drawn_cases
 from wristctl.study_files.load import load_study
 from wristctl.work.executors import Workers
-from wristctl.work.fan_out import perform_units
-from wristctl.work.worker import Unit
 
 HERE = Path(__file__).parent
 WORLDS, ROWS, TRIES, CORES = 40, 4, 3, cores()
@@ -60,34 +56,19 @@ def _processor(work: Callable[[], object]) -> float:
     return time.process_time() - begun
 
 
-def nothing(spec: dict[str, Any]) -> dict[str, np.ndarray]:
-    """A unit that waits."""
-    time.sleep(spec["takes"])
-    return {"done": np.array(spec["number"])}
-
-
 def overheads() -> dict[str, float]:
     """Seconds that an executor adds to a unit, on one worker: of units that wait, the rest of what they take."""
-    os.environ["PYTHONPATH"] = os.pathsep.join([str(HERE), str(HERE.parent), os.environ.get("PYTHONPATH", "")])
-    units = [Unit("cost:nothing", {"number": k, "takes": TAKES}) for k in range(SLEEPS)]
-    return {named: _overhead(Workers.of(named), units) for named in ("serial", "processes:1")} | _dask(units)
+    sys.path.append(str(HERE.parent / "benchmarks"))
+    from scaling import a_second, ends, help_workers_find_this, on_dask
 
+    def added(workers: Workers) -> float:
+        return 1.0 / a_second(ends(workers, SLEEPS, TAKES)) - TAKES
 
-def _overhead(workers: Workers, units: list[Unit]) -> float:
-    ends: list[float] = []
-    with tempfile.TemporaryDirectory() as folder:
-        perform_units(units, workers, None, Path(folder), report=lambda *_: ends.append(time.perf_counter()))
-    return (ends[-1] - ends[0]) / (len(ends) - 1) - TAKES
-
-
-def _dask(units: list[Unit]) -> dict[str, float]:
-    try:
-        from distributed import LocalCluster
-    except ImportError:
-        return {}
-    with LocalCluster(n_workers=1, threads_per_worker=1, dashboard_address=None) as cluster:
-        address = str(cluster.scheduler_address).removeprefix("tcp://")
-        return {"Dask, one worker": _overhead(Workers.of(f"dask://{address}"), units)}
+    help_workers_find_this()
+    found = {named: added(Workers.of(named)) for named in ("serial", "processes:1")}
+    with suppress(ImportError), on_dask(1) as workers:
+        found["Dask, one worker"] = added(workers)
+    return found
 
 
 def main() -> None:
@@ -180,5 +161,4 @@ _MANY = [
 
 
 if __name__ == "__main__":
-    sys.path.insert(0, str(HERE))
     main()

@@ -21,7 +21,7 @@ from wristctl.control.table import controller
 from wristctl.simulation.cases import Measured, measure
 from wristctl.simulation.drawn_worlds import drawn_cases
 from wristctl.study_files.load import load_study
-from wristctl.tuning.objective import Judge
+from wristctl.tuning.objective import Judge, metrics_of
 
 HERE = Path(__file__).parent
 LAWS = {"smc-tracking": "camera", "pid-ff": "hardware", "ct-dob": "hardware"}
@@ -58,8 +58,7 @@ def judged(study: Study, family: str, name: str) -> Judged:
     seen, unseen = (
         drawn_cases(own, family, split, 0, draws, study.wrist) for split, draws in (("tune", most), ("test", JUDGED_ON))
     )
-    metrics = list(dict.fromkeys([*OBJECTIVES["as it is"].weights(), "oscillation", "sustained"]))
-    measured = measure(law, gains, seen, study.wrist, metrics)
+    measured = measure(law, gains, seen, study.wrist, metrics_of(OBJECTIVES["as it is"]))
     objectives = {}
     for worlds in TUNED_ON:
         count = worlds * len(seen) // most

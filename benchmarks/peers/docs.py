@@ -178,17 +178,17 @@ def scaling(found: dict[str, Any]) -> str:
         "A study is handed out in [units of work](cluster.md); one of tests takes 20 s and more of a core "
         f"([what rollouts cost](cost.md)). Here are units that wait for {found['takes']:g} s, so that cores are no "
         "limit: the share of the workers' time that they fill, on worker processes of a Dask scheduler on this "
-        "machine, and on simulated ones, whose units end by a clock while handing out and keeping results is the "
-        "program's own.\n",
+        "machine, and on simulated ones, whose units end by a clock, without a network, while handing out and keeping "
+        f"results is the program's own ({found['date']}).\n",
         "| workers | Dask processes | simulated |\n|---|---|---|",
     ]  # fmt: skip
     for many, share in simulated.items():
-        measured = f"{100.0 * dask[many]:.1f} %" if many in dask else "-"
-        lines.append(f"| {int(many):,} | {measured} | {100.0 * share:.1f} % |")
+        measured = f"{100.0 * dask[many]:.0f} %" if many in dask else "-"
+        lines.append(f"| {int(many):,} | {measured} | {100.0 * share:.0f} % |")
     least = max(map(int, simulated)) / most["dask"]
     lines.append(
-        f"\nOf units that take no time {most['simulated']:.0f} a second are handed out and kept, {most['dask']:.0f} "
-        f"through Dask on this machine, by whichever 1,000 workers are kept busy with units of {least:.0f} s or more."
+        f"\nUnits that take no time are handed out and kept at {most['simulated']:.0f} a second, through Dask on this "
+        f"machine at {most['dask']:.0f}. So 1,000 workers are kept busy where a unit takes {least:.0f} s or more."
     )
     return "\n".join(lines) + "\n"
 

@@ -81,7 +81,11 @@ class CameraPace:
     @property
     def oldest(self) -> float:
         """Age [s] of the newest angle just before the next one comes, where one picture between them is lost."""
-        return self.latency + 2.0 / self.rate
+        return self.oldest_after(1)
+
+    def oldest_after(self, lost: int) -> float:
+        """The same [s] where so many are lost, one after the other."""
+        return self.latency + (1 + lost) / self.rate
 
     def said(self) -> str:
         """In words."""
@@ -125,11 +129,15 @@ class CameraPace:
             raise CameraError(problem, "camera", self._faster(hidden))
 
     def _faster(self, hidden: float = 0.0) -> str:
-        least = np.ceil(20.0 * (self.oldest + hidden)) / 20.0
         return (
             "a faster mode of the camera (device.fourcc: MJPG, device.frame_rate, a shorter device.exposure), or "
-            f"safety.stale of {least:g} s at least, with a slower reference"
+            f"safety.stale of {stale_for(self.oldest + hidden):g} s at least, with a slower reference"
         )
+
+
+def stale_for(age: float) -> float:
+    """`safety.stale` [s] that bears an angle of this age [s]: the next twentieth of a second."""
+    return math.ceil(20.0 * age) / 20.0
 
 
 class CameraPaces:

@@ -13,7 +13,7 @@ from wristctl.board.driver import Board
 from wristctl.board.messages import LAYOUTS, Command, Pulls, Rate, Status
 from wristctl.config.hw_run import HwRunSettings
 from wristctl.config.wrist import WristParameters
-from wristctl.trial.camera_pace import BY_CHECK, FIX, CameraPace, CameraPaces
+from wristctl.trial.camera_pace import BY_CHECK, FIX, CameraPace, CameraPaces, stale_for
 from wristctl.trial.expected_moves import Bend, ExpectedMoves
 from wristctl.trial.resting import judge_rest
 from wristctl.trial.rig_belief import PLANES, layout_of_rig
@@ -281,7 +281,7 @@ def _of_a_camera(camera: CameraFacts, settings: HwRunSettings) -> list[Trouble]:
     except CameraError as error:
         met.append(Trouble(True, error.what, error.fix))
     else:
-        met += _of_two_lost(pace.oldest + hidden + 1.0 / pace.rate, pace.whose, settings.safety.stale)
+        met += _of_two_lost(pace.oldest_after(2) + hidden, pace.whose, settings.safety.stale)
     if pace.jitter * pace.rate > _UNEVEN:
         problem = f"pictures{pace.whose} come unevenly, +-{1e3 * pace.jitter:.0f} ms"
         met.append(Trouble(False, problem, "another USB port or hub, or a computer that does less besides"))
@@ -296,9 +296,7 @@ def _of_two_lost(oldest: float, whose: str, stale: float) -> list[Trouble]:
         f"where two pictures{whose} are lost one after the other, the angle is {1e3 * oldest:.0f} ms old before the "
         f"next: beyond safety.stale ({1e3 * stale:.0f} ms), that ends a trial"
     )
-    return [
-        Trouble(False, problem, f"a faster mode of the camera, or --set safety.stale={math.ceil(20 * oldest) / 20:g}")
-    ]
+    return [Trouble(False, problem, f"a faster mode of the camera, or --set safety.stale={stale_for(oldest):g}")]
 
 
 def _of_the_age(facts: RigFacts, settings: HwRunSettings) -> list[Trouble]:

@@ -43,6 +43,11 @@ def marks_of(law: Controller, gains: Array, cases: Sequence[Case], wrist: WristP
     return {mark: count for mark, count in counts.items() if count}
 
 
+def metrics_of(weights: Objective) -> list[str]:
+    """Metrics that an objective is made of, those by which swings are told among them."""
+    return list(dict.fromkeys([*weights.weights(), *(["oscillation", "sustained"] if weights.swinging else [])]))
+
+
 class Judge:
     """The objective of gains of any law on the same cases; the yardstick runs on them once.
 
@@ -61,9 +66,7 @@ class Judge:
         self.own_loop = own or OwnLoop(cases, wrist, controller(YARDSTICK))
         self._cells = np.array([case.cell for case in cases])
         self._horizons = np.array([case.motion.horizon for case in cases])
-        self._metrics = list(
-            dict.fromkeys([*weights.weights(), *(["oscillation", "sustained"] if weights.swinging else [])])
-        )
+        self._metrics = metrics_of(weights)
         self._yardstick = measure(controller(YARDSTICK), np.zeros((1, 0)), cases, wrist, self._metrics)
 
     @property

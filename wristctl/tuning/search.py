@@ -265,7 +265,7 @@ def _start(controller: Controller, space: GainSpace) -> Array:
     preset = first_tried(controller)
     if preset is None:
         return np.full(len(space.names), 0.5)
-    return np.clip(space.unit(_presets(controller, space)[preset]), 0.0, 1.0)
+    return np.clip(space.unit(np.array(controller.values(controller.presets[preset]))), 0.0, 1.0)
 
 
 def _found(controller: Controller, tried: Tried, restarts: int) -> Search:
