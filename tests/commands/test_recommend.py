@@ -97,8 +97,27 @@ def test_of_two_hundred_and_one_rigs_five_stay_below_the_spread_and_five_are_abo
 
 
 @pytest.fixture(scope="module")
-def found(tmp_path_factory: pytest.TempPathFactory) -> Recommended:
-    return wristctl.recommend(study_of(), out=tmp_path_factory.mktemp("recommend"))
+def reported() -> list[tuple[str, int]]:
+    """What the recommendation was at, and its count, at each step of its progress."""
+    return []
+
+
+@pytest.fixture(scope="module")
+def found(tmp_path_factory: pytest.TempPathFactory, reported: list[tuple[str, int]]) -> Recommended:
+    def watch(what: str, count: int, *_: object) -> None:
+        reported.append((what, count))
+
+    return wristctl.recommend(study_of(), out=tmp_path_factory.mktemp("recommend"), progress=watch)
+
+
+@pytest.mark.slow
+def test_a_search_counts_by_its_rigs_those_twice_by_which_gains_are_chosen(
+    found: Recommended, reported: list[tuple[str, int]]
+) -> None:
+    """An iteration on two rigs and a choice on two for each of two controllers: 2, 6, 8 and 12 of 12."""
+    shares = [count for what, count in reported if what == "tuning"]
+    assert shares == sorted(shares) and shares[-1] == 100
+    assert {17, 50, 67} <= set(shares) and max(share for share in shares if share < 67) == 50
 
 
 @pytest.mark.slow

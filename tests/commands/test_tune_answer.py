@@ -19,7 +19,7 @@ from wristctl import load_study, tune
 from wristctl.commands.perform import perform, prepare
 from wristctl.commands.progress import counting, no_event
 from wristctl.commands.session import Done, Event, Unattended
-from wristctl.commands.tune.answer import Beside, Start, answer_of, at_edge, beside_feedforward
+from wristctl.commands.tune.answer import Beside, Start, answer_of, at_edge, beside_feedforward, starts_of
 from wristctl.commands.tune.command import TUNE, Tuned
 from wristctl.config.wrist import WristParameters
 from wristctl.control.law import Controller
@@ -164,6 +164,18 @@ def test_use_is_said_only_of_what_holds(
         f"{name} = {value:.4g} {controller('smc').gains[name].unit}" for name, value in found.gains.items()
     )
     assert told is not None and told.sentence.startswith(begin.format(f"smc with {gains}"))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("name", "preset", "began"), [
+    ("pid-ff", "hardware", True), ("pid-ff", "default", False), ("gvsc", "hardware", True),
+])  # fmt: skip
+def test_a_search_begins_with_the_last_preset_of_its_controller(name: str, preset: str, began: bool) -> None:
+    search = _search(name)
+    kept = Finalist(controller(name).values(controller(name).presets[preset]), preset, -0.5, -0.5)
+    cases, _ = tuning_cases(load_study(None, "tune.scenarios=[{loop: exact, reference: {angle_deg: 10}}]"), None)
+    told = starts_of({name: replace(search, finalists=(*search.finalists, kept))}, cases, WristParameters())
+    assert (told[name].preset, told[name].began) == (preset, began)
 
 
 @pytest.mark.parametrize(
