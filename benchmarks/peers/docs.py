@@ -175,11 +175,12 @@ def scaling(found: dict[str, Any]) -> str:
     dask, simulated, most = found["dask"], found["simulated"], found["most"]
     lines = [
         "## Over a cluster's workers\n",
-        "A study is handed out in [units of work](cluster.md); one of tests takes 20 s and more of a core "
-        f"([what rollouts cost](cost.md)). Here are units that wait for {found['takes']:g} s, so that cores are no "
-        "limit: the share of the workers' time that they fill, on worker processes of a Dask scheduler on this "
-        "machine, and on simulated ones, whose units end by a clock, without a network, while handing out and keeping "
-        f"results is the program's own ({found['date']}).\n",
+        "A study is handed out in [units of work](cluster.md); one of tests takes 20 s or more of a core "
+        f"([what rollouts cost](cost.md)). Here each unit waits for {found['takes']:g} s, so that cores are no limit. "
+        "The table gives the share of the workers' time that units fill: of worker processes of a Dask scheduler on "
+        "this machine, and of simulated workers. A simulated worker's unit ends by a clock, and no network lies "
+        "between; handing units out and keeping their results is the program's own work. Measured on "
+        f"{found['date']}.\n",
         "| workers | Dask processes | simulated |\n|---|---|---|",
     ]  # fmt: skip
     for many, share in simulated.items():
@@ -188,7 +189,8 @@ def scaling(found: dict[str, Any]) -> str:
     least = max(map(int, simulated)) / most["dask"]
     lines.append(
         f"\nUnits that take no time are handed out and kept at {most['simulated']:.0f} a second, through Dask on this "
-        f"machine at {most['dask']:.0f}. So 1,000 workers are kept busy where a unit takes {least:.0f} s or more."
+        f"machine at {most['dask']:.0f}. At that rate 1,000 workers are kept busy where a unit takes {least:.0f} s or "
+        "more."
     )
     return "\n".join(lines) + "\n"
 

@@ -289,7 +289,7 @@ def _of_a_camera(camera: CameraFacts, settings: HwRunSettings) -> list[Trouble]:
 
 
 def _of_two_lost(oldest: float, whose: str, stale: float) -> list[Trouble]:
-    """Of an angle that is so old [s] before the next one comes, where two pictures are lost one after the other."""
+    """Trouble where two pictures in a row are lost: the angle is `oldest` [s] before the next, more than `stale`."""
     if oldest <= stale:
         return []
     problem = (
