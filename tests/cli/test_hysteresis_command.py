@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import shlex
+import tarfile
 from pathlib import Path
 
 import pytest
@@ -11,12 +12,13 @@ import pytest
 from tests.cli.conftest import Call
 from tests.identification.made_loops import SHORT, made_loop, written
 from wristctl.cli.former_hysteresis import words_today
-from wristctl.records import open_run
+from wristctl.records import Run, list_runs, open_run
 from wristctl.simulation.strokes import FrictionCase
 
 QUICK = ("ranges_deg=[[0, 10]]", "frequencies=[1, 5]", "angles_deg=[]")
 SET = tuple(word for text in QUICK for word in ("--set", f"hysteresis.{text}"))
 LOOP = ("--of", "hysteresis", *SET)
+ARCHIVE = Path(__file__).parents[1] / "data" / "runs" / "hysteresis.tar.xz"
 MEASURED = ("identify", "loop.csv", "--model", "hysteresis")
 
 
@@ -49,6 +51,39 @@ def test_what_was_typed_before_runs_and_is_answered_with_todays_words(call: Call
     code, again, _ = call(*shlex.split(err.split("`")[3])[1:])
     assert code == 0 and open_run(again.splitlines()[-1]).result_hash == run.result_hash
     _repeated(call, run.id)
+
+
+@pytest.fixture
+def sealed_before(tmp_path: Path) -> dict[str, Run]:
+    """Runs that `wristctl hysteresis` sealed, by what they are today: of the model, and of a measured loop."""
+    with tarfile.open(ARCHIVE) as archive:
+        archive.extraction_filter = getattr(tarfile, "data_filter", None)  # which Python 3.11.2 lacks
+        archive.extractall(tmp_path / "results")
+    runs = list_runs(tmp_path / "results")
+    return {run.kind_today: run for run in runs}
+
+
+def test_runs_of_the_former_kind_are_opened_and_verified(call: Call, sealed_before: dict[str, Run]) -> None:
+    code, out, _ = call("runs", "verify")
+    assert code == 0 and out.count("  as sealed") == 2
+    modelled, measured = sealed_before["analyse"], sealed_before["identify"]
+    assert {run.kind for run in sealed_before.values()} == {"hysteresis"} and len(sealed_before) == 2
+    assert modelled.config.analyse.of == "hysteresis" and modelled.config.hysteresis.circles_deg == (5.0,)
+    fit = measured.config.identify
+    assert (fit.model, fit.segments, fit.step, fit.misfit) == ("hysteresis", 1, 2e-3, "tell")
+    assert [Path(log).is_file() for log in fit.logs] == [True] and fit.logs[0].startswith(str(measured.path))
+    assert call("runs", "export", modelled.id, "--file", "loop.csv")[0] == 0 and Path("loop.csv").is_file()
+    code, out, _ = call("identify", "--config", f"{measured.path}/config.yaml", "--dry-run")
+    assert code == 0 and "friction, sheath, presliding from 140 samples of loop.csv" in out
+
+
+@pytest.mark.painted
+@pytest.mark.slow
+@pytest.mark.parametrize("today", ["analyse", "identify"])
+def test_runs_of_the_former_kind_are_repeated(call: Call, sealed_before: dict[str, Run], today: str) -> None:
+    code, out, _ = call("runs", "replay", sealed_before[today].id, "--json")
+    found = json.loads(out)
+    assert code == 0 and found["same"], found
 
 
 FORMER = {

@@ -191,7 +191,7 @@ COMMANDS = {
     "analyse": Entry(
         "wristctl.commands.analyse.command:ANALYSE",
         _MORE,
-        "Find the stability margins of one loop, or the hysteresis of the wrist.",
+        "Find the stability margins of one loop, or a wrist's hysteresis.",
         shortcuts=("of", "controller", "gains", "over"),
         examples=(
             "wristctl analyse --controller computed-torque --gains default",

@@ -72,7 +72,11 @@ def check_mode(study: Study, command: str | None, origins: Mapping[KeyPath, Phra
 
     if command == "analyse" and (unread := [path for path in origins if is_unread(path)]):
         path, what = max(unread, key=len), {"loop": "a loop"}.get(of, of)
-        fix = ("leave it out, or ", Setting(f"of={other}", "analyse", option=True), " (documentation: Hysteresis)")
+        fix = (
+            "leave it out, or ",
+            Setting(f"of={other}", "analyse", option=True),
+            " (documentation: Hysteresis of the wrist)",
+        )
         raise UserError(f"an analysis of {what} does not read {'.'.join(map(str, path))}", origins[path], fix)
 
 
