@@ -33,7 +33,7 @@ COMMANDS = (
     "analyse --controller gvsc --gains default",
     "study pid-ff ct-dob scenarios/ideal --executor processes",
     "paper audit claims",
-    "hysteresis hysteresis",
+    "analyse hysteresis",
     "hw-run --set directions=[ulnar] --set push.force=0",
     "identify latest:hw-run --dry-run",
     "new controller own",

@@ -31,7 +31,6 @@ COMMANDS = (
     "recommend",
     "simulate",
     "analyse",
-    "hysteresis",
     "identify",
     "hw-run",
 )

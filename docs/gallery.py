@@ -102,7 +102,7 @@ EXHIBITS = (
         "hysteresis",
         "Hysteresis of tendons",
         "Friction of the sheaths keeps the wrist from going back the way it came.",
-        "hysteresis",
+        "analyse --of hysteresis",
         "loops",
     ),
     Exhibit(

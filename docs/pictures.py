@@ -14,7 +14,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from shots import shot
 
-from wristctl.commands.hysteresis.figures import loops as loops_by_speed
+from wristctl.commands.analyse.hysteresis_figures import loops as loops_by_speed
 from wristctl.commands.ranking_drawing import places_of
 from wristctl.comparison.combinations import ComparedRow, compare
 from wristctl.comparison.controller_ranking import class_rankings
@@ -130,7 +130,9 @@ def keep(name: str, figure: Figure) -> None:
 
 def hysteresis() -> None:
     """Outer loops by sheath and speed, with the roots of the statics."""
-    study = load_study([HERE.parent / "experiments" / "hysteresis.yaml"], ["ranges_deg=[[0, 30]]"], "hysteresis")
+    study = load_study(
+        [HERE.parent / "experiments" / "hysteresis.yaml"], ["hysteresis.ranges_deg=[[0, 30]]"], "analyse"
+    )
     own = strokes(study.wrist, study.hysteresis)
     keep("hysteresis", loops_by_speed(own, loops(own)))
 

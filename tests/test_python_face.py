@@ -24,8 +24,8 @@ from wristctl.errors import UserError
 PACKAGE = Path(wristctl.__file__).parent
 
 FACE = {
-    "analyse", "audit", "compare", "gen_data", "hw_run", "hysteresis", "identify", "load_study", "open_run",
-    "recommend", "runs", "simulate", "study", "train", "tune",
+    "analyse", "audit", "compare", "gen_data", "hw_run", "identify", "load_study", "open_run", "recommend",
+    "runs", "simulate", "study", "train", "tune",
 }  # fmt: skip
 
 SMALL = """

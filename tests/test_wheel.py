@@ -103,7 +103,7 @@ def test_the_documented_commands_find_their_studies_in_an_empty_folder(installed
     page = (ROOT / "docs" / "commands.md").read_text(encoding="utf-8")
     named = re.findall(r"`(wristctl [^`]*experiments/[^`]*)`", page.replace("wristctl paper audit", "wristctl audit"))
     examples = [shlex.split(each)[1:] for each in named]
-    assert {typed[0] for typed in examples} >= {"gen-data", "train", "tune", "study", "audit", "hysteresis"}
+    assert {typed[0] for typed in examples} >= {"gen-data", "train", "tune", "study", "audit", "analyse"}
     calls = [[*typed, "--dry-run"] for typed in [*examples, ["tune", "quick"], ["tune", "scenarios/camera"]]]
     out, ended = _said(installed, tmp_path, *calls)
     assert out.startswith(f"package: {installed}/wristctl/")

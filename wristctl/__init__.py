@@ -14,8 +14,8 @@ In a notebook:
     wristctl.runs(kind="compare", newer="2d")    # a DataFrame
     wristctl.open_run("latest:compare").data("comparison")
 
-`gen_data`, `train`, `tune`, `study`, `hw_run`, `analyse`, `hysteresis`, `identify`, `recommend` and `audit` go the
-same way: wristctl.api.
+`gen_data`, `train`, `tune`, `study`, `hw_run`, `analyse`, `identify`, `recommend` and `audit` go the same way:
+wristctl.api.
 """
 
 from __future__ import annotations
@@ -32,7 +32,6 @@ if TYPE_CHECKING:
         compare,
         gen_data,
         hw_run,
-        hysteresis,
         identify,
         load_study,
         open_run,
@@ -51,7 +50,6 @@ __all__ = [
     "compare",
     "gen_data",
     "hw_run",
-    "hysteresis",
     "identify",
     "load_study",
     "open_run",
@@ -66,7 +64,7 @@ __all__ = [
 
 def __getattr__(name: str) -> Any:
     """The functions are imported when one is first asked for, so that `import wristctl` stays light."""
-    if name not in (*__all__, "api"):
+    if name not in (*__all__, "hysteresis", "api"):  # a former name
         raise AttributeError(f"module 'wristctl' has no attribute {name!r}")
     import_module("wristctl.platforms").check()
     api = import_module("wristctl.api")

@@ -15,22 +15,22 @@ says what, where and how to mend it.
 
 from __future__ import annotations
 
+import json
+import logging
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
-from wristctl.commands.analyse.command import ANALYSE, Analysed
+from wristctl.commands.analyse.command import ANALYSE
+from wristctl.commands.analyse.hysteresis_results import Hysteresis
+from wristctl.commands.analyse.results import Analysed
 from wristctl.commands.audit.command import AUDIT, Audited
 from wristctl.commands.compare.command import COMPARE, Compared
 from wristctl.commands.gen_data.command import GEN_DATA, Generated
 from wristctl.commands.gen_data.transitions import Moved
 from wristctl.commands.hw_run.command import HW_RUN
 from wristctl.commands.hw_run.results import Performed
-from wristctl.commands.hysteresis.command import HYSTERESIS, Hysteresis
-from wristctl.commands.identify.bends import BendsTold
-from wristctl.commands.identify.command import IDENTIFY, Identified
-from wristctl.commands.identify.driven import DrivenTold
-from wristctl.commands.identify.logs import LogTold
+from wristctl.commands.identify.command import IDENTIFY, AnyTold, Identified
 from wristctl.commands.perform import RESULTS, Folder, Ref, StudyOrFile, carry_out, in_python, study_with
 from wristctl.commands.progress import Watch
 from wristctl.commands.recommend.answer import Recommended
@@ -46,7 +46,9 @@ from wristctl.config.study import Study
 from wristctl.errors import UserError
 from wristctl.records import Run
 from wristctl.records import open_run as _open_run
+from wristctl.study_files.keys import keys_of
 from wristctl.study_files.load import load_study as _load_study
+from wristctl.study_files.load import read_study
 
 if TYPE_CHECKING:
     from typing import Unpack
@@ -58,7 +60,6 @@ if TYPE_CHECKING:
         CompareArguments,
         GenDataArguments,
         HwRunArguments,
-        HysteresisArguments,
         IdentifyArguments,
         RecommendArguments,
         SimulateArguments,
@@ -66,8 +67,9 @@ if TYPE_CHECKING:
         TuneArguments,
     )
 
-# What identify tells: of trials, of a log of spools, of one of tensions or currents, or of one in two planes.
-Told = Identified | LogTold | DrivenTold | BendsTold
+# What identify tells: of trials, or of logs by their model.
+Told = Identified | AnyTold
+_log = logging.getLogger(__name__)
 
 
 @in_python()
@@ -226,13 +228,17 @@ def analyse(
     from_identified: Ref | Told | None = None, out: Folder | None = None, label: str = "",
     progress: Watch | None = None,
     **settings: Unpack[AnalyseArguments],
-) -> Analysed:  # fmt: skip
+) -> Analysed | Hysteresis:  # fmt: skip
     """The loop of the study's `simulate` section, linearised about where it rests, by its `analyse` section.
 
     `network`, `tuned` and `from_identified` are as in `simulate`. The result has `.answer`, `.found` about each of
     `.angles`, `.locus`, `.portrait`; `.frame()` is a row per angle. Raises UserError as `simulate` does, and where the
-    loop cannot rest. `out`, `label`, `progress` and `settings` are as in
-    `gen_data`.
+    loop cannot rest.
+
+    With `of="hysteresis"` it is the wrist without a controller, whose tendons have friction, by the study's section
+    `hysteresis`: a `Hysteresis` with `.loops`, `.dead_bands` and `.circles`, whose `.frame()` is a row per loop, SI
+    units. Raises UserError for ranges in which the wrist cannot be held. `out`, `label`, `progress` and `settings` are
+    as in `gen_data`.
     """
     inputs = {"network": network, "tuned": tuned, "from_identified": from_identified}
     return carry_out(ANALYSE, study, inputs, out, label, progress, settings=settings)
@@ -241,16 +247,19 @@ def analyse(
 @in_python()
 def hysteresis(
     study: StudyOrFile | None = None, *, out: Folder | None = None, label: str = "", progress: Watch | None = None,
-    **settings: Unpack[HysteresisArguments],
-) -> Hysteresis:  # fmt: skip
-    """Loops of a wrist whose tendons have friction, by the study's `hysteresis` section, which may name a measured one.
-
-    The result has `.loops`, `.dead_bands` and, of a measured loop, `.fit` (coefficient, sheath and presliding with 95 %
-    intervals); `.frame()` is a row per loop, SI units. Raises UserError for ranges in which the wrist cannot be held,
-    and for a measured file that is none, with its line. `out`, `label`, `progress`,
-    `settings`: as `gen_data`.
-    """
-    return carry_out(HYSTERESIS, study, {}, out, label, progress, settings=settings)
+    **settings: Any,
+) -> Analysed | Hysteresis | Told:  # fmt: skip
+    """Former name of `analyse(of="hysteresis")` and, of a measured loop, of `identify(model="hysteresis")`."""
+    files, base = ([], study) if isinstance(study, Study) else ([Path(study)] if study is not None else [], None)
+    sections = {name.replace("-", "_"): name for name in keys_of(Study)}
+    overrides = [f"{sections.get(key, f'hysteresis.{key}')}={json.dumps(value)}" for key, value in settings.items()]
+    whole, _ = read_study(files, overrides, base=base)
+    measured = whole.identify.model == "hysteresis"
+    today = 'identify(runs=FILE, model="hysteresis")' if measured else 'analyse(of="hysteresis", hysteresis={...})'
+    _log.warning("wristctl.hysteresis is now wristctl.%s", today)
+    if measured:
+        return carry_out(IDENTIFY, whole, {}, out, label, progress)
+    return carry_out(ANALYSE, whole, {}, out, label, progress, settings={"of": "hysteresis"})
 
 
 @in_python()
@@ -261,8 +270,8 @@ def identify(
     """Stiffness, damping, tendons and delay of a real wrist from the logged trials of `runs` (hw-run).
 
     A run that is a file is an open log (documentation: The open log): the result then is a `LogTold`, what such logs
-    tell, of a log of tensions or currents a `DrivenTold`, or with `identify.model: wrist` a `BendsTold`, what logs in
-    two planes tell of the study's wrist.
+    tell, of a log of tensions or currents a `DrivenTold`, with `model="wrist"` a `BendsTold`, what logs in two planes
+    tell of the study's wrist, or with `model="hysteresis"` a `LoopTold`, what a loop of tension and angle tells.
 
     By the study's `identify` section. The result has `.values`, `.fit`, `.knowledge` and `.yaml`, a study file of what
     was found; `.frame()` is a row per parameter with its 95 % interval and unit. Raises UserError without runs, and

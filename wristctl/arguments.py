@@ -288,41 +288,14 @@ class AnalyseArguments(SharedArguments, total=False):
     start: Literal["straight", "equilibrium"]
     horizon: float  # s
     repetitions: int
+    of: Literal["loop", "hysteresis"]
     angles_deg: Sequence[float]  # deg
     over: str
     span: float
     friction: Literal["slipping", "stuck"]
     simulate: Mapping[str, Any]
     controller_settings: Mapping[str, Mapping[str, float]]
-
-
-class HysteresisArguments(SharedArguments, total=False):
-    """Keywords of `hysteresis`."""
-
-    drive: Literal["spools", "tensions"]
-    toward_deg: float  # deg
-    shape: Literal["sine", "triangle"]
-    ranges_deg: Sequence[Sequence[float]]  # deg
-    circles_deg: Sequence[float]  # deg
-    frequencies: Sequence[float]  # 1/s
-    frictions: Sequence[float]
-    sheaths: Sequence[float]  # rad
-    preslidings: Sequence[float]  # m
-    tendon_stiffness: float  # N/m
-    stiffness: float | None  # N m/rad
-    stiffness_over_deg: float  # deg
-    angles_deg: Sequence[float]  # deg
-    ramp: float  # s
-    segments: int
-    step: float  # s
-    samples: int
-    measured: str | None
-    columns: str | None
-    trial: str | None
-    known: Mapping[str, Any]
-    fix: Mapping[str, Any]
-    lack_of_fit: float
-    misfit: Literal["refuse", "tell"]
+    hysteresis: Mapping[str, Any]
 
 
 class IdentifyArguments(SharedArguments, total=False):
@@ -330,8 +303,10 @@ class IdentifyArguments(SharedArguments, total=False):
 
     logs: Sequence[str]
     columns: str | None
-    model: Literal["arcs", "wrist"]
+    trial: str | None
+    model: Literal["arcs", "wrist", "hysteresis"]
     fix: Mapping[str, Any]
+    known: Mapping[str, Any]
     torque_constant: float | None  # N m/A
     spool_radius: float | None  # m
     segments: int

@@ -11,7 +11,7 @@ from pathlib import Path
 
 _FUNCTIONS = {
     "gen-data": "gen_data", "train": "train", "tune": "tune", "compare": "compare", "simulate": "simulate",
-    "analyse": "analyse", "hysteresis": "hysteresis", "identify": "identify", "paper audit": "audit", "runs ls": "runs",
+    "analyse": "analyse", "identify": "identify", "paper audit": "audit", "runs ls": "runs",
     "hw-run": "hw_run",
 }  # fmt: skip
 """The function of each command that Python has; the others are called at the shell from there too."""

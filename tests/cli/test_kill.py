@@ -20,7 +20,10 @@ ROOT = Path(__file__).parents[2]
 THOROUGH = bool(os.environ.get("WRISTCTL_THOROUGH"))
 FAST = ("--set", "loops={fast: {plant_segments: 1}}")
 MOVE = "{kind: minimum-jerk, duration: 0.3, angle_deg: %s}"
-LOOPS = ("--set", "ranges_deg=[[0, 5]]", "--set", "frequencies=[5]", "--set", "angles_deg=[]", "--set", "sheaths=[1]")
+LOOPS = (
+    "--of", "hysteresis", "--set", "hysteresis.ranges_deg=[[0, 5]]", "--set", "hysteresis.frequencies=[5]",
+    "--set", "hysteresis.angles_deg=[]", "--set", "hysteresis.sheaths=[1]",
+)  # fmt: skip
 QUICK = ("--epochs", "5", "--set", "hidden=[8]", "--set", "gen-data.samples=100")
 GRID = "grid={depths: [1, 2], activations: [tanh], widths: [8], folds: 2}"
 BUDGET = "{candidates: 3, iterations: 1, finalists: 1, draws: 1, validation: 1, worlds: 8, noises: 1}"
@@ -33,10 +36,9 @@ QUICKLY: dict[str, tuple[tuple[str, ...], ...]] = {
         "--set", f"scenarios=[{{loop: fast, reference: {MOVE % 20}}}]",
     ),),
     "simulate": (("--set", "horizon=0.5"),),
-    "analyse": (("--controller", "gvsc", "--gains", "default"),),
+    "analyse": (("--controller", "gvsc", "--gains", "default"), LOOPS),
     "compare": ((*FAST, "--horizon", "0.5", "--set", "inverses=[none]", "--set", f"references=[{MOVE % 30}]"),),
     "study": (("scenarios/ideal", "--set", "controllers=[pd-ff]", "--set", f"budgets.small={BUDGET}"),),
-    "hysteresis": (LOOPS,),
     "recommend": ((
         "--set", "controllers=[pid-ff]", "--set", "loop={plant_segments: 1, control_period: 5.0e-3}",
         "--set", "draw={plant.stiffness: x0.7..1.3}", "--set", "draws=2", "--set", "validation=2", "--set", "tests=8",

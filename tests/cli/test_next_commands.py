@@ -300,15 +300,17 @@ def test_what_new_and_init_write_is_followed_by_commands_that_run(did: Did, call
         ("compare", "--set", "inverses=[none]", "--set", "controllers=[{controller: pid-ff, gains: hardware}]"),
         ("analyse", "--controller", "pid-ff", "--set", "reference.angle_deg=10"),
         (
+            "analyse",
+            "--of",
             "hysteresis",
             "--set",
-            "ranges_deg=[[0, 10]]",
+            "hysteresis.ranges_deg=[[0, 10]]",
             "--set",
-            "frequencies=[2.0]",
+            "hysteresis.frequencies=[2.0]",
             "--set",
-            "sheaths=[0.0]",
+            "hysteresis.sheaths=[0.0]",
             "--set",
-            "angles_deg=[5]",
+            "hysteresis.angles_deg=[5]",
         ),
         ("simulate", "--controller", "ct-dob", "--reference", "circle"),
         ("simulate", "--sweep", "wrist.length=0.07,0.08"),
@@ -372,7 +374,8 @@ def test_a_file_of_three_tendons_goes_through_every_command_and_what_each_advise
     _, behind, _ = walked(*simulate)
     assert behind.config.simulate.reference.inverse == "network" and behind.metrics["rmse_flexion"]["value"] > 1e-6
     loops = ("ranges_deg=[[0,10]]", "frequencies=[2.0]", "sheaths=[0.0]", "angles_deg=[5]")
-    said, _, _ = walked("hysteresis", robot, *(word for each in loops for word in ("--set", each)))
+    loops_set = [word for each in loops for word in ("--set", f"hysteresis.{each}")]
+    said, _, _ = walked("analyse", robot, "--of", "hysteresis", *loops_set)
     assert "In two planes (these tendons bend the wrist in both), bent toward ulnar" in said
     motors = ("--set", "loop.actuator.level=tendon", "--set", "loop.plant_segments=1")
     said, recorded, _ = walked("simulate", robot, "--reference", "circumduction", "--controller", "ct-dob", *motors)

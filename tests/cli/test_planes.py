@@ -21,16 +21,15 @@ TWO_PLANES = {
     "compare": ("--set", "references=[{kind: circumduction}]"),
     "tune": ("--set", "scenarios=[{reference: {kind: circumduction}}]"),
     "analyse": ("--set", "reference.kind=circumduction"),
-    "hysteresis": ("--set", "toward_deg=45"),
     "gen-data": ("--set", "planes=2"),
     "train": ("--set", "gen-data.planes=2"),
     "recommend": ("--set", "references=[{kind: circumduction}]"),
     "study": (),  # its family has motions in two planes
 }
 """How a motion in two planes is asked for, of commands whose motions can be chosen."""
-WRIST = {"simulate", "gen-data", "train", "tune", "compare", "recommend", "hw-run", "study", "analyse", "hysteresis"}
+WRIST = {"simulate", "gen-data", "train", "tune", "compare", "recommend", "hw-run", "study", "analyse"}
 """Commands that compute with a wrist of the user's."""
-ANY = {"simulate", "compare", "tune", "study", "recommend", "analyse", "hysteresis", "gen-data", "train", "hw-run"}
+ANY = {"simulate", "compare", "tune", "study", "recommend", "analyse", "gen-data", "train", "hw-run"}
 """Of these, those that take tendons at any places; of a motor board it is as many as its axes wind."""
 MUST = {"study": ("two_planes_study",)}
 """Study files without which a command has nothing to do."""

@@ -84,7 +84,10 @@ CHAIN = (
         "compare", *LOOP, "--network", "latest:train", "--tuned", "latest:tune", "--set", ROW,
         "--set", "references=[{kind: step}]",
     ),
-    ("hysteresis", "--set", "frequencies=[1, 5]", "--set", "ranges_deg=[[0, 20], [5, 15]]", "--set", "angles_deg=[10]"),
+    (
+        "analyse", "--of", "hysteresis", "--set", "hysteresis.frequencies=[1, 5]",
+        "--set", "hysteresis.ranges_deg=[[0, 20], [5, 15]]", "--set", "hysteresis.angles_deg=[10]",
+    ),
     ("audit", "--set", f"claims=[{CLAIM}]", "--set", "horizon=0.3"),
 )  # fmt: skip
 

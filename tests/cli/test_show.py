@@ -193,4 +193,4 @@ def test_a_label_after_a_dash_and_a_csv_are_no_runs_and_what_is_meant_is_said(ca
     Path("my.csv").write_text("t [s]\n0\n")
     for command in (("train", "--data", "my.csv"), ("runs", "show", "my.csv")):
         code, _, err = call(*command)
-        assert code == 2 and "gen-data --source csv" in err and "hysteresis --measured" in err, command
+        assert code == 2 and "gen-data --source csv" in err and "--model hysteresis" in err, command

@@ -186,7 +186,7 @@ FILES: dict[str, tuple[str, ...]] = {
     "a log": ("identify", "odd.csv"),
     "a parquet log": ("identify", "odd.parquet"),
     "a recording of another robot": ("identify", "odd.csv", "--columns", "spirob"),
-    "a measured loop": ("hysteresis", "--measured", "odd.csv"),
+    "a measured loop": ("identify", "odd.csv", "--model", "hysteresis"),
     "measured data": ("gen-data", "--source", "csv", "--set", "files=[odd.csv]"),
     "a reference": ("simulate", "--set", "reference.kind=recording", "--set", "reference.file=odd.csv"),
     "a controller": ("simulate", "--controller", "odd.py:LAW"),

@@ -34,6 +34,8 @@ INPUTS: dict[str, dict[str, str]] = {
     "audit": {"table1": "train"},
 }
 """What each function is given of those before it."""
+MODES = {"hysteresis": {"of": "hysteresis"}}
+"""What is a mode of `analyse`."""
 MAIN_TABLE = {
     "gen_data": "samples", "train": "trials", "compare": "comparison", "simulate": "trajectory", "analyse": "margins",
     "hysteresis": "loops", "audit": "claims", "identify": "parameters",
@@ -46,8 +48,9 @@ Results = dict[str, StudyResult]
 def _chain(study: Study, out: Path | None) -> Results:
     found: Results = {}
     for name in CHAIN:
-        given = {leaf: found[earlier] for leaf, earlier in INPUTS[name].items()}
-        found[name] = getattr(wristctl, name)(study, **given, out=out, label="small" if out else "")
+        given: dict[str, Any] = {leaf: found[earlier] for leaf, earlier in INPUTS[name].items()}
+        function = getattr(wristctl, "analyse" if name in MODES else name)
+        found[name] = function(study, **given, **MODES.get(name, {}), out=out, label="small" if out else "")
     return found
 
 
@@ -227,7 +230,7 @@ def test_runs_are_a_table_with_the_filters_of_the_command(
     recorded: Results, folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     table = wristctl.runs(out=folder)
-    assert list(table["kind"]) == ["gen-data", "train", "tune", "compare", "simulate", "analyse", "hysteresis", "audit"]
+    assert list(table["kind"]) == ["gen-data", "train", "tune", "compare", "simulate", "analyse", "analyse", "audit"]
     assert set(table["label"]) == {"small"} and (table["state"] == "ok").all()
     assert table.set_index("kind")["rmse"]["simulate"] == recorded["simulate"].metrics["rmse"]
     low = wristctl.runs("rmse<1e9", kind="simulate", newer="1d", out=folder)

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from wristctl.commands.hysteresis.answer import measured_answer
+from wristctl.commands.identify.hysteresis import loop_answer
 from wristctl.config.wrist import WristParameters
 from wristctl.identification.friction_fit import FrictionEstimate
 from wristctl.identification.loop_shape import LoopShape
@@ -46,7 +46,7 @@ def no_shape(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def rows(one: Any) -> dict[str, tuple[Any, ...]]:
     """Value, interval and unit by the first words of each row."""
-    table = measured_answer([one], WristParameters(), "").table
+    table = loop_answer([one], WristParameters(), "").table
     assert table is not None
     return {str(name).partition(",")[0].partition(" (")[0]: tuple(cells) for name, *cells in table.rows}
 
@@ -96,10 +96,10 @@ def test_only_what_was_searched_for_has_a_row() -> None:
 
 @pytest.mark.parametrize(("misfit", "refused"), [(1.9, False), (2.1, True)])
 def test_a_model_that_leaves_more_than_noise_is_nothing_to_rely_on(misfit: float, refused: bool) -> None:
-    answer = measured_answer([fit(misfit=misfit)], WristParameters(), "")
+    answer = loop_answer([fit(misfit=misfit)], WristParameters(), "")
     assert answer.sentence.startswith("Nothing to rely on") == refused
 
 
 def test_what_is_left_over_is_told_in_degrees_and_of_the_tensions_by_the_larger() -> None:
-    noted = " ".join(map(str, measured_answer([fit()], WristParameters(), "").notes))
+    noted = " ".join(map(str, loop_answer([fit()], WristParameters(), "").notes))
     assert "0.05 deg" in noted and "0.08 N" in noted and "321 samples" in noted

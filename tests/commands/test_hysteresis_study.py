@@ -1,4 +1,4 @@
-"""What a study of hysteresis says, writes and draws; and a measured loop in it."""
+"""What an analysis of hysteresis says, writes and draws, and what is identified of a measured loop."""
 
 from __future__ import annotations
 
@@ -14,9 +14,11 @@ import pytest
 
 import wristctl
 from tests.identification.made_loops import SHORT, made_loop, written
-from wristctl.commands.hysteresis.command import Hysteresis
+from wristctl.commands.analyse.hysteresis_results import Hysteresis
+from wristctl.commands.identify.hysteresis import LoopTold
 from wristctl.config.study import Study
 from wristctl.errors import UserError
+from wristctl.identification.loop_problem import AS_BELIEVED
 from wristctl.records.files import sha256_of
 from wristctl.simulation.strokes import FrictionCase
 
@@ -29,10 +31,22 @@ def study(*overrides: str) -> Study:
     return wristctl.load_study(None, *QUICK, *overrides)
 
 
+def analysed(*overrides: str, out: Path | None = None) -> Hysteresis:
+    done = wristctl.analyse(study(*overrides), of="hysteresis", out=out)
+    assert isinstance(done, Hysteresis)
+    return done
+
+
+def identified(file: Path, *overrides: str, out: Path | None = None) -> LoopTold:
+    done = wristctl.identify(study(*overrides), runs=file, model="hysteresis", out=out)
+    assert isinstance(done, LoopTold)
+    return done
+
+
 @pytest.fixture(scope="module")
 def done(tmp_path_factory: pytest.TempPathFactory) -> Hysteresis:
     """In a run directory."""
-    return wristctl.hysteresis(study(), out=tmp_path_factory.mktemp("hysteresis"))
+    return analysed(out=tmp_path_factory.mktemp("hysteresis"))
 
 
 def test_the_numbers_of_the_answer_are_the_runs(done: Hysteresis) -> None:
@@ -75,8 +89,8 @@ def recorded(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.mark.slow
 def test_a_measured_loop_is_fitted_and_told_before_all_else(recorded: Path, tmp_path: Path) -> None:
-    done = wristctl.hysteresis(study(f"hysteresis.measured={recorded}"), out=tmp_path)
-    assert done.fit is not None and done.run is not None
+    done = identified(recorded, out=tmp_path)
+    assert done.run is not None
     assert done.answer.sentence.startswith("The loop of rig.csv by itself")
     for name, truth in CABLE._asdict().items():
         found = done.run.metrics[name]
@@ -96,7 +110,7 @@ def test_a_measured_loop_is_fitted_and_told_before_all_else(recorded: Path, tmp_
         assert [float(end) for end in row[2].split(" to ")] == pytest.approx([low, high], rel=5e-3)
 
 
-def _rows_of_a_screen(done: Hysteresis) -> list[Sequence[Any]]:
+def _rows_of_a_screen(done: Hysteresis | LoopTold) -> list[Sequence[Any]]:
     """Rows of the answer's table, of an answer that fits a screen."""
     assert len(done.summary) <= 32 and done.answer.table is not None
     assert all(len(line) <= 100 for line in done.summary if "report.html" not in line)
@@ -116,9 +130,7 @@ def test_the_answer_without_a_loop_gives_the_dead_band_and_the_width_of_each_she
 @pytest.mark.slow
 def test_what_a_narrow_loop_does_not_tell_is_said(tmp_path: Path) -> None:
     narrow = made_loop(CABLE, 2, SHORT._replace(low=13.0, high=17.0, what="spools")).loop
-    named = f"hysteresis.measured={written(narrow, tmp_path / 'narrow.csv')}"
-    done = wristctl.hysteresis(study(named))
-    assert done.fit is not None
+    done = identified(written(narrow, tmp_path / "narrow.csv"))
     said = " ".join(map(str, done.answer.notes))
     assert "only together" in said and f"up to {done.fit.friction.high:.3g}" in said and "wider range" in said
     assert math.isnan(done.metrics["sheath"]) and done.metrics["exponent"] > 0.0
@@ -131,7 +143,7 @@ def test_a_loop_sampled_too_coarsely_at_its_turns_is_warned_of(
     tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
     coarse = made_loop(CABLE, 3, SHORT._replace(rate=20.0, cycles=2.0)).loop
-    wristctl.hysteresis(study(f"hysteresis.measured={written(coarse, tmp_path / 'coarse.csv')}"))
+    identified(written(coarse, tmp_path / "coarse.csv"))
     assert any("leaps" in said and "sample more often" in said for said in caplog.messages)
 
 
@@ -142,23 +154,23 @@ def test_pulls_that_tremble_are_warned_of(tmp_path: Path, caplog: pytest.LogCapt
     noise = 0.05 * np.random.default_rng(0).standard_normal(loop.tensions.shape)
     for own, told in ((loop, False), (replace(loop, tensions=loop.tensions + noise), True)):
         caplog.clear()
-        wristctl.hysteresis(study(f"hysteresis.measured={written(own, tmp_path / 'pulls.csv')}"))
+        identified(written(own, tmp_path / "pulls.csv"))
         assert any("tremble" in said for said in caplog.messages) == told
 
 
 def test_a_file_that_is_no_loop_leaves_nothing_behind(tmp_path: Path) -> None:
     (tmp_path / "wrong.csv").write_text("time [s],angel [deg]\n")
     with pytest.raises(UserError, match="unknown column 'angel'"):
-        wristctl.hysteresis(study(f"hysteresis.measured={tmp_path / 'wrong.csv'}"), out=tmp_path / "results")
+        identified(tmp_path / "wrong.csv", out=tmp_path / "results")
     assert not (tmp_path / "results").exists()
 
 
 @pytest.mark.slow
 def test_what_does_not_converge_is_marked_where_its_numbers_are(monkeypatch: pytest.MonkeyPatch) -> None:
     own = ("wrist.damping=1e-4", "hysteresis.tendon_stiffness=5e5", "hysteresis.shape=triangle")
-    sound = wristctl.hysteresis(study(*own))
+    sound = analysed(*own)
     monkeypatch.setattr("wristctl.simulation.hysteresis.FINER", (2,))
-    found = wristctl.hysteresis(study(*own))
+    found = analysed(*own)
     drifts = [each.drift for each in found.loops] + [each.drift for each in found.dead_bands]
     open_ = [each for each in drifts if each > 0.0]
     assert 0 < len(open_) == found.metrics["not_converged"] and sound.metrics["not_converged"] == 0.0
@@ -179,14 +191,8 @@ def test_a_fit_by_too_long_a_step_is_warned_of(
     step: float, told: bool, tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
     loop = made_loop(CABLE, 1, SHORT._replace(frequency=1.0, cycles=2.0)).loop
-    wristctl.hysteresis(
-        study(
-            f"hysteresis.measured={written(loop, tmp_path / 'quick.csv')}",
-            f"hysteresis.step={step}",
-            "hysteresis.misfit=tell",
-        )
-    )
-    assert any("hysteresis.step: 0.0025" in said for said in caplog.messages) == told
+    identified(written(loop, tmp_path / "quick.csv"), f"identify.step={step}", "identify.misfit=tell")
+    assert any("identify.step: 0.0025" in said for said in caplog.messages) == told
 
 
 @pytest.mark.slow
@@ -197,21 +203,21 @@ def test_a_loop_that_no_model_fits_is_refused_where_everybody_looks(
     loop = made_loop(CABLE, 1, SHORT._replace(what="spools")).loop
     wriggle = np.radians(1.0) * np.sin(12.0 * np.pi * 0.3 * loop.time)
     wriggling = replace(loop, angle=loop.angle + wriggle)
-    named = f"hysteresis.measured={written(wriggling, tmp_path / 'wriggling.csv')}"
+    file = written(wriggling, tmp_path / "wriggling.csv")
     with pytest.raises(UserError, match=r"the best model is off by .* it misses something") as caught:
-        wristctl.hysteresis(study(named), out=tmp_path / "results")
+        identified(file, out=tmp_path / "results")
     assert caught.value.exit_code == 3
-    (run,) = (tmp_path / "results").glob("*-hysteresis-*")
+    (run,) = (tmp_path / "results").glob("*-identify-*")
     told = (run / "README.md").read_text()
     assert "Nothing to rely on: the best model leaves" in told and "friction inside the wrist" in told
     assert json.loads((run / "metrics.json").read_text())["misfit"]["value"] > 2.0
-    taken = wristctl.hysteresis(study(named, "hysteresis.misfit=tell"))
-    assert taken.summary[0].startswith("Nothing to rely on") and taken.loops == [] and len(taken.fits) == 3
+    taken = identified(file, "identify.misfit=tell")
+    assert taken.summary[0].startswith("Nothing to rely on") and len(taken.fits) == 3
 
 
 @pytest.mark.slow
 def test_in_two_planes_its_files_hold_both_bends_and_every_place(tmp_path: Path) -> None:
-    done = wristctl.hysteresis(study("wrist.tendons=three", "hysteresis.toward_deg=30"), out=tmp_path)
+    done = analysed("wrist.tendons=three", "hysteresis.toward_deg=30", out=tmp_path)
     assert done.run is not None
     courses, loop = done.run.data("courses"), done.loops[0]
     own = courses[courses.loop == 0]
@@ -226,8 +232,48 @@ def test_in_two_planes_its_files_hold_both_bends_and_every_place(tmp_path: Path)
 
 
 @pytest.mark.parametrize(
-    ("setting", "said"), [("wrist.tendons=three", "tendon 1 of this wrist"), ("hysteresis.toward_deg=30", "one plane")]
+    ("setting", "said"),
+    [
+        ("wrist.tendons=three", "tendon 1 of this wrist"),
+        ("identify.fix.damping=0.1", "damping of a loop of hysteresis cannot be held"),
+        ("identify.columns=a;b", "names for 2 logs"),
+    ],
 )
-def test_a_measured_loop_is_fitted_in_one_plane(setting: str, said: str) -> None:
+def test_a_measured_loop_is_of_one_plane_and_of_its_own_parameters(setting: str, said: str) -> None:
     with pytest.raises(UserError, match=said):
-        wristctl.hysteresis(study(setting, "hysteresis.measured=loop.csv"))
+        identified(Path("loop.csv"), setting)
+
+
+def test_friction_inside_the_wrist_is_held_of_a_loop_alone(recorded: Path) -> None:
+    with pytest.raises(UserError, match="inner_friction is no parameter of this model"):
+        wristctl.identify(runs=recorded, fix={"inner_friction": 0.01})
+
+
+def test_two_logs_are_no_loop(recorded: Path, tmp_path: Path) -> None:
+    again = tmp_path / "again.csv"
+    again.write_bytes(recorded.read_bytes())
+    with pytest.raises(UserError, match="2 logs, and a loop of hysteresis is one"):
+        wristctl.identify(runs=[recorded, again], model="hysteresis")
+
+
+def test_what_a_loop_tells_is_no_wrist_to_simulate(recorded: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("wristctl.identification.loop_problem.SUPPOSITIONS", (AS_BELIEVED,))
+    told = identified(recorded, "identify.misfit=tell")
+    frame = told.frame().set_index("parameter")
+    assert frame.value["friction"] == told.metrics["friction"] and frame.unit["presliding"] == "m"
+    assert list(frame.index) == list(told.told)
+    with pytest.raises(UserError, match="no wrist was identified there"):
+        wristctl.simulate(from_identified=told, horizon=0.1)
+
+
+def test_an_analysis_of_hysteresis_reads_no_controller_and_no_run(done: Hysteresis) -> None:
+    assert done.run is not None
+    config = done.run.file("config.yaml").read_text()
+    assert "\nhysteresis:" in config and "\n  of: hysteresis" in config and "\nsimulate:" not in config
+    assert done.run.config.hysteresis == done.study.hysteresis and done.run.config.analyse.of == "hysteresis"
+    with pytest.raises(UserError, match="reads no earlier run here - from_identified"):
+        wristctl.analyse(of="hysteresis", from_identified=done)  # type: ignore[arg-type]
+    with pytest.raises(UserError, match=r"an analysis of hysteresis does not read simulate\.controller"):
+        wristctl.analyse(of="hysteresis", controller="pid")
+    with pytest.raises(UserError, match=r"an analysis of a loop does not read hysteresis\.drive"):
+        wristctl.analyse(hysteresis={"drive": "tensions"})

@@ -79,7 +79,6 @@ def test_what_an_error_calls_is_there_to_be_called() -> None:
         "compare",
         "simulate",
         "analyse",
-        "hysteresis",
         "identify",
         "paper audit",
         "runs ls",

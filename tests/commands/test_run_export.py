@@ -144,13 +144,14 @@ def test_a_rigs_motions_are_an_open_log_with_spools_and_bends_at_their_own_times
         export_run(run, "csv", tmp_path / "none.csv")
 
 
-def test_a_hysteresis_run_is_a_loop_that_can_be_measured(tmp_path: Path) -> None:
+@pytest.mark.parametrize("kind", ["analyse", "hysteresis"])
+def test_a_run_of_hysteresis_is_a_loop_that_can_be_measured(kind: str, tmp_path: Path) -> None:
     courses = {
         "loop": np.array([0, 0, 1]), "time": np.array([0.0, 0.1, 0.0]), "theta": np.array([0.1, 0.2, 0.3]),
         "given_plus": np.array([1e-3, 2e-3, 3e-3]), "given_minus": -np.array([1e-3, 2e-3, 3e-3]),
         "spool_plus": np.array([4.0, 6.0, 8.0]), "spool_minus": np.array([4.0, 2.0, 2.0]),
     }  # fmt: skip
-    with start_run("hysteresis", load_study(), "", tmp_path) as live:
+    with start_run(kind, load_study([], ["analyse.of=hysteresis"]), "", tmp_path) as live:
         live.table("data/courses.csv", courses)
     first, _ = read_log(export_run(Run(live.path), "csv", tmp_path / "loops.csv")).trials().values()
     assert first.columns["tension_1"].tolist() == [2.0, 3.0] and first.columns["spool_2"].tolist() == [-1e-3, -2e-3]

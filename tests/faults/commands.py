@@ -23,7 +23,10 @@ from wristctl.vision.scene import Scene
 FAST = ("--set", "loops={fast: {plant_segments: 1}}")
 MOVE = "{kind: minimum-jerk, duration: 0.1, angle_deg: 20}"
 CLAIM = "{id: A, says: A, evidence: comparison, controller: smc, gains: exchanged, metric: rmse, value: 1e-3}"
-LOOPS = ("--set", "ranges_deg=[[0, 5]]", "--set", "frequencies=[5]", "--set", "angles_deg=[]", "--set", "sheaths=[1]")
+LOOPS = (
+    "--of", "hysteresis", "--set", "hysteresis.ranges_deg=[[0, 5]]", "--set", "hysteresis.frequencies=[5]",
+    "--set", "hysteresis.angles_deg=[]", "--set", "hysteresis.sheaths=[1]",
+)  # fmt: skip
 SCENARIO = f"scenarios=[{{loop: fast, reference: {MOVE}}}]"
 KINDS: dict[str, tuple[str, ...]] = {
     "gen-data": ("gen-data", "--samples", "50"),
@@ -35,7 +38,7 @@ KINDS: dict[str, tuple[str, ...]] = {
     ),
     "simulate": ("simulate", "--set", "horizon=0.1"),
     "analyse": ("analyse", "--controller", "pid", "--set", "gains={Kp: 10.0, Ki: 20.0, Kd: 0.5}"),
-    "hysteresis": ("hysteresis", *LOOPS),
+    "analyse --of hysteresis": ("analyse", *LOOPS),
     "audit": ("audit", "--set", f"claims=[{CLAIM}]", "--set", "horizon=0.1"),
     "identify": ("identify", "UPRIGHT", "LEVEL", "--set", "fix.friction=0.1"),
     "track": ("track", "pictures", "--set", "frame_rate=60.0"),

@@ -16,7 +16,7 @@ import numpy as np
 
 from tests.drawn_rigs import options, tried
 from wristctl.arrays import Array
-from wristctl.config.hysteresis import HysteresisSettings
+from wristctl.config.identify import IdentifySettings
 from wristctl.config.plant import Actuator, TrueWrist
 from wristctl.config.wrist import WristParameters
 from wristctl.identification.arc_fit import fit_arcs
@@ -108,10 +108,10 @@ def by_arcs(rig: InnerRig, rng: np.random.Generator) -> Counted:
 
 
 def by_loop(rig: InnerRig, rng: np.random.Generator) -> Counted:
-    """What `hysteresis --measured` finds of two cycles without tensions."""
+    """What `identify --model hysteresis` finds of two cycles without tensions."""
     time = 0.02 * np.arange(400.0)
     angle, spools = recorded(rig, lambda at: 6e-3 * np.sin(0.5 * math.pi * at), time, rng)
-    settings = HysteresisSettings(segments=1, step=1e-3)
+    settings = IdentifySettings(segments=1, step=1e-3)
     fit = fit_in_turn(LoopProblem(MeasuredLoop("made.csv", time, angle, spools, None), BELIEVED, settings))[-1]
     found = {"stiffness": fit.stiffness, "tendon_radius": fit.tendon_radius, "slack_plus": fit.slack[0],
              "slack_minus": fit.slack[1], "exponent": fit.exponent}  # fmt: skip

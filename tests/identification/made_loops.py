@@ -8,7 +8,8 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from wristctl.config.hysteresis import HysteresisSettings, KnownBeforehand
+from wristctl.config.hysteresis import HysteresisSettings
+from wristctl.config.identify import IdentifySettings
 from wristctl.config.plant import Actuator
 from wristctl.config.wrist import WristParameters
 from wristctl.identification.loop_problem import LoopProblem
@@ -16,7 +17,8 @@ from wristctl.identification.measured_loop import MeasuredLoop
 from wristctl.simulation.spool_driven import SpooledWrist, spooled
 from wristctl.simulation.strokes import FrictionCase, strokes
 
-BELIEVED, KNOWN = WristParameters(), KnownBeforehand()
+BELIEVED, ASKED = WristParameters(), IdentifySettings()
+KNOWN = ASKED.known
 Measured = Literal["spools and tensions", "spools", "tensions"]
 _STEP = 5e-4
 """Half of what a fit takes by default [s]: nature has no steps."""
@@ -48,7 +50,6 @@ def made_loop(truth: FrictionCase, seed: int, recording: Recording | None = None
     winch = recording.what == "tensions"
     settings = HysteresisSettings(
         ranges_deg=((recording.low, recording.high),), angles_deg=(), drive="tensions" if winch else "spools",
-        known=KNOWN.model_copy(update={"run_up": 10.0 * truth.presliding}),
     )  # fmt: skip
     own, drawn = strokes(BELIEVED, settings), rng.standard_normal(6)
     drawn = drawn if recording.errors is None else np.array(recording.errors)
@@ -60,7 +61,7 @@ def made_loop(truth: FrictionCase, seed: int, recording: Recording | None = None
     )
     stiffness = settings.tendon_stiffness * math.exp(KNOWN.tendon_stiffness_error * drawn[2])
     tendons = Actuator(level="tendon", tendon_stiffness=stiffness, **truth._asdict())
-    zeros = np.zeros(2) if winch else KNOWN.spool_error * drawn[4:]
+    zeros = np.zeros(2) if winch else ASKED.spool_error * drawn[4:]
 
     def given(time: np.ndarray) -> np.ndarray:
         swing = 0.5 - 0.5 * np.cos(2.0 * np.pi * recording.frequency * time)
@@ -73,7 +74,7 @@ def made_loop(truth: FrictionCase, seed: int, recording: Recording | None = None
     at = time + recording.lead / recording.frequency
     grid = _STEP * np.arange(done.theta.shape[1])
     angle, *pulls = (np.interp(at, grid, each[0]) for each in (done.theta, done.spool[..., 0], done.spool[..., 1]))
-    angle += math.radians(KNOWN.zero_error_deg * drawn[3]) + np.radians(recording.noise_deg) * rng.standard_normal(
+    angle += math.radians(ASKED.zero_error_deg * drawn[3]) + np.radians(recording.noise_deg) * rng.standard_normal(
         len(at)
     )
     tensions = 0.5 * np.stack(pulls, axis=1)
@@ -83,7 +84,8 @@ def made_loop(truth: FrictionCase, seed: int, recording: Recording | None = None
         "spools": (given(at).T, None),
         "tensions": (None, 0.5 * given(at).T),
     }[recording.what]
-    return LoopProblem(MeasuredLoop("made.csv", time, angle, *loop), BELIEVED, settings)
+    asked = ASKED.model_copy(update={"known": KNOWN.model_copy(update={"run_up": 10.0 * truth.presliding})})
+    return LoopProblem(MeasuredLoop("made.csv", time, angle, *loop), BELIEVED, asked)
 
 
 def written(loop: MeasuredLoop, file: Path) -> Path:

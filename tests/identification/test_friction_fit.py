@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from tests.identification.made_loops import SHORT, Measured, Recording, made_loop
 from wristctl.arrays import Array
-from wristctl.config.hysteresis import FixedInLoop, HysteresisSettings
+from wristctl.config.identify import Fixed, IdentifySettings
 from wristctl.config.plant import Actuator, TrueWrist
 from wristctl.config.wrist import WristParameters
 from wristctl.errors import UserError
@@ -196,7 +196,7 @@ def probe(torque: float, slack: float, seed: int = 3) -> LoopProblem:
     angle = np.interp(time, 1e-3 * np.arange(done.theta.shape[1]), done.theta[0])
     angle += np.radians(0.05) * np.random.default_rng(seed).standard_normal(len(time))
     loop = MeasuredLoop("probe.csv", time, angle, np.stack([spool, -spool], axis=1), None)
-    return LoopProblem(loop, wrist, HysteresisSettings())
+    return LoopProblem(loop, wrist, IdentifySettings())
 
 
 @pytest.mark.slow
@@ -219,9 +219,7 @@ def test_a_loop_of_slack_tendons_wants_friction_inside_the_wrist() -> None:
 def test_a_loop_that_tendons_explain_is_asked_for_nothing_more(wide: FrictionFit) -> None:
     assert wide.misfit < 1.5 and wide.inner_friction is None and INNER in wide.problem.fixed
     assert wide.problem.step == wide.problem.settings.step
-    held = wide.problem.settings.model_copy(
-        update={"fix": FixedInLoop(stiffness=0.5, presliding=1e-5, inner_friction=0.02)}
-    )
+    held = wide.problem.settings.model_copy(update={"fix": Fixed(stiffness=0.5, presliding=1e-5, inner_friction=0.02)})
     fixed = replace(wide.problem, settings=held)
     assert fixed.begin()[STIFFNESS] == pytest.approx(math.log(0.5 / wide.problem.wrist.stiffness))
     assert (

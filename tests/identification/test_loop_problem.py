@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from wristctl.config.hysteresis import HysteresisSettings
+from wristctl.config.identify import IdentifySettings
 from wristctl.config.wrist import WristParameters
 from wristctl.errors import UserError
 from wristctl.identification.loop_problem import (
@@ -46,7 +46,7 @@ def problem(
 ) -> LoopProblem:
     pulled = np.stack([5.0 + 10.0 * BEND, 5.0 - 10.0 * BEND], axis=1)
     loop = MeasuredLoop("made.csv", scale * TIME, BEND, None if winch else SPOOLS, pulled if winch or pulls else None)
-    return LoopProblem(loop, WRIST, HysteresisSettings.model_validate(more), supposed)
+    return LoopProblem(loop, WRIST, IdentifySettings.model_validate(more), supposed)
 
 
 def test_the_exponent_and_the_bends_share_of_it_are_those_of_the_tendons() -> None:
@@ -59,9 +59,9 @@ def test_the_exponent_and_the_bends_share_of_it_are_those_of_the_tendons() -> No
         assert tendons.friction * (asked.bend + tendons.sheath) == pytest.approx(exponent)
         assert asked.bend / (asked.bend + tendons.sheath) == pytest.approx(share)
         assert tendons.presliding == pytest.approx(3.0 * BEGIN_PRESLIDING)
-        assert tendons.tendon_stiffness == pytest.approx(0.5 * asked.settings.tendon_stiffness)
+        assert tendons.tendon_stiffness == pytest.approx(0.5 * asked.settings.known.tendon_stiffness)
     without = problem(winch=True)
-    assert without.tendons(without.begin()).tendon_stiffness == without.settings.tendon_stiffness
+    assert without.tendons(without.begin()).tendon_stiffness == without.settings.known.tendon_stiffness
 
 
 def test_a_search_begins_with_usual_tendons_and_the_wrist_as_it_is_believed() -> None:
@@ -122,11 +122,11 @@ def test_what_a_study_fixes_is_held_at_its_value() -> None:
 
 
 def test_what_is_known_beforehand_counts_by_its_deviation_and_less_where_it_is_freed() -> None:
-    known = {
-        "stiffness_error": 0.2, "damping_error": 0.5, "tendon_stiffness_error": 0.3, "zero_error_deg": 0.4,
+    known: dict[str, Any] = {
+        "known": {"stiffness_error": 0.2, "damping_error": 0.5, "tendon_stiffness_error": 0.3}, "zero_error_deg": 0.4,
         "spool_error": 1e-4, "radius_error": 0.02,
     }  # fmt: skip
-    asked, freed = problem(known=known), problem(FREED, known=known)
+    asked, freed = problem(**known), problem(FREED, **known)
     with np.errstate(divide="ignore"):
         deviation = 1.0 / asked.prior
     own = {STIFFNESS: 0.2, DAMPING: 0.5, TENDON: 0.3, ANGLE_ZERO: math.radians(0.4), RADIUS: 0.02}
@@ -135,7 +135,7 @@ def test_what_is_known_beforehand_counts_by_its_deviation_and_less_where_it_is_f
     assert np.isinf(deviation[[EXPONENT, SHARE, PRESLIDING, INNER]]).all()
     loose = {STIFFNESS, RADIUS, ANGLE_ZERO, SPOOL_PLUS, SPOOL_MINUS}
     assert names(np.flatnonzero(freed.prior < 0.5 * asked.prior)) == loose
-    certain = problem(FREED, known={"stiffness_error": 1.7, "spool_error": 0.01}).prior
+    certain = problem(FREED, known={"stiffness_error": 1.7}, spool_error=0.01).prior
     assert 1.0 / certain[[STIFFNESS, SPOOL_PLUS]] == pytest.approx([1.7, 0.01]), "never better known for being freed"
 
 
@@ -173,7 +173,7 @@ def test_a_loop_of_which_too_much_comes_before_the_first_long_turn_is_refused() 
     for seconds, fits in ((5.8, True), (5.6, False)):
         some = seconds > TIME
         loop = replace(problem().loop, time=TIME[some], angle=BEND[some], spools=SPOOLS[some])
-        asked = LoopProblem(loop, WRIST, HysteresisSettings())
+        asked = LoopProblem(loop, WRIST, IdentifySettings())
         if fits:
             assert asked.first == 200
         else:

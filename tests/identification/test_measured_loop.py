@@ -10,7 +10,9 @@ import pytest
 
 from wristctl.config.wrist import WristParameters
 from wristctl.errors import UserError
-from wristctl.identification.measured_loop import MeasuredLoop, read_loop
+from wristctl.identification.measured_loop import MeasuredLoop, loop_of
+from wristctl.records.log_converters import read_log
+from wristctl.records.log_looks import looked_at
 
 WRIST = WristParameters()
 TIME = np.linspace(0.0, 10.0, 201)
@@ -42,7 +44,12 @@ def put(before: str, after: str, line: int, text: str = "") -> str:
 def read(text: str, folder: Path) -> MeasuredLoop:
     file = folder / "loop.csv"
     file.write_text(text, encoding="utf-8")
-    return read_loop(file, WRIST)
+    return loop_in(file)
+
+
+def loop_in(file: Path) -> MeasuredLoop:
+    offset = WRIST.tendon_offset
+    return loop_of(looked_at(read_log(file, what="measured loop", tendon_offset=offset), tendon_offset=offset), WRIST)
 
 
 def test_columns_may_stand_in_any_order_and_unit(tmp_path: Path) -> None:
@@ -132,10 +139,10 @@ def test_what_is_wrong_is_said_with_its_place_and_remedy(
 
 def test_a_file_that_cannot_be_read_is_named(tmp_path: Path) -> None:
     with pytest.raises(UserError, match=r"cannot read the measured loop: No such file.*gone\.csv"):
-        read_loop(tmp_path / "gone.csv", WRIST)
+        loop_in(tmp_path / "gone.csv")
     (tmp_path / "picture.png").write_bytes(bytes(range(256)))
     with pytest.raises(UserError, match=r"no text in UTF-8.*picture\.png"):
-        read_loop(tmp_path / "picture.png", WRIST)
+        loop_in(tmp_path / "picture.png")
 
 
 def test_of_four_tendons_each_side_is_the_mean_of_its_pair(tmp_path: Path) -> None:

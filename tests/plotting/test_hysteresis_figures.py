@@ -9,7 +9,8 @@ from matplotlib.lines import Line2D
 
 from tests.identification.made_loops import SHORT, Measured, made_loop
 from wristctl.arrays import Array
-from wristctl.commands.hysteresis import figures
+from wristctl.commands.analyse import hysteresis_figures as figures
+from wristctl.commands.identify.figures import measured as drawn_beside
 from wristctl.config.hysteresis import HysteresisSettings
 from wristctl.config.wrist import WristParameters
 from wristctl.identification.friction_fit import FrictionFit
@@ -103,7 +104,7 @@ def test_a_measured_loop_is_drawn_with_the_model_and_what_is_left_over(what: Mea
     problem = made_loop(FrictionCase(0.1, 1.0, 2e-5), 0, SHORT._replace(what=what))
     x = problem.begin()
     residuals = [m - e for m, e in zip(problem.measured, problem.expected([x])[0], strict=True)]
-    made = figures.measured(FrictionFit(problem, x, residuals, np.ones(rows), np.eye(len(x)), 0.0))
+    made = drawn_beside(FrictionFit(problem, x, residuals, np.ones(rows), np.eye(len(x)), 0.0))
     left, right = np.array(made.axes).reshape(rows, 2).T
     for axes, residual, seen in zip(left, residuals, problem.measured, strict=True):
         measured, model = labelled(axes, "measured")[0], labelled(axes, "model, fitted")[0]

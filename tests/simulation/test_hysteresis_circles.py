@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 import wristctl
+from wristctl.commands.analyse.hysteresis_results import Hysteresis
 from wristctl.config.hysteresis import HysteresisSettings
 from wristctl.config.wrist import WristParameters
 from wristctl.errors import UserError
@@ -70,7 +71,8 @@ def test_a_study_with_circles_has_a_row_a_figure_and_both_bends_of_each(tmp_path
         None, "hysteresis.ranges_deg=[[0, 10]]", "hysteresis.frequencies=[0.5]", "hysteresis.sheaths=[0, 1]",
         "hysteresis.angles_deg=[]", "hysteresis.segments=1", "hysteresis.circles_deg=[10]",
     )  # fmt: skip
-    done = wristctl.hysteresis(study, out=tmp_path)
+    done = wristctl.analyse(study, of="hysteresis", out=tmp_path)
+    assert isinstance(done, Hysteresis)
     assert done.run is not None and done.run.problems() == [] and "circles" in done.figures
     rows, courses = done.run.data("circles"), done.run.data("circle_courses")
     assert len(rows) == 2 and len(courses) == 2 * (study.hysteresis.samples + 1)
@@ -80,5 +82,5 @@ def test_a_study_with_circles_has_a_row_a_figure_and_both_bends_of_each(tmp_path
         assert rows.lag[number] == circle.lag and rows.friction_work[number] == circle.friction_work
     told = next(note for note in map(str, done.answer.notes) if "circle of 10 deg" in note)
     assert f"{1e3 * done.circles[1].friction_work:.3g} mJ a turn" in told
-    with pytest.raises(UserError, match="of one plane"):
-        wristctl.hysteresis(wristctl.load_study(None, "hysteresis.circles_deg=[10]", "hysteresis.measured=x.csv"))
+    with pytest.raises(UserError, match="identify does not read hysteresis"):
+        wristctl.identify(runs="x.csv", model="hysteresis", hysteresis={"circles_deg": [10]})  # type: ignore[call-arg]

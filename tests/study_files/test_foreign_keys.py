@@ -62,9 +62,7 @@ def test_a_key_of_another_command_is_an_error_that_names_it(command: str, key: s
 
 @pytest.mark.parametrize("command", ["simulate", "tune", "compare"])
 def test_a_sweep_over_a_key_of_another_command_is_an_error_too(command: str) -> None:
-    with pytest.raises(
-        UserError, match=rf"{command} does not read hysteresis\.frequencies.*`wristctl hysteresis` reads"
-    ):
+    with pytest.raises(UserError, match=rf"{command} does not read hysteresis\.frequencies.*`wristctl analyse` reads"):
         axes_of(Study(sweep=("hysteresis.frequencies=1,2",)), command)
 
 

@@ -118,10 +118,11 @@ COMMANDS = {
         "wristctl.commands.identify.command:IDENTIFY",
         _MAIN,
         "Find a real wrist's parameters from measured motions.",
-        shortcuts=("columns",),
+        shortcuts=("model", "columns"),
         argument="runs",
         examples=(
             "wristctl identify latest:hw-run",
+            "wristctl identify loop.csv --model hysteresis",
             "wristctl identify my.csv --columns 'time=t [ms], spool_1=m1 [mm], spool_2=m2 [mm], bend_y=imu [deg]'",
             "wristctl identify my.csv --columns 'time=t [ms], current_1=I1 [mA], current_2=I2 [mA], bend_y=imu [deg]'",
             "wristctl identify UPRIGHT_RUN LEVEL_RUN --set fix.friction=0.1",
@@ -190,24 +191,15 @@ COMMANDS = {
     "analyse": Entry(
         "wristctl.commands.analyse.command:ANALYSE",
         _MORE,
-        "Find the stability margins of one loop.",
-        shortcuts=("controller", "gains", "over"),
+        "Find the stability margins of one loop, or a wrist's hysteresis.",
+        shortcuts=("of", "controller", "gains", "over"),
         examples=(
             "wristctl analyse --controller computed-torque --gains default",
+            "wristctl analyse experiments/hysteresis.yaml",
+            "wristctl analyse --of hysteresis --set hysteresis.drive=tensions --set 'hysteresis.sheaths=[0, 1]'",
             "wristctl analyse --controller pid --set 'gains={Kp: 10.0, Ki: 20.0, Kd: 0.5}' --over Kp",
             "wristctl analyse --controller smc-tracking --gains hardware --set loop.control_period=5e-3 "
             "--set 'loop={actuator: {level: tendon}, sensor: {level: camera}}'",
-        ),
-    ),
-    "hysteresis": Entry(
-        "wristctl.commands.hysteresis.command:HYSTERESIS",
-        _MORE,
-        "Drive the wrist through hysteresis loops; fit a measured one.",
-        shortcuts=("drive", "shape", "measured", "columns"),
-        examples=(
-            "wristctl hysteresis experiments/hysteresis.yaml",
-            "wristctl hysteresis --measured loop.csv",
-            "wristctl hysteresis --drive tensions --set 'ranges_deg=[[0, 30]]' --set 'sheaths=[0, 1]'",
         ),
     ),
     "validate": Entry(
@@ -252,6 +244,9 @@ PAPER = {
 # Former names.
 COMMANDS |= {
     "audit": PAPER["audit"]._replace(hidden=True),
+    "hysteresis": Entry(
+        "wristctl.cli.former_hysteresis:hysteresis_app", None, "Now a mode of analyse and identify.", hidden=True
+    ),
     "check-law": COMMANDS["check-controller"]._replace(hidden=True),
 }
 

@@ -38,7 +38,7 @@ def adopted(study: Study, command: str) -> Adopted:
 
     Raises UserError for what cannot be loaded or does not keep to what a law is, and for two things of one name.
     """
-    read = names_read(command)
+    read = names_read(command, study)
     names: dict[tuple[str, str], str] = {}
     settings = dict(study.controller_settings)
     owners: dict[tuple[str, str], str] = {}
@@ -145,7 +145,7 @@ def with_presets(study: Study, command: str, tell: bool = True, for_several: boo
     `tell` the log says which. A preset that was chosen `for_several` controllers in turn holds for those that have it.
     Gains by loop are the preset of all loops, where these have the same one.
     """
-    if command in ("simulate", "analyse"):
+    if command in ("simulate", "analyse") and "simulate" in names_read(command, study):
         row = _with_preset(_by_loop(study.simulate, [study.simulate.loop], tell), tell, for_several)
         return study.model_copy(update={"simulate": row})
     if command not in ("compare", "hw-run"):
@@ -222,7 +222,7 @@ def sources_in(study: Study) -> dict[str, str]:
 
 def adoption(study: Study, command: str) -> dict[str, Any]:
     """Specification, as JSON has it, from which `adopt` loads the same laws in another process."""
-    content = with_places(study).model_dump_json(by_alias=True, include=names_read(command))
+    content = with_places(study).model_dump_json(by_alias=True, include=names_read(command, study))
     return {"study": json.loads(content), "command": command, "sources": sources_in(study)}
 
 

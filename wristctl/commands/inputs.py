@@ -41,6 +41,12 @@ class EarlierRun:
     content: Content | None = None
 
 
+IDENTIFIED, RATIOS = "data/identified.yaml", "data/ratios.json"
+"""Files of an identify run with its wrist, as a study or by ratios; missing where too little was told."""
+_WRIST = Content(f"{IDENTIFIED} or {RATIOS}", "wrist")
+FROM_IDENTIFIED = EarlierRun("from_identified", kind="identify", optional=True, content=_WRIST)
+
+
 class Inputs(Mapping[str, Given]):
     """Inputs by role: the leaf that names them, or `leaf[0]`, `leaf[1]`, ... Whatever is read of one is read once."""
 
@@ -111,6 +117,9 @@ def opened(
         Folders in which a run is looked for that is not in `out`.
     """
     by_role: dict[str, Given] = {}
+    for name in named_inputs.keys() - {need.leaf for need in needs}:
+        if named_inputs[name] is not None:
+            raise UserError(f"{kind} reads no earlier run here", Argument(name), "leave it out")
     for need in needs:
         named, several = _here(getattr(section, need.leaf), out, beside), isinstance(getattr(section, need.leaf), tuple)
         chosen = named if named_inputs.get(need.leaf) is None else named_inputs[need.leaf]
@@ -218,7 +227,7 @@ def check_motions(study: Study, command: str) -> None:
 
     Raises UserError with file and line.
     """
-    for section in sections_read(command):
+    for section in sections_read(command, study):
         for reference in _recordings(getattr(study, section)):
             _check(reference, study.wrist.range_deg)
 

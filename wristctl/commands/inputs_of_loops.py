@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Protocol
 
-from wristctl.commands.inputs import Inputs, check_sides
+from wristctl.commands.inputs import IDENTIFIED, RATIOS, Inputs, check_sides
 from wristctl.config.compare import CompareSettings
 from wristctl.config.controller_row import BY_LOOP, Row
 from wristctl.config.families import Family
@@ -28,10 +28,8 @@ if TYPE_CHECKING:
 
 log = logging.getLogger(__name__)
 
-IDENTIFIED, RATIOS = "data/identified.yaml", "data/ratios.json"
 # What puts the identified motors and camera into a loop.
 _RIG = "loop.actuator.level=tendon, loop.sensor.level=camera and loop.control_period=0.01 have them"
-"""File of an identify run with its wrist, a study file; missing where too little was told."""
 
 
 class _Tuning(Protocol):

@@ -75,6 +75,8 @@ def prepare(
     """
     if procedure.completed is not None:
         study = procedure.completed(study)
+    if procedure.mode is not None:
+        procedure = procedure.mode(study) or procedure
     section = procedure.section(study)
     beside = [file.absolute().parent.parent for file in files if (file.parent / MANIFEST).is_file()]
     inputs = opened(procedure.kind, section, procedure.needs, named_inputs or {}, out, beside)
@@ -265,7 +267,7 @@ def carry_out(
 
 
 # Kinds of runs whose repetition gives the same result.
-AGAIN = ("gen-data", "train", "tune", "compare", "recommend", "simulate", "analyse", "hysteresis", "identify", "audit")
+AGAIN = ("gen-data", "train", "tune", "compare", "recommend", "simulate", "analyse", "identify", "audit")
 # Relative difference of metrics up to which a repetition counts as the same result.
 _ALIKE = 1e-6
 
@@ -276,7 +278,7 @@ def redrawn(run: Run, show: ShowProgress) -> StudyResult:
     UserError for a kind of run that cannot be had again, for one that did not end well, and where the repetition does
     not find what the run did: a figure of it would show something else.
     """
-    if run.kind not in AGAIN:
+    if run.kind_today not in AGAIN:
         raise UserError(
             f"{run.kind} runs cannot be drawn again: they are no calculation",
             str(run.path),

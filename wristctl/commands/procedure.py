@@ -46,6 +46,10 @@ class Procedure(Generic[Found]):
     """Settings that follow from others, filled in before anything is written. Raises UserError."""
     in_one_plane: Callable[[Study], bool] = lambda study: True
     """Whether it pulls a wrist in one plane, by two tendons alike on either side."""
+    works_on: str = ""
+    """The section in which its runs find what they are about, where that is another than the command's."""
+    mode: Callable[[Study], Procedure[Any] | None] | None = None
+    """The procedure of the same command that a study asks for in place of this one."""
 
     @property
     def sweeps(self) -> bool:
@@ -59,7 +63,7 @@ class Procedure(Generic[Found]):
     @property
     def subject(self) -> str:
         """The command in whose section that is: its own, or that of the one it works on."""
-        return SUBJECTS.get(self.kind, self.kind)
+        return self.works_on or SUBJECTS.get(self.kind, self.kind)
 
 
 def no_tendons(study: Study) -> bool:
@@ -88,9 +92,9 @@ _PLACES |= {"study": "study.command:FAIR_STUDY"}
 
 def procedure_of(run: Run) -> Procedure[Any]:
     """Procedure that made a run. Raises UserError for a kind that no command makes."""
-    if run.kind not in _PLACES:
+    if run.kind_today not in _PLACES:
         raise UserError(f"no command of wristctl makes a {run.kind!r} run", str(run.path), NAME_A_RUN)
-    module, _, name = _PLACES[run.kind].partition(":")
+    module, _, name = _PLACES[run.kind_today].partition(":")
     procedure: Procedure[Any] = getattr(import_module(f"wristctl.commands.{module}"), name)
     return procedure
 

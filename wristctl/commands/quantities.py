@@ -143,8 +143,8 @@ def told_frame(told: Mapping[str, Told]) -> pd.DataFrame:
     return pd.DataFrame(rows, columns=["parameter", "value", "low", "high", "unit", "meaning"])
 
 
-def keep_told(findings: Findings, told: Mapping[str, Told], of: str = "") -> None:
-    """Parameters as metrics, without a value where the data do not tell it; `of` follows each name."""
+def keep_told(findings: Findings, told: Mapping[str, Told], of: str = "", n: int = 1) -> None:
+    """Parameters as metrics of `n` samples, without a value where the data do not tell it; `of` follows each name."""
     for name, one in told.items():
         ends = (one.low, one.high) if one.known else None
-        findings.metric(f"{name}{of}", one.value if one.known else None, one.unit, "", 1, ends, one.meaning)
+        findings.metric(f"{name}{of}", one.value if one.known else None, one.unit, "", n, ends, one.meaning)

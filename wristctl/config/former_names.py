@@ -1,6 +1,6 @@
 """Former names of keys, gain presets and loops: studies and sealed runs that have them mean the same as ever."""
 
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 from pathlib import Path
 
 # Key paths that studies had, and the paths of today.
@@ -9,7 +9,24 @@ KEYS: dict[tuple[str, ...], tuple[str, ...]] = {
     ("hw-run", "rows"): ("hw-run", "controllers"),
     ("study", "laws"): ("study", "controllers"),
     ("laws",): ("controller-settings",),
+    **{("hysteresis", "known", name): ("identify", name) for name in ("zero_error_deg", "spool_error", "radius_error")},
+    **{
+        ("hysteresis", name): ("identify", name)
+        for name in ("columns", "trial", "known", "fix", "lack_of_fit", "misfit")
+    },
 }
+
+# The key that named a loop to be fitted beside those of the model's loops, and keys of these that its fit read too.
+MEASURED = ("hysteresis", "measured")
+KEYS[MEASURED] = ("identify", "logs")
+WITH_MEASURED: dict[tuple[str, ...], tuple[str, ...]] = {
+    ("hysteresis", "segments"): ("identify", "segments"),
+    ("hysteresis", "step"): ("identify", "step"),
+    ("hysteresis", "tendon_stiffness"): ("identify", "known", "tendon_stiffness"),
+}
+
+# Settings by which commands of today do what runs of a former command were of.
+OF_KINDS = {"hysteresis": "analyse.of=hysteresis"}
 
 # Gain presets of the built-in controllers.
 PRESETS = {"stepper": "hardware"}
@@ -21,9 +38,11 @@ LOOPS = {"default": "four-segments"}
 FOLDERS = {"experiments/laws": "experiments/own_controllers"}
 
 
-def key_today(path: tuple[str | int, ...]) -> tuple[str | int, ...]:
+def key_today(
+    path: tuple[str | int, ...], keys: Mapping[tuple[str, ...], tuple[str, ...]] = KEYS
+) -> tuple[str | int, ...]:
     """A key path with its beginning as it is called today."""
-    for before, today in KEYS.items():
+    for before, today in keys.items():
         if path[: len(before)] == before:
             return (*today, *path[len(before) :])
     return path

@@ -1,40 +1,15 @@
-"""Hysteresis of a wrist on its tendons: the loops that it is driven through, and a measured loop to be fitted."""
+"""Hysteresis of a wrist on its tendons: the loops that `analyse` drives it through."""
 
 from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from wristctl.config.given_files import columns_of_file, given_file, of_file
 from wristctl.config.plant import Actuator
 from wristctl.config.section import Section, choice, quantity
 
 Speed = Annotated[float, Field(gt=0, le=20)]
 NotNegative = Annotated[float, Field(ge=0)]
 Path = Annotated[float, Field(gt=0)]
-
-
-class FixedInLoop(Section):
-    """Parameters of a measured loop held at a value instead of found; null: found."""
-
-    stiffness: float | None = quantity(None, "N m/rad", "bending stiffness of the whole wrist", gt=0)
-    tendon_radius: float | None = quantity(None, "m", "radius of the tendons' circle", gt=0)
-    presliding: float | None = quantity(None, "m", "path in which the tendons' friction turns round", gt=0)
-    inner_friction: float | None = quantity(None, "N m", "torque of friction inside the wrist", ge=0)
-    inner_presliding_deg: float | None = quantity(None, "deg", "bend in which that turns round", gt=0)
-
-
-class KnownBeforehand(Section):
-    """Prior knowledge of a fit as standard deviations. The relative ones are logarithmic."""
-
-    stiffness_error: float = quantity(0.1, "", "of wrist.stiffness, relative", "assumed", gt=0)
-    damping_error: float = quantity(0.3, "", "of wrist.damping, relative", "assumed", gt=0)
-    tendon_stiffness_error: float = quantity(0.1, "", "of tendon_stiffness, relative", "assumed", gt=0)
-    zero_error_deg: float = quantity(0.1, "deg", "of the angle's zero", "as identify's", gt=0)
-    spool_error: float = quantity(2e-5, "m", "of where each side's tendons are taut", "as identify's", gt=0)
-    radius_error: float = quantity(0.01, "", "of wrist.tendon_radius, relative", "as identify's", gt=0)
-    run_up: float = quantity(
-        2e-4, "m", "path after which bristles are bent fully; what comes before is not used", "10 presliding", gt=0
-    )
 
 
 class HysteresisSettings(Section):
@@ -77,18 +52,6 @@ class HysteresisSettings(Section):
     segments: int = choice(4, "constant-curvature segments of the wrist", "as simulated", ge=1, le=8)
     step: float = quantity(1e-3, "s", "longest integration step", "as simulated", gt=0, le=5e-3)
     samples: int = choice(200, "samples kept of each cycle, a multiple of 4", ge=40, le=10_000, multiple_of=4)
-    measured: str | None = given_file(
-        "a measured loop to overlay and to fit: an open log (documentation: The open log)"
-    )
-    columns: str | None = columns_of_file()
-    trial: str | None = of_file("trial of the measured log that is the loop, where it has several")
-    known: KnownBeforehand = KnownBeforehand()
-    fix: FixedInLoop = FixedInLoop()
-    lack_of_fit: float = quantity(
-        2.0, "", "variance of a fit's residuals over that of the samples' own noise beyond which it is refused",
-        "as identify's", gt=1,
-    )  # fmt: skip
-    misfit: Literal["refuse", "tell"] = choice("refuse", "what to do with a measured loop that no model fits")
 
     @model_validator(mode="after")
     def _ranges_go_up(self) -> Self:

@@ -2,7 +2,7 @@
 
 from typing import Literal
 
-from wristctl.config.given_files import columns_of_file, given_file
+from wristctl.config.given_files import columns_of_file, given_file, of_file
 from wristctl.config.section import Section, choice, quantity
 
 
@@ -18,6 +18,24 @@ class Fixed(Section):
     presliding: float | None = quantity(None, "m", "path in which friction turns round", gt=0)
     delay: float | None = quantity(None, "s", "how much older a picture is than its time stamp")
     tendon_radius: float | None = quantity(None, "m", "radius of the tendons' circle, the pulley's as known", gt=0)
+    inner_friction: float | None = quantity(
+        None, "N m", "torque of friction inside the wrist, with model: hysteresis", ge=0
+    )
+    inner_presliding_deg: float | None = quantity(
+        None, "deg", "bend in which that turns round, with model: hysteresis", gt=0
+    )
+
+
+class KnownBeforehand(Section):
+    """Prior knowledge of the wrist of a loop of hysteresis; standard deviations, the relative ones logarithmic."""
+
+    stiffness_error: float = quantity(0.1, "", "of wrist.stiffness, relative", "assumed", gt=0)
+    damping_error: float = quantity(0.3, "", "of wrist.damping, relative", "assumed", gt=0)
+    tendon_stiffness: float = quantity(20e3, "N/m", "stiffness of one tendon", "assumed", gt=0)
+    tendon_stiffness_error: float = quantity(0.1, "", "of that, relative", "assumed", gt=0)
+    run_up: float = quantity(
+        2e-4, "m", "path after which bristles are bent fully; what comes before is not used", "10 presliding", gt=0
+    )
 
 
 class IdentifySettings(Section):
@@ -28,11 +46,14 @@ class IdentifySettings(Section):
     )
     logs: tuple[str, ...] = given_file("open logs (documentation: The open log)", ())
     columns: str | None = columns_of_file()
-    model: Literal["arcs", "wrist"] = choice(
+    trial: str | None = of_file("trial of a log that is the loop of hysteresis, where it has several")
+    model: Literal["arcs", "wrist", "hysteresis"] = choice(
         "arcs",
-        "what logs are of: any robot, as arcs without weight; or the study's wrist, in two planes",
+        "what logs are of: any robot, as arcs without weight; the study's wrist, in two planes; or a loop of its "
+        "tension and angle there and back, whose friction is found",
     )
     fix: Fixed = Fixed()
+    known: KnownBeforehand = KnownBeforehand()
     torque_constant: float | None = quantity(
         None, "N m/A", "torque of a motor at its spool for an ampere, gears included; null: unknown", gt=0
     )

@@ -1,4 +1,4 @@
-"""Settings of `simulate`, one closed loop, and of `analyse`, the same loop linearised."""
+"""Settings of `simulate`, one closed loop, and of `analyse`, the same loop linearised or its wrist alone."""
 
 from typing import Literal
 
@@ -26,8 +26,11 @@ class SimulateSettings(Section):
 
 
 class AnalyseSettings(Section):
-    """The loop of the `simulate` section, linearised about where it rests."""
+    """The loop of the `simulate` section, linearised about where it rests; or the wrist's hysteresis by its section."""
 
+    of: Literal["loop", "hysteresis"] = choice(
+        "loop", "what is analysed: the closed loop of simulate, or the wrist on its tendons without a controller"
+    )
     angles_deg: tuple[float, ...] = quantity(
         (), "deg", "resting angles toward the direction; none: straight, half way, and where the reference ends"
     )

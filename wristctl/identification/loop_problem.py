@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from scipy.interpolate import PchipInterpolator
 
 from wristctl.arrays import Array
-from wristctl.config.hysteresis import HysteresisSettings
+from wristctl.config.identify import IdentifySettings
 from wristctl.config.plant import Actuator, TrueWrist
 from wristctl.config.wrist import WristParameters
 from wristctl.errors import UserError
@@ -79,7 +79,7 @@ class LoopProblem:
 
     loop: MeasuredLoop
     wrist: WristParameters
-    settings: HysteresisSettings
+    settings: IdentifySettings
     supposed: Supposition = AS_BELIEVED
     finer: int = 1
     """Integration steps in place of each usual one."""
@@ -97,7 +97,7 @@ class LoopProblem:
             run_up = f"{1e3 * self.settings.known.run_up:g} mm of its tendons' path"
             raise UserError(
                 f"too little comes after the first turn that follows a stroke of {run_up}", self.loop.name,
-                "record two cycles or more; for small ones lower hysteresis.known.run_up to some times the presliding",
+                "record two cycles or more; for small ones lower identify.known.run_up to some times the presliding",
             )  # fmt: skip
         return int(turn)
 
@@ -161,16 +161,16 @@ class LoopProblem:
     @cached_property
     def prior(self) -> Array:
         """One over the standard deviation with which each coordinate is known beforehand; 0 where nothing is."""
-        known = self.settings.known
+        settings, known = self.settings, self.settings.known
         errors = {
             STIFFNESS: known.stiffness_error,
             DAMPING: known.damping_error,
-            ANGLE_ZERO: math.radians(known.zero_error_deg),
+            ANGLE_ZERO: math.radians(settings.zero_error_deg),
             INNER_PRESLIDING: _INNER_PRESLIDING_ERROR,
-            RADIUS: known.radius_error,
+            RADIUS: settings.radius_error,
             TENDON: known.tendon_stiffness_error,
-            SPOOL_PLUS: known.spool_error,
-            SPOOL_MINUS: known.spool_error,
+            SPOOL_PLUS: settings.spool_error,
+            SPOOL_MINUS: settings.spool_error,
         }
         if self.supposed.freed:
             errors |= {index: max(error, errors[index]) for index, error in _FREED.items()}
@@ -195,12 +195,13 @@ class LoopProblem:
 
     def tendons(self, x: Array) -> Actuator:
         """The tendons at coordinates x."""
+        stiffer = math.exp(x[TENDON]) if len(x) > TENDON else 1.0
         return Actuator(level="tendon").model_copy(
             update={
                 "friction": x[SHARE] * x[EXPONENT] / self.bend,
                 "sheath": self.bend * (1.0 / x[SHARE] - 1.0),
                 "presliding": BEGIN_PRESLIDING * math.exp(x[PRESLIDING]),
-                "tendon_stiffness": self.settings.tendon_stiffness * math.exp(x[TENDON] if len(x) > TENDON else 0.0),
+                "tendon_stiffness": self.settings.known.tendon_stiffness * stiffer,
             }
         )
 

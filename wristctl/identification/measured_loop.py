@@ -3,7 +3,6 @@
 import math
 from dataclasses import dataclass
 from functools import cached_property
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,11 +10,9 @@ from numpy.typing import NDArray
 from wristctl.arrays import Array
 from wristctl.config.wrist import WristParameters
 from wristctl.errors import UserError
-from wristctl.records.log_converters import read_log
-from wristctl.records.log_looks import looked_at, telling
+from wristctl.records.log_looks import telling
 from wristctl.records.open_log import OpenLog
 from wristctl.wrist.directions import DIRECTIONS
-from wristctl.wrist.tendon_layout import TendonLayout
 
 _EXAMPLE = "time [s],angle [deg],spool_plus [mm],spool_minus [mm]"
 _FEWEST = 100
@@ -86,21 +83,18 @@ class MeasuredLoop:
         return bool(pulled[away[0]] > pulled[0])
 
 
-def read_loop(file: Path, wrist: WristParameters, names: str = "", trial: str | None = None) -> MeasuredLoop:
-    """A measured loop in an open log. Raises UserError for a file that is none, with line and column.
+def loop_of(log: OpenLog, wrist: WristParameters, trial: str | None = None) -> MeasuredLoop:
+    """A measured loop in an open log, or in a `trial` of it. Raises UserError for a log that is none, with its line.
 
-    `names` are another author's columns as `wristctl.records.open_log` has them, `trial` is that of several to be used.
     A log without times is taken as slow: so much of its way in a second that damping plays no part.
     """
-    offset = TendonLayout.of(wrist).offset
-    read = read_log(file, names, "measured loop", tendon_offset=offset)
-    log = trial_of(telling(looked_at(read, tendon_offset=offset)), trial)
+    log = trial_of(telling(log), trial)
     slow: Array = _SLOWLY * np.arange(len(log), dtype=np.float64)
     time = log.whole("time", _EXAMPLE) if "time" in log.columns else slow
     bend, spools, tensions = planar_bend(log), in_pairs(log, "spool"), in_pairs(log, "tension")
     if spools is None and tensions is None:
-        raise UserError("neither spools nor tensions", str(file), f"columns of both sides, as in {_EXAMPLE}")
-    loop = MeasuredLoop(file.name, time, bend, spools, tensions)
+        raise UserError("neither spools nor tensions", str(log.file), f"columns of both sides, as in {_EXAMPLE}")
+    loop = MeasuredLoop(log.file.name, time, bend, spools, tensions)
     _check(loop, wrist, log)
     return loop
 
@@ -112,7 +106,7 @@ def trial_of(log: OpenLog, trial: str | None) -> OpenLog:
         return log
     if trial is None or trial not in trials:
         problem = f"{len(trials)} trials" if trial is None else f"no trial {trial}"
-        raise UserError(problem, str(log.file), f"name one of them with hysteresis.trial: {', '.join(trials)}")
+        raise UserError(problem, str(log.file), f"name one of them with identify.trial: {', '.join(trials)}")
     return trials[trial]
 
 

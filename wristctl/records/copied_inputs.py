@@ -32,7 +32,7 @@ class SealedFiles:
 
 def sealed_files(study: Study, kind: str) -> SealedFiles:
     """The files of the sections that a command reads. Raises UserError for one that cannot be read."""
-    sections = sections_read(kind)
+    sections = sections_read(kind, study)
     contents, names = dict[str, bytes](), dict[str, str]()
     for section in sections:
         for name in files_of(getattr(study, section)):

@@ -22,7 +22,7 @@ _log = logging.getLogger(__name__)
 
 _OF_CSV = (
     "for samples of tip and angle: wristctl gen-data --source csv --set 'files=[FILE]', then latest:gen-data; for a "
-    "loop of torque or tension over angle: wristctl hysteresis --measured FILE"
+    "loop of torque or tension over angle: wristctl identify FILE --model hysteresis"
 )
 
 
@@ -74,11 +74,12 @@ class Content(NamedTuple):
     """File of a run that other runs of its kind may lack, and what it is: for sentences."""
 
     file: str
+    """Its name, or those of several of which one will do: `a or b`."""
     what: str
 
     def of(self, run: Path) -> bool:
         """Whether the run in this folder has it."""
-        return (run / self.file).is_file()
+        return any((run / name).is_file() for name in self.file.split(" or "))
 
 
 def require(ref: str | Path, kind: str | None, results: Path = RESULTS, content: Content | None = None) -> Run:

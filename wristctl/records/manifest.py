@@ -25,7 +25,7 @@ TABLES, OVERVIEW = "tables.json", "overview.json"
 
 # Commands that make runs.
 KINDS = (
-    "gen-data", "train", "tune", "compare", "study", "recommend", "simulate", "analyse", "hysteresis", "audit",
+    "gen-data", "train", "tune", "compare", "study", "recommend", "simulate", "analyse", "audit",
     "hw-run", "identify", "validate", "track", "calibrate-camera", "calibrate-wrist",
 )  # fmt: skip
 # Options that say where a run lies, and what it was cut short as.

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from pydantic import ValidationError
 
+from wristctl.config.former_names import OF_KINDS
 from wristctl.config.study import Study
 from wristctl.errors import Call, UserError, meant, reason_of
 from wristctl.plain_files import LINK, open_plain, read_json, read_plain, unreadable
@@ -86,6 +87,13 @@ class Run:
         return self.manifest.kind
 
     @property
+    def kind_today(self) -> str:
+        """The same, or the command of which that is a mode today."""
+        if self.kind not in OF_KINDS:
+            return self.kind
+        return "identify" if self.config.identify.model == "hysteresis" else "analyse"
+
+    @property
     def sealed(self) -> bool:
         """Whether its manifest was sealed, which makes it a run whatever has become of the manifest."""
         return MANIFEST in (read_seal(self.path) or ())
@@ -105,7 +113,8 @@ class Run:
     @cached_property
     def config(self) -> Study:
         """The resolved study it ran."""
-        return read_study([self.file(CONFIG)], note=False)[0]
+        of_kind = [OF_KINDS[self.kind]] if self.kind in OF_KINDS else []
+        return read_study([self.file(CONFIG)], of_kind, note=False)[0]
 
     @property
     def metrics(self) -> dict[str, dict[str, Any]]:

@@ -44,7 +44,7 @@ def _given(annotation: Any) -> Any:
 # Commands that work on what a section of another name describes: its keys are theirs too.
 SUBJECTS = {"analyse": "simulate", "validate": "real-robot"}
 # Keys of a study that are no section of a command.
-NO_COMMANDS = ("seed", "wrist", "families", "sweep", "controller-settings", "real-robot")
+NO_COMMANDS = ("seed", "wrist", "families", "sweep", "controller-settings", "real-robot", "hysteresis")
 
 
 def is_command(kind: str) -> bool:

@@ -27,7 +27,7 @@ from wristctl.study_files.renaming import (
     with_keys_of_today,
     with_loops_of_today,
 )
-from wristctl.study_files.resolved import check_read
+from wristctl.study_files.resolved import check_mode, check_read
 from wristctl.study_files.shipped import shipped_name, shipped_names, studies_beside, study_file
 from wristctl.study_files.short_rows import for_their_own_controller, in_lists, with_gains_apart
 from wristctl.study_files.strict_yaml import Document, KeyPath, parse_yaml
@@ -103,6 +103,7 @@ def read_study(
     except ValidationError as error:
         raise explained(error, origins) from error
     _refuse_horizon_of_worlds(study, origins, command)
+    check_mode(study, command, origins)
     if for_another:
         study.simulate.model_fields_set.discard("gains")
     given, fields = study.wrist.model_fields_set, type(study.wrist).model_fields

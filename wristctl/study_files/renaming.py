@@ -45,17 +45,39 @@ def with_keys_of_today(document: Document, place: Phrase, found: NewNames) -> Do
     data, lines = document.data, {former_names.key_today(path): line for path, line in document.lines.items()}
     if not isinstance(data, dict):
         return document
-    for before, today in former_names.KEYS.items():
-        holder: Any = data
-        for key in before[:-1]:
-            holder = holder.get(key) if isinstance(holder, dict) else None
-        if not isinstance(holder, dict) or before[-1] not in holder or today[-1] in holder:
+    renamed = former_names.KEYS
+    if isinstance(log := _at(data, former_names.MEASURED), str):
+        data = _with(_with(data, former_names.MEASURED, (log,)), ("identify", "model"), "hysteresis")
+        renamed = renamed | former_names.WITH_MEASURED
+    for before, today in renamed.items():
+        value = _at(data, before)
+        if value is None or _at(data, today) is not None:
             continue
-        renamed = {today[-1] if key == before[-1] else key: value for key, value in holder.items()}
-        data = {**data, before[0]: renamed} if len(before) > 1 else renamed
+        data = _with(_without(data, before), today, value)
         line = lines.get(today)
         found.add(".".join(before), ".".join(today), f"{worded(place)}:{line}" if line else place)
     return Document(data, lines)
+
+
+def _at(data: Any, path: KeyPath) -> Any:
+    """What a document has at a key path; None of nothing."""
+    for key in path:
+        data = data.get(key) if isinstance(data, dict) else None
+    return data
+
+
+def _with(data: Any, path: KeyPath, value: Any) -> Any:
+    """A copy of the document with a value at a key path."""
+    if not path:
+        return value
+    held = data if isinstance(data, dict) else {}
+    return {**held, path[0]: _with(held.get(path[0]), path[1:], value)}
+
+
+def _without(data: dict[Any, Any], path: KeyPath) -> dict[Any, Any]:
+    """A copy of the document without a key path that it has."""
+    kept = {key: value for key, value in data.items() if key != path[0]}
+    return kept if len(path) == 1 else {**data, path[0]: _without(data[path[0]], path[1:])}
 
 
 def with_loops_of_today(data: dict[str, Any], origins: dict[KeyPath, Phrase], found: NewNames) -> None:

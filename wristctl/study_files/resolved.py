@@ -3,7 +3,7 @@
 import hashlib
 import json
 import re
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
 import yaml
@@ -14,9 +14,9 @@ from wristctl.config.loop import LOOPS
 from wristctl.config.plant import is_unsaid
 from wristctl.config.section import OpenSection, Parameter, Section
 from wristctl.config.study import Study
-from wristctl.errors import Phrase, UserError
+from wristctl.errors import Phrase, Setting, UserError
 from wristctl.study_files.keys import NO_COMMANDS, SUBJECTS, choices_of, command_of, keys_of, source_of, unit_of
-from wristctl.study_files.strict_yaml import parse_yaml
+from wristctl.study_files.strict_yaml import KeyPath, parse_yaml
 
 _WORD = re.compile(r"[A-Za-z0-9_./][A-Za-z0-9_./ -]*[A-Za-z0-9_./]|[A-Za-z_/]")
 
@@ -33,14 +33,18 @@ _READ: dict[str, tuple[str, ...]] = {"train": ("gen-data",), "simulate": (_OWN, 
 _READ |= dict.fromkeys(("hw-run", "recommend"), (_OWN,))
 _READ |= dict.fromkeys(("tune", "compare"), ("families", _OWN, "sweep")) | {"study": ("families", _OWN)}
 _READ |= {command: (subject, _OWN) for command, subject in SUBJECTS.items()}
+_READ["analyse"] += ("hysteresis",)
+"""Sections that a command reads beside its own: without a data run, train draws what gen-data would."""
+_UNREAD = {"loop": ("hysteresis",), "hysteresis": ("simulate", _OWN)}
+"""What `analyse` leaves alone of them, by what it is of."""
 _PASSED_ON: dict[str, tuple[str, ...]] = {"recommend": ("simulate", "hw-run"), "calibrate-camera": ("track",)}
 """Sections whose settings go into the files that a command writes: the study of a recommendation, printed markers."""
-"""Sections that a command reads beside its own: without a data run, train draws what gen-data would."""
 
 
-def sections_read(command: str) -> tuple[str, ...]:
-    """The sections of a study that a command reads, by their names as attributes."""
-    return tuple(name.replace("-", "_") for name in _keys(command) if name in keys_of(Study) and name not in _SHARED)
+def sections_read(command: str, study: Study | None = None) -> tuple[str, ...]:
+    """The sections that a command reads, of a study or of any, by their names as attributes."""
+    read = _keys(command, study)
+    return tuple(name.replace("-", "_") for name in read if name in keys_of(Study) and name not in _SHARED)
 
 
 def check_read(key: str, command: str, where: Phrase) -> None:
@@ -58,15 +62,33 @@ def check_read(key: str, command: str, where: Phrase) -> None:
     raise UserError(f"{command_of(command)} does not read {key}", where, fix)
 
 
+def check_mode(study: Study, command: str | None, origins: Mapping[KeyPath, Phrase]) -> None:
+    """UserError for an override of what `analyse` does not read of a loop, or of hysteresis."""
+    of, other = study.analyse.of, next(name for name in _UNREAD if name != study.analyse.of)
+
+    def is_unread(path: KeyPath) -> bool:
+        own = path[0] == "analyse" and of == "hysteresis" and path[1:] not in ((), ("of",))
+        return isinstance(origins[path], Setting) and (own or path[0] in _UNREAD[of])
+
+    if command == "analyse" and (unread := [path for path in origins if is_unread(path)]):
+        path, what = max(unread, key=len), {"loop": "a loop"}.get(of, of)
+        fix = (
+            "leave it out, or ",
+            Setting(f"of={other}", "analyse", option=True),
+            " (documentation: Hysteresis of the wrist)",
+        )
+        raise UserError(f"an analysis of {what} does not read {'.'.join(map(str, path))}", origins[path], fix)
+
+
 def resolved_yaml(study: Study, command: str) -> str:
     """Part of a study that `command` reads (seed, wrist, sections), as YAML that gives the same study."""
-    entries = [entry for entry in _entries(study) if entry[0] in _keys(command)]
+    entries = [entry for entry in _entries(study) if entry[0] in _keys(command, study)]
     return "\n".join(_mapping(entries, "")) + "\n"
 
 
 def changed_yaml(study: Study, command: str) -> str:
     """The settings of what `command` reads that are not at their defaults, as YAML that gives the same study."""
-    changed = [entry for entry in _changed(study) if entry[0] in _keys(command)]
+    changed = [entry for entry in _changed(study) if entry[0] in _keys(command, study)]
     return "\n".join(_mapping(changed, "")) + "\n" if changed else ""
 
 
@@ -102,17 +124,18 @@ def _reduced(value: Any) -> Any:
 
 def config_hash(study: Study, command: str) -> str:
     """SHA-256 of what `command` reads, as canonical JSON."""
-    part = study.model_dump(mode="json", by_alias=True, include=names_read(command))
+    part = study.model_dump(mode="json", by_alias=True, include=names_read(command, study))
     return hashlib.sha256(json.dumps(part, sort_keys=True, separators=(",", ":")).encode()).hexdigest()
 
 
-def names_read(command: str) -> set[str]:
-    """The fields of a study that a command reads."""
-    return {name.replace("-", "_") for name in _keys(command)}
+def names_read(command: str, study: Study | None = None) -> set[str]:
+    """The fields that a command reads, of a study or of any."""
+    return {name.replace("-", "_") for name in _keys(command, study)}
 
 
-def _keys(command: str) -> Sequence[str]:
-    return (*_SHARED, command, *_READ.get(command, ()))
+def _keys(command: str, study: Study | None = None) -> Sequence[str]:
+    unread = () if study is None or command != "analyse" else _UNREAD[study.analyse.of]
+    return tuple(name for name in (*_SHARED, command, *_READ.get(command, ())) if name not in unread)
 
 
 def _names(section: Section) -> list[str]:

@@ -21,6 +21,7 @@ from wristctl.cli.progress import listening, progress
 from wristctl.commands.printed_table import Table
 from wristctl.commands.procedure import inputs_of, procedure_of
 from wristctl.commands.progress import no_event
+from wristctl.config.former_names import OF_KINDS
 from wristctl.config.loop import comes_live
 from wristctl.errors import UserError
 from wristctl.plain_files import UNREADABLE, unreadable
@@ -188,15 +189,16 @@ def _replay(run: Run, overrides: list[str], as_json: bool) -> None:
     run.manifest  # noqa: B018 - raises where it cannot be read
     if state != "ok":
         raise UserError(f"run is {state}, not ok", str(run.path), "repeat a run that ended ok")
-    inputs = inputs_of(run)
+    inputs, kind = inputs_of(run), run.kind_today
     check_trust(leaves_of(run), run.path / CONFIG)
-    study, _ = read_study([run.path / CONFIG], overrides, run.kind, note=False)  # the repetition notes former names
-    section = getattr(study, run.kind.replace("-", "_"))
+    overrides = [OF_KINDS[run.kind], *overrides] if run.kind != kind == "analyse" else overrides
+    study, _ = read_study([run.path / CONFIG], overrides, kind, note=False)  # the repetition notes former names
+    section = getattr(study, kind.replace("-", "_"))
     if comes_live(getattr(section, "reference", None)):
         from wristctl.trial.trial_results import RECORD
 
         record = f"--set 'reference={{kind: live, file: {run.path / RECORD}}}'"
-        fix = f"follow its record: wristctl {command_of(run.kind)} --config {run.path / CONFIG} {record}"
+        fix = f"follow its record: wristctl {command_of(kind)} --config {run.path / CONFIG} {record}"
         raise UserError("nobody sends a live reference again", str(run.path), fix, exit_code=3)
     if getattr(section, "port", None) is not None:
         fix = "look at it: wristctl runs report; or do the experiment anew by its own command, with a person at the rig"
@@ -238,7 +240,7 @@ def _again(run: Run, scratch: Path, settings: Sequence[str]) -> int:
     It opens no board and no camera, for any configuration.
     """
     options = [part for text in settings for part in ("--set", text)]
-    again = [*command_of(run.kind).split(), "--config", str(run.path / CONFIG), "--out", str(scratch)]
+    again = [*command_of(run.kind_today).split(), "--config", str(run.path / CONFIG), "--out", str(scratch)]
     command = [sys.executable, "-P", "-m", "wristctl", *again, *options, "--label", "replay"]
     alone = {**os.environ, NO_HARDWARE: "yes"}
     return subprocess.run(command, stdout=subprocess.DEVNULL, env=alone, preexec_fn=end_with_parent).returncode

@@ -1,4 +1,4 @@
-"""The answer of the analysis of a loop: whether it is stable, and its least margins."""
+"""The answer of the analysis of a loop: whether it is stable, and its least margins; what its quantities are."""
 
 from __future__ import annotations
 
@@ -6,16 +6,43 @@ import math
 from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-from wristctl.commands.analyse.results import decibels, picked
 from wristctl.commands.answer import Answer
 from wristctl.commands.printed_table import joined
-from wristctl.commands.quantities import table_of
+from wristctl.commands.quantities import Quantity, table_of
 
 if TYPE_CHECKING:
     from wristctl.stability.linear_range import LinearityLimit
     from wristctl.stability.loop_analysis import LoopAnalysis
 
 
+_EACH = "factor of one plane's gain {} to which it is stable, whatever the other's up to its own"
+_QUANTITIES = {
+    quantity.name: quantity
+    for quantity in (
+        Quantity("angle_deg", "deg", "where the loop rests, toward the direction", "at rest"),
+        Quantity("torque", "N m", "that holds it there"),
+        Quantity("stable", "", "whether small swings die out"),
+        Quantity("growth", "1/s", "of the least stable mode"),
+        Quantity("gain_margin", "dB"),
+        Quantity("gain_most", "", "factor of the loop's gain up to which it is stable"),
+        Quantity("gain_most_frequency", "Hz", "with which it begins to oscillate there", "at"),
+        Quantity("gain_least", "", "factor of the loop's gain down to which it is stable", "least factor"),
+        Quantity("gain_least_frequency", "Hz", "with which it begins to oscillate there", "least factor at"),
+        Quantity("phase_margin", "rad", "smallest where the loop gain is 1"),
+        Quantity("delay_margin", "s", "least delay more that makes it unstable", shown="ms"),
+        Quantity("delay_frequency", "Hz", "with which it begins to oscillate then", "then at"),
+        Quantity("sensitivity", "", "Ms, largest |1/(1 + L)|", "Ms"),
+        Quantity("complementary", "", "Mt, largest |L/(1 + L)|", "Mt"),
+        Quantity("rise", "s", "of a small step from 10 to 90 %", "rise 10-90 %", "ms"),
+        Quantity("overshoot", "", "of a small step, as a share of where it ends", shown="%"),
+        Quantity("settling", "s", "of a small step to 2 %", shown="ms"),
+        Quantity("final", "", "share of a small step at which the angle arrives", "arrives at", "%"),
+        Quantity("toward_deg", "deg", "direction of the resting bend, from ulnar toward flexion"),
+        Quantity("each_least", "", _EACH.format("down"), "least factor"),
+        Quantity("each_most", "", _EACH.format("up"), "largest factor"),
+        Quantity("each_phase", "rad", "phase that each plane bears by itself", "phase"),
+    )
+}  # fmt: skip
 # Name of the limit of linearity that only adds to a swing.
 NOISE = "the camera's noise"
 
@@ -24,6 +51,16 @@ def listed(angles: Iterable[float]) -> str:
     """Angles [deg] as text: 0, 15 and 30 deg."""
     texts = [f"{round(angle, 6):g}" for angle in angles]
     return f"{joined(texts)} deg"
+
+
+def picked(*names: str) -> list[Quantity]:
+    """Quantities of a resting loop by name."""
+    return [_QUANTITIES[name] for name in names]
+
+
+def decibels(factor: float) -> float:
+    """A factor of the gain in dB; -inf for 0."""
+    return 20.0 * math.log10(factor) if factor > 0.0 else -math.inf
 
 
 def answer_of(label: str, records: Sequence[Mapping[str, Any]], analyses: Sequence[LoopAnalysis]) -> Answer:

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import logging
 import math
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from wristctl.commands.analyse.answer import answer_of, listed
+from wristctl.commands.analyse.answer import listed
+from wristctl.commands.analyse.hysteresis import HYSTERESIS
+from wristctl.commands.analyse.hysteresis_results import Hysteresis
 from wristctl.commands.analyse.results import (
     CUTS,
-    LoopResults,
+    Analysed,
     draw,
     limit_table,
     locus_table,
@@ -18,8 +19,7 @@ from wristctl.commands.analyse.results import (
     tables_of_margins,
     write,
 )
-from wristctl.commands.answer import Answer
-from wristctl.commands.inputs import EarlierRun, Inputs
+from wristctl.commands.inputs import FROM_IDENTIFIED, EarlierRun, Inputs
 from wristctl.commands.inputs_of_loops import (
     asked_of_simulation,
     check_inverses,
@@ -37,21 +37,17 @@ from wristctl.commands.loop_warnings import (
     warn_of_one_plane,
     warn_outside_conditions,
 )
+from wristctl.commands.printed_table import Table
 from wristctl.commands.procedure import Procedure, no_tendons
-from wristctl.commands.results import StudyResult
 from wristctl.commands.session import Session
 from wristctl.commands.stiffness_table import stiffness_table
 from wristctl.config.study import Study
 from wristctl.errors import UserError, meant, under
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    import pandas as pd
-
     from wristctl.arrays import Array
     from wristctl.config.loop import Loop
-    from wristctl.stability.loop_analysis import AnalysedRow, LoopAnalysis, RootLocus
+    from wristctl.stability.loop_analysis import AnalysedRow, LoopAnalysis
     from wristctl.stability.phase_portrait import PhasePortrait
     from wristctl.wrist.kinematics import Inverse
 
@@ -59,47 +55,6 @@ log = logging.getLogger(__name__)
 
 # Change of a law's slope over 1e-4 typical sizes from which its margins are of less than anybody can see.
 _CURVED = 0.05
-
-
-@dataclass(frozen=True, repr=False, eq=False)
-class Analysed(StudyResult):
-    """One loop about each of its resting angles [deg]."""
-
-    kind = "analyse"
-
-    label: str
-    """Controller with its gains."""
-    angles: Sequence[float]
-    found: Sequence[LoopAnalysis]
-    """Analysis at each resting angle."""
-    locus: RootLocus | None
-    """Root locus at the last angle; None where nothing is fed back."""
-    portrait: PhasePortrait | None
-    """Phase portrait of a sliding law, toward the last angle; None of another law."""
-    toward_deg: float | None = None
-    """Direction of the resting bends from ulnar toward flexion [deg]; None in one plane."""
-
-    @property
-    def answer(self) -> Answer:
-        """Whether the loop is stable, with its least margins."""
-        return answer_of(self.label, self._results.records(), self.found)
-
-    @property
-    def _results(self) -> LoopResults:
-        return LoopResults(self.angles, self.found, self.locus, self.portrait, self.toward_deg)
-
-    @property
-    def fault(self) -> UserError | None:
-        """Error that names the angles at which the loop is unstable; None where it is stable."""
-        bad = [angle for angle, analysis in zip(self.angles, self.found, strict=True) if not analysis.margins.stable]
-        if not bad:
-            return None
-        fix = "look at the figures; try other gains, or a shorter control_period"
-        return UserError(f"the loop is unstable at {listed(bad)}", self.place, fix, exit_code=3)
-
-    def frame(self) -> pd.DataFrame:
-        """Margins and step, a row per resting angle [deg]; SI units, phase margins in rad, inf: no limit."""
-        return self._results.frame()
 
 
 def plan(study: Study, inputs: Inputs) -> str:
@@ -136,11 +91,12 @@ def plan(study: Study, inputs: Inputs) -> str:
     return f"linearise {chosen.controller}{where} at rest at {angles}, friction {settings.friction}"
 
 
-def analyse(session: Session) -> Analysed:
+def analyse(session: Session) -> Analysed | Hysteresis:
     """Linearise one closed loop at rest: gain, phase and delay margins, sensitivity, step, root locus, phase portrait.
 
     The loop is that of the `simulate` section, in one plane or in two, as `simulate` finds them. Exit code 3 where it
-    is unstable.
+    is unstable. With `--of hysteresis` it is the wrist on its tendons alone, by the `hysteresis` section: loops of
+    tension and angle at several speeds, ranges and frictions, the dead band, and circles in two planes.
     """
     study, findings = identified(session.study, "simulate", session.inputs), session.findings
     chosen, settings, planes = study.simulate, study.analyse, planes_of_simulation(study)
@@ -164,20 +120,20 @@ def analyse(session: Session) -> Analysed:
     label = f"{row.law.name}/{chosen.gains if isinstance(chosen.gains, str) else 'given'}{rests.words(study)}"
     findings.overview.figure = "bode"
     findings.numerics(planes=planes)
-    results = LoopResults(angles, analyses, locus, portrait, rests.toward_deg)
-    write(findings, results)
+    tables: list[Table] = []
+    result = Analysed(session.study, findings, tables, label, angles, analyses, locus, portrait, rests.toward_deg)
+    write(result)
     with session.drawing():
-        draw(findings, label, results)
-    tables = tables_of_margins(results.records())
+        draw(result)
+    tables += tables_of_margins(result.records())
     if locus is not None:
-        value = None if settings.over == "loop" else row.gains[settings.over]
-        tables.append(
-            locus_table(locus, value, "" if value is None else row.law.gains[settings.over].unit, settings.span)
-        )
+        over = "" if settings.over == "loop" else settings.over
+        unit = row.law.gains[over].unit if over else ""
+        tables.append(locus_table(locus, row.gains[over] if over else None, unit, settings.span))
     tables.append(limit_table(analyses[-1], CUTS[chosen.loop.sensor.level]))
     tables.append(stiffness_table(row.wrist, row.loop, planes))
     tables += [] if portrait is None else [portrait_table(portrait)]
-    return Analysed(session.study, findings, tables, label, angles, analyses, locus, portrait, rests.toward_deg)
+    return result
 
 
 def _row(study: Study, inputs: Inputs, planes: int) -> AnalysedRow:
@@ -295,14 +251,15 @@ def _portrait(
         return phase_portrait(row.law, row.gains, row.loop, row.wrist, theta, horizon, draws, rests.toward)
 
 
-ANALYSE = Procedure(
+ANALYSE: Procedure[Analysed | Hysteresis] = Procedure(
     "analyse",
     plan,
     analyse,
     (
         EarlierRun("network", kind="train", optional=True),
         EarlierRun("tuned", kind="tune", optional=True),
-        EarlierRun("from_identified", kind="identify", optional=True),
+        FROM_IDENTIFIED,
     ),
     in_one_plane=no_tendons,
+    mode=lambda study: HYSTERESIS if study.analyse.of == "hysteresis" else None,
 )

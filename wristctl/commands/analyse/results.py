@@ -4,11 +4,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any, Literal, NamedTuple
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Literal
 
+from wristctl.commands.analyse.answer import answer_of, decibels, listed, picked
+from wristctl.commands.answer import Answer
 from wristctl.commands.printed_table import Table, number
-from wristctl.commands.quantities import Quantity, documented, table_of
-from wristctl.commands.results import Findings
+from wristctl.commands.quantities import documented, table_of
+from wristctl.commands.results import StudyResult
+from wristctl.errors import UserError
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -22,44 +26,6 @@ CUTS = {
     "ideal": "the law's torque (ideal sensing)",
     "camera": "the camera's frames",
 }
-_EACH = "factor of one plane's gain {} to which it is stable, whatever the other's up to its own"
-_QUANTITIES = {
-    quantity.name: quantity
-    for quantity in (
-        Quantity("angle_deg", "deg", "where the loop rests, toward the direction", "at rest"),
-        Quantity("torque", "N m", "that holds it there"),
-        Quantity("stable", "", "whether small swings die out"),
-        Quantity("growth", "1/s", "of the least stable mode"),
-        Quantity("gain_margin", "dB"),
-        Quantity("gain_most", "", "factor of the loop's gain up to which it is stable"),
-        Quantity("gain_most_frequency", "Hz", "with which it begins to oscillate there", "at"),
-        Quantity("gain_least", "", "factor of the loop's gain down to which it is stable", "least factor"),
-        Quantity("gain_least_frequency", "Hz", "with which it begins to oscillate there", "least factor at"),
-        Quantity("phase_margin", "rad", "smallest where the loop gain is 1"),
-        Quantity("delay_margin", "s", "least delay more that makes it unstable", shown="ms"),
-        Quantity("delay_frequency", "Hz", "with which it begins to oscillate then", "then at"),
-        Quantity("sensitivity", "", "Ms, largest |1/(1 + L)|", "Ms"),
-        Quantity("complementary", "", "Mt, largest |L/(1 + L)|", "Mt"),
-        Quantity("rise", "s", "of a small step from 10 to 90 %", "rise 10-90 %", "ms"),
-        Quantity("overshoot", "", "of a small step, as a share of where it ends", shown="%"),
-        Quantity("settling", "s", "of a small step to 2 %", shown="ms"),
-        Quantity("final", "", "share of a small step at which the angle arrives", "arrives at", "%"),
-        Quantity("toward_deg", "deg", "direction of the resting bend, from ulnar toward flexion"),
-        Quantity("each_least", "", _EACH.format("down"), "least factor"),
-        Quantity("each_most", "", _EACH.format("up"), "largest factor"),
-        Quantity("each_phase", "rad", "phase that each plane bears by itself", "phase"),
-    )
-}  # fmt: skip
-
-
-def picked(*names: str) -> list[Quantity]:
-    """Quantities of a resting loop by name."""
-    return [_QUANTITIES[name] for name in names]
-
-
-def decibels(factor: float) -> float:
-    """A factor of the gain in dB; -inf for 0."""
-    return 20.0 * math.log10(factor) if factor > 0.0 else -math.inf
 
 
 def _record(angle: float, analysis: LoopAnalysis, toward_deg: float | None) -> dict[str, Any]:
@@ -135,23 +101,41 @@ def portrait_table(portrait: PhasePortrait) -> Table:
     return Table(f"{slope} {number(portrait.layer)} rad/s wide to either side", heads, rows)
 
 
-class LoopResults(NamedTuple):
-    """Results of the analysis of one loop."""
+@dataclass(frozen=True, repr=False, eq=False)
+class Analysed(StudyResult):
+    """One loop about each of its resting angles [deg]."""
 
+    kind = "analyse"
+
+    label: str
+    """Controller with its gains."""
     angles: Sequence[float]
-    """Resting angles [deg]."""
-    analyses: Sequence[LoopAnalysis]
+    found: Sequence[LoopAnalysis]
     """Analysis at each resting angle."""
     locus: RootLocus | None
     """Root locus at the last angle; None where nothing is fed back."""
     portrait: PhasePortrait | None
-    """Phase portrait of a sliding law; None of another law."""
-    toward_deg: float | None
-    """Direction of the resting bends [deg]; None in one plane."""
+    """Phase portrait of a sliding law, toward the last angle; None of another law."""
+    toward_deg: float | None = None
+    """Direction of the resting bends from ulnar toward flexion [deg]; None in one plane."""
+
+    @property
+    def answer(self) -> Answer:
+        """Whether the loop is stable, with its least margins."""
+        return answer_of(self.label, self.records(), self.found)
+
+    @property
+    def fault(self) -> UserError | None:
+        """Error that names the angles at which the loop is unstable; None where it is stable."""
+        bad = [angle for angle, analysis in zip(self.angles, self.found, strict=True) if not analysis.margins.stable]
+        if not bad:
+            return None
+        fix = "look at the figures; try other gains, or a shorter control_period"
+        return UserError(f"the loop is unstable at {listed(bad)}", self.place, fix, exit_code=3)
 
     def records(self) -> list[dict[str, Any]]:
         """Margins and step at each resting angle, by the quantities' names."""
-        return [_record(*row, self.toward_deg) for row in zip(self.angles, self.analyses, strict=True)]
+        return [_record(*row, self.toward_deg) for row in zip(self.angles, self.found, strict=True)]
 
     def frame(self) -> pd.DataFrame:
         """Margins and step, a row per resting angle [deg]; SI units, phase margins in rad, inf: no limit."""
@@ -160,13 +144,13 @@ class LoopResults(NamedTuple):
         return pd.DataFrame(self.records()).drop(columns="gain_margin")
 
 
-def write(findings: Findings, results: LoopResults) -> None:
+def write(result: Analysed) -> None:
     """Write the worst margins of all resting angles as metrics, and all results as tables."""
     import numpy as np
     import pandas as pd
 
-    angles, analyses, locus, portrait, toward_deg = results
-    rows = results.frame()
+    findings, angles, analyses, toward_deg = result.findings, result.angles, result.found, result.toward_deg
+    locus, portrait, rows = result.locus, result.portrait, result.frame()
     worst: dict[str, tuple[Literal["lower", "higher"], float]] = {
         "gain_most": ("higher", rows["gain_most"].min()), "gain_least": ("lower", rows["gain_least"].max()),
         "delay_margin": ("higher", rows["delay_margin"].min()), "sensitivity": ("lower", rows["sensitivity"].max()),
@@ -181,61 +165,52 @@ def write(findings: Findings, results: LoopResults) -> None:
             name, shown if math.isfinite(shown) else None, quantity.unit, better, len(analyses), meaning=description
         )
     findings.table("data/margins.csv", rows, *documented(picked(*rows)))
+    of_plane = {} if toward_deg is None else {"locus": "number of the eigenvalue"}
     curves = [
-        pd.DataFrame(
-            {
-                "angle_deg": angle, **({} if toward_deg is None else {"locus": number}),
-                "frequency": _HZ * analysis.omega, "gain": np.abs(curve), "phase": np.unwrap(np.angle(curve)),
-                "plant_gain": np.abs(plant), "plant_phase": np.unwrap(np.angle(plant)),
-            }
-        )
+        {
+            "angle_deg": angle, **dict.fromkeys(of_plane, number),
+            "frequency": _HZ * analysis.omega, "gain": np.abs(curve), "phase": np.unwrap(np.angle(curve)),
+            "plant_gain": np.abs(plant), "plant_phase": np.unwrap(np.angle(plant)),
+        }
         for angle, analysis in zip(angles, analyses, strict=True)
         for number, (curve, plant) in enumerate(zip(analysis.loci, analysis.plant_loci, strict=True), 1)
     ]  # fmt: skip
-    response_units = {
-        "angle_deg": "deg",
-        "frequency": "Hz",
-        "phase": "rad",
-        "plant_gain": "rad/(N m)",
-        "plant_phase": "rad",
-    }
-    of_response = {"gain": "of the loop's transfer"}
-    if toward_deg is not None:
-        of_response = {"gain": "of an eigenvalue of the loop's transfer", "locus": "number of the eigenvalue"}
-    findings.table("data/response.csv", pd.concat(curves), response_units, of_response)
     steps = [
-        pd.DataFrame({"angle_deg": angle, "time": analysis.step.time, "response": analysis.step.angle})
+        {"angle_deg": angle, "time": analysis.step.time, "response": analysis.step.angle}
         for angle, analysis in zip(angles, analyses, strict=True)
     ]
-    findings.table("data/step.csv", pd.concat(steps), {"angle_deg": "deg", "time": "s"}, {"response": "angle per step"})
-    if locus is not None:
-        every = [
-            pd.DataFrame({"factor": factor, "growth": poles[:, 0], "frequency": poles[:, 1]})
-            for factor, poles in zip(locus.factors, locus.poles, strict=True)
-        ]
-        findings.table("data/locus.csv", pd.concat(every), {"growth": "1/s", "frequency": "Hz"}, {"factor": locus.over})
-    if portrait is not None:
-        courses = [
-            pd.DataFrame(
-                {"course": k, "time": course.time, "error": course.error, "rate": course.rate, "sigma": course.sigma}
-            )
-            for k, course in enumerate(portrait.courses)
-        ]
-        portrait_units = {"time": "s", "error": "rad", "rate": "rad/s"}
-        findings.table("data/portrait.csv", pd.concat(courses), portrait_units, {"sigma": "0 on the sliding surface"})
+    poles = [] if locus is None else [
+        {"factor": factor, "growth": each[:, 0], "frequency": each[:, 1]}
+        for factor, each in zip(locus.factors, locus.poles, strict=True)
+    ]  # fmt: skip
+    courses = [] if portrait is None else [
+        {"course": k, "time": course.time, "error": course.error, "rate": course.rate, "sigma": course.sigma}
+        for k, course in enumerate(portrait.courses)
+    ]  # fmt: skip
+    transfer = f"of {'an eigenvalue of ' * bool(of_plane)}the loop's transfer"
+    units = {"angle_deg": "deg", "frequency": "Hz", "phase": "rad", "plant_gain": "rad/(N m)", "plant_phase": "rad"}
+    files: list[tuple[str, list[dict[str, Any]], dict[str, str], dict[str, str]]] = [
+        ("response", curves, units, {"gain": transfer, **of_plane}),
+        ("step", steps, {"angle_deg": "deg", "time": "s"}, {"response": "angle per step"}),
+        ("locus", poles, {"growth": "1/s", "frequency": "Hz"}, {"factor": locus.over if locus else ""}),
+        ("portrait", courses, {"time": "s", "error": "rad", "rate": "rad/s"}, {"sigma": "0 on the sliding surface"}),
+    ]
+    for name, parts, of_columns, meaning in files:
+        if parts:
+            findings.table(f"data/{name}.csv", pd.concat(map(pd.DataFrame, parts)), of_columns, meaning)
 
 
-def draw(findings: Findings, label: str, results: LoopResults) -> None:
-    """Draw the Bode plot first; of a loop that feeds nothing back, the plant's. `label` names the law and its gains."""
+def draw(result: Analysed) -> None:
+    """Draw the Bode plot first; of a loop that feeds nothing back, the plant's."""
     from wristctl.commands.analyse import figures
 
-    angles, analyses, locus, portrait, _ = results
-    heading = f"{label}: the plant, angle per torque" if locus is None else f"{label}: loop transfer"
+    findings, angles, analyses, locus = result.findings, result.angles, result.found, result.locus
+    heading = f"{result.label}: the plant, angle per torque" if locus is None else f"{result.label}: loop transfer"
     findings.figure("bode", figures.bode, analyses, angles, heading)
     if any(analysis.margins.stable for analysis in analyses):
         findings.figure("step", figures.step, analyses, angles)
     if locus is not None:
         findings.figure("sensitivity", figures.sensitivity, analyses, angles)
         findings.figure("locus", figures.locus, locus)
-    if portrait is not None:
-        findings.figure("portrait", figures.portrait, portrait)
+    if result.portrait is not None:
+        findings.figure("portrait", figures.portrait, result.portrait)

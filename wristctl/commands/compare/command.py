@@ -20,7 +20,7 @@ from wristctl.commands.compare.answer import (
     units,
 )
 from wristctl.commands.compare.ranking import ranked
-from wristctl.commands.inputs import EarlierRun, Inputs
+from wristctl.commands.inputs import FROM_IDENTIFIED, EarlierRun, Inputs
 from wristctl.commands.inputs_of_loops import (
     asked_of_comparison,
     check_family_reach,
@@ -376,7 +376,7 @@ COMPARE = sweepable(
         (
             EarlierRun("network", kind="train", optional=True),
             EarlierRun("tuned", kind="tune", optional=True),
-            EarlierRun("from_identified", kind="identify", optional=True),
+            FROM_IDENTIFIED,
         ),
         size=size,
         in_one_plane=lambda study: not why_two_planes(study.wrist, asked_of_comparison(study)),

@@ -105,7 +105,7 @@ def _of_run(run: Run, controller: str | None, overrides: Sequence[str]) -> tuple
     about = f"of run {run.id}"
     if overrides:
         raise UserError("a run is exported as it was", f"--set {overrides[0]}", "leave it out, or name study files")
-    if run.kind in ("simulate", "analyse"):
+    if run.kind == "simulate" or (run.kind == "analyse" and run.config.analyse.of == "loop"):
         return _with_what_it_had(run, run.config), about
     if run.kind == "hw-run":
         return _of_trials(run, controller), about

@@ -83,8 +83,9 @@ def motions_of(run: Run) -> list[RecordedMotion]:
             if run.has(f"data/{name}") and (motions := read(run)):
                 return motions
     problem = f"a {run.kind} run holds no motion over time"
-    kinds = "name a simulate, compare, track, hysteresis or hw-run run, or one of gen-data --source transitions"
-    raise UserError(problem, str(run.path), kinds)
+    kinds = "name a simulate, compare, track or hw-run run"
+    modes = "analyse --of hysteresis or gen-data --source transitions"
+    raise UserError(problem, str(run.path), f"{kinds}, or one of {modes}")
 
 
 def _trials(run: Run) -> list[RecordedMotion]:
@@ -301,14 +302,19 @@ def _compared(run: Run) -> list[RecordedMotion]:
 def _loops(run: Run) -> list[RecordedMotion]:
     """Hysteresis loops by their numbers; tensions are those of one tendon."""
     courses, motions = read_table(run.file("data/courses.csv")), list[RecordedMotion]()
+    alike, names, bends = [TENDONS_PER_SIDE] * 2, ["plus", "minus"], {"bend_y": "theta"}
+    if "given_plus" not in courses:  # of two planes
+        alike = list(TendonLayout.of(run.config.wrist).multiplicity)
+        names = [str(place) for place in range(1, len(alike) + 1)]
+        bends = {"bend_y": "bend_ulnar", "bend_z": "bend_flexion"}
     for number, table in courses.groupby("loop", sort=False):
         columns, commands = Columns(), Columns()
-        for tendon, side in enumerate(("plus", "minus"), 1):
+        for tendon, (name, count) in enumerate(zip(names, alike, strict=True), 1):
             if run.config.hysteresis.drive == "spools":
-                columns[f"spool_{tendon}"] = table[f"given_{side}"].to_numpy(float)
+                columns[f"spool_{tendon}"] = table[f"given_{name}"].to_numpy(float)
                 commands[f"spool_{tendon}"] = columns[f"spool_{tendon}"]
-            columns[f"tension_{tendon}"] = table[f"spool_{side}"].to_numpy(float) / TENDONS_PER_SIDE
-        columns |= {"bend_y": table.theta.to_numpy(float)}
+            columns[f"tension_{tendon}"] = table[f"spool_{name}"].to_numpy(float) / count
+        columns |= {ours: table[theirs].to_numpy(float) for ours, theirs in bends.items()}
         time = table.time.to_numpy(float)
         motions.append(
             RecordedMotion(

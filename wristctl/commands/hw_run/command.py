@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from wristctl.commands.adoption import wound_in_both_planes
 from wristctl.commands.calibrate.wrist import CALIBRATION
 from wristctl.commands.hw_run.results import Performed, performed
-from wristctl.commands.inputs import EarlierRun, Inputs
+from wristctl.commands.inputs import FROM_IDENTIFIED, EarlierRun, Inputs
 from wristctl.commands.inputs_of_loops import (
     check_inverses,
     check_reach,
@@ -179,7 +179,7 @@ HW_RUN: Procedure[Performed] = Procedure(
         EarlierRun("calibration", kind="calibrate-wrist", optional=True, content=CALIBRATION),
         EarlierRun("optics", kind="calibrate-camera", optional=True),
         EarlierRun("optics_2", kind="calibrate-camera", optional=True),
-        EarlierRun("from_identified", kind="identify", optional=True),
+        FROM_IDENTIFIED,
         EarlierRun("tuned", kind="tune", optional=True),
         EarlierRun("network", kind="train", optional=True),
     ),

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from wristctl.commands.answer import Answer
 from wristctl.commands.identify.answer import comparison_on, recommendation_for, simulation_of
 from wristctl.commands.identify.logs import logs_of
-from wristctl.commands.inputs import Inputs
 from wristctl.commands.printed_table import COLUMNS, Table, degrees, joined
 from wristctl.commands.quantities import keep_told, told_frame, told_table
 from wristctl.commands.results import StudyResult
@@ -30,7 +29,7 @@ if TYPE_CHECKING:
     from wristctl.identification.problem import Problem
 
 # Draws of the posterior that a run keeps as a family of worlds.
-_DRAWS = 200
+DRAWS = 200
 # Part of the larger motion up to which the motion in the other plane is none.
 _ASIDE = 0.1
 # What has to be told before a wrist is written down.
@@ -56,8 +55,7 @@ class BendsTold(StudyResult):
     @property
     def answer(self) -> Answer:
         """Springs in the sentence, then each parameter with its interval or not identifiable."""
-        run, square = self.place if self.yaml else "", _in_one_plane_too(self.study)
-        return _answer(self.fit, self.told, run, square, self.scaled, self.remark)
+        return _answer(self)
 
     @property
     def values(self) -> dict[str, float]:
@@ -89,10 +87,8 @@ def _problem(study: Study) -> Problem:
     return bend_problem(trials, places, study.wrist, Actuator(level="tendon"), settings)
 
 
-def bends_plan(study: Study, inputs: Inputs) -> str:
+def bends_plan(study: Study) -> str:
     """Say what is looked for in which logs."""
-    if inputs.runs():
-        raise UserError("runs and logs at once", "identify.runs", "identify one or the other")
     problem = _problem(study)
     readings = sum(len(trial.angle) for trial in problem.trials)
     masses = len({trial.wrist.hand_mass for trial in problem.trials})
@@ -139,27 +135,25 @@ def identify_bends(session: Session) -> BendsTold:
         f"The mass that the logs say counts, {mass:g} kg, and not {session.study.wrist.hand_mass:g} kg of "
         "wrist.hand_mass: mend the column `mass`, or leave it out."
     )  # fmt: skip
-    _refuse(session, fitted, told, missed, scaled, remark)
-    yaml = ""
+    result = BendsTold(session.study, findings, tables, fitted, known, told, "", scaled, remark)
+    _refuse(session, result, missed)
     if all(told[name].known for name in _NEEDED):
         rng = np.random.default_rng(findings.stream("posterior"))
-        yaml, family = bends_yaml(fitted, known, session.study.wrist, _DRAWS, rng)
+        yaml, family = bends_yaml(fitted, known, session.study.wrist, DRAWS, rng)
         findings.text("data/identified.yaml", yaml)
         if _in_one_plane_too(session.study):
             findings.text("data/posterior.yaml", family)
-    result = BendsTold(session.study, findings, tables, fitted, known, told, yaml, scaled, remark)
+        result = replace(result, yaml=yaml)
     findings.table("data/parameters.csv", result.frame())
     return result
 
 
-def _refuse(
-    session: Session, fitted: Fit, told: Mapping[str, Told], missed: Sequence[Misfit], scaled: bool, remark: str
-) -> None:
+def _refuse(session: Session, result: BendsTold, missed: Sequence[Misfit]) -> None:
     """UserError where the model does not fit the readings, with the answer told all the same."""
     settings, worst = session.study.identify, max(missed, key=lambda misfit: misfit.ratio)
     if settings.misfit == "tell" or worst.ratio <= settings.lack_of_fit:
         return
-    session.tell_refused(_answer(fitted, told, "", True, scaled, remark))
+    session.tell_refused(result.answer)
     problem = f"{worst.direction}: the model is off by {math.sqrt(worst.ratio):.2g} times the readings' own noise"
     accept = ("check geometry, masses and senses; or take it as it is: ", Setting("misfit=tell", "identify"))
     raise UserError(problem, "identify", accept, exit_code=3)
@@ -200,16 +194,8 @@ def _in_one_plane(trials: Sequence[MeasuredTrial]) -> bool:
     return min(ways) < _ASIDE * max(ways)
 
 
-def _answer(fit: Fit, told: Mapping[str, Told], run: str, square: bool, scaled: bool, remark: str = "") -> Answer:
-    """The answer.
-
-    Parameters
-    ----------
-    run : path of a run with the wrist; empty of none
-    square : whether its tendons are those of one plane
-    scaled : whether anybody has said a force or a mass
-    remark : on what the logs say in place of the study
-    """
+def _answer(result: BendsTold) -> Answer:
+    fit, told, run = result.fit, result.told, result.place if result.yaml else ""
     along, across, axis = (told[name] for name in ("stiffness", "stiffness_across", "stiffness_axis_deg"))
     if along.known and across.known:
         where = toward_words(axis.value) if axis.known else "along an axis that is not identifiable"
@@ -218,10 +204,10 @@ def _answer(fit: Fit, told: Mapping[str, Told], run: str, square: bool, scaled: 
         springs = "The springs are not identifiable from these readings."
     readings = sum(map(len, fit.residuals))
     left = f"{degrees(float(fit.noise))} deg are left over of {readings} readings (standard deviation)."
-    notes: list[str | Table] = [remark] * bool(remark)
+    notes: list[str | Table] = [result.remark] * bool(result.remark)
     if lacking := [name for name, one in told.items() if not one.known]:
         notes.append(f"Not told: {joined(lacking)}. {what_tells(fit, lacking)}".strip())
-    if not scaled:
+    if not result.scaled:
         mass = fit.problem.trials[0].wrist.hand_mass
         notes.append(
             f"Forces need a mass or a tension, and nobody has said one: {mass:g} kg are the hand's by default. Weigh "
@@ -229,6 +215,7 @@ def _answer(fit: Fit, told: Mapping[str, Told], run: str, square: bool, scaled: 
             "`model=wrist` the same log tells ratios."
         )
     if run:
+        square = _in_one_plane_too(result.study)
         compares = ", or compare controllers on all that the readings leave possible"
         notes += [
             f"Next, find its gains, bend it in simulation{compares * square}:",

@@ -4,19 +4,18 @@ from __future__ import annotations
 
 import logging
 import os
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple, TypeAlias
 
 from wristctl.commands.answer import Answer
 from wristctl.commands.identify.answer import found_answer, refused_answer
-from wristctl.commands.identify.bends import BendsTold, bends_plan, identify_bends
+from wristctl.commands.identify.bends import DRAWS, BendsTold, bends_plan, identify_bends
 from wristctl.commands.identify.driven import DrivenTold
+from wristctl.commands.identify.hysteresis import LoopTold, identify_loop, loop_plan
 from wristctl.commands.identify.logs import LogTold, identify_logs, log_plan
 from wristctl.commands.inputs import EarlierRun, Inputs
-from wristctl.commands.printed_table import Table
 from wristctl.commands.procedure import Procedure, no_tendons
 from wristctl.commands.results import StudyResult
 from wristctl.commands.session import Session
@@ -35,11 +34,16 @@ if TYPE_CHECKING:
 
 log = logging.getLogger(__name__)
 
+AnyTold: TypeAlias = LogTold | DrivenTold | BendsTold | LoopTold
 # Endings of names that are of tables and never of runs.
 _TABLES = (".csv", ".txt", ".tsv", ".xlsx", ".xlsm", ".parquet", ".mat", ".mcap", ".db3", ".bag")
 _STUDIES = (".yaml", ".yml")
-# Draws of the posterior that a run keeps as a family of worlds.
-_DRAWS = 200
+# Plan and computation of each model of logs.
+_OF_LOGS: Mapping[str, tuple[Callable[[Study], str], Callable[[Session], AnyTold]]] = {
+    "arcs": (log_plan, identify_logs),
+    "wrist": (bends_plan, identify_bends),
+    "hysteresis": (loop_plan, identify_loop),
+}
 
 
 @dataclass(frozen=True, repr=False, eq=False)
@@ -109,24 +113,32 @@ def _is_log(path: Path) -> bool:
 
 def plan(study: Study, inputs: Inputs) -> str:
     """Say what will be found from which trials."""
-    if study.identify.logs:
-        return (bends_plan if study.identify.model == "wrist" else log_plan)(study, inputs)
+    settings = study.identify
+    if settings.model != "hysteresis" and (inner := [name for name in settings.fixed if name.startswith("inner_")]):
+        fix = ("leave it out, or ", Setting("model=hysteresis", "identify", option=True), " for a loop of hysteresis")
+        raise UserError(f"{inner[0]} is no parameter of this model", f"identify.fix.{inner[0]}", fix)
+    if settings.logs:
+        if inputs.runs():
+            raise UserError("runs and logs at once", "identify.runs", "identify one or the other")
+        return _OF_LOGS[settings.model][0](study)
     problem = _problem(study, inputs)
     poses = len({(trial.wrist.gravity, trial.wrist.hand_mass) for trial in problem.trials})
     frames = sum(len(trial.angle) for trial in problem.trials)
     return f"{', '.join(problem.free)} from {len(problem.trials)} trials, {frames} frames, {poses} poses or masses"
 
 
-def identify(session: Session) -> Identified | LogTold | DrivenTold | BendsTold:
+def identify(session: Session) -> Identified | AnyTold:
     """Find stiffness, damping, tendons and delay of a real wrist from logged trials, with 95 % intervals.
 
     Trials are those of hw-run runs, or of open logs of wrists with two or more tendons in one plane or two. Of logs a
     parameter has its interval or is not identifiable, and a part that was not fitted decides which of slack, friction
-    and creep they want. Tensions or motors' currents may stand in place of spools. With `model: wrist` logs in two
-    planes are of the study's wrist: springs, their axis, and each tendon's direction and gain.
+    and creep they want. Tensions or motors' currents may stand in place of spools. With `--model wrist` logs in two
+    planes are of the study's wrist: springs, their axis, and each tendon's direction and gain. With `--model
+    hysteresis` a log is a loop of its tension and angle there and back: friction of tendons and wrist, stiffness,
+    radius and slack.
     """
     if session.study.identify.logs:
-        return identify_bends(session) if session.study.identify.model == "wrist" else identify_logs(session)
+        return _OF_LOGS[session.study.identify.model][1](session)
     import numpy as np
 
     from wristctl.commands.identify.figures import angles, correlations, residuals
@@ -166,30 +178,23 @@ def identify(session: Session) -> Identified | LogTold | DrivenTold | BendsTold:
             log.warning("the trials look like %s, which the model has not; intervals are widened", suspicion.told)
     runs = [os.path.relpath(run.path) for run in session.inputs.runs().values()]
     refused = refused_answer(fitted, estimated, lacking, suspected, offered, runs)
-    with _told_if_refused(session, refused, tables):
+    try:
         if settings.misfit == "refuse":
             refuse_misfit(fitted, sure, suspected, missed)
         refuse(lacking, offered, estimated.condition, problem.start)
+    except UserError:
+        session.tell_refused(refused, tables)
+        raise
     camera = _camera(session.inputs, fitted)
     yaml = identified_yaml(fitted.values, camera)
     findings.text("data/identified.yaml", yaml)
     rng = np.random.default_rng(findings.stream("posterior"))
-    draws = posterior_draws(fitted, estimated, _DRAWS, rng)
+    draws = posterior_draws(fitted, estimated, DRAWS, rng)
     first = next(iter(session.inputs.runs().values()))
     whole = identified_yaml(fitted.values, camera, known=first.config.wrist)
     findings.text("data/posterior.yaml", whole + posterior_yaml(draws, fitted.values, camera, _period(session.inputs)))
     known = os.path.relpath(first.path / "config.yaml")
     return Identified(session.study, findings, tables, fitted, estimated, yaml, suspected, known)
-
-
-@contextmanager
-def _told_if_refused(session: Session, refused: Answer, tables: Sequence[Table]) -> Iterator[None]:
-    """Where the result is refused its answer is told all the same, and the run keeps the tables."""
-    try:
-        yield
-    except UserError:
-        session.tell_refused(refused, tables)
-        raise
 
 
 def _problem(study: Study, inputs: Inputs) -> Problem:
@@ -209,12 +214,14 @@ def _problem(study: Study, inputs: Inputs) -> Problem:
     start: dict[str, float] = {}
     believed = Actuator()
     for role, run in inputs.runs().items():
+        by_log, of_log = "which are fitted by their open log", "wristctl runs export RUN, then wristctl identify FILE"
+        if settings.model == "hysteresis":
+            problem = "a loop of hysteresis is an open log, not a run"
+            raise UserError(problem, run.id, f"{of_log} --model hysteresis")
         if run.config.hw_run.planes == 2:
-            fix = "wristctl runs export RUN, then wristctl identify FILE --set model=wrist"
-            raise UserError("its trials bend in two planes, which are fitted by their open log", run.id, fix)
+            raise UserError(f"its trials bend in two planes, {by_log}", run.id, f"{of_log} --model wrist")
         if run.config.hw_run.rig is not None:
-            fix = "wristctl runs export RUN, then wristctl identify FILE"
-            raise UserError("its trials are of a robot of your own, which are fitted by their open log", run.id, fix)
+            raise UserError(f"its trials are of a robot of your own, {by_log}", run.id, of_log)
         config, logged = run.config, inputs.read(role, _logged)
         assert logged is not None
         actuator, wrist = config.hw_run.actuator, config.wrist
@@ -252,6 +259,6 @@ def _camera(inputs: Inputs, fitted: Fit) -> dict[str, float]:
 
 
 _RUNS = EarlierRun("runs", kind="hw-run", optional=True)
-IDENTIFY: Procedure[Identified | LogTold | DrivenTold | BendsTold] = Procedure(
+IDENTIFY: Procedure[Identified | AnyTold] = Procedure(
     "identify", plan, identify, (_RUNS,), completed=with_logs, in_one_plane=no_tendons
 )

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from wristctl.commands.answer import Answer
 from wristctl.commands.identify.answer import recommendation_by_ratios
-from wristctl.commands.inputs_of_loops import RATIOS
+from wristctl.commands.inputs import RATIOS
 from wristctl.commands.printed_table import COLUMNS, Table, degrees, joined
 from wristctl.commands.quantities import MEANT, keep_told, told_frame, told_table
 from wristctl.commands.results import StudyResult

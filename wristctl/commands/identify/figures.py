@@ -1,4 +1,4 @@
-"""Figures of an identification: measured and expected angles, what is left over, and what depends on what."""
+"""Figures of an identification: measured and expected angles and tensions, what is left over, what depends on what."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -8,10 +8,11 @@ from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 
 from wristctl.identification.fit import Fit
+from wristctl.identification.friction_fit import FrictionFit
 from wristctl.identification.intervals import Knowledge
 from wristctl.identification.measured_trials import BOTH, PLANES, MeasuredTrial
 from wristctl.plotting.kinds import draw_cells
-from wristctl.plotting.style import BLACK, BLUE, GREY, VERMILLION, figure, legend, legend_below, title
+from wristctl.plotting.style import BLACK, BLUE, GREY, THIN, VERMILLION, figure, legend, legend_below, title
 
 # Trials drawn, spread over all of them.
 _SHOWN = 8
@@ -99,4 +100,36 @@ def correlations(fit: Fit, knowledge: Knowledge) -> Figure:
     axes.set_yticks(range(len(names)), names)
     picture.colorbar(image, label="correlation")
     title(axes, f"condition number {knowledge.condition:.3g}")
+    return picture
+
+
+def measured(fit: FrictionFit) -> Figure:
+    """A measured loop, after its first turn, and the fitted model: the angle over what drove it, less that of the same
+    wrist without friction where spools did; tensions over the angle; and what is left over, in time."""
+    problem, loop, rows = fit.problem, fit.problem.loop, len(fit.residuals)
+    picture, axes = figure(rows, 2, height=0.8 + 2.4 * rows, width_ratios=(3, 2))
+    time, samples = loop.time[problem.first :], problem.measured
+    model = [sample - residual for sample, residual in zip(samples, fit.residuals, strict=True)]
+    driver = loop.drive[problem.first :, 0]
+    if loop.winch:
+        lines = [(driver, np.degrees(samples[0]), driver, np.degrees(model[0]), "+ tension [N]", "angle [deg]")]
+    else:
+        free, mm = fit.without_friction, 1e3 * driver
+        ylabel = "angle less that\nwithout friction [deg]"
+        lines = [(mm, np.degrees(samples[0] - free), mm, np.degrees(model[0] - free), "+ spool [mm]", ylabel)]
+    for side, number in (("+", 1), ("-", 2)):
+        if number < rows:
+            drawn = np.degrees(samples[0]), samples[number], np.degrees(model[0]), model[number]
+            lines.append((*drawn, "angle [deg]", f"{side} tension [N]"))
+    for (left, right), (x, y, model_x, model_y, below, beside), residual in zip(
+        axes, lines, fit.residuals, strict=True
+    ):
+        left.plot(x, y, ".", color=GREY, markersize=2.5, label="measured")
+        left.plot(model_x, model_y, color=BLUE, linewidth=1.0, label="model, fitted")
+        left.set(xlabel=below, ylabel=beside)
+        scale = 1.0 if "tension" in beside else 180.0 / np.pi
+        right.plot(time, scale * residual, ".", color=VERMILLION, markersize=2.0)
+        right.axhline(0.0, **THIN)
+        right.set(xlabel="time [s]", ylabel="left over [N]" if "tension" in beside else "left over [deg]")
+    legend_below(picture)
     return picture

@@ -10,8 +10,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from wristctl.commands.answer import Answer
 from wristctl.commands.identify.answer import recommendation_by_ratios
 from wristctl.commands.identify.driven import DRAWN, TRIED, DrivenTold, driven_plan, identify_driven, keep_prediction
-from wristctl.commands.inputs import Inputs
-from wristctl.commands.inputs_of_loops import RATIOS
+from wristctl.commands.inputs import RATIOS
 from wristctl.commands.printed_table import COLUMNS, Table, joined
 from wristctl.commands.quantities import MEANT, keep_told, told_frame, told_table
 from wristctl.commands.results import StudyResult
@@ -136,10 +135,8 @@ def _sides(robot: ArcRobot, numbers: Sequence[int]) -> str:
     return f"Tendons {joined(sides[0])} pull to one side and {joined(sides[1])} to the other, as the motion says."
 
 
-def log_plan(study: Study, inputs: Inputs) -> str:
+def log_plan(study: Study) -> str:
     """Say what is looked for in which logs."""
-    if inputs.runs():
-        raise UserError("runs and logs at once", "identify.runs", "identify one or the other")
     logs = logs_of(study)
     if _are_driven(logs, study):
         return driven_plan(study, logs)

@@ -9,7 +9,7 @@ from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING
 
-from wristctl.commands.inputs import EarlierRun, Inputs
+from wristctl.commands.inputs import FROM_IDENTIFIED, EarlierRun, Inputs
 from wristctl.commands.inputs_of_loops import (
     asked_of_simulation,
     check_inverses,
@@ -254,7 +254,7 @@ SIMULATE = sweepable(
         (
             EarlierRun("network", kind="train", optional=True),
             EarlierRun("tuned", kind="tune", optional=True),
-            EarlierRun("from_identified", kind="identify", optional=True),
+            FROM_IDENTIFIED,
         ),
         size=size,
         in_one_plane=lambda study: planes_of_simulation(study) == 1,

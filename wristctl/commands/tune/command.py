@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from wristctl.commands.answer import Answer
-from wristctl.commands.inputs import EarlierRun, Inputs
+from wristctl.commands.inputs import FROM_IDENTIFIED, EarlierRun, Inputs
 from wristctl.commands.inputs_of_loops import (
     asked_of_search,
     check_family_reach,
@@ -319,7 +319,7 @@ TUNE = sweepable(
         tune,
         (
             EarlierRun("network", kind="train", optional=True),
-            EarlierRun("from_identified", kind="identify", optional=True),
+            FROM_IDENTIFIED,
             EarlierRun("resume", kind="tune", optional=True, unfinished=True),
         ),
         doubts=refuse_out_of_reach,

@@ -1,11 +1,11 @@
-"""Figures of hysteresis: loops, the dead band, work a cycle, inner loops, and a measured loop beside the model."""
+"""Figures of hysteresis: loops, the dead band, work a cycle, inner loops, and circles."""
 
 from collections.abc import Sequence
 
 import numpy as np
 from matplotlib.figure import Figure
 
-from wristctl.identification.friction_fit import FrictionFit
+from wristctl.commands.analyse.hysteresis_tables import by_speed
 from wristctl.plotting.bend_figure import draw_plane_of_bends
 from wristctl.plotting.style import (
     BLACK,
@@ -16,7 +16,6 @@ from wristctl.plotting.style import (
     ORANGE,
     PURPLE,
     SKY,
-    THIN,
     VERMILLION,
     columns_within,
     figure,
@@ -59,11 +58,11 @@ def _heading(case: FrictionCase, narrow: bool) -> str:
 def loops(all_strokes: Strokes, driven: Sequence[HysteresisLoop]) -> Figure:
     """The outer loops with up to three sheaths: tension over angle, at the spool by speed and, of the slowest, at the
     wrist; and by how much the angle differs from that without friction, between the roots of the statics."""
-    outer, cases = _outer(driven), _some(with_sheaths(all_strokes.settings))
+    cases = _some(with_sheaths(all_strokes.settings))
     picture, axes = figure(2, len(cases), height=6.2, sharey="row")
     narrow, (place, alike, name) = _narrow(cases), _pulling(all_strokes)
     for (above, below), case in zip(axes.T, cases, strict=True):
-        mine = sorted((loop for loop in outer if loop.case.tendons == case), key=lambda each: each.case.frequency)
+        mine = by_speed(driven, case)
         for loop, colour in zip(mine[::-1], _COLOURS[: len(mine)][::-1], strict=False):
             angle, label = np.degrees(loop.bend), f"{loop.case.frequency:g} Hz"
             above.plot(angle, loop.course.spool[:, place] / alike, color=colour, linewidth=1.0, label=label)
@@ -94,11 +93,6 @@ def _pulling(all_strokes: Strokes) -> tuple[int, int, str]:
 _ROOTS = {"color": BLACK, "linewidth": 1.2, "linestyle": (0, (4, 2))}
 
 
-def _outer(driven: Sequence[HysteresisLoop]) -> list[HysteresisLoop]:
-    first = driven[0].case
-    return [loop for loop in driven if (loop.case.low, loop.case.high) == (first.low, first.high)]
-
-
 def dead_band(all_strokes: Strokes, bands: Sequence[DeadBand]) -> Figure:
     """Width of the dead band over the angle: roots of the statics, and where ramps came to rest."""
     picture, ((axes,),) = figure(height=3.6)
@@ -124,10 +118,9 @@ def dead_band(all_strokes: Strokes, bands: Sequence[DeadBand]) -> Figure:
 
 def work(all_strokes: Strokes, driven: Sequence[HysteresisLoop]) -> Figure:
     """Work of a cycle over how often it is gone through: what friction takes, what damping takes, and the raw loop."""
-    outer = _outer(driven)
     picture, ((axes,),) = figure(height=3.8)
     for case, colour in zip(_some(with_sheaths(all_strokes.settings)), _COLOURS, strict=False):
-        mine = sorted((loop for loop in outer if loop.case.tendons == case), key=lambda each: each.case.frequency)
+        mine = by_speed(driven, case)
         speed = [loop.case.frequency for loop in mine]
         for name, dashes in _WORKS.items():
             values = 1e3 * np.array([getattr(loop, name) for loop in mine])
@@ -180,36 +173,4 @@ def circles(around: Sequence[HysteresisCircle]) -> Figure:
     draw_plane_of_bends(left, paths)
     right.set(xlabel="turn", ylabel="bend less that without friction [deg]")
     legend_below(picture, 3)
-    return picture
-
-
-def measured(fit: FrictionFit) -> Figure:
-    """A measured loop, after its first turn, and the fitted model: the angle over what drove it, less that of the same
-    wrist without friction where spools did; tensions over the angle; and what is left over, in time."""
-    problem, loop, rows = fit.problem, fit.problem.loop, len(fit.residuals)
-    picture, axes = figure(rows, 2, height=0.8 + 2.4 * rows, width_ratios=(3, 2))
-    time, samples = loop.time[problem.first :], problem.measured
-    model = [sample - residual for sample, residual in zip(samples, fit.residuals, strict=True)]
-    driver = loop.drive[problem.first :, 0]
-    if loop.winch:
-        lines = [(driver, np.degrees(samples[0]), driver, np.degrees(model[0]), "+ tension [N]", "angle [deg]")]
-    else:
-        free, mm = fit.without_friction, 1e3 * driver
-        ylabel = "angle less that\nwithout friction [deg]"
-        lines = [(mm, np.degrees(samples[0] - free), mm, np.degrees(model[0] - free), "+ spool [mm]", ylabel)]
-    for side, number in (("+", 1), ("-", 2)):
-        if number < rows:
-            drawn = np.degrees(samples[0]), samples[number], np.degrees(model[0]), model[number]
-            lines.append((*drawn, "angle [deg]", f"{side} tension [N]"))
-    for (left, right), (x, y, model_x, model_y, below, beside), residual in zip(
-        axes, lines, fit.residuals, strict=True
-    ):
-        left.plot(x, y, ".", color=GREY, markersize=2.5, label="measured")
-        left.plot(model_x, model_y, color=BLUE, linewidth=1.0, label="model, fitted")
-        left.set(xlabel=below, ylabel=beside)
-        scale = 1.0 if "tension" in beside else 180.0 / np.pi
-        right.plot(time, scale * residual, ".", color=VERMILLION, markersize=2.0)
-        right.axhline(0.0, **THIN)
-        right.set(xlabel="time [s]", ylabel="left over [N]" if "tension" in beside else "left over [deg]")
-    legend_below(picture)
     return picture

@@ -1,1 +1,0 @@
-"""`hysteresis`: loops of a wrist whose tendons have friction."""
