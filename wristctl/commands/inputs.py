@@ -91,24 +91,10 @@ def opened(
     out: Path,
     beside: Sequence[Path] = (),
 ) -> Inputs:
-    """Inputs of a command by role.
+    """Inputs of a command by role: those that `named_inputs` has by leaf, else those that its section names.
 
-    Raises UserError for a run that is missing, of another kind, or not as it was sealed.
-
-    Parameters
-    ----------
-    kind
-        Name of the command.
-    section
-        Section of the study that names the inputs.
-    needs
-        Earlier runs that the command reads.
-    named_inputs
-        Inputs by leaf that come before those of the section.
-    out
-        Folder of the runs.
-    beside
-        Folders in which a run is looked for that is not in `out`.
+    A run is looked for in the folder `out`, then in those `beside` it. Raises UserError for a run that is missing, of
+    another kind, or not as it was sealed.
     """
     by_role: dict[str, Given] = {}
     for need in needs:

@@ -29,24 +29,8 @@ def performed(
 ) -> UnitsDone:
     """Compute a command's units with the session's workers, into the run where there is one, and show the progress.
 
-    The hashes of laws from elsewhere are part of the units' specifications.
-
-    Parameters
-    ----------
-    session
-        Session of the study.
-    command
-        Name of the command.
-    task
-        Name of the task in the display of the progress.
-    units
-        Units of work.
-    golden
-        Numbers that all workers must reproduce; None for no check.
-    counted
-        Unit of the units' sizes.
-    then, after
-        Time that the command takes after them, as `Session.progress` has it.
+    All workers must reproduce the `golden` numbers. The hashes of laws from elsewhere are part of the units'
+    specifications. What the units' sizes are of is `counted`; `then` and `after` are those of `Session.progress`.
     """
     from wristctl.commands.adoption import adoption, sources_in
     from wristctl.work.executors import Workers

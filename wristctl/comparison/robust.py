@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wristctl.arrays import Array
-from wristctl.comparison.claims import printed
+from wristctl.comparison.claims import NOMINAL, printed, rows_asked
 from wristctl.comparison.paper import T2, rounded
 from wristctl.comparison.tie_groups import Share, share
 from wristctl.comparison.unknowns_sampling import Reactions
@@ -142,17 +142,18 @@ class Strip:
 
 def rows_in_box(claims: Sequence[Claim]) -> list[Row]:
     """The rows that the claims need, each once; those of a symmetry are run to both sides."""
-    boxed = [claim for claim in claims if claim.evidence in IN_BOX and claim.stiffness_scale == 1.0]
-    labels = dict.fromkeys(label for claim in boxed for label in (claim.label, claim.than) if label)
-    return [Row(controller=name, gains=gains) for name, gains in (label.split("/") for label in labels)]
+    return rows_asked(_boxed(claims))
+
+
+def _boxed(claims: Sequence[Claim]) -> list[Claim]:
+    return [claim for claim in claims if claim.evidence in IN_BOX and claim.stiffness_scale == NOMINAL]
 
 
 def strips(claims: Sequence[Claim], drawn: Reactions, mirrored: Reactions | None = None) -> list[Strip]:
     """Every claim that draws can judge, by those of its rows."""
-    boxed = [claim for claim in claims if claim.evidence in IN_BOX and claim.stiffness_scale == 1.0]
     values = {name: drawn.values(name) for name in drawn.settings[0].values}
     found = []
-    for claim in boxed:
+    for claim in _boxed(claims):
         if claim.label not in drawn.found or (claim.than and claim.than not in drawn.found):
             continue
         ratios, judged = _judged(claim, drawn, mirrored)

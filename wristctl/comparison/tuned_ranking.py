@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from functools import cached_property
+from itertools import chain
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -16,7 +17,7 @@ import numpy as np
 from wristctl.arrays import Array
 from wristctl.comparison.bootstrap import GeometricMean, Resampled, penalised
 from wristctl.comparison.controller_ranking import STREAM
-from wristctl.comparison.repeated_tunings import HALVES, Firsts, Order, RepeatedTunings, median_tuning
+from wristctl.comparison.repeated_tunings import HALVES, Firsts, RepeatedTunings, firsts, median_tuning
 from wristctl.comparison.tie_groups import share
 from wristctl.comparison.world_ranking import RankedRow, WorldRanking, ranking
 from wristctl.config.families import TOLERATED
@@ -57,9 +58,10 @@ class TunedRanking(WorldRanking):
         """Ratio of a reference row's RMSE to another row's, tunings and worlds drawn anew."""
         return self.repeated.ratio(reference_row, row)
 
-    def firsts(self, row: int) -> Firsts:
-        """In how many halves of the worlds, and with how many tunings, a ranked row has the least error."""
-        return self._order.firsts(row)
+    @cached_property
+    def firsts(self) -> dict[int, Firsts]:
+        """In how many halves of the worlds, and with how many tunings, each ranked row has the least error."""
+        return firsts(self.logarithms, [*chain.from_iterable(self.standing.groups)], STREAM)
 
     def firsts_frame(self) -> pd.DataFrame:
         """A line for each ranked row: in how many halves of the worlds, and with how many tunings, it is first.
@@ -68,20 +70,17 @@ class TunedRanking(WorldRanking):
         """
         import pandas as pd
 
-        ranked_rows = [row for group in self.standing.groups for row in group]
-        lines = []
-        for row in ranked_rows if len(ranked_rows) > 1 else []:
-            halves, tunings, of_tunings = self.firsts(row)
-            lines.append(
-                {"family": self.name, "row": self.labels[row], "first_in_halves": halves, "halves": HALVES,
-                 "first_in_tunings": tunings, "tunings": of_tunings}
-            )  # fmt: skip
+        lines = [
+            {"family": self.name, "row": self.labels[row], "first_in_halves": halves, "halves": HALVES,
+             "first_in_tunings": tunings, "tunings": of_tunings}
+            for row, (halves, tunings, of_tunings) in (self.firsts if self.may_change else {}).items()
+        ]  # fmt: skip
         return pd.DataFrame(lines)
 
-    @cached_property
-    def _order(self) -> Order:
-        ranked_rows = [row for group in self.standing.groups for row in group]
-        return Order(self.logarithms, ranked_rows or range(len(self.rows)), STREAM)
+    @property
+    def may_change(self) -> bool:
+        """Whether two rows or more are ranked, so that another could come first."""
+        return sum(map(len, self.standing.groups)) > 1
 
     @cached_property
     def spreads(self) -> list[tuple[float, float]]:
@@ -142,9 +141,8 @@ def logarithms(tunings: Sequence[Sequence[RankedRow]]) -> Array:
 
 def _streams(row: RankedRow) -> Array:
     """Geometric mean over the motions of a row's RMSE (W, S) in every world and stream of noise; inf: one failed."""
-    measured, worlds = row.measured, len(row.rmse)
-    rmse = np.where(measured.failed, np.inf, measured.metrics["rmse"]).reshape(worlds, row.motions, -1)
-    means: Array = np.exp(np.log(rmse).mean(axis=1))
+    rmse = np.where(row.measured.failed, np.inf, row.measured.metrics["rmse"])
+    means: Array = np.exp(np.log(rmse.reshape(len(row.rmse), row.motions, -1)).mean(axis=1))
     return means
 
 

@@ -31,16 +31,9 @@ def mark_of(listed: Sequence[IndexEntry]) -> str:
 
 
 def index_page(results: Path, listed: Sequence[IndexEntry], advance: Advance = lambda count: None) -> str:
-    """The page of runs of a folder, newest first.
+    """The page of a folder's runs, `listed` with their tags, oldest first; the newest are on top.
 
-    Parameters
-    ----------
-    results
-        Folder of run directories.
-    listed
-        Its runs, oldest first, with their tags.
-    advance
-        Called with the number of runs whose picture is ready.
+    `advance` is called with the number of runs whose picture is ready.
     """
     newest = listed[::-1]
     pictures = _pictures(results, newest, advance)

@@ -194,16 +194,8 @@ Part = TypeVar("Part")
 def page(run: Run, manifest: Manifest, beside: Path | None = None, undrawn: Undrawn | None = None) -> str:
     """The page of a run; the manifest may be newer than what the directory holds, while the run is being sealed.
 
-    Parameters
-    ----------
-    run
-        Run directory.
-    manifest
-        Its manifest, in which `undrawn` may note more.
-    beside
-        Folder of figures that were drawn later.
-    undrawn
-        Called for a part that cannot be drawn, which is then left out. Without it the part's error is raised.
+    `beside` is a folder of figures that were drawn later. `undrawn` is called for a part that cannot be drawn, which is
+    then left out, and may note more in the manifest; without it the part's error is raised.
     """
 
     def part(name: str, draw: Callable[[], Part], default: Part) -> Part:

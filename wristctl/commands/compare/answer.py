@@ -41,18 +41,9 @@ def answer_of(
 ) -> Answer | None:
     """The answer of a comparison for one screen; None where nothing was compared.
 
-    Parameters
-    ----------
-    rankings
-        Rankings of the controllers under each condition.
-    run
-        Path of the run; empty for a result in memory.
-    gains
-        Gains by name, in SI units, of every row by its label.
-    bending
-        Planes that all loops bend in, a sentence; empty where they stay in one.
-    asked
-        Labels of controllers that the table has, however many others there are.
+    `run` is its path, empty for a result in memory; `gains` are those of every row by its label, in SI units; `bending`
+    says in which planes all loops bend, where these are two; the table has the labels that were `asked` for, however
+    many others there are.
     """
     if not rankings:
         return None

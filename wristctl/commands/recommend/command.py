@@ -196,7 +196,7 @@ def _candidates(scaled: Sequence[Controller], searches: Mapping[str, Search]) ->
 def _tested(session: Session, study: Study, family: Family, candidates: Sequence[Candidate]) -> WorldRanking:
     import numpy as np
 
-    from wristctl.comparison.world_ranking import RANKED, RankedRow, ranking, world_scores
+    from wristctl.comparison.world_ranking import RANKED, measured_row, ranking
     from wristctl.control.table import controller
     from wristctl.simulation.cases import measure
     from wristctl.simulation.drawn_worlds import drawn_cases
@@ -210,15 +210,8 @@ def _tested(session: Session, study: Study, family: Family, candidates: Sequence
             gains = np.array([list(law.values(candidate.gains))])
             measured.append(measure(law, gains, cases, study.wrist, RANKED))
             advance(number)
-    rows = [
-        RankedRow(
-            candidate.label,
-            world_scores(of_candidate, tests)[0],
-            np.any(of_candidate.swings_beside(measured[-1]).reshape(tests, -1), axis=1),
-            of_candidate,
-        )
-        for candidate, of_candidate in zip(candidates, measured, strict=True)
-    ]
+    labels = [candidate.label for candidate in candidates]
+    rows = [measured_row(label, own, measured[-1], tests) for label, own in zip(labels, measured, strict=True)]
     return ranking(FAMILY, family, rows, tolerated=TOLERATED)
 
 

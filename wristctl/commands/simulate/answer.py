@@ -43,20 +43,10 @@ _OVERSHOOT = 0.5
 
 
 def answer(study: Study, repeated: Repeated, reason: str = "", advice: Sequence[str] = (), wrist: str = "") -> Answer:
-    """The answer of a loop that was simulated once or several times.
+    """The answer of a loop that was simulated once or several times, of a study with the loop as it was simulated.
 
-    Parameters
-    ----------
-    study
-        Study with the loop as it was simulated.
-    repeated
-        Its repetitions.
-    reason
-        Reason why it does not arrive; empty where it does.
-    advice
-        Paragraphs and commands on what to do about a loop that is no good.
-    wrist
-        The wrist in words; empty: by its parameters.
+    `reason` says why it does not arrive, `advice` in paragraphs and commands what to do about it, and `wrist` which one
+    it is, where it is not told by its parameters.
     """
     from wristctl.simulation.planes import why_two
 

@@ -25,18 +25,8 @@ def answer_of(
 ) -> Answer | None:
     """The answer of a study for one screen; None where nothing was ranked.
 
-    Parameters
-    ----------
-    rankings
-        Rankings of the controllers by family.
-    terms
-        RMSE without each term over RMSE with it, by family.
-    shifts
-        Changes of the order where controllers were tuned otherwise.
-    run
-        Path of the run; empty for a result in memory.
-    bending
-        Families whose loops bend in two planes, and why, in sentences; empty where all stay in one.
+    `shifts` are of the order where controllers were tuned otherwise; `run` is the path, empty for a result in memory;
+    `bending` says which families bend in two planes, and why.
     """
     if not rankings:
         return None
@@ -70,9 +60,9 @@ def first_again(rankings: Sequence[TunedRanking]) -> str:
     facts = []
     for ranking in rankings:
         row = winner(ranking, rankings)
-        if row is None or len([one for group in ranking.standing.groups for one in group]) < 2:
+        if row is None or not ranking.may_change:
             continue
-        firsts = ranking.firsts(row)
+        firsts = ranking.firsts[row]
         name = ranking.labels[row].split("/")[0]
         facts.append(f"{condition(ranking)} {name} {firsts.halves} and {firsts.tunings} of {firsts.of_tunings}")
     if not facts:

@@ -29,18 +29,9 @@ Pieces = Mapping[StudyPlace, Sequence[Piece]]
 
 
 def written(session: Session, judged: Pieces, searches: dict[StudyPlace, Search], poisoned: list[Poisoned]) -> Studied:
-    """Rank the judged rows, and write rankings, tables and figures.
+    """Rank the judged rows by their metrics in ranges of worlds, and write rankings, tables and figures.
 
-    Parameters
-    ----------
-    session
-        Session of the study.
-    judged
-        Metrics of each judged row, in ranges of worlds.
-    searches
-        Search behind each row with tuned gains.
-    poisoned
-        Units that failed on every worker.
+    `poisoned` are units that failed on every worker.
     """
     from wristctl.comparison.paired_worlds import term_values
 
