@@ -61,30 +61,6 @@ def asked_for(reference: Reference) -> dict[str, Any]:
     return reference.model_dump(mode="json", exclude_defaults=True)
 
 
-def keep_gains(
-    findings: Findings, file: str, title: str, study: Study, rows: Sequence[Mapping[str, Any]],
-    **sections: Mapping[str, Any],
-) -> None:  # fmt: skip
-    """Write the file of gains into the run, if there is one.
-
-    Parameters
-    ----------
-    findings
-        findings of the run
-    file
-        name of the file in the run
-    title
-        first line
-    study
-        study with the wrist that the gains are for
-    rows
-        controllers with their gains: `simulate` and `hw-run` take the first, `compare` all
-    sections
-        further settings of `simulate`, `compare` and `hw_run`
-    """
-    keep_study(findings, file, title, gains_content(study, rows, **sections))
-
-
 def keep_study(findings: Findings, file: str, title: str, content: Mapping[str, Any]) -> None:
     """Write a study file into the run, if there is one: code and files by the run's copies, which count from there."""
     if findings.run is None:

@@ -44,14 +44,14 @@ from wristctl.config.study import Study
 from wristctl.errors import under
 
 if TYPE_CHECKING:
-    from wristctl.config.wrist import WristParameters
     from wristctl.simulation.closed_loop import Size
     from wristctl.simulation.repetitions import Repeated
     from wristctl.wrist.kinematics import Inverse
 
 
 def plan(study: Study, inputs: Inputs) -> str:
-    """Check the controller and its gains."""
+    """Check the controller and its gains, and tell the rollouts and what of their world is not as believed."""
+    from wristctl.commands.truth_table import truth_told
     from wristctl.simulation.closed_loop import check_size
 
     settings, known = study.simulate, identified(study, "simulate", inputs)
@@ -63,15 +63,8 @@ def plan(study: Study, inputs: Inputs) -> str:
             check_motion(known, planes)
         check_inverses(inverses_of([settings.reference]), inputs)
         check_size(size(study), planes=planes)
-    return _in_words(study, " in two planes" * (planes == 2), known.wrist)
-
-
-def _in_words(study: Study, where: str, wrist: WristParameters) -> str:
-    """The rollouts of a plan, and what of their world is not as believed."""
-    from wristctl.commands.truth_table import truth_told
-
-    times, settings = size(study).rollouts, study.simulate
-    truth = truth_told(wrist, {"simulate": settings.loop})
+    times, where = size(study).rollouts, " in two planes" * (planes == 2)
+    truth = truth_told(known.wrist, {"simulate": settings.loop})
     return f"{'one rollout' if times == 1 else f'{times} rollouts'} of {settings.horizon:g} s{where}{truth}"
 
 
@@ -91,7 +84,6 @@ def simulate(session: Session) -> Simulated:
     from wristctl.commands.truth_table import truth_tables
     from wristctl.simulation.closed_loop import scenario_of
     from wristctl.simulation.closed_loop import simulate as run_simulation
-    from wristctl.simulation.metrics import metrics_in
     from wristctl.simulation.worlds import Draws
 
     asked, session = session.study, replace(session, study=listened(session))
@@ -111,13 +103,12 @@ def simulate(session: Session) -> Simulated:
     warn_if_outside(course.outside)
     if planes == 2:
         findings.numerics(planes=2, substeps=int(repeated.metrics["substeps"].max()), drift=repeated.drift)
-    trajectory_table(findings, "trajectory" if planes == 1 else "bends", course)
+    trajectory_table(findings, course)
     findings.headline(*_HEADLINES[planes])
     gains = settings.gains if isinstance(settings.gains, str) else "given"
     label = course.label if planes == 1 else f"{settings.controller}/{gains} in two planes"
     title = ", ".join(part for part in (label, repeated.fate) if part)
-    metrics = metrics_in(planes)
-    tables = [metrics_table(findings, title, metrics, repeated), *truth_tables(wrist, {"simulate": settings.loop})]
+    tables = [metrics_table(findings, title, repeated), *truth_tables(wrist, {"simulate": settings.loop})]
     with session.drawing():
         (_draw if planes == 1 else _draw_bends)(session, study, repeated)
     arrives = repeated.failed.any() or repeated.arrives

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any
 
 from wristctl.commands.answer import Answer
 from wristctl.commands.course_table import course_of_trajectory
@@ -18,6 +18,10 @@ if TYPE_CHECKING:
     from wristctl.config.study import Study
     from wristctl.simulation.repetitions import Repeated
     from wristctl.simulation.trajectory import Trajectory
+
+
+# Names of the table of a trajectory, by planes.
+_TABLES = {1: "trajectory", 2: "bends"}
 
 
 @dataclass(frozen=True, repr=False, eq=False)
@@ -56,12 +60,7 @@ class Simulated(StudyResult):
 
     def courses(self) -> Mapping[str, Mapping[str, Any]]:
         """The columns of the trajectory, by the name of its table."""
-        return {self.table: self.trajectory.columns()}
-
-    @property
-    def table(self) -> str:
-        """Name of the table of the trajectory."""
-        return "trajectory" if self.trajectory.planes == 1 else "bends"
+        return {_TABLES[self.trajectory.planes]: self.trajectory.columns()}
 
     def frame(self) -> pd.DataFrame:
         """Every column of the trajectory; SI units."""
@@ -86,48 +85,34 @@ class Simulated(StudyResult):
         return self.repeated.marks
 
 
-class Explained(Protocol):
-    """A metric with its unit and how it is computed."""
-
-    @property
-    def unit(self) -> str:
-        """Unit of its values."""
-
-    @property
-    def formula(self) -> str:
-        """How it is computed."""
-
-
-def trajectory_table(findings: Findings, name: str, course: Trajectory) -> None:
+def trajectory_table(findings: Findings, course: Trajectory) -> None:
     """Keep a trajectory in the run, with unit and meaning of each column."""
     from wristctl.simulation.trajectory import meanings
 
     columns = course.columns()
     told = meanings(list(columns))
     units, meaning = ({name: column[i] for name, column in told.items()} for i in range(2))
-    findings.table(f"data/{name}.csv", columns, units=units, meaning=meaning)
+    findings.table(f"data/{_TABLES[course.planes]}.csv", columns, units=units, meaning=meaning)
 
 
-def metrics_table(findings: Findings, title: str, metrics: Mapping[str, Explained], repeated: Repeated) -> Table:
+def metrics_table(findings: Findings, title: str, repeated: Repeated) -> Table:
     """Every metric, kept in the run: its value, or of several repetitions the median with its 95 % interval."""
     import numpy as np
 
     from wristctl.comparison.repetition_spread import spread
+    from wristctl.simulation.metrics import metrics_in
 
-    count, rows = len(repeated.failed), list[tuple[object, ...]]()
+    metrics, several = metrics_in(repeated.first.trajectory.planes), len(repeated.failed) > 1
+    rows = list[tuple[object, ...]]()
     for name, metric in metrics.items():
-        if count == 1:
-            value = float(repeated.metrics[name][0])
-            findings.metric(name, value, metric.unit, "lower", meaning=metric.formula)
-            rows.append((name, value, metric.unit, metric.formula))
-        else:
-            estimate = spread(repeated.metrics[name])
-            meaning = f"{metric.formula}; median"
-            findings.metric(name, estimate.median, metric.unit, "lower", estimate.n, estimate.interval, meaning)
-            rows.append((name, estimate.median, estimate.low, estimate.high, metric.unit, metric.formula))
-    if count == 1:
+        found = spread(repeated.metrics[name])
+        value = found.median if several else float(repeated.metrics[name][0])
+        meaning = metric.formula + "; median" * several
+        findings.metric(name, value, metric.unit, "lower", found.n, found.interval, meaning)
+        rows.append((name, value, *found[1:3] * several, metric.unit, metric.formula))
+    if not several:
         return Table(title, ("metric", "value", "unit", "meaning"), rows)
-    every = {"repetition": np.arange(count), "failed": repeated.failed, **repeated.metrics}
+    every = {"repetition": np.arange(len(repeated.failed)), "failed": repeated.failed, **repeated.metrics}
     findings.table("data/repetitions.csv", every, {name: metric.unit for name, metric in metrics.items()})
     heads = ("metric", "median", "95 % low", "95 % high", "unit", "meaning")
-    return Table(f"{title}, {count} repetitions", heads, rows)
+    return Table(f"{title}, {len(repeated.failed)} repetitions", heads, rows)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -21,7 +21,7 @@ from wristctl.commands.inputs_of_loops import (
     network_for,
     why_two_planes,
 )
-from wristctl.commands.kept_studies import asked_for, file_of, hw_run_fits, keep_gains, rig_of, row_of
+from wristctl.commands.kept_studies import asked_for, file_of, gains_content, hw_run_fits, keep_study, rig_of, row_of
 from wristctl.commands.loop_warnings import (
     asked_by,
     refuse_out_of_reach,
@@ -44,10 +44,8 @@ from wristctl.commands.tune.answer import (
     starts_of,
 )
 from wristctl.commands.tune.searches import search_all
-from wristctl.config.families import Family
 from wristctl.config.loop import Reference
 from wristctl.config.study import Study
-from wristctl.config.tune import TuneSettings
 from wristctl.errors import UserError, under
 
 if TYPE_CHECKING:
@@ -141,7 +139,7 @@ def planned_search(study: Study, inputs: Inputs) -> str:
     from wristctl.simulation.planes import planes_of
     from wristctl.tuning.search import check_loops, check_optimiser, check_tunable
 
-    settings, families = study.tune, study.families
+    settings = study.tune
     for number, name in enumerate(settings.controllers):
         try:
             check_tunable(controller(name))
@@ -151,17 +149,17 @@ def planned_search(study: Study, inputs: Inputs) -> str:
         check_optimiser(settings)
     except UserError as error:
         raise error.at(str(error.where).removeprefix("tune.")) from error
+    references: Sequence[Reference] = [scenario.reference for scenario in settings.scenarios]
     if settings.worlds.family:
-        family_of(families, settings.worlds.family, "worlds.family")
+        references = family_of(study.families, settings.worlds.family, "worlds.family").references
     else:
         check_loops(settings)
     planes = planes_of(study.wrist, asked_of_search(study))
     if not settings.worlds.family:
-        references = [scenario.reference for scenario in settings.scenarios]
         check_reach(references, study.wrist, "scenarios.{}.reference", planes)
     asked = size(study)
     check_size(asked, planes)
-    check_inverses(inverses_of(_references(settings, families)), inputs)
+    check_inverses(inverses_of(references), inputs)
     times = {name: controller(name).learning for name in settings.controllers}
     told = f"{asked.rollouts // sum(times.values())} rollouts of {asked.horizon:g} s for each of {', '.join(times)}"
     return told + "".join(f", {n} times as many for {name}, which learns" for name, n in times.items() if n > 1)
@@ -208,10 +206,9 @@ def tune(session: Session) -> Tuned:
     searches = search_all(session, study, network, tried)
     gains = {name: best.gains for name, best in searches.items()}
     with session.progress("trying the gains found"):
-        lost = {
-            name: marks_of(law, np.array(law.values(gains[name])), cases, study.wrist)
-            for name, law in ((name, controller(name)) for name in gains)
-        }
+        laws = {name: controller(name) for name in gains}
+        values = {name: np.array(law.values(gains[name])) for name, law in laws.items()}
+        lost = {name: marks_of(law, values[name], cases, study.wrist) for name, law in laws.items()}
         errors, starts = beside_feedforward(gains, cases, study.wrist), starts_of(searches, cases, study.wrist)
     title = "Tuned gains, best first; objective in decades beside feedforward"
     tables = [searches_table(searches, errors, lost, len(cases), title)]
@@ -249,8 +246,8 @@ def _write_files(findings: Findings, study: Study, gains: Mapping[str, Mapping[s
     trial = rig_of(tried.loops[tried.name]) if tried.on_a_rig else {}
     for name, values in gains.items():
         title = f"{name}, as `wristctl tune` found it on {tried.where}: wristctl simulate THIS"
-        rows = [row_of(name, values)]
-        keep_gains(findings, file_of(name), title, study, rows, simulate=asked, compare={"loops": loops}, hw_run=trial)
+        sections = {"simulate": asked, "compare": {"loops": loops}, "hw_run": trial}
+        keep_study(findings, file_of(name), title, gains_content(study, [row_of(name, values)], **sections))
 
 
 def _stood(session: Session, own: OwnLoop, gains: Mapping[str, Mapping[str, float]]) -> dict[str, Stood]:
@@ -305,11 +302,6 @@ def _elsewhere(
                 done += effort
                 report(round(100.0 * done / whole))
     return tried
-
-
-def _references(settings: TuneSettings, families: Mapping[str, Family]) -> list[Reference]:
-    family = settings.worlds.family
-    return list(families[family].references) if family else [scenario.reference for scenario in settings.scenarios]
 
 
 TUNE = sweepable(
