@@ -22,8 +22,7 @@ from wristctl.commands.ranking_answer import (
     recommended,
     winner,
 )
-from wristctl.commands.ranking_drawing import keep_error
-from wristctl.commands.ranking_tables import controllers_table
+from wristctl.commands.ranking_tables import controllers_table, keep_error
 from wristctl.commands.results import Findings
 
 if TYPE_CHECKING:

@@ -48,8 +48,7 @@ from wristctl.commands.loop_warnings import (
 )
 from wristctl.commands.procedure import Procedure
 from wristctl.commands.ranking_answer import condition
-from wristctl.commands.ranking_drawing import draw_rankings
-from wristctl.commands.ranking_tables import answer_tables, every_row
+from wristctl.commands.ranking_tables import answer_tables, draw_rankings, every_row
 from wristctl.commands.results import Findings, StudyResult
 from wristctl.commands.session import Session
 from wristctl.commands.step_times import after_rollouts, timed_steps
@@ -78,8 +77,7 @@ if TYPE_CHECKING:
 
 def draw(findings: Findings, study: Study, results: list[ComparedRow], rankings: Sequence[Ranking]) -> None:
     """Draw each condition, RMSE against tension variation and over a growing setting, and every row on every loop."""
-    from wristctl.commands.compare.class_figures import error_against_variation
-    from wristctl.commands.compare.figures import error_over_disturbance, series_of_sizes
+    from wristctl.commands.compare.figures import error_against_variation, error_over_disturbance, series_of_sizes
 
     draw_rankings(findings, rankings, later=True)
     for ranking in rankings:
@@ -96,7 +94,7 @@ def draw(findings: Findings, study: Study, results: list[ComparedRow], rankings:
 
 def _of_class(findings: Findings, ranking: Ranking, results: Sequence[ComparedRow]) -> None:
     """Errors and tensions over time of the best rows and of the paper's, on the motion that stands for the class."""
-    from wristctl.commands.compare.class_figures import shown_rows, tension_rows
+    from wristctl.commands.compare.figures import shown_rows, tension_rows
     from wristctl.plotting.bend_figure import bend_overlay
     from wristctl.plotting.loop_figures import over_time, spread_of_sizes
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from wristctl.commands.ranking_drawing import draw_intervals, keep_error
+from wristctl.commands.ranking_tables import draw_intervals, keep_error
 from wristctl.commands.step_times import after_rollouts
 from wristctl.config.study import Study
 

@@ -12,7 +12,7 @@ from wristctl.commands.answer import Answer
 from wristctl.commands.kept_studies import FOLDER
 from wristctl.commands.printed_table import Table, degrees, joined, two
 from wristctl.commands.ranking_answer import decided
-from wristctl.commands.recommend.candidate import ENOUGH, Candidate, share_of, spread
+from wristctl.commands.recommend.expected import ENOUGH, Candidate, share_of, spread
 from wristctl.commands.recommend.study_file import own_rig, takers_of
 from wristctl.commands.results import StudyResult
 from wristctl.errors import UserError

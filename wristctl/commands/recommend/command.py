@@ -20,8 +20,7 @@ from wristctl.commands.recommend.answer import (
     files_table,
     sine_deg,
 )
-from wristctl.commands.recommend.candidate import Candidate, spread
-from wristctl.commands.recommend.expected import asked_for, expected
+from wristctl.commands.recommend.expected import Candidate, asked_for, expected, spread
 from wristctl.commands.recommend.own_rig import on_the_rig, said_of_facts
 from wristctl.commands.recommend.reach import FAMILY, LEAST_DEG, TOLERATED, asked_of_rigs, family_of_rigs, reach_deg
 from wristctl.commands.recommend.rehearsals import check_homing

@@ -10,7 +10,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from wristctl.commands.recommend.candidate import spread
+from wristctl.commands.recommend.expected import spread
 from wristctl.plotting.kinds import Dot, draw_dots
 from wristctl.plotting.style import BLUE, GREY, VERMILLION, figure, logarithmic
 

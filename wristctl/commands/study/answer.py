@@ -12,8 +12,7 @@ from wristctl.commands.ranking_answer import advice, certainty, condition, decid
 from wristctl.commands.ranking_tables import decision_table
 
 if TYPE_CHECKING:
-    from wristctl.comparison.paired_worlds import OrderShift, TermValue
-    from wristctl.comparison.tuned_ranking import TunedRanking
+    from wristctl.comparison.tuned_ranking import OrderShift, TermValue, TunedRanking
 
 
 def answer_of(

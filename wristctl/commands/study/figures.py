@@ -12,7 +12,7 @@ from matplotlib.ticker import LogLocator, NullFormatter
 
 from wristctl.arrays import Array
 from wristctl.comparison.bootstrap import plain
-from wristctl.comparison.paired_worlds import TermValue
+from wristctl.comparison.tuned_ranking import TermValue
 from wristctl.comparison.world_ranking import WorldRanking
 from wristctl.plotting.kinds import Dot, draw_cells, draw_dots, draw_front, name_rows
 from wristctl.plotting.style import (

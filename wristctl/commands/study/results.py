@@ -7,8 +7,7 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from wristctl.commands.printed_table import Table
-from wristctl.commands.ranking_drawing import draw_intervals, draw_rankings, keep_error
-from wristctl.commands.ranking_tables import answer_tables, every_row
+from wristctl.commands.ranking_tables import answer_tables, draw_intervals, draw_rankings, every_row, keep_error
 from wristctl.commands.session import Session
 from wristctl.commands.step_times import timed_steps
 from wristctl.commands.study.published import PUBLISHED, published, published_gains
@@ -18,8 +17,7 @@ from wristctl.config.study import Study
 if TYPE_CHECKING:
     import numpy as np
 
-    from wristctl.comparison.paired_worlds import OrderShift, TermValue
-    from wristctl.comparison.tuned_ranking import TunedRanking
+    from wristctl.comparison.tuned_ranking import OrderShift, TermValue, TunedRanking
     from wristctl.control.law import Controller
     from wristctl.tuning.search import Search
     from wristctl.work.fan_out import Poisoned
@@ -33,7 +31,7 @@ def written(session: Session, judged: Pieces, searches: dict[StudyPlace, Search]
 
     `poisoned` are units that failed on every worker.
     """
-    from wristctl.comparison.paired_worlds import term_values
+    from wristctl.comparison.tuned_ranking import term_values
 
     study = session.study
     with session.progress("ranking"):
@@ -94,7 +92,7 @@ def _rankings(study: Study, judged: Pieces) -> dict[str, TunedRanking]:
 
 def _shifts(study: Study, judged: Pieces) -> list[OrderShift]:
     """Shift of the order by each variant, on the smooth motions of its family where it has any."""
-    from wristctl.comparison.paired_worlds import order_shift
+    from wristctl.comparison.tuned_ranking import order_shift
     from wristctl.comparison.world_ranking import kinds_of, row_of
 
     shifts, width = [], study.wrist.tension_range

@@ -18,8 +18,7 @@ from wristctl.errors import UserError
 if TYPE_CHECKING:
     import pandas as pd
 
-    from wristctl.comparison.paired_worlds import OrderShift, TermValue
-    from wristctl.comparison.tuned_ranking import TunedRanking
+    from wristctl.comparison.tuned_ranking import OrderShift, TermValue, TunedRanking
     from wristctl.tuning.search import Search
     from wristctl.work.fan_out import Poisoned
     from wristctl.work.worker import Golden, Unit
