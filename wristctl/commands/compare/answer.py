@@ -261,14 +261,18 @@ def loop_tables(loop: str, results: list[ComparedRow], cells: Container[tuple[st
 
 def _row(result: ComparedRow, shown: Iterable[str], repeated: bool, theirs: bool) -> tuple[str | float, ...]:
     from wristctl.commands.compare.csv_data import metrics_of
+    from wristctl.comparison.paper import T2, verdict
     from wristctl.comparison.repetition_spread import spread
 
-    metrics = metrics_of(result)
-    never = "failed" if result.repeated.failed.any() else "never"
-    settling = metrics["settling"] if metrics["settling"] == metrics["settling"] else never
-    values = [settling if name == "settling" else metrics[name] for name in shown]
+    metrics: dict[str, str | float] = dict(found := metrics_of(result))
+    if found["settling"] != found["settling"]:
+        metrics["settling"] = "failed" if result.repeated.failed.any() else "never"
     ends = spread(result.repeated.metrics["rmse"])[1:3] if repeated else ()
-    papers = _paper(result) if theirs else ()
+    papers: tuple[str, ...] = ("", "") if theirs else ()
+    if theirs and result.controller in T2:
+        printed = " / ".join(f"{value:g}" for value in T2[result.controller])
+        papers = printed, verdict(result.controller, found["rmse"], found["settling"], found["steady_state"])
+    values = (metrics[name] for name in shown)
     return (result.label, result.inverse, *values, *ends, *papers, result.repeated.fate)
 
 
@@ -276,14 +280,3 @@ def step_table(times: dict[str, StepTime]) -> Table:
     """Table of the time of a control step on this machine [us]."""
     rows = [(label, time.median, time.p99) for label, time in times.items()]
     return Table("Control step of one wrist on this machine", ("controller", "median [us]", "p99 [us]"), rows)
-
-
-def _paper(result: ComparedRow) -> tuple[str, str]:
-    from wristctl.commands.compare.csv_data import metrics_of
-    from wristctl.comparison.paper import T2, verdict
-
-    if result.controller not in T2:
-        return "", ""
-    metrics = metrics_of(result)
-    printed = " / ".join(f"{value:g}" for value in T2[result.controller])
-    return printed, verdict(result.controller, metrics["rmse"], metrics["settling"], metrics["steady_state"])

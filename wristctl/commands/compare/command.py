@@ -19,7 +19,6 @@ from wristctl.commands.compare.answer import (
     step_table,
     units,
 )
-from wristctl.commands.compare.ranking import ranked
 from wristctl.commands.inputs import EarlierRun, Inputs
 from wristctl.commands.inputs_of_loops import (
     asked_of_comparison,
@@ -48,7 +47,7 @@ from wristctl.commands.loop_warnings import (
 )
 from wristctl.commands.procedure import Procedure
 from wristctl.commands.ranking_answer import condition
-from wristctl.commands.ranking_tables import answer_tables, draw_rankings, every_row
+from wristctl.commands.ranking_tables import answer_tables, draw_intervals, draw_rankings, every_row, keep_error
 from wristctl.commands.results import Findings, StudyResult
 from wristctl.commands.session import Session
 from wristctl.commands.step_times import after_rollouts, timed_steps
@@ -69,27 +68,46 @@ if TYPE_CHECKING:
     from wristctl.comparison.combinations import ComparedRow
     from wristctl.comparison.controller_ranking import Ranking
     from wristctl.comparison.step_cost import StepTime
+    from wristctl.comparison.world_ranking import WorldRanking
     from wristctl.control.law import Controller
     from wristctl.control.table import Gains
     from wristctl.simulation.closed_loop import Size
     from wristctl.tuning.search import Search
+    from wristctl.wrist.kinematics import Inverse
 
 
 def draw(findings: Findings, study: Study, results: list[ComparedRow], rankings: Sequence[Ranking]) -> None:
     """Draw each condition, RMSE against tension variation and over a growing setting, and every row on every loop."""
-    from wristctl.commands.compare.figures import error_against_variation, error_over_disturbance, series_of_sizes
+    from wristctl.commands.compare.figures import (
+        error_against_variation,
+        error_over_disturbance,
+        rmse_map,
+        series_of_sizes,
+        variation_dots,
+    )
+    from wristctl.comparison.combinations import paper_cells
 
     draw_rankings(findings, rankings, later=True)
     for ranking in rankings:
         _of_class(findings, ranking, results)
-    later = partial(findings.figure, later=True)
+    later, cells = partial(findings.figure, later=True), paper_cells(study)
     first = [result for result in results if result.inverse == _stands_for(results)[2]]
     caption = "RMSE against total variation of tension, medians over motions; the line is Pareto's front"
     later("rmse-against-tension-variation", error_against_variation, first, rankings, caption=caption)
     for leaf, sizes in series_of_sizes(study.compare.loops).items():
         caption = f"RMSE over {leaf}, medians over motions"
         later(f"rmse-over-{_slug(leaf)}", error_over_disturbance, first, leaf, sizes, caption=caption)
-    _of_every_row(findings, study, results)
+    for loop in study.compare.loops:
+        selected = [result for result in results if result.loop == loop]
+        beside = any(cell[0] == loop for cell in cells)
+        caption = f"RMSE of every row on each reference, loop {loop}" + ", beside the paper's T2" * beside
+        later(f"rmse-by-reference-{_slug(loop)}", rmse_map, selected, f"loop {loop}", beside=beside, caption=caption)
+        caption = f"Total variation of tension of every row, loop {loop}"
+        later(f"tension-variation-{_slug(loop)}", variation_dots, selected, f"loop {loop}", caption=caption)
+    for reference in dict.fromkeys(result.reference for result in results) if len(study.compare.loops) > 1 else ():
+        selected = [result for result in results if result.reference == reference]
+        caption = f"RMSE of every row on each loop, {reference}"
+        later(f"rmse-by-loop-{_slug(reference)}", rmse_map, selected, reference, "loop", beside=False, caption=caption)
 
 
 def _of_class(findings: Findings, ranking: Ranking, results: Sequence[ComparedRow]) -> None:
@@ -104,45 +122,18 @@ def _of_class(findings: Findings, ranking: Ranking, results: Sequence[ComparedRo
     shown = [by_label[row] for row in shown_rows(ranking) if row in by_label]
     courses = [result.simulation.trajectory for result in shown]
     slug, where = _slug(ranking.name), f"{condition(ranking)}: loop {cell[0]}, {cell[1]}"
-    caption = f"Angle and error of the best controllers and of the paper's, {where}"
+    tendons, overlay = "each tendon", partial(findings.figure, f"overlay-{slug}", bend_overlay, courses)
     if courses[0].planes == 1:
-        parts: dict[str, Any] = {"heading": where, "later": ranking.jumps, "caption": caption}
-        findings.figure(f"overlay-{slug}", over_time, courses, "angle", "measurable size", **parts)
-    else:
-        findings.figure(f"overlay-{slug}", bend_overlay, courses, where, later=ranking.jumps, caption=caption)
+        tendons = "both sides"
+        overlay = partial(findings.figure, f"overlay-{slug}", over_time, courses, "angle", "measurable size")
+    caption = f"Angle and error of the best controllers and of the paper's, {where}"
+    overlay(heading=where, later=ranking.jumps, caption=caption)
     caption = f"|theta - reference| of the best rows and of the paper's laws, {where}"
     later(f"error-over-time-{slug}", over_time, courses, "size", heading=where, caption=caption)
-    tendons = "both sides" if courses[0].planes == 1 else "each tendon"
     later(f"tension-over-time-{slug}", tension_rows, courses, where, caption=f"Commanded tension of {tendons}, {where}")
-    repeated = [result.repeated for result in shown if len(result.repeated.failed) > 1]
-    if repeated:
-        caption = f"|error| over repetitions: median and 95 % interval, {where}"
-        later(
-            f"error-of-repetitions-{slug}",
-            over_time,
-            courses[:1],
-            spread_of_sizes(repeated),
-            heading=where,
-            caption=caption,
-        )
-
-
-def _of_every_row(findings: Findings, study: Study, results: Sequence[ComparedRow]) -> None:
-    from wristctl.commands.compare.figures import rmse_map, variation_dots
-    from wristctl.comparison.combinations import paper_cells
-
-    later, cells, settings = partial(findings.figure, later=True), paper_cells(study), study.compare
-    for loop in settings.loops:
-        selected = [result for result in results if result.loop == loop]
-        beside = any(cell[0] == loop for cell in cells)
-        caption = f"RMSE of every row on each reference, loop {loop}" + ", beside the paper's T2" * beside
-        later(f"rmse-by-reference-{_slug(loop)}", rmse_map, selected, f"loop {loop}", beside=beside, caption=caption)
-        caption = f"Total variation of tension of every row, loop {loop}"
-        later(f"tension-variation-{_slug(loop)}", variation_dots, selected, f"loop {loop}", caption=caption)
-    for reference in dict.fromkeys(result.reference for result in results) if len(settings.loops) > 1 else ():
-        selected = [result for result in results if result.reference == reference]
-        caption = f"RMSE of every row on each loop, {reference}"
-        later(f"rmse-by-loop-{_slug(reference)}", rmse_map, selected, reference, "loop", beside=False, caption=caption)
+    if repeated := [result.repeated for result in shown if len(result.repeated.failed) > 1]:
+        caption, sizes = f"|error| over repetitions: median and 95 % interval, {where}", spread_of_sizes(repeated)
+        later(f"error-of-repetitions-{slug}", over_time, courses[:1], sizes, heading=where, caption=caption)
 
 
 def _stands_for(results: Sequence[ComparedRow]) -> tuple[str, str, str]:
@@ -302,7 +293,7 @@ def compare(session: Session) -> Compared:
     tuned = dict(tuned_gains(session.inputs) or {}) | {name: search.gains for name, search in searches.items()}
     gains = _gains_of_rows(study, tuned)
     if settings.worlds.family:
-        of_worlds = ranked(session, study, network, tuned)
+        of_worlds = _ranked(session, study, network, tuned)
         warn_of_lost(settings.rows, loops, of_worlds)
         head_with_the_best(findings, of_worlds)
         draw_rankings(findings, of_worlds)
@@ -337,6 +328,29 @@ def compare(session: Session) -> Compared:
         *truth_tables(study.wrist, settings.loops),
     ]
     return Compared(study, findings, tables, results, searches, times, rankings, gains)
+
+
+def _ranked(session: Session, study: Study, network: Inverse | None, tuned: Gains) -> list[WorldRanking]:
+    """Rank the rows on the worlds that the study names, and write down rankings and worlds."""
+    import pandas as pd
+
+    from wristctl.comparison.world_ranking import rank, ranked_units, ranking_frame, worlds_frame
+    from wristctl.simulation.drawn_worlds import streams_of
+
+    findings, worlds = session.findings, study.compare.worlds
+    with session.progress("ranking", 100, "%", after=after_rollouts(len(study.compare.rows))) as report:
+        rankings = rank(study, tuned, network, lambda share: report(round(100 * share)))
+    if worlds.sealed is None:
+        findings.note_streams(streams_of(study.families[worlds.family], worlds.family, worlds.split))
+    frames = pd.concat([worlds_frame(each) for each in rankings], ignore_index=True)
+    findings.table("data/worlds.csv", frames, units=ranked_units())
+    for each, end in zip(rankings, ("", "_steps"), strict=False):
+        findings.table(f"data/ranking{end.replace('_', '-')}.csv", ranking_frame(each), units=ranked_units())
+        for row, label in enumerate(each.labels):
+            keep_error(findings, f"rmse_{label}{end}", each, row)
+        with session.drawing():
+            draw_intervals(findings, each, end)
+    return rankings
 
 
 def _gains_of_rows(study: Study, tuned: Gains) -> dict[str, dict[str, float]]:
