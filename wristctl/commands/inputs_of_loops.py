@@ -309,7 +309,6 @@ class Found:
 
 def with_found(study: Study, command: str, found: Found) -> Study:
     """The study with the wrist that was found. UserError where a log told ratios and nobody says the stiffness."""
-    from wristctl.commands.recommend.own_rig import narrowed
     from wristctl.identification.unknowns import with_identified
 
     text, told = found.yaml, None
@@ -326,7 +325,11 @@ def with_found(study: Study, command: str, found: Found) -> Study:
         found.said = True
         text, told = wrist.yaml, {"wrist.stiffness", *wrist.told}
     known = with_identified(study, command, text)
-    return narrowed(known, told) if command == "recommend" else known
+    if command != "recommend":
+        return known
+    from wristctl.commands.recommend.own_rig import narrowed
+
+    return narrowed(known, told)
 
 
 def found_in(earlier: Any) -> Found:

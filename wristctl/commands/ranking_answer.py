@@ -8,12 +8,12 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
-from typing import TYPE_CHECKING
 
 from wristctl.commands.printed_table import degrees, joined, two
-
-if TYPE_CHECKING:
-    from wristctl.comparison.controller_ranking import Fault, Ranking, Traits
+from wristctl.comparison.controller_ranking import MOTORS_DECIDE, Fault, Ranking, Traits
+from wristctl.comparison.model_confidence_set import LEAST_PAIRS
+from wristctl.control.table import controller
+from wristctl.tuning.objective import YARDSTICK
 
 # Names of gains that the paper prints, and of those with P1 and P2 exchanged: never left out of a label.
 PRINTED = "printed"
@@ -78,8 +78,6 @@ def _shortened(names: Mapping[str, str]) -> dict[str, str]:
 
 def gains_words(name: str, gains: Mapping[str, float]) -> str:
     """Gains of a controller with their units: Kp = 4672 N m/rad, Kd = 0.02105 N m s/rad."""
-    from wristctl.control.table import controller
-
     table = controller(name).gains
     return ", ".join(f"{gain} = {value:.4g} {table[gain].unit}".rstrip() for gain, value in gains.items())
 
@@ -91,8 +89,6 @@ def called(label: str) -> str:
 
 def open_loop(label: str) -> bool:
     """Whether a label is of the controller without feedback."""
-    from wristctl.tuning.objective import YARDSTICK
-
     return label.split("/")[0] == YARDSTICK
 
 
@@ -270,8 +266,6 @@ def _counted(places: Sequence[str]) -> str:
 
 
 def _no_ranking(alike: Sequence[Ranking]) -> str:
-    from wristctl.comparison.model_confidence_set import LEAST_PAIRS
-
     few = [ranking for ranking in alike if ranking.standing.untold]
     if not few:
         return "use none of these: each fails, swings, chatters or does not arrive"
@@ -313,8 +307,6 @@ def decided(rankings: Sequence[Ranking]) -> str:
 
     Where none can be used it is told of the one with the least error.
     """
-    from wristctl.comparison.controller_ranking import MOTORS_DECIDE
-
     shares, motors = list[str](), list[str]()
     known = [ranking for ranking in rankings if ranking.at_limit]
     for ranking in known:

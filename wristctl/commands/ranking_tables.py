@@ -5,7 +5,8 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Collection, Mapping, Sequence
-from typing import TYPE_CHECKING
+
+import numpy as np
 
 from wristctl.commands.printed_table import COLUMNS, Table, degrees, joined, two
 from wristctl.commands.ranking_answer import (
@@ -20,12 +21,9 @@ from wristctl.commands.ranking_answer import (
     with_interval,
 )
 from wristctl.commands.results import Findings
-
-if TYPE_CHECKING:
-    from wristctl.comparison.controller_ranking import Ranking
-    from wristctl.comparison.step_cost import StepTime
-    from wristctl.comparison.world_ranking import WorldRanking
-
+from wristctl.comparison.controller_ranking import Ranking, undominated
+from wristctl.comparison.step_cost import StepTime
+from wristctl.comparison.world_ranking import WorldRanking
 
 # Controllers that a table on the screen has, at most, unless more were asked for.
 _DOZEN = 12
@@ -126,10 +124,6 @@ def every_row(ranking: WorldRanking, times: Mapping[str, StepTime] | None = None
 
     `times` are those of a tick, by controller or by row.
     """
-    import numpy as np
-
-    from wristctl.comparison.controller_ranking import undominated
-
     energy, chattering = ranking.medians("energy"), ranking.medians("chattering")
     rmse = np.array([estimate.value for estimate in ranking.means])
     front = undominated(np.column_stack([rmse, chattering, energy]))

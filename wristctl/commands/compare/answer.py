@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Container, Iterable, Mapping, Sequence
-from typing import TYPE_CHECKING
+
+import numpy as np
 
 from wristctl.commands.answer import Answer
+from wristctl.commands.compare.csv_data import metrics_of
 from wristctl.commands.printed_table import Table, capital, joined
 from wristctl.commands.ranking_answer import (
     PRINTED,
@@ -24,11 +26,15 @@ from wristctl.commands.ranking_answer import (
 )
 from wristctl.commands.ranking_tables import controllers_table, keep_error
 from wristctl.commands.results import Findings
-
-if TYPE_CHECKING:
-    from wristctl.comparison.combinations import ComparedRow
-    from wristctl.comparison.controller_ranking import Ranking, Traits
-    from wristctl.comparison.step_cost import StepTime
+from wristctl.comparison.combinations import CLASS_MEANINGS, ComparedRow
+from wristctl.comparison.controller_ranking import Ranking, Traits
+from wristctl.comparison.paper import T2, verdict
+from wristctl.comparison.repetition_spread import spread
+from wristctl.comparison.step_cost import StepTime
+from wristctl.comparison.tie_groups import share
+from wristctl.comparison.world_ranking import WorldRanking
+from wristctl.simulation.metrics import METRICS
+from wristctl.simulation.trajectory import rests
 
 
 def answer_of(
@@ -68,11 +74,6 @@ def best_on_yours(rankings: Sequence[Ranking]) -> str:
 
     Empty where the worlds are no draws of an identification's posterior.
     """
-    import numpy as np
-
-    from wristctl.comparison.tie_groups import share
-    from wristctl.comparison.world_ranking import WorldRanking
-
     posteriors = [one for one in rankings if isinstance(one, WorldRanking) and one.family.together]
     sentences = []
     for ranking in posteriors:
@@ -120,8 +121,6 @@ def gains_of_best(rankings: Sequence[Ranking], gains: Mapping[str, Mapping[str, 
 
 def conditions(rankings: Sequence[Ranking]) -> str:
     """What the names of the conditions mean; empty for families of worlds, which a study describes."""
-    from wristctl.comparison.combinations import CLASS_MEANINGS
-
     meanings = dict[str, str]()
     for one in rankings:
         if one.unit != "world":
@@ -187,8 +186,6 @@ def _outcomes(rankings: Sequence[Ranking], label: str) -> str:
 
 def papers_order(rankings: Sequence[Ranking]) -> str:
     """Whether the order of the paper's five controllers by RMSE is that of their best rows here."""
-    from wristctl.comparison.paper import T2
-
     printed = sorted(T2, key=lambda name: T2[name].rmse)
     holds, complete = [], 0
     for ranking in rankings:
@@ -228,8 +225,6 @@ STANDING_UNITS = dict.fromkeys(("rmse", "rmse_low", "rmse_high", "swing"), "rad"
 
 def units() -> dict[str, str]:
     """Units of the columns of the comparison table, by name."""
-    from wristctl.simulation.metrics import METRICS
-
     metric_units = {name: metric.unit or "1" for name, metric in METRICS.items()}
     ends = {f"{name}_{end}": unit for name, unit in metric_units.items() for end in ("low", "high")}
     return metric_units | ends | {"paper_rmse": "rad", "paper_settling": "s", "paper_steady_state": "rad"}
@@ -241,9 +236,6 @@ def loop_tables(loop: str, results: list[ComparedRow], cells: Container[tuple[st
     The paper's numbers stand in those of the `cells` (loop, reference) alone; a motion that never rests has neither
     settling time nor overshoot.
     """
-    from wristctl.simulation.metrics import METRICS
-    from wristctl.simulation.trajectory import rests
-
     shown = {name: METRICS[name].heading for name in dict.fromkeys((*_FIRST, *METRICS)) if METRICS[name].heading}
     times = max(len(result.repeated.failed) for result in results)
     ends = ("RMSE's 95 % low", "high") if times > 1 else ()
@@ -260,10 +252,6 @@ def loop_tables(loop: str, results: list[ComparedRow], cells: Container[tuple[st
 
 
 def _row(result: ComparedRow, shown: Iterable[str], repeated: bool, theirs: bool) -> tuple[str | float, ...]:
-    from wristctl.commands.compare.csv_data import metrics_of
-    from wristctl.comparison.paper import T2, verdict
-    from wristctl.comparison.repetition_spread import spread
-
     metrics: dict[str, str | float] = dict(found := metrics_of(result))
     if found["settling"] != found["settling"]:
         metrics["settling"] = "failed" if result.repeated.failed.any() else "never"

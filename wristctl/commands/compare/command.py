@@ -3,22 +3,12 @@
 from __future__ import annotations
 
 import logging
-import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import partial
 from itertools import chain
 from typing import TYPE_CHECKING, Any
 
 from wristctl.commands.answer import Answer
-from wristctl.commands.compare.answer import (
-    STANDING_UNITS,
-    answer_of,
-    head_with_the_best,
-    loop_tables,
-    step_table,
-    units,
-)
 from wristctl.commands.inputs import EarlierRun, Inputs
 from wristctl.commands.inputs_of_loops import (
     asked_of_comparison,
@@ -46,14 +36,11 @@ from wristctl.commands.loop_warnings import (
     warn_out_of_reach,
 )
 from wristctl.commands.procedure import Procedure
-from wristctl.commands.ranking_answer import condition
-from wristctl.commands.ranking_tables import answer_tables, draw_intervals, draw_rankings, every_row, keep_error
-from wristctl.commands.results import Findings, StudyResult
+from wristctl.commands.results import StudyResult
 from wristctl.commands.session import Session
 from wristctl.commands.step_times import after_rollouts, timed_steps
 from wristctl.commands.sweep.command import sweepable
 from wristctl.commands.tune.command import planned_search
-from wristctl.commands.tune.searches import search_all
 from wristctl.config.choices import CONTROLLERS
 from wristctl.config.controller_row import BY_LOOP, label_of
 from wristctl.config.study import Study
@@ -68,83 +55,10 @@ if TYPE_CHECKING:
     from wristctl.comparison.combinations import ComparedRow
     from wristctl.comparison.controller_ranking import Ranking
     from wristctl.comparison.step_cost import StepTime
-    from wristctl.comparison.world_ranking import WorldRanking
     from wristctl.control.law import Controller
     from wristctl.control.table import Gains
     from wristctl.simulation.closed_loop import Size
     from wristctl.tuning.search import Search
-    from wristctl.wrist.kinematics import Inverse
-
-
-def draw(findings: Findings, study: Study, results: list[ComparedRow], rankings: Sequence[Ranking]) -> None:
-    """Draw each condition, RMSE against tension variation and over a growing setting, and every row on every loop."""
-    from wristctl.commands.compare.figures import (
-        error_against_variation,
-        error_over_disturbance,
-        rmse_map,
-        series_of_sizes,
-        variation_dots,
-    )
-    from wristctl.comparison.combinations import paper_cells
-
-    draw_rankings(findings, rankings, later=True)
-    for ranking in rankings:
-        _of_class(findings, ranking, results)
-    later, cells = partial(findings.figure, later=True), paper_cells(study)
-    first = [result for result in results if result.inverse == _stands_for(results)[2]]
-    caption = "RMSE against total variation of tension, medians over motions; the line is Pareto's front"
-    later("rmse-against-tension-variation", error_against_variation, first, rankings, caption=caption)
-    for leaf, sizes in series_of_sizes(study.compare.loops).items():
-        caption = f"RMSE over {leaf}, medians over motions"
-        later(f"rmse-over-{_slug(leaf)}", error_over_disturbance, first, leaf, sizes, caption=caption)
-    for loop in study.compare.loops:
-        selected = [result for result in results if result.loop == loop]
-        beside = any(cell[0] == loop for cell in cells)
-        caption = f"RMSE of every row on each reference, loop {loop}" + ", beside the paper's T2" * beside
-        later(f"rmse-by-reference-{_slug(loop)}", rmse_map, selected, f"loop {loop}", beside=beside, caption=caption)
-        caption = f"Total variation of tension of every row, loop {loop}"
-        later(f"tension-variation-{_slug(loop)}", variation_dots, selected, f"loop {loop}", caption=caption)
-    for reference in dict.fromkeys(result.reference for result in results) if len(study.compare.loops) > 1 else ():
-        selected = [result for result in results if result.reference == reference]
-        caption = f"RMSE of every row on each loop, {reference}"
-        later(f"rmse-by-loop-{_slug(reference)}", rmse_map, selected, reference, "loop", beside=False, caption=caption)
-
-
-def _of_class(findings: Findings, ranking: Ranking, results: Sequence[ComparedRow]) -> None:
-    """Errors and tensions over time of the best rows and of the paper's, on the motion that stands for the class."""
-    from wristctl.commands.compare.figures import shown_rows, tension_rows
-    from wristctl.plotting.bend_figure import bend_overlay
-    from wristctl.plotting.loop_figures import over_time, spread_of_sizes
-
-    later = partial(findings.figure, later=True)
-    cell = _stands_for(ranking.of(results))
-    by_label = {result.label: result for result in results if (result.loop, result.reference, result.inverse) == cell}
-    shown = [by_label[row] for row in shown_rows(ranking) if row in by_label]
-    courses = [result.simulation.trajectory for result in shown]
-    slug, where = _slug(ranking.name), f"{condition(ranking)}: loop {cell[0]}, {cell[1]}"
-    tendons, overlay = "each tendon", partial(findings.figure, f"overlay-{slug}", bend_overlay, courses)
-    if courses[0].planes == 1:
-        tendons = "both sides"
-        overlay = partial(findings.figure, f"overlay-{slug}", over_time, courses, "angle", "measurable size")
-    caption = f"Angle and error of the best controllers and of the paper's, {where}"
-    overlay(heading=where, later=ranking.jumps, caption=caption)
-    caption = f"|theta - reference| of the best rows and of the paper's laws, {where}"
-    later(f"error-over-time-{slug}", over_time, courses, "size", heading=where, caption=caption)
-    later(f"tension-over-time-{slug}", tension_rows, courses, where, caption=f"Commanded tension of {tendons}, {where}")
-    if repeated := [result.repeated for result in shown if len(result.repeated.failed) > 1]:
-        caption, sizes = f"|error| over repetitions: median and 95 % interval, {where}", spread_of_sizes(repeated)
-        later(f"error-of-repetitions-{slug}", over_time, courses[:1], sizes, heading=where, caption=caption)
-
-
-def _stands_for(results: Sequence[ComparedRow]) -> tuple[str, str, str]:
-    """The loop, reference and inverse of the first row that is no step and, if there are others, not of a network."""
-    chosen = min(results, key=lambda result: (result.inverse == "network", result.jumps))
-    return chosen.loop, chosen.reference, chosen.inverse
-
-
-def _slug(name: str) -> str:
-    """Name of a file made from a title."""
-    return re.sub(r"[^A-Za-z0-9.-]+", "-", name.replace(" -", " minus ").replace("+", "plus ")).strip("-")
 
 
 @dataclass(frozen=True, repr=False, eq=False)
@@ -177,6 +91,8 @@ class Compared(StudyResult):
     @property
     def answer(self) -> Answer | None:
         """Which controller to use under which condition, and which must not be used."""
+        from wristctl.commands.compare.answer import answer_of
+
         bending = why_two_planes(self.study.wrist, asked_of_comparison(self.study))
         own = [row.label for row in self.study.compare.rows if CONTROLLERS.origin(row.controller)]
         typed = [row.label for row in self.study.compare.rows if row.gains == BY_LOOP]
@@ -185,6 +101,8 @@ class Compared(StudyResult):
     @property
     def marks(self) -> list[str]:
         """Conditions in which no controller can be used, or none is ranked for want of cases."""
+        from wristctl.commands.ranking_answer import condition
+
         unranked = [ranking for ranking in self.rankings if not ranking.standing.groups and not ranking.jumps]
         few = [condition(ranking) for ranking in unranked if ranking.standing.untold]
         none = [condition(ranking) for ranking in unranked if not ranking.standing.untold]
@@ -264,8 +182,12 @@ def size(study: Study) -> Size:
 
 def compare(session: Session) -> Compared:
     """Compare controllers on loops and references, beside the paper's numbers, or rank them on a family of worlds."""
+    from wristctl.commands.compare.answer import STANDING_UNITS, head_with_the_best, loop_tables, step_table, units
     from wristctl.commands.compare.csv_data import frame, repetitions_frame, series
+    from wristctl.commands.compare.drawing import draw, ranked
+    from wristctl.commands.ranking_tables import answer_tables, draw_rankings, every_row
     from wristctl.commands.truth_table import truth_tables
+    from wristctl.commands.tune.searches import search_all
     from wristctl.comparison.combinations import compare as run_comparison
     from wristctl.comparison.combinations import paper_cells
     from wristctl.comparison.controller_ranking import class_rankings, standings_frame
@@ -293,7 +215,7 @@ def compare(session: Session) -> Compared:
     tuned = dict(tuned_gains(session.inputs) or {}) | {name: search.gains for name, search in searches.items()}
     gains = _gains_of_rows(study, tuned)
     if settings.worlds.family:
-        of_worlds = _ranked(session, study, network, tuned)
+        of_worlds = ranked(session, study, network, tuned)
         warn_of_lost(settings.rows, loops, of_worlds)
         head_with_the_best(findings, of_worlds)
         draw_rankings(findings, of_worlds)
@@ -328,29 +250,6 @@ def compare(session: Session) -> Compared:
         *truth_tables(study.wrist, settings.loops),
     ]
     return Compared(study, findings, tables, results, searches, times, rankings, gains)
-
-
-def _ranked(session: Session, study: Study, network: Inverse | None, tuned: Gains) -> list[WorldRanking]:
-    """Rank the rows on the worlds that the study names, and write down rankings and worlds."""
-    import pandas as pd
-
-    from wristctl.comparison.world_ranking import rank, ranked_units, ranking_frame, worlds_frame
-    from wristctl.simulation.drawn_worlds import streams_of
-
-    findings, worlds = session.findings, study.compare.worlds
-    with session.progress("ranking", 100, "%", after=after_rollouts(len(study.compare.rows))) as report:
-        rankings = rank(study, tuned, network, lambda share: report(round(100 * share)))
-    if worlds.sealed is None:
-        findings.note_streams(streams_of(study.families[worlds.family], worlds.family, worlds.split))
-    frames = pd.concat([worlds_frame(each) for each in rankings], ignore_index=True)
-    findings.table("data/worlds.csv", frames, units=ranked_units())
-    for each, end in zip(rankings, ("", "_steps"), strict=False):
-        findings.table(f"data/ranking{end.replace('_', '-')}.csv", ranking_frame(each), units=ranked_units())
-        for row, label in enumerate(each.labels):
-            keep_error(findings, f"rmse_{label}{end}", each, row)
-        with session.drawing():
-            draw_intervals(findings, each, end)
-    return rankings
 
 
 def _gains_of_rows(study: Study, tuned: Gains) -> dict[str, dict[str, float]]:

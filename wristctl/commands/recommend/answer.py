@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, NamedTuple
 from wristctl.commands.answer import Answer
 from wristctl.commands.kept_studies import FOLDER
 from wristctl.commands.printed_table import Table, degrees, joined, two
-from wristctl.commands.ranking_answer import decided
 from wristctl.commands.recommend.expected import ENOUGH, Candidate, share_of, spread
 from wristctl.commands.recommend.study_file import own_rig, takers_of
 from wristctl.commands.results import StudyResult
@@ -250,6 +249,8 @@ def _lost(ranked: WorldRanking, k: int) -> str:
 
 
 def _notes(result: Recommended) -> list[str]:
+    from wristctl.commands.ranking_answer import decided
+
     wanted = result.study.recommend.largest_deg
     short = f" (asked: {wanted:g} deg)" if result.reach_deg < wanted else ""
     sides = "any side" if result.bending else "either side"

@@ -20,10 +20,7 @@ from wristctl.commands.recommend.answer import (
     files_table,
     sine_deg,
 )
-from wristctl.commands.recommend.expected import Candidate, asked_for, expected, spread
-from wristctl.commands.recommend.own_rig import on_the_rig, said_of_facts
-from wristctl.commands.recommend.reach import FAMILY, LEAST_DEG, TOLERATED, asked_of_rigs, family_of_rigs, reach_deg
-from wristctl.commands.recommend.rehearsals import check_homing
+from wristctl.commands.recommend.expected import FAMILY, TOLERATED, Candidate, asked_for, expected, spread
 from wristctl.commands.recommend.study_file import next_command, own_rig, sections_of, takers_of, trial_of
 from wristctl.commands.results import Findings
 from wristctl.commands.session import Session
@@ -57,6 +54,9 @@ _ALIKE = 1e-9
 
 def plan(study: Study, inputs: Inputs) -> str:
     """Check the controllers, and that the tendons reach what is asked for. Raises UserError."""
+    from wristctl.commands.recommend.own_rig import on_the_rig
+    from wristctl.commands.recommend.reach import LEAST_DEG, asked_of_rigs, family_of_rigs, reach_deg
+    from wristctl.commands.recommend.rehearsals import check_homing
     from wristctl.control.table import controller
     from wristctl.simulation.closed_loop import Size, check_size
     from wristctl.simulation.planes import planes_of
@@ -91,6 +91,9 @@ def plan(study: Study, inputs: Inputs) -> str:
 
 def recommend(session: Session) -> Recommended:
     """Scale presets to the wrist, tune each controller shortly, test all on rigs that no search has seen."""
+    from wristctl.commands.recommend.own_rig import on_the_rig, said_of_facts
+    from wristctl.commands.recommend.reach import asked_of_rigs, family_of_rigs, reach_deg
+    from wristctl.commands.recommend.rehearsals import check_homing
     from wristctl.control.table import controller
     from wristctl.simulation.drawn_worlds import streams_of
     from wristctl.tuning.scaled_presets import scaled_to
@@ -133,6 +136,8 @@ def recommend(session: Session) -> Recommended:
 
 def _reach_identified(study: Study, reach: float) -> float | None:
     """Angle [deg] that the tendons would hold, were they and the springs known; None where nobody asks for more."""
+    from wristctl.commands.recommend.reach import reach_deg
+
     settings = study.recommend
     if settings.rig is not None or reach >= math.floor(min(settings.largest_deg, study.wrist.range_deg)):
         return None
@@ -311,10 +316,16 @@ def _write_files(study: Study, findings: Findings, result: Recommended) -> None:
         keep_study(findings, file, found, content)
 
 
+def _in_one_plane(study: Study) -> bool:
+    from wristctl.commands.recommend.reach import asked_of_rigs
+
+    return study.recommend.rig is None and not why_two_planes(study.wrist, asked_of_rigs(study))
+
+
 RECOMMEND = Procedure(
     "recommend",
     plan,
     recommend,
     (EarlierRun("from_identified", kind="identify", optional=True),),
-    in_one_plane=lambda study: study.recommend.rig is None and not why_two_planes(study.wrist, asked_of_rigs(study)),
+    in_one_plane=_in_one_plane,
 )

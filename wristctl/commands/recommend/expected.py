@@ -8,8 +8,6 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from wristctl.commands.kept_studies import file_of
 from wristctl.commands.printed_table import capital, degrees, joined
-from wristctl.commands.recommend.reach import FAMILY
-from wristctl.commands.recommend.rehearsals import motions_of_trial
 from wristctl.config.families import Drawn, Family, Range
 from wristctl.config.recommend import DELAY, MEASURED, known_delay
 
@@ -19,6 +17,11 @@ if TYPE_CHECKING:
     from wristctl.config.study import Study
 
 
+# Name of the family of simulated rigs, of which the draws are named.
+FAMILY = "recommend"
+# Share of rigs that may fall short of an angle, and that a controller must not be shown to lose: those drawn have the
+# worst of friction, delay and load.
+TOLERATED = 0.05
 # Rigs from which 95 % of them are told: of fewer, the ends would be the least and the largest error.
 ENOUGH = 40
 
@@ -152,6 +155,8 @@ class Expected(NamedTuple):
 
 def expected(study: Study, best: Candidate, family: Family, reach_deg: float, planes: int) -> Expected:
     """The error of the recommended gains over the simulated rigs in the trial that `hw-run` makes of them."""
+    from wristctl.commands.recommend.rehearsals import motions_of_trial
+
     motions, horizon = motions_of_trial(study, reach_deg, planes)
     asked = asked_for(family, motions, horizon)
     found = _over_rigs(study, best, asked)

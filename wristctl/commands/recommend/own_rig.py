@@ -8,17 +8,21 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Sequence
 from functools import cache
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
+
+from scipy.stats.qmc import Halton
 
 from wristctl.config.choices import RIGS
+from wristctl.config.families import Drawn, Family
+from wristctl.config.hw_run import HwRunSettings
+from wristctl.config.loop import Loop
 from wristctl.config.recommend import RecommendSettings
 from wristctl.config.study import Study
 from wristctl.rig import Drive, Facts, Quantity, Sensor, Spread, value
-
-if TYPE_CHECKING:
-    from wristctl.config.families import Drawn, Family
-    from wristctl.config.hw_run import HwRunSettings
-    from wristctl.config.loop import Loop
+from wristctl.trial.experiment import spared
+from wristctl.trial.rig_belief import layout_of_rig
+from wristctl.trial.rig_settings import check_facts, settings_of, wrist_of
+from wristctl.trial.trial_results import in_pairs
 
 # Rigs whose facts are drawn; of these each simulated rig has one.
 _ROWS = 32
@@ -68,15 +72,11 @@ def _facts(study: Study) -> tuple[Facts, str]:
 
 def _facts_of(name: str) -> Facts:
     """Facts of the rig of this name. Raises UserError where they cannot be."""
-    from wristctl.trial.rig_settings import check_facts
-
     return check_facts(getattr(RIGS[name], "facts", None), name)
 
 
 def _trials(study: Study) -> HwRunSettings:
     """Settings of `hw-run` on this rig."""
-    from wristctl.trial.rig_settings import settings_of
-
     facts, name = _facts(study)
     return settings_of(facts, study.hw_run.model_copy(update={"rig": name}), name)
 
@@ -86,8 +86,6 @@ def with_facts(study: Study, name: str) -> Study:
 
     Raises UserError where the facts cannot be, or do not fit what was given.
     """
-    from wristctl.trial.rig_settings import wrist_of
-
     facts = _facts_of(name)
     wrist = wrist_of(facts, study.wrist, name)
     settings, known = study.recommend, _trials(study).known_loop
@@ -132,10 +130,6 @@ def on_the_rig(study: Study) -> Study:
     """
     if study.recommend.rig is None:
         return study
-    from wristctl.trial.experiment import spared
-    from wristctl.trial.rig_belief import layout_of_rig
-    from wristctl.trial.trial_results import in_pairs
-
     trials, settings = _trials(study), study.recommend
     wrist, loop = spared(study.wrist, trials), settings.loop
     layout = layout_of_rig(trials, wrist)
@@ -199,8 +193,6 @@ def _row(
 @cache
 def _even(count: int) -> tuple[tuple[float, ...], ...]:
     """Shares in [0, 1) of so many ranges, evenly spread (Halton)."""
-    from scipy.stats.qmc import Halton
-
     return tuple(tuple(row) for row in Halton(count, scramble=False).random(_ROWS + 1)[1:].tolist())
 
 

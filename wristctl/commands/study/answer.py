@@ -4,15 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 from wristctl.commands.answer import Answer
 from wristctl.commands.printed_table import Table
 from wristctl.commands.ranking_answer import advice, certainty, condition, decided, names_of, not_to_use, winner
 from wristctl.commands.ranking_tables import decision_table
-
-if TYPE_CHECKING:
-    from wristctl.comparison.tuned_ranking import OrderShift, TermValue, TunedRanking
+from wristctl.comparison.bootstrap import plain
+from wristctl.comparison.repeated_tunings import FEWEST_TUNINGS, HALVES
+from wristctl.comparison.tuned_ranking import OrderShift, TermValue, TunedRanking
 
 
 def answer_of(
@@ -45,8 +44,6 @@ def answer_of(
 
 def few_tunings(rankings: Sequence[TunedRanking]) -> str:
     """That two tunings tell no interval, where there are no more."""
-    from wristctl.comparison.repeated_tunings import FEWEST_TUNINGS
-
     if not any(1 < len(tunings) < FEWEST_TUNINGS for ranking in rankings for tunings in ranking.tunings):
         return ""
     return f"Two tunings tell no interval of an RMSE, nor of a ratio: {FEWEST_TUNINGS} or more do (`study.budgets`)."
@@ -54,8 +51,6 @@ def few_tunings(rankings: Sequence[TunedRanking]) -> str:
 
 def first_again(rankings: Sequence[TunedRanking]) -> str:
     """How often the best is first again: in halves of the worlds, and in single tunings of all."""
-    from wristctl.comparison.repeated_tunings import HALVES
-
     facts = []
     for ranking in rankings:
         row = winner(ranking, rankings)
@@ -71,8 +66,6 @@ def first_again(rankings: Sequence[TunedRanking]) -> str:
 
 def terms_table(terms: Sequence[TermValue]) -> Table:
     """A term a line: how many times less the RMSE is with it in each family; undecided where the interval holds 1."""
-    from wristctl.comparison.bootstrap import plain
-
     families, names = (list(dict.fromkeys(getattr(one, key) for one in terms)) for key in ("family", "term"))
     values = {(one.term, one.family): one.times for one in terms}
 

@@ -11,7 +11,6 @@ from wristctl.commands.loop_warnings import warn_of_one_plane
 from wristctl.commands.procedure import Procedure
 from wristctl.commands.session import Session
 from wristctl.commands.step_times import after_rollouts
-from wristctl.commands.study.results import written
 from wristctl.commands.study.units import (
     Studied,
     budget_of,
@@ -112,6 +111,7 @@ def _labels(study: Study) -> list[str]:
 
 def fair_study(session: Session) -> Studied:
     """Tune and judge all laws at equal budget on families of worlds: which is for which rig, what each term buys."""
+    from wristctl.commands.study.results import written
     from wristctl.tuning.search import search_of
 
     study = session.study

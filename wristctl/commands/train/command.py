@@ -19,17 +19,6 @@ from wristctl.commands.results import StudyResult
 from wristctl.commands.session import Session
 from wristctl.commands.train.answer import answer_of
 from wristctl.commands.train.learned_dynamics import TrainedDynamics, check_dynamics, keep_dynamics
-from wristctl.commands.train.results import (
-    best_row,
-    error_table,
-    grid_tables,
-    keep_curves,
-    keep_network,
-    ranking_tables,
-    timing_table,
-    trial_table,
-    trials_frame,
-)
 from wristctl.config.learning import NetworkSettings, TrainSettings
 from wristctl.config.study import Study
 from wristctl.errors import Argument, UserError
@@ -243,6 +232,7 @@ def train(session: Session) -> Trained | TrainedDynamics:
     """Train networks from tip position to bend, or one of the dynamics where the samples are transitions."""
     import numpy as np
 
+    from wristctl.commands.train import results
     from wristctl.learning.dataset import split_samples
     from wristctl.learning.evaluation import places
     from wristctl.learning.training_result import best_of
@@ -269,22 +259,22 @@ def train(session: Session) -> Trained | TrainedDynamics:
     if settings.search:
         choice = chosen_by_folds(session, samples, split, checkpoints)
         wanted = {"": choice.chosen.settings}
-        tables += grid_tables(findings, choice)
+        tables += results.grid_tables(findings, choice)
     trials = train_networks(session, samples, split, wanted, checkpoints)
     seconds = time.perf_counter() - began
 
-    name, row_trials = best_row(trials)
+    name, row_trials = results.best_row(trials)
     kept = best_of(row_trials)
-    keep_network(session, kept.network, name, choice.reason if choice else "")
+    results.keep_network(session, kept.network, name, choice.reason if choice else "")
     if any(trial.interrupted for row_results in trials.values() for trial in row_results):
-        keep_curves(findings, row_trials)
+        results.keep_curves(findings, row_trials)
         raise KeyboardInterrupt  # at once: to judge a network on very many samples takes longer than anybody waits
     where = places(samples, split)
-    tables.append(trial_table(findings, row_trials, kept))
-    measures = trials_frame(trials, where)
-    tables += ranking_tables(findings, settings, trials, measures)
-    errors = error_table(findings, kept, samples, split, where)
-    tables.append(timing_table(findings, kept, samples, split, seconds))
+    tables.append(results.trial_table(findings, row_trials, kept))
+    measures = results.trials_frame(trials, where)
+    tables += results.ranking_tables(findings, settings, trials, measures)
+    errors = results.error_table(findings, kept, samples, split, where)
+    tables.append(results.timing_table(findings, kept, samples, split, seconds))
     if checkpoints:
         shutil.rmtree(checkpoints, ignore_errors=True)
     data = session.inputs.runs().get("data")

@@ -5,21 +5,24 @@ from __future__ import annotations
 import math
 import shlex
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
+import numpy as np
+
+from wristctl.arrays import Array
 from wristctl.commands.answer import Answer
 from wristctl.commands.kept_studies import FOLDER, file_of
 from wristctl.commands.printed_table import Table, degrees, joined, two
 from wristctl.commands.quantities import Quantity, table_of
 from wristctl.commands.ranking_answer import gains_words
-
-if TYPE_CHECKING:
-    from wristctl.arrays import Array
-    from wristctl.config.loop import Loop, Reference
-    from wristctl.config.wrist import WristParameters
-    from wristctl.simulation.cases import Case
-    from wristctl.tuning.margin import Stood
-    from wristctl.tuning.search import Search
+from wristctl.comparison.bootstrap import MEASURABLE
+from wristctl.config.loop import Loop, Reference
+from wristctl.config.wrist import WristParameters
+from wristctl.control.table import controller
+from wristctl.simulation.cases import Case, measure
+from wristctl.tuning.margin import Stood
+from wristctl.tuning.objective import YARDSTICK, marks_of
+from wristctl.tuning.search import SEARCHED, Search, first_tried
 
 # Share of a gain's search range, on its logarithmic scale, within which a gain lies at the edge.
 _EDGE = 0.01
@@ -86,12 +89,6 @@ def beside_feedforward(
     gains: Mapping[str, Mapping[str, float]], cases: Sequence[Case], wrist: WristParameters
 ) -> dict[str, Beside]:
     """Error of each controller's gains beside feedforward; errors too small to be measured count alike."""
-    import numpy as np
-
-    from wristctl.comparison.bootstrap import MEASURABLE
-    from wristctl.control.table import controller
-    from wristctl.simulation.cases import measure
-    from wristctl.tuning.objective import YARDSTICK
 
     def errors(name: str, values: Mapping[str, float]) -> Array:
         law = controller(name)
@@ -109,12 +106,6 @@ def beside_feedforward(
 
 def starts_of(searches: Mapping[str, Search], cases: Sequence[Case], wrist: WristParameters) -> dict[str, Start]:
     """The best preset of each controller for which a search found better gains, on the cases these were chosen by."""
-    import numpy as np
-
-    from wristctl.control.table import controller
-    from wristctl.tuning.objective import marks_of
-    from wristctl.tuning.search import first_tried
-
     presets = {name: search.best_preset for name, search in searches.items() if not _preset_of(search)}
     found = {name: preset for name, preset in presets.items() if preset is not None}
     gains = {name: dict(zip(controller(name).gains, preset.gains, strict=True)) for name, preset in found.items()}
@@ -244,9 +235,6 @@ def _passed_over(
 
 def _preset_of(search: Search) -> str:
     """The preset that nothing better was found than, also where the search came upon it; empty where something was."""
-    from wristctl.control.table import controller
-    from wristctl.tuning.search import SEARCHED
-
     if not search.finalists:
         return ""
     if search.finalists[0].origin != SEARCHED:
@@ -332,8 +320,6 @@ def _edges(ordered: Sequence[str], searches: Mapping[str, Search]) -> str:
 
 def at_edge(search: Search) -> list[tuple[str, float, float, float, str]]:
     """Gains within 1 % of an end of their search box, by its logarithmic scale: name, value, ends, unit."""
-    from wristctl.control.table import controller
-
     table = controller(search.controller).gains
     near = []
     for name, value in search.gains.items():

@@ -34,16 +34,6 @@ from wristctl.commands.procedure import Procedure
 from wristctl.commands.results import Findings, StudyResult
 from wristctl.commands.session import Session
 from wristctl.commands.sweep.command import sweepable
-from wristctl.commands.tune.answer import (
-    Beside,
-    Motion,
-    Start,
-    answer_of,
-    beside_feedforward,
-    searches_table,
-    starts_of,
-)
-from wristctl.commands.tune.searches import search_all
 from wristctl.config.loop import Reference
 from wristctl.config.study import Study
 from wristctl.errors import UserError, under
@@ -51,6 +41,7 @@ from wristctl.errors import UserError, under
 if TYPE_CHECKING:
     import pandas as pd
 
+    from wristctl.commands.tune.answer import Beside, Motion, Start
     from wristctl.simulation.closed_loop import Size
     from wristctl.tuning.margin import OwnLoop, Stood
     from wristctl.tuning.search import Search
@@ -92,6 +83,8 @@ class Tuned(StudyResult):
     @property
     def answer(self) -> Answer | None:
         """Best gains, their error beside feedforward, and what they do wrong."""
+        from wristctl.commands.tune.answer import answer_of
+
         motion = motion_of(self.study, self.place)
         found = self.searches, self.errors, self.lost, self.cases, self.place, self.elsewhere
         return answer_of(*found, motion, self.stood, self.bending, self.starts)
@@ -187,6 +180,8 @@ def tune(session: Session) -> Tuned:
     import numpy as np
 
     from wristctl.commands.truth_table import truth_tables
+    from wristctl.commands.tune.answer import beside_feedforward, searches_table, starts_of
+    from wristctl.commands.tune.searches import search_all
     from wristctl.control.table import controller
     from wristctl.tuning.margin import LADDERS
     from wristctl.tuning.objective import marks_of
@@ -224,6 +219,8 @@ def tune(session: Session) -> Tuned:
 
 def motion_of(study: Study, run: str) -> Motion:
     """One motion of those that gains were searched on: of a family its loop, and a motion within what is drawn."""
+    from wristctl.commands.tune.answer import Motion
+
     settings, family = study.tune, study.families.get(study.tune.worlds.family)
     loops, horizon = judged_loops(study, settings), settings.horizon
     if family is not None:

@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 from wristctl.commands.results import Findings
 from wristctl.commands.session import Done, Session
 from wristctl.config.study import Study
-
-if TYPE_CHECKING:
-    from wristctl.tuning.objective import Judge
-    from wristctl.tuning.search import Search, Tried
-    from wristctl.wrist.kinematics import Inverse
+from wristctl.control.table import controller, write_gains
+from wristctl.simulation.closed_loop import scenario_of
+from wristctl.simulation.drawn_worlds import streams_of
+from wristctl.simulation.worlds import Draws
+from wristctl.tuning.margin import CHANGES
+from wristctl.tuning.objective import Judge
+from wristctl.tuning.search import Search, Tried, finalists, history, judges_of, search, tried_of
+from wristctl.wrist.kinematics import Inverse
 
 # Time of a rollout at short steps over that of a search's; rollouts whose time an iteration takes beside those that it
 # runs; candidates of it that are looked at closely.
@@ -25,10 +26,6 @@ def search_all(session: Session, study: Study, network: Inverse | None, then: fl
 
     `then` are the rollouts that the command runs after it, for each controller.
     """
-    from wristctl.control.table import controller
-    from wristctl.tuning.margin import CHANGES
-    from wristctl.tuning.search import judges_of, search
-
     settings = study.tune
     _note_streams(session, study)
     judge, choose = judges_of(study, network)
@@ -59,10 +56,6 @@ def search_all(session: Session, study: Study, network: Inverse | None, then: fl
 
 
 def _note_streams(session: Session, study: Study) -> None:
-    from wristctl.simulation.closed_loop import scenario_of
-    from wristctl.simulation.drawn_worlds import streams_of
-    from wristctl.simulation.worlds import Draws
-
     settings = study.tune
     if settings.worlds.family:
         name = settings.worlds.family
@@ -78,9 +71,6 @@ def _note_streams(session: Session, study: Study) -> None:
 
 def _known(session: Session, name: str) -> Tried | None:
     """Gains of a controller that the run to resume has tried."""
-    from wristctl.control.table import controller
-    from wristctl.tuning.search import tried_of
-
     stopped = session.inputs.runs().get("resume")
     if stopped is None or not stopped.has(f"data/history-{name}.csv"):
         return None
@@ -90,8 +80,6 @@ def _known(session: Session, name: str) -> Tried | None:
 def _keep(findings: Findings, searches: dict[str, Search], judge: Judge) -> None:
     """Keep what was found, also of a search that was cut short."""
     from wristctl.commands.tune.figures import convergence, gain_history, tornado
-    from wristctl.control.table import controller, write_gains
-    from wristctl.tuning.search import finalists, history
 
     if not searches:
         return
