@@ -148,12 +148,9 @@ def escaped(text: str) -> str:
 COLUMNS = 100
 
 
-def in_lines(text: str, columns: int = COLUMNS, most: int | None = None, indent: str = "") -> list[str]:
-    """A text in at most so many lines, broken between words; where some is left out a mark says so."""
-    return textwrap.wrap(
-        text, columns, subsequent_indent=indent, max_lines=most, placeholder=" ...",
-        break_long_words=False, break_on_hyphens=False,
-    )  # fmt: skip
+def in_lines(text: str, columns: int = COLUMNS) -> list[str]:
+    """A text in lines, broken between words."""
+    return textwrap.wrap(text, columns, break_long_words=False, break_on_hyphens=False)
 
 
 def joined(words: Sequence[str], last: str = "and") -> str:
