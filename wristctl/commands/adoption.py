@@ -263,21 +263,17 @@ def _entry(table: Choices[Any], name: str, entry: Any, origin: Foreign, study: S
         if not (isinstance(entry, type) and issubclass(entry, Optimiser)):
             raise UserError(f"{origin.attribute} is no Optimiser", str(origin.file), "derive it from Optimiser")
         entry_name = str(entry.name)
-    elif table.what == RIGS.what:
-        from wristctl.trial.rig_settings import check_facts
-
-        check_facts(getattr(entry, "facts", None), origin.reference)
-        if not is_reference(name):
-            table.lend(name, entry, origin)
-        return name  # as a reference's
     else:
         from wristctl.simulation.reference import ReferenceKind
+        from wristctl.trial.rig_settings import check_facts
 
-        if not isinstance(entry, ReferenceKind):
+        if table.what == RIGS.what:
+            check_facts(getattr(entry, "facts", None), origin.reference)
+        elif not isinstance(entry, ReferenceKind):
             raise UserError(f"{origin.attribute} is no ReferenceKind", str(origin.file), "make it a ReferenceKind")
         if not is_reference(name):
             table.lend(name, entry, origin)
-        return name  # a reference has no name but its place, by which its section is read
+        return name  # rigs and references have no name but their place, by which their sections are read
     if table.belongs(entry_name) or (entry_name in entry_point_names(table.group) and is_reference(name)):
         reason = f"there is a {table.what} '{entry_name}' already"
         raise UserError(reason, origin.reference, f'rename this one: name="my-{entry_name}"')
