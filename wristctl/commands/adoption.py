@@ -73,7 +73,7 @@ def adopted(study: Study, command: str) -> Adopted:
     if "recommend" in read and study.recommend.rig is not None:
         from wristctl.commands.recommend.own_rig import with_facts
 
-        study = with_facts(study, study.recommend.rig)
+        study = with_facts(study)
     if not origins:
         return Adopted(study, ())
     called = renamed_fields(study, own_name, read)

@@ -165,11 +165,6 @@ def for_a_page(answer: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
     return shown
 
 
-def without_options(table: dict[str, Any]) -> dict[str, Any]:
-    """The table with a title that names no option."""
-    return table | {"title": _IN_A_TITLE.sub("", table["title"])}
-
-
 def _stands_in(answer: Sequence[dict[str, Any]], table: dict[str, Any]) -> bool:
     """Whether the answer holds the table: the same heads, and in each row the same first cell."""
     firsts = [str(row[0]) for row in table["rows"] if row]
@@ -183,8 +178,8 @@ def _stands_in(answer: Sequence[dict[str, Any]], table: dict[str, Any]) -> bool:
 
 _LEAST_DEG = 1e-3
 
-# Headline numbers shown where the command names none.
-_CARDS = 6
+# Headline numbers shown where the command names none, and what a page shows of every metric.
+_CARDS, _KEPT = 6, ("value", "unit", "better", "n", "meaning")
 
 # Figures of a page: name, caption and data URL.
 Figures = list[tuple[str, str, str]]
@@ -224,8 +219,10 @@ def page(run: Run, manifest: Manifest, beside: Path | None = None, undrawn: Undr
         verdict=", ".join(overview.marks) if manifest.state == "ok" else "",
         answer=answer,
         headline=headline(run.metrics, overview.cards, manifest.state == "ok"),
-        metrics=_metrics(run),
-        tables=[without_options(table) for table in results if not _stands_in(answer, table)],
+        metrics=[(name, *map(_for_people(metric).get, _KEPT)) for name, metric in run.metrics.items()],
+        tables=[
+            table | {"title": _IN_A_TITLE.sub("", table["title"])} for table in results if not _stands_in(answer, table)
+        ],
         figures=[picture for picture in drawn if picture not in first],
         first=first,
         later=[caption or name for name, caption in overview.captions.items() if name not in known],
@@ -263,9 +260,8 @@ def _templates() -> Environment:
     environment.filters["cell"], environment.filters["words"] = _cell, metric_in_words
     scripts = [environment.get_template(script.name).render().encode() for script in sorted(folder.glob("*.js"))]
     hashes = [base64.b64encode(hashlib.sha256(script).digest()).decode() for script in scripts]
-    environment.globals["allowed"] = " ".join(
-        f"'sha256-{digest}'" for digest in hashes
-    )  # no other script runs in a page
+    allowed = " ".join(f"'sha256-{digest}'" for digest in hashes)  # no other script runs in a page
+    environment.globals["allowed"] = allowed
     return environment
 
 
@@ -315,12 +311,6 @@ def headline(metrics: dict[str, dict[str, Any]], cards: Sequence[str], ended: bo
 def _for_people(metric: dict[str, Any]) -> dict[str, Any]:
     value, unit = in_degrees(metric["value"], metric.get("unit") or "")
     return metric | {"value": value, "unit": unit}
-
-
-def _metrics(run: Run) -> list[tuple[Any, ...]]:
-    kept = ("value", "unit", "better", "n", "meaning")
-    shown = {name: _for_people(metric) for name, metric in run.metrics.items()}
-    return [(name, *(metric.get(key) for key in kept)) for name, metric in shown.items()]
 
 
 def _provenance(manifest: Manifest) -> list[tuple[str, str]]:

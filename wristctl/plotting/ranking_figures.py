@@ -72,11 +72,9 @@ def answer_figure(rankings: Sequence[Ranking], places: Mapping[str, str]) -> Fig
     names = dict.fromkeys(label.split("/")[0] for label in labels)
     alone = "o" if len(marks) > 1 else next(iter(marks.values()))
     handles = [Line2D([], [], marker=alone, color=colour(name), label=called(name), **every) for name in names]
-    handles += [
-        Line2D([], [], marker=mark, color=GREY, markerfacecolor="none", label=_gains_words(gains), **every)
-        for gains, mark in marks.items()
-        if len(marks) > 1
-    ]
+    for gains, mark in marks.items() if len(marks) > 1 else ():  # hollow: a full grey mark is a controller
+        words = f"{gains} gains" if gains else "preset by loop"
+        handles.append(Line2D([], [], marker=mark, color=GREY, markerfacecolor="none", label=words, **every))
     if any(ranking.standing.unusable for ranking in rankings):
         handles.append(Line2D([], [], linestyle="none", label="must not be used", **UNUSABLE))
     legend_under(picture, handles, 3)
@@ -90,11 +88,6 @@ def _dot(ranking: Ranking, row: int, place: float, mark: Mapping[str, Any], case
     value, low, high = np.degrees([mean.value, mean.low, mean.high]).tolist()
     mark = UNUSABLE if row in ranking.standing.unusable else mark
     return Dot(place, value, colour(ranking.labels[row].split("/")[0]), (low, high), points, mark)
-
-
-def _gains_words(gains: str) -> str:
-    """Gains in a legend, whose mark is hollow: a full grey one is a controller."""
-    return f"{gains} gains" if gains else "preset by loop"
 
 
 def _marks(labels: Sequence[str]) -> dict[str, str]:
@@ -127,9 +120,8 @@ def performance_profile(rankings: Sequence[Ranking], places: Mapping[str, str]) 
     Drawn are the best two of each ranking and feedforward. What fails in a case is within no factor.
     """
     picture, panels = _panels(rankings, 1.9, 0.95, sharex=True, sharey=True)
-    shown = _often_first(rankings)[: _SHOWN - 1]
-    shown += [one.labels[one.yardstick] for one in rankings if one.yardstick is not None]
-    shown = list(dict.fromkeys(shown))
+    yardsticks = [one.labels[one.yardstick] for one in rankings if one.yardstick is not None]
+    shown = list(dict.fromkeys([*_often_first(rankings)[: _SHOWN - 1], *yardsticks]))
     for panel, ranking in zip(panels, rankings, strict=True):
         scores = np.where(np.isfinite(ranking.scores), penalised(ranking.scores), np.inf)
         shares = performance_profiles(scores, _FACTORS)

@@ -107,9 +107,9 @@ class Recommended(StudyResult):
     @property
     def excess(self) -> dict[int, float]:
         """Of those of `near` that are sound in their rehearsal, in order, by how much they err more than the least."""
-        sound = [row for row in self.near if row in self.rehearsals and not self.rehearsals[row].fault]
-        others = [self.rehearsals[row] for row in sound]
-        return {row: self.rehearsals[row].excess(others) for row in sound}
+        sound = {row: self.rehearsals[row] for row in self.near if row not in self.untried}
+        sound = {row: rehearsal for row, rehearsal in sound.items() if not rehearsal.fault}
+        return {row: rehearsal.excess([*sound.values()]) for row, rehearsal in sound.items()}
 
     @property
     def untried(self) -> list[int]:
@@ -168,7 +168,7 @@ class Recommended(StudyResult):
     @property
     def marks(self) -> list[str]:
         """`nothing to recommend` where that is so."""
-        return [] if self.best is not None else ["nothing to recommend"]
+        return ["nothing to recommend"] * (self.best is None)
 
     def frame(self) -> pd.DataFrame:
         """A row for each candidate, best first; angles in rad."""

@@ -228,9 +228,7 @@ def _rehearsed(session: Session, study: Study, result: Recommended, planes: int)
         return result
     while result.untried:
         rows = result.untried[:at_once]
-        finalists = [
-            {"controller": one.controller, "gains": dict(one.gains)} for one in map(result.candidates.__getitem__, rows)
-        ]
+        finalists = [row_of(one.controller, one.gains) for one in map(result.candidates.__getitem__, rows)]
         runs = rehearsed(session, study, finalists, result.reach_deg, planes)
         result = replace(result, rehearsals={**result.rehearsals, **dict(zip(rows, runs, strict=True))})
         if result.best_row is not None:

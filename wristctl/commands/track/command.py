@@ -249,15 +249,13 @@ def _frame(sightings: Sequence[Sighting], bends: Array | None = None) -> pd.Data
     import numpy as np
     import pandas as pd
 
-    fields = {
-        name: [getattr(sighting, name) for sighting in sightings]
-        for name in ("time", "number", "theta", "tip_x", "tip_y")
-    }
-    verdicts: dict[str, Any] = {"verdict": [str(sighting.verdict) for sighting in sightings]}
+    names = ("time", "number", "theta", "tip_x", "tip_y")
+    fields: dict[str, Any] = {name: [getattr(sighting, name) for sighting in sightings] for name in names}
+    fields["verdict"] = [str(sighting.verdict) for sighting in sightings]
     if bends is not None:
-        verdicts |= {"plane": [_PLANES[sighting.plane] for sighting in sightings], "bend": bends}
+        fields |= {"plane": [_PLANES[sighting.plane] for sighting in sightings], "bend": bends}
     corners = np.array([sighting.corners.ravel() for sighting in sightings]).T
-    return pd.DataFrame(fields | verdicts | dict(zip(_CORNERS, corners, strict=True)))
+    return pd.DataFrame(fields | dict(zip(_CORNERS, corners, strict=True)))
 
 
 def _digest(source: Path) -> str:

@@ -239,12 +239,11 @@ def _preset_of(search: Search) -> str:
         return ""
     if search.finalists[0].origin != SEARCHED:
         return search.finalists[0].origin
-    return next((name for name, gains in controller(search.controller).presets.items() if _same(search, gains)), "")
 
+    def same(gains: Mapping[str, float]) -> bool:
+        return all(math.isclose(value, gains[name], rel_tol=_DIGITS) for name, value in search.gains.items())
 
-def _same(search: Search, gains: Mapping[str, float]) -> bool:
-    """Whether gains are what a search found, to the four digits that are printed."""
-    return all(math.isclose(value, gains[name], rel_tol=_DIGITS) for name, value in search.gains.items())
+    return next((name for name, gains in controller(search.controller).presets.items() if same(gains)), "")
 
 
 def _next(file: str, motion: Motion) -> list[str]:
@@ -309,12 +308,11 @@ def searches_table(
 
 def _edges(ordered: Sequence[str], searches: Mapping[str, Search]) -> str:
     """Gains that lie at an end of the range in which they were searched: beyond it may be better ones."""
-    lines = []
-    for name in ordered:
-        lines += [
-            f"{gain} = {value:.4g} of {name} is at the edge of its box ({low:g} to {high:g} {unit}".rstrip() + ")."
-            for gain, value, low, high, unit in at_edge(searches[name])
-        ]
+    lines = [
+        f"{gain} = {value:.4g} of {name} is at the edge of its box ({low:g} to {high:g} {unit}".rstrip() + ")."
+        for name in ordered
+        for gain, value, low, high, unit in at_edge(searches[name])
+    ]
     return " ".join(lines) or "No gain lies at the edge of the box that was searched."
 
 
@@ -332,11 +330,8 @@ def at_edge(search: Search) -> list[tuple[str, float, float, float, str]]:
 
 def _presets(ordered: Sequence[str], searches: Mapping[str, Search]) -> list[str]:
     """Controllers for which the search found nothing better than a preset."""
-    lines = []
-    for name in ordered:
-        if preset := _preset_of(searches[name]):
-            lines.append(f"For {name} nothing better than the preset {preset} was found.")
-    return [" ".join(lines)] * bool(lines)
+    presets = {name: preset for name in ordered if (preset := _preset_of(searches[name]))}
+    return [f"For {name} nothing better than the preset {preset} was found." for name, preset in presets.items()]
 
 
 def _lost(ordered: Sequence[str], lost: Mapping[str, Mapping[str, int]], cases: int) -> str:
