@@ -10,8 +10,6 @@ from collections.abc import Collection, Mapping
 from functools import cache
 from typing import Any, NamedTuple
 
-from scipy.stats.qmc import Halton
-
 from wristctl.config.choices import RIGS
 from wristctl.config.families import Drawn, Family
 from wristctl.config.hw_run import HwRunSettings
@@ -183,6 +181,8 @@ def _row(drawn: Mapping[str, float], known: Mapping[str, float], facts: Facts, l
 @cache
 def _even(count: int) -> tuple[tuple[float, ...], ...]:
     """Shares in [0, 1) of so many ranges, evenly spread (Halton)."""
+    from scipy.stats.qmc import Halton
+
     return tuple(tuple(row) for row in Halton(count, scramble=False).random(_ROWS + 1)[1:].tolist())
 
 
