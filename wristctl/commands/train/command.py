@@ -17,7 +17,6 @@ from wristctl.commands.printed_table import Table
 from wristctl.commands.procedure import Procedure
 from wristctl.commands.results import StudyResult
 from wristctl.commands.session import Session
-from wristctl.commands.train.answer import answer_of
 from wristctl.commands.train.learned_dynamics import TrainedDynamics, check_dynamics, keep_dynamics
 from wristctl.config.learning import NetworkSettings, TrainSettings
 from wristctl.config.study import Study
@@ -155,6 +154,8 @@ class Trained(StudyResult):
     @property
     def answer(self) -> Answer:
         """Error on samples that no training has seen, beside the closed form's."""
+        from wristctl.commands.train.results import answer_of
+
         kept, segments = (self.kept, len(self.trials)), self.network.segments
         return answer_of(self.errors, len(self.split.test), kept, self.place, self.data, segments)
 
