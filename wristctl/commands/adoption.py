@@ -7,6 +7,7 @@ from typing import Any, NamedTuple, TypeVar
 
 from pydantic import ValidationError
 
+from wristctl.board.messages import AXES
 from wristctl.commands.inputs_of_loops import judged_loops
 from wristctl.config.choices import CONTROLLERS, OPTIMISERS, REFERENCES, RIGS, Choices
 from wristctl.config.controller_row import BY_LOOP, Row
@@ -121,7 +122,6 @@ def wound_in_both_planes(wrist: WristParameters) -> bool:
     """Whether a board winds the wrist's tendons, and they are not those of two sides: it bends in both planes then."""
     if wrist.tendons == "four":
         return False
-    from wristctl.board.messages import AXES
     from wristctl.wrist.tendon_layout import off_both_sides, wound_by
 
     try:

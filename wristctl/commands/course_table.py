@@ -5,11 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
+from wristctl.config.wrist import WristParameters
+
 if TYPE_CHECKING:
     import pandas as pd
 
     from wristctl.arrays import Array
-    from wristctl.config.wrist import WristParameters
     from wristctl.simulation.trajectory import Trajectory
 
 _PLANES = ("ulnar", "flexion")

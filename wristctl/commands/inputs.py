@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeVar
 
+from wristctl.board.messages import AXES
 from wristctl.commands.results import StudyResult
 from wristctl.config.loop import LIVE, Reference
 from wristctl.config.section import Section
@@ -158,7 +159,6 @@ def _stopped(ref: str | Path, wanted: EarlierRun, out: Path) -> Run:
 
 def check_wound(wrist: WristParameters, planes: int, command: str) -> None:
     """UserError unless a board's four axes wind this wrist's tendons in so many planes."""
-    from wristctl.board.messages import AXES
     from wristctl.wrist.tendon_layout import wound_by
 
     if planes == 1:
@@ -169,7 +169,6 @@ def check_wound(wrist: WristParameters, planes: int, command: str) -> None:
 
 def check_sides(wrist: WristParameters, command: str) -> None:
     """UserError, naming what takes this wrist, unless its tendons are the four at 45 deg from both planes."""
-    from wristctl.board.messages import AXES
     from wristctl.wrist.tendon_layout import TendonLayout, key_of_tendon, off_both_sides, wound_by
 
     odd = off_both_sides(wrist)

@@ -11,6 +11,7 @@ from wristctl.commands.inputs import Inputs
 from wristctl.commands.inputs_of_loops import ends_of_family, identified
 from wristctl.commands.printed_table import joined
 from wristctl.commands.results import Findings
+from wristctl.commands.study.published import what_changed
 from wristctl.config.choices import CONTROLLERS
 from wristctl.config.compare import CompareSettings
 from wristctl.config.controller_row import BY_LOOP, Row
@@ -119,7 +120,6 @@ def warn_outside_conditions(rows: Iterable[Row | SimulateSettings], loops: Itera
 
 def warn_of_earlier_families(rows: Iterable[Row | SimulateSettings]) -> None:
     """Warn of shipped gains whose family or simulated drive has changed since they were found, once of each family."""
-    from wristctl.commands.study.published import what_changed
     from wristctl.control.shipped_gains import PREFIX, is_shipped, shipped_gains
     from wristctl.control.table import controller
 

@@ -31,6 +31,7 @@ from wristctl.records.run_writer import Undrawn
 from wristctl.study_files.error_messages import located
 from wristctl.study_files.load import read_study
 from wristctl.study_files.strict_yaml import KeyPath
+from wristctl.work.executors import Workers
 
 # Laws that a listing names.
 _NAMED = 2
@@ -189,8 +190,6 @@ def in_python() -> Iterator[None]:
 
 def check_executor(named: str) -> None:
     """UserError for what names no executor."""
-    from wristctl.work.executors import Workers
-
     Workers.of(named)
 
 

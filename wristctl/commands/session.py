@@ -7,14 +7,14 @@ from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Protocol
 
+from wristctl.commands.answer import Answer
 from wristctl.commands.inputs import Inputs
+from wristctl.commands.printed_table import Table
 from wristctl.commands.results import Findings
 from wristctl.config.study import Study
 from wristctl.errors import UserError
 
 if TYPE_CHECKING:
-    from wristctl.commands.answer import Answer
-    from wristctl.commands.printed_table import Table
     from wristctl.trial.control_loop import Shown
     from wristctl.trial.supervised_wait import Meanwhile
     from wristctl.trial.trials import Trial

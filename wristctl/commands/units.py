@@ -5,14 +5,12 @@ from __future__ import annotations
 import logging
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
+from wristctl.commands.adoption import adoption, sources_in
 from wristctl.commands.session import Session
-
-if TYPE_CHECKING:
-    from wristctl.work.fan_out import UnitsDone
-    from wristctl.work.worker import Golden, Unit
-
+from wristctl.work.executors import Workers
+from wristctl.work.fan_out import UnitsDone, perform_units
+from wristctl.work.worker import UNITS, Computed, Furnish, Golden, Unit, code_digest
 
 log = logging.getLogger(__name__)
 
@@ -32,11 +30,6 @@ def performed(
     All workers must reproduce the `golden` numbers. The hashes of laws from elsewhere are part of the units'
     specifications. What the units' sizes are of is `counted`; `then` and `after` are those of `Session.progress`.
     """
-    from wristctl.commands.adoption import adoption, sources_in
-    from wristctl.work.executors import Workers
-    from wristctl.work.fan_out import perform_units
-    from wristctl.work.worker import UNITS, Computed, Furnish, code_digest
-
     run, stopped = session.findings.run, session.inputs.runs().get("resume")
     folder, earlier = (source.path / UNITS if source else None for source in (run, stopped))
     first = folder is None or not folder.exists()

@@ -21,12 +21,10 @@ from wristctl.comparison.controller_ranking import STREAM
 from wristctl.comparison.repeated_tunings import HALVES, Firsts, RepeatedTunings, firsts, median_tuning
 from wristctl.comparison.tie_groups import share
 from wristctl.comparison.world_ranking import RankedRow, WorldRanking, ranking
-from wristctl.config.families import TOLERATED
+from wristctl.config.families import TOLERATED, Family
 
 if TYPE_CHECKING:
     import pandas as pd
-
-    from wristctl.config.families import Family
 
 
 @dataclass(frozen=True, kw_only=True)

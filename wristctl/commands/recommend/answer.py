@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, NamedTuple
 from wristctl.commands.answer import Answer
 from wristctl.commands.kept_studies import FOLDER
 from wristctl.commands.printed_table import Table, degrees, joined, two
-from wristctl.commands.recommend.expected import ENOUGH, Candidate, share_of, spread
+from wristctl.commands.recommend.expected import ENOUGH, Candidate, Expected, share_of, spread
 from wristctl.commands.recommend.study_file import own_rig, takers_of
 from wristctl.commands.results import StudyResult
 from wristctl.errors import UserError
@@ -19,7 +19,6 @@ from wristctl.errors import UserError
 if TYPE_CHECKING:
     import pandas as pd
 
-    from wristctl.commands.recommend.expected import Expected
     from wristctl.commands.recommend.rehearsals import Rehearsal
     from wristctl.comparison.world_ranking import WorldRanking
     from wristctl.trial.rehearsed import Rehearsed

@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING, NamedTuple
 from wristctl.commands.kept_studies import file_of
 from wristctl.commands.printed_table import capital, degrees, joined
 from wristctl.config.families import Drawn, Family, Range
+from wristctl.config.loop import Reference
 from wristctl.config.recommend import DELAY, MEASURED, known_delay
+from wristctl.config.study import Study
 
 if TYPE_CHECKING:
     from wristctl.arrays import Array
-    from wristctl.config.loop import Reference
-    from wristctl.config.study import Study
 
 
 # Name of the family of simulated rigs, of which the draws are named.

@@ -42,6 +42,7 @@ from wristctl.config.choices import REFERENCES
 from wristctl.config.loop import sample_period
 from wristctl.config.study import Study
 from wristctl.errors import under
+from wristctl.wrist.directions import DIRECTIONS
 
 if TYPE_CHECKING:
     from wristctl.simulation.closed_loop import Size
@@ -218,7 +219,6 @@ def _search(session: Session, study: Study) -> str:
     Empty without a run, and in the other plane than `tune` has.
     """
     from wristctl.simulation.reference import toward
-    from wristctl.wrist.directions import DIRECTIONS
 
     chosen, findings, name = study.simulate, session.findings, "here"
     own_plane = REFERENCES[chosen.reference.kind].planes == 2 or DIRECTIONS[chosen.direction].plane == "ulnar"

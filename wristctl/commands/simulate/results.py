@@ -12,6 +12,9 @@ from wristctl.commands.course_table import course_of_trajectory
 from wristctl.commands.inputs_of_loops import asked_of_simulation
 from wristctl.commands.printed_table import Table, degrees, joined, two
 from wristctl.commands.results import Findings, StudyResult
+from wristctl.config.choices import REFERENCES
+from wristctl.config.loop import DirectionName, Loop, Reference
+from wristctl.config.study import Study
 from wristctl.config.wrist import WristParameters
 from wristctl.errors import UserError
 from wristctl.wrist.directions import toward_words
@@ -20,8 +23,6 @@ if TYPE_CHECKING:
     import pandas as pd
 
     from wristctl.comparison.repetition_spread import Spread
-    from wristctl.config.loop import DirectionName, Loop, Reference
-    from wristctl.config.study import Study
     from wristctl.simulation.repetitions import Repeated
     from wristctl.simulation.trajectory import Trajectory
 
@@ -255,7 +256,6 @@ def controller_words(name: str, gains: str | Mapping[str, float]) -> str:
 
 def motion_words(reference: Reference, direction: DirectionName = "ulnar") -> str:
     """A wanted motion: 30 deg ulnar in 1 s (minimum jerk)."""
-    from wristctl.config.choices import REFERENCES
     from wristctl.simulation.reference import reference_name
 
     if REFERENCES[reference.kind].plane or REFERENCES[reference.kind].planes == 2:

@@ -6,13 +6,21 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from wristctl.commands.inputs import EarlierRun, Inputs
-from wristctl.commands.inputs_of_loops import asked_of_family
+from wristctl.commands.inputs_of_loops import (
+    asked_of_family,
+    check_family_reach,
+    check_inverses,
+    check_row,
+    family_of,
+    inverses_of,
+)
 from wristctl.commands.loop_warnings import warn_of_one_plane
 from wristctl.commands.procedure import Procedure
 from wristctl.commands.session import Session
 from wristctl.commands.step_times import after_rollouts
 from wristctl.commands.study.units import (
     Studied,
+    StudyPlace,
     budget_of,
     families_of,
     golden_of,
@@ -24,17 +32,14 @@ from wristctl.commands.study.units import (
 from wristctl.commands.units import performed
 from wristctl.config.study import Study
 from wristctl.errors import UserError, meant, under
+from wristctl.work.worker import Unit
 
 if TYPE_CHECKING:
     import numpy as np
 
-    from wristctl.commands.study.units import StudyPlace
-    from wristctl.work.worker import Unit
-
 
 def plan(study: Study, inputs: Inputs) -> str:
     """Check all names, and state the number of rollouts."""
-    from wristctl.commands.inputs_of_loops import check_family_reach, check_inverses, check_row, family_of, inverses_of
     from wristctl.control.table import controller
     from wristctl.simulation.closed_loop import Size, check_size, check_steps
     from wristctl.tuning.search import check_optimiser, check_tunable

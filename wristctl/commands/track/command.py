@@ -18,6 +18,7 @@ from wristctl.commands.results import StudyResult
 from wristctl.commands.session import Session
 from wristctl.config.study import Study
 from wristctl.errors import UserError
+from wristctl.records.files import files_below, sha256_of, sha256_of_list
 
 if TYPE_CHECKING:
     import numpy as np
@@ -260,8 +261,6 @@ def _frame(sightings: Sequence[Sighting], bends: Array | None = None) -> pd.Data
 
 def _digest(source: Path) -> str:
     """SHA-256 of a file, or of the list of a folder's files."""
-    from wristctl.records.files import files_below, sha256_of, sha256_of_list
-
     if source.is_file():
         return sha256_of(source)
     return sha256_of_list([(name, sha256_of(source / name)) for name in files_below(source)])
