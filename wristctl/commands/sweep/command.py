@@ -22,7 +22,7 @@ from wristctl.commands.inputs_of_loops import (
     identified,
     tuned_gains,
 )
-from wristctl.commands.procedure import Procedure, check_tendons
+from wristctl.commands.procedure import Procedure, check_tendons, procedure_named
 from wristctl.commands.progress import watched
 from wristctl.commands.quantities import Quantity, documented
 from wristctl.commands.results import Findings, StudyResult
@@ -34,7 +34,7 @@ from wristctl.config.study import Study
 from wristctl.errors import Argument, UserError
 from wristctl.study_files.sweeps import SweepAxis, axes_of, points_of, study_at, unit_at
 from wristctl.work.fan_out import Poisoned
-from wristctl.work.worker import Golden, Unit, function_at
+from wristctl.work.worker import Golden, Unit
 
 if TYPE_CHECKING:
     import numpy as np
@@ -138,18 +138,12 @@ def performed_at(spec: Mapping[str, Any]) -> dict[str, np.ndarray]:
     from wristctl.commands.perform import Prepared, perform
 
     (study,) = _studies(spec)
-    procedure: Any = function_at(_PROCEDURES[spec["command"]])
-    result: Any = perform(Prepared(procedure, study, Inputs()), None, watched(None), Unattended())
+    procedure = procedure_named(spec["command"])
+    result = perform(Prepared(procedure, study, Inputs()), None, watched(None), Unattended())
     metrics = result.findings.metrics
     values = {f"metric {name}": np.array([value]) for name, value in result.metrics.items()}
     units = {f"unit {name}": np.array([metric["unit"]]) for name, metric in metrics.items()}
     return {"point": np.zeros(1, np.int64), "repetition": np.zeros(1, np.int64), **values, **units}
-
-
-_PROCEDURES: Mapping[str, str] = {
-    "tune": "wristctl.commands.tune.command:TUNE",
-    "compare": "wristctl.commands.compare.command:COMPARE",
-}
 
 
 Found = TypeVar("Found", bound=StudyResult)

@@ -241,19 +241,21 @@ def train(session: Session) -> Trained | TrainedDynamics:
 
     settings, findings = session.study.train, session.findings
     samples = session.inputs.read("data", samples_of)
-    if samples is None and session.study.gen_data.source == "transitions":
-        entropy = findings.stream("samples")
-        samples = draw_transitions(session.study.gen_data, session.study.wrist, np.random.default_rng(entropy))
+    if samples is None:
+        study, entropy = session.study, findings.stream("samples")
+        if study.gen_data.source == "transitions":
+            samples = draw_transitions(study.gen_data, study.wrist, np.random.default_rng(entropy))
+        else:
+            samples = drawn(study, entropy, recorded(study, Inputs()))
         findings.arrays("data/samples.npz", samples.arrays())
     if isinstance(samples, Transitions):
-        return _of_dynamics(session, samples)
-    if samples is None:
-        samples = drawn(session.study, findings.stream("samples"), recorded(session.study, Inputs()))
-        findings.arrays("data/samples.npz", samples.arrays())
+        check_dynamics(settings)
     rng = np.random.default_rng(findings.stream("split"))
     whose = recordings(samples, settings)
-    split = split_samples(len(samples.theta), settings.train_share, rng, samples.held_out, whose)
+    split = split_samples(len(samples.targets), settings.train_share, rng, samples.held_out, whose)
     checkpoints = checkpoints_of(session)
+    if isinstance(samples, Transitions):
+        return _of_dynamics(session, samples, split, checkpoints)
 
     began, choice, tables = time.perf_counter(), None, []
     wanted = networks(settings)
@@ -285,18 +287,10 @@ def train(session: Session) -> Trained | TrainedDynamics:
     )  # fmt: skip
 
 
-def _of_dynamics(session: Session, samples: Transitions) -> TrainedDynamics:
+def _of_dynamics(session: Session, samples: Transitions, split: Split, checkpoints: Path | None) -> TrainedDynamics:
     """Train a network on transitions, and leave the controller over it."""
-    import numpy as np
-
-    from wristctl.learning.dataset import split_samples
-
-    settings, source = session.study.train, session.inputs.get("data")
-    check_dynamics(settings)
-    rng = np.random.default_rng(session.findings.stream("split"))
-    split = split_samples(len(samples.tick), settings.train_share, rng, None, recordings(samples, settings))
-    checkpoints = checkpoints_of(session)
-    (trials,) = train_networks(session, samples, split, networks(settings), checkpoints).values()
+    source, wanted = session.inputs.get("data"), networks(session.study.train)
+    (trials,) = train_networks(session, samples, split, wanted, checkpoints).values()
     known = source.config if isinstance(source, Run) else source.study if source else session.study
     result = keep_dynamics(session, samples, split, trials, known.wrist)
     if checkpoints:
