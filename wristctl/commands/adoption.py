@@ -152,16 +152,12 @@ def with_presets(study: Study, command: str, tell: bool = True, for_several: boo
         return study
     name = command.replace("-", "_")
     section = getattr(study, name)
-    rows = tuple(_with_preset(_by_loop(row, _loops(study, command), tell), tell) for row in section.rows)
+    loops: Collection[Loop] = ()  # none for the trials of a rig
+    if command == "compare":
+        with under(command):
+            loops = judged_loops(study, study.compare).values()
+    rows = tuple(_with_preset(_by_loop(row, loops, tell), tell) for row in section.rows)
     return study.model_copy(update={name: section.model_copy(update={"rows": rows})})
-
-
-def _loops(study: Study, command: str) -> Collection[Loop]:
-    """Loops that the rows of `compare` are judged on; none for the trials of a rig."""
-    if command == "hw-run":
-        return ()
-    with under(command):
-        return judged_loops(study, study.compare).values()
 
 
 def _by_loop(row: _Row, loops: Collection[Loop], tell: bool) -> _Row:

@@ -148,16 +148,15 @@ def advice(rankings: Sequence[Ranking]) -> str:
     """Which controller to use: of conditions with motors or a camera, and of ideal ones; of smooth motions, if any."""
     told = []
     for alike in _sides(rankings):
-        where = f"With {_simulated(alike)}" if alike[0].traits.rig else "With exact angles and torques"
+        where = "With exact angles and torques"
+        if alike[0].traits.rig:
+            camera, tendons = (all(getattr(one.traits, part) for one in alike) for part in ("camera", "tendons"))
+            parts = {(True, False): "a simulated camera", (False, True): "simulated motors and tendons"}
+            both = f"simulated motors, tendons {'and' if camera else 'or'} a camera"
+            where = f"With {parts.get((camera, tendons), both)}"
         where = f"For steps {where[0].lower()}{where[1:]}" if alike[0].jumps else where
         told.append(_use(where, alike, [ranking for ranking in rankings if ranking not in alike]))
     return " ".join(told)
-
-
-def _simulated(alike: Sequence[Ranking]) -> str:
-    every = [all(getattr(one.traits, part) for one in alike) for part in ("camera", "tendons")]
-    words = {(True, False): "a simulated camera", (False, True): "simulated motors and tendons"}
-    return words.get((every[0], every[1]), f"simulated motors, tendons {'and' if every[0] else 'or'} a camera")
 
 
 def recommended(rankings: Sequence[Ranking]) -> list[str]:

@@ -38,11 +38,6 @@ _log = logging.getLogger(__name__)
 _FURTHER = "further figures"
 
 
-def _subject(draw: Callable[..., Figure]) -> str:
-    """First line of a function's docstring, without its full stop; empty where there is none."""
-    return (draw.__doc__ or "").partition("\n")[0].removesuffix(".")
-
-
 class Metrics(dict[str, float]):
     """Numbers by name. An unknown name is a KeyError that says which is meant."""
 
@@ -133,7 +128,7 @@ class Findings:
         """
         drawer = partial(draw, *of, **options)
         self.figures.add(name, drawer)
-        self.overview.captions[name] = caption or _subject(draw)
+        self.overview.captions[name] = caption or (draw.__doc__ or "").partition("\n")[0].removesuffix(".")
         if self.run and self._draws and not later:
             self.run.figure(name, drawer)
 

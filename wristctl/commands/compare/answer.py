@@ -27,7 +27,7 @@ from wristctl.commands.ranking_answer import (
 from wristctl.commands.ranking_tables import controllers_table, keep_error
 from wristctl.commands.results import Findings
 from wristctl.comparison.combinations import CLASS_MEANINGS, ComparedRow
-from wristctl.comparison.controller_ranking import Ranking, Traits
+from wristctl.comparison.controller_ranking import Ranking
 from wristctl.comparison.paper import T2, verdict
 from wristctl.comparison.repetition_spread import spread
 from wristctl.comparison.step_cost import StepTime
@@ -125,14 +125,11 @@ def conditions(rankings: Sequence[Ranking]) -> str:
     for one in rankings:
         if one.unit != "world":
             name, words = one.name.removesuffix(", steps"), condition(one).removesuffix(" (steps)")
-            meanings[words] = _rig(one.traits) if name == "camera and tendons" else CLASS_MEANINGS[name]
+            rig = "angles come from pictures" if one.traits.camera else "of some loops"
+            if one.traits.tendons:
+                rig = "spools follow the reference, so even low gains track it"
+            meanings[words] = rig if name == "camera and tendons" else CLASS_MEANINGS[name]
     return f"{capital('; '.join(f'{name}: {meaning}' for name, meaning in meanings.items()))}." if meanings else ""
-
-
-def _rig(traits: Traits) -> str:
-    if traits.tendons:
-        return "spools follow the reference, so even low gains track it"
-    return "angles come from pictures" if traits.camera else "of some loops"
 
 
 # For what presets were made; those of the paper are told apart.

@@ -211,15 +211,12 @@ def error_over_disturbance(results: Sequence[ComparedRow], leaf: str, sizes: Map
             errors.append(np.nan if failed else np.median([metrics_of(result)["rmse"] for result in of_loop]))
         axes.plot(list(sizes.values()), np.degrees(errors), marker="o", markersize=3.5, label=row, **line(row))
     logarithmic(axes.yaxis)
-    axes.set(xlabel=f"{leaf} [{_unit(leaf)}]", ylabel="RMSE [deg]")
+    _, field = field_at(("simulate", "loop", *leaf.split(".")))
+    unit = unit_of(field) if field is not None else ""
+    axes.set(xlabel=f"{leaf} [{unit or '1'}]", ylabel="RMSE [deg]")
     title(axes, f"error over {leaf}")
     legend_below(fig)
     return fig
-
-
-def _unit(leaf: str) -> str:
-    _, field = field_at(("simulate", "loop", *leaf.split(".")))
-    return (unit_of(field) if field is not None else "") or "1"
 
 
 def _leaves(node: Mapping[str, Any], begin: str) -> dict[str, Any]:

@@ -172,12 +172,6 @@ def answer(study: Study, repeated: Repeated, reason: str = "", advice: Sequence[
     return Answer(sentence, table, advice, "All metrics: `--all`; the motion and its figures: report.html of the run.")
 
 
-def _rests(repeated: Repeated) -> bool:
-    from wristctl.simulation.oscillation import at_rest
-
-    return at_rest(repeated.first.trajectory)
-
-
 def _faults(repeated: Repeated) -> list[str]:
     """Why the loop is no good, as what the controller does; where it does not arrive, that has a reason of its own."""
     if repeated.failure:
@@ -198,6 +192,8 @@ def _faults(repeated: Repeated) -> list[str]:
 
 def _told(repeated: Repeated) -> list[str]:
     """The main figures in words, medians of several repetitions."""
+    from wristctl.simulation.oscillation import at_rest
+
     course = repeated.first.trajectory
     values = {name: _estimate(repeated, name).median for name in _FIGURES[course.planes]}
     least = f"at most {two(values['peak_tension'])} N in a tendon"
@@ -211,7 +207,7 @@ def _told(repeated: Repeated) -> list[str]:
     parts.append(f"{degrees(values['steady_state'])} deg off at the end")
     if values["overshoot"] > _OVERSHOOT:
         parts.append(f"an overshoot of {two(values['overshoot'])} %")
-    if _rests(repeated) and not repeated.swing:
+    if at_rest(course) and not repeated.swing:
         parts.append("no swing at rest")
     return [*parts, least]
 

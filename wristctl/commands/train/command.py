@@ -187,6 +187,10 @@ def plan(study: Study, inputs: Inputs) -> str:
         source = run.id if run else "those given" if "data" in inputs else source
         whose = recordings(samples, settings)
     split = split_samples(count, settings.train_share, np.random.default_rng(0), held_out, whose)
+    shares = []
+    if split.recording is not None:
+        counts = [len(np.unique(split.recording[rows])) for rows in (split.train, split.validation, split.test)]
+        shares = [f"of {sum(counts)} recordings {counts[0]}, {counts[1]} and {counts[2]}, each whole"]
     lines = [
         f"{settings.seeds} x {row.epochs} epochs of a {'-'.join(map(str, row.hidden))} {row.activation} network"
         + (f" ({name})" if name else "")
@@ -200,7 +204,7 @@ def plan(study: Study, inputs: Inputs) -> str:
             *lines,
             f"on {source}: {len(split.train)} samples to train on, {len(split.validation)} to choose by, "
             f"{len(split.test)} to judge by",
-            *([] if split.recording is None else [_shares(split, split.recording)]),
+            *shares,
         ]
     )
 
@@ -208,13 +212,6 @@ def plan(study: Study, inputs: Inputs) -> str:
 def recordings(samples: Samples | Transitions, settings: TrainSettings) -> NDArray[np.int64] | None:
     """The recording of each sample where these are what is split, else None."""
     return samples.recording if settings.split == "recording" else None
-
-
-def _shares(split: Split, whose: NDArray[np.int64]) -> str:
-    import numpy as np
-
-    counts = [len(np.unique(whose[rows])) for rows in (split.train, split.validation, split.test)]
-    return f"of {sum(counts)} recordings {counts[0]}, {counts[1]} and {counts[2]}, each whole"
 
 
 def networks(settings: TrainSettings) -> dict[str, NetworkSettings]:

@@ -142,7 +142,7 @@ def _printed(settings: TrainSettings, name: str, measure: str) -> float | None:
 
 def best_row(trials: dict[str, list[TrainingResult]]) -> tuple[str, list[TrainingResult]]:
     """The network whose best training has the least validation loss, and all its trainings."""
-    return min(trials.items(), key=lambda item: min(_losses(item[1])))
+    return min(trials.items(), key=lambda item: min(np.nan_to_num([t.validation_loss for t in item[1]], nan=np.inf)))
 
 
 def grid_tables(findings: Findings, choice: Choice) -> list[Table]:
@@ -157,10 +157,6 @@ def grid_tables(findings: Findings, choice: Choice) -> list[Table]:
     heads = ("layers", "activation", "rate", "decay", "multiply-adds", "RMSE [deg]", "standard error [deg]")
     rows = [tuple(row) for row in shown.itertuples(index=False)]
     return [Table(f"Cross-validation: {choice.reason}", heads, rows), depth_table(findings, choice)]
-
-
-def _losses(trials: list[TrainingResult]) -> list[float]:
-    return [trial.validation_loss if math.isfinite(trial.validation_loss) else math.inf for trial in trials]
 
 
 def keep_network(session: Session, network: Network, name: str, reason: str) -> None:
